@@ -1,0 +1,314 @@
+//! The engine: one step of a planned body.
+
+use rayon::prelude::*;
+
+use super::plan::{Plan, RoleChange};
+use crate::flock::body::Body;
+use crate::flock::fracture::Break;
+use crate::flock::grid::CellGrid;
+use crate::flock::interaction::Interaction;
+use crate::flock::points::{Points, distance};
+use crate::flock::pseudo_energy::{pe1, pe2};
+use crate::flock::role::Role;
+use crate::scene::Quantity;
+use crate::solve::sweep::{Order, Sweep, Update};
+
+/// A body on its way; positions in [length, world frame], shape \[count\].
+#[derive(Debug)]
+pub struct Engine {
+    body: Body,
+    interaction: Interaction,
+    update: Update,
+    sweep: Sweep,
+    roles: Vec<Role>,
+    changes: Vec<RoleChange>,
+    leaders: Vec<Led>,
+    present: Points,
+    /// The positions before the last step; the next ones are written over them.
+    previous: Points,
+    breaks: Vec<Break>,
+    present_neighbours: Option<PresentNeighbours>,
+    step: usize,
+}
+
+/// A particle under a leader's program.
+#[derive(Clone, Copy, Debug)]
+struct Led {
+    particle: usize,
+    /// Which role change made it a leader, and its number among that change's particles.
+    change: usize,
+    which: usize,
+    /// Step before the first one led.
+    since: usize,
+    base: [f64; 2],
+}
+
+/// Buffers of a neighbourhood that is found anew at every step.
+#[derive(Clone, Debug)]
+struct PresentNeighbours {
+    radius: f64,
+    grid: CellGrid,
+    members: Vec<bool>,
+}
+
+/// How far the body moved in the last step, and whether it still is one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Movement {
+    /// Largest one-step motion [length].
+    pub largest_move: f64,
+    /// Largest distance from the reference place [length], and whose it is.
+    pub largest_displacement: f64,
+    pub farthest: usize,
+    /// First particle whose position is not finite.
+    pub lost: Option<usize>,
+}
+
+impl Engine {
+    pub fn new(plan: Plan) -> Self {
+        let Plan { body, interaction, update, present_radius, roles, changes, cuts, .. } = plan;
+        let present_neighbours = present_radius.map(|radius| PresentNeighbours {
+            radius,
+            grid: CellGrid::default(),
+            members: roles.iter().map(|role| role.is_body()).collect(),
+        });
+        let mut engine = Self {
+            sweep: Sweep::uncompiled(update, &roles),
+            present: body.reference.clone(),
+            previous: body.reference.clone(),
+            body,
+            interaction,
+            update,
+            roles,
+            changes,
+            leaders: Vec::new(),
+            breaks: cuts,
+            present_neighbours,
+            step: 0,
+        };
+        // The plan has given the roles that hold from the start; their motions begin here.
+        for change in 0..engine.changes.len() {
+            if engine.changes[change].from <= 1 && engine.changes[change].when.is_none() {
+                engine.start_leading(change, 0);
+            }
+        }
+        engine.after_role_change();
+        engine
+    }
+
+    pub fn step(&self) -> usize {
+        self.step
+    }
+
+    pub fn body(&self) -> &Body {
+        &self.body
+    }
+
+    pub fn interaction(&self) -> &Interaction {
+        &self.interaction
+    }
+
+    pub fn roles(&self) -> &[Role] {
+        &self.roles
+    }
+
+    pub fn update(&self) -> Update {
+        self.update
+    }
+
+    pub fn present(&self) -> &Points {
+        &self.present
+    }
+
+    pub fn previous(&self) -> &Points {
+        &self.previous
+    }
+
+    /// Bonds broken so far, in the order they broke.
+    pub fn breaks(&self) -> &[Break] {
+        &self.breaks
+    }
+
+    /// PE1 of one particle [length^2]; zero for the frame and for ghosts, which see nobody.
+    pub fn pe1(&self, particle: usize) -> f64 {
+        pe1(&self.interaction, particle, &self.present)
+    }
+
+    /// PE2 of one particle [length].
+    pub fn pe2(&self, particle: usize) -> f64 {
+        pe2(particle, &self.present, &self.previous)
+    }
+
+    /// Moves the body by one step.
+    pub fn advance(&mut self) {
+        self.step += 1;
+        self.take_roles();
+        self.break_bonds();
+        self.find_present_neighbours();
+        if self.update.order == Order::Sequential {
+            self.previous.clone_from(&self.present);
+        }
+        self.move_leaders();
+        self.sweep.step(&self.interaction, self.body.frame.as_ref(), &self.present, &mut self.previous);
+        std::mem::swap(&mut self.present, &mut self.previous);
+    }
+
+    /// Takes the last step back: positions as before it. Bonds that broke in it stay broken.
+    pub fn take_back(&mut self) {
+        self.step -= 1;
+        self.present.clone_from(&self.previous);
+    }
+
+    /// Whether a role change or a leader's motion is still to come, so that rest is no equilibrium.
+    pub fn is_scheduled(&self) -> bool {
+        let waits = |change: &RoleChange| change.when.is_none() && change.from > self.step.max(1);
+        self.changes.iter().any(waits)
+            || self.leaders.iter().any(|led| {
+                let duration = self.changes[led.change].motion.as_ref().map(|motion| motion.duration());
+                match duration {
+                    None => false,
+                    Some(None) => true,
+                    Some(Some(duration)) => led.since + duration > self.step,
+                }
+            })
+    }
+
+    /// Looks over the last step.
+    pub fn movement(&self) -> Movement {
+        const NONE: Movement = Movement { largest_move: 0.0, largest_displacement: 0.0, farthest: 0, lost: None };
+        let one = |i: usize| {
+            let place = self.present.get(i);
+            if !(place[0].is_finite() && place[1].is_finite()) {
+                return Movement { lost: Some(i), ..NONE };
+            }
+            Movement {
+                largest_move: distance(place, self.previous.get(i)),
+                largest_displacement: distance(place, self.body.reference.get(i)),
+                farthest: i,
+                lost: None,
+            }
+        };
+        // Largest of all and first of all do not depend on how the particles are shared out.
+        let both = |a: Movement, b: Movement| {
+            let b_is_farther = b.largest_displacement > a.largest_displacement
+                || (b.largest_displacement == a.largest_displacement && b.farthest < a.farthest);
+            Movement {
+                largest_move: a.largest_move.max(b.largest_move),
+                largest_displacement: a.largest_displacement.max(b.largest_displacement),
+                farthest: if b_is_farther { b.farthest } else { a.farthest },
+                lost: [a.lost, b.lost].into_iter().flatten().min(),
+            }
+        };
+        const SERIAL_BELOW: usize = 1 << 15;
+        (0..self.present.len())
+            .into_par_iter()
+            .with_min_len(SERIAL_BELOW)
+            .map(one)
+            .reduce(|| Movement { farthest: usize::MAX, ..NONE }, both)
+    }
+
+    fn take_roles(&mut self) {
+        let mut changed = false;
+        for change in 0..self.changes.len() {
+            let RoleChange { from, when, .. } = self.changes[change];
+            match when {
+                // Those from the start hold already.
+                None if from == self.step && from > 1 => {
+                    for which in 0..self.changes[change].particles.len() {
+                        self.take_role(change, which);
+                    }
+                    changed = true;
+                }
+                Some(condition) if from <= self.step => {
+                    for which in 0..self.changes[change].particles.len() {
+                        let particle = self.changes[change].particles[which];
+                        let takes = self.roles[particle] != self.changes[change].role
+                            && condition.holds(self.quantity(condition.quantity, particle));
+                        if takes {
+                            self.take_role(change, which);
+                            changed = true;
+                        }
+                    }
+                }
+                _ => {}
+            }
+        }
+        if changed {
+            self.after_role_change();
+        }
+    }
+
+    fn take_role(&mut self, change: usize, which: usize) {
+        let particle = self.changes[change].particles[which];
+        self.roles[particle] = self.changes[change].role;
+        self.leaders.retain(|led| led.particle != particle);
+        if self.changes[change].motion.is_some() {
+            let base = self.present.get(particle);
+            self.leaders.push(Led { particle, change, which, since: self.step - 1, base });
+        }
+    }
+
+    fn start_leading(&mut self, change: usize, since: usize) {
+        for which in 0..self.changes[change].particles.len() {
+            let particle = self.changes[change].particles[which];
+            self.leaders.retain(|led| led.particle != particle);
+            if self.changes[change].motion.is_some() {
+                let base = self.present.get(particle);
+                self.leaders.push(Led { particle, change, which, since, base });
+            }
+        }
+    }
+
+    fn after_role_change(&mut self) {
+        // Whoever is not moved any more must stand still in both buffers.
+        self.previous.clone_from(&self.present);
+        if let Some(bonds) = &mut self.interaction.bonds {
+            let places = (&self.body.reference, &self.present);
+            bonds.release_ghosts(self.step, &self.interaction.neighbours, places, &self.roles, &mut self.breaks);
+        }
+        if let Some(present) = &mut self.present_neighbours {
+            present.members = self.roles.iter().map(|role| role.is_body()).collect();
+        }
+        self.compile_sweep();
+    }
+
+    fn compile_sweep(&mut self) {
+        self.sweep = if self.present_neighbours.is_some() {
+            Sweep::uncompiled(self.update, &self.roles)
+        } else {
+            Sweep::compile(self.update, &self.interaction, &self.roles)
+        };
+    }
+
+    fn break_bonds(&mut self) {
+        let Some(bonds) = &mut self.interaction.bonds else { return };
+        let was_whole = !bonds.any_broken();
+        let places = (&self.body.reference, &self.present);
+        bonds.break_stretched(self.step, &self.interaction.neighbours, places, &self.roles, &mut self.breaks);
+        if was_whole && bonds.any_broken() {
+            self.compile_sweep();
+        }
+    }
+
+    fn find_present_neighbours(&mut self) {
+        let Some(PresentNeighbours { radius, grid, members }) = &mut self.present_neighbours else { return };
+        self.interaction.neighbours.rebuild_within(grid, &self.present, members, *radius);
+    }
+
+    fn move_leaders(&mut self) {
+        for led in &self.leaders {
+            let Some(motion) = &self.changes[led.change].motion else { continue };
+            let [dx, dy] = motion.displacement((self.step - led.since) as f64, led.which, led.base);
+            self.previous.set(led.particle, [led.base[0] + dx, led.base[1] + dy]);
+        }
+    }
+
+    fn quantity(&self, quantity: Quantity, particle: usize) -> f64 {
+        match quantity {
+            Quantity::X => self.present.x[particle],
+            Quantity::Y => self.present.y[particle],
+            Quantity::Displacement => distance(self.present.get(particle), self.body.reference.get(particle)),
+            Quantity::Pe1 => self.pe1(particle),
+            Quantity::Pe2 => self.pe2(particle),
+        }
+    }
+}

@@ -1,0 +1,64 @@
+//! What is kept of a run: whole configurations at some steps, a few particles at every step.
+
+use super::engine::Engine;
+use crate::flock::points::Points;
+use crate::flock::role::Role;
+
+/// A whole configuration at one step; arrays of shape \[count\].
+#[derive(Clone, Debug)]
+pub struct Snapshot {
+    pub step: usize,
+    /// Present positions [length, world frame].
+    pub positions: Points,
+    pub roles: Vec<Role>,
+    /// First pseudo-energy [length^2].
+    pub pe1: Vec<f64>,
+    /// Second pseudo-energy [length].
+    pub pe2: Vec<f64>,
+    /// Index pairs of the bonds broken so far.
+    pub broken: Vec<[u32; 2]>,
+}
+
+impl Snapshot {
+    pub fn of(engine: &Engine) -> Self {
+        let count = engine.present().len();
+        Self {
+            step: engine.step(),
+            positions: engine.present().clone(),
+            roles: engine.roles().to_vec(),
+            pe1: (0..count).map(|i| engine.pe1(i)).collect(),
+            pe2: (0..count).map(|i| engine.pe2(i)).collect(),
+            broken: engine.breaks().iter().map(|b| b.pair).collect(),
+        }
+    }
+
+    /// Sums of PE1 [length^2] and PE2 [length] over the body, in order of index.
+    pub fn energies(&self) -> [f64; 2] {
+        let sum = |values: &[f64]| {
+            values.iter().zip(&self.roles).filter(|(_, role)| role.is_body()).map(|(value, _)| value).sum()
+        };
+        [sum(&self.pe1), sum(&self.pe2)]
+    }
+}
+
+/// The history of one particle: entry `t` is step `t`, the start included.
+#[derive(Clone, Debug, Default)]
+pub struct ProbeSeries {
+    /// Index of the particle.
+    pub particle: usize,
+    pub positions: Points,
+    pub pe1: Vec<f64>,
+    pub pe2: Vec<f64>,
+}
+
+impl ProbeSeries {
+    pub fn new(particle: usize) -> Self {
+        Self { particle, ..Self::default() }
+    }
+
+    pub fn record(&mut self, engine: &Engine) {
+        self.positions.push(engine.present().get(self.particle));
+        self.pe1.push(engine.pe1(self.particle));
+        self.pe2.push(engine.pe2(self.particle));
+    }
+}

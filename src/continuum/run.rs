@@ -1,0 +1,126 @@
+//! The loop around the engine: until equilibrium, the last step, an interrupt or divergence.
+
+use std::ops::ControlFlow;
+
+use super::engine::{Engine, Movement};
+use super::plan::Plan;
+use crate::flock::rules::{FeedbackReference, Mean};
+use crate::solve::sweep::Order;
+
+/// Why a run ended.
+#[derive(Clone, Debug, PartialEq)]
+pub enum StopReason {
+    /// Nothing moved farther in a step than the tolerance.
+    Equilibrium,
+    /// The scene's number of steps was reached.
+    Steps,
+    /// Whoever watched asked for it.
+    Interrupted,
+    Diverged(Divergence),
+}
+
+impl StopReason {
+    pub fn name(&self) -> &'static str {
+        match self {
+            StopReason::Equilibrium => "equilibrium",
+            StopReason::Steps => "steps",
+            StopReason::Interrupted => "interrupted",
+            StopReason::Diverged(_) => "diverged",
+        }
+    }
+}
+
+/// A body that ceased to be one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Divergence {
+    /// Step at which it was seen; the engine holds the state before it.
+    pub step: usize,
+    /// Id of the particle, counted from 1.
+    pub particle: usize,
+    pub what: String,
+    pub likely_cause: String,
+}
+
+impl std::fmt::Display for Divergence {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "diverged at step {}: particle {} {}; likely cause: {}", self.step, self.particle, self.what, self.likely_cause)
+    }
+}
+
+/// How a run ended, with the engine in its last good state.
+#[derive(Debug)]
+pub struct Outcome {
+    pub engine: Engine,
+    pub reason: StopReason,
+    /// Largest one-step motion over the spacing, at the last step.
+    pub residual: f64,
+}
+
+/// Runs a plan to its end. `watch` sees the engine before the first step (with an infinite residual)
+/// and after each one, with the residual; it can break the run off.
+pub fn run(plan: Plan, watch: &mut dyn FnMut(&Engine, f64) -> ControlFlow<()>) -> Outcome {
+    let (stop, diagonal, spacing) = (plan.stop, plan.diagonal, plan.body.lattice.spacing());
+    let mut engine = Engine::new(plan);
+    let mut residual = f64::INFINITY;
+    let mut interrupted = watch(&engine, residual).is_break();
+    let reason = loop {
+        if interrupted {
+            break StopReason::Interrupted;
+        }
+        if engine.step() >= stop.steps {
+            break StopReason::Steps;
+        }
+        engine.advance();
+        let movement = engine.movement();
+        if let Some(divergence) = divergence(&engine, &movement, stop.growth * diagonal) {
+            engine.take_back();
+            break StopReason::Diverged(divergence);
+        }
+        residual = movement.largest_move / spacing;
+        interrupted = watch(&engine, residual).is_break();
+        if stop.tolerance.is_some_and(|tolerance| residual <= tolerance) && !engine.is_scheduled() {
+            break StopReason::Equilibrium;
+        }
+    };
+    Outcome { engine, reason, residual }
+}
+
+fn divergence(engine: &Engine, movement: &Movement, bound: f64) -> Option<Divergence> {
+    let (particle, what) = match movement.lost {
+        Some(lost) => (lost, "has no finite position any more".to_owned()),
+        None if movement.largest_displacement > bound => {
+            let far = movement.largest_displacement;
+            (movement.farthest, format!("is {far:.3e} from its reference place, beyond the bound {bound:.3e}"))
+        }
+        None => return None,
+    };
+    Some(Divergence { step: engine.step(), particle: particle + 1, what, likely_cause: likely_cause(engine) })
+}
+
+/// The likeliest reason, from what the rule contains.
+fn likely_cause(engine: &Engine) -> String {
+    let rule = engine.interaction().rule;
+    let damping = engine.update().damping;
+    let overshoot = rule.feedback.map(|f| (f.factor, f.reference));
+    if let Some((factor, FeedbackReference::Initial)) = overshoot {
+        return format!(
+            "feedback factor {factor}: the sweep grows once |1 + factor| times its spectral radius exceeds 1; bring the factor closer to 0"
+        );
+    }
+    if let Some((factor, FeedbackReference::Previous)) = overshoot {
+        return format!("over-relaxation by 1 + {factor} in a synchronous update; bring the factor below 0");
+    }
+    if damping > 1.0 {
+        return format!("damping = {damping} overshoots every target; use at most 1");
+    }
+    if let Some(poisson) = rule.poisson {
+        return format!("the Poisson term adds K = {} at every step; use a smaller K", poisson.k);
+    }
+    if matches!(rule.mean, Mean::Distance { .. }) && engine.update().order == Order::Synchronous {
+        return "weights that grow with distance are marginal in a synchronous update; use update.order = \"sequential\" or update.damping = 0.5".into();
+    }
+    if engine.interaction().weights.is_some() {
+        return "weights of both signs; give weights that are not negative".into();
+    }
+    "a leader leaves the body behind; check the leaders' motions, or raise stop.growth".into()
+}

@@ -1,0 +1,256 @@
+//! A body: the sites of a lattice inside a shape, numbered, with the frame around them.
+
+use super::frame::{Frame, FrameRule};
+use super::lattice::{Lattice, Site};
+use super::neighbourhood::{Neighbourhood, NeighbourhoodError, Neighbours};
+use super::points::Points;
+use super::shape::Shape;
+
+/// What is cut from the lattice.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Cut {
+    /// A rectangle by count: `columns` sites in a row, `rows` rows, from site (0, 0).
+    Count { columns: u32, rows: u32 },
+    /// The sites inside a shape.
+    Shape(Shape),
+}
+
+/// Why no body can be made.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum BodyError {
+    #[error("the shape holds no lattice site: the lattice's spacing is {spacing}, the shape measures {width} by {height}")]
+    Empty { spacing: f64, width: f64, height: f64 },
+    #[error("the body would have more than {limit} lattice sites in its bounds")]
+    TooLarge { limit: u64 },
+    #[error(
+        "the body falls into {parts} parts that are no neighbours of each other: particle {first} and particle {second} are not connected"
+    )]
+    Disconnected { parts: usize, first: usize, second: usize },
+    #[error(transparent)]
+    Neighbourhood(#[from] NeighbourhoodError),
+}
+
+/// Particles in the paper's numbering: column by column, from the bottom, the frame included.
+/// Indices count from 0 here and ids from 1 in files and messages.
+#[derive(Clone, Debug)]
+pub struct Body {
+    pub lattice: Lattice,
+    /// Column and row of each particle, shape \[count\].
+    pub sites: Vec<Site>,
+    /// Reference positions [length], shape \[count\].
+    pub reference: Points,
+    /// Whether the particle belongs to the frame, shape \[count\].
+    pub is_frame: Vec<bool>,
+    pub neighbours: Neighbours,
+    pub frame: Option<Frame>,
+}
+
+/// More lattice sites than this are refused before memory is asked for.
+const MOST_SITES: u64 = 1 << 28;
+
+impl Body {
+    /// Cuts the body, adds the frame where a rule for it is given, and lists the neighbours.
+    pub fn build(
+        lattice: Lattice,
+        cut: &Cut,
+        neighbourhood: &Neighbourhood,
+        frame: Option<FrameRule>,
+    ) -> Result<Self, BodyError> {
+        let offsets = neighbourhood.offsets(&lattice)?;
+        let mut shell = offsets.clone();
+        if frame.is_some() {
+            // The corners of a rectangle touch no edge particle, yet the paper numbers them.
+            let corners = lattice.cell_corners();
+            shell.iter_mut().for_each(|offsets| offsets.extend(&corners));
+        }
+        let margin = if frame.is_some() { reach(&shell) } else { [0, 0] };
+        let mut map = SiteMap::cut(&lattice, cut, margin)?;
+        if frame.is_some() {
+            map.mark_frame(&lattice, &shell);
+        }
+        let (sites, is_frame) = map.number();
+        let reference: Points = sites.iter().map(|&site| lattice.position(site)).collect();
+        let map = &map;
+        let neighbours = Neighbours::from_lists(sites.iter().zip(&is_frame).map(|(&site, &is_frame)| {
+            let offsets: &[Site] = if is_frame { &[] } else { &offsets[lattice.sublattice(site)] };
+            offsets.iter().filter_map(move |offset| map.index([site[0] + offset[0], site[1] + offset[1]]))
+        }));
+        let frame = frame.map(|rule| Frame::build(rule, &lattice, &sites, &is_frame, |site| map.index(site)));
+        Ok(Self { lattice, sites, reference, is_frame, neighbours, frame })
+    }
+
+    pub fn count(&self) -> usize {
+        self.sites.len()
+    }
+
+    /// Refuses a body some of whose particles cannot feel each other through any chain of
+    /// neighbours.
+    pub fn require_connected(&self) -> Result<(), BodyError> {
+        let labels = self.components();
+        let body = |&i: &usize| !self.is_frame[i];
+        let first = (0..self.count()).find(body).unwrap_or(0);
+        match (0..self.count()).filter(body).find(|&i| labels[i] != labels[first]) {
+            None => Ok(()),
+            Some(second) => {
+                let mut parts: Vec<u32> = (0..self.count()).filter(body).map(|i| labels[i]).collect();
+                parts.sort_unstable();
+                parts.dedup();
+                Err(BodyError::Disconnected { parts: parts.len(), first: first + 1, second: second + 1 })
+            }
+        }
+    }
+
+    /// Label of the connected part each particle belongs to, neighbour relations taken both ways and
+    /// the frame left out, shape \[count\].
+    pub fn components(&self) -> Vec<u32> {
+        let mut parent: Vec<u32> = (0..self.count() as u32).collect();
+        fn root(parent: &mut [u32], mut i: u32) -> u32 {
+            while parent[i as usize] != i {
+                parent[i as usize] = parent[parent[i as usize] as usize];
+                i = parent[i as usize];
+            }
+            i
+        }
+        for i in 0..self.count() {
+            for &k in self.neighbours.of(i).iter().filter(|&&k| !self.is_frame[k as usize]) {
+                let (a, b) = (root(&mut parent, i as u32), root(&mut parent, k));
+                parent[a.max(b) as usize] = a.min(b);
+            }
+        }
+        (0..self.count() as u32).map(|i| root(&mut parent, i)).collect()
+    }
+}
+
+/// Farthest column and row any offset reaches.
+fn reach(shell: &[Vec<Site>]) -> Site {
+    shell.iter().flatten().fold([0, 0], |far, o| [far[0].max(o[0].abs()), far[1].max(o[1].abs())])
+}
+
+const NOTHING: u32 = u32::MAX;
+const BODY: u32 = u32::MAX - 1;
+const FRAME: u32 = u32::MAX - 2;
+
+/// A window of the integer grid: what stands at each pair of integers, then its particle's index.
+struct SiteMap {
+    low: Site,
+    columns: i64,
+    rows: i64,
+    cells: Vec<u32>,
+}
+
+impl SiteMap {
+    fn cut(lattice: &Lattice, cut: &Cut, margin: Site) -> Result<Self, BodyError> {
+        let (low, high) = window(lattice, cut)?;
+        let low = [low[0] - margin[0], low[1] - margin[1]];
+        let (columns, rows) =
+            (i64::from(high[0] + margin[0] - low[0]) + 1, i64::from(high[1] + margin[1] - low[1]) + 1);
+        if columns as u64 * rows as u64 > MOST_SITES {
+            return Err(BodyError::TooLarge { limit: MOST_SITES });
+        }
+        let mut map = Self { low, columns, rows, cells: vec![NOTHING; (columns * rows) as usize] };
+        let tolerance = 1e-9 * lattice.spacing();
+        let mut found = false;
+        for cell in 0..map.cells.len() {
+            let site = map.site(cell);
+            let inside = lattice.is_site(site)
+                && match cut {
+                    Cut::Count { columns, rows } => {
+                        let steps = columns_per_site(lattice);
+                        let within = |value: i32, most: u32| value >= 0 && i64::from(value) < i64::from(most);
+                        within(site[0], steps * columns) && within(site[1], *rows)
+                    }
+                    Cut::Shape(shape) => shape.contains(lattice.position(site), tolerance),
+                };
+            if inside {
+                map.cells[cell] = BODY;
+                found = true;
+            }
+        }
+        if found {
+            return Ok(map);
+        }
+        let (low, high) = match cut {
+            Cut::Shape(shape) => shape.bounds(),
+            Cut::Count { .. } => ([0.0; 2], [0.0; 2]),
+        };
+        Err(BodyError::Empty { spacing: lattice.spacing(), width: high[0] - low[0], height: high[1] - low[1] })
+    }
+
+    /// Marks every site that a body particle reaches and that is no body particle.
+    fn mark_frame(&mut self, lattice: &Lattice, shell: &[Vec<Site>]) {
+        for cell in (0..self.cells.len()).filter(|&cell| self.cells[cell] == BODY).collect::<Vec<_>>() {
+            let site = self.site(cell);
+            for offset in &shell[lattice.sublattice(site)] {
+                let there = [site[0] + offset[0], site[1] + offset[1]];
+                if let Some(cell) = self.cell(there)
+                    && self.cells[cell] == NOTHING
+                    && lattice.is_site(there)
+                {
+                    self.cells[cell] = FRAME;
+                }
+            }
+        }
+    }
+
+    /// Numbers what was marked, column by column from the bottom.
+    fn number(&mut self) -> (Vec<Site>, Vec<bool>) {
+        let (mut sites, mut is_frame) = (Vec::new(), Vec::new());
+        for cell in 0..self.cells.len() {
+            let mark = self.cells[cell];
+            if mark != NOTHING {
+                self.cells[cell] = sites.len() as u32;
+                sites.push(self.site(cell));
+                is_frame.push(mark == FRAME);
+            }
+        }
+        (sites, is_frame)
+    }
+
+    fn index(&self, site: Site) -> Option<u32> {
+        self.cell(site).map(|cell| self.cells[cell]).filter(|&index| index != NOTHING)
+    }
+
+    fn site(&self, cell: usize) -> Site {
+        [self.low[0] + (cell as i64 / self.rows) as i32, self.low[1] + (cell as i64 % self.rows) as i32]
+    }
+
+    fn cell(&self, [i, j]: Site) -> Option<usize> {
+        let (column, row) = (i64::from(i) - i64::from(self.low[0]), i64::from(j) - i64::from(self.low[1]));
+        let inside = (0..self.columns).contains(&column) && (0..self.rows).contains(&row);
+        inside.then_some((column * self.rows + row) as usize)
+    }
+}
+
+/// Grid columns from one site of a row to the next.
+fn columns_per_site(lattice: &Lattice) -> u32 {
+    if lattice.is_site([1, 0]) { 1 } else { 2 }
+}
+
+/// Lowest and highest integer pair whose position can lie in the cut.
+fn window(lattice: &Lattice, cut: &Cut) -> Result<(Site, Site), BodyError> {
+    match cut {
+        Cut::Count { columns, rows } => {
+            let too_large = BodyError::TooLarge { limit: MOST_SITES };
+            let across = u64::from(columns_per_site(lattice)) * u64::from(*columns);
+            if across.saturating_mul(u64::from(*rows)) > MOST_SITES {
+                return Err(too_large);
+            }
+            Ok(([0, 0], [across.saturating_sub(1) as i32, rows.saturating_sub(1) as i32]))
+        }
+        Cut::Shape(shape) => {
+            let (low, high) = shape.bounds();
+            let corners = [low, [high[0], low[1]], high, [low[0], high[1]]].map(|corner| lattice.grid_coordinates(corner));
+            let extreme = |k: usize, pick: fn(f64, f64) -> f64, start: f64| {
+                corners.iter().map(|corner| corner[k]).fold(start, pick)
+            };
+            let lows = [0, 1].map(|k| extreme(k, f64::min, f64::INFINITY).floor() - 1.0);
+            let highs = [0, 1].map(|k| extreme(k, f64::max, f64::NEG_INFINITY).ceil() + 1.0);
+            let cells = (highs[0] - lows[0] + 1.0) * (highs[1] - lows[1] + 1.0);
+            let in_range = lows.iter().chain(&highs).all(|v| v.abs() < 1e9);
+            if !(in_range && cells <= MOST_SITES as f64) {
+                return Err(BodyError::TooLarge { limit: MOST_SITES });
+            }
+            Ok((lows.map(|v| v as i32), highs.map(|v| v as i32)))
+        }
+    }
+}

@@ -1,0 +1,240 @@
+//! Fracture (the paper's Choices 5 and 6): a pair stretched past a threshold never influences each
+//! other again, and ghosts stand in for what was lost.
+
+use super::neighbourhood::Neighbours;
+use super::points::{Points, distance};
+use super::role::Role;
+use super::shape::segments_cross;
+
+/// When a bond breaks.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Threshold {
+    /// Longer than this (the paper's `df`) [length].
+    Distance(f64),
+    /// Longer than this multiple of its reference length [1].
+    Stretch(f64),
+}
+
+impl Threshold {
+    /// Whether a bond of reference length `rest` breaks at `length` [length].
+    pub fn is_passed(self, length: f64, rest: f64) -> bool {
+        match self {
+            Threshold::Distance(df) => length > df,
+            Threshold::Stretch(ratio) => length > ratio * rest,
+        }
+    }
+}
+
+/// What a particle sees in the place of a neighbour it has lost.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ghosts {
+    /// A point at the original lattice offset from the particle's present position: the fragment
+    /// recovers the shape of the lattice.
+    Lattice,
+    /// The mirror image of the opposite neighbour through the particle; where there is none, as
+    /// `Lattice`.
+    Mirrored,
+    /// Nothing: the mean runs over whoever is left (the literal formula, which draws the flanks of a
+    /// crack together).
+    None,
+}
+
+/// A bond that broke.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Break {
+    pub step: usize,
+    /// Indices of the two particles, the lower first.
+    pub pair: [u32; 2],
+    /// Middle of the bond in the reference configuration [length].
+    pub place: [f64; 2],
+    /// Length at which it broke [length]; its present length for bonds cut or lost otherwise.
+    pub length: f64,
+}
+
+/// Which bonds are broken, parallel to [`Neighbours::index`].
+#[derive(Clone, Debug)]
+pub struct Bonds {
+    pub threshold: Option<Threshold>,
+    pub ghosts: Ghosts,
+    broken: Vec<bool>,
+    any_broken: bool,
+}
+
+impl Bonds {
+    pub fn new(threshold: Option<Threshold>, ghosts: Ghosts, neighbours: &Neighbours) -> Self {
+        Self { threshold, ghosts, broken: vec![false; neighbours.index.len()], any_broken: false }
+    }
+
+    pub fn is_broken(&self, bond: usize) -> bool {
+        self.broken[bond]
+    }
+
+    pub fn any_broken(&self) -> bool {
+        self.any_broken
+    }
+
+    /// Breaks every live bond past the threshold and appends it, once per pair, to `breaks`.
+    /// Bonds to the frame never break: it is no matter.
+    pub fn break_stretched(
+        &mut self,
+        step: usize,
+        neighbours: &Neighbours,
+        (reference, present): (&Points, &Points),
+        roles: &[Role],
+        breaks: &mut Vec<Break>,
+    ) {
+        let Some(threshold) = self.threshold else { return };
+        self.break_where(step, neighbours, (reference, present), breaks, |j, k| {
+            let length = distance(present.get(j), present.get(k));
+            roles[k].is_body() && threshold.is_passed(length, distance(reference.get(j), reference.get(k)))
+        });
+    }
+
+    /// Breaks every bond whose reference segment crosses the cut from `from` to `to` [length].
+    pub fn cut(
+        &mut self,
+        (from, to): ([f64; 2], [f64; 2]),
+        neighbours: &Neighbours,
+        reference: &Points,
+        breaks: &mut Vec<Break>,
+    ) {
+        self.break_where(0, neighbours, (reference, reference), breaks, |j, k| {
+            segments_cross(reference.get(j), reference.get(k), from, to)
+        });
+    }
+
+    /// Breaks every bond to a particle that has become a ghost.
+    pub fn release_ghosts(
+        &mut self,
+        step: usize,
+        neighbours: &Neighbours,
+        (reference, present): (&Points, &Points),
+        roles: &[Role],
+        breaks: &mut Vec<Break>,
+    ) {
+        self.break_where(step, neighbours, (reference, present), breaks, |j, k| {
+            roles[j] == Role::Ghost || roles[k] == Role::Ghost
+        });
+    }
+
+    fn break_where(
+        &mut self,
+        step: usize,
+        neighbours: &Neighbours,
+        (reference, present): (&Points, &Points),
+        breaks: &mut Vec<Break>,
+        breaks_now: impl Fn(usize, usize) -> bool,
+    ) {
+        for j in 0..neighbours.count() {
+            for bond in neighbours.bonds(j) {
+                let k = neighbours.index[bond] as usize;
+                if self.broken[bond] || !breaks_now(j, k) {
+                    continue;
+                }
+                self.broken[bond] = true;
+                self.any_broken = true;
+                // Seen from both ends where both list it, recorded from the lower one.
+                if j < k || !neighbours.of(k).contains(&(j as u32)) {
+                    let (a, b) = (reference.get(j), reference.get(k));
+                    breaks.push(Break {
+                        step,
+                        pair: [j.min(k) as u32, j.max(k) as u32],
+                        place: [(a[0] + b[0]) / 2.0, (a[1] + b[1]) / 2.0],
+                        length: distance(present.get(j), present.get(k)),
+                    });
+                }
+            }
+        }
+    }
+
+    /// Where particle `j` sees the ghost of the neighbour at the other end of `bond`, if it does
+    /// [length].
+    pub fn ghost(
+        &self,
+        j: usize,
+        bond: usize,
+        neighbours: &Neighbours,
+        reference: &Points,
+        present: &Points,
+    ) -> Option<[f64; 2]> {
+        let offset = |k: usize| {
+            [reference.x[k] - reference.x[j], reference.y[k] - reference.y[j]]
+        };
+        let lost = offset(neighbours.index[bond] as usize);
+        let here = present.get(j);
+        let at_lattice_offset = [here[0] + lost[0], here[1] + lost[1]];
+        match self.ghosts {
+            Ghosts::None => None,
+            Ghosts::Lattice => Some(at_lattice_offset),
+            Ghosts::Mirrored => {
+                let size = lost[0].hypot(lost[1]);
+                let opposite = neighbours.bonds(j).filter(|&other| !self.broken[other]).find_map(|other| {
+                    let k = neighbours.index[other] as usize;
+                    let [x, y] = offset(k);
+                    ((x + lost[0]).hypot(y + lost[1]) <= 1e-6 * size).then_some(k)
+                });
+                Some(opposite.map_or(at_lattice_offset, |k| {
+                    [2.0 * here[0] - present.x[k], 2.0 * here[1] - present.y[k]]
+                }))
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Three particles in a row; the outer two see the middle one, which sees both.
+    fn row() -> (Neighbours, Points) {
+        let neighbours = Neighbours::from_lists([vec![1], vec![0, 2], vec![1]]);
+        (neighbours, [[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]].into_iter().collect())
+    }
+
+    #[test]
+    fn a_bond_past_the_distance_breaks_once_and_for_both() {
+        let (neighbours, reference) = row();
+        let mut bonds = Bonds::new(Some(Threshold::Distance(1.5)), Ghosts::None, &neighbours);
+        let mut present = reference.clone();
+        present.x[2] = 3.0;
+        let mut breaks = Vec::new();
+        let roles = [Role::Follower; 3];
+        bonds.break_stretched(4, &neighbours, (&reference, &present), &roles, &mut breaks);
+        bonds.break_stretched(5, &neighbours, (&reference, &reference), &roles, &mut breaks);
+        assert_eq!(breaks, [Break { step: 4, pair: [1, 2], place: [1.5, 0.0], length: 2.0 }]);
+        assert_eq!((0..4).map(|b| bonds.is_broken(b)).collect::<Vec<_>>(), [false, false, true, true]);
+    }
+
+    #[test]
+    fn a_stretch_threshold_is_relative_to_the_bond() {
+        assert!(Threshold::Stretch(1.5).is_passed(3.1, 2.0));
+        assert!(!Threshold::Stretch(1.5).is_passed(2.9, 2.0));
+    }
+
+    #[test]
+    fn each_kind_of_ghost_stands_in_its_own_place() {
+        let (neighbours, reference) = row();
+        let mut present = reference.clone();
+        present.x[0] = -0.5;
+        present.x[1] = 1.25;
+        let ghost = |ghosts| {
+            let mut bonds = Bonds::new(None, ghosts, &neighbours);
+            bonds.cut(([1.5, -1.0], [1.5, 1.0]), &neighbours, &reference, &mut Vec::new());
+            bonds.ghost(1, 2, &neighbours, &reference, &present)
+        };
+        assert_eq!(ghost(Ghosts::Lattice), Some([2.25, 0.0]));
+        assert_eq!(ghost(Ghosts::Mirrored), Some([3.0, 0.0]));
+        assert_eq!(ghost(Ghosts::None), None);
+    }
+
+    #[test]
+    fn a_ghost_loses_all_its_bonds() {
+        let (neighbours, reference) = row();
+        let mut bonds = Bonds::new(None, Ghosts::Lattice, &neighbours);
+        let roles = [Role::Follower, Role::Ghost, Role::Follower];
+        let mut breaks = Vec::new();
+        bonds.release_ghosts(2, &neighbours, (&reference, &reference), &roles, &mut breaks);
+        assert_eq!(breaks.len(), 2);
+        assert!((0..4).all(|b| bonds.is_broken(b)));
+    }
+}

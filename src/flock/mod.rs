@@ -1,0 +1,25 @@
+//! The core: particles, lattices, neighbourhoods and the flocking rule.
+//!
+//! Pure computation: no input or output, no clock, no threads of its own, no other room of this
+//! crate. A [`body::Body`] is cut from a lattice; an [`interaction::Interaction`] says who sees whom
+//! through which rule; its `target` is the function that moves particles and robots alike.
+//!
+//! Source: R. dell'Erba, "Flocking rules governing swarm robot as tool to describe continuum
+//! deformation", 2021, doi 10.1007/978-3-030-53755-5_14 ("the paper" throughout).
+
+pub mod body;
+pub mod fracture;
+pub mod frame;
+pub mod grid;
+pub mod interaction;
+pub mod lattice;
+pub mod motion;
+pub mod neighbourhood;
+pub mod points;
+pub mod pseudo_energy;
+pub mod region;
+pub mod role;
+pub mod rules;
+pub mod shape;
+pub mod specimen;
+pub mod stencil;

@@ -1,0 +1,188 @@
+//! Whose positions a particle sees (the paper's Choice 2).
+
+use super::grid::CellGrid;
+use super::lattice::{Lattice, Site, ring};
+use super::points::Points;
+
+/// How the neighbours of a particle are chosen.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Neighbourhood {
+    /// The first `nc`, `nc` being the lattice's coordination number; `keep` reduces them, dropping
+    /// from the end of the order of [`Lattice::offsets_within`].
+    First { keep: Option<usize> },
+    /// All sites within `radius` primitive cells each way: 8 for radius 1, 24 for radius 2.
+    Ring { radius: i32 },
+    /// The first neighbours and theirs (the paper's second gradient).
+    Second,
+    /// The sites at these offsets, in columns and rows.
+    Offsets(Vec<Site>),
+    /// The sites within this distance in the reference configuration [length].
+    Within { radius: f64 },
+    /// Whoever is within this distance now [length]: the paper's liquid and gas.
+    Present { radius: f64 },
+}
+
+/// Why a neighbourhood cannot be laid on a lattice.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum NeighbourhoodError {
+    #[error("the {lattice} lattice has {coordination} first neighbours, {keep} cannot be kept")]
+    TooMany { lattice: &'static str, coordination: usize, keep: usize },
+    #[error("offset [{}, {}] leads from a {lattice} site to a place that is no site", .offset[0], .offset[1])]
+    NoSite { lattice: &'static str, offset: Site },
+    #[error("a honeycomb has no Chebyshev ring: its sites are no translations of each other")]
+    RingOnHoneycomb,
+    #[error("no site lies within {radius} of another: the nearest is {spacing} away")]
+    TooSmall { radius: f64, spacing: f64 },
+}
+
+impl Neighbourhood {
+    /// Offsets to the neighbours of a site, for each sublattice, in summation order; empty for
+    /// [`Neighbourhood::Present`], whose neighbours are no function of the lattice.
+    pub fn offsets(&self, lattice: &Lattice) -> Result<Vec<Vec<Site>>, NeighbourhoodError> {
+        (0..lattice.sublattices()).map(|sublattice| self.offsets_of(lattice, sublattice)).collect()
+    }
+
+    fn offsets_of(&self, lattice: &Lattice, sublattice: usize) -> Result<Vec<Site>, NeighbourhoodError> {
+        let first = || lattice.first_neighbours(sublattice);
+        let mut offsets = match self {
+            Neighbourhood::First { keep: None } => first(),
+            Neighbourhood::First { keep: Some(keep) } => {
+                let mut offsets = first();
+                if *keep > offsets.len() {
+                    return Err(NeighbourhoodError::TooMany {
+                        lattice: lattice.name(),
+                        coordination: offsets.len(),
+                        keep: *keep,
+                    });
+                }
+                offsets.truncate(*keep);
+                offsets
+            }
+            Neighbourhood::Ring { .. } if lattice.sublattices() > 1 => {
+                return Err(NeighbourhoodError::RingOnHoneycomb);
+            }
+            Neighbourhood::Ring { radius } => ring(&lattice.primitive(), *radius),
+            Neighbourhood::Second => neighbours_of_neighbours(lattice, sublattice),
+            Neighbourhood::Offsets(offsets) => {
+                let base = lattice.site_of_sublattice(sublattice);
+                if let Some(&offset) =
+                    offsets.iter().find(|o| !lattice.is_site([base[0] + o[0], base[1] + o[1]]))
+                {
+                    return Err(NeighbourhoodError::NoSite { lattice: lattice.name(), offset });
+                }
+                // The user's order is kept: it is the order of summation.
+                return Ok(offsets.clone());
+            }
+            Neighbourhood::Within { radius } => {
+                let offsets = lattice.offsets_within(sublattice, *radius);
+                if offsets.is_empty() {
+                    return Err(NeighbourhoodError::TooSmall { radius: *radius, spacing: lattice.spacing() });
+                }
+                offsets
+            }
+            Neighbourhood::Present { .. } => Vec::new(),
+        };
+        lattice.sort_nearest_first(&mut offsets);
+        Ok(offsets)
+    }
+}
+
+fn neighbours_of_neighbours(lattice: &Lattice, sublattice: usize) -> Vec<Site> {
+    let base = lattice.site_of_sublattice(sublattice);
+    let first = lattice.first_neighbours(sublattice);
+    let mut offsets = first.clone();
+    for near in first {
+        let there = lattice.sublattice([base[0] + near[0], base[1] + near[1]]);
+        offsets.extend(lattice.first_neighbours(there).iter().map(|far| [near[0] + far[0], near[1] + far[1]]));
+    }
+    offsets.sort_unstable();
+    offsets.dedup();
+    offsets.retain(|&offset| offset != [0, 0]);
+    offsets
+}
+
+/// Neighbour lists in compressed rows: particle `j` sees `index[starts[j]..starts[j + 1]]`, in
+/// summation order. Shapes: `starts` \[count + 1\], `index` \[bonds\].
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Neighbours {
+    pub starts: Vec<u32>,
+    pub index: Vec<u32>,
+}
+
+impl Neighbours {
+    pub fn from_lists(lists: impl IntoIterator<Item = impl IntoIterator<Item = u32>>) -> Self {
+        let mut neighbours = Self { starts: vec![0], index: Vec::new() };
+        for list in lists {
+            neighbours.index.extend(list);
+            neighbours.starts.push(neighbours.index.len() as u32);
+        }
+        neighbours
+    }
+
+    pub fn count(&self) -> usize {
+        self.starts.len().saturating_sub(1)
+    }
+
+    /// Where the bonds of `particle` lie in `index` and in every array parallel to it.
+    pub fn bonds(&self, particle: usize) -> std::ops::Range<usize> {
+        self.starts[particle] as usize..self.starts[particle + 1] as usize
+    }
+
+    pub fn of(&self, particle: usize) -> &[u32] {
+        &self.index[self.bonds(particle)]
+    }
+
+    /// Rebuilds the lists as whoever of the `members` is within `radius` now, in order of index.
+    /// Reuses the buffers: no allocation once they have grown.
+    pub fn rebuild_within(&mut self, grid: &mut CellGrid, present: &Points, members: &[bool], radius: f64) {
+        grid.fill(present, members, radius);
+        self.starts.clear();
+        self.index.clear();
+        self.starts.push(0);
+        for particle in 0..present.len() {
+            if members[particle] {
+                let begin = self.index.len();
+                grid.within(present, particle, radius, &mut self.index);
+                // Index order, so that the sum does not depend on how the cells were walked.
+                self.index[begin..].sort_unstable();
+            }
+            self.starts.push(self.index.len() as u32);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::lattice::LatticeKind;
+    use super::*;
+
+    fn count(kind: LatticeKind, neighbourhood: Neighbourhood) -> Vec<usize> {
+        let lattice = Lattice::new(kind, [0.0, 0.0], 0.0);
+        neighbourhood.offsets(&lattice).expect("fits").iter().map(Vec::len).collect()
+    }
+
+    #[test]
+    fn the_counts_are_those_of_the_paper() {
+        let square = LatticeKind::Square { spacing: 1.0 };
+        let hexagonal = LatticeKind::Hexagonal { spacing: 1.0 };
+        let honeycomb = LatticeKind::Honeycomb { spacing: 1.0 };
+        assert_eq!(count(square, Neighbourhood::First { keep: None }), [4]);
+        assert_eq!(count(square, Neighbourhood::Second), [12]);
+        assert_eq!(count(square, Neighbourhood::Ring { radius: 1 }), [8]);
+        assert_eq!(count(square, Neighbourhood::Ring { radius: 2 }), [24]);
+        assert_eq!(count(hexagonal, Neighbourhood::Second), [18]);
+        assert_eq!(count(hexagonal, Neighbourhood::First { keep: Some(5) }), [5]);
+        assert_eq!(count(honeycomb, Neighbourhood::Second), [9, 9]);
+        assert_eq!(count(square, Neighbourhood::Within { radius: 1.5 }), [8]);
+    }
+
+    #[test]
+    fn what_does_not_fit_the_lattice_is_refused() {
+        let honeycomb = Lattice::new(LatticeKind::Honeycomb { spacing: 1.0 }, [0.0, 0.0], 0.0);
+        let refused = |n: Neighbourhood| n.offsets(&honeycomb).expect_err("refused");
+        assert_eq!(refused(Neighbourhood::Ring { radius: 1 }), NeighbourhoodError::RingOnHoneycomb);
+        assert!(matches!(refused(Neighbourhood::First { keep: Some(4) }), NeighbourhoodError::TooMany { .. }));
+        assert!(matches!(refused(Neighbourhood::Offsets(vec![[1, 0]])), NeighbourhoodError::NoSite { .. }));
+        assert!(matches!(refused(Neighbourhood::Within { radius: 0.5 }), NeighbourhoodError::TooSmall { .. }));
+    }
+}

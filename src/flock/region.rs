@@ -1,0 +1,66 @@
+//! Regions pick particles of a body, by where they are in the reference configuration.
+
+use super::body::Body;
+
+/// Which particles; the frame is never picked.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Region {
+    All,
+    /// The particles within `depth` [length] of the body's outermost coordinate on that side.
+    Edge { side: Side, depth: f64 },
+    /// The particles in this box, its boundary included [length].
+    Box { min: [f64; 2], max: [f64; 2] },
+    Disc { centre: [f64; 2], radius: f64 },
+    /// The particles with these ids, counted from 1.
+    Ids(Vec<usize>),
+    /// Every particle that lacks a neighbour: the outline of the body, holes included.
+    Boundary,
+}
+
+/// A side of a body.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Side {
+    Left,
+    Right,
+    Bottom,
+    Top,
+}
+
+impl Region {
+    /// Indices of the particles of `body` in the region, ascending.
+    pub fn pick(&self, body: &Body) -> Vec<usize> {
+        let tolerance = 1e-9 * body.lattice.spacing();
+        let matter = (0..body.count()).filter(|&i| !body.is_frame[i]);
+        let place = |i: usize| body.reference.get(i);
+        match self {
+            Region::All => matter.collect(),
+            Region::Edge { side, depth } => {
+                let Some((low, high)) = body.reference.bounds(matter.clone()) else { return Vec::new() };
+                let depth = depth + tolerance;
+                matter
+                    .filter(|&i| match side {
+                        Side::Left => place(i)[0] - low[0] <= depth,
+                        Side::Right => high[0] - place(i)[0] <= depth,
+                        Side::Bottom => place(i)[1] - low[1] <= depth,
+                        Side::Top => high[1] - place(i)[1] <= depth,
+                    })
+                    .collect()
+            }
+            Region::Box { min, max } => matter
+                .filter(|&i| (0..2).all(|k| place(i)[k] >= min[k] - tolerance && place(i)[k] <= max[k] + tolerance))
+                .collect(),
+            Region::Disc { centre, radius } => matter
+                .filter(|&i| super::points::distance(place(i), *centre) <= radius + tolerance)
+                .collect(),
+            Region::Ids(ids) => matter.filter(|i| ids.contains(&(i + 1))).collect(),
+            Region::Boundary => {
+                let complete = matter.clone().map(|i| body.neighbours.of(i).len()).max().unwrap_or(0);
+                let lacks = |i: usize| {
+                    let neighbours = body.neighbours.of(i);
+                    neighbours.len() < complete || neighbours.iter().any(|&k| body.is_frame[k as usize])
+                };
+                matter.filter(|&i| lacks(i)).collect()
+            }
+        }
+    }
+}

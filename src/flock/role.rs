@@ -1,0 +1,35 @@
+//! What a particle does at a step.
+
+/// The kinds of particle (the paper, section 2, with `Clamped` set apart from `Leader`).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Role {
+    /// Takes the position the rule computes from its neighbours.
+    Follower,
+    /// Moved from outside; followers react to it.
+    Leader,
+    /// A leader that does not move.
+    Clamped,
+    /// Part of the shell that gives edge particles their full neighbourhood; moved by the frame rule.
+    Frame,
+    /// Out of the body: it holds its place and every bond to it is broken.
+    Ghost,
+}
+
+impl Role {
+    pub const ALL: [Role; 5] = [Role::Follower, Role::Leader, Role::Clamped, Role::Frame, Role::Ghost];
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Role::Follower => "follower",
+            Role::Leader => "leader",
+            Role::Clamped => "clamped",
+            Role::Frame => "frame",
+            Role::Ghost => "ghost",
+        }
+    }
+
+    /// Whether the particle is matter: part of the body rather than scaffolding around it.
+    pub fn is_body(self) -> bool {
+        matches!(self, Role::Follower | Role::Leader | Role::Clamped)
+    }
+}

@@ -1,0 +1,54 @@
+//! Feedback, the paper's Eq. 4: `x_j = b + fd (b - MT_j)`, `b` being the target so far.
+//!
+//! With `MT` the initial position the displacement obeys d' = (1 + fd) W d, so the body oscillates or
+//! grows as soon as |1 + fd| times the spectral radius of the sweep exceeds 1. With `MT` the
+//! previous position it is over-relaxation by the factor 1 + fd.
+
+use super::Own;
+
+/// What `MT` in Eq. 4 is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FeedbackReference {
+    /// The position in the reference configuration (the paper's `MT(j, t0)`).
+    Initial,
+    /// The position before this step.
+    Previous,
+}
+
+/// Eq. 4 with its parameters.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Feedback {
+    /// Feedback factor `fd` [1].
+    pub factor: f64,
+    pub reference: FeedbackReference,
+}
+
+impl Feedback {
+    /// Moves the target past itself.
+    pub fn overshoot(&self, own: &Own, target: &mut [f64; 2]) {
+        let from = match self.reference {
+            FeedbackReference::Initial => own.reference,
+            FeedbackReference::Previous => own.present,
+        };
+        for k in 0..2 {
+            target[k] += self.factor * (target[k] - from[k]);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_two_references_overshoot_from_different_places() {
+        let own = Own { present: [1.0, 0.0], reference: [0.0, 0.0], rest: [0.0; 2] };
+        let overshoot = |reference| {
+            let mut target = [3.0, 0.0];
+            Feedback { factor: 0.5, reference }.overshoot(&own, &mut target);
+            target[0]
+        };
+        assert_eq!(overshoot(FeedbackReference::Initial), 4.5);
+        assert_eq!(overshoot(FeedbackReference::Previous), 4.0);
+    }
+}

@@ -1,0 +1,178 @@
+//! The flocking rule: neighbours in, target position out (the paper's Choice 3).
+//!
+//! [`Rule::target`] is the one function that moves a particle of a body and a robot of a swarm. A
+//! rule is a mean of the neighbours' positions and, where the scene names them, terms added to it:
+//! the rest offset, the Poisson term (Eq. 2) and feedback (Eq. 4), in that order. Each stands in a
+//! file of its own.
+
+mod barycentre;
+mod distance;
+mod feedback;
+mod poisson;
+mod power;
+mod spaced;
+
+pub use feedback::{Feedback, FeedbackReference};
+pub use poisson::{Axis, Poisson};
+pub use power::Origin;
+
+/// One neighbour as a rule sees it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Neighbour {
+    /// Present position [length, world frame].
+    pub position: [f64; 2],
+    /// Fixed weight; 1 where the scene gives none.
+    pub weight: f64,
+}
+
+/// The particle whose target is wanted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Own {
+    /// Position before this step [length, world frame].
+    pub present: [f64; 2],
+    /// Position in the reference configuration [length, world frame].
+    pub reference: [f64; 2],
+    /// Added to the mean [length]: see [`Rule::rest_offset`]. Zero for the literal formulas.
+    pub rest: [f64; 2],
+}
+
+/// Which mean of the neighbours' positions.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Mean {
+    /// The centre of gravity (Eq. 1), weighted by the neighbours' fixed weights.
+    Barycentre,
+    /// Weighted by this power of the present distance (Eq. 3; the paper's power is 1).
+    Distance { power: f64 },
+    /// The power mean of each coordinate; exponent 0 is the geometric mean.
+    Power { exponent: f64, origin: Origin },
+    /// The mean of the places at `spacing` [length] from each neighbour, towards the particle.
+    Spaced { spacing: f64 },
+}
+
+/// A composed rule; what a scene does not name is `None` and not evaluated.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rule {
+    pub mean: Mean,
+    pub poisson: Option<Poisson>,
+    pub feedback: Option<Feedback>,
+}
+
+impl Rule {
+    /// The paper's plain rule (Eq. 1).
+    pub const BARYCENTRE: Rule = Rule { mean: Mean::Barycentre, poisson: None, feedback: None };
+
+    /// Whether the rule is the unadorned mean of Eq. 1, for which sweeps have a faster path that
+    /// gives the same bits.
+    pub fn is_plain_barycentre(&self) -> bool {
+        *self == Self::BARYCENTRE
+    }
+
+    /// Where the particle moves [length, world frame]. A particle without neighbours stays: no target
+    /// is computed from nothing. Finite input gives finite output unless the result itself overflows.
+    pub fn target(&self, own: &Own, neighbours: impl Iterator<Item = Neighbour> + Clone) -> [f64; 2] {
+        let Some(mean) = self.mean(own.present, neighbours) else { return own.present };
+        let mut target = [mean[0] + own.rest[0], mean[1] + own.rest[1]];
+        if let Some(poisson) = &self.poisson {
+            poisson.add(own, &mut target);
+        }
+        if let Some(feedback) = &self.feedback {
+            feedback.overshoot(own, &mut target);
+        }
+        target
+    }
+
+    /// The bare mean, before any term; `None` without neighbours or without any weight.
+    pub fn mean(
+        &self,
+        present: [f64; 2],
+        neighbours: impl Iterator<Item = Neighbour> + Clone,
+    ) -> Option<[f64; 2]> {
+        match self.mean {
+            Mean::Barycentre => barycentre::mean(neighbours),
+            Mean::Distance { power } => distance::mean(power, present, neighbours),
+            Mean::Power { exponent, origin } => power::mean(exponent, origin, neighbours),
+            Mean::Spaced { spacing } => spaced::mean(spacing, present, neighbours),
+        }
+    }
+
+    /// The offset that makes a particle with these neighbours stay at `reference`: reference minus
+    /// mean. It is zero (up to rounding) for the barycentre of a complete stencil; where neighbours
+    /// are missing, reduced to an odd number or unevenly weighted it is what keeps the body from
+    /// collapsing towards the side with more of them, and a rest configuration is then one to the
+    /// last bit. `neighbours` are those of the reference configuration.
+    pub fn rest_offset(
+        &self,
+        reference: [f64; 2],
+        neighbours: impl Iterator<Item = Neighbour> + Clone,
+    ) -> [f64; 2] {
+        let Some(mean) = self.mean(reference, neighbours) else { return [0.0; 2] };
+        [0, 1].map(|k| exact_difference(reference[k], mean[k]))
+    }
+}
+
+/// The number nearest to `sum - part` for which `part + it` rounds to `sum` exactly, where there is
+/// one.
+fn exact_difference(sum: f64, part: f64) -> f64 {
+    let difference = sum - part;
+    [difference, difference.next_up(), difference.next_down()]
+        .into_iter()
+        .find(|candidate| part + candidate == sum)
+        .unwrap_or(difference)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    pub(super) fn at(points: &[[f64; 2]]) -> impl Iterator<Item = Neighbour> + Clone + '_ {
+        points.iter().map(|&position| Neighbour { position, weight: 1.0 })
+    }
+
+    const EVERY_MEAN: [Mean; 8] = [
+        Mean::Barycentre,
+        Mean::Distance { power: 1.0 },
+        Mean::Distance { power: -2.0 },
+        Mean::Power { exponent: 0.0, origin: Origin::Moving { margin: 1.0 } },
+        Mean::Power { exponent: 3.0, origin: Origin::Moving { margin: 1.0 } },
+        Mean::Power { exponent: -1.0, origin: Origin::World },
+        Mean::Power { exponent: 0.0, origin: Origin::World },
+        Mean::Spaced { spacing: 1.0 },
+    ];
+
+    fn own(present: [f64; 2]) -> Own {
+        Own { present, reference: present, rest: [0.0; 2] }
+    }
+
+    #[test]
+    fn a_particle_without_neighbours_stays() {
+        for mean in EVERY_MEAN {
+            let rule = Rule { mean, ..Rule::BARYCENTRE };
+            assert_eq!(rule.target(&own([3.0, 4.0]), at(&[])), [3.0, 4.0], "{mean:?}");
+        }
+    }
+
+    #[test]
+    fn the_rest_offset_makes_the_reference_a_fixed_point_to_the_bit() {
+        let around = [[0.1, 0.7], [1.3, -0.2], [0.4, 0.9]];
+        let here = [0.3, 0.6];
+        for mean in EVERY_MEAN {
+            let rule = Rule { mean, ..Rule::BARYCENTRE };
+            let rest = rule.rest_offset(here, at(&around));
+            if rest.iter().all(|r| r.is_finite()) {
+                let own = Own { present: here, reference: here, rest };
+                assert_eq!(rule.target(&own, at(&around)), here, "{mean:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn coincident_points_give_finite_targets() {
+        for mean in EVERY_MEAN {
+            let rule = Rule { mean, ..Rule::BARYCENTRE };
+            for here in [[2.0, 2.0], [1.0, 5.0]] {
+                let target = rule.target(&own(here), at(&[[2.0, 2.0]; 3]));
+                assert!(target.iter().all(|t| t.is_finite()), "{mean:?} at {here:?}: {target:?}");
+            }
+        }
+    }
+}

@@ -1,0 +1,135 @@
+//! Regions of the plane from which a body is cut (the paper's samples and ASTM specimens).
+
+use super::specimen::Specimen;
+
+/// A solid region [length, world frame]; its boundary belongs to it, within the tolerance given to
+/// [`Shape::contains`].
+#[derive(Clone, Debug, PartialEq)]
+pub enum Shape {
+    Rectangle { min: [f64; 2], max: [f64; 2] },
+    Disc { centre: [f64; 2], radius: f64 },
+    /// Vertices in order, either way round; the last joins the first.
+    Polygon { vertices: Vec<[f64; 2]> },
+    Specimen(Specimen),
+    /// The first shape without the others, whose boundaries stay with the body.
+    WithHoles { body: Box<Shape>, holes: Vec<Shape> },
+}
+
+impl Shape {
+    /// Whether `point` lies inside or within `tolerance` [length] of the boundary.
+    pub fn contains(&self, point: [f64; 2], tolerance: f64) -> bool {
+        match self {
+            Shape::Rectangle { min, max } => {
+                (0..2).all(|k| point[k] >= min[k] - tolerance && point[k] <= max[k] + tolerance)
+            }
+            Shape::Disc { centre, radius } => {
+                (point[0] - centre[0]).hypot(point[1] - centre[1]) <= radius + tolerance
+            }
+            Shape::Polygon { vertices } => polygon_contains(vertices, point, tolerance),
+            Shape::Specimen(specimen) => specimen.contains(point, tolerance),
+            Shape::WithHoles { body, holes } => {
+                body.contains(point, tolerance) && !holes.iter().any(|hole| hole.contains(point, -tolerance))
+            }
+        }
+    }
+
+    /// Lowest and highest coordinate on each axis [length].
+    pub fn bounds(&self) -> ([f64; 2], [f64; 2]) {
+        match self {
+            Shape::Rectangle { min, max } => (*min, *max),
+            Shape::Disc { centre: [x, y], radius: r } => ([x - r, y - r], [x + r, y + r]),
+            Shape::Polygon { vertices } => vertices.iter().fold(
+                ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]),
+                |(low, high), v| {
+                    ([low[0].min(v[0]), low[1].min(v[1])], [high[0].max(v[0]), high[1].max(v[1])])
+                },
+            ),
+            Shape::Specimen(specimen) => specimen.bounds(),
+            Shape::WithHoles { body, .. } => body.bounds(),
+        }
+    }
+
+    /// Where a lattice is anchored unless told otherwise: the centre of a disc, else the lower
+    /// left corner of the bounds.
+    pub fn anchor(&self) -> [f64; 2] {
+        match self {
+            Shape::Disc { centre, .. } => *centre,
+            Shape::WithHoles { body, .. } => body.anchor(),
+            _ => self.bounds().0,
+        }
+    }
+}
+
+/// Even-odd test; a negative tolerance shrinks the polygon.
+fn polygon_contains(vertices: &[[f64; 2]], [x, y]: [f64; 2], tolerance: f64) -> bool {
+    let mut inside = false;
+    let mut nearest = f64::INFINITY;
+    for (k, &[ax, ay]) in vertices.iter().enumerate() {
+        let [bx, by] = vertices[(k + 1) % vertices.len()];
+        if (ay > y) != (by > y) && x < ax + (y - ay) / (by - ay) * (bx - ax) {
+            inside = !inside;
+        }
+        nearest = nearest.min(segment_distance([x, y], [ax, ay], [bx, by]));
+    }
+    if tolerance >= 0.0 { inside || nearest <= tolerance } else { inside && nearest > -tolerance }
+}
+
+fn segment_distance(p: [f64; 2], a: [f64; 2], b: [f64; 2]) -> f64 {
+    let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
+    let length = dx.hypot(dy);
+    // Along the segment from 0 at `a` to 1 at `b`; a segment of no length is its point.
+    let along = if length > 0.0 {
+        (((p[0] - a[0]) * (dx / length) + (p[1] - a[1]) * (dy / length)) / length).clamp(0.0, 1.0)
+    } else {
+        0.0
+    };
+    (p[0] - a[0] - along * dx).hypot(p[1] - a[1] - along * dy)
+}
+
+/// Whether the segments `a`-`b` and `c`-`d` cross or touch.
+pub fn segments_cross(a: [f64; 2], b: [f64; 2], c: [f64; 2], d: [f64; 2]) -> bool {
+    let side = |p: [f64; 2], q: [f64; 2], r: [f64; 2]| (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]);
+    let (abc, abd, cda, cdb) = (side(a, b, c), side(a, b, d), side(c, d, a), side(c, d, b));
+    if abc == 0.0 && abd == 0.0 {
+        // On one line: they meet where their projections overlap.
+        return (0..2).all(|k| a[k].min(b[k]) <= c[k].max(d[k]) && c[k].min(d[k]) <= a[k].max(b[k]));
+    }
+    abc * abd <= 0.0 && cda * cdb <= 0.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const L_SHAPE: [[f64; 2]; 6] = [[0.0, 0.0], [4.0, 0.0], [4.0, 2.0], [2.0, 2.0], [2.0, 4.0], [0.0, 4.0]];
+
+    #[test]
+    fn a_polygon_keeps_its_boundary_and_loses_its_reentrant_corner() {
+        let shape = Shape::Polygon { vertices: L_SHAPE.to_vec() };
+        assert!(shape.contains([1.0, 3.0], 1e-9));
+        assert!(shape.contains([4.0, 1.0], 1e-9));
+        assert!(shape.contains([2.0, 2.0], 1e-9));
+        assert!(!shape.contains([3.0, 3.0], 1e-9));
+        assert!(!shape.contains([4.1, 1.0], 1e-9));
+    }
+
+    #[test]
+    fn a_hole_takes_its_inside_but_leaves_its_rim() {
+        let shape = Shape::WithHoles {
+            body: Box::new(Shape::Rectangle { min: [0.0, 0.0], max: [4.0, 4.0] }),
+            holes: vec![Shape::Disc { centre: [2.0, 2.0], radius: 1.0 }],
+        };
+        assert!(!shape.contains([2.0, 2.5], 1e-9));
+        assert!(shape.contains([2.0, 3.0], 1e-9));
+        assert!(shape.contains([0.0, 0.0], 1e-9));
+    }
+
+    #[test]
+    fn crossing_and_touching_segments_meet_and_parallel_ones_do_not() {
+        assert!(segments_cross([0.0, 0.0], [2.0, 2.0], [0.0, 2.0], [2.0, 0.0]));
+        assert!(segments_cross([0.0, 0.0], [2.0, 0.0], [1.0, 0.0], [1.0, 1.0]));
+        assert!(!segments_cross([0.0, 0.0], [2.0, 0.0], [0.0, 1.0], [2.0, 1.0]));
+        assert!(segments_cross([0.0, 0.0], [2.0, 0.0], [1.0, 0.0], [3.0, 0.0]));
+        assert!(!segments_cross([0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [3.0, 0.0]));
+    }
+}

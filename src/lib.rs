@@ -1,0 +1,36 @@
+//! **flockform**: one set of flocking rules that makes a body deform or a swarm hold a formation.
+//!
+//! A body is a set of particles. *Leaders* are moved from outside; each *follower* takes a position
+//! computed from its neighbours' positions. That function, neighbours in and target position out,
+//! is the flocking rule, and it is written once, in [`flock`].
+//!
+//! The rooms, in the direction data flows:
+//!
+//! * [`scene`]: a TOML file becomes a validated [`scene::Scene`]; nothing downstream re-checks it.
+//! * [`flock`]: the core. Lattices, bodies, neighbourhoods, rules, frames, fracture. Pure, and it
+//!   imports no other room.
+//! * [`solve`]: sweeps over the flock's interaction, and their spectra.
+//! * [`continuum`]: plans a scene, steps it, and hands what happens to an observer.
+//! * `export` (feature `export`): CSV, JSON, VTK and figures, one file per format.
+//! * `bench` (feature `bench`): how fast the sweeps are, beside what the machine can do.
+//!
+//! ```
+//! use flockform::continuum::{plan::Plan, run::{run, Watch}};
+//! use flockform::scene;
+//!
+//! let scene = scene::bundled("tension").expect("bundled").load(&["stop.steps=25".into()])?;
+//! let plan = Plan::new(&scene)?;
+//! let outcome = run(plan, &mut Watch::nothing());
+//! assert_eq!(outcome.engine.step(), 25);
+//! # Ok::<(), scene::SceneError>(())
+//! ```
+
+pub mod continuum;
+pub mod flock;
+pub mod scene;
+pub mod solve;
+
+#[cfg(feature = "bench")]
+pub mod bench;
+#[cfg(feature = "export")]
+pub mod export;

@@ -1,0 +1,167 @@
+//! A scene file becomes a validated [`Scene`]: complete, in radians and steps, with every key checked.
+//!
+//! [`document`] reads TOML and overrides and checks every key against the JSON Schema of
+//! [`raw::RawScene`]; [`validate`] turns the raw scene into this one. Errors name file, line, key, value
+//! and remedy. What needs the body itself (whether a region is empty, say) is checked by the plan,
+//! which reports through [`Scene::refuse`] in the same form.
+
+pub mod bundled;
+pub mod document;
+mod overrides;
+mod problem;
+pub mod raw;
+mod schema_check;
+mod schema_rule;
+pub mod table;
+pub mod validate;
+
+use crate::flock::body::Cut;
+use crate::flock::fracture::{Ghosts, Threshold};
+use crate::flock::frame::FrameRule;
+use crate::flock::lattice::Lattice;
+use crate::flock::motion::Motion;
+use crate::flock::neighbourhood::Neighbourhood;
+use crate::flock::region::{Region, Side};
+use crate::flock::role::Role;
+use crate::flock::rules::{Axis, Feedback, Mean};
+use crate::solve::sweep::Update;
+
+pub use bundled::{Bundled, bundled};
+pub use document::Document;
+pub use problem::{Place, Problem, SceneError};
+use raw::RawScene;
+
+/// A continuum scene, ready to be planned.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    /// Short name: the bundled scene's, or the file's without its ending.
+    pub name: String,
+    /// The scene as written, overrides and defaults included.
+    pub raw: RawScene,
+    pub lattice: Lattice,
+    pub cut: Cut,
+    pub frame: Option<FrameRule>,
+    pub neighbourhood: Neighbourhood,
+    pub mean: Mean,
+    pub weights: Option<Weights>,
+    /// Whether particles with unbalanced neighbours are kept in place at rest.
+    pub keeps_rest: bool,
+    pub poisson: Option<PoissonTerm>,
+    pub feedback: Option<Feedback>,
+    pub update: Update,
+    pub roles: Vec<RoleEntry>,
+    pub fracture: Option<Fracture>,
+    /// Ends of each cut [length].
+    pub cuts: Vec<([f64; 2], [f64; 2])>,
+    pub stop: Stop,
+    pub record: Record,
+    document: Document,
+}
+
+impl Scene {
+    /// The error that refuses this scene for what stands at `key`.
+    pub fn refuse(&self, key: &str, message: impl Into<String>, help: impl Into<String>) -> SceneError {
+        SceneError::from(self.document.problem(key, message, Some(help.into())))
+    }
+
+    /// The unit of length, for axes and tables.
+    pub fn unit(&self) -> &str {
+        &self.raw.unit
+    }
+}
+
+/// Fixed weights of neighbours.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Weights {
+    /// One for each neighbour, in the neighbourhood's order.
+    List(Vec<f64>),
+    /// A power of the reference distance.
+    Distance { power: f64 },
+}
+
+/// The Poisson term (Eq. 2) before the body's width is known.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PoissonTerm {
+    pub k: f64,
+    pub pull: Axis,
+    /// Coordinate of the central axis [length]; the middle of the body where `None`.
+    pub centre: Option<f64>,
+    pub exponent: f64,
+}
+
+/// A role for the particles of a region.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RoleEntry {
+    pub region: SceneRegion,
+    pub role: Role,
+    /// First step at which it holds.
+    pub from: usize,
+    pub when: Option<Condition>,
+    pub motion: Option<LeaderMotion>,
+}
+
+/// A region before the lattice's spacing has set what it leaves open.
+#[derive(Clone, Debug, PartialEq)]
+pub enum SceneRegion {
+    Known(Region),
+    /// The outermost particles on a side, half a spacing deep.
+    Outermost(Side),
+}
+
+/// A condition on one particle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Condition {
+    pub quantity: Quantity,
+    pub above: Option<f64>,
+    pub below: Option<f64>,
+}
+
+impl Condition {
+    pub fn holds(&self, value: f64) -> bool {
+        self.above.is_none_or(|bound| value > bound) && self.below.is_none_or(|bound| value < bound)
+    }
+}
+
+/// What a condition looks at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quantity {
+    X,
+    Y,
+    Displacement,
+    Pe1,
+    Pe2,
+}
+
+/// How leaders move.
+#[derive(Clone, Debug, PartialEq)]
+pub enum LeaderMotion {
+    Program(Motion),
+    /// Displacements read from a file, reached in even parts over `steps`.
+    Table { rows: table::DisplacementTable, steps: usize },
+}
+
+/// When bonds break and what stands in for them; without a threshold none breaks by itself.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fracture {
+    pub threshold: Option<Threshold>,
+    pub ghosts: Ghosts,
+}
+
+/// When the run ends.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stop {
+    pub steps: usize,
+    /// Largest one-step motion over spacing at which the body is in equilibrium.
+    pub tolerance: Option<f64>,
+    /// Displacement over the body's diagonal at which the run has diverged.
+    pub growth: f64,
+}
+
+/// What is kept of the run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Record {
+    /// Ids, counted from 1.
+    pub probes: Vec<usize>,
+    pub figures: Vec<usize>,
+    pub vtk_every: usize,
+}

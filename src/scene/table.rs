@@ -1,0 +1,92 @@
+//! Displacements of leaders from a CSV file.
+
+use crate::flock::points::{Points, distance};
+
+/// Rows of a displacement file, and how they name their particle.
+#[derive(Clone, Debug, PartialEq)]
+pub enum DisplacementTable {
+    /// `x,y,ux,uy`: by reference position [length].
+    ByPlace(Vec<([f64; 2], [f64; 2])>),
+    /// `id,ux,uy`: by id, counted from 1.
+    ById(Vec<(usize, [f64; 2])>),
+}
+
+impl DisplacementTable {
+    /// Reads the text of a CSV file with the header `x,y,ux,uy` or `id,ux,uy`; every displacement is
+    /// multiplied by `scale`.
+    ///
+    /// # Errors
+    /// A sentence that names the line and what is wrong with it.
+    pub fn parse(text: &str, scale: f64) -> Result<Self, String> {
+        let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes());
+        let header = reader.headers().map_err(|e| e.to_string())?.iter().map(str::to_owned).collect::<Vec<_>>();
+        let by_id = match header.iter().map(String::as_str).collect::<Vec<_>>()[..] {
+            ["id", "ux", "uy"] => true,
+            ["x", "y", "ux", "uy"] => false,
+            _ => return Err(format!("line 1: the header is `{}`, not `x,y,ux,uy` or `id,ux,uy`", header.join(","))),
+        };
+        let (mut places, mut ids) = (Vec::new(), Vec::new());
+        for (row, record) in reader.records().enumerate() {
+            let line = row + 2;
+            let record = record.map_err(|e| format!("line {line}: {e}"))?;
+            let number = |column: usize| -> Result<f64, String> {
+                let text = &record[column];
+                let value = text.parse::<f64>().ok().filter(|v| v.is_finite());
+                value.ok_or_else(|| format!("line {line}: `{}` = `{text}` is not a finite number", header[column]))
+            };
+            let last = header.len() - 1;
+            let displacement = [scale * number(last - 1)?, scale * number(last)?];
+            if by_id {
+                let id = record[0].parse::<usize>().ok().filter(|&id| id > 0);
+                let id = id.ok_or_else(|| format!("line {line}: `id` = `{}` is not a particle id (1, 2, ...)", &record[0]))?;
+                ids.push((id, displacement));
+            } else {
+                places.push(([number(0)?, number(1)?], displacement));
+            }
+        }
+        Ok(if by_id { Self::ById(ids) } else { Self::ByPlace(places) })
+    }
+
+    /// Displacement of each of `particles` (indices), in their order.
+    ///
+    /// # Errors
+    /// A sentence that names the first particle without a row.
+    pub fn of(&self, particles: &[usize], reference: &Points, spacing: f64) -> Result<Vec<[f64; 2]>, String> {
+        particles
+            .iter()
+            .map(|&i| {
+                let place = reference.get(i);
+                let row = match self {
+                    Self::ById(rows) => rows.iter().find(|(id, _)| *id == i + 1).map(|row| row.1),
+                    Self::ByPlace(rows) => {
+                        rows.iter().find(|(at, _)| distance(*at, place) <= 1e-6 * spacing).map(|row| row.1)
+                    }
+                };
+                row.ok_or_else(|| format!("no row for particle {} at ({}, {})", i + 1, place[0], place[1]))
+            })
+            .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_are_matched_by_place_or_by_id() {
+        let reference: Points = [[10.0, 10.0], [11.0, 10.0]].into_iter().collect();
+        let by_place = DisplacementTable::parse("x,y,ux,uy\n11,10,0.5,-1\n10,10,0,0\n", 2.0).expect("reads");
+        assert_eq!(by_place.of(&[0, 1], &reference, 1.0), Ok(vec![[0.0, 0.0], [1.0, -2.0]]));
+        let by_id = DisplacementTable::parse("id,ux,uy\n2,3,4\n", 1.0).expect("reads");
+        assert_eq!(by_id.of(&[1], &reference, 1.0), Ok(vec![[3.0, 4.0]]));
+        assert_eq!(by_id.of(&[0], &reference, 1.0), Err("no row for particle 1 at (10, 10)".into()));
+    }
+
+    #[test]
+    fn a_bad_row_is_named() {
+        let error = |text| DisplacementTable::parse(text, 1.0).expect_err("refused");
+        assert_eq!(error("x,y,ux,uy\n1,2,nan,0\n"), "line 2: `ux` = `nan` is not a finite number");
+        assert_eq!(error("a,b\n"), "line 1: the header is `a,b`, not `x,y,ux,uy` or `id,ux,uy`");
+        assert_eq!(error("id,ux,uy\n0,1,1\n"), "line 2: `id` = `0` is not a particle id (1, 2, ...)");
+    }
+}

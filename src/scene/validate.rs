@@ -1,0 +1,443 @@
+//! From the scene as written to the scene as meant: degrees to radians, choices to rules, and the
+//! checks that concern several keys at once.
+
+use std::path::Path;
+
+use super::document::Document;
+use super::problem::{Place, Problem, SceneError};
+use super::raw::*;
+use super::table::DisplacementTable;
+use super::{
+    Condition, Fracture, LeaderMotion, PoissonTerm, Quantity, Record, RoleEntry, Scene, SceneRegion, Stop, Weights,
+};
+use crate::flock::body::Cut;
+use crate::flock::fracture::{Ghosts, Threshold};
+use crate::flock::frame::FrameRule;
+use crate::flock::lattice::{Lattice, LatticeKind};
+use crate::flock::motion::{Interpolation, Keyframe, Motion};
+use crate::flock::neighbourhood::Neighbourhood;
+use crate::flock::region::{Region, Side};
+use crate::flock::role::Role;
+use crate::flock::rules::{Axis, Feedback, FeedbackReference, Mean, Origin};
+use crate::flock::shape::Shape;
+use crate::flock::specimen::Specimen;
+use crate::solve::sweep::{Order, Update};
+
+impl Scene {
+    /// Reads a scene file from disk; `overrides` are `KEY.PATH=VALUE` texts applied on top.
+    pub fn from_file(path: &Path, overrides: &[String]) -> Result<Self, SceneError> {
+        let file = path.display().to_string();
+        let text = std::fs::read_to_string(path).map_err(|error| unreadable(&file, &error))?;
+        let name = path.file_stem().map_or_else(|| "scene".into(), |stem| stem.to_string_lossy().into_owned());
+        Self::parse(&name, &file, &text, overrides, path.parent())
+    }
+
+    /// Reads a scene from text. `file` names it in messages; CSV files are looked up in `folder`.
+    pub fn parse(
+        name: &str,
+        file: &str,
+        text: &str,
+        overrides: &[String],
+        folder: Option<&Path>,
+    ) -> Result<Self, SceneError> {
+        let document = Document::parse(file, text, overrides)?;
+        let checked = document.check(&schema())?;
+        let raw: RawScene = serde_json::from_value(checked)
+            .map_err(|error| SceneError::from(document.problem("", error.to_string(), None)))?;
+        validate(name, raw, document, folder)
+    }
+}
+
+/// The JSON Schema of a scene file.
+pub fn schema() -> serde_json::Value {
+    schemars::schema_for!(RawScene).into()
+}
+
+/// The error for a scene file that cannot be read at all.
+fn unreadable(file: &str, error: &std::io::Error) -> SceneError {
+    SceneError::from(Problem {
+        place: Place::File { file: file.to_owned() },
+        key: String::new(),
+        found: None,
+        message: format!("cannot be read: {error}"),
+        help: Some("give the path of a scene file, or a name that `flockform scenes` lists".into()),
+    })
+}
+
+/// Makes the error for a key, a message and a remedy.
+type Refuse<'a> = &'a dyn Fn(&str, String, &str) -> SceneError;
+
+fn validate(name: &str, raw: RawScene, document: Document, folder: Option<&Path>) -> Result<Scene, SceneError> {
+    let refuse: Refuse<'_> =
+        &|key, message, help| SceneError::from(document.problem(key, message, Some(help.to_owned())));
+    let shape = shape(&raw.body, refuse)?;
+    let lattice = lattice(&raw, shape.as_ref());
+    let spacing = lattice.spacing();
+    let neighbourhood = neighbourhood(&raw.neighbours);
+    check_present_neighbours(&raw, refuse)?;
+    let roles = raw
+        .roles
+        .iter()
+        .enumerate()
+        .map(|(k, entry)| role_entry(&format!("roles[{k}]"), entry, folder, refuse))
+        .collect::<Result<_, _>>()?;
+    Ok(Scene {
+        name: name.to_owned(),
+        cut: cut(&raw.body, shape),
+        frame: frame(raw.frame),
+        neighbourhood,
+        mean: mean(&raw.rule.mean, spacing, refuse)?,
+        weights: weights(&raw.rule.weights, refuse)?,
+        // Neighbours found anew every step have no reference configuration to be at rest in.
+        keeps_rest: raw.rule.rest == RawRest::Kept && !matches!(raw.neighbours, RawNeighbours::Present { .. }),
+        poisson: raw.rule.poisson.as_ref().map(|p| PoissonTerm {
+            k: p.k,
+            pull: match p.pull {
+                RawAxis::X => Axis::X,
+                RawAxis::Y => Axis::Y,
+            },
+            centre: p.centre,
+            exponent: p.exponent,
+        }),
+        feedback: raw.rule.feedback.as_ref().map(|f| Feedback {
+            factor: f.factor,
+            reference: match f.reference {
+                RawFeedbackReference::Initial => FeedbackReference::Initial,
+                RawFeedbackReference::Previous => FeedbackReference::Previous,
+            },
+        }),
+        update: Update {
+            order: match raw.update.order {
+                RawOrder::Synchronous => Order::Synchronous,
+                RawOrder::Sequential => Order::Sequential,
+            },
+            damping: raw.update.damping,
+        },
+        roles,
+        fracture: fracture(&raw.fracture, refuse)?,
+        cuts: cuts(&raw.cuts, refuse)?,
+        stop: Stop { steps: raw.stop.steps, tolerance: raw.stop.tolerance, growth: raw.stop.growth },
+        record: Record {
+            probes: raw.record.probes.clone(),
+            figures: raw.record.figures.clone(),
+            vtk_every: raw.record.vtk_every,
+        },
+        lattice,
+        raw,
+        document,
+    })
+}
+
+fn lattice(raw: &RawScene, shape: Option<&Shape>) -> Lattice {
+    let (kind, orientation) = match raw.lattice {
+        RawLattice::Square { spacing, orientation } => (LatticeKind::Square { spacing }, orientation),
+        RawLattice::Rectangular { a, b, orientation } => (LatticeKind::Rectangular { a, b }, orientation),
+        RawLattice::CentredRectangular { a, b, orientation } => (LatticeKind::CentredRectangular { a, b }, orientation),
+        RawLattice::Hexagonal { spacing, orientation } => (LatticeKind::Hexagonal { spacing }, orientation),
+        RawLattice::Oblique { a, b, angle, orientation } => {
+            (LatticeKind::Oblique { a, b, angle: angle.to_radians() }, orientation)
+        }
+        RawLattice::Honeycomb { spacing, orientation } => (LatticeKind::Honeycomb { spacing }, orientation),
+    };
+    let anchor = raw.body.anchor.unwrap_or_else(|| shape.map_or([0.0; 2], Shape::anchor));
+    Lattice::new(kind, anchor, orientation.to_radians())
+}
+
+/// The shape with its holes; `None` for a rectangle by count.
+fn shape(
+    body: &RawBody,
+    refuse: Refuse<'_>,
+) -> Result<Option<Shape>, SceneError> {
+    let Some(whole) = solid(&body.shape, "body.shape", refuse)? else {
+        if body.holes.is_empty() {
+            return Ok(None);
+        }
+        let message = "a rectangle by count takes no holes".into();
+        return Err(refuse("body.holes", message, "give the body as kind = \"rectangle\" with min and max"));
+    };
+    let mut holes = Vec::new();
+    for (k, hole) in body.holes.iter().enumerate() {
+        let key = format!("body.holes[{k}]");
+        let message = "a hole has to have a shape of its own, not a count of sites".into();
+        let help = "use kind = \"rectangle\", \"disc\" or \"polygon\"";
+        holes.push(solid(hole, &key, refuse)?.ok_or_else(|| refuse(&key, message, help))?);
+    }
+    let body = Box::new(whole);
+    Ok(Some(if holes.is_empty() { *body } else { Shape::WithHoles { body, holes } }))
+}
+
+fn solid(
+    raw: &RawShape,
+    key: &str,
+    refuse: Refuse<'_>,
+) -> Result<Option<Shape>, SceneError> {
+    Ok(Some(match raw {
+        RawShape::Grid { .. } => return Ok(None),
+        RawShape::Rectangle { min, max } => {
+            ordered_box(key, *min, *max, refuse)?;
+            Shape::Rectangle { min: *min, max: *max }
+        }
+        RawShape::Disc { centre, radius } => Shape::Disc { centre: *centre, radius: *radius },
+        RawShape::Polygon { vertices } => Shape::Polygon { vertices: vertices.clone() },
+        RawShape::E8Sheet { scale, lying } => Shape::Specimen(Specimen { lying: *lying, ..Specimen::e8_sheet(*scale) }),
+        RawShape::D638TypeI { scale, lying } => {
+            Shape::Specimen(Specimen { lying: *lying, ..Specimen::d638_type_i(*scale) })
+        }
+    }))
+}
+
+fn ordered_box(
+    key: &str,
+    min: [f64; 2],
+    max: [f64; 2],
+    refuse: Refuse<'_>,
+) -> Result<(), SceneError> {
+    if (0..2).all(|k| min[k] <= max[k]) {
+        return Ok(());
+    }
+    let message = format!("max = [{}, {}] lies below min = [{}, {}]", max[0], max[1], min[0], min[1]);
+    Err(refuse(&format!("{key}.max"), message, "give the lower left corner as min and the upper right one as max"))
+}
+
+fn cut(body: &RawBody, shape: Option<Shape>) -> Cut {
+    match (&body.shape, shape) {
+        (RawShape::Grid { columns, rows }, _) => Cut::Count { columns: *columns, rows: *rows },
+        (_, shape) => Cut::Shape(shape.expect("every shape but the grid is solid")),
+    }
+}
+
+fn frame(raw: RawFrame) -> Option<FrameRule> {
+    match raw {
+        RawFrame::None => None,
+        RawFrame::Lagged => Some(FrameRule::Lagged),
+        RawFrame::Immediate => Some(FrameRule::Immediate),
+        RawFrame::Mirror => Some(FrameRule::Mirror),
+    }
+}
+
+fn neighbourhood(raw: &RawNeighbours) -> Neighbourhood {
+    match raw {
+        RawNeighbours::First { keep } => Neighbourhood::First { keep: *keep },
+        RawNeighbours::Ring { radius } => Neighbourhood::Ring { radius: *radius },
+        RawNeighbours::Second {} => Neighbourhood::Second,
+        RawNeighbours::Offsets { offsets } => Neighbourhood::Offsets(offsets.clone()),
+        RawNeighbours::Within { radius } => Neighbourhood::Within { radius: *radius },
+        RawNeighbours::Present { radius } => Neighbourhood::Present { radius: *radius },
+    }
+}
+
+/// Neighbours found anew at every step have no bonds, so whatever needs bonds is refused with them.
+fn check_present_neighbours(
+    raw: &RawScene,
+    refuse: Refuse<'_>,
+) -> Result<(), SceneError> {
+    if !matches!(raw.neighbours, RawNeighbours::Present { .. }) {
+        return Ok(());
+    }
+    let clash = [
+        ("frame", raw.frame != RawFrame::None, "a frame"),
+        ("fracture", raw.fracture.is_some(), "fracture"),
+        ("cuts", !raw.cuts.is_empty(), "cuts"),
+        ("rule.weights", raw.rule.weights.is_some(), "fixed weights"),
+    ];
+    match clash.into_iter().find(|(_, used, _)| *used) {
+        None => Ok(()),
+        Some((key, _, what)) => Err(refuse(
+            key,
+            format!("{what} cannot go with neighbours that are found anew at every step"),
+            "use neighbours of kind \"within\", which are fixed at the start, or leave this out",
+        )),
+    }
+}
+
+fn mean(
+    raw: &RawMean,
+    spacing: f64,
+    refuse: Refuse<'_>,
+) -> Result<Mean, SceneError> {
+    let origin = |origin: RawOrigin| match origin {
+        RawOrigin::Moving => Origin::Moving { margin: spacing },
+        RawOrigin::World => Origin::World,
+    };
+    Ok(match *raw {
+        RawMean::Barycentre => Mean::Barycentre,
+        RawMean::Distance { power } => Mean::Distance { power },
+        RawMean::Geometric { origin: from } => Mean::Power { exponent: 0.0, origin: origin(from) },
+        RawMean::Power { exponent: 0.0, .. } => {
+            let message = "exponent = 0 has no power mean".into();
+            return Err(refuse("rule.mean.exponent", message, "use kind = \"geometric\", which is its limit"));
+        }
+        RawMean::Power { exponent, origin: from } => Mean::Power { exponent, origin: origin(from) },
+        RawMean::Spaced { spacing } => Mean::Spaced { spacing },
+    })
+}
+
+fn weights(
+    raw: &Option<RawWeights>,
+    refuse: Refuse<'_>,
+) -> Result<Option<Weights>, SceneError> {
+    Ok(match raw {
+        None => None,
+        Some(RawWeights::Distance { power }) => Some(Weights::Distance { power: *power }),
+        Some(RawWeights::List { values }) => {
+            // Also refuses a sum that is nothing but rounding, whose mean would be noise.
+            let (sum, size) = values.iter().fold((0.0, 0.0), |(s, a), v| (s + v, a + f64::abs(*v)));
+            if sum.abs() <= 1e-12 * size {
+                let message = format!("the weights add up to {sum}: no mean can be taken with them");
+                return Err(refuse("rule.weights.values", message, "give weights with a sum other than 0"));
+            }
+            Some(Weights::List(values.clone()))
+        }
+    })
+}
+
+fn role_entry(
+    key: &str,
+    raw: &RawRoles,
+    folder: Option<&Path>,
+    refuse: Refuse<'_>,
+) -> Result<RoleEntry, SceneError> {
+    let role = match raw.role {
+        RawRole::Follower => Role::Follower,
+        RawRole::Leader => Role::Leader,
+        RawRole::Clamped => Role::Clamped,
+        RawRole::Ghost => Role::Ghost,
+    };
+    match (role, &raw.motion) {
+        (Role::Leader, None) => {
+            let help = "add `motion = { kind = \"velocity\", per_step = [0.6, 0.0] }`, or use role = \"clamped\"";
+            return Err(refuse(&format!("{key}.role"), "a leader needs a motion".into(), help));
+        }
+        (Role::Leader, _) | (_, None) => {}
+        (_, Some(_)) => {
+            let message = format!("a {} has no motion of its own", role.name());
+            return Err(refuse(&format!("{key}.motion"), message, "remove it, or use role = \"leader\""));
+        }
+    }
+    let when = raw.when.as_ref().map(|when| condition(key, when, refuse)).transpose()?;
+    let motion = raw.motion.as_ref().map(|motion| leader_motion(key, motion, folder, refuse)).transpose()?;
+    Ok(RoleEntry { region: region(key, &raw.region, refuse)?, role, from: raw.from.max(1), when, motion })
+}
+
+fn region(
+    key: &str,
+    raw: &RawRegion,
+    refuse: Refuse<'_>,
+) -> Result<SceneRegion, SceneError> {
+    let side = |side: RawSide| match side {
+        RawSide::Left => Side::Left,
+        RawSide::Right => Side::Right,
+        RawSide::Bottom => Side::Bottom,
+        RawSide::Top => Side::Top,
+    };
+    Ok(SceneRegion::Known(match raw {
+        RawRegion::All {} => Region::All,
+        RawRegion::Edge { side: s, depth: None } => return Ok(SceneRegion::Outermost(side(*s))),
+        RawRegion::Edge { side: s, depth: Some(depth) } => Region::Edge { side: side(*s), depth: *depth },
+        RawRegion::Box { min, max } => {
+            ordered_box(&format!("{key}.region"), *min, *max, refuse)?;
+            Region::Box { min: *min, max: *max }
+        }
+        RawRegion::Disc { centre, radius } => Region::Disc { centre: *centre, radius: *radius },
+        RawRegion::Ids { ids } => Region::Ids(ids.clone()),
+        RawRegion::Boundary {} => Region::Boundary,
+    }))
+}
+
+fn condition(
+    key: &str,
+    raw: &RawWhen,
+    refuse: Refuse<'_>,
+) -> Result<Condition, SceneError> {
+    if raw.above.is_none() && raw.below.is_none() {
+        let message = "the condition has no bound".into();
+        return Err(refuse(&format!("{key}.when"), message, "add `above = VALUE`, `below = VALUE` or both"));
+    }
+    let quantity = match raw.quantity {
+        RawQuantity::X => Quantity::X,
+        RawQuantity::Y => Quantity::Y,
+        RawQuantity::Displacement => Quantity::Displacement,
+        RawQuantity::Pe1 => Quantity::Pe1,
+        RawQuantity::Pe2 => Quantity::Pe2,
+    };
+    Ok(Condition { quantity, above: raw.above, below: raw.below })
+}
+
+fn leader_motion(
+    key: &str,
+    raw: &RawMotion,
+    folder: Option<&Path>,
+    refuse: Refuse<'_>,
+) -> Result<LeaderMotion, SceneError> {
+    Ok(LeaderMotion::Program(match raw {
+        RawMotion::Velocity { per_step } => Motion::Velocity { per_step: *per_step },
+        RawMotion::Keyframes { frames, interpolation } => {
+            if let Some(late) = frames.windows(2).position(|pair| pair[0].step >= pair[1].step) {
+                let message = format!("step {} does not come after step {}", frames[late + 1].step, frames[late].step);
+                let key = format!("{key}.motion.frames[{}].step", late + 1);
+                return Err(refuse(&key, message, "list keyframes by ascending step, each step once"));
+            }
+            let interpolation = match interpolation {
+                RawInterpolation::Linear => Interpolation::Linear,
+                RawInterpolation::Smooth => Interpolation::Smooth,
+                RawInterpolation::Hold => Interpolation::Hold,
+            };
+            let frame = |f: &RawKeyframe| Keyframe { step: f.step as f64, displacement: f.displacement };
+            Motion::Keyframes { frames: frames.iter().map(frame).collect(), interpolation }
+        }
+        RawMotion::Affine { about, rotate, stretch, shear, steps } => Motion::Affine {
+            about: *about,
+            angle: rotate.to_radians(),
+            stretch: *stretch,
+            shear: *shear,
+            steps: *steps as f64,
+        },
+        RawMotion::Sinusoid { amplitude, period, phase } => {
+            Motion::Sinusoid { amplitude: *amplitude, period: *period, phase: *phase }
+        }
+        RawMotion::Csv { file, scale, steps } => {
+            let key = format!("{key}.motion.file");
+            let path = folder.unwrap_or(Path::new("")).join(file);
+            let help = "the path is relative to the scene file";
+            let text = std::fs::read_to_string(&path)
+                .map_err(|error| refuse(&key, format!("cannot read {}: {error}", path.display()), help))?;
+            let rows = DisplacementTable::parse(&text, *scale).map_err(|error| {
+                refuse(&key, format!("{}: {error}", path.display()), "mend the file, or name another")
+            })?;
+            return Ok(LeaderMotion::Table { rows, steps: *steps });
+        }
+    }))
+}
+
+fn fracture(
+    raw: &Option<RawFracture>,
+    refuse: Refuse<'_>,
+) -> Result<Option<Fracture>, SceneError> {
+    let Some(raw) = raw else { return Ok(None) };
+    let threshold = match (raw.distance, raw.stretch) {
+        (Some(df), None) => Some(Threshold::Distance(df)),
+        (None, Some(ratio)) => Some(Threshold::Stretch(ratio)),
+        (None, None) => None,
+        (Some(_), Some(_)) => {
+            let message = "both a distance and a stretch are given".to_owned();
+            return Err(refuse("fracture.stretch", message, "keep the one that breaks the bonds of this scene"));
+        }
+    };
+    let ghosts = match raw.ghosts {
+        RawGhosts::Lattice => Ghosts::Lattice,
+        RawGhosts::Mirrored => Ghosts::Mirrored,
+        RawGhosts::None => Ghosts::None,
+    };
+    Ok(Some(Fracture { threshold, ghosts }))
+}
+
+fn cuts(
+    raw: &[RawCut],
+    refuse: Refuse<'_>,
+) -> Result<Vec<([f64; 2], [f64; 2])>, SceneError> {
+    if let Some(k) = raw.iter().position(|cut| cut.from == cut.to) {
+        let message = format!("from = to = [{}, {}]: the cut has no length", raw[k].from[0], raw[k].from[1]);
+        return Err(refuse(&format!("cuts[{k}].to"), message, "give its other end"));
+    }
+    Ok(raw.iter().map(|cut| (cut.from, cut.to)).collect())
+}

@@ -1,0 +1,128 @@
+//! One step of the body: every follower takes its target.
+//!
+//! The synchronous sweep (the paper's) reads the positions before the step and writes the next ones;
+//! it runs in parallel above a size where that pays, and each particle's target depends on the old
+//! positions alone, so the bits are the same for any number of threads. The sequential sweep moves
+//! the particles one after the other in their numbering, each seeing the new places of those before
+//! it (Gauss-Seidel).
+
+use rayon::prelude::*;
+
+use crate::flock::frame::Frame;
+use crate::flock::interaction::Interaction;
+use crate::flock::points::Points;
+use crate::flock::role::Role;
+use crate::flock::stencil::{CHUNK, Stencil};
+
+/// Who sees whose new position within one step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Order {
+    /// Everybody sees the old positions (the paper).
+    Synchronous,
+    /// Each sees the new positions of the particles numbered before it.
+    Sequential,
+}
+
+/// How targets become positions.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Update {
+    pub order: Order,
+    /// `x <- x + damping (target - x)` [1]; 1 takes the target itself.
+    pub damping: f64,
+}
+
+impl Default for Update {
+    fn default() -> Self {
+        Self { order: Order::Synchronous, damping: 1.0 }
+    }
+}
+
+/// Bodies below this many particles are swept by one thread: handing out work costs more.
+const PARALLEL_FROM: usize = 4 * CHUNK;
+
+/// The followers of a body, made ready to be swept.
+#[derive(Clone, Debug)]
+pub struct Sweep {
+    update: Update,
+    follows: Vec<bool>,
+    /// Present where the rule is the plain barycentre and no bond is broken.
+    stencil: Option<Stencil>,
+}
+
+impl Sweep {
+    /// Compile anew whenever roles or neighbours change or the first bond breaks.
+    pub fn compile(update: Update, interaction: &Interaction, roles: &[Role]) -> Self {
+        let follows = followers(roles);
+        let broken = interaction.bonds.as_ref().is_some_and(|bonds| bonds.any_broken());
+        let plain = interaction.rule.is_plain_barycentre() && interaction.weights.is_none() && !broken;
+        let synchronous = update == Update::default();
+        let stencil = (plain && synchronous).then(|| Stencil::compile(&interaction.neighbours, &follows));
+        Self { update, follows, stencil }
+    }
+
+    /// For neighbours that change at every step: nothing is compiled from them.
+    pub fn uncompiled(update: Update, roles: &[Role]) -> Self {
+        Self { update, follows: followers(roles), stencil: None }
+    }
+
+    /// Share of the followers swept without neighbour lists.
+    pub fn share_in_runs(&self) -> f64 {
+        self.stencil.as_ref().map_or(0.0, Stencil::share_in_runs)
+    }
+
+    /// Writes the followers' next positions, then the frame's. Leaders must stand in `next` already;
+    /// whoever neither follows nor is frame keeps what stands there. The sequential sweep starts from
+    /// what `next` holds, so it must hold the present positions.
+    pub fn step(&self, interaction: &Interaction, frame: Option<&Frame>, present: &Points, next: &mut Points) {
+        match (self.update.order, &self.stencil) {
+            (Order::Synchronous, Some(stencil)) => {
+                let rest = interaction.rest.as_ref();
+                for_chunks(next, |chunk, x, y| {
+                    stencil.sweep_chunk(chunk, &interaction.neighbours, (present, rest), (x, y));
+                });
+            }
+            (Order::Synchronous, None) => for_chunks(next, |chunk, x, y| {
+                let begin = chunk * CHUNK;
+                for i in (0..x.len()).filter(|i| self.follows[begin + i]) {
+                    [x[i], y[i]] = self.moved(begin + i, interaction, present);
+                }
+            }),
+            (Order::Sequential, _) => {
+                for j in (0..self.follows.len()).filter(|&j| self.follows[j]) {
+                    next.set(j, self.moved(j, interaction, next));
+                }
+            }
+        }
+        if let Some(frame) = frame {
+            frame.follow(&interaction.reference, present, next);
+        }
+    }
+
+    fn moved(&self, j: usize, interaction: &Interaction, seen: &Points) -> [f64; 2] {
+        let target = interaction.target(j, seen);
+        let damping = self.update.damping;
+        if damping == 1.0 {
+            return target;
+        }
+        let here = seen.get(j);
+        [0, 1].map(|k| here[k] + damping * (target[k] - here[k]))
+    }
+}
+
+fn followers(roles: &[Role]) -> Vec<bool> {
+    roles.iter().map(|&role| role == Role::Follower).collect()
+}
+
+/// Runs `work(chunk, x, y)` on every chunk of the points, in parallel where that pays.
+fn for_chunks(points: &mut Points, work: impl Fn(usize, &mut [f64], &mut [f64]) + Sync) {
+    let parallel = points.len() >= PARALLEL_FROM && rayon::current_num_threads() > 1;
+    let Points { x, y } = points;
+    if parallel {
+        x.par_chunks_mut(CHUNK)
+            .zip(y.par_chunks_mut(CHUNK))
+            .enumerate()
+            .for_each(|(chunk, (x, y))| work(chunk, x, y));
+    } else {
+        x.chunks_mut(CHUNK).zip(y.chunks_mut(CHUNK)).enumerate().for_each(|(chunk, (x, y))| work(chunk, x, y));
+    }
+}
