@@ -15,12 +15,12 @@
 //! * `bench` (feature `bench`): how fast the sweeps are, beside what the machine can do.
 //!
 //! ```
-//! use flockform::continuum::{plan::Plan, run::{run, Watch}};
+//! use std::ops::ControlFlow;
+//! use flockform::continuum::{plan::Plan, run::run};
 //! use flockform::scene;
 //!
 //! let scene = scene::bundled("tension").expect("bundled").load(&["stop.steps=25".into()])?;
-//! let plan = Plan::new(&scene)?;
-//! let outcome = run(plan, &mut Watch::nothing());
+//! let outcome = run(Plan::new(&scene)?, &mut |_engine, _residual| ControlFlow::Continue(()));
 //! assert_eq!(outcome.engine.step(), 25);
 //! # Ok::<(), scene::SceneError>(())
 //! ```

@@ -18,7 +18,13 @@ struct Oracle {
 }
 
 const ORACLES: [Oracle; 2] = [
-    Oracle { scene: "tension", largest: (2.265537, 63), at_401: 0.314566, edge_row: 0.3436, centre_row: 0.4198 },
+    Oracle {
+        scene: "tension",
+        largest: (2.265537, 63),
+        at_401: 0.314566,
+        edge_row: 0.3436,
+        centre_row: 0.4198,
+    },
     Oracle {
         scene: "tension-immediate",
         largest: (2.200423, 60),
@@ -40,7 +46,8 @@ fn displacement(engine: &Engine, column: i32, row: i32) -> f64 {
 #[test]
 fn the_tension_test_gives_the_oracle_s_numbers_with_both_frames() {
     for oracle in ORACLES {
-        let plan = Plan::new(&bundled(oracle.scene).expect("bundled").load(&[]).expect("valid")).expect("plans");
+        let plan =
+            Plan::new(&bundled(oracle.scene).expect("bundled").load(&[]).expect("valid")).expect("plans");
         let mut centre = ProbeSeries::new(66);
         let (mut edge_row, mut centre_row, mut peak_column) = (0.0, 0.0, 0);
         let outcome = run(plan, &mut |engine, _| {
@@ -48,7 +55,8 @@ fn the_tension_test_gives_the_oracle_s_numbers_with_both_frames() {
             if engine.step() == 20 {
                 edge_row = displacement(engine, 6, 2);
                 centre_row = displacement(engine, 6, 6);
-                let peak = (0..engine.present().len()).max_by(|&a, &b| engine.pe1(a).total_cmp(&engine.pe1(b)));
+                let peak =
+                    (0..engine.present().len()).max_by(|&a, &b| engine.pe1(a).total_cmp(&engine.pe1(b)));
                 peak_column = peak.expect("has particles") / 12 + 1;
             }
             ControlFlow::Continue(())
@@ -58,7 +66,11 @@ fn the_tension_test_gives_the_oracle_s_numbers_with_both_frames() {
         let (at, largest) =
             moved.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1)).expect("has steps");
         let near = |value: f64, expected: f64, tolerance: f64, what: &str| {
-            assert!((value - expected).abs() <= tolerance, "{} {what}: {value}, not {expected}", oracle.scene);
+            assert!(
+                (value - expected).abs() <= tolerance,
+                "{} {what}: {value}, not {expected}",
+                oracle.scene
+            );
         };
         assert_eq!(outcome.engine.step(), 401);
         assert_eq!(moved.iter().position(|&d| d != 0.0), Some(6), "first move");

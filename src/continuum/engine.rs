@@ -174,7 +174,8 @@ impl Engine {
 
     /// Looks over the last step.
     pub fn movement(&self) -> Movement {
-        const NONE: Movement = Movement { largest_move: 0.0, largest_displacement: 0.0, farthest: 0, lost: None };
+        const NONE: Movement =
+            Movement { largest_move: 0.0, largest_displacement: 0.0, farthest: 0, lost: None };
         let one = |i: usize| {
             let place = self.present.get(i);
             if !(place[0].is_finite() && place[1].is_finite()) {
@@ -263,7 +264,13 @@ impl Engine {
         self.previous.clone_from(&self.present);
         if let Some(bonds) = &mut self.interaction.bonds {
             let places = (&self.body.reference, &self.present);
-            bonds.release_ghosts(self.step, &self.interaction.neighbours, places, &self.roles, &mut self.breaks);
+            bonds.release_ghosts(
+                self.step,
+                &self.interaction.neighbours,
+                places,
+                &self.roles,
+                &mut self.breaks,
+            );
         }
         if let Some(present) = &mut self.present_neighbours {
             present.members = self.roles.iter().map(|role| role.is_body()).collect();

@@ -99,14 +99,16 @@ impl Plan {
 }
 
 fn build_body(scene: &Scene) -> Result<Body, SceneError> {
-    let body = Body::build(scene.lattice.clone(), &scene.cut, &scene.neighbourhood, scene.frame).map_err(|error| {
-        let (key, help) = match &error {
-            BodyError::Neighbourhood(_) => ("neighbours", "choose a neighbourhood that the lattice has"),
-            BodyError::TooLarge { .. } => ("body.shape", "use a wider spacing or a smaller shape"),
-            _ => ("body.shape", "use a smaller spacing or a larger shape"),
-        };
-        scene.refuse(key, error.to_string(), help)
-    })?;
+    let body = Body::build(scene.lattice.clone(), &scene.cut, &scene.neighbourhood, scene.frame).map_err(
+        |error| {
+            let (key, help) = match &error {
+                BodyError::Neighbourhood(_) => ("neighbours", "choose a neighbourhood that the lattice has"),
+                BodyError::TooLarge { .. } => ("body.shape", "use a wider spacing or a smaller shape"),
+                _ => ("body.shape", "use a smaller spacing or a larger shape"),
+            };
+            scene.refuse(key, error.to_string(), help)
+        },
+    )?;
     if !matches!(scene.neighbourhood, Neighbourhood::Present { .. }) {
         body.require_connected().map_err(|error| {
             let help = "close the gap, use a wider neighbourhood, or run the parts as scenes of their own";
@@ -136,8 +138,9 @@ fn interaction(scene: &Scene, body: &Body) -> Result<Interaction, SceneError> {
             exponent: term.exponent,
         }
     });
-    let needs_bonds =
-        scene.fracture.is_some() || !scene.cuts.is_empty() || scene.roles.iter().any(|entry| entry.role == Role::Ghost);
+    let needs_bonds = scene.fracture.is_some()
+        || !scene.cuts.is_empty()
+        || scene.roles.iter().any(|entry| entry.role == Role::Ghost);
     let bonds = needs_bonds.then(|| {
         let (threshold, ghosts) =
             scene.fracture.map_or((None, Ghosts::Lattice), |fracture| (fracture.threshold, fracture.ghosts));
@@ -165,7 +168,8 @@ fn weights(scene: &Scene, body: &Body) -> Result<Option<Vec<f64>>, SceneError> {
             let weight = |j: usize, k: u32| {
                 (distance(body.reference.get(j), body.reference.get(k as usize)) / spacing).powf(*power)
             };
-            let all = (0..body.count()).flat_map(|j| body.neighbours.of(j).iter().map(move |&k| weight(j, k)));
+            let all =
+                (0..body.count()).flat_map(|j| body.neighbours.of(j).iter().map(move |&k| weight(j, k)));
             Ok(Some(all.collect()))
         }
         Some(Weights::List(values)) => {
@@ -224,7 +228,11 @@ fn check_ids(scene: &Scene, key: &str, region: &SceneRegion, body: &Body) -> Res
             Some(true) => format!("particle {id} belongs to the frame, whose role is fixed"),
             None => format!("there is no particle {id}: ids run from 1 to {}", body.count()),
         };
-        return Err(scene.refuse(&format!("{key}.ids[{n}]"), message, "`flockform plan` prints the numbering"));
+        return Err(scene.refuse(
+            &format!("{key}.ids[{n}]"),
+            message,
+            "`flockform plan` prints the numbering",
+        ));
     }
     Ok(())
 }
@@ -239,7 +247,8 @@ fn region(region: &SceneRegion, body: &Body) -> Region {
 /// Deep enough for a staggered edge: less than one period of the lattice's rows across the side.
 fn outermost_depth(side: Side, body: &Body) -> f64 {
     let k = usize::from(matches!(side, Side::Bottom | Side::Top));
-    let steps = body.lattice.first_neighbours(0).into_iter().map(|offset| body.lattice.vector(offset)[k].abs());
+    let steps =
+        body.lattice.first_neighbours(0).into_iter().map(|offset| body.lattice.vector(offset)[k].abs());
     let spacing = body.lattice.spacing();
     let shortest = steps.clone().filter(|&step| step > 1e-6 * spacing).fold(f64::INFINITY, f64::min);
     let longest = steps.fold(0.0, f64::max);
@@ -258,10 +267,15 @@ fn motion(
         None => Ok(None),
         Some(LeaderMotion::Program(motion)) => Ok(Some(motion.clone())),
         Some(LeaderMotion::Table { rows, steps }) => {
-            let displacements = rows.of(particles, &body.reference, body.lattice.spacing()).map_err(|message| {
-                let key = format!("roles[{entry_number}].motion.file");
-                scene.refuse(&key, message, "give every particle of the region a row, or narrow the region")
-            })?;
+            let displacements =
+                rows.of(particles, &body.reference, body.lattice.spacing()).map_err(|message| {
+                    let key = format!("roles[{entry_number}].motion.file");
+                    scene.refuse(
+                        &key,
+                        message,
+                        "give every particle of the region a row, or narrow the region",
+                    )
+                })?;
             Ok(Some(Motion::Table { displacements, steps: *steps as f64 }))
         }
     }

@@ -43,7 +43,11 @@ pub struct Divergence {
 
 impl std::fmt::Display for Divergence {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "diverged at step {}: particle {} {}; likely cause: {}", self.step, self.particle, self.what, self.likely_cause)
+        write!(
+            f,
+            "diverged at step {}: particle {} {}; likely cause: {}",
+            self.step, self.particle, self.what, self.likely_cause
+        )
     }
 }
 
@@ -90,7 +94,10 @@ fn divergence(engine: &Engine, movement: &Movement, bound: f64) -> Option<Diverg
         Some(lost) => (lost, "has no finite position any more".to_owned()),
         None if movement.largest_displacement > bound => {
             let far = movement.largest_displacement;
-            (movement.farthest, format!("is {far:.3e} from its reference place, beyond the bound {bound:.3e}"))
+            (
+                movement.farthest,
+                format!("is {far:.3e} from its reference place, beyond the bound {bound:.3e}"),
+            )
         }
         None => return None,
     };

@@ -18,7 +18,9 @@ pub enum Cut {
 /// Why no body can be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum BodyError {
-    #[error("the shape holds no lattice site: the lattice's spacing is {spacing}, the shape measures {width} by {height}")]
+    #[error(
+        "the shape holds no lattice site: the lattice's spacing is {spacing}, the shape measures {width} by {height}"
+    )]
     Empty { spacing: f64, width: f64, height: f64 },
     #[error("the body would have more than {limit} lattice sites in its bounds")]
     TooLarge { limit: u64 },
@@ -173,7 +175,11 @@ impl SiteMap {
             Cut::Shape(shape) => shape.bounds(),
             Cut::Count { .. } => ([0.0; 2], [0.0; 2]),
         };
-        Err(BodyError::Empty { spacing: lattice.spacing(), width: high[0] - low[0], height: high[1] - low[1] })
+        Err(BodyError::Empty {
+            spacing: lattice.spacing(),
+            width: high[0] - low[0],
+            height: high[1] - low[1],
+        })
     }
 
     /// Marks every site that a body particle reaches and that is no body particle.
@@ -239,7 +245,8 @@ fn window(lattice: &Lattice, cut: &Cut) -> Result<(Site, Site), BodyError> {
         }
         Cut::Shape(shape) => {
             let (low, high) = shape.bounds();
-            let corners = [low, [high[0], low[1]], high, [low[0], high[1]]].map(|corner| lattice.grid_coordinates(corner));
+            let corners = [low, [high[0], low[1]], high, [low[0], high[1]]]
+                .map(|corner| lattice.grid_coordinates(corner));
             let extreme = |k: usize, pick: fn(f64, f64) -> f64, start: f64| {
                 corners.iter().map(|corner| corner[k]).fold(start, pick)
             };

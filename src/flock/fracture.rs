@@ -157,9 +157,7 @@ impl Bonds {
         reference: &Points,
         present: &Points,
     ) -> Option<[f64; 2]> {
-        let offset = |k: usize| {
-            [reference.x[k] - reference.x[j], reference.y[k] - reference.y[j]]
-        };
+        let offset = |k: usize| [reference.x[k] - reference.x[j], reference.y[k] - reference.y[j]];
         let lost = offset(neighbours.index[bond] as usize);
         let here = present.get(j);
         let at_lattice_offset = [here[0] + lost[0], here[1] + lost[1]];

@@ -62,7 +62,8 @@ impl Frame {
             frame.points.push(point as u32);
             for near in nearest(lattice, site, &body) {
                 let opposite = [2 * near[0] - site[0], 2 * near[1] - site[1]];
-                let served = if rule == FrameRule::Mirror { body(opposite).or(body(near)) } else { body(near) };
+                let served =
+                    if rule == FrameRule::Mirror { body(opposite).or(body(near)) } else { body(near) };
                 frame.served.extend(served);
             }
             frame.starts.push(frame.served.len() as u32);

@@ -52,7 +52,11 @@ impl Interaction {
         self.neighbours.bonds(particle).filter(live).map(|bond| self.neighbours.index[bond] as usize)
     }
 
-    fn seen<'a>(&'a self, particle: usize, present: &'a Points) -> impl Iterator<Item = Neighbour> + Clone + 'a {
+    fn seen<'a>(
+        &'a self,
+        particle: usize,
+        present: &'a Points,
+    ) -> impl Iterator<Item = Neighbour> + Clone + 'a {
         self.neighbours.bonds(particle).map(move |bond| Neighbour {
             position: present.get(self.neighbours.index[bond] as usize),
             weight: self.weight(bond),

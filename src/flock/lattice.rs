@@ -13,16 +13,32 @@ pub type Site = [i32; 2];
 /// Which lattice, with its spacings [length] and angle [rad].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LatticeKind {
-    Square { spacing: f64 },
-    Rectangular { a: f64, b: f64 },
+    Square {
+        spacing: f64,
+    },
+    Rectangular {
+        a: f64,
+        b: f64,
+    },
     /// Conventional cell `a` by `b` with a site at its centre.
-    CentredRectangular { a: f64, b: f64 },
+    CentredRectangular {
+        a: f64,
+        b: f64,
+    },
     /// Triangular lattice; one bond direction lies along x.
-    Hexagonal { spacing: f64 },
+    Hexagonal {
+        spacing: f64,
+    },
     /// Edges `a` along x and `b` at `angle` [rad] from it.
-    Oblique { a: f64, b: f64, angle: f64 },
+    Oblique {
+        a: f64,
+        b: f64,
+        angle: f64,
+    },
     /// A hexagonal lattice with every third site missing; `spacing` is the bond length.
-    Honeycomb { spacing: f64 },
+    Honeycomb {
+        spacing: f64,
+    },
 }
 
 /// A lattice placed in the plane.
@@ -69,7 +85,9 @@ impl Lattice {
 
     pub fn is_site(&self, [i, j]: Site) -> bool {
         match self.kind {
-            LatticeKind::Square { .. } | LatticeKind::Rectangular { .. } | LatticeKind::Oblique { .. } => true,
+            LatticeKind::Square { .. } | LatticeKind::Rectangular { .. } | LatticeKind::Oblique { .. } => {
+                true
+            }
             LatticeKind::CentredRectangular { .. } | LatticeKind::Hexagonal { .. } => (i + j) % 2 == 0,
             LatticeKind::Honeycomb { .. } => (i + j) % 2 == 0 && honeycomb_class([i, j]) != 2,
         }
@@ -117,7 +135,9 @@ impl Lattice {
     pub fn coordination(&self) -> usize {
         match self.kind {
             LatticeKind::Square { .. } | LatticeKind::Rectangular { .. } => 4,
-            LatticeKind::CentredRectangular { .. } | LatticeKind::Hexagonal { .. } | LatticeKind::Oblique { .. } => 6,
+            LatticeKind::CentredRectangular { .. }
+            | LatticeKind::Hexagonal { .. }
+            | LatticeKind::Oblique { .. } => 6,
             LatticeKind::Honeycomb { .. } => 3,
         }
     }
@@ -126,7 +146,9 @@ impl Lattice {
     pub fn cell_area(&self) -> f64 {
         let grid_cell = (self.e1[0] * self.e2[1] - self.e1[1] * self.e2[0]).abs();
         match self.kind {
-            LatticeKind::Square { .. } | LatticeKind::Rectangular { .. } | LatticeKind::Oblique { .. } => grid_cell,
+            LatticeKind::Square { .. } | LatticeKind::Rectangular { .. } | LatticeKind::Oblique { .. } => {
+                grid_cell
+            }
             LatticeKind::CentredRectangular { .. } | LatticeKind::Hexagonal { .. } => 2.0 * grid_cell,
             LatticeKind::Honeycomb { .. } => 3.0 * grid_cell,
         }
@@ -177,7 +199,9 @@ impl Lattice {
     /// First neighbours of a site of `sublattice`, in the documented order.
     pub fn first_neighbours(&self, sublattice: usize) -> Vec<Site> {
         let mut offsets: Vec<Site> = match self.kind {
-            LatticeKind::Square { .. } | LatticeKind::Rectangular { .. } => vec![[1, 0], [-1, 0], [0, 1], [0, -1]],
+            LatticeKind::Square { .. } | LatticeKind::Rectangular { .. } => {
+                vec![[1, 0], [-1, 0], [0, 1], [0, -1]]
+            }
             LatticeKind::Hexagonal { .. } => vec![[2, 0], [-2, 0], [1, 1], [-1, -1], [1, -1], [-1, 1]],
             LatticeKind::CentredRectangular { a, b } => {
                 let short = if a <= b { [2, 0] } else { [0, 2] };

@@ -65,7 +65,9 @@ impl Motion {
         match self {
             Motion::Velocity { per_step } => (*per_step == [0.0; 2]).then_some(0),
             Motion::Sinusoid { amplitude, .. } => (*amplitude == [0.0; 2]).then_some(0),
-            Motion::Keyframes { frames, .. } => Some(frames.last().map_or(0, |frame| frame.step.ceil() as usize)),
+            Motion::Keyframes { frames, .. } => {
+                Some(frames.last().map_or(0, |frame| frame.step.ceil() as usize))
+            }
             Motion::Affine { steps, .. } | Motion::Table { steps, .. } => Some(steps.ceil() as usize),
         }
     }

@@ -93,7 +93,8 @@ fn neighbours_of_neighbours(lattice: &Lattice, sublattice: usize) -> Vec<Site> {
     let mut offsets = first.clone();
     for near in first {
         let there = lattice.sublattice([base[0] + near[0], base[1] + near[1]]);
-        offsets.extend(lattice.first_neighbours(there).iter().map(|far| [near[0] + far[0], near[1] + far[1]]));
+        offsets
+            .extend(lattice.first_neighbours(there).iter().map(|far| [near[0] + far[0], near[1] + far[1]]));
     }
     offsets.sort_unstable();
     offsets.dedup();
@@ -181,8 +182,14 @@ mod tests {
         let honeycomb = Lattice::new(LatticeKind::Honeycomb { spacing: 1.0 }, [0.0, 0.0], 0.0);
         let refused = |n: Neighbourhood| n.offsets(&honeycomb).expect_err("refused");
         assert_eq!(refused(Neighbourhood::Ring { radius: 1 }), NeighbourhoodError::RingOnHoneycomb);
-        assert!(matches!(refused(Neighbourhood::First { keep: Some(4) }), NeighbourhoodError::TooMany { .. }));
+        assert!(matches!(
+            refused(Neighbourhood::First { keep: Some(4) }),
+            NeighbourhoodError::TooMany { .. }
+        ));
         assert!(matches!(refused(Neighbourhood::Offsets(vec![[1, 0]])), NeighbourhoodError::NoSite { .. }));
-        assert!(matches!(refused(Neighbourhood::Within { radius: 0.5 }), NeighbourhoodError::TooSmall { .. }));
+        assert!(matches!(
+            refused(Neighbourhood::Within { radius: 0.5 }),
+            NeighbourhoodError::TooSmall { .. }
+        ));
     }
 }

@@ -7,10 +7,19 @@ use super::body::Body;
 pub enum Region {
     All,
     /// The particles within `depth` [length] of the body's outermost coordinate on that side.
-    Edge { side: Side, depth: f64 },
+    Edge {
+        side: Side,
+        depth: f64,
+    },
     /// The particles in this box, its boundary included [length].
-    Box { min: [f64; 2], max: [f64; 2] },
-    Disc { centre: [f64; 2], radius: f64 },
+    Box {
+        min: [f64; 2],
+        max: [f64; 2],
+    },
+    Disc {
+        centre: [f64; 2],
+        radius: f64,
+    },
     /// The particles with these ids, counted from 1.
     Ids(Vec<usize>),
     /// Every particle that lacks a neighbour: the outline of the body, holes included.
@@ -47,11 +56,13 @@ impl Region {
                     .collect()
             }
             Region::Box { min, max } => matter
-                .filter(|&i| (0..2).all(|k| place(i)[k] >= min[k] - tolerance && place(i)[k] <= max[k] + tolerance))
+                .filter(|&i| {
+                    (0..2).all(|k| place(i)[k] >= min[k] - tolerance && place(i)[k] <= max[k] + tolerance)
+                })
                 .collect(),
-            Region::Disc { centre, radius } => matter
-                .filter(|&i| super::points::distance(place(i), *centre) <= radius + tolerance)
-                .collect(),
+            Region::Disc { centre, radius } => {
+                matter.filter(|&i| super::points::distance(place(i), *centre) <= radius + tolerance).collect()
+            }
             Region::Ids(ids) => matter.filter(|i| ids.contains(&(i + 1))).collect(),
             Region::Boundary => {
                 let complete = matter.clone().map(|i| body.neighbours.of(i).len()).max().unwrap_or(0);

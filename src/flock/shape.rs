@@ -6,13 +6,24 @@ use super::specimen::Specimen;
 /// [`Shape::contains`].
 #[derive(Clone, Debug, PartialEq)]
 pub enum Shape {
-    Rectangle { min: [f64; 2], max: [f64; 2] },
-    Disc { centre: [f64; 2], radius: f64 },
+    Rectangle {
+        min: [f64; 2],
+        max: [f64; 2],
+    },
+    Disc {
+        centre: [f64; 2],
+        radius: f64,
+    },
     /// Vertices in order, either way round; the last joins the first.
-    Polygon { vertices: Vec<[f64; 2]> },
+    Polygon {
+        vertices: Vec<[f64; 2]>,
+    },
     Specimen(Specimen),
     /// The first shape without the others, whose boundaries stay with the body.
-    WithHoles { body: Box<Shape>, holes: Vec<Shape> },
+    WithHoles {
+        body: Box<Shape>,
+        holes: Vec<Shape>,
+    },
 }
 
 impl Shape {
@@ -38,12 +49,11 @@ impl Shape {
         match self {
             Shape::Rectangle { min, max } => (*min, *max),
             Shape::Disc { centre: [x, y], radius: r } => ([x - r, y - r], [x + r, y + r]),
-            Shape::Polygon { vertices } => vertices.iter().fold(
-                ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]),
-                |(low, high), v| {
+            Shape::Polygon { vertices } => {
+                vertices.iter().fold(([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]), |(low, high), v| {
                     ([low[0].min(v[0]), low[1].min(v[1])], [high[0].max(v[0]), high[1].max(v[1])])
-                },
-            ),
+                })
+            }
             Shape::Specimen(specimen) => specimen.bounds(),
             Shape::WithHoles { body, .. } => body.bounds(),
         }
@@ -88,7 +98,8 @@ fn segment_distance(p: [f64; 2], a: [f64; 2], b: [f64; 2]) -> f64 {
 
 /// Whether the segments `a`-`b` and `c`-`d` cross or touch.
 pub fn segments_cross(a: [f64; 2], b: [f64; 2], c: [f64; 2], d: [f64; 2]) -> bool {
-    let side = |p: [f64; 2], q: [f64; 2], r: [f64; 2]| (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]);
+    let side =
+        |p: [f64; 2], q: [f64; 2], r: [f64; 2]| (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]);
     let (abc, abd, cda, cdb) = (side(a, b, c), side(a, b, d), side(c, d, a), side(c, d, b));
     if abc == 0.0 && abd == 0.0 {
         // On one line: they meet where their projections overlap.

@@ -76,7 +76,7 @@ mod tests {
         assert_eq!(e8.half_width(128.5) * 2.0, 12.5);
         assert_eq!(e8.half_width(10.0) * 2.0, 20.0);
         // 3.75 mm of rise on a 12.5 mm fillet are reached sqrt(12.5^2 - 8.75^2) = 8.93 mm from its start.
-        assert!((e8.half_width(128.5 + 8.926) * 2.0 - 20.0).abs() < 1e-3);
+        assert!((e8.half_width(128.5 + 8.927) * 2.0 - 20.0).abs() < 1e-3);
         assert!(e8.half_width(128.5 + 8.0) < 10.0);
     }
 

@@ -58,7 +58,9 @@ mod tests {
         let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/launch-configs/scenes");
         let mut files: Vec<String> = std::fs::read_dir(folder)
             .expect("the folder is part of the checkout")
-            .map(|entry| entry.expect("readable").path().file_stem().expect("named").to_string_lossy().into_owned())
+            .map(|entry| {
+                entry.expect("readable").path().file_stem().expect("named").to_string_lossy().into_owned()
+            })
             .collect();
         files.sort();
         let mut names: Vec<&str> = SCENES.iter().map(|scene| scene.name).collect();

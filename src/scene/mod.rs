@@ -137,7 +137,10 @@ pub enum Quantity {
 pub enum LeaderMotion {
     Program(Motion),
     /// Displacements read from a file, reached in even parts over `steps`.
-    Table { rows: table::DisplacementTable, steps: usize },
+    Table {
+        rows: table::DisplacementTable,
+        steps: usize,
+    },
 }
 
 /// When bonds break and what stands in for them; without a threshold none breaks by itself.

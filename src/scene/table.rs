@@ -19,11 +19,17 @@ impl DisplacementTable {
     /// A sentence that names the line and what is wrong with it.
     pub fn parse(text: &str, scale: f64) -> Result<Self, String> {
         let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes());
-        let header = reader.headers().map_err(|e| e.to_string())?.iter().map(str::to_owned).collect::<Vec<_>>();
+        let header =
+            reader.headers().map_err(|e| e.to_string())?.iter().map(str::to_owned).collect::<Vec<_>>();
         let by_id = match header.iter().map(String::as_str).collect::<Vec<_>>()[..] {
             ["id", "ux", "uy"] => true,
             ["x", "y", "ux", "uy"] => false,
-            _ => return Err(format!("line 1: the header is `{}`, not `x,y,ux,uy` or `id,ux,uy`", header.join(","))),
+            _ => {
+                return Err(format!(
+                    "line 1: the header is `{}`, not `x,y,ux,uy` or `id,ux,uy`",
+                    header.join(",")
+                ));
+            }
         };
         let (mut places, mut ids) = (Vec::new(), Vec::new());
         for (row, record) in reader.records().enumerate() {
@@ -32,13 +38,17 @@ impl DisplacementTable {
             let number = |column: usize| -> Result<f64, String> {
                 let text = &record[column];
                 let value = text.parse::<f64>().ok().filter(|v| v.is_finite());
-                value.ok_or_else(|| format!("line {line}: `{}` = `{text}` is not a finite number", header[column]))
+                value.ok_or_else(|| {
+                    format!("line {line}: `{}` = `{text}` is not a finite number", header[column])
+                })
             };
             let last = header.len() - 1;
             let displacement = [scale * number(last - 1)?, scale * number(last)?];
             if by_id {
                 let id = record[0].parse::<usize>().ok().filter(|&id| id > 0);
-                let id = id.ok_or_else(|| format!("line {line}: `id` = `{}` is not a particle id (1, 2, ...)", &record[0]))?;
+                let id = id.ok_or_else(|| {
+                    format!("line {line}: `id` = `{}` is not a particle id (1, 2, ...)", &record[0])
+                })?;
                 ids.push((id, displacement));
             } else {
                 places.push(([number(0)?, number(1)?], displacement));

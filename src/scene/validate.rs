@@ -8,7 +8,8 @@ use super::problem::{Place, Problem, SceneError};
 use super::raw::*;
 use super::table::DisplacementTable;
 use super::{
-    Condition, Fracture, LeaderMotion, PoissonTerm, Quantity, Record, RoleEntry, Scene, SceneRegion, Stop, Weights,
+    Condition, Fracture, LeaderMotion, PoissonTerm, Quantity, Record, RoleEntry, Scene, SceneRegion, Stop,
+    Weights,
 };
 use crate::flock::body::Cut;
 use crate::flock::fracture::{Ghosts, Threshold};
@@ -28,7 +29,8 @@ impl Scene {
     pub fn from_file(path: &Path, overrides: &[String]) -> Result<Self, SceneError> {
         let file = path.display().to_string();
         let text = std::fs::read_to_string(path).map_err(|error| unreadable(&file, &error))?;
-        let name = path.file_stem().map_or_else(|| "scene".into(), |stem| stem.to_string_lossy().into_owned());
+        let name =
+            path.file_stem().map_or_else(|| "scene".into(), |stem| stem.to_string_lossy().into_owned());
         Self::parse(&name, &file, &text, overrides, path.parent())
     }
 
@@ -67,7 +69,12 @@ fn unreadable(file: &str, error: &std::io::Error) -> SceneError {
 /// Makes the error for a key, a message and a remedy.
 type Refuse<'a> = &'a dyn Fn(&str, String, &str) -> SceneError;
 
-fn validate(name: &str, raw: RawScene, document: Document, folder: Option<&Path>) -> Result<Scene, SceneError> {
+fn validate(
+    name: &str,
+    raw: RawScene,
+    document: Document,
+    folder: Option<&Path>,
+) -> Result<Scene, SceneError> {
     let refuse: Refuse<'_> =
         &|key, message, help| SceneError::from(document.problem(key, message, Some(help.to_owned())));
     let shape = shape(&raw.body, refuse)?;
@@ -89,7 +96,8 @@ fn validate(name: &str, raw: RawScene, document: Document, folder: Option<&Path>
         mean: mean(&raw.rule.mean, spacing, refuse)?,
         weights: weights(&raw.rule.weights, refuse)?,
         // Neighbours found anew every step have no reference configuration to be at rest in.
-        keeps_rest: raw.rule.rest == RawRest::Kept && !matches!(raw.neighbours, RawNeighbours::Present { .. }),
+        keeps_rest: raw.rule.rest == RawRest::Kept
+            && !matches!(raw.neighbours, RawNeighbours::Present { .. }),
         poisson: raw.rule.poisson.as_ref().map(|p| PoissonTerm {
             k: p.k,
             pull: match p.pull {
@@ -132,7 +140,9 @@ fn lattice(raw: &RawScene, shape: Option<&Shape>) -> Lattice {
     let (kind, orientation) = match raw.lattice {
         RawLattice::Square { spacing, orientation } => (LatticeKind::Square { spacing }, orientation),
         RawLattice::Rectangular { a, b, orientation } => (LatticeKind::Rectangular { a, b }, orientation),
-        RawLattice::CentredRectangular { a, b, orientation } => (LatticeKind::CentredRectangular { a, b }, orientation),
+        RawLattice::CentredRectangular { a, b, orientation } => {
+            (LatticeKind::CentredRectangular { a, b }, orientation)
+        }
         RawLattice::Hexagonal { spacing, orientation } => (LatticeKind::Hexagonal { spacing }, orientation),
         RawLattice::Oblique { a, b, angle, orientation } => {
             (LatticeKind::Oblique { a, b, angle: angle.to_radians() }, orientation)
@@ -144,10 +154,7 @@ fn lattice(raw: &RawScene, shape: Option<&Shape>) -> Lattice {
 }
 
 /// The shape with its holes; `None` for a rectangle by count.
-fn shape(
-    body: &RawBody,
-    refuse: Refuse<'_>,
-) -> Result<Option<Shape>, SceneError> {
+fn shape(body: &RawBody, refuse: Refuse<'_>) -> Result<Option<Shape>, SceneError> {
     let Some(whole) = solid(&body.shape, "body.shape", refuse)? else {
         if body.holes.is_empty() {
             return Ok(None);
@@ -166,11 +173,7 @@ fn shape(
     Ok(Some(if holes.is_empty() { *body } else { Shape::WithHoles { body, holes } }))
 }
 
-fn solid(
-    raw: &RawShape,
-    key: &str,
-    refuse: Refuse<'_>,
-) -> Result<Option<Shape>, SceneError> {
+fn solid(raw: &RawShape, key: &str, refuse: Refuse<'_>) -> Result<Option<Shape>, SceneError> {
     Ok(Some(match raw {
         RawShape::Grid { .. } => return Ok(None),
         RawShape::Rectangle { min, max } => {
@@ -179,24 +182,25 @@ fn solid(
         }
         RawShape::Disc { centre, radius } => Shape::Disc { centre: *centre, radius: *radius },
         RawShape::Polygon { vertices } => Shape::Polygon { vertices: vertices.clone() },
-        RawShape::E8Sheet { scale, lying } => Shape::Specimen(Specimen { lying: *lying, ..Specimen::e8_sheet(*scale) }),
+        RawShape::E8Sheet { scale, lying } => {
+            Shape::Specimen(Specimen { lying: *lying, ..Specimen::e8_sheet(*scale) })
+        }
         RawShape::D638TypeI { scale, lying } => {
             Shape::Specimen(Specimen { lying: *lying, ..Specimen::d638_type_i(*scale) })
         }
     }))
 }
 
-fn ordered_box(
-    key: &str,
-    min: [f64; 2],
-    max: [f64; 2],
-    refuse: Refuse<'_>,
-) -> Result<(), SceneError> {
+fn ordered_box(key: &str, min: [f64; 2], max: [f64; 2], refuse: Refuse<'_>) -> Result<(), SceneError> {
     if (0..2).all(|k| min[k] <= max[k]) {
         return Ok(());
     }
     let message = format!("max = [{}, {}] lies below min = [{}, {}]", max[0], max[1], min[0], min[1]);
-    Err(refuse(&format!("{key}.max"), message, "give the lower left corner as min and the upper right one as max"))
+    Err(refuse(
+        &format!("{key}.max"),
+        message,
+        "give the lower left corner as min and the upper right one as max",
+    ))
 }
 
 fn cut(body: &RawBody, shape: Option<Shape>) -> Cut {
@@ -227,10 +231,7 @@ fn neighbourhood(raw: &RawNeighbours) -> Neighbourhood {
 }
 
 /// Neighbours found anew at every step have no bonds, so whatever needs bonds is refused with them.
-fn check_present_neighbours(
-    raw: &RawScene,
-    refuse: Refuse<'_>,
-) -> Result<(), SceneError> {
+fn check_present_neighbours(raw: &RawScene, refuse: Refuse<'_>) -> Result<(), SceneError> {
     if !matches!(raw.neighbours, RawNeighbours::Present { .. }) {
         return Ok(());
     }
@@ -250,11 +251,7 @@ fn check_present_neighbours(
     }
 }
 
-fn mean(
-    raw: &RawMean,
-    spacing: f64,
-    refuse: Refuse<'_>,
-) -> Result<Mean, SceneError> {
+fn mean(raw: &RawMean, spacing: f64, refuse: Refuse<'_>) -> Result<Mean, SceneError> {
     let origin = |origin: RawOrigin| match origin {
         RawOrigin::Moving => Origin::Moving { margin: spacing },
         RawOrigin::World => Origin::World,
@@ -265,17 +262,18 @@ fn mean(
         RawMean::Geometric { origin: from } => Mean::Power { exponent: 0.0, origin: origin(from) },
         RawMean::Power { exponent: 0.0, .. } => {
             let message = "exponent = 0 has no power mean".into();
-            return Err(refuse("rule.mean.exponent", message, "use kind = \"geometric\", which is its limit"));
+            return Err(refuse(
+                "rule.mean.exponent",
+                message,
+                "use kind = \"geometric\", which is its limit",
+            ));
         }
         RawMean::Power { exponent, origin: from } => Mean::Power { exponent, origin: origin(from) },
         RawMean::Spaced { spacing } => Mean::Spaced { spacing },
     })
 }
 
-fn weights(
-    raw: &Option<RawWeights>,
-    refuse: Refuse<'_>,
-) -> Result<Option<Weights>, SceneError> {
+fn weights(raw: &Option<RawWeights>, refuse: Refuse<'_>) -> Result<Option<Weights>, SceneError> {
     Ok(match raw {
         None => None,
         Some(RawWeights::Distance { power }) => Some(Weights::Distance { power: *power }),
@@ -305,7 +303,8 @@ fn role_entry(
     };
     match (role, &raw.motion) {
         (Role::Leader, None) => {
-            let help = "add `motion = { kind = \"velocity\", per_step = [0.6, 0.0] }`, or use role = \"clamped\"";
+            let help =
+                "add `motion = { kind = \"velocity\", per_step = [0.6, 0.0] }`, or use role = \"clamped\"";
             return Err(refuse(&format!("{key}.role"), "a leader needs a motion".into(), help));
         }
         (Role::Leader, _) | (_, None) => {}
@@ -319,11 +318,7 @@ fn role_entry(
     Ok(RoleEntry { region: region(key, &raw.region, refuse)?, role, from: raw.from.max(1), when, motion })
 }
 
-fn region(
-    key: &str,
-    raw: &RawRegion,
-    refuse: Refuse<'_>,
-) -> Result<SceneRegion, SceneError> {
+fn region(key: &str, raw: &RawRegion, refuse: Refuse<'_>) -> Result<SceneRegion, SceneError> {
     let side = |side: RawSide| match side {
         RawSide::Left => Side::Left,
         RawSide::Right => Side::Right,
@@ -344,11 +339,7 @@ fn region(
     }))
 }
 
-fn condition(
-    key: &str,
-    raw: &RawWhen,
-    refuse: Refuse<'_>,
-) -> Result<Condition, SceneError> {
+fn condition(key: &str, raw: &RawWhen, refuse: Refuse<'_>) -> Result<Condition, SceneError> {
     if raw.above.is_none() && raw.below.is_none() {
         let message = "the condition has no bound".into();
         return Err(refuse(&format!("{key}.when"), message, "add `above = VALUE`, `below = VALUE` or both"));
@@ -373,7 +364,8 @@ fn leader_motion(
         RawMotion::Velocity { per_step } => Motion::Velocity { per_step: *per_step },
         RawMotion::Keyframes { frames, interpolation } => {
             if let Some(late) = frames.windows(2).position(|pair| pair[0].step >= pair[1].step) {
-                let message = format!("step {} does not come after step {}", frames[late + 1].step, frames[late].step);
+                let message =
+                    format!("step {} does not come after step {}", frames[late + 1].step, frames[late].step);
                 let key = format!("{key}.motion.frames[{}].step", late + 1);
                 return Err(refuse(&key, message, "list keyframes by ascending step, each step once"));
             }
@@ -409,10 +401,7 @@ fn leader_motion(
     }))
 }
 
-fn fracture(
-    raw: &Option<RawFracture>,
-    refuse: Refuse<'_>,
-) -> Result<Option<Fracture>, SceneError> {
+fn fracture(raw: &Option<RawFracture>, refuse: Refuse<'_>) -> Result<Option<Fracture>, SceneError> {
     let Some(raw) = raw else { return Ok(None) };
     let threshold = match (raw.distance, raw.stretch) {
         (Some(df), None) => Some(Threshold::Distance(df)),
@@ -420,7 +409,11 @@ fn fracture(
         (None, None) => None,
         (Some(_), Some(_)) => {
             let message = "both a distance and a stretch are given".to_owned();
-            return Err(refuse("fracture.stretch", message, "keep the one that breaks the bonds of this scene"));
+            return Err(refuse(
+                "fracture.stretch",
+                message,
+                "keep the one that breaks the bonds of this scene",
+            ));
         }
     };
     let ghosts = match raw.ghosts {
@@ -431,10 +424,7 @@ fn fracture(
     Ok(Some(Fracture { threshold, ghosts }))
 }
 
-fn cuts(
-    raw: &[RawCut],
-    refuse: Refuse<'_>,
-) -> Result<Vec<([f64; 2], [f64; 2])>, SceneError> {
+fn cuts(raw: &[RawCut], refuse: Refuse<'_>) -> Result<Vec<([f64; 2], [f64; 2])>, SceneError> {
     if let Some(k) = raw.iter().position(|cut| cut.from == cut.to) {
         let message = format!("from = to = [{}, {}]: the cut has no length", raw[k].from[0], raw[k].from[1]);
         return Err(refuse(&format!("cuts[{k}].to"), message, "give its other end"));

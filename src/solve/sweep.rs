@@ -73,7 +73,13 @@ impl Sweep {
     /// Writes the followers' next positions, then the frame's. Leaders must stand in `next` already;
     /// whoever neither follows nor is frame keeps what stands there. The sequential sweep starts from
     /// what `next` holds, so it must hold the present positions.
-    pub fn step(&self, interaction: &Interaction, frame: Option<&Frame>, present: &Points, next: &mut Points) {
+    pub fn step(
+        &self,
+        interaction: &Interaction,
+        frame: Option<&Frame>,
+        present: &Points,
+        next: &mut Points,
+    ) {
         match (self.update.order, &self.stencil) {
             (Order::Synchronous, Some(stencil)) => {
                 let rest = interaction.rest.as_ref();
@@ -123,6 +129,9 @@ fn for_chunks(points: &mut Points, work: impl Fn(usize, &mut [f64], &mut [f64]) 
             .enumerate()
             .for_each(|(chunk, (x, y))| work(chunk, x, y));
     } else {
-        x.chunks_mut(CHUNK).zip(y.chunks_mut(CHUNK)).enumerate().for_each(|(chunk, (x, y))| work(chunk, x, y));
+        x.chunks_mut(CHUNK)
+            .zip(y.chunks_mut(CHUNK))
+            .enumerate()
+            .for_each(|(chunk, (x, y))| work(chunk, x, y));
     }
 }

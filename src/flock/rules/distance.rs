@@ -17,7 +17,8 @@ pub fn mean(
 ) -> Option<[f64; 2]> {
     let distances = neighbours.clone().map(|n| distance(n.position, present));
     // Relative to the largest weight, so that no power of a distance overflows.
-    let scale = if power >= 0.0 { distances.fold(0.0, f64::max) } else { distances.fold(f64::INFINITY, f64::min) };
+    let scale =
+        if power >= 0.0 { distances.fold(0.0, f64::max) } else { distances.fold(f64::INFINITY, f64::min) };
     let weighted = neighbours.clone().map(|n| {
         let d = distance(n.position, present);
         let relative = if d == scale { 1.0 } else { (d / scale).powf(power) };

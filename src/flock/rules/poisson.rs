@@ -47,7 +47,8 @@ impl Poisson {
             Axis::X => (0, 1),
             Axis::Y => (1, 0),
         };
-        target[across] += self.k * (target[along] - own.reference[along]) * self.distance_from_axis(own.reference);
+        target[across] +=
+            self.k * (target[along] - own.reference[along]) * self.distance_from_axis(own.reference);
     }
 }
 
