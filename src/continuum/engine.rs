@@ -73,8 +73,8 @@ impl Engine {
         });
         let mut engine = Self {
             sweep: Sweep::uncompiled(update, &roles),
-            present: body.reference.clone(),
-            previous: body.reference.clone(),
+            present: Points::clone(&body.reference),
+            previous: Points::clone(&body.reference),
             body,
             interaction,
             update,
@@ -88,7 +88,8 @@ impl Engine {
         // The plan has given the roles that hold from the start; their motions begin here.
         for change in 0..engine.changes.len() {
             if engine.changes[change].from <= 1 && engine.changes[change].when.is_none() {
-                engine.start_leading(change, 0);
+                let all: Vec<usize> = (0..engine.changes[change].particles.len()).collect();
+                engine.start_leading(change, &all, 0);
             }
         }
         engine.after_role_change();
@@ -210,52 +211,46 @@ impl Engine {
     fn take_roles(&mut self) {
         let mut changed = false;
         for change in 0..self.changes.len() {
-            let RoleChange { from, when, .. } = self.changes[change];
-            match when {
-                // Those from the start hold already.
-                None if from == self.step && from > 1 => {
-                    for which in 0..self.changes[change].particles.len() {
-                        self.take_role(change, which);
-                    }
-                    changed = true;
-                }
-                Some(condition) if from <= self.step => {
-                    for which in 0..self.changes[change].particles.len() {
-                        let particle = self.changes[change].particles[which];
-                        let takes = self.roles[particle] != self.changes[change].role
-                            && condition.holds(self.quantity(condition.quantity, particle));
-                        if takes {
-                            self.take_role(change, which);
-                            changed = true;
-                        }
-                    }
-                }
-                _ => {}
+            let taking = self.taking(change);
+            if taking.is_empty() {
+                continue;
             }
+            for &which in &taking {
+                self.roles[self.changes[change].particles[which]] = self.changes[change].role;
+            }
+            self.start_leading(change, &taking, self.step - 1);
+            changed = true;
         }
         if changed {
             self.after_role_change();
         }
     }
 
-    fn take_role(&mut self, change: usize, which: usize) {
-        let particle = self.changes[change].particles[which];
-        self.roles[particle] = self.changes[change].role;
-        self.leaders.retain(|led| led.particle != particle);
-        if self.changes[change].motion.is_some() {
-            let base = self.present.get(particle);
-            self.leaders.push(Led { particle, change, which, since: self.step - 1, base });
+    /// Which of a change's particles take its role at this step.
+    fn taking(&self, change: usize) -> Vec<usize> {
+        let RoleChange { particles, role, from, when, .. } = &self.changes[change];
+        match when {
+            // Those from the start hold already.
+            None if *from == self.step && *from > 1 => (0..particles.len()).collect(),
+            Some(condition) if *from <= self.step => (0..particles.len())
+                .filter(|&which| self.roles[particles[which]] != *role)
+                .filter(|&which| condition.holds(self.quantity(condition.quantity, particles[which])))
+                .collect(),
+            _ => Vec::new(),
         }
     }
 
-    fn start_leading(&mut self, change: usize, since: usize) {
-        for which in 0..self.changes[change].particles.len() {
-            let particle = self.changes[change].particles[which];
-            self.leaders.retain(|led| led.particle != particle);
-            if self.changes[change].motion.is_some() {
-                let base = self.present.get(particle);
-                self.leaders.push(Led { particle, change, which, since, base });
-            }
+    /// Puts these particles of a change under its motion, if it has one, and under no other.
+    fn start_leading(&mut self, change: usize, taking: &[usize], since: usize) {
+        let RoleChange { particles, motion, .. } = &self.changes[change];
+        let mut taken = vec![false; self.roles.len()];
+        taking.iter().for_each(|&which| taken[particles[which]] = true);
+        self.leaders.retain(|led| !taken[led.particle]);
+        if motion.is_some() {
+            self.leaders.extend(taking.iter().map(|&which| {
+                let particle = particles[which];
+                Led { particle, change, which, since, base: self.present.get(particle) }
+            }));
         }
     }
 
@@ -263,7 +258,7 @@ impl Engine {
         // Whoever is not moved any more must stand still in both buffers.
         self.previous.clone_from(&self.present);
         if let Some(bonds) = &mut self.interaction.bonds {
-            let places = (&self.body.reference, &self.present);
+            let places = (&*self.body.reference, &self.present);
             bonds.release_ghosts(
                 self.step,
                 &self.interaction.neighbours,
@@ -289,7 +284,7 @@ impl Engine {
     fn break_bonds(&mut self) {
         let Some(bonds) = &mut self.interaction.bonds else { return };
         let was_whole = !bonds.any_broken();
-        let places = (&self.body.reference, &self.present);
+        let places = (&*self.body.reference, &self.present);
         bonds.break_stretched(self.step, &self.interaction.neighbours, places, &self.roles, &mut self.breaks);
         if was_whole && bonds.any_broken() {
             self.compile_sweep();

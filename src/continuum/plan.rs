@@ -4,7 +4,8 @@ use crate::flock::body::{Body, BodyError};
 use crate::flock::fracture::{Bonds, Break, Ghosts};
 use crate::flock::interaction::Interaction;
 use crate::flock::motion::Motion;
-use crate::flock::neighbourhood::Neighbourhood;
+use crate::flock::lattice::Site;
+use crate::flock::neighbourhood::{Neighbourhood, Neighbours};
 use crate::flock::points::distance;
 use crate::flock::region::{Region, Side};
 use crate::flock::role::Role;
@@ -49,9 +50,10 @@ impl Plan {
     /// Names the key of the scene that cannot be laid out: an empty or disconnected body, a region
     /// without particles, a neighbourhood that does not fit the lattice, an id that does not exist.
     pub fn new(scene: &Scene) -> Result<Self, SceneError> {
-        let body = build_body(scene)?;
-        let interaction = interaction(scene, &body)?;
-        let changes = role_changes(scene, &body)?;
+        let (body, neighbours) = build_body(scene)?;
+        let changes = role_changes(scene, &body, &neighbours)?;
+        let weights = weights(scene, &body, &neighbours)?;
+        let interaction = interaction(scene, &body, neighbours, weights);
         let probes = probes(scene, &body)?;
         let roles = body.is_frame.iter().map(|&f| if f { Role::Frame } else { Role::Follower }).collect();
         let (low, high) = bounds(&body);
@@ -98,8 +100,8 @@ impl Plan {
     }
 }
 
-fn build_body(scene: &Scene) -> Result<Body, SceneError> {
-    let body = Body::build(scene.lattice.clone(), &scene.cut, &scene.neighbourhood, scene.frame).map_err(
+fn build_body(scene: &Scene) -> Result<(Body, Neighbours), SceneError> {
+    let (body, neighbours) = Body::build(scene.lattice.clone(), &scene.cut, &scene.neighbourhood, scene.frame).map_err(
         |error| {
             let (key, help) = match &error {
                 BodyError::Neighbourhood(_) => ("neighbours", "choose a neighbourhood that the lattice has"),
@@ -110,19 +112,19 @@ fn build_body(scene: &Scene) -> Result<Body, SceneError> {
         },
     )?;
     if !matches!(scene.neighbourhood, Neighbourhood::Present { .. }) {
-        body.require_connected().map_err(|error| {
+        body.require_connected(&neighbours).map_err(|error| {
             let help = "close the gap, use a wider neighbourhood, or run the parts as scenes of their own";
             scene.refuse("body.shape", error.to_string(), help)
         })?;
     }
-    Ok(body)
+    Ok((body, neighbours))
 }
 
 fn bounds(body: &Body) -> ([f64; 2], [f64; 2]) {
     body.reference.bounds((0..body.count()).filter(|&i| !body.is_frame[i])).unwrap_or(([0.0; 2], [0.0; 2]))
 }
 
-fn interaction(scene: &Scene, body: &Body) -> Result<Interaction, SceneError> {
+fn interaction(scene: &Scene, body: &Body, neighbours: Neighbours, weights: Option<Vec<f64>>) -> Interaction {
     let (low, high) = bounds(body);
     let poisson = scene.poisson.map(|term| {
         let across = match term.pull {
@@ -144,23 +146,23 @@ fn interaction(scene: &Scene, body: &Body) -> Result<Interaction, SceneError> {
     let bonds = needs_bonds.then(|| {
         let (threshold, ghosts) =
             scene.fracture.map_or((None, Ghosts::Lattice), |fracture| (fracture.threshold, fracture.ghosts));
-        Bonds::new(threshold, ghosts, &body.neighbours)
+        Bonds::new(threshold, ghosts, &neighbours)
     });
     let mut interaction = Interaction {
         rule: Rule { mean: scene.mean, poisson, feedback: scene.feedback },
         reference: body.reference.clone(),
-        neighbours: body.neighbours.clone(),
-        weights: weights(scene, body)?,
+        neighbours,
+        weights,
         rest: None,
         bonds,
     };
     if scene.keeps_rest {
         interaction.keep_rest();
     }
-    Ok(interaction)
+    interaction
 }
 
-fn weights(scene: &Scene, body: &Body) -> Result<Option<Vec<f64>>, SceneError> {
+fn weights(scene: &Scene, body: &Body, neighbours: &Neighbours) -> Result<Option<Vec<f64>>, SceneError> {
     match &scene.weights {
         None => Ok(None),
         Some(Weights::Distance { power }) => {
@@ -169,7 +171,7 @@ fn weights(scene: &Scene, body: &Body) -> Result<Option<Vec<f64>>, SceneError> {
                 (distance(body.reference.get(j), body.reference.get(k as usize)) / spacing).powf(*power)
             };
             let all =
-                (0..body.count()).flat_map(|j| body.neighbours.of(j).iter().map(move |&k| weight(j, k)));
+                (0..body.count()).flat_map(|j| neighbours.of(j).iter().map(move |&k| weight(j, k)));
             Ok(Some(all.collect()))
         }
         Some(Weights::List(values)) => {
@@ -180,16 +182,16 @@ fn weights(scene: &Scene, body: &Body) -> Result<Option<Vec<f64>>, SceneError> {
                 let help = "give one weight for each neighbour, in the neighbourhood's order";
                 return Err(scene.refuse("rule.weights.values", message, help));
             }
-            Ok(Some(listed_weights(values, &offsets, body)))
+            Ok(Some(listed_weights(values, &offsets, body, neighbours)))
         }
     }
 }
 
 /// Weights follow the offsets; a particle that lacks a neighbour lacks its weight.
-fn listed_weights(values: &[f64], offsets: &[Vec<[i32; 2]>], body: &Body) -> Vec<f64> {
-    let mut all = Vec::with_capacity(body.neighbours.index.len());
+fn listed_weights(values: &[f64], offsets: &[Vec<Site>], body: &Body, neighbours: &Neighbours) -> Vec<f64> {
+    let mut all = Vec::with_capacity(neighbours.index.len());
     for j in 0..body.count() {
-        let mut next = body.neighbours.of(j).iter().map(|&k| body.sites[k as usize]).peekable();
+        let mut next = neighbours.of(j).iter().map(|&k| body.sites[k as usize]).peekable();
         for (offset, &value) in offsets[body.lattice.sublattice(body.sites[j])].iter().zip(values) {
             let there = [body.sites[j][0] + offset[0], body.sites[j][1] + offset[1]];
             if next.next_if_eq(&there).is_some() {
@@ -200,12 +202,12 @@ fn listed_weights(values: &[f64], offsets: &[Vec<[i32; 2]>], body: &Body) -> Vec
     all
 }
 
-fn role_changes(scene: &Scene, body: &Body) -> Result<Vec<RoleChange>, SceneError> {
+fn role_changes(scene: &Scene, body: &Body, neighbours: &Neighbours) -> Result<Vec<RoleChange>, SceneError> {
     let mut changes = Vec::new();
     for (k, entry) in scene.roles.iter().enumerate() {
         let key = format!("roles[{k}].region");
         check_ids(scene, &key, &entry.region, body)?;
-        let particles = region(&entry.region, body).pick(body);
+        let particles = region(&entry.region, body).pick(body, neighbours);
         if particles.is_empty() {
             let (low, high) = bounds(body);
             let message = format!(

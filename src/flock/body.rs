@@ -1,5 +1,7 @@
 //! A body: the sites of a lattice inside a shape, numbered, with the frame around them.
 
+use std::sync::Arc;
+
 use super::frame::{Frame, FrameRule};
 use super::lattice::{Lattice, Site};
 use super::neighbourhood::{Neighbourhood, NeighbourhoodError, Neighbours};
@@ -39,11 +41,10 @@ pub struct Body {
     pub lattice: Lattice,
     /// Column and row of each particle, shape \[count\].
     pub sites: Vec<Site>,
-    /// Reference positions [length], shape \[count\].
-    pub reference: Points,
+    /// Reference positions [length], shape \[count\]; shared with the interaction.
+    pub reference: Arc<Points>,
     /// Whether the particle belongs to the frame, shape \[count\].
     pub is_frame: Vec<bool>,
-    pub neighbours: Neighbours,
     pub frame: Option<Frame>,
 }
 
@@ -51,13 +52,13 @@ pub struct Body {
 const MOST_SITES: u64 = 1 << 28;
 
 impl Body {
-    /// Cuts the body, adds the frame where a rule for it is given, and lists the neighbours.
+    /// Cuts the body, adds the frame where a rule for it is given, and lists who sees whom.
     pub fn build(
         lattice: Lattice,
         cut: &Cut,
         neighbourhood: &Neighbourhood,
         frame: Option<FrameRule>,
-    ) -> Result<Self, BodyError> {
+    ) -> Result<(Self, Neighbours), BodyError> {
         let offsets = neighbourhood.offsets(&lattice)?;
         let mut shell = offsets.clone();
         if frame.is_some() {
@@ -71,14 +72,14 @@ impl Body {
             map.mark_frame(&lattice, &shell);
         }
         let (sites, is_frame) = map.number();
-        let reference: Points = sites.iter().map(|&site| lattice.position(site)).collect();
+        let reference: Arc<Points> = Arc::new(sites.iter().map(|&site| lattice.position(site)).collect());
         let map = &map;
         let neighbours = Neighbours::from_lists(sites.iter().zip(&is_frame).map(|(&site, &is_frame)| {
             let offsets: &[Site] = if is_frame { &[] } else { &offsets[lattice.sublattice(site)] };
             offsets.iter().filter_map(move |offset| map.index([site[0] + offset[0], site[1] + offset[1]]))
         }));
         let frame = frame.map(|rule| Frame::build(rule, &lattice, &sites, &is_frame, |site| map.index(site)));
-        Ok(Self { lattice, sites, reference, is_frame, neighbours, frame })
+        Ok((Self { lattice, sites, reference, is_frame, frame }, neighbours))
     }
 
     pub fn count(&self) -> usize {
@@ -87,8 +88,8 @@ impl Body {
 
     /// Refuses a body some of whose particles cannot feel each other through any chain of
     /// neighbours.
-    pub fn require_connected(&self) -> Result<(), BodyError> {
-        let labels = self.components();
+    pub fn require_connected(&self, neighbours: &Neighbours) -> Result<(), BodyError> {
+        let labels = self.components(neighbours);
         let body = |&i: &usize| !self.is_frame[i];
         let first = (0..self.count()).find(body).unwrap_or(0);
         match (0..self.count()).filter(body).find(|&i| labels[i] != labels[first]) {
@@ -104,7 +105,7 @@ impl Body {
 
     /// Label of the connected part each particle belongs to, neighbour relations taken both ways and
     /// the frame left out, shape \[count\].
-    pub fn components(&self) -> Vec<u32> {
+    pub fn components(&self, neighbours: &Neighbours) -> Vec<u32> {
         let mut parent: Vec<u32> = (0..self.count() as u32).collect();
         fn root(parent: &mut [u32], mut i: u32) -> u32 {
             while parent[i as usize] != i {
@@ -114,7 +115,7 @@ impl Body {
             i
         }
         for i in 0..self.count() {
-            for &k in self.neighbours.of(i).iter().filter(|&&k| !self.is_frame[k as usize]) {
+            for &k in neighbours.of(i).iter().filter(|&&k| !self.is_frame[k as usize]) {
                 let (a, b) = (root(&mut parent, i as u32), root(&mut parent, k));
                 parent[a.max(b) as usize] = a.min(b);
             }

@@ -1,5 +1,7 @@
 //! Who sees whom, through which rule: everything that turns present positions into a target.
 
+use std::sync::Arc;
+
 use super::fracture::Bonds;
 use super::neighbourhood::Neighbours;
 use super::points::Points;
@@ -10,7 +12,7 @@ use super::rules::{Neighbour, Own, Rule};
 pub struct Interaction {
     pub rule: Rule,
     /// Reference positions [length], shape \[count\].
-    pub reference: Points,
+    pub reference: Arc<Points>,
     pub neighbours: Neighbours,
     /// Fixed weights, parallel to the neighbours' index list; all 1 where absent.
     pub weights: Option<Vec<f64>>,

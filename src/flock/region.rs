@@ -1,6 +1,8 @@
 //! Regions pick particles of a body, by where they are in the reference configuration.
 
 use super::body::Body;
+use super::neighbourhood::Neighbours;
+use super::points::distance;
 
 /// Which particles; the frame is never picked.
 #[derive(Clone, Debug, PartialEq)]
@@ -37,7 +39,7 @@ pub enum Side {
 
 impl Region {
     /// Indices of the particles of `body` in the region, ascending.
-    pub fn pick(&self, body: &Body) -> Vec<usize> {
+    pub fn pick(&self, body: &Body, neighbours: &Neighbours) -> Vec<usize> {
         let tolerance = 1e-9 * body.lattice.spacing();
         let matter = (0..body.count()).filter(|&i| !body.is_frame[i]);
         let place = |i: usize| body.reference.get(i);
@@ -61,14 +63,14 @@ impl Region {
                 })
                 .collect(),
             Region::Disc { centre, radius } => {
-                matter.filter(|&i| super::points::distance(place(i), *centre) <= radius + tolerance).collect()
+                matter.filter(|&i| distance(place(i), *centre) <= radius + tolerance).collect()
             }
             Region::Ids(ids) => matter.filter(|i| ids.contains(&(i + 1))).collect(),
             Region::Boundary => {
-                let complete = matter.clone().map(|i| body.neighbours.of(i).len()).max().unwrap_or(0);
+                let complete = matter.clone().map(|i| neighbours.of(i).len()).max().unwrap_or(0);
                 let lacks = |i: usize| {
-                    let neighbours = body.neighbours.of(i);
-                    neighbours.len() < complete || neighbours.iter().any(|&k| body.is_frame[k as usize])
+                    let seen = neighbours.of(i);
+                    seen.len() < complete || seen.iter().any(|&k| body.is_frame[k as usize])
                 };
                 matter.filter(|&i| lacks(i)).collect()
             }

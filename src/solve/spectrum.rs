@@ -39,7 +39,7 @@ pub fn spectral_radius(
         return None;
     }
     let count = roles.len();
-    let linear = Interaction { reference: Points::zeros(count), rest: None, ..interaction.clone() };
+    let linear = Interaction { reference: Points::zeros(count).into(), rest: None, ..interaction.clone() };
     let sweep = Sweep::compile(update, &linear, roles);
     // Any start with a share in every mode will do; this one has no symmetry to hide a mode behind.
     let moves = |role: Role| matches!(role, Role::Follower | Role::Frame);
