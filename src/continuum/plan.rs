@@ -3,8 +3,8 @@
 use crate::flock::body::{Body, BodyError};
 use crate::flock::fracture::{Bonds, Break, Ghosts};
 use crate::flock::interaction::Interaction;
-use crate::flock::motion::Motion;
 use crate::flock::lattice::Site;
+use crate::flock::motion::Motion;
 use crate::flock::neighbourhood::{Neighbourhood, Neighbours};
 use crate::flock::points::distance;
 use crate::flock::region::{Region, Side};
@@ -101,16 +101,19 @@ impl Plan {
 }
 
 fn build_body(scene: &Scene) -> Result<(Body, Neighbours), SceneError> {
-    let (body, neighbours) = Body::build(scene.lattice.clone(), &scene.cut, &scene.neighbourhood, scene.frame).map_err(
-        |error| {
-            let (key, help) = match &error {
-                BodyError::Neighbourhood(_) => ("neighbours", "choose a neighbourhood that the lattice has"),
-                BodyError::TooLarge { .. } => ("body.shape", "use a wider spacing or a smaller shape"),
-                _ => ("body.shape", "use a smaller spacing or a larger shape"),
-            };
-            scene.refuse(key, error.to_string(), help)
-        },
-    )?;
+    let (body, neighbours) =
+        Body::build(scene.lattice.clone(), &scene.cut, &scene.neighbourhood, scene.frame).map_err(
+            |error| {
+                let (key, help) = match &error {
+                    BodyError::Neighbourhood(_) => {
+                        ("neighbours", "choose a neighbourhood that the lattice has")
+                    }
+                    BodyError::TooLarge { .. } => ("body.shape", "use a wider spacing or a smaller shape"),
+                    _ => ("body.shape", "use a smaller spacing or a larger shape"),
+                };
+                scene.refuse(key, error.to_string(), help)
+            },
+        )?;
     if !matches!(scene.neighbourhood, Neighbourhood::Present { .. }) {
         body.require_connected(&neighbours).map_err(|error| {
             let help = "close the gap, use a wider neighbourhood, or run the parts as scenes of their own";
@@ -170,8 +173,7 @@ fn weights(scene: &Scene, body: &Body, neighbours: &Neighbours) -> Result<Option
             let weight = |j: usize, k: u32| {
                 (distance(body.reference.get(j), body.reference.get(k as usize)) / spacing).powf(*power)
             };
-            let all =
-                (0..body.count()).flat_map(|j| neighbours.of(j).iter().map(move |&k| weight(j, k)));
+            let all = (0..body.count()).flat_map(|j| neighbours.of(j).iter().map(move |&k| weight(j, k)));
             Ok(Some(all.collect()))
         }
         Some(Weights::List(values)) => {

@@ -1,0 +1,153 @@
+//! The command line: what can be asked for, and who answers.
+
+mod progress;
+mod run;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Args, CommandFactory, Parser, Subcommand};
+use clap_complete::Shell;
+use flockform::continuum::plan::Plan;
+use flockform::continuum::report::PlanReport;
+use flockform::scene::{self, Scene, SceneError, bundled};
+use flockform::{bench, export};
+
+/// Exit code of a run that started and failed: diverged or interrupted.
+pub const FAILED: u8 = 1;
+
+/// Exit code for input that was refused.
+pub const BAD_INPUT: Refused = Refused;
+
+/// Converts to exit code 2.
+pub struct Refused;
+
+impl From<Refused> for ExitCode {
+    fn from(_: Refused) -> Self {
+        ExitCode::from(2)
+    }
+}
+
+/// Flocking rules that make a body deform or a swarm hold a formation.
+#[derive(Debug, Parser)]
+#[command(version, propagate_version = true, after_help = "Example:\n  flockform run tension\n\nExit codes: 0 done, 1 ran but failed (diverged, interrupted), 2 bad input.")]
+pub struct Arguments {
+    #[command(subcommand)]
+    pub command: Command,
+    /// Say more on standard error: -v information, -vv debugging, -vvv everything (RUST_LOG overrides)
+    #[arg(short, long, action = clap::ArgAction::Count, global = true)]
+    pub verbose: u8,
+}
+
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Run a continuum scene and write its results and figures
+    #[command(after_help = "Example:\n  flockform run tension --out /tmp/tension --set stop.steps=800 --set frame=immediate")]
+    Run(run::RunArguments),
+    /// List the bundled scenes
+    #[command(after_help = "Example:\n  flockform scenes")]
+    Scenes,
+    /// Say what a scene makes the program model and what it leaves out, without running it
+    #[command(after_help = "Example:\n  flockform plan fracture --set lattice.a=5.0")]
+    Plan(SceneArguments),
+    /// Print the JSON Schema of a scene file
+    #[command(after_help = "Example:\n  flockform schema > scene.schema.json")]
+    Schema,
+    /// Print a completion script for a shell
+    #[command(after_help = "Example:\n  flockform completions bash > ~/.local/share/bash-completion/completions/flockform")]
+    Completions {
+        /// The shell to complete for
+        shell: Shell,
+    },
+    /// Measure how fast this machine runs the rules
+    #[command(subcommand)]
+    Bench(BenchCommand),
+}
+
+#[derive(Debug, Subcommand)]
+pub enum BenchCommand {
+    /// Particle updates per second of the plain rule, beside the machine's memory bandwidth
+    #[command(after_help = "Example:\n  flockform bench sweep --json > sweep.json")]
+    Sweep {
+        /// Print JSON instead of a table
+        #[arg(long)]
+        json: bool,
+        /// Small sizes and few repetitions: shows that it works, measures nothing worth quoting
+        #[arg(long)]
+        quick: bool,
+    },
+}
+
+/// Which scene, with which changes.
+#[derive(Debug, Args)]
+pub struct SceneArguments {
+    /// Name of a bundled scene (see `flockform scenes`) or path of a scene file
+    pub scene: String,
+    /// Override a key of the scene, validated like the file: lattice.spacing=0.5, roles[1].from=30
+    #[arg(long = "set", value_name = "KEY.PATH=VALUE")]
+    pub set: Vec<String>,
+}
+
+impl SceneArguments {
+    fn load(&self, more: impl IntoIterator<Item = String>) -> Result<Scene, SceneError> {
+        let overrides: Vec<String> = self.set.iter().cloned().chain(more).collect();
+        match bundled(&self.scene) {
+            Some(bundled) => bundled.load(&overrides),
+            None => Scene::from_file(&PathBuf::from(&self.scene), &overrides),
+        }
+    }
+}
+
+/// Why nothing was done.
+#[derive(Debug, thiserror::Error)]
+pub enum Refusal {
+    #[error("{0}")]
+    Scene(#[from] SceneError),
+    #[error("{0}")]
+    Export(#[from] export::ExportError),
+    #[error("--threads {threads}: {error}\n  help: give a number from 1 to the machine's cores")]
+    Threads { threads: usize, error: rayon::ThreadPoolBuildError },
+}
+
+/// Logs go to standard error; `RUST_LOG` wins over `-v`.
+pub fn start_log(verbose: u8) {
+    let level = ["warn", "flockform=info", "flockform=debug", "trace"][usize::from(verbose.min(3))];
+    let filter = tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| level.into());
+    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).without_time().init();
+}
+
+pub fn dispatch(command: Command) -> Result<ExitCode, Refusal> {
+    match command {
+        Command::Run(arguments) => return run::run(&arguments),
+        Command::Scenes => list_scenes()?,
+        Command::Plan(arguments) => {
+            let scene = arguments.load([])?;
+            print(&PlanReport::new(&scene, &Plan::new(&scene)?).to_string());
+        }
+        Command::Schema => print(&format!("{:#}\n", scene::validate::schema())),
+        Command::Completions { shell } => {
+            let mut script = Vec::new();
+            clap_complete::generate(shell, &mut Arguments::command(), "flockform", &mut script);
+            print(&String::from_utf8_lossy(&script));
+        }
+        Command::Bench(BenchCommand::Sweep { json, quick }) => {
+            let report = bench::sweep::run(&bench::sweep::Options { quick });
+            print(&if json { format!("{}\n", report.to_json()) } else { report.to_string() });
+        }
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn list_scenes() -> Result<(), SceneError> {
+    let width = bundled::SCENES.iter().map(|scene| scene.name.len()).max().unwrap_or(0);
+    for scene in bundled::SCENES {
+        print(&format!("{:width$}  {}\n", scene.name, scene.load(&[])?.raw.title));
+    }
+    Ok(())
+}
+
+/// Writes to standard output; a reader that has gone away (`| head`) is no error.
+fn print(text: &str) {
+    use std::io::Write;
+    let _ = std::io::stdout().write_all(text.as_bytes());
+}

@@ -1,0 +1,192 @@
+//! What a scene makes the program model, what it leaves out, and why.
+
+use std::fmt;
+
+use super::plan::Plan;
+use crate::flock::fracture::Threshold;
+use crate::flock::role::Role;
+use crate::flock::rules::{FeedbackReference, Mean};
+use crate::scene::Scene;
+use crate::solve::sweep::{Order, Sweep};
+
+/// A plan in words and numbers.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PlanReport {
+    pub title: String,
+    pub facts: Vec<(String, String)>,
+    /// What is modelled, and which key of the scene asks for it.
+    pub modelled: Vec<(String, String)>,
+    /// What is left out, and what would ask for it.
+    pub left_out: Vec<(String, String)>,
+    /// What the user should know before running.
+    pub cautions: Vec<String>,
+}
+
+impl PlanReport {
+    pub fn new(scene: &Scene, plan: &Plan) -> Self {
+        let mut report = Self {
+            title: format!("{}: {}", scene.name, scene.raw.title),
+            facts: facts(scene, plan),
+            modelled: Vec::new(),
+            left_out: Vec::new(),
+            cautions: cautions(scene, plan),
+        };
+        report.capabilities(scene, plan);
+        report
+    }
+
+    fn capabilities(&mut self, scene: &Scene, plan: &Plan) {
+        let rule = plan.interaction.rule;
+        let mean = match rule.mean {
+            Mean::Barycentre => "barycentre (Eq. 1)".to_owned(),
+            Mean::Distance { power } => format!("mean weighted by distance^{power} (Eq. 3)"),
+            Mean::Power { exponent: 0.0, .. } => "geometric mean".to_owned(),
+            Mean::Power { exponent, .. } => format!("power mean with exponent {exponent}"),
+            Mean::Spaced { spacing } => format!("cohesion with separation at {spacing}"),
+        };
+        self.models(mean, "rule.mean");
+        let frame = scene.frame.map(|frame| {
+            let points = plan.body.frame.as_ref().map_or(0, |frame| frame.len());
+            format!("{} frame of {points} points", frame.name())
+        });
+        self.models_or_not(frame, "frame", "edge particles have fewer neighbours");
+        let rest =
+            plan.interaction.rest.as_ref().map(|_| "rest offsets for unbalanced neighbourhoods".to_owned());
+        self.models_or_not(rest, "rule.rest", "every neighbourhood is balanced, or rule.rest is \"literal\"");
+        let weights = plan.interaction.weights.as_ref().map(|_| "fixed weights".to_owned());
+        self.models_or_not(weights, "rule.weights", "all neighbours count the same");
+        let poisson = rule.poisson.map(|p| format!("Poisson term (Eq. 2), K = {}", p.k));
+        self.models_or_not(poisson, "rule.poisson", "x and y do not act on each other");
+        let feedback = rule.feedback.map(|f| format!("feedback (Eq. 4), fd = {}", f.factor));
+        self.models_or_not(feedback, "rule.feedback", "targets are not overshot");
+        let fracture = plan.interaction.bonds.as_ref().map(|bonds| match bonds.threshold {
+            Some(Threshold::Distance(df)) => format!("fracture past df = {df} {}", scene.unit()),
+            Some(Threshold::Stretch(ratio)) => format!("fracture past {ratio} times a bond's length"),
+            None => "broken bonds (no threshold: only cuts and ghosts break them)".to_owned(),
+        });
+        self.models_or_not(fracture, "fracture", "no bond can break");
+        let anew = plan.present_radius.map(|r| format!("neighbours found anew at every step within {r}"));
+        self.models_or_not(anew, "neighbours.kind = \"present\"", "neighbours are those of the reference");
+        let vtk = (scene.record.vtk_every > 0)
+            .then(|| format!("ParaView files every {} steps", scene.record.vtk_every));
+        self.models_or_not(vtk, "record.vtk_every", "no ParaView files are written");
+    }
+
+    fn models(&mut self, what: String, key: &str) {
+        self.modelled.push((what, key.to_owned()));
+    }
+
+    fn models_or_not(&mut self, what: Option<String>, key: &str, because: &str) {
+        match what {
+            Some(what) => self.models(what, key),
+            None => self.left_out.push((key.to_owned(), because.to_owned())),
+        }
+    }
+}
+
+fn facts(scene: &Scene, plan: &Plan) -> Vec<(String, String)> {
+    let of = |role: Role| plan.roles.iter().filter(|&&r| r == role).count();
+    let roles: Vec<String> = Role::ALL
+        .iter()
+        .filter(|&&role| of(role) > 0)
+        .map(|&role| format!("{} {}", of(role), role.name()))
+        .collect();
+    let sweep = Sweep::compile(plan.update, &plan.interaction, &plan.roles);
+    let order = match plan.update.order {
+        Order::Synchronous => "synchronous",
+        Order::Sequential => "sequential",
+    };
+    let stop = match plan.stop.tolerance {
+        Some(tolerance) => {
+            format!("at residual {tolerance:e}, at the latest after {} steps", plan.stop.steps)
+        }
+        None => format!("after {} steps", plan.stop.steps),
+    };
+    let bonds = plan.interaction.neighbours.index.len();
+    let unit = scene.unit();
+    let lattice = format!(
+        "{}, nearest sites {:.6} {unit} apart",
+        plan.body.lattice.name(),
+        plan.body.lattice.spacing()
+    );
+    [
+        ("particles", format!("{} ({})", plan.count(), roles.join(", "))),
+        ("lattice", lattice),
+        ("neighbour entries", format!("{bonds} ({:.2} a particle)", bonds as f64 / plan.count() as f64)),
+        ("update", format!("{order}, damping {}", plan.update.damping)),
+        ("swept without lists", format!("{:.0} % of the followers", 100.0 * sweep.share_in_runs())),
+        ("memory", format!("about {}", readable_bytes(memory(plan)))),
+        ("stops", stop),
+    ]
+    .map(|(name, value)| (name.to_owned(), value))
+    .to_vec()
+}
+
+fn cautions(scene: &Scene, plan: &Plan) -> Vec<String> {
+    let mut cautions = Vec::new();
+    let rule = plan.interaction.rule;
+    let undamped = plan.update.order == Order::Synchronous && plan.update.damping == 1.0;
+    if undamped && matches!(rule.mean, Mean::Distance { power } if power > 0.0) {
+        cautions.push(
+            "weights that grow with distance are marginal in a synchronous update: large deformations do not settle; \
+             use update.order = \"sequential\" or update.damping = 0.5"
+                .into(),
+        );
+    }
+    if undamped && rule.feedback.is_some_and(|f| f.reference == FeedbackReference::Previous && f.factor > 0.0)
+    {
+        cautions.push("over-relaxation in a synchronous update makes the fastest mode grow".into());
+    }
+    if matches!(plan.present_radius, Some(_)) && rule.mean == Mean::Barycentre {
+        cautions.push(
+            "the barycentre of whoever is near keeps no distance: the body contracts; use rule.mean.kind = \"spaced\"".into(),
+        );
+    }
+    let led = |role: &Role| matches!(role, Role::Leader | Role::Clamped);
+    if !plan.roles.iter().any(led) && scene.roles.iter().all(|entry| !led(&entry.role)) {
+        cautions.push("nobody leads: the body relaxes by itself".into());
+    }
+    cautions
+}
+
+/// Bytes that the run holds: positions (twice), reference, roles, sites, neighbour lists and what
+/// the scene adds to them.
+fn memory(plan: &Plan) -> usize {
+    let (count, bonds) = (plan.count(), plan.interaction.neighbours.index.len());
+    let present = |is: bool, bytes: usize| if is { bytes } else { 0 };
+    count * (3 * 16 + 3 + 8 + 4)
+        + bonds * 4
+        + present(plan.interaction.weights.is_some(), 8 * bonds)
+        + present(plan.interaction.rest.is_some(), 16 * count)
+        + present(plan.interaction.bonds.is_some(), bonds)
+        + present(plan.present_radius.is_some(), 8 * count)
+}
+
+fn readable_bytes(bytes: usize) -> String {
+    match bytes as f64 {
+        b if b < 1024.0 * 1024.0 => format!("{:.0} KiB", (b / 1024.0).ceil()),
+        b if b < 1024.0 * 1024.0 * 1024.0 => format!("{:.1} MiB", b / 1024.0 / 1024.0),
+        b => format!("{:.2} GiB", b / 1024.0 / 1024.0 / 1024.0),
+    }
+}
+
+impl fmt::Display for PlanReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "{}", self.title)?;
+        let width = self.facts.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
+        for (name, value) in &self.facts {
+            writeln!(f, "  {name:width$}  {value}")?;
+        }
+        let section = |f: &mut fmt::Formatter<'_>, head: &str, rows: &[(String, String)], link: &str| {
+            writeln!(f, "{head}")?;
+            let width = rows.iter().map(|(left, _)| left.chars().count()).max().unwrap_or(0);
+            rows.iter().try_for_each(|(left, right)| writeln!(f, "  {left:width$}  {link}{right}"))
+        };
+        section(f, "models", &self.modelled, "because of ")?;
+        section(f, "leaves out", &self.left_out, "")?;
+        for caution in &self.cautions {
+            writeln!(f, "caution: {caution}")?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,70 @@
+//! The rooms keep their order: the core imports no other room.
+
+use std::path::{Path, PathBuf};
+
+fn rust_files(folder: &Path) -> Vec<PathBuf> {
+    let mut files = Vec::new();
+    for entry in std::fs::read_dir(folder).expect("the folder exists") {
+        let path = entry.expect("readable").path();
+        if path.is_dir() {
+            files.extend(rust_files(&path));
+        } else if path.extension().is_some_and(|ending| ending == "rs") {
+            files.push(path);
+        }
+    }
+    files
+}
+
+/// Rooms of this crate that a room's files name, tests included.
+fn rooms_named_in(room: &str) -> Vec<(PathBuf, String)> {
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("src").join(room);
+    let files = rust_files(&source);
+    assert!(!files.is_empty(), "{room} has files");
+    let mut named = Vec::new();
+    for file in files {
+        let text = std::fs::read_to_string(&file).expect("readable");
+        for path in text.split("crate::").skip(1) {
+            let other: String = path.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
+            if other != room {
+                named.push((file.clone(), other));
+            }
+        }
+    }
+    named
+}
+
+fn assert_imports_only(room: &str, allowed: &[&str]) {
+    for (file, other) in rooms_named_in(room) {
+        assert!(allowed.contains(&other.as_str()), "{} imports {other}", file.display());
+    }
+}
+
+#[test]
+fn flock_imports_no_other_room() {
+    assert_imports_only("flock", &[]);
+}
+
+#[test]
+fn flock_has_no_features_no_clock_and_no_threads() {
+    for file in rust_files(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src/flock")) {
+        let text = std::fs::read_to_string(&file).expect("readable");
+        for word in ["feature =", "std::time", "std::thread", "std::fs", "std::io", "rayon", "serde"] {
+            assert!(!text.contains(word), "{} uses {word}", file.display());
+        }
+    }
+}
+
+#[test]
+fn solve_imports_the_flock_alone() {
+    assert_imports_only("solve", &["flock"]);
+}
+
+#[test]
+fn scene_knows_nothing_of_hosts_and_outputs() {
+    assert_imports_only("scene", &["flock", "solve"]);
+}
+
+#[test]
+fn continuum_knows_nothing_of_outputs() {
+    assert_imports_only("continuum", &["flock", "solve", "scene"]);
+}
