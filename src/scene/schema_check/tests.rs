@@ -473,6 +473,9 @@ const PLACES: [&str; 11] = [
 ];
 
 proptest! {
+    // Failures are kept as unit tests above, not as seed files beside the crate.
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
+
     #[test]
     fn any_text_and_any_override_are_checked_without_panic(text in any_text(), set in any_text()) {
         never_panics_and_agrees_with_serde(&text, std::slice::from_ref(&set));
