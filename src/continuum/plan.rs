@@ -56,7 +56,7 @@ impl Plan {
         let interaction = interaction(scene, &body, neighbours, weights);
         let probes = probes(scene, &body)?;
         let roles = body.is_frame.iter().map(|&f| if f { Role::Frame } else { Role::Follower }).collect();
-        let (low, high) = bounds(&body);
+        let (low, high) = body.bounds();
         let mut plan = Self {
             update: scene.update,
             present_radius: match scene.neighbourhood {
@@ -123,12 +123,8 @@ fn build_body(scene: &Scene) -> Result<(Body, Neighbours), SceneError> {
     Ok((body, neighbours))
 }
 
-fn bounds(body: &Body) -> ([f64; 2], [f64; 2]) {
-    body.reference.bounds((0..body.count()).filter(|&i| !body.is_frame[i])).unwrap_or(([0.0; 2], [0.0; 2]))
-}
-
 fn interaction(scene: &Scene, body: &Body, neighbours: Neighbours, weights: Option<Vec<f64>>) -> Interaction {
-    let (low, high) = bounds(body);
+    let (low, high) = body.bounds();
     let poisson = scene.poisson.map(|term| {
         let across = match term.pull {
             Axis::X => 1,
@@ -211,7 +207,7 @@ fn role_changes(scene: &Scene, body: &Body, neighbours: &Neighbours) -> Result<V
         check_ids(scene, &key, &entry.region, body)?;
         let particles = region(&entry.region, body).pick(body, neighbours);
         if particles.is_empty() {
-            let (low, high) = bounds(body);
+            let (low, high) = body.bounds();
             let message = format!(
                 "no particle of the body lies in this region; the body spans [{}, {}] to [{}, {}]",
                 low[0], low[1], high[0], high[1]

@@ -1,0 +1,204 @@
+//! `flockform run`: plan, step, record, write.
+
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use clap::Args;
+use flockform::continuum::engine::Engine;
+use flockform::continuum::plan::Plan;
+use flockform::continuum::record::{ProbeSeries, Snapshot};
+use flockform::continuum::run::{Outcome, StopReason, run as run_plan};
+use flockform::export::{ExportError, OutputFolder, Results, Timings, VtkSeries, write_all};
+use flockform::scene::Scene;
+
+use super::progress::Progress;
+use super::{FAILED, Refusal, SceneArguments, print};
+
+#[derive(Debug, Args)]
+pub struct RunArguments {
+    #[command(flatten)]
+    scene: SceneArguments,
+    /// Folder for the results; must be empty or new [default: out/SCENE, numbered if taken]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Run at most this many steps (the same as --set stop.steps=N)
+    #[arg(long, value_name = "N")]
+    steps: Option<usize>,
+    /// Threads to use [default: the machine's]; results are the same to the bit for any number
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    threads: Option<u16>,
+    /// Print nothing but errors
+    #[arg(long, short)]
+    quiet: bool,
+    /// Replace an earlier output of flockform in DIR
+    #[arg(long)]
+    force: bool,
+}
+
+/// Runs a scene and writes what comes of it.
+pub fn run(arguments: &RunArguments) -> Result<ExitCode, Refusal> {
+    let threads = usize::from(arguments.threads.unwrap_or(0));
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    pool.map_err(|error| Refusal::Threads { threads, error })?.install(|| run_here(arguments))
+}
+
+fn run_here(arguments: &RunArguments) -> Result<ExitCode, Refusal> {
+    let start = Instant::now();
+    let scene = arguments.scene.load(arguments.steps.map(|steps| format!("stop.steps={steps}")))?;
+    let plan = Plan::new(&scene)?;
+    let out = arguments.out.clone().unwrap_or_else(|| free_folder(&scene.name));
+    let folder = OutputFolder::create(&out, arguments.force)?;
+    let setup = start.elapsed();
+
+    let mut recorder = Recorder::new(&scene, &plan, &folder)?;
+    let mut progress = Progress::new(arguments.quiet, scene.stop.steps);
+    let interrupted = interrupt_flag();
+    let stepping = Instant::now();
+    let outcome = run_plan(plan, &mut |engine, residual| {
+        recorder.step(engine);
+        progress.step(engine.step(), residual);
+        let stop = recorder.failed() || interrupted.load(Ordering::Relaxed);
+        if stop { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    });
+    progress.finish();
+
+    let elapsed = stepping.elapsed();
+    let records = recorder.finish(&outcome.engine)?;
+    let timings = Timings { setup, steps: elapsed.saturating_sub(records.writing), output: records.writing };
+    let (snapshots, probes) = (&records.snapshots, &records.probes);
+    write_all(&folder, &Results { scene: &scene, outcome: &outcome, snapshots, probes, timings })?;
+    let kept = folder.commit()?;
+    if !arguments.quiet {
+        print(&closing_words(&scene, &outcome, elapsed, &kept));
+    }
+    Ok(exit_code(&outcome))
+}
+
+/// The first of out/NAME, out/NAME-2, ... that is not taken.
+fn free_folder(name: &str) -> PathBuf {
+    let taken = |path: &Path| path.read_dir().is_ok_and(|mut entries| entries.next().is_some());
+    let numbered = (2..).map(|n| PathBuf::from(format!("out/{name}-{n}")));
+    std::iter::once(PathBuf::from(format!("out/{name}"))).chain(numbered).find(|path| !taken(path)).expect("endless")
+}
+
+/// Set by Ctrl-C and by SIGTERM; the run then stops at the next step.
+fn interrupt_flag() -> Arc<AtomicBool> {
+    let flag = Arc::new(AtomicBool::new(false));
+    let raised = Arc::clone(&flag);
+    if let Err(error) = ctrlc::set_handler(move || raised.store(true, Ordering::Relaxed)) {
+        tracing::warn!("an interrupt will end the program without writing results: {error}");
+    }
+    flag
+}
+
+/// Keeps what the scene asks for while the run goes on.
+struct Recorder<'a> {
+    scene: &'a Scene,
+    snapshots: Vec<Snapshot>,
+    probes: Vec<ProbeSeries>,
+    frames: Option<VtkSeries>,
+    failure: Option<ExportError>,
+    writing: Duration,
+}
+
+/// What was kept, and how long writing took on the way.
+struct Records {
+    snapshots: Vec<Snapshot>,
+    probes: Vec<ProbeSeries>,
+    writing: Duration,
+}
+
+impl<'a> Recorder<'a> {
+    fn new(scene: &'a Scene, plan: &Plan, folder: &OutputFolder) -> Result<Self, ExportError> {
+        Ok(Self {
+            scene,
+            snapshots: Vec::new(),
+            probes: plan.probes.iter().map(|&particle| ProbeSeries::new(particle)).collect(),
+            frames: (scene.record.vtk_every > 0).then(|| VtkSeries::create(folder)).transpose()?,
+            failure: None,
+            writing: Duration::ZERO,
+        })
+    }
+
+    fn step(&mut self, engine: &Engine) {
+        self.probes.iter_mut().for_each(|probe| probe.record(engine));
+        if self.scene.record.figures.contains(&engine.step()) {
+            self.snapshots.push(Snapshot::of(engine));
+        }
+        if self.frames.is_some() && engine.step() % self.scene.record.vtk_every == 0 {
+            self.write_frame(engine);
+        }
+    }
+
+    fn write_frame(&mut self, engine: &Engine) {
+        let start = Instant::now();
+        if let Some(frames) = &mut self.frames {
+            self.failure = frames.write(engine).err();
+        }
+        self.writing += start.elapsed();
+    }
+
+    fn failed(&self) -> bool {
+        self.failure.is_some()
+    }
+
+    /// The last configuration is always drawn, and for ParaView always written.
+    fn finish(mut self, engine: &Engine) -> Result<Records, ExportError> {
+        let step = engine.step();
+        if self.snapshots.last().is_none_or(|last| last.step != step) {
+            self.snapshots.push(Snapshot::of(engine));
+        }
+        if self.frames.is_some() && !self.failed() && step % self.scene.record.vtk_every != 0 {
+            self.write_frame(engine);
+        }
+        if let Some(failure) = self.failure {
+            return Err(failure);
+        }
+        if let Some(frames) = self.frames {
+            frames.finish()?;
+        }
+        Ok(Records { snapshots: self.snapshots, probes: self.probes, writing: self.writing })
+    }
+}
+
+fn closing_words(scene: &Scene, outcome: &Outcome, elapsed: Duration, kept: &Path) -> String {
+    let engine = &outcome.engine;
+    let how = match &outcome.reason {
+        StopReason::Equilibrium => "in equilibrium".to_owned(),
+        StopReason::Steps => "all steps done".to_owned(),
+        StopReason::Interrupted => "interrupted: what there was is written".to_owned(),
+        StopReason::Diverged(divergence) => format!("{divergence}; the last good state is written"),
+    };
+    let mut words = format!(
+        "{}: step {}, residual {:.2e}, {how} ({:.2} s)\n",
+        scene.name,
+        engine.step(),
+        outcome.residual,
+        elapsed.as_secs_f64()
+    );
+    let broken: Vec<_> = engine.breaks().iter().filter(|b| b.step > 0).collect();
+    if let (Some(first), Some(last)) = (broken.first(), broken.last()) {
+        words += &format!(
+            "{} bonds broke, from step {} to {}, the first at ({:.1}, {:.1}) {}, {:.0} % along the body\n",
+            broken.len(),
+            first.step,
+            last.step,
+            first.place[0],
+            first.place[1],
+            scene.unit(),
+            100.0 * engine.body().along(first.place)
+        );
+    }
+    words + &format!("results in {}\n", kept.display())
+}
+
+fn exit_code(outcome: &Outcome) -> ExitCode {
+    match outcome.reason {
+        StopReason::Equilibrium | StopReason::Steps => ExitCode::SUCCESS,
+        StopReason::Interrupted | StopReason::Diverged(_) => ExitCode::from(FAILED),
+    }
+}
