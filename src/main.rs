@@ -13,7 +13,7 @@ fn main() -> ExitCode {
         Ok(code) => code,
         Err(refusal) => {
             eprintln!("error: {refusal}");
-            cli::BAD_INPUT.into()
+            ExitCode::from(cli::BAD_INPUT)
         }
     }
 }

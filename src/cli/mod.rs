@@ -17,16 +17,7 @@ use flockform::{bench, export};
 pub const FAILED: u8 = 1;
 
 /// Exit code for input that was refused.
-pub const BAD_INPUT: Refused = Refused;
-
-/// Converts to exit code 2.
-pub struct Refused;
-
-impl From<Refused> for ExitCode {
-    fn from(_: Refused) -> Self {
-        ExitCode::from(2)
-    }
-}
+pub const BAD_INPUT: u8 = 2;
 
 /// Flocking rules that make a body deform or a swarm hold a formation.
 #[derive(Debug, Parser)]
@@ -83,18 +74,30 @@ pub enum BenchCommand {
 pub struct SceneArguments {
     /// Name of a bundled scene (see `flockform scenes`) or path of a scene file
     pub scene: String,
-    /// Override a key of the scene, validated like the file: lattice.spacing=0.5, roles[1].from=30
+    /// Override a key of the scene, validated like the file: lattice.spacing=0.5, roles\[1\].from=30
     #[arg(long = "set", value_name = "KEY.PATH=VALUE")]
     pub set: Vec<String>,
 }
 
 impl SceneArguments {
-    fn load(&self, more: impl IntoIterator<Item = String>) -> Result<Scene, SceneError> {
+    fn load(&self, more: impl IntoIterator<Item = String>) -> Result<Scene, Refusal> {
         let overrides: Vec<String> = self.set.iter().cloned().chain(more).collect();
         match bundled(&self.scene) {
-            Some(bundled) => bundled.load(&overrides),
-            None => Scene::from_file(&PathBuf::from(&self.scene), &overrides),
+            Some(bundled) => Ok(bundled.load(&overrides)?),
+            None => Ok(Scene::from_file(&self.path()?, &overrides)?),
         }
+    }
+
+    /// The scene as a path; a word that is no file is taken for the name of a bundled scene, misspelt.
+    fn path(&self) -> Result<PathBuf, Refusal> {
+        let path = PathBuf::from(&self.scene);
+        if path.exists() || self.scene.contains(['/', '\\', '.']) {
+            return Ok(path);
+        }
+        let likeness = |name: &str| strsim::jaro_winkler(name, &self.scene);
+        let names = bundled::SCENES.iter().map(|scene| scene.name);
+        let nearest = names.max_by(|a, b| likeness(a).total_cmp(&likeness(b))).unwrap_or_default();
+        Err(Refusal::NoScene { name: self.scene.clone(), nearest })
     }
 }
 
@@ -105,6 +108,8 @@ pub enum Refusal {
     Scene(#[from] SceneError),
     #[error("{0}")]
     Export(#[from] export::ExportError),
+    #[error("there is no scene file and no bundled scene `{name}`\n  help: the nearest bundled scene is `{nearest}`; `flockform scenes` lists them all")]
+    NoScene { name: String, nearest: &'static str },
     #[error("--threads {threads}: {error}\n  help: give a number from 1 to the machine's cores")]
     Threads { threads: usize, error: rayon::ThreadPoolBuildError },
 }

@@ -13,7 +13,7 @@ use crate::flock::role::Role;
 use crate::scene::Quantity;
 use crate::solve::sweep::{Order, Sweep, Update};
 
-/// A body on its way; positions in [length, world frame], shape \[count\].
+/// A body on its way; positions in \[length, world frame\], shape \[count\].
 #[derive(Debug)]
 pub struct Engine {
     body: Body,
@@ -54,9 +54,9 @@ struct PresentNeighbours {
 /// How far the body moved in the last step, and whether it still is one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Movement {
-    /// Largest one-step motion [length].
+    /// Largest one-step motion \[length\].
     pub largest_move: f64,
-    /// Largest distance from the reference place [length], and whose it is.
+    /// Largest distance from the reference place \[length\], and whose it is.
     pub largest_displacement: f64,
     pub farthest: usize,
     /// First particle whose position is not finite.
@@ -129,12 +129,12 @@ impl Engine {
         &self.breaks
     }
 
-    /// PE1 of one particle [length^2]; zero for the frame and for ghosts, which see nobody.
+    /// PE1 of one particle \[length^2\]; zero for the frame and for ghosts, which see nobody.
     pub fn pe1(&self, particle: usize) -> f64 {
         pe1(&self.interaction, particle, &self.present)
     }
 
-    /// PE2 of one particle [length].
+    /// PE2 of one particle \[length\].
     pub fn pe2(&self, particle: usize) -> f64 {
         pe2(particle, &self.present, &self.previous)
     }

@@ -1,8 +1,8 @@
 //! The continuum host: a scene is planned, stepped, watched.
 //!
 //! [`plan::Plan`] lays the scene out as arrays and index lists and says what it makes the program
-//! model; [`engine::Engine`] steps them; [`run::run`] is the loop around it, and everything that wants
-//! to see the body on the way (recorders, progress bars, interrupts) is a [`run::Watch`].
+//! model; [`engine::Engine`] steps them; [`run::run`] is the loop around it, and whoever wants to see
+//! the body on the way (a recorder, a progress bar, an interrupt) gives it a closure to call.
 
 pub mod engine;
 pub mod plan;

@@ -19,7 +19,7 @@ pub struct Plan {
     pub body: Body,
     pub interaction: Interaction,
     pub update: Update,
-    /// Radius within which neighbours are found anew at every step [length].
+    /// Radius within which neighbours are found anew at every step \[length\].
     pub present_radius: Option<f64>,
     /// Roles before the first step, shape \[count\].
     pub roles: Vec<Role>,
@@ -28,7 +28,7 @@ pub struct Plan {
     /// Bonds cut before the first step.
     pub cuts: Vec<Break>,
     pub stop: Stop,
-    /// Diagonal of the body's bounds [length].
+    /// Diagonal of the body's bounds \[length\].
     pub diagonal: f64,
     /// Indices of the particles kept at every step.
     pub probes: Vec<usize>,

@@ -8,12 +8,12 @@ use crate::flock::role::Role;
 #[derive(Clone, Debug)]
 pub struct Snapshot {
     pub step: usize,
-    /// Present positions [length, world frame].
+    /// Present positions \[length, world frame\].
     pub positions: Points,
     pub roles: Vec<Role>,
-    /// First pseudo-energy [length^2].
+    /// First pseudo-energy \[length^2\].
     pub pe1: Vec<f64>,
-    /// Second pseudo-energy [length].
+    /// Second pseudo-energy \[length\].
     pub pe2: Vec<f64>,
     /// Index pairs of the bonds broken so far.
     pub broken: Vec<[u32; 2]>,
@@ -32,7 +32,7 @@ impl Snapshot {
         }
     }
 
-    /// Sums of PE1 [length^2] and PE2 [length] over the body, in order of index.
+    /// Sums of PE1 \[length^2\] and PE2 \[length\] over the body, in order of index.
     pub fn energies(&self) -> [f64; 2] {
         let sum = |values: &[f64]| {
             values.iter().zip(&self.roles).filter(|(_, role)| role.is_body()).map(|(value, _)| value).sum()

@@ -137,7 +137,7 @@ fn cautions(scene: &Scene, plan: &Plan) -> Vec<String> {
     {
         cautions.push("over-relaxation in a synchronous update makes the fastest mode grow".into());
     }
-    if matches!(plan.present_radius, Some(_)) && rule.mean == Mean::Barycentre {
+    if plan.present_radius.is_some() && rule.mean == Mean::Barycentre {
         cautions.push(
             "the barycentre of whoever is near keeps no distance: the body contracts; use rule.mean.kind = \"spaced\"".into(),
         );

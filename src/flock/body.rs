@@ -41,7 +41,7 @@ pub struct Body {
     pub lattice: Lattice,
     /// Column and row of each particle, shape \[count\].
     pub sites: Vec<Site>,
-    /// Reference positions [length], shape \[count\]; shared with the interaction.
+    /// Reference positions \[length\], shape \[count\]; shared with the interaction.
     pub reference: Arc<Points>,
     /// Whether the particle belongs to the frame, shape \[count\].
     pub is_frame: Vec<bool>,
@@ -86,7 +86,7 @@ impl Body {
         self.sites.len()
     }
 
-    /// Bounds of the body without its frame [length].
+    /// Bounds of the body without its frame \[length\].
     pub fn bounds(&self) -> ([f64; 2], [f64; 2]) {
         let matter = (0..self.count()).filter(|&i| !self.is_frame[i]);
         self.reference.bounds(matter).unwrap_or(([0.0; 2], [0.0; 2]))

@@ -4,19 +4,19 @@
 use super::neighbourhood::Neighbours;
 use super::points::{Points, distance};
 use super::role::Role;
-use super::shape::segments_cross;
+use super::shape::{Segment, segments_cross};
 
 /// When a bond breaks.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Threshold {
-    /// Longer than this (the paper's `df`) [length].
+    /// Longer than this (the paper's `df`) \[length\].
     Distance(f64),
-    /// Longer than this multiple of its reference length [1].
+    /// Longer than this multiple of its reference length \[1\].
     Stretch(f64),
 }
 
 impl Threshold {
-    /// Whether a bond of reference length `rest` breaks at `length` [length].
+    /// Whether a bond of reference length `rest` breaks at `length` \[length\].
     pub fn is_passed(self, length: f64, rest: f64) -> bool {
         match self {
             Threshold::Distance(df) => length > df,
@@ -45,9 +45,9 @@ pub struct Break {
     pub step: usize,
     /// Indices of the two particles, the lower first.
     pub pair: [u32; 2],
-    /// Middle of the bond in the reference configuration [length].
+    /// Middle of the bond in the reference configuration \[length\].
     pub place: [f64; 2],
-    /// Length at which it broke [length]; its present length for bonds cut or lost otherwise.
+    /// Length at which it broke \[length\]; its present length for bonds cut or lost otherwise.
     pub length: f64,
 }
 
@@ -90,10 +90,10 @@ impl Bonds {
         });
     }
 
-    /// Breaks every bond whose reference segment crosses the cut from `from` to `to` [length].
+    /// Breaks every bond whose reference segment crosses the cut from `from` to `to` \[length\].
     pub fn cut(
         &mut self,
-        (from, to): ([f64; 2], [f64; 2]),
+        (from, to): Segment,
         neighbours: &Neighbours,
         reference: &Points,
         breaks: &mut Vec<Break>,
@@ -148,7 +148,7 @@ impl Bonds {
     }
 
     /// Where particle `j` sees the ghost of the neighbour at the other end of `bond`, if it does
-    /// [length].
+    /// \[length\].
     pub fn ghost(
         &self,
         j: usize,

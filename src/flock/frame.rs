@@ -84,7 +84,7 @@ impl Frame {
         &self.served[self.starts[k] as usize..self.starts[k + 1] as usize]
     }
 
-    /// Displacement of frame point number `k` when the body stands at `seen` [length].
+    /// Displacement of frame point number `k` when the body stands at `seen` \[length\].
     pub fn displacement(&self, k: usize, reference: &Points, seen: &Points) -> [f64; 2] {
         let served = self.served_by(k);
         let (mut x, mut y) = (0.0, 0.0);

@@ -14,7 +14,7 @@ pub struct CellGrid {
 }
 
 impl CellGrid {
-    /// Sorts the points marked in `included` into cells at least `radius` wide [length].
+    /// Sorts the points marked in `included` into cells at least `radius` wide \[length\].
     /// Points that are not finite are left out: nobody has them as a neighbour.
     pub fn fill(&mut self, points: &Points, included: &[bool], radius: f64) {
         let usable = |i: &usize| included[*i] && points.x[*i].is_finite() && points.y[*i].is_finite();
@@ -27,7 +27,7 @@ impl CellGrid {
         // A few far points must not ask for more cells than there are points to put in them.
         let extent = [high[0] - low[0], high[1] - low[1]];
         let widest = extent[0].max(extent[1]);
-        let most_per_axis = (2.0 * (count as f64).sqrt()).max(1.0).min(4096.0);
+        let most_per_axis = (2.0 * (count as f64).sqrt()).clamp(1.0, 4096.0);
         self.cell = radius.max(widest / most_per_axis);
         self.columns = (extent[0] / self.cell) as usize + 1;
         self.rows = (extent[1] / self.cell) as usize + 1;

@@ -11,19 +11,19 @@ use super::rules::{Neighbour, Own, Rule};
 #[derive(Clone, Debug)]
 pub struct Interaction {
     pub rule: Rule,
-    /// Reference positions [length], shape \[count\].
+    /// Reference positions \[length\], shape \[count\].
     pub reference: Arc<Points>,
     pub neighbours: Neighbours,
     /// Fixed weights, parallel to the neighbours' index list; all 1 where absent.
     pub weights: Option<Vec<f64>>,
-    /// Rest offsets [length], shape \[count\]; all zero where absent.
+    /// Rest offsets \[length\], shape \[count\]; all zero where absent.
     pub rest: Option<Points>,
     /// Broken bonds; none can break where absent.
     pub bonds: Option<Bonds>,
 }
 
 impl Interaction {
-    /// Target position of `particle` when all stand at `present` [length, world frame].
+    /// Target position of `particle` when all stand at `present` \[length, world frame\].
     pub fn target(&self, particle: usize, present: &Points) -> [f64; 2] {
         let own = Own {
             present: present.get(particle),

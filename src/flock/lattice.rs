@@ -10,7 +10,7 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 /// Integer coordinates of a site: `[column, row]`.
 pub type Site = [i32; 2];
 
-/// Which lattice, with its spacings [length] and angle [rad].
+/// Which lattice, with its spacings \[length\] and angle \[rad\].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LatticeKind {
     Square {
@@ -29,7 +29,7 @@ pub enum LatticeKind {
     Hexagonal {
         spacing: f64,
     },
-    /// Edges `a` along x and `b` at `angle` [rad] from it.
+    /// Edges `a` along x and `b` at `angle` \[rad\] from it.
     Oblique {
         a: f64,
         b: f64,
@@ -53,7 +53,7 @@ pub struct Lattice {
 }
 
 impl Lattice {
-    /// `origin` is the place of site (0, 0) [length]; `orientation` turns the lattice about it [rad].
+    /// `origin` is the place of site (0, 0) \[length\]; `orientation` turns the lattice about it \[rad\].
     pub fn new(kind: LatticeKind, origin: [f64; 2], orientation: f64) -> Self {
         let half_root3 = 3f64.sqrt() / 2.0;
         let (e1, e2) = match kind {
@@ -111,7 +111,7 @@ impl Lattice {
         [self.origin[0] + x, self.origin[1] + y]
     }
 
-    /// Vector from a site to the site `offset` away from it [length].
+    /// Vector from a site to the site `offset` away from it \[length\].
     pub fn vector(&self, offset: Site) -> [f64; 2] {
         combine([self.e1, self.e2], offset)
     }
@@ -125,7 +125,7 @@ impl Lattice {
         [(dx * by - dy * bx) / area, (dy * ax - dx * ay) / area]
     }
 
-    /// Smallest distance between two sites [length]: the scale residuals are relative to.
+    /// Smallest distance between two sites \[length\]: the scale residuals are relative to.
     pub fn spacing(&self) -> f64 {
         self.first_neighbours(0).iter().map(|&offset| norm(self.vector(offset))).fold(f64::INFINITY, f64::min)
     }
@@ -142,7 +142,7 @@ impl Lattice {
         }
     }
 
-    /// Area of the Voronoi cell of one particle [length^2].
+    /// Area of the Voronoi cell of one particle \[length^2\].
     pub fn cell_area(&self) -> f64 {
         let grid_cell = (self.e1[0] * self.e2[1] - self.e1[1] * self.e2[0]).abs();
         match self.kind {
@@ -165,7 +165,7 @@ impl Lattice {
         }
     }
 
-    /// Offsets to the sites within `radius` [length] of a site of `sublattice`, nearest first. Ties in
+    /// Offsets to the sites within `radius` \[length\] of a site of `sublattice`, nearest first. Ties in
     /// distance (1e-9 relative) are ordered in opposite pairs, by the angle of the pair and then by
     /// the angle itself, so that cutting the list at an even number keeps a Bravais neighbourhood
     /// balanced: east, west, north, south on the square.

@@ -1,15 +1,15 @@
 //! How leaders move: displacement from where they stood when they became leaders, as a function of
 //! the steps since.
 
-/// A leader's program; vectors in [length, world frame], times in steps since it became a leader.
+/// A leader's program; vectors in \[length, world frame\], times in steps since it became a leader.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Motion {
-    /// Constant velocity [length per step].
+    /// Constant velocity \[length per step\].
     Velocity { per_step: [f64; 2] },
     /// Displacements at given steps, ascending; before the first it runs from zero at step 0, after
     /// the last it holds.
     Keyframes { frames: Vec<Keyframe>, interpolation: Interpolation },
-    /// Rotation by `angle` [rad], stretch and shear about `about`, reached in even parts over `steps`.
+    /// Rotation by `angle` \[rad\], stretch and shear about `about`, reached in even parts over `steps`.
     Affine { about: [f64; 2], angle: f64, stretch: [f64; 2], shear: [f64; 2], steps: f64 },
     /// `amplitude * sin(2 pi (step / period + phase))`, less its value at step 0.
     Sinusoid { amplitude: [f64; 2], period: f64, phase: f64 },
@@ -35,7 +35,7 @@ pub enum Interpolation {
 }
 
 impl Motion {
-    /// Displacement after `step` steps of the leader number `which`, who started from `base` [length].
+    /// Displacement after `step` steps of the leader number `which`, who started from `base` \[length\].
     pub fn displacement(&self, step: f64, which: usize, base: [f64; 2]) -> [f64; 2] {
         match self {
             Motion::Velocity { per_step } => per_step.map(|v| v * step),

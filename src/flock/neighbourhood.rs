@@ -16,9 +16,9 @@ pub enum Neighbourhood {
     Second,
     /// The sites at these offsets, in columns and rows.
     Offsets(Vec<Site>),
-    /// The sites within this distance in the reference configuration [length].
+    /// The sites within this distance in the reference configuration \[length\].
     Within { radius: f64 },
-    /// Whoever is within this distance now [length]: the paper's liquid and gas.
+    /// Whoever is within this distance now \[length\]: the paper's liquid and gas.
     Present { radius: f64 },
 }
 
@@ -140,8 +140,8 @@ impl Neighbours {
         self.starts.clear();
         self.index.clear();
         self.starts.push(0);
-        for particle in 0..present.len() {
-            if members[particle] {
+        for (particle, &is_member) in members.iter().enumerate() {
+            if is_member {
                 let begin = self.index.len();
                 grid.within(present, particle, radius, &mut self.index);
                 // Index order, so that the sum does not depend on how the cells were walked.

@@ -3,7 +3,7 @@
 use super::interaction::Interaction;
 use super::points::{Points, distance};
 
-/// `PE1(j) = sum_k (d(k,j) - d0(k,j))^2` over the live bonds of `particle` [length^2].
+/// `PE1(j) = sum_k (d(k,j) - d0(k,j))^2` over the live bonds of `particle` \[length^2\].
 pub fn pe1(interaction: &Interaction, particle: usize, present: &Points) -> f64 {
     let reference = &interaction.reference;
     interaction.live_neighbours(particle).fold(0.0, |sum, k| {
@@ -13,7 +13,7 @@ pub fn pe1(interaction: &Interaction, particle: usize, present: &Points) -> f64 
     })
 }
 
-/// `PE2(j) = |x_j(t) - x_j(t-1)|`, the length of the particle's last move [length].
+/// `PE2(j) = |x_j(t) - x_j(t-1)|`, the length of the particle's last move \[length\].
 pub fn pe2(particle: usize, present: &Points, previous: &Points) -> f64 {
     distance(present.get(particle), previous.get(particle))
 }

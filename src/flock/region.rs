@@ -8,12 +8,12 @@ use super::points::distance;
 #[derive(Clone, Debug, PartialEq)]
 pub enum Region {
     All,
-    /// The particles within `depth` [length] of the body's outermost coordinate on that side.
+    /// The particles within `depth` \[length\] of the body's outermost coordinate on that side.
     Edge {
         side: Side,
         depth: f64,
     },
-    /// The particles in this box, its boundary included [length].
+    /// The particles in this box, its boundary included \[length\].
     Box {
         min: [f64; 2],
         max: [f64; 2],

@@ -2,7 +2,7 @@
 
 use super::specimen::Specimen;
 
-/// A solid region [length, world frame]; its boundary belongs to it, within the tolerance given to
+/// A solid region \[length, world frame\]; its boundary belongs to it, within the tolerance given to
 /// [`Shape::contains`].
 #[derive(Clone, Debug, PartialEq)]
 pub enum Shape {
@@ -27,7 +27,7 @@ pub enum Shape {
 }
 
 impl Shape {
-    /// Whether `point` lies inside or within `tolerance` [length] of the boundary.
+    /// Whether `point` lies inside or within `tolerance` \[length\] of the boundary.
     pub fn contains(&self, point: [f64; 2], tolerance: f64) -> bool {
         match self {
             Shape::Rectangle { min, max } => {
@@ -44,7 +44,7 @@ impl Shape {
         }
     }
 
-    /// Lowest and highest coordinate on each axis [length].
+    /// Lowest and highest coordinate on each axis \[length\].
     pub fn bounds(&self) -> ([f64; 2], [f64; 2]) {
         match self {
             Shape::Rectangle { min, max } => (*min, *max),
@@ -69,6 +69,9 @@ impl Shape {
         }
     }
 }
+
+/// The two ends of a straight line \[length\].
+pub type Segment = ([f64; 2], [f64; 2]);
 
 /// Even-odd test; a negative tolerance shrinks the polygon.
 fn polygon_contains(vertices: &[[f64; 2]], [x, y]: [f64; 2], tolerance: f64) -> bool {

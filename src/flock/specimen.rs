@@ -6,15 +6,15 @@
 /// A dog-bone whose axis runs along y, centred on x = 0, from y = 0 at the lower grip.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Specimen {
-    /// Overall length [length].
+    /// Overall length \[length\].
     pub overall: f64,
-    /// Width of the grips [length].
+    /// Width of the grips \[length\].
     pub grip_width: f64,
-    /// Width of the gauge section [length].
+    /// Width of the gauge section \[length\].
     pub gauge_width: f64,
-    /// Length of the straight, narrow section [length].
+    /// Length of the straight, narrow section \[length\].
     pub gauge_length: f64,
-    /// Radius of the fillets [length].
+    /// Radius of the fillets \[length\].
     pub fillet: f64,
     /// Whether the axis lies along x instead (the body is then centred on y = 0).
     pub lying: bool,
@@ -38,7 +38,7 @@ impl Specimen {
         Self { overall, grip_width, gauge_width, gauge_length, fillet, lying: false }
     }
 
-    /// Half width at distance `along` from the lower end [length].
+    /// Half width at distance `along` from the lower end \[length\].
     pub fn half_width(&self, along: f64) -> f64 {
         let beyond_gauge = (along - self.overall / 2.0).abs() - self.gauge_length / 2.0;
         let (narrow, wide) = (self.gauge_width / 2.0, self.grip_width / 2.0);

@@ -66,7 +66,7 @@ pub(crate) enum Content {
 }
 
 impl Document {
-    /// Parses the text of `file` and lays the overrides, such as `roles[1].speed=0.6`, over it in order.
+    /// Parses the text of `file` and lays the overrides, such as `roles\[1\].speed=0.6`, over it in order.
     ///
     /// An override's value is TOML; text that is not is taken as a bare string.
     ///

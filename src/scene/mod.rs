@@ -24,6 +24,7 @@ use crate::flock::neighbourhood::Neighbourhood;
 use crate::flock::region::{Region, Side};
 use crate::flock::role::Role;
 use crate::flock::rules::{Axis, Feedback, Mean};
+use crate::flock::shape::Segment;
 use crate::solve::sweep::Update;
 
 pub use bundled::{Bundled, bundled};
@@ -51,8 +52,8 @@ pub struct Scene {
     pub update: Update,
     pub roles: Vec<RoleEntry>,
     pub fracture: Option<Fracture>,
-    /// Ends of each cut [length].
-    pub cuts: Vec<([f64; 2], [f64; 2])>,
+    /// Ends of each cut \[length\].
+    pub cuts: Vec<Segment>,
     pub stop: Stop,
     pub record: Record,
     document: Document,
@@ -84,7 +85,7 @@ pub enum Weights {
 pub struct PoissonTerm {
     pub k: f64,
     pub pull: Axis,
-    /// Coordinate of the central axis [length]; the middle of the body where `None`.
+    /// Coordinate of the central axis \[length\]; the middle of the body where `None`.
     pub centre: Option<f64>,
     pub exponent: f64,
 }

@@ -50,7 +50,7 @@ fn split_assignment(text: &str) -> Option<(&str, &str)> {
     Some((text[..at].trim(), text[at + 1..].trim()))
 }
 
-/// Reads a path such as `roles[1].motion`, `roles.1.motion` or `names."a.b"`.
+/// Reads a path such as `roles\[1\].motion`, `roles.1.motion` or `names."a.b"`.
 pub(crate) fn parse_path(path: &str) -> Result<Vec<Segment>, String> {
     let mut segments = Vec::new();
     let mut rest = path;

@@ -42,7 +42,7 @@ impl fmt::Display for Place {
 pub struct Problem {
     /// Where it stands.
     pub place: Place,
-    /// The key path, such as `roles[1].motion.per_step`; empty for the document as a whole.
+    /// The key path, such as `roles\[1\].motion.per_step`; empty for the document as a whole.
     pub key: String,
     /// The value that was found there, abbreviated; `None` where there is none to show.
     pub found: Option<String>,

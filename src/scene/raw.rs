@@ -4,6 +4,9 @@
 //! in steps; angles in degrees. The doc comments here are the documentation of the scene format:
 //! `flockform schema` prints them.
 
+// Units stand in brackets as they are: the schema prints these comments, which escapes would spoil.
+#![allow(rustdoc::broken_intra_doc_links)]
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

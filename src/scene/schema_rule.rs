@@ -190,7 +190,7 @@ impl<'s> Rule<'s> {
         self.all(keyword).find_map(Value::as_u64).and_then(|count| usize::try_from(count).ok())
     }
 
-    /// The unit as a suffix to a message, such as ` [length]`.
+    /// The unit as a suffix to a message, such as ` \[length\]`.
     pub(crate) fn unit_suffix(&self) -> String {
         let described = || self.all("description").filter_map(Value::as_str).find_map(trailing_unit);
         let unit = self.text("x-unit").or_else(described);

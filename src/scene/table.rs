@@ -5,7 +5,7 @@ use crate::flock::points::{Points, distance};
 /// Rows of a displacement file, and how they name their particle.
 #[derive(Clone, Debug, PartialEq)]
 pub enum DisplacementTable {
-    /// `x,y,ux,uy`: by reference position [length].
+    /// `x,y,ux,uy`: by reference position \[length\].
     ByPlace(Vec<([f64; 2], [f64; 2])>),
     /// `id,ux,uy`: by id, counted from 1.
     ById(Vec<(usize, [f64; 2])>),

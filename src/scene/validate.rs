@@ -20,7 +20,7 @@ use crate::flock::neighbourhood::Neighbourhood;
 use crate::flock::region::{Region, Side};
 use crate::flock::role::Role;
 use crate::flock::rules::{Axis, Feedback, FeedbackReference, Mean, Origin};
-use crate::flock::shape::Shape;
+use crate::flock::shape::{Segment, Shape};
 use crate::flock::specimen::Specimen;
 use crate::solve::sweep::{Order, Update};
 
@@ -424,7 +424,7 @@ fn fracture(raw: &Option<RawFracture>, refuse: Refuse<'_>) -> Result<Option<Frac
     Ok(Some(Fracture { threshold, ghosts }))
 }
 
-fn cuts(raw: &[RawCut], refuse: Refuse<'_>) -> Result<Vec<([f64; 2], [f64; 2])>, SceneError> {
+fn cuts(raw: &[RawCut], refuse: Refuse<'_>) -> Result<Vec<Segment>, SceneError> {
     if let Some(k) = raw.iter().position(|cut| cut.from == cut.to) {
         let message = format!("from = to = [{}, {}]: the cut has no length", raw[k].from[0], raw[k].from[1]);
         return Err(refuse(&format!("cuts[{k}].to"), message, "give its other end"));

@@ -13,7 +13,7 @@ use crate::flock::rules::Mean;
 /// What power iteration found.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SpectralRadius {
-    /// Largest modulus of an eigenvalue: the factor by which the slowest mode shrinks per step [1].
+    /// Largest modulus of an eigenvalue: the factor by which the slowest mode shrinks per step \[1\].
     pub radius: f64,
     pub iterations: usize,
     /// Whether the estimate had settled to 1e-9 when the iteration stopped.

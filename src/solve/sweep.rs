@@ -27,7 +27,7 @@ pub enum Order {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Update {
     pub order: Order,
-    /// `x <- x + damping (target - x)` [1]; 1 takes the target itself.
+    /// `x <- x + damping (target - x)` \[1\]; 1 takes the target itself.
     pub damping: f64,
 }
 

@@ -18,7 +18,7 @@ pub enum FeedbackReference {
 /// Eq. 4 with its parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Feedback {
-    /// Feedback factor `fd` [1].
+    /// Feedback factor `fd` \[1\].
     pub factor: f64,
     pub reference: FeedbackReference,
 }

@@ -19,7 +19,7 @@ pub use power::Origin;
 /// One neighbour as a rule sees it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Neighbour {
-    /// Present position [length, world frame].
+    /// Present position \[length, world frame\].
     pub position: [f64; 2],
     /// Fixed weight; 1 where the scene gives none.
     pub weight: f64,
@@ -28,11 +28,11 @@ pub struct Neighbour {
 /// The particle whose target is wanted.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Own {
-    /// Position before this step [length, world frame].
+    /// Position before this step \[length, world frame\].
     pub present: [f64; 2],
-    /// Position in the reference configuration [length, world frame].
+    /// Position in the reference configuration \[length, world frame\].
     pub reference: [f64; 2],
-    /// Added to the mean [length]: see [`Rule::rest_offset`]. Zero for the literal formulas.
+    /// Added to the mean \[length\]: see [`Rule::rest_offset`]. Zero for the literal formulas.
     pub rest: [f64; 2],
 }
 
@@ -45,7 +45,7 @@ pub enum Mean {
     Distance { power: f64 },
     /// The power mean of each coordinate; exponent 0 is the geometric mean.
     Power { exponent: f64, origin: Origin },
-    /// The mean of the places at `spacing` [length] from each neighbour, towards the particle.
+    /// The mean of the places at `spacing` \[length\] from each neighbour, towards the particle.
     Spaced { spacing: f64 },
 }
 
@@ -67,7 +67,7 @@ impl Rule {
         *self == Self::BARYCENTRE
     }
 
-    /// Where the particle moves [length, world frame]. A particle without neighbours stays: no target
+    /// Where the particle moves \[length, world frame\]. A particle without neighbours stays: no target
     /// is computed from nothing. Finite input gives finite output unless the result itself overflows.
     pub fn target(&self, own: &Own, neighbours: impl Iterator<Item = Neighbour> + Clone) -> [f64; 2] {
         let Some(mean) = self.mean(own.present, neighbours) else { return own.present };

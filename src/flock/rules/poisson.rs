@@ -18,20 +18,20 @@ pub enum Axis {
 /// Eq. 2 with its parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Poisson {
-    /// `K` [1]: response per unit of displacement along `pull`; negative draws the sides together.
+    /// `K` \[1\]: response per unit of displacement along `pull`; negative draws the sides together.
     pub k: f64,
     /// The axis whose displacement acts (the paper's x).
     pub pull: Axis,
-    /// Coordinate of the central axis across `pull` [length].
+    /// Coordinate of the central axis across `pull` \[length\].
     pub centre: f64,
-    /// Half width of the body across `pull` [length], greater than 0.
+    /// Half width of the body across `pull` \[length\], greater than 0.
     pub half_width: f64,
     /// Exponent of the distance function: 1 linear, 0 its sign alone.
     pub exponent: f64,
 }
 
 impl Poisson {
-    /// Distance function `da` [1] at a reference position [length].
+    /// Distance function `da` \[1\] at a reference position \[length\].
     pub fn distance_from_axis(&self, reference: [f64; 2]) -> f64 {
         let across = match self.pull {
             Axis::X => reference[1],

@@ -12,7 +12,7 @@ use super::Neighbour;
 /// What coordinates are measured from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Origin {
-    /// `margin` [length] below the lowest neighbour, on each axis: translation-invariant.
+    /// `margin` \[length\] below the lowest neighbour, on each axis: translation-invariant.
     Moving { margin: f64 },
     /// The axes' own zero: the literal formula. A particle with a neighbour at a coordinate that
     /// is not positive has no mean and stays.

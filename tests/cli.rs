@@ -1,0 +1,376 @@
+//! The program as a person meets it: what it prints, what it writes, and how it refuses.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use std::time::{Duration, Instant};
+
+fn flockform(arguments: &[&str], folder: &Path) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_flockform"))
+        .args(arguments)
+        .current_dir(folder)
+        .env_remove("RUST_LOG")
+        .output()
+        .expect("the program starts")
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+fn temporary() -> tempfile::TempDir {
+    tempfile::tempdir().expect("a temporary folder")
+}
+
+/// Everything below a folder, hidden files included.
+fn files(folder: &Path) -> Vec<PathBuf> {
+    let Ok(entries) = std::fs::read_dir(folder) else { return Vec::new() };
+    entries
+        .flat_map(|entry| {
+            let path = entry.expect("readable").path();
+            if path.is_dir() { files(&path) } else { vec![path] }
+        })
+        .collect()
+}
+
+/// Runs and expects a refusal: exit code 2, these words, nothing on disk.
+fn refused(arguments: &[&str], words: &[&str]) {
+    let folder = temporary();
+    let before = files(folder.path()).len();
+    let output = flockform(arguments, folder.path());
+    let said = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {said}");
+    for word in words {
+        assert!(said.contains(word), "{arguments:?} does not say `{word}`:\n{said}");
+    }
+    assert_eq!(files(folder.path()).len(), before, "{arguments:?} left files");
+}
+
+/// As [`refused`] for a scene that is the bundled one with overrides.
+fn refused_with(scene: &str, overrides: &[&str], words: &[&str]) {
+    let mut arguments = vec!["run", scene];
+    overrides.iter().for_each(|set| arguments.extend(["--set", set]));
+    refused(&arguments, words);
+}
+
+fn run_in(folder: &Path, arguments: &[&str]) -> String {
+    let output = flockform(arguments, folder);
+    assert!(output.status.success(), "{arguments:?}: {}", text(&output.stderr));
+    text(&output.stdout)
+}
+
+fn json(path: &Path) -> serde_json::Value {
+    serde_json::from_str(&std::fs::read_to_string(path).expect("written")).expect("valid JSON")
+}
+
+#[test]
+fn the_main_job_writes_the_figures_and_tables_of_the_paper() {
+    let folder = temporary();
+    let said = run_in(folder.path(), &["run", "tension"]);
+    assert!(said.contains("step 401") && said.contains("out/tension"), "{said}");
+    let out = folder.path().join("out/tension");
+    for figure in ["configuration_0001", "configuration_0020", "pe1_0020", "configuration_0401", "probes"] {
+        for ending in ["svg", "png"] {
+            assert!(out.join(format!("{figure}.{ending}")).is_file(), "{figure}.{ending}");
+        }
+    }
+    let summary = json(&out.join("summary.json"));
+    assert_eq!(summary["stop_reason"], "steps");
+    assert_eq!(summary["steps"], 401);
+    assert_eq!(summary["counts"]["frame"], 44);
+    assert_eq!(summary["scene"]["lattice"]["spacing"], 1.0);
+    let table = std::fs::read_to_string(out.join("final.csv")).expect("written");
+    assert_eq!(table.lines().next(), Some("id,column,row,role,X,Y,x,y,pe1,pe2"));
+    assert_eq!(table.lines().count(), 145);
+    assert!(table.lines().nth(67).is_some_and(|row| row.starts_with("67,6,7,follower,")));
+}
+
+#[test]
+fn a_second_run_takes_a_new_folder_unless_one_is_named() {
+    let folder = temporary();
+    run_in(folder.path(), &["run", "tension", "--steps", "2", "-q"]);
+    let said = run_in(folder.path(), &["run", "tension", "--steps", "2"]);
+    assert!(said.contains("out/tension-2"), "{said}");
+    let again = flockform(&["run", "tension", "--steps", "2", "--out", "out/tension"], folder.path());
+    assert_eq!(again.status.code(), Some(2));
+    assert!(text(&again.stderr).contains("--force"), "{}", text(&again.stderr));
+    run_in(folder.path(), &["run", "tension", "--steps", "3", "--out", "out/tension", "--force"]);
+    assert_eq!(json(&folder.path().join("out/tension/summary.json"))["steps"], 3);
+}
+
+#[test]
+fn force_leaves_a_folder_alone_that_is_not_ours() {
+    let folder = temporary();
+    std::fs::create_dir(folder.path().join("mine")).expect("made");
+    std::fs::write(folder.path().join("mine/thesis.txt"), "years").expect("written");
+    let output = flockform(&["run", "tension", "--out", "mine", "--force"], folder.path());
+    assert_eq!(output.status.code(), Some(2));
+    assert!(text(&output.stderr).contains("does not look like an output of flockform"));
+    assert_eq!(files(folder.path()).len(), 1);
+}
+
+#[test]
+fn quiet_prints_nothing_and_a_pipe_gets_no_bar() {
+    let folder = temporary();
+    let quiet = flockform(&["run", "tension", "--steps", "2", "--quiet"], folder.path());
+    assert!(quiet.stdout.is_empty() && quiet.stderr.is_empty(), "{}", text(&quiet.stderr));
+    let piped = flockform(&["run", "tension", "--steps", "2"], folder.path());
+    assert!(!text(&piped.stderr).contains('\r') && !text(&piped.stdout).contains('\x1b'));
+}
+
+#[test]
+fn overrides_and_steps_reach_the_scene() {
+    let folder = temporary();
+    let sets = ["run", "tension", "--steps", "7", "--set", "roles[1].motion.per_step=[0.1, 0.2]", "--out", "o"];
+    run_in(folder.path(), &sets);
+    let summary = json(&folder.path().join("o/summary.json"));
+    assert_eq!(summary["steps"], 7);
+    assert_eq!(summary["scene"]["roles"][1]["motion"]["per_step"], serde_json::json!([0.1, 0.2]));
+}
+
+#[test]
+fn paraview_frames_are_written_when_asked_for() {
+    let folder = temporary();
+    run_in(folder.path(), &["run", "tension", "--steps", "5", "--set", "record.vtk_every=2", "--out", "o"]);
+    let frames = files(&folder.path().join("o/steps"));
+    // Steps 0, 2 and 4, and the last one.
+    assert_eq!(frames.len(), 4, "{frames:?}");
+    assert!(folder.path().join("o/steps.pvd").is_file());
+}
+
+#[test]
+fn the_fracture_scene_breaks_near_the_top_and_its_variants_elsewhere_or_faster() {
+    let folder = temporary();
+    let broken = |scene: &str| {
+        run_in(folder.path(), &["run", scene, "-q", "--out", scene]);
+        let summary = json(&folder.path().join(scene).join("summary.json"));
+        let first = &summary["broken_bonds"]["first"];
+        (first["along"].as_f64().expect("broke"), first["step"].as_u64().expect("broke"))
+    };
+    let (top, _) = broken("fracture");
+    // The profile narrows between 0.31 and 0.69 of the length; its middle is at 0.5.
+    assert!((0.67..0.71).contains(&top), "{top}");
+    let (slow, _) = broken("fracture-slow");
+    assert!((0.62..0.67).contains(&slow), "{slow}: slower, lower");
+}
+
+#[test]
+fn a_run_that_diverges_fails_names_the_cause_and_keeps_the_last_good_state() {
+    let folder = temporary();
+    let arguments =
+        ["run", "tension", "--out", "o", "--set", "rule.feedback={factor=1.0}", "--set", "stop.steps=4000"];
+    let output = flockform(&arguments, folder.path());
+    assert_eq!(output.status.code(), Some(1), "{}", text(&output.stderr));
+    let said = text(&output.stdout);
+    assert!(said.contains("diverged at step") && said.contains("particle"), "{said}");
+    assert!(said.contains("feedback factor 1"), "{said}");
+    let summary = json(&folder.path().join("o/summary.json"));
+    assert_eq!(summary["stop_reason"], "diverged");
+    let table = std::fs::read_to_string(folder.path().join("o/final.csv")).expect("written");
+    assert!(!table.contains("NaN") && !table.contains("inf"));
+}
+
+/// Starts a run that would go on for minutes.
+fn long_run(folder: &Path) -> std::process::Child {
+    let arguments = ["run", "tension", "--out", "o", "--set", "stop.steps=100000000", "--set", "record={}"];
+    let mut command = Command::new(env!("CARGO_BIN_EXE_flockform"));
+    let child = command.args(arguments).current_dir(folder).stdout(std::process::Stdio::piped()).spawn();
+    let child = child.expect("the program starts");
+    // The hidden folder shows that it has begun.
+    let patience = Instant::now();
+    while std::fs::read_dir(folder).expect("readable").next().is_none() {
+        assert!(patience.elapsed() < Duration::from_secs(30), "the run never began");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    std::thread::sleep(Duration::from_millis(200));
+    child
+}
+
+fn signal(child: &std::process::Child, name: &str) {
+    let sent = Command::new("kill").args([name, &child.id().to_string()]).status().expect("kill is there");
+    assert!(sent.success());
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupt_stops_at_the_next_step_and_writes_what_there_is() {
+    for name in ["-INT", "-TERM"] {
+        let folder = temporary();
+        let child = long_run(folder.path());
+        signal(&child, name);
+        let output = child.wait_with_output().expect("ends");
+        assert_eq!(output.status.code(), Some(1), "{name}");
+        assert!(text(&output.stdout).contains("interrupted"), "{}", text(&output.stdout));
+        assert_eq!(json(&folder.path().join("o/summary.json"))["stop_reason"], "interrupted");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn a_killed_run_leaves_nothing_at_the_output_s_place() {
+    let folder = temporary();
+    let mut child = long_run(folder.path());
+    child.kill().expect("kills");
+    child.wait().expect("ends");
+    assert!(!folder.path().join("o").exists());
+}
+
+#[test]
+fn a_missing_scene_is_refused_with_the_nearest_name() {
+    refused(&["run", "tensoin"], &["no bundled scene `tensoin`", "`tension`", "flockform scenes"]);
+    refused(&["run", "scenes/nowhere.toml"], &["scenes/nowhere.toml", "cannot be read"]);
+    refused(&["plan", "fractur"], &["`fracture`"]);
+}
+
+#[test]
+fn a_misspelt_key_is_refused_with_line_and_nearest_key() {
+    let folder = temporary();
+    let path = folder.path().join("mine.toml");
+    let scene = "title = \"t\"\n[lattice]\nkind = \"square\"\nspcaing = 1.0\n[body]\nshape = { kind = \"grid\", columns = 3, rows = 3 }\n";
+    std::fs::write(&path, scene).expect("written");
+    let path = path.display().to_string();
+    refused(&["run", &path], &["mine.toml:4", "spcaing", "`spacing`"]);
+}
+
+#[test]
+fn values_out_of_range_are_refused_with_the_range() {
+    refused_with("tension", &["lattice.spacing=-1.0"], &["--set lattice.spacing=-1.0", "greater than 0"]);
+    refused_with("tension", &["lattice.spacing=nan"], &["finite"]);
+    refused_with("tension", &["roles[1].motion.per_step=[0.6, inf]"], &["finite"]);
+    refused_with("tension", &["update.damping=0"], &["greater than 0"]);
+    refused_with("tension", &["update.damping=2.5"], &["2"]);
+    refused_with("lattice-oblique", &["lattice.angle=180"], &["less than 180"]);
+    refused_with("tension", &["body.shape.columns=0"], &["body.shape.columns", "1"]);
+    refused_with("fracture", &["fracture.distance=0"], &["greater than 0"]);
+    refused_with("tension", &["stop.steps=0"], &["stop.steps"]);
+}
+
+#[test]
+fn wrong_choices_are_refused_with_the_choices() {
+    refused_with("tension", &["lattice.kind=sqare"], &["`square`"]);
+    refused_with("tension", &["frame=laged"], &["`lagged`"]);
+    refused_with("tension", &["roles[0].role=ghots"], &["`ghost`"]);
+    refused_with("tension", &["lattice={kind=\"square\",spacing=1.0,a=2.0}"], &["a"]);
+}
+
+#[test]
+fn a_body_that_cannot_be_is_refused_with_the_remedy() {
+    refused_with(
+        "tension",
+        &["body.shape={kind=\"disc\",radius=0.1}", "body.anchor=[5.0,5.0]", "roles=[]", "record={}"],
+        &["holds no lattice site", "smaller spacing"],
+    );
+    refused_with(
+        "shear",
+        &["body={shape={kind=\"rectangle\",max=[20,20]},holes=[{kind=\"rectangle\",min=[-1,5.5],max=[21,9.5]}]}"],
+        &["body.shape", "parts", "not connected"],
+    );
+    refused_with("tension", &["body.shape={kind=\"rectangle\",min=[4,4],max=[1,9]}"], &["max", "min"]);
+    refused_with("tension", &["lattice.spacing=1e-9", "body.shape={kind=\"disc\",radius=9.0}"], &["more than"]);
+}
+
+#[test]
+fn regions_roles_and_probes_that_miss_the_body_are_refused() {
+    refused_with("tension", &["roles[0].region={kind=\"box\",min=[90,90],max=[99,99]}"], &["roles[0].region", "no particle", "spans"]);
+    refused_with("tension", &["roles[0].region={kind=\"ids\",ids=[9999]}"], &["no particle 9999", "1 to 144"]);
+    refused_with("tension", &["roles[0].region={kind=\"ids\",ids=[1]}"], &["belongs to the frame"]);
+    refused_with("tension", &["record.probes=[0]"], &["record.probes[0]", "no particle 0"]);
+    refused_with("tension", &["roles[0].role=leader"], &["a leader needs a motion"]);
+    refused_with("tension", &["roles[2].motion={kind=\"velocity\",per_step=[1,0]}"], &["has no motion of its own"]);
+    refused_with("tension", &["roles[2].when={quantity=\"pe1\"}"], &["no bound", "above"]);
+}
+
+#[test]
+fn rules_that_contradict_themselves_are_refused() {
+    refused_with("tension", &["neighbours={kind=\"first\",keep=9}"], &["4 first neighbours"]);
+    refused_with("lattice-honeycomb", &["neighbours={kind=\"ring\",radius=1}"], &["honeycomb"]);
+    refused_with("lattice-hexagonal", &["neighbours={kind=\"offsets\",offsets=[[1,0]]}"], &["no site"]);
+    refused_with("tension", &["rule.weights={kind=\"list\",values=[1,1,-1,-1]}"], &["add up to 0"]);
+    refused_with("tension", &["rule.weights={kind=\"list\",values=[1,1]}"], &["2 weights", "4 neighbours"]);
+    refused_with("tension", &["rule.mean={kind=\"power\",exponent=0}"], &["geometric"]);
+    refused_with("drop", &["frame=lagged"], &["found anew at every step"]);
+    refused_with("fracture", &["fracture.stretch=1.5"], &["both a distance and a stretch"]);
+    refused_with("shear", &["roles[1].motion.frames=[{step=9,displacement=[1,0]},{step=3,displacement=[2,0]}]"], &["ascending"]);
+}
+
+#[test]
+fn overrides_that_cannot_be_placed_are_refused() {
+    refused_with("tension", &["lattice.spacing"], &["--set lattice.spacing", "="]);
+    refused_with("tension", &["roles[9].role=follower"], &["roles"]);
+    refused_with("tension", &["title.more=1"], &["title"]);
+}
+
+#[test]
+fn a_broken_displacement_file_is_refused_with_its_line() {
+    let csv = "roles[1].motion={kind=\"csv\",file=\"FILE\"}";
+    refused_with("tension", &[&csv.replace("FILE", "nowhere.csv")], &["nowhere.csv", "relative to the scene file"]);
+    let folder = temporary();
+    let path = folder.path().join("led.csv");
+    std::fs::write(&path, "id,ux,uy\n1,oops,0\n").expect("written");
+    let path = path.display().to_string();
+    refused_with("tension", &[&csv.replace("FILE", &path)], &["line 2", "oops", "not a finite number"]);
+    std::fs::write(&path, "id,ux,uy\n1,0,0\n").expect("written");
+    refused_with("tension", &[&csv.replace("FILE", &path)], &["no row for particle 122"]);
+}
+
+#[test]
+fn unknown_arguments_are_refused() {
+    refused(&["run"], &["SCENE"]);
+    refused(&["fly"], &["fly"]);
+    refused(&["run", "tension", "--threads", "0"], &["--threads"]);
+    refused(&["run", "tension", "--steps", "-3"], &["-3"]);
+}
+
+#[test]
+fn an_output_that_cannot_be_written_is_refused() {
+    let folder = temporary();
+    std::fs::write(folder.path().join("file"), "").expect("written");
+    let output = flockform(&["run", "tension", "--out", "file"], folder.path());
+    assert_eq!(output.status.code(), Some(2));
+    assert!(text(&output.stderr).contains("is no folder"), "{}", text(&output.stderr));
+}
+
+#[test]
+fn scenes_are_listed_with_a_line_each() {
+    let said = run_in(temporary().path(), &["scenes"]);
+    assert_eq!(said.lines().count(), flockform::scene::bundled::SCENES.len());
+    assert!(said.lines().all(|line| line.split_whitespace().count() > 3), "{said}");
+}
+
+#[test]
+fn a_plan_says_what_is_modelled_left_out_and_why() {
+    let folder = temporary();
+    let said = run_in(folder.path(), &["plan", "fracture"]);
+    for words in ["particles", "memory", "models", "fracture past df = 11 mm", "leaves out", "frame"] {
+        assert!(said.contains(words), "no `{words}` in\n{said}");
+    }
+    assert!(files(folder.path()).is_empty());
+    let said = run_in(folder.path(), &["plan", "tension", "--set", "rule.mean={kind=\"distance\"}"]);
+    assert!(said.contains("caution") && said.contains("sequential"), "{said}");
+}
+
+#[test]
+fn the_schema_is_json_and_knows_every_top_level_key() {
+    let said = run_in(temporary().path(), &["schema"]);
+    let schema: serde_json::Value = serde_json::from_str(&said).expect("JSON");
+    for key in ["lattice", "body", "frame", "neighbours", "rule", "update", "roles", "fracture", "stop", "record"] {
+        assert!(schema["properties"][key].is_object(), "{key}");
+    }
+}
+
+#[test]
+fn completions_and_help_have_what_they_promise() {
+    let folder = temporary();
+    for shell in ["bash", "zsh", "fish"] {
+        assert!(run_in(folder.path(), &["completions", shell]).contains("flockform"));
+    }
+    for command in ["run", "scenes", "plan", "schema", "completions"] {
+        assert!(run_in(folder.path(), &[command, "--help"]).contains("Example:"), "{command}");
+    }
+}
+
+#[test]
+fn the_bench_completes_and_its_json_is_valid() {
+    let said = run_in(temporary().path(), &["bench", "sweep", "--quick", "--json"]);
+    let report: serde_json::Value = serde_json::from_str(&said).expect("JSON");
+    assert!(report.is_object(), "{said}");
+}
