@@ -120,7 +120,8 @@ fn quiet_prints_nothing_and_a_pipe_gets_no_bar() {
 #[test]
 fn overrides_and_steps_reach_the_scene() {
     let folder = temporary();
-    let sets = ["run", "tension", "--steps", "7", "--set", "roles[1].motion.per_step=[0.1, 0.2]", "--out", "o"];
+    let sets =
+        ["run", "tension", "--steps", "7", "--set", "roles[1].motion.per_step=[0.1, 0.2]", "--out", "o"];
     run_in(folder.path(), &sets);
     let summary = json(&folder.path().join("o/summary.json"));
     assert_eq!(summary["steps"], 7);
@@ -261,21 +262,39 @@ fn a_body_that_cannot_be_is_refused_with_the_remedy() {
     );
     refused_with(
         "shear",
-        &["body={shape={kind=\"rectangle\",max=[20,20]},holes=[{kind=\"rectangle\",min=[-1,5.5],max=[21,9.5]}]}"],
+        &[
+            "body={shape={kind=\"rectangle\",max=[20,20]},holes=[{kind=\"rectangle\",min=[-1,5.5],max=[21,9.5]}]}",
+        ],
         &["body.shape", "parts", "not connected"],
     );
     refused_with("tension", &["body.shape={kind=\"rectangle\",min=[4,4],max=[1,9]}"], &["max", "min"]);
-    refused_with("tension", &["lattice.spacing=1e-9", "body.shape={kind=\"disc\",radius=9.0}"], &["more than"]);
+    refused_with(
+        "tension",
+        &["lattice.spacing=1e-9", "body.shape={kind=\"disc\",radius=9.0}"],
+        &["more than"],
+    );
 }
 
 #[test]
 fn regions_roles_and_probes_that_miss_the_body_are_refused() {
-    refused_with("tension", &["roles[0].region={kind=\"box\",min=[90,90],max=[99,99]}"], &["roles[0].region", "no particle", "spans"]);
-    refused_with("tension", &["roles[0].region={kind=\"ids\",ids=[9999]}"], &["no particle 9999", "1 to 144"]);
+    refused_with(
+        "tension",
+        &["roles[0].region={kind=\"box\",min=[90,90],max=[99,99]}"],
+        &["roles[0].region", "no particle", "spans"],
+    );
+    refused_with(
+        "tension",
+        &["roles[0].region={kind=\"ids\",ids=[9999]}"],
+        &["no particle 9999", "1 to 144"],
+    );
     refused_with("tension", &["roles[0].region={kind=\"ids\",ids=[1]}"], &["belongs to the frame"]);
     refused_with("tension", &["record.probes=[0]"], &["record.probes[0]", "no particle 0"]);
     refused_with("tension", &["roles[0].role=leader"], &["a leader needs a motion"]);
-    refused_with("tension", &["roles[2].motion={kind=\"velocity\",per_step=[1,0]}"], &["has no motion of its own"]);
+    refused_with(
+        "tension",
+        &["roles[2].motion={kind=\"velocity\",per_step=[1,0]}"],
+        &["has no motion of its own"],
+    );
     refused_with("tension", &["roles[2].when={quantity=\"pe1\"}"], &["no bound", "above"]);
 }
 
@@ -289,7 +308,11 @@ fn rules_that_contradict_themselves_are_refused() {
     refused_with("tension", &["rule.mean={kind=\"power\",exponent=0}"], &["geometric"]);
     refused_with("drop", &["frame=lagged"], &["found anew at every step"]);
     refused_with("fracture", &["fracture.stretch=1.5"], &["both a distance and a stretch"]);
-    refused_with("shear", &["roles[1].motion.frames=[{step=9,displacement=[1,0]},{step=3,displacement=[2,0]}]"], &["ascending"]);
+    refused_with(
+        "shear",
+        &["roles[1].motion.frames=[{step=9,displacement=[1,0]},{step=3,displacement=[2,0]}]"],
+        &["ascending"],
+    );
 }
 
 #[test]
@@ -302,7 +325,11 @@ fn overrides_that_cannot_be_placed_are_refused() {
 #[test]
 fn a_broken_displacement_file_is_refused_with_its_line() {
     let csv = "roles[1].motion={kind=\"csv\",file=\"FILE\"}";
-    refused_with("tension", &[&csv.replace("FILE", "nowhere.csv")], &["nowhere.csv", "relative to the scene file"]);
+    refused_with(
+        "tension",
+        &[&csv.replace("FILE", "nowhere.csv")],
+        &["nowhere.csv", "relative to the scene file"],
+    );
     let folder = temporary();
     let path = folder.path().join("led.csv");
     std::fs::write(&path, "id,ux,uy\n1,oops,0\n").expect("written");
@@ -352,7 +379,9 @@ fn a_plan_says_what_is_modelled_left_out_and_why() {
 fn the_schema_is_json_and_knows_every_top_level_key() {
     let said = run_in(temporary().path(), &["schema"]);
     let schema: serde_json::Value = serde_json::from_str(&said).expect("JSON");
-    for key in ["lattice", "body", "frame", "neighbours", "rule", "update", "roles", "fracture", "stop", "record"] {
+    for key in
+        ["lattice", "body", "frame", "neighbours", "rule", "update", "roles", "fracture", "stop", "record"]
+    {
         assert!(schema["properties"][key].is_object(), "{key}");
     }
 }

@@ -7,7 +7,9 @@ use flockform::continuum::plan::Plan;
 use flockform::continuum::run::run;
 use flockform::flock::motion::Motion;
 use flockform::flock::points::Points;
-use flockform::flock::rules::{Axis, Feedback, FeedbackReference, Mean, Neighbour, Origin, Own, Poisson, Rule};
+use flockform::flock::rules::{
+    Axis, Feedback, FeedbackReference, Mean, Neighbour, Origin, Own, Poisson, Rule,
+};
 use flockform::scene::bundled::SCENES;
 use flockform::scene::{Scene, bundled};
 use proptest::prelude::*;
@@ -173,8 +175,7 @@ fn any_mean() -> impl Strategy<Value = Mean> {
     prop_oneof![
         Just(Mean::Barycentre),
         (-6.0..6.0f64).prop_map(|power| Mean::Distance { power }),
-        (-6.0..6.0f64)
-            .prop_map(move |exponent| Mean::Power { exponent, origin: Origin::Moving { margin } }),
+        (-6.0..6.0f64).prop_map(move |exponent| Mean::Power { exponent, origin: Origin::Moving { margin } }),
         Just(Mean::Power { exponent: 0.0, origin: Origin::Moving { margin } }),
         Just(Mean::Power { exponent: 0.0, origin: Origin::World }),
         (-6.0..6.0f64).prop_map(|exponent| Mean::Power { exponent, origin: Origin::World }),

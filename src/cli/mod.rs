@@ -21,7 +21,11 @@ pub const BAD_INPUT: u8 = 2;
 
 /// Flocking rules that make a body deform or a swarm hold a formation.
 #[derive(Debug, Parser)]
-#[command(version, propagate_version = true, after_help = "Example:\n  flockform run tension\n\nExit codes: 0 done, 1 ran but failed (diverged, interrupted), 2 bad input.")]
+#[command(
+    version,
+    propagate_version = true,
+    after_help = "Example:\n  flockform run tension\n\nExit codes: 0 done, 1 ran but failed (diverged, interrupted), 2 bad input."
+)]
 pub struct Arguments {
     #[command(subcommand)]
     pub command: Command,
@@ -33,7 +37,9 @@ pub struct Arguments {
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Run a continuum scene and write its results and figures
-    #[command(after_help = "Example:\n  flockform run tension --out /tmp/tension --set stop.steps=800 --set frame=immediate")]
+    #[command(
+        after_help = "Example:\n  flockform run tension --out /tmp/tension --set stop.steps=800 --set frame=immediate"
+    )]
     Run(run::RunArguments),
     /// List the bundled scenes
     #[command(after_help = "Example:\n  flockform scenes")]
@@ -45,7 +51,9 @@ pub enum Command {
     #[command(after_help = "Example:\n  flockform schema > scene.schema.json")]
     Schema,
     /// Print a completion script for a shell
-    #[command(after_help = "Example:\n  flockform completions bash > ~/.local/share/bash-completion/completions/flockform")]
+    #[command(
+        after_help = "Example:\n  flockform completions bash > ~/.local/share/bash-completion/completions/flockform"
+    )]
     Completions {
         /// The shell to complete for
         shell: Shell,
@@ -108,7 +116,9 @@ pub enum Refusal {
     Scene(#[from] SceneError),
     #[error("{0}")]
     Export(#[from] export::ExportError),
-    #[error("there is no scene file and no bundled scene `{name}`\n  help: the nearest bundled scene is `{nearest}`; `flockform scenes` lists them all")]
+    #[error(
+        "there is no scene file and no bundled scene `{name}`\n  help: the nearest bundled scene is `{nearest}`; `flockform scenes` lists them all"
+    )]
     NoScene { name: String, nearest: &'static str },
     #[error("--threads {threads}: {error}\n  help: give a number from 1 to the machine's cores")]
     Threads { threads: usize, error: rayon::ThreadPoolBuildError },

@@ -82,7 +82,10 @@ fn run_here(arguments: &RunArguments) -> Result<ExitCode, Refusal> {
 fn free_folder(name: &str) -> PathBuf {
     let taken = |path: &Path| path.read_dir().is_ok_and(|mut entries| entries.next().is_some());
     let numbered = (2..).map(|n| PathBuf::from(format!("out/{name}-{n}")));
-    std::iter::once(PathBuf::from(format!("out/{name}"))).chain(numbered).find(|path| !taken(path)).expect("endless")
+    std::iter::once(PathBuf::from(format!("out/{name}")))
+        .chain(numbered)
+        .find(|path| !taken(path))
+        .expect("endless")
 }
 
 /// Set by Ctrl-C and by SIGTERM; the run then stops at the next step.

@@ -7,11 +7,7 @@
 
 pub mod bundled;
 pub mod document;
-mod overrides;
-mod problem;
 pub mod raw;
-mod schema_check;
-mod schema_rule;
 pub mod table;
 pub mod validate;
 
@@ -29,7 +25,7 @@ use crate::solve::sweep::Update;
 
 pub use bundled::{Bundled, bundled};
 pub use document::Document;
-pub use problem::{Place, Problem, SceneError};
+pub use document::problem::{Place, Problem, SceneError};
 use raw::RawScene;
 
 /// A continuum scene, ready to be planned.

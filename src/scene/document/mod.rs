@@ -1,14 +1,18 @@
 //! Scene text with its `--set` overrides, every value knowing the line or override it came from.
 
+mod overrides;
+pub mod problem;
+mod schema_check;
+mod schema_rule;
+
 use std::thread::ScopedJoinHandle;
 
 use serde_json::Value;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue, Error};
 
-use crate::scene::overrides::{self, Segment};
-use crate::scene::problem::{Place, Problem, SceneError};
-use crate::scene::schema_check;
+use overrides::Segment;
+use problem::{Place, Problem, SceneError};
 
 /// Tables and lists may nest this deep, so that recursion over a document cannot exhaust the stack.
 pub(crate) const MAX_DEPTH: usize = 64;

@@ -2,9 +2,9 @@
 
 use serde_json::{Map, Number, Value};
 
+use crate::scene::document::problem::{Problem, SceneError};
+use crate::scene::document::schema_rule::{OtherKeys, Rule, Variants, any_of, listed, one_of};
 use crate::scene::document::{Content, Document, Node, child_path, entry};
-use crate::scene::problem::{Problem, SceneError};
-use crate::scene::schema_rule::{OtherKeys, Rule, Variants, any_of, listed, one_of};
 
 /// Branches of an untagged enum are tried out only this many enums deep, since the tries multiply.
 const NESTED_TRIALS: usize = 2;

@@ -2,8 +2,8 @@
 
 use toml::de::DeValue;
 
+use crate::scene::document::problem::{Place, Problem};
 use crate::scene::document::{Content, MAX_DEPTH, Node, Origin, child_path, node};
-use crate::scene::problem::{Place, Problem};
 
 /// One step of a key path.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -1,0 +1,144 @@
+//! The body as written: its lattice and its shape.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// The five plane Bravais lattices and the honeycomb.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum RawLattice {
+    Square {
+        /// Distance between neighbours [length].
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        spacing: f64,
+        /// Turns the lattice against the body [degree].
+        #[serde(default)]
+        orientation: f64,
+    },
+    Rectangular {
+        /// Edge of the cell along x [length].
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        a: f64,
+        /// Edge of the cell along y [length].
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        b: f64,
+        /// Turns the lattice against the body [degree].
+        #[serde(default)]
+        orientation: f64,
+    },
+    /// A site at each corner of the cell and one at its centre.
+    CentredRectangular {
+        /// Edge of the conventional cell along x [length].
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        a: f64,
+        /// Edge of the conventional cell along y [length].
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        b: f64,
+        /// Turns the lattice against the body [degree].
+        #[serde(default)]
+        orientation: f64,
+    },
+    /// Triangles; one bond direction lies along x.
+    Hexagonal {
+        /// Distance between neighbours [length].
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        spacing: f64,
+        /// Turns the lattice against the body [degree].
+        #[serde(default)]
+        orientation: f64,
+    },
+    Oblique {
+        /// Edge of the cell along x [length].
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        a: f64,
+        /// The other edge of the cell [length].
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        b: f64,
+        /// Angle between the edges [degree].
+        #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 180))]
+        angle: f64,
+        /// Turns the lattice against the body [degree].
+        #[serde(default)]
+        orientation: f64,
+    },
+    /// Hexagons; three neighbours each.
+    Honeycomb {
+        /// Distance between neighbours [length].
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        spacing: f64,
+        /// Turns the lattice against the body [degree].
+        #[serde(default)]
+        orientation: f64,
+    },
+}
+
+/// The body that is cut from the lattice.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawBody {
+    pub shape: RawShape,
+    /// Shapes taken out of the body; particles on their rims stay.
+    #[serde(default)]
+    pub holes: Vec<RawShape>,
+    /// Where the lattice has a site [length]. Unless given: the lower left corner of the shape's
+    /// bounds, or the centre of a disc.
+    #[serde(default)]
+    pub anchor: Option<[f64; 2]>,
+}
+
+/// A region of the plane; its boundary belongs to it.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum RawShape {
+    /// A rectangle by count, from the anchor (which is then [0, 0] unless given).
+    Grid {
+        /// Sites in a row [1].
+        #[schemars(range(min = 1, max = 65535))]
+        columns: u32,
+        /// Rows of sites [1].
+        #[schemars(range(min = 1, max = 65535))]
+        rows: u32,
+    },
+    Rectangle {
+        /// Lower left corner [length].
+        #[serde(default)]
+        min: [f64; 2],
+        /// Upper right corner [length].
+        max: [f64; 2],
+    },
+    Disc {
+        /// Centre [length].
+        #[serde(default)]
+        centre: [f64; 2],
+        /// Radius [length].
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        radius: f64,
+    },
+    Polygon {
+        /// Corners in order, either way round; the last joins the first [length].
+        #[schemars(length(min = 3))]
+        vertices: Vec<[f64; 2]>,
+    },
+    /// The sheet-type tensile specimen of ASTM E8/E8M (200 x 20 mm, gauge 57 x 12.5 mm, fillet 12.5 mm),
+    /// its axis along y from y = 0, centred on x = 0.
+    E8Sheet {
+        /// Multiplies every length of the standard [1].
+        #[serde(default = "super::defaults::one")]
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        scale: f64,
+        /// Lays the axis along x instead.
+        #[serde(default)]
+        lying: bool,
+    },
+    /// The Type I tensile specimen of ASTM D638 (165 x 19 mm, gauge 57 x 13 mm, fillet 76 mm), its axis
+    /// along y from y = 0, centred on x = 0.
+    D638TypeI {
+        /// Multiplies every length of the standard [1].
+        #[serde(default = "super::defaults::one")]
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        scale: f64,
+        /// Lays the axis along x instead.
+        #[serde(default)]
+        lying: bool,
+    },
+}

@@ -1,0 +1,173 @@
+//! A scene file as written: what serde reads and the JSON Schema describes.
+//!
+//! Lengths are in one unit of the user's choice (`[length]`), the same throughout a scene; times are
+//! in steps; angles in degrees. The doc comments here are the documentation of the scene format:
+//! `flockform schema` prints them.
+
+// Units stand in brackets as they are: the schema prints these comments, which escapes would spoil.
+#![allow(rustdoc::broken_intra_doc_links)]
+
+mod body;
+mod roles;
+mod rule;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+pub use body::*;
+pub use roles::*;
+pub use rule::*;
+
+/// A continuum scene: a body, who leads it, by which rule it follows, when it stops and what to keep.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawScene {
+    /// One line that says what the scene shows.
+    pub title: String,
+    /// Where the values come from, and why those the paper does not give were chosen.
+    #[serde(default)]
+    pub notes: String,
+    /// Name of the unit of length, for axes and tables.
+    #[serde(default = "defaults::unit")]
+    pub unit: String,
+    pub lattice: RawLattice,
+    pub body: RawBody,
+    /// The shell around the body that gives edge particles their full neighbourhood.
+    #[serde(default)]
+    pub frame: RawFrame,
+    #[serde(default)]
+    pub neighbours: RawNeighbours,
+    #[serde(default)]
+    pub rule: RawRule,
+    #[serde(default)]
+    pub update: RawUpdate,
+    /// Who is what, from when; later entries win. Particles that no entry names are followers.
+    #[serde(default)]
+    pub roles: Vec<RawRoles>,
+    /// Bonds break where this is given.
+    #[serde(default)]
+    pub fracture: Option<RawFracture>,
+    /// Cuts made before the first step: every bond that crosses one is broken.
+    #[serde(default)]
+    pub cuts: Vec<RawCut>,
+    #[serde(default)]
+    pub stop: RawStop,
+    #[serde(default)]
+    pub record: RawRecord,
+}
+
+/// How frame points follow the body.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum RawFrame {
+    /// No frame: edge particles have fewer neighbours.
+    #[default]
+    None,
+    /// A frame point copies the displacement its particle had before the sweep (the paper's delay).
+    Lagged,
+    /// A frame point copies the displacement its particle has after the sweep.
+    Immediate,
+    /// A frame point copies the particle opposite across its nearest one, as if the body went on.
+    Mirror,
+}
+
+/// When bonds break, and what stands in for them.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawFracture {
+    /// A bond longer than this breaks: the paper's `df` [length].
+    #[serde(default)]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub distance: Option<f64>,
+    /// A bond longer than this multiple of its reference length breaks [1].
+    #[serde(default)]
+    #[schemars(extend("exclusiveMinimum" = 1))]
+    pub stretch: Option<f64>,
+    #[serde(default)]
+    pub ghosts: RawGhosts,
+}
+
+/// What a particle sees in the place of a lost neighbour.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum RawGhosts {
+    /// A point at the original lattice offset: fragments recover the lattice's shape.
+    #[default]
+    Lattice,
+    /// The mirror image of the opposite neighbour.
+    Mirrored,
+    /// Nothing: the mean runs over those left.
+    None,
+}
+
+/// A straight cut.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawCut {
+    /// One end [length].
+    pub from: [f64; 2],
+    /// The other end [length].
+    pub to: [f64; 2],
+}
+
+/// When the run ends.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawStop {
+    /// At the latest after this many steps [step].
+    #[serde(default = "defaults::steps")]
+    #[schemars(range(min = 1))]
+    pub steps: usize,
+    /// As soon as no particle moves farther in a step than this part of the spacing, every scheduled
+    /// motion and role change being over [1].
+    #[serde(default)]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub tolerance: Option<f64>,
+    /// The run has diverged once a particle is farther from its reference place than this many times
+    /// the body's diagonal [1].
+    #[serde(default = "defaults::growth")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub growth: f64,
+}
+
+impl Default for RawStop {
+    fn default() -> Self {
+        Self { steps: defaults::steps(), tolerance: None, growth: defaults::growth() }
+    }
+}
+
+/// What is kept of the run.
+#[derive(Clone, Debug, Default, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawRecord {
+    /// Ids of the particles whose coordinates and pseudo-energies are kept at every step.
+    #[serde(default)]
+    pub probes: Vec<usize>,
+    /// Steps at which the configuration is drawn (the last step always is) [step].
+    #[serde(default)]
+    pub figures: Vec<usize>,
+    /// Every so many steps the configuration is written for ParaView; 0 writes none [step].
+    #[serde(default)]
+    pub vtk_every: usize,
+}
+
+mod defaults {
+    pub fn unit() -> String {
+        "length".into()
+    }
+    pub fn one() -> f64 {
+        1.0
+    }
+    pub fn ones() -> [f64; 2] {
+        [1.0, 1.0]
+    }
+    pub fn one_step() -> usize {
+        1
+    }
+    pub fn steps() -> usize {
+        1000
+    }
+    pub fn growth() -> f64 {
+        1000.0
+    }
+}

@@ -1,0 +1,195 @@
+//! Roles as written: who leads, from when, how.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A role for the particles of a region.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawRoles {
+    pub region: RawRegion,
+    pub role: RawRole,
+    /// First step at which the role holds [step]; 0 and 1 both mean from the start.
+    #[serde(default)]
+    pub from: usize,
+    /// The role is taken, particle by particle, when this first holds (from step `from` on).
+    #[serde(default)]
+    pub when: Option<RawWhen>,
+    /// How leaders move; only they do.
+    #[serde(default)]
+    pub motion: Option<RawMotion>,
+}
+
+/// What a particle does.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum RawRole {
+    /// Takes the position the rule computes.
+    Follower,
+    /// Is moved by its motion.
+    Leader,
+    /// Stays where it is.
+    Clamped,
+    /// Leaves the body: all its bonds break.
+    Ghost,
+}
+
+/// Picks particles by where they are in the reference configuration.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum RawRegion {
+    /// The whole body.
+    All {},
+    /// The outermost particles on a side.
+    Edge {
+        side: RawSide,
+        /// How far in from the outermost coordinate [length]; half a spacing unless given.
+        #[serde(default)]
+        #[schemars(range(min = 0))]
+        depth: Option<f64>,
+    },
+    /// The particles in a box.
+    Box {
+        /// Lower left corner [length].
+        min: [f64; 2],
+        /// Upper right corner [length].
+        max: [f64; 2],
+    },
+    Disc {
+        /// Centre [length].
+        centre: [f64; 2],
+        /// Radius [length].
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        radius: f64,
+    },
+    /// The particles with these ids.
+    Ids {
+        /// Counted from 1, column by column from the bottom, the frame included [1].
+        #[schemars(length(min = 1))]
+        ids: Vec<usize>,
+    },
+    /// Every particle that lacks a neighbour: the outline, rims of holes included.
+    Boundary {},
+}
+
+/// A side of the body.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum RawSide {
+    Left,
+    Right,
+    Bottom,
+    Top,
+}
+
+/// A condition on one particle.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawWhen {
+    pub quantity: RawQuantity,
+    /// Holds above this value [unit of the quantity].
+    #[serde(default)]
+    pub above: Option<f64>,
+    /// Holds below this value [unit of the quantity].
+    #[serde(default)]
+    pub below: Option<f64>,
+}
+
+/// What a condition looks at.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum RawQuantity {
+    /// Present x [length].
+    X,
+    /// Present y [length].
+    Y,
+    /// Distance from the place in the reference configuration [length].
+    Displacement,
+    /// First pseudo-energy [length^2].
+    Pe1,
+    /// Length of the last move [length].
+    Pe2,
+}
+
+/// How leaders move; steps are counted from when they became leaders.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum RawMotion {
+    /// The same displacement every step.
+    Velocity {
+        /// [length per step]
+        per_step: [f64; 2],
+    },
+    /// Displacements at given steps; the last one is held.
+    Keyframes {
+        #[schemars(length(min = 1))]
+        frames: Vec<RawKeyframe>,
+        #[serde(default)]
+        interpolation: RawInterpolation,
+    },
+    /// Rotation, stretch and shear about a point, reached in even parts over a number of steps.
+    Affine {
+        /// The point that stays [length].
+        #[serde(default)]
+        about: [f64; 2],
+        /// Rotation, applied after stretch and shear [degree].
+        #[serde(default)]
+        rotate: f64,
+        /// Factors along x and y [1].
+        #[serde(default = "super::defaults::ones")]
+        stretch: [f64; 2],
+        /// Shear: x moves with y, and y moves with x [1].
+        #[serde(default)]
+        shear: [f64; 2],
+        /// Steps to get there [step].
+        #[schemars(range(min = 1))]
+        steps: usize,
+    },
+    /// To and fro.
+    Sinusoid {
+        /// [length]
+        amplitude: [f64; 2],
+        /// [step]
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        period: f64,
+        /// Part of a period by which the motion is ahead [1].
+        #[serde(default)]
+        phase: f64,
+    },
+    /// Displacements read from a CSV file with the columns `x,y,ux,uy` (matched to particles by their
+    /// reference position) or `id,ux,uy`, reached in even parts over a number of steps.
+    Csv {
+        /// Path, relative to the scene file.
+        file: String,
+        /// Multiplies every displacement [1].
+        #[serde(default = "super::defaults::one")]
+        scale: f64,
+        /// Steps to get there [step].
+        #[serde(default = "super::defaults::one_step")]
+        #[schemars(range(min = 1))]
+        steps: usize,
+    },
+}
+
+/// Where a leader is at a step.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawKeyframe {
+    /// [step]
+    #[schemars(range(min = 1))]
+    pub step: usize,
+    /// [length]
+    pub displacement: [f64; 2],
+}
+
+/// How a motion goes from one keyframe to the next.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum RawInterpolation {
+    #[default]
+    Linear,
+    /// At rest at each keyframe.
+    Smooth,
+    /// Jumps.
+    Hold,
+}

@@ -1,0 +1,224 @@
+//! The rule as written: whose positions count, how a target comes from them, how it becomes a position.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Whose positions a particle sees.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum RawNeighbours {
+    /// The first neighbours: as many as the lattice's coordination number (square and rectangular 4,
+    /// centred rectangular, hexagonal and oblique 6, honeycomb 3).
+    First {
+        /// Keeps only this many, dropping from the end of: nearest first; equally near ones in
+        /// opposite pairs by angle (east, west, north, south) [1].
+        #[serde(default)]
+        #[schemars(range(min = 1))]
+        keep: Option<usize>,
+    },
+    /// All sites within `radius` cells each way: 8 or 24.
+    Ring {
+        /// Cells each way [1].
+        #[schemars(range(min = 1, max = 8))]
+        radius: i32,
+    },
+    /// The neighbours of the neighbours too: the paper's second gradient.
+    Second {},
+    /// The sites at these offsets in columns and rows of the lattice.
+    Offsets {
+        /// Pairs of whole numbers, in the order of summation.
+        #[schemars(length(min = 1))]
+        offsets: Vec<[i32; 2]>,
+    },
+    /// Whoever is within a radius in the reference configuration.
+    Within {
+        /// Radius [length].
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        radius: f64,
+    },
+    /// Whoever is within a radius now, found anew at every step: the paper's liquid and gas.
+    Present {
+        /// Radius [length].
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        radius: f64,
+    },
+}
+
+impl Default for RawNeighbours {
+    fn default() -> Self {
+        RawNeighbours::First { keep: None }
+    }
+}
+
+/// How a follower's position comes from its neighbours'; what is not named is not evaluated.
+#[derive(Clone, Debug, Default, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawRule {
+    #[serde(default)]
+    pub mean: RawMean,
+    /// Fixed weights of the neighbours, on top of the mean's own.
+    #[serde(default)]
+    pub weights: Option<RawWeights>,
+    /// What keeps a particle in place whose neighbours are not balanced around it.
+    #[serde(default)]
+    pub rest: RawRest,
+    /// The Poisson term (Eq. 2).
+    #[serde(default)]
+    pub poisson: Option<RawPoisson>,
+    /// Feedback (Eq. 4).
+    #[serde(default)]
+    pub feedback: Option<RawFeedback>,
+}
+
+/// Which mean of the neighbours' positions is the target.
+#[derive(Clone, Debug, Default, Deserialize, Serialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum RawMean {
+    /// The centre of gravity (Eq. 1).
+    #[default]
+    Barycentre,
+    /// Weighted by a power of the present distance (Eq. 3).
+    Distance {
+        /// The power; the paper's is 1 [1].
+        #[serde(default = "super::defaults::one")]
+        power: f64,
+    },
+    /// The geometric mean of each coordinate.
+    Geometric {
+        #[serde(default)]
+        origin: RawOrigin,
+    },
+    /// The power mean of each coordinate.
+    Power {
+        /// Exponent: 1 is the barycentre, 2 the quadratic mean, -1 the harmonic mean [1].
+        exponent: f64,
+        #[serde(default)]
+        origin: RawOrigin,
+    },
+    /// The mean of the places at a distance from each neighbour: cohesion with separation (ours).
+    Spaced {
+        /// The distance [length].
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        spacing: f64,
+    },
+}
+
+/// What the coordinates of geometric and power means are measured from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum RawOrigin {
+    /// One spacing below the lowest neighbour: invariant under translation.
+    #[default]
+    Moving,
+    /// The axes' zero: the literal formula, which depends on where the body is and needs positive
+    /// coordinates.
+    World,
+}
+
+/// Fixed weights of neighbours.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum RawWeights {
+    /// A weight for each neighbour in the neighbourhood's order.
+    List {
+        /// As many as there are neighbours [1].
+        #[schemars(length(min = 1))]
+        values: Vec<f64>,
+    },
+    /// A power of the distance in the reference configuration.
+    Distance {
+        /// The power [1].
+        power: f64,
+    },
+}
+
+/// Whether the reference configuration is one of rest.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum RawRest {
+    /// Each particle adds the offset that keeps it in place while its neighbours are in theirs. Zero
+    /// for a complete neighbourhood.
+    #[default]
+    Kept,
+    /// The formula alone: a body with missing or unbalanced neighbours draws together.
+    Literal,
+}
+
+/// A coordinate axis.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum RawAxis {
+    #[default]
+    X,
+    Y,
+}
+
+/// The Poisson term (Eq. 2): `across += K (along - along at rest) da`.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawPoisson {
+    /// Response `K`; negative draws the sides together when pulled [1].
+    pub k: f64,
+    /// The axis whose displacement acts.
+    #[serde(default)]
+    pub pull: RawAxis,
+    /// Coordinate of the central axis [length]; the middle of the body unless given.
+    #[serde(default)]
+    pub centre: Option<f64>,
+    /// `da = sign(s) |s / half width|^exponent`, `s` being the distance from the axis: 1 is linear, 0 the
+    /// sign alone [1].
+    #[serde(default = "super::defaults::one")]
+    #[schemars(range(min = 0))]
+    pub exponent: f64,
+}
+
+/// Feedback (Eq. 4): the target is overshot.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawFeedback {
+    /// Feedback factor `fd` [1].
+    pub factor: f64,
+    /// What `MT` is.
+    #[serde(default)]
+    pub reference: RawFeedbackReference,
+}
+
+/// The position that feedback overshoots from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum RawFeedbackReference {
+    /// The position in the reference configuration (the paper's).
+    #[default]
+    Initial,
+    /// The position before the step: over-relaxation.
+    Previous,
+}
+
+/// How targets become positions.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawUpdate {
+    #[serde(default)]
+    pub order: RawOrder,
+    /// Part of the way to the target that is gone in one step [1].
+    #[serde(default = "super::defaults::one")]
+    #[schemars(extend("exclusiveMinimum" = 0, "maximum" = 2))]
+    pub damping: f64,
+}
+
+impl Default for RawUpdate {
+    fn default() -> Self {
+        Self { order: RawOrder::default(), damping: super::defaults::one() }
+    }
+}
+
+/// Who sees whose new position within one step.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum RawOrder {
+    /// Everybody sees the old ones (the paper).
+    #[default]
+    Synchronous,
+    /// Each sees the new ones of the particles numbered before it.
+    Sequential,
+}

@@ -1,0 +1,124 @@
+//! Who leads, from when, how.
+
+use std::path::Path;
+
+use super::{Refuse, ordered_box};
+use crate::flock::motion::{Interpolation, Keyframe, Motion};
+use crate::flock::region::{Region, Side};
+use crate::flock::role::Role;
+use crate::scene::document::problem::SceneError;
+use crate::scene::raw::*;
+use crate::scene::table::DisplacementTable;
+use crate::scene::{Condition, LeaderMotion, Quantity, RoleEntry, SceneRegion};
+
+pub fn role_entry(
+    key: &str,
+    raw: &RawRoles,
+    folder: Option<&Path>,
+    refuse: Refuse<'_>,
+) -> Result<RoleEntry, SceneError> {
+    let role = match raw.role {
+        RawRole::Follower => Role::Follower,
+        RawRole::Leader => Role::Leader,
+        RawRole::Clamped => Role::Clamped,
+        RawRole::Ghost => Role::Ghost,
+    };
+    match (role, &raw.motion) {
+        (Role::Leader, None) => {
+            let help =
+                "add `motion = { kind = \"velocity\", per_step = [0.6, 0.0] }`, or use role = \"clamped\"";
+            return Err(refuse(&format!("{key}.role"), "a leader needs a motion".into(), help));
+        }
+        (Role::Leader, _) | (_, None) => {}
+        (_, Some(_)) => {
+            let message = format!("a {} has no motion of its own", role.name());
+            return Err(refuse(&format!("{key}.motion"), message, "remove it, or use role = \"leader\""));
+        }
+    }
+    let when = raw.when.as_ref().map(|when| condition(key, when, refuse)).transpose()?;
+    let motion = raw.motion.as_ref().map(|motion| leader_motion(key, motion, folder, refuse)).transpose()?;
+    Ok(RoleEntry { region: region(key, &raw.region, refuse)?, role, from: raw.from.max(1), when, motion })
+}
+
+fn region(key: &str, raw: &RawRegion, refuse: Refuse<'_>) -> Result<SceneRegion, SceneError> {
+    let side = |side: RawSide| match side {
+        RawSide::Left => Side::Left,
+        RawSide::Right => Side::Right,
+        RawSide::Bottom => Side::Bottom,
+        RawSide::Top => Side::Top,
+    };
+    Ok(SceneRegion::Known(match raw {
+        RawRegion::All {} => Region::All,
+        RawRegion::Edge { side: s, depth: None } => return Ok(SceneRegion::Outermost(side(*s))),
+        RawRegion::Edge { side: s, depth: Some(depth) } => Region::Edge { side: side(*s), depth: *depth },
+        RawRegion::Box { min, max } => {
+            ordered_box(&format!("{key}.region"), *min, *max, refuse)?;
+            Region::Box { min: *min, max: *max }
+        }
+        RawRegion::Disc { centre, radius } => Region::Disc { centre: *centre, radius: *radius },
+        RawRegion::Ids { ids } => Region::Ids(ids.clone()),
+        RawRegion::Boundary {} => Region::Boundary,
+    }))
+}
+
+fn condition(key: &str, raw: &RawWhen, refuse: Refuse<'_>) -> Result<Condition, SceneError> {
+    if raw.above.is_none() && raw.below.is_none() {
+        let message = "the condition has no bound".into();
+        return Err(refuse(&format!("{key}.when"), message, "add `above = VALUE`, `below = VALUE` or both"));
+    }
+    let quantity = match raw.quantity {
+        RawQuantity::X => Quantity::X,
+        RawQuantity::Y => Quantity::Y,
+        RawQuantity::Displacement => Quantity::Displacement,
+        RawQuantity::Pe1 => Quantity::Pe1,
+        RawQuantity::Pe2 => Quantity::Pe2,
+    };
+    Ok(Condition { quantity, above: raw.above, below: raw.below })
+}
+
+fn leader_motion(
+    key: &str,
+    raw: &RawMotion,
+    folder: Option<&Path>,
+    refuse: Refuse<'_>,
+) -> Result<LeaderMotion, SceneError> {
+    Ok(LeaderMotion::Program(match raw {
+        RawMotion::Velocity { per_step } => Motion::Velocity { per_step: *per_step },
+        RawMotion::Keyframes { frames, interpolation } => {
+            if let Some(late) = frames.windows(2).position(|pair| pair[0].step >= pair[1].step) {
+                let message =
+                    format!("step {} does not come after step {}", frames[late + 1].step, frames[late].step);
+                let key = format!("{key}.motion.frames[{}].step", late + 1);
+                return Err(refuse(&key, message, "list keyframes by ascending step, each step once"));
+            }
+            let interpolation = match interpolation {
+                RawInterpolation::Linear => Interpolation::Linear,
+                RawInterpolation::Smooth => Interpolation::Smooth,
+                RawInterpolation::Hold => Interpolation::Hold,
+            };
+            let frame = |f: &RawKeyframe| Keyframe { step: f.step as f64, displacement: f.displacement };
+            Motion::Keyframes { frames: frames.iter().map(frame).collect(), interpolation }
+        }
+        RawMotion::Affine { about, rotate, stretch, shear, steps } => Motion::Affine {
+            about: *about,
+            angle: rotate.to_radians(),
+            stretch: *stretch,
+            shear: *shear,
+            steps: *steps as f64,
+        },
+        RawMotion::Sinusoid { amplitude, period, phase } => {
+            Motion::Sinusoid { amplitude: *amplitude, period: *period, phase: *phase }
+        }
+        RawMotion::Csv { file, scale, steps } => {
+            let key = format!("{key}.motion.file");
+            let path = folder.unwrap_or(Path::new("")).join(file);
+            let help = "the path is relative to the scene file";
+            let text = std::fs::read_to_string(&path)
+                .map_err(|error| refuse(&key, format!("cannot read {}: {error}", path.display()), help))?;
+            let rows = DisplacementTable::parse(&text, *scale).map_err(|error| {
+                refuse(&key, format!("{}: {error}", path.display()), "mend the file, or name another")
+            })?;
+            return Ok(LeaderMotion::Table { rows, steps: *steps });
+        }
+    }))
+}
