@@ -32,7 +32,7 @@ struct Scene {
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Lattice {
-    /// Distance between neighbours \[length\].
+    /// Distance between neighbours [length].
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     spacing: f64,
     #[schemars(range(min = 1, max = 9))]
