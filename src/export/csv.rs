@@ -1,0 +1,85 @@
+//! Tables: `final.csv`, every particle at the end, and `probes.csv`, a few of them at every step.
+//!
+//! Ids count from 1, columns and rows from the lowest site, frame included, which is the paper's
+//! numbering. Numbers are the shortest that read back as the same.
+
+use std::path::PathBuf;
+
+use csv::Writer;
+use serde::Serialize;
+
+use super::OutputFolder;
+use super::error::ExportError;
+use crate::continuum::record::{ProbeSeries, Snapshot};
+use crate::flock::body::Body;
+
+#[derive(Serialize)]
+struct FinalRow {
+    id: usize,
+    column: i64,
+    row: i64,
+    role: &'static str,
+    #[serde(rename = "X")]
+    reference_x: f64,
+    #[serde(rename = "Y")]
+    reference_y: f64,
+    x: f64,
+    y: f64,
+    pe1: f64,
+    pe2: f64,
+}
+
+#[derive(Serialize)]
+struct ProbeRow {
+    step: usize,
+    id: usize,
+    x: f64,
+    y: f64,
+    pe1: f64,
+    pe2: f64,
+}
+
+/// Writes every particle at the end: reference and present place [length], PE1 [length^2], PE2 [length].
+pub fn write_final(folder: &OutputFolder, body: &Body, last: &Snapshot) -> Result<PathBuf, ExportError> {
+    let lowest = |axis: usize| body.sites.iter().map(|site| i64::from(site[axis])).min().unwrap_or(0);
+    let (first_column, first_row) = (lowest(0), lowest(1));
+    let rows = (0..body.count()).map(|i| FinalRow {
+        id: i + 1,
+        column: i64::from(body.sites[i][0]) - first_column + 1,
+        row: i64::from(body.sites[i][1]) - first_row + 1,
+        role: last.roles[i].name(),
+        reference_x: body.reference.x[i],
+        reference_y: body.reference.y[i],
+        x: last.positions.x[i],
+        y: last.positions.y[i],
+        pe1: last.pe1[i],
+        pe2: last.pe2[i],
+    });
+    write(folder, "final.csv", rows)
+}
+
+/// Writes the probed particles step by step.
+pub fn write_probes(folder: &OutputFolder, probes: &[ProbeSeries]) -> Result<PathBuf, ExportError> {
+    let steps = probes.iter().map(|probe| probe.positions.len()).max().unwrap_or(0);
+    let rows = (0..steps).flat_map(|step| {
+        probes.iter().filter(move |probe| step < probe.positions.len()).map(move |probe| {
+            let [x, y] = probe.positions.get(step);
+            ProbeRow { step, id: probe.particle + 1, x, y, pe1: probe.pe1[step], pe2: probe.pe2[step] }
+        })
+    });
+    write(folder, "probes.csv", rows)
+}
+
+fn write(
+    folder: &OutputFolder,
+    name: &str,
+    rows: impl Iterator<Item = impl Serialize>,
+) -> Result<PathBuf, ExportError> {
+    let path = folder.path(name);
+    let mut writer = Writer::from_path(&path).map_err(ExportError::io("write", &path))?;
+    for row in rows {
+        writer.serialize(row).map_err(ExportError::io("write", &path))?;
+    }
+    writer.flush().map_err(ExportError::io("write", &path))?;
+    Ok(path)
+}

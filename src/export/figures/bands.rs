@@ -1,0 +1,149 @@
+//! The bands of a filled contour plot: their levels, colours and outlines.
+
+use super::colour::viridis;
+use super::svg::{Anchor, INK, Svg, text_width};
+use super::ticks::Ticks;
+
+const LABEL_TEXT: f64 = 12.0;
+const NAME_TEXT: f64 = 13.0;
+const BAR_WIDTH: f64 = 16.0;
+const BAR_GAP: f64 = 18.0;
+
+/// A point of the sheet [px] and the field's value there.
+pub type Sample = ([f64; 2], f64);
+
+/// Levels at round values around the field's range.
+#[derive(Clone, Debug)]
+pub struct Bands {
+    levels: Ticks,
+}
+
+impl Bands {
+    /// Bands for values from `low` to `high`; one band if they differ by no more than `noise`.
+    pub fn around(low: f64, high: f64, noise: f64) -> Self {
+        const ABOUT: f64 = 10.0;
+        let is_uniform = !(high - low > noise.max(1e-9 * high.abs()));
+        let value = if high.abs() <= noise || !high.is_finite() { 0.0 } else { high };
+        Self { levels: if is_uniform { Ticks::single(value) } else { Ticks::around(low, high, ABOUT) } }
+    }
+
+    pub fn count(&self) -> usize {
+        (self.levels.values.len() - 1).max(1)
+    }
+
+    /// Lowest value of a band.
+    pub fn level(&self, band: usize) -> f64 {
+        self.levels.values[band]
+    }
+
+    /// The band that a value falls into.
+    pub fn of(&self, value: f64) -> usize {
+        self.levels.values.partition_point(|&level| level <= value).clamp(1, self.count()) - 1
+    }
+
+    pub fn colour(&self, band: usize) -> String {
+        match self.count() {
+            1 => viridis(0.0),
+            count => viridis(band as f64 / (count - 1) as f64),
+        }
+    }
+
+    /// Room that the bar takes beside a plot [px].
+    pub fn bar_room(&self) -> f64 {
+        BAR_GAP + BAR_WIDTH + 8.0 + self.widest_label() + 30.0
+    }
+
+    /// Draws the colour bar to the right of a plot with this top right corner and height [px].
+    pub fn draw_bar(&self, svg: &mut Svg, [right, top]: [f64; 2], height: f64, quantity: &str, unit: &str) {
+        let left = right + BAR_GAP;
+        let count = self.count();
+        let part = height / count as f64;
+        for band in 0..count {
+            let corner = [left, top + height - (band + 1) as f64 * part];
+            svg.rect(corner, [BAR_WIDTH, part], format_args!("fill=\"{}\"", self.colour(band)));
+        }
+        svg.rect([left, top], [BAR_WIDTH, height], format_args!("fill=\"none\" stroke=\"{INK}\""));
+        let every = (1.4 * LABEL_TEXT / part).ceil() as usize;
+        let is_uniform = self.levels.values.len() == 1;
+        for (n, &value) in self.levels.values.iter().enumerate().step_by(every.max(1)) {
+            let y = if is_uniform { top + height / 2.0 } else { top + height - n as f64 * part };
+            let label = self.levels.label(value);
+            svg.text([left + BAR_WIDTH + 7.0, y], Anchor::Start, LABEL_TEXT, INK, &label);
+        }
+        let name_x = left + BAR_WIDTH + 8.0 + self.widest_label() + 14.0;
+        svg.upward_text([name_x, top + height / 2.0], NAME_TEXT, &self.levels.axis_name(quantity, unit));
+    }
+
+    fn widest_label(&self) -> f64 {
+        let width = |&value: &f64| text_width(&self.levels.label(value), LABEL_TEXT);
+        self.levels.values.iter().map(width).fold(0.0, f64::max)
+    }
+}
+
+/// The part of a triangle in which the linear field through its corners is at least `level`.
+pub fn at_least(level: f64, triangle: [Sample; 3]) -> Vec<[f64; 2]> {
+    let mut part = Vec::with_capacity(4);
+    for n in 0..3 {
+        let ((a, at_a), (b, at_b)) = (triangle[n], triangle[(n + 1) % 3]);
+        if at_a >= level {
+            part.push(a);
+        }
+        if (at_a >= level) != (at_b >= level) {
+            let fraction = (level - at_a) / (at_b - at_a);
+            part.push([0, 1].map(|k| a[k] + fraction * (b[k] - a[k])));
+        }
+    }
+    part
+}
+
+/// Cuts a face into triangles on which a linear field is defined: itself, or a fan around its middle.
+pub fn triangles(face: &[Sample]) -> Vec<[Sample; 3]> {
+    if let [a, b, c] = *face {
+        return vec![[a, b, c]];
+    }
+    let share = 1.0 / face.len() as f64;
+    let middle = face.iter().fold(([0.0, 0.0], 0.0), |(at, sum), &(point, value)| {
+        ([at[0] + share * point[0], at[1] + share * point[1]], sum + share * value)
+    });
+    (0..face.len()).map(|n| [face[n], face[(n + 1) % face.len()], middle]).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_linear_field_is_cut_along_its_level() {
+        let field = |[x, y]: [f64; 2]| ([x, y], 2.0 * x + y);
+        let square = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(field);
+        let mut area = 0.0;
+        for triangle in triangles(&square) {
+            let part = at_least(2.0, triangle);
+            for &[x, y] in &part {
+                assert!(2.0 * x + y >= 2.0 - 1e-12, "[{x}, {y}]");
+            }
+            let cross = |n: usize| {
+                let (a, b) = (part[n], part[(n + 1) % part.len()]);
+                (a[0] * b[1] - a[1] * b[0]) / 2.0
+            };
+            area += (0..part.len()).map(cross).sum::<f64>();
+        }
+        // 2x + y >= 2 within the unit square is the triangle (1, 0), (1, 1), (1/2, 1).
+        assert!((area - 0.25).abs() < 1e-12, "{area}");
+    }
+
+    #[test]
+    fn values_fall_into_the_band_between_their_levels() {
+        let bands = Bands::around(0.0, 1.0, 0.0);
+        assert_eq!((bands.count(), bands.of(0.0), bands.of(0.25), bands.of(1.0)), (10, 0, 2, 9));
+        assert_eq!([bands.colour(0), bands.colour(9)], ["#440154", "#fde725"]);
+    }
+
+    #[test]
+    fn a_uniform_field_has_one_band_and_noise_is_uniform() {
+        for (low, high) in [(0.0, 0.0), (3.0, 3.0), (0.0, 1e-25), (f64::NAN, f64::NAN)] {
+            let bands = Bands::around(low, high, 1e-20);
+            assert_eq!((bands.count(), bands.of(high)), (1, 0), "{low} to {high}");
+        }
+    }
+}

@@ -1,0 +1,59 @@
+//! Colours of roles, fields and lines.
+
+use crate::flock::role::Role;
+
+pub const BROKEN_BOND: &str = "#d0021b";
+pub const LIVE_BOND: &str = "#b8bcc2";
+
+/// The paper's colours, with the clamped ones in a darker red than the leaders that move.
+pub fn of_role(role: Role) -> &'static str {
+    match role {
+        Role::Follower => "#2060c0",
+        Role::Leader => "#e8201c",
+        Role::Clamped => "#7d0a0a",
+        Role::Frame => "#ff9a1f",
+        Role::Ghost => "#9aa0a6",
+    }
+}
+
+/// Lines that stay apart for colour-blind readers (Okabe and Ito), dark enough for white paper.
+pub const SERIES: [&str; 8] =
+    ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#444444", "#8a5a2b"];
+
+/// The colour map viridis at every tenth.
+const VIRIDIS: [[u8; 3]; 11] = [
+    [0x44, 0x01, 0x54],
+    [0x48, 0x24, 0x75],
+    [0x41, 0x44, 0x87],
+    [0x35, 0x5f, 0x8d],
+    [0x2a, 0x78, 0x8e],
+    [0x21, 0x91, 0x8c],
+    [0x22, 0xa8, 0x84],
+    [0x44, 0xbf, 0x70],
+    [0x7a, 0xd1, 0x51],
+    [0xbd, 0xdf, 0x26],
+    [0xfd, 0xe7, 0x25],
+];
+
+/// Viridis, perceptually uniform, at `fraction` of its way from dark to bright.
+pub fn viridis(fraction: f64) -> String {
+    let place = fraction.clamp(0.0, 1.0) * 10.0;
+    let below = (place as usize).min(9);
+    let part = place - below as f64;
+    let mix = |channel: usize| {
+        let [from, to] = [VIRIDIS[below], VIRIDIS[below + 1]].map(|colour| f64::from(colour[channel]));
+        (from + part * (to - from)).round() as u8
+    };
+    format!("#{:02x}{:02x}{:02x}", mix(0), mix(1), mix(2))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn viridis_runs_from_dark_violet_to_yellow() {
+        assert_eq!([viridis(0.0), viridis(0.5), viridis(1.0)], ["#440154", "#21918c", "#fde725"]);
+        assert_eq!(viridis(0.05), "#461365");
+    }
+}

@@ -1,0 +1,112 @@
+//! PE1 as filled contours over the deformed body.
+
+use super::axes::Axes;
+use super::bands::{Bands, Sample, at_least, triangles};
+use super::configuration::dot_radius;
+use super::faces::faces;
+use super::heading::Heading;
+use super::page;
+use super::raster::Raster;
+use super::svg::{Path, Svg};
+use super::{MOST_DOTS, Subject};
+use crate::continuum::record::Snapshot;
+
+/// PE1 comes from differences of positions, whose last digits are rounding: what is below the
+/// square of this many spacings is no deformation.
+const NOISE_IN_SPACINGS: f64 = 1e-10;
+
+/// Filled contours over the faces of the lattice; particles in no whole face, and bodies whose
+/// neighbours are no function of the lattice, as dots in the colours of the same bands. Frame and
+/// ghosts, which are no matter, are left out.
+pub fn pe1(subject: &Subject<'_>, snapshot: &Snapshot) -> String {
+    let spacing = subject.body.lattice.spacing();
+    let is_drawn: Vec<bool> = (0..snapshot.roles.len())
+        .map(|i| snapshot.roles[i].is_body() && snapshot.positions.get(i).iter().all(|v| v.is_finite()))
+        .collect();
+    let drawn: Vec<usize> = (0..is_drawn.len()).filter(|&i| is_drawn[i]).collect();
+    let (low, high) = drawn
+        .iter()
+        .map(|&i| snapshot.pe1[i])
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
+    let bands = Bands::around(low, high, (NOISE_IN_SPACINGS * spacing).powi(2));
+    let axes = page::window(&snapshot.positions, drawn.iter().copied(), spacing);
+    let note = format!("first pseudo-energy PE1, {}", page::note(snapshot));
+    let mut heading = Heading { title: subject.title.into(), note, legend: Vec::new() };
+    let is_raster = drawn.len() > MOST_DOTS;
+    if is_raster {
+        heading.note += &format!("; {} particles as squares, each with its largest value", drawn.len());
+    }
+    page::with_body(&heading, axes, subject.unit, bands.bar_room(), |svg, axes| {
+        if is_raster {
+            draw_raster(svg, axes, snapshot, &drawn, &bands, spacing);
+        } else {
+            draw_contours(svg, axes, subject, snapshot, &is_drawn, &bands);
+        }
+        let top_right = [axes.corner[0] + axes.size[0], axes.corner[1]];
+        bands.draw_bar(svg, top_right, axes.size[1], "PE1", &format!("{}²", subject.unit));
+    })
+}
+
+fn draw_contours(
+    svg: &mut Svg,
+    axes: &Axes,
+    subject: &Subject<'_>,
+    snapshot: &Snapshot,
+    is_drawn: &[bool],
+    bands: &Bands,
+) {
+    let mut is_alone = is_drawn.to_vec();
+    let sample = |&i: &u32| (axes.place(snapshot.positions.get(i as usize)), snapshot.pe1[i as usize]);
+    let mut patches: Vec<Vec<Sample>> = Vec::new();
+    for face in faces(subject.body, is_drawn, &snapshot.broken) {
+        face.iter().for_each(|&corner| is_alone[corner as usize] = false);
+        patches.push(face.iter().map(sample).collect());
+    }
+    // Every band is laid over all of what is at least as high, so that no seam shows between bands.
+    for band in 0..bands.count() {
+        let path = superlevel(&patches, (band > 0).then(|| bands.level(band)));
+        svg.path(&path, format_args!("class=\"band\" fill=\"{}\"", bands.colour(band)));
+    }
+    let radius = dot_radius(axes, subject.body.lattice.spacing());
+    for i in (0..is_alone.len()).filter(|&i| is_alone[i]) {
+        let attributes = format!("fill=\"{}\"", bands.colour(bands.of(snapshot.pe1[i])));
+        svg.group(attributes, |svg| svg.circle(axes.place(snapshot.positions.get(i)), radius));
+    }
+}
+
+/// Where the field is at least `level`; everywhere if there is none.
+fn superlevel(patches: &[Vec<Sample>], level: Option<f64>) -> Path {
+    let mut path = Path::default();
+    for patch in patches {
+        let is_above = |&(_, value): &Sample| level.is_none_or(|level| value >= level);
+        match level {
+            _ if patch.iter().all(is_above) => path.polygon(patch.iter().map(|&(point, _)| point)),
+            Some(level) if patch.iter().any(is_above) => {
+                for part in triangles(patch).into_iter().map(|triangle| at_least(level, triangle)) {
+                    if part.len() > 2 {
+                        path.polygon(part);
+                    }
+                }
+            }
+            _ => {}
+        }
+    }
+    path
+}
+
+fn draw_raster(
+    svg: &mut Svg,
+    axes: &Axes,
+    snapshot: &Snapshot,
+    drawn: &[usize],
+    bands: &Bands,
+    spacing: f64,
+) {
+    let mut raster = Raster::over(axes, spacing);
+    for &i in drawn {
+        raster.drop(axes.place(snapshot.positions.get(i)), snapshot.pe1[i]);
+    }
+    for (band, path) in raster.paths(bands.count(), |value| bands.of(value)).iter().enumerate() {
+        svg.path(path, format_args!("fill=\"{}\" shape-rendering=\"crispEdges\"", bands.colour(band)));
+    }
+}

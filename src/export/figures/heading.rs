@@ -1,0 +1,105 @@
+//! What stands above a plot: title, what is shown, legend.
+
+use super::svg::{Anchor, INK, Svg, text_width};
+
+const TITLE_TEXT: f64 = 16.0;
+const NOTE_TEXT: f64 = 13.0;
+const KEY_TEXT: f64 = 13.0;
+const MARGIN: f64 = 16.0;
+const QUIET: &str = "#555555";
+
+/// An entry of the legend.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Key {
+    pub name: &'static str,
+    pub colour: &'static str,
+    pub mark: Mark,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mark {
+    Dot,
+    DashedLine,
+}
+
+#[derive(Clone, Debug, Default)]
+pub struct Heading {
+    pub title: String,
+    pub note: String,
+    pub legend: Vec<Key>,
+}
+
+impl Heading {
+    /// Height on a sheet of this width, the space to the plot included [px].
+    pub fn height(&self, width: f64) -> f64 {
+        self.draw(&mut Svg::new(width, 1.0), width)
+    }
+
+    /// Draws at the top of a sheet of this width; returns where the plot may begin [px].
+    pub fn draw(&self, svg: &mut Svg, width: f64) -> f64 {
+        let room = width - 2.0 * MARGIN;
+        let mut y = 6.0;
+        for (text, size, colour) in [(&self.title, TITLE_TEXT, INK), (&self.note, NOTE_TEXT, QUIET)] {
+            for line in wrapped(text, size, room) {
+                y += 0.75 * size;
+                svg.text([MARGIN, y], Anchor::Start, size, colour, &line);
+                y += 0.65 * size;
+            }
+        }
+        let mut x = MARGIN;
+        for (n, key) in self.legend.iter().enumerate() {
+            let takes = 22.0 + text_width(key.name, KEY_TEXT) + 10.0;
+            if n == 0 || x + takes > width {
+                x = MARGIN;
+                y += if n == 0 { 14.0 } else { 20.0 };
+            }
+            draw_key(svg, key, [x, y]);
+            x += takes;
+        }
+        y + if self.legend.is_empty() { 8.0 } else { 18.0 }
+    }
+}
+
+fn draw_key(svg: &mut Svg, key: &Key, [x, y]: [f64; 2]) {
+    match key.mark {
+        Mark::Dot => {
+            svg.group(format_args!("fill=\"{}\" class=\"key\"", key.colour), |svg| {
+                svg.rect([x + 3.0, y - 5.0], [10.0, 10.0], "rx=\"5\"");
+            });
+        }
+        Mark::DashedLine => {
+            let attributes = format!("stroke=\"{}\" stroke-width=\"1.5\" stroke-dasharray=\"4 2\"", key.colour);
+            svg.group(attributes, |svg| svg.line([x, y], [x + 16.0, y]));
+        }
+    }
+    svg.text([x + 21.0, y], Anchor::Start, KEY_TEXT, INK, key.name);
+}
+
+/// Breaks a text between words so that no line is wider than `room` [px].
+fn wrapped(text: &str, size: f64, room: f64) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for word in text.split_whitespace() {
+        match lines.last_mut() {
+            Some(line) if text_width(&format!("{line} {word}"), size) <= room => {
+                line.push(' ');
+                line.push_str(word);
+            }
+            _ => lines.push(word.to_owned()),
+        }
+    }
+    lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_long_title_wraps_and_pushes_the_plot_down() {
+        let heading = |title: &str| Heading { title: title.into(), ..Heading::default() };
+        let (short, long) = (heading("Tension"), heading(&"tension ".repeat(40)));
+        assert_eq!(wrapped(&short.title, TITLE_TEXT, 768.0), ["Tension"]);
+        assert_eq!(wrapped(&long.title, TITLE_TEXT, 768.0).concat().matches("tension").count(), 40);
+        assert!(long.height(800.0) > short.height(800.0) + 50.0);
+    }
+}

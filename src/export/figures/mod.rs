@@ -1,0 +1,53 @@
+//! Figures: each is drawn once, as SVG, and its PNG is rendered from that very SVG.
+//!
+//! [`configuration`]: the body at a step, in the paper's colours. [`pe1`]: filled contours of the first
+//! pseudo-energy over it. [`probes`]: the history of a few particles. Axes of bodies are equal, and
+//! every axis carries its unit. SVG is written directly: a figure here is circles, lines and paths,
+//! and what matters is where they go.
+
+mod axes;
+mod bands;
+mod colour;
+mod configuration;
+mod energy;
+mod faces;
+mod heading;
+mod history;
+mod page;
+mod png;
+mod raster;
+mod svg;
+mod ticks;
+
+use std::path::{Path, PathBuf};
+
+use super::error::{ExportError, write_file};
+use crate::flock::body::Body;
+pub use configuration::configuration;
+pub use energy::pe1;
+pub use history::probes;
+
+/// Whom a figure shows.
+#[derive(Clone, Copy, Debug)]
+pub struct Subject<'a> {
+    pub title: &'a str,
+    /// Name of the unit of length.
+    pub unit: &'a str,
+    pub body: &'a Body,
+}
+
+/// Width of every PNG [pixel].
+pub const PNG_WIDTH: u32 = 1600;
+
+/// More particles than this are drawn as a raster: an SVG of a million circles opens nowhere.
+const MOST_DOTS: usize = 60_000;
+
+/// Writes `PATH.svg` and `PATH.png`; `path` has no ending.
+pub fn write(svg: &str, path: &Path) -> Result<[PathBuf; 2], ExportError> {
+    let [svg_path, png_path] = ["svg", "png"].map(|ending| path.with_extension(ending));
+    write_file(&svg_path, svg)?;
+    let png = png::render(svg, PNG_WIDTH)
+        .map_err(|reason| ExportError::Figure { path: png_path.clone(), reason })?;
+    write_file(&png_path, png)?;
+    Ok([svg_path, png_path])
+}

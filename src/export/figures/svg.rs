@@ -1,0 +1,163 @@
+//! SVG elements, as text.
+
+use std::fmt::{Display, Write};
+
+/// First choice and fallback; the PNG is rendered with the first, which the program carries.
+pub const FONT: &str = "DejaVu Sans, Verdana, sans-serif";
+
+/// Ink of axes and text.
+pub const INK: &str = "#222222";
+
+/// A drawing under way; coordinates in [px] from the top left corner.
+#[derive(Debug)]
+pub struct Svg {
+    text: String,
+}
+
+/// Where a text stands against its point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Anchor {
+    Start,
+    Middle,
+    End,
+}
+
+impl Svg {
+    /// An empty white sheet.
+    pub fn new(width: f64, height: f64) -> Self {
+        let mut svg = Self { text: String::new() };
+        svg.push(format_args!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width:.0}\" height=\"{height:.0}\" \
+             viewBox=\"0 0 {width:.0} {height:.0}\" font-family=\"{FONT}\">"
+        ));
+        svg.push("<rect width=\"100%\" height=\"100%\" fill=\"white\"/>");
+        svg
+    }
+
+    pub fn finish(mut self) -> String {
+        self.push("</svg>");
+        self.text
+    }
+
+    /// Elements that share `attributes`.
+    pub fn group(&mut self, attributes: impl Display, draw: impl FnOnce(&mut Self)) {
+        self.push(format_args!("<g {attributes}>"));
+        draw(self);
+        self.push("</g>");
+    }
+
+    pub fn circle(&mut self, [x, y]: [f64; 2], radius: f64) {
+        self.push(format_args!("<circle cx=\"{x:.2}\" cy=\"{y:.2}\" r=\"{radius:.2}\"/>"));
+    }
+
+    pub fn line(&mut self, [x1, y1]: [f64; 2], [x2, y2]: [f64; 2]) {
+        self.push(format_args!("<line x1=\"{x1:.2}\" y1=\"{y1:.2}\" x2=\"{x2:.2}\" y2=\"{y2:.2}\"/>"));
+    }
+
+    pub fn rect(&mut self, [x, y]: [f64; 2], [width, height]: [f64; 2], attributes: impl Display) {
+        self.push(format_args!(
+            "<rect x=\"{x:.2}\" y=\"{y:.2}\" width=\"{width:.2}\" height=\"{height:.2}\" {attributes}/>"
+        ));
+    }
+
+    pub fn path(&mut self, path: &Path, attributes: impl Display) {
+        self.push(format_args!("<path {attributes} d=\"{}\"/>", path.0));
+    }
+
+    /// One line of text, centred on the height of `at`.
+    pub fn text(&mut self, at: [f64; 2], anchor: Anchor, size: f64, colour: &str, content: &str) {
+        self.turned_text(at, anchor, size, colour, content, "");
+    }
+
+    /// Text that reads upwards, centred on `at`.
+    pub fn upward_text(&mut self, at: [f64; 2], size: f64, content: &str) {
+        let turn = format!(" transform=\"rotate(-90 {:.2} {:.2})\"", at[0], at[1]);
+        self.turned_text(at, Anchor::Middle, size, INK, content, &turn);
+    }
+
+    fn turned_text(
+        &mut self,
+        [x, y]: [f64; 2],
+        anchor: Anchor,
+        size: f64,
+        colour: &str,
+        content: &str,
+        turn: &str,
+    ) {
+        let anchor = match anchor {
+            Anchor::Start => "start",
+            Anchor::Middle => "middle",
+            Anchor::End => "end",
+        };
+        // Half the height of a capital, since renderers disagree on `dominant-baseline`.
+        let rise = 0.36 * size;
+        self.push(format_args!(
+            "<text x=\"{x:.2}\" y=\"{y:.2}\" dy=\"{rise:.2}\" text-anchor=\"{anchor}\" font-size=\"{size}\" \
+             fill=\"{colour}\"{turn}>{}</text>",
+            escaped(content)
+        ));
+    }
+
+    fn push(&mut self, element: impl Display) {
+        // Writing to a string cannot fail.
+        let _ = writeln!(self.text, "{element}");
+    }
+}
+
+/// The `d` of a path.
+#[derive(Clone, Debug, Default)]
+pub struct Path(String);
+
+impl Path {
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    pub fn polyline(&mut self, points: impl IntoIterator<Item = [f64; 2]>) {
+        for (n, [x, y]) in points.into_iter().enumerate() {
+            let command = if n == 0 { 'M' } else { 'L' };
+            let _ = write!(self.0, "{command}{x:.2} {y:.2}");
+        }
+    }
+
+    pub fn polygon(&mut self, points: impl IntoIterator<Item = [f64; 2]>) {
+        self.polyline(points);
+        self.0.push('Z');
+    }
+
+    pub fn rectangle(&mut self, [x, y]: [f64; 2], [width, height]: [f64; 2]) {
+        let _ = write!(self.0, "M{x:.2} {y:.2}h{width:.2}v{height:.2}h-{width:.2}Z");
+    }
+}
+
+/// Width that a text takes at most [px]: DejaVu's digits and most of its letters are narrower.
+pub fn text_width(content: &str, size: f64) -> f64 {
+    0.64 * size * content.chars().count() as f64
+}
+
+fn escaped(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for character in text.chars() {
+        match character {
+            '&' => out.push_str("&amp;"),
+            '<' => out.push_str("&lt;"),
+            '>' => out.push_str("&gt;"),
+            // XML 1.0 has no place for control characters, not even as references.
+            c if c.is_control() => out.push(' '),
+            c => out.push(c),
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn text_cannot_break_out_of_its_element() {
+        let mut svg = Svg::new(10.0, 10.0);
+        svg.text([1.0, 2.0], Anchor::Start, 12.0, INK, "a < b & \u{1} </text>");
+        assert!(svg.finish().contains(">a &lt; b &amp;   &lt;/text&gt;</text>"));
+    }
+}

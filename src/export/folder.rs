@@ -1,0 +1,150 @@
+//! The output folder: whole, or not there.
+//!
+//! Everything is written into a hidden folder beside the one asked for, `.NAME.partial-PID`, which takes
+//! the name only when the last file is closed. Whoever kills a run finds the former outputs or
+//! nothing in their place, never half of the new ones.
+
+use std::ffi::OsString;
+use std::fs;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+
+use super::error::ExportError;
+use super::summary;
+
+/// A folder being filled. Dropped without [`OutputFolder::commit`], it leaves nothing behind.
+#[derive(Debug)]
+pub struct OutputFolder {
+    out: PathBuf,
+    partial: PathBuf,
+    force: bool,
+    /// Whether what was written outlives this value.
+    is_kept: bool,
+}
+
+/// What stands where the outputs shall go.
+enum Standing {
+    Nothing,
+    EmptyFolder,
+    /// Outputs of an earlier run that may be replaced.
+    FormerOutputs,
+}
+
+impl OutputFolder {
+    /// # Errors
+    /// A folder that is not empty is refused without `force`; with it, one that this program did not
+    /// write. A file in the place, and a parent that cannot be written to, are refused too.
+    pub fn create(out: &Path, force: bool) -> Result<Self, ExportError> {
+        if out.file_name().is_none() {
+            return Err(ExportError::Unnamed(out.to_owned()));
+        }
+        // A symbolic link stays one: what it leads to is replaced. And the place must not move with the
+        // working directory.
+        let out = if out.is_symlink() { fs::canonicalize(out) } else { std::path::absolute(out) }
+            .map_err(ExportError::io("find", out))?;
+        standing(&out, force)?;
+        if let Some(parent) = out.parent() {
+            fs::create_dir_all(parent).map_err(ExportError::io("create", parent))?;
+        }
+        let partial = create_beside(&out, "partial")?;
+        Ok(Self { out, partial, force, is_kept: false })
+    }
+
+    /// Where to write the output of this name.
+    pub fn path(&self, name: impl AsRef<Path>) -> PathBuf {
+        self.partial.join(name)
+    }
+
+    /// Gives the folder its name, in the place of what may be replaced.
+    ///
+    /// # Errors
+    /// Keeps the outputs under their temporary name, and tells it, if they cannot be moved.
+    pub fn commit(mut self) -> Result<PathBuf, ExportError> {
+        self.is_kept = true;
+        match self.take_place() {
+            Ok(()) => Ok(self.out.clone()),
+            Err(error) => {
+                Err(ExportError::NotMoved { kept: self.partial.clone(), source: Box::new(error) })
+            }
+        }
+    }
+
+    fn take_place(&self) -> Result<(), ExportError> {
+        let Self { out, partial, .. } = self;
+        // Looked at again: a run takes time, and somebody may have written there meanwhile.
+        match standing(out, self.force)? {
+            Standing::Nothing => rename(partial, out),
+            Standing::EmptyFolder => {
+                fs::remove_dir(out).map_err(ExportError::io("replace", out))?;
+                rename(partial, out)
+            }
+            Standing::FormerOutputs => {
+                let aside = create_beside(out, "replaced")?;
+                let former = aside.join("former");
+                rename(out, &former)?;
+                let moved = rename(partial, out);
+                if moved.is_err() {
+                    rename(&former, out)?;
+                }
+                if let Err(error) = fs::remove_dir_all(&aside) {
+                    tracing::warn!("the former outputs are left in {}: {error}", aside.display());
+                }
+                moved
+            }
+        }
+    }
+}
+
+impl Drop for OutputFolder {
+    fn drop(&mut self) {
+        if !self.is_kept
+            && let Err(error) = fs::remove_dir_all(&self.partial)
+        {
+            tracing::warn!("unfinished outputs are left in {}: {error}", self.partial.display());
+        }
+    }
+}
+
+fn standing(out: &Path, force: bool) -> Result<Standing, ExportError> {
+    match fs::metadata(out) {
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Standing::Nothing),
+        Err(error) => return Err(ExportError::io("look at", out)(error)),
+        Ok(found) if !found.is_dir() => return Err(ExportError::NotAFolder(out.to_owned())),
+        Ok(_) => {}
+    }
+    let mut entries = fs::read_dir(out).map_err(ExportError::io("look into", out))?;
+    match entries.next() {
+        None => Ok(Standing::EmptyFolder),
+        Some(_) if !force => Err(ExportError::NotEmpty(out.to_owned())),
+        Some(_) if summary::is_in(out) => Ok(Standing::FormerOutputs),
+        Some(_) => Err(ExportError::NotOurs(out.to_owned())),
+    }
+}
+
+/// Makes a hidden folder in the same parent, hence on the same file system, so that a rename is one
+/// step.
+fn create_beside(out: &Path, what: &str) -> Result<PathBuf, ExportError> {
+    let name = |attempt: u32| {
+        let mut name = OsString::from(".");
+        name.push(out.file_name().unwrap_or_default());
+        name.push(format!(".{what}-{}", std::process::id()));
+        if attempt > 0 {
+            name.push(format!("-{attempt}"));
+        }
+        out.with_file_name(name)
+    };
+    let mut attempt = 0;
+    loop {
+        let path = name(attempt);
+        match fs::create_dir(&path) {
+            Ok(()) => return Ok(path),
+            // Process ids repeat, in containers at every start: a killed run may have left its own.
+            Err(error) if error.kind() == ErrorKind::AlreadyExists && attempt < 1000 => attempt += 1,
+            Err(error) => return Err(ExportError::io("create", &path)(error)),
+        }
+    }
+}
+
+fn rename(from: &Path, to: &Path) -> Result<(), ExportError> {
+    fs::rename(from, to).map_err(ExportError::io("rename the finished folder to", to))
+}

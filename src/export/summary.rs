@@ -1,0 +1,180 @@
+//! `summary.json`: what was run, how it ended, in numbers.
+
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use serde::Serialize;
+
+use super::error::{ExportError, write_file};
+use super::{OutputFolder, bonds};
+use crate::continuum::engine::Engine;
+use crate::continuum::record::Snapshot;
+use crate::continuum::run::{Outcome, StopReason};
+use crate::flock::fracture::Break;
+use crate::flock::role::Role;
+use crate::scene::Scene;
+use crate::scene::raw::RawScene;
+
+const PROGRAM: &str = env!("CARGO_PKG_NAME");
+const FILE: &str = "summary.json";
+
+/// How long the parts of a run took.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Timings {
+    /// From the scene file to the engine.
+    pub setup: Duration,
+    pub steps: Duration,
+    /// Outputs written while the run went on; writing the others is added to it.
+    pub output: Duration,
+}
+
+/// The contents of `summary.json`; lengths in the scene's unit, infinities as `null`.
+#[derive(Clone, Debug, Serialize)]
+pub struct Summary {
+    pub program: &'static str,
+    pub version: &'static str,
+    pub name: String,
+    pub title: String,
+    pub counts: Counts,
+    /// Steps taken.
+    pub steps: usize,
+    pub stop_reason: &'static str,
+    /// Where and probably why the body diverged, if it did.
+    pub divergence: Option<String>,
+    /// Largest one-step motion over the spacing, at the last step.
+    pub residual: Option<f64>,
+    pub energies: Energies,
+    pub broken_bonds: BrokenBonds,
+    pub timings: Seconds,
+    /// The scene, its defaults and overrides included.
+    pub scene: RawScene,
+}
+
+/// Particles by their role at the end, and pairs of neighbours.
+#[derive(Clone, Copy, Debug, Serialize, PartialEq, Eq)]
+pub struct Counts {
+    pub particles: usize,
+    pub followers: usize,
+    pub leaders: usize,
+    pub clamped: usize,
+    pub ghosts: usize,
+    pub frame: usize,
+    /// Pairs of which at least one sees the other, broken ones included.
+    pub neighbour_pairs: usize,
+}
+
+/// Sums over the body at the end.
+#[derive(Clone, Copy, Debug, Serialize, PartialEq)]
+pub struct Energies {
+    /// [length^2]
+    pub pe1: f64,
+    /// [length]
+    pub pe2: f64,
+}
+
+#[derive(Clone, Copy, Debug, Serialize, PartialEq)]
+pub struct BrokenBonds {
+    pub count: usize,
+    /// Those of them that were broken before the first step: cuts and ghosts of the scene.
+    pub before_the_start: usize,
+    /// The first to break in a step; among several, the one with the lowest particle.
+    pub first: Option<FirstBreak>,
+}
+
+#[derive(Clone, Copy, Debug, Serialize, PartialEq)]
+pub struct FirstBreak {
+    pub step: usize,
+    /// Ids, counted from 1.
+    pub pair: [usize; 2],
+    /// Middle of the bond in the reference configuration [length].
+    pub place: [f64; 2],
+    /// The place along the longer side of the body's bounds, from 0 to 1.
+    pub along: f64,
+}
+
+/// [`Timings`] in seconds.
+#[derive(Clone, Copy, Debug, Serialize, PartialEq)]
+pub struct Seconds {
+    pub setup_s: f64,
+    pub steps_s: f64,
+    pub output_s: f64,
+}
+
+impl Summary {
+    /// `last` is the configuration at the end.
+    pub fn new(scene: &Scene, outcome: &Outcome, last: &Snapshot, timings: Timings) -> Self {
+        let [pe1, pe2] = last.energies();
+        Self {
+            program: PROGRAM,
+            version: env!("CARGO_PKG_VERSION"),
+            name: scene.name.clone(),
+            title: scene.raw.title.clone(),
+            counts: counts(&outcome.engine),
+            steps: outcome.engine.step(),
+            stop_reason: outcome.reason.name(),
+            divergence: match &outcome.reason {
+                StopReason::Diverged(divergence) => Some(divergence.to_string()),
+                _ => None,
+            },
+            residual: Some(outcome.residual).filter(|residual| residual.is_finite()),
+            energies: Energies { pe1, pe2 },
+            broken_bonds: broken_bonds(&outcome.engine),
+            timings: Seconds {
+                setup_s: timings.setup.as_secs_f64(),
+                steps_s: timings.steps.as_secs_f64(),
+                output_s: timings.output.as_secs_f64(),
+            },
+            scene: scene.raw.clone(),
+        }
+    }
+
+    pub fn write(&self, folder: &OutputFolder) -> Result<PathBuf, ExportError> {
+        let path = folder.path(FILE);
+        let mut text = serde_json::to_string_pretty(self).map_err(ExportError::io("write", &path))?;
+        text.push('\n');
+        write_file(&path, text)?;
+        Ok(path)
+    }
+}
+
+/// Whether the folder holds a summary that this program wrote.
+pub(super) fn is_in(folder: &Path) -> bool {
+    let text = std::fs::read_to_string(folder.join(FILE)).unwrap_or_default();
+    serde_json::from_str::<serde_json::Value>(&text).is_ok_and(|summary| summary["program"] == PROGRAM)
+}
+
+fn counts(engine: &Engine) -> Counts {
+    let of = |role: Role| engine.roles().iter().filter(|&&r| r == role).count();
+    Counts {
+        particles: engine.roles().len(),
+        followers: of(Role::Follower),
+        leaders: of(Role::Leader),
+        clamped: of(Role::Clamped),
+        ghosts: of(Role::Ghost),
+        frame: of(Role::Frame),
+        neighbour_pairs: bonds::pairs(&engine.interaction().neighbours).count(),
+    }
+}
+
+fn broken_bonds(engine: &Engine) -> BrokenBonds {
+    let breaks = engine.breaks();
+    let first = breaks.iter().find(|one| one.step > 0);
+    BrokenBonds {
+        count: breaks.len(),
+        before_the_start: breaks.iter().filter(|one| one.step == 0).count(),
+        first: first.map(|one| FirstBreak {
+            step: one.step,
+            pair: one.pair.map(|particle| particle as usize + 1),
+            place: one.place,
+            along: along_body(engine, one),
+        }),
+    }
+}
+
+fn along_body(engine: &Engine, one: &Break) -> f64 {
+    let body = engine.body();
+    let matter = (0..body.count()).filter(|&i| !body.is_frame[i]);
+    let Some((low, high)) = body.reference.bounds(matter) else { return 0.0 };
+    let axis = usize::from(high[1] - low[1] > high[0] - low[0]);
+    (one.place[axis] - low[axis]) / (high[axis] - low[axis])
+}
