@@ -1,1 +1,11 @@
+//! How fast the sweeps are, beside what the machine can do.
+//!
+//! A number of updates per second says little without the machine it was taken on, so every
+//! benchmark measures the machine's limit in the same run and reports its own share of it:
+//!
+//! * [`machine`]: the memory bandwidth of the triad `a = b + s c`.
+//! * [`sweep`]: particle updates per second of the plain rule, beside the roofline that bandwidth
+//!   draws.
 
+pub mod machine;
+pub mod sweep;
