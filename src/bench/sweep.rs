@@ -171,7 +171,7 @@ impl SquareLattice {
         present.x[last_column..].iter_mut().for_each(|x| *x += 0.5);
         let interaction = Interaction {
             rule: Rule::BARYCENTRE,
-            reference,
+            reference: reference.into(),
             neighbours,
             weights: None,
             rest: None,

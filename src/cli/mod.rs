@@ -120,6 +120,8 @@ pub enum Refusal {
         "there is no scene file and no bundled scene `{name}`\n  help: the nearest bundled scene is `{nearest}`; `flockform scenes` lists them all"
     )]
     NoScene { name: String, nearest: &'static str },
+    #[error("no threads to measure with: {0}")]
+    Bench(#[from] rayon::ThreadPoolBuildError),
     #[error("--threads {threads}: {error}\n  help: give a number from 1 to the machine's cores")]
     Threads { threads: usize, error: rayon::ThreadPoolBuildError },
 }
@@ -146,8 +148,8 @@ pub fn dispatch(command: Command) -> Result<ExitCode, Refusal> {
             print(&String::from_utf8_lossy(&script));
         }
         Command::Bench(BenchCommand::Sweep { json, quick }) => {
-            let report = bench::sweep::run(&bench::sweep::Options { quick });
-            print(&if json { format!("{}\n", report.to_json()) } else { report.to_string() });
+            let report = bench::sweep::run(&bench::sweep::Options { quick })?;
+            print(&if json { format!("{}\n", serde_json::json!(report)) } else { report.to_string() });
         }
     }
     Ok(ExitCode::SUCCESS)

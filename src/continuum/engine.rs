@@ -7,6 +7,7 @@ use crate::flock::body::Body;
 use crate::flock::fracture::Break;
 use crate::flock::grid::CellGrid;
 use crate::flock::interaction::Interaction;
+use crate::flock::neighbourhood::Neighbours;
 use crate::flock::points::{Points, distance};
 use crate::flock::pseudo_energy::{pe1, pe2};
 use crate::flock::role::Role;
@@ -106,6 +107,11 @@ impl Engine {
 
     pub fn interaction(&self) -> &Interaction {
         &self.interaction
+    }
+
+    /// The neighbour lists, unless they are found anew at every step.
+    pub fn lasting_neighbours(&self) -> Option<&Neighbours> {
+        self.present_neighbours.is_none().then_some(&self.interaction.neighbours)
     }
 
     pub fn roles(&self) -> &[Role] {

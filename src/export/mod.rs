@@ -95,8 +95,13 @@ pub fn write_all(folder: &OutputFolder, results: &Results<'_>) -> Result<Vec<Pat
 
 fn write_figures(folder: &OutputFolder, results: &Results<'_>) -> Result<Vec<PathBuf>, ExportError> {
     let scene = results.scene;
-    let subject =
-        Subject { title: &scene.raw.title, unit: scene.unit(), body: results.outcome.engine.body() };
+    let engine = &results.outcome.engine;
+    let subject = Subject {
+        title: &scene.raw.title,
+        unit: scene.unit(),
+        body: engine.body(),
+        neighbours: engine.lasting_neighbours(),
+    };
     let of_snapshots: Result<Vec<_>, _> = results
         .snapshots
         .par_iter()

@@ -10,7 +10,6 @@ use super::{OutputFolder, bonds};
 use crate::continuum::engine::Engine;
 use crate::continuum::record::Snapshot;
 use crate::continuum::run::{Outcome, StopReason};
-use crate::flock::fracture::Break;
 use crate::flock::role::Role;
 use crate::scene::Scene;
 use crate::scene::raw::RawScene;
@@ -166,15 +165,8 @@ fn broken_bonds(engine: &Engine) -> BrokenBonds {
             step: one.step,
             pair: one.pair.map(|particle| particle as usize + 1),
             place: one.place,
-            along: along_body(engine, one),
+            along: engine.body().along(one.place),
         }),
     }
 }
 
-fn along_body(engine: &Engine, one: &Break) -> f64 {
-    let body = engine.body();
-    let matter = (0..body.count()).filter(|&i| !body.is_frame[i]);
-    let Some((low, high)) = body.reference.bounds(matter) else { return 0.0 };
-    let axis = usize::from(high[1] - low[1] > high[0] - low[0]);
-    (one.place[axis] - low[axis]) / (high[axis] - low[axis])
-}

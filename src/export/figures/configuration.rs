@@ -64,8 +64,10 @@ fn draw_bonds(svg: &mut Svg, axes: &Axes, subject: &Subject<'_>, snapshot: &Snap
     };
     let broken: HashSet<[u32; 2]> = snapshot.broken.iter().copied().collect();
     let is_live = |[j, k]: [u32; 2]| !broken.contains(&[j.min(k), j.max(k)]);
-    let neighbours = &subject.body.neighbours;
-    if snapshot.positions.len() <= MOST_PARTICLES_WITH_BONDS && neighbours.index.len() <= 2 * MOST_BONDS {
+    if let Some(neighbours) = subject.neighbours
+        && snapshot.positions.len() <= MOST_PARTICLES_WITH_BONDS
+        && neighbours.index.len() <= 2 * MOST_BONDS
+    {
         let mut live = Path::default();
         bonds::pairs(neighbours).filter(|&pair| is_live(pair)).for_each(|pair| line(&mut live, pair));
         svg.path(&live, format_args!("fill=\"none\" stroke=\"{}\" stroke-width=\"0.8\"", colour::LIVE_BOND));

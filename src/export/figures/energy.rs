@@ -58,7 +58,9 @@ fn draw_contours(
     let mut is_alone = is_drawn.to_vec();
     let sample = |&i: &u32| (axes.place(snapshot.positions.get(i as usize)), snapshot.pe1[i as usize]);
     let mut patches: Vec<Vec<Sample>> = Vec::new();
-    for face in faces(subject.body, is_drawn, &snapshot.broken) {
+    // Where neighbours are found anew at every step the faces of the lattice mean nothing.
+    let faces = subject.neighbours.map_or_else(Vec::new, |_| faces(subject.body, is_drawn, &snapshot.broken));
+    for face in faces {
         face.iter().for_each(|&corner| is_alone[corner as usize] = false);
         patches.push(face.iter().map(sample).collect());
     }

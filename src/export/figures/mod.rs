@@ -23,6 +23,7 @@ use std::path::{Path, PathBuf};
 
 use super::error::{ExportError, write_file};
 use crate::flock::body::Body;
+use crate::flock::neighbourhood::Neighbours;
 pub use configuration::configuration;
 pub use energy::pe1;
 pub use history::probes;
@@ -34,6 +35,8 @@ pub struct Subject<'a> {
     /// Name of the unit of length.
     pub unit: &'a str,
     pub body: &'a Body,
+    /// The bonds of the body; `None` where neighbours are found anew at every step.
+    pub neighbours: Option<&'a Neighbours>,
 }
 
 /// Width of every PNG [pixel].
