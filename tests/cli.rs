@@ -247,9 +247,9 @@ fn values_out_of_range_are_refused_with_the_range() {
 
 #[test]
 fn wrong_choices_are_refused_with_the_choices() {
-    refused_with("tension", &["lattice.kind=sqare"], &["`square`"]);
-    refused_with("tension", &["frame=laged"], &["`lagged`"]);
-    refused_with("tension", &["roles[0].role=ghots"], &["`ghost`"]);
+    refused_with("tension", &["lattice.kind=sqare"], &["did you mean \"square\""]);
+    refused_with("tension", &["frame=laged"], &["did you mean \"lagged\""]);
+    refused_with("tension", &["roles[0].role=ghots"], &["did you mean \"ghost\""]);
     refused_with("tension", &["lattice={kind=\"square\",spacing=1.0,a=2.0}"], &["a"]);
 }
 
@@ -257,7 +257,7 @@ fn wrong_choices_are_refused_with_the_choices() {
 fn a_body_that_cannot_be_is_refused_with_the_remedy() {
     refused_with(
         "tension",
-        &["body.shape={kind=\"disc\",radius=0.1}", "body.anchor=[5.0,5.0]", "roles=[]", "record={}"],
+        &["body.shape={kind=\"disc\",radius=0.1}", "body.anchor=[0.5,0.5]", "roles=[]", "record={}"],
         &["holds no lattice site", "smaller spacing"],
     );
     refused_with(

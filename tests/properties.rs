@@ -29,7 +29,7 @@ const ROTATE: [&str; 6] = [
     r#"rule.mean={kind="distance",power=1.5}"#,
     r#"rule={weights={kind="distance",power=-1.0}}"#,
     r#"rule.feedback={factor=-0.3}"#,
-    r#"rule={mean={kind="spaced",spacing=0.9},feedback={factor=-0.5,reference="previous"}}"#,
+    r#"rule={mean={kind="spaced",spacing=0.9,power=-2.0},feedback={factor=-0.5,reference="previous"}}"#,
     r#"rule={rest="literal"}"#,
 ];
 
@@ -179,7 +179,7 @@ fn any_mean() -> impl Strategy<Value = Mean> {
         Just(Mean::Power { exponent: 0.0, origin: Origin::Moving { margin } }),
         Just(Mean::Power { exponent: 0.0, origin: Origin::World }),
         (-6.0..6.0f64).prop_map(|exponent| Mean::Power { exponent, origin: Origin::World }),
-        (0.01..5.0f64).prop_map(|spacing| Mean::Spaced { spacing }),
+        (0.01..5.0f64, -6.0..2.0f64).prop_map(|(spacing, power)| Mean::Spaced { spacing, power }),
     ]
 }
 

@@ -42,7 +42,7 @@ impl PlanReport {
             Mean::Distance { power } => format!("mean weighted by distance^{power} (Eq. 3)"),
             Mean::Power { exponent: 0.0, .. } => "geometric mean".to_owned(),
             Mean::Power { exponent, .. } => format!("power mean with exponent {exponent}"),
-            Mean::Spaced { spacing } => format!("cohesion with separation at {spacing}"),
+            Mean::Spaced { spacing, .. } => format!("cohesion with separation at {spacing}"),
         };
         self.models(mean, "rule.mean");
         let frame = scene.frame.map(|frame| {

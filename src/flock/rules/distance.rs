@@ -15,16 +15,23 @@ pub fn mean(
     present: [f64; 2],
     neighbours: impl Iterator<Item = Neighbour> + Clone,
 ) -> Option<[f64; 2]> {
-    let distances = neighbours.clone().map(|n| distance(n.position, present));
+    barycentre::mean(weighted(power, present, neighbours))
+}
+
+/// The neighbours, their weights multiplied by `d^p` up to a common factor.
+pub fn weighted(
+    power: f64,
+    present: [f64; 2],
+    neighbours: impl Iterator<Item = Neighbour> + Clone,
+) -> impl Iterator<Item = Neighbour> + Clone {
+    let distances = neighbours.clone().map(move |n| distance(n.position, present));
     // Relative to the largest weight, so that no power of a distance overflows.
-    let scale =
-        if power >= 0.0 { distances.fold(0.0, f64::max) } else { distances.fold(f64::INFINITY, f64::min) };
-    let weighted = neighbours.clone().map(|n| {
+    let scale = if power >= 0.0 { distances.fold(0.0, f64::max) } else { distances.fold(f64::INFINITY, f64::min) };
+    neighbours.map(move |n| {
         let d = distance(n.position, present);
         let relative = if d == scale { 1.0 } else { (d / scale).powf(power) };
         Neighbour { weight: n.weight * if relative.is_finite() { relative } else { 0.0 }, ..n }
-    });
-    barycentre::mean(weighted)
+    })
 }
 
 #[cfg(test)]

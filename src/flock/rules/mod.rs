@@ -45,8 +45,9 @@ pub enum Mean {
     Distance { power: f64 },
     /// The power mean of each coordinate; exponent 0 is the geometric mean.
     Power { exponent: f64, origin: Origin },
-    /// The mean of the places at `spacing` \[length\] from each neighbour, towards the particle.
-    Spaced { spacing: f64 },
+    /// The mean of the places at `spacing` \[length\] from each neighbour, towards the particle,
+    /// weighted by this power of the present distance.
+    Spaced { spacing: f64, power: f64 },
 }
 
 /// A composed rule; what a scene does not name is `None` and not evaluated.
@@ -91,7 +92,7 @@ impl Rule {
             Mean::Barycentre => barycentre::mean(neighbours),
             Mean::Distance { power } => distance::mean(power, present, neighbours),
             Mean::Power { exponent, origin } => power::mean(exponent, origin, neighbours),
-            Mean::Spaced { spacing } => spaced::mean(spacing, present, neighbours),
+            Mean::Spaced { spacing, power } => spaced::mean(spacing, power, present, neighbours),
         }
     }
 
@@ -138,7 +139,7 @@ mod tests {
         Mean::Power { exponent: 3.0, origin: Origin::Moving { margin: 1.0 } },
         Mean::Power { exponent: -1.0, origin: Origin::World },
         Mean::Power { exponent: 0.0, origin: Origin::World },
-        Mean::Spaced { spacing: 1.0 },
+        Mean::Spaced { spacing: 1.0, power: -4.0 },
     ];
 
     fn own(present: [f64; 2]) -> Own {

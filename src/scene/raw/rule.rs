@@ -100,6 +100,10 @@ pub enum RawMean {
         /// The distance [length].
         #[schemars(extend("exclusiveMinimum" = 0))]
         spacing: f64,
+        /// Power of the present distance that weighs the neighbours; well below 0 the nearest have the
+        /// say and particles do not crowd [1].
+        #[serde(default)]
+        power: f64,
     },
 }
 

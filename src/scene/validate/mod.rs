@@ -264,7 +264,7 @@ fn mean(raw: &RawMean, spacing: f64, refuse: Refuse<'_>) -> Result<Mean, SceneEr
             ));
         }
         RawMean::Power { exponent, origin: from } => Mean::Power { exponent, origin: origin(from) },
-        RawMean::Spaced { spacing } => Mean::Spaced { spacing },
+        RawMean::Spaced { spacing, power } => Mean::Spaced { spacing, power },
     })
 }
 
