@@ -104,8 +104,10 @@ fn write_figures(folder: &OutputFolder, results: &Results<'_>) -> Result<Vec<Pat
             let path = |what: &str| folder.path(format!("{what}_{:04}", snapshot.step));
             let configuration = figures::configuration(&subject, snapshot);
             let pe1 = figures::pe1(&subject, snapshot);
-            let written =
-                [figures::write(&configuration, &path("configuration"))?, figures::write(&pe1, &path("pe1"))?];
+            let written = [
+                figures::write(&configuration, &path("configuration"))?,
+                figures::write(&pe1, &path("pe1"))?,
+            ];
             Ok(written.concat())
         })
         .collect();

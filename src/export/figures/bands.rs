@@ -21,10 +21,10 @@ pub struct Bands {
 impl Bands {
     /// Bands for values from `low` to `high`; one band if they differ by no more than `noise`.
     pub fn around(low: f64, high: f64, noise: f64) -> Self {
-        const ABOUT: f64 = 10.0;
+        const MOST: f64 = 14.0;
         let is_uniform = !(high - low > noise.max(1e-9 * high.abs()));
         let value = if high.abs() <= noise || !high.is_finite() { 0.0 } else { high };
-        Self { levels: if is_uniform { Ticks::single(value) } else { Ticks::around(low, high, ABOUT) } }
+        Self { levels: if is_uniform { Ticks::single(value) } else { Ticks::around(low, high, MOST) } }
     }
 
     pub fn count(&self) -> usize {

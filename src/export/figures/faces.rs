@@ -17,9 +17,10 @@ pub fn faces(body: &Body, included: &[bool], broken: &[[u32; 2]]) -> Vec<Vec<u32
     let broken: HashSet<[u32; 2]> = broken.iter().copied().collect();
     let is_whole = |face: &[u32]| {
         broken.is_empty()
-            || face.iter().enumerate().all(|(n, &a)| {
-                face[n + 1..].iter().all(|&b| !broken.contains(&[a.min(b), a.max(b)]))
-            })
+            || face
+                .iter()
+                .enumerate()
+                .all(|(n, &a)| face[n + 1..].iter().all(|&b| !broken.contains(&[a.min(b), a.max(b)])))
     };
     let mut found = Vec::new();
     for &site in &body.sites {

@@ -48,8 +48,8 @@ impl Heading {
         }
         let mut x = MARGIN;
         for (n, key) in self.legend.iter().enumerate() {
-            let takes = 22.0 + text_width(key.name, KEY_TEXT) + 10.0;
-            if n == 0 || x + takes > width {
+            let takes = 21.0 + text_width(key.name, KEY_TEXT) + 20.0;
+            if n == 0 || x + takes - 20.0 > width - MARGIN {
                 x = MARGIN;
                 y += if n == 0 { 14.0 } else { 20.0 };
             }
@@ -68,7 +68,8 @@ fn draw_key(svg: &mut Svg, key: &Key, [x, y]: [f64; 2]) {
             });
         }
         Mark::DashedLine => {
-            let attributes = format!("stroke=\"{}\" stroke-width=\"1.5\" stroke-dasharray=\"4 2\"", key.colour);
+            let attributes =
+                format!("stroke=\"{}\" stroke-width=\"1.5\" stroke-dasharray=\"4 2\"", key.colour);
             svg.group(attributes, |svg| svg.line([x, y], [x + 16.0, y]));
         }
     }
