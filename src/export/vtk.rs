@@ -2,8 +2,8 @@
 //!
 //! An unstructured grid of the present configuration. Its cells are the particles, as vertices, and the
 //! bonds that live, as lines, so that a crack shows as what is missing. Point data: `id` from 1,
-//! `role` (0 follower, 1 leader, 2 clamped, 3 frame, 4 ghost), `displacement` [length], `pe1`
-//! [length^2], `pe2` [length]. Arrays are base64 within the XML: a number costs 11 bytes, loses
+//! `role` (0 follower, 1 leader, 2 clamped, 3 frame, 4 ghost), `displacement` \[length\], `pe1`
+//! \[length^2\], `pe2` \[length\]. Arrays are base64 within the XML: a number costs 11 bytes, loses
 //! nothing, and the file stays well-formed, which raw appended data would not.
 
 use std::fs::{self, File};

@@ -3,7 +3,7 @@
 use super::svg::{Anchor, INK, Svg, text_width};
 use super::ticks::Ticks;
 
-/// Size of tick labels and of axis names [px].
+/// Size of tick labels and of axis names \[px\].
 const TICK_TEXT: f64 = 12.0;
 const NAME_TEXT: f64 = 13.0;
 const TICK: f64 = 5.0;
@@ -11,7 +11,7 @@ const TICK: f64 = 5.0;
 /// A window on the data and its place on the sheet.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Axes {
-    /// Top left corner and size [px].
+    /// Top left corner and size \[px\].
     pub corner: [f64; 2],
     pub size: [f64; 2],
     /// Lowest and highest value on each axis.
@@ -27,7 +27,7 @@ pub struct Measure<'a> {
 }
 
 impl Axes {
-    /// Room below the plot for ticks and name [px].
+    /// Room below the plot for ticks and name \[px\].
     pub const BELOW: f64 = 52.0;
 
     /// A plot in which a unit is as long in y as it is in x, around a body within `low` to `high`
@@ -48,12 +48,12 @@ impl Axes {
         }
     }
 
-    /// Length of a unit along x [px].
+    /// Length of a unit along x \[px\].
     pub fn scale(&self) -> f64 {
         self.size[0] / (self.high[0] - self.low[0])
     }
 
-    /// Where the data point lies on the sheet [px].
+    /// Where the data point lies on the sheet \[px\].
     pub fn place(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let along =
             |k: usize, value: f64| (value - self.low[k]) / (self.high[k] - self.low[k]) * self.size[k];
@@ -73,7 +73,7 @@ impl Axes {
         [horizontal, ticks(1, 34.0)]
     }
 
-    /// Room that the labels of the vertical axis take to the left of the plot [px].
+    /// Room that the labels of the vertical axis take to the left of the plot \[px\].
     pub fn left_of_plot(&self) -> f64 {
         let [_, ticks] = self.ticks();
         widest_label(&ticks) + TICK + 34.0
@@ -105,7 +105,7 @@ impl Axes {
         svg.text([middle, bottom + 37.0], Anchor::Middle, NAME_TEXT, INK, &name);
     }
 
-    /// `room` is how far to the left of the plot the name stands [px].
+    /// `room` is how far to the left of the plot the name stands \[px\].
     pub fn draw_vertical(&self, svg: &mut Svg, measure: Measure<'_>, room: f64) {
         let [_, ticks] = self.ticks();
         let left = self.corner[0];

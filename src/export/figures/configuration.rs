@@ -123,7 +123,7 @@ fn draw_dots(svg: &mut Svg, axes: &Axes, snapshot: &Snapshot, spacing: f64) {
     }
 }
 
-/// Dots leave gaps through which bonds are seen [px].
+/// Dots leave gaps through which bonds are seen \[px\].
 pub(super) fn dot_radius(axes: &Axes, spacing: f64) -> f64 {
     (0.3 * spacing * axes.scale()).clamp(0.6, 8.0)
 }

@@ -104,7 +104,7 @@ mod tests {
                 4 => 1.0,
                 _ => 2.0,
             };
-            assert!(found.len() > 8, "{kind:?}");
+            assert!(found.len() > 4, "{kind:?}");
             for face in found {
                 assert_eq!(face.len(), corners, "{kind:?}");
                 assert!((area(&body, &face) - share * body.lattice.cell_area()).abs() < 1e-9, "{kind:?}");
@@ -125,6 +125,6 @@ mod tests {
     #[test]
     fn a_body_whose_neighbours_are_found_anew_has_no_faces() {
         let body = block(LatticeKind::Square { spacing: 1.0 }, Neighbourhood::Present { radius: 1.5 });
-        assert!(faces(&body, &vec![true; 49], &[]).is_empty());
+        assert!(faces(&body, &[true; 49], &[]).is_empty());
     }
 }

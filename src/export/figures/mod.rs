@@ -36,7 +36,7 @@ pub struct Subject<'a> {
     pub body: &'a Body,
 }
 
-/// Width of every PNG [pixel].
+/// Width of every PNG \[pixel\].
 pub const PNG_WIDTH: u32 = 1600;
 
 /// More particles than this are drawn as a raster: an SVG of a million circles opens nowhere.
