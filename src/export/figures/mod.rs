@@ -1,6 +1,6 @@
 //! Figures: each is drawn once, as SVG, and its PNG is rendered from that very SVG.
 //!
-//! [`configuration`]: the body at a step, in the paper's colours. [`pe1`]: filled contours of the first
+//! [`configuration()`]: the body at a step, in the paper's colours. [`pe1`]: filled contours of the first
 //! pseudo-energy over it. [`probes`]: the history of a few particles. Axes of bodies are equal, and
 //! every axis carries its unit. SVG is written directly: a figure here is circles, lines and paths,
 //! and what matters is where they go.
