@@ -39,7 +39,7 @@ struct ProbeRow {
     pe2: f64,
 }
 
-/// Writes every particle at the end: reference and present place [length], PE1 [length^2], PE2 [length].
+/// Writes every particle at the end: reference and present place \[length\], PE1 \[length^2\], PE2 \[length\].
 pub fn write_final(folder: &OutputFolder, body: &Body, last: &Snapshot) -> Result<PathBuf, ExportError> {
     let lowest = |axis: usize| body.sites.iter().map(|site| i64::from(site[axis])).min().unwrap_or(0);
     let (first_column, first_row) = (lowest(0), lowest(1));

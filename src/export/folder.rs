@@ -63,9 +63,7 @@ impl OutputFolder {
         self.is_kept = true;
         match self.take_place() {
             Ok(()) => Ok(self.out.clone()),
-            Err(error) => {
-                Err(ExportError::NotMoved { kept: self.partial.clone(), source: Box::new(error) })
-            }
+            Err(error) => Err(ExportError::NotMoved { kept: self.partial.clone(), source: Box::new(error) }),
         }
     }
 

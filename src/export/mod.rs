@@ -95,13 +95,7 @@ pub fn write_all(folder: &OutputFolder, results: &Results<'_>) -> Result<Vec<Pat
 
 fn write_figures(folder: &OutputFolder, results: &Results<'_>) -> Result<Vec<PathBuf>, ExportError> {
     let scene = results.scene;
-    let engine = &results.outcome.engine;
-    let subject = Subject {
-        title: &scene.raw.title,
-        unit: scene.unit(),
-        body: engine.body(),
-        neighbours: engine.lasting_neighbours(),
-    };
+    let subject = Subject::of(scene, &results.outcome.engine);
     let of_snapshots: Result<Vec<_>, _> = results
         .snapshots
         .par_iter()
@@ -109,8 +103,10 @@ fn write_figures(folder: &OutputFolder, results: &Results<'_>) -> Result<Vec<Pat
             let path = |what: &str| folder.path(format!("{what}_{:04}", snapshot.step));
             let configuration = figures::configuration(&subject, snapshot);
             let pe1 = figures::pe1(&subject, snapshot);
-            let written =
-                [figures::write(&configuration, &path("configuration"))?, figures::write(&pe1, &path("pe1"))?];
+            let written = [
+                figures::write(&configuration, &path("configuration"))?,
+                figures::write(&pe1, &path("pe1"))?,
+            ];
             Ok(written.concat())
         })
         .collect();

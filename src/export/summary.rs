@@ -65,9 +65,9 @@ pub struct Counts {
 /// Sums over the body at the end.
 #[derive(Clone, Copy, Debug, Serialize, PartialEq)]
 pub struct Energies {
-    /// [length^2]
+    /// \[length^2\]
     pub pe1: f64,
-    /// [length]
+    /// \[length\]
     pub pe2: f64,
 }
 
@@ -85,7 +85,7 @@ pub struct FirstBreak {
     pub step: usize,
     /// Ids, counted from 1.
     pub pair: [usize; 2],
-    /// Middle of the bond in the reference configuration [length].
+    /// Middle of the bond in the reference configuration \[length\].
     pub place: [f64; 2],
     /// The place along the longer side of the body's bounds, from 0 to 1.
     pub along: f64,
@@ -169,4 +169,3 @@ fn broken_bonds(engine: &Engine) -> BrokenBonds {
         }),
     }
 }
-

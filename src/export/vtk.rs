@@ -2,8 +2,8 @@
 //!
 //! An unstructured grid of the present configuration. Its cells are the particles, as vertices, and the
 //! bonds that live, as lines, so that a crack shows as what is missing. Point data: `id` from 1,
-//! `role` (0 follower, 1 leader, 2 clamped, 3 frame, 4 ghost), `displacement` [length], `pe1`
-//! [length^2], `pe2` [length]. Arrays are base64 within the XML: a number costs 11 bytes, loses
+//! `role` (0 follower, 1 leader, 2 clamped, 3 frame, 4 ghost), `displacement` \[length\], `pe1`
+//! \[length^2\], `pe2` \[length\]. Arrays are base64 within the XML: a number costs 11 bytes, loses
 //! nothing, and the file stays well-formed, which raw appended data would not.
 
 use std::fs::{self, File};
@@ -85,15 +85,11 @@ fn write_frame(path: &Path, engine: &Engine) -> io::Result<()> {
     let roles = Role::ALL.map(|role| format!("{} {}", role_number(role), role.name())).join(", ");
     writeln!(out, "<!-- step {}; role: {roles} -->", engine.step())?;
     writeln!(out, "<UnstructuredGrid>")?;
-    writeln!(
-        out,
-        "<Piece NumberOfPoints=\"{points}\" NumberOfCells=\"{}\">",
-        points + lines.len()
-    )?;
+    writeln!(out, "<Piece NumberOfPoints=\"{points}\" NumberOfCells=\"{}\">", points + lines.len())?;
     write_point_data(&mut out, engine)?;
     writeln!(out, "<Points>")?;
     let places = engine.present().iter().flat_map(|[x, y]| [x, y, 0.0]);
-    floats(&mut out, "Points", 3, 3 * points, places)?;
+    vectors(&mut out, "Points", points, places)?;
     writeln!(out, "</Points>")?;
     write_cells(&mut out, points, &lines)?;
     writeln!(out, "</Piece>\n</UnstructuredGrid>\n</VTKFile>")?;
@@ -108,9 +104,9 @@ fn write_point_data(out: &mut impl Write, engine: &Engine) -> io::Result<()> {
     bytes(out, "role", points, roles)?;
     let moved = engine.present().iter().zip(engine.body().reference.iter());
     let displacement = moved.flat_map(|(now, initial)| [now[0] - initial[0], now[1] - initial[1], 0.0]);
-    floats(out, "displacement", 3, 3 * points, displacement)?;
-    floats(out, "pe1", 1, points, (0..points).map(|i| engine.pe1(i)))?;
-    floats(out, "pe2", 1, points, (0..points).map(|i| engine.pe2(i)))?;
+    vectors(out, "displacement", points, displacement)?;
+    floats(out, "pe1", points, (0..points).map(|i| engine.pe1(i)))?;
+    floats(out, "pe2", points, (0..points).map(|i| engine.pe2(i)))?;
     writeln!(out, "</PointData>")
 }
 
@@ -134,14 +130,23 @@ fn live_bonds(engine: &Engine) -> Vec<[u32; 2]> {
         .collect()
 }
 
+fn vectors(
+    out: &mut impl Write,
+    name: &str,
+    points: usize,
+    components: impl Iterator<Item = f64>,
+) -> io::Result<()> {
+    let attributes = format!("type=\"Float64\" Name=\"{name}\" NumberOfComponents=\"3\"");
+    array(out, &attributes, 3 * points, components.map(f64::to_le_bytes))
+}
+
 fn floats(
     out: &mut impl Write,
     name: &str,
-    components: usize,
     count: usize,
     values: impl Iterator<Item = f64>,
 ) -> io::Result<()> {
-    array(out, &format!("Float64\" NumberOfComponents=\"{components}"), name, count, values.map(f64::to_le_bytes))
+    array(out, &format!("type=\"Float64\" Name=\"{name}\""), count, values.map(f64::to_le_bytes))
 }
 
 fn integers(
@@ -150,27 +155,21 @@ fn integers(
     count: usize,
     values: impl Iterator<Item = i64>,
 ) -> io::Result<()> {
-    array(out, "Int64", name, count, values.map(i64::to_le_bytes))
+    array(out, &format!("type=\"Int64\" Name=\"{name}\""), count, values.map(i64::to_le_bytes))
 }
 
-fn bytes(
-    out: &mut impl Write,
-    name: &str,
-    count: usize,
-    values: impl Iterator<Item = u8>,
-) -> io::Result<()> {
-    array(out, "UInt8", name, count, values.map(u8::to_le_bytes))
+fn bytes(out: &mut impl Write, name: &str, count: usize, values: impl Iterator<Item = u8>) -> io::Result<()> {
+    array(out, &format!("type=\"UInt8\" Name=\"{name}\""), count, values.map(u8::to_le_bytes))
 }
 
 /// One array of `count` values of `SIZE` bytes, after the length that the format asks for.
 fn array<const SIZE: usize>(
     out: &mut impl Write,
-    kind: &str,
-    name: &str,
+    attributes: &str,
     count: usize,
     values: impl Iterator<Item = [u8; SIZE]>,
 ) -> io::Result<()> {
-    write!(out, "<DataArray type=\"{kind}\" Name=\"{name}\" format=\"binary\">")?;
+    write!(out, "<DataArray {attributes} format=\"binary\">")?;
     let mut encoder = EncoderWriter::new(&mut *out, &STANDARD);
     encoder.write_all(&((count * SIZE) as u64).to_le_bytes())?;
     for value in values {

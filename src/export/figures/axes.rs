@@ -3,7 +3,7 @@
 use super::svg::{Anchor, INK, Svg, text_width};
 use super::ticks::Ticks;
 
-/// Size of tick labels and of axis names [px].
+/// Size of tick labels and of axis names \[px\].
 const TICK_TEXT: f64 = 12.0;
 const NAME_TEXT: f64 = 13.0;
 const TICK: f64 = 5.0;
@@ -11,7 +11,7 @@ const TICK: f64 = 5.0;
 /// A window on the data and its place on the sheet.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Axes {
-    /// Top left corner and size [px].
+    /// Top left corner and size \[px\].
     pub corner: [f64; 2],
     pub size: [f64; 2],
     /// Lowest and highest value on each axis.
@@ -27,7 +27,7 @@ pub struct Measure<'a> {
 }
 
 impl Axes {
-    /// Room below the plot for ticks and name [px].
+    /// Room below the plot for ticks and name \[px\].
     pub const BELOW: f64 = 52.0;
 
     /// A plot in which a unit is as long in y as it is in x, around a body within `low` to `high`
@@ -48,36 +48,39 @@ impl Axes {
         }
     }
 
-    /// Length of a unit along x [px].
+    /// Length of a unit along x \[px\].
     pub fn scale(&self) -> f64 {
         self.size[0] / (self.high[0] - self.low[0])
     }
 
-    /// Where the data point lies on the sheet [px].
+    /// Where the data point lies on the sheet \[px\].
     pub fn place(&self, [x, y]: [f64; 2]) -> [f64; 2] {
-        let along = |k: usize, value: f64| (value - self.low[k]) / (self.high[k] - self.low[k]) * self.size[k];
+        let along =
+            |k: usize, value: f64| (value - self.low[k]) / (self.high[k] - self.low[k]) * self.size[k];
         [self.corner[0] + along(0, x), self.corner[1] + self.size[1] - along(1, y)]
     }
 
     pub fn ticks(&self) -> [Ticks; 2] {
-        [64.0, 48.0]
-            .iter()
-            .enumerate()
-            .map(|(k, apart)| Ticks::within(self.low[k], self.high[k], self.size[k] / apart))
-            .collect::<Vec<_>>()
-            .try_into()
-            .expect("two axes")
+        // More would be read no better, however tall the plot is.
+        const MOST: f64 = 12.0;
+        let ticks =
+            |k: usize, apart: f64| Ticks::within(self.low[k], self.high[k], (self.size[k] / apart).min(MOST));
+        let mut horizontal = ticks(0, 44.0);
+        // Long labels need more room, and fewer ticks may have shorter labels.
+        for _ in 0..3 {
+            horizontal = ticks(0, (widest_label(&horizontal) + 16.0).max(44.0));
+        }
+        [horizontal, ticks(1, 34.0)]
     }
 
-    /// Room that the labels of the vertical axis take to the left of the plot [px].
+    /// Room that the labels of the vertical axis take to the left of the plot \[px\].
     pub fn left_of_plot(&self) -> f64 {
         let [_, ticks] = self.ticks();
-        let widest = ticks.values.iter().map(|&v| text_width(&ticks.label(v), TICK_TEXT)).fold(0.0, f64::max);
-        widest + TICK + 34.0
+        widest_label(&ticks) + TICK + 34.0
     }
 
     pub fn draw(&self, svg: &mut Svg, [x, y]: [Measure<'_>; 2]) {
-        self.draw_vertical(svg, y);
+        self.draw_vertical(svg, y, self.left_of_plot());
         self.draw_frame(svg);
         self.draw_horizontal(svg, x);
     }
@@ -102,7 +105,8 @@ impl Axes {
         svg.text([middle, bottom + 37.0], Anchor::Middle, NAME_TEXT, INK, &name);
     }
 
-    pub fn draw_vertical(&self, svg: &mut Svg, measure: Measure<'_>) {
+    /// `room` is how far to the left of the plot the name stands \[px\].
+    pub fn draw_vertical(&self, svg: &mut Svg, measure: Measure<'_>, room: f64) {
         let [_, ticks] = self.ticks();
         let left = self.corner[0];
         let at = |value: f64| self.place([self.low[0], value])[1];
@@ -113,9 +117,13 @@ impl Axes {
             svg.text([left - TICK - 4.0, at(value)], Anchor::End, TICK_TEXT, INK, &ticks.label(value));
         }
         let name = ticks.axis_name(measure.quantity, measure.unit);
-        let at = [left - self.left_of_plot() + 14.0, self.corner[1] + self.size[1] / 2.0];
+        let at = [left - room + 14.0, self.corner[1] + self.size[1] / 2.0];
         svg.upward_text(at, NAME_TEXT, &name);
     }
+}
+
+fn widest_label(ticks: &Ticks) -> f64 {
+    ticks.values.iter().map(|&value| text_width(&ticks.label(value), TICK_TEXT)).fold(0.0, f64::max)
 }
 
 #[cfg(test)]

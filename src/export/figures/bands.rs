@@ -9,7 +9,7 @@ const NAME_TEXT: f64 = 13.0;
 const BAR_WIDTH: f64 = 16.0;
 const BAR_GAP: f64 = 18.0;
 
-/// A point of the sheet [px] and the field's value there.
+/// A point of the sheet \[px\] and the field's value there.
 pub type Sample = ([f64; 2], f64);
 
 /// Levels at round values around the field's range.
@@ -21,10 +21,10 @@ pub struct Bands {
 impl Bands {
     /// Bands for values from `low` to `high`; one band if they differ by no more than `noise`.
     pub fn around(low: f64, high: f64, noise: f64) -> Self {
-        const ABOUT: f64 = 10.0;
-        let is_uniform = !(high - low > noise.max(1e-9 * high.abs()));
+        const MOST: f64 = 14.0;
         let value = if high.abs() <= noise || !high.is_finite() { 0.0 } else { high };
-        Self { levels: if is_uniform { Ticks::single(value) } else { Ticks::around(low, high, ABOUT) } }
+        let varies = high - low > noise.max(1e-9 * high.abs());
+        Self { levels: if varies { Ticks::around(low, high, MOST) } else { Ticks::single(value) } }
     }
 
     pub fn count(&self) -> usize {
@@ -48,12 +48,12 @@ impl Bands {
         }
     }
 
-    /// Room that the bar takes beside a plot [px].
+    /// Room that the bar takes beside a plot \[px\].
     pub fn bar_room(&self) -> f64 {
         BAR_GAP + BAR_WIDTH + 8.0 + self.widest_label() + 30.0
     }
 
-    /// Draws the colour bar to the right of a plot with this top right corner and height [px].
+    /// Draws the colour bar to the right of a plot with this top right corner and height \[px\].
     pub fn draw_bar(&self, svg: &mut Svg, [right, top]: [f64; 2], height: f64, quantity: &str, unit: &str) {
         let left = right + BAR_GAP;
         let count = self.count();

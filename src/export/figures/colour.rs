@@ -3,6 +3,8 @@
 use crate::flock::role::Role;
 
 pub const BROKEN_BOND: &str = "#d0021b";
+/// In a raster, where a broken bond is a dot like any other and must not pass for a leader.
+pub const BROKEN_BOND_SQUARE: &str = "#111111";
 pub const LIVE_BOND: &str = "#b8bcc2";
 
 /// The paper's colours, with the clamped ones in a darker red than the leaders that move.

@@ -11,6 +11,7 @@ use super::svg::{Path, Svg};
 use super::{MOST_DOTS, Subject};
 use crate::continuum::record::Snapshot;
 use crate::export::bonds;
+use crate::flock::points::distance;
 use crate::flock::role::Role;
 
 /// Bodies of more particles, or bonds, are drawn without bonds, which would be a grey sheet.
@@ -20,18 +21,19 @@ const MOST_BONDS: usize = 60_000;
 /// Later ones are drawn over earlier ones: the few must not drown in the many.
 const PAINTING_ORDER: [Role; 5] = [Role::Frame, Role::Follower, Role::Ghost, Role::Clamped, Role::Leader];
 
-const BROKEN_NAME: &str = "broken bond";
-
 /// Particles as dots in the colours of their roles, live bonds grey, broken ones dashed red.
 pub fn configuration(subject: &Subject<'_>, snapshot: &Snapshot) -> String {
     let count = snapshot.positions.len();
     let spacing = subject.body.lattice.spacing();
     let axes = page::window(&snapshot.positions, 0..count, spacing);
     let is_raster = count > MOST_DOTS;
-    let mut heading =
-        Heading { title: subject.title.into(), note: page::note(snapshot), legend: legend(snapshot, is_raster) };
+    let mut heading = Heading {
+        title: subject.title.into(),
+        note: page::note(snapshot),
+        legend: legend(snapshot, is_raster),
+    };
     if is_raster {
-        heading.note += &format!("; {count} particles as squares, each in the colour of its rarest kind");
+        heading.note += &format!("; {count} particles drawn as squares");
     }
     page::with_body(&heading, axes, subject.unit, 20.0, |svg, axes| {
         if is_raster {
@@ -44,8 +46,12 @@ pub fn configuration(subject: &Subject<'_>, snapshot: &Snapshot) -> String {
 }
 
 fn legend(snapshot: &Snapshot, is_raster: bool) -> Vec<Key> {
-    let mark = if is_raster { Mark::Dot } else { Mark::DashedLine };
-    let broken = Key { name: BROKEN_NAME, colour: colour::BROKEN_BOND, mark };
+    let (colour, mark) = if is_raster {
+        (colour::BROKEN_BOND_SQUARE, Mark::Dot)
+    } else {
+        (colour::BROKEN_BOND, Mark::DashedLine)
+    };
+    let broken = Key { name: "broken bond", colour, mark };
     let is_present = |role: &Role| snapshot.roles.contains(role);
     let roles = PAINTING_ORDER.into_iter().rev().filter(is_present);
     roles
@@ -55,9 +61,8 @@ fn legend(snapshot: &Snapshot, is_raster: bool) -> Vec<Key> {
 }
 
 fn draw_bonds(svg: &mut Svg, axes: &Axes, subject: &Subject<'_>, snapshot: &Snapshot) {
-    let place = |i: u32| axes.place(snapshot.positions.get(i as usize));
-    let line = |path: &mut Path, pair: [u32; 2]| {
-        let ends = pair.map(place);
+    let line = |path: &mut Path, ends: [[f64; 2]; 2]| {
+        let ends = ends.map(|end| axes.place(end));
         if ends.iter().flatten().all(|value| value.is_finite()) {
             path.polyline(ends);
         }
@@ -69,15 +74,41 @@ fn draw_bonds(svg: &mut Svg, axes: &Axes, subject: &Subject<'_>, snapshot: &Snap
         && neighbours.index.len() <= 2 * MOST_BONDS
     {
         let mut live = Path::default();
-        bonds::pairs(neighbours).filter(|&pair| is_live(pair)).for_each(|pair| line(&mut live, pair));
+        for pair in bonds::pairs(neighbours).filter(|&pair| is_live(pair)) {
+            line(&mut live, pair.map(|i| snapshot.positions.get(i as usize)));
+        }
         svg.path(&live, format_args!("fill=\"none\" stroke=\"{}\" stroke-width=\"0.8\"", colour::LIVE_BOND));
     }
     let mut lost = Path::default();
-    snapshot.broken.iter().for_each(|&pair| line(&mut lost, pair));
+    for &pair in &snapshot.broken {
+        broken_bond(axes, subject, snapshot, pair).into_iter().for_each(|ends| line(&mut lost, ends));
+    }
     if !lost.is_empty() {
-        let stroke = format!("stroke=\"{}\" stroke-width=\"0.9\"", colour::BROKEN_BOND);
+        let stroke = format!("stroke=\"{}\" stroke-width=\"1.3\"", colour::BROKEN_BOND);
         svg.path(&lost, format_args!("class=\"broken\" fill=\"none\" {stroke} stroke-dasharray=\"3 2\""));
     }
+}
+
+/// The lines that stand for a broken bond: one from end to end or, where the ends are far apart,
+/// a stub at either, as long as the bond was or as it takes to be seen. Lines across the gaps would
+/// hide what is there.
+fn broken_bond(
+    axes: &Axes,
+    subject: &Subject<'_>,
+    snapshot: &Snapshot,
+    pair: [u32; 2],
+) -> Vec<[[f64; 2]; 2]> {
+    const FAR: f64 = 3.0;
+    const SHORTEST_STUB: f64 = 8.0;
+    let [a, b] = pair.map(|i| snapshot.positions.get(i as usize));
+    let [from, to] = pair.map(|i| subject.body.reference.get(i as usize));
+    let (rest, length) = (distance(from, to), distance(a, b));
+    let part = (rest.max(SHORTEST_STUB / axes.scale()) / length).min(1.0);
+    if part > 1.0 / FAR {
+        return vec![[a, b]];
+    }
+    let towards = |start: [f64; 2], end: [f64; 2]| [0, 1].map(|k| start[k] + part * (end[k] - start[k]));
+    vec![[a, towards(a, b)], [b, towards(b, a)]]
 }
 
 fn draw_dots(svg: &mut Svg, axes: &Axes, snapshot: &Snapshot, spacing: f64) {
@@ -94,7 +125,7 @@ fn draw_dots(svg: &mut Svg, axes: &Axes, snapshot: &Snapshot, spacing: f64) {
     }
 }
 
-/// Dots leave gaps through which bonds are seen [px].
+/// Dots leave gaps through which bonds are seen \[px\].
 pub(super) fn dot_radius(axes: &Axes, spacing: f64) -> f64 {
     (0.3 * spacing * axes.scale()).clamp(0.6, 8.0)
 }
@@ -109,7 +140,7 @@ fn draw_raster(svg: &mut Svg, axes: &Axes, snapshot: &Snapshot, spacing: f64) {
     for &end in snapshot.broken.iter().flatten() {
         raster.drop(axes.place(snapshot.positions.get(end as usize)), PAINTING_ORDER.len() as f64);
     }
-    let colours = PAINTING_ORDER.map(colour::of_role).into_iter().chain([colour::BROKEN_BOND]);
+    let colours = PAINTING_ORDER.map(colour::of_role).into_iter().chain([colour::BROKEN_BOND_SQUARE]);
     for (path, colour) in raster.paths(PAINTING_ORDER.len() + 1, |rank| rank as usize).iter().zip(colours) {
         svg.path(path, format_args!("fill=\"{colour}\" shape-rendering=\"crispEdges\""));
     }

@@ -30,12 +30,12 @@ pub struct Heading {
 }
 
 impl Heading {
-    /// Height on a sheet of this width, the space to the plot included [px].
+    /// Height on a sheet of this width, the space to the plot included \[px\].
     pub fn height(&self, width: f64) -> f64 {
         self.draw(&mut Svg::new(width, 1.0), width)
     }
 
-    /// Draws at the top of a sheet of this width; returns where the plot may begin [px].
+    /// Draws at the top of a sheet of this width; returns where the plot may begin \[px\].
     pub fn draw(&self, svg: &mut Svg, width: f64) -> f64 {
         let room = width - 2.0 * MARGIN;
         let mut y = 6.0;
@@ -48,8 +48,8 @@ impl Heading {
         }
         let mut x = MARGIN;
         for (n, key) in self.legend.iter().enumerate() {
-            let takes = 22.0 + text_width(key.name, KEY_TEXT) + 10.0;
-            if n == 0 || x + takes > width {
+            let takes = 21.0 + text_width(key.name, KEY_TEXT) + 20.0;
+            if n == 0 || x + takes - 20.0 > width - MARGIN {
                 x = MARGIN;
                 y += if n == 0 { 14.0 } else { 20.0 };
             }
@@ -68,14 +68,15 @@ fn draw_key(svg: &mut Svg, key: &Key, [x, y]: [f64; 2]) {
             });
         }
         Mark::DashedLine => {
-            let attributes = format!("stroke=\"{}\" stroke-width=\"1.5\" stroke-dasharray=\"4 2\"", key.colour);
+            let attributes =
+                format!("stroke=\"{}\" stroke-width=\"1.5\" stroke-dasharray=\"4 2\"", key.colour);
             svg.group(attributes, |svg| svg.line([x, y], [x + 16.0, y]));
         }
     }
     svg.text([x + 21.0, y], Anchor::Start, KEY_TEXT, INK, key.name);
 }
 
-/// Breaks a text between words so that no line is wider than `room` [px].
+/// Breaks a text between words so that no line is wider than `room` \[px\].
 fn wrapped(text: &str, size: f64, room: f64) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for word in text.split_whitespace() {

@@ -53,7 +53,7 @@ pub fn probes(subject: &Subject<'_>, probes: &[ProbeSeries]) -> String {
         draw_panel(&mut svg, axes, panel, &ids);
     }
     if let Some(lowest) = plots.last() {
-        lowest.draw_horizontal(&mut svg, Measure { quantity: "step", unit: "1" });
+        lowest.draw_horizontal(&mut svg, Measure { quantity: "step", unit: "" });
     }
     svg.finish()
 }
@@ -104,7 +104,7 @@ fn window(panel: &Panel, last_step: usize) -> Axes {
 }
 
 fn draw_panel(svg: &mut Svg, axes: &Axes, panel: &Panel, ids: &[String]) {
-    axes.draw_vertical(svg, Measure { quantity: panel.quantity, unit: &panel.unit });
+    axes.draw_vertical(svg, Measure { quantity: panel.quantity, unit: &panel.unit }, axes.corner[0]);
     let mut ends = Vec::new();
     for (n, values) in panel.values.iter().enumerate() {
         let finite = values.iter().enumerate().filter(|(_, value)| value.is_finite());

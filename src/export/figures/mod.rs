@@ -1,6 +1,6 @@
 //! Figures: each is drawn once, as SVG, and its PNG is rendered from that very SVG.
 //!
-//! [`configuration`]: the body at a step, in the paper's colours. [`pe1`]: filled contours of the first
+//! [`configuration()`]: the body at a step, in the paper's colours. [`pe1`]: filled contours of the first
 //! pseudo-energy over it. [`probes`]: the history of a few particles. Axes of bodies are equal, and
 //! every axis carries its unit. SVG is written directly: a figure here is circles, lines and paths,
 //! and what matters is where they go.
@@ -22,8 +22,10 @@ mod ticks;
 use std::path::{Path, PathBuf};
 
 use super::error::{ExportError, write_file};
+use crate::continuum::engine::Engine;
 use crate::flock::body::Body;
 use crate::flock::neighbourhood::Neighbours;
+use crate::scene::Scene;
 pub use configuration::configuration;
 pub use energy::pe1;
 pub use history::probes;
@@ -39,7 +41,18 @@ pub struct Subject<'a> {
     pub neighbours: Option<&'a Neighbours>,
 }
 
-/// Width of every PNG [pixel].
+impl<'a> Subject<'a> {
+    pub fn of(scene: &'a Scene, engine: &'a Engine) -> Self {
+        Self {
+            title: &scene.raw.title,
+            unit: scene.unit(),
+            body: engine.body(),
+            neighbours: engine.lasting_neighbours(),
+        }
+    }
+}
+
+/// Width of every PNG \[pixel\].
 pub const PNG_WIDTH: u32 = 1600;
 
 /// More particles than this are drawn as a raster: an SVG of a million circles opens nowhere.

@@ -6,9 +6,9 @@ use super::svg::Svg;
 use crate::continuum::record::Snapshot;
 use crate::flock::points::Points;
 
-/// Every figure is this wide unless its body is slender [px].
+/// Every figure is this wide unless its body is slender \[px\].
 pub const WIDTH: f64 = 800.0;
-/// The narrowest sheet that still holds a title [px].
+/// The narrowest sheet that still holds a title \[px\].
 const NARROWEST: f64 = 430.0;
 
 /// Draws a body's plot under its heading, with `beside` px of room to its right.

@@ -20,12 +20,7 @@ impl Raster {
         Self { corner: axes.corner, side, columns, largest: vec![None; columns * rows] }
     }
 
-    /// Side of a square [px].
-    pub fn side(&self) -> f64 {
-        self.side
-    }
-
-    /// Lets `value` fall onto the sheet at `place` [px].
+    /// Lets `value` fall onto the sheet at `place` \[px\].
     pub fn drop(&mut self, place: [f64; 2], value: f64) {
         let [column, row] = [0, 1].map(|k| (place[k] - self.corner[k]) / self.side);
         if column >= 0.0

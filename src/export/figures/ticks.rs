@@ -10,14 +10,14 @@ pub struct Ticks {
 }
 
 impl Ticks {
-    /// Ticks within `low` to `high`, about `most` of them.
+    /// Ticks within `low` to `high`, at most as many steps as `most` apart.
     pub fn within(low: f64, high: f64, most: f64) -> Self {
         let step = round_step((high - low) / most.max(1.0));
         let slack = 1e-9;
         Self::multiples(step, (low / step - slack).ceil(), (high / step + slack).floor())
     }
 
-    /// The fewest ticks that enclose `low` to `high` in about `most` steps.
+    /// The fewest ticks that enclose `low` to `high` in steps of which `most` would fit.
     pub fn around(low: f64, high: f64, most: f64) -> Self {
         let step = round_step((high - low) / most.max(1.0));
         let slack = 1e-9;
@@ -50,11 +50,14 @@ impl Ticks {
         }
     }
 
-    /// `quantity [unit]`, with the power of ten that the labels leave out.
+    /// `quantity [unit]`, with the power of ten that the labels leave out; a count has no unit.
     pub fn axis_name(&self, quantity: &str, unit: &str) -> String {
-        match self.exponent {
-            0 => format!("{quantity} [{unit}]"),
-            exponent => format!("{quantity} [10{} {unit}]", superscript(exponent)),
+        let power = format!("10{}", superscript(self.exponent));
+        match (self.exponent, unit) {
+            (0, "") => quantity.to_owned(),
+            (0, unit) => format!("{quantity} [{unit}]"),
+            (_, "") => format!("{quantity} [{power}]"),
+            (_, unit) => format!("{quantity} [{power} {unit}]"),
         }
     }
 }
@@ -74,7 +77,11 @@ fn round_step(least: f64) -> f64 {
         return 1.0;
     }
     let decade = 10f64.powf(least.log10().floor());
-    [1.0, 2.0, 5.0].map(|m| m * decade).into_iter().find(|&s| s >= least * (1.0 - 1e-9)).unwrap_or(10.0 * decade)
+    [1.0, 2.0, 5.0]
+        .map(|m| m * decade)
+        .into_iter()
+        .find(|&s| s >= least * (1.0 - 1e-9))
+        .unwrap_or(10.0 * decade)
 }
 
 fn superscript(number: i32) -> String {
@@ -99,7 +106,7 @@ mod tests {
     #[test]
     fn ticks_around_a_range_enclose_it() {
         let ticks = Ticks::around(0.0, 0.93, 10.0);
-        assert_eq!((ticks.values[0], ticks.values.len()), (0.0, 11));
+        assert_eq!((ticks.values[0], ticks.values.len()), (0.0, 11), "{ticks:?}");
         assert!(ticks.values[10] >= 0.93);
     }
 

@@ -26,7 +26,8 @@ pub fn weighted(
 ) -> impl Iterator<Item = Neighbour> + Clone {
     let distances = neighbours.clone().map(move |n| distance(n.position, present));
     // Relative to the largest weight, so that no power of a distance overflows.
-    let scale = if power >= 0.0 { distances.fold(0.0, f64::max) } else { distances.fold(f64::INFINITY, f64::min) };
+    let scale =
+        if power >= 0.0 { distances.fold(0.0, f64::max) } else { distances.fold(f64::INFINITY, f64::min) };
     neighbours.map(move |n| {
         let d = distance(n.position, present);
         let relative = if d == scale { 1.0 } else { (d / scale).powf(power) };

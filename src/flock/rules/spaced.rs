@@ -20,7 +20,8 @@ pub fn mean(
 ) -> Option<[f64; 2]> {
     barycentre::mean(distance::weighted(power, present, neighbours).map(|n| {
         let apart = crate::flock::points::distance(present, n.position);
-        let away = |k: usize| if apart > 0.0 { spacing * ((present[k] - n.position[k]) / apart) } else { 0.0 };
+        let away =
+            |k: usize| if apart > 0.0 { spacing * ((present[k] - n.position[k]) / apart) } else { 0.0 };
         Neighbour { position: [n.position[0] + away(0), n.position[1] + away(1)], ..n }
     }))
 }
