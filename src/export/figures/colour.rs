@@ -18,9 +18,11 @@ pub fn of_role(role: Role) -> &'static str {
     }
 }
 
-/// Lines that stay apart for colour-blind readers (Okabe and Ito), dark enough for white paper.
-pub const SERIES: [&str; 8] =
-    ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#444444", "#8a5a2b"];
+/// Lines on white paper; the first six stay apart for colour-blind readers (Okabe and Ito).
+pub const SERIES: [&str; 12] = [
+    "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#444444", "#8a5a2b", "#6a3d9a",
+    "#a80042", "#7f8c1f", "#00a3a3",
+];
 
 /// The colour map viridis at every tenth.
 const VIRIDIS: [[u8; 3]; 11] = [

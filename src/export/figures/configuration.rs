@@ -130,18 +130,32 @@ pub(super) fn dot_radius(axes: &Axes, spacing: f64) -> f64 {
     (0.3 * spacing * axes.scale()).clamp(0.6, 8.0)
 }
 
-/// Squares in the colour of whatever in them is painted last; broken bonds mark their ends.
+/// What a square of the raster shows if several fall into it: the last of these. Ends of broken bonds
+/// (`None`) must not hide the few that are led.
+const SQUARE_ORDER: [Option<Role>; 6] = [
+    Some(Role::Frame),
+    Some(Role::Follower),
+    Some(Role::Ghost),
+    None,
+    Some(Role::Clamped),
+    Some(Role::Leader),
+];
+
 fn draw_raster(svg: &mut Svg, axes: &Axes, snapshot: &Snapshot, spacing: f64) {
     let mut raster = Raster::over(axes, spacing);
-    let rank = |role: Role| PAINTING_ORDER.iter().position(|&r| r == role).unwrap_or(0);
+    let mut drop = |place: [f64; 2], shown: Option<Role>| {
+        let rank = SQUARE_ORDER.iter().position(|&other| other == shown).unwrap_or(0);
+        raster.drop(axes.place(place), rank as f64);
+    };
     for (place, &role) in snapshot.positions.iter().zip(&snapshot.roles) {
-        raster.drop(axes.place(place), rank(role) as f64);
+        drop(place, Some(role));
     }
     for &end in snapshot.broken.iter().flatten() {
-        raster.drop(axes.place(snapshot.positions.get(end as usize)), PAINTING_ORDER.len() as f64);
+        drop(snapshot.positions.get(end as usize), None);
     }
-    let colours = PAINTING_ORDER.map(colour::of_role).into_iter().chain([colour::BROKEN_BOND_SQUARE]);
-    for (path, colour) in raster.paths(PAINTING_ORDER.len() + 1, |rank| rank as usize).iter().zip(colours) {
+    let paths = raster.paths(SQUARE_ORDER.len(), |rank| rank as usize);
+    for (path, shown) in paths.iter().zip(SQUARE_ORDER) {
+        let colour = shown.map_or(colour::BROKEN_BOND_SQUARE, colour::of_role);
         svg.path(path, format_args!("fill=\"{colour}\" shape-rendering=\"crispEdges\""));
     }
 }

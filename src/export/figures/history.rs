@@ -13,7 +13,7 @@ const PANEL_GAP: f64 = 16.0;
 const LABEL_TEXT: f64 = 12.0;
 const LABELS_APART: f64 = 14.0;
 /// As many labels as stand below each other beside a panel.
-const MOST_LINES: usize = 12;
+const MOST_LINES: usize = SERIES.len();
 
 /// One panel: a quantity of every probe.
 struct Panel {
@@ -111,7 +111,7 @@ fn draw_panel(svg: &mut Svg, axes: &Axes, panel: &Panel, ids: &[String]) {
         let line: Vec<[f64; 2]> = finite.map(|(step, &value)| axes.place([step as f64, value])).collect();
         let mut path = Path::default();
         path.polyline(thinned(&line));
-        let stroke = format!("stroke=\"{}\" stroke-width=\"1.6\" stroke-linejoin=\"round\"", colour_of(n));
+        let stroke = format!("stroke=\"{}\" stroke-width=\"1.6\" stroke-linejoin=\"round\"", SERIES[n]);
         svg.path(&path, format_args!("class=\"probe\" fill=\"none\" {stroke}"));
         ends.extend(line.last().map(|&[_, y]| (n, y)));
     }
@@ -119,12 +119,8 @@ fn draw_panel(svg: &mut Svg, axes: &Axes, panel: &Panel, ids: &[String]) {
     let right = axes.corner[0] + axes.size[0];
     let [top, bottom] = [axes.corner[1], axes.corner[1] + axes.size[1]].map(|y| y.round());
     for (n, y) in spread(ends, [top + LABELS_APART / 2.0, bottom - LABELS_APART / 2.0]) {
-        svg.text([right + 6.0, y], Anchor::Start, LABEL_TEXT, colour_of(n), &ids[n]);
+        svg.text([right + 6.0, y], Anchor::Start, LABEL_TEXT, SERIES[n], &ids[n]);
     }
-}
-
-fn colour_of(line: usize) -> &'static str {
-    SERIES[line % SERIES.len()]
 }
 
 /// Of a long line, what a sheet can show: the ends and extremes within each half pixel.
