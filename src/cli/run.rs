@@ -132,7 +132,7 @@ impl<'a> Recorder<'a> {
         if self.scene.record.figures.contains(&engine.step()) {
             self.snapshots.push(Snapshot::of(engine));
         }
-        if self.frames.is_some() && engine.step() % self.scene.record.vtk_every == 0 {
+        if self.frames.is_some() && engine.step().is_multiple_of(self.scene.record.vtk_every) {
             self.write_frame(engine);
         }
     }
@@ -155,7 +155,7 @@ impl<'a> Recorder<'a> {
         if self.snapshots.last().is_none_or(|last| last.step != step) {
             self.snapshots.push(Snapshot::of(engine));
         }
-        if self.frames.is_some() && !self.failed() && step % self.scene.record.vtk_every != 0 {
+        if self.frames.is_some() && !self.failed() && !step.is_multiple_of(self.scene.record.vtk_every) {
             self.write_frame(engine);
         }
         if let Some(failure) = self.failure {

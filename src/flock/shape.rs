@@ -59,11 +59,12 @@ impl Shape {
         }
     }
 
-    /// Where a lattice is anchored unless told otherwise: the centre of a disc, else the lower
-    /// left corner of the bounds.
+    /// Where a lattice is anchored unless told otherwise: the centre of a disc, the end of a
+    /// specimen's axis, else the lower left corner of the bounds.
     pub fn anchor(&self) -> [f64; 2] {
         match self {
             Shape::Disc { centre, .. } => *centre,
+            Shape::Specimen(_) => [0.0; 2],
             Shape::WithHoles { body, .. } => body.anchor(),
             _ => self.bounds().0,
         }

@@ -81,7 +81,7 @@ pub struct RawBody {
     #[serde(default)]
     pub holes: Vec<RawShape>,
     /// Where the lattice has a site [length]. Unless given: the lower left corner of the shape's
-    /// bounds, or the centre of a disc.
+    /// bounds, the centre of a disc, or the end of a specimen's axis.
     #[serde(default)]
     pub anchor: Option<[f64; 2]>,
 }
