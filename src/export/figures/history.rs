@@ -58,13 +58,14 @@ pub fn probes(subject: &Subject<'_>, probes: &[ProbeSeries]) -> String {
     svg.finish()
 }
 
-fn panels(subject: &Subject<'_>, shown: &[ProbeSeries]) -> [Panel; 3] {
+/// A panel in which nothing happens is left out, unless nothing happens in any.
+fn panels(subject: &Subject<'_>, shown: &[ProbeSeries]) -> Vec<Panel> {
     let (unit, spacing) = (subject.unit, subject.body.lattice.spacing());
     let reference = &subject.body.reference;
     let moved = |now: &[f64], initial: f64| now.iter().map(|value| value - initial).collect();
     let noise = 1e-10 * spacing;
     let displacement = |quantity, values| Panel { quantity, unit: unit.into(), values, noise, span: spacing };
-    [
+    let mut panels = vec![
         displacement(
             "x displacement",
             shown.iter().map(|p| moved(&p.positions.x, reference.x[p.particle])).collect(),
@@ -80,7 +81,12 @@ fn panels(subject: &Subject<'_>, shown: &[ProbeSeries]) -> [Panel; 3] {
             noise: noise * noise,
             span: spacing * spacing,
         },
-    ]
+    ];
+    let happens = |panel: &Panel| panel.values.iter().flatten().any(|value| value.abs() > panel.noise);
+    if panels.iter().any(happens) {
+        panels.retain(happens);
+    }
+    panels
 }
 
 /// The axes of a panel, whose place on the sheet is still to be given.
