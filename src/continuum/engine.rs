@@ -1,7 +1,6 @@
 //! The engine: one step of a planned body.
 
-use rayon::prelude::*;
-
+use super::movement::Movement;
 use super::plan::{Plan, RoleChange};
 use crate::flock::body::Body;
 use crate::flock::fracture::Break;
@@ -50,18 +49,6 @@ struct PresentNeighbours {
     radius: f64,
     grid: CellGrid,
     members: Vec<bool>,
-}
-
-/// How far the body moved in the last step, and whether it still is one.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Movement {
-    /// Largest one-step motion \[length\].
-    pub largest_move: f64,
-    /// Largest distance from the reference place \[length\], and whose it is.
-    pub largest_displacement: f64,
-    pub farthest: usize,
-    /// First particle whose position is not finite.
-    pub lost: Option<usize>,
 }
 
 impl Engine {
@@ -181,37 +168,7 @@ impl Engine {
 
     /// Looks over the last step.
     pub fn movement(&self) -> Movement {
-        const NONE: Movement =
-            Movement { largest_move: 0.0, largest_displacement: 0.0, farthest: 0, lost: None };
-        let one = |i: usize| {
-            let place = self.present.get(i);
-            if !(place[0].is_finite() && place[1].is_finite()) {
-                return Movement { lost: Some(i), ..NONE };
-            }
-            Movement {
-                largest_move: distance(place, self.previous.get(i)),
-                largest_displacement: distance(place, self.body.reference.get(i)),
-                farthest: i,
-                lost: None,
-            }
-        };
-        // Largest of all and first of all do not depend on how the particles are shared out.
-        let both = |a: Movement, b: Movement| {
-            let b_is_farther = b.largest_displacement > a.largest_displacement
-                || (b.largest_displacement == a.largest_displacement && b.farthest < a.farthest);
-            Movement {
-                largest_move: a.largest_move.max(b.largest_move),
-                largest_displacement: a.largest_displacement.max(b.largest_displacement),
-                farthest: if b_is_farther { b.farthest } else { a.farthest },
-                lost: [a.lost, b.lost].into_iter().flatten().min(),
-            }
-        };
-        const SERIAL_BELOW: usize = 1 << 15;
-        (0..self.present.len())
-            .into_par_iter()
-            .with_min_len(SERIAL_BELOW)
-            .map(one)
-            .reduce(|| Movement { farthest: usize::MAX, ..NONE }, both)
+        Movement::of(&self.present, &self.previous, &self.body.reference, self.body.lattice.spacing())
     }
 
     fn take_roles(&mut self) {

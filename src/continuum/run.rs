@@ -2,8 +2,10 @@
 
 use std::ops::ControlFlow;
 
-use super::engine::{Engine, Movement};
+use super::engine::Engine;
+use super::movement::{Movement, farthest, first_lost};
 use super::plan::Plan;
+use crate::flock::points::distance;
 use crate::flock::rules::{FeedbackReference, Mean};
 use crate::solve::sweep::Order;
 
@@ -63,7 +65,9 @@ pub struct Outcome {
 /// Runs a plan to its end. `watch` sees the engine before the first step (with an infinite residual)
 /// and after each one, with the residual; it can break the run off.
 pub fn run(plan: Plan, watch: &mut dyn FnMut(&Engine, f64) -> ControlFlow<()>) -> Outcome {
-    let (stop, diagonal, spacing) = (plan.stop, plan.diagonal, plan.body.lattice.spacing());
+    let stop = plan.stop;
+    // Both over the spacing, as the movement is.
+    let bound = stop.growth * plan.diagonal / plan.body.lattice.spacing();
     let mut engine = Engine::new(plan);
     let mut residual = f64::INFINITY;
     let mut interrupted = watch(&engine, residual).is_break();
@@ -76,11 +80,11 @@ pub fn run(plan: Plan, watch: &mut dyn FnMut(&Engine, f64) -> ControlFlow<()>) -
         }
         engine.advance();
         let movement = engine.movement();
-        if let Some(divergence) = divergence(&engine, &movement, stop.growth * diagonal) {
+        if let Some(divergence) = divergence(&engine, &movement, bound) {
             engine.take_back();
             break StopReason::Diverged(divergence);
         }
-        residual = movement.largest_move / spacing;
+        residual = movement.largest_move;
         interrupted = watch(&engine, residual).is_break();
         if stop.tolerance.is_some_and(|tolerance| residual <= tolerance) && !engine.is_scheduled() {
             break StopReason::Equilibrium;
@@ -90,16 +94,15 @@ pub fn run(plan: Plan, watch: &mut dyn FnMut(&Engine, f64) -> ControlFlow<()>) -
 }
 
 fn divergence(engine: &Engine, movement: &Movement, bound: f64) -> Option<Divergence> {
-    let (particle, what) = match movement.lost {
-        Some(lost) => (lost, "has no finite position any more".to_owned()),
-        None if movement.largest_displacement > bound => {
-            let far = movement.largest_displacement;
-            (
-                movement.farthest,
-                format!("is {far:.3e} from its reference place, beyond the bound {bound:.3e}"),
-            )
-        }
-        None => return None,
+    let (present, reference) = (engine.present(), &engine.body().reference);
+    let (particle, what) = if let Some(lost) = (!movement.is_finite).then(|| first_lost(present)).flatten() {
+        (lost, "has no finite position any more".to_owned())
+    } else if movement.largest_displacement > bound {
+        let far = farthest(present, reference);
+        let apart = distance(present.get(far), reference.get(far));
+        (far, format!("is {apart:.3e} from its reference place, more than stop.growth allows"))
+    } else {
+        return None;
     };
     Some(Divergence { step: engine.step(), particle: particle + 1, what, likely_cause: likely_cause(engine) })
 }

@@ -1,0 +1,164 @@
+//! How far a body moved in a step, and how far it is from where it began.
+
+use rayon::prelude::*;
+
+use crate::flock::points::{Points, distance};
+
+/// The largest distances of a step over the lattice's spacing \[1\].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Movement {
+    /// Largest one-step motion.
+    pub largest_move: f64,
+    /// Largest distance from the reference place.
+    pub largest_displacement: f64,
+    /// Whether every position is finite.
+    pub is_finite: bool,
+}
+
+/// Particles per piece of work; the largest of all does not depend on how they are shared out.
+const PIECE: usize = 1 << 14;
+
+/// Independent maxima side by side, so that the loop vectorises.
+const LANES: usize = 8;
+
+impl Movement {
+    /// Looks over a step from `previous` to `present`.
+    pub fn of(present: &Points, previous: &Points, reference: &Points, spacing: f64) -> Self {
+        let pieces = present.len().div_ceil(PIECE);
+        let all = [present, previous, reference];
+        let one = |piece: usize| Squares::of(all, piece * PIECE, spacing.recip());
+        let squares = if pieces > 4 {
+            (0..pieces).into_par_iter().map(one).reduce(Squares::default, Squares::or)
+        } else {
+            (0..pieces).map(one).fold(Squares::default(), Squares::or)
+        };
+        if squares.poison == 0.0 {
+            return Self {
+                largest_move: squares.moved.sqrt(),
+                largest_displacement: squares.displaced.sqrt(),
+                is_finite: true,
+            };
+        }
+        Self::exactly(all, spacing)
+    }
+
+    /// For positions that are lost or so far away that a square overflows.
+    fn exactly([present, previous, reference]: [&Points; 3], spacing: f64) -> Self {
+        let largest = |from: &Points| {
+            (0..present.len()).map(|i| distance(present.get(i), from.get(i)) / spacing).fold(0.0, f64::max)
+        };
+        Self {
+            largest_move: largest(previous),
+            largest_displacement: largest(reference),
+            is_finite: first_lost(present).is_none(),
+        }
+    }
+}
+
+/// Index of the first particle whose position is not finite.
+pub fn first_lost(present: &Points) -> Option<usize> {
+    present.iter().position(|[x, y]| !(x.is_finite() && y.is_finite()))
+}
+
+/// Index of the particle farthest from its reference place, the first of several.
+pub fn farthest(present: &Points, reference: &Points) -> usize {
+    let from_reference = |i: usize| distance(present.get(i), reference.get(i));
+    let farther = |best: usize, i: usize| if from_reference(i) > from_reference(best) { i } else { best };
+    (0..present.len()).fold(0, farther)
+}
+
+/// Largest squared distances over the squared spacing; `poison` is not 0 where one is not finite.
+#[derive(Clone, Copy, Default)]
+struct Squares {
+    moved: f64,
+    displaced: f64,
+    poison: f64,
+}
+
+impl Squares {
+    fn or(self, other: Self) -> Self {
+        Self {
+            moved: self.moved.max(other.moved),
+            displaced: self.displaced.max(other.displaced),
+            // Not a number once it ever was.
+            poison: self.poison + other.poison,
+        }
+    }
+
+    fn of([present, previous, reference]: [&Points; 3], begin: usize, scale: f64) -> Self {
+        let piece = begin..(begin + PIECE).min(present.len());
+        let [x, y] = [&present.x[piece.clone()], &present.y[piece.clone()]];
+        let [px, py] = [&previous.x[piece.clone()], &previous.y[piece.clone()]];
+        let [rx, ry] = [&reference.x[piece.clone()], &reference.y[piece]];
+        let mut lanes = [Squares::default(); LANES];
+        let whole = x.len() - x.len() % LANES;
+        for i in (0..whole).step_by(LANES) {
+            for (lane, squares) in lanes.iter_mut().enumerate() {
+                let k = i + lane;
+                squares.see([x[k] - px[k], y[k] - py[k]], [x[k] - rx[k], y[k] - ry[k]], scale);
+            }
+        }
+        for k in whole..x.len() {
+            lanes[0].see([x[k] - px[k], y[k] - py[k]], [x[k] - rx[k], y[k] - ry[k]], scale);
+        }
+        lanes.into_iter().fold(Squares::default(), Squares::or)
+    }
+
+    fn see(&mut self, step: [f64; 2], displacement: [f64; 2], scale: f64) {
+        let square = |[x, y]: [f64; 2]| (x * scale) * (x * scale) + (y * scale) * (y * scale);
+        let (moved, displaced) = (square(step), square(displacement));
+        self.moved = if moved > self.moved { moved } else { self.moved };
+        self.displaced = if displaced > self.displaced { displaced } else { self.displaced };
+        self.poison += 0.0 * displaced;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn line(count: usize) -> Points {
+        (0..count).map(|i| [i as f64, 0.0]).collect()
+    }
+
+    #[test]
+    fn the_largest_of_all_is_found_wherever_it_stands() {
+        let reference = line(100_003);
+        for at in [0, 7, PIECE, 70_000, 100_002] {
+            let (mut previous, mut present) = (reference.clone(), reference.clone());
+            previous.x[at] += 1.0;
+            present.x[at] += 1.0;
+            present.y[at] += 3.0;
+            let movement = Movement::of(&present, &previous, &reference, 2.0);
+            assert_eq!(movement.largest_move, 1.5, "at {at}");
+            assert!((movement.largest_displacement - 10f64.sqrt() / 2.0).abs() < 1e-15, "at {at}");
+            assert_eq!(farthest(&present, &reference), at);
+        }
+    }
+
+    #[test]
+    fn a_lost_particle_is_noticed_and_named() {
+        for value in [f64::NAN, f64::INFINITY] {
+            let reference = line(50_000);
+            let mut present = reference.clone();
+            present.y[33_333] = value;
+            assert!(!Movement::of(&present, &reference, &reference, 1.0).is_finite);
+            assert_eq!(first_lost(&present), Some(33_333));
+        }
+    }
+
+    #[test]
+    fn distances_whose_squares_overflow_or_vanish_are_still_told() {
+        for scale in [1e200, 1e-200] {
+            let reference: Points = line(9).iter().map(|[x, y]| [x * scale, y]).collect();
+            let mut present = reference.clone();
+            present.y[4] = 3.0 * scale;
+            let movement = Movement::of(&present, &reference, &reference, scale);
+            assert!((movement.largest_move - 3.0).abs() < 1e-12 && movement.is_finite, "{movement:?}");
+        }
+        let (reference, mut present) = (line(9), line(9));
+        present.x[2] = 1e300;
+        let movement = Movement::of(&present, &reference, &reference, 1.0);
+        assert!(movement.is_finite && (movement.largest_move / 1e300 - 1.0).abs() < 1e-12);
+    }
+}
