@@ -126,3 +126,117 @@ fn nearest(lattice: &Lattice, site: Site, body: &impl Fn(Site) -> Option<u32>) -
     }
     Vec::new()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::body::{Body, Cut};
+    use super::super::lattice::LatticeKind;
+    use super::super::neighbourhood::Neighbourhood;
+    use super::super::shape::Shape;
+    use super::*;
+
+    const KINDS: [LatticeKind; 6] = [
+        LatticeKind::Square { spacing: 1.0 },
+        LatticeKind::Rectangular { a: 1.0, b: 1.5 },
+        LatticeKind::CentredRectangular { a: 1.0, b: 1.4 },
+        LatticeKind::Hexagonal { spacing: 1.0 },
+        LatticeKind::Oblique { a: 1.0, b: 1.2, angle: 1.2 },
+        LatticeKind::Honeycomb { spacing: 1.0 },
+    ];
+
+    fn framed(
+        kind: LatticeKind,
+        shape: Shape,
+        neighbourhood: Neighbourhood,
+        rule: FrameRule,
+    ) -> (Body, Vec<usize>) {
+        let lattice = Lattice::new(kind, [0.0; 2], 0.0);
+        let (body, neighbours) =
+            Body::build(lattice, &Cut::Shape(shape), &neighbourhood, Some(rule)).expect("a body");
+        let counts =
+            (0..body.count()).filter(|&i| !body.is_frame[i]).map(|i| neighbours.of(i).len()).collect();
+        (body, counts)
+    }
+
+    /// An L: two arms of width 2 around an empty corner.
+    fn corner() -> Shape {
+        Shape::Polygon {
+            vertices: vec![[0.0, 0.0], [6.0, 0.0], [6.0, 2.0], [2.0, 2.0], [2.0, 6.0], [0.0, 6.0]],
+        }
+    }
+
+    /// The sites that the frame point at `site` serves.
+    fn served(body: &Body, site: Site) -> Vec<Site> {
+        let frame = body.frame.as_ref().expect("framed");
+        let k = frame.points.iter().position(|&p| body.sites[p as usize] == site).expect("a frame point");
+        frame.served_by(k).iter().map(|&i| body.sites[i as usize]).collect()
+    }
+
+    #[test]
+    fn every_particle_of_a_framed_body_has_all_its_neighbours_on_every_lattice() {
+        for kind in KINDS {
+            for neighbourhood in [Neighbourhood::First { keep: None }, Neighbourhood::Second] {
+                for shape in [Shape::Disc { centre: [0.0; 2], radius: 4.0 }, corner()] {
+                    let (body, counts) = framed(kind, shape, neighbourhood.clone(), FrameRule::Lagged);
+                    let all = neighbourhood.offsets(&body.lattice).expect("fits")[0].len();
+                    assert!(counts.iter().all(|&count| count == all), "{kind:?} {neighbourhood:?}");
+                    let frame = body.frame.as_ref().expect("framed");
+                    assert!((0..frame.len()).all(|k| !frame.served_by(k).is_empty()), "{kind:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_frame_point_serves_its_nearest_particles_and_a_corner_averages_them() {
+        let square = LatticeKind::Square { spacing: 1.0 };
+        let first = Neighbourhood::First { keep: None };
+        let (body, _) = framed(square, corner(), first, FrameRule::Lagged);
+        assert_eq!(served(&body, [3, -1]), [[3, 0]]);
+        assert_eq!(served(&body, [-1, -1]), [[0, 0]]);
+        // Beside both arms of the L: as near to one as to the other.
+        let mut both = served(&body, [3, 3]);
+        both.sort_unstable();
+        assert_eq!(both, [[2, 3], [3, 2]]);
+        let frame = body.frame.as_ref().expect("framed");
+        let k = frame.points.iter().position(|&p| body.sites[p as usize] == [3, 3]).expect("a frame point");
+        let mut seen = Points::clone(&body.reference);
+        let at = |site: Site| body.sites.iter().position(|&s| s == site).expect("a particle");
+        seen.set(at([2, 3]), [2.0 + 0.4, 3.0]);
+        seen.set(at([3, 2]), [3.0, 2.0 - 0.2]);
+        let [dx, dy] = frame.displacement(k, &body.reference, &seen);
+        assert!((dx - 0.2).abs() < 1e-15 && (dy + 0.1).abs() < 1e-15, "{dx} {dy}");
+    }
+
+    #[test]
+    fn the_mirror_shows_the_particle_opposite_across_the_edge() {
+        let square = LatticeKind::Square { spacing: 1.0 };
+        let shape = Shape::Rectangle { min: [0.0; 2], max: [5.0, 5.0] };
+        let (body, _) = framed(square, shape.clone(), Neighbourhood::Second, FrameRule::Mirror);
+        assert_eq!(served(&body, [3, -1]), [[3, 1]]);
+        assert_eq!(served(&body, [3, -2]), [[3, 2]]);
+        assert_eq!(served(&body, [-1, -1]), [[1, 1]]);
+        // A body one row deep has nobody opposite: the point shows the edge itself.
+        let row = Shape::Rectangle { min: [0.0; 2], max: [5.0, 0.0] };
+        let (body, _) = framed(square, row, Neighbourhood::First { keep: None }, FrameRule::Mirror);
+        assert_eq!(served(&body, [3, -1]), [[3, 0]]);
+    }
+
+    #[test]
+    fn a_lagging_frame_looks_before_the_sweep_and_the_others_after_it() {
+        let square = LatticeKind::Square { spacing: 1.0 };
+        let shape = Shape::Rectangle { min: [0.0; 2], max: [4.0, 4.0] };
+        for (rule, expected) in
+            [(FrameRule::Lagged, 1.0), (FrameRule::Immediate, 3.0), (FrameRule::Mirror, 3.0)]
+        {
+            let (body, _) = framed(square, shape.clone(), Neighbourhood::First { keep: None }, rule);
+            let frame = body.frame.as_ref().expect("framed");
+            let shifted = |by: f64| -> Points { body.reference.iter().map(|[x, y]| [x + by, y]).collect() };
+            let mut next = shifted(3.0);
+            frame.follow(&body.reference, &shifted(1.0), &mut next);
+            for &point in &frame.points {
+                assert_eq!(next.x[point as usize] - body.reference.x[point as usize], expected, "{rule:?}");
+            }
+        }
+    }
+}

@@ -1,0 +1,309 @@
+//! What a scene says is what happens: roles, motions, updates, fracture, stopping.
+
+use std::ops::ControlFlow;
+
+use flockform::continuum::engine::Engine;
+use flockform::continuum::plan::Plan;
+use flockform::continuum::report::PlanReport;
+use flockform::continuum::run::{Outcome, StopReason, run};
+use flockform::flock::points::distance;
+use flockform::flock::role::Role;
+use flockform::scene::{Scene, bundled};
+
+fn scene(name: &str, overrides: &[&str]) -> Scene {
+    let overrides: Vec<String> = overrides.iter().map(|&text| text.to_owned()).collect();
+    bundled(name).expect("bundled").load(&overrides).unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn outcome(name: &str, overrides: &[&str]) -> Outcome {
+    watched(name, overrides, |_| {})
+}
+
+fn watched(name: &str, overrides: &[&str], mut watch: impl FnMut(&Engine)) -> Outcome {
+    let plan = Plan::new(&scene(name, overrides)).unwrap_or_else(|error| panic!("{error}"));
+    run(plan, &mut |engine, _| {
+        watch(engine);
+        ControlFlow::Continue(())
+    })
+}
+
+fn displacement(engine: &Engine, id: usize) -> [f64; 2] {
+    let (now, then) = (engine.present().get(id - 1), engine.body().reference.get(id - 1));
+    [now[0] - then[0], now[1] - then[1]]
+}
+
+#[test]
+fn leaders_move_while_they_lead_and_the_clamped_never_do() {
+    // Particle 127 is a leader in column 11, 14 is clamped in column 2.
+    watched("tension", &["stop.steps=30"], |engine| {
+        let step = engine.step();
+        assert_eq!(displacement(engine, 14), [0.0, 0.0]);
+        if step <= 20 {
+            let [dx, _] = displacement(engine, 127);
+            assert!((dx - 0.6 * step as f64).abs() < 1e-12, "step {step}: {dx}");
+        }
+        assert_eq!(
+            engine.roles()[126],
+            if step <= 20 { Role::Leader } else { Role::Follower },
+            "step {step}"
+        );
+    });
+}
+
+#[test]
+fn a_role_can_be_taken_by_rule_particle_by_particle() {
+    // Whoever has moved 1.5 is clamped there and then.
+    let when = r#"roles[2]={region={kind="all"},role="clamped",when={quantity="displacement",above=1.5}}"#;
+    let mut held: Vec<Option<[f64; 2]>> = vec![None; 144];
+    let outcome = watched("tension", &[when, "stop.steps=60"], |engine| {
+        for (i, held) in held.iter_mut().enumerate() {
+            if let Some(place) = held {
+                assert_eq!(engine.present().get(i), *place, "particle {} moved on", i + 1);
+            }
+            let was_clamped = engine.body().sites[i][0] == engine.body().sites[13][0];
+            if engine.roles()[i] == Role::Clamped && !was_clamped && held.is_none() {
+                *held = Some(engine.present().get(i));
+            }
+        }
+    });
+    let clamped = held.iter().flatten().count();
+    assert!(clamped >= 10, "{clamped} were clamped");
+    // The leaders were, at the first step after they had passed 1.5: the third moved them to 1.8.
+    let [dx, _] = displacement(&outcome.engine, 127);
+    assert!((dx - 1.8).abs() < 1e-12, "{dx}");
+}
+
+#[test]
+fn a_new_motion_starts_from_where_the_leader_stands() {
+    let second = r#"roles[2]={from=11,region={kind="edge",side="right"},role="leader",motion={kind="keyframes",frames=[{step=5,displacement=[0.0,2.0]}]}}"#;
+    let outcome = outcome("tension", &[second, "stop.steps=15"]);
+    let [dx, dy] = displacement(&outcome.engine, 127);
+    assert!((dx - 6.0).abs() < 1e-12 && (dy - 2.0).abs() < 1e-12, "{dx} {dy}");
+}
+
+#[test]
+fn a_displacement_file_leads_its_particles() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let rows: String = (0..10).map(|row| format!("9,{row},0.5,{}\n", 0.1 * f64::from(row))).collect();
+    std::fs::write(folder.path().join("led.csv"), format!("x,y,ux,uy\n{rows}")).expect("written");
+    let csv = r#"roles[1].motion={kind="csv",file="led.csv",scale=2.0,steps=4}"#;
+    let text = bundled("tension").expect("bundled").text;
+    let scene =
+        Scene::parse("csv", "csv.toml", text, &[csv.into(), "stop.steps=8".into()], Some(folder.path()));
+    let plan =
+        Plan::new(&scene.unwrap_or_else(|error| panic!("{error}"))).unwrap_or_else(|error| panic!("{error}"));
+    let mut half = [0.0; 2];
+    let outcome = run(plan, &mut |engine, _| {
+        if engine.step() == 2 {
+            half = displacement(engine, 125);
+        }
+        ControlFlow::Continue(())
+    });
+    // Particle 125 stands in the fourth row of the body.
+    assert!((half[0] - 0.5).abs() < 1e-12 && (half[1] - 0.3).abs() < 1e-12, "{half:?}");
+    let whole = displacement(&outcome.engine, 125);
+    assert!((whole[0] - 1.0).abs() < 1e-12 && (whole[1] - 0.6).abs() < 1e-12, "{whole:?}");
+}
+
+#[test]
+fn every_update_reaches_the_same_equilibrium_and_the_sequential_one_sooner() {
+    let ended = |update: &str| {
+        let outcome = outcome("shear", &[update, "stop={steps=50000,tolerance=1e-12}"]);
+        assert_eq!(outcome.reason, StopReason::Equilibrium, "{update}");
+        (outcome.engine.step(), outcome.engine.present().clone())
+    };
+    let (synchronous, expected) = ended("update={}");
+    for update in [r#"update={order="sequential"}"#, "update={damping=0.5}"] {
+        let (steps, places) = ended(update);
+        let apart = places.iter().zip(expected.iter()).map(|(a, b)| distance(a, b)).fold(0.0, f64::max);
+        assert!(apart < 1e-8, "{update}: {apart}");
+        assert_eq!(
+            steps < synchronous,
+            update.contains("sequential"),
+            "{update}: {steps} against {synchronous}"
+        );
+    }
+}
+
+#[test]
+fn weights_that_grow_with_distance_settle_only_sequentially_or_damped() {
+    // A chain of three: two held ends and one particle between them, pushed off its middle.
+    let between = |update: &str| {
+        outcome(
+            "lattice-square",
+            &[
+                r#"body={shape={kind="grid",columns=3,rows=1}}"#,
+                r#"roles=[{region={kind="edge",side="left"},role="clamped"},{region={kind="edge",side="right"},role="leader",motion={kind="keyframes",frames=[{step=1,displacement=[2.0,0.0]}]}}]"#,
+                r#"rule.mean={kind="distance"}"#,
+                "stop={steps=400,tolerance=1e-9}",
+                update,
+            ],
+        )
+    };
+    let marginal = between("update={}");
+    assert_eq!(marginal.reason, StopReason::Steps, "the synchronous update settled");
+    assert!(marginal.residual > 0.1, "{}", marginal.residual);
+    let damped = between("update={damping=0.5}");
+    assert_eq!(damped.reason, StopReason::Equilibrium);
+    assert!((damped.engine.present().x[1] - 2.0).abs() < 1e-6);
+}
+
+#[test]
+fn rest_is_no_equilibrium_while_something_is_scheduled() {
+    let late = r#"roles[1].motion={kind="keyframes",interpolation="hold",frames=[{step=40,displacement=[1.0,0.0]}]}"#;
+    let outcome = outcome("shear", &[late, "stop={steps=4000,tolerance=1e-7}"]);
+    assert_eq!(outcome.reason, StopReason::Equilibrium);
+    assert!(outcome.engine.step() > 40, "stopped at {}", outcome.engine.step());
+    let [dx, _] = displacement(&outcome.engine, 400);
+    assert_eq!(dx, 1.0);
+}
+
+#[test]
+fn without_anything_to_do_the_body_rests_at_once() {
+    let outcome = outcome("shear", &["roles=[]", "stop={steps=100,tolerance=1e-12}"]);
+    assert_eq!((outcome.reason, outcome.engine.step()), (StopReason::Equilibrium, 1));
+}
+
+#[test]
+fn a_literal_barycentre_without_a_frame_draws_the_body_together_and_the_rest_offset_does_not() {
+    let shrinks = |rest: &str| {
+        let outcome = outcome("shear", &["roles=[]", "stop={steps=50}", rest]);
+        let (low, high) = outcome.engine.present().bounds(0..400).expect("has particles");
+        high[0] - low[0]
+    };
+    assert_eq!(shrinks("rule.rest=kept"), 19.0);
+    assert!(shrinks("rule.rest=literal") < 15.0);
+}
+
+#[test]
+fn a_ghost_leaves_the_body_and_the_rest_stays_in_place() {
+    let ghosts = r#"roles=[{from=3,region={kind="box",min=[5,5],max=[7,7]},role="ghost"}]"#;
+    for kind in ["lattice", "mirrored"] {
+        let fracture = format!("fracture={{ghosts=\"{kind}\"}}");
+        let outcome = outcome("shear", &[ghosts, &fracture, "stop={steps=30}", "record={}"]);
+        assert_eq!(outcome.engine.roles().iter().filter(|&&role| role == Role::Ghost).count(), 9);
+        // 9 particles have 12 bonds among them and 12 to the others.
+        assert_eq!(outcome.engine.breaks().len(), 24);
+        assert!(outcome.engine.breaks().iter().all(|b| b.step == 3));
+        assert_eq!(
+            outcome.engine.present(),
+            &*outcome.engine.body().reference,
+            "{kind} ghosts keep the balance"
+        );
+    }
+    let fracture = "fracture={ghosts=\"none\"}";
+    let outcome = outcome(
+        "shear",
+        &[ghosts, fracture, "rule.rest=literal", "frame=immediate", "stop={steps=30}", "record={}"],
+    );
+    assert_ne!(
+        outcome.engine.present(),
+        &*outcome.engine.body().reference,
+        "without ghosts the flanks draw together"
+    );
+}
+
+#[test]
+fn a_broken_pair_never_influences_each_other_again() {
+    // A row of six: torn between a held and a led half, then brought back together.
+    let row = r#"body={shape={kind="grid",columns=6,rows=1}}"#;
+    let roles = r#"roles=[{region={kind="edge",side="left"},role="clamped"},{region={kind="edge",side="right"},role="leader",motion={kind="keyframes",interpolation="hold",frames=[{step=1,displacement=[9,0]},{step=60,displacement=[0.0,0.0]}]}}]"#;
+    let mut broken_at_50 = 0;
+    let outcome =
+        watched("lattice-square", &[row, roles, "fracture={stretch=3.0}", "stop={steps=400}"], |engine| {
+            if engine.step() == 50 {
+                broken_at_50 = engine.breaks().len();
+            }
+        });
+    let engine = &outcome.engine;
+    assert_eq!(broken_at_50, 1);
+    assert_eq!(engine.breaks().len(), 1, "a bond broke twice or another did: {:?}", engine.breaks());
+    assert_eq!(engine.breaks()[0].pair, [4, 5]);
+    // The leader came back to its place beside its old neighbour, which does not mind.
+    assert_eq!(displacement(engine, 6), [0.0, 0.0]);
+    assert!(displacement(engine, 5)[0].abs() < 1e-6);
+}
+
+#[test]
+fn pseudo_energies_are_those_of_the_formulas() {
+    watched("tension", &["stop.steps=5"], |engine| {
+        if engine.step() == 1 {
+            // Particle 127's left neighbour has not moved; the frame point right of it lags too.
+            assert!(
+                (engine.pe1(126) - (0.6 * 0.6 + 0.6 * 0.6) - expected_above_and_below(engine)).abs() < 1e-12
+            );
+            assert!((engine.pe2(126) - 0.6).abs() < 1e-12);
+            assert_eq!(engine.pe2(13), 0.0);
+        }
+    });
+}
+
+/// Share of particle 127's PE1 from the bonds to the leaders above and below, which move with it.
+fn expected_above_and_below(engine: &Engine) -> f64 {
+    let here = engine.present().get(126);
+    [125, 127].into_iter().map(|k| (distance(here, engine.present().get(k)) - 1.0).powi(2)).sum()
+}
+
+#[test]
+fn the_liquid_drop_stays_in_one_piece_and_rounds_itself() {
+    let oblong = |engine: &Engine| {
+        let (low, high) = engine.present().bounds(0..engine.present().len()).expect("has particles");
+        (high[0] - low[0]) / (high[1] - low[1])
+    };
+    let mut start = 0.0;
+    let outcome = watched("drop", &[], |engine| {
+        if engine.step() == 0 {
+            start = oblong(engine);
+        }
+    });
+    let engine = &outcome.engine;
+    // Everybody has somebody near and nobody on top of it.
+    for (i, here) in engine.present().iter().enumerate() {
+        let nearest = engine
+            .present()
+            .iter()
+            .enumerate()
+            .filter(|&(k, _)| k != i)
+            .map(|(_, there)| distance(here, there));
+        let nearest = nearest.fold(f64::INFINITY, f64::min);
+        assert!((0.3..1.2).contains(&nearest), "particle {}: {nearest}", i + 1);
+    }
+    let end = oblong(engine);
+    assert!(start > 1.8 && end < 1.4, "{start} became {end}");
+}
+
+#[test]
+fn a_plan_counts_what_it_says() {
+    let scene = scene("tension", &[]);
+    let report = PlanReport::new(&scene, &Plan::new(&scene).expect("plans")).to_string();
+    for words in
+        ["144 (80 follower, 10 leader, 10 clamped, 44 frame)", "lagged frame of 44 points", "401 steps"]
+    {
+        assert!(report.contains(words), "no `{words}` in\n{report}");
+    }
+}
+
+#[test]
+fn a_specimen_has_the_standard_s_outline_on_every_lattice() {
+    for lattice in ["square", "hexagonal", "honeycomb"] {
+        for shape in ["e8-sheet", "d638-type-i"] {
+            let body = format!("body={{shape={{kind=\"{shape}\"}}}}");
+            let plan =
+                Plan::new(&scene(&format!("lattice-{lattice}"), &[&body])).unwrap_or_else(|e| panic!("{e}"));
+            let width = |low: f64, high: f64| {
+                let reference = &plan.body.reference;
+                let band = (0..plan.count()).filter(|&i| (low..high).contains(&reference.y[i]));
+                let (min, max) = reference.bounds(band).expect("not empty");
+                max[0] - min[0]
+            };
+            let (overall, gauge, grip) =
+                if shape == "e8-sheet" { (200.0, 12.5, 20.0) } else { (165.0, 13.0, 19.0) };
+            let near = |value: f64, expected: f64| value <= expected && value > expected - 2.0;
+            assert!(
+                near(width(overall / 2.0 - 20.0, overall / 2.0 + 20.0), gauge),
+                "{lattice} {shape} gauge"
+            );
+            assert!(near(width(0.0, 20.0), grip), "{lattice} {shape} grip");
+        }
+    }
+}
