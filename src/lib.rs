@@ -12,6 +12,7 @@
 //! * [`solve`]: sweeps over the flock's interaction, and their spectra.
 //! * [`continuum`]: plans a scene, steps it, and hands what happens to an observer.
 //! * `export` (feature `export`): CSV, JSON, VTK and figures, one file per format.
+//! * `fem` (feature `fem`): finite elements, the truth to hold the rules against; it knows no flock.
 //! * `bench` (feature `bench`): how fast the sweeps are, beside what the machine can do.
 //!
 //! ```
@@ -34,3 +35,5 @@ pub mod solve;
 pub mod bench;
 #[cfg(feature = "export")]
 pub mod export;
+#[cfg(feature = "fem")]
+pub mod fem;

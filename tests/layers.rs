@@ -60,6 +60,11 @@ fn solve_imports_the_flock_alone() {
 }
 
 #[test]
+fn the_finite_elements_know_no_other_room() {
+    assert_imports_only("fem", &[]);
+}
+
+#[test]
 fn scene_knows_nothing_of_hosts_and_outputs() {
     assert_imports_only("scene", &["flock", "solve"]);
 }

@@ -1,0 +1,120 @@
+//! Everything that can be wrong with a problem, named by index, value and allowed range.
+
+use super::problem::Axis;
+
+/// What the finite-element room refuses, and why.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum FemError {
+    /// A material constant outside the range that keeps the strain energy positive.
+    #[error("material: {quantity} = {value} is outside the admissible range {range}")]
+    Inadmissible {
+        /// The constant, as written in the constructor.
+        quantity: &'static str,
+        /// Its value.
+        value: f64,
+        /// The range it must lie in, as text.
+        range: String,
+    },
+    /// A stiffness matrix that is not symmetric and positive definite.
+    #[error(
+        "material: the 3x3 stiffness must be finite, symmetric and positive definite; it is not {lacking}"
+    )]
+    BadStiffness {
+        /// "finite", "symmetric" or "positive definite".
+        lacking: &'static str,
+    },
+    /// Arrays that do not belong together.
+    #[error("{what}: length {found}, expected {expected}")]
+    Length {
+        /// Which array.
+        what: &'static str,
+        /// Its length.
+        found: usize,
+        /// The length that fits.
+        expected: String,
+    },
+    /// A node, cell or side number past the end.
+    #[error("{what} {index} does not exist: there are {count}")]
+    NoSuch {
+        /// "node", "cell" or "side".
+        what: &'static str,
+        /// The number asked for, from 0.
+        index: usize,
+        /// How many there are.
+        count: usize,
+    },
+    /// A NaN or an infinity in the input.
+    #[error("{what} {index} holds a value that is not finite")]
+    NotFinite {
+        /// Which list: "node", "fixed displacement", "traction", "point force", "body force".
+        what: &'static str,
+        /// Place in that list, from 0.
+        index: usize,
+    },
+    /// A cell whose Jacobian determinant is not positive: nodes clockwise, folded, or of no area.
+    #[error(
+        "cell {cell} is inverted or flat: its Jacobian determinant falls to {determinant:e}; \
+         list nodes counter-clockwise"
+    )]
+    InvertedCell {
+        /// The cell, from 0.
+        cell: usize,
+        /// The smallest determinant found [m2 per reference area].
+        determinant: f64,
+    },
+    /// A node without stiffness.
+    #[error("node {node} belongs to no cell")]
+    UnusedNode {
+        /// The node, from 0.
+        node: usize,
+    },
+    /// Two different values prescribed for the same displacement component.
+    #[error("node {node} is prescribed twice along {axis:?}: {first} and {second}")]
+    Conflict {
+        /// The node, from 0.
+        node: usize,
+        /// The component.
+        axis: Axis,
+        /// The value met first \[m\].
+        first: f64,
+        /// The value met later \[m\].
+        second: f64,
+    },
+    /// Too few prescribed displacements: a part can move as a rigid body.
+    #[error("the part that contains node {node} is not held: it is free to {motion}")]
+    Mechanism {
+        /// The lowest-numbered node of the part.
+        node: usize,
+        /// "translate along x", "translate along y" or "rotate".
+        motion: &'static str,
+    },
+    /// The stiffness matrix is singular to working precision though every part is held against
+    /// rigid motion: usually parts that hang together by a single node, as by a hinge.
+    #[error(
+        "the stiffness matrix is singular to working precision; \
+         the softest motion is largest at node {node}"
+    )]
+    Singular {
+        /// The node that moves most in the softest motion.
+        node: usize,
+    },
+    /// The sparse factorisation could not be carried out: the factor does not fit in memory.
+    #[error("sparse factorisation of {unknowns} unknowns failed: {reason}")]
+    Factorisation {
+        /// Number of unknowns.
+        unknowns: usize,
+        /// What the linear-algebra library said.
+        reason: String,
+    },
+    /// A point at which a value was asked for lies in no cell.
+    #[error("point {index} at ({x}, {y}) lies outside the mesh")]
+    OutsideMesh {
+        /// Place in the list of points, from 0.
+        index: usize,
+        /// Abscissa \[m\].
+        x: f64,
+        /// Ordinate \[m\].
+        y: f64,
+    },
+}

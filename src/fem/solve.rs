@@ -1,0 +1,302 @@
+//! The direct solve: sparse Cholesky with an approximate-minimum-degree ordering, from the library faer,
+//! and the detection of bodies that are not held.
+
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::cholesky::llt::factor::LltError;
+use faer::sparse::linalg::cholesky::{
+    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
+};
+use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
+use faer::{Conj, MatMut, Par, Side};
+
+use super::assemble::{System, assemble};
+use super::error::FemError;
+use super::mesh::Mesh;
+use super::problem::Problem;
+use super::solution::Solution;
+
+/// Below this ratio of the softest motion's stiffness to the stiffness of the single components, at most
+/// two digits of the answer would be left: the matrix counts as singular.
+const SINGULAR: f64 = 1e-14;
+
+/// Solves for the displacement in equilibrium.
+///
+/// The factorisation runs on the calling thread, whatever faer's global setting, so the same input gives
+/// the same bits on one machine.
+///
+/// # Errors
+/// [`FemError::NoSuch`], [`FemError::NotFinite`] and [`FemError::Conflict`] for input that makes no
+/// sense; [`FemError::Mechanism`] for a part that rigid motion leaves free; [`FemError::Singular`] for
+/// parts that hang together by hinges; [`FemError::Factorisation`] if memory does not suffice.
+pub fn solve(problem: &Problem) -> Result<Solution, FemError> {
+    problem.check()?;
+    let prescribed = problem.prescribed()?;
+    check_rigid_motion(&problem.mesh, &prescribed)?;
+    let system = assemble(problem, &prescribed);
+    let unknowns = if system.load.is_empty() { Vec::new() } else { solve_reduced(&system)? };
+    let component = |c: usize| match system.unknown[c] {
+        Some(i) => unknowns[i],
+        None => prescribed[c].unwrap_or(0.0),
+    };
+    let nodes = 0..problem.mesh.node_count();
+    let ux = nodes.clone().map(|i| component(2 * i)).collect();
+    let uy = nodes.map(|i| component(2 * i + 1)).collect();
+    Solution::from_displacements(problem.mesh.clone(), problem.material, ux, uy)
+}
+
+/// A part (cells joined through nodes) is held if x and y are prescribed somewhere in it, and if no point
+/// of the plane can serve as centre of rotation: that needs all nodes held along x at one height and all
+/// nodes held along y at one abscissa.
+fn check_rigid_motion(mesh: &Mesh, prescribed: &[Option<f64>]) -> Result<(), FemError> {
+    let part = parts(mesh);
+    let mut held = vec![[f64::MAX, f64::MIN, f64::MAX, f64::MIN]; mesh.node_count()];
+    for (c, _) in prescribed.iter().enumerate().filter(|(_, p)| p.is_some()) {
+        let (node, lever) = (c / 2, 2 * (c % 2));
+        let at = if lever == 0 { mesh.y()[node] } else { mesh.x()[node] };
+        let range = &mut held[part[node]][lever..lever + 2];
+        (range[0], range[1]) = (range[0].min(at), range[1].max(at));
+    }
+    let size = |v: &[f64]| v.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+    let slack = 1e-12 * size(mesh.x()).max(size(mesh.y()));
+    for node in (0..mesh.node_count()).filter(|&n| part[n] == n) {
+        let [y_low, y_high, x_low, x_high] = held[node];
+        let motion = if y_low > y_high {
+            "translate along x"
+        } else if x_low > x_high {
+            "translate along y"
+        } else if y_high - y_low <= slack && x_high - x_low <= slack {
+            "rotate"
+        } else {
+            continue;
+        };
+        return Err(FemError::Mechanism { node, motion });
+    }
+    Ok(())
+}
+
+/// For each node the lowest-numbered node of its part (union by lowest root, with path halving).
+fn parts(mesh: &Mesh) -> Vec<usize> {
+    fn root(parent: &mut [usize], mut i: usize) -> usize {
+        while parent[i] != i {
+            parent[i] = parent[parent[i]];
+            i = parent[i];
+        }
+        i
+    }
+    let mut parent: Vec<usize> = (0..mesh.node_count()).collect();
+    for cell in 0..mesh.cell_count() {
+        let nodes = mesh.cell(cell);
+        for &node in &nodes[1..] {
+            let (a, b) = (root(&mut parent, nodes[0] as usize), root(&mut parent, node as usize));
+            parent[a.max(b)] = a.min(b);
+        }
+    }
+    (0..parent.len()).map(|i| root(&mut parent, i)).collect()
+}
+
+/// The factor L of the permuted matrix.
+struct Factor {
+    symbolic: SymbolicCholesky<usize>,
+    values: Vec<f64>,
+    memory: MemBuffer,
+}
+
+fn solve_reduced(system: &System) -> Result<Vec<f64>, FemError> {
+    let mut factor = factorise(system)?;
+    check_softest_motion(system, &mut factor)?;
+    let mut u = system.load.clone();
+    factor.solve(&mut u);
+    Ok(u)
+}
+
+fn factorise(system: &System) -> Result<Factor, FemError> {
+    let n = system.load.len();
+    let failed = |e: &dyn std::fmt::Debug| FemError::Factorisation { unknowns: n, reason: format!("{e:?}") };
+    let pattern = SymbolicSparseColMatRef::new_checked(n, n, &system.starts, None, &system.rows);
+    let matrix = SparseColMatRef::new(pattern, &system.values);
+    let params = CholeskySymbolicParams::default();
+    let symbolic = factorize_symbolic_cholesky(pattern, Side::Lower, SymmetricOrdering::Amd, params)
+        .map_err(|e| failed(&e))?;
+    let mut values = Vec::new();
+    values.try_reserve_exact(symbolic.len_val()).map_err(|e| failed(&e))?;
+    values.resize(symbolic.len_val(), 0.0);
+    let need = symbolic
+        .factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default())
+        .or(symbolic.solve_in_place_scratch::<f64>(1, Par::Seq));
+    let mut memory = MemBuffer::try_new(need).map_err(|e| failed(&e))?;
+    symbolic
+        .factorize_numeric_llt(
+            &mut values,
+            matrix,
+            Side::Lower,
+            Default::default(),
+            Par::Seq,
+            MemStack::new(&mut memory),
+            Default::default(),
+        )
+        .map_err(|LltError::NonPositivePivot { index }| {
+            let unknown = symbolic.perm().map_or(index, |p| p.arrays().0[index]);
+            FemError::Singular { node: node_of(system, unknown) }
+        })?;
+    Ok(Factor { symbolic, values, memory })
+}
+
+impl Factor {
+    /// Overwrites `rhs` with the solution.
+    fn solve(&mut self, rhs: &mut [f64]) {
+        let n = rhs.len();
+        LltRef::new(&self.symbolic, &self.values).solve_in_place_with_conj(
+            Conj::No,
+            MatMut::from_column_major_slice_mut(rhs, n, 1),
+            Par::Seq,
+            MemStack::new(&mut self.memory),
+        );
+    }
+}
+
+/// Two steps of inverse iteration on K z = lambda diag(K) z; lambda from the Rayleigh quotient. A hinge
+/// leaves lambda at rounding level even where every pivot of the factorisation came out positive.
+fn check_softest_motion(system: &System, factor: &mut Factor) -> Result<(), FemError> {
+    let diagonal: Vec<f64> = system.starts[..system.load.len()].iter().map(|&d| system.values[d]).collect();
+    // A fixed start without symmetry: the fractional parts of multiples of the golden ratio.
+    let mut z: Vec<f64> =
+        (1..=diagonal.len()).map(|i| (i as f64 * 0.618_033_988_749_895).fract() - 0.4).collect();
+    let mut ratio = f64::MAX;
+    for _ in 0..2 {
+        let largest = z.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+        let load: Vec<f64> = z.iter().zip(&diagonal).map(|(z, d)| z / largest * d).collect();
+        z.copy_from_slice(&load);
+        factor.solve(&mut z);
+        let energy: f64 = z.iter().zip(&load).map(|(z, f)| z * f).sum();
+        ratio = energy / z.iter().zip(&diagonal).map(|(z, d)| z * z * d).sum::<f64>();
+    }
+    if ratio > SINGULAR {
+        return Ok(());
+    }
+    let most = (0..z.len()).fold(0, |best, i| if z[i].abs() > z[best].abs() { i } else { best });
+    Err(FemError::Singular { node: node_of(system, most) })
+}
+
+fn node_of(system: &System, unknown: usize) -> usize {
+    system.unknown.iter().position(|&u| u == Some(unknown)).map_or(0, |component| component / 2)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fem::{Axis, CellKind, Material, Plane, PointForce, Side, Traction};
+
+    fn strip(kind: CellKind) -> Problem {
+        let mesh = Mesh::rectangle(kind, [6, 2], [0.0, 0.0], [3.0, 1.0]).unwrap();
+        let mut problem = Problem::new(mesh, Material::isotropic(1000.0, 0.3, Plane::Stress, 0.5).unwrap());
+        let end = problem.mesh.boundary_where(|x, _| x == 3.0);
+        problem.pull(&end, [0.0, 10.0]);
+        problem
+    }
+
+    fn motion(problem: &Problem) -> &'static str {
+        match solve(problem) {
+            Err(FemError::Mechanism { node: 0, motion }) => motion,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn a_body_that_is_not_held_is_told_how_it_can_move() {
+        for kind in CellKind::ALL {
+            let mut problem = strip(kind);
+            assert_eq!(motion(&problem), "translate along x");
+            problem.fix(&[0, 1], Axis::X, 0.0);
+            assert_eq!(motion(&problem), "translate along y");
+            problem.fix(&[0, 7], Axis::Y, 0.0);
+            assert_eq!(motion(&problem), "rotate", "{kind:?}: node 7 lies above node 0");
+            problem.fix(&[6], Axis::Y, 0.0);
+            assert!(solve(&problem).is_ok(), "{kind:?}");
+        }
+    }
+
+    /// Two squares that share only the node at the origin, the left one clamped.
+    fn hinged(kind: CellKind) -> Problem {
+        let x = vec![-1.0, 0.0, 0.0, -1.0, 1.0, 1.0, 0.0];
+        let y = vec![-1.0, -1.0, 0.0, 0.0, 0.0, 1.0, 1.0];
+        let linear = Mesh::new(CellKind::Quad4, x, y, vec![0, 1, 2, 3, 2, 4, 5, 6]).unwrap();
+        let mesh = if kind.degree() == 2 { linear.promoted() } else { linear };
+        let mut problem = Problem::new(mesh, Material::isotropic(1000.0, 0.3, Plane::Stress, 1.0).unwrap());
+        let left = problem.mesh.nodes_where(|x, _| x == -1.0);
+        problem.prescribe(&left, |_, _| [0.0; 2]);
+        problem.forces.push(PointForce { node: 5, force: [1.0, 0.0] });
+        problem
+    }
+
+    #[test]
+    fn a_hinge_is_found_though_every_part_touches_the_wall() {
+        for kind in [CellKind::Quad4, CellKind::Quad9] {
+            let mut problem = hinged(kind);
+            let refused = solve(&problem);
+            assert!(
+                matches!(refused, Err(FemError::Singular { node }) if problem.mesh.x()[node] >= 0.0),
+                "{refused:?}"
+            );
+            problem.fix(&[4], Axis::Y, 0.0);
+            assert!(solve(&problem).is_ok(), "{kind:?}");
+        }
+    }
+
+    #[test]
+    fn a_very_slender_but_held_beam_is_not_called_singular() {
+        let mesh = Mesh::rectangle(CellKind::Quad9, [400, 1], [0.0, 0.0], [400.0, 1.0]).unwrap();
+        let mut problem = Problem::new(mesh, Material::isotropic(1.0, 0.3, Plane::Stress, 1.0).unwrap());
+        let wall = problem.mesh.nodes_where(|x, _| x == 0.0);
+        let end = problem.mesh.boundary_where(|x, _| x == 400.0);
+        problem.prescribe(&wall, |_, _| [0.0; 2]);
+        problem.pull(&end, [0.0, 1e-9]);
+        let tip = solve(&problem).unwrap().displacements_at(&[400.0], &[0.5]).unwrap()[0][1];
+        // Euler-Bernoulli: P L^3 / (3 E I).
+        assert!((tip / (1e-9 * 400.0_f64.powi(3) * 4.0) - 1.0).abs() < 1e-3, "{tip}");
+    }
+
+    #[test]
+    fn input_that_is_not_finite_or_does_not_exist_is_refused_by_list_and_index() {
+        let mut p = strip(CellKind::Quad4);
+        p.fix(&[0, 7], Axis::X, 0.0);
+        p.fix(&[0], Axis::Y, 0.0);
+        let refused = |change: &dyn Fn(&mut Problem)| {
+            let mut spoiled = p.clone();
+            change(&mut spoiled);
+            solve(&spoiled).unwrap_err()
+        };
+        let not_finite = |what, index| FemError::NotFinite { what, index };
+        assert_eq!(refused(&|p| p.body_force[1] = f64::NAN), not_finite("body force", 0));
+        assert_eq!(refused(&|p| p.fixed[1].value = f64::INFINITY), not_finite("fixed displacement", 1));
+        assert_eq!(refused(&|p| p.tractions[1].at_gauss[2][0] = f64::NAN), not_finite("traction", 1));
+        let force = |node, f| PointForce { node, force: [f, 0.0] };
+        assert_eq!(refused(&|p| p.forces.push(force(1, f64::NAN))), not_finite("point force", 0));
+        let no_such = |what, index, count| FemError::NoSuch { what, index, count };
+        assert_eq!(refused(&|p| p.forces.push(force(99, 1.0))), no_such("node", 99, 21));
+        let side = |cell, side| Traction::uniform(Side { cell, side }, [0.0; 2]);
+        assert_eq!(refused(&|p| p.tractions.push(side(12, 0))), no_such("cell", 12, 12));
+        assert_eq!(refused(&|p| p.tractions.push(side(0, 4))), no_such("side", 4, 4));
+        let twice = refused(&|p| p.fix(&[7], Axis::X, 0.25));
+        assert_eq!(twice, FemError::Conflict { node: 7, axis: Axis::X, first: 0.0, second: 0.25 });
+    }
+
+    #[test]
+    fn the_same_problem_gives_the_same_bits_and_a_repeated_support_changes_nothing() {
+        let mut p = strip(CellKind::Tri6);
+        let wall = p.mesh.nodes_where(|x, _| x == 0.0);
+        p.prescribe(&wall, |_, y| [0.01 * y, 0.0]);
+        let first = solve(&p).unwrap();
+        p.prescribe(&wall, |_, y| [0.01 * y, 0.0]);
+        let second = solve(&p).unwrap();
+        assert!(first.ux() == second.ux() && first.uy() == second.uy());
+    }
+
+    #[test]
+    fn a_body_with_every_node_prescribed_needs_no_factorisation() {
+        let mut p = strip(CellKind::Quad9);
+        let all = p.mesh.nodes_where(|_, _| true);
+        p.prescribe(&all, |x, y| [x * y, -x]);
+        let found = solve(&p).unwrap();
+        assert!((found.ux()[20] - 3.0).abs() < 1e-15 && (found.uy()[20] + 3.0).abs() < 1e-15);
+    }
+}
