@@ -20,9 +20,9 @@ const MOVED_BYTES: f64 = 32.0;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Bandwidth {
     pub threads: usize,
-    /// The bytes the program names [B/s].
+    /// The bytes the program names \[B/s\].
     pub counted_bytes_per_second: f64,
-    /// The same and the write-allocate traffic [B/s]: what the roofline is drawn from.
+    /// The same and the write-allocate traffic \[B/s\]: what the roofline is drawn from.
     pub moved_bytes_per_second: f64,
 }
 

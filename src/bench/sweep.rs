@@ -72,10 +72,10 @@ pub struct Case {
     pub threads: usize,
     /// Particles that follow: all but the outermost.
     pub followers: usize,
-    /// Median over the repetitions [s].
+    /// Median over the repetitions \[s\].
     pub seconds_per_step: f64,
     pub updates_per_second: f64,
-    /// Of the updates per second that the triad's bandwidth would allow [1].
+    /// Of the updates per second that the triad's bandwidth would allow \[1\].
     pub share_of_roofline: f64,
 }
 
@@ -112,27 +112,26 @@ impl Report {
         // Between the bodies rather than once, so that a neighbour's load on the machine does not hit
         // the triad or the sweeps alone.
         triad.measure(effort.repetitions);
-        let first = self.cases.len();
-        for lattice in lattices {
-            let seconds_per_step = lattice.seconds_per_step(effort);
-            let (side, followers) = (lattice.side, lattice.followers());
+        let mut seconds_per_step = Vec::new();
+        for lattice in &mut *lattices {
+            seconds_per_step.push(lattice.seconds_per_step(effort));
+            triad.measure(effort.repetitions);
+        }
+        let bandwidth = triad.take_bandwidth(threads);
+        let roofline = bandwidth.moved_bytes_per_second / BYTES_PER_UPDATE;
+        self.cases.extend(lattices.iter().zip(seconds_per_step).map(|(lattice, seconds_per_step)| {
+            let followers = lattice.followers();
             let updates_per_second = followers as f64 / seconds_per_step;
-            let share_of_roofline = f64::NAN;
-            self.cases.push(Case {
-                side,
+            let share_of_roofline = updates_per_second / roofline;
+            Case {
+                side: lattice.side,
                 threads,
                 followers,
                 seconds_per_step,
                 updates_per_second,
                 share_of_roofline,
-            });
-            triad.measure(effort.repetitions);
-        }
-        let bandwidth = triad.take_bandwidth(threads);
-        let roofline = bandwidth.moved_bytes_per_second / BYTES_PER_UPDATE;
-        for case in &mut self.cases[first..] {
-            case.share_of_roofline = case.updates_per_second / roofline;
-        }
+            }
+        }));
         self.triad.push(bandwidth);
     }
 }
@@ -254,4 +253,53 @@ fn duration(seconds: f64) -> String {
         s => (s * 1e3, "ms"),
     };
     format!("{value:.*} {unit}", if value < 10.0 { 2 } else { usize::from(value < 100.0) })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_quick_run_measures_two_bodies_on_one_and_two_threads() {
+        let report = run(&Options { quick: true }).expect("threads");
+        let cases: Vec<_> = report.cases.iter().map(|case| (case.side, case.threads)).collect();
+        assert_eq!(cases, [(12, 1), (256, 1), (12, 2), (256, 2)]);
+        let json = serde_json::to_value(&report).expect("plain numbers");
+        for case in json["cases"].as_array().expect("cases") {
+            for key in ["seconds_per_step", "updates_per_second", "share_of_roofline"] {
+                assert!(case[key].as_f64().expect("a number") > 0.0, "{key}");
+            }
+        }
+        assert!(report.to_string().contains("256 x 256"));
+    }
+
+    #[test]
+    fn the_lattice_built_directly_is_the_one_a_scene_would_cut() {
+        use crate::flock::body::{Body, Cut};
+        let lattice = Lattice::new(LatticeKind::Square { spacing: 1.0 }, [0.0; 2], 0.0);
+        let cut = Cut::Count { columns: 9, rows: 9 };
+        let body = Body::build(lattice, &cut, &Neighbourhood::First { keep: None }, None).expect("fits");
+        let direct = SquareLattice::new(9);
+        assert_eq!(direct.interaction.reference, body.reference);
+        let inner = (1..8).flat_map(|column| (1..8).map(move |row| 9 * column + row));
+        for particle in inner {
+            assert_eq!(direct.interaction.neighbours.of(particle), body.neighbours.of(particle));
+        }
+        assert_eq!(direct.interaction.neighbours.index.len(), 4 * direct.followers());
+    }
+
+    #[test]
+    fn a_step_moves_the_followers_beside_the_stretched_side_and_nobody_held() {
+        let mut lattice = SquareLattice::new(12);
+        let before = lattice.present.clone();
+        lattice.time(1);
+        let moved: Vec<usize> = (0..144).filter(|&i| lattice.present.x[i] != before.x[i]).collect();
+        assert_eq!(moved, (10 * 12 + 1..10 * 12 + 11).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn durations_are_written_with_three_figures() {
+        let written = [1.234e-9, 45.67e-9, 345.6e-6, 7.891e-3, 1.5].map(duration);
+        assert_eq!(written, ["1.23 ns", "45.7 ns", "346 us", "7.89 ms", "1500 ms"]);
+    }
 }
