@@ -59,7 +59,7 @@ pub struct Report {
     /// Whether this was the quick run, whose times mean little.
     pub quick: bool,
     pub bytes_per_update: f64,
-    /// One entry for each number of threads.
+    /// One entry for each number of threads: the median over the whole run.
     pub triad: Vec<Bandwidth>,
     pub cases: Vec<Case>,
 }
@@ -75,7 +75,8 @@ pub struct Case {
     /// Median over the repetitions \[s\].
     pub seconds_per_step: f64,
     pub updates_per_second: f64,
-    /// Of the updates per second that the triad's bandwidth would allow \[1\].
+    /// Of the updates per second that the triad's bandwidth would allow \[1\], going by those passes of
+    /// the triad that were taken in turn with this body's repetitions.
     pub share_of_roofline: f64,
 }
 
@@ -109,30 +110,27 @@ impl Report {
         lattices: &mut [SquareLattice],
         triad: &mut Triad,
     ) {
-        // Between the bodies rather than once, so that a neighbour's load on the machine does not hit
-        // the triad or the sweeps alone.
-        triad.measure(effort.repetitions);
-        let mut seconds_per_step = Vec::new();
-        for lattice in &mut *lattices {
-            seconds_per_step.push(lattice.seconds_per_step(effort));
-            triad.measure(effort.repetitions);
-        }
-        let bandwidth = triad.take_bandwidth(threads);
-        let roofline = bandwidth.moved_bytes_per_second / BYTES_PER_UPDATE;
-        self.cases.extend(lattices.iter().zip(seconds_per_step).map(|(lattice, seconds_per_step)| {
-            let followers = lattice.followers();
+        triad.time();
+        let mut passes = Vec::new();
+        for lattice in lattices {
+            // In turn, so that a neighbour's load on the machine hits the sweep and the triad alike.
+            let steps = lattice.steps_in(effort.seconds);
+            let (mut beside, mut times): (Vec<f64>, Vec<f64>) =
+                (0..effort.repetitions).map(|_| (triad.time(), lattice.time(steps))).unzip();
+            passes.extend_from_slice(&beside);
+            let (followers, seconds_per_step) = (lattice.followers(), median(&mut times));
             let updates_per_second = followers as f64 / seconds_per_step;
-            let share_of_roofline = updates_per_second / roofline;
-            Case {
+            let roofline = triad.bandwidth(threads, &mut beside).moved_bytes_per_second / BYTES_PER_UPDATE;
+            self.cases.push(Case {
                 side: lattice.side,
                 threads,
                 followers,
                 seconds_per_step,
                 updates_per_second,
-                share_of_roofline,
-            }
-        }));
-        self.triad.push(bandwidth);
+                share_of_roofline: updates_per_second / roofline,
+            });
+        }
+        self.triad.push(triad.bandwidth(threads, &mut passes));
     }
 }
 
@@ -184,12 +182,10 @@ impl SquareLattice {
         (self.side - 2).pow(2)
     }
 
-    fn seconds_per_step(&mut self, effort: &Effort) -> f64 {
+    /// A small body's step is too short for the clock: as many as fill the time.
+    fn steps_in(&mut self, seconds: f64) -> usize {
         self.time(1);
-        // A small body's step is too short for the clock: as many as fill the time.
-        let steps = (effort.seconds / self.time(2)).clamp(1.0, 1e7) as usize;
-        let mut seconds: Vec<f64> = (0..effort.repetitions).map(|_| self.time(steps)).collect();
-        median(&mut seconds)
+        (seconds / self.time(2)).clamp(1.0, 1e7) as usize
     }
 
     /// Seconds per step over some steps.
