@@ -20,43 +20,35 @@ const MOVED_BYTES: f64 = 32.0;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Bandwidth {
     pub threads: usize,
-    /// The bytes the program names [B/s].
+    /// The bytes the program names \[B/s\].
     pub counted_bytes_per_second: f64,
-    /// The same and the write-allocate traffic [B/s]: what the roofline is drawn from.
+    /// The same and the write-allocate traffic \[B/s\]: what the roofline is drawn from.
     pub moved_bytes_per_second: f64,
 }
 
-/// The arrays of the triad, and the times taken so far.
+/// The arrays of the triad.
 pub(super) struct Triad {
     a: Vec<f64>,
     b: Vec<f64>,
     c: Vec<f64>,
-    /// Seconds of each pass.
-    passes: Vec<f64>,
 }
 
 impl Triad {
     pub(super) fn new(elements: usize) -> Self {
         // Ones rather than zeros, so that every page is written to and thus really there.
-        Self { a: vec![1.0; elements], b: vec![1.0; elements], c: vec![2.0; elements], passes: Vec::new() }
+        Self { a: vec![1.0; elements], b: vec![1.0; elements], c: vec![2.0; elements] }
     }
 
-    /// Times `passes` passes on all threads of the present pool, after one that is not counted.
-    pub(super) fn measure(&mut self, passes: usize) {
+    /// Seconds that one pass takes on all threads of the present pool.
+    pub(super) fn time(&mut self) -> f64 {
+        let begin = Instant::now();
         self.pass();
-        for _ in 0..passes {
-            let begin = Instant::now();
-            self.pass();
-            self.passes.push(begin.elapsed().as_secs_f64());
-        }
+        begin.elapsed().as_secs_f64()
     }
 
-    /// The bandwidth of the median pass since the last call; all of them must have been timed on this
-    /// number of threads.
-    pub(super) fn take_bandwidth(&mut self, threads: usize) -> Bandwidth {
-        let passes_per_second = 1.0 / median(&mut self.passes);
-        self.passes.clear();
-        let elements_per_second = self.a.len() as f64 * passes_per_second;
+    /// The bandwidth of the median of passes that took so many seconds each.
+    pub(super) fn bandwidth(&self, threads: usize, seconds: &mut [f64]) -> Bandwidth {
+        let elements_per_second = self.a.len() as f64 / median(seconds);
         Bandwidth {
             threads,
             counted_bytes_per_second: COUNTED_BYTES * elements_per_second,
@@ -102,10 +94,9 @@ mod tests {
     #[test]
     fn the_triad_writes_all_of_its_elements_and_counts_its_bytes() {
         let mut triad = Triad::new(1001);
-        triad.measure(3);
+        assert!(triad.time() > 0.0);
         assert!(triad.a.iter().all(|&a| a == 7.0));
-        triad.passes = vec![1.0, 2.0, 4.0];
-        let bandwidth = triad.take_bandwidth(1);
+        let bandwidth = triad.bandwidth(1, &mut [1.0, 4.0, 2.0]);
         assert_eq!(bandwidth.counted_bytes_per_second, 1001.0 * 24.0 / 2.0);
         assert_eq!(bandwidth.moved_bytes_per_second, 1001.0 * 32.0 / 2.0);
     }
