@@ -274,12 +274,13 @@ mod tests {
         use crate::flock::body::{Body, Cut};
         let lattice = Lattice::new(LatticeKind::Square { spacing: 1.0 }, [0.0; 2], 0.0);
         let cut = Cut::Count { columns: 9, rows: 9 };
-        let body = Body::build(lattice, &cut, &Neighbourhood::First { keep: None }, None).expect("fits");
+        let (body, neighbours) =
+            Body::build(lattice, &cut, &Neighbourhood::First { keep: None }, None).expect("fits");
         let direct = SquareLattice::new(9);
         assert_eq!(direct.interaction.reference, body.reference);
         let inner = (1..8).flat_map(|column| (1..8).map(move |row| 9 * column + row));
         for particle in inner {
-            assert_eq!(direct.interaction.neighbours.of(particle), body.neighbours.of(particle));
+            assert_eq!(direct.interaction.neighbours.of(particle), neighbours.of(particle));
         }
         assert_eq!(direct.interaction.neighbours.index.len(), 4 * direct.followers());
     }

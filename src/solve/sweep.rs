@@ -146,8 +146,8 @@ mod tests {
     fn body(rule: Rule) -> Interaction {
         let lattice = Lattice::new(LatticeKind::Hexagonal { spacing: 1.0 }, [0.0, 0.0], 0.1);
         let cut = Cut::Count { columns: 263, rows: 301 };
-        let body = Body::build(lattice, &cut, &Neighbourhood::Second, None).expect("fits");
-        let (reference, neighbours) = (body.reference, body.neighbours);
+        let (body, neighbours) = Body::build(lattice, &cut, &Neighbourhood::Second, None).expect("fits");
+        let reference = body.reference;
         let mut interaction =
             Interaction { rule, reference, neighbours, weights: None, rest: None, bonds: None };
         interaction.keep_rest();
@@ -160,7 +160,7 @@ mod tests {
 
     fn after_steps(interaction: &Interaction, roles: &[Role], threads: usize) -> Points {
         let sweep = Sweep::compile(Update::default(), interaction, roles);
-        let mut present = interaction.reference.clone();
+        let mut present = Points::clone(&interaction.reference);
         for i in (0..present.len()).step_by(101) {
             present.x[i] += 1.0 + (i % 13) as f64 / 7.0;
         }

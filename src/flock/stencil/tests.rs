@@ -33,11 +33,11 @@ fn rough(count: usize, seed: u64) -> Points {
 
 fn lay(lattice: LatticeKind, cut: &Cut, neighbourhood: &Neighbourhood) -> Interaction {
     let lattice = Lattice::new(lattice, [0.0, 0.0], 0.3);
-    let body = Body::build(lattice, cut, neighbourhood, None).expect("fits");
+    let (body, neighbours) = Body::build(lattice, cut, neighbourhood, None).expect("fits");
     Interaction {
         rule: Rule::BARYCENTRE,
         reference: body.reference,
-        neighbours: body.neighbours,
+        neighbours,
         weights: None,
         rest: None,
         bonds: None,
@@ -126,7 +126,7 @@ fn a_mean_of_negative_zeros_and_a_particle_without_neighbours_give_the_bits_of_t
     let lists = (0..22u32).map(|j| (1..21).contains(&j).then(|| j - 1));
     let interaction = Interaction {
         rule: Rule::BARYCENTRE,
-        reference: Points::zeros(22),
+        reference: Points::zeros(22).into(),
         neighbours: Neighbours::from_lists(lists),
         weights: None,
         rest: None,
