@@ -27,6 +27,7 @@
 
 pub mod continuum;
 pub mod flock;
+pub mod material;
 pub mod scene;
 pub mod solve;
 
