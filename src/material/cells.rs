@@ -4,6 +4,8 @@
 //! two triangles of its Delaunay tessellation, the honeycomb its hexagons. A cell exists where all its
 //! corners are particles of the body; the frame, which stands for the world outside, has no cells.
 
+use std::sync::Arc;
+
 use crate::flock::body::Body;
 use crate::flock::lattice::{Lattice, LatticeKind, Site};
 use crate::flock::neighbourhood::{Neighbourhood, Neighbours};
@@ -20,7 +22,7 @@ pub struct Cells {
     pub index: Vec<u32>,
     /// Which of `shapes` each cell has, shape \[count\].
     pub kind: Vec<u32>,
-    /// Corners relative to the first [length], shape \[kinds, corners\]. A lattice has one or two; they come
+    /// Corners relative to the first \[length\], shape \[kinds, corners\]. A lattice has one or two; they come
     /// from the lattice's vectors, not from differences of positions, so a body far from the origin
     /// loses no digits.
     pub shapes: Vec<Vec<[f64; 2]>>,
@@ -78,7 +80,7 @@ impl Cells {
         cells
     }
 
-    /// The same cells with their corners at these points [length], each with a shape of its own.
+    /// The same cells with their corners at these points \[length\], each with a shape of its own.
     pub fn on_points(&self, points: &Points) -> Self {
         let shapes = self
             .iter()
@@ -104,7 +106,7 @@ impl Cells {
         self.index.chunks_exact(self.corners)
     }
 
-    /// Corners of a cell relative to the first [length], shape \[corners\].
+    /// Corners of a cell relative to the first \[length\], shape \[corners\].
     pub fn shape(&self, cell: usize) -> &[[f64; 2]] {
         &self.shapes[self.kind[cell] as usize]
     }
@@ -159,7 +161,7 @@ impl Cells {
         sides.filter(|&side| self.across(incidence, side).is_none()).collect()
     }
 
-    /// Mean strain of each cell (xx, yy, engineering xy) \[1\] under these displacements [length], shape
+    /// Mean strain of each cell (xx, yy, engineering xy) \[1\] under these displacements \[length\], shape
     /// \[count, 3\]; on a quadrilateral that is the bilinear strain at the centre.
     pub fn strains(&self, displacement: &Points) -> Vec<[f64; 3]> {
         let strain = |cell: usize| {
@@ -169,7 +171,7 @@ impl Cells {
         (0..self.count()).map(strain).collect()
     }
 
-    /// Centre of each cell, the mean of its corners [length], shape \[count\].
+    /// Centre of each cell, the mean of its corners \[length\], shape \[count\].
     pub fn centres(&self, reference: &Points) -> Points {
         let centre = |cell: &[u32]| {
             let sum = cell.iter().fold([0.0; 2], |[x, y], &i| {
@@ -180,6 +182,28 @@ impl Cells {
         };
         self.iter().map(centre).collect()
     }
+}
+
+/// The body without the particles that are in no cell (sites that stick out of a curved or ragged
+/// edge, a frame), renumbered in the same order, with its neighbours and its cells. A frame is gone
+/// afterwards: free edges need none.
+pub fn without_loose_sites(body: &Body, neighbours: &Neighbours) -> (Body, Neighbours, Cells) {
+    let mut cells = Cells::of_body(body);
+    let incidence = cells.incidence(body.count());
+    let keep: Vec<usize> = (0..body.count()).filter(|&i| !incidence.of(i).is_empty()).collect();
+    let mut renumbered = vec![None; body.count()];
+    keep.iter().enumerate().for_each(|(new, &old)| renumbered[old] = Some(new as u32));
+    // Corners are kept, every one of them.
+    cells.index.iter_mut().for_each(|i| *i = renumbered[*i as usize].unwrap_or_default());
+    let kept = Body {
+        lattice: body.lattice.clone(),
+        sites: keep.iter().map(|&i| body.sites[i]).collect(),
+        reference: Arc::new(keep.iter().map(|&i| body.reference.get(i)).collect()),
+        is_frame: vec![false; keep.len()],
+        frame: None,
+    };
+    let seen = |&i: &usize| neighbours.of(i).iter().filter_map(|&j| renumbered[j as usize]);
+    (kept, Neighbours::from_lists(keep.iter().map(seen)), cells)
 }
 
 /// The neighbourhood that a material needs: everybody with whom a particle shares a cell.

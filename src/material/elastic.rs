@@ -6,7 +6,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-/// Strain to membrane force, Voigt order (xx, yy, xy) [force / length], shape \[3, 3\].
+/// Strain to membrane force, Voigt order (xx, yy, xy) \[force / length\], shape \[3, 3\].
 pub type Voigt = Matrix3<f64>;
 
 /// What is assumed across the thickness.
@@ -21,15 +21,15 @@ pub enum Plane {
 /// Elastic constants as an engineer names them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Constants {
-    /// Young's modulus [force / length^2] and Poisson's ratio \[1\].
+    /// Young's modulus \[force / length^2\] and Poisson's ratio \[1\].
     ///
     /// Plane stress takes -1 < nu < 1, the range in which a two-dimensional sheet has positive
     /// energy; a sheet cut from a three-dimensional isotropic solid has nu < 1/2. Plane strain takes
     /// -1 < nu < 1/2: at 1/2 the material is incompressible.
     Isotropic { young: f64, poisson: f64, plane: Plane },
-    /// Plane stress: moduli along the fibres and across them and for shear [force / length^2],
+    /// Plane stress: moduli along the fibres and across them and for shear \[force / length^2\],
     /// contraction across the fibres under tension along them \[1\], and the angle of the fibres from
-    /// x [rad]. Positive energy needs `poisson_12^2 < young[0] / young[1]`.
+    /// x \[rad\]. Positive energy needs `poisson_12^2 < young[0] / young[1]`.
     Orthotropic { young: [f64; 2], poisson_12: f64, shear: f64, angle: f64 },
 }
 
@@ -56,7 +56,7 @@ pub enum ElasticError {
     Range,
 }
 
-/// A sheet: admissible constants and a thickness [length].
+/// A sheet: admissible constants and a thickness \[length\].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Elastic {
     constants: Constants,
@@ -86,22 +86,22 @@ impl Elastic {
         self.constants
     }
 
-    /// Thickness [length].
+    /// Thickness \[length\].
     pub fn thickness(&self) -> f64 {
         self.thickness
     }
 
-    /// Stiffness of the whole thickness [force / length].
+    /// Stiffness of the whole thickness \[force / length\].
     pub fn stiffness(&self) -> &Voigt {
         &self.stiffness
     }
 
-    /// In-plane stress (xx, yy, xy) [force / length^2] under a strain (xx, yy, engineering xy) \[1\].
+    /// In-plane stress (xx, yy, xy) \[force / length^2\] under a strain (xx, yy, engineering xy) \[1\].
     pub fn stress(&self, strain: [f64; 3]) -> [f64; 3] {
         (self.stiffness * Vector3::from(strain) / self.thickness).into()
     }
 
-    /// Von Mises stress [force / length^2] under a strain (xx, yy, engineering xy) \[1\]; in plane strain
+    /// Von Mises stress \[force / length^2\] under a strain (xx, yy, engineering xy) \[1\]; in plane strain
     /// with the stress across the thickness that keeps the faces from parting.
     pub fn von_mises(&self, strain: [f64; 3]) -> f64 {
         let [xx, yy, xy] = self.stress(strain);
@@ -144,7 +144,8 @@ fn orthotropic(young: [f64; 2], poisson_12: f64, shear: f64, angle: f64) -> Resu
     positive("Young's modulus across the fibres", young[1])?;
     positive("the shear modulus", shear)?;
     let bound = (young[0] / young[1]).sqrt();
-    if !(poisson_12.abs() < bound) {
+    let gives_energy = poisson_12.is_nan() || poisson_12.abs() >= bound;
+    if gives_energy {
         return Err(ElasticError::PoissonOrthotropic { value: poisson_12, bound });
     }
     if !angle.is_finite() {
@@ -156,7 +157,7 @@ fn orthotropic(young: [f64; 2], poisson_12: f64, shear: f64, angle: f64) -> Resu
     Ok(turned(&Matrix3::new(along, cross, 0.0, cross, across, 0.0, 0.0, 0.0, shear), angle))
 }
 
-/// The stiffness of a material turned by `angle` [rad] against the axes.
+/// The stiffness of a material turned by `angle` \[rad\] against the axes.
 pub fn turned(stiffness: &Voigt, angle: f64) -> Voigt {
     let (s, c) = angle.sin_cos();
     // Strain in the axes of the material from strain in the axes of the plane.

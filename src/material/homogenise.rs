@@ -28,11 +28,11 @@ use crate::flock::lattice::{Lattice, Site};
 /// A neighbour of an interior particle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bond {
-    /// From the particle to the neighbour [length].
+    /// From the particle to the neighbour \[length\].
     pub vector: [f64; 2],
     /// Sublattice of the neighbour.
     pub to: usize,
-    /// `K_ij` [force / length], or `w_ij` times the identity \[1\] for a scalar rule.
+    /// `K_ij` \[force / length\], or `w_ij` times the identity \[1\] for a scalar rule.
     pub block: Block,
 }
 
@@ -41,7 +41,7 @@ pub struct Bond {
 pub struct Crystal {
     /// Bonds of one particle of each sublattice, shape \[sublattices\]\[neighbours\].
     pub bonds: Vec<Vec<Bond>>,
-    /// Translations of the lattice [length].
+    /// Translations of the lattice \[length\].
     pub primitive: [[f64; 2]; 2],
 }
 
@@ -56,6 +56,10 @@ pub enum HomogeniseError {
     #[error("the particles of a lattice cell do not hold each other: their difference costs nothing")]
     Loose,
     #[error(
+        "the weights of a particle of sublattice {sublattice} do not sum to a positive definite matrix, so it has no target"
+    )]
+    Singular { sublattice: usize },
+    #[error(
         "{given} lists of weights were given for {needed} sublattices, or lists of other lengths than the neighbours'"
     )]
     Weights { given: usize, needed: usize },
@@ -66,9 +70,9 @@ pub enum HomogeniseError {
 /// The continuum that weights are for long waves. For a scalar rule every stiffness is up to a scale.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Effective {
-    /// Stiffness, Voigt order (xx, yy, xy) [force / length], shape \[3, 3\].
+    /// Stiffness, Voigt order (xx, yy, xy) \[force / length\], shape \[3, 3\].
     pub stiffness: Voigt,
-    /// Lame's constants of the nearest isotropic stiffness [force / length], two-dimensional: the
+    /// Lame's constants of the nearest isotropic stiffness \[force / length\], two-dimensional: the
     /// stiffness of an equal stretch is `lambda + mu`.
     pub lambda: f64,
     pub mu: f64,
@@ -76,11 +80,11 @@ pub struct Effective {
     pub anisotropy: f64,
     /// How far the acoustic tensor is from that of any symmetric stress, relative \[1\].
     pub misfit: f64,
-    /// Gradient lengths squared, with their sign [length^2]: see [`GradientLength`].
+    /// Gradient lengths squared, with their sign \[length^2\]: see [`GradientLength`].
     pub gradient: GradientLength,
 }
 
-/// Gradient length squared `l^2` [length^2]: positive stiffens short waves.
+/// Gradient length squared `l^2` \[length^2\]: positive stiffens short waves.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GradientLength {
     /// Of waves along x that move along x, and across it.
@@ -104,13 +108,13 @@ impl Effective {
         (bulk > 1e-12 * self.mu.abs()).then(|| self.lambda / (2.0 * bulk))
     }
 
-    /// Young's modulus times thickness in plane stress [force / length], up to scale for a scalar rule;
+    /// Young's modulus times thickness in plane stress \[force / length\], up to scale for a scalar rule;
     /// zero for Eq. 1.
     pub fn young_plane_stress(&self) -> f64 {
         4.0 * self.mu * (self.lambda + self.mu) / (self.lambda + 2.0 * self.mu)
     }
 
-    /// Young's modulus times thickness in plane strain [force / length], up to scale for a scalar rule.
+    /// Young's modulus times thickness in plane strain \[force / length\], up to scale for a scalar rule.
     pub fn young_plane_strain(&self) -> Option<f64> {
         self.poisson_plane_strain().map(|poisson| 2.0 * self.mu * (1.0 + poisson))
     }
@@ -173,7 +177,7 @@ impl Crystal {
         Ok(Self { bonds: bonds.collect(), primitive: primitive(lattice) })
     }
 
-    /// `D = sum_j K_j` of a sublattice [force / length].
+    /// `D = sum_j K_j` of a sublattice \[force / length\].
     pub fn diagonal(&self, sublattice: usize) -> Block {
         let mut sum = [[0.0; 2]; 2];
         for bond in &self.bonds[sublattice] {
@@ -224,7 +228,7 @@ impl Crystal {
         Ok(())
     }
 
-    /// Area of a lattice cell [length^2].
+    /// Area of a lattice cell \[length^2\].
     fn cell_area(&self) -> f64 {
         let [[ax, ay], [bx, by]] = self.primitive;
         (ax * by - ay * bx).abs()
@@ -327,7 +331,8 @@ fn condensed(series: &[DMatrix<Complex<f64>>]) -> Result<[DMatrix<Complex<f64>>;
     let (mean, to_mean, from_mean, difference) = (part(0, 0), part(0, 2), part(2, 0), part(2, 2));
     let scale = difference[0].norm();
     let inverse = difference[0].clone().try_inverse().ok_or(HomogeniseError::Loose)?;
-    if !(inverse.norm() * scale < 1e12) {
+    let condition = inverse.norm() * scale;
+    if condition.is_nan() || condition > 1e12 {
         return Err(HomogeniseError::Loose);
     }
     // The difference that answers the mean: solve `difference * answer = from_mean` order by order.

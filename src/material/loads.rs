@@ -10,7 +10,7 @@ use crate::flock::points::Points;
 pub struct Traction {
     /// Particles at the ends of the side, either way round.
     pub side: [u32; 2],
-    /// At either end [force / length]: stress times the thickness of the sheet.
+    /// At either end \[force / length\]: stress times the thickness of the sheet.
     pub at_ends: [[f64; 2]; 2],
 }
 
@@ -18,9 +18,9 @@ pub struct Traction {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Loads {
     pub tractions: Vec<Traction>,
-    /// Forces on particles [force]; several on one particle add up.
+    /// Forces on particles \[force\]; several on one particle add up.
     pub forces: Vec<(u32, [f64; 2])>,
-    /// On every cell alike [force / length^2]: weight per volume times the thickness of the sheet.
+    /// On every cell alike \[force / length^2\]: weight per volume times the thickness of the sheet.
     pub body: [f64; 2],
 }
 
@@ -39,14 +39,14 @@ pub enum LoadError {
 }
 
 impl Traction {
-    /// The same traction all along the side [force / length].
+    /// The same traction all along the side \[force / length\].
     pub fn uniform(side: [u32; 2], traction: [f64; 2]) -> Self {
         Self { side, at_ends: [traction; 2] }
     }
 }
 
 impl Loads {
-    /// The force on each particle [force], shape \[count\].
+    /// The force on each particle \[force\], shape \[count\].
     pub fn on_particles(&self, cells: &Cells, reference: &Points) -> Result<Points, LoadError> {
         let incidence = cells.incidence(reference.len());
         let mut forces = Points::zeros(reference.len());

@@ -77,10 +77,10 @@ pub fn require_held(
     let groups = linkage.groups();
     let mut leaders = vec![0usize; linkage.parts];
     let mut first = vec![usize::MAX; linkage.parts];
-    for i in 0..reference.len() {
+    for (i, &held) in held.iter().enumerate() {
         let Some(&cell) = incidence.of(i).first() else { continue };
         let group = groups[linkage.part[cell as usize]];
-        leaders[group] += usize::from(held[i]);
+        leaders[group] += usize::from(held);
         first[group] = first[group].min(i);
     }
     let weak = (0..linkage.parts).filter(|&group| first[group] != usize::MAX);

@@ -33,7 +33,7 @@
 //!
 //! Displacements are small: a rotation of the whole body by a finite angle strains it here. The
 //! shapes of arrays follow the particles of the body they belong to; a stiffness is that of the whole
-//! thickness of the sheet [force / length].
+//! thickness of the sheet \[force / length\].
 //!
 //! ```
 //! use flockform::flock::{body::{Body, Cut}, lattice::{Lattice, LatticeKind}};

@@ -26,8 +26,8 @@ pub enum ShapeError {
     Folded { corner: usize },
 }
 
-/// Stiffness of a cell [force / length], shape \[2 corners, 2 corners\], symmetric to the bit: a
-/// triangle, a quadrilateral or a virtual element by the number of corners. `corners` [length] run
+/// Stiffness of a cell \[force / length\], shape \[2 corners, 2 corners\], symmetric to the bit: a
+/// triangle, a quadrilateral or a virtual element by the number of corners. `corners` \[length\] run
 /// counter-clockwise.
 pub fn element(corners: &[[f64; 2]], stiffness: &Voigt) -> Result<DMatrix<f64>, ShapeError> {
     match corners.len() {
@@ -79,12 +79,12 @@ pub fn polygon(corners: &[[f64; 2]], stiffness: &Voigt) -> Result<DMatrix<f64>, 
     Ok(symmetric(consistent(&corners, stiffness) + rest.transpose() * rest * alpha))
 }
 
-/// Area of a polygon [length^2], positive if its corners run counter-clockwise.
+/// Area of a polygon \[length^2\], positive if its corners run counter-clockwise.
 pub fn area(corners: &[[f64; 2]]) -> f64 {
     (1..corners.len() - 1).map(|k| 0.5 * cross(corners[0], corners[k], corners[k + 1])).sum()
 }
 
-/// The part of a load per area that falls to each corner [length^2], shape \[corners\]: the integral of
+/// The part of a load per area that falls to each corner \[length^2\], shape \[corners\]: the integral of
 /// the corner's shape function, on a virtual element of its affine projection. The parts add up to
 /// the area, and their centre is the cell's.
 pub fn load_shares(corners: &[[f64; 2]]) -> Vec<f64> {
@@ -103,7 +103,7 @@ pub fn load_shares(corners: &[[f64; 2]]) -> Vec<f64> {
 }
 
 /// Mean strain (xx, yy, engineering xy) \[1\] of a cell whose corner `k` moves by `displacement(k)`
-/// [length].
+/// \[length\].
 pub fn mean_strain(corners: &[[f64; 2]], displacement: impl Fn(usize) -> [f64; 2]) -> [f64; 3] {
     // Relative to the first corner: a translation must not cost digits.
     let first = displacement(0);
@@ -141,7 +141,7 @@ fn mean(corners: &[[f64; 2]]) -> [f64; 2] {
     [0, 1].map(|k| corners.iter().map(|p| p[k]).sum::<f64>() / corners.len() as f64)
 }
 
-/// Mean over the cell of the gradient of each corner's shape function [1/length]: by the divergence
+/// Mean over the cell of the gradient of each corner's shape function \[1/length\]: by the divergence
 /// theorem an integral over the sides, on which every element here is linear.
 fn mean_gradients(corners: &[[f64; 2]]) -> Vec<[f64; 2]> {
     let (m, twice) = (corners.len(), 2.0 * area(corners));
@@ -243,7 +243,7 @@ fn centroid(corners: &[[f64; 2]]) -> [f64; 2] {
     [o[0] + sum[0] / area, o[1] + sum[1] / area]
 }
 
-/// Integral of `(x - centroid) (x - centroid)'` over the polygon [length^4].
+/// Integral of `(x - centroid) (x - centroid)'` over the polygon \[length^4\].
 fn second_moments(corners: &[[f64; 2]]) -> Matrix2<f64> {
     let centre = centroid(corners);
     let from_centre = |k: usize| {

@@ -12,18 +12,24 @@ use crate::flock::body::Body;
 use crate::flock::neighbourhood::Neighbours;
 use crate::flock::points::Points;
 
+/// Particles whose rows one thread puts together at a time.
+const CHUNK: usize = 4096;
+
+/// First particle of a chunk, then its blocks, `D_i` and `D_i^-1`.
+type Chunk<'a> = (usize, &'a mut [Block], &'a mut [Block], &'a mut [Block]);
+
 /// The material as seen by each particle. All arrays follow the particles or the bonds of
 /// `neighbours`; particles of a frame have neither cells nor weights.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MaterialWeights {
     /// Who sees whom, in the order in which it was asked for: the order of summation.
     pub neighbours: Neighbours,
-    /// `K_ij` [force / length], parallel to the neighbours' index list, shape \[bonds\]. Zero between
+    /// `K_ij` \[force / length\], parallel to the neighbours' index list, shape \[bonds\]. Zero between
     /// neighbours that share no cell. `K_ji` is the transpose of `K_ij`, to the bit.
     pub blocks: Vec<Block>,
-    /// `D_i = sum_j K_ij` [force / length], shape \[count\].
+    /// `D_i = sum_j K_ij` \[force / length\], shape \[count\].
     pub diagonal: Vec<Block>,
-    /// `D_i^-1` [length / force], shape \[count\].
+    /// `D_i^-1` \[length / force\], shape \[count\].
     pub inverse: Vec<Block>,
 }
 
@@ -92,20 +98,35 @@ impl MaterialWeights {
         check_factor(cells, factor)?;
         let elements = elements(cells, elastic)?;
         let count = neighbours.count();
+        let mut weights = Self {
+            blocks: vec![Block::default(); neighbours.index.len()],
+            diagonal: vec![Block::default(); count],
+            inverse: vec![Block::default(); count],
+            neighbours,
+        };
+        let mut rest = weights.blocks.as_mut_slice();
+        let mut chunks = Vec::new();
+        let (diagonal, inverse) = (weights.diagonal.chunks_mut(CHUNK), weights.inverse.chunks_mut(CHUNK));
+        for (chunk, (diagonal, inverse)) in diagonal.zip(inverse).enumerate() {
+            let (first, starts) = (chunk * CHUNK, &weights.neighbours.starts);
+            let bonds = starts[first + diagonal.len()] - starts[first];
+            let (blocks, after) = rest.split_at_mut(bonds as usize);
+            rest = after;
+            chunks.push((first, blocks, diagonal, inverse));
+        }
         // Every row is summed over its own cells in their order: the same bits on any number of threads.
-        let rows = (0..count)
-            .into_par_iter()
-            .map(|i| row(i, cells, incidence, &neighbours, &elements, factor))
-            .collect::<Result<Vec<_>, _>>()?;
-        let blocks: Vec<Block> = rows.into_iter().flatten().collect();
-        let mut weights = Self { neighbours, blocks, diagonal: Vec::new(), inverse: Vec::new() };
-        weights.diagonal = (0..count).map(|i| weights.sum_of_blocks(i)).collect();
-        weights.inverse = (0..count)
-            .map(|i| match inverse(&weights.diagonal[i]) {
-                None if !incidence.of(i).is_empty() => Err(WeightsError::Singular { particle: i + 1 }),
-                inverse => Ok(inverse.unwrap_or_default()),
-            })
-            .collect::<Result<_, _>>()?;
+        let assembly = Assembly { cells, incidence, neighbours: &weights.neighbours, elements, factor };
+        let fill = |(first, mut blocks, diagonal, inverse): Chunk<'_>| {
+            for (k, (diagonal, inverse)) in diagonal.iter_mut().zip(inverse).enumerate() {
+                let (row, after) = blocks.split_at_mut(assembly.neighbours.of(first + k).len());
+                blocks = after;
+                (*diagonal, *inverse) = assembly.row(first + k, row)?;
+            }
+            Ok(())
+        };
+        // Collected before looking: the first error in the order of particles, not the first to be found.
+        let outcomes: Vec<Result<(), WeightsError>> = chunks.into_par_iter().map(fill).collect();
+        outcomes.into_iter().collect::<Result<(), _>>()?;
         Ok(weights)
     }
 
@@ -124,8 +145,8 @@ impl MaterialWeights {
         (0..self.count()).flat_map(of_particle).collect()
     }
 
-    /// What is added to the matrix-weighted mean of the neighbours' positions [length], shape \[count\]:
-    /// `X_i - sum_j W_ij X_j`, and `D_i^-1 f_i` where there are `forces` [force], shape \[count\].
+    /// What is added to the matrix-weighted mean of the neighbours' positions \[length\], shape \[count\]:
+    /// `X_i - sum_j W_ij X_j`, and `D_i^-1 f_i` where there are `forces` \[force\], shape \[count\].
     pub fn rest_offsets(&self, reference: &Points, forces: Option<&Points>) -> Points {
         let offset = |i: usize| {
             let here = reference.get(i);
@@ -140,14 +161,14 @@ impl MaterialWeights {
         (0..self.count()).map(offset).collect()
     }
 
-    /// `D_i^-1 f_i` [length], shape \[count\]: how far a load alone moves a particle whose neighbours
+    /// `D_i^-1 f_i` \[length\], shape \[count\]: how far a load alone moves a particle whose neighbours
     /// stay. Added to a rest offset computed elsewhere.
     pub fn load_offsets(&self, forces: &Points) -> Points {
         (0..self.count()).map(|i| apply(&self.inverse[i], forces.get(i))).collect()
     }
 
-    /// Force of the neighbours on a particle, `sum_j K_ij (u_j - u_i)` [force], under displacements
-    /// [length]: zero to the last bit if all move alike.
+    /// Force of the neighbours on a particle, `sum_j K_ij (u_j - u_i)` \[force\], under displacements
+    /// \[length\]: zero to the last bit if all move alike.
     pub fn force(&self, particle: usize, displacement: &Points) -> [f64; 2] {
         let here = displacement.get(particle);
         let bonds = self.neighbours.bonds(particle);
@@ -158,17 +179,13 @@ impl MaterialWeights {
         })
     }
 
-    /// Strain energy [force length] under displacements [length].
+    /// Strain energy \[force length\] under displacements \[length\].
     pub fn energy(&self, displacement: &Points) -> f64 {
         let work = |i: usize| {
             let ([fx, fy], [x, y]) = (self.force(i, displacement), displacement.get(i));
             fx * x + fy * y
         };
         -0.5 * (0..self.count()).map(work).sum::<f64>()
-    }
-
-    fn sum_of_blocks(&self, particle: usize) -> Block {
-        self.neighbours.bonds(particle).fold([[0.0; 2]; 2], |sum, bond| plus(&sum, &self.blocks[bond]))
     }
 }
 
@@ -191,38 +208,49 @@ fn elements(cells: &Cells, elastic: &Elastic) -> Result<Vec<DMatrix<f64>>, Weigh
             WeightsError::Shape { cell, reason }
         })
     };
-    (0..cells.shapes.len()).into_par_iter().map(of_kind).collect()
+    let outcomes: Vec<_> = (0..cells.shapes.len()).into_par_iter().map(of_kind).collect();
+    outcomes.into_iter().collect()
 }
 
-/// The blocks `K_ij` of one particle, in the order of its neighbours.
-fn row(
-    particle: usize,
-    cells: &Cells,
-    incidence: &Incidence,
-    neighbours: &Neighbours,
-    elements: &[DMatrix<f64>],
-    factor: Option<&[f64]>,
-) -> Result<Vec<Block>, WeightsError> {
-    let seen = neighbours.of(particle);
-    let mut blocks = vec![[[0.0; 2]; 2]; seen.len()];
-    for &cell in incidence.of(particle) {
-        let (corners, k) = (cells.of(cell as usize), &elements[cells.kind[cell as usize] as usize]);
-        let factor = factor.map_or(1.0, |factor| factor[cell as usize]);
-        let own = corners.iter().position(|&corner| corner as usize == particle).unwrap_or_default();
-        for (other, &corner) in corners.iter().enumerate().filter(|&(other, _)| other != own) {
-            let Some(slot) = seen.iter().position(|&j| j == corner) else {
-                return Err(WeightsError::MissingNeighbour {
-                    particle: particle + 1,
-                    missing: corner as usize + 1,
-                    neighbours: seen.len(),
-                    corners: cells.corners,
-                });
-            };
-            let entry = |a: usize, b: usize| -factor * k[(2 * own + a, 2 * other + b)];
-            blocks[slot] = plus(&blocks[slot], &[[entry(0, 0), entry(0, 1)], [entry(1, 0), entry(1, 1)]]);
+/// What the rows are put together from.
+struct Assembly<'a> {
+    cells: &'a Cells,
+    incidence: &'a Incidence,
+    neighbours: &'a Neighbours,
+    elements: Vec<DMatrix<f64>>,
+    factor: Option<&'a [f64]>,
+}
+
+impl Assembly<'_> {
+    /// Adds the blocks `K_ij` of one particle to `blocks`, in the order of its neighbours; returns `D_i`
+    /// and its inverse.
+    fn row(&self, particle: usize, blocks: &mut [Block]) -> Result<(Block, Block), WeightsError> {
+        let (cells, seen) = (self.cells, self.neighbours.of(particle));
+        let around = self.incidence.of(particle);
+        for cell in around.iter().map(|&cell| cell as usize) {
+            let (corners, k) = (cells.of(cell), &self.elements[cells.kind[cell] as usize]);
+            let factor = self.factor.map_or(1.0, |factor| factor[cell]);
+            let own = corners.iter().position(|&corner| corner as usize == particle).unwrap_or_default();
+            for (other, &corner) in corners.iter().enumerate().filter(|&(other, _)| other != own) {
+                let Some(slot) = seen.iter().position(|&j| j == corner) else {
+                    return Err(WeightsError::MissingNeighbour {
+                        particle: particle + 1,
+                        missing: corner as usize + 1,
+                        neighbours: seen.len(),
+                        corners: cells.corners,
+                    });
+                };
+                let entry = |a: usize, b: usize| -factor * k[(2 * own + a, 2 * other + b)];
+                blocks[slot] = plus(&blocks[slot], &[[entry(0, 0), entry(0, 1)], [entry(1, 0), entry(1, 1)]]);
+            }
+        }
+        let diagonal = blocks.iter().fold(Block::default(), |sum, block| plus(&sum, block));
+        match inverse(&diagonal) {
+            Some(inverse) => Ok((diagonal, inverse)),
+            None if around.is_empty() => Ok((diagonal, Block::default())),
+            None => Err(WeightsError::Singular { particle: particle + 1 }),
         }
     }
-    Ok(blocks)
 }
 
 fn plus(a: &Block, b: &Block) -> Block {
@@ -241,6 +269,6 @@ pub(crate) fn inverse(block: &Block) -> Option<Block> {
     let scale = a.abs().max(d.abs());
     let [a, b, c, d] = [a, b, c, d].map(|entry| entry / scale);
     let determinant = a * d - b * c;
-    let regular = determinant > 1e-14;
+    let regular = a > 0.0 && determinant > 1e-14;
     regular.then(|| [[d, -b], [-c, a]].map(|row| row.map(|entry| entry / determinant / scale)))
 }

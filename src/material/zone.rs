@@ -15,14 +15,15 @@ use super::weights::{inverse, product};
 pub struct Zone {
     /// Whether every wave but a translation costs energy.
     pub stable: bool,
-    /// Least cost of a wave, as a share of the greatest \[1\], cost being the smallest eigenvalue of the
-    /// symbol over that of a lattice of equal springs along the translations; not above zero if unstable.
+    /// Least cost of a wave \[1\]: the smallest eigenvalue of the symbol over `4 - 2 cos p - 2 cos q`, `p` and
+    /// `q` its phases along the two translations, and over the mean diagonal entry of `D`; not above zero
+    /// if unstable.
     pub least: f64,
-    /// The wave of that cost [1/length].
+    /// The wave of that cost \[1/length\].
     pub worst: [f64; 2],
     /// Largest eigenvalue of `D^-1 S(k)` \[1\].
     pub largest: f64,
-    /// The wave that has it [1/length].
+    /// The wave that has it \[1/length\].
     pub largest_at: [f64; 2],
     /// A synchronous update must be damped below this: 2 over the largest eigenvalue \[1\].
     pub damping_limit: f64,
@@ -31,20 +32,20 @@ pub struct Zone {
 /// Samples each way: a multiple of 6, so that the corners of square and hexagonal zones are among them.
 const SAMPLES: i32 = 48;
 
-/// Below this share of the greatest cost a wave counts as free: it is rounding.
+/// Below this a wave counts as free: it is rounding.
 const FREE: f64 = 1e-10;
 
 impl Crystal {
     /// Samples the Brillouin zone and refines the extremes found; refuses a rule that is not symmetric,
-    /// and one whose `D` is singular.
+    /// and one whose `D` is not positive definite.
     pub fn zone(&self) -> Result<Zone, HomogeniseError> {
         self.require_symmetric()?;
         let inverses: Vec<_> = (0..self.bonds.len())
-            .map(|s| inverse(&self.diagonal(s)).ok_or(HomogeniseError::Loose))
+            .map(|s| inverse(&self.diagonal(s)).ok_or(HomogeniseError::Singular { sublattice: s }))
             .collect::<Result<_, _>>()?;
         let roots: Vec<_> = inverses.iter().map(cholesky).collect();
         let growth = |phase: [f64; 2]| self.growth(phase, &roots);
-        let (mut lowest, mut highest, mut top) = ((f64::INFINITY, [0.0; 2]), 0f64, (0f64, [0.0; 2]));
+        let (mut lowest, mut top) = ((f64::INFINITY, [0.0; 2]), (0f64, [0.0; 2]));
         // S(-k) is the conjugate of S(k): half the zone is enough.
         for i in 0..=SAMPLES / 2 {
             for j in -SAMPLES / 2..=SAMPLES / 2 {
@@ -52,20 +53,20 @@ impl Crystal {
                     continue;
                 }
                 let phase = [i, j].map(|n| std::f64::consts::TAU * f64::from(n) / f64::from(SAMPLES));
-                let (here, most) = self.cost(phase);
-                highest = highest.max(most);
-                if here < lowest.0 {
-                    lowest = (here, phase);
+                let (cost, factor) = (self.cost(phase), growth(phase));
+                if cost < lowest.0 {
+                    lowest = (cost, phase);
                 }
-                let factor = growth(phase);
                 if factor > top.0 {
                     top = (factor, phase);
                 }
             }
         }
-        let lowest = climb(lowest, |phase| -self.cost(phase).0, -1.0);
+        let lowest = climb(lowest, |phase| -self.cost(phase), -1.0);
         let top = climb(top, growth, 1.0);
-        let least = lowest.0 / highest;
+        let diagonals = (0..self.bonds.len()).map(|s| self.diagonal(s));
+        let least =
+            lowest.0 * 2.0 * self.bonds.len() as f64 / diagonals.map(|d| d[0][0] + d[1][1]).sum::<f64>();
         Ok(Zone {
             stable: least > FREE,
             least,
@@ -82,7 +83,7 @@ impl Crystal {
             .map(|inverse| product(&inverse, &self.bonds[sublattice][bond].block))
     }
 
-    /// The wave vector [1/length] whose phases along the two translations [rad] are these.
+    /// The wave vector \[1/length\] whose phases along the two translations \[rad\] are these.
     fn wave(&self, [p, q]: [f64; 2]) -> [f64; 2] {
         let [[ax, ay], [bx, by]] = self.primitive;
         let area = ax * by - ay * bx;
@@ -106,11 +107,10 @@ impl Crystal {
         (symbol + adjoint) * Complex::from(0.5)
     }
 
-    /// Least and greatest eigenvalue of the symbol over `4 - 2 cos p - 2 cos q`.
-    fn cost(&self, phase: [f64; 2]) -> (f64, f64) {
+    /// Least eigenvalue of the symbol over `4 - 2 cos p - 2 cos q` \[force / length\].
+    fn cost(&self, phase: [f64; 2]) -> f64 {
         let springs: f64 = phase.iter().map(|p| 4.0 * (0.5 * p).sin().powi(2)).sum();
-        let values = self.symbol(self.wave(phase)).symmetric_eigenvalues();
-        (values.min() / springs, values.max() / springs)
+        self.symbol(self.wave(phase)).symmetric_eigenvalues().min() / springs
     }
 
     /// Largest eigenvalue of `D^-1 S(k)`: that of the Hermitian `L' S L` with `D^-1 = L L'`.
