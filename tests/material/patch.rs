@@ -171,3 +171,37 @@ fn weights_are_the_same_at_any_spacing() {
         }
     }
 }
+
+#[test]
+fn the_equilibrium_under_loads_is_the_fixed_point_of_the_rule_and_stores_half_their_work() {
+    for kind in KINDS {
+        let (body, neighbours, cells) = sample(kind, 0.3);
+        let weights = MaterialWeights::assemble(&cells, &body, neighbours, &fibres()).expect("assembles");
+        // Loads everywhere, free edges included; three particles held.
+        let forces: Points =
+            (0..body.count()).map(|i| [(1.3 * i as f64).sin(), (0.7 * i as f64).cos()]).collect();
+        let leads: Vec<bool> = (0..body.count()).map(|i| i % 20 == 0).collect();
+        let held = Points::zeros(body.count());
+        let found = equilibrium(&weights, &leads, &forces, &held);
+        let (w, rest) = (weights.weights(), weights.rest_offsets(&body.reference, Some(&forces)));
+        let at = |i: usize| [body.reference.x[i] + found.x[i], body.reference.y[i] + found.y[i]];
+        let size = found.x.iter().chain(&found.y).fold(1.0, |m: f64, u| m.max(u.abs()));
+        let mut work = 0.0;
+        for i in (0..body.count()).filter(|&i| !leads[i]) {
+            let target = weights.neighbours.bonds(i).fold(rest.get(i), |sum, bond| {
+                let p = at(weights.neighbours.index[bond] as usize);
+                [0, 1].map(|a| sum[a] + w[bond][a][0] * p[0] + w[bond][a][1] * p[1])
+            });
+            let error = (target[0] - at(i)[0]).hypot(target[1] - at(i)[1]);
+            assert!(error < 1e-12 * size, "{kind:?} particle {i}: {error}");
+            work += forces.x[i] * found.x[i] + forces.y[i] * found.y[i];
+        }
+        assert!((weights.energy(&found) - 0.5 * work).abs() < 1e-11 * work, "{kind:?}");
+        // The load alone is the difference between rest offsets with and without it.
+        let (bare, load) = (weights.rest_offsets(&body.reference, None), weights.load_offsets(&forces));
+        for i in 0..body.count() {
+            let (a, b, c) = (rest.get(i), bare.get(i), load.get(i));
+            assert!((0..2).all(|k| (a[k] - b[k] - c[k]).abs() < 1e-12 * size), "{kind:?} particle {i}");
+        }
+    }
+}
