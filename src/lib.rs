@@ -10,6 +10,7 @@
 //! * [`flock`]: the core. Lattices, bodies, neighbourhoods, rules, frames, fracture. Pure, and it
 //!   imports no other room.
 //! * [`solve`]: sweeps over the flock's interaction, and their spectra.
+//! * [`material`]: rule weights from Young's modulus and Poisson's ratio, and what material a rule is.
 //! * [`continuum`]: plans a scene, steps it, and hands what happens to an observer.
 //! * `export` (feature `export`): CSV, JSON, VTK and figures, one file per format.
 //! * `fem` (feature `fem`): finite elements, the truth to hold the rules against; it knows no flock.
@@ -28,6 +29,7 @@
 
 pub mod continuum;
 pub mod flock;
+pub mod material;
 pub mod scene;
 pub mod solve;
 

@@ -65,6 +65,11 @@ fn the_finite_elements_know_no_other_room() {
 }
 
 #[test]
+fn material_imports_the_flock_alone() {
+    assert_imports_only("material", &["flock"]);
+}
+
+#[test]
 fn scene_knows_nothing_of_hosts_and_outputs() {
     assert_imports_only("scene", &["flock", "solve"]);
 }

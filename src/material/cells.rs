@@ -1,0 +1,331 @@
+//! The cells between the particles of a body: what the material fills.
+//!
+//! A square or rectangular lattice has rectangles, a hexagonal, centred rectangular or oblique one the
+//! two triangles of its Delaunay tessellation, the honeycomb its hexagons. A cell exists where all its
+//! corners are particles of the body; the frame, which stands for the world outside, has no cells.
+
+use std::sync::Arc;
+
+use crate::flock::body::Body;
+use crate::flock::lattice::{Lattice, LatticeKind, Site};
+use crate::flock::neighbourhood::{Neighbourhood, Neighbours};
+use crate::flock::points::Points;
+
+use super::stiffness::mean_strain;
+
+/// Cells of one kind of polygon, in compressed form. Corners run counter-clockwise.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Cells {
+    /// Corners of every cell: 3, 4 or 6 on lattices.
+    pub corners: usize,
+    /// Particles at the corners, shape \[count, corners\].
+    pub index: Vec<u32>,
+    /// Which of `shapes` each cell has, shape \[count\].
+    pub kind: Vec<u32>,
+    /// Corners relative to the first \[length\], shape \[kinds, corners\]. A lattice has one or two; they come
+    /// from the lattice's vectors, not from differences of positions, so a body far from the origin
+    /// loses no digits.
+    pub shapes: Vec<Vec<[f64; 2]>>,
+}
+
+/// A corner of cells at a particle: which cells, and the particle's place among their corners.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Incidence {
+    starts: Vec<u32>,
+    cell: Vec<u32>,
+}
+
+impl Incidence {
+    /// Cells that have the particle as a corner, ascending.
+    pub fn of(&self, particle: usize) -> &[u32] {
+        &self.cell[self.starts[particle] as usize..self.starts[particle + 1] as usize]
+    }
+}
+
+impl Cells {
+    /// All cells whose corners are particles of the body and not of its frame, in the order of their
+    /// first corner's particle.
+    pub fn of_body(body: &Body) -> Self {
+        // Particles are numbered in the lexicographic order of their sites.
+        let lookup = |site: Site| {
+            body.sites.binary_search(&site).ok().filter(|&i| !body.is_frame[i]).map(|i| i as u32)
+        };
+        Self::of_sites(&body.lattice, &body.sites, lookup)
+    }
+
+    /// All cells whose corners `lookup` knows, in the order of `sites`.
+    pub fn of_sites(lattice: &Lattice, sites: &[Site], lookup: impl Fn(Site) -> Option<u32>) -> Self {
+        let templates = templates(lattice);
+        let corners = templates[0].len();
+        let mut cells = Self {
+            corners,
+            index: Vec::new(),
+            kind: Vec::new(),
+            shapes: templates
+                .iter()
+                .map(|t| t.iter().map(|&corner| lattice.vector(corner)).collect())
+                .collect(),
+        };
+        let mut found = Vec::with_capacity(corners);
+        for &[i, j] in sites.iter().filter(|&&site| lattice.sublattice(site) == 0) {
+            for (kind, template) in templates.iter().enumerate() {
+                found.clear();
+                found.extend(template.iter().map_while(|corner| lookup([i + corner[0], j + corner[1]])));
+                if found.len() == corners {
+                    cells.index.extend(&found);
+                    cells.kind.push(kind as u32);
+                }
+            }
+        }
+        cells
+    }
+
+    /// The same cells with their corners at these points \[length\], each with a shape of its own.
+    pub fn on_points(&self, points: &Points) -> Self {
+        let shapes = self
+            .iter()
+            .map(|cell| {
+                let [x0, y0] = points.get(cell[0] as usize);
+                let relative = |&i: &u32| [points.x[i as usize] - x0, points.y[i as usize] - y0];
+                cell.iter().map(relative).collect()
+            })
+            .collect();
+        Self { kind: (0..self.count() as u32).collect(), shapes, ..self.clone() }
+    }
+
+    pub fn count(&self) -> usize {
+        self.kind.len()
+    }
+
+    /// Particles at the corners of a cell, counter-clockwise, shape \[corners\].
+    pub fn of(&self, cell: usize) -> &[u32] {
+        &self.index[cell * self.corners..(cell + 1) * self.corners]
+    }
+
+    pub fn iter(&self) -> impl Iterator<Item = &[u32]> {
+        self.index.chunks_exact(self.corners)
+    }
+
+    /// Corners of a cell relative to the first \[length\], shape \[corners\].
+    pub fn shape(&self, cell: usize) -> &[[f64; 2]] {
+        &self.shapes[self.kind[cell] as usize]
+    }
+
+    /// Which cells each of `particles` particles is a corner of.
+    pub fn incidence(&self, particles: usize) -> Incidence {
+        let mut starts = vec![0u32; particles + 1];
+        for &i in &self.index {
+            starts[i as usize + 1] += 1;
+        }
+        for i in 0..particles {
+            starts[i + 1] += starts[i];
+        }
+        let mut next = starts.clone();
+        let mut cell = vec![0; self.index.len()];
+        for (place, &i) in self.index.iter().enumerate() {
+            cell[next[i as usize] as usize] = (place / self.corners) as u32;
+            next[i as usize] += 1;
+        }
+        Incidence { starts, cell }
+    }
+
+    /// For each of `particles` particles those it shares a cell with, in order of index: the fewest
+    /// neighbours that carry the material.
+    pub fn mates(&self, particles: usize) -> Neighbours {
+        let incidence = self.incidence(particles);
+        Neighbours::from_lists((0..particles).map(|i| {
+            let cells = incidence.of(i).iter();
+            let mut mates: Vec<u32> = cells.flat_map(|&c| self.of(c as usize)).copied().collect();
+            mates.sort_unstable();
+            mates.dedup();
+            mates.retain(|&mate| mate as usize != i);
+            mates
+        }))
+    }
+
+    /// The cell on the other side of the side that runs from `a` to `b` in the cell at hand.
+    pub fn across(&self, incidence: &Incidence, [a, b]: [u32; 2]) -> Option<usize> {
+        let sees = |&&cell: &&u32| self.sides(cell as usize).any(|side| side == [b, a]);
+        incidence.of(a as usize).iter().find(sees).map(|&cell| cell as usize)
+    }
+
+    /// Sides of a cell, counter-clockwise.
+    pub fn sides(&self, cell: usize) -> impl Iterator<Item = [u32; 2]> {
+        let corners = self.of(cell);
+        (0..corners.len()).map(|k| [corners[k], corners[(k + 1) % corners.len()]])
+    }
+
+    /// Sides that belong to one cell only, the body to the left of each, in the order of cells.
+    pub fn boundary_sides(&self, incidence: &Incidence) -> Vec<[u32; 2]> {
+        let sides = (0..self.count()).flat_map(|cell| self.sides(cell));
+        sides.filter(|&side| self.across(incidence, side).is_none()).collect()
+    }
+
+    /// Mean strain of each cell (xx, yy, engineering xy) \[1\] under these displacements \[length\], shape
+    /// \[count, 3\]; on a quadrilateral that is the bilinear strain at the centre.
+    pub fn strains(&self, displacement: &Points) -> Vec<[f64; 3]> {
+        let strain = |cell: usize| {
+            let at_corner = |k: usize| displacement.get(self.of(cell)[k] as usize);
+            mean_strain(self.shape(cell), at_corner)
+        };
+        (0..self.count()).map(strain).collect()
+    }
+
+    /// Centre of each cell, the mean of its corners \[length\], shape \[count\].
+    pub fn centres(&self, reference: &Points) -> Points {
+        let centre = |cell: &[u32]| {
+            let sum = cell.iter().fold([0.0; 2], |[x, y], &i| {
+                let p = reference.get(i as usize);
+                [x + p[0], y + p[1]]
+            });
+            sum.map(|s| s / cell.len() as f64)
+        };
+        self.iter().map(centre).collect()
+    }
+}
+
+/// The body without the particles that are in no cell (sites that stick out of a curved or ragged
+/// edge, a frame), renumbered in the same order, with its neighbours and its cells. A frame is gone
+/// afterwards: free edges need none.
+pub fn without_loose_sites(body: &Body, neighbours: &Neighbours) -> (Body, Neighbours, Cells) {
+    let mut cells = Cells::of_body(body);
+    let incidence = cells.incidence(body.count());
+    let keep: Vec<usize> = (0..body.count()).filter(|&i| !incidence.of(i).is_empty()).collect();
+    let mut renumbered = vec![None; body.count()];
+    keep.iter().enumerate().for_each(|(new, &old)| renumbered[old] = Some(new as u32));
+    // Corners are kept, every one of them.
+    cells.index.iter_mut().for_each(|i| *i = renumbered[*i as usize].unwrap_or_default());
+    let kept = Body {
+        lattice: body.lattice.clone(),
+        sites: keep.iter().map(|&i| body.sites[i]).collect(),
+        reference: Arc::new(keep.iter().map(|&i| body.reference.get(i)).collect()),
+        is_frame: vec![false; keep.len()],
+        frame: None,
+    };
+    let seen = |&i: &usize| neighbours.of(i).iter().filter_map(|&j| renumbered[j as usize]);
+    (kept, Neighbours::from_lists(keep.iter().map(seen)), cells)
+}
+
+/// The neighbourhood that a material needs: everybody with whom a particle shares a cell.
+pub fn neighbourhood(lattice: &Lattice) -> Neighbourhood {
+    match lattice.kind() {
+        LatticeKind::Square { .. } | LatticeKind::Rectangular { .. } => Neighbourhood::Ring { radius: 1 },
+        LatticeKind::Honeycomb { spacing } => Neighbourhood::Within { radius: 2.0 * spacing },
+        _ => Neighbourhood::First { keep: None },
+    }
+}
+
+/// The cells that belong to a site of sublattice 0: corners as offsets from that site, the site itself
+/// first, counter-clockwise in the plane. Every cell of the lattice belongs to one site.
+pub fn templates(lattice: &Lattice) -> Vec<Vec<Site>> {
+    let mut templates = match lattice.kind() {
+        LatticeKind::Square { .. } | LatticeKind::Rectangular { .. } => {
+            vec![vec![[0, 0], [1, 0], [1, 1], [0, 1]]]
+        }
+        LatticeKind::Honeycomb { .. } => {
+            // The hexagon whose centre is the missing site two columns to the left.
+            let hexagon = [[2, 0], [1, 1], [-1, 1], [-2, 0], [-1, -1], [1, -1]];
+            vec![hexagon.map(|[i, j]| [i - 2, j]).to_vec()]
+        }
+        _ => {
+            let mut around = lattice.first_neighbours(0);
+            around.sort_by(|&a, &b| angle(lattice, a).total_cmp(&angle(lattice, b)));
+            let triangle = |k: usize| vec![[0, 0], around[k], around[k + 1]];
+            vec![triangle(0), triangle(1)]
+        }
+    };
+    for template in &mut templates {
+        let [a, b] = [1, 2].map(|k| lattice.vector(template[k]));
+        if a[0] * b[1] < a[1] * b[0] {
+            template[1..].reverse();
+        }
+    }
+    templates
+}
+
+fn angle(lattice: &Lattice, offset: Site) -> f64 {
+    let [x, y] = lattice.vector(offset);
+    y.atan2(x)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flock::body::Cut;
+    use crate::material::stiffness::area;
+
+    const KINDS: [LatticeKind; 6] = [
+        LatticeKind::Square { spacing: 1.0 },
+        LatticeKind::Rectangular { a: 1.0, b: 1.5 },
+        LatticeKind::CentredRectangular { a: 1.0, b: 1.4 },
+        LatticeKind::Hexagonal { spacing: 1.0 },
+        LatticeKind::Oblique { a: 1.0, b: 1.2, angle: 1.2 },
+        LatticeKind::Honeycomb { spacing: 1.0 },
+    ];
+
+    fn body(kind: LatticeKind, orientation: f64) -> (Body, Neighbours) {
+        let lattice = Lattice::new(kind, [5.0, -3.0], orientation);
+        let neighbourhood = neighbourhood(&lattice);
+        Body::build(lattice, &Cut::Count { columns: 9, rows: 9 }, &neighbourhood, None).expect("builds")
+    }
+
+    #[test]
+    fn cells_run_counter_clockwise_and_each_particle_has_its_share_of_them() {
+        for kind in KINDS {
+            for orientation in [0.0, 2.0] {
+                let (body, _) = body(kind, orientation);
+                let cells = Cells::of_body(&body);
+                let on_points = cells.on_points(&body.reference);
+                let cell_area = area(cells.shape(0));
+                for cell in 0..cells.count() {
+                    assert!((area(on_points.shape(cell)) - cell_area).abs() < 1e-12, "{kind:?}");
+                }
+                // One lattice cell for each particle: as many cells as fill its Voronoi area.
+                let around_each = cells.corners as f64 * body.lattice.cell_area() / cell_area;
+                let incidence = cells.incidence(body.count());
+                let most = (0..body.count()).map(|i| incidence.of(i).len()).max();
+                assert_eq!(most, Some(around_each.round() as usize), "{kind:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn mates_are_the_neighbourhood_that_the_room_asks_for() {
+        for kind in KINDS {
+            let (body, neighbours) = body(kind, 0.4);
+            let mates = Cells::of_body(&body).mates(body.count());
+            let fullest = (0..body.count()).max_by_key(|&i| mates.of(i).len()).expect("particles");
+            let mut asked = neighbours.of(fullest).to_vec();
+            asked.sort_unstable();
+            assert_eq!(asked, mates.of(fullest), "{kind:?}");
+        }
+    }
+
+    #[test]
+    fn a_frame_has_no_cells() {
+        let lattice = Lattice::new(KINDS[0], [0.0; 2], 0.0);
+        let frame = crate::flock::frame::FrameRule::Lagged;
+        let cut = Cut::Count { columns: 4, rows: 3 };
+        let (body, _) =
+            Body::build(lattice, &cut, &Neighbourhood::Ring { radius: 1 }, Some(frame)).expect("builds");
+        let cells = Cells::of_body(&body);
+        assert_eq!(cells.count(), 6);
+        assert!(cells.index.iter().all(|&i| !body.is_frame[i as usize]));
+    }
+
+    #[test]
+    fn the_boundary_of_a_rectangle_runs_around_it_once() {
+        let (body, _) = body(KINDS[0], 0.0);
+        let cells = Cells::of_body(&body);
+        let sides = cells.boundary_sides(&cells.incidence(body.count()));
+        assert_eq!(sides.len(), 32);
+        let enclosed: f64 = sides
+            .iter()
+            .map(|&[a, b]| {
+                let (a, b) = (body.reference.get(a as usize), body.reference.get(b as usize));
+                0.5 * (a[0] * b[1] - a[1] * b[0])
+            })
+            .sum();
+        assert!((enclosed - 64.0).abs() < 1e-12);
+    }
+}

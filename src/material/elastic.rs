@@ -1,0 +1,239 @@
+//! Elastic constants of a sheet and the 3x3 stiffness they stand for.
+//!
+//! Voigt order (xx, yy, xy) with the engineering shear strain `gamma = u_y + v_x`. Sources: the
+//! textbook relations, e.g. O. C. Zienkiewicz and R. L. Taylor, *The Finite Element Method*, vol. 1;
+//! for the orthotropic sheet R. M. Jones, *Mechanics of Composite Materials*, ch. 2.
+
+use nalgebra::{Matrix3, Vector3};
+
+/// Strain to membrane force, Voigt order (xx, yy, xy) \[force / length\], shape \[3, 3\].
+pub type Voigt = Matrix3<f64>;
+
+/// What is assumed across the thickness.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Plane {
+    /// The faces are free: a thin sheet.
+    Stress,
+    /// The faces cannot part: a slice of a long body.
+    Strain,
+}
+
+/// Elastic constants as an engineer names them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Constants {
+    /// Young's modulus \[force / length^2\] and Poisson's ratio \[1\].
+    ///
+    /// Plane stress takes -1 < nu < 1, the range in which a two-dimensional sheet has positive
+    /// energy; a sheet cut from a three-dimensional isotropic solid has nu < 1/2. Plane strain takes
+    /// -1 < nu < 1/2: at 1/2 the material is incompressible.
+    Isotropic { young: f64, poisson: f64, plane: Plane },
+    /// Plane stress: moduli along the fibres and across them and for shear \[force / length^2\],
+    /// contraction across the fibres under tension along them \[1\], and the angle of the fibres from
+    /// x \[rad\]. Positive energy needs `poisson_12^2 < young[0] / young[1]`.
+    Orthotropic { young: [f64; 2], poisson_12: f64, shear: f64, angle: f64 },
+}
+
+/// Why constants make no stable material.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ElasticError {
+    #[error("{name} must be positive and finite, but it is {value}")]
+    NotPositive { name: &'static str, value: f64 },
+    #[error(
+        "Poisson's ratio in plane {} must lie between {low} and {high}, ends excluded, but it is {value}: {}",
+        if *.plane == Plane::Stress { "stress" } else { "strain" },
+        if *.value <= -1.0 { "at -1 and below, stretching in all directions would cost no energy" }
+        else if *.plane == Plane::Stress { "at 1 and above, stretching in all directions has no finite, positive stiffness" }
+        else { "at 1/2 the material is incompressible, and above it compression would give energy" }
+    )]
+    Poisson { plane: Plane, value: f64, low: f64, high: f64 },
+    #[error(
+        "the orthotropic Poisson's ratio must be smaller in size than sqrt(E1/E2) = {bound}, but it is {value}: straining the sheet would give energy"
+    )]
+    PoissonOrthotropic { value: f64, bound: f64 },
+    #[error("the angle of the fibres must be finite, but it is {value}")]
+    Angle { value: f64 },
+    #[error("the stiffness of the sheet does not fit a double: the constants are too large or too small")]
+    Range,
+}
+
+/// A sheet: admissible constants and a thickness \[length\].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Elastic {
+    constants: Constants,
+    thickness: f64,
+    stiffness: Voigt,
+}
+
+impl Elastic {
+    /// Refuses constants of no stable material, naming the bound, and a thickness that is not positive.
+    pub fn new(constants: Constants, thickness: f64) -> Result<Self, ElasticError> {
+        positive("the thickness", thickness)?;
+        let per_thickness = match constants {
+            Constants::Isotropic { young, poisson, plane } => isotropic(young, poisson, plane)?,
+            Constants::Orthotropic { young, poisson_12, shear, angle } => {
+                orthotropic(young, poisson_12, shear, angle)?
+            }
+        };
+        let stiffness = per_thickness * thickness;
+        let fits = stiffness.iter().all(|c| c.is_finite()) && (0..3).all(|k| stiffness[(k, k)].is_normal());
+        if !fits {
+            return Err(ElasticError::Range);
+        }
+        Ok(Self { constants, thickness, stiffness })
+    }
+
+    pub fn constants(&self) -> Constants {
+        self.constants
+    }
+
+    /// Thickness \[length\].
+    pub fn thickness(&self) -> f64 {
+        self.thickness
+    }
+
+    /// Stiffness of the whole thickness \[force / length\].
+    pub fn stiffness(&self) -> &Voigt {
+        &self.stiffness
+    }
+
+    /// In-plane stress (xx, yy, xy) \[force / length^2\] under a strain (xx, yy, engineering xy) \[1\].
+    pub fn stress(&self, strain: [f64; 3]) -> [f64; 3] {
+        (self.stiffness * Vector3::from(strain) / self.thickness).into()
+    }
+
+    /// Von Mises stress \[force / length^2\] under a strain (xx, yy, engineering xy) \[1\]; in plane strain
+    /// with the stress across the thickness that keeps the faces from parting.
+    pub fn von_mises(&self, strain: [f64; 3]) -> f64 {
+        let [xx, yy, xy] = self.stress(strain);
+        let zz = match self.constants {
+            Constants::Isotropic { poisson, plane: Plane::Strain, .. } => poisson * (xx + yy),
+            _ => 0.0,
+        };
+        let (a, b, c) = (xx - yy, yy - zz, zz - xx);
+        (0.5 * (a * a + b * b + c * c) + 3.0 * xy * xy).sqrt()
+    }
+}
+
+fn positive(name: &'static str, value: f64) -> Result<(), ElasticError> {
+    let fits = value > 0.0 && value.is_finite();
+    if fits { Ok(()) } else { Err(ElasticError::NotPositive { name, value }) }
+}
+
+fn isotropic(young: f64, poisson: f64, plane: Plane) -> Result<Voigt, ElasticError> {
+    positive("Young's modulus", young)?;
+    let high = if plane == Plane::Stress { 1.0 } else { 0.5 };
+    if !(poisson > -1.0 && poisson < high) {
+        return Err(ElasticError::Poisson { plane, value: poisson, low: -1.0, high });
+    }
+    let (direct, cross) = match plane {
+        Plane::Stress => {
+            let c = young / ((1.0 - poisson) * (1.0 + poisson));
+            (c, c * poisson)
+        }
+        Plane::Strain => {
+            let c = young / ((1.0 + poisson) * (1.0 - 2.0 * poisson));
+            (c * (1.0 - poisson), c * poisson)
+        }
+    };
+    let shear = young / (2.0 * (1.0 + poisson));
+    Ok(Matrix3::new(direct, cross, 0.0, cross, direct, 0.0, 0.0, 0.0, shear))
+}
+
+fn orthotropic(young: [f64; 2], poisson_12: f64, shear: f64, angle: f64) -> Result<Voigt, ElasticError> {
+    positive("Young's modulus along the fibres", young[0])?;
+    positive("Young's modulus across the fibres", young[1])?;
+    positive("the shear modulus", shear)?;
+    let bound = (young[0] / young[1]).sqrt();
+    let gives_energy = poisson_12.is_nan() || poisson_12.abs() >= bound;
+    if gives_energy {
+        return Err(ElasticError::PoissonOrthotropic { value: poisson_12, bound });
+    }
+    if !angle.is_finite() {
+        return Err(ElasticError::Angle { value: angle });
+    }
+    let rest = 1.0 - poisson_12 * (poisson_12 * young[1] / young[0]);
+    let along = young[0] / rest;
+    let (across, cross) = (young[1] / rest, poisson_12 * young[1] / rest);
+    Ok(turned(&Matrix3::new(along, cross, 0.0, cross, across, 0.0, 0.0, 0.0, shear), angle))
+}
+
+/// The stiffness of a material turned by `angle` \[rad\] against the axes.
+pub fn turned(stiffness: &Voigt, angle: f64) -> Voigt {
+    let (s, c) = angle.sin_cos();
+    // Strain in the axes of the material from strain in the axes of the plane.
+    let t = Matrix3::new(c * c, s * s, s * c, s * s, c * c, -s * c, -2.0 * s * c, 2.0 * s * c, c * c - s * s);
+    let product = t.transpose() * stiffness * t;
+    (product + product.transpose()) * 0.5
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn isotropic_sheet(poisson: f64, plane: Plane) -> Result<Elastic, ElasticError> {
+        Elastic::new(Constants::Isotropic { young: 1000.0, poisson, plane }, 0.5)
+    }
+
+    fn fibres(poisson_12: f64, angle: f64) -> Result<Elastic, ElasticError> {
+        Elastic::new(Constants::Orthotropic { young: [9.0, 1.0], poisson_12, shear: 0.7, angle }, 1.0)
+    }
+
+    #[test]
+    fn uniaxial_stress_gives_back_young_and_poisson() {
+        let c = *isotropic_sheet(0.33, Plane::Stress).expect("admissible").stiffness();
+        let strain = c.try_inverse().expect("regular") * Vector3::new(1.0, 0.0, 0.0);
+        assert!((1.0 / strain[0] - 500.0).abs() < 1e-10);
+        assert!((strain[1] / strain[0] + 0.33).abs() < 1e-14);
+        let c = *fibres(0.3, 0.0).expect("admissible").stiffness();
+        let strain = c.try_inverse().expect("regular") * Vector3::new(1.0, 0.0, 0.0);
+        assert!((1.0 / strain[0] - 9.0).abs() < 1e-12);
+        assert!((strain[1] / strain[0] + 0.3).abs() < 1e-14);
+    }
+
+    #[test]
+    fn fibres_turned_by_a_right_angle_swap_their_moduli() {
+        let (along, across) = (fibres(0.3, 0.0).expect("fits"), fibres(0.3, std::f64::consts::FRAC_PI_2));
+        let (a, b) = (along.stiffness(), *across.expect("fits").stiffness());
+        assert!((a[(0, 0)] - b[(1, 1)]).abs() < 1e-14 && (a[(1, 1)] - b[(0, 0)]).abs() < 1e-14);
+        assert!(fibres(0.3, 0.5).expect("fits").stiffness()[(0, 2)] > 0.1, "fibres to the upper right");
+    }
+
+    #[test]
+    fn an_isotropic_sheet_does_not_change_when_turned() {
+        let sheet = isotropic_sheet(0.2, Plane::Strain).expect("admissible");
+        assert!(
+            (turned(sheet.stiffness(), 0.7) - sheet.stiffness()).norm() < 1e-12 * sheet.stiffness().norm()
+        );
+    }
+
+    #[test]
+    fn inadmissible_constants_are_refused_and_the_bound_is_named() {
+        for (poisson, plane) in
+            [(-1.0, Plane::Stress), (1.0, Plane::Stress), (0.5, Plane::Strain), (f64::NAN, Plane::Strain)]
+        {
+            let refused = isotropic_sheet(poisson, plane).expect_err("refused");
+            assert!(matches!(refused, ElasticError::Poisson { .. }), "{refused}");
+        }
+        let refused = isotropic_sheet(0.5, Plane::Strain).expect_err("refused");
+        assert!(refused.to_string().contains("incompressible"), "{refused}");
+        assert!(isotropic_sheet(0.5, Plane::Stress).is_ok() && isotropic_sheet(0.499, Plane::Strain).is_ok());
+        assert_eq!(
+            fibres(3.0, 0.0).expect_err("refused"),
+            ElasticError::PoissonOrthotropic { value: 3.0, bound: 3.0 }
+        );
+        assert!(fibres(2.9, 0.0).is_ok());
+        let constants = Constants::Isotropic { young: 1e308, poisson: 0.0, plane: Plane::Stress };
+        assert_eq!(Elastic::new(constants, 1e10), Err(ElasticError::Range));
+        assert!(matches!(Elastic::new(constants, 0.0), Err(ElasticError::NotPositive { .. })));
+    }
+
+    #[test]
+    fn von_mises_of_uniaxial_tension_is_the_tension() {
+        let sheet = isotropic_sheet(0.33, Plane::Stress).expect("admissible");
+        assert!((sheet.von_mises([1e-3, -0.33e-3, 0.0]) - 1.0).abs() < 1e-13);
+        // Equal strains in all directions of the plane, none across: 2 nu - 1 of the in-plane stress.
+        let slice = isotropic_sheet(0.25, Plane::Strain).expect("admissible");
+        let pressure = slice.stress([1e-3, 1e-3, 0.0])[0];
+        assert!((slice.von_mises([1e-3, 1e-3, 0.0]) - 0.5 * pressure).abs() < 1e-13);
+    }
+}

@@ -1,0 +1,338 @@
+//! Whether the cells hold the body together.
+//!
+//! Cells joined along a side are rigid together. Cells joined at a corner only are hinged there: the
+//! particle belongs to both, and nothing resists the turning of one about the other. Parts of a body
+//! (cells joined along sides) are therefore treated as rigid bodies pinned to each other at the
+//! particles that they share, and the body is refused if that linkage can move other than as a whole.
+//! A hinge between parts that are pinned elsewhere too is harmless and passes.
+
+use nalgebra::DMatrix;
+
+use super::cells::{Cells, Incidence};
+use crate::flock::points::Points;
+
+/// How a body, or what its leaders hold of it, can move without strain. Particles are named by their
+/// ids, which count from 1.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Mechanism {
+    #[error(
+        "a mechanism: particle {particle} belongs to no cell, so nothing holds it to the body; fill or remove its surroundings"
+    )]
+    NoCell { particle: usize },
+    #[error(
+        "a mechanism: at particle {particle} cells meet at a corner only, and one side turns about it like a hinge"
+    )]
+    Hinge { particle: usize },
+    #[error("a mechanism: no chain of cells joins particle {first} to particle {second}")]
+    Apart { first: usize, second: usize },
+    #[error("a mechanism: no leader holds the part of the body to which particle {particle} belongs")]
+    Loose { particle: usize },
+    #[error(
+        "a mechanism: the part of the body to which particle {particle} belongs is held at one particle only and turns about it"
+    )]
+    Turns { particle: usize },
+}
+
+/// Linkages of more parts than this are not analysed: a hinge among them counts as a mechanism.
+const MOST_PARTS: usize = 128;
+
+/// Parts of a body and the particles at which they are pinned to each other.
+struct Linkage {
+    /// Part of each cell, counted from 0 in the order of first cells.
+    part: Vec<usize>,
+    parts: usize,
+    /// Particles in two or more parts, with those parts.
+    hinges: Vec<(usize, Vec<usize>)>,
+}
+
+/// Refuses a body whose cells can move against each other without strain. `members` says which
+/// particles should belong to a cell (those that are not frame), shape \[count\].
+pub fn require_rigid(
+    cells: &Cells,
+    incidence: &Incidence,
+    reference: &Points,
+    members: impl Fn(usize) -> bool,
+) -> Result<(), Mechanism> {
+    let orphan = (0..reference.len()).find(|&i| members(i) && incidence.of(i).is_empty());
+    if let Some(i) = orphan {
+        return Err(Mechanism::NoCell { particle: i + 1 });
+    }
+    let linkage = Linkage::of(cells, incidence, reference.len());
+    if linkage.parts <= 1 {
+        return Ok(());
+    }
+    linkage.require_joined(cells)?;
+    linkage.require_no_turning(reference, &[])
+}
+
+/// Refuses a body that the `held` particles (the leaders) do not keep from moving as a whole or in
+/// part, shape \[count\]: some part of it has no leader, or can turn about the only one.
+pub fn require_held(
+    cells: &Cells,
+    incidence: &Incidence,
+    reference: &Points,
+    held: &[bool],
+) -> Result<(), Mechanism> {
+    let linkage = Linkage::of(cells, incidence, reference.len());
+    let groups = linkage.groups();
+    let mut leaders = vec![0usize; linkage.parts];
+    let mut first = vec![usize::MAX; linkage.parts];
+    for (i, &held) in held.iter().enumerate() {
+        let Some(&cell) = incidence.of(i).first() else { continue };
+        let group = groups[linkage.part[cell as usize]];
+        leaders[group] += usize::from(held);
+        first[group] = first[group].min(i);
+    }
+    let weak = (0..linkage.parts).filter(|&group| first[group] != usize::MAX);
+    for group in weak {
+        let particle = first[group] + 1;
+        match leaders[group] {
+            0 => return Err(Mechanism::Loose { particle }),
+            1 => return Err(Mechanism::Turns { particle }),
+            _ => {}
+        }
+    }
+    if linkage.hinges.is_empty() {
+        return Ok(());
+    }
+    let grounded: Vec<(usize, usize)> = (0..reference.len())
+        .filter(|&i| held[i])
+        .flat_map(|i| incidence.of(i).iter().map(move |&cell| (i, cell)))
+        .map(|(i, cell)| (i, linkage.part[cell as usize]))
+        .collect();
+    linkage.require_no_turning(reference, &grounded)
+}
+
+impl Linkage {
+    fn of(cells: &Cells, incidence: &Incidence, particles: usize) -> Self {
+        let mut union = Union::new(cells.count());
+        for cell in 0..cells.count() {
+            for side in cells.sides(cell) {
+                if let Some(other) = cells.across(incidence, side) {
+                    union.join(cell, other);
+                }
+            }
+        }
+        let (part, parts) = union.labels();
+        let mut hinges = Vec::new();
+        if parts > 1 {
+            for i in 0..particles {
+                let mut here: Vec<usize> = incidence.of(i).iter().map(|&cell| part[cell as usize]).collect();
+                here.sort_unstable();
+                here.dedup();
+                if here.len() > 1 {
+                    hinges.push((i, here));
+                }
+            }
+        }
+        Self { part, parts, hinges }
+    }
+
+    /// Label of each part such that parts pinned to each other, however loosely, share it.
+    fn groups(&self) -> Vec<usize> {
+        let mut union = Union::new(self.parts);
+        for (_, parts) in &self.hinges {
+            parts.iter().for_each(|&part| union.join(parts[0], part));
+        }
+        union.labels().0
+    }
+
+    fn require_joined(&self, cells: &Cells) -> Result<(), Mechanism> {
+        let groups = self.groups();
+        match (0..cells.count()).find(|&cell| groups[self.part[cell]] != groups[self.part[0]]) {
+            None => Ok(()),
+            Some(other) => {
+                let id = |cell: usize| cells.of(cell)[0] as usize + 1;
+                Err(Mechanism::Apart { first: id(0), second: id(other) })
+            }
+        }
+    }
+
+    /// Looks for motions of the parts that keep every pin together and every grounded (particle, part)
+    /// in place, other than a motion of the whole, and names the pin that turns most.
+    fn require_no_turning(&self, reference: &Points, grounded: &[(usize, usize)]) -> Result<(), Mechanism> {
+        if self.parts > MOST_PARTS {
+            return Err(Mechanism::Hinge { particle: self.hinges[0].0 + 1 });
+        }
+        let (low, high) = reference.bounds(0..reference.len()).unwrap_or_default();
+        let size = (high[0] - low[0]).max(high[1] - low[1]);
+        // The velocity of a part at a particle is (tx - turn y, ty + turn x).
+        let velocity = |particle: usize, part: usize, sign: f64| {
+            let [x, y] = reference.get(particle);
+            let (x, y) = ((x - low[0]) / size - 0.5, (y - low[1]) / size - 0.5);
+            [[(3 * part, sign), (3 * part + 2, -y * sign)], [(3 * part + 1, sign), (3 * part + 2, x * sign)]]
+        };
+        let mut gram = DMatrix::<f64>::zeros(3 * self.parts, 3 * self.parts);
+        let mut constrain = |row: &[(usize, f64)]| {
+            for &(a, u) in row {
+                row.iter().for_each(|&(b, v)| gram[(a, b)] += u * v);
+            }
+        };
+        for &(particle, part) in grounded {
+            velocity(particle, part, 1.0).iter().for_each(|row| constrain(row));
+        }
+        for (particle, parts) in &self.hinges {
+            for &part in &parts[1..] {
+                let (one, other) = (velocity(*particle, parts[0], 1.0), velocity(*particle, part, -1.0));
+                (0..2).for_each(|axis| constrain(&[one[axis], other[axis]].concat()));
+            }
+        }
+        self.name_turning(gram)
+    }
+
+    fn name_turning(&self, gram: DMatrix<f64>) -> Result<(), Mechanism> {
+        let eigen = gram.symmetric_eigen();
+        let largest = eigen.eigenvalues.amax();
+        let mut worst = (1e-6, None);
+        for (value, motion) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
+            if *value > 1e-10 * largest {
+                continue;
+            }
+            for (i, parts) in &self.hinges {
+                for part in parts {
+                    let turning = (motion[3 * part + 2] - motion[3 * parts[0] + 2]).abs();
+                    if turning > worst.0 {
+                        worst = (turning, Some(*i));
+                    }
+                }
+            }
+        }
+        worst.1.map_or(Ok(()), |i| Err(Mechanism::Hinge { particle: i + 1 }))
+    }
+}
+
+/// Disjoint sets.
+struct Union {
+    parent: Vec<usize>,
+}
+
+impl Union {
+    fn new(count: usize) -> Self {
+        Self { parent: (0..count).collect() }
+    }
+
+    fn root(&mut self, mut i: usize) -> usize {
+        while self.parent[i] != i {
+            self.parent[i] = self.parent[self.parent[i]];
+            i = self.parent[i];
+        }
+        i
+    }
+
+    fn join(&mut self, a: usize, b: usize) {
+        let (a, b) = (self.root(a), self.root(b));
+        self.parent[a.max(b)] = a.min(b);
+    }
+
+    /// Number of its set for each member, counted in the order of first members, and how many sets.
+    fn labels(mut self) -> (Vec<usize>, usize) {
+        let (mut labels, mut sets) = (vec![0; self.parent.len()], 0);
+        for i in 0..labels.len() {
+            let root = self.root(i);
+            if root == i {
+                labels[i] = sets;
+                sets += 1;
+            } else {
+                labels[i] = labels[root];
+            }
+        }
+        (labels, sets)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flock::lattice::{Lattice, LatticeKind, Site};
+
+    /// Unit squares with these lower left corners, and the sites of their particles.
+    fn squares(of: &[Site]) -> (Cells, Points, Vec<Site>) {
+        let corners = |&[i, j]: &Site| [[i, j], [i + 1, j], [i + 1, j + 1], [i, j + 1]];
+        let mut sites: Vec<Site> = of.iter().flat_map(corners).collect();
+        sites.sort_unstable();
+        sites.dedup();
+        let lattice = Lattice::new(LatticeKind::Square { spacing: 1.0 }, [0.0; 2], 0.0);
+        let lookup = |site: Site| sites.binary_search(&site).ok().map(|i| i as u32);
+        let mut cells = Cells::of_sites(&lattice, &sites, lookup);
+        // Sites around a hole make a cell in the hole too: keep those asked for.
+        let keep: Vec<usize> =
+            (0..cells.count()).filter(|&c| of.contains(&sites[cells.of(c)[0] as usize])).collect();
+        cells.index = keep.iter().flat_map(|&c| cells.of(c).to_vec()).collect();
+        cells.kind.truncate(keep.len());
+        (cells, sites.iter().map(|&site| lattice.position(site)).collect(), sites)
+    }
+
+    fn rigid(of: &[Site]) -> Result<(), Mechanism> {
+        let (cells, reference, _) = squares(of);
+        require_rigid(&cells, &cells.incidence(reference.len()), &reference, |_| true)
+    }
+
+    fn held(of: &[Site], leaders: &[Site]) -> Result<(), Mechanism> {
+        let (cells, reference, sites) = squares(of);
+        let held: Vec<bool> = sites.iter().map(|site| leaders.contains(site)).collect();
+        require_held(&cells, &cells.incidence(reference.len()), &reference, &held)
+    }
+
+    #[test]
+    fn cells_joined_along_sides_are_rigid() {
+        assert_eq!(rigid(&[[0, 0], [1, 0], [1, 1]]), Ok(()));
+    }
+
+    #[test]
+    fn a_hinge_is_named_by_the_particle_at_it() {
+        // Sites column by column: (0,0) (0,1) (1,0) (1,1): the shared corner has id 4.
+        assert_eq!(rigid(&[[0, 0], [1, 1]]), Err(Mechanism::Hinge { particle: 4 }));
+    }
+
+    #[test]
+    fn a_corner_contact_in_a_body_that_is_closed_elsewhere_passes() {
+        // A ring of cells whose hole touches the outside at one corner.
+        let ring = [[0, 0], [1, 0], [2, 0], [0, 1], [2, 1], [0, 2], [1, 2]];
+        assert_eq!(rigid(&ring), Ok(()));
+        // Three parts pinned to each other in pairs: a triangle.
+        let (base, right) = (vec![[0, 0], [1, 0], [2, 0]], vec![[3, 1], [3, 2]]);
+        let left = vec![[-1, 1], [-1, 2], [-1, 3], [0, 3], [1, 3], [2, 3]];
+        assert_eq!(rigid(&[base.clone(), right, left.clone()].concat()), Ok(()));
+        assert!(matches!(rigid(&[base, left].concat()), Err(Mechanism::Hinge { .. })));
+    }
+
+    #[test]
+    fn four_squares_pinned_in_a_ring_move_and_are_refused() {
+        let ring = [[1, 0], [0, 1], [2, 1], [1, 2]];
+        assert!(matches!(rigid(&ring), Err(Mechanism::Hinge { .. })));
+    }
+
+    #[test]
+    fn parts_that_do_not_touch_and_particles_without_a_cell_are_named() {
+        assert_eq!(rigid(&[[0, 0], [5, 0]]), Err(Mechanism::Apart { first: 1, second: 5 }));
+        let (cells, mut reference, _) = squares(&[[0, 0]]);
+        reference.push([9.0, 9.0]);
+        let incidence = cells.incidence(5);
+        assert_eq!(
+            require_rigid(&cells, &incidence, &reference, |_| true),
+            Err(Mechanism::NoCell { particle: 5 })
+        );
+        assert_eq!(require_rigid(&cells, &incidence, &reference, |i| i < 4), Ok(()));
+    }
+
+    #[test]
+    fn leaders_must_hold_every_part_at_two_particles() {
+        let two = [[0, 0], [5, 0]];
+        assert_eq!(held(&two, &[[0, 0], [0, 1], [5, 0], [6, 1]]), Ok(()));
+        assert_eq!(held(&two, &[[0, 0], [0, 1]]), Err(Mechanism::Loose { particle: 5 }));
+        assert_eq!(held(&two, &[[0, 0], [0, 1], [5, 0]]), Err(Mechanism::Turns { particle: 5 }));
+    }
+
+    #[test]
+    fn leaders_on_both_sides_stop_a_hinge() {
+        let hinged = [[0, 0], [1, 1]];
+        assert_eq!(held(&hinged, &[[0, 0], [0, 1]]), Err(Mechanism::Hinge { particle: 4 }));
+        assert_eq!(held(&hinged, &[[0, 0], [0, 1], [2, 2]]), Ok(()));
+        assert_eq!(
+            held(&hinged, &[[0, 0], [2, 2]]),
+            Err(Mechanism::Hinge { particle: 4 }),
+            "three pins on a line"
+        );
+        assert_eq!(held(&hinged, &[[1, 0], [2, 2]]), Ok(()), "an arch");
+    }
+}

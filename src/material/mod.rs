@@ -1,0 +1,69 @@
+//! Rules that carry a material: Young's modulus and Poisson's ratio to weights, and back.
+//!
+//! The barycentre rule (Eq. 1) moves a particle to the mean of its neighbours. As a continuum that
+//! is a Laplace equation for each coordinate, a material of Poisson's ratio -1, and no choice of
+//! positive scalar weights is any other. This room replaces the scalar weights by 2x2 matrices taken
+//! from a material, and the rule stays what it was, neighbours in and target position out:
+//!
+//! ```text
+//! x_i <- sum_j W_ij x_j + rest_i      W_ij = D_i^-1 K_ij      D_i = sum_j K_ij      sum_j W_ij = 1
+//! rest_i = X_i - sum_j W_ij X_j + D_i^-1 f_i
+//! ```
+//!
+//! `X` are the reference positions, `f_i` is the load on the particle, and `K_ij` is minus the
+//! off-diagonal 2x2 block of the stiffness that the cells between the particles would have as finite
+//! elements. A fixed point of the rule is then exactly the equilibrium of those elements; the rule is
+//! one relaxation of it that needs nobody but the neighbours. Where the body ends the cells are simply
+//! missing, and the missing cells *are* the free edge: no frame is needed.
+//!
+//! The way through the room, one file each:
+//!
+//! * [`elastic`]: engineering constants, refused where no stable material has them, to the 3x3
+//!   stiffness of the sheet.
+//! * [`cells`]: the cells of a body: rectangles, triangles or hexagons between its particles.
+//! * [`stiffness`]: what one cell resists: bilinear quadrilateral, constant-strain triangle, and the
+//!   lowest-order virtual element for any polygon.
+//! * [`mechanism`]: whether the cells hold the body together, or a hinge lets it fold.
+//! * [`weights`]: cells and neighbours to `K_ij`, `D_i`, `W_ij` and rest offsets.
+//! * [`loads`]: tractions, point forces and a body force to the forces `f_i`.
+//! * [`homogenise`]: the way back, from the weights of an interior particle, matrices or scalars, to
+//!   the material that they are.
+//! * [`zone`]: over all waves on the lattice: is the rule stable, and how much must a synchronous
+//!   update be damped?
+//!
+//! Displacements are small: a rotation of the whole body by a finite angle strains it here. The
+//! shapes of arrays follow the particles of the body they belong to; a stiffness is that of the whole
+//! thickness of the sheet \[force / length\].
+//!
+//! ```
+//! use flockform::flock::{body::{Body, Cut}, lattice::{Lattice, LatticeKind}};
+//! use flockform::material::{cells::Cells, elastic::{Constants, Elastic, Plane}, weights::MaterialWeights};
+//!
+//! let lattice = Lattice::new(LatticeKind::Square { spacing: 1.0 }, [0.0, 0.0], 0.0);
+//! let cut = Cut::Count { columns: 5, rows: 5 };
+//! let neighbourhood = flockform::material::cells::neighbourhood(&lattice);
+//! let (body, neighbours) = Body::build(lattice, &cut, &neighbourhood, None)?;
+//! let steel = Constants::Isotropic { young: 210e9, poisson: 0.3, plane: Plane::Stress };
+//! let cells = Cells::of_body(&body);
+//! let weights = MaterialWeights::assemble(&cells, &body, neighbours, &Elastic::new(steel, 1e-3)?)?;
+//! assert_eq!(weights.neighbours.of(12).len(), 8);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+pub mod cells;
+pub mod elastic;
+pub mod homogenise;
+pub mod loads;
+pub mod mechanism;
+pub mod stiffness;
+pub mod weights;
+pub mod zone;
+
+/// A 2x2 matrix by rows: `block[a][b]` takes component `b` of a neighbour to component `a` of the
+/// particle.
+pub type Block = [[f64; 2]; 2];
+
+/// `block * vector`.
+pub(crate) fn apply(block: &Block, [x, y]: [f64; 2]) -> [f64; 2] {
+    [block[0][0] * x + block[0][1] * y, block[1][0] * x + block[1][1] * y]
+}

@@ -1,0 +1,264 @@
+//! What one cell resists: its element stiffness.
+//!
+//! Degrees of freedom are the displacements of the corners, x and y of the first, then of the second,
+//! and so on. A stiffness in the plane does not change when the cell is scaled, so every cell is
+//! brought to unit size (by a power of two, which rounds nothing) before anything is computed from it.
+//!
+//! * Triangle: constant strain (M. J. Turner et al., 1956).
+//! * Quadrilateral: bilinear, 2x2 Gauss points (O. C. Zienkiewicz and R. L. Taylor, *The Finite
+//!   Element Method*, vol. 1). Plane strain near nu = 1/2 locks it, as it does the triangle.
+//! * Any other polygon: the virtual element of lowest order (L. Beirao da Veiga, F. Brezzi and
+//!   L. D. Marini, *Virtual elements for linear elasticity problems*, SIAM J. Numer. Anal. 51, 2013; in the
+//!   form of A. L. Gain, C. Talischi and G. H. Paulino, CMAME 282, 2014). See [`polygon`].
+
+use nalgebra::{DMatrix, DVector, Matrix2, SMatrix, Vector2, Vector3};
+
+use super::elastic::Voigt;
+
+/// Why a polygon is no cell.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ShapeError {
+    #[error("a cell needs at least 3 corners, but this one has {corners}")]
+    TooFew { corners: usize },
+    #[error("the cell has no area to its left: its corners coincide, lie on a line or run clockwise")]
+    NoArea,
+    #[error("the quadrilateral is not convex: it folds over at corner {corner}")]
+    Folded { corner: usize },
+}
+
+/// Stiffness of a cell \[force / length\], shape \[2 corners, 2 corners\], symmetric to the bit: a
+/// triangle, a quadrilateral or a virtual element by the number of corners. `corners` \[length\] run
+/// counter-clockwise.
+pub fn element(corners: &[[f64; 2]], stiffness: &Voigt) -> Result<DMatrix<f64>, ShapeError> {
+    match corners.len() {
+        3 => triangle(corners, stiffness),
+        4 => quadrilateral(corners, stiffness),
+        _ => polygon(corners, stiffness),
+    }
+}
+
+/// The constant-strain triangle.
+pub fn triangle(corners: &[[f64; 2]], stiffness: &Voigt) -> Result<DMatrix<f64>, ShapeError> {
+    let corners = unit_size(corners)?;
+    Ok(symmetric(consistent(&corners, stiffness)))
+}
+
+/// The bilinear quadrilateral with 2x2 Gauss points.
+pub fn quadrilateral(corners: &[[f64; 2]], stiffness: &Voigt) -> Result<DMatrix<f64>, ShapeError> {
+    let corners = unit_size(corners)?;
+    let folded = |&k: &usize| cross(corners[k], corners[(k + 1) % 4], corners[(k + 3) % 4]) <= 0.0;
+    if let Some(corner) = (0..4).find(folded) {
+        return Err(ShapeError::Folded { corner });
+    }
+    let mut sum = DMatrix::zeros(8, 8);
+    for point in gauss_points() {
+        let (gradients, area) = bilinear_gradients(&corners, point);
+        let b = strain_matrix(&gradients);
+        sum += b.transpose() * stiffness * b * area;
+    }
+    Ok(symmetric(sum))
+}
+
+/// The virtual element of lowest order: exact for every affine displacement, on any simple polygon.
+///
+/// The stiffness is `A B' C B`, `B` the mean strain, plus `alpha (I - P)' (I - P)`, `P` the projection
+/// of corner displacements on affine ones. The second term does not touch affine displacements (so
+/// the patch test is exact) and resists all others (so only the three rigid motions are free).
+///
+/// What is left to choose is `alpha`. Here it is the value for which *pure bending*, the simplest
+/// displacement that is not affine, costs what it costs in the continuum: energies of bending about
+/// four axes half a right angle apart are summed, cell and continuum, and made equal. Bending costs
+/// Young's modulus, so `alpha` stays finite where the bulk modulus grows without bound (plane
+/// strain towards nu = 1/2) and such cells do not lock; four axes are enough for the sum not to
+/// depend on how the axes are turned.
+pub fn polygon(corners: &[[f64; 2]], stiffness: &Voigt) -> Result<DMatrix<f64>, ShapeError> {
+    let corners = unit_size(corners)?;
+    let affine = affine_projection(&corners);
+    let rest = DMatrix::identity(affine.nrows(), affine.ncols()) - affine;
+    let alpha = bending_stiffness(&corners, stiffness, &rest);
+    Ok(symmetric(consistent(&corners, stiffness) + rest.transpose() * rest * alpha))
+}
+
+/// Area of a polygon \[length^2\], positive if its corners run counter-clockwise.
+pub fn area(corners: &[[f64; 2]]) -> f64 {
+    (1..corners.len() - 1).map(|k| 0.5 * cross(corners[0], corners[k], corners[k + 1])).sum()
+}
+
+/// The part of a load per area that falls to each corner \[length^2\], shape \[corners\]: the integral of
+/// the corner's shape function, on a virtual element of its affine projection. The parts add up to
+/// the area, and their centre is the cell's.
+pub fn load_shares(corners: &[[f64; 2]]) -> Vec<f64> {
+    if corners.len() == 4 {
+        let at_point = |point: [f64; 2]| {
+            let (_, area) = bilinear_gradients(corners, point);
+            bilinear(point).map(|n| n * area)
+        };
+        let parts = gauss_points().map(at_point);
+        return (0..4).map(|k| parts.iter().map(|part| part[k]).sum()).collect();
+    }
+    let (count, area) = (corners.len() as f64, area(corners));
+    let (centre, middle) = (centroid(corners), mean(corners));
+    let off = [centre[0] - middle[0], centre[1] - middle[1]];
+    mean_gradients(corners).iter().map(|g| area * (1.0 / count + g[0] * off[0] + g[1] * off[1])).collect()
+}
+
+/// Mean strain (xx, yy, engineering xy) \[1\] of a cell whose corner `k` moves by `displacement(k)`
+/// \[length\].
+pub fn mean_strain(corners: &[[f64; 2]], displacement: impl Fn(usize) -> [f64; 2]) -> [f64; 3] {
+    // Relative to the first corner: a translation must not cost digits.
+    let first = displacement(0);
+    mean_gradients(corners).iter().enumerate().fold([0.0; 3], |[xx, yy, xy], (k, g)| {
+        let [u, v] = displacement(k);
+        let (u, v) = (u - first[0], v - first[1]);
+        [xx + g[0] * u, yy + g[1] * v, xy + g[1] * u + g[0] * v]
+    })
+}
+
+/// The polygon with its first corner at the origin and scaled by a power of two to about unit size.
+fn unit_size(corners: &[[f64; 2]]) -> Result<Vec<[f64; 2]>, ShapeError> {
+    if corners.len() < 3 {
+        return Err(ShapeError::TooFew { corners: corners.len() });
+    }
+    let [x0, y0] = corners[0];
+    let relative: Vec<[f64; 2]> = corners.iter().map(|[x, y]| [x - x0, y - y0]).collect();
+    let size = relative.iter().flatten().fold(0f64, |size, x| size.max(x.abs()));
+    let scale = (-size.log2().floor()).exp2();
+    let scaled: Vec<[f64; 2]> = relative.iter().map(|p| p.map(|x| x * scale)).collect();
+    // Cells of aspect ratio 1e12 are still cells; below that rounding decides what is left of a line.
+    if area(&scaled) > 1e-12 { Ok(scaled) } else { Err(ShapeError::NoArea) }
+}
+
+/// Twice the area of the triangle a, b, c.
+fn cross(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
+    (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+}
+
+fn symmetric(matrix: DMatrix<f64>) -> DMatrix<f64> {
+    (&matrix + matrix.transpose()) * 0.5
+}
+
+fn mean(corners: &[[f64; 2]]) -> [f64; 2] {
+    [0, 1].map(|k| corners.iter().map(|p| p[k]).sum::<f64>() / corners.len() as f64)
+}
+
+/// Mean over the cell of the gradient of each corner's shape function \[1/length\]: by the divergence
+/// theorem an integral over the sides, on which every element here is linear.
+fn mean_gradients(corners: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    let (m, twice) = (corners.len(), 2.0 * area(corners));
+    (0..m)
+        .map(|k| {
+            let ([x0, y0], [x1, y1]) = (corners[(k + m - 1) % m], corners[(k + 1) % m]);
+            [(y1 - y0) / twice, (x0 - x1) / twice]
+        })
+        .collect()
+}
+
+fn strain_matrix(gradients: &[[f64; 2]]) -> DMatrix<f64> {
+    let mut b = DMatrix::zeros(3, 2 * gradients.len());
+    for (k, &[gx, gy]) in gradients.iter().enumerate() {
+        (b[(0, 2 * k)], b[(1, 2 * k + 1)]) = (gx, gy);
+        (b[(2, 2 * k)], b[(2, 2 * k + 1)]) = (gy, gx);
+    }
+    b
+}
+
+/// Stiffness of the mean strain.
+fn consistent(corners: &[[f64; 2]], stiffness: &Voigt) -> DMatrix<f64> {
+    let b = strain_matrix(&mean_gradients(corners));
+    b.transpose() * stiffness * b * area(corners)
+}
+
+fn gauss_points() -> [[f64; 2]; 4] {
+    let g = 1.0 / 3f64.sqrt();
+    [[-g, -g], [g, -g], [g, g], [-g, g]]
+}
+
+const QUADRANTS: [[f64; 2]; 4] = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
+
+fn bilinear([s, t]: [f64; 2]) -> [f64; 4] {
+    QUADRANTS.map(|[a, b]| 0.25 * (1.0 + a * s) * (1.0 + b * t))
+}
+
+/// Gradients of the bilinear functions at a point of the unit square and the area that a Gauss point
+/// there stands for.
+fn bilinear_gradients(corners: &[[f64; 2]], [s, t]: [f64; 2]) -> (Vec<[f64; 2]>, f64) {
+    let local = QUADRANTS.map(|[a, b]| Vector2::new(0.25 * a * (1.0 + b * t), 0.25 * b * (1.0 + a * s)));
+    let mut jacobian = Matrix2::zeros();
+    for (corner, gradient) in corners.iter().zip(&local) {
+        jacobian += Vector2::from(*corner) * gradient.transpose();
+    }
+    let area = jacobian.determinant();
+    let adjugate =
+        Matrix2::new(jacobian[(1, 1)], -jacobian[(0, 1)], -jacobian[(1, 0)], jacobian[(0, 0)]) / area;
+    (local.iter().map(|gradient| (adjugate.transpose() * gradient).into()).collect(), area)
+}
+
+/// Projection of corner displacements on affine ones: the mean gradient about the mean of the corners.
+fn affine_projection(corners: &[[f64; 2]]) -> DMatrix<f64> {
+    let (count, middle, gradients) = (corners.len(), mean(corners), mean_gradients(corners));
+    let mut projection = DMatrix::zeros(2 * count, 2 * count);
+    for (i, &[x, y]) in corners.iter().enumerate() {
+        for (j, g) in gradients.iter().enumerate() {
+            let part = 1.0 / count as f64 + g[0] * (x - middle[0]) + g[1] * (y - middle[1]);
+            projection[(2 * i, 2 * j)] = part;
+            projection[(2 * i + 1, 2 * j + 1)] = part;
+        }
+    }
+    projection
+}
+
+/// The `alpha` of [`polygon`]; `rest` takes what is not affine from corner displacements.
+fn bending_stiffness(corners: &[[f64; 2]], stiffness: &Voigt, rest: &DMatrix<f64>) -> f64 {
+    // An admissible stiffness is positive definite.
+    let Some(compliance) = stiffness.try_inverse() else { return 0.5 * stiffness.trace() };
+    let (centre, moments) = (centroid(corners), second_moments(corners));
+    let axes = [[1.0, 0.0], [0.5f64.sqrt(), 0.5f64.sqrt()], [0.0, 1.0], [-(0.5f64.sqrt()), 0.5f64.sqrt()]];
+    let (mut continuum, mut cell) = (0.0, 0.0);
+    for [nx, ny] in axes {
+        // Tension along the axis that grows in the direction t across it.
+        let tension = Vector3::new(nx * nx, ny * ny, nx * ny);
+        let strain = compliance * tension;
+        let tensor = Matrix2::new(strain[0], strain[2] / 2.0, strain[2] / 2.0, strain[1]);
+        let t = Vector2::new(-ny, nx);
+        continuum += tension.dot(&strain) * (t.transpose() * moments * t)[0];
+        let bent = corners.iter().flat_map(|corner| {
+            let x = Vector2::new(corner[0] - centre[0], corner[1] - centre[1]);
+            let e_x = tensor * x;
+            let u = e_x * x.dot(&t) - t * (0.5 * x.dot(&e_x));
+            [u[0], u[1]]
+        });
+        cell += (rest * DVector::from_iterator(rest.ncols(), bent)).norm_squared();
+    }
+    continuum / cell
+}
+
+fn centroid(corners: &[[f64; 2]]) -> [f64; 2] {
+    let o = corners[0];
+    let sum = (1..corners.len() - 1).fold([0.0; 2], |sum, k| {
+        let (a, b) = (corners[k], corners[k + 1]);
+        let third = cross(o, a, b) / 6.0;
+        [0, 1].map(|d| sum[d] + third * (a[d] - o[d] + b[d] - o[d]))
+    });
+    let area = area(corners);
+    [o[0] + sum[0] / area, o[1] + sum[1] / area]
+}
+
+/// Integral of `(x - centroid) (x - centroid)'` over the polygon \[length^4\].
+fn second_moments(corners: &[[f64; 2]]) -> Matrix2<f64> {
+    let centre = centroid(corners);
+    let from_centre = |k: usize| {
+        let [x, y] = corners[k % corners.len()];
+        Vector2::new(x - centre[0], y - centre[1])
+    };
+    let mut sum = SMatrix::zeros();
+    for k in 0..corners.len() {
+        let (a, b) = (from_centre(k), from_centre(k + 1));
+        // Over the triangle centre, a, b: area / 12 (a a' + b b' + (a + b)(a + b)').
+        let (area, c) = (0.5 * a.perp(&b), a + b);
+        sum += (a * a.transpose() + b * b.transpose() + c * c.transpose()) * (area / 12.0);
+    }
+    sum
+}
+
+#[cfg(test)]
+mod tests;

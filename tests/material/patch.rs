@@ -1,0 +1,207 @@
+//! Affine fields are followed exactly, rigid motions cost nothing.
+
+use flockform::flock::body::Cut;
+use flockform::flock::lattice::{Lattice, LatticeKind};
+use flockform::flock::points::Points;
+use flockform::material::loads::{Loads, Traction};
+use flockform::material::weights::MaterialWeights;
+
+use crate::support::*;
+
+fn affine([x, y]: [f64; 2]) -> [f64; 2] {
+    [0.2 + 0.03 * x - 0.01 * y, -0.1 + 0.04 * x + 0.02 * y]
+}
+
+fn largest_difference(a: &Points, b: &Points) -> f64 {
+    a.iter().zip(b.iter()).map(|(a, b)| (a[0] - b[0]).abs().max((a[1] - b[1]).abs())).fold(0.0, f64::max)
+}
+
+#[test]
+fn an_affine_boundary_is_followed_exactly_on_every_lattice() {
+    for kind in KINDS {
+        for elastic in [sheet(1000.0, 0.33), sheet(1.0, -0.9), fibres()] {
+            let (body, neighbours, cells) = sample(kind, 0.3);
+            let weights = MaterialWeights::assemble(&cells, &body, neighbours, &elastic).expect("assembles");
+            let exact: Points = body.reference.iter().map(affine).collect();
+            let leads = on_boundary(&cells, body.count());
+            assert!(leads.iter().filter(|&&leads| !leads).count() > 10, "{kind:?} has an interior");
+            let led = (0..body.count()).map(|i| if leads[i] { exact.get(i) } else { [0.0; 2] }).collect();
+            let found = equilibrium(&weights, &leads, &Points::zeros(body.count()), &led);
+            assert!(largest_difference(&found, &exact) < 1e-12, "{kind:?}");
+            for i in (0..body.count()).filter(|&i| !leads[i]) {
+                let force = weights.force(i, &exact);
+                assert!(force[0].hypot(force[1]) < 1e-12 * elastic.stiffness().norm(), "{kind:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn an_affine_boundary_is_followed_exactly_where_points_are_out_of_place() {
+    for kind in KINDS {
+        let (body, _, cells) = sample(kind, 0.3);
+        let shift = |i: usize| [0.11 * (7.3 * i as f64).sin(), 0.11 * (3.1 * i as f64 + 1.0).sin()];
+        let points: Points = (0..body.count())
+            .map(|i| {
+                let (p, s) = (body.reference.get(i), shift(i));
+                [p[0] + s[0], p[1] + s[1]]
+            })
+            .collect();
+        let weights =
+            MaterialWeights::on_points(&cells, &points, &sheet(1000.0, 0.33), None).expect("assembles");
+        let exact: Points = points.iter().map(affine).collect();
+        let leads = on_boundary(&cells, body.count());
+        let led = (0..body.count()).map(|i| if leads[i] { exact.get(i) } else { [0.0; 2] }).collect();
+        let found = equilibrium(&weights, &leads, &Points::zeros(body.count()), &led);
+        assert!(largest_difference(&found, &exact) < 1e-12, "{kind:?}");
+    }
+}
+
+#[test]
+fn sweeping_the_rule_itself_reaches_the_affine_field() {
+    // Positions, matrix-weighted mean plus rest offset: what a host will sweep.
+    let (body, neighbours, cells) = sample(KINDS[5], 0.0);
+    let weights =
+        MaterialWeights::assemble(&cells, &body, neighbours, &sheet(1000.0, 0.33)).expect("assembles");
+    let (w, rest) = (weights.weights(), weights.rest_offsets(&body.reference, None));
+    let leads = on_boundary(&cells, body.count());
+    let goal: Points = body
+        .reference
+        .iter()
+        .map(|p| {
+            let u = affine(p);
+            [p[0] + u[0], p[1] + u[1]]
+        })
+        .collect();
+    let mut x: Points =
+        (0..body.count()).map(|i| if leads[i] { goal.get(i) } else { body.reference.get(i) }).collect();
+    for _ in 0..500 {
+        for i in (0..body.count()).filter(|&i| !leads[i]) {
+            let mean = weights.neighbours.bonds(i).fold(rest.get(i), |sum, bond| {
+                let p = x.get(weights.neighbours.index[bond] as usize);
+                [0, 1].map(|a| sum[a] + w[bond][a][0] * p[0] + w[bond][a][1] * p[1])
+            });
+            x.set(i, mean);
+        }
+    }
+    assert!(largest_difference(&x, &goal) < 1e-12);
+}
+
+#[test]
+fn rigid_motions_cost_no_force_anywhere_free_edges_included() {
+    for kind in KINDS {
+        let (body, neighbours, cells) = sample(kind, 0.3);
+        let weights = MaterialWeights::assemble(&cells, &body, neighbours, &fibres()).expect("assembles");
+        let scale = fibres().stiffness().norm();
+        let shifted: Points = body.reference.iter().map(|_| [0.7, -1.3]).collect();
+        let turned: Points = body.reference.iter().map(|[x, y]| [-y, x]).collect();
+        for i in 0..body.count() {
+            assert_eq!(weights.force(i, &shifted), [0.0; 2]);
+            let force = weights.force(i, &turned);
+            assert!(force[0].hypot(force[1]) < 1e-12 * scale, "{kind:?} particle {i}: {force:?}");
+        }
+        assert!(weights.energy(&turned).abs() < 1e-12 * scale);
+    }
+}
+
+#[test]
+fn weights_sum_to_the_identity_and_forces_come_in_equal_and_opposite_pairs() {
+    for kind in KINDS {
+        let (body, neighbours, cells) = sample(kind, 0.3);
+        let weights = MaterialWeights::assemble(&cells, &body, neighbours, &fibres()).expect("assembles");
+        for i in 0..body.count() {
+            let mut sum = [[0.0; 2]; 2];
+            for bond in weights.neighbours.bonds(i) {
+                let w = weights.weight(i, bond);
+                (0..4).for_each(|k| sum[k / 2][k % 2] += w[k / 2][k % 2]);
+                let j = weights.neighbours.index[bond] as usize;
+                let back = weights.neighbours.bonds(j).find(|&b| weights.neighbours.index[b] as usize == i);
+                let [[a, b], [c, d]] = weights.blocks[back.expect("seen back")];
+                assert_eq!(weights.blocks[bond], [[a, c], [b, d]], "{kind:?}");
+            }
+            let error = (sum[0][0] - 1.0).abs() + sum[0][1].abs() + sum[1][0].abs() + (sum[1][1] - 1.0).abs();
+            assert!(error < 1e-12, "{kind:?} {sum:?}");
+        }
+    }
+}
+
+#[test]
+fn an_edge_column_under_uniform_tension_stretches_uniformly_and_contracts_freely() {
+    // Traction on the right, symmetry on the left: u = s x / E, v = -nu s y / E, sides free.
+    for (kind, right) in [(KINDS[0], 7.0), (KINDS[1], 7.0)] {
+        let (body, neighbours, cells) =
+            build(Lattice::new(kind, [0.0; 2], 0.0), &Cut::Count { columns: 8, rows: 5 });
+        let weights =
+            MaterialWeights::assemble(&cells, &body, neighbours, &sheet(1000.0, 0.33)).expect("assembles");
+        let pulled =
+            |&[a, b]: &[u32; 2]| [a, b].iter().all(|&i| (body.reference.x[i as usize] - right).abs() < 1e-9);
+        let sides = cells.boundary_sides(&cells.incidence(body.count()));
+        let tractions =
+            sides.into_iter().filter(pulled).map(|side| Traction::uniform(side, [50.0, 0.0])).collect();
+        let forces =
+            Loads { tractions, ..Loads::default() }.on_particles(&cells, &body.reference).expect("fits");
+        let exact: Points = body.reference.iter().map(|[x, y]| [0.05 * x, -0.33 * 0.05 * y]).collect();
+        for i in 0..body.count() {
+            if body.reference.x[i] > 0.0 {
+                let (pull, load) = (weights.force(i, &exact), forces.get(i));
+                assert!((pull[0] + load[0]).abs() + (pull[1] + load[1]).abs() < 1e-11, "{kind:?} {i}");
+            }
+        }
+    }
+}
+
+#[test]
+fn weights_are_the_same_at_any_spacing() {
+    let weights = |scale: f64, kind: fn(f64) -> LatticeKind| {
+        let lattice = Lattice::new(kind(scale), [0.0; 2], 0.3);
+        let (body, neighbours, cells) =
+            build_without_loose_sites(lattice, &Cut::Count { columns: 4, rows: 4 });
+        MaterialWeights::assemble(&cells, &body, neighbours, &fibres()).expect("assembles").weights()
+    };
+    for kind in
+        [|s| LatticeKind::Rectangular { a: s, b: 1000.0 * s }, |s| LatticeKind::Honeycomb { spacing: s }]
+    {
+        let plain = weights(1.0, kind);
+        for scale in [1e-9, 1e9] {
+            for (a, b) in
+                weights(scale, kind).iter().flatten().flatten().zip(plain.iter().flatten().flatten())
+            {
+                assert!((a - b).abs() < 1e-10, "{a} {b}");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_equilibrium_under_loads_is_the_fixed_point_of_the_rule_and_stores_half_their_work() {
+    for kind in KINDS {
+        let (body, neighbours, cells) = sample(kind, 0.3);
+        let weights = MaterialWeights::assemble(&cells, &body, neighbours, &fibres()).expect("assembles");
+        // Loads everywhere, free edges included; three particles held.
+        let forces: Points =
+            (0..body.count()).map(|i| [(1.3 * i as f64).sin(), (0.7 * i as f64).cos()]).collect();
+        let leads: Vec<bool> = (0..body.count()).map(|i| i % 20 == 0).collect();
+        let held = Points::zeros(body.count());
+        let found = equilibrium(&weights, &leads, &forces, &held);
+        let (w, rest) = (weights.weights(), weights.rest_offsets(&body.reference, Some(&forces)));
+        let at = |i: usize| [body.reference.x[i] + found.x[i], body.reference.y[i] + found.y[i]];
+        let size = found.x.iter().chain(&found.y).fold(1.0, |m: f64, u| m.max(u.abs()));
+        let mut work = 0.0;
+        for i in (0..body.count()).filter(|&i| !leads[i]) {
+            let target = weights.neighbours.bonds(i).fold(rest.get(i), |sum, bond| {
+                let p = at(weights.neighbours.index[bond] as usize);
+                [0, 1].map(|a| sum[a] + w[bond][a][0] * p[0] + w[bond][a][1] * p[1])
+            });
+            let error = (target[0] - at(i)[0]).hypot(target[1] - at(i)[1]);
+            assert!(error < 1e-12 * size, "{kind:?} particle {i}: {error}");
+            work += forces.x[i] * found.x[i] + forces.y[i] * found.y[i];
+        }
+        assert!((weights.energy(&found) - 0.5 * work).abs() < 1e-11 * work, "{kind:?}");
+        // The load alone is the difference between rest offsets with and without it.
+        let (bare, load) = (weights.rest_offsets(&body.reference, None), weights.load_offsets(&forces));
+        for i in 0..body.count() {
+            let (a, b, c) = (rest.get(i), bare.get(i), load.get(i));
+            assert!((0..2).all(|k| (a[k] - b[k] - c[k]).abs() < 1e-12 * size), "{kind:?} particle {i}");
+        }
+    }
+}

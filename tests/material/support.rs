@@ -1,0 +1,130 @@
+//! Bodies, materials and a direct solver, shared by the tests of the material rule.
+
+use flockform::flock::body::{Body, Cut};
+use flockform::flock::lattice::{Lattice, LatticeKind};
+use flockform::flock::neighbourhood::Neighbours;
+use flockform::flock::points::Points;
+use flockform::material::Block;
+use flockform::material::cells::{Cells, neighbourhood, without_loose_sites};
+use flockform::material::elastic::{Constants, Elastic, Plane};
+use flockform::material::weights::MaterialWeights;
+
+pub const KINDS: [LatticeKind; 6] = [
+    LatticeKind::Square { spacing: 1.0 },
+    LatticeKind::Rectangular { a: 1.0, b: 1.5 },
+    LatticeKind::CentredRectangular { a: 1.0, b: 1.4 },
+    LatticeKind::Hexagonal { spacing: 1.0 },
+    LatticeKind::Oblique { a: 1.0, b: 1.2, angle: 1.2 },
+    LatticeKind::Honeycomb { spacing: 1.0 },
+];
+
+pub fn sheet(young: f64, poisson: f64) -> Elastic {
+    Elastic::new(Constants::Isotropic { young, poisson, plane: Plane::Stress }, 1.0).expect("admissible")
+}
+
+pub fn fibres() -> Elastic {
+    let constants = Constants::Orthotropic { young: [9.0, 1.0], poisson_12: 0.4, shear: 0.6, angle: 0.5 };
+    Elastic::new(constants, 0.7).expect("admissible")
+}
+
+pub fn build(lattice: Lattice, cut: &Cut) -> (Body, Neighbours, Cells) {
+    let near = neighbourhood(&lattice);
+    let (body, neighbours) = Body::build(lattice, cut, &near, None).expect("builds");
+    let cells = Cells::of_body(&body);
+    (body, neighbours, cells)
+}
+
+pub fn build_without_loose_sites(lattice: Lattice, cut: &Cut) -> (Body, Neighbours, Cells) {
+    let (body, neighbours, _) = build(lattice, cut);
+    without_loose_sites(&body, &neighbours)
+}
+
+/// A turned and shifted body of every lattice.
+pub fn sample(kind: LatticeKind, orientation: f64) -> (Body, Neighbours, Cells) {
+    let lattice = Lattice::new(kind, [3.0, -2.0], orientation);
+    build_without_loose_sites(lattice, &Cut::Count { columns: 8, rows: 9 })
+}
+
+/// Particles on a free side.
+pub fn on_boundary(cells: &Cells, count: usize) -> Vec<bool> {
+    let mut boundary = vec![false; count];
+    for [a, b] in cells.boundary_sides(&cells.incidence(count)) {
+        (boundary[a as usize], boundary[b as usize]) = (true, true);
+    }
+    boundary
+}
+
+/// Followers at rest under their neighbours and loads, leaders where `displacement` has them: banded
+/// Cholesky over the followers in their numbering.
+pub fn equilibrium(
+    weights: &MaterialWeights,
+    leads: &[bool],
+    forces: &Points,
+    displacement: &Points,
+) -> Points {
+    let followers: Vec<usize> = (0..leads.len()).filter(|&i| !leads[i]).collect();
+    let mut place = vec![usize::MAX; leads.len()];
+    followers.iter().enumerate().for_each(|(row, &i)| place[i] = row);
+    let mut entries: Vec<(usize, usize, Block)> = Vec::new();
+    let mut right: Vec<f64> = Vec::new();
+    for (row, &i) in followers.iter().enumerate() {
+        entries.push((row, row, weights.diagonal[i]));
+        let mut load = forces.get(i);
+        for bond in weights.neighbours.bonds(i) {
+            let (j, block) = (weights.neighbours.index[bond] as usize, weights.blocks[bond]);
+            if leads[j] {
+                let u = displacement.get(j);
+                (0..2).for_each(|a| load[a] += block[a][0] * u[0] + block[a][1] * u[1]);
+            } else {
+                entries.push((row, place[j], block.map(|row| row.map(|x| -x))));
+            }
+        }
+        right.extend(load);
+    }
+    let solution = banded_cholesky(right.len(), &entries, right);
+    let mut result = displacement.clone();
+    followers
+        .iter()
+        .enumerate()
+        .for_each(|(row, &i)| result.set(i, [solution[2 * row], solution[2 * row + 1]]));
+    result
+}
+
+fn banded_cholesky(n: usize, entries: &[(usize, usize, Block)], mut x: Vec<f64>) -> Vec<f64> {
+    let band = entries.iter().map(|&(r, c, _)| 2 * r.abs_diff(c) + 2).max().unwrap_or(1);
+    // l[i][d] is the entry in row i, column i - d.
+    let mut l = vec![vec![0.0; band]; n];
+    for (row, column, block) in entries {
+        for (a, b) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+            let (i, j) = (2 * row + a, 2 * column + b);
+            if j <= i {
+                l[i][i - j] += block[a][b];
+            }
+        }
+    }
+    for i in 0..n {
+        for j in i.saturating_sub(band - 1)..=i {
+            let first = i.saturating_sub(band - 1).max(j.saturating_sub(band - 1));
+            let sum: f64 = (first..j).map(|k| l[i][i - k] * l[j][j - k]).sum();
+            let rest = l[i][i - j] - sum;
+            l[i][i - j] = if i == j { rest.sqrt() } else { rest / l[j][0] };
+        }
+        let sum: f64 = (1..band.min(i + 1)).map(|d| l[i][d] * x[i - d]).sum();
+        x[i] = (x[i] - sum) / l[i][0];
+    }
+    for i in (0..n).rev() {
+        let sum: f64 = (1..band.min(n - i)).map(|d| l[i + d][d] * x[i + d]).sum();
+        x[i] = (x[i] - sum) / l[i][0];
+    }
+    x
+}
+
+pub fn relative_l2(found: &Points, truth: &Points, counts: impl Fn(usize) -> bool) -> f64 {
+    let (mut error, mut size) = (0.0, 0.0);
+    for i in (0..truth.len()).filter(|&i| counts(i)) {
+        let (f, t) = (found.get(i), truth.get(i));
+        error += (f[0] - t[0]).powi(2) + (f[1] - t[1]).powi(2);
+        size += t[0] * t[0] + t[1] * t[1];
+    }
+    (error / size).sqrt()
+}
