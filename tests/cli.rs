@@ -148,6 +148,12 @@ fn the_fracture_scene_breaks_near_the_top_and_its_variants_elsewhere_or_faster()
         (first["along"].as_f64().expect("broke"), first["step"].as_u64().expect("broke"))
     };
     let (top, _) = broken("fracture");
+    let breaks = std::fs::read_to_string(folder.path().join("fracture/breaks.csv")).expect("written");
+    assert_eq!(breaks.lines().next(), Some("step,id_a,id_b,X,Y,along,length"));
+    // Broken at the step after the bond had grown past df = 11.
+    let first: Vec<f64> =
+        breaks.lines().nth(1).expect("a break").split(',').map(|v| v.parse().expect("a number")).collect();
+    assert!((first[5] - top).abs() < 1e-12 && first[6] > 11.0 && first[6] < 12.0, "{first:?}");
     // The profile narrows between 0.31 and 0.69 of the length; its middle is at 0.5.
     assert!((0.67..0.71).contains(&top), "{top}");
     let (slow, _) = broken("fracture-slow");

@@ -53,6 +53,7 @@ fn run_here(arguments: &RunArguments) -> Result<ExitCode, Refusal> {
     let out = arguments.out.clone().unwrap_or_else(|| free_folder(&scene.name));
     let folder = OutputFolder::create(&out, arguments.force)?;
     let setup = start.elapsed();
+    tracing::info!("planned {} particles of `{}` in {setup:.1?}", plan.count(), scene.name);
 
     let mut recorder = Recorder::new(&scene, &plan, &folder)?;
     let mut progress = Progress::new(arguments.quiet, scene.stop.steps);
@@ -67,6 +68,7 @@ fn run_here(arguments: &RunArguments) -> Result<ExitCode, Refusal> {
     progress.finish();
 
     let elapsed = stepping.elapsed();
+    tracing::info!("{} steps in {elapsed:.1?}, writing to {}", outcome.engine.step(), out.display());
     let records = recorder.finish(&outcome.engine)?;
     let timings = Timings { setup, steps: elapsed.saturating_sub(records.writing), output: records.writing };
     let (snapshots, probes) = (&records.snapshots, &records.probes);
@@ -193,7 +195,7 @@ fn closing_words(scene: &Scene, outcome: &Outcome, elapsed: Duration, kept: &Pat
             first.place[0],
             first.place[1],
             scene.unit(),
-            100.0 * engine.body().along(first.place)
+            100.0 * engine.body().along()(first.place)
         );
     }
     words + &format!("results in {}\n", kept.display())

@@ -182,6 +182,8 @@ impl Engine {
                 self.roles[self.changes[change].particles[which]] = self.changes[change].role;
             }
             self.start_leading(change, &taking, self.step - 1);
+            let role = self.changes[change].role.name();
+            tracing::debug!("step {}: {} particles become {role}", self.step, taking.len());
             changed = true;
         }
         if changed {
@@ -246,9 +248,12 @@ impl Engine {
 
     fn break_bonds(&mut self) {
         let Some(bonds) = &mut self.interaction.bonds else { return };
-        let was_whole = !bonds.any_broken();
+        let (was_whole, known) = (!bonds.any_broken(), self.breaks.len());
         let places = (&*self.body.reference, &self.present);
         bonds.break_stretched(self.step, &self.interaction.neighbours, places, &self.roles, &mut self.breaks);
+        if self.breaks.len() > known {
+            tracing::debug!("step {}: {} bonds break", self.step, self.breaks.len() - known);
+        }
         if was_whole && bonds.any_broken() {
             self.compile_sweep();
         }

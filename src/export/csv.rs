@@ -1,4 +1,5 @@
-//! Tables: `final.csv`, every particle at the end, and `probes.csv`, a few of them at every step.
+//! Tables: `final.csv`, every particle at the end; `probes.csv`, a few of them at every step;
+//! `breaks.csv`, every broken bond.
 //!
 //! Ids count from 1, columns and rows from the lowest site, frame included, which is the paper's
 //! numbering. Numbers are the shortest that read back as the same.
@@ -12,6 +13,7 @@ use super::OutputFolder;
 use super::error::ExportError;
 use crate::continuum::record::{ProbeSeries, Snapshot};
 use crate::flock::body::Body;
+use crate::flock::fracture::Break;
 
 #[derive(Serialize)]
 struct FinalRow {
@@ -39,6 +41,19 @@ struct ProbeRow {
     pe2: f64,
 }
 
+#[derive(Serialize)]
+struct BreakRow {
+    step: usize,
+    id_a: usize,
+    id_b: usize,
+    #[serde(rename = "X")]
+    reference_x: f64,
+    #[serde(rename = "Y")]
+    reference_y: f64,
+    along: f64,
+    length: f64,
+}
+
 /// Writes every particle at the end: reference and present place \[length\], PE1 \[length^2\], PE2 \[length\].
 pub fn write_final(folder: &OutputFolder, body: &Body, last: &Snapshot) -> Result<PathBuf, ExportError> {
     let lowest = |axis: usize| body.sites.iter().map(|site| i64::from(site[axis])).min().unwrap_or(0);
@@ -56,6 +71,23 @@ pub fn write_final(folder: &OutputFolder, body: &Body, last: &Snapshot) -> Resul
         pe2: last.pe2[i],
     });
     write(folder, "final.csv", rows)
+}
+
+/// Writes every broken bond in the order they broke: its step (0 for those cut before the first), its
+/// two particles, its middle in the reference configuration \[length\] and along the body \[1\], and the
+/// length at which it broke \[length\].
+pub fn write_breaks(folder: &OutputFolder, body: &Body, breaks: &[Break]) -> Result<PathBuf, ExportError> {
+    let along = body.along();
+    let rows = breaks.iter().map(|one| BreakRow {
+        step: one.step,
+        id_a: one.pair[0] as usize + 1,
+        id_b: one.pair[1] as usize + 1,
+        reference_x: one.place[0],
+        reference_y: one.place[1],
+        along: along(one.place),
+        length: one.length,
+    });
+    write(folder, "breaks.csv", rows)
 }
 
 /// Writes the probed particles step by step.

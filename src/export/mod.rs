@@ -7,6 +7,7 @@
 //! | `summary.json` | program, scene, counts, how it ended, energies, first break, timings |
 //! | `final.csv` | every particle at the end |
 //! | `probes.csv` | the probed particles at every step |
+//! | `breaks.csv` | every broken bond, with its step and place |
 //! | `steps.pvd`, `steps/*.vtu` | frames for ParaView |
 //! | `configuration_*`, `pe1_*`, `probes` | figures, as SVG and as the PNG rendered from it |
 //!
@@ -85,6 +86,9 @@ pub fn write_all(folder: &OutputFolder, results: &Results<'_>) -> Result<Vec<Pat
     let mut written = vec![csv::write_final(folder, engine.body(), &last)?];
     if !results.probes.is_empty() {
         written.push(csv::write_probes(folder, results.probes)?);
+    }
+    if !engine.breaks().is_empty() {
+        written.push(csv::write_breaks(folder, engine.body(), engine.breaks())?);
     }
     written.extend(write_figures(folder, results)?);
     let mut timings = results.timings;

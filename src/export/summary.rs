@@ -165,7 +165,7 @@ fn broken_bonds(engine: &Engine) -> BrokenBonds {
             step: one.step,
             pair: one.pair.map(|particle| particle as usize + 1),
             place: one.place,
-            along: engine.body().along(one.place),
+            along: engine.body().along()(one.place),
         }),
     }
 }

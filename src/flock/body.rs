@@ -92,12 +92,12 @@ impl Body {
         self.reference.bounds(matter).unwrap_or(([0.0; 2], [0.0; 2]))
     }
 
-    /// How far along the longer side of the body's bounds a place lies, from 0 to 1.
-    pub fn along(&self, place: [f64; 2]) -> f64 {
+    /// The measure of how far along the longer side of the body's bounds a place lies, from 0 to 1.
+    pub fn along(&self) -> impl Fn([f64; 2]) -> f64 + use<> {
         let (low, high) = self.bounds();
         let long = usize::from(high[1] - low[1] > high[0] - low[0]);
         let length = high[long] - low[long];
-        if length > 0.0 { (place[long] - low[long]) / length } else { 0.0 }
+        move |place| if length > 0.0 { (place[long] - low[long]) / length } else { 0.0 }
     }
 
     /// Refuses a body some of whose particles cannot feel each other through any chain of
