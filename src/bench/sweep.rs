@@ -11,7 +11,7 @@ use std::time::Instant;
 use rayon::{ThreadPoolBuildError, ThreadPoolBuilder};
 use serde::Serialize;
 
-use super::machine::{Bandwidth, Triad, median};
+use super::machine::{Bandwidth, median, time_triad};
 use crate::flock::interaction::Interaction;
 use crate::flock::lattice::{Lattice, LatticeKind};
 use crate::flock::neighbourhood::{Neighbourhood, Neighbours};
@@ -40,18 +40,11 @@ struct Effort {
     repetitions: usize,
     /// Time of one repetition [s]; a single step may take longer.
     seconds: f64,
-    triad_elements: usize,
 }
 
-const FULL: Effort = Effort {
-    sides: &[12, 256, 1024, 4096],
-    repetitions: 9,
-    seconds: 0.12,
-    // 768 MiB in three arrays: far beyond any cache.
-    triad_elements: 1 << 25,
-};
+const FULL: Effort = Effort { sides: &[12, 256, 1024, 4096], repetitions: 9, seconds: 0.12 };
 
-const QUICK: Effort = Effort { sides: &[12, 256], repetitions: 3, seconds: 1e-3, triad_elements: 1 << 18 };
+const QUICK: Effort = Effort { sides: &[12, 256], repetitions: 3, seconds: 1e-3 };
 
 /// The machine and the sweeps on it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -59,7 +52,7 @@ pub struct Report {
     /// Whether this was the quick run, whose times mean little.
     pub quick: bool,
     pub bytes_per_update: f64,
-    /// One entry for each number of threads.
+    /// One entry for each number of threads: the median over the whole run.
     pub triad: Vec<Bandwidth>,
     pub cases: Vec<Case>,
 }
@@ -72,10 +65,11 @@ pub struct Case {
     pub threads: usize,
     /// Particles that follow: all but the outermost.
     pub followers: usize,
-    /// Median over the repetitions [s].
+    /// Median over the repetitions \[s\].
     pub seconds_per_step: f64,
     pub updates_per_second: f64,
-    /// Of the updates per second that the triad's bandwidth would allow [1].
+    /// Of the updates per second that the triad's bandwidth would allow \[1\], going by those passes of
+    /// the triad that were taken in turn with this body's repetitions.
     pub share_of_roofline: f64,
 }
 
@@ -93,47 +87,44 @@ pub fn run(options: &Options) -> Result<Report, ThreadPoolBuildError> {
     };
     let mut lattices: Vec<SquareLattice> =
         effort.sides.iter().map(|&side| SquareLattice::new(side)).collect();
-    let mut triad = Triad::new(effort.triad_elements);
     for threads in THREADS {
         let pool = ThreadPoolBuilder::new().num_threads(threads).build()?;
-        pool.install(|| report.measure(threads, effort, &mut lattices, &mut triad));
+        pool.install(|| report.measure(threads, effort, &mut lattices));
     }
     Ok(report)
 }
 
 impl Report {
-    fn measure(
-        &mut self,
-        threads: usize,
-        effort: &Effort,
-        lattices: &mut [SquareLattice],
-        triad: &mut Triad,
-    ) {
-        // Between the bodies rather than once, so that a neighbour's load on the machine does not hit
-        // the triad or the sweeps alone.
-        triad.measure(effort.repetitions);
-        let first = self.cases.len();
-        for lattice in lattices {
-            let seconds_per_step = lattice.seconds_per_step(effort);
-            let (side, followers) = (lattice.side, lattice.followers());
-            let updates_per_second = followers as f64 / seconds_per_step;
-            let share_of_roofline = f64::NAN;
-            self.cases.push(Case {
-                side,
-                threads,
-                followers,
-                seconds_per_step,
-                updates_per_second,
-                share_of_roofline,
-            });
-            triad.measure(effort.repetitions);
+    fn measure(&mut self, threads: usize, effort: &Effort, lattices: &mut [SquareLattice]) {
+        let largest = lattices.len() - 1;
+        let elements = lattices[largest].present.len();
+        let mut passes = Vec::new();
+        for index in 0..lattices.len() {
+            let steps = lattices[index].steps_in(effort.seconds);
+            // In turn, so that a neighbour's load on the machine hits the sweep and the triad alike.
+            let (mut beside, mut times): (Vec<f64>, Vec<f64>) = (0..effort.repetitions)
+                .map(|_| (lattices[largest].time_triad(), lattices[index].time(steps)))
+                .unzip();
+            passes.extend_from_slice(&beside);
+            let bandwidth = Bandwidth::of_passes(elements, threads, &mut beside);
+            self.cases.push(Case::new(&lattices[index], median(&mut times), &bandwidth));
         }
-        let bandwidth = triad.take_bandwidth(threads);
-        let roofline = bandwidth.moved_bytes_per_second / BYTES_PER_UPDATE;
-        for case in &mut self.cases[first..] {
-            case.share_of_roofline = case.updates_per_second / roofline;
+        self.triad.push(Bandwidth::of_passes(elements, threads, &mut passes));
+    }
+}
+
+impl Case {
+    fn new(lattice: &SquareLattice, seconds_per_step: f64, bandwidth: &Bandwidth) -> Self {
+        let followers = lattice.followers();
+        let updates_per_second = followers as f64 / seconds_per_step;
+        Self {
+            side: lattice.side,
+            threads: bandwidth.threads,
+            followers,
+            seconds_per_step,
+            updates_per_second,
+            share_of_roofline: updates_per_second * BYTES_PER_UPDATE / bandwidth.moved_bytes_per_second,
         }
-        self.triad.push(bandwidth);
     }
 }
 
@@ -185,12 +176,21 @@ impl SquareLattice {
         (self.side - 2).pow(2)
     }
 
-    fn seconds_per_step(&mut self, effort: &Effort) -> f64 {
+    /// A small body's step is too short for the clock: as many as fill the time.
+    fn steps_in(&mut self, seconds: f64) -> usize {
         self.time(1);
-        // A small body's step is too short for the clock: as many as fill the time.
-        let steps = (effort.seconds / self.time(2)).clamp(1.0, 1e7) as usize;
-        let mut seconds: Vec<f64> = (0..effort.repetitions).map(|_| self.time(steps)).collect();
-        median(&mut seconds)
+        (seconds / self.time(2)).clamp(1.0, 1e7) as usize
+    }
+
+    /// Seconds of the triad over `x` and over `y`, on average: all the memory that a sweep uses.
+    fn time_triad(&mut self) -> f64 {
+        let (present, next) = (&self.present, &mut self.next);
+        let x = time_triad(&mut next.x, &present.x, &present.y);
+        let y = time_triad(&mut next.y, &present.y, &present.x);
+        // The held particles' places must stand in both.
+        next.x.copy_from_slice(&present.x);
+        next.y.copy_from_slice(&present.y);
+        f64::midpoint(x, y)
     }
 
     /// Seconds per step over some steps.
@@ -254,4 +254,53 @@ fn duration(seconds: f64) -> String {
         s => (s * 1e3, "ms"),
     };
     format!("{value:.*} {unit}", if value < 10.0 { 2 } else { usize::from(value < 100.0) })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_quick_run_measures_two_bodies_on_one_and_two_threads() {
+        let report = run(&Options { quick: true }).expect("threads");
+        let cases: Vec<_> = report.cases.iter().map(|case| (case.side, case.threads)).collect();
+        assert_eq!(cases, [(12, 1), (256, 1), (12, 2), (256, 2)]);
+        let json = serde_json::to_value(&report).expect("plain numbers");
+        for case in json["cases"].as_array().expect("cases") {
+            for key in ["seconds_per_step", "updates_per_second", "share_of_roofline"] {
+                assert!(case[key].as_f64().expect("a number") > 0.0, "{key}");
+            }
+        }
+        assert!(report.to_string().contains("256 x 256"));
+    }
+
+    #[test]
+    fn the_lattice_built_directly_is_the_one_a_scene_would_cut() {
+        use crate::flock::body::{Body, Cut};
+        let lattice = Lattice::new(LatticeKind::Square { spacing: 1.0 }, [0.0; 2], 0.0);
+        let cut = Cut::Count { columns: 9, rows: 9 };
+        let body = Body::build(lattice, &cut, &Neighbourhood::First { keep: None }, None).expect("fits");
+        let direct = SquareLattice::new(9);
+        assert_eq!(direct.interaction.reference, body.reference);
+        let inner = (1..8).flat_map(|column| (1..8).map(move |row| 9 * column + row));
+        for particle in inner {
+            assert_eq!(direct.interaction.neighbours.of(particle), body.neighbours.of(particle));
+        }
+        assert_eq!(direct.interaction.neighbours.index.len(), 4 * direct.followers());
+    }
+
+    #[test]
+    fn a_step_moves_the_followers_beside_the_stretched_side_and_nobody_held() {
+        let mut lattice = SquareLattice::new(12);
+        let before = lattice.present.clone();
+        lattice.time(1);
+        let moved: Vec<usize> = (0..144).filter(|&i| lattice.present.x[i] != before.x[i]).collect();
+        assert_eq!(moved, (10 * 12 + 1..10 * 12 + 11).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn durations_are_written_with_three_figures() {
+        let written = [1.234e-9, 45.67e-9, 345.6e-6, 7.891e-3, 1.5].map(duration);
+        assert_eq!(written, ["1.23 ns", "45.7 ns", "346 us", "7.89 ms", "1500 ms"]);
+    }
 }
