@@ -6,19 +6,30 @@
 //! keep their lists. Both ways sum in the neighbours' order and divide once, which is what
 //! [`Rule::target`](super::rules::Rule::target) does: the bits are the same.
 
+mod kernel;
+#[cfg(test)]
+mod tests;
+
 use super::neighbourhood::Neighbours;
 use super::points::Points;
 
-/// Particles per chunk: the unit of work for one thread.
-pub const CHUNK: usize = 1 << 14;
+/// Fewest and most particles in a chunk.
+const CHUNKS: [usize; 2] = [1 << 14, 1 << 17];
 
 /// Shorter runs are not worth the set-up of one.
 const SHORTEST_RUN: usize = 8;
+
+/// Particles per chunk, the unit of work for one thread, in a body of so many: large enough to hold
+/// many columns, small enough that every thread gets several.
+pub fn chunk_size(particles: usize) -> usize {
+    (particles / 64).clamp(CHUNKS[0], CHUNKS[1])
+}
 
 /// The particles that follow, as runs and lists, chunk by chunk.
 #[derive(Clone, Debug, Default)]
 pub struct Stencil {
     chunks: Vec<Chunk>,
+    chunk_size: usize,
     /// Index distances of all runs, one stencil after the other.
     distances: Vec<isize>,
 }
@@ -41,9 +52,10 @@ struct Run {
 impl Stencil {
     /// Compresses the lists of the particles that follow.
     pub fn compile(neighbours: &Neighbours, follows: &[bool]) -> Self {
-        let mut stencil = Self { chunks: Vec::new(), distances: Vec::new() };
-        for begin in (0..follows.len()).step_by(CHUNK) {
-            let end = (begin + CHUNK).min(follows.len());
+        let chunk_size = chunk_size(follows.len());
+        let mut stencil = Self { chunks: Vec::new(), chunk_size, distances: Vec::new() };
+        for begin in (0..follows.len()).step_by(chunk_size) {
+            let end = (begin + chunk_size).min(follows.len());
             let mut chunk = Chunk::default();
             let mut j = begin;
             while j < end {
@@ -82,24 +94,16 @@ impl Stencil {
         (present, rest): (&Points, Option<&Points>),
         (x, y): (&mut [f64], &mut [f64]),
     ) {
-        let (begin, chunk) = (index * CHUNK, &self.chunks[index]);
-        for run in &chunk.runs {
-            let distances = &self.distances[run.stencil as usize..(run.stencil + run.neighbours) as usize];
-            let (start, len) = (run.start as usize, run.len as usize);
-            let place = start - begin..start - begin + len;
-            sum_run(&present.x, distances, start, &mut x[place.clone()]);
-            sum_run(&present.y, distances, start, &mut y[place.clone()]);
-            if let Some(rest) = rest {
-                add(&rest.x[start..start + len], &mut x[place.clone()]);
-                add(&rest.y[start..start + len], &mut y[place]);
-            }
+        let (begin, chunk) = (index * self.chunk_size, &self.chunks[index]);
+        for alike in chunk.runs.chunk_by(|a, b| a.neighbours == b.neighbours) {
+            let rest_x = rest.map(|rest| &rest.x[..]);
+            let rest_y = rest.map(|rest| &rest.y[..]);
+            kernel::sweep(alike, &self.distances, (&present.x, rest_x), begin, x);
+            kernel::sweep(alike, &self.distances, (&present.y, rest_y), begin, y);
         }
         for &j in &chunk.listed {
             let j = j as usize;
-            let [tx, ty] = listed_mean(neighbours.of(j), present, j);
-            let [rx, ry] = rest.map_or([0.0; 2], |rest| rest.get(j));
-            x[j - begin] = tx + rx;
-            y[j - begin] = ty + ry;
+            [x[j - begin], y[j - begin]] = listed_target(neighbours.of(j), present, rest, j);
         }
     }
 
@@ -126,53 +130,18 @@ fn is_translate(neighbours: &Neighbours, j: usize, k: usize) -> bool {
     !a.is_empty() && a.len() == b.len() && a.iter().zip(b).all(|(&a, &b)| a + shift == b)
 }
 
-fn listed_mean(list: &[u32], present: &Points, j: usize) -> [f64; 2] {
+/// What [`Rule::target`](super::rules::Rule::target) computes: the rest offset is added to the mean,
+/// also where it is zero, which makes 0.0 of -0.0.
+fn listed_target(list: &[u32], present: &Points, rest: Option<&Points>, j: usize) -> [f64; 2] {
+    if list.is_empty() {
+        return present.get(j);
+    }
     let (mut x, mut y) = (-0.0, -0.0);
     for &k in list {
         x += present.x[k as usize];
         y += present.y[k as usize];
     }
     let count = list.len() as f64;
-    if list.is_empty() { present.get(j) } else { [x / count, y / count] }
-}
-
-fn sum_run(source: &[f64], distances: &[isize], start: usize, target: &mut [f64]) {
-    match distances.len() {
-        2 => sum_of::<2>(source, distances, start, target),
-        3 => sum_of::<3>(source, distances, start, target),
-        4 => sum_of::<4>(source, distances, start, target),
-        5 => sum_of::<5>(source, distances, start, target),
-        6 => sum_of::<6>(source, distances, start, target),
-        8 => sum_of::<8>(source, distances, start, target),
-        12 => sum_of::<12>(source, distances, start, target),
-        18 => sum_of::<18>(source, distances, start, target),
-        24 => sum_of::<24>(source, distances, start, target),
-        count => {
-            let shifted = |k: usize| &source[start.wrapping_add_signed(distances[k])..][..target.len()];
-            let first: Vec<&[f64]> = (0..count).map(shifted).collect();
-            for (i, target) in target.iter_mut().enumerate() {
-                *target = first.iter().fold(-0.0, |sum, slice| sum + slice[i]) / count as f64;
-            }
-        }
-    }
-}
-
-/// `N` known when compiled: the loop over the run vectorises and the sum unrolls.
-fn sum_of<const N: usize>(source: &[f64], distances: &[isize], start: usize, target: &mut [f64]) {
-    let len = target.len();
-    let shifted: [&[f64]; N] =
-        std::array::from_fn(|k| &source[start.wrapping_add_signed(distances[k])..][..len]);
-    for i in 0..len {
-        let mut sum = shifted[0][i];
-        for slice in &shifted[1..] {
-            sum += slice[i];
-        }
-        target[i] = sum / N as f64;
-    }
-}
-
-fn add(rest: &[f64], target: &mut [f64]) {
-    for (target, rest) in target.iter_mut().zip(rest) {
-        *target += rest;
-    }
+    let [rx, ry] = rest.map_or([0.0; 2], |rest| rest.get(j));
+    [x / count + rx, y / count + ry]
 }

@@ -12,7 +12,7 @@ use crate::flock::frame::Frame;
 use crate::flock::interaction::Interaction;
 use crate::flock::points::Points;
 use crate::flock::role::Role;
-use crate::flock::stencil::{CHUNK, Stencil};
+use crate::flock::stencil::{Stencil, chunk_size};
 
 /// Who sees whose new position within one step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,7 +27,7 @@ pub enum Order {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Update {
     pub order: Order,
-    /// `x <- x + damping (target - x)` [1]; 1 takes the target itself.
+    /// `x <- x + damping (target - x)` \[1\]; 1 takes the target itself.
     pub damping: f64,
 }
 
@@ -38,7 +38,7 @@ impl Default for Update {
 }
 
 /// Bodies below this many particles are swept by one thread: handing out work costs more.
-const PARALLEL_FROM: usize = 4 * CHUNK;
+const PARALLEL_FROM: usize = 1 << 16;
 
 /// The followers of a body, made ready to be swept.
 #[derive(Clone, Debug)]
@@ -88,7 +88,7 @@ impl Sweep {
                 });
             }
             (Order::Synchronous, None) => for_chunks(next, |chunk, x, y| {
-                let begin = chunk * CHUNK;
+                let begin = chunk * chunk_size(present.len());
                 for i in (0..x.len()).filter(|i| self.follows[begin + i]) {
                     [x[i], y[i]] = self.moved(begin + i, interaction, present);
                 }
@@ -122,16 +122,87 @@ fn followers(roles: &[Role]) -> Vec<bool> {
 /// Runs `work(chunk, x, y)` on every chunk of the points, in parallel where that pays.
 fn for_chunks(points: &mut Points, work: impl Fn(usize, &mut [f64], &mut [f64]) + Sync) {
     let parallel = points.len() >= PARALLEL_FROM && rayon::current_num_threads() > 1;
+    let size = chunk_size(points.len());
     let Points { x, y } = points;
     if parallel {
-        x.par_chunks_mut(CHUNK)
-            .zip(y.par_chunks_mut(CHUNK))
+        x.par_chunks_mut(size)
+            .zip(y.par_chunks_mut(size))
             .enumerate()
             .for_each(|(chunk, (x, y))| work(chunk, x, y));
     } else {
-        x.chunks_mut(CHUNK)
-            .zip(y.chunks_mut(CHUNK))
-            .enumerate()
-            .for_each(|(chunk, (x, y))| work(chunk, x, y));
+        x.chunks_mut(size).zip(y.chunks_mut(size)).enumerate().for_each(|(chunk, (x, y))| work(chunk, x, y));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flock::body::{Body, Cut};
+    use crate::flock::lattice::{Lattice, LatticeKind};
+    use crate::flock::neighbourhood::Neighbourhood;
+    use crate::flock::rules::{Mean, Rule};
+
+    /// Large enough to be swept in parallel, and of no whole number of chunks.
+    fn body(rule: Rule) -> Interaction {
+        let lattice = Lattice::new(LatticeKind::Hexagonal { spacing: 1.0 }, [0.0, 0.0], 0.1);
+        let cut = Cut::Count { columns: 263, rows: 301 };
+        let body = Body::build(lattice, &cut, &Neighbourhood::Second, None).expect("fits");
+        let (reference, neighbours) = (body.reference, body.neighbours);
+        let mut interaction =
+            Interaction { rule, reference, neighbours, weights: None, rest: None, bonds: None };
+        interaction.keep_rest();
+        interaction
+    }
+
+    fn bits(points: &Points) -> Vec<u64> {
+        points.x.iter().chain(&points.y).map(|value| value.to_bits()).collect()
+    }
+
+    fn after_steps(interaction: &Interaction, roles: &[Role], threads: usize) -> Points {
+        let sweep = Sweep::compile(Update::default(), interaction, roles);
+        let mut present = interaction.reference.clone();
+        for i in (0..present.len()).step_by(101) {
+            present.x[i] += 1.0 + (i % 13) as f64 / 7.0;
+        }
+        let mut next = present.clone();
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+        pool.install(|| {
+            for _ in 0..3 {
+                sweep.step(interaction, None, &present, &mut next);
+                std::mem::swap(&mut present, &mut next);
+            }
+        });
+        present
+    }
+
+    #[test]
+    fn any_number_of_threads_gives_the_same_bits() {
+        let weighted = Rule { mean: Mean::Distance { power: 1.0 }, ..Rule::BARYCENTRE };
+        for rule in [Rule::BARYCENTRE, weighted] {
+            let interaction = body(rule);
+            assert!(interaction.reference.len() > PARALLEL_FROM);
+            let mut roles = vec![Role::Follower; interaction.reference.len()];
+            roles[..301].fill(Role::Clamped);
+            let one = bits(&after_steps(&interaction, &roles, 1));
+            for threads in [2, 4] {
+                assert!(bits(&after_steps(&interaction, &roles, threads)) == one, "{threads} threads");
+            }
+        }
+    }
+
+    #[test]
+    fn a_compiled_sweep_gives_the_bits_of_an_uncompiled_one() {
+        let interaction = body(Rule::BARYCENTRE);
+        let mut roles = vec![Role::Follower; interaction.reference.len()];
+        roles.iter_mut().step_by(7919).for_each(|role| *role = Role::Leader);
+        let present: Points = interaction.reference.iter().map(|[x, y]| [x * 1.01, y - 0.02 * x]).collect();
+        let compiled = Sweep::compile(Update::default(), &interaction, &roles);
+        assert!(compiled.share_in_runs() > 0.95, "{}", compiled.share_in_runs());
+        let swept = |sweep: &Sweep| {
+            let mut next = present.clone();
+            sweep.step(&interaction, None, &present, &mut next);
+            bits(&next)
+        };
+        assert!(swept(&compiled) == swept(&Sweep::uncompiled(Update::default(), &roles)));
     }
 }

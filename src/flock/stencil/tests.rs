@@ -1,0 +1,150 @@
+use super::super::body::{Body, Cut};
+use super::super::interaction::Interaction;
+use super::super::lattice::{Lattice, LatticeKind};
+use super::super::neighbourhood::Neighbourhood;
+use super::super::rules::Rule;
+use super::super::shape::Shape;
+use super::*;
+
+const LATTICES: [LatticeKind; 6] = [
+    LatticeKind::Square { spacing: 1.0 },
+    LatticeKind::Rectangular { a: 1.0, b: 1.5 },
+    LatticeKind::CentredRectangular { a: 1.0, b: 1.5 },
+    LatticeKind::Hexagonal { spacing: 1.0 },
+    LatticeKind::Oblique { a: 1.0, b: 1.2, angle: 1.2 },
+    LatticeKind::Honeycomb { spacing: 1.0 },
+];
+
+/// Numbers that look random, of very different sizes and both signs, with zeros of both signs.
+fn rough(count: usize, seed: u64) -> Points {
+    let mut state = seed;
+    let mut draw = || {
+        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        let fraction = (state >> 12) as f64 / (1u64 << 52) as f64 - 0.5;
+        match (state >> 58) % 8 {
+            0 => -0.0,
+            1 => 1e6 * fraction,
+            2 => -5e-324,
+            _ => fraction,
+        }
+    };
+    (0..count).map(|_| [draw(), draw()]).collect()
+}
+
+fn lay(lattice: LatticeKind, cut: &Cut, neighbourhood: &Neighbourhood) -> Interaction {
+    let lattice = Lattice::new(lattice, [0.0, 0.0], 0.3);
+    let body = Body::build(lattice, cut, neighbourhood, None).expect("fits");
+    Interaction {
+        rule: Rule::BARYCENTRE,
+        reference: body.reference,
+        neighbours: body.neighbours,
+        weights: None,
+        rest: None,
+        bonds: None,
+    }
+}
+
+fn disc_with_hole() -> Cut {
+    let disc = |radius| Shape::Disc { centre: [0.0, 0.0], radius };
+    Cut::Shape(Shape::WithHoles { body: Box::new(disc(23.0)), holes: vec![disc(6.0)] })
+}
+
+/// Sweeps with the stencil and compares every bit with the rule; whoever does not follow keeps its
+/// mark. Gives the share in runs.
+fn compare(interaction: &Interaction, held: impl Fn(usize) -> bool, what: &str) -> f64 {
+    const MARK: f64 = 12345.0;
+    let count = interaction.reference.len();
+    let follows: Vec<bool> = (0..count).map(|j| !held(j)).collect();
+    let stencil = Stencil::compile(&interaction.neighbours, &follows);
+    let present = rough(count, 1);
+    let mut next = Points { x: vec![MARK; count], y: vec![MARK; count] };
+    let size = chunk_size(count);
+    for (chunk, (x, y)) in next.x.chunks_mut(size).zip(next.y.chunks_mut(size)).enumerate() {
+        stencil.sweep_chunk(chunk, &interaction.neighbours, (&present, interaction.rest.as_ref()), (x, y));
+    }
+    for (j, &follows) in follows.iter().enumerate() {
+        let expected = if follows { interaction.target(j, &present) } else { [MARK; 2] };
+        let bits = |point: [f64; 2]| point.map(f64::to_bits);
+        assert_eq!(bits(next.get(j)), bits(expected), "particle {j} of {count}, {what}: {expected:?}");
+    }
+    stencil.share_in_runs()
+}
+
+#[test]
+fn every_lattice_and_neighbourhood_gives_the_bits_of_the_rule() {
+    use Neighbourhood::{First, Ring, Second, Within};
+    let everywhere = [
+        First { keep: None },
+        First { keep: Some(3) },
+        Second,
+        Within { radius: 1.9 },
+        Within { radius: 3.1 },
+    ];
+    let rings = [Ring { radius: 1 }, Ring { radius: 2 }];
+    for kind in LATTICES {
+        let ringed = !matches!(kind, LatticeKind::Honeycomb { .. });
+        for neighbourhood in everywhere.iter().chain(rings.iter().filter(|_| ringed)) {
+            for cut in [disc_with_hole(), Cut::Count { columns: 9, rows: 300 }] {
+                let mut interaction = lay(kind, &cut, neighbourhood);
+                let what = format!("{kind:?} {neighbourhood:?}");
+                compare(&interaction, |j| j % 97 == 5, &what);
+                interaction.rest = Some(rough(interaction.reference.len(), 2));
+                compare(&interaction, |j| j % 97 == 5, &format!("{what} with rest offsets"));
+            }
+        }
+    }
+}
+
+#[test]
+fn numbers_of_neighbours_without_loops_of_their_own_give_the_bits_of_the_rule() {
+    for kind in LATTICES.into_iter().filter(|kind| !matches!(kind, LatticeKind::Honeycomb { .. })) {
+        let near = Lattice::new(kind, [0.0, 0.0], 0.0).offsets_within(0, 3.0);
+        for count in [1, 2, 7, 9, 10] {
+            let neighbourhood = Neighbourhood::Offsets(near[..count].to_vec());
+            let mut interaction = lay(kind, &disc_with_hole(), &neighbourhood);
+            compare(&interaction, |_| false, &format!("{kind:?}, {count} neighbours"));
+            interaction.rest = Some(rough(interaction.reference.len(), 3));
+            compare(&interaction, |_| false, &format!("{kind:?}, {count} neighbours with rest offsets"));
+        }
+    }
+}
+
+#[test]
+fn a_body_larger_than_the_caches_gives_the_bits_of_the_rule_and_is_nearly_all_runs() {
+    let square = LatticeKind::Square { spacing: 1.0 };
+    let cut = Cut::Count { columns: 521, rows: 601 };
+    let interaction = lay(square, &cut, &Neighbourhood::First { keep: None });
+    for (held, what) in [(usize::MAX, "all follow"), (300, "a row is held")] {
+        let share = compare(&interaction, |j| j % 601 == held, what);
+        assert!(share > 0.99, "{share}, {what}");
+    }
+}
+
+#[test]
+fn a_mean_of_negative_zeros_and_a_particle_without_neighbours_give_the_bits_of_the_rule() {
+    // Particles 1 to 20 see the one before them, the others nobody.
+    let lists = (0..22u32).map(|j| (1..21).contains(&j).then(|| j - 1));
+    let interaction = Interaction {
+        rule: Rule::BARYCENTRE,
+        reference: Points::zeros(22),
+        neighbours: Neighbours::from_lists(lists),
+        weights: None,
+        rest: None,
+        bonds: None,
+    };
+    let stencil = Stencil::compile(&interaction.neighbours, &[true; 22]);
+    assert!(stencil.share_in_runs() > 0.9);
+    let negative = || vec![-0.0; 22];
+    let present = Points { x: negative(), y: negative() };
+    let positive = Some(Points::zeros(22));
+    for rest in [None, Some(present.clone()), positive] {
+        let interaction = Interaction { rest, ..interaction.clone() };
+        let mut next = Points { x: vec![7.0; 22], y: vec![7.0; 22] };
+        let places = (&present, interaction.rest.as_ref());
+        stencil.sweep_chunk(0, &interaction.neighbours, places, (&mut next.x, &mut next.y));
+        for j in 0..22 {
+            let bits = |point: [f64; 2]| point.map(f64::to_bits);
+            assert_eq!(bits(next.get(j)), bits(interaction.target(j, &present)), "particle {j}");
+        }
+    }
+}
