@@ -11,7 +11,7 @@ use std::time::Instant;
 use rayon::{ThreadPoolBuildError, ThreadPoolBuilder};
 use serde::Serialize;
 
-use super::machine::{Bandwidth, Triad, median};
+use super::machine::{Bandwidth, median, time_triad};
 use crate::flock::interaction::Interaction;
 use crate::flock::lattice::{Lattice, LatticeKind};
 use crate::flock::neighbourhood::{Neighbourhood, Neighbours};
@@ -40,18 +40,11 @@ struct Effort {
     repetitions: usize,
     /// Time of one repetition [s]; a single step may take longer.
     seconds: f64,
-    triad_elements: usize,
 }
 
-const FULL: Effort = Effort {
-    sides: &[12, 256, 1024, 4096],
-    repetitions: 9,
-    seconds: 0.12,
-    // 768 MiB in three arrays: far beyond any cache.
-    triad_elements: 1 << 25,
-};
+const FULL: Effort = Effort { sides: &[12, 256, 1024, 4096], repetitions: 9, seconds: 0.12 };
 
-const QUICK: Effort = Effort { sides: &[12, 256], repetitions: 3, seconds: 1e-3, triad_elements: 1 << 18 };
+const QUICK: Effort = Effort { sides: &[12, 256], repetitions: 3, seconds: 1e-3 };
 
 /// The machine and the sweeps on it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -94,43 +87,44 @@ pub fn run(options: &Options) -> Result<Report, ThreadPoolBuildError> {
     };
     let mut lattices: Vec<SquareLattice> =
         effort.sides.iter().map(|&side| SquareLattice::new(side)).collect();
-    let mut triad = Triad::new(effort.triad_elements);
     for threads in THREADS {
         let pool = ThreadPoolBuilder::new().num_threads(threads).build()?;
-        pool.install(|| report.measure(threads, effort, &mut lattices, &mut triad));
+        pool.install(|| report.measure(threads, effort, &mut lattices));
     }
     Ok(report)
 }
 
 impl Report {
-    fn measure(
-        &mut self,
-        threads: usize,
-        effort: &Effort,
-        lattices: &mut [SquareLattice],
-        triad: &mut Triad,
-    ) {
-        triad.time();
+    fn measure(&mut self, threads: usize, effort: &Effort, lattices: &mut [SquareLattice]) {
+        let largest = lattices.len() - 1;
+        let elements = lattices[largest].present.len();
         let mut passes = Vec::new();
-        for lattice in lattices {
+        for index in 0..lattices.len() {
+            let steps = lattices[index].steps_in(effort.seconds);
             // In turn, so that a neighbour's load on the machine hits the sweep and the triad alike.
-            let steps = lattice.steps_in(effort.seconds);
-            let (mut beside, mut times): (Vec<f64>, Vec<f64>) =
-                (0..effort.repetitions).map(|_| (triad.time(), lattice.time(steps))).unzip();
+            let (mut beside, mut times): (Vec<f64>, Vec<f64>) = (0..effort.repetitions)
+                .map(|_| (lattices[largest].time_triad(), lattices[index].time(steps)))
+                .unzip();
             passes.extend_from_slice(&beside);
-            let (followers, seconds_per_step) = (lattice.followers(), median(&mut times));
-            let updates_per_second = followers as f64 / seconds_per_step;
-            let roofline = triad.bandwidth(threads, &mut beside).moved_bytes_per_second / BYTES_PER_UPDATE;
-            self.cases.push(Case {
-                side: lattice.side,
-                threads,
-                followers,
-                seconds_per_step,
-                updates_per_second,
-                share_of_roofline: updates_per_second / roofline,
-            });
+            let bandwidth = Bandwidth::of_passes(elements, threads, &mut beside);
+            self.cases.push(Case::new(&lattices[index], median(&mut times), &bandwidth));
         }
-        self.triad.push(triad.bandwidth(threads, &mut passes));
+        self.triad.push(Bandwidth::of_passes(elements, threads, &mut passes));
+    }
+}
+
+impl Case {
+    fn new(lattice: &SquareLattice, seconds_per_step: f64, bandwidth: &Bandwidth) -> Self {
+        let followers = lattice.followers();
+        let updates_per_second = followers as f64 / seconds_per_step;
+        Self {
+            side: lattice.side,
+            threads: bandwidth.threads,
+            followers,
+            seconds_per_step,
+            updates_per_second,
+            share_of_roofline: updates_per_second * BYTES_PER_UPDATE / bandwidth.moved_bytes_per_second,
+        }
     }
 }
 
@@ -186,6 +180,17 @@ impl SquareLattice {
     fn steps_in(&mut self, seconds: f64) -> usize {
         self.time(1);
         (seconds / self.time(2)).clamp(1.0, 1e7) as usize
+    }
+
+    /// Seconds of the triad over `x` and over `y`, on average: all the memory that a sweep uses.
+    fn time_triad(&mut self) -> f64 {
+        let (present, next) = (&self.present, &mut self.next);
+        let x = time_triad(&mut next.x, &present.x, &present.y);
+        let y = time_triad(&mut next.y, &present.y, &present.x);
+        // The held particles' places must stand in both.
+        next.x.copy_from_slice(&present.x);
+        next.y.copy_from_slice(&present.y);
+        f64::midpoint(x, y)
     }
 
     /// Seconds per step over some steps.

@@ -4,7 +4,7 @@
 ///
 /// Parallel arrays rather than an array of pairs, so that a sweep streams one coordinate at a
 /// time and the compiler can vectorise it.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Debug, Default, PartialEq)]
 pub struct Points {
     pub x: Vec<f64>,
     pub y: Vec<f64>,
@@ -48,6 +48,18 @@ impl Points {
             let (low, high) = bounds.unwrap_or(([x, y], [x, y]));
             Some(([low[0].min(x), low[1].min(y)], [high[0].max(x), high[1].max(y)]))
         })
+    }
+}
+
+impl Clone for Points {
+    fn clone(&self) -> Self {
+        Self { x: self.x.clone(), y: self.y.clone() }
+    }
+
+    /// Reuses the buffers, which a derived one would not: it stands in the step loop.
+    fn clone_from(&mut self, source: &Self) {
+        self.x.clone_from(&source.x);
+        self.y.clone_from(&source.y);
     }
 }
 
