@@ -3,6 +3,7 @@
 mod progress;
 mod run;
 
+use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -130,7 +131,9 @@ pub enum Refusal {
 pub fn start_log(verbose: u8) {
     let level = ["warn", "flockform=info", "flockform=debug", "trace"][usize::from(verbose.min(3))];
     let filter = tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| level.into());
-    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).without_time().init();
+    let colours = std::io::stderr().is_terminal();
+    let log = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr);
+    log.with_ansi(colours).without_time().init();
 }
 
 pub fn dispatch(command: Command) -> Result<ExitCode, Refusal> {

@@ -102,7 +102,7 @@ fn facts(scene: &Scene, plan: &Plan) -> Vec<(String, String)> {
         }
         None => format!("after {} steps", plan.stop.steps),
     };
-    let bonds = plan.interaction.neighbours.index.len();
+    let bonds = neighbour_entries(plan);
     let unit = scene.unit();
     let lattice = format!(
         "{}, nearest sites {:.6} {unit} apart",
@@ -149,10 +149,22 @@ fn cautions(scene: &Scene, plan: &Plan) -> Vec<String> {
     cautions
 }
 
+/// Entries of the neighbour lists; where they are found anew at every step, about as many as the
+/// radius holds at the reference density.
+fn neighbour_entries(plan: &Plan) -> usize {
+    match plan.present_radius {
+        None => plan.interaction.neighbours.index.len(),
+        Some(radius) => {
+            let within = std::f64::consts::PI * radius * radius / plan.body.lattice.cell_area();
+            (plan.count() as f64 * within.min(plan.count() as f64)) as usize
+        }
+    }
+}
+
 /// Bytes that the run holds: positions (twice), reference, roles, sites, neighbour lists and what
 /// the scene adds to them.
 fn memory(plan: &Plan) -> usize {
-    let (count, bonds) = (plan.count(), plan.interaction.neighbours.index.len());
+    let (count, bonds) = (plan.count(), neighbour_entries(plan));
     let present = |is: bool, bytes: usize| if is { bytes } else { 0 };
     count * (3 * 16 + 3 + 8 + 4)
         + bonds * 4

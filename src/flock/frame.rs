@@ -135,15 +135,6 @@ mod tests {
     use super::super::shape::Shape;
     use super::*;
 
-    const KINDS: [LatticeKind; 6] = [
-        LatticeKind::Square { spacing: 1.0 },
-        LatticeKind::Rectangular { a: 1.0, b: 1.5 },
-        LatticeKind::CentredRectangular { a: 1.0, b: 1.4 },
-        LatticeKind::Hexagonal { spacing: 1.0 },
-        LatticeKind::Oblique { a: 1.0, b: 1.2, angle: 1.2 },
-        LatticeKind::Honeycomb { spacing: 1.0 },
-    ];
-
     fn framed(
         kind: LatticeKind,
         shape: Shape,
@@ -174,7 +165,7 @@ mod tests {
 
     #[test]
     fn every_particle_of_a_framed_body_has_all_its_neighbours_on_every_lattice() {
-        for kind in KINDS {
+        for kind in LatticeKind::SAMPLES {
             for neighbourhood in [Neighbourhood::First { keep: None }, Neighbourhood::Second] {
                 for shape in [Shape::Disc { centre: [0.0; 2], radius: 4.0 }, corner()] {
                     let (body, counts) = framed(kind, shape, neighbourhood.clone(), FrameRule::Lagged);

@@ -296,20 +296,24 @@ fn rounded_angle(angle: f64, period: f64) -> i64 {
 }
 
 #[cfg(test)]
+impl LatticeKind {
+    /// One lattice of each kind, for tests that must hold on all of them.
+    pub(crate) const SAMPLES: [LatticeKind; 6] = [
+        LatticeKind::Square { spacing: 1.0 },
+        LatticeKind::Rectangular { a: 1.0, b: 1.5 },
+        LatticeKind::CentredRectangular { a: 1.0, b: 1.4 },
+        LatticeKind::Hexagonal { spacing: 1.0 },
+        LatticeKind::Oblique { a: 1.0, b: 1.2, angle: 1.2 },
+        LatticeKind::Honeycomb { spacing: 1.0 },
+    ];
+}
+
+#[cfg(test)]
 mod tests {
     use super::*;
 
     fn every_kind() -> Vec<Lattice> {
-        [
-            LatticeKind::Square { spacing: 1.0 },
-            LatticeKind::Rectangular { a: 1.0, b: 1.5 },
-            LatticeKind::CentredRectangular { a: 1.0, b: 1.4 },
-            LatticeKind::Hexagonal { spacing: 1.0 },
-            LatticeKind::Oblique { a: 1.0, b: 1.2, angle: 1.2 },
-            LatticeKind::Honeycomb { spacing: 1.0 },
-        ]
-        .map(|kind| Lattice::new(kind, [0.0, 0.0], 0.3))
-        .to_vec()
+        LatticeKind::SAMPLES.map(|kind| Lattice::new(kind, [0.0, 0.0], 0.3)).to_vec()
     }
 
     #[test]

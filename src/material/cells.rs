@@ -254,15 +254,6 @@ mod tests {
     use crate::flock::body::Cut;
     use crate::material::stiffness::area;
 
-    const KINDS: [LatticeKind; 6] = [
-        LatticeKind::Square { spacing: 1.0 },
-        LatticeKind::Rectangular { a: 1.0, b: 1.5 },
-        LatticeKind::CentredRectangular { a: 1.0, b: 1.4 },
-        LatticeKind::Hexagonal { spacing: 1.0 },
-        LatticeKind::Oblique { a: 1.0, b: 1.2, angle: 1.2 },
-        LatticeKind::Honeycomb { spacing: 1.0 },
-    ];
-
     fn body(kind: LatticeKind, orientation: f64) -> (Body, Neighbours) {
         let lattice = Lattice::new(kind, [5.0, -3.0], orientation);
         let neighbourhood = neighbourhood(&lattice);
@@ -271,7 +262,7 @@ mod tests {
 
     #[test]
     fn cells_run_counter_clockwise_and_each_particle_has_its_share_of_them() {
-        for kind in KINDS {
+        for kind in LatticeKind::SAMPLES {
             for orientation in [0.0, 2.0] {
                 let (body, _) = body(kind, orientation);
                 let cells = Cells::of_body(&body);
@@ -291,7 +282,7 @@ mod tests {
 
     #[test]
     fn mates_are_the_neighbourhood_that_the_room_asks_for() {
-        for kind in KINDS {
+        for kind in LatticeKind::SAMPLES {
             let (body, neighbours) = body(kind, 0.4);
             let mates = Cells::of_body(&body).mates(body.count());
             let fullest = (0..body.count()).max_by_key(|&i| mates.of(i).len()).expect("particles");
@@ -303,7 +294,7 @@ mod tests {
 
     #[test]
     fn a_frame_has_no_cells() {
-        let lattice = Lattice::new(KINDS[0], [0.0; 2], 0.0);
+        let lattice = Lattice::new(LatticeKind::SAMPLES[0], [0.0; 2], 0.0);
         let frame = crate::flock::frame::FrameRule::Lagged;
         let cut = Cut::Count { columns: 4, rows: 3 };
         let (body, _) =
@@ -315,7 +306,7 @@ mod tests {
 
     #[test]
     fn the_boundary_of_a_rectangle_runs_around_it_once() {
-        let (body, _) = body(KINDS[0], 0.0);
+        let (body, _) = body(LatticeKind::SAMPLES[0], 0.0);
         let cells = Cells::of_body(&body);
         let sides = cells.boundary_sides(&cells.incidence(body.count()));
         assert_eq!(sides.len(), 32);

@@ -6,15 +6,6 @@ use super::super::rules::Rule;
 use super::super::shape::Shape;
 use super::*;
 
-const LATTICES: [LatticeKind; 6] = [
-    LatticeKind::Square { spacing: 1.0 },
-    LatticeKind::Rectangular { a: 1.0, b: 1.5 },
-    LatticeKind::CentredRectangular { a: 1.0, b: 1.5 },
-    LatticeKind::Hexagonal { spacing: 1.0 },
-    LatticeKind::Oblique { a: 1.0, b: 1.2, angle: 1.2 },
-    LatticeKind::Honeycomb { spacing: 1.0 },
-];
-
 /// Numbers that look random, of very different sizes and both signs, with zeros of both signs.
 fn rough(count: usize, seed: u64) -> Points {
     let mut state = seed;
@@ -81,7 +72,7 @@ fn every_lattice_and_neighbourhood_gives_the_bits_of_the_rule() {
         Within { radius: 3.1 },
     ];
     let rings = [Ring { radius: 1 }, Ring { radius: 2 }];
-    for kind in LATTICES {
+    for kind in LatticeKind::SAMPLES {
         let ringed = !matches!(kind, LatticeKind::Honeycomb { .. });
         for neighbourhood in everywhere.iter().chain(rings.iter().filter(|_| ringed)) {
             for cut in [disc_with_hole(), Cut::Count { columns: 9, rows: 300 }] {
@@ -97,7 +88,8 @@ fn every_lattice_and_neighbourhood_gives_the_bits_of_the_rule() {
 
 #[test]
 fn numbers_of_neighbours_without_loops_of_their_own_give_the_bits_of_the_rule() {
-    for kind in LATTICES.into_iter().filter(|kind| !matches!(kind, LatticeKind::Honeycomb { .. })) {
+    for kind in LatticeKind::SAMPLES.into_iter().filter(|kind| !matches!(kind, LatticeKind::Honeycomb { .. }))
+    {
         let near = Lattice::new(kind, [0.0, 0.0], 0.0).offsets_within(0, 3.0);
         for count in [1, 2, 7, 9, 10] {
             let neighbourhood = Neighbourhood::Offsets(near[..count].to_vec());
