@@ -59,11 +59,4 @@ pub mod stiffness;
 pub mod weights;
 pub mod zone;
 
-/// A 2x2 matrix by rows: `block[a][b]` takes component `b` of a neighbour to component `a` of the
-/// particle.
-pub type Block = [[f64; 2]; 2];
-
-/// `block * vector`.
-pub(crate) fn apply(block: &Block, [x, y]: [f64; 2]) -> [f64; 2] {
-    [block[0][0] * x + block[0][1] * y, block[1][0] * x + block[1][1] * y]
-}
+pub use crate::flock::block::Block;

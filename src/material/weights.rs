@@ -7,7 +7,7 @@ use super::cells::{Cells, Incidence};
 use super::elastic::Elastic;
 use super::mechanism::{Mechanism, require_rigid};
 use super::stiffness::{ShapeError, element};
-use super::{Block, apply};
+use crate::flock::block::{Block, apply, inverse, plus, product};
 use crate::flock::body::Body;
 use crate::flock::neighbourhood::Neighbours;
 use crate::flock::points::Points;
@@ -251,24 +251,4 @@ impl Assembly<'_> {
             None => Err(WeightsError::Singular { particle: particle + 1 }),
         }
     }
-}
-
-fn plus(a: &Block, b: &Block) -> Block {
-    [[a[0][0] + b[0][0], a[0][1] + b[0][1]], [a[1][0] + b[1][0], a[1][1] + b[1][1]]]
-}
-
-pub(crate) fn product(a: &Block, b: &Block) -> Block {
-    let (left, right) = (apply(a, [b[0][0], b[1][0]]), apply(a, [b[0][1], b[1][1]]));
-    [[left[0], right[0]], [left[1], right[1]]]
-}
-
-/// The inverse of a positive definite block; `None` where it is singular to the precision of a double.
-pub(crate) fn inverse(block: &Block) -> Option<Block> {
-    let [[a, b], [c, d]] = *block;
-    // Scaled first, so that no product of two stiffnesses over- or underflows.
-    let scale = a.abs().max(d.abs());
-    let [a, b, c, d] = [a, b, c, d].map(|entry| entry / scale);
-    let determinant = a * d - b * c;
-    let regular = a > 0.0 && determinant > 1e-14;
-    regular.then(|| [[d, -b], [-c, a]].map(|row| row.map(|entry| entry / determinant / scale)))
 }

@@ -8,7 +8,7 @@
 use nalgebra::{Complex, DMatrix};
 
 use super::homogenise::{Crystal, HomogeniseError};
-use super::weights::{inverse, product};
+use crate::flock::block::{inverse, product};
 
 /// What the waves of a lattice say about its rule.
 #[derive(Clone, Copy, Debug, PartialEq)]
