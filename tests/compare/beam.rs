@@ -5,12 +5,11 @@ use std::time::Instant;
 
 use flockform::compare::measures::{Comparison, Sides};
 use flockform::compare::mesh::TruthMesh;
-use flockform::compare::truth::{Setting, Truth};
 use flockform::flock::body::Body;
+use flockform::flock::neighbourhood::Neighbourhood;
 use flockform::flock::points::Points;
 use flockform::material::cells::Cells;
-use flockform::material::elastic::{Constants, Elastic, Plane};
-use flockform::material::loads::{Loads, Traction};
+use flockform::material::weights::MaterialWeights;
 
 use crate::support::*;
 
@@ -33,33 +32,12 @@ fn reference(aspect: u32, body: &Body) -> Points {
     body.reference.iter().map(|p| [at(p)[2], at(p)[3]]).collect()
 }
 
-fn polypropylene() -> Elastic {
-    let constants = Constants::Isotropic { young: 1000.0, poisson: 0.33, plane: Plane::Stress };
-    Elastic::new(constants, 1.0).expect("admissible")
-}
-
-/// The left column clamped, 50 per length upwards on the right.
-fn solve_beam(body: &Body, cells: &Cells, refine: usize) -> Truth {
-    let (low, high) = body.bounds();
-    let x = |i: u32| body.reference.x[i as usize];
-    let held: Vec<Option<[f64; 2]>> =
-        body.reference.x.iter().map(|&x| (x == low[0]).then_some([0.0; 2])).collect();
-    let sides = cells.boundary_sides(&cells.incidence(body.count()));
-    let end = sides.into_iter().filter(|&[a, b]| x(a) == high[0] && x(b) == high[0]);
-    let tractions = end.map(|side| Traction::uniform(side, [0.0, 50.0])).collect();
-    let loads = Loads { tractions, ..Loads::default() };
-    let elastic = polypropylene();
-    let setting =
-        Setting { cells, reference: &body.reference, elastic: &elastic, held: &held, loads: &loads };
-    Truth::solve(&setting, refine).expect("solves")
-}
-
 /// Distance of the truth from the reference, by the measures of a comparison.
 fn distance_from_reference(aspect: u32, refine: Option<usize>) -> Comparison {
     let (body, cells) = beam(aspect);
     let refine = refine.unwrap_or_else(|| TruthMesh::default_refinement(&cells));
     let start = Instant::now();
-    let truth = solve_beam(&body, &cells, refine);
+    let truth = beam_truth(&body, &cells, refine);
     let seconds = start.elapsed().as_secs_f64();
     let follows: Vec<bool> = body.reference.x.iter().map(|&x| x > 10.5).collect();
     let sides = Sides {
@@ -98,5 +76,40 @@ fn the_truth_of_the_beam_by_refinement() {
     for refine in [1, 2, 3, 4, 6] {
         distance_from_reference(5, Some(refine));
         distance_from_reference(10, Some(refine));
+    }
+}
+
+/// What the rule makes of the beam whose end columns the truth leads.
+fn led_by_the_truth(aspect: u32, weights: impl FnOnce(&Body) -> MaterialWeights) -> Comparison {
+    let (body, cells) = beam(aspect);
+    let truth = beam_truth(&body, &cells, 4).displacement;
+    let follows = between_the_ends(&body);
+    let rule = equilibrium(&weights(&body), &follows, &truth);
+    let elastic = polypropylene();
+    let sides = Sides { cells: &cells, elastic: &elastic, rule: &rule, truth: &truth, follows: &follows };
+    Comparison::of(&sides).expect("measures")
+}
+
+#[test]
+fn the_material_rule_on_the_beam_is_within_half_a_percent_of_the_truth() {
+    let found = led_by_the_truth(1, |body| {
+        let cells = Cells::of_body(body);
+        MaterialWeights::assemble(&cells, body, cells.mates(body.count()), &polypropylene()).expect("fits")
+    });
+    assert!(found.displacement_rel_l2 < 0.005 && found.von_mises_rel_l2 < 0.025, "{found}");
+    assert!((found.displacement_rel_l2 - 0.00387).abs() < 2e-4, "{found}");
+    assert!((found.von_mises_rel_l2 - 0.0194).abs() < 1e-3, "{found}");
+}
+
+#[test]
+fn the_papers_rule_on_the_beam_has_its_large_errors_whatever_the_neighbours() {
+    for (neighbourhood, displacement, von_mises) in [
+        (Neighbourhood::First { keep: None }, 0.262, 0.74),
+        (Neighbourhood::Ring { radius: 1 }, 0.264, 0.76),
+        (Neighbourhood::Second, 0.264, 0.75),
+    ] {
+        let found = led_by_the_truth(1, |body| barycentre(body, &neighbourhood));
+        assert!((found.displacement_rel_l2 - displacement).abs() < 0.01, "{neighbourhood:?}\n{found}");
+        assert!((found.von_mises_rel_l2 - von_mises).abs() < 0.01, "{neighbourhood:?}\n{found}");
     }
 }

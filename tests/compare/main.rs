@@ -3,5 +3,7 @@
 mod beam;
 mod measured;
 mod mesh;
+#[cfg(feature = "export")]
+mod pictures;
 mod support;
 mod truth;

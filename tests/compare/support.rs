@@ -1,10 +1,15 @@
 //! Bodies and materials, shared by the tests of the comparison.
 
+use flockform::compare::truth::{Setting, Truth};
 use flockform::flock::body::{Body, Cut};
 use flockform::flock::lattice::{Lattice, LatticeKind};
+use flockform::flock::neighbourhood::{Neighbourhood, Neighbours};
 use flockform::flock::points::Points;
+use flockform::material::Block;
 use flockform::material::cells::{Cells, neighbourhood, without_loose_sites};
 use flockform::material::elastic::{Constants, Elastic, Plane};
+use flockform::material::loads::{Loads, Traction};
+use flockform::material::weights::MaterialWeights;
 
 pub const KINDS: [LatticeKind; 6] = [
     LatticeKind::Square { spacing: 1.0 },
@@ -54,4 +59,65 @@ pub fn on_boundary(cells: &Cells, count: usize) -> Vec<bool> {
 
 pub fn largest_difference(a: &Points, b: &Points) -> f64 {
     a.iter().zip(b.iter()).map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1])).fold(0.0, f64::max)
+}
+
+pub fn polypropylene() -> Elastic {
+    let constants = Constants::Isotropic { young: 1000.0, poisson: 0.33, plane: Plane::Stress };
+    Elastic::new(constants, 1.0).expect("admissible")
+}
+
+/// The paper's beam: the left column clamped, 50 per length upwards on the right.
+pub fn beam_truth(body: &Body, cells: &Cells, refine: usize) -> Truth {
+    let (low, high) = body.bounds();
+    let x = |i: u32| body.reference.x[i as usize];
+    let held: Vec<Option<[f64; 2]>> =
+        body.reference.x.iter().map(|&x| (x == low[0]).then_some([0.0; 2])).collect();
+    let sides = cells.boundary_sides(&cells.incidence(body.count()));
+    let end = sides.into_iter().filter(|&[a, b]| x(a) == high[0] && x(b) == high[0]);
+    let tractions = end.map(|side| Traction::uniform(side, [0.0, 50.0])).collect();
+    let loads = Loads { tractions, ..Loads::default() };
+    let elastic = polypropylene();
+    let setting =
+        Setting { cells, reference: &body.reference, elastic: &elastic, held: &held, loads: &loads };
+    Truth::solve(&setting, refine).expect("solves")
+}
+
+/// Who follows on the beam: all but its end columns.
+pub fn between_the_ends(body: &Body) -> Vec<bool> {
+    let (low, high) = body.bounds();
+    body.reference.x.iter().map(|&x| x > low[0] && x < high[0]).collect()
+}
+
+/// Eq. 1 with rest offsets: displacements go to the mean of those of the neighbours that there are.
+pub fn barycentre(body: &Body, neighbourhood: &Neighbourhood) -> MaterialWeights {
+    let cut = Cut::Count { columns: body.sites[body.count() - 1][0] as u32 + 1, rows: 12 };
+    let (_, neighbours) = Body::build(body.lattice.clone(), &cut, neighbourhood, None).expect("builds");
+    let scaled = |by: f64| -> Block { [[by, 0.0], [0.0, by]] };
+    let degree = |neighbours: &Neighbours, i: usize| neighbours.of(i).len() as f64;
+    MaterialWeights {
+        blocks: vec![scaled(1.0); neighbours.index.len()],
+        diagonal: (0..body.count()).map(|i| scaled(degree(&neighbours, i))).collect(),
+        inverse: (0..body.count()).map(|i| scaled(1.0 / degree(&neighbours, i))).collect(),
+        neighbours,
+    }
+}
+
+/// Sweeps over the followers, over-relaxed, until nothing moves.
+pub fn equilibrium(weights: &MaterialWeights, follows: &[bool], led: &Points) -> Points {
+    let mut u = led.clone();
+    (0..u.len()).filter(|&i| follows[i]).for_each(|i| u.set(i, [0.0; 2]));
+    for _ in 0..20_000 {
+        let mut largest = 0.0_f64;
+        for i in (0..u.len()).filter(|&i| follows[i]) {
+            let ([fx, fy], [a, b]) = (weights.force(i, &u), weights.inverse[i]);
+            let step = [a[0] * fx + a[1] * fy, b[0] * fx + b[1] * fy].map(|s| 1.7 * s);
+            largest = largest.max(step[0].hypot(step[1]));
+            let [x, y] = u.get(i);
+            u.set(i, [x + step[0], y + step[1]]);
+        }
+        if largest < 1e-12 {
+            return u;
+        }
+    }
+    panic!("not at rest");
 }
