@@ -71,12 +71,12 @@ fn material_imports_the_flock_alone() {
 
 #[test]
 fn scene_knows_nothing_of_hosts_and_outputs() {
-    assert_imports_only("scene", &["flock", "solve"]);
+    assert_imports_only("scene", &["flock", "solve", "material"]);
 }
 
 #[test]
 fn continuum_knows_nothing_of_outputs() {
-    assert_imports_only("continuum", &["flock", "solve", "scene"]);
+    assert_imports_only("continuum", &["flock", "solve", "scene", "material"]);
 }
 
 #[test]

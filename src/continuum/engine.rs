@@ -1,7 +1,8 @@
 //! The engine: one step of a planned body.
 
+use super::layout::RoleChange;
 use super::movement::Movement;
-use super::plan::{Plan, RoleChange};
+use super::plan::Plan;
 use crate::flock::body::Body;
 use crate::flock::fracture::Break;
 use crate::flock::grid::CellGrid;

@@ -5,6 +5,7 @@
 //! the body on the way (a recorder, a progress bar, an interrupt) gives it a closure to call.
 
 pub mod engine;
+pub mod layout;
 pub mod movement;
 pub mod plan;
 pub mod record;

@@ -4,8 +4,9 @@ use std::fmt;
 
 use super::plan::Plan;
 use crate::flock::fracture::Threshold;
+use crate::flock::interaction::Weights;
 use crate::flock::role::Role;
-use crate::flock::rules::{FeedbackReference, Mean};
+use crate::flock::rules::{FeedbackReference, Mean, Rotation};
 use crate::scene::Scene;
 use crate::solve::sweep::{Order, Sweep};
 
@@ -43,8 +44,12 @@ impl PlanReport {
             Mean::Power { exponent: 0.0, .. } => "geometric mean".to_owned(),
             Mean::Power { exponent, .. } => format!("power mean with exponent {exponent}"),
             Mean::Spaced { spacing, .. } => format!("cohesion with separation at {spacing}"),
+            Mean::Material { rotation: Rotation::Small } => "material (small rotations)".to_owned(),
+            Mean::Material { rotation: Rotation::Corotated } => "material (corotated)".to_owned(),
         };
         self.models(mean, "rule.mean");
+        let forces = plan.interaction.forces.as_ref().map(|_| format!("{} loads", scene.loads.len()));
+        self.models_or_not(forces, "loads", "nothing pushes the body but its leaders");
         let frame = scene.frame.map(|frame| {
             let points = plan.body.frame.as_ref().map_or(0, |frame| frame.len());
             format!("{} frame of {points} points", frame.name())
@@ -53,7 +58,14 @@ impl PlanReport {
         let rest =
             plan.interaction.rest.as_ref().map(|_| "rest offsets for unbalanced neighbourhoods".to_owned());
         self.models_or_not(rest, "rule.rest", "every neighbourhood is balanced, or rule.rest is \"literal\"");
-        let weights = plan.interaction.weights.as_ref().map(|_| "fixed weights".to_owned());
+        let weights = match &plan.interaction.weights {
+            Weights::Equal => None,
+            Weights::Scalar(_) => Some("fixed weights".to_owned()),
+            Weights::Matrix(weights) => Some(format!(
+                "2x2 weights from the material, {} kinds of neighbourhood",
+                weights.compliance.len()
+            )),
+        };
         self.models_or_not(weights, "rule.weights", "all neighbours count the same");
         let poisson = rule.poisson.map(|p| format!("Poisson term (Eq. 2), K = {}", p.k));
         self.models_or_not(poisson, "rule.poisson", "x and y do not act on each other");
@@ -168,7 +180,12 @@ fn memory(plan: &Plan) -> usize {
     let present = |is: bool, bytes: usize| if is { bytes } else { 0 };
     count * (3 * 16 + 3 + 8 + 4)
         + bonds * 4
-        + present(plan.interaction.weights.is_some(), 8 * bonds)
+        + match &plan.interaction.weights {
+            Weights::Equal => 0,
+            Weights::Scalar(weights) => 8 * weights.len(),
+            Weights::Matrix(weights) => 4 * count + 32 * weights.blocks.len(),
+        }
+        + present(plan.interaction.forces.is_some(), 16 * count)
         + present(plan.interaction.rest.is_some(), 16 * count)
         + present(plan.interaction.bonds.is_some(), bonds)
         + present(plan.present_radius.is_some(), 8 * count)

@@ -5,6 +5,7 @@ use std::ops::ControlFlow;
 use super::engine::Engine;
 use super::movement::{Movement, farthest, first_lost};
 use super::plan::Plan;
+use crate::flock::interaction::Weights;
 use crate::flock::points::distance;
 use crate::flock::rules::{FeedbackReference, Mean};
 use crate::solve::sweep::Order;
@@ -126,10 +127,15 @@ fn likely_cause(engine: &Engine) -> String {
     if let Some(poisson) = rule.poisson {
         return format!("the Poisson term adds K = {} at every step; use a smaller K", poisson.k);
     }
+    if matches!(rule.mean, Mean::Material { .. }) && engine.update().order == Order::Synchronous {
+        return format!(
+            "a material swept synchronously with damping = {damping} lets its shortest waves grow; leave update.damping out"
+        );
+    }
     if matches!(rule.mean, Mean::Distance { .. }) && engine.update().order == Order::Synchronous {
         return "weights that grow with distance are marginal in a synchronous update; use update.order = \"sequential\" or update.damping = 0.5".into();
     }
-    if engine.interaction().weights.is_some() {
+    if matches!(engine.interaction().weights, Weights::Scalar(_)) {
         return "weights of both signs; give weights that are not negative".into();
     }
     "a leader leaves the body behind; check the leaders' motions, or raise stop.growth".into()

@@ -44,12 +44,6 @@ pub enum RawNeighbours {
     },
 }
 
-impl Default for RawNeighbours {
-    fn default() -> Self {
-        RawNeighbours::First { keep: None }
-    }
-}
-
 /// How a follower's position comes from its neighbours'; what is not named is not evaluated.
 #[derive(Clone, Debug, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -105,6 +99,22 @@ pub enum RawMean {
         #[serde(default)]
         power: f64,
     },
+    /// Weighted by 2x2 matrices that make the body the scene's `[material]`. Free edges need no frame.
+    Material {
+        #[serde(default)]
+        rotation: RawRotation,
+    },
+}
+
+/// Which turns of the body cost a material nothing.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum RawRotation {
+    /// Small ones, to first order.
+    #[default]
+    Small,
+    /// All: each particle works in axes that turn with its neighbours.
+    Corotated,
 }
 
 /// What the coordinates of geometric and power means are measured from.
@@ -199,21 +209,16 @@ pub enum RawFeedbackReference {
 }
 
 /// How targets become positions.
-#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Debug, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawUpdate {
     #[serde(default)]
     pub order: RawOrder,
-    /// Part of the way to the target that is gone in one step [1].
-    #[serde(default = "super::defaults::one")]
+    /// Part of the way to the target that is gone in one step [1]. Unless given, 1; for the rule
+    /// `material` swept synchronously, nine tenths of the most at which no wave grows.
+    #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0, "maximum" = 2))]
-    pub damping: f64,
-}
-
-impl Default for RawUpdate {
-    fn default() -> Self {
-        Self { order: RawOrder::default(), damping: super::defaults::one() }
-    }
+    pub damping: Option<f64>,
 }
 
 /// Who sees whose new position within one step.
