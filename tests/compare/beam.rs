@@ -6,10 +6,7 @@ use std::time::Instant;
 use flockform::compare::measures::{Comparison, Sides};
 use flockform::compare::mesh::TruthMesh;
 use flockform::flock::body::Body;
-use flockform::flock::neighbourhood::Neighbourhood;
 use flockform::flock::points::Points;
-use flockform::material::cells::Cells;
-use flockform::material::weights::MaterialWeights;
 
 use crate::support::*;
 
@@ -79,37 +76,53 @@ fn the_truth_of_the_beam_by_refinement() {
     }
 }
 
-/// What the rule makes of the beam whose end columns the truth leads.
-fn led_by_the_truth(aspect: u32, weights: impl FnOnce(&Body) -> MaterialWeights) -> Comparison {
-    let (body, cells) = beam(aspect);
-    let truth = beam_truth(&body, &cells, 4).displacement;
-    let follows = between_the_ends(&body);
-    let rule = equilibrium(&weights(&body), &follows, &truth);
-    let elastic = polypropylene();
-    let sides = Sides { cells: &cells, elastic: &elastic, rule: &rule, truth: &truth, follows: &follows };
-    Comparison::of(&sides).expect("measures")
-}
-
 #[test]
-fn the_material_rule_on_the_beam_is_within_half_a_percent_of_the_truth() {
-    let found = led_by_the_truth(1, |body| {
-        let cells = Cells::of_body(body);
-        MaterialWeights::assemble(&cells, body, cells.mates(body.count()), &polypropylene()).expect("fits")
-    });
-    assert!(found.displacement_rel_l2 < 0.005 && found.von_mises_rel_l2 < 0.025, "{found}");
-    assert!((found.displacement_rel_l2 - 0.00387).abs() < 2e-4, "{found}");
-    assert!((found.von_mises_rel_l2 - 0.0194).abs() < 1e-3, "{found}");
-}
-
-#[test]
-fn the_papers_rule_on_the_beam_has_its_large_errors_whatever_the_neighbours() {
-    for (neighbourhood, displacement, von_mises) in [
-        (Neighbourhood::First { keep: None }, 0.262, 0.74),
-        (Neighbourhood::Ring { radius: 1 }, 0.264, 0.76),
-        (Neighbourhood::Second, 0.264, 0.75),
+fn table() {
+    for name in [
+        "beam",
+        "beam-loaded",
+        "beam-hexagonal",
+        "beam-paper",
+        "beam-paper-ring",
+        "beam-paper-second",
+        "beam-paper-reduced",
+        "beam-paper-hexagonal",
+        "beam-paper-hexagonal-reduced",
+        "beam-5",
+        "beam-paper-5",
+        "beam-10",
+        "beam-paper-10",
     ] {
-        let found = led_by_the_truth(1, |body| barycentre(body, &neighbourhood));
-        assert!((found.displacement_rel_l2 - displacement).abs() < 0.01, "{neighbourhood:?}\n{found}");
-        assert!((found.von_mises_rel_l2 - von_mises).abs() < 0.01, "{neighbourhood:?}\n{found}");
+        let f = compared(name, &[]);
+        let c = f.comparison;
+        println!(
+            "TAB {name:30} d {:.3} max {:.3} vm {:.3} en {:.3} steps {} res {:.1e} {:.2} s, truth {:.2} s {}",
+            100.0 * c.displacement_rel_l2,
+            100.0 * c.displacement_max_rel,
+            100.0 * c.von_mises_rel_l2,
+            100.0 * c.energy_rel,
+            f.outcome.engine.step(),
+            f.outcome.residual,
+            c.seconds_rule,
+            c.seconds_truth,
+            f.outcome.reason.name()
+        );
+    }
+    for name in ["beam-paper", "beam-paper-ring", "beam-paper-second"] {
+        for frame in ["lagged", "immediate", "mirror"] {
+            let f = compared(name, &[&format!("frame={frame}"), "update.damping=1.0"]);
+            let c = f.comparison;
+            println!(
+                "TAB {name:30} {frame} d {:.3} max {:.3} vm {:.3} en {:.3} steps {} res {:.1e} {:.2} s, truth {:.2} s",
+                100.0 * c.displacement_rel_l2,
+                100.0 * c.displacement_max_rel,
+                100.0 * c.von_mises_rel_l2,
+                100.0 * c.energy_rel,
+                f.outcome.engine.step(),
+                f.outcome.residual,
+                c.seconds_rule,
+                c.seconds_truth
+            );
+        }
     }
 }

@@ -3,7 +3,5 @@
 mod beam;
 mod measured;
 mod mesh;
-#[cfg(feature = "export")]
-mod pictures;
 mod support;
 mod truth;

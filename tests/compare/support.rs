@@ -1,5 +1,8 @@
 //! Bodies and materials, shared by the tests of the comparison.
 
+use std::ops::ControlFlow;
+
+use flockform::compare::run::{Compared, compare};
 use flockform::compare::truth::{Setting, Truth};
 use flockform::flock::body::{Body, Cut};
 use flockform::flock::lattice::{Lattice, LatticeKind};
@@ -9,7 +12,7 @@ use flockform::material::Block;
 use flockform::material::cells::{Cells, neighbourhood, without_loose_sites};
 use flockform::material::elastic::{Constants, Elastic, Plane};
 use flockform::material::loads::{Loads, Traction};
-use flockform::material::weights::MaterialWeights;
+use flockform::scene::bundled;
 
 pub const KINDS: [LatticeKind; 6] = [
     LatticeKind::Square { spacing: 1.0 },
@@ -82,42 +85,9 @@ pub fn beam_truth(body: &Body, cells: &Cells, refine: usize) -> Truth {
     Truth::solve(&setting, refine).expect("solves")
 }
 
-/// Who follows on the beam: all but its end columns.
-pub fn between_the_ends(body: &Body) -> Vec<bool> {
-    let (low, high) = body.bounds();
-    body.reference.x.iter().map(|&x| x > low[0] && x < high[0]).collect()
-}
-
-/// Eq. 1 with rest offsets: displacements go to the mean of those of the neighbours that there are.
-pub fn barycentre(body: &Body, neighbourhood: &Neighbourhood) -> MaterialWeights {
-    let cut = Cut::Count { columns: body.sites[body.count() - 1][0] as u32 + 1, rows: 12 };
-    let (_, neighbours) = Body::build(body.lattice.clone(), &cut, neighbourhood, None).expect("builds");
-    let scaled = |by: f64| -> Block { [[by, 0.0], [0.0, by]] };
-    let degree = |neighbours: &Neighbours, i: usize| neighbours.of(i).len() as f64;
-    MaterialWeights {
-        blocks: vec![scaled(1.0); neighbours.index.len()],
-        diagonal: (0..body.count()).map(|i| scaled(degree(&neighbours, i))).collect(),
-        inverse: (0..body.count()).map(|i| scaled(1.0 / degree(&neighbours, i))).collect(),
-        neighbours,
-    }
-}
-
-/// Sweeps over the followers, over-relaxed, until nothing moves.
-pub fn equilibrium(weights: &MaterialWeights, follows: &[bool], led: &Points) -> Points {
-    let mut u = led.clone();
-    (0..u.len()).filter(|&i| follows[i]).for_each(|i| u.set(i, [0.0; 2]));
-    for _ in 0..20_000 {
-        let mut largest = 0.0_f64;
-        for i in (0..u.len()).filter(|&i| follows[i]) {
-            let ([fx, fy], [a, b]) = (weights.force(i, &u), weights.inverse[i]);
-            let step = [a[0] * fx + a[1] * fy, b[0] * fx + b[1] * fy].map(|s| 1.7 * s);
-            largest = largest.max(step[0].hypot(step[1]));
-            let [x, y] = u.get(i);
-            u.set(i, [x + step[0], y + step[1]]);
-        }
-        if largest < 1e-12 {
-            return u;
-        }
-    }
-    panic!("not at rest");
+/// What the rule of a bundled scene makes of its body, with changes.
+pub fn compared(name: &str, overrides: &[&str]) -> Compared {
+    let overrides: Vec<String> = overrides.iter().map(|&text| text.into()).collect();
+    let scene = bundled(name).expect("bundled").load(&overrides).unwrap_or_else(|e| panic!("{e}"));
+    compare(&scene, Some(4), &mut |_, _| ControlFlow::Continue(())).unwrap_or_else(|e| panic!("{e}"))
 }
