@@ -12,15 +12,17 @@ use crate::material::cells::Cells;
 
 /// Bodies of more particles are drawn as outlines: dots would be one blot.
 const MOST_PARTICLES: usize = 20_000;
-/// Largest displacements below this part of the body's longer side cannot be seen and are enlarged.
+/// Displacements whose largest is below this part of the body's longer side cannot be seen.
 const SEEN: f64 = 0.02;
+/// Above this part they would make the body itself a speck: small strain has no bound on them.
+const LOST: f64 = 0.6;
 
 const TRUTH: &str = "#d55e00";
 const UNDEFORMED: &str = "#a8adb4";
 
 /// Two displacements of one body. Arrays follow the particles, shape \[particles\].
 #[derive(Clone, Copy, Debug)]
-pub struct Compared<'a> {
+pub struct Pair<'a> {
     pub title: &'a str,
     /// Name of the unit of length.
     pub unit: &'a str,
@@ -38,44 +40,45 @@ pub struct Compared<'a> {
 }
 
 /// Particles where the rule has them and where the truth has them, on the same axes.
-pub fn overlay(compared: &Compared<'_>) -> String {
-    let factor = compared.factor();
-    let [rule, truth] = [compared.rule, compared.truth].map(|u| compared.displaced(u, factor));
-    let axes = compared.window([compared.reference, &rule, &truth], Axes::equal);
-    let is_dotted = compared.roles.len() <= MOST_PARTICLES;
+pub fn overlay(pair: &Pair<'_>) -> String {
+    let factor = pair.factor();
+    let [rule, truth] = [pair.rule, pair.truth].map(|u| pair.displaced(u, factor));
+    let axes = pair.window([pair.reference, &rule, &truth], Axes::equal);
+    let is_dotted = pair.roles.len() <= MOST_PARTICLES;
     let mut note = "the rule's particles and the true ones".to_owned();
     if !is_dotted {
         note = "outlines by the rule and in truth".to_owned();
     }
     note += &told(factor);
-    let heading = Heading { title: compared.title.into(), note, legend: legend(compared, is_dotted) };
-    page::with_body(&heading, axes, compared.unit, 20.0, |svg, axes| {
+    let heading = Heading { title: pair.title.into(), note, legend: legend(pair, is_dotted) };
+    page::with_body(&heading, axes, pair.unit, 20.0, |svg, axes| {
         let dashes = "stroke-dasharray=\"5 3\"";
-        draw_outline(svg, axes, compared, compared.reference, &format!("stroke=\"{UNDEFORMED}\" {dashes}"));
-        draw_outline(svg, axes, compared, &truth, &format!("stroke=\"{TRUTH}\" stroke-width=\"1.2\""));
+        draw_outline(svg, axes, pair, pair.reference, &format!("stroke=\"{UNDEFORMED}\" {dashes}"));
+        draw_outline(svg, axes, pair, &truth, &format!("stroke=\"{TRUTH}\" stroke-width=\"1.2\""));
         if is_dotted {
-            draw_particles(svg, axes, compared, &rule, &truth);
+            draw_particles(svg, axes, pair, &rule, &truth);
         } else {
             let ink = colour::of_role(Role::Follower);
-            draw_outline(svg, axes, compared, &rule, &format!("stroke=\"{ink}\" stroke-width=\"1.2\""));
+            draw_outline(svg, axes, pair, &rule, &format!("stroke=\"{ink}\" stroke-width=\"1.2\""));
         }
     })
 }
 
-impl Compared<'_> {
-    /// By how much displacements are drawn larger than they are: 1, or 1, 2, 5 times a power of ten.
+impl Pair<'_> {
+    /// Times what displacements are drawn: 1, or 1, 2, 5 times a power of ten for those too small to be
+    /// seen and those so large that the body would be lost beside them.
     pub(super) fn factor(&self) -> f64 {
         let size = |u: [f64; 2]| u[0].hypot(u[1]);
-        let largest = self.drawn().map(|i| size(self.truth.get(i)).max(size(self.rule.get(i))));
-        let largest = largest.filter(|u| u.is_finite()).fold(0.0, f64::max);
+        let largest =
+            self.drawn().map(|i| size(self.truth.get(i))).filter(|u| u.is_finite()).fold(0.0, f64::max);
         let (low, high) = self.reference.bounds(self.drawn()).unwrap_or_default();
-        let wanted = 4.0 * SEEN * (high[0] - low[0]).max(high[1] - low[1]);
-        if largest == 0.0 || 4.0 * largest >= wanted {
+        let part = largest / (high[0] - low[0]).max(high[1] - low[1]);
+        if !part.is_normal() || (SEEN..=LOST).contains(&part) {
             return 1.0;
         }
-        let decade = 10f64.powf((wanted / largest).log10().floor());
-        let round = [5.0, 2.0, 1.0].map(|m| m * decade);
-        round.into_iter().find(|&factor| factor * largest <= wanted).unwrap_or(decade)
+        let wanted = if part < SEEN { 4.0 * SEEN } else { 0.5 * LOST } / part;
+        let decade = 10f64.powf(wanted.log10().floor());
+        [5.0, 2.0].map(|m| m * decade).into_iter().find(|&factor| factor <= wanted).unwrap_or(decade)
     }
 
     /// The particles that are matter: the frame and ghosts are no part of the truth.
@@ -106,23 +109,23 @@ impl Compared<'_> {
     }
 }
 
-/// How the note ends where displacements are enlarged.
+/// How the note ends: times what displacements are drawn.
 pub(super) fn told(factor: f64) -> String {
-    if factor == 1.0 {
-        ", displacements to scale".into()
-    } else {
-        format!(", displacements enlarged {factor} times")
+    match factor {
+        1.0 => ", displacements to scale".into(),
+        small if small < 1.0 => format!(", displacements drawn at {small} of their size"),
+        large => format!(", displacements enlarged {large} times"),
     }
 }
 
-fn legend(compared: &Compared<'_>, is_dotted: bool) -> Vec<Key> {
+fn legend(pair: &Pair<'_>, is_dotted: bool) -> Vec<Key> {
     let blue = colour::of_role(Role::Follower);
     let undeformed = Key { name: "undeformed", colour: UNDEFORMED, mark: Mark::DashedLine };
     if !is_dotted {
         let line = |name, colour| Key { name, colour, mark: Mark::Line };
         return vec![line("truth", TRUTH), line("rule", blue), undeformed];
     }
-    let present = |role: &Role| compared.roles.contains(role);
+    let present = |role: &Role| pair.roles.contains(role);
     let led = [Role::Leader, Role::Clamped].into_iter().filter(present);
     let dot = |role: Role| Key { name: role.name(), colour: colour::of_role(role), mark: Mark::Dot };
     let first = [
@@ -133,8 +136,8 @@ fn legend(compared: &Compared<'_>, is_dotted: bool) -> Vec<Key> {
 }
 
 /// The body's boundary with its corners at `places`.
-fn draw_outline(svg: &mut Svg, axes: &Axes, compared: &Compared<'_>, places: &Points, stroke: &str) {
-    let cells = compared.cells;
+fn draw_outline(svg: &mut Svg, axes: &Axes, pair: &Pair<'_>, places: &Points, stroke: &str) {
+    let cells = pair.cells;
     let mut path = Path::default();
     for side in cells.boundary_sides(&cells.incidence(places.len())) {
         let ends = side.map(|i| axes.place(places.get(i as usize)));
@@ -146,23 +149,23 @@ fn draw_outline(svg: &mut Svg, axes: &Axes, compared: &Compared<'_>, places: &Po
 }
 
 /// Rings where the truth is, dots where the rule is, and a line from each to the other.
-fn draw_particles(svg: &mut Svg, axes: &Axes, compared: &Compared<'_>, rule: &Points, truth: &Points) {
-    let radius = (0.75 * dot_radius(axes, compared.spacing)).min(4.2);
+fn draw_particles(svg: &mut Svg, axes: &Axes, pair: &Pair<'_>, rule: &Points, truth: &Points) {
+    let radius = (0.75 * dot_radius(axes, pair.spacing)).min(4.2);
     let ring = (radius + 1.4).min(1.5 * radius);
     let is_seen = |i: &usize| rule.get(*i).iter().chain(&truth.get(*i)).all(|value| value.is_finite());
     let mut errors = Path::default();
-    for i in compared.drawn().filter(is_seen) {
+    for i in pair.drawn().filter(is_seen) {
         errors.polyline([truth.get(i), rule.get(i)].map(|place| axes.place(place)));
     }
     svg.path(&errors, "class=\"error\" fill=\"none\" stroke=\"#6b7280\" stroke-width=\"0.8\"");
     for role in [Role::Follower, Role::Clamped, Role::Leader] {
         svg.group(format_args!("class=\"{}\" fill=\"{}\"", role.name(), colour::of_role(role)), |svg| {
-            for i in compared.drawn().filter(is_seen).filter(|&i| compared.roles[i] == role) {
+            for i in pair.drawn().filter(is_seen).filter(|&i| pair.roles[i] == role) {
                 svg.circle(axes.place(rule.get(i)), radius);
             }
         });
     }
     svg.group(format_args!("class=\"truth\" fill=\"none\" stroke=\"{TRUTH}\" stroke-width=\"1.3\""), |svg| {
-        compared.drawn().filter(is_seen).for_each(|i| svg.circle(axes.place(truth.get(i)), ring));
+        pair.drawn().filter(is_seen).for_each(|i| svg.circle(axes.place(truth.get(i)), ring));
     });
 }

@@ -28,7 +28,7 @@ use crate::continuum::engine::Engine;
 use crate::flock::body::Body;
 use crate::flock::neighbourhood::Neighbours;
 use crate::scene::Scene;
-pub use comparison::{Compared, overlay};
+pub use comparison::{Pair, overlay};
 pub use configuration::configuration;
 pub use energy::pe1;
 pub use history::probes;

@@ -2,7 +2,7 @@
 
 use super::axes::{Axes, Measure};
 use super::colour::viridis;
-use super::comparison::{Compared, told};
+use super::comparison::{Pair, told};
 use super::heading::Heading;
 use super::svg::{Anchor, INK, Path, Svg, text_width};
 use super::ticks::Ticks;
@@ -28,9 +28,9 @@ const BAR_GAP: f64 = 20.0;
 
 /// Rule, truth and the size of their difference at the centres of the cells, on one scale; `rule` and
 /// `truth` are \[force / length^2\], shape \[cells\].
-pub fn von_mises(compared: &Compared<'_>, rule: &[f64], truth: &[f64]) -> String {
-    let factor = compared.factor();
-    let [by_rule, in_truth] = [compared.rule, compared.truth].map(|u| compared.displaced(u, factor));
+pub fn von_mises(pair: &Pair<'_>, rule: &[f64], truth: &[f64]) -> String {
+    let factor = pair.factor();
+    let [by_rule, in_truth] = [pair.rule, pair.truth].map(|u| pair.displaced(u, factor));
     let apart: Vec<f64> = rule.iter().zip(truth).map(|(rule, truth)| (rule - truth).abs()).collect();
     let panels = [
         Panel { name: "rule", stress: rule, places: &by_rule },
@@ -39,19 +39,19 @@ pub fn von_mises(compared: &Compared<'_>, rule: &[f64], truth: &[f64]) -> String
     ];
     let scale = Scale::of(rule, truth);
     let places = || [&by_rule, &in_truth];
-    let row = compared.window(places(), |low, high, margin| Axes::fitted(low, high, margin, IN_ROW));
+    let row = pair.window(places(), |low, high, margin| Axes::fitted(low, high, margin, IN_ROW));
     let is_row = row.size[0] < 1.6 * row.size[1];
     let axes = if is_row {
         row
     } else {
-        compared.window(places(), |low, high, margin| Axes::fitted(low, high, margin, STACKED))
+        pair.window(places(), |low, high, margin| Axes::fitted(low, high, margin, STACKED))
     };
     let heading = Heading {
-        title: compared.title.into(),
+        title: pair.title.into(),
         note: format!("von Mises stress at the centres of the cells{}", told(factor)),
         legend: Vec::new(),
     };
-    Sheet { axes, is_row, scale, heading }.draw(compared, &panels)
+    Sheet { axes, is_row, scale, heading }.draw(pair, &panels)
 }
 
 /// One body filled with one field.
@@ -136,7 +136,7 @@ struct Sheet {
 }
 
 impl Sheet {
-    fn draw(mut self, compared: &Compared<'_>, panels: &[Panel<'_>; 3]) -> String {
+    fn draw(mut self, pair: &Pair<'_>, panels: &[Panel<'_>; 3]) -> String {
         let left = self.axes.left_of_plot();
         let [width, height] = self.axes.size;
         let step = if self.is_row { [width + GAP, 0.0] } else { [0.0, height + NAME + 8.0] };
@@ -147,19 +147,19 @@ impl Sheet {
         self.heading.draw(&mut svg, sheet_width);
         for (n, panel) in panels.iter().enumerate() {
             self.axes.corner = [left + n as f64 * step[0], top + n as f64 * step[1]];
-            self.draw_panel(&mut svg, compared, panel, n);
+            self.draw_panel(&mut svg, pair, panel, n);
         }
         let bar = [left + block[0] + BAR_GAP, top];
-        self.scale.draw(&mut svg, bar, block[1], compared.stress_unit);
+        self.scale.draw(&mut svg, bar, block[1], pair.stress_unit);
         svg.finish()
     }
 
-    fn draw_panel(&self, svg: &mut Svg, compared: &Compared<'_>, panel: &Panel<'_>, number: usize) {
-        let (axes, unit) = (&self.axes, compared.unit);
+    fn draw_panel(&self, svg: &mut Svg, pair: &Pair<'_>, panel: &Panel<'_>, number: usize) {
+        let (axes, unit) = (&self.axes, pair.unit);
         let name_at = [axes.corner[0] + axes.size[0] / 2.0, axes.corner[1] - 0.6 * NAME_TEXT - 2.0];
         svg.text(name_at, Anchor::Middle, NAME_TEXT, INK, panel.name);
         let mut paths = vec![Path::default(); SHADES + 1];
-        for (cell, &stress) in compared.cells.iter().zip(panel.stress) {
+        for (cell, &stress) in pair.cells.iter().zip(panel.stress) {
             let corners: Vec<[f64; 2]> =
                 cell.iter().map(|&i| axes.place(panel.places.get(i as usize))).collect();
             if stress.is_finite() && corners.iter().flatten().all(|value| value.is_finite()) {
