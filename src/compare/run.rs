@@ -127,6 +127,9 @@ fn plan_led_by(scene: &Scene, truth: &Truth) -> Result<Plan, SceneError> {
 
 /// The truth knows one body and one state of rest.
 fn require_comparable(scene: &Scene) -> Result<(), SceneError> {
+    if scene.material.is_none() {
+        return Err(without_material(scene));
+    }
     let later = scene.roles.iter().position(|entry| entry.from > 1 || entry.when.is_some());
     if let Some(k) = later {
         let key = if scene.roles[k].when.is_some() { "when" } else { "from" };
@@ -150,6 +153,11 @@ fn require_comparable(scene: &Scene) -> Result<(), SceneError> {
             "leave this out to compare",
         )),
     }
+}
+
+fn without_material(scene: &Scene) -> SceneError {
+    let help = "add [material] with kind = \"isotropic\", young and poisson";
+    scene.refuse("material", "the truth is that of a material, and the scene has none", help)
 }
 
 /// Particles in no cell cannot be led by a truth that does not know them.

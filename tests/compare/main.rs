@@ -3,5 +3,8 @@
 mod beam;
 mod measured;
 mod mesh;
+#[cfg(feature = "export")]
+mod outputs;
+mod refusals;
 mod support;
 mod truth;

@@ -137,15 +137,35 @@ fn legend(pair: &Pair<'_>, is_dotted: bool) -> Vec<Key> {
 
 /// The body's boundary with its corners at `places`.
 fn draw_outline(svg: &mut Svg, axes: &Axes, pair: &Pair<'_>, places: &Points, stroke: &str) {
-    let cells = pair.cells;
     let mut path = Path::default();
-    for side in cells.boundary_sides(&cells.incidence(places.len())) {
-        let ends = side.map(|i| axes.place(places.get(i as usize)));
-        if ends.iter().flatten().all(|value| value.is_finite()) {
-            path.polyline(ends);
+    for way in boundary(pair.cells, places.len()) {
+        let way: Vec<[f64; 2]> = way.iter().map(|&i| axes.place(places.get(i as usize))).collect();
+        if way.iter().flatten().all(|value| value.is_finite()) {
+            path.polyline(way);
         }
     }
-    svg.path(&path, format_args!("fill=\"none\" {stroke} stroke-linecap=\"round\""));
+    svg.path(&path, format_args!("class=\"outline\" fill=\"none\" {stroke} stroke-linejoin=\"round\""));
+}
+
+/// The ways around the body and its holes, each from a particle back to it. In one piece each, or the
+/// dashes of a line would begin anew at every particle.
+fn boundary(cells: &Cells, particles: usize) -> Vec<Vec<u32>> {
+    let mut onwards: Vec<Vec<u32>> = vec![Vec::new(); particles];
+    for [a, b] in cells.boundary_sides(&cells.incidence(particles)) {
+        onwards[a as usize].push(b);
+    }
+    let mut ways = Vec::new();
+    for start in 0..particles {
+        while let Some(mut here) = onwards[start].pop() {
+            let mut way = vec![start as u32, here];
+            while let Some(next) = onwards[here as usize].pop() {
+                way.push(next);
+                here = next;
+            }
+            ways.push(way);
+        }
+    }
+    ways
 }
 
 /// Rings where the truth is, dots where the rule is, and a line from each to the other.
@@ -168,4 +188,59 @@ fn draw_particles(svg: &mut Svg, axes: &Axes, pair: &Pair<'_>, rule: &Points, tr
     svg.group(format_args!("class=\"truth\" fill=\"none\" stroke=\"{TRUTH}\" stroke-width=\"1.3\""), |svg| {
         pair.drawn().filter(is_seen).for_each(|i| svg.circle(axes.place(truth.get(i)), ring));
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flock::body::{Body, Cut};
+    use crate::flock::lattice::{Lattice, LatticeKind};
+    use crate::flock::shape::Shape;
+    use crate::material::cells::neighbourhood;
+
+    #[test]
+    fn a_body_with_a_hole_is_outlined_by_two_closed_ways() {
+        let shape = Shape::Rectangle { min: [0.0; 2], max: [9.0, 6.0] };
+        for kind in LatticeKind::SAMPLES {
+            let lattice = Lattice::new(kind, [0.0; 2], 0.0);
+            let near = neighbourhood(&lattice);
+            let (body, _) = Body::build(lattice, &Cut::Shape(shape.clone()), &near, None).expect("builds");
+            let mut cells = Cells::of_body(&body);
+            let whole = boundary(&cells, body.count());
+            assert_eq!(whole.len(), 1, "{kind:?}");
+            // A cell that touches no side of the boundary.
+            let inner = |cell: &usize| cells.of(*cell).iter().all(|corner| !whole[0].contains(corner));
+            let hole = (0..cells.count()).find(inner).expect("inside");
+            cells.index.drain(hole * cells.corners..(hole + 1) * cells.corners);
+            cells.kind.remove(hole);
+            let ways = boundary(&cells, body.count());
+            let closed = ways.iter().filter(|way| way.first() == way.last()).count();
+            assert_eq!((ways.len(), closed), (2, 2), "{kind:?}");
+            assert_eq!(ways.iter().map(Vec::len).sum::<usize>(), whole[0].len() + cells.corners + 1);
+        }
+    }
+
+    #[test]
+    fn displacements_are_enlarged_or_reduced_by_round_factors_until_they_can_be_seen() {
+        let lattice = Lattice::new(LatticeKind::Square { spacing: 1.0 }, [0.0; 2], 0.0);
+        let near = neighbourhood(&lattice);
+        let cut = Cut::Count { columns: 11, rows: 3 };
+        let (body, _) = Body::build(lattice, &cut, &near, None).expect("builds");
+        let cells = Cells::of_body(&body);
+        for (size, factor) in [(1.0, 1.0), (0.0, 1.0), (5.9, 1.0), (1e-3, 500.0), (60.0, 0.05), (0.1, 5.0)] {
+            let moved: Points = body.reference.iter().map(|_| [0.0, size]).collect();
+            let pair = Pair {
+                title: "",
+                unit: "m",
+                stress_unit: "",
+                spacing: 1.0,
+                cells: &cells,
+                roles: &vec![Role::Follower; body.count()],
+                reference: &body.reference,
+                rule: &moved,
+                truth: &moved,
+            };
+            assert!((pair.factor() - factor).abs() < 1e-12 * factor, "{size}: {}", pair.factor());
+        }
+    }
 }

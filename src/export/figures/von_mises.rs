@@ -65,8 +65,8 @@ struct Panel<'a> {
 /// From zero stress to the end of the scale.
 struct Scale {
     end: f64,
-    /// Whether some stress lies above the end.
-    is_exceeded: bool,
+    /// The largest stress, if it lies above the end.
+    above: Option<f64>,
     ticks: Ticks,
 }
 
@@ -76,8 +76,12 @@ impl Scale {
         let (by_rule, in_truth) = (largest(rule), largest(truth));
         let end = if in_truth == 0.0 { by_rule } else { by_rule.min(HEADROOM * in_truth).max(in_truth) };
         let end = if end > 0.0 { end } else { 1.0 };
-        // The difference may exceed what both sides keep to only if one of them exceeds it too.
-        Self { end, is_exceeded: by_rule > end, ticks: Ticks::within(0.0, end, 10.0) }
+        // The difference, no larger than the larger of the two, keeps to what they keep to.
+        Self {
+            end,
+            above: Some(by_rule).filter(|&largest| largest > end),
+            ticks: Ticks::within(0.0, end, 10.0),
+        }
     }
 
     fn shade(&self, stress: f64) -> usize {
@@ -90,8 +94,12 @@ impl Scale {
 
     fn widest_label(&self) -> f64 {
         let width = |&value: &f64| text_width(&self.ticks.label(value), TICK_TEXT);
-        let above = if self.is_exceeded { text_width("above", TICK_TEXT) } else { 0.0 };
+        let above = self.above.map_or(0.0, |largest| text_width(&self.up_to(largest), TICK_TEXT));
         self.ticks.values.iter().map(width).fold(above, f64::max)
+    }
+
+    fn up_to(&self, largest: f64) -> String {
+        format!("up to {}", self.ticks.label(largest))
     }
 
     /// Room beside the panels \[px\].
@@ -100,7 +108,7 @@ impl Scale {
     }
 
     fn draw(&self, svg: &mut Svg, [left, top]: [f64; 2], height: f64, unit: &str) {
-        let above = if self.is_exceeded { 18.0 } else { 0.0 };
+        let above = if self.above.is_some() { 18.0 } else { 0.0 };
         let (top, height) = (top + above, height - above);
         // Each shade reaches under the next, so that no seam shows between them.
         for shade in 0..SHADES {
@@ -109,10 +117,11 @@ impl Scale {
         }
         svg.rect([left, top], [BAR_WIDTH, height], format_args!("fill=\"none\" stroke=\"{INK}\""));
         let text = left + BAR_WIDTH + 8.0;
-        if self.is_exceeded {
+        if let Some(largest) = self.above {
             let corner = [left, top - above];
             svg.rect(corner, [BAR_WIDTH, above - 4.0], format_args!("fill=\"{ABOVE}\" stroke=\"{INK}\""));
-            svg.text([text, top - above + 7.0], Anchor::Start, TICK_TEXT, INK, "above");
+            let at = [text, top - above + 7.0];
+            svg.text(at, Anchor::Start, TICK_TEXT, INK, &self.up_to(largest));
         }
         for &value in &self.ticks.values {
             let y = top + height * (1.0 - value / self.end);
