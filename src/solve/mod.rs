@@ -1,4 +1,7 @@
-//! Sweeps and spectra over the flock's interaction.
+//! Sweeps and spectra over the flock's interaction, and the solvers for equilibrium.
 
+pub mod equilibrium;
+pub mod field;
+pub mod operator;
 pub mod spectrum;
 pub mod sweep;
