@@ -7,5 +7,7 @@
 //! * [`sweep`]: particle updates per second of the plain rule, beside the roofline that bandwidth
 //!   draws.
 
+#[cfg(feature = "fem")]
+pub mod equilibrium;
 pub mod machine;
 pub mod sweep;

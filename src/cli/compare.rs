@@ -64,20 +64,18 @@ pub fn compare(arguments: &CompareArguments) -> Result<ExitCode, Refusal> {
 /// How the rule's run ended, and the table.
 fn words(scene: &Scene, compared: &Compared) -> String {
     let (outcome, truth) = (&compared.outcome, compared.truth.truth.mesh());
+    let residual = outcome.residual;
     let end = match &outcome.reason {
-        StopReason::Equilibrium => "the rule is at rest".to_owned(),
-        StopReason::Steps if scene.stop.tolerance.is_some() => {
-            format!("the rule is not at rest yet: residual {:.2e}", outcome.residual)
-        }
-        StopReason::Steps => format!("all steps done, residual {:.2e}", outcome.residual),
+        StopReason::Equilibrium => "at rest".to_owned(),
+        StopReason::Unsettled => format!("not at rest: the solver ended at a residual of {residual:.2e}"),
+        StopReason::Steps => format!("all steps done, residual {residual:.2e}"),
         StopReason::Interrupted => "interrupted: compared as far as it came".to_owned(),
         StopReason::Diverged(divergence) => format!("{divergence}; the last good state is compared"),
     };
+    let way = match &outcome.solved {
+        Some(solved) => format!("{}, {} iterations", solved.solver, solved.iterations),
+        None => format!("{} steps", outcome.engine.step()),
+    };
     let nodes = truth.mesh().node_count();
-    format!(
-        "{}: {end} after {} steps; truth on {nodes} nodes\n{}",
-        scene.name,
-        outcome.engine.step(),
-        compared.comparison
-    )
+    format!("{}: the rule by {way}, {end}; truth on {nodes} nodes\n{}", scene.name, compared.comparison)
 }

@@ -152,7 +152,7 @@ pub fn dispatch(command: Command) -> Result<ExitCode, Refusal> {
         Command::Scenes => list_scenes()?,
         Command::Plan(arguments) => {
             let scene = arguments.load([])?;
-            print(&PlanReport::new(&scene, &plan(&scene)?).to_string());
+            print(&PlanReport::new(&scene, &plan(&scene)?)?.to_string());
         }
         Command::Schema => print(&format!("{:#}\n", scene::validate::schema())),
         Command::Completions { shell } => {

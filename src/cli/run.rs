@@ -9,9 +9,10 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use flockform::continuum::engine::Engine;
+use flockform::continuum::equilibrium::come_to_rest;
 use flockform::continuum::plan::Plan;
 use flockform::continuum::record::{ProbeSeries, Snapshot};
-use flockform::continuum::run::{Outcome, StopReason, run as run_plan};
+use flockform::continuum::run::{Outcome, StopReason};
 use flockform::export::{ExportError, OutputFolder, Results, Timings, VtkSeries, write_all};
 use flockform::scene::Scene;
 
@@ -59,12 +60,12 @@ fn run_here(arguments: &RunArguments) -> Result<ExitCode, Refusal> {
     let mut progress = Progress::new(arguments.quiet, scene.stop.steps);
     let interrupted = interrupt_flag();
     let stepping = Instant::now();
-    let outcome = run_plan(plan, &mut |engine, residual| {
+    let outcome = come_to_rest(&scene, plan, &mut |engine, residual| {
         recorder.step(engine);
         progress.step(engine.step(), residual);
         let stop = recorder.failed() || interrupted.load(Ordering::Relaxed);
         if stop { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-    });
+    })?;
     progress.finish();
 
     let elapsed = stepping.elapsed();
@@ -174,6 +175,7 @@ fn closing_words(scene: &Scene, outcome: &Outcome, elapsed: Duration, kept: &Pat
     let engine = &outcome.engine;
     let how = match &outcome.reason {
         StopReason::Equilibrium => "in equilibrium".to_owned(),
+        StopReason::Unsettled => "the solver ended short of its tolerance".to_owned(),
         StopReason::Steps => "all steps done".to_owned(),
         StopReason::Interrupted => "interrupted: what there was is written".to_owned(),
         StopReason::Diverged(divergence) => format!("{divergence}; the last good state is written"),
@@ -185,6 +187,18 @@ fn closing_words(scene: &Scene, outcome: &Outcome, elapsed: Duration, kept: &Pat
         outcome.residual,
         elapsed.as_secs_f64()
     );
+    if let Some(solved) = &outcome.solved {
+        let phases: Vec<String> =
+            solved.phases.iter().map(|(name, time)| format!("{name} {:.3} s", time.as_secs_f64())).collect();
+        words += &format!(
+            "{}, {}: {} iterations to a residual force of {:.1e} of the load, {}\n",
+            solved.solver,
+            solved.why,
+            solved.iterations,
+            solved.residuals.last().copied().unwrap_or_default(),
+            phases.join(", ")
+        );
+    }
     let broken: Vec<_> = engine.breaks().iter().filter(|b| b.step > 0).collect();
     if let (Some(first), Some(last)) = (broken.first(), broken.last()) {
         words += &format!(
@@ -204,6 +218,6 @@ fn closing_words(scene: &Scene, outcome: &Outcome, elapsed: Duration, kept: &Pat
 pub fn exit_code(outcome: &Outcome) -> ExitCode {
     match outcome.reason {
         StopReason::Equilibrium | StopReason::Steps => ExitCode::SUCCESS,
-        StopReason::Interrupted | StopReason::Diverged(_) => ExitCode::from(FAILED),
+        StopReason::Unsettled | StopReason::Interrupted | StopReason::Diverged(_) => ExitCode::from(FAILED),
     }
 }

@@ -7,9 +7,10 @@ use super::measures::{Comparison, Sides, von_mises};
 use super::mesh::{MeshError, TruthMesh};
 use super::truth::{Setting, Truth, TruthError};
 use crate::continuum::engine::Engine;
+use crate::continuum::equilibrium::come_to_rest;
 use crate::continuum::layout::{Layout, RoleChange, held};
 use crate::continuum::plan::Plan;
-use crate::continuum::run::{Outcome, run};
+use crate::continuum::run::Outcome;
 use crate::flock::points::Points;
 use crate::flock::role::Role;
 use crate::material::cells::Cells;
@@ -84,7 +85,7 @@ pub fn plan(scene: &Scene) -> Result<Plan, SceneError> {
 }
 
 /// Runs the rule of a scene to its end and measures where it has the body against where the truth has it.
-/// `watch` sees the run as in [`run`].
+/// `watch` sees the run as [`come_to_rest`] shows it.
 ///
 /// # Errors
 /// Names the key of a scene that has no truth, or none that its end could be held against.
@@ -98,7 +99,7 @@ pub fn compare(
     let start = Instant::now();
     let plan = plan_led_by(scene, &truth.truth)?;
     let cells = plan.cells.clone().unwrap_or_else(|| Cells::of_body(&plan.body));
-    let outcome = run(plan, watch);
+    let outcome = come_to_rest(scene, plan, watch)?;
     let time = start.elapsed();
 
     let engine = &outcome.engine;

@@ -8,13 +8,16 @@ use super::plan::Plan;
 use crate::flock::interaction::Weights;
 use crate::flock::points::distance;
 use crate::flock::rules::{FeedbackReference, Mean};
+use crate::solve::equilibrium::Solved;
 use crate::solve::sweep::Order;
 
 /// Why a run ended.
 #[derive(Clone, Debug, PartialEq)]
 pub enum StopReason {
-    /// Nothing moved farther in a step than the tolerance.
+    /// Nothing moved farther in a step than the tolerance, or the solver reached its own.
     Equilibrium,
+    /// The solver ended short of its tolerance.
+    Unsettled,
     /// The scene's number of steps was reached.
     Steps,
     /// Whoever watched asked for it.
@@ -26,6 +29,7 @@ impl StopReason {
     pub fn name(&self) -> &'static str {
         match self {
             StopReason::Equilibrium => "equilibrium",
+            StopReason::Unsettled => "unsettled",
             StopReason::Steps => "steps",
             StopReason::Interrupted => "interrupted",
             StopReason::Diverged(_) => "diverged",
@@ -61,6 +65,8 @@ pub struct Outcome {
     pub reason: StopReason,
     /// Largest one-step motion over the spacing, at the last step.
     pub residual: f64,
+    /// How the equilibrium was found, unless it was stepped to.
+    pub solved: Option<Solved>,
 }
 
 /// Runs a plan to its end. `watch` sees the engine before the first step (with an infinite residual)
@@ -91,7 +97,7 @@ pub fn run(plan: Plan, watch: &mut dyn FnMut(&Engine, f64) -> ControlFlow<()>) -
             break StopReason::Equilibrium;
         }
     };
-    Outcome { engine, reason, residual }
+    Outcome { engine, reason, residual, solved: None }
 }
 
 fn divergence(engine: &Engine, movement: &Movement, bound: f64) -> Option<Divergence> {

@@ -34,8 +34,11 @@ pub struct ComparisonReport {
 pub struct RuleEnd {
     pub steps: usize,
     pub stop_reason: &'static str,
-    /// Largest one-step motion over the spacing, at the last step.
+    /// How far the follower farthest from its target is from it, over the spacing.
     pub residual: Option<f64>,
+    /// Who found the equilibrium, where it was not stepped to, and in how many iterations.
+    pub solver: Option<&'static str>,
+    pub iterations: Option<usize>,
 }
 
 /// What the truth was computed on.
@@ -82,6 +85,8 @@ impl ComparisonReport {
                 steps: outcome.engine.step(),
                 stop_reason: outcome.reason.name(),
                 residual: Some(outcome.residual).filter(|residual| residual.is_finite()),
+                solver: outcome.solved.as_ref().map(|solved| solved.solver.name()),
+                iterations: outcome.solved.as_ref().map(|solved| solved.iterations),
             },
             truth: TruthSize {
                 refine: truth.mesh().refine(),

@@ -1,5 +1,6 @@
 //! `summary.json`: what was run, how it ended, in numbers.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -13,6 +14,7 @@ use crate::continuum::run::{Outcome, StopReason};
 use crate::flock::role::Role;
 use crate::scene::Scene;
 use crate::scene::raw::RawScene;
+use crate::solve::equilibrium::Solved;
 
 pub(super) const PROGRAM: &str = env!("CARGO_PKG_NAME");
 const FILE: &str = "summary.json";
@@ -44,6 +46,8 @@ pub struct Summary {
     pub divergence: Option<String>,
     /// Largest one-step motion over the spacing, at the last step.
     pub residual: Option<f64>,
+    /// How the equilibrium was found, unless it was stepped to.
+    pub equilibrium: Option<Equilibrium>,
     pub energies: Energies,
     pub broken_bonds: BrokenBonds,
     pub timings: Seconds,
@@ -93,6 +97,20 @@ pub struct FirstBreak {
     pub along: f64,
 }
 
+/// What the solver did.
+#[derive(Clone, Debug, Serialize, PartialEq)]
+pub struct Equilibrium {
+    pub solver: &'static str,
+    /// Why this one.
+    pub why: String,
+    pub iterations: usize,
+    pub converged: bool,
+    /// Residual force over the load's, at the end \[1\].
+    pub residual: f64,
+    /// Seconds by phase.
+    pub phases: BTreeMap<&'static str, f64>,
+}
+
 /// [`Timings`] in seconds.
 #[derive(Clone, Copy, Debug, Serialize, PartialEq)]
 pub struct Seconds {
@@ -118,6 +136,7 @@ impl Summary {
                 _ => None,
             },
             residual: Some(outcome.residual).filter(|residual| residual.is_finite()),
+            equilibrium: outcome.solved.as_ref().map(Equilibrium::of),
             energies: Energies { pe1, pe2 },
             broken_bonds: broken_bonds(&outcome.engine),
             timings: Seconds {
@@ -135,6 +154,19 @@ impl Summary {
         text.push('\n');
         write_file(&path, text)?;
         Ok(path)
+    }
+}
+
+impl Equilibrium {
+    fn of(solved: &Solved) -> Self {
+        Self {
+            solver: solved.solver.name(),
+            why: solved.why.clone(),
+            iterations: solved.iterations,
+            converged: solved.converged,
+            residual: solved.residuals.last().copied().unwrap_or_default(),
+            phases: solved.phases.iter().map(|(name, time)| (*name, time.as_secs_f64())).collect(),
+        }
     }
 }
 

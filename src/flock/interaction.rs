@@ -44,8 +44,10 @@ pub struct MatrixWeights {
     pub class: Vec<u32>,
     /// Where each class begins in `blocks`, shape \[classes + 1\].
     pub starts: Vec<u32>,
-    /// `W_ij` \[1\] in the order of the particle's neighbours.
+    /// `W_ij = D_i^-1 K_ij` \[1\] in the order of the particle's neighbours.
     pub blocks: Vec<Block>,
+    /// `K_ij` \[force / length\], parallel to `blocks`: what solvers work with, since it is symmetric.
+    pub stiffness: Vec<Block>,
     /// `D_i^-1` \[length / force\], shape \[classes\].
     pub compliance: Vec<Block>,
 }
@@ -53,8 +55,17 @@ pub struct MatrixWeights {
 impl MatrixWeights {
     /// Weights of a particle, parallel to its neighbours.
     pub fn of(&self, particle: usize) -> &[Block] {
+        &self.blocks[self.range(particle)]
+    }
+
+    /// Stiffnesses of a particle, parallel to its neighbours.
+    pub fn stiffness_of(&self, particle: usize) -> &[Block] {
+        &self.stiffness[self.range(particle)]
+    }
+
+    fn range(&self, particle: usize) -> std::ops::Range<usize> {
         let class = self.class[particle] as usize;
-        &self.blocks[self.starts[class] as usize..self.starts[class + 1] as usize]
+        self.starts[class] as usize..self.starts[class + 1] as usize
     }
 
     pub fn compliance(&self, particle: usize) -> Block {
@@ -82,6 +93,11 @@ impl Weights {
 impl Interaction {
     /// Target position of `particle` when all stand at `present` \[length, world frame\].
     pub fn target(&self, particle: usize, present: &Points) -> [f64; 2] {
+        self.target_by(&self.rule, particle, present)
+    }
+
+    /// Target position by another rule over the same neighbours and weights.
+    pub fn target_by(&self, rule: &Rule, particle: usize, present: &Points) -> [f64; 2] {
         let own = Own {
             present: present.get(particle),
             reference: self.reference.get(particle),
@@ -90,9 +106,9 @@ impl Interaction {
         };
         match &self.bonds {
             Some(bonds) if bonds.any_broken() => {
-                self.rule.target(&own, self.seen_with_ghosts(particle, present, bonds))
+                rule.target(&own, self.seen_with_ghosts(particle, present, bonds))
             }
-            _ => self.rule.target(&own, self.seen(particle, present)),
+            _ => rule.target(&own, self.seen(particle, present)),
         }
     }
 

@@ -138,10 +138,12 @@ impl MaterialWeights {
             class: self.class.clone(),
             starts: vec![0],
             blocks: Vec::new(),
+            stiffness: Vec::new(),
             compliance: self.rows.iter().map(|row| row.inverse).collect(),
         };
         for row in &self.rows {
             weights.blocks.extend(row.blocks.iter().map(|block| product(&row.inverse, block)));
+            weights.stiffness.extend(&row.blocks);
             weights.starts.push(weights.blocks.len() as u32);
         }
         weights
@@ -246,6 +248,10 @@ impl Assembly<'_> {
         (class, first)
     }
 
+    fn most_neighbours(&self) -> usize {
+        (0..self.neighbours.count()).map(|i| self.neighbours.of(i).len()).max().unwrap_or(0)
+    }
+
     /// `None` where cells differ in more than their kind, or do not fit the pattern.
     fn pattern(&self, particle: usize) -> Option<Pattern> {
         if self.factor.is_some() || self.cells.shapes.len() > 2 {
@@ -284,7 +290,7 @@ impl Assembly<'_> {
                     return Err(WeightsError::MissingNeighbour {
                         particle: particle + 1,
                         missing: corner as usize + 1,
-                        neighbours: seen.len(),
+                        neighbours: self.most_neighbours(),
                         corners: cells.corners,
                     });
                 };

@@ -1,4 +1,8 @@
-//! Sweeps and spectra over the flock's interaction.
+//! Sweeps and spectra over the flock's interaction, and the solvers for equilibrium.
 
+pub mod equilibrium;
+pub mod field;
+pub mod linear;
+pub mod operator;
 pub mod spectrum;
 pub mod sweep;

@@ -119,20 +119,16 @@ pub(super) fn told(factor: f64) -> String {
 }
 
 fn legend(pair: &Pair<'_>, is_dotted: bool) -> Vec<Key> {
+    let key = |name: &'static str, colour, mark| Key { name: name.into(), colour, mark };
+    let undeformed = key("undeformed", UNDEFORMED, Mark::DashedLine);
     let blue = colour::of_role(Role::Follower);
-    let undeformed = Key { name: "undeformed", colour: UNDEFORMED, mark: Mark::DashedLine };
     if !is_dotted {
-        let line = |name, colour| Key { name, colour, mark: Mark::Line };
-        return vec![line("truth", TRUTH), line("rule", blue), undeformed];
+        return vec![key("truth", TRUTH, Mark::Line), key("rule", blue, Mark::Line), undeformed];
     }
-    let present = |role: &Role| pair.roles.contains(role);
-    let led = [Role::Leader, Role::Clamped].into_iter().filter(present);
-    let dot = |role: Role| Key { name: role.name(), colour: colour::of_role(role), mark: Mark::Dot };
-    let first = [
-        Key { name: "truth", colour: TRUTH, mark: Mark::Ring },
-        Key { name: "rule: follower", colour: blue, mark: Mark::Dot },
-    ];
-    first.into_iter().chain(led.map(dot)).chain([undeformed]).collect()
+    let led = [Role::Leader, Role::Clamped].into_iter().filter(|role| pair.roles.contains(role));
+    let led = led.map(|role| key(role.name(), colour::of_role(role), Mark::Dot));
+    let first = [key("truth", TRUTH, Mark::Ring), key("rule: follower", blue, Mark::Dot)];
+    first.into_iter().chain(led).chain([undeformed]).collect()
 }
 
 /// The body's boundary with its corners at `places`.

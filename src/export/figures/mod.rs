@@ -7,6 +7,7 @@
 
 mod axes;
 mod bands;
+pub mod chart;
 mod colour;
 mod comparison;
 mod configuration;

@@ -134,10 +134,12 @@ pub fn check_equilibrium(raw: &RawScene, refuse: Refuse<'_>) -> Result<(), Scene
         return Ok(());
     }
     let when = raw.roles.iter().position(|entry| entry.when.is_some());
+    let later = raw.roles.iter().position(|entry| entry.from > 1);
     let present = matches!(raw.neighbours, Some(RawNeighbours::Present { .. }));
     let broken = raw.fracture.is_some() || !raw.cuts.is_empty();
     let clash = [
-        (when.map(|k| format!("roles[{k}].when")), "a condition on the way"),
+        (when.map(|k| format!("roles[{k}].when")), "condition on the way"),
+        (later.map(|k| format!("roles[{k}].from")), "role that changes on the way"),
         (present.then(|| "neighbours".to_owned()), "neighbours found anew at every step"),
         (broken.then(|| if raw.cuts.is_empty() { "fracture" } else { "cuts" }.to_owned()), "breaking bonds"),
     ];
@@ -145,7 +147,7 @@ pub fn check_equilibrium(raw: &RawScene, refuse: Refuse<'_>) -> Result<(), Scene
         None => Ok(()),
         Some((key, what)) => Err(refuse(
             &key,
-            format!("an equilibrium that is not stepped to knows no {what}"),
+            format!("an equilibrium that is not stepped to has no {what}"),
             "leave [equilibrium] out to step, or leave this out",
         )),
     }

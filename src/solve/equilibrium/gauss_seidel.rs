@@ -1,0 +1,67 @@
+//! Gauss-Seidel: each follower is moved to where its neighbours' newest places leave it, by colours.
+//!
+//! No two particles of a colour feel each other, so within a colour the order does not matter, and the
+//! colours follow from column and row alone: the result depends neither on the numbering nor on threads.
+//! For a positive operator it always converges (A. M. Ostrowski 1954), whatever the largest eigenvalue.
+
+use std::time::Instant;
+
+use super::jacobi::require_bounded;
+use super::system::Prepared;
+use super::{Found, Request, SolveError, Solver, steps};
+use crate::solve::field::Field;
+use crate::solve::operator::{Matrix, Stencils};
+
+pub(super) fn solve(prepared: &mut Prepared, request: &Request) -> Result<Found, SolveError> {
+    let begin = Instant::now();
+    let Prepared { matrix, stencils, right, size, .. } = prepared;
+    let colours = colours(matrix);
+    let mut u = Field::zeros(matrix.count());
+    let mut r = Field::zeros(matrix.count());
+    let set_up = begin.elapsed();
+    let mut residuals = vec![1.0];
+    while residuals[residuals.len() - 1] > request.tolerance && residuals.len() <= request.most_iterations {
+        for colour in &colours {
+            sweep(matrix, stencils, colour, right, &mut u);
+        }
+        residuals.push(steps::residual(matrix, stencils, (&u, right), &mut r).sqrt() / *size);
+        require_bounded(Solver::GaussSeidel, &residuals)?;
+    }
+    Ok(Found { displacement: u, residuals, set_up })
+}
+
+/// A particle of a colour and the run that it belongs to.
+type Coloured = (u32, u32);
+
+/// The particles of each colour. Columns that lie closer than anybody reaches differ in colour, and so do
+/// rows.
+fn colours(matrix: &Matrix) -> Vec<Vec<Coloured>> {
+    let [across, along] = matrix.reach().map(|reach| reach + 1);
+    let mut colours = vec![Vec::new(); (across * along) as usize];
+    let mut sites = matrix.columns.sites();
+    for (number, run) in matrix.runs().iter().enumerate() {
+        for particle in run.start..run.start + run.len {
+            // Runs and sites both go through the followers in their numbering.
+            let [column, row] = sites.next().expect("a site for each follower");
+            let colour = column.rem_euclid(across) * along + row.rem_euclid(along);
+            colours[colour as usize].push((particle, number as u32));
+        }
+    }
+    colours.retain(|colour| !colour.is_empty());
+    colours
+}
+
+fn sweep(matrix: &Matrix, stencils: &Stencils<f64>, colour: &[Coloured], f: &Field<f64>, u: &mut Field<f64>) {
+    for &(particle, run) in colour {
+        let (i, run) = (particle as usize, &matrix.runs()[run as usize]);
+        let [mut x, mut y] = f.get(i);
+        for ([xx, xy, yx, yy], &distance) in stencils.blocks(run.class).iter().zip(matrix.distances(run)) {
+            let [ux, uy] = u.get(i.wrapping_add_signed(distance as isize));
+            x -= xx * ux + xy * uy;
+            y -= yx * ux + yy * uy;
+        }
+        let [xx, xy, yx, yy] = stencils.inverse(run.class);
+        u.x[i] += xx * x + xy * y;
+        u.y[i] += yx * x + yy * y;
+    }
+}

@@ -1,0 +1,61 @@
+//! Damped Jacobi: the paper's synchronous sweep of the rule, `u <- u + w D^-1 (f - K u)`.
+//!
+//! It converges where `w` times the largest eigenvalue of `D^-1 K` is below 2, and the slowest mode
+//! shrinks by `1 - w` times the smallest eigenvalue at each step. Where neighbours feel each other alike
+//! the largest eigenvalue is estimated (Lanczos); elsewhere the norm of the rows bounds it.
+
+use std::time::Instant;
+
+use super::system::Prepared;
+use super::{Found, Request, SolveError, Solver, lanczos, steps};
+use crate::flock::block::{inverse, product};
+use crate::solve::field::Field;
+use crate::solve::operator::Matrix;
+
+/// Share of the largest damping that converges; below 1 since the eigenvalue is estimated from within,
+/// and the largest mode would not shrink at 1.
+const SHARE: f64 = 0.96;
+
+/// Lanczos steps: within a percent of the largest eigenvalue on all lattices.
+const ESTIMATE: usize = 20;
+
+pub(super) fn solve(prepared: &mut Prepared, request: &Request) -> Result<Found, SolveError> {
+    let begin = Instant::now();
+    let Prepared { matrix, stencils, right, size, symmetric, .. } = prepared;
+    let largest = if *symmetric { lanczos::largest(matrix, stencils, ESTIMATE) } else { largest_row(matrix) };
+    let weight = SHARE * 2.0 / largest;
+    let mut u = Field::zeros(matrix.count());
+    let mut r = right.clone();
+    let set_up = begin.elapsed();
+    let mut residuals = vec![1.0];
+    while residuals[residuals.len() - 1] > request.tolerance && residuals.len() <= request.most_iterations {
+        steps::precondition(matrix, stencils, (1.0, weight), &r, &mut u);
+        let residual = steps::residual(matrix, stencils, (&u, right), &mut r).sqrt() / *size;
+        residuals.push(residual);
+        require_bounded(Solver::Jacobi, &residuals)?;
+    }
+    Ok(Found { displacement: u, residuals, set_up })
+}
+
+/// Refuses to go on where the residual has grown beyond all use.
+pub(super) fn require_bounded(solver: Solver, residuals: &[f64]) -> Result<(), SolveError> {
+    let residual = residuals[residuals.len() - 1];
+    let bounded = residual < 1e12;
+    let diverged = SolveError::Diverged { solver, iterations: residuals.len() - 1, residual };
+    if bounded { Ok(()) } else { Err(diverged) }
+}
+
+/// The largest sum of the norms of a row of `D^-1 K`: no eigenvalue is larger in modulus.
+fn largest_row(matrix: &Matrix) -> f64 {
+    let norm = |block: &[[f64; 2]; 2]| block.iter().flatten().map(|v| v * v).sum::<f64>().sqrt();
+    let spectral = |block: &[[f64; 2]; 2]| {
+        let [[a, b], [c, d]] = *block;
+        let (square, determinant) = (norm(block).powi(2), a * d - b * c);
+        ((square + (square * square - 4.0 * determinant * determinant).max(0.0).sqrt()) / 2.0).sqrt()
+    };
+    let of_row = |row: &crate::solve::operator::Row| {
+        let inverse = inverse(&row.diagonal).unwrap_or_default();
+        1.0 + row.entries.iter().map(|(_, block)| spectral(&product(&inverse, block))).sum::<f64>()
+    };
+    matrix.rows.iter().map(of_row).fold(1.0, f64::max)
+}

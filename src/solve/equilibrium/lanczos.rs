@@ -1,0 +1,183 @@
+//! Bounds of the spectrum of `D^-1 K`, from a few steps of conjugate gradients.
+//!
+//! The coefficients of the iteration are those of Lanczos' tridiagonal matrix, whose extreme eigenvalues
+//! approach those of the operator from within (G. H. Golub and C. F. Van Loan, *Matrix Computations*,
+//! section 10.2.5). On a large body the steps are taken on a few groups of its columns with everybody else
+//! held, which lowers the largest eigenvalue by next to nothing.
+
+use super::steps::Apply;
+use crate::solve::field::{Field, Part, Real, dot};
+use crate::solve::operator::{Matrix, Stencils, pass};
+
+/// Lowest and highest eigenvalue found of `D^-1 K`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bounds {
+    pub low: f64,
+    pub high: f64,
+}
+
+/// Groups of columns that a largest eigenvalue is looked for in: both ends and the middle.
+fn samples(matrix: &Matrix) -> Vec<usize> {
+    let last = matrix.groups() - 1;
+    let mut samples = vec![0, last / 2, last];
+    samples.dedup();
+    samples
+}
+
+/// The largest eigenvalue, found from below.
+pub fn largest<T: Real>(matrix: &Matrix, stencils: &Stencils<T>, steps: usize) -> f64 {
+    bounds(matrix, stencils, &samples(matrix), steps).high
+}
+
+/// Both ends of the spectrum on the whole body; the low one is found from above, and slowly.
+pub fn both<T: Real>(matrix: &Matrix, stencils: &Stencils<T>, steps: usize) -> Bounds {
+    let all: Vec<usize> = (0..matrix.groups()).collect();
+    bounds(matrix, stencils, &all, steps)
+}
+
+fn bounds<T: Real>(matrix: &Matrix, stencils: &Stencils<T>, groups: &[usize], steps: usize) -> Bounds {
+    let mut krylov = Krylov::new(matrix, stencils, groups);
+    let (mut diagonal, mut beside) = (Vec::new(), Vec::new());
+    let (mut step_before, mut ratio) = (1.0, 0.0);
+    for _ in 0..steps {
+        let Some((step, next_ratio)) = krylov.step() else { break };
+        diagonal.push(1.0 / step + ratio / step_before);
+        beside.push(next_ratio.sqrt() / step);
+        (step_before, ratio) = (step, next_ratio);
+    }
+    if diagonal.is_empty() {
+        return Bounds { low: 1.0, high: 1.0 };
+    }
+    beside.truncate(diagonal.len() - 1);
+    extremes(&diagonal, &beside)
+}
+
+/// Conjugate gradients on some groups of columns, everybody else held.
+struct Krylov<'a, T> {
+    matrix: &'a Matrix,
+    stencils: &'a Stencils<T>,
+    groups: &'a [usize],
+    r: Field<T>,
+    z: Field<T>,
+    p: Field<T>,
+    q: Field<T>,
+    rz: f64,
+}
+
+impl<'a, T: Real> Krylov<'a, T> {
+    /// Fields of zeros are not touched outside the groups, so they cost no memory there.
+    fn new(matrix: &'a Matrix, stencils: &'a Stencils<T>, groups: &'a [usize]) -> Self {
+        let zeros = || Field::zeros(matrix.count());
+        let (r, z, p, q) = (zeros(), zeros(), zeros(), zeros());
+        let mut krylov = Self { matrix, stencils, groups, r, z, p, q, rz: 0.0 };
+        // A fixed start without symmetry: the fractional parts of multiples of the golden ratio.
+        let noise = |i: usize| T::of((i as f64 * 0.618_033_988_749_895).fract() - 0.5);
+        krylov.each_follower(|k, i| (k.r.x[i], k.r.y[i]) = (noise(2 * i + 1), noise(2 * i + 2)));
+        krylov.precondition();
+        krylov.rz = krylov.product(&krylov.r, &krylov.z);
+        krylov.each_follower(|k, i| (k.p.x[i], k.p.y[i]) = (k.z.x[i], k.z.y[i]));
+        krylov
+    }
+
+    /// Step length, and the ratio of the residuals' squares; `None` once nothing is left.
+    fn step(&mut self) -> Option<(f64, f64)> {
+        for &group in self.groups {
+            let range = self.matrix.bounds[group]..self.matrix.bounds[group + 1];
+            let out = Part { begin: range.start, x: &mut self.q.x[range.clone()], y: &mut self.q.y[range] };
+            pass(self.matrix, self.stencils, group, self.p.view(), &mut Apply { out });
+        }
+        let pq = self.product(&self.p, &self.q);
+        let before = self.rz;
+        let exhausted = !(pq > 0.0 && before > 0.0);
+        if exhausted {
+            return None;
+        }
+        let step = before / pq;
+        let t = T::of(step);
+        self.each_follower(|k, i| {
+            k.r.x[i] = k.r.x[i] - t * k.q.x[i];
+            k.r.y[i] = k.r.y[i] - t * k.q.y[i];
+        });
+        self.precondition();
+        self.rz = self.product(&self.r, &self.z);
+        let ratio = self.rz / before;
+        let t = T::of(ratio);
+        self.each_follower(|k, i| {
+            k.p.x[i] = k.z.x[i] + t * k.p.x[i];
+            k.p.y[i] = k.z.y[i] + t * k.p.y[i];
+        });
+        (ratio > 0.0).then_some((step, ratio))
+    }
+
+    fn precondition(&mut self) {
+        let stencils = self.stencils;
+        self.each_follower(|k, i| {
+            let [xx, xy, yx, yy] = *stencils.inverse(k.matrix.class[i]);
+            let [x, y] = k.r.get(i);
+            (k.z.x[i], k.z.y[i]) = (xx * x + xy * y, yx * x + yy * y);
+        });
+    }
+
+    fn product(&self, a: &Field<T>, b: &Field<T>) -> f64 {
+        let of_group = |&group: &usize| {
+            let range = self.matrix.bounds[group]..self.matrix.bounds[group + 1];
+            dot(a.view().range(range.clone()), b.view().range(range))
+        };
+        self.groups.iter().map(of_group).sum()
+    }
+
+    fn each_follower(&mut self, work: impl Fn(&mut Self, usize)) {
+        let matrix = self.matrix;
+        for &group in self.groups {
+            for run in matrix.runs_of(group) {
+                (run.start as usize..(run.start + run.len) as usize).for_each(|i| work(self, i));
+            }
+        }
+    }
+}
+
+/// Lowest and highest eigenvalue of a symmetric tridiagonal matrix, by bisection on Sturm's count.
+fn extremes(diagonal: &[f64], beside: &[f64]) -> Bounds {
+    let below = |shift: f64| {
+        let mut pivot = 1.0;
+        let negative = |k: usize| {
+            let coupling = if k == 0 { 0.0 } else { beside[k - 1] * beside[k - 1] };
+            pivot = diagonal[k] - shift - coupling / pivot;
+            if pivot == 0.0 {
+                pivot = f64::MIN_POSITIVE;
+            }
+            pivot < 0.0
+        };
+        (0..diagonal.len()).map(negative).filter(|&negative| negative).count()
+    };
+    let radius = |k: usize| {
+        let left = if k == 0 { 0.0 } else { beside[k - 1].abs() };
+        left + beside.get(k).map_or(0.0, |b| b.abs())
+    };
+    let reach = |sign: f64| (0..diagonal.len()).map(move |k| diagonal[k] + sign * radius(k));
+    let (floor, ceiling) =
+        (reach(-1.0).fold(f64::INFINITY, f64::min), reach(1.0).fold(f64::NEG_INFINITY, f64::max));
+    let bisect = |count: usize| {
+        let (mut low, mut high) = (floor, ceiling);
+        for _ in 0..100 {
+            let middle = f64::midpoint(low, high);
+            if below(middle) >= count { high = middle } else { low = middle }
+        }
+        f64::midpoint(low, high)
+    };
+    Bounds { low: bisect(1), high: bisect(diagonal.len()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_extremes_of_a_chain_are_known() {
+        let n = 30;
+        let found = extremes(&vec![2.0; n], &vec![-1.0; n - 1]);
+        let angle = std::f64::consts::PI / (n as f64 + 1.0);
+        assert!((found.low - (2.0 - 2.0 * angle.cos())).abs() < 1e-12, "{found:?}");
+        assert!((found.high - (2.0 + 2.0 * angle.cos())).abs() < 1e-12, "{found:?}");
+    }
+}

@@ -1,0 +1,216 @@
+//! Where a body comes to rest: solvers for `K u = f` over the followers, the held particles' displacements
+//! being given.
+//!
+//! A sweep moves every particle to its target and arrives at equilibrium in the end; these solvers go
+//! there directly. One file each:
+//!
+//! * [`jacobi`]: the paper's synchronous sweep, damped by what the spectrum allows.
+//! * [`gauss_seidel`]: the sequential sweep, by colours, so that its order depends on the lattice alone.
+//! * [`chebyshev`]: synchronous sweeps whose damping varies, after the bounds of the spectrum.
+//! * [`conjugate_gradients`]: the best that sweeps with memory can do without knowing the body's shape.
+//! * [`multigrid`]: conjugate gradients that let the whole body move and turn as well, on coarser and
+//!   coarser grids: the number of iterations does not grow with the body.
+//! * [`direct`]: a sparse factorisation (feature `fem`).
+//!
+//! All of them reach the same equilibrium; [`solve`] says how it went, and [`choose`] which of them
+//! [`Choice::Auto`] is.
+
+pub mod chebyshev;
+mod choice;
+pub mod conjugate_gradients;
+pub mod direct;
+mod error;
+pub mod gauss_seidel;
+pub mod jacobi;
+mod lanczos;
+pub mod multigrid;
+mod steps;
+mod system;
+
+use std::time::{Duration, Instant};
+
+pub use choice::choose;
+pub use error::SolveError;
+pub use system::System;
+
+use super::field::Field;
+use crate::flock::points::Points;
+use system::Prepared;
+
+/// Relative residual that no whole solve in single precision is asked to go below.
+pub const SINGLE_FLOOR: f64 = 1e-5;
+
+/// The solvers there are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Solver {
+    Jacobi,
+    GaussSeidel,
+    Chebyshev,
+    ConjugateGradients,
+    Multigrid,
+    Direct,
+}
+
+impl Solver {
+    pub const ALL: [Solver; 6] = [
+        Solver::Jacobi,
+        Solver::GaussSeidel,
+        Solver::Chebyshev,
+        Solver::ConjugateGradients,
+        Solver::Multigrid,
+        Solver::Direct,
+    ];
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Solver::Jacobi => "jacobi",
+            Solver::GaussSeidel => "gauss-seidel",
+            Solver::Chebyshev => "chebyshev",
+            Solver::ConjugateGradients => "conjugate-gradients",
+            Solver::Multigrid => "multigrid",
+            Solver::Direct => "direct",
+        }
+    }
+
+    /// Whether it only converges where any two neighbours feel each other alike.
+    pub fn needs_symmetry(self) -> bool {
+        matches!(self, Solver::Chebyshev | Solver::ConjugateGradients | Solver::Multigrid)
+    }
+
+    /// Whether it can compute in single precision throughout.
+    pub fn has_single(self) -> bool {
+        matches!(self, Solver::ConjugateGradients | Solver::Multigrid)
+    }
+}
+
+impl std::fmt::Display for Solver {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// Which solver to take.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Choice {
+    /// By size, symmetry and tolerance: see [`choose`].
+    #[default]
+    Auto,
+    This(Solver),
+}
+
+/// What all vectors of a solve are computed in.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Precision {
+    #[default]
+    F64,
+    /// The whole solve in single precision: down to [`SINGLE_FLOOR`], and on slender bodies an error in
+    /// the displacement that is larger by their condition number.
+    F32,
+}
+
+/// How equilibrium is asked for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Request {
+    pub solver: Choice,
+    /// Largest residual force `|f - K u|` over that at the start, with all followers at zero, `|b|` \[1\].
+    pub tolerance: f64,
+    pub most_iterations: usize,
+    pub precision: Precision,
+}
+
+impl Default for Request {
+    fn default() -> Self {
+        Self {
+            solver: Choice::Auto,
+            tolerance: 1e-10,
+            most_iterations: 1_000_000,
+            precision: Precision::default(),
+        }
+    }
+}
+
+/// An equilibrium and how it was found.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Solved {
+    /// Displacements \[length\], those of the held particles included, shape \[count\].
+    pub displacement: Points,
+    pub solver: Solver,
+    /// Why this solver.
+    pub why: String,
+    pub iterations: usize,
+    /// Relative residual before the first iteration, which is 1, and after each.
+    pub residuals: Vec<f64>,
+    /// What took how long.
+    pub phases: Vec<(&'static str, Duration)>,
+    /// Whether the tolerance was reached.
+    pub converged: bool,
+}
+
+/// What a solver hands back: displacements of the followers, zero elsewhere.
+struct Found {
+    displacement: Field<f64>,
+    residuals: Vec<f64>,
+    /// Time the solver itself spent before the first iteration.
+    set_up: Duration,
+}
+
+/// Finds the equilibrium of a system.
+pub fn solve(system: &System, request: &Request) -> Result<Solved, SolveError> {
+    let begin = Instant::now();
+    let allowed = request.tolerance > 0.0 && request.tolerance < 1.0;
+    if !allowed {
+        return Err(SolveError::Tolerance { tolerance: request.tolerance });
+    }
+    let (solver, why) = choose(system, request);
+    check(system, request, solver)?;
+    let mut prepared = Prepared::new(system)?;
+    let prepared_in = begin.elapsed();
+    let found = match solver {
+        _ if prepared.size == 0.0 => Found::nothing(system.operator.count()),
+        Solver::Jacobi => jacobi::solve(&mut prepared, request)?,
+        Solver::GaussSeidel => gauss_seidel::solve(&mut prepared, request)?,
+        Solver::Chebyshev => chebyshev::solve(&mut prepared, request)?,
+        Solver::ConjugateGradients => conjugate_gradients::solve(&mut prepared, request)?,
+        Solver::Multigrid => multigrid::solve(&mut prepared, request)?,
+        Solver::Direct => direct::solve(&mut prepared, system)?,
+    };
+    let set_up = prepared_in + found.set_up;
+    let last = found.residuals.last().copied().unwrap_or(1.0);
+    let displacement = system.with_held(found.displacement);
+    Ok(Solved {
+        displacement,
+        solver,
+        why,
+        iterations: found.residuals.len() - 1,
+        converged: last <= request.tolerance,
+        residuals: found.residuals,
+        phases: vec![("set-up", set_up), ("solve", begin.elapsed() - set_up)],
+    })
+}
+
+/// What can be refused before anything is computed.
+fn check(system: &System, request: &Request, solver: Solver) -> Result<(), SolveError> {
+    let tolerance = request.tolerance;
+    if request.precision == Precision::F32 {
+        if !solver.has_single() {
+            return Err(SolveError::DoubleOnly { solver });
+        }
+        if tolerance < SINGLE_FLOOR {
+            return Err(SolveError::SinglePrecision { tolerance, floor: SINGLE_FLOOR });
+        }
+    }
+    system.check()?;
+    if solver.needs_symmetry()
+        && let Some([first, second]) = system.asymmetric_pair()
+    {
+        return Err(SolveError::NotSymmetric { solver, first: first + 1, second: second + 1 });
+    }
+    Ok(())
+}
+
+impl Found {
+    /// Without any load the followers stay where they are.
+    fn nothing(count: usize) -> Self {
+        Self { displacement: Field::zeros(count), residuals: vec![0.0], set_up: Duration::ZERO }
+    }
+}

@@ -1,0 +1,212 @@
+//! Conjugate gradients preconditioned by multigrid: a V-cycle moves the body on grids that are coarser and
+//! coarser, so that a displacement of the whole takes one step and not a walk from particle to particle.
+//!
+//! * Level 0 are the particles. The nodes of the next level stand every few columns and rows of their
+//!   sites ([`transfer`]), and interpolation is linear along both: translations, rotations and every
+//!   uniform strain are among what the coarse grid can do, on every lattice.
+//! * Every level's operator is `P' K P` in double precision, by classes ([`coarsen`]): a rectangle has a
+//!   few dozen different rows on each, so that setting up costs little time and next to no memory.
+//! * Smoothing is block-Jacobi with Chebyshev's weights of degree 2 before and after (M. F. Adams, M. Brezina,
+//!   J. J. Hu, R. S. Tuminaro, Journal of Computational Physics 188, 2003), bounded by an estimate of the
+//!   largest eigenvalue of each level.
+//! * The coarsest level is solved outright ([`envelope`]).
+//!
+//! The cycle runs in single precision: it begins at zero and its result is only a direction, so what
+//! rounding does to it costs no digit of the equilibrium; the iteration around it runs in double precision.
+
+mod coarsen;
+mod envelope;
+mod transfer;
+
+use std::time::Instant;
+
+use self::envelope::Envelope;
+use self::transfer::Transfer;
+use super::conjugate_gradients::{Preconditioner, iterate, iterate_single, single_scale};
+use super::steps::for_groups;
+use super::system::Prepared;
+use super::{Found, Precision, Request, SolveError, Solver, lanczos, steps};
+use crate::solve::field::{Field, Real, dot};
+use crate::solve::operator::{Matrix, Stencils};
+
+/// Nodes of the coarsest level: fewer are not worth another level.
+const COARSEST: usize = 400;
+
+/// Entries of a factor that are no trouble to keep and to solve with, whatever the body's size.
+const SMALL_FACTOR: usize = 1 << 16;
+
+/// Lanczos steps for the largest eigenvalue of each level, and what its estimate is raised by.
+const ESTIMATE: usize = 12;
+const SAFETY: f64 = 1.04;
+
+/// Largest over smallest eigenvalue that the smoother is to dampen; what is below is left to the coarser
+/// level.
+const SMOOTHED: f64 = 5.0;
+
+pub(super) fn solve(prepared: &mut Prepared, request: &Request) -> Result<Found, SolveError> {
+    let begin = Instant::now();
+    let right = std::mem::take(&mut prepared.right);
+    let mut cycle = Cycle::new(&prepared.matrix, prepared.grid)?;
+    let set_up = begin.elapsed();
+    tracing::debug!(levels = cycle.levels.len() + 1, "multigrid is set up");
+    let found = match request.precision {
+        Precision::F64 => {
+            iterate(prepared, &prepared.stencils, right, &mut cycle, request, Solver::Multigrid)
+        }
+        Precision::F32 => {
+            let stencils = cycle.finest.clone();
+            iterate_single(prepared, &stencils, right, &mut cycle, request, Solver::Multigrid)
+        }
+    }?;
+    Ok(Found { set_up: found.set_up + set_up, ..found })
+}
+
+/// All levels of a body.
+struct Cycle<'a> {
+    matrix: &'a Matrix,
+    finest: Stencils<f32>,
+    weights: [f64; 2],
+    vectors: Vectors,
+    /// The way down from each level, the finest first.
+    levels: Vec<Level>,
+    coarsest: Option<Envelope>,
+}
+
+/// A coarser level, and how it is reached.
+struct Level {
+    transfer: Transfer,
+    matrix: Matrix,
+    stencils: Stencils<f32>,
+    weights: [f64; 2],
+    vectors: Vectors,
+}
+
+/// What a level computes with.
+struct Vectors {
+    f: Field<f32>,
+    u: Field<f32>,
+    v: Field<f32>,
+}
+
+impl Vectors {
+    fn new(count: usize) -> Self {
+        Self { f: Field::zeros(count), u: Field::zeros(count), v: Field::zeros(count) }
+    }
+}
+
+/// Weights of two sweeps that dampen all eigenvalues from `largest / SMOOTHED` to `largest` best.
+fn weights(largest: f64) -> [f64; 2] {
+    let (low, high) = (largest / SMOOTHED, largest);
+    [1.0, 3.0].map(|k: f64| {
+        let node = (std::f64::consts::PI * k / 4.0).cos();
+        1.0 / (f64::midpoint(high, low) + (high - low) / 2.0 * node)
+    })
+}
+
+impl<'a> Cycle<'a> {
+    fn new(matrix: &'a Matrix, grid: [[f64; 2]; 2]) -> Result<Self, SolveError> {
+        let scale = single_scale(matrix);
+        let finest = Stencils::new(&matrix.rows, scale);
+        let weights = weights(SAFETY * lanczos::largest(matrix, &finest, ESTIMATE));
+        let vectors = Vectors::new(matrix.count());
+        let mut cycle = Self { matrix, finest, weights, vectors, levels: Vec::new(), coarsest: None };
+        let mut spacing = grid.map(|v| v[0].hypot(v[1]));
+        while !cycle.is_coarse_enough() {
+            let fine = cycle.levels.last().map_or(matrix, |level| &level.matrix);
+            let steps = match cycle.levels.len() {
+                0 => coarsen::first_steps(grid, particles_per_site(fine)),
+                _ => coarsen::next_steps(spacing),
+            };
+            let level = Level::new(fine, Transfer { steps }, scale);
+            if level.matrix.count() >= fine.count() {
+                break;
+            }
+            spacing = [0, 1].map(|k| spacing[k] * f64::from(steps[k]));
+            cycle.levels.push(level);
+        }
+        let coarsest = cycle.levels.last().map_or(matrix, |level| &level.matrix);
+        let not_positive = SolveError::NotPositive { solver: Solver::Multigrid, iteration: 0 };
+        cycle.coarsest = Some(Envelope::new(coarsest, scale).ok_or(not_positive)?);
+        Ok(cycle)
+    }
+
+    fn is_coarse_enough(&self) -> bool {
+        let matrix = self.levels.last().map_or(self.matrix, |level| &level.matrix);
+        matrix.count() <= COARSEST
+            || (matrix.count() <= 64 * COARSEST && envelope::entries(matrix) <= SMALL_FACTOR)
+    }
+
+    /// `v` of the finest level becomes the cycle's answer to its `f`.
+    fn run(&mut self) {
+        let Self { matrix, finest, weights, vectors, levels, coarsest, .. } = self;
+        let top = Smoothed { matrix, stencils: finest, weights: *weights };
+        descend(&top, vectors, levels, coarsest.as_mut().expect("set up"));
+    }
+}
+
+/// A level's operator and smoother.
+struct Smoothed<'a> {
+    matrix: &'a Matrix,
+    stencils: &'a Stencils<f32>,
+    weights: [f64; 2],
+}
+
+fn descend(here: &Smoothed<'_>, vectors: &mut Vectors, below: &mut [Level], coarsest: &mut Envelope) {
+    let Smoothed { matrix, stencils, weights } = *here;
+    let Vectors { f, u, v } = vectors;
+    let Some((next, further)) = below.split_first_mut() else {
+        coarsest.solve((&f.x, &f.y), (&mut v.x, &mut v.y));
+        return;
+    };
+    steps::precondition(matrix, stencils, (0.0, weights[0]), f, u);
+    steps::smooth(matrix, stencils, weights[1], (u, f), v);
+    steps::residual(matrix, stencils, (v, f), u);
+    let levels = (matrix, &next.matrix);
+    next.transfer.restrict(levels, u, &mut next.vectors.f);
+    let view = Smoothed { matrix: &next.matrix, stencils: &next.stencils, weights: next.weights };
+    descend(&view, &mut next.vectors, further, coarsest);
+    next.transfer.prolong(levels, &next.vectors.v, v);
+    steps::smooth(matrix, stencils, weights[1], (v, f), u);
+    steps::smooth(matrix, stencils, weights[0], (u, f), v);
+}
+
+impl Level {
+    fn new(fine: &Matrix, transfer: Transfer, scale: f64) -> Self {
+        let matrix = coarsen::coarsen(fine, transfer);
+        let stencils = Stencils::new(&matrix.rows, scale);
+        let weights = weights(SAFETY * lanczos::largest(&matrix, &stencils, ESTIMATE));
+        let vectors = Vectors::new(matrix.count());
+        Self { transfer, matrix, stencils, weights, vectors }
+    }
+}
+
+/// One on lattices that have a particle at every column and row, less on others.
+fn particles_per_site(matrix: &Matrix) -> f64 {
+    let columns: Vec<i32> = matrix.columns.range().filter(|&i| !matrix.columns.of(i).is_empty()).collect();
+    let occupied = columns.len() as f64 / matrix.columns.range().len().max(1) as f64;
+    occupied / f64::from(matrix.columns.step())
+}
+
+impl<T: Real> Preconditioner<T> for Cycle<'_> {
+    type Z = f32;
+
+    fn precondition(&mut self, r: &Field<T>, size: f64) -> (&Field<f32>, f64) {
+        let f = &mut self.vectors.f;
+        let scale = 1.0 / size;
+        for_groups(f.parts(&self.matrix.bounds), |_, f| {
+            let r = r.view().range(f.range());
+            let cast = |f: &mut [f32], r: &[T]| {
+                f.iter_mut().zip(r).for_each(|(f, r)| *f = (r.wide() * scale) as f32);
+            };
+            cast(f.x, r.x);
+            cast(f.y, r.y);
+        });
+        self.run();
+        let z = &self.vectors.v;
+        let groups = self.matrix.bounds.windows(2).map(|ends| ends[0]..ends[1]).collect();
+        let sums = for_groups(groups, |_, range: std::ops::Range<usize>| {
+            dot(z.view().range(range.clone()), r.view().range(range))
+        });
+        (z, sums.iter().sum())
+    }
+}

@@ -1,0 +1,193 @@
+//! To the coarse grid and back: linear interpolation along columns and along rows.
+//!
+//! A node of the coarse grid stands at every `steps` columns and rows of the fine one, whether there is a
+//! particle or not. Places are affine in column and row on every lattice, so displacements that are
+//! affine, rotations among them, are reproduced to rounding.
+
+use crate::solve::equilibrium::steps::for_groups;
+use crate::solve::field::{Field, Part, View};
+use crate::solve::operator::{Columns, Matrix, Segment};
+
+/// Between the particles of one matrix and the nodes of the next.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Transfer {
+    /// Columns and rows of the fine grid to a column and a row of the coarse one.
+    pub steps: [i32; 2],
+}
+
+/// Rows of one column, whether there is somebody or not.
+struct Column {
+    low: i32,
+    x: Vec<f32>,
+    y: Vec<f32>,
+}
+
+impl Column {
+    fn new() -> Self {
+        Self { low: 0, x: Vec::new(), y: Vec::new() }
+    }
+
+    fn clear(&mut self, low: i32, high: i32) {
+        self.low = low;
+        let len = (high - low + 1).max(0) as usize;
+        for values in [&mut self.x, &mut self.y] {
+            values.clear();
+            values.resize(len, 0.0);
+        }
+    }
+
+    /// Adds a weighted segment, as far as its rows lie within.
+    fn add(&mut self, segment: &Segment, step: i32, weight: f32, from: View<'_, f32>) {
+        let skip = if segment.row < self.low { (self.low - segment.row + step - 1) / step } else { 0 };
+        let row = segment.row + skip * step;
+        let room = (self.low + self.x.len() as i32 - row + step - 1) / step;
+        let len = (segment.len as i32 - skip).min(room);
+        if len <= 0 {
+            return;
+        }
+        let begin = (segment.start as i32 + skip) as usize;
+        let from = from.range(begin..begin + len as usize);
+        let at = (row - self.low) as usize;
+        for (to, from) in [(&mut self.x, from.x), (&mut self.y, from.y)] {
+            if step == 1 {
+                to[at..].iter_mut().zip(from).for_each(|(to, from)| *to += weight * from);
+            } else {
+                let to = to[at..].iter_mut().step_by(step as usize);
+                to.zip(from).for_each(|(to, from)| *to += weight * from);
+            }
+        }
+    }
+}
+
+impl Transfer {
+    /// Share of the node `steps` away that a place `at` away from the other has.
+    fn weight(self, axis: usize, at: i32) -> f32 {
+        1.0 - at.abs() as f32 / self.steps[axis] as f32
+    }
+
+    /// `coarse = P' fine`.
+    pub fn restrict(self, (fine, coarse): (&Matrix, &Matrix), from: &Field<f32>, to: &mut Field<f32>) {
+        for_groups(to.parts(&coarse.bounds), |group, mut to| {
+            let mut column = Column::new();
+            for number in coarse.group_columns[group]..coarse.group_columns[group + 1] {
+                self.gather(&fine.columns, (&coarse.columns, number), from.view(), &mut column);
+                for segment in coarse.columns.of(number) {
+                    self.contract(segment, &column, &mut to);
+                }
+            }
+        });
+    }
+
+    /// The fine columns that have a share in a coarse one, weighted and added up row by row.
+    fn gather(
+        self,
+        fine: &Columns,
+        (coarse, number): (&Columns, i32),
+        from: View<'_, f32>,
+        column: &mut Column,
+    ) {
+        let [across, along] = self.steps;
+        let Some([low, high]) = coarse.rows_of(number) else { return };
+        column.clear(low * along - along + 1, high * along + along - 1);
+        for i in number * across - across + 1..number * across + across {
+            let weight = self.weight(0, i - number * across);
+            fine.of(i).iter().for_each(|segment| column.add(segment, fine.step(), weight, from));
+        }
+    }
+
+    /// The rows of a column that have a share in each node of a segment, weighted and added up.
+    fn contract(self, segment: &Segment, column: &Column, to: &mut Part<'_, f32>) {
+        let along = self.steps[1];
+        let at = segment.start as usize - to.begin;
+        let begin = (segment.row * along - (along - 1) - column.low) as usize;
+        let len = segment.len as usize;
+        for (to, from) in [(&mut to.x[at..at + len], &column.x), (&mut to.y[at..at + len], &column.y)] {
+            match along {
+                1 => to.copy_from_slice(&from[begin..begin + len]),
+                2 => {
+                    let from = &from[begin..begin + 2 * len + 1];
+                    for (k, to) in to.iter_mut().enumerate() {
+                        *to = from[2 * k + 1] + 0.5 * (from[2 * k] + from[2 * k + 2]);
+                    }
+                }
+                _ => {
+                    let width = 2 * along as usize - 1;
+                    for (k, to) in to.iter_mut().enumerate() {
+                        let window = &from[begin + k * along as usize..][..width];
+                        let shares = (1 - along..along).map(|d| self.weight(1, d));
+                        *to = window.iter().zip(shares).map(|(value, share)| share * value).sum();
+                    }
+                }
+            }
+        }
+    }
+
+    /// `fine += P coarse`.
+    pub fn prolong(self, (fine, coarse): (&Matrix, &Matrix), from: &Field<f32>, to: &mut Field<f32>) {
+        for_groups(to.parts(&fine.bounds), |group, mut to| {
+            let mut column = Column::new();
+            for number in fine.group_columns[group]..fine.group_columns[group + 1] {
+                let Some([low, high]) = fine.columns.rows_of(number) else { continue };
+                let [across, along] = self.steps;
+                column.clear(low.div_euclid(along), high.div_euclid(along) + 1);
+                let (left, beyond) = (number.div_euclid(across), number.rem_euclid(across));
+                for (node, at) in [(left, beyond), (left + 1, across - beyond)] {
+                    let weight = self.weight(0, at);
+                    if weight > 0.0 {
+                        let segments = coarse.columns.of(node).iter();
+                        segments.for_each(|segment| column.add(segment, 1, weight, from.view()));
+                    }
+                }
+                for segment in fine.columns.of(number) {
+                    self.expand(segment, fine.columns.step(), &column, &mut to);
+                }
+            }
+        });
+    }
+
+    /// Adds what a column of nodes gives to the particles of a segment.
+    fn expand(self, segment: &Segment, step: i32, column: &Column, to: &mut Part<'_, f32>) {
+        let along = self.steps[1];
+        let at = segment.start as usize - to.begin;
+        let len = segment.len as usize;
+        for (to, from) in [(&mut to.x[at..at + len], &column.x), (&mut to.y[at..at + len], &column.y)] {
+            let node = (segment.row.div_euclid(along) - column.low) as usize;
+            let beyond = segment.row.rem_euclid(along);
+            match (along, step) {
+                (2, 1) => expand_halves(beyond == 1, &from[node..], to),
+                _ if along == step => {
+                    let (near, far) = (self.weight(1, beyond), self.weight(1, along - beyond));
+                    let pairs = from[node..].iter().zip(&from[node + 1..]);
+                    to.iter_mut().zip(pairs).for_each(|(to, (a, b))| *to += near * a + far * b);
+                }
+                _ => {
+                    let (mut node, mut beyond) = (node, beyond);
+                    for to in to {
+                        let (near, far) = (self.weight(1, beyond), self.weight(1, along - beyond));
+                        *to += near * from[node] + far * from[node + 1];
+                        beyond += step;
+                        while beyond >= along {
+                            (node, beyond) = (node + 1, beyond - along);
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Every second particle stands at a node, beginning with the first or, if `between`, with the second.
+fn expand_halves(between: bool, mut from: &[f32], mut to: &mut [f32]) {
+    if between && let [first, rest @ ..] = to {
+        *first += 0.5 * (from[0] + from[1]);
+        (from, to) = (&from[1..], rest);
+    }
+    let (pairs, last) = to.as_chunks_mut::<2>();
+    for (to, from) in pairs.iter_mut().zip(from.windows(2)) {
+        to[0] += from[0];
+        to[1] += 0.5 * (from[0] + from[1]);
+    }
+    if let [last] = last {
+        *last += from[pairs.len()];
+    }
+}

@@ -1,0 +1,165 @@
+//! The passes over a body that solvers are made of. Each is done group by group, in parallel where there
+//! is more than one; sums are taken over each group and then over the groups in their order, so that any
+//! number of threads gives the same bits.
+
+use rayon::prelude::*;
+
+use crate::solve::field::{Field, Part, Real, View, dot};
+use crate::solve::operator::{Matrix, Stencils, Task, array, array_mut, pass};
+
+/// Does some work on every group, in parallel where that pays; answers in the order of groups.
+pub fn for_groups<P: Send, R: Send>(groups: Vec<P>, work: impl Fn(usize, P) -> R + Sync) -> Vec<R> {
+    if groups.len() > 1 && rayon::current_num_threads() > 1 {
+        groups.into_par_iter().enumerate().map(|(group, part)| work(group, part)).collect()
+    } else {
+        groups.into_iter().enumerate().map(|(group, part)| work(group, part)).collect()
+    }
+}
+
+/// `K u`, written to `out`.
+pub struct Apply<'a, T> {
+    pub out: Part<'a, T>,
+}
+
+impl<T: Real> Task<T> for Apply<'_, T> {
+    #[inline(always)]
+    fn take<const W: usize>(&mut self, at: usize, _: &[T; 4], x: &[T; W], y: &[T; W]) {
+        let at = at - self.out.begin;
+        *array_mut(self.out.x, at) = *x;
+        *array_mut(self.out.y, at) = *y;
+    }
+}
+
+/// `f - K u`, written to `out`.
+pub struct Residual<'a, T> {
+    pub f: View<'a, T>,
+    pub out: Part<'a, T>,
+}
+
+impl<T: Real> Task<T> for Residual<'_, T> {
+    #[inline(always)]
+    fn take<const W: usize>(&mut self, at: usize, _: &[T; 4], x: &[T; W], y: &[T; W]) {
+        let (fx, fy) = (array::<T, W>(self.f.x, at), array::<T, W>(self.f.y, at));
+        let at = at - self.out.begin;
+        let out = array_mut::<T, W>(self.out.x, at);
+        for k in 0..W {
+            out[k] = fx[k] - x[k];
+        }
+        let out = array_mut::<T, W>(self.out.y, at);
+        for k in 0..W {
+            out[k] = fy[k] - y[k];
+        }
+    }
+}
+
+/// `u + weight D^-1 (f - K u)`, written to `out`.
+pub struct Smooth<'a, T> {
+    pub weight: T,
+    pub f: View<'a, T>,
+    pub u: View<'a, T>,
+    pub out: Part<'a, T>,
+}
+
+impl<T: Real> Task<T> for Smooth<'_, T> {
+    #[inline(always)]
+    fn take<const W: usize>(&mut self, at: usize, inverse: &[T; 4], x: &[T; W], y: &[T; W]) {
+        let [xx, xy, yx, yy] = inverse.map(|entry| entry * self.weight);
+        let (fx, fy) = (array::<T, W>(self.f.x, at), array::<T, W>(self.f.y, at));
+        let (ux, uy) = (array::<T, W>(self.u.x, at), array::<T, W>(self.u.y, at));
+        let at = at - self.out.begin;
+        let out = array_mut::<T, W>(self.out.x, at);
+        for k in 0..W {
+            out[k] = ux[k] + (xx * (fx[k] - x[k]) + xy * (fy[k] - y[k]));
+        }
+        let out = array_mut::<T, W>(self.out.y, at);
+        for k in 0..W {
+            out[k] = uy[k] + (yx * (fx[k] - x[k]) + yy * (fy[k] - y[k]));
+        }
+    }
+}
+
+/// `out = K u`; returns `u . K u`.
+pub fn apply<T: Real>(matrix: &Matrix, stencils: &Stencils<T>, u: &Field<T>, out: &mut Field<T>) -> f64 {
+    let sums = for_groups(out.parts(&matrix.bounds), |group, out| {
+        let range = out.range();
+        let mut task = Apply { out };
+        pass(matrix, stencils, group, u.view(), &mut task);
+        dot(View { x: task.out.x, y: task.out.y }, u.view().range(range))
+    });
+    sums.iter().sum()
+}
+
+/// `out = f - K u`; returns its square.
+pub fn residual<T: Real>(
+    matrix: &Matrix,
+    stencils: &Stencils<T>,
+    (u, f): (&Field<T>, &Field<T>),
+    out: &mut Field<T>,
+) -> f64 {
+    let sums = for_groups(out.parts(&matrix.bounds), |group, out| {
+        let mut task = Residual { f: f.view(), out };
+        pass(matrix, stencils, group, u.view(), &mut task);
+        let out = View { x: &*task.out.x, y: &*task.out.y };
+        dot(out, out)
+    });
+    sums.iter().sum()
+}
+
+/// `out = u + weight D^-1 (f - K u)`.
+pub fn smooth<T: Real>(
+    matrix: &Matrix,
+    stencils: &Stencils<T>,
+    weight: f64,
+    (u, f): (&Field<T>, &Field<T>),
+    out: &mut Field<T>,
+) {
+    for_groups(out.parts(&matrix.bounds), |group, out| {
+        let mut task = Smooth { weight: T::of(weight), f: f.view(), u: u.view(), out };
+        pass(matrix, stencils, group, u.view(), &mut task);
+    });
+}
+
+/// `out = keep out + weight D^-1 f`.
+pub fn precondition<T: Real>(
+    matrix: &Matrix,
+    stencils: &Stencils<T>,
+    (keep, weight): (f64, f64),
+    f: &Field<T>,
+    out: &mut Field<T>,
+) {
+    for_groups(out.parts(&matrix.bounds), |group, out| {
+        precondition_group(matrix, stencils, (keep, weight), f.view(), group, out);
+    });
+}
+
+/// One group of [`precondition`].
+pub fn precondition_group<T: Real>(
+    matrix: &Matrix,
+    stencils: &Stencils<T>,
+    (keep, weight): (f64, f64),
+    f: View<'_, T>,
+    group: usize,
+    out: Part<'_, T>,
+) {
+    let (keep, weight) = (T::of(keep), T::of(weight));
+    for run in matrix.runs_of(group) {
+        let [xx, xy, yx, yy] = stencils.inverse(run.class).map(|entry| entry * weight);
+        let range = run.start as usize..(run.start + run.len) as usize;
+        let f = f.range(range.clone());
+        let here = range.start - out.begin..range.end - out.begin;
+        let (x, y) = (&mut out.x[here.clone()], &mut out.y[here]);
+        for (((x, y), &fx), &fy) in x.iter_mut().zip(y).zip(f.x).zip(f.y) {
+            *x = keep * *x + (xx * fx + xy * fy);
+            *y = keep * *y + (yx * fx + yy * fy);
+        }
+    }
+}
+
+/// `u += step`.
+pub fn advance<T: Real>(matrix: &Matrix, step: &Field<T>, u: &mut Field<T>) {
+    for_groups(u.parts(&matrix.bounds), |_, u| {
+        let step = step.view().range(u.range());
+        u.x.iter_mut().zip(step.x).for_each(|(u, &step)| *u += step);
+        u.y.iter_mut().zip(step.y).for_each(|(u, &step)| *u += step);
+    });
+}

@@ -1,0 +1,140 @@
+//! Vectors over the particles in single or double precision, and sums over them in a fixed order.
+
+use std::ops::{Add, AddAssign, Mul, Sub};
+
+use crate::flock::points::Points;
+
+/// The two precisions that equilibrium is computed in.
+pub trait Real:
+    Copy
+    + Default
+    + Send
+    + Sync
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + AddAssign
+    + PartialEq
+    + std::fmt::Debug
+    + 'static
+{
+    fn of(value: f64) -> Self;
+    fn wide(self) -> f64;
+}
+
+impl Real for f64 {
+    fn of(value: f64) -> Self {
+        value
+    }
+    fn wide(self) -> f64 {
+        self
+    }
+}
+
+impl Real for f32 {
+    fn of(value: f64) -> Self {
+        value as f32
+    }
+    fn wide(self) -> f64 {
+        f64::from(self)
+    }
+}
+
+/// One vector in the plane for each particle, shape \[count\] each: [`Points`] of either precision.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Field<T> {
+    pub x: Vec<T>,
+    pub y: Vec<T>,
+}
+
+impl<T: Real> Field<T> {
+    pub fn zeros(count: usize) -> Self {
+        Self { x: vec![T::default(); count], y: vec![T::default(); count] }
+    }
+
+    pub fn len(&self) -> usize {
+        self.x.len()
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.x.is_empty()
+    }
+
+    pub fn of_points(points: &Points) -> Self {
+        let cast = |values: &[f64]| values.iter().map(|&value| T::of(value)).collect();
+        Self { x: cast(&points.x), y: cast(&points.y) }
+    }
+
+    pub fn get(&self, index: usize) -> [T; 2] {
+        [self.x[index], self.y[index]]
+    }
+
+    /// Both coordinates, whole.
+    pub fn view(&self) -> View<'_, T> {
+        View { x: &self.x, y: &self.y }
+    }
+
+    /// Both coordinates, cut at `bounds`: ascending, from 0 to the length.
+    pub fn parts(&mut self, bounds: &[usize]) -> Vec<Part<'_, T>> {
+        let (mut x, mut y) = (&mut self.x[..], &mut self.y[..]);
+        let mut parts = Vec::with_capacity(bounds.len());
+        for ends in bounds.windows(2) {
+            let (head_x, tail_x) = x.split_at_mut(ends[1] - ends[0]);
+            let (head_y, tail_y) = y.split_at_mut(ends[1] - ends[0]);
+            parts.push(Part { begin: ends[0], x: head_x, y: head_y });
+            (x, y) = (tail_x, tail_y);
+        }
+        parts
+    }
+}
+
+/// A field to be read.
+#[derive(Clone, Copy, Debug)]
+pub struct View<'a, T> {
+    pub x: &'a [T],
+    pub y: &'a [T],
+}
+
+impl<'a, T> View<'a, T> {
+    pub fn range(self, range: std::ops::Range<usize>) -> Self {
+        Self { x: &self.x[range.clone()], y: &self.y[range] }
+    }
+}
+
+/// The stretch of a field that one thread writes.
+#[derive(Debug)]
+pub struct Part<'a, T> {
+    /// Index of its first particle.
+    pub begin: usize,
+    pub x: &'a mut [T],
+    pub y: &'a mut [T],
+}
+
+impl<T> Part<'_, T> {
+    pub fn range(&self) -> std::ops::Range<usize> {
+        self.begin..self.begin + self.x.len()
+    }
+}
+
+/// Lanes that products are summed in: enough to keep an adder busy, and fixed, so that the sum has the
+/// same bits on every machine.
+const LANES: usize = 16;
+
+/// `sum a b` over one coordinate, in double precision.
+fn dot_of<A: Real, B: Real>(a: &[A], b: &[B]) -> f64 {
+    let mut sums = [0.0; LANES];
+    let (whole_a, rest_a) = a.as_chunks::<LANES>();
+    let (whole_b, rest_b) = b.as_chunks::<LANES>();
+    for (a, b) in whole_a.iter().zip(whole_b) {
+        for k in 0..LANES {
+            sums[k] += a[k].wide() * b[k].wide();
+        }
+    }
+    let rest: f64 = rest_a.iter().zip(rest_b).map(|(a, b)| a.wide() * b.wide()).sum();
+    sums.iter().sum::<f64>() + rest
+}
+
+/// `sum a . b` over all particles, in double precision.
+pub fn dot<A: Real, B: Real>(a: View<'_, A>, b: View<'_, B>) -> f64 {
+    dot_of(a.x, b.x) + dot_of(a.y, b.y)
+}

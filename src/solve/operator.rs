@@ -1,0 +1,236 @@
+//! The flock's operator by classes of rows.
+//!
+//! On a lattice body of one material, what a particle feels depends on nothing but which of the cells
+//! around it exist, so a body of millions of particles has a few dozen different rows. The operator keeps
+//! those and one class number a particle; indices of neighbours follow from the sites.
+
+mod columns;
+mod connected;
+mod kernel;
+mod matrix;
+
+use std::collections::HashMap;
+
+pub use columns::{Columns, Segment};
+pub use kernel::{Stencils, Task, array, array_mut, pass};
+pub use matrix::{HELD, Matrix};
+
+use crate::flock::block::{Block, transposed};
+use crate::flock::lattice::Site;
+
+/// `(K u)_i = diagonal u_i - sum_k block_k u_{i + offset_k}`: what holds a particle back, less what its
+/// neighbours pull it along with \[force / length\].
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Row {
+    pub diagonal: Block,
+    /// Offsets in columns and rows of sites, none of them zero and none twice.
+    pub entries: Vec<(Site, Block)>,
+}
+
+/// Why rows make no operator. Particles are named by their ids, which count from 1.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum OperatorError {
+    #[error("{sites} sites, {classes} classes and {follows} roles do not describe one body")]
+    Shapes { sites: usize, classes: usize, follows: usize },
+    #[error("the sites must ascend column by column, but that of particle {particle} does not")]
+    Order { particle: usize },
+    #[error("particle {particle} has row class {class}, but there are {rows}")]
+    NoClass { particle: usize, class: u32, rows: usize },
+    #[error(
+        "the row of particle {particle} reaches {} columns and {} rows away, where no particle is",
+        .offset[0], .offset[1]
+    )]
+    NoNeighbour { particle: usize, offset: Site },
+    #[error("the row of particle {particle} is not finite")]
+    NotFinite { particle: usize },
+}
+
+/// Rows for all particles of a body that follow.
+#[derive(Clone, Debug)]
+pub struct Operator {
+    pub(super) columns: Columns,
+    pub(super) class: Vec<u32>,
+    pub(super) rows: Vec<Row>,
+    pub(super) follows: Vec<bool>,
+    /// Vectors from a site to that of the next column and of the next row \[length\].
+    pub(super) grid: [[f64; 2]; 2],
+}
+
+impl Operator {
+    /// `class` names the row of each particle, shape \[count\]; that of particles that do not follow is not
+    /// looked at. `sites` ascend, as those of a body do. `grid` are the vectors of one column and of one
+    /// row \[length\].
+    pub fn new(
+        sites: &[Site],
+        grid: [[f64; 2]; 2],
+        class: Vec<u32>,
+        rows: Vec<Row>,
+        follows: Vec<bool>,
+    ) -> Result<Self, OperatorError> {
+        let (count, classes) = (sites.len(), class.len());
+        if classes != count || follows.len() != count {
+            return Err(OperatorError::Shapes { sites: count, classes, follows: follows.len() });
+        }
+        if let Some(i) = sites.windows(2).position(|pair| pair[0] >= pair[1]) {
+            return Err(OperatorError::Order { particle: i + 2 });
+        }
+        let known = |i: &usize| !follows[*i] || (class[*i] as usize) < rows.len();
+        if let Some(i) = (0..count).find(|i| !known(i)) {
+            return Err(OperatorError::NoClass { particle: i + 1, class: class[i], rows: rows.len() });
+        }
+        let columns = Columns::new(sites.iter().copied(), |_| true);
+        let operator = Self { columns, class, rows, follows, grid };
+        operator.check_rows()?;
+        Ok(operator)
+    }
+
+    /// From a row for each particle, alike rows becoming one class; `row(i)` is asked of followers only.
+    pub fn from_rows(
+        sites: &[Site],
+        grid: [[f64; 2]; 2],
+        follows: Vec<bool>,
+        row: impl Fn(usize) -> Row,
+    ) -> Result<Self, OperatorError> {
+        let mut known: HashMap<Vec<u64>, u32> = HashMap::new();
+        let mut rows: Vec<Row> = Vec::new();
+        let mut class = vec![0; sites.len()];
+        for i in (0..sites.len().min(follows.len())).filter(|&i| follows[i]) {
+            let row = row(i);
+            // Most particles are like the one before.
+            class[i] = match i.checked_sub(1).filter(|&before| follows[before]) {
+                Some(before) if rows[class[before] as usize] == row => class[before],
+                _ => *known.entry(content(&row)).or_insert_with(|| {
+                    rows.push(row);
+                    rows.len() as u32 - 1
+                }),
+            };
+        }
+        Self::new(sites, grid, class, rows, follows)
+    }
+
+    pub fn count(&self) -> usize {
+        self.class.len()
+    }
+
+    pub fn followers(&self) -> usize {
+        self.follows.iter().filter(|&&follows| follows).count()
+    }
+
+    pub fn follows(&self) -> &[bool] {
+        &self.follows
+    }
+
+    /// The different rows.
+    pub fn rows(&self) -> &[Row] {
+        &self.rows
+    }
+
+    /// Two followers, counted from 0, of which the second does not feel the first as the first feels it;
+    /// `None` where the operator is symmetric, to rounding.
+    pub fn asymmetric_pair(&self) -> Option<[usize; 2]> {
+        // The last class that each entry of each class was found to fit; a body has few pairs.
+        let mut fits: Vec<Vec<u32>> = self.rows.iter().map(|row| vec![HELD; row.entries.len()]).collect();
+        self.stretches().find_map(|stretch| {
+            let class = stretch.class as usize;
+            for (e, &(offset, _)) in self.rows[class].entries.iter().enumerate() {
+                let (first, _) = self.columns.find(add(stretch.site, offset))?;
+                for k in 0..stretch.len {
+                    let other = first + k;
+                    if !self.follows[other] || fits[class][e] == self.class[other] {
+                        continue;
+                    }
+                    if !self.see_each_other_alike(class, e, self.class[other] as usize) {
+                        return Some([stretch.start + k, other]);
+                    }
+                    fits[class][e] = self.class[other];
+                }
+            }
+            None
+        })
+    }
+
+    fn see_each_other_alike(&self, class: usize, entry: usize, other: usize) -> bool {
+        let (offset, block) = self.rows[class].entries[entry];
+        let back = [-offset[0], -offset[1]];
+        let zero = Block::default();
+        let seen = self.rows[other].entries.iter().find(|(o, _)| *o == back).map_or(&zero, |(_, b)| b);
+        let size = |block: &Block| block.iter().flatten().fold(0.0f64, |m, v| m.max(v.abs()));
+        let scale = size(&self.rows[class].diagonal).min(size(&self.rows[other].diagonal));
+        let expected = transposed(block);
+        (0..4).all(|k| (seen[k / 2][k % 2] - expected[k / 2][k % 2]).abs() <= 1e-10 * scale)
+    }
+
+    /// Index of the particle at an offset from a site, which a row of the operator leads to.
+    pub(super) fn index_of(&self, site: Site, offset: Site) -> usize {
+        self.columns.find(add(site, offset)).map(|(index, _)| index).expect("checked when made")
+    }
+
+    /// Followers of one class in a row, in segments whose neighbours are segments as well.
+    pub(super) fn stretches(&self) -> impl Iterator<Item = Stretch> + '_ {
+        self.columns.iter().flat_map(move |(column, segment)| {
+            let mut done = 0;
+            std::iter::from_fn(move || {
+                let begin = segment.start as usize;
+                while done < segment.len as usize && !self.follows[begin + done] {
+                    done += 1;
+                }
+                let start = begin + done;
+                let class = *self.class[..begin + segment.len as usize].get(start)?;
+                let site = [column, segment.row + self.columns.step() * done as i32];
+                let most = segment.len as usize - done;
+                let same =
+                    (0..most).take_while(|k| self.follows[start + k] && self.class[start + k] == class);
+                let mut len = same.count();
+                for (offset, _) in &self.rows[class as usize].entries {
+                    len = len.min(self.columns.find(add(site, *offset)).map_or(1, |(_, room)| room));
+                }
+                done += len;
+                Some(Stretch { site, start, len, class })
+            })
+        })
+    }
+
+    fn check_rows(&self) -> Result<(), OperatorError> {
+        let finite = |row: &Row| {
+            let blocks = std::iter::once(&row.diagonal).chain(row.entries.iter().map(|(_, block)| block));
+            blocks.flatten().flatten().all(|value| value.is_finite())
+        };
+        let finite: Vec<bool> = self.rows.iter().map(finite).collect();
+        for Stretch { site, start, class, .. } in self.stretches() {
+            if !finite[class as usize] {
+                return Err(OperatorError::NotFinite { particle: start + 1 });
+            }
+            for (offset, _) in &self.rows[class as usize].entries {
+                if self.columns.find(add(site, *offset)).is_none() {
+                    return Err(OperatorError::NoNeighbour { particle: start + 1, offset: *offset });
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Followers `start..start + len`, the first at `site`, that have one class and each neighbour at one
+/// index distance.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Stretch {
+    pub site: Site,
+    pub start: usize,
+    pub len: usize,
+    pub class: u32,
+}
+
+pub(super) fn add(a: Site, b: Site) -> Site {
+    [a[0] + b[0], a[1] + b[1]]
+}
+
+/// What two rows must share to be of one class, to the bit.
+fn content(row: &Row) -> Vec<u64> {
+    let blocks = |block: &Block| block.iter().flatten().map(|value| value.to_bits()).collect::<Vec<_>>();
+    let mut content = blocks(&row.diagonal);
+    for (offset, block) in &row.entries {
+        content.push((offset[0] as u64) << 32 | u64::from(offset[1] as u32));
+        content.extend(blocks(block));
+    }
+    content
+}

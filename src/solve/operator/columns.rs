@@ -1,0 +1,164 @@
+//! Which particle stands at a site, without a map: the numbering runs column by column from the bottom,
+//! so a column is a few stretches of evenly spaced rows with ascending indices.
+
+use crate::flock::lattice::Site;
+
+/// Particles of one column whose rows are evenly spaced.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Segment {
+    pub row: i32,
+    /// Index of the first particle.
+    pub start: u32,
+    pub len: u32,
+}
+
+/// The columns of a body as segments.
+#[derive(Clone, Debug, Default)]
+pub struct Columns {
+    /// Number of the first column.
+    first: i32,
+    /// Rows from one particle of a segment to the next.
+    step: i32,
+    /// Where the segments of each column begin, shape \[columns + 1\].
+    starts: Vec<u32>,
+    segments: Vec<Segment>,
+    /// Index of the first particle of each column, whether in a segment or not, shape \[columns + 1\].
+    begins: Vec<u32>,
+}
+
+impl Columns {
+    /// Segments of the particles for which `counts` holds; `sites` ascend.
+    pub fn new(sites: impl Iterator<Item = Site> + Clone, counts: impl Fn(usize) -> bool) -> Self {
+        let mut steps = sites.clone().zip(sites.clone().skip(1)).filter(|(a, b)| a[0] == b[0]);
+        // The sites of a column are evenly spaced on every lattice, so that the first few tell.
+        let step = steps.by_ref().take(4096).map(|(a, b)| b[1] - a[1]).min().unwrap_or(1).max(1);
+        let mut columns = Self { step, ..Self::default() };
+        // The site before, if it ended a segment that may go on.
+        let mut last: Option<Site> = None;
+        let mut count = 0;
+        for (index, site) in sites.enumerate() {
+            columns.open(site[0], index);
+            count = index + 1;
+            if !counts(index) {
+                last = None;
+                continue;
+            }
+            match columns.segments.last_mut() {
+                Some(segment) if last == Some([site[0], site[1].wrapping_sub(step)]) => segment.len += 1,
+                _ => columns.segments.push(Segment { row: site[1], start: index as u32, len: 1 }),
+            }
+            last = Some(site);
+        }
+        columns.starts.push(columns.segments.len() as u32);
+        columns.begins.push(count as u32);
+        columns
+    }
+
+    /// Begins the columns up to `column`, the particle `index` being the next.
+    fn open(&mut self, column: i32, index: usize) {
+        if index == 0 {
+            self.first = column;
+        }
+        while self.first + (self.begins.len() as i32) <= column {
+            self.begins.push(index as u32);
+            self.starts.push(self.segments.len() as u32);
+        }
+    }
+
+    /// Numbers of the columns.
+    pub fn range(&self) -> std::ops::Range<i32> {
+        self.first..self.first + self.begins.len() as i32 - 1
+    }
+
+    pub fn step(&self) -> i32 {
+        self.step
+    }
+
+    pub fn segments(&self) -> &[Segment] {
+        &self.segments
+    }
+
+    /// Segments of a column, from the bottom; none where there is no such column.
+    pub fn of(&self, column: i32) -> &[Segment] {
+        if !self.range().contains(&column) {
+            return &[];
+        }
+        let c = (column - self.first) as usize;
+        &self.segments[self.starts[c] as usize..self.starts[c + 1] as usize]
+    }
+
+    /// Column, and segment, of every segment in order.
+    pub fn iter(&self) -> impl Iterator<Item = (i32, Segment)> + '_ {
+        self.range().flat_map(|column| self.of(column).iter().map(move |&segment| (column, segment)))
+    }
+
+    /// Sites of all particles in segments, ascending.
+    pub fn sites(&self) -> impl Iterator<Item = Site> + Clone + '_ {
+        let of_segment = move |column: i32, segment: Segment| {
+            (0..segment.len as i32).map(move |k| [column, segment.row + self.step * k])
+        };
+        self.range().flat_map(move |column| {
+            self.of(column).iter().flat_map(move |&segment| of_segment(column, segment))
+        })
+    }
+
+    /// Lowest and highest row of a column's segments.
+    pub fn rows_of(&self, column: i32) -> Option<[i32; 2]> {
+        let segments = self.of(column);
+        let (low, high) = (segments.first()?, segments.last()?);
+        Some([low.row, high.row + self.step * (high.len as i32 - 1)])
+    }
+
+    /// The particle at a site, and how many follow it in its segment, itself included.
+    pub fn find(&self, [column, row]: Site) -> Option<(usize, usize)> {
+        let segments = self.of(column);
+        let after = segments.partition_point(|segment| segment.row <= row);
+        let segment = segments[..after].last()?;
+        let (steps, odd) = ((row - segment.row) / self.step, (row - segment.row) % self.step);
+        (odd == 0 && steps < segment.len as i32)
+            .then(|| ((segment.start as i32 + steps) as usize, (segment.len as i32 - steps) as usize))
+    }
+
+    /// Index bounds of groups of whole columns of at least `size` particles but for the last, with the
+    /// number of the column that each begins with: `[begin of the first, ..., end of the last]`.
+    pub fn groups(&self, size: usize, count: usize) -> (Vec<usize>, Vec<i32>) {
+        let (mut bounds, mut columns) = (vec![0], vec![self.first]);
+        for (c, &begin) in self.begins[..self.begins.len() - 1].iter().enumerate() {
+            if begin as usize - bounds[bounds.len() - 1] >= size {
+                bounds.push(begin as usize);
+                columns.push(self.first + c as i32);
+            }
+        }
+        bounds.push(count);
+        columns.push(self.range().end);
+        (bounds, columns)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flock::body::{Body, Cut};
+    use crate::flock::lattice::{Lattice, LatticeKind};
+    use crate::flock::neighbourhood::Neighbourhood;
+
+    #[test]
+    fn every_counted_particle_is_found_at_its_site_and_no_other() {
+        for kind in LatticeKind::SAMPLES {
+            let lattice = Lattice::new(kind, [0.0; 2], 0.0);
+            let cut = Cut::Count { columns: 13, rows: 11 };
+            let (body, _) =
+                Body::build(lattice, &cut, &Neighbourhood::First { keep: None }, None).expect("fits");
+            let counts = |i: usize| i % 7 != 3;
+            let columns = Columns::new(body.sites.iter().copied(), counts);
+            for i in -2..40 {
+                for j in -2..14 {
+                    let there = body.sites.binary_search(&[i, j]).ok().filter(|&k| counts(k));
+                    assert_eq!(columns.find([i, j]).map(|(index, _)| index), there, "{kind:?} {i} {j}");
+                }
+            }
+            let (bounds, _) = columns.groups(30, body.count());
+            assert!(bounds.windows(2).all(|w| w[0] < w[1]), "{bounds:?}");
+        }
+    }
+}

@@ -1,0 +1,160 @@
+//! The loops that equilibrium is found in: a matrix applied over its runs, and what is made of the
+//! product while it is in the registers.
+//!
+//! Per particle a row of nine blocks is 36 multiplications and as many additions: in single precision
+//! less than the memory takes, if the vectors are as wide as the processor has them. The loops are
+//! therefore compiled twice. Lanes are never added to each other, so the width changes no bit.
+
+use super::Row;
+use super::matrix::{Matrix, Run};
+use crate::flock::block::{Block, inverse};
+use crate::solve::field::{Real, View};
+
+/// Particles at a time: four AVX2 vectors of single and eight of double precision, so that a block is
+/// loaded once for all of them.
+const WIDE: usize = 32;
+/// The same for what is left.
+const NARROW: usize = 8;
+
+/// The rows of a matrix in the precision they are applied in.
+#[derive(Clone, Debug)]
+pub struct Stencils<T> {
+    /// Where the blocks of each class begin, shape \[classes + 1\].
+    starts: Vec<u32>,
+    /// By class: `D`, then `-K` of each entry.
+    blocks: Vec<[T; 4]>,
+    /// `D^-1` by class.
+    inverse: Vec<[T; 4]>,
+}
+
+impl<T: Real> Stencils<T> {
+    /// Rows multiplied by `scale`. A `D` without inverse is given zero: what it belongs to stays put.
+    pub fn new(rows: &[Row], scale: f64) -> Self {
+        let mut stencils = Self { starts: vec![0], blocks: Vec::new(), inverse: Vec::new() };
+        let cast = |block: &Block, factor: f64| {
+            [block[0][0], block[0][1], block[1][0], block[1][1]].map(|value| T::of(value * factor))
+        };
+        for row in rows {
+            stencils.blocks.push(cast(&row.diagonal, scale));
+            stencils.blocks.extend(row.entries.iter().map(|(_, block)| cast(block, -scale)));
+            stencils.starts.push(stencils.blocks.len() as u32);
+            stencils.inverse.push(cast(&inverse(&row.diagonal).unwrap_or_default(), 1.0 / scale));
+        }
+        stencils
+    }
+
+    /// `D` and `-K` of each entry of a class, by rows.
+    pub fn blocks(&self, class: u32) -> &[[T; 4]] {
+        &self.blocks[self.starts[class as usize] as usize..self.starts[class as usize + 1] as usize]
+    }
+
+    /// `D^-1` of a class, by rows.
+    pub fn inverse(&self, class: u32) -> &[T; 4] {
+        &self.inverse[class as usize]
+    }
+}
+
+/// What is made of `K u`.
+pub trait Task<T> {
+    /// Takes `K u` of the particles from number `at` on, whose `D^-1` is given.
+    fn take<const W: usize>(&mut self, at: usize, inverse: &[T; 4], x: &[T; W], y: &[T; W]);
+}
+
+/// Hands `K u` of the particles in a group to the task.
+pub fn pass<T: Real>(
+    matrix: &Matrix,
+    stencils: &Stencils<T>,
+    group: usize,
+    u: View<'_, T>,
+    task: &mut impl Task<T>,
+) {
+    over_runs(matrix, stencils, matrix.runs_of(group), u, task);
+}
+
+/// Hands `K u` of the particles in runs to the task.
+pub fn over_runs<T: Real>(
+    matrix: &Matrix,
+    stencils: &Stencils<T>,
+    runs: &[Run],
+    u: View<'_, T>,
+    task: &mut impl Task<T>,
+) {
+    #[cfg(target_arch = "x86_64")]
+    if is_x86_feature_detected!("avx2") {
+        // SAFETY: the processor has AVX2, which is all that the callee asks for.
+        return unsafe { over_runs_avx2(matrix, stencils, runs, u, task) };
+    }
+    over_runs_portable(matrix, stencils, runs, u, task);
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn over_runs_avx2<T: Real>(
+    matrix: &Matrix,
+    stencils: &Stencils<T>,
+    runs: &[Run],
+    u: View<'_, T>,
+    task: &mut impl Task<T>,
+) {
+    over_runs_portable(matrix, stencils, runs, u, task);
+}
+
+#[inline(always)]
+fn over_runs_portable<T: Real>(
+    matrix: &Matrix,
+    stencils: &Stencils<T>,
+    runs: &[Run],
+    u: View<'_, T>,
+    task: &mut impl Task<T>,
+) {
+    for run in runs {
+        let (blocks, distances) = (stencils.blocks(run.class), matrix.distances(run));
+        let inverse = stencils.inverse(run.class);
+        let (mut at, end) = (run.start as usize, (run.start + run.len) as usize);
+        while at + WIDE <= end {
+            lanes::<T, WIDE>(blocks, distances, inverse, at, u, task);
+            at += WIDE;
+        }
+        while at + NARROW <= end {
+            lanes::<T, NARROW>(blocks, distances, inverse, at, u, task);
+            at += NARROW;
+        }
+        while at < end {
+            lanes::<T, 1>(blocks, distances, inverse, at, u, task);
+            at += 1;
+        }
+    }
+}
+
+#[inline(always)]
+fn lanes<T: Real, const W: usize>(
+    blocks: &[[T; 4]],
+    distances: &[i32],
+    inverse: &[T; 4],
+    at: usize,
+    u: View<'_, T>,
+    task: &mut impl Task<T>,
+) {
+    let (mut x, mut y) = ([T::default(); W], [T::default(); W]);
+    for ([xx, xy, yx, yy], &distance) in blocks.iter().zip(distances) {
+        let from = at.wrapping_add_signed(distance as isize);
+        let (ux, uy) = (array::<T, W>(u.x, from), array::<T, W>(u.y, from));
+        for k in 0..W {
+            x[k] += *xx * ux[k] + *xy * uy[k];
+            y[k] += *yx * ux[k] + *yy * uy[k];
+        }
+    }
+    task.take(at, inverse, &x, &y);
+}
+
+/// The `W` values from number `at` on.
+#[inline(always)]
+pub fn array<T, const W: usize>(values: &[T], at: usize) -> &[T; W] {
+    values[at..at + W].try_into().expect("as many as asked for")
+}
+
+/// The `W` places from number `at` on.
+#[inline(always)]
+pub fn array_mut<T, const W: usize>(values: &mut [T], at: usize) -> &mut [T; W] {
+    (&mut values[at..at + W]).try_into().expect("as many as asked for")
+}

@@ -1,0 +1,161 @@
+//! The operator over the followers alone, compiled for speed: what the solvers iterate with, and what
+//! every level of multigrid is.
+
+use std::collections::HashMap;
+
+use super::columns::Columns;
+use super::{Operator, Row, Stretch, add};
+
+/// Class of particles that do not follow.
+pub const HELD: u32 = u32::MAX;
+
+/// Fewest particles that a thread is given at a time: their vectors stay in its second cache over a few
+/// loops.
+const GROUP: usize = 1 << 13;
+
+/// Consecutive particles of one class whose neighbours lie at the same index distances.
+#[derive(Clone, Copy, Debug)]
+pub struct Run {
+    pub start: u32,
+    pub len: u32,
+    pub class: u32,
+    /// Where the index distances begin: zero for the particle itself, then its neighbours'.
+    pub distances: u32,
+}
+
+/// A square matrix over the followers. Vectors are as long as the body, zero at particles that are held.
+#[derive(Clone, Debug)]
+pub struct Matrix {
+    /// Segments of followers.
+    pub columns: Columns,
+    /// Row of each particle, [`HELD`] where it does not follow, shape \[count\].
+    pub class: Vec<u32>,
+    pub rows: Vec<Row>,
+    runs: Vec<Run>,
+    distances: Vec<i32>,
+    /// Index bounds of the groups of columns that threads work on, shape \[groups + 1\].
+    pub bounds: Vec<usize>,
+    /// First column of each group, shape \[groups + 1\].
+    pub group_columns: Vec<i32>,
+    /// First run of each group, shape \[groups + 1\].
+    group_runs: Vec<usize>,
+}
+
+impl Matrix {
+    /// `columns` hold the particles that have a class, and the entries of every row lead to such.
+    pub fn compile(columns: Columns, class: Vec<u32>, rows: Vec<Row>) -> Self {
+        let (bounds, group_columns) = columns.groups(GROUP, class.len());
+        let mut matrix = Self {
+            columns,
+            class,
+            rows,
+            runs: Vec::new(),
+            distances: Vec::new(),
+            bounds,
+            group_columns,
+            group_runs: Vec::new(),
+        };
+        matrix.find_runs();
+        let first = |&bound: &usize| matrix.runs.partition_point(|run| (run.start as usize) < bound);
+        matrix.group_runs = matrix.bounds.iter().map(first).collect();
+        matrix
+    }
+
+    /// The rows of the operator without what they owe to held particles.
+    pub fn of_followers(operator: &Operator) -> Self {
+        let columns = Columns::new(operator.columns.sites(), |i| operator.follows[i]);
+        let mut class = vec![HELD; operator.count()];
+        let mut rows = operator.rows.clone();
+        let mut known = HashMap::new();
+        for stretch in operator.stretches() {
+            let Stretch { start, len, class: full, .. } = stretch;
+            let entries = &operator.rows[full as usize].entries;
+            let firsts: Vec<usize> =
+                entries.iter().map(|(offset, _)| operator.index_of(stretch.site, *offset)).collect();
+            let free = firsts.iter().all(|&j| operator.follows[j..j + len].iter().all(|&follows| follows));
+            if free {
+                class[start..start + len].fill(full);
+                continue;
+            }
+            for k in 0..len {
+                let keep: Vec<bool> = firsts.iter().map(|&j| operator.follows[j + k]).collect();
+                class[start + k] = *known.entry((full, keep)).or_insert_with_key(|(full, keep)| {
+                    let mut row = operator.rows[*full as usize].clone();
+                    let mut kept = keep.iter();
+                    row.entries.retain(|_| kept.next() == Some(&true));
+                    rows.push(row);
+                    rows.len() as u32 - 1
+                });
+            }
+        }
+        Self::compile(columns, class, rows)
+    }
+
+    pub fn count(&self) -> usize {
+        self.class.len()
+    }
+
+    pub fn groups(&self) -> usize {
+        self.bounds.len() - 1
+    }
+
+    /// Runs of a group.
+    pub fn runs_of(&self, group: usize) -> &[Run] {
+        &self.runs[self.group_runs[group]..self.group_runs[group + 1]]
+    }
+
+    pub fn runs(&self) -> &[Run] {
+        &self.runs
+    }
+
+    /// Index distances to a run's particles themselves (zero) and to their neighbours, in the order of
+    /// the row's entries.
+    pub fn distances(&self, run: &Run) -> &[i32] {
+        let entries = self.rows[run.class as usize].entries.len();
+        &self.distances[run.distances as usize..][..entries + 1]
+    }
+
+    /// Most columns and rows that an entry reaches.
+    pub fn reach(&self) -> [i32; 2] {
+        let entries = self.rows.iter().flat_map(|row| &row.entries);
+        entries.fold([0, 0], |far, (o, _)| [far[0].max(o[0].abs()), far[1].max(o[1].abs())])
+    }
+
+    /// Bytes on the heap.
+    pub fn bytes(&self) -> usize {
+        let entries: usize = self.rows.iter().map(|row| row.entries.len() * 40 + 56).sum();
+        self.class.len() * 4 + self.runs.len() * 16 + self.distances.len() * 4 + entries
+    }
+
+    fn find_runs(&mut self) {
+        // Where the distances last used with each class lie: most columns are like the one before.
+        let mut last = vec![None; self.rows.len()];
+        let mut found = Vec::new();
+        for (column, segment) in self.columns.iter() {
+            let mut done = 0;
+            while done < segment.len {
+                let start = segment.start + done;
+                let class = self.class[start as usize];
+                let classes = &self.class[start as usize..(segment.start + segment.len) as usize];
+                let mut len = classes.iter().take_while(|&&c| c == class).count();
+                let site = [column, segment.row + self.columns.step() * done as i32];
+                found.clear();
+                found.push(0);
+                for (offset, _) in &self.rows[class as usize].entries {
+                    let (there, room) =
+                        self.columns.find(add(site, *offset)).expect("rows lead to followers");
+                    len = len.min(room);
+                    found.push(there as i32 - start as i32);
+                }
+                let known = last[class as usize].filter(|&at| self.distances[at..].starts_with(&found));
+                let at = known.unwrap_or_else(|| {
+                    self.distances.extend(&found);
+                    self.distances.len() - found.len()
+                });
+                last[class as usize] = Some(at);
+                self.runs.push(Run { start, len: len as u32, class, distances: at as u32 });
+                done += len as u32;
+            }
+        }
+    }
+}
