@@ -78,3 +78,8 @@ fn scene_knows_nothing_of_hosts_and_outputs() {
 fn continuum_knows_nothing_of_outputs() {
     assert_imports_only("continuum", &["flock", "solve", "scene", "material"]);
 }
+
+#[test]
+fn the_comparison_knows_nothing_of_outputs() {
+    assert_imports_only("compare", &["scene", "continuum", "flock", "material", "solve", "fem"]);
+}

@@ -1,5 +1,7 @@
 //! The command line: what can be asked for, and who answers.
 
+#[cfg(feature = "fem")]
+mod compare;
 mod progress;
 mod run;
 
@@ -42,6 +44,12 @@ pub enum Command {
         after_help = "Example:\n  flockform run tension --out /tmp/tension --set stop.steps=800 --set frame=immediate"
     )]
     Run(run::RunArguments),
+    /// Hold a scene's rule against finite elements on the same body
+    #[cfg(feature = "fem")]
+    #[command(
+        after_help = "Example:\n  flockform compare beam --out /tmp/beam\n  flockform compare beam-paper --set neighbours.kind=second"
+    )]
+    Compare(compare::CompareArguments),
     /// List the bundled scenes
     #[command(after_help = "Example:\n  flockform scenes")]
     Scenes,
@@ -139,10 +147,12 @@ pub fn start_log(verbose: u8) {
 pub fn dispatch(command: Command) -> Result<ExitCode, Refusal> {
     match command {
         Command::Run(arguments) => return run::run(&arguments),
+        #[cfg(feature = "fem")]
+        Command::Compare(arguments) => return compare::compare(&arguments),
         Command::Scenes => list_scenes()?,
         Command::Plan(arguments) => {
             let scene = arguments.load([])?;
-            print(&PlanReport::new(&scene, &Plan::new(&scene)?)?.to_string());
+            print(&PlanReport::new(&scene, &plan(&scene)?)?.to_string());
         }
         Command::Schema => print(&format!("{:#}\n", scene::validate::schema())),
         Command::Completions { shell } => {
@@ -156,6 +166,14 @@ pub fn dispatch(command: Command) -> Result<ExitCode, Refusal> {
         }
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// The plan of a scene, with the truth that its leaders may be led by.
+fn plan(scene: &Scene) -> Result<Plan, SceneError> {
+    #[cfg(feature = "fem")]
+    return flockform::compare::run::plan(scene);
+    #[cfg(not(feature = "fem"))]
+    Plan::new(scene)
 }
 
 fn list_scenes() -> Result<(), SceneError> {

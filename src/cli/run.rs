@@ -17,7 +17,7 @@ use flockform::export::{ExportError, OutputFolder, Results, Timings, VtkSeries, 
 use flockform::scene::Scene;
 
 use super::progress::Progress;
-use super::{FAILED, Refusal, SceneArguments, print};
+use super::{FAILED, Refusal, SceneArguments, plan, print};
 
 #[derive(Debug, Args)]
 pub struct RunArguments {
@@ -50,7 +50,7 @@ pub fn run(arguments: &RunArguments) -> Result<ExitCode, Refusal> {
 fn run_here(arguments: &RunArguments) -> Result<ExitCode, Refusal> {
     let start = Instant::now();
     let scene = arguments.scene.load(arguments.steps.map(|steps| format!("stop.steps={steps}")))?;
-    let plan = Plan::new(&scene)?;
+    let plan = plan(&scene)?;
     let out = arguments.out.clone().unwrap_or_else(|| free_folder(&scene.name));
     let folder = OutputFolder::create(&out, arguments.force)?;
     let setup = start.elapsed();
@@ -82,7 +82,7 @@ fn run_here(arguments: &RunArguments) -> Result<ExitCode, Refusal> {
 }
 
 /// The first of out/NAME, out/NAME-2, ... that is not taken.
-fn free_folder(name: &str) -> PathBuf {
+pub fn free_folder(name: &str) -> PathBuf {
     let taken = |path: &Path| path.read_dir().is_ok_and(|mut entries| entries.next().is_some());
     let numbered = (2..).map(|n| PathBuf::from(format!("out/{name}-{n}")));
     std::iter::once(PathBuf::from(format!("out/{name}")))
@@ -92,7 +92,7 @@ fn free_folder(name: &str) -> PathBuf {
 }
 
 /// Set by Ctrl-C and by SIGTERM; the run then stops at the next step.
-fn interrupt_flag() -> Arc<AtomicBool> {
+pub fn interrupt_flag() -> Arc<AtomicBool> {
     let flag = Arc::new(AtomicBool::new(false));
     let raised = Arc::clone(&flag);
     if let Err(error) = ctrlc::set_handler(move || raised.store(true, Ordering::Relaxed)) {
@@ -217,7 +217,7 @@ fn closing_words(scene: &Scene, outcome: &Outcome, elapsed: Duration, kept: &Pat
     words + &format!("results in {}\n", kept.display())
 }
 
-fn exit_code(outcome: &Outcome) -> ExitCode {
+pub fn exit_code(outcome: &Outcome) -> ExitCode {
     match outcome.reason {
         StopReason::Equilibrium | StopReason::Steps => ExitCode::SUCCESS,
         StopReason::Unsettled | StopReason::Interrupted | StopReason::Diverged(_) => ExitCode::from(FAILED),

@@ -96,12 +96,27 @@ impl Layout {
     /// # Errors
     /// Names the load that has nothing to act on.
     pub fn forces(&self, scene: &Scene) -> Result<Option<Points>, SceneError> {
-        let (Some(cells), Some(elastic)) = (&self.cells, &scene.material) else { return Ok(None) };
+        let Some(cells) = &self.cells else { return Ok(None) };
         if scene.loads.is_empty() {
             return Ok(None);
         }
-        let thickness = elastic.thickness();
+        self.loads(scene)?.on_particles(cells, &self.body.reference).map(Some).map_err(|error| {
+            let help = match error {
+                LoadError::NotFinite => "give finite numbers",
+                _ => "move the region onto particles that belong to cells",
+            };
+            scene.refuse("loads", error.to_string(), help)
+        })
+    }
+
+    /// The scene's loads on the sides and particles that they act on; none without a material.
+    ///
+    /// # Errors
+    /// Names a load whose region holds no particle or no side.
+    pub fn loads(&self, scene: &Scene) -> Result<Loads, SceneError> {
         let mut loads = Loads::default();
+        let (Some(cells), Some(elastic)) = (&self.cells, &scene.material) else { return Ok(loads) };
+        let thickness = elastic.thickness();
         for (k, load) in scene.loads.iter().enumerate() {
             match load {
                 Load::Traction { region, traction } => {
@@ -118,13 +133,7 @@ impl Layout {
                 }
             }
         }
-        loads.on_particles(cells, &self.body.reference).map(Some).map_err(|error| {
-            let help = match error {
-                LoadError::NotFinite => "give finite numbers",
-                _ => "move the region onto particles that belong to cells",
-            };
-            scene.refuse("loads", error.to_string(), help)
-        })
+        Ok(loads)
     }
 
     /// Sides of the boundary both of whose particles are in the region.

@@ -114,7 +114,7 @@ pub fn write_probes(folder: &OutputFolder, probes: &[ProbeSeries]) -> Result<Pat
     write(folder, "probes.csv", rows)
 }
 
-fn write(
+pub(super) fn write(
     folder: &OutputFolder,
     name: &str,
     rows: impl Iterator<Item = impl Serialize>,

@@ -12,6 +12,8 @@
 //! | `steps.pvd`, `steps/*.vtu` | frames for ParaView |
 //! | `configuration_*`, `pe1_*`, `probes` | figures, as SVG and as the PNG rendered from it |
 //!
+//! A comparison with the truth (`comparison`, feature `fem`) has a folder of its own.
+//!
 //! Frames are written while the run goes on, since a long run cannot keep them ([`VtkSeries`]); the
 //! rest comes at the end, by [`write_all`]:
 //!
@@ -43,6 +45,8 @@
 //! ```
 
 mod bonds;
+#[cfg(feature = "fem")]
+pub mod comparison;
 pub mod csv;
 mod error;
 pub mod figures;

@@ -16,8 +16,10 @@ use crate::scene::Scene;
 use crate::scene::raw::RawScene;
 use crate::solve::equilibrium::Solved;
 
-const PROGRAM: &str = env!("CARGO_PKG_NAME");
+pub(super) const PROGRAM: &str = env!("CARGO_PKG_NAME");
 const FILE: &str = "summary.json";
+/// What a comparison writes in the place of a summary.
+pub(super) const COMPARISON: &str = "compare.json";
 
 /// How long the parts of a run took.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -168,10 +170,12 @@ impl Equilibrium {
     }
 }
 
-/// Whether the folder holds a summary that this program wrote.
+/// Whether the folder holds a summary, or a comparison, that this program wrote.
 pub(super) fn is_in(folder: &Path) -> bool {
-    let text = std::fs::read_to_string(folder.join(FILE)).unwrap_or_default();
-    serde_json::from_str::<serde_json::Value>(&text).is_ok_and(|summary| summary["program"] == PROGRAM)
+    [FILE, COMPARISON].into_iter().any(|file| {
+        let text = std::fs::read_to_string(folder.join(file)).unwrap_or_default();
+        serde_json::from_str::<serde_json::Value>(&text).is_ok_and(|summary| summary["program"] == PROGRAM)
+    })
 }
 
 fn counts(engine: &Engine) -> Counts {

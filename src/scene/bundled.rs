@@ -35,6 +35,19 @@ pub const SCENES: &[Bundled] = scenes![
     "lattice-hexagonal",
     "lattice-oblique",
     "lattice-honeycomb",
+    "beam",
+    "beam-5",
+    "beam-10",
+    "beam-loaded",
+    "beam-hexagonal",
+    "beam-paper",
+    "beam-paper-5",
+    "beam-paper-10",
+    "beam-paper-ring",
+    "beam-paper-second",
+    "beam-paper-reduced",
+    "beam-paper-hexagonal",
+    "beam-paper-hexagonal-reduced",
 ];
 
 /// The bundled scene of this name.

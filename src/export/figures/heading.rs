@@ -21,6 +21,7 @@ pub struct Key {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mark {
     Dot,
+    Ring,
     Line,
     DashedLine,
 }
@@ -70,8 +71,12 @@ fn draw_key(svg: &mut Svg, key: &Key, [x, y]: [f64; 2]) {
                 svg.rect([x + 3.0, y - 5.0], [10.0, 10.0], "rx=\"5\"");
             });
         }
+        Mark::Ring => {
+            let attributes = format!("fill=\"none\" stroke=\"{}\" stroke-width=\"1.5\"", key.colour);
+            svg.group(attributes, |svg| svg.rect([x + 3.0, y - 5.0], [10.0, 10.0], "rx=\"5\""));
+        }
         Mark::Line | Mark::DashedLine => {
-            let dashes = if key.mark == Mark::Line { "" } else { " stroke-dasharray=\"4 2\"" };
+            let dashes = if key.mark == Mark::DashedLine { " stroke-dasharray=\"4 2\"" } else { "" };
             let attributes = format!("stroke=\"{}\" stroke-width=\"1.5\"{dashes}", key.colour);
             svg.group(attributes, |svg| svg.line([x, y], [x + 16.0, y]));
         }
