@@ -120,10 +120,12 @@ struct Records {
 
 impl<'a> Recorder<'a> {
     fn new(scene: &'a Scene, plan: &Plan, folder: &OutputFolder) -> Result<Self, ExportError> {
+        // A body that is not stepped has no history.
+        let probed: &[usize] = if scene.raw.equilibrium.is_some() { &[] } else { &plan.probes };
         Ok(Self {
             scene,
             snapshots: Vec::new(),
-            probes: plan.probes.iter().map(|&particle| ProbeSeries::new(particle)).collect(),
+            probes: probed.iter().map(|&particle| ProbeSeries::new(particle)).collect(),
             frames: (scene.record.vtk_every > 0).then(|| VtkSeries::create(folder)).transpose()?,
             failure: None,
             writing: Duration::ZERO,

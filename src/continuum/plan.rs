@@ -231,9 +231,10 @@ fn material_weights(
     let material = MaterialWeights::assemble(cells, body, neighbours.clone(), elastic);
     material.map(|material| Weights::Matrix(material.weights())).map_err(|error| {
         let (key, help) = match &error {
-            WeightsError::MissingNeighbour { .. } => {
-                ("neighbours", "leave the neighbours out: the rule takes those that it needs")
-            }
+            WeightsError::MissingNeighbour { .. } => (
+                "neighbours",
+                "use kind = \"cells\", or leave the neighbours out: the rule takes those that it needs",
+            ),
             WeightsError::Mechanism(_) => ("body.shape", "use a smaller spacing or a larger shape"),
             _ => ("material", "use constants and a lattice less far apart"),
         };

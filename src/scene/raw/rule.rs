@@ -22,6 +22,9 @@ pub enum RawNeighbours {
         #[schemars(range(min = 1, max = 8))]
         radius: i32,
     },
+    /// Everybody with whom a particle shares a cell of the lattice, as a material needs: 8 on square and
+    /// rectangular lattices, 6 on the triangular ones, 12 on the honeycomb.
+    Cells {},
     /// The neighbours of the neighbours too: the paper's second gradient.
     Second {},
     /// The sites at these offsets in columns and rows of the lattice.

@@ -58,7 +58,7 @@ pub fn rotation(raw: RawRotation) -> Rotation {
 /// The neighbourhood as written, or what the rule needs where none is.
 pub fn neighbourhood(raw: &RawScene, lattice: &Lattice) -> Neighbourhood {
     match &raw.neighbours {
-        Some(neighbours) => super::neighbourhood(neighbours),
+        Some(neighbours) => super::neighbourhood(neighbours, lattice),
         None if is_material(raw) => cells::neighbourhood(lattice),
         None => Neighbourhood::First { keep: None },
     }

@@ -18,6 +18,7 @@ use crate::flock::neighbourhood::Neighbourhood;
 use crate::flock::rules::{Axis, Feedback, FeedbackReference, Mean, Origin};
 use crate::flock::shape::{Segment, Shape};
 use crate::flock::specimen::Specimen;
+use crate::material::cells;
 use crate::solve::sweep::{Order, Update};
 
 impl Scene {
@@ -221,10 +222,11 @@ fn frame(raw: RawFrame) -> Option<FrameRule> {
     }
 }
 
-fn neighbourhood(raw: &RawNeighbours) -> Neighbourhood {
+fn neighbourhood(raw: &RawNeighbours, lattice: &Lattice) -> Neighbourhood {
     match raw {
         RawNeighbours::First { keep } => Neighbourhood::First { keep: *keep },
         RawNeighbours::Ring { radius } => Neighbourhood::Ring { radius: *radius },
+        RawNeighbours::Cells {} => cells::neighbourhood(lattice),
         RawNeighbours::Second {} => Neighbourhood::Second,
         RawNeighbours::Offsets { offsets } => Neighbourhood::Offsets(offsets.clone()),
         RawNeighbours::Within { radius } => Neighbourhood::Within { radius: *radius },
