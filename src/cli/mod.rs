@@ -4,9 +4,11 @@
 mod compare;
 mod progress;
 mod run;
+#[cfg(feature = "fem")]
+mod trade;
 
 use std::io::IsTerminal;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Args, CommandFactory, Parser, Subcommand};
@@ -50,6 +52,12 @@ pub enum Command {
         after_help = "Example:\n  flockform compare beam --out /tmp/beam\n  flockform compare beam-paper --set neighbours.kind=second"
     )]
     Compare(compare::CompareArguments),
+    /// What accuracy costs: run a scene by many rules, spacings and solvers against finite elements
+    #[cfg(feature = "fem")]
+    #[command(
+        after_help = "Example:\n  flockform trade grips --out /tmp/trade\n  flockform trade beam-loaded --most-particles 5000"
+    )]
+    Trade(trade::TradeArguments),
     /// List the bundled scenes
     #[command(after_help = "Example:\n  flockform scenes")]
     Scenes,
@@ -98,10 +106,19 @@ pub struct SceneArguments {
 
 impl SceneArguments {
     fn load(&self, more: impl IntoIterator<Item = String>) -> Result<Scene, Refusal> {
-        let overrides: Vec<String> = self.set.iter().cloned().chain(more).collect();
+        let more: Vec<String> = more.into_iter().collect();
+        if bundled(&self.scene).is_none() {
+            self.path()?;
+        }
+        Ok(self.load_scene(&more)?)
+    }
+
+    /// The scene with these overrides after the user's own.
+    fn load_scene(&self, more: &[String]) -> Result<Scene, SceneError> {
+        let overrides = [&self.set, more].concat();
         match bundled(&self.scene) {
-            Some(bundled) => Ok(bundled.load(&overrides)?),
-            None => Ok(Scene::from_file(&self.path()?, &overrides)?),
+            Some(bundled) => bundled.load(&overrides),
+            None => Scene::from_file(Path::new(&self.scene), &overrides),
         }
     }
 
@@ -149,6 +166,8 @@ pub fn dispatch(command: Command) -> Result<ExitCode, Refusal> {
         Command::Run(arguments) => return run::run(&arguments),
         #[cfg(feature = "fem")]
         Command::Compare(arguments) => return compare::compare(&arguments),
+        #[cfg(feature = "fem")]
+        Command::Trade(arguments) => return trade::trade(&arguments),
         Command::Scenes => list_scenes()?,
         Command::Plan(arguments) => {
             let scene = arguments.load([])?;

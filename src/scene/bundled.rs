@@ -29,6 +29,7 @@ pub const SCENES: &[Bundled] = scenes![
     "fracture-hexagonal",
     "notched-plate",
     "drop",
+    "grips",
     "lattice-square",
     "lattice-rectangular",
     "lattice-centred-rectangular",
