@@ -55,6 +55,7 @@ pub mod elastic;
 pub mod homogenise;
 pub mod loads;
 pub mod mechanism;
+pub mod report;
 pub mod stiffness;
 pub mod weights;
 pub mod zone;
