@@ -76,5 +76,5 @@ fn scene_knows_nothing_of_hosts_and_outputs() {
 
 #[test]
 fn continuum_knows_nothing_of_outputs() {
-    assert_imports_only("continuum", &["flock", "solve", "scene"]);
+    assert_imports_only("continuum", &["flock", "solve", "material", "scene"]);
 }

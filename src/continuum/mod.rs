@@ -5,8 +5,10 @@
 //! the body on the way (a recorder, a progress bar, an interrupt) gives it a closure to call.
 
 pub mod engine;
+pub mod interior;
 pub mod movement;
 pub mod plan;
 pub mod record;
 pub mod report;
 pub mod run;
+mod weights;

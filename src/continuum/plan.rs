@@ -1,16 +1,16 @@
 //! From a scene to the arrays that an engine steps, with the checks that need the body.
 
+use super::weights;
 use crate::flock::body::{Body, BodyError};
 use crate::flock::fracture::{Bonds, Break, Ghosts};
 use crate::flock::interaction::Interaction;
-use crate::flock::lattice::Site;
 use crate::flock::motion::Motion;
 use crate::flock::neighbourhood::{Neighbourhood, Neighbours};
 use crate::flock::points::distance;
 use crate::flock::region::{Region, Side};
 use crate::flock::role::Role;
 use crate::flock::rules::{Axis, Poisson, Rule};
-use crate::scene::{Condition, LeaderMotion, RoleEntry, Scene, SceneError, SceneRegion, Stop, Weights};
+use crate::scene::{Condition, LeaderMotion, RoleEntry, Scene, SceneError, SceneRegion, Stop};
 use crate::solve::sweep::Update;
 
 /// Everything an engine needs; nothing of it refers to the scene file.
@@ -52,7 +52,7 @@ impl Plan {
     pub fn new(scene: &Scene) -> Result<Self, SceneError> {
         let (body, neighbours) = build_body(scene)?;
         let changes = role_changes(scene, &body, &neighbours)?;
-        let weights = weights(scene, &body, &neighbours)?;
+        let weights = weights::of_body(scene, &body, &neighbours)?;
         let interaction = interaction(scene, &body, neighbours, weights);
         let probes = probes(scene, &body)?;
         let roles = body.is_frame.iter().map(|&f| if f { Role::Frame } else { Role::Follower }).collect();
@@ -159,45 +159,6 @@ fn interaction(scene: &Scene, body: &Body, neighbours: Neighbours, weights: Opti
         interaction.keep_rest();
     }
     interaction
-}
-
-fn weights(scene: &Scene, body: &Body, neighbours: &Neighbours) -> Result<Option<Vec<f64>>, SceneError> {
-    match &scene.weights {
-        None => Ok(None),
-        Some(Weights::Distance { power }) => {
-            let spacing = body.lattice.spacing();
-            let weight = |j: usize, k: u32| {
-                (distance(body.reference.get(j), body.reference.get(k as usize)) / spacing).powf(*power)
-            };
-            let all = (0..body.count()).flat_map(|j| neighbours.of(j).iter().map(move |&k| weight(j, k)));
-            Ok(Some(all.collect()))
-        }
-        Some(Weights::List(values)) => {
-            let offsets = scene.neighbourhood.offsets(&scene.lattice).unwrap_or_default();
-            let size = offsets.first().map_or(0, Vec::len);
-            if size != values.len() {
-                let message = format!("{} weights are given for {size} neighbours", values.len());
-                let help = "give one weight for each neighbour, in the neighbourhood's order";
-                return Err(scene.refuse("rule.weights.values", message, help));
-            }
-            Ok(Some(listed_weights(values, &offsets, body, neighbours)))
-        }
-    }
-}
-
-/// Weights follow the offsets; a particle that lacks a neighbour lacks its weight.
-fn listed_weights(values: &[f64], offsets: &[Vec<Site>], body: &Body, neighbours: &Neighbours) -> Vec<f64> {
-    let mut all = Vec::with_capacity(neighbours.index.len());
-    for j in 0..body.count() {
-        let mut next = neighbours.of(j).iter().map(|&k| body.sites[k as usize]).peekable();
-        for (offset, &value) in offsets[body.lattice.sublattice(body.sites[j])].iter().zip(values) {
-            let there = [body.sites[j][0] + offset[0], body.sites[j][1] + offset[1]];
-            if next.next_if_eq(&there).is_some() {
-                all.push(value);
-            }
-        }
-    }
-    all
 }
 
 fn role_changes(scene: &Scene, body: &Body, neighbours: &Neighbours) -> Result<Vec<RoleChange>, SceneError> {

@@ -2,11 +2,12 @@
 
 use std::fmt;
 
+use super::interior;
 use super::plan::Plan;
 use crate::flock::fracture::Threshold;
 use crate::flock::role::Role;
 use crate::flock::rules::{FeedbackReference, Mean};
-use crate::scene::Scene;
+use crate::scene::{Scene, Weights};
 use crate::solve::sweep::{Order, Sweep};
 
 /// A plan in words and numbers.
@@ -53,7 +54,12 @@ impl PlanReport {
         let rest =
             plan.interaction.rest.as_ref().map(|_| "rest offsets for unbalanced neighbourhoods".to_owned());
         self.models_or_not(rest, "rule.rest", "every neighbourhood is balanced, or rule.rest is \"literal\"");
-        let weights = plan.interaction.weights.as_ref().map(|_| "fixed weights".to_owned());
+        let weights = plan.interaction.weights.as_ref().map(|_| match scene.weights {
+            Some(Weights::Gradient { length }) => {
+                format!("second gradient of length {length} {}", scene.unit())
+            }
+            _ => "fixed weights".to_owned(),
+        });
         self.models_or_not(weights, "rule.weights", "all neighbours count the same");
         let poisson = rule.poisson.map(|p| format!("Poisson term (Eq. 2), K = {}", p.k));
         self.models_or_not(poisson, "rule.poisson", "x and y do not act on each other");
@@ -142,6 +148,7 @@ fn cautions(scene: &Scene, plan: &Plan) -> Vec<String> {
             "the barycentre of whoever is near keeps no distance: the body contracts; use rule.mean.kind = \"spaced\"".into(),
         );
     }
+    cautions.extend(interior::cautions(scene));
     let led = |role: &Role| matches!(role, Role::Leader | Role::Clamped);
     if !plan.roles.iter().any(led) && scene.roles.iter().all(|entry| !led(&entry.role)) {
         cautions.push("nobody leads: the body relaxes by itself".into());

@@ -52,6 +52,7 @@
 
 pub mod cells;
 pub mod elastic;
+pub mod gradient;
 pub mod homogenise;
 pub mod loads;
 pub mod mechanism;

@@ -77,6 +77,7 @@ fn validate(
     let spacing = lattice.spacing();
     let neighbourhood = neighbourhood(&raw.neighbours);
     check_present_neighbours(&raw, refuse)?;
+    check_gradient(&raw, refuse)?;
     let roles = raw
         .roles
         .iter()
@@ -219,6 +220,7 @@ fn neighbourhood(raw: &RawNeighbours) -> Neighbourhood {
         RawNeighbours::First { keep } => Neighbourhood::First { keep: *keep },
         RawNeighbours::Ring { radius } => Neighbourhood::Ring { radius: *radius },
         RawNeighbours::Second {} => Neighbourhood::Second,
+        RawNeighbours::Straight {} => Neighbourhood::Straight,
         RawNeighbours::Offsets { offsets } => Neighbourhood::Offsets(offsets.clone()),
         RawNeighbours::Within { radius } => Neighbourhood::Within { radius: *radius },
         RawNeighbours::Present { radius } => Neighbourhood::Present { radius: *radius },
@@ -244,6 +246,28 @@ fn check_present_neighbours(raw: &RawScene, refuse: Refuse<'_>) -> Result<(), Sc
             "use neighbours of kind \"within\", which are fixed at the start, or leave this out",
         )),
     }
+}
+
+/// A second gradient holds only with the neighbours, the mean and the unbroken bonds it is derived for.
+fn check_gradient(raw: &RawScene, refuse: Refuse<'_>) -> Result<(), SceneError> {
+    if !matches!(raw.rule.weights, Some(RawWeights::Gradient { .. })) {
+        return Ok(());
+    }
+    if !matches!(raw.neighbours, RawNeighbours::Straight {}) {
+        let message = "weights of kind \"gradient\" reach the sites behind the first neighbours".into();
+        return Err(refuse("neighbours", message, "give `neighbours = { kind = \"straight\" }`"));
+    }
+    if !matches!(raw.rule.mean, RawMean::Barycentre) {
+        let message = "weights of kind \"gradient\" have negative parts, which this mean cannot take".into();
+        return Err(refuse("rule.mean", message, "use kind = \"barycentre\""));
+    }
+    if raw.fracture.is_some() {
+        let message = "weights of kind \"gradient\" are stable only while the bonds between a particle and \
+                       the site behind its neighbour hold: bonds cannot break one by one"
+            .into();
+        return Err(refuse("fracture", message, "leave fracture out, or use other weights"));
+    }
+    Ok(())
 }
 
 fn mean(raw: &RawMean, spacing: f64, refuse: Refuse<'_>) -> Result<Mean, SceneError> {
@@ -272,6 +296,7 @@ fn weights(raw: &Option<RawWeights>, refuse: Refuse<'_>) -> Result<Option<Weight
     Ok(match raw {
         None => None,
         Some(RawWeights::Distance { power }) => Some(Weights::Distance { power: *power }),
+        Some(RawWeights::Gradient { length }) => Some(Weights::Gradient { length: *length }),
         Some(RawWeights::List { values }) => {
             // Also refuses a sum that is nothing but rounding, whose mean would be noise.
             let (sum, size) = values.iter().fold((0.0, 0.0), |(s, a), v| (s + v, a + f64::abs(*v)));
