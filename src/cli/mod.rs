@@ -1,5 +1,6 @@
 //! The command line: what can be asked for, and who answers.
 
+mod material;
 mod progress;
 mod run;
 
@@ -48,6 +49,14 @@ pub enum Command {
     /// Say what a scene makes the program model and what it leaves out, without running it
     #[command(after_help = "Example:\n  flockform plan fracture --set lattice.a=5.0")]
     Plan(SceneArguments),
+    /// Say what material a rule is, or which weights a material takes
+    #[command(
+        after_help = "Examples:\n  flockform material --lattice square\n  flockform material --lattice hexagonal --neighbours second\n  \
+                      flockform material --lattice hexagonal --young 210e9 --poisson 0.3 --thickness 1e-3\n  \
+                      flockform material --lattice square --young 9,1 --poisson 0.4 --shear 0.6 --fibres 30\n  \
+                      flockform material second-gradient --json"
+    )]
+    Material(material::MaterialArguments),
     /// Print the JSON Schema of a scene file
     #[command(after_help = "Example:\n  flockform schema > scene.schema.json")]
     Schema,
@@ -121,6 +130,8 @@ pub enum Refusal {
         "there is no scene file and no bundled scene `{name}`\n  help: the nearest bundled scene is `{nearest}`; `flockform scenes` lists them all"
     )]
     NoScene { name: String, nearest: &'static str },
+    #[error("{0}")]
+    Option(#[from] material::WrongOption),
     #[error("no threads to measure with: {0}")]
     Bench(#[from] rayon::ThreadPoolBuildError),
     #[error("--threads {threads}: {error}\n  help: give a number from 1 to the machine's cores")]
@@ -144,6 +155,7 @@ pub fn dispatch(command: Command) -> Result<ExitCode, Refusal> {
             let scene = arguments.load([])?;
             print(&PlanReport::new(&scene, &Plan::new(&scene)?).to_string());
         }
+        Command::Material(arguments) => print(&material::answer(&arguments)?),
         Command::Schema => print(&format!("{:#}\n", scene::validate::schema())),
         Command::Completions { shell } => {
             let mut script = Vec::new();
