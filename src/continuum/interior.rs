@@ -40,6 +40,7 @@ pub fn remedy(error: &HomogeniseError) -> &'static str {
         HomogeniseError::NotSymmetric { .. } => {
             "give opposite neighbours and equal weights to them: a whole neighbourhood, not a reduced one"
         }
+        HomogeniseError::NoStiffness => "give far neighbours weights that are less negative",
         HomogeniseError::Loose => "use neighbours that join the two kinds of site",
         HomogeniseError::Singular { .. } => "give weights whose sum is positive",
         HomogeniseError::Weights { .. } => "give one weight for each neighbour, in the neighbourhood's order",
@@ -186,11 +187,14 @@ pub(super) fn cautions(scene: &Scene) -> Vec<String> {
     let fixed =
         scene.mean == Mean::Barycentre && !matches!(scene.neighbourhood, Neighbourhood::Present { .. });
     // Rules that have no waves (not symmetric, say) are no error here.
-    let zone = fixed.then(|| scalar_crystal(scene).ok()?.zone().ok()).flatten();
-    let Some(zone) = zone else { return Vec::new() };
+    let crystal = fixed.then(|| scalar_crystal(scene).ok()).flatten();
+    let Some((crystal, zone)) = crystal.and_then(|crystal| crystal.zone().ok().map(|zone| (crystal, zone)))
+    else {
+        return Vec::new();
+    };
     let gradient = matches!(scene.weights, Some(Weights::Gradient { .. }));
     let damping = scene.update.damping;
-    if !zone.stable {
+    if !zone.stable || crystal.effective() == Err(HomogeniseError::NoStiffness) {
         let length = std::f64::consts::TAU / zone.worst[0].hypot(zone.worst[1]);
         return vec![format!(
             "these weights are unstable: a wave of length {length:.4} {} costs nothing or gives energy and grows in any update; \

@@ -55,6 +55,7 @@ impl MaterialReport {
                 writeln!(f, "  [{a:13.9} {b:13.9}; {c:13.9} {d:13.9}]")?;
             }
             let [[a, b], [_, d]] = *d;
+            let b = if b.abs() < 1e-14 * a { 0.0 } else { b };
             row(f, "D = sum of K", format_args!("[{a:.6e} {b:.6e}; {b:.6e} {d:.6e}]"))?;
         }
         Ok(())
@@ -88,7 +89,7 @@ impl fmt::Display for Asked {
             }
             Asked::Orthotropic { young: [along, across], poisson_12, shear, fibres, thickness } => write!(
                 f,
-                "E1 = {along}, E2 = {across}, nu12 = {poisson_12}, G = {shear}, fibres at {fibres} deg, thickness {thickness}"
+                "E1 = {along}, E2 = {across}, nu12 = {poisson_12}, G = {shear}, fibres at {fibres:.4} deg, thickness {thickness}"
             ),
         }
     }
@@ -102,8 +103,10 @@ impl Material {
             "force / length, whole thickness"
         };
         writeln!(f, "material of long waves")?;
+        let largest = self.stiffness.iter().flatten().fold(0f64, |most, c| most.max(c.abs()));
         for (k, stiffness) in self.stiffness.iter().enumerate() {
-            let [a, b, c] = stiffness.map(settled);
+            // Relative to the largest, for what is left of a cancellation.
+            let [a, b, c] = stiffness.map(|c| if c.abs() < 1e-14 * largest { 0.0 } else { c });
             let name = if k == 0 { "stiffness (xx, yy, xy)" } else { "" };
             let unit = if k == 0 { format!("   {unit}") } else { String::new() };
             row(f, name, format_args!("[{} {} {}]{unit}", number(a), number(b), number(c)))?;
