@@ -79,8 +79,8 @@ fn poisson_is_recovered_to_a_millionth_from_minus_nine_tenths_to_almost_a_half()
     ];
     for kind in kinds {
         let lattice = Lattice::new(kind, [0.0; 2], 0.2);
-        for step in 0..=20 {
-            let poisson = -0.9 + 1.39 * f64::from(step) / 20.0;
+        for step in 0..=7 {
+            let poisson = -0.9 + 1.39 * f64::from(step) / 7.0;
             for plane in [Plane::Stress, Plane::Strain] {
                 let constants = Constants::Isotropic { young: 7.0, poisson, plane };
                 let elastic = Elastic::new(constants, 0.5).expect("admissible");

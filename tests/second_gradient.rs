@@ -62,15 +62,15 @@ fn line(points: &[(f64, f64)]) -> (f64, f64) {
     (sxy / sxx, y - sxy / sxx * x)
 }
 
-/// Decay length of the deviation from the line that the far half follows \[length\]; the last place is
+/// Decay length of the deviation from the line that the far third follows \[length\]; the last place is
 /// led, the first is where the layer begins.
 fn decay_length(profile: &[(f64, f64)]) -> f64 {
-    let (slope, start) = line(&profile[profile.len() / 2..]);
+    let (slope, start) = line(&profile[2 * profile.len() / 3..]);
     let layer: Vec<(f64, f64)> = profile.iter().map(|&(x, u)| (x, u - start - slope * x)).collect();
     let largest = layer[1].1.abs();
     let logs: Vec<(f64, f64)> = layer[1..]
         .iter()
-        .take_while(|(_, deviation)| deviation.abs() > 0.02 * largest)
+        .take_while(|(_, deviation)| deviation.abs() > 0.005 * largest)
         .map(|&(x, deviation)| (x, deviation.abs().ln()))
         .collect();
     assert!(logs.len() >= 3, "{layer:?}");
@@ -82,10 +82,12 @@ fn assert_measures(overrides: &[&str], across: usize, axis: usize, length: f64) 
     let all: Vec<&str> = overrides.iter().copied().chain([prescribed.as_str()]).collect();
     let measured = decay_length(&profile(&at_rest(&scene(&all)), across, axis));
     let error = (measured / length).powi(2) - 1.0;
+    println!("prescribed {length}: l^2 off by {error:.1e}");
     assert!(error.abs() < 0.02, "{overrides:?}: l^2 = {} instead of {}", measured.powi(2), length * length);
 }
 
-const LONG: [&str; 3] = ["stop.tolerance=1e-12", "stop.steps=400000", "update.damping=1.9"];
+const LONG: [&str; 4] =
+    ["stop.tolerance=1e-12", "stop.steps=400000", "update.damping=1.9", "record.probes=[]"];
 
 #[test]
 fn the_measured_length_squared_is_the_prescribed_one_within_two_per_cent() {
@@ -114,21 +116,21 @@ fn a_layer_has_the_same_length_across_and_along_a_rectangular_lattice() {
 
 #[test]
 fn on_a_hexagonal_lattice_a_layer_along_the_rows_has_the_prescribed_length() {
+    // Wide, for the ragged sides bend the layer near them.
     let up = [
         "lattice={kind=\"hexagonal\",spacing=1.0}",
-        "body.shape={kind=\"grid\",columns=40,rows=32}",
+        "body.shape={kind=\"grid\",columns=150,rows=28}",
         "roles[0].region={kind=\"edge\",side=\"bottom\",depth=1.3}",
         "roles[1].region.side=top",
         "roles[1].motion.frames=[{step=1,displacement=[0.0,1.0]}]",
-        "record.probes=[]",
     ];
-    assert_measures(&[&up, &LONG[..]].concat(), 1, 1, 2.0);
+    assert_measures(&[&up, &LONG[..]].concat(), 1, 1, 1.5);
 }
 
 #[test]
 fn the_paper_s_neighbours_of_neighbours_have_a_negative_length_squared_and_no_layer() {
     let paper = scene(&[
-        "rule.weights=null",
+        "rule={mean={kind=\"barycentre\"}}",
         "neighbours={kind=\"second\"}",
         "stop.tolerance=1e-12",
         "stop.steps=400000",

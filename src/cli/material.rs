@@ -17,7 +17,7 @@ use super::{Refusal, SceneArguments};
 #[derive(Debug, Args)]
 pub struct MaterialArguments {
     /// Name of a bundled scene or path of a scene file, whose rule is the question
-    #[arg(required_unless_present = "lattice", conflicts_with_all = ["lattice", "neighbours", "weights", "young"])]
+    #[arg(conflicts_with_all = ["lattice", "neighbours", "weights", "young"])]
     scene: Option<String>,
     /// Override a key of the scene, as in `flockform run`
     #[arg(long = "set", value_name = "KEY.PATH=VALUE", requires = "scene")]
@@ -190,8 +190,10 @@ fn second_gradient(
 
 impl LatticeArguments {
     fn lattice(&self) -> Result<Lattice, WrongOption> {
-        // The command line is refused without either a scene or this.
-        let name = self.lattice.unwrap_or(KindName::Square);
+        let Some(name) = self.lattice else {
+            let help = "name a scene, as in `flockform material tension`, or give --lattice square";
+            return Err(wrong("SCENE", "there is neither a scene nor a lattice to ask about", help));
+        };
         self.require_no_other(name)?;
         let needed = |option: &'static str, value: Option<f64>| {
             let Some(value) = value else {
