@@ -165,6 +165,12 @@ fn a_free_edge_of_a_stretched_strip_has_no_layer() {
 #[test]
 fn what_cannot_be_a_stable_second_gradient_is_refused_with_the_remedy() {
     for (overrides, words) in [
+        (
+            vec![
+                "body={shape={kind=\"rectangle\",max=[9,4]},holes=[{kind=\"rectangle\",min=[4.5,-1],max=[5.5,5]}]}",
+            ],
+            vec!["body.shape", "not connected", "close the gap"],
+        ),
         (vec!["rule.weights.length=0.3"], vec!["rule.weights.length", "too short", "0.5 or more"]),
         (vec!["rule.weights.length=2e4"], vec!["10000 times", "shorter"]),
         (vec!["rule.weights.length=0"], vec!["rule.weights.length", "greater than 0"]),

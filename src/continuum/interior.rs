@@ -7,6 +7,7 @@ use crate::flock::rules::{FeedbackReference, Mean};
 use crate::material::gradient::{GradientError, GradientWeights, SAFE_DAMPING};
 use crate::material::homogenise::{Bond, Crystal, HomogeniseError};
 use crate::material::report::MaterialReport;
+use crate::material::zone::Zone;
 use crate::scene::{Scene, SceneError, Weights};
 use crate::solve::sweep::Order;
 
@@ -184,14 +185,8 @@ pub(super) fn require_damped(scene: &Scene, gradient: &GradientWeights) -> Resul
 
 /// What the waves of a scene's fixed weights say about its run.
 pub(super) fn cautions(scene: &Scene) -> Vec<String> {
-    let fixed =
-        scene.mean == Mean::Barycentre && !matches!(scene.neighbourhood, Neighbourhood::Present { .. });
     // Rules that have no waves (not symmetric, say) are no error here.
-    let crystal = fixed.then(|| scalar_crystal(scene).ok()).flatten();
-    let Some((crystal, zone)) = crystal.and_then(|crystal| crystal.zone().ok().map(|zone| (crystal, zone)))
-    else {
-        return Vec::new();
-    };
+    let Some((crystal, zone)) = waves_in_doubt(scene) else { return Vec::new() };
     let gradient = matches!(scene.weights, Some(Weights::Gradient { .. }));
     let damping = scene.update.damping;
     if !zone.stable || crystal.effective() == Err(HomogeniseError::NoStiffness) {
@@ -215,4 +210,19 @@ pub(super) fn cautions(scene: &Scene) -> Vec<String> {
         )];
     }
     Vec::new()
+}
+
+/// The rule and its waves, where the answer is not known beforehand: a mean with positive weights is
+/// stable, and an update that does not overshoot it never grows.
+fn waves_in_doubt(scene: &Scene) -> Option<(Crystal, Zone)> {
+    if scene.mean != Mean::Barycentre || matches!(scene.neighbourhood, Neighbourhood::Present { .. }) {
+        return None;
+    }
+    let crystal = scalar_crystal(scene).ok()?;
+    let positive = crystal.bonds.iter().flatten().all(|bond| bond.block[0][0] >= 0.0);
+    if positive && (scene.update.order == Order::Sequential || scene.update.damping <= 1.0) {
+        return None;
+    }
+    let zone = crystal.zone().ok()?;
+    Some((crystal, zone))
 }

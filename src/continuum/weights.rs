@@ -30,7 +30,9 @@ pub fn of_body(scene: &Scene, body: &Body, neighbours: &Neighbours) -> Result<Op
         Some(Weights::Gradient { length }) => {
             let gradient = gradient(scene, *length)?;
             interior::require_damped(scene, &gradient)?;
-            Ok(Some(gradient.of_body(body, neighbours)))
+            let weights = gradient.of_body(body, neighbours);
+            require_joined(scene, body, neighbours, &weights)?;
+            Ok(Some(weights))
         }
     }
 }
@@ -48,4 +50,21 @@ fn listed_weights(values: &[f64], offsets: &[Vec<Site>], body: &Body, neighbours
         }
     }
     all
+}
+
+/// Refuses a body that hangs together by neighbours of no weight alone: those across a gap.
+fn require_joined(
+    scene: &Scene,
+    body: &Body,
+    neighbours: &Neighbours,
+    weights: &[f64],
+) -> Result<(), SceneError> {
+    let joined = |i: usize| neighbours.bonds(i).filter(|&b| weights[b] != 0.0).map(|b| neighbours.index[b]);
+    body.require_connected(&Neighbours::from_lists((0..body.count()).map(joined))).map_err(|error| {
+        scene.refuse(
+            "body.shape",
+            error.to_string(),
+            "close the gap, or run the parts as scenes of their own",
+        )
+    })
 }

@@ -135,19 +135,13 @@ impl GradientWeights {
         let weight = |own: Site, other: Site| {
             let offset = [other[0] - own[0], other[1] - own[1]];
             match self.find(offset) {
-                None => 0.0,
                 Some((near, q)) if near == offset => {
                     // Triples around the particle and around the neighbour.
                     let triples = u8::from(there(own, near, -1)) + u8::from(there(own, near, 2));
                     1.0 + 2.0 * q * f64::from(triples)
                 }
-                Some((near, q)) => {
-                    if there(own, near, 1) {
-                        -q
-                    } else {
-                        0.0
-                    }
-                }
+                Some((near, q)) if there(own, near, 1) => -q,
+                _ => 0.0,
             }
         };
         let of_particle =
