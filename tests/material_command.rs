@@ -79,8 +79,8 @@ fn poisson_is_recovered_to_a_millionth_from_minus_nine_tenths_to_almost_a_half()
     ];
     for kind in kinds {
         let lattice = Lattice::new(kind, [0.0; 2], 0.2);
-        for step in 0..=7 {
-            let poisson = -0.9 + 1.39 * f64::from(step) / 7.0;
+        for step in 0..=28 {
+            let poisson = -0.9 + 1.39 * f64::from(step) / 28.0;
             for plane in [Plane::Stress, Plane::Strain] {
                 let constants = Constants::Isotropic { young: 7.0, poisson, plane };
                 let elastic = Elastic::new(constants, 0.5).expect("admissible");
@@ -185,6 +185,14 @@ fn an_unstable_rule_says_so_and_offers_no_damping() {
 }
 
 #[test]
+fn neighbours_that_leave_particles_loose_are_unstable() {
+    for arguments in [["--neighbours", "offsets:2,0;-2,0;0,2;0,-2"], ["--weights", "1,1,0,0"]] {
+        let report = json(&[&["--lattice", "square"][..], &arguments].concat());
+        assert_eq!(report["waves"]["stable"], false, "{arguments:?}");
+    }
+}
+
+#[test]
 fn a_second_gradient_reports_a_positive_length_squared() {
     let report = json(&["--lattice", "hexagonal", "--weights", "gradient:4"]);
     assert_eq!(report["gradient"]["effect"], "stiffens");
@@ -241,6 +249,12 @@ fn options_that_make_no_question_are_refused_with_the_remedy() {
         &["--lattice", "square", "--neighbours", "straight", "--weights", cancels],
         &["long waves cost nothing"],
     );
+    refused(
+        &["--lattice", "square", "--neighbours", "second", "--weights", "distance:1e9"],
+        &["power", "double"],
+    );
+    refused(&["--lattice", "square", "--spacing", "1e-200"], &["too small", "units"]);
+    refused(&["--lattice", "square", "--young", "1e300", "--poisson", "0.3"], &["too large", "units"]);
     refused(&["--lattice", "square", "--a", "2"], &["--a", "--spacing"]);
     refused(&["--lattice", "square", "--spacing", "-1"], &["--spacing", "positive"]);
     refused(&["--lattice", "rectangular", "--a", "2"], &["--b", "needs"]);

@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum};
 use flockform::continuum::interior;
 use flockform::flock::lattice::{Lattice, LatticeKind};
 use flockform::material::elastic::{Constants, Elastic, ElasticError, Plane};
-use flockform::material::gradient::GradientWeights;
+use flockform::material::gradient::{GradientWeights, layer_note};
 use flockform::material::homogenise::Crystal;
 use flockform::material::report::MaterialReport;
 
@@ -150,24 +150,17 @@ fn of_rule(
     who: Option<&str>,
     weights: Option<&str>,
 ) -> Result<MaterialReport, WrongOption> {
-    let (crystal, name) = match weights.and_then(|weights| weights.strip_prefix("gradient:")) {
-        Some(length) => second_gradient(lattice, who, length)?,
-        None => {
-            let offsets = neighbours::neighbourhood(who.unwrap_or("first"), lattice)?;
-            let (weights, name) = match weights {
-                None => (None, "barycentre (Eq. 1)".to_owned()),
-                Some(text) => (
-                    Some(neighbours::weights(text, lattice, &offsets)?),
-                    "barycentre with weights given".into(),
-                ),
-            };
-            let crystal = Crystal::scalar(lattice, &offsets, weights.as_deref())
-                .map_err(|error| wrong("--weights", error.to_string(), interior::remedy(&error)))?;
-            (crystal, name)
-        }
+    if let Some(length) = weights.and_then(|weights| weights.strip_prefix("gradient:")) {
+        return second_gradient(lattice, who, length);
+    }
+    let offsets = neighbours::neighbourhood(who.unwrap_or("first"), lattice)?;
+    let (option, name) = match weights {
+        None => ("--neighbours", "barycentre (Eq. 1)"),
+        Some(_) => ("--weights", "barycentre with weights given"),
     };
-    let option = if weights.is_some() { "--weights" } else { "--neighbours" };
-    MaterialReport::of_rule(lattice, name, &crystal)
+    let weights = weights.map(|text| neighbours::weights(text, lattice, &offsets)).transpose()?;
+    Crystal::scalar(lattice, &offsets, weights.as_deref())
+        .and_then(|crystal| MaterialReport::of_rule(lattice, name.to_owned(), &crystal))
         .map_err(|error| wrong(option, error.to_string(), interior::remedy(&error)))
 }
 
@@ -175,17 +168,20 @@ fn second_gradient(
     lattice: &Lattice,
     who: Option<&str>,
     length: &str,
-) -> Result<(Crystal, String), WrongOption> {
+) -> Result<MaterialReport, WrongOption> {
     if who.is_some_and(|who| who != "straight") {
         let message = "a second gradient reaches the sites behind the first neighbours";
         return Err(wrong("--neighbours", message, "leave it out, or give --neighbours straight"));
     }
     let length = number("--weights", length)?;
-    let crystal = GradientWeights::new(lattice, length).and_then(|weights| weights.crystal(lattice));
+    let name = format!("second gradient of length {length}");
+    let report = GradientWeights::new(lattice, length)
+        .and_then(|weights| Ok(MaterialReport::of_rule(lattice, name, &weights.crystal(lattice)?)?));
     let help =
         "give gradient:LENGTH with a length of half the spacing or more, on one of the five Bravais lattices";
-    let crystal = crystal.map_err(|error| wrong("--weights", error.to_string(), help))?;
-    Ok((crystal, format!("second gradient of length {length}")))
+    let mut report = report.map_err(|error| wrong("--weights", error.to_string(), help))?;
+    report.notes.push(layer_note(length));
+    Ok(report)
 }
 
 impl LatticeArguments {

@@ -4,7 +4,7 @@
 use crate::flock::lattice::Site;
 use crate::flock::neighbourhood::Neighbourhood;
 use crate::flock::rules::{FeedbackReference, Mean};
-use crate::material::gradient::{GradientError, GradientWeights, SAFE_DAMPING};
+use crate::material::gradient::{GradientError, GradientWeights, SAFE_DAMPING, layer_note};
 use crate::material::homogenise::{Bond, Crystal, HomogeniseError};
 use crate::material::report::MaterialReport;
 use crate::material::zone::Zone;
@@ -24,6 +24,9 @@ pub fn material(scene: &Scene) -> Result<MaterialReport, SceneError> {
     };
     let mut report = MaterialReport::of_rule(&scene.lattice, name, &crystal)
         .map_err(|error| scene.refuse("neighbours", error.to_string(), remedy(&error)))?;
+    if let Some(Weights::Gradient { length }) = scene.weights {
+        report.notes.push(layer_note(length));
+    }
     if at_rest {
         // Its update divides by the sum of the weights, not by that of their derivatives.
         report.waves.damping_limit = None;
@@ -42,6 +45,7 @@ pub fn remedy(error: &HomogeniseError) -> &'static str {
             "give opposite neighbours and equal weights to them: a whole neighbourhood, not a reduced one"
         }
         HomogeniseError::NoStiffness => "give far neighbours weights that are less negative",
+        HomogeniseError::Range => "use units in which they are of ordinary size",
         HomogeniseError::Loose => "use neighbours that join the two kinds of site",
         HomogeniseError::Singular { .. } => "give weights whose sum is positive",
         HomogeniseError::Weights { .. } => "give one weight for each neighbour, in the neighbourhood's order",
@@ -192,7 +196,7 @@ pub(super) fn cautions(scene: &Scene) -> Vec<String> {
     if !zone.stable || crystal.effective() == Err(HomogeniseError::NoStiffness) {
         let length = std::f64::consts::TAU / zone.worst[0].hypot(zone.worst[1]);
         return vec![format!(
-            "these weights are unstable: a wave of length {length:.4} {} costs nothing or gives energy and grows in any update; \
+            "these weights are unstable: a wave of length {length:.4} {} costs nothing or gives energy and does not die out in any update; \
              weights of far neighbours are too negative (on a chain, w2 must be above -w1/4)",
             scene.unit()
         )];

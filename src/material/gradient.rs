@@ -159,6 +159,14 @@ impl GradientWeights {
     }
 }
 
+/// What the prescribed length is, beside the `l^2` of long waves that a report gives.
+pub fn layer_note(length: f64) -> String {
+    format!(
+        "a boundary layer along a row of bonds decays as exp(-distance / {length}): that is the prescribed length; \
+         l^2 above is that of long waves, smaller by about a sixth of the rows' distance squared along the same direction"
+    )
+}
+
 /// Distance of the lattice's rows along a bond \[length\].
 fn row_distance(lattice: &Lattice, bond: Site) -> f64 {
     let [x, y] = lattice.vector(bond);

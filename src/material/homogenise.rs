@@ -57,6 +57,8 @@ pub enum HomogeniseError {
         "long waves cost nothing: the weights of far neighbours cancel those of near ones, so there is no stiffness"
     )]
     NoStiffness,
+    #[error("lengths or weights are too large or too small: their products do not fit a double")]
+    Range,
     #[error("the particles of a lattice cell do not hold each other: their difference costs nothing")]
     Loose,
     #[error(
@@ -198,7 +200,12 @@ impl Crystal {
         let along = |n: [f64; 2]| Ok::<_, HomogeniseError>(self.long_wave(n)?.0);
         let (xx, yy, diagonal) = (along([1.0, 0.0])?, along([0.0, 1.0])?, along([half, half])?);
         let xy = diagonal - (xx + yy) * 0.5;
-        if xx.norm() + yy.norm() <= 1e-12 * self.pull() {
+        let pull = self.pull();
+        // So that neither squares nor what is left of a cancellation leave the range of a double.
+        if !(1e-140..1e140).contains(&pull) {
+            return Err(HomogeniseError::Range);
+        }
+        if xx.norm() + yy.norm() <= 1e-12 * pull {
             return Err(HomogeniseError::NoStiffness);
         }
         let (stiffness, misfit) = fit_stiffness(&xx, &yy, &xy);

@@ -72,7 +72,12 @@ pub fn weights(text: &str, lattice: &Lattice, offsets: &[Vec<Site>]) -> Result<V
             let [x, y] = lattice.vector(offset);
             (x.hypot(y) / lattice.spacing()).powf(power)
         };
-        return Ok(offsets.iter().map(|offsets| offsets.iter().map(weight).collect()).collect());
+        let all: Vec<Vec<f64>> = offsets.iter().map(|offsets| offsets.iter().map(weight).collect()).collect();
+        if all.iter().flatten().any(|weight| !weight.is_finite()) {
+            let message = format!("the power {power} of a distance does not fit a double");
+            return Err(wrong("--weights", message, "give a smaller power"));
+        }
+        return Ok(all);
     }
     let values = text.split(',').map(|value| number("--weights", value)).collect::<Result<Vec<f64>, _>>()?;
     let size = offsets.first().map_or(0, Vec::len);

@@ -195,7 +195,7 @@ impl Waves {
             row(f, "stable", "yes: every wave costs energy")?;
             row(f, "cheapest wave", format_args!("{wave}: {:.4} of what springs would cost", self.least))?;
         } else {
-            row(f, "stable", "NO: some wave costs nothing or gives energy, and grows in any update")?;
+            row(f, "stable", "NO: some wave costs nothing or gives energy; no update makes it die out")?;
             row(f, "worst wave", format_args!("{wave}: {:.4} of what springs would cost", self.least))?;
         }
         if let Some(limit) = self.damping_limit {
