@@ -171,7 +171,7 @@ fn what_cannot_be_a_stable_second_gradient_is_refused_with_the_remedy() {
             ],
             vec!["body.shape", "not connected", "close the gap"],
         ),
-        (vec!["rule.weights.length=0.3"], vec!["rule.weights.length", "too short", "0.5 or more"]),
+        (vec!["rule.weights.length=0.3"], vec!["rule.weights.length", "too short", "0.3803 or more"]),
         (vec!["rule.weights.length=2e4"], vec!["10000 times", "shorter"]),
         (vec!["rule.weights.length=0"], vec!["rule.weights.length", "greater than 0"]),
         (vec!["neighbours={kind=\"second\"}"], vec!["neighbours", "straight"]),

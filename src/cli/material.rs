@@ -178,7 +178,7 @@ fn second_gradient(
     let report = GradientWeights::new(lattice, length)
         .and_then(|weights| Ok(MaterialReport::of_rule(lattice, name, &weights.crystal(lattice)?)?));
     let help =
-        "give gradient:LENGTH with a length of half the spacing or more, on one of the five Bravais lattices";
+        "give gradient:LENGTH with a length that the lattice carries, on one of the five Bravais lattices";
     let mut report = report.map_err(|error| wrong("--weights", error.to_string(), help))?;
     report.notes.push(layer_note(length));
     Ok(report)

@@ -152,8 +152,8 @@ pub(super) fn gradient(scene: &Scene, length: f64) -> Result<GradientWeights, Sc
 
 fn refuse_gradient(scene: &Scene, error: &GradientError) -> SceneError {
     let (key, help) = match error {
-        GradientError::TooShort { rows, .. } => {
-            ("rule.weights.length", format!("give a length of {} or more, or a finer lattice", 0.5 * rows))
+        GradientError::TooShort { shortest, .. } => {
+            ("rule.weights.length", format!("give a length of {shortest:.4} or more, or a finer lattice"))
         }
         GradientError::TooLong { .. } | GradientError::Unstable { .. } => {
             ("rule.weights.length", "give a shorter length".into())

@@ -10,7 +10,7 @@
 //!
 //! a triple being a particle `i` with two opposite first neighbours `h`, `j` in the bond direction `d`.
 //! With all triples there, a neighbour in direction `d` has the weight `1 + 4 q_d` and the site behind
-//! it `-q_d`. Three things follow:
+//! it `-q_d`. It follows:
 //!
 //! * Long waves have the material of Eq. 1, up to the same scale: `w1 + 4 w2 = 1`.
 //! * Where a particle lacks a neighbour, its triples are missing, and the weights of the bonds that
@@ -20,6 +20,9 @@
 //!   last bond `2 q_d` stiffer than the others, an edge that acts as if it were clamped.
 //! * Every term alone is overshot by a synchronous update by a factor of 3 at most, so damping below
 //!   2/3 ([`SAFE_DAMPING`]) is stable on any body.
+//! * On nearly right-angled cells the diagonal's `q_d` comes out negative, but never below -1/12: its
+//!   bonds' squares keep 2/3 of themselves, and all that is said above holds (the factor is then
+//!   `2 / (1 - 3/12)`, still below 3).
 //!
 //! **Which length.** A layer that varies across rows of bonds, `h` apart, has displacements
 //! `u ~ exp(-x / l)` with `4 sinh^2(h / 2l) = 1 / Q`, `Q` the mean of `q_d` over the directions that
@@ -29,8 +32,11 @@
 //! `q_1 = Q_2 + Q_3 - Q_1`. The coefficient of long waves in the same direction is
 //! `l_wave^2 = h^2 (Q - 1/12) = l^2 - h^2 / 6 + h^4 / (240 l^2) - ...`: the same up to the lattice.
 //! Between the rows a square lattice has less, about `l^2 / 2` at 45 degrees; the hexagonal lattice is
-//! isotropic in this too, to the order of the lattice; the others lie between, or a few per cent above. Below a length of about 0.38 `h` (`cosh(h / l) = 7`) the lattice's own
-//! dispersion outweighs the gradient, `l_wave^2 < 0`, and the choice is refused.
+//! isotropic in this too, to the order of the lattice; the others lie between, or a few per cent above.
+//!
+//! A length so short that the lattice's own dispersion outweighs the gradient, `l_wave^2 < 0` in some
+//! direction, is refused: below 0.38 `h` on a square lattice (`cosh(h / l) = 7`), below up to about
+//! 0.9 of the widest `h` on nearly right-angled oblique ones. The refusal names the least length.
 
 use super::homogenise::{Crystal, HomogeniseError};
 use crate::flock::body::Body;
@@ -60,9 +66,9 @@ pub enum GradientError {
     #[error(transparent)]
     Neighbours(#[from] NeighbourhoodError),
     #[error(
-        "the length {length} is too short for rows that are {rows} apart: l^2 of long waves comes out as {found:.6}, so short waves would soften"
+        "the length {length} is too short for this lattice: l^2 of long waves comes out as {found:.6}, so short waves would soften; it carries {shortest:.4} and more"
     )]
-    TooShort { length: f64, rows: f64, found: f64 },
+    TooShort { length: f64, found: f64, shortest: f64 },
     #[error("the length {length} is more than {LONGEST:.0} times the distance of rows, {rows}")]
     TooLong { length: f64, rows: f64 },
     #[error("the length must be positive and finite, but it is {length}")]
@@ -82,31 +88,42 @@ impl GradientWeights {
             return Err(GradientError::NotPositive { length });
         }
         Neighbourhood::Straight.offsets(lattice)?;
-        let around = lattice.first_neighbours(0);
-        let bonds: Vec<Site> = around.iter().copied().filter(|&[i, j]| (i, j) > (0, 0)).collect();
-        let rows: Vec<f64> = bonds.iter().map(|&bond| row_distance(lattice, bond)).collect();
-        let widest = rows.iter().copied().fold(0.0, f64::max);
-        if rows.iter().any(|row| length > LONGEST * row) {
+        let rows = rows(lattice);
+        let widest = rows.iter().fold(0.0, |most, &(_, row)| f64::max(most, row));
+        if rows.iter().any(|&(_, row)| length > LONGEST * row) {
             return Err(GradientError::TooLong { length, rows: widest });
         }
-        let crossed: Vec<f64> = rows.iter().map(|row| 0.25 / (0.5 * row / length).sinh().powi(2)).collect();
-        let strength = |d: usize| match bonds.len() {
+        let weights = Self::unchecked(&rows, length);
+        let found = weights.least_of_long_waves(lattice)?;
+        let stiffens = found > 0.0;
+        if !stiffens {
+            return Err(GradientError::TooShort {
+                length,
+                found,
+                shortest: shortest(lattice, &rows, widest)?,
+            });
+        }
+        if !weights.crystal(lattice)?.zone()?.stable {
+            return Err(GradientError::Unstable { length });
+        }
+        Ok(weights)
+    }
+
+    fn unchecked(rows: &[(Site, f64)], length: f64) -> Self {
+        let crossed: Vec<f64> =
+            rows.iter().map(|(_, row)| 0.25 / (0.5 * row / length).sinh().powi(2)).collect();
+        let strength = |d: usize| match rows.len() {
             // The rows along one direction are crossed by the other alone.
             2 => crossed[1 - d],
             _ => crossed.iter().sum::<f64>() - 2.0 * crossed[d],
         };
-        let directions = bonds.iter().enumerate().map(|(d, &bond)| (bond, strength(d))).collect();
-        let weights = Self { length, directions };
-        let crystal = weights.crystal(lattice)?;
-        let found = crystal.effective()?.gradient.least;
-        let stiffens = found > 0.0;
-        if !stiffens {
-            return Err(GradientError::TooShort { length, rows: widest, found });
-        }
-        if !crystal.zone()?.stable {
-            return Err(GradientError::Unstable { length });
-        }
-        Ok(weights)
+        let directions = rows.iter().enumerate().map(|(d, &(bond, _))| (bond, strength(d))).collect();
+        Self { length, directions }
+    }
+
+    /// The smallest `l^2` of long waves in any direction \[length^2\].
+    fn least_of_long_waves(&self, lattice: &Lattice) -> Result<f64, GradientError> {
+        Ok(self.crystal(lattice)?.effective()?.gradient.least)
     }
 
     /// The rule of an interior particle, neighbours in the order of [`Neighbourhood::Straight`].
@@ -167,10 +184,26 @@ pub fn layer_note(length: f64) -> String {
     )
 }
 
-/// Distance of the lattice's rows along a bond \[length\].
-fn row_distance(lattice: &Lattice, bond: Site) -> f64 {
-    let [x, y] = lattice.vector(bond);
-    lattice.cell_area() / x.hypot(y)
+/// One bond of each direction and the distance of the lattice's rows along it \[length\].
+fn rows(lattice: &Lattice) -> Vec<(Site, f64)> {
+    let bonds = lattice.first_neighbours(0).into_iter().filter(|&[i, j]| (i, j) > (0, 0));
+    let distance = |bond: Site| {
+        let [x, y] = lattice.vector(bond);
+        lattice.cell_area() / x.hypot(y)
+    };
+    bonds.map(|bond| (bond, distance(bond))).collect()
+}
+
+/// The shortest length that stiffens short waves in all directions, by bisection and rounded up a
+/// little \[length\].
+fn shortest(lattice: &Lattice, rows: &[(Site, f64)], widest: f64) -> Result<f64, GradientError> {
+    let (mut low, mut high) = (0.0, 2.0 * widest);
+    for _ in 0..12 {
+        let middle = 0.5 * (low + high);
+        let stiffens = GradientWeights::unchecked(rows, middle).least_of_long_waves(lattice)? > 0.0;
+        if stiffens { high = middle } else { low = middle }
+    }
+    Ok(1.001 * high)
 }
 
 #[cfg(test)]
@@ -186,7 +219,7 @@ mod tests {
     }
 
     fn widest(lattice: &Lattice) -> f64 {
-        lattice.first_neighbours(0).into_iter().map(|bond| row_distance(lattice, bond)).fold(0.0, f64::max)
+        rows(lattice).into_iter().map(|(_, row)| row).fold(0.0, f64::max)
     }
 
     #[test]
@@ -239,6 +272,24 @@ mod tests {
     }
 
     #[test]
+    fn no_cell_makes_a_term_of_the_energy_outweigh_its_bonds() {
+        for b in [0.6, 1.0, 1.7, 3.0] {
+            for degrees in (40..=140).step_by(5).chain([89, 91]) {
+                let kind = LatticeKind::Oblique { a: 1.0, b, angle: f64::from(degrees).to_radians() };
+                let lattice = Lattice::new(kind, [0.0; 2], 0.0);
+                for length in [1.0, 2.0, 10.0].map(|l| l * widest(&lattice)) {
+                    let weights = GradientWeights::new(&lattice, length).expect("long enough");
+                    for (_, q) in &weights.directions {
+                        assert!(*q > -1.0 / 12.0 - 1e-9, "{b} {degrees} {length}: {q}");
+                    }
+                    let zone = weights.crystal(&lattice).expect("fits").zone().expect("symmetric");
+                    assert!(zone.damping_limit > SAFE_DAMPING, "{b} {degrees} {length}: {zone:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
     fn lengths_that_would_soften_short_waves_are_refused() {
         let square = Lattice::new(LatticeKind::Square { spacing: 2.0 }, [0.0; 2], 0.0);
         let limit = 2.0 / 7f64.acosh();
@@ -250,7 +301,13 @@ mod tests {
         }
         assert!(matches!(GradientWeights::new(&square, 3e4), Err(GradientError::TooLong { .. })));
         assert!(GradientWeights::new(&square, 1.9e4).is_ok());
+        // The remedy that is named is one.
         for lattice in lattices() {
+            let Err(GradientError::TooShort { shortest, .. }) = GradientWeights::new(&lattice, 0.1) else {
+                panic!("{} carries everything", lattice.name());
+            };
+            assert!(GradientWeights::new(&lattice, shortest).is_ok(), "{}", lattice.name());
+            assert!(GradientWeights::new(&lattice, 0.99 * shortest).is_err(), "{}", lattice.name());
             assert!(GradientWeights::new(&lattice, 0.5 * widest(&lattice)).is_ok(), "{}", lattice.name());
         }
         let honeycomb = Lattice::new(LatticeKind::Honeycomb { spacing: 1.0 }, [0.0; 2], 0.0);

@@ -141,8 +141,8 @@ pub enum RawWeights {
     /// neighbours are negative. Needs `neighbours.kind = "straight"`.
     Gradient {
         /// Decay length of a boundary layer along a row of bonds: what is clamped or loaded at an edge
-        /// dies off as `exp(-distance / length)`. Above about 0.4 of the widest spacing between rows
-        /// [length].
+        /// dies off as `exp(-distance / length)`. At least 0.38 of the spacing on a square lattice; on
+        /// others a refusal names the least [length].
         #[schemars(extend("exclusiveMinimum" = 0))]
         length: f64,
     },
