@@ -1,10 +1,9 @@
 //! The command line: what can be asked for, and who answers.
 
-#[cfg(feature = "fem")]
 mod compare;
+mod material;
 mod progress;
 mod run;
-#[cfg(feature = "fem")]
 mod trade;
 
 use std::io::IsTerminal;
@@ -13,7 +12,7 @@ use std::process::ExitCode;
 
 use clap::{Args, CommandFactory, Parser, Subcommand};
 use clap_complete::Shell;
-use flockform::continuum::plan::Plan;
+use flockform::compare::run::plan;
 use flockform::continuum::report::PlanReport;
 use flockform::scene::{self, Scene, SceneError, bundled};
 use flockform::{bench, export};
@@ -47,13 +46,11 @@ pub enum Command {
     )]
     Run(run::RunArguments),
     /// Hold a scene's rule against finite elements on the same body
-    #[cfg(feature = "fem")]
     #[command(
         after_help = "Example:\n  flockform compare beam --out /tmp/beam\n  flockform compare beam-paper --set neighbours.kind=second"
     )]
     Compare(compare::CompareArguments),
     /// What accuracy costs: run a scene by many rules, spacings and solvers against finite elements
-    #[cfg(feature = "fem")]
     #[command(
         after_help = "Example:\n  flockform trade grips --out /tmp/trade\n  flockform trade beam-loaded --most-particles 5000"
     )]
@@ -64,6 +61,14 @@ pub enum Command {
     /// Say what a scene makes the program model and what it leaves out, without running it
     #[command(after_help = "Example:\n  flockform plan fracture --set lattice.a=5.0")]
     Plan(SceneArguments),
+    /// Say what material a rule is, or which weights a material takes
+    #[command(
+        after_help = "Examples:\n  flockform material --lattice square\n  flockform material --lattice hexagonal --neighbours second\n  \
+                      flockform material --lattice hexagonal --young 210e9 --poisson 0.3 --thickness 1e-3\n  \
+                      flockform material --lattice square --young 9,1 --poisson 0.4 --shear 0.6 --fibres 30\n  \
+                      flockform material second-gradient --json"
+    )]
+    Material(material::MaterialArguments),
     /// Print the JSON Schema of a scene file
     #[command(after_help = "Example:\n  flockform schema > scene.schema.json")]
     Schema,
@@ -146,6 +151,8 @@ pub enum Refusal {
         "there is no scene file and no bundled scene `{name}`\n  help: the nearest bundled scene is `{nearest}`; `flockform scenes` lists them all"
     )]
     NoScene { name: String, nearest: &'static str },
+    #[error("{0}")]
+    Option(#[from] material::WrongOption),
     #[error("no threads to measure with: {0}")]
     Bench(#[from] rayon::ThreadPoolBuildError),
     #[error("--threads {threads}: {error}\n  help: give a number from 1 to the machine's cores")]
@@ -164,15 +171,14 @@ pub fn start_log(verbose: u8) {
 pub fn dispatch(command: Command) -> Result<ExitCode, Refusal> {
     match command {
         Command::Run(arguments) => return run::run(&arguments),
-        #[cfg(feature = "fem")]
         Command::Compare(arguments) => return compare::compare(&arguments),
-        #[cfg(feature = "fem")]
         Command::Trade(arguments) => return trade::trade(&arguments),
         Command::Scenes => list_scenes()?,
         Command::Plan(arguments) => {
             let scene = arguments.load([])?;
             print(&PlanReport::new(&scene, &plan(&scene)?)?.to_string());
         }
+        Command::Material(arguments) => print(&material::answer(&arguments)?),
         Command::Schema => print(&format!("{:#}\n", scene::validate::schema())),
         Command::Completions { shell } => {
             let mut script = Vec::new();
@@ -185,14 +191,6 @@ pub fn dispatch(command: Command) -> Result<ExitCode, Refusal> {
         }
     }
     Ok(ExitCode::SUCCESS)
-}
-
-/// The plan of a scene, with the truth that its leaders may be led by.
-fn plan(scene: &Scene) -> Result<Plan, SceneError> {
-    #[cfg(feature = "fem")]
-    return flockform::compare::run::plan(scene);
-    #[cfg(not(feature = "fem"))]
-    Plan::new(scene)
 }
 
 fn list_scenes() -> Result<(), SceneError> {

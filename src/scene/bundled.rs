@@ -24,6 +24,7 @@ pub const SCENES: &[Bundled] = scenes![
     "feedback-overrelax",
     "shear",
     "second-gradient",
+    "gradient-layer",
     "fracture",
     "fracture-slow",
     "fracture-hexagonal",
