@@ -83,3 +83,8 @@ fn continuum_knows_nothing_of_outputs() {
 fn the_comparison_knows_nothing_of_outputs() {
     assert_imports_only("compare", &["scene", "continuum", "flock", "material", "solve", "fem"]);
 }
+
+#[test]
+fn trade_stands_on_compare_and_knows_nothing_of_outputs() {
+    assert_imports_only("trade", &["scene", "continuum", "flock", "solve", "compare"]);
+}

@@ -1,17 +1,18 @@
 //! The command line: what can be asked for, and who answers.
 
-#[cfg(feature = "fem")]
 mod compare;
+mod material;
 mod progress;
 mod run;
+mod trade;
 
 use std::io::IsTerminal;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Args, CommandFactory, Parser, Subcommand};
 use clap_complete::Shell;
-use flockform::continuum::plan::Plan;
+use flockform::compare::run::plan;
 use flockform::continuum::report::PlanReport;
 use flockform::scene::{self, Scene, SceneError, bundled};
 use flockform::{bench, export};
@@ -45,17 +46,29 @@ pub enum Command {
     )]
     Run(run::RunArguments),
     /// Hold a scene's rule against finite elements on the same body
-    #[cfg(feature = "fem")]
     #[command(
         after_help = "Example:\n  flockform compare beam --out /tmp/beam\n  flockform compare beam-paper --set neighbours.kind=second"
     )]
     Compare(compare::CompareArguments),
+    /// What accuracy costs: run a scene by many rules, spacings and solvers against finite elements
+    #[command(
+        after_help = "Example:\n  flockform trade grips --out /tmp/trade\n  flockform trade beam-loaded --most-particles 5000"
+    )]
+    Trade(trade::TradeArguments),
     /// List the bundled scenes
     #[command(after_help = "Example:\n  flockform scenes")]
     Scenes,
     /// Say what a scene makes the program model and what it leaves out, without running it
     #[command(after_help = "Example:\n  flockform plan fracture --set lattice.a=5.0")]
     Plan(SceneArguments),
+    /// Say what material a rule is, or which weights a material takes
+    #[command(
+        after_help = "Examples:\n  flockform material --lattice square\n  flockform material --lattice hexagonal --neighbours second\n  \
+                      flockform material --lattice hexagonal --young 210e9 --poisson 0.3 --thickness 1e-3\n  \
+                      flockform material --lattice square --young 9,1 --poisson 0.4 --shear 0.6 --fibres 30\n  \
+                      flockform material second-gradient --json"
+    )]
+    Material(material::MaterialArguments),
     /// Print the JSON Schema of a scene file
     #[command(after_help = "Example:\n  flockform schema > scene.schema.json")]
     Schema,
@@ -98,10 +111,19 @@ pub struct SceneArguments {
 
 impl SceneArguments {
     fn load(&self, more: impl IntoIterator<Item = String>) -> Result<Scene, Refusal> {
-        let overrides: Vec<String> = self.set.iter().cloned().chain(more).collect();
+        let more: Vec<String> = more.into_iter().collect();
+        if bundled(&self.scene).is_none() {
+            self.path()?;
+        }
+        Ok(self.load_scene(&more)?)
+    }
+
+    /// The scene with these overrides after the user's own.
+    fn load_scene(&self, more: &[String]) -> Result<Scene, SceneError> {
+        let overrides = [&self.set, more].concat();
         match bundled(&self.scene) {
-            Some(bundled) => Ok(bundled.load(&overrides)?),
-            None => Ok(Scene::from_file(&self.path()?, &overrides)?),
+            Some(bundled) => bundled.load(&overrides),
+            None => Scene::from_file(Path::new(&self.scene), &overrides),
         }
     }
 
@@ -129,6 +151,8 @@ pub enum Refusal {
         "there is no scene file and no bundled scene `{name}`\n  help: the nearest bundled scene is `{nearest}`; `flockform scenes` lists them all"
     )]
     NoScene { name: String, nearest: &'static str },
+    #[error("{0}")]
+    Option(#[from] material::WrongOption),
     #[error("no threads to measure with: {0}")]
     Bench(#[from] rayon::ThreadPoolBuildError),
     #[error("--threads {threads}: {error}\n  help: give a number from 1 to the machine's cores")]
@@ -147,13 +171,14 @@ pub fn start_log(verbose: u8) {
 pub fn dispatch(command: Command) -> Result<ExitCode, Refusal> {
     match command {
         Command::Run(arguments) => return run::run(&arguments),
-        #[cfg(feature = "fem")]
         Command::Compare(arguments) => return compare::compare(&arguments),
+        Command::Trade(arguments) => return trade::trade(&arguments),
         Command::Scenes => list_scenes()?,
         Command::Plan(arguments) => {
             let scene = arguments.load([])?;
             print(&PlanReport::new(&scene, &plan(&scene)?)?.to_string());
         }
+        Command::Material(arguments) => print(&material::answer(&arguments)?),
         Command::Schema => print(&format!("{:#}\n", scene::validate::schema())),
         Command::Completions { shell } => {
             let mut script = Vec::new();
@@ -166,14 +191,6 @@ pub fn dispatch(command: Command) -> Result<ExitCode, Refusal> {
         }
     }
     Ok(ExitCode::SUCCESS)
-}
-
-/// The plan of a scene, with the truth that its leaders may be led by.
-fn plan(scene: &Scene) -> Result<Plan, SceneError> {
-    #[cfg(feature = "fem")]
-    return flockform::compare::run::plan(scene);
-    #[cfg(not(feature = "fem"))]
-    Plan::new(scene)
 }
 
 fn list_scenes() -> Result<(), SceneError> {

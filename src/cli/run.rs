@@ -8,6 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use clap::Args;
+use flockform::compare::run::plan;
 use flockform::continuum::engine::Engine;
 use flockform::continuum::equilibrium::come_to_rest;
 use flockform::continuum::plan::Plan;
@@ -17,7 +18,7 @@ use flockform::export::{ExportError, OutputFolder, Results, Timings, VtkSeries, 
 use flockform::scene::Scene;
 
 use super::progress::Progress;
-use super::{FAILED, Refusal, SceneArguments, plan, print};
+use super::{FAILED, Refusal, SceneArguments, print};
 
 #[derive(Debug, Args)]
 pub struct RunArguments {

@@ -7,9 +7,11 @@
 
 pub mod engine;
 pub mod equilibrium;
+pub mod interior;
 pub mod layout;
 pub mod movement;
 pub mod plan;
 pub mod record;
 pub mod report;
 pub mod run;
+mod weights;

@@ -1,19 +1,17 @@
 //! From a scene to the arrays that an engine steps, with the checks that need the body.
 
 use super::layout::{Layout, RoleChange, Truth};
+use super::weights;
 use crate::flock::body::Body;
 use crate::flock::fracture::{Bonds, Break, Ghosts};
 use crate::flock::interaction::{Interaction, Weights};
-use crate::flock::lattice::Site;
 use crate::flock::neighbourhood::{Neighbourhood, Neighbours};
 use crate::flock::points::{Points, distance};
 use crate::flock::role::Role;
 use crate::flock::rules::{Axis, Mean, Poisson, Rule};
 use crate::material::cells::Cells;
-use crate::material::elastic::Elastic;
 use crate::material::mechanism::require_held;
-use crate::material::weights::{MaterialWeights, WeightsError};
-use crate::scene::{Scene, SceneError, Stop, Weights as FixedWeights};
+use crate::scene::{Scene, SceneError, Stop};
 use crate::solve::sweep::Update;
 
 /// Everything an engine needs; nothing of it refers to the scene file.
@@ -67,7 +65,7 @@ impl Plan {
         let forces = layout.forces(scene)?;
         require_carried(scene, &layout, &changes, forces.as_ref())?;
         let Layout { body, neighbours, cells } = layout;
-        let weights = weights(scene, &body, &neighbours, cells.as_ref())?;
+        let weights = weights::of_body(scene, &body, &neighbours, cells.as_ref())?;
         let interaction = interaction(scene, &body, neighbours, weights, forces);
         let probes = probes(scene, &body)?;
         let roles = body.is_frame.iter().map(|&f| if f { Role::Frame } else { Role::Follower }).collect();
@@ -187,74 +185,6 @@ fn interaction(
         interaction.keep_rest();
     }
     interaction
-}
-
-fn weights(
-    scene: &Scene,
-    body: &Body,
-    neighbours: &Neighbours,
-    cells: Option<&Cells>,
-) -> Result<Weights, SceneError> {
-    if let (Mean::Material { .. }, Some(cells), Some(elastic)) = (scene.mean, cells, &scene.material) {
-        return material_weights(scene, body, neighbours, cells, elastic);
-    }
-    match &scene.weights {
-        None => Ok(Weights::Equal),
-        Some(FixedWeights::Distance { power }) => {
-            let spacing = body.lattice.spacing();
-            let weight = |j: usize, k: u32| {
-                (distance(body.reference.get(j), body.reference.get(k as usize)) / spacing).powf(*power)
-            };
-            let all = (0..body.count()).flat_map(|j| neighbours.of(j).iter().map(move |&k| weight(j, k)));
-            Ok(Weights::Scalar(all.collect()))
-        }
-        Some(FixedWeights::List(values)) => {
-            let offsets = scene.neighbourhood.offsets(&scene.lattice).unwrap_or_default();
-            let size = offsets.first().map_or(0, Vec::len);
-            if size != values.len() {
-                let message = format!("{} weights are given for {size} neighbours", values.len());
-                let help = "give one weight for each neighbour, in the neighbourhood's order";
-                return Err(scene.refuse("rule.weights.values", message, help));
-            }
-            Ok(Weights::Scalar(listed_weights(values, &offsets, body, neighbours)))
-        }
-    }
-}
-
-fn material_weights(
-    scene: &Scene,
-    body: &Body,
-    neighbours: &Neighbours,
-    cells: &Cells,
-    elastic: &Elastic,
-) -> Result<Weights, SceneError> {
-    let material = MaterialWeights::assemble(cells, body, neighbours.clone(), elastic);
-    material.map(|material| Weights::Matrix(material.weights())).map_err(|error| {
-        let (key, help) = match &error {
-            WeightsError::MissingNeighbour { .. } => (
-                "neighbours",
-                "use kind = \"cells\", or leave the neighbours out: the rule takes those that it needs",
-            ),
-            WeightsError::Mechanism(_) => ("body.shape", "use a smaller spacing or a larger shape"),
-            _ => ("material", "use constants and a lattice less far apart"),
-        };
-        scene.refuse(key, error.to_string(), help)
-    })
-}
-
-/// Weights follow the offsets; a particle that lacks a neighbour lacks its weight.
-fn listed_weights(values: &[f64], offsets: &[Vec<Site>], body: &Body, neighbours: &Neighbours) -> Vec<f64> {
-    let mut all = Vec::with_capacity(neighbours.index.len());
-    for j in 0..body.count() {
-        let mut next = neighbours.of(j).iter().map(|&k| body.sites[k as usize]).peekable();
-        for (offset, &value) in offsets[body.lattice.sublattice(body.sites[j])].iter().zip(values) {
-            let there = [body.sites[j][0] + offset[0], body.sites[j][1] + offset[1]];
-            if next.next_if_eq(&there).is_some() {
-                all.push(value);
-            }
-        }
-    }
-    all
 }
 
 fn probes(scene: &Scene, body: &Body) -> Result<Vec<usize>, SceneError> {

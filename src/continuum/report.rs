@@ -3,12 +3,13 @@
 use std::fmt;
 
 use super::equilibrium::foresee;
+use super::interior;
 use super::plan::Plan;
 use crate::flock::fracture::Threshold;
 use crate::flock::interaction::Weights;
 use crate::flock::role::Role;
 use crate::flock::rules::{FeedbackReference, Mean, Rotation};
-use crate::scene::{Scene, SceneError};
+use crate::scene::{Scene, SceneError, Weights as SceneWeights};
 use crate::solve::sweep::{Order, Sweep};
 
 /// A plan in words and numbers.
@@ -67,13 +68,18 @@ impl PlanReport {
         self.models_or_not(rest, "rule.rest", "every neighbourhood is balanced, or rule.rest is \"literal\"");
         let weights = match &plan.interaction.weights {
             Weights::Equal => None,
-            Weights::Scalar(_) => Some("fixed weights".to_owned()),
+            Weights::Scalar(_) => Some(match scene.weights {
+                Some(SceneWeights::Gradient { length }) => {
+                    format!("second gradient of length {length} {}", scene.unit())
+                }
+                _ => "fixed weights".to_owned(),
+            }),
             Weights::Matrix(weights) => Some(format!(
                 "2x2 weights from the material, {} kinds of neighbourhood",
                 weights.compliance.len()
             )),
         };
-        let key = if scene.material.is_some() { "material" } else { "rule.weights" };
+        let key = if matches!(rule.mean, Mean::Material { .. }) { "material" } else { "rule.weights" };
         self.models_or_not(weights, key, "all neighbours count the same");
         let poisson = rule.poisson.map(|p| format!("Poisson term (Eq. 2), K = {}", p.k));
         self.models_or_not(poisson, "rule.poisson", "x and y do not act on each other");
@@ -166,6 +172,7 @@ fn cautions(scene: &Scene, plan: &Plan) -> Vec<String> {
             "the barycentre of whoever is near keeps no distance: the body contracts; use rule.mean.kind = \"spaced\"".into(),
         );
     }
+    cautions.extend(interior::cautions(scene));
     let led = |role: &Role| matches!(role, Role::Leader | Role::Clamped);
     if !plan.roles.iter().any(led) && scene.roles.iter().all(|entry| !led(&entry.role)) {
         cautions.push("nobody leads: the body relaxes by itself".into());

@@ -52,6 +52,8 @@ mod error;
 pub mod figures;
 mod folder;
 mod summary;
+#[cfg(feature = "fem")]
+pub mod trade;
 mod vtk;
 
 use std::path::PathBuf;

@@ -20,6 +20,8 @@ pub(super) const PROGRAM: &str = env!("CARGO_PKG_NAME");
 const FILE: &str = "summary.json";
 /// What a comparison writes in the place of a summary.
 pub(super) const COMPARISON: &str = "compare.json";
+/// What a trade study writes in the place of a summary.
+pub(super) const TRADE: &str = "trade.json";
 
 /// How long the parts of a run took.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -172,7 +174,7 @@ impl Equilibrium {
 
 /// Whether the folder holds a summary, or a comparison, that this program wrote.
 pub(super) fn is_in(folder: &Path) -> bool {
-    [FILE, COMPARISON].into_iter().any(|file| {
+    [FILE, COMPARISON, TRADE].into_iter().any(|file| {
         let text = std::fs::read_to_string(folder.join(file)).unwrap_or_default();
         serde_json::from_str::<serde_json::Value>(&text).is_ok_and(|summary| summary["program"] == PROGRAM)
     })

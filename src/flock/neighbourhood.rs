@@ -14,6 +14,8 @@ pub enum Neighbourhood {
     Ring { radius: i32 },
     /// The first neighbours and theirs (the paper's second gradient).
     Second,
+    /// The first neighbours and the sites behind them, twice as far in the same directions.
+    Straight,
     /// The sites at these offsets, in columns and rows.
     Offsets(Vec<Site>),
     /// The sites within this distance in the reference configuration \[length\].
@@ -31,6 +33,8 @@ pub enum NeighbourhoodError {
     NoSite { lattice: &'static str, offset: Site },
     #[error("a honeycomb has no Chebyshev ring: its sites are no translations of each other")]
     RingOnHoneycomb,
+    #[error("on a {lattice} lattice no site lies twice as far in the direction of a first neighbour")]
+    NothingBehind { lattice: &'static str },
     #[error("no site lies within {radius} of another: the nearest is {spacing} away")]
     TooSmall { radius: f64, spacing: f64 },
 }
@@ -63,6 +67,7 @@ impl Neighbourhood {
             }
             Neighbourhood::Ring { radius } => ring(&lattice.primitive(), *radius),
             Neighbourhood::Second => neighbours_of_neighbours(lattice, sublattice),
+            Neighbourhood::Straight => straight(lattice, sublattice)?,
             Neighbourhood::Offsets(offsets) => {
                 let base = lattice.site_of_sublattice(sublattice);
                 if let Some(&offset) =
@@ -85,6 +90,16 @@ impl Neighbourhood {
         lattice.sort_nearest_first(&mut offsets);
         Ok(offsets)
     }
+}
+
+fn straight(lattice: &Lattice, sublattice: usize) -> Result<Vec<Site>, NeighbourhoodError> {
+    let base = lattice.site_of_sublattice(sublattice);
+    let first = lattice.first_neighbours(sublattice);
+    let behind: Vec<Site> = first.iter().map(|&[i, j]| [2 * i, 2 * j]).collect();
+    if behind.iter().any(|[i, j]| !lattice.is_site([base[0] + i, base[1] + j])) {
+        return Err(NeighbourhoodError::NothingBehind { lattice: lattice.name() });
+    }
+    Ok([first, behind].concat())
 }
 
 fn neighbours_of_neighbours(lattice: &Lattice, sublattice: usize) -> Vec<Site> {
@@ -169,6 +184,8 @@ mod tests {
         let honeycomb = LatticeKind::Honeycomb { spacing: 1.0 };
         assert_eq!(count(square, Neighbourhood::First { keep: None }), [4]);
         assert_eq!(count(square, Neighbourhood::Second), [12]);
+        assert_eq!(count(square, Neighbourhood::Straight), [8]);
+        assert_eq!(count(hexagonal, Neighbourhood::Straight), [12]);
         assert_eq!(count(square, Neighbourhood::Ring { radius: 1 }), [8]);
         assert_eq!(count(square, Neighbourhood::Ring { radius: 2 }), [24]);
         assert_eq!(count(hexagonal, Neighbourhood::Second), [18]);
@@ -182,6 +199,7 @@ mod tests {
         let honeycomb = Lattice::new(LatticeKind::Honeycomb { spacing: 1.0 }, [0.0, 0.0], 0.0);
         let refused = |n: Neighbourhood| n.offsets(&honeycomb).expect_err("refused");
         assert_eq!(refused(Neighbourhood::Ring { radius: 1 }), NeighbourhoodError::RingOnHoneycomb);
+        assert!(matches!(refused(Neighbourhood::Straight), NeighbourhoodError::NothingBehind { .. }));
         assert!(matches!(
             refused(Neighbourhood::First { keep: Some(4) }),
             NeighbourhoodError::TooMany { .. }

@@ -53,6 +53,12 @@ pub enum HomogeniseError {
         .vector[0], .vector[1]
     )]
     NotSymmetric { sublattice: usize, vector: [f64; 2] },
+    #[error(
+        "long waves cost nothing: the weights of far neighbours cancel those of near ones, so there is no stiffness"
+    )]
+    NoStiffness,
+    #[error("lengths or weights are too large or too small: their products do not fit a double")]
+    Range,
     #[error("the particles of a lattice cell do not hold each other: their difference costs nothing")]
     Loose,
     #[error(
@@ -194,6 +200,14 @@ impl Crystal {
         let along = |n: [f64; 2]| Ok::<_, HomogeniseError>(self.long_wave(n)?.0);
         let (xx, yy, diagonal) = (along([1.0, 0.0])?, along([0.0, 1.0])?, along([half, half])?);
         let xy = diagonal - (xx + yy) * 0.5;
+        let pull = self.pull();
+        // So that neither squares nor what is left of a cancellation leave the range of a double.
+        if !(1e-140..1e140).contains(&pull) {
+            return Err(HomogeniseError::Range);
+        }
+        if xx.norm() + yy.norm() <= 1e-12 * pull {
+            return Err(HomogeniseError::NoStiffness);
+        }
         let (stiffness, misfit) = fit_stiffness(&xx, &yy, &xy);
         let c = |i: usize, j: usize| stiffness[(i, j)];
         let bulk = (c(0, 0) + c(1, 1) + 2.0 * c(0, 1)) / 4.0;
@@ -226,6 +240,13 @@ impl Crystal {
             }
         }
         Ok(())
+    }
+
+    /// What the acoustic tensor would be if nothing cancelled \[force / length\].
+    fn pull(&self) -> f64 {
+        let size = |bond: &Bond| bond.block.iter().flatten().fold(0f64, |m, x| m.max(x.abs()));
+        let bonds = self.bonds.iter().flatten();
+        bonds.map(|b| size(b) * (b.vector[0].powi(2) + b.vector[1].powi(2))).sum::<f64>() / self.cell_area()
     }
 
     /// Area of a lattice cell \[length^2\].

@@ -52,9 +52,11 @@
 
 pub mod cells;
 pub mod elastic;
+pub mod gradient;
 pub mod homogenise;
 pub mod loads;
 pub mod mechanism;
+pub mod report;
 pub mod stiffness;
 pub mod weights;
 pub mod zone;

@@ -32,6 +32,9 @@ pub struct Zone {
 /// Samples each way: a multiple of 6, so that the corners of square and hexagonal zones are among them.
 const SAMPLES: i32 = 48;
 
+/// Steps of one size while climbing: samples lie two of the first size apart.
+const MOST_MOVES: usize = 16;
+
 /// Below this a wave counts as free: it is rounding.
 const FREE: f64 = 1e-10;
 
@@ -136,6 +139,7 @@ fn cholesky(block: &super::Block) -> super::Block {
 fn climb(start: (f64, [f64; 2]), height: impl Fn([f64; 2]) -> f64, sign: f64) -> (f64, [f64; 2]) {
     let mut best = (sign * start.0, start.1);
     let mut step = std::f64::consts::PI / f64::from(SAMPLES);
+    let mut moves = 0;
     while step > 1e-7 {
         let [p, q] = best.1;
         let around = [[step, 0.0], [-step, 0.0], [0.0, step], [0.0, -step], [step, -step], [-step, step]];
@@ -146,7 +150,12 @@ fn climb(start: (f64, [f64; 2]), height: impl Fn([f64; 2]) -> f64, sign: f64) ->
             .filter(|phase| phase[0].hypot(phase[1]) > 0.01)
             .map(|phase| (height(phase), phase))
             .fold(best, |best, next| if next.0 > best.0 { next } else { best });
-        if higher.0 > best.0 { best = higher } else { step *= 0.5 }
+        // Along a ridge, or around the origin, it would climb for thousands of the smallest steps.
+        if higher.0 > best.0 && moves < MOST_MOVES {
+            (best, moves) = (higher, moves + 1);
+        } else {
+            (step, moves) = (0.5 * step, 0);
+        }
     }
     (sign * best.0, best.1)
 }

@@ -83,6 +83,8 @@ pub enum Weights {
     List(Vec<f64>),
     /// A power of the reference distance.
     Distance { power: f64 },
+    /// A second gradient whose boundary layers have this decay length \[length\].
+    Gradient { length: f64 },
 }
 
 /// The Poisson term (Eq. 2) before the body's width is known.

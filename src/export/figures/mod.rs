@@ -29,6 +29,7 @@ use crate::continuum::engine::Engine;
 use crate::flock::body::Body;
 use crate::flock::neighbourhood::Neighbours;
 use crate::scene::Scene;
+pub use colour::SERIES;
 pub use comparison::{Pair, overlay};
 pub use configuration::configuration;
 pub use energy::pe1;

@@ -27,6 +27,9 @@ pub enum RawNeighbours {
     Cells {},
     /// The neighbours of the neighbours too: the paper's second gradient.
     Second {},
+    /// The first neighbours and the sites behind them, twice as far in the same directions: what
+    /// `rule.weights.kind = "gradient"` needs. The honeycomb has no such sites.
+    Straight {},
     /// The sites at these offsets in columns and rows of the lattice.
     Offsets {
         /// Pairs of whole numbers, in the order of summation.
@@ -146,6 +149,15 @@ pub enum RawWeights {
     Distance {
         /// The power [1].
         power: f64,
+    },
+    /// A second gradient of prescribed length (ours): the weights of the sites behind the first
+    /// neighbours are negative. Needs `neighbours.kind = "straight"`.
+    Gradient {
+        /// Decay length of a boundary layer along a row of bonds: what is clamped or loaded at an edge
+        /// dies off as `exp(-distance / length)`. At least 0.38 of the spacing on a square lattice; on
+        /// others a refusal names the least [length].
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        length: f64,
     },
 }
 

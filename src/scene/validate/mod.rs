@@ -83,6 +83,7 @@ fn validate(
     material::check_equilibrium(&raw, refuse)?;
     check_truth(&raw, refuse)?;
     let elastic = material::elastic(&raw.material, refuse)?;
+    check_gradient(&raw, refuse)?;
     let roles = raw
         .roles
         .iter()
@@ -228,6 +229,7 @@ fn neighbourhood(raw: &RawNeighbours, lattice: &Lattice) -> Neighbourhood {
         RawNeighbours::Ring { radius } => Neighbourhood::Ring { radius: *radius },
         RawNeighbours::Cells {} => cells::neighbourhood(lattice),
         RawNeighbours::Second {} => Neighbourhood::Second,
+        RawNeighbours::Straight {} => Neighbourhood::Straight,
         RawNeighbours::Offsets { offsets } => Neighbourhood::Offsets(offsets.clone()),
         RawNeighbours::Within { radius } => Neighbourhood::Within { radius: *radius },
         RawNeighbours::Present { radius } => Neighbourhood::Present { radius: *radius },
@@ -268,6 +270,28 @@ fn check_truth(raw: &RawScene, refuse: Refuse<'_>) -> Result<(), SceneError> {
     }
 }
 
+/// A second gradient holds only with the neighbours, the mean and the unbroken bonds it is derived for.
+fn check_gradient(raw: &RawScene, refuse: Refuse<'_>) -> Result<(), SceneError> {
+    if !matches!(raw.rule.weights, Some(RawWeights::Gradient { .. })) {
+        return Ok(());
+    }
+    if !matches!(raw.neighbours, Some(RawNeighbours::Straight {})) {
+        let message = "weights of kind \"gradient\" reach the sites behind the first neighbours".into();
+        return Err(refuse("neighbours", message, "give `neighbours = { kind = \"straight\" }`"));
+    }
+    if !matches!(raw.rule.mean, RawMean::Barycentre) {
+        let message = "weights of kind \"gradient\" have negative parts, which this mean cannot take".into();
+        return Err(refuse("rule.mean", message, "use kind = \"barycentre\""));
+    }
+    if raw.fracture.is_some() {
+        let message = "weights of kind \"gradient\" are stable only while the bonds between a particle and \
+                       the site behind its neighbour hold: bonds cannot break one by one"
+            .into();
+        return Err(refuse("fracture", message, "leave fracture out, or use other weights"));
+    }
+    Ok(())
+}
+
 fn mean(raw: &RawMean, spacing: f64, refuse: Refuse<'_>) -> Result<Mean, SceneError> {
     let origin = |origin: RawOrigin| match origin {
         RawOrigin::Moving => Origin::Moving { margin: spacing },
@@ -295,6 +319,7 @@ fn weights(raw: &Option<RawWeights>, refuse: Refuse<'_>) -> Result<Option<Weight
     Ok(match raw {
         None => None,
         Some(RawWeights::Distance { power }) => Some(Weights::Distance { power: *power }),
+        Some(RawWeights::Gradient { length }) => Some(Weights::Gradient { length: *length }),
         Some(RawWeights::List { values }) => {
             // Also refuses a sum that is nothing but rounding, whose mean would be noise.
             let (sum, size) = values.iter().fold((0.0, 0.0), |(s, a), v| (s + v, a + f64::abs(*v)));

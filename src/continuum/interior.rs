@@ -1,0 +1,236 @@
+//! The rule of an interior particle of a scene, as on an infinite lattice: what its waves say about the
+//! scene before it runs, and what material it is.
+
+use crate::flock::lattice::Site;
+use crate::flock::neighbourhood::Neighbourhood;
+use crate::flock::rules::{FeedbackReference, Mean};
+use crate::material::gradient::{GradientError, GradientWeights, SAFE_DAMPING, layer_note};
+use crate::material::homogenise::{Bond, Crystal, HomogeniseError};
+use crate::material::report::MaterialReport;
+use crate::material::zone::Zone;
+use crate::scene::{Scene, SceneError, Weights};
+use crate::solve::sweep::Order;
+
+/// What material a scene's rule is.
+///
+/// # Errors
+/// Refuses rules that are no homogeneous material, naming the key that makes them so.
+pub fn material(scene: &Scene) -> Result<MaterialReport, SceneError> {
+    if let (Mean::Material { .. }, Some(elastic)) = (scene.mean, &scene.material) {
+        let report = MaterialReport::of_material(&scene.lattice, elastic);
+        return report.map_err(|error| scene.refuse("material", error.to_string(), remedy(&error)));
+    }
+    check_homogeneous(scene)?;
+    let (scalar, name) = (scalar_crystal(scene)?, rule_name(scene));
+    let (crystal, at_rest) = match scene.mean {
+        Mean::Distance { power } => (linearised(&scalar, power), true),
+        _ => (scalar, false),
+    };
+    let mut report = MaterialReport::of_rule(&scene.lattice, name, &crystal)
+        .map_err(|error| scene.refuse("neighbours", error.to_string(), remedy(&error)))?;
+    if let Some(Weights::Gradient { length }) = scene.weights {
+        report.notes.push(layer_note(length));
+    }
+    if at_rest {
+        // Its update divides by the sum of the weights, not by that of their derivatives.
+        report.waves.damping_limit = None;
+        report.notes.push(
+            "weights that depend on the present distance are taken for small displacements about rest, K = d^p (1 + p n n')"
+                .into(),
+        );
+    }
+    Ok(report)
+}
+
+/// What to do about a rule that has no material.
+pub fn remedy(error: &HomogeniseError) -> &'static str {
+    match error {
+        HomogeniseError::NotSymmetric { .. } => {
+            "give opposite neighbours and equal weights to them: a whole neighbourhood, not a reduced one"
+        }
+        HomogeniseError::NoStiffness => "give far neighbours weights that are less negative",
+        HomogeniseError::Range => "use units in which they are of ordinary size",
+        HomogeniseError::Loose => "use neighbours that join the two kinds of site",
+        HomogeniseError::Singular { .. } => "give weights whose sum is positive",
+        HomogeniseError::Weights { .. } => "give one weight for each neighbour, in the neighbourhood's order",
+        HomogeniseError::Shape(_) => "use a lattice whose cells are less slender",
+    }
+}
+
+fn check_homogeneous(scene: &Scene) -> Result<(), SceneError> {
+    let no_fixed = |what: &str| format!("{what} has no fixed weights, so no material");
+    let (key, message) = if let Neighbourhood::Present { .. } = scene.neighbourhood {
+        ("neighbours.kind", no_fixed("a rule whose neighbours are found anew at every step"))
+    } else if matches!(scene.mean, Mean::Power { .. }) {
+        ("rule.mean", no_fixed("a power mean of coordinates"))
+    } else if matches!(scene.mean, Mean::Spaced { .. }) {
+        ("rule.mean", no_fixed("cohesion with separation"))
+    } else if scene.poisson.is_some() {
+        (
+            "rule.poisson",
+            "the Poisson term (Eq. 2) depends on the distance from an axis: no homogeneous material".into(),
+        )
+    } else if scene.feedback.is_some_and(|f| f.reference == FeedbackReference::Initial) {
+        (
+            "rule.feedback",
+            "feedback from the initial position ties each particle to its place, which no material does"
+                .into(),
+        )
+    } else {
+        return Ok(());
+    };
+    Err(scene.refuse(key, message, "ask about the rule without it: --set, or --lattice and --neighbours"))
+}
+
+fn rule_name(scene: &Scene) -> String {
+    let mean = match scene.mean {
+        Mean::Distance { power } => format!("mean weighted by distance^{power} (Eq. 3)"),
+        _ => "barycentre (Eq. 1)".into(),
+    };
+    match &scene.weights {
+        None => mean,
+        Some(Weights::Distance { power }) => format!("{mean} with weights reference distance^{power}"),
+        Some(Weights::List(_)) => format!("{mean} with weights given"),
+        Some(Weights::Gradient { length }) => format!("second gradient of length {length}"),
+    }
+}
+
+/// The fixed weights of an interior particle.
+fn scalar_crystal(scene: &Scene) -> Result<Crystal, SceneError> {
+    let offsets = scene.neighbourhood.offsets(&scene.lattice).map_err(|error| {
+        scene.refuse("neighbours", error.to_string(), "choose a neighbourhood that the lattice has")
+    })?;
+    let weights: Option<Vec<Vec<f64>>> = match &scene.weights {
+        None => None,
+        Some(Weights::Gradient { length }) => {
+            let crystal = gradient(scene, *length)?.crystal(&scene.lattice);
+            return crystal.map_err(|error| refuse_gradient(scene, &error));
+        }
+        Some(Weights::List(values)) => {
+            check_count(scene, values, &offsets)?;
+            Some(vec![values.clone(); offsets.len()])
+        }
+        Some(Weights::Distance { power }) => {
+            let spacing = scene.lattice.spacing();
+            let weight = |&offset: &Site| {
+                let [x, y] = scene.lattice.vector(offset);
+                (x.hypot(y) / spacing).powf(*power)
+            };
+            Some(offsets.iter().map(|offsets| offsets.iter().map(weight).collect()).collect())
+        }
+    };
+    Crystal::scalar(&scene.lattice, &offsets, weights.as_deref())
+        .map_err(|error| scene.refuse("rule.weights", error.to_string(), remedy(&error)))
+}
+
+/// Weights `d^p` of the present distance `d`, for small displacements about rest: their derivative adds
+/// a pull along the bond, `K = d^p (1 + p n n')`.
+fn linearised(crystal: &Crystal, power: f64) -> Crystal {
+    let linear = |bond: &Bond| {
+        let [x, y] = bond.vector;
+        let distance = x.hypot(y);
+        let ([nx, ny], size) = ([x / distance, y / distance], distance.powf(power) * bond.block[0][0]);
+        let along = size * power;
+        let block = [[size + along * nx * nx, along * nx * ny], [along * nx * ny, size + along * ny * ny]];
+        Bond { block, ..*bond }
+    };
+    let bonds = crystal.bonds.iter().map(|bonds| bonds.iter().map(linear).collect()).collect();
+    Crystal { bonds, ..*crystal }
+}
+
+/// Refuses listed weights that are not as many as the neighbours.
+pub(super) fn check_count(scene: &Scene, values: &[f64], offsets: &[Vec<Site>]) -> Result<(), SceneError> {
+    let size = offsets.first().map_or(0, Vec::len);
+    if size == values.len() {
+        return Ok(());
+    }
+    let message = format!("{} weights are given for {size} neighbours", values.len());
+    let help = "give one weight for each neighbour, in the neighbourhood's order";
+    Err(scene.refuse("rule.weights.values", message, help))
+}
+
+/// The weights of a second gradient.
+pub(super) fn gradient(scene: &Scene, length: f64) -> Result<GradientWeights, SceneError> {
+    GradientWeights::new(&scene.lattice, length).map_err(|error| refuse_gradient(scene, &error))
+}
+
+fn refuse_gradient(scene: &Scene, error: &GradientError) -> SceneError {
+    let (key, help) = match error {
+        GradientError::TooShort { shortest, .. } => {
+            ("rule.weights.length", format!("give a length of {shortest:.4} or more, or a finer lattice"))
+        }
+        GradientError::TooLong { .. } | GradientError::Unstable { .. } => {
+            ("rule.weights.length", "give a shorter length".into())
+        }
+        GradientError::Neighbours(_) => ("lattice.kind", "use one of the five Bravais lattices".into()),
+        GradientError::NotPositive { .. } | GradientError::Wave(_) => {
+            ("rule.weights.length", "give a positive length".into())
+        }
+    };
+    scene.refuse(key, error.to_string(), help)
+}
+
+/// Refuses a synchronous update that makes the fastest wave of a second gradient grow.
+pub(super) fn require_damped(scene: &Scene, gradient: &GradientWeights) -> Result<(), SceneError> {
+    if scene.update.order == Order::Sequential || scene.raw.equilibrium.is_some() {
+        return Ok(());
+    }
+    let crystal = gradient.crystal(&scene.lattice).map_err(|error| refuse_gradient(scene, &error))?;
+    let limit = crystal.zone().map_or(SAFE_DAMPING, |zone| zone.damping_limit);
+    if scene.update.damping < limit {
+        return Ok(());
+    }
+    let message = format!(
+        "a synchronous update of this second gradient diverges with damping {}: the limit is {limit:.4}",
+        scene.update.damping
+    );
+    Err(scene.refuse(
+        "update.damping",
+        message,
+        "use update.order = \"sequential\", or update.damping = 0.65",
+    ))
+}
+
+/// What the waves of a scene's fixed weights say about its run.
+pub(super) fn cautions(scene: &Scene) -> Vec<String> {
+    // Rules that have no waves (not symmetric, say) are no error here.
+    let Some((crystal, zone)) = waves_in_doubt(scene) else { return Vec::new() };
+    let gradient = matches!(scene.weights, Some(Weights::Gradient { .. }));
+    let damping = scene.update.damping;
+    if !zone.stable || crystal.effective() == Err(HomogeniseError::NoStiffness) {
+        let length = std::f64::consts::TAU / zone.worst[0].hypot(zone.worst[1]);
+        return vec![format!(
+            "these weights are unstable: a wave of length {length:.4} {} costs nothing or gives energy and does not die out in any update; \
+             weights of far neighbours are too negative (on a chain, w2 must be above -w1/4)",
+            scene.unit()
+        )];
+    }
+    if scene.update.order == Order::Synchronous && damping > zone.damping_limit * (1.0 + 1e-9) {
+        return vec![format!(
+            "a synchronous update of these weights diverges unless damped below {:.4}: set update.damping or use update.order = \"sequential\"",
+            zone.damping_limit
+        )];
+    }
+    if gradient && scene.update.order == Order::Synchronous && damping >= SAFE_DAMPING {
+        return vec![format!(
+            "a synchronous update of a second gradient is stable on any body only if damped below 2/3; here damping is {damping}, \
+             and edges may grow"
+        )];
+    }
+    Vec::new()
+}
+
+/// The rule and its waves, where the answer is not known beforehand: a mean with positive weights is
+/// stable, and an update that does not overshoot it never grows.
+fn waves_in_doubt(scene: &Scene) -> Option<(Crystal, Zone)> {
+    if scene.mean != Mean::Barycentre || matches!(scene.neighbourhood, Neighbourhood::Present { .. }) {
+        return None;
+    }
+    let crystal = scalar_crystal(scene).ok()?;
+    let positive = crystal.bonds.iter().flatten().all(|bond| bond.block[0][0] >= 0.0);
+    if positive && (scene.update.order == Order::Sequential || scene.update.damping <= 1.0) {
+        return None;
+    }
+    let zone = crystal.zone().ok()?;
+    Some((crystal, zone))
+}

@@ -1,0 +1,105 @@
+//! Fixed weights of the neighbours, from what the scene says of them and of its material.
+
+use super::interior::{self, gradient};
+use crate::flock::body::Body;
+use crate::flock::interaction::Weights;
+use crate::flock::lattice::Site;
+use crate::flock::neighbourhood::Neighbours;
+use crate::flock::points::distance;
+use crate::flock::rules::Mean;
+use crate::material::cells::Cells;
+use crate::material::elastic::Elastic;
+use crate::material::weights::{MaterialWeights, WeightsError};
+use crate::scene::{Scene, SceneError, Weights as FixedWeights};
+
+/// Weights of the body's bonds; of a material those of its cells.
+///
+/// # Errors
+/// Names the key of weights that do not fit the neighbourhood or that no update can carry, or what in the
+/// body cannot carry a material.
+pub fn of_body(
+    scene: &Scene,
+    body: &Body,
+    neighbours: &Neighbours,
+    cells: Option<&Cells>,
+) -> Result<Weights, SceneError> {
+    if let (Mean::Material { .. }, Some(cells), Some(elastic)) = (scene.mean, cells, &scene.material) {
+        return of_material(scene, body, neighbours, cells, elastic);
+    }
+    match &scene.weights {
+        None => Ok(Weights::Equal),
+        Some(FixedWeights::Distance { power }) => {
+            let spacing = body.lattice.spacing();
+            let weight = |j: usize, k: u32| {
+                (distance(body.reference.get(j), body.reference.get(k as usize)) / spacing).powf(*power)
+            };
+            let all = (0..body.count()).flat_map(|j| neighbours.of(j).iter().map(move |&k| weight(j, k)));
+            Ok(Weights::Scalar(all.collect()))
+        }
+        Some(FixedWeights::List(values)) => {
+            let offsets = scene.neighbourhood.offsets(&scene.lattice).unwrap_or_default();
+            interior::check_count(scene, values, &offsets)?;
+            Ok(Weights::Scalar(listed_weights(values, &offsets, body, neighbours)))
+        }
+        Some(FixedWeights::Gradient { length }) => {
+            let gradient = gradient(scene, *length)?;
+            interior::require_damped(scene, &gradient)?;
+            let weights = gradient.of_body(body, neighbours);
+            require_joined(scene, body, neighbours, &weights)?;
+            Ok(Weights::Scalar(weights))
+        }
+    }
+}
+
+fn of_material(
+    scene: &Scene,
+    body: &Body,
+    neighbours: &Neighbours,
+    cells: &Cells,
+    elastic: &Elastic,
+) -> Result<Weights, SceneError> {
+    let material = MaterialWeights::assemble(cells, body, neighbours.clone(), elastic);
+    material.map(|material| Weights::Matrix(material.weights())).map_err(|error| {
+        let (key, help) = match &error {
+            WeightsError::MissingNeighbour { .. } => (
+                "neighbours",
+                "use kind = \"cells\", or leave the neighbours out: the rule takes those that it needs",
+            ),
+            WeightsError::Mechanism(_) => ("body.shape", "use a smaller spacing or a larger shape"),
+            _ => ("material", "use constants and a lattice less far apart"),
+        };
+        scene.refuse(key, error.to_string(), help)
+    })
+}
+
+/// Weights follow the offsets; a particle that lacks a neighbour lacks its weight.
+fn listed_weights(values: &[f64], offsets: &[Vec<Site>], body: &Body, neighbours: &Neighbours) -> Vec<f64> {
+    let mut all = Vec::with_capacity(neighbours.index.len());
+    for j in 0..body.count() {
+        let mut next = neighbours.of(j).iter().map(|&k| body.sites[k as usize]).peekable();
+        for (offset, &value) in offsets[body.lattice.sublattice(body.sites[j])].iter().zip(values) {
+            let there = [body.sites[j][0] + offset[0], body.sites[j][1] + offset[1]];
+            if next.next_if_eq(&there).is_some() {
+                all.push(value);
+            }
+        }
+    }
+    all
+}
+
+/// Refuses a body that hangs together by neighbours of no weight alone: those across a gap.
+fn require_joined(
+    scene: &Scene,
+    body: &Body,
+    neighbours: &Neighbours,
+    weights: &[f64],
+) -> Result<(), SceneError> {
+    let joined = |i: usize| neighbours.bonds(i).filter(|&b| weights[b] != 0.0).map(|b| neighbours.index[b]);
+    body.require_connected(&Neighbours::from_lists((0..body.count()).map(joined))).map_err(|error| {
+        scene.refuse(
+            "body.shape",
+            error.to_string(),
+            "close the gap, or run the parts as scenes of their own",
+        )
+    })
+}

@@ -1,0 +1,215 @@
+//! The report as a person reads it.
+
+use std::fmt;
+
+use super::{Asked, Effect, Gradient, Material, MaterialReport, Waves, Weight};
+
+/// Width of the names of a table.
+const NAMES: usize = 26;
+
+impl fmt::Display for MaterialReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let counts: Vec<usize> = (0..self.diagonal.len())
+            .map(|s| self.weights.iter().filter(|weight| weight.sublattice == s).count())
+            .collect();
+        // Both sublattices of a honeycomb see as many neighbours.
+        let neighbours = counts.first().copied().unwrap_or_default();
+        let (lattice, spacing) = (self.lattice.kind, self.lattice.spacing);
+        writeln!(
+            f,
+            "{lattice} lattice, nearest sites {spacing:.6} apart, {neighbours} neighbours: {}",
+            self.rule
+        )?;
+        if let Some(asked) = &self.asked {
+            row(f, "asked for", asked)?;
+        }
+        if self.asked.is_some() || !self.is_scalar() {
+            self.blocks(f)?;
+        } else {
+            self.scalars(f)?;
+        }
+        self.material.table(f)?;
+        self.gradient.table(f)?;
+        self.waves.table(f)?;
+        self.notes.iter().try_for_each(|note| writeln!(f, "note: {note}"))
+    }
+}
+
+fn row(f: &mut fmt::Formatter<'_>, name: &str, value: impl fmt::Display) -> fmt::Result {
+    writeln!(f, "  {name:NAMES$}  {value}")
+}
+
+impl MaterialReport {
+    fn blocks(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            f,
+            "weights W = D^-1 K of each neighbour (columns, rows; vector; direction), which sum to the identity"
+        )?;
+        for (s, d) in self.diagonal.iter().enumerate() {
+            if self.diagonal.len() > 1 {
+                writeln!(f, "  sublattice {s}")?;
+            }
+            for weight in self.weights.iter().filter(|weight| weight.sublattice == s) {
+                place(f, weight)?;
+                let [[a, b], [c, d]] = weight.weight.map(|row| row.map(settled));
+                writeln!(f, "  [{a:13.9} {b:13.9}; {c:13.9} {d:13.9}]")?;
+            }
+            let [[a, b], [_, d]] = *d;
+            let b = if b.abs() < 1e-14 * a { 0.0 } else { b };
+            row(f, "D = sum of K", format_args!("[{a:.6e} {b:.6e}; {b:.6e} {d:.6e}]"))?;
+        }
+        Ok(())
+    }
+
+    fn scalars(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "weights of each neighbour (columns, rows; vector; direction), which sum to 1")?;
+        for weight in &self.weights {
+            place(f, weight)?;
+            writeln!(f, "  {:12.9}", weight.weight[0][0])?;
+        }
+        Ok(())
+    }
+}
+
+/// A number without the minus of a zero that is rounding.
+fn settled(value: f64) -> f64 {
+    if value.abs() < 1e-14 { 0.0 } else { value }
+}
+
+fn place(f: &mut fmt::Formatter<'_>, weight: &Weight) -> fmt::Result {
+    let ([i, j], [x, y]) = (weight.offset, weight.vector.map(settled));
+    write!(f, "  {i:3} {j:3}   [{x:9.5} {y:9.5}]  {:7.2} deg", settled(weight.direction))
+}
+
+impl fmt::Display for Asked {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Asked::Isotropic { young, poisson, plane, thickness } => {
+                write!(f, "E = {young}, nu = {poisson}, plane {plane}, thickness {thickness}")
+            }
+            Asked::Orthotropic { young: [along, across], poisson_12, shear, fibres, thickness } => write!(
+                f,
+                "E1 = {along}, E2 = {across}, nu12 = {poisson_12}, G = {shear}, fibres at {fibres:.4} deg, thickness {thickness}"
+            ),
+        }
+    }
+}
+
+impl Material {
+    fn table(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let unit = if self.up_to_scale {
+            "in units of the shear modulus: the rule has no force"
+        } else {
+            "force / length, whole thickness"
+        };
+        writeln!(f, "material of long waves")?;
+        let largest = self.stiffness.iter().flatten().fold(0f64, |most, c| most.max(c.abs()));
+        for (k, stiffness) in self.stiffness.iter().enumerate() {
+            // Relative to the largest, for what is left of a cancellation.
+            let [a, b, c] = stiffness.map(|c| if c.abs() < 1e-14 * largest { 0.0 } else { c });
+            let name = if k == 0 { "stiffness (xx, yy, xy)" } else { "" };
+            let unit = if k == 0 { format!("   {unit}") } else { String::new() };
+            row(f, name, format_args!("[{} {} {}]{unit}", number(a), number(b), number(c)))?;
+        }
+        if self.isotropic {
+            row(f, "isotropic", "yes")?;
+        } else if self.misfit < super::ROUNDING {
+            let words = "nu and E below are those of the nearest isotropic material";
+            row(f, "isotropic", format_args!("no, {:.3} % away; {words}", 100.0 * self.anisotropy))?;
+        } else {
+            let words = "the acoustic tensor is that of no symmetric stress; what stands here is the nearest";
+            row(f, "isotropic", format_args!("no, {:.3} % away", 100.0 * self.anisotropy))?;
+            row(f, "misfit", format_args!("{:.3} %: {words}", 100.0 * self.misfit))?;
+        }
+        self.constants(f)
+    }
+
+    fn constants(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let scale = if self.up_to_scale { " (in units of the shear modulus)" } else { "" };
+        row(f, "nu in plane stress", format_args!("{:.9}", settled(self.poisson_plane_stress)))?;
+        match self.poisson_plane_strain {
+            Some(poisson) => row(f, "nu in plane strain", format_args!("{:.9}", settled(poisson)))?,
+            None => {
+                row(f, "nu in plane strain", "none: no solid resists an equal stretch with nothing or less")?
+            }
+        }
+        let young =
+            if self.young_plane_stress.abs() < 1e-9 * self.mu.abs() { 0.0 } else { self.young_plane_stress };
+        row(f, "E in plane stress", format_args!("{}{scale}", number(young).trim_start()))?;
+        match self.young_plane_strain {
+            Some(young) => {
+                row(f, "E in plane strain", format_args!("{}{scale}", number(young).trim_start()))?
+            }
+            None => row(f, "E in plane strain", "none")?,
+        }
+        match &self.engineering {
+            Some(found) if !self.isotropic => {
+                let [along, across] = found.young.map(number);
+                let (along, across, shear) = (along.trim_start(), across.trim_start(), number(found.shear));
+                let words = format!(
+                    "E1 = {along}, E2 = {across}, nu12 = {:.9}, G = {}",
+                    found.poisson_12,
+                    shear.trim_start()
+                );
+                row(f, &format!("along {:.4} deg", found.angle), words)
+            }
+            Some(_) => Ok(()),
+            None => row(f, "engineering constants", "none: some strain costs nothing or less"),
+        }
+    }
+}
+
+/// Ten significant digits, in powers of ten where that is shorter.
+fn number(value: f64) -> String {
+    let size = value.abs();
+    if value == 0.0 || (1e-3..1e5).contains(&size) {
+        format!("{value:14.9}")
+    } else {
+        format!("{value:14.8e}")
+    }
+}
+
+impl Gradient {
+    fn table(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "gradient length squared l^2 (length^2)")?;
+        let words = match self.effect {
+            Effect::Stiffens => "positive: stiffens short waves, a second gradient",
+            Effect::Softens => "negative: softens short waves, not a second gradient",
+            Effect::Mixed => "its sign depends on the direction: no second gradient",
+        };
+        row(
+            f,
+            "waves along x",
+            format_args!("{:.9} along, {:.9} across", self.longitudinal_x, self.transverse_x),
+        )?;
+        row(f, "over all directions", format_args!("{:.9} to {:.9}; {words}", self.least, self.greatest))
+    }
+}
+
+impl Waves {
+    fn table(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "all waves")?;
+        let [x, y] = self.worst.map(settled);
+        let wave = format!("wave vector [{x:.4} {y:.4}], wavelength {:.4}", self.worst_length);
+        if self.stable {
+            row(f, "stable", "yes: every wave costs energy")?;
+            row(f, "cheapest wave", format_args!("{wave}: {:.4} of what springs would cost", self.least))?;
+        } else {
+            row(f, "stable", "NO: some wave costs nothing or gives energy; no update makes it die out")?;
+            row(f, "worst wave", format_args!("{wave}: {:.4} of what springs would cost", self.least))?;
+        }
+        if let Some(limit) = self.damping_limit {
+            let words = if limit < 1.0 - 1e-9 {
+                "an undamped one diverges"
+            } else {
+                "an undamped one is at worst marginal"
+            };
+            row(
+                f,
+                "synchronous update",
+                format_args!("damp below {limit:.6} (largest eigenvalue {:.6}): {words}", self.largest),
+            )?;
+        }
+        Ok(())
+    }
+}
