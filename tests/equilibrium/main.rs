@@ -1,0 +1,4 @@
+//! Equilibrium: every solver finds the same one.
+
+mod agreement;
+mod support;
