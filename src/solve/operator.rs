@@ -120,6 +120,11 @@ impl Operator {
         &self.follows
     }
 
+    /// The row of a follower.
+    pub fn row(&self, particle: usize) -> &Row {
+        &self.rows[self.class[particle] as usize]
+    }
+
     /// The different rows.
     pub fn rows(&self) -> &[Row] {
         &self.rows

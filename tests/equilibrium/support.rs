@@ -44,8 +44,8 @@ pub fn plate(_: [f64; 2]) -> bool {
 
 /// A round hole and a slit from the upper edge.
 pub fn holed([x, y]: [f64; 2]) -> bool {
-    let slit = (0.66..0.78).contains(&x) && y > 0.6;
-    (x - 0.36).hypot(y - 0.5) > 0.22 && !slit
+    let slit = (0.7..0.8).contains(&x) && y > 0.75;
+    (x - 0.4).hypot(y - 0.5) > 0.2 && !slit
 }
 
 /// Thin legs, held at one end, that join at the other.

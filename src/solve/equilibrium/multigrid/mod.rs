@@ -30,10 +30,11 @@ use crate::solve::field::{Field, Real, dot};
 use crate::solve::operator::{Matrix, Stencils};
 
 /// Nodes of the coarsest level: fewer are not worth another level.
-const COARSEST: usize = 400;
+const COARSEST: usize = 640;
 
-/// Entries of a factor that are no trouble to keep and to solve with, whatever the body's size.
-const SMALL_FACTOR: usize = 1 << 16;
+/// Nodes across a slender body below which it is not coarsened further: fewer could not bend. Along it
+/// the factor only grows with its length.
+const ACROSS: i32 = 5;
 
 /// Lanczos steps for the largest eigenvalue of each level, and what its estimate is raised by.
 const ESTIMATE: usize = 12;
@@ -132,8 +133,8 @@ impl<'a> Cycle<'a> {
 
     fn is_coarse_enough(&self) -> bool {
         let matrix = self.levels.last().map_or(self.matrix, |level| &level.matrix);
-        matrix.count() <= COARSEST
-            || (matrix.count() <= 64 * COARSEST && envelope::entries(matrix) <= SMALL_FACTOR)
+        let is_slender = || matrix.columns.extent().iter().any(|&nodes| nodes <= ACROSS);
+        matrix.count() <= COARSEST || (!self.levels.is_empty() && is_slender())
     }
 
     /// `v` of the finest level becomes the cycle's answer to its `f`.
