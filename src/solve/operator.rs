@@ -8,6 +8,10 @@ mod columns;
 mod connected;
 mod kernel;
 mod matrix;
+#[cfg(test)]
+pub mod samples;
+#[cfg(test)]
+mod tests;
 
 use std::collections::HashMap;
 

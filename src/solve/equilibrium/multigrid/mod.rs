@@ -16,6 +16,8 @@
 
 mod coarsen;
 mod envelope;
+#[cfg(test)]
+mod tests;
 mod transfer;
 
 use std::time::Instant;
