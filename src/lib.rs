@@ -14,6 +14,8 @@
 //! * [`continuum`]: plans a scene, steps it, and hands what happens to an observer.
 //! * `export` (feature `export`): CSV, JSON, VTK and figures, one file per format.
 //! * `fem` (feature `fem`): finite elements, the truth to hold the rules against; it knows no flock.
+//! * `compare` (feature `fem`): rule and truth on the same body, and the numbers that tell them apart.
+//! * `trade` (feature `fem`): what accuracy costs: many settings of a scene against its truth.
 //! * `bench` (feature `bench`): how fast the sweeps are, beside what the machine can do.
 //!
 //! ```
@@ -35,7 +37,11 @@ pub mod solve;
 
 #[cfg(feature = "bench")]
 pub mod bench;
+#[cfg(feature = "fem")]
+pub mod compare;
 #[cfg(feature = "export")]
 pub mod export;
 #[cfg(feature = "fem")]
 pub mod fem;
+#[cfg(feature = "fem")]
+pub mod trade;

@@ -71,10 +71,20 @@ fn material_imports_the_flock_alone() {
 
 #[test]
 fn scene_knows_nothing_of_hosts_and_outputs() {
-    assert_imports_only("scene", &["flock", "solve"]);
+    assert_imports_only("scene", &["flock", "solve", "material"]);
 }
 
 #[test]
 fn continuum_knows_nothing_of_outputs() {
-    assert_imports_only("continuum", &["flock", "solve", "scene"]);
+    assert_imports_only("continuum", &["flock", "solve", "scene", "material"]);
+}
+
+#[test]
+fn the_comparison_knows_nothing_of_outputs() {
+    assert_imports_only("compare", &["scene", "continuum", "flock", "material", "solve", "fem"]);
+}
+
+#[test]
+fn trade_stands_on_compare_and_knows_nothing_of_outputs() {
+    assert_imports_only("trade", &["scene", "continuum", "flock", "solve", "compare"]);
 }

@@ -185,7 +185,7 @@ fn any_mean() -> impl Strategy<Value = Mean> {
 
 fn neighbours(coordinate: impl Strategy<Value = f64> + Clone) -> impl Strategy<Value = Vec<Neighbour>> {
     let one = (prop::array::uniform2(coordinate), 0.0..3.0f64)
-        .prop_map(|(position, weight)| Neighbour { position, weight });
+        .prop_map(|(position, weight)| Neighbour { weight, ..Neighbour::at(position) });
     // Coincident points are as likely as not.
     (prop::collection::vec(one, 1..9), any::<bool>()).prop_map(|(mut all, coincide)| {
         if coincide {
@@ -197,7 +197,7 @@ fn neighbours(coordinate: impl Strategy<Value = f64> + Clone) -> impl Strategy<V
 }
 
 fn own(present: [f64; 2]) -> Own {
-    Own { present, reference: present, rest: [0.0; 2] }
+    Own { present, reference: present, rest: [0.0; 2], load: None }
 }
 
 proptest! {
@@ -258,7 +258,7 @@ proptest! {
             poisson: Some(Poisson { k, pull: Axis::X, centre: 0.0, half_width: 2.0, exponent }),
             feedback: Some(Feedback { factor, reference: FeedbackReference::Initial }),
         };
-        let target = rule.target(&Own { present, reference: [0.0, 1.0], rest: [0.1, 0.0] }, seen.iter().copied());
+        let target = rule.target(&Own { present, reference: [0.0, 1.0], rest: [0.1, 0.0], load: None }, seen.iter().copied());
         prop_assert!(!target[0].is_nan() && !target[1].is_nan(), "{rule:?}: {target:?}");
     }
 

@@ -275,7 +275,7 @@ fn the_liquid_drop_stays_in_one_piece_and_rounds_itself() {
 #[test]
 fn a_plan_counts_what_it_says() {
     let scene = scene("tension", &[]);
-    let report = PlanReport::new(&scene, &Plan::new(&scene).expect("plans")).to_string();
+    let report = PlanReport::new(&scene, &Plan::new(&scene).expect("plans")).expect("plans").to_string();
     for words in
         ["144 (80 follower, 10 leader, 10 clamped, 44 frame)", "lagged frame of 44 points", "401 steps"]
     {

@@ -12,7 +12,7 @@ use rayon::{ThreadPoolBuildError, ThreadPoolBuilder};
 use serde::Serialize;
 
 use super::machine::{Bandwidth, median, time_triad};
-use crate::flock::interaction::Interaction;
+use crate::flock::interaction::{Interaction, Weights};
 use crate::flock::lattice::{Lattice, LatticeKind};
 use crate::flock::neighbourhood::{Neighbourhood, Neighbours};
 use crate::flock::points::Points;
@@ -164,7 +164,8 @@ impl SquareLattice {
             rule: Rule::BARYCENTRE,
             reference: reference.into(),
             neighbours,
-            weights: None,
+            weights: Weights::Equal,
+            forces: None,
             rest: None,
             bonds: None,
         };

@@ -1,10 +1,14 @@
 //! The command line: what can be asked for, and who answers.
 
+#[cfg(feature = "fem")]
+mod compare;
 mod progress;
 mod run;
+#[cfg(feature = "fem")]
+mod trade;
 
 use std::io::IsTerminal;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Args, CommandFactory, Parser, Subcommand};
@@ -42,6 +46,18 @@ pub enum Command {
         after_help = "Example:\n  flockform run tension --out /tmp/tension --set stop.steps=800 --set frame=immediate"
     )]
     Run(run::RunArguments),
+    /// Hold a scene's rule against finite elements on the same body
+    #[cfg(feature = "fem")]
+    #[command(
+        after_help = "Example:\n  flockform compare beam --out /tmp/beam\n  flockform compare beam-paper --set neighbours.kind=second"
+    )]
+    Compare(compare::CompareArguments),
+    /// What accuracy costs: run a scene by many rules, spacings and solvers against finite elements
+    #[cfg(feature = "fem")]
+    #[command(
+        after_help = "Example:\n  flockform trade grips --out /tmp/trade\n  flockform trade beam-loaded --most-particles 5000"
+    )]
+    Trade(trade::TradeArguments),
     /// List the bundled scenes
     #[command(after_help = "Example:\n  flockform scenes")]
     Scenes,
@@ -101,10 +117,19 @@ pub struct SceneArguments {
 
 impl SceneArguments {
     fn load(&self, more: impl IntoIterator<Item = String>) -> Result<Scene, Refusal> {
-        let overrides: Vec<String> = self.set.iter().cloned().chain(more).collect();
+        let more: Vec<String> = more.into_iter().collect();
+        if bundled(&self.scene).is_none() {
+            self.path()?;
+        }
+        Ok(self.load_scene(&more)?)
+    }
+
+    /// The scene with these overrides after the user's own.
+    fn load_scene(&self, more: &[String]) -> Result<Scene, SceneError> {
+        let overrides = [&self.set, more].concat();
         match bundled(&self.scene) {
-            Some(bundled) => Ok(bundled.load(&overrides)?),
-            None => Ok(Scene::from_file(&self.path()?, &overrides)?),
+            Some(bundled) => bundled.load(&overrides),
+            None => Scene::from_file(Path::new(&self.scene), &overrides),
         }
     }
 
@@ -153,10 +178,14 @@ pub fn start_log(verbose: u8) {
 pub fn dispatch(command: Command) -> Result<ExitCode, Refusal> {
     match command {
         Command::Run(arguments) => return run::run(&arguments),
+        #[cfg(feature = "fem")]
+        Command::Compare(arguments) => return compare::compare(&arguments),
+        #[cfg(feature = "fem")]
+        Command::Trade(arguments) => return trade::trade(&arguments),
         Command::Scenes => list_scenes()?,
         Command::Plan(arguments) => {
             let scene = arguments.load([])?;
-            print(&PlanReport::new(&scene, &Plan::new(&scene)?).to_string());
+            print(&PlanReport::new(&scene, &plan(&scene)?)?.to_string());
         }
         Command::Schema => print(&format!("{:#}\n", scene::validate::schema())),
         Command::Completions { shell } => {
@@ -175,6 +204,14 @@ pub fn dispatch(command: Command) -> Result<ExitCode, Refusal> {
         }
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// The plan of a scene, with the truth that its leaders may be led by.
+fn plan(scene: &Scene) -> Result<Plan, SceneError> {
+    #[cfg(feature = "fem")]
+    return flockform::compare::run::plan(scene);
+    #[cfg(not(feature = "fem"))]
+    Plan::new(scene)
 }
 
 fn list_scenes() -> Result<(), SceneError> {

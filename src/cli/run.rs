@@ -9,14 +9,15 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use flockform::continuum::engine::Engine;
+use flockform::continuum::equilibrium::come_to_rest;
 use flockform::continuum::plan::Plan;
 use flockform::continuum::record::{ProbeSeries, Snapshot};
-use flockform::continuum::run::{Outcome, StopReason, run as run_plan};
+use flockform::continuum::run::{Outcome, StopReason};
 use flockform::export::{ExportError, OutputFolder, Results, Timings, VtkSeries, write_all};
 use flockform::scene::Scene;
 
 use super::progress::Progress;
-use super::{FAILED, Refusal, SceneArguments, print};
+use super::{FAILED, Refusal, SceneArguments, plan, print};
 
 #[derive(Debug, Args)]
 pub struct RunArguments {
@@ -49,7 +50,7 @@ pub fn run(arguments: &RunArguments) -> Result<ExitCode, Refusal> {
 fn run_here(arguments: &RunArguments) -> Result<ExitCode, Refusal> {
     let start = Instant::now();
     let scene = arguments.scene.load(arguments.steps.map(|steps| format!("stop.steps={steps}")))?;
-    let plan = Plan::new(&scene)?;
+    let plan = plan(&scene)?;
     let out = arguments.out.clone().unwrap_or_else(|| free_folder(&scene.name));
     let folder = OutputFolder::create(&out, arguments.force)?;
     let setup = start.elapsed();
@@ -59,12 +60,12 @@ fn run_here(arguments: &RunArguments) -> Result<ExitCode, Refusal> {
     let mut progress = Progress::new(arguments.quiet, scene.stop.steps);
     let interrupted = interrupt_flag();
     let stepping = Instant::now();
-    let outcome = run_plan(plan, &mut |engine, residual| {
+    let outcome = come_to_rest(&scene, plan, &mut |engine, residual| {
         recorder.step(engine);
         progress.step(engine.step(), residual);
         let stop = recorder.failed() || interrupted.load(Ordering::Relaxed);
         if stop { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-    });
+    })?;
     progress.finish();
 
     let elapsed = stepping.elapsed();
@@ -81,7 +82,7 @@ fn run_here(arguments: &RunArguments) -> Result<ExitCode, Refusal> {
 }
 
 /// The first of out/NAME, out/NAME-2, ... that is not taken.
-fn free_folder(name: &str) -> PathBuf {
+pub fn free_folder(name: &str) -> PathBuf {
     let taken = |path: &Path| path.read_dir().is_ok_and(|mut entries| entries.next().is_some());
     let numbered = (2..).map(|n| PathBuf::from(format!("out/{name}-{n}")));
     std::iter::once(PathBuf::from(format!("out/{name}")))
@@ -91,7 +92,7 @@ fn free_folder(name: &str) -> PathBuf {
 }
 
 /// Set by Ctrl-C and by SIGTERM; the run then stops at the next step.
-fn interrupt_flag() -> Arc<AtomicBool> {
+pub fn interrupt_flag() -> Arc<AtomicBool> {
     let flag = Arc::new(AtomicBool::new(false));
     let raised = Arc::clone(&flag);
     if let Err(error) = ctrlc::set_handler(move || raised.store(true, Ordering::Relaxed)) {
@@ -119,10 +120,12 @@ struct Records {
 
 impl<'a> Recorder<'a> {
     fn new(scene: &'a Scene, plan: &Plan, folder: &OutputFolder) -> Result<Self, ExportError> {
+        // A body that is not stepped has no history.
+        let probed: &[usize] = if scene.raw.equilibrium.is_some() { &[] } else { &plan.probes };
         Ok(Self {
             scene,
             snapshots: Vec::new(),
-            probes: plan.probes.iter().map(|&particle| ProbeSeries::new(particle)).collect(),
+            probes: probed.iter().map(|&particle| ProbeSeries::new(particle)).collect(),
             frames: (scene.record.vtk_every > 0).then(|| VtkSeries::create(folder)).transpose()?,
             failure: None,
             writing: Duration::ZERO,
@@ -174,6 +177,7 @@ fn closing_words(scene: &Scene, outcome: &Outcome, elapsed: Duration, kept: &Pat
     let engine = &outcome.engine;
     let how = match &outcome.reason {
         StopReason::Equilibrium => "in equilibrium".to_owned(),
+        StopReason::Unsettled => "the solver ended short of its tolerance".to_owned(),
         StopReason::Steps => "all steps done".to_owned(),
         StopReason::Interrupted => "interrupted: what there was is written".to_owned(),
         StopReason::Diverged(divergence) => format!("{divergence}; the last good state is written"),
@@ -185,6 +189,18 @@ fn closing_words(scene: &Scene, outcome: &Outcome, elapsed: Duration, kept: &Pat
         outcome.residual,
         elapsed.as_secs_f64()
     );
+    if let Some(solved) = &outcome.solved {
+        let phases: Vec<String> =
+            solved.phases.iter().map(|(name, time)| format!("{name} {:.3} s", time.as_secs_f64())).collect();
+        words += &format!(
+            "{}, {}: {} iterations to a residual force of {:.1e} of the load, {}\n",
+            solved.solver,
+            solved.why,
+            solved.iterations,
+            solved.residuals.last().copied().unwrap_or_default(),
+            phases.join(", ")
+        );
+    }
     let broken: Vec<_> = engine.breaks().iter().filter(|b| b.step > 0).collect();
     if let (Some(first), Some(last)) = (broken.first(), broken.last()) {
         words += &format!(
@@ -201,9 +217,9 @@ fn closing_words(scene: &Scene, outcome: &Outcome, elapsed: Duration, kept: &Pat
     words + &format!("results in {}\n", kept.display())
 }
 
-fn exit_code(outcome: &Outcome) -> ExitCode {
+pub fn exit_code(outcome: &Outcome) -> ExitCode {
     match outcome.reason {
         StopReason::Equilibrium | StopReason::Steps => ExitCode::SUCCESS,
-        StopReason::Interrupted | StopReason::Diverged(_) => ExitCode::from(FAILED),
+        StopReason::Unsettled | StopReason::Interrupted | StopReason::Diverged(_) => ExitCode::from(FAILED),
     }
 }

@@ -1,7 +1,8 @@
 //! The engine: one step of a planned body.
 
+use super::layout::RoleChange;
 use super::movement::Movement;
-use super::plan::{Plan, RoleChange};
+use super::plan::Plan;
 use crate::flock::body::Body;
 use crate::flock::fracture::Break;
 use crate::flock::grid::CellGrid;
@@ -144,6 +145,20 @@ impl Engine {
         self.move_leaders();
         self.sweep.step(&self.interaction, self.body.frame.as_ref(), &self.present, &mut self.previous);
         std::mem::swap(&mut self.present, &mut self.previous);
+    }
+
+    /// Puts the body where everybody is displaced by `displacement` \[length\], shape \[count\], as if it had
+    /// come to rest there by `step`; frame points copy whom they serve.
+    pub fn settle(&mut self, step: usize, displacement: &Points) {
+        self.step = step;
+        let reference = &self.body.reference;
+        let place = |(here, by): ([f64; 2], [f64; 2])| [here[0] + by[0], here[1] + by[1]];
+        self.present = reference.iter().zip(displacement.iter()).map(place).collect();
+        if let Some(frame) = &self.body.frame {
+            let seen = self.present.clone();
+            frame.follow(reference, &seen, &mut self.present);
+        }
+        self.previous.clone_from(&self.present);
     }
 
     /// Takes the last step back: positions as before it. Bonds that broke in it stay broken.

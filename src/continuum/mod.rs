@@ -3,8 +3,11 @@
 //! [`plan::Plan`] lays the scene out as arrays and index lists and says what it makes the program
 //! model; [`engine::Engine`] steps them; [`run::run`] is the loop around it, and whoever wants to see
 //! the body on the way (a recorder, a progress bar, an interrupt) gives it a closure to call.
+//! [`layout`] is the body before anybody moves; [`equilibrium`] goes straight to rest instead of stepping.
 
 pub mod engine;
+pub mod equilibrium;
+pub mod layout;
 pub mod movement;
 pub mod plan;
 pub mod record;

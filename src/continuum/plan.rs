@@ -1,16 +1,19 @@
 //! From a scene to the arrays that an engine steps, with the checks that need the body.
 
-use crate::flock::body::{Body, BodyError};
+use super::layout::{Layout, RoleChange, Truth};
+use crate::flock::body::Body;
 use crate::flock::fracture::{Bonds, Break, Ghosts};
-use crate::flock::interaction::Interaction;
+use crate::flock::interaction::{Interaction, Weights};
 use crate::flock::lattice::Site;
-use crate::flock::motion::Motion;
 use crate::flock::neighbourhood::{Neighbourhood, Neighbours};
-use crate::flock::points::distance;
-use crate::flock::region::{Region, Side};
+use crate::flock::points::{Points, distance};
 use crate::flock::role::Role;
-use crate::flock::rules::{Axis, Poisson, Rule};
-use crate::scene::{Condition, LeaderMotion, RoleEntry, Scene, SceneError, SceneRegion, Stop, Weights};
+use crate::flock::rules::{Axis, Mean, Poisson, Rule};
+use crate::material::cells::Cells;
+use crate::material::elastic::Elastic;
+use crate::material::mechanism::require_held;
+use crate::material::weights::{MaterialWeights, WeightsError};
+use crate::scene::{Scene, SceneError, Stop, Weights as FixedWeights};
 use crate::solve::sweep::Update;
 
 /// Everything an engine needs; nothing of it refers to the scene file.
@@ -32,28 +35,40 @@ pub struct Plan {
     pub diagonal: f64,
     /// Indices of the particles kept at every step.
     pub probes: Vec<usize>,
-}
-
-/// A role that some particles take.
-#[derive(Clone, Debug)]
-pub struct RoleChange {
-    pub particles: Vec<usize>,
-    pub role: Role,
-    /// First step at which it holds.
-    pub from: usize,
-    pub when: Option<Condition>,
-    pub motion: Option<Motion>,
+    /// Between the particles, where the scene has a material.
+    pub cells: Option<Cells>,
 }
 
 impl Plan {
     /// # Errors
     /// Names the key of the scene that cannot be laid out: an empty or disconnected body, a region
-    /// without particles, a neighbourhood that does not fit the lattice, an id that does not exist.
+    /// without particles, a neighbourhood that does not fit the lattice, an id that does not exist, a
+    /// material that the cells cannot carry. Leaders led by the truth need [`Plan::with_truth`].
     pub fn new(scene: &Scene) -> Result<Self, SceneError> {
-        let (body, neighbours) = build_body(scene)?;
-        let changes = role_changes(scene, &body, &neighbours)?;
-        let weights = weights(scene, &body, &neighbours)?;
-        let interaction = interaction(scene, &body, neighbours, weights);
+        if let Some(k) = scene.truth_led() {
+            let help = "build with the feature `fem`, or give the leaders a motion of their own";
+            let message = "the truth is not known: it takes finite elements to compute";
+            return Err(scene.refuse(&format!("roles[{k}].motion"), message, help));
+        }
+        Self::lay_out(scene, None)
+    }
+
+    /// Like [`Plan::new`], with leaders led by the truth where the scene has such.
+    ///
+    /// # Errors
+    /// As [`Plan::new`].
+    pub fn with_truth(scene: &Scene, truth: Truth<'_>) -> Result<Self, SceneError> {
+        Self::lay_out(scene, Some(truth))
+    }
+
+    fn lay_out(scene: &Scene, truth: Option<Truth<'_>>) -> Result<Self, SceneError> {
+        let layout = Layout::new(scene)?;
+        let changes = layout.role_changes(scene, truth)?;
+        let forces = layout.forces(scene)?;
+        require_carried(scene, &layout, &changes, forces.as_ref())?;
+        let Layout { body, neighbours, cells } = layout;
+        let weights = weights(scene, &body, &neighbours, cells.as_ref())?;
+        let interaction = interaction(scene, &body, neighbours, weights, forces);
         let probes = probes(scene, &body)?;
         let roles = body.is_frame.iter().map(|&f| if f { Role::Frame } else { Role::Follower }).collect();
         let (low, high) = body.bounds();
@@ -70,6 +85,7 @@ impl Plan {
             // A body of one particle has no extent; its spacing stands in.
             diagonal: distance(low, high).max(body.lattice.spacing()),
             probes,
+            cells,
             body,
             interaction,
         };
@@ -100,30 +116,41 @@ impl Plan {
     }
 }
 
-fn build_body(scene: &Scene) -> Result<(Body, Neighbours), SceneError> {
-    let (body, neighbours) =
-        Body::build(scene.lattice.clone(), &scene.cut, &scene.neighbourhood, scene.frame).map_err(
-            |error| {
-                let (key, help) = match &error {
-                    BodyError::Neighbourhood(_) => {
-                        ("neighbours", "choose a neighbourhood that the lattice has")
-                    }
-                    BodyError::TooLarge { .. } => ("body.shape", "use a wider spacing or a smaller shape"),
-                    _ => ("body.shape", "use a smaller spacing or a larger shape"),
-                };
-                scene.refuse(key, error.to_string(), help)
-            },
-        )?;
-    if !matches!(scene.neighbourhood, Neighbourhood::Present { .. }) {
-        body.require_connected(&neighbours).map_err(|error| {
-            let help = "close the gap, use a wider neighbourhood, or run the parts as scenes of their own";
-            scene.refuse("body.shape", error.to_string(), help)
-        })?;
+/// A load on a follower needs a rule with a stiffness, and a body that cannot get away.
+fn require_carried(
+    scene: &Scene,
+    layout: &Layout,
+    changes: &[RoleChange],
+    forces: Option<&Points>,
+) -> Result<(), SceneError> {
+    let (Some(cells), Some(forces)) = (&layout.cells, forces) else { return Ok(()) };
+    let mut leads = vec![false; layout.body.count()];
+    for change in changes.iter().filter(|change| change.from <= 1 && change.when.is_none()) {
+        let is_led = matches!(change.role, Role::Leader | Role::Clamped);
+        change.particles.iter().for_each(|&i| leads[i] = is_led);
     }
-    Ok((body, neighbours))
+    if !matches!(scene.mean, Mean::Material { .. }) {
+        let Some(i) = (0..leads.len()).find(|&i| !leads[i] && forces.get(i) != [0.0; 2]) else {
+            return Ok(());
+        };
+        let message = format!("particle {} follows by a rule without a stiffness: no load moves it", i + 1);
+        let help =
+            "use rule.mean.kind = \"material\", or load leaders alone (which steers the truth they follow)";
+        return Err(scene.refuse("loads", message, help));
+    }
+    let incidence = cells.incidence(layout.body.count());
+    require_held(cells, &incidence, &layout.body.reference, &leads).map_err(|mechanism| {
+        scene.refuse("roles", mechanism.to_string(), "clamp or lead at least two particles of every part")
+    })
 }
 
-fn interaction(scene: &Scene, body: &Body, neighbours: Neighbours, weights: Option<Vec<f64>>) -> Interaction {
+fn interaction(
+    scene: &Scene,
+    body: &Body,
+    neighbours: Neighbours,
+    weights: Weights,
+    forces: Option<Points>,
+) -> Interaction {
     let (low, high) = body.bounds();
     let poisson = scene.poisson.map(|term| {
         let across = match term.pull {
@@ -152,6 +179,7 @@ fn interaction(scene: &Scene, body: &Body, neighbours: Neighbours, weights: Opti
         reference: body.reference.clone(),
         neighbours,
         weights,
+        forces,
         rest: None,
         bonds,
     };
@@ -161,18 +189,26 @@ fn interaction(scene: &Scene, body: &Body, neighbours: Neighbours, weights: Opti
     interaction
 }
 
-fn weights(scene: &Scene, body: &Body, neighbours: &Neighbours) -> Result<Option<Vec<f64>>, SceneError> {
+fn weights(
+    scene: &Scene,
+    body: &Body,
+    neighbours: &Neighbours,
+    cells: Option<&Cells>,
+) -> Result<Weights, SceneError> {
+    if let (Mean::Material { .. }, Some(cells), Some(elastic)) = (scene.mean, cells, &scene.material) {
+        return material_weights(scene, body, neighbours, cells, elastic);
+    }
     match &scene.weights {
-        None => Ok(None),
-        Some(Weights::Distance { power }) => {
+        None => Ok(Weights::Equal),
+        Some(FixedWeights::Distance { power }) => {
             let spacing = body.lattice.spacing();
             let weight = |j: usize, k: u32| {
                 (distance(body.reference.get(j), body.reference.get(k as usize)) / spacing).powf(*power)
             };
             let all = (0..body.count()).flat_map(|j| neighbours.of(j).iter().map(move |&k| weight(j, k)));
-            Ok(Some(all.collect()))
+            Ok(Weights::Scalar(all.collect()))
         }
-        Some(Weights::List(values)) => {
+        Some(FixedWeights::List(values)) => {
             let offsets = scene.neighbourhood.offsets(&scene.lattice).unwrap_or_default();
             let size = offsets.first().map_or(0, Vec::len);
             if size != values.len() {
@@ -180,9 +216,30 @@ fn weights(scene: &Scene, body: &Body, neighbours: &Neighbours) -> Result<Option
                 let help = "give one weight for each neighbour, in the neighbourhood's order";
                 return Err(scene.refuse("rule.weights.values", message, help));
             }
-            Ok(Some(listed_weights(values, &offsets, body, neighbours)))
+            Ok(Weights::Scalar(listed_weights(values, &offsets, body, neighbours)))
         }
     }
+}
+
+fn material_weights(
+    scene: &Scene,
+    body: &Body,
+    neighbours: &Neighbours,
+    cells: &Cells,
+    elastic: &Elastic,
+) -> Result<Weights, SceneError> {
+    let material = MaterialWeights::assemble(cells, body, neighbours.clone(), elastic);
+    material.map(|material| Weights::Matrix(material.weights())).map_err(|error| {
+        let (key, help) = match &error {
+            WeightsError::MissingNeighbour { .. } => (
+                "neighbours",
+                "use kind = \"cells\", or leave the neighbours out: the rule takes those that it needs",
+            ),
+            WeightsError::Mechanism(_) => ("body.shape", "use a smaller spacing or a larger shape"),
+            _ => ("material", "use constants and a lattice less far apart"),
+        };
+        scene.refuse(key, error.to_string(), help)
+    })
 }
 
 /// Weights follow the offsets; a particle that lacks a neighbour lacks its weight.
@@ -198,87 +255,6 @@ fn listed_weights(values: &[f64], offsets: &[Vec<Site>], body: &Body, neighbours
         }
     }
     all
-}
-
-fn role_changes(scene: &Scene, body: &Body, neighbours: &Neighbours) -> Result<Vec<RoleChange>, SceneError> {
-    let mut changes = Vec::new();
-    for (k, entry) in scene.roles.iter().enumerate() {
-        let key = format!("roles[{k}].region");
-        check_ids(scene, &key, &entry.region, body)?;
-        let particles = region(&entry.region, body).pick(body, neighbours);
-        if particles.is_empty() {
-            let (low, high) = body.bounds();
-            let message = format!(
-                "no particle of the body lies in this region; the body spans [{}, {}] to [{}, {}]",
-                low[0], low[1], high[0], high[1]
-            );
-            return Err(scene.refuse(&key, message, "move or widen the region"));
-        }
-        let motion = motion(scene, k, entry, &particles, body)?;
-        changes.push(RoleChange { particles, role: entry.role, from: entry.from, when: entry.when, motion });
-    }
-    Ok(changes)
-}
-
-fn check_ids(scene: &Scene, key: &str, region: &SceneRegion, body: &Body) -> Result<(), SceneError> {
-    let SceneRegion::Known(Region::Ids(ids)) = region else { return Ok(()) };
-    for (n, &id) in ids.iter().enumerate() {
-        let message = match body.is_frame.get(id.wrapping_sub(1)) {
-            Some(false) => continue,
-            Some(true) => format!("particle {id} belongs to the frame, whose role is fixed"),
-            None => format!("there is no particle {id}: ids run from 1 to {}", body.count()),
-        };
-        return Err(scene.refuse(
-            &format!("{key}.ids[{n}]"),
-            message,
-            "`flockform plan` prints the numbering",
-        ));
-    }
-    Ok(())
-}
-
-fn region(region: &SceneRegion, body: &Body) -> Region {
-    match region {
-        SceneRegion::Known(region) => region.clone(),
-        SceneRegion::Outermost(side) => Region::Edge { side: *side, depth: outermost_depth(*side, body) },
-    }
-}
-
-/// Deep enough for a staggered edge: less than one period of the lattice's rows across the side.
-fn outermost_depth(side: Side, body: &Body) -> f64 {
-    let k = usize::from(matches!(side, Side::Bottom | Side::Top));
-    let steps =
-        body.lattice.first_neighbours(0).into_iter().map(|offset| body.lattice.vector(offset)[k].abs());
-    let spacing = body.lattice.spacing();
-    let shortest = steps.clone().filter(|&step| step > 1e-6 * spacing).fold(f64::INFINITY, f64::min);
-    let longest = steps.fold(0.0, f64::max);
-    // Rows that are staggered by part of a period count as one edge.
-    if longest > 1.5 * shortest { 0.75 * longest } else { shortest / 2.0 }
-}
-
-fn motion(
-    scene: &Scene,
-    entry_number: usize,
-    entry: &RoleEntry,
-    particles: &[usize],
-    body: &Body,
-) -> Result<Option<Motion>, SceneError> {
-    match &entry.motion {
-        None => Ok(None),
-        Some(LeaderMotion::Program(motion)) => Ok(Some(motion.clone())),
-        Some(LeaderMotion::Table { rows, steps }) => {
-            let displacements =
-                rows.of(particles, &body.reference, body.lattice.spacing()).map_err(|message| {
-                    let key = format!("roles[{entry_number}].motion.file");
-                    scene.refuse(
-                        &key,
-                        message,
-                        "give every particle of the region a row, or narrow the region",
-                    )
-                })?;
-            Ok(Some(Motion::Table { displacements, steps: *steps as f64 }))
-        }
-    }
 }
 
 fn probes(scene: &Scene, body: &Body) -> Result<Vec<usize>, SceneError> {

@@ -2,11 +2,13 @@
 
 use std::fmt;
 
+use super::equilibrium::foresee;
 use super::plan::Plan;
 use crate::flock::fracture::Threshold;
+use crate::flock::interaction::Weights;
 use crate::flock::role::Role;
-use crate::flock::rules::{FeedbackReference, Mean};
-use crate::scene::Scene;
+use crate::flock::rules::{FeedbackReference, Mean, Rotation};
+use crate::scene::{Scene, SceneError};
 use crate::solve::sweep::{Order, Sweep};
 
 /// A plan in words and numbers.
@@ -23,16 +25,18 @@ pub struct PlanReport {
 }
 
 impl PlanReport {
-    pub fn new(scene: &Scene, plan: &Plan) -> Self {
+    /// # Errors
+    /// Names what keeps the scene from having the equilibrium it asks for.
+    pub fn new(scene: &Scene, plan: &Plan) -> Result<Self, SceneError> {
         let mut report = Self {
             title: format!("{}: {}", scene.name, scene.raw.title),
-            facts: facts(scene, plan),
+            facts: facts(scene, plan)?,
             modelled: Vec::new(),
             left_out: Vec::new(),
             cautions: cautions(scene, plan),
         };
         report.capabilities(scene, plan);
-        report
+        Ok(report)
     }
 
     fn capabilities(&mut self, scene: &Scene, plan: &Plan) {
@@ -43,18 +47,34 @@ impl PlanReport {
             Mean::Power { exponent: 0.0, .. } => "geometric mean".to_owned(),
             Mean::Power { exponent, .. } => format!("power mean with exponent {exponent}"),
             Mean::Spaced { spacing, .. } => format!("cohesion with separation at {spacing}"),
+            Mean::Material { rotation: Rotation::Small } => "material (small rotations)".to_owned(),
+            Mean::Material { rotation: Rotation::Corotated } => "material (corotated)".to_owned(),
         };
         self.models(mean, "rule.mean");
+        let forces = plan.interaction.forces.as_ref().map(|_| format!("{} loads", scene.loads.len()));
+        self.models_or_not(forces, "loads", "nothing pushes the body but its leaders");
         let frame = scene.frame.map(|frame| {
             let points = plan.body.frame.as_ref().map_or(0, |frame| frame.len());
             format!("{} frame of {points} points", frame.name())
         });
-        self.models_or_not(frame, "frame", "edge particles have fewer neighbours");
+        let free = match rule.mean {
+            Mean::Material { .. } => "missing cells are the free edge",
+            _ => "edge particles have fewer neighbours",
+        };
+        self.models_or_not(frame, "frame", free);
         let rest =
             plan.interaction.rest.as_ref().map(|_| "rest offsets for unbalanced neighbourhoods".to_owned());
         self.models_or_not(rest, "rule.rest", "every neighbourhood is balanced, or rule.rest is \"literal\"");
-        let weights = plan.interaction.weights.as_ref().map(|_| "fixed weights".to_owned());
-        self.models_or_not(weights, "rule.weights", "all neighbours count the same");
+        let weights = match &plan.interaction.weights {
+            Weights::Equal => None,
+            Weights::Scalar(_) => Some("fixed weights".to_owned()),
+            Weights::Matrix(weights) => Some(format!(
+                "2x2 weights from the material, {} kinds of neighbourhood",
+                weights.compliance.len()
+            )),
+        };
+        let key = if scene.material.is_some() { "material" } else { "rule.weights" };
+        self.models_or_not(weights, key, "all neighbours count the same");
         let poisson = rule.poisson.map(|p| format!("Poisson term (Eq. 2), K = {}", p.k));
         self.models_or_not(poisson, "rule.poisson", "x and y do not act on each other");
         let feedback = rule.feedback.map(|f| format!("feedback (Eq. 4), fd = {}", f.factor));
@@ -84,7 +104,7 @@ impl PlanReport {
     }
 }
 
-fn facts(scene: &Scene, plan: &Plan) -> Vec<(String, String)> {
+fn facts(scene: &Scene, plan: &Plan) -> Result<Vec<(String, String)>, SceneError> {
     let of = |role: Role| plan.roles.iter().filter(|&&r| r == role).count();
     let roles: Vec<String> = Role::ALL
         .iter()
@@ -96,11 +116,15 @@ fn facts(scene: &Scene, plan: &Plan) -> Vec<(String, String)> {
         Order::Synchronous => "synchronous",
         Order::Sequential => "sequential",
     };
-    let stop = match plan.stop.tolerance {
-        Some(tolerance) => {
+    let stop = match (&scene.raw.equilibrium, plan.stop.tolerance) {
+        (Some(asked), _) => {
+            let (solver, why) = foresee(scene, asked, plan)?;
+            format!("in the equilibrium of step {}, found by {solver}: {why}", plan.stop.steps)
+        }
+        (None, Some(tolerance)) => {
             format!("at residual {tolerance:e}, at the latest after {} steps", plan.stop.steps)
         }
-        None => format!("after {} steps", plan.stop.steps),
+        (None, None) => format!("after {} steps", plan.stop.steps),
     };
     let bonds = neighbour_entries(plan);
     let unit = scene.unit();
@@ -109,7 +133,7 @@ fn facts(scene: &Scene, plan: &Plan) -> Vec<(String, String)> {
         plan.body.lattice.name(),
         plan.body.lattice.spacing()
     );
-    [
+    let facts = [
         ("particles", format!("{} ({})", plan.count(), roles.join(", "))),
         ("lattice", lattice),
         ("neighbour entries", format!("{bonds} ({:.2} a particle)", bonds as f64 / plan.count() as f64)),
@@ -118,8 +142,8 @@ fn facts(scene: &Scene, plan: &Plan) -> Vec<(String, String)> {
         ("memory", format!("about {}", readable_bytes(memory(plan)))),
         ("stops", stop),
     ]
-    .map(|(name, value)| (name.to_owned(), value))
-    .to_vec()
+    .map(|(name, value)| (name.to_owned(), value));
+    Ok(facts.to_vec())
 }
 
 fn cautions(scene: &Scene, plan: &Plan) -> Vec<String> {
@@ -168,7 +192,12 @@ fn memory(plan: &Plan) -> usize {
     let present = |is: bool, bytes: usize| if is { bytes } else { 0 };
     count * (3 * 16 + 3 + 8 + 4)
         + bonds * 4
-        + present(plan.interaction.weights.is_some(), 8 * bonds)
+        + match &plan.interaction.weights {
+            Weights::Equal => 0,
+            Weights::Scalar(weights) => 8 * weights.len(),
+            Weights::Matrix(weights) => 4 * count + 32 * weights.blocks.len(),
+        }
+        + present(plan.interaction.forces.is_some(), 16 * count)
         + present(plan.interaction.rest.is_some(), 16 * count)
         + present(plan.interaction.bonds.is_some(), bonds)
         + present(plan.present_radius.is_some(), 8 * count)

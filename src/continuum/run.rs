@@ -5,15 +5,19 @@ use std::ops::ControlFlow;
 use super::engine::Engine;
 use super::movement::{Movement, farthest, first_lost};
 use super::plan::Plan;
+use crate::flock::interaction::Weights;
 use crate::flock::points::distance;
 use crate::flock::rules::{FeedbackReference, Mean};
+use crate::solve::equilibrium::Solved;
 use crate::solve::sweep::Order;
 
 /// Why a run ended.
 #[derive(Clone, Debug, PartialEq)]
 pub enum StopReason {
-    /// Nothing moved farther in a step than the tolerance.
+    /// Nothing moved farther in a step than the tolerance, or the solver reached its own.
     Equilibrium,
+    /// The solver ended short of its tolerance.
+    Unsettled,
     /// The scene's number of steps was reached.
     Steps,
     /// Whoever watched asked for it.
@@ -25,6 +29,7 @@ impl StopReason {
     pub fn name(&self) -> &'static str {
         match self {
             StopReason::Equilibrium => "equilibrium",
+            StopReason::Unsettled => "unsettled",
             StopReason::Steps => "steps",
             StopReason::Interrupted => "interrupted",
             StopReason::Diverged(_) => "diverged",
@@ -60,6 +65,8 @@ pub struct Outcome {
     pub reason: StopReason,
     /// Largest one-step motion over the spacing, at the last step.
     pub residual: f64,
+    /// How the equilibrium was found, unless it was stepped to.
+    pub solved: Option<Solved>,
 }
 
 /// Runs a plan to its end. `watch` sees the engine before the first step (with an infinite residual)
@@ -90,7 +97,7 @@ pub fn run(plan: Plan, watch: &mut dyn FnMut(&Engine, f64) -> ControlFlow<()>) -
             break StopReason::Equilibrium;
         }
     };
-    Outcome { engine, reason, residual }
+    Outcome { engine, reason, residual, solved: None }
 }
 
 fn divergence(engine: &Engine, movement: &Movement, bound: f64) -> Option<Divergence> {
@@ -126,10 +133,15 @@ fn likely_cause(engine: &Engine) -> String {
     if let Some(poisson) = rule.poisson {
         return format!("the Poisson term adds K = {} at every step; use a smaller K", poisson.k);
     }
+    if matches!(rule.mean, Mean::Material { .. }) && engine.update().order == Order::Synchronous {
+        return format!(
+            "a material swept synchronously with damping = {damping} lets its shortest waves grow; leave update.damping out"
+        );
+    }
     if matches!(rule.mean, Mean::Distance { .. }) && engine.update().order == Order::Synchronous {
         return "weights that grow with distance are marginal in a synchronous update; use update.order = \"sequential\" or update.damping = 0.5".into();
     }
-    if engine.interaction().weights.is_some() {
+    if matches!(engine.interaction().weights, Weights::Scalar(_)) {
         return "weights of both signs; give weights that are not negative".into();
     }
     "a leader leaves the body behind; check the leaders' motions, or raise stop.growth".into()

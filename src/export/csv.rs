@@ -1,5 +1,5 @@
 //! Tables: `final.csv`, every particle at the end; `probes.csv`, a few of them at every step;
-//! `breaks.csv`, every broken bond.
+//! `breaks.csv`, every broken bond; `residuals.csv`, how a solver came to rest.
 //!
 //! Ids count from 1, columns and rows from the lowest site, frame included, which is the paper's
 //! numbering. Numbers are the shortest that read back as the same.
@@ -54,6 +54,12 @@ struct BreakRow {
     length: f64,
 }
 
+#[derive(Serialize)]
+struct ResidualRow {
+    iteration: usize,
+    residual: f64,
+}
+
 /// Writes every particle at the end: reference and present place \[length\], PE1 \[length^2\], PE2 \[length\].
 pub fn write_final(folder: &OutputFolder, body: &Body, last: &Snapshot) -> Result<PathBuf, ExportError> {
     let lowest = |axis: usize| body.sites.iter().map(|site| i64::from(site[axis])).min().unwrap_or(0);
@@ -90,6 +96,12 @@ pub fn write_breaks(folder: &OutputFolder, body: &Body, breaks: &[Break]) -> Res
     write(folder, "breaks.csv", rows)
 }
 
+/// Writes the residual before the first iteration of a solver and after each.
+pub fn write_residuals(folder: &OutputFolder, residuals: &[f64]) -> Result<PathBuf, ExportError> {
+    let row = |(iteration, &residual): (usize, &f64)| ResidualRow { iteration, residual };
+    write(folder, "residuals.csv", residuals.iter().enumerate().map(row))
+}
+
 /// Writes the probed particles step by step.
 pub fn write_probes(folder: &OutputFolder, probes: &[ProbeSeries]) -> Result<PathBuf, ExportError> {
     let steps = probes.iter().map(|probe| probe.positions.len()).max().unwrap_or(0);
@@ -102,7 +114,7 @@ pub fn write_probes(folder: &OutputFolder, probes: &[ProbeSeries]) -> Result<Pat
     write(folder, "probes.csv", rows)
 }
 
-fn write(
+pub(super) fn write(
     folder: &OutputFolder,
     name: &str,
     rows: impl Iterator<Item = impl Serialize>,

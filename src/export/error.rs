@@ -8,7 +8,7 @@ pub enum ExportError {
     #[error("{} is not empty: give --force to replace it, or another --out", .0.display())]
     NotEmpty(PathBuf),
     #[error(
-        "{} does not look like an output of flockform, which has a summary.json: --force leaves it alone; give another --out",
+        "{} does not look like an output of flockform, which has a summary.json or a compare.json: --force leaves it alone; give another --out",
         .0.display()
     )]
     NotOurs(PathBuf),

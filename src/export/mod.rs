@@ -7,9 +7,12 @@
 //! | `summary.json` | program, scene, counts, how it ended, energies, first break, timings |
 //! | `final.csv` | every particle at the end |
 //! | `probes.csv` | the probed particles at every step |
+//! | `residuals.csv`, `residuals` | how near the solver came, iteration by iteration, where one was used |
 //! | `breaks.csv` | every broken bond, with its step and place |
 //! | `steps.pvd`, `steps/*.vtu` | frames for ParaView |
 //! | `configuration_*`, `pe1_*`, `probes` | figures, as SVG and as the PNG rendered from it |
+//!
+//! A comparison with the truth (`comparison`, feature `fem`) has a folder of its own.
 //!
 //! Frames are written while the run goes on, since a long run cannot keep them ([`VtkSeries`]); the
 //! rest comes at the end, by [`write_all`]:
@@ -42,11 +45,15 @@
 //! ```
 
 mod bonds;
+#[cfg(feature = "fem")]
+pub mod comparison;
 pub mod csv;
 mod error;
 pub mod figures;
 mod folder;
 mod summary;
+#[cfg(feature = "fem")]
+pub mod trade;
 mod vtk;
 
 use std::path::PathBuf;
@@ -60,7 +67,7 @@ use crate::scene::Scene;
 pub use error::ExportError;
 use figures::Subject;
 pub use folder::OutputFolder;
-pub use summary::{BrokenBonds, Counts, Energies, FirstBreak, Seconds, Summary, Timings};
+pub use summary::{BrokenBonds, Counts, Energies, Equilibrium, FirstBreak, Seconds, Summary, Timings};
 pub use vtk::VtkSeries;
 
 /// What a run leaves to be written at its end.
@@ -89,6 +96,12 @@ pub fn write_all(folder: &OutputFolder, results: &Results<'_>) -> Result<Vec<Pat
     }
     if !engine.breaks().is_empty() {
         written.push(csv::write_breaks(folder, engine.body(), engine.breaks())?);
+    }
+    if let Some(solved) = &results.outcome.solved {
+        written.push(csv::write_residuals(folder, &solved.residuals)?);
+        let title = &results.scene.raw.title;
+        let chart = figures::chart::residuals(title, solved.solver.name(), &solved.residuals);
+        written.extend(figures::write(&chart, &folder.path("residuals"))?);
     }
     written.extend(write_figures(folder, results)?);
     let mut timings = results.timings;

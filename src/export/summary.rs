@@ -1,5 +1,6 @@
 //! `summary.json`: what was run, how it ended, in numbers.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -13,9 +14,14 @@ use crate::continuum::run::{Outcome, StopReason};
 use crate::flock::role::Role;
 use crate::scene::Scene;
 use crate::scene::raw::RawScene;
+use crate::solve::equilibrium::Solved;
 
-const PROGRAM: &str = env!("CARGO_PKG_NAME");
+pub(super) const PROGRAM: &str = env!("CARGO_PKG_NAME");
 const FILE: &str = "summary.json";
+/// What a comparison writes in the place of a summary.
+pub(super) const COMPARISON: &str = "compare.json";
+/// What a trade study writes in the place of a summary.
+pub(super) const TRADE: &str = "trade.json";
 
 /// How long the parts of a run took.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -42,6 +48,8 @@ pub struct Summary {
     pub divergence: Option<String>,
     /// Largest one-step motion over the spacing, at the last step.
     pub residual: Option<f64>,
+    /// How the equilibrium was found, unless it was stepped to.
+    pub equilibrium: Option<Equilibrium>,
     pub energies: Energies,
     pub broken_bonds: BrokenBonds,
     pub timings: Seconds,
@@ -91,6 +99,20 @@ pub struct FirstBreak {
     pub along: f64,
 }
 
+/// What the solver did.
+#[derive(Clone, Debug, Serialize, PartialEq)]
+pub struct Equilibrium {
+    pub solver: &'static str,
+    /// Why this one.
+    pub why: String,
+    pub iterations: usize,
+    pub converged: bool,
+    /// Residual force over the load's, at the end \[1\].
+    pub residual: f64,
+    /// Seconds by phase.
+    pub phases: BTreeMap<&'static str, f64>,
+}
+
 /// [`Timings`] in seconds.
 #[derive(Clone, Copy, Debug, Serialize, PartialEq)]
 pub struct Seconds {
@@ -116,6 +138,7 @@ impl Summary {
                 _ => None,
             },
             residual: Some(outcome.residual).filter(|residual| residual.is_finite()),
+            equilibrium: outcome.solved.as_ref().map(Equilibrium::of),
             energies: Energies { pe1, pe2 },
             broken_bonds: broken_bonds(&outcome.engine),
             timings: Seconds {
@@ -136,10 +159,25 @@ impl Summary {
     }
 }
 
-/// Whether the folder holds a summary that this program wrote.
+impl Equilibrium {
+    fn of(solved: &Solved) -> Self {
+        Self {
+            solver: solved.solver.name(),
+            why: solved.why.clone(),
+            iterations: solved.iterations,
+            converged: solved.converged,
+            residual: solved.residuals.last().copied().unwrap_or_default(),
+            phases: solved.phases.iter().map(|(name, time)| (*name, time.as_secs_f64())).collect(),
+        }
+    }
+}
+
+/// Whether the folder holds a summary, or a comparison, that this program wrote.
 pub(super) fn is_in(folder: &Path) -> bool {
-    let text = std::fs::read_to_string(folder.join(FILE)).unwrap_or_default();
-    serde_json::from_str::<serde_json::Value>(&text).is_ok_and(|summary| summary["program"] == PROGRAM)
+    [FILE, COMPARISON, TRADE].into_iter().any(|file| {
+        let text = std::fs::read_to_string(folder.join(file)).unwrap_or_default();
+        serde_json::from_str::<serde_json::Value>(&text).is_ok_and(|summary| summary["program"] == PROGRAM)
+    })
 }
 
 fn counts(engine: &Engine) -> Counts {

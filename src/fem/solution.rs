@@ -1,6 +1,6 @@
 //! The displacement found, and what follows from it: strain, stress, energy, forces, values at points.
 
-use super::element::{Gradient, Rule};
+use super::element::{Gradient, Rule, Shape};
 use super::error::FemError;
 use super::locate::Locator;
 use super::material::{Material, Stress};
@@ -67,13 +67,40 @@ impl Solution {
     /// [`FemError::Length`] if `x` and `y` differ in length; [`FemError::OutsideMesh`] names the first
     /// point that lies in no cell.
     pub fn displacements_at(&self, x: &[f64], y: &[f64]) -> Result<Vec<[f64; 2]>, FemError> {
+        self.at_places(x, y, |cell, shape| shape.interpolate(&self.of_cell(cell)[..self.mesh.kind().nodes()]))
+    }
+
+    /// The recovered stress of [`Solution::stress_at_points`] at each point (x, y) \[m\] of the undeformed
+    /// body, interpolated between the nodes; shape \[points\].
+    ///
+    /// # Errors
+    /// As for [`Solution::displacements_at`].
+    pub fn recovered_at(&self, x: &[f64], y: &[f64]) -> Result<Vec<Stress>, FemError> {
+        let at_nodes = self.stress_at_points();
+        let all = |component: fn(&Stress) -> f64| at_nodes.iter().map(component).collect::<Vec<f64>>();
+        let (xx, yy, xy, zz) = (all(|s| s.xx), all(|s| s.yy), all(|s| s.xy), all(|s| s.zz));
+        self.at_places(x, y, |cell, shape| {
+            let n = self.mesh.kind().nodes();
+            let [in_x, in_y] = shape.interpolate(&self.mesh.gather(cell, &xx, &yy)[..n]);
+            let [shear, out] = shape.interpolate(&self.mesh.gather(cell, &xy, &zz)[..n]);
+            Stress { xx: in_x, yy: in_y, xy: shear, zz: out }
+        })
+    }
+
+    /// `value(cell, shape functions)` at each point.
+    fn at_places<T>(
+        &self,
+        x: &[f64],
+        y: &[f64],
+        value: impl Fn(usize, &Shape) -> T,
+    ) -> Result<Vec<T>, FemError> {
         if x.len() != y.len() {
             return Err(FemError::Length { what: "y", found: y.len(), expected: x.len().to_string() });
         }
         let locator = Locator::new(&self.mesh);
         let at = |(index, (&x, &y)): (usize, (&f64, &f64))| {
             let (cell, place) = locator.find([x, y]).ok_or(FemError::OutsideMesh { index, x, y })?;
-            Ok(self.mesh.kind().shape(place).interpolate(&self.of_cell(cell)[..self.mesh.kind().nodes()]))
+            Ok(value(cell, &self.mesh.kind().shape(place)))
         };
         x.iter().zip(y).enumerate().map(at).collect()
     }

@@ -2,10 +2,11 @@
 
 use std::sync::Arc;
 
+use super::block::{Block, IDENTITY};
 use super::fracture::Bonds;
 use super::neighbourhood::Neighbours;
 use super::points::Points;
-use super::rules::{Neighbour, Own, Rule};
+use super::rules::{Load, Neighbour, Own, Rule};
 
 /// The arrays and index lists that a sweep runs over; it knows particles, not lattices.
 #[derive(Clone, Debug)]
@@ -14,27 +15,100 @@ pub struct Interaction {
     /// Reference positions \[length\], shape \[count\].
     pub reference: Arc<Points>,
     pub neighbours: Neighbours,
-    /// Fixed weights, parallel to the neighbours' index list; all 1 where absent.
-    pub weights: Option<Vec<f64>>,
+    pub weights: Weights,
+    /// Loads on the particles of a material \[force\], shape \[count\].
+    pub forces: Option<Points>,
     /// Rest offsets \[length\], shape \[count\]; all zero where absent.
     pub rest: Option<Points>,
     /// Broken bonds; none can break where absent.
     pub bonds: Option<Bonds>,
 }
 
+/// Fixed weights of the neighbours.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum Weights {
+    /// All count the same.
+    #[default]
+    Equal,
+    /// Parallel to the neighbours' index list, shape \[bonds\].
+    Scalar(Vec<f64>),
+    /// Matrices of a material. They take memory by class, not by particle.
+    Matrix(MatrixWeights),
+}
+
+/// Matrix weights. Particles with the same cells around them have the same weights, so on a lattice a
+/// few classes of particles hold them all.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MatrixWeights {
+    /// Class of each particle, shape \[count\].
+    pub class: Vec<u32>,
+    /// Where each class begins in `blocks`, shape \[classes + 1\].
+    pub starts: Vec<u32>,
+    /// `W_ij = D_i^-1 K_ij` \[1\] in the order of the particle's neighbours.
+    pub blocks: Vec<Block>,
+    /// `K_ij` \[force / length\], parallel to `blocks`: what solvers work with, since it is symmetric.
+    pub stiffness: Vec<Block>,
+    /// `D_i^-1` \[length / force\], shape \[classes\].
+    pub compliance: Vec<Block>,
+}
+
+impl MatrixWeights {
+    /// Weights of a particle, parallel to its neighbours.
+    pub fn of(&self, particle: usize) -> &[Block] {
+        &self.blocks[self.range(particle)]
+    }
+
+    /// Stiffnesses of a particle, parallel to its neighbours.
+    pub fn stiffness_of(&self, particle: usize) -> &[Block] {
+        &self.stiffness[self.range(particle)]
+    }
+
+    fn range(&self, particle: usize) -> std::ops::Range<usize> {
+        let class = self.class[particle] as usize;
+        self.starts[class] as usize..self.starts[class + 1] as usize
+    }
+
+    pub fn compliance(&self, particle: usize) -> Block {
+        self.compliance[self.class[particle] as usize]
+    }
+}
+
+impl Weights {
+    fn scalar(&self, bond: usize) -> f64 {
+        match self {
+            Weights::Scalar(weights) => weights[bond],
+            Weights::Equal | Weights::Matrix(_) => 1.0,
+        }
+    }
+
+    /// Of bond number `k` of a particle.
+    fn matrix(&self, particle: usize, k: usize) -> Block {
+        match self {
+            Weights::Matrix(weights) => weights.of(particle)[k],
+            Weights::Equal | Weights::Scalar(_) => IDENTITY,
+        }
+    }
+}
+
 impl Interaction {
     /// Target position of `particle` when all stand at `present` \[length, world frame\].
     pub fn target(&self, particle: usize, present: &Points) -> [f64; 2] {
+        self.target_by(&self.rule, particle, present)
+    }
+
+    /// Target position by another rule over the same neighbours and weights.
+    pub fn target_by(&self, rule: &Rule, particle: usize, present: &Points) -> [f64; 2] {
         let own = Own {
             present: present.get(particle),
             reference: self.reference.get(particle),
             rest: self.rest.as_ref().map_or([0.0; 2], |rest| rest.get(particle)),
+            load: self.load(particle),
         };
         match &self.bonds {
             Some(bonds) if bonds.any_broken() => {
-                self.rule.target(&own, self.seen_with_ghosts(particle, present, bonds))
+                rule.target(&own, self.seen_with_ghosts(particle, present, bonds))
             }
-            _ => self.rule.target(&own, self.seen(particle, present)),
+            _ => rule.target(&own, self.seen(particle, present)),
         }
     }
 
@@ -54,14 +128,23 @@ impl Interaction {
         self.neighbours.bonds(particle).filter(live).map(|bond| self.neighbours.index[bond] as usize)
     }
 
+    fn load(&self, particle: usize) -> Option<Load> {
+        match (&self.forces, &self.weights) {
+            (Some(forces), Weights::Matrix(weights)) => {
+                Some(Load { force: forces.get(particle), compliance: weights.compliance(particle) })
+            }
+            _ => None,
+        }
+    }
+
     fn seen<'a>(
         &'a self,
         particle: usize,
         present: &'a Points,
     ) -> impl Iterator<Item = Neighbour> + Clone + 'a {
-        self.neighbours.bonds(particle).map(move |bond| Neighbour {
-            position: present.get(self.neighbours.index[bond] as usize),
-            weight: self.weight(bond),
+        self.neighbours.bonds(particle).map(move |bond| {
+            let position = present.get(self.neighbours.index[bond] as usize);
+            self.neighbour(particle, bond, position)
         })
     }
 
@@ -77,11 +160,16 @@ impl Interaction {
             } else {
                 present.get(self.neighbours.index[bond] as usize)
             };
-            Some(Neighbour { position, weight: self.weight(bond) })
+            Some(self.neighbour(particle, bond, position))
         })
     }
 
-    fn weight(&self, bond: usize) -> f64 {
-        self.weights.as_ref().map_or(1.0, |weights| weights[bond])
+    fn neighbour(&self, particle: usize, bond: usize, position: [f64; 2]) -> Neighbour {
+        Neighbour {
+            position,
+            reference: self.reference.get(self.neighbours.index[bond] as usize),
+            weight: self.weights.scalar(bond),
+            matrix: self.weights.matrix(particle, bond - self.neighbours.starts[particle] as usize),
+        }
     }
 }

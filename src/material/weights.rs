@@ -1,5 +1,7 @@
 //! Cells and neighbours to the 2x2 weights of the rule.
 
+use std::collections::HashMap;
+
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
@@ -9,28 +11,36 @@ use super::mechanism::{Mechanism, require_rigid};
 use super::stiffness::{ShapeError, element};
 use crate::flock::block::{Block, apply, inverse, plus, product};
 use crate::flock::body::Body;
+use crate::flock::interaction::MatrixWeights;
 use crate::flock::neighbourhood::Neighbours;
 use crate::flock::points::Points;
 
-/// Particles whose rows one thread puts together at a time.
-const CHUNK: usize = 4096;
+/// Particles whose classes one thread finds at a time.
+const CHUNK: usize = 1 << 14;
 
-/// First particle of a chunk, then its blocks, `D_i` and `D_i^-1`.
-type Chunk<'a> = (usize, &'a mut [Block], &'a mut [Block], &'a mut [Block]);
-
-/// The material as seen by each particle. All arrays follow the particles or the bonds of
-/// `neighbours`; particles of a frame have neither cells nor weights.
+/// The material as seen by each particle. A row depends only on the cells around its particle, so
+/// particles fall into a few classes that share one; particles of a frame have neither cells nor
+/// weights.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MaterialWeights {
     /// Who sees whom, in the order in which it was asked for: the order of summation.
     pub neighbours: Neighbours,
-    /// `K_ij` \[force / length\], parallel to the neighbours' index list, shape \[bonds\]. Zero between
-    /// neighbours that share no cell. `K_ji` is the transpose of `K_ij`, to the bit.
+    /// Class of each particle, shape \[count\].
+    pub class: Vec<u32>,
+    /// One row for each class, shape \[classes\].
+    pub rows: Vec<Row>,
+}
+
+/// What the particles of a class feel.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Row {
+    /// `K_ij` \[force / length\] in the order of the particle's neighbours. Zero between neighbours that
+    /// share no cell. `K_ji` is the transpose of `K_ij`, to the bit.
     pub blocks: Vec<Block>,
-    /// `D_i = sum_j K_ij` \[force / length\], shape \[count\].
-    pub diagonal: Vec<Block>,
-    /// `D_i^-1` \[length / force\], shape \[count\].
-    pub inverse: Vec<Block>,
+    /// `D_i = sum_j K_ij` \[force / length\].
+    pub diagonal: Block,
+    /// `D_i^-1` \[length / force\].
+    pub inverse: Block,
 }
 
 /// Why cells and neighbours make no material rule. Particles are named by their ids, which count from 1.
@@ -97,84 +107,55 @@ impl MaterialWeights {
     ) -> Result<Self, WeightsError> {
         check_factor(cells, factor)?;
         let elements = elements(cells, elastic)?;
-        let count = neighbours.count();
-        let mut weights = Self {
-            blocks: vec![Block::default(); neighbours.index.len()],
-            diagonal: vec![Block::default(); count],
-            inverse: vec![Block::default(); count],
-            neighbours,
-        };
-        let mut rest = weights.blocks.as_mut_slice();
-        let mut chunks = Vec::new();
-        let (diagonal, inverse) = (weights.diagonal.chunks_mut(CHUNK), weights.inverse.chunks_mut(CHUNK));
-        for (chunk, (diagonal, inverse)) in diagonal.zip(inverse).enumerate() {
-            let (first, starts) = (chunk * CHUNK, &weights.neighbours.starts);
-            let bonds = starts[first + diagonal.len()] - starts[first];
-            let (blocks, after) = rest.split_at_mut(bonds as usize);
-            rest = after;
-            chunks.push((first, blocks, diagonal, inverse));
-        }
+        let assembly = Assembly { cells, incidence, neighbours: &neighbours, elements, factor };
+        let (class, first) = assembly.classes();
         // Every row is summed over its own cells in their order: the same bits on any number of threads.
-        let assembly = Assembly { cells, incidence, neighbours: &weights.neighbours, elements, factor };
-        let fill = |(first, mut blocks, diagonal, inverse): Chunk<'_>| {
-            for (k, (diagonal, inverse)) in diagonal.iter_mut().zip(inverse).enumerate() {
-                let (row, after) = blocks.split_at_mut(assembly.neighbours.of(first + k).len());
-                blocks = after;
-                (*diagonal, *inverse) = assembly.row(first + k, row)?;
-            }
-            Ok(())
-        };
         // Collected before looking: the first error in the order of particles, not the first to be found.
-        let outcomes: Vec<Result<(), WeightsError>> = chunks.into_par_iter().map(fill).collect();
-        outcomes.into_iter().collect::<Result<(), _>>()?;
-        Ok(weights)
+        let rows: Vec<Result<Row, WeightsError>> = first.into_par_iter().map(|i| assembly.row(i)).collect();
+        let rows = rows.into_iter().collect::<Result<_, _>>()?;
+        Ok(Self { neighbours, class, rows })
     }
 
     pub fn count(&self) -> usize {
-        self.diagonal.len()
+        self.class.len()
     }
 
-    /// `W_ij = D_i^-1 K_ij` \[1\] of a bond; those of one particle sum to the identity.
-    pub fn weight(&self, particle: usize, bond: usize) -> Block {
-        product(&self.inverse[particle], &self.blocks[bond])
+    /// The row of a particle.
+    pub fn of(&self, particle: usize) -> &Row {
+        &self.rows[self.class[particle] as usize]
     }
 
-    /// All weights `W_ij` \[1\], parallel to the neighbours' index list, shape \[bonds\].
-    pub fn weights(&self) -> Vec<Block> {
-        let of_particle = |i: usize| self.neighbours.bonds(i).map(move |bond| self.weight(i, bond));
-        (0..self.count()).flat_map(of_particle).collect()
+    /// Bonds of a particle: the neighbour and `K_ij` \[force / length\].
+    pub fn bonds(&self, particle: usize) -> impl Iterator<Item = (usize, &Block)> {
+        let seen = self.neighbours.of(particle).iter().map(|&j| j as usize);
+        seen.zip(&self.of(particle).blocks)
     }
 
-    /// What is added to the matrix-weighted mean of the neighbours' positions \[length\], shape \[count\]:
-    /// `X_i - sum_j W_ij X_j`, and `D_i^-1 f_i` where there are `forces` \[force\], shape \[count\].
-    pub fn rest_offsets(&self, reference: &Points, forces: Option<&Points>) -> Points {
-        let offset = |i: usize| {
-            let here = reference.get(i);
-            let mut pull = forces.map_or([0.0; 2], |forces| forces.get(i));
-            for bond in self.neighbours.bonds(i) {
-                let there = reference.get(self.neighbours.index[bond] as usize);
-                let [x, y] = apply(&self.blocks[bond], [here[0] - there[0], here[1] - there[1]]);
-                pull = [pull[0] + x, pull[1] + y];
-            }
-            apply(&self.inverse[i], pull)
+    /// The weights `W_ij = D_i^-1 K_ij` \[1\] as the rule applies them; those of one particle sum to the
+    /// identity.
+    pub fn weights(&self) -> MatrixWeights {
+        let mut weights = MatrixWeights {
+            class: self.class.clone(),
+            starts: vec![0],
+            blocks: Vec::new(),
+            stiffness: Vec::new(),
+            compliance: self.rows.iter().map(|row| row.inverse).collect(),
         };
-        (0..self.count()).map(offset).collect()
-    }
-
-    /// `D_i^-1 f_i` \[length\], shape \[count\]: how far a load alone moves a particle whose neighbours
-    /// stay. Added to a rest offset computed elsewhere.
-    pub fn load_offsets(&self, forces: &Points) -> Points {
-        (0..self.count()).map(|i| apply(&self.inverse[i], forces.get(i))).collect()
+        for row in &self.rows {
+            weights.blocks.extend(row.blocks.iter().map(|block| product(&row.inverse, block)));
+            weights.stiffness.extend(&row.blocks);
+            weights.starts.push(weights.blocks.len() as u32);
+        }
+        weights
     }
 
     /// Force of the neighbours on a particle, `sum_j K_ij (u_j - u_i)` \[force\], under displacements
     /// \[length\]: zero to the last bit if all move alike.
     pub fn force(&self, particle: usize, displacement: &Points) -> [f64; 2] {
         let here = displacement.get(particle);
-        let bonds = self.neighbours.bonds(particle);
-        bonds.fold([0.0; 2], |sum, bond| {
-            let there = displacement.get(self.neighbours.index[bond] as usize);
-            let [x, y] = apply(&self.blocks[bond], [there[0] - here[0], there[1] - here[1]]);
+        self.bonds(particle).fold([0.0; 2], |sum, (j, block)| {
+            let there = displacement.get(j);
+            let [x, y] = apply(block, [there[0] - here[0], there[1] - here[1]]);
             [sum[0] + x, sum[1] + y]
         })
     }
@@ -221,12 +202,85 @@ struct Assembly<'a> {
     factor: Option<&'a [f64]>,
 }
 
+/// What tells the classes apart: which corner of which kind of cell the particle is, and where among its
+/// neighbours the other corners are, packed; and how many neighbours there are.
+type Pattern = (u128, u32);
+
 impl Assembly<'_> {
-    /// Adds the blocks `K_ij` of one particle to `blocks`, in the order of its neighbours; returns `D_i`
-    /// and its inverse.
-    fn row(&self, particle: usize, blocks: &mut [Block]) -> Result<(Block, Block), WeightsError> {
+    /// Class of each particle, and the first particle of each class.
+    fn classes(&self) -> (Vec<u32>, Vec<usize>) {
+        let count = self.neighbours.count();
+        let chunks: Vec<usize> = (0..count).step_by(CHUNK).collect();
+        let of_chunk = |&begin: &usize| {
+            let mut known: HashMap<Pattern, u32> = HashMap::new();
+            // Each pattern of the chunk with the first particle that has it; none has its own class.
+            let mut first: Vec<(Option<Pattern>, usize)> = Vec::new();
+            let of_particle = |i: usize| match self.pattern(i) {
+                Some(pattern) => *known.entry(pattern).or_insert_with(|| {
+                    first.push((Some(pattern), i));
+                    first.len() as u32 - 1
+                }),
+                None => {
+                    first.push((None, i));
+                    first.len() as u32 - 1
+                }
+            };
+            let class: Vec<u32> = (begin..count.min(begin + CHUNK)).map(of_particle).collect();
+            (class, first)
+        };
+        let found: Vec<_> = chunks.par_iter().map(of_chunk).collect();
+        let mut known: HashMap<Pattern, u32> = HashMap::new();
+        let (mut class, mut first) = (Vec::with_capacity(count), Vec::new());
+        for (of_chunk, first_of_chunk) in found {
+            let mut add = |i: usize| {
+                first.push(i);
+                first.len() as u32 - 1
+            };
+            let global: Vec<u32> = first_of_chunk
+                .into_iter()
+                .map(|(pattern, i)| match pattern {
+                    Some(pattern) => *known.entry(pattern).or_insert_with(|| add(i)),
+                    None => add(i),
+                })
+                .collect();
+            class.extend(of_chunk.into_iter().map(|local| global[local as usize]));
+        }
+        (class, first)
+    }
+
+    fn most_neighbours(&self) -> usize {
+        (0..self.neighbours.count()).map(|i| self.neighbours.of(i).len()).max().unwrap_or(0)
+    }
+
+    /// `None` where cells differ in more than their kind, or do not fit the pattern.
+    fn pattern(&self, particle: usize) -> Option<Pattern> {
+        if self.factor.is_some() || self.cells.shapes.len() > 2 {
+            return None;
+        }
+        let seen = self.neighbours.of(particle);
+        let mut packed: u128 = 1;
+        let mut push = |value: usize, bits: u32| {
+            let fits = packed.leading_zeros() >= bits && value >> bits == 0;
+            packed = (packed << bits) | value as u128;
+            fits.then_some(())
+        };
+        for cell in self.incidence.of(particle).iter().map(|&cell| cell as usize) {
+            let corners = self.cells.of(cell);
+            let own = corners.iter().position(|&corner| corner as usize == particle)?;
+            push(self.cells.kind[cell] as usize, 1)?;
+            push(own, 3)?;
+            for &corner in corners.iter().filter(|&&corner| corner as usize != particle) {
+                push(seen.iter().position(|&j| j == corner)?, 5)?;
+            }
+        }
+        Some((packed, seen.len() as u32))
+    }
+
+    /// The row of one particle; refuses a particle that does not see a corner of its cells.
+    fn row(&self, particle: usize) -> Result<Row, WeightsError> {
         let (cells, seen) = (self.cells, self.neighbours.of(particle));
         let around = self.incidence.of(particle);
+        let mut blocks = vec![Block::default(); seen.len()];
         for cell in around.iter().map(|&cell| cell as usize) {
             let (corners, k) = (cells.of(cell), &self.elements[cells.kind[cell] as usize]);
             let factor = self.factor.map_or(1.0, |factor| factor[cell]);
@@ -236,7 +290,7 @@ impl Assembly<'_> {
                     return Err(WeightsError::MissingNeighbour {
                         particle: particle + 1,
                         missing: corner as usize + 1,
-                        neighbours: seen.len(),
+                        neighbours: self.most_neighbours(),
                         corners: cells.corners,
                     });
                 };
@@ -245,10 +299,11 @@ impl Assembly<'_> {
             }
         }
         let diagonal = blocks.iter().fold(Block::default(), |sum, block| plus(&sum, block));
-        match inverse(&diagonal) {
-            Some(inverse) => Ok((diagonal, inverse)),
-            None if around.is_empty() => Ok((diagonal, Block::default())),
-            None => Err(WeightsError::Singular { particle: particle + 1 }),
-        }
+        let inverse = match inverse(&diagonal) {
+            Some(inverse) => inverse,
+            None if around.is_empty() => Block::default(),
+            None => return Err(WeightsError::Singular { particle: particle + 1 }),
+        };
+        Ok(Row { blocks, diagonal, inverse })
     }
 }

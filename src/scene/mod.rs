@@ -21,6 +21,7 @@ use crate::flock::region::{Region, Side};
 use crate::flock::role::Role;
 use crate::flock::rules::{Axis, Feedback, Mean};
 use crate::flock::shape::Segment;
+use crate::material::elastic::Elastic;
 use crate::solve::sweep::Update;
 
 pub use bundled::{Bundled, bundled};
@@ -46,6 +47,9 @@ pub struct Scene {
     pub poisson: Option<PoissonTerm>,
     pub feedback: Option<Feedback>,
     pub update: Update,
+    /// What the body is made of, where the scene says so.
+    pub material: Option<Elastic>,
+    pub loads: Vec<Load>,
     pub roles: Vec<RoleEntry>,
     pub fracture: Option<Fracture>,
     /// Ends of each cut \[length\].
@@ -59,6 +63,11 @@ impl Scene {
     /// The error that refuses this scene for what stands at `key`.
     pub fn refuse(&self, key: &str, message: impl Into<String>, help: impl Into<String>) -> SceneError {
         SceneError::from(self.document.problem(key, message, Some(help.into())))
+    }
+
+    /// Which role entry, if any, first leads particles to where finite elements have them.
+    pub fn truth_led(&self) -> Option<usize> {
+        self.roles.iter().position(|entry| matches!(entry.motion, Some(LeaderMotion::Truth { .. })))
     }
 
     /// The unit of length, for axes and tables.
@@ -84,6 +93,17 @@ pub struct PoissonTerm {
     /// Coordinate of the central axis \[length\]; the middle of the body where `None`.
     pub centre: Option<f64>,
     pub exponent: f64,
+}
+
+/// Something that pushes the body.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Load {
+    /// On every side of the boundary between two particles of the region \[force / length^2\].
+    Traction { region: SceneRegion, traction: [f64; 2] },
+    /// On each particle of the region \[force\].
+    Force { region: SceneRegion, force: [f64; 2] },
+    /// On all of the body \[force / length^3\].
+    Body { force: [f64; 2] },
 }
 
 /// A role for the particles of a region.
@@ -136,6 +156,10 @@ pub enum LeaderMotion {
     /// Displacements read from a file, reached in even parts over `steps`.
     Table {
         rows: table::DisplacementTable,
+        steps: usize,
+    },
+    /// To where finite elements have the particles, in even parts over `steps`.
+    Truth {
         steps: usize,
     },
 }

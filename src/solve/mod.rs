@@ -2,6 +2,7 @@
 
 pub mod equilibrium;
 pub mod field;
+pub mod linear;
 pub mod operator;
 pub mod spectrum;
 pub mod sweep;

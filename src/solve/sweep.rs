@@ -9,7 +9,7 @@
 use rayon::prelude::*;
 
 use crate::flock::frame::Frame;
-use crate::flock::interaction::Interaction;
+use crate::flock::interaction::{Interaction, Weights};
 use crate::flock::points::Points;
 use crate::flock::role::Role;
 use crate::flock::stencil::{Stencil, chunk_size};
@@ -54,7 +54,9 @@ impl Sweep {
     pub fn compile(update: Update, interaction: &Interaction, roles: &[Role]) -> Self {
         let follows = followers(roles);
         let broken = interaction.bonds.as_ref().is_some_and(|bonds| bonds.any_broken());
-        let plain = interaction.rule.is_plain_barycentre() && interaction.weights.is_none() && !broken;
+        let plain = interaction.rule.is_plain_barycentre()
+            && matches!(interaction.weights, Weights::Equal)
+            && !broken;
         let synchronous = update == Update::default();
         let stencil = (plain && synchronous).then(|| Stencil::compile(&interaction.neighbours, &follows));
         Self { update, follows, stencil }
@@ -148,8 +150,15 @@ mod tests {
         let cut = Cut::Count { columns: 263, rows: 301 };
         let (body, neighbours) = Body::build(lattice, &cut, &Neighbourhood::Second, None).expect("fits");
         let reference = body.reference;
-        let mut interaction =
-            Interaction { rule, reference, neighbours, weights: None, rest: None, bonds: None };
+        let mut interaction = Interaction {
+            rule,
+            reference,
+            neighbours,
+            weights: Weights::Equal,
+            forces: None,
+            rest: None,
+            bonds: None,
+        };
         interaction.keep_rest();
         interaction
     }

@@ -9,7 +9,7 @@ use flockform::flock::points::Points;
 use flockform::material::cells::Cells;
 use flockform::material::elastic::Elastic;
 use flockform::material::loads::{Loads, Traction};
-use flockform::material::weights::MaterialWeights;
+use flockform::material::weights::{MaterialWeights, Row};
 
 use crate::support::*;
 
@@ -98,13 +98,13 @@ fn the_barycentre_on_the_beam_has_the_errors_of_the_paper() {
             .expect("builds");
     let one = [[1.0, 0.0], [0.0, 1.0]];
     let scaled = |by: f64| one.map(|row| row.map(|x| by * x));
-    let degree = |i: usize| neighbours.of(i).len() as f64;
-    let weights = MaterialWeights {
-        blocks: vec![one; neighbours.index.len()],
-        diagonal: (0..body.count()).map(|i| scaled(degree(i))).collect(),
-        inverse: (0..body.count()).map(|i| scaled(1.0 / degree(i))).collect(),
-        neighbours,
+    let row = |i: usize| {
+        let degree = neighbours.of(i).len();
+        let (diagonal, inverse) = (scaled(degree as f64), scaled(1.0 / degree as f64));
+        Row { blocks: vec![one; degree], diagonal, inverse }
     };
+    let rows = (0..body.count()).map(row).collect();
+    let weights = MaterialWeights { class: (0..body.count() as u32).collect(), rows, neighbours };
     let leads = end_columns(&body);
     let found = equilibrium(&weights, &leads, &Points::zeros(body.count()), &truth);
     let displacement = relative_l2(&found, &truth, |i| !leads[i]);

@@ -1,8 +1,9 @@
 //! Affine fields are followed exactly, rigid motions cost nothing.
 
+use flockform::flock::block::{Block, plus, transposed};
 use flockform::flock::body::Cut;
 use flockform::flock::lattice::{Lattice, LatticeKind};
-use flockform::flock::points::Points;
+use flockform::flock::points::{Points, distance};
 use flockform::material::loads::{Loads, Traction};
 use flockform::material::weights::MaterialWeights;
 
@@ -63,7 +64,7 @@ fn sweeping_the_rule_itself_reaches_the_affine_field() {
     let (body, neighbours, cells) = sample(KINDS[5], 0.0);
     let weights =
         MaterialWeights::assemble(&cells, &body, neighbours, &sheet(1000.0, 0.33)).expect("assembles");
-    let (w, rest) = (weights.weights(), weights.rest_offsets(&body.reference, None));
+    let rule = interaction(&body, &weights, None);
     let leads = on_boundary(&cells, body.count());
     let goal: Points = body
         .reference
@@ -77,11 +78,7 @@ fn sweeping_the_rule_itself_reaches_the_affine_field() {
         (0..body.count()).map(|i| if leads[i] { goal.get(i) } else { body.reference.get(i) }).collect();
     for _ in 0..500 {
         for i in (0..body.count()).filter(|&i| !leads[i]) {
-            let mean = weights.neighbours.bonds(i).fold(rest.get(i), |sum, bond| {
-                let p = x.get(weights.neighbours.index[bond] as usize);
-                [0, 1].map(|a| sum[a] + w[bond][a][0] * p[0] + w[bond][a][1] * p[1])
-            });
-            x.set(i, mean);
+            x.set(i, rule.target(i, &x));
         }
     }
     assert!(largest_difference(&x, &goal) < 1e-12);
@@ -109,15 +106,13 @@ fn weights_sum_to_the_identity_and_forces_come_in_equal_and_opposite_pairs() {
     for kind in KINDS {
         let (body, neighbours, cells) = sample(kind, 0.3);
         let weights = MaterialWeights::assemble(&cells, &body, neighbours, &fibres()).expect("assembles");
+        let as_applied = weights.weights();
         for i in 0..body.count() {
-            let mut sum = [[0.0; 2]; 2];
-            for bond in weights.neighbours.bonds(i) {
-                let w = weights.weight(i, bond);
-                (0..4).for_each(|k| sum[k / 2][k % 2] += w[k / 2][k % 2]);
-                let j = weights.neighbours.index[bond] as usize;
-                let back = weights.neighbours.bonds(j).find(|&b| weights.neighbours.index[b] as usize == i);
-                let [[a, b], [c, d]] = weights.blocks[back.expect("seen back")];
-                assert_eq!(weights.blocks[bond], [[a, c], [b, d]], "{kind:?}");
+            let mut sum: Block = [[0.0; 2]; 2];
+            for ((j, &block), w) in weights.bonds(i).zip(as_applied.of(i)) {
+                sum = plus(&sum, w);
+                let back = weights.bonds(j).find(|(back, _)| *back == i).expect("seen back");
+                assert_eq!(block, transposed(*back.1), "{kind:?}");
             }
             let error = (sum[0][0] - 1.0).abs() + sum[0][1].abs() + sum[1][0].abs() + (sum[1][1] - 1.0).abs();
             assert!(error < 1e-12, "{kind:?} {sum:?}");
@@ -156,7 +151,7 @@ fn weights_are_the_same_at_any_spacing() {
         let lattice = Lattice::new(kind(scale), [0.0; 2], 0.3);
         let (body, neighbours, cells) =
             build_without_loose_sites(lattice, &Cut::Count { columns: 4, rows: 4 });
-        MaterialWeights::assemble(&cells, &body, neighbours, &fibres()).expect("assembles").weights()
+        MaterialWeights::assemble(&cells, &body, neighbours, &fibres()).expect("assembles").weights().blocks
     };
     for kind in
         [|s| LatticeKind::Rectangular { a: s, b: 1000.0 * s }, |s| LatticeKind::Honeycomb { spacing: s }]
@@ -183,25 +178,16 @@ fn the_equilibrium_under_loads_is_the_fixed_point_of_the_rule_and_stores_half_th
         let leads: Vec<bool> = (0..body.count()).map(|i| i % 20 == 0).collect();
         let held = Points::zeros(body.count());
         let found = equilibrium(&weights, &leads, &forces, &held);
-        let (w, rest) = (weights.weights(), weights.rest_offsets(&body.reference, Some(&forces)));
-        let at = |i: usize| [body.reference.x[i] + found.x[i], body.reference.y[i] + found.y[i]];
+        let rule = interaction(&body, &weights, Some(forces.clone()));
+        let at: Points =
+            (0..body.count()).map(|i| [0, 1].map(|k| body.reference.get(i)[k] + found.get(i)[k])).collect();
         let size = found.x.iter().chain(&found.y).fold(1.0, |m: f64, u| m.max(u.abs()));
         let mut work = 0.0;
         for i in (0..body.count()).filter(|&i| !leads[i]) {
-            let target = weights.neighbours.bonds(i).fold(rest.get(i), |sum, bond| {
-                let p = at(weights.neighbours.index[bond] as usize);
-                [0, 1].map(|a| sum[a] + w[bond][a][0] * p[0] + w[bond][a][1] * p[1])
-            });
-            let error = (target[0] - at(i)[0]).hypot(target[1] - at(i)[1]);
+            let error = distance(rule.target(i, &at), at.get(i));
             assert!(error < 1e-12 * size, "{kind:?} particle {i}: {error}");
             work += forces.x[i] * found.x[i] + forces.y[i] * found.y[i];
         }
         assert!((weights.energy(&found) - 0.5 * work).abs() < 1e-11 * work, "{kind:?}");
-        // The load alone is the difference between rest offsets with and without it.
-        let (bare, load) = (weights.rest_offsets(&body.reference, None), weights.load_offsets(&forces));
-        for i in 0..body.count() {
-            let (a, b, c) = (rest.get(i), bare.get(i), load.get(i));
-            assert!((0..2).all(|k| (a[k] - b[k] - c[k]).abs() < 1e-12 * size), "{kind:?} particle {i}");
-        }
     }
 }

@@ -1,9 +1,11 @@
 //! Bodies, materials and a direct solver, shared by the tests of the material rule.
 
 use flockform::flock::body::{Body, Cut};
+use flockform::flock::interaction::{Interaction, Weights};
 use flockform::flock::lattice::{Lattice, LatticeKind};
 use flockform::flock::neighbourhood::Neighbours;
 use flockform::flock::points::Points;
+use flockform::flock::rules::{Mean, Rotation, Rule};
 use flockform::material::Block;
 use flockform::material::cells::{Cells, neighbourhood, without_loose_sites};
 use flockform::material::elastic::{Constants, Elastic, Plane};
@@ -54,6 +56,21 @@ pub fn on_boundary(cells: &Cells, count: usize) -> Vec<bool> {
     boundary
 }
 
+/// The rule as a host sweeps it.
+pub fn interaction(body: &Body, weights: &MaterialWeights, forces: Option<Points>) -> Interaction {
+    let mut interaction = Interaction {
+        rule: Rule { mean: Mean::Material { rotation: Rotation::Small }, ..Rule::BARYCENTRE },
+        reference: body.reference.clone(),
+        neighbours: weights.neighbours.clone(),
+        weights: Weights::Matrix(weights.weights()),
+        forces,
+        rest: None,
+        bonds: None,
+    };
+    interaction.keep_rest();
+    interaction
+}
+
 /// Followers at rest under their neighbours and loads, leaders where `displacement` has them: banded
 /// Cholesky over the followers in their numbering.
 pub fn equilibrium(
@@ -68,10 +85,9 @@ pub fn equilibrium(
     let mut entries: Vec<(usize, usize, Block)> = Vec::new();
     let mut right: Vec<f64> = Vec::new();
     for (row, &i) in followers.iter().enumerate() {
-        entries.push((row, row, weights.diagonal[i]));
+        entries.push((row, row, weights.of(i).diagonal));
         let mut load = forces.get(i);
-        for bond in weights.neighbours.bonds(i) {
-            let (j, block) = (weights.neighbours.index[bond] as usize, weights.blocks[bond]);
+        for (j, &block) in weights.bonds(i) {
             if leads[j] {
                 let u = displacement.get(j);
                 (0..2).for_each(|a| load[a] += block[a][0] * u[0] + block[a][1] * u[1]);

@@ -33,10 +33,15 @@ impl Axes {
     /// A plot in which a unit is as long in y as it is in x, around a body within `low` to `high`
     /// with `margin` to every side; its corner is at the origin.
     pub fn equal(low: [f64; 2], high: [f64; 2], margin: f64) -> Self {
-        let extent = [0, 1].map(|k| (high[k] - low[k] + 2.0 * margin).max(f64::MIN_POSITIVE));
+        let [width, height] = [0, 1].map(|k| (high[k] - low[k] + 2.0 * margin).max(f64::MIN_POSITIVE));
         // A slender body that stands gets a taller sheet, so that it is more than a line.
-        let tallest = 680.0 * (extent[1] / extent[0] / 2.0).clamp(1.0, 1.6);
-        let scale = (680.0 / extent[0]).min(tallest / extent[1]);
+        Self::fitted(low, high, margin, [680.0, 680.0 * (height / width / 2.0).clamp(1.0, 1.6)])
+    }
+
+    /// Such a plot that takes no more than `room` \[px\], unless ticks could not be told apart there.
+    pub fn fitted(low: [f64; 2], high: [f64; 2], margin: f64, room: [f64; 2]) -> Self {
+        let extent = [0, 1].map(|k| (high[k] - low[k] + 2.0 * margin).max(f64::MIN_POSITIVE));
+        let scale = (room[0] / extent[0]).min(room[1] / extent[1]);
         let least = [150.0, 110.0];
         let size = [0, 1].map(|k| (extent[k] * scale).max(least[k]));
         let centre = [0, 1].map(|k| low[k] / 2.0 + high[k] / 2.0);

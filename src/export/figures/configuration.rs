@@ -51,11 +51,11 @@ fn legend(snapshot: &Snapshot, is_raster: bool) -> Vec<Key> {
     } else {
         (colour::BROKEN_BOND, Mark::DashedLine)
     };
-    let broken = Key { name: "broken bond", colour, mark };
+    let broken = Key { name: "broken bond".into(), colour, mark };
     let is_present = |role: &Role| snapshot.roles.contains(role);
     let roles = PAINTING_ORDER.into_iter().rev().filter(is_present);
     roles
-        .map(|role| Key { name: role.name(), colour: colour::of_role(role), mark: Mark::Dot })
+        .map(|role| Key { name: role.name().into(), colour: colour::of_role(role), mark: Mark::Dot })
         .chain((!snapshot.broken.is_empty()).then_some(broken))
         .collect()
 }

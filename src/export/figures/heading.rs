@@ -1,5 +1,7 @@
 //! What stands above a plot: title, what is shown, legend.
 
+use std::borrow::Cow;
+
 use super::svg::{Anchor, INK, Svg, text_width};
 
 const TITLE_TEXT: f64 = 16.0;
@@ -9,9 +11,9 @@ const MARGIN: f64 = 16.0;
 const QUIET: &str = "#555555";
 
 /// An entry of the legend.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Key {
-    pub name: &'static str,
+    pub name: Cow<'static, str>,
     pub colour: &'static str,
     pub mark: Mark,
 }
@@ -19,6 +21,8 @@ pub struct Key {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mark {
     Dot,
+    Ring,
+    Line,
     DashedLine,
 }
 
@@ -48,7 +52,7 @@ impl Heading {
         }
         let mut x = MARGIN;
         for (n, key) in self.legend.iter().enumerate() {
-            let takes = 21.0 + text_width(key.name, KEY_TEXT) + 20.0;
+            let takes = 21.0 + text_width(&key.name, KEY_TEXT) + 20.0;
             if n == 0 || x + takes - 20.0 > width - MARGIN {
                 x = MARGIN;
                 y += if n == 0 { 14.0 } else { 20.0 };
@@ -67,13 +71,17 @@ fn draw_key(svg: &mut Svg, key: &Key, [x, y]: [f64; 2]) {
                 svg.rect([x + 3.0, y - 5.0], [10.0, 10.0], "rx=\"5\"");
             });
         }
-        Mark::DashedLine => {
-            let attributes =
-                format!("stroke=\"{}\" stroke-width=\"1.5\" stroke-dasharray=\"4 2\"", key.colour);
+        Mark::Ring => {
+            let attributes = format!("fill=\"none\" stroke=\"{}\" stroke-width=\"1.5\"", key.colour);
+            svg.group(attributes, |svg| svg.rect([x + 3.0, y - 5.0], [10.0, 10.0], "rx=\"5\""));
+        }
+        Mark::Line | Mark::DashedLine => {
+            let dashes = if key.mark == Mark::DashedLine { " stroke-dasharray=\"4 2\"" } else { "" };
+            let attributes = format!("stroke=\"{}\" stroke-width=\"1.5\"{dashes}", key.colour);
             svg.group(attributes, |svg| svg.line([x, y], [x + 16.0, y]));
         }
     }
-    svg.text([x + 21.0, y], Anchor::Start, KEY_TEXT, INK, key.name);
+    svg.text([x + 21.0, y], Anchor::Start, KEY_TEXT, INK, &key.name);
 }
 
 /// Breaks a text between words so that no line is wider than `room` \[px\].

@@ -1,13 +1,15 @@
 //! Figures: each is drawn once, as SVG, and its PNG is rendered from that very SVG.
 //!
 //! [`configuration()`]: the body at a step, in the paper's colours. [`pe1`]: filled contours of the first
-//! pseudo-energy over it. [`probes`]: the history of a few particles. Axes of bodies are equal, and
-//! every axis carries its unit. SVG is written directly: a figure here is circles, lines and paths,
-//! and what matters is where they go.
+//! pseudo-energy over it. [`probes`]: the history of a few particles. [`overlay`] and [`von_mises()`]: what a
+//! rule makes of a body beside the truth. Axes of bodies are equal, and every axis carries its unit. SVG is
+//! written directly: a figure here is circles, lines and paths, and what matters is where they go.
 
 mod axes;
 mod bands;
+pub mod chart;
 mod colour;
+mod comparison;
 mod configuration;
 mod energy;
 mod faces;
@@ -18,6 +20,7 @@ mod png;
 mod raster;
 mod svg;
 mod ticks;
+mod von_mises;
 
 use std::path::{Path, PathBuf};
 
@@ -26,9 +29,12 @@ use crate::continuum::engine::Engine;
 use crate::flock::body::Body;
 use crate::flock::neighbourhood::Neighbours;
 use crate::scene::Scene;
+pub use colour::SERIES;
+pub use comparison::{Pair, overlay};
 pub use configuration::configuration;
 pub use energy::pe1;
 pub use history::probes;
+pub use von_mises::von_mises;
 
 /// Whom a figure shows.
 #[derive(Clone, Copy, Debug)]

@@ -52,7 +52,7 @@ impl Ticks {
 
     /// `quantity [unit]`, with the power of ten that the labels leave out; a count has no unit.
     pub fn axis_name(&self, quantity: &str, unit: &str) -> String {
-        let power = format!("10{}", superscript(self.exponent));
+        let power = power_of_ten(self.exponent);
         match (self.exponent, unit) {
             (0, "") => quantity.to_owned(),
             (0, unit) => format!("{quantity} [{unit}]"),
@@ -60,6 +60,11 @@ impl Ticks {
             (_, unit) => format!("{quantity} [{power} {unit}]"),
         }
     }
+}
+
+/// `10` with this exponent, as it is printed.
+pub fn power_of_ten(exponent: i32) -> String {
+    format!("10{}", superscript(exponent))
 }
 
 /// A power of a thousand for numbers that would need many digits.

@@ -9,7 +9,7 @@ use super::Neighbour;
 pub fn mean(neighbours: impl Iterator<Item = Neighbour>) -> Option<[f64; 2]> {
     // -0.0 is the neutral element of addition: adding the first neighbour to it changes no bit.
     let (mut x, mut y, mut total) = (-0.0, -0.0, 0.0);
-    for Neighbour { position, weight } in neighbours {
+    for Neighbour { position, weight, .. } in neighbours {
         x += weight * position[0];
         y += weight * position[1];
         total += weight;
@@ -23,7 +23,8 @@ mod tests {
 
     #[test]
     fn weights_pull_the_centre_of_gravity() {
-        let pair = [(0.0, 3.0), (4.0, 1.0)].map(|(x, weight)| Neighbour { position: [x, 1.0], weight });
+        let pair =
+            [(0.0, 3.0), (4.0, 1.0)].map(|(x, weight)| Neighbour { weight, ..Neighbour::at([x, 1.0]) });
         assert_eq!(mean(pair.into_iter()), Some([1.0, 1.0]));
     }
 }

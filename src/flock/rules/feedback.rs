@@ -42,7 +42,7 @@ mod tests {
 
     #[test]
     fn the_two_references_overshoot_from_different_places() {
-        let own = Own { present: [1.0, 0.0], reference: [0.0, 0.0], rest: [0.0; 2] };
+        let own = Own { present: [1.0, 0.0], reference: [0.0, 0.0], rest: [0.0; 2], load: None };
         let overshoot = |reference| {
             let mut target = [3.0, 0.0];
             Feedback { factor: 0.5, reference }.overshoot(&own, &mut target);

@@ -8,11 +8,16 @@
 mod barycentre;
 mod distance;
 mod feedback;
+mod material;
 mod poisson;
 mod power;
 mod spaced;
 
+use super::block::{Block, IDENTITY, apply};
+use material::Turn;
+
 pub use feedback::{Feedback, FeedbackReference};
+pub use material::Rotation;
 pub use poisson::{Axis, Poisson};
 pub use power::Origin;
 
@@ -21,8 +26,28 @@ pub use power::Origin;
 pub struct Neighbour {
     /// Present position \[length, world frame\].
     pub position: [f64; 2],
+    /// Position in the reference configuration \[length, world frame\]; only a corotated rule looks.
+    pub reference: [f64; 2],
     /// Fixed weight; 1 where the scene gives none.
     pub weight: f64,
+    /// Fixed weight of a material; only [`Mean::Material`] looks.
+    pub matrix: Block,
+}
+
+impl Neighbour {
+    /// A neighbour that counts once.
+    pub fn at(position: [f64; 2]) -> Self {
+        Self { position, reference: position, weight: 1.0, matrix: IDENTITY }
+    }
+}
+
+/// A push on a particle of a material.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Load {
+    /// \[force\]
+    pub force: [f64; 2],
+    /// How far a force moves the particle while its neighbours stay, `D^-1` \[length / force\].
+    pub compliance: Block,
 }
 
 /// The particle whose target is wanted.
@@ -34,6 +59,7 @@ pub struct Own {
     pub reference: [f64; 2],
     /// Added to the mean \[length\]: see [`Rule::rest_offset`]. Zero for the literal formulas.
     pub rest: [f64; 2],
+    pub load: Option<Load>,
 }
 
 /// Which mean of the neighbours' positions.
@@ -48,6 +74,8 @@ pub enum Mean {
     /// The mean of the places at `spacing` \[length\] from each neighbour, towards the particle,
     /// weighted by this power of the present distance.
     Spaced { spacing: f64, power: f64 },
+    /// Weighted by the neighbours' matrices, which sum to the identity: a rule that is a material.
+    Material { rotation: Rotation },
 }
 
 /// A composed rule; what a scene does not name is `None` and not evaluated.
@@ -71,8 +99,17 @@ impl Rule {
     /// Where the particle moves \[length, world frame\]. A particle without neighbours stays: no target
     /// is computed from nothing. Finite input gives finite output unless the result itself overflows.
     pub fn target(&self, own: &Own, neighbours: impl Iterator<Item = Neighbour> + Clone) -> [f64; 2] {
-        let Some(mean) = self.mean(own.present, neighbours) else { return own.present };
-        let mut target = [mean[0] + own.rest[0], mean[1] + own.rest[1]];
+        let turn = self.turn(own, neighbours.clone());
+        let Some(mean) = self.mean(own.present, turn, neighbours) else { return own.present };
+        let rest = turn.map_or(own.rest, |turn| turn.forth(own.rest));
+        let mut target = [mean[0] + rest[0], mean[1] + rest[1]];
+        if let Some(Load { force, compliance }) = &own.load {
+            let push = match turn {
+                None => apply(compliance, *force),
+                Some(turn) => turn.forth(apply(compliance, turn.back(*force))),
+            };
+            target = [target[0] + push[0], target[1] + push[1]];
+        }
         if let Some(poisson) = &self.poisson {
             poisson.add(own, &mut target);
         }
@@ -82,10 +119,19 @@ impl Rule {
         target
     }
 
+    /// The turn of the neighbours about the particle, where the rule looks for it.
+    fn turn(&self, own: &Own, neighbours: impl Iterator<Item = Neighbour>) -> Option<Turn> {
+        match self.mean {
+            Mean::Material { rotation: Rotation::Corotated } => Turn::of(own, neighbours),
+            _ => None,
+        }
+    }
+
     /// The bare mean, before any term; `None` without neighbours or without any weight.
-    pub fn mean(
+    fn mean(
         &self,
         present: [f64; 2],
+        turn: Option<Turn>,
         neighbours: impl Iterator<Item = Neighbour> + Clone,
     ) -> Option<[f64; 2]> {
         match self.mean {
@@ -93,6 +139,7 @@ impl Rule {
             Mean::Distance { power } => distance::mean(power, present, neighbours),
             Mean::Power { exponent, origin } => power::mean(exponent, origin, neighbours),
             Mean::Spaced { spacing, power } => spaced::mean(spacing, power, present, neighbours),
+            Mean::Material { .. } => material::mean(turn, neighbours),
         }
     }
 
@@ -108,7 +155,7 @@ impl Rule {
         reference: [f64; 2],
         neighbours: impl Iterator<Item = Neighbour> + Clone,
     ) -> [f64; 2] {
-        let Some(mean) = self.mean(reference, neighbours) else { return [0.0; 2] };
+        let Some(mean) = self.mean(reference, None, neighbours) else { return [0.0; 2] };
         [0, 1].map(|k| exact_difference(reference[k], mean[k]))
     }
 }
@@ -128,7 +175,7 @@ mod tests {
     use super::*;
 
     pub(super) fn at(points: &[[f64; 2]]) -> impl Iterator<Item = Neighbour> + Clone + '_ {
-        points.iter().map(|&position| Neighbour { position, weight: 1.0 })
+        points.iter().map(|&position| Neighbour::at(position))
     }
 
     const EVERY_MEAN: [Mean; 8] = [
@@ -143,7 +190,7 @@ mod tests {
     ];
 
     fn own(present: [f64; 2]) -> Own {
-        Own { present, reference: present, rest: [0.0; 2] }
+        Own { present, reference: present, rest: [0.0; 2], load: None }
     }
 
     #[test]
@@ -162,7 +209,7 @@ mod tests {
             let rule = Rule { mean, ..Rule::BARYCENTRE };
             let rest = rule.rest_offset(here, at(&around));
             if rest.iter().all(|r| r.is_finite()) {
-                let own = Own { present: here, reference: here, rest };
+                let own = Own { present: here, reference: here, rest, load: None };
                 assert_eq!(rule.target(&own, at(&around)), here, "{mean:?}");
             }
         }

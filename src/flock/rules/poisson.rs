@@ -60,7 +60,7 @@ mod tests {
     fn a_pull_along_x_draws_both_sides_towards_the_axis() {
         let poisson = Poisson { k: -0.1, pull: Axis::X, centre: 2.0, half_width: 2.0, exponent: 1.0 };
         let moved = |y: f64| {
-            let own = Own { present: [0.0, y], reference: [0.0, y], rest: [0.0; 2] };
+            let own = Own { present: [0.0, y], reference: [0.0, y], rest: [0.0; 2], load: None };
             let mut target = [1.0, y];
             poisson.add(&own, &mut target);
             target[1] - y

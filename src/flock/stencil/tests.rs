@@ -1,5 +1,5 @@
 use super::super::body::{Body, Cut};
-use super::super::interaction::Interaction;
+use super::super::interaction::{Interaction, Weights};
 use super::super::lattice::{Lattice, LatticeKind};
 use super::super::neighbourhood::Neighbourhood;
 use super::super::rules::Rule;
@@ -29,7 +29,8 @@ fn lay(lattice: LatticeKind, cut: &Cut, neighbourhood: &Neighbourhood) -> Intera
         rule: Rule::BARYCENTRE,
         reference: body.reference,
         neighbours,
-        weights: None,
+        weights: Weights::Equal,
+        forces: None,
         rest: None,
         bonds: None,
     }
@@ -120,7 +121,8 @@ fn a_mean_of_negative_zeros_and_a_particle_without_neighbours_give_the_bits_of_t
         rule: Rule::BARYCENTRE,
         reference: Points::zeros(22).into(),
         neighbours: Neighbours::from_lists(lists),
-        weights: None,
+        weights: Weights::Equal,
+        forces: None,
         rest: None,
         bonds: None,
     };

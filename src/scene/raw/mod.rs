@@ -8,6 +8,7 @@
 #![allow(rustdoc::broken_intra_doc_links)]
 
 mod body;
+mod material;
 mod roles;
 mod rule;
 
@@ -15,6 +16,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use body::*;
+pub use material::*;
 pub use roles::*;
 pub use rule::*;
 
@@ -35,10 +37,16 @@ pub struct RawScene {
     /// The shell around the body that gives edge particles their full neighbourhood.
     #[serde(default)]
     pub frame: RawFrame,
+    /// The first neighbours unless given; for the rule `material` all those with whom a particle shares
+    /// a cell of the lattice.
     #[serde(default)]
-    pub neighbours: RawNeighbours,
+    pub neighbours: Option<RawNeighbours>,
     #[serde(default)]
     pub rule: RawRule,
+    #[serde(default)]
+    pub material: Option<RawMaterial>,
+    #[serde(default)]
+    pub loads: Vec<RawLoad>,
     #[serde(default)]
     pub update: RawUpdate,
     /// Who is what, from when; later entries win. Particles that no entry names are followers.
@@ -52,6 +60,8 @@ pub struct RawScene {
     pub cuts: Vec<RawCut>,
     #[serde(default)]
     pub stop: RawStop,
+    #[serde(default)]
+    pub equilibrium: Option<RawEquilibrium>,
     #[serde(default)]
     pub record: RawRecord,
 }
@@ -169,5 +179,11 @@ mod defaults {
     }
     pub fn growth() -> f64 {
         1000.0
+    }
+    pub fn residual() -> f64 {
+        1e-8
+    }
+    pub fn iterations() -> usize {
+        1_000_000
     }
 }

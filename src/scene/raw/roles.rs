@@ -169,6 +169,14 @@ pub enum RawMotion {
         #[schemars(range(min = 1))]
         steps: usize,
     },
+    /// To where finite elements have these particles in the scene's material under its loads, reached in
+    /// even parts over a number of steps. The rest of the body can then be held against the same truth.
+    Truth {
+        /// Steps to get there [step].
+        #[serde(default = "super::defaults::one_step")]
+        #[schemars(range(min = 1))]
+        steps: usize,
+    },
 }
 
 /// Where a leader is at a step.

@@ -22,6 +22,9 @@ pub enum RawNeighbours {
         #[schemars(range(min = 1, max = 8))]
         radius: i32,
     },
+    /// Everybody with whom a particle shares a cell of the lattice, as a material needs: 8 on square and
+    /// rectangular lattices, 6 on the triangular ones, 12 on the honeycomb.
+    Cells {},
     /// The neighbours of the neighbours too: the paper's second gradient.
     Second {},
     /// The sites at these offsets in columns and rows of the lattice.
@@ -42,12 +45,6 @@ pub enum RawNeighbours {
         #[schemars(extend("exclusiveMinimum" = 0))]
         radius: f64,
     },
-}
-
-impl Default for RawNeighbours {
-    fn default() -> Self {
-        RawNeighbours::First { keep: None }
-    }
 }
 
 /// How a follower's position comes from its neighbours'; what is not named is not evaluated.
@@ -105,6 +102,22 @@ pub enum RawMean {
         #[serde(default)]
         power: f64,
     },
+    /// Weighted by 2x2 matrices that make the body the scene's `[material]`. Free edges need no frame.
+    Material {
+        #[serde(default)]
+        rotation: RawRotation,
+    },
+}
+
+/// Which turns of the body cost a material nothing.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum RawRotation {
+    /// Small ones, to first order.
+    #[default]
+    Small,
+    /// All: each particle works in axes that turn with its neighbours.
+    Corotated,
 }
 
 /// What the coordinates of geometric and power means are measured from.
@@ -199,21 +212,16 @@ pub enum RawFeedbackReference {
 }
 
 /// How targets become positions.
-#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Debug, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawUpdate {
     #[serde(default)]
     pub order: RawOrder,
-    /// Part of the way to the target that is gone in one step [1].
-    #[serde(default = "super::defaults::one")]
+    /// Part of the way to the target that is gone in one step [1]. Unless given, 1; for the rule
+    /// `material` swept synchronously, nine tenths of the most at which no wave grows.
+    #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0, "maximum" = 2))]
-    pub damping: f64,
-}
-
-impl Default for RawUpdate {
-    fn default() -> Self {
-        Self { order: RawOrder::default(), damping: super::defaults::one() }
-    }
+    pub damping: Option<f64>,
 }
 
 /// Who sees whose new position within one step.

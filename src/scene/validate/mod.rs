@@ -1,6 +1,7 @@
 //! From the scene as written to the scene as meant: degrees to radians, choices to rules, and the
 //! checks that concern several keys at once.
 
+mod material;
 mod roles;
 
 use std::path::Path;
@@ -17,6 +18,7 @@ use crate::flock::neighbourhood::Neighbourhood;
 use crate::flock::rules::{Axis, Feedback, FeedbackReference, Mean, Origin};
 use crate::flock::shape::{Segment, Shape};
 use crate::flock::specimen::Specimen;
+use crate::material::cells;
 use crate::solve::sweep::{Order, Update};
 
 impl Scene {
@@ -75,8 +77,12 @@ fn validate(
     let shape = shape(&raw.body, refuse)?;
     let lattice = lattice(&raw, shape.as_ref());
     let spacing = lattice.spacing();
-    let neighbourhood = neighbourhood(&raw.neighbours);
+    let neighbourhood = material::neighbourhood(&raw, &lattice);
     check_present_neighbours(&raw, refuse)?;
+    material::check_rule(&raw, refuse)?;
+    material::check_equilibrium(&raw, refuse)?;
+    check_truth(&raw, refuse)?;
+    let elastic = material::elastic(&raw.material, refuse)?;
     let roles = raw
         .roles
         .iter()
@@ -92,7 +98,7 @@ fn validate(
         weights: weights(&raw.rule.weights, refuse)?,
         // Neighbours found anew every step have no reference configuration to be at rest in.
         keeps_rest: raw.rule.rest == RawRest::Kept
-            && !matches!(raw.neighbours, RawNeighbours::Present { .. }),
+            && !matches!(raw.neighbours, Some(RawNeighbours::Present { .. })),
         poisson: raw.rule.poisson.as_ref().map(|p| PoissonTerm {
             k: p.k,
             pull: match p.pull {
@@ -114,8 +120,10 @@ fn validate(
                 RawOrder::Synchronous => Order::Synchronous,
                 RawOrder::Sequential => Order::Sequential,
             },
-            damping: raw.update.damping,
+            damping: material::damping(&raw, &lattice, elastic.as_ref()),
         },
+        loads: material::loads(&raw.loads, refuse)?,
+        material: elastic,
         roles,
         fracture: fracture(&raw.fracture, refuse)?,
         cuts: cuts(&raw.cuts, refuse)?,
@@ -214,10 +222,11 @@ fn frame(raw: RawFrame) -> Option<FrameRule> {
     }
 }
 
-fn neighbourhood(raw: &RawNeighbours) -> Neighbourhood {
+fn neighbourhood(raw: &RawNeighbours, lattice: &Lattice) -> Neighbourhood {
     match raw {
         RawNeighbours::First { keep } => Neighbourhood::First { keep: *keep },
         RawNeighbours::Ring { radius } => Neighbourhood::Ring { radius: *radius },
+        RawNeighbours::Cells {} => cells::neighbourhood(lattice),
         RawNeighbours::Second {} => Neighbourhood::Second,
         RawNeighbours::Offsets { offsets } => Neighbourhood::Offsets(offsets.clone()),
         RawNeighbours::Within { radius } => Neighbourhood::Within { radius: *radius },
@@ -227,7 +236,7 @@ fn neighbourhood(raw: &RawNeighbours) -> Neighbourhood {
 
 /// Neighbours found anew at every step have no bonds, so whatever needs bonds is refused with them.
 fn check_present_neighbours(raw: &RawScene, refuse: Refuse<'_>) -> Result<(), SceneError> {
-    if !matches!(raw.neighbours, RawNeighbours::Present { .. }) {
+    if !matches!(raw.neighbours, Some(RawNeighbours::Present { .. })) {
         return Ok(());
     }
     let clash = [
@@ -243,6 +252,19 @@ fn check_present_neighbours(raw: &RawScene, refuse: Refuse<'_>) -> Result<(), Sc
             format!("{what} cannot go with neighbours that are found anew at every step"),
             "use neighbours of kind \"within\", which are fixed at the start, or leave this out",
         )),
+    }
+}
+
+/// Leaders led by the truth need a material to compute it for.
+fn check_truth(raw: &RawScene, refuse: Refuse<'_>) -> Result<(), SceneError> {
+    let led = raw.roles.iter().position(|entry| matches!(entry.motion, Some(RawMotion::Truth { .. })));
+    match led {
+        Some(k) if raw.material.is_none() => Err(refuse(
+            &format!("roles[{k}].motion"),
+            "the truth is that of a material, and the scene has none".into(),
+            "add [material] with kind = \"isotropic\", young and poisson",
+        )),
+        _ => Ok(()),
     }
 }
 
@@ -265,6 +287,7 @@ fn mean(raw: &RawMean, spacing: f64, refuse: Refuse<'_>) -> Result<Mean, SceneEr
         }
         RawMean::Power { exponent, origin: from } => Mean::Power { exponent, origin: origin(from) },
         RawMean::Spaced { spacing, power } => Mean::Spaced { spacing, power },
+        RawMean::Material { rotation } => Mean::Material { rotation: material::rotation(rotation) },
     })
 }
 

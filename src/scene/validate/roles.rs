@@ -40,7 +40,7 @@ pub fn role_entry(
     Ok(RoleEntry { region: region(key, &raw.region, refuse)?, role, from: raw.from.max(1), when, motion })
 }
 
-fn region(key: &str, raw: &RawRegion, refuse: Refuse<'_>) -> Result<SceneRegion, SceneError> {
+pub fn region(key: &str, raw: &RawRegion, refuse: Refuse<'_>) -> Result<SceneRegion, SceneError> {
     let side = |side: RawSide| match side {
         RawSide::Left => Side::Left,
         RawSide::Right => Side::Right,
@@ -109,6 +109,7 @@ fn leader_motion(
         RawMotion::Sinusoid { amplitude, period, phase } => {
             Motion::Sinusoid { amplitude: *amplitude, period: *period, phase: *phase }
         }
+        RawMotion::Truth { steps } => return Ok(LeaderMotion::Truth { steps: *steps }),
         RawMotion::Csv { file, scale, steps } => {
             let key = format!("{key}.motion.file");
             let path = folder.unwrap_or(Path::new("")).join(file);

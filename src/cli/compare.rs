@@ -1,0 +1,81 @@
+//! `flockform compare`: rule and truth of a scene, how far apart they are.
+
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::atomic::Ordering;
+
+use clap::Args;
+use flockform::compare::run::{Compared, compare as compare_scene};
+use flockform::continuum::run::StopReason;
+use flockform::export::OutputFolder;
+use flockform::export::comparison::{ComparisonReport, write_comparison};
+use flockform::scene::Scene;
+
+use super::progress::Progress;
+use super::run::{exit_code, free_folder, interrupt_flag};
+use super::{Refusal, SceneArguments, print};
+
+#[derive(Debug, Args)]
+pub struct CompareArguments {
+    #[command(flatten)]
+    scene: SceneArguments,
+    /// Folder for the results; must be empty or new [default: out/SCENE-compare, numbered if taken]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Cut each side of a cell into N parts for the truth [default: as many as make it exact enough]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    refine: Option<u16>,
+    /// Print compare.json instead of a table
+    #[arg(long)]
+    json: bool,
+    /// Print nothing but errors
+    #[arg(long, short, conflicts_with = "json")]
+    quiet: bool,
+    /// Replace an earlier output of flockform in DIR
+    #[arg(long)]
+    force: bool,
+}
+
+/// Compares a scene's rule with its truth, prints the measures and writes what comes of it.
+pub fn compare(arguments: &CompareArguments) -> Result<ExitCode, Refusal> {
+    let scene = arguments.scene.load(None)?;
+    let out = arguments.out.clone().unwrap_or_else(|| free_folder(&format!("{}-compare", scene.name)));
+    let folder = OutputFolder::create(&out, arguments.force)?;
+    let mut progress = Progress::new(arguments.quiet, scene.stop.steps);
+    let interrupted = interrupt_flag();
+    let compared = compare_scene(&scene, arguments.refine.map(usize::from), &mut |engine, residual| {
+        progress.step(engine.step(), residual);
+        if interrupted.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    })?;
+    progress.finish();
+
+    let report = ComparisonReport::new(&scene, &compared);
+    write_comparison(&folder, &scene, &compared, &report)?;
+    let kept = folder.commit()?;
+    if arguments.json {
+        print(&format!("{:#}\n", serde_json::json!(report)));
+    } else if !arguments.quiet {
+        print(&format!("{}results in {}\n", words(&scene, &compared), kept.display()));
+    }
+    Ok(exit_code(&compared.outcome))
+}
+
+/// How the rule's run ended, and the table.
+fn words(scene: &Scene, compared: &Compared) -> String {
+    let (outcome, truth) = (&compared.outcome, compared.truth.truth.mesh());
+    let residual = outcome.residual;
+    let end = match &outcome.reason {
+        StopReason::Equilibrium => "at rest".to_owned(),
+        StopReason::Unsettled => format!("not at rest: the solver ended at a residual of {residual:.2e}"),
+        StopReason::Steps => format!("all steps done, residual {residual:.2e}"),
+        StopReason::Interrupted => "interrupted: compared as far as it came".to_owned(),
+        StopReason::Diverged(divergence) => format!("{divergence}; the last good state is compared"),
+    };
+    let way = match &outcome.solved {
+        Some(solved) => format!("{}, {} iterations", solved.solver, solved.iterations),
+        None => format!("{} steps", outcome.engine.step()),
+    };
+    let nodes = truth.mesh().node_count();
+    format!("{}: the rule by {way}, {end}; truth on {nodes} nodes\n{}", scene.name, compared.comparison)
+}

@@ -1,0 +1,143 @@
+//! How far two displacements of one body are apart.
+//!
+//! Both sides are known at the particles and pass through the same formulas, so what is measured is the
+//! rule and not the way from displacement to stress.
+
+use std::fmt;
+
+use nalgebra::DVector;
+use serde::{Deserialize, Serialize};
+
+use crate::flock::points::{Points, distance};
+use crate::material::cells::Cells;
+use crate::material::elastic::Elastic;
+use crate::material::stiffness::{ShapeError, element};
+
+/// A rule's displacements beside the true ones. Keys ending in `_rel` and `_rel_l2` are fractions \[1\].
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Comparison {
+    /// Relative L2 error of the displacement over the followers: sqrt(sum |u - t|^2 / sum |t|^2).
+    pub displacement_rel_l2: f64,
+    /// Largest distance between where the rule and the truth have a follower \[length\].
+    pub displacement_max: f64,
+    /// The same over the largest true displacement of a follower.
+    pub displacement_max_rel: f64,
+    /// Relative L2 error of the von Mises stress over the centres of all cells.
+    pub von_mises_rel_l2: f64,
+    /// Energy norm of the error over that of the truth, in the cells: sqrt(a(u - t, u - t) / a(t, t)).
+    pub energy_rel: f64,
+    /// Strain energy of the cells at the rule's displacements \[force length\].
+    pub strain_energy_rule: f64,
+    /// Strain energy of the cells at the true displacements \[force length\].
+    pub strain_energy_truth: f64,
+    /// Particles that follow and are in a cell: those compared.
+    pub followers: usize,
+    pub cells: usize,
+    /// Time to the rule's equilibrium and to the truth's \[s\]; zero where nobody took it.
+    pub seconds_rule: f64,
+    pub seconds_truth: f64,
+}
+
+/// Two displacements of one body. Arrays follow the particles, shape \[particles\].
+#[derive(Clone, Copy, Debug)]
+pub struct Sides<'a> {
+    pub cells: &'a Cells,
+    pub elastic: &'a Elastic,
+    /// Displacements \[length\].
+    pub rule: &'a Points,
+    pub truth: &'a Points,
+    /// Who is free to go elsewhere than the truth: the followers that are in a cell.
+    pub follows: &'a [bool],
+}
+
+impl Comparison {
+    /// Measures the distance; times are left at zero.
+    ///
+    /// # Errors
+    /// A cell that has no stiffness; those of lattices all have one.
+    pub fn of(sides: &Sides<'_>) -> Result<Self, ShapeError> {
+        let Sides { cells, elastic, rule, truth, follows } = *sides;
+        let followers = || (0..follows.len()).filter(|&i| follows[i]);
+        let zero = [0.0; 2];
+        let apart =
+            |a: &Points, b: &Points| followers().map(|i| distance(a.get(i), b.get(i))).collect::<Vec<_>>();
+        let still: Points = std::iter::repeat_n(zero, truth.len()).collect();
+        let (off, size) = (apart(rule, truth), apart(truth, &still));
+        let stress = [rule, truth].map(|u| von_mises(cells, elastic, u));
+        let stress_off: Vec<f64> =
+            stress[0].iter().zip(&stress[1]).map(|(rule, truth)| rule - truth).collect();
+        let error: Points = rule.iter().zip(truth.iter()).map(|(u, t)| [u[0] - t[0], u[1] - t[1]]).collect();
+        let energy_truth = strain_energy(cells, elastic, truth)?;
+        Ok(Self {
+            displacement_rel_l2: ratio(norm(&off), norm(&size)),
+            displacement_max: largest(&off),
+            displacement_max_rel: ratio(largest(&off), largest(&size)),
+            von_mises_rel_l2: ratio(norm(&stress_off), norm(&stress[1])),
+            energy_rel: ratio(strain_energy(cells, elastic, &error)?, energy_truth).sqrt(),
+            strain_energy_rule: strain_energy(cells, elastic, rule)?,
+            strain_energy_truth: energy_truth,
+            followers: off.len(),
+            cells: cells.count(),
+            seconds_rule: 0.0,
+            seconds_truth: 0.0,
+        })
+    }
+}
+
+/// Von Mises stress at the centres of cells \[force / length^2\] whose corners are displaced by
+/// `displacement` \[length\], shape \[cells\]: on a quadrilateral by the bilinear formula.
+pub fn von_mises(cells: &Cells, elastic: &Elastic, displacement: &Points) -> Vec<f64> {
+    cells.strains(displacement).into_iter().map(|strain| elastic.von_mises(strain)).collect()
+}
+
+/// Strain energy of the cells \[force length\] under displacements \[length\] of their corners.
+pub fn strain_energy(cells: &Cells, elastic: &Elastic, displacement: &Points) -> Result<f64, ShapeError> {
+    let elements: Result<Vec<_>, _> =
+        cells.shapes.iter().map(|shape| element(shape, elastic.stiffness())).collect();
+    let elements = elements?;
+    let of_cell = |(cell, &kind): (&[u32], &u32)| {
+        // Relative to the first corner: a translation must not cost digits.
+        let first = displacement.get(cell[0] as usize);
+        let relative = |&i: &u32| {
+            let u = displacement.get(i as usize);
+            [u[0] - first[0], u[1] - first[1]]
+        };
+        let u = DVector::from_iterator(2 * cell.len(), cell.iter().flat_map(relative));
+        0.5 * u.dot(&(&elements[kind as usize] * &u))
+    };
+    Ok(cells.iter().zip(&cells.kind).map(of_cell).sum())
+}
+
+fn norm(values: &[f64]) -> f64 {
+    values.iter().map(|v| v * v).sum::<f64>().sqrt()
+}
+
+fn largest(values: &[f64]) -> f64 {
+    values.iter().copied().fold(0.0, f64::max)
+}
+
+/// No error is no error, whatever it is measured by.
+fn ratio(error: f64, size: f64) -> f64 {
+    if error == 0.0 { 0.0 } else { error / size }
+}
+
+impl fmt::Display for Comparison {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let percent = |part: f64| format!("{:.3} %", 100.0 * part);
+        let largest =
+            format!("{:.4e} ({} of the largest)", self.displacement_max, percent(self.displacement_max_rel));
+        let energies = format!("{:.5e}, truth {:.5e}", self.strain_energy_rule, self.strain_energy_truth);
+        let rows = [
+            ("displacement, relative L2", percent(self.displacement_rel_l2)),
+            ("displacement, largest error", largest),
+            ("von Mises, relative L2", percent(self.von_mises_rel_l2)),
+            ("energy norm of the error", percent(self.energy_rel)),
+            ("strain energy, rule", energies),
+            ("compared", format!("{} followers, {} cells", self.followers, self.cells)),
+            ("time, rule", format!("{:.3} s", self.seconds_rule)),
+            ("time, truth", format!("{:.3} s", self.seconds_truth)),
+        ];
+        let width = rows.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
+        rows.iter().try_for_each(|(name, value)| writeln!(f, "{name:width$}  {value}"))
+    }
+}

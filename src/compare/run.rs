@@ -1,0 +1,193 @@
+//! Rule and truth of a scene.
+
+use std::ops::ControlFlow;
+use std::time::{Duration, Instant};
+
+use super::measures::{Comparison, Sides, von_mises};
+use super::mesh::{MeshError, TruthMesh};
+use super::truth::{Setting, Truth, TruthError};
+use crate::continuum::engine::Engine;
+use crate::continuum::equilibrium::come_to_rest;
+use crate::continuum::layout::{Layout, RoleChange, held};
+use crate::continuum::plan::Plan;
+use crate::continuum::run::Outcome;
+use crate::flock::points::Points;
+use crate::flock::role::Role;
+use crate::material::cells::Cells;
+use crate::material::elastic::Elastic;
+use crate::scene::{LeaderMotion, Scene, SceneError};
+
+/// The truth of a scene's body in its material, under its loads and whoever does not follow.
+#[derive(Clone, Debug)]
+pub struct SceneTruth {
+    pub truth: Truth,
+    pub layout: Layout,
+    pub elastic: Elastic,
+    /// Time to the solution.
+    pub time: Duration,
+}
+
+/// What a comparison leaves. Arrays follow the particles or the cells of the body.
+#[derive(Debug)]
+pub struct Compared {
+    pub comparison: Comparison,
+    pub outcome: Outcome,
+    pub truth: SceneTruth,
+    pub cells: Cells,
+    /// Displacements by the rule \[length\], shape \[particles\]; the true ones are the truth's.
+    pub rule: Points,
+    /// At the centres of the cells, the corners displaced by the rule and in truth
+    /// \[force / length^2\], shape \[cells\].
+    pub von_mises_rule: Vec<f64>,
+    pub von_mises_truth: Vec<f64>,
+}
+
+/// Solves for the truth of a scene: clamped particles and leaders with a motion of their own are held where
+/// they are at step `stop.steps`, leaders led by the truth are as free as the followers.
+///
+/// `refine` is how many parts each side of a cell is cut into;
+/// [`TruthMesh::default_refinement`] unless given.
+///
+/// # Errors
+/// Names the key of the scene for which there is no truth: no material, a body that nothing holds, a body
+/// too large for the refinement, a leader that is in no cell.
+pub fn truth_of(scene: &Scene, refine: Option<usize>) -> Result<SceneTruth, SceneError> {
+    let start = Instant::now();
+    let layout = Layout::new(scene)?;
+    let (Some(cells), Some(elastic)) = (&layout.cells, scene.material) else {
+        let help = "add [material] with kind = \"isotropic\", young and poisson";
+        return Err(scene.refuse(
+            "material",
+            "the truth is that of a material, and the scene has none",
+            help,
+        ));
+    };
+    let changes = layout.role_changes(scene, None)?;
+    let held = held(&changes, &layout.body, scene.stop.steps);
+    let loads = layout.loads(scene)?;
+    let reference = &layout.body.reference;
+    let setting = Setting { cells, reference, elastic: &elastic, held: &held, loads: &loads };
+    let refine = refine.unwrap_or_else(|| TruthMesh::default_refinement(cells));
+    let truth = Truth::solve(&setting, refine).map_err(|error| refused(scene, &error))?;
+    require_known(scene, &truth, &changes)?;
+    Ok(SceneTruth { truth, layout, elastic, time: start.elapsed() })
+}
+
+/// The plan of a scene, its leaders led by the truth where the scene asks for that.
+///
+/// # Errors
+/// As [`truth_of`] and [`Plan::new`].
+pub fn plan(scene: &Scene) -> Result<Plan, SceneError> {
+    match scene.truth_led() {
+        None => Plan::new(scene),
+        Some(_) => plan_led_by(scene, &truth_of(scene, None)?.truth),
+    }
+}
+
+/// Runs the rule of a scene to its end and measures where it has the body against where the truth has it.
+/// `watch` sees the run as [`come_to_rest`] shows it.
+///
+/// # Errors
+/// Names the key of a scene that has no truth, or none that its end could be held against.
+pub fn compare(
+    scene: &Scene,
+    refine: Option<usize>,
+    watch: &mut dyn FnMut(&Engine, f64) -> ControlFlow<()>,
+) -> Result<Compared, SceneError> {
+    require_comparable(scene)?;
+    let truth = truth_of(scene, refine)?;
+    let start = Instant::now();
+    let plan = plan_led_by(scene, &truth.truth)?;
+    let cells = plan.cells.clone().unwrap_or_else(|| Cells::of_body(&plan.body));
+    let outcome = come_to_rest(scene, plan, watch)?;
+    let time = start.elapsed();
+
+    let engine = &outcome.engine;
+    let moved = |(p, x): ([f64; 2], [f64; 2])| [x[0] - p[0], x[1] - p[1]];
+    let rule: Points = engine.body().reference.iter().zip(engine.present().iter()).map(moved).collect();
+    let followed = |(i, &role): (usize, &Role)| role == Role::Follower && truth.truth.knows(i);
+    let follows: Vec<bool> = engine.roles().iter().enumerate().map(followed).collect();
+    let (elastic, known) = (&truth.elastic, &truth.truth.displacement);
+    let sides = Sides { cells: &cells, elastic, rule: &rule, truth: known, follows: &follows };
+    let mut comparison = Comparison::of(&sides)
+        .map_err(|shape| scene.refuse("lattice", shape.to_string(), "use a lattice less slender"))?;
+    comparison.seconds_rule = time.as_secs_f64();
+    comparison.seconds_truth = truth.time.as_secs_f64();
+    let von_mises_rule = von_mises(&cells, elastic, &rule);
+    let von_mises_truth = von_mises(&cells, elastic, known);
+    Ok(Compared { comparison, outcome, truth, cells, rule, von_mises_rule, von_mises_truth })
+}
+
+fn plan_led_by(scene: &Scene, truth: &Truth) -> Result<Plan, SceneError> {
+    // Leaders are particles of cells, or the truth would have been refused.
+    Plan::with_truth(scene, &|places| match truth.displacements_at(places) {
+        Ok(found) => found.iter().collect(),
+        Err(_) => vec![[f64::NAN; 2]; places.len()],
+    })
+}
+
+/// The truth knows one body and one state of rest.
+fn require_comparable(scene: &Scene) -> Result<(), SceneError> {
+    if scene.material.is_none() {
+        return Err(without_material(scene));
+    }
+    let later = scene.roles.iter().position(|entry| entry.from > 1 || entry.when.is_some());
+    if let Some(k) = later {
+        let key = if scene.roles[k].when.is_some() { "when" } else { "from" };
+        return Err(scene.refuse(
+            &format!("roles[{k}].{key}"),
+            "the truth knows the body at rest under roles that hold from the start, and this one comes later",
+            "leave this entry out to compare",
+        ));
+    }
+    let ghosts = scene.roles.iter().position(|entry| entry.role == Role::Ghost);
+    let broken = [
+        (scene.fracture.is_some(), "fracture".to_owned()),
+        (!scene.cuts.is_empty(), "cuts".to_owned()),
+        (ghosts.is_some(), format!("roles[{}].role", ghosts.unwrap_or_default())),
+    ];
+    match broken.into_iter().find(|(is_there, _)| *is_there) {
+        None => Ok(()),
+        Some((_, key)) => Err(scene.refuse(
+            &key,
+            "the truth is that of a whole body: bonds that break have no part in it",
+            "leave this out to compare",
+        )),
+    }
+}
+
+fn without_material(scene: &Scene) -> SceneError {
+    let help = "add [material] with kind = \"isotropic\", young and poisson";
+    scene.refuse("material", "the truth is that of a material, and the scene has none", help)
+}
+
+/// Particles in no cell cannot be led by a truth that does not know them.
+fn require_known(scene: &Scene, truth: &Truth, changes: &[RoleChange]) -> Result<(), SceneError> {
+    for (k, change) in changes.iter().enumerate() {
+        let is_led = matches!(scene.roles[k].motion, Some(LeaderMotion::Truth { .. }));
+        if let Some(i) = change.particles.iter().find(|&&i| is_led && !truth.knows(i)) {
+            let message =
+                format!("particle {} is in no cell of the lattice: the truth does not know it", i + 1);
+            return Err(scene.refuse(&format!("roles[{k}].region"), message, "narrow the region"));
+        }
+    }
+    Ok(())
+}
+
+fn refused(scene: &Scene, error: &TruthError) -> SceneError {
+    let (key, help) = match error {
+        TruthError::Mechanism { .. } => {
+            ("roles", "clamp at least two particles of every part, or lead them by a motion of their own")
+        }
+        TruthError::Singular { .. } | TruthError::Mesh(MeshError::NoCells) => {
+            ("body.shape", "use a smaller spacing or a larger shape")
+        }
+        TruthError::Mesh(MeshError::TooLarge { .. }) => {
+            ("body.shape", "use a wider spacing, a smaller shape or a lower --refine")
+        }
+        TruthError::Mesh(MeshError::NotRefined) => ("body.shape", "give --refine 1 or more"),
+        TruthError::Load(_) => ("loads", "move the load onto particles that belong to cells"),
+        _ => ("material", "use constants, lattice and loads less far apart"),
+    };
+    scene.refuse(key, error.to_string(), help)
+}

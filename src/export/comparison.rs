@@ -1,0 +1,167 @@
+//! A comparison's outputs: `compare.json`, the measures and what they were taken of; `compare.csv`, every
+//! particle; `cells.csv`, the stress of every cell; the figures `overlay` and `von_mises`.
+
+use std::path::PathBuf;
+
+use serde::Serialize;
+
+use super::csv::write;
+use super::error::{ExportError, write_file};
+use super::figures::{self, Pair};
+use super::{OutputFolder, summary};
+use crate::compare::measures::Comparison;
+use crate::compare::run::Compared;
+use crate::scene::Scene;
+use crate::scene::raw::RawScene;
+
+/// The contents of `compare.json`; lengths in the scene's unit, infinities as `null`.
+#[derive(Clone, Debug, Serialize)]
+pub struct ComparisonReport {
+    pub program: &'static str,
+    pub version: &'static str,
+    pub name: String,
+    pub title: String,
+    #[serde(flatten)]
+    pub comparison: Comparison,
+    pub rule: RuleEnd,
+    pub truth: TruthSize,
+    /// The scene, its defaults and overrides included.
+    pub scene: RawScene,
+}
+
+/// How the rule's run ended.
+#[derive(Clone, Copy, Debug, Serialize, PartialEq)]
+pub struct RuleEnd {
+    pub steps: usize,
+    pub stop_reason: &'static str,
+    /// How far the follower farthest from its target is from it, over the spacing.
+    pub residual: Option<f64>,
+    /// Who found the equilibrium, where it was not stepped to, and in how many iterations.
+    pub solver: Option<&'static str>,
+    pub iterations: Option<usize>,
+}
+
+/// What the truth was computed on.
+#[derive(Clone, Copy, Debug, Serialize, PartialEq)]
+pub struct TruthSize {
+    /// Parts into which each side of a cell was cut.
+    pub refine: usize,
+    pub nodes: usize,
+    /// Of the finite elements themselves \[force length\].
+    pub strain_energy: f64,
+}
+
+#[derive(Serialize)]
+struct ParticleRow {
+    id: usize,
+    x: f64,
+    y: f64,
+    role: &'static str,
+    ux_rule: f64,
+    uy_rule: f64,
+    /// Empty where the truth does not know the particle: it is in no cell.
+    ux_truth: Option<f64>,
+    uy_truth: Option<f64>,
+}
+
+#[derive(Serialize)]
+struct CellRow {
+    x: f64,
+    y: f64,
+    von_mises_rule: f64,
+    von_mises_truth: f64,
+}
+
+impl ComparisonReport {
+    pub fn new(scene: &Scene, compared: &Compared) -> Self {
+        let (outcome, truth) = (&compared.outcome, &compared.truth.truth);
+        Self {
+            program: summary::PROGRAM,
+            version: env!("CARGO_PKG_VERSION"),
+            name: scene.name.clone(),
+            title: scene.raw.title.clone(),
+            comparison: compared.comparison,
+            rule: RuleEnd {
+                steps: outcome.engine.step(),
+                stop_reason: outcome.reason.name(),
+                residual: Some(outcome.residual).filter(|residual| residual.is_finite()),
+                solver: outcome.solved.as_ref().map(|solved| solved.solver.name()),
+                iterations: outcome.solved.as_ref().map(|solved| solved.iterations),
+            },
+            truth: TruthSize {
+                refine: truth.mesh().refine(),
+                nodes: truth.mesh().mesh().node_count(),
+                strain_energy: truth.strain_energy(),
+            },
+            scene: scene.raw.clone(),
+        }
+    }
+}
+
+/// Writes tables, figures and, last, the report. Returns the paths within the folder under its temporary
+/// name.
+///
+/// # Errors
+/// The first file that cannot be written.
+pub fn write_comparison(
+    folder: &OutputFolder,
+    scene: &Scene,
+    compared: &Compared,
+    report: &ComparisonReport,
+) -> Result<Vec<PathBuf>, ExportError> {
+    let mut written = vec![write_particles(folder, compared)?, write_cells(folder, compared)?];
+    let body = compared.outcome.engine.body();
+    let stress_unit = format!("force/{}²", scene.unit());
+    let pair = Pair {
+        title: &scene.raw.title,
+        unit: scene.unit(),
+        stress_unit: &stress_unit,
+        spacing: body.lattice.spacing(),
+        cells: &compared.cells,
+        roles: compared.outcome.engine.roles(),
+        reference: &body.reference,
+        rule: &compared.rule,
+        truth: &compared.truth.truth.displacement,
+    };
+    let stresses = figures::von_mises(&pair, &compared.von_mises_rule, &compared.von_mises_truth);
+    written.extend(figures::write(&figures::overlay(&pair), &folder.path("overlay"))?);
+    written.extend(figures::write(&stresses, &folder.path("von_mises"))?);
+    let path = folder.path(summary::COMPARISON);
+    let mut text = serde_json::to_string_pretty(report).map_err(ExportError::io("write", &path))?;
+    text.push('\n');
+    write_file(&path, text)?;
+    written.push(path);
+    Ok(written)
+}
+
+/// Reference place and both displacements of every particle \[length\].
+fn write_particles(folder: &OutputFolder, compared: &Compared) -> Result<PathBuf, ExportError> {
+    let (engine, truth) = (&compared.outcome.engine, &compared.truth.truth);
+    let reference = &engine.body().reference;
+    let rows = (0..reference.len()).map(|i| {
+        let known = |values: &[f64]| truth.knows(i).then(|| values[i]);
+        ParticleRow {
+            id: i + 1,
+            x: reference.x[i],
+            y: reference.y[i],
+            role: engine.roles()[i].name(),
+            ux_rule: compared.rule.x[i],
+            uy_rule: compared.rule.y[i],
+            ux_truth: known(&truth.displacement.x),
+            uy_truth: known(&truth.displacement.y),
+        }
+    });
+    write(folder, "compare.csv", rows)
+}
+
+/// Centre \[length\] and stress \[force / length^2\] of every cell.
+fn write_cells(folder: &OutputFolder, compared: &Compared) -> Result<PathBuf, ExportError> {
+    let centres = compared.cells.centres(&compared.outcome.engine.body().reference);
+    let rows = (0..centres.len()).map(|cell| CellRow {
+        x: centres.x[cell],
+        y: centres.y[cell],
+        von_mises_rule: compared.von_mises_rule[cell],
+        von_mises_truth: compared.von_mises_truth[cell],
+    });
+    write(folder, "cells.csv", rows)
+}

@@ -1,0 +1,270 @@
+//! Curves and points over two axes, each linear or logarithmic: what a solver, a trade or a threshold
+//! looks like.
+
+use super::axes::Axes;
+use super::heading::{Heading, Key, Mark};
+use super::page;
+use super::svg::{Anchor, INK, Path, Svg};
+use super::ticks::{Ticks, power_of_ten};
+
+const HEIGHT: f64 = 430.0;
+const RIGHT: f64 = 26.0;
+const TEXT: f64 = 12.0;
+const TICK: f64 = 5.0;
+const GRID: &str = "#e6e8eb";
+
+/// What an axis measures, and how it is divided.
+#[derive(Clone, Copy, Debug)]
+pub struct Axis<'a> {
+    pub quantity: &'a str,
+    pub unit: &'a str,
+    pub is_log: bool,
+}
+
+/// How a series is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Style {
+    Line,
+    Dots,
+    /// Larger, ringed dots on a line: those that matter among many.
+    Front,
+}
+
+/// A named set of points; those that an axis cannot show (zero on a logarithmic one) are left out.
+#[derive(Clone, Debug)]
+pub struct Series {
+    pub name: String,
+    pub colour: &'static str,
+    pub style: Style,
+    pub points: Vec<[f64; 2]>,
+}
+
+/// A value on the horizontal axis that deserves a line and a word.
+#[derive(Clone, Debug)]
+pub struct Landmark {
+    pub x: f64,
+    pub name: String,
+    pub colour: &'static str,
+}
+
+#[derive(Clone, Debug)]
+pub struct Chart<'a> {
+    pub title: String,
+    pub note: String,
+    pub axes: [Axis<'a>; 2],
+    pub series: Vec<Series>,
+    pub landmarks: Vec<Landmark>,
+}
+
+/// Draws a chart.
+pub fn draw(chart: &Chart<'_>) -> String {
+    let legend = chart
+        .series
+        .iter()
+        .map(|series| Key {
+            name: series.name.clone().into(),
+            colour: series.colour,
+            mark: if series.style == Style::Line { Mark::Line } else { Mark::Dot },
+        })
+        .collect();
+    let heading = Heading { title: chart.title.clone(), note: chart.note.clone(), legend };
+    let top = heading.height(page::WIDTH) + 4.0;
+    let mut axes = window(chart);
+    let left = room_on_the_left(chart, &axes);
+    axes.corner = [left, top];
+    axes.size = [page::WIDTH - left - RIGHT, HEIGHT];
+    let mut svg = Svg::new(page::WIDTH, top + HEIGHT + Axes::BELOW);
+    heading.draw(&mut svg, page::WIDTH);
+    draw_horizontal(&mut svg, chart.axes[0], &axes);
+    draw_vertical(&mut svg, chart.axes[1], &axes, left);
+    for landmark in &chart.landmarks {
+        draw_landmark(&mut svg, chart, &axes, landmark);
+    }
+    for series in &chart.series {
+        draw_series(&mut svg, chart, &axes, series);
+    }
+    svg.rect(axes.corner, axes.size, format_args!("fill=\"none\" stroke=\"{INK}\""));
+    svg.finish()
+}
+
+/// A value as the axes count it; `None` where they cannot show it.
+fn on_axis(axis: Axis<'_>, value: f64) -> Option<f64> {
+    let value = if axis.is_log { value.log10() } else { value };
+    value.is_finite().then_some(value)
+}
+
+fn on_axes(chart: &Chart<'_>, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
+    Some([on_axis(chart.axes[0], x)?, on_axis(chart.axes[1], y)?])
+}
+
+/// The axes around everything shown, their place still to be given.
+fn window(chart: &Chart<'_>) -> Axes {
+    let shown = || chart.series.iter().flat_map(|s| &s.points).filter_map(|&p| on_axes(chart, p));
+    let marked: Vec<f64> = chart.landmarks.iter().filter_map(|m| on_axis(chart.axes[0], m.x)).collect();
+    let range = |k: usize| {
+        let values = shown().map(|p| p[k]).chain(if k == 0 { marked.clone() } else { Vec::new() });
+        let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+        match (low.is_finite(), high - low) {
+            (false, _) => [0.0, 1.0],
+            (true, extent) if extent > 1e-9 * low.abs().max(1e-300) => {
+                [low - 0.05 * extent, high + 0.05 * extent]
+            }
+            _ => [low - 0.5, high + 0.5],
+        }
+    };
+    let [x, y] = [range(0), range(1)];
+    Axes { corner: [0.0; 2], size: [page::WIDTH, HEIGHT], low: [x[0], y[0]], high: [x[1], y[1]] }
+}
+
+/// Where ticks stand as the axes count, and what is written beside each (nothing beside a minor one).
+fn ticks(axis: Axis<'_>, low: f64, high: f64, most: f64) -> (Vec<(f64, String)>, String) {
+    if !axis.is_log || high - low < 0.7 {
+        // Within less than a decade powers of ten would leave the axis bare.
+        let exponential = |value: f64| if axis.is_log { 10f64.powf(value) } else { value };
+        let ticks = Ticks::within(exponential(low), exponential(high), most);
+        let at = |value: f64| Some((on_axis(axis, value)?, ticks.label(value)));
+        let name = ticks.axis_name(axis.quantity, axis.unit);
+        return (ticks.values.iter().filter_map(|&value| at(value)).collect(), name);
+    }
+    let (first, last) = (low.ceil() as i32, high.floor() as i32);
+    let every = (f64::from(last - first + 1) / most).ceil().max(1.0) as i32;
+    let mut marks: Vec<(f64, String)> = Vec::new();
+    for decade in first - 1..=last {
+        let labelled = decade.rem_euclid(every) == 0;
+        let label = if labelled { power_of_ten(decade) } else { String::new() };
+        marks.push((f64::from(decade), label));
+        if last - first < 5 {
+            marks.extend((2..10).map(|m| (f64::from(decade) + f64::from(m).log10(), String::new())));
+        }
+    }
+    marks.retain(|(at, _)| (low..=high).contains(at));
+    let name = match axis.unit {
+        "" => axis.quantity.to_owned(),
+        unit => format!("{} [{unit}]", axis.quantity),
+    };
+    (marks, name)
+}
+
+fn vertical_ticks(chart: &Chart<'_>, axes: &Axes) -> (Vec<(f64, String)>, String) {
+    ticks(chart.axes[1], axes.low[1], axes.high[1], 9.0)
+}
+
+fn room_on_the_left(chart: &Chart<'_>, axes: &Axes) -> f64 {
+    let (marks, _) = vertical_ticks(chart, axes);
+    let widest = marks.iter().map(|(_, label)| super::svg::text_width(label, TEXT)).fold(0.0, f64::max);
+    widest + TICK + 36.0
+}
+
+fn draw_horizontal(svg: &mut Svg, axis: Axis<'_>, axes: &Axes) {
+    let (marks, name) = ticks(axis, axes.low[0], axes.high[0], 10.0);
+    let bottom = axes.corner[1] + axes.size[1];
+    for (value, label) in &marks {
+        let x = axes.place([*value, axes.low[1]])[0];
+        let long = if label.is_empty() { 0.5 * TICK } else { TICK };
+        if !label.is_empty() {
+            svg.group(format_args!("stroke=\"{GRID}\""), |svg| svg.line([x, axes.corner[1]], [x, bottom]));
+            svg.text([x, bottom + 15.0], Anchor::Middle, TEXT, INK, label);
+        }
+        svg.group(format_args!("stroke=\"{INK}\""), |svg| svg.line([x, bottom], [x, bottom + long]));
+    }
+    let middle = axes.corner[0] + axes.size[0] / 2.0;
+    svg.text([middle, bottom + 37.0], Anchor::Middle, TEXT + 1.0, INK, &name);
+}
+
+fn draw_vertical(svg: &mut Svg, axis: Axis<'_>, axes: &Axes, room: f64) {
+    let (marks, name) = ticks(axis, axes.low[1], axes.high[1], 9.0);
+    let [left, right] = [axes.corner[0], axes.corner[0] + axes.size[0]];
+    for (value, label) in &marks {
+        let y = axes.place([axes.low[0], *value])[1];
+        let long = if label.is_empty() { 0.5 * TICK } else { TICK };
+        if !label.is_empty() {
+            svg.group(format_args!("stroke=\"{GRID}\""), |svg| svg.line([left, y], [right, y]));
+            svg.text([left - TICK - 4.0, y], Anchor::End, TEXT, INK, label);
+        }
+        svg.group(format_args!("stroke=\"{INK}\""), |svg| svg.line([left - long, y], [left, y]));
+    }
+    svg.upward_text([left - room + 14.0, axes.corner[1] + axes.size[1] / 2.0], TEXT + 1.0, &name);
+}
+
+fn draw_landmark(svg: &mut Svg, chart: &Chart<'_>, axes: &Axes, landmark: &Landmark) {
+    let Some(x) = on_axis(chart.axes[0], landmark.x) else { return };
+    let at = axes.place([x, axes.high[1]]);
+    let stroke = format!("stroke=\"{}\" stroke-dasharray=\"5 3\"", landmark.colour);
+    svg.group(stroke, |svg| svg.line(at, [at[0], axes.corner[1] + axes.size[1]]));
+    let right = at[0] > axes.corner[0] + 0.6 * axes.size[0];
+    let (anchor, beside) = if right { (Anchor::End, -5.0) } else { (Anchor::Start, 5.0) };
+    svg.text([at[0] + beside, at[1] + 12.0], anchor, TEXT, landmark.colour, &landmark.name);
+}
+
+fn draw_series(svg: &mut Svg, chart: &Chart<'_>, axes: &Axes, series: &Series) {
+    let places: Vec<[f64; 2]> =
+        series.points.iter().filter_map(|&p| on_axes(chart, p)).map(|p| axes.place(p)).collect();
+    if series.style != Style::Dots {
+        let mut path = Path::default();
+        path.polyline(page::thinned(&places));
+        let stroke = format!("stroke=\"{}\" stroke-width=\"1.7\" stroke-linejoin=\"round\"", series.colour);
+        svg.path(&path, format_args!("class=\"series\" fill=\"none\" {stroke}"));
+    }
+    let (radius, attributes) = match series.style {
+        Style::Line => return,
+        Style::Dots => (3.0, format!("fill=\"{}\" fill-opacity=\"0.65\"", series.colour)),
+        Style::Front => (4.5, format!("fill=\"{}\" stroke=\"{INK}\" stroke-width=\"1.1\"", series.colour)),
+    };
+    svg.group(attributes, |svg| places.iter().for_each(|&place| svg.circle(place, radius)));
+}
+
+/// How near a solver came to equilibrium, iteration by iteration.
+pub fn residuals(title: &str, solver: &str, residuals: &[f64]) -> String {
+    let points = residuals.iter().enumerate().map(|(n, &residual)| [n as f64, residual]).collect();
+    draw(&Chart {
+        title: title.to_owned(),
+        note: format!("residual of {solver}, {} iterations", residuals.len().saturating_sub(1)),
+        axes: [
+            Axis { quantity: "iteration", unit: "", is_log: false },
+            Axis { quantity: "residual force over load", unit: "", is_log: true },
+        ],
+        series: vec![Series {
+            name: solver.to_owned(),
+            colour: super::colour::SERIES[0],
+            style: Style::Line,
+            points,
+        }],
+        landmarks: Vec::new(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn chart(points: Vec<[f64; 2]>) -> Chart<'static> {
+        let axis = |quantity| Axis { quantity, unit: "s", is_log: true };
+        let series = Series { name: "a < b".into(), colour: "#000000", style: Style::Front, points };
+        Chart {
+            title: "T".into(),
+            note: String::new(),
+            axes: [axis("time"), axis("error")],
+            series: vec![series],
+            landmarks: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn a_logarithmic_axis_counts_in_powers_of_ten_and_leaves_zeros_out() {
+        let svg = draw(&chart(vec![[1e-3, 1e-1], [1.0, 1e-8], [0.0, 1.0], [1.0, f64::NAN]]));
+        assert_eq!(svg.matches("<circle").count(), 2);
+        assert!(svg.contains(">10⁻³<") && svg.contains(">10⁻⁸<"), "{svg}");
+        assert!(svg.contains("a &lt; b"));
+    }
+
+    #[test]
+    fn an_axis_of_less_than_a_decade_still_has_labels() {
+        let svg = draw(&chart(vec![[1.0, 0.5], [1.2, 0.7]]));
+        assert!(svg.contains(">0.50<") && svg.contains(">1.0") && !svg.contains("NaN"), "{svg}");
+    }
+
+    #[test]
+    fn a_chart_of_nothing_is_drawn_all_the_same() {
+        assert!(draw(&chart(Vec::new())).contains("</svg>"));
+    }
+}

@@ -1,0 +1,120 @@
+//! A trade study's outputs: `trade.json` and `trade.csv`, every setting; the figure `trade`, error against
+//! time with the settings that no other beats.
+
+use std::path::PathBuf;
+
+use serde::Serialize;
+
+use super::csv::write;
+use super::error::{ExportError, write_file};
+use super::figures::chart::{Axis, Chart, Landmark, Series, Style, draw};
+use super::figures::{self, SERIES};
+use super::{OutputFolder, summary};
+use crate::trade::{Outcome, Point, Study};
+
+#[derive(Serialize)]
+struct Report<'a> {
+    program: &'static str,
+    version: &'static str,
+    #[serde(flatten)]
+    study: &'a Study,
+}
+
+#[derive(Serialize)]
+struct Row<'a> {
+    rule: &'static str,
+    spacing: f64,
+    particles: usize,
+    solver: &'static str,
+    tolerance: f64,
+    bits: u32,
+    outcome: &'static str,
+    error: Option<f64>,
+    seconds: Option<f64>,
+    iterations: Option<usize>,
+    on_the_front: bool,
+    reason: &'a str,
+}
+
+/// Writes everything.
+///
+/// # Errors
+/// The first file that cannot be written.
+pub fn write_trade(folder: &OutputFolder, study: &Study) -> Result<Vec<PathBuf>, ExportError> {
+    let front = study.front();
+    let rows = study.points.iter().map(|point| row(point, front.contains(&point)));
+    let mut written = vec![write(folder, "trade.csv", rows)?];
+    written.extend(figures::write(&figure(study), &folder.path("trade"))?);
+    let path = folder.path(summary::TRADE);
+    let report = Report { program: summary::PROGRAM, version: env!("CARGO_PKG_VERSION"), study };
+    let mut text = serde_json::to_string_pretty(&report).map_err(ExportError::io("write", &path))?;
+    text.push('\n');
+    write_file(&path, text)?;
+    written.push(path);
+    Ok(written)
+}
+
+fn row(point: &Point, on_the_front: bool) -> Row<'_> {
+    let (outcome, reason) = match &point.outcome {
+        Outcome::Settled => ("settled", ""),
+        Outcome::Unsettled => ("unsettled", ""),
+        Outcome::Refused { reason } => ("refused", reason.as_str()),
+    };
+    Row {
+        rule: point.setting.rule.name(),
+        spacing: point.setting.spacing,
+        particles: point.particles,
+        solver: point.setting.solver,
+        tolerance: point.setting.tolerance,
+        bits: point.setting.bits,
+        outcome,
+        error: point.error,
+        seconds: point.seconds,
+        iterations: point.iterations,
+        on_the_front,
+        reason,
+    }
+}
+
+/// Error against time, both logarithmic: a series for each rule and kind of solver, and the front.
+pub fn figure(study: &Study) -> String {
+    let at = |point: &Point| Some([point.seconds?, point.error?]);
+    let mut series: Vec<Series> = Vec::new();
+    for point in study.points.iter().filter(|point| point.outcome == Outcome::Settled) {
+        let Some(place) = at(point) else { continue };
+        let name = format!("{} rule, {}", point.setting.rule.name(), point.setting.solver);
+        match series.iter_mut().find(|series| series.name == name) {
+            Some(series) => series.points.push(place),
+            None => {
+                let colour = SERIES[series.len() % SERIES.len()];
+                series.push(Series { name, colour, style: Style::Dots, points: vec![place] });
+            }
+        }
+    }
+    let front: Vec<[f64; 2]> = study.front().into_iter().filter_map(at).collect();
+    series.push(Series {
+        name: "nothing is both faster and nearer".into(),
+        colour: "#f2f2f2",
+        style: Style::Front,
+        points: front,
+    });
+    draw(&Chart {
+        title: study.title.clone(),
+        note: format!(
+            "{} settings, median of {} runs each, from the scene to rest; error against finite elements on {} nodes",
+            study.points.len(),
+            study.repeats,
+            study.truth_nodes
+        ),
+        axes: [
+            Axis { quantity: "time", unit: "s", is_log: true },
+            Axis { quantity: "relative L2 error of the displacement", unit: "", is_log: true },
+        ],
+        landmarks: vec![Landmark {
+            x: study.truth_seconds,
+            name: "the truth itself".into(),
+            colour: "#8a8f98",
+        }],
+        series,
+    })
+}

@@ -1,0 +1,123 @@
+//! What the body is made of, what pushes it, and how its equilibrium is found, as written.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::RawRegion;
+
+/// What the body is made of. The rule `material` takes its weights from it, loads need it, and
+/// `flockform compare` gives it to the finite elements; the paper's rules do without.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum RawMaterial {
+    /// The same in every direction.
+    Isotropic {
+        /// Young's modulus [force / length^2].
+        young: f64,
+        /// Poisson's ratio: between -1 and 1 in plane stress, between -1 and 1/2 in plane strain [1].
+        poisson: f64,
+        #[serde(default)]
+        plane: RawPlane,
+        /// Thickness [length].
+        #[serde(default = "super::defaults::one")]
+        thickness: f64,
+    },
+    /// Plane stress with fibres.
+    Orthotropic {
+        /// Young's moduli along the fibres and across them [force / length^2].
+        young: [f64; 2],
+        /// Contraction across the fibres under tension along them [1].
+        poisson_12: f64,
+        /// Shear modulus [force / length^2].
+        shear: f64,
+        /// Direction of the fibres, from x [degree].
+        #[serde(default)]
+        angle: f64,
+        /// Thickness [length].
+        #[serde(default = "super::defaults::one")]
+        thickness: f64,
+    },
+}
+
+/// What is assumed across the thickness.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum RawPlane {
+    /// The faces are free: a thin sheet.
+    #[default]
+    Stress,
+    /// The faces cannot part: a slice of a long body.
+    Strain,
+}
+
+/// Something that pushes the body, from the first step on.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum RawLoad {
+    /// On every side of the boundary between two particles of the region.
+    Traction {
+        region: RawRegion,
+        /// Along x and y [force / length^2].
+        traction: [f64; 2],
+    },
+    /// On each particle of the region.
+    Force {
+        region: RawRegion,
+        /// Along x and y [force].
+        force: [f64; 2],
+    },
+    /// On all of the body, like weight.
+    Body {
+        /// Along x and y [force / length^3].
+        force: [f64; 2],
+    },
+}
+
+/// Finds where the followers come to rest under the leaders' places at step `stop.steps`, instead of
+/// stepping there.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawEquilibrium {
+    #[serde(default)]
+    pub solver: RawSolver,
+    /// Largest residual force over the load's at which the solver stops [1].
+    #[serde(default = "super::defaults::residual")]
+    #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
+    pub tolerance: f64,
+    #[serde(default = "super::defaults::iterations")]
+    #[schemars(range(min = 1))]
+    pub most_iterations: usize,
+    #[serde(default)]
+    pub precision: RawPrecision,
+}
+
+/// How the equilibrium is found.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum RawSolver {
+    /// Whatever suits the size, the shape and the rule; `flockform plan` says which and why.
+    #[default]
+    Auto,
+    /// The paper's sweep, damped by its estimated spectrum.
+    Jacobi,
+    /// Sweeps of one colour of particles after the other, each seeing those before it.
+    GaussSeidel,
+    /// Sweeps whose damping varies so as to use the whole spectrum.
+    Chebyshev,
+    ConjugateGradients,
+    /// Conjugate gradients with a multigrid cycle before each step.
+    Multigrid,
+    /// A sparse factorisation.
+    Direct,
+}
+
+/// Digits of the numbers that a solver works with.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum RawPrecision {
+    /// Doubles.
+    #[default]
+    F64,
+    /// Singles: half the memory traffic, five to six digits at best.
+    F32,
+}

@@ -1,0 +1,187 @@
+//! A linear rule as an operator on displacements.
+//!
+//! Where a rule is linear in its neighbours' positions, a follower rests at `u_i = S_i sum_j W_ij u_j + c_i`.
+//! Multiplied by what its neighbours' weights add up to, `D_i`, that is a row of `K u = f`: of a scalar rule
+//! (Eq. 1) the graph Laplacian, of a material its stiffness. Frame points are no unknowns: whoever sees
+//! one sees the particles whose displacement it copies.
+
+use super::equilibrium::System;
+use super::operator::{Operator, OperatorError, Row};
+use crate::flock::block::{Block, IDENTITY, apply, plus, product};
+use crate::flock::body::Body;
+use crate::flock::interaction::{Interaction, Weights};
+use crate::flock::lattice::Site;
+use crate::flock::points::Points;
+use crate::flock::rules::{Axis, Feedback, FeedbackReference, Mean, Rotation, Rule};
+
+/// Why a rule has no operator.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum NotLinear {
+    #[error("{rule} is not linear in the neighbours' positions")]
+    Rule { rule: &'static str },
+    #[error("broken bonds make the rule depend on present positions")]
+    Broken,
+    #[error(transparent)]
+    Operator(#[from] OperatorError),
+}
+
+/// The equilibrium that the rule asks for, with the held particles (those that do not follow) displaced
+/// by `held` \[length\], shape \[count\]; what it holds for followers and frame points is not looked at.
+pub fn system(
+    interaction: &Interaction,
+    body: &Body,
+    follows: Vec<bool>,
+    held: Points,
+) -> Result<System, NotLinear> {
+    require_linear(interaction)?;
+    let lattice = &body.lattice;
+    let grid = [lattice.vector([1, 0]), lattice.vector([0, 1])];
+    let linear = Linear { interaction, body, served: served_by_frame(body) };
+    let forces = (0..body.count()).map(|i| if follows[i] { linear.force(i) } else { [0.0; 2] }).collect();
+    let operator = match &interaction.weights {
+        // The classes of a plain material are those of its rows.
+        Weights::Matrix(weights) if linear.is_plain() => {
+            let mut rows = vec![Row::default(); weights.compliance.len()];
+            let mut known = vec![false; rows.len()];
+            for i in (0..body.count()).filter(|&i| follows[i]) {
+                let class = weights.class[i] as usize;
+                if !std::mem::replace(&mut known[class], true) {
+                    rows[class] = linear.row(i);
+                }
+            }
+            Operator::new(&body.sites, grid, weights.class.clone(), rows, follows)?
+        }
+        _ => Operator::from_rows(&body.sites, grid, follows, |i| linear.row(i))?,
+    };
+    Ok(System::new(operator, forces, held))
+}
+
+fn require_linear(interaction: &Interaction) -> Result<(), NotLinear> {
+    let rule = match interaction.rule.mean {
+        Mean::Barycentre | Mean::Material { rotation: Rotation::Small } => {
+            let broken = interaction.bonds.as_ref().is_some_and(|bonds| bonds.any_broken());
+            return if broken { Err(NotLinear::Broken) } else { Ok(()) };
+        }
+        Mean::Distance { .. } => "the mean weighted by distance",
+        Mean::Power { .. } => "the power mean",
+        Mean::Spaced { .. } => "cohesion with separation",
+        Mean::Material { rotation: Rotation::Corotated } => "the corotated material",
+    };
+    Err(NotLinear::Rule { rule })
+}
+
+/// The particles that each particle copies if it is a frame point, shape \[count\]; empty without a frame.
+fn served_by_frame(body: &Body) -> Vec<Vec<u32>> {
+    let Some(frame) = &body.frame else { return Vec::new() };
+    let mut served = vec![Vec::new(); body.count()];
+    for (k, &point) in frame.points.iter().enumerate() {
+        served[point as usize] = frame.served_by(k).to_vec();
+    }
+    served
+}
+
+struct Linear<'a> {
+    interaction: &'a Interaction,
+    body: &'a Body,
+    served: Vec<Vec<u32>>,
+}
+
+impl Linear<'_> {
+    /// Whether rows are those of the weights alone.
+    fn is_plain(&self) -> bool {
+        let rule = &self.interaction.rule;
+        self.served.is_empty() && rule.poisson.is_none() && overshoot(rule) == 1.0
+    }
+
+    /// `K_ij` of bond number `k` of a particle.
+    fn stiffness(&self, particle: usize, k: usize) -> Block {
+        let scaled = |by: f64| IDENTITY.map(|row| row.map(|entry| by * entry));
+        match &self.interaction.weights {
+            Weights::Equal => IDENTITY,
+            Weights::Scalar(weights) => {
+                scaled(weights[self.interaction.neighbours.bonds(particle).start + k])
+            }
+            Weights::Matrix(weights) => weights.stiffness_of(particle)[k],
+        }
+    }
+
+    /// `D_i`.
+    fn diagonal(&self, particle: usize) -> Block {
+        let bonds = 0..self.interaction.neighbours.of(particle).len();
+        bonds.fold(Block::default(), |sum, k| plus(&sum, &self.stiffness(particle, k)))
+    }
+
+    fn row(&self, particle: usize) -> Row {
+        let terms = self.terms(particle);
+        let mut row = Row { diagonal: self.diagonal(particle), entries: Vec::new() };
+        for (k, &j) in self.interaction.neighbours.of(particle).iter().enumerate() {
+            let block = product(&terms, &self.stiffness(particle, k));
+            if self.body.is_frame[j as usize] {
+                let served = &self.served[j as usize];
+                let part = block.map(|row| row.map(|entry| entry / served.len() as f64));
+                served.iter().for_each(|&s| self.pull(&mut row, particle, s as usize, &part));
+            } else {
+                self.pull(&mut row, particle, j as usize, &block);
+            }
+        }
+        row
+    }
+
+    /// Adds what `other` pulls `particle` along with.
+    fn pull(&self, row: &mut Row, particle: usize, other: usize, block: &Block) {
+        if *block == Block::default() {
+            return;
+        }
+        if other == particle {
+            let less = block.map(|row| row.map(|entry| -entry));
+            row.diagonal = plus(&row.diagonal, &less);
+            return;
+        }
+        let (here, there) = (self.body.sites[particle], self.body.sites[other]);
+        let offset: Site = [there[0] - here[0], there[1] - here[1]];
+        match row.entries.iter_mut().find(|(known, _)| *known == offset) {
+            Some((_, sum)) => *sum = plus(sum, block),
+            None => row.entries.push((offset, *block)),
+        }
+    }
+
+    /// What the terms added to the mean make of it: feedback on the initial position (Eq. 4) and the
+    /// Poisson term (Eq. 2).
+    fn terms(&self, particle: usize) -> Block {
+        let rule = &self.interaction.rule;
+        let mut terms = IDENTITY;
+        if let Some(poisson) = &rule.poisson {
+            let response = poisson.k * poisson.distance_from_axis(self.body.reference.get(particle));
+            match poisson.pull {
+                Axis::X => terms[1][0] = response,
+                Axis::Y => terms[0][1] = response,
+            }
+        }
+        terms.map(|row| row.map(|entry| overshoot(rule) * entry))
+    }
+
+    /// `f_i`: the load, and what pulls where the reference is not at rest.
+    fn force(&self, particle: usize) -> [f64; 2] {
+        if let (Some(forces), true) = (&self.interaction.forces, self.is_plain()) {
+            return forces.get(particle);
+        }
+        let reference = &self.body.reference;
+        // Over-relaxation does not move the place of rest.
+        let target = if overshoot(&self.interaction.rule) == 1.0 && self.interaction.rule.feedback.is_some() {
+            let rule = Rule { feedback: None, ..self.interaction.rule };
+            self.interaction.target_by(&rule, particle, reference)
+        } else {
+            self.interaction.target(particle, reference)
+        };
+        let here = reference.get(particle);
+        apply(&self.diagonal(particle), [target[0] - here[0], target[1] - here[1]])
+    }
+}
+
+/// Factor by which feedback stretches displacements from the initial position.
+fn overshoot(rule: &Rule) -> f64 {
+    match rule.feedback {
+        Some(Feedback { factor, reference: FeedbackReference::Initial }) => 1.0 + factor,
+        _ => 1.0,
+    }
+}

@@ -1,0 +1,174 @@
+//! The settings that are tried.
+
+use serde::Serialize;
+
+use crate::scene::Scene;
+use crate::scene::raw::{RawLattice, RawMean, RawShape};
+use crate::solve::equilibrium::Solver;
+
+/// How far the study goes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Grid {
+    /// Spacings tried, as parts of the scene's \[1\].
+    pub spacings: Vec<f64>,
+    pub tolerances: Vec<f64>,
+    pub solvers: Vec<Solver>,
+    /// Larger bodies are left out.
+    pub most_particles: usize,
+    /// Sweeps (damped Jacobi, Gauss-Seidel) of larger bodies are left out: they take forever.
+    pub most_particles_to_sweep: usize,
+    /// Runs of each setting; the median time counts.
+    pub repeats: usize,
+}
+
+impl Default for Grid {
+    fn default() -> Self {
+        Self {
+            spacings: vec![2.0, 1.0, 0.5, 0.25, 0.125],
+            tolerances: vec![1e-2, 1e-4, 1e-6, 1e-8],
+            solvers: Solver::ALL.to_vec(),
+            most_particles: 20_000,
+            most_particles_to_sweep: 2_000,
+            repeats: 3,
+        }
+    }
+}
+
+impl Grid {
+    /// Enough to see that the study works.
+    pub fn quick() -> Self {
+        Self {
+            spacings: vec![1.0, 0.5],
+            tolerances: vec![1e-2, 1e-6],
+            solvers: vec![Solver::ConjugateGradients, Solver::Multigrid],
+            most_particles: 2_000,
+            repeats: 1,
+            ..Self::default()
+        }
+    }
+}
+
+/// Whose rule.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum RuleChoice {
+    /// Eq. 1, with the scene's neighbours or the first ones.
+    Paper,
+    Material,
+}
+
+impl RuleChoice {
+    pub const ALL: [RuleChoice; 2] = [RuleChoice::Paper, RuleChoice::Material];
+
+    pub fn name(self) -> &'static str {
+        match self {
+            RuleChoice::Paper => "paper",
+            RuleChoice::Material => "material",
+        }
+    }
+}
+
+/// One way to run the scene.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Setting {
+    pub rule: RuleChoice,
+    /// Distance of nearest particles over the scene's \[1\].
+    pub spacing: f64,
+    pub solver: &'static str,
+    pub tolerance: f64,
+    /// Bits of a number: 32 or 64.
+    pub bits: u32,
+}
+
+impl std::fmt::Display for Setting {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let (rule, spacing, bits) = (self.rule.name(), self.spacing, self.bits);
+        write!(f, "{rule} rule, {spacing} x spacing, {}", self.solver)?;
+        // A factorisation has no tolerance to choose.
+        if self.solver != Solver::Direct.name() {
+            write!(f, " to {:e}", self.tolerance)?;
+        }
+        write!(f, ", f{bits}")
+    }
+}
+
+/// What must be set in a scene to have this rule at this part of its spacing.
+pub fn body_overrides(scene: &Scene, rule: RuleChoice, part: f64) -> Vec<String> {
+    let mut overrides = Vec::new();
+    let mean = match (rule, &scene.raw.rule.mean) {
+        (RuleChoice::Paper, _) => Some("barycentre"),
+        (RuleChoice::Material, RawMean::Material { .. }) => None,
+        (RuleChoice::Material, _) => Some("material"),
+    };
+    overrides.extend(mean.map(|kind| format!("rule.mean={{kind=\"{kind}\"}}")));
+    if part == 1.0 {
+        return overrides;
+    }
+    match scene.raw.lattice {
+        RawLattice::Square { spacing, .. }
+        | RawLattice::Hexagonal { spacing, .. }
+        | RawLattice::Honeycomb { spacing, .. } => {
+            overrides.push(format!("lattice.spacing={:?}", part * spacing));
+        }
+        RawLattice::Rectangular { a, b, .. }
+        | RawLattice::CentredRectangular { a, b, .. }
+        | RawLattice::Oblique { a, b, .. } => {
+            overrides.extend([("a", a), ("b", b)].map(|(key, v)| format!("lattice.{key}={:?}", part * v)));
+        }
+    }
+    if let RawShape::Grid { columns, rows } = scene.raw.body.shape {
+        // The same extent: one gap less than there are particles.
+        let rescaled = |count: u32| (f64::from(count - 1) / part).round() as u32 + 1;
+        let counts = [("columns", columns), ("rows", rows)];
+        overrides.extend(counts.map(|(key, count)| format!("body.shape.{key}={}", rescaled(count))));
+    }
+    overrides
+}
+
+/// What must be set in a scene to be solved so.
+pub fn solver_overrides(setting: &Setting) -> Vec<String> {
+    let Setting { solver, tolerance, bits, .. } = setting;
+    vec![format!("equilibrium={{solver=\"{solver}\",tolerance={tolerance:?},precision=\"f{bits}\"}}")]
+}
+
+/// The settings of one rule and spacing, for a body of so many particles.
+pub fn settings(grid: &Grid, rule: RuleChoice, spacing: f64, particles: usize) -> Vec<Setting> {
+    let sweeps = |solver: &Solver| matches!(solver, Solver::Jacobi | Solver::GaussSeidel);
+    let fits = |solver: &&Solver| !sweeps(solver) || particles <= grid.most_particles_to_sweep;
+    let mut all = Vec::new();
+    for solver in grid.solvers.iter().filter(fits) {
+        let tolerances = if *solver == Solver::Direct { &grid.tolerances[..1] } else { &grid.tolerances[..] };
+        for &tolerance in tolerances {
+            let single = solver.has_single() && tolerance >= crate::solve::equilibrium::SINGLE_FLOOR;
+            let bits: &[u32] = if single { &[32, 64] } else { &[64] };
+            let one = |&bits: &u32| Setting { rule, spacing, solver: solver.name(), tolerance, bits };
+            all.extend(bits.iter().map(one));
+        }
+    }
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::bundled;
+
+    #[test]
+    fn a_grid_keeps_its_extent_at_any_spacing() {
+        let scene = bundled("tension").expect("bundled").load(&[]).expect("loads");
+        let overrides = body_overrides(&scene, RuleChoice::Paper, 0.5);
+        let finer = bundled("tension").expect("bundled").load(&overrides).expect("loads");
+        let RawShape::Grid { columns, rows } = finer.raw.body.shape else { panic!("a grid") };
+        assert_eq!((columns, rows, finer.lattice.spacing()), (19, 19, 0.5));
+    }
+
+    #[test]
+    fn sweeps_are_left_out_for_large_bodies_and_singles_for_tight_tolerances() {
+        let grid = Grid::default();
+        let small = settings(&grid, RuleChoice::Paper, 1.0, 100);
+        let large = settings(&grid, RuleChoice::Paper, 1.0, 100_000);
+        assert!(small.iter().any(|s| s.solver == "jacobi") && large.iter().all(|s| s.solver != "jacobi"));
+        assert!(large.iter().any(|s| s.bits == 32));
+        assert!(large.iter().all(|s| s.bits == 64 || s.tolerance >= 1e-5));
+    }
+}

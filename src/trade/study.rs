@@ -1,0 +1,276 @@
+//! Runs the settings and holds them against the truth.
+
+use std::fmt;
+use std::time::Instant;
+
+use serde::Serialize;
+
+use super::grid::{Grid, RuleChoice, Setting, body_overrides, settings, solver_overrides};
+use crate::compare::run::{SceneTruth, truth_of};
+use crate::compare::truth::Truth;
+use crate::continuum::equilibrium::settle;
+use crate::continuum::plan::Plan;
+use crate::continuum::run::Outcome as RunOutcome;
+use crate::flock::points::distance;
+use crate::flock::role::Role;
+use crate::scene::{Scene, SceneError};
+
+/// What became of a setting.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(tag = "outcome", rename_all = "kebab-case")]
+pub enum Outcome {
+    Settled,
+    /// The solver ended short of its tolerance.
+    Unsettled,
+    /// The scene is not to be had in this setting.
+    Refused {
+        reason: String,
+    },
+}
+
+/// A setting with what it costs and how far it is from the truth.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Point {
+    #[serde(flatten)]
+    pub setting: Setting,
+    pub particles: usize,
+    /// Relative L2 error of the followers' displacements \[1\].
+    pub error: Option<f64>,
+    /// From the scene to the followers at rest, median of the repeats \[s\].
+    pub seconds: Option<f64>,
+    pub iterations: Option<usize>,
+    #[serde(flatten)]
+    pub outcome: Outcome,
+}
+
+/// All settings of a scene.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Study {
+    pub name: String,
+    pub title: String,
+    /// Nodes of the truth that errors are measured against, and the time it took \[s\].
+    pub truth_nodes: usize,
+    pub truth_seconds: f64,
+    pub repeats: usize,
+    pub points: Vec<Point>,
+}
+
+/// Loads the scene with these overrides, after those that the user gave.
+pub type Load<'a> = &'a dyn Fn(&[String]) -> Result<Scene, SceneError>;
+
+/// Runs a scene in every setting of the grid. `tell` is told of each before it runs.
+///
+/// # Errors
+/// Whatever keeps the scene from having a truth; a setting that is refused is part of the study.
+pub fn run(load: Load<'_>, grid: &Grid, tell: &mut dyn FnMut(&Setting)) -> Result<Study, SceneError> {
+    let scene = load(&[])?;
+    let truth = finest_truth(load, &scene, grid)?;
+    let mut study = Study {
+        name: scene.name.clone(),
+        title: scene.raw.title.clone(),
+        truth_nodes: truth.truth.mesh().mesh().node_count(),
+        truth_seconds: truth.time.as_secs_f64(),
+        repeats: grid.repeats,
+        points: Vec::new(),
+    };
+    for rule in RuleChoice::ALL {
+        for &spacing in &grid.spacings {
+            let overrides = body_overrides(&scene, rule, spacing);
+            let particles = match load(&overrides).and_then(|scene| led(&scene, &truth.truth)) {
+                Ok(plan) if plan.count() <= grid.most_particles => plan.count(),
+                Ok(_) => continue,
+                Err(error) => {
+                    study.points.push(refused(rule, spacing, &error));
+                    continue;
+                }
+            };
+            for setting in settings(grid, rule, spacing, particles) {
+                tell(&setting);
+                let overrides: Vec<String> =
+                    overrides.iter().cloned().chain(solver_overrides(&setting)).collect();
+                study.points.push(measure(
+                    &load(&overrides)?,
+                    &truth.truth,
+                    setting,
+                    particles,
+                    grid.repeats,
+                ));
+            }
+        }
+    }
+    Ok(study)
+}
+
+/// The truth of the finest body that is within bounds.
+fn finest_truth(load: Load<'_>, scene: &Scene, grid: &Grid) -> Result<SceneTruth, SceneError> {
+    let mut spacings = grid.spacings.clone();
+    spacings.sort_by(f64::total_cmp);
+    let fits = |truth: &SceneTruth| truth.layout.body.count() <= grid.most_particles;
+    for &spacing in spacings.iter().filter(|&&spacing| spacing <= 1.0) {
+        let finer = load(&body_overrides(scene, RuleChoice::Material, spacing));
+        if let Some(truth) = finer.ok().and_then(|scene| truth_of(&scene, None).ok()).filter(fits) {
+            return Ok(truth);
+        }
+    }
+    truth_of(scene, None)
+}
+
+fn led(scene: &Scene, truth: &Truth) -> Result<Plan, SceneError> {
+    Plan::with_truth(scene, &|places| match truth.displacements_at(places) {
+        Ok(found) => found.iter().collect(),
+        Err(_) => vec![[f64::NAN; 2]; places.len()],
+    })
+}
+
+fn refused(rule: RuleChoice, spacing: f64, error: &SceneError) -> Point {
+    let setting = Setting { rule, spacing, solver: "", tolerance: 0.0, bits: 64 };
+    let outcome = Outcome::Refused { reason: reason(error) };
+    Point { setting, particles: 0, error: None, seconds: None, iterations: None, outcome }
+}
+
+/// What is wrong, without its place, which is in an override of the study's own.
+fn reason(error: &SceneError) -> String {
+    error.problems().first().map_or_else(String::new, |problem| problem.message.clone())
+}
+
+fn measure(scene: &Scene, truth: &Truth, setting: Setting, particles: usize, repeats: usize) -> Point {
+    let mut seconds = Vec::new();
+    let mut last = None;
+    for _ in 0..repeats.max(1) {
+        let start = Instant::now();
+        let settled = led(scene, truth).and_then(|plan| match &scene.raw.equilibrium {
+            Some(asked) => settle(scene, asked, plan),
+            None => Err(scene.refuse("equilibrium", "no solver is set", "set one")),
+        });
+        seconds.push(start.elapsed().as_secs_f64());
+        match settled {
+            Ok(outcome) => last = Some(outcome),
+            Err(error) => {
+                let outcome = Outcome::Refused { reason: reason(&error) };
+                return Point { setting, particles, error: None, seconds: None, iterations: None, outcome };
+            }
+        }
+    }
+    seconds.sort_by(f64::total_cmp);
+    let solved = last.as_ref().and_then(|outcome| outcome.solved.as_ref());
+    let converged = solved.is_some_and(|solved| solved.converged);
+    Point {
+        setting,
+        particles,
+        error: last.as_ref().and_then(|outcome| error_of(outcome, truth)),
+        seconds: Some(seconds[seconds.len() / 2]),
+        iterations: solved.map(|solved| solved.iterations),
+        outcome: if converged { Outcome::Settled } else { Outcome::Unsettled },
+    }
+}
+
+/// Relative L2 distance of the followers from where the truth has them; `None` where it has none of them.
+fn error_of(outcome: &RunOutcome, truth: &Truth) -> Option<f64> {
+    let engine = &outcome.engine;
+    let reference = &engine.body().reference;
+    let followers = (0..reference.len()).filter(|&i| engine.roles()[i] == Role::Follower);
+    let places = followers.clone().map(|i| reference.get(i)).collect();
+    let known = truth.displacements_at(&places).ok()?;
+    let (mut off, mut size) = (0.0, 0.0);
+    for (i, t) in followers.zip(known.iter()) {
+        let (x, p) = (engine.present().get(i), reference.get(i));
+        off += distance([x[0] - p[0], x[1] - p[1]], t).powi(2);
+        size += t[0] * t[0] + t[1] * t[1];
+    }
+    Some((off / size).sqrt()).filter(|error| error.is_finite())
+}
+
+impl Study {
+    /// Settings that none other beats both in time and in error, the quickest first.
+    pub fn front(&self) -> Vec<&Point> {
+        let mut known: Vec<(f64, f64, &Point)> =
+            self.settled().filter_map(|p| Some((p.seconds?, p.error?, p))).collect();
+        known.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+        let mut best = f64::INFINITY;
+        known.retain(|&(_, error, _)| {
+            let better = error < best;
+            best = best.min(error);
+            better
+        });
+        known.into_iter().map(|(_, _, point)| point).collect()
+    }
+
+    /// The quickest setting whose error is at most `error` \[1\].
+    pub fn cheapest(&self, error: f64) -> Option<&Point> {
+        self.front().into_iter().find(|point| point.error.is_some_and(|e| e <= error))
+    }
+
+    fn settled(&self) -> impl Iterator<Item = &Point> {
+        self.points.iter().filter(|point| point.outcome == Outcome::Settled)
+    }
+}
+
+/// Errors that the table is written for \[1\].
+const ASKED: [f64; 4] = [0.3, 0.1, 0.01, 0.001];
+
+impl fmt::Display for Study {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "{}: {} settings, {} runs each", self.title, self.points.len(), self.repeats)?;
+        writeln!(f, "truth: {} nodes, {:.3} s", self.truth_nodes, self.truth_seconds)?;
+        for asked in ASKED {
+            match self.cheapest(asked) {
+                Some(point) => writeln!(
+                    f,
+                    "for {} % error the cheapest setting is {} ({} particles): {:.3} % in {:.2} ms",
+                    100.0 * asked,
+                    point.setting,
+                    point.particles,
+                    100.0 * point.error.unwrap_or_default(),
+                    1e3 * point.seconds.unwrap_or_default()
+                )?,
+                None => writeln!(f, "for {} % error no setting tried is good enough", 100.0 * asked)?,
+            }
+        }
+        let best = |rule: RuleChoice| {
+            let errors = self.settled().filter(|p| p.setting.rule == rule).filter_map(|p| p.error);
+            errors.fold(f64::INFINITY, f64::min)
+        };
+        for rule in RuleChoice::ALL {
+            let best = best(rule);
+            if best.is_finite() {
+                writeln!(f, "the {} rule comes as near as {:.3} %", rule.name(), 100.0 * best)?;
+            } else if let Some(reason) = self.points.iter().find_map(|point| match &point.outcome {
+                Outcome::Refused { reason } if point.setting.rule == rule => Some(reason),
+                _ => None,
+            }) {
+                writeln!(f, "the {} rule is not to be had: {reason}", rule.name())?;
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn point(seconds: f64, error: f64) -> Point {
+        let setting =
+            Setting { rule: RuleChoice::Paper, spacing: 1.0, solver: "direct", tolerance: 1e-2, bits: 64 };
+        let (error, seconds) = (Some(error), Some(seconds));
+        Point { setting, particles: 1, error, seconds, iterations: Some(1), outcome: Outcome::Settled }
+    }
+
+    #[test]
+    fn the_front_is_what_nothing_beats_in_both() {
+        let mut points = vec![point(3.0, 0.1), point(1.0, 0.5), point(2.0, 0.6), point(4.0, 0.1)];
+        points.push(Point { outcome: Outcome::Unsettled, ..point(0.1, 0.001) });
+        let study = Study {
+            name: String::new(),
+            title: String::new(),
+            truth_nodes: 1,
+            truth_seconds: 0.0,
+            repeats: 1,
+            points,
+        };
+        let times: Vec<f64> = study.front().iter().filter_map(|p| p.seconds).collect();
+        assert_eq!(times, [1.0, 3.0]);
+        assert_eq!(study.cheapest(0.2).and_then(|p| p.seconds), Some(3.0));
+        assert_eq!(study.cheapest(0.01), None);
+    }
+}

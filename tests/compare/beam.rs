@@ -1,0 +1,144 @@
+//! The truth against the reference files.
+
+use std::path::Path;
+use std::time::Instant;
+
+use flockform::compare::measures::{Comparison, Sides};
+use flockform::compare::mesh::TruthMesh;
+use flockform::flock::body::Body;
+use flockform::flock::points::Points;
+
+use crate::support::*;
+
+/// Displacements of a reference file at the particles.
+fn reference(aspect: u32, body: &Body) -> Points {
+    // Beside the checkout, or above it where the checkout is a worktree in a folder of such.
+    let name = format!("shared/reference/beam_aspect{aspect}.csv");
+    let above = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().skip(1).map(|folder| folder.join(&name));
+    let path = above.clone().find(|path| path.exists()).or(above.clone().next()).expect("has a parent");
+    let text = std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+    let rows: Vec<[f64; 4]> = text
+        .lines()
+        .skip(1)
+        .map(|line| {
+            let values: Vec<f64> = line.split(',').map(|v| v.parse().expect("a number")).collect();
+            values.try_into().expect("four columns")
+        })
+        .collect();
+    let at = |p: [f64; 2]| rows.iter().find(|r| (r[0] - p[0]).hypot(r[1] - p[1]) < 1e-9).expect("listed");
+    body.reference.iter().map(|p| [at(p)[2], at(p)[3]]).collect()
+}
+
+/// Distance of the truth from the reference, by the measures of a comparison.
+fn distance_from_reference(aspect: u32, refine: Option<usize>) -> Comparison {
+    let (body, cells) = beam(aspect);
+    let refine = refine.unwrap_or_else(|| TruthMesh::default_refinement(&cells));
+    let start = Instant::now();
+    let truth = beam_truth(&body, &cells, refine);
+    let seconds = start.elapsed().as_secs_f64();
+    let follows: Vec<bool> = body.reference.x.iter().map(|&x| x > 10.5).collect();
+    let sides = Sides {
+        cells: &cells,
+        elastic: &polypropylene(),
+        rule: &truth.displacement,
+        truth: &reference(aspect, &body),
+        follows: &follows,
+    };
+    let found = Comparison::of(&sides).expect("measures");
+    println!(
+        "aspect {aspect}, refine {refine}, {} nodes: displacement {:.2e}, von Mises {:.2e}, energy {:.2e}, {seconds:.2} s",
+        truth.mesh().mesh().node_count(),
+        found.displacement_rel_l2,
+        found.von_mises_rel_l2,
+        found.energy_rel
+    );
+    found
+}
+
+#[test]
+#[ignore = "needs ../shared/reference"]
+fn the_truth_of_the_beam_is_that_of_the_reference() {
+    for aspect in [1, 5, 10] {
+        let found = distance_from_reference(aspect, None);
+        assert!(found.displacement_rel_l2 < 5e-4 && found.von_mises_rel_l2 < 1e-3, "{aspect}: {found}");
+    }
+}
+
+#[test]
+#[ignore = "prints a table for choosing the default refinement; needs ../shared/reference"]
+fn the_truth_of_the_beam_by_refinement() {
+    for refine in [1, 2, 3, 4, 6, 8, 12, 16] {
+        distance_from_reference(1, Some(refine));
+    }
+    for refine in [1, 2, 3, 4, 6] {
+        distance_from_reference(5, Some(refine));
+        distance_from_reference(10, Some(refine));
+    }
+}
+
+/// Displacement and von Mises errors of a bundled scene.
+fn errors(name: &str, overrides: &[&str]) -> [f64; 2] {
+    let found = compared(name, overrides);
+    assert_eq!(found.outcome.reason.name(), "equilibrium", "{name}");
+    println!("{name} {overrides:?}\n{}", found.comparison);
+    [found.comparison.displacement_rel_l2, found.comparison.von_mises_rel_l2]
+}
+
+fn assert_errors(name: &str, overrides: &[&str], expected: [f64; 2], slack: f64) {
+    let found = errors(name, overrides);
+    for k in 0..2 {
+        assert!((found[k] - expected[k]).abs() < slack, "{name} {overrides:?}: {found:?}");
+    }
+}
+
+#[test]
+fn the_material_rule_led_by_the_truth_is_within_half_a_percent_of_it() {
+    for (name, displacement, von_mises) in
+        [("beam", 0.005, 0.025), ("beam-5", 0.005, 0.01), ("beam-10", 0.005, 0.01)]
+    {
+        let found = errors(name, &[]);
+        assert!(found[0] < displacement && found[1] < von_mises, "{name}: {found:?}");
+    }
+    assert_errors("beam", &[], [0.0038, 0.0192], 3e-4);
+    assert_errors("beam-hexagonal", &[], [0.0093, 0.040], 1e-3);
+}
+
+#[test]
+fn the_material_rule_under_its_load_is_within_two_percent_of_the_truth() {
+    let found = errors("beam-loaded", &[]);
+    assert!(found[0] < 0.02 && found[1] < 0.03, "{found:?}");
+}
+
+#[test]
+fn the_papers_rule_has_its_large_errors_whatever_the_neighbours() {
+    assert_errors("beam-paper", &[], [0.262, 0.74], 0.01);
+    assert_errors("beam-paper-ring", &[], [0.264, 0.76], 0.01);
+    assert_errors("beam-paper-second", &[], [0.264, 0.75], 0.01);
+    assert_errors("beam-paper-reduced", &[], [0.437, 1.450], 0.01);
+    assert_errors("beam-paper-hexagonal", &[], [0.259, 0.758], 0.01);
+    assert_errors("beam-paper-hexagonal-reduced", &[], [0.259, 0.725], 0.01);
+    for (name, von_mises) in [("beam-paper-5", 5.85), ("beam-paper-10", 12.37)] {
+        let found = errors(name, &[]);
+        assert!((found[1] - von_mises).abs() < 0.01, "{name}: {found:?}");
+    }
+}
+
+#[test]
+fn neighbours_beyond_those_of_the_cells_change_nothing_in_the_material_rule() {
+    let few = compared("beam", &[]);
+    for neighbours in ["neighbours.kind=second", "neighbours={ kind = \"ring\", radius = 2 }"] {
+        let many = compared("beam", &[neighbours]);
+        assert!(largest_difference(&few.rule, &many.rule) < 1e-6, "{neighbours}");
+    }
+}
+
+#[test]
+fn followers_on_plane_strain_and_fibres_are_near_their_own_truth_too() {
+    for material in [
+        "material={ kind = \"isotropic\", young = 1000.0, poisson = 0.33, plane = \"strain\", thickness = 0.1 }",
+        "material={ kind = \"orthotropic\", young = [1000.0, 300.0], poisson_12 = 0.3, shear = 200.0, angle = 30.0 }",
+    ] {
+        let found = errors("beam", &[material]);
+        assert!(found[0] < 0.006 && found[1] < 0.04, "{material}: {found:?}");
+    }
+}

@@ -1,0 +1,10 @@
+//! Rule and truth on the same body.
+
+mod beam;
+mod measured;
+mod mesh;
+#[cfg(feature = "export")]
+mod outputs;
+mod refusals;
+mod support;
+mod truth;

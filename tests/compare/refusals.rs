@@ -1,0 +1,70 @@
+//! What cannot be compared is refused by the key of the scene.
+
+use std::ops::ControlFlow;
+
+use flockform::compare::run::{compare, plan};
+use flockform::scene::{Scene, bundled};
+
+fn load(name: &str, overrides: &[&str]) -> Scene {
+    let overrides: Vec<String> = overrides.iter().map(|&text| text.into()).collect();
+    bundled(name).expect("bundled").load(&overrides).unwrap_or_else(|e| panic!("{e}"))
+}
+
+fn refused(name: &str, overrides: &[&str], words: &[&str]) {
+    let scene = load(name, overrides);
+    let outcome = compare(&scene, Some(2), &mut |_, _| ControlFlow::Continue(()));
+    let said = outcome.err().unwrap_or_else(|| panic!("{name} {overrides:?} is compared")).to_string();
+    for word in words {
+        assert!(said.contains(word), "{name} {overrides:?} does not say `{word}`:\n{said}");
+    }
+}
+
+#[test]
+fn scenes_without_a_material_or_without_one_state_of_rest_are_refused() {
+    let isotropic = "material={ kind = \"isotropic\", young = 1.0, poisson = 0.3 }";
+    refused("shear", &[], &["material", "the scene has none", "add [material]"]);
+    refused("tension", &[isotropic], &["roles[2].from", "comes later"]);
+    refused("fracture", &[isotropic], &["fracture", "bonds that break have no part in it"]);
+    let cut = "cuts=[{ from = [5.5, 4.0], to = [5.5, 6.0] }]";
+    refused("shear", &[isotropic, cut], &["cuts", "a whole body"]);
+}
+
+#[test]
+fn a_body_that_the_truth_cannot_hold_is_refused_where_the_roles_stand() {
+    let free = "roles=[{ region = { kind = \"edge\", side = \"right\" }, role = \"leader\", motion = { kind = \"truth\" } }]";
+    refused(
+        "beam-paper",
+        &[free],
+        &["roles", "is not held and free to translate along x", "clamp at least two"],
+    );
+}
+
+#[test]
+fn four_neighbours_cannot_carry_a_material_and_the_reason_is_given() {
+    for neighbours in ["neighbours={ kind = \"first\" }", "neighbours={ kind = \"first\", keep = 3 }"] {
+        refused("beam", &[neighbours], &["neighbours", "cannot carry shear coupling"]);
+    }
+    let reduced = "neighbours={ kind = \"first\", keep = 4 }";
+    refused("beam-hexagonal", &[reduced], &["neighbours", "cannot carry shear coupling", "stiffness is cut"]);
+}
+
+#[test]
+fn leaders_in_no_cell_are_refused_by_id() {
+    // The outermost sites of a disc on a square lattice stick out; the paper's rule keeps them.
+    let disc = "body={ shape = { kind = \"disc\", centre = [15.0, 15.0], radius = 3.0 } }";
+    let roles = r#"roles=[
+        { region = { kind = "box", min = [10.0, 10.0], max = [15.0, 20.0] }, role = "clamped" },
+        { region = { kind = "edge", side = "right" }, role = "leader", motion = { kind = "truth" } },
+    ]"#;
+    refused("beam-paper", &[disc, roles, "loads=[]", "frame=none"], &["roles[1].region", "is in no cell"]);
+}
+
+#[test]
+fn a_run_plans_leaders_led_by_the_truth() {
+    let plan = plan(&load("beam", &[])).unwrap_or_else(|e| panic!("{e}"));
+    let led = &plan.changes[1];
+    let motion = led.motion.as_ref().expect("led");
+    let tip = motion.displacement(1.0, 0, [0.0; 2]);
+    // Of the lower right corner, in the reference data.
+    assert!((tip[0] - 1.8864).abs() < 0.02 && (tip[1] - 4.08).abs() < 0.02, "{tip:?}");
+}

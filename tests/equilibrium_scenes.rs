@@ -1,0 +1,190 @@
+//! Scenes that go straight to rest get where sweeping them gets.
+
+use std::ops::ControlFlow;
+
+use flockform::continuum::equilibrium::come_to_rest;
+use flockform::continuum::plan::Plan;
+use flockform::continuum::run::{Outcome, StopReason};
+use flockform::flock::points::distance;
+use flockform::scene::{Scene, bundled};
+
+fn load(name: &str, overrides: &[&str]) -> Scene {
+    let overrides: Vec<String> = overrides.iter().map(|o| (*o).to_owned()).collect();
+    bundled(name).expect("bundled").load(&overrides).unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn ended(scene: &Scene) -> Outcome {
+    let plan = Plan::new(scene).unwrap_or_else(|error| panic!("{error}"));
+    come_to_rest(scene, plan, &mut |_, _| ControlFlow::Continue(())).unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn refusal(name: &str, overrides: &[&str]) -> String {
+    let overrides: Vec<String> = overrides.iter().map(|o| (*o).to_owned()).collect();
+    let end = bundled(name).expect("bundled").load(&overrides).and_then(|scene| {
+        let plan = Plan::new(&scene)?;
+        come_to_rest(&scene, plan, &mut |_, _| ControlFlow::Continue(()))
+    });
+    end.expect_err("refused").to_string()
+}
+
+fn farthest_apart(a: &Outcome, b: &Outcome) -> f64 {
+    let pairs = a.engine.present().iter().zip(b.engine.present().iter());
+    pairs.map(|(a, b)| distance(a, b)).fold(0.0, f64::max)
+}
+
+const MATERIAL: &str = "material={kind=\"isotropic\",young=1000.0,poisson=0.3}";
+const BY_MATERIAL: &str = "rule.mean={kind=\"material\"}";
+const CELLS: &str = "neighbours={kind=\"cells\"}";
+const SWEPT: [&str; 2] = ["stop.tolerance=1e-13", "stop.steps=200000"];
+
+/// Lattices of the bundled scenes `lattice-*`, stretched, sheared and turned by their boundary.
+const LATTICES: [&str; 6] =
+    ["square", "rectangular", "centred-rectangular", "hexagonal", "oblique", "honeycomb"];
+
+fn assert_alike(name: &str, overrides: &[&str], within: f64) {
+    let stepped = ended(&load(name, &[overrides, &SWEPT].concat()));
+    assert_eq!(stepped.reason, StopReason::Equilibrium, "{name}: {}", stepped.residual);
+    let asked = ["equilibrium={solver=\"auto\",tolerance=1e-12}", "stop.steps=200000"];
+    let solved = ended(&load(name, &[overrides, &asked].concat()));
+    assert_eq!(solved.reason, StopReason::Equilibrium, "{name}");
+    let apart = farthest_apart(&stepped, &solved);
+    assert!(apart < within, "{name} {overrides:?}: {apart}");
+    let moved = stepped.engine.present().iter().zip(stepped.engine.body().reference.iter());
+    assert!(moved.map(|(x, p)| distance(x, p)).fold(0.0, f64::max) > 0.1, "{name} moves at all");
+}
+
+#[test]
+fn a_material_is_solved_to_where_it_is_swept_on_every_lattice() {
+    for lattice in LATTICES {
+        let pushed = "loads=[{kind=\"body\",force=[3.0,-5.0]}]";
+        assert_alike(&format!("lattice-{lattice}"), &[MATERIAL, BY_MATERIAL, CELLS, pushed], 1e-8);
+    }
+}
+
+#[test]
+fn the_barycentre_is_solved_to_where_it_is_swept_with_any_frame_and_neighbourhood() {
+    let pulled = ["roles=[{region={kind=\"edge\",side=\"left\"},role=\"clamped\"},\
+         {region={kind=\"edge\",side=\"right\"},role=\"leader\",\
+          motion={kind=\"affine\",about=[0.0,0.0],stretch=[1.3,1.1],steps=2}}]"];
+    for frame in ["none", "lagged", "immediate", "mirror"] {
+        for neighbours in ["{kind=\"first\"}", "{kind=\"ring\",radius=1}", "{kind=\"second\"}"] {
+            let overrides = [format!("frame={frame}"), format!("neighbours={neighbours}")];
+            let overrides: Vec<&str> =
+                overrides.iter().map(String::as_str).chain(pulled).chain(["record.probes=[]"]).collect();
+            assert_alike("tension", &overrides, 1e-8);
+        }
+    }
+    for more in [
+        "rule.weights={kind=\"list\",values=[1.0,2.0,1.0,3.0]}",
+        "rule.poisson={k=-0.01}",
+        "rule.feedback={factor=-0.2}",
+        "rule.feedback={factor=-0.2,reference=\"previous\"}",
+        "neighbours={kind=\"first\",keep=3}",
+        "rule.rest=literal",
+    ] {
+        assert_alike("tension", &[&["frame=none", "record.probes=[]", more][..], &pulled].concat(), 1e-8);
+    }
+}
+
+#[test]
+fn a_body_turned_by_a_right_angle_is_not_strained_by_the_corotated_rule() {
+    let turned = |side: &str| {
+        format!(
+            "{{region={{kind=\"edge\",side=\"{side}\"}},role=\"leader\",\
+             motion={{kind=\"affine\",about=[2.0,1.0],rotate=90.0,steps=60}}}}"
+        )
+    };
+    let roles = format!("roles=[{},{}]", turned("left"), turned("right"));
+    for lattice in LATTICES {
+        let name = format!("lattice-{lattice}");
+        let corotated = "rule.mean={kind=\"material\",rotation=\"corotated\"}";
+        let overrides = [MATERIAL, corotated, CELLS, &roles, "stop.tolerance=1e-14", "stop.steps=100000"];
+        let outcome = ended(&load(&name, &overrides));
+        let engine = &outcome.engine;
+        for i in 0..engine.body().count() {
+            let [x, y] = engine.body().reference.get(i);
+            let apart = distance(engine.present().get(i), [2.0 - (y - 1.0), 1.0 + (x - 2.0)]);
+            assert!(apart < 1e-10, "{lattice}: particle {} is {apart} away", i + 1);
+            assert!(engine.pe1(i) < 1e-20, "{lattice}");
+        }
+    }
+}
+
+#[test]
+fn loads_turn_a_corotated_cantilever_less_than_they_stretch_the_small_strain_one() {
+    // A beam bent far: small rotations let it grow longer, the corotated rule keeps its length.
+    let scene = |rotation: &str| {
+        let mean = format!("rule.mean={{kind=\"material\",rotation=\"{rotation}\"}}");
+        let roles = "roles=[{region={kind=\"edge\",side=\"left\"},role=\"clamped\"}]";
+        let load = "loads=[{kind=\"traction\",region={kind=\"edge\",side=\"right\"},traction=[0.0,-6.0]}]";
+        let shape = "body.shape={kind=\"grid\",columns=21,rows=3}";
+        load_with("lattice-square", &[MATERIAL, &mean, CELLS, roles, load, shape], &SWEPT)
+    };
+    let length = |outcome: &Outcome| {
+        let present = outcome.engine.present();
+        (0..20).map(|c| distance(present.get(3 * c + 1), present.get(3 * c + 4))).sum::<f64>()
+    };
+    let [small, corotated] = ["small", "corotated"].map(|rotation| length(&ended(&scene(rotation))));
+    let rest = 20.0 * load("lattice-square", &[]).lattice.spacing();
+    assert!(corotated / rest - 1.0 < 0.01 && small / rest - 1.0 > 0.05, "{small} {corotated} {rest}");
+}
+
+fn load_with(name: &str, overrides: &[&str], more: &[&str]) -> Scene {
+    load(name, &[overrides, more].concat())
+}
+
+#[test]
+fn what_has_no_equilibrium_to_solve_for_is_refused_with_its_place() {
+    let asked = "equilibrium={}";
+    for (overrides, words) in [
+        (vec![asked, "rule.mean={kind=\"distance\"}"], "rule.mean = { kind = \"distance\" }"),
+        (
+            vec![asked, MATERIAL, CELLS, "rule.mean={kind=\"material\",rotation=\"corotated\"}"],
+            "corotated material",
+        ),
+        (vec![asked, "roles[0].from=7"], "roles[0].from"),
+        (vec![asked, "fracture={stretch=2.0}"], "fracture"),
+        (vec![asked, "roles=[]"], "held"),
+        (vec!["equilibrium={tolerance=0.0}"], "equilibrium.tolerance = 0.0"),
+        (vec!["equilibrium={solver=\"multgrid\"}"], "multigrid"),
+    ] {
+        let message = refusal("lattice-square", &overrides);
+        assert!(message.contains(words), "{overrides:?}: {message}");
+    }
+}
+
+#[test]
+fn what_cannot_carry_a_material_is_refused_with_the_reason() {
+    let with = |more: &[&str]| refusal("lattice-square", &[&[MATERIAL, BY_MATERIAL, CELLS], more].concat());
+    for (more, words) in [
+        ("neighbours={kind=\"first\"}", "4 neighbours cannot carry shear coupling"),
+        ("material.poisson=1.0", "Poisson's ratio"),
+        ("material.young=-1.0", "Young's modulus must be positive"),
+        ("material.thickness=0.0", "thickness"),
+        ("frame=lagged", "needs no frame"),
+        ("fracture={stretch=2.0}", "in cells, not in bonds"),
+        ("rule.rest=literal", "at rest where nothing pulls it"),
+        ("body.shape={kind=\"grid\",columns=5,rows=1}", "no cell"),
+        (
+            "loads=[{kind=\"traction\",region={kind=\"disc\",centre=[4.0,4.0],radius=0.1},traction=[1.0,0.0]}]",
+            "no side",
+        ),
+    ] {
+        let message = with(&[more]);
+        assert!(message.contains(words) && message.contains("help: "), "{more}: {message}");
+    }
+    let message = refusal("lattice-square", &[BY_MATERIAL]);
+    assert!(message.contains("no material to take its weights from"), "{message}");
+    let message = refusal("lattice-square", &["loads=[{kind=\"body\",force=[1.0,0.0]}]"]);
+    assert!(message.contains("a load needs a material"), "{message}");
+    let message = refusal("lattice-square", &[MATERIAL, "loads=[{kind=\"body\",force=[1.0,0.0]}]"]);
+    assert!(message.contains("without a stiffness"), "{message}");
+}
+
+#[test]
+fn a_loaded_body_that_its_leaders_do_not_hold_is_refused() {
+    let load = "loads=[{kind=\"body\",force=[1.0,0.0]}]";
+    let at_one_point = "roles=[{region={kind=\"ids\",ids=[1]},role=\"clamped\"}]";
+    let message = refusal("lattice-square", &[MATERIAL, BY_MATERIAL, CELLS, load, at_one_point]);
+    assert!(message.contains("held at one particle only and turns about it"), "{message}");
+}
