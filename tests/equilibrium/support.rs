@@ -50,7 +50,7 @@ pub fn holed([x, y]: [f64; 2]) -> bool {
 
 /// Thin legs, held at one end, that join at the other.
 pub fn fork([x, y]: [f64; 2]) -> bool {
-    x < 0.1 || x > 0.85 || ((y * 4.0).fract() < 0.45)
+    !(0.1..0.85).contains(&x) || (y * 4.0).fract() < 0.45
 }
 
 /// A rectangle of sites cut to a shape, less what is in no cell.
@@ -110,10 +110,8 @@ pub fn operator(body: &Body, neighbours: Neighbours, feel: Feel, held: impl Fn(u
             let cells = Cells::of_body(body);
             let weights = MaterialWeights::assemble(&cells, body, neighbours, &elastic).expect("holds");
             Box::new(move |i| {
-                let bonds = weights.neighbours.bonds(i);
-                let entry = |bond: usize| (offset(i, weights.neighbours.index[bond]), weights.blocks[bond]);
-                let entries: Vec<(_, Block)> = bonds.map(entry).collect();
-                Row { diagonal: weights.diagonal[i], entries }
+                let entry = |(j, block): (usize, &Block)| (offset(i, j as u32), *block);
+                Row { diagonal: weights.of(i).diagonal, entries: weights.bonds(i).map(entry).collect() }
             })
         }
     };

@@ -313,11 +313,10 @@ mod tests {
         let weights = weights.expect("holds together");
         for i in (0..body.count()).filter(|&i| system.operator.follows()[i]) {
             let row = system.operator.row(i);
-            for bond in weights.neighbours.bonds(i) {
-                let there = body.sites[weights.neighbours.index[bond] as usize];
-                let offset = [there[0] - body.sites[i][0], there[1] - body.sites[i][1]];
+            for (j, block) in weights.bonds(i) {
+                let offset = [0, 1].map(|k| body.sites[j][k] - body.sites[i][k]);
                 let entry = row.entries.iter().find(|entry| entry.0 == offset).expect("a neighbour");
-                let pairs = entry.1.iter().flatten().zip(weights.blocks[bond].iter().flatten());
+                let pairs = entry.1.iter().flatten().zip(block.iter().flatten());
                 assert!(pairs.into_iter().all(|(a, b)| (a - b).abs() < 1e-9), "{i} {offset:?}");
             }
             assert_eq!(row.entries.len(), weights.neighbours.of(i).len());

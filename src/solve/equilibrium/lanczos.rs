@@ -9,7 +9,10 @@ use super::steps::{Apply, precondition_group};
 use crate::solve::field::{Field, Part, Real, dot};
 use crate::solve::operator::{Matrix, Stencils, pass};
 
-/// Lowest and highest eigenvalue found of `D^-1 K`.
+/// Share of the first residual's square below which the next one is rounding.
+const EXHAUSTED: f64 = 1e-24;
+
+/// Lowest and highest eigenvalue found of `D^-1 K`; zero and infinity of one that is not positive.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounds {
     pub low: f64,
@@ -39,8 +42,15 @@ fn bounds<T: Real>(matrix: &Matrix, stencils: &Stencils<T>, groups: &[usize], st
     let mut krylov = Krylov::new(matrix, stencils, groups);
     let (mut diagonal, mut beside) = (Vec::new(), Vec::new());
     let (mut step_before, mut ratio) = (1.0, 0.0);
+    let at_start = krylov.rz;
     for _ in 0..steps {
-        let Some((step, next_ratio)) = krylov.step() else { break };
+        let Some((step, next_ratio)) = krylov.step() else {
+            // Nothing is left, unless a displacement was met that costs no energy.
+            if krylov.rz > EXHAUSTED * at_start {
+                return Bounds { low: 0.0, high: f64::INFINITY };
+            }
+            break;
+        };
         diagonal.push(1.0 / step + ratio / step_before);
         beside.push(next_ratio.sqrt() / step);
         (step_before, ratio) = (step, next_ratio);
