@@ -6,6 +6,7 @@
 //! * [`machine`]: the memory bandwidth of the triad `a = b + s c`.
 //! * [`sweep`]: particle updates per second of the plain rule, beside the roofline that bandwidth
 //!   draws.
+//! * `equilibrium` (feature `fem`): seconds to equilibrium, beside a factorisation of the same system.
 
 #[cfg(feature = "fem")]
 pub mod equilibrium;

@@ -97,6 +97,17 @@ pub enum BenchCommand {
         #[arg(long)]
         quick: bool,
     },
+    /// Seconds to equilibrium by multigrid, beside a factorisation of the same system
+    #[cfg(feature = "fem")]
+    #[command(after_help = "Example:\n  flockform bench equilibrium --json > equilibrium.json")]
+    Equilibrium {
+        /// Print JSON instead of a table
+        #[arg(long)]
+        json: bool,
+        /// Small bodies and few repetitions: shows that it works, measures nothing worth quoting
+        #[arg(long)]
+        quick: bool,
+    },
 }
 
 /// Which scene, with which changes.
@@ -155,6 +166,9 @@ pub enum Refusal {
     Option(#[from] material::WrongOption),
     #[error("no threads to measure with: {0}")]
     Bench(#[from] rayon::ThreadPoolBuildError),
+    #[cfg(feature = "fem")]
+    #[error("{0}")]
+    BenchEquilibrium(#[from] bench::equilibrium::EquilibriumError),
     #[error("--threads {threads}: {error}\n  help: give a number from 1 to the machine's cores")]
     Threads { threads: usize, error: rayon::ThreadPoolBuildError },
 }
@@ -187,6 +201,11 @@ pub fn dispatch(command: Command) -> Result<ExitCode, Refusal> {
         }
         Command::Bench(BenchCommand::Sweep { json, quick }) => {
             let report = bench::sweep::run(&bench::sweep::Options { quick })?;
+            print(&if json { format!("{}\n", serde_json::json!(report)) } else { report.to_string() });
+        }
+        #[cfg(feature = "fem")]
+        Command::Bench(BenchCommand::Equilibrium { json, quick }) => {
+            let report = bench::equilibrium::run(&bench::equilibrium::Options { quick })?;
             print(&if json { format!("{}\n", serde_json::json!(report)) } else { report.to_string() });
         }
     }

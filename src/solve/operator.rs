@@ -8,6 +8,10 @@ mod columns;
 mod connected;
 mod kernel;
 mod matrix;
+#[cfg(test)]
+pub mod samples;
+#[cfg(test)]
+mod tests;
 
 use std::collections::HashMap;
 
@@ -118,6 +122,11 @@ impl Operator {
 
     pub fn follows(&self) -> &[bool] {
         &self.follows
+    }
+
+    /// The row of a follower.
+    pub fn row(&self, particle: usize) -> &Row {
+        &self.rows[self.class[particle] as usize]
     }
 
     /// The different rows.

@@ -22,7 +22,8 @@ const ESTIMATE: usize = 20;
 pub(super) fn solve(prepared: &mut Prepared, request: &Request) -> Result<Found, SolveError> {
     let begin = Instant::now();
     let Prepared { matrix, stencils, right, size, symmetric, .. } = prepared;
-    let largest = if *symmetric { lanczos::largest(matrix, stencils, ESTIMATE) } else { largest_row(matrix) };
+    let bound = largest_row(matrix);
+    let largest = if *symmetric { lanczos::largest(matrix, stencils, ESTIMATE).min(bound) } else { bound };
     let weight = SHARE * 2.0 / largest;
     let mut u = Field::zeros(matrix.count());
     let mut r = right.clone();

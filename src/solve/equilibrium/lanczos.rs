@@ -5,11 +5,14 @@
 //! section 10.2.5). On a large body the steps are taken on a few groups of its columns with everybody else
 //! held, which lowers the largest eigenvalue by next to nothing.
 
-use super::steps::Apply;
+use super::steps::{Apply, precondition_group};
 use crate::solve::field::{Field, Part, Real, dot};
 use crate::solve::operator::{Matrix, Stencils, pass};
 
-/// Lowest and highest eigenvalue found of `D^-1 K`.
+/// Share of the first residual's square below which the next one is rounding.
+const EXHAUSTED: f64 = 1e-24;
+
+/// Lowest and highest eigenvalue found of `D^-1 K`; zero and infinity of one that is not positive.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounds {
     pub low: f64,
@@ -39,8 +42,15 @@ fn bounds<T: Real>(matrix: &Matrix, stencils: &Stencils<T>, groups: &[usize], st
     let mut krylov = Krylov::new(matrix, stencils, groups);
     let (mut diagonal, mut beside) = (Vec::new(), Vec::new());
     let (mut step_before, mut ratio) = (1.0, 0.0);
+    let at_start = krylov.rz;
     for _ in 0..steps {
-        let Some((step, next_ratio)) = krylov.step() else { break };
+        let Some((step, next_ratio)) = krylov.step() else {
+            // Nothing is left, unless a displacement was met that costs no energy.
+            if krylov.rz > EXHAUSTED * at_start {
+                return Bounds { low: 0.0, high: f64::INFINITY };
+            }
+            break;
+        };
         diagonal.push(1.0 / step + ratio / step_before);
         beside.push(next_ratio.sqrt() / step);
         (step_before, ratio) = (step, next_ratio);
@@ -71,19 +81,23 @@ impl<'a, T: Real> Krylov<'a, T> {
         let (r, z, p, q) = (zeros(), zeros(), zeros(), zeros());
         let mut krylov = Self { matrix, stencils, groups, r, z, p, q, rz: 0.0 };
         // A fixed start without symmetry: the fractional parts of multiples of the golden ratio.
-        let noise = |i: usize| T::of((i as f64 * 0.618_033_988_749_895).fract() - 0.5);
-        krylov.each_follower(|k, i| (k.r.x[i], k.r.y[i]) = (noise(2 * i + 1), noise(2 * i + 2)));
+        let noise = |i: u32| T::of((f64::from(i) * 0.618_033_988_749_895).fract() - 0.5);
+        for run in groups.iter().flat_map(|&group| matrix.runs_of(group)) {
+            for i in run.start..run.start + run.len {
+                krylov.r.x[i as usize] = noise(2 * i + 1);
+                krylov.r.y[i as usize] = noise(2 * i + 2);
+            }
+        }
         krylov.precondition();
         krylov.rz = krylov.product(&krylov.r, &krylov.z);
-        krylov.each_follower(|k, i| (k.p.x[i], k.p.y[i]) = (k.z.x[i], k.z.y[i]));
+        krylov.p = krylov.z.clone();
         krylov
     }
 
     /// Step length, and the ratio of the residuals' squares; `None` once nothing is left.
     fn step(&mut self) -> Option<(f64, f64)> {
         for &group in self.groups {
-            let range = self.matrix.bounds[group]..self.matrix.bounds[group + 1];
-            let out = Part { begin: range.start, x: &mut self.q.x[range.clone()], y: &mut self.q.y[range] };
+            let out = part(&mut self.q, self.matrix, group);
             pass(self.matrix, self.stencils, group, self.p.view(), &mut Apply { out });
         }
         let pq = self.product(&self.p, &self.q);
@@ -93,29 +107,23 @@ impl<'a, T: Real> Krylov<'a, T> {
             return None;
         }
         let step = before / pq;
-        let t = T::of(step);
-        self.each_follower(|k, i| {
-            k.r.x[i] = k.r.x[i] - t * k.q.x[i];
-            k.r.y[i] = k.r.y[i] - t * k.q.y[i];
-        });
+        for &group in self.groups {
+            add_times(part(&mut self.r, self.matrix, group), (T::of(1.0), T::of(-step)), &self.q);
+        }
         self.precondition();
         self.rz = self.product(&self.r, &self.z);
         let ratio = self.rz / before;
-        let t = T::of(ratio);
-        self.each_follower(|k, i| {
-            k.p.x[i] = k.z.x[i] + t * k.p.x[i];
-            k.p.y[i] = k.z.y[i] + t * k.p.y[i];
-        });
+        for &group in self.groups {
+            add_times(part(&mut self.p, self.matrix, group), (T::of(ratio), T::of(1.0)), &self.z);
+        }
         (ratio > 0.0).then_some((step, ratio))
     }
 
     fn precondition(&mut self) {
-        let stencils = self.stencils;
-        self.each_follower(|k, i| {
-            let [xx, xy, yx, yy] = *stencils.inverse(k.matrix.class[i]);
-            let [x, y] = k.r.get(i);
-            (k.z.x[i], k.z.y[i]) = (xx * x + xy * y, yx * x + yy * y);
-        });
+        for &group in self.groups {
+            let out = part(&mut self.z, self.matrix, group);
+            precondition_group(self.matrix, self.stencils, (0.0, 1.0), self.r.view(), group, out);
+        }
     }
 
     fn product(&self, a: &Field<T>, b: &Field<T>) -> f64 {
@@ -125,15 +133,19 @@ impl<'a, T: Real> Krylov<'a, T> {
         };
         self.groups.iter().map(of_group).sum()
     }
+}
 
-    fn each_follower(&mut self, work: impl Fn(&mut Self, usize)) {
-        let matrix = self.matrix;
-        for &group in self.groups {
-            for run in matrix.runs_of(group) {
-                (run.start as usize..(run.start + run.len) as usize).for_each(|i| work(self, i));
-            }
-        }
-    }
+/// The stretch of a field that belongs to a group.
+fn part<'a, T>(field: &'a mut Field<T>, matrix: &Matrix, group: usize) -> Part<'a, T> {
+    let range = matrix.bounds[group]..matrix.bounds[group + 1];
+    Part { begin: range.start, x: &mut field.x[range.clone()], y: &mut field.y[range] }
+}
+
+/// `to = keep to + weight from`.
+fn add_times<T: Real>(to: Part<'_, T>, (keep, weight): (T, T), from: &Field<T>) {
+    let from = from.view().range(to.range());
+    to.x.iter_mut().zip(from.x).for_each(|(to, &from)| *to = keep * *to + weight * from);
+    to.y.iter_mut().zip(from.y).for_each(|(to, &from)| *to = keep * *to + weight * from);
 }
 
 /// Lowest and highest eigenvalue of a symmetric tridiagonal matrix, by bisection on Sturm's count.

@@ -33,12 +33,9 @@ impl System {
         if forces != particles || held != particles {
             return Err(SolveError::Shapes { forces, held, particles });
         }
-        let finite = |values: &[f64], i: usize| values[i].is_finite();
-        let follows = self.operator.follows();
-        for i in 0..particles {
-            let (points, what) =
-                if follows[i] { (&self.forces, "force") } else { (&self.held, "displacement") };
-            if !(finite(&points.x, i) && finite(&points.y, i)) {
+        for (i, &follows) in self.operator.follows().iter().enumerate() {
+            let (points, what) = if follows { (&self.forces, "force") } else { (&self.held, "displacement") };
+            if !points.get(i).iter().all(|value| value.is_finite()) {
                 return Err(SolveError::NotFinite { what, particle: i + 1 });
             }
         }

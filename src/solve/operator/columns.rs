@@ -92,6 +92,13 @@ impl Columns {
         self.range().flat_map(|column| self.of(column).iter().map(move |&segment| (column, segment)))
     }
 
+    /// Columns, and rows, from the first to the last that has a particle.
+    pub fn extent(&self) -> [i32; 2] {
+        let rows = self.range().filter_map(|column| self.rows_of(column));
+        let rows = rows.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]);
+        [self.range().len() as i32, rows.map_or(0, |[low, high]| (high - low) / self.step + 1)]
+    }
+
     /// Sites of all particles in segments, ascending.
     pub fn sites(&self) -> impl Iterator<Item = Site> + Clone + '_ {
         let of_segment = move |column: i32, segment: Segment| {

@@ -158,3 +158,48 @@ pub fn array<T, const W: usize>(values: &[T], at: usize) -> &[T; W] {
 pub fn array_mut<T, const W: usize>(values: &mut [T], at: usize) -> &mut [T; W] {
     (&mut values[at..at + W]).try_into().expect("as many as asked for")
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flock::lattice::LatticeKind;
+    use crate::solve::field::Field;
+    use crate::solve::operator::samples::operator;
+
+    struct Collect<T>(Vec<(usize, T, T)>);
+
+    impl<T: Real> Task<T> for Collect<T> {
+        fn take<const W: usize>(&mut self, at: usize, _: &[T; 4], x: &[T; W], y: &[T; W]) {
+            self.0.extend((0..W).map(|k| (at + k, x[k], y[k])));
+        }
+    }
+
+    fn assert_widths_agree<T: Real>() {
+        let matrix = Matrix::of_followers(&operator(LatticeKind::SAMPLES[3], 30, 143, |i| i % 211 == 0));
+        let stencils = Stencils::<T>::new(&matrix.rows, 0.7);
+        let noise = |i: usize| T::of((i as f64 * 0.618_033_988_749_895).fract() - 0.5);
+        let u = Field {
+            x: (0..matrix.count()).map(noise).collect(),
+            y: (0..matrix.count()).map(|i| noise(7 * i)).collect(),
+        };
+        let (mut wide, mut portable) = (Collect(Vec::new()), Collect(Vec::new()));
+        over_runs(&matrix, &stencils, matrix.runs(), u.view(), &mut wide);
+        over_runs_portable(&matrix, &stencils, matrix.runs(), u.view(), &mut portable);
+        assert!(wide.0.len() > 4000);
+        assert!(wide.0 == portable.0);
+        let mut alone = Collect(Vec::new());
+        for run in matrix.runs() {
+            for at in run.start as usize..(run.start + run.len) as usize {
+                let (blocks, inverse) = (stencils.blocks(run.class), stencils.inverse(run.class));
+                lanes::<T, 1>(blocks, matrix.distances(run), inverse, at, u.view(), &mut alone);
+            }
+        }
+        assert!(alone.0 == portable.0);
+    }
+
+    #[test]
+    fn the_width_of_the_vectors_changes_no_bit() {
+        assert_widths_agree::<f32>();
+        assert_widths_agree::<f64>();
+    }
+}

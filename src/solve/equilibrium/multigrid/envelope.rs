@@ -1,9 +1,7 @@
 //! The coarsest grid is solved outright: Cholesky's factorisation within the envelope, in double precision.
 
-use std::collections::HashMap;
-
 use crate::flock::lattice::Site;
-use crate::solve::operator::{HELD, Matrix};
+use crate::solve::operator::Matrix;
 
 /// Pivots below this share of their diagonal are rounding: what they stand for moves nothing that the
 /// others do not move already, and stays put.
@@ -23,42 +21,36 @@ pub struct Envelope {
     x: Vec<f64>,
 }
 
-/// Entries that the factor of a matrix would have.
-pub fn entries(matrix: &Matrix) -> usize {
-    let by = |along_rows| Plan::new(matrix, along_rows).starts.last().copied().unwrap_or(0);
-    by(false).min(by(true))
-}
-
 /// An order of elimination and the envelope that it leads to.
 struct Plan {
-    order: Vec<u32>,
-    place: HashMap<u32, usize>,
+    nodes: Vec<(Site, u32)>,
+    /// Place of each node in the order, shape \[count\].
+    place: Vec<u32>,
     first: Vec<u32>,
     starts: Vec<usize>,
 }
 
 impl Plan {
     /// Column by column or row by row: whichever is shorter makes the narrower envelope.
-    fn new(matrix: &Matrix, along_rows: bool) -> Self {
+    fn new(matrix: &Matrix) -> Self {
         let mut nodes: Vec<(Site, u32)> = sites(matrix);
-        if along_rows {
+        let [across, along] = matrix.columns.extent();
+        if across < along {
             nodes.sort_unstable_by_key(|&([column, row], _)| [row, column]);
         }
-        let order: Vec<u32> = nodes.iter().map(|&(_, node)| node).collect();
-        let place: HashMap<u32, usize> =
-            order.iter().enumerate().map(|(place, &node)| (node, place)).collect();
+        let mut place = vec![0; matrix.count()];
+        nodes.iter().enumerate().for_each(|(at, &(_, node))| place[node as usize] = at as u32);
         let (mut first, mut starts) = (Vec::new(), vec![0]);
-        for (place_of, &(site, node)) in nodes.iter().enumerate() {
+        for (at, &(site, node)) in nodes.iter().enumerate() {
             let entries = matrix.rows[matrix.class[node as usize] as usize].entries.iter();
-            let before =
-                entries.map(|&(offset, _)| place[&index(matrix, site, offset)]).chain([place_of]).min();
-            let before = 2 * before.unwrap_or(place_of) as u32;
-            for row in 2 * place_of..2 * place_of + 2 {
+            let places = entries.map(|&(offset, _)| place[index(matrix, site, offset)]);
+            let before = 2 * places.fold(at as u32, u32::min);
+            for row in 2 * at..2 * at + 2 {
                 first.push(before);
                 starts.push(starts[row] + row + 1 - before as usize);
             }
         }
-        Self { order, place, first, starts }
+        Self { nodes, place, first, starts }
     }
 }
 
@@ -68,31 +60,28 @@ fn sites(matrix: &Matrix) -> Vec<(Site, u32)> {
     followers.filter_map(of).collect()
 }
 
-fn index(matrix: &Matrix, site: Site, offset: Site) -> u32 {
+fn index(matrix: &Matrix, site: Site, offset: Site) -> usize {
     let there = [site[0] + offset[0], site[1] + offset[1]];
-    matrix.columns.find(there).expect("rows lead to followers").0 as u32
+    matrix.columns.find(there).expect("rows lead to followers").0
 }
 
 impl Envelope {
     /// Factorises a matrix, its rows multiplied by `scale`; `None` if it is not positive.
     pub fn new(matrix: &Matrix, scale: f64) -> Option<Self> {
-        let size = |plan: &Plan| plan.starts.last().copied();
-        let (by_column, by_row) = (Plan::new(matrix, false), Plan::new(matrix, true));
-        let plan = if size(&by_row) < size(&by_column) { by_row } else { by_column };
+        let plan = Plan::new(matrix);
         let unknowns = plan.first.len();
         let mut factor = Self {
             values: vec![0.0; plan.starts[unknowns]],
-            order: plan.order,
+            order: plan.nodes.iter().map(|&(_, node)| node).collect(),
             first: plan.first,
             starts: plan.starts,
             x: vec![0.0; unknowns],
         };
-        for (site, node) in sites(matrix) {
-            debug_assert_ne!(matrix.class[node as usize], HELD);
+        for (here, &(site, node)) in plan.nodes.iter().enumerate() {
             let row = &matrix.rows[matrix.class[node as usize] as usize];
-            let here = plan.place[&node];
             let others = row.entries.iter().map(|(offset, block)| {
-                (plan.place[&index(matrix, site, *offset)], block.map(|row| row.map(|v| -v)))
+                let there = plan.place[index(matrix, site, *offset)] as usize;
+                (there, block.map(|row| row.map(|v| -v)))
             });
             for (there, block) in others.chain([(here, row.diagonal)]) {
                 for (a, b) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
@@ -162,10 +151,6 @@ impl Envelope {
             u.1[node as usize] = x[2 * place + 1] as f32;
         }
         self.x = x;
-    }
-
-    pub fn bytes(&self) -> usize {
-        self.values.len() * 8 + self.first.len() * 32
     }
 }
 

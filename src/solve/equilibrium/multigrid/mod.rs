@@ -2,20 +2,22 @@
 //! coarser, so that a displacement of the whole takes one step and not a walk from particle to particle.
 //!
 //! * Level 0 are the particles. The nodes of the next level stand every few columns and rows of their
-//!   sites ([`transfer`]), and interpolation is linear along both: translations, rotations and every
+//!   sites (`transfer`), and interpolation is linear along both: translations, rotations and every
 //!   uniform strain are among what the coarse grid can do, on every lattice.
-//! * Every level's operator is `P' K P` in double precision, by classes ([`coarsen`]): a rectangle has a
+//! * Every level's operator is `P' K P` in double precision, by classes (`coarsen`): a rectangle has a
 //!   few dozen different rows on each, so that setting up costs little time and next to no memory.
 //! * Smoothing is block-Jacobi with Chebyshev's weights of degree 2 before and after (M. F. Adams, M. Brezina,
 //!   J. J. Hu, R. S. Tuminaro, Journal of Computational Physics 188, 2003), bounded by an estimate of the
 //!   largest eigenvalue of each level.
-//! * The coarsest level is solved outright ([`envelope`]).
+//! * The coarsest level is solved outright (`envelope`).
 //!
 //! The cycle runs in single precision: it begins at zero and its result is only a direction, so what
 //! rounding does to it costs no digit of the equilibrium; the iteration around it runs in double precision.
 
 mod coarsen;
 mod envelope;
+#[cfg(test)]
+mod tests;
 mod transfer;
 
 use std::time::Instant;
@@ -30,10 +32,11 @@ use crate::solve::field::{Field, Real, dot};
 use crate::solve::operator::{Matrix, Stencils};
 
 /// Nodes of the coarsest level: fewer are not worth another level.
-const COARSEST: usize = 400;
+const COARSEST: usize = 640;
 
-/// Entries of a factor that are no trouble to keep and to solve with, whatever the body's size.
-const SMALL_FACTOR: usize = 1 << 16;
+/// Nodes across a slender body below which it is not coarsened further: fewer could not bend. Along it
+/// the factor only grows with its length.
+const ACROSS: i32 = 5;
 
 /// Lanczos steps for the largest eigenvalue of each level, and what its estimate is raised by.
 const ESTIMATE: usize = 12;
@@ -94,20 +97,24 @@ impl Vectors {
     }
 }
 
-/// Weights of two sweeps that dampen all eigenvalues from `largest / SMOOTHED` to `largest` best.
-fn weights(largest: f64) -> [f64; 2] {
-    let (low, high) = (largest / SMOOTHED, largest);
-    [1.0, 3.0].map(|k: f64| {
+/// Weights of two sweeps that dampen all eigenvalues from a share of the largest to the largest best;
+/// `None` if the matrix is not positive.
+fn weights(matrix: &Matrix, stencils: &Stencils<f32>) -> Option<[f64; 2]> {
+    let high = SAFETY * lanczos::largest(matrix, stencils, ESTIMATE);
+    let low = high / SMOOTHED;
+    let weight = |k: f64| {
         let node = (std::f64::consts::PI * k / 4.0).cos();
         1.0 / (f64::midpoint(high, low) + (high - low) / 2.0 * node)
-    })
+    };
+    high.is_finite().then(|| [1.0, 3.0].map(weight))
 }
 
 impl<'a> Cycle<'a> {
     fn new(matrix: &'a Matrix, grid: [[f64; 2]; 2]) -> Result<Self, SolveError> {
         let scale = single_scale(matrix);
         let finest = Stencils::new(&matrix.rows, scale);
-        let weights = weights(SAFETY * lanczos::largest(matrix, &finest, ESTIMATE));
+        let not_positive = SolveError::NotPositive { solver: Solver::Multigrid, iteration: 0 };
+        let weights = weights(matrix, &finest).ok_or(not_positive.clone())?;
         let vectors = Vectors::new(matrix.count());
         let mut cycle = Self { matrix, finest, weights, vectors, levels: Vec::new(), coarsest: None };
         let mut spacing = grid.map(|v| v[0].hypot(v[1]));
@@ -117,7 +124,7 @@ impl<'a> Cycle<'a> {
                 0 => coarsen::first_steps(grid, particles_per_site(fine)),
                 _ => coarsen::next_steps(spacing),
             };
-            let level = Level::new(fine, Transfer { steps }, scale);
+            let level = Level::new(fine, Transfer { steps }, scale).ok_or(not_positive.clone())?;
             if level.matrix.count() >= fine.count() {
                 break;
             }
@@ -125,15 +132,14 @@ impl<'a> Cycle<'a> {
             cycle.levels.push(level);
         }
         let coarsest = cycle.levels.last().map_or(matrix, |level| &level.matrix);
-        let not_positive = SolveError::NotPositive { solver: Solver::Multigrid, iteration: 0 };
         cycle.coarsest = Some(Envelope::new(coarsest, scale).ok_or(not_positive)?);
         Ok(cycle)
     }
 
     fn is_coarse_enough(&self) -> bool {
         let matrix = self.levels.last().map_or(self.matrix, |level| &level.matrix);
-        matrix.count() <= COARSEST
-            || (matrix.count() <= 64 * COARSEST && envelope::entries(matrix) <= SMALL_FACTOR)
+        let is_slender = || matrix.columns.extent().iter().any(|&nodes| nodes <= ACROSS);
+        matrix.count() <= COARSEST || (!self.levels.is_empty() && is_slender())
     }
 
     /// `v` of the finest level becomes the cycle's answer to its `f`.
@@ -171,12 +177,12 @@ fn descend(here: &Smoothed<'_>, vectors: &mut Vectors, below: &mut [Level], coar
 }
 
 impl Level {
-    fn new(fine: &Matrix, transfer: Transfer, scale: f64) -> Self {
+    fn new(fine: &Matrix, transfer: Transfer, scale: f64) -> Option<Self> {
         let matrix = coarsen::coarsen(fine, transfer);
         let stencils = Stencils::new(&matrix.rows, scale);
-        let weights = weights(SAFETY * lanczos::largest(&matrix, &stencils, ESTIMATE));
+        let weights = weights(&matrix, &stencils)?;
         let vectors = Vectors::new(matrix.count());
-        Self { transfer, matrix, stencils, weights, vectors }
+        Some(Self { transfer, matrix, stencils, weights, vectors })
     }
 }
 

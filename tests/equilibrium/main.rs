@@ -1,0 +1,7 @@
+//! Equilibrium: every solver finds the same one, multigrid as fast on large bodies as on small ones.
+
+mod agreement;
+mod growth;
+mod refusals;
+mod reports;
+mod support;

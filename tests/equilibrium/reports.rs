@@ -1,0 +1,100 @@
+//! What a solve says about itself.
+
+use flockform::bench::equilibrium::beam::Plate;
+use flockform::flock::points::Points;
+use flockform::solve::equilibrium::{
+    Choice, Precision, Request, SINGLE_FLOOR, Solver, System, choose, solve,
+};
+
+use crate::support::{Feel, KINDS, body, by, difference, operator, plate, solved, system};
+
+fn beam(columns: i32, rows: i32) -> System {
+    Plate { cells: [columns, rows], holes: false }.parts().system().expect("an operator")
+}
+
+#[test]
+fn the_history_begins_at_one_and_ends_below_the_tolerance() {
+    let system = beam(30, 12);
+    for solver in Solver::ALL {
+        let solved = solved(&system, solver, 1e-7);
+        assert_eq!((solved.solver, solved.why.as_str()), (solver, "asked for"));
+        assert_eq!(solved.residuals.len(), solved.iterations + 1, "{solver}");
+        assert_eq!(solved.residuals[0], 1.0);
+        assert!(solved.residuals[..solved.iterations].iter().all(|&r| r > 1e-7), "{solver}");
+        assert!(solved.residuals[solved.iterations] <= 1e-7, "{solver}");
+        assert_eq!(solved.phases.iter().map(|phase| phase.0).collect::<Vec<_>>(), ["set-up", "solve"]);
+    }
+}
+
+#[test]
+fn a_solve_that_runs_out_of_iterations_says_so() {
+    let system = beam(70, 60);
+    let iterative = Solver::ALL.into_iter().filter(|&solver| solver != Solver::Direct);
+    for solver in iterative {
+        let request = Request { most_iterations: 3, ..by(solver, 1e-14) };
+        let solved = solve(&system, &request).expect("no error");
+        assert!(!solved.converged && solved.iterations == 3, "{solver} {}", solved.iterations);
+    }
+}
+
+#[test]
+fn auto_takes_what_suits_size_and_precision_and_says_why() {
+    let auto = |system: &System, precision| {
+        let tolerance = 1e-4;
+        choose(system, &Request { solver: Choice::Auto, tolerance, precision, ..Request::default() })
+    };
+    let (small, large) = (beam(8, 8), beam(120, 100));
+    assert_eq!(auto(&small, Precision::F64).0, Solver::Direct);
+    assert_eq!(auto(&large, Precision::F64).0, Solver::Multigrid);
+    assert_eq!(auto(&small, Precision::F32).0, Solver::Multigrid);
+    assert!(auto(&large, Precision::F64).1.contains("12120 followers"));
+    let solved = solve(&small, &Request::default()).expect("solvable");
+    assert_eq!(solved.solver, Solver::Direct);
+    assert!(solved.converged && solved.why.contains("72 followers"), "{}", solved.why);
+}
+
+#[test]
+fn in_single_precision_the_answer_is_as_good_as_the_condition_of_the_body_allows() {
+    for kind in KINDS {
+        let (body, neighbours) = body(kind, [40, 38], plate);
+        let system = system(&body, neighbours, Feel::Material);
+        let truth = solved(&system, Solver::Direct, 1e-9).displacement;
+        for solver in [Solver::ConjugateGradients, Solver::Multigrid] {
+            let request = Request { precision: Precision::F32, ..by(solver, SINGLE_FLOOR) };
+            let found = solve(&system, &request).expect("solvable");
+            let error = difference(&found.displacement, &truth);
+            println!("{kind:?} {solver} {error:e} after {}", found.iterations);
+            assert!(found.converged && error < 1e-3, "{kind:?} {solver}: {error:e}");
+            assert!(error > 1e-12, "{kind:?} {solver}: computed in double precision after all");
+        }
+    }
+}
+
+#[test]
+fn without_loads_nobody_moves_and_held_particles_are_where_they_are_held() {
+    let (plate, neighbours) = body(KINDS[5], [12, 12], plate);
+    let count = plate.count();
+    let operator = operator(&plate, neighbours, Feel::Material, |i| i < 20);
+    let lead: Points = (0..count).map(|_| [0.25, -0.5]).collect();
+    for held in [Points::zeros(count), lead] {
+        let system = System::new(operator.clone(), Points::zeros(count), held.clone());
+        for solver in Solver::ALL {
+            let found = solved(&system, solver, 1e-12).displacement;
+            // A translation of the held particles is one of the whole body.
+            let worst = (0..count).map(|i| (found.x[i] - held.x[i]).abs() + (found.y[i] - held.y[i]).abs());
+            assert!(worst.fold(0.0, f64::max) < 1e-9, "{solver}");
+        }
+    }
+}
+
+#[test]
+fn scales_of_force_and_stiffness_do_not_matter() {
+    for scale in [1e-140, 1e140] {
+        let mut system = beam(40, 30);
+        let usual = solved(&system, Solver::Multigrid, 1e-10).displacement;
+        system.forces.y.iter_mut().for_each(|force| *force *= scale);
+        let scaled = solved(&system, Solver::Multigrid, 1e-10).displacement;
+        let back = scaled.iter().map(|u| u.map(|u| u / scale)).collect();
+        assert!(difference(&back, &usual) < 1e-8, "{scale}");
+    }
+}
