@@ -41,6 +41,7 @@ pub const SCENES: &[Bundled] = scenes![
     "beam-5",
     "beam-10",
     "beam-loaded",
+    "beam-second",
     "beam-hexagonal",
     "beam-paper",
     "beam-paper-5",

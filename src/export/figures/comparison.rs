@@ -223,7 +223,7 @@ mod tests {
         let cut = Cut::Count { columns: 11, rows: 3 };
         let (body, _) = Body::build(lattice, &cut, &near, None).expect("builds");
         let cells = Cells::of_body(&body);
-        for (size, factor) in [(1.0, 1.0), (0.0, 1.0), (5.9, 1.0), (1e-3, 500.0), (60.0, 0.05), (0.1, 5.0)] {
+        for (size, factor) in [(1.0, 1.0), (0.0, 1.0), (5.9, 1.0), (1e-3, 500.0), (50.0, 0.05), (0.1, 5.0)] {
             let moved: Points = body.reference.iter().map(|_| [0.0, size]).collect();
             let pair = Pair {
                 title: "",
