@@ -16,6 +16,7 @@ use flockform::continuum::record::{ProbeSeries, Snapshot};
 use flockform::continuum::run::{Outcome, StopReason};
 use flockform::export::{ExportError, OutputFolder, Results, Timings, VtkSeries, write_all};
 use flockform::scene::Scene;
+use flockform::trade::{Chosen, choose};
 
 use super::progress::Progress;
 use super::{FAILED, Refusal, SceneArguments, print};
@@ -50,7 +51,11 @@ pub fn run(arguments: &RunArguments) -> Result<ExitCode, Refusal> {
 
 fn run_here(arguments: &RunArguments) -> Result<ExitCode, Refusal> {
     let start = Instant::now();
-    let scene = arguments.scene.load(arguments.steps.map(|steps| format!("stop.steps={steps}")))?;
+    let steps = arguments.steps.map(|steps| format!("stop.steps={steps}"));
+    // Asked for first, so that a misspelt name is a misspelt name.
+    arguments.scene.load(steps.clone())?;
+    let load = |more: &[String]| arguments.scene.load_scene(&[steps.as_slice(), more].concat());
+    let Chosen { scene, words } = choose(&load)?;
     let plan = plan(&scene)?;
     let out = arguments.out.clone().unwrap_or_else(|| free_folder(&scene.name));
     let folder = OutputFolder::create(&out, arguments.force)?;
@@ -77,6 +82,7 @@ fn run_here(arguments: &RunArguments) -> Result<ExitCode, Refusal> {
     write_all(&folder, &Results { scene: &scene, outcome: &outcome, snapshots, probes, timings })?;
     let kept = folder.commit()?;
     if !arguments.quiet {
+        print(&words);
         print(&closing_words(&scene, &outcome, elapsed, &kept));
     }
     Ok(exit_code(&outcome))

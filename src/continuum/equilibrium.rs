@@ -8,11 +8,8 @@ use super::plan::Plan;
 use super::run::{Outcome, StopReason, run};
 use crate::flock::points::{Points, distance};
 use crate::flock::role::Role;
-use crate::scene::raw::{RawEquilibrium, RawPrecision, RawSolver};
 use crate::scene::{Scene, SceneError};
-use crate::solve::equilibrium::{
-    Choice, Precision, Request, SolveError, Solved, Solver, System, choose, solve,
-};
+use crate::solve::equilibrium::{Request, SolveError, Solved, Solver, System, choose, solve};
 use crate::solve::linear::{NotLinear, system};
 
 /// Runs a plan to its end as its scene asks: stepping, or straight to the equilibrium. `watch` sees a
@@ -25,8 +22,8 @@ pub fn come_to_rest(
     plan: Plan,
     watch: &mut dyn FnMut(&Engine, f64) -> ControlFlow<()>,
 ) -> Result<Outcome, SceneError> {
-    let Some(asked) = &scene.raw.equilibrium else { return Ok(run(plan, watch)) };
-    let outcome = settle(scene, asked, plan)?;
+    let Some(asked) = &scene.equilibrium else { return Ok(run(plan, watch)) };
+    let outcome = settle(scene, &asked.request, plan)?;
     // There is nothing left to break off.
     let _ = watch(&outcome.engine, outcome.residual);
     Ok(outcome)
@@ -36,9 +33,9 @@ pub fn come_to_rest(
 ///
 /// # Errors
 /// Names what in the scene has no equilibrium, or none that the solver asked for can find.
-pub fn settle(scene: &Scene, asked: &RawEquilibrium, plan: Plan) -> Result<Outcome, SceneError> {
+pub fn settle(scene: &Scene, request: &Request, plan: Plan) -> Result<Outcome, SceneError> {
     let system = of_plan(scene, &plan)?;
-    let solved = solve(&system, &request(asked)).map_err(|error| refuse(scene, &error))?;
+    let solved = solve(&system, request).map_err(|error| refuse(scene, &error))?;
     Ok(outcome(plan, solved))
 }
 
@@ -46,8 +43,8 @@ pub fn settle(scene: &Scene, asked: &RawEquilibrium, plan: Plan) -> Result<Outco
 ///
 /// # Errors
 /// As [`settle`], as far as can be told without solving.
-pub fn foresee(scene: &Scene, asked: &RawEquilibrium, plan: &Plan) -> Result<(Solver, String), SceneError> {
-    Ok(choose(&of_plan(scene, plan)?, &request(asked)))
+pub fn foresee(scene: &Scene, request: &Request, plan: &Plan) -> Result<(Solver, String), SceneError> {
+    Ok(choose(&of_plan(scene, plan)?, request))
 }
 
 /// The linear system of a plan: leaders where they are at the last step.
@@ -68,23 +65,6 @@ pub fn of_plan(scene: &Scene, plan: &Plan) -> Result<System, SceneError> {
         };
         scene.refuse(key, format!("no equilibrium can be solved for: {error}"), help)
     })
-}
-
-fn request(asked: &RawEquilibrium) -> Request {
-    let solver = match asked.solver {
-        RawSolver::Auto => Choice::Auto,
-        RawSolver::Jacobi => Choice::This(Solver::Jacobi),
-        RawSolver::GaussSeidel => Choice::This(Solver::GaussSeidel),
-        RawSolver::Chebyshev => Choice::This(Solver::Chebyshev),
-        RawSolver::ConjugateGradients => Choice::This(Solver::ConjugateGradients),
-        RawSolver::Multigrid => Choice::This(Solver::Multigrid),
-        RawSolver::Direct => Choice::This(Solver::Direct),
-    };
-    let precision = match asked.precision {
-        RawPrecision::F64 => Precision::F64,
-        RawPrecision::F32 => Precision::F32,
-    };
-    Request { solver, tolerance: asked.tolerance, most_iterations: asked.most_iterations, precision }
 }
 
 fn refuse(scene: &Scene, error: &SolveError) -> SceneError {

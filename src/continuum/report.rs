@@ -122,9 +122,9 @@ fn facts(scene: &Scene, plan: &Plan) -> Result<Vec<(String, String)>, SceneError
         Order::Synchronous => "synchronous",
         Order::Sequential => "sequential",
     };
-    let stop = match (&scene.raw.equilibrium, plan.stop.tolerance) {
+    let stop = match (&scene.equilibrium, plan.stop.tolerance) {
         (Some(asked), _) => {
-            let (solver, why) = foresee(scene, asked, plan)?;
+            let (solver, why) = foresee(scene, &asked.request, plan)?;
             format!("in the equilibrium of step {}, found by {solver}: {why}", plan.stop.steps)
         }
         (None, Some(tolerance)) => {

@@ -8,9 +8,10 @@ use serde::Serialize;
 use super::csv::write;
 use super::error::{ExportError, write_file};
 use super::figures::chart::{Axis, Chart, Landmark, Series, Style, draw};
-use super::figures::{self, SERIES};
+use super::figures::{self, INK, SERIES};
 use super::{OutputFolder, summary};
-use crate::trade::{Outcome, Point, Study};
+use crate::solve::equilibrium::Solver;
+use crate::trade::{Outcome, Point, RuleChoice, Study};
 
 #[derive(Serialize)]
 struct Report<'a> {
@@ -76,32 +77,35 @@ fn row(point: &Point, on_the_front: bool) -> Row<'_> {
     }
 }
 
-/// Error against time, both logarithmic: a series for each rule and kind of solver, and the front.
+/// Error against time, both logarithmic: a colour for each solver, rings for the paper's rule and dots for
+/// the material rule, and the front.
 pub fn figure(study: &Study) -> String {
-    let at = |point: &Point| Some([point.seconds?, point.error?]);
-    let mut series: Vec<Series> = Vec::new();
-    for point in study.points.iter().filter(|point| point.outcome == Outcome::Settled) {
-        let Some(place) = at(point) else { continue };
-        let name = format!("{} rule, {}", point.setting.rule.name(), point.setting.solver);
-        match series.iter_mut().find(|series| series.name == name) {
-            Some(series) => series.points.push(place),
-            None => {
-                let colour = SERIES[series.len() % SERIES.len()];
-                series.push(Series { name, colour, style: Style::Dots, points: vec![place] });
-            }
-        }
+    let front = study.front().into_iter().filter_map(place).collect();
+    let mut series = Vec::new();
+    for (n, solver) in Solver::ALL.into_iter().enumerate() {
+        let of = |rule: RuleChoice| {
+            let is_one = |point: &&Point| point.setting.solver == solver.name() && point.setting.rule == rule;
+            let settled = study.points.iter().filter(|point| point.outcome == Outcome::Settled);
+            settled.filter(is_one).filter_map(place).collect::<Vec<_>>()
+        };
+        let (colour, [paper, material]) = (SERIES[n], RuleChoice::ALL.map(of));
+        // The legend names a solver once, whichever rule it was used with.
+        let unnamed = if material.is_empty() { solver.name().to_owned() } else { String::new() };
+        series.push(Series { name: unnamed, colour, style: Style::Rings, points: paper });
+        series.push(Series { name: solver.name().into(), colour, style: Style::Dots, points: material });
     }
-    let front: Vec<[f64; 2]> = study.front().into_iter().filter_map(at).collect();
+    series.retain(|series| !series.points.is_empty());
     series.push(Series {
         name: "nothing is both faster and nearer".into(),
-        colour: "#f2f2f2",
+        colour: INK,
         style: Style::Front,
         points: front,
     });
     draw(&Chart {
         title: study.title.clone(),
         note: format!(
-            "{} settings, median of {} runs each, from the scene to rest; error against finite elements on {} nodes",
+            "rings: the paper's rule, dots: the material rule; {} settings, median of {} runs each, from the scene to \
+             rest; error against finite elements on {} nodes",
             study.points.len(),
             study.repeats,
             study.truth_nodes
@@ -117,4 +121,8 @@ pub fn figure(study: &Study) -> String {
         }],
         series,
     })
+}
+
+fn place(point: &Point) -> Option<[f64; 2]> {
+    Some([point.seconds?, point.error?])
 }

@@ -22,6 +22,7 @@ use crate::flock::role::Role;
 use crate::flock::rules::{Axis, Feedback, Mean};
 use crate::flock::shape::Segment;
 use crate::material::elastic::Elastic;
+use crate::solve::equilibrium::Request;
 use crate::solve::sweep::Update;
 
 pub use bundled::{Bundled, bundled};
@@ -55,6 +56,8 @@ pub struct Scene {
     /// Ends of each cut \[length\].
     pub cuts: Vec<Segment>,
     pub stop: Stop,
+    /// How the equilibrium is found, where the scene is not stepped.
+    pub equilibrium: Option<Equilibrium>,
     pub record: Record,
     document: Document,
 }
@@ -181,6 +184,14 @@ pub struct Stop {
     pub tolerance: Option<f64>,
     /// Displacement over the body's diagonal at which the run has diverged.
     pub growth: f64,
+}
+
+/// How the equilibrium is found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Equilibrium {
+    pub request: Request,
+    /// Relative error of the followers' displacements that is asked for \[1\].
+    pub accuracy: Option<f64>,
 }
 
 /// What is kept of the run.

@@ -97,7 +97,7 @@ pub fn body_overrides(scene: &Scene, rule: RuleChoice, part: f64) -> Vec<String>
     let mut overrides = Vec::new();
     let mean = match (rule, &scene.raw.rule.mean) {
         (RuleChoice::Paper, _) => Some("barycentre"),
-        (RuleChoice::Material, RawMean::Material { .. }) => None,
+        (RuleChoice::Material, Some(RawMean::Material { .. })) => None,
         (RuleChoice::Material, _) => Some("material"),
     };
     overrides.extend(mean.map(|kind| format!("rule.mean={{kind=\"{kind}\"}}")));

@@ -3,10 +3,12 @@
 //! A scene is run in many settings. Each is timed from the scene to the followers at rest, and its error is
 //! the relative L2 distance of the followers from the same truth, finite elements on the finest of the
 //! bodies. What is cheapest for an error can then be read off ([`Study::cheapest`]), and which settings no
-//! other beats in both ([`Study::front`]).
+//! other beats in both ([`Study::front`]). [`choose`] goes the other way: from an accuracy to the setting.
 
+mod accuracy;
 mod grid;
 mod study;
 
+pub use accuracy::{Chosen, choose};
 pub use grid::{Grid, RuleChoice, Setting};
-pub use study::{Outcome, Point, Study, run};
+pub use study::{Load, Outcome, Point, Study, run};

@@ -138,8 +138,8 @@ fn measure(scene: &Scene, truth: &Truth, setting: Setting, particles: usize, rep
     let mut last = None;
     for _ in 0..repeats.max(1) {
         let start = Instant::now();
-        let settled = led(scene, truth).and_then(|plan| match &scene.raw.equilibrium {
-            Some(asked) => settle(scene, asked, plan),
+        let settled = led(scene, truth).and_then(|plan| match &scene.equilibrium {
+            Some(asked) => settle(scene, &asked.request, plan),
             None => Err(scene.refuse("equilibrium", "no solver is set", "set one")),
         });
         seconds.push(start.elapsed().as_secs_f64());
@@ -180,16 +180,20 @@ fn error_of(outcome: &RunOutcome, truth: &Truth) -> Option<f64> {
     Some((off / size).sqrt()).filter(|error| error.is_finite())
 }
 
+/// Less than this is rounding, or luck.
+const NEARER: f64 = 0.99;
+
 impl Study {
-    /// Settings that none other beats both in time and in error, the quickest first.
+    /// Settings that none other beats both in time and in error, the quickest first; one that is nearer by
+    /// less than a hundredth of its error is not counted as nearer.
     pub fn front(&self) -> Vec<&Point> {
         let mut known: Vec<(f64, f64, &Point)> =
             self.settled().filter_map(|p| Some((p.seconds?, p.error?, p))).collect();
         known.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
         let mut best = f64::INFINITY;
         known.retain(|&(_, error, _)| {
-            let better = error < best;
-            best = best.min(error);
+            let better = error < NEARER * best;
+            best = if better { error } else { best };
             better
         });
         known.into_iter().map(|(_, _, point)| point).collect()

@@ -26,11 +26,12 @@ pub struct Axis<'a> {
 pub enum Style {
     Line,
     Dots,
-    /// Larger, ringed dots on a line: those that matter among many.
+    Rings,
+    /// Large rings on a line: those that matter among many.
     Front,
 }
 
-/// A named set of points; those that an axis cannot show (zero on a logarithmic one) are left out.
+/// A set of points, in the legend if it has a name; those that an axis cannot show (zero on a logarithmic one) are left out.
 #[derive(Clone, Debug)]
 pub struct Series {
     pub name: String,
@@ -58,15 +59,17 @@ pub struct Chart<'a> {
 
 /// Draws a chart.
 pub fn draw(chart: &Chart<'_>) -> String {
-    let legend = chart
-        .series
-        .iter()
-        .map(|series| Key {
-            name: series.name.clone().into(),
-            colour: series.colour,
-            mark: if series.style == Style::Line { Mark::Line } else { Mark::Dot },
-        })
-        .collect();
+    let mark = |style: Style| match style {
+        Style::Line => Mark::Line,
+        Style::Dots => Mark::Dot,
+        Style::Rings | Style::Front => Mark::Ring,
+    };
+    let key = |series: &Series| Key {
+        name: series.name.clone().into(),
+        colour: series.colour,
+        mark: mark(series.style),
+    };
+    let legend = chart.series.iter().filter(|series| !series.name.is_empty()).map(key).collect();
     let heading = Heading { title: chart.title.clone(), note: chart.note.clone(), legend };
     let top = heading.height(page::WIDTH) + 4.0;
     let mut axes = window(chart);
@@ -199,16 +202,19 @@ fn draw_landmark(svg: &mut Svg, chart: &Chart<'_>, axes: &Axes, landmark: &Landm
 fn draw_series(svg: &mut Svg, chart: &Chart<'_>, axes: &Axes, series: &Series) {
     let places: Vec<[f64; 2]> =
         series.points.iter().filter_map(|&p| on_axes(chart, p)).map(|p| axes.place(p)).collect();
-    if series.style != Style::Dots {
+    if matches!(series.style, Style::Line | Style::Front) {
         let mut path = Path::default();
         path.polyline(page::thinned(&places));
-        let stroke = format!("stroke=\"{}\" stroke-width=\"1.7\" stroke-linejoin=\"round\"", series.colour);
+        let width = if series.style == Style::Line { 1.7 } else { 1.0 };
+        let stroke =
+            format!("stroke=\"{}\" stroke-width=\"{width}\" stroke-linejoin=\"round\"", series.colour);
         svg.path(&path, format_args!("class=\"series\" fill=\"none\" {stroke}"));
     }
     let (radius, attributes) = match series.style {
         Style::Line => return,
-        Style::Dots => (3.0, format!("fill=\"{}\" fill-opacity=\"0.65\"", series.colour)),
-        Style::Front => (4.5, format!("fill=\"{}\" stroke=\"{INK}\" stroke-width=\"1.1\"", series.colour)),
+        Style::Dots => (3.0, format!("fill=\"{}\" fill-opacity=\"0.75\"", series.colour)),
+        Style::Rings => (2.8, format!("fill=\"none\" stroke=\"{}\" stroke-width=\"1.2\"", series.colour)),
+        Style::Front => (5.5, format!("fill=\"none\" stroke=\"{}\" stroke-width=\"1.2\"", series.colour)),
     };
     svg.group(attributes, |svg| places.iter().for_each(|&place| svg.circle(place, radius)));
 }

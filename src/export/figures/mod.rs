@@ -34,6 +34,7 @@ pub use comparison::{Pair, overlay};
 pub use configuration::configuration;
 pub use energy::pe1;
 pub use history::probes;
+pub use svg::INK;
 pub use von_mises::von_mises;
 
 /// Whom a figure shows.

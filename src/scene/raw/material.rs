@@ -80,15 +80,31 @@ pub enum RawLoad {
 pub struct RawEquilibrium {
     #[serde(default)]
     pub solver: RawSolver,
-    /// Largest residual force over the load's at which the solver stops [1].
-    #[serde(default = "super::defaults::residual")]
+    /// How near to elasticity the followers should come: the relative error of their displacements, as
+    /// "1%" or 0.01. The rule (unless written), the spacing (the written one is the widest), tolerance and
+    /// precision are then chosen, by what `flockform trade` has shown.
+    #[serde(default)]
+    pub accuracy: Option<RawAccuracy>,
+    /// Largest residual force over the load's at which the solver stops; 1e-8 unless an accuracy is given [1].
+    #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
-    pub tolerance: f64,
+    pub tolerance: Option<f64>,
     #[serde(default = "super::defaults::iterations")]
     #[schemars(range(min = 1))]
     pub most_iterations: usize,
+    /// Doubles unless an accuracy is given that singles reach.
     #[serde(default)]
-    pub precision: RawPrecision,
+    pub precision: Option<RawPrecision>,
+}
+
+/// A part of 1, or a percentage.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(untagged)]
+pub enum RawAccuracy {
+    /// A part of 1 [1].
+    Part(f64),
+    /// Such as "1%".
+    Text(String),
 }
 
 /// How the equilibrium is found.
@@ -112,11 +128,10 @@ pub enum RawSolver {
 }
 
 /// Digits of the numbers that a solver works with.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum RawPrecision {
     /// Doubles.
-    #[default]
     F64,
     /// Singles: half the memory traffic, five to six digits at best.
     F32,

@@ -180,9 +180,6 @@ mod defaults {
     pub fn growth() -> f64 {
         1000.0
     }
-    pub fn residual() -> f64 {
-        1e-8
-    }
     pub fn iterations() -> usize {
         1_000_000
     }

@@ -54,8 +54,9 @@ pub enum RawNeighbours {
 #[derive(Clone, Debug, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawRule {
+    /// The centre of gravity unless given.
     #[serde(default)]
-    pub mean: RawMean,
+    pub mean: Option<RawMean>,
     /// Fixed weights of the neighbours, on top of the mean's own.
     #[serde(default)]
     pub weights: Option<RawWeights>,
@@ -71,11 +72,10 @@ pub struct RawRule {
 }
 
 /// Which mean of the neighbours' positions is the target.
-#[derive(Clone, Debug, Default, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum RawMean {
     /// The centre of gravity (Eq. 1).
-    #[default]
     Barycentre,
     /// Weighted by a power of the present distance (Eq. 3).
     Distance {

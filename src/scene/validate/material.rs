@@ -65,7 +65,7 @@ pub fn neighbourhood(raw: &RawScene, lattice: &Lattice) -> Neighbourhood {
 }
 
 pub fn is_material(raw: &RawScene) -> bool {
-    matches!(raw.rule.mean, RawMean::Material { .. })
+    matches!(raw.rule.mean, Some(RawMean::Material { .. }))
 }
 
 /// The damping as written; unless it is, 1, or what keeps every wave of a material from growing.
@@ -125,31 +125,6 @@ pub fn check_rule(raw: &RawScene, refuse: Refuse<'_>) -> Result<(), SceneError> 
     match clash.into_iter().find(|(_, clashes, ..)| *clashes) {
         None => Ok(()),
         Some((key, _, message, help)) => Err(refuse(key, message.into(), help)),
-    }
-}
-
-/// Stepless runs: nothing may depend on how the body got where it is.
-pub fn check_equilibrium(raw: &RawScene, refuse: Refuse<'_>) -> Result<(), SceneError> {
-    if raw.equilibrium.is_none() {
-        return Ok(());
-    }
-    let when = raw.roles.iter().position(|entry| entry.when.is_some());
-    let later = raw.roles.iter().position(|entry| entry.from > 1);
-    let present = matches!(raw.neighbours, Some(RawNeighbours::Present { .. }));
-    let broken = raw.fracture.is_some() || !raw.cuts.is_empty();
-    let clash = [
-        (when.map(|k| format!("roles[{k}].when")), "condition on the way"),
-        (later.map(|k| format!("roles[{k}].from")), "role that changes on the way"),
-        (present.then(|| "neighbours".to_owned()), "neighbours found anew at every step"),
-        (broken.then(|| if raw.cuts.is_empty() { "fracture" } else { "cuts" }.to_owned()), "breaking bonds"),
-    ];
-    match clash.into_iter().find_map(|(key, what)| key.map(|key| (key, what))) {
-        None => Ok(()),
-        Some((key, what)) => Err(refuse(
-            &key,
-            format!("an equilibrium that is not stepped to has no {what}"),
-            "leave [equilibrium] out to step, or leave this out",
-        )),
     }
 }
 

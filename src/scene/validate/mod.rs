@@ -1,6 +1,7 @@
 //! From the scene as written to the scene as meant: degrees to radians, choices to rules, and the
 //! checks that concern several keys at once.
 
+mod equilibrium;
 mod material;
 mod roles;
 
@@ -68,21 +69,26 @@ type Refuse<'a> = &'a dyn Fn(&str, String, &str) -> SceneError;
 
 fn validate(
     name: &str,
-    raw: RawScene,
+    mut raw: RawScene,
     document: Document,
     folder: Option<&Path>,
 ) -> Result<Scene, SceneError> {
     let refuse: Refuse<'_> =
         &|key, message, help| SceneError::from(document.problem(key, message, Some(help.to_owned())));
+    // Whoever asks for an accuracy and leaves the rule open gets the one that can have it.
+    let is_asked = raw.equilibrium.as_ref().is_some_and(|asked| asked.accuracy.is_some());
+    if is_asked && raw.rule.mean.is_none() && raw.material.is_some() {
+        raw.rule.mean = Some(RawMean::Material { rotation: RawRotation::Small });
+    }
     let shape = shape(&raw.body, refuse)?;
     let lattice = lattice(&raw, shape.as_ref());
     let spacing = lattice.spacing();
     let neighbourhood = material::neighbourhood(&raw, &lattice);
     check_present_neighbours(&raw, refuse)?;
     material::check_rule(&raw, refuse)?;
-    material::check_equilibrium(&raw, refuse)?;
     check_truth(&raw, refuse)?;
     let elastic = material::elastic(&raw.material, refuse)?;
+    let equilibrium = equilibrium::equilibrium(&raw, refuse)?;
     check_gradient(&raw, refuse)?;
     let roles = raw
         .roles
@@ -95,7 +101,8 @@ fn validate(
         cut: cut(&raw.body, shape),
         frame: frame(raw.frame),
         neighbourhood,
-        mean: mean(&raw.rule.mean, spacing, refuse)?,
+        mean: mean(raw.rule.mean.as_ref().unwrap_or(&RawMean::Barycentre), spacing, refuse)?,
+        equilibrium,
         weights: weights(&raw.rule.weights, refuse)?,
         // Neighbours found anew every step have no reference configuration to be at rest in.
         keeps_rest: raw.rule.rest == RawRest::Kept
@@ -279,7 +286,7 @@ fn check_gradient(raw: &RawScene, refuse: Refuse<'_>) -> Result<(), SceneError> 
         let message = "weights of kind \"gradient\" reach the sites behind the first neighbours".into();
         return Err(refuse("neighbours", message, "give `neighbours = { kind = \"straight\" }`"));
     }
-    if !matches!(raw.rule.mean, RawMean::Barycentre) {
+    if !matches!(raw.rule.mean, None | Some(RawMean::Barycentre)) {
         let message = "weights of kind \"gradient\" have negative parts, which this mean cannot take".into();
         return Err(refuse("rule.mean", message, "use kind = \"barycentre\""));
     }
