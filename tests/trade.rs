@@ -96,7 +96,7 @@ fn an_accuracy_that_cannot_be_had_is_refused_with_the_reason() {
         (refused("grips", &[], "much"), "more than 0 and less than 1"),
         (refused("lattice-square", &[], "1%"), "the scene has none"),
         (refused("beam-loaded", &["record.probes=[3]"], "1%"), "these ids are other particles"),
-        (refused("lattice-honeycomb", &HONEYCOMB, "1%"), "no two bodies have particles in the same places"),
+        (refused("lattice-honeycomb", &HONEYCOMB, "0.1%"), "after 5 halvings of the spacing"),
     ] {
         assert!(message.contains(words) && message.contains("help: "), "{message}");
     }
