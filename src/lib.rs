@@ -9,14 +9,14 @@
 //! * [`scene`]: a TOML file becomes a validated [`scene::Scene`]; nothing downstream re-checks it.
 //! * [`flock`]: the core. Lattices, bodies, neighbourhoods, rules, frames, fracture. Pure, and it
 //!   imports no other room.
-//! * [`solve`]: sweeps over the flock's interaction, and their spectra.
+//! * [`solve`]: sweeps over the flock's interaction, their spectra, and the solvers for equilibrium.
 //! * [`material`]: rule weights from Young's modulus and Poisson's ratio, and what material a rule is.
-//! * [`continuum`]: plans a scene, steps it, and hands what happens to an observer.
+//! * [`continuum`]: plans a scene, steps it or goes straight to rest, and hands what happens to an observer.
 //! * `export` (feature `export`): CSV, JSON, VTK and figures, one file per format.
 //! * `fem` (feature `fem`): finite elements, the truth to hold the rules against; it knows no flock.
 //! * `compare` (feature `fem`): rule and truth on the same body, and the numbers that tell them apart.
 //! * `trade` (feature `fem`): what accuracy costs: many settings of a scene against its truth.
-//! * `bench` (feature `bench`): how fast the sweeps are, beside what the machine can do.
+//! * `bench` (feature `bench`): how fast sweeps and solvers are, beside what the machine and others can do.
 //!
 //! ```
 //! use std::ops::ControlFlow;

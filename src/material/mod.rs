@@ -24,16 +24,17 @@
 //! * [`stiffness`]: what one cell resists: bilinear quadrilateral, constant-strain triangle, and the
 //!   lowest-order virtual element for any polygon.
 //! * [`mechanism`]: whether the cells hold the body together, or a hinge lets it fold.
-//! * [`weights`]: cells and neighbours to `K_ij`, `D_i`, `W_ij` and rest offsets.
+//! * [`weights`]: cells and neighbours to `K_ij`, `D_i` and `W_ij`, kept by class of particles.
 //! * [`loads`]: tractions, point forces and a body force to the forces `f_i`.
 //! * [`homogenise`]: the way back, from the weights of an interior particle, matrices or scalars, to
 //!   the material that they are.
 //! * [`zone`]: over all waves on the lattice: is the rule stable, and how much must a synchronous
 //!   update be damped?
 //!
-//! Displacements are small: a rotation of the whole body by a finite angle strains it here. The
-//! shapes of arrays follow the particles of the body they belong to; a stiffness is that of the whole
-//! thickness of the sheet \[force / length\].
+//! Displacements are small: a rotation of the whole body by a finite angle strains it, unless the rule that
+//! applies the weights is corotated ([`Rotation`](crate::flock::rules::Rotation)). The shapes of arrays follow
+//! the particles of the body they belong to; a stiffness is that of the whole thickness of the sheet
+//! \[force / length\].
 //!
 //! ```
 //! use flockform::flock::{body::{Body, Cut}, lattice::{Lattice, LatticeKind}};
