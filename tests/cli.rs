@@ -199,6 +199,51 @@ fn signal(child: &std::process::Child, name: &str) {
 
 #[cfg(unix)]
 #[test]
+fn a_solved_scene_reports_its_solver_and_how_it_came_to_rest() {
+    let folder = temporary();
+    let set = ["--set", "equilibrium.solver=conjugate-gradients"];
+    let said = run_in(folder.path(), &[&["run", "beam-loaded", "--out", "here"][..], &set].concat());
+    assert!(said.contains("conjugate-gradients, asked for:") && said.contains("in equilibrium"), "{said}");
+    let here = folder.path().join("here");
+    let summary = json(&here.join("summary.json"));
+    let solved = &summary["equilibrium"];
+    assert_eq!((&solved["solver"], &solved["converged"]), (&"conjugate-gradients".into(), &true.into()));
+    assert!(solved["phases"]["solve"].as_f64().is_some_and(|s| s > 0.0), "{solved}");
+    let history = std::fs::read_to_string(here.join("residuals.csv")).expect("written");
+    assert_eq!(history.lines().count() as u64, solved["iterations"].as_u64().expect("a count") + 2);
+    assert!(here.join("residuals.png").is_file());
+    let too_few = ["run", "beam-loaded", "--out", "there", "--set"];
+    let asked = "equilibrium={solver=\"jacobi\",most_iterations=3}";
+    let output = flockform(&[&too_few[..], &[asked]].concat(), folder.path());
+    assert_eq!(output.status.code(), Some(1), "{}", text(&output.stderr));
+    assert_eq!(json(&folder.path().join("there/summary.json"))["stop_reason"], "unsettled");
+}
+
+#[test]
+fn a_trade_study_prints_what_is_cheapest_and_writes_every_setting() {
+    let folder = temporary();
+    let said = run_in(folder.path(), &["trade", "grips", "--quick", "--out", "here"]);
+    for words in ["for 10 % error the cheapest setting is", "the material rule comes as near as"] {
+        assert!(said.contains(words), "{said}");
+    }
+    let here = folder.path().join("here");
+    let table = std::fs::read_to_string(here.join("trade.csv")).expect("written");
+    let study = json(&here.join("trade.json"));
+    assert_eq!(table.lines().count() - 1, study["points"].as_array().expect("points").len());
+    assert!(table.lines().any(|line| line.starts_with("material,0.5,") && line.contains(",multigrid,")));
+    assert!(here.join("trade.png").is_file() && here.join("trade.svg").is_file());
+    run_in(folder.path(), &["trade", "grips", "--quick", "--out", "here", "--force", "--quiet"]);
+}
+
+#[test]
+fn an_accuracy_is_met_and_told() {
+    let folder = temporary();
+    let arguments = ["run", "beam-loaded", "--out", "here", "--set", "equilibrium.accuracy=1%"];
+    let said = run_in(folder.path(), &arguments);
+    assert!(said.starts_with("accuracy 1 %: material rule at 0.5 of the written spacing"), "{said}");
+}
+
+#[test]
 fn an_interrupt_stops_at_the_next_step_and_writes_what_there_is() {
     for name in ["-INT", "-TERM"] {
         let folder = temporary();

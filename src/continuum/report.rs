@@ -52,7 +52,10 @@ impl PlanReport {
             Mean::Material { rotation: Rotation::Corotated } => "material (corotated)".to_owned(),
         };
         self.models(mean, "rule.mean");
-        let forces = plan.interaction.forces.as_ref().map(|_| format!("{} loads", scene.loads.len()));
+        let forces = plan.interaction.forces.as_ref().map(|_| match scene.loads.len() {
+            1 => "1 load".to_owned(),
+            many => format!("{many} loads"),
+        });
         self.models_or_not(forces, "loads", "nothing pushes the body but its leaders");
         let frame = scene.frame.map(|frame| {
             let points = plan.body.frame.as_ref().map_or(0, |frame| frame.len());
@@ -139,17 +142,21 @@ fn facts(scene: &Scene, plan: &Plan) -> Result<Vec<(String, String)>, SceneError
         plan.body.lattice.name(),
         plan.body.lattice.spacing()
     );
-    let facts = [
+    let swept = match scene.equilibrium {
+        Some(_) => None,
+        None => Some([
+            ("update", format!("{order}, damping {:.4}", plan.update.damping)),
+            ("swept without lists", format!("{:.0} % of the followers", 100.0 * sweep.share_in_runs())),
+        ]),
+    };
+    let first = [
         ("particles", format!("{} ({})", plan.count(), roles.join(", "))),
         ("lattice", lattice),
         ("neighbour entries", format!("{bonds} ({:.2} a particle)", bonds as f64 / plan.count() as f64)),
-        ("update", format!("{order}, damping {}", plan.update.damping)),
-        ("swept without lists", format!("{:.0} % of the followers", 100.0 * sweep.share_in_runs())),
-        ("memory", format!("about {}", readable_bytes(memory(plan)))),
-        ("stops", stop),
-    ]
-    .map(|(name, value)| (name.to_owned(), value));
-    Ok(facts.to_vec())
+    ];
+    let last = [("memory", format!("about {}", readable_bytes(memory(plan)))), ("stops", stop)];
+    let facts = first.into_iter().chain(swept.into_iter().flatten()).chain(last);
+    Ok(facts.map(|(name, value)| (name.to_owned(), value)).collect())
 }
 
 fn cautions(scene: &Scene, plan: &Plan) -> Vec<String> {

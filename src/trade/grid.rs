@@ -41,7 +41,7 @@ impl Grid {
             spacings: vec![1.0, 0.5],
             tolerances: vec![1e-2, 1e-6],
             solvers: vec![Solver::ConjugateGradients, Solver::Multigrid],
-            most_particles: 2_000,
+            most_particles: 3_000,
             repeats: 1,
             ..Self::default()
         }
