@@ -25,7 +25,6 @@ fn iterations_grow_by_less_than_half_from_2500_to_160_thousand_particles() {
 }
 
 #[test]
-#[ignore = "a million particles"]
 fn iterations_grow_by_less_than_half_from_10_thousand_to_a_million_particles() {
     assert_flat(&[[100, 100], [317, 317], [1000, 1000]]);
     assert_flat(&[[316, 32], [1000, 100], [3160, 316]]);
