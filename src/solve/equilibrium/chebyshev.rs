@@ -7,7 +7,7 @@
 
 use std::time::Instant;
 
-use super::jacobi::require_bounded;
+use super::history::History;
 use super::lanczos::Bounds;
 use super::system::Prepared;
 use super::{Found, Request, SolveError, Solver, lanczos, steps};
@@ -30,9 +30,9 @@ pub(super) fn solve(prepared: &mut Prepared, request: &Request) -> Result<Found,
     let (mut u, mut step) = (Field::zeros(matrix.count()), Field::zeros(matrix.count()));
     let mut r = right.clone();
     let set_up = begin.elapsed();
-    let mut residuals = vec![1.0];
-    while residuals[residuals.len() - 1] > request.tolerance && residuals.len() <= request.most_iterations {
-        let (begun_at, rate) = (residuals.len() - 1, rate(low, high));
+    let mut history = History::new();
+    while history.goes_on(request) {
+        let (begun_at, rate) = (history.iterations(), rate(low, high));
         // Half of the promised digits, and never fewer steps than it takes to gain one.
         let window = (2.3 / -rate.ln()).ceil() as usize + 10;
         let mut recurrence = Recurrence::new(low, high);
@@ -41,18 +41,18 @@ pub(super) fn solve(prepared: &mut Prepared, request: &Request) -> Result<Found,
             steps::precondition(matrix, stencils, factors, &r, &mut step);
             steps::advance(matrix, &step, &mut u);
             let residual = steps::residual(matrix, stencils, (&u, right), &mut r).sqrt() / *size;
-            residuals.push(residual);
-            require_bounded(Solver::Chebyshev, &residuals)?;
-            let taken = residuals.len() - 1 - begun_at;
-            let done = residual <= request.tolerance || residuals.len() > request.most_iterations;
+            history.push(Solver::Chebyshev, residual)?;
+            let taken = history.iterations() - begun_at;
             let promised = 2.0 * rate.powi(taken as i32);
-            if done || (taken % window == 0 && residual > residuals[begun_at] * promised.sqrt()) {
+            let slow =
+                taken.is_multiple_of(window) && residual > history.residuals[begun_at] * promised.sqrt();
+            if slow || !history.goes_on(request) {
                 break;
             }
         }
         low *= 0.4;
     }
-    Ok(Found { displacement: u, residuals, set_up })
+    Ok(Found { displacement: u, residuals: history.residuals, set_up })
 }
 
 /// Factor by which the error shrinks at each step, in the long run.

@@ -6,6 +6,7 @@
 
 use std::time::Instant;
 
+use super::history::History;
 use super::steps::for_groups;
 use super::system::Prepared;
 use super::{Found, Precision, Request, SolveError, Solver, steps};
@@ -81,9 +82,9 @@ pub(super) fn iterate<T: Real, P: Preconditioner<T>>(
     let at_start = dot(r.view(), r.view()).sqrt();
     let (mut size, mut rz_before) = (at_start, f64::INFINITY);
     let set_up = begin.elapsed();
-    let mut residuals = vec![1.0];
-    while residuals[residuals.len() - 1] > request.tolerance && residuals.len() <= request.most_iterations {
-        let iteration = residuals.len();
+    let mut history = History::new();
+    while history.goes_on(request) {
+        let iteration = history.iterations() + 1;
         let (z, rz) = preconditioner.precondition(&r, size);
         let rz = rz * size;
         let positive = rz > 0.0;
@@ -98,10 +99,10 @@ pub(super) fn iterate<T: Real, P: Preconditioner<T>>(
         }
         size = advance(matrix, rz / pq, (&p, &q), (&mut x, &mut r)).sqrt();
         rz_before = rz;
-        residuals.push(size / at_start);
+        history.push(solver, size / at_start)?;
     }
     let wide = |values: Vec<T>| values.into_iter().map(Real::wide).collect();
-    Ok(Found { displacement: Field { x: wide(x.x), y: wide(x.y) }, residuals, set_up })
+    Ok(Found { displacement: Field { x: wide(x.x), y: wide(x.y) }, residuals: history.residuals, set_up })
 }
 
 /// `p = size z + ratio p`.

@@ -6,7 +6,7 @@
 
 use std::time::Instant;
 
-use super::jacobi::require_bounded;
+use super::history::History;
 use super::system::Prepared;
 use super::{Found, Request, SolveError, Solver, steps};
 use crate::solve::field::Field;
@@ -19,15 +19,15 @@ pub(super) fn solve(prepared: &mut Prepared, request: &Request) -> Result<Found,
     let mut u = Field::zeros(matrix.count());
     let mut r = Field::zeros(matrix.count());
     let set_up = begin.elapsed();
-    let mut residuals = vec![1.0];
-    while residuals[residuals.len() - 1] > request.tolerance && residuals.len() <= request.most_iterations {
+    let mut history = History::new();
+    while history.goes_on(request) {
         for colour in &colours {
             sweep(matrix, stencils, colour, right, &mut u);
         }
-        residuals.push(steps::residual(matrix, stencils, (&u, right), &mut r).sqrt() / *size);
-        require_bounded(Solver::GaussSeidel, &residuals)?;
+        let residual = steps::residual(matrix, stencils, (&u, right), &mut r).sqrt() / *size;
+        history.push(Solver::GaussSeidel, residual)?;
     }
-    Ok(Found { displacement: u, residuals, set_up })
+    Ok(Found { displacement: u, residuals: history.residuals, set_up })
 }
 
 /// A particle of a colour and the run that it belongs to.

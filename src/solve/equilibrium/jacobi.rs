@@ -6,6 +6,7 @@
 
 use std::time::Instant;
 
+use super::history::History;
 use super::system::Prepared;
 use super::{Found, Request, SolveError, Solver, lanczos, steps};
 use crate::flock::block::{inverse, product};
@@ -28,22 +29,13 @@ pub(super) fn solve(prepared: &mut Prepared, request: &Request) -> Result<Found,
     let mut u = Field::zeros(matrix.count());
     let mut r = right.clone();
     let set_up = begin.elapsed();
-    let mut residuals = vec![1.0];
-    while residuals[residuals.len() - 1] > request.tolerance && residuals.len() <= request.most_iterations {
+    let mut history = History::new();
+    while history.goes_on(request) {
         steps::precondition(matrix, stencils, (1.0, weight), &r, &mut u);
         let residual = steps::residual(matrix, stencils, (&u, right), &mut r).sqrt() / *size;
-        residuals.push(residual);
-        require_bounded(Solver::Jacobi, &residuals)?;
+        history.push(Solver::Jacobi, residual)?;
     }
-    Ok(Found { displacement: u, residuals, set_up })
-}
-
-/// Refuses to go on where the residual has grown beyond all use.
-pub(super) fn require_bounded(solver: Solver, residuals: &[f64]) -> Result<(), SolveError> {
-    let residual = residuals[residuals.len() - 1];
-    let bounded = residual < 1e12;
-    let diverged = SolveError::Diverged { solver, iterations: residuals.len() - 1, residual };
-    if bounded { Ok(()) } else { Err(diverged) }
+    Ok(Found { displacement: u, residuals: history.residuals, set_up })
 }
 
 /// The largest sum of the norms of a row of `D^-1 K`: no eigenvalue is larger in modulus.

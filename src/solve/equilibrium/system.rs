@@ -1,6 +1,6 @@
 //! What is to be solved, and what every solver starts from.
 
-use super::SolveError;
+use super::{SolveError, steps};
 use crate::flock::block::{apply, inverse};
 use crate::flock::points::Points;
 use crate::solve::field::{Field, dot};
@@ -77,14 +77,17 @@ impl System {
     }
 }
 
-/// A system over its followers.
+/// A system over its followers, its stiffness and its right-hand side each divided by a power of two that
+/// brings them near 1: no square of a force or stiffness then over- or underflows, and no bit changes.
 pub(super) struct Prepared {
     pub matrix: Matrix,
     pub stencils: Stencils<f64>,
-    /// Right-hand side \[force\], shape \[count\].
+    /// Right-hand side \[1\], shape \[count\].
     pub right: Field<f64>,
-    /// `|right|` \[force\].
+    /// `|right|` \[1\].
     pub size: f64,
+    /// The powers of two that a displacement has to be multiplied by, one after the other.
+    pub scales: [f64; 2],
     /// Vectors from a site to that of the next column and of the next row \[length\].
     pub grid: [[f64; 2]; 2],
     /// Whether any two neighbours feel each other alike.
@@ -97,19 +100,52 @@ impl Prepared {
         if operator.followers() == 0 {
             return Err(SolveError::NothingFollows);
         }
-        let matrix = Matrix::of_followers(operator);
+        let mut matrix = Matrix::of_followers(operator);
         if let Some(i) = operator.adrift(&matrix) {
             return Err(SolveError::Adrift { particle: i + 1 });
         }
         if let Some(i) = loose(&matrix) {
             return Err(SolveError::Loose { particle: i + 1 });
         }
+        let mut right = system.right_side(&matrix);
+        if let Some(i) = (0..right.len()).find(|&i| !right.get(i).iter().all(|f| f.is_finite())) {
+            return Err(SolveError::NotFinite { what: "pull on the held neighbours", particle: i + 1 });
+        }
+        let force = power_of_two(right.x.iter().chain(&right.y).copied());
+        right.x.iter_mut().chain(&mut right.y).for_each(|f| *f /= force);
+        let stiffness = power_of_two(matrix.rows.iter().flat_map(|row| row.diagonal.as_flattened()).copied());
+        for row in &mut matrix.rows {
+            let blocks = row.entries.iter_mut().map(|(_, block)| block).chain([&mut row.diagonal]);
+            blocks.flatten().flatten().for_each(|k| *k /= stiffness);
+        }
         let stencils = Stencils::new(&matrix.rows, 1.0);
-        let right = system.right_side(&matrix);
         let size = dot(right.view(), right.view()).sqrt();
         let symmetric = system.asymmetric_pair().is_none();
-        Ok(Self { matrix, stencils, right, size, grid: operator.grid, symmetric })
+        let scales = [1.0 / stiffness, force];
+        Ok(Self { matrix, stencils, right, size, scales, grid: operator.grid, symmetric })
     }
+
+    /// `|f - K u| / |f|` of these displacements, which is not what an iteration that never looks back takes
+    /// it for.
+    pub fn residual(&self, system: &System, found: &Field<f64>) -> f64 {
+        let mut right = system.right_side(&self.matrix);
+        right.x.iter_mut().chain(&mut right.y).for_each(|f| *f /= self.scales[1]);
+        let mut r = Field::zeros(right.len());
+        steps::residual(&self.matrix, &self.stencils, (found, &right), &mut r).sqrt() / self.size
+    }
+
+    /// Displacements \[length\] from those of the scaled system.
+    pub fn unscaled(&self, mut found: Field<f64>) -> Field<f64> {
+        let [first, second] = self.scales;
+        found.x.iter_mut().chain(&mut found.y).for_each(|u| *u = *u * first * second);
+        found
+    }
+}
+
+/// The power of two nearest below the largest of these in size, as far as its inverse is a double too.
+fn power_of_two(values: impl Iterator<Item = f64>) -> f64 {
+    let largest = values.fold(0.0, |largest: f64, value| largest.max(value.abs()));
+    if largest == 0.0 { 1.0 } else { largest.log2().floor().clamp(-1020.0, 1020.0).exp2() }
 }
 
 /// The first particle, counted from 0, that its own row does not hold back.
