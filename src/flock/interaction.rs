@@ -6,7 +6,7 @@ use super::block::{Block, IDENTITY};
 use super::fracture::Bonds;
 use super::neighbourhood::Neighbours;
 use super::points::Points;
-use super::rules::{Load, Neighbour, Own, Rule};
+use super::rules::{Load, Mean, Neighbour, Own, Rotation, Rule};
 
 /// The arrays and index lists that a sweep runs over; it knows particles, not lattices.
 #[derive(Clone, Debug)]
@@ -23,6 +23,9 @@ pub struct Interaction {
     /// Broken bonds; none can break where absent.
     pub bonds: Option<Bonds>,
 }
+
+/// The material that looks at nothing but weights and positions.
+const SMALL: Mean = Mean::Material { rotation: Rotation::Small };
 
 /// Fixed weights of the neighbours.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -54,6 +57,7 @@ pub struct MatrixWeights {
 
 impl MatrixWeights {
     /// Weights of a particle, parallel to its neighbours.
+    #[inline]
     pub fn of(&self, particle: usize) -> &[Block] {
         &self.blocks[self.range(particle)]
     }
@@ -63,6 +67,7 @@ impl MatrixWeights {
         &self.stiffness[self.range(particle)]
     }
 
+    #[inline]
     fn range(&self, particle: usize) -> std::ops::Range<usize> {
         let class = self.class[particle] as usize;
         self.starts[class] as usize..self.starts[class + 1] as usize
@@ -97,6 +102,7 @@ impl Interaction {
     }
 
     /// Target position by another rule over the same neighbours and weights.
+    #[inline]
     pub fn target_by(&self, rule: &Rule, particle: usize, present: &Points) -> [f64; 2] {
         let own = Own {
             present: present.get(particle),
@@ -104,9 +110,12 @@ impl Interaction {
             rest: self.rest.as_ref().map_or([0.0; 2], |rest| rest.get(particle)),
             load: self.load(particle),
         };
-        match &self.bonds {
-            Some(bonds) if bonds.any_broken() => {
-                rule.target(&own, self.seen_with_ghosts(particle, present, bonds))
+        let broken = self.bonds.as_ref().filter(|bonds| bonds.any_broken());
+        match (broken, &self.weights) {
+            (Some(bonds), _) => rule.target(&own, self.seen_with_ghosts(particle, present, bonds)),
+            (None, Weights::Matrix(weights)) if rule.mean == SMALL => {
+                let seen = self.neighbours.of(particle).iter().map(|&k| present.get(k as usize));
+                rule.target_of_material(&own, weights.of(particle).iter().copied().zip(seen))
             }
             _ => rule.target(&own, self.seen(particle, present)),
         }
@@ -170,6 +179,52 @@ impl Interaction {
             reference: self.reference.get(self.neighbours.index[bond] as usize),
             weight: self.weights.scalar(bond),
             matrix: self.weights.matrix(particle, bond - self.neighbours.starts[particle] as usize),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Three particles that see each other by matrices with no symmetry to hide behind.
+    fn triangle() -> (Interaction, Points) {
+        let reference: Points = [[0.0, 0.0], [1.0, 0.25], [0.5, 1.0]].into_iter().collect();
+        let first: Block = [[0.7, -0.2], [0.1, 0.4]];
+        let second: Block = [[0.3, 0.2], [-0.1, 0.6]];
+        let weights = MatrixWeights {
+            class: vec![0; 3],
+            starts: vec![0, 2],
+            blocks: vec![first, second],
+            stiffness: vec![first, second],
+            compliance: vec![[[0.5, 0.1], [0.1, 0.3]]],
+        };
+        let mut interaction = Interaction {
+            rule: Rule { mean: SMALL, ..Rule::BARYCENTRE },
+            reference: reference.into(),
+            neighbours: Neighbours::from_lists([[1, 2], [2, 0], [0, 1]]),
+            weights: Weights::Matrix(weights),
+            forces: Some([[1.0, 0.0], [0.0, -2.0], [0.3, 0.3]].into_iter().collect()),
+            rest: None,
+            bonds: None,
+        };
+        interaction.keep_rest();
+        let present = [[0.1, 0.0], [1.1, 0.3], [0.4, 0.9]].into_iter().collect();
+        (interaction, present)
+    }
+
+    #[test]
+    fn the_short_way_to_a_material_s_target_gives_the_bits_of_the_rule() {
+        let (interaction, present) = triangle();
+        for i in 0..3 {
+            let own = Own {
+                present: present.get(i),
+                reference: interaction.reference.get(i),
+                rest: interaction.rest.as_ref().expect("kept").get(i),
+                load: interaction.load(i),
+            };
+            let by_rule = interaction.rule.target(&own, interaction.seen(i, &present));
+            assert_eq!(interaction.target(i, &present).map(f64::to_bits), by_rule.map(f64::to_bits));
         }
     }
 }

@@ -12,7 +12,7 @@
 //! changes from one particle to the next, forces balance up to strain times that change.
 
 use super::{Neighbour, Own};
-use crate::flock::block::apply;
+use crate::flock::block::{Block, apply};
 
 /// Which turns of the body cost nothing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -56,14 +56,16 @@ impl Turn {
     }
 }
 
-/// The weighted mean, in turned axes where there is a turn; `None` without neighbours.
-pub fn mean(turn: Option<Turn>, neighbours: impl Iterator<Item = Neighbour>) -> Option<[f64; 2]> {
-    let mut sum: Option<[f64; 2]> = None;
-    for n in neighbours {
-        let [x, y] = apply(&n.matrix, turn.map_or(n.position, |turn| turn.back(n.position)));
-        sum = Some(sum.map_or([x, y], |[a, b]| [a + x, b + y]));
-    }
-    sum.map(|sum| turn.map_or(sum, |turn| turn.forth(sum)))
+/// `sum_j W_ij x_j` over pairs of weight and position; `None` without any.
+#[inline]
+pub fn mean(pairs: impl Iterator<Item = (Block, [f64; 2])>) -> Option<[f64; 2]> {
+    pairs.map(|(block, position)| apply(&block, position)).reduce(|[a, b], [x, y]| [a + x, b + y])
+}
+
+/// The mean in turned axes: `sum_j R W_ij R' x_j`.
+pub fn turned_mean(turn: Turn, neighbours: impl Iterator<Item = Neighbour>) -> Option<[f64; 2]> {
+    let pulls = neighbours.map(|n| apply(&n.matrix, turn.back(n.position)));
+    pulls.reduce(|[a, b], [x, y]| [a + x, b + y]).map(|sum| turn.forth(sum))
 }
 
 #[cfg(test)]
@@ -84,7 +86,8 @@ mod tests {
 
     #[test]
     fn matrices_couple_the_components_of_a_position() {
-        let [x, y] = mean(None, pair().into_iter()).expect("has neighbours");
+        let pair = pair();
+        let [x, y] = mean(pair.iter().map(|n| (n.matrix, n.position))).expect("has neighbours");
         assert_eq!([x, y], [-0.75 + 0.125 + 0.5 - 0.25, -0.125 + 0.25 - 0.25 + 0.5]);
     }
 

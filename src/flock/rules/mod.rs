@@ -98,9 +98,28 @@ impl Rule {
 
     /// Where the particle moves \[length, world frame\]. A particle without neighbours stays: no target
     /// is computed from nothing. Finite input gives finite output unless the result itself overflows.
+    #[inline]
     pub fn target(&self, own: &Own, neighbours: impl Iterator<Item = Neighbour> + Clone) -> [f64; 2] {
         let turn = self.turn(own, neighbours.clone());
-        let Some(mean) = self.mean(own.present, turn, neighbours) else { return own.present };
+        match self.mean(own.present, turn, neighbours) {
+            Some(mean) => self.completed(own, turn, mean),
+            None => own.present,
+        }
+    }
+
+    /// What [`Rule::target`] gives for a material of small rotations, which looks at nothing but pairs of
+    /// weight and position: for sweeps, that have them at hand.
+    #[inline]
+    pub fn target_of_material(&self, own: &Own, pairs: impl Iterator<Item = (Block, [f64; 2])>) -> [f64; 2] {
+        match material::mean(pairs) {
+            Some(mean) => self.completed(own, None, mean),
+            None => own.present,
+        }
+    }
+
+    /// The target from the bare mean: rest offset, load and terms added.
+    #[inline]
+    fn completed(&self, own: &Own, turn: Option<Turn>, mean: [f64; 2]) -> [f64; 2] {
         let rest = turn.map_or(own.rest, |turn| turn.forth(own.rest));
         let mut target = [mean[0] + rest[0], mean[1] + rest[1]];
         if let Some(Load { force, compliance }) = &own.load {
@@ -139,7 +158,10 @@ impl Rule {
             Mean::Distance { power } => distance::mean(power, present, neighbours),
             Mean::Power { exponent, origin } => power::mean(exponent, origin, neighbours),
             Mean::Spaced { spacing, power } => spaced::mean(spacing, power, present, neighbours),
-            Mean::Material { .. } => material::mean(turn, neighbours),
+            Mean::Material { .. } => match turn {
+                Some(turn) => material::turned_mean(turn, neighbours),
+                None => material::mean(neighbours.map(|n| (n.matrix, n.position))),
+            },
         }
     }
 
