@@ -8,7 +8,7 @@ use flockform::continuum::run::run;
 use flockform::flock::motion::Motion;
 use flockform::flock::points::Points;
 use flockform::flock::rules::{
-    Axis, Feedback, FeedbackReference, Mean, Neighbour, Origin, Own, Poisson, Rule,
+    Axis, Feedback, FeedbackReference, Load, Mean, Neighbour, Origin, Own, Poisson, Rotation, Rule,
 };
 use flockform::scene::bundled::SCENES;
 use flockform::scene::{Scene, bundled};
@@ -260,6 +260,49 @@ proptest! {
         };
         let target = rule.target(&Own { present, reference: [0.0, 1.0], rest: [0.1, 0.0], load: None }, seen.iter().copied());
         prop_assert!(!target[0].is_nan() && !target[1].is_nan(), "{rule:?}: {target:?}");
+    }
+
+    #[test]
+    fn a_material_moves_with_its_neighbours_and_a_corotated_one_turns_with_them(
+        places in prop::collection::vec((prop::array::uniform2(-1.0..1.0f64), prop::array::uniform2(-0.1..0.1f64)), 3..8),
+        blocks in prop::collection::vec(prop::array::uniform4(-1.0..1.0f64), 8),
+        here in prop::array::uniform2(-0.5..0.5f64),
+        shift in prop::array::uniform2(-5.0..5.0f64),
+        angle in -3.1..3.1f64,
+        push in prop::array::uniform2(-1.0..1.0f64),
+    ) {
+        // Any weights that sum to the identity.
+        let count = places.len();
+        let mut matrices: Vec<[[f64; 2]; 2]> = blocks[..count].iter().map(|&[a, b, c, d]| [[a, b], [c, d]]).collect();
+        let sum = |k: usize, l: usize, of: &[[[f64; 2]; 2]]| of.iter().map(|m| m[k][l]).sum::<f64>();
+        let rest = &matrices[..count - 1];
+        let last = [[1.0 - sum(0, 0, rest), -sum(0, 1, rest)], [-sum(1, 0, rest), 1.0 - sum(1, 1, rest)]];
+        matrices[count - 1] = last;
+        let (sin, cos) = angle.sin_cos();
+        let turned = |[x, y]: [f64; 2]| [cos * x - sin * y + shift[0], sin * x + cos * y + shift[1]];
+        let moved = |[x, y]: [f64; 2]| [x + shift[0], y + shift[1]];
+        let load = |force: [f64; 2]| Some(Load { force, compliance: [[0.3, 0.1], [0.1, 0.2]] });
+        let seen = |go: &dyn Fn([f64; 2]) -> [f64; 2]| -> Vec<Neighbour> {
+            let one = |((reference, off), matrix): (&([f64; 2], [f64; 2]), &[[f64; 2]; 2])| {
+                let position = go([reference[0] + off[0], reference[1] + off[1]]);
+                Neighbour { reference: *reference, matrix: *matrix, ..Neighbour::at(position) }
+            };
+            places.iter().zip(&matrices).map(one).collect()
+        };
+        for (rotation, go, pushed) in [
+            (Rotation::Small, &moved as &dyn Fn([f64; 2]) -> [f64; 2], push),
+            (Rotation::Corotated, &moved, push),
+            (Rotation::Corotated, &turned, [cos * push[0] - sin * push[1], sin * push[0] + cos * push[1]]),
+        ] {
+            let rule = Rule { mean: Mean::Material { rotation }, ..Rule::BARYCENTRE };
+            let still = |p: [f64; 2]| p;
+            let one = |present, force| Own { present, reference: here, rest: [0.02, -0.01], load: load(force) };
+            let before = rule.target(&one(here, push), seen(&still).into_iter());
+            let after = rule.target(&one(go(here), pushed), seen(go).into_iter());
+            let expected = go(before);
+            let apart = (after[0] - expected[0]).hypot(after[1] - expected[1]);
+            prop_assert!(apart < 1e-11, "{rotation:?}: {after:?}, not {expected:?}");
+        }
     }
 
     #[test]
