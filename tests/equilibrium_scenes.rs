@@ -74,6 +74,10 @@ fn the_barycentre_is_solved_to_where_it_is_swept_with_any_frame_and_neighbourhoo
             assert_alike("tension", &overrides, 1e-8);
         }
     }
+    // Between two rows of a hexagonal edge a frame point copies the mean of two.
+    for frame in ["frame=lagged", "frame=immediate"] {
+        assert_alike("lattice-hexagonal", &[&[frame][..], &pulled].concat(), 1e-8);
+    }
     for more in [
         "rule.weights={kind=\"list\",values=[1.0,2.0,1.0,3.0]}",
         "rule.poisson={k=-0.01}",
