@@ -65,3 +65,33 @@ fn sweep(matrix: &Matrix, stencils: &Stencils<f64>, colour: &[Coloured], f: &Fie
         u.y[i] += yx * x + yy * y;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flock::lattice::LatticeKind;
+    use crate::solve::operator::samples::operator;
+
+    #[test]
+    fn every_follower_has_one_colour_and_no_neighbour_of_the_same() {
+        for kind in LatticeKind::SAMPLES {
+            let operator = operator(kind, 14, 11, |i| i % 9 == 0);
+            let matrix = Matrix::of_followers(&operator);
+            let colours = colours(&matrix);
+            let mut colour_of = vec![None; matrix.count()];
+            for (colour, particles) in colours.iter().enumerate() {
+                for &(particle, _) in particles {
+                    assert_eq!(colour_of[particle as usize].replace(colour), None, "{kind:?}");
+                }
+            }
+            assert_eq!(colour_of.iter().flatten().count(), operator.followers(), "{kind:?}");
+            for &(particle, run) in colours.iter().flatten() {
+                // The first distance is the particle's own.
+                for &distance in &matrix.distances(&matrix.runs()[run as usize])[1..] {
+                    let other = (particle as usize).wrapping_add_signed(distance as isize);
+                    assert_ne!(colour_of[particle as usize], colour_of[other], "{kind:?}");
+                }
+            }
+        }
+    }
+}
