@@ -11,9 +11,9 @@ use crate::flock::role::Role;
 use crate::scene::raw::{RawEquilibrium, RawPrecision, RawSolver};
 use crate::scene::{Scene, SceneError};
 use crate::solve::equilibrium::{
-    Choice, Precision, Request, SolveError, Solved, Solver, System, choose, solve,
+    Choice, Precision, Request, SolveError, Solved, Solver, choose, solve,
 };
-use crate::solve::linear::{NotLinear, system};
+use crate::solve::linear::{NotLinear, Scaled, scaled_system};
 
 /// Runs a plan to its end as its scene asks: stepping, or straight to the equilibrium. `watch` sees a
 /// stepped run as [`run`] shows it, and of a solved one the end.
@@ -37,8 +37,10 @@ pub fn come_to_rest(
 /// # Errors
 /// Names what in the scene has no equilibrium, or none that the solver asked for can find.
 pub fn settle(scene: &Scene, asked: &RawEquilibrium, plan: Plan) -> Result<Outcome, SceneError> {
-    let system = of_plan(scene, &plan)?;
-    let solved = solve(&system, &request(asked)).map_err(|error| refuse(scene, &error))?;
+    let Scaled { system, length } = of_plan(scene, &plan)?;
+    let mut solved = solve(&system, &request(asked)).map_err(|error| refuse(scene, &error))?;
+    let Points { x, y } = &mut solved.displacement;
+    x.iter_mut().chain(y).for_each(|displacement| *displacement *= length);
     Ok(outcome(plan, solved))
 }
 
@@ -47,18 +49,18 @@ pub fn settle(scene: &Scene, asked: &RawEquilibrium, plan: Plan) -> Result<Outco
 /// # Errors
 /// As [`settle`], as far as can be told without solving.
 pub fn foresee(scene: &Scene, asked: &RawEquilibrium, plan: &Plan) -> Result<(Solver, String), SceneError> {
-    Ok(choose(&of_plan(scene, plan)?, &request(asked)))
+    Ok(choose(&of_plan(scene, plan)?.system, &request(asked)))
 }
 
-/// The linear system of a plan: leaders where they are at the last step.
+/// The linear system of a plan, in units of its own: leaders where they are at the last step.
 ///
 /// # Errors
 /// Names the part of the rule that is not linear.
-pub fn of_plan(scene: &Scene, plan: &Plan) -> Result<System, SceneError> {
+pub fn of_plan(scene: &Scene, plan: &Plan) -> Result<Scaled, SceneError> {
     let follows = plan.roles.iter().map(|&role| role == Role::Follower).collect();
     let at_rest = |d: Option<[f64; 2]>| d.unwrap_or_default();
-    let held = held(&plan.changes, &plan.body, plan.stop.steps).into_iter().map(at_rest).collect();
-    system(&plan.interaction, &plan.body, follows, held).map_err(|error| {
+    let held: Points = held(&plan.changes, &plan.body, plan.stop.steps).into_iter().map(at_rest).collect();
+    scaled_system(&plan.interaction, &plan.body, follows, &held).map_err(|error| {
         let (key, help) = match error {
             NotLinear::Rule { .. } => {
                 ("rule.mean", "leave [equilibrium] out: sweeps find where such a rule comes to rest")

@@ -105,18 +105,20 @@ impl<'a> LinearSweep<'a> {
 
     fn eigenvalues(&self, wanted: Wanted, most: usize) -> (Vec<Ritz>, usize, bool) {
         let count = self.roles.len();
-        // What a particle at rest in the reference stays at, to the bit or to rounding.
+        // Of the body's own size where the reference is there, so that it does not swallow them.
+        let unit = self.interaction.rule.poisson.map_or(1.0, |poisson| poisson.half_width);
         let base = &self.interaction.reference;
         let mut present = Points::clone(base);
         let mut next = Points::zeros(count);
         let mut apply = |from: &[f64], to: &mut [f64]| {
             for i in 0..count {
-                present.set(i, [base.x[i] + from[2 * i], base.y[i] + from[2 * i + 1]]);
+                present.set(i, [base.x[i] + unit * from[2 * i], base.y[i] + unit * from[2 * i + 1]]);
             }
             next.clone_from(&present);
             self.sweep.step(&self.interaction, self.frame, &present, &mut next);
             for i in 0..count {
-                (to[2 * i], to[2 * i + 1]) = (next.x[i] - base.x[i], next.y[i] - base.y[i]);
+                to[2 * i] = (next.x[i] - base.x[i]) / unit;
+                to[2 * i + 1] = (next.y[i] - base.y[i]) / unit;
             }
         };
         let found = eigenvalues(&mut apply, self.start(), wanted, most);
