@@ -28,6 +28,8 @@ pub enum Style {
     Dots,
     /// Larger, ringed dots on a line: those that matter among many.
     Front,
+    /// Larger, ringed dots alone.
+    Rings,
 }
 
 /// A named set of points; those that an axis cannot show (zero on a logarithmic one) are left out.
@@ -58,6 +60,27 @@ pub struct Chart<'a> {
 
 /// Draws a chart.
 pub fn draw(chart: &Chart<'_>) -> String {
+    let mut svg = Svg::new(page::WIDTH, height(chart));
+    draw_on(&mut svg, chart);
+    svg.finish()
+}
+
+/// Draws several charts on one sheet, in this order from the top.
+pub fn draw_below_each_other(charts: &[Chart<'_>]) -> String {
+    let mut svg = Svg::new(page::WIDTH, charts.iter().map(height).sum());
+    let mut top = 0.0;
+    for chart in charts {
+        svg.group(format_args!("transform=\"translate(0 {top:.2})\""), |svg| draw_on(svg, chart));
+        top += height(chart);
+    }
+    svg.finish()
+}
+
+fn height(chart: &Chart<'_>) -> f64 {
+    heading(chart).height(page::WIDTH) + 4.0 + HEIGHT + Axes::BELOW
+}
+
+fn heading(chart: &Chart<'_>) -> Heading {
     let legend = chart
         .series
         .iter()
@@ -67,24 +90,26 @@ pub fn draw(chart: &Chart<'_>) -> String {
             mark: if series.style == Style::Line { Mark::Line } else { Mark::Dot },
         })
         .collect();
-    let heading = Heading { title: chart.title.clone(), note: chart.note.clone(), legend };
+    Heading { title: chart.title.clone(), note: chart.note.clone(), legend }
+}
+
+fn draw_on(svg: &mut Svg, chart: &Chart<'_>) {
+    let heading = heading(chart);
     let top = heading.height(page::WIDTH) + 4.0;
     let mut axes = window(chart);
     let left = room_on_the_left(chart, &axes);
     axes.corner = [left, top];
     axes.size = [page::WIDTH - left - RIGHT, HEIGHT];
-    let mut svg = Svg::new(page::WIDTH, top + HEIGHT + Axes::BELOW);
-    heading.draw(&mut svg, page::WIDTH);
-    draw_horizontal(&mut svg, chart.axes[0], &axes);
-    draw_vertical(&mut svg, chart.axes[1], &axes, left);
+    heading.draw(svg, page::WIDTH);
+    draw_horizontal(svg, chart.axes[0], &axes);
+    draw_vertical(svg, chart.axes[1], &axes, left);
     for landmark in &chart.landmarks {
-        draw_landmark(&mut svg, chart, &axes, landmark);
+        draw_landmark(svg, chart, &axes, landmark);
     }
     for series in &chart.series {
-        draw_series(&mut svg, chart, &axes, series);
+        draw_series(svg, chart, &axes, series);
     }
     svg.rect(axes.corner, axes.size, format_args!("fill=\"none\" stroke=\"{INK}\""));
-    svg.finish()
 }
 
 /// A value as the axes count it; `None` where they cannot show it.
@@ -199,7 +224,7 @@ fn draw_landmark(svg: &mut Svg, chart: &Chart<'_>, axes: &Axes, landmark: &Landm
 fn draw_series(svg: &mut Svg, chart: &Chart<'_>, axes: &Axes, series: &Series) {
     let places: Vec<[f64; 2]> =
         series.points.iter().filter_map(|&p| on_axes(chart, p)).map(|p| axes.place(p)).collect();
-    if series.style != Style::Dots {
+    if matches!(series.style, Style::Line | Style::Front) {
         let mut path = Path::default();
         path.polyline(page::thinned(&places));
         let stroke = format!("stroke=\"{}\" stroke-width=\"1.7\" stroke-linejoin=\"round\"", series.colour);
@@ -208,7 +233,7 @@ fn draw_series(svg: &mut Svg, chart: &Chart<'_>, axes: &Axes, series: &Series) {
     let (radius, attributes) = match series.style {
         Style::Line => return,
         Style::Dots => (3.0, format!("fill=\"{}\" fill-opacity=\"0.65\"", series.colour)),
-        Style::Front => (4.5, format!("fill=\"{}\" stroke=\"{INK}\" stroke-width=\"1.1\"", series.colour)),
+        Style::Front | Style::Rings => (4.5, format!("fill=\"{}\" stroke=\"{INK}\" stroke-width=\"1.1\"", series.colour)),
     };
     svg.group(attributes, |svg| places.iter().for_each(|&place| svg.circle(place, radius)));
 }
