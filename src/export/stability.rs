@@ -90,6 +90,8 @@ fn rows(linear: &Linear) -> Vec<Row> {
     rows
 }
 
+const THRESHOLD: &str = "#a33b2a";
+
 /// A panel for each parameter.
 pub fn figure(study: &Study, linear: &Linear) -> String {
     let panels: Vec<Chart> = linear.sweeps.iter().map(|sweep| panel(study, linear, sweep)).collect();
@@ -116,15 +118,16 @@ fn panel<'a>(study: &Study, linear: &Linear, sweep: &Sweep) -> Chart<'a> {
         ),
         line(
             "threshold by bisection of runs",
-            "#f2f2f2",
+            THRESHOLD,
             Style::Rings,
             thresholds().filter_map(|t| Some([t.found.as_ref()?.value, 1.0])).collect(),
         ),
     ];
     Chart {
-        title: format!("{}: growth and {}", study.title, sweep.parameter.name()),
+        title: format!("Growth against the {}", sweep.parameter.name()),
         note: format!(
-            "{} followers, held at rest and disturbed; here the {} is {}",
+            "{}; {} followers disturbed, leaders at rest; {} of the scene {}",
+            study.title,
             linear.followers,
             sweep.parameter.name(),
             rounded(sweep.present, 4)
@@ -141,11 +144,11 @@ fn panel<'a>(study: &Study, linear: &Linear, sweep: &Sweep) -> Chart<'a> {
 fn landmark(threshold: &Threshold) -> Option<Landmark> {
     let predicted = threshold.predicted.as_ref()?.value;
     let runs = match &threshold.found {
-        Some(found) => format!("runs {}", rounded(found.value, 6)),
-        None => "no run".into(),
+        Some(found) => format!("by runs {}", rounded(found.value, 6)),
+        None => "no run grows".into(),
     };
-    let name = format!("grows beyond {} ({runs})", rounded(predicted, 6));
-    Some(Landmark { x: predicted, name, colour: "#a33b2a" })
+    let name = format!("predicted {}\n{runs}", rounded(predicted, 6));
+    Some(Landmark { x: predicted, name, colour: THRESHOLD })
 }
 
 /// With so many decimals at most.

@@ -83,7 +83,9 @@ pub fn growth(subject: &Subject, parameter: Parameter, value: f64, most_steps: u
         let now = size(engine.present(), &engine.body().reference, spacing);
         sizes.push(now);
         let gone = !(now < FAR * sizes[0] && now > sizes[0] / FAR);
-        settled = gone || sizes.len() % LOOK == 1 && sizes.len() > 4 * LOOK && is_settled(&sizes);
+        // A mode that grows may begin small: what shrinks must have shrunk, or have had the time.
+        let told = now < 1e-3 * sizes[0] || now > 1e3 * sizes[0] || 4 * sizes.len() > most_steps;
+        settled = gone || told && sizes.len() % LOOK == 1 && is_settled(&sizes);
     }
     let steps = sizes.len() - 1;
     Growth { value, per_step: factor(&sizes, steps, part(steps)), steps, settled }
@@ -115,6 +117,9 @@ fn factor(sizes: &[f64], end: usize, steps: usize) -> f64 {
 /// Whether the factor of the last part of the run is that of the part before it, as far from 1 as it is.
 fn is_settled(sizes: &[f64]) -> bool {
     let end = sizes.len() - 1;
+    if end < 4 * LOOK {
+        return false;
+    }
     let part = part(end);
     let [last, before] = [factor(sizes, end, part), factor(sizes, end - part, part)];
     (last - before).abs() <= 0.02 * (last - 1.0).abs()

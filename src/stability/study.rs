@@ -171,7 +171,7 @@ fn sweep(subject: &Subject, parameter: Parameter, thresholds: &[Threshold], effo
         .map(|k| range[0] + (range[1] - range[0]) * k as f64 / (effort.samples.max(2) - 1) as f64)
         .map(|value| growth(subject, parameter, value, effort.most_steps / 10))
         .collect();
-    let spectrum = curve(subject, parameter, range, 4 * effort.samples + 1);
+    let spectrum = curve(subject, parameter, range, 6 * effort.samples + 1);
     Sweep { parameter, present: subject.present(parameter), spectrum, runs }
 }
 

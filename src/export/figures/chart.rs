@@ -45,6 +45,7 @@ pub struct Series {
 #[derive(Clone, Debug)]
 pub struct Landmark {
     pub x: f64,
+    /// Of one line or several.
     pub name: String,
     pub colour: &'static str,
 }
@@ -218,7 +219,10 @@ fn draw_landmark(svg: &mut Svg, chart: &Chart<'_>, axes: &Axes, landmark: &Landm
     svg.group(stroke, |svg| svg.line(at, [at[0], axes.corner[1] + axes.size[1]]));
     let right = at[0] > axes.corner[0] + 0.6 * axes.size[0];
     let (anchor, beside) = if right { (Anchor::End, -5.0) } else { (Anchor::Start, 5.0) };
-    svg.text([at[0] + beside, at[1] + 12.0], anchor, TEXT, landmark.colour, &landmark.name);
+    for (row, line) in landmark.name.lines().enumerate() {
+        let below = 14.0 + 15.0 * row as f64;
+        svg.text([at[0] + beside, at[1] + below], anchor, TEXT, landmark.colour, line);
+    }
 }
 
 fn draw_series(svg: &mut Svg, chart: &Chart<'_>, axes: &Axes, series: &Series) {
