@@ -10,9 +10,7 @@ use crate::flock::points::{Points, distance};
 use crate::flock::role::Role;
 use crate::scene::raw::{RawEquilibrium, RawPrecision, RawSolver};
 use crate::scene::{Scene, SceneError};
-use crate::solve::equilibrium::{
-    Choice, Precision, Request, SolveError, Solved, Solver, choose, solve,
-};
+use crate::solve::equilibrium::{Choice, Precision, Request, SolveError, Solved, Solver, choose, solve};
 use crate::solve::linear::{NotLinear, Scaled, scaled_system};
 
 /// Runs a plan to its end as its scene asks: stepping, or straight to the equilibrium. `watch` sees a

@@ -44,6 +44,7 @@ impl Layout {
         let (body, neighbours) =
             Body::build(scene.lattice.clone(), &scene.cut, &scene.neighbourhood, scene.frame)
                 .map_err(|error| refuse_body(scene, &error))?;
+        require_resolved(scene, &body)?;
         let layout = match scene.mean {
             Mean::Material { .. } => {
                 // Sites in no cell carry nothing; they stick out of a curved edge.
@@ -217,6 +218,40 @@ pub fn held(changes: &[RoleChange], body: &Body, step: usize) -> Vec<Option<[f64
         }
     }
     held
+}
+
+/// Least spacing over the distance of two doubles at the body's largest coordinate: six digits of a
+/// displacement of one spacing.
+const LEAST_RESOLUTION: f64 = 1e6;
+
+/// Refuses a body whose places, or small displacements from them, doubles cannot tell apart.
+fn require_resolved(scene: &Scene, body: &Body) -> Result<(), SceneError> {
+    let spacing = body.lattice.spacing();
+    if !spacing.is_normal() {
+        let message = format!("doubles lose digits below 2.3e-308, and the particles are {spacing:e} apart");
+        return Err(scene.refuse("lattice", message, "use a smaller unit of length"));
+    }
+    let Points { x, y } = &*body.reference;
+    let farthest = x
+        .iter()
+        .chain(y)
+        .fold(0.0, |most: f64, v| if v.is_finite() { most.max(v.abs()) } else { f64::INFINITY });
+    if farthest == f64::INFINITY {
+        let message = format!(
+            "the body reaches beyond the largest double, 1.8e308; its particles are {spacing:e} apart"
+        );
+        return Err(scene.refuse("lattice", message, "use a larger unit of length"));
+    }
+    let grain = farthest.next_up() - farthest;
+    if spacing < LEAST_RESOLUTION * grain {
+        let message = format!(
+            "particles {spacing:e} apart with coordinates up to {farthest:e}: a double has steps of {grain:.1e} there, and \
+             displacements would be rounded to them"
+        );
+        let key = if scene.raw.body.anchor.is_some() { "body.anchor" } else { "body.shape" };
+        return Err(scene.refuse(key, message, "put the origin of the coordinates near the body"));
+    }
+    Ok(())
 }
 
 fn refuse_body(scene: &Scene, error: &BodyError) -> SceneError {

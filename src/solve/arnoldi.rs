@@ -221,8 +221,7 @@ mod tests {
     #[test]
     fn a_chain_longer_than_the_vectors_kept_is_found_after_starting_over() {
         let size = 700;
-        let chain =
-            DMatrix::from_fn(size, size, |i, j| if i.abs_diff(j) == 1 { 0.5 } else { 0.0 });
+        let chain = DMatrix::from_fn(size, size, |i, j| if i.abs_diff(j) == 1 { 0.5 } else { 0.0 });
         let found = of_matrix(&chain, Wanted::Ends);
         let expected = (std::f64::consts::PI / (size as f64 + 1.0)).cos();
         assert!(found.converged, "{found:?}");

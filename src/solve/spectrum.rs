@@ -85,10 +85,8 @@ impl<'a> LinearSweep<'a> {
         roles: &'a [Role],
         update: Update,
     ) -> Option<Self> {
-        let linear = matches!(
-            interaction.rule.mean,
-            Mean::Barycentre | Mean::Material { rotation: Rotation::Small }
-        );
+        let linear =
+            matches!(interaction.rule.mean, Mean::Barycentre | Mean::Material { rotation: Rotation::Small });
         if !linear || !roles.contains(&Role::Follower) {
             return None;
         }

@@ -10,8 +10,25 @@ const TABLES: [&str; 9] =
 
 /// Keys of lengths, wherever they stand.
 const LENGTHS: [&str; 19] = [
-    "spacing", "a", "b", "min", "max", "centre", "radius", "vertices", "anchor", "depth", "per_step",
-    "displacement", "about", "amplitude", "length", "distance", "thickness", "scale", "to",
+    "spacing",
+    "a",
+    "b",
+    "min",
+    "max",
+    "centre",
+    "radius",
+    "vertices",
+    "anchor",
+    "depth",
+    "per_step",
+    "displacement",
+    "about",
+    "amplitude",
+    "length",
+    "distance",
+    "thickness",
+    "scale",
+    "to",
 ];
 
 /// Overrides that make the scene `factor` times as large: strains, stresses and angles stay, a force grows

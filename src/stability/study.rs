@@ -4,11 +4,11 @@ use std::fmt;
 
 use serde::Serialize;
 
+use super::Load;
 use super::bisection::{Effort, Found, Growth, find, growth};
 use super::extremes::{self, Case, Outcome};
 use super::subject::{Parameter, Subject};
 use super::thresholds::{Predicted, Radius, Side, curve, predict, start};
-use super::Load;
 use crate::scene::SceneError;
 
 /// A threshold from both sides.
@@ -93,13 +93,7 @@ pub fn run(load: Load<'_>, options: Options, tell: &mut dyn FnMut(&str)) -> Resu
         Err(error) => return Err(error),
     };
     let extremes = if options.no_extremes { Vec::new() } else { extremes::run(load, &scene, tell) };
-    Ok(Study {
-        name: scene.name.clone(),
-        title: scene.raw.title.clone(),
-        linear,
-        refused,
-        extremes,
-    })
+    Ok(Study { name: scene.name.clone(), title: scene.raw.title.clone(), linear, refused, extremes })
 }
 
 fn linear(subject: &Subject, effort: Effort, tell: &mut dyn FnMut(&str)) -> Linear {
@@ -162,7 +156,8 @@ fn sweep(subject: &Subject, parameter: Parameter, thresholds: &[Threshold], effo
         .collect();
     let (inside, _) = start(subject, parameter, Side::Upper);
     known.push(if parameter == Parameter::Damping { 0.0 } else { inside });
-    let (low, high) = known.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &v| (l.min(v), h.max(v)));
+    let (low, high) =
+        known.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &v| (l.min(v), h.max(v)));
     let beyond = 0.12 * (high - low);
     // Nothing moves without damping, so there is no growth to speak of.
     let low = if parameter == Parameter::Damping { 0.05 * high } else { low - beyond };

@@ -177,5 +177,9 @@ fn require_linear(scene: &Scene, plan: &Plan) -> Result<(), SceneError> {
     let message = format!(
         "{reason} make the rule nonlinear: its sweep is no matrix, so it has no spectrum and no one threshold"
     );
-    Err(scene.refuse(key, message, "ask about a linear rule: rule.mean.kind = \"barycentre\" or \"material\""))
+    Err(scene.refuse(
+        key,
+        message,
+        "ask about a linear rule: rule.mean.kind = \"barycentre\" or \"material\"",
+    ))
 }

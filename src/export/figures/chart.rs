@@ -237,7 +237,9 @@ fn draw_series(svg: &mut Svg, chart: &Chart<'_>, axes: &Axes, series: &Series) {
     let (radius, attributes) = match series.style {
         Style::Line => return,
         Style::Dots => (3.0, format!("fill=\"{}\" fill-opacity=\"0.65\"", series.colour)),
-        Style::Front | Style::Rings => (4.5, format!("fill=\"{}\" stroke=\"{INK}\" stroke-width=\"1.1\"", series.colour)),
+        Style::Front | Style::Rings => {
+            (4.5, format!("fill=\"{}\" stroke=\"{INK}\" stroke-width=\"1.1\"", series.colour))
+        }
     };
     svg.group(attributes, |svg| places.iter().for_each(|&place| svg.circle(place, radius)));
 }

@@ -26,7 +26,8 @@ pub fn cases(scene: &Scene) -> Vec<Case> {
     let lattice = lattice.unwrap_or_else(|| r#"lattice={kind="square",spacing=1.0}"#.into());
     for (plane, ratios) in [("stress", &[-0.99, 0.499, 0.99][..]), ("strain", &[-0.99, 0.499])] {
         for poisson in ratios {
-            let sheet = format!(r#"material={{kind="isotropic",young=1000.0,poisson={poisson:?},plane="{plane}"}}"#);
+            let sheet =
+                format!(r#"material={{kind="isotropic",young=1000.0,poisson={poisson:?},plane="{plane}"}}"#);
             let made: [&str; 3] = [&lattice, &sheet, MATERIAL];
             let name = format!("nu = {poisson}, plane {plane}");
             let solved = [&made[..], &[AT_REST]].concat();
@@ -36,7 +37,8 @@ pub fn cases(scene: &Scene) -> Vec<Case> {
         }
     }
     for (plane, poisson) in [("stress", -1.0), ("stress", 1.0), ("strain", 0.5), ("strain", -1.0)] {
-        let sheet = format!(r#"material={{kind="isotropic",young=1000.0,poisson={poisson:?},plane="{plane}"}}"#);
+        let sheet =
+            format!(r#"material={{kind="isotropic",young=1000.0,poisson={poisson:?},plane="{plane}"}}"#);
         let outcome = patch(&[&sheet, MATERIAL, AT_REST], 0.0);
         all.push(Case::new(format!("nu = {poisson}, plane {plane}"), OWN, outcome));
     }
@@ -84,9 +86,8 @@ fn stress(overrides: &[&str]) -> Result<Outcome, SceneError> {
         Traction::uniform(side, [xx * nx + xy * ny, xy * nx + yy * ny])
     };
     let loads = Loads { tractions: outline.into_iter().map(traction).collect(), ..Loads::default() };
-    let pushed = loads
-        .on_particles(cells, reference)
-        .map_err(|error| scene.refuse("loads", error.to_string(), ""))?;
+    let pushed =
+        loads.on_particles(cells, reference).map_err(|error| scene.refuse("loads", error.to_string(), ""))?;
     let largest = pushed.iter().map(|p| distance(p, [0.0; 2])).fold(0.0, f64::max);
     let left = |i: usize| {
         let ([fx, fy], [px, py]) = (weights.force(i, &displaced), pushed.get(i));
@@ -123,7 +124,7 @@ pub fn contrast(solver: Solver, contrast: f64) -> Outcome {
         Err(error) => return Outcome::Refused { message: error.to_string() },
     };
     let end = f64::from(columns - 1);
-    let interaction = Interaction {
+    let mut interaction = Interaction {
         rule: Rule { mean: Mean::Material { rotation: Rotation::Small }, ..Rule::BARYCENTRE },
         reference: body.reference.clone(),
         neighbours: weights.neighbours.clone(),
@@ -132,6 +133,7 @@ pub fn contrast(solver: Solver, contrast: f64) -> Outcome {
         rest: None,
         bonds: None,
     };
+    interaction.keep_rest();
     let follows: Vec<bool> = body.reference.iter().map(|[x, _]| x > 0.0 && x < end).collect();
     let held: Points = body.reference.iter().map(|[x, _]| [if x == end { 1.0 } else { 0.0 }, 0.0]).collect();
     let Scaled { system, length } = match scaled_system(&interaction, &body, follows, &held) {
@@ -148,7 +150,8 @@ pub fn contrast(solver: Solver, contrast: f64) -> Outcome {
         let message = format!("{solver} ended short of its tolerance, {left:.1e} of the load being left");
         return Outcome::Refused { message };
     }
-    let compliance = |columns: std::ops::Range<u32>| columns.map(|c| 1.0 / stiffness(f64::from(c))).sum::<f64>();
+    let compliance =
+        |columns: std::ops::Range<u32>| columns.map(|c| 1.0 / stiffness(f64::from(c))).sum::<f64>();
     let whole = compliance(0..columns - 1);
     let off = |i: usize| {
         let expected = compliance(0..body.reference.x[i] as u32) / whole;

@@ -129,13 +129,18 @@ impl End {
             }
             StopReason::Unsettled => {
                 let left = outcome.solved.and_then(|s| s.residuals.last().copied()).unwrap_or(f64::NAN);
-                let message = format!("the solver ended short of its tolerance, {left:.1e} of the load being left");
+                let message =
+                    format!("the solver ended short of its tolerance, {left:.1e} of the load being left");
                 return Err(scene.refuse("equilibrium", message, ""));
             }
             _ => {}
         }
         let engine = &outcome.engine;
-        Ok(Self { reference: Points::clone(&engine.body().reference), present: engine.present().clone(), spacing })
+        Ok(Self {
+            reference: Points::clone(&engine.body().reference),
+            present: engine.present().clone(),
+            spacing,
+        })
     }
 
     /// Displacement of a particle over `unit` \[1\].
@@ -183,7 +188,10 @@ impl End {
 
 /// The largest, or not a number where one is not.
 fn worst(errors: impl Iterator<Item = f64>) -> f64 {
-    errors.fold(0.0, |worst: f64, error| if worst.is_nan() || error.is_nan() { f64::NAN } else { worst.max(error) })
+    errors.fold(
+        0.0,
+        |worst: f64, error| if worst.is_nan() || error.is_nan() { f64::NAN } else { worst.max(error) },
+    )
 }
 
 /// A small body of ours, all of whose outline is led by a strain.
@@ -215,5 +223,9 @@ fn small(overrides: &[&str]) -> Result<Scene, SceneError> {
 fn patch(overrides: &[&str], within: f64) -> Result<Outcome, SceneError> {
     let scene = small(overrides)?;
     let end = End::of(&scene)?;
-    Ok(Outcome::judged(end.apart_from_motion(&scene), within, "patch test: everybody follows the strain of the outline"))
+    Ok(Outcome::judged(
+        end.apart_from_motion(&scene),
+        within,
+        "patch test: everybody follows the strain of the outline",
+    ))
 }

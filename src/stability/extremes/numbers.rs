@@ -60,7 +60,9 @@ fn rest(numbers: Numbers, precision: &str, solver: &str) -> Result<End, SceneErr
         format!("lattice.spacing={spacing:e}"),
         format!(r#"material={{kind="isotropic",young={young:e},poisson=0.3,thickness={spacing:e}}}"#),
         r#"roles=[{region={kind="edge",side="left"},role="clamped"}]"#.to_owned(),
-        format!(r#"loads=[{{kind="traction",region={{kind="edge",side="right"}},traction=[0.0,{traction:e}]}}]"#),
+        format!(
+            r#"loads=[{{kind="traction",region={{kind="edge",side="right"}},traction=[0.0,{traction:e}]}}]"#
+        ),
         format!("equilibrium={{solver=\"{solver}\",tolerance={tolerance:e},precision=\"{precision}\"}}"),
         MATERIAL.to_owned(),
     ];
