@@ -3,7 +3,7 @@
 use crate::flock::body::{Body, BodyError};
 use crate::flock::motion::Motion;
 use crate::flock::neighbourhood::{Neighbourhood, Neighbours};
-use crate::flock::points::Points;
+use crate::flock::points::{Points, distance};
 use crate::flock::region::{Region, Side};
 use crate::flock::role::Role;
 use crate::flock::rules::Mean;
@@ -41,6 +41,7 @@ impl Layout {
     /// Names the key of the scene that cannot be laid out: an empty or disconnected body, a
     /// neighbourhood that does not fit the lattice.
     pub fn new(scene: &Scene) -> Result<Self, SceneError> {
+        require_in_range(scene)?;
         let (body, neighbours) =
             Body::build(scene.lattice.clone(), &scene.cut, &scene.neighbourhood, scene.frame)
                 .map_err(|error| refuse_body(scene, &error))?;
@@ -224,26 +225,31 @@ pub fn held(changes: &[RoleChange], body: &Body, step: usize) -> Vec<Option<[f64
 /// displacement of one spacing.
 const LEAST_RESOLUTION: f64 = 1e6;
 
+/// Cells \[length\] within which areas, strains and pseudo-energies fit a double.
+const CELLS: std::ops::RangeInclusive<f64> = 1e-152..=1e152;
+
+/// Refuses a lattice whose squares of lengths no double holds.
+fn require_in_range(scene: &Scene) -> Result<(), SceneError> {
+    let sides = [[1, 0], [0, 1]].map(|step| distance(scene.lattice.vector(step), [0.0; 2]));
+    match sides.into_iter().find(|side| !CELLS.contains(side)) {
+        None => Ok(()),
+        Some(side) => {
+            let message = format!("particles {side:e} apart: no double holds the squares of such lengths");
+            let help = "use another unit of length, with distances from 1e-152 to 1e152";
+            Err(scene.refuse("lattice", message, help))
+        }
+    }
+}
+
 /// Refuses a body whose places, or small displacements from them, doubles cannot tell apart.
 fn require_resolved(scene: &Scene, body: &Body) -> Result<(), SceneError> {
     let spacing = body.lattice.spacing();
-    if !spacing.is_normal() {
-        let message = format!("doubles lose digits below 2.3e-308, and the particles are {spacing:e} apart");
-        return Err(scene.refuse("lattice", message, "use a smaller unit of length"));
-    }
     let Points { x, y } = &*body.reference;
-    let farthest = x
-        .iter()
-        .chain(y)
-        .fold(0.0, |most: f64, v| if v.is_finite() { most.max(v.abs()) } else { f64::INFINITY });
-    if farthest == f64::INFINITY {
-        let message = format!(
-            "the body reaches beyond the largest double, 1.8e308; its particles are {spacing:e} apart"
-        );
-        return Err(scene.refuse("lattice", message, "use a larger unit of length"));
-    }
+    let farthest = x.iter().chain(y).fold(0.0, |most: f64, v| most.max(v.abs()));
     let grain = farthest.next_up() - farthest;
-    if spacing < LEAST_RESOLUTION * grain {
+    // Not a number where the body reaches beyond the doubles.
+    let is_resolved = spacing >= LEAST_RESOLUTION * grain;
+    if !is_resolved {
         let message = format!(
             "particles {spacing:e} apart with coordinates up to {farthest:e}: a double has steps of {grain:.1e} there, and \
              displacements would be rounded to them"

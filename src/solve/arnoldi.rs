@@ -131,7 +131,11 @@ impl Krylov {
         if !small.iter().all(|v| v.is_finite()) {
             return None;
         }
-        let all = Schur::try_new(small.clone(), f64::EPSILON, 100 * size + 1000)?.complex_eigenvalues();
+        // About their mean: what is told apart is what is left of a nearly idle operator.
+        let mean = small.trace() / size as f64;
+        let about_mean = &small - DMatrix::identity(size, size) * mean;
+        let about_mean = Schur::try_new(about_mean, f64::EPSILON, 100 * size + 1000)?;
+        let all = about_mean.complex_eigenvalues().map(|value| value + Complex::from(mean));
         let most = |key: &dyn Fn(&Complex<f64>) -> f64| {
             all.iter().copied().max_by(|a, b| key(a).total_cmp(&key(b))).unwrap_or_default()
         };
@@ -237,6 +241,22 @@ mod tests {
         };
         let start = (0..400).map(|k| 1.0 + (0.7391 * f64::from(k)).sin()).collect();
         assert!(!eigenvalues(&mut apply, start, Wanted::Modulus, 20).converged);
+    }
+
+    #[test]
+    fn an_operator_that_hardly_moves_anything_is_told_from_one_that_does_not() {
+        for power in 1..17 {
+            let part = 10f64.powi(-power);
+            let little = DMatrix::from_fn(120, 120, |i, j| match i.abs_diff(j) {
+                0 => 1.0 - part,
+                1 => 0.5 * part,
+                _ => 0.0,
+            });
+            let found = of_matrix(&little, Wanted::Modulus);
+            let expected = 1.0 - part * (1.0 - (std::f64::consts::PI / 121.0).cos());
+            assert!(found.converged, "{power}: {found:?}");
+            assert!((found.eigenvalues[0].value.norm() - expected).abs() < 1e-9, "{power}: {found:?}");
+        }
     }
 
     #[test]

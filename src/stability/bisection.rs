@@ -12,20 +12,27 @@ use crate::solve::spectrum::scatter;
 pub struct Effort {
     /// Most steps of one run.
     pub most_steps: usize,
+    /// Most steps times particles of one run: large bodies get fewer steps.
+    pub most_moves: usize,
     /// Runs and spectra over the whole range of each parameter, for the figure.
     pub samples: usize,
 }
 
 impl Default for Effort {
     fn default() -> Self {
-        Self { most_steps: 40_000, samples: 25 }
+        Self { most_steps: 40_000, most_moves: 20_000_000, samples: 25 }
     }
 }
 
 impl Effort {
     /// Enough to see that the study works.
     pub fn quick() -> Self {
-        Self { most_steps: 10_000, samples: 9 }
+        Self { most_steps: 10_000, most_moves: 3_000_000, samples: 9 }
+    }
+
+    /// Most steps of one run of so many particles.
+    pub fn steps(&self, particles: usize) -> usize {
+        self.most_steps.min(self.most_moves / particles.max(1)).max(8 * LOOK)
     }
 }
 
@@ -54,6 +61,9 @@ pub struct Found {
     pub value: f64,
     /// Half of the last bracket.
     pub within: f64,
+    /// Whether the runs at both ends of the last bracket had settled; where they had not, the body is too
+    /// slow for so few steps.
+    pub settled: bool,
     /// Every run on the way.
     pub runs: Vec<Growth>,
 }
@@ -159,5 +169,6 @@ pub fn find(
         }
         *if grows(middle) { &mut high } else { &mut low } = middle;
     }
-    Some(Found { value: 0.5 * (low + high), within: 0.5 * (high - low).abs(), runs })
+    let settled = [low, high].iter().all(|end| runs.iter().any(|run| run.value == *end && run.settled));
+    Some(Found { value: 0.5 * (low + high), within: 0.5 * (high - low).abs(), settled, runs })
 }

@@ -100,6 +100,8 @@ pub fn toml(value: &Value) -> String {
         }
         // With an exponent, or TOML would take 1e300 written out for an integer.
         Value::Number(number) if number.is_f64() => format!("{:e}", number.as_f64().unwrap_or_default()),
+        // Beyond the doubles, and to be refused as such.
+        Value::Null => "1e999".into(),
         other => other.to_string(),
     }
 }

@@ -21,7 +21,8 @@ pub struct Threshold {
     /// From runs.
     pub found: Option<Found>,
     /// How far apart the two may be: a thousandth of what the sweep is from growing, or from not growing,
-    /// at the parameter's neutral value (no feedback, no damping), and 1e-6 at least \[1\].
+    /// at the parameter's neutral value (no feedback, no damping), and 1e-6 at least; where runs do not settle
+    /// 4 over the number of their steps, which is what they can tell \[1\].
     pub tolerance: f64,
 }
 
@@ -137,13 +138,11 @@ fn threshold(subject: &Subject, parameter: Parameter, side: Side, effort: Effort
     };
     let margin = (subject.with(parameter, neutral).radius().radius - 1.0).abs();
     let tolerance = (1e-3 * margin).max(1e-6);
-    Threshold {
-        parameter,
-        side,
-        predicted: predict(subject, parameter, side),
-        found: find(subject, parameter, start(subject, parameter, side), tolerance / 8.0, effort.most_steps),
-        tolerance,
-    }
+    let steps = effort.steps(subject.particles());
+    let found = find(subject, parameter, start(subject, parameter, side), tolerance / 8.0, steps);
+    let settled = found.as_ref().is_none_or(|found| found.settled);
+    let tolerance = if settled { tolerance } else { tolerance.max(4.0 / steps as f64) };
+    Threshold { parameter, side, predicted: predict(subject, parameter, side), found, tolerance }
 }
 
 /// Runs and spectra from one threshold to the other and a little beyond.
@@ -164,7 +163,7 @@ fn sweep(subject: &Subject, parameter: Parameter, thresholds: &[Threshold], effo
     let range = [low, high + beyond];
     let runs = (0..effort.samples)
         .map(|k| range[0] + (range[1] - range[0]) * k as f64 / (effort.samples.max(2) - 1) as f64)
-        .map(|value| growth(subject, parameter, value, effort.most_steps / 10))
+        .map(|value| growth(subject, parameter, value, effort.steps(subject.particles()) / 4))
         .collect();
     let spectrum = curve(subject, parameter, range, 6 * effort.samples + 1);
     Sweep { parameter, present: subject.present(parameter), spectrum, runs }
@@ -238,7 +237,12 @@ impl fmt::Display for Linear {
             ];
             let shown = |value: Option<f64>| value.map_or("nowhere".into(), |v| format!("{v:.8}"));
             let apart = predicted.zip(found).map_or(String::new(), |(p, f)| format!("{:.1e}", (p - f).abs()));
-            let verdict = if threshold.agrees() { "" } else { "  THEY DISAGREE" };
+            let settled = threshold.found.as_ref().is_none_or(|found| found.settled);
+            let verdict = match (threshold.agrees(), settled) {
+                (false, _) => format!("  THEY DISAGREE by more than {:.1e}", threshold.tolerance),
+                (true, false) => format!("  too slow to settle: told to {:.1e}", threshold.tolerance),
+                (true, true) => String::new(),
+            };
             writeln!(f, "{name:26} {:>14} {:>14} {apart:>10}{verdict}", shown(predicted), shown(found))?;
         }
         writeln!(f, "delay: a threshold of swarms; a scene has none")

@@ -52,7 +52,10 @@ pub fn cases(scene: &Scene) -> Vec<Case> {
 
 /// The scene's mean, without terms, on a small body whose outline is drawn into one point.
 fn coincident(scene: &Scene) -> Result<Outcome, SceneError> {
-    let mean = serde_json::json!({ "mean": scene.raw.rule.mean, "weights": scene.raw.rule.weights });
+    // What keeps a particle off the mean of its neighbours would keep it off the point.
+    let rest = if matches!(scene.mean, Mean::Material { .. }) { "kept" } else { "literal" };
+    let rule = &scene.raw.rule;
+    let mean = serde_json::json!({ "mean": rule.mean, "weights": rule.weights, "rest": rest });
     let mut overrides = vec![TO_A_POINT.to_owned(), format!("rule={}", scaling::toml(&mean))];
     overrides
         .extend(["lattice", "neighbours", "material"].iter().filter_map(|key| scaling::table(scene, key)));
