@@ -187,6 +187,17 @@ fn assert_refused(cases: &[Case], begin: &str, words: &str) {
 }
 
 #[test]
+fn a_second_gradient_and_a_drop_are_the_same_in_any_unit() {
+    for name in ["gradient-layer", "drop"] {
+        let all = cases(name);
+        assert_none_wrong(&all);
+        for case in ["coordinates times 1e-150", "coordinates times 1e150", "spacing 1e-9", "spacing 1e9"] {
+            assert_right(&all, case);
+        }
+    }
+}
+
+#[test]
 fn extremes_end_right_or_refused() {
     for scene in ["tension", "grips"] {
         let all = cases(scene);

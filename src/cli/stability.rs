@@ -7,6 +7,7 @@ use clap::Args;
 use flockform::export::OutputFolder;
 use flockform::export::stability::{json, write_stability};
 use flockform::stability::bisection::Effort;
+use flockform::stability::extremes::plan;
 use flockform::stability::study::{Options, run};
 
 use super::run::free_folder;
@@ -40,8 +41,10 @@ pub struct StabilityArguments {
 pub fn stability(arguments: &StabilityArguments) -> Result<ExitCode, Refusal> {
     let effort = if arguments.quick { Effort::quick() } else { Effort::default() };
     let options = Options { effort, no_extremes: arguments.no_extremes };
-    // Asked for first, so that a misspelt name is a misspelt name.
-    let name = arguments.scene.load([])?.name;
+    // Before a folder is made: a misspelt name, a body that cannot be.
+    let scene = arguments.scene.load([])?;
+    plan(&scene)?;
+    let name = scene.name;
     let out = arguments.out.clone().unwrap_or_else(|| free_folder(&format!("{name}-stability")));
     let folder = OutputFolder::create(&out, arguments.force)?;
     let load = |more: &[String]| arguments.scene.load_scene(more);

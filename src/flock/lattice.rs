@@ -68,6 +68,25 @@ impl Lattice {
         Self { kind, origin, grid: [e1, e2], e1: rotate(e1, orientation), e2: rotate(e2, orientation) }
     }
 
+    /// The same lattice `factor` times as large, about the origin of the coordinates.
+    pub fn scaled(&self, factor: f64) -> Self {
+        let by = |v: [f64; 2]| v.map(|v| factor * v);
+        let kind = match self.kind {
+            LatticeKind::Square { spacing } => LatticeKind::Square { spacing: factor * spacing },
+            LatticeKind::Rectangular { a, b } => LatticeKind::Rectangular { a: factor * a, b: factor * b },
+            LatticeKind::CentredRectangular { a, b } => {
+                LatticeKind::CentredRectangular { a: factor * a, b: factor * b }
+            }
+            LatticeKind::Hexagonal { spacing } => LatticeKind::Hexagonal { spacing: factor * spacing },
+            LatticeKind::Oblique { a, b, angle } => {
+                LatticeKind::Oblique { a: factor * a, b: factor * b, angle }
+            }
+            LatticeKind::Honeycomb { spacing } => LatticeKind::Honeycomb { spacing: factor * spacing },
+        };
+        let (origin, grid) = (by(self.origin), self.grid.map(by));
+        Self { kind, origin, grid, e1: by(self.e1), e2: by(self.e2) }
+    }
+
     pub fn kind(&self) -> LatticeKind {
         self.kind
     }

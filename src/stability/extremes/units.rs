@@ -1,6 +1,7 @@
 //! The scene in other units of length, from the smallest numbers to the largest.
 
 use super::{Case, End, Load, Outcome, THE_SCENE, plan};
+use crate::flock::neighbourhood::Neighbourhood;
 use crate::scene::raw::RawMotion;
 use crate::scene::{Scene, SceneError};
 use crate::stability::scaling;
@@ -45,11 +46,18 @@ fn scaled(
     factor: f64,
     base: &End,
 ) -> Result<Outcome, SceneError> {
+    // Who is a neighbour now hangs on the last digit of a distance: only a power of two keeps it.
+    let present = matches!(scene.neighbourhood, Neighbourhood::Present { .. });
+    let factor = if present { factor.log2().round().exp2() } else { factor };
     let mut overrides = scaling::overrides(scene, factor);
     overrides.push(steps.to_owned());
     let scaled = load(&overrides)?;
     plan(&scaled)?;
     let end = End::of(&scaled)?;
-    let check = "the scene in its own unit does the same";
+    let check = if present {
+        "the scene in its own unit does the same; by the nearest power of two, since neighbours are found anew"
+    } else {
+        "the scene in its own unit does the same"
+    };
     Ok(Outcome::judged(base.apart_from(&end, factor, 1.0), 1e-9, check))
 }
