@@ -82,6 +82,9 @@ pub fn eigenvalues(
     }
 }
 
+/// An eigenvalue and its vector in the basis of the vectors kept.
+type Pair = (Ritz, DVector<Complex<f64>>);
+
 /// Orthonormal vectors and what the operator makes of them.
 struct Krylov {
     vectors: Vec<Vec<f64>>,
@@ -124,7 +127,7 @@ impl Krylov {
 
     /// The wanted eigenvalues of the small matrix with their vectors, and the largest modulus of all;
     /// `None` where they are not to be had.
-    fn ritz(&self, wanted: Wanted) -> Option<(Vec<(Ritz, DVector<Complex<f64>>)>, f64)> {
+    fn ritz(&self, wanted: Wanted) -> Option<(Vec<Pair>, f64)> {
         let size = self.columns.len();
         let entry = |row: usize, column: usize| self.columns[column].get(row).copied().unwrap_or(0.0);
         let small = DMatrix::from_fn(size, size, entry);

@@ -139,9 +139,8 @@ impl Subject {
         let Plan { body, interaction, roles, .. } = &self.plan;
         let labels = body.components(&interaction.neighbours);
         let mut held = vec![false; labels.len()];
-        for (i, role) in roles.iter().enumerate().filter(|(_, role)| **role == Role::Clamped) {
-            debug_assert!(role.is_body());
-            held[labels[i] as usize] = true;
+        for (&label, _) in labels.iter().zip(roles).filter(|(_, role)| **role == Role::Clamped) {
+            held[label as usize] = true;
         }
         let follower = |&i: &usize| roles[i] == Role::Follower;
         let help = "clamp or lead some of every part, and leave some to follow";

@@ -17,7 +17,7 @@ pub fn cases(load: Load<'_>, scene: &Scene) -> Vec<Case> {
         return vec![Case::new("the scene in other units", THE_SCENE, Ok(outcome))];
     }
     let steps = format!("stop.steps={}", scene.stop.steps.min(STEPS));
-    let base = load(&[steps.clone()]).and_then(|scene| End::of(&scene));
+    let base = load(std::slice::from_ref(&steps)).and_then(|scene| End::of(&scene));
     let spacing = scene.lattice.spacing();
     let asked = [
         ("coordinates times 1e-150", 1e-150),
