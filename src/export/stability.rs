@@ -103,21 +103,21 @@ fn panel<'a>(study: &Study, linear: &Linear, sweep: &Sweep) -> Chart<'a> {
     let thresholds = || linear.thresholds.iter().filter(|t| t.parameter == sweep.parameter);
     let line = |name: &str, colour, style, points| Series { name: name.into(), colour, style, points };
     let series = vec![
-        line("neither grows nor shrinks", "#8a8f98", Style::Line, ends.map(|value| [value, 1.0]).to_vec()),
+        line("no growth", "#8a8f98", Style::Line, ends.map(|value| [value, 1.0]).to_vec()),
         line(
-            "predicted: spectral radius of the sweep",
+            "predicted (spectral radius)",
             SERIES[0],
             Style::Line,
             sweep.spectrum.iter().map(|point| [point.value, point.radius]).collect(),
         ),
         line(
-            "runs of the body",
+            "runs",
             SERIES[1],
             Style::Dots,
             sweep.runs.iter().map(|run| [run.value, run.per_step]).collect(),
         ),
         line(
-            "threshold by bisection of runs",
+            "threshold found by runs",
             THRESHOLD,
             Style::Rings,
             thresholds().filter_map(|t| Some([t.found.as_ref()?.value, 1.0])).collect(),
@@ -126,11 +126,10 @@ fn panel<'a>(study: &Study, linear: &Linear, sweep: &Sweep) -> Chart<'a> {
     Chart {
         title: format!("Growth against the {}", sweep.parameter.name()),
         note: format!(
-            "{}; {} followers disturbed, leaders at rest; {} of the scene {}",
+            "{}; {} followers, the scene's value is {}",
             study.title,
             linear.followers,
-            sweep.parameter.name(),
-            rounded(sweep.present, 4)
+            rounded(sweep.present).trim_end_matches('0').trim_end_matches('.')
         ),
         axes: [
             Axis { quantity: sweep.parameter.name(), unit: "", is_log: false },
@@ -144,16 +143,14 @@ fn panel<'a>(study: &Study, linear: &Linear, sweep: &Sweep) -> Chart<'a> {
 fn landmark(threshold: &Threshold) -> Option<Landmark> {
     let predicted = threshold.predicted.as_ref()?.value;
     let runs = match &threshold.found {
-        Some(found) => format!("by runs {}", rounded(found.value, 6)),
+        Some(found) => format!("by runs {}", rounded(found.value)),
         None => "no run grows".into(),
     };
-    let name = format!("predicted {}\n{runs}", rounded(predicted, 6));
+    let name = format!("predicted {}\n{runs}", rounded(predicted));
     Some(Landmark { x: predicted, name, colour: THRESHOLD })
 }
 
-/// With so many decimals at most.
-fn rounded(value: f64, decimals: usize) -> String {
-    let text = format!("{value:.decimals$}");
-    let short = text.trim_end_matches('0').trim_end_matches('.');
-    short.replace('-', "\u{2212}")
+/// To six decimals, with a minus sign.
+fn rounded(value: f64) -> String {
+    format!("{value:.6}").replace('-', "\u{2212}")
 }
