@@ -12,6 +12,7 @@
 //! * [`solve`]: sweeps over the flock's interaction, their spectra, and the solvers for equilibrium.
 //! * [`material`]: rule weights from Young's modulus and Poisson's ratio, and what material a rule is.
 //! * [`continuum`]: plans a scene, steps it or goes straight to rest, and hands what happens to an observer.
+//! * [`stability`]: when a body grows instead of coming to rest, foretold and found; the extremes.
 //! * `export` (feature `export`): CSV, JSON, VTK and figures, one file per format.
 //! * `fem` (feature `fem`): finite elements, the truth to hold the rules against; it knows no flock.
 //! * `compare` (feature `fem`): rule and truth on the same body, and the numbers that tell them apart.
@@ -34,6 +35,7 @@ pub mod flock;
 pub mod material;
 pub mod scene;
 pub mod solve;
+pub mod stability;
 
 #[cfg(feature = "bench")]
 pub mod bench;

@@ -88,3 +88,8 @@ fn the_comparison_knows_nothing_of_outputs() {
 fn trade_stands_on_compare_and_knows_nothing_of_outputs() {
     assert_imports_only("trade", &["scene", "continuum", "flock", "solve", "compare"]);
 }
+
+#[test]
+fn stability_knows_nothing_of_outputs() {
+    assert_imports_only("stability", &["scene", "continuum", "flock", "material", "solve"]);
+}

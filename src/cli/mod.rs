@@ -4,6 +4,7 @@ mod compare;
 mod material;
 mod progress;
 mod run;
+mod stability;
 mod trade;
 
 use std::io::IsTerminal;
@@ -55,6 +56,12 @@ pub enum Command {
         after_help = "Example:\n  flockform trade grips --out /tmp/trade\n  flockform trade beam-loaded --most-particles 5000"
     )]
     Trade(trade::TradeArguments),
+    /// When a scene's body grows instead of coming to rest, foretold and found, and what holds at the extremes
+    #[command(
+        after_help = "Example:\n  flockform stability tension --out /tmp/stability\n  flockform stability beam --set update.damping=0.7 --no-extremes\n\n\
+                      Exit codes: 0 predictions and runs agree and no extreme is wrong, 1 otherwise, 2 bad input."
+    )]
+    Stability(stability::StabilityArguments),
     /// List the bundled scenes
     #[command(after_help = "Example:\n  flockform scenes")]
     Scenes,
@@ -187,6 +194,7 @@ pub fn dispatch(command: Command) -> Result<ExitCode, Refusal> {
         Command::Run(arguments) => return run::run(&arguments),
         Command::Compare(arguments) => return compare::compare(&arguments),
         Command::Trade(arguments) => return trade::trade(&arguments),
+        Command::Stability(arguments) => return stability::stability(&arguments),
         Command::Scenes => list_scenes()?,
         Command::Plan(arguments) => {
             let scene = arguments.load([])?;

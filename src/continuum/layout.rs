@@ -3,7 +3,7 @@
 use crate::flock::body::{Body, BodyError};
 use crate::flock::motion::Motion;
 use crate::flock::neighbourhood::{Neighbourhood, Neighbours};
-use crate::flock::points::Points;
+use crate::flock::points::{Points, distance};
 use crate::flock::region::{Region, Side};
 use crate::flock::role::Role;
 use crate::flock::rules::Mean;
@@ -41,9 +41,11 @@ impl Layout {
     /// Names the key of the scene that cannot be laid out: an empty or disconnected body, a
     /// neighbourhood that does not fit the lattice.
     pub fn new(scene: &Scene) -> Result<Self, SceneError> {
+        require_in_range(scene)?;
         let (body, neighbours) =
             Body::build(scene.lattice.clone(), &scene.cut, &scene.neighbourhood, scene.frame)
                 .map_err(|error| refuse_body(scene, &error))?;
+        require_resolved(scene, &body)?;
         let layout = match scene.mean {
             Mean::Material { .. } => {
                 // Sites in no cell carry nothing; they stick out of a curved edge.
@@ -217,6 +219,45 @@ pub fn held(changes: &[RoleChange], body: &Body, step: usize) -> Vec<Option<[f64
         }
     }
     held
+}
+
+/// Least spacing over the distance of two doubles at the body's largest coordinate: six digits of a
+/// displacement of one spacing.
+const LEAST_RESOLUTION: f64 = 1e6;
+
+/// Cells \[length\] within which areas, strains and pseudo-energies fit a double.
+const CELLS: std::ops::RangeInclusive<f64> = 1e-152..=1e152;
+
+/// Refuses a lattice whose squares of lengths no double holds.
+fn require_in_range(scene: &Scene) -> Result<(), SceneError> {
+    let sides = [[1, 0], [0, 1]].map(|step| distance(scene.lattice.vector(step), [0.0; 2]));
+    match sides.into_iter().find(|side| !CELLS.contains(side)) {
+        None => Ok(()),
+        Some(side) => {
+            let message = format!("particles {side:e} apart: no double holds the squares of such lengths");
+            let help = "use another unit of length, with distances from 1e-152 to 1e152";
+            Err(scene.refuse("lattice", message, help))
+        }
+    }
+}
+
+/// Refuses a body whose places, or small displacements from them, doubles cannot tell apart.
+fn require_resolved(scene: &Scene, body: &Body) -> Result<(), SceneError> {
+    let spacing = body.lattice.spacing();
+    let Points { x, y } = &*body.reference;
+    let farthest = x.iter().chain(y).fold(0.0, |most: f64, v| most.max(v.abs()));
+    let grain = farthest.next_up() - farthest;
+    // Not a number where the body reaches beyond the doubles.
+    let is_resolved = spacing >= LEAST_RESOLUTION * grain;
+    if !is_resolved {
+        let message = format!(
+            "particles {spacing:e} apart with coordinates up to {farthest:e}: a double has steps of {grain:.1e} there, and \
+             displacements would be rounded to them"
+        );
+        let key = if scene.raw.body.anchor.is_some() { "body.anchor" } else { "body.shape" };
+        return Err(scene.refuse(key, message, "put the origin of the coordinates near the body"));
+    }
+    Ok(())
 }
 
 fn refuse_body(scene: &Scene, error: &BodyError) -> SceneError {

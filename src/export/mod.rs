@@ -12,7 +12,8 @@
 //! | `steps.pvd`, `steps/*.vtu` | frames for ParaView |
 //! | `configuration_*`, `pe1_*`, `probes` | figures, as SVG and as the PNG rendered from it |
 //!
-//! A comparison with the truth (`comparison`, feature `fem`) has a folder of its own.
+//! A comparison with the truth (`comparison`, feature `fem`) has a folder of its own, and so has a study of
+//! what grows (`stability`).
 //!
 //! Frames are written while the run goes on, since a long run cannot keep them ([`VtkSeries`]); the
 //! rest comes at the end, by [`write_all`]:
@@ -51,6 +52,7 @@ pub mod csv;
 mod error;
 pub mod figures;
 mod folder;
+pub mod stability;
 mod summary;
 #[cfg(feature = "fem")]
 pub mod trade;

@@ -68,6 +68,25 @@ impl Lattice {
         Self { kind, origin, grid: [e1, e2], e1: rotate(e1, orientation), e2: rotate(e2, orientation) }
     }
 
+    /// The same lattice `factor` times as large, about the origin of the coordinates.
+    pub fn scaled(&self, factor: f64) -> Self {
+        let by = |v: [f64; 2]| v.map(|v| factor * v);
+        let kind = match self.kind {
+            LatticeKind::Square { spacing } => LatticeKind::Square { spacing: factor * spacing },
+            LatticeKind::Rectangular { a, b } => LatticeKind::Rectangular { a: factor * a, b: factor * b },
+            LatticeKind::CentredRectangular { a, b } => {
+                LatticeKind::CentredRectangular { a: factor * a, b: factor * b }
+            }
+            LatticeKind::Hexagonal { spacing } => LatticeKind::Hexagonal { spacing: factor * spacing },
+            LatticeKind::Oblique { a, b, angle } => {
+                LatticeKind::Oblique { a: factor * a, b: factor * b, angle }
+            }
+            LatticeKind::Honeycomb { spacing } => LatticeKind::Honeycomb { spacing: factor * spacing },
+        };
+        let (origin, grid) = (by(self.origin), self.grid.map(by));
+        Self { kind, origin, grid, e1: by(self.e1), e2: by(self.e2) }
+    }
+
     pub fn kind(&self) -> LatticeKind {
         self.kind
     }
@@ -119,8 +138,10 @@ impl Lattice {
     /// The integer coordinates, as reals, of a point in the plane: the inverse of
     /// [`Lattice::position`].
     pub fn grid_coordinates(&self, [x, y]: [f64; 2]) -> [f64; 2] {
-        let (dx, dy) = (x - self.origin[0], y - self.origin[1]);
-        let ([ax, ay], [bx, by]) = (self.e1, self.e2);
+        // In units of the grid, or areas would leave the range of a double long before lengths do.
+        let unit = norm(self.e1).max(norm(self.e2));
+        let (dx, dy) = ((x - self.origin[0]) / unit, (y - self.origin[1]) / unit);
+        let ([ax, ay], [bx, by]) = (self.e1.map(|v| v / unit), self.e2.map(|v| v / unit));
         let area = ax * by - ay * bx;
         [(dx * by - dy * bx) / area, (dy * ax - dx * ay) / area]
     }
@@ -172,9 +193,11 @@ impl Lattice {
     pub fn offsets_within(&self, sublattice: usize, radius: f64) -> Vec<Site> {
         let reach = radius * (1.0 + 1e-9);
         // A grid vector's height over the other bounds how many steps of it fit in the radius.
-        let area = (self.grid[0][0] * self.grid[1][1] - self.grid[0][1] * self.grid[1][0]).abs();
-        let window = |other: [f64; 2]| (reach * norm(other) / area) as i32 + 1;
-        let (columns, rows) = (window(self.grid[1]), window(self.grid[0]));
+        let [[ax, ay], [bx, by]] = self.grid;
+        let (a, b) = (norm(self.grid[0]), norm(self.grid[1]));
+        let sine = ((ax / a) * (by / b) - (ay / a) * (bx / b)).abs();
+        let window = |own: f64| (reach / own / sine) as i32 + 1;
+        let (columns, rows) = (window(a), window(b));
         let base = self.site_of_sublattice(sublattice);
         let mut offsets: Vec<Site> = (-columns..=columns)
             .flat_map(|i| (-rows..=rows).map(move |j| [i, j]))

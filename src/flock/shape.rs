@@ -102,8 +102,14 @@ fn segment_distance(p: [f64; 2], a: [f64; 2], b: [f64; 2]) -> f64 {
 
 /// Whether the segments `a`-`b` and `c`-`d` cross or touch.
 pub fn segments_cross(a: [f64; 2], b: [f64; 2], c: [f64; 2], d: [f64; 2]) -> bool {
-    let side =
-        |p: [f64; 2], q: [f64; 2], r: [f64; 2]| (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]);
+    let apart = |p: [f64; 2], q: [f64; 2]| [q[0] - p[0], q[1] - p[1]];
+    // In units of the largest distance, and by sign: their products would be fourth powers of lengths.
+    let unit = [b, c, d].iter().flat_map(|&end| apart(a, end)).fold(f64::MIN_POSITIVE, |m, v| m.max(v.abs()));
+    let side = |p: [f64; 2], q: [f64; 2], r: [f64; 2]| {
+        let ([x, y], [u, v]) = (apart(p, q).map(|v| v / unit), apart(p, r).map(|v| v / unit));
+        let twice_area = x * v - y * u;
+        if twice_area == 0.0 { 0.0 } else { twice_area.signum() }
+    };
     let (abc, abd, cda, cdb) = (side(a, b, c), side(a, b, d), side(c, d, a), side(c, d, b));
     if abc == 0.0 && abd == 0.0 {
         // On one line: they meet where their projections overlap.
@@ -137,6 +143,18 @@ mod tests {
         assert!(!shape.contains([2.0, 2.5], 1e-9));
         assert!(shape.contains([2.0, 3.0], 1e-9));
         assert!(shape.contains([0.0, 0.0], 1e-9));
+    }
+
+    #[test]
+    fn segments_cross_in_any_unit() {
+        for unit in [1e-150, 1e-90, 1.0, 1e90, 1e150] {
+            let cross = |ends: [[f64; 2]; 4]| {
+                let [a, b, c, d] = ends.map(|end| end.map(|v| v * unit));
+                segments_cross(a, b, c, d)
+            };
+            assert!(cross([[0.0, 0.0], [2.0, 2.0], [0.0, 2.0], [2.0, 0.0]]), "{unit}");
+            assert!(!cross([[0.0, 0.0], [1.0, 1.0], [3.0, 2.0], [3.5, 0.0]]), "{unit}");
+        }
     }
 
     #[test]

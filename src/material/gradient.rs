@@ -88,20 +88,21 @@ impl GradientWeights {
             return Err(GradientError::NotPositive { length });
         }
         Neighbourhood::Straight.offsets(lattice)?;
+        // In a unit near the spacing, or the fourth powers of lengths in what follows would vanish or
+        // overflow; a power of two, which changes no digit.
+        let unit = lattice.spacing().log2().floor().exp2();
+        let (own, lattice) = (length / unit, &lattice.scaled(1.0 / unit));
         let rows = rows(lattice);
         let widest = rows.iter().fold(0.0, |most, &(_, row)| f64::max(most, row));
-        if rows.iter().any(|&(_, row)| length > LONGEST * row) {
-            return Err(GradientError::TooLong { length, rows: widest });
+        if rows.iter().any(|&(_, row)| own > LONGEST * row) {
+            return Err(GradientError::TooLong { length, rows: widest * unit });
         }
-        let weights = Self::unchecked(&rows, length);
+        let weights = Self { length, ..Self::unchecked(&rows, own) };
         let found = weights.least_of_long_waves(lattice)?;
         let stiffens = found > 0.0;
         if !stiffens {
-            return Err(GradientError::TooShort {
-                length,
-                found,
-                shortest: shortest(lattice, &rows, widest)?,
-            });
+            let shortest = shortest(lattice, &rows, widest)? * unit;
+            return Err(GradientError::TooShort { length, found: found * unit * unit, shortest });
         }
         if !weights.crystal(lattice)?.zone()?.stable {
             return Err(GradientError::Unstable { length });

@@ -1,33 +1,46 @@
-//! The spectral radius of a sweep: how fast a body relaxes, and when feedback makes it grow.
+//! The spectrum of a sweep: how fast a body relaxes, when feedback makes it grow, how far it may be damped.
 //!
 //! For a linear rule the displacements obey d' = A d with the leaders held; A is applied by the sweep
-//! itself to displacements from a reference at zero, so no matrix is built.
+//! itself to displacements from a reference at zero, so no matrix is built. Frame points are part of `d`:
+//! where they lag they are what the sweep remembers of the step before, and A is not symmetric.
 
+use super::arnoldi::{Ritz, Wanted, eigenvalues};
 use super::sweep::{Sweep, Update};
 use crate::flock::frame::Frame;
 use crate::flock::interaction::Interaction;
 use crate::flock::points::Points;
 use crate::flock::role::Role;
-use crate::flock::rules::Mean;
+use crate::flock::rules::{Mean, Rotation};
 
-/// What power iteration found.
+/// The largest modulus of an eigenvalue.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SpectralRadius {
-    /// Largest modulus of an eigenvalue: the factor by which the slowest mode shrinks per step \[1\].
+    /// The factor by which the slowest mode shrinks, or the fastest grows, per step \[1\].
     pub radius: f64,
+    /// Sweeps made to find it.
     pub iterations: usize,
-    /// Whether the estimate had settled to 1e-9 when the iteration stopped.
+    /// Whether it is known to 1e-10 of itself (its residual; an error bound up to how far the sweep is from
+    /// symmetric).
     pub converged: bool,
 }
 
-/// Steps over which growth is averaged: even, since on a lattice whose sites are two-coloured the
-/// spectrum is symmetric and one step swaps the two ends.
-const WINDOW: usize = 64;
+/// The ends of a spectrum on the real axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ends {
+    /// Least and greatest real part of an eigenvalue \[1\].
+    pub lowest: f64,
+    pub highest: f64,
+    /// Whether both are real to rounding; then, of a sweep that is symmetric in some scalar product, all are.
+    pub are_real: bool,
+    pub iterations: usize,
+    pub converged: bool,
+}
 
-/// Spectral radius of the sweep with these roles, by power iteration on the followers and the frame.
+/// Spectral radius of the sweep with these roles over the followers and the frame, in at most so many
+/// sweeps.
 ///
-/// `None` where the sweep is not linear (weights that depend on distance, power means) or where
-/// nobody follows.
+/// `None` where the sweep is not linear (weights that depend on distance, power means, corotation) or
+/// where nobody follows.
 pub fn spectral_radius(
     interaction: &Interaction,
     frame: Option<&Frame>,
@@ -35,40 +48,93 @@ pub fn spectral_radius(
     update: Update,
     most_iterations: usize,
 ) -> Option<SpectralRadius> {
-    if interaction.rule.mean != Mean::Barycentre || !roles.contains(&Role::Follower) {
-        return None;
-    }
-    let count = roles.len();
-    let linear = Interaction { reference: Points::zeros(count).into(), rest: None, ..interaction.clone() };
-    let sweep = Sweep::compile(update, &linear, roles);
-    // Any start with a share in every mode will do; this one has no symmetry to hide a mode behind.
-    let moves = |role: Role| matches!(role, Role::Follower | Role::Frame);
-    let start = |j: usize| if moves(roles[j]) { 1.0 + (j as f64 * 0.7391).sin() } else { 0.0 };
-    let mut present: Points = (0..count).map(|j| [start(j), start(j)]).collect();
-    let mut next = present.clone();
-    let mut estimate = f64::NAN;
-    for window in 1..=most_iterations.div_ceil(WINDOW) {
-        let before = norm(&present);
-        for _ in 0..WINDOW {
-            next.clone_from(&present);
-            sweep.step(&linear, frame, &present, &mut next);
-            std::mem::swap(&mut present, &mut next);
-        }
-        let after = norm(&present);
-        if after == 0.0 || before == 0.0 {
-            return Some(SpectralRadius { radius: 0.0, iterations: window * WINDOW, converged: true });
-        }
-        let radius = ((after / before).ln() / WINDOW as f64).exp();
-        let settled = (radius - estimate).abs() <= 1e-9 * radius;
-        if settled || window * WINDOW >= most_iterations {
-            return Some(SpectralRadius { radius, iterations: window * WINDOW, converged: settled });
-        }
-        estimate = radius;
-        present.x.iter_mut().chain(&mut present.y).for_each(|v| *v /= after);
-    }
-    None
+    let linear = LinearSweep::new(interaction, frame, roles, update)?;
+    let found = linear.eigenvalues(Wanted::Modulus, most_iterations);
+    let radius = found.0[0].value.norm();
+    Some(SpectralRadius { radius, iterations: found.1, converged: found.2 })
 }
 
-fn norm(points: &Points) -> f64 {
-    points.x.iter().chain(&points.y).map(|v| v * v).sum::<f64>().sqrt()
+/// Ends of the sweep's spectrum; `None` as for [`spectral_radius`].
+pub fn spectral_ends(
+    interaction: &Interaction,
+    frame: Option<&Frame>,
+    roles: &[Role],
+    update: Update,
+    most_iterations: usize,
+) -> Option<Ends> {
+    let linear = LinearSweep::new(interaction, frame, roles, update)?;
+    let (found, iterations, converged) = linear.eigenvalues(Wanted::Ends, most_iterations);
+    // One of them only where nothing could be found at all.
+    let (low, high) = (found[0].value, found[found.len() - 1].value);
+    let are_real = [low, high].iter().all(|v| v.im.abs() <= 1e-9 * low.norm().max(high.norm()));
+    Some(Ends { lowest: low.re, highest: high.re, are_real, iterations, converged })
+}
+
+/// The sweep on displacements.
+struct LinearSweep<'a> {
+    interaction: Interaction,
+    frame: Option<&'a Frame>,
+    roles: &'a [Role],
+    sweep: Sweep,
+}
+
+impl<'a> LinearSweep<'a> {
+    fn new(
+        interaction: &Interaction,
+        frame: Option<&'a Frame>,
+        roles: &'a [Role],
+        update: Update,
+    ) -> Option<Self> {
+        let linear =
+            matches!(interaction.rule.mean, Mean::Barycentre | Mean::Material { rotation: Rotation::Small });
+        if !linear || !roles.contains(&Role::Follower) {
+            return None;
+        }
+        // Without what only shifts the place of rest: loads, rest offsets, the reference itself. The Poisson
+        // term measures how far from the axis a particle is in the reference, so it needs that one.
+        let poisson = interaction.rule.poisson.is_some();
+        let reference =
+            if poisson { interaction.reference.clone() } else { Points::zeros(roles.len()).into() };
+        let rest = if poisson { interaction.rest.clone() } else { None };
+        let interaction = Interaction { reference, rest, forces: None, ..interaction.clone() };
+        let sweep = Sweep::compile(update, &interaction, roles);
+        Some(Self { interaction, frame, roles, sweep })
+    }
+
+    fn eigenvalues(&self, wanted: Wanted, most: usize) -> (Vec<Ritz>, usize, bool) {
+        let count = self.roles.len();
+        // Of the body's own size where the reference is there, so that it does not swallow them.
+        let unit = self.interaction.rule.poisson.map_or(1.0, |poisson| poisson.half_width);
+        let base = &self.interaction.reference;
+        let mut present = Points::clone(base);
+        let mut next = Points::zeros(count);
+        let mut apply = |from: &[f64], to: &mut [f64]| {
+            for i in 0..count {
+                present.set(i, [base.x[i] + unit * from[2 * i], base.y[i] + unit * from[2 * i + 1]]);
+            }
+            next.clone_from(&present);
+            self.sweep.step(&self.interaction, self.frame, &present, &mut next);
+            for i in 0..count {
+                to[2 * i] = (next.x[i] - base.x[i]) / unit;
+                to[2 * i + 1] = (next.y[i] - base.y[i]) / unit;
+            }
+        };
+        let found = eigenvalues(&mut apply, self.start(), wanted, most);
+        (found.eigenvalues, found.applications, found.converged)
+    }
+
+    /// A start with a share in every mode: of no symmetry that could hide one.
+    fn start(&self) -> Vec<f64> {
+        let moves = |role: Role| matches!(role, Role::Follower | Role::Frame);
+        let share = |k: usize| if moves(self.roles[k / 2]) { scatter(k as u64) } else { 0.0 };
+        (0..2 * self.roles.len()).map(share).collect()
+    }
+}
+
+/// A number between -1 and 1 for each index, the same on every machine (splitmix64).
+pub fn scatter(index: u64) -> f64 {
+    let mut z = index.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 52) as f64 - 1.0
 }

@@ -29,6 +29,8 @@ pub enum Style {
     Rings,
     /// Large rings on a line: those that matter among many.
     Front,
+    /// Large, ringed dots alone.
+    Beads,
 }
 
 /// A set of points, in the legend if it has a name; those that an axis cannot show (zero on a logarithmic one) are left out.
@@ -44,6 +46,7 @@ pub struct Series {
 #[derive(Clone, Debug)]
 pub struct Landmark {
     pub x: f64,
+    /// Of one line or several.
     pub name: String,
     pub colour: &'static str,
 }
@@ -59,9 +62,30 @@ pub struct Chart<'a> {
 
 /// Draws a chart.
 pub fn draw(chart: &Chart<'_>) -> String {
+    let mut svg = Svg::new(page::WIDTH, height(chart));
+    draw_on(&mut svg, chart);
+    svg.finish()
+}
+
+/// Draws several charts on one sheet, in this order from the top.
+pub fn draw_below_each_other(charts: &[Chart<'_>]) -> String {
+    let mut svg = Svg::new(page::WIDTH, charts.iter().map(height).sum());
+    let mut top = 0.0;
+    for chart in charts {
+        svg.group(format_args!("transform=\"translate(0 {top:.2})\""), |svg| draw_on(svg, chart));
+        top += height(chart);
+    }
+    svg.finish()
+}
+
+fn height(chart: &Chart<'_>) -> f64 {
+    heading(chart).height(page::WIDTH) + 4.0 + HEIGHT + Axes::BELOW
+}
+
+fn heading(chart: &Chart<'_>) -> Heading {
     let mark = |style: Style| match style {
         Style::Line => Mark::Line,
-        Style::Dots => Mark::Dot,
+        Style::Dots | Style::Beads => Mark::Dot,
         Style::Rings | Style::Front => Mark::Ring,
     };
     let key = |series: &Series| Key {
@@ -70,24 +94,26 @@ pub fn draw(chart: &Chart<'_>) -> String {
         mark: mark(series.style),
     };
     let legend = chart.series.iter().filter(|series| !series.name.is_empty()).map(key).collect();
-    let heading = Heading { title: chart.title.clone(), note: chart.note.clone(), legend };
+    Heading { title: chart.title.clone(), note: chart.note.clone(), legend }
+}
+
+fn draw_on(svg: &mut Svg, chart: &Chart<'_>) {
+    let heading = heading(chart);
     let top = heading.height(page::WIDTH) + 4.0;
     let mut axes = window(chart);
     let left = room_on_the_left(chart, &axes);
     axes.corner = [left, top];
     axes.size = [page::WIDTH - left - RIGHT, HEIGHT];
-    let mut svg = Svg::new(page::WIDTH, top + HEIGHT + Axes::BELOW);
-    heading.draw(&mut svg, page::WIDTH);
-    draw_horizontal(&mut svg, chart.axes[0], &axes);
-    draw_vertical(&mut svg, chart.axes[1], &axes, left);
+    heading.draw(svg, page::WIDTH);
+    draw_horizontal(svg, chart.axes[0], &axes);
+    draw_vertical(svg, chart.axes[1], &axes, left);
     for landmark in &chart.landmarks {
-        draw_landmark(&mut svg, chart, &axes, landmark);
+        draw_landmark(svg, chart, &axes, landmark);
     }
     for series in &chart.series {
-        draw_series(&mut svg, chart, &axes, series);
+        draw_series(svg, chart, &axes, series);
     }
     svg.rect(axes.corner, axes.size, format_args!("fill=\"none\" stroke=\"{INK}\""));
-    svg.finish()
 }
 
 /// A value as the axes count it; `None` where they cannot show it.
@@ -196,7 +222,10 @@ fn draw_landmark(svg: &mut Svg, chart: &Chart<'_>, axes: &Axes, landmark: &Landm
     svg.group(stroke, |svg| svg.line(at, [at[0], axes.corner[1] + axes.size[1]]));
     let right = at[0] > axes.corner[0] + 0.6 * axes.size[0];
     let (anchor, beside) = if right { (Anchor::End, -5.0) } else { (Anchor::Start, 5.0) };
-    svg.text([at[0] + beside, at[1] + 12.0], anchor, TEXT, landmark.colour, &landmark.name);
+    for (row, line) in landmark.name.lines().enumerate() {
+        let below = 14.0 + 15.0 * row as f64;
+        svg.text([at[0] + beside, at[1] + below], anchor, TEXT, landmark.colour, line);
+    }
 }
 
 fn draw_series(svg: &mut Svg, chart: &Chart<'_>, axes: &Axes, series: &Series) {
@@ -215,6 +244,7 @@ fn draw_series(svg: &mut Svg, chart: &Chart<'_>, axes: &Axes, series: &Series) {
         Style::Dots => (3.0, format!("fill=\"{}\" fill-opacity=\"0.75\"", series.colour)),
         Style::Rings => (2.8, format!("fill=\"none\" stroke=\"{}\" stroke-width=\"1.2\"", series.colour)),
         Style::Front => (5.5, format!("fill=\"none\" stroke=\"{}\" stroke-width=\"1.2\"", series.colour)),
+        Style::Beads => (4.5, format!("fill=\"{}\" stroke=\"{INK}\" stroke-width=\"1.1\"", series.colour)),
     };
     svg.group(attributes, |svg| places.iter().for_each(|&place| svg.circle(place, radius)));
 }

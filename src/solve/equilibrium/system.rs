@@ -88,7 +88,7 @@ pub(super) struct Prepared {
     pub size: f64,
     /// The powers of two that a displacement has to be multiplied by, one after the other.
     pub scales: [f64; 2],
-    /// Vectors from a site to that of the next column and of the next row \[length\].
+    /// Vectors from a site to that of the next column and of the next row, the longer about 1 \[1\].
     pub grid: [[f64; 2]; 2],
     /// Whether any two neighbours feel each other alike.
     pub symmetric: bool,
@@ -122,7 +122,9 @@ impl Prepared {
         let size = dot(right.view(), right.view()).sqrt();
         let symmetric = system.asymmetric_pair().is_none();
         let scales = [1.0 / stiffness, force];
-        Ok(Self { matrix, stencils, right, size, scales, grid: operator.grid, symmetric })
+        let length = power_of_two(operator.grid.as_flattened().iter().copied());
+        let grid = operator.grid.map(|vector| vector.map(|v| v / length));
+        Ok(Self { matrix, stencils, right, size, scales, grid, symmetric })
     }
 
     /// `|f - K u| / |f|` of these displacements, which is not what an iteration that never looks back takes

@@ -1,0 +1,156 @@
+//! A stability study's outputs: `stability.json`, everything; `growth.csv`, every spectrum and every run; the
+//! figure `growth`, growth per step against each parameter with the thresholds.
+
+use std::path::PathBuf;
+
+use serde::Serialize;
+
+use super::csv::write;
+use super::error::{ExportError, write_file};
+use super::figures::chart::{Axis, Chart, Landmark, Series, Style, draw_below_each_other};
+use super::figures::{self, SERIES};
+use super::{OutputFolder, summary};
+use crate::stability::bisection::Growth;
+use crate::stability::study::{Linear, Study, Sweep, Threshold};
+
+#[derive(Serialize)]
+struct Report<'a> {
+    program: &'static str,
+    version: &'static str,
+    /// Whether predictions and runs agree and no extreme is wrong.
+    holds: bool,
+    #[serde(flatten)]
+    study: &'a Study,
+}
+
+#[derive(Serialize)]
+struct Row {
+    parameter: &'static str,
+    value: f64,
+    /// `spectrum`, `run` or `bisection`.
+    source: &'static str,
+    growth_per_step: f64,
+    steps: Option<usize>,
+    settled: Option<bool>,
+}
+
+/// Writes everything; without thresholds there is no growth to write.
+///
+/// # Errors
+/// The first file that cannot be written.
+pub fn write_stability(folder: &OutputFolder, study: &Study) -> Result<Vec<PathBuf>, ExportError> {
+    let mut written = Vec::new();
+    if let Some(linear) = &study.linear {
+        written.push(write(folder, "growth.csv", rows(linear).into_iter())?);
+        written.extend(figures::write(&figure(study, linear), &folder.path("growth"))?);
+    }
+    let path = folder.path(summary::STABILITY);
+    let text = json(study).map_err(ExportError::io("write", &path))?;
+    write_file(&path, text)?;
+    written.push(path);
+    Ok(written)
+}
+
+/// What `stability.json` says.
+///
+/// # Errors
+/// None that a study could cause.
+pub fn json(study: &Study) -> serde_json::Result<String> {
+    let (program, version) = (summary::PROGRAM, env!("CARGO_PKG_VERSION"));
+    let report = Report { program, version, holds: study.holds(), study };
+    Ok(serde_json::to_string_pretty(&report)? + "\n")
+}
+
+fn rows(linear: &Linear) -> Vec<Row> {
+    let run = |parameter: &'static str, source: &'static str, run: &Growth| Row {
+        parameter,
+        value: run.value,
+        source,
+        growth_per_step: run.per_step,
+        steps: Some(run.steps),
+        settled: Some(run.settled),
+    };
+    let mut rows = Vec::new();
+    for sweep in &linear.sweeps {
+        let name = sweep.parameter.name();
+        rows.extend(sweep.spectrum.iter().map(|point| Row {
+            parameter: name,
+            value: point.value,
+            source: "spectrum",
+            growth_per_step: point.radius,
+            steps: None,
+            settled: None,
+        }));
+        rows.extend(sweep.runs.iter().map(|one| run(name, "run", one)));
+    }
+    for threshold in &linear.thresholds {
+        let runs = threshold.found.iter().flat_map(|found| &found.runs);
+        rows.extend(runs.map(|one| run(threshold.parameter.name(), "bisection", one)));
+    }
+    rows
+}
+
+const THRESHOLD: &str = "#a33b2a";
+
+/// A panel for each parameter.
+pub fn figure(study: &Study, linear: &Linear) -> String {
+    let panels: Vec<Chart> = linear.sweeps.iter().map(|sweep| panel(study, linear, sweep)).collect();
+    draw_below_each_other(&panels)
+}
+
+fn panel<'a>(study: &Study, linear: &Linear, sweep: &Sweep) -> Chart<'a> {
+    let ends = [sweep.spectrum.first(), sweep.spectrum.last()].map(|end| end.map_or(0.0, |end| end.value));
+    let thresholds = || linear.thresholds.iter().filter(|t| t.parameter == sweep.parameter);
+    let line = |name: &str, colour, style, points| Series { name: name.into(), colour, style, points };
+    let series = vec![
+        line("no growth", "#8a8f98", Style::Line, ends.map(|value| [value, 1.0]).to_vec()),
+        line(
+            "predicted (spectral radius)",
+            SERIES[0],
+            Style::Line,
+            sweep.spectrum.iter().map(|point| [point.value, point.radius]).collect(),
+        ),
+        line(
+            "runs",
+            SERIES[1],
+            Style::Dots,
+            sweep.runs.iter().map(|run| [run.value, run.per_step]).collect(),
+        ),
+        line(
+            "threshold found by runs",
+            THRESHOLD,
+            Style::Beads,
+            thresholds().filter_map(|t| Some([t.found.as_ref()?.value, 1.0])).collect(),
+        ),
+    ];
+    Chart {
+        title: format!("Growth against the {}", sweep.parameter.name()),
+        note: format!(
+            "{}; {} followers, the scene's value is {}",
+            study.title,
+            linear.followers,
+            rounded(sweep.present).trim_end_matches('0').trim_end_matches('.')
+        ),
+        axes: [
+            Axis { quantity: sweep.parameter.name(), unit: "", is_log: false },
+            Axis { quantity: "growth per step", unit: "", is_log: false },
+        ],
+        series,
+        landmarks: thresholds().filter_map(landmark).collect(),
+    }
+}
+
+fn landmark(threshold: &Threshold) -> Option<Landmark> {
+    let predicted = threshold.predicted.as_ref()?.value;
+    let runs = match &threshold.found {
+        Some(found) => format!("by runs {}", rounded(found.value)),
+        None => "no run grows".into(),
+    };
+    let name = format!("predicted {}\n{runs}", rounded(predicted));
+    Some(Landmark { x: predicted, name, colour: THRESHOLD })
+}
+
+/// To six decimals, with a minus sign.
+fn rounded(value: f64) -> String {
+    format!("{value:.6}").replace('-', "\u{2212}")
+}

@@ -1,0 +1,174 @@
+//! Thresholds found by running the body: it is disturbed, released, and either grows or comes back.
+
+use serde::Serialize;
+
+use super::subject::{Parameter, Subject};
+use crate::flock::points::Points;
+use crate::flock::role::Role;
+use crate::solve::spectrum::scatter;
+
+/// How far runs go.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Effort {
+    /// Most steps of one run.
+    pub most_steps: usize,
+    /// Most steps times particles of one run: large bodies get fewer steps.
+    pub most_moves: usize,
+    /// Runs and spectra over the whole range of each parameter, for the figure.
+    pub samples: usize,
+}
+
+impl Default for Effort {
+    fn default() -> Self {
+        Self { most_steps: 40_000, most_moves: 20_000_000, samples: 25 }
+    }
+}
+
+impl Effort {
+    /// Enough to see that the study works.
+    pub fn quick() -> Self {
+        Self { most_steps: 10_000, most_moves: 3_000_000, samples: 9 }
+    }
+
+    /// Most steps of one run of so many particles.
+    pub fn steps(&self, particles: usize) -> usize {
+        self.most_steps.min(self.most_moves / particles.max(1)).max(8 * LOOK)
+    }
+}
+
+/// What a disturbance did.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Growth {
+    /// Value of the parameter.
+    pub value: f64,
+    /// Factor by which the followers' displacements grew per step over the last part of the run \[1\].
+    pub per_step: f64,
+    pub steps: usize,
+    /// Whether the factor had come to rest: one mode was left.
+    pub settled: bool,
+}
+
+impl Growth {
+    pub fn grows(&self) -> bool {
+        self.per_step > 1.0
+    }
+}
+
+/// Where growth begins.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Found {
+    /// Middle of the last bracket.
+    pub value: f64,
+    /// Half of the last bracket.
+    pub within: f64,
+    /// Whether the runs at both ends of the last bracket had settled; where they had not, the body is too
+    /// slow for so few steps.
+    pub settled: bool,
+    /// Every run on the way.
+    pub runs: Vec<Growth>,
+}
+
+/// Displacements that have grown or shrunk by this are not followed further: the rest would be infinite, or
+/// rounding of the positions.
+const FAR: f64 = 1e9;
+
+/// Steps between two looks at whether the factor has come to rest: even, since a lattice whose sites are
+/// two-coloured may swap them at every step.
+const LOOK: usize = 64;
+
+/// Disturbs the body with this value of the parameter, lets go and watches.
+pub fn growth(subject: &Subject, parameter: Parameter, value: f64, most_steps: usize) -> Growth {
+    let subject = subject.with(parameter, value);
+    let mut engine = subject.engine();
+    let follows = |i: usize| engine.roles()[i] == Role::Follower;
+    let spacing = subject.spacing();
+    let push = |k: usize| if follows(k / 2) { 0.25 * spacing * scatter(k as u64) } else { 0.0 };
+    let disturbed: Points = (0..subject.particles()).map(|i| [push(2 * i), push(2 * i + 1)]).collect();
+    engine.settle(0, &disturbed);
+    let mut sizes = vec![size(engine.present(), &engine.body().reference, spacing)];
+    let mut settled = false;
+    while sizes.len() <= most_steps && !settled {
+        engine.advance();
+        let now = size(engine.present(), &engine.body().reference, spacing);
+        sizes.push(now);
+        let gone = !(now < FAR * sizes[0] && now > sizes[0] / FAR);
+        // A mode that grows may begin small: what shrinks must have shrunk, or have had the time.
+        let told = now < 1e-3 * sizes[0] || now > 1e3 * sizes[0] || 4 * sizes.len() > most_steps;
+        settled = gone || told && sizes.len() % LOOK == 1 && is_settled(&sizes);
+    }
+    let steps = sizes.len() - 1;
+    Growth { value, per_step: factor(&sizes, steps, part(steps)), steps, settled }
+}
+
+/// Root of the mean square displacement over the spacing.
+fn size(present: &Points, reference: &Points, spacing: f64) -> f64 {
+    let apart = |(p, r): ([f64; 2], [f64; 2])| {
+        let [x, y] = [(p[0] - r[0]) / spacing, (p[1] - r[1]) / spacing];
+        x * x + y * y
+    };
+    (present.iter().zip(reference.iter()).map(apart).sum::<f64>() / present.len() as f64).sqrt()
+}
+
+/// The last part of a run, an even number of steps where there are two.
+fn part(steps: usize) -> usize {
+    (steps / 4).next_multiple_of(2).min(steps).max(1)
+}
+
+/// Mean factor per step over the `steps` before the one numbered `end`.
+fn factor(sizes: &[f64], end: usize, steps: usize) -> f64 {
+    let (before, after) = (sizes[end - steps], sizes[end]);
+    if before == 0.0 || after == 0.0 {
+        return 0.0;
+    }
+    ((after.ln() - before.ln()) / steps as f64).exp()
+}
+
+/// Whether the factor of the last part of the run is that of the part before it, as far from 1 as it is.
+fn is_settled(sizes: &[f64]) -> bool {
+    let end = sizes.len() - 1;
+    if end < 4 * LOOK {
+        return false;
+    }
+    let part = part(end);
+    let [last, before] = [factor(sizes, end, part), factor(sizes, end - part, part)];
+    (last - before).abs() <= 0.02 * (last - 1.0).abs()
+}
+
+/// Where between a value at which the body comes back and one beyond it growth begins, to `within`.
+/// `toward` is the direction to look in and the first stride; `None` where nothing grows for thousands of
+/// strides.
+pub fn find(
+    subject: &Subject,
+    parameter: Parameter,
+    (inside, toward): (f64, f64),
+    within: f64,
+    most_steps: usize,
+) -> Option<Found> {
+    let mut runs = Vec::new();
+    let mut grows = |value: f64| {
+        let run = growth(subject, parameter, value, most_steps);
+        runs.push(run);
+        run.grows()
+    };
+    let (mut low, mut stride) = (inside, toward);
+    if grows(low) {
+        return None;
+    }
+    let mut high = low + stride;
+    while !grows(high) {
+        (low, stride) = (high, 2.0 * stride);
+        high = low + stride;
+        if stride.abs() > 4096.0 * toward.abs() {
+            return None;
+        }
+    }
+    while (high - low).abs() > 2.0 * within {
+        let middle = 0.5 * (low + high);
+        if middle == low || middle == high {
+            break;
+        }
+        *if grows(middle) { &mut high } else { &mut low } = middle;
+    }
+    let settled = [low, high].iter().all(|end| runs.iter().any(|run| run.value == *end && run.settled));
+    Some(Found { value: 0.5 * (low + high), within: 0.5 * (high - low).abs(), settled, runs })
+}

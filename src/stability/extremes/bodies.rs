@@ -1,0 +1,104 @@
+//! Bodies and leaders that are hardly there: coincident leaders, one follower, nobody to lead, far away.
+
+use super::{AT_REST, Case, End, MATERIAL, Outcome, SHEET, patch, small, worst};
+use crate::flock::points::distance;
+use crate::flock::rules::Mean;
+use crate::scene::{Scene, SceneError};
+use crate::stability::scaling;
+use crate::stability::subject::Subject;
+
+const OWN: &str = "a small body of its own";
+const OF_THE_RULE: &str = "a small body of its own with the scene's mean";
+
+/// All of the outline in one point.
+const TO_A_POINT: &str = "roles=[{region={kind=\"boundary\"},role=\"leader\",motion={kind=\"affine\",about=[3.0,2.0],\
+                          stretch=[0.0,0.0],steps=1}}]";
+const ONE_FOLLOWER: &str = r#"body={shape={kind="grid",columns=3,rows=3}}"#;
+const NOBODY_LEADS: &str = "roles=[]";
+const IN_TWO: &str = r#"body={shape={kind="rectangle",max=[8.0,3.0]},holes=[{kind="rectangle",min=[3.5,-1.0],max=[4.5,4.0]}]}"#;
+const ALONE: &str = r#"body={shape={kind="grid",columns=1,rows=1}}"#;
+
+pub fn cases(scene: &Scene) -> Vec<Case> {
+    let mut all = vec![
+        Case::new("coincident leaders", OF_THE_RULE, coincident(scene)),
+        Case::new("coincident leaders, material", OWN, collapsed(&[SHEET, MATERIAL, AT_REST, TO_A_POINT])),
+        Case::new("a body of one follower", OWN, patch(&[ONE_FOLLOWER, "stop.steps=2"], 1e-14)),
+        Case::new(
+            "a body of one follower, material",
+            OWN,
+            patch(&[ONE_FOLLOWER, SHEET, MATERIAL, AT_REST], 1e-14),
+        ),
+        Case::new("one particle and no leader, stepped", OWN, stays(&[ALONE, NOBODY_LEADS])),
+        Case::new("nobody leads, stepped", OWN, stays(&[NOBODY_LEADS])),
+        Case::new("nobody leads, solved", OWN, stays(&[NOBODY_LEADS, AT_REST])),
+        Case::new("nobody leads, material, solved", OWN, stays(&[NOBODY_LEADS, SHEET, MATERIAL, AT_REST])),
+        Case::new("nobody leads, thresholds", OWN, thresholds(&[NOBODY_LEADS])),
+        Case::new("followers in a part of their own without leaders", OWN, stays(&[IN_TWO])),
+    ];
+    for exponent in [9, 12, 15, 17, 300] {
+        let anchor = format!("body.anchor=[1e{exponent},-1e{exponent}]");
+        let about = format!(
+            "roles=[{{region={{kind=\"boundary\"}},role=\"leader\",motion={{kind=\"affine\",about=[1e{exponent},-1e{exponent}],\
+             stretch=[1.01,0.995],shear=[0.004,0.002],steps=1}}}}]"
+        );
+        for (rule, more) in [("", &[][..]), (", material", &[SHEET, MATERIAL, AT_REST])] {
+            let overrides = [&[&anchor[..], &about[..], "stop.steps=400"], more].concat();
+            let name = format!("1e{exponent} spacings from the origin{rule}");
+            all.push(Case::new(name, OWN, patch(&overrides, 1e-6)));
+        }
+    }
+    all
+}
+
+/// The scene's mean, without terms, on a small body whose outline is drawn into one point.
+fn coincident(scene: &Scene) -> Result<Outcome, SceneError> {
+    // What keeps a particle off the mean of its neighbours would keep it off the point.
+    let rest = if matches!(scene.mean, Mean::Material { .. }) { "kept" } else { "literal" };
+    let rule = &scene.raw.rule;
+    let mean = serde_json::json!({ "mean": rule.mean, "weights": rule.weights, "rest": rest });
+    let mut overrides = vec![TO_A_POINT.to_owned(), format!("rule={}", scaling::toml(&mean))];
+    overrides
+        .extend(["lattice", "neighbours", "material"].iter().filter_map(|key| scaling::table(scene, key)));
+    // Weights that grow with distance are marginal in a synchronous update.
+    overrides.push("update.order=\"sequential\"".into());
+    let overrides: Vec<&str> = overrides.iter().map(String::as_str).collect();
+    if let Mean::Spaced { .. } = scene.mean {
+        return near(&overrides);
+    }
+    collapsed(&[&overrides[..], &["stop={steps=20000,tolerance=1e-14}"]].concat())
+}
+
+/// Everybody ends in the point.
+fn collapsed(overrides: &[&str]) -> Result<Outcome, SceneError> {
+    let scene = small(overrides)?;
+    let end = End::of(&scene)?;
+    let apart = |p: [f64; 2]| distance(p, [3.0, 2.0]) / end.spacing;
+    let error = worst(end.present.iter().map(apart));
+    Ok(Outcome::judged(error, 1e-9, "everybody ends where the leaders are"))
+}
+
+/// A mean that keeps its distance has no such place; it stays within reach.
+fn near(overrides: &[&str]) -> Result<Outcome, SceneError> {
+    let end = End::of(&small(&[overrides, &["stop.steps=200"]].concat())?)?;
+    let reach = 100.0 * end.spacing;
+    let error = worst(end.present.iter().map(|p| distance(p, [3.0, 2.0]) / reach));
+    Ok(Outcome::judged(error, 1.0, "everybody is somewhere within a hundred spacings"))
+}
+
+/// Without leaders nobody moves.
+fn stays(overrides: &[&str]) -> Result<Outcome, SceneError> {
+    let end = End::of(&small(&[overrides, &["stop.steps=100"]].concat())?)?;
+    let error = worst((0..end.reference.len()).map(|i| distance(end.moved(i, end.spacing), [0.0; 2])));
+    Ok(Outcome::judged(error, 1e-12, "a body at rest that nobody leads stays"))
+}
+
+fn thresholds(overrides: &[&str]) -> Result<Outcome, SceneError> {
+    let subject = Subject::of(&small(overrides)?)?;
+    let error = (subject.radius().radius - 1.0).abs();
+    // A spectrum with the eigenvalue 1 has no threshold: an answer would be wrong.
+    Ok(Outcome::Wrong {
+        error: Some(error),
+        within: 0.0,
+        check: "a body that nobody holds has no threshold".into(),
+    })
+}

@@ -1,0 +1,189 @@
+//! Materials at the end of their range, and cells and bodies out of all proportion.
+
+use super::{AT_REST, Case, End, MATERIAL, Outcome, SHEET, patch, plan, small, worst};
+use crate::flock::body::{Body, Cut};
+use crate::flock::interaction::{Interaction, Weights};
+use crate::flock::lattice::{Lattice, LatticeKind};
+use crate::flock::points::{Points, distance};
+use crate::flock::rules::{Mean, Rotation, Rule};
+use crate::material::cells::{Cells, neighbourhood};
+use crate::material::elastic::{Constants, Elastic, Plane};
+use crate::material::loads::{Loads, Traction};
+use crate::material::weights::MaterialWeights;
+use crate::scene::{Scene, SceneError};
+use crate::solve::equilibrium::{Choice, Request, Solver, solve};
+use crate::solve::linear::{Scaled, scaled_system};
+use crate::stability::scaling;
+use crate::stability::subject::Subject;
+
+const OWN: &str = "a small body of its own";
+const OF_THE_LATTICE: &str = "a small body of its own on the scene's lattice";
+
+pub fn cases(scene: &Scene) -> Vec<Case> {
+    let mut all = Vec::new();
+    let lattice = scaling::table(scene, "lattice").filter(|_| scene.material.is_some());
+    let body = if lattice.is_some() { OF_THE_LATTICE } else { OWN };
+    let lattice = lattice.unwrap_or_else(|| r#"lattice={kind="square",spacing=1.0}"#.into());
+    for (plane, ratios) in [("stress", &[-0.99, 0.499, 0.99][..]), ("strain", &[-0.99, 0.499])] {
+        for poisson in ratios {
+            let sheet =
+                format!(r#"material={{kind="isotropic",young=1000.0,poisson={poisson:?},plane="{plane}"}}"#);
+            let made: [&str; 3] = [&lattice, &sheet, MATERIAL];
+            let name = format!("nu = {poisson}, plane {plane}");
+            let solved = [&made[..], &[AT_REST]].concat();
+            all.push(Case::new(format!("{name}: strain"), body, patch(&solved, 1e-8)));
+            all.push(Case::new(format!("{name}: stress"), body, stress(&made)));
+            all.push(Case::new(format!("{name}: damping by itself"), body, damped(&made)));
+        }
+    }
+    for (plane, poisson) in [("stress", -1.0), ("stress", 1.0), ("strain", 0.5), ("strain", -1.0)] {
+        let sheet =
+            format!(r#"material={{kind="isotropic",young=1000.0,poisson={poisson:?},plane="{plane}"}}"#);
+        let outcome = patch(&[&sheet, MATERIAL, AT_REST], 0.0);
+        all.push(Case::new(format!("nu = {poisson}, plane {plane}"), OWN, outcome));
+    }
+    for solver in Solver::ALL {
+        all.push(Case::new(format!("stiffness contrast 1e12, {solver}"), OWN, Ok(contrast(solver, 1e12))));
+    }
+    for (a, b) in [("1000.0", "1.0"), ("1.0", "1000.0")] {
+        let lattice = format!(r#"lattice={{kind="rectangular",a={a},b={b}}}"#);
+        let name = format!("cells of {a} by {b}");
+        all.push(Case::new(name.clone(), OWN, patch(&[&lattice, "stop.steps=2000"], 1e-9)));
+        all.push(Case::new(
+            format!("{name}, material"),
+            OWN,
+            patch(&[&lattice, SHEET, MATERIAL, AT_REST], 1e-6),
+        ));
+    }
+    all.push(Case::new("a strip of aspect ratio 1000, pulled", OWN, pulled()));
+    for solver in ["auto", "multigrid", "conjugate-gradients"] {
+        all.push(Case::new(format!("a strip of aspect ratio 1000, bent, {solver}"), OWN, bent(solver)));
+    }
+    all
+}
+
+/// The forces that a uniform strain takes are those of the material's stress on the outline.
+fn stress(overrides: &[&str]) -> Result<Outcome, SceneError> {
+    let scene = small(overrides)?;
+    let plan = plan(&scene)?;
+    let (Some(cells), Some(elastic)) = (&plan.cells, &scene.material) else {
+        return Err(scene.refuse("material", "the body has none", ""));
+    };
+    let neighbours = plan.interaction.neighbours.clone();
+    let weights = MaterialWeights::assemble(cells, &plan.body, neighbours, elastic)
+        .map_err(|error| scene.refuse("material", error.to_string(), ""))?;
+    let reference = &plan.body.reference;
+    let strain = [3e-3, -1e-3, 2e-3];
+    let displaced: Points =
+        reference.iter().map(|[x, y]| [strain[0] * x + strain[2] * y, strain[1] * y]).collect();
+    let [xx, yy, xy] = elastic.stress(strain).map(|stress| stress * elastic.thickness());
+    let outline = cells.boundary_sides(&cells.incidence(reference.len()));
+    let traction = |side: [u32; 2]| {
+        let [[ax, ay], [bx, by]] = side.map(|i| reference.get(i as usize));
+        let length = (bx - ax).hypot(by - ay);
+        // The body lies to the left.
+        let [nx, ny] = [(by - ay) / length, (ax - bx) / length];
+        Traction::uniform(side, [xx * nx + xy * ny, xy * nx + yy * ny])
+    };
+    let loads = Loads { tractions: outline.into_iter().map(traction).collect(), ..Loads::default() };
+    let pushed =
+        loads.on_particles(cells, reference).map_err(|error| scene.refuse("loads", error.to_string(), ""))?;
+    let largest = pushed.iter().map(|p| distance(p, [0.0; 2])).fold(0.0, f64::max);
+    let left = |i: usize| {
+        let ([fx, fy], [px, py]) = (weights.force(i, &displaced), pushed.get(i));
+        (fx + px).hypot(fy + py) / largest
+    };
+    let error = worst((0..reference.len()).map(left));
+    // Rounding of displacements, times what the stiffest direction makes of it.
+    Ok(Outcome::judged(error, 1e-9, "forces on the outline against the stress of the constants"))
+}
+
+/// The damping that the rule takes by itself lets nothing grow.
+fn damped(overrides: &[&str]) -> Result<Outcome, SceneError> {
+    let subject = Subject::of(&small(overrides)?)?;
+    let radius = subject.radius();
+    let check = format!("spectral radius {:.6} of the sweep as damped by itself", radius.radius);
+    let error = if radius.converged { (radius.radius - 1.0).max(0.0) } else { f64::NAN };
+    Ok(Outcome::judged(error, 0.0, check))
+}
+
+/// Three parts in a row, the middle one so many times as stiff, between a clamp and an end that is led: without
+/// lateral contraction each part stretches as its compliance has it.
+pub fn contrast(solver: Solver, contrast: f64) -> Outcome {
+    let columns = 13u32;
+    let lattice = Lattice::new(LatticeKind::Square { spacing: 1.0 }, [0.0; 2], 0.0);
+    let around = neighbourhood(&lattice);
+    let (body, _) = Body::build(lattice, &Cut::Count { columns, rows: 4 }, &around, None).expect("builds");
+    let cells = Cells::of_body(&body);
+    let constants = Constants::Isotropic { young: 1000.0, poisson: 0.0, plane: Plane::Stress };
+    let sheet = Elastic::new(constants, 1.0).expect("admissible");
+    let stiffness = |x: f64| if (4.0..8.0).contains(&x) { contrast } else { 1.0 };
+    let factor: Vec<f64> = cells.iter().map(|cell| stiffness(body.reference.x[cell[0] as usize])).collect();
+    let weights = match MaterialWeights::on_points(&cells, &body.reference, &sheet, Some(&factor)) {
+        Ok(weights) => weights,
+        Err(error) => return Outcome::Refused { message: error.to_string() },
+    };
+    let end = f64::from(columns - 1);
+    let mut interaction = Interaction {
+        rule: Rule { mean: Mean::Material { rotation: Rotation::Small }, ..Rule::BARYCENTRE },
+        reference: body.reference.clone(),
+        neighbours: weights.neighbours.clone(),
+        weights: Weights::Matrix(weights.weights()),
+        forces: None,
+        rest: None,
+        bonds: None,
+    };
+    interaction.keep_rest();
+    let follows: Vec<bool> = body.reference.iter().map(|[x, _]| x > 0.0 && x < end).collect();
+    let held: Points = body.reference.iter().map(|[x, _]| [if x == end { 1.0 } else { 0.0 }, 0.0]).collect();
+    let Scaled { system, length } = match scaled_system(&interaction, &body, follows, &held) {
+        Ok(scaled) => scaled,
+        Err(error) => return Outcome::Refused { message: error.to_string() },
+    };
+    let request = Request { solver: Choice::This(solver), most_iterations: 20_000, ..Request::default() };
+    let solved = match solve(&system, &request) {
+        Ok(solved) => solved,
+        Err(error) => return Outcome::Refused { message: error.to_string() },
+    };
+    if !solved.converged {
+        let left = solved.residuals.last().copied().unwrap_or(f64::NAN);
+        let message = format!("{solver} ended short of its tolerance, {left:.1e} of the load being left");
+        return Outcome::Refused { message };
+    }
+    let compliance =
+        |columns: std::ops::Range<u32>| columns.map(|c| 1.0 / stiffness(f64::from(c))).sum::<f64>();
+    let whole = compliance(0..columns - 1);
+    let off = |i: usize| {
+        let expected = compliance(0..body.reference.x[i] as u32) / whole;
+        let [x, y] = solved.displacement.get(i).map(|d| length * d);
+        distance([x, y], [expected, 0.0])
+    };
+    let error = worst((0..body.count()).map(off));
+    Outcome::judged(error, 1e-3, "each part stretches by its compliance, over the pull")
+}
+
+const STRIP: &str = r#"body={shape={kind="grid",columns=1001,rows=2}}"#;
+
+fn pulled() -> Result<Outcome, SceneError> {
+    let roles = "roles=[{region={kind=\"edge\",side=\"right\"},role=\"leader\",motion={kind=\"affine\",stretch=[1.01,1.0],\
+                 steps=1}},{region={kind=\"edge\",side=\"left\"},role=\"clamped\"}]";
+    let sheet = r#"material={kind="isotropic",young=1000.0,poisson=0.0}"#;
+    let scene = small(&[STRIP, roles, sheet, MATERIAL, AT_REST])?;
+    let end = End::of(&scene)?;
+    let check = "without contraction the strip stretches evenly";
+    Ok(Outcome::judged(end.apart_from_motion(&scene), 1e-6, check))
+}
+
+/// The strip as a cantilever, against the direct solver.
+fn bent(solver: &str) -> Result<Outcome, SceneError> {
+    let roles = r#"roles=[{region={kind="edge",side="left"},role="clamped"}]"#;
+    let loads = r#"loads=[{kind="traction",region={kind="edge",side="right"},traction=[0.0,1e-6]}]"#;
+    let by = |solver: &str| {
+        let how = format!("equilibrium={{solver=\"{solver}\",tolerance=1e-8,most_iterations=100000}}");
+        End::of(&small(&[STRIP, roles, loads, SHEET, MATERIAL, &how])?)
+    };
+    let (end, exact) = (by(solver)?, by("direct")?);
+    // Bending is softer than stretching by the square of the aspect ratio: of a residual of 1e-8, 1e-2 is
+    // what a displacement can be off by.
+    Ok(Outcome::judged(exact.apart_from(&end, 1.0, 1.0), 1e-2, "the direct solver"))
+}

@@ -1,0 +1,19 @@
+//! When a scene's body grows instead of coming to rest, foretold and found; and what holds at the extremes.
+//!
+//! [`thresholds`] foretells the feedback factors and the damping beyond which the sweep grows, from its
+//! spectrum; [`bisection`] finds them by running the body; [`extremes`] runs it, and small bodies made for
+//! the purpose, where numbers and shapes are as bad as they come. [`study::run`] does all of it.
+//!
+//! Delay is a threshold of swarms: no scene has one yet, so none is looked for.
+
+pub mod bisection;
+pub mod extremes;
+mod scaling;
+pub mod study;
+pub mod subject;
+pub mod thresholds;
+
+use crate::scene::{Scene, SceneError};
+
+/// Loads the scene with these overrides, after those that the user gave.
+pub type Load<'a> = &'a dyn Fn(&[String]) -> Result<Scene, SceneError>;

@@ -1,0 +1,250 @@
+//! Thresholds of a scene, foretold and found, and its extremes.
+
+use std::fmt;
+
+use serde::Serialize;
+
+use super::Load;
+use super::bisection::{Effort, Found, Growth, find, growth};
+use super::extremes::{self, Case, Outcome};
+use super::subject::{Parameter, Subject};
+use super::thresholds::{Predicted, Radius, Side, curve, predict, start};
+use crate::scene::SceneError;
+
+/// A threshold from both sides.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Threshold {
+    pub parameter: Parameter,
+    pub side: Side,
+    /// From the spectrum; none where the body grows at no value of the parameter, or at every one.
+    pub predicted: Option<Predicted>,
+    /// From runs.
+    pub found: Option<Found>,
+    /// How far apart the two may be: a thousandth of what the sweep is from growing, or from not growing,
+    /// at the parameter's neutral value (no feedback, no damping), and 1e-6 at least; where runs do not settle
+    /// 4 over the number of their steps, which is what they can tell \[1\].
+    pub tolerance: f64,
+}
+
+impl Threshold {
+    /// Whether runs and spectrum say the same.
+    pub fn agrees(&self) -> bool {
+        match (&self.predicted, &self.found) {
+            (Some(predicted), Some(found)) => (predicted.value - found.value).abs() <= self.tolerance,
+            (None, None) => true,
+            _ => false,
+        }
+    }
+}
+
+/// Spectrum and runs over the whole range of a parameter.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Sweep {
+    pub parameter: Parameter,
+    /// The scene's own value.
+    pub present: f64,
+    pub spectrum: Vec<Radius>,
+    pub runs: Vec<Growth>,
+}
+
+/// What the spectrum and runs say of a linear rule.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Linear {
+    pub particles: usize,
+    pub followers: usize,
+    /// Spectral radius of the scene's sweep as it is, and the sweeps it took to find it.
+    pub radius: f64,
+    pub iterations: usize,
+    pub converged: bool,
+    /// Least and greatest eigenvalue of the sweep without feedback and damping, where they are real \[1\].
+    pub ends: Option<[f64; 2]>,
+    pub thresholds: Vec<Threshold>,
+    pub sweeps: Vec<Sweep>,
+}
+
+/// Everything.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Study {
+    pub name: String,
+    pub title: String,
+    /// `None` where the rule is not linear or the body not held.
+    pub linear: Option<Linear>,
+    /// Why there are no thresholds.
+    pub refused: Option<String>,
+    pub extremes: Vec<Case>,
+}
+
+/// How far the study goes.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Options {
+    pub effort: Effort,
+    /// Leaves the extremes out.
+    pub no_extremes: bool,
+}
+
+/// Foretells and finds the thresholds of a scene and runs its extremes. `tell` is told what comes next.
+///
+/// # Errors
+/// Whatever keeps the scene from being planned; a scene without thresholds is part of the study.
+pub fn run(load: Load<'_>, options: Options, tell: &mut dyn FnMut(&str)) -> Result<Study, SceneError> {
+    let scene = load(&[])?;
+    let (linear, refused) = match Subject::of(&scene) {
+        Ok(subject) => (Some(linear(&subject, options.effort, tell)), None),
+        Err(error) if extremes::plan(&scene).is_ok() => (None, Some(error.to_string())),
+        Err(error) => return Err(error),
+    };
+    let extremes = if options.no_extremes { Vec::new() } else { extremes::run(load, &scene, tell) };
+    Ok(Study { name: scene.name.clone(), title: scene.raw.title.clone(), linear, refused, extremes })
+}
+
+fn linear(subject: &Subject, effort: Effort, tell: &mut dyn FnMut(&str)) -> Linear {
+    let here = subject.radius();
+    let bare = subject.with(Parameter::Feedback, 0.0).with(Parameter::Damping, 1.0).ends();
+    let asked = [
+        (Parameter::Feedback, Side::Lower),
+        (Parameter::Feedback, Side::Upper),
+        (Parameter::Damping, Side::Upper),
+    ];
+    let thresholds: Vec<Threshold> = asked
+        .into_iter()
+        .map(|(parameter, side)| {
+            tell(&format!("the {} threshold of the {}", side.name(), parameter.name()));
+            threshold(subject, parameter, side, effort)
+        })
+        .collect();
+    let sweeps = Parameter::ALL
+        .into_iter()
+        .map(|parameter| {
+            tell(&format!("growth over the {}", parameter.name()));
+            sweep(subject, parameter, &thresholds, effort)
+        })
+        .collect();
+    Linear {
+        particles: subject.particles(),
+        followers: subject.followers(),
+        radius: here.radius,
+        iterations: here.iterations,
+        converged: here.converged,
+        ends: (bare.are_real && bare.converged).then_some([bare.lowest, bare.highest]),
+        thresholds,
+        sweeps,
+    }
+}
+
+fn threshold(subject: &Subject, parameter: Parameter, side: Side, effort: Effort) -> Threshold {
+    let neutral = match parameter {
+        Parameter::Feedback => 0.0,
+        Parameter::Damping => 1.0,
+    };
+    let margin = (subject.with(parameter, neutral).radius().radius - 1.0).abs();
+    let tolerance = (1e-3 * margin).max(1e-6);
+    let steps = effort.steps(subject.particles());
+    let found = find(subject, parameter, start(subject, parameter, side), tolerance / 8.0, steps);
+    let settled = found.as_ref().is_none_or(|found| found.settled);
+    let tolerance = if settled { tolerance } else { tolerance.max(4.0 / steps as f64) };
+    Threshold { parameter, side, predicted: predict(subject, parameter, side), found, tolerance }
+}
+
+/// Runs and spectra from one threshold to the other and a little beyond.
+fn sweep(subject: &Subject, parameter: Parameter, thresholds: &[Threshold], effort: Effort) -> Sweep {
+    let mut known: Vec<f64> = thresholds
+        .iter()
+        .filter(|threshold| threshold.parameter == parameter)
+        .flat_map(|t| [t.predicted.as_ref().map(|p| p.value), t.found.as_ref().map(|f| f.value)])
+        .flatten()
+        .collect();
+    let (inside, _) = start(subject, parameter, Side::Upper);
+    known.push(if parameter == Parameter::Damping { 0.0 } else { inside });
+    let (low, high) =
+        known.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &v| (l.min(v), h.max(v)));
+    let beyond = 0.12 * (high - low);
+    // Nothing moves without damping, so there is no growth to speak of.
+    let low = if parameter == Parameter::Damping { 0.05 * high } else { low - beyond };
+    let range = [low, high + beyond];
+    let runs = (0..effort.samples)
+        .map(|k| range[0] + (range[1] - range[0]) * k as f64 / (effort.samples.max(2) - 1) as f64)
+        .map(|value| growth(subject, parameter, value, effort.steps(subject.particles()) / 4))
+        .collect();
+    let spectrum = curve(subject, parameter, range, 6 * effort.samples + 1);
+    Sweep { parameter, present: subject.present(parameter), spectrum, runs }
+}
+
+impl Side {
+    pub fn name(self) -> &'static str {
+        match self {
+            Side::Lower => "lower",
+            Side::Upper => "upper",
+        }
+    }
+}
+
+impl Study {
+    /// Whether every prediction agrees with its bisection and no extreme is wrong.
+    pub fn holds(&self) -> bool {
+        let agree = self.linear.as_ref().is_none_or(|l| l.thresholds.iter().all(Threshold::agrees));
+        agree && !self.extremes.iter().any(|case| matches!(case.outcome, Outcome::Wrong { .. }))
+    }
+}
+
+impl fmt::Display for Study {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "{}", self.title)?;
+        if let Some(linear) = &self.linear {
+            write!(f, "{linear}")?;
+        }
+        if let Some(reason) = &self.refused {
+            writeln!(f, "no thresholds: {reason}")?;
+        }
+        if self.extremes.is_empty() {
+            return Ok(());
+        }
+        let count = |which: fn(&Outcome) -> bool| self.extremes.iter().filter(|c| which(&c.outcome)).count();
+        writeln!(
+            f,
+            "extremes: {} right, {} refused, {} wrong",
+            count(|o| matches!(o, Outcome::Right { .. })),
+            count(|o| matches!(o, Outcome::Refused { .. })),
+            count(|o| matches!(o, Outcome::Wrong { .. }))
+        )?;
+        let width = self.extremes.iter().map(|case| case.name.chars().count()).max().unwrap_or(0);
+        self.extremes.iter().try_for_each(|case| writeln!(f, "  {:width$}  {}", case.name, case.outcome))
+    }
+}
+
+impl fmt::Display for Linear {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            f,
+            "{} of {} particles follow; spectral radius of the sweep {:.9}, found in {} sweeps{}",
+            self.followers,
+            self.particles,
+            self.radius,
+            self.iterations,
+            if self.converged { "" } else { " (not settled)" }
+        )?;
+        match self.ends {
+            Some([low, high]) => {
+                writeln!(f, "eigenvalues without feedback and damping from {low:.9} to {high:.9}")?;
+            }
+            None => writeln!(f, "its eigenvalues are not real: the sweep is not symmetric")?,
+        }
+        writeln!(f, "{:26} {:>14} {:>14} {:>10}", "grows beyond", "predicted", "found by runs", "apart")?;
+        for threshold in &self.thresholds {
+            let name = format!("{} ({})", threshold.parameter.name(), threshold.side.name());
+            let [predicted, found] = [
+                threshold.predicted.as_ref().map(|p| p.value),
+                threshold.found.as_ref().map(|found| found.value),
+            ];
+            let shown = |value: Option<f64>| value.map_or("nowhere".into(), |v| format!("{v:.8}"));
+            let apart = predicted.zip(found).map_or(String::new(), |(p, f)| format!("{:.1e}", (p - f).abs()));
+            let settled = threshold.found.as_ref().is_none_or(|found| found.settled);
+            let verdict = match (threshold.agrees(), settled) {
+                (false, _) => format!("  THEY DISAGREE by more than {:.1e}", threshold.tolerance),
+                (true, false) => format!("  too slow to settle: told to {:.1e}", threshold.tolerance),
+                (true, true) => String::new(),
+            };
+            writeln!(f, "{name:26} {:>14} {:>14} {apart:>10}{verdict}", shown(predicted), shown(found))?;
+        }
+        writeln!(f, "delay: a threshold of swarms; a scene has none")
+    }
+}

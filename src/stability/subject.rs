@@ -1,0 +1,184 @@
+//! The body of a scene, held where it is held and pushed by nothing, under settings of its update.
+
+use serde::Serialize;
+
+use crate::continuum::engine::Engine;
+use crate::continuum::plan::Plan;
+use crate::flock::role::Role;
+use crate::flock::rules::{Feedback, FeedbackReference, Mean, Rotation};
+use crate::scene::{Scene, SceneError};
+use crate::solve::spectrum::{Ends, SpectralRadius, spectral_ends, spectral_radius};
+use crate::solve::sweep::Order;
+
+/// What is varied.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Parameter {
+    /// The feedback factor `fd` of Eq. 4.
+    Feedback,
+    Damping,
+}
+
+impl Parameter {
+    pub const ALL: [Parameter; 2] = [Parameter::Feedback, Parameter::Damping];
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Parameter::Feedback => "feedback factor",
+            Parameter::Damping => "damping",
+        }
+    }
+}
+
+/// A linear body at rest.
+#[derive(Clone, Debug)]
+pub struct Subject {
+    /// Everybody who does not follow is clamped, nobody changes role, and there are no loads.
+    plan: Plan,
+}
+
+/// Sweeps in which an eigenvalue has to be found.
+const MOST_SWEEPS: usize = 200_000;
+
+impl Subject {
+    /// The body with the roles that hold at the end of the scene, its leaders held.
+    ///
+    /// # Errors
+    /// Names what makes the rule nonlinear, and a follower that no leader holds.
+    pub fn of(scene: &Scene) -> Result<Self, SceneError> {
+        // Where the truth would have its leaders is all the same: they are held at rest.
+        let mut plan = Plan::with_truth(scene, &|places| vec![[0.0; 2]; places.len()])?;
+        require_linear(scene, &plan)?;
+        let mut changes = std::mem::take(&mut plan.changes);
+        changes.sort_by_key(|change| change.from);
+        for change in changes.iter().filter(|change| change.when.is_none()) {
+            change.particles.iter().for_each(|&i| plan.roles[i] = change.role);
+        }
+        for role in plan.roles.iter_mut().filter(|role| **role == Role::Leader) {
+            *role = Role::Clamped;
+        }
+        plan.interaction.forces = None;
+        // Runs are watched from here: neither a limit nor a tolerance ends them.
+        plan.stop.tolerance = None;
+        let subject = Self { plan };
+        subject.require_held(scene)?;
+        Ok(subject)
+    }
+
+    /// The feedback factor or the damping as the scene has it.
+    pub fn present(&self, parameter: Parameter) -> f64 {
+        match parameter {
+            Parameter::Feedback => self.plan.interaction.rule.feedback.map_or(0.0, |f| f.factor),
+            Parameter::Damping => self.plan.update.damping,
+        }
+    }
+
+    pub fn feedback_reference(&self) -> FeedbackReference {
+        self.plan.interaction.rule.feedback.map_or(FeedbackReference::Initial, |f| f.reference)
+    }
+
+    pub fn order(&self) -> Order {
+        self.plan.update.order
+    }
+
+    pub fn particles(&self) -> usize {
+        self.plan.count()
+    }
+
+    pub fn followers(&self) -> usize {
+        self.plan.roles.iter().filter(|&&role| role == Role::Follower).count()
+    }
+
+    /// Whether frame points remember the step before, so that the sweep is more than one matrix.
+    pub fn has_memory(&self) -> bool {
+        self.plan.body.frame.as_ref().is_some_and(|frame| frame.rule.looks_before_the_sweep())
+    }
+
+    /// The same body with a parameter set.
+    pub fn with(&self, parameter: Parameter, value: f64) -> Self {
+        let mut plan = self.plan.clone();
+        match parameter {
+            Parameter::Feedback => {
+                let reference = self.feedback_reference();
+                let feedback = Feedback { factor: value, reference };
+                plan.interaction.rule.feedback = (value != 0.0).then_some(feedback);
+            }
+            Parameter::Damping => plan.update.damping = value,
+        }
+        Self { plan }
+    }
+
+    /// The body in an engine, at rest.
+    pub fn engine(&self) -> Engine {
+        Engine::new(self.plan.clone())
+    }
+
+    /// Distance of neighbours \[length\].
+    pub fn spacing(&self) -> f64 {
+        self.plan.body.lattice.spacing()
+    }
+
+    /// How its sweep grows or shrinks what is left of a displacement.
+    pub fn radius(&self) -> SpectralRadius {
+        let engine = self.engine();
+        let frame = self.plan.body.frame.as_ref();
+        spectral_radius(engine.interaction(), frame, engine.roles(), engine.update(), MOST_SWEEPS)
+            .expect("linear, and somebody follows")
+    }
+
+    /// Ends of the spectrum of its sweep.
+    pub fn ends(&self) -> Ends {
+        let engine = self.engine();
+        let frame = self.plan.body.frame.as_ref();
+        spectral_ends(engine.interaction(), frame, engine.roles(), engine.update(), MOST_SWEEPS)
+            .expect("linear, and somebody follows")
+    }
+
+    /// Refuses followers in a part of the body that nobody leads: nothing brings them back to rest.
+    fn require_held(&self, scene: &Scene) -> Result<(), SceneError> {
+        let Plan { body, interaction, roles, .. } = &self.plan;
+        let labels = body.components(&interaction.neighbours);
+        let mut held = vec![false; labels.len()];
+        for (&label, _) in labels.iter().zip(roles).filter(|(_, role)| **role == Role::Clamped) {
+            held[label as usize] = true;
+        }
+        let follower = |&i: &usize| roles[i] == Role::Follower;
+        let help = "clamp or lead some of every part, and leave some to follow";
+        match (0..labels.len()).filter(follower).find(|&i| !held[labels[i] as usize]) {
+            Some(i) => {
+                let message = format!(
+                    "particle {} follows in a part of the body where nobody leads or is clamped: nothing brings it \
+                     back to rest, and every damping and feedback is marginal",
+                    i + 1
+                );
+                Err(scene.refuse("roles", message, help))
+            }
+            None if self.followers() == 0 => {
+                Err(scene.refuse("roles", "nobody follows: there is no sweep to be stable", help))
+            }
+            None => Ok(()),
+        }
+    }
+}
+
+fn require_linear(scene: &Scene, plan: &Plan) -> Result<(), SceneError> {
+    let (key, reason) = match scene.mean {
+        Mean::Distance { .. } => ("rule.mean", "weights that depend on the present distance"),
+        Mean::Power { .. } => ("rule.mean", "power means of coordinates"),
+        Mean::Spaced { .. } => ("rule.mean", "cohesion with separation"),
+        Mean::Material { rotation: Rotation::Corotated } => ("rule.mean", "axes that turn with the body"),
+        _ if plan.present_radius.is_some() => ("neighbours", "neighbours found anew at every step"),
+        _ if scene.fracture.is_some_and(|fracture| fracture.threshold.is_some()) => {
+            ("fracture", "bonds that break")
+        }
+        _ => return Ok(()),
+    };
+    let message = format!(
+        "{reason} make the rule nonlinear: its sweep is no matrix, so it has no spectrum and no one threshold"
+    );
+    Err(scene.refuse(
+        key,
+        message,
+        "ask about a linear rule: rule.mean.kind = \"barycentre\" or \"material\"",
+    ))
+}
