@@ -192,3 +192,27 @@ fn a_loaded_body_that_its_leaders_do_not_hold_is_refused() {
     let message = refusal("lattice-square", &[MATERIAL, BY_MATERIAL, CELLS, load, at_one_point]);
     assert!(message.contains("held at one particle only and turns about it"), "{message}");
 }
+
+#[test]
+fn tractions_and_weight_act_on_the_thickness_and_forces_on_the_whole_of_it() {
+    let held = "roles=[{region={kind=\"edge\",side=\"left\"},role=\"clamped\"}]";
+    let largest = |load: &str, thickness: &str| {
+        let thickness = format!("material.thickness={thickness}");
+        let load = format!("loads=[{load}]");
+        let shape = "body.shape={kind=\"grid\",columns=9,rows=5}";
+        let overrides = [MATERIAL, BY_MATERIAL, CELLS, held, shape, &thickness, &load, "equilibrium={}"];
+        let outcome = ended(&load_with("lattice-square", &overrides, &[]));
+        let engine = &outcome.engine;
+        let moved = engine.present().iter().zip(engine.body().reference.iter());
+        moved.map(|(x, p)| distance(x, p)).fold(0.0, f64::max)
+    };
+    let right = "region={kind=\"edge\",side=\"right\"}";
+    for (load, thin_over_thick) in [
+        (format!("{{kind=\"traction\",{right},traction=[3.0,1.0]}}"), 1.0),
+        ("{kind=\"body\",force=[0.5,-1.0]}".to_owned(), 1.0),
+        (format!("{{kind=\"force\",{right},force=[3.0,1.0]}}"), 4.0),
+    ] {
+        let ratio = largest(&load, "0.5") / largest(&load, "2.0");
+        assert!((ratio / thin_over_thick - 1.0).abs() < 1e-9, "{load}: {ratio}");
+    }
+}

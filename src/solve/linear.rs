@@ -33,51 +33,27 @@ pub fn system(
     follows: Vec<bool>,
     held: Points,
 ) -> Result<System, NotLinear> {
-    let mut system = Linear::new(interaction, body, 1.0)?.system(follows)?;
-    system.held = held;
-    Ok(system)
-}
-
-/// A system in units of its own.
-#[derive(Clone, Debug)]
-pub struct Scaled {
-    /// The stiffest bond and the largest displacement or load are about 1.
-    pub system: System,
-    /// What a displacement of 1 stands for \[length\].
-    pub length: f64,
-}
-
-/// Like [`system`], in units that keep squares and single-precision numbers from over- and underflowing
-/// whatever the body's. They are powers of two: the same digits come out.
-pub fn scaled_system(
-    interaction: &Interaction,
-    body: &Body,
-    follows: Vec<bool>,
-    held: &Points,
-) -> Result<Scaled, NotLinear> {
-    let stiffest = match &interaction.weights {
-        Weights::Equal => 1.0,
-        Weights::Scalar(weights) => largest(weights),
-        Weights::Matrix(weights) => largest(weights.stiffness.iter().flatten().flatten()),
+    require_linear(interaction)?;
+    let lattice = &body.lattice;
+    let grid = [lattice.vector([1, 0]), lattice.vector([0, 1])];
+    let linear = Linear { interaction, body, served: served_by_frame(body) };
+    let forces = (0..body.count()).map(|i| if follows[i] { linear.force(i) } else { [0.0; 2] }).collect();
+    let operator = match &interaction.weights {
+        // The classes of a plain material are those of its rows.
+        Weights::Matrix(weights) if linear.is_plain() => {
+            let mut rows = vec![Row::default(); weights.compliance.len()];
+            let mut known = vec![false; rows.len()];
+            for i in (0..body.count()).filter(|&i| follows[i]) {
+                let class = weights.class[i] as usize;
+                if !std::mem::replace(&mut known[class], true) {
+                    rows[class] = linear.row(i);
+                }
+            }
+            Operator::new(&body.sites, grid, weights.class.clone(), rows, follows)?
+        }
+        _ => Operator::from_rows(&body.sites, grid, follows, |i| linear.row(i))?,
     };
-    let mut system = Linear::new(interaction, body, inverse_power_of_two(stiffest))?.system(follows)?;
-    let follows = system.operator.follows();
-    let owed = |i: usize| if follows[i] { system.forces.get(i) } else { held.get(i) };
-    let all: Vec<f64> = (0..body.count()).filter(|&i| !body.is_frame[i]).flat_map(owed).collect();
-    let to_own = inverse_power_of_two(largest(&all));
-    let scale = |points: &Points| points.iter().map(|[x, y]| [to_own * x, to_own * y]).collect();
-    (system.forces, system.held) = (scale(&system.forces), scale(held));
-    Ok(Scaled { system, length: to_own.recip() })
-}
-
-fn largest<'a>(values: impl IntoIterator<Item = &'a f64>) -> f64 {
-    values.into_iter().fold(0.0, |largest, value| largest.max(value.abs()))
-}
-
-/// The power of two that brings `value` to between 1 and 2, as far as it and its inverse are ordinary
-/// numbers; 1 for zero and for what is not finite.
-fn inverse_power_of_two(value: f64) -> f64 {
-    if value > 0.0 && value.is_finite() { (-value.log2().floor()).clamp(-1020.0, 1020.0).exp2() } else { 1.0 }
+    Ok(System::new(operator, forces, held))
 }
 
 fn require_linear(interaction: &Interaction) -> Result<(), NotLinear> {
@@ -108,42 +84,9 @@ struct Linear<'a> {
     interaction: &'a Interaction,
     body: &'a Body,
     served: Vec<Vec<u32>>,
-    /// Multiplies every stiffness, and every force with them.
-    unit: f64,
 }
 
-impl<'a> Linear<'a> {
-    fn new(interaction: &'a Interaction, body: &'a Body, unit: f64) -> Result<Self, NotLinear> {
-        require_linear(interaction)?;
-        Ok(Self { interaction, body, served: served_by_frame(body), unit })
-    }
-
-    /// With nobody displaced who is held.
-    fn system(&self, follows: Vec<bool>) -> Result<System, NotLinear> {
-        let Self { interaction, body, .. } = *self;
-        let lattice = &body.lattice;
-        // Lengths of the grid are compared with each other only.
-        let per = inverse_power_of_two(lattice.spacing());
-        let grid = [[1, 0], [0, 1]].map(|step| lattice.vector(step).map(|v| per * v));
-        let forces = (0..body.count()).map(|i| if follows[i] { self.force(i) } else { [0.0; 2] }).collect();
-        let operator = match &interaction.weights {
-            // The classes of a plain material are those of its rows.
-            Weights::Matrix(weights) if self.is_plain() => {
-                let mut rows = vec![Row::default(); weights.compliance.len()];
-                let mut known = vec![false; rows.len()];
-                for i in (0..body.count()).filter(|&i| follows[i]) {
-                    let class = weights.class[i] as usize;
-                    if !std::mem::replace(&mut known[class], true) {
-                        rows[class] = self.row(i);
-                    }
-                }
-                Operator::new(&body.sites, grid, weights.class.clone(), rows, follows)?
-            }
-            _ => Operator::from_rows(&body.sites, grid, follows, |i| self.row(i))?,
-        };
-        Ok(System::new(operator, forces, Points::zeros(body.count())))
-    }
-
+impl Linear<'_> {
     /// Whether rows are those of the weights alone.
     fn is_plain(&self) -> bool {
         let rule = &self.interaction.rule;
@@ -152,15 +95,14 @@ impl<'a> Linear<'a> {
 
     /// `K_ij` of bond number `k` of a particle.
     fn stiffness(&self, particle: usize, k: usize) -> Block {
-        let block = match &self.interaction.weights {
+        let scaled = |by: f64| IDENTITY.map(|row| row.map(|entry| by * entry));
+        match &self.interaction.weights {
             Weights::Equal => IDENTITY,
             Weights::Scalar(weights) => {
-                let weight = weights[self.interaction.neighbours.bonds(particle).start + k];
-                IDENTITY.map(|row| row.map(|entry| weight * entry))
+                scaled(weights[self.interaction.neighbours.bonds(particle).start + k])
             }
             Weights::Matrix(weights) => weights.stiffness_of(particle)[k],
-        };
-        block.map(|row| row.map(|entry| self.unit * entry))
+        }
     }
 
     /// `D_i`.
@@ -221,7 +163,7 @@ impl<'a> Linear<'a> {
     /// `f_i`: the load, and what pulls where the reference is not at rest.
     fn force(&self, particle: usize) -> [f64; 2] {
         if let (Some(forces), true) = (&self.interaction.forces, self.is_plain()) {
-            return forces.get(particle).map(|force| self.unit * force);
+            return forces.get(particle);
         }
         let reference = &self.body.reference;
         // Over-relaxation does not move the place of rest.

@@ -188,6 +188,9 @@ pub fn solve(system: &System, request: &Request) -> Result<Solved, SolveError> {
     // Rounding keeps an iteration from the last digits of what it was asked for.
     let converged = residuals.last().is_some_and(|last| *last <= 2.0 * request.tolerance);
     let displacement = system.with_held(prepared.unscaled(found.displacement));
+    if let Some(i) = displacement.iter().position(|u| !u.iter().all(|u| u.is_finite())) {
+        return Err(SolveError::NotFinite { what: "displacement in equilibrium", particle: i + 1 });
+    }
     Ok(Solved {
         displacement,
         solver,
