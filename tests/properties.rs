@@ -283,11 +283,12 @@ proptest! {
         let moved = |[x, y]: [f64; 2]| [x + shift[0], y + shift[1]];
         let load = |force: [f64; 2]| Some(Load { force, compliance: [[0.3, 0.1], [0.1, 0.2]] });
         let seen = |go: &dyn Fn([f64; 2]) -> [f64; 2]| -> Vec<Neighbour> {
-            let one = |((reference, off), matrix): (&([f64; 2], [f64; 2]), &[[f64; 2]; 2])| {
+            let one = |k: usize| {
+                let (reference, off) = places[k];
                 let position = go([reference[0] + off[0], reference[1] + off[1]]);
-                Neighbour { reference: *reference, matrix: *matrix, ..Neighbour::at(position) }
+                Neighbour { reference, matrix: matrices[k], ..Neighbour::at(position) }
             };
-            places.iter().zip(&matrices).map(one).collect()
+            (0..count).map(one).collect()
         };
         for (rotation, go, pushed) in [
             (Rotation::Small, &moved as &dyn Fn([f64; 2]) -> [f64; 2], push),
