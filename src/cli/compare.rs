@@ -1,48 +1,39 @@
 //! `flockform compare`: rule and truth of a scene, how far apart they are.
 
 use std::ops::ControlFlow;
-use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::atomic::Ordering;
 
 use clap::Args;
 use flockform::compare::run::{Compared, compare as compare_scene};
 use flockform::continuum::run::StopReason;
-use flockform::export::OutputFolder;
 use flockform::export::comparison::{ComparisonReport, write_comparison};
 use flockform::scene::Scene;
 
+use super::output::OutputArguments;
 use super::progress::Progress;
-use super::run::{exit_code, free_folder, interrupt_flag};
+use super::run::{exit_code, interrupt_flag};
 use super::{Refusal, SceneArguments, print};
 
 #[derive(Debug, Args)]
 pub struct CompareArguments {
     #[command(flatten)]
     scene: SceneArguments,
-    /// Folder for the results; must be empty or new [default: out/SCENE-compare, numbered if taken]
-    #[arg(long, value_name = "DIR")]
-    out: Option<PathBuf>,
+    #[command(flatten)]
+    output: OutputArguments,
     /// Cut each side of a cell into N parts for the truth [default: as many as make it exact enough]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     refine: Option<u16>,
     /// Print compare.json instead of a table
-    #[arg(long)]
+    #[arg(long, conflicts_with = "quiet")]
     json: bool,
-    /// Print nothing but errors
-    #[arg(long, short, conflicts_with = "json")]
-    quiet: bool,
-    /// Replace an earlier output of flockform in DIR
-    #[arg(long)]
-    force: bool,
 }
 
 /// Compares a scene's rule with its truth, prints the measures and writes what comes of it.
 pub fn compare(arguments: &CompareArguments) -> Result<ExitCode, Refusal> {
     let scene = arguments.scene.load(None)?;
-    let out = arguments.out.clone().unwrap_or_else(|| free_folder(&format!("{}-compare", scene.name)));
-    let folder = OutputFolder::create(&out, arguments.force)?;
-    let mut progress = Progress::new(arguments.quiet, scene.stop.steps);
+    let folder = arguments.output.folder(&format!("{}-compare", scene.name))?;
+    let mut progress = Progress::new(arguments.output.quiet, scene.stop.steps);
     let interrupted = interrupt_flag();
     let compared = compare_scene(&scene, arguments.refine.map(usize::from), &mut |engine, residual| {
         progress.step(engine.step(), residual);
@@ -55,7 +46,7 @@ pub fn compare(arguments: &CompareArguments) -> Result<ExitCode, Refusal> {
     let kept = folder.commit()?;
     if arguments.json {
         print(&format!("{:#}\n", serde_json::json!(report)));
-    } else if !arguments.quiet {
+    } else if !arguments.output.quiet {
         print(&format!("{}results in {}\n", words(&scene, &compared), kept.display()));
     }
     Ok(exit_code(&compared.outcome))

@@ -2,6 +2,7 @@
 
 mod compare;
 mod material;
+mod output;
 mod progress;
 mod run;
 mod stability;

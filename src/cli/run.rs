@@ -1,7 +1,7 @@
 //! `flockform run`: plan, step, record, write.
 
 use std::ops::ControlFlow;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -18,6 +18,7 @@ use flockform::export::{ExportError, OutputFolder, Results, Timings, VtkSeries, 
 use flockform::scene::Scene;
 use flockform::trade::{Chosen, choose};
 
+use super::output::OutputArguments;
 use super::progress::Progress;
 use super::{FAILED, Refusal, SceneArguments, print};
 
@@ -25,21 +26,14 @@ use super::{FAILED, Refusal, SceneArguments, print};
 pub struct RunArguments {
     #[command(flatten)]
     scene: SceneArguments,
-    /// Folder for the results; must be empty or new [default: out/SCENE, numbered if taken]
-    #[arg(long, value_name = "DIR")]
-    out: Option<PathBuf>,
+    #[command(flatten)]
+    output: OutputArguments,
     /// Run at most this many steps (the same as --set stop.steps=N)
     #[arg(long, value_name = "N")]
     steps: Option<usize>,
     /// Threads to use [default: the machine's]; results are the same to the bit for any number
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
-    /// Print nothing but errors
-    #[arg(long, short)]
-    quiet: bool,
-    /// Replace an earlier output of flockform in DIR
-    #[arg(long)]
-    force: bool,
 }
 
 /// Runs a scene and writes what comes of it.
@@ -57,13 +51,12 @@ fn run_here(arguments: &RunArguments) -> Result<ExitCode, Refusal> {
     let load = |more: &[String]| arguments.scene.load_scene(&[steps.as_slice(), more].concat());
     let Chosen { scene, words } = choose(&load)?;
     let plan = plan(&scene)?;
-    let out = arguments.out.clone().unwrap_or_else(|| free_folder(&scene.name));
-    let folder = OutputFolder::create(&out, arguments.force)?;
+    let folder = arguments.output.folder(&scene.name)?;
     let setup = start.elapsed();
     tracing::info!("planned {} particles of `{}` in {setup:.1?}", plan.count(), scene.name);
 
     let mut recorder = Recorder::new(&scene, &plan, &folder)?;
-    let mut progress = Progress::new(arguments.quiet, scene.stop.steps);
+    let mut progress = Progress::new(arguments.output.quiet, scene.stop.steps);
     let interrupted = interrupt_flag();
     let stepping = Instant::now();
     let outcome = come_to_rest(&scene, plan, &mut |engine, residual| {
@@ -75,27 +68,17 @@ fn run_here(arguments: &RunArguments) -> Result<ExitCode, Refusal> {
     progress.finish();
 
     let elapsed = stepping.elapsed();
-    tracing::info!("{} steps in {elapsed:.1?}, writing to {}", outcome.engine.step(), out.display());
+    tracing::info!("{} steps in {elapsed:.1?}, writing", outcome.engine.step());
     let records = recorder.finish(&outcome.engine)?;
     let timings = Timings { setup, steps: elapsed.saturating_sub(records.writing), output: records.writing };
     let (snapshots, probes) = (&records.snapshots, &records.probes);
     write_all(&folder, &Results { scene: &scene, outcome: &outcome, snapshots, probes, timings })?;
     let kept = folder.commit()?;
-    if !arguments.quiet {
+    if !arguments.output.quiet {
         print(&words);
         print(&closing_words(&scene, &outcome, elapsed, &kept));
     }
     Ok(exit_code(&outcome))
-}
-
-/// The first of out/NAME, out/NAME-2, ... that is not taken.
-pub fn free_folder(name: &str) -> PathBuf {
-    let taken = |path: &Path| path.read_dir().is_ok_and(|mut entries| entries.next().is_some());
-    let numbered = (2..).map(|n| PathBuf::from(format!("out/{name}-{n}")));
-    std::iter::once(PathBuf::from(format!("out/{name}")))
-        .chain(numbered)
-        .find(|path| !taken(path))
-        .expect("endless")
 }
 
 /// Set by Ctrl-C and by SIGTERM; the run then stops at the next step.

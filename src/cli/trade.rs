@@ -1,23 +1,20 @@
 //! `flockform trade`: what accuracy costs in a scene.
 
-use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
-use flockform::export::OutputFolder;
 use flockform::export::trade::write_trade;
 use flockform::trade::{Grid, run};
 
-use super::run::free_folder;
+use super::output::OutputArguments;
 use super::{Refusal, SceneArguments, print};
 
 #[derive(Debug, Args)]
 pub struct TradeArguments {
     #[command(flatten)]
     scene: SceneArguments,
-    /// Folder for the results; must be empty or new [default: out/SCENE-trade, numbered if taken]
-    #[arg(long, value_name = "DIR")]
-    out: Option<PathBuf>,
+    #[command(flatten)]
+    output: OutputArguments,
     /// Run each setting so often; the median time counts
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u16).range(1..))]
     repeats: u16,
@@ -28,14 +25,8 @@ pub struct TradeArguments {
     #[arg(long)]
     quick: bool,
     /// Print trade.json instead of a table
-    #[arg(long)]
+    #[arg(long, conflicts_with = "quiet")]
     json: bool,
-    /// Print nothing but errors
-    #[arg(long, short, conflicts_with = "json")]
-    quiet: bool,
-    /// Replace an earlier output of flockform in DIR
-    #[arg(long)]
-    force: bool,
 }
 
 /// Runs the scene in many settings and writes what each costs.
@@ -48,15 +39,14 @@ pub fn trade(arguments: &TradeArguments) -> Result<ExitCode, Refusal> {
     };
     // Asked for first, so that a misspelt name is a misspelt name.
     let name = arguments.scene.load([])?.name;
-    let out = arguments.out.clone().unwrap_or_else(|| free_folder(&format!("{name}-trade")));
-    let folder = OutputFolder::create(&out, arguments.force)?;
+    let folder = arguments.output.folder(&format!("{name}-trade"))?;
     let load = |more: &[String]| arguments.scene.load_scene(more);
     let study = run(&load, &grid, &mut |setting| tracing::info!("{setting}"))?;
     write_trade(&folder, &study)?;
     let kept = folder.commit()?;
     if arguments.json {
         print(&format!("{:#}\n", serde_json::json!(study)));
-    } else if !arguments.quiet {
+    } else if !arguments.output.quiet {
         print(&format!("{study}results in {}\n", kept.display()));
     }
     Ok(ExitCode::SUCCESS)

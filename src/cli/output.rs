@@ -1,0 +1,37 @@
+//! Where a command's results go, and how much it says.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use flockform::export::{ExportError, OutputFolder};
+
+#[derive(Debug, Args)]
+pub struct OutputArguments {
+    /// Folder for the results; must be empty or new [default: out/NAME, numbered if taken]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Print nothing but errors
+    #[arg(long, short)]
+    pub quiet: bool,
+    /// Replace an earlier output of flockform in DIR
+    #[arg(long)]
+    force: bool,
+}
+
+impl OutputArguments {
+    /// The folder asked for, or a free one of this name.
+    pub fn folder(&self, name: &str) -> Result<OutputFolder, ExportError> {
+        let out = self.out.clone().unwrap_or_else(|| free_folder(name));
+        OutputFolder::create(&out, self.force)
+    }
+}
+
+/// The first of out/NAME, out/NAME-2, ... that is not taken.
+fn free_folder(name: &str) -> PathBuf {
+    let taken = |path: &Path| path.read_dir().is_ok_and(|mut entries| entries.next().is_some());
+    let numbered = (2..).map(|n| PathBuf::from(format!("out/{name}-{n}")));
+    std::iter::once(PathBuf::from(format!("out/{name}")))
+        .chain(numbered)
+        .find(|path| !taken(path))
+        .expect("endless")
+}
