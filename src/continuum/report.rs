@@ -128,7 +128,13 @@ fn facts(scene: &Scene, plan: &Plan) -> Result<Vec<(String, String)>, SceneError
     let stop = match (&scene.equilibrium, plan.stop.tolerance) {
         (Some(asked), _) => {
             let (solver, why) = foresee(scene, &asked.request, plan)?;
-            format!("in the equilibrium of step {}, found by {solver}: {why}", plan.stop.steps)
+            let spacing = match asked.accuracy {
+                Some(part) => {
+                    format!("; for an accuracy of {} % the run may halve the spacing", 100.0 * part)
+                }
+                None => String::new(),
+            };
+            format!("in the equilibrium of step {}, found by {solver}: {why}{spacing}", plan.stop.steps)
         }
         (None, Some(tolerance)) => {
             format!("at residual {tolerance:e}, at the latest after {} steps", plan.stop.steps)

@@ -28,7 +28,7 @@ pub enum SolveError {
     )]
     NotSymmetric { solver: Solver, first: usize, second: usize },
     #[error(
-        "the body is not stable: {solver} found a displacement that costs no energy or gains some (iteration {iteration})"
+        "the body is not stable, or its stiffnesses are further apart than the digits of a double: {solver} found a displacement that costs no energy or gains some (iteration {iteration})"
     )]
     NotPositive { solver: Solver, iteration: usize },
     #[error("{solver} diverged: the residual had grown to {residual:e} after {iterations} iterations")]

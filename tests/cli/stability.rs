@@ -1,24 +1,6 @@
 //! `flockform stability` as a person meets it.
 
-use std::path::Path;
-use std::process::{Command, Output};
-
-fn flockform(arguments: &[&str], folder: &Path) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_flockform"))
-        .args(arguments)
-        .current_dir(folder)
-        .env_remove("RUST_LOG")
-        .output()
-        .expect("the program starts")
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8_lossy(bytes).into_owned()
-}
-
-fn temporary() -> tempfile::TempDir {
-    tempfile::tempdir().expect("a temporary folder")
-}
+use crate::program::*;
 
 const QUICK: [&str; 4] = ["stability", "tension", "--quick", "--no-extremes"];
 

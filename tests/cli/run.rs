@@ -1,25 +1,10 @@
-//! The program as a person meets it: what it prints, what it writes, and how it refuses.
+//! `flockform run`, `scenes`, `plan`, `schema`, `trade` and `bench`, and what they refuse.
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::Command;
 use std::time::{Duration, Instant};
 
-fn flockform(arguments: &[&str], folder: &Path) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_flockform"))
-        .args(arguments)
-        .current_dir(folder)
-        .env_remove("RUST_LOG")
-        .output()
-        .expect("the program starts")
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8_lossy(bytes).into_owned()
-}
-
-fn temporary() -> tempfile::TempDir {
-    tempfile::tempdir().expect("a temporary folder")
-}
+use crate::program::*;
 
 /// Everything below a folder, hidden files included.
 fn files(folder: &Path) -> Vec<PathBuf> {

@@ -1,19 +1,17 @@
 //! `flockform material` as a person meets it, and the numbers it reports.
 
-use std::process::{Command, Output};
+use std::path::Path;
+use std::process::Output;
 
 use flockform::flock::lattice::{Lattice, LatticeKind};
 use flockform::material::elastic::{Constants, Elastic, Plane};
 use flockform::material::report::MaterialReport;
 use serde_json::Value;
 
+use crate::program::*;
+
 fn material(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_flockform"))
-        .arg("material")
-        .args(arguments)
-        .env_remove("RUST_LOG")
-        .output()
-        .expect("the program starts")
+    flockform(&[&["material"], arguments].concat(), Path::new("."))
 }
 
 fn said(arguments: &[&str]) -> String {
