@@ -216,7 +216,7 @@ fn extremes_end_right_or_refused() {
             "nu = 0.499, plane stress:",
             "nu = -0.99, plane strain:",
             "nu = 0.499, plane strain:",
-            "stiffness contrast 1e6, direct",
+            "stiffness contrast 1e6, multigrid",
             "cells of 1000.0 by 1.0",
             "cells of 1.0 by 1000.0",
             "a strip of aspect ratio 1000, pulled",
