@@ -58,7 +58,8 @@ fn chosen(name: &str, overrides: &[&str], accuracy: &str) -> Result<Scene, Scene
     let scene = bundled(name).expect("bundled");
     let mut base: Vec<String> = overrides.iter().map(|o| (*o).to_owned()).collect();
     base.push(format!("equilibrium.accuracy={accuracy}"));
-    choose(&|more| scene.load(&[&base, more].concat())).map(|chosen| chosen.scene)
+    let load = |more: &[String]| scene.load(&[&base, more].concat());
+    choose(load(&[])?, &load).map(|chosen| chosen.scene)
 }
 
 #[test]

@@ -46,10 +46,9 @@ pub fn run(arguments: &RunArguments) -> Result<ExitCode, Refusal> {
 fn run_here(arguments: &RunArguments) -> Result<ExitCode, Refusal> {
     let start = Instant::now();
     let steps = arguments.steps.map(|steps| format!("stop.steps={steps}"));
-    // Asked for first, so that a misspelt name is a misspelt name.
-    arguments.scene.load(steps.clone())?;
+    let scene = arguments.scene.load(steps.clone())?;
     let load = |more: &[String]| arguments.scene.load_scene(&[steps.as_slice(), more].concat());
-    let Chosen { scene, words } = choose(&load)?;
+    let Chosen { scene, words } = choose(scene, &load)?;
     let plan = plan(&scene)?;
     let folder = arguments.output.folder(&scene.name)?;
     let setup = start.elapsed();

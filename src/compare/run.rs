@@ -103,8 +103,7 @@ pub fn compare(
     let time = start.elapsed();
 
     let engine = &outcome.engine;
-    let moved = |(p, x): ([f64; 2], [f64; 2])| [x[0] - p[0], x[1] - p[1]];
-    let rule: Points = engine.body().reference.iter().zip(engine.present().iter()).map(moved).collect();
+    let rule: Points = (0..engine.body().count()).map(|i| engine.displacement(i)).collect();
     let followed = |(i, &role): (usize, &Role)| role == Role::Follower && truth.truth.knows(i);
     let follows: Vec<bool> = engine.roles().iter().enumerate().map(followed).collect();
     let (elastic, known) = (&truth.elastic, &truth.truth.displacement);
@@ -118,8 +117,12 @@ pub fn compare(
     Ok(Compared { comparison, outcome, truth, cells, rule, von_mises_rule, von_mises_truth })
 }
 
-fn plan_led_by(scene: &Scene, truth: &Truth) -> Result<Plan, SceneError> {
-    // Leaders are particles of cells, or the truth would have been refused.
+/// The plan of a scene, its leaders led by this truth of its body or of a finer one; a leader that the truth
+/// does not know has no place to go.
+///
+/// # Errors
+/// As [`Plan::new`].
+pub fn plan_led_by(scene: &Scene, truth: &Truth) -> Result<Plan, SceneError> {
     Plan::with_truth(scene, &|places| match truth.displacements_at(places) {
         Ok(found) => found.iter().collect(),
         Err(_) => vec![[f64::NAN; 2]; places.len()],

@@ -114,6 +114,12 @@ impl Engine {
         &self.present
     }
 
+    /// Where one particle is from its place in the reference configuration \[length\].
+    pub fn displacement(&self, particle: usize) -> [f64; 2] {
+        let ([x, y], [px, py]) = (self.present.get(particle), self.body.reference.get(particle));
+        [x - px, y - py]
+    }
+
     pub fn previous(&self) -> &Points {
         &self.previous
     }

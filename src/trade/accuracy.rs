@@ -33,12 +33,12 @@ pub struct Chosen {
 }
 
 /// Chooses the widest spacing, the written one at most, at which the scene's followers are as near to
-/// elasticity as its accuracy asks; a scene without an accuracy is returned as it is.
+/// elasticity as its accuracy asks; a scene without an accuracy is returned as it is. `load` loads `scene`
+/// with more overrides.
 ///
 /// # Errors
 /// Names what keeps the scene from being refined, or how near it came.
-pub fn choose(load: Load<'_>) -> Result<Chosen, SceneError> {
-    let scene = load(&[])?;
+pub fn choose(scene: Scene, load: Load<'_>) -> Result<Chosen, SceneError> {
     let Some(accuracy) = scene.equilibrium.and_then(|asked| asked.accuracy) else {
         return Ok(Chosen { scene, words: String::new() });
     };
@@ -123,17 +123,13 @@ fn apart(coarse: &Outcome, fine: &Outcome) -> Option<f64> {
     let cell = |p: [f64; 2]| p.map(|v| (v / grain).round() as i64);
     let places: HashMap<[i64; 2], usize> =
         (0..body.count()).map(|i| (cell(body.reference.get(i)), i)).collect();
-    let displacement = |outcome: &Outcome, i: usize| {
-        let (x, p) = (outcome.engine.present().get(i), outcome.engine.body().reference.get(i));
-        [x[0] - p[0], x[1] - p[1]]
-    };
     let reference = &coarse.engine.body().reference;
     let followers = (0..reference.len()).filter(|&i| coarse.engine.roles()[i] == Role::Follower);
     let (mut off, mut size, mut met, mut all) = (0.0, 0.0, 0usize, 0usize);
     for i in followers {
         all += 1;
         let Some(&j) = places.get(&cell(reference.get(i))) else { continue };
-        let (u, v) = (displacement(coarse, i), displacement(fine, j));
+        let (u, v) = (coarse.engine.displacement(i), fine.engine.displacement(j));
         off += distance(u, v).powi(2);
         size += v[0] * v[0] + v[1] * v[1];
         met += 1;

@@ -6,10 +6,9 @@ use std::time::Instant;
 use serde::Serialize;
 
 use super::grid::{Grid, RuleChoice, Setting, body_overrides, settings, solver_overrides};
-use crate::compare::run::{SceneTruth, truth_of};
+use crate::compare::run::{SceneTruth, plan_led_by, truth_of};
 use crate::compare::truth::Truth;
 use crate::continuum::equilibrium::settle;
-use crate::continuum::plan::Plan;
 use crate::continuum::run::Outcome as RunOutcome;
 use crate::flock::points::distance;
 use crate::flock::role::Role;
@@ -76,7 +75,7 @@ pub fn run(load: Load<'_>, grid: &Grid, tell: &mut dyn FnMut(&Setting)) -> Resul
     for rule in RuleChoice::ALL {
         for &spacing in &grid.spacings {
             let overrides = body_overrides(&scene, rule, spacing);
-            let particles = match load(&overrides).and_then(|scene| led(&scene, &truth.truth)) {
+            let particles = match load(&overrides).and_then(|scene| plan_led_by(&scene, &truth.truth)) {
                 Ok(plan) if plan.count() <= grid.most_particles => plan.count(),
                 Ok(_) => continue,
                 Err(error) => {
@@ -115,13 +114,6 @@ fn finest_truth(load: Load<'_>, scene: &Scene, grid: &Grid) -> Result<SceneTruth
     truth_of(scene, None)
 }
 
-fn led(scene: &Scene, truth: &Truth) -> Result<Plan, SceneError> {
-    Plan::with_truth(scene, &|places| match truth.displacements_at(places) {
-        Ok(found) => found.iter().collect(),
-        Err(_) => vec![[f64::NAN; 2]; places.len()],
-    })
-}
-
 fn refused(rule: RuleChoice, spacing: f64, error: &SceneError) -> Point {
     let setting = Setting { rule, spacing, solver: "", tolerance: 0.0, bits: 64 };
     let outcome = Outcome::Refused { reason: reason(error) };
@@ -138,7 +130,7 @@ fn measure(scene: &Scene, truth: &Truth, setting: Setting, particles: usize, rep
     let mut last = None;
     for _ in 0..repeats.max(1) {
         let start = Instant::now();
-        let settled = led(scene, truth).and_then(|plan| match &scene.equilibrium {
+        let settled = plan_led_by(scene, truth).and_then(|plan| match &scene.equilibrium {
             Some(asked) => settle(scene, &asked.request, plan),
             None => Err(scene.refuse("equilibrium", "no solver is set", "set one")),
         });
@@ -173,8 +165,7 @@ fn error_of(outcome: &RunOutcome, truth: &Truth) -> Option<f64> {
     let known = truth.displacements_at(&places).ok()?;
     let (mut off, mut size) = (0.0, 0.0);
     for (i, t) in followers.zip(known.iter()) {
-        let (x, p) = (engine.present().get(i), reference.get(i));
-        off += distance([x[0] - p[0], x[1] - p[1]], t).powi(2);
+        off += distance(engine.displacement(i), t).powi(2);
         size += t[0] * t[0] + t[1] * t[1];
     }
     Some((off / size).sqrt()).filter(|error| error.is_finite())
