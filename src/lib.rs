@@ -17,6 +17,8 @@
 //! * `fem` (feature `fem`): finite elements, the truth to hold the rules against; it knows no flock.
 //! * `compare` (feature `fem`): rule and truth on the same body, and the numbers that tell them apart.
 //! * `trade` (feature `fem`): what accuracy costs: many settings of a scene against its truth.
+//! * `swarm` (feature `swarm`): formations of robots: targets by the same rule, made safe; flights of simulated robots.
+//! * `ros` (feature `ros`): the same over ROS 2: arguments, messages, parameters, lifecycle, the node.
 //! * `bench` (feature `bench`): how fast sweeps and solvers are, beside what the machine and others can do.
 //!
 //! ```
@@ -45,5 +47,9 @@ pub mod compare;
 pub mod export;
 #[cfg(feature = "fem")]
 pub mod fem;
+#[cfg(feature = "ros")]
+pub mod ros;
+#[cfg(feature = "swarm")]
+pub mod swarm;
 #[cfg(feature = "fem")]
 pub mod trade;

@@ -93,3 +93,13 @@ fn trade_stands_on_compare_and_knows_nothing_of_outputs() {
 fn stability_knows_nothing_of_outputs() {
     assert_imports_only("stability", &["scene", "continuum", "flock", "material", "solve"]);
 }
+
+#[test]
+fn the_swarm_knows_nothing_of_middleware_and_outputs() {
+    assert_imports_only("swarm", &["scene", "continuum", "flock", "material", "solve"]);
+}
+
+#[test]
+fn ros_is_an_edge_of_the_swarm() {
+    assert_imports_only("ros", &["scene", "continuum", "flock", "swarm"]);
+}

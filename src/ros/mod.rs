@@ -1,0 +1,1 @@
+//! The edge to ROS 2: what the node reads from its command line, the messages it speaks, the node itself.

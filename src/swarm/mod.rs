@@ -1,0 +1,1 @@
+//! The swarm host: the flocking rule moves robots, safely.
