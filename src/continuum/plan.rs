@@ -92,6 +92,25 @@ impl Plan {
         Ok(plan)
     }
 
+    /// Particles on no lattice, who see each other through `interaction`; those with another role than to follow
+    /// are led from outside.
+    pub fn of_places(body: Body, interaction: Interaction, roles: Vec<Role>, update: Update) -> Self {
+        let (low, high) = body.bounds();
+        Self {
+            present_radius: None,
+            changes: Vec::new(),
+            cuts: Vec::new(),
+            stop: Stop { steps: usize::MAX, tolerance: None, growth: f64::INFINITY },
+            diagonal: distance(low, high).max(body.lattice.spacing()),
+            probes: Vec::new(),
+            cells: None,
+            body,
+            interaction,
+            update,
+            roles,
+        }
+    }
+
     pub fn count(&self) -> usize {
         self.body.count()
     }
