@@ -150,7 +150,9 @@ impl Interaction {
             present: present.get(particle),
             reference,
             rest: self.rule.rest_offset(reference, kept(&self.reference).map(shared)),
-            load: self.load(particle).map(|load| Load { compliance: product(&share, &load.compliance), ..load }),
+            load: self
+                .load(particle)
+                .map(|load| Load { compliance: product(&share, &load.compliance), ..load }),
         };
         Some(self.rule.target(&own, kept(present).map(shared)))
     }

@@ -132,7 +132,16 @@ mod tests {
         let manoeuvre = Manoeuvre { about: [0.0; 2], from: Posture::NOMINAL, legs };
         assert_eq!(manoeuvre.duration(), 7.0);
         let along = |time: f64| manoeuvre.posture(time).translate[0];
-        let expected = [(-1.0, 0.0), (0.0, 0.0), (1.0, 2.5), (2.0, 5.0), (2.9, 5.0), (5.0, 2.5), (7.0, 0.0), (99.0, 0.0)];
+        let expected = [
+            (-1.0, 0.0),
+            (0.0, 0.0),
+            (1.0, 2.5),
+            (2.0, 5.0),
+            (2.9, 5.0),
+            (5.0, 2.5),
+            (7.0, 0.0),
+            (99.0, 0.0),
+        ];
         for (time, x) in expected {
             assert_eq!(along(time), x, "at {time} s");
         }

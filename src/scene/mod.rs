@@ -8,6 +8,7 @@
 pub mod bundled;
 pub mod document;
 pub mod raw;
+pub mod swarm;
 pub mod table;
 pub mod validate;
 

@@ -143,7 +143,7 @@ pub enum RawFaultKind {
 }
 
 /// What has to hold; a flight that breaks one of these ends with exit code 1.
-#[derive(Clone, Debug, Default, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawBounds {
     /// Largest distance of a follower from where the leaders' affine motion has its place, ever [m].
@@ -170,4 +170,17 @@ pub struct RawBounds {
     #[serde(default)]
     #[schemars(range(min = 0))]
     pub continuum_error: Option<f64>,
+}
+
+impl Default for RawBounds {
+    fn default() -> Self {
+        Self {
+            affine_error: None,
+            final_error: None,
+            clearance: None,
+            settling_time: None,
+            settled_within: defaults::settling(),
+            continuum_error: None,
+        }
+    }
 }

@@ -43,9 +43,7 @@ pub enum RawProgram {
         scale: f64,
     },
     /// With the other leaders, by one of the `manoeuvres`.
-    Manoeuvre {
-        name: String,
-    },
+    Manoeuvre { name: String },
 }
 
 /// Where a leader is at a time.

@@ -185,9 +185,6 @@ pub(super) mod defaults {
     pub fn one() -> f64 {
         1.0
     }
-    pub fn duration() -> f64 {
-        30.0
-    }
     pub fn yes() -> bool {
         true
     }
