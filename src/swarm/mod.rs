@@ -1,1 +1,3 @@
 //! The swarm host: the flocking rule moves robots, safely.
+
+pub mod robots;
