@@ -1,3 +1,5 @@
 //! The swarm host: the flocking rule moves robots, safely.
 
+pub mod channel;
 pub mod robots;
+pub mod watch;
