@@ -6,6 +6,7 @@ mod output;
 mod progress;
 mod run;
 mod stability;
+mod swarm;
 mod trade;
 
 use std::io::IsTerminal;
@@ -16,7 +17,7 @@ use clap::{Args, CommandFactory, Parser, Subcommand};
 use clap_complete::Shell;
 use flockform::compare::run::plan;
 use flockform::continuum::report::PlanReport;
-use flockform::scene::{self, Scene, SceneError, bundled};
+use flockform::scene::{self, Bundled, Scene, SceneError, bundled};
 use flockform::{bench, export};
 
 /// Exit code of a run that started and failed: diverged or interrupted.
@@ -63,6 +64,15 @@ pub enum Command {
                       Exit codes: 0 predictions and runs agree and no extreme is wrong, 1 otherwise, 2 bad input."
     )]
     Stability(stability::StabilityArguments),
+    /// Fly a swarm of simulated robots, without middleware, and say how it went
+    #[command(
+        after_help = "Example:\n  flockform swarm gap --out /tmp/gap\n  flockform swarm antipodal --set limits.speed=0.5\n\n\
+                      Exit codes: 0 flown and every declared bound held, 1 a bound broken or interrupted, 2 bad input."
+    )]
+    Swarm(swarm::SwarmArguments),
+    /// List the bundled swarms
+    #[command(after_help = "Example:\n  flockform swarms")]
+    Swarms,
     /// List the bundled scenes
     #[command(after_help = "Example:\n  flockform scenes")]
     Scenes,
@@ -78,8 +88,12 @@ pub enum Command {
     )]
     Material(material::MaterialArguments),
     /// Print the JSON Schema of a scene file
-    #[command(after_help = "Example:\n  flockform schema > scene.schema.json")]
-    Schema,
+    #[command(after_help = "Example:\n  flockform schema > scene.schema.json\n  flockform schema --swarm")]
+    Schema {
+        /// Of a swarm file instead
+        #[arg(long)]
+        swarm: bool,
+    },
     /// Print a completion script for a shell
     #[command(
         after_help = "Example:\n  flockform completions bash > ~/.local/share/bash-completion/completions/flockform"
@@ -132,7 +146,7 @@ impl SceneArguments {
     fn load(&self, more: impl IntoIterator<Item = String>) -> Result<Scene, Refusal> {
         let more: Vec<String> = more.into_iter().collect();
         if bundled(&self.scene).is_none() {
-            self.path()?;
+            scene_path("scene", &self.scene, bundled::SCENES)?;
         }
         Ok(self.load_scene(&more)?)
     }
@@ -145,18 +159,18 @@ impl SceneArguments {
             None => Scene::from_file(Path::new(&self.scene), &overrides),
         }
     }
+}
 
-    /// The scene as a path; a word that is no file is taken for the name of a bundled scene, misspelt.
-    fn path(&self) -> Result<PathBuf, Refusal> {
-        let path = PathBuf::from(&self.scene);
-        if path.exists() || self.scene.contains(['/', '\\', '.']) {
-            return Ok(path);
-        }
-        let likeness = |name: &str| strsim::jaro_winkler(name, &self.scene);
-        let names = bundled::SCENES.iter().map(|scene| scene.name);
-        let nearest = names.max_by(|a, b| likeness(a).total_cmp(&likeness(b))).unwrap_or_default();
-        Err(Refusal::NoScene { name: self.scene.clone(), nearest })
+/// A word as a path; one that is no file is taken for the name of something bundled, misspelt.
+fn scene_path(what: &'static str, word: &str, all: &[Bundled]) -> Result<PathBuf, Refusal> {
+    let path = PathBuf::from(word);
+    if path.exists() || word.contains(['/', '\\', '.']) {
+        return Ok(path);
     }
+    let likeness = |name: &str| strsim::jaro_winkler(name, word);
+    let names = all.iter().map(|one| one.name);
+    let nearest = names.max_by(|a, b| likeness(a).total_cmp(&likeness(b))).unwrap_or_default();
+    Err(Refusal::NotBundled { what, name: word.to_owned(), nearest })
 }
 
 /// Why nothing was done.
@@ -167,9 +181,9 @@ pub enum Refusal {
     #[error("{0}")]
     Export(#[from] export::ExportError),
     #[error(
-        "there is no scene file and no bundled scene `{name}`\n  help: the nearest bundled scene is `{nearest}`; `flockform scenes` lists them all"
+        "there is no {what} file and no bundled {what} `{name}`\n  help: the nearest bundled {what} is `{nearest}`; `flockform {what}s` lists them all"
     )]
-    NoScene { name: String, nearest: &'static str },
+    NotBundled { what: &'static str, name: String, nearest: &'static str },
     #[error("{0}")]
     Option(#[from] material::WrongOption),
     #[error("no threads to measure with: {0}")]
@@ -196,13 +210,16 @@ pub fn dispatch(command: Command) -> Result<ExitCode, Refusal> {
         Command::Compare(arguments) => return compare::compare(&arguments),
         Command::Trade(arguments) => return trade::trade(&arguments),
         Command::Stability(arguments) => return stability::stability(&arguments),
-        Command::Scenes => list_scenes()?,
+        Command::Swarm(arguments) => return swarm::swarm(&arguments),
+        Command::Scenes => list(bundled::SCENES, |scene| Ok(scene.load(&[])?.raw.title))?,
+        Command::Swarms => list(bundled::SWARMS, |swarm| Ok(swarm.load_swarm(&[])?.raw.title))?,
         Command::Plan(arguments) => {
             let scene = arguments.load([])?;
             print(&PlanReport::new(&scene, &plan(&scene)?)?.to_string());
         }
         Command::Material(arguments) => print(&material::answer(&arguments)?),
-        Command::Schema => print(&format!("{:#}\n", scene::validate::schema())),
+        Command::Schema { swarm: false } => print(&format!("{:#}\n", scene::validate::schema())),
+        Command::Schema { swarm: true } => print(&format!("{:#}\n", scene::swarm::schema())),
         Command::Completions { shell } => {
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut Arguments::command(), "flockform", &mut script);
@@ -221,10 +238,10 @@ pub fn dispatch(command: Command) -> Result<ExitCode, Refusal> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn list_scenes() -> Result<(), SceneError> {
-    let width = bundled::SCENES.iter().map(|scene| scene.name.len()).max().unwrap_or(0);
-    for scene in bundled::SCENES {
-        print(&format!("{:width$}  {}\n", scene.name, scene.load(&[])?.raw.title));
+fn list(all: &[Bundled], title: impl Fn(&Bundled) -> Result<String, SceneError>) -> Result<(), SceneError> {
+    let width = all.iter().map(|one| one.name.len()).max().unwrap_or(0);
+    for one in all {
+        print(&format!("{:width$}  {}\n", one.name, title(one)?));
     }
     Ok(())
 }

@@ -1,6 +1,7 @@
 //! Fixed weights of the neighbours, from what the scene says of them and of its material.
 
 use super::interior::{self, gradient};
+use crate::flock::affine_weights;
 use crate::flock::body::Body;
 use crate::flock::interaction::Weights;
 use crate::flock::lattice::Site;
@@ -22,6 +23,7 @@ pub fn of_body(
     body: &Body,
     neighbours: &Neighbours,
     cells: Option<&Cells>,
+    follows: &[bool],
 ) -> Result<Weights, SceneError> {
     if let (Mean::Material { .. }, Some(cells), Some(elastic)) = (scene.mean, cells, &scene.material) {
         return of_material(scene, body, neighbours, cells, elastic);
@@ -40,6 +42,13 @@ pub fn of_body(
             let offsets = scene.neighbourhood.offsets(&scene.lattice).unwrap_or_default();
             interior::check_count(scene, values, &offsets)?;
             Ok(Weights::Scalar(listed_weights(values, &offsets, body, neighbours)))
+        }
+        Some(FixedWeights::Solved) => {
+            let solved = affine_weights::solve(&body.reference, neighbours, follows).map_err(|error| {
+                let help = "use a wider neighbourhood or a frame, or let a leader have this place";
+                scene.refuse("rule.weights", error.to_string(), help)
+            })?;
+            Ok(Weights::Scalar(solved.weights))
         }
         Some(FixedWeights::Gradient { length }) => {
             let gradient = gradient(scene, *length)?;

@@ -385,7 +385,7 @@ fn filter(swarm: &Swarm, limits: Limits, radii: Vec<f64>) -> Result<Filter, Scen
         .obstacles
         .iter()
         .map(|obstacle| match obstacle {
-            RawObstacle::Polygon { vertices } => Obstacle::Polygon { vertices: vertices.clone() },
+            RawObstacle::Polygon { vertices } => Obstacle::Polygon(vertices.clone()),
             RawObstacle::Disc { centre, radius } => Obstacle::Disc { centre: *centre, radius: *radius },
         })
         .collect();

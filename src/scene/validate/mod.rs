@@ -332,6 +332,7 @@ fn weights(raw: &Option<RawWeights>, refuse: Refuse<'_>) -> Result<Option<Weight
     Ok(match raw {
         None => None,
         Some(RawWeights::Distance { power }) => Some(Weights::Distance { power: *power }),
+        Some(RawWeights::Solved {}) => Some(Weights::Solved),
         Some(RawWeights::Gradient { length }) => Some(Weights::Gradient { length: *length }),
         Some(RawWeights::List { values }) => {
             // Also refuses a sum that is nothing but rounding, whose mean would be noise.

@@ -167,6 +167,9 @@ impl Filter {
         let radius = radius + 2.0 * reach + 4.0 * drift;
         let Crowd { grid, seen: ever_seen, found, .. } = &mut self.crowd;
         found.clear();
+        if !self.limits.keeps_apart {
+            return;
+        }
         if self.radii.len() >= GRID_FROM {
             grid.within(seen.present, member, radius, found);
             found.sort_unstable();

@@ -10,6 +10,9 @@ pub struct Limits {
     pub speed: f64,
     /// Highest acceleration \[m/s^2\]; default none (infinite). It takes velocities to hold it.
     pub acceleration: f64,
+    /// Whether members are kept apart from each other at all; default yes. Without it the clearance is
+    /// that from obstacles.
+    pub keeps_apart: bool,
     /// Free space kept between the rims of two members, and of a member and an obstacle \[m\];
     /// default 0.
     pub clearance: f64,
@@ -25,6 +28,7 @@ impl Default for Limits {
         Self {
             speed: f64::INFINITY,
             acceleration: f64::INFINITY,
+            keeps_apart: true,
             clearance: 0.0,
             geofence: None,
             patience: Patience::default(),

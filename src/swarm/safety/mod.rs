@@ -34,6 +34,7 @@
 //! It is a filter, not a planner: it goes around what is convex and waits before what is not.
 
 mod cell;
+mod clearance;
 mod deadlock;
 mod filter;
 mod limits;
