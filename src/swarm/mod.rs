@@ -3,3 +3,4 @@
 pub mod channel;
 pub mod robots;
 pub mod watch;
+pub mod weights;
