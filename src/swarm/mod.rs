@@ -12,3 +12,4 @@ pub mod formation;
 pub mod robots;
 pub mod safety;
 pub mod watch;
+pub mod weights;
