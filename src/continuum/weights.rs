@@ -1,7 +1,6 @@
 //! Fixed weights of the neighbours, from what the scene says of them and of its material.
 
 use super::interior::{self, gradient};
-use crate::flock::affine_weights;
 use crate::flock::body::Body;
 use crate::flock::interaction::Weights;
 use crate::flock::lattice::Site;
@@ -12,6 +11,7 @@ use crate::material::cells::Cells;
 use crate::material::elastic::Elastic;
 use crate::material::weights::{MaterialWeights, WeightsError};
 use crate::scene::{Scene, SceneError, Weights as FixedWeights};
+use crate::solve::affine_weights;
 
 /// Weights of the body's bonds; of a material those of its cells.
 ///
@@ -46,7 +46,7 @@ pub fn of_body(
         Some(FixedWeights::Solved) => {
             let solved = affine_weights::solve(&body.reference, neighbours, follows).map_err(|error| {
                 let help = "use a wider neighbourhood or a frame, or let a leader have this place";
-                scene.refuse("rule.weights", error.to_string(), help)
+                scene.refuse("rule.weights", error.told(|i| format!("particle {}", i + 1)), help)
             })?;
             Ok(Weights::Scalar(solved.weights))
         }

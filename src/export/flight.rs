@@ -82,7 +82,7 @@ fn errors(record: &Record, report: &FlightReport) -> String {
     if shape.iter().any(visible) {
         charts.push(Chart {
             title: report.title.clone(),
-            note: "largest distance of a follower from its place".into(),
+            note: "largest distance of a robot from its place".into(),
             axes: [time, Axis { quantity: "distance", unit: "m", is_log: true }],
             series: shape.into_iter().filter(visible).collect(),
             landmarks: Vec::new(),

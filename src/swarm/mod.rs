@@ -12,4 +12,3 @@ pub mod formation;
 pub mod robots;
 pub mod safety;
 pub mod watch;
-pub mod weights;

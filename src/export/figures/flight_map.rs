@@ -21,7 +21,9 @@ const MOST_WAYS: usize = 400;
 const ROUND: usize = 48;
 
 pub fn flight(swarm: &Swarm, record: &Record, report: &FlightReport) -> String {
-    let (Some(first), Some(last)) = (record.tracks.first(), record.tracks.last()) else { return String::new() };
+    let (Some(first), Some(last)) = (record.tracks.first(), record.tracks.last()) else {
+        return String::new();
+    };
     let leads = |m: usize| report.per_robot[m].role != Role::Follower.name();
     let count = first.len();
     let shown: Points = record
@@ -53,7 +55,10 @@ pub fn flight(swarm: &Swarm, record: &Record, report: &FlightReport) -> String {
                         record.tracks.iter().map(|places| axes.place(places.get(m))).collect();
                     ways.polyline(simplified(&way));
                 }
-                svg.path(&ways, format_args!("class=\"way\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"0.9\""));
+                svg.path(
+                    &ways,
+                    format_args!("class=\"way\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"0.9\""),
+                );
             }
         }
         svg.group(format_args!("class=\"start\" fill=\"none\" stroke=\"{START}\""), |svg| {

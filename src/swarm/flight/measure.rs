@@ -9,7 +9,7 @@ use crate::scene::swarm::Swarm;
 pub struct Sample {
     /// At the end of the period \[s\].
     pub time: f64,
-    /// Largest distance of a follower from its place under the leaders' affine motion.
+    /// Largest distance of a robot, leaders included, from its place under the leaders' affine motion.
     pub affine_error: Option<f64>,
     /// Largest distance of a follower from where the rule comes to rest behind the leaders as they are.
     pub formation_error: Option<f64>,
@@ -67,10 +67,9 @@ impl Record {
         for (least, &now) in self.clearances.iter_mut().zip(&self.around) {
             *least = least.min(now);
         }
-        let follower = |&m: &usize| !formation.leads(m) && flight.is_able(m);
         let worst = |place: &dyn Fn(usize) -> [f64; 2]| {
             let apart = |m: usize| distance(place(m), present.get(m));
-            (0..formation.count()).filter(follower).map(apart).fold(0.0, f64::max)
+            (0..formation.count()).filter(|&m| flight.is_able(m)).map(apart).fold(0.0, f64::max)
         };
         let affine = formation.affine(control.program_time());
         let measures = formation.measures(&present);

@@ -50,7 +50,11 @@ fn mean_value(corners: &[[f64; 2]], place: [f64; 2]) -> Option<Vec<f64>> {
         if cross <= tolerance * size {
             // On the line of a side: on the side itself, or outside.
             let whole = lengths[k] + lengths[(k + 1) % count];
-            return if dot < 0.0 { only(k, lengths[(k + 1) % count] / whole, lengths[k] / whole) } else { None };
+            return if dot < 0.0 {
+                only(k, lengths[(k + 1) % count] / whole, lengths[k] / whole)
+            } else {
+                None
+            };
         }
         half_tangents.push((along - dot) / cross);
     }
@@ -65,13 +69,15 @@ fn mean_value(corners: &[[f64; 2]], place: [f64; 2]) -> Option<Vec<f64>> {
 mod tests {
     use super::*;
 
-    const HEXAGON: [[f64; 2]; 6] = [[1.0, 0.0], [0.5, 0.9], [-0.5, 0.9], [-1.0, 0.0], [-0.5, -0.9], [0.5, -0.9]];
+    const HEXAGON: [[f64; 2]; 6] =
+        [[1.0, 0.0], [0.5, 0.9], [-0.5, 0.9], [-1.0, 0.0], [-0.5, -0.9], [0.5, -0.9]];
 
     #[test]
     fn shares_sum_to_one_and_reproduce_the_place() {
         for place in [[0.0, 0.0], [0.3, -0.2], [-0.9, 0.05], [0.5, 0.9], [0.0, 0.9], [0.75, 0.45]] {
             let shares = mean_value(&HEXAGON, place).unwrap_or_else(|| panic!("{place:?} is inside"));
-            let [x, y] = shares.iter().zip(HEXAGON).fold([0.0; 2], |[a, b], (w, c)| [a + w * c[0], b + w * c[1]]);
+            let [x, y] =
+                shares.iter().zip(HEXAGON).fold([0.0; 2], |[a, b], (w, c)| [a + w * c[0], b + w * c[1]]);
             assert!((shares.iter().sum::<f64>() - 1.0).abs() < 1e-14);
             assert!((x - place[0]).abs() < 1e-9 && (y - place[1]).abs() < 1e-9, "{place:?}: {x} {y}");
             assert!(shares.iter().all(|&share| share >= 0.0));

@@ -4,7 +4,6 @@ use super::{Course, Formation, Lead, inside, links, spacing_of};
 use crate::continuum::engine::Engine;
 use crate::continuum::layout::Layout;
 use crate::continuum::plan::Plan;
-use crate::flock::affine_weights;
 use crate::flock::body::Body;
 use crate::flock::interaction::{Interaction, Weights};
 use crate::flock::manoeuvre::{Manoeuvre, Posture};
@@ -17,6 +16,7 @@ use crate::scene::raw::{RawRest, RawWeights};
 use crate::scene::swarm::raw::RawLinks;
 use crate::scene::swarm::{Program, Recording, Shape, Swarm, Who};
 use crate::scene::{RoleEntry, Scene, SceneError, SceneRegion};
+use crate::solve::affine_weights;
 use crate::solve::sweep::Update;
 
 impl Formation {
@@ -57,13 +57,13 @@ fn of_places(swarm: &Swarm, rule: Rule) -> Result<Formation, SceneError> {
         Some(RawWeights::Solved {}) => {
             let solved = affine_weights::solve(&places, &neighbours, &follows).map_err(|error| {
                 let help = "give it more neighbours on all its sides, or make it a leader";
-                let named = error.named(|i| format!("`{}`", names[i]));
-                swarm.refuse("rule.weights", named, help)
+                swarm.refuse("rule.weights", error.told(|i| format!("`{}`", names[i])), help)
             })?;
             Weights::Scalar(solved.weights)
         }
         Some(RawWeights::Distance { power }) => {
-            let weight = |i: usize, k: u32| (distance(places.get(i), places.get(k as usize)) / spacing).powf(*power);
+            let weight =
+                |i: usize, k: u32| (distance(places.get(i), places.get(k as usize)) / spacing).powf(*power);
             let all = (0..places.len()).flat_map(|i| neighbours.of(i).iter().map(move |&k| weight(i, k)));
             Weights::Scalar(all.collect())
         }
@@ -110,7 +110,8 @@ fn of_body(swarm: &Swarm, scene: &Scene) -> Result<Formation, SceneError> {
         let picked = layout.pick(scene, &format!("leaders[{k}]"), region)?;
         Ok(picked.into_iter().filter_map(|i| members.binary_search(&i).ok()).collect())
     })?;
-    let ids: Vec<usize> = (0..members.len()).filter(|&m| leads[m].is_some()).map(|m| members[m] + 1).collect();
+    let ids: Vec<usize> =
+        (0..members.len()).filter(|&m| leads[m].is_some()).map(|m| members[m] + 1).collect();
     let mut led = scene.clone();
     if !ids.is_empty() {
         let region = SceneRegion::Known(Region::Ids(ids));
@@ -205,7 +206,11 @@ fn leads(
                 .map(|(n, name)| {
                     names.iter().position(|known| known == name).ok_or_else(|| {
                         let message = format!("there is no robot `{name}`; the first is `{}`", names[0]);
-                        swarm.refuse(&format!("leaders[{k}].robots[{n}]"), message, "name a robot of this swarm")
+                        swarm.refuse(
+                            &format!("leaders[{k}].robots[{n}]"),
+                            message,
+                            "name a robot of this swarm",
+                        )
                     })
                 })
                 .collect::<Result<_, _>>()?,
@@ -231,7 +236,11 @@ fn lead(
         Program::Own(tracks) => {
             let track = tracks.iter().find(|(known, _)| known == name).ok_or_else(|| {
                 let key = format!("leaders[{entry}].program.path");
-                swarm.refuse(&key, format!("the file has no rows for `{name}`"), "give every leader rows of its own")
+                swarm.refuse(
+                    &key,
+                    format!("the file has no rows for `{name}`"),
+                    "give every leader rows of its own",
+                )
             })?;
             Lead::Motion { motion: track.1.clone(), since: 0.0 }
         }
@@ -258,7 +267,11 @@ fn require_apart(swarm: &Swarm, formation: &Formation) -> Result<(), SceneError>
                     "the places of `{}` and `{}` are {apart} m apart, and their radii and the clearance need {needed} m",
                     formation.names[j], formation.names[i]
                 );
-                return Err(swarm.refuse("limits.clearance", message, "widen the formation, or lower the clearance or the radius"));
+                return Err(swarm.refuse(
+                    "limits.clearance",
+                    message,
+                    "widen the formation, or lower the clearance or the radius",
+                ));
             }
         }
     }

@@ -43,7 +43,8 @@ fn listed(swarm: &Swarm) -> Result<Vec<Vec<u32>>, SceneError> {
         let number = |(n, name): (usize, &String)| {
             let key = format!("robots[{i}].neighbours[{n}]");
             let k = robots.iter().position(|other| other.name == *name);
-            let k = k.ok_or_else(|| swarm.refuse(&key, "there is no such robot", "name a robot of this file"))?;
+            let k =
+                k.ok_or_else(|| swarm.refuse(&key, "there is no such robot", "name a robot of this file"))?;
             if k == i {
                 return Err(swarm.refuse(&key, "a robot does not follow itself", "name others"));
             }

@@ -55,8 +55,14 @@ pub enum Lead {
     /// Told from outside; its place until it is told another.
     External([f64; 2]),
     /// From the time `since` on \[s\].
-    Motion { motion: Motion, since: f64 },
-    Manoeuvre { manoeuvre: Manoeuvre, since: f64 },
+    Motion {
+        motion: Motion,
+        since: f64,
+    },
+    Manoeuvre {
+        manoeuvre: Manoeuvre,
+        since: f64,
+    },
 }
 
 /// What is known of the members as a period begins.
@@ -228,9 +234,8 @@ impl Formation {
             }
             Course::Rule { engine, particles } => {
                 let members = 0..particles.len();
-                engine.observe(
-                    members.filter(|&m| seen.known[m]).map(|m| (particles[m], seen.present.get(m))),
-                );
+                engine
+                    .observe(members.filter(|&m| seen.known[m]).map(|m| (particles[m], seen.present.get(m))));
                 for sweep in 0..sweeps {
                     leads.iter().for_each(|&(m, place)| engine.lead(particles[m], place));
                     engine.advance();
@@ -289,12 +294,19 @@ impl Formation {
         let displaced = settling.displacements(of_particle);
         let mut rest: Points = self.places.clone();
         for (m, &i) in particles.iter().enumerate() {
-            match displaced(i) {
+            match displaced[i] {
                 Some(u) => rest.set(m, [self.places.x[m] + u[0], self.places.y[m] + u[1]]),
                 None => rest.set(m, present.get(m)),
             }
         }
         Some(rest)
+    }
+
+    /// Goes this much of the way to each target from the next period on \[1\].
+    pub fn set_damping(&mut self, damping: f64) {
+        if let Course::Rule { engine, .. } = &mut self.course {
+            engine.set_rule(engine.interaction().rule, damping);
+        }
     }
 
     /// PE1 of a member \[m^2\] with all where `present` has them.

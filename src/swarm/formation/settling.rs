@@ -52,20 +52,19 @@ impl Settling {
     }
 
     /// Displacement of each follower \[m\] when leaders have those that `of_particle` says; `None` for others.
-    pub fn displacements(
-        &self,
-        of_particle: impl Fn(usize) -> Option<[f64; 2]>,
-    ) -> impl Fn(usize) -> Option<[f64; 2]> + use<'_> {
+    /// Shape \[particles\].
+    pub fn displacements(&self, of_particle: impl Fn(usize) -> Option<[f64; 2]>) -> Vec<Option<[f64; 2]>> {
         let mut led = DMatrix::zeros(2 * self.leaders.len(), 1);
         for (n, &i) in self.leaders.iter().enumerate() {
             let [x, y] = of_particle(i).unwrap_or_default();
             (led[2 * n], led[2 * n + 1]) = (x, y);
         }
         let found = &self.answer * led + &self.offset;
-        move |i| {
-            let n = self.number[i].filter(|_| self.follows[i])?;
+        let of = |(number, &follows): (&Option<usize>, &bool)| {
+            let n = number.filter(|_| follows)?;
             Some([found[2 * n], found[2 * n + 1]])
-        }
+        };
+        self.number.iter().zip(&self.follows).map(of).collect()
     }
 }
 

@@ -11,7 +11,9 @@ impl Filter {
     /// between members the least ever, to obstacles at several places on the way. Shapes \[count\].
     pub fn clearance_on_the_way(&self, before: &Points, after: &Points, nearest: &mut Vec<f64>) {
         nearest.clear();
-        nearest.extend((0..after.len()).map(|m| self.from_obstacles(before.get(m), after.get(m)) - self.radii[m]));
+        nearest.extend(
+            (0..after.len()).map(|m| self.from_obstacles(before.get(m), after.get(m)) - self.radii[m]),
+        );
         for a in 0..after.len() {
             for b in 0..a {
                 let apart = |points: &Points| {
@@ -41,7 +43,8 @@ impl Filter {
 fn least_length(from: [f64; 2], to: [f64; 2]) -> f64 {
     let way = [to[0] - from[0], to[1] - from[1]];
     let square = way[0] * way[0] + way[1] * way[1];
-    let part = if square > 0.0 { (-(from[0] * way[0] + from[1] * way[1]) / square).clamp(0.0, 1.0) } else { 0.0 };
+    let part =
+        if square > 0.0 { (-(from[0] * way[0] + from[1] * way[1]) / square).clamp(0.0, 1.0) } else { 0.0 };
     f64::hypot(from[0] + part * way[0], from[1] + part * way[1])
 }
 
@@ -53,7 +56,8 @@ mod tests {
     #[test]
     fn two_that_pass_each_other_are_seen_to_come_close_in_between() {
         let wall = Obstacle::Disc { centre: [2.0, 5.0], radius: 1.0 };
-        let filter = Filter::new(Limits::default(), vec![0.25; 2], Obstacles::new(&[wall]).expect("solid")).expect("filter");
+        let filter = Filter::new(Limits::default(), vec![0.25; 2], Obstacles::new(&[wall]).expect("solid"))
+            .expect("filter");
         let before: Points = [[0.0, 0.0], [4.0, 1.0]].into_iter().collect();
         let after: Points = [[4.0, 0.0], [0.0, 1.0]].into_iter().collect();
         let mut nearest = Vec::new();

@@ -146,11 +146,11 @@ pub enum RawFaultKind {
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawBounds {
-    /// Largest distance of a follower from where the leaders' affine motion has its place, ever [m].
+    /// Largest distance of a robot from where the leaders' affine motion has its place, ever [m].
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub affine_error: Option<f64>,
-    /// The same at the end [m].
+    /// The same at the end, or the distance from where the rule comes to rest if there is no affine motion [m].
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub final_error: Option<f64>,

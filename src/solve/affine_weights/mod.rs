@@ -29,29 +29,41 @@ pub struct Solved {
     pub negative: Vec<usize>,
 }
 
-/// Why a shape has no weights. Members are named by index.
+/// Why a shape has no weights. Members are named by index; the texts are about them and do not name them.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum WeightsError {
-    #[error("member {member} follows and has no neighbours: give it at least 3, or make it a leader")]
+    #[error("follows and has no neighbours")]
     NoNeighbours { member: usize },
-    #[error("the place of member {member} or of one of its neighbours is not finite")]
+    #[error("has a place, or a neighbour with one, that is not finite")]
     NotFinite { member: usize },
     #[error(
-        "member {member} cannot be placed by its {neighbours} neighbours: they stand in one point or on one \
-         line, {off:.3e} of their spread away from it: give it neighbours off that line, or make it a leader"
+        "cannot be placed by its {neighbours} neighbours: they stand in one point or on one line, {off:.3e} of \
+         their spread away from it"
     )]
     Unreachable { member: usize, neighbours: usize, off: f64 },
     #[error(
-        "the weights of member {member} would multiply errors of its neighbours' poses by {factor:.3e}, at \
-         most {most} is allowed: its neighbours stand nearly on one line; give it neighbours off that line, \
-         or make it a leader"
+        "has neighbours that stand nearly on one line: its weights would multiply errors of their places by \
+         {factor:.3e}, at most {most} is allowed"
     )]
     Amplifies { member: usize, factor: f64, most: f64 },
     #[error(
-        "the formation does not come to rest: the slowest error is multiplied by {radius:.6} in every period, \
-         less than 1 is needed: make the members at the corners leaders, or give more neighbours"
+        "the slowest error is multiplied by {radius:.6} in every period, and less than 1 is needed: not everybody \
+         is tied to leaders that span the plane"
     )]
     DoesNotSettle { radius: f64 },
+}
+
+impl WeightsError {
+    /// The error as a sentence about whom it is about.
+    pub fn told(&self, name: impl Fn(usize) -> String) -> String {
+        match self {
+            Self::NoNeighbours { member }
+            | Self::NotFinite { member }
+            | Self::Unreachable { member, .. }
+            | Self::Amplifies { member, .. } => format!("{} {self}", name(*member)),
+            Self::DoesNotSettle { .. } => self.to_string(),
+        }
+    }
 }
 
 /// Sum of the weights' moduli up to which they are of use.
