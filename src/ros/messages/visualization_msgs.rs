@@ -29,7 +29,7 @@ pub struct Marker {
     pub id: i32,
     /// Shape, one of the constants.
     pub r#type: i32,
-    /// [`Marker::ADD`] (and modify), [`Marker::DELETE`] or [`Marker::DELETEALL`].
+    /// [`Marker::ADD`] (the same as modify), [`Marker::DELETE`] or [`Marker::DELETEALL`].
     pub action: i32,
     pub pose: Pose,
     /// Size \[m\]; for lines, `x` is their width.
@@ -68,6 +68,7 @@ impl Marker {
     pub const ARROW_STRIP: i32 = 12;
 
     pub const ADD: i32 = 0;
+    pub const MODIFY: i32 = 0;
     pub const DELETE: i32 = 2;
     pub const DELETEALL: i32 = 3;
 }
