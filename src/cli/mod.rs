@@ -1,6 +1,7 @@
 //! The command line: what can be asked for, and who answers.
 
 mod compare;
+mod install;
 mod material;
 mod output;
 mod progress;
@@ -77,6 +78,11 @@ pub enum Command {
                       flockform material second-gradient --json"
     )]
     Material(material::MaterialArguments),
+    /// Install this program as a ROS 2 package: executable, launch files, parameters, swarms
+    #[command(
+        after_help = "Example:\n  flockform install --prefix ~/flockform && source ~/flockform/setup.bash && ros2 launch flockform formation_launch.xml"
+    )]
+    Install(install::InstallArguments),
     /// Print the JSON Schema of a scene file
     #[command(after_help = "Example:\n  flockform schema > scene.schema.json")]
     Schema,
@@ -172,6 +178,8 @@ pub enum Refusal {
     NoScene { name: String, nearest: &'static str },
     #[error("{0}")]
     Option(#[from] material::WrongOption),
+    #[error("{0}")]
+    Install(#[from] install::InstallError),
     #[error("no threads to measure with: {0}")]
     Bench(#[from] rayon::ThreadPoolBuildError),
     #[cfg(feature = "fem")]
@@ -196,6 +204,7 @@ pub fn dispatch(command: Command) -> Result<ExitCode, Refusal> {
         Command::Compare(arguments) => return compare::compare(&arguments),
         Command::Trade(arguments) => return trade::trade(&arguments),
         Command::Stability(arguments) => return stability::stability(&arguments),
+        Command::Install(arguments) => return install::install(&arguments),
         Command::Scenes => list_scenes()?,
         Command::Plan(arguments) => {
             let scene = arguments.load([])?;
