@@ -1,6 +1,7 @@
 //! The command line: what can be asked for, and who answers.
 
 mod compare;
+mod install;
 mod material;
 mod output;
 mod progress;
@@ -87,6 +88,11 @@ pub enum Command {
                       flockform material second-gradient --json"
     )]
     Material(material::MaterialArguments),
+    /// Install this program as a ROS 2 package: executable, launch files, parameters, swarms
+    #[command(
+        after_help = "Example:\n  flockform install --prefix ~/flockform && source ~/flockform/setup.bash && ros2 launch flockform formation_launch.xml"
+    )]
+    Install(install::InstallArguments),
     /// Print the JSON Schema of a scene file
     #[command(after_help = "Example:\n  flockform schema > scene.schema.json\n  flockform schema --swarm")]
     Schema {
@@ -186,6 +192,8 @@ pub enum Refusal {
     NotBundled { what: &'static str, name: String, nearest: &'static str },
     #[error("{0}")]
     Option(#[from] material::WrongOption),
+    #[error("{0}")]
+    Install(#[from] install::InstallError),
     #[error("no threads to measure with: {0}")]
     Bench(#[from] rayon::ThreadPoolBuildError),
     #[cfg(feature = "fem")]
@@ -213,6 +221,7 @@ pub fn dispatch(command: Command) -> Result<ExitCode, Refusal> {
         Command::Swarm(arguments) => return swarm::swarm(&arguments),
         Command::Scenes => list(bundled::SCENES, |scene| Ok(scene.load(&[])?.raw.title))?,
         Command::Swarms => list(bundled::SWARMS, |swarm| Ok(swarm.load_swarm(&[])?.raw.title))?,
+        Command::Install(arguments) => return install::install(&arguments),
         Command::Plan(arguments) => {
             let scene = arguments.load([])?;
             print(&PlanReport::new(&scene, &plan(&scene)?)?.to_string());

@@ -1,6 +1,7 @@
 //! The program as a person meets it: what it prints, what it writes, and how it refuses.
 
 mod compare;
+mod install;
 mod material;
 mod program;
 mod run;

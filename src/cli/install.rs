@@ -1,0 +1,239 @@
+//! `flockform install`: this program and its files where ROS 2 tools look for a package.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::Args;
+
+use super::{Refusal, print};
+
+#[derive(Debug, Args)]
+pub struct InstallArguments {
+    /// Folder to install into: a new one, or the install folder of a workspace
+    #[arg(long, value_name = "DIR")]
+    prefix: PathBuf,
+    /// Replace files that are not flockform's, or were changed since it installed them
+    #[arg(long)]
+    force: bool,
+}
+
+/// Why nothing was installed.
+#[derive(Debug, thiserror::Error)]
+pub enum InstallError {
+    #[error(
+        "{} {} not flockform's, or changed since flockform installed it\n  help: choose another --prefix, move it away, or replace it with --force",
+        list(paths), if paths.len() == 1 { "is" } else { "are each" }
+    )]
+    Foreign { paths: Vec<PathBuf> },
+    #[error("cannot install {}: {error}\n  help: choose a --prefix that you can write to", path.display())]
+    Write { path: PathBuf, error: io::Error },
+    #[error("cannot read this program to copy it: {0}")]
+    OwnProgram(io::Error),
+}
+
+fn list(paths: &[PathBuf]) -> String {
+    paths.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(", ")
+}
+
+macro_rules! embedded {
+    ($($place:literal from $file:literal),+ $(,)?) => {
+        &[$(($place, include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/", $file)))),+]
+    };
+}
+
+/// What lies in `share/flockform`, beside the swarms.
+const SHARED: &[(&str, &str)] = embedded![
+    "package.xml" from "package.xml",
+    "launch/formation_launch.xml" from "launch-configs/formation_launch.xml",
+    "launch/formation_launch.py" from "launch-configs/formation_launch.py",
+    "launch/node_launch.xml" from "launch-configs/node_launch.xml",
+    "parameters/formation.yaml" from "launch-configs/parameters/formation.yaml",
+    "msgs/flockform_msgs/package.xml" from "msgs/flockform_msgs/package.xml",
+    "msgs/flockform_msgs/CMakeLists.txt" from "msgs/flockform_msgs/CMakeLists.txt",
+    "msgs/flockform_msgs/msg/FormationState.msg" from "msgs/flockform_msgs/msg/FormationState.msg",
+    "msgs/flockform_msgs/msg/MemberState.msg" from "msgs/flockform_msgs/msg/MemberState.msg",
+    "msgs/flockform_msgs/srv/SetFormation.srv" from "msgs/flockform_msgs/srv/SetFormation.srv",
+];
+
+/// Name and text of each swarm file.
+const SWARMS: &[(&str, &str)] = &[];
+
+/// What a shell sources; a workspace that has its own keeps them.
+const ENVIRONMENT: &[(&str, &str)] = embedded![
+    "setup.bash" from "launch-configs/environment/setup.bash",
+    "local_setup.bash" from "launch-configs/environment/setup.bash",
+    "setup.zsh" from "launch-configs/environment/setup.zsh",
+    "local_setup.zsh" from "launch-configs/environment/setup.zsh",
+];
+
+const SHARE: &str = "share/flockform";
+const EXECUTABLE: &str = "lib/flockform/flockform";
+/// The ament index knows a package by an empty file of its name.
+const INDEX_MARKER: &str = "share/ament_index/resource_index/packages/flockform";
+/// Checksum and path of each file that was installed.
+const MANIFEST: &str = "share/flockform/installed-files";
+
+/// A file to install; its path is below the prefix.
+struct File {
+    path: PathBuf,
+    bytes: Vec<u8>,
+    executable: bool,
+}
+
+/// Installs everything or nothing: files are written beside their places first, then moved there.
+pub fn install(arguments: &InstallArguments) -> Result<ExitCode, Refusal> {
+    let prefix = &std::path::absolute(&arguments.prefix)
+        .map_err(|error| InstallError::Write { path: arguments.prefix.clone(), error })?;
+    let earlier = Manifest::read(prefix);
+    let mut files = package_files()?;
+    files.extend(environment_files().filter(|file| earlier.allows(prefix, file)));
+    let foreign: Vec<PathBuf> = files
+        .iter()
+        .filter(|file| !arguments.force && !earlier.allows(prefix, file))
+        .map(|file| prefix.join(&file.path))
+        .collect();
+    if !foreign.is_empty() {
+        return Err(InstallError::Foreign { paths: foreign }.into());
+    }
+    files.push(Manifest::of(&files).into_file());
+    let staged = files.iter().map(|file| Staged::write(prefix, file)).collect::<Result<Vec<_>, _>>()?;
+    staged.into_iter().try_for_each(Staged::move_into_place)?;
+    earlier.remove_what_is_gone(prefix, &files);
+    print(&format!(
+        "Installed into {prefix}. Then, where ROS 2 is set up:\n  source '{prefix}/setup.bash'\n  \
+         ros2 launch flockform formation_launch.xml\n",
+        prefix = prefix.display()
+    ));
+    Ok(ExitCode::SUCCESS)
+}
+
+fn package_files() -> Result<Vec<File>, InstallError> {
+    let program = std::env::current_exe().and_then(fs::read).map_err(InstallError::OwnProgram)?;
+    let mut files = vec![
+        File { path: EXECUTABLE.into(), bytes: program, executable: true },
+        text_file(INDEX_MARKER.into(), ""),
+    ];
+    let share = Path::new(SHARE);
+    files.extend(SHARED.iter().map(|(place, text)| text_file(share.join(place), text)));
+    let swarm = |name: &str| share.join("swarms").join(format!("{name}.toml"));
+    files.extend(SWARMS.iter().map(|(name, text)| text_file(swarm(name), text)));
+    Ok(files)
+}
+
+fn environment_files() -> impl Iterator<Item = File> {
+    ENVIRONMENT.iter().map(|(place, text)| text_file(place.into(), text))
+}
+
+fn text_file(path: PathBuf, text: &str) -> File {
+    File { path, bytes: text.into(), executable: false }
+}
+
+/// What an earlier install left, by path below the prefix.
+struct Manifest(Vec<(u64, PathBuf)>);
+
+impl Manifest {
+    /// Of what is installed; empty where nothing is.
+    fn read(prefix: &Path) -> Self {
+        let text = fs::read_to_string(prefix.join(MANIFEST)).unwrap_or_default();
+        let entry = |line: &str| {
+            let (sum, path) = line.split_once(' ')?;
+            Some((u64::from_str_radix(sum, 16).ok()?, PathBuf::from(path)))
+        };
+        Self(text.lines().filter_map(entry).collect())
+    }
+
+    fn of(files: &[File]) -> Self {
+        Self(files.iter().map(|file| (checksum(&file.bytes), file.path.clone())).collect())
+    }
+
+    fn into_file(self) -> File {
+        let line = |(sum, path): &(u64, PathBuf)| format!("{sum:016x} {}\n", path.display());
+        text_file(MANIFEST.into(), &self.0.iter().map(line).collect::<String>())
+    }
+
+    /// Whether the file's place is free, or holds what was installed there or is to be.
+    fn allows(&self, prefix: &Path, file: &File) -> bool {
+        let place = prefix.join(&file.path);
+        match fs::read(&place) {
+            Ok(bytes) => bytes == file.bytes || self.has(&file.path, &bytes),
+            Err(_) => fs::symlink_metadata(&place).is_err(),
+        }
+    }
+
+    fn has(&self, path: &Path, bytes: &[u8]) -> bool {
+        let sum = checksum(bytes);
+        self.0.iter().any(|(installed, at)| *installed == sum && at == path)
+    }
+
+    /// Removes files of an earlier install that are in this one no more, unless they were changed.
+    fn remove_what_is_gone(&self, prefix: &Path, files: &[File]) {
+        for (_, path) in &self.0 {
+            let place = prefix.join(path);
+            let is_gone = path.is_relative() && !files.iter().any(|file| file.path == *path);
+            if is_gone && fs::read(&place).is_ok_and(|bytes| self.has(path, &bytes)) {
+                // A file left over does no harm.
+                let _ = fs::remove_file(place);
+            }
+        }
+    }
+}
+
+/// FNV-1a: tells a changed file from an installed one, and the same in every build.
+fn checksum(bytes: &[u8]) -> u64 {
+    bytes
+        .iter()
+        .fold(0xcbf2_9ce4_8422_2325, |sum, byte| (sum ^ u64::from(*byte)).wrapping_mul(0x100_0000_01b3))
+}
+
+/// A file written beside its place; removed again unless it is moved there.
+struct Staged {
+    beside: PathBuf,
+    place: PathBuf,
+}
+
+impl Staged {
+    fn write(prefix: &Path, file: &File) -> Result<Self, InstallError> {
+        let place = prefix.join(&file.path);
+        let name = place.file_name().unwrap_or_default().to_string_lossy();
+        let beside = place.with_file_name(format!(".{name}.partial-{}", std::process::id()));
+        let staged = Self { beside, place };
+        staged.fill(file).map_err(|error| staged.refusal(error))?;
+        Ok(staged)
+    }
+
+    fn fill(&self, file: &File) -> io::Result<()> {
+        if let Some(folder) = self.place.parent() {
+            fs::create_dir_all(folder)?;
+        }
+        fs::write(&self.beside, &file.bytes)?;
+        set_mode(&self.beside, if file.executable { 0o755 } else { 0o644 })
+    }
+
+    fn move_into_place(self) -> Result<(), InstallError> {
+        fs::rename(&self.beside, &self.place).map_err(|error| self.refusal(error))
+    }
+
+    fn refusal(&self, error: io::Error) -> InstallError {
+        InstallError::Write { path: self.place.clone(), error }
+    }
+}
+
+impl Drop for Staged {
+    fn drop(&mut self) {
+        // Fails where the file was moved, which is what it is for.
+        let _ = fs::remove_file(&self.beside);
+    }
+}
+
+#[cfg(unix)]
+fn set_mode(path: &Path, mode: u32) -> io::Result<()> {
+    use std::os::unix::fs::PermissionsExt;
+    fs::set_permissions(path, fs::Permissions::from_mode(mode))
+}
+
+#[cfg(not(unix))]
+fn set_mode(_path: &Path, _mode: u32) -> io::Result<()> {
+    Ok(())
+}

@@ -1,0 +1,99 @@
+//! The environment variables that ROS 2 nodes read.
+
+use super::RosArgumentError;
+use super::value::integer;
+
+/// Largest domain whose ports fit below 65536 (RTPS 2.3, section 9.6.1: 7400 + 250 domain).
+pub const LARGEST_DOMAIN: u16 = 232;
+
+/// How far nodes look for each other.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum DiscoveryRange {
+    /// No discovery at all.
+    Off,
+    /// This machine only.
+    Localhost,
+    /// Whoever multicast reaches.
+    #[default]
+    Subnet,
+    /// Whatever the middleware does by itself.
+    SystemDefault,
+}
+
+/// What the environment says; `Default` is an empty environment.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Environment {
+    /// DDS domain (`ROS_DOMAIN_ID`), 0 to 232 \[default: 0\].
+    pub domain: u16,
+    /// How far to discover (`ROS_LOCALHOST_ONLY` before `ROS_AUTOMATIC_DISCOVERY_RANGE`)
+    /// \[default: subnet\].
+    pub discovery: DiscoveryRange,
+    /// Hosts to discover besides (`ROS_STATIC_PEERS`, separated by `;`), as typed.
+    pub static_peers: Vec<String>,
+    /// The middleware of the nodes around (`RMW_IMPLEMENTATION`), as typed: it decides how services
+    /// are called.
+    pub middleware: Option<String>,
+}
+
+impl Environment {
+    /// Reads the variables through `look_up`; an empty one counts as not set.
+    ///
+    /// # Errors
+    /// A domain that is no whole number from 0 to 232, an unknown discovery range, enforced security.
+    pub fn read(look_up: &dyn Fn(&str) -> Option<String>) -> Result<Self, RosArgumentError> {
+        let variable = |name: &str| look_up(name).filter(|value| !value.is_empty());
+        refuse_enforced_security(&variable)?;
+        let domain = variable("ROS_DOMAIN_ID").map_or(Ok(0), read_domain)?;
+        let localhost_only = variable("ROS_LOCALHOST_ONLY").is_some_and(|value| value.starts_with('1'));
+        let discovery = match variable("ROS_AUTOMATIC_DISCOVERY_RANGE") {
+            _ if localhost_only => DiscoveryRange::Localhost,
+            Some(range) => read_range(range)?,
+            None => DiscoveryRange::default(),
+        };
+        let static_peers = variable("ROS_STATIC_PEERS").unwrap_or_default();
+        let static_peers =
+            static_peers.split(';').filter(|peer| !peer.is_empty()).map(String::from).collect();
+        Ok(Self { domain, discovery, static_peers, middleware: variable("RMW_IMPLEMENTATION") })
+    }
+}
+
+fn read_domain(value: String) -> Result<u16, RosArgumentError> {
+    let domain = integer(&value).and_then(|number| u16::try_from(number).ok());
+    domain.filter(|domain| *domain <= LARGEST_DOMAIN).ok_or(RosArgumentError::Environment {
+        variable: "ROS_DOMAIN_ID",
+        value,
+        reason: "is no whole number from 0 to 232",
+        help: "set a domain from 0 to 232 (0 to 101 is safe on every system), or unset it for 0",
+    })
+}
+
+fn read_range(value: String) -> Result<DiscoveryRange, RosArgumentError> {
+    Ok(match value.as_str() {
+        "OFF" => DiscoveryRange::Off,
+        "LOCALHOST" => DiscoveryRange::Localhost,
+        "SUBNET" => DiscoveryRange::Subnet,
+        "SYSTEM_DEFAULT" => DiscoveryRange::SystemDefault,
+        _ => {
+            return Err(RosArgumentError::Environment {
+                variable: "ROS_AUTOMATIC_DISCOVERY_RANGE",
+                value,
+                reason: "is no discovery range",
+                help: "set OFF, LOCALHOST, SUBNET or SYSTEM_DEFAULT, or unset it for SUBNET",
+            });
+        }
+    })
+}
+
+/// Whoever enforces security must not get a node that speaks in the clear.
+fn refuse_enforced_security(variable: &dyn Fn(&str) -> Option<String>) -> Result<(), RosArgumentError> {
+    let is = |name: &str, value: &str| variable(name).is_some_and(|set| set == value);
+    if is("ROS_SECURITY_ENABLE", "true") && is("ROS_SECURITY_STRATEGY", "Enforce") {
+        return Err(RosArgumentError::Environment {
+            variable: "ROS_SECURITY_STRATEGY",
+            value: "Enforce".into(),
+            reason: "this node speaks unsecured DDS",
+            help: "set ROS_SECURITY_STRATEGY=Permissive or ROS_SECURITY_ENABLE=false for this process",
+        });
+    }
+    Ok(())
+}

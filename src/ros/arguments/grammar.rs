@@ -1,0 +1,118 @@
+//! Which arguments are ROS ones, and what each flag takes.
+
+use std::path::PathBuf;
+
+use super::assignment::{Assignment, Origin};
+use super::logging::Logging;
+use super::remap::RemapRule;
+use super::{RosArgumentError, RosArguments, assignment, parameter_file};
+
+/// Every flag that may follow `--ros-args`.
+pub const FLAGS: [&str; 17] = [
+    "-r",
+    "--remap",
+    "-p",
+    "--param",
+    "--params-file",
+    "--log-level",
+    "--log-config-file",
+    "--log-file-name",
+    "-e",
+    "--enclave",
+    "--enable-rosout-logs",
+    "--disable-rosout-logs",
+    "--enable-stdout-logs",
+    "--disable-stdout-logs",
+    "--enable-external-lib-logs",
+    "--disable-external-lib-logs",
+    "--ros-args",
+];
+
+/// Splits arguments at `--ros-args ... [--]` (any number of times) and reads the ROS ones.
+pub fn parse(
+    arguments: impl IntoIterator<Item = String>,
+) -> Result<(Vec<String>, RosArguments), RosArgumentError> {
+    let mut arguments = arguments.into_iter();
+    let (mut rest, mut ros, mut inside) = (Vec::new(), RosArguments::default(), false);
+    while let Some(argument) = arguments.next() {
+        match (inside, argument.as_str()) {
+            (_, "--ros-args") => inside = true,
+            (true, "--") => inside = false,
+            (true, _) => ros.take_flag(argument, &mut arguments)?,
+            (false, _) => rest.push(argument),
+        }
+    }
+    Ok((rest, ros))
+}
+
+impl RosArguments {
+    fn take_flag(
+        &mut self,
+        flag: String,
+        arguments: &mut impl Iterator<Item = String>,
+    ) -> Result<(), RosArgumentError> {
+        // As in rcl, a flag takes whatever follows, even `--`.
+        let mut value = |expects: &'static str| {
+            arguments.next().ok_or_else(|| RosArgumentError::MissingValue { flag: flag.clone(), expects })
+        };
+        match flag.as_str() {
+            "-r" | "--remap" => self.remaps.push(RemapRule::parse(&flag, &value("a rule FROM:=TO")?)?),
+            "-p" | "--param" => {
+                self.assignments.push(assignment::parse(&flag, &value("an assignment NAME:=VALUE")?)?);
+            }
+            "--params-file" => self.read_parameters(value("the path of a YAML file")?.into())?,
+            "--log-level" => {
+                let rule = value("a level or LOGGER:=LEVEL")?;
+                self.logging.take_level(&rule)?;
+            }
+            "--log-config-file" => {
+                self.logging.config_file = Some(value("the path of a configuration file")?.into());
+            }
+            "--log-file-name" => self.logging.file_name = Some(value("a file name prefix")?),
+            "-e" | "--enclave" => self.enclave = Some(value("a security enclave /PATH")?),
+            switch if switch_of(&mut self.logging, switch) => {}
+            _ => return Err(unknown(flag)),
+        }
+        Ok(())
+    }
+
+    fn read_parameters(&mut self, path: PathBuf) -> Result<(), RosArgumentError> {
+        let text = std::fs::read_to_string(&path)
+            .map_err(|error| RosArgumentError::ReadFile { path: path.clone(), error })?;
+        let read = parameter_file::parse(&text).map_err(|error| error.in_file(&path))?;
+        self.assignments.extend(read.into_iter().map(|entry| {
+            let origin = Origin::File { path: path.clone(), line: entry.line };
+            Assignment::new(entry.node, entry.name, entry.value, origin)
+        }));
+        self.parameter_files.push(path);
+        Ok(())
+    }
+}
+
+/// Sets the switch that `flag` names; false where it names none.
+fn switch_of(logging: &mut Logging, flag: &str) -> bool {
+    let (on, name) = match (flag.strip_prefix("--enable-"), flag.strip_prefix("--disable-")) {
+        (Some(name), _) => (true, name),
+        (_, Some(name)) => (false, name),
+        _ => return false,
+    };
+    let switch = match name {
+        "rosout-logs" => &mut logging.rosout,
+        "stdout-logs" => &mut logging.stdout,
+        "external-lib-logs" => &mut logging.external_library,
+        _ => return false,
+    };
+    *switch = on;
+    true
+}
+
+fn unknown(flag: String) -> RosArgumentError {
+    if !flag.starts_with('-') {
+        let guess = if flag.contains(":=") { "--remap" } else { "--params-file" };
+        return RosArgumentError::StrayWord { word: flag, guess };
+    }
+    let likeness = |known: &&str| strsim::jaro_winkler(known, &flag);
+    let nearest = FLAGS.into_iter().max_by(|a, b| likeness(a).total_cmp(&likeness(b)));
+    let nearest = nearest.filter(|known| flag.len() > 2 && likeness(known) > 0.8);
+    RosArgumentError::UnknownFlag { flag, nearest }
+}

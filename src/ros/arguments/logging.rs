@@ -1,0 +1,90 @@
+//! What is logged, and to where.
+
+use std::path::PathBuf;
+
+use super::RosArgumentError;
+
+/// Severity of a log message, as `rcutils` names them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Severity {
+    /// Whatever the logger's parent says.
+    Unset,
+    Debug,
+    Info,
+    Warn,
+    Error,
+    Fatal,
+}
+
+/// What is logged, and to where; `Default` is what a node does without arguments.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Logging {
+    /// Least severity logged, where the logger has none of its own \[default: none given\].
+    pub level: Option<Severity>,
+    /// Least severity of single loggers, in the order given; the last one of a name counts.
+    pub loggers: Vec<(String, Severity)>,
+    /// Configuration of an external logging library; there is none in this program.
+    pub config_file: Option<PathBuf>,
+    /// Prefix of log files of an external logging library; there is none in this program.
+    pub file_name: Option<String>,
+    /// Logs go to `/rosout` \[default: true\].
+    pub rosout: bool,
+    /// Logs go to the console \[default: true\].
+    pub stdout: bool,
+    /// Logs go to an external logging library \[default: true\].
+    pub external_library: bool,
+}
+
+impl Default for Logging {
+    fn default() -> Self {
+        Self {
+            level: None,
+            loggers: Vec::new(),
+            config_file: None,
+            file_name: None,
+            rosout: true,
+            stdout: true,
+            external_library: true,
+        }
+    }
+}
+
+impl Logging {
+    /// The least severity of the logger of this name, if any was given for it or for all.
+    pub fn level_of(&self, logger: &str) -> Option<Severity> {
+        let own = self.loggers.iter().rev().find(|(name, _)| name == logger).map(|(_, level)| *level);
+        own.or(self.level)
+    }
+
+    /// Reads the value of `--log-level`: `LEVEL` or `LOGGER:=LEVEL`.
+    pub(super) fn take_level(&mut self, rule: &str) -> Result<(), RosArgumentError> {
+        let refuse = |reason: String| RosArgumentError::Rule {
+            flag: "--log-level".into(),
+            rule: rule.into(),
+            reason,
+            help: "write DEBUG, INFO, WARN, ERROR, FATAL or UNSET, or LOGGER:=LEVEL for one logger",
+        };
+        let severity =
+            |word: &str| Severity::parse(word).ok_or_else(|| refuse(format!("`{word}` is no log level")));
+        match rule.split_once(":=") {
+            Some(("", _)) => return Err(refuse("the name of the logger is empty".into())),
+            Some((logger, level)) => self.loggers.push((logger.into(), severity(level)?)),
+            None => self.level = Some(severity(rule)?),
+        }
+        Ok(())
+    }
+}
+
+impl Severity {
+    fn parse(word: &str) -> Option<Self> {
+        Some(match word.to_ascii_uppercase().as_str() {
+            "UNSET" => Self::Unset,
+            "DEBUG" => Self::Debug,
+            "INFO" => Self::Info,
+            "WARN" => Self::Warn,
+            "ERROR" => Self::Error,
+            "FATAL" => Self::Fatal,
+            _ => return None,
+        })
+    }
+}

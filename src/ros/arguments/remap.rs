@@ -1,0 +1,151 @@
+//! Remap rules: `[NODE:]FROM:=TO`, `[NODE:]__node:=NAME`, `[NODE:]__ns:=/NAMESPACE`.
+
+use super::RosArgumentError;
+use super::names::{check_namespace, check_node_name, check_token};
+
+/// Which names a rule speaks of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Scope {
+    Topics,
+    Services,
+    Both,
+}
+
+/// What a rule changes.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Remap {
+    /// The node's name becomes this.
+    NodeName(String),
+    /// The node's namespace becomes this, fully qualified.
+    Namespace(String),
+    /// The topic or service `from` becomes `to`; both are expanded like any name of the node.
+    Name { scope: Scope, from: String, to: String },
+}
+
+/// One `-r` rule.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RemapRule {
+    /// The one node it is for, by name without namespace; every node if none.
+    pub node: Option<String>,
+    pub remap: Remap,
+}
+
+const SHAPE: &str = "write [NODE:]FROM:=TO, [NODE:]__node:=NAME or [NODE:]__ns:=/NAMESPACE";
+
+impl RemapRule {
+    /// Reads the rule that follows `flag`.
+    ///
+    /// # Errors
+    /// A rule that `rcl` does not understand or implement; the message says which part.
+    pub fn parse(flag: &str, rule: &str) -> Result<Self, RosArgumentError> {
+        let refuse = |(reason, help): Reason| RosArgumentError::Rule {
+            flag: flag.into(),
+            rule: rule.into(),
+            reason,
+            help,
+        };
+        let named = |error| RosArgumentError::Name { flag: flag.into(), rule: rule.into(), error };
+        let (node, body) = split_node(rule);
+        if let Some(node) = node {
+            check_token(node).map_err(|reason| refuse((format!("the node prefix {reason}"), SHAPE)))?;
+        }
+        let (from, to) = body.split_once(":=").ok_or_else(|| refuse(("has no `:=`".into(), SHAPE)))?;
+        let remap = match from {
+            "__node" | "__name" => {
+                check_node_name(to).map_err(named)?;
+                Remap::NodeName(to.into())
+            }
+            "__ns" => {
+                check_namespace(to).map_err(named)?;
+                Remap::Namespace(to.into())
+            }
+            _ => parse_name(from, to).map_err(refuse)?,
+        };
+        Ok(Self { node: node.map(String::from), remap })
+    }
+
+    /// What a node of this name is called by this rule, if it renames it.
+    pub(super) fn new_node_name(&self, node: &str) -> Option<&str> {
+        match &self.remap {
+            Remap::NodeName(name) if self.is_for(node) => Some(name),
+            _ => None,
+        }
+    }
+
+    /// Where this rule puts a node of this name, if it moves it.
+    pub(super) fn new_namespace(&self, node: &str) -> Option<&str> {
+        match &self.remap {
+            Remap::Namespace(namespace) if self.is_for(node) => Some(namespace),
+            _ => None,
+        }
+    }
+
+    /// The two sides of the rule, if it is for names of this scope of a node of this name.
+    pub(super) fn name_for(&self, node: &str, wanted: Scope) -> Option<(&str, &str)> {
+        match &self.remap {
+            Remap::Name { scope, from, to }
+                if self.is_for(node) && (*scope == wanted || *scope == Scope::Both) =>
+            {
+                Some((from, to))
+            }
+            _ => None,
+        }
+    }
+
+    fn is_for(&self, node: &str) -> bool {
+        self.node.as_deref().is_none_or(|name| name == node)
+    }
+}
+
+/// What is wrong, and the remedy.
+type Reason = (String, &'static str);
+
+/// Splits `NODE:` off, where there is one; the schemes and `:=` have colons of their own.
+pub(super) fn split_node(rule: &str) -> (Option<&str>, &str) {
+    match rule.split_once(':') {
+        Some((_, after)) if after.starts_with('=') => (None, rule),
+        Some(("rostopic" | "rosservice", after)) if after.starts_with("//") => (None, rule),
+        Some((node, after)) => (Some(node), after),
+        None => (None, rule),
+    }
+}
+
+fn parse_name(from: &str, to: &str) -> Result<Remap, Reason> {
+    let (scope, from) = match (from.strip_prefix("rostopic://"), from.strip_prefix("rosservice://")) {
+        (Some(topic), _) => (Scope::Topics, topic),
+        (_, Some(service)) => (Scope::Services, service),
+        _ => (Scope::Both, from),
+    };
+    if to.starts_with("rostopic://") || to.starts_with("rosservice://") {
+        return Err((
+            "the right side has a scheme".into(),
+            "write rostopic:// or rosservice:// on the left only",
+        ));
+    }
+    if scope != Scope::Both && ["__ns", "__node", "__name"].contains(&from) {
+        return Err((format!("`{from}` has a scheme before it"), SHAPE));
+    }
+    check_side("left", from)?;
+    check_side("right", to)?;
+    Ok(Remap::Name { scope, from: from.into(), to: to.into() })
+}
+
+/// One side of a rule: tokens with `/` between them, absolute, private (`~/`) or relative.
+fn check_side(side: &str, name: &str) -> Result<(), Reason> {
+    if name.contains('*') {
+        let reason = format!("the {side} side has a wildcard, which ROS 2 does not implement for names");
+        return Err((reason, "write one rule for each name"));
+    }
+    if name.contains('\\') {
+        let reason = format!("the {side} side refers to a wildcard, which ROS 2 does not implement");
+        return Err((reason, "write one rule for each name"));
+    }
+    let tokens = name.strip_prefix("~/").or_else(|| name.strip_prefix('/')).unwrap_or(name);
+    for token in tokens.split('/') {
+        check_token(token).map_err(|reason| {
+            let reason = if token.is_empty() { format!("`{name}` has an empty token") } else { reason };
+            (format!("the {side} side: {reason}"), "write names as /team/pose, pose or ~/pose")
+        })?;
+    }
+    Ok(())
+}

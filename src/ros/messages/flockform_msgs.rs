@@ -1,0 +1,116 @@
+//! `flockform_msgs`: our own messages; meaning, units and frames are in `msgs/flockform_msgs`.
+
+use serde::{Deserialize, Serialize};
+
+use super::geometry_msgs::{Point, Vector3};
+use super::std_msgs::Header;
+
+/// What the formation's node knows of one member.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct MemberState {
+    pub name: String,
+    /// [`MemberState::LEADER`] or [`MemberState::FOLLOWER`].
+    pub role: u8,
+    /// [`MemberState::WAITING`] to [`MemberState::STOPPED`].
+    pub health: u8,
+    /// \[m\]; NaN while no pose has come.
+    pub position: Point,
+    /// After the safety filter \[m\]; NaN while it is sent nowhere.
+    pub target: Point,
+    /// Where the rule comes to rest with the leaders as they are \[m\]; NaN where not known.
+    pub settled: Point,
+    /// From the nominal place \[m\].
+    pub displacement: Vector3,
+    /// \[m^2\].
+    pub pe1: f64,
+    /// xx, yy, xy \[1\].
+    pub strain: [f64; 3],
+    /// \[rad\].
+    pub rotation: f64,
+    /// Of the pose \[s\].
+    pub age: f64,
+    /// To the nearest robot or obstacle, hull to hull \[m\].
+    pub clearance: f64,
+    /// From position to settled \[m\].
+    pub to_settled: f64,
+    /// Sum of [`MemberState::SPEED_LIMITED`] to [`MemberState::POSE_REJECTED`].
+    pub flags: u32,
+}
+
+impl MemberState {
+    pub const LEADER: u8 = 0;
+    pub const FOLLOWER: u8 = 1;
+
+    pub const WAITING: u8 = 0;
+    pub const FRESH: u8 = 1;
+    pub const HELD: u8 = 2;
+    pub const DEGRADED: u8 = 3;
+    pub const STOPPED: u8 = 4;
+
+    pub const SPEED_LIMITED: u32 = 1;
+    pub const ACCELERATION_LIMITED: u32 = 2;
+    pub const GEOFENCED: u32 = 4;
+    pub const SEPARATED: u32 = 8;
+    pub const OBSTRUCTED: u32 = 16;
+    pub const RESOLVING_DEADLOCK: u32 = 32;
+    pub const NEIGHBOUR_LOST: u32 = 64;
+    pub const TRIMMED: u32 = 128;
+    pub const POSE_REJECTED: u32 = 256;
+}
+
+/// How a formation is, once a tick.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct FormationState {
+    pub header: Header,
+    pub formation: String,
+    pub tick: u64,
+    /// [`FormationState::RUNNING`] to [`FormationState::INACTIVE`].
+    pub mode: u8,
+    /// \[m\].
+    pub formation_error: f64,
+    /// Smallest of the members' \[m\].
+    pub clearance: f64,
+    /// \[m^2\].
+    pub pe1_sum: f64,
+    /// Principal strain largest in size \[1\].
+    pub strain_max: f64,
+    /// Time that computing the tick took \[s\].
+    pub elapsed: f64,
+    pub members: Vec<MemberState>,
+}
+
+impl FormationState {
+    pub const RUNNING: u8 = 0;
+    pub const HOLDING: u8 = 1;
+    pub const EMERGENCY_STOPPED: u8 = 2;
+    pub const INACTIVE: u8 = 3;
+}
+
+super::messages!("flockform_msgs": MemberState, FormationState);
+
+/// What the service `SetFormation` is asked.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct SetFormationRequest {
+    /// A manoeuvre of the swarm file; empty for the numbers below.
+    pub name: String,
+    /// From the nominal place \[m\].
+    pub translate: [f64; 2],
+    /// \[rad\].
+    pub rotate: f64,
+    /// \[1\].
+    pub stretch: [f64; 2],
+    /// \[1\].
+    pub shear: [f64; 2],
+    /// \[s\].
+    pub duration: f64,
+}
+
+/// What the service `SetFormation` answers.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct SetFormationResponse {
+    pub success: bool,
+    pub message: String,
+}
+
+impl ros2_client::Message for SetFormationRequest {}
+impl ros2_client::Message for SetFormationResponse {}

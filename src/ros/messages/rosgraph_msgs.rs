@@ -1,0 +1,13 @@
+//! `rosgraph_msgs`: simulated time.
+
+use serde::{Deserialize, Serialize};
+
+use super::builtin_interfaces::Time;
+
+/// What `/clock` carries.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Clock {
+    pub clock: Time,
+}
+
+super::messages!("rosgraph_msgs": Clock);

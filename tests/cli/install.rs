@@ -1,0 +1,133 @@
+//! `flockform install`: the layout that ROS 2 tools look for, and nothing overwritten that is not ours.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use crate::program::{flockform, temporary, text};
+
+const CHECKOUT: &str = env!("CARGO_MANIFEST_DIR");
+
+/// Paths of all files below a folder, relative to it.
+fn files(folder: &Path) -> BTreeSet<String> {
+    let mut found = BTreeSet::new();
+    let mut folders = vec![PathBuf::new()];
+    while let Some(inside) = folders.pop() {
+        for entry in std::fs::read_dir(folder.join(&inside)).expect("readable") {
+            let entry = entry.expect("readable");
+            let path = inside.join(entry.file_name());
+            if entry.path().is_dir() {
+                folders.push(path)
+            } else {
+                found.insert(path.display().to_string());
+            }
+        }
+    }
+    found
+}
+
+fn read(path: impl AsRef<Path>) -> String {
+    std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.as_ref().display()))
+}
+
+#[test]
+fn the_package_lies_where_ros_looks_for_it() {
+    let folder = temporary();
+    let output = flockform(&["install", "--prefix", "p"], folder.path());
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    assert!(text(&output.stdout).contains("/p/setup.bash'"), "{}", text(&output.stdout));
+
+    let prefix = folder.path().join("p");
+    let version =
+        std::process::Command::new(prefix.join("lib/flockform/flockform")).arg("--version").output();
+    assert!(text(&version.expect("executable").stdout).starts_with("flockform "));
+    assert_eq!(read(prefix.join("share/ament_index/resource_index/packages/flockform")), "");
+    let share = prefix.join("share/flockform");
+    let checkout = Path::new(CHECKOUT);
+    assert_eq!(read(share.join("package.xml")), read(checkout.join("package.xml")));
+    for (there, here) in [("msgs", "msgs"), ("parameters", "launch-configs/parameters")] {
+        let here = checkout.join(here);
+        assert_eq!(files(&share.join(there)), files(&here));
+        for file in files(&here) {
+            assert_eq!(read(share.join(there).join(&file)), read(here.join(&file)), "{file}");
+        }
+    }
+    let launch: BTreeSet<String> = files(&checkout.join("launch-configs"))
+        .into_iter()
+        .filter(|file| file.contains("_launch."))
+        .collect();
+    assert_eq!(files(&share.join("launch")), launch);
+    assert!(files(&prefix).iter().all(|file| !file.contains("partial")), "{:?}", files(&prefix));
+}
+
+#[test]
+fn sourcing_the_prefix_puts_it_first_and_once() {
+    let folder = temporary();
+    assert!(flockform(&["install", "--prefix", "a b"], folder.path()).status.success());
+    let script = "set -eu; . 'a b/setup.bash'; . 'a b/local_setup.bash'; printf %s \"$AMENT_PREFIX_PATH\"";
+    let shell = std::process::Command::new("bash")
+        .args(["-c", script])
+        .current_dir(folder.path())
+        .env("AMENT_PREFIX_PATH", "/opt/ros/jazzy")
+        .output()
+        .expect("bash");
+    let prefix = std::fs::canonicalize(folder.path()).expect("exists").join("a b");
+    assert_eq!(
+        text(&shell.stdout),
+        format!("{}:/opt/ros/jazzy", prefix.display()),
+        "{}",
+        text(&shell.stderr)
+    );
+}
+
+#[test]
+fn installing_again_renews_what_is_ours() {
+    let folder = temporary();
+    let install = || flockform(&["install", "--prefix", "."], folder.path());
+    assert!(install().status.success());
+    let before = files(folder.path());
+    std::fs::remove_file(folder.path().join("setup.bash")).expect("installed");
+    let output = install();
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    assert_eq!(files(folder.path()), before);
+}
+
+#[test]
+fn a_file_that_was_changed_is_replaced_by_force_only() {
+    let folder = temporary();
+    let parameters = folder.path().join("share/flockform/parameters/formation.yaml");
+    assert!(flockform(&["install", "--prefix", "."], folder.path()).status.success());
+    std::fs::write(&parameters, "mine").expect("writable");
+    let before = files(folder.path());
+
+    let output = flockform(&["install", "--prefix", "."], folder.path());
+    assert_eq!(output.status.code(), Some(2));
+    let message = text(&output.stderr);
+    assert!(
+        message.contains("formation.yaml is not flockform's") && message.contains("--force"),
+        "{message}"
+    );
+    assert_eq!(read(&parameters), "mine");
+    assert_eq!(files(folder.path()), before);
+
+    assert!(flockform(&["install", "--prefix", ".", "--force"], folder.path()).status.success());
+    assert!(read(&parameters).contains("ros__parameters"));
+}
+
+#[test]
+fn a_workspace_keeps_its_own_setup_files() {
+    let folder = temporary();
+    std::fs::write(folder.path().join("setup.bash"), "colcon").expect("writable");
+    assert!(flockform(&["install", "--prefix", "."], folder.path()).status.success());
+    assert_eq!(read(folder.path().join("setup.bash")), "colcon");
+    assert!(folder.path().join("local_setup.bash").exists());
+}
+
+#[test]
+fn a_prefix_that_cannot_be_is_refused_and_nothing_is_left() {
+    let folder = temporary();
+    std::fs::write(folder.path().join("share"), "a file").expect("writable");
+    let output = flockform(&["install", "--prefix", "."], folder.path());
+    assert_eq!(output.status.code(), Some(2));
+    assert!(text(&output.stderr).contains("cannot install"), "{}", text(&output.stderr));
+    assert_eq!(files(folder.path()), BTreeSet::from(["share".to_string()]));
+}

@@ -1,0 +1,11 @@
+//! The message structs against their definitions: names, order and types of the fields, constants,
+//! and the bytes on the wire.
+
+mod definition;
+mod package;
+mod payloads;
+mod reference;
+mod sample;
+mod standard;
+mod structs;
+mod wire;

@@ -1,0 +1,87 @@
+//! The definitions of the standard messages (ROS 2 Jazzy), without their comments.
+
+pub const DEFINITIONS: &[(&str, &str)] = &[
+    ("builtin_interfaces/Time", "int32 sec\nuint32 nanosec"),
+    ("builtin_interfaces/Duration", "int32 sec\nuint32 nanosec"),
+    ("std_msgs/Header", "builtin_interfaces/Time stamp\nstring frame_id"),
+    ("std_msgs/ColorRGBA", "float32 r\nfloat32 g\nfloat32 b\nfloat32 a"),
+    ("geometry_msgs/Point", "float64 x\nfloat64 y\nfloat64 z"),
+    ("geometry_msgs/Vector3", "float64 x\nfloat64 y\nfloat64 z"),
+    ("geometry_msgs/Quaternion", "float64 x\nfloat64 y\nfloat64 z\nfloat64 w"),
+    ("geometry_msgs/Pose", "Point position\nQuaternion orientation"),
+    ("geometry_msgs/PoseStamped", "std_msgs/Header header\nPose pose"),
+    ("geometry_msgs/PoseWithCovariance", "Pose pose\nfloat64[36] covariance"),
+    ("geometry_msgs/PoseWithCovarianceStamped", "std_msgs/Header header\nPoseWithCovariance pose"),
+    ("geometry_msgs/PoseArray", "std_msgs/Header header\nPose[] poses"),
+    ("geometry_msgs/Twist", "Vector3 linear\nVector3 angular"),
+    ("geometry_msgs/TwistStamped", "std_msgs/Header header\nTwist twist"),
+    ("geometry_msgs/TwistWithCovariance", "Twist twist\nfloat64[36] covariance"),
+    ("geometry_msgs/Transform", "Vector3 translation\nQuaternion rotation"),
+    ("geometry_msgs/TransformStamped", "std_msgs/Header header\nstring child_frame_id\nTransform transform"),
+    (
+        "nav_msgs/Odometry",
+        "std_msgs/Header header
+         string child_frame_id
+         geometry_msgs/PoseWithCovariance pose
+         geometry_msgs/TwistWithCovariance twist",
+    ),
+    ("rosgraph_msgs/Clock", "builtin_interfaces/Time clock"),
+    ("tf2_msgs/TFMessage", "geometry_msgs/TransformStamped[] transforms"),
+    ("sensor_msgs/CompressedImage", "std_msgs/Header header\nstring format\nuint8[] data"),
+    ("diagnostic_msgs/KeyValue", "string key\nstring value"),
+    (
+        "diagnostic_msgs/DiagnosticStatus",
+        "byte OK=0
+         byte WARN=1
+         byte ERROR=2
+         byte STALE=3
+         byte level
+         string name
+         string message
+         string hardware_id
+         KeyValue[] values",
+    ),
+    ("diagnostic_msgs/DiagnosticArray", "std_msgs/Header header\nDiagnosticStatus[] status"),
+    ("visualization_msgs/UVCoordinate", "float32 u\nfloat32 v"),
+    ("visualization_msgs/MeshFile", "string filename\nuint8[] data"),
+    (
+        "visualization_msgs/Marker",
+        "int32 ARROW=0
+         int32 CUBE=1
+         int32 SPHERE=2
+         int32 CYLINDER=3
+         int32 LINE_STRIP=4
+         int32 LINE_LIST=5
+         int32 CUBE_LIST=6
+         int32 SPHERE_LIST=7
+         int32 POINTS=8
+         int32 TEXT_VIEW_FACING=9
+         int32 MESH_RESOURCE=10
+         int32 TRIANGLE_LIST=11
+         int32 ARROW_STRIP=12
+         int32 ADD=0
+         int32 MODIFY=0
+         int32 DELETE=2
+         int32 DELETEALL=3
+         std_msgs/Header header
+         string ns
+         int32 id
+         int32 type
+         int32 action
+         geometry_msgs/Pose pose
+         geometry_msgs/Vector3 scale
+         std_msgs/ColorRGBA color
+         builtin_interfaces/Duration lifetime
+         bool frame_locked
+         geometry_msgs/Point[] points
+         std_msgs/ColorRGBA[] colors
+         string texture_resource
+         sensor_msgs/CompressedImage texture
+         UVCoordinate[] uv_coordinates
+         string text
+         string mesh_resource
+         MeshFile mesh_file
+         bool mesh_use_embedded_materials",
+    ),
+    ("visualization_msgs/MarkerArray", "Marker[] markers"),
+];
