@@ -1,1 +1,3 @@
 //! The edge to ROS 2: what the node reads from its command line, the messages it speaks, the node itself.
+
+pub mod edge;
