@@ -12,18 +12,18 @@
 //!
 //! Times are seconds since the Unix epoch as `f64`.
 
-//TMP pub mod clock;
+pub mod clock;
 mod graph;
-//TMP pub mod lifecycle;
+pub mod lifecycle;
 pub mod loopback;
 pub mod message;
 pub mod names;
-//TMP pub mod parameters;
+pub mod parameters;
 pub mod participant;
 pub mod quality;
 pub mod service;
 pub mod services;
-//TMP pub mod steady;
+pub mod steady;
 pub mod topic;
 pub mod wire;
 

@@ -29,7 +29,7 @@ const HEADER: usize = 16;
 /// have seen where to answer, and a reply sent then is lost.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// Samples looked at in one call.
+/// Samples looked at and requests answered in one call.
 const MOST_AT_ONCE: usize = 256;
 
 /// Which request a reply answers.
@@ -128,6 +128,16 @@ impl<S: ServiceType> Service<S> {
             .write_with_options(payload, options.build())
             .map(|_| ())
             .map_err(|error| refused(error.to_string()))
+    }
+
+    /// Answers the requests that wait, without waiting. A reply that cannot be sent is logged.
+    pub fn serve(&self, mut answer: impl FnMut(S::Request) -> S::Response) {
+        for _ in 0..MOST_AT_ONCE {
+            let Some((id, request)) = self.take() else { return };
+            if let Err(error) = self.reply(&id, &answer(request)) {
+                tracing::warn!("{error}");
+            }
+        }
     }
 
     fn refuse(&self, reason: &str) {
