@@ -152,6 +152,12 @@ impl<S: ServiceType> Service<S> {
         self.refused.get()
     }
 
+    /// Clients elsewhere that can ask and be answered \[1\].
+    pub fn matched(&self) -> usize {
+        let graph = &self.shared.graph;
+        graph.matched(self.reader.guid()).min(graph.matched(self.writer.guid()))
+    }
+
     pub fn name(&self) -> &str {
         &self.name
     }
