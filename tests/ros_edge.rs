@@ -13,7 +13,9 @@ use flockform::ros::edge::services::{Empty, Time, lifecycle_msgs, rcl_interfaces
 use flockform::ros::edge::{
     Edge, EdgeError, Message, Node, Options, Publisher, Quality, ServiceType, Subscription,
 };
-use ros2_client::dds::rustdds::DomainParticipantBuilder;
+use ros2_client::builtin_topics::ros_discovery;
+use ros2_client::dds::rustdds::policy::Durability;
+use ros2_client::dds::rustdds::{self, DomainParticipantBuilder, QosPolicyBuilder, TopicKind};
 use ros2_client::qos::{History, WhenFull};
 use ros2_client::{
     Client, Context, NodeName, NodeOptions, QosProfile, RmwRequestId, ServiceMapping, ServiceTypeName,
@@ -33,6 +35,7 @@ struct Peers {
     theirs: Edge,
     /// A peer with another implementation of nodes and services.
     foreign: ros2_client::Node,
+    context: Context,
 }
 
 fn peers() -> MutexGuard<'static, Peers> {
@@ -48,7 +51,7 @@ fn peers() -> MutexGuard<'static, Peers> {
         let foreign = context.new_node(name, NodeOptions::new().enable_rosout(false)).expect("a node");
         let ours = Edge::open(options).expect("sockets");
         let theirs = Edge::open(options).expect("sockets");
-        Mutex::new(Peers { ours, theirs, foreign })
+        Mutex::new(Peers { ours, theirs, foreign, context })
     };
     PEERS.get_or_init(open).lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -128,18 +131,68 @@ fn poses_go_in_and_targets_go_out() {
     assert_eq!(poses_in.take(), None);
 }
 
+/// What `ros2 node list` and `ros2 node info` go by.
 #[test]
-fn nodes_of_one_participant_hear_each_other() {
+fn nodes_of_one_participant_are_announced_each_with_what_it_owns() {
     let peers = peers();
     let one = peers.ours.node("/swarm", "one").expect("a node");
     let two = one.another_node("/swarm", "two").expect("a node");
     assert_eq!(two.name(), "/swarm/two");
     assert_eq!(two.private("get_state"), "/swarm/two/get_state");
-    let out = one.publisher("/same_process", Quality::BEST_EFFORT).expect("out");
-    let come = two.subscription::<PoseStamped>("/same_process", Quality::BEST_EFFORT).expect("in");
-    meet(&out, &come);
-    out.publish(&pose(1.0)).expect("sent");
-    assert_eq!(until("a pose", || come.take()).0, pose(1.0));
+    let _out = one.publisher::<PoseStamped>("/announced", Quality::BEST_EFFORT).expect("out");
+    let _in = two.subscription::<PoseStamped>("/announced", Quality::BEST_EFFORT).expect("in");
+    let _service = two.service::<std_srvs::Trigger>("/swarm/two/stop").expect("a service");
+
+    let participant = peers.context.domain_participant();
+    let topic = participant
+        .create_topic(
+            ros_discovery::TOPIC_NAME.into(),
+            ros_discovery::TYPE_NAME.into(),
+            &ros_discovery::QOS_PUB,
+            TopicKind::NoKey,
+        )
+        .expect("a topic");
+    // Every participant announces on this topic: the last sample alone would be anyone's.
+    let every = QosPolicyBuilder::new()
+        .durability(Durability::TransientLocal)
+        .reliable(rustdds::Duration::ZERO)
+        .history(rustdds::policy::History::KeepAll)
+        .build();
+    let mut reader = participant
+        .create_subscriber(&ros_discovery::QOS_PUB)
+        .expect("a subscriber")
+        .create_datareader_no_key_cdr::<Announcement>(&topic, Some(every))
+        .expect("a reader");
+    // Node: its readers and writers, the writer of the announcement itself included.
+    let owned = |nodes: &[AnnouncedNode], name: &str| {
+        let node = nodes.iter().find(|node| node.namespace == "/swarm" && node.name == name)?;
+        Some([node.readers.len(), node.writers.len()])
+    };
+    until("both nodes", || {
+        let nodes = reader.take_next_sample().ok()??.into_value().nodes;
+        (owned(&nodes, "one")? == [0, 2] && owned(&nodes, "two")? == [2, 2]).then_some(())
+    });
+    drop(two);
+    until("one node", || {
+        let nodes = reader.take_next_sample().ok()??.into_value().nodes;
+        (owned(&nodes, "one")? == [0, 2] && owned(&nodes, "two").is_none()).then_some(())
+    });
+}
+
+/// `rmw_dds_common/msg/ParticipantEntitiesInfo`.
+#[derive(Debug, Serialize, Deserialize)]
+struct Announcement {
+    participant: [u8; 16],
+    nodes: Vec<AnnouncedNode>,
+}
+
+/// `rmw_dds_common/msg/NodeEntitiesInfo`.
+#[derive(Debug, Serialize, Deserialize)]
+struct AnnouncedNode {
+    namespace: String,
+    name: String,
+    readers: Vec<[u8; 16]>,
+    writers: Vec<[u8; 16]>,
 }
 
 /// Goes by the name of a pose and is none.

@@ -181,7 +181,8 @@ impl Node {
         format!("{}/{leaf}", self.name)
     }
 
-    /// Another node of the same participant: see [`Edge::node`].
+    /// Another node of the same participant: see [`Edge::node`]. The two do not hear each other for certain:
+    /// RustDDS carries even what stays in the process over the network's multicast.
     pub fn another_node(&self, namespace: &str, name: &str) -> Result<Node, EdgeError> {
         Edge { shared: self.shared.clone() }.node(namespace, name)
     }
