@@ -337,6 +337,14 @@ fn of_several_values_the_one_given_last_counts_whether_in_a_file_or_not() {
 }
 
 #[test]
+fn the_parameter_file_of_the_launch_files_is_for_every_node() {
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/launch-configs/parameters/formation.yaml");
+    let parameters = ros(&format!("--params-file {file}")).parameters_for("/team/formation");
+    assert_eq!(parameters[0].name, "autostart");
+    assert_eq!(parameters[0].value, Value::Bool(true));
+}
+
+#[test]
 fn a_wrong_parameter_file_is_refused_with_its_line() {
     for (yaml, line, reason) in [
         ("- a", 1, "is no mapping of node names"),

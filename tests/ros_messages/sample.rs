@@ -90,7 +90,7 @@ impl<'de> Deserializer<'de> for Filler<'_> {
 
     fn deserialize_bool<V: Visitor<'de>>(mut self, visitor: V) -> Result<V::Value, Error> {
         let value = self.next("bool");
-        visitor.visit_bool(value % 2 == 0)
+        visitor.visit_bool(value.is_multiple_of(2))
     }
 
     fn deserialize_string<V: Visitor<'de>>(mut self, visitor: V) -> Result<V::Value, Error> {

@@ -2,7 +2,8 @@
 
 use std::path::PathBuf;
 
-use super::names::NameError;
+/// What is wrong with a rule or value, and the remedy.
+pub(super) type Reason = (String, &'static str);
 
 /// Why `--ros-args` or the environment was refused.
 #[derive(Debug, thiserror::Error)]
@@ -17,8 +18,6 @@ pub enum RosArgumentError {
     MissingValue { flag: String, expects: &'static str },
     #[error("--ros-args {flag} {rule}: {reason}\n  help: {help}")]
     Rule { flag: String, rule: String, reason: String, help: &'static str },
-    #[error("--ros-args {flag} {rule}: {error}")]
-    Name { flag: String, rule: String, error: NameError },
     #[error("--ros-args --params-file {}: {error}", path.display())]
     ReadFile { path: PathBuf, error: std::io::Error },
     #[error("parameter file {}, line {line}: {reason}\n  help: {help}", path.display())]

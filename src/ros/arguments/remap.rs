@@ -1,7 +1,7 @@
 //! Remap rules: `[NODE:]FROM:=TO`, `[NODE:]__node:=NAME`, `[NODE:]__ns:=/NAMESPACE`.
 
-use super::RosArgumentError;
-use super::names::{check_namespace, check_node_name, check_token};
+use super::error::{Reason, RosArgumentError};
+use super::names::{NameError, check_namespace, check_node_name, check_token};
 
 /// Which names a rule speaks of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -44,7 +44,6 @@ impl RemapRule {
             reason,
             help,
         };
-        let named = |error| RosArgumentError::Name { flag: flag.into(), rule: rule.into(), error };
         let (node, body) = split_node(rule);
         if let Some(node) = node {
             check_token(node).map_err(|reason| refuse((format!("the node prefix {reason}"), SHAPE)))?;
@@ -52,11 +51,11 @@ impl RemapRule {
         let (from, to) = body.split_once(":=").ok_or_else(|| refuse(("has no `:=`".into(), SHAPE)))?;
         let remap = match from {
             "__node" | "__name" => {
-                check_node_name(to).map_err(named)?;
+                check_node_name(to).map_err(|error| refuse(error.into()))?;
                 Remap::NodeName(to.into())
             }
             "__ns" => {
-                check_namespace(to).map_err(named)?;
+                check_namespace(to).map_err(|error| refuse(error.into()))?;
                 Remap::Namespace(to.into())
             }
             _ => parse_name(from, to).map_err(refuse)?,
@@ -97,8 +96,11 @@ impl RemapRule {
     }
 }
 
-/// What is wrong, and the remedy.
-type Reason = (String, &'static str);
+impl From<NameError> for Reason {
+    fn from(error: NameError) -> Self {
+        (format!("{} `{}`: {}", error.what, error.name, error.reason), error.help)
+    }
+}
 
 /// Splits `NODE:` off, where there is one; the schemes and `:=` have colons of their own.
 pub(super) fn split_node(rule: &str) -> (Option<&str>, &str) {

@@ -1,5 +1,6 @@
 //! Parameter values, typed as `rcl_yaml_param_parser` types them.
 
+use super::error::Reason;
 use super::yaml::{self, Node, Scalar};
 
 /// A parameter's value: the types of `rcl_interfaces/msg/ParameterValue` that text can have.
@@ -14,9 +15,6 @@ pub enum Value {
     Doubles(Vec<f64>),
     Texts(Vec<String>),
 }
-
-/// What is wrong, and the remedy.
-pub(super) type Reason = (String, &'static str);
 
 const ONE_VALUE: &str = "write one value or a list of values of one type: 1.5, true, word, [1.0, 2.0]";
 
