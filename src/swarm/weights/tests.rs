@@ -105,10 +105,11 @@ fn whoever_lies_among_its_neighbours_has_no_negative_weight_and_the_nearest_to_e
     let (mut among, mut outside) = (0, 0);
     for seed in 0..400 {
         let count = 3 + seed % 6;
-        // Off the middle, where weights set to zero must be let go again.
+        // Uneven and off the middle, where weights set to zero must be let go again.
         let middle = [7, 11].map(|k| 0.9 * scatter(k * seed + 1));
+        let power = 1 + 2 * (seed % 3) as i32;
         let places = scattered(count, seed, middle);
-        let offsets: Vec<[f64; 2]> = places.iter().collect();
+        let offsets: Vec<[f64; 2]> = places.iter().map(|[x, y]| [x.powi(power), y]).collect();
         let found = nearest(&offsets, 1.0).expect("no line");
         match best_of_all_supports(&offsets) {
             Some(best) => {
