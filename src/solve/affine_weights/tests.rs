@@ -103,10 +103,13 @@ fn the_interior_of_a_square_lattice_has_equal_weights_to_the_bit() {
 #[test]
 fn whoever_lies_among_its_neighbours_has_no_negative_weight_and_the_nearest_to_equal() {
     let (mut among, mut outside) = (0, 0);
-    for seed in 0..300 {
-        let count = 3 + seed % 5;
-        let places = scattered(count, seed, [0.0, 0.0]);
-        let offsets: Vec<[f64; 2]> = places.iter().collect();
+    for seed in 0..400 {
+        let count = 3 + seed % 6;
+        // Uneven and off the middle, where weights set to zero must be let go again.
+        let middle = [7, 11].map(|k| 0.9 * scatter(k * seed + 1));
+        let power = 1 + 2 * (seed % 3) as i32;
+        let places = scattered(count, seed, middle);
+        let offsets: Vec<[f64; 2]> = places.iter().map(|[x, y]| [x.powi(power), y]).collect();
         let found = nearest(&offsets, 1.0).expect("no line");
         match best_of_all_supports(&offsets) {
             Some(best) => {
@@ -237,9 +240,14 @@ fn a_chain_on_a_line_is_placed_along_it() {
 }
 
 #[test]
-fn a_formation_without_leaders_does_not_settle() {
-    let (reference, neighbours) = patch(LatticeKind::Square { spacing: 1.0 }, [0.0, 0.0], 0.0);
-    let solved = solve(&reference, &neighbours, &[true; 100]).expect("solved");
-    let error = settles(&solved.weights, &neighbours, &[true; 100]).expect_err("nobody leads");
-    assert!(matches!(error, WeightsError::DoesNotSettle { .. }), "{error}");
+fn followers_that_no_leader_reaches_do_not_settle() {
+    let neighbours = Neighbours::from_lists([vec![1, 3], vec![0], vec![3], vec![]]);
+    let settled = |weights: &[f64]| settles(weights, &neighbours, &[true, true, true, false]);
+    let half = settled(&[0.5, 0.5, 1.0, 1.0]).expect("the leader is seen");
+    assert!((half.radius - 0.5f64.sqrt()).abs() < 1e-9, "{half:?}");
+    let error = settled(&[1.0, 0.0, 1.0, 1.0]).expect_err("nobody listens to the leader");
+    assert!(
+        matches!(error, WeightsError::DoesNotSettle { radius } if (radius - 1.0).abs() < 1e-9),
+        "{error}"
+    );
 }
