@@ -35,6 +35,23 @@ pub struct Detour {
     ticks: u32,
     /// Eighths of a turn to the right; 0 is straight ahead.
     turn: u8,
+    /// Distance from the goal where the detour began \[m\].
+    begun: f64,
+}
+
+/// What a member could do and did at a tick; all relative to it.
+#[derive(Clone, Copy, Debug)]
+pub struct Tick {
+    /// How far it could go in open space \[m\], at most.
+    pub scale: f64,
+    /// Its goal \[m\].
+    pub wanted: [f64; 2],
+    /// The share of `scale` \[1\] that is free straight to the goal.
+    pub straight: f64,
+    /// The point of the cell nearest to the goal, as far as `scale` \[m\].
+    pub direct: [f64; 2],
+    /// Its step by its present aim \[m\].
+    pub moved: [f64; 2],
 }
 
 /// A quarter turn, where detours begin, and the furthest, in eighths.
@@ -53,21 +70,17 @@ impl Detour {
         [cos * wanted[0] - sin * wanted[1], sin * wanted[0] + cos * wanted[1]]
     }
 
-    /// Takes note of a tick: the member could have gone `scale` \[m\] straight to `wanted`, it can go
-    /// `direct`, and by its present aim it goes `moved` \[m\], all relative to it.
-    pub fn update(
-        &mut self,
-        patience: &Patience,
-        scale: f64,
-        wanted: [f64; 2],
-        direct: [f64; 2],
-        moved: [f64; 2],
-    ) {
+    /// Takes note of a tick.
+    pub fn update(&mut self, patience: &Patience, tick: &Tick) {
+        let Tick { scale, wanted, straight, direct, moved } = *tick;
         let length = wanted[0].hypot(wanted[1]);
         let progress = dot(direct, wanted) / (length * scale);
+        // Sliding back to where the detour began is no progress: the way is free that leads straight on,
+        // or past something from a place nearer to the goal.
+        let is_free = straight > patience.free || (progress > patience.free && length < self.begun);
         let speaks_for_change = match self.turn {
             0 => progress < patience.blocked,
-            _ => progress > patience.free || moved[0].hypot(moved[1]) < patience.blocked * scale,
+            _ => is_free || moved[0].hypot(moved[1]) < patience.blocked * scale,
         };
         self.ticks = if speaks_for_change { self.ticks + 1 } else { 0 };
         if patience.ticks == 0 || self.ticks < patience.ticks {
@@ -75,8 +88,11 @@ impl Detour {
         }
         self.ticks = 0;
         self.turn = match self.turn {
-            0 => FIRST,
-            _ if progress > patience.free => 0,
+            0 => {
+                self.begun = length;
+                FIRST
+            }
+            _ if is_free => 0,
             LAST => FIRST,
             turn => turn + 1,
         };

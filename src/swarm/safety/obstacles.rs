@@ -2,8 +2,8 @@
 //! speaks to parry.
 //!
 //! Solids are kept out by their borders. Outside a polygon, each edge near the member gives a
-//! half-plane: the edge is convex, so it lies wholly behind the plane through its nearest point
-//! across the line to it, and whoever stays before that plane keeps its distance, however far the
+//! half-plane, unless it lies behind that of a nearer one: the edge is convex, so it lies wholly behind
+//! the plane through its nearest point across the line to it, and whoever stays before that plane keeps its distance, however far the
 //! step. That holds for concave polygons too, since nobody gets inside without crossing an edge.
 //! Whoever starts inside is led out by the nearest point of the border, and its depth.
 
@@ -36,6 +36,8 @@ pub struct Obstacles {
     tree: Bvh,
     /// Whether a member stands in the outline's solid, for the member asked about last.
     within: Vec<bool>,
+    /// Pieces near that member, with their distances \[m\].
+    near: Vec<(f64, u32)>,
 }
 
 #[derive(Clone, Copy)]
@@ -146,21 +148,37 @@ impl Obstacles {
         }
         let margin = Vector::splat((keep + reach).min(LARGEST));
         let near = Aabb::new(here - margin, here + margin);
+        self.near.clear();
         for leaf in self.tree.intersect_aabb(&near) {
-            match self.pieces[leaf as usize] {
-                Piece::Edge { outline, .. } if self.within[outline] => {}
-                Piece::Edge { segment, outline } => {
-                    let (away, distance) = apart(segment.project_local_point(here, true).point - here);
-                    let normal = if distance > 0.0 { away } else { self.outlines[outline].inward(&segment) };
-                    planes.push(HalfPlane { normal, offset: distance - keep });
-                }
-                Piece::Disc { centre, ball } => {
-                    let (away, distance) = apart(centre - here);
-                    let normal = if distance > 0.0 { away } else { [1.0, 0.0] };
-                    planes.push(HalfPlane { normal, offset: distance - ball.radius - keep });
-                }
+            match &self.pieces[leaf as usize] {
+                Piece::Edge { outline, .. } if self.within[*outline] => {}
+                piece => self.near.push((piece.distance(here), leaf)),
             }
         }
+        self.near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let first = planes.len();
+        for &(distance, leaf) in &self.near {
+            let piece = &self.pieces[leaf as usize];
+            if distance - keep > reach
+                || planes[first..].iter().any(|plane| piece.is_behind(plane, here, keep))
+            {
+                continue;
+            }
+            planes.push(HalfPlane { normal: self.towards(piece, here), offset: distance - keep });
+        }
+    }
+
+    /// Unit vector from `here` to the nearest point of a piece.
+    fn towards(&self, piece: &Piece, here: Vector) -> [f64; 2] {
+        let (way, on_border) = match piece {
+            Piece::Edge { segment, outline } => {
+                let way = segment.project_local_point(here, true).point - here;
+                (way, self.outlines[*outline].inward(segment))
+            }
+            Piece::Disc { centre, .. } => (*centre - here, [1.0, 0.0]),
+        };
+        let (direction, distance) = apart(way);
+        if distance > 0.0 { direction } else { on_border }
     }
 
     /// The half-plane that leads out of a solid over the nearest point of its border.
@@ -260,6 +278,20 @@ impl Piece {
             Piece::Edge { segment, .. } => segment.distance_to_local_point(here, true),
             Piece::Disc { centre, ball } => (*centre - here).length() - ball.radius,
         }
+    }
+}
+
+impl Piece {
+    /// Whether all of the piece is as far behind a plane as the plane's own piece, so that whoever keeps
+    /// before that plane keeps its distance from this piece too: so it is with the edges of a convex
+    /// polygon but the nearest.
+    fn is_behind(&self, plane: &HalfPlane, here: Vector, keep: f64) -> bool {
+        let normal = vector(plane.normal);
+        let depth = match self {
+            Piece::Edge { segment, .. } => normal.dot(segment.a - here).min(normal.dot(segment.b - here)),
+            Piece::Disc { centre, ball } => normal.dot(*centre - here) - ball.radius,
+        };
+        depth >= (plane.offset + keep) * (1.0 - 1e-14)
     }
 }
 

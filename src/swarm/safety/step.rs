@@ -1,6 +1,7 @@
 //! One member's part of a tick: its cell, and its step within it.
 
-use super::cell::{HalfPlane, dot};
+use super::cell::{HalfPlane, dot, length, shortened};
+use super::deadlock::Tick;
 use super::filter::{Filter, Flags, Seen};
 
 /// How far a member can get at this tick \[m\].
@@ -126,24 +127,25 @@ impl Filter {
 
     /// The point of the cell to go to: the nearest to the wanted one or, of a detour, to its aim.
     fn around(&mut self, way: [f64; 2], range: Range, member: usize, flags: &mut Flags) -> [f64; 2] {
-        let direct = self.cell.nearest(way);
+        let direct = self.cell.nearest(way, range.reach);
         let size = self.radii[member] + self.limits.clearance;
         let distance = length(way);
         // Nearer to its goal than its own size, a member waits for whoever stands there.
         if distance <= size || distance == 0.0 {
             self.detours[member].reset();
-            return shortened(direct, range.reach);
+            return direct;
         }
         let scale = if size > 0.0 { size.min(range.step) } else { range.step }.min(distance);
         let detour = &mut self.detours[member];
         let goal = if detour.is_active() {
             flags.0 |= Flags::RESOLVING_DEADLOCK;
-            shortened(self.cell.nearest(detour.aim(way)), scale)
+            self.cell.nearest(detour.aim(way), scale.min(range.reach))
         } else {
-            shortened(direct, range.reach)
+            direct
         };
-        let patience = &self.limits.patience;
-        detour.update(patience, scale, way, shortened(direct, scale), goal);
+        let straight = self.cell.share(shortened(way, scale));
+        let direct = shortened(direct, scale);
+        detour.update(&self.limits.patience, &Tick { scale, wanted: way, straight, direct, moved: goal });
         goal
     }
 
@@ -171,7 +173,8 @@ impl Filter {
             return goal;
         }
         flags.0 |= Flags::ACCELERATION_LIMITED;
-        self.cell.nearest([(velocity[0] + held[0]) * period, (velocity[1] + held[1]) * period])
+        let next = [(velocity[0] + held[0]) * period, (velocity[1] + held[1]) * period];
+        self.cell.nearest(next, range.step)
     }
 
     /// Cuts the step where a disc cast along it touches a solid. The cell has seen to that already: this
@@ -216,18 +219,4 @@ fn border(here: [f64; 2], there: [f64; 2], keep: f64, stray: f64, reach: f64) ->
 /// Age alone drives nobody back: at most it keeps a member where it stands.
 fn aged(offset: f64, fresh: f64) -> f64 {
     offset.max(fresh.min(0.0))
-}
-
-fn length(way: [f64; 2]) -> f64 {
-    way[0].hypot(way[1])
-}
-
-/// The way, or as much of it as is `most` \[m\] long.
-fn shortened(way: [f64; 2], most: f64) -> [f64; 2] {
-    let length = length(way);
-    if length <= most {
-        return way;
-    }
-    let share = most / length;
-    [share * way[0], share * way[1]]
 }
