@@ -3,6 +3,7 @@
 mod compare;
 mod install;
 mod material;
+mod node;
 mod output;
 mod progress;
 mod run;
@@ -18,6 +19,8 @@ use clap::{Args, CommandFactory, Parser, Subcommand};
 use clap_complete::Shell;
 use flockform::compare::run::plan;
 use flockform::continuum::report::PlanReport;
+use flockform::ros::arguments::{RosArgumentError, RosArguments, Severity};
+use flockform::ros::node::NodeError;
 use flockform::scene::{self, Bundled, Scene, SceneError, bundled};
 use flockform::{bench, export};
 
@@ -71,6 +74,14 @@ pub enum Command {
                       Exit codes: 0 flown and every declared bound held, 1 a bound broken or interrupted, 2 bad input."
     )]
     Swarm(swarm::SwarmArguments),
+    /// Keep a swarm in formation over ROS 2: poses in, safe targets out
+    #[command(
+        after_help = "Example:\n  flockform node square --ros-args -r __ns:=/fleet -p speed_limit:=0.5\n  flockform node square --member robot_3"
+    )]
+    Node(node::NodeArguments),
+    /// Be the robots of a swarm file as ROS 2 nodes, simulated
+    #[command(after_help = "Example:\n  flockform robots square --ros-args -p publish_clock:=true")]
+    Robots(node::RobotsArguments),
     /// List the bundled swarms
     #[command(after_help = "Example:\n  flockform swarms")]
     Swarms,
@@ -185,6 +196,14 @@ pub enum Refusal {
     #[error("{0}")]
     Scene(#[from] SceneError),
     #[error("{0}")]
+    Node(#[from] NodeError),
+    #[error("{0}")]
+    Ros(#[from] RosArgumentError),
+    #[error(
+        "--ros-args: this command is no ROS 2 node\n  help: leave them out, or use `flockform node` or `flockform robots`"
+    )]
+    NoNode,
+    #[error("{0}")]
     Export(#[from] export::ExportError),
     #[error(
         "there is no {what} file and no bundled {what} `{name}`\n  help: the nearest bundled {what} is `{nearest}`; `flockform {what}s` lists them all"
@@ -203,22 +222,57 @@ pub enum Refusal {
     Threads { threads: usize, error: rayon::ThreadPoolBuildError },
 }
 
-/// Logs go to standard error; `RUST_LOG` wins over `-v`.
-pub fn start_log(verbose: u8) {
-    let level = ["warn", "flockform=info", "flockform=debug", "trace"][usize::from(verbose.min(3))];
+/// The command line, with what ROS was told split off.
+///
+/// # Errors
+/// ROS arguments that are none, or that are given to a command that is no node.
+pub fn arguments() -> Result<(Arguments, RosArguments), Refusal> {
+    let all = std::env::args_os().map(|argument| argument.to_string_lossy().into_owned());
+    let all: Vec<String> = all.collect();
+    let is_asked = all.iter().any(|argument| argument == "--ros-args");
+    let split = RosArguments::parse(all.clone(), &|name| std::env::var(name).ok());
+    // What is wrong with ROS's variables concerns no command that is no node.
+    let (rest, ros) = match split {
+        Err(error) if is_asked => return Err(error.into()),
+        Err(error) => (all, Err(error)),
+        Ok((rest, ros)) => (rest, Ok(ros)),
+    };
+    let arguments = Arguments::parse_from(rest);
+    match arguments.command {
+        Command::Node(_) | Command::Robots(_) => Ok((arguments, ros?)),
+        _ if is_asked => Err(Refusal::NoNode),
+        _ => Ok((arguments, RosArguments::default())),
+    }
+}
+
+/// Logs go to standard error; `RUST_LOG` wins over `--log-level`, and that over `-v`.
+pub fn start_log(verbose: u8, ros: &RosArguments) {
+    let level = match ros.logging.level_of("flockform") {
+        None | Some(Severity::Unset) => {
+            ["warn", "flockform=info", "flockform=debug", "trace"][usize::from(verbose.min(3))]
+        }
+        Some(Severity::Debug) => "flockform=debug",
+        Some(Severity::Info) => "flockform=info",
+        Some(Severity::Warn) => "flockform=warn",
+        Some(Severity::Error | Severity::Fatal) => "flockform=error",
+    };
+    // The middleware reports every peer that comes and goes as a warning.
+    let level = format!("{level},rustdds=error,ros2_client=error");
     let filter = tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| level.into());
     let colours = std::io::stderr().is_terminal();
     let log = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr);
     log.with_ansi(colours).without_time().init();
 }
 
-pub fn dispatch(command: Command) -> Result<ExitCode, Refusal> {
+pub fn dispatch(command: Command, ros: &RosArguments) -> Result<ExitCode, Refusal> {
     match command {
         Command::Run(arguments) => return run::run(&arguments),
         Command::Compare(arguments) => return compare::compare(&arguments),
         Command::Trade(arguments) => return trade::trade(&arguments),
         Command::Stability(arguments) => return stability::stability(&arguments),
         Command::Swarm(arguments) => return swarm::swarm(&arguments),
+        Command::Node(arguments) => return node::node(&arguments, ros),
+        Command::Robots(arguments) => return node::robots(&arguments, ros),
         Command::Scenes => list(bundled::SCENES, |scene| Ok(scene.load(&[])?.raw.title))?,
         Command::Swarms => list(bundled::SWARMS, |swarm| Ok(swarm.load_swarm(&[])?.raw.title))?,
         Command::Install(arguments) => return install::install(&arguments),

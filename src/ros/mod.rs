@@ -3,3 +3,5 @@
 pub mod arguments;
 pub mod edge;
 pub mod messages;
+pub mod node;
+pub mod robots;

@@ -42,8 +42,10 @@ pub struct Control {
     period: f64,
     mode: Mode,
     ticks: u64,
-    /// Periods run: the leaders' programs stand still in an emergency stop.
+    /// Periods run since the period last changed: the leaders' programs stand still in an emergency stop.
     run: u64,
+    /// Time run before that \[s\].
+    run_before: f64,
     now: f64,
     present: Points,
     /// Velocities between the last two poses \[m/s\].
@@ -91,6 +93,7 @@ impl Control {
             mode: Mode::Running,
             ticks: 0,
             run: 0,
+            run_before: 0.0,
             now: 0.0,
             present: formation.places.clone(),
             velocity: Points::zeros(count),
@@ -130,7 +133,18 @@ impl Control {
 
     /// Time that the leaders' programs have run \[s\].
     pub fn program_time(&self) -> f64 {
-        self.run as f64 * self.period
+        self.run_before + self.run as f64 * self.period
+    }
+
+    /// Changes the time between two ticks \[s\] from the next one on.
+    pub fn set_period(&mut self, period: f64) {
+        (self.run_before, self.run) = (self.program_time(), 0);
+        self.period = period;
+    }
+
+    /// How much of the way to its target a follower goes in a sweep \[1\].
+    pub fn damping(&self) -> f64 {
+        self.formation.damping()
     }
 
     /// A pose of `member` that arrives at `now` \[s\].
@@ -303,6 +317,11 @@ impl Control {
     /// Where the member was last seen \[m\].
     pub fn position(&self, member: usize) -> Option<[f64; 2]> {
         self.known[member].then(|| self.present.get(member))
+    }
+
+    /// Where the member looks \[rad\], while it is heard.
+    pub fn yaw(&self, member: usize) -> Option<f64> {
+        self.watch.pose(member).map(|pose| pose.yaw)
     }
 
     pub fn velocity(&self, member: usize) -> [f64; 2] {

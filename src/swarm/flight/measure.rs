@@ -43,11 +43,11 @@ pub struct Record {
 
 impl Record {
     pub fn new(swarm: &Swarm, flight: &Flight) -> Self {
-        let count = flight.robots().len();
+        let count = flight.fleet().robots().len();
         Self {
             samples: Vec::new(),
             times: vec![0.0],
-            tracks: vec![flight.places()],
+            tracks: vec![flight.fleet().places()],
             ways: vec![0.0; count],
             clearances: vec![f64::INFINITY; count],
             every: swarm.raw.flight.record_every,
@@ -59,7 +59,7 @@ impl Record {
     pub fn take(&mut self, flight: &Flight, before: &Points) -> Sample {
         let control = flight.control();
         let formation = control.formation();
-        let present = flight.places();
+        let present = flight.fleet().places();
         for (m, way) in self.ways.iter_mut().enumerate() {
             *way += distance(before.get(m), present.get(m));
         }
@@ -69,12 +69,12 @@ impl Record {
         }
         let worst = |place: &dyn Fn(usize) -> [f64; 2]| {
             let apart = |m: usize| distance(place(m), present.get(m));
-            (0..formation.count()).filter(|&m| flight.is_able(m)).map(apart).fold(0.0, f64::max)
+            (0..formation.count()).filter(|&m| flight.fleet().is_able(m)).map(apart).fold(0.0, f64::max)
         };
         let affine = formation.affine(control.program_time());
         let measures = formation.measures(&present);
         let sample = Sample {
-            time: flight.time(),
+            time: flight.fleet().time(),
             affine_error: affine.map(|map| worst(&|m| map.apply(formation.places.get(m)))),
             formation_error: formation.settled(&present).map(|rest| worst(&|m| rest.get(m))),
             clearance: self.around.iter().copied().fold(f64::INFINITY, f64::min),
@@ -84,8 +84,10 @@ impl Record {
             lost: (0..formation.count()).filter(|&m| !control.health(m).is_usable()).count(),
         };
         self.samples.push(sample);
-        if (flight.period() as usize).is_multiple_of(self.every) || flight.period() == flight.periods() {
-            self.times.push(flight.time());
+        if (flight.fleet().period() as usize).is_multiple_of(self.every)
+            || flight.fleet().period() == flight.periods()
+        {
+            self.times.push(flight.fleet().time());
             self.tracks.push(present);
         }
         sample

@@ -5,35 +5,28 @@
 //! through the tick that flies.
 
 mod faults;
+mod fleet;
 mod measure;
 mod report;
 
 use std::ops::ControlFlow;
 
-use super::channel::{Channel, ChannelParams};
 use super::control::Control;
-use super::robots::{DoubleIntegrator, Integrator, Model, Robot, Unicycle};
-use super::watch::Pose;
+use super::robots::Robot;
 use crate::continuum::engine::Engine;
 use crate::continuum::plan::Plan;
-use crate::flock::points::{Points, distance};
+use crate::flock::points::distance;
 use crate::scene::SceneError;
-use crate::scene::swarm::raw::{RawModel, RawSwarm};
 use crate::scene::swarm::{Shape, Swarm};
-use faults::Fault;
-
+pub use fleet::Fleet;
 pub use measure::{Record, Sample};
 pub use report::{FlightReport, RobotReport, Verdict};
 
 /// Robots under way. Members by number, as everywhere in this room.
 pub struct Flight {
     control: Control,
-    robots: Vec<Robot>,
-    channels: Vec<Channel>,
-    faults: Vec<Fault>,
-    model: Model,
+    fleet: Fleet,
     periods: u64,
-    period: u64,
     /// The same scene as a continuum, stepped beside the flight.
     continuum: Option<(Box<Engine>, Vec<usize>)>,
 }
@@ -43,29 +36,10 @@ impl Flight {
     /// Names the key of the swarm that cannot be laid out, kept safe or flown.
     pub fn new(swarm: &Swarm) -> Result<Self, SceneError> {
         let control = Control::new(swarm)?;
-        let formation = control.formation();
-        let raw = &swarm.raw;
-        let mut robots: Vec<Robot> = formation.places.iter().map(|place| Robot::at(place, 0.0)).collect();
-        for (k, start) in raw.flight.start.iter().enumerate() {
-            let m = faults::member(swarm, formation, &format!("flight.start[{k}].robot"), &start.robot)?;
-            robots[m].position = start.place;
-        }
-        let params = ChannelParams {
-            noise: raw.flight.noise,
-            delay: raw.flight.delay,
-            jitter: raw.flight.jitter,
-            loss: raw.flight.loss,
-            duplication: raw.flight.duplicates,
-            ..ChannelParams::default()
-        };
         Ok(Self {
-            channels: (0..robots.len()).map(|m| Channel::new(params, raw.flight.seed, m)).collect(),
-            faults: faults::of(swarm, formation)?,
-            model: model(raw),
+            fleet: Fleet::new(swarm, control.formation())?,
             periods: periods(swarm, &control),
-            period: 0,
             continuum: continuum(swarm)?,
-            robots,
             control,
         })
     }
@@ -78,8 +52,8 @@ impl Flight {
         &mut self.control
     }
 
-    pub fn robots(&self) -> &[Robot] {
-        &self.robots
+    pub fn fleet(&self) -> &Fleet {
+        &self.fleet
     }
 
     /// How many periods the flight takes.
@@ -87,61 +61,26 @@ impl Flight {
         self.periods
     }
 
-    /// Periods flown.
-    pub fn period(&self) -> u64 {
-        self.period
-    }
-
-    /// Time flown \[s\].
-    pub fn time(&self) -> f64 {
-        self.period as f64 * self.control.period()
-    }
-
-    /// Whether the robot moves at all now.
-    pub fn is_able(&self, member: usize) -> bool {
-        let now = self.time();
-        !self.faults.iter().any(|fault| fault.member == member && fault.holds(now) && fault.stands())
-    }
-
     /// Flies one period.
     pub fn step(&mut self) {
-        let (now, dt) = (self.time(), self.control.period());
-        for (m, channel) in self.channels.iter_mut().enumerate() {
-            let fault = self.faults.iter().rev().find(|fault| fault.member == m && fault.holds(now));
-            channel.set_sender(fault.map(Fault::sender).unwrap_or_default());
-            let Robot { position, yaw, .. } = self.robots[m];
-            let frame_is_right = !fault.is_some_and(Fault::is_in_wrong_frame);
-            channel.send(self.period, Pose { position, yaw, stamp: now, frame_is_right });
-            for pose in channel.deliver(self.period) {
-                // What is turned away is counted by the watch.
-                let _ = self.control.receive(m, pose, now);
-            }
-        }
+        let now = self.fleet.time();
+        let control = &mut self.control;
+        self.fleet.say(now, &mut |member, pose| {
+            // What is turned away is counted by the watch.
+            let _ = control.receive(member, pose, now);
+        });
         self.control.tick(now);
-        for m in 0..self.robots.len() {
-            if self.is_able(m) {
-                let target = self.control.target(m).unwrap_or(self.robots[m].position);
-                self.robots[m].step(&self.model, target, dt);
-            } else {
-                self.robots[m].velocity = [0.0; 2];
-            }
-        }
+        self.fleet.go(|member| self.control.target(member));
         if let Some((engine, _)) = &mut self.continuum {
             engine.advance();
         }
-        self.period += 1;
     }
 
     /// Largest distance of a robot from its particle in the continuum run of the same scene \[m\].
     pub fn continuum_error(&self) -> Option<f64> {
         let (engine, particles) = self.continuum.as_ref()?;
         let apart = |(robot, &i): (&Robot, &usize)| distance(robot.position, engine.present().get(i));
-        Some(self.robots.iter().zip(particles).map(apart).fold(0.0, f64::max))
-    }
-
-    /// Where the robots are \[m\].
-    pub fn places(&self) -> Points {
-        self.robots.iter().map(|robot| robot.position).collect()
+        Some(self.fleet.robots().iter().zip(particles).map(apart).fold(0.0, f64::max))
     }
 }
 
@@ -155,8 +94,8 @@ pub fn fly(
 ) -> Result<(Record, FlightReport), SceneError> {
     let mut flight = Flight::new(swarm)?;
     let mut record = Record::new(swarm, &flight);
-    while flight.period() < flight.periods() {
-        let before = flight.places();
+    while flight.fleet.period() < flight.periods() {
+        let before = flight.fleet.places();
         flight.step();
         let sample = record.take(&flight, &before);
         if watch(&flight, &sample).is_break() {
@@ -165,21 +104,6 @@ pub fn fly(
     }
     let report = FlightReport::new(swarm, &flight, &record);
     Ok((record, report))
-}
-
-fn model(raw: &RawSwarm) -> Model {
-    let speed = raw.limits.speed.unwrap_or(f64::INFINITY);
-    match raw.flight.model {
-        RawModel::Ideal => Model::Ideal,
-        RawModel::Integrator => Model::Integrator(Integrator { speed }),
-        RawModel::Unicycle { turn_rate } => {
-            Model::Unicycle(Unicycle { speed, turn_rate: turn_rate.to_radians(), ..Unicycle::default() })
-        }
-        RawModel::DoubleIntegrator => Model::DoubleIntegrator(DoubleIntegrator {
-            speed,
-            acceleration: raw.limits.acceleration.unwrap_or(f64::INFINITY),
-        }),
-    }
 }
 
 /// As long as the file says; else as many periods as the scene has steps, or until some time after the programs.

@@ -78,9 +78,9 @@ impl FlightReport {
             title: swarm.raw.title.clone(),
             robots: formation.count(),
             leaders,
-            model: flight.model.name(),
-            seconds: flight.time(),
-            periods: flight.period(),
+            model: flight.fleet().model().name(),
+            seconds: flight.fleet().time(),
+            periods: flight.fleet().period(),
             affine_error: largest_and_last(samples, |s| s.affine_error),
             formation_error: largest_and_last(samples, |s| s.formation_error),
             settling_time: settling_time(samples, formation.programs_end(), bounds.settled_within),
@@ -110,7 +110,7 @@ impl FlightReport {
 fn robot(flight: &Flight, record: &Record, m: usize) -> RobotReport {
     let control = flight.control();
     let counts = control.watch().counts(m);
-    let [x, y] = flight.robots()[m].position;
+    let [x, y] = flight.fleet().robots()[m].position;
     let role = if control.formation().leads(m) { Role::Leader } else { Role::Follower };
     RobotReport {
         name: control.formation().names[m].clone(),

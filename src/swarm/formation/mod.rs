@@ -17,6 +17,7 @@ use crate::flock::pseudo_energy::pe1;
 use crate::flock::role::Role;
 use crate::flock::strain::{Strain, strain};
 use crate::scene::swarm::NamedManoeuvre;
+use crate::solve::sweep::Order;
 use settling::Settling;
 
 /// Members are named by their number, from 0; positions in \[m\], world frame.
@@ -108,6 +109,11 @@ impl Formation {
         !self.is_scene
     }
 
+    /// Whether a member's target follows from where its neighbours were seen, whoever else has moved.
+    pub fn can_be_followed_alone(&self) -> bool {
+        matches!(&self.course, Course::Rule { engine, .. } if engine.update().order == Order::Synchronous)
+    }
+
     /// Members whose positions the member's target depends on.
     pub fn depends_on(&self, member: usize) -> Vec<usize> {
         let Course::Rule { engine, particles } = &self.course else { return Vec::new() };
@@ -140,6 +146,11 @@ impl Formation {
             Course::Rule { engine, .. } | Course::Inside { engine, .. } => Some(engine),
             Course::Recorded { .. } => None,
         }
+    }
+
+    /// Leaders that are told from outside where to go.
+    pub fn told(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..self.count()).filter(|&m| matches!(self.leads[m], Some(Lead::External(_))))
     }
 
     /// Gives leaders that are told from outside a new place \[m\]; false for everybody else.
@@ -300,6 +311,10 @@ impl Formation {
             }
         }
         Some(rest)
+    }
+
+    pub fn damping(&self) -> f64 {
+        self.engine().map_or(1.0, |engine| engine.update().damping)
     }
 
     /// Goes this much of the way to each target from the next period on \[1\].

@@ -41,6 +41,10 @@ impl Declaration {
         }
     }
 
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
     /// Meaning and unit, for people.
     #[must_use]
     pub fn describe(mut self, description: &str) -> Self {
