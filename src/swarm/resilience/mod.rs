@@ -36,12 +36,12 @@ pub enum Trim {
 pub fn trim(trim: Trim, own: [f64; 2], displacements: &[[f64; 2]], f: usize, keep: &mut Vec<[bool; 2]>) {
     keep.clear();
     keep.extend(displacements.iter().map(|d| [d.iter().all(|d| d.is_finite()); 2]));
-    for axis in 0..2 {
+    for (axis, own) in own.into_iter().enumerate() {
         for _ in 0..f {
-            drop_farthest(axis, |d| d - own[axis], displacements, keep);
+            drop_farthest(axis, |d| d - own, displacements, keep);
         }
         for _ in 0..f {
-            drop_farthest(axis, |d| own[axis] - d, displacements, keep);
+            drop_farthest(axis, |d| own - d, displacements, keep);
         }
     }
     if trim == Trim::Whole {
