@@ -9,6 +9,7 @@ pub mod channel;
 pub mod control;
 pub mod flight;
 pub mod formation;
+pub mod resilience;
 pub mod robots;
 pub mod safety;
 pub mod watch;

@@ -53,7 +53,8 @@ fn each_kind_of_bad_pose_is_turned_away_for_its_reason() {
     let good = pose(1.0, 10.0);
     let at = |position| Pose { position, ..good };
     let stamped = |stamp| Pose { stamp, ..good };
-    let rows: [(Pose, fn(&Rejection) -> bool); 9] = [
+    type IsReason = fn(&Rejection) -> bool;
+    let rows: [(Pose, IsReason); 9] = [
         (at([f64::NAN, 0.0]), |r| *r == Rejection::NotFinite { what: "position" }),
         (at([0.0, f64::NEG_INFINITY]), |r| *r == Rejection::NotFinite { what: "position" }),
         (Pose { yaw: f64::NAN, ..good }, |r| *r == Rejection::NotFinite { what: "heading" }),

@@ -1,0 +1,160 @@
+//! How many liars a graph of neighbours tolerates.
+//!
+//! Resilience of consensus in general needs (r, s)-robustness, which is hard to decide (co-NP-complete). Of
+//! followers that listen to leaders less is asked, and that is decided in one walk: strong `2 f + 1`-
+//! robustness with respect to the leaders (Usevitch & Panagou, "Resilient leader-follower consensus to
+//! arbitrary reference values", ACC 2018; equal to bootstrap percolation from the leaders). Then, with at
+//! most `f` liars among the neighbours of anyone, leaders included, what the honest leaders say reaches
+//! every follower: whoever hears `2 f + 1` that are right is left with one after trimming.
+
+use super::Trim;
+use crate::flock::neighbourhood::Neighbours;
+
+/// Why so many liars are not tolerated.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Unsupported {
+    #[error(
+        "member {member} has {neighbours} neighbours, and {needed} are needed to tolerate F = {f} \
+         liars: give it more (on a lattice 8 each tolerate 1, 24 tolerate 3), make it a leader, or lower F"
+    )]
+    TooFewNeighbours { member: usize, neighbours: usize, needed: usize, f: usize },
+    #[error(
+        "of the {neighbours} neighbours of member {member} only {reached} are sure to learn what the leaders \
+         say, and {needed} are needed to tolerate F = {f} liars: give more neighbours (on a lattice 8 \
+         each tolerate 1, 24 tolerate 3), add leaders, or lower F"
+    )]
+    NotReached { member: usize, neighbours: usize, reached: usize, needed: usize, f: usize },
+}
+
+/// Whether the followers, all but the `leaders`, learn what the leaders say whichever `f` of the neighbours
+/// of anyone lie. Without liars (`f` = 0) that is whether everybody is linked to a leader.
+///
+/// [`Trim::PerAxis`] needs `2 f + 1` neighbours that are sure, [`Trim::Whole`] `4 f + 1`; with fewer the
+/// followers are as safe, but one that is left with no neighbour stays where it is.
+pub fn supported(neighbours: &Neighbours, leaders: &[bool], f: usize, trim: Trim) -> Result<(), Unsupported> {
+    let needed = match trim {
+        Trim::PerAxis => 2 * f + 1,
+        Trim::Whole => 4 * f + 1,
+    };
+    let is_follower = |member: &usize| !leaders[*member];
+    let members = || (0..neighbours.count()).filter(is_follower);
+    let heard = |member: usize| neighbours.of(member).len();
+    if let Some(member) = members().find(|&member| heard(member) < needed) {
+        return Err(Unsupported::TooFewNeighbours { member, neighbours: heard(member), needed, f });
+    }
+    let (sure, reached) = percolate(neighbours, leaders, needed);
+    // The one that lacks least: there the remedy is smallest.
+    match members()
+        .filter(|&member| !sure[member])
+        .max_by_key(|&member| (reached[member], usize::MAX - member))
+    {
+        None => Ok(()),
+        Some(member) => Err(Unsupported::NotReached {
+            member,
+            neighbours: heard(member),
+            reached: reached[member],
+            needed,
+            f,
+        }),
+    }
+}
+
+/// The most liars among the neighbours of anyone that are tolerated; `None` where some follower is linked
+/// to no leader at all.
+pub fn most_supported(neighbours: &Neighbours, leaders: &[bool], trim: Trim) -> Option<usize> {
+    // Where nobody follows nothing bounds it; more liars than neighbours say nothing.
+    let most = (0..neighbours.count()).map(|member| neighbours.of(member).len()).max().unwrap_or(0);
+    (0..=most).take_while(|&f| supported(neighbours, leaders, f, trim).is_ok()).last()
+}
+
+/// Adds to the leaders, until none is left to add, whoever has enough neighbours among those in already:
+/// who is in, and how many of each one's neighbours are.
+fn percolate(neighbours: &Neighbours, leaders: &[bool], needed: usize) -> (Vec<bool>, Vec<usize>) {
+    let count = neighbours.count();
+    let mut heard_by: Vec<Vec<u32>> = vec![Vec::new(); count];
+    for member in 0..count {
+        neighbours.of(member).iter().for_each(|&k| heard_by[k as usize].push(member as u32));
+    }
+    let mut sure = leaders.to_vec();
+    let mut reached = vec![0; count];
+    let mut added: Vec<usize> = (0..count).filter(|&member| leaders[member]).collect();
+    // Each member is added once.
+    while let Some(member) = added.pop() {
+        for &listener in &heard_by[member] {
+            let listener = listener as usize;
+            reached[listener] += 1;
+            if reached[listener] >= needed && !sure[listener] {
+                sure[listener] = true;
+                added.push(listener);
+            }
+        }
+    }
+    (sure, reached)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flock::body::{Body, Cut};
+    use crate::flock::lattice::{Lattice, LatticeKind};
+    use crate::flock::neighbourhood::Neighbourhood;
+
+    fn square(neighbourhood: Neighbourhood) -> Neighbours {
+        let lattice = Lattice::new(LatticeKind::Square { spacing: 1.0 }, [0.0, 0.0], 0.0);
+        Body::build(lattice, &Cut::Count { columns: 10, rows: 10 }, &neighbourhood, None).expect("fits").1
+    }
+
+    /// The first columns lead.
+    fn columns(count: usize) -> Vec<bool> {
+        (0..100).map(|member| member < 10 * count).collect()
+    }
+
+    /// Everybody at the edge leads.
+    fn ring() -> Vec<bool> {
+        (0..100).map(|m| [m / 10, m % 10].iter().any(|&k| k == 0 || k == 9)).collect()
+    }
+
+    #[test]
+    fn lattices_tolerate_what_they_are_known_to() {
+        let (four, eight, twenty_four) = (
+            square(Neighbourhood::First { keep: None }),
+            square(Neighbourhood::Ring { radius: 1 }),
+            square(Neighbourhood::Ring { radius: 2 }),
+        );
+        assert_eq!(most_supported(&four, &ring(), Trim::PerAxis), Some(0));
+        assert_eq!(most_supported(&eight, &ring(), Trim::PerAxis), Some(1));
+        assert_eq!(most_supported(&eight, &columns(1), Trim::PerAxis), Some(1));
+        assert_eq!(most_supported(&twenty_four, &columns(2), Trim::PerAxis), Some(3));
+        assert_eq!(most_supported(&eight, &ring(), Trim::Whole), Some(0));
+        assert_eq!(most_supported(&twenty_four, &columns(2), Trim::Whole), Some(1));
+    }
+
+    #[test]
+    fn a_refusal_names_the_member_and_what_it_lacks() {
+        let four = square(Neighbourhood::First { keep: None });
+        let refusal = supported(&four, &ring(), 1, Trim::PerAxis).expect_err("two of four lead at best");
+        let expected = Unsupported::NotReached { member: 11, neighbours: 4, reached: 2, needed: 3, f: 1 };
+        assert_eq!(refusal, expected);
+        assert!(refusal.to_string().contains("member 11 only 2"), "{refusal}");
+        let refusal = supported(&four, &columns(1), 2, Trim::PerAxis).expect_err("four at most");
+        let expected = Unsupported::TooFewNeighbours { member: 10, neighbours: 3, needed: 5, f: 2 };
+        assert_eq!(refusal, expected);
+    }
+
+    #[test]
+    fn without_liars_it_is_whether_a_leader_is_heard() {
+        let chain = Neighbours::from_lists([vec![], vec![0], vec![1], vec![4], vec![3]]);
+        let leaders = [true, false, false, false, false];
+        assert_eq!(most_supported(&chain, &leaders, Trim::PerAxis), None);
+        let refusal = supported(&chain, &leaders, 0, Trim::PerAxis).expect_err("two hear each other only");
+        assert!(matches!(refusal, Unsupported::NotReached { member: 3, reached: 0, .. }), "{refusal:?}");
+        assert_eq!(supported(&chain, &[true, false, false, true, false], 0, Trim::PerAxis), Ok(()));
+    }
+
+    #[test]
+    fn a_neighbour_is_who_is_heard_not_who_hears() {
+        // 0 leads and hears 1; 1 hears nobody.
+        let deaf = Neighbours::from_lists([vec![1], vec![]]);
+        assert!(supported(&deaf, &[true, false], 0, Trim::PerAxis).is_err());
+    }
+}
