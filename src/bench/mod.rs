@@ -6,9 +6,12 @@
 //! * [`machine`]: the memory bandwidth of the triad `a = b + s c`.
 //! * [`sweep`]: particle updates per second of the plain rule, beside the roofline that bandwidth
 //!   draws.
+//! * `swarm` (feature `swarm`): robots served per millisecond: neighbour query, rule, safety filter.
 //! * `equilibrium` (feature `fem`): seconds to equilibrium, beside a factorisation of the same system.
 
 #[cfg(feature = "fem")]
 pub mod equilibrium;
 pub mod machine;
+#[cfg(feature = "swarm")]
+pub mod swarm;
 pub mod sweep;

@@ -136,6 +136,17 @@ pub enum BenchCommand {
         #[arg(long)]
         quick: bool,
     },
+    /// Robots served per millisecond by one thread: neighbour query and rule, and with the safety filter
+    #[cfg(feature = "swarm")]
+    #[command(after_help = "Example:\n  flockform bench swarm --json > swarm.json")]
+    Swarm {
+        /// Print JSON instead of a table
+        #[arg(long)]
+        json: bool,
+        /// Small swarms and few repetitions: shows that it works, measures nothing worth quoting
+        #[arg(long)]
+        quick: bool,
+    },
     /// Seconds to equilibrium by multigrid, beside a factorisation of the same system
     #[cfg(feature = "fem")]
     #[command(after_help = "Example:\n  flockform bench equilibrium --json > equilibrium.json")]
@@ -290,6 +301,11 @@ pub fn dispatch(command: Command, ros: &RosArguments) -> Result<ExitCode, Refusa
         }
         Command::Bench(BenchCommand::Sweep { json, quick }) => {
             let report = bench::sweep::run(&bench::sweep::Options { quick })?;
+            print(&if json { format!("{}\n", serde_json::json!(report)) } else { report.to_string() });
+        }
+        #[cfg(feature = "swarm")]
+        Command::Bench(BenchCommand::Swarm { json, quick }) => {
+            let report = bench::swarm::run(&bench::swarm::Options { quick });
             print(&if json { format!("{}\n", serde_json::json!(report)) } else { report.to_string() });
         }
         #[cfg(feature = "fem")]

@@ -3,15 +3,43 @@
 use super::points::Points;
 
 /// Points sorted into square cells by counting; its buffers are kept between fills.
+///
+/// The points' coordinates are kept in the order of the cells, row after row, so that a query reads
+/// one stretch of memory for each row of cells that it touches.
 #[derive(Clone, Debug, Default)]
 pub struct CellGrid {
     low: [f64; 2],
     cell: f64,
+    /// Cells per length.
+    scale: f64,
     columns: usize,
     rows: usize,
+    /// Cell of each point that was included, in order of index.
+    cells: Vec<u32>,
+    /// Where each cell begins in the three that follow, shape \[cells + 1\].
     starts: Vec<u32>,
     members: Vec<u32>,
+    x: Vec<f64>,
+    y: Vec<f64>,
+    /// Everybody's neighbours, unsorted, in order of cells; and where each point's begin, and how many.
+    lists: Vec<u32>,
+    found: Vec<(u32, u32)>,
+    /// Where each point's list ends as it is written.
+    ends: Vec<u32>,
+    around: Candidates,
 }
+
+/// Cells are this much wider than the radius, so that rounding hides no neighbour in the next but one.
+const MARGIN: f64 = 1.0 + 1e-9;
+
+/// Cells are at least this wide \[length\], so that as many to a length is a number.
+const NARROWEST: f64 = 1e-300;
+
+/// Squared distances decide, but for those this near to the squared radius \[1\].
+const DOUBTFUL: f64 = 1e-14;
+
+/// Radii whose squares are neither infinite nor anywhere near underflow \[length\].
+const SQUARABLE: std::ops::Range<f64> = 1e-140..1e140;
 
 impl CellGrid {
     /// Sorts the points marked in `included` into cells at least `radius` wide \[length\].
@@ -28,93 +56,289 @@ impl CellGrid {
         let extent = [high[0] - low[0], high[1] - low[1]];
         let widest = extent[0].max(extent[1]);
         let most_per_axis = (2.0 * (count as f64).sqrt()).clamp(1.0, 4096.0);
-        self.cell = radius.max(widest / most_per_axis);
-        self.columns = (extent[0] / self.cell) as usize + 1;
-        self.rows = (extent[1] / self.cell) as usize + 1;
-
-        self.starts.clear();
-        self.starts.resize(self.columns * self.rows + 1, 0);
-        for i in (0..points.len()).filter(usable) {
-            let cell = self.cell_of(points.get(i));
-            self.starts[cell] += 1;
-        }
-        for cell in 1..self.starts.len() {
-            self.starts[cell] += self.starts[cell - 1];
-        }
-        self.members.clear();
-        self.members.resize(count, 0);
-        // From the back, counting each cell's end down to its start: members stay in index order.
-        for i in (0..points.len()).rev().filter(usable) {
-            let cell = self.cell_of(points.get(i));
-            self.starts[cell] -= 1;
-            self.members[self.starts[cell] as usize] = i as u32;
-        }
+        self.cell = (MARGIN * radius).max(widest / most_per_axis).max(NARROWEST);
+        self.scale = 1.0 / self.cell;
+        self.columns = (extent[0] * self.scale) as usize + 1;
+        self.rows = (extent[1] * self.scale) as usize + 1;
+        self.sort(points, (0..points.len()).filter(usable));
     }
 
-    /// Appends to `found` every other point within `radius` of `particle`, walking the cells that the
-    /// radius touches; a radius near that of the last [`CellGrid::fill`] is the cheapest.
+    fn sort(&mut self, points: &Points, usable: impl Iterator<Item = usize> + Clone) {
+        self.starts.clear();
+        self.starts.resize(self.columns * self.rows + 1, 0);
+        self.cells.clear();
+        for i in usable.clone() {
+            let cell = self.axis_cell(points.y[i], 1) * self.columns + self.axis_cell(points.x[i], 0);
+            self.cells.push(cell as u32);
+            self.starts[cell] += 1;
+        }
+        let count = self.cells.len();
+        let mut begin = 0;
+        for start in &mut self.starts {
+            begin += std::mem::replace(start, begin);
+        }
+        self.members.resize(count, 0);
+        self.x.resize(count, 0.0);
+        self.y.resize(count, 0.0);
+        for (i, &cell) in usable.zip(&self.cells) {
+            let place = &mut self.starts[cell as usize];
+            let at = *place as usize;
+            *place += 1;
+            (self.members[at], self.x[at], self.y[at]) = (i as u32, points.x[i], points.y[i]);
+        }
+        // Each cell's start has been counted up to its end, the start of the next.
+        self.starts.copy_within(..self.columns * self.rows, 1);
+        self.starts[0] = 0;
+    }
+
+    /// Appends to `found` every other point within `radius` of `particle`, in order of index. A radius up
+    /// to that of the last [`CellGrid::fill`] looks into nine cells, a larger one into more.
     pub fn within(&self, points: &Points, particle: usize, radius: f64, found: &mut Vec<u32>) {
-        let [x, y] = points.get(particle);
-        if self.columns == 0 || !(x.is_finite() && y.is_finite()) {
+        let here = points.get(particle);
+        if self.columns == 0 || !(here[0].is_finite() && here[1].is_finite()) {
             return;
         }
-        for c in self.cells_within(x - self.low[0], radius, self.columns) {
-            for r in self.cells_within(y - self.low[1], radius, self.rows) {
-                for &other in self.cell_members(c * self.rows + r) {
-                    let (dx, dy) = (points.x[other as usize] - x, points.y[other as usize] - y);
-                    if other as usize != particle && dx.hypot(dy) <= radius {
-                        found.push(other);
-                    }
-                }
+        let columns = self.cells_within(here[0], radius, 0);
+        let rows = self.cells_within(here[1], radius, 1);
+        let begin = found.len();
+        for row in rows {
+            let near = self.run(row, &columns).near(here, radius);
+            found.extend(near.filter(|&member| member as usize != particle));
+        }
+        // Index order, so that no sum depends on how the cells were walked.
+        found[begin..].sort_unstable();
+    }
+
+    /// Replaces the lists by those of every point within the radius of the last [`CellGrid::fill`] of
+    /// each of `count` points, in order of index: what [`CellGrid::within`] finds, a cell at a time.
+    /// A point that was not included sees nobody.
+    pub fn all_within(&mut self, count: usize, radius: f64, starts: &mut Vec<u32>, index: &mut Vec<u32>) {
+        self.found.clear();
+        self.found.resize(count, (0, 0));
+        let total = self.look_around(radius);
+        let mut end = 0;
+        starts.clear();
+        starts.push(0);
+        starts.extend(self.found.iter().map(|&(_, found)| {
+            end += found;
+            end
+        }));
+        self.ends.clear();
+        self.ends.extend_from_slice(&starts[..count]);
+        index.resize(total, 0);
+        // Who has me as a neighbour is mine: handed out in order of index, every list comes out sorted.
+        for (particle, &(begin, found)) in self.found.iter().enumerate() {
+            for &other in &self.lists[begin as usize..][..found as usize] {
+                let end = &mut self.ends[other as usize];
+                index[*end as usize] = particle as u32;
+                *end += 1;
             }
         }
     }
 
-    fn cells_within(&self, offset: f64, radius: f64, cells: usize) -> std::ops::Range<usize> {
-        // One cell more on either side than the division says, for it rounds.
-        let first = ((offset - radius) / self.cell) as usize;
-        let last = ((offset + radius) / self.cell) as usize;
-        first.saturating_sub(1).min(cells - 1)..last.saturating_add(2).min(cells)
+    /// Writes everybody's neighbours into `lists`, unsorted, cell after cell; returns how many.
+    fn look_around(&mut self, radius: f64) -> usize {
+        let mut around = std::mem::take(&mut self.around);
+        let mut lists = std::mem::take(&mut self.lists);
+        let mut found = std::mem::take(&mut self.found);
+        let mut end = 0;
+        for row in 0..self.rows {
+            for column in 0..self.columns {
+                let own = self.run(row, &(column..column + 1));
+                if own.members.is_empty() {
+                    continue;
+                }
+                let columns = column.saturating_sub(1)..(column + 2).min(self.columns);
+                around.clear();
+                let mut first = 0;
+                for beside in row.saturating_sub(1)..(row + 2).min(self.rows) {
+                    if beside == row {
+                        first = around.len() + self.run(row, &(columns.start..column)).members.len();
+                    }
+                    around.add(self.run(beside, &columns));
+                }
+                let room = end + own.members.len() * around.len() + 1;
+                if lists.len() < room {
+                    lists.resize(2 * room, 0);
+                }
+                for (k, &member) in own.members.iter().enumerate() {
+                    let kept = around.keep_near(first + k, radius, &mut lists[end..]);
+                    found[member as usize] = (end as u32, kept as u32);
+                    end += kept;
+                }
+            }
+        }
+        (self.around, self.lists, self.found) = (around, lists, found);
+        end
     }
 
-    fn cell_members(&self, cell: usize) -> &[u32] {
-        &self.members[self.starts[cell] as usize..self.starts[cell + 1] as usize]
+    /// The points of some cells of a row.
+    fn run(&self, row: usize, columns: &std::ops::Range<usize>) -> Run<'_> {
+        let first = row * self.columns;
+        let (begin, end) = (self.starts[first + columns.start], self.starts[first + columns.end]);
+        let range = begin as usize..end as usize;
+        Run { members: &self.members[range.clone()], x: &self.x[range.clone()], y: &self.y[range] }
     }
 
-    fn cell_of(&self, [x, y]: [f64; 2]) -> usize {
-        let axis = |value: f64, low: f64, cells: usize| (((value - low) / self.cell) as usize).min(cells - 1);
-        axis(x, self.low[0], self.columns) * self.rows + axis(y, self.low[1], self.rows)
+    fn axis_cell(&self, value: f64, axis: usize) -> usize {
+        let cells = [self.columns, self.rows][axis];
+        (((value - self.low[axis]) * self.scale) as usize).min(cells - 1)
     }
+
+    /// Cells of an axis in which points within `radius` of a coordinate lie.
+    fn cells_within(&self, value: f64, radius: f64, axis: usize) -> std::ops::Range<usize> {
+        let cells = [self.columns, self.rows][axis];
+        // As the cells are at least as wide as the radius they were made for, that is one.
+        let width = if MARGIN * radius <= self.cell { 1 } else { (MARGIN * radius / self.cell) as usize + 1 };
+        let cell = self.axis_cell(value, axis);
+        cell.saturating_sub(width)..cell.saturating_add(width + 1).min(cells)
+    }
+}
+
+/// Points that lie side by side in memory.
+#[derive(Clone, Copy)]
+struct Run<'a> {
+    members: &'a [u32],
+    x: &'a [f64],
+    y: &'a [f64],
+}
+
+impl<'a> Run<'a> {
+    fn near(self, here: [f64; 2], radius: f64) -> impl Iterator<Item = u32> + 'a {
+        let points = self.members.iter().zip(self.x.iter().zip(self.y));
+        let near = points.filter(move |&(_, (&x, &y))| (x - here[0]).hypot(y - here[1]) <= radius);
+        near.map(|(&member, _)| member)
+    }
+}
+
+/// Points that may be near those of one cell.
+#[derive(Clone, Debug, Default)]
+struct Candidates {
+    members: Vec<u32>,
+    x: Vec<f64>,
+    y: Vec<f64>,
+    near: Vec<u64>,
+}
+
+impl Candidates {
+    fn len(&self) -> usize {
+        self.members.len()
+    }
+
+    fn clear(&mut self) {
+        self.members.clear();
+        self.x.clear();
+        self.y.clear();
+    }
+
+    fn add(&mut self, run: Run) {
+        self.members.extend_from_slice(run.members);
+        self.x.extend_from_slice(run.x);
+        self.y.extend_from_slice(run.y);
+        self.near.resize(self.members.len(), 0);
+    }
+
+    /// Writes those near number `own` of them to `list`, which has room for one more than there are;
+    /// returns how many.
+    #[inline(always)]
+    fn keep_near(&mut self, own: usize, radius: f64, list: &mut [u32]) -> usize {
+        let count = self.members.len();
+        let (members, x, y) = (&self.members[..count], &self.x[..count], &self.y[..count]);
+        let here = [x[own], y[own]];
+        let list = &mut list[..=count];
+        if SQUARABLE.contains(&radius) && mark_near((x, y), here, radius, &mut self.near[..count]) {
+            self.near[own] = 0;
+            let mut kept = 0;
+            // Written whether near or not, and kept by going on: no branch to be mispredicted.
+            for (&member, &near) in members.iter().zip(&self.near[..count]) {
+                list[kept] = member;
+                kept += near as usize;
+            }
+            return kept;
+        }
+        let near = Run { members, x, y }.near(here, radius).filter(|&member| member != members[own]);
+        near.zip(list).map(|(member, place)| *place = member).count()
+    }
+}
+
+/// Marks whose squared distance is within the radius by 1, the others by 0; false if one of them is so
+/// near to the radius that squares cannot tell. As wide as the coordinates, for the sake of vectors.
+#[inline(always)]
+fn mark_near((x, y): (&[f64], &[f64]), here: [f64; 2], radius: f64, near: &mut [u64]) -> bool {
+    let (surely, hardly) = (radius * radius * (1.0 - DOUBTFUL), radius * radius * (1.0 + DOUBTFUL));
+    let mut doubtful = 0;
+    for ((near, &x), &y) in near.iter_mut().zip(x).zip(y) {
+        let (dx, dy) = (x - here[0], y - here[1]);
+        let square = dx * dx + dy * dy;
+        *near = u64::from(square <= surely);
+        doubtful += u64::from(square <= hardly) - *near;
+    }
+    doubtful == 0
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    #[test]
-    fn the_grid_finds_what_a_scan_finds() {
-        let points: Points = (0..200)
+    fn scan(points: &Points, i: usize, radius: f64) -> Vec<u32> {
+        (0..points.len())
+            .filter(|&k| {
+                let (dx, dy) = (points.x[k] - points.x[i], points.y[k] - points.y[i]);
+                k != i && dx.hypot(dy) <= radius
+            })
+            .map(|k| k as u32)
+            .collect()
+    }
+
+    fn scans(points: &Points, radius: f64) -> Vec<Vec<u32>> {
+        (0..points.len()).map(|i| scan(points, i, radius)).collect()
+    }
+
+    fn all(grid: &mut CellGrid, points: &Points, radius: f64) -> Vec<Vec<u32>> {
+        let (mut starts, mut index) = (vec![3], vec![9; 5]);
+        grid.all_within(points.len(), radius, &mut starts, &mut index);
+        starts.windows(2).map(|pair| index[pair[0] as usize..pair[1] as usize].to_vec()).collect()
+    }
+
+    fn wave() -> Points {
+        (0..200)
             .map(|i| {
                 let t = f64::from(i);
                 [(t * 0.7).sin() * 3.0 + 1e-3 * t, (t * 1.3).cos() * 2.0]
             })
-            .chain([[1e9, 0.0], [f64::NAN, 0.0], [-4.0, f64::INFINITY]])
-            .collect();
+            .collect()
+    }
+
+    #[test]
+    fn the_grid_finds_what_a_scan_finds() {
+        let odd = [[1e9, 0.0], [f64::NAN, 0.0], [-4.0, f64::INFINITY]];
+        let points: Points = wave().iter().chain(odd).collect();
         let included = vec![true; points.len()];
         let mut grid = CellGrid::default();
         grid.fill(&points, &included, 0.8);
-        for i in 0..points.len() {
-            let mut found = Vec::new();
-            grid.within(&points, i, 0.8, &mut found);
-            found.sort_unstable();
-            let scanned: Vec<u32> = (0..points.len())
-                .filter(|&k| {
-                    let (dx, dy) = (points.x[k] - points.x[i], points.y[k] - points.y[i]);
-                    k != i && dx.hypot(dy) <= 0.8
-                })
-                .map(|k| k as u32)
-                .collect();
-            assert_eq!(found, scanned, "around point {i}");
+        for radius in [0.8, 0.1, 5.0] {
+            for i in 0..points.len() {
+                let mut found = vec![7];
+                grid.within(&points, i, radius, &mut found);
+                assert_eq!(found[1..], scan(&points, i, radius), "around point {i}");
+            }
+        }
+        assert_eq!(all(&mut grid, &points, 0.8), scans(&points, 0.8));
+    }
+
+    #[test]
+    fn a_radius_that_is_hit_exactly_and_one_beyond_squares_find_what_a_scan_finds() {
+        let lattice: Points = (0..400).map(|i| [0.1 * f64::from(i % 20), 0.1 * f64::from(i / 20)]).collect();
+        for (unit, radius) in [(1.0, 0.1), (1.0, 0.5), (1e150, 1.01e149), (1e-150, 2.0e-151)] {
+            let points: Points = lattice.iter().map(|[x, y]| [unit * x, unit * y]).collect();
+            let mut grid = CellGrid::default();
+            grid.fill(&points, &[true; 400], radius);
+            for i in 0..400 {
+                let mut found = Vec::new();
+                grid.within(&points, i, radius, &mut found);
+                assert_eq!(found, scan(&points, i, radius), "around point {i} of {unit}");
+            }
+            assert_eq!(all(&mut grid, &points, radius), scans(&points, radius), "{unit}");
         }
     }
 }

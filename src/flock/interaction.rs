@@ -117,6 +117,11 @@ impl Interaction {
                 let seen = self.neighbours.of(particle).iter().map(|&k| present.get(k as usize));
                 rule.target_of_material(&own, weights.of(particle).iter().copied().zip(seen))
             }
+            // A plain mean looks at places alone: the same bits without fetching the rest.
+            (None, Weights::Equal) if rule.mean == Mean::Barycentre => {
+                let seen = self.neighbours.of(particle).iter().map(|&k| present.get(k as usize));
+                rule.target(&own, seen.map(Neighbour::at))
+            }
             _ => rule.target(&own, self.seen(particle, present)),
         }
     }

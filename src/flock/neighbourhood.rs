@@ -152,18 +152,7 @@ impl Neighbours {
     /// Reuses the buffers: no allocation once they have grown.
     pub fn rebuild_within(&mut self, grid: &mut CellGrid, present: &Points, members: &[bool], radius: f64) {
         grid.fill(present, members, radius);
-        self.starts.clear();
-        self.index.clear();
-        self.starts.push(0);
-        for (particle, &is_member) in members.iter().enumerate() {
-            if is_member {
-                let begin = self.index.len();
-                grid.within(present, particle, radius, &mut self.index);
-                // Index order, so that the sum does not depend on how the cells were walked.
-                self.index[begin..].sort_unstable();
-            }
-            self.starts.push(self.index.len() as u32);
-        }
+        grid.all_within(members.len(), radius, &mut self.starts, &mut self.index);
     }
 }
 

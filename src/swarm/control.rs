@@ -4,6 +4,7 @@
 //! without some of its neighbours; what is safe ([`Filter`]). A member that is not heard gets no target.
 
 use super::formation::{Formation, Measures, Seen};
+use super::resilience::trim;
 use super::safety::{self, Filter, Flags, Limits, Obstacle, Obstacles, SafetyError};
 use super::watch::{Health, Pose, Rejection, Watch, WatchLimits};
 use crate::flock::manoeuvre::Manoeuvre;
@@ -70,6 +71,12 @@ impl Control {
         let raw = &swarm.raw;
         let (period, count) = (raw.control.period, formation.count());
         let liars = raw.resilience.as_ref().map_or(0, |resilience| resilience.liars);
+        if liars > 0 {
+            formation.require_support(liars).map_err(|unsupported| {
+                let help = "lower it, widen the neighbourhood, or make more robots leaders";
+                swarm.refuse("resilience.liars", unsupported, help)
+            })?;
+        }
         let limits = limits(&raw.limits);
         let speed = limits.speed;
         let filter = filter(swarm, limits, formation.radii.clone())?;
@@ -275,9 +282,9 @@ impl Control {
             }
             let lost = self.formation.neighbours(member).any(|k| !self.usable[k]);
             let target = if self.liars > 0 {
-                let (kept, trimmed) = self.trimmed(member);
+                let (target, trimmed) = self.resilient_target(member, &seen);
                 self.flags[member] |= if trimmed { TRIMMED } else { 0 };
-                self.formation.target_among(member, &seen, |k| kept.contains(&k))
+                Some(target)
             } else if lost {
                 self.formation.target_among(member, &seen, |_| true)
             } else {
@@ -290,18 +297,23 @@ impl Control {
         }
     }
 
-    /// The neighbours whose displacements do not stray from the member's own, and whether any does.
-    fn trimmed(&self, member: usize) -> (Vec<usize>, bool) {
+    /// The target by those neighbours alone whose displacements do not stray from the member's own, axis by axis,
+    /// and whether any does. With nobody left on an axis the member stays where it is on that axis.
+    fn resilient_target(&self, member: usize, seen: &Seen<'_>) -> ([f64; 2], bool) {
         let displacement = |m: usize| {
             let (now, then) = (self.present.get(m), self.formation.places.get(m));
             [now[0] - then[0], now[1] - then[1]]
         };
         let heard: Vec<usize> = self.formation.neighbours(member).filter(|&k| self.usable[k]).collect();
         let all: Vec<[f64; 2]> = heard.iter().map(|&k| displacement(k)).collect();
-        let keeps = trim(displacement(member), &all, self.liars);
-        let kept: Vec<usize> = heard.iter().zip(&keeps).filter(|(_, keep)| **keep).map(|(&k, _)| k).collect();
-        let trimmed = kept.len() < heard.len();
-        (kept, trimmed)
+        let mut keep = Vec::new();
+        trim(self.formation.trim(), displacement(member), &all, self.liars, &mut keep);
+        let here = self.present.get(member);
+        let along = |axis: usize| {
+            let keeps = |k: usize| heard.iter().zip(&keep).any(|(&other, keep)| other == k && keep[axis]);
+            self.formation.target_among(member, seen, keeps).map_or(here[axis], |target| target[axis])
+        };
+        ([along(0), along(1)], keep.iter().any(|keep| *keep != [true; 2]))
     }
 
     /// The member's safe target \[m\]; `None` for one that is not heard, and while the loop is inactive.
@@ -377,10 +389,6 @@ impl Control {
         }
         places
     }
-}
-
-fn trim(_: [f64; 2], all: &[[f64; 2]], _: usize) -> Vec<bool> {
-    vec![true; all.len()]
 }
 
 /// What the filter holds members to, as the file says.

@@ -6,6 +6,7 @@ use super::Neighbour;
 ///
 /// The sum runs in the neighbours' order and is divided once: sweeps that keep to this order give
 /// the same bits.
+#[inline]
 pub fn mean(neighbours: impl Iterator<Item = Neighbour>) -> Option<[f64; 2]> {
     // -0.0 is the neutral element of addition: adding the first neighbour to it changes no bit.
     let (mut x, mut y, mut total) = (-0.0, -0.0, 0.0);

@@ -36,6 +36,7 @@ pub struct Neighbour {
 
 impl Neighbour {
     /// A neighbour that counts once.
+    #[inline]
     pub fn at(position: [f64; 2]) -> Self {
         Self { position, reference: position, weight: 1.0, matrix: IDENTITY }
     }
@@ -147,6 +148,7 @@ impl Rule {
     }
 
     /// The bare mean, before any term; `None` without neighbours or without any weight.
+    #[inline]
     fn mean(
         &self,
         present: [f64; 2],

@@ -12,12 +12,15 @@ mod settling;
 use crate::continuum::engine::Engine;
 use crate::flock::manoeuvre::{Affine, Manoeuvre, Posture};
 use crate::flock::motion::Motion;
+use crate::flock::neighbourhood::Neighbours;
 use crate::flock::points::{Points, distance};
 use crate::flock::pseudo_energy::pe1;
 use crate::flock::role::Role;
+use crate::flock::rules::Mean;
 use crate::flock::strain::{Strain, strain};
 use crate::scene::swarm::NamedManoeuvre;
 use crate::solve::sweep::Order;
+use crate::swarm::resilience::{Trim, supported};
 use settling::Settling;
 
 /// Members are named by their number, from 0; positions in \[m\], world frame.
@@ -280,6 +283,25 @@ impl Formation {
         let damping = engine.update().damping;
         let here = seen.present.get(member);
         Some([0, 1].map(|k| here[k] + damping * (target[k] - here[k])))
+    }
+
+    /// What is left out together where neighbours lie: matrices mix the axes.
+    pub fn trim(&self) -> Trim {
+        match self.engine().map(|engine| engine.interaction().rule.mean) {
+            Some(Mean::Material { .. }) => Trim::Whole,
+            _ => Trim::PerAxis,
+        }
+    }
+
+    /// Refuses more liars among the neighbours of anyone than the formation tolerates.
+    ///
+    /// # Errors
+    /// A sentence that names the robot and what it lacks.
+    pub fn require_support(&self, liars: usize) -> Result<(), String> {
+        let lists = (0..self.count()).map(|m| self.neighbours(m).map(|k| k as u32).collect::<Vec<_>>());
+        let leaders: Vec<bool> = (0..self.count()).map(|m| self.leads(m)).collect();
+        supported(&Neighbours::from_lists(lists), &leaders, liars, self.trim())
+            .map_err(|unsupported| format!("`{}` {unsupported}", self.names[unsupported.member()]))
     }
 
     /// The neighbours of a member among the members.

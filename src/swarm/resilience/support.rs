@@ -10,20 +10,28 @@
 use super::Trim;
 use crate::flock::neighbourhood::Neighbours;
 
-/// Why so many liars are not tolerated.
+/// Why so many liars are not tolerated. The texts are about the member and do not name it.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Unsupported {
     #[error(
-        "member {member} has {neighbours} neighbours, and {needed} are needed to tolerate F = {f} \
-         liars: give it more (on a lattice 8 each tolerate 1, 24 tolerate 3), make it a leader, or lower F"
+        "has {neighbours} neighbours, and {needed} are needed to tolerate F = {f} liars (on a lattice 8 each \
+         tolerate 1, 24 tolerate 3)"
     )]
     TooFewNeighbours { member: usize, neighbours: usize, needed: usize, f: usize },
     #[error(
-        "of the {neighbours} neighbours of member {member} only {reached} are sure to learn what the leaders \
-         say, and {needed} are needed to tolerate F = {f} liars: give more neighbours (on a lattice 8 \
-         each tolerate 1, 24 tolerate 3), add leaders, or lower F"
+        "has {neighbours} neighbours of whom only {reached} are sure to learn what the leaders say, and {needed} \
+         are needed to tolerate F = {f} liars (on a lattice 8 each tolerate 1, 24 tolerate 3)"
     )]
     NotReached { member: usize, neighbours: usize, reached: usize, needed: usize, f: usize },
+}
+
+impl Unsupported {
+    /// Whom it is about.
+    pub fn member(&self) -> usize {
+        match *self {
+            Self::TooFewNeighbours { member, .. } | Self::NotReached { member, .. } => member,
+        }
+    }
 }
 
 /// Whether the followers, all but the `leaders`, learn what the leaders say whichever `f` of the neighbours

@@ -120,8 +120,10 @@ pub fn dot(a: [f64; 2], b: [f64; 2]) -> f64 {
     a[0] * b[0] + a[1] * b[1]
 }
 
+/// As `hypot`, without the call where the squares are in range.
 pub fn length(way: [f64; 2]) -> f64 {
-    way[0].hypot(way[1])
+    let square = dot(way, way);
+    if (1e-200..1e200).contains(&square) { square.sqrt() } else { way[0].hypot(way[1]) }
 }
 
 /// The way, or as much of it as is `most` \[m\] long.

@@ -7,7 +7,7 @@
 //! it took to give it up. The aim is projected onto the cell like any other: a detour cannot do harm.
 //! It finds the way round convex things, not out of a maze.
 
-use super::cell::dot;
+use super::cell::{dot, length};
 
 /// When a blocked member looks for a way round.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -46,6 +46,8 @@ pub struct Tick {
     pub scale: f64,
     /// Its goal \[m\].
     pub wanted: [f64; 2],
+    /// How far that is \[m\].
+    pub distance: f64,
     /// The share of `scale` \[1\] that is free straight to the goal.
     pub straight: f64,
     /// The point of the cell nearest to the goal, as far as `scale` \[m\].
@@ -72,15 +74,14 @@ impl Detour {
 
     /// Takes note of a tick.
     pub fn update(&mut self, patience: &Patience, tick: &Tick) {
-        let Tick { scale, wanted, straight, direct, moved } = *tick;
-        let length = wanted[0].hypot(wanted[1]);
-        let progress = dot(direct, wanted) / (length * scale);
+        let Tick { scale, wanted, distance, straight, direct, moved } = *tick;
+        let progress = dot(direct, wanted) / (distance * scale);
         // Sliding back to where the detour began is no progress: the way is free that leads straight on,
         // or past something from a place nearer to the goal.
-        let is_free = straight > patience.free || (progress > patience.free && length < self.begun);
+        let is_free = straight > patience.free || (progress > patience.free && distance < self.begun);
         let speaks_for_change = match self.turn {
             0 => progress < patience.blocked,
-            _ => is_free || moved[0].hypot(moved[1]) < patience.blocked * scale,
+            _ => is_free || length(moved) < patience.blocked * scale,
         };
         self.ticks = if speaks_for_change { self.ticks + 1 } else { 0 };
         if patience.ticks == 0 || self.ticks < patience.ticks {
@@ -89,13 +90,18 @@ impl Detour {
         self.ticks = 0;
         self.turn = match self.turn {
             0 => {
-                self.begun = length;
+                self.begun = distance;
                 FIRST
             }
             _ if is_free => 0,
             LAST => FIRST,
             turn => turn + 1,
         };
+    }
+
+    /// Whether there is nothing to forget.
+    pub fn is_fresh(self) -> bool {
+        self.turn == 0 && self.ticks == 0
     }
 
     pub fn reset(&mut self) {

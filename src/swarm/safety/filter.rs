@@ -1,10 +1,12 @@
 //! The filter: one pass over the members, each with a cell of its own.
 
-use super::cell::Cell;
+use super::cell::{Cell, length};
 use super::deadlock::Detour;
 use super::limits::{Limits, SafetyError};
 use super::obstacles::Obstacles;
+use super::step::TOUCHING;
 use crate::flock::grid::CellGrid;
+use crate::flock::neighbourhood::Neighbours;
 use crate::flock::points::{Points, distance};
 
 /// What changed a target: bits that may stand together.
@@ -62,6 +64,9 @@ pub struct Filter {
 #[derive(Clone, Default)]
 pub(super) struct Crowd {
     grid: CellGrid,
+    /// Who is within `listed` \[m\] of whom.
+    neighbours: Neighbours,
+    listed: f64,
     /// Whether a member was ever seen.
     seen: Vec<bool>,
     /// Largest drift of a member from its pose \[m\].
@@ -142,22 +147,25 @@ impl Filter {
     fn meet(&mut self, seen: &Seen, wanted: &Points, period: f64) {
         let count = self.radii.len();
         let drift = (0..count).map(|member| self.drift(seen, member)).fold(0.0, f64::max);
-        let Crowd { grid, seen: ever_seen, drift: largest, .. } = &mut self.crowd;
-        *largest = drift;
-        ever_seen.clear();
-        ever_seen.extend(seen.present.iter().map(|[x, y]| x.is_finite() && y.is_finite()));
+        let crowd = &mut self.crowd;
+        crowd.drift = drift;
+        crowd.seen.clear();
+        crowd.seen.extend(seen.present.iter().map(|[x, y]| x.is_finite() && y.is_finite()));
         if count < GRID_FROM {
             return;
         }
-        // Cells as wide as the mean query: whoever has further to go looks through more of them.
+        // As wide as most queries: whoever has much further to go than the mean looks by itself.
         let step = self.limits.speed * period;
         let ways =
             seen.present.iter().zip(wanted.iter()).map(|(here, there)| distance(here, there).min(step));
-        let (sum, finite) =
-            ways.filter(|way| way.is_finite()).fold((0.0, 0.0), |(sum, n), way| (sum + way, n + 1.0));
-        let reach = if finite > 0.0 { sum / finite } else { 0.0 };
-        let radius = 2.0 * self.largest_radius + self.limits.clearance + 2.0 * reach;
-        grid.fill(seen.present, ever_seen, radius.max(f64::MIN_POSITIVE));
+        let (mut sum, mut finite, mut longest) = (0.0, 0.0, 0.0_f64);
+        for way in ways.filter(|way| way.is_finite()) {
+            (sum, finite, longest) = (sum + way, finite + 1.0, longest.max(way));
+        }
+        let reach = if finite > 0.0 { longest.min(1.5 * sum / finite) } else { 0.0 };
+        let radius = 2.0 * self.largest_radius + self.limits.clearance + 2.0 * reach + 8.0 * drift;
+        crowd.listed = (radius * (1.0 + TOUCHING)).clamp(f64::MIN_POSITIVE, f64::MAX);
+        crowd.neighbours.rebuild_within(&mut crowd.grid, seen.present, &crowd.seen, crowd.listed);
     }
 
     /// Finds all members that matter to one that moves no further than `reach` \[m\].
@@ -165,21 +173,23 @@ impl Filter {
         let drift = self.drift(seen, member) + self.crowd.drift;
         let radius = self.radii[member] + self.largest_radius + self.limits.clearance;
         let radius = radius + 2.0 * reach + 4.0 * drift;
-        let Crowd { grid, seen: ever_seen, found, .. } = &mut self.crowd;
+        let Crowd { grid, neighbours, listed, seen: ever_seen, found, .. } = &mut self.crowd;
         found.clear();
         if !self.limits.keeps_apart {
             return;
         }
-        if self.radii.len() >= GRID_FROM {
-            grid.within(seen.present, member, radius, found);
-            found.sort_unstable();
-            return;
-        }
-        let here = seen.present.get(member);
-        for (other, there) in seen.present.iter().enumerate() {
-            if other != member && ever_seen[other] && distance(here, there) <= radius {
-                found.push(other as u32);
+        if self.radii.len() < GRID_FROM {
+            let here = seen.present.get(member);
+            for (other, there) in seen.present.iter().enumerate() {
+                let way = [there[0] - here[0], there[1] - here[1]];
+                if other != member && ever_seen[other] && length(way) <= radius {
+                    found.push(other as u32);
+                }
             }
+        } else if radius <= *listed {
+            found.extend_from_slice(neighbours.of(member));
+        } else {
+            grid.within(seen.present, member, radius, found);
         }
     }
 

@@ -4,12 +4,16 @@ use super::cell::{HalfPlane, dot, length, shortened};
 use super::deadlock::Tick;
 use super::filter::{Filter, Flags, Seen};
 
-/// How far a member can get at this tick \[m\].
+/// What a member wants at this tick and how far it can get.
 #[derive(Clone, Copy)]
-pub(super) struct Range {
-    /// The way in one period, by the limits of speed and acceleration.
+struct Errand {
+    /// To the wanted place \[m\], relative to the member.
+    way: [f64; 2],
+    /// Its length \[m\].
+    distance: f64,
+    /// The way in one period by the limits of speed and acceleration \[m\].
     step: f64,
-    /// How far the cell has to be right: the step, and the way it takes to brake after it.
+    /// How far the cell has to be right \[m\]: the step, and the way it takes to brake after it.
     reach: f64,
 }
 
@@ -24,7 +28,7 @@ struct Origins {
 const CAST_TOLERANCE: f64 = 1e-7;
 
 /// Standing in somebody's space by less than this share of the distance to keep is rounding \[1\].
-const TOUCHING: f64 = 1e-9;
+pub(super) const TOUCHING: f64 = 1e-9;
 
 impl Filter {
     /// The target of one member, and what changed it.
@@ -41,31 +45,34 @@ impl Filter {
             self.detours[member].reset();
             return (here, Flags(Flags::HELD));
         }
-        let range = self.range(seen, way, period, member);
-        let (origins, range) = self.enclose(seen, range, member);
-        let mut flags = self.why(shortened(way, range.reach), origins);
-        let goal = self.around(way, range, member, &mut flags);
-        let mut step = self.braked(seen, goal, period, member, range, &mut flags);
-        step = shortened(step, range.step);
-        if step == way {
-            return (wanted, flags);
-        }
-        if length(way) > range.step {
+        let mut errand = self.errand(seen, way, period, member);
+        let origins = self.enclose(seen, &mut errand, member);
+        let open = errand.open(errand.reach);
+        let mut flags = self.why(open, origins);
+        let goal = if flags == Flags::default() && self.detours[member].is_fresh() {
+            open
+        } else {
+            self.around(&errand, member, &mut flags)
+        };
+        let step = self.braked(seen, goal, period, member, &errand, &mut flags);
+        let step = self.cast(here, shortened(step, errand.step), origins, member);
+        if errand.distance > errand.step {
             flags.0 |= Flags::SPEED_LIMITED;
         }
-        step = self.cast(here, step, origins, member);
-        ([here[0] + step[0], here[1] + step[1]], flags)
+        // To the last bit what was wanted, where nothing speaks against it.
+        let target = if step == way { wanted } else { [here[0] + step[0], here[1] + step[1]] };
+        (target, flags)
     }
 
-    fn range(&self, seen: &Seen, way: [f64; 2], period: f64, member: usize) -> Range {
-        let step = self.limits.speed * period;
+    fn errand(&self, seen: &Seen, way: [f64; 2], period: f64, member: usize) -> Errand {
+        let (step, distance) = (self.limits.speed * period, length(way));
         match self.velocity(seen, member) {
-            None => Range { step, reach: length(way).min(step) },
+            None => Errand { way, distance, step, reach: distance.min(step) },
             Some(velocity) => {
                 let most = self.limits.acceleration;
                 let top = (length(velocity) + most * period).min(self.limits.speed);
                 let reach = top * period + top * top / (2.0 * most);
-                Range { step: step.min(top * period), reach }
+                Errand { way, distance, step: step.min(top * period), reach }
             }
         }
     }
@@ -77,14 +84,14 @@ impl Filter {
     }
 
     /// Builds the member's cell; wider where it stands in somebody's space, for it then moves away.
-    fn enclose(&mut self, seen: &Seen, range: Range, member: usize) -> (Origins, Range) {
-        let origins = self.build_cell(seen, range.reach, member);
+    fn enclose(&mut self, seen: &Seen, errand: &mut Errand, member: usize) -> Origins {
+        let origins = self.build_cell(seen, errand.reach, member);
         let away = self.radii[member] + self.largest_radius + self.limits.clearance;
-        if range.reach >= away || !self.cell.planes.iter().any(|plane| plane.offset < -TOUCHING * away) {
-            return (origins, range);
+        if errand.reach >= away || !self.cell.planes.iter().any(|plane| plane.offset < -TOUCHING * away) {
+            return origins;
         }
-        let reach = away.min(range.step);
-        (self.build_cell(seen, reach, member), Range { reach, ..range })
+        errand.reach = away.min(errand.step);
+        self.build_cell(seen, errand.reach, member)
     }
 
     fn build_cell(&mut self, seen: &Seen, reach: f64, member: usize) -> Origins {
@@ -126,26 +133,27 @@ impl Filter {
     }
 
     /// The point of the cell to go to: the nearest to the wanted one or, of a detour, to its aim.
-    fn around(&mut self, way: [f64; 2], range: Range, member: usize, flags: &mut Flags) -> [f64; 2] {
-        let direct = self.cell.nearest(way, range.reach);
+    fn around(&mut self, errand: &Errand, member: usize, flags: &mut Flags) -> [f64; 2] {
+        let Errand { way, distance, step, reach } = *errand;
+        let direct = self.cell.nearest(way, reach);
         let size = self.radii[member] + self.limits.clearance;
-        let distance = length(way);
         // Nearer to its goal than its own size, a member waits for whoever stands there.
         if distance <= size || distance == 0.0 {
             self.detours[member].reset();
             return direct;
         }
-        let scale = if size > 0.0 { size.min(range.step) } else { range.step }.min(distance);
+        let scale = if size > 0.0 { size.min(step) } else { step }.min(distance);
         let detour = &mut self.detours[member];
         let goal = if detour.is_active() {
             flags.0 |= Flags::RESOLVING_DEADLOCK;
-            self.cell.nearest(detour.aim(way), scale.min(range.reach))
+            self.cell.nearest(detour.aim(way), scale.min(reach))
         } else {
             direct
         };
-        let straight = self.cell.share(shortened(way, scale));
+        let straight = self.cell.share(errand.open(scale));
         let direct = shortened(direct, scale);
-        detour.update(&self.limits.patience, &Tick { scale, wanted: way, straight, direct, moved: goal });
+        let tick = Tick { scale, wanted: way, distance, straight, direct, moved: goal };
+        detour.update(&self.limits.patience, &tick);
         goal
     }
 
@@ -157,7 +165,7 @@ impl Filter {
         goal: [f64; 2],
         period: f64,
         member: usize,
-        range: Range,
+        errand: &Errand,
         flags: &mut Flags,
     ) -> [f64; 2] {
         let Some(velocity) = self.velocity(seen, member) else { return goal };
@@ -165,7 +173,7 @@ impl Filter {
         let distance = length(goal);
         // From v T + v^2 / (2 a) = distance.
         let brakable = most * ((period * period + 2.0 * distance / most).sqrt() - period);
-        let pace = brakable.min(range.step / period);
+        let pace = brakable.min(errand.step / period);
         let fitting = shortened(goal, pace * period);
         let change = [fitting[0] / period - velocity[0], fitting[1] / period - velocity[1]];
         let held = shortened(change, most * period);
@@ -174,7 +182,7 @@ impl Filter {
         }
         flags.0 |= Flags::ACCELERATION_LIMITED;
         let next = [(velocity[0] + held[0]) * period, (velocity[1] + held[1]) * period];
-        self.cell.nearest(next, range.step)
+        self.cell.nearest(next, errand.step)
     }
 
     /// Cuts the step where a disc cast along it touches a solid. The cell has seen to that already: this
@@ -187,6 +195,17 @@ impl Filter {
         }
         let share = self.obstacles.free_way(here, [here[0] + step[0], here[1] + step[1]], disc);
         [share * step[0], share * step[1]]
+    }
+}
+
+impl Errand {
+    /// The straight way, or as much of it as is `most` \[m\] long.
+    fn open(&self, most: f64) -> [f64; 2] {
+        if self.distance <= most {
+            return self.way;
+        }
+        let share = most / self.distance;
+        [share * self.way[0], share * self.way[1]]
     }
 }
 
@@ -211,7 +230,7 @@ fn border(here: [f64; 2], there: [f64; 2], keep: f64, stray: f64, reach: f64) ->
     if offset >= reach && offset > 0.0 {
         return None;
     }
-    // Two at one place: each is the other's right, so that they part.
+    // Who stands at the very same place leaves to the left: see `members_at_one_place`.
     let normal = if distance > 0.0 { [way[0] / distance, way[1] / distance] } else { [1.0, 0.0] };
     Some(HalfPlane { normal, offset })
 }

@@ -1,0 +1,251 @@
+//! How many robots a thread serves: neighbour query and rule, and the same with the safety filter.
+//!
+//! The robots stand about a unit apart in places shaken from a lattice, numbered without any order, and
+//! see those within 1.9 units: about ten. Their targets come from the very function that moves
+//! particles. With the filter, all are led to far beyond the reach of a tick and the speed is such that
+//! the filter has to look at the same ten, and to project onto a cell of as many half-planes.
+
+use std::fmt;
+use std::hint::black_box;
+use std::time::Instant;
+
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+use serde::Serialize;
+
+use super::machine::median;
+use crate::flock::grid::CellGrid;
+use crate::flock::interaction::{Interaction, Weights};
+use crate::flock::neighbourhood::Neighbours;
+use crate::flock::points::Points;
+use crate::flock::rules::Rule;
+use crate::swarm::safety::{Filter, Flags, Limits, Obstacles, Seen};
+
+/// What to measure.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Options {
+    /// The two smallest swarms and few repetitions, to see that it runs; the times mean little.
+    pub quick: bool,
+}
+
+/// What [`Options`] stand for.
+struct Effort {
+    robots: &'static [usize],
+    repetitions: usize,
+    /// Time of one repetition [s]; a single tick may take longer.
+    seconds: f64,
+}
+
+const FULL: Effort = Effort { robots: &[12, 100, 1000, 10_000], repetitions: 15, seconds: 0.05 };
+
+const QUICK: Effort = Effort { robots: &[12, 100], repetitions: 3, seconds: 1e-3 };
+
+/// How far robots see [m].
+const SIGHT: f64 = 1.9;
+
+/// Their radius [m].
+const RADIUS: f64 = 0.1;
+
+/// [m]
+const CLEARANCE: f64 = 0.05;
+
+/// Of a tick [s].
+const PERIOD: f64 = 0.1;
+
+/// Makes the filter look as far as the robots see [m/s].
+const SPEED: f64 = (SIGHT - 2.0 * RADIUS - CLEARANCE) / (2.0 * PERIOD);
+
+/// How far beyond their targets all are led [m].
+const LED: f64 = 10.0;
+
+/// Sets of places that are served in turn, so that no tick is the repetition of the one before.
+const SETS: usize = 8;
+
+/// Swarms of several sizes, on one thread.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Report {
+    /// Whether this was the quick run, whose times mean little.
+    pub quick: bool,
+    pub cases: Vec<Case>,
+}
+
+/// One swarm; medians over the repetitions.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Case {
+    pub robots: usize,
+    /// Whom a robot sees, on average \[1\].
+    pub neighbours: f64,
+    /// Neighbour query and rule of all robots \[s\].
+    pub rule_seconds_per_tick: f64,
+    pub rule_robots_per_millisecond: f64,
+    /// The same with the safety filter \[s\].
+    pub safe_seconds_per_tick: f64,
+    pub safe_robots_per_millisecond: f64,
+}
+
+/// Measures; takes a few seconds, or next to nothing if quick.
+pub fn run(options: &Options) -> Report {
+    let effort = if options.quick { &QUICK } else { &FULL };
+    let cases = effort.robots.iter().map(|&robots| measure(robots, effort)).collect();
+    Report { quick: options.quick, cases }
+}
+
+fn measure(robots: usize, effort: &Effort) -> Case {
+    let mut swarm = Swarm::new(robots);
+    let ticks = swarm.ticks_in(effort.seconds);
+    // In turn, so that another's load on the machine hits both alike.
+    let (mut rule, mut safe): (Vec<f64>, Vec<f64>) =
+        (0..effort.repetitions).map(|_| (swarm.time(ticks, false), swarm.time(ticks, true))).unzip();
+    let (rule, safe) = (median(&mut rule), median(&mut safe));
+    let per_millisecond = |seconds: f64| 1e-3 * robots as f64 / seconds;
+    Case {
+        robots,
+        neighbours: swarm.interaction.neighbours.index.len() as f64 / robots as f64,
+        rule_seconds_per_tick: rule,
+        rule_robots_per_millisecond: per_millisecond(rule),
+        safe_seconds_per_tick: safe,
+        safe_robots_per_millisecond: per_millisecond(safe),
+    }
+}
+
+struct Swarm {
+    places: Vec<Points>,
+    interaction: Interaction,
+    grid: CellGrid,
+    members: Vec<bool>,
+    ages: Vec<f64>,
+    wanted: Points,
+    filter: Filter,
+    safe: Points,
+    flags: Vec<Flags>,
+    tick: usize,
+}
+
+impl Swarm {
+    fn new(robots: usize) -> Self {
+        let mut random = Pcg64Mcg::seed_from_u64(robots as u64);
+        let side = (robots as f64).sqrt().ceil() as usize;
+        let mut sites: Vec<usize> = (0..robots).collect();
+        for k in (1..robots).rev() {
+            sites.swap(k, random.random_range(0..=k));
+        }
+        let mut shaken = |site: usize| site as f64 + random.random_range(-0.35..0.35);
+        let places: Vec<Points> = (0..SETS)
+            .map(|_| sites.iter().map(|&site| [shaken(site / side), shaken(site % side)]).collect())
+            .collect();
+        let limits = Limits { speed: SPEED, clearance: CLEARANCE, ..Limits::default() };
+        let filter = Filter::new(limits, vec![RADIUS; robots], Obstacles::default());
+        Self {
+            interaction: Interaction {
+                rule: Rule::BARYCENTRE,
+                reference: places[0].clone().into(),
+                neighbours: Neighbours::default(),
+                weights: Weights::Equal,
+                forces: None,
+                rest: None,
+                bonds: None,
+            },
+            grid: CellGrid::default(),
+            members: vec![true; robots],
+            ages: vec![0.0; robots],
+            wanted: Points::zeros(robots),
+            filter: filter.expect("the numbers above are in range"),
+            safe: Points::zeros(robots),
+            flags: vec![Flags::default(); robots],
+            places,
+            tick: 0,
+        }
+    }
+
+    /// A small swarm's tick is too short for the clock: as many as fill the time.
+    fn ticks_in(&mut self, seconds: f64) -> usize {
+        self.time(SETS, true);
+        (seconds / self.time(SETS, true)).clamp(1.0, 1e6) as usize
+    }
+
+    /// Seconds per tick over some ticks.
+    fn time(&mut self, ticks: usize, filtered: bool) -> f64 {
+        let begin = Instant::now();
+        for _ in 0..ticks {
+            self.serve(filtered);
+        }
+        begin.elapsed().as_secs_f64() / ticks as f64
+    }
+
+    fn serve(&mut self, filtered: bool) {
+        self.tick += 1;
+        let present = &self.places[self.tick % SETS];
+        self.interaction.neighbours.rebuild_within(&mut self.grid, present, &self.members, SIGHT);
+        let led = if filtered { LED } else { 0.0 };
+        for robot in 0..present.len() {
+            let [x, y] = self.interaction.target(robot, present);
+            self.wanted.set(robot, [x + led, y]);
+        }
+        if filtered {
+            let seen = Seen { present, known: &self.members, ages: &self.ages, velocity: None };
+            self.filter.apply(&seen, &self.wanted, PERIOD, &mut self.safe, &mut self.flags);
+            black_box(&self.safe);
+        }
+        black_box(&self.wanted);
+    }
+}
+
+impl fmt::Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let rule = "query and rule";
+        let safe = "with the safety filter";
+        writeln!(f, "{:>7}  {:>10}  {rule:>27}  {safe:>27}", "robots", "neighbours")?;
+        for case in &self.cases {
+            writeln!(
+                f,
+                "{:>7}  {:>10.1}  {:>10.1} us {:>8.0} / ms  {:>10.1} us {:>8.0} / ms",
+                case.robots,
+                case.neighbours,
+                1e6 * case.rule_seconds_per_tick,
+                case.rule_robots_per_millisecond,
+                1e6 * case.safe_seconds_per_tick,
+                case.safe_robots_per_millisecond,
+            )?;
+        }
+        writeln!(f, "\nOne thread; time of a tick for all robots, and robots served in a millisecond.")?;
+        if self.quick {
+            writeln!(f, "A quick run: it shows that the benchmark works, its times mean little.")?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_quick_run_serves_two_swarms_with_and_without_the_filter() {
+        let report = run(&Options { quick: true });
+        let json = serde_json::to_value(&report).expect("plain numbers");
+        let robots: Vec<_> = report.cases.iter().map(|case| case.robots).collect();
+        assert_eq!(robots, [12, 100]);
+        for case in json["cases"].as_array().expect("cases") {
+            for key in ["rule_robots_per_millisecond", "safe_robots_per_millisecond"] {
+                assert!(case[key].as_f64().expect("a number") > 0.0, "{key}");
+            }
+        }
+        assert!(report.to_string().contains("100"));
+    }
+
+    #[test]
+    fn robots_see_about_ten_and_the_filter_changes_what_they_want() {
+        let mut swarm = Swarm::new(1000);
+        swarm.serve(true);
+        let neighbours = swarm.interaction.neighbours.index.len();
+        assert!((9000..10_500).contains(&neighbours), "{neighbours}");
+        assert!(swarm.flags.iter().all(|flags| flags.has(Flags::SPEED_LIMITED)));
+        assert!(swarm.flags.iter().filter(|flags| flags.has(Flags::SEPARATED)).count() > 500);
+    }
+
+    #[test]
+    #[ignore = "prints the full measurement: cargo test --release --lib bench::swarm -- --ignored --nocapture"]
+    fn the_full_measurement() {
+        println!("{}", run(&Options { quick: false }));
+    }
+}
