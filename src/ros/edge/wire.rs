@@ -121,3 +121,49 @@ impl SerializerAdapter<Payload> for Verbatim {
         Ok(Bytes::copy_from_slice(&value.bytes))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ros::edge::services::{lifecycle_msgs, rcl_interfaces, rosgraph_msgs, std_srvs};
+    use proptest::prelude::*;
+
+    /// Decodes in both byte orders; what comes out must encode again.
+    fn survives<T: Serialize + DeserializeOwned>(bytes: &[u8]) {
+        for order in [Order::Little, Order::Big] {
+            if let Ok(value) = decode::<T>(bytes, order) {
+                encode(&value, &mut Vec::new()).expect("was decoded");
+            }
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn any_bytes_end_in_a_value_or_an_error(bytes in prop::collection::vec(any::<u8>(), 0..256)) {
+            survives::<rosgraph_msgs::Clock>(&bytes);
+            survives::<std_srvs::SetBoolRequest>(&bytes);
+            survives::<rcl_interfaces::ParameterEvent>(&bytes);
+            survives::<rcl_interfaces::DescribeParametersResponse>(&bytes);
+            survives::<rcl_interfaces::Settings>(&bytes);
+            survives::<rcl_interfaces::ListParametersRequest>(&bytes);
+            survives::<lifecycle_msgs::TransitionEvent>(&bytes);
+            survives::<lifecycle_msgs::ChangeStateRequest>(&bytes);
+        }
+    }
+
+    #[test]
+    fn a_length_larger_than_the_payload_is_refused() {
+        let endless = [0xff; 12];
+        assert!(decode::<Vec<f64>>(&endless, Order::Little).is_err());
+        assert!(decode::<String>(&endless, Order::Little).is_err());
+        assert!(decode::<Vec<String>>(&endless, Order::Big).is_err());
+    }
+
+    #[test]
+    fn fields_are_aligned_to_their_size_from_the_beginning() {
+        let mut bytes = Vec::new();
+        encode(&(1_u8, 2_u32, 3_f64), &mut bytes).expect("plain");
+        assert_eq!(bytes.len(), 16);
+        assert_eq!(decode::<(u8, u32, f64)>(&bytes, Order::Little), Ok((1, 2, 3.0)));
+    }
+}

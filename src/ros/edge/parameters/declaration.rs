@@ -1,0 +1,186 @@
+//! What a parameter may be: its type, its range, its conditions. Pure.
+
+use std::ops::RangeInclusive;
+
+use super::Value;
+use crate::ros::edge::services::rcl_interfaces::{FloatingPointRange, IntegerRange, ParameterDescriptor};
+
+/// A validator: `Err` with the reason refuses a value.
+pub type Check = Box<dyn Fn(&str, &Value) -> Result<(), String> + Send>;
+
+/// Values that a number may take, both ends included; a step of 0 allows all between.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Range {
+    Integer(IntegerRange),
+    Double(FloatingPointRange),
+}
+
+/// A parameter as the node declares it.
+pub struct Declaration {
+    pub(super) name: String,
+    pub(super) value: Value,
+    description: String,
+    constraints: String,
+    range: Option<Range>,
+    pub(super) read_only: bool,
+    check: Option<Check>,
+}
+
+impl Declaration {
+    /// A parameter with its default value, which fixes its type.
+    pub fn new(name: &str, default: impl Into<Value>) -> Self {
+        Self {
+            name: name.into(),
+            value: default.into(),
+            description: String::new(),
+            constraints: String::new(),
+            range: None,
+            read_only: false,
+            check: None,
+        }
+    }
+
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Meaning and unit, for people.
+    #[must_use]
+    pub fn describe(mut self, description: &str) -> Self {
+        self.description = description.into();
+        self
+    }
+
+    /// Smallest and largest number.
+    #[must_use]
+    pub fn range(mut self, range: RangeInclusive<f64>) -> Self {
+        let (from_value, to_value) = range.into_inner();
+        self.range = Some(Range::Double(FloatingPointRange { from_value, to_value, step: 0.0 }));
+        self
+    }
+
+    /// Smallest and largest whole number, and the step between values (0: any).
+    #[must_use]
+    pub fn integer_range(mut self, range: RangeInclusive<i64>, step: u64) -> Self {
+        let (from_value, to_value) = range.into_inner();
+        self.range = Some(Range::Integer(IntegerRange { from_value, to_value, step }));
+        self
+    }
+
+    /// Step between numbers, counted from the smallest; after [`Declaration::range`].
+    #[must_use]
+    pub fn step(mut self, step: f64) -> Self {
+        if let Some(Range::Double(range)) = &mut self.range {
+            range.step = step;
+        }
+        self
+    }
+
+    /// Set at the start and never again.
+    #[must_use]
+    pub fn read_only(mut self) -> Self {
+        self.read_only = true;
+        self
+    }
+
+    /// One more condition on new values, and in words for people.
+    #[must_use]
+    pub fn checked(
+        mut self,
+        constraints: &str,
+        check: impl Fn(&str, &Value) -> Result<(), String> + Send + 'static,
+    ) -> Self {
+        self.constraints = constraints.into();
+        self.check = Some(Box::new(check));
+        self
+    }
+
+    /// As others are told.
+    pub(super) fn descriptor(&self) -> ParameterDescriptor {
+        ParameterDescriptor {
+            name: self.name.clone(),
+            kind: self.value.kind(),
+            description: self.description.clone(),
+            additional_constraints: self.constraints.clone(),
+            read_only: self.read_only,
+            dynamic_typing: false,
+            floating_point_range: match self.range {
+                Some(Range::Double(range)) => vec![range],
+                _ => Vec::new(),
+            },
+            integer_range: match self.range {
+                Some(Range::Integer(range)) => vec![range],
+                _ => Vec::new(),
+            },
+        }
+    }
+
+    /// The value as it would be stored.
+    pub(super) fn admit(&self, value: Value) -> Result<Value, Refusal> {
+        let name = || self.name.clone();
+        let value = value.widened(&self.value);
+        if value.kind() != self.value.kind() {
+            let (expected, found) = (self.value.kind_name(), value.kind_name());
+            return Err(Refusal::Type { name: name(), expected, found, value: value.to_string() });
+        }
+        if matches!(&value, Value::Double(number) if number.is_nan()) {
+            return Err(Refusal::NotANumber { name: name() });
+        }
+        match (self.range, &value) {
+            (Some(Range::Double(range)), Value::Double(number)) => within(&self.name, range, *number)?,
+            (Some(Range::Integer(range)), Value::Integer(number)) => {
+                within_whole(&self.name, range, *number)?
+            }
+            _ => {}
+        }
+        if let Some(check) = &self.check {
+            check(&self.name, &value).map_err(|reason| Refusal::Vetoed { name: name(), reason })?;
+        }
+        Ok(value)
+    }
+}
+
+fn within(name: &str, range: FloatingPointRange, value: f64) -> Result<(), Refusal> {
+    let FloatingPointRange { from_value: from, to_value: to, step } = range;
+    let steps = (value - from) / step;
+    // Steps are decimal fractions to people and binary ones here.
+    let on_step = step == 0.0 || value == to || (steps - steps.round()).abs() <= 1e-6;
+    if (from..=to).contains(&value) && on_step {
+        return Ok(());
+    }
+    let steps = if step == 0.0 { String::new() } else { format!(" in steps of {step:?}") };
+    let allowed = format!("{from:?} to {to:?}{steps}");
+    Err(Refusal::Range { name: name.into(), value: format!("{value:?}"), allowed })
+}
+
+fn within_whole(name: &str, range: IntegerRange, value: i64) -> Result<(), Refusal> {
+    let IntegerRange { from_value: from, to_value: to, step } = range;
+    let on_step = step == 0 || value == to || value.abs_diff(from).is_multiple_of(step);
+    if (from..=to).contains(&value) && on_step {
+        return Ok(());
+    }
+    let steps = if step == 0 { String::new() } else { format!(" in steps of {step}") };
+    let allowed = format!("{from} to {to}{steps}");
+    Err(Refusal::Range { name: name.into(), value: value.to_string(), allowed })
+}
+
+/// Why a parameter was not set or declared.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Refusal {
+    #[error("parameter {name} has not been declared")]
+    Undeclared { name: String },
+    #[error("parameter {name} is declared already")]
+    Declared { name: String },
+    #[error("parameter {name} is read-only: give it at the start (-p {name}:=VALUE)")]
+    ReadOnly { name: String },
+    #[error("parameter {name} cannot be unset")]
+    Unset { name: String },
+    #[error("parameter {name} is a {expected}, {value} is a {found}")]
+    Type { name: String, expected: &'static str, found: &'static str, value: String },
+    #[error("parameter {name} must be a number")]
+    NotANumber { name: String },
+    #[error("parameter {name} = {value} is not within {allowed}")]
+    Range { name: String, value: String, allowed: String },
+    #[error("parameter {name}: {reason}")]
+    Vetoed { name: String, reason: String },
+}

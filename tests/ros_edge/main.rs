@@ -1,0 +1,11 @@
+//! The edge on loopback: two participants of ours in one process, and ros2-client as the foreign peer.
+//!
+//! The tests share the participants and take turns: DDS discovery is slow on a busy computer, and each
+//! participant costs sockets and threads. Every wait is bounded.
+
+mod graph;
+mod lifecycle;
+mod parameters;
+mod services;
+mod support;
+mod topics;
