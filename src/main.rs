@@ -4,16 +4,13 @@ mod cli;
 
 use std::process::ExitCode;
 
-use clap::Parser;
-
 fn main() -> ExitCode {
-    let arguments = cli::Arguments::parse();
-    cli::start_log(arguments.verbose);
-    match cli::dispatch(arguments.command) {
-        Ok(code) => code,
-        Err(refusal) => {
-            eprintln!("error: {refusal}");
-            ExitCode::from(cli::BAD_INPUT)
-        }
-    }
+    let done = cli::arguments().and_then(|(arguments, ros)| {
+        cli::start_log(arguments.verbose, &ros);
+        cli::dispatch(arguments.command, &ros)
+    });
+    done.unwrap_or_else(|refusal| {
+        eprintln!("error: {refusal}");
+        ExitCode::from(cli::BAD_INPUT)
+    })
 }

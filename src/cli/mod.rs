@@ -3,10 +3,12 @@
 mod compare;
 mod install;
 mod material;
+mod node;
 mod output;
 mod progress;
 mod run;
 mod stability;
+mod swarm;
 mod trade;
 
 use std::io::IsTerminal;
@@ -17,7 +19,9 @@ use clap::{Args, CommandFactory, Parser, Subcommand};
 use clap_complete::Shell;
 use flockform::compare::run::plan;
 use flockform::continuum::report::PlanReport;
-use flockform::scene::{self, Scene, SceneError, bundled};
+use flockform::ros::arguments::{RosArgumentError, RosArguments, Severity};
+use flockform::ros::node::NodeError;
+use flockform::scene::{self, Bundled, Scene, SceneError, bundled};
 use flockform::{bench, export};
 
 /// Exit code of a run that started and failed: diverged or interrupted.
@@ -64,6 +68,23 @@ pub enum Command {
                       Exit codes: 0 predictions and runs agree and no extreme is wrong, 1 otherwise, 2 bad input."
     )]
     Stability(stability::StabilityArguments),
+    /// Fly a swarm of simulated robots, without middleware, and say how it went
+    #[command(
+        after_help = "Example:\n  flockform swarm gap --out /tmp/gap\n  flockform swarm antipodal --set limits.speed=0.5\n\n\
+                      Exit codes: 0 flown and every declared bound held, 1 a bound broken or interrupted, 2 bad input."
+    )]
+    Swarm(swarm::SwarmArguments),
+    /// Keep a swarm in formation over ROS 2: poses in, safe targets out
+    #[command(
+        after_help = "Example:\n  flockform node square --ros-args -r __ns:=/fleet -p speed_limit:=0.5\n  flockform node square --member robot_3"
+    )]
+    Node(node::NodeArguments),
+    /// Be the robots of a swarm file as ROS 2 nodes, simulated
+    #[command(after_help = "Example:\n  flockform robots square --ros-args -p publish_clock:=true")]
+    Robots(node::RobotsArguments),
+    /// List the bundled swarms
+    #[command(after_help = "Example:\n  flockform swarms")]
+    Swarms,
     /// List the bundled scenes
     #[command(after_help = "Example:\n  flockform scenes")]
     Scenes,
@@ -84,8 +105,12 @@ pub enum Command {
     )]
     Install(install::InstallArguments),
     /// Print the JSON Schema of a scene file
-    #[command(after_help = "Example:\n  flockform schema > scene.schema.json")]
-    Schema,
+    #[command(after_help = "Example:\n  flockform schema > scene.schema.json\n  flockform schema --swarm")]
+    Schema {
+        /// Of a swarm file instead
+        #[arg(long)]
+        swarm: bool,
+    },
     /// Print a completion script for a shell
     #[command(
         after_help = "Example:\n  flockform completions bash > ~/.local/share/bash-completion/completions/flockform"
@@ -138,7 +163,7 @@ impl SceneArguments {
     fn load(&self, more: impl IntoIterator<Item = String>) -> Result<Scene, Refusal> {
         let more: Vec<String> = more.into_iter().collect();
         if bundled(&self.scene).is_none() {
-            self.path()?;
+            scene_path("scene", &self.scene, bundled::SCENES)?;
         }
         Ok(self.load_scene(&more)?)
     }
@@ -151,18 +176,18 @@ impl SceneArguments {
             None => Scene::from_file(Path::new(&self.scene), &overrides),
         }
     }
+}
 
-    /// The scene as a path; a word that is no file is taken for the name of a bundled scene, misspelt.
-    fn path(&self) -> Result<PathBuf, Refusal> {
-        let path = PathBuf::from(&self.scene);
-        if path.exists() || self.scene.contains(['/', '\\', '.']) {
-            return Ok(path);
-        }
-        let likeness = |name: &str| strsim::jaro_winkler(name, &self.scene);
-        let names = bundled::SCENES.iter().map(|scene| scene.name);
-        let nearest = names.max_by(|a, b| likeness(a).total_cmp(&likeness(b))).unwrap_or_default();
-        Err(Refusal::NoScene { name: self.scene.clone(), nearest })
+/// A word as a path; one that is no file is taken for the name of something bundled, misspelt.
+fn scene_path(what: &'static str, word: &str, all: &[Bundled]) -> Result<PathBuf, Refusal> {
+    let path = PathBuf::from(word);
+    if path.exists() || word.contains(['/', '\\', '.']) {
+        return Ok(path);
     }
+    let likeness = |name: &str| strsim::jaro_winkler(name, word);
+    let names = all.iter().map(|one| one.name);
+    let nearest = names.max_by(|a, b| likeness(a).total_cmp(&likeness(b))).unwrap_or_default();
+    Err(Refusal::NotBundled { what, name: word.to_owned(), nearest })
 }
 
 /// Why nothing was done.
@@ -171,11 +196,19 @@ pub enum Refusal {
     #[error("{0}")]
     Scene(#[from] SceneError),
     #[error("{0}")]
+    Node(#[from] NodeError),
+    #[error("{0}")]
+    Ros(#[from] RosArgumentError),
+    #[error(
+        "--ros-args: this command is no ROS 2 node\n  help: leave them out, or use `flockform node` or `flockform robots`"
+    )]
+    NoNode,
+    #[error("{0}")]
     Export(#[from] export::ExportError),
     #[error(
-        "there is no scene file and no bundled scene `{name}`\n  help: the nearest bundled scene is `{nearest}`; `flockform scenes` lists them all"
+        "there is no {what} file and no bundled {what} `{name}`\n  help: the nearest bundled {what} is `{nearest}`; `flockform {what}s` lists them all"
     )]
-    NoScene { name: String, nearest: &'static str },
+    NotBundled { what: &'static str, name: String, nearest: &'static str },
     #[error("{0}")]
     Option(#[from] material::WrongOption),
     #[error("{0}")]
@@ -189,29 +222,67 @@ pub enum Refusal {
     Threads { threads: usize, error: rayon::ThreadPoolBuildError },
 }
 
-/// Logs go to standard error; `RUST_LOG` wins over `-v`.
-pub fn start_log(verbose: u8) {
-    let level = ["warn", "flockform=info", "flockform=debug", "trace"][usize::from(verbose.min(3))];
+/// The command line, with what ROS was told split off.
+///
+/// # Errors
+/// ROS arguments that are none, or that are given to a command that is no node.
+pub fn arguments() -> Result<(Arguments, RosArguments), Refusal> {
+    let all = std::env::args_os().map(|argument| argument.to_string_lossy().into_owned());
+    let all: Vec<String> = all.collect();
+    let is_asked = all.iter().any(|argument| argument == "--ros-args");
+    let split = RosArguments::parse(all.clone(), &|name| std::env::var(name).ok());
+    // What is wrong with ROS's variables concerns no command that is no node.
+    let (rest, ros) = match split {
+        Err(error) if is_asked => return Err(error.into()),
+        Err(error) => (all, Err(error)),
+        Ok((rest, ros)) => (rest, Ok(ros)),
+    };
+    let arguments = Arguments::parse_from(rest);
+    match arguments.command {
+        Command::Node(_) | Command::Robots(_) => Ok((arguments, ros?)),
+        _ if is_asked => Err(Refusal::NoNode),
+        _ => Ok((arguments, RosArguments::default())),
+    }
+}
+
+/// Logs go to standard error; `RUST_LOG` wins over `--log-level`, and that over `-v`.
+pub fn start_log(verbose: u8, ros: &RosArguments) {
+    let level = match ros.logging.level_of("flockform") {
+        None | Some(Severity::Unset) => {
+            ["warn", "flockform=info", "flockform=debug", "trace"][usize::from(verbose.min(3))]
+        }
+        Some(Severity::Debug) => "flockform=debug",
+        Some(Severity::Info) => "flockform=info",
+        Some(Severity::Warn) => "flockform=warn",
+        Some(Severity::Error | Severity::Fatal) => "flockform=error",
+    };
+    // The middleware reports every peer that comes and goes as a warning.
+    let level = format!("{level},rustdds=error,ros2_client=error");
     let filter = tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| level.into());
     let colours = std::io::stderr().is_terminal();
     let log = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr);
     log.with_ansi(colours).without_time().init();
 }
 
-pub fn dispatch(command: Command) -> Result<ExitCode, Refusal> {
+pub fn dispatch(command: Command, ros: &RosArguments) -> Result<ExitCode, Refusal> {
     match command {
         Command::Run(arguments) => return run::run(&arguments),
         Command::Compare(arguments) => return compare::compare(&arguments),
         Command::Trade(arguments) => return trade::trade(&arguments),
         Command::Stability(arguments) => return stability::stability(&arguments),
+        Command::Swarm(arguments) => return swarm::swarm(&arguments),
+        Command::Node(arguments) => return node::node(&arguments, ros),
+        Command::Robots(arguments) => return node::robots(&arguments, ros),
+        Command::Scenes => list(bundled::SCENES, |scene| Ok(scene.load(&[])?.raw.title))?,
+        Command::Swarms => list(bundled::SWARMS, |swarm| Ok(swarm.load_swarm(&[])?.raw.title))?,
         Command::Install(arguments) => return install::install(&arguments),
-        Command::Scenes => list_scenes()?,
         Command::Plan(arguments) => {
             let scene = arguments.load([])?;
             print(&PlanReport::new(&scene, &plan(&scene)?)?.to_string());
         }
         Command::Material(arguments) => print(&material::answer(&arguments)?),
-        Command::Schema => print(&format!("{:#}\n", scene::validate::schema())),
+        Command::Schema { swarm: false } => print(&format!("{:#}\n", scene::validate::schema())),
+        Command::Schema { swarm: true } => print(&format!("{:#}\n", scene::swarm::schema())),
         Command::Completions { shell } => {
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut Arguments::command(), "flockform", &mut script);
@@ -230,10 +301,10 @@ pub fn dispatch(command: Command) -> Result<ExitCode, Refusal> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn list_scenes() -> Result<(), SceneError> {
-    let width = bundled::SCENES.iter().map(|scene| scene.name.len()).max().unwrap_or(0);
-    for scene in bundled::SCENES {
-        print(&format!("{:width$}  {}\n", scene.name, scene.load(&[])?.raw.title));
+fn list(all: &[Bundled], title: impl Fn(&Bundled) -> Result<String, SceneError>) -> Result<(), SceneError> {
+    let width = all.iter().map(|one| one.name.len()).max().unwrap_or(0);
+    for one in all {
+        print(&format!("{:width$}  {}\n", one.name, title(one)?));
     }
     Ok(())
 }

@@ -11,11 +11,12 @@ use crate::flock::neighbourhood::Neighbours;
 use crate::flock::points::{Points, distance};
 use crate::flock::pseudo_energy::{pe1, pe2};
 use crate::flock::role::Role;
+use crate::flock::rules::Rule;
 use crate::scene::Quantity;
 use crate::solve::sweep::{Order, Sweep, Update};
 
 /// A body on its way; positions in \[length, world frame\], shape \[count\].
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Engine {
     body: Body,
     interaction: Interaction,
@@ -24,6 +25,8 @@ pub struct Engine {
     roles: Vec<Role>,
     changes: Vec<RoleChange>,
     leaders: Vec<Led>,
+    /// Where particles that are led from outside will be after the next step.
+    guided: Vec<(usize, [f64; 2])>,
     present: Points,
     /// The positions before the last step; the next ones are written over them.
     previous: Points,
@@ -70,6 +73,7 @@ impl Engine {
             roles,
             changes,
             leaders: Vec::new(),
+            guided: Vec::new(),
             breaks: cuts,
             present_neighbours,
             step: 0,
@@ -151,6 +155,30 @@ impl Engine {
         self.move_leaders();
         self.sweep.step(&self.interaction, self.body.frame.as_ref(), &self.present, &mut self.previous);
         std::mem::swap(&mut self.present, &mut self.previous);
+    }
+
+    /// Puts particles where they have been seen \[length\], in place of where the last step sent them; frame
+    /// points follow. A body whose particles are seen where they were sent goes on as if nobody had looked.
+    pub fn observe(&mut self, seen: impl IntoIterator<Item = (usize, [f64; 2])>) {
+        for (particle, place) in seen {
+            self.present.set(particle, place);
+        }
+        if let Some(frame) = self.body.frame.as_ref().filter(|frame| !frame.rule.looks_before_the_sweep()) {
+            let body = self.present.clone();
+            frame.follow(&self.body.reference, &body, &mut self.present);
+        }
+    }
+
+    /// Leads a particle that has no program of its own to `place` \[length\] in the next step.
+    pub fn lead(&mut self, particle: usize, place: [f64; 2]) {
+        self.guided.push((particle, place));
+    }
+
+    /// Follows by another rule from the next step on.
+    pub fn set_rule(&mut self, rule: Rule, damping: f64) {
+        self.interaction.rule = rule;
+        self.update.damping = damping;
+        self.compile_sweep();
     }
 
     /// Puts the body where everybody is displaced by `displacement` \[length\], shape \[count\], as if it had
@@ -290,6 +318,9 @@ impl Engine {
             let Some(motion) = &self.changes[led.change].motion else { continue };
             let [dx, dy] = motion.displacement((self.step - led.since) as f64, led.which, led.base);
             self.previous.set(led.particle, [led.base[0] + dx, led.base[1] + dy]);
+        }
+        for (particle, place) in self.guided.drain(..) {
+            self.previous.set(particle, place);
         }
     }
 

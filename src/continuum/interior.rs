@@ -88,7 +88,8 @@ fn rule_name(scene: &Scene) -> String {
         _ => "barycentre (Eq. 1)".into(),
     };
     match &scene.weights {
-        None => mean,
+        // A whole neighbourhood reproduces its particle's place by equal weights.
+        None | Some(Weights::Solved) => mean,
         Some(Weights::Distance { power }) => format!("{mean} with weights reference distance^{power}"),
         Some(Weights::List(_)) => format!("{mean} with weights given"),
         Some(Weights::Gradient { length }) => format!("second gradient of length {length}"),
@@ -101,7 +102,7 @@ fn scalar_crystal(scene: &Scene) -> Result<Crystal, SceneError> {
         scene.refuse("neighbours", error.to_string(), "choose a neighbourhood that the lattice has")
     })?;
     let weights: Option<Vec<Vec<f64>>> = match &scene.weights {
-        None => None,
+        None | Some(Weights::Solved) => None,
         Some(Weights::Gradient { length }) => {
             let crystal = gradient(scene, *length)?.crystal(&scene.lattice);
             return crystal.map_err(|error| refuse_gradient(scene, &error));

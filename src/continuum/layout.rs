@@ -159,7 +159,10 @@ impl Layout {
     }
 
     /// Particles of the region that stands at `key`.
-    fn pick(&self, scene: &Scene, key: &str, region: &SceneRegion) -> Result<Vec<usize>, SceneError> {
+    ///
+    /// # Errors
+    /// Names a region without particles and an id that does not exist.
+    pub fn pick(&self, scene: &Scene, key: &str, region: &SceneRegion) -> Result<Vec<usize>, SceneError> {
         let key = format!("{key}.region");
         check_ids(scene, &key, region, &self.body)?;
         let particles = known_region(region, &self.body).pick(&self.body, &self.neighbours);

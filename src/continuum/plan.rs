@@ -65,7 +65,8 @@ impl Plan {
         let forces = layout.forces(scene)?;
         require_carried(scene, &layout, &changes, forces.as_ref())?;
         let Layout { body, neighbours, cells } = layout;
-        let weights = weights::of_body(scene, &body, &neighbours, cells.as_ref())?;
+        let follows = ever_follow(&body, &changes);
+        let weights = weights::of_body(scene, &body, &neighbours, cells.as_ref(), &follows)?;
         let interaction = interaction(scene, &body, neighbours, weights, forces);
         let probes = probes(scene, &body)?;
         let roles = body.is_frame.iter().map(|&f| if f { Role::Frame } else { Role::Follower }).collect();
@@ -92,6 +93,25 @@ impl Plan {
         Ok(plan)
     }
 
+    /// Particles on no lattice, who see each other through `interaction`; those with another role than to follow
+    /// are led from outside.
+    pub fn of_places(body: Body, interaction: Interaction, roles: Vec<Role>, update: Update) -> Self {
+        let (low, high) = body.bounds();
+        Self {
+            present_radius: None,
+            changes: Vec::new(),
+            cuts: Vec::new(),
+            stop: Stop { steps: usize::MAX, tolerance: None, growth: f64::INFINITY },
+            diagonal: distance(low, high).max(body.lattice.spacing()),
+            probes: Vec::new(),
+            cells: None,
+            body,
+            interaction,
+            update,
+            roles,
+        }
+    }
+
     pub fn count(&self) -> usize {
         self.body.count()
     }
@@ -112,6 +132,18 @@ impl Plan {
             }
         }
     }
+}
+
+/// Who follows at any time: all but those who are led or clamped from the start and for good, shape \[count\].
+fn ever_follow(body: &Body, changes: &[RoleChange]) -> Vec<bool> {
+    let mut follows: Vec<bool> = body.is_frame.iter().map(|frame| !frame).collect();
+    for change in changes {
+        let at_once = change.from <= 1 && change.when.is_none();
+        for &i in &change.particles {
+            follows[i] = change.role == Role::Follower || (follows[i] && !at_once);
+        }
+    }
+    follows
 }
 
 /// A load on a follower needs a rule with a stiffness, and a body that cannot get away.

@@ -75,6 +75,7 @@ impl PlanReport {
                 Some(SceneWeights::Gradient { length }) => {
                     format!("second gradient of length {length} {}", scene.unit())
                 }
+                Some(SceneWeights::Solved) => "weights that reproduce each particle's place".to_owned(),
                 _ => "fixed weights".to_owned(),
             }),
             Weights::Matrix(weights) => Some(format!(

@@ -11,6 +11,7 @@ use crate::material::cells::Cells;
 use crate::material::elastic::Elastic;
 use crate::material::weights::{MaterialWeights, WeightsError};
 use crate::scene::{Scene, SceneError, Weights as FixedWeights};
+use crate::solve::affine_weights;
 
 /// Weights of the body's bonds; of a material those of its cells.
 ///
@@ -22,6 +23,7 @@ pub fn of_body(
     body: &Body,
     neighbours: &Neighbours,
     cells: Option<&Cells>,
+    follows: &[bool],
 ) -> Result<Weights, SceneError> {
     if let (Mean::Material { .. }, Some(cells), Some(elastic)) = (scene.mean, cells, &scene.material) {
         return of_material(scene, body, neighbours, cells, elastic);
@@ -40,6 +42,13 @@ pub fn of_body(
             let offsets = scene.neighbourhood.offsets(&scene.lattice).unwrap_or_default();
             interior::check_count(scene, values, &offsets)?;
             Ok(Weights::Scalar(listed_weights(values, &offsets, body, neighbours)))
+        }
+        Some(FixedWeights::Solved) => {
+            let solved = affine_weights::solve(&body.reference, neighbours, follows).map_err(|error| {
+                let help = "use a wider neighbourhood or a frame, or let a leader have this place";
+                scene.refuse("rule.weights", error.told(|i| format!("particle {}", i + 1)), help)
+            })?;
+            Ok(Weights::Scalar(solved.weights))
         }
         Some(FixedWeights::Gradient { length }) => {
             let gradient = gradient(scene, *length)?;

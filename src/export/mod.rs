@@ -12,7 +12,7 @@
 //! | `steps.pvd`, `steps/*.vtu` | frames for ParaView |
 //! | `configuration_*`, `pe1_*`, `probes` | figures, as SVG and as the PNG rendered from it |
 //!
-//! A comparison with the truth (`comparison`, feature `fem`) has a folder of its own, and so has a study of
+//! A flight (`flight`, feature `swarm`), a comparison with the truth (`comparison`, feature `fem`) have folders of their own, and so has a study of
 //! what grows (`stability`).
 //!
 //! Frames are written while the run goes on, since a long run cannot keep them ([`VtkSeries`]); the
@@ -51,6 +51,8 @@ pub mod comparison;
 pub mod csv;
 mod error;
 pub mod figures;
+#[cfg(feature = "swarm")]
+pub mod flight;
 mod folder;
 pub mod stability;
 mod summary;

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::frame::{Frame, FrameRule};
-use super::lattice::{Lattice, Site};
+use super::lattice::{Lattice, LatticeKind, Site};
 use super::neighbourhood::{Neighbourhood, NeighbourhoodError, Neighbours};
 use super::points::Points;
 use super::shape::Shape;
@@ -80,6 +80,18 @@ impl Body {
         }));
         let frame = frame.map(|rule| Frame::build(rule, &lattice, &sites, &is_frame, |site| map.index(site)));
         Ok((Self { lattice, sites, reference, is_frame, frame }, neighbours))
+    }
+
+    /// Particles that lie on no lattice. Of one they keep the `spacing` \[length\]; their sites are a row, in
+    /// their order.
+    pub fn of_places(places: Points, spacing: f64) -> Self {
+        Self {
+            lattice: Lattice::new(LatticeKind::Square { spacing }, [0.0; 2], 0.0),
+            sites: (0..places.len() as i32).map(|i| [i, 0]).collect(),
+            is_frame: vec![false; places.len()],
+            reference: Arc::new(places),
+            frame: None,
+        }
     }
 
     pub fn count(&self) -> usize {

@@ -51,17 +51,15 @@ impl CellGrid {
         }
     }
 
-    /// Appends to `found` every other point within `radius` of `particle`; `radius` must not exceed
-    /// that of the last [`CellGrid::fill`].
+    /// Appends to `found` every other point within `radius` of `particle`, walking the cells that the
+    /// radius touches; a radius near that of the last [`CellGrid::fill`] is the cheapest.
     pub fn within(&self, points: &Points, particle: usize, radius: f64, found: &mut Vec<u32>) {
         let [x, y] = points.get(particle);
         if self.columns == 0 || !(x.is_finite() && y.is_finite()) {
             return;
         }
-        let cell = self.cell_of([x, y]);
-        let (column, row) = (cell / self.rows, cell % self.rows);
-        for c in column.saturating_sub(1)..(column + 2).min(self.columns) {
-            for r in row.saturating_sub(1)..(row + 2).min(self.rows) {
+        for c in self.cells_within(x - self.low[0], radius, self.columns) {
+            for r in self.cells_within(y - self.low[1], radius, self.rows) {
                 for &other in self.cell_members(c * self.rows + r) {
                     let (dx, dy) = (points.x[other as usize] - x, points.y[other as usize] - y);
                     if other as usize != particle && dx.hypot(dy) <= radius {
@@ -70,6 +68,13 @@ impl CellGrid {
                 }
             }
         }
+    }
+
+    fn cells_within(&self, offset: f64, radius: f64, cells: usize) -> std::ops::Range<usize> {
+        // One cell more on either side than the division says, for it rounds.
+        let first = ((offset - radius) / self.cell) as usize;
+        let last = ((offset + radius) / self.cell) as usize;
+        first.saturating_sub(1).min(cells - 1)..last.saturating_add(2).min(cells)
     }
 
     fn cell_members(&self, cell: usize) -> &[u32] {

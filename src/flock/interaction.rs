@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::block::{Block, IDENTITY};
+use super::block::{Block, IDENTITY, inverse as invert, plus, product};
 use super::fracture::Bonds;
 use super::neighbourhood::Neighbours;
 use super::points::Points;
@@ -121,6 +121,42 @@ impl Interaction {
         }
     }
 
+    /// Target position of `particle` by those of its neighbours alone whom `keeps` names: of the others nothing
+    /// is known, or nothing believed. What the lost ones carried the others carry, so that the reference
+    /// configuration stays at rest; `None` where too few are left to say where to go.
+    pub fn target_among(
+        &self,
+        particle: usize,
+        present: &Points,
+        keeps: impl Fn(usize) -> bool + Clone,
+    ) -> Option<[f64; 2]> {
+        let kept = |points| {
+            let keeps = keeps.clone();
+            self.seen(particle, points)
+                .zip(self.neighbours.of(particle))
+                .filter(move |&(_, &k)| keeps(k as usize))
+                .map(|(neighbour, _)| neighbour)
+        };
+        kept(present).next()?;
+        let share = match &self.weights {
+            Weights::Matrix(_) => {
+                invert(&kept(present).fold(Block::default(), |sum, n| plus(&sum, &n.matrix)))?
+            }
+            Weights::Equal | Weights::Scalar(_) => IDENTITY,
+        };
+        let shared = |n: Neighbour| Neighbour { matrix: product(&share, &n.matrix), ..n };
+        let reference = self.reference.get(particle);
+        let own = Own {
+            present: present.get(particle),
+            reference,
+            rest: self.rule.rest_offset(reference, kept(&self.reference).map(shared)),
+            load: self
+                .load(particle)
+                .map(|load| Load { compliance: product(&share, &load.compliance), ..load }),
+        };
+        Some(self.rule.target(&own, kept(present).map(shared)))
+    }
+
     /// Computes and keeps the rest offsets of the reference configuration; none are kept where all
     /// are zero, so that a body that needs none does not pay for them.
     pub fn keep_rest(&mut self) {
@@ -211,6 +247,37 @@ mod tests {
         interaction.keep_rest();
         let present = [[0.1, 0.0], [1.1, 0.3], [0.4, 0.9]].into_iter().collect();
         (interaction, present)
+    }
+
+    #[test]
+    fn a_target_among_all_neighbours_is_the_target() {
+        let (material, present) = triangle();
+        let weights = Weights::Scalar(vec![1.0, 3.0, 0.5, 2.0, 1.0, 1.0]);
+        let mut scalar = Interaction { rule: Rule::BARYCENTRE, weights, forces: None, ..material };
+        scalar.keep_rest();
+        for i in 0..3 {
+            let target = scalar.target_among(i, &present, |_| true).expect("has neighbours");
+            assert_eq!(target.map(f64::to_bits), scalar.target(i, &present).map(f64::to_bits));
+        }
+    }
+
+    #[test]
+    fn whoever_is_lost_leaves_the_rest_where_it_was() {
+        let (mut material, present) = triangle();
+        material.forces = None;
+        let mut scalar = Interaction { rule: Rule::BARYCENTRE, weights: Weights::Equal, ..material.clone() };
+        scalar.keep_rest();
+        for interaction in [&material, &scalar] {
+            let reference = &interaction.reference;
+            let here = interaction.target_among(0, reference, |k| k != 2).expect("one is left");
+            assert!(crate::flock::points::distance(here, reference.get(0)) < 1e-15, "{here:?}");
+            assert_eq!(interaction.target_among(0, reference, |_| false), None);
+            // The one that is left is followed wherever it goes.
+            let target = interaction.target_among(0, &present, |k| k == 1).expect("one is left");
+            let moved = [0, 1].map(|axis| target[axis] - reference.get(0)[axis]);
+            let led = [0, 1].map(|axis| present.get(1)[axis] - reference.get(1)[axis]);
+            assert!(crate::flock::points::distance(moved, led) < 1e-15, "{moved:?} {led:?}");
+        }
     }
 
     #[test]

@@ -1,22 +1,23 @@
-//! The scenes that the binary carries: `launch-configs/scenes/*.toml`.
+//! The scenes and swarms that the binary carries: `launch-configs/scenes/*.toml` and `launch-configs/swarms/*.toml`.
 
+use super::swarm::Swarm;
 use super::{Scene, SceneError};
 
-/// A scene in the binary.
+/// A scene or a swarm in the binary.
 #[derive(Clone, Copy, Debug)]
 pub struct Bundled {
     pub name: &'static str,
     pub text: &'static str,
 }
 
-macro_rules! scenes {
-    ($($name:literal),* $(,)?) => {
-        &[$(Bundled { name: $name, text: include_str!(concat!("../../launch-configs/scenes/", $name, ".toml")) }),*]
+macro_rules! files {
+    ($folder:literal: $($name:literal),* $(,)?) => {
+        &[$(Bundled { name: $name, text: include_str!(concat!("../../launch-configs/", $folder, "/", $name, ".toml")) }),*]
     };
 }
 
 /// Every bundled scene, in the order in which `flockform scenes` lists them.
-pub const SCENES: &[Bundled] = scenes![
+pub const SCENES: &[Bundled] = files!["scenes":
     "tension",
     "tension-immediate",
     "feedback-grow",
@@ -53,12 +54,28 @@ pub const SCENES: &[Bundled] = scenes![
     "beam-paper-hexagonal-reduced",
 ];
 
+/// Every bundled swarm, in the order in which `flockform swarms` lists them.
+pub const SWARMS: &[Bundled] = files!["swarms": "square", "gap", "patch", "antipodal", "bridge"];
+
+/// The bundled swarm of this name.
+pub fn bundled_swarm(name: &str) -> Option<Bundled> {
+    SWARMS.iter().copied().find(|swarm| swarm.name == name)
+}
+
 /// The bundled scene of this name.
 pub fn bundled(name: &str) -> Option<Bundled> {
     SCENES.iter().copied().find(|scene| scene.name == name)
 }
 
 impl Bundled {
+    /// Reads the swarm; `overrides` are `KEY.PATH=VALUE` texts applied on top.
+    ///
+    /// # Errors
+    /// What the overrides make of it.
+    pub fn load_swarm(&self, overrides: &[String]) -> Result<Swarm, SceneError> {
+        Swarm::parse(self.name, &format!("{}.toml (bundled)", self.name), self.text, overrides, None)
+    }
+
     /// Reads the scene; `overrides` are `KEY.PATH=VALUE` texts applied on top.
     pub fn load(&self, overrides: &[String]) -> Result<Scene, SceneError> {
         Scene::parse(self.name, &format!("{}.toml (bundled)", self.name), self.text, overrides, None)
@@ -69,22 +86,39 @@ impl Bundled {
 mod tests {
     use super::*;
 
+    /// Names of the files in a folder of `launch-configs`.
+    fn files(folder: &str) -> Vec<String> {
+        let folder = format!("{}/launch-configs/{folder}", env!("CARGO_MANIFEST_DIR"));
+        let name = |entry: std::io::Result<std::fs::DirEntry>| {
+            entry.expect("readable").path().file_stem().expect("named").to_string_lossy().into_owned()
+        };
+        let entries = std::fs::read_dir(folder).expect("the folder is part of the checkout");
+        let mut files: Vec<String> = entries.map(name).collect();
+        files.sort();
+        files
+    }
+
+    fn names(all: &[Bundled]) -> Vec<&str> {
+        let mut names: Vec<&str> = all.iter().map(|one| one.name).collect();
+        names.sort_unstable();
+        names
+    }
+
     #[test]
     fn every_scene_file_is_bundled_and_loads() {
-        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/launch-configs/scenes");
-        let mut files: Vec<String> = std::fs::read_dir(folder)
-            .expect("the folder is part of the checkout")
-            .map(|entry| {
-                entry.expect("readable").path().file_stem().expect("named").to_string_lossy().into_owned()
-            })
-            .collect();
-        files.sort();
-        let mut names: Vec<&str> = SCENES.iter().map(|scene| scene.name).collect();
-        names.sort_unstable();
-        assert_eq!(files, names);
+        assert_eq!(files("scenes"), names(SCENES));
         for scene in SCENES {
             let loaded = scene.load(&[]).unwrap_or_else(|error| panic!("{error}"));
             assert!(!loaded.raw.title.is_empty(), "{} has a title", scene.name);
+        }
+    }
+
+    #[test]
+    fn every_swarm_file_is_bundled_and_loads() {
+        assert_eq!(files("swarms"), names(SWARMS));
+        for swarm in SWARMS {
+            let loaded = swarm.load_swarm(&[]).unwrap_or_else(|error| panic!("{error}"));
+            assert!(!loaded.raw.title.is_empty(), "{} has a title", swarm.name);
         }
     }
 }

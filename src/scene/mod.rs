@@ -8,6 +8,7 @@
 pub mod bundled;
 pub mod document;
 pub mod raw;
+pub mod swarm;
 pub mod table;
 pub mod validate;
 
@@ -86,6 +87,8 @@ pub enum Weights {
     List(Vec<f64>),
     /// A power of the reference distance.
     Distance { power: f64 },
+    /// Such that each particle's neighbours reproduce its place.
+    Solved,
     /// A second gradient whose boundary layers have this decay length \[length\].
     Gradient { length: f64 },
 }

@@ -1,5 +1,6 @@
 //! Sweeps and spectra over the flock's interaction, and the solvers for equilibrium.
 
+pub mod affine_weights;
 pub mod arnoldi;
 pub mod equilibrium;
 pub mod field;

@@ -13,6 +13,8 @@ mod comparison;
 mod configuration;
 mod energy;
 mod faces;
+#[cfg(feature = "swarm")]
+pub mod flight_map;
 mod heading;
 mod history;
 mod page;

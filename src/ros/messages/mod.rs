@@ -16,26 +16,13 @@ pub mod std_msgs;
 pub mod tf2_msgs;
 pub mod visualization_msgs;
 
-use ros2_client::MessageTypeName;
-
-/// A message that topics can carry.
-pub trait Message: ros2_client::Message {
-    /// The interface package it is defined in.
-    const PACKAGE: &'static str;
-    /// Its name in that package.
-    const NAME: &'static str;
-
-    /// What a topic of this type is created with.
-    fn type_name() -> MessageTypeName {
-        MessageTypeName::new(Self::PACKAGE, Self::NAME)
-    }
-}
+pub use crate::ros::edge::Message;
 
 /// Names the messages of one package after their structs.
 macro_rules! messages {
     ($package:literal: $($message:ident),+ $(,)?) => {$(
         impl ros2_client::Message for $message {}
-        impl $crate::ros::messages::Message for $message {
+        impl $crate::ros::edge::Message for $message {
             const PACKAGE: &'static str = $package;
             const NAME: &'static str = stringify!($message);
         }

@@ -150,6 +150,10 @@ pub enum RawWeights {
         /// The power [1].
         power: f64,
     },
+    /// Such that each particle's neighbours reproduce its place (ours): where leaders are stretched, sheared,
+    /// turned or moved as a whole, the followers are exactly so too, at the edge as inside. As near to
+    /// equal ones as that allows; negative only where it has to be.
+    Solved {},
     /// A second gradient of prescribed length (ours): the weights of the sites behind the first
     /// neighbours are negative. Needs `neighbours.kind = "straight"`.
     Gradient {

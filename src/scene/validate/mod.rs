@@ -3,7 +3,7 @@
 
 mod equilibrium;
 mod material;
-mod roles;
+pub(super) mod roles;
 
 use std::path::Path;
 
@@ -26,7 +26,13 @@ impl Scene {
     /// Reads a scene file from disk; `overrides` are `KEY.PATH=VALUE` texts applied on top.
     pub fn from_file(path: &Path, overrides: &[String]) -> Result<Self, SceneError> {
         let file = path.display().to_string();
-        let text = std::fs::read_to_string(path).map_err(|error| unreadable(&file, &error))?;
+        let text = std::fs::read_to_string(path).map_err(|error| {
+            unreadable(
+                &file,
+                &error,
+                "give the path of a scene file, or a name that `flockform scenes` lists",
+            )
+        })?;
         let name =
             path.file_stem().map_or_else(|| "scene".into(), |stem| stem.to_string_lossy().into_owned());
         Self::parse(&name, &file, &text, overrides, path.parent())
@@ -53,21 +59,21 @@ pub fn schema() -> serde_json::Value {
     schemars::schema_for!(RawScene).into()
 }
 
-/// The error for a scene file that cannot be read at all.
-fn unreadable(file: &str, error: &std::io::Error) -> SceneError {
+/// The error for a file that cannot be read at all.
+pub(super) fn unreadable(file: &str, error: &std::io::Error, help: &str) -> SceneError {
     SceneError::from(Problem {
         place: Place::File { file: file.to_owned() },
         key: String::new(),
         found: None,
         message: format!("cannot be read: {error}"),
-        help: Some("give the path of a scene file, or a name that `flockform scenes` lists".into()),
+        help: Some(help.to_owned()),
     })
 }
 
 /// Makes the error for a key, a message and a remedy.
-type Refuse<'a> = &'a dyn Fn(&str, String, &str) -> SceneError;
+pub(super) type Refuse<'a> = &'a dyn Fn(&str, String, &str) -> SceneError;
 
-fn validate(
+pub(super) fn validate(
     name: &str,
     mut raw: RawScene,
     document: Document,
@@ -299,7 +305,7 @@ fn check_gradient(raw: &RawScene, refuse: Refuse<'_>) -> Result<(), SceneError> 
     Ok(())
 }
 
-fn mean(raw: &RawMean, spacing: f64, refuse: Refuse<'_>) -> Result<Mean, SceneError> {
+pub(super) fn mean(raw: &RawMean, spacing: f64, refuse: Refuse<'_>) -> Result<Mean, SceneError> {
     let origin = |origin: RawOrigin| match origin {
         RawOrigin::Moving => Origin::Moving { margin: spacing },
         RawOrigin::World => Origin::World,
@@ -326,6 +332,7 @@ fn weights(raw: &Option<RawWeights>, refuse: Refuse<'_>) -> Result<Option<Weight
     Ok(match raw {
         None => None,
         Some(RawWeights::Distance { power }) => Some(Weights::Distance { power: *power }),
+        Some(RawWeights::Solved {}) => Some(Weights::Solved),
         Some(RawWeights::Gradient { length }) => Some(Weights::Gradient { length: *length }),
         Some(RawWeights::List { values }) => {
             // Also refuses a sum that is nothing but rounding, whose mean would be noise.

@@ -1,0 +1,114 @@
+//! `flockform swarm`: flies a swarm file without middleware.
+
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::process::ExitCode;
+use std::sync::atomic::Ordering;
+use std::time::Instant;
+
+use clap::Args;
+use flockform::export::flight::write_flight;
+use flockform::scene::bundled::{self, bundled_swarm};
+use flockform::scene::swarm::Swarm;
+use flockform::swarm::flight::{FlightReport, fly};
+
+use super::output::OutputArguments;
+use super::run::interrupt_flag;
+use super::{FAILED, Refusal, print, scene_path};
+
+/// Which swarm, with which changes.
+#[derive(Debug, Args)]
+pub struct SwarmFileArguments {
+    /// Name of a bundled swarm (see `flockform swarms`) or path of a swarm file
+    pub swarm: String,
+    /// Override a key of the swarm, validated like the file: limits.speed=0.5, leaders\[0\].program.kind=external
+    #[arg(long = "set", value_name = "KEY.PATH=VALUE")]
+    pub set: Vec<String>,
+}
+
+impl SwarmFileArguments {
+    pub fn load(&self) -> Result<Swarm, Refusal> {
+        if let Some(bundled) = bundled_swarm(&self.swarm) {
+            return Ok(bundled.load_swarm(&self.set)?);
+        }
+        let path = scene_path("swarm", &self.swarm, bundled::SWARMS)?;
+        Ok(Swarm::from_file(Path::new(&path), &self.set)?)
+    }
+}
+
+#[derive(Debug, Args)]
+pub struct SwarmArguments {
+    #[command(flatten)]
+    swarm: SwarmFileArguments,
+    #[command(flatten)]
+    output: OutputArguments,
+    /// Print flight.json's report instead of words
+    #[arg(long, conflicts_with = "quiet")]
+    json: bool,
+}
+
+/// Flies a swarm and writes what came of it.
+pub fn swarm(arguments: &SwarmArguments) -> Result<ExitCode, Refusal> {
+    let swarm = arguments.swarm.load()?;
+    flockform::swarm::flight::Flight::new(&swarm)?;
+    let folder = arguments.output.folder(&swarm.name)?;
+    let interrupted = interrupt_flag();
+    let start = Instant::now();
+    let (record, report) = fly(&swarm, &mut |_, _| {
+        if interrupted.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    })?;
+    let seconds = start.elapsed().as_secs_f64();
+    write_flight(&folder, &swarm, &record, &report)?;
+    let kept = folder.commit()?;
+    if arguments.json {
+        print(&format!("{:#}\n", serde_json::json!(report)));
+    } else if !arguments.output.quiet {
+        print(&words(&report, seconds, &kept));
+    }
+    let broken_off = interrupted.load(Ordering::Relaxed);
+    Ok(if report.holds() && !broken_off { ExitCode::SUCCESS } else { ExitCode::from(FAILED) })
+}
+
+fn words(report: &FlightReport, seconds: f64, kept: &Path) -> String {
+    let mut words = format!(
+        "{}: {} robots ({}), {} leaders, {:.2} s flown in {seconds:.2} s ({:.0} times real time)\n",
+        report.name,
+        report.robots,
+        report.model,
+        report.leaders,
+        report.seconds,
+        report.seconds / seconds.max(1e-9)
+    );
+    let mut line = |name: &str, value: String| words += &format!("  {name:<18} {value}\n");
+    if let Some([largest, last]) = report.affine_error {
+        line("affine error", format!("largest {largest:.3e} m, at the end {last:.3e} m"));
+    }
+    if let Some([largest, last]) = report.formation_error {
+        line("formation error", format!("largest {largest:.3e} m, at the end {last:.3e} m"));
+    }
+    if let Some(error) = report.continuum_error {
+        line("from the continuum", format!("largest {error:.3e} m"));
+    }
+    line(
+        "settling time",
+        match report.settling_time {
+            Some(time) => format!("{time:.2} s (within {} m)", report.settled_within),
+            None => format!("never within {} m", report.settled_within),
+        },
+    );
+    if let Some(clearance) = report.clearance {
+        line("clearance", format!("smallest {clearance:.4} m"));
+    }
+    line("way", format!("mean {:.2} m, longest {:.2} m", report.way[0], report.way[1]));
+    line("PE1", format!("largest {:.4e} m^2, at the end {:.4e} m^2", report.pe1[0], report.pe1[1]));
+    line("strain", format!("largest {:.4e}, at the end {:.4e}", report.strain[0], report.strain[1]));
+    if report.most_lost > 0 {
+        line("robots lost", format!("{} at one time", report.most_lost));
+    }
+    for verdict in &report.bounds {
+        let found = verdict.found.map_or("not measured".into(), |found| format!("{found:.4e}"));
+        let word = if verdict.holds { "holds" } else { "BROKEN" };
+        line(verdict.bound, format!("{word}: declared {}, found {found}", verdict.declared));
+    }
+    words + &format!("results in {}\n", kept.display())
+}

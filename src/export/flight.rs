@@ -1,0 +1,111 @@
+//! A flight's outputs: `flight.json`, how it went; `samples.csv`, every period; `robots.csv`, every robot at the
+//! end; `tracks.csv`, every robot at the recorded periods; the figures `flight` (the ways on a map) and
+//! `errors` (shape and clearance against time).
+
+use std::path::PathBuf;
+
+use serde::Serialize;
+
+use super::csv::write;
+use super::error::{ExportError, write_file};
+use super::figures::chart::{Axis, Chart, Series, Style, draw_below_each_other};
+use super::figures::{self, SERIES, flight_map};
+use super::{OutputFolder, summary};
+use crate::scene::swarm::Swarm;
+use crate::swarm::flight::{FlightReport, Record, Sample};
+
+#[derive(Serialize)]
+struct Report<'a> {
+    program: &'static str,
+    version: &'static str,
+    /// Whether every declared bound held.
+    holds: bool,
+    #[serde(flatten)]
+    report: &'a FlightReport,
+    swarm: &'a crate::scene::swarm::raw::RawSwarm,
+}
+
+#[derive(Serialize)]
+struct TrackRow<'a> {
+    time: f64,
+    name: &'a str,
+    x: f64,
+    y: f64,
+}
+
+/// Writes everything.
+///
+/// # Errors
+/// The first file that cannot be written.
+pub fn write_flight(
+    folder: &OutputFolder,
+    swarm: &Swarm,
+    record: &Record,
+    report: &FlightReport,
+) -> Result<Vec<PathBuf>, ExportError> {
+    let tracks = record.times.iter().zip(&record.tracks).flat_map(|(&time, places)| {
+        let named = report.per_robot.iter().zip(places.iter());
+        named.map(move |(robot, [x, y])| TrackRow { time, name: &robot.name, x, y })
+    });
+    let mut written = vec![
+        write(folder, "samples.csv", record.samples.iter())?,
+        write(folder, "robots.csv", report.per_robot.iter())?,
+        write(folder, "tracks.csv", tracks)?,
+    ];
+    written.extend(figures::write(&flight_map::flight(swarm, record, report), &folder.path("flight"))?);
+    written.extend(figures::write(&errors(record, report), &folder.path("errors"))?);
+    let path = folder.path(summary::FLIGHT);
+    let (program, version) = (summary::PROGRAM, env!("CARGO_PKG_VERSION"));
+    let whole = Report { program, version, holds: report.holds(), report, swarm: &swarm.raw };
+    let text = serde_json::to_string_pretty(&whole).map_err(ExportError::io("write", &path))? + "\n";
+    write_file(&path, text)?;
+    written.push(path);
+    Ok(written)
+}
+
+/// Shape and clearance against time.
+fn errors(record: &Record, report: &FlightReport) -> String {
+    let series = |name: &str, colour, of: &dyn Fn(&Sample) -> Option<f64>| {
+        let points = record.samples.iter().filter_map(|s| of(s).map(|value| [s.time, value])).collect();
+        Series { name: name.into(), colour, style: Style::Line, points }
+    };
+    let time = Axis { quantity: "time", unit: "s", is_log: false };
+    let shape = [
+        series("from the leaders' affine motion", SERIES[0], &|s| s.affine_error),
+        series("from where the rule comes to rest", SERIES[1], &|s| s.formation_error),
+        series("from the continuum run", SERIES[2], &|s| s.continuum_error),
+    ];
+    let clearance = series("", SERIES[4], &|s| s.clearance.is_finite().then_some(s.clearance));
+    let mut charts = Vec::new();
+    // An ideal flight has errors of rounding, which no axis in metres would show.
+    let visible = |s: &Series| s.points.iter().any(|point| point[1] > 0.0);
+    if shape.iter().any(visible) {
+        charts.push(Chart {
+            title: report.title.clone(),
+            note: "largest distance of a robot from its place".into(),
+            axes: [time, Axis { quantity: "distance", unit: "m", is_log: true }],
+            series: shape.into_iter().filter(visible).collect(),
+            landmarks: Vec::new(),
+        });
+    }
+    if !clearance.points.is_empty() {
+        charts.push(Chart {
+            title: "Smallest free space".into(),
+            note: "between two robots' rims, or a rim and an obstacle".into(),
+            axes: [time, Axis { quantity: "clearance", unit: "m", is_log: false }],
+            series: vec![clearance],
+            landmarks: Vec::new(),
+        });
+    }
+    if charts.is_empty() {
+        let strain = series("", SERIES[3], &|s| Some(s.strain));
+        charts.push(Chart {
+            title: report.title.clone(),
+            note: "largest strain of a robot's surroundings".into(),
+            axes: [time, Axis { quantity: "strain", unit: "1", is_log: false }],
+            series: vec![strain],
+            landmarks: Vec::new(),
+        });
+    }
+    draw_below_each_other(&charts)
+}

@@ -1,0 +1,99 @@
+//! Strain and rotation of a particle's surroundings, from its neighbours' displacements.
+//!
+//! The deformation gradient `F` is the one that takes the neighbours' places about the particle nearest to
+//! their present ones (least squares; M. L. Falk and J. S. Langer, *Dynamics of viscoplastic deformation in
+//! amorphous solids*, 1998, Eq. 2.11-2.14). With `F = R U` the rotation is that of `R`, the strain `U - 1`: a
+//! body or a formation turned by any angle is not strained.
+
+use super::interaction::Interaction;
+use super::points::Points;
+
+/// What became of a particle's surroundings.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Strain {
+    /// `xx, yy, xy` of the right stretch less one, in the axes of the reference configuration \[1\].
+    pub components: [f64; 3],
+    /// \[rad\], counter-clockwise, from -pi to pi.
+    pub rotation: f64,
+}
+
+impl Strain {
+    /// The principal strain largest in size \[1\].
+    pub fn largest(&self) -> f64 {
+        let [xx, yy, xy] = self.components;
+        let (middle, radius) = (0.5 * (xx + yy), f64::hypot(0.5 * (xx - yy), xy));
+        middle.abs() + radius
+    }
+}
+
+/// Of one particle over its live neighbours; `None` where these lie on a line, or are fewer than two.
+pub fn strain(interaction: &Interaction, particle: usize, present: &Points) -> Option<Strain> {
+    let pairs = interaction.live_neighbours(particle).map(|k| (interaction.reference.get(k), present.get(k)));
+    of_pairs((interaction.reference.get(particle), present.get(particle)), pairs)
+}
+
+/// From places in the reference configuration and at present, of the particle and of its neighbours.
+fn of_pairs(own: ([f64; 2], [f64; 2]), pairs: impl Iterator<Item = ([f64; 2], [f64; 2])>) -> Option<Strain> {
+    let (mut then_then, mut now_then) = ([0.0; 3], [[0.0; 2]; 2]);
+    for (reference, present) in pairs {
+        let then = [reference[0] - own.0[0], reference[1] - own.0[1]];
+        let now = [present[0] - own.1[0], present[1] - own.1[1]];
+        then_then[0] += then[0] * then[0];
+        then_then[1] += then[1] * then[1];
+        then_then[2] += then[0] * then[1];
+        for a in 0..2 {
+            for b in 0..2 {
+                now_then[a][b] += now[a] * then[b];
+            }
+        }
+    }
+    let [xx, yy, xy] = then_then;
+    let determinant = xx * yy - xy * xy;
+    // Neighbours on a line leave one direction unknown.
+    if determinant.is_nan() || determinant <= 1e-9 * xx.max(yy) * xx.max(yy) {
+        return None;
+    }
+    let inverse = [[yy / determinant, -xy / determinant], [-xy / determinant, xx / determinant]];
+    let f = super::block::product(&now_then, &inverse);
+    let rotation = f64::atan2(f[1][0] - f[0][1], f[0][0] + f[1][1]);
+    let (sin, cos) = rotation.sin_cos();
+    let u = super::block::product(&[[cos, sin], [-sin, cos]], &f);
+    let components = [u[0][0] - 1.0, u[1][1] - 1.0, 0.5 * (u[0][1] + u[1][0])];
+    components.iter().all(|c| c.is_finite()).then_some(Strain { components, rotation })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const AROUND: [[f64; 2]; 3] = [[3.0, 2.0], [1.5, 3.5], [2.5, 1.0]];
+
+    fn of(map: impl Fn([f64; 2]) -> [f64; 2]) -> Option<Strain> {
+        let own = [2.0, 2.0];
+        of_pairs((own, map(own)), AROUND.into_iter().map(|at| (at, map(at))))
+    }
+
+    #[test]
+    fn a_turned_and_moved_body_is_not_strained() {
+        let (sin, cos) = 2.5_f64.sin_cos();
+        let found = of(|[x, y]| [7.0 + cos * x - sin * y, sin * x + cos * y]).expect("spanned");
+        assert!(found.components.iter().all(|c| c.abs() < 1e-14), "{found:?}");
+        assert!((found.rotation - 2.5).abs() < 1e-14);
+    }
+
+    #[test]
+    fn stretch_and_shear_are_told_apart() {
+        let found = of(|[x, y]| [1.1 * x, 0.8 * y]).expect("spanned");
+        assert!((found.components[0] - 0.1).abs() < 1e-14 && (found.components[1] + 0.2).abs() < 1e-14);
+        assert!((found.largest() - 0.2).abs() < 1e-14);
+        let sheared = of(|[x, y]| [x + 0.02 * y, y]).expect("spanned");
+        assert!((sheared.components[2] - 0.01).abs() < 1e-4 && (sheared.rotation + 0.01).abs() < 1e-4);
+    }
+
+    #[test]
+    fn neighbours_on_a_line_say_nothing() {
+        let line = [[1.0, 1.0], [3.0, 3.0]].map(|at| (at, at));
+        assert_eq!(of_pairs(([2.0, 2.0], [2.0, 2.0]), line.into_iter()), None);
+        assert_eq!(of_pairs(([2.0, 2.0], [2.0, 2.0]), std::iter::empty()), None);
+    }
+}

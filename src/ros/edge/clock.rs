@@ -1,0 +1,107 @@
+//! What time it is: the computer's, or the simulator's from `/clock`.
+
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use super::services::rosgraph_msgs;
+use super::{EdgeError, Node, Quality, Subscription};
+
+/// The node's clock.
+pub struct Clock {
+    simulated: Option<Simulated>,
+}
+
+struct Simulated {
+    subscription: Subscription<rosgraph_msgs::Clock>,
+    reading: Reading,
+}
+
+/// What was last heard of a simulator's time. Pure.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Reading {
+    now: Option<f64>,
+    jump: f64,
+}
+
+impl Reading {
+    /// Another time from the simulator \[s\].
+    pub fn hear(&mut self, time: f64) {
+        if let Some(before) = self.now
+            && time < before
+        {
+            self.jump += before - time;
+        }
+        self.now = Some(time);
+    }
+
+    /// Simulated time \[s\], if any was heard.
+    pub fn now(&self) -> Option<f64> {
+        self.now
+    }
+
+    /// How far time went back since last asked \[s\], if it did.
+    pub fn jump_back(&mut self) -> Option<f64> {
+        let jump = std::mem::take(&mut self.jump);
+        (jump > 0.0).then_some(jump)
+    }
+}
+
+impl Clock {
+    /// The computer's time.
+    pub fn system() -> Self {
+        Self { simulated: None }
+    }
+
+    /// The simulator's time (`use_sim_time`), from `/clock`.
+    ///
+    /// # Errors
+    /// As [`Node::subscription`].
+    pub fn simulated(node: &Node) -> Result<Self, EdgeError> {
+        let subscription = node.subscription("/clock", Quality::BEST_EFFORT)?;
+        Ok(Self { simulated: Some(Simulated { subscription, reading: Reading::default() }) })
+    }
+
+    /// Hears what came since the last tick. Returns how far time went back \[s\], if it did: everything
+    /// stamped before then is from another run.
+    pub fn poll(&mut self) -> Option<f64> {
+        let Simulated { subscription, reading } = self.simulated.as_mut()?;
+        while let Some((message, _)) = subscription.take() {
+            reading.hear(message.clock.seconds());
+        }
+        reading.jump_back()
+    }
+
+    /// Seconds since the epoch; `None` while the simulator has not spoken.
+    pub fn now(&self) -> Option<f64> {
+        match &self.simulated {
+            Some(simulated) => simulated.reading.now(),
+            None => Some(system_time()),
+        }
+    }
+
+    /// Whether time comes from `/clock`.
+    pub fn is_simulated(&self) -> bool {
+        self.simulated.is_some()
+    }
+}
+
+/// The computer's time \[s since the Unix epoch\].
+pub fn system_time() -> f64 {
+    SystemTime::now().duration_since(UNIX_EPOCH).map_or(0.0, |since| since.as_secs_f64())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_jump_backwards_is_reported_once() {
+        let mut reading = Reading::default();
+        assert_eq!(reading.now(), None);
+        for time in [10.0, 10.5, 2.0, 2.5] {
+            reading.hear(time);
+        }
+        assert_eq!(reading.now(), Some(2.5));
+        assert_eq!(reading.jump_back(), Some(8.5));
+        assert_eq!(reading.jump_back(), None);
+    }
+}

@@ -1,0 +1,193 @@
+//! Who is there: which remote endpoints match ours, and what we tell others about our nodes.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use ros2_client::dds::rustdds::no_key::DataWriterCdr;
+use ros2_client::dds::rustdds::{
+    DomainParticipant, DomainParticipantStatusEvent, DomainParticipantStatusListener, GUID, StatusEvented,
+    Timestamp,
+};
+use ros2_client::entities_info::{NodeEntitiesInfo, ParticipantEntitiesInfo};
+use ros2_client::{Gid, NodeName};
+
+/// How often the watcher looks \[s\]. Nodes announced within one look go out as one sample.
+const LOOK: Duration = Duration::from_millis(20);
+
+/// First twelve bytes of a GUID: the participant.
+pub(super) fn prefix(guid: GUID) -> [u8; 12] {
+    let bytes = guid.to_bytes();
+    std::array::from_fn(|i| bytes[i])
+}
+
+#[derive(Default)]
+pub(super) struct Graph {
+    state: Mutex<State>,
+}
+
+#[derive(Default)]
+struct State {
+    /// Local endpoint to the remote endpoints that match it.
+    matched: BTreeMap<GUID, BTreeSet<GUID>>,
+    /// Local endpoint to its ROS 2 name, for messages to people.
+    names: BTreeMap<GUID, String>,
+    /// Node's fully qualified name to what it owns.
+    nodes: BTreeMap<String, Owned>,
+    nodes_changed: bool,
+}
+
+struct Owned {
+    name: NodeName,
+    readers: Vec<GUID>,
+    writers: Vec<GUID>,
+}
+
+impl Graph {
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    pub fn add_node(&self, name: NodeName) {
+        let mut state = self.state();
+        let owned = Owned { name: name.clone(), readers: Vec::new(), writers: Vec::new() };
+        state.nodes.insert(name.fully_qualified_name(), owned);
+        state.nodes_changed = true;
+    }
+
+    pub fn remove_node(&self, node: &str) {
+        let mut state = self.state();
+        state.nodes.remove(node);
+        state.nodes_changed = true;
+    }
+
+    pub fn add_reader(&self, node: &str, reader: GUID, name: &str) {
+        self.add(node, reader, name, |owned| &mut owned.readers);
+    }
+
+    pub fn add_writer(&self, node: &str, writer: GUID, name: &str) {
+        self.add(node, writer, name, |owned| &mut owned.writers);
+    }
+
+    fn add(&self, node: &str, endpoint: GUID, name: &str, list: fn(&mut Owned) -> &mut Vec<GUID>) {
+        let mut state = self.state();
+        state.names.insert(endpoint, name.to_owned());
+        if let Some(owned) = state.nodes.get_mut(node) {
+            list(owned).push(endpoint);
+            state.nodes_changed = true;
+        }
+    }
+
+    /// Remote endpoints that match a local one \[1\].
+    pub fn matched(&self, local: GUID) -> usize {
+        self.state().matched.get(&local).map_or(0, BTreeSet::len)
+    }
+
+    /// Whether some endpoint of that participant matches the local one.
+    pub fn matches_participant(&self, local: GUID, participant: [u8; 12]) -> bool {
+        self.state()
+            .matched
+            .get(&local)
+            .is_some_and(|all| all.iter().any(|&guid| prefix(guid) == participant))
+    }
+
+    fn note(&self, event: DomainParticipantStatusEvent) {
+        use DomainParticipantStatusEvent as Event;
+        let mut state = self.state();
+        match event {
+            Event::RemoteReaderMatched { local_writer: local, remote_reader: remote }
+            | Event::RemoteWriterMatched { local_reader: local, remote_writer: remote } => {
+                state.matched.entry(local).or_default().insert(remote);
+            }
+            Event::ReaderLost { guid, .. } | Event::WriterLost { guid, .. } => {
+                state.matched.values_mut().for_each(|all| {
+                    all.remove(&guid);
+                });
+            }
+            Event::ParticipantLost { id, .. } => {
+                let gone: &[u8] = id.as_ref();
+                state.matched.values_mut().for_each(|all| all.retain(|&guid| prefix(guid) != gone));
+            }
+            Event::RemoteReaderQosIncompatible { local_writer: local, .. }
+            | Event::RemoteWriterQosIncompatible { local_reader: local, .. } => {
+                if let Some(name) = state.names.get(&local) {
+                    tracing::warn!(
+                        "{name}: a peer asks for another quality of service (reliability, durability) than \
+                         we offer, so nothing flows between us and it"
+                    );
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// Our nodes as `ros_discovery_info` wants them, if they changed since last asked.
+    fn news(&self, participant: GUID, own_writer: GUID) -> Option<ParticipantEntitiesInfo> {
+        let mut state = self.state();
+        if !std::mem::take(&mut state.nodes_changed) {
+            return None;
+        }
+        let nodes = state.nodes.values().map(|owned| {
+            let mut info = NodeEntitiesInfo::new(owned.name.clone());
+            owned.readers.iter().for_each(|&reader| info.add_reader(Gid::from(reader)));
+            owned.writers.iter().for_each(|&writer| info.add_writer(Gid::from(writer)));
+            info.add_writer(Gid::from(own_writer));
+            info
+        });
+        Some(ParticipantEntitiesInfo::new(Gid::from(participant), nodes.collect()))
+    }
+}
+
+/// The thread that watches; it ends when dropped.
+pub(super) struct Watcher {
+    stop: Option<Sender<()>>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Watcher {
+    pub fn start(
+        graph: Arc<Graph>,
+        participant: &DomainParticipant,
+        guid: GUID,
+        writer: DataWriterCdr<ParticipantEntitiesInfo>,
+    ) -> std::io::Result<Self> {
+        let (stop, stopped) = channel();
+        let listener = participant.status_listener();
+        let thread = std::thread::Builder::new()
+            .name("ros graph".into())
+            .spawn(move || watch(&graph, &listener, guid, &writer, &stopped))?;
+        Ok(Self { stop: Some(stop), thread: Some(thread) })
+    }
+}
+
+impl Drop for Watcher {
+    fn drop(&mut self) {
+        self.stop.take();
+        if let Some(thread) = self.thread.take() {
+            // It wakes within one look; what it panicked with has been printed.
+            let _ = thread.join();
+        }
+    }
+}
+
+fn watch(
+    graph: &Graph,
+    listener: &DomainParticipantStatusListener,
+    guid: GUID,
+    writer: &DataWriterCdr<ParticipantEntitiesInfo>,
+    stopped: &Receiver<()>,
+) {
+    use ros2_client::dds::rustdds::RTPSEntity;
+    while stopped.recv_timeout(LOOK) == Err(RecvTimeoutError::Timeout) {
+        while let Some(event) = listener.try_recv_status() {
+            graph.note(event);
+        }
+        if let Some(news) = graph.news(guid, writer.guid())
+            && let Err(error) = writer.write(news, Some(Timestamp::now()))
+        {
+            tracing::warn!("our nodes could not be announced: {error:?}");
+        }
+    }
+}

@@ -1,0 +1,123 @@
+//! The machine behind its services.
+
+use super::machine::{Goal, Machine, Outcome, State, Transition};
+use crate::ros::edge::services::lifecycle_msgs as msgs;
+use crate::ros::edge::{EdgeError, Node, Publisher, Quality, Service};
+
+/// A node's lifecycle and the services `~/change_state`, `~/get_state`, `~/get_available_states`,
+/// `~/get_available_transitions`, `~/get_transition_graph`, with the topic `~/transition_event`.
+pub struct Lifecycle {
+    machine: Machine,
+    change: Service<msgs::ChangeState>,
+    state: Service<msgs::GetState>,
+    states: Service<msgs::GetAvailableStates>,
+    transitions: Service<msgs::GetAvailableTransitions>,
+    graph: Service<msgs::GetAvailableTransitions>,
+    events: Publisher<msgs::TransitionEvent>,
+}
+
+impl Lifecycle {
+    /// An unconfigured node.
+    ///
+    /// # Errors
+    /// As [`Node::service`].
+    pub fn new(node: &Node) -> Result<Self, EdgeError> {
+        Ok(Self {
+            machine: Machine::default(),
+            change: node.service(&node.private("change_state"))?,
+            state: node.service(&node.private("get_state"))?,
+            states: node.service(&node.private("get_available_states"))?,
+            transitions: node.service(&node.private("get_available_transitions"))?,
+            graph: node.service(&node.private("get_transition_graph"))?,
+            events: node.publisher(&node.private("transition_event"), Quality::reliable(10))?,
+        })
+    }
+
+    pub fn state(&self) -> State {
+        self.machine.state()
+    }
+
+    /// Whether the node may move robots.
+    pub fn is_active(&self) -> bool {
+        self.state() == State::Active
+    }
+
+    /// Takes an unconfigured node to active, doing what each step asks for. Stops where a step does not
+    /// succeed.
+    pub fn autostart(&mut self, now: f64, act: &mut dyn FnMut(Goal) -> Outcome) {
+        for label in ["configure", "activate"] {
+            let Some(edge) = self.machine.asked(0, label) else { return };
+            self.run(edge, now, act);
+        }
+    }
+
+    /// Takes the node to finalized from wherever it stands, as a signal to end does.
+    pub fn shut_down(&mut self, now: f64, act: &mut dyn FnMut(Goal) -> Outcome) {
+        if let Some(edge) = self.machine.asked(0, "shutdown") {
+            self.run(edge, now, act);
+        }
+    }
+
+    /// Answers what was asked since the last tick, doing with `act` what transitions ask for. `now` \[s\]
+    /// stamps the events.
+    pub fn poll(&mut self, now: f64, act: &mut dyn FnMut(Goal) -> Outcome) {
+        while let Some((id, request)) = self.change.take() {
+            let asked = request.transition;
+            let edge = self.machine.asked(asked.id, &asked.label);
+            let success = edge.is_some_and(|edge| self.run(edge, now, act));
+            if let Err(error) = self.change.reply(&id, &msgs::ChangeStateResponse { success }) {
+                tracing::warn!("{error}");
+            }
+        }
+        self.answer_questions();
+    }
+
+    /// Follows an edge to the next primary state; says whether what it asks for was done.
+    fn run(&mut self, edge: Transition, now: f64, act: &mut dyn FnMut(Goal) -> Outcome) -> bool {
+        let Some(goal) = self.machine.begin(edge) else { return false };
+        self.tell(edge, now);
+        let asked = act(goal);
+        let mut outcome = asked;
+        while let Some(end) = self.machine.end(outcome) {
+            self.tell(end, now);
+            // Only an error leads to one more thing to do: putting it right.
+            let Some(recover) = self.machine.goal() else { break };
+            outcome = act(recover);
+        }
+        asked == Outcome::Success
+    }
+
+    fn answer_questions(&self) {
+        let now = self.state();
+        self.state.serve(|_| msgs::GetStateResponse { current_state: state(now) });
+        self.states
+            .serve(|_| msgs::GetAvailableStatesResponse { available_states: State::ALL.map(state).into() });
+        self.transitions.serve(|_| msgs::GetAvailableTransitionsResponse {
+            available_transitions: Transition::from(now).map(description).collect(),
+        });
+        self.graph.serve(|_| msgs::GetAvailableTransitionsResponse {
+            available_transitions: Transition::ALL.map(description).into(),
+        });
+    }
+
+    fn tell(&self, edge: Transition, now: f64) {
+        let msgs::TransitionDescription { transition, start_state, goal_state } = description(edge);
+        let timestamp = (now * 1e9) as u64;
+        let event = msgs::TransitionEvent { timestamp, transition, start_state, goal_state };
+        if let Err(error) = self.events.publish(&event) {
+            tracing::warn!("{error}");
+        }
+    }
+}
+
+fn state(state: State) -> msgs::State {
+    msgs::State { id: state.id(), label: state.label().into() }
+}
+
+fn description(edge: Transition) -> msgs::TransitionDescription {
+    msgs::TransitionDescription {
+        transition: msgs::Transition { id: edge.id, label: edge.label.into() },
+        start_state: state(edge.start),
+        goal_state: state(edge.goal),
+    }
+}

@@ -1,0 +1,55 @@
+//! The wire: participant, nodes, topics, services, parameters, lifecycle and clock of ROS 2, without ROS 2.
+//!
+//! Everything here is polled. A node's loop is one thread that takes what arrived once per tick and
+//! publishes; no call below waits for the network. RustDDS (through ros2-client) does the protocol on its
+//! own threads, and one more thread of ours watches who is there.
+//!
+//! * [`participant`]: an [`Edge`] is one DDS participant; [`Node`]s of one process share it.
+//! * [`topic`]: publishers and subscriptions; [`quality`]: what they promise each other.
+//! * [`service`]: services that answer peers on Fast DDS and on Cyclone DDS alike.
+//! * [`parameters`], [`lifecycle`]: what ROS 2 expects of a node, as pure cores and their services.
+//! * [`clock`]: system time or the simulator's; [`steady`]: the loop's pace.
+//!
+//! Times are seconds since the Unix epoch as `f64`.
+
+pub mod clock;
+mod graph;
+pub mod lifecycle;
+pub mod loopback;
+pub mod message;
+pub mod names;
+pub mod parameters;
+pub mod participant;
+pub mod quality;
+pub mod service;
+pub mod services;
+pub mod steady;
+pub mod topic;
+pub mod wire;
+
+pub use message::{Message, ServiceType};
+pub use participant::{Edge, Node, Options};
+pub use quality::Quality;
+pub use service::{RequestId, Service};
+pub use topic::{Publisher, Stamps, Subscription};
+
+/// Why something at the edge could not be made or sent.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum EdgeError {
+    #[error(
+        "domain {domain} is out of range: ROS_DOMAIN_ID is 0 to 232 (0 to 101 keeps clear of the ports the \
+         system hands out)"
+    )]
+    Domain { domain: u16 },
+    #[error(
+        "no DDS participant on domain {domain}: {reason}; is another process holding every port of the \
+         domain? try another ROS_DOMAIN_ID"
+    )]
+    Participant { domain: u16, reason: String },
+    #[error("{name:?} is no {kind} name: {reason}")]
+    Name { kind: &'static str, name: String, reason: &'static str },
+    #[error("no endpoint on {topic}: {reason}")]
+    Endpoint { topic: String, reason: String },
+    #[error("not sent on {topic}: {reason}")]
+    Send { topic: String, reason: String },
+}

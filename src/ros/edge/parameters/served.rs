@@ -1,0 +1,126 @@
+//! The store behind its services.
+
+use super::{Change, Declaration, Refusal, Store, Value};
+use crate::ros::edge::services::{Time, rcl_interfaces as msgs};
+use crate::ros::edge::{EdgeError, Node, Publisher, Quality, Service};
+
+/// A node's parameters and the services `~/get_parameters`, `~/set_parameters`,
+/// `~/set_parameters_atomically`, `~/list_parameters`, `~/describe_parameters`, `~/get_parameter_types`, with
+/// the topic `/parameter_events`.
+pub struct Parameters {
+    store: Store,
+    node: String,
+    get: Service<msgs::GetParameters>,
+    types: Service<msgs::GetParameterTypes>,
+    describe: Service<msgs::DescribeParameters>,
+    list: Service<msgs::ListParameters>,
+    set: Service<msgs::SetParameters>,
+    set_atomically: Service<msgs::SetParametersAtomically>,
+    events: Publisher<msgs::ParameterEvent>,
+    announced: bool,
+}
+
+impl Parameters {
+    /// Serves what the store declares.
+    ///
+    /// # Errors
+    /// As [`Node::service`].
+    pub fn new(node: &Node, store: Store) -> Result<Self, EdgeError> {
+        Ok(Self {
+            store,
+            node: node.name().into(),
+            get: node.service(&node.private("get_parameters"))?,
+            types: node.service(&node.private("get_parameter_types"))?,
+            describe: node.service(&node.private("describe_parameters"))?,
+            list: node.service(&node.private("list_parameters"))?,
+            set: node.service(&node.private("set_parameters"))?,
+            set_atomically: node.service(&node.private("set_parameters_atomically"))?,
+            events: node.publisher("/parameter_events", Quality::reliable(1000))?,
+            announced: false,
+        })
+    }
+
+    /// Declares one more: see [`Store::declare`].
+    pub fn declare(&mut self, declaration: Declaration, start: Option<Value>) -> Result<(), Refusal> {
+        self.store.declare(declaration, start)
+    }
+
+    pub fn get(&self, name: &str) -> Option<&Value> {
+        self.store.get(name)
+    }
+
+    /// Sets one from inside; the next [`Parameters::poll`] returns and announces it.
+    ///
+    /// # Errors
+    /// As from outside.
+    pub fn set(&mut self, name: &str, value: impl Into<Value>) -> Result<(), Refusal> {
+        self.store.set(name, Some(value.into()))
+    }
+
+    /// Answers what was asked since the last tick and returns what changed. `now` \[s\] stamps the event.
+    pub fn poll(&mut self, now: f64) -> Vec<Change> {
+        self.answer_questions();
+        self.set.serve(|request| {
+            let set = |parameter: msgs::Parameter| {
+                result(self.store.set(&parameter.name, Value::from_wire(parameter.value)))
+            };
+            msgs::SetParametersResponse { results: request.parameters.into_iter().map(set).collect() }
+        });
+        self.set_atomically.serve(|request| {
+            let wanted = |parameter: msgs::Parameter| (parameter.name, Value::from_wire(parameter.value));
+            let settings = request.parameters.into_iter().map(wanted).collect();
+            msgs::SetParametersAtomicallyResponse { result: result(self.store.set_atomically(settings)) }
+        });
+        let changes = self.store.take_changes();
+        self.announce(&changes, now);
+        changes
+    }
+
+    fn answer_questions(&self) {
+        let store = &self.store;
+        let unset = msgs::ParameterValue::default;
+        self.get.serve(|request| msgs::GetParametersResponse {
+            values: each(&request, |name| store.get(name).map_or_else(unset, Value::to_wire)),
+        });
+        self.types.serve(|request| msgs::GetParameterTypesResponse {
+            types: each(&request, |name| store.get(name).map_or(0, Value::kind)),
+        });
+        self.describe.serve(|request| msgs::DescribeParametersResponse {
+            descriptors: each(&request, |name| store.descriptor(name)),
+        });
+        self.list.serve(|request| {
+            let (names, prefixes) = store.list(&request.prefixes, request.depth);
+            msgs::ListParametersResponse { names, prefixes }
+        });
+    }
+
+    fn announce(&mut self, changes: &[Change], now: f64) {
+        let parameter =
+            |name: &str, value: &Value| msgs::Parameter { name: name.into(), value: value.to_wire() };
+        let mut event = msgs::ParameterEvent {
+            stamp: Time::from_seconds(now),
+            node: self.node.clone(),
+            ..msgs::ParameterEvent::default()
+        };
+        if !std::mem::replace(&mut self.announced, true) {
+            event.new_parameters = self.store.iter().map(|(name, value)| parameter(name, value)).collect();
+        }
+        event.changed_parameters =
+            changes.iter().map(|change| parameter(&change.name, &change.value)).collect();
+        if event.new_parameters.is_empty() && event.changed_parameters.is_empty() {
+            return;
+        }
+        if let Err(error) = self.events.publish(&event) {
+            tracing::warn!("{error}");
+        }
+    }
+}
+
+fn each<T>(request: &msgs::Names, answer: impl Fn(&str) -> T) -> Vec<T> {
+    request.names.iter().map(|name| answer(name)).collect()
+}
+
+fn result(set: Result<(), Refusal>) -> msgs::SetParametersResult {
+    let reason = set.as_ref().err().map(ToString::to_string).unwrap_or_default();
+    msgs::SetParametersResult { successful: set.is_ok(), reason }
+}

@@ -1,0 +1,434 @@
+//! Declared parameters and what may become of them. Pure.
+
+use std::collections::BTreeMap;
+use std::ops::RangeInclusive;
+
+use super::Value;
+use crate::ros::edge::services::rcl_interfaces::{FloatingPointRange, IntegerRange, ParameterDescriptor};
+
+/// A validator: `Err` with the reason refuses a value.
+pub type Check = Box<dyn Fn(&str, &Value) -> Result<(), String> + Send>;
+
+/// Values that a number may take, both ends included; a step of 0 allows all between.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Range {
+    Integer(IntegerRange),
+    Double(FloatingPointRange),
+}
+
+/// A parameter as the node declares it.
+pub struct Declaration {
+    name: String,
+    value: Value,
+    description: String,
+    constraints: String,
+    range: Option<Range>,
+    read_only: bool,
+    check: Option<Check>,
+}
+
+impl Declaration {
+    /// A parameter with its default value, which fixes its type.
+    pub fn new(name: &str, default: impl Into<Value>) -> Self {
+        Self {
+            name: name.into(),
+            value: default.into(),
+            description: String::new(),
+            constraints: String::new(),
+            range: None,
+            read_only: false,
+            check: None,
+        }
+    }
+
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Meaning and unit, for people.
+    #[must_use]
+    pub fn describe(mut self, description: &str) -> Self {
+        self.description = description.into();
+        self
+    }
+
+    /// Smallest and largest number.
+    #[must_use]
+    pub fn range(mut self, range: RangeInclusive<f64>) -> Self {
+        let (from_value, to_value) = range.into_inner();
+        self.range = Some(Range::Double(FloatingPointRange { from_value, to_value, step: 0.0 }));
+        self
+    }
+
+    /// Smallest and largest whole number, and the step between values (0: any).
+    #[must_use]
+    pub fn integer_range(mut self, range: RangeInclusive<i64>, step: u64) -> Self {
+        let (from_value, to_value) = range.into_inner();
+        self.range = Some(Range::Integer(IntegerRange { from_value, to_value, step }));
+        self
+    }
+
+    /// Step between numbers, counted from the smallest; after [`Declaration::range`].
+    #[must_use]
+    pub fn step(mut self, step: f64) -> Self {
+        if let Some(Range::Double(range)) = &mut self.range {
+            range.step = step;
+        }
+        self
+    }
+
+    /// Set at the start and never again.
+    #[must_use]
+    pub fn read_only(mut self) -> Self {
+        self.read_only = true;
+        self
+    }
+
+    /// One more condition on new values, and in words for people.
+    #[must_use]
+    pub fn checked(
+        mut self,
+        constraints: &str,
+        check: impl Fn(&str, &Value) -> Result<(), String> + Send + 'static,
+    ) -> Self {
+        self.constraints = constraints.into();
+        self.check = Some(Box::new(check));
+        self
+    }
+
+    fn descriptor(&self) -> ParameterDescriptor {
+        ParameterDescriptor {
+            name: self.name.clone(),
+            kind: self.value.kind(),
+            description: self.description.clone(),
+            additional_constraints: self.constraints.clone(),
+            read_only: self.read_only,
+            dynamic_typing: false,
+            floating_point_range: match self.range {
+                Some(Range::Double(range)) => vec![range],
+                _ => Vec::new(),
+            },
+            integer_range: match self.range {
+                Some(Range::Integer(range)) => vec![range],
+                _ => Vec::new(),
+            },
+        }
+    }
+
+    fn admit(&self, value: Value) -> Result<Value, Refusal> {
+        let name = || self.name.clone();
+        let value = value.widened(&self.value);
+        if value.kind() != self.value.kind() {
+            return Err(Refusal::Type { name: name(), expected: self.value.kind_name(), found: value });
+        }
+        if matches!(&value, Value::Double(number) if number.is_nan()) {
+            return Err(Refusal::NotANumber { name: name() });
+        }
+        match (self.range, &value) {
+            (Some(Range::Double(range)), Value::Double(number)) => within(&self.name, range, *number)?,
+            (Some(Range::Integer(range)), Value::Integer(number)) => {
+                within_whole(&self.name, range, *number)?
+            }
+            _ => {}
+        }
+        if let Some(check) = &self.check {
+            check(&self.name, &value).map_err(|reason| Refusal::Vetoed { name: name(), reason })?;
+        }
+        Ok(value)
+    }
+}
+
+fn within(name: &str, range: FloatingPointRange, value: f64) -> Result<(), Refusal> {
+    let FloatingPointRange { from_value: from, to_value: to, step } = range;
+    let refusal = || Refusal::Range {
+        name: name.into(),
+        value: Value::Double(value),
+        from: Value::Double(from),
+        to: Value::Double(to),
+        step: Value::Double(step),
+    };
+    if !(from..=to).contains(&value) {
+        return Err(refusal());
+    }
+    if step > 0.0 && value != to {
+        let steps = (value - from) / step;
+        // Steps are decimal fractions to people and binary ones here.
+        if (steps - steps.round()).abs() > 1e-6 {
+            return Err(refusal());
+        }
+    }
+    Ok(())
+}
+
+fn within_whole(name: &str, range: IntegerRange, value: i64) -> Result<(), Refusal> {
+    let IntegerRange { from_value: from, to_value: to, step } = range;
+    let on_step = step == 0 || value == to || value.abs_diff(from).is_multiple_of(step);
+    if (from..=to).contains(&value) && on_step {
+        return Ok(());
+    }
+    Err(Refusal::Range {
+        name: name.into(),
+        value: Value::Integer(value),
+        from: Value::Integer(from),
+        to: Value::Integer(to),
+        step: Value::Integer(i64::try_from(step).unwrap_or(i64::MAX)),
+    })
+}
+
+/// Why a parameter was not set or declared.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum Refusal {
+    #[error("parameter {name} has not been declared")]
+    Undeclared { name: String },
+    #[error("parameter {name} is declared already")]
+    Declared { name: String },
+    #[error("parameter {name} is read-only: give it at the start (-p {name}:=VALUE)")]
+    ReadOnly { name: String },
+    #[error("parameter {name} cannot be unset")]
+    Unset { name: String },
+    #[error("parameter {name} is a {expected}, {found} is a {}", found.kind_name())]
+    Type { name: String, expected: &'static str, found: Value },
+    #[error("parameter {name} must be a number")]
+    NotANumber { name: String },
+    #[error("parameter {name} = {value} is not within {from} to {to} (step {step}; 0: any)")]
+    Range { name: String, value: Value, from: Value, to: Value, step: Value },
+    #[error("parameter {name}: {reason}")]
+    Vetoed { name: String, reason: String },
+}
+
+/// A parameter that changed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Change {
+    pub name: String,
+    pub value: Value,
+}
+
+/// The parameters of a node, by name.
+#[derive(Default)]
+pub struct Store {
+    declared: BTreeMap<String, Declaration>,
+    changes: Vec<Change>,
+}
+
+impl Store {
+    /// Declares a parameter; `start` (from the command line or a file) stands in for its default and is
+    /// checked like any value, read-only parameters included.
+    ///
+    /// # Errors
+    /// A name declared twice, or a start value that is refused.
+    pub fn declare(&mut self, mut declaration: Declaration, start: Option<Value>) -> Result<(), Refusal> {
+        if self.declared.contains_key(&declaration.name) {
+            return Err(Refusal::Declared { name: declaration.name });
+        }
+        if let Some(start) = start {
+            declaration.value = declaration.admit(start)?;
+        }
+        self.declared.insert(declaration.name.clone(), declaration);
+        Ok(())
+    }
+
+    pub fn get(&self, name: &str) -> Option<&Value> {
+        self.declared.get(name).map(|declaration| &declaration.value)
+    }
+
+    /// Names and values, by name.
+    pub fn iter(&self) -> impl Iterator<Item = (&str, &Value)> {
+        self.declared.iter().map(|(name, declaration)| (name.as_str(), &declaration.value))
+    }
+
+    /// Sets one parameter.
+    ///
+    /// # Errors
+    /// The reason; the value is as before.
+    pub fn set(&mut self, name: &str, value: Option<Value>) -> Result<(), Refusal> {
+        let value = self.admit(name, value)?;
+        self.apply(name, value);
+        Ok(())
+    }
+
+    /// Sets all or none.
+    ///
+    /// # Errors
+    /// The first reason; every value is as before.
+    pub fn set_atomically(&mut self, settings: Vec<(String, Option<Value>)>) -> Result<(), Refusal> {
+        let admitted: Result<Vec<_>, _> = settings
+            .into_iter()
+            .map(|(name, value)| self.admit(&name, value).map(|value| (name, value)))
+            .collect();
+        for (name, value) in admitted? {
+            self.apply(&name, value);
+        }
+        Ok(())
+    }
+
+    fn admit(&self, name: &str, value: Option<Value>) -> Result<Value, Refusal> {
+        let declaration = self.declared.get(name).ok_or_else(|| Refusal::Undeclared { name: name.into() })?;
+        if declaration.read_only {
+            return Err(Refusal::ReadOnly { name: name.into() });
+        }
+        declaration.admit(value.ok_or_else(|| Refusal::Unset { name: name.into() })?)
+    }
+
+    fn apply(&mut self, name: &str, value: Value) {
+        if let Some(declaration) = self.declared.get_mut(name) {
+            declaration.value = value.clone();
+            self.changes.push(Change { name: name.into(), value });
+        }
+    }
+
+    /// What was set since last asked, in the order it was set.
+    pub fn take_changes(&mut self) -> Vec<Change> {
+        std::mem::take(&mut self.changes)
+    }
+
+    /// What is known of a parameter; type 0 where it is not declared.
+    pub fn descriptor(&self, name: &str) -> ParameterDescriptor {
+        self.declared.get(name).map_or_else(
+            || ParameterDescriptor { name: name.into(), ..Default::default() },
+            Declaration::descriptor,
+        )
+    }
+
+    /// Names below any of the prefixes (none: all), at most `depth` dots deep (0: any), and the groups
+    /// that they stand in.
+    pub fn list(&self, prefixes: &[String], depth: u64) -> (Vec<String>, Vec<String>) {
+        let shallow = |rest: &str| depth == 0 || (rest.matches('.').count() as u64) < depth;
+        let listed = |name: &str| {
+            let below = |prefix: &String| {
+                name == prefix
+                    || name
+                        .strip_prefix(prefix.as_str())
+                        .and_then(|rest| rest.strip_prefix('.'))
+                        .is_some_and(shallow)
+            };
+            if prefixes.is_empty() { shallow(name) } else { prefixes.iter().any(below) }
+        };
+        let names: Vec<String> = self.declared.keys().filter(|name| listed(name)).cloned().collect();
+        let mut groups: Vec<String> =
+            names.iter().filter_map(|name| name.rsplit_once('.')).map(|(group, _)| group.into()).collect();
+        groups.sort();
+        groups.dedup();
+        (names, groups)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn store() -> Store {
+        let mut store = Store::default();
+        let declarations = [
+            Declaration::new("rate", 50.0).describe("ticks per second [Hz]").range(1.0..=500.0),
+            Declaration::new("gains.p", 1.0).range(0.0..=2.0).step(0.1),
+            Declaration::new("gains.inner.d", 0.0),
+            Declaration::new("count", 4_i64).integer_range(0..=11, 4),
+            Declaration::new("frame", "map").checked("not empty", |_, value| {
+                if value.as_str() == Some("") { Err("must not be empty".into()) } else { Ok(()) }
+            }),
+            Declaration::new("use_sim_time", false).read_only(),
+        ];
+        for declaration in declarations {
+            store.declare(declaration, None).expect("declared once");
+        }
+        store
+    }
+
+    fn set(store: &mut Store, name: &str, value: impl Into<Value>) -> Result<(), Refusal> {
+        store.set(name, Some(value.into()))
+    }
+
+    #[test]
+    fn values_of_another_type_are_refused_and_whole_numbers_are_numbers() {
+        let mut store = store();
+        assert!(matches!(set(&mut store, "rate", "fast"), Err(Refusal::Type { .. })));
+        assert!(matches!(set(&mut store, "count", 4.0), Err(Refusal::Type { .. })));
+        assert_eq!(set(&mut store, "rate", 100_i64), Ok(()));
+        assert_eq!(store.get("rate"), Some(&Value::Double(100.0)));
+    }
+
+    #[test]
+    fn values_off_range_or_off_step_are_refused_and_leave_no_trace() {
+        let mut store = store();
+        for (name, value) in [
+            ("rate", Value::Double(0.5)),
+            ("rate", Value::Double(500.1)),
+            ("rate", Value::Double(f64::INFINITY)),
+            ("gains.p", Value::Double(0.15)),
+            ("count", Value::Integer(5)),
+            ("count", Value::Integer(12)),
+        ] {
+            assert!(
+                matches!(store.set(name, Some(value.clone())), Err(Refusal::Range { .. })),
+                "{name} {value}"
+            );
+        }
+        assert!(matches!(set(&mut store, "rate", f64::NAN), Err(Refusal::NotANumber { .. })));
+        assert_eq!(store.take_changes(), []);
+        assert_eq!(set(&mut store, "gains.p", 0.7), Ok(()));
+        assert_eq!(set(&mut store, "count", 8_i64), Ok(()));
+        assert_eq!(set(&mut store, "count", 11_i64), Ok(()), "the end is on every step");
+    }
+
+    #[test]
+    fn read_only_undeclared_unset_and_vetoed_are_refused_with_the_reason() {
+        let mut store = store();
+        assert!(matches!(set(&mut store, "use_sim_time", true), Err(Refusal::ReadOnly { .. })));
+        assert!(matches!(set(&mut store, "speed", 1.0), Err(Refusal::Undeclared { .. })));
+        assert!(matches!(store.set("rate", None), Err(Refusal::Unset { .. })));
+        let vetoed = set(&mut store, "frame", "").expect_err("vetoed");
+        assert_eq!(vetoed.to_string(), "parameter frame: must not be empty");
+    }
+
+    #[test]
+    fn all_or_none_are_set_atomically() {
+        let mut store = store();
+        let both = |rate: f64| {
+            vec![("count".into(), Some(Value::Integer(0))), ("rate".into(), Some(Value::Double(rate)))]
+        };
+        assert!(store.set_atomically(both(0.0)).is_err());
+        assert_eq!(store.get("count"), Some(&Value::Integer(4)));
+        assert_eq!(store.set_atomically(both(2.0)), Ok(()));
+        assert_eq!(store.get("count"), Some(&Value::Integer(0)));
+        assert_eq!(store.take_changes().len(), 2);
+        assert_eq!(store.take_changes().len(), 0);
+    }
+
+    #[test]
+    fn start_values_are_checked_and_may_set_what_is_read_only() {
+        let mut store = Store::default();
+        let rate = || Declaration::new("rate", 50.0).range(1.0..=500.0).read_only();
+        assert!(store.declare(rate(), Some(Value::Double(0.0))).is_err());
+        assert_eq!(store.declare(rate(), Some(Value::Integer(5))), Ok(()));
+        assert_eq!(store.get("rate"), Some(&Value::Double(5.0)));
+        assert_eq!(store.take_changes(), []);
+        assert_eq!(store.declare(rate(), None), Err(Refusal::Declared { name: "rate".into() }));
+    }
+
+    #[test]
+    fn lists_go_by_prefix_and_depth() {
+        let store = store();
+        let names = |prefixes: &[&str], depth| {
+            let prefixes: Vec<String> = prefixes.iter().map(|&prefix| prefix.into()).collect();
+            store.list(&prefixes, depth).0
+        };
+        assert_eq!(names(&[], 0).len(), 6);
+        assert_eq!(names(&[], 1), ["count", "frame", "rate", "use_sim_time"]);
+        assert_eq!(names(&["gains"], 1), ["gains.p"]);
+        assert_eq!(names(&["gains"], 0), ["gains.inner.d", "gains.p"]);
+        assert_eq!(names(&["gain"], 0), [""; 0]);
+        assert_eq!(store.list(&[], 0).1, ["gains", "gains.inner"]);
+    }
+
+    #[test]
+    fn a_descriptor_says_all_that_was_declared() {
+        let descriptor = store().descriptor("gains.p");
+        assert_eq!(descriptor.kind, 3);
+        let range = FloatingPointRange { from_value: 0.0, to_value: 2.0, step: 0.1 };
+        assert_eq!(descriptor.floating_point_range, [range]);
+        assert_eq!(store().descriptor("count").integer_range.len(), 1);
+        assert!(store().descriptor("use_sim_time").read_only);
+        assert_eq!(store().descriptor("frame").additional_constraints, "not empty");
+        assert_eq!(store().descriptor("none").kind, 0);
+    }
+}

@@ -1,0 +1,239 @@
+//! The participant of a process, and the nodes in it.
+
+use std::net::IpAddr;
+use std::sync::Arc;
+use std::sync::mpsc::channel;
+use std::time::Duration;
+
+use ros2_client::NodeName;
+use ros2_client::builtin_topics::ros_discovery;
+use ros2_client::dds::rustdds::no_key::{DataWriter, SimpleDataReader};
+use ros2_client::dds::rustdds::{
+    DomainParticipant, DomainParticipantBuilder, GUID, Publisher as DdsPublisher, QosPolicies,
+    QosPolicyBuilder, RTPSEntity, Subscriber as DdsSubscriber, Topic, TopicKind,
+};
+
+use super::graph::{Graph, Watcher};
+use super::wire::{Payload, Verbatim};
+use super::{EdgeError, Message, Publisher, Quality, Service, ServiceType, Subscription, names};
+
+/// Where to take part.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Options {
+    /// `ROS_DOMAIN_ID`, 0 to 232. Default 0.
+    pub domain: u16,
+    /// Peers on this computer only. Default false.
+    pub loopback_only: bool,
+}
+
+#[expect(clippy::derivable_impls, reason = "defaults stand in one place, each with its meaning")]
+impl Default for Options {
+    fn default() -> Self {
+        Self { domain: 0, loopback_only: false }
+    }
+}
+
+pub(super) type Reader = SimpleDataReader<Payload, Verbatim>;
+pub(super) type Writer = DataWriter<Payload, Verbatim>;
+
+/// One DDS participant. Clones share it; it leaves the network when the last clone, node and endpoint
+/// made from it is gone.
+#[derive(Clone)]
+pub struct Edge {
+    shared: Arc<Shared>,
+}
+
+/// How long leaving the network may take \[s\].
+const LEAVING: Duration = Duration::from_secs(3);
+
+pub(super) struct Shared {
+    // Fields drop in this order: the watcher holds the participant too.
+    watcher: Option<Watcher>,
+    publisher: DdsPublisher,
+    subscriber: DdsSubscriber,
+    participant: Option<DomainParticipant>,
+    guid: GUID,
+    pub graph: Arc<Graph>,
+}
+
+impl Edge {
+    /// Joins a domain.
+    ///
+    /// # Errors
+    /// A domain out of range, or a computer that gives no sockets.
+    pub fn open(options: Options) -> Result<Self, EdgeError> {
+        let domain = options.domain;
+        if domain > 232 {
+            return Err(EdgeError::Domain { domain });
+        }
+        super::loopback::warn_without_multicast();
+        let mut builder = DomainParticipantBuilder::new(domain);
+        if options.loopback_only {
+            builder = builder.with_only_networks([IpAddr::from([127, 0, 0, 1])]);
+        }
+        let refused = |reason: String| EdgeError::Participant { domain, reason };
+        let participant = builder.build().map_err(|error| refused(error.to_string()))?;
+        let shared = Shared::join(participant).map_err(|error| refused(error.to_string()))?;
+        Ok(Self { shared: Arc::new(shared) })
+    }
+
+    /// A node of this participant.
+    ///
+    /// # Errors
+    /// A namespace that is not `/` or a fully qualified name, or a name with other characters than
+    /// letters, digits and underscores.
+    pub fn node(&self, namespace: &str, name: &str) -> Result<Node, EdgeError> {
+        let qualified = if namespace == "/" { format!("/{name}") } else { format!("{namespace}/{name}") };
+        names::check("node", &qualified)?;
+        let reserved =
+            |_| EdgeError::Name { kind: "node", name: qualified.clone(), reason: "not a node name" };
+        let parsed = NodeName::new(namespace, name).map_err(reserved)?;
+        self.shared.graph.add_node(parsed);
+        Ok(Node { shared: self.shared.clone(), name: qualified })
+    }
+}
+
+impl Shared {
+    fn join(participant: DomainParticipant) -> Result<Self, Box<dyn std::error::Error>> {
+        let plain = QosPolicyBuilder::new().build();
+        let publisher = participant.create_publisher(&plain)?;
+        let subscriber = participant.create_subscriber(&plain)?;
+        let announcements = participant.create_topic(
+            ros_discovery::TOPIC_NAME.into(),
+            ros_discovery::TYPE_NAME.into(),
+            &ros_discovery::QOS_PUB,
+            TopicKind::NoKey,
+        )?;
+        let writer = publisher.create_datawriter_no_key_cdr(&announcements, None)?;
+        let graph = Arc::new(Graph::default());
+        let guid = participant.guid();
+        let watcher = Watcher::start(graph.clone(), &participant, guid, writer)?;
+        Ok(Self {
+            watcher: Some(watcher),
+            publisher,
+            subscriber,
+            participant: Some(participant),
+            guid,
+            graph,
+        })
+    }
+
+    /// GUID of the participant.
+    pub fn guid(&self) -> GUID {
+        self.guid
+    }
+
+    fn topic(&self, name: &str, kind: &str, policies: &QosPolicies) -> Result<Topic, EdgeError> {
+        let refused = |reason: String| EdgeError::Endpoint { topic: name.to_owned(), reason };
+        let participant = self.participant.as_ref().ok_or_else(|| refused("the edge is closed".into()))?;
+        participant
+            .create_topic(name.to_owned(), kind.to_owned(), policies, TopicKind::NoKey)
+            .map_err(|error| refused(error.to_string()))
+    }
+
+    fn reader(&self, topic: &str, kind: &str, quality: Quality) -> Result<Reader, EdgeError> {
+        let policies = quality.policies();
+        let dds = self.topic(topic, kind, &policies)?;
+        self.subscriber
+            .create_simple_datareader_no_key(&dds, Some(policies))
+            .map_err(|error| EdgeError::Endpoint { topic: topic.to_owned(), reason: error.to_string() })
+    }
+
+    fn writer(&self, topic: &str, kind: &str, quality: Quality) -> Result<Writer, EdgeError> {
+        let policies = quality.policies();
+        let dds = self.topic(topic, kind, &policies)?;
+        self.publisher
+            .create_datawriter_no_key(&dds, Some(policies))
+            .map_err(|error| EdgeError::Endpoint { topic: topic.to_owned(), reason: error.to_string() })
+    }
+}
+
+impl Drop for Shared {
+    fn drop(&mut self) {
+        self.watcher.take();
+        let (done, finished) = channel();
+        let participant = self.participant.take();
+        // RustDDS joins its threads without a limit; ours is not kept by a thread of its that hangs.
+        let left = std::thread::Builder::new().name("ros leave".into()).spawn(move || {
+            drop(participant);
+            let _ = done.send(());
+        });
+        if left.is_err() || finished.recv_timeout(LEAVING).is_err() {
+            tracing::warn!("the DDS participant did not leave within {} s", LEAVING.as_secs());
+        }
+    }
+}
+
+/// A ROS 2 node: a name under which endpoints are announced.
+pub struct Node {
+    shared: Arc<Shared>,
+    name: String,
+}
+
+impl Node {
+    /// Fully qualified name, e.g. `/swarm/flockform`.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Fully qualified name of a private name: `~/leaf`.
+    pub fn private(&self, leaf: &str) -> String {
+        format!("{}/{leaf}", self.name)
+    }
+
+    /// Another node of the same participant: see [`Edge::node`]. The two do not hear each other for certain:
+    /// RustDDS carries even what stays in the process over the network's multicast.
+    pub fn another_node(&self, namespace: &str, name: &str) -> Result<Node, EdgeError> {
+        Edge { shared: self.shared.clone() }.node(namespace, name)
+    }
+
+    /// A publisher on a fully qualified topic.
+    ///
+    /// # Errors
+    /// A bad name, or an endpoint that RustDDS refuses (the same topic with another type).
+    pub fn publisher<M: Message>(&self, topic: &str, quality: Quality) -> Result<Publisher<M>, EdgeError> {
+        names::check("topic", topic)?;
+        let kind = names::dds_message(M::PACKAGE, M::NAME);
+        let writer = self.shared.writer(&names::dds_topic(topic), &kind, quality)?;
+        self.shared.graph.add_writer(&self.name, writer.guid(), topic);
+        Ok(Publisher::new(topic.to_owned(), writer, self.shared.clone()))
+    }
+
+    /// A subscription on a fully qualified topic.
+    ///
+    /// # Errors
+    /// As [`Node::publisher`].
+    pub fn subscription<M: Message>(
+        &self,
+        topic: &str,
+        quality: Quality,
+    ) -> Result<Subscription<M>, EdgeError> {
+        names::check("topic", topic)?;
+        let kind = names::dds_message(M::PACKAGE, M::NAME);
+        let reader = self.shared.reader(&names::dds_topic(topic), &kind, quality)?;
+        self.shared.graph.add_reader(&self.name, reader.guid(), topic);
+        Ok(Subscription::new(topic.to_owned(), reader, self.shared.clone()))
+    }
+
+    /// A service under a fully qualified name.
+    ///
+    /// # Errors
+    /// As [`Node::publisher`].
+    pub fn service<S: ServiceType>(&self, name: &str) -> Result<Service<S>, EdgeError> {
+        names::check("service", name)?;
+        let [requests, replies] = names::dds_service(name);
+        let [request, response] = names::dds_service_types(S::PACKAGE, S::NAME);
+        // Replies first: a client that sees the requests' reader may ask at once.
+        let writer = self.shared.writer(&replies, &response, Service::<S>::QUALITY)?;
+        let reader = self.shared.reader(&requests, &request, Service::<S>::QUALITY)?;
+        self.shared.graph.add_writer(&self.name, writer.guid(), name);
+        self.shared.graph.add_reader(&self.name, reader.guid(), name);
+        Ok(Service::new(name.to_owned(), reader, writer, self.shared.clone()))
+    }
+}
+
+impl Drop for Node {
+    fn drop(&mut self) {
+        self.shared.graph.remove_node(&self.name);
+    }
+}

@@ -1,0 +1,202 @@
+//! Package `rcl_interfaces`: parameters.
+
+use serde::{Deserialize, Serialize};
+
+use super::Time;
+use crate::ros::edge::{Message, ServiceType};
+
+/// `msg/ParameterValue`: the field that `kind` names counts.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ParameterValue {
+    /// `msg/ParameterType`: 0 not set, 1 bool, 2 integer, 3 double, 4 string, 5 to 9 arrays of byte, bool,
+    /// integer, double, string.
+    pub kind: u8,
+    pub bool_value: bool,
+    pub integer_value: i64,
+    pub double_value: f64,
+    pub string_value: String,
+    pub byte_array_value: Vec<u8>,
+    pub bool_array_value: Vec<bool>,
+    pub integer_array_value: Vec<i64>,
+    pub double_array_value: Vec<f64>,
+    pub string_array_value: Vec<String>,
+}
+
+/// `msg/Parameter`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Parameter {
+    pub name: String,
+    pub value: ParameterValue,
+}
+
+/// `msg/SetParametersResult`.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SetParametersResult {
+    pub successful: bool,
+    pub reason: String,
+}
+
+/// `msg/FloatingPointRange`: both ends included; a step of 0 allows every value between.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct FloatingPointRange {
+    pub from_value: f64,
+    pub to_value: f64,
+    pub step: f64,
+}
+
+/// `msg/IntegerRange`: both ends included; a step of 0 allows every value between.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct IntegerRange {
+    pub from_value: i64,
+    pub to_value: i64,
+    pub step: u64,
+}
+
+/// `msg/ParameterDescriptor`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ParameterDescriptor {
+    pub name: String,
+    pub kind: u8,
+    pub description: String,
+    pub additional_constraints: String,
+    pub read_only: bool,
+    pub dynamic_typing: bool,
+    /// None or one.
+    pub floating_point_range: Vec<FloatingPointRange>,
+    /// None or one.
+    pub integer_range: Vec<IntegerRange>,
+}
+
+/// `msg/ParameterEvent`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ParameterEvent {
+    pub stamp: Time,
+    /// Fully qualified name.
+    pub node: String,
+    pub new_parameters: Vec<Parameter>,
+    pub changed_parameters: Vec<Parameter>,
+    pub deleted_parameters: Vec<Parameter>,
+}
+
+impl Message for ParameterEvent {
+    const PACKAGE: &str = "rcl_interfaces";
+    const NAME: &str = "ParameterEvent";
+}
+
+/// Request of [`GetParameters`], [`GetParameterTypes`] and [`DescribeParameters`].
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Names {
+    pub names: Vec<String>,
+}
+
+/// `srv/GetParameters`.
+pub struct GetParameters;
+
+/// Response of [`GetParameters`], one value per name.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct GetParametersResponse {
+    pub values: Vec<ParameterValue>,
+}
+
+impl ServiceType for GetParameters {
+    const PACKAGE: &str = "rcl_interfaces";
+    const NAME: &str = "GetParameters";
+    type Request = Names;
+    type Response = GetParametersResponse;
+}
+
+/// `srv/GetParameterTypes`.
+pub struct GetParameterTypes;
+
+/// Response of [`GetParameterTypes`], one type per name.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct GetParameterTypesResponse {
+    pub types: Vec<u8>,
+}
+
+impl ServiceType for GetParameterTypes {
+    const PACKAGE: &str = "rcl_interfaces";
+    const NAME: &str = "GetParameterTypes";
+    type Request = Names;
+    type Response = GetParameterTypesResponse;
+}
+
+/// `srv/DescribeParameters`.
+pub struct DescribeParameters;
+
+/// Response of [`DescribeParameters`], one descriptor per name.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct DescribeParametersResponse {
+    pub descriptors: Vec<ParameterDescriptor>,
+}
+
+impl ServiceType for DescribeParameters {
+    const PACKAGE: &str = "rcl_interfaces";
+    const NAME: &str = "DescribeParameters";
+    type Request = Names;
+    type Response = DescribeParametersResponse;
+}
+
+/// `srv/ListParameters`.
+pub struct ListParameters;
+
+/// Request of [`ListParameters`].
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ListParametersRequest {
+    /// Groups to list; none: all.
+    pub prefixes: Vec<String>,
+    /// How many dots deep below a prefix \[1\]; 0: all.
+    pub depth: u64,
+}
+
+/// Response of [`ListParameters`]: `msg/ListParametersResult`.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ListParametersResponse {
+    pub names: Vec<String>,
+    pub prefixes: Vec<String>,
+}
+
+impl ServiceType for ListParameters {
+    const PACKAGE: &str = "rcl_interfaces";
+    const NAME: &str = "ListParameters";
+    type Request = ListParametersRequest;
+    type Response = ListParametersResponse;
+}
+
+/// Request of [`SetParameters`] and [`SetParametersAtomically`].
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Settings {
+    pub parameters: Vec<Parameter>,
+}
+
+/// `srv/SetParameters`.
+pub struct SetParameters;
+
+/// Response of [`SetParameters`], one result per setting.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SetParametersResponse {
+    pub results: Vec<SetParametersResult>,
+}
+
+impl ServiceType for SetParameters {
+    const PACKAGE: &str = "rcl_interfaces";
+    const NAME: &str = "SetParameters";
+    type Request = Settings;
+    type Response = SetParametersResponse;
+}
+
+/// `srv/SetParametersAtomically`.
+pub struct SetParametersAtomically;
+
+/// Response of [`SetParametersAtomically`].
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SetParametersAtomicallyResponse {
+    pub result: SetParametersResult,
+}
+
+impl ServiceType for SetParametersAtomically {
+    const PACKAGE: &str = "rcl_interfaces";
+    const NAME: &str = "SetParametersAtomically";
+    type Request = Settings;
+    type Response = SetParametersAtomicallyResponse;
+}

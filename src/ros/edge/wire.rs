@@ -1,0 +1,123 @@
+//! Payloads as they arrive, and the CDR encoding.
+//!
+//! Endpoints hand over bytes, and decoding happens here: a service must look at a request before it knows
+//! how to read it, and any bytes at all must end in a value or an error.
+
+use std::convert::Infallible;
+
+use ros2_client::dds::rustdds::RepresentationIdentifier;
+use ros2_client::dds::rustdds::bytes::Bytes;
+use ros2_client::dds::rustdds::no_key::{Decode, DefaultDecoder, DeserializerAdapter, SerializerAdapter};
+use ros2_client::dds::rustdds::serialization::{deserialize_from_cdr_with_rep_id, to_writer_with_rep_id};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+/// Byte order of a payload.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Order {
+    Little,
+    Big,
+}
+
+impl Order {
+    fn identifier(self) -> RepresentationIdentifier {
+        match self {
+            Order::Little => RepresentationIdentifier::CDR_LE,
+            Order::Big => RepresentationIdentifier::CDR_BE,
+        }
+    }
+}
+
+/// Bytes that are no value of the type asked for.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{length} bytes are no {kind}: {reason}")]
+pub struct BadPayload {
+    pub kind: &'static str,
+    pub length: usize,
+    pub reason: String,
+}
+
+/// Reads a value from a payload (without its four byte encapsulation header). Bytes after the value are
+/// padding and ignored.
+///
+/// # Errors
+/// Whatever the bytes are, a value or [`BadPayload`].
+pub fn decode<T: DeserializeOwned>(bytes: &[u8], order: Order) -> Result<T, BadPayload> {
+    deserialize_from_cdr_with_rep_id::<T>(bytes, order.identifier()).map(|(value, _)| value).map_err(
+        |error| BadPayload {
+            kind: std::any::type_name::<T>(),
+            length: bytes.len(),
+            reason: error.to_string(),
+        },
+    )
+}
+
+/// Appends a value in little endian CDR, aligned to the beginning of `value` itself.
+///
+/// # Errors
+/// Types that CDR cannot express: sequences of unknown length, maps.
+pub fn encode<T: Serialize>(value: &T, into: &mut Vec<u8>) -> Result<(), String> {
+    to_writer_with_rep_id(into, value, RepresentationIdentifier::CDR_LE).map_err(|error| error.to_string())
+}
+
+/// One sample's bytes.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Payload {
+    pub order: Order,
+    pub bytes: Vec<u8>,
+}
+
+impl Payload {
+    /// A value, ready to be sent.
+    pub fn of<T: Serialize>(value: &T) -> Result<Self, String> {
+        let mut bytes = Vec::with_capacity(2 * size_of::<T>());
+        encode(value, &mut bytes)?;
+        Ok(Self { order: Order::Little, bytes })
+    }
+}
+
+/// Lets RustDDS read and write [`Payload`]s.
+pub(super) struct Verbatim;
+
+impl DeserializerAdapter<Payload> for Verbatim {
+    type Error = Infallible;
+    type Decoded = Payload;
+
+    fn supported_encodings() -> &'static [RepresentationIdentifier] {
+        &[RepresentationIdentifier::CDR_LE, RepresentationIdentifier::CDR_BE]
+    }
+
+    fn transform_decoded(decoded: Payload) -> Payload {
+        decoded
+    }
+}
+
+impl DefaultDecoder<Payload> for Verbatim {
+    type Decoder = Copied;
+    const DECODER: Copied = Copied;
+}
+
+/// Copies the bytes out of RustDDS's cache.
+#[derive(Clone)]
+pub(super) struct Copied;
+
+impl Decode<'_, Payload> for Copied {
+    type Error = Infallible;
+
+    fn decode_bytes(self, bytes: &[u8], encoding: RepresentationIdentifier) -> Result<Payload, Infallible> {
+        let order = if encoding == RepresentationIdentifier::CDR_BE { Order::Big } else { Order::Little };
+        Ok(Payload { order, bytes: bytes.to_vec() })
+    }
+}
+
+impl SerializerAdapter<Payload> for Verbatim {
+    type Error = Infallible;
+
+    fn output_encoding() -> RepresentationIdentifier {
+        RepresentationIdentifier::CDR_LE
+    }
+
+    fn to_bytes(value: &Payload) -> Result<Bytes, Infallible> {
+        Ok(Bytes::copy_from_slice(&value.bytes))
+    }
+}

@@ -1,0 +1,122 @@
+//! What RViz and Foxglove draw: members by role, links by strain, targets, obstacles.
+
+use crate::flock::points::distance;
+use crate::ros::messages::builtin_interfaces::Duration;
+use crate::ros::messages::geometry_msgs::{Point, Pose, Vector3};
+use crate::ros::messages::std_msgs::{ColorRGBA, Header};
+use crate::ros::messages::visualization_msgs::{Marker, MarkerArray};
+use crate::scene::swarm::raw::{RawObstacle, RawSwarm};
+use crate::swarm::control::Control;
+
+/// Markers that are not renewed vanish after this long \[s\].
+const LIFETIME: f64 = 2.0;
+/// Strain at which a link has its full colour \[1\].
+const FULL_STRAIN: f64 = 0.3;
+/// Height of what stands on the plane \[m\].
+const HEIGHT: f64 = 0.1;
+
+const LEADER: ColorRGBA = colour(0.91, 0.13, 0.11, 1.0);
+const FOLLOWER: ColorRGBA = colour(0.13, 0.38, 0.75, 1.0);
+const LOST: ColorRGBA = colour(0.6, 0.63, 0.65, 0.6);
+const TARGET: ColorRGBA = colour(0.0, 0.62, 0.45, 0.8);
+const OBSTACLE: ColorRGBA = colour(0.42, 0.44, 0.47, 1.0);
+
+const fn colour(r: f32, g: f32, b: f32, a: f32) -> ColorRGBA {
+    ColorRGBA { r, g, b, a }
+}
+
+pub fn message(control: &Control, raw: &RawSwarm, header: &Header) -> MarkerArray {
+    let mut markers = vec![links(control, header), targets(control, header)];
+    markers.extend((0..control.formation().count()).filter_map(|m| member(control, m, header)));
+    markers.extend(raw.obstacles.iter().enumerate().map(|(k, one)| obstacle(one, k, header)));
+    markers.extend(raw.limits.geofence.as_ref().map(|fence| outline("fence", 0, fence, header)));
+    MarkerArray { markers }
+}
+
+fn marker(header: &Header, ns: &str, id: usize, kind: i32) -> Marker {
+    Marker {
+        header: header.clone(),
+        ns: ns.into(),
+        id: id as i32,
+        r#type: kind,
+        lifetime: Duration::from_seconds(LIFETIME),
+        ..Marker::default()
+    }
+}
+
+fn point([x, y]: [f64; 2]) -> Point {
+    Point { x, y, z: 0.0 }
+}
+
+fn member(control: &Control, m: usize, header: &Header) -> Option<Marker> {
+    let formation = control.formation();
+    let place = control.position(m)?;
+    let width = 2.0 * formation.radii[m];
+    Some(Marker {
+        pose: Pose::planar(place, control.yaw(m).unwrap_or(0.0)),
+        scale: Vector3 { x: width, y: width, z: HEIGHT },
+        color: match (control.health(m).is_usable(), formation.leads(m)) {
+            (false, _) => LOST,
+            (true, true) => LEADER,
+            (true, false) => FOLLOWER,
+        },
+        text: formation.names[m].clone(),
+        ..marker(header, "members", m, Marker::CYLINDER)
+    })
+}
+
+/// Every link once, blue where it is too short, red where it is too long.
+fn links(control: &Control, header: &Header) -> Marker {
+    let formation = control.formation();
+    let mut marker = Marker {
+        scale: Vector3 { x: 0.03, y: 0.0, z: 0.0 },
+        color: LOST,
+        ..marker(header, "links", 0, Marker::LINE_LIST)
+    };
+    for m in 0..formation.count() {
+        for k in formation.neighbours(m).filter(|&k| k > m || !formation.neighbours(k).any(|back| back == m))
+        {
+            let (Some(a), Some(b)) = (control.position(m), control.position(k)) else { continue };
+            let rest = distance(formation.places.get(m), formation.places.get(k));
+            let part = ((distance(a, b) / rest - 1.0) / FULL_STRAIN).clamp(-1.0, 1.0) as f32;
+            let colour = match part {
+                part if part >= 0.0 => colour(0.6 + 0.3 * part, 0.6 * (1.0 - part), 0.6 * (1.0 - part), 0.9),
+                part => colour(0.6 * (1.0 + part), 0.6 * (1.0 + part), 0.6 - 0.3 * part, 0.9),
+            };
+            marker.points.extend([point(a), point(b)]);
+            marker.colors.extend([colour, colour]);
+        }
+    }
+    marker
+}
+
+fn targets(control: &Control, header: &Header) -> Marker {
+    let size = control.formation().radii.iter().copied().fold(f64::INFINITY, f64::min);
+    Marker {
+        scale: Vector3 { x: size, y: size, z: size },
+        color: TARGET,
+        points: (0..control.formation().count()).filter_map(|m| control.target(m)).map(point).collect(),
+        ..marker(header, "targets", 0, Marker::SPHERE_LIST)
+    }
+}
+
+fn obstacle(obstacle: &RawObstacle, id: usize, header: &Header) -> Marker {
+    match obstacle {
+        RawObstacle::Disc { centre, radius } => Marker {
+            pose: Pose::planar(*centre, 0.0),
+            scale: Vector3 { x: 2.0 * radius, y: 2.0 * radius, z: HEIGHT },
+            color: OBSTACLE,
+            ..marker(header, "obstacles", id, Marker::CYLINDER)
+        },
+        RawObstacle::Polygon { vertices } => outline("obstacles", id, vertices, header),
+    }
+}
+
+fn outline(ns: &str, id: usize, corners: &[[f64; 2]], header: &Header) -> Marker {
+    Marker {
+        scale: Vector3 { x: 0.05, y: 0.0, z: 0.0 },
+        color: OBSTACLE,
+        points: corners.iter().chain(corners.first()).copied().map(point).collect(),
+        ..marker(header, ns, id, Marker::LINE_STRIP)
+    }
+}

@@ -1,0 +1,368 @@
+//! `flockform node`: the control loop over ROS 2.
+//!
+//! One thread ticks at a steady rate: it takes what arrived, calls [`Control::tick`] and publishes. Everything it
+//! holds is polled; a peer that is slow, gone or wrong cannot hold it up.
+
+mod diagnostics;
+mod drive;
+mod markers;
+mod pose;
+mod settings;
+mod state;
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+use super::arguments::{DiscoveryRange, NameError, RosArguments};
+use super::edge::clock::{Clock, system_time};
+use super::edge::lifecycle::{Goal, Lifecycle, Outcome};
+use super::edge::parameters::{Parameters, Refusal};
+use super::edge::services::std_srvs;
+use super::edge::steady::Pace;
+use super::edge::{Edge, EdgeError, Node, Options, Publisher, Quality, Service, ServiceType, Subscription};
+use super::messages::builtin_interfaces::Time;
+use super::messages::diagnostic_msgs::DiagnosticArray;
+use super::messages::flockform_msgs::{FormationState, SetFormationRequest, SetFormationResponse};
+use super::messages::geometry_msgs::{Pose, PoseStamped};
+use super::messages::std_msgs::Header;
+use super::messages::visualization_msgs::MarkerArray;
+use crate::flock::manoeuvre::{Leg, Manoeuvre, Posture};
+use crate::scene::SceneError;
+use crate::scene::swarm::Swarm;
+use crate::swarm::control::Control;
+use diagnostics::Statistics;
+use drive::Drive;
+use pose::PoseSource;
+use settings::Settings;
+
+/// Name of the node unless `__node` says otherwise.
+pub const NAME: &str = "flockform";
+
+/// Why there is no node.
+#[derive(Debug, thiserror::Error)]
+pub enum NodeError {
+    #[error("{0}")]
+    Swarm(#[from] SceneError),
+    #[error("{0}")]
+    Edge(#[from] EdgeError),
+    #[error("{0}")]
+    Name(#[from] NameError),
+    #[error("parameter {0}")]
+    Parameter(#[from] Refusal),
+    #[error("--member {name}: there is no such robot\n  help: they are called `{first}` to `{last}`")]
+    Member { name: String, first: String, last: String },
+    #[error("--member {name}: {why}\n  help: run one node for all, without --member")]
+    NotAlone { name: String, why: &'static str },
+}
+
+/// The service that moves the leaders.
+struct SetFormation;
+
+impl ServiceType for SetFormation {
+    const PACKAGE: &str = "flockform_msgs";
+    const NAME: &str = "SetFormation";
+    type Request = SetFormationRequest;
+    type Response = SetFormationResponse;
+}
+
+/// A formation's node.
+pub struct FormationNode {
+    clock: Clock,
+    pace: Pace,
+    control: Control,
+    settings: Settings,
+    parameters: Parameters,
+    lifecycle: Lifecycle,
+    stop: Service<std_srvs::Trigger>,
+    resume: Service<std_srvs::Trigger>,
+    set_formation: Service<SetFormation>,
+    poses: PoseSource,
+    leaders: Vec<(usize, Subscription<PoseStamped>)>,
+    targets: Vec<(usize, Publisher<PoseStamped>)>,
+    drives: Vec<(usize, Drive)>,
+    state: Publisher<FormationState>,
+    markers: Option<Publisher<MarkerArray>>,
+    diagnostics: Publisher<DiagnosticArray>,
+    statistics: Statistics,
+    frame_id: String,
+    swarm: Swarm,
+    // Dropped after all that was made from it.
+    _node: Node,
+}
+
+impl FormationNode {
+    /// Takes part in the network: for all members, or for one that hears none but itself and its neighbours.
+    ///
+    /// # Errors
+    /// What in the swarm file, the ROS arguments or the network stands in the way.
+    pub fn open(swarm: &Swarm, arguments: &RosArguments, member: Option<&str>) -> Result<Self, NodeError> {
+        let mut control = Control::new(swarm)?;
+        let member = member.map(|name| only(swarm, &control, name)).transpose()?;
+        let namespace = member.map_or("/".into(), |m| format!("/{}", control.formation().names[m]));
+        let names = arguments.names(NAME, &namespace)?;
+        let edge = Edge::open(options(arguments))?;
+        let node = edge.node(names.namespace(), names.node_name())?;
+
+        let (mut settings, store) = settings::declare(&control, arguments, &names.fully_qualified())?;
+        let mut pace = Pace::new(settings.rate);
+        settings.apply_all(&store, &mut control, &mut pace);
+        let clock = if settings.use_sim_time { Clock::simulated(&node)? } else { Clock::system() };
+        let mine: Vec<usize> = match member {
+            Some(m) => vec![m],
+            None => (0..control.formation().count()).collect(),
+        };
+        let heard: Vec<usize> = match member {
+            Some(m) => {
+                let mut heard = control.formation().depends_on(m);
+                heard.push(m);
+                heard.sort_unstable();
+                heard
+            }
+            None => mine.clone(),
+        };
+        let raw = &swarm.raw.node;
+        let topic = |pattern: &str, m: usize| {
+            names.topic(&pattern.replace("{name}", &control.formation().names[m])).map_err(NodeError::from)
+        };
+        let mut leaders = Vec::new();
+        for m in control.formation().told().filter(|m| mine.contains(m)) {
+            let topic = topic("/{name}/leader_pose", m)?;
+            leaders.push((m, node.subscription(&topic, Quality::BEST_EFFORT)?));
+        }
+        let mut targets = Vec::new();
+        let mut drives = Vec::new();
+        for &m in &mine {
+            targets.push((m, node.publisher(&topic(&raw.target_topic, m)?, Quality::reliable(1))?));
+            if let Some(kind) = raw.velocity {
+                let topic = topic(&raw.velocity_topic, m)?;
+                drives.push((m, Drive::open(&node, &topic, kind, &swarm.raw)?));
+            }
+        }
+        let private = |leaf: &str| names.topic(&format!("~/{leaf}")).map_err(NodeError::from);
+        let service = |leaf: &str| names.service(&format!("~/{leaf}")).map_err(NodeError::from);
+        let mut this = Self {
+            poses: PoseSource::open(&node, &swarm.raw.node, &heard, &topic)?,
+            pace,
+            parameters: Parameters::new(&node, store)?,
+            lifecycle: Lifecycle::new(&node)?,
+            stop: node.service(&service("emergency_stop")?)?,
+            resume: node.service(&service("resume")?)?,
+            set_formation: node.service(&service("set_formation")?)?,
+            state: node.publisher(&private("state")?, Quality::reliable(5))?,
+            markers: raw
+                .markers
+                .then(|| private("markers"))
+                .transpose()?
+                .map(|topic| node.publisher(&topic, Quality::reliable(1)))
+                .transpose()?,
+            diagnostics: node.publisher(&names.topic("/diagnostics")?, Quality::reliable(5))?,
+            statistics: Statistics::default(),
+            frame_id: raw.frame_id.clone(),
+            swarm: swarm.clone(),
+            leaders,
+            targets,
+            drives,
+            clock,
+            settings,
+            control,
+            _node: node,
+        };
+        this.control.set_active(false);
+        if this.settings.autostart {
+            let now = this.clock.now().unwrap_or_else(system_time);
+            let control = &mut this.control;
+            this.lifecycle.autostart(now, &mut |goal| act(control, goal));
+        }
+        Ok(this)
+    }
+
+    /// Ticks until `stop` is set.
+    pub fn run(&mut self, stop: &AtomicBool) {
+        while !stop.load(Ordering::Relaxed) {
+            let missed = self.pace.wait();
+            self.statistics.missed += missed;
+            self.tick();
+        }
+        let now = self.clock.now().unwrap_or_else(system_time);
+        let control = &mut self.control;
+        self.lifecycle.shut_down(now, &mut |goal| act(control, goal));
+    }
+
+    pub fn control(&self) -> &Control {
+        &self.control
+    }
+
+    /// One period: what arrived, the targets, what is published.
+    pub fn tick(&mut self) {
+        let begun = Instant::now();
+        if let Some(jump) = self.clock.poll() {
+            tracing::warn!("time went back by {jump} s: waiting for poses of the new time");
+        }
+        let stamp = self.clock.now().unwrap_or_else(system_time);
+        self.answer(stamp);
+        // Without a clock there is no age, and so nobody to be believed.
+        let Some(now) = self.clock.now() else { return };
+        self.hear(now);
+        self.control.tick(now);
+        self.publish(now);
+        self.statistics.tick(begun.elapsed().as_secs_f64());
+        self.report(now);
+    }
+
+    fn answer(&mut self, now: f64) {
+        let control = &mut self.control;
+        self.lifecycle.poll(now, &mut |goal| act(control, goal));
+        for change in self.parameters.poll(now) {
+            self.settings.apply(&change, &mut self.control, &mut self.pace);
+        }
+        let outcome = |success, message: &str| std_srvs::Outcome { success, message: message.into() };
+        let control = &mut self.control;
+        self.stop.serve(|_| {
+            control.emergency_stop();
+            outcome(true, "everybody holds its place until ~/resume")
+        });
+        self.resume.serve(|_| match control.resume() {
+            true => outcome(true, "the formation goes on"),
+            false => outcome(false, "there is no emergency stop to lift"),
+        });
+        self.set_formation.serve(|request| match set_formation(control, &request) {
+            Ok(message) => SetFormationResponse { success: true, message },
+            Err(message) => SetFormationResponse { success: false, message },
+        });
+        // A node that was switched off in an emergency stop stays off after it.
+        if !self.lifecycle.is_active() {
+            self.control.set_active(false);
+        }
+    }
+
+    fn hear(&mut self, now: f64) {
+        let Self { poses, control, frame_id, leaders, .. } = self;
+        poses.take(frame_id, &mut |member, pose| {
+            if let Err(rejection) = control.receive(member, pose, now) {
+                tracing::debug!("{}: {rejection}", control.formation().names[member]);
+            }
+        });
+        for (member, topic) in leaders {
+            if let Some((message, _)) = topic.take_last() {
+                if !pose::is_frame(&message.header.frame_id, frame_id) {
+                    tracing::warn!(
+                        "{}: frame `{}` is not `{frame_id}`, which the swarm file names",
+                        topic.topic(),
+                        message.header.frame_id
+                    );
+                } else {
+                    let place = message.pose.position;
+                    control.tell(*member, [place.x, place.y]);
+                }
+            }
+        }
+    }
+
+    fn header(&self, now: f64) -> Header {
+        Header { stamp: Time::from_seconds(now), frame_id: self.frame_id.clone() }
+    }
+
+    fn publish(&mut self, now: f64) {
+        for (member, topic) in &self.targets {
+            let Some(target) = self.control.target(*member) else { continue };
+            let here = self.control.position(*member).unwrap_or(target);
+            // A target says where to look too: ahead, or where the robot looks now.
+            let way = [target[0] - here[0], target[1] - here[1]];
+            let yaw = match way {
+                [0.0, 0.0] => self.control.yaw(*member).unwrap_or(0.0),
+                [x, y] => y.atan2(x),
+            };
+            let message = PoseStamped { header: self.header(now), pose: Pose::planar(target, yaw) };
+            self.statistics.sent(topic.publish(&message));
+        }
+        for (member, drive) in &self.drives {
+            self.statistics.sent(drive.publish(&self.control, *member, self.header(now)));
+        }
+    }
+
+    /// What people and their tools look at, at their pace.
+    fn report(&mut self, now: f64) {
+        if self.statistics.is_due(diagnostics::STATE, now, self.settings.state_rate) {
+            let state = state::message(&self.control, &self.swarm.name, self.header(now), &self.statistics);
+            self.statistics.sent(self.state.publish(&state));
+            if let Some(topic) = &self.markers {
+                let markers = markers::message(&self.control, &self.swarm.raw, &self.header(now));
+                self.statistics.sent(topic.publish(&markers));
+            }
+        }
+        if self.statistics.is_due(diagnostics::DIAGNOSTICS, now, 1.0) {
+            let message =
+                self.statistics.message(&self.control, &self.swarm.name, self.header(now), &self.poses);
+            self.statistics.sent(self.diagnostics.publish(&message));
+        }
+    }
+}
+
+/// What a transition of the lifecycle asks for.
+fn act(control: &mut Control, goal: Goal) -> Outcome {
+    match goal {
+        Goal::Activate => control.set_active(true),
+        Goal::Deactivate | Goal::CleanUp | Goal::ShutDown | Goal::Recover => control.set_active(false),
+        Goal::Configure => {}
+    }
+    Outcome::Success
+}
+
+fn only(swarm: &Swarm, control: &Control, name: &str) -> Result<usize, NodeError> {
+    let formation = control.formation();
+    let refuse = |why| Err(NodeError::NotAlone { name: name.to_owned(), why });
+    if swarm.raw.control.sweeps > 1 {
+        return refuse("control.sweeps above 1 needs to see the whole formation");
+    }
+    if !formation.is_led_here() && !formation.can_be_followed_alone() {
+        return refuse("this scene is swept one robot after another, which needs to see the whole formation");
+    }
+    formation.number(name).ok_or_else(|| NodeError::Member {
+        name: name.to_owned(),
+        first: formation.names[0].clone(),
+        last: formation.names[formation.count() - 1].clone(),
+    })
+}
+
+/// Where to take part, as the environment says.
+pub fn options(arguments: &RosArguments) -> Options {
+    let environment = &arguments.environment;
+    Options { domain: environment.domain, loopback_only: environment.discovery == DiscoveryRange::Localhost }
+}
+
+/// Names of topics under the rules given to a node.
+pub type TopicOf<'a> = &'a dyn Fn(&str, usize) -> Result<String, NodeError>;
+
+fn set_formation(control: &mut Control, request: &SetFormationRequest) -> Result<String, String> {
+    if !control.formation().is_led_here() {
+        return Err("the leaders are moved by a scene's program".into());
+    }
+    let time = control.program_time();
+    if !request.name.is_empty() {
+        let manoeuvre = control.formation().manoeuvre(&request.name, time);
+        let manoeuvre = manoeuvre.ok_or_else(|| {
+            let known: Vec<&str> =
+                control.formation().manoeuvres.iter().map(|manoeuvre| manoeuvre.name.as_str()).collect();
+            format!("there is no manoeuvre `{}`; there are: {}", request.name, known.join(", "))
+        })?;
+        control.begin(&manoeuvre);
+        return Ok(format!("manoeuvre `{}`, {} s", request.name, manoeuvre.duration()));
+    }
+    let SetFormationRequest { translate, rotate, stretch, shear, duration, .. } = *request;
+    let numbers = [translate[0], translate[1], rotate, stretch[0], stretch[1], shear[0], shear[1], duration];
+    if !numbers.iter().all(|number| number.is_finite()) {
+        return Err("a number is not finite".into());
+    }
+    if duration <= 0.0 {
+        return Err(format!("duration = {duration} s: give a positive one"));
+    }
+    if stretch[0] * stretch[1] == shear[0] * shear[1] {
+        return Err("stretch and shear would bring everybody onto one line or point".into());
+    }
+    let about = control.formation().middle();
+    let posture = Posture { translate, rotate, stretch, shear };
+    let from = control.formation().posture(about, time);
+    let leg = Leg { seconds: duration, hold: 0.0, posture };
+    control.begin(&Manoeuvre { about, from, legs: vec![leg] });
+    Ok(format!("under way for {duration} s"))
+}

@@ -1,0 +1,118 @@
+//! Poses as they come in: one topic a member, or one for all; four types of message.
+
+use super::{NodeError, TopicOf};
+use crate::ros::edge::{Node, Quality, Stamps, Subscription};
+use crate::ros::messages::geometry_msgs::{self, PoseArray, PoseStamped, PoseWithCovarianceStamped};
+use crate::ros::messages::nav_msgs::Odometry;
+use crate::ros::messages::std_msgs::Header;
+use crate::scene::swarm::raw::{RawNode, RawPoseType};
+use crate::swarm::watch::Pose;
+
+/// Where the members' poses come from.
+pub enum PoseSource {
+    Stamped(Vec<(usize, Subscription<PoseStamped>)>),
+    WithCovariance(Vec<(usize, Subscription<PoseWithCovarianceStamped>)>),
+    Odometry(Vec<(usize, Subscription<Odometry>)>),
+    /// All at once, in the order of the members; whom to listen to.
+    Array(Subscription<PoseArray>, Vec<usize>),
+}
+
+/// Poses of one member taken in a tick at most: a flood must not hold the loop.
+const MOST_AT_ONCE: usize = 64;
+
+impl PoseSource {
+    pub fn open(node: &Node, raw: &RawNode, heard: &[usize], topic: TopicOf<'_>) -> Result<Self, NodeError> {
+        Ok(match raw.pose_type {
+            RawPoseType::PoseStamped => Self::Stamped(each(node, raw, heard, topic)?),
+            RawPoseType::PoseWithCovarianceStamped => Self::WithCovariance(each(node, raw, heard, topic)?),
+            RawPoseType::Odometry => Self::Odometry(each(node, raw, heard, topic)?),
+            RawPoseType::PoseArray => {
+                let topic = topic(&raw.pose_topic, 0)?;
+                Self::Array(node.subscription(&topic, Quality::BEST_EFFORT)?, heard.to_vec())
+            }
+        })
+    }
+
+    /// Tells `hear` every pose that arrived since the last call.
+    pub fn take(&self, frame_id: &str, hear: &mut dyn FnMut(usize, Pose)) {
+        match self {
+            Self::Stamped(all) => {
+                drain(all, |message, stamps| pose(&message.header, &message.pose, stamps, frame_id), hear);
+            }
+            Self::WithCovariance(all) => {
+                drain(
+                    all,
+                    |message, stamps| pose(&message.header, &message.pose.pose, stamps, frame_id),
+                    hear,
+                );
+            }
+            Self::Odometry(all) => {
+                drain(
+                    all,
+                    |message, stamps| pose(&message.header, &message.pose.pose, stamps, frame_id),
+                    hear,
+                );
+            }
+            Self::Array(topic, heard) => {
+                for (message, stamps) in std::iter::from_fn(|| topic.take()).take(MOST_AT_ONCE) {
+                    for &member in heard {
+                        if let Some(one) = message.poses.get(member) {
+                            hear(member, pose(&message.header, one, stamps, frame_id));
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// Messages that were no message of the type.
+    pub fn refused(&self) -> u64 {
+        match self {
+            Self::Stamped(all) => all.iter().map(|(_, topic)| topic.refused()).sum(),
+            Self::WithCovariance(all) => all.iter().map(|(_, topic)| topic.refused()).sum(),
+            Self::Odometry(all) => all.iter().map(|(_, topic)| topic.refused()).sum(),
+            Self::Array(topic, _) => topic.refused(),
+        }
+    }
+}
+
+fn each<M: crate::ros::edge::Message>(
+    node: &Node,
+    raw: &RawNode,
+    heard: &[usize],
+    topic: TopicOf<'_>,
+) -> Result<Vec<(usize, Subscription<M>)>, NodeError> {
+    let open = |&member: &usize| {
+        let topic = topic(&raw.pose_topic, member)?;
+        Ok((member, node.subscription(&topic, Quality::BEST_EFFORT)?))
+    };
+    heard.iter().map(open).collect()
+}
+
+fn drain<M: crate::ros::edge::Message>(
+    all: &[(usize, Subscription<M>)],
+    pose: impl Fn(&M, Stamps) -> Pose,
+    hear: &mut dyn FnMut(usize, Pose),
+) {
+    for (member, topic) in all {
+        for (message, stamps) in std::iter::from_fn(|| topic.take()).take(MOST_AT_ONCE) {
+            hear(*member, pose(&message, stamps));
+        }
+    }
+}
+
+/// A pose with its stamp; one that bears none was measured when it was received.
+fn pose(header: &Header, pose: &geometry_msgs::Pose, stamps: Stamps, frame_id: &str) -> Pose {
+    let stamped = header.stamp.seconds();
+    Pose {
+        position: [pose.position.x, pose.position.y],
+        yaw: pose.orientation.yaw().unwrap_or(f64::NAN),
+        stamp: if stamped == 0.0 { stamps.received } else { stamped },
+        frame_is_right: is_frame(&header.frame_id, frame_id),
+    }
+}
+
+/// Whether a header speaks of this frame; older tools write a slash before it.
+pub fn is_frame(said: &str, meant: &str) -> bool {
+    said.strip_prefix('/').unwrap_or(said) == meant
+}

@@ -1,0 +1,119 @@
+//! The node's parameters: what of the swarm file can be changed while it flies.
+
+use super::NodeError;
+use crate::ros::arguments::{RosArguments, Value as Given};
+use crate::ros::edge::parameters::{Change, Declaration, Store, Value};
+use crate::ros::edge::steady::Pace;
+use crate::swarm::control::Control;
+
+/// What is read of the parameters where it is used.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// \[Hz\]
+    pub rate: f64,
+    /// \[Hz\]
+    pub state_rate: f64,
+    pub use_sim_time: bool,
+    pub autostart: bool,
+}
+
+/// No limit, as a parameter that cannot be infinite says it.
+const NONE: f64 = 0.0;
+
+/// Declares every parameter, with what the arguments give.
+pub fn declare(
+    control: &Control,
+    arguments: &RosArguments,
+    node: &str,
+) -> Result<(Settings, Store), NodeError> {
+    let limits = control.limits();
+    let finite = |limit: f64| if limit.is_finite() { limit } else { NONE };
+    let declarations = [
+        Declaration::new("rate", 1.0 / control.period()).range(1.0..=500.0).describe("targets a second [Hz]"),
+        Declaration::new("state_rate", 10.0)
+            .range(0.1..=100.0)
+            .describe("formation states and markers a second, at most one a target [Hz]"),
+        Declaration::new("speed_limit", finite(limits.speed))
+            .range(0.0..=1000.0)
+            .describe("highest speed of a robot; 0 for none [m/s]"),
+        Declaration::new("acceleration_limit", finite(limits.acceleration))
+            .range(0.0..=1000.0)
+            .describe("highest acceleration of a robot; 0 for none [m/s^2]"),
+        Declaration::new("clearance", limits.clearance)
+            .range(0.0..=1000.0)
+            .describe("free space kept between two robots, or a robot and an obstacle [m]"),
+        Declaration::new("damping", control.damping())
+            .range(0.0..=2.0)
+            .describe("part of the way to its target that a follower goes in a sweep [1]"),
+        Declaration::new("autostart", true)
+            .read_only()
+            .describe("become active without waiting for a lifecycle manager"),
+        Declaration::new("use_sim_time", false).read_only().describe("take the time from /clock"),
+    ];
+    let given = arguments.parameters_for(node);
+    let mut store = Store::default();
+    let names: Vec<String> = declarations.iter().map(|one| one.name().to_owned()).collect();
+    for declaration in declarations {
+        let start =
+            given.iter().rev().find(|one| one.name == declaration.name()).map(|one| value(&one.value));
+        store.declare(declaration, start)?;
+    }
+    for one in given.iter().filter(|one| !names.contains(&one.name)) {
+        tracing::warn!("parameter `{}` is not one of this node's: {}", one.name, names.join(", "));
+    }
+    let number = |name: &str| store.get(name).and_then(Value::as_double).unwrap_or_default();
+    let flag = |name: &str| store.get(name).and_then(Value::as_bool).unwrap_or_default();
+    let settings = Settings {
+        rate: number("rate"),
+        state_rate: number("state_rate"),
+        use_sim_time: flag("use_sim_time"),
+        autostart: flag("autostart"),
+    };
+    Ok((settings, store))
+}
+
+impl Settings {
+    /// Applies all that the arguments gave.
+    pub fn apply_all(&mut self, store: &Store, control: &mut Control, pace: &mut Pace) {
+        for (name, value) in store.iter() {
+            self.apply(&Change { name: name.to_owned(), value: value.clone() }, control, pace);
+        }
+    }
+
+    pub fn apply(&mut self, change: &Change, control: &mut Control, pace: &mut Pace) {
+        let Some(number) = change.value.as_double() else { return };
+        let limit = if number == NONE { f64::INFINITY } else { number };
+        let mut limits = control.limits().clone();
+        match change.name.as_str() {
+            "rate" => {
+                self.rate = number;
+                pace.set_rate(number);
+                control.set_period(1.0 / number);
+            }
+            "state_rate" => self.state_rate = number,
+            "damping" => control.set_damping(number),
+            "speed_limit" => limits.speed = limit,
+            "acceleration_limit" => limits.acceleration = limit,
+            "clearance" => limits.clearance = number,
+            _ => return,
+        }
+        if limits != *control.limits()
+            && let Err(error) = control.set_limits(limits)
+        {
+            tracing::warn!("{error}");
+        }
+    }
+}
+
+fn value(given: &Given) -> Value {
+    match given.clone() {
+        Given::Bool(value) => Value::Bool(value),
+        Given::Integer(value) => Value::Integer(value),
+        Given::Double(value) => Value::Double(value),
+        Given::Text(value) => Value::String(value),
+        Given::Bools(values) => Value::Bools(values),
+        Given::Integers(values) => Value::Integers(values),
+        Given::Doubles(values) => Value::Doubles(values),
+        Given::Texts(values) => Value::Strings(values),
+    }
+}

@@ -1,0 +1,200 @@
+//! `flockform robots`: the simulated robots of a swarm file as ROS 2 nodes in one process.
+//!
+//! Each is a node of its own name: poses out, targets in, its frame on `/tf`. What the file says of noise,
+//! delay, loss and faults happens here, so the node that keeps the formation sees it as it would see it in
+//! the world.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use super::arguments::{Names, RosArguments, Value};
+use super::edge::clock::system_time;
+use super::edge::steady::Pace;
+use super::edge::{Edge, Node, Publisher, Quality, Subscription};
+use super::messages::builtin_interfaces::Time;
+use super::messages::geometry_msgs::{
+    self, PoseArray, PoseStamped, PoseWithCovariance, PoseWithCovarianceStamped, Quaternion, Transform,
+    TransformStamped, Vector3,
+};
+use super::messages::nav_msgs::Odometry;
+use super::messages::rosgraph_msgs::Clock;
+use super::messages::std_msgs::Header;
+use super::messages::tf2_msgs::TFMessage;
+use super::node::{NodeError, options};
+use crate::scene::swarm::Swarm;
+use crate::scene::swarm::raw::RawPoseType;
+use crate::swarm::control::Control;
+use crate::swarm::flight::Fleet;
+use crate::swarm::watch::Pose;
+
+/// The robots, and what they speak through.
+pub struct RobotNodes {
+    fleet: Fleet,
+    pace: Pace,
+    names: Vec<String>,
+    targets: Vec<Subscription<PoseStamped>>,
+    goals: Vec<Option<[f64; 2]>>,
+    poses: Poses,
+    frames: Publisher<TFMessage>,
+    clock: Option<Publisher<Clock>>,
+    frame_id: String,
+    // Dropped after all that was made from them.
+    _nodes: Vec<Node>,
+}
+
+enum Poses {
+    Stamped(Vec<Publisher<PoseStamped>>),
+    WithCovariance(Vec<Publisher<PoseWithCovarianceStamped>>),
+    Odometry(Vec<Publisher<Odometry>>),
+    /// With the last pose of each robot.
+    Array(Publisher<PoseArray>, Vec<geometry_msgs::Pose>),
+}
+
+impl RobotNodes {
+    /// # Errors
+    /// What in the swarm file, the ROS arguments or the network stands in the way.
+    pub fn open(swarm: &Swarm, arguments: &RosArguments) -> Result<Self, NodeError> {
+        let control = Control::new(swarm)?;
+        let formation = control.formation();
+        let fleet = Fleet::new(swarm, formation)?;
+        let edge = Edge::open(options(arguments))?;
+        let raw = &swarm.raw.node;
+        let mut nodes = Vec::new();
+        let mut topics = Vec::new();
+        for name in &formation.names {
+            let names = arguments.names("robot", &format!("/{name}"))?;
+            nodes.push(edge.node(names.namespace(), names.node_name())?);
+            topics.push(names);
+        }
+        let of = |pattern: &str, m: usize| topic(&topics[m], pattern, &formation.names[m]);
+        let mut targets = Vec::new();
+        for (m, node) in nodes.iter().enumerate() {
+            targets.push(node.subscription(&of(&raw.target_topic, m)?, Quality::reliable(1))?);
+        }
+        let world = arguments.names("robots", "/")?;
+        let first = &nodes[0];
+        let is_set = |name: &str| {
+            let given = arguments.parameters_for(&world.fully_qualified());
+            given.iter().any(|one| one.name == name && one.value == Value::Bool(true))
+        };
+        Ok(Self {
+            poses: match raw.pose_type {
+                RawPoseType::PoseStamped => Poses::Stamped(each(&nodes, &|m| of(&raw.pose_topic, m))?),
+                RawPoseType::PoseWithCovarianceStamped => {
+                    Poses::WithCovariance(each(&nodes, &|m| of(&raw.pose_topic, m))?)
+                }
+                RawPoseType::Odometry => Poses::Odometry(each(&nodes, &|m| of(&raw.pose_topic, m))?),
+                RawPoseType::PoseArray => {
+                    let topic = first.publisher(&of(&raw.pose_topic, 0)?, Quality::BEST_EFFORT)?;
+                    // Nowhere until it says where.
+                    let nowhere = geometry_msgs::Pose::planar([f64::NAN; 2], f64::NAN);
+                    Poses::Array(topic, vec![nowhere; formation.count()])
+                }
+            },
+            frames: first.publisher("/tf", Quality::reliable(100))?,
+            clock: is_set("publish_clock")
+                .then(|| first.publisher("/clock", Quality::BEST_EFFORT))
+                .transpose()?,
+            pace: Pace::new(1.0 / control.period()),
+            names: formation.names.clone(),
+            goals: vec![None; formation.count()],
+            frame_id: raw.frame_id.clone(),
+            targets,
+            fleet,
+            _nodes: nodes,
+        })
+    }
+
+    /// Flies until `stop` is set.
+    pub fn run(&mut self, stop: &AtomicBool) {
+        while !stop.load(Ordering::Relaxed) {
+            self.pace.wait();
+            self.tick();
+        }
+    }
+
+    pub fn fleet(&self) -> &Fleet {
+        &self.fleet
+    }
+
+    /// One period: targets in, poses out.
+    pub fn tick(&mut self) {
+        for (goal, topic) in self.goals.iter_mut().zip(&self.targets) {
+            if let Some((message, _)) = topic.take_last() {
+                let place = [message.pose.position.x, message.pose.position.y];
+                *goal = place.iter().all(|value| value.is_finite()).then_some(place).or(*goal);
+            }
+        }
+        self.fleet.go(|m| self.goals[m]);
+        // Who publishes the time begins it.
+        let now = if self.clock.is_some() { self.fleet.time() } else { system_time() };
+        let mut said = Vec::new();
+        self.fleet.say(now, &mut |m, pose| said.push((m, pose)));
+        let sent = self.publish(now, &said);
+        if let Err(error) = sent {
+            tracing::debug!("{error}");
+        }
+    }
+
+    fn publish(&mut self, now: f64, said: &[(usize, Pose)]) -> Result<(), super::edge::EdgeError> {
+        let stamp = Time::from_seconds(now);
+        if let Some(clock) = &self.clock {
+            clock.publish(&Clock { clock: stamp })?;
+        }
+        let header = |pose: &Pose| {
+            let frame_id = if pose.frame_is_right { self.frame_id.clone() } else { "elsewhere".into() };
+            Header { stamp: Time::from_seconds(pose.stamp), frame_id }
+        };
+        let planar = |pose: &Pose| geometry_msgs::Pose::planar(pose.position, pose.yaw);
+        for (m, pose) in said {
+            match &mut self.poses {
+                Poses::Stamped(all) => {
+                    all[*m].publish(&PoseStamped { header: header(pose), pose: planar(pose) })?;
+                }
+                Poses::WithCovariance(all) => {
+                    let pose_only = PoseWithCovariance { pose: planar(pose), ..Default::default() };
+                    all[*m].publish(&PoseWithCovarianceStamped { header: header(pose), pose: pose_only })?;
+                }
+                Poses::Odometry(all) => {
+                    let pose_only = PoseWithCovariance { pose: planar(pose), ..Default::default() };
+                    all[*m].publish(&Odometry {
+                        header: header(pose),
+                        child_frame_id: frame_of(&self.names[*m]),
+                        pose: pose_only,
+                        ..Odometry::default()
+                    })?;
+                }
+                Poses::Array(_, poses) => poses[*m] = planar(pose),
+            }
+        }
+        if let (Poses::Array(topic, poses), Some((_, last))) = (&self.poses, said.last()) {
+            topic.publish(&PoseArray { header: header(last), poses: poses.clone() })?;
+        }
+        let frame = |(name, robot): (&String, &crate::swarm::robots::Robot)| TransformStamped {
+            header: Header { stamp, frame_id: self.frame_id.clone() },
+            child_frame_id: frame_of(name),
+            transform: Transform {
+                translation: Vector3 { x: robot.position[0], y: robot.position[1], z: 0.0 },
+                rotation: Quaternion::from_yaw(robot.yaw),
+            },
+        };
+        let transforms = self.names.iter().zip(self.fleet.robots()).map(frame).collect();
+        self.frames.publish(&TFMessage { transforms })
+    }
+}
+
+/// Frame that a robot carries (REP 105).
+fn frame_of(name: &str) -> String {
+    format!("{name}/base_link")
+}
+
+fn topic(names: &Names, pattern: &str, name: &str) -> Result<String, NodeError> {
+    Ok(names.topic(&pattern.replace("{name}", name))?)
+}
+
+fn each<M: super::edge::Message>(
+    nodes: &[Node],
+    topic: &dyn Fn(usize) -> Result<String, NodeError>,
+) -> Result<Vec<Publisher<M>>, NodeError> {
+    let open = |(m, node): (usize, &Node)| Ok(node.publisher(&topic(m)?, Quality::BEST_EFFORT)?);
+    nodes.iter().enumerate().map(open).collect()
+}

@@ -1,0 +1,163 @@
+//! Who leads and how, with the tracks that leaders follow from a file.
+
+use std::path::Path;
+
+use super::raw::*;
+use super::{Leaders, Program, Shape, Who};
+use crate::flock::motion::{Interpolation, Keyframe, Motion};
+use crate::scene::document::problem::SceneError;
+use crate::scene::raw::RawInterpolation;
+use crate::scene::validate::{Refuse, roles};
+
+pub fn leaders(
+    raw: &RawSwarm,
+    shape: &Shape,
+    folder: Option<&Path>,
+    refuse: Refuse<'_>,
+) -> Result<Vec<Leaders>, SceneError> {
+    let entry = |(k, entry): (usize, &RawLeaders)| {
+        let key = format!("leaders[{k}]");
+        let who = match (&entry.robots[..], &entry.region) {
+            ([], Some(region)) if matches!(shape, Shape::Body(_)) => {
+                Who::Region(roles::region(&key, region, refuse)?)
+            }
+            ([], Some(_)) => {
+                let message =
+                    "regions pick particles of a lattice, and the robots are given one by one".into();
+                return Err(refuse(&format!("{key}.region"), message, "name the robots: robots = [\"r1\"]"));
+            }
+            ([], None) => {
+                let help = "name the robots (robots = [\"r1\"]) or give a region";
+                return Err(refuse(&key, "nobody leads by this entry".into(), help));
+            }
+            (names, None) => Who::Names(names.to_vec()),
+            (_, Some(_)) => {
+                let message = "both names and a region are given".into();
+                return Err(refuse(&format!("{key}.region"), message, "keep one of them"));
+            }
+        };
+        Ok(Leaders { who, program: program(&key, &entry.program, raw, folder, refuse)? })
+    };
+    raw.leaders.iter().enumerate().map(entry).collect()
+}
+
+fn program(
+    key: &str,
+    program: &RawProgram,
+    raw: &RawSwarm,
+    folder: Option<&Path>,
+    refuse: Refuse<'_>,
+) -> Result<Program, SceneError> {
+    Ok(match program {
+        RawProgram::External {} => Program::External,
+        RawProgram::Path { points, interpolation } => {
+            let frames: Vec<Keyframe> = points
+                .iter()
+                .map(|point| Keyframe { step: point.at, displacement: point.displacement })
+                .collect();
+            if let Some(k) = (1..frames.len()).find(|&k| frames[k].step <= frames[k - 1].step) {
+                let message = format!("is not later than the point before it, at {} s", frames[k - 1].step);
+                let help = "give the points in the order of their times";
+                return Err(refuse(&format!("{key}.program.points[{k}].at"), message, help));
+            }
+            let interpolation = match interpolation {
+                RawInterpolation::Linear => Interpolation::Linear,
+                RawInterpolation::Smooth => Interpolation::Smooth,
+                RawInterpolation::Hold => Interpolation::Hold,
+            };
+            Program::Motion(Motion::Keyframes { frames, interpolation })
+        }
+        RawProgram::File { path, scale } => {
+            let key = format!("{key}.program.path");
+            let place = folder.unwrap_or(Path::new("")).join(path);
+            let text = std::fs::read_to_string(&place).map_err(|error| {
+                refuse(&key, format!("cannot be read: {error}"), "give a path relative to the swarm file")
+            })?;
+            track(&text, *scale).map_err(|message| {
+                refuse(&key, message, "give the columns t,dx,dy or t,name,dx,dy in order of time")
+            })?
+        }
+        RawProgram::Manoeuvre { name } => {
+            let number = raw.manoeuvres.iter().position(|manoeuvre| manoeuvre.name == *name);
+            Program::Manoeuvre(number.ok_or_else(|| {
+                let known: Vec<&str> = raw.manoeuvres.iter().map(|m| m.name.as_str()).collect();
+                let message = format!("there is no manoeuvre `{name}`; there are: {}", known.join(", "));
+                refuse(&format!("{key}.program.name"), message, "add it as [[manoeuvres]]")
+            })?)
+        }
+    })
+}
+
+/// Reads the text of a CSV file with the header `t,dx,dy` or `t,name,dx,dy`.
+///
+/// # Errors
+/// A sentence that names the line and what is wrong with it.
+fn track(text: &str, scale: f64) -> Result<Program, String> {
+    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes());
+    let header: Vec<String> =
+        reader.headers().map_err(|error| error.to_string())?.iter().map(str::to_owned).collect();
+    let named = match header.iter().map(String::as_str).collect::<Vec<_>>()[..] {
+        ["t", "dx", "dy"] => false,
+        ["t", "name", "dx", "dy"] => true,
+        _ => return Err(format!("line 1: the header is `{}`", header.join(","))),
+    };
+    let mut tracks: Vec<(String, Vec<Keyframe>)> = Vec::new();
+    for (row, record) in reader.records().enumerate() {
+        let line = row + 2;
+        let record = record.map_err(|error| format!("line {line}: {error}"))?;
+        let number = |column: usize| -> Result<f64, String> {
+            let value = record[column].parse::<f64>().ok().filter(|value| value.is_finite());
+            value.ok_or_else(|| {
+                format!("line {line}: `{}` = `{}` is not a finite number", header[column], &record[column])
+            })
+        };
+        let last = header.len() - 1;
+        let frame =
+            Keyframe { step: number(0)?, displacement: [scale * number(last - 1)?, scale * number(last)?] };
+        let name = if named { &record[1] } else { "" };
+        let place = tracks.iter().position(|(known, _)| known == name).unwrap_or_else(|| {
+            tracks.push((name.to_owned(), Vec::new()));
+            tracks.len() - 1
+        });
+        let frames = &mut tracks[place].1;
+        if frames.last().is_some_and(|before| before.step >= frame.step) || frame.step < 0.0 {
+            return Err(format!("line {line}: t = {} is not later than the row before it", frame.step));
+        }
+        frames.push(frame);
+    }
+    let motion = |frames| Motion::Keyframes { frames, interpolation: Interpolation::Linear };
+    if named {
+        return Ok(Program::Own(tracks.into_iter().map(|(name, frames)| (name, motion(frames))).collect()));
+    }
+    tracks
+        .pop()
+        .map(|(_, frames)| Program::Motion(motion(frames)))
+        .ok_or_else(|| "the file has no rows".into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_track_moves_all_alike_or_each_by_name() {
+        let at = |program: &Program, t: f64| match program {
+            Program::Motion(motion) => motion.displacement(t, 0, [0.0; 2]),
+            Program::Own(tracks) => tracks[1].1.displacement(t, 0, [0.0; 2]),
+            _ => unreachable!("a track is a motion"),
+        };
+        let alike = track("t,dx,dy\n0,0,0\n2,1,-1\n", 2.0).expect("reads");
+        assert_eq!(at(&alike, 1.0), [1.0, -1.0]);
+        let named = track("t,name,dx,dy\n1,a,5,5\n1,b,3,4\n2,b,4,4\n", 1.0).expect("reads");
+        assert_eq!(at(&named, 1.5), [3.5, 4.0]);
+    }
+
+    #[test]
+    fn a_bad_row_of_a_track_is_named() {
+        let error = |text| track(text, 1.0).expect_err("refused");
+        assert_eq!(error("t,dx,dy\n0,nan,0\n"), "line 2: `dx` = `nan` is not a finite number");
+        assert_eq!(error("t,dx,dy\n1,0,0\n1,0,0\n"), "line 3: t = 1 is not later than the row before it");
+        assert_eq!(error("t,dx,dy\n"), "the file has no rows");
+        assert_eq!(error("x,y\n"), "line 1: the header is `x,y`");
+    }
+}

@@ -1,0 +1,107 @@
+//! A swarm file becomes a validated [`Swarm`]: the same reading, checks and messages as a scene's.
+//!
+//! What needs the robots' places themselves (whether a name exists, say) is checked where the formation is
+//! laid out, which reports through [`Swarm::refuse`] in the same form.
+
+mod leaders;
+pub mod raw;
+mod recording;
+mod validate;
+
+use super::document::Document;
+use super::document::problem::SceneError;
+use super::{Scene, SceneRegion};
+use crate::flock::manoeuvre::Leg;
+use crate::flock::motion::Motion;
+use crate::flock::rules::Rule;
+use raw::RawSwarm;
+
+pub use validate::schema;
+
+/// A swarm, ready to be laid out. SI units, angles in radians, except in `raw`, which is as written.
+#[derive(Clone, Debug)]
+pub struct Swarm {
+    /// Short name: the bundled swarm's, or the file's without its ending.
+    pub name: String,
+    pub raw: RawSwarm,
+    pub shape: Shape,
+    pub leaders: Vec<Leaders>,
+    pub manoeuvres: Vec<NamedManoeuvre>,
+    document: Document,
+}
+
+/// A motion of all leaders together.
+#[derive(Clone, Debug)]
+pub struct NamedManoeuvre {
+    pub name: String,
+    /// The point that is turned about \[m\]; the middle of the formation's places where `None`.
+    pub about: Option<[f64; 2]>,
+    pub legs: Vec<Leg>,
+}
+
+/// What gives the robots their places.
+#[derive(Clone, Debug)]
+pub enum Shape {
+    /// The file names each, and they follow by this rule.
+    Places(Rule),
+    /// They are the particles of a body.
+    Body(Box<Scene>),
+    /// They are the particles of a scene's body, and its leaders lead.
+    Scene(Box<Scene>),
+    /// Each has a place inside a scene's body, which carries it along.
+    Inside(Box<Scene>),
+    /// They are particles of a scene's body, and go where a run of it went.
+    Recorded(Box<Scene>, Recording),
+}
+
+/// Places of particles, step by step.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Recording {
+    /// Ids, counted from 1, ascending.
+    pub ids: Vec<usize>,
+    /// Places \[length\], shape \[steps, ids\].
+    pub places: Vec<Vec<[f64; 2]>>,
+}
+
+/// Robots that lead.
+#[derive(Clone, Debug)]
+pub struct Leaders {
+    pub who: Who,
+    pub program: Program,
+}
+
+#[derive(Clone, Debug)]
+pub enum Who {
+    Names(Vec<String>),
+    Region(SceneRegion),
+}
+
+/// How leaders move; times of motions in seconds.
+#[derive(Clone, Debug)]
+pub enum Program {
+    /// From outside.
+    External,
+    /// All alike.
+    Motion(Motion),
+    /// Each by its own.
+    Own(Vec<(String, Motion)>),
+    /// By number among the swarm's manoeuvres.
+    Manoeuvre(usize),
+}
+
+impl Swarm {
+    /// The error that refuses this swarm for what stands at `key`.
+    pub fn refuse(&self, key: &str, message: impl Into<String>, help: impl Into<String>) -> SceneError {
+        SceneError::from(self.document.problem(key, message, Some(help.into())))
+    }
+
+    /// The continuum scene behind the formation, where there is one.
+    pub fn scene(&self) -> Option<&Scene> {
+        match &self.shape {
+            Shape::Places(_) => None,
+            Shape::Body(scene) | Shape::Scene(scene) | Shape::Inside(scene) | Shape::Recorded(scene, _) => {
+                Some(scene)
+            }
+        }
+    }
+}

@@ -1,0 +1,186 @@
+//! Simulated flights as written: what the robots are, what goes wrong, and what has to hold.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::defaults;
+
+/// What `flockform swarm` and `flockform robots` simulate.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawFlight {
+    /// [s]; a scene flies for as many periods as it has steps unless this is given.
+    #[serde(default)]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub duration: Option<f64>,
+    /// Same seed, same flight.
+    #[serde(default)]
+    pub seed: u64,
+    #[serde(default)]
+    pub model: RawModel,
+    /// Standard deviation of each coordinate of a pose [m].
+    #[serde(default)]
+    #[schemars(range(min = 0))]
+    pub noise: f64,
+    /// How late poses arrive [period].
+    #[serde(default)]
+    #[schemars(range(max = 1000))]
+    pub delay: u32,
+    /// Most that is added to the delay at random; poses may overtake each other [period].
+    #[serde(default)]
+    #[schemars(range(max = 1000))]
+    pub jitter: u32,
+    /// Part of the poses that is lost [1].
+    #[serde(default)]
+    #[schemars(range(min = 0, max = 1))]
+    pub loss: f64,
+    /// Part of the poses that arrives twice [1].
+    #[serde(default)]
+    #[schemars(range(min = 0, max = 1))]
+    pub duplicates: f64,
+    /// Where the robots are at first, instead of at their places.
+    #[serde(default)]
+    pub start: Vec<RawStart>,
+    #[serde(default)]
+    pub faults: Vec<RawFault>,
+    #[serde(default)]
+    pub bounds: RawBounds,
+    /// Every so many periods the robots' places are kept for tables and figures [period].
+    #[serde(default = "defaults::sweeps")]
+    #[schemars(range(min = 1))]
+    pub record_every: usize,
+}
+
+impl Default for RawFlight {
+    fn default() -> Self {
+        Self {
+            duration: None,
+            seed: 0,
+            model: RawModel::default(),
+            noise: 0.0,
+            delay: 0,
+            jitter: 0,
+            loss: 0.0,
+            duplicates: 0.0,
+            start: Vec::new(),
+            faults: Vec::new(),
+            bounds: RawBounds::default(),
+            record_every: 1,
+        }
+    }
+}
+
+/// What a robot can do; limits are those of `[limits]`.
+#[derive(Clone, Debug, Default, Deserialize, Serialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum RawModel {
+    /// Is at its target after a period.
+    #[default]
+    Ideal,
+    /// Goes straight to its target with at most the speed limit.
+    Integrator,
+    /// Drives and turns: needs a speed limit.
+    Unicycle {
+        /// [degree/s]
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        turn_rate: f64,
+    },
+    /// Speeds up and brakes: needs a speed and an acceleration limit.
+    DoubleIntegrator,
+}
+
+/// Where a robot is at first.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawStart {
+    pub robot: String,
+    /// [m]
+    pub place: [f64; 2],
+}
+
+/// Something that goes wrong with a robot.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawFault {
+    pub robot: String,
+    /// From this time on [s].
+    #[schemars(range(min = 0))]
+    pub at: f64,
+    /// Until this time [s]; for good unless given.
+    #[serde(default)]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub until: Option<f64>,
+    pub what: RawFaultKind,
+}
+
+/// What goes wrong.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum RawFaultKind {
+    /// Moves on but is not heard.
+    Silent,
+    /// Stands still and is not heard.
+    Dead,
+    /// Stands still and is heard.
+    Stuck,
+    /// Says it is this far from where it is.
+    Offset {
+        /// [m]
+        by: [f64; 2],
+    },
+    /// Says over and over what it said last.
+    Frozen,
+    /// Says places at random within this distance of its own.
+    Random {
+        /// [m]
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        within: f64,
+    },
+    /// Says what is no number.
+    NotANumber,
+    /// Speaks of another frame.
+    WrongFrame,
+}
+
+/// What has to hold; a flight that breaks one of these ends with exit code 1.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawBounds {
+    /// Largest distance of a robot from where the leaders' affine motion has its place, ever [m].
+    #[serde(default)]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub affine_error: Option<f64>,
+    /// The same at the end, or the distance from where the rule comes to rest if there is no affine motion [m].
+    #[serde(default)]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub final_error: Option<f64>,
+    /// Smallest free space between two rims, or a rim and an obstacle, ever [m].
+    #[serde(default)]
+    #[schemars(range(min = 0))]
+    pub clearance: Option<f64>,
+    /// When the formation is within `settled_within` of its shape for good [s].
+    #[serde(default)]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub settling_time: Option<f64>,
+    /// [m]
+    #[serde(default = "defaults::settling")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub settled_within: f64,
+    /// Largest distance from the continuum run of the same scene, ever [m].
+    #[serde(default)]
+    #[schemars(range(min = 0))]
+    pub continuum_error: Option<f64>,
+}
+
+impl Default for RawBounds {
+    fn default() -> Self {
+        Self {
+            affine_error: None,
+            final_error: None,
+            clearance: None,
+            settling_time: None,
+            settled_within: defaults::settling(),
+            continuum_error: None,
+        }
+    }
+}

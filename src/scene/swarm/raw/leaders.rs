@@ -1,0 +1,97 @@
+//! Leaders as written: who they are and how they move.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::defaults;
+use crate::scene::raw::{RawInterpolation, RawRegion};
+
+/// Robots that lead.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawLeaders {
+    /// By name.
+    #[serde(default)]
+    pub robots: Vec<String>,
+    /// By their place in the formation; on a lattice only.
+    #[serde(default)]
+    pub region: Option<RawRegion>,
+    pub program: RawProgram,
+}
+
+/// How leaders move; times are counted from the first period.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum RawProgram {
+    /// Moved from outside: by topic (`leader_pose`) or by the service `set_formation`; holds its place until
+    /// then.
+    External {},
+    /// Along displacements from its place in the formation.
+    Path {
+        #[schemars(length(min = 1))]
+        points: Vec<RawWaypoint>,
+        #[serde(default)]
+        interpolation: RawInterpolation,
+    },
+    /// As a CSV file says, with the columns `t,dx,dy` (all alike) or `t,name,dx,dy`: seconds, and metres from
+    /// the place in the formation. Straight between the rows; the last is held.
+    File {
+        /// Path, relative to the swarm file.
+        path: String,
+        /// Multiplies every displacement [1].
+        #[serde(default = "defaults::one")]
+        scale: f64,
+    },
+    /// With the other leaders, by one of the `manoeuvres`.
+    Manoeuvre { name: String },
+}
+
+/// Where a leader is at a time.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawWaypoint {
+    /// [s]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub at: f64,
+    /// From the place in the formation [m].
+    pub displacement: [f64; 2],
+}
+
+/// An affine motion of the formation, leg by leg. Each leg says where the formation is at its end, starting
+/// from the nominal places; between legs the numbers go smoothly.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawManoeuvre {
+    pub name: String,
+    /// The point about which the formation is turned, stretched and sheared [m]; the middle of its places
+    /// unless given.
+    #[serde(default)]
+    pub about: Option<[f64; 2]>,
+    #[schemars(length(min = 1))]
+    pub legs: Vec<RawLeg>,
+}
+
+/// Where a manoeuvre goes.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawLeg {
+    /// Time to get there [s].
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub seconds: f64,
+    /// Time to stay there [s].
+    #[serde(default)]
+    #[schemars(range(min = 0))]
+    pub hold: f64,
+    /// Where the point `about` is moved by [m].
+    #[serde(default)]
+    pub translate: [f64; 2],
+    /// Turn, applied after stretch and shear [degree].
+    #[serde(default)]
+    pub rotate: f64,
+    /// Factors along x and y [1].
+    #[serde(default = "defaults::ones")]
+    pub stretch: [f64; 2],
+    /// x moves with y, and y moves with x [1].
+    #[serde(default)]
+    pub shear: [f64; 2],
+}

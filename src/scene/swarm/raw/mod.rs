@@ -1,0 +1,218 @@
+//! A swarm file as written: what serde reads and the JSON Schema describes.
+//!
+//! SI throughout: metres, seconds; angles in degrees. The doc comments here are the documentation of the
+//! format: `flockform schema --swarm` prints them.
+
+// Units stand in brackets as they are: the schema prints these comments, which escapes would spoil.
+#![allow(rustdoc::broken_intra_doc_links)]
+
+mod flight;
+mod leaders;
+mod node;
+mod safety;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::scene::raw::{RawBody, RawFrame, RawLattice, RawMaterial, RawNeighbours, RawRule};
+
+pub use flight::*;
+pub use leaders::*;
+pub use node::*;
+pub use safety::*;
+
+/// A swarm: who flies in what shape, who leads, by which rule the others follow, and what keeps them safe.
+///
+/// The shape is one of: `robots` with a place each; a `lattice` and a `body` cut from it; a continuum
+/// `scene` whose particles the robots are, or inside which they have their places.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawSwarm {
+    /// One line that says what the swarm does.
+    pub title: String,
+    /// Where the values come from.
+    #[serde(default)]
+    pub notes: String,
+    /// Robots one by one.
+    #[serde(default)]
+    pub robots: Vec<RawRobot>,
+    /// Name of the robots that a lattice or a scene gives places: this and a number counted from 1.
+    #[serde(default = "defaults::prefix")]
+    pub prefix: String,
+    /// Radius of the robots that give none of their own [m].
+    #[serde(default = "defaults::radius")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub radius: f64,
+    #[serde(default)]
+    pub scene: Option<RawBridge>,
+    #[serde(default)]
+    pub lattice: Option<RawLattice>,
+    #[serde(default)]
+    pub body: Option<RawBody>,
+    /// Virtual points around a body that give robots at its edge their full neighbourhood.
+    #[serde(default)]
+    pub frame: RawFrame,
+    /// Who sees whom on a lattice; the first neighbours unless given.
+    #[serde(default)]
+    pub neighbours: Option<RawNeighbours>,
+    /// Who sees whom among robots that are given one by one; the six nearest unless given.
+    #[serde(default)]
+    pub links: Option<RawLinks>,
+    #[serde(default)]
+    pub rule: RawRule,
+    #[serde(default)]
+    pub material: Option<RawMaterial>,
+    /// Who leads, and how. Robots that no entry names follow.
+    #[serde(default)]
+    pub leaders: Vec<RawLeaders>,
+    /// Motions of all leaders together, by name.
+    #[serde(default)]
+    pub manoeuvres: Vec<RawManoeuvre>,
+    #[serde(default)]
+    pub obstacles: Vec<RawObstacle>,
+    #[serde(default)]
+    pub limits: RawLimits,
+    #[serde(default)]
+    pub poses: RawPoses,
+    /// Trims neighbours that stray: tolerance of robots that lie.
+    #[serde(default)]
+    pub resilience: Option<RawResilience>,
+    #[serde(default)]
+    pub control: RawControl,
+    #[serde(default)]
+    pub flight: RawFlight,
+    #[serde(default)]
+    pub node: RawNode,
+}
+
+/// One robot.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawRobot {
+    /// A ROS name: letters, digits and underscores, no digit first.
+    pub name: String,
+    /// Its place in the formation [m].
+    pub place: [f64; 2],
+    /// [m]
+    #[serde(default)]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub radius: Option<f64>,
+    /// Whom it sees, by name; needs `links.kind = "listed"`.
+    #[serde(default)]
+    pub neighbours: Vec<String>,
+}
+
+/// Who sees whom among robots that are given one by one.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum RawLinks {
+    /// Those nearest in the formation; with equally near ones all of them.
+    Nearest {
+        /// [1]
+        #[schemars(range(min = 1))]
+        count: usize,
+    },
+    /// Whoever has a place within a radius in the formation.
+    Within {
+        /// [m]
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        radius: f64,
+    },
+    /// Whom each robot's `neighbours` name.
+    Listed {},
+    /// Whoever is within a radius now.
+    Present {
+        /// [m]
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        radius: f64,
+    },
+}
+
+/// A continuum scene as the formation.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawBridge {
+    /// Name of a bundled scene, or path of a scene file relative to this one. One unit of the scene's
+    /// length is one metre.
+    pub name: String,
+    /// Overrides of the scene's keys, as `--set` takes them.
+    #[serde(default)]
+    pub set: Vec<String>,
+    /// `probes.csv` of an earlier run, relative to this file: its steps are flown as targets by the
+    /// particles that it holds.
+    #[serde(default)]
+    pub recording: Option<String>,
+}
+
+/// The control loop.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawControl {
+    /// Time between two targets [s].
+    #[serde(default = "defaults::period")]
+    #[schemars(range(min = 0.002, max = 1.0))]
+    pub period: f64,
+    /// How often the rule is applied in a period; it stops early when nothing moves any more. With 1
+    /// each robot looks at its neighbours once, as a robot on its own can; a central node may let the whole
+    /// formation come to rest behind its leaders in every period [1].
+    #[serde(default = "defaults::sweeps")]
+    #[schemars(range(min = 1, max = 100_000))]
+    pub sweeps: usize,
+}
+
+impl Default for RawControl {
+    fn default() -> Self {
+        Self { period: defaults::period(), sweeps: defaults::sweeps() }
+    }
+}
+
+pub(super) mod defaults {
+    pub fn prefix() -> String {
+        "robot_".into()
+    }
+    pub fn radius() -> f64 {
+        0.15
+    }
+    pub fn period() -> f64 {
+        0.05
+    }
+    pub fn sweeps() -> usize {
+        1
+    }
+    pub fn ones() -> [f64; 2] {
+        [1.0, 1.0]
+    }
+    pub fn one() -> f64 {
+        1.0
+    }
+    pub fn yes() -> bool {
+        true
+    }
+    pub fn age_limit() -> f64 {
+        0.5
+    }
+    pub fn stop_after() -> f64 {
+        2.0
+    }
+    pub fn range() -> f64 {
+        1e4
+    }
+    pub fn recover() -> usize {
+        5
+    }
+    pub fn frame_id() -> String {
+        "map".into()
+    }
+    pub fn pose_topic() -> String {
+        "/{name}/pose".into()
+    }
+    pub fn target_topic() -> String {
+        "/{name}/target_pose".into()
+    }
+    pub fn velocity_topic() -> String {
+        "/{name}/cmd_vel".into()
+    }
+    pub fn settling() -> f64 {
+        0.01
+    }
+}

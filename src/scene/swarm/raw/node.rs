@@ -1,0 +1,70 @@
+//! The ROS 2 side as written: topics, types and frames.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::defaults;
+
+/// What the node subscribes to and publishes. `{name}` in a topic stands for the robot's name.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawNode {
+    /// Frame of every pose (REP 105).
+    #[serde(default = "defaults::frame_id")]
+    pub frame_id: String,
+    #[serde(default)]
+    pub pose_type: RawPoseType,
+    /// Topic of each robot's pose.
+    #[serde(default = "defaults::pose_topic")]
+    pub pose_topic: String,
+    /// Topic of each robot's target, a `geometry_msgs/PoseStamped`.
+    #[serde(default = "defaults::target_topic")]
+    pub target_topic: String,
+    /// Publishes velocities towards the targets too.
+    #[serde(default)]
+    pub velocity: Option<RawVelocityType>,
+    #[serde(default = "defaults::velocity_topic")]
+    pub velocity_topic: String,
+    /// Publishes `visualization_msgs/MarkerArray` on `~/markers`.
+    #[serde(default = "defaults::yes")]
+    pub markers: bool,
+}
+
+impl Default for RawNode {
+    fn default() -> Self {
+        Self {
+            frame_id: defaults::frame_id(),
+            pose_type: RawPoseType::default(),
+            pose_topic: defaults::pose_topic(),
+            target_topic: defaults::target_topic(),
+            velocity: None,
+            velocity_topic: defaults::velocity_topic(),
+            markers: true,
+        }
+    }
+}
+
+/// Message that carries poses.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum RawPoseType {
+    /// `geometry_msgs/PoseStamped`.
+    #[default]
+    PoseStamped,
+    /// `geometry_msgs/PoseWithCovarianceStamped`.
+    PoseWithCovarianceStamped,
+    /// `nav_msgs/Odometry`.
+    Odometry,
+    /// One `geometry_msgs/PoseArray` for all, in the order of the robots; `pose_topic` names it.
+    PoseArray,
+}
+
+/// Message that carries velocities.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum RawVelocityType {
+    /// `geometry_msgs/Twist`.
+    Twist,
+    /// `geometry_msgs/TwistStamped`.
+    TwistStamped,
+}

@@ -1,0 +1,305 @@
+//! From the swarm as written to the swarm as meant, with the checks that concern several keys at once.
+
+use std::path::Path;
+
+use super::leaders::leaders;
+use super::raw::*;
+use super::recording;
+use super::{NamedManoeuvre, Shape, Swarm};
+use crate::flock::manoeuvre::{Leg, Posture};
+use crate::flock::rules::{Feedback, FeedbackReference, Rule};
+use crate::scene::document::Document;
+use crate::scene::document::problem::SceneError;
+use crate::scene::raw::{
+    RawBody, RawFeedbackReference, RawFrame, RawLattice, RawMean, RawRecord, RawScene, RawStop, RawUpdate,
+    RawWeights,
+};
+use crate::scene::validate::{self as scene_checks, Refuse, unreadable};
+use crate::scene::{Scene, bundled};
+
+impl Swarm {
+    /// Reads a swarm file from disk; `overrides` are `KEY.PATH=VALUE` texts applied on top.
+    ///
+    /// # Errors
+    /// Every key that is unknown, missing, out of range or at odds with another, with its line.
+    pub fn from_file(path: &Path, overrides: &[String]) -> Result<Self, SceneError> {
+        let file = path.display().to_string();
+        let text = std::fs::read_to_string(path).map_err(|error| {
+            unreadable(
+                &file,
+                &error,
+                "give the path of a swarm file, or a name that `flockform swarms` lists",
+            )
+        })?;
+        let name =
+            path.file_stem().map_or_else(|| "swarm".into(), |stem| stem.to_string_lossy().into_owned());
+        Self::parse(&name, &file, &text, overrides, path.parent())
+    }
+
+    /// Reads a swarm from text. `file` names it in messages; other files are looked up in `folder`.
+    ///
+    /// # Errors
+    /// As [`Swarm::from_file`].
+    pub fn parse(
+        name: &str,
+        file: &str,
+        text: &str,
+        overrides: &[String],
+        folder: Option<&Path>,
+    ) -> Result<Self, SceneError> {
+        let document = Document::parse(file, text, overrides)?;
+        let checked = document.check(&schema())?;
+        let raw: RawSwarm = serde_json::from_value(checked)
+            .map_err(|error| SceneError::from(document.problem("", error.to_string(), None)))?;
+        let refuse: Refuse<'_> =
+            &|key, message, help| SceneError::from(document.problem(key, message, Some(help.to_owned())));
+        check_robots(&raw, refuse)?;
+        check_safety(&raw, refuse)?;
+        check_flight(&raw, refuse)?;
+        let shape = shape(name, &raw, &document, folder, refuse)?;
+        let manoeuvres = manoeuvres(&raw, refuse)?;
+        let leaders = leaders(&raw, &shape, folder, refuse)?;
+        Ok(Self { name: name.to_owned(), shape, leaders, manoeuvres, raw, document })
+    }
+}
+
+/// The JSON Schema of a swarm file.
+pub fn schema() -> serde_json::Value {
+    schemars::schema_for!(RawSwarm).into()
+}
+
+fn shape(
+    name: &str,
+    raw: &RawSwarm,
+    document: &Document,
+    folder: Option<&Path>,
+    refuse: Refuse<'_>,
+) -> Result<Shape, SceneError> {
+    let help = "give one of: [[robots]] with a place each; [lattice] and [body]; [scene]";
+    match (&raw.scene, &raw.lattice, &raw.body) {
+        (None, None, None) if raw.robots.is_empty() => Err(refuse("robots", "nobody flies".into(), help)),
+        (None, None, None) => Ok(Shape::Places(rule_of_places(raw, refuse)?)),
+        (None, Some(lattice), Some(body)) if raw.robots.is_empty() => {
+            let scene = body_scene(raw, lattice, body);
+            if raw.links.is_some() {
+                let message = "links are those of robots that are given one by one".into();
+                return Err(refuse("links", message, "use [neighbours], which are the lattice's"));
+            }
+            Ok(Shape::Body(Box::new(scene_checks::validate(name, scene, document.clone(), folder)?)))
+        }
+        (Some(bridge), None, None) => bridged(raw, bridge, folder, refuse),
+        (None, Some(_), None) => Err(refuse("body", "the lattice has no body cut from it".into(), help)),
+        (None, None, Some(_)) => Err(refuse("lattice", "the body has no lattice".into(), help)),
+        _ => {
+            let key = if raw.scene.is_some() { "scene" } else { "robots" };
+            Err(refuse(key, "the formation has two shapes".into(), help))
+        }
+    }
+}
+
+/// A lattice formation is laid out as the body of a continuum scene with the same keys would be.
+fn body_scene(raw: &RawSwarm, lattice: &RawLattice, body: &RawBody) -> RawScene {
+    RawScene {
+        title: raw.title.clone(),
+        notes: String::new(),
+        unit: "m".into(),
+        lattice: lattice.clone(),
+        body: body.clone(),
+        frame: raw.frame,
+        neighbours: raw.neighbours.clone(),
+        rule: raw.rule.clone(),
+        material: raw.material.clone(),
+        loads: Vec::new(),
+        update: RawUpdate::default(),
+        roles: Vec::new(),
+        fracture: None,
+        cuts: Vec::new(),
+        stop: RawStop::default(),
+        equilibrium: None,
+        record: RawRecord::default(),
+    }
+}
+
+fn bridged(
+    raw: &RawSwarm,
+    bridge: &RawBridge,
+    folder: Option<&Path>,
+    refuse: Refuse<'_>,
+) -> Result<Shape, SceneError> {
+    let own = [
+        ("rule", raw.rule.mean.is_some() || raw.rule.weights.is_some() || raw.rule.feedback.is_some()),
+        ("frame", raw.frame != RawFrame::None),
+        ("neighbours", raw.neighbours.is_some()),
+        ("links", raw.links.is_some()),
+        ("material", raw.material.is_some()),
+        ("leaders", !raw.leaders.is_empty()),
+        ("control.sweeps", raw.control.sweeps != 1),
+    ];
+    if let Some((key, _)) = own.into_iter().find(|(_, given)| *given) {
+        let message = "the formation is the body of a scene, which says this itself".into();
+        return Err(refuse(
+            key,
+            message,
+            "leave it out, or change the scene by scene.set = [\"KEY.PATH=VALUE\"]",
+        ));
+    }
+    let scene = match bundled(&bridge.name) {
+        Some(bundled) => bundled.load(&bridge.set)?,
+        None => Scene::from_file(&folder.unwrap_or(Path::new("")).join(&bridge.name), &bridge.set)?,
+    };
+    let scene = Box::new(scene);
+    if scene.equilibrium.is_some() {
+        let message = format!("scene `{}` goes straight to rest: there is nothing to fly", scene.name);
+        return Err(refuse("scene.name", message, "use a scene without [equilibrium], which is stepped"));
+    }
+    match &bridge.recording {
+        Some(_) if !raw.robots.is_empty() => {
+            let message = "robots of a recording are the particles that it holds".into();
+            Err(refuse("robots", message, "leave [[robots]] out, or scene.recording"))
+        }
+        Some(file) => Ok(Shape::Recorded(scene, recording::read(file, folder, refuse)?)),
+        None if raw.robots.is_empty() => Ok(Shape::Scene(scene)),
+        None => Ok(Shape::Inside(scene)),
+    }
+}
+
+/// The rule of robots that stand on no lattice.
+fn rule_of_places(raw: &RawSwarm, refuse: Refuse<'_>) -> Result<Rule, SceneError> {
+    let lattice_only = [
+        ("frame", raw.frame != RawFrame::None, "a frame"),
+        ("neighbours", raw.neighbours.is_some(), "a neighbourhood of lattice sites"),
+        ("material", raw.material.is_some(), "a material"),
+        ("rule.mean", matches!(raw.rule.mean, Some(RawMean::Material { .. })), "the mean of a material"),
+        ("rule.poisson", raw.rule.poisson.is_some(), "the Poisson term"),
+        (
+            "rule.weights",
+            matches!(raw.rule.weights, Some(RawWeights::Gradient { .. } | RawWeights::List { .. })),
+            "a list of weights",
+        ),
+    ];
+    if let Some((key, _, what)) = lattice_only.into_iter().find(|(_, given, _)| *given) {
+        let message = format!("{what} needs a lattice, and the robots are given one by one");
+        return Err(refuse(
+            key,
+            message,
+            "use [lattice] and [body], or links and rule.weights of kind \"solved\"",
+        ));
+    }
+    let nearest = raw.robots.iter().enumerate().flat_map(|(i, a)| {
+        raw.robots[..i].iter().map(move |b| f64::hypot(a.place[0] - b.place[0], a.place[1] - b.place[1]))
+    });
+    let spacing = nearest.fold(f64::INFINITY, f64::min);
+    let mean = scene_checks::mean(raw.rule.mean.as_ref().unwrap_or(&RawMean::Barycentre), spacing, refuse)?;
+    let feedback = raw.rule.feedback.as_ref().map(|f| Feedback {
+        factor: f.factor,
+        reference: match f.reference {
+            RawFeedbackReference::Initial => FeedbackReference::Initial,
+            RawFeedbackReference::Previous => FeedbackReference::Previous,
+        },
+    });
+    Ok(Rule { mean, poisson: None, feedback })
+}
+
+/// Names that ROS can carry, each once, and places apart.
+fn check_robots(raw: &RawSwarm, refuse: Refuse<'_>) -> Result<(), SceneError> {
+    let is_name = |name: &str| {
+        name.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_')
+            && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
+            && !name.contains("__")
+    };
+    let help = "use letters, digits and single underscores, no digit first: r1, left_wing";
+    if !is_name(&raw.prefix) {
+        return Err(refuse("prefix", "no ROS name can begin so".into(), help));
+    }
+    for (k, robot) in raw.robots.iter().enumerate() {
+        if !is_name(&robot.name) {
+            return Err(refuse(&format!("robots[{k}].name"), "is no ROS name".into(), help));
+        }
+        if let Some(other) = raw.robots[..k].iter().find(|other| other.name == robot.name) {
+            let message = format!("two robots are called `{}`", other.name);
+            return Err(refuse(&format!("robots[{k}].name"), message, "give each a name of its own"));
+        }
+        if let Some(other) = raw.robots[..k].iter().find(|other| other.place == robot.place) {
+            let message = format!("`{}` and `{}` have the same place", other.name, robot.name);
+            return Err(refuse(&format!("robots[{k}].place"), message, "give each a place of its own"));
+        }
+    }
+    Ok(())
+}
+
+fn check_safety(raw: &RawSwarm, refuse: Refuse<'_>) -> Result<(), SceneError> {
+    let poses = &raw.poses;
+    if let Some(fresh) = poses.fresh.filter(|&fresh| fresh > poses.age_limit) {
+        let message =
+            format!("a pose would be fresh for {fresh} s, longer than it is held ({} s)", poses.age_limit);
+        return Err(refuse("poses.fresh", message, "raise poses.age_limit, or lower this"));
+    }
+    if poses.stop_after < poses.age_limit {
+        let message = format!("a robot would be stopped before its pose is too old ({} s)", poses.age_limit);
+        return Err(refuse("poses.stop_after", message, "give at least poses.age_limit"));
+    }
+    if poses.age_limit < raw.control.period {
+        let message = format!("poses would be too old before the next period ({} s)", raw.control.period);
+        return Err(refuse("poses.age_limit", message, "give several periods"));
+    }
+    for (k, obstacle) in raw.obstacles.iter().enumerate() {
+        if let RawObstacle::Polygon { vertices } = obstacle
+            && area(vertices).abs() == 0.0
+        {
+            let message = "the polygon has no area".into();
+            return Err(refuse(&format!("obstacles[{k}].vertices"), message, "give its corners in order"));
+        }
+    }
+    if let Some(fence) = raw.limits.geofence.as_ref().filter(|fence| area(fence).abs() == 0.0) {
+        let message = format!("the fence of {} corners holds no area", fence.len());
+        return Err(refuse("limits.geofence", message, "give its corners in order"));
+    }
+    Ok(())
+}
+
+fn area(corners: &[[f64; 2]]) -> f64 {
+    let next = corners.iter().cycle().skip(1);
+    corners.iter().zip(next).map(|(a, b)| 0.5 * (a[0] * b[1] - a[1] * b[0])).sum()
+}
+
+fn check_flight(raw: &RawSwarm, refuse: Refuse<'_>) -> Result<(), SceneError> {
+    let RawLimits { speed, acceleration, .. } = raw.limits;
+    let needs = match raw.flight.model {
+        RawModel::Ideal => None,
+        RawModel::Integrator | RawModel::Unicycle { .. } => speed.is_none().then_some("limits.speed"),
+        RawModel::DoubleIntegrator if speed.is_none() => Some("limits.speed"),
+        RawModel::DoubleIntegrator => acceleration.is_none().then_some("limits.acceleration"),
+    };
+    if let Some(key) = needs {
+        let message = "this model of a robot needs a limit".into();
+        return Err(refuse(key, message, "give it, or use flight.model = { kind = \"ideal\" }"));
+    }
+    for (k, fault) in raw.flight.faults.iter().enumerate() {
+        if fault.until.is_some_and(|until| until <= fault.at) {
+            let message = format!("ends before it begins, at {} s", fault.at);
+            return Err(refuse(&format!("flight.faults[{k}].until"), message, "give a later time"));
+        }
+    }
+    Ok(())
+}
+
+fn manoeuvres(raw: &RawSwarm, refuse: Refuse<'_>) -> Result<Vec<NamedManoeuvre>, SceneError> {
+    let named = |(k, raw_one): (usize, &RawManoeuvre)| {
+        if raw.manoeuvres[..k].iter().any(|other| other.name == raw_one.name) {
+            let message = format!("two manoeuvres are called `{}`", raw_one.name);
+            return Err(refuse(&format!("manoeuvres[{k}].name"), message, "give each a name of its own"));
+        }
+        let legs = raw_one.legs.iter().map(|leg| Leg {
+            seconds: leg.seconds,
+            hold: leg.hold,
+            posture: Posture {
+                translate: leg.translate,
+                rotate: leg.rotate.to_radians(),
+                stretch: leg.stretch,
+                shear: leg.shear,
+            },
+        });
+        Ok(NamedManoeuvre { name: raw_one.name.clone(), about: raw_one.about, legs: legs.collect() })
+    };
+    raw.manoeuvres.iter().enumerate().map(named).collect()
+}

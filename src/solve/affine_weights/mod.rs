@@ -1,0 +1,146 @@
+//! Weights solved from the nominal shape, so that any affine motion of the leaders is followed exactly.
+//!
+//! A follower whose weights add up to one and reproduce its own nominal place, `sum_k w_k p_k = p_j`, keeps
+//! doing so under every affine map: translation, rotation, stretch, shear. Equal weights do that in the
+//! interior of a lattice; here the weights are those nearest to equal ones that do it anywhere, edges and
+//! irregular shapes included (Zhao, "Affine formation maneuver control of multiagent systems", IEEE TAC
+//! 63(12), 2018, calls such weights a stress). They are not negative where the own place lies among the
+//! neighbours: targets then stay in the convex hull of what was received, and the formation comes to rest
+//! as soon as everybody is linked to a leader by positive weights. Elsewhere some are negative; ask
+//! [`settles`] about those.
+
+mod nearest;
+
+use crate::flock::interaction::{Interaction, Weights};
+use crate::flock::neighbourhood::Neighbours;
+use crate::flock::points::Points;
+use crate::flock::role::Role;
+use crate::flock::rules::Rule;
+use crate::solve::spectrum::{SpectralRadius, spectral_radius};
+use crate::solve::sweep::Update;
+use nearest::{Unreachable, nearest};
+
+/// Weights of all bonds.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Solved {
+    /// Parallel to [`Neighbours::index`] \[1\]; equal for those that do not follow.
+    pub weights: Vec<f64>,
+    /// Followers with a negative weight: they lie outside the hull of their neighbours.
+    pub negative: Vec<usize>,
+}
+
+/// Why a shape has no weights. Members are named by index; the texts are about them and do not name them.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum WeightsError {
+    #[error("follows and has no neighbours")]
+    NoNeighbours { member: usize },
+    #[error("has a place, or a neighbour with one, that is not finite")]
+    NotFinite { member: usize },
+    #[error(
+        "cannot be placed by its {neighbours} neighbours: they stand in one point or on one line, {off:.3e} of \
+         their spread away from it"
+    )]
+    Unreachable { member: usize, neighbours: usize, off: f64 },
+    #[error(
+        "has neighbours that stand nearly on one line: its weights would multiply errors of their places by \
+         {factor:.3e}, at most {most} is allowed"
+    )]
+    Amplifies { member: usize, factor: f64, most: f64 },
+    #[error(
+        "the slowest error is multiplied by {radius:.6} in every period, and less than 1 is needed: not everybody \
+         is tied to leaders that span the plane"
+    )]
+    DoesNotSettle { radius: f64 },
+}
+
+impl WeightsError {
+    /// The error as a sentence about whom it is about.
+    pub fn told(&self, name: impl Fn(usize) -> String) -> String {
+        match self {
+            Self::NoNeighbours { member }
+            | Self::NotFinite { member }
+            | Self::Unreachable { member, .. }
+            | Self::Amplifies { member, .. } => format!("{} {self}", name(*member)),
+            Self::DoesNotSettle { .. } => self.to_string(),
+        }
+    }
+}
+
+/// Sum of the weights' moduli up to which they are of use.
+const MOST_AMPLIFICATION: f64 = 1000.0;
+
+/// Weights of every follower for the nominal places `reference` \[m\], shape \[count\]. Sums and places are
+/// met to 1e-12 of the distance to the farthest neighbour, or to a few units in the last place of the
+/// coordinates where those are coarser.
+pub fn solve(reference: &Points, neighbours: &Neighbours, follows: &[bool]) -> Result<Solved, WeightsError> {
+    let mut solved = Solved::default();
+    for (member, &follows) in follows.iter().enumerate() {
+        let count = neighbours.of(member).len();
+        if !follows {
+            solved.weights.extend(std::iter::repeat_n(1.0 / count as f64, count));
+            continue;
+        }
+        let weights = weights_of(member, reference, neighbours)?;
+        let factor = weights.iter().map(|w| w.abs()).sum::<f64>();
+        if factor > MOST_AMPLIFICATION {
+            return Err(WeightsError::Amplifies { member, factor, most: MOST_AMPLIFICATION });
+        }
+        if weights.iter().any(|&w| w < 0.0) {
+            solved.negative.push(member);
+        }
+        solved.weights.extend(weights);
+    }
+    Ok(solved)
+}
+
+fn weights_of(member: usize, reference: &Points, neighbours: &Neighbours) -> Result<Vec<f64>, WeightsError> {
+    let own = reference.get(member);
+    let places: Vec<[f64; 2]> = neighbours.of(member).iter().map(|&k| reference.get(k as usize)).collect();
+    if places.is_empty() {
+        return Err(WeightsError::NoNeighbours { member });
+    }
+    let largest = places.iter().chain([&own]).flatten().fold(0.0, |most: f64, p| most.max(p.abs()));
+    if !places.iter().chain([&own]).flatten().all(|p| p.is_finite()) {
+        return Err(WeightsError::NotFinite { member });
+    }
+    // Relative to the own place: far from the origin nothing is lost that the coordinates still hold.
+    let offsets: Vec<[f64; 2]> = places.iter().map(|p| [p[0] - own[0], p[1] - own[1]]).collect();
+    nearest(&offsets, largest).map_err(|Unreachable { off }| WeightsError::Unreachable {
+        member,
+        neighbours: places.len(),
+        off,
+    })
+}
+
+/// How fast a formation with these weights comes to rest when all move at once: the factor by which the
+/// slowest error shrinks in every period. Refused unless that is below one. Without followers it is zero.
+pub fn settles(
+    weights: &[f64],
+    neighbours: &Neighbours,
+    follows: &[bool],
+) -> Result<SpectralRadius, WeightsError> {
+    let role = |follows: &bool| if *follows { Role::Follower } else { Role::Leader };
+    let roles: Vec<Role> = follows.iter().map(role).collect();
+    let interaction = Interaction {
+        rule: Rule::BARYCENTRE,
+        reference: Points::zeros(roles.len()).into(),
+        neighbours: neighbours.clone(),
+        weights: Weights::Scalar(weights.to_vec()),
+        forces: None,
+        rest: None,
+        bonds: None,
+    };
+    let nobody = SpectralRadius { radius: 0.0, iterations: 0, converged: true };
+    let found = spectral_radius(&interaction, None, &roles, Update::default(), MOST_SWEEPS).unwrap_or(nobody);
+    // Followers that no leader reaches keep an error for ever: exactly one, found as one to rounding.
+    if found.radius < 1.0 - 1e-9 {
+        Ok(found)
+    } else {
+        Err(WeightsError::DoesNotSettle { radius: found.radius })
+    }
+}
+
+const MOST_SWEEPS: usize = 4000;
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,347 @@
+//! What lies between a robot and those who see it: noise, delay, loss, and what the robot itself does to
+//! deceive. Seeded, and a stream of its own for every member, so that one channel's randomness depends
+//! neither on the other members nor on who asks when.
+
+use rand::RngExt;
+use rand_distr::StandardNormal;
+use rand_pcg::Pcg64Mcg;
+
+use super::watch::Pose;
+
+/// How poses travel. The default channel hands everything on at once and unchanged.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ChannelParams {
+    /// Standard deviation of each coordinate \[m\], default 0.
+    pub noise: f64,
+    /// Standard deviation of the heading \[rad\], default 0.
+    pub yaw_noise: f64,
+    /// Periods that every pose takes \[1\], default 0.
+    pub delay: u32,
+    /// Up to so many periods more, all equally likely \[1\], default 0. Poses keep their order: one that
+    /// takes long holds back those behind it.
+    pub jitter: u32,
+    /// Probability that a pose is lost \[1\], default 0.
+    pub loss: f64,
+    /// Probability that it comes once more, a period later \[1\], default 0.
+    pub duplication: f64,
+    /// Probability that it comes a period late, behind the next one \[1\], default 0.
+    pub reordering: f64,
+}
+
+/// What a robot says in the place of the truth; stamps stay true.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Lie {
+    /// So far from where it is \[m\].
+    Offset {
+        by: [f64; 2],
+    },
+    /// Where it was when it began to lie.
+    Frozen,
+    /// Always this place \[m, world frame\].
+    Claimed {
+        position: [f64; 2],
+    },
+    /// To and fro about where it is, `amplitude` \[m\] each way, in so many periods.
+    Oscillating {
+        amplitude: [f64; 2],
+        periods: u32,
+    },
+    /// Anywhere within `radius` \[m\] of where it is.
+    Random {
+        radius: f64,
+    },
+    NotANumber,
+}
+
+/// What a robot sends.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Sender {
+    #[default]
+    Honest,
+    /// Nothing; what is on its way still arrives.
+    Dead,
+    Lying(Lie),
+}
+
+/// The channel of one member. Time is counted in periods, so that no rounding decides when a pose arrives.
+#[derive(Clone, Debug)]
+pub struct Channel {
+    params: ChannelParams,
+    sender: Sender,
+    /// Where the robot was when it began to lie \[m\], and when \[period\].
+    lying_since: Option<([f64; 2], u64)>,
+    /// A stream for each cause: what is lost does not change the noise on what is not.
+    noise: Pcg64Mcg,
+    network: Pcg64Mcg,
+    lies: Pcg64Mcg,
+    /// In the order of arrival.
+    on_the_way: Vec<Arrival>,
+    /// When the last pose that keeps its order arrives \[period\].
+    last_in_order: u64,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Arrival {
+    period: u64,
+    /// Behind all that arrive in the same period in order.
+    late: bool,
+    pose: Pose,
+}
+
+impl Channel {
+    /// The same `seed` and `member` give the same channel, on every machine.
+    pub fn new(params: ChannelParams, seed: u64, member: usize) -> Self {
+        let stream = |cause: u64| stream(seed, member as u64, cause);
+        Self {
+            params,
+            sender: Sender::Honest,
+            lying_since: None,
+            noise: stream(0),
+            network: stream(1),
+            lies: stream(2),
+            on_the_way: Vec::new(),
+            last_in_order: 0,
+        }
+    }
+
+    /// From the next pose on.
+    pub fn set_sender(&mut self, sender: Sender) {
+        if sender != self.sender {
+            self.lying_since = None;
+        }
+        self.sender = sender;
+    }
+
+    pub fn sender(&self) -> Sender {
+        self.sender
+    }
+
+    /// Sends the true pose of the robot in this period; periods must not go back.
+    pub fn send(&mut self, period: u64, pose: Pose) {
+        let pose = match self.sender {
+            Sender::Dead => return,
+            Sender::Honest => pose,
+            Sender::Lying(lie) => self.twisted(lie, period, pose),
+        };
+        let pose = self.noisy(pose);
+        // All drawn for every pose, so that one probability does not change what another decides.
+        let [lost, held_up, doubled, late] = [(); 4].map(|()| self.network.random::<f64>());
+        let params = &self.params;
+        if lost < params.loss {
+            return;
+        }
+        let jitter = (held_up * (f64::from(params.jitter) + 1.0)) as u64;
+        let in_order = self.last_in_order.max(period + u64::from(params.delay) + jitter);
+        let first = if late < params.reordering {
+            Arrival { period: in_order + 1, late: true, pose }
+        } else {
+            self.last_in_order = in_order;
+            Arrival { period: in_order, late: false, pose }
+        };
+        let again = doubled < params.duplication;
+        self.put(first);
+        if again {
+            self.put(Arrival { period: first.period + 1, late: true, pose });
+        }
+    }
+
+    /// Hands over what has arrived up to this period, in the order of arrival.
+    pub fn deliver(&mut self, period: u64) -> impl Iterator<Item = Pose> + '_ {
+        let arrived = self.on_the_way.partition_point(|arrival| arrival.period <= period);
+        self.on_the_way.drain(..arrived).map(|arrival| arrival.pose)
+    }
+
+    fn put(&mut self, arrival: Arrival) {
+        let key = |a: &Arrival| (a.period, a.late);
+        let place = self.on_the_way.partition_point(|other| key(other) <= key(&arrival));
+        self.on_the_way.insert(place, arrival);
+    }
+
+    fn noisy(&mut self, pose: Pose) -> Pose {
+        let [x, y, turn] = [(); 3].map(|()| self.noise.sample::<f64, _>(StandardNormal));
+        Pose {
+            position: [pose.position[0] + self.params.noise * x, pose.position[1] + self.params.noise * y],
+            yaw: pose.yaw + self.params.yaw_noise * turn,
+            ..pose
+        }
+    }
+
+    fn twisted(&mut self, lie: Lie, period: u64, pose: Pose) -> Pose {
+        let (place, since) = *self.lying_since.get_or_insert((pose.position, period));
+        let moved = |by: [f64; 2]| [pose.position[0] + by[0], pose.position[1] + by[1]];
+        let position = match lie {
+            Lie::Offset { by } => moved(by),
+            Lie::Frozen => place,
+            Lie::Claimed { position } => position,
+            Lie::Oscillating { amplitude, periods } => {
+                let turn = period.saturating_sub(since) as f64 / f64::from(periods.max(1));
+                moved(amplitude.map(|a| a * (std::f64::consts::TAU * turn).sin()))
+            }
+            Lie::Random { radius } => {
+                // The root spreads them evenly over the disc.
+                let [far, turn] = [(); 2].map(|()| self.lies.random::<f64>());
+                let (sin, cos) = (std::f64::consts::TAU * turn).sin_cos();
+                moved([cos, sin].map(|c| radius * far.sqrt() * c))
+            }
+            Lie::NotANumber => [f64::NAN; 2],
+        };
+        Pose { position, ..pose }
+    }
+}
+
+/// A random stream for each seed, member and cause.
+fn stream(seed: u64, member: u64, cause: u64) -> Pcg64Mcg {
+    let base = mixed(mixed(seed) ^ member.wrapping_mul(4).wrapping_add(cause));
+    Pcg64Mcg::new(u128::from(base) << 64 | u128::from(mixed(base)))
+}
+
+/// splitmix64: neighbouring seeds give streams that have nothing in common.
+fn mixed(seed: u64) -> u64 {
+    let mut z = seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^ (z >> 31)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn pose(period: u64) -> Pose {
+        Pose { position: [period as f64, 1.0], yaw: 0.5, stamp: period as f64, frame_is_right: true }
+    }
+
+    /// What arrives in each period when the member sends in every one.
+    fn heard(mut channel: Channel, periods: u64) -> Vec<Vec<Pose>> {
+        let mut heard = Vec::new();
+        for period in 0..periods {
+            channel.send(period, pose(period));
+            heard.push(channel.deliver(period).collect());
+        }
+        heard
+    }
+
+    fn stamps(params: ChannelParams, periods: u64) -> Vec<f64> {
+        heard(Channel::new(params, 7, 3), periods).concat().iter().map(|pose| pose.stamp).collect()
+    }
+
+    #[test]
+    fn the_default_channel_changes_nothing() {
+        let expected: Vec<_> = (0..50).map(|period| vec![pose(period)]).collect();
+        assert_eq!(heard(Channel::new(ChannelParams::default(), 1, 0), 50), expected);
+    }
+
+    #[test]
+    fn a_delay_is_kept_to_the_period_and_jitter_within_its_bounds() {
+        let delayed = heard(Channel::new(ChannelParams { delay: 3, ..Default::default() }, 1, 0), 50);
+        for (period, poses) in delayed.iter().enumerate() {
+            assert_eq!(*poses, if period < 3 { vec![] } else { vec![pose(period as u64 - 3)] });
+        }
+        let params = ChannelParams { delay: 2, jitter: 4, ..Default::default() };
+        let jittered = heard(Channel::new(params, 1, 0), 2000);
+        let mut seen = [0; 5];
+        for (period, poses) in jittered.iter().enumerate() {
+            poses.iter().for_each(|pose| seen[period - 2 - pose.stamp as usize] += 1);
+        }
+        assert!(seen.iter().all(|&count| count > 50), "{seen:?}");
+        assert!(stamps(params, 2000).is_sorted(), "jitter keeps the order");
+    }
+
+    #[test]
+    fn losses_duplicates_and_late_ones_come_as_often_as_asked() {
+        let periods = 20_000;
+        let near = |count: usize, share: f64| (count as f64 / periods as f64 - share).abs() < 0.015;
+        let lossy = |loss| stamps(ChannelParams { loss, ..Default::default() }, periods).len();
+        assert!(near(lossy(0.3), 0.7) && near(lossy(0.8), 0.2));
+        assert_eq!((lossy(1.0), lossy(0.0)), (0, 20_000));
+        let doubled = stamps(ChannelParams { duplication: 0.25, ..Default::default() }, periods);
+        assert!(near(doubled.len(), 1.25), "{}", doubled.len());
+        let mixed = stamps(ChannelParams { reordering: 0.2, ..Default::default() }, periods);
+        let overtaken = mixed.windows(2).filter(|pair| pair[1] < pair[0]).count();
+        // A late one is overtaken by the next unless that is late too.
+        assert!(near(overtaken, 0.2 * 0.8), "{overtaken}");
+        assert!(near(mixed.len(), 1.0));
+    }
+
+    #[test]
+    fn noise_has_the_deviation_asked_for_and_is_the_same_whatever_is_lost() {
+        let noise = ChannelParams { noise: 0.3, yaw_noise: 0.01, ..Default::default() };
+        let heard_through = |params| heard(Channel::new(params, 5, 9), 20_000).concat();
+        let all = heard_through(noise);
+        let deviation = |error: &dyn Fn(&Pose) -> f64| {
+            (all.iter().map(|p| error(p).powi(2)).sum::<f64>() / all.len() as f64).sqrt()
+        };
+        assert!((deviation(&|p| p.position[0] - p.stamp) - 0.3).abs() < 0.01);
+        assert!((deviation(&|p| p.position[1] - 1.0) - 0.3).abs() < 0.01);
+        assert!((deviation(&|p| p.yaw - 0.5) - 0.01).abs() < 0.001);
+        let some = heard_through(ChannelParams { loss: 0.5, ..noise });
+        assert!(some.len() < 11_000 && some.iter().all(|pose| *pose == all[pose.stamp as usize]));
+    }
+
+    #[test]
+    fn a_channel_depends_on_its_seed_and_member_alone() {
+        let params = ChannelParams {
+            noise: 0.1,
+            delay: 1,
+            jitter: 3,
+            loss: 0.3,
+            duplication: 0.2,
+            reordering: 0.2,
+            ..Default::default()
+        };
+        let alone = heard(Channel::new(params, 11, 4), 300);
+        // Beside another that sends at its own pace, and asked more than once.
+        let (mut one, mut other) = (Channel::new(params, 11, 4), Channel::new(params, 11, 5));
+        for period in 0..300 {
+            (0..period % 3).for_each(|_| other.send(period, pose(period)));
+            other.deliver(period).for_each(drop);
+            one.send(period, pose(period));
+            let poses: Vec<Pose> = one.deliver(period).collect();
+            assert_eq!(poses, alone[period as usize]);
+            assert_eq!(one.deliver(period).count(), 0);
+        }
+        assert_ne!(heard(Channel::new(params, 11, 5), 300), alone);
+        assert_ne!(heard(Channel::new(params, 12, 4), 300), alone);
+    }
+
+    #[test]
+    fn a_dead_robot_is_silent_once_what_was_on_its_way_has_arrived() {
+        let mut channel = Channel::new(ChannelParams { delay: 2, ..Default::default() }, 1, 0);
+        let counts: Vec<usize> = (0..10)
+            .map(|period| {
+                channel.set_sender(if (4..7).contains(&period) { Sender::Dead } else { Sender::Honest });
+                channel.send(period, pose(period));
+                channel.deliver(period).count()
+            })
+            .collect();
+        assert_eq!(counts, [0, 0, 1, 1, 1, 1, 0, 0, 0, 1]);
+    }
+
+    #[test]
+    fn each_lie_says_what_it_should() {
+        let told = |lie| {
+            let mut channel = Channel::new(ChannelParams::default(), 1, 0);
+            channel.send(0, pose(0));
+            channel.set_sender(Sender::Lying(lie));
+            (1..9).for_each(|period| {
+                channel.set_sender(Sender::Lying(lie));
+                channel.send(period, pose(period));
+            });
+            let poses: Vec<Pose> = channel.deliver(9).collect();
+            assert_eq!(poses[0], pose(0), "honest so far");
+            assert!(poses.iter().enumerate().all(|(k, pose)| pose.stamp == k as f64));
+            poses[1..].iter().map(|pose| pose.position).collect::<Vec<_>>()
+        };
+        assert_eq!(told(Lie::Offset { by: [10.0, -2.0] })[3], [14.0, -1.0]);
+        assert_eq!(told(Lie::Frozen), [[1.0, 1.0]; 8]);
+        assert_eq!(told(Lie::Claimed { position: [99.0, 9.0] }), [[99.0, 9.0]; 8]);
+        assert!(told(Lie::NotANumber).iter().all(|p| p[0].is_nan() && p[1].is_nan()));
+        let swung = told(Lie::Oscillating { amplitude: [0.0, 3.0], periods: 4 });
+        for (k, y) in [1.0, 4.0, 1.0, -2.0, 1.0].into_iter().enumerate() {
+            assert!((swung[k][1] - y).abs() < 1e-12, "{swung:?}");
+        }
+        let random = told(Lie::Random { radius: 0.5 });
+        let away = |k: usize| (random[k][0] - (k + 1) as f64).hypot(random[k][1] - 1.0);
+        assert!((0..8).all(|k| away(k) <= 0.5) && away(0) != away(1));
+    }
+}

@@ -1,0 +1,425 @@
+//! The control loop's tick: poses in, safe targets out. The simulated flight and the ROS 2 node call the same one.
+//!
+//! A period goes: who is heard, and where; where the rule sends each ([`Formation::advance`]); who has to do
+//! without some of its neighbours; what is safe ([`Filter`]). A member that is not heard gets no target.
+
+use super::formation::{Formation, Measures, Seen};
+use super::safety::{self, Filter, Flags, Limits, Obstacle, Obstacles, SafetyError};
+use super::watch::{Health, Pose, Rejection, Watch, WatchLimits};
+use crate::flock::manoeuvre::Manoeuvre;
+use crate::flock::points::{Points, distance};
+use crate::scene::SceneError;
+use crate::scene::swarm::Swarm;
+use crate::scene::swarm::raw::{RawLimits, RawObstacle};
+
+/// What the loop is doing.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Mode {
+    #[default]
+    Running,
+    /// Everybody holds the place it had when the stop came, until it is lifted.
+    EmergencyStopped,
+    /// Nobody gets a target.
+    Inactive,
+}
+
+/// What the tick did to a member, besides the flags of the filter.
+pub const NEIGHBOUR_LOST: u32 = 1 << 16;
+/// Neighbours that stray were left out.
+pub const TRIMMED: u32 = 1 << 17;
+/// A pose was turned away since the last tick.
+pub const POSE_REJECTED: u32 = 1 << 18;
+
+/// The loop's state. Members by number, positions in \[m\], world frame, times in \[s\].
+#[derive(Clone)]
+pub struct Control {
+    formation: Formation,
+    watch: Watch,
+    filter: Filter,
+    /// Liars tolerated among a member's neighbours.
+    liars: usize,
+    sweeps: usize,
+    period: f64,
+    mode: Mode,
+    ticks: u64,
+    /// Periods run since the period last changed: the leaders' programs stand still in an emergency stop.
+    run: u64,
+    /// Time run before that \[s\].
+    run_before: f64,
+    now: f64,
+    present: Points,
+    /// Velocities between the last two poses \[m/s\].
+    velocity: Points,
+    known: Vec<bool>,
+    usable: Vec<bool>,
+    ages: Vec<f64>,
+    wanted: Points,
+    safe: Points,
+    /// Where members hold in an emergency stop.
+    held: Vec<Option<[f64; 2]>>,
+    filtered: Vec<Flags>,
+    flags: Vec<u32>,
+    rejected: Vec<bool>,
+}
+
+impl Control {
+    /// # Errors
+    /// Names the key of the swarm that cannot be laid out or kept safe.
+    pub fn new(swarm: &Swarm) -> Result<Self, SceneError> {
+        let formation = Formation::lay_out(swarm)?;
+        let raw = &swarm.raw;
+        let (period, count) = (raw.control.period, formation.count());
+        let liars = raw.resilience.as_ref().map_or(0, |resilience| resilience.liars);
+        let limits = limits(&raw.limits);
+        let speed = limits.speed;
+        let filter = filter(swarm, limits, formation.radii.clone())?;
+        let watch = WatchLimits {
+            fresh: raw.poses.fresh.unwrap_or((3.0 * period).min(raw.poses.age_limit)),
+            age_limit: raw.poses.age_limit,
+            stop_after: raw.poses.stop_after,
+            centre: formation.middle(),
+            range: raw.poses.range,
+            jump_speed: raw.poses.jump_speed.unwrap_or(10.0 * speed),
+            recover: raw.poses.recover as u32,
+            period: Some(period),
+            ..WatchLimits::default()
+        };
+        Ok(Self {
+            watch: Watch::new(count, watch),
+            filter,
+            liars,
+            sweeps: raw.control.sweeps,
+            period,
+            mode: Mode::Running,
+            ticks: 0,
+            run: 0,
+            run_before: 0.0,
+            now: 0.0,
+            present: formation.places.clone(),
+            velocity: Points::zeros(count),
+            known: vec![false; count],
+            usable: vec![false; count],
+            ages: vec![0.0; count],
+            wanted: formation.places.clone(),
+            safe: formation.places.clone(),
+            held: vec![None; count],
+            filtered: vec![Flags::default(); count],
+            flags: vec![0; count],
+            rejected: vec![false; count],
+            formation,
+        })
+    }
+
+    pub fn formation(&self) -> &Formation {
+        &self.formation
+    }
+
+    pub fn watch(&self) -> &Watch {
+        &self.watch
+    }
+
+    pub fn period(&self) -> f64 {
+        self.period
+    }
+
+    pub fn mode(&self) -> Mode {
+        self.mode
+    }
+
+    /// Ticks so far.
+    pub fn ticks(&self) -> u64 {
+        self.ticks
+    }
+
+    /// Time that the leaders' programs have run \[s\].
+    pub fn program_time(&self) -> f64 {
+        self.run_before + self.run as f64 * self.period
+    }
+
+    /// Changes the time between two ticks \[s\] from the next one on.
+    pub fn set_period(&mut self, period: f64) {
+        (self.run_before, self.run) = (self.program_time(), 0);
+        self.period = period;
+    }
+
+    /// How much of the way to its target a follower goes in a sweep \[1\].
+    pub fn damping(&self) -> f64 {
+        self.formation.damping()
+    }
+
+    /// A pose of `member` that arrives at `now` \[s\].
+    ///
+    /// # Errors
+    /// Why it is not believed; it then changes nothing but the counts.
+    pub fn receive(&mut self, member: usize, pose: Pose, now: f64) -> Result<(), Rejection> {
+        let before = self.watch.pose(member);
+        let verdict = self.watch.receive(member, pose, now);
+        match (&verdict, before) {
+            (Ok(()), Some(before)) if pose.stamp > before.stamp => {
+                let v = [0, 1].map(|k| (pose.position[k] - before.position[k]) / (pose.stamp - before.stamp));
+                self.velocity.set(member, v);
+            }
+            (Ok(()), _) => self.velocity.set(member, [0.0; 2]),
+            (Err(_), _) => self.rejected[member] = true,
+        }
+        verdict
+    }
+
+    /// Gives a leader that is moved from outside its next place \[m\]; false if it is not one.
+    pub fn tell(&mut self, member: usize, place: [f64; 2]) -> bool {
+        place.iter().all(|value| value.is_finite()) && self.formation.tell(member, place)
+    }
+
+    /// Moves all leaders by a manoeuvre from the next tick on.
+    pub fn begin(&mut self, manoeuvre: &Manoeuvre) {
+        let now = self.program_time();
+        self.formation.begin(manoeuvre, now);
+    }
+
+    /// Everybody holds its place from the next tick on, until [`Control::resume`].
+    pub fn emergency_stop(&mut self) {
+        if self.mode != Mode::EmergencyStopped {
+            self.mode = Mode::EmergencyStopped;
+            self.held.fill(None);
+        }
+    }
+
+    /// Lifts an emergency stop; false if there is none.
+    pub fn resume(&mut self) -> bool {
+        let stopped = self.mode == Mode::EmergencyStopped;
+        if stopped {
+            self.mode = Mode::Running;
+        }
+        stopped
+    }
+
+    /// Switches the loop on or off; an emergency stop outlasts both.
+    pub fn set_active(&mut self, active: bool) {
+        if self.mode != Mode::EmergencyStopped {
+            self.mode = if active { Mode::Running } else { Mode::Inactive };
+        }
+    }
+
+    pub fn limits(&self) -> &Limits {
+        self.filter.limits()
+    }
+
+    /// # Errors
+    /// Names a limit that is none; the old ones then stay.
+    pub fn set_limits(&mut self, limits: Limits) -> Result<(), SafetyError> {
+        self.filter.set_limits(limits)
+    }
+
+    /// Changes how much of the way to its target a follower goes in a sweep \[1\].
+    pub fn set_damping(&mut self, damping: f64) {
+        self.formation.set_damping(damping);
+    }
+
+    /// One period, at `now` \[s\].
+    pub fn tick(&mut self, now: f64) {
+        self.ticks += 1;
+        self.now = now;
+        self.look(now);
+        match self.mode {
+            Mode::Inactive => self.wanted.clone_from(&self.present),
+            Mode::EmergencyStopped => self.hold(),
+            Mode::Running => self.follow(),
+        }
+        let active = self.mode != Mode::Inactive;
+        let seen = safety::Seen {
+            present: &self.present,
+            known: &self.usable,
+            ages: &self.ages,
+            velocity: Some(&self.velocity),
+        };
+        self.filter.apply(&seen, &self.wanted, self.period, &mut self.safe, &mut self.filtered);
+        for (member, flags) in self.flags.iter_mut().enumerate() {
+            if active && self.usable[member] {
+                *flags |= self.filtered[member].0;
+            }
+            if std::mem::take(&mut self.rejected[member]) {
+                *flags |= POSE_REJECTED;
+            }
+        }
+    }
+
+    fn look(&mut self, now: f64) {
+        self.watch.look(now);
+        self.flags.fill(0);
+        for member in 0..self.formation.count() {
+            let last = self.watch.last(member);
+            self.known[member] = last.is_some();
+            self.usable[member] = self.watch.health(member).is_usable();
+            // Nobody knows more of a lost member than that it was there: how long ago says no more.
+            let age = self.watch.age(member, now).unwrap_or(0.0);
+            self.ages[member] = age.min(self.watch.limits().age_limit);
+            self.present.set(member, last.map_or([f64::NAN; 2], |pose| pose.position));
+        }
+    }
+
+    fn hold(&mut self) {
+        for member in (0..self.formation.count()).filter(|&member| self.usable[member]) {
+            let place = *self.held[member].get_or_insert_with(|| self.present.get(member));
+            self.wanted.set(member, place);
+        }
+    }
+
+    fn follow(&mut self) {
+        self.run += 1;
+        let time = self.program_time();
+        let seen = Seen { present: &self.present, usable: &self.usable, known: &self.known };
+        self.formation.advance(&seen, time, self.sweeps, &mut self.wanted);
+        for member in (0..self.formation.count()).filter(|&member| self.usable[member]) {
+            if self.formation.leads(member) {
+                continue;
+            }
+            let lost = self.formation.neighbours(member).any(|k| !self.usable[k]);
+            let target = if self.liars > 0 {
+                let (kept, trimmed) = self.trimmed(member);
+                self.flags[member] |= if trimmed { TRIMMED } else { 0 };
+                self.formation.target_among(member, &seen, |k| kept.contains(&k))
+            } else if lost {
+                self.formation.target_among(member, &seen, |_| true)
+            } else {
+                continue;
+            };
+            if lost {
+                self.flags[member] |= NEIGHBOUR_LOST;
+            }
+            self.wanted.set(member, target.unwrap_or(self.present.get(member)));
+        }
+    }
+
+    /// The neighbours whose displacements do not stray from the member's own, and whether any does.
+    fn trimmed(&self, member: usize) -> (Vec<usize>, bool) {
+        let displacement = |m: usize| {
+            let (now, then) = (self.present.get(m), self.formation.places.get(m));
+            [now[0] - then[0], now[1] - then[1]]
+        };
+        let heard: Vec<usize> = self.formation.neighbours(member).filter(|&k| self.usable[k]).collect();
+        let all: Vec<[f64; 2]> = heard.iter().map(|&k| displacement(k)).collect();
+        let keeps = trim(displacement(member), &all, self.liars);
+        let kept: Vec<usize> = heard.iter().zip(&keeps).filter(|(_, keep)| **keep).map(|(&k, _)| k).collect();
+        let trimmed = kept.len() < heard.len();
+        (kept, trimmed)
+    }
+
+    /// The member's safe target \[m\]; `None` for one that is not heard, and while the loop is inactive.
+    pub fn target(&self, member: usize) -> Option<[f64; 2]> {
+        (self.mode != Mode::Inactive && self.usable[member]).then(|| self.safe.get(member))
+    }
+
+    /// Where the rule alone would send the member \[m\].
+    pub fn wanted(&self, member: usize) -> [f64; 2] {
+        self.wanted.get(member)
+    }
+
+    /// Where the member was last seen \[m\].
+    pub fn position(&self, member: usize) -> Option<[f64; 2]> {
+        self.known[member].then(|| self.present.get(member))
+    }
+
+    /// Where the member looks \[rad\], while it is heard.
+    pub fn yaw(&self, member: usize) -> Option<f64> {
+        self.watch.pose(member).map(|pose| pose.yaw)
+    }
+
+    pub fn velocity(&self, member: usize) -> [f64; 2] {
+        self.velocity.get(member)
+    }
+
+    pub fn health(&self, member: usize) -> Health {
+        self.watch.health(member)
+    }
+
+    /// Bits of [`Flags`] and of this module, as of the last tick.
+    pub fn flags(&self, member: usize) -> u32 {
+        self.flags[member]
+    }
+
+    /// Age of the member's pose at the last tick \[s\].
+    pub fn age(&self, member: usize) -> Option<f64> {
+        self.watch.age(member, self.now)
+    }
+
+    /// What the formation suffers, from the poses of the last tick; members never seen stand at their places.
+    pub fn measures(&self) -> Measures {
+        self.formation.measures(&self.seen_places())
+    }
+
+    /// Where each member comes to rest with the leaders as they are \[m\]; `None` where the rule is not linear.
+    pub fn settled(&self) -> Option<Points> {
+        self.formation.settled(&self.seen_places())
+    }
+
+    /// Largest distance of a heard follower from where it comes to rest \[m\].
+    pub fn formation_error(&self) -> Option<f64> {
+        let settled = self.settled()?;
+        let follows = |&m: &usize| self.usable[m] && !self.formation.leads(m);
+        let apart = |m: usize| distance(settled.get(m), self.present.get(m));
+        Some((0..self.formation.count()).filter(follows).map(apart).fold(0.0, f64::max))
+    }
+
+    /// Free space around each member \[m\]: see [`Filter::clearance`].
+    pub fn clearance(&self, nearest: &mut Vec<f64>) {
+        self.filter.clearance(&self.present, nearest);
+    }
+
+    /// The filter's view of obstacles and radii, for measures on other places.
+    pub fn filter(&self) -> &Filter {
+        &self.filter
+    }
+
+    fn seen_places(&self) -> Points {
+        let mut places = self.formation.places.clone();
+        for member in (0..places.len()).filter(|&member| self.known[member]) {
+            places.set(member, self.present.get(member));
+        }
+        places
+    }
+}
+
+fn trim(_: [f64; 2], all: &[[f64; 2]], _: usize) -> Vec<bool> {
+    vec![true; all.len()]
+}
+
+/// What the filter holds members to, as the file says.
+fn limits(raw: &RawLimits) -> Limits {
+    Limits {
+        speed: raw.speed.unwrap_or(f64::INFINITY),
+        acceleration: raw.acceleration.unwrap_or(f64::INFINITY),
+        keeps_apart: raw.clearance.is_some(),
+        clearance: raw.clearance.unwrap_or(0.0),
+        geofence: raw.geofence.clone(),
+        ..Limits::default()
+    }
+}
+
+fn filter(swarm: &Swarm, limits: Limits, radii: Vec<f64>) -> Result<Filter, SceneError> {
+    let obstacles: Vec<Obstacle> = swarm
+        .raw
+        .obstacles
+        .iter()
+        .map(|obstacle| match obstacle {
+            RawObstacle::Polygon { vertices } => Obstacle::Polygon(vertices.clone()),
+            RawObstacle::Disc { centre, radius } => Obstacle::Disc { centre: *centre, radius: *radius },
+        })
+        .collect();
+    let refuse = |error: SafetyError| {
+        let key = match &error {
+            SafetyError::Limit { name, .. } => format!("limits.{name}"),
+            SafetyError::Radius { .. } => "radius".into(),
+            SafetyError::Corners { place, .. }
+            | SafetyError::NotFinite { place }
+            | SafetyError::NoArea { place }
+            | SafetyError::Crossing { place, .. }
+            | SafetyError::Disc { place, .. } => match place {
+                safety::Place::Geofence => "limits.geofence".into(),
+                safety::Place::Obstacle(k) => format!("obstacles[{k}]"),
+            },
+        };
+        swarm.refuse(&key, error.to_string(), "correct the swarm file")
+    };
+    let obstacles = Obstacles::new(&obstacles).map_err(refuse)?;
+    Filter::new(limits, radii, obstacles).map_err(refuse)
+}

@@ -1,0 +1,62 @@
+//! What goes wrong, with whom, from when to when.
+
+use crate::scene::SceneError;
+use crate::scene::swarm::Swarm;
+use crate::scene::swarm::raw::RawFaultKind;
+use crate::swarm::channel::{Lie, Sender};
+use crate::swarm::formation::Formation;
+
+#[derive(Clone, Debug)]
+pub struct Fault {
+    pub member: usize,
+    /// \[s\]
+    from: f64,
+    /// \[s\]
+    until: f64,
+    kind: RawFaultKind,
+}
+
+impl Fault {
+    pub fn holds(&self, now: f64) -> bool {
+        (self.from..self.until).contains(&now)
+    }
+
+    /// Whether the robot stands still.
+    pub fn stands(&self) -> bool {
+        matches!(self.kind, RawFaultKind::Dead | RawFaultKind::Stuck)
+    }
+
+    pub fn is_in_wrong_frame(&self) -> bool {
+        matches!(self.kind, RawFaultKind::WrongFrame)
+    }
+
+    pub fn sender(&self) -> Sender {
+        match self.kind {
+            RawFaultKind::Silent | RawFaultKind::Dead => Sender::Dead,
+            RawFaultKind::Stuck | RawFaultKind::WrongFrame => Sender::Honest,
+            RawFaultKind::Offset { by } => Sender::Lying(Lie::Offset { by }),
+            RawFaultKind::Frozen => Sender::Lying(Lie::Frozen),
+            RawFaultKind::Random { within } => Sender::Lying(Lie::Random { radius: within }),
+            RawFaultKind::NotANumber => Sender::Lying(Lie::NotANumber),
+        }
+    }
+}
+
+/// The faults of a swarm, in the order of the file.
+pub fn of(swarm: &Swarm, formation: &Formation) -> Result<Vec<Fault>, SceneError> {
+    let fault = |(k, raw): (usize, &crate::scene::swarm::raw::RawFault)| {
+        let member = member(swarm, formation, &format!("flight.faults[{k}].robot"), &raw.robot)?;
+        let until = raw.until.unwrap_or(f64::INFINITY);
+        Ok(Fault { member, from: raw.at, until, kind: raw.what.clone() })
+    };
+    swarm.raw.flight.faults.iter().enumerate().map(fault).collect()
+}
+
+/// The member of this name, which stands at `key`.
+pub fn member(swarm: &Swarm, formation: &Formation, key: &str, name: &str) -> Result<usize, SceneError> {
+    formation.number(name).ok_or_else(|| {
+        let (first, last) = (&formation.names[0], &formation.names[formation.count() - 1]);
+        let message = format!("there is no robot `{name}`: they are called `{first}` to `{last}`");
+        swarm.refuse(key, message, "name a robot of this swarm")
+    })
+}

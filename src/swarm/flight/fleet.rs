@@ -1,0 +1,126 @@
+//! Simulated robots with what they say and what goes wrong with them; who moves them is somebody else's business.
+
+use super::faults::{self, Fault};
+use crate::flock::points::Points;
+use crate::scene::SceneError;
+use crate::scene::swarm::Swarm;
+use crate::scene::swarm::raw::{RawModel, RawSwarm};
+use crate::swarm::channel::{Channel, ChannelParams};
+use crate::swarm::formation::Formation;
+use crate::swarm::robots::{DoubleIntegrator, Integrator, Model, Robot, Unicycle};
+use crate::swarm::watch::Pose;
+
+/// Robots by number, and the periods they have flown.
+pub struct Fleet {
+    robots: Vec<Robot>,
+    channels: Vec<Channel>,
+    faults: Vec<Fault>,
+    model: Model,
+    /// \[s\]
+    dt: f64,
+    period: u64,
+}
+
+impl Fleet {
+    /// # Errors
+    /// Names a robot that the swarm does not have.
+    pub fn new(swarm: &Swarm, formation: &Formation) -> Result<Self, SceneError> {
+        let raw = &swarm.raw;
+        let mut robots: Vec<Robot> = formation.places.iter().map(|place| Robot::at(place, 0.0)).collect();
+        for (k, start) in raw.flight.start.iter().enumerate() {
+            let m = faults::member(swarm, formation, &format!("flight.start[{k}].robot"), &start.robot)?;
+            robots[m].position = start.place;
+        }
+        let params = ChannelParams {
+            noise: raw.flight.noise,
+            delay: raw.flight.delay,
+            jitter: raw.flight.jitter,
+            loss: raw.flight.loss,
+            duplication: raw.flight.duplicates,
+            ..ChannelParams::default()
+        };
+        Ok(Self {
+            channels: (0..robots.len()).map(|m| Channel::new(params, raw.flight.seed, m)).collect(),
+            faults: faults::of(swarm, formation)?,
+            model: model(raw),
+            dt: raw.control.period,
+            period: 0,
+            robots,
+        })
+    }
+
+    pub fn robots(&self) -> &[Robot] {
+        &self.robots
+    }
+
+    pub fn model(&self) -> &Model {
+        &self.model
+    }
+
+    /// Periods flown.
+    pub fn period(&self) -> u64 {
+        self.period
+    }
+
+    /// Time flown \[s\].
+    pub fn time(&self) -> f64 {
+        self.period as f64 * self.dt
+    }
+
+    /// Where the robots are \[m\].
+    pub fn places(&self) -> Points {
+        self.robots.iter().map(|robot| robot.position).collect()
+    }
+
+    /// Whether the robot moves at all now.
+    pub fn is_able(&self, member: usize) -> bool {
+        !self.fault(member).is_some_and(Fault::stands)
+    }
+
+    /// Every robot says where it is, stamped with `stamp` \[s\]; `hear` is told what the channels deliver now.
+    pub fn say(&mut self, stamp: f64, hear: &mut dyn FnMut(usize, Pose)) {
+        for m in 0..self.robots.len() {
+            let fault = self.fault(m);
+            let sender = fault.map(Fault::sender).unwrap_or_default();
+            let frame_is_right = !fault.is_some_and(Fault::is_in_wrong_frame);
+            let Robot { position, yaw, .. } = self.robots[m];
+            self.channels[m].set_sender(sender);
+            self.channels[m].send(self.period, Pose { position, yaw, stamp, frame_is_right });
+            self.channels[m].deliver(self.period).for_each(|pose| hear(m, pose));
+        }
+    }
+
+    /// Every robot goes towards its target \[m\] for one period; those without one come to rest.
+    pub fn go(&mut self, target: impl Fn(usize) -> Option<[f64; 2]>) {
+        for m in 0..self.robots.len() {
+            if self.is_able(m) {
+                let target = target(m).unwrap_or(self.robots[m].position);
+                self.robots[m].step(&self.model, target, self.dt);
+            } else {
+                self.robots[m].velocity = [0.0; 2];
+            }
+        }
+        self.period += 1;
+    }
+
+    /// What is wrong with a robot now; of several things the last of the file.
+    fn fault(&self, member: usize) -> Option<&Fault> {
+        let now = self.time();
+        self.faults.iter().rev().find(|fault| fault.member == member && fault.holds(now))
+    }
+}
+
+fn model(raw: &RawSwarm) -> Model {
+    let speed = raw.limits.speed.unwrap_or(f64::INFINITY);
+    match raw.flight.model {
+        RawModel::Ideal => Model::Ideal,
+        RawModel::Integrator => Model::Integrator(Integrator { speed }),
+        RawModel::Unicycle { turn_rate } => {
+            Model::Unicycle(Unicycle { speed, turn_rate: turn_rate.to_radians(), ..Unicycle::default() })
+        }
+        RawModel::DoubleIntegrator => Model::DoubleIntegrator(DoubleIntegrator {
+            speed,
+            acceleration: raw.limits.acceleration.unwrap_or(f64::INFINITY),
+        }),
+    }
+}

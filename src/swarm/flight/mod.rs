@@ -1,0 +1,133 @@
+//! A simulated flight: robots, channels and the control loop in one process, without middleware, deterministic.
+//!
+//! A period goes: every robot says where it is, the channels deliver what they deliver, the control ticks, every
+//! robot goes towards its target. That is what a real swarm's period is, so what holds here is tested
+//! through the tick that flies.
+
+mod faults;
+mod fleet;
+mod measure;
+mod report;
+
+use std::ops::ControlFlow;
+
+use super::control::Control;
+use super::robots::Robot;
+use crate::continuum::engine::Engine;
+use crate::continuum::plan::Plan;
+use crate::flock::points::distance;
+use crate::scene::SceneError;
+use crate::scene::swarm::{Shape, Swarm};
+pub use fleet::Fleet;
+pub use measure::{Record, Sample};
+pub use report::{FlightReport, RobotReport, Verdict};
+
+/// Robots under way. Members by number, as everywhere in this room.
+pub struct Flight {
+    control: Control,
+    fleet: Fleet,
+    periods: u64,
+    /// The same scene as a continuum, stepped beside the flight.
+    continuum: Option<(Box<Engine>, Vec<usize>)>,
+}
+
+impl Flight {
+    /// # Errors
+    /// Names the key of the swarm that cannot be laid out, kept safe or flown.
+    pub fn new(swarm: &Swarm) -> Result<Self, SceneError> {
+        let control = Control::new(swarm)?;
+        Ok(Self {
+            fleet: Fleet::new(swarm, control.formation())?,
+            periods: periods(swarm, &control),
+            continuum: continuum(swarm)?,
+            control,
+        })
+    }
+
+    pub fn control(&self) -> &Control {
+        &self.control
+    }
+
+    pub fn control_mut(&mut self) -> &mut Control {
+        &mut self.control
+    }
+
+    pub fn fleet(&self) -> &Fleet {
+        &self.fleet
+    }
+
+    /// How many periods the flight takes.
+    pub fn periods(&self) -> u64 {
+        self.periods
+    }
+
+    /// Flies one period.
+    pub fn step(&mut self) {
+        let now = self.fleet.time();
+        let control = &mut self.control;
+        self.fleet.say(now, &mut |member, pose| {
+            // What is turned away is counted by the watch.
+            let _ = control.receive(member, pose, now);
+        });
+        self.control.tick(now);
+        self.fleet.go(|member| self.control.target(member));
+        if let Some((engine, _)) = &mut self.continuum {
+            engine.advance();
+        }
+    }
+
+    /// Largest distance of a robot from its particle in the continuum run of the same scene \[m\].
+    pub fn continuum_error(&self) -> Option<f64> {
+        let (engine, particles) = self.continuum.as_ref()?;
+        let apart = |(robot, &i): (&Robot, &usize)| distance(robot.position, engine.present().get(i));
+        Some(self.fleet.robots().iter().zip(particles).map(apart).fold(0.0, f64::max))
+    }
+}
+
+/// Flies a swarm to the end, or until `watch` breaks it off.
+///
+/// # Errors
+/// As [`Flight::new`].
+pub fn fly(
+    swarm: &Swarm,
+    watch: &mut dyn FnMut(&Flight, &Sample) -> ControlFlow<()>,
+) -> Result<(Record, FlightReport), SceneError> {
+    let mut flight = Flight::new(swarm)?;
+    let mut record = Record::new(swarm, &flight);
+    while flight.fleet.period() < flight.periods() {
+        let before = flight.fleet.places();
+        flight.step();
+        let sample = record.take(&flight, &before);
+        if watch(&flight, &sample).is_break() {
+            break;
+        }
+    }
+    let report = FlightReport::new(swarm, &flight, &record);
+    Ok((record, report))
+}
+
+/// As long as the file says; else as many periods as the scene has steps, or until some time after the programs.
+fn periods(swarm: &Swarm, control: &Control) -> u64 {
+    /// \[s\]
+    const AFTER_THE_PROGRAMS: f64 = 10.0;
+    if let Some(duration) = swarm.raw.flight.duration {
+        return (duration / control.period()).round().max(1.0) as u64;
+    }
+    match (&swarm.shape, control.formation().steps()) {
+        (_, Some(steps)) => steps as u64,
+        (Shape::Scene(scene) | Shape::Inside(scene), None) => scene.stop.steps as u64,
+        _ => {
+            let end = control.formation().programs_end();
+            let end = if end.is_finite() { end } else { 0.0 };
+            ((end + AFTER_THE_PROGRAMS) / control.period()).ceil() as u64
+        }
+    }
+}
+
+/// The run that the flight is held against, and the particle of each member.
+fn continuum(swarm: &Swarm) -> Result<Option<(Box<Engine>, Vec<usize>)>, SceneError> {
+    let Shape::Scene(scene) = &swarm.shape else { return Ok(None) };
+    let plan = Plan::new(scene)?;
+    let particles = (0..plan.count()).filter(|&i| !plan.body.is_frame[i]).collect();
+    Ok(Some((Box::new(Engine::new(plan)), particles)))
+}

@@ -1,0 +1,171 @@
+//! How a flight went, and whether what had to hold did.
+
+use serde::Serialize;
+
+use super::{Flight, Record, Sample};
+use crate::flock::role::Role;
+use crate::scene::swarm::Swarm;
+
+/// Distances in \[m\], times in \[s\].
+#[derive(Clone, Debug, Serialize)]
+pub struct FlightReport {
+    pub name: String,
+    pub title: String,
+    pub robots: usize,
+    pub leaders: usize,
+    /// What the robots are.
+    pub model: &'static str,
+    /// Time flown.
+    pub seconds: f64,
+    pub periods: u64,
+    /// Largest, and at the end; absent where the leaders' motion is not affine.
+    pub affine_error: Option<[f64; 2]>,
+    /// Largest, and at the end; absent where the rule has no single place of rest.
+    pub formation_error: Option<[f64; 2]>,
+    /// When the formation was within `settled_within` of its shape for good, counted from the end of the
+    /// leaders' programs; absent where it never was.
+    pub settling_time: Option<f64>,
+    pub settled_within: f64,
+    /// Smallest ever; absent for a single robot without obstacles.
+    pub clearance: Option<f64>,
+    pub continuum_error: Option<f64>,
+    /// Largest sum of PE1, and at the end \[m^2\].
+    pub pe1: [f64; 2],
+    /// Largest strain, and at the end \[1\].
+    pub strain: [f64; 2],
+    /// Mean and longest way of a robot.
+    pub way: [f64; 2],
+    /// Most robots that were lost at one time.
+    pub most_lost: usize,
+    pub bounds: Vec<Verdict>,
+    pub per_robot: Vec<RobotReport>,
+}
+
+/// How one robot fared.
+#[derive(Clone, Debug, Serialize)]
+pub struct RobotReport {
+    pub name: String,
+    pub role: &'static str,
+    /// At the end \[m\].
+    pub x: f64,
+    pub y: f64,
+    pub way: f64,
+    pub clearance: Option<f64>,
+    pub accepted: u64,
+    pub rejected: u64,
+    pub health: &'static str,
+}
+
+/// Whether a declared bound held.
+#[derive(Clone, Debug, Serialize)]
+pub struct Verdict {
+    /// Key of the bound.
+    pub bound: &'static str,
+    pub declared: f64,
+    /// Absent where there was nothing to measure, which is no success.
+    pub found: Option<f64>,
+    pub holds: bool,
+}
+
+impl FlightReport {
+    pub fn new(swarm: &Swarm, flight: &Flight, record: &Record) -> Self {
+        let formation = flight.control().formation();
+        let samples = &record.samples;
+        let leaders = (0..formation.count()).filter(|&m| formation.leads(m)).count();
+        let bounds = &swarm.raw.flight.bounds;
+        let mut report = Self {
+            name: swarm.name.clone(),
+            title: swarm.raw.title.clone(),
+            robots: formation.count(),
+            leaders,
+            model: flight.fleet().model().name(),
+            seconds: flight.fleet().time(),
+            periods: flight.fleet().period(),
+            affine_error: largest_and_last(samples, |s| s.affine_error),
+            formation_error: largest_and_last(samples, |s| s.formation_error),
+            settling_time: settling_time(samples, formation.programs_end(), bounds.settled_within),
+            settled_within: bounds.settled_within,
+            clearance: finite(samples.iter().map(|s| s.clearance).fold(f64::INFINITY, f64::min)),
+            continuum_error: largest_and_last(samples, |s| s.continuum_error).map(|[largest, _]| largest),
+            pe1: largest_and_last(samples, |s| Some(s.pe1)).unwrap_or_default(),
+            strain: largest_and_last(samples, |s| Some(s.strain)).unwrap_or_default(),
+            way: [
+                record.ways.iter().sum::<f64>() / record.ways.len().max(1) as f64,
+                record.ways.iter().copied().fold(0.0, f64::max),
+            ],
+            most_lost: samples.iter().map(|s| s.lost).max().unwrap_or(0),
+            bounds: Vec::new(),
+            per_robot: (0..formation.count()).map(|m| robot(flight, record, m)).collect(),
+        };
+        report.bounds = verdicts(swarm, &report);
+        report
+    }
+
+    /// Whether every declared bound held.
+    pub fn holds(&self) -> bool {
+        self.bounds.iter().all(|verdict| verdict.holds)
+    }
+}
+
+fn robot(flight: &Flight, record: &Record, m: usize) -> RobotReport {
+    let control = flight.control();
+    let counts = control.watch().counts(m);
+    let [x, y] = flight.fleet().robots()[m].position;
+    let role = if control.formation().leads(m) { Role::Leader } else { Role::Follower };
+    RobotReport {
+        name: control.formation().names[m].clone(),
+        role: role.name(),
+        x,
+        y,
+        way: record.ways[m],
+        clearance: finite(record.clearances[m]),
+        accepted: counts.accepted,
+        rejected: counts.rejected(),
+        health: control.health(m).name(),
+    }
+}
+
+fn finite(value: f64) -> Option<f64> {
+    value.is_finite().then_some(value)
+}
+
+fn largest_and_last(samples: &[Sample], of: impl Fn(&Sample) -> Option<f64>) -> Option<[f64; 2]> {
+    let last = samples.iter().rev().find_map(&of)?;
+    Some([samples.iter().filter_map(&of).fold(0.0, f64::max), last])
+}
+
+/// From the end of the programs to the first time after which the shape holds for good.
+fn settling_time(samples: &[Sample], programs_end: f64, within: f64) -> Option<f64> {
+    let error = |s: &Sample| s.affine_error.or(s.formation_error);
+    let last_off = samples.iter().rposition(|s| error(s).is_none_or(|error| error > within));
+    let settled = last_off.map_or(0, |k| k + 1);
+    samples.get(settled).map(|sample| (sample.time - programs_end).max(0.0))
+}
+
+fn verdicts(swarm: &Swarm, report: &FlightReport) -> Vec<Verdict> {
+    let bounds = &swarm.raw.flight.bounds;
+    // Rounding alone may take this much of a clearance that the filter keeps exactly.
+    const ROUNDING: f64 = 1e-9;
+    let at_most = |bound, declared: Option<f64>, found: Option<f64>| {
+        declared.map(|declared| Verdict {
+            bound,
+            declared,
+            found,
+            holds: found.is_some_and(|found| found <= declared),
+        })
+    };
+    let shape = report.affine_error.or(report.formation_error);
+    let all = [
+        at_most("affine_error", bounds.affine_error, report.affine_error.map(|[largest, _]| largest)),
+        at_most("final_error", bounds.final_error, shape.map(|[_, last]| last)),
+        at_most("settling_time", bounds.settling_time, report.settling_time),
+        at_most("continuum_error", bounds.continuum_error, report.continuum_error),
+        bounds.clearance.map(|declared| Verdict {
+            bound: "clearance",
+            declared,
+            found: report.clearance,
+            holds: report.clearance.is_some_and(|found| found >= declared - ROUNDING),
+        }),
+    ];
+    all.into_iter().flatten().collect()
+}

@@ -1,0 +1,279 @@
+//! From a swarm file to its formation, with the checks that need the places.
+
+use super::{Course, Formation, Lead, inside, links, spacing_of};
+use crate::continuum::engine::Engine;
+use crate::continuum::layout::Layout;
+use crate::continuum::plan::Plan;
+use crate::flock::body::Body;
+use crate::flock::interaction::{Interaction, Weights};
+use crate::flock::manoeuvre::{Manoeuvre, Posture};
+use crate::flock::points::{Points, distance};
+use crate::flock::region::Region;
+use crate::flock::role::Role;
+use crate::flock::rules::{Mean, Rule};
+use crate::material::cells::Cells;
+use crate::scene::raw::{RawRest, RawWeights};
+use crate::scene::swarm::raw::RawLinks;
+use crate::scene::swarm::{Program, Recording, Shape, Swarm, Who};
+use crate::scene::{RoleEntry, Scene, SceneError, SceneRegion};
+use crate::solve::affine_weights;
+use crate::solve::sweep::Update;
+
+impl Formation {
+    /// # Errors
+    /// Names the key of the swarm that cannot be laid out: a robot that does not exist, a place outside the
+    /// body, a follower whom nobody leads anywhere, weights that no neighbours can have.
+    pub fn lay_out(swarm: &Swarm) -> Result<Self, SceneError> {
+        let formation = match &swarm.shape {
+            Shape::Places(rule) => of_places(swarm, *rule)?,
+            Shape::Body(scene) => of_body(swarm, scene)?,
+            Shape::Scene(scene) => of_scene(swarm, Plan::new(scene)?, true),
+            Shape::Inside(scene) => inside_of(swarm, scene)?,
+            Shape::Recorded(scene, recording) => recorded(swarm, scene, recording)?,
+        };
+        require_apart(swarm, &formation)?;
+        Ok(formation)
+    }
+}
+
+fn of_places(swarm: &Swarm, rule: Rule) -> Result<Formation, SceneError> {
+    let places: Points = swarm.raw.robots.iter().map(|robot| robot.place).collect();
+    let names: Vec<String> = swarm.raw.robots.iter().map(|robot| robot.name.clone()).collect();
+    let leads = leads(swarm, &names, &places, &|_, _| Ok(Vec::new()))?;
+    let follows: Vec<bool> = leads.iter().map(Option::is_none).collect();
+    let neighbours = links::neighbours(swarm, &places)?;
+    let present_radius = match swarm.raw.links {
+        Some(RawLinks::Present { radius }) => Some(radius),
+        _ => None,
+    };
+    if present_radius.is_none()
+        && let Some(i) = (0..places.len()).find(|&i| follows[i] && neighbours.of(i).is_empty())
+    {
+        let message = format!("`{}` follows and sees nobody", names[i]);
+        return Err(swarm.refuse("links", message, "widen the links, or make it a leader"));
+    }
+    let spacing = spacing_of(&places);
+    let weights = match &swarm.raw.rule.weights {
+        Some(RawWeights::Solved {}) => {
+            let solved = affine_weights::solve(&places, &neighbours, &follows).map_err(|error| {
+                let help = "give it more neighbours on all its sides, or make it a leader";
+                swarm.refuse("rule.weights", error.told(|i| format!("`{}`", names[i])), help)
+            })?;
+            Weights::Scalar(solved.weights)
+        }
+        Some(RawWeights::Distance { power }) => {
+            let weight =
+                |i: usize, k: u32| (distance(places.get(i), places.get(k as usize)) / spacing).powf(*power);
+            let all = (0..places.len()).flat_map(|i| neighbours.of(i).iter().map(move |&k| weight(i, k)));
+            Weights::Scalar(all.collect())
+        }
+        _ => Weights::Equal,
+    };
+    let body = Body::of_places(places.clone(), spacing);
+    let mut interaction = Interaction {
+        rule,
+        reference: body.reference.clone(),
+        neighbours,
+        weights,
+        forces: None,
+        rest: None,
+        bonds: None,
+    };
+    if swarm.raw.rule.rest == RawRest::Kept && present_radius.is_none() {
+        interaction.keep_rest();
+    }
+    let roles = leads.iter().map(|lead| if lead.is_some() { Role::Leader } else { Role::Follower }).collect();
+    let update = Update { damping: default_damping(rule), ..Update::default() };
+    let mut plan = Plan::of_places(body, interaction, roles, update);
+    plan.present_radius = present_radius;
+    let radius = |k: usize| swarm.raw.robots[k].radius.unwrap_or(swarm.raw.radius);
+    let mut formation = of_scene(swarm, plan, false);
+    formation.radii = (0..formation.count()).map(radius).collect();
+    (formation.names, formation.leads) = (names, leads);
+    Ok(formation)
+}
+
+/// Weights by distance and rules with a spacing are marginal or stiff in a synchronous update; half a step settles.
+fn default_damping(rule: Rule) -> f64 {
+    match rule.mean {
+        Mean::Distance { .. } | Mean::Spaced { .. } => 0.5,
+        Mean::Barycentre | Mean::Power { .. } | Mean::Material { .. } => 1.0,
+    }
+}
+
+fn of_body(swarm: &Swarm, scene: &Scene) -> Result<Formation, SceneError> {
+    let layout = Layout::new(scene)?;
+    let members: Vec<usize> = (0..layout.body.count()).filter(|&i| !layout.body.is_frame[i]).collect();
+    let names = numbered(swarm, members.len());
+    let places: Points = members.iter().map(|&i| layout.body.reference.get(i)).collect();
+    let leads = leads(swarm, &names, &places, &|k, region| {
+        let picked = layout.pick(scene, &format!("leaders[{k}]"), region)?;
+        Ok(picked.into_iter().filter_map(|i| members.binary_search(&i).ok()).collect())
+    })?;
+    let ids: Vec<usize> =
+        (0..members.len()).filter(|&m| leads[m].is_some()).map(|m| members[m] + 1).collect();
+    let mut led = scene.clone();
+    if !ids.is_empty() {
+        let region = SceneRegion::Known(Region::Ids(ids));
+        led.roles.push(RoleEntry { region, role: Role::Leader, from: 1, when: None, motion: None });
+    }
+    let mut formation = of_scene(swarm, Plan::new(&led)?, false);
+    (formation.names, formation.leads) = (names, leads);
+    Ok(formation)
+}
+
+/// The members are the particles of the plan's body, its frame left out.
+fn of_scene(swarm: &Swarm, plan: Plan, is_scene: bool) -> Formation {
+    let particles: Vec<usize> = (0..plan.count()).filter(|&i| !plan.body.is_frame[i]).collect();
+    let places: Points = particles.iter().map(|&i| plan.body.reference.get(i)).collect();
+    let course = Course::Rule { engine: Box::new(Engine::new(plan)), particles };
+    formation(swarm, numbered(swarm, places.len()), places, course, is_scene)
+}
+
+fn inside_of(swarm: &Swarm, scene: &Scene) -> Result<Formation, SceneError> {
+    let plan = Plan::new(scene)?;
+    let cells = Cells::of_body(&plan.body);
+    let mut shares = Vec::new();
+    for (k, robot) in swarm.raw.robots.iter().enumerate() {
+        let inside = inside::shares(&cells, &plan.body.reference, robot.place);
+        shares.push(inside.ok_or_else(|| {
+            let (low, high) = plan.body.bounds();
+            let message = format!(
+                "lies in no cell of the body, which spans [{}, {}] to [{}, {}]",
+                low[0], low[1], high[0], high[1]
+            );
+            swarm.refuse(&format!("robots[{k}].place"), message, "give a place inside the body")
+        })?);
+    }
+    let places = swarm.raw.robots.iter().map(|robot| robot.place).collect();
+    let names = swarm.raw.robots.iter().map(|robot| robot.name.clone()).collect();
+    let course = Course::Inside { engine: Box::new(Engine::new(plan)), shares };
+    let mut formation = formation(swarm, names, places, course, true);
+    let radius = |k: usize| swarm.raw.robots[k].radius.unwrap_or(swarm.raw.radius);
+    formation.radii = (0..formation.count()).map(radius).collect();
+    Ok(formation)
+}
+
+fn recorded(swarm: &Swarm, scene: &Scene, recording: &Recording) -> Result<Formation, SceneError> {
+    let body = Layout::new(scene)?.body;
+    if let Some(id) = recording.ids.iter().find(|&&id| id == 0 || id > body.count()) {
+        let message = format!("there is no particle {id} in scene `{}`", scene.name);
+        return Err(swarm.refuse("scene.recording", message, "give the recording of a run of this scene"));
+    }
+    let places = recording.ids.iter().map(|id| body.reference.get(id - 1)).collect();
+    let course = Course::Recorded { steps: recording.places.clone(), step: 0 };
+    Ok(formation(swarm, numbered(swarm, recording.ids.len()), places, course, true))
+}
+
+fn formation(swarm: &Swarm, names: Vec<String>, places: Points, course: Course, is_scene: bool) -> Formation {
+    let mut formation = Formation {
+        radii: vec![swarm.raw.radius; names.len()],
+        leads: vec![None; names.len()],
+        spacing: spacing_of(&places),
+        manoeuvres: swarm.manoeuvres.clone(),
+        settling: None,
+        settled_roles: Vec::new(),
+        names,
+        places,
+        course,
+        is_scene,
+    };
+    formation.look_at_roles();
+    formation
+}
+
+fn numbered(swarm: &Swarm, count: usize) -> Vec<String> {
+    (1..=count).map(|n| format!("{}{n}", swarm.raw.prefix)).collect()
+}
+
+/// Members in a region, for the entry of leaders of this number.
+type Pick<'a> = &'a dyn Fn(usize, &SceneRegion) -> Result<Vec<usize>, SceneError>;
+
+/// How each member leads, if it does; later entries win.
+fn leads(
+    swarm: &Swarm,
+    names: &[String],
+    places: &Points,
+    pick: Pick<'_>,
+) -> Result<Vec<Option<Lead>>, SceneError> {
+    let mut leads = vec![None; names.len()];
+    for (k, entry) in swarm.leaders.iter().enumerate() {
+        let members = match &entry.who {
+            Who::Region(region) => pick(k, region)?,
+            Who::Names(wanted) => wanted
+                .iter()
+                .enumerate()
+                .map(|(n, name)| {
+                    names.iter().position(|known| known == name).ok_or_else(|| {
+                        let message = format!("there is no robot `{name}`; the first is `{}`", names[0]);
+                        swarm.refuse(
+                            &format!("leaders[{k}].robots[{n}]"),
+                            message,
+                            "name a robot of this swarm",
+                        )
+                    })
+                })
+                .collect::<Result<_, _>>()?,
+        };
+        for m in members {
+            leads[m] = Some(lead(swarm, k, &entry.program, &names[m], m, places)?);
+        }
+    }
+    Ok(leads)
+}
+
+fn lead(
+    swarm: &Swarm,
+    entry: usize,
+    program: &Program,
+    name: &str,
+    member: usize,
+    places: &Points,
+) -> Result<Lead, SceneError> {
+    Ok(match program {
+        Program::External => Lead::External(places.get(member)),
+        Program::Motion(motion) => Lead::Motion { motion: motion.clone(), since: 0.0 },
+        Program::Own(tracks) => {
+            let track = tracks.iter().find(|(known, _)| known == name).ok_or_else(|| {
+                let key = format!("leaders[{entry}].program.path");
+                swarm.refuse(
+                    &key,
+                    format!("the file has no rows for `{name}`"),
+                    "give every leader rows of its own",
+                )
+            })?;
+            Lead::Motion { motion: track.1.clone(), since: 0.0 }
+        }
+        Program::Manoeuvre(number) => {
+            let named = &swarm.manoeuvres[*number];
+            let count = places.len() as f64;
+            let sum = places.iter().fold([0.0; 2], |[a, b], [x, y]| [a + x, b + y]);
+            let about = named.about.unwrap_or(sum.map(|s| s / count));
+            let manoeuvre = Manoeuvre { about, from: Posture::NOMINAL, legs: named.legs.clone() };
+            Lead::Manoeuvre { manoeuvre, since: 0.0 }
+        }
+    })
+}
+
+/// Refuses places at which two robots would be closer than the swarm's own limit.
+fn require_apart(swarm: &Swarm, formation: &Formation) -> Result<(), SceneError> {
+    let Some(clearance) = swarm.raw.limits.clearance else { return Ok(()) };
+    for i in 0..formation.count() {
+        for j in 0..i {
+            let needed = formation.radii[i] + formation.radii[j] + clearance;
+            let apart = distance(formation.places.get(i), formation.places.get(j));
+            if apart < needed {
+                let message = format!(
+                    "the places of `{}` and `{}` are {apart} m apart, and their radii and the clearance need {needed} m",
+                    formation.names[j], formation.names[i]
+                );
+                return Err(swarm.refuse(
+                    "limits.clearance",
+                    message,
+                    "widen the formation, or lower the clearance or the radius",
+                ));
+            }
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,370 @@
+//! A formation: who flies, where each has its place, who leads, and where the rule sends the followers.
+//!
+//! Its particles are the members and, around a lattice formation with a frame, the frame's virtual points. They
+//! are moved by the engine that moves bodies: a period of a swarm is a step of a continuum whose particles
+//! have been put where the robots were seen.
+
+mod inside;
+mod layout;
+mod links;
+mod settling;
+
+use crate::continuum::engine::Engine;
+use crate::flock::manoeuvre::{Affine, Manoeuvre, Posture};
+use crate::flock::motion::Motion;
+use crate::flock::points::{Points, distance};
+use crate::flock::pseudo_energy::pe1;
+use crate::flock::role::Role;
+use crate::flock::strain::{Strain, strain};
+use crate::scene::swarm::NamedManoeuvre;
+use crate::solve::sweep::Order;
+use settling::Settling;
+
+/// Members are named by their number, from 0; positions in \[m\], world frame.
+#[derive(Clone, Debug)]
+pub struct Formation {
+    pub names: Vec<String>,
+    /// \[m\], shape \[members\].
+    pub radii: Vec<f64>,
+    /// Nominal places \[m\], shape \[members\].
+    pub places: Points,
+    pub manoeuvres: Vec<NamedManoeuvre>,
+    leads: Vec<Option<Lead>>,
+    course: Course,
+    spacing: f64,
+    settling: Option<Settling>,
+    /// Roles for which `settling` was computed.
+    settled_roles: Vec<Role>,
+    /// Whether the rule keeps the nominal shape at rest; if so a neighbour that is lost can be done without.
+    is_scene: bool,
+}
+
+/// Where targets come from.
+#[derive(Clone, Debug)]
+enum Course {
+    /// The rule, over where the members were seen: member `m` is particle `particles[m]`.
+    Rule { engine: Box<Engine>, particles: Vec<usize> },
+    /// A body that moves by itself carries the members along: shares of its particles in each place.
+    Inside { engine: Box<Engine>, shares: Vec<Vec<(u32, f64)>> },
+    /// Places step by step, shape \[steps, members\].
+    Recorded { steps: Vec<Vec<[f64; 2]>>, step: usize },
+}
+
+/// How a leader moves.
+#[derive(Clone, Debug)]
+pub enum Lead {
+    /// Told from outside; its place until it is told another.
+    External([f64; 2]),
+    /// From the time `since` on \[s\].
+    Motion {
+        motion: Motion,
+        since: f64,
+    },
+    Manoeuvre {
+        manoeuvre: Manoeuvre,
+        since: f64,
+    },
+}
+
+/// What is known of the members as a period begins.
+#[derive(Clone, Copy, Debug)]
+pub struct Seen<'a> {
+    /// Where each was last seen \[m\], shape \[members\]; of those never seen it is not looked at.
+    pub present: &'a Points,
+    /// Whom the others may look at, shape \[members\].
+    pub usable: &'a [bool],
+    /// Who has been seen at all, shape \[members\].
+    pub known: &'a [bool],
+}
+
+impl Formation {
+    pub fn count(&self) -> usize {
+        self.names.len()
+    }
+
+    /// Smallest distance between two places \[m\].
+    pub fn spacing(&self) -> f64 {
+        self.spacing
+    }
+
+    pub fn number(&self, name: &str) -> Option<usize> {
+        self.names.iter().position(|known| known == name)
+    }
+
+    /// Middle of the nominal places \[m\].
+    pub fn middle(&self) -> [f64; 2] {
+        let sum = self.places.iter().fold([0.0; 2], |[a, b], [x, y]| [a + x, b + y]);
+        sum.map(|s| s / self.count().max(1) as f64)
+    }
+
+    pub fn leads(&self, member: usize) -> bool {
+        match &self.course {
+            Course::Rule { engine, particles } => engine.roles()[particles[member]] != Role::Follower,
+            Course::Inside { .. } | Course::Recorded { .. } => false,
+        }
+    }
+
+    /// Whether leaders are moved by programs of the swarm, not by those of a scene.
+    pub fn is_led_here(&self) -> bool {
+        !self.is_scene
+    }
+
+    /// Whether a member's target follows from where its neighbours were seen, whoever else has moved.
+    pub fn can_be_followed_alone(&self) -> bool {
+        matches!(&self.course, Course::Rule { engine, .. } if engine.update().order == Order::Synchronous)
+    }
+
+    /// Members whose positions the member's target depends on.
+    pub fn depends_on(&self, member: usize) -> Vec<usize> {
+        let Course::Rule { engine, particles } = &self.course else { return Vec::new() };
+        let frame = engine.body().frame.as_ref();
+        let mut seen = Vec::new();
+        for &k in engine.interaction().neighbours.of(particles[member]) {
+            let point = frame.and_then(|frame| Some((frame, frame.points.binary_search(&k).ok()?)));
+            match point {
+                Some((frame, number)) => seen.extend(frame.served_by(number)),
+                None => seen.push(k),
+            }
+        }
+        seen.sort_unstable();
+        seen.dedup();
+        let member_of = |particle: u32| particles.binary_search(&(particle as usize)).ok();
+        seen.into_iter().filter_map(member_of).filter(|&other| other != member).collect()
+    }
+
+    /// Number of steps after which a scene's or a recording's program is over.
+    pub fn steps(&self) -> Option<usize> {
+        match &self.course {
+            Course::Recorded { steps, .. } => Some(steps.len().saturating_sub(1)),
+            _ => None,
+        }
+    }
+
+    /// The engine that moves the body, where there is one.
+    pub fn engine(&self) -> Option<&Engine> {
+        match &self.course {
+            Course::Rule { engine, .. } | Course::Inside { engine, .. } => Some(engine),
+            Course::Recorded { .. } => None,
+        }
+    }
+
+    /// Leaders that are told from outside where to go.
+    pub fn told(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..self.count()).filter(|&m| matches!(self.leads[m], Some(Lead::External(_))))
+    }
+
+    /// Gives leaders that are told from outside a new place \[m\]; false for everybody else.
+    pub fn tell(&mut self, member: usize, place: [f64; 2]) -> bool {
+        match &mut self.leads[member] {
+            Some(Lead::External(told)) => {
+                *told = place;
+                true
+            }
+            _ => false,
+        }
+    }
+
+    /// Moves all leaders by a manoeuvre from `now` \[s\] on.
+    pub fn begin(&mut self, manoeuvre: &Manoeuvre, now: f64) {
+        for lead in self.leads.iter_mut().flatten() {
+            *lead = Lead::Manoeuvre { manoeuvre: manoeuvre.clone(), since: now };
+        }
+    }
+
+    /// The manoeuvre of this name, from the nominal places or from the posture in which the leaders are.
+    pub fn manoeuvre(&self, name: &str, now: f64) -> Option<Manoeuvre> {
+        let NamedManoeuvre { about, legs, .. } = self.manoeuvres.iter().find(|one| one.name == name)?;
+        let about = about.unwrap_or_else(|| self.middle());
+        Some(Manoeuvre { about, from: self.posture(about, now), legs: legs.clone() })
+    }
+
+    /// The posture in which leaders on a manoeuvre about this point are.
+    pub fn posture(&self, about: [f64; 2], now: f64) -> Posture {
+        let under_way = self.leads.iter().flatten().find_map(|lead| match lead {
+            Lead::Manoeuvre { manoeuvre, since } if manoeuvre.about == about => {
+                Some(manoeuvre.posture(now - since))
+            }
+            _ => None,
+        });
+        under_way.unwrap_or(Posture::NOMINAL)
+    }
+
+    /// The affine motion of the formation at `now`, where all its leaders follow one.
+    pub fn affine(&self, now: f64) -> Option<Affine> {
+        let mut leads = self.leads.iter().flatten();
+        let of = |lead: &Lead| match lead {
+            Lead::Manoeuvre { manoeuvre, since } => Some(manoeuvre.affine(now - since)),
+            _ => None,
+        };
+        let first = of(leads.next()?)?;
+        leads.all(|lead| of(lead) == Some(first)).then_some(first)
+    }
+
+    /// When the last program of the swarm's leaders is over \[s\].
+    pub fn programs_end(&self) -> f64 {
+        let end = |lead: &Lead| match lead {
+            Lead::External(_) => 0.0,
+            Lead::Motion { motion: Motion::Keyframes { frames, .. }, since } => {
+                since + frames.last().map_or(0.0, |frame| frame.step)
+            }
+            Lead::Motion { .. } => f64::INFINITY,
+            Lead::Manoeuvre { manoeuvre, since } => since + manoeuvre.duration(),
+        };
+        self.leads.iter().flatten().map(end).fold(0.0, f64::max)
+    }
+
+    /// Where a leader's program has it at `time` \[m\].
+    fn led_to(&self, member: usize, time: f64) -> Option<[f64; 2]> {
+        let place = self.places.get(member);
+        Some(match self.leads[member].as_ref()? {
+            Lead::External(told) => *told,
+            Lead::Motion { motion, since } => {
+                let [dx, dy] = motion.displacement(time - since, 0, place);
+                [place[0] + dx, place[1] + dy]
+            }
+            Lead::Manoeuvre { manoeuvre, since } => manoeuvre.affine(time - since).apply(place),
+        })
+    }
+
+    /// Moves the formation on by a period that ends at `time` \[s\]: `targets` become where the leaders' programs and
+    /// the rule send the members that were seen. With more than one sweep the followers come nearer to
+    /// where they would rest behind the leaders.
+    pub fn advance(&mut self, seen: &Seen<'_>, time: f64, sweeps: usize, targets: &mut Points) {
+        let leads: Vec<(usize, [f64; 2])> =
+            (0..self.count()).filter_map(|m| Some((m, self.led_to(m, time)?))).collect();
+        match &mut self.course {
+            Course::Recorded { steps, step } => {
+                *step = (*step + 1).min(steps.len() - 1);
+                steps[*step].iter().enumerate().for_each(|(m, &place)| targets.set(m, place));
+            }
+            Course::Inside { engine, shares } => {
+                engine.advance();
+                for (m, shares) in shares.iter().enumerate() {
+                    targets.set(m, inside::place(shares, engine.present()));
+                }
+            }
+            Course::Rule { engine, particles } => {
+                let members = 0..particles.len();
+                engine
+                    .observe(members.filter(|&m| seen.known[m]).map(|m| (particles[m], seen.present.get(m))));
+                for sweep in 0..sweeps {
+                    leads.iter().for_each(|&(m, place)| engine.lead(particles[m], place));
+                    engine.advance();
+                    // The first sweep tells the leaders' move to their neighbours alone.
+                    if sweep > 0 && engine.movement().largest_move <= SETTLED {
+                        break;
+                    }
+                }
+                particles.iter().enumerate().for_each(|(m, &i)| targets.set(m, engine.present().get(i)));
+            }
+        }
+        self.look_at_roles();
+    }
+
+    /// The follower's target by those of its neighbours alone whom `keeps` names, as [`Formation::advance`] would
+    /// have it from where they were seen; `None` where they are too few.
+    pub fn target_among(
+        &self,
+        member: usize,
+        seen: &Seen<'_>,
+        keeps: impl Fn(usize) -> bool + Clone,
+    ) -> Option<[f64; 2]> {
+        let Course::Rule { engine, particles } = &self.course else { return None };
+        // The engine's state before the step, which the members' sightings were put into.
+        let before = engine.previous();
+        let of_particle = |i: usize| particles.binary_search(&i).ok();
+        let interaction = engine.interaction();
+        let target = interaction.target_among(particles[member], before, |i| {
+            of_particle(i).is_none_or(|m| seen.usable[m] && keeps(m))
+        })?;
+        let damping = engine.update().damping;
+        let here = seen.present.get(member);
+        Some([0, 1].map(|k| here[k] + damping * (target[k] - here[k])))
+    }
+
+    /// The neighbours of a member among the members.
+    pub fn neighbours(&self, member: usize) -> impl Iterator<Item = usize> + '_ {
+        let (engine, particles) = match &self.course {
+            Course::Rule { engine, particles } => (Some(engine), &particles[..]),
+            _ => (None, &[][..]),
+        };
+        let of = engine.map_or(&[][..], |engine| engine.interaction().neighbours.of(particles[member]));
+        of.iter().filter_map(|&i| particles.binary_search(&(i as usize)).ok())
+    }
+
+    /// Where each member comes to rest with the leaders at `leaders` (those of `present` that lead) \[m\]; `None`
+    /// where the rule is not linear.
+    pub fn settled(&self, present: &Points) -> Option<Points> {
+        let Course::Rule { particles, .. } = &self.course else { return None };
+        let settling = self.settling.as_ref()?;
+        let of_particle = |i: usize| {
+            let m = particles.binary_search(&i).ok()?;
+            let (now, then) = (present.get(m), self.places.get(m));
+            Some([now[0] - then[0], now[1] - then[1]])
+        };
+        let displaced = settling.displacements(of_particle);
+        let mut rest: Points = self.places.clone();
+        for (m, &i) in particles.iter().enumerate() {
+            match displaced[i] {
+                Some(u) => rest.set(m, [self.places.x[m] + u[0], self.places.y[m] + u[1]]),
+                None => rest.set(m, present.get(m)),
+            }
+        }
+        Some(rest)
+    }
+
+    pub fn damping(&self) -> f64 {
+        self.engine().map_or(1.0, |engine| engine.update().damping)
+    }
+
+    /// Goes this much of the way to each target from the next period on \[1\].
+    pub fn set_damping(&mut self, damping: f64) {
+        if let Course::Rule { engine, .. } = &mut self.course {
+            engine.set_rule(engine.interaction().rule, damping);
+        }
+    }
+
+    /// PE1 of a member \[m^2\] with all where `present` has them.
+    pub fn measures(&self, present: &Points) -> Measures {
+        let Course::Rule { engine, particles } = &self.course else {
+            return Measures { pe1: vec![0.0; self.count()], strain: vec![None; self.count()] };
+        };
+        let mut body = engine.present().clone();
+        particles.iter().enumerate().for_each(|(m, &i)| body.set(i, present.get(m)));
+        if let Some(frame) = &engine.body().frame {
+            let seen = body.clone();
+            frame.follow(&engine.body().reference, &seen, &mut body);
+        }
+        let interaction = engine.interaction();
+        Measures {
+            pe1: particles.iter().map(|&i| pe1(interaction, i, &body)).collect(),
+            strain: particles.iter().map(|&i| strain(interaction, i, &body)).collect(),
+        }
+    }
+
+    fn look_at_roles(&mut self) {
+        let Course::Rule { engine, .. } = &self.course else { return };
+        if self.settled_roles != engine.roles() {
+            self.settled_roles = engine.roles().to_vec();
+            self.settling = Settling::of(engine);
+        }
+    }
+}
+
+/// What the formation suffers.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Measures {
+    /// \[m^2\], shape \[members\].
+    pub pe1: Vec<f64>,
+    /// Shape \[members\]; `None` where the neighbours lie on a line.
+    pub strain: Vec<Option<Strain>>,
+}
+
+/// Largest move over the spacing at which a formation that is swept to rest is at rest.
+const SETTLED: f64 = 1e-14;
+
+fn spacing_of(places: &Points) -> f64 {
+    let pairs = (0..places.len()).flat_map(|i| (0..i).map(move |j| (i, j)));
+    let nearest = pairs.map(|(i, j)| distance(places.get(i), places.get(j))).fold(f64::INFINITY, f64::min);
+    if nearest.is_finite() { nearest } else { 1.0 }
+}

@@ -1,0 +1,110 @@
+//! Double integrator with limits on speed and acceleration, the acceleration constant over a period.
+
+use super::Robot;
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DoubleIntegrator {
+    /// Highest speed \[m/s\], default 1.
+    pub speed: f64,
+    /// Highest acceleration, and deceleration \[m/s^2\], default 1.
+    pub acceleration: f64,
+}
+
+impl Default for DoubleIntegrator {
+    fn default() -> Self {
+        Self { speed: 1.0, acceleration: 1.0 }
+    }
+}
+
+impl DoubleIntegrator {
+    /// Takes the highest speed towards the target from which it can still brake in time; from rest, to a
+    /// target that stays, it stands on it after finitely many periods and never goes past it. With speed
+    /// sideways it shares its acceleration between the two directions and may swing around.
+    pub fn step(&self, robot: &mut Robot, target: [f64; 2], dt: f64) {
+        let velocity = robot.velocity;
+        // The period moves it by dt (v + v') / 2, of which the half with v is settled.
+        let offset = robot.offset_to(target);
+        let open = [0, 1].map(|k| offset[k] - 0.5 * dt * velocity[k]);
+        let length = open[0].hypot(open[1]);
+        let wanted = self.approach(length, dt).min(self.speed);
+        let towards = if length > 0.0 { open.map(|d| d / length) } else { [0.0; 2] };
+        self.accelerate(robot, towards.map(|t| wanted * t), dt);
+    }
+
+    /// Comes to rest as soon as it can.
+    pub fn brake(&self, robot: &mut Robot, dt: f64) {
+        self.accelerate(robot, [0.0; 2], dt);
+    }
+
+    /// Goes on for a period with the velocity nearest to `wanted` \[m/s\] that it can reach in it.
+    fn accelerate(&self, robot: &mut Robot, wanted: [f64; 2], dt: f64) {
+        let velocity = robot.velocity;
+        let change = [0, 1].map(|k| wanted[k] - velocity[k]);
+        let (size, most) = (change[0].hypot(change[1]), self.acceleration * dt);
+        let share = if size > most { most / size } else { 1.0 };
+        robot.velocity = [0, 1].map(|k| velocity[k] + share * change[k]);
+        robot.position = [0, 1].map(|k| robot.position[k] + 0.5 * dt * (velocity[k] + robot.velocity[k]));
+    }
+
+    /// The speed `v'` at the end of this period that covers `length` \[m\] in `v' dt / 2` and the way it
+    /// takes to brake. In units of `a dt` and `a dt^2`, a speed of `n + r`, `n` whole and `0 <= r < 1`,
+    /// takes `n (n + 1) / 2 + r (n + 1)`: whole periods of braking, the rest in the last.
+    fn approach(&self, length: f64, dt: f64) -> f64 {
+        let unit = self.acceleration * dt;
+        let way = length / (unit * dt);
+        let whole = ((0.25 + 2.0 * way).sqrt() - 0.5).floor();
+        unit * (whole + (way - 0.5 * whole * (whole + 1.0)) / (whole + 1.0))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::DT;
+    use super::*;
+    use crate::flock::points::distance;
+
+    #[test]
+    fn it_keeps_its_limits_whatever_its_target_does() {
+        let double = DoubleIntegrator { speed: 1.2, acceleration: 0.6 };
+        let mut robot = Robot::at([0.0, 0.0], 0.0);
+        for k in 0..2000 {
+            let angle = 0.7 * f64::from(k / 30);
+            let before = robot.velocity;
+            double.step(&mut robot, [8.0 * angle.cos(), 5.0 * (1.7 * angle).sin()], DT);
+            let change = distance(before, robot.velocity);
+            assert!(change <= 0.6 * DT + 1e-12, "{change}");
+            assert!(robot.velocity[0].hypot(robot.velocity[1]) <= 1.2 + 1e-12);
+        }
+    }
+
+    #[test]
+    fn from_rest_it_brakes_in_time_and_lands_within_a_period_of_the_best_there_is() {
+        for length in [1e-5, 0.01, 0.3, 0.9, 1.0, 7.3] {
+            let double = DoubleIntegrator::default();
+            let mut robot = Robot::at([0.0, 0.0], 0.0);
+            // Bang-bang: 2 sqrt(l) below the speed limit, l + 1 above.
+            let best: f64 = if length < 1.0 { 2.0 * f64::sqrt(length) } else { length + 1.0 };
+            let periods = (best / DT).ceil() as usize + 2;
+            for _ in 0..periods {
+                double.step(&mut robot, [length, 0.0], DT);
+                assert!(robot.position[0] <= length + 1e-12, "past {length} at {:?}", robot.position);
+                assert!(robot.velocity[0] >= -1e-12);
+            }
+            let missing = (robot.position[0] - length).abs().max(robot.velocity[0].abs());
+            assert!(missing <= 1e-9, "{missing} left of {length} after {periods} periods");
+        }
+    }
+
+    #[test]
+    fn from_any_velocity_it_comes_to_stand_on_its_target() {
+        for turn in 0..12 {
+            let angle = f64::from(turn) / 6.0 * std::f64::consts::PI;
+            let mut robot = Robot { velocity: [angle.cos(), angle.sin()], ..Robot::at([0.0, 0.0], 0.0) };
+            for _ in 0..400 {
+                DoubleIntegrator::default().step(&mut robot, [0.4, 0.2], DT);
+            }
+            assert!(distance(robot.position, [0.4, 0.2]) < 1e-9, "{robot:?}");
+            assert!(robot.velocity[0].hypot(robot.velocity[1]) < 1e-9, "{robot:?}");
+        }
+    }
+}

@@ -1,0 +1,49 @@
+//! Single integrator with a speed limit: a quadrotor under a position controller, seen from far.
+
+use super::Robot;
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Integrator {
+    /// Highest speed \[m/s\], default 1.
+    pub speed: f64,
+}
+
+impl Default for Integrator {
+    fn default() -> Self {
+        Self { speed: 1.0 }
+    }
+}
+
+impl Integrator {
+    /// Straight towards the target, so it stays in every convex cell that holds both; never past it.
+    pub fn step(&self, robot: &mut Robot, target: [f64; 2], dt: f64) {
+        let offset = robot.offset_to(target);
+        let (length, reach) = (offset[0].hypot(offset[1]), self.speed * dt);
+        let place = if length <= reach {
+            target
+        } else {
+            [0, 1].map(|k| robot.position[k] + offset[k] * (reach / length))
+        };
+        robot.move_to(place, dt);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flock::points::distance;
+
+    #[test]
+    fn it_keeps_its_speed_limit_and_lands_on_the_target() {
+        let integrator = Integrator { speed: 0.7 };
+        let (mut robot, target, dt) = (Robot::at([0.0, 0.0], 0.0), [2.102, 0.0], 0.03);
+        let periods = (distance(robot.position, target) / (0.7 * dt)).ceil() as usize;
+        for period in 1..=periods {
+            let before = robot.position;
+            integrator.step(&mut robot, target, dt);
+            assert!(distance(before, robot.position) <= 0.7 * dt + 1e-12);
+            assert!(robot.velocity[0].hypot(robot.velocity[1]) <= 0.7 + 1e-12);
+            assert_eq!(robot.position == target, period == periods, "in period {period}");
+        }
+    }
+}

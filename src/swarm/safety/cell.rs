@@ -1,0 +1,135 @@
+//! A member's cell: the intersection of half-planes in which it may move, and the point of it that is
+//! nearest to where the member wants to go.
+//!
+//! Everything is relative to the member's own place, so that a half-plane whose offset is not
+//! negative contains the member, and a cell of such half-planes is never empty.
+
+/// The points `x` with `normal . x <= offset` \[m\], relative to the member.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HalfPlane {
+    /// Unit vector that points out of the half-plane.
+    pub normal: [f64; 2],
+    /// Distance of the member from the border \[m\]; negative if the member stands outside.
+    pub offset: f64,
+}
+
+/// An intersection of half-planes.
+#[derive(Clone, Debug, Default)]
+pub struct Cell {
+    pub planes: Vec<HalfPlane>,
+}
+
+/// Rounding that is no violation, in units of the lengths involved \[1\].
+const ROUNDING: f64 = 1e-13;
+
+/// Shares of the way back into its cell that a member outside it tries to make in one step.
+const SHARES: [f64; 6] = [1.0, 0.5, 0.25, 0.125, 0.0625, 0.0];
+
+impl Cell {
+    /// Whether the member stands outside by more than rounding.
+    pub fn is_left(&self) -> bool {
+        self.planes.iter().any(|plane| plane.offset < 0.0)
+    }
+
+    /// The point of the cell within `reach` \[m\] of the member that is nearest to `wanted` \[m\], and the way
+    /// to it free: a step along the straight line from the member to the point, of any length, comes no
+    /// nearer to anything than allowed.
+    ///
+    /// Where the member stands outside (negative offsets) and the cell is empty, it is brought back as
+    /// large a share of the way as leaves a cell, and at least moves no further out. Never fails: where
+    /// there is nowhere to go the member stays.
+    pub fn nearest(&self, wanted: [f64; 2], reach: f64) -> [f64; 2] {
+        let shares = if self.is_left() { &SHARES[..] } else { &SHARES[..1] };
+        let found = shares.iter().find_map(|&share| self.projection(wanted, reach, share));
+        found.map_or([0.0; 2], |point| self.cut(point))
+    }
+
+    /// Projection of `wanted` onto the cell whose negative offsets count only this share, and onto the
+    /// disc of radius `reach`; `None` if that is empty. Half-plane after half-plane: where one is violated
+    /// the optimum lies on its border (Seidel, "Small-dimensional linear programming and convex hulls
+    /// made easy", 1991).
+    fn projection(&self, wanted: [f64; 2], reach: f64, share: f64) -> Option<[f64; 2]> {
+        let mut point = shortened(wanted, reach);
+        for (k, plane) in self.planes.iter().enumerate() {
+            if dot(plane.normal, point) > plane.shared(reach, share) {
+                point = self.on_border(k, wanted, reach, share)?;
+            }
+        }
+        Some(point)
+    }
+
+    /// The point nearest to `wanted` on the border of half-plane `k` and in all before it.
+    fn on_border(&self, k: usize, wanted: [f64; 2], reach: f64, share: f64) -> Option<[f64; 2]> {
+        let HalfPlane { normal, .. } = self.planes[k];
+        let offset = self.planes[k].shared(reach, share);
+        let along = [-normal[1], normal[0]];
+        let foot = [offset * normal[0], offset * normal[1]];
+        let half_chord = (reach * reach - offset * offset).max(0.0).sqrt();
+        let (mut low, mut high) = (-half_chord, half_chord);
+        for plane in &self.planes[..k] {
+            let slope = dot(plane.normal, along);
+            let other = plane.shared(reach, share);
+            let room = other - dot(plane.normal, foot);
+            if slope.abs() <= ROUNDING {
+                // Parallel: either all of the border is inside or none of it.
+                if room < -ROUNDING * (offset.abs() + other.abs()) {
+                    return None;
+                }
+            } else if slope > 0.0 {
+                high = high.min(room / slope);
+            } else {
+                low = low.max(room / slope);
+            }
+        }
+        if low > high + ROUNDING * (low.abs() + high.abs()) {
+            return None;
+        }
+        // `low` may exceed `high` by rounding: then either will do.
+        let at = dot(wanted, along).max(low).min(high);
+        Some([foot[0] + at * along[0], foot[1] + at * along[1]])
+    }
+
+    /// Cuts the way to `point` where it leaves a half-plane, whatever rounding did before.
+    fn cut(&self, point: [f64; 2]) -> [f64; 2] {
+        let share = self.share(point);
+        [share * point[0], share * point[1]]
+    }
+
+    /// The share of the straight way to `point` \[m\] that leads no further out of any half-plane \[1\].
+    pub fn share(&self, point: [f64; 2]) -> f64 {
+        let length = length(point);
+        let mut share = 1.0_f64;
+        for plane in &self.planes {
+            let (forward, allowed) = (dot(plane.normal, point), plane.offset.max(0.0));
+            if forward > allowed + ROUNDING * (length + allowed) {
+                share = share.min(allowed / forward);
+            }
+        }
+        share
+    }
+}
+
+impl HalfPlane {
+    /// The offset, of which only a share counts where it is negative, and no more than is in reach.
+    fn shared(&self, reach: f64, share: f64) -> f64 {
+        if self.offset < 0.0 { share * self.offset.max(-reach) } else { self.offset }
+    }
+}
+
+pub fn dot(a: [f64; 2], b: [f64; 2]) -> f64 {
+    a[0] * b[0] + a[1] * b[1]
+}
+
+pub fn length(way: [f64; 2]) -> f64 {
+    way[0].hypot(way[1])
+}
+
+/// The way, or as much of it as is `most` \[m\] long.
+pub fn shortened(way: [f64; 2], most: f64) -> [f64; 2] {
+    let length = length(way);
+    if length <= most {
+        return way;
+    }
+    let share = most / length;
+    [share * way[0], share * way[1]]
+}

@@ -1,0 +1,104 @@
+//! The way out of a deadlock: who is blocked for some ticks keeps to the right.
+//!
+//! Members that want to swap places stop each other: every one stands at the point of its cell that is
+//! nearest to its goal, and nobody moves. Zhou et al. (2017, section V) break the symmetry by the
+//! right-hand rule. Here a blocked member aims to the right of its goal, a quarter turn first and
+//! further back if that does not move it either, until the straight way is free again for as long as
+//! it took to give it up. The aim is projected onto the cell like any other: a detour cannot do harm.
+//! It finds the way round convex things, not out of a maze.
+
+use super::cell::dot;
+
+/// When a blocked member looks for a way round.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Patience {
+    /// Ticks without progress before a detour, and with progress before it ends; default 3. At 0 nobody
+    /// ever makes a detour.
+    pub ticks: u32,
+    /// Share \[1\] of the way a member could make in a tick (at most its own size) below which it is
+    /// blocked; default 0.1.
+    pub blocked: f64,
+    /// The same, above which its way is free; default 0.5.
+    pub free: f64,
+}
+
+impl Default for Patience {
+    fn default() -> Self {
+        Self { ticks: 3, blocked: 0.1, free: 0.5 }
+    }
+}
+
+/// One member's memory.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Detour {
+    /// Ticks in a row that speak for a change.
+    ticks: u32,
+    /// Eighths of a turn to the right; 0 is straight ahead.
+    turn: u8,
+    /// Distance from the goal where the detour began \[m\].
+    begun: f64,
+}
+
+/// What a member could do and did at a tick; all relative to it.
+#[derive(Clone, Copy, Debug)]
+pub struct Tick {
+    /// How far it could go in open space \[m\], at most.
+    pub scale: f64,
+    /// Its goal \[m\].
+    pub wanted: [f64; 2],
+    /// The share of `scale` \[1\] that is free straight to the goal.
+    pub straight: f64,
+    /// The point of the cell nearest to the goal, as far as `scale` \[m\].
+    pub direct: [f64; 2],
+    /// Its step by its present aim \[m\].
+    pub moved: [f64; 2],
+}
+
+/// A quarter turn, where detours begin, and the furthest, in eighths.
+const FIRST: u8 = 2;
+const LAST: u8 = 4;
+
+impl Detour {
+    pub fn is_active(self) -> bool {
+        self.turn > 0
+    }
+
+    /// Where to aim instead of `wanted` \[m\], relative to the member.
+    pub fn aim(self, wanted: [f64; 2]) -> [f64; 2] {
+        let angle = -std::f64::consts::FRAC_PI_4 * f64::from(self.turn);
+        let (sin, cos) = angle.sin_cos();
+        [cos * wanted[0] - sin * wanted[1], sin * wanted[0] + cos * wanted[1]]
+    }
+
+    /// Takes note of a tick.
+    pub fn update(&mut self, patience: &Patience, tick: &Tick) {
+        let Tick { scale, wanted, straight, direct, moved } = *tick;
+        let length = wanted[0].hypot(wanted[1]);
+        let progress = dot(direct, wanted) / (length * scale);
+        // Sliding back to where the detour began is no progress: the way is free that leads straight on,
+        // or past something from a place nearer to the goal.
+        let is_free = straight > patience.free || (progress > patience.free && length < self.begun);
+        let speaks_for_change = match self.turn {
+            0 => progress < patience.blocked,
+            _ => is_free || moved[0].hypot(moved[1]) < patience.blocked * scale,
+        };
+        self.ticks = if speaks_for_change { self.ticks + 1 } else { 0 };
+        if patience.ticks == 0 || self.ticks < patience.ticks {
+            return;
+        }
+        self.ticks = 0;
+        self.turn = match self.turn {
+            0 => {
+                self.begun = length;
+                FIRST
+            }
+            _ if is_free => 0,
+            LAST => FIRST,
+            turn => turn + 1,
+        };
+    }
+
+    pub fn reset(&mut self) {
+        *self = Self::default();
+    }
+}

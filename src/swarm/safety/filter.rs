@@ -1,0 +1,210 @@
+//! The filter: one pass over the members, each with a cell of its own.
+
+use super::cell::Cell;
+use super::deadlock::Detour;
+use super::limits::{Limits, SafetyError};
+use super::obstacles::Obstacles;
+use crate::flock::grid::CellGrid;
+use crate::flock::points::{Points, distance};
+
+/// What changed a target: bits that may stand together.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Flags(pub u32);
+
+impl Flags {
+    /// The target was further than the speed limit reaches in a period.
+    pub const SPEED_LIMITED: u32 = 1;
+    /// The change of velocity was too large, or braking needs the room.
+    pub const ACCELERATION_LIMITED: u32 = 2;
+    /// The way was cut or bent by the geofence.
+    pub const GEOFENCED: u32 = 4;
+    /// The same by another member.
+    pub const SEPARATED: u32 = 8;
+    /// The same by an obstacle.
+    pub const OBSTRUCTED: u32 = 16;
+    /// The member keeps to the right to get around what blocks it.
+    pub const RESOLVING_DEADLOCK: u32 = 32;
+    /// The member got no target: its pose is not known, or the wanted target is not finite. It stays.
+    pub const HELD: u32 = 64;
+
+    pub fn has(self, flag: u32) -> bool {
+        self.0 & flag != 0
+    }
+}
+
+/// What is known of the members at a tick; shapes \[count\].
+#[derive(Clone, Copy, Debug)]
+pub struct Seen<'a> {
+    /// Last known places \[m, world frame\]; not finite for a member that was never seen.
+    pub present: &'a Points,
+    /// Whether a member gets a target. The others are avoided where they were last seen.
+    pub known: &'a [bool],
+    /// Ages of the poses \[s\].
+    pub ages: &'a [f64],
+    /// Present velocities \[m/s\]; without them no acceleration is limited.
+    pub velocity: Option<&'a Points>,
+}
+
+/// The safety filter of a swarm. Nothing is allocated per tick once its buffers have grown.
+#[derive(Clone)]
+pub struct Filter {
+    pub(super) limits: Limits,
+    pub(super) radii: Vec<f64>,
+    pub(super) largest_radius: f64,
+    pub(super) obstacles: Obstacles,
+    pub(super) fence: Obstacles,
+    pub(super) detours: Vec<Detour>,
+    pub(super) crowd: Crowd,
+    pub(super) cell: Cell,
+}
+
+/// Who can be met at this tick.
+#[derive(Clone, Default)]
+pub(super) struct Crowd {
+    grid: CellGrid,
+    /// Whether a member was ever seen.
+    seen: Vec<bool>,
+    /// Largest drift of a member from its pose \[m\].
+    drift: f64,
+    /// Who is near the member in hand, in order of index.
+    pub(super) found: Vec<u32>,
+}
+
+/// Swarms below this many members are scanned: a grid costs more.
+const GRID_FROM: usize = 64;
+
+impl Filter {
+    /// A filter for as many members as there are `radii` \[m\].
+    ///
+    /// # Errors
+    /// A limit or a radius that is negative or not a number, a geofence that is no polygon.
+    pub fn new(limits: Limits, radii: Vec<f64>, obstacles: Obstacles) -> Result<Self, SafetyError> {
+        limits.check()?;
+        let wrong = radii.iter().position(|radius| !(radius.is_finite() && *radius >= 0.0));
+        if let Some(member) = wrong {
+            return Err(SafetyError::Radius { member, radius: radii[member] });
+        }
+        let fence = limits.geofence.as_deref().map(Obstacles::fence).transpose()?.unwrap_or_default();
+        Ok(Self {
+            largest_radius: radii.iter().copied().fold(0.0, f64::max),
+            detours: vec![Detour::default(); radii.len()],
+            limits,
+            radii,
+            obstacles,
+            fence,
+            crowd: Crowd::default(),
+            cell: Cell::default(),
+        })
+    }
+
+    pub fn limits(&self) -> &Limits {
+        &self.limits
+    }
+
+    /// Changes the limits from the next tick on; detours go on.
+    ///
+    /// # Errors
+    /// As [`Filter::new`]; the old limits then stay.
+    pub fn set_limits(&mut self, limits: Limits) -> Result<(), SafetyError> {
+        limits.check()?;
+        self.fence = limits.geofence.as_deref().map(Obstacles::fence).transpose()?.unwrap_or_default();
+        self.limits = limits;
+        Ok(())
+    }
+
+    /// Safe targets \[m, world frame\] for the wanted ones over the next `period` \[s\], and what changed
+    /// them. The members are to go straight to their targets, at any pace; the speed is
+    /// `|safe - present| / period`.
+    ///
+    /// # Panics
+    /// If the slices are not as long as there are members.
+    pub fn apply(
+        &mut self,
+        seen: &Seen,
+        wanted: &Points,
+        period: f64,
+        safe: &mut Points,
+        flags: &mut [Flags],
+    ) {
+        let count = self.radii.len();
+        let lengths = [seen.present.len(), seen.known.len(), seen.ages.len(), wanted.len(), flags.len()];
+        assert_eq!(lengths, [count; 5], "one of everything for each member");
+        self.meet(seen, wanted, period);
+        safe.clone_from(seen.present);
+        for (member, flags) in flags.iter_mut().enumerate() {
+            let (target, changed) = self.target(seen, wanted.get(member), period, member);
+            safe.set(member, target);
+            *flags = changed;
+        }
+    }
+
+    /// Sorts the members for the queries to come.
+    fn meet(&mut self, seen: &Seen, wanted: &Points, period: f64) {
+        let count = self.radii.len();
+        let drift = (0..count).map(|member| self.drift(seen, member)).fold(0.0, f64::max);
+        let Crowd { grid, seen: ever_seen, drift: largest, .. } = &mut self.crowd;
+        *largest = drift;
+        ever_seen.clear();
+        ever_seen.extend(seen.present.iter().map(|[x, y]| x.is_finite() && y.is_finite()));
+        if count < GRID_FROM {
+            return;
+        }
+        // Cells as wide as the mean query: whoever has further to go looks through more of them.
+        let step = self.limits.speed * period;
+        let ways =
+            seen.present.iter().zip(wanted.iter()).map(|(here, there)| distance(here, there).min(step));
+        let (sum, finite) =
+            ways.filter(|way| way.is_finite()).fold((0.0, 0.0), |(sum, n), way| (sum + way, n + 1.0));
+        let reach = if finite > 0.0 { sum / finite } else { 0.0 };
+        let radius = 2.0 * self.largest_radius + self.limits.clearance + 2.0 * reach;
+        grid.fill(seen.present, ever_seen, radius.max(f64::MIN_POSITIVE));
+    }
+
+    /// Finds all members that matter to one that moves no further than `reach` \[m\].
+    pub(super) fn find(&mut self, seen: &Seen, reach: f64, member: usize) {
+        let drift = self.drift(seen, member) + self.crowd.drift;
+        let radius = self.radii[member] + self.largest_radius + self.limits.clearance;
+        let radius = radius + 2.0 * reach + 4.0 * drift;
+        let Crowd { grid, seen: ever_seen, found, .. } = &mut self.crowd;
+        found.clear();
+        if !self.limits.keeps_apart {
+            return;
+        }
+        if self.radii.len() >= GRID_FROM {
+            grid.within(seen.present, member, radius, found);
+            found.sort_unstable();
+            return;
+        }
+        let here = seen.present.get(member);
+        for (other, there) in seen.present.iter().enumerate() {
+            if other != member && ever_seen[other] && distance(here, there) <= radius {
+                found.push(other as u32);
+            }
+        }
+    }
+
+    /// How far a member may be from its pose \[m\].
+    pub(super) fn drift(&self, seen: &Seen, member: usize) -> f64 {
+        let age = seen.ages[member];
+        if self.limits.speed.is_finite() && age > 0.0 { self.limits.speed * age } else { 0.0 }
+    }
+
+    /// Free space between each member's rim and the nearest rim of another member or border of an
+    /// obstacle \[m\], negative where they overlap; infinite for a member without a pose and for one
+    /// that has nothing around it. For reports: it takes the square of the number of members.
+    pub fn clearance(&self, present: &Points, nearest: &mut Vec<f64>) {
+        nearest.clear();
+        nearest.extend(present.iter().zip(&self.radii).map(|(place, radius)| {
+            let finite = place.iter().all(|value| value.is_finite());
+            if finite { self.obstacles.distance(place) - radius } else { f64::INFINITY }
+        }));
+        for a in 0..present.len() {
+            for b in a + 1..present.len() {
+                let gap = distance(present.get(a), present.get(b)) - self.radii[a] - self.radii[b];
+                // A place that is not finite gives NaN or infinity, which `min` leaves out.
+                nearest[a] = nearest[a].min(gap);
+                nearest[b] = nearest[b].min(gap);
+            }
+        }
+    }
+}

@@ -1,0 +1,91 @@
+//! What robots must not do.
+
+use super::deadlock::Patience;
+
+/// What the filter holds every member to.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Limits {
+    /// Highest speed \[m/s\]; default none (infinite). It also bounds how far a member may have strayed
+    /// from an old pose: without it old poses are taken for present ones.
+    pub speed: f64,
+    /// Highest acceleration \[m/s^2\]; default none (infinite). It takes velocities to hold it.
+    pub acceleration: f64,
+    /// Whether members are kept apart from each other at all; default yes. Without it the clearance is
+    /// that from obstacles.
+    pub keeps_apart: bool,
+    /// Free space kept between the rims of two members, and of a member and an obstacle \[m\];
+    /// default 0.
+    pub clearance: f64,
+    /// Polygon that every member's disc stays inside \[m, world frame\], vertices in order, either way
+    /// round, convex or not; default none.
+    pub geofence: Option<Vec<[f64; 2]>>,
+    /// When a blocked member looks for a way round; default after 3 ticks.
+    pub patience: Patience,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self {
+            speed: f64::INFINITY,
+            acceleration: f64::INFINITY,
+            keeps_apart: true,
+            clearance: 0.0,
+            geofence: None,
+            patience: Patience::default(),
+        }
+    }
+}
+
+/// Why there is no filter.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SafetyError {
+    #[error("limit `{name}` = {value}: give a number {range}, or leave it out for {default}")]
+    Limit { name: &'static str, value: f64, range: &'static str, default: &'static str },
+    #[error("radius of member {member} = {radius} m: give a number from 0 up")]
+    Radius { member: usize, radius: f64 },
+    #[error("{place} has {count} corners: give at least 3")]
+    Corners { place: Place, count: usize },
+    #[error("{place} has a number that is not finite or beyond 1e100 m: give finite coordinates in metres")]
+    NotFinite { place: Place },
+    #[error("{place} has no area: give corners that do not lie on one line")]
+    NoArea { place: Place },
+    #[error("{place}: edges {first} and {second} (from 0) cross: give corners in order around the shape")]
+    Crossing { place: Place, first: usize, second: usize },
+    #[error("{place} has radius {radius} m: give a positive number")]
+    Disc { place: Place, radius: f64 },
+}
+
+/// Which shape an error is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Place {
+    Geofence,
+    /// By its index in the list of obstacles.
+    Obstacle(usize),
+}
+
+impl std::fmt::Display for Place {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Place::Geofence => write!(f, "the geofence"),
+            Place::Obstacle(index) => write!(f, "obstacle {index} (from 0)"),
+        }
+    }
+}
+
+impl Limits {
+    /// Refuses limits that are negative or not numbers.
+    pub(super) fn check(&self) -> Result<(), SafetyError> {
+        let positive = [("speed", self.speed), ("acceleration", self.acceleration)];
+        for (name, value) in positive {
+            if value.is_nan() || value <= 0.0 {
+                return Err(SafetyError::Limit { name, value, range: "above 0", default: "no limit" });
+            }
+        }
+        let value = self.clearance;
+        if !(value.is_finite() && value >= 0.0) {
+            let (name, range) = ("clearance", "from 0 up");
+            return Err(SafetyError::Limit { name, value, range, default: "0" });
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,362 @@
+//! What stands in the way: polygons and discs behind a tree of bounding boxes. The one file that
+//! speaks to parry.
+//!
+//! Solids are kept out by their borders. Outside a polygon, each edge near the member gives a
+//! half-plane, unless it lies behind that of a nearer one: the edge is convex, so it lies wholly behind
+//! the plane through its nearest point across the line to it, and whoever stays before that plane keeps its distance, however far the
+//! step. That holds for concave polygons too, since nobody gets inside without crossing an edge.
+//! Whoever starts inside is led out by the nearest point of the border, and its depth.
+
+use parry2d::bounding_volume::Aabb;
+use parry2d::math::{Pose, Vector};
+use parry2d::partitioning::{Bvh, BvhBuildStrategy};
+use parry2d::query::{PointQuery, ShapeCastOptions, cast_shapes};
+use parry2d::shape::{Ball, Segment};
+
+use super::cell::HalfPlane;
+use super::limits::{Place, SafetyError};
+use crate::flock::shape::segments_cross;
+
+/// A solid \[m, world frame\].
+#[derive(Clone, Debug, PartialEq)]
+pub enum Obstacle {
+    /// Corners in order, either way round, convex or not; the last joins the first.
+    Polygon(Vec<[f64; 2]>),
+    Disc {
+        centre: [f64; 2],
+        radius: f64,
+    },
+}
+
+/// Solids, ready to be asked what is near.
+#[derive(Clone, Default)]
+pub struct Obstacles {
+    pieces: Vec<Piece>,
+    outlines: Vec<Outline>,
+    tree: Bvh,
+    /// Whether a member stands in the outline's solid, for the member asked about last.
+    within: Vec<bool>,
+    /// Pieces near that member, with their distances \[m\].
+    near: Vec<(f64, u32)>,
+}
+
+#[derive(Clone, Copy)]
+enum Piece {
+    Edge { segment: Segment, outline: usize },
+    Disc { centre: Vector, ball: Ball },
+}
+
+/// The border of one polygon.
+#[derive(Clone)]
+struct Outline {
+    corners: Vec<[f64; 2]>,
+    low: [f64; 2],
+    high: [f64; 2],
+    /// The solid is all that lies outside: a fence.
+    inverted: bool,
+    /// Corners run anticlockwise.
+    anticlockwise: bool,
+}
+
+/// Coordinates up to this are told apart from nonsense \[m\]: their squares must not overflow.
+const LARGEST: f64 = 1e100;
+
+impl Obstacles {
+    /// # Errors
+    /// A polygon of fewer than 3 corners, without area or with crossing edges, a disc without radius,
+    /// a number that is not finite.
+    pub fn new(obstacles: &[Obstacle]) -> Result<Self, SafetyError> {
+        let mut built = Self::default();
+        for (index, obstacle) in obstacles.iter().enumerate() {
+            let place = Place::Obstacle(index);
+            match obstacle {
+                Obstacle::Polygon(corners) => built.add_outline(corners, false, place)?,
+                Obstacle::Disc { centre, radius } => built.add_disc(*centre, *radius, place)?,
+            }
+        }
+        built.grow_tree();
+        Ok(built)
+    }
+
+    /// All that lies outside a polygon.
+    pub(super) fn fence(corners: &[[f64; 2]]) -> Result<Self, SafetyError> {
+        let mut built = Self::default();
+        built.add_outline(corners, true, Place::Geofence)?;
+        built.grow_tree();
+        Ok(built)
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.pieces.is_empty()
+    }
+
+    fn add_outline(&mut self, corners: &[[f64; 2]], inverted: bool, place: Place) -> Result<(), SafetyError> {
+        let twice_area = check_polygon(corners, place)?;
+        let outline = self.outlines.len();
+        for (k, &a) in corners.iter().enumerate() {
+            let b = corners[(k + 1) % corners.len()];
+            if a != b {
+                self.pieces.push(Piece::Edge { segment: Segment::new(vector(a), vector(b)), outline });
+            }
+        }
+        let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        for corner in corners {
+            for k in 0..2 {
+                (low[k], high[k]) = (low[k].min(corner[k]), high[k].max(corner[k]));
+            }
+        }
+        let anticlockwise = twice_area > 0.0;
+        self.outlines.push(Outline { corners: corners.to_vec(), low, high, inverted, anticlockwise });
+        self.within.push(false);
+        Ok(())
+    }
+
+    fn add_disc(&mut self, centre: [f64; 2], radius: f64, place: Place) -> Result<(), SafetyError> {
+        if !centre.iter().chain([&radius]).all(|value| value.abs() <= LARGEST) {
+            return Err(SafetyError::NotFinite { place });
+        }
+        if radius <= 0.0 {
+            return Err(SafetyError::Disc { place, radius });
+        }
+        self.pieces.push(Piece::Disc { centre: vector(centre), ball: Ball::new(radius) });
+        Ok(())
+    }
+
+    fn grow_tree(&mut self) {
+        let boxes: Vec<Aabb> = self.pieces.iter().map(Piece::bounds).collect();
+        self.tree = Bvh::from_leaves(BvhBuildStrategy::default(), &boxes);
+    }
+
+    /// Appends the half-planes that keep a member at `place`, finite, `keep` \[m\] away from every solid as
+    /// long as it moves no further than `reach` \[m\].
+    pub(super) fn planes_near(
+        &mut self,
+        place: [f64; 2],
+        keep: f64,
+        reach: f64,
+        planes: &mut Vec<HalfPlane>,
+    ) {
+        if self.pieces.is_empty() {
+            return;
+        }
+        let here = vector(place);
+        for (index, outline) in self.outlines.iter().enumerate() {
+            self.within[index] = outline.is_solid_at(place);
+            if self.within[index] {
+                planes.push(self.way_out(index, here, keep));
+            }
+        }
+        let margin = Vector::splat((keep + reach).min(LARGEST));
+        let near = Aabb::new(here - margin, here + margin);
+        self.near.clear();
+        for leaf in self.tree.intersect_aabb(&near) {
+            match &self.pieces[leaf as usize] {
+                Piece::Edge { outline, .. } if self.within[*outline] => {}
+                piece => self.near.push((piece.distance(here), leaf)),
+            }
+        }
+        self.near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let first = planes.len();
+        for &(distance, leaf) in &self.near {
+            let piece = &self.pieces[leaf as usize];
+            if distance - keep > reach
+                || planes[first..].iter().any(|plane| piece.is_behind(plane, here, keep))
+            {
+                continue;
+            }
+            planes.push(HalfPlane { normal: self.towards(piece, here), offset: distance - keep });
+        }
+    }
+
+    /// Unit vector from `here` to the nearest point of a piece.
+    fn towards(&self, piece: &Piece, here: Vector) -> [f64; 2] {
+        let (way, on_border) = match piece {
+            Piece::Edge { segment, outline } => {
+                let way = segment.project_local_point(here, true).point - here;
+                (way, self.outlines[*outline].inward(segment))
+            }
+            Piece::Disc { centre, .. } => (*centre - here, [1.0, 0.0]),
+        };
+        let (direction, distance) = apart(way);
+        if distance > 0.0 { direction } else { on_border }
+    }
+
+    /// The half-plane that leads out of a solid over the nearest point of its border.
+    fn way_out(&self, outline: usize, here: Vector, keep: f64) -> HalfPlane {
+        let mut nearest = ([1.0, 0.0], f64::INFINITY);
+        for piece in &self.pieces {
+            let Piece::Edge { segment, outline: of } = piece else { continue };
+            if *of == outline {
+                let (back, depth) = apart(here - segment.project_local_point(here, true).point);
+                if depth < nearest.1 {
+                    let normal = if depth > 0.0 { back } else { self.outlines[outline].inward(segment) };
+                    nearest = (normal, depth);
+                }
+            }
+        }
+        HalfPlane { normal: nearest.0, offset: -(nearest.1 + keep) }
+    }
+
+    /// Distance from `place`, finite, to the nearest solid, negative inside \[m\]; infinite without any.
+    pub fn distance(&self, place: [f64; 2]) -> f64 {
+        let here = vector(place);
+        let border = self.tree.find_best(
+            f64::MAX,
+            |node: &parry2d::partitioning::BvhNode, _| node.aabb().distance_to_local_point(here, true),
+            |leaf, _| Some(Distance(self.pieces[leaf as usize].distance(here))),
+        );
+        let inside = self.outlines.iter().any(|outline| outline.is_solid_at(place));
+        let depth = |piece: &Piece| match piece {
+            Piece::Edge { segment, outline } if self.outlines[*outline].is_solid_at(place) => {
+                Some(segment.distance_to_local_point(here, true))
+            }
+            _ => None,
+        };
+        match border {
+            _ if inside => -self.pieces.iter().filter_map(depth).fold(f64::INFINITY, f64::min),
+            Some((_, Distance(distance))) => distance,
+            None => f64::INFINITY,
+        }
+    }
+
+    /// The share of the straight way \[1\] that a disc of this radius \[m\] goes before it touches a solid,
+    /// by shape cast; 1 where nothing is in the way.
+    pub fn free_way(&self, from: [f64; 2], to: [f64; 2], radius: f64) -> f64 {
+        let (here, there) = (vector(from), vector(to));
+        let margin = Vector::splat(radius);
+        let swept = Aabb::new(here.min(there) - margin, here.max(there) + margin);
+        let options = ShapeCastOptions {
+            stop_at_penetration: false,
+            compute_impact_geometry_on_penetration: false,
+            ..ShapeCastOptions::with_max_time_of_impact(1.0)
+        };
+        let (disc, way) = (Ball::new(radius), there - here);
+        let mut share = 1.0_f64;
+        for leaf in self.tree.intersect_aabb(&swept) {
+            let hit = match &self.pieces[leaf as usize] {
+                Piece::Edge { segment, .. } => {
+                    // In the edge's own neighbourhood, so that far from the origin nothing is lost.
+                    let local = Segment::new(segment.a - here, segment.b - here);
+                    let (still, here) = (Vector::ZERO, Pose::IDENTITY);
+                    cast_shapes(&here, way, &disc, &here, still, &local, options)
+                }
+                Piece::Disc { centre, ball } => {
+                    let at = Pose::from_translation(*centre - here);
+                    cast_shapes(&Pose::IDENTITY, way, &disc, &at, Vector::ZERO, ball, options)
+                }
+            };
+            if let Ok(Some(hit)) = hit {
+                share = share.min(hit.time_of_impact);
+            }
+        }
+        share
+    }
+}
+
+/// Orders the leaves of the tree.
+struct Distance(f64);
+
+impl parry2d::partitioning::BvhLeafCost for Distance {
+    fn cost(&self) -> f64 {
+        self.0
+    }
+}
+
+impl Piece {
+    fn bounds(&self) -> Aabb {
+        match self {
+            Piece::Edge { segment, .. } => Aabb::new(segment.a.min(segment.b), segment.a.max(segment.b)),
+            Piece::Disc { centre, ball } => {
+                let radius = Vector::splat(ball.radius);
+                Aabb::new(*centre - radius, *centre + radius)
+            }
+        }
+    }
+
+    fn distance(&self, here: Vector) -> f64 {
+        match self {
+            Piece::Edge { segment, .. } => segment.distance_to_local_point(here, true),
+            Piece::Disc { centre, ball } => (*centre - here).length() - ball.radius,
+        }
+    }
+}
+
+impl Piece {
+    /// Whether all of the piece is as far behind a plane as the plane's own piece, so that whoever keeps
+    /// before that plane keeps its distance from this piece too: so it is with the edges of a convex
+    /// polygon but the nearest.
+    fn is_behind(&self, plane: &HalfPlane, here: Vector, keep: f64) -> bool {
+        let normal = vector(plane.normal);
+        let depth = match self {
+            Piece::Edge { segment, .. } => normal.dot(segment.a - here).min(normal.dot(segment.b - here)),
+            Piece::Disc { centre, ball } => normal.dot(*centre - here) - ball.radius,
+        };
+        depth >= (plane.offset + keep) * (1.0 - 1e-14)
+    }
+}
+
+impl Outline {
+    /// Whether the place lies in the solid; even-odd.
+    fn is_solid_at(&self, [x, y]: [f64; 2]) -> bool {
+        let boxed = self.low[0] <= x && x <= self.high[0] && self.low[1] <= y && y <= self.high[1];
+        let mut inside = false;
+        if boxed {
+            for (k, &[ax, ay]) in self.corners.iter().enumerate() {
+                let [bx, by] = self.corners[(k + 1) % self.corners.len()];
+                if (ay > y) != (by > y) && x < ax + (y - ay) / (by - ay) * (bx - ax) {
+                    inside = !inside;
+                }
+            }
+        }
+        inside != self.inverted
+    }
+
+    /// The edge's unit normal into the solid.
+    fn inward(&self, edge: &Segment) -> [f64; 2] {
+        let (along, _) = apart(edge.b - edge.a);
+        let left = [-along[1], along[0]];
+        if self.anticlockwise != self.inverted { left } else { [along[1], -along[0]] }
+    }
+}
+
+/// Twice the signed area.
+fn check_polygon(corners: &[[f64; 2]], place: Place) -> Result<f64, SafetyError> {
+    let count = corners.len();
+    if count < 3 {
+        return Err(SafetyError::Corners { place, count });
+    }
+    if !corners.iter().flatten().all(|value| value.abs() <= LARGEST) {
+        return Err(SafetyError::NotFinite { place });
+    }
+    let edge = |k: usize| (corners[k], corners[(k + 1) % count]);
+    for first in 0..count {
+        // Neighbouring edges share a corner; they cannot cross, but they can lie on each other.
+        for second in first + 2..count {
+            let ((a, b), (c, d)) = (edge(first), edge(second));
+            if !(first == 0 && second == count - 1) && segments_cross(a, b, c, d) {
+                return Err(SafetyError::Crossing { place, first, second });
+            }
+        }
+    }
+    let [ox, oy] = corners[0];
+    let (mut twice_area, mut extent) = (0.0, 0.0_f64);
+    for k in 0..count {
+        let ([ax, ay], [bx, by]) = edge(k);
+        twice_area += (ax - ox) * (by - oy) - (bx - ox) * (ay - oy);
+        extent = extent.max((ax - ox).abs()).max((ay - oy).abs());
+    }
+    if twice_area.abs() <= 1e-12 * extent * extent {
+        return Err(SafetyError::NoArea { place });
+    }
+    Ok(twice_area)
+}
+
+fn vector([x, y]: [f64; 2]) -> Vector {
+    Vector::new(x, y)
+}
+
+/// Direction and length.
+fn apart(way: Vector) -> ([f64; 2], f64) {
+    let length = way.length();
+    ([way.x / length, way.y / length], length)
+}

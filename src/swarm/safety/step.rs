@@ -1,0 +1,222 @@
+//! One member's part of a tick: its cell, and its step within it.
+
+use super::cell::{HalfPlane, dot, length, shortened};
+use super::deadlock::Tick;
+use super::filter::{Filter, Flags, Seen};
+
+/// How far a member can get at this tick \[m\].
+#[derive(Clone, Copy)]
+pub(super) struct Range {
+    /// The way in one period, by the limits of speed and acceleration.
+    step: f64,
+    /// How far the cell has to be right: the step, and the way it takes to brake after it.
+    reach: f64,
+}
+
+/// Where the planes of a cell come from, by their index: first members, then obstacles, then the fence.
+#[derive(Clone, Copy)]
+struct Origins {
+    obstacles: usize,
+    fence: usize,
+}
+
+/// Of the distance to keep, how much the shape cast leaves to rounding \[1\].
+const CAST_TOLERANCE: f64 = 1e-7;
+
+/// Standing in somebody's space by less than this share of the distance to keep is rounding \[1\].
+const TOUCHING: f64 = 1e-9;
+
+impl Filter {
+    /// The target of one member, and what changed it.
+    pub(super) fn target(
+        &mut self,
+        seen: &Seen,
+        wanted: [f64; 2],
+        period: f64,
+        member: usize,
+    ) -> ([f64; 2], Flags) {
+        let here = seen.present.get(member);
+        let way = [wanted[0] - here[0], wanted[1] - here[1]];
+        if !seen.known[member] || !way.iter().all(|value| value.is_finite()) {
+            self.detours[member].reset();
+            return (here, Flags(Flags::HELD));
+        }
+        let range = self.range(seen, way, period, member);
+        let (origins, range) = self.enclose(seen, range, member);
+        let mut flags = self.why(shortened(way, range.reach), origins);
+        let goal = self.around(way, range, member, &mut flags);
+        let mut step = self.braked(seen, goal, period, member, range, &mut flags);
+        step = shortened(step, range.step);
+        if step == way {
+            return (wanted, flags);
+        }
+        if length(way) > range.step {
+            flags.0 |= Flags::SPEED_LIMITED;
+        }
+        step = self.cast(here, step, origins, member);
+        ([here[0] + step[0], here[1] + step[1]], flags)
+    }
+
+    fn range(&self, seen: &Seen, way: [f64; 2], period: f64, member: usize) -> Range {
+        let step = self.limits.speed * period;
+        match self.velocity(seen, member) {
+            None => Range { step, reach: length(way).min(step) },
+            Some(velocity) => {
+                let most = self.limits.acceleration;
+                let top = (length(velocity) + most * period).min(self.limits.speed);
+                let reach = top * period + top * top / (2.0 * most);
+                Range { step: step.min(top * period), reach }
+            }
+        }
+    }
+
+    /// The member's velocity, where there is one and a limit that asks for it.
+    fn velocity(&self, seen: &Seen, member: usize) -> Option<[f64; 2]> {
+        let velocity = seen.velocity.filter(|_| self.limits.acceleration.is_finite())?.get(member);
+        velocity.iter().all(|value| value.is_finite()).then_some(velocity)
+    }
+
+    /// Builds the member's cell; wider where it stands in somebody's space, for it then moves away.
+    fn enclose(&mut self, seen: &Seen, range: Range, member: usize) -> (Origins, Range) {
+        let origins = self.build_cell(seen, range.reach, member);
+        let away = self.radii[member] + self.largest_radius + self.limits.clearance;
+        if range.reach >= away || !self.cell.planes.iter().any(|plane| plane.offset < -TOUCHING * away) {
+            return (origins, range);
+        }
+        let reach = away.min(range.step);
+        (self.build_cell(seen, reach, member), Range { reach, ..range })
+    }
+
+    fn build_cell(&mut self, seen: &Seen, reach: f64, member: usize) -> Origins {
+        self.cell.planes.clear();
+        self.find(seen, reach, member);
+        let here = seen.present.get(member);
+        let drift = self.drift(seen, member);
+        for k in 0..self.crowd.found.len() {
+            let other = self.crowd.found[k] as usize;
+            let stray = drift + self.drift(seen, other);
+            let keep = self.radii[member] + self.radii[other] + self.limits.clearance;
+            self.cell.planes.extend(border(here, seen.present.get(other), keep, stray, reach));
+        }
+        let obstacles = self.cell.planes.len();
+        let radius = self.radii[member];
+        let reach = reach + drift;
+        self.obstacles.planes_near(here, radius + self.limits.clearance, reach, &mut self.cell.planes);
+        let fence = self.cell.planes.len();
+        self.fence.planes_near(here, radius, reach, &mut self.cell.planes);
+        for plane in &mut self.cell.planes[obstacles..] {
+            plane.offset = aged(plane.offset - drift, plane.offset);
+        }
+        Origins { obstacles, fence }
+    }
+
+    /// Whose planes stand between the member and the end of its way.
+    fn why(&self, way: [f64; 2], origins: Origins) -> Flags {
+        let mut flags = Flags::default();
+        for (k, plane) in self.cell.planes.iter().enumerate() {
+            if dot(plane.normal, way) > plane.offset {
+                flags.0 |= match k {
+                    k if k >= origins.fence => Flags::GEOFENCED,
+                    k if k >= origins.obstacles => Flags::OBSTRUCTED,
+                    _ => Flags::SEPARATED,
+                };
+            }
+        }
+        flags
+    }
+
+    /// The point of the cell to go to: the nearest to the wanted one or, of a detour, to its aim.
+    fn around(&mut self, way: [f64; 2], range: Range, member: usize, flags: &mut Flags) -> [f64; 2] {
+        let direct = self.cell.nearest(way, range.reach);
+        let size = self.radii[member] + self.limits.clearance;
+        let distance = length(way);
+        // Nearer to its goal than its own size, a member waits for whoever stands there.
+        if distance <= size || distance == 0.0 {
+            self.detours[member].reset();
+            return direct;
+        }
+        let scale = if size > 0.0 { size.min(range.step) } else { range.step }.min(distance);
+        let detour = &mut self.detours[member];
+        let goal = if detour.is_active() {
+            flags.0 |= Flags::RESOLVING_DEADLOCK;
+            self.cell.nearest(detour.aim(way), scale.min(range.reach))
+        } else {
+            direct
+        };
+        let straight = self.cell.share(shortened(way, scale));
+        let direct = shortened(direct, scale);
+        detour.update(&self.limits.patience, &Tick { scale, wanted: way, straight, direct, moved: goal });
+        goal
+    }
+
+    /// The step towards a goal in the cell that the acceleration allows and from which there is room
+    /// to brake before the goal.
+    fn braked(
+        &self,
+        seen: &Seen,
+        goal: [f64; 2],
+        period: f64,
+        member: usize,
+        range: Range,
+        flags: &mut Flags,
+    ) -> [f64; 2] {
+        let Some(velocity) = self.velocity(seen, member) else { return goal };
+        let most = self.limits.acceleration;
+        let distance = length(goal);
+        // From v T + v^2 / (2 a) = distance.
+        let brakable = most * ((period * period + 2.0 * distance / most).sqrt() - period);
+        let pace = brakable.min(range.step / period);
+        let fitting = shortened(goal, pace * period);
+        let change = [fitting[0] / period - velocity[0], fitting[1] / period - velocity[1]];
+        let held = shortened(change, most * period);
+        if held == change && fitting == goal {
+            return goal;
+        }
+        flags.0 |= Flags::ACCELERATION_LIMITED;
+        let next = [(velocity[0] + held[0]) * period, (velocity[1] + held[1]) * period];
+        self.cell.nearest(next, range.step)
+    }
+
+    /// Cuts the step where a disc cast along it touches a solid. The cell has seen to that already: this
+    /// is another algorithm's opinion. Members that start too near a solid are on their way out of it.
+    fn cast(&self, here: [f64; 2], step: [f64; 2], origins: Origins, member: usize) -> [f64; 2] {
+        let solids = &self.cell.planes[origins.obstacles..origins.fence];
+        let disc = (self.radii[member] + self.limits.clearance) * (1.0 - CAST_TOLERANCE);
+        if solids.is_empty() || disc <= 0.0 || solids.iter().any(|plane| plane.offset < 0.0) {
+            return step;
+        }
+        let share = self.obstacles.free_way(here, [here[0] + step[0], here[1] + step[1]], disc);
+        [share * step[0], share * step[1]]
+    }
+}
+
+/// The half-plane that keeps a member `here` on its own side of another, if it can matter within
+/// `reach` \[m\]: the module's docs prove it.
+fn border(here: [f64; 2], there: [f64; 2], keep: f64, stray: f64, reach: f64) -> Option<HalfPlane> {
+    let way = [there[0] - here[0], there[1] - here[1]];
+    let distance = length(way);
+    let fresh = (distance - keep) / 2.0;
+    let offset = if stray > 0.0 {
+        let sine = stray / distance;
+        if sine < 1.0 {
+            let cosine = (1.0 - sine * sine).sqrt();
+            let turned = (2.0 - 2.0 * cosine).sqrt() * reach;
+            aged((distance * cosine - stray - keep) / 2.0 - turned, fresh)
+        } else {
+            fresh.min(0.0)
+        }
+    } else {
+        fresh
+    };
+    if offset >= reach && offset > 0.0 {
+        return None;
+    }
+    // Two at one place: each is the other's right, so that they part.
+    let normal = if distance > 0.0 { [way[0] / distance, way[1] / distance] } else { [1.0, 0.0] };
+    Some(HalfPlane { normal, offset })
+}
+
+/// Age alone drives nobody back: at most it keeps a member where it stands.
+fn aged(offset: f64, fresh: f64) -> f64 {
+    offset.max(fresh.min(0.0))
+}

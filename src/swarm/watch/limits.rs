@@ -1,0 +1,96 @@
+//! What is asked of a pose, and what its age means.
+
+use super::{Health, Pose, Rejection};
+use crate::flock::points::distance;
+
+/// What is asked of poses. Needs `0 < fresh <= age_limit <= stop_after`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WatchLimits {
+    /// Up to this age a pose is fresh \[s\], default 0.25.
+    pub fresh: f64,
+    /// Up to this age it is held, and older ones are turned away on arrival \[s\], default 1.
+    pub age_limit: f64,
+    /// Beyond this age its member is stopped \[s\], default 3.
+    pub stop_after: f64,
+    /// Middle of where members may be \[m, world frame\], default the origin.
+    pub centre: [f64; 2],
+    /// How far from there they may be \[m\], default 10 000.
+    pub range: f64,
+    /// How far ahead of the clock a stamp may be, and by how much the clock may be set back without
+    /// everything starting anew \[s\], default 0.1.
+    pub skew: f64,
+    /// Speed that no member reaches \[m/s\], default 10. What moves farther in the time between two stamps
+    /// has jumped.
+    pub jump_speed: f64,
+    /// How far two poses at one time may lie apart by noise \[m\], default 0.5.
+    pub jump_slack: f64,
+    /// So many poses in a row that agree with each other are believed after a jump or a stop \[1\], default
+    /// 5; with 1 or 0 the first one is.
+    pub recover: u32,
+    /// Time between the stamps of a member \[s\], where it is known, to count what is lost; default none.
+    pub period: Option<f64>,
+}
+
+impl Default for WatchLimits {
+    fn default() -> Self {
+        Self {
+            fresh: 0.25,
+            age_limit: 1.0,
+            stop_after: 3.0,
+            centre: [0.0; 2],
+            range: 10_000.0,
+            skew: 0.1,
+            jump_speed: 10.0,
+            jump_slack: 0.5,
+            recover: 5,
+            period: None,
+        }
+    }
+}
+
+impl WatchLimits {
+    /// Whether a pose is good in itself.
+    pub(super) fn admit(&self, pose: &Pose, now: f64) -> Result<(), Rejection> {
+        let numbers = [
+            ("position", pose.position[0]),
+            ("position", pose.position[1]),
+            ("heading", pose.yaw),
+            ("stamp", pose.stamp),
+            ("time of arrival", now),
+        ];
+        if let Some((what, _)) = numbers.into_iter().find(|(_, number)| !number.is_finite()) {
+            return Err(Rejection::NotFinite { what });
+        }
+        if !pose.frame_is_right {
+            return Err(Rejection::WrongFrame);
+        }
+        let away = distance(pose.position, self.centre);
+        if away > self.range {
+            return Err(Rejection::OutOfRange { distance: away, range: self.range });
+        }
+        let age = now - pose.stamp;
+        if -age > self.skew {
+            return Err(Rejection::FromTheFuture { ahead: -age, skew: self.skew });
+        }
+        if age > self.age_limit {
+            return Err(Rejection::TooOld { age, age_limit: self.age_limit });
+        }
+        Ok(())
+    }
+
+    /// How far apart two poses are and how far they may be \[m\].
+    pub(super) fn jump(&self, from: &Pose, to: &Pose) -> (f64, f64) {
+        let far = distance(from.position, to.position);
+        (far, self.jump_speed * (to.stamp - from.stamp) + self.jump_slack)
+    }
+
+    pub(super) fn health(&self, age: Option<f64>) -> Health {
+        match age {
+            None => Health::Waiting,
+            Some(age) if age <= self.fresh => Health::Fresh,
+            Some(age) if age <= self.age_limit => Health::Held,
+            Some(age) if age <= self.stop_after => Health::Degraded,
+            Some(_) => Health::Stopped,
+        }
+    }
+}

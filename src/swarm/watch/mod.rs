@@ -1,0 +1,216 @@
+//! Watches over the poses that come in: which are believed, and whether a member is heard at all.
+//!
+//! The newest good pose of a member is held while it is young enough, which leaves the fixed point of the
+//! rule where it is however many poses are lost in between; a member that is not heard for longer drops
+//! out. Nothing here has a clock: `now` \[s\] is handed in, in the time of the stamps. No pose that is not
+//! finite ever comes out.
+
+mod limits;
+mod rejection;
+
+pub use limits::WatchLimits;
+pub use rejection::{Counts, Rejection};
+
+/// A pose as it comes in.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pose {
+    /// \[m, world frame\]
+    pub position: [f64; 2],
+    /// Heading from the x axis \[rad\].
+    pub yaw: f64,
+    /// When it was measured \[s\].
+    pub stamp: f64,
+    /// Whether it is in the swarm's frame, as who received it found.
+    pub frame_is_right: bool,
+}
+
+/// How well a member is heard.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Health {
+    /// Nothing believed yet, or the clock has been set back.
+    Waiting,
+    Fresh,
+    /// The last pose still stands in for the present one.
+    Held,
+    /// Too old to be used: no neighbour of anybody's, and its own target stays.
+    Degraded,
+    /// Silent for so long that it must prove itself before it goes on.
+    Stopped,
+}
+
+impl Health {
+    pub fn name(self) -> &'static str {
+        match self {
+            Health::Waiting => "waiting",
+            Health::Fresh => "fresh",
+            Health::Held => "held",
+            Health::Degraded => "degraded",
+            Health::Stopped => "stopped",
+        }
+    }
+
+    /// Whether there is a position to use.
+    pub fn is_usable(self) -> bool {
+        matches!(self, Health::Fresh | Health::Held)
+    }
+}
+
+/// What is known of every member.
+#[derive(Clone, Debug)]
+pub struct Watch {
+    limits: WatchLimits,
+    members: Vec<Member>,
+    /// Latest time seen \[s\].
+    clock: Option<f64>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Member {
+    health: Health,
+    /// Newest pose believed.
+    accepted: Option<Pose>,
+    /// Newest pose of a run that is consistent in itself and not yet believed, and how many are in it.
+    candidate: Option<(Pose, u32)>,
+    counts: Counts,
+}
+
+impl Watch {
+    pub fn new(members: usize, limits: WatchLimits) -> Self {
+        let member =
+            Member { health: Health::Waiting, accepted: None, candidate: None, counts: Counts::default() };
+        Self { limits, members: vec![member; members], clock: None }
+    }
+
+    pub fn limits(&self) -> &WatchLimits {
+        &self.limits
+    }
+
+    /// Takes effect from the next pose or look on; what is believed stays so.
+    pub fn set_limits(&mut self, limits: WatchLimits) {
+        self.limits = limits;
+    }
+
+    /// Takes in a pose of `member` that arrives at `now` \[s\]. A rejected pose changes nothing but its
+    /// count and, where it jumps or follows a stop, the run that makes the next ones believed.
+    ///
+    /// Panics if there is no such member.
+    pub fn receive(&mut self, member: usize, pose: Pose, now: f64) -> Result<(), Rejection> {
+        self.follow_clock(now);
+        let watched = &mut self.members[member];
+        let verdict = self.limits.admit(&pose, now).and_then(|()| watched.weigh(&pose, now, &self.limits));
+        match &verdict {
+            Ok(()) => watched.accept(pose, now, &self.limits),
+            Err(rejection) => watched.counts.count(rejection),
+        }
+        verdict
+    }
+
+    /// Updates the health of all at `now` \[s\]: call it once in every period, before anything is read.
+    pub fn look(&mut self, now: f64) {
+        self.follow_clock(now);
+        for member in &mut self.members {
+            member.health = self.limits.health(member.age(now));
+        }
+    }
+
+    /// As of the last look, or the last pose accepted since.
+    pub fn health(&self, member: usize) -> Health {
+        self.members[member].health
+    }
+
+    /// The position to use \[m, world frame\]; `None` unless fresh or held.
+    pub fn position(&self, member: usize) -> Option<[f64; 2]> {
+        self.pose(member).map(|pose| pose.position)
+    }
+
+    /// The pose to use; `None` unless fresh or held.
+    pub fn pose(&self, member: usize) -> Option<Pose> {
+        let member = &self.members[member];
+        member.accepted.filter(|_| member.health.is_usable())
+    }
+
+    /// The newest pose believed, whatever its age: to show, not to use.
+    pub fn last(&self, member: usize) -> Option<Pose> {
+        self.members[member].accepted
+    }
+
+    /// Age of the newest pose believed \[s\]; zero where its sender's clock runs ahead.
+    pub fn age(&self, member: usize, now: f64) -> Option<f64> {
+        self.members[member].age(now)
+    }
+
+    pub fn counts(&self, member: usize) -> &Counts {
+        &self.members[member].counts
+    }
+
+    /// Forgets every pose when the clock is set back, or is none: what is stamped in another time says
+    /// nothing about this one.
+    fn follow_clock(&mut self, now: f64) {
+        let set_back = self.clock.is_some_and(|clock| now < clock - self.limits.skew);
+        if set_back || !now.is_finite() {
+            for member in &mut self.members {
+                (member.health, member.accepted, member.candidate) = (Health::Waiting, None, None);
+            }
+            self.clock = None;
+        }
+        if now.is_finite() {
+            self.clock = Some(self.clock.map_or(now, |clock| clock.max(now)));
+        }
+    }
+}
+
+impl Member {
+    fn age(&self, now: f64) -> Option<f64> {
+        self.accepted.map(|pose| (now - pose.stamp).max(0.0))
+    }
+
+    /// Whether a pose that is good in itself is believed after those before it.
+    fn weigh(&mut self, pose: &Pose, now: f64, limits: &WatchLimits) -> Result<(), Rejection> {
+        let Some(last) = self.accepted else { return Ok(()) };
+        if pose.stamp <= last.stamp {
+            return Err(Rejection::NotNewer { behind: last.stamp - pose.stamp });
+        }
+        let (far, allowed) = limits.jump(&last, pose);
+        let stopped = limits.health(self.age(now)) == Health::Stopped;
+        if !stopped && far <= allowed {
+            return Ok(());
+        }
+        let seen = self.run_with(pose, now, limits)?;
+        let recover = limits.recover;
+        match (seen >= recover, stopped) {
+            (true, _) => Ok(()),
+            (false, true) => Err(Rejection::Recovering { seen, recover }),
+            (false, false) => Err(Rejection::Jump { distance: far, allowed, seen, recover }),
+        }
+    }
+
+    /// Adds a pose to the run of those not yet believed, or begins a new one with it; how many are in it.
+    fn run_with(&mut self, pose: &Pose, now: f64, limits: &WatchLimits) -> Result<u32, Rejection> {
+        let seen = match self.candidate {
+            Some((before, seen)) if now - before.stamp <= limits.age_limit => {
+                if pose.stamp <= before.stamp {
+                    return Err(Rejection::NotNewer { behind: before.stamp - pose.stamp });
+                }
+                let (far, allowed) = limits.jump(&before, pose);
+                if far <= allowed { seen.saturating_add(1) } else { 1 }
+            }
+            _ => 1,
+        };
+        self.candidate = Some((*pose, seen));
+        Ok(seen)
+    }
+
+    fn accept(&mut self, pose: Pose, now: f64, limits: &WatchLimits) {
+        if let (Some(last), Some(period)) = (self.accepted, limits.period) {
+            // The cast saturates: a period of zero or a NaN harms nothing but the count.
+            self.counts.lost += ((pose.stamp - last.stamp) / period - 1.0).round() as u64;
+        }
+        self.counts.accepted += 1;
+        self.accepted = Some(pose);
+        self.candidate = None;
+        self.health = limits.health(self.age(now));
+    }
+}
+
+#[cfg(test)]
+mod tests;
