@@ -1,0 +1,102 @@
+//! Which arguments are ROS ones, what they say, and what is refused.
+
+use flockform::ros::arguments::Severity;
+
+use crate::{parse, refusal, ros, words};
+
+#[test]
+fn ordinary_arguments_stay_and_keep_their_order() {
+    for (line, rest) in [
+        ("", ""),
+        ("node square.toml", "node square.toml"),
+        ("node --ros-args", "node"),
+        ("node --ros-args --", "node"),
+        ("node --ros-args -- square.toml", "node square.toml"),
+        ("node --ros-args -r a:=b -- square.toml", "node square.toml"),
+        ("--ros-args -r a:=b -- node --ros-args -p c:=1", "node"),
+        ("node --ros-args --ros-args -r a:=b", "node"),
+        ("node -- --ros-args -r a:=b -- --member", "node -- --member"),
+        ("node -r a:=b", "node -r a:=b"),
+        ("node a:=b", "node a:=b"),
+    ] {
+        assert_eq!(parse(&words(line)).expect(line).0, words(rest), "{line}");
+    }
+}
+
+#[test]
+fn several_sets_of_ros_arguments_add_up() {
+    let (_, ros) =
+        parse(&words("--ros-args -r a:=b -r c:=d -- node --ros-args -r e:=f -p g:=1")).expect("valid");
+    assert_eq!((ros.remaps.len(), ros.assignments.len()), (3, 1));
+}
+
+#[test]
+fn what_ros_does_not_understand_is_refused_by_name_with_a_remedy() {
+    for (line, reason) in [
+        ("-r", "`-r` is the last argument and needs a rule FROM:=TO"),
+        ("--param", "needs an assignment NAME:=VALUE"),
+        ("--params-file", "needs the path of a YAML file"),
+        ("--log-level", "needs a level or LOGGER:=LEVEL"),
+        ("-e", "needs a security enclave"),
+        ("-r foo", "has no `:=`"),
+        ("-r foo:bar", "has no `:=`"),
+        ("-r :=bar", "the left side: `` has an empty token"),
+        ("-r foo:=", "the right side: `` has an empty token"),
+        ("-r foo:=bar:=baz", "contains `:`"),
+        ("-r */foo:=bar", "the left side has a wildcard"),
+        ("-r **/foo:=bar", "the left side has a wildcard"),
+        (r"-r foo:=\1/bar", "the right side refers to a wildcard"),
+        ("-r foo:=rostopic://bar", "the right side has a scheme"),
+        ("-r rostopic://__ns:=/foo", "`__ns` has a scheme before it"),
+        ("-r rosservice://node:foo:=bar", "contains `:`"),
+        ("-r __ns:=foo", "namespace `foo`: does not begin with `/`"),
+        ("-r __node:=/foo", "node name `/foo`: contains `/`"),
+        ("-r __node:=", "node name ``: is empty"),
+        ("-r foo__bar:=a", "two underscores in a row"),
+        ("-r foo/:=bar", "empty token"),
+        ("-r 2:a:=b", "the node prefix `2` begins with a digit"),
+        ("-r --", "has no `:=`"),
+        ("-p foo", "has no `:=`"),
+        ("-p foo:=", "has no value"),
+        ("-p :=1", "empty part"),
+        ("-p a..b:=1", "empty part"),
+        ("-p a-b:=1", "contains `-`"),
+        ("-p a.2:=1", "begins with a digit"),
+        ("-p foo:=[1,2.0]", "mixes integer and double in one list"),
+        ("-p foo:=[]", "empty list"),
+        ("-p foo:=[[1]]", "list or a mapping inside a list"),
+        ("-p foo:={a:1}", "is a mapping"),
+        ("-p foo:=[1", "is no YAML"),
+        ("-p foo:=*a", "is no YAML"),
+        ("--params-file /no/such/file.yaml", "--params-file /no/such/file.yaml: "),
+        ("--log-level LOUD", "`LOUD` is no log level"),
+        ("--log-level a:=LOUD", "`LOUD` is no log level"),
+        ("--log-level :=DEBUG", "the name of the logger is empty"),
+        ("--remapp a:=b", "did you mean `--remap`?"),
+        ("--disable-rosout-log", "did you mean `--disable-rosout-logs`?"),
+        ("--verbose", "unknown flag `--verbose`"),
+        ("-v", "unknown flag `-v`"),
+        ("square.toml", "`square.toml` belongs to no flag"),
+        ("a:=b", "write `--remap a:=b`"),
+    ] {
+        let message = refusal(line);
+        assert!(message.contains(reason), "{line}: {message}");
+    }
+}
+
+#[test]
+fn logging_and_enclave_are_read_and_the_last_word_counts() {
+    let logging = ros("--log-level debug --log-level WARN --log-level a.b:=ERROR --log-level a.b:=fatal \
+                       --disable-rosout-logs --disable-stdout-logs --enable-stdout-logs \
+                       --disable-external-lib-logs --log-config-file log.config --log-file-name run")
+    .logging;
+    assert_eq!(logging.level, Some(Severity::Warn));
+    assert_eq!(logging.level_of("a.b"), Some(Severity::Fatal));
+    assert_eq!(logging.level_of("other"), Some(Severity::Warn));
+    assert_eq!((logging.rosout, logging.stdout, logging.external_library), (false, true, false));
+    assert_eq!(logging.config_file, Some("log.config".into()));
+    assert_eq!(logging.file_name, Some("run".into()));
+    assert_eq!(ros("-e /a --enclave /b").enclave, Some("/b".into()));
+    assert_eq!(ros("").logging.level, None);
+    assert!(ros("").logging.rosout);
+}

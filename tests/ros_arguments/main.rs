@@ -1,0 +1,30 @@
+//! `--ros-args` and the environment, held against the rules of the ROS 2 design articles "ROS Command
+//! Line Arguments" and "Remapping Names", and against what `rcl` implements of them.
+
+mod any_input;
+mod environment;
+mod grammar;
+mod names;
+mod parameters;
+
+use flockform::ros::arguments::{RosArgumentError, RosArguments};
+
+pub fn words(line: &str) -> Vec<String> {
+    line.split_whitespace().map(String::from).collect()
+}
+
+pub fn parse(arguments: &[String]) -> Result<(Vec<String>, RosArguments), RosArgumentError> {
+    RosArguments::parse(arguments.iter().cloned(), &|_| None)
+}
+
+/// The ROS arguments of `--ros-args LINE`.
+pub fn ros(line: &str) -> RosArguments {
+    parse(&words(&format!("--ros-args {line}"))).unwrap_or_else(|error| panic!("{line}: {error}")).1
+}
+
+pub fn refusal(line: &str) -> String {
+    match parse(&words(&format!("--ros-args {line}"))) {
+        Ok(_) => panic!("{line} is accepted"),
+        Err(error) => error.to_string(),
+    }
+}
