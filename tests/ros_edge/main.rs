@@ -1,8 +1,9 @@
-//! The edge on loopback: two participants of ours in one process, and ros2-client as the foreign peer.
+//! The edge and the formation's node on loopback: two participants of ours in one process, and ros2-client as the foreign peer.
 //!
 //! The tests share the participants and take turns: DDS discovery is slow on a busy computer, and each
 //! participant costs sockets and threads. Every wait is bounded.
 
+mod formation;
 mod graph;
 mod lifecycle;
 mod parameters;

@@ -1,0 +1,185 @@
+//! What goes wrong with robots in flight, row by row: what the rest of the formation does.
+
+use flockform::flock::points::distance;
+use flockform::swarm::control::{Control, NEIGHBOUR_LOST, TRIMMED};
+use flockform::swarm::flight::Flight;
+use flockform::swarm::watch::{Health, Pose};
+
+use super::support::*;
+
+/// The square of the bundled file, flown with a fault from 2 s on; robot_13 is its middle.
+fn with_fault(what: &str, more: &[&str]) -> Flight {
+    let fault = format!("flight.faults=[{{ robot = \"robot_13\", at = 2.0, what = {what} }}]");
+    let mut overrides = vec!["control.sweeps=1", "flight.duration=40.0", fault.as_str()];
+    overrides.extend(more);
+    Flight::new(&bundled("square", &overrides)).unwrap_or_else(|error| panic!("{error}"))
+}
+
+const MIDDLE: usize = 12;
+
+fn fly(flight: &mut Flight, periods: usize) {
+    (0..periods).for_each(|_| flight.step());
+}
+
+fn worst_but(flight: &Flight, without: usize) -> f64 {
+    let control = flight.control();
+    let formation = control.formation();
+    let map = formation.affine(control.program_time()).expect("a manoeuvre");
+    let places = flight.fleet().places();
+    let apart = |m: usize| distance(places.get(m), map.apply(formation.places.get(m)));
+    (0..formation.count()).filter(|&m| m != without).map(apart).fold(0.0, f64::max)
+}
+
+/// Periods from the fault until the middle has this health, at most 100.
+fn until_health(flight: &mut Flight, health: Health) -> usize {
+    fly(flight, 40);
+    (0..100)
+        .find(|_| {
+            flight.step();
+            flight.control().health(MIDDLE) == health
+        })
+        .unwrap_or(100)
+        + 1
+}
+
+#[test]
+fn a_silent_member_is_held_then_dropped_then_stopped_and_the_others_come_home() {
+    let mut flight = with_fault("{ kind = \"dead\" }", &[]);
+    // Fresh for 3 periods of 0.05 s, held for 0.5 s, stopped after 2 s.
+    assert!((3..=5).contains(&until_health(&mut flight, Health::Held)));
+    let mut flight = with_fault("{ kind = \"dead\" }", &[]);
+    assert!((10..=12).contains(&until_health(&mut flight, Health::Degraded)));
+    assert!(flight.control().target(MIDDLE).is_none(), "nobody is sent anywhere from nothing");
+    fly(&mut flight, 1);
+    let lost: Vec<usize> = (0..25).filter(|&m| flight.control().flags(m) & NEIGHBOUR_LOST != 0).collect();
+    assert_eq!(lost, [6, 7, 8, 11, 13, 16, 17, 18], "its neighbours say so, and nobody else");
+    fly(&mut flight, 800);
+    assert_eq!(flight.control().health(MIDDLE), Health::Stopped);
+    // It stands in the way of those whose places are beyond it; all others are home.
+    let worst = worst_but(&flight, MIDDLE);
+    assert!(worst < 0.5, "{worst}");
+}
+
+#[test]
+fn a_member_that_comes_back_is_believed_again_and_the_formation_is_whole() {
+    let fault =
+        "flight.faults=[{ robot = \"robot_13\", at = 2.0, until = 6.0, what = { kind = \"silent\" } }]";
+    let overrides = ["control.sweeps=1", "flight.duration=60.0", fault];
+    let (_, report) = flown(&bundled("square", &overrides));
+    assert_eq!(report.most_lost, 1);
+    assert!(report.affine_error.expect("affine")[1] < 1e-3, "{:?}", report.affine_error);
+}
+
+#[test]
+fn nonsense_poses_are_turned_away_and_leave_the_others_where_they_belong() {
+    for what in ["{ kind = \"not-a-number\" }", "{ kind = \"wrong-frame\" }"] {
+        let mut flight = with_fault(what, &[]);
+        fly(&mut flight, 60);
+        assert!(!flight.control().health(MIDDLE).is_usable(), "{what}");
+        assert!(flight.control().watch().counts(MIDDLE).rejected() > 10, "{what}");
+        fly(&mut flight, 740);
+        for m in 0..25 {
+            assert!(flight.fleet().robots()[m].position.iter().all(|value| value.is_finite()), "{what}");
+        }
+        assert!(worst_but(&flight, MIDDLE) < 0.5, "{what}: {}", worst_but(&flight, MIDDLE));
+    }
+}
+
+#[test]
+fn lost_late_and_doubled_poses_change_the_way_and_not_the_end() {
+    let cases: [&[&str]; 4] = [
+        &["flight.loss=0.3"],
+        &["flight.loss=0.8", "poses.age_limit=3.0", "poses.stop_after=5.0"],
+        &[
+            "flight.delay=20",
+            "poses.fresh=1.5",
+            "poses.age_limit=2.0",
+            "poses.stop_after=4.0",
+            "limits={ speed = 0.2 }",
+        ],
+        &["flight.duplicates=0.5", "flight.jitter=3"],
+    ];
+    for more in cases {
+        let mut overrides = vec!["control.sweeps=1", "flight.duration=150.0", "flight.bounds={}"];
+        overrides.extend(more);
+        let (_, report) = flown(&bundled("square", &overrides));
+        let [_, last] = report.affine_error.expect("affine");
+        assert!(last < 0.02, "{more:?}: {last}");
+    }
+}
+
+#[test]
+fn one_liar_is_trimmed_on_eight_neighbours_and_leads_them_astray_without() {
+    // All the rim leads, so that every follower has eight neighbours of whom one may lie.
+    let rim = "leaders=[{ region = { kind = \"boundary\" }, program = { kind = \"path\", points = [{ at = 3.0, displacement = [2.0, 1.0] }] } }]";
+    let end = |resilient: bool| {
+        let fault = "flight.faults=[{ robot = \"robot_13\", at = 0.5, what = { kind = \"offset\", by = [3.0, -4.0] } }]";
+        let mut overrides = vec![
+            "control.sweeps=1",
+            "rule={}",
+            rim,
+            fault,
+            "limits={}",
+            "flight.duration=30.0",
+            "flight.model={ kind = \"ideal\" }",
+            "flight.bounds={}",
+            // Let the lie pass for a pose.
+            "poses.recover=1",
+        ];
+        if resilient {
+            overrides.push("resilience={ liars = 1 }");
+        }
+        let mut flight =
+            Flight::new(&bundled("square", &overrides)).unwrap_or_else(|error| panic!("{error}"));
+        fly(&mut flight, 600);
+        let trimmed = (0..25).any(|m| flight.control().flags(m) & TRIMMED != 0);
+        let formation = flight.control().formation();
+        let places = flight.fleet().places();
+        let apart = |m: usize| {
+            let [x, y] = formation.places.get(m);
+            distance(places.get(m), [x + 2.0, y + 1.0])
+        };
+        let honest = (0..25).filter(|&m| m != MIDDLE && !formation.leads(m));
+        (honest.map(apart).fold(0.0, f64::max), trimmed)
+    };
+    let (with, trimmed) = end(true);
+    assert!(with < 1e-9 && trimmed, "{with}");
+    let (without, _) = end(false);
+    assert!(without > 0.2, "{without}");
+}
+
+#[test]
+fn nobody_gets_a_target_before_it_is_heard() {
+    let mut control = Control::new(&bundled("square", &[])).expect("laid out");
+    control.tick(0.0);
+    assert!((0..25).all(|m| control.target(m).is_none()));
+    let pose = |stamp: f64| Pose { position: control_place(7), yaw: 0.0, stamp, frame_is_right: true };
+    control.receive(7, pose(0.05), 0.05).expect("believed");
+    control.tick(0.05);
+    let told: Vec<usize> = (0..25).filter(|&m| control.target(m).is_some()).collect();
+    assert_eq!(told, [7]);
+    assert_eq!(control.target(7), Some(control_place(7)), "alone it has nobody to follow");
+}
+
+fn control_place(m: usize) -> [f64; 2] {
+    Control::new(&bundled("square", &[])).expect("laid out").formation().places.get(m)
+}
+
+#[test]
+fn an_emergency_stop_latches_and_the_programs_wait() {
+    let mut flight = with_fault("{ kind = \"stuck\" }", &["limits={ speed = 1.0, clearance = 0.3 }"]);
+    fly(&mut flight, 30);
+    let time = flight.control().program_time();
+    flight.control_mut().emergency_stop();
+    fly(&mut flight, 5);
+    let before = flight.fleet().places();
+    fly(&mut flight, 50);
+    assert_eq!(flight.fleet().places(), before);
+    assert_eq!(flight.control().program_time(), time);
+    flight.control_mut().set_active(true);
+    fly(&mut flight, 5);
+    assert_eq!(flight.fleet().places(), before, "only resume lifts it");
+    assert!(flight.control_mut().resume());
+    fly(&mut flight, 50);
+    assert_ne!(flight.fleet().places(), before);
+}

@@ -1,0 +1,89 @@
+//! Flights of the bundled swarms, and what they promise.
+
+use flockform::flock::points::distance;
+use flockform::scene::bundled::SWARMS;
+
+use super::support::*;
+
+#[test]
+fn every_bundled_swarm_keeps_the_bounds_that_it_declares() {
+    for swarm in SWARMS {
+        let swarm = bundled(swarm.name, &[]);
+        let (_, report) = flown(&swarm);
+        assert!(!report.bounds.is_empty(), "{} declares something", swarm.name);
+        assert!(report.holds(), "{}: {:#?}", swarm.name, report.bounds);
+    }
+}
+
+#[test]
+fn an_affine_manoeuvre_is_followed_exactly_through_the_gap_at_every_moment() {
+    for name in ["gap", "patch"] {
+        let (record, report) = flown(&bundled(name, &[]));
+        let [largest, _] = report.affine_error.expect("an affine manoeuvre");
+        assert!(largest <= 1e-9, "{name}: {largest:e}");
+        // It did go: the formation's middle is where the manoeuvre ends.
+        let moved = record.tracks[0].iter().zip(record.tracks.last().expect("recorded").iter());
+        assert!(moved.map(|(a, b)| distance(a, b)).fold(f64::INFINITY, f64::min) > 15.0);
+        assert!(report.clearance.expect("others") >= 0.1);
+    }
+}
+
+#[test]
+fn without_solved_weights_the_edge_does_not_follow() {
+    // The barycentre reproduces places in the interior alone: what the solved weights are for.
+    let plain = bundled("gap", &["rule={}", "flight.duration=8.0"]);
+    let (_, report) = flown(&plain);
+    assert!(report.affine_error.expect("affine")[0] > 0.1, "{:?}", report.affine_error);
+    assert!(!report.holds());
+}
+
+#[test]
+fn a_frame_makes_up_for_the_missing_neighbours_of_a_formation_that_is_moved_as_a_whole() {
+    let overrides = [
+        "rule={}",
+        "frame=immediate",
+        "obstacles=[]",
+        "flight.duration=20.0",
+        "flight.bounds={ final_error = 1e-6 }",
+        "manoeuvres[0].legs=[{ seconds = 5.0, translate = [3.0, 1.0] }]",
+    ];
+    let (_, report) = flown(&bundled("gap", &overrides));
+    assert!(report.holds(), "{:?}", report.bounds);
+}
+
+#[test]
+fn a_hundred_robots_swap_places_across_a_circle_and_all_arrive() {
+    let swarm = bundled("antipodal", &["flight.bounds={ clearance = 0.1, final_error = 0.01 }"]);
+    let (_, report) = flown(&swarm);
+    assert!(report.holds(), "{:?}", report.bounds);
+}
+
+#[test]
+fn the_same_seed_gives_the_same_flight_and_another_does_not() {
+    let noisy = ["flight.noise=0.01", "flight.loss=0.2", "flight.delay=2", "flight.duration=5.0"];
+    let places = |seed: &str| {
+        let swarm = bundled("square", &[&noisy[..], &[seed]].concat());
+        let (record, _) = flown(&swarm);
+        record.tracks.last().expect("recorded").clone()
+    };
+    assert_eq!(places("flight.seed=3"), places("flight.seed=3"));
+    assert_ne!(places("flight.seed=3"), places("flight.seed=4"));
+}
+
+#[test]
+fn every_model_of_a_robot_brings_the_formation_home() {
+    let models = [
+        "{ kind = \"ideal\" }",
+        "{ kind = \"integrator\" }",
+        "{ kind = \"unicycle\", turn_rate = 180.0 }",
+        "{ kind = \"double-integrator\" }",
+    ];
+    for model in models {
+        let overrides = ["limits.acceleration=4.0".to_owned(), format!("flight.model={model}")];
+        let overrides: Vec<&str> = overrides.iter().map(String::as_str).collect();
+        let (_, report) = flown(&bundled("square", &overrides));
+        let [_, last] = report.affine_error.expect("affine");
+        assert!(last < 0.01, "{model}: {last}");
+        assert!(report.clearance.expect("others") >= 0.3 - 1e-9, "{model}: {:?}", report.clearance);
+    }
+}

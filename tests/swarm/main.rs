@@ -1,0 +1,7 @@
+//! Swarm files, formations and flights.
+
+mod bridge;
+mod faults;
+mod files;
+mod flights;
+mod support;
