@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
+use flockform::scene::bundled::SWARMS;
 
 use super::{Refusal, print};
 
@@ -56,9 +57,6 @@ const SHARED: &[(&str, &str)] = embedded![
     "msgs/flockform_msgs/msg/MemberState.msg" from "msgs/flockform_msgs/msg/MemberState.msg",
     "msgs/flockform_msgs/srv/SetFormation.srv" from "msgs/flockform_msgs/srv/SetFormation.srv",
 ];
-
-/// Name and text of each swarm file.
-const SWARMS: &[(&str, &str)] = &[];
 
 /// What a shell sources; a workspace that has its own keeps them.
 const ENVIRONMENT: &[(&str, &str)] = embedded![
@@ -117,8 +115,10 @@ fn package_files() -> Result<Vec<File>, InstallError> {
     ];
     let share = Path::new(SHARE);
     files.extend(SHARED.iter().map(|(place, text)| text_file(share.join(place), text)));
-    let swarm = |name: &str| share.join("swarms").join(format!("{name}.toml"));
-    files.extend(SWARMS.iter().map(|(name, text)| text_file(swarm(name), text)));
+    let swarms = share.join("swarms");
+    files.extend(
+        SWARMS.iter().map(|swarm| text_file(swarms.join(format!("{}.toml", swarm.name)), swarm.text)),
+    );
     Ok(files)
 }
 

@@ -44,7 +44,9 @@ fn the_package_lies_where_ros_looks_for_it() {
     let share = prefix.join("share/flockform");
     let checkout = Path::new(CHECKOUT);
     assert_eq!(read(share.join("package.xml")), read(checkout.join("package.xml")));
-    for (there, here) in [("msgs", "msgs"), ("parameters", "launch-configs/parameters")] {
+    let folders =
+        [("msgs", "msgs"), ("parameters", "launch-configs/parameters"), ("swarms", "launch-configs/swarms")];
+    for (there, here) in folders {
         let here = checkout.join(here);
         assert_eq!(files(&share.join(there)), files(&here));
         for file in files(&here) {
