@@ -20,7 +20,7 @@ fn a_bad_swarm_file_is_refused_with_place_and_remedy() {
     let with = |more: &str| format!("{PAIR}{more}");
     let cases = [
         ("title = \"t\"\n".into(), "robots: nobody flies"),
-        (with("[limits]\nspeed = -1.0\n"), "test.toml:14: limits.speed = -1.0"),
+        (with("[limits]\nspeed = -1.0\n"), "limits.speed = -1.0: must be greater than 0 [m/s]"),
         (with("[limits]\nspede = 1.0\n"), "did you mean `speed`"),
         (with("[[robots]]\nname = \"a\"\nplace = [5.0, 5.0]\n"), "two robots are called `a`"),
         (with("[[robots]]\nname = \"d\"\nplace = [1.0, 0.0]\n"), "`b` and `d` have the same place"),

@@ -6,8 +6,11 @@
 //! irregular shapes included (Zhao, "Affine formation maneuver control of multiagent systems", IEEE TAC
 //! 63(12), 2018, calls such weights a stress). They are not negative where the own place lies among the
 //! neighbours: targets then stay in the convex hull of what was received, and the formation comes to rest
-//! as soon as everybody is linked to a leader by positive weights. Elsewhere some are negative; ask
-//! [`settles`] about those.
+//! as soon as everybody is linked to a leader by positive weights. Elsewhere some are negative, and then
+//! [`settles`] must be asked: followers outside the hull of the leaders extrapolate, and on lattices a corner
+//! that follows is enough for an error to grow that no damping stops: 10 by 10 with 8 neighbours and three
+//! leaders in the middle has an eigenvalue of 1.0019, which damping only brings nearer to one. The remedy is
+//! in [`Solved::negative`]: let those lead.
 
 mod nearest;
 
@@ -47,8 +50,8 @@ pub enum WeightsError {
     )]
     Amplifies { member: usize, factor: f64, most: f64 },
     #[error(
-        "the slowest error is multiplied by {radius:.6} in every period, and less than 1 is needed: not everybody \
-         is tied to leaders that span the plane"
+        "the formation does not come to rest: the slowest error is multiplied by {radius:.6} in every period, and \
+         less than 1 is needed: those at the corners, whose weights are negative, have to lead"
     )]
     DoesNotSettle { radius: f64 },
 }
@@ -112,8 +115,9 @@ fn weights_of(member: usize, reference: &Points, neighbours: &Neighbours) -> Res
     })
 }
 
-/// How fast a formation with these weights comes to rest when all move at once: the factor by which the
-/// slowest error shrinks in every period. Refused unless that is below one. Without followers it is zero.
+/// How fast a formation with these weights comes to rest when all take their targets at once, undamped: the
+/// factor by which the slowest error shrinks in every period. Refused unless that is below one. Without
+/// followers it is zero.
 pub fn settles(
     weights: &[f64],
     neighbours: &Neighbours,
