@@ -1,7 +1,7 @@
 //! The safety filter on whole scenes: nobody comes nearer than declared, and who can arrive does.
 
 use flockform::flock::points::{Points, distance};
-use flockform::swarm::safety::{Filter, Flags, Limits, Obstacle, Obstacles, Seen};
+use flockform::swarm::safety::{Filter, Flags, Limits, Obstacle, Obstacles, Patience, Seen};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
@@ -133,50 +133,91 @@ fn a_robot_goes_around_a_wall() {
     }
 }
 
-#[test]
-fn nobody_comes_too_near_in_ten_thousand_random_scenes() {
-    let mut random = Pcg64Mcg::seed_from_u64(4);
-    for scene in 0..10_000 {
-        let mut world = random_world(&mut random, if scene % 2 == 0 { 1.0 } else { f64::INFINITY });
-        for tick in 0..20 {
+/// Each row of a scene's ticks: how much of the way to its target a robot goes.
+#[derive(Clone, Copy, PartialEq)]
+enum Pace {
+    Whole,
+    /// A random share, another for every robot and tick.
+    Lagging,
+}
+
+/// Runs ten thousand scenes of 3 to 12 robots for 40 ticks each.
+fn run_random_scenes(seed: u64, scenes: usize, speed: f64, pace: Pace, scale: f64) {
+    let mut random = Pcg64Mcg::seed_from_u64(seed);
+    let (mut separated, mut obstructed) = (0, 0);
+    for scene in 0..scenes {
+        let (mut world, solids) = random_world(&mut random, speed, scale);
+        let declared = world.filter.limits().clearance;
+        for tick in 0..40 {
+            let before = world.present.clone();
             world.tick();
-            let (clearance, declared) = (world.smallest_clearance(), world.filter.limits().clearance);
-            assert!(clearance >= declared - 1e-9, "scene {scene}, tick {tick}: {clearance} of {declared}");
+            if pace == Pace::Lagging {
+                for (robot, was) in before.iter().enumerate() {
+                    let share = random.random_range(0.0..1.0);
+                    let is = world.present.get(robot);
+                    let at = [0, 1].map(|k| was[k] + share * (is[k] - was[k]));
+                    world.present.set(robot, at);
+                }
+            }
+            let clearance = world.smallest_clearance();
+            assert!(
+                clearance >= declared - 1e-9 * scale,
+                "scene {scene} of seed {seed}, tick {tick}: {clearance} of {declared}"
+            );
+            for (robot, (a, b)) in before.iter().zip(world.present.iter()).enumerate() {
+                assert!(distance(a, b) <= speed * world.period * (1.0 + 1e-9), "too fast");
+                let disc = (world.radii[robot] + declared) * (1.0 - 1e-6);
+                assert_eq!(solids.free_way(a, b, disc), 1.0, "through a solid on the way");
+            }
+            separated += world.flags.iter().filter(|flags| flags.has(Flags::SEPARATED)).count();
+            obstructed += world.flags.iter().filter(|flags| flags.has(Flags::OBSTRUCTED)).count();
         }
+    }
+    // The scenes are worth something only if robots meet each other and solids.
+    assert!(separated > 10 * scenes && obstructed > 10 * scenes, "{separated}, {obstructed}");
+}
+
+#[test]
+fn nobody_comes_too_near_in_five_thousand_random_scenes_at_unlimited_speed() {
+    run_random_scenes(4, 2500, f64::INFINITY, Pace::Whole, 1.0);
+    run_random_scenes(5, 2500, f64::INFINITY, Pace::Lagging, 1.0);
+}
+
+#[test]
+fn nobody_comes_too_near_in_five_thousand_random_scenes_at_limited_speed() {
+    run_random_scenes(6, 2500, 1.0, Pace::Whole, 1.0);
+    run_random_scenes(7, 2500, 1.0, Pace::Lagging, 1.0);
+}
+
+#[test]
+fn nanometres_and_thousands_of_kilometres_are_as_safe_as_metres() {
+    for (k, scale) in [1e-9, 1e-6, 1e-3, 1e3, 1e6].into_iter().enumerate() {
+        run_random_scenes(10 + k as u64, 100, scale, Pace::Whole, scale);
+        run_random_scenes(20 + k as u64, 100, f64::INFINITY, Pace::Lagging, scale);
     }
 }
 
-/// 3 to 12 robots of unlike sizes in legal places among 0 to 3 solids, with goals anywhere.
-fn random_world(random: &mut Pcg64Mcg, speed: f64) -> World {
-    let side = 6.0;
+/// 3 to 12 robots of unlike sizes in legal places among up to 3 solids, with goals anywhere.
+fn random_world(random: &mut Pcg64Mcg, speed: f64, scale: f64) -> (World, Obstacles) {
+    let side = 6.0 * scale;
     let mut anywhere = |low: f64, high: f64| random.random_range(low..high);
     let solids: Vec<Obstacle> = (0..anywhere(0.0, 4.0) as usize)
         .map(|_| {
             let [x, y] = [anywhere(0.0, side), anywhere(0.0, side)];
+            let [w, h] = [scale * anywhere(0.1, 2.0), scale * anywhere(0.1, 2.0)];
             match anywhere(0.0, 3.0) as usize {
-                0 => Obstacle::Disc { centre: [x, y], radius: anywhere(0.1, 1.0) },
-                1 => rectangle([x, y], [x + anywhere(0.05, 2.0), y + anywhere(0.05, 2.0)]),
-                _ => {
-                    let (w, h) = (anywhere(0.4, 2.0), anywhere(0.4, 2.0));
-                    // An L.
-                    Obstacle::Polygon(vec![
-                        [x, y],
-                        [x + w, y],
-                        [x + w, y + 0.3 * h],
-                        [x + 0.3 * w, y + 0.3 * h],
-                        [x + 0.3 * w, y + h],
-                        [x, y + h],
-                    ])
-                }
+                0 => Obstacle::Disc { centre: [x, y], radius: w / 2.0 },
+                1 => rectangle([x, y], [x + w, y + h]),
+                _ => letter_l([x, y], [w, h]),
             }
         })
         .collect();
     let obstacles = Obstacles::new(&solids).expect("solids");
-    let clearance = anywhere(0.0, 0.2);
+    let clearance = scale * anywhere(0.0, 0.2);
     let wanted = anywhere(3.0, 13.0) as usize;
     let (mut radii, mut present) = (Vec::<f64>::new(), Points::default());
     for _ in 0..50 * wanted {
-        let (place, radius) = ([anywhere(0.0, side), anywhere(0.0, side)], anywhere(0.0, 0.3));
+        let (place, radius) = ([anywhere(0.0, side), anywhere(0.0, side)], scale * anywhere(0.0, 0.3));
         let apart = |k: usize| distance(present.get(k), place) >= radii[k] + radius + clearance;
         if radii.len() < wanted
             && obstacles.distance(place) >= radius + clearance
@@ -188,13 +229,266 @@ fn random_world(random: &mut Pcg64Mcg, speed: f64) -> World {
     }
     let goals = (0..radii.len()).map(|_| [anywhere(0.0, side), anywhere(0.0, side)]).collect();
     let count = radii.len();
-    World {
-        filter: Filter::new(limits(speed, clearance), radii.clone(), obstacles).expect("limits"),
-        radii,
-        present,
-        goals,
-        period: 0.3,
-        safe: Points::default(),
-        flags: vec![Flags::default(); count],
+    let filter = Filter::new(limits(speed, clearance), radii.clone(), obstacles.clone()).expect("limits");
+    let (safe, flags) = (Points::default(), vec![Flags::default(); count]);
+    (World { filter, radii, present, goals, period: 0.3, safe, flags }, obstacles)
+}
+
+fn letter_l([x, y]: [f64; 2], [w, h]: [f64; 2]) -> Obstacle {
+    let (thick, high) = (x + 0.3 * w, y + 0.3 * h);
+    Obstacle::Polygon(vec![[x, y], [x + w, y], [x + w, high], [thick, high], [thick, y + h], [x, y + h]])
+}
+
+#[test]
+fn a_robot_in_the_bay_of_a_concave_solid_keeps_clear_of_both_walls() {
+    let bay = [letter_l([0.0, 0.0], [4.0, 4.0])];
+    let mut world = World::new(limits(1.0, 0.1), 0.3, &bay, &[[[4.0, 4.0], [-3.0, -3.0]]]);
+    let mut seen = Flags::default();
+    for _ in 0..100 {
+        world.tick();
+        seen.0 |= world.flags[0].0;
+        assert!(world.smallest_clearance() >= 0.1 - 1e-9);
     }
+    assert!(seen.has(Flags::OBSTRUCTED) && seen.has(Flags::RESOLVING_DEADLOCK));
+}
+
+#[test]
+fn no_step_is_large_enough_to_tunnel() {
+    let wall = [Obstacle::Polygon(vec![[0.0, -1e3], [1e-6, -1e3], [1e-6, 1e3], [0.0, 1e3]])];
+    let solid = Obstacles::new(&wall).expect("a polygon");
+    for speed in [1e9, f64::INFINITY] {
+        let ways = [[[-5.0, 0.3], [500.0, 0.0]], [[-1e6, 0.0], [1e6, 0.0]]];
+        let mut world = World::new(limits(speed, 0.0), 0.1, &wall, &ways);
+        for _ in 0..50 {
+            let before = world.present.clone();
+            world.tick();
+            for (a, b) in before.iter().zip(world.present.iter()) {
+                assert_eq!(solid.free_way(a, b, 0.1 * (1.0 - 1e-6)), 1.0, "from {a:?} to {b:?}");
+            }
+        }
+        assert!(world.present.x[0] < 0.0, "the long way around takes more ticks");
+        // Without a wall, past each other.
+        let mut world = World::new(limits(speed, 0.5), 0.1, &[], &[ways[0], [[5.0, 0.3], [-5e3, 0.3]]]);
+        assert!(world.ticks_to_arrive(1e-6, 500).is_some());
+    }
+}
+
+#[test]
+fn a_robot_that_starts_inside_a_solid_is_brought_out_the_short_way() {
+    let solids = [letter_l([0.0, 0.0], [4.0, 4.0]), Obstacle::Disc { centre: [10.0, 0.0], radius: 1.0 }];
+    // In the lower leg, in the upper one, in the corner where the legs meet, in the disc, at its centre.
+    for (start, out) in [
+        ([3.0, 0.4], [3.0, -0.4]),
+        ([0.5, 3.0], [-0.4, 3.0]),
+        ([0.2, 0.3], [-0.4, 0.3]),
+        ([10.5, 0.0], [11.4, 0.0]),
+        ([10.0, 0.0], [8.6, 0.0]),
+    ] {
+        let mut world = World::new(limits(0.5, 0.1), 0.3, &solids, &[[start, out]]);
+        for _ in 0..100 {
+            let before = world.smallest_clearance();
+            world.tick();
+            assert!(world.smallest_clearance() >= before.min(0.1) - 1e-9, "deeper in");
+        }
+        let there = world.present.get(0);
+        assert!(distance(there, out) < 1e-6, "{start:?} came out at {there:?}");
+    }
+}
+
+#[test]
+fn robots_that_start_too_near_each_other_part_and_never_come_nearer() {
+    let starts = [[0.0, 0.0], [0.1, 0.0], [0.0, 0.0], [0.05, 0.2], [5.0, 0.0], [5.0, 0.0]];
+    let ways: Vec<_> = starts.map(|start| [start, [2.0, 0.0]]).into();
+    for speed in [0.5, f64::INFINITY] {
+        let mut world = World::new(limits(speed, 0.1), 0.2, &[], &ways);
+        let gaps = |world: &World| -> Vec<f64> {
+            (0..6)
+                .flat_map(|a| (0..a).map(move |b| (a, b)))
+                .map(|(a, b)| distance(world.present.get(a), world.present.get(b)))
+                .collect()
+        };
+        for _ in 0..200 {
+            let before = gaps(&world);
+            world.tick();
+            for (before, now) in before.iter().zip(gaps(&world)) {
+                assert!(now >= before.min(0.5) - 1e-9, "{before} m apart, then {now}");
+            }
+        }
+        assert!(world.smallest_clearance() >= 0.1 - 1e-6, "{}", world.smallest_clearance());
+    }
+}
+
+#[test]
+fn discs_stay_inside_the_geofence_and_come_back_from_outside() {
+    let square = vec![[0.0, 0.0], [10.0, 0.0], [10.0, 10.0], [0.0, 10.0]];
+    let horseshoe = vec![
+        [0.0, 0.0],
+        [10.0, 0.0],
+        [10.0, 10.0],
+        [7.0, 10.0],
+        [7.0, 3.0],
+        [3.0, 3.0],
+        [3.0, 10.0],
+        [0.0, 10.0],
+    ];
+    for fence in [square, horseshoe.clone(), horseshoe.into_iter().rev().collect()] {
+        let limits = Limits { geofence: Some(fence.clone()), ..limits(1.0, 0.0) };
+        let inside = Obstacles::new(&[Obstacle::Polygon(fence)]).expect("a polygon");
+        let ways = [[[1.5, 5.0], [-20.0, 5.0]], [[1.5, 8.0], [8.5, 8.0]], [[12.0, 5.0], [8.0, 5.0]]];
+        let mut world = World::new(limits, 0.5, &[], &ways);
+        for tick in 0..150 {
+            world.tick();
+            for (robot, place) in world.present.iter().enumerate() {
+                if robot < 2 || tick > 60 {
+                    assert!(-inside.distance(place) >= 0.5 - 1e-9, "robot {robot} at {place:?}");
+                }
+            }
+        }
+        assert!(world.flags[0].has(Flags::GEOFENCED));
+        let nearest_allowed = [0.5, 5.0];
+        assert!((world.present.x[0] - nearest_allowed[0]).abs() < 1e-9);
+        assert!(distance(world.present.get(2), [8.0, 5.0]) < 1e-6, "back and at its goal");
+    }
+}
+
+#[test]
+fn targets_that_harm_nobody_come_back_to_the_last_bit() {
+    let mut world = World::new(
+        limits(1.0, 0.1),
+        0.2,
+        &[],
+        &[[[0.1, 0.2], [0.1 + 1e-3, 0.2]], [[3.0, 0.1], [3.0, 0.1 / 3.0]]],
+    );
+    world.goals = world.present.iter().map(|[x, y]| [x + 0.1 / 3.0, y - 0.07]).collect();
+    world.tick();
+    assert_eq!(world.safe, world.goals);
+    assert_eq!(world.flags, [Flags::default(); 2]);
+}
+
+#[test]
+fn members_without_a_pose_or_a_target_are_held_and_avoided_where_they_were_seen() {
+    let places = [[0.0, 0.0], [1.0, 0.0], [f64::NAN, 0.0], [0.0, 5.0]];
+    let ways: Vec<_> = places.map(|place| [place, [2.0, 0.0]]).into();
+    let mut world = World::new(limits(1.0, 0.1), 0.2, &[], &ways);
+    world.goals.set(3, [f64::INFINITY, 0.0]);
+    let known = [true, false, false, true];
+    for _ in 0..50 {
+        let seen = Seen { present: &world.present, known: &known, ages: &[0.0; 4], velocity: None };
+        world.filter.apply(&seen, &world.goals, world.period, &mut world.safe, &mut world.flags);
+        world.present.clone_from(&world.safe);
+        assert!(distance(world.present.get(0), [1.0, 0.0]) >= 0.5 - 1e-9);
+    }
+    assert_eq!(world.present.get(1), [1.0, 0.0]);
+    assert_eq!(world.present.get(3), [0.0, 5.0]);
+    assert!([1, 2, 3].iter().all(|&robot| world.flags[robot] == Flags(Flags::HELD)));
+    assert!(distance(world.present.get(0), [2.0, 0.0]) < 1e-6, "around the one that stands there");
+}
+
+#[test]
+fn a_node_that_knows_one_member_and_its_surroundings_gives_the_bits_of_one_that_knows_all() {
+    let mut random = Pcg64Mcg::seed_from_u64(30);
+    let ways: Vec<_> = (0..200)
+        .map(|k| {
+            let site = [f64::from(k % 20), f64::from(k / 20)];
+            let shaken = |random: &mut Pcg64Mcg| site.map(|value| value + random.random_range(-0.3..0.3));
+            [shaken(&mut random), shaken(&mut random)]
+        })
+        .collect();
+    let mut all = World::new(limits(2.0, 0.1), 0.1, &[], &ways);
+    all.tick();
+    for member in [0, 37, 110, 199] {
+        let mut one = World::new(limits(2.0, 0.1), 0.1, &[], &ways);
+        for other in 0..200 {
+            if distance(ways[member][0], ways[other][0]) > 0.3 + 2.0 * 0.2 {
+                one.present.set(other, [f64::NAN; 2]);
+            }
+        }
+        one.tick();
+        assert_eq!(one.safe.get(member), all.safe.get(member), "member {member}");
+    }
+}
+
+#[test]
+fn robots_that_see_each_other_late_keep_clear_all_the_same() {
+    let mut random = Pcg64Mcg::seed_from_u64(40);
+    for delay in [0, 1, 3] {
+        for _ in 0..30 {
+            let angle = |k: usize| (k as f64 + random_phase(k)) / 8.0 * std::f64::consts::TAU;
+            let turn: f64 = random.random_range(0.0..1.0);
+            let at =
+                |k: usize, radius: f64| [radius * (angle(k) + turn).cos(), radius * (angle(k) + turn).sin()];
+            let ways: Vec<_> = (0..8).map(|k| [at(k, 2.5), at(k, -2.5)]).collect();
+            let mut world = World::new(limits(1.0, 0.1), 0.15, &[], &ways);
+            let mut filters = vec![world.filter.clone(); 8];
+            let mut history = vec![world.present.clone(); delay + 1];
+            for _ in 0..100 {
+                // Each knows its own place now and the others' as they were.
+                let mut next = world.present.clone();
+                for (member, filter) in filters.iter_mut().enumerate() {
+                    let mut present = history[0].clone();
+                    present.set(member, world.present.get(member));
+                    let mut ages = [world.period * delay as f64; 8];
+                    ages[member] = 0.0;
+                    let seen = Seen { present: &present, known: &[true; 8], ages: &ages, velocity: None };
+                    filter.apply(&seen, &world.goals, world.period, &mut world.safe, &mut world.flags);
+                    next.set(member, world.safe.get(member));
+                }
+                world.present = next;
+                history.remove(0);
+                history.push(world.present.clone());
+                let clearance = world.smallest_clearance();
+                assert!(clearance >= 0.1 - 1e-9, "{delay} ticks late: {clearance}");
+            }
+        }
+    }
+}
+
+fn random_phase(k: usize) -> f64 {
+    0.2 * ((k * 7) as f64).sin()
+}
+
+#[test]
+fn velocity_changes_no_faster_than_allowed_and_a_robot_stops_at_its_goal() {
+    let limits = Limits { acceleration: 0.5, ..limits(1.0, 0.1) };
+    let mut world =
+        World::new(limits, 0.2, &[rectangle([6.0, -1.0], [7.0, 1.0])], &[[[0.0, 0.0], [20.0, 0.0]]]);
+    world
+        .filter
+        .set_limits(Limits {
+            patience: Patience { ticks: 0, ..Patience::default() },
+            ..world.filter.limits().clone()
+        })
+        .expect("limits");
+    let mut velocity = Points::zeros(1);
+    let mut fastest = 0.0_f64;
+    for _ in 0..200 {
+        let seen = Seen { present: &world.present, known: &[true], ages: &[0.0], velocity: Some(&velocity) };
+        world.filter.apply(&seen, &world.goals, world.period, &mut world.safe, &mut world.flags);
+        let next = [0, 1].map(|k| (world.safe.get(0)[k] - world.present.get(0)[k]) / world.period);
+        assert!(distance(next, velocity.get(0)) <= 0.5 * world.period + 1e-9, "{next:?} after {velocity:?}");
+        fastest = fastest.max(next[0]);
+        velocity.set(0, next);
+        world.present.clone_from(&world.safe);
+    }
+    assert!(fastest > 0.9, "it gets up to speed: {fastest}");
+    assert!((world.present.x[0] - 5.7).abs() < 1e-3, "it stands before the wall: {:?}", world.present.get(0));
+}
+
+#[test]
+fn what_makes_no_sense_is_refused_by_name() {
+    let refused = |limits: Limits, radii: Vec<f64>| {
+        Filter::new(limits, radii, Obstacles::default()).err().expect("refused").to_string()
+    };
+    assert!(refused(limits(-1.0, 0.0), vec![]).starts_with("limit `speed` = -1"));
+    assert!(refused(limits(1.0, f64::NAN), vec![]).starts_with("limit `clearance` = NaN"));
+    assert!(refused(limits(1.0, 0.0), vec![0.1, -0.1]).starts_with("radius of member 1 = -0.1 m"));
+    let bow = vec![[0.0, 0.0], [1.0, 1.0], [1.0, 0.0], [0.0, 1.0]];
+    let fenced = Limits { geofence: Some(bow.clone()), ..Limits::default() };
+    assert!(refused(fenced, vec![]).starts_with("the geofence: edges 0 and 2 (from 0) cross"));
+    let solid = |obstacle: Obstacle| Obstacles::new(&[obstacle]).err().expect("refused").to_string();
+    assert!(solid(Obstacle::Polygon(bow)).starts_with("obstacle 0 (from 0): edges 0 and 2"));
+    assert!(solid(Obstacle::Polygon(vec![[0.0, 0.0], [1.0, 0.0]])).contains("2 corners"));
+    assert!(solid(Obstacle::Polygon(vec![[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]])).contains("no area"));
+    assert!(solid(Obstacle::Polygon(vec![[0.0, f64::NAN], [1.0, 0.0], [2.0, 1.0]])).contains("not finite"));
+    assert!(solid(Obstacle::Disc { centre: [0.0, 0.0], radius: 0.0 }).contains("radius 0 m"));
 }

@@ -135,3 +135,99 @@ pub fn shortened(way: [f64; 2], most: f64) -> [f64; 2] {
     let share = most / length;
     [share * way[0], share * way[1]]
 }
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::{FRAC_PI_2, PI};
+
+    use super::*;
+    use proptest::prelude::*;
+
+    fn cell(planes: &[(f64, f64)]) -> Cell {
+        let planes = planes.iter();
+        Cell {
+            planes: planes
+                .map(|&(angle, offset)| HalfPlane { normal: [angle.cos(), angle.sin()], offset })
+                .collect(),
+        }
+    }
+
+    fn excess(cell: &Cell, point: [f64; 2]) -> f64 {
+        let beyond = |plane: &HalfPlane| dot(plane.normal, point) - plane.offset;
+        cell.planes.iter().map(beyond).fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    fn apart(a: [f64; 2], b: [f64; 2]) -> f64 {
+        length([a[0] - b[0], a[1] - b[1]])
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(2000))]
+
+        #[test]
+        fn the_projection_lies_in_the_cell_and_no_point_of_the_cell_is_nearer(
+            planes in prop::collection::vec((0.0..6.3, 0.0..1.0), 0..12),
+            wanted in prop::array::uniform2(-3.0..3.0),
+            reach in 0.1..4.0,
+            scale in prop::sample::select(vec![1e-9, 1e-3, 1.0, 1e6]),
+            samples in prop::collection::vec(prop::array::uniform2(-1.0..1.0), 200),
+        ) {
+            let planes: Vec<_> = planes.iter().map(|(angle, offset)| (*angle, scale * offset)).collect();
+            let (cell, reach) = (cell(&planes), scale * reach);
+            let wanted = [scale * wanted[0], scale * wanted[1]];
+            let found = cell.nearest(wanted, reach);
+            prop_assert!(excess(&cell, found) <= 1e-12 * scale && length(found) <= reach * (1.0 + 1e-12));
+            for [x, y] in samples {
+                // Near the point that was found, where a better one would have to be, and anywhere.
+                for size in [1e-6, 1e-2, 1.0] {
+                    let other = [found[0] + scale * size * x, found[1] + scale * size * y];
+                    if excess(&cell, other) <= 0.0 && length(other) <= reach {
+                        let gain = apart(wanted, found) - apart(wanted, other);
+                        prop_assert!(gain <= 1e-9 * scale, "{other:?} beats {found:?} by {gain}");
+                    }
+                }
+            }
+        }
+
+        #[test]
+        fn whoever_stands_outside_moves_no_further_out(
+            planes in prop::collection::vec((0.0..6.3, -1.0..1.0), 1..8),
+            wanted in prop::array::uniform2(-3.0..3.0),
+            reach in 0.1..4.0,
+        ) {
+            let cell = cell(&planes);
+            let found = cell.nearest(wanted, reach);
+            prop_assert!(length(found) <= reach * (1.0 + 1e-12));
+            for plane in &cell.planes {
+                let forward = dot(plane.normal, found);
+                prop_assert!(forward <= plane.offset.max(0.0) + 1e-12, "{plane:?}: {forward}");
+            }
+        }
+    }
+
+    #[test]
+    fn degenerate_cells_leave_the_member_where_it_is_or_on_its_line() {
+        let (east, north, west, south) = (0.0, FRAC_PI_2, PI, 3.0 * FRAC_PI_2);
+        let point = cell(&[(east, 0.0), (north, 0.0), (west, 0.0), (south, 0.0)]);
+        assert!(length(point.nearest([2.0, 1.0], 9.0)) < 1e-12);
+        let line = cell(&[(east, 0.0), (west, 0.0), (east, 0.0)]);
+        assert!(apart(line.nearest([2.0, 1.0], 9.0), [0.0, 1.0]) < 1e-12);
+        let needle = cell(&[(1e-9, 0.0), (west, 0.0)]);
+        assert!(needle.nearest([2.0, 1.0], 9.0)[0].abs() < 1e-8);
+    }
+
+    #[test]
+    fn whoever_stands_outside_two_half_planes_comes_back_into_both_or_stays_between() {
+        let corner = cell(&[(0.0, -0.5), (FRAC_PI_2, -0.25)]);
+        assert!(apart(corner.nearest([3.0, 3.0], 9.0), [-0.5, -0.25]) < 1e-12);
+        let trap = cell(&[(0.0, -0.5), (PI, -0.25)]);
+        assert!(trap.nearest([3.0, 0.0], 9.0)[0].abs() < 1e-12);
+        let far = cell(&[(0.0, -0.5)]);
+        assert!(apart(far.nearest([3.0, 0.0], 0.125), [-0.125, 0.0]) < 1e-9, "as far as in reach");
+    }
+
+    #[test]
+    fn without_planes_the_wanted_point_comes_back_to_the_bit() {
+        assert_eq!(cell(&[]).nearest([0.1, -0.3], f64::INFINITY), [0.1, -0.3]);
+    }
+}

@@ -219,8 +219,8 @@ impl Obstacles {
         }
     }
 
-    /// The share of the straight way \[1\] that a disc of this radius \[m\] goes before it touches a solid,
-    /// by shape cast; 1 where nothing is in the way.
+    /// The share of the straight way \[1\] that a disc of this radius \[m\], above 0, goes before it touches
+    /// a solid, by shape cast; 1 where nothing is in the way.
     pub fn free_way(&self, from: [f64; 2], to: [f64; 2], radius: f64) -> f64 {
         let (here, there) = (vector(from), vector(to));
         let margin = Vector::splat(radius);
@@ -230,19 +230,19 @@ impl Obstacles {
             compute_impact_geometry_on_penetration: false,
             ..ShapeCastOptions::with_max_time_of_impact(1.0)
         };
-        let (disc, way) = (Ball::new(radius), there - here);
+        // In radii and seen from the disc: the cast's tolerances are absolute, made for sizes about 1.
+        let seen = |point: Vector| (point - here) / radius;
+        let (disc, way, start, still) = (Ball::new(1.0), seen(there), Pose::IDENTITY, Vector::ZERO);
         let mut share = 1.0_f64;
         for leaf in self.tree.intersect_aabb(&swept) {
             let hit = match &self.pieces[leaf as usize] {
                 Piece::Edge { segment, .. } => {
-                    // In the edge's own neighbourhood, so that far from the origin nothing is lost.
-                    let local = Segment::new(segment.a - here, segment.b - here);
-                    let (still, here) = (Vector::ZERO, Pose::IDENTITY);
-                    cast_shapes(&here, way, &disc, &here, still, &local, options)
+                    let edge = Segment::new(seen(segment.a), seen(segment.b));
+                    cast_shapes(&start, way, &disc, &start, still, &edge, options)
                 }
                 Piece::Disc { centre, ball } => {
-                    let at = Pose::from_translation(*centre - here);
-                    cast_shapes(&Pose::IDENTITY, way, &disc, &at, Vector::ZERO, ball, options)
+                    let (at, ball) = (Pose::from_translation(seen(*centre)), Ball::new(ball.radius / radius));
+                    cast_shapes(&start, way, &disc, &at, still, &ball, options)
                 }
             };
             if let Ok(Some(hit)) = hit {

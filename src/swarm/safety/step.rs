@@ -103,7 +103,10 @@ impl Filter {
             let other = self.crowd.found[k] as usize;
             let stray = drift + self.drift(seen, other);
             let keep = self.radii[member] + self.radii[other] + self.limits.clearance;
-            self.cell.planes.extend(border(here, seen.present.get(other), keep, stray, reach));
+            // Two at the very same place part: the lower number to the left.
+            let aside = if member < other { [1.0, 0.0] } else { [-1.0, 0.0] };
+            let places = [here, seen.present.get(other), aside];
+            add_border(&mut self.cell.planes, places, keep, stray, reach);
         }
         let obstacles = self.cell.planes.len();
         let radius = self.radii[member];
@@ -209,30 +212,45 @@ impl Errand {
     }
 }
 
-/// The half-plane that keeps a member `here` on its own side of another, if it can matter within
-/// `reach` \[m\]: the module's docs prove it.
-fn border(here: [f64; 2], there: [f64; 2], keep: f64, stray: f64, reach: f64) -> Option<HalfPlane> {
+/// Appends the half-planes that keep a member `here` on its own side of another, if they can matter
+/// within `reach` \[m\]: the module's docs prove it. `aside` is the direction to it where both stand at
+/// the very same place.
+fn add_border(
+    planes: &mut Vec<HalfPlane>,
+    [here, there, aside]: [[f64; 2]; 3],
+    keep: f64,
+    stray: f64,
+    reach: f64,
+) {
     let way = [there[0] - here[0], there[1] - here[1]];
     let distance = length(way);
+    let normal = if distance > 0.0 { [way[0] / distance, way[1] / distance] } else { aside };
     let fresh = (distance - keep) / 2.0;
-    let offset = if stray > 0.0 {
-        let sine = stray / distance;
-        if sine < 1.0 {
-            let cosine = (1.0 - sine * sine).sqrt();
-            let turned = (2.0 - 2.0 * cosine).sqrt() * reach;
-            aged((distance * cosine - stray - keep) / 2.0 - turned, fresh)
-        } else {
-            fresh.min(0.0)
+    if stray <= 0.0 {
+        if fresh < reach || fresh <= 0.0 {
+            planes.push(HalfPlane { normal, offset: fresh });
         }
-    } else {
-        fresh
-    };
-    if offset >= reach && offset > 0.0 {
-        return None;
+        return;
     }
-    // Who stands at the very same place leaves to the left: see `members_at_one_place`.
-    let normal = if distance > 0.0 { [way[0] / distance, way[1] / distance] } else { [1.0, 0.0] };
-    Some(HalfPlane { normal, offset })
+    let sine = (stray / distance).min(1.0);
+    let cosine = (1.0 - sine * sine).sqrt();
+    let turned = (2.0 - 2.0 * cosine).sqrt() * reach;
+    let offset = (distance * cosine - stray - keep) / 2.0 - turned;
+    if offset >= 0.0 && sine < 1.0 {
+        if offset < reach {
+            planes.push(HalfPlane { normal, offset });
+        }
+        return;
+    }
+    // Perhaps too near already: away from wherever the other may be, or nowhere.
+    planes.push(HalfPlane { normal, offset: fresh.min(0.0) });
+    for sine in [sine, -sine] {
+        let normal = [cosine * normal[0] - sine * normal[1], sine * normal[0] + cosine * normal[1]];
+        planes.push(HalfPlane { normal, offset: 0.0 });
+    }
+    if sine >= 1.0 {
+        planes.push(HalfPlane { normal: [-normal[0], -normal[1]], offset: (-fresh).max(0.0) });
+    }
 }
 
 /// Age alone drives nobody back: at most it keeps a member where it stands.
