@@ -54,8 +54,9 @@ impl Filter {
         } else {
             self.around(&errand, member, &mut flags)
         };
-        let step = self.braked(seen, goal, period, member, &errand, &mut flags);
-        let step = self.cast(here, shortened(step, errand.step), origins, member);
+        let step = shortened(self.braked(seen, goal, period, member, &errand, &mut flags), errand.step);
+        let step = self.to_rest(seen, step, period, member, &errand);
+        let step = self.cast(here, step, origins, member);
         if errand.distance > errand.step {
             flags.0 |= Flags::SPEED_LIMITED;
         }
@@ -186,6 +187,18 @@ impl Filter {
         flags.0 |= Flags::ACCELERATION_LIMITED;
         let next = [(velocity[0] + held[0]) * period, (velocity[1] + held[1]) * period];
         self.cell.nearest(next, errand.step)
+    }
+
+    /// A member that takes time to brake is sent to where it would come to rest after the step: sent to the end
+    /// of the step, it would begin to brake at once and never get up to speed.
+    fn to_rest(&self, seen: &Seen, step: [f64; 2], period: f64, member: usize, errand: &Errand) -> [f64; 2] {
+        if self.velocity(seen, member).is_none() {
+            return step;
+        }
+        let pace = length(step) / period;
+        let braking = 1.0 + pace / (2.0 * self.limits.acceleration * period);
+        let whole = [braking * step[0], braking * step[1]];
+        self.cell.nearest(shortened(whole, length(step).max(errand.distance)), errand.reach)
     }
 
     /// Cuts the step where a disc cast along it touches a solid. The cell has seen to that already: this
