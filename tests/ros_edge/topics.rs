@@ -37,6 +37,8 @@ fn poses_go_in_and_targets_go_out() {
     for x in [4.0, 5.0] {
         poses_out.publish(&pose(x)).expect("sent");
     }
+    // Time for both to come, so that the older one is there to be passed over.
+    std::thread::sleep(std::time::Duration::from_millis(300));
     until("the last pose", || poses_in.take_last().filter(|(pose, _)| pose.position[0] == 5.0));
     assert_eq!(poses_in.take(), None);
 }
