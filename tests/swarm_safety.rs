@@ -1,6 +1,7 @@
 //! The safety filter on whole scenes: nobody comes nearer than declared, and who can arrive does.
 
 use flockform::flock::points::{Points, distance};
+use flockform::swarm::robots::{DoubleIntegrator, Model, Robot};
 use flockform::swarm::safety::{Filter, Flags, Limits, Obstacle, Obstacles, Patience, Seen};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
@@ -353,16 +354,15 @@ fn discs_stay_inside_the_geofence_and_come_back_from_outside() {
 
 #[test]
 fn targets_that_harm_nobody_come_back_to_the_last_bit() {
-    let mut world = World::new(
-        limits(1.0, 0.1),
-        0.2,
-        &[],
-        &[[[0.1, 0.2], [0.1 + 1e-3, 0.2]], [[3.0, 0.1], [3.0, 0.1 / 3.0]]],
-    );
-    world.goals = world.present.iter().map(|[x, y]| [x + 0.1 / 3.0, y - 0.07]).collect();
+    let place = |k: usize| [3.1 * k as f64 + 0.1, 0.7 / (k + 1) as f64];
+    let goal = |k: usize| [place(k)[0] + 0.1 / 3.0, 0.01 / (k + 3) as f64];
+    let ways: Vec<_> = (0..20).map(|k| [place(k), goal(k)]).collect();
+    let mut world = World::new(limits(100.0, 0.1), 0.2, &[], &ways);
+    let there_and_back = |k: usize| place(k)[1] + (goal(k)[1] - place(k)[1]);
+    assert!((0..20).any(|k| there_and_back(k) != goal(k)[1]), "rounding would show");
     world.tick();
     assert_eq!(world.safe, world.goals);
-    assert_eq!(world.flags, [Flags::default(); 2]);
+    assert_eq!(world.flags, [Flags::default(); 20]);
 }
 
 #[test]
@@ -451,7 +451,7 @@ fn random_phase(k: usize) -> f64 {
 fn velocity_changes_no_faster_than_allowed_and_a_robot_stops_at_its_goal() {
     let limits = Limits { acceleration: 0.5, ..limits(1.0, 0.1) };
     let mut world =
-        World::new(limits, 0.2, &[rectangle([6.0, -1.0], [7.0, 1.0])], &[[[0.0, 0.0], [20.0, 0.0]]]);
+        World::new(limits, 0.2, &[rectangle([6.0, -1.0], [7.0, 30.0])], &[[[0.0, 0.0], [0.0, 20.0]]]);
     world
         .filter
         .set_limits(Limits {
@@ -459,16 +459,19 @@ fn velocity_changes_no_faster_than_allowed_and_a_robot_stops_at_its_goal() {
             ..world.filter.limits().clone()
         })
         .expect("limits");
-    let mut velocity = Points::zeros(1);
+    let model = Model::DoubleIntegrator(DoubleIntegrator { speed: 1.0, acceleration: 0.5 });
+    let mut robot = Robot::at([0.0, 0.0], 0.0);
     let mut fastest = 0.0_f64;
     for _ in 0..200 {
+        let velocity: Points = [robot.velocity].into_iter().collect();
         let seen = Seen { present: &world.present, known: &[true], ages: &[0.0], velocity: Some(&velocity) };
         world.filter.apply(&seen, &world.goals, world.period, &mut world.safe, &mut world.flags);
-        let next = [0, 1].map(|k| (world.safe.get(0)[k] - world.present.get(0)[k]) / world.period);
-        assert!(distance(next, velocity.get(0)) <= 0.5 * world.period + 1e-9, "{next:?} after {velocity:?}");
-        fastest = fastest.max(next[0]);
-        velocity.set(0, next);
-        world.present.clone_from(&world.safe);
+        robot.step(&model, world.safe.get(0), world.period);
+        let change = distance(robot.velocity, velocity.get(0));
+        assert!(change <= 0.5 * world.period + 1e-9, "{:?} after {velocity:?}", robot.velocity);
+        assert!(robot.position[0] <= 5.7 + 1e-9, "into the wall: {robot:?}");
+        fastest = fastest.max(robot.velocity[0]);
+        world.present.set(0, robot.position);
     }
     assert!(fastest > 0.9, "it gets up to speed: {fastest}");
     assert!((world.present.x[0] - 5.7).abs() < 1e-3, "it stands before the wall: {:?}", world.present.get(0));

@@ -9,7 +9,7 @@
 //!   alone decide, and a member's target takes only its own and its neighbours': a node that serves one
 //!   member gives the same bits as one that serves all.
 //! * **Obstacles and geofence** by the plane through the nearest point of every edge in reach
-//!   ([`obstacles`](Obstacle)), and a shape cast along the way as a second opinion.
+//!   ([`Obstacles`]), and a shape cast along the way as a second opinion.
 //! * **Deadlock** by keeping to the right ([`Patience`]).
 //!
 //! # Why it is safe
@@ -28,10 +28,17 @@
 //! Poses of ages `a_i`, `a_j` are off by at most `e = speed (a_i + a_j)` together. The direction `n` is then
 //! off by an angle of sine `e / d` at most, and the border is at least `(sqrt(d^2 - e^2) - s - e) / 2` away;
 //! turning it costs a further `2 sin(angle / 2) reach`. The cell takes all of that off, so it lies inside
-//! every cell that the true places could have. Age alone drives nobody apart: who is
-//! far enough going by the poses stays.
+//! every cell that the true places could have. Where that leaves nothing, the member moves only away from
+//! all places where the other may be, or stays: age alone drives nobody apart. That takes poses
+//! whose ages are true and a speed limit that others keep too. For obstacles the member's own age counts.
 //!
-//! It is a filter, not a planner: it goes around what is convex and waits before what is not.
+//! # Acceleration
+//! Given velocities, a member goes no faster than lets it brake before every border of its cell, as they
+//! stand. Borders move, since neighbours do: where one comes too fast the cell is kept and the acceleration
+//! exceeded, with [`Flags::ACCELERATION_LIMITED`] set. A robot that cannot follow is not covered.
+//!
+//! It is a filter, not a planner: it goes around what is convex and may wait or wander before what is not.
+//! A member whose goal lies inside a solid circles it: keep targets out of solids.
 
 mod cell;
 mod clearance;

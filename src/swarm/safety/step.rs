@@ -49,13 +49,23 @@ impl Filter {
         let origins = self.enclose(seen, &mut errand, member);
         let open = errand.open(errand.reach);
         let mut flags = self.why(open, origins);
-        let goal = if flags == Flags::default() && self.detours[member].is_fresh() {
+        let velocity = self.velocity(seen, member);
+        if velocity.is_some() {
+            self.leave_room_to_brake(&mut errand, period, &mut flags);
+        }
+        let hindered = flags != Flags::default() || velocity.is_some();
+        let goal = if !hindered && self.detours[member].is_fresh() {
             open
         } else {
             self.around(&errand, member, &mut flags)
         };
-        let step = shortened(self.braked(seen, goal, period, member, &errand, &mut flags), errand.step);
-        let step = self.to_rest(seen, step, period, member, &errand);
+        let step = match velocity {
+            Some(velocity) => {
+                let step = self.steered(velocity, goal, period, &errand, &mut flags);
+                self.to_rest(shortened(step, errand.step), period, &errand)
+            }
+            None => shortened(goal, errand.step),
+        };
         let step = self.cast(here, step, origins, member);
         if errand.distance > errand.step {
             flags.0 |= Flags::SPEED_LIMITED;
@@ -161,27 +171,35 @@ impl Filter {
         goal
     }
 
-    /// The step towards a goal in the cell that the acceleration allows and from which there is room
-    /// to brake before the goal.
-    fn braked(
+    /// Brings the cell's borders and the end of the way as near as the member can go in a period and brake
+    /// in time after it, `v T + v^2 / (2 a)` being the room: whoever kept to that at the last tick can do
+    /// so at this one, as long as the borders stay.
+    fn leave_room_to_brake(&mut self, errand: &mut Errand, period: f64, flags: &mut Flags) {
+        let most = self.limits.acceleration;
+        let step = |room: f64| period * most * ((period * period + 2.0 * room / most).sqrt() - period);
+        for plane in self.cell.planes.iter_mut().filter(|plane| plane.offset > 0.0) {
+            plane.offset = step(plane.offset);
+        }
+        let brakable = step(errand.distance);
+        if brakable < errand.step.min(errand.distance) {
+            flags.0 |= Flags::ACCELERATION_LIMITED;
+        }
+        errand.reach = errand.step.min(brakable);
+    }
+
+    /// The step nearest to a goal in the cell that changes the velocity no faster than allowed; the cell
+    /// comes first where it leaves none.
+    fn steered(
         &self,
-        seen: &Seen,
+        velocity: [f64; 2],
         goal: [f64; 2],
         period: f64,
-        member: usize,
         errand: &Errand,
         flags: &mut Flags,
     ) -> [f64; 2] {
-        let Some(velocity) = self.velocity(seen, member) else { return goal };
-        let most = self.limits.acceleration;
-        let distance = length(goal);
-        // From v T + v^2 / (2 a) = distance.
-        let brakable = most * ((period * period + 2.0 * distance / most).sqrt() - period);
-        let pace = brakable.min(errand.step / period);
-        let fitting = shortened(goal, pace * period);
-        let change = [fitting[0] / period - velocity[0], fitting[1] / period - velocity[1]];
-        let held = shortened(change, most * period);
-        if held == change && fitting == goal {
+        let change = [goal[0] / period - velocity[0], goal[1] / period - velocity[1]];
+        let held = shortened(change, self.limits.acceleration * period);
+        if held == change {
             return goal;
         }
         flags.0 |= Flags::ACCELERATION_LIMITED;
@@ -190,15 +208,22 @@ impl Filter {
     }
 
     /// A member that takes time to brake is sent to where it would come to rest after the step: sent to the end
-    /// of the step, it would begin to brake at once and never get up to speed.
-    fn to_rest(&self, seen: &Seen, step: [f64; 2], period: f64, member: usize, errand: &Errand) -> [f64; 2] {
-        if self.velocity(seen, member).is_none() {
-            return step;
+    /// of the step, it would begin to brake at once and never get up to speed. Stays inside the borders as
+    /// they were before room was left.
+    fn to_rest(&self, step: [f64; 2], period: f64, errand: &Errand) -> [f64; 2] {
+        let per_length = 1.0 / (2.0 * self.limits.acceleration * period * period);
+        let mut stretch = 1.0 + length(step) * per_length;
+        if length(step) > 0.0 {
+            stretch = stretch.min((errand.distance / length(step)).max(1.0));
         }
-        let pace = length(step) / period;
-        let braking = 1.0 + pace / (2.0 * self.limits.acceleration * period);
-        let whole = [braking * step[0], braking * step[1]];
-        self.cell.nearest(shortened(whole, length(step).max(errand.distance)), errand.reach)
+        for plane in &self.cell.planes {
+            let towards = dot(plane.normal, step);
+            if towards > 0.0 && plane.offset > 0.0 {
+                let room = plane.offset * (1.0 + plane.offset * per_length);
+                stretch = stretch.min((room / towards).max(1.0));
+            }
+        }
+        [stretch * step[0], stretch * step[1]]
     }
 
     /// Cuts the step where a disc cast along it touches a solid. The cell has seen to that already: this
