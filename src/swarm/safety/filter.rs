@@ -119,7 +119,7 @@ impl Filter {
 
     /// Safe targets \[m, world frame\] for the wanted ones over the next `period` \[s\], and what changed
     /// them. The members are to go straight to their targets, at any pace; the speed is
-    /// `|safe - present| / period` or, where the acceleration is limited, such that they come to rest there.
+    /// `|safe - present| / period` unless they brake ([`Limits::brakes`]).
     ///
     /// # Panics
     /// If the slices are not as long as there are members.

@@ -10,6 +10,10 @@ pub struct Limits {
     pub speed: f64,
     /// Highest acceleration \[m/s^2\]; default none (infinite). It takes velocities to hold it.
     pub acceleration: f64,
+    /// Whether members brake by themselves to stand still at a target, as those do whose controller goes for
+    /// positions; default no. With an acceleration limit they are sent to where they would come to rest: sent
+    /// to the end of the next step, they would begin to brake at once and never get up to speed.
+    pub brakes: bool,
     /// Whether members are kept apart from each other at all; default yes. Without it the clearance is
     /// that from obstacles.
     pub keeps_apart: bool,
@@ -28,6 +32,7 @@ impl Default for Limits {
         Self {
             speed: f64::INFINITY,
             acceleration: f64::INFINITY,
+            brakes: false,
             keeps_apart: true,
             clearance: 0.0,
             geofence: None,

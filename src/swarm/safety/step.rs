@@ -61,8 +61,8 @@ impl Filter {
         };
         let step = match velocity {
             Some(velocity) => {
-                let step = self.steered(velocity, goal, period, &errand, &mut flags);
-                self.to_rest(shortened(step, errand.step), period, &errand)
+                let step = shortened(self.steered(velocity, goal, period, &errand, &mut flags), errand.step);
+                if self.limits.brakes { self.to_rest(step, period, &errand) } else { step }
             }
             None => shortened(goal, errand.step),
         };
@@ -207,9 +207,8 @@ impl Filter {
         self.cell.nearest(next, errand.step)
     }
 
-    /// A member that takes time to brake is sent to where it would come to rest after the step: sent to the end
-    /// of the step, it would begin to brake at once and never get up to speed. Stays inside the borders as
-    /// they were before room was left.
+    /// Where a member that takes this step would come to rest after it; inside the borders as they were before
+    /// room was left.
     fn to_rest(&self, step: [f64; 2], period: f64, errand: &Errand) -> [f64; 2] {
         let per_length = 1.0 / (2.0 * self.limits.acceleration * period * period);
         let mut stretch = 1.0 + length(step) * per_length;

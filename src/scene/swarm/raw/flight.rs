@@ -85,7 +85,7 @@ pub enum RawModel {
         #[schemars(extend("exclusiveMinimum" = 0))]
         turn_rate: f64,
     },
-    /// Speeds up and brakes: needs a speed and an acceleration limit.
+    /// Speeds up, and brakes to stand still at its target: needs a speed and an acceleration limit.
     DoubleIntegrator,
 }
 
