@@ -174,10 +174,10 @@ impl Filter {
     fn leave_room_to_brake(&mut self, errand: &mut Errand, period: f64, flags: &mut Flags) {
         let most = self.limits.acceleration;
         let step = |room: f64| period * most * ((period * period + 2.0 * room / most).sqrt() - period);
+        let brakable = step(length(self.cell.nearest(errand.way, errand.reach)));
         for plane in self.cell.planes.iter_mut().filter(|plane| plane.offset > 0.0) {
             plane.offset = step(plane.offset);
         }
-        let brakable = step(errand.distance);
         if brakable < errand.step.min(errand.distance) {
             flags.0 |= Flags::ACCELERATION_LIMITED;
         }
