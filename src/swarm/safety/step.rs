@@ -231,6 +231,7 @@ impl Errand {
 /// Appends the half-planes that keep a member `here` on its own side of another, if they can matter
 /// within `reach` \[m\]: the module's docs prove it. `aside` is the direction to it where both stand at
 /// the very same place.
+#[inline]
 fn add_border(
     planes: &mut Vec<HalfPlane>,
     [here, there, aside]: [[f64; 2]; 3],
@@ -242,7 +243,7 @@ fn add_border(
     let distance = length(way);
     let normal = if distance > 0.0 { [way[0] / distance, way[1] / distance] } else { aside };
     let fresh = (distance - keep) / 2.0;
-    if stray <= 0.0 {
+    if stray == 0.0 {
         if fresh < reach || fresh <= 0.0 {
             planes.push(HalfPlane { normal, offset: fresh });
         }
