@@ -46,7 +46,7 @@ enum Poses {
     WithCovariance(Vec<Publisher<PoseWithCovarianceStamped>>),
     Odometry(Vec<Publisher<Odometry>>),
     /// With the last pose of each robot.
-    Array(Publisher<PoseArray>, Vec<geometry_msgs::Pose>),
+    Array(Box<Publisher<PoseArray>>, Vec<geometry_msgs::Pose>),
 }
 
 impl RobotNodes {
@@ -87,7 +87,7 @@ impl RobotNodes {
                     let topic = first.publisher(&of(&raw.pose_topic, 0)?, Quality::BEST_EFFORT)?;
                     // Nowhere until it says where.
                     let nowhere = geometry_msgs::Pose::planar([f64::NAN; 2], f64::NAN);
-                    Poses::Array(topic, vec![nowhere; formation.count()])
+                    Poses::Array(Box::new(topic), vec![nowhere; formation.count()])
                 }
             },
             frames: first.publisher("/tf", Quality::reliable(100))?,

@@ -14,7 +14,7 @@ pub enum PoseSource {
     WithCovariance(Vec<(usize, Subscription<PoseWithCovarianceStamped>)>),
     Odometry(Vec<(usize, Subscription<Odometry>)>),
     /// All at once, in the order of the members; whom to listen to.
-    Array(Subscription<PoseArray>, Vec<usize>),
+    Array(Box<Subscription<PoseArray>>, Vec<usize>),
 }
 
 /// Poses of one member taken in a tick at most: a flood must not hold the loop.
@@ -28,7 +28,8 @@ impl PoseSource {
             RawPoseType::Odometry => Self::Odometry(each(node, raw, heard, topic)?),
             RawPoseType::PoseArray => {
                 let topic = topic(&raw.pose_topic, 0)?;
-                Self::Array(node.subscription(&topic, Quality::BEST_EFFORT)?, heard.to_vec())
+                let topic = node.subscription(&topic, Quality::BEST_EFFORT)?;
+                Self::Array(Box::new(topic), heard.to_vec())
             }
         })
     }

@@ -22,13 +22,20 @@ pub use fleet::Fleet;
 pub use measure::{Record, Sample};
 pub use report::{FlightReport, RobotReport, Verdict};
 
+/// The continuum run of the scene that is flown.
+struct Twin {
+    engine: Engine,
+    /// Particle of each member.
+    particles: Vec<usize>,
+}
+
 /// Robots under way. Members by number, as everywhere in this room.
 pub struct Flight {
     control: Control,
     fleet: Fleet,
     periods: u64,
     /// The same scene as a continuum, stepped beside the flight.
-    continuum: Option<(Box<Engine>, Vec<usize>)>,
+    continuum: Option<Twin>,
 }
 
 impl Flight {
@@ -71,14 +78,14 @@ impl Flight {
         });
         self.control.tick(now);
         self.fleet.go(|member| self.control.target(member));
-        if let Some((engine, _)) = &mut self.continuum {
-            engine.advance();
+        if let Some(twin) = &mut self.continuum {
+            twin.engine.advance();
         }
     }
 
     /// Largest distance of a robot from its particle in the continuum run of the same scene \[m\].
     pub fn continuum_error(&self) -> Option<f64> {
-        let (engine, particles) = self.continuum.as_ref()?;
+        let Twin { engine, particles } = self.continuum.as_ref()?;
         let apart = |(robot, &i): (&Robot, &usize)| distance(robot.position, engine.present().get(i));
         Some(self.fleet.robots().iter().zip(particles).map(apart).fold(0.0, f64::max))
     }
@@ -124,10 +131,10 @@ fn periods(swarm: &Swarm, control: &Control) -> u64 {
     }
 }
 
-/// The run that the flight is held against, and the particle of each member.
-fn continuum(swarm: &Swarm) -> Result<Option<(Box<Engine>, Vec<usize>)>, SceneError> {
+/// The run that the flight is held against.
+fn continuum(swarm: &Swarm) -> Result<Option<Twin>, SceneError> {
     let Shape::Scene(scene) = &swarm.shape else { return Ok(None) };
     let plan = Plan::new(scene)?;
     let particles = (0..plan.count()).filter(|&i| !plan.body.is_frame[i]).collect();
-    Ok(Some((Box::new(Engine::new(plan)), particles)))
+    Ok(Some(Twin { engine: Engine::new(plan), particles }))
 }

@@ -12,7 +12,7 @@ impl Filter {
     pub fn clearance_on_the_way(&self, before: &Points, after: &Points, nearest: &mut Vec<f64>) {
         nearest.clear();
         nearest.extend(
-            (0..after.len()).map(|m| self.from_obstacles(before.get(m), after.get(m)) - self.radii[m]),
+            (0..after.len()).map(|m| self.obstacle_distance(before.get(m), after.get(m)) - self.radii[m]),
         );
         for a in 0..after.len() {
             for b in 0..a {
@@ -27,7 +27,7 @@ impl Filter {
         }
     }
 
-    fn from_obstacles(&self, from: [f64; 2], to: [f64; 2]) -> f64 {
+    fn obstacle_distance(&self, from: [f64; 2], to: [f64; 2]) -> f64 {
         if self.obstacles.is_empty() {
             return f64::INFINITY;
         }

@@ -177,10 +177,10 @@ impl Filter {
     fn leave_room_to_brake(&mut self, errand: &mut Errand, period: f64, flags: &mut Flags) {
         let most = self.limits.acceleration;
         let step = |room: f64| period * most * ((period * period + 2.0 * room / most).sqrt() - period);
+        let brakable = step(length(self.cell.nearest(errand.way, errand.reach)));
         for plane in self.cell.planes.iter_mut().filter(|plane| plane.offset > 0.0) {
             plane.offset = step(plane.offset);
         }
-        let brakable = step(errand.distance);
         if brakable < errand.step.min(errand.distance) {
             flags.0 |= Flags::ACCELERATION_LIMITED;
         }
@@ -252,6 +252,7 @@ impl Errand {
 /// Appends the half-planes that keep a member `here` on its own side of another, if they can matter
 /// within `reach` \[m\]: the module's docs prove it. `aside` is the direction to it where both stand at
 /// the very same place.
+#[inline]
 fn add_border(
     planes: &mut Vec<HalfPlane>,
     [here, there, aside]: [[f64; 2]; 3],
@@ -263,7 +264,7 @@ fn add_border(
     let distance = length(way);
     let normal = if distance > 0.0 { [way[0] / distance, way[1] / distance] } else { aside };
     let fresh = (distance - keep) / 2.0;
-    if stray <= 0.0 {
+    if stray == 0.0 {
         if fresh < reach || fresh <= 0.0 {
             planes.push(HalfPlane { normal, offset: fresh });
         }
