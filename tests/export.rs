@@ -54,7 +54,7 @@ impl Run {
             probes: &self.probes,
             timings: Timings::default(),
         };
-        let written = write_all(&folder, &results)?;
+        let (written, _) = write_all(&folder, &results)?;
         assert!(written.iter().all(|path| path.is_file()), "{written:?}");
         folder.commit().map(|_| ())
     }
