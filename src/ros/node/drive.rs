@@ -34,9 +34,14 @@ impl Drive {
     }
 
     /// A member without a target is told to stand.
-    pub fn publish(&self, control: &Control, member: usize, header: Header) -> Result<(), EdgeError> {
-        let here = control.position(member);
-        let twist = match (here, control.target(member), control.yaw(member)) {
+    pub fn publish(
+        &self,
+        control: &Control,
+        member: usize,
+        target: Option<[f64; 2]>,
+        header: Header,
+    ) -> Result<(), EdgeError> {
+        let twist = match (control.position(member), target, control.yaw(member)) {
             (Some(here), Some(target), Some(yaw)) => {
                 let way = [target[0] - here[0], target[1] - here[1]];
                 twist(way, yaw, control.period(), control.limits().speed, self.turn_rate)

@@ -186,6 +186,8 @@ impl FormationNode {
         let now = self.clock.now().unwrap_or_else(system_time);
         let control = &mut self.control;
         self.lifecycle.shut_down(now, &mut |goal| act(control, goal));
+        // Robots that are driven by velocities would go on for ever.
+        self.publish(now);
     }
 
     pub fn control(&self) -> &Control {
@@ -262,8 +264,10 @@ impl FormationNode {
         Header { stamp: Time::from_seconds(now), frame_id: self.frame_id.clone() }
     }
 
+    /// Targets while the node is active; velocities always, which are zero while it is not.
     fn publish(&mut self, now: f64) {
-        for (member, topic) in &self.targets {
+        let active = self.lifecycle.is_active();
+        for (member, topic) in self.targets.iter().filter(|_| active) {
             let Some(target) = self.control.target(*member) else { continue };
             let here = self.control.position(*member).unwrap_or(target);
             // A target says where to look too: ahead, or where the robot looks now.
@@ -276,7 +280,8 @@ impl FormationNode {
             self.statistics.sent(topic.publish(&message));
         }
         for (member, drive) in &self.drives {
-            self.statistics.sent(drive.publish(&self.control, *member, self.header(now)));
+            let target = self.control.target(*member).filter(|_| active);
+            self.statistics.sent(drive.publish(&self.control, *member, target, self.header(now)));
         }
     }
 
