@@ -4,7 +4,8 @@
 //! spectrum; [`bisection`] finds them by running the body; [`extremes`] runs it, and small bodies made for
 //! the purpose, where numbers and shapes are as bad as they come. [`study::run`] does all of it.
 //!
-//! Delay is a threshold of swarms: no scene has one yet, so none is looked for.
+//! Delay has no threshold: a swarm's targets are places, so with poses `d` periods late the sweep `M` becomes
+//! `x(k+1) = M x(k-d)`, whose growth per step is that of `M` to the power `1/(d+1)` (`tests/swarm` measures it).
 
 pub mod bisection;
 pub mod extremes;

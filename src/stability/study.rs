@@ -245,6 +245,9 @@ impl fmt::Display for Linear {
             };
             writeln!(f, "{name:26} {:>14} {:>14} {apart:>10}{verdict}", shown(predicted), shown(found))?;
         }
-        writeln!(f, "delay: a threshold of swarms; a scene has none")
+        writeln!(
+            f,
+            "delay: no threshold, since targets are places: poses d periods late take growth per step to the power 1/(d+1)"
+        )
     }
 }

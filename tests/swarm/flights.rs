@@ -1,7 +1,8 @@
 //! Flights of the bundled swarms, and what they promise.
 
-use flockform::flock::points::Points;
+use flockform::flock::points::{Points, distance};
 use flockform::scene::bundled::SWARMS;
+use flockform::swarm::flight::Flight;
 
 use super::support::*;
 
@@ -87,5 +88,34 @@ fn every_model_of_a_robot_brings_the_formation_home() {
         let [_, last] = report.affine_error.expect("affine");
         assert!(last < 0.01, "{model}: {last}");
         assert!(report.clearance.expect("others") >= 0.3 - 1e-9, "{model}: {:?}", report.clearance);
+    }
+}
+
+#[test]
+fn a_square_led_all_around_settles_at_its_rate_and_late_poses_only_slow_it() {
+    // DESIGN: rho = cos(pi / (n + 1)) for n x n followers; x(k+1) = M x(k-d) takes it to the power 1/(d+1).
+    let rate = (std::f64::consts::PI / 6.0).cos();
+    for delay in [0, 1, 4] {
+        let text = format!(
+            "title = \"rate\"\n[lattice]\nkind = \"square\"\nspacing = 1.0\n\
+             [body]\nshape = {{ kind = \"grid\", columns = 7, rows = 7 }}\n\
+             [[leaders]]\nregion = {{ kind = \"boundary\" }}\nprogram = {{ kind = \"external\" }}\n\
+             [control]\nperiod = 0.1\n[poses]\nfresh = 2.0\nage_limit = 2.0\nstop_after = 3.0\n\
+             [flight]\ndelay = {delay}\n[[flight.start]]\nrobot = \"robot_25\"\nplace = [3.2, 2.9]\n"
+        );
+        let mut flight = Flight::new(&parse(&text).expect("valid")).expect("flies");
+        let places = flight.fleet().places();
+        let error = |flight: &Flight| {
+            let now = flight.fleet().places();
+            let home = flight.control().formation().places.clone();
+            (0..places.len()).map(|m| distance(now.get(m), home.get(m)).powi(2)).sum::<f64>().sqrt()
+        };
+        let cycle = 2 * (delay + 1);
+        (0..30 * cycle).for_each(|_| flight.step());
+        let before = error(&flight);
+        (0..10 * cycle).for_each(|_| flight.step());
+        // Ten cycles of two sweeps each.
+        let found = (error(&flight) / before).powf(1.0 / 20.0);
+        assert!((found - rate).abs() < 1e-6, "delay {delay}: {found}, not {rate}");
     }
 }
