@@ -55,7 +55,7 @@ pub const SCENES: &[Bundled] = files!["scenes":
 ];
 
 /// Every bundled swarm, in the order in which `flockform swarms` lists them.
-pub const SWARMS: &[Bundled] = files!["swarms": "square", "gap", "patch", "antipodal", "bridge"];
+pub const SWARMS: &[Bundled] = files!["swarms": "square", "gap", "patch", "antipodal", "liar", "bridge"];
 
 /// The bundled swarm of this name.
 pub fn bundled_swarm(name: &str) -> Option<Bundled> {

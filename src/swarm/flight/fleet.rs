@@ -72,8 +72,13 @@ impl Fleet {
         self.robots.iter().map(|robot| robot.position).collect()
     }
 
+    /// Whether nothing is wrong with the robot now.
+    pub fn is_sound(&self, member: usize) -> bool {
+        self.fault(member).is_none()
+    }
+
     /// Whether the robot moves at all now.
-    pub fn is_able(&self, member: usize) -> bool {
+    fn is_able(&self, member: usize) -> bool {
         !self.fault(member).is_some_and(Fault::stands)
     }
 

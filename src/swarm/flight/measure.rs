@@ -1,4 +1,5 @@
-//! What is measured of a flight, from where the robots are, not from where they say they are.
+//! What is measured of a flight, from where the robots are, not from where they say they are. Errors are those of
+//! the robots with which nothing is wrong at the time.
 
 use super::Flight;
 use crate::flock::points::{Points, distance};
@@ -69,7 +70,7 @@ impl Record {
         }
         let worst = |place: &dyn Fn(usize) -> [f64; 2]| {
             let apart = |m: usize| distance(place(m), present.get(m));
-            (0..formation.count()).filter(|&m| flight.fleet().is_able(m)).map(apart).fold(0.0, f64::max)
+            (0..formation.count()).filter(|&m| flight.fleet().is_sound(m)).map(apart).fold(0.0, f64::max)
         };
         let affine = formation.affine(control.program_time());
         let measures = formation.measures(&present);

@@ -142,7 +142,8 @@ pub enum RawFaultKind {
     WrongFrame,
 }
 
-/// What has to hold; a flight that breaks one of these ends with exit code 1.
+/// What has to hold; a flight that breaks one of these ends with exit code 1. Errors are those of the robots with
+/// which nothing is wrong at the time.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawBounds {
