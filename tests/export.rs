@@ -54,7 +54,7 @@ impl Run {
             probes: &self.probes,
             timings: Timings::default(),
         };
-        let written = write_all(&folder, &results)?;
+        let (written, _) = write_all(&folder, &results)?;
         assert!(written.iter().all(|path| path.is_file()), "{written:?}");
         folder.commit().map(|_| ())
     }
@@ -166,7 +166,9 @@ fn the_tables_of_the_tension_test_use_the_papers_numbering_and_read_back_exactly
 
     let mut table = csv::Reader::from_path(out.join("final.csv")).expect("readable");
     let header: Vec<String> = table.headers().expect("a header").iter().map(str::to_owned).collect();
-    assert_eq!(header, ["id", "column", "row", "role", "X", "Y", "x", "y", "pe1", "pe2"]);
+    let places = ["id", "column", "row", "role", "X", "Y", "x", "y"];
+    let measures = ["pe1", "pe2", "strain_xx", "strain_yy", "strain_xy", "rotation"];
+    assert_eq!(header, [&places[..], &measures].concat());
     let rows: Vec<csv::StringRecord> = table.records().map(|row| row.expect("a row")).collect();
     assert_eq!(rows.len(), 144);
     // The paper: j = 67 stands in the sixth column, seventh row; j = 115 beside the leaders.
@@ -181,6 +183,8 @@ fn the_tables_of_the_tension_test_use_the_papers_numbering_and_read_back_exactly
         assert_eq!([number(4), number(5)], engine.body().reference.get(i));
         assert_eq!([number(6), number(7)], engine.present().get(i));
         assert_eq!([number(8), number(9)], [engine.pe1(i), engine.pe2(i)]);
+        let strain = row[10].parse::<f64>().ok().map(|xx| ([xx, number(11), number(12)], number(13)));
+        assert_eq!(strain, engine.strain(i).map(|strain| (strain.components, strain.rotation)));
     }
 
     let mut table = csv::Reader::from_path(out.join("probes.csv")).expect("readable");

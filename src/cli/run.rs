@@ -14,7 +14,9 @@ use flockform::continuum::equilibrium::come_to_rest;
 use flockform::continuum::plan::Plan;
 use flockform::continuum::record::{ProbeSeries, Snapshot};
 use flockform::continuum::run::{Outcome, StopReason};
-use flockform::export::{ExportError, OutputFolder, Results, Timings, VtkSeries, write_all};
+use flockform::export::{
+    Energies, ExportError, OutputFolder, Results, Summary, Timings, VtkSeries, write_all,
+};
 use flockform::scene::Scene;
 use flockform::trade::{Chosen, choose};
 
@@ -71,11 +73,12 @@ fn run_here(arguments: &RunArguments) -> Result<ExitCode, Refusal> {
     let records = recorder.finish(&outcome.engine)?;
     let timings = Timings { setup, steps: elapsed.saturating_sub(records.writing), output: records.writing };
     let (snapshots, probes) = (&records.snapshots, &records.probes);
-    write_all(&folder, &Results { scene: &scene, outcome: &outcome, snapshots, probes, timings })?;
+    let results = Results { scene: &scene, outcome: &outcome, snapshots, probes, timings };
+    let (_, Summary { energies, .. }) = write_all(&folder, &results)?;
     let kept = folder.commit()?;
     if !arguments.output.quiet {
         print(&words);
-        print(&closing_words(&scene, &outcome, elapsed, &kept));
+        print(&closing_words(&scene, &outcome, &energies, elapsed, &kept));
     }
     Ok(exit_code(&outcome))
 }
@@ -162,7 +165,13 @@ impl<'a> Recorder<'a> {
     }
 }
 
-fn closing_words(scene: &Scene, outcome: &Outcome, elapsed: Duration, kept: &Path) -> String {
+fn closing_words(
+    scene: &Scene,
+    outcome: &Outcome,
+    energies: &Energies,
+    elapsed: Duration,
+    kept: &Path,
+) -> String {
     let engine = &outcome.engine;
     let how = match &outcome.reason {
         StopReason::Equilibrium => "in equilibrium".to_owned(),
@@ -190,6 +199,12 @@ fn closing_words(scene: &Scene, outcome: &Outcome, elapsed: Duration, kept: &Pat
             phases.join(", ")
         );
     }
+    words += &format!(
+        "PE1 {:.4e} {unit}^2 in all, largest strain {:.4e}\n",
+        energies.pe1,
+        energies.largest_strain.unwrap_or(0.0),
+        unit = scene.unit(),
+    );
     let broken: Vec<_> = engine.breaks().iter().filter(|b| b.step > 0).collect();
     if let (Some(first), Some(last)) = (broken.first(), broken.last()) {
         words += &format!(

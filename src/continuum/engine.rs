@@ -12,6 +12,7 @@ use crate::flock::points::{Points, distance};
 use crate::flock::pseudo_energy::{pe1, pe2};
 use crate::flock::role::Role;
 use crate::flock::rules::Rule;
+use crate::flock::strain::{Strain, strain};
 use crate::scene::Quantity;
 use crate::solve::sweep::{Order, Sweep, Update};
 
@@ -141,6 +142,11 @@ impl Engine {
     /// PE2 of one particle \[length\].
     pub fn pe2(&self, particle: usize) -> f64 {
         pe2(particle, &self.present, &self.previous)
+    }
+
+    /// What became of one particle's surroundings; `None` for those who see too few.
+    pub fn strain(&self, particle: usize) -> Option<Strain> {
+        strain(&self.interaction, particle, &self.present)
     }
 
     /// Moves the body by one step.

@@ -14,6 +14,7 @@ use super::error::ExportError;
 use crate::continuum::record::{ProbeSeries, Snapshot};
 use crate::flock::body::Body;
 use crate::flock::fracture::Break;
+use crate::flock::strain::Strain;
 
 #[derive(Serialize)]
 struct FinalRow {
@@ -29,6 +30,10 @@ struct FinalRow {
     y: f64,
     pe1: f64,
     pe2: f64,
+    strain_xx: Option<f64>,
+    strain_yy: Option<f64>,
+    strain_xy: Option<f64>,
+    rotation: Option<f64>,
 }
 
 #[derive(Serialize)]
@@ -60,8 +65,14 @@ struct ResidualRow {
     residual: f64,
 }
 
-/// Writes every particle at the end: reference and present place \[length\], PE1 \[length^2\], PE2 \[length\].
-pub fn write_final(folder: &OutputFolder, body: &Body, last: &Snapshot) -> Result<PathBuf, ExportError> {
+/// Writes every particle at the end: reference and present place \[length\], PE1 \[length^2\], PE2 \[length\], the
+/// strain \[1\] and the rotation \[rad\] of its surroundings, empty where it sees too few.
+pub fn write_final(
+    folder: &OutputFolder,
+    body: &Body,
+    last: &Snapshot,
+    strains: &[Option<Strain>],
+) -> Result<PathBuf, ExportError> {
     let lowest = |axis: usize| body.sites.iter().map(|site| i64::from(site[axis])).min().unwrap_or(0);
     let (first_column, first_row) = (lowest(0), lowest(1));
     let rows = (0..body.count()).map(|i| FinalRow {
@@ -75,6 +86,10 @@ pub fn write_final(folder: &OutputFolder, body: &Body, last: &Snapshot) -> Resul
         y: last.positions.y[i],
         pe1: last.pe1[i],
         pe2: last.pe2[i],
+        strain_xx: strains[i].map(|strain| strain.components[0]),
+        strain_yy: strains[i].map(|strain| strain.components[1]),
+        strain_xy: strains[i].map(|strain| strain.components[2]),
+        rotation: strains[i].map(|strain| strain.rotation),
     });
     write(folder, "final.csv", rows)
 }

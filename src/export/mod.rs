@@ -67,6 +67,7 @@ use rayon::prelude::*;
 
 use crate::continuum::record::{ProbeSeries, Snapshot};
 use crate::continuum::run::Outcome;
+use crate::flock::strain::Strain;
 use crate::scene::Scene;
 pub use error::ExportError;
 use figures::Subject;
@@ -86,15 +87,20 @@ pub struct Results<'a> {
 }
 
 /// Writes tables, figures and, last, the summary, which tells how long the others took. Returns the
-/// paths within the folder under its temporary name.
+/// paths within the folder under its temporary name, and the summary.
 ///
 /// # Errors
 /// The first file that cannot be written.
-pub fn write_all(folder: &OutputFolder, results: &Results<'_>) -> Result<Vec<PathBuf>, ExportError> {
+pub fn write_all(
+    folder: &OutputFolder,
+    results: &Results<'_>,
+) -> Result<(Vec<PathBuf>, Summary), ExportError> {
     let start = Instant::now();
     let engine = &results.outcome.engine;
     let last = Snapshot::of(engine);
-    let mut written = vec![csv::write_final(folder, engine.body(), &last)?];
+    let strains: Vec<_> = (0..engine.body().count()).into_par_iter().map(|i| engine.strain(i)).collect();
+    let largest_strain = strains.iter().flatten().map(Strain::largest).reduce(f64::max);
+    let mut written = vec![csv::write_final(folder, engine.body(), &last, &strains)?];
     if !results.probes.is_empty() {
         written.push(csv::write_probes(folder, results.probes)?);
     }
@@ -110,8 +116,9 @@ pub fn write_all(folder: &OutputFolder, results: &Results<'_>) -> Result<Vec<Pat
     written.extend(write_figures(folder, results)?);
     let mut timings = results.timings;
     timings.output += start.elapsed();
-    written.push(Summary::new(results.scene, results.outcome, &last, timings).write(folder)?);
-    Ok(written)
+    let summary = Summary::new(results.scene, results.outcome, &last, largest_strain, timings);
+    written.push(summary.write(folder)?);
+    Ok((written, summary))
 }
 
 fn write_figures(folder: &OutputFolder, results: &Results<'_>) -> Result<Vec<PathBuf>, ExportError> {

@@ -74,13 +74,15 @@ pub struct Counts {
     pub neighbour_pairs: usize,
 }
 
-/// Sums over the body at the end.
+/// Sums over the body at the end, and the worst of it.
 #[derive(Clone, Copy, Debug, Serialize, PartialEq)]
 pub struct Energies {
     /// \[length^2\]
     pub pe1: f64,
     /// \[length\]
     pub pe2: f64,
+    /// The strain largest in size of any particle's surroundings \[1\]; absent where nobody sees enough others.
+    pub largest_strain: Option<f64>,
 }
 
 #[derive(Clone, Copy, Debug, Serialize, PartialEq)]
@@ -127,7 +129,13 @@ pub struct Seconds {
 
 impl Summary {
     /// `last` is the configuration at the end.
-    pub fn new(scene: &Scene, outcome: &Outcome, last: &Snapshot, timings: Timings) -> Self {
+    pub fn new(
+        scene: &Scene,
+        outcome: &Outcome,
+        last: &Snapshot,
+        largest_strain: Option<f64>,
+        timings: Timings,
+    ) -> Self {
         let [pe1, pe2] = last.energies();
         Self {
             program: PROGRAM,
@@ -143,7 +151,7 @@ impl Summary {
             },
             residual: Some(outcome.residual).filter(|residual| residual.is_finite()),
             equilibrium: outcome.solved.as_ref().map(Equilibrium::of),
-            energies: Energies { pe1, pe2 },
+            energies: Energies { pe1, pe2, largest_strain },
             broken_bonds: broken_bonds(&outcome.engine),
             timings: Seconds {
                 setup_s: timings.setup.as_secs_f64(),

@@ -6,3 +6,4 @@ mod material;
 mod program;
 mod run;
 mod stability;
+mod swarm;

@@ -64,7 +64,10 @@ fn the_main_job_writes_the_figures_and_tables_of_the_paper() {
     assert_eq!(summary["counts"]["frame"], 44);
     assert_eq!(summary["scene"]["lattice"]["spacing"], 1.0);
     let table = std::fs::read_to_string(out.join("final.csv")).expect("written");
-    assert_eq!(table.lines().next(), Some("id,column,row,role,X,Y,x,y,pe1,pe2"));
+    assert_eq!(
+        table.lines().next(),
+        Some("id,column,row,role,X,Y,x,y,pe1,pe2,strain_xx,strain_yy,strain_xy,rotation")
+    );
     assert_eq!(table.lines().count(), 145);
     assert!(table.lines().nth(67).is_some_and(|row| row.starts_with("67,6,7,follower,")));
 }

@@ -80,6 +80,16 @@ fn four_neighbours_tolerate_no_liar_and_eight_one() {
 }
 
 #[test]
+fn corners_that_follow_by_negative_weights_are_refused_and_named() {
+    let text = "title = \"t\"\n[lattice]\nkind = \"square\"\nspacing = 1.0\n[body]\nshape = { kind = \"grid\", columns = 10, rows = 10 }\n\
+                [neighbours]\nkind = \"ring\"\nradius = 1\n[rule]\nweights = { kind = \"solved\" }\n\
+                [[leaders]]\nregion = { kind = \"ids\", ids = [45, 56, 46] }\nprogram = { kind = \"external\" }\n";
+    let report = refusal(text);
+    assert!(report.contains("does not come to rest"), "{report}");
+    assert!(report.contains("robot_1, robot_10, robot_91, robot_100"), "{report}");
+}
+
+#[test]
 fn a_corner_without_enough_neighbours_for_its_place_is_named() {
     let text = "title = \"t\"\n[lattice]\nkind = \"square\"\nspacing = 1.0\n[body]\nshape = { kind = \"grid\", columns = 4, rows = 4 }\n\
                 [rule]\nweights = { kind = \"solved\" }\n";

@@ -51,7 +51,7 @@ impl Statistics {
         // A clock that was set back starts anew.
         let due = self.due[what].is_none_or(|due| now >= due || due - now > 2.0 / rate);
         if due {
-            let next = self.due[what].filter(|due| now - due < 1.0 / rate).unwrap_or(now);
+            let next = self.due[what].filter(|due| (0.0..1.0 / rate).contains(&(now - due))).unwrap_or(now);
             self.due[what] = Some(next + 1.0 / rate);
         }
         due

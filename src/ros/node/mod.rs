@@ -308,20 +308,24 @@ fn act(control: &mut Control, goal: Goal) -> Outcome {
     Outcome::Success
 }
 
+/// The number of the robot that the node is alone for.
 fn only(swarm: &Swarm, control: &Control, name: &str) -> Result<usize, NodeError> {
     let formation = control.formation();
+    let number = formation.number(name).ok_or_else(|| NodeError::Member {
+        name: name.to_owned(),
+        first: formation.names[0].clone(),
+        last: formation.names[formation.count() - 1].clone(),
+    })?;
     let refuse = |why| Err(NodeError::NotAlone { name: name.to_owned(), why });
     if swarm.raw.control.sweeps > 1 {
         return refuse("control.sweeps above 1 needs to see the whole formation");
     }
-    if !formation.is_led_here() && !formation.can_be_followed_alone() {
-        return refuse("this scene is swept one robot after another, which needs to see the whole formation");
+    if !formation.can_be_followed_alone() {
+        return refuse(
+            "robots that a body carries, or that are swept one after another, depend on all others",
+        );
     }
-    formation.number(name).ok_or_else(|| NodeError::Member {
-        name: name.to_owned(),
-        first: formation.names[0].clone(),
-        last: formation.names[formation.count() - 1].clone(),
-    })
+    Ok(number)
 }
 
 /// Where to take part, as the environment says.

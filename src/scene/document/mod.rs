@@ -7,6 +7,7 @@ mod schema_rule;
 
 use std::thread::ScopedJoinHandle;
 
+use serde::de::DeserializeOwned;
 use serde_json::Value;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue, Error};
@@ -109,6 +110,15 @@ impl Document {
     /// range, unknown choices, numbers that are not finite.
     pub fn check(&self, schema: &Value) -> Result<Value, SceneError> {
         schema_check::check(self, &self.root, schema)
+    }
+
+    /// The document as `T`, whose schema this is.
+    ///
+    /// # Errors
+    /// As [`Document::check`].
+    pub fn read<T: DeserializeOwned>(&self, schema: &Value) -> Result<T, SceneError> {
+        serde_json::from_value(self.check(schema)?)
+            .map_err(|error| SceneError::from(self.problem("", error.to_string(), None)))
     }
 
     /// A problem with the value at `key_path`, for checks that no schema can express.

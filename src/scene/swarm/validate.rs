@@ -7,14 +7,13 @@ use super::raw::*;
 use super::recording;
 use super::{NamedManoeuvre, Shape, Swarm};
 use crate::flock::manoeuvre::{Leg, Posture};
-use crate::flock::rules::{Feedback, FeedbackReference, Rule};
+use crate::flock::rules::Rule;
 use crate::scene::document::Document;
 use crate::scene::document::problem::SceneError;
 use crate::scene::raw::{
-    RawBody, RawFeedbackReference, RawFrame, RawLattice, RawMean, RawRecord, RawScene, RawStop, RawUpdate,
-    RawWeights,
+    RawBody, RawFrame, RawLattice, RawMean, RawRecord, RawScene, RawStop, RawUpdate, RawWeights,
 };
-use crate::scene::validate::{self as scene_checks, Refuse, unreadable};
+use crate::scene::validate::{self as scene_checks, File, Refuse};
 use crate::scene::{Scene, bundled};
 
 impl Swarm {
@@ -23,16 +22,8 @@ impl Swarm {
     /// # Errors
     /// Every key that is unknown, missing, out of range or at odds with another, with its line.
     pub fn from_file(path: &Path, overrides: &[String]) -> Result<Self, SceneError> {
-        let file = path.display().to_string();
-        let text = std::fs::read_to_string(path).map_err(|error| {
-            unreadable(
-                &file,
-                &error,
-                "give the path of a swarm file, or a name that `flockform swarms` lists",
-            )
-        })?;
-        let name =
-            path.file_stem().map_or_else(|| "swarm".into(), |stem| stem.to_string_lossy().into_owned());
+        let help = "give the path of a swarm file, or a name that `flockform swarms` lists";
+        let File { name, file, text } = File::read(path, help)?;
         Self::parse(&name, &file, &text, overrides, path.parent())
     }
 
@@ -48,9 +39,7 @@ impl Swarm {
         folder: Option<&Path>,
     ) -> Result<Self, SceneError> {
         let document = Document::parse(file, text, overrides)?;
-        let checked = document.check(&schema())?;
-        let raw: RawSwarm = serde_json::from_value(checked)
-            .map_err(|error| SceneError::from(document.problem("", error.to_string(), None)))?;
+        let raw: RawSwarm = document.read(&schema())?;
         let refuse: Refuse<'_> =
             &|key, message, help| SceneError::from(document.problem(key, message, Some(help.to_owned())));
         check_robots(&raw, refuse)?;
@@ -190,13 +179,7 @@ fn rule_of_places(raw: &RawSwarm, refuse: Refuse<'_>) -> Result<Rule, SceneError
     });
     let spacing = nearest.fold(f64::INFINITY, f64::min);
     let mean = scene_checks::mean(raw.rule.mean.as_ref().unwrap_or(&RawMean::Barycentre), spacing, refuse)?;
-    let feedback = raw.rule.feedback.as_ref().map(|f| Feedback {
-        factor: f.factor,
-        reference: match f.reference {
-            RawFeedbackReference::Initial => FeedbackReference::Initial,
-            RawFeedbackReference::Previous => FeedbackReference::Previous,
-        },
-    });
+    let feedback = raw.rule.feedback.as_ref().map(scene_checks::feedback);
     Ok(Rule { mean, poisson: None, feedback })
 }
 

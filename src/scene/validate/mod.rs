@@ -25,16 +25,8 @@ use crate::solve::sweep::{Order, Update};
 impl Scene {
     /// Reads a scene file from disk; `overrides` are `KEY.PATH=VALUE` texts applied on top.
     pub fn from_file(path: &Path, overrides: &[String]) -> Result<Self, SceneError> {
-        let file = path.display().to_string();
-        let text = std::fs::read_to_string(path).map_err(|error| {
-            unreadable(
-                &file,
-                &error,
-                "give the path of a scene file, or a name that `flockform scenes` lists",
-            )
-        })?;
-        let name =
-            path.file_stem().map_or_else(|| "scene".into(), |stem| stem.to_string_lossy().into_owned());
+        let help = "give the path of a scene file, or a name that `flockform scenes` lists";
+        let File { name, file, text } = File::read(path, help)?;
         Self::parse(&name, &file, &text, overrides, path.parent())
     }
 
@@ -47,9 +39,7 @@ impl Scene {
         folder: Option<&Path>,
     ) -> Result<Self, SceneError> {
         let document = Document::parse(file, text, overrides)?;
-        let checked = document.check(&schema())?;
-        let raw: RawScene = serde_json::from_value(checked)
-            .map_err(|error| SceneError::from(document.problem("", error.to_string(), None)))?;
+        let raw = document.read(&schema())?;
         validate(name, raw, document, folder)
     }
 }
@@ -59,15 +49,32 @@ pub fn schema() -> serde_json::Value {
     schemars::schema_for!(RawScene).into()
 }
 
-/// The error for a file that cannot be read at all.
-pub(super) fn unreadable(file: &str, error: &std::io::Error, help: &str) -> SceneError {
-    SceneError::from(Problem {
-        place: Place::File { file: file.to_owned() },
-        key: String::new(),
-        found: None,
-        message: format!("cannot be read: {error}"),
-        help: Some(help.to_owned()),
-    })
+/// A file as read from disk.
+pub(super) struct File {
+    /// Without its folder and ending.
+    pub name: String,
+    /// As messages name it.
+    pub file: String,
+    pub text: String,
+}
+
+impl File {
+    /// # Errors
+    /// Why it cannot be read, with `help`.
+    pub(super) fn read(path: &Path, help: &str) -> Result<Self, SceneError> {
+        let file = path.display().to_string();
+        let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        match std::fs::read_to_string(path) {
+            Ok(text) => Ok(Self { name, file, text }),
+            Err(error) => Err(SceneError::from(Problem {
+                place: Place::File { file },
+                key: String::new(),
+                found: None,
+                message: format!("cannot be read: {error}"),
+                help: Some(help.to_owned()),
+            })),
+        }
+    }
 }
 
 /// Makes the error for a key, a message and a remedy.
@@ -122,13 +129,7 @@ pub(super) fn validate(
             centre: p.centre,
             exponent: p.exponent,
         }),
-        feedback: raw.rule.feedback.as_ref().map(|f| Feedback {
-            factor: f.factor,
-            reference: match f.reference {
-                RawFeedbackReference::Initial => FeedbackReference::Initial,
-                RawFeedbackReference::Previous => FeedbackReference::Previous,
-            },
-        }),
+        feedback: raw.rule.feedback.as_ref().map(feedback),
         update: Update {
             order: match raw.update.order {
                 RawOrder::Synchronous => Order::Synchronous,
@@ -326,6 +327,16 @@ pub(super) fn mean(raw: &RawMean, spacing: f64, refuse: Refuse<'_>) -> Result<Me
         RawMean::Spaced { spacing, power } => Mean::Spaced { spacing, power },
         RawMean::Material { rotation } => Mean::Material { rotation: material::rotation(rotation) },
     })
+}
+
+pub(super) fn feedback(raw: &RawFeedback) -> Feedback {
+    Feedback {
+        factor: raw.factor,
+        reference: match raw.reference {
+            RawFeedbackReference::Initial => FeedbackReference::Initial,
+            RawFeedbackReference::Previous => FeedbackReference::Previous,
+        },
+    }
 }
 
 fn weights(raw: &Option<RawWeights>, refuse: Refuse<'_>) -> Result<Option<Weights>, SceneError> {

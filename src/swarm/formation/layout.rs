@@ -32,6 +32,9 @@ impl Formation {
             Shape::Recorded(scene, recording) => recorded(swarm, scene, recording)?,
         };
         require_apart(swarm, &formation)?;
+        if matches!(swarm.raw.rule.weights, Some(RawWeights::Solved {})) {
+            require_settling(swarm, &formation)?;
+        }
         Ok(formation)
     }
 }
@@ -252,6 +255,31 @@ fn lead(
             let manoeuvre = Manoeuvre { about, from: Posture::NOMINAL, legs: named.legs.clone() };
             Lead::Manoeuvre { manoeuvre, since: 0.0 }
         }
+    })
+}
+
+/// Refuses solved weights with which the followers would not come to rest. Those outside the hull of their
+/// neighbours have negative ones, and several of them together may drive each other away.
+fn require_settling(swarm: &Swarm, formation: &Formation) -> Result<(), SceneError> {
+    let Some(engine) = formation.engine() else { return Ok(()) };
+    let Weights::Scalar(weights) = &engine.interaction().weights else { return Ok(()) };
+    let neighbours = &engine.interaction().neighbours;
+    let follows: Vec<bool> = engine.roles().iter().map(|&role| role == Role::Follower).collect();
+    affine_weights::settles(weights, neighbours, &follows).map(drop).map_err(|error| {
+        let outside = |&m: &usize| {
+            let Course::Rule { particles, .. } = &formation.course else { return false };
+            follows[particles[m]] && neighbours.bonds(particles[m]).any(|bond| weights[bond] < 0.0)
+        };
+        let names: Vec<&str> =
+            (0..formation.count()).filter(outside).map(|m| formation.names[m].as_str()).collect();
+        let help = match names[..] {
+            [] => "let robots lead that do not stand on one line, and that everybody is linked to".to_owned(),
+            _ => format!(
+                "let these lead, which lie outside the hull of their neighbours: {}",
+                names.join(", ")
+            ),
+        };
+        swarm.refuse("rule.weights", error.to_string(), help)
     })
 }
 

@@ -143,7 +143,8 @@ mod tests {
         let refusal = supported(&four, &ring(), 1, Trim::PerAxis).expect_err("two of four lead at best");
         let expected = Unsupported::NotReached { member: 11, neighbours: 4, reached: 2, needed: 3, f: 1 };
         assert_eq!(refusal, expected);
-        assert!(refusal.to_string().contains("member 11 only 2"), "{refusal}");
+        assert!(refusal.to_string().contains("4 neighbours of whom only 2"), "{refusal}");
+        assert_eq!(refusal.member(), 11);
         let refusal = supported(&four, &columns(1), 2, Trim::PerAxis).expect_err("four at most");
         let expected = Unsupported::TooFewNeighbours { member: 10, neighbours: 3, needed: 5, f: 2 };
         assert_eq!(refusal, expected);

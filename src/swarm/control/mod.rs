@@ -3,15 +3,16 @@
 //! A period goes: who is heard, and where; where the rule sends each ([`Formation::advance`]); who has to do
 //! without some of its neighbours; what is safe ([`Filter`]). A member that is not heard gets no target.
 
+mod setup;
+
 use super::formation::{Formation, Measures, Seen};
 use super::resilience::trim;
-use super::safety::{self, Filter, Flags, Limits, Obstacle, Obstacles, SafetyError};
-use super::watch::{Health, Pose, Rejection, Watch, WatchLimits};
+use super::safety::{self, Filter, Flags, Limits, SafetyError};
+use super::watch::{Health, Pose, Rejection, Watch};
 use crate::flock::manoeuvre::Manoeuvre;
 use crate::flock::points::{Points, distance};
 use crate::scene::SceneError;
 use crate::scene::swarm::Swarm;
-use crate::scene::swarm::raw::{RawLimits, RawModel, RawObstacle};
 
 /// What the loop is doing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -68,34 +69,15 @@ impl Control {
     /// Names the key of the swarm that cannot be laid out or kept safe.
     pub fn new(swarm: &Swarm) -> Result<Self, SceneError> {
         let formation = Formation::lay_out(swarm)?;
-        let raw = &swarm.raw;
-        let (period, count) = (raw.control.period, formation.count());
-        let liars = raw.resilience.as_ref().map_or(0, |resilience| resilience.liars);
-        if liars > 0 {
-            formation.require_support(liars).map_err(|unsupported| {
-                let help = "lower it, widen the neighbourhood, or make more robots leaders";
-                swarm.refuse("resilience.liars", unsupported, help)
-            })?;
-        }
-        let limits = limits(&raw.limits, &raw.flight.model);
-        let speed = limits.speed;
-        let filter = filter(swarm, limits, formation.radii.clone())?;
-        let watch = WatchLimits {
-            fresh: raw.poses.fresh.unwrap_or((3.0 * period).min(raw.poses.age_limit)),
-            age_limit: raw.poses.age_limit,
-            stop_after: raw.poses.stop_after,
-            centre: formation.middle(),
-            range: raw.poses.range,
-            jump_speed: raw.poses.jump_speed.unwrap_or(10.0 * speed),
-            recover: raw.poses.recover as u32,
-            period: Some(period),
-            ..WatchLimits::default()
-        };
+        let (period, count) = (swarm.raw.control.period, formation.count());
+        let liars = setup::liars(swarm, &formation)?;
+        let filter = setup::filter(swarm, &formation)?;
+        let watch = setup::watch(swarm, &formation, filter.limits().speed);
         Ok(Self {
             watch: Watch::new(count, watch),
             filter,
             liars,
-            sweeps: raw.control.sweeps,
+            sweeps: swarm.raw.control.sweeps,
             period,
             mode: Mode::Running,
             ticks: 0,
@@ -389,46 +371,4 @@ impl Control {
         }
         places
     }
-}
-
-/// What the filter holds members to, as the file says.
-fn limits(raw: &RawLimits, model: &RawModel) -> Limits {
-    Limits {
-        brakes: matches!(model, RawModel::DoubleIntegrator),
-        speed: raw.speed.unwrap_or(f64::INFINITY),
-        acceleration: raw.acceleration.unwrap_or(f64::INFINITY),
-        keeps_apart: raw.clearance.is_some(),
-        clearance: raw.clearance.unwrap_or(0.0),
-        geofence: raw.geofence.clone(),
-        ..Limits::default()
-    }
-}
-
-fn filter(swarm: &Swarm, limits: Limits, radii: Vec<f64>) -> Result<Filter, SceneError> {
-    let obstacles: Vec<Obstacle> = swarm
-        .raw
-        .obstacles
-        .iter()
-        .map(|obstacle| match obstacle {
-            RawObstacle::Polygon { vertices } => Obstacle::Polygon(vertices.clone()),
-            RawObstacle::Disc { centre, radius } => Obstacle::Disc { centre: *centre, radius: *radius },
-        })
-        .collect();
-    let refuse = |error: SafetyError| {
-        let key = match &error {
-            SafetyError::Limit { name, .. } => format!("limits.{name}"),
-            SafetyError::Radius { .. } => "radius".into(),
-            SafetyError::Corners { place, .. }
-            | SafetyError::NotFinite { place }
-            | SafetyError::NoArea { place }
-            | SafetyError::Crossing { place, .. }
-            | SafetyError::Disc { place, .. } => match place {
-                safety::Place::Geofence => "limits.geofence".into(),
-                safety::Place::Obstacle(k) => format!("obstacles[{k}]"),
-            },
-        };
-        swarm.refuse(&key, error.to_string(), "correct the swarm file")
-    };
-    let obstacles = Obstacles::new(&obstacles).map_err(refuse)?;
-    Filter::new(limits, radii, obstacles).map_err(refuse)
 }

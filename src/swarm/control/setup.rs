@@ -1,0 +1,89 @@
+//! From the swarm file to what the loop is made of: limits, obstacles, which poses are believed.
+
+use crate::scene::SceneError;
+use crate::scene::swarm::Swarm;
+use crate::scene::swarm::raw::{RawLimits, RawModel, RawObstacle};
+use crate::swarm::formation::Formation;
+use crate::swarm::safety::{Filter, Limits, Obstacle, Obstacles, Place, SafetyError};
+use crate::swarm::watch::WatchLimits;
+
+/// How many liars among a member's neighbours are to be tolerated.
+///
+/// # Errors
+/// Names the member that does not have the neighbours for it.
+pub fn liars(swarm: &Swarm, formation: &Formation) -> Result<usize, SceneError> {
+    let liars = swarm.raw.resilience.as_ref().map_or(0, |resilience| resilience.liars);
+    if liars == 0 {
+        return Ok(0);
+    }
+    formation.require_support(liars).map_err(|unsupported| {
+        let help = "lower it, widen the neighbourhood, or make more robots leaders";
+        swarm.refuse("resilience.liars", unsupported, help)
+    })?;
+    if formation.affine(0.0).is_some() {
+        tracing::warn!(
+            "robots that leave out who strays follow a common displacement exactly; a formation that is turned, \
+             stretched or sheared loses its shape somewhat"
+        );
+    }
+    Ok(liars)
+}
+
+/// Which poses are believed; nobody is taken for faster than ten times the speed limit unless the file says so.
+pub fn watch(swarm: &Swarm, formation: &Formation, speed: f64) -> WatchLimits {
+    let (poses, period) = (&swarm.raw.poses, swarm.raw.control.period);
+    WatchLimits {
+        fresh: poses.fresh.unwrap_or((3.0 * period).min(poses.age_limit)),
+        age_limit: poses.age_limit,
+        stop_after: poses.stop_after,
+        centre: formation.middle(),
+        range: poses.range,
+        jump_speed: poses.jump_speed.unwrap_or(10.0 * speed),
+        recover: poses.recover as u32,
+        period: Some(period),
+        ..WatchLimits::default()
+    }
+}
+
+/// What the filter holds members to, as the file says.
+fn limits(raw: &RawLimits, model: &RawModel) -> Limits {
+    Limits {
+        brakes: matches!(model, RawModel::DoubleIntegrator),
+        speed: raw.speed.unwrap_or(f64::INFINITY),
+        acceleration: raw.acceleration.unwrap_or(f64::INFINITY),
+        keeps_apart: raw.clearance.is_some(),
+        clearance: raw.clearance.unwrap_or(0.0),
+        geofence: raw.geofence.clone(),
+        ..Limits::default()
+    }
+}
+
+pub fn filter(swarm: &Swarm, formation: &Formation) -> Result<Filter, SceneError> {
+    let limits = limits(&swarm.raw.limits, &swarm.raw.flight.model);
+    let obstacles: Vec<Obstacle> = swarm
+        .raw
+        .obstacles
+        .iter()
+        .map(|obstacle| match obstacle {
+            RawObstacle::Polygon { vertices } => Obstacle::Polygon(vertices.clone()),
+            RawObstacle::Disc { centre, radius } => Obstacle::Disc { centre: *centre, radius: *radius },
+        })
+        .collect();
+    let refuse = |error: SafetyError| {
+        let key = match &error {
+            SafetyError::Limit { name, .. } => format!("limits.{name}"),
+            SafetyError::Radius { .. } => "radius".into(),
+            SafetyError::Corners { place, .. }
+            | SafetyError::NotFinite { place }
+            | SafetyError::NoArea { place }
+            | SafetyError::Crossing { place, .. }
+            | SafetyError::Disc { place, .. } => match place {
+                Place::Geofence => "limits.geofence".into(),
+                Place::Obstacle(k) => format!("obstacles[{k}]"),
+            },
+        };
+        swarm.refuse(&key, error.to_string(), "correct the swarm file")
+    };
+    let obstacles = Obstacles::new(&obstacles).map_err(refuse)?;
+    Filter::new(limits, formation.radii.clone(), obstacles).map_err(refuse)
+}
