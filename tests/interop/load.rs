@@ -12,7 +12,7 @@ const FIFTY: [&str; 5] = [
     "leaders[0].region.ids=[1, 5, 46, 50]",
     "control.period=0.01",
     "control.sweeps=1",
-    "limits.speed=8.0",
+    "limits.speed=2.0",
 ];
 
 const FLIGHT: Duration = Duration::from_secs(10);

@@ -136,7 +136,7 @@ fn the_lifecycle_switches_targets_off_and_on() {
 #[test]
 #[ignore = "needs the cyclonedds package of PyPI: see the head of tests/interop/main.rs"]
 fn an_emergency_stop_holds_everybody_whatever_else_is_asked_until_it_is_lifted() {
-    let slow = ["manoeuvres[0].legs=[{ seconds = 100.0, translate = [50.0, 0.0] }]", "limits.speed=8.0"];
+    let slow = ["manoeuvres[0].legs=[{ seconds = 100.0, translate = [50.0, 0.0] }]", "limits.speed=2.0"];
     let mut asked = Asked::open(&slow);
     assert_eq!(asked.ask("emergency_stop", json!(null))["success"], json!(true));
     assert_eq!(asked.mode(), u64::from(FormationState::EMERGENCY_STOPPED));
