@@ -27,7 +27,8 @@ fn dependents(square: &Square, lost: &[&str]) -> Vec<String> {
     let control = square.control();
     let formation = control.formation();
     let is_lost = |m: usize| lost.contains(&formation.names[m].as_str());
-    let depends = |&m: &usize| !is_lost(m) && !formation.leads(m) && formation.depends_on(m).into_iter().any(is_lost);
+    let depends =
+        |&m: &usize| !is_lost(m) && !formation.leads(m) && formation.depends_on(m).into_iter().any(is_lost);
     (0..formation.count()).filter(depends).map(|m| formation.names[m].clone()).collect()
 }
 
@@ -71,7 +72,9 @@ fn silent_robots_are_held_then_lost_and_only_who_depends_on_them_is_told() {
         for name in lost {
             assert_eq!(now[name], before[name], "{name} was sent a target");
         }
-        now.iter().all(|(name, count)| lost.contains(&name.as_str()) || *count > before[name] + 20).then_some(())
+        now.iter()
+            .all(|(name, count)| lost.contains(&name.as_str()) || *count > before[name] + 20)
+            .then_some(())
     });
     robots.tell(json!({"robot_7": null, "robot_19": null}));
     watch.until("everybody is heard again", |line| {

@@ -57,7 +57,8 @@ fn a_member_s_own_node_hears_its_neighbours_alone_and_takes_its_robot_to_where_t
     let near = |report: &serde_json::Value| {
         place(report, "robot_7").is_some_and(|at| distance(at, away(nominal)) < 1e-6)
     };
-    let report = robots.until("robot_7 is among its neighbours", |report| near(report).then(|| report.clone()));
+    let report =
+        robots.until("robot_7 is among its neighbours", |report| near(report).then(|| report.clone()));
     // Column by column, five high: robot_7 is the second of the second column.
     let mut heard: Vec<String> =
         [1, 2, 3, 6, 7, 8, 11, 12, 13].iter().map(|number| format!("robot_{number}")).collect();

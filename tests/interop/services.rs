@@ -63,7 +63,8 @@ fn parameters_are_listed_described_and_changed_within_their_ranges() {
     let mut asked = Asked::open(&[far, "limits.speed=1.0"]);
     let listed = asked.ask("list_parameters", json!(null));
     let names = ["rate", "state_rate", "speed_limit", "acceleration_limit", "clearance", "damping"];
-    let listed: Vec<&str> = listed["names"].as_array().expect("names").iter().filter_map(Json::as_str).collect();
+    let listed: Vec<&str> =
+        listed["names"].as_array().expect("names").iter().filter_map(Json::as_str).collect();
     names.iter().for_each(|name| assert!(listed.contains(name), "{name} is not among {listed:?}"));
 
     let described = asked.ask("describe_parameters", json!(["speed_limit", "rate"]));

@@ -92,8 +92,7 @@ pub struct Peer {
 
 impl Peer {
     pub fn start(script: &'static str, domain: u16, argument: &str) -> Self {
-        let mut child =
-            python(script, &[&domain.to_string(), argument]).spawn().expect("python starts");
+        let mut child = python(script, &[&domain.to_string(), argument]).spawn().expect("python starts");
         let orders = child.stdin.take().expect("piped");
         let output = BufReader::new(child.stdout.take().expect("piped"));
         let (say, lines) = channel();
@@ -153,10 +152,8 @@ pub const PATIENT: [&str; 3] = ["poses.fresh=4.0", "poses.age_limit=5.0", "poses
 
 /// A short flight. No faster: in the age of a pose each robot may have gone that far, and that much room is left
 /// around it, so at 8 m/s robots 1.5 m apart block each other.
-pub const SHORT: [&str; 2] = [
-    "manoeuvres[0].legs=[{ seconds = 1.0, translate = [2.0, 0.5], rotate = 30.0 }]",
-    "limits.speed=2.0",
-];
+pub const SHORT: [&str; 2] =
+    ["manoeuvres[0].legs=[{ seconds = 1.0, translate = [2.0, 0.5], rotate = 30.0 }]", "limits.speed=2.0"];
 
 impl Square {
     pub fn new(overrides: &[&[&str]]) -> Self {
@@ -239,7 +236,10 @@ pub mod state {
 
     /// Names of those of whom something holds.
     pub fn who(state: &Json, holds: impl Fn(&Json) -> bool) -> Vec<String> {
-        members(state).filter(|one| holds(one)).map(|one| one["name"].as_str().expect("a name").into()).collect()
+        members(state)
+            .filter(|one| holds(one))
+            .map(|one| one["name"].as_str().expect("a name").into())
+            .collect()
     }
 
     pub fn health(member: &Json) -> u8 {
