@@ -1,198 +1,21 @@
-//! A real peer: Cyclone DDS from PyPI, as another process on loopback.
+//! Real peers: Cyclone DDS from PyPI, as other processes on loopback.
 //!
-//! `peer.py` beside this file is the peer. Run with
-//! `FLOCKFORM_PYTHON=venv/bin/python cargo test --test interop -- --ignored --test-threads=1`
-//! where the venv has `pip install cyclonedds`. Nothing of ROS 2 is needed. Cyclone DDS speaks here as
-//! rmw_cyclonedds_cpp does: requests carry its 16 byte header. Its Python package cannot put a request's
-//! identity beside the payload, so the enhanced mapping is tested in `ros_edge.rs`, with ros2-client.
+//! They need Python 3.10 or newer with that package, and nothing of ROS 2:
+//!
+//! ```text
+//! python3 -m venv venv && venv/bin/pip install cyclonedds
+//! FLOCKFORM_PYTHON=venv/bin/python cargo test --test interop -- --ignored --test-threads=1
+//! ```
+//!
+//! `edge.rs` puts the edge alone against `peer.py`; the others put `flockform node`, as it is installed, between
+//! robots (`robots.py`) and somebody who watches it and calls its services (`watch.py`). Cyclone DDS speaks here
+//! as rmw_cyclonedds_cpp does: requests carry its 16 byte header. Its Python package cannot put a request's
+//! identity beside the payload, so the enhanced mapping is tested in `ros_edge`, with ros2-client.
 
-use std::io::Read;
-use std::process::{Child, Command, Stdio};
-use std::time::{Duration, Instant};
-
-use flockform::ros::edge::lifecycle::{Lifecycle, Outcome};
-use flockform::ros::edge::parameters::{Declaration, Parameters, Store, Value};
-use flockform::ros::edge::services::{Time, std_srvs};
-use flockform::ros::edge::{Edge, Message, Node, Options, Quality};
-use serde::{Deserialize, Serialize};
-use serde_json::{Value as Json, json};
-
-const CYCLONE: &str = "<CycloneDDS><Domain><General><Interfaces><NetworkInterface name=\"lo\" \
-     multicast=\"true\"/></Interfaces></General></Domain></CycloneDDS>";
-
-/// Each test has a domain of its own, away from those of other runs.
-fn domain(test: u16) -> u16 {
-    101 + (std::process::id() % 16) as u16 * 6 + test
-}
-
-fn node(test: u16) -> Node {
-    let options = Options { domain: domain(test), loopback_only: true };
-    Edge::open(options).expect("sockets").node("/", "swarm").expect("a node")
-}
-
-fn peer(scenario: &str, test: u16) -> Child {
-    let python = std::env::var("FLOCKFORM_PYTHON").unwrap_or_else(|_| "python3".into());
-    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/interop/peer.py");
-    Command::new(python)
-        .args([script, scenario, &domain(test).to_string()])
-        .env("CYCLONEDDS_URI", CYCLONE)
-        .stdout(Stdio::piped())
-        .spawn()
-        .expect("python starts")
-}
-
-/// Runs the peer through a scenario while `tick` serves it; what it found, line by line.
-fn findings(scenario: &str, test: u16, mut tick: impl FnMut()) -> Vec<Json> {
-    let mut peer = peer(scenario, test);
-    let since = Instant::now();
-    let status = loop {
-        tick();
-        if let Some(status) = peer.try_wait().expect("a child") {
-            break status;
-        }
-        if since.elapsed() > Duration::from_secs(60) {
-            peer.kill().expect("a child");
-            peer.wait().expect("a child");
-            panic!("{scenario}: the peer did not end within 60 s");
-        }
-        std::thread::sleep(Duration::from_millis(5));
-    };
-    let mut lines = String::new();
-    peer.stdout.take().expect("piped").read_to_string(&mut lines).expect("text");
-    assert!(status.success(), "{scenario}: {status}, having found\n{lines}");
-    lines.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect()
-}
-
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-struct PoseStamped {
-    stamp: Time,
-    frame_id: String,
-    position: [f64; 3],
-    orientation: [f64; 4],
-}
-
-impl Message for PoseStamped {
-    const PACKAGE: &str = "geometry_msgs";
-    const NAME: &str = "PoseStamped";
-}
-
-#[test]
-#[ignore = "needs the cyclonedds package of PyPI: see the head of tests/interop/main.rs"]
-fn a_peer_sees_each_node_and_what_it_owns() {
-    let swarm = node(0);
-    let robot = swarm.another_node("/robot_1", "driver").expect("a node");
-    let _out = robot.publisher::<PoseStamped>("/robot_1/pose", Quality::BEST_EFFORT).expect("out");
-    let _service = swarm.service::<std_srvs::Trigger>("/swarm/stop").expect("a service");
-    let expected = [
-        json!({"node": "/robot_1 driver", "readers": 0, "writers": 2}),
-        json!({"node": "/ swarm", "readers": 1, "writers": 2}),
-    ];
-    assert_eq!(findings("graph", 0, || {}), expected);
-}
-
-#[test]
-#[ignore = "needs the cyclonedds package of PyPI: see the head of tests/interop/main.rs"]
-fn poses_of_a_peer_come_in_and_targets_go_out_to_it() {
-    let swarm = node(1);
-    let poses = swarm.subscription::<PoseStamped>("/robot_1/pose", Quality::BEST_EFFORT).expect("in");
-    let targets = swarm.publisher("/robot_1/target_pose", Quality::reliable(10)).expect("out");
-    // Killed and started again: the second peer is served like the first.
-    for _ in 0..2 {
-        let mut silent = peer("late", 1);
-        std::thread::sleep(Duration::from_millis(500));
-        silent.kill().expect("a child");
-        silent.wait().expect("a child");
-        let found = findings("poses", 1, || {
-            while let Some((mut pose, stamps)) = poses.take() {
-                assert!(stamps.sent.is_some());
-                pose.position[0] *= 2.0;
-                targets.publish(&pose).expect("sent");
-            }
-        });
-        let expected = json!({
-            "frame": "map",
-            "stamp": [7, 8],
-            "position": [3.0, 2.5, 3.5],
-            "orientation": [0.0, 0.0, 0.6, 0.8],
-        });
-        assert_eq!(found, [expected]);
-        assert_eq!(poses.refused(), 0);
-    }
-}
-
-#[test]
-#[ignore = "needs the cyclonedds package of PyPI: see the head of tests/interop/main.rs"]
-fn a_peer_that_comes_late_gets_what_was_kept() {
-    let swarm = node(2);
-    let kept = swarm.publisher("/kept", Quality::transient_local(1)).expect("out");
-    let pose = PoseStamped {
-        stamp: Time::default(),
-        frame_id: "map".into(),
-        position: [4.5, 0.0, 0.0],
-        orientation: [0.0, 0.0, 0.0, 1.0],
-    };
-    kept.publish(&pose).expect("sent");
-    assert_eq!(findings("late", 2, || {}), [json!({"x": 4.5})]);
-}
-
-#[test]
-#[ignore = "needs the cyclonedds package of PyPI: see the head of tests/interop/main.rs"]
-fn requests_with_cyclones_header_are_answered_each_to_its_client() {
-    let swarm = node(3);
-    let stop = swarm.service::<std_srvs::Trigger>("/swarm/stop").expect("a service");
-    let mut served = 0;
-    let found = findings("trigger", 3, || {
-        stop.serve(|_| {
-            served += 1;
-            std_srvs::Outcome { success: served % 2 == 1, message: format!("call {served}") }
-        });
-    });
-    let mut expected = Vec::new();
-    for (round, guid) in (1..=3).flat_map(|round| [(round, 3), (round, 4)]) {
-        let call = expected.len() + 1;
-        let message = format!("call {call}");
-        expected.push(json!({"guid": guid, "seq": round, "success": call % 2 == 1, "message": message}));
-    }
-    assert_eq!(found, expected);
-    assert_eq!((served, stop.refused()), (6, 0));
-}
-
-#[test]
-#[ignore = "needs the cyclonedds package of PyPI: see the head of tests/interop/main.rs"]
-fn a_peer_gets_and_sets_parameters_within_their_bounds() {
-    let swarm = node(4);
-    let mut store = Store::default();
-    store.declare(Declaration::new("rate", 50.0).range(1.0..=500.0), None).expect("declared once");
-    let mut parameters = Parameters::new(&swarm, store).expect("services");
-    let mut changes = Vec::new();
-    let found = findings("parameters", 4, || changes.extend(parameters.poll(0.0)));
-    assert_eq!(
-        found[..3],
-        [json!({"names": ["rate"]}), json!({"rate": 50.0}), json!({"successful": true, "reason": ""}),]
-    );
-    assert_eq!(found[3]["successful"], json!(false));
-    assert!(
-        found[3]["reason"].as_str().is_some_and(|reason| reason.contains("1.0 to 500.0")),
-        "{:?}",
-        found[3]
-    );
-    assert_eq!(found[4], json!({"rate": 120.0}));
-    assert_eq!(changes.len(), 1);
-    assert_eq!(changes[0].value, Value::Double(120.0));
-}
-
-#[test]
-#[ignore = "needs the cyclonedds package of PyPI: see the head of tests/interop/main.rs"]
-fn a_peer_drives_the_lifecycle() {
-    let swarm = node(5);
-    let mut lifecycle = Lifecycle::new(&swarm).expect("services");
-    let found = findings("lifecycle", 5, || lifecycle.poll(0.0, &mut |_| Outcome::Success));
-    let expected = [
-        json!({"state": "unconfigured"}),
-        json!({"success": false, "state": "unconfigured"}),
-        json!({"success": true, "state": "inactive"}),
-        json!({"success": true, "state": "active"}),
-    ];
-    assert_eq!(found, expected);
-    assert!(lifecycle.is_active());
-}
+mod edge;
+mod faults;
+mod flight;
+mod load;
+mod own_network;
+mod services;
+mod support;

@@ -22,7 +22,7 @@ use ros2_client::ServiceMapping;
 
 use super::support::*;
 
-fn arguments(more: &[&str]) -> RosArguments {
+pub fn arguments(more: &[&str]) -> RosArguments {
     let domain = domain().to_string();
     let environment = |name: &str| match name {
         "ROS_DOMAIN_ID" => Some(domain.clone()),
@@ -33,43 +33,43 @@ fn arguments(more: &[&str]) -> RosArguments {
     RosArguments::parse(words, &environment).expect("arguments").1
 }
 
-fn square(overrides: &[&str]) -> Swarm {
+pub fn square(overrides: &[&str]) -> Swarm {
     let overrides: Vec<String> = overrides.iter().map(|&text| text.to_owned()).collect();
     bundled_swarm("square").expect("bundled").load_swarm(&overrides).expect("valid")
 }
 
 /// Both sides, and what a busy computer may do to them without anybody being taken for lost.
-struct Swarming {
-    node: FormationNode,
-    robots: RobotNodes,
+pub struct Swarming {
+    pub node: FormationNode,
+    pub robots: RobotNodes,
 }
 
-const PATIENT: [&str; 4] =
+pub const PATIENT: [&str; 4] =
     ["control.period=0.01", "poses.fresh=4.0", "poses.age_limit=5.0", "poses.stop_after=9.0"];
 
 impl Swarming {
-    fn open(swarm: &Swarm, more: &[&str]) -> Self {
+    pub fn open(swarm: &Swarm, more: &[&str]) -> Self {
         Self {
             robots: RobotNodes::open(swarm, &arguments(&[])).expect("robots"),
             node: FormationNode::open(swarm, &arguments(more), None).expect("a node"),
         }
     }
 
-    fn tick(&mut self) {
+    pub fn tick(&mut self) {
         self.robots.tick();
         std::thread::sleep(Duration::from_millis(4));
         self.node.tick();
         std::thread::sleep(Duration::from_millis(4));
     }
 
-    fn fly_until(&mut self, what: &str, mut done: impl FnMut(&Self) -> bool) {
+    pub fn fly_until(&mut self, what: &str, mut done: impl FnMut(&Self) -> bool) {
         until(what, || {
             self.tick();
             done(self).then_some(())
         });
     }
 
-    fn until_all_are_heard(&mut self) {
+    pub fn until_all_are_heard(&mut self) {
         self.fly_until("everybody is heard", |swarm| {
             let control = swarm.node.control();
             (0..control.formation().count()).all(|m| control.health(m) == Health::Fresh)

@@ -5,6 +5,7 @@
 
 mod formation;
 mod graph;
+mod interfaces;
 mod lifecycle;
 mod parameters;
 mod services;

@@ -238,8 +238,8 @@ impl FormationNode {
     }
 
     fn hear(&mut self, now: f64) {
-        let Self { poses, control, frame_id, leaders, .. } = self;
-        poses.take(frame_id, &mut |member, pose| {
+        let Self { poses, control, frame_id, leaders, clock, .. } = self;
+        poses.take(frame_id, clock.is_simulated().then_some(now), &mut |member, pose| {
             if let Err(rejection) = control.receive(member, pose, now) {
                 tracing::debug!("{}: {rejection}", control.formation().names[member]);
             }

@@ -34,31 +34,27 @@ impl PoseSource {
         })
     }
 
-    /// Tells `hear` every pose that arrived since the last call.
-    pub fn take(&self, frame_id: &str, hear: &mut dyn FnMut(usize, Pose)) {
+    /// Tells `hear` every pose that arrived since the last call. Under simulated time `now` \[s\] is given: the
+    /// computer's, by which DDS says when a message came, then means nothing.
+    pub fn take(&self, frame_id: &str, now: Option<f64>, hear: &mut dyn FnMut(usize, Pose)) {
+        let pose = |header: &Header, one: &geometry_msgs::Pose, stamps: Stamps| {
+            pose(header, one, now.unwrap_or(stamps.received), frame_id)
+        };
         match self {
             Self::Stamped(all) => {
-                drain(all, |message, stamps| pose(&message.header, &message.pose, stamps, frame_id), hear);
+                drain(all, |message, stamps| pose(&message.header, &message.pose, stamps), hear);
             }
             Self::WithCovariance(all) => {
-                drain(
-                    all,
-                    |message, stamps| pose(&message.header, &message.pose.pose, stamps, frame_id),
-                    hear,
-                );
+                drain(all, |message, stamps| pose(&message.header, &message.pose.pose, stamps), hear);
             }
             Self::Odometry(all) => {
-                drain(
-                    all,
-                    |message, stamps| pose(&message.header, &message.pose.pose, stamps, frame_id),
-                    hear,
-                );
+                drain(all, |message, stamps| pose(&message.header, &message.pose.pose, stamps), hear);
             }
             Self::Array(topic, heard) => {
                 for (message, stamps) in std::iter::from_fn(|| topic.take()).take(MOST_AT_ONCE) {
                     for &member in heard {
                         if let Some(one) = message.poses.get(member) {
-                            hear(member, pose(&message.header, one, stamps, frame_id));
+                            hear(member, pose(&message.header, one, stamps));
                         }
                     }
                 }
@@ -102,13 +98,13 @@ fn drain<M: crate::ros::edge::Message>(
     }
 }
 
-/// A pose with its stamp; one that bears none was measured when it was received.
-fn pose(header: &Header, pose: &geometry_msgs::Pose, stamps: Stamps, frame_id: &str) -> Pose {
+/// A pose with its stamp; one that bears none was measured when it arrived.
+fn pose(header: &Header, pose: &geometry_msgs::Pose, arrival: f64, frame_id: &str) -> Pose {
     let stamped = header.stamp.seconds();
     Pose {
         position: [pose.position.x, pose.position.y],
         yaw: pose.orientation.yaw().unwrap_or(f64::NAN),
-        stamp: if stamped == 0.0 { stamps.received } else { stamped },
+        stamp: if stamped == 0.0 { arrival } else { stamped },
         frame_is_right: is_frame(&header.frame_id, frame_id),
     }
 }

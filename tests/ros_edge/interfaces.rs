@@ -1,0 +1,178 @@
+//! Every way in and out of the formation's node: types of poses, leaders moved by topic, velocities, simulated time.
+
+use std::time::Duration;
+
+use flockform::flock::points::distance;
+use flockform::ros::edge::Quality;
+use flockform::ros::messages::geometry_msgs::{Pose, PoseStamped, Twist, TwistStamped};
+use flockform::ros::messages::rosgraph_msgs::Clock;
+use flockform::ros::messages::std_msgs::Header;
+use flockform::ros::messages::{builtin_interfaces, geometry_msgs};
+use flockform::ros::node::FormationNode;
+use flockform::ros::robots::RobotNodes;
+use flockform::swarm::watch::Health;
+
+use super::formation::{PATIENT, Swarming, arguments, square};
+use super::support::{peers, until};
+
+/// A flight short enough for a test.
+const SHORT: [&str; 2] =
+    ["manoeuvres[0].legs=[{ seconds = 0.5, translate = [1.0, 0.5], rotate = 10.0 }]", "limits.speed=4.0"];
+
+fn with(more: &[&'static str]) -> Vec<&'static str> {
+    [&PATIENT, more].concat()
+}
+
+/// Largest distance of a robot from where `to` takes its place.
+fn away(swarm: &Swarming, to: impl Fn([f64; 2]) -> [f64; 2]) -> f64 {
+    let formation = swarm.node.control().formation();
+    let places = swarm.robots.fleet().places();
+    let apart = |m: usize| distance(places.get(m), to(formation.places.get(m)));
+    (0..formation.count()).map(apart).fold(0.0, f64::max)
+}
+
+fn until_flown(swarm: &mut Swarming, what: &str) {
+    swarm.fly_until(what, |swarm| {
+        let formation = swarm.node.control().formation();
+        let map = formation.affine(formation.programs_end()).expect("a manoeuvre");
+        away(swarm, |place| map.apply(place)) < 0.01
+    });
+}
+
+#[test]
+fn poses_come_in_every_type_of_message() {
+    let _peers = peers();
+    for kind in ["pose-stamped", "pose-with-covariance-stamped", "odometry", "pose-array"] {
+        let kind_is = format!("node.pose_type=\"{kind}\"");
+        let mut overrides = with(&SHORT);
+        overrides.push(&kind_is);
+        if kind == "pose-array" {
+            overrides.push("node.pose_topic=\"/all/poses\"");
+        }
+        let mut swarm = Swarming::open(&square(&overrides), &[]);
+        swarm.until_all_are_heard();
+        until_flown(&mut swarm, kind);
+        let control = swarm.node.control();
+        for m in 0..control.formation().count() {
+            assert_eq!(control.watch().counts(m).rejected(), 0, "{kind}");
+        }
+    }
+}
+
+fn stamped(place: [f64; 2], frame_id: &str) -> PoseStamped {
+    let header = Header { stamp: builtin_interfaces::Time::default(), frame_id: frame_id.into() };
+    PoseStamped { header, pose: Pose::planar(place, 0.0) }
+}
+
+#[test]
+fn leaders_are_moved_by_topic_in_the_swarm_s_frame_alone() {
+    let peers = peers();
+    let overrides = with(&["leaders[0].program={ kind = \"external\" }", "limits.speed=4.0"]);
+    let mut swarm = Swarming::open(&square(&overrides), &[]);
+    let guide = peers.theirs.node("/", "guide").expect("a node");
+    let corners = [0, 4, 20, 24].map(|m| {
+        let formation = swarm.node.control().formation();
+        let topic = format!("/{}/leader_pose", formation.names[m]);
+        (formation.places.get(m), guide.publisher(&topic, Quality::BEST_EFFORT).expect("out"))
+    });
+    let lead = |by: [f64; 2], frame_id: &str| {
+        for ([x, y], topic) in &corners {
+            topic.publish(&stamped([x + by[0], y + by[1]], frame_id)).expect("sent");
+        }
+    };
+    swarm.until_all_are_heard();
+    until("the guide is heard", || corners.iter().all(|(_, topic)| topic.matched() == 1).then_some(()));
+    swarm.fly_until("everybody follows the corners", |swarm| {
+        lead([1.0, -0.5], "map");
+        away(swarm, |[x, y]| [x + 1.0, y - 0.5]) < 0.01
+    });
+    for _ in 0..50 {
+        lead([9.0, 9.0], "elsewhere");
+        lead([f64::NAN, 9.0], "map");
+        swarm.tick();
+    }
+    assert!(away(&swarm, |[x, y]| [x + 1.0, y - 0.5]) < 0.01);
+}
+
+#[test]
+fn velocities_lead_to_the_targets() {
+    let peers = peers();
+    let hearer = peers.theirs.node("/", "driver").expect("a node");
+    let plain = hearer.subscription::<Twist>("/robot_7/cmd_vel", Quality::reliable(1)).expect("hears");
+    let overrides = with(&[SHORT[0], "limits.speed=0.2", "node.velocity=\"twist\""]);
+    let mut swarm = Swarming::open(&square(&overrides), &[]);
+    swarm.until_all_are_heard();
+    until("a velocity on the way", || {
+        while plain.take().is_some() {}
+        swarm.tick();
+        let control = swarm.node.control();
+        let (here, there) = (control.position(6)?, control.target(6)?);
+        let expected = [0, 1].map(|k| (there[k] - here[k]) / control.period());
+        std::thread::sleep(Duration::from_millis(30));
+        let (twist, _) = plain.take_last()?;
+        let speed = f64::hypot(twist.linear.x, twist.linear.y);
+        // Robots of this model never turn: their axes are the world's.
+        (distance([twist.linear.x, twist.linear.y], expected) < 1e-9 && speed > 0.01).then_some(())
+    });
+}
+
+#[test]
+fn a_robot_that_is_not_heard_is_told_to_stand() {
+    let peers = peers();
+    let hearer = peers.theirs.node("/", "stamped_driver").expect("a node");
+    let overrides = with(&["node.velocity=\"twist-stamped\"", "node.velocity_topic=\"/drive/{name}\""]);
+    let topic = hearer.subscription::<TwistStamped>("/drive/robot_7", Quality::reliable(1)).expect("hears");
+    let mut node = FormationNode::open(&square(&overrides), &arguments(&[]), None).expect("a node");
+    let message = until("a velocity", || {
+        node.tick();
+        topic.take_last()
+    });
+    assert_eq!(message.0.twist, geometry_msgs::Twist::default());
+    assert_eq!(message.0.header.frame_id, "map");
+}
+
+const SIMULATED: [&str; 2] = ["-p", "use_sim_time:=true"];
+
+#[test]
+fn a_swarm_flies_by_the_time_of_its_simulator_and_once_more_when_that_begins_anew() {
+    let _peers = peers();
+    let swarm = square(&with(&SHORT));
+    let robots = || RobotNodes::open(&swarm, &arguments(&["-p", "publish_clock:=true"])).expect("robots");
+    let node = FormationNode::open(&swarm, &arguments(&SIMULATED), None).expect("a node");
+    let mut swarm = Swarming { robots: robots(), node };
+    swarm.until_all_are_heard();
+    until_flown(&mut swarm, "the first time");
+    let age = swarm.node.control().age(6).expect("heard");
+    assert!(age < 1.0, "the pose is {age} s old by the simulator's time");
+    // Back at their places, at time zero: nothing of before counts.
+    swarm.robots = robots();
+    swarm.fly_until("time goes back", |swarm| {
+        let control = swarm.node.control();
+        (0..25).all(|m| control.health(m) == Health::Fresh)
+            && swarm.robots.fleet().time() < 2.0
+            && control.position(6).is_some_and(|at| distance(at, control.formation().places.get(6)) < 2.0)
+    });
+    until_flown(&mut swarm, "the second time");
+}
+
+#[test]
+fn a_pose_without_a_stamp_is_as_old_as_its_arrival_by_whatever_clock() {
+    let peers = peers();
+    let sender = peers.theirs.node("/", "plain_robot").expect("a node");
+    let clock = sender.publisher::<Clock>("/clock", Quality::BEST_EFFORT).expect("out");
+    let pose = sender.publisher("/robot_7/pose", Quality::BEST_EFFORT).expect("out");
+    for simulated in [false, true] {
+        let more = if simulated { &SIMULATED[..] } else { &[] };
+        let mut node = FormationNode::open(&square(&PATIENT), &arguments(more), None).expect("a node");
+        let mut time = 100.0;
+        until("robot_7 is heard", || {
+            time += 0.01;
+            let message = Clock { clock: builtin_interfaces::Time::from_seconds(time) };
+            clock.publish(&message).expect("sent");
+            pose.publish(&stamped([1.5, 1.5], "map")).expect("sent");
+            std::thread::sleep(Duration::from_millis(5));
+            node.tick();
+            (node.control().health(6) == Health::Fresh).then_some(())
+        });
+    }
+}
