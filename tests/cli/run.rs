@@ -457,7 +457,8 @@ fn the_swarm_bench_says_in_json_what_a_tick_costs_and_how_long_a_target_takes() 
     }
     let latency = &report["latency"];
     let cases = latency["cases"].as_array().expect("a list");
-    assert!(latency["skipped"].is_string() || cases.len() == 2, "{said}");
+    let no_network = |why: &str| why.starts_with("no DDS participant");
+    assert!(latency["skipped"].as_str().map_or(cases.len() == 2, no_network), "{said}");
     for case in cases {
         for key in ["robots", "samples", "lost", "period_seconds", "p50_seconds", "p99_seconds"] {
             assert!(case[key].is_number() || case[key].is_null(), "{key}: {said}");

@@ -278,7 +278,8 @@ mod tests {
     #[test]
     fn a_pose_is_answered_by_its_target_or_it_is_said_why_not() {
         let report = measure(&[(2, 5)]);
-        assert!(report.skipped.is_some() || report.cases.len() == 2, "{report}");
+        let no_network = |why: &String| why.starts_with("no DDS participant");
+        assert!(report.skipped.as_ref().map_or(report.cases.len() == 2, no_network), "{report}");
         for case in &report.cases {
             assert_eq!(case.samples + case.lost, 10, "{report}");
             assert!(case.p50_seconds <= case.p99_seconds);

@@ -90,6 +90,7 @@ fn formation(robots: usize, sweeps: usize, period: f64) -> Result<Swarm, SceneEr
     let (low, high) = (-4.0, width + 4.0);
     let text = format!(
         r#"
+title = "A square of robots"
 radius = 0.2
 robots = [
 {all}]
