@@ -1,6 +1,11 @@
 //! A uniform grid of cells for neighbour queries among points that move.
 
+mod candidates;
+
+use std::ops::Range;
+
 use super::points::Points;
+use candidates::{Candidates, Slots};
 
 /// Points sorted into square cells by counting; its buffers are kept between fills.
 ///
@@ -18,15 +23,14 @@ pub struct CellGrid {
     cells: Vec<u32>,
     /// Where each cell begins in the three that follow, shape \[cells + 1\].
     starts: Vec<u32>,
-    members: Vec<u32>,
-    x: Vec<f64>,
-    y: Vec<f64>,
+    slots: Slots,
+    around: Candidates,
     /// Everybody's neighbours, unsorted, in order of cells; and where each point's begin, and how many.
     lists: Vec<u32>,
     found: Vec<(u32, u32)>,
     /// Where each point's list ends as it is written.
     ends: Vec<u32>,
-    around: Candidates,
+    lengths: Vec<u32>,
 }
 
 /// Cells are this much wider than the radius, so that rounding hides no neighbour in the next but one.
@@ -34,12 +38,6 @@ const MARGIN: f64 = 1.0 + 1e-9;
 
 /// Cells are at least this wide \[length\], so that as many to a length is a number.
 const NARROWEST: f64 = 1e-300;
-
-/// Squared distances decide, but for those this near to the squared radius \[1\].
-const DOUBTFUL: f64 = 1e-14;
-
-/// Radii whose squares are neither infinite nor anywhere near underflow \[length\].
-const SQUARABLE: std::ops::Range<f64> = 1e-140..1e140;
 
 impl CellGrid {
     /// Sorts the points marked in `included` into cells at least `radius` wide \[length\].
@@ -77,14 +75,12 @@ impl CellGrid {
         for start in &mut self.starts {
             begin += std::mem::replace(start, begin);
         }
-        self.members.resize(count, 0);
-        self.x.resize(count, 0.0);
-        self.y.resize(count, 0.0);
+        self.slots.resize(count);
         for (i, &cell) in usable.zip(&self.cells) {
             let place = &mut self.starts[cell as usize];
             let at = *place as usize;
             *place += 1;
-            (self.members[at], self.x[at], self.y[at]) = (i as u32, points.x[i], points.y[i]);
+            self.slots.set(at, i as u32, points.get(i));
         }
         // Each cell's start has been counted up to its end, the start of the next.
         self.starts.copy_within(..self.columns * self.rows, 1);
@@ -102,7 +98,7 @@ impl CellGrid {
         let rows = self.cells_within(here[1], radius, 1);
         let begin = found.len();
         for row in rows {
-            let near = self.run(row, &columns).near(here, radius);
+            let near = self.slots.near(self.run(row, &columns), here, radius);
             found.extend(near.filter(|&member| member as usize != particle));
         }
         // Index order, so that no sum depends on how the cells were walked.
@@ -141,43 +137,44 @@ impl CellGrid {
         let mut around = std::mem::take(&mut self.around);
         let mut lists = std::mem::take(&mut self.lists);
         let mut found = std::mem::take(&mut self.found);
+        let mut lengths = std::mem::take(&mut self.lengths);
         let mut end = 0;
         for row in 0..self.rows {
             for column in 0..self.columns {
                 let own = self.run(row, &(column..column + 1));
-                if own.members.is_empty() {
+                if own.is_empty() {
                     continue;
                 }
-                let columns = column.saturating_sub(1)..(column + 2).min(self.columns);
-                around.clear();
-                let mut first = 0;
-                for beside in row.saturating_sub(1)..(row + 2).min(self.rows) {
-                    if beside == row {
-                        first = around.len() + self.run(row, &(columns.start..column)).members.len();
-                    }
-                    around.add(self.run(beside, &columns));
-                }
-                let room = end + own.members.len() * around.len() + 1;
+                let (runs, first) = self.runs_around(row, column);
+                around.gather(&self.slots, &runs);
+                let room = end + own.len() * around.room();
                 if lists.len() < room {
                     lists.resize(2 * room, 0);
                 }
-                for (k, &member) in own.members.iter().enumerate() {
-                    let kept = around.keep_near(first + k, radius, &mut lists[end..]);
-                    found[member as usize] = (end as u32, kept as u32);
-                    end += kept;
+                around.list_near(first..first + own.len(), radius, &mut lists[end..], &mut lengths);
+                for (&member, &length) in self.slots.members[own].iter().zip(&lengths) {
+                    found[member as usize] = (end as u32, length);
+                    end += length as usize;
                 }
             }
         }
-        (self.around, self.lists, self.found) = (around, lists, found);
+        (self.around, self.lists, self.found, self.lengths) = (around, lists, found, lengths);
         end
     }
 
-    /// The points of some cells of a row.
-    fn run(&self, row: usize, columns: &std::ops::Range<usize>) -> Run<'_> {
+    /// The slots of a cell and of those around it, row after row, and how many come before its own.
+    fn runs_around(&self, row: usize, column: usize) -> ([Range<usize>; 3], usize) {
+        let columns = column.saturating_sub(1)..(column + 2).min(self.columns);
+        let below = if row > 0 { self.run(row - 1, &columns) } else { 0..0 };
+        let above = if row + 1 < self.rows { self.run(row + 1, &columns) } else { 0..0 };
+        let before = below.len() + self.run(row, &(columns.start..column)).len();
+        ([below, self.run(row, &columns), above], before)
+    }
+
+    /// The slots of some cells of a row.
+    fn run(&self, row: usize, columns: &Range<usize>) -> Range<usize> {
         let first = row * self.columns;
-        let (begin, end) = (self.starts[first + columns.start], self.starts[first + columns.end]);
-        let range = begin as usize..end as usize;
-        Run { members: &self.members[range.clone()], x: &self.x[range.clone()], y: &self.y[range] }
+        self.starts[first + columns.start] as usize..self.starts[first + columns.end] as usize
     }
 
     fn axis_cell(&self, value: f64, axis: usize) -> usize {
@@ -186,94 +183,13 @@ impl CellGrid {
     }
 
     /// Cells of an axis in which points within `radius` of a coordinate lie.
-    fn cells_within(&self, value: f64, radius: f64, axis: usize) -> std::ops::Range<usize> {
+    fn cells_within(&self, value: f64, radius: f64, axis: usize) -> Range<usize> {
         let cells = [self.columns, self.rows][axis];
         // As the cells are at least as wide as the radius they were made for, that is one.
         let width = if MARGIN * radius <= self.cell { 1 } else { (MARGIN * radius / self.cell) as usize + 1 };
         let cell = self.axis_cell(value, axis);
         cell.saturating_sub(width)..cell.saturating_add(width + 1).min(cells)
     }
-}
-
-/// Points that lie side by side in memory.
-#[derive(Clone, Copy)]
-struct Run<'a> {
-    members: &'a [u32],
-    x: &'a [f64],
-    y: &'a [f64],
-}
-
-impl<'a> Run<'a> {
-    fn near(self, here: [f64; 2], radius: f64) -> impl Iterator<Item = u32> + 'a {
-        let points = self.members.iter().zip(self.x.iter().zip(self.y));
-        let near = points.filter(move |&(_, (&x, &y))| (x - here[0]).hypot(y - here[1]) <= radius);
-        near.map(|(&member, _)| member)
-    }
-}
-
-/// Points that may be near those of one cell.
-#[derive(Clone, Debug, Default)]
-struct Candidates {
-    members: Vec<u32>,
-    x: Vec<f64>,
-    y: Vec<f64>,
-    near: Vec<u64>,
-}
-
-impl Candidates {
-    fn len(&self) -> usize {
-        self.members.len()
-    }
-
-    fn clear(&mut self) {
-        self.members.clear();
-        self.x.clear();
-        self.y.clear();
-    }
-
-    fn add(&mut self, run: Run) {
-        self.members.extend_from_slice(run.members);
-        self.x.extend_from_slice(run.x);
-        self.y.extend_from_slice(run.y);
-        self.near.resize(self.members.len(), 0);
-    }
-
-    /// Writes those near number `own` of them to `list`, which has room for one more than there are;
-    /// returns how many.
-    #[inline(always)]
-    fn keep_near(&mut self, own: usize, radius: f64, list: &mut [u32]) -> usize {
-        let count = self.members.len();
-        let (members, x, y) = (&self.members[..count], &self.x[..count], &self.y[..count]);
-        let here = [x[own], y[own]];
-        let list = &mut list[..=count];
-        if SQUARABLE.contains(&radius) && mark_near((x, y), here, radius, &mut self.near[..count]) {
-            self.near[own] = 0;
-            let mut kept = 0;
-            // Written whether near or not, and kept by going on: no branch to be mispredicted.
-            for (&member, &near) in members.iter().zip(&self.near[..count]) {
-                list[kept] = member;
-                kept += near as usize;
-            }
-            return kept;
-        }
-        let near = Run { members, x, y }.near(here, radius).filter(|&member| member != members[own]);
-        near.zip(list).map(|(member, place)| *place = member).count()
-    }
-}
-
-/// Marks whose squared distance is within the radius by 1, the others by 0; false if one of them is so
-/// near to the radius that squares cannot tell. As wide as the coordinates, for the sake of vectors.
-#[inline(always)]
-fn mark_near((x, y): (&[f64], &[f64]), here: [f64; 2], radius: f64, near: &mut [u64]) -> bool {
-    let (surely, hardly) = (radius * radius * (1.0 - DOUBTFUL), radius * radius * (1.0 + DOUBTFUL));
-    let mut doubtful = 0;
-    for ((near, &x), &y) in near.iter_mut().zip(x).zip(y) {
-        let (dx, dy) = (x - here[0], y - here[1]);
-        let square = dx * dx + dy * dy;
-        *near = u64::from(square <= surely);
-        doubtful += u64::from(square <= hardly) - *near;
-    }
-    doubtful == 0
 }
 
 #[cfg(test)]

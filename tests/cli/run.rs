@@ -442,3 +442,30 @@ fn the_bench_completes_and_its_json_is_valid() {
     let report: serde_json::Value = serde_json::from_str(&said).expect("JSON");
     assert!(report.is_object(), "{said}");
 }
+
+#[cfg(feature = "swarm")]
+#[test]
+fn the_swarm_bench_says_in_json_what_a_tick_costs_and_how_long_a_target_takes() {
+    let said = run_in(temporary().path(), &["bench", "swarm", "--quick", "--json"]);
+    let report: serde_json::Value = serde_json::from_str(&said).expect("JSON");
+    for (list, keys) in [
+        ("cases", &["robots", "rule_robots_per_millisecond", "safe_robots_per_millisecond"][..]),
+        ("ticks", &["robots", "sweeps", "seconds_per_tick", "robots_per_millisecond"]),
+    ] {
+        let cases = report[list].as_array().expect("a list");
+        assert!(!cases.is_empty(), "{said}");
+        for (case, key) in cases.iter().flat_map(|case| keys.iter().map(move |key| (case, key))) {
+            assert!(case[key].as_f64().is_some_and(|number| number > 0.0), "{list} {key}: {said}");
+        }
+    }
+    let latency = &report["latency"];
+    let cases = latency["cases"].as_array().expect("a list");
+    let no_network = |why: &str| why.starts_with("no DDS participant");
+    assert!(latency["skipped"].as_str().map_or(cases.len() == 2, no_network), "{said}");
+    for case in cases {
+        for key in ["robots", "samples", "lost", "period_seconds", "p50_seconds", "p99_seconds"] {
+            assert!(case[key].is_number() || case[key].is_null(), "{key}: {said}");
+        }
+        assert!(case["robots"].is_u64() && case.get("period_seconds").is_some(), "{said}");
+    }
+}

@@ -1,11 +1,10 @@
-//! How many robots a thread serves: neighbour query and rule, and the same with the safety filter.
+//! Neighbour query and rule, and the same with the safety filter.
 //!
 //! The robots stand about a unit apart in places shaken from a lattice, numbered without any order, and
 //! see those within 1.9 units: about ten. Their targets come from the very function that moves
 //! particles. With the filter, all are led to far beyond the reach of a tick and the speed is such that
 //! the filter has to look at the same ten, and to project onto a cell of as many half-planes.
 
-use std::fmt;
 use std::hint::black_box;
 use std::time::Instant;
 
@@ -13,32 +12,14 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use serde::Serialize;
 
-use super::machine::median;
+use super::Effort;
+use crate::bench::machine::median;
 use crate::flock::grid::CellGrid;
 use crate::flock::interaction::{Interaction, Weights};
 use crate::flock::neighbourhood::Neighbours;
 use crate::flock::points::Points;
 use crate::flock::rules::Rule;
 use crate::swarm::safety::{Filter, Flags, Limits, Obstacles, Seen};
-
-/// What to measure.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Options {
-    /// The two smallest swarms and few repetitions, to see that it runs; the times mean little.
-    pub quick: bool,
-}
-
-/// What [`Options`] stand for.
-struct Effort {
-    robots: &'static [usize],
-    repetitions: usize,
-    /// Time of one repetition [s]; a single tick may take longer.
-    seconds: f64,
-}
-
-const FULL: Effort = Effort { robots: &[12, 100, 1000, 10_000], repetitions: 15, seconds: 0.05 };
-
-const QUICK: Effort = Effort { robots: &[12, 100], repetitions: 3, seconds: 1e-3 };
 
 /// How far robots see [m].
 const SIGHT: f64 = 1.9;
@@ -61,14 +42,6 @@ const LED: f64 = 10.0;
 /// Sets of places that are served in turn, so that no tick is the repetition of the one before.
 const SETS: usize = 8;
 
-/// Swarms of several sizes, on one thread.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Report {
-    /// Whether this was the quick run, whose times mean little.
-    pub quick: bool,
-    pub cases: Vec<Case>,
-}
-
 /// One swarm; medians over the repetitions.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Case {
@@ -83,14 +56,7 @@ pub struct Case {
     pub safe_robots_per_millisecond: f64,
 }
 
-/// Measures; takes a few seconds, or next to nothing if quick.
-pub fn run(options: &Options) -> Report {
-    let effort = if options.quick { &QUICK } else { &FULL };
-    let cases = effort.robots.iter().map(|&robots| measure(robots, effort)).collect();
-    Report { quick: options.quick, cases }
-}
-
-fn measure(robots: usize, effort: &Effort) -> Case {
+pub(super) fn measure(robots: usize, effort: &Effort) -> Case {
     let mut swarm = Swarm::new(robots);
     let ticks = swarm.ticks_in(effort.seconds);
     // In turn, so that another's load on the machine hits both alike.
@@ -190,48 +156,9 @@ impl Swarm {
     }
 }
 
-impl fmt::Display for Report {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let rule = "query and rule";
-        let safe = "with the safety filter";
-        writeln!(f, "{:>7}  {:>10}  {rule:>27}  {safe:>27}", "robots", "neighbours")?;
-        for case in &self.cases {
-            writeln!(
-                f,
-                "{:>7}  {:>10.1}  {:>10.1} us {:>8.0} / ms  {:>10.1} us {:>8.0} / ms",
-                case.robots,
-                case.neighbours,
-                1e6 * case.rule_seconds_per_tick,
-                case.rule_robots_per_millisecond,
-                1e6 * case.safe_seconds_per_tick,
-                case.safe_robots_per_millisecond,
-            )?;
-        }
-        writeln!(f, "\nOne thread; time of a tick for all robots, and robots served in a millisecond.")?;
-        if self.quick {
-            writeln!(f, "A quick run: it shows that the benchmark works, its times mean little.")?;
-        }
-        Ok(())
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_quick_run_serves_two_swarms_with_and_without_the_filter() {
-        let report = run(&Options { quick: true });
-        let json = serde_json::to_value(&report).expect("plain numbers");
-        let robots: Vec<_> = report.cases.iter().map(|case| case.robots).collect();
-        assert_eq!(robots, [12, 100]);
-        for case in json["cases"].as_array().expect("cases") {
-            for key in ["rule_robots_per_millisecond", "safe_robots_per_millisecond"] {
-                assert!(case[key].as_f64().expect("a number") > 0.0, "{key}");
-            }
-        }
-        assert!(report.to_string().contains("100"));
-    }
 
     #[test]
     fn robots_see_about_ten_and_the_filter_changes_what_they_want() {
@@ -241,11 +168,5 @@ mod tests {
         assert!((9000..10_500).contains(&neighbours), "{neighbours}");
         assert!(swarm.flags.iter().all(|flags| flags.has(Flags::SPEED_LIMITED)));
         assert!(swarm.flags.iter().filter(|flags| flags.has(Flags::SEPARATED)).count() > 500);
-    }
-
-    #[test]
-    #[ignore = "prints the full measurement: cargo test --release --lib bench::swarm -- --ignored --nocapture"]
-    fn the_full_measurement() {
-        println!("{}", run(&Options { quick: false }));
     }
 }
