@@ -25,7 +25,7 @@ pub struct Case {
 const PERIOD: f64 = 0.05;
 
 /// How far robots are from their places, at most [m]: so that nobody stands where the rule wants it.
-const ASIDE: f64 = 0.05;
+const ASIDE: f64 = 0.03;
 
 pub(super) fn measure(robots: usize, sweeps: usize, effort: &Effort) -> Case {
     let mut served = Loop::new(robots, sweeps);
