@@ -167,6 +167,24 @@ fn control_place(m: usize) -> [f64; 2] {
 }
 
 #[test]
+fn the_programs_wait_until_every_leader_has_been_heard() {
+    let mut control = Control::new(&bundled("square", &[])).expect("laid out");
+    let places = control.formation().places.clone();
+    let pose = |m: usize, stamp: f64| Pose { position: places.get(m), yaw: 0.0, stamp, frame_is_right: true };
+    // robot_25 leads too, and comes last.
+    for tick in 1..=10 {
+        let now = 0.05 * f64::from(tick);
+        (0..24).for_each(|m| control.receive(m, pose(m, now), now).expect("believed"));
+        control.tick(now);
+        assert_eq!(control.program_time(), 0.0);
+        assert_eq!(control.target(7), Some(places.get(7)), "everybody stays meanwhile");
+    }
+    (0..25).for_each(|m| control.receive(m, pose(m, 0.55), 0.55).expect("believed"));
+    control.tick(0.55);
+    assert_eq!(control.program_time(), 0.05);
+}
+
+#[test]
 fn an_emergency_stop_latches_and_the_programs_wait() {
     let mut flight = with_fault("{ kind = \"stuck\" }", &["limits={ speed = 1.0, clearance = 0.3 }"]);
     fly(&mut flight, 30);

@@ -76,7 +76,7 @@ impl Statistics {
         let (rejected, unheard) =
             counts.fold((0, 0), |(rejected, lost), one| (rejected + one.rejected(), lost + one.lost));
         let missed = self.missed - self.reported_missed;
-        let rate = self.since.map(|since| self.ticks as f64 / (now - since));
+        let rate = self.since.filter(|&since| now > since).map(|since| self.ticks as f64 / (now - since));
         let (level, message) = match (control.mode(), lost.len(), missed) {
             (Mode::EmergencyStopped, ..) => (DiagnosticStatus::ERROR, "emergency stop".to_owned()),
             (_, all, _) if all == formation.count() => (DiagnosticStatus::ERROR, "nobody is heard".into()),

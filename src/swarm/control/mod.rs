@@ -48,6 +48,8 @@ pub struct Control {
     run: u64,
     /// Time run before that \[s\].
     run_before: f64,
+    /// Whether every leader has been heard once.
+    begun: bool,
     now: f64,
     present: Points,
     /// Velocities between the last two poses \[m/s\].
@@ -83,6 +85,7 @@ impl Control {
             ticks: 0,
             run: 0,
             run_before: 0.0,
+            begun: false,
             now: 0.0,
             present: formation.places.clone(),
             velocity: Points::zeros(count),
@@ -254,6 +257,12 @@ impl Control {
     }
 
     fn follow(&mut self) {
+        // A program that ran while its leaders were still coming up would be over before they could follow it.
+        self.begun |= (0..self.formation.count()).all(|m| self.known[m] || !self.formation.leads(m));
+        if !self.begun {
+            self.wanted.clone_from(&self.present);
+            return;
+        }
         self.run += 1;
         let time = self.program_time();
         let seen = Seen { present: &self.present, usable: &self.usable, known: &self.known };
