@@ -72,7 +72,7 @@ pub fn run(options: &Options) -> Report {
 }
 
 /// Distance of robots that stand side by side in [`formation`] \[m\]: so near that the filter has to look.
-const SPACING: f64 = 0.8;
+const SPACING: f64 = 0.72;
 
 /// Robots in a square, each with its eight nearest as neighbours; the first is led from outside. They are
 /// kept apart, from two discs and inside a fence, and poses are believed wherever they jump.
