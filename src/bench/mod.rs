@@ -6,7 +6,8 @@
 //! * [`machine`]: the memory bandwidth of the triad `a = b + s c`.
 //! * [`sweep`]: particle updates per second of the plain rule, beside the roofline that bandwidth
 //!   draws.
-//! * `swarm` (feature `swarm`): robots served per millisecond: neighbour query, rule, safety filter.
+//! * `swarm` (feature `swarm`): robots served per millisecond: neighbour query, rule, safety filter, the whole tick;
+//!   with feature `ros` the time from a pose to its target over loopback.
 //! * `equilibrium` (feature `fem`): seconds to equilibrium, beside a factorisation of the same system.
 
 #[cfg(feature = "fem")]

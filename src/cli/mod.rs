@@ -136,7 +136,7 @@ pub enum BenchCommand {
         #[arg(long)]
         quick: bool,
     },
-    /// Robots served per millisecond by one thread: neighbour query and rule, and with the safety filter
+    /// Robots served per millisecond: neighbour query and rule, safety filter, whole tick; pose to target over loopback
     #[cfg(feature = "swarm")]
     #[command(after_help = "Example:\n  flockform bench swarm --json > swarm.json")]
     Swarm {
