@@ -38,7 +38,7 @@ pub struct Formation {
     settling: Option<Settling>,
     /// Roles for which `settling` was computed.
     settled_roles: Vec<Role>,
-    /// Whether the rule keeps the nominal shape at rest; if so a neighbour that is lost can be done without.
+    /// Whether a scene's own program leads.
     is_scene: bool,
 }
 
@@ -346,7 +346,7 @@ impl Formation {
         }
     }
 
-    /// PE1 of a member \[m^2\] with all where `present` has them.
+    /// What the members suffer with all of them where `present` has them.
     pub fn measures(&self, present: &Points) -> Measures {
         let Course::Rule { engine, particles } = &self.course else {
             return Measures { pe1: vec![0.0; self.count()], strain: vec![None; self.count()] };
