@@ -120,6 +120,7 @@ impl FormationNode {
             }
             None => mine.clone(),
         };
+        control.listen_to(&heard);
         let raw = &swarm.raw.node;
         let topic = |pattern: &str, m: usize| {
             names.topic(&pattern.replace("{name}", &control.formation().names[m])).map_err(NodeError::from)

@@ -48,8 +48,10 @@ pub struct Control {
     run: u64,
     /// Time run before that \[s\].
     run_before: f64,
-    /// Whether every leader has been heard once.
+    /// Whether every leader that is listened to has been heard once.
     begun: bool,
+    /// Whose poses can come at all.
+    listens: Vec<bool>,
     now: f64,
     present: Points,
     /// Velocities between the last two poses \[m/s\].
@@ -86,6 +88,7 @@ impl Control {
             run: 0,
             run_before: 0.0,
             begun: false,
+            listens: vec![true; count],
             now: 0.0,
             present: formation.places.clone(),
             velocity: Points::zeros(count),
@@ -100,6 +103,12 @@ impl Control {
             rejected: vec![false; count],
             formation,
         })
+    }
+
+    /// Expects poses of these members alone, as a robot's own node does.
+    pub fn listen_to(&mut self, members: &[usize]) {
+        self.listens.fill(false);
+        members.iter().for_each(|&member| self.listens[member] = true);
     }
 
     pub fn formation(&self) -> &Formation {
@@ -258,7 +267,8 @@ impl Control {
 
     fn follow(&mut self) {
         // A program that ran while its leaders were still coming up would be over before they could follow it.
-        self.begun |= (0..self.formation.count()).all(|m| self.known[m] || !self.formation.leads(m));
+        let awaited = |m: usize| self.listens[m] && self.formation.leads(m) && !self.known[m];
+        self.begun |= !(0..self.formation.count()).any(awaited);
         if !self.begun {
             self.wanted.clone_from(&self.present);
             return;
