@@ -19,6 +19,7 @@ pub mod motion;
 pub mod neighbourhood;
 pub mod points;
 pub mod pseudo_energy;
+pub mod real;
 pub mod region;
 pub mod role;
 pub mod rules;

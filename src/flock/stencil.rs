@@ -5,39 +5,61 @@
 //! lists are compressed into such runs wherever they allow it; edges, holes and irregular bodies
 //! keep their lists. Both ways sum in the neighbours' order and divide once, which is what
 //! [`Rule::target`](super::rules::Rule::target) does: the bits are the same.
+//!
+//! The particles are parted into *bands* in their numbering, at least as long as a particle sees far. A
+//! particle then sees nobody beyond the next band on either side, which is what lets a sweep take several
+//! steps while a few bands are in the caches, and leave out those where nothing moves.
 
 mod kernel;
 #[cfg(test)]
 mod tests;
 
-use super::neighbourhood::Neighbours;
-use super::points::Points;
+use std::ops::Range;
 
-/// Fewest and most particles in a chunk.
-const CHUNKS: [usize; 2] = [1 << 14, 1 << 17];
+pub use kernel::Plane;
+
+use super::neighbourhood::Neighbours;
+use super::real::Real;
 
 /// Shorter runs are not worth the set-up of one.
 const SHORTEST_RUN: usize = 8;
 
-/// Particles per chunk, the unit of work for one thread, in a body of so many: large enough to hold
-/// many columns, small enough that every thread gets several.
-pub fn chunk_size(particles: usize) -> usize {
-    (particles / 64).clamp(CHUNKS[0], CHUNKS[1])
-}
+/// Fewest particles in a band: less is not worth looking after.
+const SMALLEST_BAND: usize = 1 << 10;
 
-/// The particles that follow, as runs and lists, chunk by chunk.
+/// Most particles in a band, and how far particles may see for bands to be made: beyond that they are of
+/// this size and bound nothing.
+const LARGEST_BAND: usize = 1 << 17;
+
+/// Most particles of a body that counts as within the caches: 8 MiB in four arrays. Its columns are swept one
+/// after the other, and gaps between them swept over.
+const IN_CACHE: usize = 1 << 18;
+
+/// Longest gap between two runs that is swept over rather than stopped at, and most particles in the gaps of
+/// one run.
+const GAPS: [usize; 2] = [6, kernel::MOST_KEPT];
+
+/// The particles that follow, as runs and lists, band by band.
 #[derive(Clone, Debug, Default)]
 pub struct Stencil {
-    chunks: Vec<Chunk>,
-    chunk_size: usize,
-    /// Index distances of all runs, one stencil after the other.
-    distances: Vec<isize>,
-}
-
-#[derive(Clone, Debug, Default)]
-struct Chunk {
+    bands: Vec<Band>,
     runs: Vec<Run>,
     listed: Vec<u32>,
+    /// Index distances of all runs, one stencil after the other.
+    distances: Vec<isize>,
+    /// Particles in gaps of runs that keep what stands there.
+    kept: Vec<u32>,
+    /// Whether nobody sees beyond the next band.
+    is_local: bool,
+}
+
+/// Where a band begins; it ends where the next one begins.
+#[derive(Clone, Copy, Debug, Default)]
+struct Band {
+    particle: u32,
+    run: u32,
+    listed: u32,
+    followers: u32,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -47,63 +69,118 @@ struct Run {
     /// Where the run's stencil begins in `distances`, and its size.
     stencil: u32,
     neighbours: u32,
+    /// Where the particles in its gaps begin in `kept`, and how many they are.
+    kept: u32,
+    gaps: u32,
 }
 
 impl Stencil {
     /// Compresses the lists of the particles that follow.
     pub fn compile(neighbours: &Neighbours, follows: &[bool]) -> Self {
-        let chunk_size = chunk_size(follows.len());
-        let mut stencil = Self { chunks: Vec::new(), chunk_size, distances: Vec::new() };
-        for begin in (0..follows.len()).step_by(chunk_size) {
-            let end = (begin + chunk_size).min(follows.len());
-            let mut chunk = Chunk::default();
-            let mut j = begin;
-            while j < end {
-                if !follows[j] {
-                    j += 1;
-                    continue;
-                }
-                let same = (j + 1..end).find(|&k| !(follows[k] && is_translate(neighbours, j, k)));
-                let len = same.unwrap_or(end) - j;
-                if len >= SHORTEST_RUN {
-                    let (at, size) = stencil.distances_of(neighbours, j);
-                    chunk.runs.push(Run { start: j as u32, len: len as u32, stencil: at, neighbours: size });
-                } else {
-                    chunk.listed.extend(j as u32..(j + len) as u32);
-                }
-                j += len;
+        let reach = reach(neighbours, follows);
+        let is_local = reach <= LARGEST_BAND / 3;
+        // Three columns of a lattice, which are swept abreast; cut where a run ends anyway.
+        let size = if is_local { (reach * 5 / 2).max(SMALLEST_BAND) } else { LARGEST_BAND };
+        let mut stencil = Self { is_local, ..Self::default() };
+        let mut j = 0;
+        stencil.open_band(0);
+        while j < follows.len() {
+            let len = run_length(neighbours, follows, j, size);
+            if follows[j] && len >= SHORTEST_RUN {
+                stencil.push_run(neighbours, j, len, follows.len() <= IN_CACHE);
+            } else if follows[j] {
+                stencil.listed.extend(j as u32..(j + len) as u32);
             }
-            stencil.chunks.push(chunk);
+            j += len;
+            let begin = stencil.bands.last().map_or(0, |band| band.particle as usize);
+            if j - begin >= size && j < follows.len() {
+                stencil.open_band(j);
+            }
+        }
+        stencil.open_band(follows.len());
+        for band in 0..stencil.band_count() {
+            let count = stencil.particles(band..band + 1).filter(|&j| follows[j]).count();
+            stencil.bands[band].followers = count as u32;
         }
         stencil
     }
 
-    /// Share of the following particles that need no neighbour list.
-    pub fn share_in_runs(&self) -> f64 {
-        let in_runs: u64 = self.chunks.iter().flat_map(|c| &c.runs).map(|run| u64::from(run.len)).sum();
-        let listed: u64 = self.chunks.iter().map(|c| c.listed.len() as u64).sum();
-        in_runs as f64 / (in_runs + listed).max(1) as f64
+    fn open_band(&mut self, particle: usize) {
+        let (run, listed) = (self.runs.len() as u32, self.listed.len() as u32);
+        self.bands.push(Band { particle: particle as u32, run, listed, followers: 0 });
     }
 
-    /// Computes the targets of chunk number `index` into `x` and `y`, the chunk's part of the next
-    /// positions.
-    pub fn sweep_chunk(
-        &self,
-        index: usize,
-        neighbours: &Neighbours,
-        (present, rest): (&Points, Option<&Points>),
-        (x, y): (&mut [f64], &mut [f64]),
-    ) {
-        let (begin, chunk) = (index * self.chunk_size, &self.chunks[index]);
-        for alike in chunk.runs.chunk_by(|a, b| a.neighbours == b.neighbours) {
-            let rest_x = rest.map(|rest| &rest.x[..]);
-            let rest_y = rest.map(|rest| &rest.y[..]);
-            kernel::sweep(alike, &self.distances, (&present.x, rest_x), begin, x);
-            kernel::sweep(alike, &self.distances, (&present.y, rest_y), begin, y);
+    fn push_run(&mut self, neighbours: &Neighbours, j: usize, len: usize, bridge: bool) {
+        let (stencil, size) = self.distances_of(neighbours, j);
+        let first_of_band = self.bands.last().map_or(0, |band| band.run as usize);
+        let kept = self.kept.len();
+        if bridge && self.runs.len() > first_of_band {
+            let listed_from = self.bands.last().map_or(0, |band| band.listed as usize);
+            let last = self.runs.last_mut().expect("the band has one");
+            let gap = (last.start + last.len)..j as u32;
+            // Those in the gap who follow by lists are computed after the runs; the others must not change.
+            let lists = &self.listed[listed_from..];
+            let still = gap.clone().filter(|i| lists.binary_search(i).is_err());
+            let alike = (last.stencil, last.neighbours) == (stencil, size) && gap.len() <= GAPS[0];
+            if alike && last.gaps as usize + still.clone().count() <= GAPS[1] {
+                self.kept.extend(still);
+                last.gaps += (self.kept.len() - kept) as u32;
+                last.len = (j + len) as u32 - last.start;
+                return;
+            }
         }
-        for &j in &chunk.listed {
-            let j = j as usize;
-            [x[j - begin], y[j - begin]] = listed_target(neighbours.of(j), present, rest, j);
+        let (start, len, kept) = (j as u32, len as u32, kept as u32);
+        self.runs.push(Run { start, len, stencil, neighbours: size, kept, gaps: 0 });
+    }
+
+    pub fn band_count(&self) -> usize {
+        self.bands.len().saturating_sub(1)
+    }
+
+    /// Whether no particle sees farther than into the bands beside its own.
+    pub fn is_local(&self) -> bool {
+        self.is_local
+    }
+
+    /// The particles of some bands.
+    pub fn particles(&self, bands: Range<usize>) -> Range<usize> {
+        self.bands[bands.start].particle as usize..self.bands[bands.end].particle as usize
+    }
+
+    /// How many particles of a band follow.
+    pub fn followers(&self, band: usize) -> usize {
+        self.bands[band].followers as usize
+    }
+
+    /// Share of the following particles that need no neighbour list.
+    pub fn share_in_runs(&self) -> f64 {
+        let followers: u64 = self.bands.iter().map(|band| u64::from(band.followers)).sum();
+        (followers - self.listed.len() as u64) as f64 / followers.max(1) as f64
+    }
+
+    /// Computes one coordinate of the targets of those in some bands that follow without lists, `tile` of a
+    /// column at a time. Call it before [`Stencil::sweep_listed`]: it writes over the listed ones in its gaps.
+    pub fn sweep_runs<T: Real>(&self, bands: Range<usize>, tile: usize, plane: &mut Plane<'_, T>) {
+        let runs = &self.runs[self.bands[bands.start].run as usize..self.bands[bands.end].run as usize];
+        for alike in runs.chunk_by(|a, b| a.neighbours == b.neighbours) {
+            kernel::sweep(alike, (&self.distances, &self.kept), tile, plane);
+        }
+    }
+
+    /// Computes some coordinates of the targets of those in some bands that follow by lists.
+    pub fn sweep_listed<T: Real, const N: usize>(
+        &self,
+        bands: Range<usize>,
+        neighbours: &Neighbours,
+        planes: &mut [Plane<'_, T>; N],
+    ) {
+        let listed = self.bands[bands.start].listed as usize..self.bands[bands.end].listed as usize;
+        for &j in &self.listed[listed] {
+            let (j, list) = (j as usize, neighbours.of(j as usize));
+            let targets = listed_targets(list, planes, j);
+            for (plane, target) in planes.iter_mut().zip(targets) {
+                plane.next[j - plane.begin] = target;
+            }
         }
     }
 
@@ -123,6 +200,22 @@ impl Stencil {
     }
 }
 
+/// How many places away the farthest neighbour of anybody who follows is.
+fn reach(neighbours: &Neighbours, follows: &[bool]) -> usize {
+    let farthest = |j: usize| neighbours.of(j).iter().map(|&k| j.abs_diff(k as usize)).max().unwrap_or(0);
+    (0..follows.len()).filter(|&j| follows[j]).map(farthest).max().unwrap_or(0)
+}
+
+/// How many particles from `j` on have the same neighbours but for the place, at most `most`.
+fn run_length(neighbours: &Neighbours, follows: &[bool], j: usize, most: usize) -> usize {
+    if !follows[j] {
+        return 1;
+    }
+    let end = (j + most).min(follows.len());
+    let other = (j + 1..end).find(|&k| !(follows[k] && is_translate(neighbours, j, k)));
+    other.unwrap_or(end) - j
+}
+
 /// Whether the neighbours of `k` are those of `j` moved by `k - j` places.
 fn is_translate(neighbours: &Neighbours, j: usize, k: usize) -> bool {
     let (a, b) = (neighbours.of(j), neighbours.of(k));
@@ -132,16 +225,17 @@ fn is_translate(neighbours: &Neighbours, j: usize, k: usize) -> bool {
 
 /// What [`Rule::target`](super::rules::Rule::target) computes: the rest offset is added to the mean,
 /// also where it is zero, which makes 0.0 of -0.0.
-fn listed_target(list: &[u32], present: &Points, rest: Option<&Points>, j: usize) -> [f64; 2] {
+#[inline]
+fn listed_targets<T: Real, const N: usize>(list: &[u32], planes: &[Plane<'_, T>; N], j: usize) -> [T; N] {
     if list.is_empty() {
-        return present.get(j);
+        return std::array::from_fn(|n| planes[n].present[j - planes[n].seen_from]);
     }
-    let (mut x, mut y) = (-0.0, -0.0);
+    let mut sums = [T::of(-0.0); N];
     for &k in list {
-        x += present.x[k as usize];
-        y += present.y[k as usize];
+        for (sum, plane) in sums.iter_mut().zip(planes) {
+            *sum += plane.present[k as usize - plane.seen_from];
+        }
     }
-    let count = list.len() as f64;
-    let [rx, ry] = rest.map_or([0.0; 2], |rest| rest.get(j));
-    [x / count + rx, y / count + ry]
+    let count = T::of(list.len() as f64);
+    std::array::from_fn(|n| sums[n] / count + planes[n].rest.map_or(T::default(), |rest| rest[j]))
 }

@@ -1,44 +1,7 @@
 //! Vectors over the particles in single or double precision, and sums over them in a fixed order.
 
-use std::ops::{Add, AddAssign, Mul, Sub};
-
 use crate::flock::points::Points;
-
-/// The two precisions that equilibrium is computed in.
-pub trait Real:
-    Copy
-    + Default
-    + Send
-    + Sync
-    + Add<Output = Self>
-    + Sub<Output = Self>
-    + Mul<Output = Self>
-    + AddAssign
-    + PartialEq
-    + std::fmt::Debug
-    + 'static
-{
-    fn of(value: f64) -> Self;
-    fn wide(self) -> f64;
-}
-
-impl Real for f64 {
-    fn of(value: f64) -> Self {
-        value
-    }
-    fn wide(self) -> f64 {
-        self
-    }
-}
-
-impl Real for f32 {
-    fn of(value: f64) -> Self {
-        value as f32
-    }
-    fn wide(self) -> f64 {
-        f64::from(self)
-    }
-}
+pub use crate::flock::real::Real;
 
 /// One vector in the plane for each particle, shape \[count\] each: [`Points`] of either precision.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -2,6 +2,7 @@ use super::super::body::{Body, Cut};
 use super::super::interaction::{Interaction, Weights};
 use super::super::lattice::{Lattice, LatticeKind};
 use super::super::neighbourhood::Neighbourhood;
+use super::super::points::Points;
 use super::super::rules::Rule;
 use super::super::shape::Shape;
 use super::*;
@@ -41,6 +42,31 @@ fn disc_with_hole() -> Cut {
     Cut::Shape(Shape::WithHoles { body: Box::new(disc(23.0)), holes: vec![disc(6.0)] })
 }
 
+/// Sweeps all bands, in two pieces.
+fn sweep(stencil: &Stencil, interaction: &Interaction, present: &Points, next: &mut Points) {
+    let (bands, rest) = (stencil.band_count(), interaction.rest.as_ref());
+    for piece in [0..bands / 2, bands / 2..bands] {
+        let mut planes = [
+            Plane {
+                seen_from: 0,
+                present: &present.x,
+                rest: rest.map(|r| &r.x[..]),
+                begin: 0,
+                next: &mut next.x,
+            },
+            Plane {
+                seen_from: 0,
+                present: &present.y,
+                rest: rest.map(|r| &r.y[..]),
+                begin: 0,
+                next: &mut next.y,
+            },
+        ];
+        planes.iter_mut().for_each(|plane| stencil.sweep_runs(piece.clone(), 64, plane));
+        stencil.sweep_listed(piece, &interaction.neighbours, &mut planes);
+    }
+}
+
 /// Sweeps with the stencil and compares every bit with the rule; whoever does not follow keeps its
 /// mark. Gives the share in runs.
 fn compare(interaction: &Interaction, held: impl Fn(usize) -> bool, what: &str) -> f64 {
@@ -50,10 +76,7 @@ fn compare(interaction: &Interaction, held: impl Fn(usize) -> bool, what: &str) 
     let stencil = Stencil::compile(&interaction.neighbours, &follows);
     let present = rough(count, 1);
     let mut next = Points { x: vec![MARK; count], y: vec![MARK; count] };
-    let size = chunk_size(count);
-    for (chunk, (x, y)) in next.x.chunks_mut(size).zip(next.y.chunks_mut(size)).enumerate() {
-        stencil.sweep_chunk(chunk, &interaction.neighbours, (&present, interaction.rest.as_ref()), (x, y));
-    }
+    sweep(&stencil, interaction, &present, &mut next);
     for (j, &follows) in follows.iter().enumerate() {
         let expected = if follows { interaction.target(j, &present) } else { [MARK; 2] };
         let bits = |point: [f64; 2]| point.map(f64::to_bits);
@@ -134,8 +157,7 @@ fn a_mean_of_negative_zeros_and_a_particle_without_neighbours_give_the_bits_of_t
     for rest in [None, Some(present.clone()), positive] {
         let interaction = Interaction { rest, ..interaction.clone() };
         let mut next = Points { x: vec![7.0; 22], y: vec![7.0; 22] };
-        let places = (&present, interaction.rest.as_ref());
-        stencil.sweep_chunk(0, &interaction.neighbours, places, (&mut next.x, &mut next.y));
+        sweep(&stencil, &interaction, &present, &mut next);
         for j in 0..22 {
             let bits = |point: [f64; 2]| point.map(f64::to_bits);
             assert_eq!(bits(next.get(j)), bits(interaction.target(j, &present)), "particle {j}");

@@ -6,13 +6,17 @@
 //! the particles one after the other in their numbering, each seeing the new places of those before
 //! it (Gauss-Seidel).
 
+mod several;
+
 use rayon::prelude::*;
+
+pub use several::{Activity, Led, MOST_STEPS, Steps};
 
 use crate::flock::frame::Frame;
 use crate::flock::interaction::{Interaction, Weights};
 use crate::flock::points::Points;
 use crate::flock::role::Role;
-use crate::flock::stencil::{Stencil, chunk_size};
+use crate::flock::stencil::{Plane, Stencil};
 
 /// Who sees whose new position within one step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,6 +43,9 @@ impl Default for Update {
 
 /// Bodies below this many particles are swept by one thread: handing out work costs more.
 const PARALLEL_FROM: usize = 1 << 16;
+
+/// Particles of a column that are swept before it is the next one's turn.
+const TILE: usize = 64;
 
 /// The followers of a body, made ready to be swept.
 #[derive(Clone, Debug)]
@@ -83,12 +90,7 @@ impl Sweep {
         next: &mut Points,
     ) {
         match (self.update.order, &self.stencil) {
-            (Order::Synchronous, Some(stencil)) => {
-                let rest = interaction.rest.as_ref();
-                for_chunks(next, |chunk, x, y| {
-                    stencil.sweep_chunk(chunk, &interaction.neighbours, (present, rest), (x, y));
-                });
-            }
+            (Order::Synchronous, Some(stencil)) => sweep_whole(stencil, interaction, present, next),
             (Order::Synchronous, None) => for_chunks(next, |chunk, x, y| {
                 let begin = chunk * chunk_size(present.len());
                 for i in (0..x.len()).filter(|i| self.follows[begin + i]) {
@@ -106,6 +108,34 @@ impl Sweep {
         }
     }
 
+    /// Takes up to [`MOST_STEPS`] steps at once, for bodies without a frame whose sweep [`Sweep::takes_several`]; the bits are
+    /// those of single steps. `next` must hold the positions before the last step, but for those who are led. For
+    /// each step, whether somebody moved farther in it than `farther` \[length\] along an axis.
+    pub fn steps(
+        &self,
+        interaction: &Interaction,
+        (present, next): (&mut Points, &mut Points),
+        (count, led, farther): (usize, Led<'_>, Option<f64>),
+        activity: &mut Activity,
+    ) -> Vec<bool> {
+        let stencil = self.stencil.as_ref().expect("a sweep that takes several steps has a stencil");
+        let rest = interaction.rest.as_ref().map(|rest| [&rest.x[..], &rest.y[..]]);
+        let threads = if is_parallel(present.len()) { rayon::current_num_threads() } else { 1 };
+        let steps =
+            Steps { stencil, neighbours: &interaction.neighbours, rest, led, count, farther, threads };
+        let even = [&mut present.x[..], &mut present.y[..]];
+        let farther = steps.take(activity, even, [&mut next.x[..], &mut next.y[..]]);
+        if count % 2 == 1 {
+            std::mem::swap(present, next);
+        }
+        farther
+    }
+
+    /// Whether [`Sweep::steps`] can take the steps.
+    pub fn takes_several(&self) -> bool {
+        self.stencil.is_some()
+    }
+
     fn moved(&self, j: usize, interaction: &Interaction, seen: &Points) -> [f64; 2] {
         let target = interaction.target(j, seen);
         let damping = self.update.damping;
@@ -121,10 +151,18 @@ fn followers(roles: &[Role]) -> Vec<bool> {
     roles.iter().map(|&role| role == Role::Follower).collect()
 }
 
+/// Particles per piece of work in a body of so many: every thread gets several.
+fn chunk_size(particles: usize) -> usize {
+    (particles / 64).clamp(1 << 14, 1 << 17)
+}
+
+fn is_parallel(particles: usize) -> bool {
+    particles >= PARALLEL_FROM && rayon::current_num_threads() > 1
+}
+
 /// Runs `work(chunk, x, y)` on every chunk of the points, in parallel where that pays.
 fn for_chunks(points: &mut Points, work: impl Fn(usize, &mut [f64], &mut [f64]) + Sync) {
-    let parallel = points.len() >= PARALLEL_FROM && rayon::current_num_threads() > 1;
-    let size = chunk_size(points.len());
+    let (parallel, size) = (is_parallel(points.len()), chunk_size(points.len()));
     let Points { x, y } = points;
     if parallel {
         x.par_chunks_mut(size)
@@ -133,6 +171,38 @@ fn for_chunks(points: &mut Points, work: impl Fn(usize, &mut [f64], &mut [f64]) 
             .for_each(|(chunk, (x, y))| work(chunk, x, y));
     } else {
         x.chunks_mut(size).zip(y.chunks_mut(size)).enumerate().for_each(|(chunk, (x, y))| work(chunk, x, y));
+    }
+}
+
+/// One step of everybody, in pieces of whole bands.
+fn sweep_whole(stencil: &Stencil, interaction: &Interaction, present: &Points, next: &mut Points) {
+    let bands = stencil.band_count();
+    let size = if is_parallel(present.len()) { chunk_size(present.len()) } else { usize::MAX };
+    let mut pieces = Vec::new();
+    let (mut x, mut y) = (&mut next.x[..], &mut next.y[..]);
+    let mut first = 0;
+    for band in 0..bands {
+        let particles = stencil.particles(first..band + 1);
+        if particles.len() >= size || band + 1 == bands {
+            let (head_x, tail_x) = x.split_at_mut(particles.len());
+            let (head_y, tail_y) = y.split_at_mut(particles.len());
+            pieces.push((first..band + 1, particles.start, head_x, head_y));
+            (x, y, first) = (tail_x, tail_y, band + 1);
+        }
+    }
+    let [rest_x, rest_y] = [0, 1]
+        .map(|axis| interaction.rest.as_ref().map(|rest| if axis == 0 { &rest.x[..] } else { &rest.y[..] }));
+    let work = |(bands, begin, x, y): (std::ops::Range<usize>, usize, &mut [f64], &mut [f64])| {
+        let mut planes = [
+            Plane { seen_from: 0, present: &present.x, rest: rest_x, begin, next: x },
+            Plane { seen_from: 0, present: &present.y, rest: rest_y, begin, next: y },
+        ];
+        planes.iter_mut().for_each(|plane| stencil.sweep_runs(bands.clone(), TILE, plane));
+        stencil.sweep_listed(bands, &interaction.neighbours, &mut planes);
+    };
+    match pieces.len() {
+        0 | 1 => pieces.into_iter().for_each(work),
+        _ => pieces.into_par_iter().for_each(work),
     }
 }
 
