@@ -10,10 +10,10 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use flockform::compare::run::plan;
 use flockform::continuum::engine::Engine;
-use flockform::continuum::equilibrium::come_to_rest;
+use flockform::continuum::equilibrium::come_to_rest_watched;
 use flockform::continuum::plan::Plan;
 use flockform::continuum::record::{ProbeSeries, Snapshot};
-use flockform::continuum::run::{Outcome, StopReason};
+use flockform::continuum::run::{Outcome, StopReason, Watch};
 use flockform::export::{
     Energies, ExportError, OutputFolder, Results, Summary, Timings, VtkSeries, write_all,
 };
@@ -60,12 +60,15 @@ fn run_here(arguments: &RunArguments) -> Result<ExitCode, Refusal> {
     let mut progress = Progress::new(arguments.output.quiet, scene.stop.steps);
     let interrupted = interrupt_flag();
     let stepping = Instant::now();
-    let outcome = come_to_rest(&scene, plan, &mut |engine, residual| {
+    let looks = Looks::new(&scene, &plan);
+    let mut see = |engine: &Engine, residual: f64| {
         recorder.step(engine);
         progress.step(engine.step(), residual);
         let stop = recorder.failed() || interrupted.load(Ordering::Relaxed);
         if stop { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-    })?;
+    };
+    let watch = Watch { next: &|step| looks.after(step), see: &mut see };
+    let outcome = come_to_rest_watched(&scene, plan, watch)?;
     progress.finish();
 
     let elapsed = stepping.elapsed();
@@ -92,6 +95,31 @@ pub fn interrupt_flag() -> Arc<AtomicBool> {
     }
     flag
 }
+
+/// At which steps a run is looked at: those that are recorded, and now and then one to show how far it is.
+struct Looks<'a> {
+    scene: &'a Scene,
+    /// Most steps between two looks.
+    most: usize,
+}
+
+impl<'a> Looks<'a> {
+    fn new(scene: &'a Scene, plan: &Plan) -> Self {
+        // Probes are recorded at every step. Otherwise about twice a second.
+        let most = if plan.probes.is_empty() { (UPDATES_BETWEEN_LOOKS / plan.count()).max(1) } else { 1 };
+        Self { scene, most }
+    }
+
+    fn after(&self, step: usize) -> usize {
+        let record = &self.scene.record;
+        let figure = record.figures.iter().copied().filter(|&figure| figure > step).min();
+        let vtk = (record.vtk_every > 0).then(|| (step / record.vtk_every + 1) * record.vtk_every);
+        [figure, vtk].into_iter().flatten().fold(step + self.most, usize::min)
+    }
+}
+
+/// Updates of particles that take some half a second.
+const UPDATES_BETWEEN_LOOKS: usize = 1 << 28;
 
 /// Keeps what the scene asks for while the run goes on.
 struct Recorder<'a> {

@@ -1,5 +1,7 @@
 //! The engine: one step of a planned body.
 
+mod several;
+
 use super::layout::RoleChange;
 use super::movement::Movement;
 use super::plan::Plan;
@@ -14,7 +16,7 @@ use crate::flock::role::Role;
 use crate::flock::rules::Rule;
 use crate::flock::strain::{Strain, strain};
 use crate::scene::Quantity;
-use crate::solve::sweep::{Order, Sweep, Update};
+use crate::solve::sweep::{Activity, Order, Sweep, Update};
 
 /// A body on its way; positions in \[length, world frame\], shape \[count\].
 #[derive(Clone, Debug)]
@@ -25,7 +27,10 @@ pub struct Engine {
     sweep: Sweep,
     roles: Vec<Role>,
     changes: Vec<RoleChange>,
+    /// By particle.
     leaders: Vec<Led>,
+    /// The particles of `leaders`.
+    led: Vec<usize>,
     /// Where particles that are led from outside will be after the next step.
     guided: Vec<(usize, [f64; 2])>,
     present: Points,
@@ -33,6 +38,8 @@ pub struct Engine {
     previous: Points,
     breaks: Vec<Break>,
     present_neighbours: Option<PresentNeighbours>,
+    /// Where something moved in the last step.
+    activity: Activity,
     step: usize,
 }
 
@@ -74,9 +81,11 @@ impl Engine {
             roles,
             changes,
             leaders: Vec::new(),
+            led: Vec::new(),
             guided: Vec::new(),
             breaks: cuts,
             present_neighbours,
+            activity: Activity::default(),
             step: 0,
         };
         // The plan has given the roles that hold from the start; their motions begin here.
@@ -151,6 +160,10 @@ impl Engine {
 
     /// Moves the body by one step.
     pub fn advance(&mut self) {
+        if self.steps_at_once(1) == 1 {
+            self.advance_by(1, None);
+            return;
+        }
         self.step += 1;
         self.take_roles();
         self.break_bonds();
@@ -161,6 +174,8 @@ impl Engine {
         self.move_leaders();
         self.sweep.step(&self.interaction, self.body.frame.as_ref(), &self.present, &mut self.previous);
         std::mem::swap(&mut self.present, &mut self.previous);
+        self.activity.forget();
+        self.activity.count_whole(self.sweep.followers());
     }
 
     /// Puts particles where they have been seen \[length\], in place of where the last step sent them; frame
@@ -169,6 +184,7 @@ impl Engine {
         for (particle, place) in seen {
             self.present.set(particle, place);
         }
+        self.activity.forget();
         if let Some(frame) = self.body.frame.as_ref().filter(|frame| !frame.rule.looks_before_the_sweep()) {
             let body = self.present.clone();
             frame.follow(&self.body.reference, &body, &mut self.present);
@@ -199,12 +215,12 @@ impl Engine {
             frame.follow(reference, &seen, &mut self.present);
         }
         self.previous.clone_from(&self.present);
+        self.activity.forget();
     }
 
     /// Takes the last step back: positions as before it. Bonds that broke in it stay broken.
     pub fn take_back(&mut self) {
-        self.step -= 1;
-        self.present.clone_from(&self.previous);
+        self.return_to(self.step - 1, &self.previous.clone());
     }
 
     /// Whether a role change or a leader's motion is still to come, so that rest is no equilibrium.
@@ -271,7 +287,9 @@ impl Engine {
                 let particle = particles[which];
                 Led { particle, change, which, since, base: self.present.get(particle) }
             }));
+            self.leaders.sort_unstable_by_key(|led| led.particle);
         }
+        self.led = self.leaders.iter().map(|led| led.particle).collect();
     }
 
     fn after_role_change(&mut self) {
@@ -294,6 +312,7 @@ impl Engine {
     }
 
     fn compile_sweep(&mut self) {
+        self.activity.forget();
         self.sweep = if self.present_neighbours.is_some() {
             Sweep::uncompiled(self.update, &self.roles)
         } else {

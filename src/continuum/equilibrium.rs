@@ -5,27 +5,35 @@ use std::ops::ControlFlow;
 use super::engine::Engine;
 use super::layout::held;
 use super::plan::Plan;
-use super::run::{Outcome, StopReason, run};
+use super::run::{Outcome, StopReason, Watch, run_watched};
 use crate::flock::points::{Points, distance};
 use crate::flock::role::Role;
 use crate::scene::{Scene, SceneError};
 use crate::solve::equilibrium::{Request, SolveError, Solved, Solver, System, choose, solve};
 use crate::solve::linear::{NotLinear, system};
 
-/// Runs a plan to its end as its scene asks: stepping, or straight to the equilibrium. `watch` sees a
-/// stepped run as [`run`] shows it, and of a solved one the end.
+/// Runs a plan to its end as its scene asks: stepping, or straight to the equilibrium. `see` sees each step of
+/// a stepped run as [`run`](super::run::run) shows it, and of a solved one the end.
 ///
 /// # Errors
 /// As [`settle`]; a scene that is stepped has none.
 pub fn come_to_rest(
     scene: &Scene,
     plan: Plan,
-    watch: &mut dyn FnMut(&Engine, f64) -> ControlFlow<()>,
+    see: &mut dyn FnMut(&Engine, f64) -> ControlFlow<()>,
 ) -> Result<Outcome, SceneError> {
-    let Some(asked) = &scene.equilibrium else { return Ok(run(plan, watch)) };
+    come_to_rest_watched(scene, plan, Watch { next: &|step| step + 1, see })
+}
+
+/// The same, seen at those steps alone that `watch` names.
+///
+/// # Errors
+/// As [`come_to_rest`].
+pub fn come_to_rest_watched(scene: &Scene, plan: Plan, watch: Watch<'_>) -> Result<Outcome, SceneError> {
+    let Some(asked) = &scene.equilibrium else { return Ok(run_watched(plan, watch)) };
     let outcome = settle(scene, &asked.request, plan)?;
     // There is nothing left to break off.
-    let _ = watch(&outcome.engine, outcome.residual);
+    let _ = (watch.see)(&outcome.engine, outcome.residual);
     Ok(outcome)
 }
 

@@ -7,6 +7,7 @@
 
 pub mod engine;
 pub mod equilibrium;
+mod front;
 pub mod interior;
 pub mod layout;
 pub mod movement;

@@ -3,6 +3,7 @@
 use std::fmt;
 
 use super::equilibrium::foresee;
+use super::front::share_reached;
 use super::interior;
 use super::plan::Plan;
 use crate::flock::fracture::Threshold;
@@ -161,8 +162,14 @@ fn facts(scene: &Scene, plan: &Plan) -> Result<Vec<(String, String)>, SceneError
         ("lattice", lattice),
         ("neighbour entries", format!("{bonds} ({:.2} a particle)", bonds as f64 / plan.count() as f64)),
     ];
+    let moving = share_reached(plan).filter(|_| scene.equilibrium.is_none()).map(|share| {
+        (
+            "computed",
+            format!("about {:.0} % of the updates: motion spreads by one neighbour a step", 100.0 * share),
+        )
+    });
     let last = [("memory", format!("about {}", readable_bytes(memory(plan)))), ("stops", stop)];
-    let facts = first.into_iter().chain(swept.into_iter().flatten()).chain(last);
+    let facts = first.into_iter().chain(swept.into_iter().flatten()).chain(moving).chain(last);
     Ok(facts.map(|(name, value)| (name.to_owned(), value)).collect())
 }
 

@@ -6,7 +6,7 @@ use super::engine::Engine;
 use super::movement::{Movement, farthest, first_lost};
 use super::plan::Plan;
 use crate::flock::interaction::Weights;
-use crate::flock::points::distance;
+use crate::flock::points::{Points, distance};
 use crate::flock::rules::{FeedbackReference, Mean};
 use crate::solve::equilibrium::Solved;
 use crate::solve::sweep::Order;
@@ -69,15 +69,31 @@ pub struct Outcome {
     pub solved: Option<Solved>,
 }
 
-/// Runs a plan to its end. `watch` sees the engine before the first step (with an infinite residual)
+/// Whoever watches a run.
+pub struct Watch<'a> {
+    /// Given a step, the next one that is looked at. The steps in between may be taken several at once, which is
+    /// several times as fast for a large body.
+    pub next: &'a dyn Fn(usize) -> usize,
+    /// Sees the engine before the first step (with an infinite residual), at the steps named by `next` and at the last one,
+    /// with the residual; can break the run off.
+    pub see: &'a mut dyn FnMut(&Engine, f64) -> ControlFlow<()>,
+}
+
+/// Runs a plan to its end. `see` sees the engine before the first step (with an infinite residual)
 /// and after each one, with the residual; it can break the run off.
-pub fn run(plan: Plan, watch: &mut dyn FnMut(&Engine, f64) -> ControlFlow<()>) -> Outcome {
+pub fn run(plan: Plan, see: &mut dyn FnMut(&Engine, f64) -> ControlFlow<()>) -> Outcome {
+    run_watched(plan, Watch { next: &|step| step + 1, see })
+}
+
+/// Runs a plan to its end, seen at those steps alone that `watch` names. The results are the same to the bit.
+pub fn run_watched(plan: Plan, watch: Watch<'_>) -> Outcome {
     let stop = plan.stop;
     // Both over the spacing, as the movement is.
     let bound = stop.growth * plan.diagonal / plan.body.lattice.spacing();
     let mut engine = Engine::new(plan);
+    let mut strides = Strides::new(&engine, stop.tolerance, bound);
     let mut residual = f64::INFINITY;
-    let mut interrupted = watch(&engine, residual).is_break();
+    let mut interrupted = (watch.see)(&engine, residual).is_break();
     let reason = loop {
         if interrupted {
             break StopReason::Interrupted;
@@ -85,19 +101,72 @@ pub fn run(plan: Plan, watch: &mut dyn FnMut(&Engine, f64) -> ControlFlow<()>) -
         if engine.step() >= stop.steps {
             break StopReason::Steps;
         }
-        engine.advance();
+        let look = (watch.next)(engine.step()).clamp(engine.step() + 1, stop.steps);
+        let most = look - engine.step();
+        strides.advance(&mut engine, most);
         let movement = engine.movement();
         if let Some(divergence) = divergence(&engine, &movement, bound) {
             engine.take_back();
             break StopReason::Diverged(divergence);
         }
+        strides.displacement = movement.largest_displacement;
         residual = movement.largest_move;
-        interrupted = watch(&engine, residual).is_break();
-        if stop.tolerance.is_some_and(|tolerance| residual <= tolerance) && !engine.is_scheduled() {
+        let settled = stop.tolerance.is_some_and(|tolerance| residual <= tolerance) && !engine.is_scheduled();
+        if settled || engine.step() == look {
+            interrupted = (watch.see)(&engine, residual).is_break();
+        }
+        if settled {
             break StopReason::Equilibrium;
         }
     };
     Outcome { engine, reason, residual, solved: None }
+}
+
+/// Takes as many steps at once as can be known to hold neither the last one nor a divergence.
+struct Strides {
+    tolerance: Option<f64>,
+    /// Largest distance from the reference place over the spacing \[1\]: of anybody now, and that no body may pass.
+    displacement: f64,
+    bound: f64,
+    /// Whether a mean takes nobody farther from the reference than somebody is.
+    contracts: bool,
+    /// Where a stride began, if it may have gone too far.
+    start: Points,
+    /// Steps to be taken one at a time.
+    singly: usize,
+}
+
+impl Strides {
+    fn new(engine: &Engine, tolerance: Option<f64>, bound: f64) -> Self {
+        let contracts = engine.steps_at_once(1) > 0 && engine.rests_at_reference();
+        let start = Points::default();
+        Self { tolerance, displacement: 0.0, bound, contracts, start, singly: 0 }
+    }
+
+    /// Takes at most `most` steps, and at least one.
+    fn advance(&mut self, engine: &mut Engine, most: usize) {
+        let count = if self.contracts && self.singly == 0 { engine.steps_at_once(most) } else { 0 };
+        let spacing = engine.body().lattice.spacing();
+        let reach = self.displacement.max(engine.leaders_reach(count) / spacing);
+        // Along each axis a mean stays within what there was; along both at once, within the diagonal.
+        if count < 2 || reach * std::f64::consts::SQRT_2 * (1.0 + 1e-9) > self.bound {
+            self.singly = self.singly.saturating_sub(1);
+            return engine.advance();
+        }
+        let Some(tolerance) = self.tolerance else {
+            engine.advance_by(count, None);
+            return;
+        };
+        let step = engine.step();
+        self.start.clone_from(engine.present());
+        let told = engine.advance_by(count, Some(tolerance * spacing * (1.0 + 1e-9)));
+        // The last one is looked at by whoever called.
+        if told[..count - 1].contains(&false) {
+            engine.return_to(step, &self.start);
+            self.singly = count - 1;
+            engine.advance();
+        }
+    }
 }
 
 fn divergence(engine: &Engine, movement: &Movement, bound: f64) -> Option<Divergence> {

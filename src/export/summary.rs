@@ -52,6 +52,8 @@ pub struct Summary {
     pub divergence: Option<String>,
     /// Largest one-step motion over the spacing, at the last step.
     pub residual: Option<f64>,
+    /// Share of the followers' updates that were computed \[1\]: nothing is swept where nothing moves.
+    pub share_swept: Option<f64>,
     /// How the equilibrium was found, unless it was stepped to.
     pub equilibrium: Option<Equilibrium>,
     pub energies: Energies,
@@ -150,6 +152,7 @@ impl Summary {
                 _ => None,
             },
             residual: Some(outcome.residual).filter(|residual| residual.is_finite()),
+            share_swept: outcome.solved.is_none().then(|| outcome.engine.share_swept()),
             equilibrium: outcome.solved.as_ref().map(Equilibrium::of),
             energies: Energies { pe1, pe2, largest_strain },
             broken_bonds: broken_bonds(&outcome.engine),

@@ -52,6 +52,7 @@ const TILE: usize = 64;
 pub struct Sweep {
     update: Update,
     follows: Vec<bool>,
+    followers: usize,
     /// Present where the rule is the plain barycentre and no bond is broken.
     stencil: Option<Stencil>,
 }
@@ -66,12 +67,13 @@ impl Sweep {
             && !broken;
         let synchronous = update == Update::default();
         let stencil = (plain && synchronous).then(|| Stencil::compile(&interaction.neighbours, &follows));
-        Self { update, follows, stencil }
+        Self { update, followers: count(&follows), follows, stencil }
     }
 
     /// For neighbours that change at every step: nothing is compiled from them.
     pub fn uncompiled(update: Update, roles: &[Role]) -> Self {
-        Self { update, follows: followers(roles), stencil: None }
+        let follows = followers(roles);
+        Self { update, followers: count(&follows), follows, stencil: None }
     }
 
     /// Share of the followers swept without neighbour lists.
@@ -131,6 +133,11 @@ impl Sweep {
         farther
     }
 
+    /// How many particles follow.
+    pub fn followers(&self) -> usize {
+        self.followers
+    }
+
     /// Whether [`Sweep::steps`] can take the steps.
     pub fn takes_several(&self) -> bool {
         self.stencil.is_some()
@@ -149,6 +156,10 @@ impl Sweep {
 
 fn followers(roles: &[Role]) -> Vec<bool> {
     roles.iter().map(|&role| role == Role::Follower).collect()
+}
+
+fn count(follows: &[bool]) -> usize {
+    follows.iter().filter(|&&follows| follows).count()
 }
 
 /// Particles per piece of work in a body of so many: every thread gets several.

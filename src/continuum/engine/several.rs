@@ -1,0 +1,75 @@
+//! Several steps of a body at once, where nothing in between depends on how it stands.
+
+use super::{Engine, Led as Leader};
+use crate::flock::points::{Points, distance};
+use crate::solve::sweep::{Led, MOST_STEPS};
+
+impl Engine {
+    /// How many steps, at most `most`, can be taken by [`Engine::advance_by`] from here; 0 where the next one
+    /// must be taken by [`Engine::advance`]: a frame, bonds that may break, neighbours found anew and roles
+    /// that change look at every step.
+    pub fn steps_at_once(&self, most: usize) -> usize {
+        let looks = self.body.frame.is_some()
+            || self.present_neighbours.is_some()
+            || self.interaction.bonds.as_ref().is_some_and(|bonds| bonds.threshold.is_some())
+            || self.changes.iter().any(|change| change.when.is_some());
+        if looks || !self.guided.is_empty() || !self.sweep.takes_several() {
+            return 0;
+        }
+        let to_come = self.changes.iter().map(|change| change.from).filter(|&from| from > self.step.max(1));
+        let until = to_come.min().map_or(usize::MAX, |from| from - 1 - self.step);
+        most.min(until).min(MOST_STEPS)
+    }
+
+    /// Takes so many steps, as many as [`Engine::steps_at_once`] allows; the bits are those of single ones. For each,
+    /// whether somebody is known to have moved farther in it than `farther` \[length\].
+    pub fn advance_by(&mut self, count: usize, farther: Option<f64>) -> Vec<bool> {
+        let (leaders, changes, step) = (&self.leaders, &self.changes, self.step);
+        let place = |which: usize, level: usize| {
+            let Leader { change, which, since, base, .. } = leaders[which];
+            let motion = changes[change].motion.as_ref().expect("leaders have a motion");
+            let [dx, dy] = motion.displacement((step + level - since) as f64, which, base);
+            [base[0] + dx, base[1] + dy]
+        };
+        let led = Led { particles: &self.led, place: &place };
+        let places = (&mut self.present, &mut self.previous);
+        let told = self.sweep.steps(&self.interaction, places, (count, led, farther), &mut self.activity);
+        self.step += count;
+        told
+    }
+
+    /// Puts the body back to where it stood at an earlier step, with the same roles.
+    pub fn return_to(&mut self, step: usize, places: &Points) {
+        self.step = step;
+        self.present.clone_from(places);
+        self.activity.forget();
+    }
+
+    /// How far from its reference place a leader gets in the next steps at most \[length\].
+    pub fn leaders_reach(&self, steps: usize) -> f64 {
+        let farthest = |leader: &Leader| {
+            let Some(motion) = &self.changes[leader.change].motion else { return 0.0 };
+            let far = |step: usize| {
+                let [dx, dy] = motion.displacement((step - leader.since) as f64, leader.which, leader.base);
+                let place = [leader.base[0] + dx, leader.base[1] + dy];
+                distance(place, self.body.reference.get(leader.particle))
+            };
+            (self.step + 1..=self.step + steps).map(far).fold(0.0, f64::max)
+        };
+        self.leaders.iter().map(farthest).fold(0.0, f64::max)
+    }
+
+    /// Whether everybody's target in the reference configuration is where they stand, to rounding. A mean then
+    /// takes nobody farther from there, along an axis, than somebody is already.
+    pub fn rests_at_reference(&self) -> bool {
+        let reference = &self.body.reference;
+        let near = 1e-9 * self.body.lattice.spacing();
+        let rests = |j: usize| distance(self.interaction.target(j, reference), reference.get(j)) <= near;
+        (0..reference.len()).filter(|&j| !self.body.is_frame[j]).all(rests)
+    }
+
+    /// Share of the updates of the steps so far that were computed \[1\]: where nothing moves, nothing is swept.
+    pub fn share_swept(&self) -> f64 {
+        self.activity.share_computed()
+    }
+}

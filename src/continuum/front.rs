@@ -1,0 +1,74 @@
+//! How far motion can have come: one neighbour a step.
+
+use super::plan::Plan;
+use crate::flock::neighbourhood::Neighbours;
+use crate::solve::sweep::Sweep;
+
+/// Share of the followers' updates that the motion of the leaders can reach within `stop.steps` \[1\]; the others
+/// are known to change nothing and are left out. `None` where every update is made: the sweep of this scene does not
+/// look for what stands still.
+pub fn share_reached(plan: &Plan) -> Option<f64> {
+    let looks = plan.body.frame.is_some()
+        || plan.present_radius.is_some()
+        || plan.interaction.bonds.as_ref().is_some_and(|bonds| bonds.threshold.is_some())
+        || plan.changes.iter().any(|change| change.when.is_some());
+    if looks || !Sweep::compile(plan.update, &plan.interaction, &plan.roles).takes_several() {
+        return None;
+    }
+    let steps = plan.stop.steps;
+    let begins = first_motions(plan, steps);
+    let reached = |begin: usize| (steps + 1).saturating_sub(begin) as f64;
+    let updates: f64 = begins.iter().map(|&begin| reached(begin)).sum();
+    Some(updates / (steps as f64 * plan.count() as f64))
+}
+
+/// The step in which each particle can move first, beyond the last one for those whom nothing reaches.
+fn first_motions(plan: &Plan, steps: usize) -> Vec<usize> {
+    let mut begins = vec![steps + 1; plan.count()];
+    // Whoever is moved, and whoever is let go.
+    let mut starts: Vec<(usize, usize)> = plan
+        .changes
+        .iter()
+        .filter(|change| change.motion.is_some() || change.from > 1)
+        .flat_map(|change| change.particles.iter().map(|&particle| (change.from.max(1), particle)))
+        .collect();
+    starts.sort_unstable();
+    let (seen_by, mut to_come) = (seen_by(plan), starts.into_iter().peekable());
+    let mut front: Vec<usize> = Vec::new();
+    for step in 1..=steps {
+        let mut moved = std::mem::take(&mut front);
+        while let Some((_, particle)) = to_come.next_if(|&(from, _)| from <= step) {
+            moved.push(particle);
+        }
+        moved.retain(|&particle| {
+            let first = begins[particle] > step;
+            begins[particle] = begins[particle].min(step);
+            first
+        });
+        if moved.is_empty() && to_come.peek().is_none() {
+            break;
+        }
+        for &particle in &moved {
+            front.extend(seen_by.of(particle).iter().map(|&who| who as usize));
+        }
+    }
+    begins
+}
+
+/// Who sees each particle.
+fn seen_by(plan: &Plan) -> Neighbours {
+    let neighbours = &plan.interaction.neighbours;
+    let mut starts = vec![0u32; plan.count() + 1];
+    neighbours.index.iter().for_each(|&k| starts[k as usize + 1] += 1);
+    for k in 0..plan.count() {
+        starts[k + 1] += starts[k];
+    }
+    let (mut next, mut index) = (starts.clone(), vec![0; neighbours.index.len()]);
+    for j in 0..plan.count() {
+        for &k in neighbours.of(j) {
+            index[next[k as usize] as usize] = j as u32;
+            next[k as usize] += 1;
+        }
+    }
+    Neighbours { starts, index }
+}

@@ -1,0 +1,98 @@
+//! Runs that are looked at now and then end with the bits of those that are looked at after every step.
+
+use std::ops::ControlFlow;
+
+use flockform::continuum::plan::Plan;
+use flockform::continuum::report::PlanReport;
+use flockform::continuum::run::{Outcome, Watch, run, run_watched};
+use flockform::scene::{Scene, bundled};
+
+fn scene(name: &str, overrides: &[&str]) -> Scene {
+    let overrides: Vec<String> = overrides.iter().map(|&text| text.to_owned()).collect();
+    bundled(name).expect("bundled").load(&overrides).unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn plan(scene: &Scene) -> Plan {
+    Plan::new(scene).unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn watched(scene: &Scene, next: &dyn Fn(usize) -> usize) -> (Outcome, Vec<usize>) {
+    let mut looks = Vec::new();
+    let outcome = run_watched(
+        plan(scene),
+        Watch {
+            next,
+            see: &mut |engine, _| {
+                looks.push(engine.step());
+                ControlFlow::Continue(())
+            },
+        },
+    );
+    (outcome, looks)
+}
+
+fn bits(outcome: &Outcome) -> Vec<u64> {
+    let engine = &outcome.engine;
+    let all = [engine.present(), engine.previous()];
+    all.iter().flat_map(|points| points.x.iter().chain(&points.y)).map(|value| value.to_bits()).collect()
+}
+
+fn assert_same(scene: &Scene, next: &dyn Fn(usize) -> usize, what: &str) -> (Outcome, Vec<usize>) {
+    let every = run(plan(scene), &mut |_, _| ControlFlow::Continue(()));
+    let (some, looks) = watched(scene, next);
+    assert_eq!(some.engine.step(), every.engine.step(), "{what}");
+    assert_eq!(some.reason, every.reason, "{what}");
+    assert_eq!(some.residual.to_bits(), every.residual.to_bits(), "{what}");
+    assert!(bits(&some) == bits(&every), "{what}");
+    (some, looks)
+}
+
+#[test]
+fn every_lattice_settles_at_the_same_step_with_the_same_bits() {
+    for lattice in ["square", "rectangular", "centred-rectangular", "hexagonal", "oblique", "honeycomb"] {
+        let scene = scene(&format!("lattice-{lattice}"), &[]);
+        let (outcome, looks) = assert_same(&scene, &|_| usize::MAX, lattice);
+        assert!(outcome.engine.step() > 100, "{lattice}");
+        // The start, and the step in which it settled.
+        assert_eq!(looks, [0, outcome.engine.step()], "{lattice}");
+    }
+}
+
+#[test]
+fn leaders_on_their_way_and_roles_that_change_are_met_at_their_steps() {
+    let free = scene("tension", &["frame=\"none\"", "record.probes=[]"]);
+    let (outcome, looks) = assert_same(&free, &|step| (step / 50 + 1) * 50, "tension without a frame");
+    assert_eq!(looks, [0, 50, 100, 150, 200, 250, 300, 350, 400, 401]);
+    // Pulled 12 units and let go: nothing would be left to see if the motion had gone on, or not begun.
+    let first = outcome.engine.displacement(99);
+    assert!(first[0] > 0.01 && first[0] < 6.0, "{first:?}");
+    // A frame, fracture and terms that look at every step are stepped one at a time.
+    for name in ["tension", "fracture-hexagonal", "feedback-grow"] {
+        let bundled = bundled(name).expect("bundled");
+        let scene = bundled.load(&["stop.steps=60".into()]).unwrap_or_else(|error| panic!("{error}"));
+        assert_same(&scene, &|_| usize::MAX, name);
+    }
+}
+
+#[test]
+fn a_body_that_leaves_its_bounds_is_caught_at_the_same_step() {
+    let overrides = ["frame=\"none\"", "stop.growth=0.2", "record.probes=[]"];
+    let scene = scene("tension", &overrides);
+    let (outcome, _) = assert_same(&scene, &|_| usize::MAX, "pulled out of its bounds");
+    assert_eq!(outcome.reason.name(), "diverged");
+    assert_eq!(outcome.engine.step(), 4);
+}
+
+#[test]
+fn what_is_swept_is_what_moves_and_the_plan_foresees_it() {
+    let grid = "body.shape={kind=\"grid\",columns=400,rows=30}";
+    let scene =
+        scene("tension", &["frame=\"none\"", grid, "stop.steps=20", "record.probes=[]", "record.figures=[]"]);
+    let (outcome, _) = assert_same(&scene, &|_| usize::MAX, "a long strip");
+    let swept = outcome.engine.share_swept();
+    // All once, to find out that they stand still; and of 400 columns half of 20 on average, whole bands.
+    assert!((0.05..0.15).contains(&swept), "{swept}");
+    let plan = plan(&scene);
+    let report = PlanReport::new(&scene, &plan).expect("a plan").to_string();
+    assert!(report.contains("about 3 % of the updates"), "{report}");
+}
