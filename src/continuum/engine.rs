@@ -322,14 +322,12 @@ impl Engine {
 
     fn break_bonds(&mut self) {
         let Some(bonds) = &mut self.interaction.bonds else { return };
-        let (was_whole, known) = (!bonds.any_broken(), self.breaks.len());
+        let known = self.breaks.len();
         let places = (&*self.body.reference, &self.present);
         bonds.break_stretched(self.step, &self.interaction.neighbours, places, &self.roles, &mut self.breaks);
         if self.breaks.len() > known {
             tracing::debug!("step {}: {} bonds break", self.step, self.breaks.len() - known);
-        }
-        if was_whole && bonds.any_broken() {
-            self.compile_sweep();
+            self.sweep.set_aside(self.breaks[known..].iter().flat_map(|b| b.pair).map(|j| j as usize));
         }
     }
 

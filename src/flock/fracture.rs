@@ -23,6 +23,23 @@ impl Threshold {
             Threshold::Stretch(ratio) => length > ratio * rest,
         }
     }
+
+    /// Whether a bond whose present and reference length have these squares is so much shorter than the
+    /// threshold that rounding cannot matter; squares that overflow or vanish are never far.
+    #[inline]
+    fn is_far(self, [length, rest]: [f64; 2]) -> bool {
+        let limit = match self {
+            Threshold::Distance(df) => df * df,
+            Threshold::Stretch(ratio) => ratio * ratio * rest,
+        };
+        length < limit * (1.0 - NEAR_THRESHOLD) && length > f64::MIN_POSITIVE / NEAR_THRESHOLD
+    }
+}
+
+#[inline]
+fn square_of_distance(at: &Points, j: usize, k: usize) -> f64 {
+    let (x, y) = (at.x[j] - at.x[k], at.y[j] - at.y[k]);
+    x * x + y * y
 }
 
 /// What a particle sees in the place of a neighbour it has lost.
@@ -58,11 +75,24 @@ pub struct Bonds {
     pub ghosts: Ghosts,
     broken: Vec<bool>,
     any_broken: bool,
+    /// Whether everybody is seen by those they see.
+    is_mutual: bool,
 }
+
+/// Part of a threshold within which a bond is measured exactly: far more than the rounding of a square.
+const NEAR_THRESHOLD: f64 = 1e-9;
 
 impl Bonds {
     pub fn new(threshold: Option<Threshold>, ghosts: Ghosts, neighbours: &Neighbours) -> Self {
-        Self { threshold, ghosts, broken: vec![false; neighbours.index.len()], any_broken: false }
+        let sees = |j: usize, k: u32| neighbours.of(j).contains(&k);
+        let seen_by = |j: usize| neighbours.of(j).iter().all(|&k| sees(k as usize, j as u32));
+        Self {
+            threshold,
+            ghosts,
+            broken: vec![false; neighbours.index.len()],
+            any_broken: false,
+            is_mutual: (0..neighbours.count()).all(seen_by),
+        }
     }
 
     pub fn is_broken(&self, bond: usize) -> bool {
@@ -84,9 +114,16 @@ impl Bonds {
         breaks: &mut Vec<Break>,
     ) {
         let Some(threshold) = self.threshold else { return };
+        let is_mutual = self.is_mutual;
         self.break_where(step, neighbours, (reference, present), breaks, |j, k| {
-            let length = distance(present.get(j), present.get(k));
-            roles[k].is_body() && threshold.is_passed(length, distance(reference.get(j), reference.get(k)))
+            // What both see, the lower one looks after.
+            (!is_mutual || j < k)
+                && !threshold.is_far([present, reference].map(|at| square_of_distance(at, j, k)))
+                && roles[k].is_body()
+                && threshold.is_passed(
+                    distance(present.get(j), present.get(k)),
+                    distance(reference.get(j), reference.get(k)),
+                )
         });
     }
 
@@ -131,10 +168,14 @@ impl Bonds {
                 if self.broken[bond] || !breaks_now(j, k) {
                     continue;
                 }
+                let back = neighbours.bonds(k).find(|&bond| neighbours.index[bond] as usize == j);
                 self.broken[bond] = true;
                 self.any_broken = true;
+                if let Some(back) = back.filter(|_| self.is_mutual) {
+                    self.broken[back] = true;
+                }
                 // Seen from both ends where both list it, recorded from the lower one.
-                if j < k || !neighbours.of(k).contains(&(j as u32)) {
+                if j < k || back.is_none() {
                     let (a, b) = (reference.get(j), reference.get(k));
                     breaks.push(Break {
                         step,
@@ -234,5 +275,25 @@ mod tests {
         bonds.release_ghosts(2, &neighbours, (&reference, &reference), &roles, &mut breaks);
         assert_eq!(breaks.len(), 2);
         assert!((0..4).all(|b| bonds.is_broken(b)));
+    }
+
+    #[test]
+    fn a_bond_is_measured_exactly_where_a_square_would_not_tell() {
+        // At the threshold to the last bit, just beyond it, and where squares overflow or vanish.
+        for scale in [1e-200, 1.0, 1e200] {
+            let neighbours = Neighbours::from_lists([vec![1], vec![0]]);
+            let reference: Points = [[0.0, 0.0], [scale, 0.0]].into_iter().collect();
+            for threshold in [Threshold::Distance(1.3 * scale), Threshold::Stretch(1.3)] {
+                let limit = 1.3 * scale;
+                for (length, breaks) in [(limit, false), (limit.next_up(), true), (0.99 * limit, false)] {
+                    let present: Points = [[0.0, 0.0], [0.0, length]].into_iter().collect();
+                    let mut bonds = Bonds::new(Some(threshold), Ghosts::None, &neighbours);
+                    let (roles, mut broken) = ([Role::Follower; 2], Vec::new());
+                    bonds.break_stretched(1, &neighbours, (&reference, &present), &roles, &mut broken);
+                    assert_eq!(broken.len(), usize::from(breaks), "{threshold:?} {length:e}");
+                    assert!(bonds.is_broken(0) == breaks && bonds.is_broken(1) == breaks);
+                }
+            }
+        }
     }
 }

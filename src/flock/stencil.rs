@@ -11,6 +11,7 @@
 //! steps while a few bands are in the caches, and leave out those where nothing moves.
 
 mod kernel;
+pub mod matrix;
 #[cfg(test)]
 mod tests;
 

@@ -91,6 +91,10 @@ impl Rule {
     /// The paper's plain rule (Eq. 1).
     pub const BARYCENTRE: Rule = Rule { mean: Mean::Barycentre, poisson: None, feedback: None };
 
+    /// A material and nothing else, for small rotations.
+    pub const MATERIAL: Rule =
+        Rule { mean: Mean::Material { rotation: Rotation::Small }, poisson: None, feedback: None };
+
     /// Whether the rule is the unadorned mean of Eq. 1, for which sweeps have a faster path that
     /// gives the same bits.
     pub fn is_plain_barycentre(&self) -> bool {

@@ -16,6 +16,8 @@ use crate::flock::frame::Frame;
 use crate::flock::interaction::{Interaction, Weights};
 use crate::flock::points::Points;
 use crate::flock::role::Role;
+use crate::flock::rules::Rule;
+use crate::flock::stencil::matrix::{self, MatrixStencil};
 use crate::flock::stencil::{Plane, Stencil};
 
 /// Who sees whose new position within one step.
@@ -44,6 +46,9 @@ impl Default for Update {
 /// Bodies below this many particles are swept by one thread: handing out work costs more.
 const PARALLEL_FROM: usize = 1 << 16;
 
+/// From so many particles on that are swept one by one, threads share them.
+const ASIDE_IN_PARALLEL: usize = 1 << 11;
+
 /// Particles of a column that are swept before it is the next one's turn.
 const TILE: usize = 64;
 
@@ -53,27 +58,50 @@ pub struct Sweep {
     update: Update,
     follows: Vec<bool>,
     followers: usize,
-    /// Present where the rule is the plain barycentre and no bond is broken.
+    /// Present where the rule is the plain barycentre.
     stencil: Option<Stencil>,
+    /// Present where the rule is a material and nothing else.
+    matrices: Option<MatrixStencil>,
+    /// Followers with a broken bond, whom no stencil fits, ascending.
+    aside: Vec<u32>,
 }
 
 impl Sweep {
-    /// Compile anew whenever roles or neighbours change or the first bond breaks.
+    /// Compile anew whenever roles or neighbours change; whoever loses a bond is [set aside](Sweep::set_aside).
     pub fn compile(update: Update, interaction: &Interaction, roles: &[Role]) -> Self {
         let follows = followers(roles);
-        let broken = interaction.bonds.as_ref().is_some_and(|bonds| bonds.any_broken());
-        let plain = interaction.rule.is_plain_barycentre()
-            && matches!(interaction.weights, Weights::Equal)
-            && !broken;
-        let synchronous = update == Update::default();
-        let stencil = (plain && synchronous).then(|| Stencil::compile(&interaction.neighbours, &follows));
-        Self { update, followers: count(&follows), follows, stencil }
+        let Interaction { rule, neighbours, weights, .. } = interaction;
+        let plain = rule.is_plain_barycentre() && matches!(weights, Weights::Equal);
+        let stencil = (plain && update == Update::default()).then(|| Stencil::compile(neighbours, &follows));
+        let matrices = match weights {
+            Weights::Matrix(weights) if *rule == Rule::MATERIAL && update.order == Order::Synchronous => {
+                let chunk = chunk_size(follows.len());
+                Some(MatrixStencil::compile(neighbours, weights, &follows, chunk))
+            }
+            _ => None,
+        };
+        let mut sweep =
+            Self { update, followers: count(&follows), follows, stencil, matrices, aside: Vec::new() };
+        if let Some(bonds) = interaction.bonds.as_ref().filter(|bonds| bonds.any_broken()) {
+            let is_torn = |j: &usize| neighbours.bonds(*j).any(|bond| bonds.is_broken(bond));
+            sweep.set_aside((0..neighbours.count()).filter(is_torn));
+        }
+        sweep
+    }
+
+    /// Sweeps these one by one from now on: they have lost a bond.
+    pub fn set_aside(&mut self, particles: impl IntoIterator<Item = usize>) {
+        let follows = &self.follows;
+        self.aside.extend(particles.into_iter().filter(|&j| follows[j]).map(|j| j as u32));
+        self.aside.sort_unstable();
+        self.aside.dedup();
     }
 
     /// For neighbours that change at every step: nothing is compiled from them.
     pub fn uncompiled(update: Update, roles: &[Role]) -> Self {
         let follows = followers(roles);
-        Self { update, followers: count(&follows), follows, stencil: None }
+        let (stencil, matrices, aside) = (None, None, Vec::new());
+        Self { update, followers: count(&follows), follows, stencil, matrices, aside }
     }
 
     /// Share of the followers swept without neighbour lists.
@@ -91,22 +119,49 @@ impl Sweep {
         present: &Points,
         next: &mut Points,
     ) {
-        match (self.update.order, &self.stencil) {
-            (Order::Synchronous, Some(stencil)) => sweep_whole(stencil, interaction, present, next),
-            (Order::Synchronous, None) => for_chunks(next, |chunk, x, y| {
+        if let Some(stencil) = &self.stencil {
+            sweep_whole(stencil, interaction, present, next);
+            self.step_aside(interaction, present, next);
+        } else if let Some(matrices) = &self.matrices {
+            let Weights::Matrix(weights) = &interaction.weights else {
+                unreachable!("compiled from matrices")
+            };
+            let Interaction { neighbours, forces, rest, .. } = interaction;
+            let (forces, rest, damping) = (forces.as_ref(), rest.as_ref(), self.update.damping);
+            let body = matrix::Body { neighbours, weights, forces, rest, present, damping };
+            for_chunks(next, |chunk, x, y| {
+                let begin = chunk * chunk_size(present.len());
+                for &j in matrices.sweep_chunk(chunk, &body, (&mut *x, &mut *y)) {
+                    let i = j as usize - begin;
+                    [x[i], y[i]] = self.moved(j as usize, interaction, present);
+                }
+            });
+            self.step_aside(interaction, present, next);
+        } else if self.update.order == Order::Synchronous {
+            for_chunks(next, |chunk, x, y| {
                 let begin = chunk * chunk_size(present.len());
                 for i in (0..x.len()).filter(|i| self.follows[begin + i]) {
                     [x[i], y[i]] = self.moved(begin + i, interaction, present);
                 }
-            }),
-            (Order::Sequential, _) => {
-                for j in (0..self.follows.len()).filter(|&j| self.follows[j]) {
-                    next.set(j, self.moved(j, interaction, next));
-                }
+            });
+        } else {
+            for j in (0..self.follows.len()).filter(|&j| self.follows[j]) {
+                next.set(j, self.moved(j, interaction, next));
             }
         }
         if let Some(frame) = frame {
             frame.follow(&interaction.reference, present, next);
+        }
+    }
+
+    /// Those whom no stencil fits; what one left in their places is written over.
+    fn step_aside(&self, interaction: &Interaction, present: &Points, next: &mut Points) {
+        let moved = |&j: &u32| (j, self.moved(j as usize, interaction, present));
+        if self.aside.len() >= ASIDE_IN_PARALLEL && rayon::current_num_threads() > 1 {
+            let moved: Vec<(u32, [f64; 2])> = self.aside.par_iter().map(moved).collect();
+            moved.into_iter().for_each(|(j, place)| next.set(j as usize, place));
+        } else {
+            self.aside.iter().map(moved).for_each(|(j, place)| next.set(j as usize, place));
         }
     }
 
@@ -140,7 +195,7 @@ impl Sweep {
 
     /// Whether [`Sweep::steps`] can take the steps.
     pub fn takes_several(&self) -> bool {
-        self.stencil.is_some()
+        self.stencil.is_some() && self.aside.is_empty()
     }
 
     fn moved(&self, j: usize, interaction: &Interaction, seen: &Points) -> [f64; 2] {
@@ -223,7 +278,7 @@ mod tests {
     use crate::flock::body::{Body, Cut};
     use crate::flock::lattice::{Lattice, LatticeKind};
     use crate::flock::neighbourhood::Neighbourhood;
-    use crate::flock::rules::{Mean, Rule};
+    use crate::flock::rules::Mean;
 
     /// Large enough to be swept in parallel, and of no whole number of chunks.
     fn body(rule: Rule) -> Interaction {
@@ -294,5 +349,70 @@ mod tests {
             bits(&next)
         };
         assert!(swept(&compiled) == swept(&Sweep::uncompiled(Update::default(), &roles)));
+    }
+
+    fn assert_compiled_as_uncompiled(interaction: &Interaction, roles: &[Role], update: Update) {
+        let reference = &interaction.reference;
+        let present: Points =
+            reference.iter().map(|[x, y]| [x * 1.01 + 0.1 * y.sin(), y - 0.02 * x]).collect();
+        let swept = |sweep: &Sweep| {
+            let mut next = present.clone();
+            sweep.step(interaction, None, &present, &mut next);
+            bits(&next)
+        };
+        let compiled = Sweep::compile(update, interaction, roles);
+        assert!(compiled.stencil.is_some() || compiled.matrices.is_some());
+        assert!(swept(&compiled) == swept(&Sweep::uncompiled(update, roles)));
+    }
+
+    #[test]
+    fn a_compiled_sweep_of_a_material_gives_the_bits_of_an_uncompiled_one() {
+        use crate::flock::block::Block;
+        use crate::flock::interaction::MatrixWeights;
+        let mut interaction = body(Rule::MATERIAL);
+        let neighbours = &interaction.neighbours;
+        // A class for each number of neighbours, of matrices without any symmetry.
+        let most = (0..neighbours.count()).map(|j| neighbours.of(j).len()).max().expect("particles");
+        let starts: Vec<u32> = (0..=most as u32 + 1).map(|n| n * n.saturating_sub(1) / 2).collect();
+        let blocks: Vec<Block> = (0..starts[most + 1])
+            .map(|k| f64::from(k))
+            .map(|k| [[0.1 + 0.01 * k.sin(), 0.02 * k.cos()], [0.03 * (2.0 * k).sin(), 0.1 - 0.01 * k.cos()]])
+            .collect();
+        interaction.weights = Weights::Matrix(MatrixWeights {
+            class: (0..neighbours.count()).map(|j| neighbours.of(j).len() as u32).collect(),
+            starts,
+            stiffness: blocks.clone(),
+            blocks,
+            compliance: (0..=most).map(|n| [[0.1 * n as f64, 0.2], [0.3, 0.4]]).collect(),
+        });
+        let mut roles = vec![Role::Follower; interaction.reference.len()];
+        roles.iter_mut().step_by(7919).for_each(|role| *role = Role::Leader);
+        let gentle = Update { damping: 0.7, ..Update::default() };
+        for update in [Update::default(), gentle] {
+            interaction.rest = None;
+            interaction.forces = None;
+            assert_compiled_as_uncompiled(&interaction, &roles, update);
+            interaction.keep_rest();
+            interaction.forces =
+                Some(interaction.reference.iter().map(|[x, y]| [y.cos(), 0.1 * x]).collect());
+            assert_compiled_as_uncompiled(&interaction, &roles, update);
+        }
+    }
+
+    #[test]
+    fn a_cracked_body_is_swept_to_the_bits_of_one_by_one() {
+        use crate::flock::fracture::{Bonds, Ghosts};
+        let mut interaction = body(Rule::BARYCENTRE);
+        let mut roles = vec![Role::Follower; interaction.reference.len()];
+        roles[..301].fill(Role::Clamped);
+        for ghosts in [Ghosts::Lattice, Ghosts::Mirrored, Ghosts::None] {
+            let mut bonds = Bonds::new(None, ghosts, &interaction.neighbours);
+            let (reference, neighbours) = (&interaction.reference, &interaction.neighbours);
+            bonds.cut(([100.0, -400.0], [130.0, 400.0]), neighbours, reference, &mut Vec::new());
+            interaction.bonds = Some(bonds);
+            assert_compiled_as_uncompiled(&interaction, &roles, Update::default());
+            let sweep = Sweep::compile(Update::default(), &interaction, &roles);
+            assert!(sweep.aside.len() > 500 && sweep.aside.len() < 5000, "{}", sweep.aside.len());
+        }
     }
 }
