@@ -98,10 +98,14 @@ impl Body {
         self.sites.len()
     }
 
+    /// Indices of the particles that are no frame.
+    pub fn matter(&self) -> impl Iterator<Item = usize> + Clone + '_ {
+        (0..self.count()).filter(|&i| !self.is_frame[i])
+    }
+
     /// Bounds of the body without its frame \[length\].
     pub fn bounds(&self) -> ([f64; 2], [f64; 2]) {
-        let matter = (0..self.count()).filter(|&i| !self.is_frame[i]);
-        self.reference.bounds(matter).unwrap_or(([0.0; 2], [0.0; 2]))
+        self.reference.bounds(self.matter()).unwrap_or(([0.0; 2], [0.0; 2]))
     }
 
     /// The measure of how far along the longer side of the body's bounds a place lies, from 0 to 1.
@@ -116,12 +120,11 @@ impl Body {
     /// neighbours.
     pub fn require_connected(&self, neighbours: &Neighbours) -> Result<(), BodyError> {
         let labels = self.components(neighbours);
-        let body = |&i: &usize| !self.is_frame[i];
-        let first = (0..self.count()).find(body).unwrap_or(0);
-        match (0..self.count()).filter(body).find(|&i| labels[i] != labels[first]) {
+        let first = self.matter().next().unwrap_or(0);
+        match self.matter().find(|&i| labels[i] != labels[first]) {
             None => Ok(()),
             Some(second) => {
-                let mut parts: Vec<u32> = (0..self.count()).filter(body).map(|i| labels[i]).collect();
+                let mut parts: Vec<u32> = self.matter().map(|i| labels[i]).collect();
                 parts.sort_unstable();
                 parts.dedup();
                 Err(BodyError::Disconnected { parts: parts.len(), first: first + 1, second: second + 1 })

@@ -9,6 +9,7 @@
 
 pub mod block;
 pub mod body;
+pub mod curve;
 pub mod fracture;
 pub mod frame;
 pub mod grid;

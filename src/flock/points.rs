@@ -42,6 +42,12 @@ impl Points {
         self.x.iter().zip(&self.y).map(|(&x, &y)| [x, y])
     }
 
+    /// The mean of all; the origin if there are none.
+    pub fn middle(&self) -> [f64; 2] {
+        let sum = self.iter().fold([0.0; 2], |[a, b], [x, y]| [a + x, b + y]);
+        sum.map(|s| s / self.len().max(1) as f64)
+    }
+
     /// Lowest and highest coordinate on each axis, over `indices`; `None` if there are none.
     pub fn bounds(&self, indices: impl IntoIterator<Item = usize>) -> Option<([f64; 2], [f64; 2])> {
         indices.into_iter().map(|i| self.get(i)).fold(None, |bounds, [x, y]| {

@@ -41,7 +41,7 @@ impl Region {
     /// Indices of the particles of `body` in the region, ascending.
     pub fn pick(&self, body: &Body, neighbours: &Neighbours) -> Vec<usize> {
         let tolerance = 1e-9 * body.lattice.spacing();
-        let matter = (0..body.count()).filter(|&i| !body.is_frame[i]);
+        let matter = body.matter();
         let place = |i: usize| body.reference.get(i);
         match self {
             Region::All => matter.collect(),

@@ -65,7 +65,7 @@ impl Engine {
         let reference = &self.body.reference;
         let near = 1e-9 * self.body.lattice.spacing();
         let rests = |j: usize| distance(self.interaction.target(j, reference), reference.get(j)) <= near;
-        (0..reference.len()).filter(|&j| !self.body.is_frame[j]).all(rests)
+        self.body.matter().all(rests)
     }
 
     /// Share of the updates of the steps so far that were computed \[1\]: where nothing moves, nothing is swept.

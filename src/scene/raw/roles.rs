@@ -3,6 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::flock::motion::Interpolation;
+
 /// A role for the particles of a region.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -200,4 +202,14 @@ pub enum RawInterpolation {
     Smooth,
     /// Jumps.
     Hold,
+}
+
+impl From<RawInterpolation> for Interpolation {
+    fn from(raw: RawInterpolation) -> Self {
+        match raw {
+            RawInterpolation::Linear => Interpolation::Linear,
+            RawInterpolation::Smooth => Interpolation::Smooth,
+            RawInterpolation::Hold => Interpolation::Hold,
+        }
+    }
 }

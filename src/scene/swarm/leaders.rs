@@ -6,7 +6,6 @@ use super::raw::*;
 use super::{Leaders, Program, Shape, Who};
 use crate::flock::motion::{Interpolation, Keyframe, Motion};
 use crate::scene::document::problem::SceneError;
-use crate::scene::raw::RawInterpolation;
 use crate::scene::validate::{Refuse, roles};
 
 pub fn leaders(
@@ -60,12 +59,7 @@ fn program(
                 let help = "give the points in the order of their times";
                 return Err(refuse(&format!("{key}.program.points[{k}].at"), message, help));
             }
-            let interpolation = match interpolation {
-                RawInterpolation::Linear => Interpolation::Linear,
-                RawInterpolation::Smooth => Interpolation::Smooth,
-                RawInterpolation::Hold => Interpolation::Hold,
-            };
-            Program::Motion(Motion::Keyframes { frames, interpolation })
+            Program::Motion(Motion::Keyframes { frames, interpolation: (*interpolation).into() })
         }
         RawProgram::File { path, scale } => {
             let key = format!("{key}.program.path");

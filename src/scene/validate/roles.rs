@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::{Refuse, ordered_box};
-use crate::flock::motion::{Interpolation, Keyframe, Motion};
+use crate::flock::motion::{Keyframe, Motion};
 use crate::flock::region::{Region, Side};
 use crate::flock::role::Role;
 use crate::scene::document::problem::SceneError;
@@ -91,13 +91,11 @@ fn leader_motion(
                 let key = format!("{key}.motion.frames[{}].step", late + 1);
                 return Err(refuse(&key, message, "list keyframes by ascending step, each step once"));
             }
-            let interpolation = match interpolation {
-                RawInterpolation::Linear => Interpolation::Linear,
-                RawInterpolation::Smooth => Interpolation::Smooth,
-                RawInterpolation::Hold => Interpolation::Hold,
-            };
             let frame = |f: &RawKeyframe| Keyframe { step: f.step as f64, displacement: f.displacement };
-            Motion::Keyframes { frames: frames.iter().map(frame).collect(), interpolation }
+            Motion::Keyframes {
+                frames: frames.iter().map(frame).collect(),
+                interpolation: (*interpolation).into(),
+            }
         }
         RawMotion::Affine { about, rotate, stretch, shear, steps } => Motion::Affine {
             about: *about,

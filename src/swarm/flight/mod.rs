@@ -135,6 +135,6 @@ fn periods(swarm: &Swarm, control: &Control) -> u64 {
 fn continuum(swarm: &Swarm) -> Result<Option<Twin>, SceneError> {
     let Shape::Scene(scene) = &swarm.shape else { return Ok(None) };
     let plan = Plan::new(scene)?;
-    let particles = (0..plan.count()).filter(|&i| !plan.body.is_frame[i]).collect();
+    let particles = plan.body.matter().collect();
     Ok(Some(Twin { engine: Engine::new(plan), particles }))
 }

@@ -106,7 +106,7 @@ fn default_damping(rule: Rule) -> f64 {
 
 fn of_body(swarm: &Swarm, scene: &Scene) -> Result<Formation, SceneError> {
     let layout = Layout::new(scene)?;
-    let members: Vec<usize> = (0..layout.body.count()).filter(|&i| !layout.body.is_frame[i]).collect();
+    let members: Vec<usize> = layout.body.matter().collect();
     let names = numbered(swarm, members.len());
     let places: Points = members.iter().map(|&i| layout.body.reference.get(i)).collect();
     let leads = leads(swarm, &names, &places, &|k, region| {
@@ -127,7 +127,7 @@ fn of_body(swarm: &Swarm, scene: &Scene) -> Result<Formation, SceneError> {
 
 /// The members are the particles of the plan's body, its frame left out.
 fn of_scene(swarm: &Swarm, plan: Plan, is_scene: bool) -> Formation {
-    let particles: Vec<usize> = (0..plan.count()).filter(|&i| !plan.body.is_frame[i]).collect();
+    let particles: Vec<usize> = plan.body.matter().collect();
     let places: Points = particles.iter().map(|&i| plan.body.reference.get(i)).collect();
     let course = Course::Rule { engine: Box::new(Engine::new(plan)), particles };
     formation(swarm, numbered(swarm, places.len()), places, course, is_scene)
@@ -249,9 +249,7 @@ fn lead(
         }
         Program::Manoeuvre(number) => {
             let named = &swarm.manoeuvres[*number];
-            let count = places.len() as f64;
-            let sum = places.iter().fold([0.0; 2], |[a, b], [x, y]| [a + x, b + y]);
-            let about = named.about.unwrap_or(sum.map(|s| s / count));
+            let about = named.about.unwrap_or_else(|| places.middle());
             let manoeuvre = Manoeuvre { about, from: Posture::NOMINAL, legs: named.legs.clone() };
             Lead::Manoeuvre { manoeuvre, since: 0.0 }
         }

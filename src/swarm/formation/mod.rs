@@ -96,8 +96,7 @@ impl Formation {
 
     /// Middle of the nominal places \[m\].
     pub fn middle(&self) -> [f64; 2] {
-        let sum = self.places.iter().fold([0.0; 2], |[a, b], [x, y]| [a + x, b + y]);
-        sum.map(|s| s / self.count().max(1) as f64)
+        self.places.middle()
     }
 
     pub fn leads(&self, member: usize) -> bool {

@@ -1,0 +1,408 @@
+//! The bodies that are swept, and the ways to do it.
+
+use std::time::Instant;
+
+use crate::flock::block::Block;
+use crate::flock::curve::order_along_curve;
+use crate::flock::fracture::{Bonds, Ghosts, Threshold};
+use crate::flock::interaction::{Interaction, MatrixWeights, Weights};
+use crate::flock::lattice::{Lattice, LatticeKind};
+use crate::flock::neighbourhood::{Neighbourhood, Neighbours};
+use crate::flock::points::Points;
+use crate::flock::real::Real;
+use crate::flock::role::Role;
+use crate::flock::rules::Rule;
+use crate::flock::stencil::Stencil;
+use crate::solve::sweep::{Activity, Led, MOST_STEPS, Steps, Sweep, Update};
+
+pub const LOOP: &str = "a plain compiled loop";
+pub const PLAIN: &str = "barycentre, 4 neighbours";
+pub const EIGHT: &str = "barycentre, 8 neighbours";
+pub const MATERIAL: &str = "material, 8 neighbours";
+pub const INTACT: &str = "fracture on, intact";
+pub const CRACKED: &str = "fracture on, cracked";
+const SPATIAL: &str = "lists of a hexagonal lattice";
+const RANDOM: &str = "the same in random order";
+const RENUMBERED: &str = "the same renumbered along a curve";
+
+/// Bytes that one update moves when no cache holds the body: `x` and `y`, each read, written and
+/// fetched for writing.
+const BYTES_PER_UPDATE: f64 = 48.0;
+
+/// Bytes of the lists of one particle with six neighbours: where they begin, and six indices.
+const BYTES_PER_LIST: f64 = 28.0;
+
+/// Of the bonds of the cracked body, the share that is broken.
+const CRACKS_EVERY: usize = 12;
+
+/// A body and a way to sweep it.
+pub struct Subject {
+    pub name: &'static str,
+    pub precision: &'static str,
+    pub side: usize,
+    pub steps_together: usize,
+    pub followers: usize,
+    pub bonds_watched: usize,
+    pub bytes_per_update: f64,
+    /// Whether more threads than one are worth measuring.
+    pub is_shared: bool,
+    /// Takes so many steps.
+    step: Box<dyn FnMut(usize) + Send>,
+}
+
+impl Subject {
+    /// A small body's step is too short for the clock: as many as fill the time.
+    pub fn steps_in(&mut self, seconds: f64) -> usize {
+        self.time(self.steps_together);
+        let steps = (seconds / self.time(2 * self.steps_together)).clamp(1.0, 1e7) as usize;
+        steps.next_multiple_of(self.steps_together)
+    }
+
+    /// Seconds per step over some steps.
+    pub fn time(&mut self, steps: usize) -> f64 {
+        let begin = Instant::now();
+        (self.step)(steps);
+        begin.elapsed().as_secs_f64() / steps as f64
+    }
+}
+
+type Make = Box<dyn FnOnce() -> Subject>;
+
+/// All subjects, each made when its turn comes: the large ones do not fit into memory together.
+pub fn all(sides: &[usize], other: usize) -> Vec<Make> {
+    let mut all: Vec<Make> = Vec::new();
+    for &side in sides {
+        all.push(Box::new(move || plain_loop(side)));
+        all.push(Box::new(move || square(side, 1)));
+        all.push(Box::new(move || square(side, MOST_STEPS)));
+        all.push(Box::new(move || square_single(side, 1)));
+        all.push(Box::new(move || square_single(side, MOST_STEPS)));
+    }
+    all.push(Box::new(move || {
+        let body = Body::square(other, &Neighbourhood::Ring { radius: 1 });
+        body.subject(EIGHT, BYTES_PER_UPDATE, 1)
+    }));
+    all.push(Box::new(move || material(other)));
+    all.push(Box::new(move || fracture(other, false)));
+    all.push(Box::new(move || fracture(other, true)));
+    for order in [SPATIAL, RANDOM, RENUMBERED] {
+        all.push(Box::new(move || lists(other, order)));
+    }
+    all
+}
+
+struct Body {
+    side: usize,
+    interaction: Interaction,
+    roles: Vec<Role>,
+    present: Points,
+}
+
+impl Body {
+    /// A square body whose outermost particles are held, in the numbering and with the neighbours' order that a scene
+    /// would give; only the lists are made directly, a body of this many sites being slow to cut.
+    fn square(side: usize, neighbourhood: &Neighbourhood) -> Self {
+        let lattice = Lattice::new(LatticeKind::Square { spacing: 1.0 }, [0.0; 2], 0.0);
+        let offsets = neighbourhood.offsets(&lattice).expect("the square lattice has these");
+        let sites = || (0..side).flat_map(|column| (0..side).map(move |row| (column, row)));
+        let inner = 1..side - 1;
+        let follows = |(column, row)| inner.contains(&column) && inner.contains(&row);
+        let offsets = offsets[0].iter().map(|&[i, j]| i as isize * side as isize + j as isize);
+        let neighbours = Neighbours::from_lists(sites().enumerate().map(|(particle, site)| {
+            let seen = if follows(site) { usize::MAX } else { 0 };
+            offsets.clone().take(seen).map(move |offset| particle.wrapping_add_signed(offset) as u32)
+        }));
+        let roles = sites().map(|site| if follows(site) { Role::Follower } else { Role::Clamped }).collect();
+        let reference: Points = sites().map(|(i, j)| lattice.position([i as i32, j as i32])).collect();
+        Self::new(side, reference, neighbours, roles)
+    }
+
+    fn new(side: usize, reference: Points, neighbours: Neighbours, roles: Vec<Role>) -> Self {
+        // Nobody at rest to the bit, so that there is something to compute everywhere.
+        let waves = |[x, y]: [f64; 2]| [x + 0.01 * (0.1 * y).sin(), y + 0.01 * (0.1 * x).sin()];
+        let present = reference.iter().map(waves).collect();
+        let (rule, weights, reference) = (Rule::BARYCENTRE, Weights::Equal, reference.into());
+        let interaction =
+            Interaction { rule, reference, neighbours, weights, forces: None, rest: None, bonds: None };
+        Self { side, interaction, roles, present }
+    }
+
+    fn sweep(&self, update: Update) -> Sweep {
+        Sweep::compile(update, &self.interaction, &self.roles)
+    }
+
+    fn subject(self, name: &'static str, bytes_per_update: f64, steps_together: usize) -> Subject {
+        let sweep = self.sweep(Update::default());
+        let followers = sweep.followers();
+        let Self { side, interaction, mut present, .. } = self;
+        let mut next = present.clone();
+        let step = move |steps: usize| {
+            let mut to_go = steps;
+            while to_go > 0 {
+                if steps_together == 1 {
+                    sweep.step(&interaction, None, &present, &mut next);
+                    std::mem::swap(&mut present, &mut next);
+                    to_go -= 1;
+                } else {
+                    let count = to_go.min(steps_together);
+                    let whole = &mut Activity::default();
+                    sweep.steps(&interaction, (&mut present, &mut next), (count, Led::NOBODY, None), whole);
+                    to_go -= count;
+                }
+            }
+        };
+        Subject {
+            name,
+            precision: "f64",
+            side,
+            steps_together,
+            followers,
+            bonds_watched: 0,
+            bytes_per_update,
+            is_shared: true,
+            step: Box::new(step),
+        }
+    }
+}
+
+const FIRST: Neighbourhood = Neighbourhood::First { keep: None };
+
+fn square(side: usize, steps_together: usize) -> Subject {
+    Body::square(side, &FIRST).subject(PLAIN, BYTES_PER_UPDATE, steps_together)
+}
+
+/// In single precision, which half the memory carries.
+fn square_single(side: usize, steps_together: usize) -> Subject {
+    let body = Body::square(side, &FIRST);
+    let follows: Vec<bool> = body.roles.iter().map(|&role| role == Role::Follower).collect();
+    let neighbours = body.interaction.neighbours;
+    let stencil = Stencil::compile(&neighbours, &follows);
+    let followers = follows.iter().filter(|&&follows| follows).count();
+    let single = |values: &[f64]| values.iter().map(|&value| f32::of(value)).collect::<Vec<f32>>();
+    let mut even = [single(&body.present.x), single(&body.present.y)];
+    let mut odd = even.clone();
+    let step = move |steps: usize| {
+        let mut to_go = steps;
+        while to_go > 0 {
+            let count = to_go.min(steps_together);
+            let (neighbours, threads) = (&neighbours, rayon::current_num_threads());
+            let (stencil, led) = (&stencil, Led::NOBODY);
+            let steps = Steps { stencil, neighbours, rest: None, led, count, farther: None, threads };
+            let rows = |[x, y]: &mut [Vec<f32>; 2]| [std::mem::take(x), std::mem::take(y)];
+            let ([mut ex, mut ey], [mut ox, mut oy]) = (rows(&mut even), rows(&mut odd));
+            steps.take(&mut Activity::default(), [&mut ex, &mut ey], [&mut ox, &mut oy]);
+            (even, odd) = ([ex, ey], [ox, oy]);
+            if count % 2 == 1 {
+                std::mem::swap(&mut even, &mut odd);
+            }
+            to_go -= count;
+        }
+    };
+    Subject {
+        name: PLAIN,
+        precision: "f32",
+        side,
+        steps_together,
+        followers,
+        bonds_watched: 0,
+        bytes_per_update: BYTES_PER_UPDATE / 2.0,
+        is_shared: true,
+        step: Box::new(step),
+    }
+}
+
+/// What one would write without thinking of caches: for each column, for each row.
+fn plain_loop(side: usize) -> Subject {
+    let Points { x, y } = Body::square(side, &FIRST).present;
+    let mut present = [x, y];
+    let mut next = present.clone();
+    let step = move |steps: usize| {
+        for _ in 0..steps {
+            for (present, next) in present.iter().zip(&mut next) {
+                for column in 1..side - 1 {
+                    let begin = column * side;
+                    for i in begin + 1..begin + side - 1 {
+                        let sum = present[i - side] + present[i - 1] + present[i + 1] + present[i + side];
+                        next[i] = 0.25 * sum;
+                    }
+                }
+            }
+            std::mem::swap(&mut present, &mut next);
+        }
+    };
+    Subject {
+        name: LOOP,
+        precision: "f64",
+        side,
+        steps_together: 1,
+        followers: (side - 2).pow(2),
+        bonds_watched: 0,
+        bytes_per_update: BYTES_PER_UPDATE,
+        is_shared: false,
+        step: Box::new(step),
+    }
+}
+
+/// Matrices that take every place to the barycentre's, but have to be multiplied out.
+fn material(side: usize) -> Subject {
+    let mut body = Body::square(side, &Neighbourhood::Ring { radius: 1 });
+    let blocks: Vec<Block> =
+        (0..8).map(|k| f64::from(k % 2) - 0.5).map(|s| [[0.125, 0.01 * s], [0.01 * s, 0.125]]).collect();
+    body.interaction.rule = Rule::MATERIAL;
+    body.interaction.weights = Weights::Matrix(MatrixWeights {
+        class: body.roles.iter().map(|&role| u32::from(role == Role::Follower)).collect(),
+        starts: vec![0, 0, 8],
+        stiffness: blocks.clone(),
+        blocks,
+        compliance: vec![[[1.0, 0.0], [0.0, 1.0]]; 2],
+    });
+    body.subject(MATERIAL, BYTES_PER_UPDATE, 1)
+}
+
+/// Bonds are looked at in every step; none breaks, and if `cracked`, many are broken.
+fn fracture(side: usize, cracked: bool) -> Subject {
+    let mut body = Body::square(side, &FIRST);
+    let (neighbours, reference) = (&body.interaction.neighbours, &body.interaction.reference);
+    let threshold = Threshold::Stretch(3.0);
+    let mut bonds = Bonds::new(Some(threshold), Ghosts::Lattice, neighbours);
+    if cracked {
+        // Cuts along columns, as many as tear one bond in so many.
+        let far = 2.0 * side as f64;
+        for column in (3..side - 3).step_by(CRACKS_EVERY / 2) {
+            let at = column as f64 + 0.5;
+            bonds.cut(([at, -far], [at, far]), neighbours, reference, &mut Vec::new());
+        }
+    }
+    body.interaction.bonds = Some(bonds);
+    let (roles, bonds_watched) = (body.roles.clone(), body.interaction.neighbours.index.len() / 2);
+    let sweep = body.sweep(Update::default());
+    let Body { mut interaction, mut present, .. } = body;
+    let (mut next, followers) = (present.clone(), sweep.followers());
+    let step = move |steps: usize| {
+        for _ in 0..steps {
+            let Interaction { bonds, neighbours, reference, .. } = &mut interaction;
+            let bonds = bonds.as_mut().expect("given above");
+            bonds.break_stretched(1, neighbours, (&**reference, &present), &roles, &mut Vec::new());
+            sweep.step(&interaction, None, &present, &mut next);
+            std::mem::swap(&mut present, &mut next);
+        }
+    };
+    Subject {
+        name: if cracked { CRACKED } else { INTACT },
+        precision: "f64",
+        side,
+        steps_together: 1,
+        followers,
+        bonds_watched,
+        // Each index once, and the reference as the positions.
+        bytes_per_update: BYTES_PER_UPDATE + 4.0 * 4.0 + 16.0,
+        is_shared: false,
+        step: Box::new(step),
+    }
+}
+
+/// A hexagonal lattice swept by lists, as an irregular body is, its particles numbered one way or the other.
+fn lists(side: usize, order: &'static str) -> Subject {
+    let (points, lists) = hexagonal(side);
+    let mut rank: Vec<u32> = (0..points.len() as u32).collect();
+    if order != SPATIAL {
+        shuffle(&mut rank);
+    }
+    if order == RENUMBERED {
+        let shuffled = reorder(&points, &rank);
+        rank = order_along_curve(&shuffled).into_iter().map(|i| rank[i as usize]).collect();
+    }
+    // `rank` names the old number of each new one.
+    let mut new = vec![0; rank.len()];
+    rank.iter().zip(0..).for_each(|(&old, now)| new[old as usize] = now);
+    let renamed =
+        rank.iter().map(|&old| lists[old as usize].iter().map(|&k| new[k as usize]).collect::<Vec<u32>>());
+    let neighbours = Neighbours::from_lists(renamed);
+    let roles: Vec<Role> = (0..rank.len())
+        .map(|j| if neighbours.of(j).is_empty() { Role::Clamped } else { Role::Follower })
+        .collect();
+    let body = Body::new(side, reorder(&points, &rank), neighbours, roles);
+    let mut subject = body.subject(order, BYTES_PER_UPDATE + BYTES_PER_LIST, 1);
+    subject.is_shared = false;
+    subject
+}
+
+/// The places of a hexagonal lattice, jumbled so little that nobody's neighbours change but no two are translates, and
+/// the lists of those inside.
+fn hexagonal(side: usize) -> (Points, Vec<Vec<u32>>) {
+    let at = |column: usize, row: usize| (column * side + row) as u32;
+    let points = (0..side * side)
+        .map(|i| [(i / side) as f64 * 0.75f64.sqrt(), (i % side) as f64 + 0.5 * (i / side % 2) as f64]);
+    let inner = 1..side - 1;
+    let lists = (0..side * side).map(|i| {
+        let (column, row) = (i / side, i % side);
+        if !inner.contains(&column) || !inner.contains(&row) {
+            return Vec::new();
+        }
+        let shift = column % 2;
+        let mut list = vec![
+            at(column, row - 1),
+            at(column, row + 1),
+            at(column - 1, row + shift - 1),
+            at(column - 1, row + shift),
+            at(column + 1, row + shift - 1),
+            at(column + 1, row + shift),
+        ];
+        // The order of summation differs from one to the next, as in a body without lattice.
+        list.rotate_left(i % 6);
+        list
+    });
+    (points.collect(), lists.collect())
+}
+
+fn reorder(points: &Points, rank: &[u32]) -> Points {
+    rank.iter().map(|&i| points.get(i as usize)).collect()
+}
+
+/// The same jumble each time (a multiplicative generator; D. Knuth, *The Art of Computer Programming*, vol. 2).
+fn shuffle(values: &mut [u32]) {
+    let mut state = 88_172_645_463_325_252u64;
+    for i in (1..values.len()).rev() {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        values.swap(i, ((state >> 33) as usize) % (i + 1));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_lattice_built_directly_is_the_one_a_scene_would_cut() {
+        use crate::flock::body::{self, Cut};
+        let lattice = Lattice::new(LatticeKind::Square { spacing: 1.0 }, [0.0; 2], 0.0);
+        let cut = Cut::Count { columns: 9, rows: 9 };
+        let (body, neighbours) = body::Body::build(lattice, &cut, &FIRST, None).expect("fits");
+        let direct = Body::square(9, &FIRST);
+        assert_eq!(direct.interaction.reference, body.reference);
+        let inner = (1..8).flat_map(|column| (1..8).map(move |row| 9 * column + row));
+        for particle in inner {
+            assert_eq!(direct.interaction.neighbours.of(particle), neighbours.of(particle));
+        }
+        assert_eq!(
+            direct.interaction.neighbours.index.len(),
+            4 * direct.sweep(Update::default()).followers()
+        );
+    }
+
+    #[test]
+    fn the_jumbled_lattice_is_swept_by_lists_whatever_its_order() {
+        for order in [SPATIAL, RANDOM, RENUMBERED] {
+            let mut subject = lists(20, order);
+            assert_eq!(subject.followers, 18 * 18);
+            assert!(subject.time(3) > 0.0);
+        }
+        let (points, lists) = hexagonal(20);
+        for (j, list) in lists.iter().enumerate() {
+            for &k in list {
+                let apart = crate::flock::points::distance(points.get(j), points.get(k as usize));
+                assert!((apart - 1.0).abs() < 1e-12, "{j} sees {k}");
+            }
+        }
+    }
+}

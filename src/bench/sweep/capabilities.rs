@@ -1,0 +1,137 @@
+//! What a scene pays for what it does not name, and for what it names.
+
+use std::time::Instant;
+
+use serde::Serialize;
+
+use super::super::machine::median;
+use crate::continuum::engine::Engine;
+use crate::continuum::plan::Plan;
+use crate::continuum::record::Snapshot;
+use crate::flock::points::Points;
+use crate::flock::role::Role;
+use crate::flock::stencil::{Plane, Stencil};
+use crate::scene;
+
+/// A step of the engine beside the bare loops over the same body.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Capability {
+    pub name: &'static str,
+    /// Median over the repetitions \[s\].
+    pub seconds_per_step: f64,
+    /// The same over that of the loops alone, which know of no capability: the median of the ratios of pairs taken in
+    /// turn \[1\].
+    pub over_bare_loops: f64,
+}
+
+/// What is named, and the keys that name it.
+const NAMED: [(&str, &[&str]); 8] = [
+    ("nothing named", &[]),
+    ("fracture", &["fracture={stretch=3.0}"]),
+    ("feedback", &["rule.feedback={factor=-0.1,reference=\"previous\"}"]),
+    ("Poisson term", &["rule.poisson={k=1e-6,pull=\"x\"}"]),
+    ("frame", &["frame=\"lagged\""]),
+    ("ghosts", &["roles=[{region={kind=\"edge\",side=\"left\"},role=\"ghost\"}]"]),
+    ("recording each step", &[]),
+    ("neighbours by radius", &["neighbours={kind=\"within\",radius=1.5}"]),
+];
+
+/// Times steps of a square body of so many particles along each side, with each capability.
+pub fn measure(side: usize, repetitions: usize, seconds: f64) -> Vec<Capability> {
+    let mut bare = Bare::new(&plan(side, &[]));
+    let steps = bare.steps_in(seconds);
+    NAMED
+        .iter()
+        .map(|&(name, keys)| {
+            let mut engine = Engine::new(plan(side, keys));
+            let records = name == "recording each step";
+            let mut time = || time(&mut engine, steps, records);
+            time();
+            let (mut times, mut ratios): (Vec<f64>, Vec<f64>) = (0..repetitions)
+                .map(|_| (bare.time(steps), time()))
+                .map(|(bare, engine)| (engine, engine / bare))
+                .unzip();
+            Capability { name, seconds_per_step: median(&mut times), over_bare_loops: median(&mut ratios) }
+        })
+        .collect()
+}
+
+/// A square body held all around and stirred, so that every particle moves in every step.
+fn plan(side: usize, keys: &[&str]) -> Plan {
+    let body = format!("body.shape={{kind=\"grid\",columns={side},rows={side}}}");
+    let held = "roles=[{region={kind=\"boundary\"},role=\"clamped\"}]";
+    let mut overrides: Vec<String> =
+        vec!["frame=\"none\"".into(), body, held.into(), "record.probes=[]".into()];
+    overrides.extend(keys.iter().map(|&key| key.to_owned()));
+    let scene = scene::bundled("tension").expect("bundled").load(&overrides);
+    let plan = scene.and_then(|scene| Plan::new(&scene));
+    plan.unwrap_or_else(|error| panic!("the benchmark's own scene is refused: {error}"))
+}
+
+fn stirred(reference: &Points) -> impl Iterator<Item = [f64; 2]> + '_ {
+    reference.iter().map(|[x, y]| [x + 0.01 * (0.1 * y).sin(), y + 0.01 * (0.1 * x).sin()])
+}
+
+fn time(engine: &mut Engine, steps: usize, records: bool) -> f64 {
+    let reference = engine.body().reference.clone();
+    engine.observe(stirred(&reference).enumerate());
+    let (begin, mut kept) = (Instant::now(), None);
+    for _ in 0..steps {
+        engine.advance();
+        if records {
+            kept = Some(Snapshot::of(engine));
+        }
+    }
+    std::hint::black_box(kept);
+    begin.elapsed().as_secs_f64() / steps as f64
+}
+
+/// The loops and nothing else.
+struct Bare {
+    stencil: Stencil,
+    present: Points,
+    next: Points,
+}
+
+impl Bare {
+    fn new(plan: &Plan) -> Self {
+        let follows: Vec<bool> = plan.roles.iter().map(|&role| role == Role::Follower).collect();
+        let present: Points = stirred(&plan.body.reference).collect();
+        Self {
+            stencil: Stencil::compile(&plan.interaction.neighbours, &follows),
+            next: present.clone(),
+            present,
+        }
+    }
+
+    fn steps_in(&mut self, seconds: f64) -> usize {
+        self.time(1);
+        (seconds / self.time(2)).clamp(1.0, 1e6) as usize
+    }
+
+    fn time(&mut self, steps: usize) -> f64 {
+        let begin = Instant::now();
+        for _ in 0..steps {
+            let bands = 0..self.stencil.band_count();
+            let Self { stencil, present, next } = self;
+            for (present, next) in [(&present.x, &mut next.x), (&present.y, &mut next.y)] {
+                let mut plane = Plane { seen_from: 0, present, rest: None, begin: 0, next };
+                stencil.sweep_runs(bands.clone(), 64, &mut plane);
+            }
+            std::mem::swap(present, next);
+        }
+        begin.elapsed().as_secs_f64() / steps as f64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_capability_s_scene_is_accepted_and_steps() {
+        let measured = measure(12, 1, 1e-5);
+        assert_eq!(measured.len(), NAMED.len());
+        assert!(measured.iter().all(|c| c.seconds_per_step > 0.0 && c.over_bare_loops > 0.0));
+    }
+}
