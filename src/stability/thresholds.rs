@@ -51,10 +51,17 @@ pub fn start(subject: &Subject, parameter: Parameter, side: Side) -> (f64, f64) 
 }
 
 /// Where the spectral radius passes 1, from the stable range outwards; `None` where it does nowhere.
-pub fn predict(subject: &Subject, parameter: Parameter, side: Side) -> Option<Predicted> {
+/// `tell` is told of each value before its radius is looked for.
+pub fn predict(
+    subject: &Subject,
+    parameter: Parameter,
+    side: Side,
+    tell: &mut dyn FnMut(f64),
+) -> Option<Predicted> {
     let mut converged = true;
     let mut excess = |value: f64| {
-        let found = subject.with(parameter, value).radius();
+        tell(value);
+        let found = subject.with(parameter, value).radius_from_one();
         converged &= found.converged;
         found.radius - 1.0
     };
@@ -149,7 +156,7 @@ fn stable_stretch(ends: &Ends, damping: f64, side: Side) -> Option<f64> {
 pub fn curve(subject: &Subject, parameter: Parameter, [low, high]: [f64; 2], points: usize) -> Vec<Radius> {
     let at = |k: usize| {
         let value = low + (high - low) * k as f64 / (points.max(2) - 1) as f64;
-        Radius { value, radius: subject.with(parameter, value).radius().radius }
+        Radius { value, radius: subject.with(parameter, value).radius_from_one().radius }
     };
     (0..points).map(at).collect()
 }

@@ -30,7 +30,7 @@ mod system;
 
 use std::time::{Duration, Instant};
 
-pub use choice::choose;
+pub use choice::{choose, choose_unsymmetric};
 pub use error::SolveError;
 pub use system::System;
 
