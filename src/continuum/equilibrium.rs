@@ -119,7 +119,7 @@ fn outcome(plan: Plan, solved: Solved) -> Outcome {
     let mut engine = Engine::new(plan);
     engine.settle(step, &solved.displacement);
     let residual = farthest_from_target(&engine) / spacing;
-    let reason = if solved.converged { StopReason::Equilibrium } else { StopReason::Unsettled };
+    let reason = if solved.is_at_rest() { StopReason::Equilibrium } else { StopReason::Unsettled };
     Outcome { engine, reason, residual, solved: Some(solved) }
 }
 

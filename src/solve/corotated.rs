@@ -106,13 +106,29 @@ pub fn solve(
     let (solver, why) = choose(followers, request)?;
     let step = Request { solver: Choice::This(solver), tolerance: OF_A_STEP, ..*request };
     let rule = Corotated { interaction, weights, body, follows, way, step };
-    let mut newton =
-        Newton { rule: &rule, size: rule.size(), residuals: vec![1.0], times: [Duration::ZERO; 2] };
+    let mut newton = Newton {
+        rule: &rule,
+        size: rule.size(),
+        residuals: vec![1.0],
+        times: [Duration::ZERO; 2],
+        last_step: f64::INFINITY,
+    };
     let displacement = if newton.size == 0.0 { way(1.0) } else { newton.go(tolerance)? };
     let residuals = if newton.size == 0.0 { vec![0.0] } else { newton.residuals };
     let converged = residuals.last().is_some_and(|last| *last <= 2.0 * tolerance);
+    // Where rounding has the last word, the last step is made of what it left.
+    let known_to = (!converged).then_some(newton.last_step);
     let phases = vec![("set-up", newton.times[0]), ("solve", newton.times[1])];
-    Ok(Solved { displacement, solver, why, iterations: residuals.len() - 1, residuals, phases, converged })
+    Ok(Solved {
+        displacement,
+        solver,
+        why,
+        iterations: residuals.len() - 1,
+        residuals,
+        phases,
+        converged,
+        known_to,
+    })
 }
 
 /// A corotated body and what is done to it.
@@ -236,6 +252,8 @@ struct Newton<'a> {
     residuals: Vec<f64>,
     /// Set-up, and solves.
     times: [Duration; 2],
+    /// Size of the last step over that of the displacements \[1\].
+    last_step: f64,
 }
 
 impl Newton<'_> {
@@ -309,6 +327,7 @@ impl Newton<'_> {
         let solved = solve_linear(&system, &self.rule.step)?;
         self.times[0] += assembled + solved.phases[0].1;
         self.times[1] += solved.phases[1].1;
+        self.last_step = norm(&solved.displacement) / norm(u).max(f64::MIN_POSITIVE);
         for (i, by) in solved.displacement.iter().enumerate() {
             let at = u.get(i);
             u.set(i, [at[0] + by[0], at[1] + by[1]]);
