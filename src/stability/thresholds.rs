@@ -63,7 +63,9 @@ pub fn predict(
         tell(value);
         let found = subject.with(parameter, value).radius_from_one();
         converged &= found.converged;
-        found.radius - 1.0
+        // Bounded: a sequential sweep can grow by 1e20 a step, and false position would creep away from there.
+        let excess = found.radius - 1.0;
+        excess / (1.0 + excess.abs())
     };
     let (inside, toward) = start(subject, parameter, side);
     let (mut low, mut stride) = ((inside, excess(inside)), toward);
@@ -92,7 +94,7 @@ fn crossing(f: &mut dyn FnMut(f64) -> f64, low: (f64, f64), high: (f64, f64)) ->
     for _ in 0..100 {
         let c = (a * fb - b * fa) / (fb - fa);
         let fc = f(c);
-        if fc.abs() <= 1e-11 || (b - a).abs() <= 1e-12 * a.abs().max(b.abs()) {
+        if fc.abs() <= 1e-11 || (b - a).abs() <= 1e-12 * a.abs().max(b.abs()).max(1.0) {
             return c;
         }
         if fc < 0.0 {
