@@ -7,6 +7,7 @@ use flockform::continuum::plan::Plan;
 use flockform::continuum::run::{Outcome, StopReason};
 use flockform::flock::points::distance;
 use flockform::scene::{Scene, bundled};
+use flockform::solve::equilibrium::Precision;
 
 fn load(name: &str, overrides: &[&str]) -> Scene {
     let overrides: Vec<String> = overrides.iter().map(|o| (*o).to_owned()).collect();
@@ -178,6 +179,16 @@ fn loads_turn_a_corotated_cantilever_less_than_they_stretch_the_small_strain_one
     let [small, corotated] = ["small", "corotated"].map(|rotation| length(&ended(&scene(rotation))));
     let rest = 20.0 * load("lattice-square", &[]).lattice.spacing();
     assert!(corotated / rest - 1.0 < 0.01 && small / rest - 1.0 > 0.05, "{small} {corotated} {rest}");
+}
+
+#[test]
+fn an_accuracy_of_a_corotated_material_is_computed_in_doubles() {
+    let scene = load("grips", &["equilibrium={accuracy=\"1%\"}"]);
+    let rotated = load("grips", &[COROTATED, "equilibrium={accuracy=\"1%\"}"]);
+    let [single, double] =
+        [&scene, &rotated].map(|s| s.equilibrium.as_ref().expect("asked for").request.precision);
+    assert_eq!((single, double), (Precision::F32, Precision::F64));
+    assert!(ended(&rotated).solved.expect("solved").converged);
 }
 
 fn load_with(name: &str, overrides: &[&str], more: &[&str]) -> Scene {
