@@ -7,6 +7,7 @@ use flockform::continuum::plan::Plan;
 use flockform::continuum::run::{Outcome, StopReason};
 use flockform::flock::points::distance;
 use flockform::scene::{Scene, bundled};
+use flockform::solve::equilibrium::Precision;
 
 fn load(name: &str, overrides: &[&str]) -> Scene {
     let overrides: Vec<String> = overrides.iter().map(|o| (*o).to_owned()).collect();
@@ -34,6 +35,7 @@ fn farthest_apart(a: &Outcome, b: &Outcome) -> f64 {
 
 const MATERIAL: &str = "material={kind=\"isotropic\",young=1000.0,poisson=0.3}";
 const BY_MATERIAL: &str = "rule.mean={kind=\"material\"}";
+const COROTATED: &str = "rule.mean={kind=\"material\",rotation=\"corotated\"}";
 const CELLS: &str = "neighbours={kind=\"cells\"}";
 const SWEPT: [&str; 2] = ["stop.tolerance=1e-13", "stop.steps=200000"];
 
@@ -101,16 +103,62 @@ fn a_body_turned_by_a_right_angle_is_not_strained_by_the_corotated_rule() {
     let roles = format!("roles=[{},{}]", turned("left"), turned("right"));
     for lattice in LATTICES {
         let name = format!("lattice-{lattice}");
-        let corotated = "rule.mean={kind=\"material\",rotation=\"corotated\"}";
-        let overrides = [MATERIAL, corotated, CELLS, &roles, "stop.tolerance=1e-14", "stop.steps=100000"];
-        let outcome = ended(&load(&name, &overrides));
-        let engine = &outcome.engine;
-        for i in 0..engine.body().count() {
-            let [x, y] = engine.body().reference.get(i);
-            let apart = distance(engine.present().get(i), [2.0 - (y - 1.0), 1.0 + (x - 2.0)]);
-            assert!(apart < 1e-10, "{lattice}: particle {} is {apart} away", i + 1);
-            assert!(engine.pe1(i) < 1e-20, "{lattice}");
+        for how in ["stop.tolerance=1e-14", "equilibrium={tolerance=1e-12}"] {
+            let overrides = [MATERIAL, COROTATED, CELLS, &roles, how, "stop.steps=100000"];
+            let outcome = ended(&load(&name, &overrides));
+            let engine = &outcome.engine;
+            for i in 0..engine.body().count() {
+                let [x, y] = engine.body().reference.get(i);
+                let apart = distance(engine.present().get(i), [2.0 - (y - 1.0), 1.0 + (x - 2.0)]);
+                assert!(apart < 1e-10, "{lattice}, {how}: particle {} is {apart} away", i + 1);
+                assert!(engine.pe1(i) < 1e-20, "{lattice}, {how}");
+            }
         }
+    }
+}
+
+#[test]
+fn a_corotated_material_is_solved_to_where_it_is_swept_on_every_lattice() {
+    // The right end is carried around and turned, so that axes differ all along the body.
+    let bent = "roles=[{region={kind=\"edge\",side=\"left\"},role=\"clamped\"},{region={kind=\"edge\",side=\"right\"},\
+                role=\"leader\",motion={kind=\"affine\",about=[0.0,4.0],rotate=50.0,stretch=[1.02,1.01],steps=60}}]";
+    let pushed = "loads=[{kind=\"body\",force=[1.0,-2.0]}]";
+    for lattice in LATTICES {
+        assert_alike(&format!("lattice-{lattice}"), &[MATERIAL, COROTATED, CELLS, bent, pushed], 1e-8);
+    }
+}
+
+#[test]
+fn a_corotated_cantilever_bends_as_far_as_it_is_swept_and_newton_s_steps_are_few() {
+    let roles = "roles=[{region={kind=\"edge\",side=\"left\"},role=\"clamped\"}]";
+    let load = "loads=[{kind=\"traction\",region={kind=\"edge\",side=\"right\"},traction=[0.0,-20.0]}]";
+    let shape = "body.shape={kind=\"grid\",columns=9,rows=3}";
+    let overrides = [MATERIAL, COROTATED, CELLS, roles, load, shape];
+    assert_alike("lattice-square", &overrides, 1e-8);
+    let solved = ended(&load_with("lattice-square", &overrides, &["equilibrium={}"])).solved.expect("solved");
+    assert!(solved.converged && solved.iterations < 25, "{:?}", solved.residuals);
+    // Near the end each step squares the residual, as only the true derivative makes it.
+    let [.., before, last] = solved.residuals[..] else { panic!("{:?}", solved.residuals) };
+    assert!(before > 1e-8 && last < 1e-10, "{:?}", solved.residuals);
+}
+
+#[test]
+fn a_body_turned_all_the_way_round_is_solved_along_its_way() {
+    let turned = |side: &str| {
+        format!(
+            "{{region={{kind=\"edge\",side=\"{side}\"}},role=\"leader\",\
+             motion={{kind=\"affine\",about=[2.0,1.0],rotate=200.0,steps=60}}}}"
+        )
+    };
+    let roles = format!("roles=[{},{}]", turned("left"), turned("right"));
+    let asked = "equilibrium={tolerance=1e-13}";
+    let outcome =
+        ended(&load("lattice-hexagonal", &[MATERIAL, COROTATED, CELLS, &roles, asked, "stop.steps=60"]));
+    let (sin, cos) = 200f64.to_radians().sin_cos();
+    for (p, x) in outcome.engine.body().reference.iter().zip(outcome.engine.present().iter()) {
+        let [a, b] = [p[0] - 2.0, p[1] - 1.0];
+        let apart = distance(x, [2.0 + cos * a - sin * b, 1.0 + sin * a + cos * b]);
+        assert!(apart < 1e-9, "{apart}");
     }
 }
 
@@ -133,6 +181,16 @@ fn loads_turn_a_corotated_cantilever_less_than_they_stretch_the_small_strain_one
     assert!(corotated / rest - 1.0 < 0.01 && small / rest - 1.0 > 0.05, "{small} {corotated} {rest}");
 }
 
+#[test]
+fn an_accuracy_of_a_corotated_material_is_computed_in_doubles() {
+    let scene = load("grips", &["equilibrium={accuracy=\"1%\"}"]);
+    let rotated = load("grips", &[COROTATED, "equilibrium={accuracy=\"1%\"}"]);
+    let [single, double] =
+        [&scene, &rotated].map(|s| s.equilibrium.as_ref().expect("asked for").request.precision);
+    assert_eq!((single, double), (Precision::F32, Precision::F64));
+    assert!(ended(&rotated).solved.expect("solved").converged);
+}
+
 fn load_with(name: &str, overrides: &[&str], more: &[&str]) -> Scene {
     load(name, &[overrides, more].concat())
 }
@@ -143,9 +201,10 @@ fn what_has_no_equilibrium_to_solve_for_is_refused_with_its_place() {
     for (overrides, words) in [
         (vec![asked, "rule.mean={kind=\"distance\"}"], "rule.mean = { kind = \"distance\" }"),
         (
-            vec![asked, MATERIAL, CELLS, "rule.mean={kind=\"material\",rotation=\"corotated\"}"],
-            "corotated material",
+            vec!["equilibrium={solver=\"multigrid\"}", MATERIAL, CELLS, COROTATED],
+            "axes that turn from particle to particle",
         ),
+        (vec![asked, MATERIAL, CELLS, COROTATED, "rule.feedback={factor=-0.1}"], "rule.feedback"),
         (vec![asked, "roles[0].from=7"], "roles[0].from"),
         (vec![asked, "fracture={stretch=2.0}"], "fracture"),
         (vec![asked, "roles=[]"], "held"),

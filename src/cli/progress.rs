@@ -14,6 +14,47 @@ pub enum Progress {
     Lines { steps: usize, last: Instant },
 }
 
+/// What a study is about to do: a line that changes on a terminal, one every few seconds in a pipe.
+pub enum Stages {
+    Silent,
+    Spinner(ProgressBar),
+    Lines { last: Option<Instant> },
+}
+
+impl Stages {
+    pub fn new(quiet: bool) -> Self {
+        if quiet {
+            return Stages::Silent;
+        }
+        if !std::io::stderr().is_terminal() {
+            return Stages::Lines { last: None };
+        }
+        let spinner = ProgressBar::new_spinner();
+        spinner.enable_steady_tick(Duration::from_millis(100));
+        Stages::Spinner(spinner)
+    }
+
+    pub fn next(&mut self, what: &str) {
+        tracing::debug!("{what}");
+        match self {
+            Stages::Silent => {}
+            Stages::Spinner(spinner) => spinner.set_message(what.to_owned()),
+            Stages::Lines { last } => {
+                if last.is_none_or(|last| last.elapsed() >= BETWEEN_LINES) {
+                    eprintln!("{what}");
+                    *last = Some(Instant::now());
+                }
+            }
+        }
+    }
+
+    pub fn finish(self) {
+        if let Stages::Spinner(spinner) = self {
+            spinner.finish_and_clear();
+        }
+    }
+}
+
 impl Progress {
     pub fn new(quiet: bool, steps: usize) -> Self {
         if quiet {

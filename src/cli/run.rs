@@ -218,8 +218,11 @@ fn closing_words(
     if let Some(solved) = &outcome.solved {
         let phases: Vec<String> =
             solved.phases.iter().map(|(name, time)| format!("{name} {:.3} s", time.as_secs_f64())).collect();
+        let rounding = solved.known_to.map_or(String::new(), |error| {
+            format!(" (what rounding leaves: displacements are known to about {error:.0e} of themselves)")
+        });
         words += &format!(
-            "{}, {}: {} iterations to a residual force of {:.1e} of the load, {}\n",
+            "{}, {}: {} iterations to a residual force of {:.1e} of the load{rounding}, {}\n",
             solved.solver,
             solved.why,
             solved.iterations,

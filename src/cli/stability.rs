@@ -9,6 +9,7 @@ use flockform::stability::extremes::plan;
 use flockform::stability::study::{Options, run};
 
 use super::output::OutputArguments;
+use super::progress::Stages;
 use super::{FAILED, Refusal, SceneArguments, print};
 
 #[derive(Debug, Args)]
@@ -38,7 +39,10 @@ pub fn stability(arguments: &StabilityArguments) -> Result<ExitCode, Refusal> {
     let name = scene.name;
     let folder = arguments.output.folder(&format!("{name}-stability"))?;
     let load = |more: &[String]| arguments.scene.load_scene(more);
-    let study = run(&load, options, &mut |next| tracing::info!("{next}"))?;
+    let mut stages = Stages::new(arguments.output.quiet);
+    let study = run(&load, options, &mut |next| stages.next(next));
+    stages.finish();
+    let study = study?;
     write_stability(&folder, &study)?;
     let kept = folder.commit()?;
     if arguments.json {

@@ -7,6 +7,7 @@ use flockform::export::trade::write_trade;
 use flockform::trade::{Grid, run};
 
 use super::output::OutputArguments;
+use super::progress::Stages;
 use super::{Refusal, SceneArguments, print};
 
 #[derive(Debug, Args)]
@@ -41,7 +42,10 @@ pub fn trade(arguments: &TradeArguments) -> Result<ExitCode, Refusal> {
     let name = arguments.scene.load([])?.name;
     let folder = arguments.output.folder(&format!("{name}-trade"))?;
     let load = |more: &[String]| arguments.scene.load_scene(more);
-    let study = run(&load, &grid, &mut |setting| tracing::info!("{setting}"))?;
+    let mut stages = Stages::new(arguments.output.quiet);
+    let study = run(&load, &grid, &mut |setting| stages.next(&setting.to_string()));
+    stages.finish();
+    let study = study?;
     write_trade(&folder, &study)?;
     let kept = folder.commit()?;
     if arguments.json {

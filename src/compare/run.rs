@@ -63,7 +63,7 @@ pub fn truth_of(scene: &Scene, refine: Option<usize>) -> Result<SceneTruth, Scen
         ));
     };
     let changes = layout.role_changes(scene, None)?;
-    let held = held(&changes, &layout.body, scene.stop.steps);
+    let held = held(&changes, &layout.body, scene.stop.steps as f64);
     let loads = layout.loads(scene)?;
     let reference = &layout.body.reference;
     let setting = Setting { cells, reference, elastic: &elastic, held: &held, loads: &loads };

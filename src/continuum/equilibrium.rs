@@ -9,6 +9,7 @@ use super::run::{Outcome, StopReason, Watch, run_watched};
 use crate::flock::points::{Points, distance};
 use crate::flock::role::Role;
 use crate::scene::{Scene, SceneError};
+use crate::solve::corotated::{self, CorotatedError};
 use crate::solve::equilibrium::{Request, SolveError, Solved, Solver, System, choose, solve};
 use crate::solve::linear::{NotLinear, system};
 
@@ -42,8 +43,15 @@ pub fn come_to_rest_watched(scene: &Scene, plan: Plan, watch: Watch<'_>) -> Resu
 /// # Errors
 /// Names what in the scene has no equilibrium, or none that the solver asked for can find.
 pub fn settle(scene: &Scene, request: &Request, plan: Plan) -> Result<Outcome, SceneError> {
-    let system = of_plan(scene, &plan)?;
-    let solved = solve(&system, request).map_err(|error| refuse(scene, &error))?;
+    let solved = if corotated::is_corotated(&plan.interaction) {
+        let steps = steps_of_the_way(&plan) as f64;
+        let way = |part: f64| held_after(&plan, part * steps);
+        corotated::solve(&plan.interaction, &plan.body, follows(&plan), &way, request)
+            .map_err(|error| refuse_corotated(scene, &error))?
+    } else {
+        let system = of_plan(scene, &plan)?;
+        solve(&system, request).map_err(|error| refuse(scene, &error))?
+    };
     Ok(outcome(plan, solved))
 }
 
@@ -52,7 +60,28 @@ pub fn settle(scene: &Scene, request: &Request, plan: Plan) -> Result<Outcome, S
 /// # Errors
 /// As [`settle`], as far as can be told without solving.
 pub fn foresee(scene: &Scene, request: &Request, plan: &Plan) -> Result<(Solver, String), SceneError> {
+    if corotated::is_corotated(&plan.interaction) {
+        let followers = follows(plan).into_iter().filter(|&follows| follows).count();
+        return corotated::choose(followers, request).map_err(|error| refuse_corotated(scene, &error));
+    }
     Ok(choose(&of_plan(scene, plan)?, request))
+}
+
+fn follows(plan: &Plan) -> Vec<bool> {
+    plan.roles.iter().map(|&role| role == Role::Follower).collect()
+}
+
+/// Steps until the last leader is where it is at the last step.
+fn steps_of_the_way(plan: &Plan) -> usize {
+    let motions = plan.changes.iter().filter_map(|change| change.motion.as_ref());
+    let last = motions.map(|motion| motion.duration().unwrap_or(usize::MAX)).max();
+    last.unwrap_or(0).min(plan.stop.steps)
+}
+
+/// Where those who do not follow are after so many steps; zero for the others \[length\], shape \[count\].
+fn held_after(plan: &Plan, steps: f64) -> Points {
+    let at_rest = |d: Option<[f64; 2]>| d.unwrap_or_default();
+    held(&plan.changes, &plan.body, steps).into_iter().map(at_rest).collect()
 }
 
 /// The linear system of a plan: leaders where they are at the last step.
@@ -60,10 +89,8 @@ pub fn foresee(scene: &Scene, request: &Request, plan: &Plan) -> Result<(Solver,
 /// # Errors
 /// Names the part of the rule that is not linear.
 pub fn of_plan(scene: &Scene, plan: &Plan) -> Result<System, SceneError> {
-    let follows = plan.roles.iter().map(|&role| role == Role::Follower).collect();
-    let at_rest = |d: Option<[f64; 2]>| d.unwrap_or_default();
-    let held = held(&plan.changes, &plan.body, plan.stop.steps).into_iter().map(at_rest).collect();
-    system(&plan.interaction, &plan.body, follows, held).map_err(|error| {
+    let held = held_after(plan, plan.stop.steps as f64);
+    system(&plan.interaction, &plan.body, follows(plan), held).map_err(|error| {
         let (key, help) = match error {
             NotLinear::Rule { .. } => {
                 ("rule.mean", "leave [equilibrium] out: sweeps find where such a rule comes to rest")
@@ -73,6 +100,21 @@ pub fn of_plan(scene: &Scene, plan: &Plan) -> Result<System, SceneError> {
         };
         scene.refuse(key, format!("no equilibrium can be solved for: {error}"), help)
     })
+}
+
+fn refuse_corotated(scene: &Scene, error: &CorotatedError) -> SceneError {
+    let (key, help) = match error {
+        CorotatedError::Solve(error) => return refuse(scene, error),
+        CorotatedError::NotSymmetric { .. } => {
+            ("equilibrium.solver", "take direct, or leave the solver out: \"auto\" does")
+        }
+        CorotatedError::Feedback => ("rule.feedback", "leave it out: it does not move the place of rest"),
+        CorotatedError::Unsettled { .. } => {
+            ("equilibrium", "load it less, or leave [equilibrium] out to step there")
+        }
+        CorotatedError::NotLinear(_) => ("rule", "leave [equilibrium] out to step"),
+    };
+    scene.refuse(key, error.to_string(), help)
 }
 
 fn refuse(scene: &Scene, error: &SolveError) -> SceneError {
@@ -85,7 +127,7 @@ fn outcome(plan: Plan, solved: Solved) -> Outcome {
     let mut engine = Engine::new(plan);
     engine.settle(step, &solved.displacement);
     let residual = farthest_from_target(&engine) / spacing;
-    let reason = if solved.converged { StopReason::Equilibrium } else { StopReason::Unsettled };
+    let reason = if solved.is_at_rest() { StopReason::Equilibrium } else { StopReason::Unsettled };
     Outcome { engine, reason, residual, solved: Some(solved) }
 }
 

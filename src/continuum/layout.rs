@@ -209,13 +209,13 @@ impl Layout {
 
 /// Displacement \[length\] of everybody who does not follow, at `step`; `None` for followers and for leaders
 /// led by a truth that is not known, shape \[count\]. Only roles that hold from the start count.
-pub fn held(changes: &[RoleChange], body: &Body, step: usize) -> Vec<Option<[f64; 2]>> {
+pub fn held(changes: &[RoleChange], body: &Body, step: f64) -> Vec<Option<[f64; 2]>> {
     let mut held = vec![None; body.count()];
     for change in changes.iter().filter(|change| change.from <= 1 && change.when.is_none()) {
         for (which, &i) in change.particles.iter().enumerate() {
             let base = body.reference.get(i);
             held[i] = match (change.role, &change.motion) {
-                (Role::Leader, Some(motion)) => Some(motion.displacement(step as f64, which, base)),
+                (Role::Leader, Some(motion)) => Some(motion.displacement(step, which, base)),
                 (Role::Clamped, _) => Some([0.0; 2]),
                 _ => None,
             };

@@ -14,7 +14,7 @@ use crate::solve::sweep::Order;
 /// Why a run ended.
 #[derive(Clone, Debug, PartialEq)]
 pub enum StopReason {
-    /// Nothing moved farther in a step than the tolerance, or the solver reached its own.
+    /// Nothing moved farther in a step than the tolerance, or the solver reached its own, or what rounding allows.
     Equilibrium,
     /// The solver ended short of its tolerance.
     Unsettled,

@@ -117,6 +117,9 @@ pub struct Equilibrium {
     pub converged: bool,
     /// Residual force over the load's, at the end \[1\].
     pub residual: f64,
+    /// Where rounding ended the solve short of its tolerance: estimated relative error of the displacements \[1\].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub known_to: Option<f64>,
     /// Seconds by phase.
     pub phases: BTreeMap<&'static str, f64>,
 }
@@ -182,6 +185,7 @@ impl Equilibrium {
             iterations: solved.iterations,
             converged: solved.converged,
             residual: solved.residuals.last().copied().unwrap_or_default(),
+            known_to: solved.known_to,
             phases: solved.phases.iter().map(|(name, time)| (*name, time.as_secs_f64())).collect(),
         }
     }

@@ -27,6 +27,15 @@ pub enum Wanted {
     Ends,
 }
 
+/// How well an eigenvalue has to be known.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Accuracy {
+    /// To ten digits.
+    Full,
+    /// To this part of how far its modulus is from 1, or to ten digits: enough to tell growth from decay.
+    FromOne(f64),
+}
+
 /// What was found.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Found {
@@ -46,16 +55,31 @@ const TOLERANCE: f64 = 1e-10;
 const MOST_VECTORS: usize = 240;
 const MOST_NUMBERS: usize = 1 << 25;
 
+/// Starts in which the residual has to halve: where it does not, too many eigenvalues lie as far out (those of
+/// an over-relaxed sweep stand on a circle), and no number of sweeps tells them apart.
+const PATIENCE: usize = 8;
+
+impl Accuracy {
+    /// Largest residual of an eigenvalue of an operator of this size.
+    fn of(self, ritz: &Ritz, scale: f64) -> f64 {
+        match self {
+            Accuracy::Full => TOLERANCE * scale,
+            Accuracy::FromOne(part) => (part * (ritz.value.norm() - 1.0).abs()).max(TOLERANCE * scale),
+        }
+    }
+}
+
 /// Eigenvalues of `apply`, which writes `A v` for its first argument into its second, from `start`.
 pub fn eigenvalues(
     apply: &mut dyn FnMut(&[f64], &mut [f64]),
     start: Vec<f64>,
-    wanted: Wanted,
+    (wanted, accuracy): (Wanted, Accuracy),
     most_applications: usize,
 ) -> Found {
     let most = MOST_VECTORS.min((MOST_NUMBERS / start.len().max(1)).max(16));
     let mut krylov = Krylov::new(start);
     let (mut applications, mut check_at) = (0, 6);
+    let mut left: Vec<f64> = Vec::new();
     loop {
         let invariant = krylov.expand(apply);
         applications += 1;
@@ -69,8 +93,12 @@ pub fn eigenvalues(
             let unknown = Ritz { value: Complex::new(f64::NAN, 0.0), residual: f64::INFINITY };
             return Found { eigenvalues: vec![unknown], applications, converged: false };
         };
-        let converged = invariant || pairs.iter().all(|(ritz, _)| ritz.residual <= TOLERANCE * scale);
-        if converged || over {
+        let converged = invariant || pairs.iter().all(|(ritz, _)| ritz.residual <= accuracy.of(ritz, scale));
+        let stuck = size == most && {
+            left.push(pairs.iter().map(|(ritz, _)| ritz.residual).fold(0.0, f64::max));
+            left.len() > PATIENCE && left[left.len() - 1] > 0.5 * left[left.len() - 1 - PATIENCE]
+        };
+        if converged || over || stuck {
             let eigenvalues = pairs.into_iter().map(|(ritz, _)| ritz).collect();
             return Found { eigenvalues, applications, converged };
         }
@@ -204,7 +232,7 @@ mod tests {
             to.copy_from_slice((matrix * DVector::from_column_slice(from)).as_slice());
         };
         let start = (0..matrix.nrows()).map(|k| 1.0 + (0.7391 * k as f64).sin()).collect();
-        eigenvalues(&mut apply, start, wanted, 20_000)
+        eigenvalues(&mut apply, start, (wanted, Accuracy::Full), 20_000)
     }
 
     #[test]
@@ -243,7 +271,30 @@ mod tests {
             to.copy_from_slice((&chain * DVector::from_column_slice(from)).as_slice());
         };
         let start = (0..400).map(|k| 1.0 + (0.7391 * f64::from(k)).sin()).collect();
-        assert!(!eigenvalues(&mut apply, start, Wanted::Modulus, 20).converged);
+        assert!(!eigenvalues(&mut apply, start, (Wanted::Modulus, Accuracy::Full), 20).converged);
+    }
+
+    #[test]
+    fn eigenvalues_on_a_circle_are_given_up_and_one_outside_it_is_found() {
+        // A turn of 900 places shrunk to 0.95, whose eigenvalues all have that modulus; then one of 1.02 with it.
+        let apply = |outside: f64| {
+            move |from: &[f64], to: &mut [f64]| {
+                (0..900).for_each(|k| to[k] = 0.95 * from[(k + 1) % 900]);
+                to[900] = outside * from[900];
+            }
+        };
+        let find = |outside: f64, accuracy| {
+            let start = (0..901).map(|k| crate::solve::spectrum::scatter(k as u64)).collect();
+            eigenvalues(&mut apply(outside), start, (Wanted::Modulus, accuracy), 200_000)
+        };
+        let circle = find(0.5, Accuracy::Full);
+        assert!(!circle.converged && circle.applications < 20_000, "{}", circle.applications);
+        let outside = find(1.02, Accuracy::FromOne(0.01));
+        assert!(
+            outside.converged && (outside.eigenvalues[0].value.norm() - 1.02).abs() < 2e-4,
+            "{outside:?}"
+        );
+        assert!(outside.applications < find(1.02, Accuracy::Full).applications);
     }
 
     #[test]

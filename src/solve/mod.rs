@@ -2,6 +2,7 @@
 
 pub mod affine_weights;
 pub mod arnoldi;
+pub mod corotated;
 pub mod equilibrium;
 pub mod field;
 pub mod linear;

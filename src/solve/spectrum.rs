@@ -4,7 +4,7 @@
 //! itself to displacements from a reference at zero, so no matrix is built. Frame points are part of `d`:
 //! where they lag they are what the sweep remembers of the step before, and A is not symmetric.
 
-use super::arnoldi::{Ritz, Wanted, eigenvalues};
+use super::arnoldi::{Accuracy, Ritz, Wanted, eigenvalues};
 use super::sweep::{Sweep, Update};
 use crate::flock::frame::Frame;
 use crate::flock::interaction::Interaction;
@@ -49,9 +49,20 @@ pub fn spectral_radius(
     most_iterations: usize,
 ) -> Option<SpectralRadius> {
     let linear = LinearSweep::new(interaction, frame, roles, update)?;
-    let found = linear.eigenvalues(Wanted::Modulus, most_iterations);
-    let radius = found.0[0].value.norm();
-    Some(SpectralRadius { radius, iterations: found.1, converged: found.2 })
+    Some(linear.radius(Accuracy::Full, most_iterations))
+}
+
+/// [`spectral_radius`] as well as it takes to tell on which side of 1 it is, and about how far: to a
+/// hundredth of that, which far from 1 takes a fraction of the sweeps.
+pub fn radius_from_one(
+    interaction: &Interaction,
+    frame: Option<&Frame>,
+    roles: &[Role],
+    update: Update,
+    most_iterations: usize,
+) -> Option<SpectralRadius> {
+    let linear = LinearSweep::new(interaction, frame, roles, update)?;
+    Some(linear.radius(Accuracy::FromOne(0.01), most_iterations))
 }
 
 /// Ends of the sweep's spectrum; `None` as for [`spectral_radius`].
@@ -63,7 +74,7 @@ pub fn spectral_ends(
     most_iterations: usize,
 ) -> Option<Ends> {
     let linear = LinearSweep::new(interaction, frame, roles, update)?;
-    let (found, iterations, converged) = linear.eigenvalues(Wanted::Ends, most_iterations);
+    let (found, iterations, converged) = linear.eigenvalues((Wanted::Ends, Accuracy::Full), most_iterations);
     // One of them only where nothing could be found at all.
     let (low, high) = (found[0].value, found[found.len() - 1].value);
     let are_real = [low, high].iter().all(|v| v.im.abs() <= 1e-9 * low.norm().max(high.norm()));
@@ -101,7 +112,12 @@ impl<'a> LinearSweep<'a> {
         Some(Self { interaction, frame, roles, sweep })
     }
 
-    fn eigenvalues(&self, wanted: Wanted, most: usize) -> (Vec<Ritz>, usize, bool) {
+    fn radius(&self, accuracy: Accuracy, most: usize) -> SpectralRadius {
+        let (found, iterations, converged) = self.eigenvalues((Wanted::Modulus, accuracy), most);
+        SpectralRadius { radius: found[0].value.norm(), iterations, converged }
+    }
+
+    fn eigenvalues(&self, wanted: (Wanted, Accuracy), most: usize) -> (Vec<Ritz>, usize, bool) {
         let count = self.roles.len();
         // Of the body's own size where the reference is there, so that it does not swallow them.
         let unit = self.interaction.rule.poisson.map_or(1.0, |poisson| poisson.half_width);

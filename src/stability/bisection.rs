@@ -136,16 +136,17 @@ fn is_settled(sizes: &[f64]) -> bool {
 
 /// Where between a value at which the body comes back and one beyond it growth begins, to `within`.
 /// `toward` is the direction to look in and the first stride; `None` where nothing grows for thousands of
-/// strides.
+/// strides. `tell` is told of each value before its run.
 pub fn find(
     subject: &Subject,
     parameter: Parameter,
     (inside, toward): (f64, f64),
-    within: f64,
-    most_steps: usize,
+    (within, most_steps): (f64, usize),
+    tell: &mut dyn FnMut(f64),
 ) -> Option<Found> {
     let mut runs = Vec::new();
     let mut grows = |value: f64| {
+        tell(value);
         let run = growth(subject, parameter, value, most_steps);
         runs.push(run);
         run.grows()

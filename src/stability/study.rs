@@ -107,17 +107,11 @@ fn linear(subject: &Subject, effort: Effort, tell: &mut dyn FnMut(&str)) -> Line
     ];
     let thresholds: Vec<Threshold> = asked
         .into_iter()
-        .map(|(parameter, side)| {
-            tell(&format!("the {} threshold of the {}", side.name(), parameter.name()));
-            threshold(subject, parameter, side, effort)
-        })
+        .map(|(parameter, side)| threshold(subject, parameter, side, effort, tell))
         .collect();
     let sweeps = Parameter::ALL
         .into_iter()
-        .map(|parameter| {
-            tell(&format!("growth over the {}", parameter.name()));
-            sweep(subject, parameter, &thresholds, effort)
-        })
+        .map(|parameter| sweep(subject, parameter, &thresholds, effort, tell))
         .collect();
     Linear {
         particles: subject.particles(),
@@ -131,22 +125,43 @@ fn linear(subject: &Subject, effort: Effort, tell: &mut dyn FnMut(&str)) -> Line
     }
 }
 
-fn threshold(subject: &Subject, parameter: Parameter, side: Side, effort: Effort) -> Threshold {
+fn threshold(
+    subject: &Subject,
+    parameter: Parameter,
+    side: Side,
+    effort: Effort,
+    tell: &mut dyn FnMut(&str),
+) -> Threshold {
+    let what = format!("the {} threshold of the {}", side.name(), parameter.name());
+    tell(&what);
     let neutral = match parameter {
         Parameter::Feedback => 0.0,
         Parameter::Damping => 1.0,
     };
-    let margin = (subject.with(parameter, neutral).radius().radius - 1.0).abs();
+    let margin = (subject.with(parameter, neutral).radius_from_one().radius - 1.0).abs();
     let tolerance = (1e-3 * margin).max(1e-6);
     let steps = effort.steps(subject.particles());
-    let found = find(subject, parameter, start(subject, parameter, side), tolerance / 8.0, steps);
+    let from = start(subject, parameter, side);
+    let found = find(subject, parameter, from, (tolerance / 8.0, steps), &mut |value| {
+        tell(&format!("{what}: a run at {value}"));
+    });
     let settled = found.as_ref().is_none_or(|found| found.settled);
     let tolerance = if settled { tolerance } else { tolerance.max(4.0 / steps as f64) };
-    Threshold { parameter, side, predicted: predict(subject, parameter, side), found, tolerance }
+    let predicted =
+        predict(subject, parameter, side, &mut |value| tell(&format!("{what}: the spectrum at {value}")));
+    Threshold { parameter, side, predicted, found, tolerance }
 }
 
 /// Runs and spectra from one threshold to the other and a little beyond.
-fn sweep(subject: &Subject, parameter: Parameter, thresholds: &[Threshold], effort: Effort) -> Sweep {
+fn sweep(
+    subject: &Subject,
+    parameter: Parameter,
+    thresholds: &[Threshold],
+    effort: Effort,
+    tell: &mut dyn FnMut(&str),
+) -> Sweep {
+    let what = format!("growth over the {}", parameter.name());
+    tell(&what);
     let mut known: Vec<f64> = thresholds
         .iter()
         .filter(|threshold| threshold.parameter == parameter)
@@ -163,8 +178,12 @@ fn sweep(subject: &Subject, parameter: Parameter, thresholds: &[Threshold], effo
     let range = [low, high + beyond];
     let runs = (0..effort.samples)
         .map(|k| range[0] + (range[1] - range[0]) * k as f64 / (effort.samples.max(2) - 1) as f64)
-        .map(|value| growth(subject, parameter, value, effort.steps(subject.particles()) / 4))
+        .map(|value| {
+            tell(&format!("{what}: a run at {value}"));
+            growth(subject, parameter, value, effort.steps(subject.particles()) / 4)
+        })
         .collect();
+    tell(&format!("{what}: spectra"));
     let spectrum = curve(subject, parameter, range, 6 * effort.samples + 1);
     Sweep { parameter, present: subject.present(parameter), spectrum, runs }
 }
@@ -238,8 +257,10 @@ impl fmt::Display for Linear {
             let shown = |value: Option<f64>| value.map_or("nowhere".into(), |v| format!("{v:.8}"));
             let apart = predicted.zip(found).map_or(String::new(), |(p, f)| format!("{:.1e}", (p - f).abs()));
             let settled = threshold.found.as_ref().is_none_or(|found| found.settled);
+            let foretold = threshold.predicted.as_ref().is_none_or(|predicted| predicted.converged);
             let verdict = match (threshold.agrees(), settled) {
                 (false, _) => format!("  THEY DISAGREE by more than {:.1e}", threshold.tolerance),
+                (true, _) if !foretold => "  a spectrum on the way did not settle".into(),
                 (true, false) => format!("  too slow to settle: told to {:.1e}", threshold.tolerance),
                 (true, true) => String::new(),
             };

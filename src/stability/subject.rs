@@ -7,7 +7,7 @@ use crate::continuum::plan::Plan;
 use crate::flock::role::Role;
 use crate::flock::rules::{Feedback, FeedbackReference, Mean, Rotation};
 use crate::scene::{Scene, SceneError};
-use crate::solve::spectrum::{Ends, SpectralRadius, spectral_ends, spectral_radius};
+use crate::solve::spectrum::{Ends, SpectralRadius, radius_from_one, spectral_ends, spectral_radius};
 use crate::solve::sweep::Order;
 
 /// What is varied.
@@ -123,6 +123,14 @@ impl Subject {
         let engine = self.engine();
         let frame = self.plan.body.frame.as_ref();
         spectral_radius(engine.interaction(), frame, engine.roles(), engine.update(), MOST_SWEEPS)
+            .expect("linear, and somebody follows")
+    }
+
+    /// The same as well as it takes to tell growth from decay.
+    pub fn radius_from_one(&self) -> SpectralRadius {
+        let engine = self.engine();
+        let frame = self.plan.body.frame.as_ref();
+        radius_from_one(engine.interaction(), frame, engine.roles(), engine.update(), MOST_SWEEPS)
             .expect("linear, and somebody follows")
     }
 

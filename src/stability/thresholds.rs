@@ -51,12 +51,21 @@ pub fn start(subject: &Subject, parameter: Parameter, side: Side) -> (f64, f64) 
 }
 
 /// Where the spectral radius passes 1, from the stable range outwards; `None` where it does nowhere.
-pub fn predict(subject: &Subject, parameter: Parameter, side: Side) -> Option<Predicted> {
+/// `tell` is told of each value before its radius is looked for.
+pub fn predict(
+    subject: &Subject,
+    parameter: Parameter,
+    side: Side,
+    tell: &mut dyn FnMut(f64),
+) -> Option<Predicted> {
     let mut converged = true;
     let mut excess = |value: f64| {
-        let found = subject.with(parameter, value).radius();
+        tell(value);
+        let found = subject.with(parameter, value).radius_from_one();
         converged &= found.converged;
-        found.radius - 1.0
+        // Bounded: a sequential sweep can grow by 1e20 a step, and false position would creep away from there.
+        let excess = found.radius - 1.0;
+        excess / (1.0 + excess.abs())
     };
     let (inside, toward) = start(subject, parameter, side);
     let (mut low, mut stride) = ((inside, excess(inside)), toward);
@@ -85,7 +94,7 @@ fn crossing(f: &mut dyn FnMut(f64) -> f64, low: (f64, f64), high: (f64, f64)) ->
     for _ in 0..100 {
         let c = (a * fb - b * fa) / (fb - fa);
         let fc = f(c);
-        if fc.abs() <= 1e-11 || (b - a).abs() <= 1e-12 * a.abs().max(b.abs()) {
+        if fc.abs() <= 1e-11 || (b - a).abs() <= 1e-12 * a.abs().max(b.abs()).max(1.0) {
             return c;
         }
         if fc < 0.0 {
@@ -149,7 +158,7 @@ fn stable_stretch(ends: &Ends, damping: f64, side: Side) -> Option<f64> {
 pub fn curve(subject: &Subject, parameter: Parameter, [low, high]: [f64; 2], points: usize) -> Vec<Radius> {
     let at = |k: usize| {
         let value = low + (high - low) * k as f64 / (points.max(2) - 1) as f64;
-        Radius { value, radius: subject.with(parameter, value).radius().radius }
+        Radius { value, radius: subject.with(parameter, value).radius_from_one().radius }
     };
     (0..points).map(at).collect()
 }

@@ -3,7 +3,7 @@
 use flockform::bench::equilibrium::beam::Plate;
 use flockform::flock::points::Points;
 use flockform::solve::equilibrium::{
-    Choice, Precision, Request, SINGLE_FLOOR, Solver, System, choose, solve,
+    Choice, Precision, Request, SINGLE_FLOOR, Solved, Solver, System, choose, solve,
 };
 
 use crate::support::{Feel, KINDS, body, by, difference, operator, plate, solved, system};
@@ -34,6 +34,7 @@ fn a_solve_that_runs_out_of_iterations_says_so() {
         let request = Request { most_iterations: 3, ..by(solver, 1e-14) };
         let solved = solve(&system, &request).expect("no error");
         assert!(!solved.converged && solved.iterations == 3, "{solver} {}", solved.iterations);
+        assert!(!solved.is_at_rest(), "{solver}");
     }
 }
 
@@ -109,4 +110,23 @@ fn a_residual_that_rounding_has_left_behind_is_told_as_it_is() {
     let found = solve(&beam(60, 6), &by(Solver::ConjugateGradients, 1e-18)).expect("solvable");
     let [.., before, last] = found.residuals[..] else { panic!("iterated") };
     assert!(before < 1e-15 && last > 1e-15 && !found.converged, "{before:e} {last:e}");
+}
+
+#[test]
+fn what_rounding_leaves_of_a_slender_body_is_told_with_the_error_it_makes() {
+    for columns in [300, 1000] {
+        let system = beam(columns, 1);
+        let [direct, multigrid] = [Solver::Direct, Solver::Multigrid]
+            .map(|solver| solve(&system, &by(solver, 1e-10)).expect("solvable"));
+        let known = |solved: &Solved| {
+            assert!(!solved.converged && solved.is_at_rest(), "{columns} {:?}", solved.residuals.last());
+            solved.known_to.expect("rounding ended it")
+        };
+        let (most, least) = (known(&direct).max(known(&multigrid)), known(&direct).min(known(&multigrid)));
+        let apart = difference(&direct.displacement, &multigrid.displacement);
+        assert!(apart < 4.0 * most && most < 1e-4, "{columns}: {apart:e} apart, {least:e} {most:e}");
+        assert!(apart > most / 100.0, "{columns}: {apart:e} apart, {most:e}");
+    }
+    let stout = solve(&beam(30, 12), &by(Solver::Direct, 1e-10)).expect("solvable");
+    assert!(stout.converged && stout.known_to.is_none());
 }

@@ -29,6 +29,9 @@ const MOST_ITERATIONS: usize = 100;
 /// Bytes a particle of a body that stand beside the solver's: position, site, neighbours, class.
 const BODY_BYTES: f64 = 16.0 + 8.0 + 36.0 + 4.0;
 
+/// A body with one coarser level, too small to leave room for that of another.
+const WARM_UP: Plate = Plate { cells: [28, 28], holes: false };
+
 /// What to measure.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Options {
@@ -104,7 +107,9 @@ fn bodies(quick: bool) -> (Vec<Plate>, usize) {
 /// If a system cannot be solved, which would be a bug.
 pub fn run(options: &Options) -> Result<Report, EquilibriumError> {
     let (plates, repetitions) = bodies(options.quick);
-    // Memory first, and small bodies before large ones: what was freed before would hide what is used.
+    // Memory first, and small bodies before large ones: what was freed before would hide what is used. The pages of
+    // the program itself and the threads' stacks are no part of the first body: a tiny one touches them.
+    bytes_per_particle(&WARM_UP.parts())?;
     let bytes: Vec<Option<f64>> =
         plates.iter().map(|plate| bytes_per_particle(&plate.parts())).collect::<Result<_, _>>()?;
     let cases = plates.iter().zip(bytes).map(|(plate, bytes)| Case::measure(plate, bytes, repetitions));

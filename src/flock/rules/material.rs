@@ -12,7 +12,7 @@
 //! changes from one particle to the next, forces balance up to strain times that change.
 
 use super::{Neighbour, Own};
-use crate::flock::block::{Block, apply};
+use crate::flock::block::{Block, apply, product};
 
 /// Which turns of the body cost nothing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -24,27 +24,54 @@ pub enum Rotation {
     Corotated,
 }
 
-/// A turn about a point.
+/// A turn about a point, fitted to neighbours.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Turn {
     cos: f64,
     sin: f64,
+    size: f64,
 }
 
 impl Turn {
+    pub const NONE: Turn = Turn { cos: 1.0, sin: 0.0, size: 1.0 };
+
     /// The turn that brings the neighbours' reference places about the particle nearest to their
     /// present ones (least squares; G. Wahba's problem, closed in the plane); none where they have no
     /// direction left, all in one point.
     pub fn of(own: &Own, neighbours: impl Iterator<Item = Neighbour>) -> Option<Self> {
-        let (mut cos, mut sin) = (0.0, 0.0);
-        for n in neighbours {
+        Self::fit(neighbours.map(|n| {
             let then = [n.reference[0] - own.reference[0], n.reference[1] - own.reference[1]];
-            let now = [n.position[0] - own.present[0], n.position[1] - own.present[1]];
+            (then, [n.position[0] - own.present[0], n.position[1] - own.present[1]])
+        }))
+    }
+
+    /// [`Turn::of`] over pairs of where a neighbour was and is from the particle \[length\].
+    pub fn fit(pairs: impl Iterator<Item = ([f64; 2], [f64; 2])>) -> Option<Self> {
+        let (mut cos, mut sin) = (0.0, 0.0);
+        for (then, now) in pairs {
             cos += then[0] * now[0] + then[1] * now[1];
             sin += then[0] * now[1] - then[1] * now[0];
         }
         let size = f64::hypot(cos, sin);
-        (size > 0.0 && size.is_finite()).then(|| Self { cos: cos / size, sin: sin / size })
+        (size > 0.0 && size.is_finite()).then(|| Self { cos: cos / size, sin: sin / size, size })
+    }
+
+    /// What was fitted: the sum of products of the neighbours' distances then and now, along the turn
+    /// \[length^2\].
+    pub fn size(self) -> f64 {
+        self.size
+    }
+
+    /// Cosine of the angle between two turns.
+    pub fn cosine_to(self, other: Self) -> f64 {
+        self.cos * other.cos + self.sin * other.sin
+    }
+
+    /// A matrix in the turned axes: `R block R'`.
+    pub fn turned(self, block: &Block) -> Block {
+        let (forth, back) =
+            ([[self.cos, -self.sin], [self.sin, self.cos]], [[self.cos, self.sin], [-self.sin, self.cos]]);
+        product(&product(&forth, block), &back)
     }
 
     pub fn forth(self, [x, y]: [f64; 2]) -> [f64; 2] {

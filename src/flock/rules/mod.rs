@@ -14,10 +14,9 @@ mod power;
 mod spaced;
 
 use super::block::{Block, IDENTITY, apply};
-use material::Turn;
 
 pub use feedback::{Feedback, FeedbackReference};
-pub use material::Rotation;
+pub use material::{Rotation, Turn};
 pub use poisson::{Axis, Poisson};
 pub use power::Origin;
 

@@ -40,6 +40,9 @@ pub fn equilibrium(raw: &RawScene, refuse: Refuse<'_>) -> Result<Option<Equilibr
         Choice::Auto => true,
         Choice::This(solver) => solver.has_single(),
     };
+    // Turned axes leave no symmetry, and the solvers that need none compute in doubles.
+    let corotated = matches!(raw.rule.mean, Some(RawMean::Material { rotation: RawRotation::Corotated, .. }));
+    let has_single = has_single && !corotated;
     let singles = accuracy.is_some_and(|a| a >= SINGLES_FROM) && has_single && tolerance >= SINGLE_FLOOR;
     let precision = match asked.precision {
         Some(RawPrecision::F64) => Precision::F64,

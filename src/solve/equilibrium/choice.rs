@@ -19,12 +19,7 @@ pub fn choose(system: &System, request: &Request) -> (Solver, String) {
     let followers = system.operator.followers();
     let has_direct = cfg!(feature = "fem");
     if system.asymmetric_pair().is_some() {
-        let alike = "neighbours do not feel each other alike";
-        return if has_direct && followers <= UNSYMMETRIC_UP_TO {
-            (Solver::Direct, format!("{alike}, and {followers} followers are few enough to factorise"))
-        } else {
-            (Solver::GaussSeidel, format!("{alike}, which rules out the faster iterations"))
-        };
+        return choose_unsymmetric(followers, "neighbours do not feel each other alike");
     }
     if request.precision == Precision::F32 {
         return (Solver::Multigrid, "in single precision only iterations are offered".into());
@@ -34,4 +29,13 @@ pub fn choose(system: &System, request: &Request) -> (Solver, String) {
         return (Solver::Direct, why);
     }
     (Solver::Multigrid, format!("the number of its iterations does not grow with {followers} followers"))
+}
+
+/// The solver for so many followers whose operator has no symmetry, for the reason given.
+pub fn choose_unsymmetric(followers: usize, because: &str) -> (Solver, String) {
+    if cfg!(feature = "fem") && followers <= UNSYMMETRIC_UP_TO {
+        (Solver::Direct, format!("{because}, and {followers} followers are few enough to factorise"))
+    } else {
+        (Solver::GaussSeidel, format!("{because}, which rules out the faster iterations"))
+    }
 }

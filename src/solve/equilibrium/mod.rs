@@ -25,12 +25,13 @@ mod history;
 pub mod jacobi;
 mod lanczos;
 pub mod multigrid;
+mod rounding;
 mod steps;
 mod system;
 
 use std::time::{Duration, Instant};
 
-pub use choice::choose;
+pub use choice::{choose, choose_unsymmetric};
 pub use error::SolveError;
 pub use system::System;
 
@@ -150,6 +151,19 @@ pub struct Solved {
     pub phases: Vec<(&'static str, Duration)>,
     /// Whether the tolerance was reached.
     pub converged: bool,
+    /// Where rounding ended the solve short of its tolerance: the relative L2 error that the displacements are
+    /// estimated to have \[1\].
+    pub known_to: Option<f64>,
+}
+
+/// Largest error of displacements that still are an equilibrium.
+const LARGEST_ERROR: f64 = 1e-3;
+
+impl Solved {
+    /// Whether this is an equilibrium: to its tolerance, or as far as doubles go and known to three digits.
+    pub fn is_at_rest(&self) -> bool {
+        self.converged || self.known_to.is_some_and(|error| error <= LARGEST_ERROR)
+    }
 }
 
 /// What a solver hands back: displacements of the followers, zero elsewhere.
@@ -171,15 +185,7 @@ pub fn solve(system: &System, request: &Request) -> Result<Solved, SolveError> {
     check(system, request, solver)?;
     let mut prepared = Prepared::new(system)?;
     let prepared_in = begin.elapsed();
-    let found = match solver {
-        _ if prepared.size == 0.0 => Found::nothing(system.operator.count()),
-        Solver::Jacobi => jacobi::solve(&mut prepared, request)?,
-        Solver::GaussSeidel => gauss_seidel::solve(&mut prepared, request)?,
-        Solver::Chebyshev => chebyshev::solve(&mut prepared, request)?,
-        Solver::ConjugateGradients => conjugate_gradients::solve(&mut prepared, request)?,
-        Solver::Multigrid => multigrid::solve(&mut prepared, request)?,
-        Solver::Direct => direct::solve(&mut prepared, system)?,
-    };
+    let found = by(solver, &mut prepared, system, request)?;
     let set_up = prepared_in + found.set_up;
     let mut residuals = found.residuals;
     if let Some(last) = residuals.last_mut().filter(|_| solver.updates_residual() && prepared.size > 0.0) {
@@ -187,6 +193,11 @@ pub fn solve(system: &System, request: &Request) -> Result<Solved, SolveError> {
     }
     // Rounding keeps an iteration from the last digits of what it was asked for.
     let converged = residuals.last().is_some_and(|last| *last <= 2.0 * request.tolerance);
+    // Nor is it rounding that ends a solve which has run out of iterations.
+    let ended = solver == Solver::Direct || residuals.len() <= request.most_iterations;
+    let known_to = (!converged && ended && request.precision == Precision::F64)
+        .then(|| rounding::known_to(&mut prepared, system, request, (solver, &found.displacement)))
+        .flatten();
     let displacement = system.with_held(prepared.unscaled(found.displacement));
     if let Some(i) = displacement.iter().position(|u| !u.iter().all(|u| u.is_finite())) {
         return Err(SolveError::NotFinite { what: "displacement in equilibrium", particle: i + 1 });
@@ -197,9 +208,27 @@ pub fn solve(system: &System, request: &Request) -> Result<Solved, SolveError> {
         why,
         iterations: residuals.len() - 1,
         converged,
+        known_to,
         residuals,
         phases: vec![("set-up", set_up), ("solve", begin.elapsed() - set_up)],
     })
+}
+
+fn by(
+    solver: Solver,
+    prepared: &mut Prepared,
+    system: &System,
+    request: &Request,
+) -> Result<Found, SolveError> {
+    match solver {
+        _ if prepared.size == 0.0 => Ok(Found::nothing(system.operator.count())),
+        Solver::Jacobi => jacobi::solve(prepared, request),
+        Solver::GaussSeidel => gauss_seidel::solve(prepared, request),
+        Solver::Chebyshev => chebyshev::solve(prepared, request),
+        Solver::ConjugateGradients => conjugate_gradients::solve(prepared, request),
+        Solver::Multigrid => multigrid::solve(prepared, request),
+        Solver::Direct => direct::solve(prepared, system),
+    }
 }
 
 /// What can be refused before anything is computed.

@@ -130,10 +130,16 @@ impl Prepared {
     /// `|f - K u| / |f|` of these displacements, which is not what an iteration that never looks back takes
     /// it for.
     pub fn residual(&self, system: &System, found: &Field<f64>) -> f64 {
-        let mut right = system.right_side(&self.matrix);
-        right.x.iter_mut().chain(&mut right.y).for_each(|f| *f /= self.scales[1]);
+        let right = self.scaled_right(system);
         let mut r = Field::zeros(right.len());
         steps::residual(&self.matrix, &self.stencils, (found, &right), &mut r).sqrt() / self.size
+    }
+
+    /// The right-hand side anew, for solvers use it up \[1\].
+    pub fn scaled_right(&self, system: &System) -> Field<f64> {
+        let mut right = system.right_side(&self.matrix);
+        right.x.iter_mut().chain(&mut right.y).for_each(|f| *f /= self.scales[1]);
+        right
     }
 
     /// Displacements \[length\] from those of the scaled system.

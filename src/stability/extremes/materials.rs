@@ -156,7 +156,7 @@ pub fn contrast(solver: Solver, contrast: f64) -> Outcome {
         Ok(solved) => solved,
         Err(error) => return Outcome::Refused { message: error.to_string() },
     };
-    if !solved.converged {
+    if !solved.is_at_rest() {
         let left = solved.residuals.last().copied().unwrap_or(f64::NAN);
         let message = format!("{solver} ended short of its tolerance, {left:.1e} of the load being left");
         return Outcome::Refused { message };

@@ -1,0 +1,62 @@
+//! Where rounding ends a solve before its tolerance does, and how far the displacements are known there.
+//!
+//! No displacement in doubles leaves less of the load than about `eps (|K| |u| + |f|)`: on a beam a thousand times as
+//! long as high that is some 1e-5 of it, and a tolerance below cannot be met. It says nothing of the
+//! displacements either, which may be known to as many digits or to none. What the residual is worth in
+//! displacements is found by solving for it: `K e = r`, `e` being about as large as the error, since at this
+//! level a residual is mostly rounding itself.
+
+use super::system::Prepared;
+use super::{Request, Solver, System, by, steps};
+use crate::solve::field::{Field, dot};
+use crate::solve::operator::{Row, Stencils};
+
+/// Roundings of a row, as far as they do not cancel.
+const ROUNDINGS: f64 = 4.0;
+
+/// Tolerance of the solve for the error, and what it may end with.
+const ASKED: f64 = 1e-4;
+const ENOUGH: f64 = 1e-2;
+
+/// Relative L2 error that the displacements are estimated to have; `None` where the residual is more than
+/// rounding leaves. `right` is the right-hand side that the solver may have used up.
+pub(super) fn known_to(
+    prepared: &mut Prepared,
+    system: &System,
+    request: &Request,
+    (solver, found): (Solver, &Field<f64>),
+) -> Option<f64> {
+    let right = prepared.scaled_right(system);
+    let mut r = Field::zeros(right.len());
+    let left = steps::residual(&prepared.matrix, &prepared.stencils, (found, &right), &mut r).sqrt();
+    if left > ROUNDINGS * f64::EPSILON * magnitude(prepared, found, &right) {
+        return None;
+    }
+    if left == 0.0 {
+        return Some(0.0);
+    }
+    (prepared.right, prepared.size) = (r, left);
+    let request = Request { tolerance: ASKED, ..*request };
+    let error = by(solver, prepared, system, &request).ok()?;
+    let size = |field: &Field<f64>| dot(field.view(), field.view()).sqrt();
+    let solved = error.residuals.last().is_some_and(|last| *last <= ENOUGH);
+    solved.then(|| size(&error.displacement) / size(found)).filter(|part| part.is_finite())
+}
+
+/// `| |K| |u| + |f| |`: what the terms of a residual add up to before they cancel.
+fn magnitude(prepared: &Prepared, found: &Field<f64>, right: &Field<f64>) -> f64 {
+    let rows: Vec<Row> = prepared.matrix.rows.iter().map(absolute).collect();
+    let stencils = Stencils::<f64>::new(&rows, 1.0);
+    let part = |values: &[f64], sign: f64| values.iter().map(|v| sign * v.abs()).collect();
+    let u = Field { x: part(&found.x, 1.0), y: part(&found.y, 1.0) };
+    let f = Field { x: part(&right.x, -1.0), y: part(&right.y, -1.0) };
+    let mut sum = Field::zeros(found.len());
+    steps::residual(&prepared.matrix, &stencils, (&u, &f), &mut sum).sqrt()
+}
+
+/// A row all of whose products add up.
+fn absolute(row: &Row) -> Row {
+    let size = |block: &[[f64; 2]; 2], sign: f64| block.map(|r| r.map(|v| sign * v.abs()));
+    let entries = row.entries.iter().map(|(offset, block)| (*offset, size(block, -1.0))).collect();
+    Row { diagonal: size(&row.diagonal, 1.0), entries }
+}
