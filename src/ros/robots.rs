@@ -22,6 +22,7 @@ use crate::scene::swarm::Swarm;
 use crate::scene::swarm::raw::RawPoseType;
 use crate::swarm::control::Control;
 use crate::swarm::flight::Fleet;
+use crate::swarm::formation::Formation;
 use crate::swarm::pace::{Pace, system_time};
 use crate::swarm::transport::{RobotsEnd, fly};
 use crate::swarm::watch::Pose;
@@ -33,17 +34,17 @@ pub struct RobotNodes {
     goals: Vec<Option<[f64; 2]>>,
     link: Link,
     frames: Publisher<TFMessage>,
-    // Dropped after all that was made from them.
-    _nodes: Vec<Node>,
 }
 
-/// The robots' end over ROS 2.
-struct Link {
+/// The robots' end over ROS 2: a node for each.
+pub struct Link {
     names: Vec<String>,
     targets: Vec<Subscription<PoseStamped>>,
     poses: Poses,
     clock: Option<Publisher<Clock>>,
     frame_id: String,
+    // Dropped after all that was made from them.
+    nodes: Vec<Node>,
 }
 
 enum Poses {
@@ -54,13 +55,10 @@ enum Poses {
     Array(Box<Publisher<PoseArray>>, Vec<geometry_msgs::Pose>),
 }
 
-impl RobotNodes {
+impl Link {
     /// # Errors
-    /// What in the swarm file, the ROS arguments or the network stands in the way.
-    pub fn open(swarm: &Swarm, arguments: &RosArguments) -> Result<Self, NodeError> {
-        let control = Control::new(swarm)?;
-        let formation = control.formation();
-        let fleet = Fleet::new(swarm, formation)?;
+    /// What in the ROS arguments or the network stands in the way.
+    pub fn open(swarm: &Swarm, formation: &Formation, arguments: &RosArguments) -> Result<Self, NodeError> {
         let edge = Edge::open(options(arguments))?;
         let raw = &swarm.raw.node;
         let mut nodes = Vec::new();
@@ -94,17 +92,27 @@ impl RobotNodes {
                 Poses::Array(Box::new(topic), vec![nowhere; formation.count()])
             }
         };
-        let clock = is_set("publish_clock")
-            .then(|| first.publisher("/clock", Quality::BEST_EFFORT))
-            .transpose()?;
+        let clock =
+            is_set("publish_clock").then(|| first.publisher("/clock", Quality::BEST_EFFORT)).transpose()?;
         let names = formation.names.clone();
+        Ok(Self { names, targets, poses, clock, frame_id: raw.frame_id.clone(), nodes })
+    }
+}
+
+impl RobotNodes {
+    /// # Errors
+    /// What in the swarm file, the ROS arguments or the network stands in the way.
+    pub fn open(swarm: &Swarm, arguments: &RosArguments) -> Result<Self, NodeError> {
+        let control = Control::new(swarm)?;
+        let formation = control.formation();
+        let fleet = Fleet::new(swarm, formation)?;
+        let link = Link::open(swarm, formation, arguments)?;
         Ok(Self {
-            link: Link { names, targets, poses, clock, frame_id: raw.frame_id.clone() },
-            frames: first.publisher("/tf", Quality::reliable(100))?,
+            frames: link.nodes[0].publisher("/tf", Quality::reliable(100))?,
             pace: Pace::new(1.0 / control.period()),
             goals: vec![None; formation.count()],
             fleet,
-            _nodes: nodes,
+            link,
         })
     }
 

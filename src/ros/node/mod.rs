@@ -34,7 +34,7 @@ use crate::swarm::pace::{Pace, system_time};
 use crate::swarm::transport::{ControllerEnd, listen, targets};
 use diagnostics::Statistics;
 use drive::Drive;
-use link::Link;
+pub use link::Link;
 use settings::Settings;
 
 /// Name of the node unless `__node` says otherwise.
@@ -240,8 +240,12 @@ impl FormationNode {
             }
         }
         if self.statistics.is_due(diagnostics::DIAGNOSTICS, now, 1.0) {
-            let message =
-                self.statistics.message(&self.control, &self.swarm.name, self.header(now), self.link.refused());
+            let message = self.statistics.message(
+                &self.control,
+                &self.swarm.name,
+                self.header(now),
+                self.link.refused(),
+            );
             self.statistics.sent(self.diagnostics.publish(&message));
         }
     }

@@ -121,16 +121,19 @@ pub fn fly<E: RobotsEnd>(
     end: &mut E,
     now: impl FnOnce(&Fleet) -> f64,
 ) -> Result<(), E::Error> {
-    end.targets(&mut |member, place| {
-        if place.iter().all(|value| value.is_finite())
-            && let Some(goal) = goals.get_mut(member)
-        {
-            *goal = Some(place);
-        }
-    });
+    end.targets(&mut |member, place| aim(goals, member, place));
     fleet.go(|member| goals[member]);
     let now = now(fleet);
     let mut said = Vec::new();
     fleet.say(now, &mut |member, pose| said.push((member, pose)));
     end.say(now, &said)
+}
+
+/// Takes a target for a robot's goal \[m\]; one that is not finite, or of no robot, changes nothing.
+pub fn aim(goals: &mut [Option<[f64; 2]>], member: usize, place: [f64; 2]) {
+    if place.iter().all(|value| value.is_finite())
+        && let Some(goal) = goals.get_mut(member)
+    {
+        *goal = Some(place);
+    }
 }
