@@ -63,7 +63,9 @@ pub fn targets_reach_their_robots_to_the_bit(transport: &mut impl Transport) {
 pub fn who_comes_late_hears_what_is_said_from_then_on(transport: &mut impl Transport) {
     let mut robots = transport.robots();
     for k in 0..100 {
-        robots.say(1.0, &[(0, pose(f64::from(k), 1.0 + f64::from(k)))]).expect("nobody listens, and nobody waits");
+        robots
+            .say(1.0, &[(0, pose(f64::from(k), 1.0 + f64::from(k)))])
+            .expect("nobody listens, and nobody waits");
     }
     let mut late = transport.controller();
     let begun = Instant::now();

@@ -120,9 +120,11 @@ fn another_version_of_a_type_is_refused_with_both_names() {
     let mut config = iceoryx2::prelude::Config::global_config().clone();
     use iceoryx2::prelude::SemanticString;
     config.global.prefix = iceoryx2::prelude::FileName::new(format!("{name}_").as_bytes()).expect("a prefix");
-    let older = iceoryx2::prelude::NodeBuilder::new().config(&config).create::<ipc::Service>().expect("a node");
+    let older =
+        iceoryx2::prelude::NodeBuilder::new().config(&config).create::<ipc::Service>().expect("a node");
     let service = "flockform/row/poses".try_into().expect("a name");
-    let _held = older.service_builder(&service).publish_subscribe::<[OlderPose]>().create().expect("a service");
+    let _held =
+        older.service_builder(&service).publish_subscribe::<[OlderPose]>().create().expect("a service");
 
     let peer = shm.join("test").expect("shared memory");
     let opened = Reader::<WirePose>::open(&peer, "row", POSES, &Capacity::SWARM);
@@ -165,7 +167,8 @@ fn a_reader_looks_into_the_memory_that_the_writer_filled() {
     let capacity = Capacity { readers: 1, ..Capacity::SWARM };
     let mut writer = Writer::<WirePose>::open(&peer, "row", POSES, &capacity, 8).expect("a writer");
     let reader = Reader::<WirePose>::open(&peer, "row", POSES, &capacity).expect("a reader");
-    let element = |k: usize| WirePose { member: k as u32, frame: 0, position: [0.5, 1.5], yaw: 2.0, stamp: 3.0 };
+    let element =
+        |k: usize| WirePose { member: k as u32, frame: 0, position: [0.5, 1.5], yaw: 2.0, stamp: 3.0 };
     writer.send(7.0, 4, 8, element).expect("sent");
     writer.send(8.0, 5, 3, element).expect("sent");
     let first = reader.take().expect("the first");
