@@ -151,6 +151,19 @@ pub enum BenchCommand {
         #[arg(long)]
         quick: bool,
     },
+    /// Latency and CPU of carrying poses: in process, iceoryx2, ours over it, Unix socket, DDS over loopback
+    #[command(after_help = "Example:\n  flockform bench transport --out /tmp/transport")]
+    Transport {
+        /// Print JSON instead of a table
+        #[arg(long)]
+        json: bool,
+        /// Small messages and few of them: shows that it works, measures nothing worth quoting
+        #[arg(long)]
+        quick: bool,
+        /// Folder for table and figure too; must be empty or new
+        #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
+    },
     /// Seconds to equilibrium by multigrid, beside a factorisation of the same system
     #[cfg(feature = "fem")]
     #[command(after_help = "Example:\n  flockform bench equilibrium --json > equilibrium.json")]
@@ -314,6 +327,15 @@ pub fn dispatch(command: Command, ros: &RosArguments) -> Result<ExitCode, Refusa
         Command::Bench(BenchCommand::Swarm { json, quick }) => {
             let report = bench::swarm::run(&bench::swarm::Options { quick });
             print(&if json { format!("{}\n", serde_json::json!(report)) } else { report.to_string() });
+        }
+        Command::Bench(BenchCommand::Transport { json, quick, out }) => {
+            let folder = out.map(|out| export::OutputFolder::create(&out, false)).transpose()?;
+            let report = bench::transport::run(&bench::transport::Options { quick });
+            print(&if json { format!("{}\n", serde_json::json!(report)) } else { report.to_string() });
+            if let Some(folder) = folder {
+                export::transport::write_transport(&folder, &report)?;
+                folder.commit()?;
+            }
         }
         #[cfg(feature = "fem")]
         Command::Bench(BenchCommand::Equilibrium { json, quick }) => {

@@ -1,7 +1,7 @@
 //! A service's two sides: a writer that fills slices of shared memory in place, a reader that borrows them.
 
 use std::marker::PhantomData;
-use std::ops::Deref;
+use std::ops::{Deref, DerefMut};
 use std::rc::Rc;
 use std::time::Duration;
 
@@ -12,6 +12,7 @@ use iceoryx2::prelude::{
     AllocationStrategy, BackpressureStrategy, MessagingPattern, Service as _, ServiceName, ipc,
 };
 use iceoryx2::sample::Sample;
+use iceoryx2::sample_mut::SampleMut;
 use iceoryx2::service::builder::event::EventOpenOrCreateError;
 use iceoryx2::service::builder::publish_subscribe::{
     PublishSubscribeOpenError as Refusal, PublishSubscribeOpenOrCreateError as OpenError,
@@ -272,15 +273,34 @@ impl<T: Payload> Writer<T> {
         count: usize,
         element: impl FnMut(usize) -> T,
     ) -> Result<(), ShmError> {
-        let service = &self.service;
-        let refused = |reason: String| ShmError::Send { service: service.clone(), reason };
-        let mut slice =
-            self.publisher.loan_slice_uninit(count).map_err(|error| refused(error.to_string()))?;
+        let filled = self.fill(count, element)?;
+        self.hand_over(filled, stamp, step)
+    }
+
+    /// The first half of [`Writer::send`]: a slice that is filled and still the writer's own. One at a time.
+    ///
+    /// # Errors
+    /// As [`Writer::send`].
+    pub fn fill(&self, count: usize, element: impl FnMut(usize) -> T) -> Result<Filled<T>, ShmError> {
+        let slice = self.publisher.loan_slice_uninit(count).map_err(|error| self.refused(error))?;
+        Ok(Filled(slice.write_from_fn(element)))
+    }
+
+    /// The second half: the slice becomes its readers'.
+    ///
+    /// # Errors
+    /// As [`Writer::send`].
+    pub fn hand_over(&mut self, filled: Filled<T>, stamp: f64, step: u64) -> Result<(), ShmError> {
+        let Filled(mut slice) = filled;
         *slice.user_header_mut() = Header { sequence: self.sequence, step, stamp };
-        slice.write_from_fn(element).send().map_err(|error| refused(error.to_string()))?;
+        slice.send().map_err(|error| self.refused(error))?;
         self.sequence += 1;
-        self.notifier.notify().map_err(|error| refused(error.to_string()))?;
+        self.notifier.notify().map_err(|error| self.refused(error))?;
         Ok(())
+    }
+
+    fn refused(&self, error: impl std::fmt::Display) -> ShmError {
+        ShmError::Send { service: self.service.clone(), reason: error.to_string() }
     }
 
     /// Readers now \[1\].
@@ -291,6 +311,24 @@ impl<T: Payload> Writer<T> {
 
     pub fn service(&self) -> &str {
         &self.service
+    }
+}
+
+/// A slice in shared memory that its writer has filled and not yet handed over.
+#[derive(Debug)]
+pub struct Filled<T: Payload>(SampleMut<ipc::Service, [T], Header>);
+
+impl<T: Payload> Deref for Filled<T> {
+    type Target = [T];
+
+    fn deref(&self) -> &[T] {
+        self.0.payload()
+    }
+}
+
+impl<T: Payload> DerefMut for Filled<T> {
+    fn deref_mut(&mut self) -> &mut [T] {
+        self.0.payload_mut()
     }
 }
 

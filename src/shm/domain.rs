@@ -69,6 +69,11 @@ pub struct Peer {
 }
 
 impl Peer {
+    /// What iceoryx2 knows it as, for services of one's own.
+    pub fn node(&self) -> &Node<ipc::Service> {
+        &self.node
+    }
+
     /// Gives back what peers that died since held: their places among the readers and the slices they had borrowed.
     pub fn clean_up(&self) {
         let state = self.node.try_cleanup_dead_nodes();

@@ -69,7 +69,7 @@ def main(domain, swarm):
             if sequence == 0:
                 print(f"{count} poses, robot 2 at {x} {y}, header {Header.type_name()}", flush=True)
             loan = leaders.loan_slice_uninit(1)
-            loan.user_header().contents = Header(sequence, 0, time.time())
+            loan.user_header()[0] = Header(sequence, 0, time.time())
             loan.payload()[0] = Leader(0, 0, (ctypes.c_double * 2)(x, y + 1.0))
             loan.assume_init().send()
             ringer.notify()
