@@ -403,7 +403,8 @@ impl<T: Payload> Reader<T> {
         last
     }
 
-    /// Sleeps until a slice arrives, for so long at most; whether one may have.
+    /// Sleeps until a slice arrives, for so long at most; whether one may have: the bell still rings for slices that
+    /// were taken since without [`Reader::still`].
     pub fn wait(&self, longest: Duration) -> bool {
         self.bell.timed_wait(|_| (), longest).is_ok_and(|rings| rings > 0)
     }

@@ -1,6 +1,6 @@
 //! A round trip between two threads, and what it costs.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use serde::Serialize;
@@ -77,7 +77,7 @@ pub struct Case {
     pub lost: usize,
     pub round_trip: Quantiles,
     pub one_way: Quantiles,
-    /// Of the whole process \[s\]; none where the system does not say (Linux does).
+    /// Of the whole process \[s\]; none for a hand-off, and where the system does not say (Linux does).
     pub cpu_seconds_per_message: Option<f64>,
 }
 
@@ -130,19 +130,19 @@ pub fn exchange(
     samples: &mut Samples,
 ) -> Result<(), String> {
     let origin = Instant::now();
-    let stop = &AtomicBool::new(false);
+    let (stop, prepared) = (&AtomicBool::new(false), &AtomicUsize::new(0));
     std::thread::scope(|scope| {
         let (ready, is_ready) = std::sync::mpsc::channel();
         let answering = scope.spawn(move || {
             let opened = far();
             // The other side waits for it.
             let _ = ready.send(());
-            answer(&mut *opened?, work, origin, stop)
+            answer(&mut *opened?, work, origin, stop, prepared)
         });
         let measured = is_ready
             .recv()
             .map_err(|error| error.to_string())
-            .and_then(|()| ask(&mut *near, work, origin, rounds, seconds, samples));
+            .and_then(|()| ask(&mut *near, work, origin, prepared, rounds, seconds, samples));
         stop.store(true, Ordering::Relaxed);
         let answered = answering.join().map_err(|_| "the answering thread panicked".to_owned())?;
         let skipped = measured?;
@@ -156,13 +156,14 @@ fn ask(
     near: &mut dyn End,
     work: Work,
     origin: Instant,
+    prepared: &AtomicUsize,
     rounds: usize,
     seconds: f64,
     samples: &mut Samples,
 ) -> Result<usize, String> {
     let mut begun = Instant::now();
     let mut cpu = cpu_seconds();
-    let (mut counted, mut warm) = (0, 0);
+    let (mut counted, mut warm, mut answers) = (0, 0, 0);
     for round in 0..WARM_UP + rounds as u64 {
         if round == WARM_UP {
             (begun, cpu) = (Instant::now(), cpu_seconds());
@@ -172,6 +173,11 @@ fn ask(
         }
         if work == Work::HandOff {
             near.fill()?;
+            // The answer lies ready too before the time is taken.
+            let filled = Instant::now();
+            while prepared.load(Ordering::Acquire) <= answers && filled.elapsed() < PATIENCE {
+                std::thread::sleep(Duration::from_micros(20));
+            }
         }
         let sent = origin.elapsed();
         if work == Work::FilledAndRead {
@@ -195,6 +201,7 @@ fn ask(
             std::hint::black_box(near.read());
         }
         let took = (origin.elapsed() - sent).as_secs_f64();
+        answers += usize::from(answered);
         match (answered, round < WARM_UP) {
             (false, true) if round == 0 => return Err(format!("no answer within {PATIENCE:?}")),
             (true, true) => warm += 1,
@@ -205,7 +212,8 @@ fn ask(
             }
         }
     }
-    if let (Some(before), Some(after)) = (cpu, cpu_seconds()) {
+    // A hand-off leaves out what filling takes, which the CPU cannot.
+    if let (Work::FilledAndRead, Some(before), Some(after)) = (work, cpu, cpu_seconds()) {
         *samples.cpu.get_or_insert(0.0) += after - before;
     }
     samples.messages += 2 * counted;
@@ -213,11 +221,18 @@ fn ask(
 }
 
 /// Answers until it is told to stop; how long each message was under way \[s\].
-fn answer(far: &mut dyn End, work: Work, origin: Instant, stop: &AtomicBool) -> Result<Vec<f64>, String> {
+fn answer(
+    far: &mut dyn End,
+    work: Work,
+    origin: Instant,
+    stop: &AtomicBool,
+    prepared: &AtomicUsize,
+) -> Result<Vec<f64>, String> {
     let mut one_ways = Vec::new();
     while !stop.load(Ordering::Relaxed) {
         if work == Work::HandOff {
             far.fill()?;
+            prepared.fetch_add(1, Ordering::Release);
         }
         let mark = loop {
             match far.receive(Duration::from_millis(20))? {

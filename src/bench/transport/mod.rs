@@ -168,7 +168,7 @@ impl fmt::Display for Report {
                 .collect();
             writeln!(f, "\nours over iceoryx2, median round trip: {}\n", ratios.join(", "))?;
         }
-        writeln!(f, "CPU is the process's, of both threads, for one message (two make a round trip).")?;
+        writeln!(f, "CPU is that of both threads for one message, of which a round trip has two.")?;
         self.skipped.iter().try_for_each(|why| writeln!(f, "not measured: {why}"))?;
         if self.quick {
             writeln!(f, "A quick run: it shows that the benchmark works, its times mean little.")?;

@@ -4,7 +4,7 @@ use std::io::{Read, Write};
 use std::os::unix::net::UnixStream;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use iceoryx2::port::listener::Listener;
 use iceoryx2::port::notifier::Notifier;
@@ -158,9 +158,12 @@ impl End for Ours {
     }
 
     fn receive(&mut self, patience: Duration) -> Result<Option<u64>, String> {
+        let begun = Instant::now();
         self.arrived = None;
         self.arrived = self.reader.take();
-        if self.arrived.is_none() && self.reader.wait(patience) {
+        // The bell may still ring for a slice that was taken without it.
+        while let (None, Some(rest)) = (&self.arrived, patience.checked_sub(begun.elapsed())) {
+            self.reader.wait(rest);
             self.arrived = self.reader.take();
         }
         Ok(self.arrived.as_ref().and_then(|slice| slice.first()).map(|pose| pose.stamp.to_bits()))
@@ -244,10 +247,12 @@ impl End for Raw {
     }
 
     fn receive(&mut self, patience: Duration) -> Result<Option<u64>, String> {
+        let begun = Instant::now();
         self.arrived = None;
         self.arrived = self.subscriber.receive().map_err(words)?;
-        if self.arrived.is_none() {
-            self.listener.timed_wait(|_| (), patience).map_err(words)?;
+        // The bell may still ring for a slice that was taken without it.
+        while let (None, Some(rest)) = (&self.arrived, patience.checked_sub(begun.elapsed())) {
+            self.listener.timed_wait(|_| (), rest).map_err(words)?;
             self.arrived = self.subscriber.receive().map_err(words)?;
         }
         let first = self.arrived.as_ref().and_then(|sample| sample.payload().first());

@@ -137,3 +137,19 @@ pub fn aim(goals: &mut [Option<[f64; 2]>], member: usize, place: [f64; 2]) {
         *goal = Some(place);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_target_that_is_not_finite_or_of_nobody_moves_nobody() {
+        let mut goals = [Some([1.0, 2.0]), None];
+        aim(&mut goals, 0, [f64::NAN, 0.0]);
+        aim(&mut goals, 1, [0.0, f64::INFINITY]);
+        aim(&mut goals, 2, [0.0, 0.0]);
+        assert_eq!(goals, [Some([1.0, 2.0]), None]);
+        aim(&mut goals, 1, [3.0, 4.0]);
+        assert_eq!(goals[1], Some([3.0, 4.0]));
+    }
+}
