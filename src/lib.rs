@@ -19,6 +19,7 @@
 //! * `trade` (feature `fem`): what accuracy costs: many settings of a scene against its truth.
 //! * `swarm` (feature `swarm`): formations of robots: targets by the same rule, made safe; flights of simulated robots.
 //! * `ros` (feature `ros`): the same over ROS 2: arguments, messages, parameters, lifecycle, the node.
+//! * `shm` (feature `shm`): the same over shared memory, without a copy; a body under way for others to look at.
 //! * `bench` (feature `bench`): how fast sweeps and solvers are, beside what the machine and others can do.
 //!
 //! ```
@@ -49,6 +50,8 @@ pub mod export;
 pub mod fem;
 #[cfg(feature = "ros")]
 pub mod ros;
+#[cfg(feature = "shm")]
+pub mod shm;
 #[cfg(feature = "swarm")]
 pub mod swarm;
 #[cfg(feature = "fem")]

@@ -103,3 +103,8 @@ fn the_swarm_knows_nothing_of_middleware_and_outputs() {
 fn ros_is_an_edge_of_the_swarm() {
     assert_imports_only("ros", &["scene", "continuum", "flock", "swarm"]);
 }
+
+#[test]
+fn shared_memory_is_an_edge_of_the_swarm_and_of_the_continuum() {
+    assert_imports_only("shm", &["scene", "continuum", "flock", "swarm"]);
+}

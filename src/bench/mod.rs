@@ -8,6 +8,7 @@
 //!   draws.
 //! * `swarm` (feature `swarm`): robots served per millisecond: neighbour query, rule, safety filter, the whole tick;
 //!   with feature `ros` the time from a pose to its target over loopback.
+//! * `transport` (feature `shm`): what carrying poses costs: shared memory, sockets, DDS.
 //! * `equilibrium` (feature `fem`): seconds to equilibrium, beside a factorisation of the same system.
 
 #[cfg(feature = "fem")]
@@ -16,3 +17,5 @@ pub mod machine;
 #[cfg(feature = "swarm")]
 pub mod swarm;
 pub mod sweep;
+#[cfg(feature = "shm")]
+pub mod transport;

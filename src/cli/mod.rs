@@ -22,7 +22,9 @@ use flockform::continuum::report::PlanReport;
 use flockform::ros::arguments::{RosArgumentError, RosArguments, Severity};
 use flockform::ros::node::NodeError;
 use flockform::scene::{self, Bundled, Scene, SceneError, bundled};
+use flockform::shm::ShmError;
 use flockform::{bench, export};
+use node::Transport;
 
 /// Exit code of a run that started and failed: diverged or interrupted.
 pub const FAILED: u8 = 1;
@@ -74,13 +76,15 @@ pub enum Command {
                       Exit codes: 0 flown and every declared bound held, 1 a bound broken or interrupted, 2 bad input."
     )]
     Swarm(swarm::SwarmArguments),
-    /// Keep a swarm in formation over ROS 2: poses in, safe targets out
+    /// Keep a swarm in formation over ROS 2 or shared memory: poses in, safe targets out
     #[command(
-        after_help = "Example:\n  flockform node square --ros-args -r __ns:=/fleet -p speed_limit:=0.5\n  flockform node square --member robot_3"
+        after_help = "Example:\n  flockform node square --ros-args -r __ns:=/fleet -p speed_limit:=0.5\n  flockform node square --member robot_3\n  flockform node square --transport shm"
     )]
     Node(node::NodeArguments),
-    /// Be the robots of a swarm file as ROS 2 nodes, simulated
-    #[command(after_help = "Example:\n  flockform robots square --ros-args -p publish_clock:=true")]
+    /// Be the robots of a swarm file, simulated, over ROS 2 or shared memory
+    #[command(
+        after_help = "Example:\n  flockform robots square --ros-args -p publish_clock:=true\n  flockform robots square --transport shm"
+    )]
     Robots(node::RobotsArguments),
     /// List the bundled swarms
     #[command(after_help = "Example:\n  flockform swarms")]
@@ -147,6 +151,19 @@ pub enum BenchCommand {
         #[arg(long)]
         quick: bool,
     },
+    /// Latency and CPU of carrying poses: in process, iceoryx2, ours over it, Unix socket, DDS over loopback
+    #[command(after_help = "Example:\n  flockform bench transport --out /tmp/transport")]
+    Transport {
+        /// Print JSON instead of a table
+        #[arg(long)]
+        json: bool,
+        /// Small messages and few of them: shows that it works, measures nothing worth quoting
+        #[arg(long)]
+        quick: bool,
+        /// Folder for table and figure too; must be empty or new
+        #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
+    },
     /// Seconds to equilibrium by multigrid, beside a factorisation of the same system
     #[cfg(feature = "fem")]
     #[command(after_help = "Example:\n  flockform bench equilibrium --json > equilibrium.json")]
@@ -209,9 +226,11 @@ pub enum Refusal {
     #[error("{0}")]
     Node(#[from] NodeError),
     #[error("{0}")]
+    Shm(#[from] ShmError),
+    #[error("{0}")]
     Ros(#[from] RosArgumentError),
     #[error(
-        "--ros-args: this command is no ROS 2 node\n  help: leave them out, or use `flockform node` or `flockform robots`"
+        "--ros-args: this command is no ROS 2 node\n  help: leave them out, or use `flockform node` or `flockform robots` without --transport shm"
     )]
     NoNode,
     #[error("{0}")]
@@ -250,7 +269,8 @@ pub fn arguments() -> Result<(Arguments, RosArguments), Refusal> {
     };
     let arguments = Arguments::parse_from(rest);
     match arguments.command {
-        Command::Node(_) | Command::Robots(_) => Ok((arguments, ros?)),
+        Command::Node(node::NodeArguments { transport: Transport::Ros2, .. })
+        | Command::Robots(node::RobotsArguments { transport: Transport::Ros2, .. }) => Ok((arguments, ros?)),
         _ if is_asked => Err(Refusal::NoNode),
         _ => Ok((arguments, RosArguments::default())),
     }
@@ -307,6 +327,15 @@ pub fn dispatch(command: Command, ros: &RosArguments) -> Result<ExitCode, Refusa
         Command::Bench(BenchCommand::Swarm { json, quick }) => {
             let report = bench::swarm::run(&bench::swarm::Options { quick });
             print(&if json { format!("{}\n", serde_json::json!(report)) } else { report.to_string() });
+        }
+        Command::Bench(BenchCommand::Transport { json, quick, out }) => {
+            let folder = out.map(|out| export::OutputFolder::create(&out, false)).transpose()?;
+            let report = bench::transport::run(&bench::transport::Options { quick });
+            print(&if json { format!("{}\n", serde_json::json!(report)) } else { report.to_string() });
+            if let Some(folder) = folder {
+                export::transport::write_transport(&folder, &report)?;
+                folder.commit()?;
+            }
         }
         #[cfg(feature = "fem")]
         Command::Bench(BenchCommand::Equilibrium { json, quick }) => {

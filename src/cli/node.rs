@@ -1,20 +1,36 @@
-//! `flockform node` and `flockform robots`: a swarm over ROS 2.
+//! `flockform node` and `flockform robots`: a swarm over ROS 2, or over shared memory.
 
 use std::process::ExitCode;
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 use flockform::ros::arguments::RosArguments;
 use flockform::ros::node::FormationNode;
 use flockform::ros::robots::RobotNodes;
+use flockform::scene::swarm::Swarm;
+use flockform::shm::{self, Domain, SimulatedRobots};
+use flockform::swarm::control::Control;
 
 use super::Refusal;
 use super::run::interrupt_flag;
 use super::swarm::SwarmFileArguments;
 
+/// What lies between the node and the robots.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum Transport {
+    /// ROS 2: topics, services, parameters, lifecycle
+    #[default]
+    Ros2,
+    /// Shared memory of this computer, without a copy (iceoryx2); FLOCKFORM_SHM_DOMAIN keeps swarms apart
+    Shm,
+}
+
 #[derive(Debug, Args)]
 pub struct NodeArguments {
     #[command(flatten)]
     swarm: SwarmFileArguments,
+    /// What poses and targets travel by
+    #[arg(long, value_enum, default_value_t)]
+    pub transport: Transport,
     /// Be the node of this robot alone: hear nobody but it and its neighbours, and send it alone targets
     #[arg(long, value_name = "NAME")]
     member: Option<String>,
@@ -24,28 +40,50 @@ pub struct NodeArguments {
 pub struct RobotsArguments {
     #[command(flatten)]
     swarm: SwarmFileArguments,
+    /// What poses and targets travel by
+    #[arg(long, value_enum, default_value_t)]
+    pub transport: Transport,
 }
 
 /// Keeps a formation until it is interrupted.
 pub fn node(arguments: &NodeArguments, ros: &RosArguments) -> Result<ExitCode, Refusal> {
     let swarm = arguments.swarm.load()?;
-    let mut node = FormationNode::open(&swarm, ros, arguments.member.as_deref())?;
-    let control = node.control();
-    tracing::info!(
-        "`{}`: {} robots at {:.1} Hz",
-        swarm.name,
-        control.formation().count(),
-        1.0 / control.period()
-    );
-    node.run(&interrupt_flag());
+    let member = arguments.member.as_deref();
+    match arguments.transport {
+        Transport::Ros2 => {
+            let mut node = FormationNode::open(&swarm, ros, member)?;
+            announce(&swarm, node.control());
+            node.run(&interrupt_flag());
+        }
+        Transport::Shm => {
+            let mut node = shm::FormationNode::open(&swarm, &Domain::from_environment()?, member)?;
+            announce(&swarm, node.control());
+            node.run(&interrupt_flag())?;
+        }
+    }
     Ok(ExitCode::SUCCESS)
+}
+
+fn announce(swarm: &Swarm, control: &Control) {
+    let (count, rate) = (control.formation().count(), 1.0 / control.period());
+    tracing::info!("`{}`: {count} robots at {rate:.1} Hz", swarm.name);
 }
 
 /// Flies simulated robots until they are interrupted.
 pub fn robots(arguments: &RobotsArguments, ros: &RosArguments) -> Result<ExitCode, Refusal> {
     let swarm = arguments.swarm.load()?;
-    let mut robots = RobotNodes::open(&swarm, ros)?;
-    tracing::info!("`{}`: {} simulated robots", swarm.name, robots.fleet().robots().len());
-    robots.run(&interrupt_flag());
+    let announce = |count| tracing::info!("`{}`: {count} simulated robots", swarm.name);
+    match arguments.transport {
+        Transport::Ros2 => {
+            let mut robots = RobotNodes::open(&swarm, ros)?;
+            announce(robots.fleet().robots().len());
+            robots.run(&interrupt_flag());
+        }
+        Transport::Shm => {
+            let mut robots = SimulatedRobots::open(&swarm, &Domain::from_environment()?)?;
+            announce(robots.fleet().robots().len());
+            robots.run(&interrupt_flag())?;
+        }
+    }
     Ok(ExitCode::SUCCESS)
 }

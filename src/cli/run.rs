@@ -18,6 +18,8 @@ use flockform::export::{
     Energies, ExportError, OutputFolder, Results, Summary, Timings, VtkSeries, write_all,
 };
 use flockform::scene::Scene;
+use flockform::shm::Domain;
+use flockform::shm::positions::Positions;
 use flockform::trade::{Chosen, choose};
 
 use super::output::OutputArguments;
@@ -36,6 +38,9 @@ pub struct RunArguments {
     /// Threads to use [default: the machine's]; results are the same to the bit for any number
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
+    /// Show the positions after every step to other processes, as flockform/NAME/positions in shared memory
+    #[arg(long, value_name = "NAME")]
+    publish: Option<String>,
 }
 
 /// Runs a scene and writes what comes of it.
@@ -52,6 +57,9 @@ fn run_here(arguments: &RunArguments) -> Result<ExitCode, Refusal> {
     let load = |more: &[String]| arguments.scene.load_scene(&[steps.as_slice(), more].concat());
     let Chosen { scene, words } = choose(scene, &load)?;
     let plan = plan(&scene)?;
+    let shown = arguments.publish.as_ref();
+    let open = |name: &String| Positions::open(&Domain::from_environment()?, name, plan.count());
+    let mut shown = shown.map(open).transpose()?;
     let folder = arguments.output.folder(&scene.name)?;
     let setup = start.elapsed();
     tracing::info!("planned {} particles of `{}` in {setup:.1?}", plan.count(), scene.name);
@@ -63,6 +71,9 @@ fn run_here(arguments: &RunArguments) -> Result<ExitCode, Refusal> {
     let looks = Looks::new(&scene, &plan);
     let mut see = |engine: &Engine, residual: f64| {
         recorder.step(engine);
+        if let Some(shown) = &mut shown {
+            shown.show(engine);
+        }
         progress.step(engine.step(), residual);
         let stop = recorder.failed() || interrupted.load(Ordering::Relaxed);
         if stop { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }

@@ -58,6 +58,8 @@ pub mod stability;
 mod summary;
 #[cfg(feature = "fem")]
 pub mod trade;
+#[cfg(all(feature = "bench", feature = "shm"))]
+pub mod transport;
 mod vtk;
 
 use std::path::PathBuf;

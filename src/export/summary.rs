@@ -24,6 +24,8 @@ pub(super) const COMPARISON: &str = "compare.json";
 pub(super) const TRADE: &str = "trade.json";
 /// What a stability study writes in the place of a summary.
 pub(super) const STABILITY: &str = "stability.json";
+/// What a benchmark of transports writes in the place of a summary.
+pub(super) const TRANSPORT: &str = "transport.json";
 /// What a flight writes in the place of a summary.
 pub(super) const FLIGHT: &str = "flight.json";
 
@@ -193,7 +195,7 @@ impl Equilibrium {
 
 /// Whether the folder holds a summary, or a comparison, that this program wrote.
 pub(super) fn is_in(folder: &Path) -> bool {
-    [FILE, COMPARISON, TRADE, STABILITY, FLIGHT].into_iter().any(|file| {
+    [FILE, COMPARISON, TRADE, STABILITY, TRANSPORT, FLIGHT].into_iter().any(|file| {
         let text = std::fs::read_to_string(folder.join(file)).unwrap_or_default();
         serde_json::from_str::<serde_json::Value>(&text).is_ok_and(|summary| summary["program"] == PROGRAM)
     })

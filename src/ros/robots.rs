@@ -7,9 +7,7 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::arguments::{Names, RosArguments, Value};
-use super::edge::clock::system_time;
-use super::edge::steady::Pace;
-use super::edge::{Edge, Node, Publisher, Quality, Subscription};
+use super::edge::{Edge, EdgeError, Node, Publisher, Quality, Subscription};
 use super::messages::builtin_interfaces::Time;
 use super::messages::geometry_msgs::{
     self, PoseArray, PoseStamped, PoseWithCovariance, PoseWithCovarianceStamped, Quaternion, Transform,
@@ -24,21 +22,29 @@ use crate::scene::swarm::Swarm;
 use crate::scene::swarm::raw::RawPoseType;
 use crate::swarm::control::Control;
 use crate::swarm::flight::Fleet;
+use crate::swarm::formation::Formation;
+use crate::swarm::pace::{Pace, system_time};
+use crate::swarm::transport::{RobotsEnd, fly};
 use crate::swarm::watch::Pose;
 
 /// The robots, and what they speak through.
 pub struct RobotNodes {
     fleet: Fleet,
     pace: Pace,
+    goals: Vec<Option<[f64; 2]>>,
+    link: Link,
+    frames: Publisher<TFMessage>,
+}
+
+/// The robots' end over ROS 2: a node for each.
+pub struct Link {
     names: Vec<String>,
     targets: Vec<Subscription<PoseStamped>>,
-    goals: Vec<Option<[f64; 2]>>,
     poses: Poses,
-    frames: Publisher<TFMessage>,
     clock: Option<Publisher<Clock>>,
     frame_id: String,
     // Dropped after all that was made from them.
-    _nodes: Vec<Node>,
+    nodes: Vec<Node>,
 }
 
 enum Poses {
@@ -49,13 +55,10 @@ enum Poses {
     Array(Box<Publisher<PoseArray>>, Vec<geometry_msgs::Pose>),
 }
 
-impl RobotNodes {
+impl Link {
     /// # Errors
-    /// What in the swarm file, the ROS arguments or the network stands in the way.
-    pub fn open(swarm: &Swarm, arguments: &RosArguments) -> Result<Self, NodeError> {
-        let control = Control::new(swarm)?;
-        let formation = control.formation();
-        let fleet = Fleet::new(swarm, formation)?;
+    /// What in the ROS arguments or the network stands in the way.
+    pub fn open(swarm: &Swarm, formation: &Formation, arguments: &RosArguments) -> Result<Self, NodeError> {
         let edge = Edge::open(options(arguments))?;
         let raw = &swarm.raw.node;
         let mut nodes = Vec::new();
@@ -76,31 +79,40 @@ impl RobotNodes {
             let given = arguments.parameters_for(&world.fully_qualified());
             given.iter().any(|one| one.name == name && one.value == Value::Bool(true))
         };
+        let poses = match raw.pose_type {
+            RawPoseType::PoseStamped => Poses::Stamped(each(&nodes, &|m| of(&raw.pose_topic, m))?),
+            RawPoseType::PoseWithCovarianceStamped => {
+                Poses::WithCovariance(each(&nodes, &|m| of(&raw.pose_topic, m))?)
+            }
+            RawPoseType::Odometry => Poses::Odometry(each(&nodes, &|m| of(&raw.pose_topic, m))?),
+            RawPoseType::PoseArray => {
+                let topic = first.publisher(&of(&raw.pose_topic, 0)?, Quality::BEST_EFFORT)?;
+                // Nowhere until it says where.
+                let nowhere = geometry_msgs::Pose::planar([f64::NAN; 2], f64::NAN);
+                Poses::Array(Box::new(topic), vec![nowhere; formation.count()])
+            }
+        };
+        let clock =
+            is_set("publish_clock").then(|| first.publisher("/clock", Quality::BEST_EFFORT)).transpose()?;
+        let names = formation.names.clone();
+        Ok(Self { names, targets, poses, clock, frame_id: raw.frame_id.clone(), nodes })
+    }
+}
+
+impl RobotNodes {
+    /// # Errors
+    /// What in the swarm file, the ROS arguments or the network stands in the way.
+    pub fn open(swarm: &Swarm, arguments: &RosArguments) -> Result<Self, NodeError> {
+        let control = Control::new(swarm)?;
+        let formation = control.formation();
+        let fleet = Fleet::new(swarm, formation)?;
+        let link = Link::open(swarm, formation, arguments)?;
         Ok(Self {
-            poses: match raw.pose_type {
-                RawPoseType::PoseStamped => Poses::Stamped(each(&nodes, &|m| of(&raw.pose_topic, m))?),
-                RawPoseType::PoseWithCovarianceStamped => {
-                    Poses::WithCovariance(each(&nodes, &|m| of(&raw.pose_topic, m))?)
-                }
-                RawPoseType::Odometry => Poses::Odometry(each(&nodes, &|m| of(&raw.pose_topic, m))?),
-                RawPoseType::PoseArray => {
-                    let topic = first.publisher(&of(&raw.pose_topic, 0)?, Quality::BEST_EFFORT)?;
-                    // Nowhere until it says where.
-                    let nowhere = geometry_msgs::Pose::planar([f64::NAN; 2], f64::NAN);
-                    Poses::Array(Box::new(topic), vec![nowhere; formation.count()])
-                }
-            },
-            frames: first.publisher("/tf", Quality::reliable(100))?,
-            clock: is_set("publish_clock")
-                .then(|| first.publisher("/clock", Quality::BEST_EFFORT))
-                .transpose()?,
+            frames: link.nodes[0].publisher("/tf", Quality::reliable(100))?,
             pace: Pace::new(1.0 / control.period()),
-            names: formation.names.clone(),
             goals: vec![None; formation.count()],
-            frame_id: raw.frame_id.clone(),
-            targets,
             fleet,
-            _nodes: nodes,
+            link,
         })
     }
 
@@ -118,24 +130,44 @@ impl RobotNodes {
 
     /// One period: targets in, poses out.
     pub fn tick(&mut self) {
-        for (goal, topic) in self.goals.iter_mut().zip(&self.targets) {
-            if let Some((message, _)) = topic.take_last() {
-                let place = [message.pose.position.x, message.pose.position.y];
-                *goal = place.iter().all(|value| value.is_finite()).then_some(place).or(*goal);
-            }
-        }
-        self.fleet.go(|m| self.goals[m]);
+        let Self { fleet, goals, link, .. } = self;
         // Who publishes the time begins it.
-        let now = if self.clock.is_some() { self.fleet.time() } else { system_time() };
-        let mut said = Vec::new();
-        self.fleet.say(now, &mut |m, pose| said.push((m, pose)));
-        let sent = self.publish(now, &said);
+        let own_time = link.clock.is_some();
+        let now = |fleet: &Fleet| if own_time { fleet.time() } else { system_time() };
+        let sent = fly(fleet, goals, link, now).and_then(|()| self.say_frames());
         if let Err(error) = sent {
             tracing::debug!("{error}");
         }
     }
 
-    fn publish(&mut self, now: f64, said: &[(usize, Pose)]) -> Result<(), super::edge::EdgeError> {
+    fn say_frames(&self) -> Result<(), EdgeError> {
+        let Self { link, fleet, .. } = self;
+        let now = if link.clock.is_some() { fleet.time() } else { system_time() };
+        let frame = |(name, robot): (&String, &crate::swarm::robots::Robot)| TransformStamped {
+            header: Header { stamp: Time::from_seconds(now), frame_id: link.frame_id.clone() },
+            child_frame_id: frame_of(name),
+            transform: Transform {
+                translation: Vector3 { x: robot.position[0], y: robot.position[1], z: 0.0 },
+                rotation: Quaternion::from_yaw(robot.yaw),
+            },
+        };
+        let transforms = link.names.iter().zip(fleet.robots()).map(frame).collect();
+        self.frames.publish(&TFMessage { transforms })
+    }
+}
+
+impl RobotsEnd for Link {
+    type Error = EdgeError;
+
+    fn targets(&mut self, go: &mut dyn FnMut(usize, [f64; 2])) {
+        for (member, topic) in self.targets.iter().enumerate() {
+            if let Some((message, _)) = topic.take_last() {
+                go(member, [message.pose.position.x, message.pose.position.y]);
+            }
+        }
+    }
+
+    fn say(&mut self, now: f64, said: &[(usize, Pose)]) -> Result<(), EdgeError> {
         let stamp = Time::from_seconds(now);
         if let Some(clock) = &self.clock {
             clock.publish(&Clock { clock: stamp })?;
@@ -169,16 +201,7 @@ impl RobotNodes {
         if let (Poses::Array(topic, poses), Some((_, last))) = (&self.poses, said.last()) {
             topic.publish(&PoseArray { header: header(last), poses: poses.clone() })?;
         }
-        let frame = |(name, robot): (&String, &crate::swarm::robots::Robot)| TransformStamped {
-            header: Header { stamp, frame_id: self.frame_id.clone() },
-            child_frame_id: frame_of(name),
-            transform: Transform {
-                translation: Vector3 { x: robot.position[0], y: robot.position[1], z: 0.0 },
-                rotation: Quaternion::from_yaw(robot.yaw),
-            },
-        };
-        let transforms = self.names.iter().zip(self.fleet.robots()).map(frame).collect();
-        self.frames.publish(&TFMessage { transforms })
+        Ok(())
     }
 }
 

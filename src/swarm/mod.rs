@@ -2,14 +2,16 @@
 //!
 //! [`formation`] is who flies and where the rule sends them; [`control`] is the tick that turns poses into safe
 //! targets, by [`watch`] (which poses are believed), [`resilience`] (which neighbours are) and [`safety`] (what is
-//! safe). [`flight`] closes the loop with simulated [`robots`] behind [`channel`]s; room `ros` closes it with
-//! real ones.
+//! safe). [`flight`] closes the loop with simulated [`robots`] behind [`channel`]s; over a [`transport`] it is
+//! closed at a steady [`pace`] with real ones: within a process, over shared memory (room `shm`), over ROS 2 (room `ros`).
 
 pub mod channel;
 pub mod control;
 pub mod flight;
 pub mod formation;
+pub mod pace;
 pub mod resilience;
 pub mod robots;
 pub mod safety;
+pub mod transport;
 pub mod watch;

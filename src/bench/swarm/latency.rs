@@ -85,7 +85,6 @@ mod over_dds {
     use super::{Case, Report};
     use crate::flock::points::Points;
     use crate::ros::arguments::{DiscoveryRange, Environment, RosArguments};
-    use crate::ros::edge::clock::system_time;
     use crate::ros::edge::{Edge, Node, Options, Publisher, Quality, Subscription};
     use crate::ros::messages::builtin_interfaces::Time;
     use crate::ros::messages::geometry_msgs::{Pose, PoseStamped};
@@ -93,6 +92,7 @@ mod over_dds {
     use crate::ros::node::FormationNode;
     use crate::scene::swarm::Swarm;
     use crate::swarm::control::Control;
+    use crate::swarm::pace::system_time;
 
     /// Of the node's loop [s]: as fast as it goes.
     const PERIOD: f64 = 0.002;

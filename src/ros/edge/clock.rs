@@ -1,9 +1,8 @@
 //! What time it is: the computer's, or the simulator's from `/clock`.
 
-use std::time::{SystemTime, UNIX_EPOCH};
-
 use super::services::rosgraph_msgs;
 use super::{EdgeError, Node, Quality, Subscription};
+use crate::swarm::pace::system_time;
 
 /// The node's clock.
 pub struct Clock {
@@ -82,11 +81,6 @@ impl Clock {
     pub fn is_simulated(&self) -> bool {
         self.simulated.is_some()
     }
-}
-
-/// The computer's time \[s since the Unix epoch\].
-pub fn system_time() -> f64 {
-    SystemTime::now().duration_since(UNIX_EPOCH).map_or(0.0, |since| since.as_secs_f64())
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@
 //! * [`topic`]: publishers and subscriptions; [`quality`]: what they promise each other.
 //! * [`service`]: services that answer peers on Fast DDS and on Cyclone DDS alike.
 //! * [`parameters`], [`lifecycle`]: what ROS 2 expects of a node, as pure cores and their services.
-//! * [`clock`]: system time or the simulator's; [`steady`]: the loop's pace.
+//! * [`clock`]: system time or the simulator's.
 //!
 //! Times are seconds since the Unix epoch as `f64`.
 
@@ -23,7 +23,6 @@ pub mod participant;
 pub mod quality;
 pub mod service;
 pub mod services;
-pub mod steady;
 pub mod topic;
 pub mod wire;
 

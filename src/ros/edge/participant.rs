@@ -134,18 +134,31 @@ impl Shared {
     fn reader(&self, topic: &str, kind: &str, quality: Quality) -> Result<Reader, EdgeError> {
         let policies = quality.policies();
         let dds = self.topic(topic, kind, &policies)?;
-        self.subscriber
-            .create_simple_datareader_no_key(&dds, Some(policies))
+        patiently(|| self.subscriber.create_simple_datareader_no_key(&dds, Some(policies.clone())))
             .map_err(|error| EdgeError::Endpoint { topic: topic.to_owned(), reason: error.to_string() })
     }
 
     fn writer(&self, topic: &str, kind: &str, quality: Quality) -> Result<Writer, EdgeError> {
         let policies = quality.policies();
         let dds = self.topic(topic, kind, &policies)?;
-        self.publisher
-            .create_datawriter_no_key(&dds, Some(policies))
+        patiently(|| self.publisher.create_datawriter_no_key(&dds, Some(policies.clone())))
             .map_err(|error| EdgeError::Endpoint { topic: topic.to_owned(), reason: error.to_string() })
     }
+}
+
+/// RustDDS hands new endpoints to a thread of its own through a channel of bounded length, and refuses those that it
+/// does not hold: hundreds of robots in one process come faster than they are taken in.
+fn patiently<T, E: std::fmt::Display>(mut create: impl FnMut() -> Result<T, E>) -> Result<T, E> {
+    const ATTEMPTS: usize = 200;
+    for _ in 1..ATTEMPTS {
+        match create() {
+            Err(error) if error.to_string().contains("full channel") => {
+                std::thread::sleep(Duration::from_millis(10));
+            }
+            done => return done,
+        }
+    }
+    create()
 }
 
 impl Drop for Shared {

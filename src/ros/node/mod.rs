@@ -5,6 +5,7 @@
 
 mod diagnostics;
 mod drive;
+mod link;
 mod markers;
 mod pose;
 mod settings;
@@ -14,25 +15,26 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use super::arguments::{DiscoveryRange, NameError, RosArguments};
-use super::edge::clock::{Clock, system_time};
+use super::edge::clock::Clock;
 use super::edge::lifecycle::{Goal, Lifecycle, Outcome};
 use super::edge::parameters::{Parameters, Refusal};
 use super::edge::services::std_srvs;
-use super::edge::steady::Pace;
-use super::edge::{Edge, EdgeError, Node, Options, Publisher, Quality, Service, ServiceType, Subscription};
+use super::edge::{Edge, EdgeError, Node, Options, Publisher, Quality, Service, ServiceType};
 use super::messages::builtin_interfaces::Time;
 use super::messages::diagnostic_msgs::DiagnosticArray;
 use super::messages::flockform_msgs::{FormationState, SetFormationRequest, SetFormationResponse};
-use super::messages::geometry_msgs::{Pose, PoseStamped};
 use super::messages::std_msgs::Header;
 use super::messages::visualization_msgs::MarkerArray;
 use crate::flock::manoeuvre::{Leg, Manoeuvre, Posture};
 use crate::scene::SceneError;
 use crate::scene::swarm::Swarm;
 use crate::swarm::control::Control;
+use crate::swarm::control::part::{Part, PartError};
+use crate::swarm::pace::{Pace, system_time};
+use crate::swarm::transport::{ControllerEnd, listen, targets};
 use diagnostics::Statistics;
 use drive::Drive;
-use pose::PoseSource;
+pub use link::Link;
 use settings::Settings;
 
 /// Name of the node unless `__node` says otherwise.
@@ -49,10 +51,8 @@ pub enum NodeError {
     Name(#[from] NameError),
     #[error("parameter {0}")]
     Parameter(#[from] Refusal),
-    #[error("--member {name}: there is no such robot\n  help: they are called `{first}` to `{last}`")]
-    Member { name: String, first: String, last: String },
-    #[error("--member {name}: {why}\n  help: run one node for all, without --member")]
-    NotAlone { name: String, why: &'static str },
+    #[error("{0}")]
+    Part(#[from] PartError),
 }
 
 /// The service that moves the leaders.
@@ -76,9 +76,8 @@ pub struct FormationNode {
     stop: Service<std_srvs::Trigger>,
     resume: Service<std_srvs::Trigger>,
     set_formation: Service<SetFormation>,
-    poses: PoseSource,
-    leaders: Vec<(usize, Subscription<PoseStamped>)>,
-    targets: Vec<(usize, Publisher<PoseStamped>)>,
+    part: Part,
+    link: Link,
     drives: Vec<(usize, Drive)>,
     state: Publisher<FormationState>,
     markers: Option<Publisher<MarkerArray>>,
@@ -97,8 +96,8 @@ impl FormationNode {
     /// What in the swarm file, the ROS arguments or the network stands in the way.
     pub fn open(swarm: &Swarm, arguments: &RosArguments, member: Option<&str>) -> Result<Self, NodeError> {
         let mut control = Control::new(swarm)?;
-        let member = member.map(|name| only(swarm, &control, name)).transpose()?;
-        let namespace = member.map_or("/".into(), |m| format!("/{}", control.formation().names[m]));
+        let part = Part::take(swarm, &mut control, member)?;
+        let namespace = member.map_or("/".into(), |name| format!("/{name}"));
         let names = arguments.names(NAME, &namespace)?;
         let edge = Edge::open(options(arguments))?;
         let node = edge.node(names.namespace(), names.node_name())?;
@@ -107,42 +106,20 @@ impl FormationNode {
         let mut pace = Pace::new(settings.rate);
         settings.apply_all(&store, &mut control, &mut pace);
         let clock = if settings.use_sim_time { Clock::simulated(&node)? } else { Clock::system() };
-        let mine: Vec<usize> = match member {
-            Some(m) => vec![m],
-            None => (0..control.formation().count()).collect(),
-        };
-        let heard: Vec<usize> = match member {
-            Some(m) => {
-                let mut heard = control.formation().depends_on(m);
-                heard.push(m);
-                heard.sort_unstable();
-                heard
-            }
-            None => mine.clone(),
-        };
-        control.listen_to(&heard);
         let raw = &swarm.raw.node;
         let topic = |pattern: &str, m: usize| {
             names.topic(&pattern.replace("{name}", &control.formation().names[m])).map_err(NodeError::from)
         };
-        let mut leaders = Vec::new();
-        for m in control.formation().told().filter(|m| mine.contains(m)) {
-            let topic = topic("/{name}/leader_pose", m)?;
-            leaders.push((m, node.subscription(&topic, Quality::BEST_EFFORT)?));
-        }
-        let mut targets = Vec::new();
+        let link = Link::open(&node, raw, &control, &part, clock.is_simulated(), &topic)?;
         let mut drives = Vec::new();
-        for &m in &mine {
-            targets.push((m, node.publisher(&topic(&raw.target_topic, m)?, Quality::reliable(1))?));
-            if let Some(kind) = raw.velocity {
-                let topic = topic(&raw.velocity_topic, m)?;
-                drives.push((m, Drive::open(&node, &topic, kind, &swarm.raw)?));
-            }
+        for (m, kind) in part.mine.iter().flat_map(|&m| Some((m, raw.velocity?))) {
+            drives.push((m, Drive::open(&node, &topic(&raw.velocity_topic, m)?, kind, &swarm.raw)?));
         }
         let private = |leaf: &str| names.topic(&format!("~/{leaf}")).map_err(NodeError::from);
         let service = |leaf: &str| names.service(&format!("~/{leaf}")).map_err(NodeError::from);
         let mut this = Self {
-            poses: PoseSource::open(&node, &swarm.raw.node, &heard, &topic)?,
+            part,
+            link,
             pace,
             parameters: Parameters::new(&node, store)?,
             lifecycle: Lifecycle::new(&node)?,
@@ -160,8 +137,6 @@ impl FormationNode {
             statistics: Statistics::default(),
             frame_id: raw.frame_id.clone(),
             swarm: swarm.clone(),
-            leaders,
-            targets,
             drives,
             clock,
             settings,
@@ -205,7 +180,7 @@ impl FormationNode {
         self.answer(stamp);
         // Without a clock there is no age, and so nobody to be believed.
         let Some(now) = self.clock.now() else { return };
-        self.hear(now);
+        listen(&mut self.control, &mut self.link, now);
         self.control.tick(now);
         self.publish(now);
         self.statistics.tick(begun.elapsed().as_secs_f64());
@@ -238,29 +213,6 @@ impl FormationNode {
         }
     }
 
-    fn hear(&mut self, now: f64) {
-        let Self { poses, control, frame_id, leaders, clock, .. } = self;
-        poses.take(frame_id, clock.is_simulated().then_some(now), &mut |member, pose| {
-            if let Err(rejection) = control.receive(member, pose, now) {
-                tracing::debug!("{}: {rejection}", control.formation().names[member]);
-            }
-        });
-        for (member, topic) in leaders {
-            if let Some((message, _)) = topic.take_last() {
-                if !pose::is_frame(&message.header.frame_id, frame_id) {
-                    tracing::warn!(
-                        "{}: frame `{}` is not `{frame_id}`, which the swarm file names",
-                        topic.topic(),
-                        message.header.frame_id
-                    );
-                } else {
-                    let place = message.pose.position;
-                    control.tell(*member, [place.x, place.y]);
-                }
-            }
-        }
-    }
-
     fn header(&self, now: f64) -> Header {
         Header { stamp: Time::from_seconds(now), frame_id: self.frame_id.clone() }
     }
@@ -268,17 +220,8 @@ impl FormationNode {
     /// Targets while the node is active; velocities always, which are zero while it is not.
     fn publish(&mut self, now: f64) {
         let active = self.lifecycle.is_active();
-        for (member, topic) in self.targets.iter().filter(|_| active) {
-            let Some(target) = self.control.target(*member) else { continue };
-            let here = self.control.position(*member).unwrap_or(target);
-            // A target says where to look too: ahead, or where the robot looks now.
-            let way = [target[0] - here[0], target[1] - here[1]];
-            let yaw = match way {
-                [0.0, 0.0] => self.control.yaw(*member).unwrap_or(0.0),
-                [x, y] => y.atan2(x),
-            };
-            let message = PoseStamped { header: self.header(now), pose: Pose::planar(target, yaw) };
-            self.statistics.sent(topic.publish(&message));
+        if active {
+            self.statistics.sent(self.link.send(now, &targets(&self.control, &self.part)));
         }
         for (member, drive) in &self.drives {
             let target = self.control.target(*member).filter(|_| active);
@@ -297,8 +240,12 @@ impl FormationNode {
             }
         }
         if self.statistics.is_due(diagnostics::DIAGNOSTICS, now, 1.0) {
-            let message =
-                self.statistics.message(&self.control, &self.swarm.name, self.header(now), &self.poses);
+            let message = self.statistics.message(
+                &self.control,
+                &self.swarm.name,
+                self.header(now),
+                self.link.refused(),
+            );
             self.statistics.sent(self.diagnostics.publish(&message));
         }
     }
@@ -312,26 +259,6 @@ fn act(control: &mut Control, goal: Goal) -> Outcome {
         Goal::Configure => {}
     }
     Outcome::Success
-}
-
-/// The number of the robot that the node is alone for.
-fn only(swarm: &Swarm, control: &Control, name: &str) -> Result<usize, NodeError> {
-    let formation = control.formation();
-    let number = formation.number(name).ok_or_else(|| NodeError::Member {
-        name: name.to_owned(),
-        first: formation.names[0].clone(),
-        last: formation.names[formation.count() - 1].clone(),
-    })?;
-    let refuse = |why| Err(NodeError::NotAlone { name: name.to_owned(), why });
-    if swarm.raw.control.sweeps > 1 {
-        return refuse("control.sweeps above 1 needs to see the whole formation");
-    }
-    if !formation.can_be_followed_alone() {
-        return refuse(
-            "robots that a body carries, or that are swept one after another, depend on all others",
-        );
-    }
-    Ok(number)
 }
 
 /// Where to take part, as the environment says.

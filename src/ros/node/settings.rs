@@ -3,8 +3,8 @@
 use super::NodeError;
 use crate::ros::arguments::{RosArguments, Value as Given};
 use crate::ros::edge::parameters::{Change, Declaration, Store, Value};
-use crate::ros::edge::steady::Pace;
 use crate::swarm::control::Control;
+use crate::swarm::pace::Pace;
 
 /// What is read of the parameters where it is used.
 #[derive(Clone, Copy, Debug, PartialEq)]

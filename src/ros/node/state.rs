@@ -1,60 +1,48 @@
 //! The formation's state as a message.
 
 use super::diagnostics::Statistics;
-use crate::flock::points::distance;
 use crate::ros::messages::flockform_msgs::{FormationState, MemberState};
 use crate::ros::messages::geometry_msgs::{Point, Vector3};
 use crate::ros::messages::std_msgs::Header;
-use crate::swarm::control::{Control, Mode, NEIGHBOUR_LOST, POSE_REJECTED, TRIMMED};
-use crate::swarm::safety::Flags;
+use crate::swarm::control::state::FormationState as State;
+use crate::swarm::control::{Control, Mode};
 use crate::swarm::watch::Health;
 
 /// What the last tick left.
 pub fn message(control: &Control, name: &str, header: Header, statistics: &Statistics) -> FormationState {
-    let formation = control.formation();
-    let measures = control.measures();
-    let settled = control.settled();
-    let mut clearances = Vec::new();
-    control.clearance(&mut clearances);
-    let members: Vec<MemberState> = (0..formation.count())
-        .map(|m| {
-            let position = control.position(m);
-            let rest = settled.as_ref().map(|rest| rest.get(m));
-            let place = formation.places.get(m);
-            let strain = measures.strain[m];
-            MemberState {
-                name: formation.names[m].clone(),
-                role: if formation.leads(m) { MemberState::LEADER } else { MemberState::FOLLOWER },
-                health: health(control.health(m)),
-                position: point(position),
-                target: point(control.target(m)),
-                settled: point(rest),
-                displacement: vector(position.map(|[x, y]| [x - place[0], y - place[1]])),
-                pe1: measures.pe1[m],
-                strain: strain.map_or([f64::NAN; 3], |strain| strain.components),
-                rotation: strain.map_or(f64::NAN, |strain| strain.rotation),
-                age: control.age(m).unwrap_or(f64::INFINITY),
-                clearance: clearances[m],
-                to_settled: position.zip(rest).map_or(f64::NAN, |(position, rest)| distance(position, rest)),
-                flags: flags(control.flags(m)),
-            }
-        })
-        .collect();
+    let state = State::of(control);
+    let names = &control.formation().names;
+    let members = state.members.iter().zip(names).map(|(member, name)| MemberState {
+        name: name.clone(),
+        role: if member.leads { MemberState::LEADER } else { MemberState::FOLLOWER },
+        health: health(member.health),
+        position: point(member.position),
+        target: point(member.target),
+        settled: point(member.settled),
+        displacement: vector(member.displacement),
+        pe1: member.pe1,
+        strain: member.strain.unwrap_or([f64::NAN; 3]),
+        rotation: member.rotation.unwrap_or(f64::NAN),
+        age: member.age.unwrap_or(f64::INFINITY),
+        clearance: member.clearance,
+        to_settled: member.to_settled().unwrap_or(f64::NAN),
+        flags: member.flags,
+    });
     FormationState {
         header,
         formation: name.to_owned(),
-        tick: control.ticks(),
-        mode: match control.mode() {
+        tick: state.tick,
+        mode: match state.mode {
             Mode::Running => FormationState::RUNNING,
             Mode::EmergencyStopped => FormationState::EMERGENCY_STOPPED,
             Mode::Inactive => FormationState::INACTIVE,
         },
-        formation_error: control.formation_error().unwrap_or(f64::NAN),
-        clearance: clearances.iter().copied().fold(f64::INFINITY, f64::min),
-        pe1_sum: measures.pe1.iter().sum(),
-        strain_max: measures.strain.iter().flatten().map(|strain| strain.largest()).fold(0.0, f64::max),
+        formation_error: state.formation_error.unwrap_or(f64::NAN),
+        clearance: state.clearance,
+        pe1_sum: state.pe1_sum,
+        strain_max: state.strain_max,
         elapsed: statistics.last_tick(),
-        members,
+        members: members.collect(),
     }
 }
 
@@ -78,18 +66,28 @@ fn health(health: Health) -> u8 {
     }
 }
 
-/// The bits of the loop as those of the message.
-fn flags(bits: u32) -> u32 {
-    let pairs = [
-        (Flags::SPEED_LIMITED, MemberState::SPEED_LIMITED),
-        (Flags::ACCELERATION_LIMITED, MemberState::ACCELERATION_LIMITED),
-        (Flags::GEOFENCED, MemberState::GEOFENCED),
-        (Flags::SEPARATED, MemberState::SEPARATED),
-        (Flags::OBSTRUCTED, MemberState::OBSTRUCTED),
-        (Flags::RESOLVING_DEADLOCK, MemberState::RESOLVING_DEADLOCK),
-        (NEIGHBOUR_LOST, MemberState::NEIGHBOUR_LOST),
-        (TRIMMED, MemberState::TRIMMED),
-        (POSE_REJECTED, MemberState::POSE_REJECTED),
-    ];
-    pairs.iter().filter(|(own, _)| bits & own != 0).map(|(_, wire)| wire).sum()
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::swarm::control::state::published_flags;
+    use crate::swarm::control::{NEIGHBOUR_LOST, POSE_REJECTED, TRIMMED};
+    use crate::swarm::safety::Flags;
+
+    #[test]
+    fn the_bits_of_the_loop_are_those_of_the_message() {
+        let pairs = [
+            (Flags::SPEED_LIMITED, MemberState::SPEED_LIMITED),
+            (Flags::ACCELERATION_LIMITED, MemberState::ACCELERATION_LIMITED),
+            (Flags::GEOFENCED, MemberState::GEOFENCED),
+            (Flags::SEPARATED, MemberState::SEPARATED),
+            (Flags::OBSTRUCTED, MemberState::OBSTRUCTED),
+            (Flags::RESOLVING_DEADLOCK, MemberState::RESOLVING_DEADLOCK),
+            (NEIGHBOUR_LOST, MemberState::NEIGHBOUR_LOST),
+            (TRIMMED, MemberState::TRIMMED),
+            (POSE_REJECTED, MemberState::POSE_REJECTED),
+        ];
+        for (own, wire) in pairs {
+            assert_eq!(published_flags(own), wire);
+        }
+    }
 }

@@ -1,9 +1,11 @@
-//! The control loop's tick: poses in, safe targets out. The simulated flight and the ROS 2 node call the same one.
+//! The control loop's tick: poses in, safe targets out. The simulated flight and the nodes call the same one.
 //!
 //! A period goes: who is heard, and where; where the rule sends each ([`Formation::advance`]); who has to do
 //! without some of its neighbours; what is safe ([`Filter`]). A member that is not heard gets no target.
 
+pub mod part;
 mod setup;
+pub mod state;
 
 use super::formation::{Formation, Measures, Seen};
 use super::resilience::trim;

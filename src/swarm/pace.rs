@@ -1,6 +1,12 @@
-//! The pace of a loop: deadlines at whole periods from a start, so that lateness never adds up.
+//! The pace of a loop: deadlines at whole periods from a start, so that lateness never adds up. The one place of
+//! this room that has a clock, for the edges that fly in real time.
 
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+/// The computer's time \[s since the Unix epoch\].
+pub fn system_time() -> f64 {
+    SystemTime::now().duration_since(UNIX_EPOCH).map_or(0.0, |since| since.as_secs_f64())
+}
 
 /// Which ticks are due, on a clock that the caller reads \[s\]. Pure: [`Pace`] sleeps by it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -64,10 +70,15 @@ impl Pace {
         Self { origin: Instant::now(), deadlines: Deadlines::new(0.0, rate) }
     }
 
+    /// What is due now, for a loop that has something else to wait for too.
+    pub fn due(&mut self) -> Due {
+        self.deadlines.due(self.origin.elapsed().as_secs_f64())
+    }
+
     /// Sleeps until the next tick is due; returns how many were missed before it.
     pub fn wait(&mut self) -> u64 {
         loop {
-            match self.deadlines.due(self.origin.elapsed().as_secs_f64()) {
+            match self.due() {
                 // At least a microsecond: a rest below the clock's resolution must not spin.
                 Due::In(rest) => std::thread::sleep(Duration::from_secs_f64(rest.max(1e-6))),
                 Due::Now { missed } => return missed,

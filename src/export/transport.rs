@@ -1,0 +1,105 @@
+//! A transport benchmark's outputs: `transport.json` and `transport.csv`, every way and size; the figure `transport`,
+//! the median round trip against the size of the message.
+
+use std::path::PathBuf;
+
+use serde::Serialize;
+
+use super::csv::write;
+use super::error::{ExportError, write_file};
+use super::figures::chart::{Axis, Chart, Series, Style, draw_below_each_other};
+use super::figures::{self, SERIES};
+use super::{OutputFolder, summary};
+use crate::bench::transport::Report;
+use crate::bench::transport::measure::{Case, Work};
+
+#[derive(Serialize)]
+struct Whole<'a> {
+    program: &'static str,
+    version: &'static str,
+    #[serde(flatten)]
+    report: &'a Report,
+}
+
+#[derive(Serialize)]
+struct Row {
+    transport: &'static str,
+    work: &'static str,
+    poses: usize,
+    samples: usize,
+    lost: usize,
+    round_trip_p50: Option<f64>,
+    round_trip_p90: Option<f64>,
+    round_trip_p99: Option<f64>,
+    round_trip_p999: Option<f64>,
+    one_way_p50: Option<f64>,
+    one_way_p90: Option<f64>,
+    one_way_p99: Option<f64>,
+    one_way_p999: Option<f64>,
+    cpu_per_message: Option<f64>,
+}
+
+/// Writes everything; times in \[s\].
+///
+/// # Errors
+/// The first file that cannot be written.
+pub fn write_transport(folder: &OutputFolder, report: &Report) -> Result<Vec<PathBuf>, ExportError> {
+    let mut written = vec![write(folder, "transport.csv", report.cases.iter().map(row))?];
+    written.extend(figures::write(&figure(report), &folder.path("transport"))?);
+    let path = folder.path(summary::TRANSPORT);
+    let whole = Whole { program: summary::PROGRAM, version: env!("CARGO_PKG_VERSION"), report };
+    let mut text = serde_json::to_string_pretty(&whole).map_err(ExportError::io("write", &path))?;
+    text.push('\n');
+    write_file(&path, text)?;
+    written.push(path);
+    Ok(written)
+}
+
+fn row(case: &Case) -> Row {
+    let (there, one) = (&case.round_trip, &case.one_way);
+    Row {
+        transport: case.transport,
+        work: case.work.name(),
+        poses: case.poses,
+        samples: case.samples,
+        lost: case.lost,
+        round_trip_p50: there.p50_seconds,
+        round_trip_p90: there.p90_seconds,
+        round_trip_p99: there.p99_seconds,
+        round_trip_p999: there.p999_seconds,
+        one_way_p50: one.p50_seconds,
+        one_way_p90: one.p90_seconds,
+        one_way_p99: one.p99_seconds,
+        one_way_p999: one.p999_seconds,
+        cpu_per_message: case.cpu_seconds_per_message,
+    }
+}
+
+/// Median round trip against poses, a line for each way, both axes logarithmic; one chart for each kind of work.
+pub fn figure(report: &Report) -> String {
+    let mut names: Vec<&'static str> = Vec::new();
+    report.cases.iter().map(|case| case.transport).for_each(|name| {
+        if !names.contains(&name) {
+            names.push(name);
+        }
+    });
+    let charts = Work::ALL.map(|work| {
+        let series = names.iter().enumerate().map(|(n, &name)| {
+            let of = report.cases.iter().filter(|case| case.work == work && case.transport == name);
+            let point = |case: &Case| Some([case.poses as f64, 1e6 * case.round_trip.p50_seconds?]);
+            let points = of.filter_map(point).collect();
+            Series { name: name.into(), colour: SERIES[n % SERIES.len()], style: Style::Front, points }
+        });
+        Chart {
+            title: work.words().into(),
+            note: format!("median round trip between two threads; {} bytes a pose", report.bytes_per_pose),
+            axes: [
+                Axis { quantity: "poses", unit: "", is_log: true },
+                Axis { quantity: "round trip", unit: "us", is_log: true },
+            ],
+            series: series.filter(|series| !series.points.is_empty()).collect(),
+            landmarks: Vec::new(),
+        }
+    });
+    draw_below_each_other(&charts)
+}

@@ -1,0 +1,86 @@
+//! The loop's end over ROS 2: poses and places of leaders in, `PoseStamped` targets out.
+
+use super::pose::{PoseSource, is_frame};
+use super::{NodeError, TopicOf};
+use crate::ros::edge::{EdgeError, Node, Publisher, Quality, Subscription};
+use crate::ros::messages::builtin_interfaces::Time;
+use crate::ros::messages::geometry_msgs::{Pose, PoseStamped};
+use crate::ros::messages::std_msgs::Header;
+use crate::scene::swarm::raw::RawNode;
+use crate::swarm::control::Control;
+use crate::swarm::control::part::Part;
+use crate::swarm::transport::{ControllerEnd, Heard, Target};
+
+/// Topics of the members.
+pub struct Link {
+    poses: PoseSource,
+    leaders: Vec<(usize, Subscription<PoseStamped>)>,
+    /// By member; none for those that others serve.
+    targets: Vec<Option<Publisher<PoseStamped>>>,
+    frame_id: String,
+    simulated_time: bool,
+}
+
+impl Link {
+    /// For a loop's part in a formation; under simulated time the computer's, by which DDS says when a message came,
+    /// means nothing.
+    pub fn open(
+        node: &Node,
+        raw: &RawNode,
+        control: &Control,
+        part: &Part,
+        simulated_time: bool,
+        topic: TopicOf<'_>,
+    ) -> Result<Self, NodeError> {
+        let formation = control.formation();
+        let mut leaders = Vec::new();
+        for m in formation.told().filter(|m| part.mine.contains(m)) {
+            leaders.push((m, node.subscription(&topic("/{name}/leader_pose", m)?, Quality::BEST_EFFORT)?));
+        }
+        let mut targets: Vec<_> = (0..formation.count()).map(|_| None).collect();
+        for &m in &part.mine {
+            targets[m] = Some(node.publisher(&topic(&raw.target_topic, m)?, Quality::reliable(1))?);
+        }
+        let poses = PoseSource::open(node, raw, &part.heard, topic)?;
+        Ok(Self { poses, leaders, targets, frame_id: raw.frame_id.clone(), simulated_time })
+    }
+}
+
+impl ControllerEnd for Link {
+    type Error = EdgeError;
+
+    fn hear(&mut self, now: f64, hear: &mut dyn FnMut(Heard)) {
+        let now = self.simulated_time.then_some(now);
+        self.poses.take(&self.frame_id, now, &mut |member, pose| hear(Heard::Pose(member, pose)));
+        for (member, topic) in &self.leaders {
+            let Some((message, _)) = topic.take_last() else { continue };
+            if is_frame(&message.header.frame_id, &self.frame_id) {
+                let place = message.pose.position;
+                hear(Heard::Leader(*member, [place.x, place.y]));
+            } else {
+                tracing::warn!(
+                    "{}: frame `{}` is not `{}`, which the swarm file names",
+                    topic.topic(),
+                    message.header.frame_id,
+                    self.frame_id
+                );
+            }
+        }
+    }
+
+    fn send(&mut self, now: f64, targets: &[Target]) -> Result<(), EdgeError> {
+        let header = Header { stamp: Time::from_seconds(now), frame_id: self.frame_id.clone() };
+        let mut outcome = Ok(());
+        for target in targets {
+            let Some(topic) = &self.targets[target.member] else { continue };
+            let pose = Pose::planar(target.position, target.yaw);
+            // Who does not take its own keeps nobody else from theirs.
+            outcome = outcome.and(topic.publish(&PoseStamped { header: header.clone(), pose }));
+        }
+        outcome
+    }
+
+    fn refused(&self) -> u64 {
+        self.poses.refused() + self.leaders.iter().map(|(_, topic)| topic.refused()).sum::<u64>()
+    }
+}

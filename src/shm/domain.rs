@@ -1,0 +1,101 @@
+//! Which processes meet: those of one domain on one computer.
+
+use iceoryx2::prelude::{Config, FileName, LogLevel, Node, NodeBuilder, NodeName, SignalHandlingMode, ipc};
+use iceoryx2::prelude::{SemanticString, set_log_level_from_env_or};
+
+use super::ShmError;
+
+/// Names the domain, as `ROS_DOMAIN_ID` does for ROS 2.
+pub const VARIABLE: &str = "FLOCKFORM_SHM_DOMAIN";
+
+/// A domain: iceoryx2's own unless named. Every file that iceoryx2 makes for a named one begins with `NAME_`, which is
+/// its configuration's `global.prefix`.
+#[derive(Clone, Debug)]
+pub struct Domain {
+    config: Config,
+}
+
+impl Domain {
+    /// The domain that the environment names.
+    ///
+    /// # Errors
+    /// A name that is none.
+    pub fn from_environment() -> Result<Self, ShmError> {
+        match std::env::var(VARIABLE) {
+            Ok(name) if !name.is_empty() => Self::named(&name),
+            _ => Ok(Self { config: Config::global_config().clone() }),
+        }
+    }
+
+    /// The domain of this name.
+    ///
+    /// # Errors
+    /// A name that is none.
+    pub fn named(name: &str) -> Result<Self, ShmError> {
+        let refused = || ShmError::Domain { variable: VARIABLE, name: name.to_owned() };
+        let is_allowed = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_');
+        if !(1..=32).contains(&name.len()) || !name.chars().all(is_allowed) {
+            return Err(refused());
+        }
+        let mut config = Config::global_config().clone();
+        config.global.prefix = FileName::new(format!("{name}_").as_bytes()).map_err(|_| refused())?;
+        Ok(Self { config })
+    }
+
+    /// Takes part under a name for diagnosis. What peers that died left behind is cleaned up.
+    ///
+    /// # Errors
+    /// A computer that gives no shared memory.
+    pub fn join(&self, name: &str) -> Result<Peer, ShmError> {
+        // Errors come back to the caller, who words them.
+        set_log_level_from_env_or(LogLevel::Fatal);
+        let refused = |reason: String| ShmError::Node { reason };
+        let name = NodeName::new(name).map_err(|error| refused(error.to_string()))?;
+        let node = NodeBuilder::new()
+            .name(&name)
+            .config(&self.config)
+            .signal_handling_mode(SignalHandlingMode::Disabled)
+            .create::<ipc::Service>()
+            .map_err(|error| refused(error.to_string()))?;
+        Ok(Peer { node, config: self.config.clone() })
+    }
+}
+
+/// A process's place in a domain, of one thread.
+#[derive(Debug)]
+pub struct Peer {
+    pub(super) node: Node<ipc::Service>,
+    pub(super) config: Config,
+}
+
+impl Peer {
+    /// What iceoryx2 knows it as, for services of one's own.
+    pub fn node(&self) -> &Node<ipc::Service> {
+        &self.node
+    }
+
+    /// Gives back what peers that died since held: their places among the readers and the slices they had borrowed.
+    pub fn clean_up(&self) {
+        let state = self.node.try_cleanup_dead_nodes();
+        if state.cleanups > 0 {
+            tracing::info!("cleaned up after {} peers that died", state.cleanups);
+        }
+        if state.failed_cleanups > 0 {
+            tracing::debug!("{} dead peers could not be cleaned up", state.failed_cleanups);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_domain_that_would_be_a_path_is_refused_by_name() {
+        for name in ["", "../x", "a b", &"x".repeat(33)] {
+            let error = Domain::named(name).expect_err("no domain").to_string();
+            assert!(error.contains(VARIABLE) && error.contains("help:"), "{error}");
+        }
+        assert!(Domain::named("lab-2_b").is_ok());
+    }
+}

@@ -1,0 +1,168 @@
+//! The ends of a [`transport`](crate::swarm::transport) over shared memory.
+
+use super::channel::MOST_AT_ONCE;
+use super::payload::{Leader, Pose as Wire, Target as WireTarget};
+use super::wait::Bell;
+use super::{Capacity, Peer, Reader, ShmError, Writer};
+use crate::swarm::control::Control;
+use crate::swarm::control::part::Part;
+use crate::swarm::transport::{ControllerEnd, Heard, RobotsEnd, Target};
+use crate::swarm::watch::Pose;
+
+pub const POSES: &str = "poses";
+pub const LEADERS: &str = "leaders";
+pub const TARGETS: &str = "targets";
+
+/// The loop's end.
+pub struct Controller {
+    poses: Reader<Wire>,
+    leaders: Reader<Leader>,
+    targets: Writer<WireTarget>,
+    /// Whose poses and places are taken, by member.
+    hears: Vec<bool>,
+    serves: Vec<bool>,
+    tick: u64,
+    refused: u64,
+}
+
+impl Controller {
+    /// Of a loop's part in the formation that its peers call `space`.
+    ///
+    /// # Errors
+    /// As [`Reader::open`] and [`Writer::open`].
+    pub fn open(peer: &Peer, space: &str, control: &Control, part: &Part) -> Result<Self, ShmError> {
+        let count = control.formation().count();
+        let among = |members: &[usize]| {
+            let mut all = vec![false; count];
+            members.iter().for_each(|&member| all[member] = true);
+            all
+        };
+        Ok(Self {
+            poses: Reader::open(peer, space, POSES, &Capacity::SWARM)?,
+            leaders: Reader::open(peer, space, LEADERS, &Capacity::SWARM)?,
+            targets: Writer::open(peer, space, TARGETS, &Capacity::SWARM, part.mine.len())?,
+            hears: among(&part.heard),
+            serves: among(&part.mine),
+            tick: 0,
+            refused: 0,
+        })
+    }
+
+    /// What rings when poses or places of leaders arrive.
+    pub fn bells(&self) -> Vec<Bell> {
+        vec![self.poses.bell(), self.leaders.bell()]
+    }
+}
+
+impl ControllerEnd for Controller {
+    type Error = ShmError;
+
+    fn hear(&mut self, now: f64, hear: &mut dyn FnMut(Heard)) {
+        self.poses.still();
+        self.leaders.still();
+        let count = self.hears.len();
+        for slice in std::iter::from_fn(|| self.poses.take()).take(MOST_AT_ONCE) {
+            for wire in slice.iter() {
+                let member = wire.member as usize;
+                if member >= count {
+                    self.refused += 1;
+                } else if self.hears[member] {
+                    hear(Heard::Pose(member, pose(wire, now)));
+                }
+            }
+        }
+        for slice in std::iter::from_fn(|| self.leaders.take()).take(MOST_AT_ONCE) {
+            for leader in slice.iter() {
+                let member = leader.member as usize;
+                if member >= count {
+                    self.refused += 1;
+                } else if self.serves[member] {
+                    hear(Heard::Leader(member, leader.position));
+                }
+            }
+        }
+    }
+
+    fn send(&mut self, now: f64, targets: &[Target]) -> Result<(), ShmError> {
+        self.tick += 1;
+        if targets.is_empty() {
+            return Ok(());
+        }
+        self.targets.send(now, self.tick, targets.len(), |k| {
+            let Target { member, position, yaw } = targets[k];
+            WireTarget { member: member as u32, reserved: 0, position, yaw }
+        })
+    }
+
+    fn refused(&self) -> u64 {
+        self.refused + self.poses.refused() + self.leaders.refused()
+    }
+}
+
+/// The robots' end: of all of them, or of one.
+pub struct Robots {
+    poses: Writer<Wire>,
+    targets: Reader<WireTarget>,
+    count: usize,
+    period: u64,
+}
+
+impl Robots {
+    /// Of `count` robots of the formation that its peers call `space`.
+    ///
+    /// # Errors
+    /// As [`Reader::open`] and [`Writer::open`].
+    pub fn open(peer: &Peer, space: &str, count: usize) -> Result<Self, ShmError> {
+        Ok(Self {
+            poses: Writer::open(peer, space, POSES, &Capacity::SWARM, count)?,
+            targets: Reader::open(peer, space, TARGETS, &Capacity::SWARM)?,
+            count,
+            period: 0,
+        })
+    }
+
+    /// What rings when targets arrive.
+    pub fn bell(&self) -> Bell {
+        self.targets.bell()
+    }
+}
+
+impl RobotsEnd for Robots {
+    type Error = ShmError;
+
+    fn say(&mut self, now: f64, poses: &[(usize, Pose)]) -> Result<(), ShmError> {
+        self.period += 1;
+        // Delays and duplicates may make more poses than robots.
+        for some in poses.chunks(self.count.max(1)) {
+            self.poses.send(now, self.period, some.len(), |k| wire(&some[k]))?;
+        }
+        Ok(())
+    }
+
+    fn targets(&mut self, go: &mut dyn FnMut(usize, [f64; 2])) {
+        self.targets.still();
+        for slice in std::iter::from_fn(|| self.targets.take()).take(MOST_AT_ONCE) {
+            slice.iter().for_each(|target| go(target.member as usize, target.position));
+        }
+    }
+}
+
+/// A pose with its stamp; one that bears none was measured when it arrived.
+fn pose(wire: &Wire, now: f64) -> Pose {
+    Pose {
+        position: wire.position,
+        yaw: wire.yaw,
+        stamp: if wire.stamp == 0.0 { now } else { wire.stamp },
+        frame_is_right: wire.frame == 0,
+    }
+}
+
+fn wire((member, pose): &(usize, Pose)) -> Wire {
+    Wire {
+        member: *member as u32,
+        frame: u32::from(!pose.frame_is_right),
+        position: pose.position,
+        yaw: pose.yaw,
+        stamp: pose.stamp,
+    }
+}

@@ -1,0 +1,72 @@
+//! The edge to shared memory: poses in, targets and formation state out, and a running body to look at, between
+//! processes of one computer without a copy (iceoryx2).
+//!
+//! Every service is a pair: publish and subscribe of slices, and an event that wakes who waits for them. Who writes
+//! borrows a slice of shared memory, fills it in place and hands it over; who reads borrows it. Nobody polls, and
+//! whoever is slow or dead holds nobody up: the oldest slice in a full queue gives way.
+//!
+//! | service | elements | from |
+//! |---|---|---|
+//! | `flockform/SWARM/poses` | [`payload::Pose`] | the robots |
+//! | `flockform/SWARM/leaders` | [`payload::Leader`] | who moves leaders from outside |
+//! | `flockform/SWARM/commands` | [`payload::Command`] | who may stop the formation |
+//! | `flockform/SWARM/targets` | [`payload::Target`] | the node |
+//! | `flockform/SWARM/state` | one [`payload::Formation`] | the node |
+//! | `flockform/SWARM/members` | [`payload::Member`] | the node |
+//! | `flockform/NAME/positions` | [`payload::Particle`] | `flockform run --publish NAME` |
+//!
+//! `SWARM` is the name of the swarm file without its ending. All carry [`payload::Header`] as user header. Types are
+//! told apart by name, and the name bears a version: another one is refused ([`ShmError::Type`]).
+//!
+//! * [`domain`]: which processes meet. [`channel`]: a service's two sides. [`wait`]: sleeping until there is something.
+//! * [`link`]: the ends of a [`transport`](crate::swarm::transport). [`node`], [`robots`]: the loop and the robots on top.
+//! * [`positions`]: a body under way.
+
+pub mod channel;
+pub mod domain;
+pub mod link;
+pub mod node;
+pub mod payload;
+pub mod positions;
+pub mod robots;
+pub mod wait;
+
+pub use channel::{Capacity, Reader, Writer};
+pub use domain::{Domain, Peer};
+pub use node::FormationNode;
+pub use robots::SimulatedRobots;
+
+use crate::scene::SceneError;
+use crate::swarm::control::part::PartError;
+
+/// Why something over shared memory could not be made or sent.
+#[derive(Debug, thiserror::Error)]
+pub enum ShmError {
+    #[error("{0}")]
+    Swarm(#[from] SceneError),
+    #[error("{0}")]
+    Part(#[from] PartError),
+    #[error(
+        "{variable}={name:?} is no domain\n  help: give 1 to 32 letters, digits, `-` and `_`, or unset it for iceoryx2's own"
+    )]
+    Domain { variable: &'static str, name: String },
+    #[error(
+        "{name:?} is no name of a service: {reason}\n  help: give 1 to 64 letters, digits, `-`, `_` and `.`"
+    )]
+    Name { name: String, reason: &'static str },
+    #[error(
+        "no place in shared memory: {reason}\n  help: is the folder of iceoryx2 (its root path, and /dev/shm) writable?"
+    )]
+    Node { reason: String },
+    #[error(
+        "{service} carries `{found}`, and this program speaks `{expected}`\n  help: use programs of one version, or keep them apart by {variable}",
+        variable = domain::VARIABLE
+    )]
+    Type { service: String, found: String, expected: String },
+    #[error("{service}: {reason}\n  help: {help}")]
+    Service { service: String, reason: String, help: String },
+    #[error("{service}: not sent: {reason}")]
+    Send { service: String, reason: String },
+    #[error("cannot wait for what arrives: {reason}")]
+    Wait { reason: String },
+}

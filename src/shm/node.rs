@@ -1,0 +1,194 @@
+//! `flockform node --transport shm`: the control loop over shared memory.
+//!
+//! The loop that ROS 2 has too: it ticks at a steady rate and sleeps between, woken by poses so that their queues stay
+//! short.
+
+use std::sync::atomic::AtomicBool;
+use std::time::{Duration, Instant};
+
+use super::link::Controller;
+use super::payload::{Command, Formation, Member};
+use super::{Capacity, Domain, Peer, Reader, ShmError, Writer, wait};
+use crate::scene::swarm::Swarm;
+use crate::swarm::control::part::Part;
+use crate::swarm::control::state::{FormationState, MemberState};
+use crate::swarm::control::{Control, Mode};
+use crate::swarm::pace::{Due, Pace, system_time};
+use crate::swarm::transport::{listen, serve};
+use crate::swarm::watch::Health;
+
+pub const COMMANDS: &str = "commands";
+pub const STATE: &str = "state";
+pub const MEMBERS: &str = "members";
+
+/// Between two states \[s\].
+const STATE_PERIOD: f64 = 0.1;
+/// Between two looks for peers that died \[s\].
+const CLEANING_PERIOD: f64 = 1.0;
+
+/// A formation's node.
+pub struct FormationNode {
+    pace: Pace,
+    control: Control,
+    part: Part,
+    end: Controller,
+    commands: Reader<Command>,
+    state: Writer<Formation>,
+    members: Writer<Member>,
+    missed: u64,
+    unsent: u64,
+    elapsed: f64,
+    // Dropped after all that was made from it.
+    peer: Peer,
+}
+
+impl FormationNode {
+    /// Takes part in the domain: for all members, or for one that hears none but itself and its neighbours.
+    ///
+    /// # Errors
+    /// What in the swarm file or in shared memory stands in the way.
+    pub fn open(swarm: &Swarm, domain: &Domain, member: Option<&str>) -> Result<Self, ShmError> {
+        let mut control = Control::new(swarm)?;
+        let part = Part::take(swarm, &mut control, member)?;
+        let peer = domain.join("flockform_node")?;
+        let (space, capacity) = (&swarm.name, &Capacity::SWARM);
+        Ok(Self {
+            pace: Pace::new(1.0 / control.period()),
+            end: Controller::open(&peer, space, &control, &part)?,
+            commands: Reader::open(&peer, space, COMMANDS, capacity)?,
+            state: Writer::open(&peer, space, STATE, capacity, 1)?,
+            members: Writer::open(&peer, space, MEMBERS, capacity, control.formation().count())?,
+            missed: 0,
+            unsent: 0,
+            elapsed: 0.0,
+            part,
+            control,
+            peer,
+        })
+    }
+
+    pub fn control(&self) -> &Control {
+        &self.control
+    }
+
+    /// Ticks until `stop` is set.
+    ///
+    /// # Errors
+    /// As [`wait::keep`].
+    pub fn run(&mut self, stop: &AtomicBool) -> Result<(), ShmError> {
+        let mut bells = self.end.bells();
+        bells.push(self.commands.bell());
+        wait::keep(&bells, stop, &mut |arrived| {
+            if arrived {
+                self.obey();
+                listen(&mut self.control, &mut self.end, system_time());
+            }
+            loop {
+                match self.pace.due() {
+                    Due::In(rest) => return Duration::from_secs_f64(rest),
+                    Due::Now { missed } => {
+                        self.missed += missed;
+                        self.tick();
+                    }
+                }
+            }
+        })
+    }
+
+    /// One period: what arrived, the tick, what is sent.
+    pub fn tick(&mut self) {
+        let begun = Instant::now();
+        let now = system_time();
+        self.obey();
+        let sent = serve(&mut self.control, &self.part, &mut self.end, now);
+        self.note(sent);
+        self.elapsed = begun.elapsed().as_secs_f64();
+        if self.every(STATE_PERIOD) {
+            let sent = self.report(now);
+            self.note(sent);
+        }
+        if self.every(CLEANING_PERIOD) {
+            self.peer.clean_up();
+        }
+    }
+
+    /// Whether what is due so often \[s\] is due in this tick.
+    fn every(&self, period: f64) -> bool {
+        let ticks = (period / self.control.period()).round().max(1.0) as u64;
+        self.control.ticks().is_multiple_of(ticks)
+    }
+
+    fn obey(&mut self) {
+        self.commands.still();
+        while let Some(slice) = self.commands.take() {
+            for command in slice.iter() {
+                match command.kind {
+                    Command::EMERGENCY_STOP => self.control.emergency_stop(),
+                    Command::RESUME => {
+                        self.control.resume();
+                    }
+                    other => tracing::warn!("{}: there is no command {other}", self.commands.service()),
+                }
+            }
+        }
+    }
+
+    fn note(&mut self, sent: Result<(), ShmError>) {
+        if let Err(error) = sent {
+            if self.unsent == 0 {
+                tracing::warn!("{error} (only the first is reported)");
+            }
+            self.unsent += 1;
+        }
+    }
+
+    fn report(&mut self, now: f64) -> Result<(), ShmError> {
+        let state = FormationState::of(&self.control);
+        let nan = |value: Option<f64>| value.unwrap_or(f64::NAN);
+        let formation = Formation {
+            mode: match state.mode {
+                Mode::Running => Formation::RUNNING,
+                Mode::EmergencyStopped => Formation::EMERGENCY_STOPPED,
+                Mode::Inactive => Formation::INACTIVE,
+            },
+            members: state.members.len() as u32,
+            formation_error: nan(state.formation_error),
+            clearance: state.clearance,
+            pe1_sum: state.pe1_sum,
+            strain_max: state.strain_max,
+            elapsed: self.elapsed,
+        };
+        self.state.send(now, state.tick, 1, |_| formation)?;
+        let names = &self.control.formation().names;
+        let members = &state.members;
+        self.members.send(now, state.tick, members.len(), |k| wire(k, &names[k], &members[k]))
+    }
+}
+
+fn wire(number: usize, name: &str, member: &MemberState) -> Member {
+    let point = |place: Option<[f64; 2]>| place.unwrap_or([f64::NAN; 2]);
+    let nan = |value: Option<f64>| value.unwrap_or(f64::NAN);
+    Member {
+        member: number as u32,
+        role: u32::from(!member.leads),
+        health: match member.health {
+            Health::Waiting => 0,
+            Health::Fresh => 1,
+            Health::Held => 2,
+            Health::Degraded => 3,
+            Health::Stopped => 4,
+        },
+        flags: member.flags,
+        position: point(member.position),
+        target: point(member.target),
+        settled: point(member.settled),
+        displacement: point(member.displacement),
+        pe1: member.pe1,
+        strain: member.strain.unwrap_or([f64::NAN; 3]),
+        rotation: nan(member.rotation),
+        age: nan(member.age),
+        clearance: member.clearance,
+        to_settled: nan(member.to_settled()),
+        name: Member::name_of(name),
+    }
+}

@@ -1,0 +1,82 @@
+//! A body under way, for other processes to look at: its positions after every step.
+//!
+//! The positions are written once, from the engine into a slice of shared memory, and read there. A step is
+//! published to whoever reads at that moment; with nobody there it costs a look at a counter.
+
+use super::payload::Particle;
+use super::{Capacity, Domain, Peer, Reader, ShmError, Writer};
+use crate::continuum::engine::Engine;
+use crate::flock::role::Role;
+use crate::swarm::pace::system_time;
+
+pub const POSITIONS: &str = "positions";
+
+/// Steps between two looks for readers that died.
+const CLEANING: usize = 1000;
+
+/// Publishes a body's positions.
+pub struct Positions {
+    writer: Writer<Particle>,
+    unsent: u64,
+    // Dropped after all that was made from it.
+    peer: Peer,
+}
+
+impl Positions {
+    /// As `flockform/NAME/positions`, of a body of so many particles.
+    ///
+    /// # Errors
+    /// A name that is none, one under which a body is published already, or too little memory.
+    pub fn open(domain: &Domain, name: &str, particles: usize) -> Result<Self, ShmError> {
+        let peer = domain.join("flockform_run")?;
+        let writer = Writer::open(&peer, name, POSITIONS, &Capacity::BODY, particles)?;
+        Ok(Self { writer, unsent: 0, peer })
+    }
+
+    /// Shows the body as it is. Never waits, and never fails: what readers that hold too much leave no room for is
+    /// left out and counted.
+    pub fn show(&mut self, engine: &Engine) {
+        let step = engine.step();
+        if step.is_multiple_of(CLEANING) {
+            self.peer.clean_up();
+        }
+        if self.writer.readers() == 0 {
+            return;
+        }
+        let (present, roles) = (engine.present(), engine.roles());
+        let particle = |i: usize| Particle {
+            id: i as u32 + 1,
+            role: code(roles[i]),
+            position: [present.x[i], present.y[i]],
+        };
+        if let Err(error) = self.writer.send(system_time(), step as u64, present.len(), particle) {
+            if self.unsent == 0 {
+                tracing::debug!("{error} (only the first is reported)");
+            }
+            self.unsent += 1;
+        }
+    }
+
+    /// Steps that could not be shown \[1\].
+    pub fn unsent(&self) -> u64 {
+        self.unsent
+    }
+}
+
+fn code(role: Role) -> u32 {
+    match role {
+        Role::Follower => 0,
+        Role::Leader => 1,
+        Role::Clamped => 2,
+        Role::Frame => 3,
+        Role::Ghost => 4,
+    }
+}
+
+/// Reads a body's positions as they are published.
+///
+/// # Errors
+/// As [`Reader::open`].
+pub fn read(peer: &Peer, name: &str) -> Result<Reader<Particle>, ShmError> {
+    Reader::open(peer, name, POSITIONS, &Capacity::BODY)
+}

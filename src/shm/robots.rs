@@ -1,0 +1,77 @@
+//! `flockform robots --transport shm`: the simulated robots of a swarm file over shared memory.
+
+use std::sync::atomic::AtomicBool;
+use std::time::Duration;
+
+use super::link::Robots;
+use super::{Domain, Peer, ShmError, wait};
+use crate::scene::swarm::Swarm;
+use crate::swarm::control::Control;
+use crate::swarm::flight::Fleet;
+use crate::swarm::pace::{Due, Pace, system_time};
+use crate::swarm::transport::{RobotsEnd, aim, fly};
+
+/// The robots, and the end they speak through.
+pub struct SimulatedRobots {
+    fleet: Fleet,
+    pace: Pace,
+    goals: Vec<Option<[f64; 2]>>,
+    end: Robots,
+    // Dropped after all that was made from it.
+    peer: Peer,
+}
+
+/// Periods between two looks for peers that died.
+const CLEANING: u64 = 50;
+
+impl SimulatedRobots {
+    /// # Errors
+    /// What in the swarm file or in shared memory stands in the way.
+    pub fn open(swarm: &Swarm, domain: &Domain) -> Result<Self, ShmError> {
+        let control = Control::new(swarm)?;
+        let formation = control.formation();
+        let peer = domain.join("flockform_robots")?;
+        Ok(Self {
+            fleet: Fleet::new(swarm, formation)?,
+            pace: Pace::new(1.0 / control.period()),
+            goals: vec![None; formation.count()],
+            end: Robots::open(&peer, &swarm.name, formation.count())?,
+            peer,
+        })
+    }
+
+    pub fn fleet(&self) -> &Fleet {
+        &self.fleet
+    }
+
+    /// Flies until `stop` is set.
+    ///
+    /// # Errors
+    /// As [`wait::keep`].
+    pub fn run(&mut self, stop: &AtomicBool) -> Result<(), ShmError> {
+        let bell = self.end.bell();
+        wait::keep(&[bell], stop, &mut |arrived| {
+            if arrived {
+                let Self { goals, end, .. } = self;
+                end.targets(&mut |member, place| aim(goals, member, place));
+            }
+            loop {
+                match self.pace.due() {
+                    Due::In(rest) => return Duration::from_secs_f64(rest),
+                    Due::Now { .. } => self.tick(),
+                }
+            }
+        })
+    }
+
+    /// One period: targets in, poses out.
+    pub fn tick(&mut self) {
+        let Self { fleet, goals, end, .. } = self;
+        if let Err(error) = fly(fleet, goals, end, |_| system_time()) {
+            tracing::debug!("{error}");
+        }
+        if self.fleet.period().is_multiple_of(CLEANING) {
+            self.peer.clean_up();
+        }
+    }
+}

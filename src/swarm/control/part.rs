@@ -1,0 +1,65 @@
+//! Whose targets a loop computes, and whom it has to hear for them: all, or one robot's own.
+
+use super::Control;
+use crate::scene::swarm::Swarm;
+
+/// The members that a loop serves, and those that it hears. By number, ascending.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Part {
+    pub mine: Vec<usize>,
+    pub heard: Vec<usize>,
+}
+
+/// Why a robot cannot be served alone.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum PartError {
+    #[error("--member {name}: there is no such robot\n  help: they are called `{first}` to `{last}`")]
+    Member { name: String, first: String, last: String },
+    #[error("--member {name}: {why}\n  help: run one node for all, without --member")]
+    NotAlone { name: String, why: &'static str },
+}
+
+impl Part {
+    /// The loop's part: of this robot, or of all; the loop then expects no other poses than it hears.
+    ///
+    /// # Errors
+    /// A name that is no robot's, or a robot whose target depends on more than its neighbours.
+    pub fn take(swarm: &Swarm, control: &mut Control, member: Option<&str>) -> Result<Self, PartError> {
+        let formation = control.formation();
+        let part = match member {
+            None => {
+                let all: Vec<usize> = (0..formation.count()).collect();
+                Self { mine: all.clone(), heard: all }
+            }
+            Some(name) => {
+                let m = only(swarm, control, name)?;
+                let mut heard = formation.depends_on(m);
+                heard.push(m);
+                heard.sort_unstable();
+                Self { mine: vec![m], heard }
+            }
+        };
+        control.listen_to(&part.heard);
+        Ok(part)
+    }
+}
+
+/// The number of the robot that the loop is alone for.
+fn only(swarm: &Swarm, control: &Control, name: &str) -> Result<usize, PartError> {
+    let formation = control.formation();
+    let number = formation.number(name).ok_or_else(|| PartError::Member {
+        name: name.to_owned(),
+        first: formation.names[0].clone(),
+        last: formation.names[formation.count() - 1].clone(),
+    })?;
+    let refuse = |why| Err(PartError::NotAlone { name: name.to_owned(), why });
+    if swarm.raw.control.sweeps > 1 {
+        return refuse("control.sweeps above 1 needs to see the whole formation");
+    }
+    if !formation.can_be_followed_alone() {
+        return refuse(
+            "robots that a body carries, or that are swept one after another, depend on all others",
+        );
+    }
+    Ok(number)
+}

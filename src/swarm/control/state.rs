@@ -1,0 +1,125 @@
+//! What the last tick left, as every edge publishes it.
+
+use super::{Control, Mode, NEIGHBOUR_LOST, POSE_REJECTED, TRIMMED};
+use crate::flock::points::distance;
+use crate::swarm::safety::Flags;
+use crate::swarm::watch::Health;
+
+/// How the formation is.
+#[derive(Clone, Debug)]
+pub struct FormationState {
+    pub tick: u64,
+    pub mode: Mode,
+    /// \[m\]; absent where the rule has no single place of rest.
+    pub formation_error: Option<f64>,
+    /// Smallest of the members' \[m\].
+    pub clearance: f64,
+    /// \[m^2\].
+    pub pe1_sum: f64,
+    /// Principal strain largest in size \[1\].
+    pub strain_max: f64,
+    pub members: Vec<MemberState>,
+}
+
+/// How one member is. Positions in \[m, world frame\].
+#[derive(Clone, Copy, Debug)]
+pub struct MemberState {
+    pub leads: bool,
+    pub health: Health,
+    pub position: Option<[f64; 2]>,
+    /// After the safety filter.
+    pub target: Option<[f64; 2]>,
+    /// Where the rule comes to rest with the leaders as they are.
+    pub settled: Option<[f64; 2]>,
+    /// From the nominal place \[m\].
+    pub displacement: Option<[f64; 2]>,
+    /// \[m^2\].
+    pub pe1: f64,
+    /// xx, yy, xy \[1\]; absent for those that see too few.
+    pub strain: Option<[f64; 3]>,
+    /// \[rad\].
+    pub rotation: Option<f64>,
+    /// Of the pose \[s\].
+    pub age: Option<f64>,
+    /// To the nearest robot or obstacle, hull to hull \[m\].
+    pub clearance: f64,
+    /// Bits as [`published_flags`] orders them.
+    pub flags: u32,
+}
+
+impl MemberState {
+    /// From position to settled \[m\].
+    pub fn to_settled(&self) -> Option<f64> {
+        self.position.zip(self.settled).map(|(position, settled)| distance(position, settled))
+    }
+}
+
+impl FormationState {
+    pub fn of(control: &Control) -> Self {
+        let formation = control.formation();
+        let measures = control.measures();
+        let settled = control.settled();
+        let mut clearances = Vec::new();
+        control.clearance(&mut clearances);
+        let member = |m: usize| {
+            let position = control.position(m);
+            let [px, py] = formation.places.get(m);
+            let strain = measures.strain[m];
+            MemberState {
+                leads: formation.leads(m),
+                health: control.health(m),
+                position,
+                target: control.target(m),
+                settled: settled.as_ref().map(|rest| rest.get(m)),
+                displacement: position.map(|[x, y]| [x - px, y - py]),
+                pe1: measures.pe1[m],
+                strain: strain.map(|strain| strain.components),
+                rotation: strain.map(|strain| strain.rotation),
+                age: control.age(m),
+                clearance: clearances[m],
+                flags: published_flags(control.flags(m)),
+            }
+        };
+        Self {
+            tick: control.ticks(),
+            mode: control.mode(),
+            formation_error: control.formation_error(),
+            clearance: clearances.iter().copied().fold(f64::INFINITY, f64::min),
+            pe1_sum: measures.pe1.iter().sum(),
+            strain_max: measures.strain.iter().flatten().map(|strain| strain.largest()).fold(0.0, f64::max),
+            members: (0..formation.count()).map(member).collect(),
+        }
+    }
+}
+
+/// The loop's bits, in the order in which `flockform_msgs/MemberState` and the shared memory publish them, from
+/// the lowest bit on.
+const PUBLISHED: [u32; 9] = [
+    Flags::SPEED_LIMITED,
+    Flags::ACCELERATION_LIMITED,
+    Flags::GEOFENCED,
+    Flags::SEPARATED,
+    Flags::OBSTRUCTED,
+    Flags::RESOLVING_DEADLOCK,
+    NEIGHBOUR_LOST,
+    TRIMMED,
+    POSE_REJECTED,
+];
+
+/// The loop's bits as they are published.
+pub fn published_flags(bits: u32) -> u32 {
+    PUBLISHED.iter().enumerate().map(|(k, own)| u32::from(bits & own != 0) << k).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_the_filter_and_the_loop_say_is_published_in_one_order() {
+        let all: u32 = PUBLISHED.iter().sum();
+        assert_eq!(published_flags(all), 0b1_1111_1111);
+        assert_eq!(published_flags(Flags::SPEED_LIMITED | POSE_REJECTED), 1 | 256);
+        assert_eq!(published_flags(Flags::HELD), 0, "what is no bit of the messages is not published");
+    }
+}

@@ -1,0 +1,118 @@
+//! Two ends in one process: a loop in one thread, its robots in another.
+
+use std::collections::VecDeque;
+use std::convert::Infallible;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use super::{ControllerEnd, Heard, RobotsEnd, Target};
+use crate::swarm::watch::Pose;
+
+/// Poses, and targets, of one member that wait to be taken at most \[1\].
+const DEPTH: usize = 64;
+
+/// A queue for every member, where the oldest gives way.
+#[derive(Debug)]
+struct Queues<T> {
+    members: Mutex<Vec<VecDeque<T>>>,
+}
+
+impl<T> Queues<T> {
+    fn new(count: usize) -> Self {
+        Self { members: Mutex::new((0..count).map(|_| VecDeque::new()).collect()) }
+    }
+
+    /// How many of them are of no member.
+    fn push(&self, all: impl Iterator<Item = (usize, T)>) -> u64 {
+        let mut members = self.members.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut strangers = 0;
+        for (member, one) in all {
+            let Some(queue) = members.get_mut(member) else {
+                strangers += 1;
+                continue;
+            };
+            if queue.len() == DEPTH {
+                queue.pop_front();
+            }
+            queue.push_back(one);
+        }
+        strangers
+    }
+
+    fn take(&self, mut each: impl FnMut(usize, T)) {
+        let mut members = self.members.lock().unwrap_or_else(PoisonError::into_inner);
+        for (member, queue) in members.iter_mut().enumerate() {
+            queue.drain(..).for_each(|one| each(member, one));
+        }
+    }
+}
+
+#[derive(Debug)]
+struct Shared {
+    poses: Queues<Pose>,
+    targets: Queues<[f64; 2]>,
+    leaders: Queues<[f64; 2]>,
+    refused: Mutex<u64>,
+}
+
+/// The loop's end.
+#[derive(Clone, Debug)]
+pub struct Controller(Arc<Shared>);
+
+/// The robots' end; clones speak for others of them.
+#[derive(Clone, Debug)]
+pub struct Robots(Arc<Shared>);
+
+/// The two ends of a formation of so many members.
+pub fn join(count: usize) -> (Controller, Robots) {
+    let shared = Arc::new(Shared {
+        poses: Queues::new(count),
+        targets: Queues::new(count),
+        leaders: Queues::new(count),
+        refused: Mutex::new(0),
+    });
+    (Controller(Arc::clone(&shared)), Robots(shared))
+}
+
+impl Robots {
+    /// Where a leader that is moved from outside shall go \[m\].
+    pub fn lead(&self, member: usize, place: [f64; 2]) {
+        self.0.leaders.push(std::iter::once((member, place)));
+    }
+
+    /// The loop's end again, for a loop that comes back.
+    pub fn controller(&self) -> Controller {
+        Controller(Arc::clone(&self.0))
+    }
+}
+
+impl ControllerEnd for Controller {
+    type Error = Infallible;
+
+    fn hear(&mut self, _now: f64, hear: &mut dyn FnMut(Heard)) {
+        self.0.poses.take(|member, pose| hear(Heard::Pose(member, pose)));
+        self.0.leaders.take(|member, place| hear(Heard::Leader(member, place)));
+    }
+
+    fn send(&mut self, _now: f64, targets: &[Target]) -> Result<(), Infallible> {
+        self.0.targets.push(targets.iter().map(|target| (target.member, target.position)));
+        Ok(())
+    }
+
+    fn refused(&self) -> u64 {
+        *self.0.refused.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl RobotsEnd for Robots {
+    type Error = Infallible;
+
+    fn say(&mut self, _now: f64, poses: &[(usize, Pose)]) -> Result<(), Infallible> {
+        let strangers = self.0.poses.push(poses.iter().copied());
+        *self.0.refused.lock().unwrap_or_else(PoisonError::into_inner) += strangers;
+        Ok(())
+    }
+
+    fn targets(&mut self, go: &mut dyn FnMut(usize, [f64; 2])) {
+        self.0.targets.take(go);
+    }
+}

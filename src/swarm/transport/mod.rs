@@ -1,0 +1,155 @@
+//! What carries poses in and targets out: one loop, whatever lies between the robots and the computer.
+//!
+//! A transport has two ends. The loop holds a [`ControllerEnd`] and calls [`serve`] once a period; robots, or
+//! those who simulate them, hold a [`RobotsEnd`] and call [`fly`]. There are three: [`in_process`] here, shared
+//! memory in room `shm`, ROS 2 in room `ros`. The tests hold all of them to one list of promises:
+//!
+//! * Poses of one member come in the order they were said, or not at all: the newest matters, and a queue that is
+//!   full drops the oldest. Whoever sends never waits for whoever receives.
+//! * An end that comes late, goes away, comes back or is killed harms nobody else.
+//! * A payload that is no pose of a member is left out and counted.
+
+pub mod in_process;
+
+use super::control::Control;
+use super::control::part::Part;
+use super::flight::Fleet;
+use super::watch::Pose;
+
+/// What reaches the loop.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Heard {
+    /// Where a member is.
+    Pose(usize, Pose),
+    /// Where a leader that is moved from outside shall go \[m\].
+    Leader(usize, [f64; 2]),
+}
+
+/// Where a member shall go next.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Target {
+    pub member: usize,
+    /// \[m, world frame\]
+    pub position: [f64; 2],
+    /// Where it shall look \[rad\].
+    pub yaw: f64,
+}
+
+/// The loop's end.
+pub trait ControllerEnd {
+    type Error: std::error::Error;
+
+    /// Tells `hear` all that arrived since the last call, without waiting; `now` \[s\] stamps what bears no stamp.
+    fn hear(&mut self, now: f64, hear: &mut dyn FnMut(Heard));
+
+    /// Sends the targets of a tick, without waiting.
+    ///
+    /// # Errors
+    /// The first that was not sent.
+    fn send(&mut self, now: f64, targets: &[Target]) -> Result<(), Self::Error>;
+
+    /// Payloads that were none, since the beginning \[1\].
+    fn refused(&self) -> u64;
+}
+
+/// The robots' end.
+pub trait RobotsEnd {
+    type Error: std::error::Error;
+
+    /// Sends poses of members, without waiting.
+    ///
+    /// # Errors
+    /// The first that was not sent.
+    fn say(&mut self, now: f64, poses: &[(usize, Pose)]) -> Result<(), Self::Error>;
+
+    /// Tells `go` the targets that arrived since the last call \[m\]; of one member's the newest comes last.
+    fn targets(&mut self, go: &mut dyn FnMut(usize, [f64; 2]));
+}
+
+/// The first half of a period: hears what arrived, and ticks.
+pub fn listen<E: ControllerEnd>(control: &mut Control, end: &mut E, now: f64) {
+    end.hear(now, &mut |heard| match heard {
+        Heard::Pose(member, pose) => {
+            if let Err(rejection) = control.receive(member, pose, now) {
+                tracing::debug!("{}: {rejection}", control.formation().names[member]);
+            }
+        }
+        Heard::Leader(member, place) => {
+            control.tell(member, place);
+        }
+    });
+}
+
+/// One period of the loop at `now` \[s\]: what arrived, the tick, the targets of those it serves.
+///
+/// # Errors
+/// The first target that was not sent; the tick is done all the same.
+pub fn serve<E: ControllerEnd>(
+    control: &mut Control,
+    part: &Part,
+    end: &mut E,
+    now: f64,
+) -> Result<(), E::Error> {
+    listen(control, end, now);
+    control.tick(now);
+    end.send(now, &targets(control, part))
+}
+
+/// The targets of the last tick.
+pub fn targets(control: &Control, part: &Part) -> Vec<Target> {
+    let target = |&member: &usize| {
+        let position = control.target(member)?;
+        let here = control.position(member).unwrap_or(position);
+        // A target says where to look too: ahead, or where the robot looks now.
+        let yaw = match [position[0] - here[0], position[1] - here[1]] {
+            [0.0, 0.0] => control.yaw(member).unwrap_or(0.0),
+            [x, y] => y.atan2(x),
+        };
+        Some(Target { member, position, yaw })
+    };
+    part.mine.iter().filter_map(target).collect()
+}
+
+/// One period of simulated robots: everybody goes towards the newest of its `goals` \[m\], and says where it is at
+/// the time \[s\] that `now` gives.
+///
+/// # Errors
+/// The first pose that was not sent; the robots have flown all the same.
+pub fn fly<E: RobotsEnd>(
+    fleet: &mut Fleet,
+    goals: &mut [Option<[f64; 2]>],
+    end: &mut E,
+    now: impl FnOnce(&Fleet) -> f64,
+) -> Result<(), E::Error> {
+    end.targets(&mut |member, place| aim(goals, member, place));
+    fleet.go(|member| goals[member]);
+    let now = now(fleet);
+    let mut said = Vec::new();
+    fleet.say(now, &mut |member, pose| said.push((member, pose)));
+    end.say(now, &said)
+}
+
+/// Takes a target for a robot's goal \[m\]; one that is not finite, or of no robot, changes nothing.
+pub fn aim(goals: &mut [Option<[f64; 2]>], member: usize, place: [f64; 2]) {
+    if place.iter().all(|value| value.is_finite())
+        && let Some(goal) = goals.get_mut(member)
+    {
+        *goal = Some(place);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_target_that_is_not_finite_or_of_nobody_moves_nobody() {
+        let mut goals = [Some([1.0, 2.0]), None];
+        aim(&mut goals, 0, [f64::NAN, 0.0]);
+        aim(&mut goals, 1, [0.0, f64::INFINITY]);
+        aim(&mut goals, 2, [0.0, 0.0]);
+        assert_eq!(goals, [Some([1.0, 2.0]), None]);
+        aim(&mut goals, 1, [3.0, 4.0]);
+        assert_eq!(goals[1], Some([3.0, 4.0]));
+    }
+}

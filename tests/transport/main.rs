@@ -1,0 +1,15 @@
+//! What every transport promises, kept by each of them: within a process, over shared memory, over ROS 2.
+//!
+//! [`promises`] are written once against the two ends of a transport; each transport's file calls them and adds what
+//! it alone can break. Processes that are killed are this test program, started again with a task ([`child`]).
+
+mod child;
+mod in_process;
+mod killed;
+mod positions;
+mod program;
+mod promises;
+mod python;
+mod ros2;
+mod shm;
+mod support;

@@ -1,0 +1,140 @@
+//! A body under way, read by others: `flockform run --publish`.
+
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+use flockform::continuum::engine::Engine;
+use flockform::continuum::plan::Plan;
+use flockform::scene::bundled::bundled;
+use flockform::shm::positions::{Positions, read};
+
+use super::child::Process;
+use super::support::*;
+
+fn engine() -> Engine {
+    let scene = bundled("tension").expect("bundled").load(&[]).expect("valid");
+    Engine::new(Plan::new(&scene).expect("planned"))
+}
+
+fn open(name: &str, engine: &Engine) -> Positions {
+    Positions::open(&domain(name), "body", engine.present().len()).expect("a publisher")
+}
+
+#[test]
+fn a_reader_sees_every_step_of_the_body_to_the_bit() {
+    let name = domain_name();
+    let peer = domain(&name).join("test").expect("shared memory");
+    let mut engine = engine();
+    let mut shown = open(&name, &engine);
+    let reader = read(&peer, "body").expect("a reader");
+    for step in 1..=50 {
+        engine.advance();
+        shown.show(&engine);
+        let slice = reader.take().expect("the step");
+        assert_eq!((slice.header().step, slice.len()), (step, engine.present().len()));
+        for (i, particle) in slice.iter().enumerate() {
+            assert_eq!(particle.id as usize, i + 1);
+            assert_eq!(particle.position.map(f64::to_bits), engine.present().get(i).map(f64::to_bits));
+        }
+    }
+    assert!(reader.take().is_none());
+}
+
+#[test]
+fn a_reader_that_never_reads_loses_all_but_the_newest_and_holds_nobody_up() {
+    let name = domain_name();
+    let peer = domain(&name).join("test").expect("shared memory");
+    let mut engine = engine();
+    let mut shown = open(&name, &engine);
+    let reader = read(&peer, "body").expect("a reader");
+    let elsewhere = Process::start("never read positions", &name);
+    for _ in 0..2000 {
+        engine.advance();
+        shown.show(&engine);
+    }
+    assert_eq!(shown.unsent(), 0);
+    assert_eq!(reader.take().expect("the newest").header().step, 2000);
+    assert!(reader.take().is_none());
+    drop(elsewhere);
+}
+
+#[test]
+fn a_reader_that_is_killed_while_it_holds_steps_takes_nothing_from_the_run() {
+    let name = domain_name();
+    let mut engine = engine();
+    let mut shown = open(&name, &engine);
+    for _ in 0..3 {
+        let (done, is_done) = std::sync::mpsc::channel();
+        let task = name.clone();
+        let reader = std::thread::spawn(move || {
+            let reader = Process::start("hold positions", &task);
+            done.send(()).expect("the test waits");
+            reader
+        });
+        while is_done.try_recv().is_err() && !reader.is_finished() {
+            engine.advance();
+            shown.show(&engine);
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        reader.join().expect("it started").kill();
+        for _ in 0..500 {
+            engine.advance();
+            shown.show(&engine);
+        }
+    }
+    assert_eq!(shown.unsent(), 0);
+    let mut alone = self::engine();
+    (0..engine.step()).for_each(|_| alone.advance());
+    assert_eq!(engine.present(), alone.present(), "to the bit what it is with nobody looking");
+}
+
+#[test]
+fn another_process_reads_a_run_of_the_program() {
+    let name = domain_name();
+    let peer = domain(&name).join("test").expect("shared memory");
+    let reader = read(&peer, "specimen").expect("a reader");
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut run = Command::new(env!("CARGO_BIN_EXE_flockform"))
+        .args(["run", "tension", "--quiet", "--publish", "specimen", "--set", "stop.steps=100000000"])
+        .arg("--out")
+        .arg(folder.path().join("out"))
+        .env(flockform::shm::domain::VARIABLE, &name)
+        .stdin(Stdio::null())
+        .spawn()
+        .expect("it starts");
+    let mut steps = Vec::new();
+    until("steps of the run", || {
+        reader.wait(Duration::from_millis(100));
+        while let Some(slice) = reader.take() {
+            assert_eq!(slice.len(), 144);
+            assert!(slice.iter().all(|particle| particle.position.iter().all(|x| x.is_finite())));
+            steps.push(slice.header().step);
+        }
+        (steps.len() > 20).then_some(())
+    });
+    assert!(steps.windows(2).all(|pair| pair[0] < pair[1]), "{steps:?}");
+    let status = Command::new("kill").args(["-s", "TERM", &run.id().to_string()]).status();
+    assert!(status.expect("kill runs").success());
+    let code = until("the run ends", || run.try_wait().expect("a child")).code();
+    assert_eq!(code, Some(1), "interrupted, and what there was is written");
+    assert!(folder.path().join("out/summary.json").exists());
+}
+
+#[test]
+fn a_name_that_is_none_or_taken_is_refused_before_anything_is_written() {
+    let name = domain_name();
+    let _holds = open(&name, &engine());
+    let folder = tempfile::tempdir().expect("a folder");
+    for (given, word) in [("a/b", "no name of a service"), ("body", "at most 1")] {
+        let out = folder.path().join("out");
+        let output = Command::new(env!("CARGO_BIN_EXE_flockform"))
+            .args(["run", "tension", "--publish", given, "--out"])
+            .arg(&out)
+            .env(flockform::shm::domain::VARIABLE, &name)
+            .output()
+            .expect("it starts");
+        let words = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{words}");
+        assert!(words.contains(word) && words.contains("help: ") && !out.exists(), "{words}");
+    }
+}

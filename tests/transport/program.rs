@@ -1,0 +1,151 @@
+//! `flockform node` and `flockform robots` over shared memory, and the same in one process.
+
+use std::process::{Child, Command, Stdio};
+
+use flockform::flock::points::distance;
+use flockform::scene::bundled::bundled_swarm;
+use flockform::scene::swarm::Swarm;
+use flockform::shm::channel::{Capacity, Reader, Slice, Writer};
+use flockform::shm::node::{COMMANDS, MEMBERS, STATE};
+use flockform::shm::payload::{Command as Order, Formation, Member};
+use flockform::shm::{FormationNode, SimulatedRobots};
+use flockform::swarm::flight::Flight;
+use flockform::swarm::watch::Health;
+
+use super::support::*;
+
+/// Patience with a busy computer, and a short flight.
+const OVERRIDES: [&str; 6] = [
+    "control.period=0.01",
+    "poses.fresh=4.0",
+    "poses.age_limit=5.0",
+    "poses.stop_after=9.0",
+    "manoeuvres[0].legs=[{ seconds = 1.0, translate = [2.0, 0.5], rotate = 30.0 }]",
+    "limits.speed=8.0",
+];
+
+fn square() -> Swarm {
+    let overrides: Vec<String> = OVERRIDES.iter().map(|&text| text.to_owned()).collect();
+    bundled_swarm("square").expect("bundled").load_swarm(&overrides).expect("valid")
+}
+
+#[test]
+fn the_loop_over_shared_memory_flies_what_the_simulated_flight_flies() {
+    let shm = domain(&domain_name());
+    let swarm = square();
+    let mut robots = SimulatedRobots::open(&swarm, &shm).expect("robots");
+    let mut node = FormationNode::open(&swarm, &shm, None).expect("a node");
+    let mut flight = Flight::new(&swarm).expect("a flight");
+    for _ in 0..150 {
+        robots.tick();
+        node.tick();
+        flight.step();
+    }
+    let control = node.control();
+    assert!((0..25).all(|m| control.health(m) == Health::Fresh));
+    assert!(control.program_time() > 1.2);
+    let map = control.formation().affine(control.program_time()).expect("a manoeuvre");
+    let places = robots.fleet().places();
+    let apart = |m: usize| distance(places.get(m), map.apply(control.formation().places.get(m)));
+    let worst = (0..25).map(apart).fold(0.0, f64::max);
+    assert!(worst < 0.01, "{worst} m from where they were led");
+    let from_flight = |m: usize| distance(places.get(m), flight.fleet().robots()[m].position);
+    let worst = (0..25).map(from_flight).fold(0.0, f64::max);
+    assert!(worst < 0.01, "{worst} m from the flight without a transport");
+}
+
+#[test]
+fn a_member_s_own_node_hears_its_neighbours_alone_and_moves_nobody_else() {
+    let shm = domain(&domain_name());
+    let overrides: Vec<String> =
+        OVERRIDES.iter().chain(&["control.sweeps=1"]).map(|&text| text.to_owned()).collect();
+    let swarm = bundled_swarm("square").expect("bundled").load_swarm(&overrides).expect("valid");
+    let mut robots = SimulatedRobots::open(&swarm, &shm).expect("robots");
+    let mut node = FormationNode::open(&swarm, &shm, Some("robot_7")).expect("a node");
+    for _ in 0..20 {
+        robots.tick();
+        node.tick();
+    }
+    let control = node.control();
+    let heard: Vec<usize> = (0..25).filter(|&m| control.position(m).is_some()).collect();
+    assert_eq!(heard, [0, 1, 2, 5, 6, 7, 10, 11, 12]);
+    let places = robots.fleet().places();
+    let moved = (0..25).filter(|&m| places.get(m) != control.formation().places.get(m));
+    assert!(moved.into_iter().all(|m| m == 6));
+}
+
+/// A process of the program that ends with its test.
+struct Program(Child);
+
+impl Program {
+    fn start(domain: &str, subcommand: &str) -> Self {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_flockform"));
+        command.args([subcommand, "square", "--transport", "shm"]);
+        OVERRIDES.iter().for_each(|one| {
+            command.args(["--set", one]);
+        });
+        command.env(flockform::shm::domain::VARIABLE, domain).stdin(Stdio::null());
+        Self(command.spawn().expect("it starts"))
+    }
+
+    fn kill(&mut self) {
+        self.0.kill().expect("it lives");
+        self.0.wait().expect("a child");
+    }
+
+    fn terminate(mut self) -> Option<i32> {
+        let status = Command::new("kill").args(["-s", "TERM", &self.0.id().to_string()]).status();
+        assert!(status.expect("kill runs").success());
+        until("it ends", || self.0.try_wait().expect("a child")).code()
+    }
+}
+
+impl Drop for Program {
+    fn drop(&mut self) {
+        // An error means that it has ended already.
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+fn next(reader: &Reader<Member>, what: &str, is: impl Fn(&Slice<Member>) -> bool) {
+    until(what, || reader.take_last().filter(&is).map(|_| ()));
+}
+
+#[test]
+fn node_and_robots_are_processes_that_may_be_killed_and_come_back() {
+    let name = domain_name();
+    let peer = domain(&name).join("test").expect("shared memory");
+    let capacity = &Capacity::SWARM;
+    let members = Reader::<Member>::open(&peer, "square", MEMBERS, capacity).expect("a reader");
+    let state = Reader::<Formation>::open(&peer, "square", STATE, capacity).expect("a reader");
+    let mut orders = Writer::<Order>::open(&peer, "square", COMMANDS, capacity, 1).expect("a writer");
+    let mut robots = Program::start(&name, "robots");
+    let mut node = Program::start(&name, "node");
+    let all_fresh = |slice: &Slice<Member>| slice.len() == 25 && slice.iter().all(|one| one.health == 1);
+    next(&members, "everybody is heard", |slice| {
+        all_fresh(slice) && slice[6].name() == "robot_7" && slice[6].target[0].is_finite()
+    });
+    next(&members, "the formation moves", |slice| slice.iter().all(|one| one.displacement[0].abs() > 0.1));
+
+    node.kill();
+    drop(node);
+    let node = Program::start(&name, "node");
+    next(&members, "a new node hears everybody", all_fresh);
+
+    robots.kill();
+    next(&members, "robots that are gone are held", |slice| slice.iter().all(|one| one.health != 1));
+    drop(robots);
+    let robots = Program::start(&name, "robots");
+    next(&members, "new robots are heard", all_fresh);
+
+    until("the emergency stop", || {
+        orders.send(0.0, 0, 1, |_| Order::new(Order::EMERGENCY_STOP)).expect("sent");
+        state.take_last().filter(|slice| slice[0].mode == Formation::EMERGENCY_STOPPED).map(|_| ())
+    });
+    until("the end of it", || {
+        orders.send(0.0, 0, 1, |_| Order::new(Order::RESUME)).expect("sent");
+        state.take_last().filter(|slice| slice[0].mode == Formation::RUNNING).map(|_| ())
+    });
+    assert_eq!((node.terminate(), robots.terminate()), (Some(0), Some(0)));
+}

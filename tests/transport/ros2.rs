@@ -1,0 +1,135 @@
+//! Over ROS 2, on loopback. The tests take turns: they share topics, and participants are dear.
+
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use flockform::ros::arguments::RosArguments;
+use flockform::ros::edge::{Edge, Node, Options};
+use flockform::ros::node::Link as Controller;
+use flockform::ros::robots::Link as Robots;
+use flockform::scene::swarm::Swarm;
+use flockform::swarm::control::part::Part;
+use flockform::swarm::transport::{ControllerEnd, Heard, Target};
+
+use super::promises;
+use super::support::*;
+
+/// A loop's end with the node that it was made from.
+pub struct Served {
+    link: Controller,
+    _node: Node,
+}
+
+impl ControllerEnd for Served {
+    type Error = <Controller as ControllerEnd>::Error;
+
+    fn hear(&mut self, now: f64, hear: &mut dyn FnMut(Heard)) {
+        self.link.hear(now, hear);
+    }
+
+    fn send(&mut self, now: f64, targets: &[Target]) -> Result<(), Self::Error> {
+        self.link.send(now, targets)
+    }
+
+    fn refused(&self) -> u64 {
+        self.link.refused()
+    }
+}
+
+struct Ros2 {
+    swarm: Swarm,
+    /// Whom the loop sends targets.
+    mine: Vec<usize>,
+    _turn: MutexGuard<'static, ()>,
+}
+
+impl Ros2 {
+    fn new(swarm: Swarm, mine: Vec<usize>) -> Self {
+        static TURN: Mutex<()> = Mutex::new(());
+        Self { swarm, mine, _turn: TURN.lock().unwrap_or_else(PoisonError::into_inner) }
+    }
+
+    fn small() -> Self {
+        Self::new(row(3, &[]), vec![0, 1, 2])
+    }
+}
+
+fn domain() -> u16 {
+    100 + (std::process::id() % 101) as u16
+}
+
+impl Transport for Ros2 {
+    type Controller = Served;
+    type Robots = Robots;
+
+    fn count(&self) -> usize {
+        control_of(&self.swarm).0.formation().count()
+    }
+
+    fn controller(&mut self) -> Served {
+        let (control, _) = control_of(&self.swarm);
+        let heard = (0..control.formation().count()).collect();
+        let part = Part { mine: self.mine.clone(), heard };
+        let edge = Edge::open(Options { domain: domain(), loopback_only: true }).expect("sockets");
+        let node = edge.node("/", "flockform").expect("a node");
+        let names = &control.formation().names;
+        let topic = |pattern: &str, m: usize| Ok(pattern.replace("{name}", &names[m]));
+        let link = Controller::open(&node, &self.swarm.raw.node, &control, &part, false, &topic);
+        Served { link: link.expect("an end"), _node: node }
+    }
+
+    fn robots(&mut self) -> Robots {
+        let id = domain().to_string();
+        let environment = |name: &str| match name {
+            "ROS_DOMAIN_ID" => Some(id.clone()),
+            "ROS_AUTOMATIC_DISCOVERY_RANGE" => Some("LOCALHOST".into()),
+            _ => None,
+        };
+        let arguments = RosArguments::parse(["flockform".to_owned()], &environment).expect("none").1;
+        let (control, _) = control_of(&self.swarm);
+        Robots::open(&self.swarm, control.formation(), &arguments).expect("an end")
+    }
+}
+
+#[test]
+fn ros2_poses_come_in_order_and_the_newest_comes() {
+    promises::poses_come_in_order_and_the_newest_comes(&mut Ros2::small());
+}
+
+#[test]
+fn ros2_targets_reach_their_robots_to_the_bit() {
+    promises::targets_reach_their_robots_to_the_bit(&mut Ros2::small());
+}
+
+#[test]
+fn ros2_who_comes_late_hears_what_is_said_from_then_on() {
+    promises::who_comes_late_hears_what_is_said_from_then_on(&mut Ros2::small());
+}
+
+#[test]
+fn ros2_a_peer_that_goes_away_harms_nobody_else() {
+    promises::a_peer_that_goes_away_harms_nobody_else(&mut Ros2::small());
+}
+
+#[test]
+fn ros2_who_comes_back_is_heard_again() {
+    promises::who_comes_back_is_heard_again(&mut Ros2::small());
+}
+
+/// As one array; ten of them get targets, a topic each.
+#[test]
+fn ros2_a_thousand_robots_are_carried() {
+    let swarm = row(1000, &["node.pose_type=pose-array", "node.pose_topic=/poses"]);
+    let served: Vec<usize> = (0..1000).step_by(100).collect();
+    promises::a_thousand_robots_are_carried(&mut Ros2::new(swarm, served.clone()), &served);
+}
+
+#[test]
+fn ros2_who_does_not_listen_holds_nobody_up() {
+    promises::who_does_not_listen_holds_nobody_up(&mut Ros2::small());
+}
+
+#[test]
+fn ros2_a_pose_that_is_not_finite_moves_nobody() {
+    let (mut control, part) = control_of(&row(3, &[]));
+    promises::a_pose_that_is_not_finite_moves_nobody(&mut Ros2::small(), &mut control, &part);
+}

@@ -1,0 +1,182 @@
+//! Over shared memory.
+
+use flockform::shm::channel::{Capacity, Reader, Writer};
+use flockform::shm::link::{Controller, POSES, Robots};
+use flockform::shm::payload::{Leader, Pose as WirePose};
+use flockform::shm::{Domain, Peer, ShmError};
+use flockform::swarm::transport::{ControllerEnd, Heard, RobotsEnd};
+use iceoryx2::prelude::{ZeroCopySend, ipc};
+
+use super::promises;
+use super::support::*;
+
+struct Shm {
+    count: usize,
+    domain: Domain,
+    peers: Vec<Peer>,
+}
+
+impl Shm {
+    fn new(count: usize) -> Self {
+        Self { count, domain: domain(&domain_name()), peers: Vec::new() }
+    }
+
+    fn peer(&mut self) -> &Peer {
+        self.peers.push(self.domain.join("test").expect("shared memory"));
+        &self.peers[self.peers.len() - 1]
+    }
+}
+
+impl Transport for Shm {
+    type Controller = Controller;
+    type Robots = Robots;
+
+    fn count(&self) -> usize {
+        self.count
+    }
+
+    fn controller(&mut self) -> Controller {
+        let (control, part) = control_of(&row(self.count, &[]));
+        Controller::open(self.peer(), "row", &control, &part).expect("an end")
+    }
+
+    fn robots(&mut self) -> Robots {
+        let count = self.count;
+        Robots::open(self.peer(), "row", count).expect("an end")
+    }
+}
+
+#[test]
+fn shm_poses_come_in_order_and_the_newest_comes() {
+    promises::poses_come_in_order_and_the_newest_comes(&mut Shm::new(3));
+}
+
+#[test]
+fn shm_targets_reach_their_robots_to_the_bit() {
+    promises::targets_reach_their_robots_to_the_bit(&mut Shm::new(3));
+}
+
+#[test]
+fn shm_who_comes_late_hears_what_is_said_from_then_on() {
+    promises::who_comes_late_hears_what_is_said_from_then_on(&mut Shm::new(3));
+}
+
+#[test]
+fn shm_a_peer_that_goes_away_harms_nobody_else() {
+    promises::a_peer_that_goes_away_harms_nobody_else(&mut Shm::new(3));
+}
+
+#[test]
+fn shm_who_comes_back_is_heard_again() {
+    promises::who_comes_back_is_heard_again(&mut Shm::new(3));
+}
+
+#[test]
+fn shm_a_thousand_robots_are_carried() {
+    let all: Vec<usize> = (0..1000).collect();
+    promises::a_thousand_robots_are_carried(&mut Shm::new(1000), &all);
+}
+
+#[test]
+fn shm_who_does_not_listen_holds_nobody_up() {
+    promises::who_does_not_listen_holds_nobody_up(&mut Shm::new(3));
+}
+
+#[test]
+fn shm_a_pose_that_is_not_finite_moves_nobody() {
+    let (mut control, part) = control_of(&row(3, &[]));
+    promises::a_pose_that_is_not_finite_moves_nobody(&mut Shm::new(3), &mut control, &part);
+}
+
+#[test]
+fn a_pose_or_a_leader_of_nobody_is_left_out_and_counted() {
+    let mut shm = Shm::new(3);
+    let mut controller = shm.controller();
+    let mut robots = shm.robots();
+    meet(&mut controller, &mut robots, 0);
+    robots.say(1.0, &[(3, pose(0.0, 1.0)), (2, pose(5.0, 1.0))]).expect("said");
+    assert_eq!(heard(&mut controller), [(2, pose(5.0, 1.0))]);
+    let peer = shm.peer();
+    let mut leaders = Writer::<Leader>::open(peer, "row", "leaders", &Capacity::SWARM, 2).expect("a writer");
+    let all = [(0, 4.0), (u32::MAX, 5.0)];
+    let leader = |k: usize| Leader { member: all[k].0, reserved: 0, position: [all[k].1, 0.0] };
+    leaders.send(1.0, 0, 2, leader).expect("sent");
+    let mut told = Vec::new();
+    controller.hear(1.0, &mut |heard| told.push(heard));
+    assert_eq!(told, [Heard::Leader(0, [4.0, 0.0])]);
+    assert_eq!(controller.refused(), 2);
+}
+
+/// An older one, of the same size and alignment.
+#[derive(Clone, Copy, Debug, ZeroCopySend)]
+#[repr(C)]
+#[type_name("FlockformPose_v0")]
+struct OlderPose([f64; 5]);
+
+#[test]
+fn another_version_of_a_type_is_refused_with_both_names() {
+    let name = domain_name();
+    let shm = domain(&name);
+    let mut config = iceoryx2::prelude::Config::global_config().clone();
+    use iceoryx2::prelude::SemanticString;
+    config.global.prefix = iceoryx2::prelude::FileName::new(format!("{name}_").as_bytes()).expect("a prefix");
+    let older =
+        iceoryx2::prelude::NodeBuilder::new().config(&config).create::<ipc::Service>().expect("a node");
+    let service = "flockform/row/poses".try_into().expect("a name");
+    let _held =
+        older.service_builder(&service).publish_subscribe::<[OlderPose]>().create().expect("a service");
+
+    let peer = shm.join("test").expect("shared memory");
+    let opened = Reader::<WirePose>::open(&peer, "row", POSES, &Capacity::SWARM);
+    let Err(error @ ShmError::Type { .. }) = opened else { panic!("not refused as another type") };
+    let words = error.to_string();
+    for part in ["flockform/row/poses", "FlockformPose_v0", "FlockformPose_v1", "help: "] {
+        assert!(words.contains(part), "{part}: {words}");
+    }
+}
+
+#[test]
+fn a_service_of_less_capacity_is_refused_with_what_it_takes() {
+    let peer = domain(&domain_name()).join("test").expect("shared memory");
+    let small = Capacity { writers: 1, ..Capacity::SWARM };
+    let _held = Reader::<WirePose>::open(&peer, "row", POSES, &small).expect("a reader");
+    let error = Reader::<WirePose>::open(&peer, "row", POSES, &Capacity::SWARM).err().expect("refused");
+    assert!(error.to_string().contains("max_publishers(64)"), "{error}");
+}
+
+#[test]
+fn swarms_and_domains_do_not_meet() {
+    let (here, there) = (domain(&domain_name()), domain(&domain_name()));
+    let peer = here.join("test").expect("shared memory");
+    let stranger = there.join("test").expect("shared memory");
+    let open = |peer: &Peer, space: &str| Robots::open(peer, space, 3).expect("an end");
+    let (control, part) = control_of(&row(3, &[]));
+    let mut controller = Controller::open(&peer, "row", &control, &part).expect("an end");
+    let mut robots = open(&peer, "row");
+    let mut strangers = [open(&peer, "other"), open(&stranger, "row")];
+    for one in &mut strangers {
+        one.say(1.0, &[(1, pose(9.0, 1.0))]).expect("said");
+    }
+    robots.say(1.0, &[(0, pose(1.0, 1.0))]).expect("said");
+    assert_eq!(heard(&mut controller), [(0, pose(1.0, 1.0))]);
+}
+
+#[test]
+fn a_reader_looks_into_the_memory_that_the_writer_filled() {
+    let peer = domain(&domain_name()).join("test").expect("shared memory");
+    let capacity = Capacity { readers: 1, ..Capacity::SWARM };
+    let mut writer = Writer::<WirePose>::open(&peer, "row", POSES, &capacity, 8).expect("a writer");
+    let reader = Reader::<WirePose>::open(&peer, "row", POSES, &capacity).expect("a reader");
+    let element =
+        |k: usize| WirePose { member: k as u32, frame: 0, position: [0.5, 1.5], yaw: 2.0, stamp: 3.0 };
+    writer.send(7.0, 4, 8, element).expect("sent");
+    writer.send(8.0, 5, 3, element).expect("sent");
+    let first = reader.take().expect("the first");
+    assert_eq!((first.len(), first[7].member, first.header().sequence), (8, 7, 0));
+    let second = reader.take().expect("the second, while the first is held");
+    assert_eq!((second.len(), second.header().step, second.header().stamp), (3, 5, 8.0));
+    let error = writer.send(9.0, 6, 9, element).expect_err("more than it was opened for");
+    assert!(matches!(error, ShmError::Send { .. }), "{error}");
+    drop((first, second));
+    assert!(reader.take().is_none());
+}
