@@ -8,6 +8,7 @@ use clap::Args;
 use flockform::compare::run::{Compared, compare as compare_scene};
 use flockform::continuum::run::StopReason;
 use flockform::export::comparison::{ComparisonReport, write_comparison};
+use flockform::export::report;
 use flockform::scene::Scene;
 
 use super::output::OutputArguments;
@@ -43,6 +44,9 @@ pub fn compare(arguments: &CompareArguments) -> Result<ExitCode, Refusal> {
 
     let report = ComparisonReport::new(&scene, &compared);
     write_comparison(&folder, &scene, &compared, &report)?;
+    if !arguments.output.no_report {
+        report::comparison::write(&folder, &scene, &compared, &report)?;
+    }
     let kept = folder.commit()?;
     if arguments.json {
         print(&format!("{:#}\n", serde_json::json!(report)));

@@ -16,6 +16,9 @@ pub struct OutputArguments {
     /// Replace an earlier output of flockform in DIR
     #[arg(long)]
     force: bool,
+    /// Write no report.html, and keep no frames for it
+    #[arg(long)]
+    pub no_report: bool,
 }
 
 impl OutputArguments {

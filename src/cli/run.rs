@@ -14,6 +14,8 @@ use flockform::continuum::equilibrium::come_to_rest;
 use flockform::continuum::plan::Plan;
 use flockform::continuum::record::{ProbeSeries, Snapshot};
 use flockform::continuum::run::{Outcome, StopReason};
+use flockform::export::report::stage::Stage;
+use flockform::export::report::{self, RunRecorder};
 use flockform::export::{
     Energies, ExportError, OutputFolder, Results, Summary, Timings, VtkSeries, write_all,
 };
@@ -57,6 +59,7 @@ fn run_here(arguments: &RunArguments) -> Result<ExitCode, Refusal> {
     tracing::info!("planned {} particles of `{}` in {setup:.1?}", plan.count(), scene.name);
 
     let mut recorder = Recorder::new(&scene, &plan, &folder)?;
+    recorder.reports = !arguments.output.no_report;
     let mut progress = Progress::new(arguments.output.quiet, scene.stop.steps);
     let interrupted = interrupt_flag();
     let stepping = Instant::now();
@@ -70,11 +73,15 @@ fn run_here(arguments: &RunArguments) -> Result<ExitCode, Refusal> {
 
     let elapsed = stepping.elapsed();
     tracing::info!("{} steps in {elapsed:.1?}, writing", outcome.engine.step());
-    let records = recorder.finish(&outcome.engine)?;
+    let records = recorder.finish(&outcome)?;
     let timings = Timings { setup, steps: elapsed.saturating_sub(records.writing), output: records.writing };
     let (snapshots, probes) = (&records.snapshots, &records.probes);
     let results = Results { scene: &scene, outcome: &outcome, snapshots, probes, timings };
-    let (_, Summary { energies, .. }) = write_all(&folder, &results)?;
+    let (_, summary) = write_all(&folder, &results)?;
+    if let Some(stage) = records.stage {
+        report::run::write(&folder, &results, &summary, stage)?;
+    }
+    let Summary { energies, .. } = summary;
     let kept = folder.commit()?;
     if !arguments.output.quiet {
         print(&words);
@@ -99,14 +106,18 @@ struct Recorder<'a> {
     snapshots: Vec<Snapshot>,
     probes: Vec<ProbeSeries>,
     frames: Option<VtkSeries>,
+    /// Whether there shall be a `report.html`, and what it shows.
+    reports: bool,
+    film: Option<RunRecorder>,
     failure: Option<ExportError>,
     writing: Duration,
 }
 
-/// What was kept, and how long writing took on the way.
+/// What was kept, and how long that took on the way.
 struct Records {
     snapshots: Vec<Snapshot>,
     probes: Vec<ProbeSeries>,
+    stage: Option<Stage>,
     writing: Duration,
 }
 
@@ -119,6 +130,8 @@ impl<'a> Recorder<'a> {
             snapshots: Vec::new(),
             probes: probed.iter().map(|&particle| ProbeSeries::new(particle)).collect(),
             frames: (scene.record.vtk_every > 0).then(|| VtkSeries::create(folder)).transpose()?,
+            reports: true,
+            film: None,
             failure: None,
             writing: Duration::ZERO,
         })
@@ -131,6 +144,11 @@ impl<'a> Recorder<'a> {
         }
         if self.frames.is_some() && engine.step().is_multiple_of(self.scene.record.vtk_every) {
             self.write_frame(engine);
+        }
+        if self.reports {
+            let start = Instant::now();
+            RunRecorder::watch(&mut self.film, engine);
+            self.writing += start.elapsed();
         }
     }
 
@@ -147,7 +165,8 @@ impl<'a> Recorder<'a> {
     }
 
     /// The last configuration is always drawn, and for ParaView always written.
-    fn finish(mut self, engine: &Engine) -> Result<Records, ExportError> {
+    fn finish(mut self, outcome: &Outcome) -> Result<Records, ExportError> {
+        let engine = &outcome.engine;
         let step = engine.step();
         if self.snapshots.last().is_none_or(|last| last.step != step) {
             self.snapshots.push(Snapshot::of(engine));
@@ -161,7 +180,10 @@ impl<'a> Recorder<'a> {
         if let Some(frames) = self.frames {
             frames.finish()?;
         }
-        Ok(Records { snapshots: self.snapshots, probes: self.probes, writing: self.writing })
+        let start = Instant::now();
+        let stage = self.film.map(|film| film.stage(self.scene, outcome));
+        let writing = self.writing + start.elapsed();
+        Ok(Records { snapshots: self.snapshots, probes: self.probes, stage, writing })
     }
 }
 

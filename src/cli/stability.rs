@@ -3,6 +3,7 @@
 use std::process::ExitCode;
 
 use clap::Args;
+use flockform::export::report;
 use flockform::export::stability::{json, write_stability};
 use flockform::stability::bisection::Effort;
 use flockform::stability::extremes::plan;
@@ -40,6 +41,9 @@ pub fn stability(arguments: &StabilityArguments) -> Result<ExitCode, Refusal> {
     let load = |more: &[String]| arguments.scene.load_scene(more);
     let study = run(&load, options, &mut |next| tracing::info!("{next}"))?;
     write_stability(&folder, &study)?;
+    if !arguments.output.no_report {
+        report::stability::write(&folder, &study)?;
+    }
     let kept = folder.commit()?;
     if arguments.json {
         print(&json(&study).unwrap_or_default());

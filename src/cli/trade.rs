@@ -3,6 +3,7 @@
 use std::process::ExitCode;
 
 use clap::Args;
+use flockform::export::report;
 use flockform::export::trade::write_trade;
 use flockform::trade::{Grid, run};
 
@@ -43,6 +44,9 @@ pub fn trade(arguments: &TradeArguments) -> Result<ExitCode, Refusal> {
     let load = |more: &[String]| arguments.scene.load_scene(more);
     let study = run(&load, &grid, &mut |setting| tracing::info!("{setting}"))?;
     write_trade(&folder, &study)?;
+    if !arguments.output.no_report {
+        report::trade::write(&folder, &study)?;
+    }
     let kept = folder.commit()?;
     if arguments.json {
         print(&format!("{:#}\n", serde_json::json!(study)));
