@@ -15,7 +15,7 @@ function svg(name, attributes, parent) {
 }
 
 function inkOf(colour) {
-  return colour === "ink" || colour === "#444444" ? "var(--ink)" : colour;
+  return colour === "ink" || colour === "#444444" ? "var(--ink)" : `color-mix(in srgb, ${colour} var(--keep), white)`;
 }
 
 export class Chart {

@@ -31,17 +31,28 @@ pub fn write(
     let truth = &compared.truth.truth;
     let known = |i: usize| if truth.knows(i) { truth.displacement.get(i) } else { [f64::NAN; 2] };
     let truth: Points = (0..compared.rule.len()).map(known).collect();
+    // The frame is scaffolding of the rule, of which the truth has none.
+    let roles = compared.outcome.engine.roles();
+    let matter = |i: usize| if roles[i].is_body() { compared.rule.get(i) } else { [f64::NAN; 2] };
+    let rule: Points = (0..roles.len()).map(matter).collect();
     let sides = [
-        ("rule", &compared.rule, &compared.von_mises_rule),
+        ("rule", &rule, &compared.von_mises_rule),
         ("truth (finite elements)", &truth, &compared.von_mises_truth),
     ];
-    let error: Vec<f64> = compared.rule.iter().zip(truth.iter()).map(|(r, t)| (r[0] - t[0]).hypot(r[1] - t[1])).collect();
+    let error: Vec<f64> =
+        rule.iter().zip(truth.iter()).map(|(r, t)| (r[0] - t[0]).hypot(r[1] - t[1])).collect();
     let page = Page {
         title: scene.raw.title.clone(),
         command: format!("flockform compare {}", scene.name),
         verdict: None,
-        stages: sides.map(|(name, moved, stress)| stage(scene, compared, name, moved, &on_particles(compared, stress), &error)).into(),
-        note: format!("{FRAMES} even parts of both displacements. Von Mises stresses are those at the centres of the cells, shared out to the corners; compare.csv and cells.csv have the numbers."),
+        stages: sides
+            .map(|(name, moved, stress)| {
+                stage(scene, compared, name, moved, &on_particles(compared, stress), &error)
+            })
+            .into(),
+        note: format!(
+            "{FRAMES} even parts of both displacements. Von Mises stresses are those at the centres of the cells, shared out to the corners; compare.csv and cells.csv have the numbers."
+        ),
         facts: facts(scene, report),
         tables: vec![measures(report)],
         texts: vec![
@@ -53,7 +64,14 @@ pub fn write(
     page.write(folder)
 }
 
-fn stage(scene: &Scene, compared: &Compared, name: &str, moved: &Points, stress: &[f64], error: &[f64]) -> Stage {
+fn stage(
+    scene: &Scene,
+    compared: &Compared,
+    name: &str,
+    moved: &Points,
+    stress: &[f64],
+    error: &[f64],
+) -> Stage {
     let engine = &compared.outcome.engine;
     let unit = scene.unit();
     let mut stage = Stage::new(Film {
@@ -79,7 +97,8 @@ fn stage(scene: &Scene, compared: &Compared, name: &str, moved: &Points, stress:
     let mut frames = Frames::new(moved.len(), names.map(channel).into());
     for frame in 0..=FRAMES {
         let part = frame as f64 / FRAMES as f64;
-        let scaled = [&moved.x[..], &moved.y, stress, error].map(|v| v.iter().map(|v| part * v).collect::<Vec<f64>>());
+        let scaled =
+            [&moved.x[..], &moved.y, stress, error].map(|v| v.iter().map(|v| part * v).collect::<Vec<f64>>());
         frames.keep(frame, &scaled.each_ref().map(Vec::as_slice));
     }
     let encoded = encoded(&mut frames, stage.size());
@@ -107,8 +126,22 @@ fn facts(scene: &Scene, report: &ComparisonReport) -> Vec<(String, String)> {
     };
     vec![
         ("Rule".into(), format!("by {way}: {}", rule.stop_reason)),
-        ("Truth".into(), format!("finite elements, {} nodes, each side of a cell in {} parts", report.truth.nodes, report.truth.refine)),
-        ("Compared".into(), format!("{} followers, {} cells, lengths in {}", report.comparison.followers, report.comparison.cells, scene.unit())),
+        (
+            "Truth".into(),
+            format!(
+                "finite elements, {} nodes, each side of a cell in {} parts",
+                report.truth.nodes, report.truth.refine
+            ),
+        ),
+        (
+            "Compared".into(),
+            format!(
+                "{} followers, {} cells, lengths in {}",
+                report.comparison.followers,
+                report.comparison.cells,
+                scene.unit()
+            ),
+        ),
     ]
 }
 

@@ -85,7 +85,11 @@ fn cheapest(track: &Track, before: Option<&Track>) -> Mode {
 }
 
 /// Small numbers for small differences of either sign, shape \[count\].
-fn differences<'a>(track: &'a Track, before: Option<&'a Track>, mode: Mode) -> impl Iterator<Item = u32> + 'a {
+fn differences<'a>(
+    track: &'a Track,
+    before: Option<&'a Track>,
+    mode: Mode,
+) -> impl Iterator<Item = u32> + 'a {
     let bits = track.bits;
     let mask = (1u32 << bits) - 1;
     let shift = before.map_or(0, |before| (before.base - track.base) as u32 & mask);
@@ -189,7 +193,8 @@ mod tests {
     #[test]
     fn codes_come_back_from_every_mode() {
         for bits in [12, 16, 24] {
-            let wave = |t: f64| (0..500).map(|i| (0.1 * f64::from(i) + t).sin() + 40.0 * t).collect::<Vec<_>>();
+            let wave =
+                |t: f64| (0..500).map(|i| (0.1 * f64::from(i) + t).sin() + 40.0 * t).collect::<Vec<_>>();
             let mut second = wave(0.3);
             second[7] = f64::NAN;
             let first = Track::of(&wave(0.0), bits, None);
@@ -205,7 +210,8 @@ mod tests {
     #[test]
     fn a_body_at_rest_costs_next_to_nothing() {
         let mut frames = Frames::new(10_000, vec![Channel { name: "dx", bits: 16 }; 2]);
-        let noise: Vec<f64> = (0..10_000_u32).map(|i| f64::from(i.wrapping_mul(2_654_435_761) >> 8)).collect();
+        let noise: Vec<f64> =
+            (0..10_000_u32).map(|i| f64::from(i.wrapping_mul(2_654_435_761) >> 8)).collect();
         (0..GROUP).for_each(|step| frames.keep(step, &[&noise, &noise]));
         let one = EncodedFrames::of(&{
             let mut one = Frames::new(10_000, frames.channels.clone());

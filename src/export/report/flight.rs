@@ -69,7 +69,8 @@ impl FlightRecorder {
         let (control, places) = (flight.control(), flight.fleet().places());
         let count = places.len();
         let moved = |now: &[f64], then: &[f64]| now.iter().zip(then).map(|(n, t)| n - t).collect();
-        let (dx, dy): (Vec<f64>, Vec<f64>) = (moved(&places.x, &self.start.x), moved(&places.y, &self.start.y));
+        let (dx, dy): (Vec<f64>, Vec<f64>) =
+            (moved(&places.x, &self.start.x), moved(&places.y, &self.start.y));
         let mut clearance = Vec::new();
         control.filter().clearance(&places, &mut clearance);
         let age: Vec<f64> = (0..count).map(|m| control.age(m).unwrap_or(f64::NAN)).collect();
@@ -106,8 +107,10 @@ impl FlightRecorder {
 
 fn film(swarm: &Swarm, report: &FlightReport) -> Film {
     let own = |m: usize| swarm.raw.robots.get(m).and_then(|robot| robot.radius).unwrap_or(swarm.raw.radius);
-    let obstacles = swarm.raw.obstacles.iter().map(|obstacle| Outline { kind: "obstacle", corners: outline(obstacle) });
-    let fence = swarm.raw.limits.geofence.iter().map(|fence| Outline { kind: "fence", corners: fence.clone() });
+    let obstacles =
+        swarm.raw.obstacles.iter().map(|obstacle| Outline { kind: "obstacle", corners: outline(obstacle) });
+    let fence =
+        swarm.raw.limits.geofence.iter().map(|fence| Outline { kind: "fence", corners: fence.clone() });
     Film {
         noun: "robot",
         unit: "m".into(),
@@ -137,7 +140,13 @@ pub fn write(
     report: &FlightReport,
     stage: Stage,
 ) -> Result<PathBuf, ExportError> {
-    let plots = flight::charts(record, report);
+    let mut plots: Vec<Plot> =
+        flight::charts(record, report).iter().map(|chart| Plot::of(chart, true)).collect();
+    // The figure has no page around it that says whose it is.
+    plots
+        .iter_mut()
+        .filter(|plot| plot.title == report.title)
+        .for_each(|plot| plot.title = plot.y.quantity.clone());
     let broken = report.bounds.iter().filter(|verdict| !verdict.holds).count();
     let verdict = match (report.bounds.len(), broken) {
         (0, _) => None,
@@ -150,7 +159,7 @@ pub fn write(
         verdict,
         note: note(&stage.film, report),
         stages: vec![stage],
-        plots: plots.iter().map(|chart| Plot::of(chart, true)).collect(),
+        plots,
         facts: facts(report),
         tables: tables(report),
         texts: texts(swarm),
@@ -173,7 +182,8 @@ fn facts(report: &FlightReport) -> Vec<(String, String)> {
     let mut fact = |name: &str, value: String| facts.push((name.to_owned(), value));
     fact("Robots", format!("{} ({}), {} of them lead", report.robots, report.model, report.leaders));
     fact("Flown", format!("{} s", number(report.seconds)));
-    let pair = |[largest, last]: [f64; 2]| format!("largest {} m, at the end {} m", number(largest), number(last));
+    let pair =
+        |[largest, last]: [f64; 2]| format!("largest {} m, at the end {} m", number(largest), number(last));
     if let Some(error) = report.affine_error {
         fact("From the leaders' affine motion", pair(error));
     }
@@ -204,7 +214,12 @@ fn tables(report: &FlightReport) -> Vec<Table> {
     if !report.bounds.is_empty() {
         let row = |v: &crate::swarm::flight::Verdict| {
             let found = v.found.map_or_else(|| "not measured".into(), number);
-            vec![v.bound.to_owned(), number(v.declared), found, if v.holds { "holds" } else { "broken" }.into()]
+            vec![
+                v.bound.to_owned(),
+                number(v.declared),
+                found,
+                if v.holds { "holds" } else { "broken" }.into(),
+            ]
         };
         tables.push(Table {
             caption: "Declared bounds".into(),
@@ -217,12 +232,36 @@ fn tables(report: &FlightReport) -> Vec<Table> {
         let counts = [robot.accepted, robot.rejected].map(|count| count.to_string());
         let [accepted, rejected] = counts;
         let (name, role) = (robot.name.clone(), robot.role.to_owned());
-        vec![name, role, number(robot.x), number(robot.y), number(robot.way), clearance, accepted, rejected, robot.health.into()]
+        vec![
+            name,
+            role,
+            number(robot.x),
+            number(robot.y),
+            number(robot.way),
+            clearance,
+            accepted,
+            rejected,
+            robot.health.into(),
+        ]
     };
     let rows: Vec<_> = report.per_robot.iter().take(MOST_ROWS).map(row).collect();
     let more = report.robots.saturating_sub(rows.len());
-    let caption = if more > 0 { format!("Robots at the end ({more} more in robots.csv)") } else { "Robots at the end".into() };
-    let names = ["name", "role", "x [m]", "y [m]", "way [m]", "least clearance [m]", "poses accepted", "rejected", "health"];
+    let caption = if more > 0 {
+        format!("Robots at the end ({more} more in robots.csv)")
+    } else {
+        "Robots at the end".into()
+    };
+    let names = [
+        "name",
+        "role",
+        "x [m]",
+        "y [m]",
+        "way [m]",
+        "least clearance [m]",
+        "poses accepted",
+        "rejected",
+        "health",
+    ];
     tables.push(Table { caption, head: head(&names), rows });
     tables
 }

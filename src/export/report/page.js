@@ -2,7 +2,7 @@
 
 import { SHADES, palette, themeColour, themeText, ticks, viridis, words } from "./colour.js";
 import { Body } from "./body.js";
-import { View } from "./view.js";
+import { View, isUnit } from "./view.js";
 import { Chart } from "./chart.js";
 import { Player } from "./player.js";
 
@@ -15,7 +15,7 @@ const LOOKED_AT = 24;
 const MOST_OF_ALL = 0.995;
 // Decades of a logarithmic scale.
 const DECADES = 4;
-// More particles than this are shown as a surface at first: dots would be one blot.
+// More particles than this are shown as a surface even by role: dots would be one blot.
 const MOST_DOTS = 12000;
 
 const state = {
@@ -23,6 +23,7 @@ const state = {
   quantity: "role",
   isLog: false,
   factor: 1,
+  turned: false,
   camera: { x: 0, y: 0, scale: 1 },
   layers: {},
   ranges: new Map(),
@@ -84,8 +85,9 @@ function shade(body, out) {
     for (let i = 0; i < out.length; i++) out[i] = roles[i] / (SHADES - 1);
     return;
   }
-  const field = body.field(state.quantity);
+  // The scale first: it looks at other frames.
   const { low, high } = rangeOf(state.quantity);
+  const field = body.field(state.quantity);
   if (state.isLog) {
     const top = Math.log10(high);
     for (let i = 0; i < out.length; i++) {
@@ -125,7 +127,7 @@ function drawScale() {
   }
   const { low, high, largest } = rangeOf(state.quantity);
   const name = Object.assign(document.createElement("span"), { className: "name" });
-  name.textContent = one.unit ? `${one.label} [${one.unit}]` : one.label;
+  name.textContent = isUnit(one.unit) ? `${one.label} [${one.unit}]` : one.label;
   const ramp = Object.assign(document.createElement("div"), { className: "ramp" });
   const canvas = Object.assign(document.createElement("canvas"), { width: SHADES, height: 1 });
   canvas.getContext("2d").putImageData(new ImageData(new Uint8ClampedArray(state.palette.subarray(0, 4 * SHADES)), SHADES, 1), 0, 0);
@@ -160,7 +162,7 @@ function key(colour, text) {
 // ---- camera ----
 
 function fit() {
-  const boxes = views.map((view) => view.bounds(sampled(player.ready, player.last), state.factor));
+  const boxes = views.map((view) => view.bounds(sampled(player.ready, player.last), state.factor, state.turned));
   const low = [0, 1].map((k) => Math.min(...boxes.map((box) => box.low[k])));
   const high = [0, 1].map((k) => Math.max(...boxes.map((box) => box.high[k])));
   const view = views[0];
@@ -269,7 +271,7 @@ function numbersOf(body, particle) {
   const role = body.film.role_names[body.roles()[particle]];
   row(["role", "role"], role, role);
   for (const { key, label, unit, value } of body.numbers(particle)) {
-    row([key, unit && unit !== "length" ? `${label} [${unit}]` : label], words(value), Number.isFinite(value) ? String(value) : "");
+    row([key, isUnit(unit) ? `${label} [${unit}]` : label], words(value), Number.isFinite(value) ? String(value) : "");
   }
   return list;
 }
@@ -358,6 +360,12 @@ function listenToView(view) {
   }, { passive: false });
 }
 
+function turn(turned) {
+  state.turned = turned;
+  element("turn").setAttribute("aria-pressed", String(turned));
+  refit();
+}
+
 function refit() {
   fit();
   draw();
@@ -409,6 +417,7 @@ function listenToControls() {
   on("zoom-in", "click", () => zoom(1.25));
   on("zoom-out", "click", () => zoom(0.8));
   on("zoom-fit", "click", refit);
+  on("turn", "click", () => turn(!state.turned));
   on("picture", "click", savePicture);
   on("quantity", "change", () => choose(element("quantity").value));
   on("log", "change", () => {
@@ -423,18 +432,20 @@ function listenToControls() {
   on("find", "change", () => views.forEach((view) => keep(view, view.body.find(element("find").value.trim()))));
   for (const name of ["points", "bonds", "surface", "cracks", "ways"]) {
     on(`layer-${name}`, "change", () => {
+      state.hasChosenLayers = true;
       state.layers[name] = element(`layer-${name}`).checked;
       draw();
     });
   }
   player.changed = () => {
-    element("play").textContent = player.playing ? "⏸" : "▶";
+    element("play-icon").setAttribute("d", player.playing ? "M4 2h2v12H4zM10 2h2v12h-2z" : "M4 2l10 6-10 6z");
     element("play").setAttribute("aria-label", player.playing ? "Pause" : "Play");
   };
 }
 
 function choose(quantity) {
   state.quantity = quantity;
+  layersFor(quantity);
   element("quantity").value = quantity;
   takePalette();
   draw();
@@ -480,31 +491,41 @@ function listenToTheme() {
   window.addEventListener("afterprint", () => take(before === "dark"));
 }
 
-// What is drawn at first.
-function layersAtFirst() {
+// Until somebody chooses layers, a field fills the body and roles are dots: each as it is read best.
+function layersFor(quantity) {
+  if (state.hasChosenLayers) return;
+  const { film, bonds, triangles } = bodies[0];
+  const filled = triangles.length > 0 && (quantity !== "role" || film.count > MOST_DOTS);
+  state.layers = {
+    points: !filled,
+    bonds: bonds.length > 0 && film.count <= MOST_DOTS && !filled,
+    surface: filled,
+    cracks: true,
+    ways: film.radii.length > 0,
+  };
+  for (const [name, on] of Object.entries(state.layers)) element(`layer-${name}`).checked = on;
+}
+
+function nameControls() {
   const { film } = bodies[0];
   const isSwarm = film.radii.length > 0;
   const has = { bonds: bodies[0].bonds.length > 0, surface: bodies[0].triangles.length > 0 };
-  const dense = film.count > MOST_DOTS;
-  const filled = has.surface && (dense || film.stress !== null || bodies.length > 1);
-  state.layers = {
-    points: !dense || !filled,
-    bonds: has.bonds && !dense && !filled,
-    surface: filled,
-    cracks: true,
-    ways: isSwarm,
-  };
-  for (const [name, on] of Object.entries(state.layers)) element(`layer-${name}`).checked = on;
   const offer = (name, is) => (element(`layer-${name}`).closest("label").hidden = !is);
   offer("bonds", has.bonds);
   offer("surface", has.surface);
   offer("cracks", bodies[0].breaks[0] < Infinity);
-  offer("ways", film.count <= 400 && !filled);
+  offer("ways", isSwarm);
   element("points-name").textContent = `${film.noun}s`;
   element("bonds-name").textContent = isSwarm ? "links" : "bonds";
   element("find-name").textContent = film.noun[0].toUpperCase() + film.noun.slice(1);
   element("magnify-label").hidden = isSwarm;
   element("find-names").replaceChildren(...film.names.map((name) => Object.assign(document.createElement("option"), { value: name })));
+}
+
+// Whether a body would be a thin upright line on a wide screen.
+function isTall() {
+  const { low, high } = views[0].bounds([0], 1, false);
+  return bodies[0].film.radii.length === 0 && high[1] - low[1] > 2.2 * (high[0] - low[0]);
 }
 
 async function startFilm() {
@@ -521,7 +542,7 @@ async function startFilm() {
     listenToView(view);
     new ResizeObserver(() => (state.isFitted && player.ready ? refit() : draw())).observe(view.box);
   });
-  layersAtFirst();
+  nameControls();
   listenToControls();
   listenToKeys();
   choose(bodies.length > 1 || film.stress ? "von_mises" : "role");
@@ -532,7 +553,7 @@ async function startFilm() {
     player.ready = ready;
     const part = Math.round((100 * ready) / film.times.length);
     element("loading").textContent = part < 100 ? `Unpacking: ${part} %.` : "";
-    if (isFirst) refit();
+    if (isFirst) turn(isTall());
   });
   state.factor = wantedFactor();
   element("magnify").value = String(state.factor);

@@ -78,7 +78,8 @@ impl Page {
         let mut arrays = String::new();
         for (number, stage) in self.stages.iter().enumerate() {
             for (name, text) in &stage.arrays {
-                let _ = writeln!(arrays, "<script type=\"text/plain\" id=\"s{number}-{name}\">{text}</script>");
+                let _ =
+                    writeln!(arrays, "<script type=\"text/plain\" id=\"s{number}-{name}\">{text}</script>");
             }
         }
         let script: String = SCRIPTS.into_iter().map(joined).collect();
@@ -117,7 +118,9 @@ impl Page {
     fn texts_html(&self) -> String {
         let text = |(title, text): &(String, String)| {
             let (title, text) = (escaped(title), escaped(text));
-            format!("<details class=\"card\"><summary>{title}</summary><pre tabindex=\"0\">{text}</pre></details>")
+            format!(
+                "<details class=\"card\"><summary>{title}</summary><pre tabindex=\"0\">{text}</pre></details>"
+            )
         };
         self.texts.iter().map(text).collect()
     }
@@ -156,8 +159,7 @@ fn table_html(table: &Table) -> String {
     let cells = |tag: &str, cells: &[String]| -> String {
         cells.iter().map(|cell| format!("<{tag}>{}</{}>", escaped(cell), &tag[..2])).collect()
     };
-    let rows: String =
-        table.rows.iter().map(|row| format!("<tr>{}</tr>\n", cells("td", row))).collect();
+    let rows: String = table.rows.iter().map(|row| format!("<tr>{}</tr>\n", cells("td", row))).collect();
     format!(
         "<div class=\"card table\" tabindex=\"0\"><table><caption>{}</caption><thead><tr>{}</tr></thead><tbody>{rows}</tbody></table></div>",
         escaped(&table.caption),

@@ -110,7 +110,9 @@ pub fn of_probes(probes: &[ProbeSeries], reference: &Points, unit: &str) -> Vec<
         note: note.clone(),
         x: PlotAxis { quantity: "step".into(), unit: String::new(), log: false },
         y: PlotAxis { quantity: quantity.into(), unit: unit.into(), log: false },
-        series: (shown.iter().zip(SERIES)).map(|(probe, colour)| probe_line(probe, colour, &values(probe))).collect(),
+        series: (shown.iter().zip(SERIES))
+            .map(|(probe, colour)| probe_line(probe, colour, &values(probe)))
+            .collect(),
         landmarks: Vec::new(),
         follows_clock: true,
     };
@@ -136,8 +138,11 @@ fn thinned(line: &[[f64; 2]]) -> Vec<[f64; 2]> {
     let mut kept = vec![finite[0]];
     for run in finite.chunks(finite.len().div_ceil(MOST_POINTS / 2)) {
         let by_height = |a: &&[f64; 2], b: &&[f64; 2]| a[1].total_cmp(&b[1]);
-        let mut extremes: Vec<[f64; 2]> =
-            [run.iter().min_by(by_height), run.iter().max_by(by_height)].into_iter().flatten().copied().collect();
+        let mut extremes: Vec<[f64; 2]> = [run.iter().min_by(by_height), run.iter().max_by(by_height)]
+            .into_iter()
+            .flatten()
+            .copied()
+            .collect();
         extremes.sort_by(|a, b| a[0].total_cmp(&b[0]));
         kept.extend(extremes);
     }

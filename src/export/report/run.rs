@@ -8,11 +8,11 @@ use super::super::bonds::listed_once;
 use super::super::error::ExportError;
 use super::super::figures::SERIES;
 use super::super::{OutputFolder, Results, Summary};
+use super::encoded;
 use super::frames::{Channel, Frames, MOST_FRAMES};
 use super::page::{Page, number, scene_text};
 use super::plot::{self, Plot, PlotAxis, PlotSeries};
 use super::stage::{self, Clock, Film, Quantity, Stage, Stress};
-use super::encoded;
 use crate::continuum::engine::Engine;
 use crate::continuum::record::Snapshot;
 use crate::continuum::run::{Outcome, StopReason};
@@ -151,7 +151,8 @@ impl RunRecorder {
 
 fn film(scene: &Scene, engine: &Engine, is_solved: bool) -> Film {
     let unit = scene.unit();
-    let mut quantities = vec![Quantity::new("pe1", "PE1", format!("{unit}²")), Quantity::new("pe2", "PE2", unit)];
+    let mut quantities =
+        vec![Quantity::new("pe1", "PE1", format!("{unit}²")), Quantity::new("pe2", "PE2", unit)];
     let stress = scene.material.as_ref().map(|elastic| stress(elastic, scene.mean));
     // At rest nothing moves.
     quantities.retain(|quantity| quantity.key != "pe2" || !is_solved);
@@ -159,11 +160,8 @@ fn film(scene: &Scene, engine: &Engine, is_solved: bool) -> Film {
         quantities.push(Quantity::new("von_mises", "von Mises stress", format!("force/{unit}²")));
     }
     quantities.push(Quantity::new("strain", "largest strain", ""));
-    let clock = if is_solved {
-        Clock { quantity: "load", unit: "%" }
-    } else {
-        Clock { quantity: "step", unit: "" }
-    };
+    let clock =
+        if is_solved { Clock { quantity: "load", unit: "%" } } else { Clock { quantity: "step", unit: "" } };
     Film {
         noun: "particle",
         unit: unit.into(),
@@ -270,7 +268,9 @@ fn note(film: &Film, outcome: &Outcome) -> String {
     let frames = film.times.len();
     let bits = film.channels.first().map_or(0, |channel| channel.bits);
     let mut note = if outcome.solved.is_some() {
-        format!("Solved for its rest, not stepped: {frames} frames in even parts of the displacement, as under a load that grows evenly.")
+        format!(
+            "Solved for its rest, not stepped: {frames} frames in even parts of the displacement, as under a load that grows evenly."
+        )
     } else {
         let steps = outcome.engine.step();
         let between = film.times.get(1).zip(film.times.first()).map_or(1.0, |(second, first)| second - first);

@@ -16,7 +16,11 @@ use crate::stability::study::Study;
 /// The file cannot be written.
 pub fn write(folder: &OutputFolder, study: &Study) -> Result<PathBuf, ExportError> {
     let holds = study.holds();
-    let words = if holds { "predictions and runs agree, no extreme is wrong" } else { "predictions and runs disagree, or an extreme is wrong" };
+    let words = if holds {
+        "predictions and runs agree, no extreme is wrong"
+    } else {
+        "predictions and runs disagree, or an extreme is wrong"
+    };
     let charts = study.linear.iter().flat_map(|linear| panels(study, linear));
     let page = Page {
         title: study.title.clone(),
@@ -53,7 +57,13 @@ fn tables(study: &Study) -> Vec<Table> {
             let predicted = threshold.predicted.as_ref().map_or("none".into(), |p| exact(p.value));
             let found = threshold.found.as_ref().map_or("none".into(), |f| exact(f.value));
             let agrees = if threshold.agrees() { "agree" } else { "DISAGREE" };
-            vec![threshold.parameter.name().into(), predicted, found, number(threshold.tolerance), agrees.into()]
+            vec![
+                threshold.parameter.name().into(),
+                predicted,
+                found,
+                number(threshold.tolerance),
+                agrees.into(),
+            ]
         });
         tables.push(Table {
             caption: "Thresholds".into(),
@@ -61,16 +71,20 @@ fn tables(study: &Study) -> Vec<Table> {
             rows: rows.collect(),
         });
     }
-    let rows: Vec<Vec<String>> = study.extremes.iter().map(|case| {
-        let word = match &case.outcome {
-            Outcome::Right { .. } => "right",
-            Outcome::Refused { .. } => "refused",
-            Outcome::Wrong { .. } => "WRONG",
-        };
-        let said = case.outcome.to_string();
-        let said = said.split_once(": ").map_or(said.clone(), |(_, rest)| rest.to_owned());
-        vec![case.name.clone(), case.body.clone(), word.into(), said]
-    }).collect();
+    let rows: Vec<Vec<String>> = study
+        .extremes
+        .iter()
+        .map(|case| {
+            let word = match &case.outcome {
+                Outcome::Right { .. } => "right",
+                Outcome::Refused { .. } => "refused",
+                Outcome::Wrong { .. } => "WRONG",
+            };
+            let said = case.outcome.to_string();
+            let said = said.split_once(": ").map_or(said.clone(), |(_, rest)| rest.to_owned());
+            vec![case.name.clone(), case.body.clone(), word.into(), said]
+        })
+        .collect();
     if !rows.is_empty() {
         tables.push(Table { caption: "Extremes".into(), head: head(&["what", "on", "", "how"]), rows });
     }

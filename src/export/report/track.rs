@@ -38,7 +38,8 @@ impl Track {
             let code = (value * scale).round() as i64 - base;
             if value.is_finite() { (code.max(0) as u32).min(nothing - 1) } else { nothing }
         };
-        let mut track = Self { exponent, base, bits, low: Vec::with_capacity(values.len()), high: Vec::new() };
+        let mut track =
+            Self { exponent, base, bits, low: Vec::with_capacity(values.len()), high: Vec::new() };
         if bits > 16 {
             track.high.extend(values.iter().map(|value| (code(value) >> 16) as u8));
         }
@@ -99,7 +100,10 @@ mod tests {
                 let values: Vec<f64> = (0..=50).map(|k| low + (high - low) * f64::from(k) / 50.0).collect();
                 let track = Track::of(&values, bits, None);
                 let quantum = f64::from(track.exponent).exp2();
-                assert!(quantum <= (2.0 * (high - low) / f64::from(none(bits) - 2)).max(1e-9), "{bits} {low}");
+                assert!(
+                    quantum <= (2.0 * (high - low) / f64::from(none(bits) - 2)).max(1e-9),
+                    "{bits} {low}"
+                );
                 for (particle, wanted) in values.iter().enumerate() {
                     let off = (value(&track, particle) - wanted).abs();
                     assert!(off <= 0.5 * quantum, "{bits}: {wanted} off by {off}");

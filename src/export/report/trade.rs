@@ -41,7 +41,8 @@ fn plot(study: &Study) -> Plot {
     series.retain(|series| !series.points.is_empty());
     let front = "nothing is both faster and nearer".to_owned();
     series.push(points(front, "ink", "front", study.front().into_iter()));
-    let axis = |quantity: &str, unit: &str| PlotAxis { quantity: quantity.into(), unit: unit.into(), log: true };
+    let axis =
+        |quantity: &str, unit: &str| PlotAxis { quantity: quantity.into(), unit: unit.into(), log: true };
     Plot {
         title: "What accuracy costs".into(),
         note: format!(
@@ -58,7 +59,12 @@ fn plot(study: &Study) -> Plot {
     }
 }
 
-fn points<'a>(name: String, colour: &str, style: &'static str, of: impl Iterator<Item = &'a Point>) -> PlotSeries {
+fn points<'a>(
+    name: String,
+    colour: &str,
+    style: &'static str,
+    of: impl Iterator<Item = &'a Point>,
+) -> PlotSeries {
     let placed = of.filter_map(|point| Some(([point.seconds?, point.error?], label(point))));
     let (points, labels) = placed.unzip();
     PlotSeries { name, colour: colour.into(), style, points, labels }
@@ -85,7 +91,20 @@ fn facts(study: &Study) -> Vec<(String, String)> {
 }
 
 fn tables(study: &Study) -> Vec<Table> {
-    let head = || ["rule", "spacing", "particles", "solver", "tolerance", "bits", "error", "time", "iterations", "outcome"];
+    let head = || {
+        [
+            "rule",
+            "spacing",
+            "particles",
+            "solver",
+            "tolerance",
+            "bits",
+            "error",
+            "time",
+            "iterations",
+            "outcome",
+        ]
+    };
     let row = |point: &Point| {
         let setting = &point.setting;
         let outcome = match &point.outcome {

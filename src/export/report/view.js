@@ -9,6 +9,11 @@ const MOST_WAYS = 400;
 // How near the pointer must come to a particle, in pixels.
 const REACH = 14;
 
+// Scenes without a unit call it so.
+export function isUnit(unit) {
+  return unit !== "" && unit !== "length" && unit !== "unit";
+}
+
 export class View {
   constructor(body, parent) {
     this.body = body;
@@ -42,11 +47,12 @@ export class View {
     this.painter.setMesh(body);
   }
 
-  // Lowest and highest places over the frames that are looked at, and whatever stands in the way.
-  bounds(frames, factor) {
+  // Lowest and highest places over the frames that are looked at, and whatever stands in the way; as shown.
+  bounds(frames, factor, turned) {
     const { body } = this;
     const box = { low: [Infinity, Infinity], high: [-Infinity, -Infinity] };
-    const take = (x, y) => {
+    const take = (worldX, worldY) => {
+      const [x, y] = turned ? [worldY, -worldX] : [worldX, worldY];
       if (!(Number.isFinite(x) && Number.isFinite(y))) return;
       box.low = [Math.min(box.low[0], x), Math.min(box.low[1], y)];
       box.high = [Math.max(box.high[0], x), Math.max(box.high[1], y)];
@@ -72,19 +78,27 @@ export class View {
     Object.assign(this, { ratio, width, height });
   }
 
-  // `show` is what the page shows: frame, camera, factor, layers, shade(body, out), palette, isFlat.
+  // A place as it is shown: as it is, or turned by a quarter, so that tall bodies lie.
+  shown([x, y]) {
+    return this.show.turned ? [y, -x] : [x, y];
+  }
+
+  // `show` is what the page shows: frame, camera, factor, turned, layers, shade(body, out), palette, isFlat. The camera
+  // is a place as shown.
   draw(show) {
     this.show = show;
     this.resize();
     const { body, places, shades, radii, ratio } = this;
     body.go(show.frame);
     const { X, Y, dx, dy, film } = body;
+    const origin = this.shown(this.origin);
     for (let i = 0; i < body.count; i++) {
-      // NaN is culled by some drivers and not by others; far away is outside everywhere.
       const x = X[i] + show.factor * dx[i] - this.origin[0];
       const y = Y[i] + show.factor * dy[i] - this.origin[1];
-      places[2 * i] = Number.isFinite(x) ? x : 1e30;
-      places[2 * i + 1] = Number.isFinite(y) ? y : 1e30;
+      // NaN is culled by some drivers and not by others; far away is outside everywhere.
+      const isThere = Number.isFinite(x) && Number.isFinite(y);
+      places[2 * i] = isThere ? (show.turned ? y : x) : 1e30;
+      places[2 * i + 1] = isThere ? (show.turned ? -x : y) : 1e30;
     }
     show.shade(body, shades);
     const scale = show.camera.scale * ratio;
@@ -95,7 +109,7 @@ export class View {
     this.painter.draw({
       places, values: shades, radii,
       palette: show.palette, isFlat: show.isFlat, layers: show.layers,
-      camera: { x: show.camera.x - this.origin[0], y: show.camera.y - this.origin[1], scale },
+      camera: { x: show.camera.x - origin[0], y: show.camera.y - origin[1], scale },
       bondsFrom, bondCount: body.bonds.length - bondsFrom,
       trianglesFrom, triangleCount: body.triangles.length - trianglesFrom,
       bondColour: themeColour("bond"),
@@ -105,13 +119,18 @@ export class View {
   }
 
   // From a place to the canvas, in CSS pixels.
-  place([x, y]) {
+  place(at) {
+    return this.pixel(this.shown(at));
+  }
+
+  pixel([x, y]) {
     const { camera } = this.show;
     return [this.width / 2 + (x - camera.x) * camera.scale, this.height / 2 - (y - camera.y) * camera.scale];
   }
 
   at(particle) {
-    return this.place([this.places[2 * particle] + this.origin[0], this.places[2 * particle + 1] + this.origin[1]]);
+    const origin = this.shown(this.origin);
+    return this.pixel([this.places[2 * particle] + origin[0], this.places[2 * particle + 1] + origin[1]]);
   }
 
   pen(canvas) {
@@ -157,20 +176,26 @@ export class View {
     pen.font = "11px system-ui, sans-serif";
     pen.beginPath();
     for (const x of across) {
-      const px = Math.round(this.place([x, 0])[0]) + 0.5;
+      const px = Math.round(this.pixel([x, 0])[0]) + 0.5;
       pen.moveTo(px, 0);
       pen.lineTo(px, this.height);
     }
     for (const y of up) {
-      const py = Math.round(this.place([0, y])[1]) + 0.5;
+      const py = Math.round(this.pixel([0, y])[1]) + 0.5;
       pen.moveTo(0, py);
       pen.lineTo(this.width, py);
     }
     pen.stroke();
-    across.slice(1).forEach((x) => pen.fillText(words(x), this.place([x, 0])[0] + 3, this.height - 5));
-    up.forEach((y) => pen.fillText(words(y), 5, this.place([0, y])[1] - 3));
-    const unit = this.body.film.unit;
-    if (unit && unit !== "length") pen.fillText(`[${unit}]`, this.width - pen.measureText(`[${unit}]`).width - 6, this.height - 5);
+    // Turned, what lies across is y, and what goes down is x.
+    const [h, v] = this.show.turned ? ["y", "x"] : ["x", "y"];
+    const { unit } = this.body.film;
+    const named = (name) => (isUnit(unit) ? `${name} [${unit}]` : name);
+    const inside = across.filter((x) => this.pixel([x, 0])[0] > 50 && this.pixel([x, 0])[0] < this.width - 70);
+    inside.forEach((x) => pen.fillText(words(x), this.pixel([x, 0])[0] + 3, this.height - 5));
+    const between = up.filter((y) => this.pixel([0, y])[1] > 34 && this.pixel([0, y])[1] < this.height - 16);
+    between.forEach((y) => pen.fillText(words(this.show.turned ? -y : y), 5, this.pixel([0, y])[1] - 3));
+    pen.fillText(named(h), this.width - pen.measureText(named(h)).width - 6, this.height - 5);
+    pen.fillText(named(v), 5, 14);
   }
 
   // The way of everybody up to now.
@@ -233,7 +258,8 @@ export class View {
     pen.beginPath();
     for (let n = 0; n < broken; n++) {
       const [a, b] = [body.bonds[2 * n], body.bonds[2 * n + 1]];
-      const half = [(body.X[b] - body.X[a]) / 2, (body.Y[b] - body.Y[a]) / 2].map((part) => part * show.camera.scale);
+      const bond = this.shown([(body.X[b] - body.X[a]) / 2, (body.Y[b] - body.Y[a]) / 2]);
+      const half = bond.map((part) => part * show.camera.scale);
       for (const [end, sign] of [[a, 1], [b, -1]]) {
         const [x, y] = this.at(end);
         const [mx, my] = [x + sign * half[0], y - sign * half[1]];
@@ -247,8 +273,9 @@ export class View {
   // The particle nearest to a point of the box, in CSS pixels; -1 if none is near.
   nearest(px, py) {
     const { camera } = this.show;
-    const x = camera.x + (px - this.width / 2) / camera.scale - this.origin[0];
-    const y = camera.y - (py - this.height / 2) / camera.scale - this.origin[1];
+    const origin = this.shown(this.origin);
+    const x = camera.x + (px - this.width / 2) / camera.scale - origin[0];
+    const y = camera.y - (py - this.height / 2) / camera.scale - origin[1];
     let [best, found] = [(REACH / camera.scale) ** 2, -1];
     for (let i = 0; i < this.body.count; i++) {
       const [u, v] = [this.places[2 * i] - x, this.places[2 * i + 1] - y];
