@@ -16,6 +16,11 @@ pub struct OutputArguments {
     /// Replace an earlier output of flockform in DIR
     #[arg(long)]
     force: bool,
+}
+
+/// Whether there shall be a report.html.
+#[derive(Debug, Args)]
+pub struct ReportArguments {
     /// Write no report.html, and keep no frames for it
     #[arg(long)]
     pub no_report: bool,

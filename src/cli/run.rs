@@ -22,7 +22,7 @@ use flockform::export::{
 use flockform::scene::Scene;
 use flockform::trade::{Chosen, choose};
 
-use super::output::OutputArguments;
+use super::output::{OutputArguments, ReportArguments};
 use super::progress::Progress;
 use super::{FAILED, Refusal, SceneArguments, print};
 
@@ -32,6 +32,8 @@ pub struct RunArguments {
     scene: SceneArguments,
     #[command(flatten)]
     output: OutputArguments,
+    #[command(flatten)]
+    report: ReportArguments,
     /// Run at most this many steps (the same as --set stop.steps=N)
     #[arg(long, value_name = "N")]
     steps: Option<usize>,
@@ -59,7 +61,7 @@ fn run_here(arguments: &RunArguments) -> Result<ExitCode, Refusal> {
     tracing::info!("planned {} particles of `{}` in {setup:.1?}", plan.count(), scene.name);
 
     let mut recorder = Recorder::new(&scene, &plan, &folder)?;
-    recorder.reports = !arguments.output.no_report;
+    recorder.reports = !arguments.report.no_report;
     let mut progress = Progress::new(arguments.output.quiet, scene.stop.steps);
     let interrupted = interrupt_flag();
     let stepping = Instant::now();
@@ -73,8 +75,9 @@ fn run_here(arguments: &RunArguments) -> Result<ExitCode, Refusal> {
 
     let elapsed = stepping.elapsed();
     tracing::info!("{} steps in {elapsed:.1?}, writing", outcome.engine.step());
+    let on_the_way = recorder.writing;
     let records = recorder.finish(&outcome)?;
-    let timings = Timings { setup, steps: elapsed.saturating_sub(records.writing), output: records.writing };
+    let timings = Timings { setup, steps: elapsed.saturating_sub(on_the_way), output: records.writing };
     let (snapshots, probes) = (&records.snapshots, &records.probes);
     let results = Results { scene: &scene, outcome: &outcome, snapshots, probes, timings };
     let (_, summary) = write_all(&folder, &results)?;

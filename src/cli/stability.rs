@@ -9,7 +9,7 @@ use flockform::stability::bisection::Effort;
 use flockform::stability::extremes::plan;
 use flockform::stability::study::{Options, run};
 
-use super::output::OutputArguments;
+use super::output::{OutputArguments, ReportArguments};
 use super::{FAILED, Refusal, SceneArguments, print};
 
 #[derive(Debug, Args)]
@@ -18,6 +18,8 @@ pub struct StabilityArguments {
     scene: SceneArguments,
     #[command(flatten)]
     output: OutputArguments,
+    #[command(flatten)]
+    report: ReportArguments,
     /// Fewer and shorter runs: slow bodies may not settle in them
     #[arg(long)]
     quick: bool,
@@ -41,7 +43,7 @@ pub fn stability(arguments: &StabilityArguments) -> Result<ExitCode, Refusal> {
     let load = |more: &[String]| arguments.scene.load_scene(more);
     let study = run(&load, options, &mut |next| tracing::info!("{next}"))?;
     write_stability(&folder, &study)?;
-    if !arguments.output.no_report {
+    if !arguments.report.no_report {
         report::stability::write(&folder, &study)?;
     }
     let kept = folder.commit()?;

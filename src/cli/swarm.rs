@@ -13,7 +13,7 @@ use flockform::scene::bundled::{self, bundled_swarm};
 use flockform::scene::swarm::Swarm;
 use flockform::swarm::flight::{Flight, FlightReport, fly};
 
-use super::output::OutputArguments;
+use super::output::{OutputArguments, ReportArguments};
 use super::run::interrupt_flag;
 use super::{FAILED, Refusal, print, scene_path};
 
@@ -43,6 +43,8 @@ pub struct SwarmArguments {
     swarm: SwarmFileArguments,
     #[command(flatten)]
     output: OutputArguments,
+    #[command(flatten)]
+    report: ReportArguments,
     /// Print flight.json's report instead of words
     #[arg(long, conflicts_with = "quiet")]
     json: bool,
@@ -52,7 +54,7 @@ pub struct SwarmArguments {
 pub fn swarm(arguments: &SwarmArguments) -> Result<ExitCode, Refusal> {
     let swarm = arguments.swarm.load()?;
     let at_start = Flight::new(&swarm)?;
-    let mut recorder = (!arguments.output.no_report).then(|| FlightRecorder::new(&at_start));
+    let mut recorder = (!arguments.report.no_report).then(|| FlightRecorder::new(&at_start));
     let folder = arguments.output.folder(&swarm.name)?;
     let interrupted = interrupt_flag();
     let start = Instant::now();

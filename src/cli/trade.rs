@@ -7,7 +7,7 @@ use flockform::export::report;
 use flockform::export::trade::write_trade;
 use flockform::trade::{Grid, run};
 
-use super::output::OutputArguments;
+use super::output::{OutputArguments, ReportArguments};
 use super::{Refusal, SceneArguments, print};
 
 #[derive(Debug, Args)]
@@ -16,6 +16,8 @@ pub struct TradeArguments {
     scene: SceneArguments,
     #[command(flatten)]
     output: OutputArguments,
+    #[command(flatten)]
+    report: ReportArguments,
     /// Run each setting so often; the median time counts
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u16).range(1..))]
     repeats: u16,
@@ -44,7 +46,7 @@ pub fn trade(arguments: &TradeArguments) -> Result<ExitCode, Refusal> {
     let load = |more: &[String]| arguments.scene.load_scene(more);
     let study = run(&load, &grid, &mut |setting| tracing::info!("{setting}"))?;
     write_trade(&folder, &study)?;
-    if !arguments.output.no_report {
+    if !arguments.report.no_report {
         report::trade::write(&folder, &study)?;
     }
     let kept = folder.commit()?;

@@ -105,11 +105,11 @@ export class Chart {
     Object.assign(this, { x, y, xs, ys, room, size });
     const root = svg("svg", { viewBox: `0 0 ${width} ${HEIGHT}`, width, height: HEIGHT, role: "img", "aria-label": this.words() });
     this.drawAxes(root, marks(plot.x, xs, width / 90), yTicks);
-    for (const { x: at, name } of plot.landmarks) {
+    plot.landmarks.forEach(({ x: at, name }, row) => {
       svg("line", { x1: x(at), x2: x(at), y1: room.top, y2: room.top + size[1], stroke: "var(--soft)", "stroke-dasharray": "5 4" }, root);
       const end = x(at) > room.left + 0.6 * size[0];
-      svg("text", { x: x(at) + (end ? -5 : 5), y: room.top + 13, "text-anchor": end ? "end" : "start", class: "faint" }, root).textContent = name;
-    }
+      svg("text", { x: x(at) + (end ? -5 : 5), y: room.top + 13 + 15 * row, "text-anchor": end ? "end" : "start", class: "faint" }, root).textContent = name;
+    });
     for (const series of this.shown()) {
       const places = series.points.map((point) => [x(point[0]), y(point[1])]).filter((place) => place.every(Number.isFinite));
       this.drawMark(root, series, places, places);

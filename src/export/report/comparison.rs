@@ -15,8 +15,8 @@ use crate::scene::Scene;
 
 /// Frames on the way from no displacement to all of it.
 const FRAMES: usize = 20;
-const PLACE_BITS: u32 = 24;
-const COLOUR_BITS: u32 = 12;
+/// Of every quantity.
+const BITS: u32 = 24;
 
 /// Writes `report.html`.
 ///
@@ -93,7 +93,7 @@ fn stage(
     stage.add_exact(Quantity::new("ux", "x displacement", unit), moved.x.iter().copied());
     stage.add_exact(Quantity::new("uy", "y displacement", unit), moved.y.iter().copied());
     let channel = |(name, bits)| Channel { name, bits };
-    let names = [("dx", PLACE_BITS), ("dy", PLACE_BITS), ("von_mises", COLOUR_BITS), ("error", COLOUR_BITS)];
+    let names = [("dx", BITS), ("dy", BITS), ("von_mises", BITS), ("error", BITS)];
     let mut frames = Frames::new(moved.len(), names.map(channel).into());
     for frame in 0..=FRAMES {
         let part = frame as f64 / FRAMES as f64;

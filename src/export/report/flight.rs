@@ -15,9 +15,8 @@ use crate::flock::role::Role;
 use crate::scene::swarm::Swarm;
 use crate::swarm::flight::{Flight, FlightReport, Record};
 
-/// Of places; and of what is only shown as a colour.
-const PLACE_BITS: u32 = 24;
-const COLOUR_BITS: u32 = 12;
+/// Of every quantity.
+const BITS: u32 = 24;
 /// Robots beyond this get no line of their own in the page's table: robots.csv has them.
 const MOST_ROWS: usize = 400;
 
@@ -36,8 +35,8 @@ impl FlightRecorder {
     /// From the flight before its first period.
     pub fn new(flight: &Flight) -> Self {
         let channel = |name, bits| Channel { name, bits };
-        let mut channels = vec![channel("dx", PLACE_BITS), channel("dy", PLACE_BITS)];
-        channels.extend(["clearance", "age", "pe1", "strain"].map(|name| channel(name, COLOUR_BITS)));
+        let mut channels = vec![channel("dx", BITS), channel("dy", BITS)];
+        channels.extend(["clearance", "age", "pe1", "strain"].map(|name| channel(name, BITS)));
         let formation = flight.control().formation();
         let count = formation.count();
         // Seen from both ends or from one, a line between two robots is one line.

@@ -5,8 +5,8 @@
 
 use super::track::Track;
 
-/// Frames that a report keeps at most: more than a slider of a page can tell apart.
-pub const MOST_FRAMES: usize = 500;
+/// Frames that a report keeps at most: about as many as a slider of a page can tell apart.
+pub const MOST_FRAMES: usize = 512;
 /// Memory for frames \[byte\]; bodies of millions of particles get fewer frames.
 const MOST_BYTES: usize = 400 << 20;
 
@@ -106,7 +106,7 @@ mod tests {
 
     #[test]
     fn a_run_of_any_length_leaves_evenly_spaced_frames_and_never_more_than_the_most() {
-        for steps in [0, 3, 499, 500, 501, 2_000, 12_345] {
+        for steps in [0, 3, 510, 511, 512, 513, 2_000, 12_345] {
             let mut frames = Frames::new(1, vec![Channel { name: "dx", bits: 16 }]);
             for step in 0..=steps {
                 if frames.wants(step) {

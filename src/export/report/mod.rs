@@ -15,6 +15,7 @@ pub mod encode;
 #[cfg(feature = "swarm")]
 pub mod flight;
 pub mod frames;
+pub mod gallery;
 pub mod page;
 pub mod plot;
 pub mod run;

@@ -33,6 +33,9 @@ let views = [];
 let charts = [];
 let player = null;
 
+// For the browser's console: `report.bodies[0].numbers(66)`.
+window.report = { bodies, state, get views() { return views; }, get player() { return player; } };
+
 // ---- colours ----
 
 // The quantities that can be chosen: role and displacement always, the others as the film has them.
@@ -166,6 +169,10 @@ function fit() {
   const low = [0, 1].map((k) => Math.min(...boxes.map((box) => box.low[k])));
   const high = [0, 1].map((k) => Math.max(...boxes.map((box) => box.high[k])));
   const view = views[0];
+  // A lying body needs no high window.
+  const wanted = (1.15 * view.box.clientWidth * (high[1] - low[1])) / (high[0] - low[0]) + 60;
+  const height = Math.round(Math.min(Math.max(wanted, 260), Math.min(0.66 * window.innerHeight, 640)));
+  if (Number.isFinite(height)) views.forEach(({ box }) => (box.style.height = `${height}px`));
   view.resize();
   const scales = [view.width / (high[0] - low[0]), view.height / (high[1] - low[1])];
   const scale = 0.9 * Math.min(...scales.filter((s) => Number.isFinite(s) && s > 0));

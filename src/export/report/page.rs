@@ -19,7 +19,7 @@ use super::stage::Stage;
 pub const FILE: &str = "report.html";
 
 const PAGE: &str = include_str!("page.html");
-const STYLE: &str = include_str!("page.css");
+pub(super) const STYLE: &str = include_str!("page.css");
 /// In the order in which they build on each other.
 const SCRIPTS: [&str; 9] = [
     include_str!("unpack.js"),
@@ -139,7 +139,7 @@ fn joined(module: &str) -> String {
 }
 
 /// The template with `{{name}}` replaced; what is filled in is not looked at again.
-fn filled(template: &str, parts: &[(&str, String)]) -> String {
+pub(super) fn filled(template: &str, parts: &[(&str, String)]) -> String {
     let mut page = String::with_capacity(parts.iter().map(|(_, text)| text.len()).sum::<usize>() + 8192);
     let mut pieces = template.split("{{");
     page += pieces.next().unwrap_or_default();
@@ -151,7 +151,7 @@ fn filled(template: &str, parts: &[(&str, String)]) -> String {
     page
 }
 
-pub(in super::super) fn escaped(text: &str) -> String {
+pub(super) fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 

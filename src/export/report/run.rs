@@ -23,10 +23,12 @@ use crate::material::cells::Cells;
 use crate::material::elastic::{Constants, Elastic, Plane};
 use crate::scene::Scene;
 
-/// Up to so many particles displacements have 24 bits, of which strains in a body that turns far are still exact;
-/// larger bodies have 16.
+/// Up to so many particles everything has the bits from which the strains of a body that turns far are still
+/// exact; larger bodies have those that a screen can show.
 const MOST_FINE: usize = 20_000;
-/// Bits of what is only shown as a colour.
+const FINE_BITS: u32 = 24;
+const COARSE_BITS: u32 = 16;
+/// Of what is only shown as a colour.
 const COLOUR_BITS: u32 = 12;
 /// More particles than this are not told exactly at the end: their numbers alone would fill the page.
 const MOST_EXACT: usize = 250_000;
@@ -48,12 +50,12 @@ impl RunRecorder {
     /// From the engine before its first step.
     fn new(engine: &Engine) -> Self {
         let count = engine.body().count();
-        let bits = if count <= MOST_FINE { 24 } else { 16 };
+        let [bits, others] = if count <= MOST_FINE { [FINE_BITS; 2] } else { [COARSE_BITS, COLOUR_BITS] };
         let channel = |name, bits| Channel { name, bits };
-        let mut channels = vec![channel("dx", bits), channel("dy", bits), channel("pe2", COLOUR_BITS)];
+        let mut channels = vec![channel("dx", bits), channel("dy", bits), channel("pe2", others)];
         // Whoever finds neighbours anew is the only one who knows them.
         if engine.lasting_neighbours().is_none() {
-            channels.extend(["pe1", "strain"].map(|name| channel(name, COLOUR_BITS)));
+            channels.extend(["pe1", "strain"].map(|name| channel(name, others)));
         }
         let roles = engine.roles().to_vec();
         let values = vec![Vec::new(); channels.len()];

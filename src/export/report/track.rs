@@ -124,7 +124,7 @@ mod tests {
         let first = Track::of(&[0.0, 0.25, 1.0], 16, None);
         let second = Track::of(&[0.0, 0.25, 0.6], 16, Some(&first));
         assert_eq!((first.exponent, first.code(1)), (second.exponent, second.code(1)));
-        let wider = Track::of(&[0.0, 0.25, 1.7], 16, Some(&second));
+        let wider = Track::of(&[0.0, 0.25, 2.7], 16, Some(&second));
         assert_eq!(wider.exponent, first.exponent + 1);
     }
 }

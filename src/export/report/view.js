@@ -190,11 +190,11 @@ export class View {
     const [h, v] = this.show.turned ? ["y", "x"] : ["x", "y"];
     const { unit } = this.body.film;
     const named = (name) => (isUnit(unit) ? `${name} [${unit}]` : name);
-    const inside = across.filter((x) => this.pixel([x, 0])[0] > 50 && this.pixel([x, 0])[0] < this.width - 70);
+    const inside = across.filter((x) => this.pixel([x, 0])[0] > 50 && this.pixel([x, 0])[0] < this.width - 190);
     inside.forEach((x) => pen.fillText(words(x), this.pixel([x, 0])[0] + 3, this.height - 5));
     const between = up.filter((y) => this.pixel([0, y])[1] > 34 && this.pixel([0, y])[1] < this.height - 16);
     between.forEach((y) => pen.fillText(words(this.show.turned ? -y : y), 5, this.pixel([0, y])[1] - 3));
-    pen.fillText(named(h), this.width - pen.measureText(named(h)).width - 6, this.height - 5);
+    pen.fillText(named(h), this.width - pen.measureText(named(h)).width - 6, 14);
     pen.fillText(named(v), 5, 14);
   }
 
