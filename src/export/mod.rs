@@ -13,6 +13,8 @@
 //! | `report.html` | the run as a page ([`report`]) |
 //! | `configuration_*`, `pe1_*`, `probes` | figures, as SVG and as the PNG rendered from it |
 //!
+//! A page for people to look at is written beside them ([`report`]), and a gallery of such pages.
+//!
 //! A flight (`flight`, feature `swarm`), a comparison with the truth (`comparison`, feature `fem`) have folders of their own, and so has a study of
 //! what grows (`stability`).
 //!

@@ -115,6 +115,8 @@ async function hover(page) {
 }
 
 async function colours(page) {
+  // Under way: at the end, at rest, many quantities are nothing everywhere.
+  await page.evaluate(() => window.report.player.go(0.2 * window.report.player.last));
   const names = await page.$$eval("#quantity option", (options) => options.map((option) => option.value));
   for (const name of names) {
     await page.selectOption("#quantity", name);

@@ -119,9 +119,9 @@ function drawScale() {
   const one = quantities().find(({ key }) => key === state.quantity);
   element("log-label").hidden = state.quantity === "role";
   if (state.quantity === "role") {
-    const roles = bodies[0].roles();
     const { role_names: names } = bodies[0].film;
-    const counts = names.map((_, role) => roles.reduce((sum, own) => sum + (own === role ? 1 : 0), 0));
+    const counts = names.map(() => 0);
+    for (const role of bodies[0].roles()) counts[role] += 1;
     const keys = names.map((name, role) => (counts[role] ? key(themeText(name), `${counts[role]} ${plural(name, counts[role])}`) : null));
     if (bodies[0].brokenBonds()) keys.push(key(themeText("crack"), `${bodies[0].brokenBonds()} broken bonds`));
     scale.replaceChildren(...keys.filter(Boolean));
@@ -224,10 +224,12 @@ function wantedFactor() {
 // ---- drawing ----
 
 let isAsked = false;
+let isPrinting = false;
 
 // Draws before the next refresh, once however often it is asked for.
 function draw() {
-  if (isAsked) return;
+  // What is printed was drawn before the page took the paper's size.
+  if (isAsked || isPrinting) return;
   isAsked = true;
   requestAnimationFrame(() => {
     isAsked = false;
@@ -494,8 +496,14 @@ function listenToTheme() {
     before = root.dataset.theme;
     take(false);
     drawNow();
+    views.forEach((view) => view.fix());
+    isPrinting = true;
   });
-  window.addEventListener("afterprint", () => take(before === "dark"));
+  window.addEventListener("afterprint", () => {
+    isPrinting = false;
+    views.forEach((view) => view.unfix());
+    take(before === "dark");
+  });
 }
 
 // Until somebody chooses layers, a field fills the body and roles are dots: each as it is read best.
@@ -547,7 +555,7 @@ async function startFilm() {
   views.forEach((view) => {
     view.prepare();
     listenToView(view);
-    new ResizeObserver(() => (state.isFitted && player.ready ? refit() : draw())).observe(view.box);
+    new ResizeObserver(() => (state.isFitted && player.ready && !isPrinting ? refit() : draw())).observe(view.box);
   });
   nameControls();
   listenToControls();

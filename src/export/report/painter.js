@@ -50,9 +50,9 @@ void main() {
 }`;
 
 export class Painter {
-  // Null where the browser has no WebGL2.
-  static on(canvas) {
-    const gl = canvas.getContext("webgl2", { antialias: true, premultipliedAlpha: true, preserveDrawingBuffer: true });
+  // Null where the browser has no WebGL2. Smooth edges cost what a processor that stands in for a graphics card has not.
+  static on(canvas, antialias) {
+    const gl = canvas.getContext("webgl2", { antialias, premultipliedAlpha: true, preserveDrawingBuffer: true });
     return gl && new Painter(canvas, gl);
   }
 

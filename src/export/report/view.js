@@ -6,6 +6,8 @@ import { themeColour, themeText, ticks, words } from "./colour.js";
 
 // Ways of more particles would cover each other.
 const MOST_WAYS = 400;
+// Edges of more particles than this are too fine to be smoothed.
+const MOST_SMOOTH = 20000;
 // How near the pointer must come to a particle, in pixels.
 const REACH = 14;
 
@@ -33,7 +35,7 @@ export class View {
     figure.append(this.box);
     parent.append(figure);
     const wanted = new URLSearchParams(location.search).get("painter") !== "2d";
-    this.painter = (wanted && Painter.on(this.middle)) || new PlainPainter(this.middle);
+    this.painter = (wanted && Painter.on(this.middle, body.count <= MOST_SMOOTH)) || new PlainPainter(this.middle);
     this.places = new Float32Array(2 * body.count);
     this.shades = new Float32Array(body.count);
     this.radii = new Float32Array(body.count);
@@ -283,6 +285,17 @@ export class View {
       if (away < best) [best, found] = [away, i];
     }
     return found;
+  }
+
+  // Puts a picture in the canvases' place: browsers leave those out on paper.
+  fix() {
+    this.print = Object.assign(document.createElement("img"), { alt: this.box.getAttribute("aria-label") });
+    this.print.src = this.composed().toDataURL();
+    this.box.append(this.print);
+  }
+
+  unfix() {
+    this.print?.remove();
   }
 
   // All three canvases as one.
