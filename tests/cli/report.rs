@@ -47,7 +47,7 @@ fn a_long_run_is_told_by_evenly_spaced_frames_and_the_page_says_so() {
     let times: Vec<f64> = serde_json::from_value(film["times"].clone()).expect("numbers");
     let expected: Vec<f64> = (0..=325).map(|k| 4.0 * f64::from(k)).chain([1301.0]).collect();
     assert_eq!(times, expected);
-    assert!(html.contains("Of 1301 steps every 4th is shown, 327 frames"), "it says what it leaves out");
+    assert!(html.contains("Of 1301 steps one in 4 is shown, 327 frames"), "it says what it leaves out");
 }
 
 #[test]

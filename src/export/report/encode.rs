@@ -1,7 +1,7 @@
 //! Frames and arrays as compressed text: differences between frames and between particles, bytes of like
 //! significance beside each other, deflate, base64.
 //!
-//! `unpack.js` is the way back. All arithmetic is modulo the range of a code, so whatever is predicted, the
+//! `web/unpack.js` is the way back. All arithmetic is modulo the range of a code, so whatever is predicted, the
 //! code comes back.
 
 use std::io::Write;

@@ -11,7 +11,7 @@ use super::super::figures;
 use super::super::{OutputFolder, summary};
 use super::page::{FILE, STYLE, escaped, filled};
 
-const PAGE: &str = include_str!("gallery.html");
+const PAGE: &str = include_str!("web/gallery.html");
 /// Of a picture \[pixel\].
 const WIDTH: u32 = 540;
 /// Longest sentence \[character\].

@@ -1,8 +1,8 @@
 //! The page: one file that needs no network and no server.
 //!
 //! What can be read without a script (title, summary, tables, texts) stands in the page as it is; films and
-//! charts are data that the scripts draw. The scripts are modules of their own beside this file; a page holds them
-//! one after another, without their imports.
+//! charts are data that the scripts draw. The scripts are modules of their own, in `web/`; a page holds them one after
+//! another, without their imports, so no two may give a name of the top level to different things.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -18,19 +18,24 @@ use super::stage::Stage;
 /// Name of the file.
 pub const FILE: &str = "report.html";
 
-const PAGE: &str = include_str!("page.html");
-pub(super) const STYLE: &str = include_str!("page.css");
+const PAGE: &str = include_str!("web/page.html");
+pub(super) const STYLE: &str = include_str!("web/page.css");
 /// In the order in which they build on each other.
-const SCRIPTS: [&str; 9] = [
-    include_str!("unpack.js"),
-    include_str!("colour.js"),
-    include_str!("body.js"),
-    include_str!("painter.js"),
-    include_str!("painter2d.js"),
-    include_str!("view.js"),
-    include_str!("chart.js"),
-    include_str!("player.js"),
-    include_str!("page.js"),
+const SCRIPTS: [&str; 14] = [
+    include_str!("web/unpack.js"),
+    include_str!("web/colour.js"),
+    include_str!("web/body.js"),
+    include_str!("web/shown.js"),
+    include_str!("web/painter.js"),
+    include_str!("web/painter2d.js"),
+    include_str!("web/view.js"),
+    include_str!("web/chart.js"),
+    include_str!("web/player.js"),
+    include_str!("web/scale.js"),
+    include_str!("web/camera.js"),
+    include_str!("web/numbers.js"),
+    include_str!("web/controls.js"),
+    include_str!("web/page.js"),
 ];
 
 /// Everything that a report shows, from the top.

@@ -129,12 +129,13 @@ impl RunRecorder {
         let mut stage = Stage::new(film(scene, engine, is_solved));
         stage.set_reference(&engine.body().reference);
         stage.set_roles(&self.first_roles, &self.changes);
+        // Bonds and cells of those whose neighbours change would say who were neighbours once.
         if engine.lasting_neighbours().is_some() {
             set_bonds(&mut stage, engine, is_solved);
-        }
-        let cells = Cells::of_body(engine.body());
-        if cells.count() > 0 {
-            stage.set_cells(&cells);
+            let cells = Cells::of_body(engine.body());
+            if cells.count() > 0 {
+                stage.set_cells(&cells);
+            }
         }
         if engine.body().count() <= MOST_EXACT {
             add_exact(&mut stage, scene, engine);
@@ -279,7 +280,7 @@ fn note(film: &Film, outcome: &Outcome) -> String {
         match between as usize {
             0 | 1 => format!("Every step is shown: {frames} frames."),
             every => format!(
-                "Of {steps} steps every {every}th is shown, {frames} frames (a page keeps at most {MOST_FRAMES}, fewer of a body whose frames are large); bonds that broke in between show at the next."
+                "Of {steps} steps one in {every} is shown, {frames} frames (a page keeps at most {MOST_FRAMES}, fewer of a body whose frames are large); bonds that broke in between show at the next."
             ),
         }
     };
