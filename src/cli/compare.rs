@@ -8,9 +8,10 @@ use clap::Args;
 use flockform::compare::run::{Compared, compare as compare_scene};
 use flockform::continuum::run::StopReason;
 use flockform::export::comparison::{ComparisonReport, write_comparison};
+use flockform::export::report;
 use flockform::scene::Scene;
 
-use super::output::OutputArguments;
+use super::output::{OutputArguments, ReportArguments};
 use super::progress::Progress;
 use super::run::{exit_code, interrupt_flag};
 use super::{Refusal, SceneArguments, print};
@@ -21,6 +22,8 @@ pub struct CompareArguments {
     scene: SceneArguments,
     #[command(flatten)]
     output: OutputArguments,
+    #[command(flatten)]
+    report: ReportArguments,
     /// Cut each side of a cell into N parts for the truth [default: as many as make it exact enough]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     refine: Option<u16>,
@@ -43,6 +46,9 @@ pub fn compare(arguments: &CompareArguments) -> Result<ExitCode, Refusal> {
 
     let report = ComparisonReport::new(&scene, &compared);
     write_comparison(&folder, &scene, &compared, &report)?;
+    if !arguments.report.no_report {
+        report::comparison::write(&folder, &scene, &compared, &report)?;
+    }
     let kept = folder.commit()?;
     if arguments.json {
         print(&format!("{:#}\n", serde_json::json!(report)));

@@ -1,6 +1,7 @@
 //! The command line: what can be asked for, and who answers.
 
 mod compare;
+mod gallery;
 mod install;
 mod material;
 mod node;
@@ -86,6 +87,11 @@ pub enum Command {
         after_help = "Example:\n  flockform robots square --ros-args -p publish_clock:=true\n  flockform robots square --transport shm"
     )]
     Robots(node::RobotsArguments),
+    /// Run every bundled scene and swarm and build one page that leads to their reports
+    #[command(
+        after_help = "Example:\n  flockform gallery --out /tmp/gallery\n  flockform gallery tension gap"
+    )]
+    Gallery(gallery::GalleryArguments),
     /// List the bundled swarms
     #[command(after_help = "Example:\n  flockform swarms")]
     Swarms,
@@ -239,6 +245,10 @@ pub enum Refusal {
         "there is no {what} file and no bundled {what} `{name}`\n  help: the nearest bundled {what} is `{nearest}`; `flockform {what}s` lists them all"
     )]
     NotBundled { what: &'static str, name: String, nearest: &'static str },
+    #[error(
+        "`{name}` left no report for the gallery: {reason}\n  help: run it alone to see why, or name the others"
+    )]
+    Exhibit { name: String, reason: String },
     #[error("{0}")]
     Option(#[from] material::WrongOption),
     #[error("{0}")]
@@ -305,6 +315,7 @@ pub fn dispatch(command: Command, ros: &RosArguments) -> Result<ExitCode, Refusa
         Command::Node(arguments) => return node::node(&arguments, ros),
         Command::Robots(arguments) => return node::robots(&arguments, ros),
         Command::Scenes => list(bundled::SCENES, |scene| Ok(scene.load(&[])?.raw.title))?,
+        Command::Gallery(arguments) => return gallery::gallery(&arguments),
         Command::Swarms => list(bundled::SWARMS, |swarm| Ok(swarm.load_swarm(&[])?.raw.title))?,
         Command::Install(arguments) => return install::install(&arguments),
         Command::Plan(arguments) => {

@@ -18,6 +18,14 @@ pub struct OutputArguments {
     force: bool,
 }
 
+/// Whether there shall be a report.html.
+#[derive(Debug, Args)]
+pub struct ReportArguments {
+    /// Write no report.html, and keep no frames for it
+    #[arg(long)]
+    pub no_report: bool,
+}
+
 impl OutputArguments {
     /// The folder asked for, or a free one of this name.
     pub fn folder(&self, name: &str) -> Result<OutputFolder, ExportError> {

@@ -1,5 +1,6 @@
 //! `flockform run`: plan, step, record, write.
 
+use std::cell::Cell;
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::process::ExitCode;
@@ -14,6 +15,8 @@ use flockform::continuum::equilibrium::come_to_rest_watched;
 use flockform::continuum::plan::Plan;
 use flockform::continuum::record::{ProbeSeries, Snapshot};
 use flockform::continuum::run::{Outcome, StopReason, Watch};
+use flockform::export::report::stage::Stage;
+use flockform::export::report::{self, RunRecorder};
 use flockform::export::{
     Energies, ExportError, OutputFolder, Results, Summary, Timings, VtkSeries, write_all,
 };
@@ -22,7 +25,7 @@ use flockform::shm::Domain;
 use flockform::shm::positions::Positions;
 use flockform::trade::{Chosen, choose};
 
-use super::output::OutputArguments;
+use super::output::{OutputArguments, ReportArguments};
 use super::progress::Progress;
 use super::{FAILED, Refusal, SceneArguments, print};
 
@@ -32,6 +35,8 @@ pub struct RunArguments {
     scene: SceneArguments,
     #[command(flatten)]
     output: OutputArguments,
+    #[command(flatten)]
+    report: ReportArguments,
     /// Run at most this many steps (the same as --set stop.steps=N)
     #[arg(long, value_name = "N")]
     steps: Option<usize>,
@@ -65,12 +70,14 @@ fn run_here(arguments: &RunArguments) -> Result<ExitCode, Refusal> {
     tracing::info!("planned {} particles of `{}` in {setup:.1?}", plan.count(), scene.name);
 
     let mut recorder = Recorder::new(&scene, &plan, &folder)?;
+    recorder.reports = !arguments.report.no_report;
     let mut progress = Progress::new(arguments.output.quiet, scene.stop.steps);
     let interrupted = interrupt_flag();
     let stepping = Instant::now();
-    let looks = Looks::new(&scene, &plan);
+    let looks = Looks::new(&scene, &plan, shown.is_some());
     let mut see = |engine: &Engine, residual: f64| {
         recorder.step(engine);
+        looks.film.set(recorder.film.as_ref().map(|film| film.next(engine.step())));
         if let Some(shown) = &mut shown {
             shown.show(engine);
         }
@@ -84,11 +91,16 @@ fn run_here(arguments: &RunArguments) -> Result<ExitCode, Refusal> {
 
     let elapsed = stepping.elapsed();
     tracing::info!("{} steps in {elapsed:.1?}, writing", outcome.engine.step());
-    let records = recorder.finish(&outcome.engine)?;
-    let timings = Timings { setup, steps: elapsed.saturating_sub(records.writing), output: records.writing };
+    let on_the_way = recorder.writing;
+    let records = recorder.finish(&outcome)?;
+    let timings = Timings { setup, steps: elapsed.saturating_sub(on_the_way), output: records.writing };
     let (snapshots, probes) = (&records.snapshots, &records.probes);
     let results = Results { scene: &scene, outcome: &outcome, snapshots, probes, timings };
-    let (_, Summary { energies, .. }) = write_all(&folder, &results)?;
+    let (_, summary) = write_all(&folder, &results)?;
+    if let Some(stage) = records.stage {
+        report::run::write(&folder, &results, &summary, stage)?;
+    }
+    let Summary { energies, .. } = summary;
     let kept = folder.commit()?;
     if !arguments.output.quiet {
         print(&words);
@@ -112,20 +124,23 @@ struct Looks<'a> {
     scene: &'a Scene,
     /// Most steps between two looks.
     most: usize,
+    /// The next step that the report shows.
+    film: Cell<Option<usize>>,
 }
 
 impl<'a> Looks<'a> {
-    fn new(scene: &'a Scene, plan: &Plan) -> Self {
-        // Probes are recorded at every step. Otherwise about twice a second.
-        let most = if plan.probes.is_empty() { (UPDATES_BETWEEN_LOOKS / plan.count()).max(1) } else { 1 };
-        Self { scene, most }
+    /// If `every`, somebody wants to see each step; probes do. Otherwise about twice a second is enough.
+    fn new(scene: &'a Scene, plan: &Plan, every: bool) -> Self {
+        let every = every || !plan.probes.is_empty();
+        let most = if every { 1 } else { (UPDATES_BETWEEN_LOOKS / plan.count()).max(1) };
+        Self { scene, most, film: Cell::new(None) }
     }
 
     fn after(&self, step: usize) -> usize {
         let record = &self.scene.record;
         let figure = record.figures.iter().copied().filter(|&figure| figure > step).min();
         let vtk = (record.vtk_every > 0).then(|| (step / record.vtk_every + 1) * record.vtk_every);
-        [figure, vtk].into_iter().flatten().fold(step + self.most, usize::min)
+        [figure, vtk, self.film.get()].into_iter().flatten().fold(step + self.most, usize::min)
     }
 }
 
@@ -138,14 +153,18 @@ struct Recorder<'a> {
     snapshots: Vec<Snapshot>,
     probes: Vec<ProbeSeries>,
     frames: Option<VtkSeries>,
+    /// Whether there shall be a `report.html`, and what it shows.
+    reports: bool,
+    film: Option<RunRecorder>,
     failure: Option<ExportError>,
     writing: Duration,
 }
 
-/// What was kept, and how long writing took on the way.
+/// What was kept, and how long that took on the way.
 struct Records {
     snapshots: Vec<Snapshot>,
     probes: Vec<ProbeSeries>,
+    stage: Option<Stage>,
     writing: Duration,
 }
 
@@ -158,6 +177,8 @@ impl<'a> Recorder<'a> {
             snapshots: Vec::new(),
             probes: probed.iter().map(|&particle| ProbeSeries::new(particle)).collect(),
             frames: (scene.record.vtk_every > 0).then(|| VtkSeries::create(folder)).transpose()?,
+            reports: true,
+            film: None,
             failure: None,
             writing: Duration::ZERO,
         })
@@ -170,6 +191,11 @@ impl<'a> Recorder<'a> {
         }
         if self.frames.is_some() && engine.step().is_multiple_of(self.scene.record.vtk_every) {
             self.write_frame(engine);
+        }
+        if self.reports {
+            let start = Instant::now();
+            RunRecorder::watch(&mut self.film, engine);
+            self.writing += start.elapsed();
         }
     }
 
@@ -186,7 +212,8 @@ impl<'a> Recorder<'a> {
     }
 
     /// The last configuration is always drawn, and for ParaView always written.
-    fn finish(mut self, engine: &Engine) -> Result<Records, ExportError> {
+    fn finish(mut self, outcome: &Outcome) -> Result<Records, ExportError> {
+        let engine = &outcome.engine;
         let step = engine.step();
         if self.snapshots.last().is_none_or(|last| last.step != step) {
             self.snapshots.push(Snapshot::of(engine));
@@ -200,7 +227,10 @@ impl<'a> Recorder<'a> {
         if let Some(frames) = self.frames {
             frames.finish()?;
         }
-        Ok(Records { snapshots: self.snapshots, probes: self.probes, writing: self.writing })
+        let start = Instant::now();
+        let stage = self.film.map(|film| film.stage(self.scene, outcome));
+        let writing = self.writing + start.elapsed();
+        Ok(Records { snapshots: self.snapshots, probes: self.probes, stage, writing })
     }
 }
 

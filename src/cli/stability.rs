@@ -3,12 +3,13 @@
 use std::process::ExitCode;
 
 use clap::Args;
+use flockform::export::report;
 use flockform::export::stability::{json, write_stability};
 use flockform::stability::bisection::Effort;
 use flockform::stability::extremes::plan;
 use flockform::stability::study::{Options, run};
 
-use super::output::OutputArguments;
+use super::output::{OutputArguments, ReportArguments};
 use super::progress::Stages;
 use super::{FAILED, Refusal, SceneArguments, print};
 
@@ -18,6 +19,8 @@ pub struct StabilityArguments {
     scene: SceneArguments,
     #[command(flatten)]
     output: OutputArguments,
+    #[command(flatten)]
+    report: ReportArguments,
     /// Fewer and shorter runs: slow bodies may not settle in them
     #[arg(long)]
     quick: bool,
@@ -44,6 +47,9 @@ pub fn stability(arguments: &StabilityArguments) -> Result<ExitCode, Refusal> {
     stages.finish();
     let study = study?;
     write_stability(&folder, &study)?;
+    if !arguments.report.no_report {
+        report::stability::write(&folder, &study)?;
+    }
     let kept = folder.commit()?;
     if arguments.json {
         print(&json(&study).unwrap_or_default());

@@ -8,11 +8,12 @@ use std::time::Instant;
 
 use clap::Args;
 use flockform::export::flight::write_flight;
+use flockform::export::report::{self, FlightRecorder};
 use flockform::scene::bundled::{self, bundled_swarm};
 use flockform::scene::swarm::Swarm;
-use flockform::swarm::flight::{FlightReport, fly};
+use flockform::swarm::flight::{Flight, FlightReport, fly};
 
-use super::output::OutputArguments;
+use super::output::{OutputArguments, ReportArguments};
 use super::run::interrupt_flag;
 use super::{FAILED, Refusal, print, scene_path};
 
@@ -42,6 +43,8 @@ pub struct SwarmArguments {
     swarm: SwarmFileArguments,
     #[command(flatten)]
     output: OutputArguments,
+    #[command(flatten)]
+    report: ReportArguments,
     /// Print flight.json's report instead of words
     #[arg(long, conflicts_with = "quiet")]
     json: bool,
@@ -50,15 +53,21 @@ pub struct SwarmArguments {
 /// Flies a swarm and writes what came of it.
 pub fn swarm(arguments: &SwarmArguments) -> Result<ExitCode, Refusal> {
     let swarm = arguments.swarm.load()?;
-    flockform::swarm::flight::Flight::new(&swarm)?;
+    let at_start = Flight::new(&swarm)?;
+    let mut recorder = (!arguments.report.no_report).then(|| FlightRecorder::new(&at_start));
     let folder = arguments.output.folder(&swarm.name)?;
     let interrupted = interrupt_flag();
     let start = Instant::now();
-    let (record, report) = fly(&swarm, &mut |_, _| {
+    let (record, report) = fly(&swarm, &mut |flight, _| {
+        recorder.iter_mut().for_each(|recorder| recorder.watch(flight));
         if interrupted.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     })?;
     let seconds = start.elapsed().as_secs_f64();
     write_flight(&folder, &swarm, &record, &report)?;
+    if let Some(recorder) = recorder {
+        let stage = recorder.stage(&swarm, &report);
+        report::flight::write(&folder, &swarm, &record, &report, stage)?;
+    }
     let kept = folder.commit()?;
     if arguments.json {
         print(&format!("{:#}\n", serde_json::json!(report)));

@@ -3,10 +3,11 @@
 use std::process::ExitCode;
 
 use clap::Args;
+use flockform::export::report;
 use flockform::export::trade::write_trade;
 use flockform::trade::{Grid, run};
 
-use super::output::OutputArguments;
+use super::output::{OutputArguments, ReportArguments};
 use super::progress::Stages;
 use super::{Refusal, SceneArguments, print};
 
@@ -16,6 +17,8 @@ pub struct TradeArguments {
     scene: SceneArguments,
     #[command(flatten)]
     output: OutputArguments,
+    #[command(flatten)]
+    report: ReportArguments,
     /// Run each setting so often; the median time counts
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u16).range(1..))]
     repeats: u16,
@@ -47,6 +50,9 @@ pub fn trade(arguments: &TradeArguments) -> Result<ExitCode, Refusal> {
     stages.finish();
     let study = study?;
     write_trade(&folder, &study)?;
+    if !arguments.report.no_report {
+        report::trade::write(&folder, &study)?;
+    }
     let kept = folder.commit()?;
     if arguments.json {
         print(&format!("{:#}\n", serde_json::json!(study)));

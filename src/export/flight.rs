@@ -53,7 +53,8 @@ pub fn write_flight(
         write(folder, "tracks.csv", tracks)?,
     ];
     written.extend(figures::write(&flight_map::flight(swarm, record, report), &folder.path("flight"))?);
-    written.extend(figures::write(&errors(record, report), &folder.path("errors"))?);
+    let errors = draw_below_each_other(&charts(record, report));
+    written.extend(figures::write(&errors, &folder.path("errors"))?);
     let path = folder.path(summary::FLIGHT);
     let (program, version) = (summary::PROGRAM, env!("CARGO_PKG_VERSION"));
     let whole = Report { program, version, holds: report.holds(), report, swarm: &swarm.raw };
@@ -64,7 +65,7 @@ pub fn write_flight(
 }
 
 /// Shape and clearance against time.
-fn errors(record: &Record, report: &FlightReport) -> String {
+pub(super) fn charts<'a>(record: &Record, report: &FlightReport) -> Vec<Chart<'a>> {
     let series = |name: &str, colour, of: &dyn Fn(&Sample) -> Option<f64>| {
         let points = record.samples.iter().filter_map(|s| of(s).map(|value| [s.time, value])).collect();
         Series { name: name.into(), colour, style: Style::Line, points }
@@ -107,5 +108,5 @@ fn errors(record: &Record, report: &FlightReport) -> String {
             landmarks: Vec::new(),
         });
     }
-    draw_below_each_other(&charts)
+    charts
 }

@@ -10,7 +10,10 @@
 //! | `residuals.csv`, `residuals` | how near the solver came, iteration by iteration, where one was used |
 //! | `breaks.csv` | every broken bond, with its step and place |
 //! | `steps.pvd`, `steps/*.vtu` | frames for ParaView |
+//! | `report.html` | the run as a page ([`report`]) |
 //! | `configuration_*`, `pe1_*`, `probes` | figures, as SVG and as the PNG rendered from it |
+//!
+//! A page for people to look at is written beside them ([`report`]), and a gallery of such pages.
 //!
 //! A flight (`flight`, feature `swarm`), a comparison with the truth (`comparison`, feature `fem`) have folders of their own, and so has a study of
 //! what grows (`stability`).
@@ -54,6 +57,7 @@ pub mod figures;
 #[cfg(feature = "swarm")]
 pub mod flight;
 mod folder;
+pub mod report;
 pub mod stability;
 mod summary;
 #[cfg(feature = "fem")]

@@ -94,8 +94,11 @@ const THRESHOLD: &str = "#a33b2a";
 
 /// A panel for each parameter.
 pub fn figure(study: &Study, linear: &Linear) -> String {
-    let panels: Vec<Chart> = linear.sweeps.iter().map(|sweep| panel(study, linear, sweep)).collect();
-    draw_below_each_other(&panels)
+    draw_below_each_other(&panels(study, linear))
+}
+
+pub(super) fn panels<'a>(study: &Study, linear: &Linear) -> Vec<Chart<'a>> {
+    linear.sweeps.iter().map(|sweep| panel(study, linear, sweep)).collect()
 }
 
 fn panel<'a>(study: &Study, linear: &Linear, sweep: &Sweep) -> Chart<'a> {

@@ -29,6 +29,9 @@ pub(super) const TRANSPORT: &str = "transport.json";
 /// What a flight writes in the place of a summary.
 pub(super) const FLIGHT: &str = "flight.json";
 
+/// What a gallery writes in the place of a summary.
+pub(super) const GALLERY: &str = "gallery.json";
+
 /// How long the parts of a run took.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Timings {
@@ -195,7 +198,7 @@ impl Equilibrium {
 
 /// Whether the folder holds a summary, or a comparison, that this program wrote.
 pub(super) fn is_in(folder: &Path) -> bool {
-    [FILE, COMPARISON, TRADE, STABILITY, TRANSPORT, FLIGHT].into_iter().any(|file| {
+    [FILE, COMPARISON, TRADE, STABILITY, TRANSPORT, FLIGHT, GALLERY].into_iter().any(|file| {
         let text = std::fs::read_to_string(folder.join(file)).unwrap_or_default();
         serde_json::from_str::<serde_json::Value>(&text).is_ok_and(|summary| summary["program"] == PROGRAM)
     })

@@ -4,6 +4,7 @@ mod compare;
 mod install;
 mod material;
 mod program;
+mod report;
 mod run;
 mod stability;
 mod swarm;

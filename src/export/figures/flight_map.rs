@@ -89,7 +89,7 @@ fn draw_obstacles(svg: &mut Svg, axes: &Axes, swarm: &Swarm) {
     }
 }
 
-fn outline(obstacle: &RawObstacle) -> Vec<[f64; 2]> {
+pub(in super::super) fn outline(obstacle: &RawObstacle) -> Vec<[f64; 2]> {
     match obstacle {
         RawObstacle::Polygon { vertices } => vertices.clone(),
         RawObstacle::Disc { centre, radius } => (0..ROUND)

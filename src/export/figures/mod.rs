@@ -67,6 +67,11 @@ pub const PNG_WIDTH: u32 = 1600;
 /// More particles than this are drawn as a raster: an SVG of a million circles opens nowhere.
 const MOST_DOTS: usize = 60_000;
 
+/// A figure as PNG, `width` pixels wide; the error is a reason.
+pub(super) fn render(svg: &str, width: u32) -> Result<Vec<u8>, String> {
+    png::render(svg, width)
+}
+
 /// Writes `PATH.svg` and `PATH.png`; `path` has no ending.
 pub fn write(svg: &str, path: &Path) -> Result<[PathBuf; 2], ExportError> {
     let [svg_path, png_path] = ["svg", "png"].map(|ending| path.with_extension(ending));

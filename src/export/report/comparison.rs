@@ -1,0 +1,166 @@
+//! The report of a comparison: the rule's body beside the true one.
+
+use std::path::PathBuf;
+
+use super::super::OutputFolder;
+use super::super::comparison::ComparisonReport;
+use super::super::error::ExportError;
+use super::encoded;
+use super::frames::{Channel, Frames};
+use super::page::{Page, Table, number, scene_text};
+use super::stage::{Clock, Film, Quantity, Stage};
+use crate::compare::run::Compared;
+use crate::flock::points::Points;
+use crate::scene::Scene;
+
+/// Frames on the way from no displacement to all of it.
+const FRAMES: usize = 20;
+/// Of every quantity.
+const BITS: u32 = 24;
+
+/// Writes `report.html`.
+///
+/// # Errors
+/// The file cannot be written.
+pub fn write(
+    folder: &OutputFolder,
+    scene: &Scene,
+    compared: &Compared,
+    report: &ComparisonReport,
+) -> Result<PathBuf, ExportError> {
+    let truth = &compared.truth.truth;
+    let known = |i: usize| if truth.knows(i) { truth.displacement.get(i) } else { [f64::NAN; 2] };
+    let truth: Points = (0..compared.rule.len()).map(known).collect();
+    // The frame is scaffolding of the rule, of which the truth has none.
+    let roles = compared.outcome.engine.roles();
+    let matter = |i: usize| if roles[i].is_body() { compared.rule.get(i) } else { [f64::NAN; 2] };
+    let rule: Points = (0..roles.len()).map(matter).collect();
+    let sides = [
+        ("rule", &rule, &compared.von_mises_rule),
+        ("truth (finite elements)", &truth, &compared.von_mises_truth),
+    ];
+    let error: Vec<f64> =
+        rule.iter().zip(truth.iter()).map(|(r, t)| (r[0] - t[0]).hypot(r[1] - t[1])).collect();
+    let page = Page {
+        title: scene.raw.title.clone(),
+        command: format!("flockform compare {}", scene.name),
+        verdict: None,
+        stages: sides
+            .map(|(name, moved, stress)| {
+                stage(scene, compared, name, moved, &on_particles(compared, stress), &error)
+            })
+            .into(),
+        note: format!(
+            "{FRAMES} even parts of both displacements. Von Mises stresses are those at the centres of the cells, shared out to the corners; compare.csv and cells.csv have the numbers."
+        ),
+        facts: facts(scene, report),
+        tables: vec![measures(report)],
+        texts: vec![
+            ("Measures in words".into(), report.comparison.to_string()),
+            ("Scene, with its defaults and overrides".into(), scene_text(&scene.raw)),
+        ],
+        ..Page::default()
+    };
+    page.write(folder)
+}
+
+fn stage(
+    scene: &Scene,
+    compared: &Compared,
+    name: &str,
+    moved: &Points,
+    stress: &[f64],
+    error: &[f64],
+) -> Stage {
+    let engine = &compared.outcome.engine;
+    let unit = scene.unit();
+    let mut stage = Stage::new(Film {
+        name: name.into(),
+        noun: "particle",
+        unit: unit.into(),
+        clock: Clock { quantity: "displacement", unit: "%" },
+        spacing: engine.body().lattice.spacing(),
+        quantities: vec![
+            Quantity::new("von_mises", "von Mises stress", format!("force/{unit}²")),
+            Quantity::new("error", "error: distance of rule and truth", unit),
+        ],
+        linear: true,
+        ..Film::default()
+    });
+    stage.set_reference(&engine.body().reference);
+    stage.set_roles(engine.roles(), &[]);
+    stage.set_cells(&compared.cells);
+    stage.add_exact(Quantity::new("ux", "x displacement", unit), moved.x.iter().copied());
+    stage.add_exact(Quantity::new("uy", "y displacement", unit), moved.y.iter().copied());
+    let channel = |(name, bits)| Channel { name, bits };
+    let names = [("dx", BITS), ("dy", BITS), ("von_mises", BITS), ("error", BITS)];
+    let mut frames = Frames::new(moved.len(), names.map(channel).into());
+    for frame in 0..=FRAMES {
+        let part = frame as f64 / FRAMES as f64;
+        let scaled =
+            [&moved.x[..], &moved.y, stress, error].map(|v| v.iter().map(|v| part * v).collect::<Vec<f64>>());
+        frames.keep(frame, &scaled.each_ref().map(Vec::as_slice));
+    }
+    let encoded = encoded(&mut frames, stage.size());
+    let times = frames.kept().iter().map(|frame| 100.0 * frame.step as f64 / FRAMES as f64).collect();
+    stage.set_frames(&frames, encoded, times);
+    stage
+}
+
+/// The mean of a particle's cells; NaN for particles in no cell.
+fn on_particles(compared: &Compared, of_cells: &[f64]) -> Vec<f64> {
+    let count = compared.rule.len();
+    let incidence = compared.cells.incidence(count);
+    let mean = |i: usize| {
+        let cells = incidence.of(i);
+        cells.iter().map(|&cell| of_cells[cell as usize]).sum::<f64>() / cells.len() as f64
+    };
+    (0..count).map(mean).collect()
+}
+
+fn facts(scene: &Scene, report: &ComparisonReport) -> Vec<(String, String)> {
+    let rule = &report.rule;
+    let way = match (rule.solver, rule.iterations) {
+        (Some(solver), Some(iterations)) => format!("{solver}, {iterations} iterations"),
+        _ => format!("{} steps", rule.steps),
+    };
+    vec![
+        ("Rule".into(), format!("by {way}: {}", rule.stop_reason)),
+        (
+            "Truth".into(),
+            format!(
+                "finite elements, {} nodes, each side of a cell in {} parts",
+                report.truth.nodes, report.truth.refine
+            ),
+        ),
+        (
+            "Compared".into(),
+            format!(
+                "{} followers, {} cells, lengths in {}",
+                report.comparison.followers,
+                report.comparison.cells,
+                scene.unit()
+            ),
+        ),
+    ]
+}
+
+fn measures(report: &ComparisonReport) -> Table {
+    let c = &report.comparison;
+    let percent = |part: f64| format!("{} %", number(100.0 * part));
+    let rows = [
+        ("Displacement, relative L2", percent(c.displacement_rel_l2)),
+        ("Displacement, largest error over the largest", percent(c.displacement_max_rel)),
+        ("Von Mises stress, relative L2", percent(c.von_mises_rel_l2)),
+        ("Energy norm of the error", percent(c.energy_rel)),
+        ("Strain energy by the rule", number(c.strain_energy_rule)),
+        ("Strain energy in truth", number(c.strain_energy_truth)),
+        ("Time, rule", format!("{} s", number(c.seconds_rule))),
+        ("Time, truth", format!("{} s", number(c.seconds_truth))),
+    ];
+    Table {
+        caption: "How far the rule is from the truth".into(),
+        head: vec!["measure".into(), "value".into()],
+        rows: rows.map(|(name, value)| vec![name.into(), value]).into(),
+    }
+}

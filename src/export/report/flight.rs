@@ -1,0 +1,275 @@
+//! The report of a flight: robots, obstacles, who hears whom, and what was measured period by period.
+
+use std::path::PathBuf;
+
+use super::super::error::ExportError;
+use super::super::figures::flight_map::outline;
+use super::super::{OutputFolder, flight};
+use super::encoded;
+use super::frames::{Channel, Frames};
+use super::page::{Page, Table, number, scene_text};
+use super::plot::Plot;
+use super::stage::{Clock, Film, Outline, Quantity, Stage};
+use crate::flock::points::Points;
+use crate::flock::role::Role;
+use crate::scene::swarm::Swarm;
+use crate::swarm::flight::{Flight, FlightReport, Record};
+
+/// Of every quantity.
+const BITS: u32 = 24;
+/// Robots beyond this get no line of their own in the page's table: robots.csv has them.
+const MOST_ROWS: usize = 400;
+
+/// Keeps the frames of a flight while it goes on.
+#[derive(Debug)]
+pub struct FlightRecorder {
+    frames: Frames,
+    start: Points,
+    links: Vec<[u32; 2]>,
+    leads: Vec<bool>,
+    /// \[s\]
+    period: f64,
+}
+
+impl FlightRecorder {
+    /// From the flight before its first period.
+    pub fn new(flight: &Flight) -> Self {
+        let channel = |name, bits| Channel { name, bits };
+        let mut channels = vec![channel("dx", BITS), channel("dy", BITS)];
+        channels.extend(["clearance", "age", "pe1", "strain"].map(|name| channel(name, BITS)));
+        let formation = flight.control().formation();
+        let count = formation.count();
+        // Seen from both ends or from one, a line between two robots is one line.
+        let mut links: Vec<[u32; 2]> = (0..count)
+            .flat_map(|m| formation.neighbours(m).map(move |k| [m.min(k) as u32, m.max(k) as u32]))
+            .collect();
+        links.sort_unstable();
+        links.dedup();
+        let mut recorder = Self {
+            frames: Frames::new(count, channels),
+            start: flight.fleet().places(),
+            links,
+            leads: (0..count).map(|m| formation.leads(m)).collect(),
+            period: flight.control().period(),
+        };
+        recorder.keep(flight, false);
+        recorder
+    }
+
+    /// Looks at a period just flown.
+    pub fn watch(&mut self, flight: &Flight) {
+        let (period, is_last) = (flight.fleet().period(), flight.fleet().period() == flight.periods());
+        if is_last || self.frames.wants(period as usize) {
+            self.keep(flight, is_last);
+        }
+    }
+
+    fn keep(&mut self, flight: &Flight, is_last: bool) {
+        let (control, places) = (flight.control(), flight.fleet().places());
+        let count = places.len();
+        let moved = |now: &[f64], then: &[f64]| now.iter().zip(then).map(|(n, t)| n - t).collect();
+        let (dx, dy): (Vec<f64>, Vec<f64>) =
+            (moved(&places.x, &self.start.x), moved(&places.y, &self.start.y));
+        let mut clearance = Vec::new();
+        control.filter().clearance(&places, &mut clearance);
+        let age: Vec<f64> = (0..count).map(|m| control.age(m).unwrap_or(f64::NAN)).collect();
+        let measures = control.formation().measures(&places);
+        let strain: Vec<f64> =
+            measures.strain.iter().map(|strain| strain.map_or(f64::NAN, |s| s.largest())).collect();
+        let values = [&dx[..], &dy, &clearance, &age, &measures.pe1, &strain];
+        let period = flight.fleet().period() as usize;
+        if is_last { self.frames.keep_last(period, &values) } else { self.frames.keep(period, &values) }
+    }
+
+    /// The film of the flight.
+    pub fn stage(mut self, swarm: &Swarm, report: &FlightReport) -> Stage {
+        let mut stage = Stage::new(film(swarm, report));
+        stage.set_reference(&self.start);
+        let role = |&leads: &bool| if leads { Role::Leader } else { Role::Follower };
+        stage.set_roles(&self.leads.iter().map(role).collect::<Vec<_>>(), &[]);
+        if !self.links.is_empty() {
+            let none = vec![0; self.links.len()];
+            stage.set_bonds(&self.links, &none, &none);
+        }
+        let robots = || report.per_robot.iter();
+        stage.add_exact(Quantity::new("x", "x", "m"), robots().map(|robot| robot.x));
+        stage.add_exact(Quantity::new("y", "y", "m"), robots().map(|robot| robot.y));
+        stage.add_exact(Quantity::new("way", "way", "m"), robots().map(|robot| robot.way));
+        let least = robots().map(|robot| robot.clearance.unwrap_or(f64::NAN));
+        stage.add_exact(Quantity::new("clearance", "least clearance", "m"), least);
+        let encoded = encoded(&mut self.frames, stage.size());
+        let times = self.frames.kept().iter().map(|frame| frame.step as f64 * self.period).collect();
+        stage.set_frames(&self.frames, encoded, times);
+        stage
+    }
+}
+
+fn film(swarm: &Swarm, report: &FlightReport) -> Film {
+    let own = |m: usize| swarm.raw.robots.get(m).and_then(|robot| robot.radius).unwrap_or(swarm.raw.radius);
+    let obstacles =
+        swarm.raw.obstacles.iter().map(|obstacle| Outline { kind: "obstacle", corners: outline(obstacle) });
+    let fence =
+        swarm.raw.limits.geofence.iter().map(|fence| Outline { kind: "fence", corners: fence.clone() });
+    Film {
+        noun: "robot",
+        unit: "m".into(),
+        clock: Clock { quantity: "time", unit: "s" },
+        names: report.per_robot.iter().map(|robot| robot.name.clone()).collect(),
+        spacing: 2.0 * swarm.raw.radius,
+        radii: (0..report.robots).map(own).collect(),
+        quantities: vec![
+            Quantity::new("clearance", "clearance", "m"),
+            Quantity::new("age", "age of the pose", "s"),
+            Quantity::new("pe1", "PE1", "m²"),
+            Quantity::new("strain", "largest strain", ""),
+        ],
+        outlines: obstacles.chain(fence).collect(),
+        ..Film::default()
+    }
+}
+
+/// Writes `report.html`.
+///
+/// # Errors
+/// The file cannot be written.
+pub fn write(
+    folder: &OutputFolder,
+    swarm: &Swarm,
+    record: &Record,
+    report: &FlightReport,
+    stage: Stage,
+) -> Result<PathBuf, ExportError> {
+    let mut plots: Vec<Plot> =
+        flight::charts(record, report).iter().map(|chart| Plot::of(chart, true)).collect();
+    // The figure has no page around it that says whose it is.
+    plots
+        .iter_mut()
+        .filter(|plot| plot.title == report.title)
+        .for_each(|plot| plot.title = plot.y.quantity.clone());
+    let broken = report.bounds.iter().filter(|verdict| !verdict.holds).count();
+    let verdict = match (report.bounds.len(), broken) {
+        (0, _) => None,
+        (declared, 0) => Some((true, format!("all {declared} declared bounds held"))),
+        (declared, broken) => Some((false, format!("{broken} of {declared} declared bounds broken"))),
+    };
+    let page = Page {
+        title: swarm.raw.title.clone(),
+        command: format!("flockform swarm {}", swarm.name),
+        verdict,
+        note: note(&stage.film, report),
+        stages: vec![stage],
+        plots,
+        facts: facts(report),
+        tables: tables(report),
+        texts: texts(swarm),
+    };
+    page.write(folder)
+}
+
+fn note(film: &Film, report: &FlightReport) -> String {
+    let shown = film.times.len();
+    let all = if shown as u64 > report.periods { "all".to_owned() } else { format!("{shown} of them are") };
+    format!(
+        "{} periods flown, {all} shown. Lines join robots that hear each other at the start. At the last frame places, ways and \
+         least clearances are those of robots.csv, to the last digit.",
+        report.periods
+    )
+}
+
+fn facts(report: &FlightReport) -> Vec<(String, String)> {
+    let mut facts = Vec::new();
+    let mut fact = |name: &str, value: String| facts.push((name.to_owned(), value));
+    fact("Robots", format!("{} ({}), {} of them lead", report.robots, report.model, report.leaders));
+    fact("Flown", format!("{} s", number(report.seconds)));
+    let pair =
+        |[largest, last]: [f64; 2]| format!("largest {} m, at the end {} m", number(largest), number(last));
+    if let Some(error) = report.affine_error {
+        fact("From the leaders' affine motion", pair(error));
+    }
+    if let Some(error) = report.formation_error {
+        fact("From where the rule comes to rest", pair(error));
+    }
+    if let Some(error) = report.continuum_error {
+        fact("From the continuum run", format!("largest {} m", number(error)));
+    }
+    let settled = match report.settling_time {
+        Some(time) => format!("{} s to within {} m", number(time), number(report.settled_within)),
+        None => format!("never within {} m", number(report.settled_within)),
+    };
+    fact("Settling time", settled);
+    if let Some(clearance) = report.clearance {
+        fact("Smallest clearance", format!("{} m", number(clearance)));
+    }
+    fact("Way", format!("mean {} m, longest {} m", number(report.way[0]), number(report.way[1])));
+    if report.most_lost > 0 {
+        fact("Robots lost", format!("{} at one time", report.most_lost));
+    }
+    facts
+}
+
+fn tables(report: &FlightReport) -> Vec<Table> {
+    let head = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
+    let mut tables = Vec::new();
+    if !report.bounds.is_empty() {
+        let row = |v: &crate::swarm::flight::Verdict| {
+            let found = v.found.map_or_else(|| "not measured".into(), number);
+            vec![
+                v.bound.to_owned(),
+                number(v.declared),
+                found,
+                if v.holds { "holds" } else { "broken" }.into(),
+            ]
+        };
+        tables.push(Table {
+            caption: "Declared bounds".into(),
+            head: head(&["bound", "declared", "found", ""]),
+            rows: report.bounds.iter().map(row).collect(),
+        });
+    }
+    let row = |robot: &crate::swarm::flight::RobotReport| {
+        let clearance = robot.clearance.map_or_else(String::new, number);
+        let counts = [robot.accepted, robot.rejected].map(|count| count.to_string());
+        let [accepted, rejected] = counts;
+        let (name, role) = (robot.name.clone(), robot.role.to_owned());
+        vec![
+            name,
+            role,
+            number(robot.x),
+            number(robot.y),
+            number(robot.way),
+            clearance,
+            accepted,
+            rejected,
+            robot.health.into(),
+        ]
+    };
+    let rows: Vec<_> = report.per_robot.iter().take(MOST_ROWS).map(row).collect();
+    let more = report.robots.saturating_sub(rows.len());
+    let caption = if more > 0 {
+        format!("Robots at the end ({more} more in robots.csv)")
+    } else {
+        "Robots at the end".into()
+    };
+    let names = [
+        "name",
+        "role",
+        "x [m]",
+        "y [m]",
+        "way [m]",
+        "least clearance [m]",
+        "poses accepted",
+        "rejected",
+        "health",
+    ];
+    tables.push(Table { caption, head: head(&names), rows });
+    tables
+}
+
+fn texts(swarm: &Swarm) -> Vec<(String, String)> {
+    let mut texts = Vec::new();
+    if !swarm.raw.notes.is_empty() {
+        texts.push(("Notes of the swarm".into(), swarm.raw.notes.trim().to_owned()));
+    }
+    texts.push(("Swarm, with its defaults and overrides".into(), scene_text(&swarm.raw)));
+    texts
+}

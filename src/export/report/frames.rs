@@ -1,0 +1,136 @@
+//! The frames of a film, kept while something runs of which nobody knows how long it will take.
+//!
+//! Frames are kept at an interval that doubles whenever there are too many: every other one is then let go,
+//! so memory is bounded and the kept ones are evenly spaced.
+
+use super::track::Track;
+
+/// Frames that a report keeps at most: about as many as a slider of a page can tell apart.
+pub const MOST_FRAMES: usize = 512;
+/// Memory for frames \[byte\]; bodies of millions of particles get fewer frames.
+const MOST_BYTES: usize = 400 << 20;
+
+/// A quantity that frames hold for every particle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Channel {
+    pub name: &'static str,
+    /// Of a code, 2 to 24.
+    pub bits: u32,
+}
+
+/// One moment.
+#[derive(Clone, Debug)]
+pub struct Frame {
+    /// Number of the step or period.
+    pub step: usize,
+    /// By channel.
+    pub tracks: Vec<Track>,
+}
+
+#[derive(Clone, Debug)]
+pub struct Frames {
+    pub channels: Vec<Channel>,
+    pub count: usize,
+    kept: Vec<Frame>,
+    /// A frame of every so many steps is kept.
+    interval: usize,
+    most: usize,
+}
+
+impl Frames {
+    /// For `count` particles.
+    pub fn new(count: usize, channels: Vec<Channel>) -> Self {
+        let bytes: usize = channels.iter().map(|channel| Track::bytes(channel.bits)).sum();
+        let most = (MOST_BYTES / (bytes * count).max(1)).clamp(4, MOST_FRAMES);
+        Self { channels, count, kept: Vec::new(), interval: 1, most }
+    }
+
+    /// Whether the frame of this step is to be kept.
+    pub fn wants(&self, step: usize) -> bool {
+        step.is_multiple_of(self.interval)
+    }
+
+    /// The next step after `step` whose frame is to be kept.
+    pub fn next(&self, step: usize) -> usize {
+        (step / self.interval + 1) * self.interval
+    }
+
+    /// Keeps the values of every channel, shape \[channels\]\[count\], of a step later than those before.
+    pub fn keep(&mut self, step: usize, values: &[&[f64]]) {
+        if self.kept.len() >= self.most {
+            self.interval *= 2;
+            self.thin();
+            if !self.wants(step) {
+                return;
+            }
+        }
+        self.push(step, values);
+    }
+
+    /// Keeps the last frame, whatever its step.
+    pub fn keep_last(&mut self, step: usize, values: &[&[f64]]) {
+        self.kept.retain(|frame| frame.step < step);
+        self.push(step, values);
+    }
+
+    /// Lets go of all but every `interval`th step.
+    fn thin(&mut self) {
+        let interval = self.interval;
+        self.kept.retain(|frame| frame.step.is_multiple_of(interval));
+    }
+
+    /// Lets go of half the frames, the last one excepted.
+    pub fn halve(&mut self) {
+        self.interval *= 2;
+        let last = self.kept.pop();
+        self.thin();
+        self.kept.extend(last);
+    }
+
+    fn push(&mut self, step: usize, values: &[&[f64]]) {
+        let before = self.kept.last();
+        let track = |(k, (channel, &values)): (usize, (&Channel, &&[f64]))| {
+            Track::of(values, channel.bits, before.map(|frame| &frame.tracks[k]))
+        };
+        let tracks = self.channels.iter().zip(values).enumerate().map(track).collect();
+        self.kept.push(Frame { step, tracks });
+    }
+
+    pub fn kept(&self) -> &[Frame] {
+        &self.kept
+    }
+
+    pub fn interval(&self) -> usize {
+        self.interval
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_run_of_any_length_leaves_evenly_spaced_frames_and_never_more_than_the_most() {
+        for steps in [0, 3, 510, 511, 512, 513, 2_000, 12_345] {
+            let mut frames = Frames::new(1, vec![Channel { name: "dx", bits: 16 }]);
+            for step in 0..=steps {
+                if frames.wants(step) {
+                    frames.keep(step, &[&[step as f64]]);
+                }
+                assert!(frames.kept().len() <= MOST_FRAMES);
+            }
+            frames.keep_last(steps, &[&[steps as f64]]);
+            let kept: Vec<usize> = frames.kept().iter().map(|frame| frame.step).collect();
+            let (last, even) = kept.split_last().expect("kept");
+            assert_eq!(*last, steps);
+            assert!(even.iter().enumerate().all(|(k, &step)| step == k * frames.interval()), "{kept:?}");
+            assert!(kept.len() > MOST_FRAMES / 2 || frames.interval() == 1, "{steps}: {}", kept.len());
+        }
+    }
+
+    #[test]
+    fn larger_bodies_get_fewer_frames_instead_of_more_memory() {
+        let frames = Frames::new(10_000_000, vec![Channel { name: "dx", bits: 16 }; 2]);
+        assert_eq!(frames.most, 10);
+    }
+}

@@ -1,0 +1,128 @@
+//! `index.html` of a gallery: a picture, a title and a sentence for each report, and the way to it.
+
+use std::path::{Path, PathBuf};
+
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+use serde::Serialize;
+
+use super::super::error::{ExportError, write_file};
+use super::super::figures;
+use super::super::{OutputFolder, summary};
+use super::page::{FILE, STYLE, escaped, filled};
+
+const PAGE: &str = include_str!("web/gallery.html");
+/// Of a picture \[pixel\].
+const WIDTH: u32 = 540;
+/// Longest sentence \[character\].
+const LONGEST: usize = 180;
+
+/// One report.
+#[derive(Clone, Debug, Serialize)]
+pub struct Exhibit {
+    /// `scenes` or `swarms`.
+    pub kind: &'static str,
+    pub name: String,
+    pub title: String,
+    pub sentence: String,
+}
+
+impl Exhibit {
+    /// `notes` are those of the scene or swarm: their first sentence is told.
+    pub fn new(kind: &'static str, name: &str, title: &str, notes: &str) -> Self {
+        let mut sentence = notes.split_inclusive(". ").next().unwrap_or_default().trim().to_owned();
+        if sentence.chars().count() > LONGEST {
+            sentence = sentence.chars().take(LONGEST).collect::<String>();
+            sentence.truncate(sentence.rfind(' ').unwrap_or(sentence.len()));
+            sentence += " \u{2026}";
+        }
+        Self { kind, name: name.into(), title: title.into(), sentence }
+    }
+
+    /// Where its outputs are within the gallery.
+    pub fn folder(&self) -> String {
+        format!("{}/{}", self.kind, self.name)
+    }
+}
+
+#[derive(Serialize)]
+struct List<'a> {
+    program: &'static str,
+    version: &'static str,
+    exhibits: &'a [Exhibit],
+}
+
+/// Writes `index.html` and `gallery.json`, the list of what it shows; the exhibits' outputs stand in the folder already.
+///
+/// # Errors
+/// An exhibit without a figure, a file that cannot be written.
+pub fn write_gallery(folder: &OutputFolder, exhibits: &[Exhibit]) -> Result<Vec<PathBuf>, ExportError> {
+    let mut sections = String::new();
+    for (kind, heading) in [("scenes", "Bodies"), ("swarms", "Swarms")] {
+        let cards: Result<String, ExportError> =
+            exhibits.iter().filter(|one| one.kind == kind).map(|one| card(folder, one)).collect();
+        let cards = cards?;
+        if !cards.is_empty() {
+            sections += &format!("<h2>{heading}</h2>\n<ul class=\"gallery\">\n{cards}</ul>\n");
+        }
+    }
+    let program = format!("{} {}", summary::PROGRAM, env!("CARGO_PKG_VERSION"));
+    let page = filled(PAGE, &[("program", program), ("style", STYLE.into()), ("sections", sections)]);
+    let index = folder.path("index.html");
+    write_file(&index, page)?;
+    let path = folder.path(summary::GALLERY);
+    let list = List { program: summary::PROGRAM, version: env!("CARGO_PKG_VERSION"), exhibits };
+    let text = serde_json::to_string_pretty(&list).map_err(ExportError::io("write", &path))? + "\n";
+    write_file(&path, text)?;
+    Ok(vec![index, path])
+}
+
+fn card(folder: &OutputFolder, exhibit: &Exhibit) -> Result<String, ExportError> {
+    let path = picture(&folder.path(exhibit.folder()))?;
+    let svg = std::fs::read_to_string(&path).map_err(ExportError::io("read", &path))?;
+    let png = figures::render(&svg, WIDTH).map_err(|reason| ExportError::Figure { path, reason })?;
+    let (title, name, sentence) =
+        (escaped(&exhibit.title), escaped(&exhibit.name), escaped(&exhibit.sentence));
+    Ok(format!(
+        "<li><a class=\"card\" href=\"{}/{FILE}\"><img alt=\"\" src=\"data:image/png;base64,{}\"><div><code>{name}</code><h3>{title}</h3><p>{sentence}</p></div></a></li>\n",
+        escaped(&exhibit.folder()),
+        STANDARD.encode(png)
+    ))
+}
+
+/// The figure that says most: of a flight its map, of a torn body the end, of others the last one on the way.
+fn picture(outputs: &Path) -> Result<PathBuf, ExportError> {
+    let flight = outputs.join("flight.svg");
+    if flight.is_file() {
+        return Ok(flight);
+    }
+    let entries = std::fs::read_dir(outputs).map_err(ExportError::io("look into", outputs))?;
+    let mut drawn: Vec<PathBuf> = entries
+        .filter_map(|entry| Some(entry.ok()?.path()))
+        .filter(|path| path.extension().is_some_and(|ending| ending == "svg"))
+        .filter(|path| {
+            path.file_name().is_some_and(|name| name.to_string_lossy().starts_with("configuration_"))
+        })
+        .collect();
+    drawn.sort();
+    let is_torn = outputs.join("breaks.csv").is_file();
+    let number = if is_torn { drawn.len().wrapping_sub(1) } else { drawn.len().saturating_sub(2) };
+    let reason = || "the run left no configuration".to_owned();
+    drawn
+        .get(number)
+        .cloned()
+        .ok_or_else(|| ExportError::Figure { path: outputs.to_owned(), reason: reason() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_exhibit_tells_the_first_sentence_and_cuts_a_long_one_between_words() {
+        let of = |notes: &str| Exhibit::new("scenes", "a", "A", notes).sentence;
+        assert_eq!(of("It is 1.5 wide. And more. "), "It is 1.5 wide.");
+        let long = of(&"word ".repeat(100));
+        assert!(long.ends_with("word \u{2026}") && long.chars().count() <= LONGEST + 2, "{long}");
+    }
+}

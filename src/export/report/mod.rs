@@ -1,0 +1,47 @@
+//! `report.html`: what became of a run, a flight, a comparison or a study, as one page that opens by double
+//! click, without network or server.
+//!
+//! A page shows bodies on the move ([`stage::Stage`]), charts ([`plot::Plot`]) and what stands in the tables. The frames of
+//! a film are kept while the run goes on ([`frames::Frames`]), at an interval that doubles when there are too many, as
+//! displacements in whole multiples of a power of two ([`track::Track`]), and written as differences, deflated
+//! ([`encode`]). What follows from displacements (PE1, strain, stress) the page computes itself; what particles are at the
+//! end it is told to the last bit, as `final.csv` has it.
+//!
+//! [`RunRecorder`] watches a run, `FlightRecorder` a flight.
+
+#[cfg(feature = "fem")]
+pub mod comparison;
+pub mod encode;
+#[cfg(feature = "swarm")]
+pub mod flight;
+pub mod frames;
+pub mod gallery;
+pub mod page;
+pub mod plot;
+pub mod run;
+pub mod stability;
+pub mod stage;
+pub mod track;
+#[cfg(feature = "fem")]
+pub mod trade;
+
+#[cfg(feature = "swarm")]
+pub use flight::FlightRecorder;
+pub use page::{Page, Table};
+pub use run::RunRecorder;
+
+use encode::EncodedFrames;
+use frames::Frames;
+
+/// Text of a page's films at most \[byte\]: with everything else a page stays under 30 MB.
+const MOST_TEXT: usize = 28 << 20;
+
+/// Compresses the frames, as many of them as fit a page beside `others` bytes of text.
+fn encoded(frames: &mut Frames, others: usize) -> EncodedFrames {
+    let mut encoded = EncodedFrames::of(frames);
+    while encoded.size() + others > MOST_TEXT && frames.kept().len() > 3 {
+        frames.halve();
+        encoded = EncodedFrames::of(frames);
+    }
+    encoded
+}

@@ -1,0 +1,239 @@
+//! The page: one file that needs no network and no server.
+//!
+//! What can be read without a script (title, summary, tables, texts) stands in the page as it is; films and
+//! charts are data that the scripts draw. The scripts are modules of their own, in `web/`; a page holds them one after
+//! another, without their imports, so no two may give a name of the top level to different things.
+
+use std::fmt::Write as _;
+use std::path::PathBuf;
+
+use serde::Serialize;
+use serde_json::json;
+
+use super::super::OutputFolder;
+use super::super::error::{ExportError, write_file};
+use super::plot::Plot;
+use super::stage::Stage;
+
+/// Name of the file.
+pub const FILE: &str = "report.html";
+
+const PAGE: &str = include_str!("web/page.html");
+pub(super) const STYLE: &str = include_str!("web/page.css");
+/// In the order in which they build on each other.
+const SCRIPTS: [&str; 14] = [
+    include_str!("web/unpack.js"),
+    include_str!("web/colour.js"),
+    include_str!("web/body.js"),
+    include_str!("web/shown.js"),
+    include_str!("web/painter.js"),
+    include_str!("web/painter2d.js"),
+    include_str!("web/view.js"),
+    include_str!("web/chart.js"),
+    include_str!("web/player.js"),
+    include_str!("web/scale.js"),
+    include_str!("web/camera.js"),
+    include_str!("web/numbers.js"),
+    include_str!("web/controls.js"),
+    include_str!("web/page.js"),
+];
+
+/// Everything that a report shows, from the top.
+#[derive(Debug, Default)]
+pub struct Page {
+    pub title: String,
+    /// The command and the name of what it was given.
+    pub command: String,
+    /// How it ended, and whether that is as it should be.
+    pub verdict: Option<(bool, String)>,
+    /// Bodies on the move; several stand beside each other and share one clock.
+    pub stages: Vec<Stage>,
+    /// What the stages' frames are and what they leave out.
+    pub note: String,
+    pub plots: Vec<Plot>,
+    /// Names and values.
+    pub facts: Vec<(String, String)>,
+    pub tables: Vec<Table>,
+    /// Long texts under their titles, folded.
+    pub texts: Vec<(String, String)>,
+}
+
+#[derive(Debug, Default)]
+pub struct Table {
+    pub caption: String,
+    pub head: Vec<String>,
+    pub rows: Vec<Vec<String>>,
+}
+
+impl Page {
+    /// Writes `report.html`.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn write(&self, folder: &OutputFolder) -> Result<PathBuf, ExportError> {
+        let path = folder.path(FILE);
+        write_file(&path, self.html())?;
+        Ok(path)
+    }
+
+    /// The whole file.
+    pub fn html(&self) -> String {
+        let stages: Vec<_> = self.stages.iter().map(|stage| &stage.film).collect();
+        let data = in_script(&json!({ "stages": stages, "plots": self.plots }));
+        let mut arrays = String::new();
+        for (number, stage) in self.stages.iter().enumerate() {
+            for (name, text) in &stage.arrays {
+                let _ =
+                    writeln!(arrays, "<script type=\"text/plain\" id=\"s{number}-{name}\">{text}</script>");
+            }
+        }
+        let script: String = SCRIPTS.into_iter().map(joined).collect();
+        let parts = [
+            ("title", escaped(&self.title)),
+            ("command", escaped(&self.command)),
+            ("verdict", self.verdict_html()),
+            ("note", escaped(&self.note)),
+            ("facts", self.facts_html()),
+            ("tables", self.tables.iter().map(table_html).collect()),
+            ("texts", self.texts_html()),
+            ("program", format!("flockform {}", env!("CARGO_PKG_VERSION"))),
+            ("stages", if self.stages.is_empty() { "hidden".into() } else { String::new() }),
+            ("plots", if self.plots.is_empty() { "hidden".into() } else { String::new() }),
+            ("style", STYLE.into()),
+            ("arrays", arrays),
+            ("data", data),
+            ("script", script),
+        ];
+        filled(PAGE, &parts)
+    }
+
+    fn verdict_html(&self) -> String {
+        let Some((holds, words)) = &self.verdict else { return String::new() };
+        let class = if *holds { "good" } else { "bad" };
+        format!("<p class=\"verdict {class}\">{}</p>", escaped(words))
+    }
+
+    fn facts_html(&self) -> String {
+        let fact = |(name, value): &(String, String)| {
+            format!("<div><dt>{}</dt><dd>{}</dd></div>", escaped(name), escaped(value))
+        };
+        self.facts.iter().map(fact).collect()
+    }
+
+    fn texts_html(&self) -> String {
+        let text = |(title, text): &(String, String)| {
+            let (title, text) = (escaped(title), escaped(text));
+            format!(
+                "<details class=\"card\"><summary>{title}</summary><pre tabindex=\"0\">{text}</pre></details>"
+            )
+        };
+        self.texts.iter().map(text).collect()
+    }
+}
+
+/// A value as JSON that a `script` element can hold.
+fn in_script(value: &impl Serialize) -> String {
+    serde_json::to_string(value).unwrap_or_default().replace('<', "\\u003c")
+}
+
+/// A module for a page that holds all of them: nothing to import, nothing to export.
+fn joined(module: &str) -> String {
+    let is_import = |line: &&str| line.starts_with("import ");
+    let own = |line: &str| line.strip_prefix("export ").unwrap_or(line).to_owned() + "\n";
+    module.lines().filter(|line| !is_import(line)).map(own).collect()
+}
+
+/// The template with `{{name}}` replaced; what is filled in is not looked at again.
+pub(super) fn filled(template: &str, parts: &[(&str, String)]) -> String {
+    let mut page = String::with_capacity(parts.iter().map(|(_, text)| text.len()).sum::<usize>() + 8192);
+    let mut pieces = template.split("{{");
+    page += pieces.next().unwrap_or_default();
+    for piece in pieces {
+        let (name, rest) = piece.split_once("}}").unwrap_or((piece, ""));
+        page += parts.iter().find(|(known, _)| *known == name).map_or("", |(_, text)| text);
+        page += rest;
+    }
+    page
+}
+
+pub(super) fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
+
+fn table_html(table: &Table) -> String {
+    let cells = |tag: &str, cells: &[String]| -> String {
+        cells.iter().map(|cell| format!("<{tag}>{}</{}>", escaped(cell), &tag[..2])).collect()
+    };
+    let rows: String = table.rows.iter().map(|row| format!("<tr>{}</tr>\n", cells("td", row))).collect();
+    format!(
+        "<div class=\"card table\" tabindex=\"0\"><table><caption>{}</caption><thead><tr>{}</tr></thead><tbody>{rows}</tbody></table></div>",
+        escaped(&table.caption),
+        cells("th scope=\"col\"", &table.head),
+    )
+}
+
+/// Up to six digits, without zeros at the end; small and large ones with a power of ten.
+pub(super) fn number(value: f64) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return if value.is_finite() { "0".into() } else { value.to_string() };
+    }
+    let exponent = value.abs().log10().floor() as i32;
+    if !(-4..7).contains(&exponent) {
+        return format!("{value:.4e}");
+    }
+    let text = format!("{value:.*}", usize::try_from(5 - exponent).unwrap_or(0));
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').into() } else { text }
+}
+
+/// A scene or swarm as it was read, defaults and overrides included, without what it leaves out.
+pub(super) fn scene_text(raw: &impl Serialize) -> String {
+    let mut value = serde_json::to_value(raw).unwrap_or_default();
+    drop_empty(&mut value);
+    serde_json::to_string_pretty(&value).unwrap_or_default()
+}
+
+fn drop_empty(value: &mut serde_json::Value) {
+    let is_empty = |value: &serde_json::Value| match value {
+        serde_json::Value::Null => true,
+        serde_json::Value::Array(list) => list.is_empty(),
+        serde_json::Value::String(text) => text.is_empty(),
+        _ => false,
+    };
+    if let serde_json::Value::Object(table) = value {
+        table.retain(|_, value| !is_empty(value));
+        table.values_mut().for_each(drop_empty);
+    } else if let serde_json::Value::Array(list) = value {
+        list.iter_mut().for_each(drop_empty);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn whatever_a_title_holds_the_page_stays_a_page() {
+        let title = "</script><b>{{script}}\"&".to_owned();
+        let page = Page { title: title.clone(), command: "run".into(), ..Page::default() };
+        let plot = Plot { title, ..crate::export::report::plot::tests_plot() };
+        let html = Page { plots: vec![plot], ..page }.html();
+        assert!(!html.contains("<b>") && html.contains("&lt;/script&gt;&lt;b&gt;{{script}}"));
+        assert_eq!(html.matches("</html>").count(), 1);
+        assert!(html.contains("\\u003c/script>"), "data is escaped too");
+    }
+
+    #[test]
+    fn a_page_asks_the_network_for_nothing() {
+        let html = Page::default().html();
+        for word in ["src=", "href=\"http", "@import", "url(http", "fetch(", "import "] {
+            assert!(!html.contains(word), "{word}");
+        }
+        assert!(!html.contains("{{"), "every place of the template is filled");
+    }
+
+    #[test]
+    fn numbers_are_short() {
+        let texts = [0.25, -1234.5678, 1e-7, 12345678.0, 3.0, f64::NAN].map(number);
+        assert_eq!(texts, ["0.25", "-1234.57", "1.0000e-7", "1.2346e7", "3", "NaN"]);
+    }
+}

@@ -1,0 +1,373 @@
+//! The report of a run: the body step by step, its probes, its summary and its scene.
+
+use std::path::PathBuf;
+
+use rayon::prelude::*;
+
+use super::super::bonds::listed_once;
+use super::super::error::ExportError;
+use super::super::figures::SERIES;
+use super::super::{OutputFolder, Results, Summary};
+use super::encoded;
+use super::frames::{Channel, Frames, MOST_FRAMES};
+use super::page::{Page, number, scene_text};
+use super::plot::{self, Plot, PlotAxis, PlotSeries};
+use super::stage::{self, Clock, Film, Quantity, Stage, Stress};
+use crate::continuum::engine::Engine;
+use crate::continuum::record::Snapshot;
+use crate::continuum::run::{Outcome, StopReason};
+use crate::flock::role::Role;
+use crate::flock::rules::{Mean, Rotation};
+use crate::flock::strain::Strain;
+use crate::material::cells::Cells;
+use crate::material::elastic::{Constants, Elastic, Plane};
+use crate::scene::Scene;
+
+/// Up to so many particles everything has the bits from which the strains of a body that turns far are still
+/// exact; larger bodies have those that a screen can show.
+const MOST_FINE: usize = 20_000;
+const FINE_BITS: u32 = 24;
+const COARSE_BITS: u32 = 16;
+/// Of what is only shown as a colour.
+const COLOUR_BITS: u32 = 12;
+/// More particles than this are not told exactly at the end: their numbers alone would fill the page.
+const MOST_EXACT: usize = 250_000;
+/// Frames of a body whose equilibrium was solved for, on its way from no load to all of it.
+const LOAD_FRAMES: usize = 20;
+
+/// Keeps the frames of a run while it goes on.
+#[derive(Debug)]
+pub struct RunRecorder {
+    frames: Frames,
+    first_roles: Vec<Role>,
+    roles: Vec<Role>,
+    /// Step, particle and role.
+    changes: Vec<[u32; 3]>,
+    values: Vec<Vec<f64>>,
+}
+
+impl RunRecorder {
+    /// From the engine before its first step.
+    fn new(engine: &Engine) -> Self {
+        let count = engine.body().count();
+        let [bits, others] = if count <= MOST_FINE { [FINE_BITS; 2] } else { [COARSE_BITS, COLOUR_BITS] };
+        let channel = |name, bits| Channel { name, bits };
+        let mut channels = vec![channel("dx", bits), channel("dy", bits), channel("pe2", others)];
+        // Whoever finds neighbours anew is the only one who knows them.
+        if engine.lasting_neighbours().is_none() {
+            channels.extend(["pe1", "strain"].map(|name| channel(name, others)));
+        }
+        let roles = engine.roles().to_vec();
+        let values = vec![Vec::new(); channels.len()];
+        let frames = Frames::new(count, channels);
+        Self { frames, first_roles: roles.clone(), roles, changes: Vec::new(), values }
+    }
+
+    /// Looks at a step; `recorder` is made at the first.
+    pub fn watch(recorder: &mut Option<Self>, engine: &Engine) {
+        let recorder = recorder.get_or_insert_with(|| Self::new(engine));
+        if recorder.frames.wants(engine.step()) {
+            recorder.take(engine, 1.0);
+            let values: Vec<&[f64]> = recorder.values.iter().map(Vec::as_slice).collect();
+            recorder.frames.keep(engine.step(), &values);
+        }
+    }
+
+    /// The next step after `step` of which a frame is kept.
+    pub fn next(&self, step: usize) -> usize {
+        self.frames.next(step)
+    }
+
+    /// The frame of the end, which is exact whatever its step; of a body that was solved for, the way there.
+    fn finish(&mut self, outcome: &Outcome) {
+        let engine = &outcome.engine;
+        if outcome.solved.is_some() {
+            self.frames = Frames::new(self.frames.count, self.frames.channels.clone());
+            for frame in 0..=LOAD_FRAMES {
+                self.take(engine, frame as f64 / LOAD_FRAMES as f64);
+                let values: Vec<&[f64]> = self.values.iter().map(Vec::as_slice).collect();
+                self.frames.keep(frame, &values);
+            }
+        } else {
+            self.take(engine, 1.0);
+            let values: Vec<&[f64]> = self.values.iter().map(Vec::as_slice).collect();
+            self.frames.keep_last(engine.step(), &values);
+        }
+    }
+
+    /// Values of every channel, displacements times `part`.
+    fn take(&mut self, engine: &Engine, part: f64) {
+        let (present, reference) = (engine.present(), &engine.body().reference);
+        let moved = |now: &[f64], then: &[f64], out: &mut Vec<f64>| {
+            out.clear();
+            out.extend(now.iter().zip(then).map(|(now, then)| part * (now - then)));
+        };
+        moved(&present.x, &reference.x, &mut self.values[0]);
+        moved(&present.y, &reference.y, &mut self.values[1]);
+        let particles = || (0..reference.len()).into_par_iter();
+        particles().map(|i| engine.pe2(i)).collect_into_vec(&mut self.values[2]);
+        if self.values.len() > 3 {
+            particles().map(|i| engine.pe1(i)).collect_into_vec(&mut self.values[3]);
+            let largest = |i| engine.strain(i).map_or(f64::NAN, |strain| strain.largest());
+            particles().map(largest).collect_into_vec(&mut self.values[4]);
+        }
+        self.take_roles(engine);
+    }
+
+    fn take_roles(&mut self, engine: &Engine) {
+        if self.roles == engine.roles() {
+            return;
+        }
+        let both = self.roles.iter().zip(engine.roles()).enumerate();
+        let step = engine.step() as u32;
+        self.changes.extend(
+            both.filter(|(_, (was, is))| was != is).map(|(i, (_, &is))| [step, i as u32, stage::number(is)]),
+        );
+        self.roles.copy_from_slice(engine.roles());
+    }
+
+    /// The film of the run.
+    pub fn stage(mut self, scene: &Scene, outcome: &Outcome) -> Stage {
+        self.finish(outcome);
+        let engine = &outcome.engine;
+        let is_solved = outcome.solved.is_some();
+        let mut stage = Stage::new(film(scene, engine, is_solved));
+        stage.set_reference(&engine.body().reference);
+        stage.set_roles(&self.first_roles, &self.changes);
+        // Bonds and cells of those whose neighbours change would say who were neighbours once.
+        if engine.lasting_neighbours().is_some() {
+            set_bonds(&mut stage, engine, is_solved);
+            let cells = Cells::of_body(engine.body());
+            if cells.count() > 0 {
+                stage.set_cells(&cells);
+            }
+        }
+        if engine.body().count() <= MOST_EXACT {
+            add_exact(&mut stage, scene, engine);
+        }
+        let encoded = encoded(&mut self.frames, stage.size());
+        let steps = self.frames.kept().iter().map(|frame| frame.step as f64);
+        let times = if is_solved {
+            steps.map(|step| 100.0 * step / LOAD_FRAMES as f64).collect()
+        } else {
+            steps.collect()
+        };
+        stage.set_frames(&self.frames, encoded, times);
+        stage
+    }
+}
+
+fn film(scene: &Scene, engine: &Engine, is_solved: bool) -> Film {
+    let unit = scene.unit();
+    let mut quantities =
+        vec![Quantity::new("pe1", "PE1", format!("{unit}²")), Quantity::new("pe2", "PE2", unit)];
+    let stress = scene.material.as_ref().map(|elastic| stress(elastic, scene.mean));
+    // At rest nothing moves.
+    quantities.retain(|quantity| quantity.key != "pe2" || !is_solved);
+    if stress.is_some() {
+        quantities.push(Quantity::new("von_mises", "von Mises stress", format!("force/{unit}²")));
+    }
+    quantities.push(Quantity::new("strain", "largest strain", ""));
+    let clock =
+        if is_solved { Clock { quantity: "load", unit: "%" } } else { Clock { quantity: "step", unit: "" } };
+    Film {
+        noun: "particle",
+        unit: unit.into(),
+        clock,
+        spacing: engine.body().lattice.spacing(),
+        quantities,
+        linear: stress.as_ref().is_some_and(|stress| stress.linear) && scene.fracture.is_none(),
+        stress,
+        ..Film::default()
+    }
+}
+
+fn stress(elastic: &Elastic, mean: Mean) -> Stress {
+    let unit = |k: usize| elastic.stress([0, 1, 2].map(|axis| f64::from(u8::from(axis == k))));
+    let columns = [unit(0), unit(1), unit(2)];
+    let across = match elastic.constants() {
+        Constants::Isotropic { poisson, plane: Plane::Strain, .. } => poisson,
+        _ => 0.0,
+    };
+    let linear = !matches!(mean, Mean::Material { rotation: Rotation::Corotated });
+    Stress { stiffness: [0, 1, 2].map(|row| [0, 1, 2].map(|k| columns[k][row])), across, linear }
+}
+
+/// Every bond with the step at which it broke; a bond without one lives.
+fn set_bonds(stage: &mut Stage, engine: &Engine, is_solved: bool) {
+    let neighbours = &engine.interaction().neighbours;
+    let mut breaks: Vec<([u32; 2], u32)> =
+        engine.breaks().iter().map(|one| (one.pair, one.step as u32 + 1)).collect();
+    breaks.sort_unstable();
+    let (mut pairs, mut sees, mut broken) = (Vec::new(), Vec::new(), Vec::new());
+    for (_, [a, b]) in listed_once(neighbours) {
+        let pair = [a.min(b), a.max(b)];
+        let found = breaks.binary_search_by_key(&pair, |one| one.0);
+        pairs.push([a, b]);
+        sees.push(u32::from(!neighbours.of(b as usize).contains(&a)));
+        // What is broken at rest was broken before the load.
+        broken.push(found.map_or(0, |n| if is_solved { 1 } else { breaks[n].1 }));
+    }
+    stage.set_bonds(&pairs, &sees, &broken);
+}
+
+/// The columns of `final.csv`.
+fn add_exact(stage: &mut Stage, scene: &Scene, engine: &Engine) {
+    let last = Snapshot::of(engine);
+    let strains: Vec<Option<Strain>> =
+        (0..engine.body().count()).into_par_iter().map(|i| engine.strain(i)).collect();
+    let unit = scene.unit();
+    let mut add = |key: &str, label: &str, unit: &str, values: &mut dyn Iterator<Item = f64>| {
+        stage.add_exact(Quantity::new(key, label, unit), values);
+    };
+    add("x", "x", unit, &mut last.positions.x.iter().copied());
+    add("y", "y", unit, &mut last.positions.y.iter().copied());
+    add("pe1", "PE1", &format!("{unit}²"), &mut last.pe1.iter().copied());
+    add("pe2", "PE2", unit, &mut last.pe2.iter().copied());
+    for (k, name) in ["xx", "yy", "xy"].into_iter().enumerate() {
+        let component = |strain: &Option<Strain>| strain.map_or(f64::NAN, |strain| strain.components[k]);
+        add(&format!("strain_{name}"), &format!("strain {name}"), "", &mut strains.iter().map(component));
+    }
+    let rotation = |strain: &Option<Strain>| strain.map_or(f64::NAN, |strain| strain.rotation);
+    add("rotation", "rotation", "rad", &mut strains.iter().map(rotation));
+}
+
+/// Writes `report.html`.
+///
+/// # Errors
+/// The file cannot be written.
+pub fn write(
+    folder: &OutputFolder,
+    results: &Results<'_>,
+    summary: &Summary,
+    stage: Stage,
+) -> Result<PathBuf, ExportError> {
+    let (scene, outcome) = (results.scene, results.outcome);
+    let mut plots = plot::of_probes(results.probes, &outcome.engine.body().reference, scene.unit());
+    plots.extend(outcome.solved.as_ref().map(|solved| residuals(&solved.residuals)));
+    let page = Page {
+        title: scene.raw.title.clone(),
+        command: format!("flockform run {}", scene.name),
+        verdict: Some(verdict(outcome)),
+        note: note(&stage.film, outcome),
+        stages: vec![stage],
+        plots,
+        facts: facts(scene, outcome, summary),
+        tables: Vec::new(),
+        texts: texts(scene, summary),
+    };
+    page.write(folder)
+}
+
+fn verdict(outcome: &Outcome) -> (bool, String) {
+    let step = outcome.engine.step();
+    match &outcome.reason {
+        StopReason::Equilibrium if outcome.solved.is_some() => (true, "in equilibrium".into()),
+        StopReason::Equilibrium => (true, format!("in equilibrium at step {step}")),
+        StopReason::Steps => (true, format!("all {step} steps done")),
+        StopReason::Unsettled => (false, "the solver ended short of its tolerance".into()),
+        StopReason::Interrupted => (false, format!("interrupted at step {step}")),
+        StopReason::Diverged(divergence) => (false, divergence.to_string()),
+    }
+}
+
+/// What the frames are, and what is not among them.
+fn note(film: &Film, outcome: &Outcome) -> String {
+    let frames = film.times.len();
+    let bits = film.channels.first().map_or(0, |channel| channel.bits);
+    let mut note = if outcome.solved.is_some() {
+        format!(
+            "Solved for its rest, not stepped: {frames} frames in even parts of the displacement, as under a load that grows evenly."
+        )
+    } else {
+        let steps = outcome.engine.step();
+        let between = film.times.get(1).zip(film.times.first()).map_or(1.0, |(second, first)| second - first);
+        match between as usize {
+            0 | 1 => format!("Every step is shown: {frames} frames."),
+            every => format!(
+                "Of {steps} steps one in {every} is shown, {frames} frames (a page keeps at most {MOST_FRAMES}, fewer of a body whose frames are large); bonds that broke in between show at the next."
+            ),
+        }
+    };
+    note += &format!(
+        " Displacements are kept to {bits} bits of each frame's range; PE1, strain and stress are computed from them."
+    );
+    note += if film.exact.is_empty() {
+        " The body is too large for its last numbers to be kept exactly: final.csv has them."
+    } else {
+        " At the last frame the numbers are those of final.csv, to the last digit."
+    };
+    note
+}
+
+fn residuals(residuals: &[f64]) -> Plot {
+    let points = residuals.iter().enumerate().map(|(n, &residual)| [n as f64, residual]).collect();
+    let axis = |quantity: &str, log| PlotAxis { quantity: quantity.into(), unit: String::new(), log };
+    Plot {
+        title: "How the solver came to rest".into(),
+        note: "residual force over the load's".into(),
+        x: axis("iteration", false),
+        y: axis("residual", true),
+        series: vec![PlotSeries {
+            name: String::new(),
+            colour: SERIES[0].into(),
+            style: "line",
+            points,
+            labels: Vec::new(),
+        }],
+        landmarks: Vec::new(),
+        follows_clock: false,
+    }
+}
+
+fn facts(scene: &Scene, outcome: &Outcome, summary: &Summary) -> Vec<(String, String)> {
+    let (counts, unit) = (summary.counts, scene.unit());
+    let mut facts = Vec::new();
+    let mut fact = |name: &str, value: String| facts.push((name.to_owned(), value));
+    let roles = [
+        (counts.followers, "followers"),
+        (counts.leaders, "leaders"),
+        (counts.clamped, "clamped"),
+        (counts.frame, "frame"),
+        (counts.ghosts, "ghosts"),
+    ];
+    let roles: Vec<String> =
+        roles.iter().filter(|(count, _)| *count > 0).map(|(count, name)| format!("{count} {name}")).collect();
+    fact("Particles", format!("{} ({})", counts.particles, roles.join(", ")));
+    fact("Pairs of neighbours", counts.neighbour_pairs.to_string());
+    if let Some(equilibrium) = &summary.equilibrium {
+        fact("Solver", format!("{}: {}", equilibrium.solver, equilibrium.why));
+        fact("Iterations", format!("{}, residual {}", equilibrium.iterations, number(equilibrium.residual)));
+    } else {
+        fact("Steps", summary.steps.to_string());
+        fact("Largest last move", format!("{} of the spacing", number(outcome.residual)));
+    }
+    fact("PE1 in all", format!("{} {unit}²", number(summary.energies.pe1)));
+    if let Some(strain) = summary.energies.largest_strain {
+        fact("Largest strain", number(strain));
+    }
+    let broken = summary.broken_bonds;
+    if broken.count > 0 {
+        let first = broken.first.map_or_else(String::new, |first| {
+            let [x, y] = first.place.map(number);
+            format!(", the first in a step at ({x}, {y}) {unit}, step {}", first.step)
+        });
+        fact("Broken bonds", format!("{}{first}", broken.count));
+    }
+    fact("Time", format!("{:.3} s for the steps", summary.timings.steps_s));
+    facts
+}
+
+fn texts(scene: &Scene, summary: &Summary) -> Vec<(String, String)> {
+    let mut texts = Vec::new();
+    if !scene.raw.notes.is_empty() {
+        texts.push(("Notes of the scene".into(), scene.raw.notes.trim().to_owned()));
+    }
+    texts.push(("Scene, with its defaults and overrides".into(), scene_text(&scene.raw)));
+    let mut value = serde_json::to_value(summary).unwrap_or_default();
+    if let serde_json::Value::Object(table) = &mut value {
+        table.remove("scene");
+    }
+    texts.push(("Summary".into(), serde_json::to_string_pretty(&value).unwrap_or_default()));
+    texts
+}

@@ -1,0 +1,92 @@
+//! The report of a stability study: growth against each parameter, thresholds from both sides, the extremes.
+
+use std::path::PathBuf;
+
+use super::super::OutputFolder;
+use super::super::error::ExportError;
+use super::super::stability::panels;
+use super::page::{Page, Table, number};
+use super::plot::Plot;
+use crate::stability::extremes::Outcome;
+use crate::stability::study::Study;
+
+/// Writes `report.html`.
+///
+/// # Errors
+/// The file cannot be written.
+pub fn write(folder: &OutputFolder, study: &Study) -> Result<PathBuf, ExportError> {
+    let holds = study.holds();
+    let words = if holds {
+        "predictions and runs agree, no extreme is wrong"
+    } else {
+        "predictions and runs disagree, or an extreme is wrong"
+    };
+    let charts = study.linear.iter().flat_map(|linear| panels(study, linear));
+    let page = Page {
+        title: study.title.clone(),
+        command: format!("flockform stability {}", study.name),
+        verdict: Some((holds, words.into())),
+        plots: charts.map(|chart| Plot::of(&chart, false)).collect(),
+        facts: facts(study),
+        tables: tables(study),
+        texts: vec![("The study in words".into(), study.to_string())],
+        ..Page::default()
+    };
+    page.write(folder)
+}
+
+fn facts(study: &Study) -> Vec<(String, String)> {
+    let mut facts = Vec::new();
+    if let Some(linear) = &study.linear {
+        facts.push(("Followers".into(), format!("{} of {} particles", linear.followers, linear.particles)));
+        facts.push(("Spectral radius of the sweep".into(), format!("{:.9}", linear.radius)));
+        if let Some([least, greatest]) = linear.ends {
+            facts.push(("Eigenvalues".into(), format!("from {least:.6} to {greatest:.6}")));
+        }
+    }
+    facts.extend(study.refused.iter().map(|why| ("No thresholds".to_owned(), why.clone())));
+    facts
+}
+
+fn tables(study: &Study) -> Vec<Table> {
+    let head = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
+    let mut tables = Vec::new();
+    if let Some(linear) = &study.linear {
+        let exact = |value: f64| format!("{value:.9}");
+        let rows = linear.thresholds.iter().map(|threshold| {
+            let predicted = threshold.predicted.as_ref().map_or("none".into(), |p| exact(p.value));
+            let found = threshold.found.as_ref().map_or("none".into(), |f| exact(f.value));
+            let agrees = if threshold.agrees() { "agree" } else { "DISAGREE" };
+            vec![
+                threshold.parameter.name().into(),
+                predicted,
+                found,
+                number(threshold.tolerance),
+                agrees.into(),
+            ]
+        });
+        tables.push(Table {
+            caption: "Thresholds".into(),
+            head: head(&["parameter", "predicted by the spectrum", "found by runs", "may differ by", ""]),
+            rows: rows.collect(),
+        });
+    }
+    let rows: Vec<Vec<String>> = study
+        .extremes
+        .iter()
+        .map(|case| {
+            let word = match &case.outcome {
+                Outcome::Right { .. } => "right",
+                Outcome::Refused { .. } => "refused",
+                Outcome::Wrong { .. } => "WRONG",
+            };
+            let said = case.outcome.to_string();
+            let said = said.split_once(": ").map_or(said.clone(), |(_, rest)| rest.to_owned());
+            vec![case.name.clone(), case.body.clone(), word.into(), said]
+        })
+        .collect();
+    if !rows.is_empty() {
+        tables.push(Table { caption: "Extremes".into(), head: head(&["what", "on", "", "how"]), rows });
+    }
+    tables
+}

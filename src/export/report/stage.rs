@@ -1,0 +1,173 @@
+//! A body or a swarm on the move, as data for the page: frames, bonds, cells, roles, and what is known exactly
+//! of the end.
+
+use serde::Serialize;
+
+use super::encode::{EncodedFrames, GROUP, doubles, integers};
+use super::frames::{Channel, Frames};
+use crate::flock::points::Points;
+use crate::flock::role::Role;
+use crate::material::cells::Cells;
+
+/// What the scripts need to know.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Film {
+    /// Said above the canvas where several stand beside each other.
+    pub name: String,
+    /// `particle` or `robot`.
+    pub noun: &'static str,
+    /// Of length.
+    pub unit: String,
+    pub clock: Clock,
+    pub count: usize,
+    /// Names of the particles where they have other names than their ids.
+    pub names: Vec<String>,
+    /// Distance of neighbours \[length\].
+    pub spacing: f64,
+    /// To be drawn \[length\], shape \[count\]; empty for points without extent.
+    pub radii: Vec<f64>,
+    /// The clock's value at every frame, shape \[frames\].
+    pub times: Vec<f64>,
+    pub channels: Vec<ChannelName>,
+    /// Shapes \[frames * channels\].
+    pub exponents: Vec<i32>,
+    pub bases: Vec<i64>,
+    pub modes: Vec<u8>,
+    /// Frames in a group.
+    pub group: usize,
+    pub groups: usize,
+    /// By number.
+    pub role_names: Vec<&'static str>,
+    /// What particles can be coloured by, besides role and displacement.
+    pub quantities: Vec<Quantity>,
+    /// Columns known to the last bit at the last frame.
+    pub exact: Vec<Quantity>,
+    /// Corners of a cell; zero where there are no cells.
+    pub corners: usize,
+    /// Stress from strain, for the von Mises stress.
+    pub stress: Option<Stress>,
+    /// Whether displacements scale with their cause, so that drawing them at another size is no lie.
+    pub linear: bool,
+    /// Closed outlines of what stands in the way and of fences.
+    pub outlines: Vec<Outline>,
+}
+
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Clock {
+    pub quantity: &'static str,
+    pub unit: &'static str,
+}
+
+#[derive(Clone, Debug, Serialize)]
+pub struct ChannelName {
+    pub name: &'static str,
+    pub bits: u32,
+}
+
+#[derive(Clone, Debug, Serialize)]
+pub struct Quantity {
+    /// As in the table that the program writes.
+    pub key: String,
+    pub label: String,
+    pub unit: String,
+}
+
+impl Quantity {
+    pub fn new(key: &str, label: &str, unit: impl Into<String>) -> Self {
+        Self { key: key.into(), label: label.into(), unit: unit.into() }
+    }
+}
+
+/// Plane stress or strain.
+#[derive(Clone, Debug, Serialize)]
+pub struct Stress {
+    /// Strain (xx, yy, engineering xy) to stress \[force / length^2\], shape \[3, 3\].
+    pub stiffness: [[f64; 3]; 3],
+    /// Share of xx + yy that acts across the plane \[1\].
+    pub across: f64,
+    /// Whether the rule's strain is the linear one; else turns are taken out first.
+    pub linear: bool,
+}
+
+#[derive(Clone, Debug, Serialize)]
+pub struct Outline {
+    /// `obstacle` or `fence`.
+    pub kind: &'static str,
+    /// \[length\]
+    pub corners: Vec<[f64; 2]>,
+}
+
+/// A film with its arrays, each compressed text with a name.
+#[derive(Debug)]
+pub struct Stage {
+    pub film: Film,
+    pub arrays: Vec<(String, String)>,
+}
+
+impl Stage {
+    pub fn new(film: Film) -> Self {
+        let role_names = Role::ALL.map(Role::name).to_vec();
+        Self { film: Film { group: GROUP, role_names, ..film }, arrays: Vec::new() }
+    }
+
+    /// The frames, and the clock's value at each of them.
+    pub fn set_frames(&mut self, frames: &Frames, encoded: EncodedFrames, times: Vec<f64>) {
+        let tracks = || frames.kept().iter().flat_map(|frame| &frame.tracks);
+        let name = |channel: &Channel| ChannelName { name: channel.name, bits: channel.bits };
+        let film = &mut self.film;
+        film.count = frames.count;
+        film.times = times;
+        film.channels = frames.channels.iter().map(name).collect();
+        film.exponents = tracks().map(|track| track.exponent).collect();
+        film.bases = tracks().map(|track| track.base).collect();
+        film.modes = encoded.modes;
+        film.groups = encoded.groups.len();
+        for (n, text) in encoded.groups.into_iter().enumerate() {
+            self.put(&format!("group-{n}"), text);
+        }
+    }
+
+    /// Places that displacements start from \[length\].
+    pub fn set_reference(&mut self, reference: &Points) {
+        self.put("X", doubles(reference.x.iter().copied()));
+        self.put("Y", doubles(reference.y.iter().copied()));
+    }
+
+    /// Roles at first, and `[step, particle, role]` of every change.
+    pub fn set_roles(&mut self, first: &[Role], changes: &[[u32; 3]]) {
+        self.put("roles", integers(first.iter().map(|&role| number(role)), 1));
+        self.put("role-changes", integers(changes.iter().flatten().copied(), 3));
+    }
+
+    /// Pairs of neighbours; `sees` says of each whether both ends see the other (0) or only the first (1), `broken`
+    /// is one more than the step at which it broke, 0 for never.
+    pub fn set_bonds(&mut self, pairs: &[[u32; 2]], sees: &[u32], broken: &[u32]) {
+        self.put("bonds", integers(pairs.iter().flatten().copied(), 2));
+        self.put("bond-sees", integers(sees.iter().copied(), 1));
+        self.put("bond-broken", integers(broken.iter().copied(), 1));
+    }
+
+    pub fn set_cells(&mut self, cells: &Cells) {
+        self.film.corners = cells.corners;
+        self.put("cells", integers(cells.index.iter().copied(), cells.corners));
+    }
+
+    /// A column known to the last bit at the end; NaN where there is nothing.
+    pub fn add_exact(&mut self, quantity: Quantity, values: impl Iterator<Item = f64>) {
+        self.put(&format!("exact-{}", quantity.key), doubles(values));
+        self.film.exact.push(quantity);
+    }
+
+    fn put(&mut self, name: &str, text: String) {
+        self.arrays.push((name.into(), text));
+    }
+
+    /// \[byte\]
+    pub fn size(&self) -> usize {
+        self.arrays.iter().map(|(_, text)| text.len()).sum()
+    }
+}
+
+pub fn number(role: Role) -> u32 {
+    Role::ALL.iter().position(|&one| one == role).unwrap_or_default() as u32
+}

@@ -1,0 +1,264 @@
+// A body or swarm on the move: where everybody is at a frame, and what follows from it.
+
+import { doubles, integers, Frames } from "./unpack.js";
+
+export class Body {
+  constructor(film, number) {
+    this.film = film;
+    this.prefix = `s${number}-`;
+    this.count = film.count;
+    this.frames = new Frames(film, this.prefix);
+    this.dx = new Float64Array(this.count);
+    this.dy = new Float64Array(this.count);
+    this.fields = new Map();
+    this.known = new Set();
+    this.at = -1;
+    this.exact = new Map();
+  }
+
+  // What does not move.
+  async open() {
+    const named = (name) => this.prefix + name;
+    this.X = await doubles(named("X"));
+    this.Y = await doubles(named("Y"));
+    this.firstRoles = Uint8Array.from(await integers(named("roles"), 1));
+    this.roleChanges = await integers(named("role-changes"), 3);
+    await this.openBonds(named);
+    await this.openCells(named);
+    for (const { key } of this.film.exact) this.exact.set(key, await doubles(named(`exact-${key}`)));
+  }
+
+  // Bonds in the order in which they break, those that never do last: the living ones are the end of the list.
+  async openBonds(named) {
+    const pairs = await integers(named("bonds"), 2);
+    const sees = await integers(named("bond-sees"), 1);
+    const broken = await integers(named("bond-broken"), 1);
+    const breakOf = (bond) => (broken[bond] === 0 ? Infinity : broken[bond] - 1);
+    const order = Array.from(broken.keys());
+    if (broken.some((step) => step > 0)) order.sort((a, b) => breakOf(a) - breakOf(b) || a - b);
+    this.bonds = new Uint32Array(pairs.length);
+    this.oneWay = new Uint8Array(broken.length);
+    this.breaks = new Float64Array(broken.length);
+    order.forEach((bond, n) => {
+      this.bonds.set([pairs[2 * bond], pairs[2 * bond + 1]], 2 * n);
+      this.oneWay[n] = sees[bond];
+      this.breaks[n] = breakOf(bond);
+    });
+  }
+
+  // Triangles in the order in which they are torn: a cell lasts as long as the bonds between its corners.
+  async openCells(named) {
+    const { corners } = this.film;
+    const index = corners ? await integers(named("cells"), corners) : new Uint32Array(0);
+    const count = corners ? index.length / corners : 0;
+    const dead = new Map();
+    for (let n = 0; n < this.breaks.length && this.breaks[n] < Infinity; n++) {
+      const [a, b] = [this.bonds[2 * n], this.bonds[2 * n + 1]];
+      dead.set(Math.min(a, b) * this.count + Math.max(a, b), this.breaks[n]);
+    }
+    const torn = new Float64Array(count).fill(Infinity);
+    if (dead.size) {
+      for (let cell = 0; cell < count; cell++) {
+        for (let j = 0; j < corners; j++) {
+          for (let k = 0; k < j; k++) {
+            const [a, b] = [index[cell * corners + j], index[cell * corners + k]];
+            const step = dead.get(Math.min(a, b) * this.count + Math.max(a, b));
+            if (step !== undefined) torn[cell] = Math.min(torn[cell], step);
+          }
+        }
+      }
+    }
+    const order = Array.from(torn.keys());
+    if (dead.size) order.sort((a, b) => torn[a] - torn[b] || a - b);
+    this.trianglesPerCell = Math.max(corners - 2, 0);
+    this.triangles = new Uint32Array(3 * this.trianglesPerCell * count);
+    this.torn = new Float64Array(count);
+    let at = 0;
+    order.forEach((cell, n) => {
+      this.torn[n] = torn[cell];
+      for (let k = 1; k + 1 < corners; k++) {
+        const first = cell * corners;
+        this.triangles.set([index[first], index[first + k], index[first + k + 1]], at);
+        at += 3;
+      }
+    });
+  }
+
+  get last() {
+    return this.film.times.length - 1;
+  }
+
+  name(particle) {
+    return this.film.names[particle] ?? String(particle + 1);
+  }
+
+  find(name) {
+    const named = this.film.names.indexOf(name);
+    if (named >= 0) return named;
+    const id = Number(name);
+    return Number.isInteger(id) && id >= 1 && id <= this.count ? id - 1 : -1;
+  }
+
+  // Takes up a frame's displacements.
+  go(frame) {
+    if (frame === this.at) return;
+    this.frames.read("dx", frame, this.dx);
+    this.frames.read("dy", frame, this.dy);
+    this.at = frame;
+    this.gradients = null;
+    this.known.clear();
+  }
+
+  get step() {
+    return this.film.times[this.at];
+  }
+
+  // How many of a list sorted by step are over by now.
+  over(steps) {
+    let [low, high] = [0, steps.length];
+    while (low < high) {
+      const middle = (low + high) >> 1;
+      if (steps[middle] <= this.step) low = middle + 1;
+      else high = middle;
+    }
+    return low;
+  }
+
+  brokenBonds() {
+    return this.over(this.breaks);
+  }
+
+  tornCells() {
+    return this.over(this.torn);
+  }
+
+  roles() {
+    const roles = this.firstRoles.slice();
+    const changes = this.roleChanges;
+    for (let n = 0; n < changes.length && changes[n] <= this.step; n += 3) roles[changes[n + 1]] = changes[n + 2];
+    return roles;
+  }
+
+  // A quantity of every particle at this frame; NaN where there is none. The array is used again at the next frame.
+  field(key) {
+    if (!this.fields.has(key)) this.fields.set(key, new Float64Array(this.count));
+    const out = this.fields.get(key);
+    if (!this.known.has(key)) this.compute(key, out);
+    this.known.add(key);
+    return out;
+  }
+
+  compute(key, out) {
+    if (this.frames.has(key)) this.frames.read(key, this.at, out);
+    else if (key === "displacement") for (let i = 0; i < this.count; i++) out[i] = Math.hypot(this.dx[i], this.dy[i]);
+    else if (key === "pe1") this.pe1(out);
+    else if (key === "strain") this.eachStrain((i, xx, yy, xy) => {
+      out[i] = Math.abs(xx + yy) / 2 + Math.hypot((xx - yy) / 2, xy);
+    }, out);
+    else if (key === "von_mises") this.vonMises(out);
+    else out.fill(NaN);
+  }
+
+  // PE1(j) = sum over living bonds of (d - d0)^2.
+  pe1(out) {
+    const { bonds, oneWay, X, Y, dx, dy } = this;
+    out.fill(0);
+    for (let n = this.brokenBonds(); n < oneWay.length; n++) {
+      const [a, b] = [bonds[2 * n], bonds[2 * n + 1]];
+      const [x, y] = [X[b] - X[a], Y[b] - Y[a]];
+      const [u, v] = [dx[b] - dx[a], dy[b] - dy[a]];
+      // (d - d0) as (d^2 - d0^2) / (d + d0): small stretches keep their digits.
+      const now = Math.sqrt((x + u) * (x + u) + (y + v) * (y + v));
+      const change = (2 * (x * u + y * v) + u * u + v * v) / (now + Math.sqrt(x * x + y * y));
+      out[a] += change * change;
+      if (!oneWay[n]) out[b] += change * change;
+    }
+  }
+
+  // Gradient of the displacement at every particle by least squares over living bonds, as flock/strain.rs has it;
+  // four numbers each, NaN where neighbours lie on a line.
+  gradient() {
+    if (this.gradients) return this.gradients;
+    const { bonds, oneWay, X, Y, dx, dy, count } = this;
+    const sums = new Float64Array(7 * count);
+    const add = (i, x, y, u, v) => {
+      const at = 7 * i;
+      sums[at] += x * x;
+      sums[at + 1] += y * y;
+      sums[at + 2] += x * y;
+      sums[at + 3] += u * x;
+      sums[at + 4] += u * y;
+      sums[at + 5] += v * x;
+      sums[at + 6] += v * y;
+    };
+    for (let n = this.brokenBonds(); n < oneWay.length; n++) {
+      const [a, b] = [bonds[2 * n], bonds[2 * n + 1]];
+      const [x, y, u, v] = [X[b] - X[a], Y[b] - Y[a], dx[b] - dx[a], dy[b] - dy[a]];
+      add(a, x, y, u, v);
+      if (!oneWay[n]) add(b, x, y, u, v);
+    }
+    const gradients = new Float64Array(4 * count);
+    for (let i = 0; i < count; i++) {
+      const at = 7 * i;
+      const [xx, yy, xy] = [sums[at], sums[at + 1], sums[at + 2]];
+      const [ux, uy, vx, vy] = [sums[at + 3], sums[at + 4], sums[at + 5], sums[at + 6]];
+      const det = xx * yy - xy * xy;
+      const widest = Math.max(xx, yy);
+      const known = det > 1e-9 * widest * widest;
+      gradients[4 * i] = known ? (ux * yy - uy * xy) / det : NaN;
+      gradients[4 * i + 1] = known ? (uy * xx - ux * xy) / det : NaN;
+      gradients[4 * i + 2] = known ? (vx * yy - vy * xy) / det : NaN;
+      gradients[4 * i + 3] = known ? (vy * xx - vx * xy) / det : NaN;
+    }
+    this.gradients = gradients;
+    return gradients;
+  }
+
+  // Calls with the right stretch less one, which a turn leaves alone, of every particle that has one.
+  eachStrain(take, out) {
+    const g = this.gradient();
+    for (let i = 0; i < this.count; i++) {
+      const [a, b, c, d] = [1 + g[4 * i], g[4 * i + 1], g[4 * i + 2], 1 + g[4 * i + 3]];
+      if (Number.isNaN(a)) {
+        out[i] = NaN;
+        continue;
+      }
+      const turn = Math.atan2(c - b, a + d);
+      const [cos, sin] = [Math.cos(turn), Math.sin(turn)];
+      take(i, cos * a + sin * c - 1, cos * d - sin * b - 1, (cos * b + sin * d + cos * c - sin * a) / 2);
+    }
+  }
+
+  vonMises(out) {
+    const { stiffness, across, linear } = this.film.stress;
+    const stress = (i, xx, yy, shear) => {
+      const [p, q, s] = stiffness.map(([a, b, c]) => a * xx + b * yy + c * shear);
+      const z = across * (p + q);
+      out[i] = Math.sqrt(((p - q) ** 2 + (q - z) ** 2 + (z - p) ** 2) / 2 + 3 * s * s);
+    };
+    if (!linear) return this.eachStrain((i, xx, yy, xy) => stress(i, xx, yy, 2 * xy), out);
+    const g = this.gradient();
+    for (let i = 0; i < this.count; i++) stress(i, g[4 * i], g[4 * i + 3], g[4 * i + 1] + g[4 * i + 2]);
+  }
+
+  // What is known of one particle at this frame, as [{key, label, unit, value}]; at the last frame to the last bit.
+  numbers(particle) {
+    const { film } = this;
+    const list = [];
+    const put = (key, label, unit, value) => list.push({ key, label, unit, value });
+    const known = (key) => (this.at === this.last ? this.exact.get(key)?.[particle] : undefined);
+    const [x, y] = [known("x") ?? this.X[particle] + this.dx[particle], known("y") ?? this.Y[particle] + this.dy[particle]];
+    put("x", "x", film.unit, x);
+    put("y", "y", film.unit, y);
+    put("ux", "x displacement", film.unit, known("ux") ?? x - this.X[particle]);
+    put("uy", "y displacement", film.unit, known("uy") ?? y - this.Y[particle]);
+    for (const { key, label, unit } of film.quantities) {
+      put(key, label, unit, known(key) ?? this.field(key)[particle]);
+    }
+    const told = new Set(list.map((one) => one.key));
+    if (this.at === this.last) {
+      for (const { key, label, unit } of film.exact) if (!told.has(key)) put(key, label, unit, known(key));
+    }
+    return list;
+  }
+}

@@ -1,0 +1,79 @@
+// Where the camera is, and times what displacements are drawn.
+
+import { draw } from "./page.js";
+import { sampled } from "./scale.js";
+import { bodies, element, shown, state } from "./shown.js";
+
+export function fit() {
+  const boxes = shown.views.map((view) => view.bounds(sampled(shown.player.ready, shown.player.last), state.factor, state.turned));
+  const low = [0, 1].map((k) => Math.min(...boxes.map((box) => box.low[k])));
+  const high = [0, 1].map((k) => Math.max(...boxes.map((box) => box.high[k])));
+  const view = shown.views[0];
+  // A lying body needs no high window.
+  const wanted = (1.15 * view.box.clientWidth * (high[1] - low[1])) / (high[0] - low[0]) + 60;
+  const height = Math.round(Math.min(Math.max(wanted, 260), Math.min(0.66 * window.innerHeight, 640)));
+  if (Number.isFinite(height)) shown.views.forEach(({ box }) => (box.style.height = `${height}px`));
+  view.resize();
+  const scales = [view.width / (high[0] - low[0]), view.height / (high[1] - low[1])];
+  const scale = 0.9 * Math.min(...scales.filter((s) => Number.isFinite(s) && s > 0));
+  state.camera = { x: (low[0] + high[0]) / 2, y: (low[1] + high[1]) / 2, scale: Number.isFinite(scale) ? scale : 1 };
+  state.isFitted = true;
+}
+
+export function zoom(by, view = shown.views[0], at = [view.width / 2, view.height / 2]) {
+  const { camera } = state;
+  const [ox, oy] = [at[0] - view.width / 2, view.height / 2 - at[1]];
+  const scale = camera.scale * by;
+  state.camera = { x: camera.x + ox / camera.scale - ox / scale, y: camera.y + oy / camera.scale - oy / scale, scale };
+  state.isFitted = false;
+  draw();
+}
+
+export function move(dx, dy) {
+  const { camera } = state;
+  state.camera = { ...camera, x: camera.x - dx / camera.scale, y: camera.y + dy / camera.scale };
+  state.isFitted = false;
+  draw();
+}
+
+// Times what displacements are drawn, so that small ones are seen and, where their size is arbitrary, large ones fit.
+export function wantedFactor() {
+  const { film } = bodies[0];
+  if (film.radii.length) return 1;
+  let largest = 0;
+  const [low, high] = [[Infinity, Infinity], [-Infinity, -Infinity]];
+  for (const body of bodies) {
+    for (const frame of sampled(shown.player.ready, shown.player.last)) {
+      body.go(frame);
+      for (const u of body.field("displacement")) if (u > largest) largest = u;
+    }
+    for (let i = 0; i < body.count; i++) {
+      [body.X[i], body.Y[i]].forEach((value, k) => {
+        low[k] = Math.min(low[k], value);
+        high[k] = Math.max(high[k], value);
+      });
+    }
+  }
+  const part = largest / Math.max(high[0] - low[0], high[1] - low[1]);
+  if (!(part > 0) || (part >= 0.02 && (part <= 0.6 || !film.linear))) return 1;
+  const wanted = (part < 0.02 ? 0.08 : 0.3) / part;
+  const decade = 10 ** Math.floor(Math.log10(wanted));
+  return Number(([5, 2].map((m) => m * decade).find((f) => f <= wanted) ?? decade).toPrecision(1));
+}
+
+// Whether a body would be a thin upright line on a wide screen.
+export function isTall() {
+  const { low, high } = shown.views[0].bounds([0], 1, false);
+  return bodies[0].film.radii.length === 0 && high[1] - low[1] > 2.2 * (high[0] - low[0]);
+}
+
+export function turn(turned) {
+  state.turned = turned;
+  element("turn").setAttribute("aria-pressed", String(turned));
+  refit();
+}
+
+export function refit() {
+  fit();
+  draw();
+}

@@ -1,0 +1,66 @@
+// Colours, ticks and numbers as text.
+
+// Viridis, perceptually uniform, at every tenth; as in the figures.
+const VIRIDIS = [
+  [68, 1, 84], [72, 36, 117], [65, 68, 135], [53, 95, 141], [42, 120, 142], [33, 145, 140],
+  [34, 168, 132], [68, 191, 112], [122, 209, 81], [189, 223, 38], [253, 231, 37],
+];
+
+export const SHADES = 256;
+
+// What a style sheet's variable holds, as [r, g, b].
+export function themeColour(name) {
+  const text = themeText(name);
+  const short = text.length === 4;
+  const part = (k) => (short ? text[k + 1] + text[k + 1] : text.slice(1 + 2 * k, 3 + 2 * k));
+  return [0, 1, 2].map((k) => parseInt(part(k), 16));
+}
+
+export function themeText(name) {
+  return getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+}
+
+export function viridis(part) {
+  const place = Math.min(Math.max(part, 0), 1) * 10;
+  const below = Math.min(Math.floor(place), 9);
+  return VIRIDIS[below].map((from, k) => Math.round(from + (place - below) * (VIRIDIS[below + 1][k] - from)));
+}
+
+// A palette of SHADES colours, RGBA, and after them the colour of nothing.
+export function palette(colourOf) {
+  const bytes = new Uint8Array(4 * (SHADES + 1));
+  for (let k = 0; k < SHADES; k++) bytes.set([...colourOf(k), 255], 4 * k);
+  bytes.set([...themeColour("none"), 255], 4 * SHADES);
+  return bytes;
+}
+
+// Up to `digits` digits, with a real minus sign.
+export function words(value, digits = 6) {
+  if (!Number.isFinite(value)) return "–";
+  if (value === 0) return "0";
+  const size = Math.abs(value);
+  let text = size >= 1e-4 && size < 1e7 ? String(Number(value.toPrecision(digits))) : value.toExponential(digits - 1);
+  text = text.replace(/\.?0+(e|$)/, (all, end) => (text.includes(".") ? end : all)).replace("e+", "e");
+  return text.replaceAll("-", "−");
+}
+
+// Round values from low to high, about `most` of them.
+export function ticks(low, high, most) {
+  const raw = (high - low) / Math.max(most, 1);
+  if (!(raw > 0) || !Number.isFinite(raw)) return [low];
+  const decade = 10 ** Math.floor(Math.log10(raw));
+  const step = [1, 2, 5, 10].map((m) => m * decade).find((s) => s >= raw * 0.999);
+  const values = [];
+  for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) values.push(k === 0 ? 0 : k * step);
+  return values;
+}
+
+// Powers of ten from low to high, no more than `most`; round values where the range holds fewer than two.
+export function logTicks(low, high, most) {
+  const [from, to] = [Math.ceil(Math.log10(low) - 1e-9), Math.floor(Math.log10(high) + 1e-9)];
+  if (to - from < 1) return [1, 2, 5, 10, 20, 50].map((m) => m * 10 ** (from - 1)).filter((v) => v >= low && v <= high);
+  const every = Math.ceil((to - from + 1) / most);
+  const values = [];
+  for (let k = from; k <= to; k += every) values.push(10 ** k);
+  return values;
+}

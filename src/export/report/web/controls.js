@@ -1,0 +1,205 @@
+// What a reader can do: pointer, keys, buttons, layers, theme.
+
+import { move, refit, turn, zoom } from "./camera.js";
+import { keep, showTip, tip } from "./numbers.js";
+import { draw, drawNow } from "./page.js";
+import { takePalette } from "./scale.js";
+import { bodies, element, shown, state } from "./shown.js";
+
+// More particles than this are shown as a surface even by role: dots would be one blot.
+const MOST_DOTS = 12000;
+
+export function listenToView(view) {
+  const { box } = view;
+  let from = null;
+  let moved = 0;
+  const local = (event) => {
+    const bounds = box.getBoundingClientRect();
+    return [event.clientX - bounds.left, event.clientY - bounds.top];
+  };
+  box.addEventListener("pointerdown", (event) => {
+    from = [event.clientX, event.clientY];
+    moved = 0;
+    box.setPointerCapture(event.pointerId);
+    box.classList.add("dragged");
+  });
+  box.addEventListener("pointermove", (event) => {
+    if (!shown.player.ready) return;
+    if (!from) return showTip(view, view.nearest(...local(event)), event);
+    const by = [event.clientX - from[0], event.clientY - from[1]];
+    moved += Math.abs(by[0]) + Math.abs(by[1]);
+    from = [event.clientX, event.clientY];
+    tip(null);
+    move(...by);
+  });
+  const end = () => {
+    from = null;
+    box.classList.remove("dragged");
+  };
+  box.addEventListener("pointerup", (event) => {
+    if (from && moved < 4 && shown.player.ready) keep(view, view.nearest(...local(event)));
+    end();
+  });
+  box.addEventListener("pointercancel", end);
+  box.addEventListener("pointerleave", () => shown.player.ready && showTip(view, -1, null));
+  box.addEventListener("dblclick", refit);
+  box.addEventListener("wheel", (event) => {
+    event.preventDefault();
+    zoom(Math.exp(-event.deltaY * (event.deltaMode ? 0.05 : 0.0016)), view, local(event));
+  }, { passive: false });
+}
+
+export function listenToKeys() {
+  document.addEventListener("keydown", (event) => {
+    const own = event.target.closest("input, select, textarea, button, summary, pre");
+    const isRange = event.target.matches?.("input[type=range], input[type=checkbox]");
+    if ((own && !isRange) || event.ctrlKey || event.metaKey || event.altKey) return;
+    const shifts = { ArrowLeft: [60, 0], ArrowRight: [-60, 0], ArrowUp: [0, 60], ArrowDown: [0, -60] };
+    const keys = {
+      " ": () => shown.player.toggle(),
+      ArrowLeft: () => step(-1),
+      ArrowRight: () => step(1),
+      Home: () => jump(0),
+      End: () => jump(shown.player.last),
+      "+": () => zoom(1.25),
+      "=": () => zoom(1.25),
+      "-": () => zoom(0.8),
+      0: refit,
+    };
+    const act = event.shiftKey && shifts[event.key] ? () => move(...shifts[event.key]) : keys[event.key];
+    if (!act || (isRange && event.target.type === "checkbox" && event.key === " ")) return;
+    event.preventDefault();
+    act();
+  });
+}
+
+export function step(by) {
+  shown.player.pause();
+  shown.player.go(shown.player.frame + by);
+}
+
+export function jump(frame) {
+  shown.player.pause();
+  shown.player.go(frame);
+}
+
+export function listenToControls() {
+  const on = (id, kind, act) => element(id).addEventListener(kind, act);
+  on("play", "click", () => shown.player.toggle());
+  on("first", "click", () => jump(0));
+  on("last", "click", () => jump(shown.player.last));
+  on("back", "click", () => step(-1));
+  on("forth", "click", () => step(1));
+  on("time", "input", () => jump(Number(element("time").value)));
+  on("speed", "change", () => (shown.player.speed = Number(element("speed").value)));
+  on("zoom-in", "click", () => zoom(1.25));
+  on("zoom-out", "click", () => zoom(0.8));
+  on("zoom-fit", "click", refit);
+  on("turn", "click", () => turn(!state.turned));
+  on("picture", "click", savePicture);
+  on("quantity", "change", () => choose(element("quantity").value));
+  on("log", "change", () => {
+    state.isLog = element("log").checked;
+    draw();
+  });
+  on("magnify", "change", () => {
+    const factor = Number(element("magnify").value);
+    if (Number.isFinite(factor) && factor >= 0) state.factor = factor;
+    refit();
+  });
+  on("find", "change", () => shown.views.forEach((view) => keep(view, view.body.find(element("find").value.trim()))));
+  for (const name of ["points", "bonds", "surface", "cracks", "ways"]) {
+    on(`layer-${name}`, "change", () => {
+      state.hasChosenLayers = true;
+      state.layers[name] = element(`layer-${name}`).checked;
+      draw();
+    });
+  }
+  shown.player.changed = () => {
+    element("play-icon").setAttribute("d", shown.player.playing ? "M4 2h2v12H4zM10 2h2v12h-2z" : "M4 2l10 6-10 6z");
+    element("play").setAttribute("aria-label", shown.player.playing ? "Pause" : "Play");
+  };
+}
+
+export function choose(quantity) {
+  state.quantity = quantity;
+  layersFor(quantity);
+  element("quantity").value = quantity;
+  takePalette();
+  draw();
+}
+
+export function savePicture() {
+  const pictures = shown.views.map((view) => view.composed());
+  const gap = 12;
+  const canvas = document.createElement("canvas");
+  canvas.width = pictures.reduce((sum, one) => sum + one.width + gap, -gap);
+  canvas.height = Math.max(...pictures.map((one) => one.height));
+  let left = 0;
+  for (const one of pictures) {
+    canvas.getContext("2d").drawImage(one, left, 0);
+    left += one.width + gap;
+  }
+  const link = document.createElement("a");
+  link.href = canvas.toDataURL("image/png");
+  link.download = `${document.title} ${element("now").textContent}.png`;
+  link.click();
+}
+
+// Until somebody chooses layers, a field fills the body and roles are dots: each as it is read best.
+export function layersFor(quantity) {
+  if (state.hasChosenLayers) return;
+  const { film, bonds, triangles } = bodies[0];
+  const filled = triangles.length > 0 && (quantity !== "role" || film.count > MOST_DOTS);
+  state.layers = {
+    points: !filled,
+    bonds: bonds.length > 0 && film.count <= MOST_DOTS && !filled,
+    surface: filled,
+    cracks: true,
+    ways: film.radii.length > 0,
+  };
+  for (const [name, on] of Object.entries(state.layers)) element(`layer-${name}`).checked = on;
+}
+
+export function nameControls() {
+  const { film } = bodies[0];
+  const isSwarm = film.radii.length > 0;
+  const has = { bonds: bodies[0].bonds.length > 0, surface: bodies[0].triangles.length > 0 };
+  const offer = (name, is) => (element(`layer-${name}`).closest("label").hidden = !is);
+  offer("bonds", has.bonds);
+  offer("surface", has.surface);
+  offer("cracks", bodies[0].breaks[0] < Infinity);
+  offer("ways", isSwarm);
+  element("points-name").textContent = `${film.noun}s`;
+  element("bonds-name").textContent = isSwarm ? "links" : "bonds";
+  element("find-name").textContent = film.noun[0].toUpperCase() + film.noun.slice(1);
+  element("magnify-label").hidden = isSwarm;
+  element("find-names").replaceChildren(...film.names.map((name) => Object.assign(document.createElement("option"), { value: name })));
+}
+
+export function listenToTheme() {
+  const root = document.documentElement;
+  const dark = window.matchMedia("(prefers-color-scheme: dark)");
+  const take = (isDark) => {
+    root.dataset.theme = isDark ? "dark" : "light";
+    if (bodies.length && state.palette) takePalette();
+    draw();
+  };
+  take(dark.matches);
+  dark.addEventListener("change", () => take(dark.matches));
+  element("theme").addEventListener("click", () => take(root.dataset.theme !== "dark"));
+  // Paper is white.
+  let before = "light";
+  window.addEventListener("beforeprint", () => {
+    before = root.dataset.theme;
+    take(false);
+    drawNow();
+    shown.views.forEach((view) => view.fix());
+    shown.isPrinting = true;
+  });
+  window.addEventListener("afterprint", () => {
+    shown.isPrinting = false;
+    shown.views.forEach((view) => view.unfix());
+    take(before === "dark");
+  });
+}

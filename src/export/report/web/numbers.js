@@ -1,0 +1,69 @@
+// The numbers of a particle: beside the pointer, or kept below the film.
+
+import { words } from "./colour.js";
+import { draw } from "./page.js";
+import { bodies, element, shown } from "./shown.js";
+import { isUnit } from "./view.js";
+
+export function numbersOf(body, particle) {
+  const list = document.createElement("dl");
+  list.className = "numbers";
+  const row = (label, value, exact) => {
+    const pair = document.createElement("div");
+    pair.style.display = "contents";
+    const number = Object.assign(document.createElement("data"), { value: exact, textContent: value });
+    number.dataset.key = label[0];
+    const dd = document.createElement("dd");
+    dd.append(number);
+    pair.append(Object.assign(document.createElement("dt"), { textContent: label[1] }), dd);
+    list.append(pair);
+  };
+  const role = body.film.role_names[body.roles()[particle]];
+  row(["role", "role"], role, role);
+  for (const { key, label, unit, value } of body.numbers(particle)) {
+    row([key, isUnit(unit) ? `${label} [${unit}]` : label], words(value), Number.isFinite(value) ? String(value) : "");
+  }
+  return list;
+}
+
+export function heading(body, particle) {
+  const noun = body.film.names.length ? "" : `${body.film.noun} `;
+  return Object.assign(document.createElement("strong"), { textContent: `${noun}${body.name(particle)}` });
+}
+
+export function showTip(view, particle, event) {
+  view.marked = particle;
+  view.drawOver();
+  if (particle < 0) return tip(null);
+  tip(event, [heading(view.body, particle), numbersOf(view.body, particle)]);
+}
+
+// A text or elements beside the pointer; nothing without an event.
+export function tip(event, content) {
+  const box = element("tip");
+  box.hidden = !event;
+  if (!event) return;
+  box.replaceChildren(...(Array.isArray(content) ? content : [content]));
+  const [width, height] = [box.offsetWidth, box.offsetHeight];
+  const x = event.clientX + 16 + width > window.innerWidth ? event.clientX - width - 12 : event.clientX + 16;
+  const y = Math.min(event.clientY + 12, window.innerHeight - height - 8);
+  Object.assign(box.style, { left: `${Math.max(x, 4)}px`, top: `${Math.max(y, 4)}px` });
+}
+
+export function keep(view, particle) {
+  shown.views.forEach((other) => (other.kept = other === view || bodies.length > 1 ? particle : -1));
+  draw();
+}
+
+export function showKept() {
+  const box = element("kept");
+  const kept = shown.views.filter((view) => view.kept >= 0);
+  box.hidden = !kept.length;
+  box.replaceChildren(
+    ...kept.flatMap((view) => {
+      const title = heading(view.body, view.kept);
+      if (view.body.film.name) title.textContent += `, ${view.body.film.name}`;
+      return [title, numbersOf(view.body, view.kept)];
+    }),
+  );
+}

@@ -1,0 +1,95 @@
+// Draws what is shown, and starts.
+
+import { fit, isTall, refit, turn, wantedFactor } from "./camera.js";
+import { Chart } from "./chart.js";
+import { words } from "./colour.js";
+import { choose, listenToControls, listenToKeys, listenToTheme, listenToView, nameControls } from "./controls.js";
+import { showKept, tip } from "./numbers.js";
+import { Player } from "./player.js";
+import { drawScale, quantities, shade } from "./scale.js";
+import { bodies, data, element, shown, state } from "./shown.js";
+import { View } from "./view.js";
+
+let isAsked = false;
+
+// Draws before the next refresh, once however often it is asked for.
+export function draw() {
+  // What is printed was drawn before the page took the paper's size.
+  if (isAsked || shown.isPrinting) return;
+  isAsked = true;
+  requestAnimationFrame(() => {
+    isAsked = false;
+    drawNow();
+  });
+}
+
+export function drawNow() {
+  if (!shown.views.length || !shown.player.ready) return;
+  const show = { ...state, shade, isFlat: state.quantity === "role" };
+  shown.views.forEach((view) => view.draw(show));
+  drawScale();
+  drawClock();
+  showKept();
+  document.body.dataset.drawn = String(Number(document.body.dataset.drawn ?? 0) + 1);
+}
+
+function drawClock() {
+  const { quantity, unit } = bodies[0].film.clock;
+  const [now, end] = [shown.player.times[shown.player.frame], shown.player.times.at(-1)];
+  const text = `${quantity} ${words(now)} of ${words(end)}${unit ? ` ${unit}` : ""}`;
+  element("now").textContent = text;
+  element("time").value = String(shown.player.frame);
+  element("time").setAttribute("aria-valuetext", text);
+  shown.charts.forEach((chart) => chart.go(now));
+}
+
+function showFrame(frame) {
+  state.frame = frame;
+  draw();
+}
+
+async function startFilm() {
+  for (const body of bodies) await body.open();
+  const { film } = bodies[0];
+  shown.player = new Player(film.times, showFrame);
+  element("time").max = String(film.times.length - 1);
+  element("quantity").replaceChildren(
+    ...quantities().map(({ key, label }) => Object.assign(document.createElement("option"), { value: key, textContent: label })),
+  );
+  shown.views = bodies.map((body) => new View(body, element("views")));
+  shown.views.forEach((view) => {
+    view.prepare();
+    listenToView(view);
+    new ResizeObserver(() => (state.isFitted && shown.player.ready && !shown.isPrinting ? refit() : draw())).observe(view.box);
+  });
+  nameControls();
+  listenToControls();
+  listenToKeys();
+  choose(bodies.length > 1 || film.stress ? "von_mises" : "role");
+  const before = bodies.slice(0, -1);
+  for (const body of before) await body.frames.load(() => {});
+  await bodies.at(-1).frames.load((ready) => {
+    const isFirst = shown.player.ready === 0;
+    shown.player.ready = ready;
+    const part = Math.round((100 * ready) / film.times.length);
+    element("loading").textContent = part < 100 ? `Unpacking: ${part} %.` : "";
+    if (isFirst) turn(isTall());
+  });
+  state.factor = wantedFactor();
+  element("magnify").value = String(state.factor);
+  if (film.clock.unit === "%") shown.player.go(shown.player.last);
+  fit();
+  drawNow();
+}
+
+async function start() {
+  listenToTheme();
+  shown.charts = data.plots.map((plot) => new Chart(plot, element("plots"), { tip, seek: (time) => shown.player?.seek(time) }));
+  if (bodies.length) await startFilm();
+  document.body.dataset.ready = "true";
+}
+
+start().catch((error) => {
+  element("loading").textContent = `This page cannot show its film: ${error.message}.`;
+  console.error(error);
+});

@@ -1,0 +1,32 @@
+// What the page shows: bodies with their views, charts, the clock, and what was chosen.
+
+import { Body } from "./body.js";
+
+export const element = (id) => document.getElementById(id);
+export const data = JSON.parse(element("data").textContent);
+export const bodies = data.stages.map((film, number) => new Body(film, number));
+
+export const state = {
+  frame: 0,
+  quantity: "role",
+  isLog: false,
+  factor: 1,
+  turned: false,
+  camera: { x: 0, y: 0, scale: 1 },
+  layers: {},
+  ranges: new Map(),
+};
+
+export const shown = { views: [], charts: [], player: null, isPrinting: false };
+
+// For the browser's console: `report.bodies[0].numbers(66)`.
+window.report = {
+  bodies,
+  state,
+  get views() {
+    return shown.views;
+  },
+  get player() {
+    return shown.player;
+  },
+};

@@ -1,0 +1,308 @@
+// One body on its canvases: what stands still below, the painter's in the middle, marks above.
+
+import { Painter } from "./painter.js";
+import { PlainPainter } from "./painter2d.js";
+import { themeColour, themeText, ticks, words } from "./colour.js";
+
+// Ways of more particles would cover each other.
+const MOST_WAYS = 400;
+// Edges of more particles than this are too fine to be smoothed.
+const MOST_SMOOTH = 20000;
+// How near the pointer must come to a particle, in pixels.
+const REACH = 14;
+
+// Scenes without a unit call it so.
+export function isUnit(unit) {
+  return unit !== "" && unit !== "length" && unit !== "unit";
+}
+
+export class View {
+  constructor(body, parent) {
+    this.body = body;
+    this.origin = [0, 0];
+    this.marked = -1;
+    this.kept = -1;
+    const figure = document.createElement("figure");
+    figure.className = "view";
+    if (body.film.name) figure.append(Object.assign(document.createElement("figcaption"), { textContent: body.film.name }));
+    this.box = document.createElement("div");
+    this.box.className = "canvas";
+    this.box.tabIndex = 0;
+    this.box.setAttribute("role", "application");
+    this.box.setAttribute("aria-label", `${body.film.name || "Body"}: ${body.count} ${body.film.noun}s. Plus and minus zoom, shift with arrows moves.`);
+    [this.under, this.middle, this.over] = [0, 1, 2].map(() => document.createElement("canvas"));
+    this.box.append(this.under, this.middle, this.over);
+    figure.append(this.box);
+    parent.append(figure);
+    const wanted = new URLSearchParams(location.search).get("painter") !== "2d";
+    this.painter = (wanted && Painter.on(this.middle, body.count <= MOST_SMOOTH)) || new PlainPainter(this.middle);
+    this.places = new Float32Array(2 * body.count);
+    this.shades = new Float32Array(body.count);
+    this.radii = new Float32Array(body.count);
+  }
+
+  // After the body is open.
+  prepare() {
+    const { body } = this;
+    const middle = (values) => values.reduce((sum, value) => sum + value / values.length, 0);
+    this.origin = [middle(body.X), middle(body.Y)];
+    this.painter.setMesh(body);
+  }
+
+  // Lowest and highest places over the frames that are looked at, and whatever stands in the way; as shown.
+  bounds(frames, factor, turned) {
+    const { body } = this;
+    const box = { low: [Infinity, Infinity], high: [-Infinity, -Infinity] };
+    const take = (worldX, worldY) => {
+      const [x, y] = turned ? [worldY, -worldX] : [worldX, worldY];
+      if (!(Number.isFinite(x) && Number.isFinite(y))) return;
+      box.low = [Math.min(box.low[0], x), Math.min(box.low[1], y)];
+      box.high = [Math.max(box.high[0], x), Math.max(box.high[1], y)];
+    };
+    const at = body.at;
+    for (const frame of frames) {
+      body.go(frame);
+      for (let i = 0; i < body.count; i++) take(body.X[i] + factor * body.dx[i], body.Y[i] + factor * body.dy[i]);
+    }
+    if (at >= 0) body.go(at);
+    const own = body.film.radii.length ? Math.max(...body.film.radii) : 0.5 * body.film.spacing;
+    for (const { kind, corners } of body.film.outlines) if (kind === "obstacle") corners.forEach(([x, y]) => take(x, y));
+    return { low: box.low.map((value) => value - own), high: box.high.map((value) => value + own) };
+  }
+
+  resize() {
+    const ratio = window.devicePixelRatio || 1;
+    const [width, height] = [this.box.clientWidth, this.box.clientHeight];
+    for (const canvas of [this.under, this.middle, this.over]) {
+      const [w, h] = [Math.round(width * ratio), Math.round(height * ratio)];
+      if (canvas.width !== w || canvas.height !== h) Object.assign(canvas, { width: w, height: h });
+    }
+    Object.assign(this, { ratio, width, height });
+  }
+
+  // A place as it is shown: as it is, or turned by a quarter, so that tall bodies lie.
+  shown([x, y]) {
+    return this.show.turned ? [y, -x] : [x, y];
+  }
+
+  // `show` is what the page shows: frame, camera, factor, turned, layers, shade(body, out), palette, isFlat. The camera
+  // is a place as shown.
+  draw(show) {
+    this.show = show;
+    this.resize();
+    const { body, places, shades, radii, ratio } = this;
+    body.go(show.frame);
+    const { X, Y, dx, dy, film } = body;
+    const origin = this.shown(this.origin);
+    for (let i = 0; i < body.count; i++) {
+      const x = X[i] + show.factor * dx[i] - this.origin[0];
+      const y = Y[i] + show.factor * dy[i] - this.origin[1];
+      // NaN is culled by some drivers and not by others; far away is outside everywhere.
+      const isThere = Number.isFinite(x) && Number.isFinite(y);
+      places[2 * i] = isThere ? (show.turned ? y : x) : 1e30;
+      places[2 * i + 1] = isThere ? (show.turned ? -x : y) : 1e30;
+    }
+    show.shade(body, shades);
+    const scale = show.camera.scale * ratio;
+    if (film.radii.length) for (let i = 0; i < body.count; i++) radii[i] = Math.max(film.radii[i] * scale, 1.5 * ratio);
+    else radii.fill(Math.min(Math.max((show.layers.surface ? 0.13 : 0.27) * film.spacing * scale, 0.7), 9 * ratio));
+    const bondsFrom = 2 * body.brokenBonds();
+    const trianglesFrom = 3 * body.trianglesPerCell * body.tornCells();
+    this.painter.draw({
+      places, values: shades, radii,
+      palette: show.palette, isFlat: show.isFlat, layers: show.layers,
+      camera: { x: show.camera.x - origin[0], y: show.camera.y - origin[1], scale },
+      bondsFrom, bondCount: body.bonds.length - bondsFrom,
+      trianglesFrom, triangleCount: body.triangles.length - trianglesFrom,
+      bondColour: themeColour("bond"),
+    });
+    this.drawUnder();
+    this.drawOver();
+  }
+
+  // From a place to the canvas, in CSS pixels.
+  place(at) {
+    return this.pixel(this.shown(at));
+  }
+
+  pixel([x, y]) {
+    const { camera } = this.show;
+    return [this.width / 2 + (x - camera.x) * camera.scale, this.height / 2 - (y - camera.y) * camera.scale];
+  }
+
+  at(particle) {
+    const origin = this.shown(this.origin);
+    return this.pixel([this.places[2 * particle] + origin[0], this.places[2 * particle + 1] + origin[1]]);
+  }
+
+  pen(canvas) {
+    const pen = canvas.getContext("2d");
+    pen.setTransform(this.ratio, 0, 0, this.ratio, 0, 0);
+    pen.clearRect(0, 0, this.width, this.height);
+    return pen;
+  }
+
+  drawUnder() {
+    const pen = this.pen(this.under);
+    pen.fillStyle = themeText("card");
+    pen.fillRect(0, 0, this.width, this.height);
+    this.drawGrid(pen);
+    for (const { kind, corners } of this.body.film.outlines) {
+      pen.beginPath();
+      corners.forEach((corner) => pen.lineTo(...this.place(corner)));
+      pen.closePath();
+      if (kind === "fence") {
+        pen.strokeStyle = themeText("obstacle");
+        pen.setLineDash([6, 4]);
+        pen.stroke();
+        pen.setLineDash([]);
+      } else {
+        pen.fillStyle = themeText("obstacle");
+        pen.fill();
+      }
+    }
+    if (this.show.layers.ways && this.body.count <= MOST_WAYS) this.drawWays(pen);
+  }
+
+  // Lines at round coordinates, with their numbers along the lower and the left edge.
+  drawGrid(pen) {
+    const { camera } = this.show;
+    const [halfWidth, halfHeight] = [this.width / 2 / camera.scale, this.height / 2 / camera.scale];
+    const across = ticks(camera.x - halfWidth, camera.x + halfWidth, this.width / 110);
+    const step = across.length > 1 ? across[1] - across[0] : 1;
+    const up = [];
+    for (let k = Math.ceil((camera.y - halfHeight) / step); k * step <= camera.y + halfHeight; k++) up.push(k * step);
+    pen.lineWidth = 1;
+    pen.strokeStyle = themeText("grid");
+    pen.fillStyle = themeText("soft");
+    pen.font = "11px system-ui, sans-serif";
+    pen.beginPath();
+    for (const x of across) {
+      const px = Math.round(this.pixel([x, 0])[0]) + 0.5;
+      pen.moveTo(px, 0);
+      pen.lineTo(px, this.height);
+    }
+    for (const y of up) {
+      const py = Math.round(this.pixel([0, y])[1]) + 0.5;
+      pen.moveTo(0, py);
+      pen.lineTo(this.width, py);
+    }
+    pen.stroke();
+    // Turned, what lies across is y, and what goes down is x.
+    const [h, v] = this.show.turned ? ["y", "x"] : ["x", "y"];
+    const { unit } = this.body.film;
+    const named = (name) => (isUnit(unit) ? `${name} [${unit}]` : name);
+    const inside = across.filter((x) => this.pixel([x, 0])[0] > 50 && this.pixel([x, 0])[0] < this.width - 190);
+    inside.forEach((x) => pen.fillText(words(x), this.pixel([x, 0])[0] + 3, this.height - 5));
+    const between = up.filter((y) => this.pixel([0, y])[1] > 34 && this.pixel([0, y])[1] < this.height - 16);
+    between.forEach((y) => pen.fillText(words(this.show.turned ? -y : y), 5, this.pixel([0, y])[1] - 3));
+    pen.fillText(named(h), this.width - pen.measureText(named(h)).width - 6, 14);
+    pen.fillText(named(v), 5, 14);
+  }
+
+  // The way of everybody up to now.
+  drawWays(pen) {
+    const { body, show } = this;
+    if (!this.ways || this.ways.length < body.frames.ready) this.collectWays();
+    pen.strokeStyle = themeText("way");
+    pen.lineWidth = 1;
+    pen.beginPath();
+    for (let i = 0; i < body.count; i++) {
+      let before = null;
+      for (let frame = 0; frame <= Math.min(show.frame, this.ways.length - 1); frame++) {
+        const [x, y] = this.place([
+          body.X[i] + show.factor * this.ways[frame][2 * i],
+          body.Y[i] + show.factor * this.ways[frame][2 * i + 1],
+        ]);
+        if (before && Math.abs(x - before[0]) + Math.abs(y - before[1]) < 1 && frame < show.frame) continue;
+        if (before) pen.lineTo(x, y);
+        else pen.moveTo(x, y);
+        before = [x, y];
+      }
+    }
+    pen.stroke();
+  }
+
+  collectWays() {
+    const { body } = this;
+    const at = body.at;
+    this.ways = [];
+    for (let frame = 0; frame < body.frames.ready; frame++) {
+      body.go(frame);
+      const way = new Float32Array(2 * body.count);
+      for (let i = 0; i < body.count; i++) way.set([body.dx[i], body.dy[i]], 2 * i);
+      this.ways.push(way);
+    }
+    body.go(at);
+  }
+
+  drawOver() {
+    const pen = this.pen(this.over);
+    if (this.show.layers.cracks) this.drawCracks(pen);
+    for (const [particle, width] of [[this.kept, 3], [this.marked, 2]]) {
+      if (particle < 0) continue;
+      const [x, y] = this.at(particle);
+      pen.beginPath();
+      pen.arc(x, y, Math.max(this.radii[particle] / this.ratio + 3, 6), 0, 7);
+      pen.lineWidth = width;
+      pen.strokeStyle = themeText("ink");
+      pen.stroke();
+    }
+  }
+
+  // Both flanks of every broken bond: half a bond from each of its ends, across it.
+  drawCracks(pen) {
+    const { body, show } = this;
+    const broken = body.brokenBonds();
+    if (!broken) return;
+    pen.strokeStyle = themeText("crack");
+    pen.lineWidth = Math.min(Math.max(0.09 * body.film.spacing * show.camera.scale, 1), 2.5);
+    pen.beginPath();
+    for (let n = 0; n < broken; n++) {
+      const [a, b] = [body.bonds[2 * n], body.bonds[2 * n + 1]];
+      const bond = this.shown([(body.X[b] - body.X[a]) / 2, (body.Y[b] - body.Y[a]) / 2]);
+      const half = bond.map((part) => part * show.camera.scale);
+      for (const [end, sign] of [[a, 1], [b, -1]]) {
+        const [x, y] = this.at(end);
+        const [mx, my] = [x + sign * half[0], y - sign * half[1]];
+        pen.moveTo(mx - half[1] * 0.9, my - half[0] * 0.9);
+        pen.lineTo(mx + half[1] * 0.9, my + half[0] * 0.9);
+      }
+    }
+    pen.stroke();
+  }
+
+  // The particle nearest to a point of the box, in CSS pixels; -1 if none is near.
+  nearest(px, py) {
+    const { camera } = this.show;
+    const origin = this.shown(this.origin);
+    const x = camera.x + (px - this.width / 2) / camera.scale - origin[0];
+    const y = camera.y - (py - this.height / 2) / camera.scale - origin[1];
+    let [best, found] = [(REACH / camera.scale) ** 2, -1];
+    for (let i = 0; i < this.body.count; i++) {
+      const [u, v] = [this.places[2 * i] - x, this.places[2 * i + 1] - y];
+      const away = u * u + v * v;
+      if (away < best) [best, found] = [away, i];
+    }
+    return found;
+  }
+
+  // Puts a picture in the canvases' place: browsers leave those out on paper.
+  fix() {
+    this.print = Object.assign(document.createElement("img"), { alt: this.box.getAttribute("aria-label") });
+    this.print.src = this.composed().toDataURL();
+    this.box.append(this.print);
+  }
+
+  unfix() {
+    this.print?.remove();
+  }
+
+  // All three canvases as one.
+  composed() {
+    const canvas = Object.assign(document.createElement("canvas"), { width: this.middle.width, height: this.middle.height });
+    const pen = canvas.getContext("2d");
+    for (const layer of [this.under, this.middle, this.over]) pen.drawImage(layer, 0, 0);
+    return canvas;
+  }
+}

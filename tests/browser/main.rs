@@ -1,0 +1,213 @@
+//! Reports as a reader has them, in headless Chromium.
+//!
+//! They need Chromium, Node and two packages of npm:
+//!
+//! ```text
+//! apt-get install chromium nodejs npm
+//! npm install --prefix browser playwright-core axe-core
+//! FLOCKFORM_NODE_MODULES=browser/node_modules cargo test --test browser -- --ignored
+//! ```
+//!
+//! `tour.mjs` does what a reader does and says what there was to see; here is what should have been.
+//! `FLOCKFORM_CHROMIUM` names another browser than `/usr/bin/chromium`.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use serde_json::{Value, json};
+use tempfile::TempDir;
+
+/// A folder with a report, and what the program said of itself in tables.
+struct Report {
+    _folder: TempDir,
+    out: PathBuf,
+}
+
+impl Report {
+    fn of(arguments: &[&str]) -> Self {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let out = folder.path().join("out");
+        let output = Command::new(env!("CARGO_BIN_EXE_flockform"))
+            .args(arguments)
+            .args(["--quiet", "--out", "out"])
+            .current_dir(folder.path())
+            .env_remove("RUST_LOG")
+            .output()
+            .expect("the program starts");
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        Self { _folder: folder, out }
+    }
+
+    fn tour(&self, asked: &Value) -> Value {
+        let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/browser/tour.mjs");
+        let output = Command::new("node")
+            .arg(script)
+            .arg(self.out.join("report.html"))
+            .arg(asked.to_string())
+            .output()
+            .expect("node starts");
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "{said}");
+        serde_json::from_slice(&output.stdout).unwrap_or_else(|error| panic!("{error}: {said}"))
+    }
+
+    /// A table's rows by column name.
+    fn table(&self, name: &str) -> Vec<std::collections::BTreeMap<String, String>> {
+        let mut reader = csv::Reader::from_path(self.out.join(name)).expect("written");
+        reader.deserialize().map(|row| row.expect("a row")).collect()
+    }
+}
+
+/// What holds of every report: nothing went wrong, nothing was asked of a network, whoever uses a keyboard or a
+/// screen reader is served.
+fn assert_sound(seen: &Value) {
+    assert_eq!(seen["errors"], json!([]), "the console has no errors");
+    assert_eq!(seen["faults"], json!([]), "axe finds nothing serious");
+    let requests = seen["requests"].as_array().expect("listed");
+    let is_own = |url: &Value| {
+        url.as_str()
+            .is_some_and(|u| u.starts_with("file:") || u.starts_with("data:") || u.starts_with("blob:"))
+    };
+    assert!(requests.iter().all(is_own), "{requests:?}");
+}
+
+/// What holds of every film: it plays, stops, steps, scrubs to the end, zooms and looks different coloured by at least
+/// `colours` of its quantities.
+fn assert_film_works(seen: &Value, colours: u64) {
+    let frames = &seen["frames"];
+    let last = frames["count"].as_u64().expect("counted") - 1;
+    let played = frames["played"].as_u64().expect("counted");
+    assert!(played >= 3 && frames["isPaused"] == true, "{frames}");
+    assert_eq!(frames["stepped"], (played + 1).min(last), "{frames}");
+    assert_eq!(frames["back"], frames["stepped"].as_u64().expect("counted") - 1, "{frames}");
+    assert_eq!(frames["scrubbed"], last, "{frames}");
+    assert_eq!(frames["moved"], true, "{frames}");
+    let zoom: Vec<f64> = serde_json::from_value(seen["zoom"].clone()).expect("numbers");
+    assert!((zoom[0] - 1.25).abs() < 1e-9 && (zoom[1] - 1.0).abs() < 1e-9, "{zoom:?}");
+    let pictures = &seen["pictures"];
+    assert!(pictures["different"].as_u64() >= Some(colours), "{pictures}");
+    assert_eq!(pictures["themes"], true);
+}
+
+/// A number as the page has it.
+fn number(shown: &Value, key: &str) -> f64 {
+    shown[key].as_str().and_then(|text| text.parse().ok()).unwrap_or_else(|| panic!("{key} in {shown}"))
+}
+
+/// Every column of the row that the page shows under the same name, to the last bit.
+fn assert_same(shown: &Value, row: &std::collections::BTreeMap<String, String>, columns: &[&str]) {
+    for &column in columns {
+        let written: f64 = row[column].parse().expect("a number");
+        assert_eq!(number(shown, column).to_bits(), written.to_bits(), "{column}: {shown} {row:?}");
+    }
+}
+
+#[test]
+#[ignore = "needs Chromium, Node, playwright-core and axe-core: see tests/browser/main.rs"]
+fn a_runs_report_shows_at_the_end_what_final_csv_has_and_before_what_probes_csv_has() {
+    let report = Report::of(&["run", "tension"]);
+    for painter in ["webgl", "2d"] {
+        let asked = json!({ "painter": painter, "find": [["67", 20], ["115", 20], ["67", 80]], "hover": [66, 114, 0, 50] });
+        let seen = report.tour(&asked);
+        assert_sound(&seen);
+        assert_film_works(&seen, 5);
+        let expected = if painter == "2d" { "PlainPainter" } else { "Painter" };
+        assert_eq!(seen["painter"], expected);
+        assert_eq!(seen["charts"], 3, "x displacement, PE1 and PE2 of the probes");
+        assert_eq!(seen["now"], "step 401 of 401");
+        let rows = report.table("final.csv");
+        for (shown, particle) in seen["hovered"].as_array().expect("listed").iter().zip([66, 114, 0, 50]) {
+            assert_same(shown, &rows[particle], &["x", "y", "pe1", "pe2"]);
+            assert_eq!(shown["role"], rows[particle]["role"].as_str());
+        }
+        assert_same(&seen["hovered"][0], &rows[66], &["strain_xx", "strain_yy", "strain_xy", "rotation"]);
+        let probes = report.table("probes.csv");
+        for (shown, (id, step)) in seen["numbers"].as_array().expect("listed").iter().zip([
+            ("67", "20"),
+            ("115", "20"),
+            ("67", "80"),
+        ]) {
+            let row = probes.iter().find(|row| row["id"] == id && row["step"] == step).expect("probed");
+            for (column, within) in [("x", 1e-5), ("y", 1e-5), ("pe1", 1e-4), ("pe2", 1e-3)] {
+                let written: f64 = row[column].parse().expect("a number");
+                assert!(
+                    (number(shown, column) - written).abs() < within,
+                    "{column} at {step}: {shown} {row:?}"
+                );
+            }
+        }
+        assert_eq!([&seen["numbers"][1]["role"], &seen["numbers"][2]["role"]], ["follower", "follower"]);
+    }
+}
+
+#[test]
+#[ignore = "needs Chromium, Node, playwright-core and axe-core: see tests/browser/main.rs"]
+fn a_torn_body_shows_its_strain_and_its_broken_bonds() {
+    let report = Report::of(&["run", "fracture"]);
+    let seen = report.tour(&json!({ "hover": [500] }));
+    assert_sound(&seen);
+    assert_film_works(&seen, 5);
+    let row = &report.table("final.csv")[500];
+    assert_same(&seen["hovered"][0], row, &["x", "y", "pe1", "strain_xx"]);
+    let part = |name: &str| row[name].parse::<f64>().expect("a number");
+    let (xx, yy, xy) = (part("strain_xx"), part("strain_yy"), part("strain_xy"));
+    let largest = ((xx + yy) / 2.0).abs() + ((xx - yy) / 2.0).hypot(xy);
+    let shown = number(&seen["hovered"][0], "strain");
+    assert!(
+        (shown - largest).abs() < 1e-4 * (1.0 + largest),
+        "computed in the page {shown}, in Rust {largest}"
+    );
+}
+
+#[test]
+#[ignore = "needs Chromium, Node, playwright-core and axe-core: see tests/browser/main.rs"]
+fn a_swarms_report_shows_its_robots_where_robots_csv_has_them() {
+    let report = Report::of(&["swarm", "square"]);
+    let seen = report.tour(&json!({ "hover": [0, 1, 2], "find": [["robot_2", 1.0]] }));
+    assert_sound(&seen);
+    // Ideal robots: nothing is strained, every pose is fresh.
+    assert_film_works(&seen, 3);
+    let rows = report.table("robots.csv");
+    for (shown, row) in seen["hovered"].as_array().expect("listed").iter().zip(&rows) {
+        assert_same(shown, row, &["x", "y", "way", "clearance"]);
+    }
+    let offered = seen["pictures"]["names"].as_array().expect("listed");
+    for quantity in ["clearance", "age", "strain"] {
+        assert!(offered.contains(&quantity.into()), "{offered:?}");
+    }
+    assert!(number(&seen["numbers"][0], "clearance") > 0.0, "found by its name");
+}
+
+#[test]
+#[ignore = "needs Chromium, Node, playwright-core and axe-core: see tests/browser/main.rs"]
+fn a_comparison_shows_rule_and_truth_beside_each_other() {
+    let report = Report::of(&["compare", "beam-paper", "--refine", "2"]);
+    let seen = report.tour(&json!({ "hover": [40] }));
+    assert_sound(&seen);
+    assert_film_works(&seen, 4);
+    assert_eq!(seen["views"], 2);
+    let row = &report.table("compare.csv")[40];
+    for (shown, written) in [("ux", "ux_rule"), ("uy", "uy_rule")] {
+        let written: f64 = row[written].parse().expect("a number");
+        assert_eq!(number(&seen["hovered"][0], shown).to_bits(), written.to_bits());
+    }
+}
+
+#[test]
+#[ignore = "needs Chromium, Node, playwright-core and axe-core: see tests/browser/main.rs"]
+fn a_trades_report_names_the_setting_of_a_point() {
+    let seen = Report::of(&["trade", "grips", "--quick"]).tour(&json!({}));
+    assert_sound(&seen);
+    let points = seen["points"].as_array().expect("listed");
+    let named =
+        |text: &Value| text.as_str().is_some_and(|text| text.contains("rule") && text.contains("particles"));
+    assert!(points.len() == 3 && points.iter().all(named), "{points:?}");
+}
+
+#[test]
+#[ignore = "needs Chromium, Node, playwright-core and axe-core: see tests/browser/main.rs"]
+fn a_stability_report_draws_growth_against_each_parameter() {
+    let seen = Report::of(&["stability", "tension", "--quick", "--no-extremes"]).tour(&json!({}));
+    assert_sound(&seen);
+    assert_eq!(seen["charts"], 2, "feedback and damping");
+}

@@ -1,0 +1,91 @@
+//! `report.html` and `flockform gallery`, as far as they can be told without a browser (see `tests/browser`).
+
+use std::fs::read_to_string;
+
+use crate::program::*;
+
+/// The data of a page.
+fn data(html: &str) -> serde_json::Value {
+    let (_, rest) = html.split_once("id=\"data\">").expect("a page has data");
+    serde_json::from_str(rest.split_once("</script>").expect("closed").0).expect("JSON")
+}
+
+#[test]
+fn every_command_with_an_outcome_leaves_a_report_unless_told_not_to() {
+    let folder = temporary();
+    for (words, stages, charts) in [
+        (vec!["run", "tension"], 1, 3),
+        (vec!["compare", "beam", "--refine", "2"], 2, 0),
+        (vec!["swarm", "square"], 1, 2),
+        (vec!["trade", "beam", "--quick"], 0, 1),
+        (vec!["stability", "tension", "--quick", "--no-extremes"], 0, 2),
+    ] {
+        let run = |more: &[&str]| {
+            let arguments = [&words[..], &["--quiet", "--force", "--out", "out"], more].concat();
+            let output = flockform(&arguments, folder.path());
+            assert!(output.status.success(), "{arguments:?}: {}", text(&output.stderr));
+        };
+        run(&[]);
+        let path = folder.path().join("out/report.html");
+        let html = read_to_string(&path).expect("written");
+        let shown = data(&html);
+        let counts = ["stages", "plots"].map(|key| shown[key].as_array().expect("listed").len());
+        assert_eq!(counts, [stages, charts], "{words:?}");
+        assert!(html.contains(&format!("<code>flockform {} {}</code>", words[0], words[1])), "{words:?}");
+        run(&["--no-report"]);
+        assert!(!path.exists(), "{words:?}");
+    }
+}
+
+#[test]
+fn a_long_run_is_told_by_evenly_spaced_frames_and_the_page_says_so() {
+    let folder = temporary();
+    let output = flockform(&["run", "tension", "--steps", "1301", "--out", "out"], folder.path());
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let html = read_to_string(folder.path().join("out/report.html")).expect("written");
+    let film = &data(&html)["stages"][0];
+    let times: Vec<f64> = serde_json::from_value(film["times"].clone()).expect("numbers");
+    let expected: Vec<f64> = (0..=325).map(|k| 4.0 * f64::from(k)).chain([1301.0]).collect();
+    assert_eq!(times, expected);
+    assert!(html.contains("Of 1301 steps one in 4 is shown, 327 frames"), "it says what it leaves out");
+}
+
+#[test]
+fn a_body_that_is_solved_for_is_shown_on_its_way_under_the_load() {
+    let folder = temporary();
+    let output = flockform(&["run", "beam-loaded", "--out", "out"], folder.path());
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let html = read_to_string(folder.path().join("out/report.html")).expect("written");
+    let film = &data(&html)["stages"][0];
+    assert_eq!(film["times"].as_array().expect("listed").len(), 21);
+    assert_eq!(film["clock"], serde_json::json!({ "quantity": "load", "unit": "%" }));
+    let quantities = film["quantities"].as_array().expect("listed").iter();
+    let keys: Vec<&str> = quantities.filter_map(|one| one["key"].as_str()).collect();
+    assert_eq!(keys, ["pe1", "von_mises", "strain"]);
+}
+
+#[test]
+fn a_gallery_leads_to_the_reports_of_what_is_named() {
+    let folder = temporary();
+    let output = flockform(&["gallery", "square", "tension", "--out", "out"], folder.path());
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let out = folder.path().join("out");
+    let index = read_to_string(out.join("index.html")).expect("written");
+    for report in ["scenes/tension/report.html", "swarms/square/report.html"] {
+        assert!(out.join(report).is_file(), "{report}");
+        assert!(index.contains(&format!("href=\"{report}\"")), "{report}");
+    }
+    assert_eq!(index.matches("<img").count(), 2);
+    let again = flockform(&["gallery", "tension", "--out", "out", "--force", "--quiet"], folder.path());
+    assert!(again.status.success(), "its own output may be replaced: {}", text(&again.stderr));
+    assert!(!out.join("swarms").exists());
+}
+
+#[test]
+fn a_gallery_of_what_is_not_bundled_is_refused_with_exit_code_2_and_leaves_nothing() {
+    let folder = temporary();
+    let output = flockform(&["gallery", "tensoin", "--out", "out"], folder.path());
+    assert_eq!(output.status.code(), Some(2));
+    assert!(text(&output.stderr).contains("`tension`"), "{}", text(&output.stderr));
+    assert!(!folder.path().join("out").exists());
+}
