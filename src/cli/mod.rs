@@ -1,5 +1,6 @@
 //! The command line: what can be asked for, and who answers.
 
+mod checkpoint;
 mod compare;
 mod install;
 mod material;
@@ -49,7 +50,7 @@ pub struct Arguments {
 pub enum Command {
     /// Run a continuum scene and write its results and figures
     #[command(
-        after_help = "Example:\n  flockform run tension --out /tmp/tension --set stop.steps=800 --set frame=immediate"
+        after_help = "Examples:\n  flockform run tension --out /tmp/tension --set stop.steps=800 --set frame=immediate\n  flockform run --resume /tmp/tension"
     )]
     Run(run::RunArguments),
     /// Hold a scene's rule against finite elements on the same body
@@ -216,6 +217,8 @@ pub enum Refusal {
     NoNode,
     #[error("{0}")]
     Export(#[from] export::ExportError),
+    #[error("{0}")]
+    Checkpoint(#[from] export::checkpoint::CheckpointError),
     #[error(
         "there is no {what} file and no bundled {what} `{name}`\n  help: the nearest bundled {what} is `{nearest}`; `flockform {what}s` lists them all"
     )]

@@ -1,5 +1,7 @@
 //! The engine: one step of a planned body.
 
+pub mod state;
+
 use super::layout::RoleChange;
 use super::movement::Movement;
 use super::plan::Plan;

@@ -3,11 +3,13 @@
 use std::ops::ControlFlow;
 
 use super::engine::Engine;
+use super::engine::state::{EngineState, WrongState};
 use super::movement::{Movement, farthest, first_lost};
 use super::plan::Plan;
 use crate::flock::interaction::Weights;
 use crate::flock::points::distance;
 use crate::flock::rules::{FeedbackReference, Mean};
+use crate::scene::Stop;
 use crate::solve::equilibrium::Solved;
 use crate::solve::sweep::Order;
 
@@ -72,13 +74,53 @@ pub struct Outcome {
 /// Runs a plan to its end. `watch` sees the engine before the first step (with an infinite residual)
 /// and after each one, with the residual; it can break the run off.
 pub fn run(plan: Plan, watch: &mut dyn FnMut(&Engine, f64) -> ControlFlow<()>) -> Outcome {
-    let stop = plan.stop;
-    // Both over the spacing, as the movement is.
-    let bound = stop.growth * plan.diagonal / plan.body.lattice.spacing();
-    let mut engine = Engine::new(plan);
-    let mut residual = f64::INFINITY;
-    let mut interrupted = watch(&engine, residual).is_break();
+    let bounds = Bounds::of(&plan);
+    let engine = Engine::new(plan);
+    let residual = f64::INFINITY;
+    let interrupted = watch(&engine, residual).is_break();
+    go_on(engine, residual, interrupted, &bounds, watch)
+}
+
+/// Runs a plan on from where an earlier run of it was, to the same end bit by bit. `residual` is the one that
+/// was seen with the state; `watch` sees the engine after each new step.
+///
+/// # Errors
+/// A state of another body.
+pub fn resume(
+    plan: Plan,
+    state: EngineState,
+    residual: f64,
+    watch: &mut dyn FnMut(&Engine, f64) -> ControlFlow<()>,
+) -> Result<Outcome, WrongState> {
+    let bounds = Bounds::of(&plan);
+    Ok(go_on(state.engine(plan)?, residual, false, &bounds, watch))
+}
+
+/// What ends a run.
+struct Bounds {
+    stop: Stop,
+    /// Largest displacement over the spacing, as the movement is.
+    growth: f64,
+}
+
+impl Bounds {
+    fn of(plan: &Plan) -> Self {
+        let growth = plan.stop.growth * plan.diagonal / plan.body.lattice.spacing();
+        Self { stop: plan.stop, growth }
+    }
+}
+
+fn go_on(
+    mut engine: Engine,
+    mut residual: f64,
+    mut interrupted: bool,
+    Bounds { stop, growth }: &Bounds,
+    watch: &mut dyn FnMut(&Engine, f64) -> ControlFlow<()>,
+) -> Outcome {
     let reason = loop {
+        if stop.tolerance.is_some_and(|tolerance| residual <= tolerance) && !engine.is_scheduled() {
+            break StopReason::Equilibrium;
+        }
         if interrupted {
             break StopReason::Interrupted;
         }
@@ -87,15 +129,12 @@ pub fn run(plan: Plan, watch: &mut dyn FnMut(&Engine, f64) -> ControlFlow<()>) -
         }
         engine.advance();
         let movement = engine.movement();
-        if let Some(divergence) = divergence(&engine, &movement, bound) {
+        if let Some(divergence) = divergence(&engine, &movement, *growth) {
             engine.take_back();
             break StopReason::Diverged(divergence);
         }
         residual = movement.largest_move;
         interrupted = watch(&engine, residual).is_break();
-        if stop.tolerance.is_some_and(|tolerance| residual <= tolerance) && !engine.is_scheduled() {
-            break StopReason::Equilibrium;
-        }
     };
     Outcome { engine, reason, residual, solved: None }
 }

@@ -10,6 +10,7 @@
 //! | `residuals.csv`, `residuals` | how near the solver came, iteration by iteration, where one was used |
 //! | `breaks.csv` | every broken bond, with its step and place |
 //! | `steps.pvd`, `steps/*.vtu` | frames for ParaView |
+//! | `checkpoint` | in an unfinished or interrupted run: all it takes to go on |
 //! | `configuration_*`, `pe1_*`, `probes` | figures, as SVG and as the PNG rendered from it |
 //!
 //! A flight (`flight`, feature `swarm`), a comparison with the truth (`comparison`, feature `fem`) have folders of their own, and so has a study of
@@ -46,6 +47,7 @@
 //! ```
 
 mod bonds;
+pub mod checkpoint;
 #[cfg(feature = "fem")]
 pub mod comparison;
 pub mod csv;
@@ -71,7 +73,7 @@ use crate::flock::strain::Strain;
 use crate::scene::Scene;
 pub use error::ExportError;
 use figures::Subject;
-pub use folder::OutputFolder;
+pub use folder::{OutputFolder, unfinished};
 pub use summary::{BrokenBonds, Counts, Energies, Equilibrium, FirstBreak, Seconds, Summary, Timings};
 pub use vtk::VtkSeries;
 

@@ -28,13 +28,54 @@ pub struct VtkSeries {
     collection: PathBuf,
     folder: PathBuf,
     frames: Vec<(usize, PathBuf)>,
+    /// How many of them are known to be on the disk.
+    synced: usize,
 }
 
 impl VtkSeries {
     pub fn create(folder: &OutputFolder) -> Result<Self, ExportError> {
         let steps = folder.path(FOLDER);
         fs::create_dir_all(&steps).map_err(ExportError::io("create", &steps))?;
-        Ok(Self { collection: folder.path("steps.pvd"), folder: steps, frames: Vec::new() })
+        Ok(Self { collection: folder.path("steps.pvd"), folder: steps, frames: Vec::new(), synced: 0 })
+    }
+
+    /// Goes on after the frames of these `steps`, which an earlier run has written below `from`.
+    ///
+    /// # Errors
+    /// A frame that is not there.
+    pub fn resume(
+        folder: &OutputFolder,
+        from: &Path,
+        steps: impl IntoIterator<Item = usize>,
+    ) -> Result<Self, ExportError> {
+        let mut series = Self::create(folder)?;
+        for step in steps {
+            let (former, path) =
+                (from.join(FOLDER).join(file_name(step)), series.folder.join(file_name(step)));
+            if !former.is_file() {
+                return Err(ExportError::MissingFrame(former));
+            }
+            if former != path {
+                fs::copy(&former, &path).map_err(ExportError::io("copy a frame to", &path))?;
+            }
+            series.frames.push((step, path));
+        }
+        Ok(series)
+    }
+
+    /// Follows a folder that has taken another name.
+    pub fn moved(&mut self, folder: &OutputFolder) {
+        (self.collection, self.folder) = (folder.path("steps.pvd"), folder.path(FOLDER));
+        self.frames.iter_mut().for_each(|(step, path)| *path = self.folder.join(file_name(*step)));
+    }
+
+    /// Brings the frames to the disk, so that a checkpoint may count on them.
+    pub fn sync(&mut self) -> Result<(), ExportError> {
+        for (_, path) in &self.frames[self.synced..] {
+            File::open(path).and_then(|file| file.sync_all()).map_err(ExportError::io("write", path))?;
+        }
+        self.synced = self.frames.len();
+        Ok(())
     }
 
     /// Writes the engine's present state.
