@@ -19,6 +19,7 @@
 //! * `trade` (feature `fem`): what accuracy costs: many settings of a scene against its truth.
 //! * `swarm` (feature `swarm`): formations of robots: targets by the same rule, made safe; flights of simulated robots.
 //! * `ros` (feature `ros`): the same over ROS 2: arguments, messages, parameters, lifecycle, the node.
+//! * `record` (feature `record`): recordings of flights and runs for Foxglove and `ros2 bag`, and their replay.
 //! * `bench` (feature `bench`): how fast sweeps and solvers are, beside what the machine and others can do.
 //!
 //! ```
@@ -47,6 +48,8 @@ pub mod compare;
 pub mod export;
 #[cfg(feature = "fem")]
 pub mod fem;
+#[cfg(feature = "record")]
+pub mod record;
 #[cfg(feature = "ros")]
 pub mod ros;
 #[cfg(feature = "swarm")]

@@ -103,3 +103,8 @@ fn the_swarm_knows_nothing_of_middleware_and_outputs() {
 fn ros_is_an_edge_of_the_swarm() {
     assert_imports_only("ros", &["scene", "continuum", "flock", "swarm"]);
 }
+
+#[test]
+fn recordings_stand_on_the_edge_and_know_nothing_of_figures() {
+    assert_imports_only("record", &["scene", "continuum", "flock", "swarm", "ros"]);
+}

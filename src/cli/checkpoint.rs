@@ -19,7 +19,7 @@ pub struct CheckpointArguments {
     #[arg(long, value_name = "INTERVAL", default_value = "60s")]
     checkpoint_every: Vec<Interval>,
     /// Go on with the run to this --out that was killed or interrupted; its results are the same to the bit
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["out", "force"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["out", "force", "record"])]
     pub resume: Option<PathBuf>,
 }
 

@@ -3,13 +3,15 @@
 use std::process::ExitCode;
 
 use clap::Args;
+use flockform::record::About;
 use flockform::ros::arguments::RosArguments;
-use flockform::ros::node::FormationNode;
+use flockform::ros::node::{FormationNode, NodeError};
 use flockform::ros::robots::RobotNodes;
 
-use super::Refusal;
+use super::recording::{RecordArguments, close};
 use super::run::interrupt_flag;
 use super::swarm::SwarmFileArguments;
+use super::{Refusal, print};
 
 #[derive(Debug, Args)]
 pub struct NodeArguments {
@@ -18,6 +20,8 @@ pub struct NodeArguments {
     /// Be the node of this robot alone: hear nobody but it and its neighbours, and send it alone targets
     #[arg(long, value_name = "NAME")]
     member: Option<String>,
+    #[command(flatten)]
+    record: RecordArguments,
 }
 
 #[derive(Debug, Args)]
@@ -30,6 +34,13 @@ pub struct RobotsArguments {
 pub fn node(arguments: &NodeArguments, ros: &RosArguments) -> Result<ExitCode, Refusal> {
     let swarm = arguments.swarm.load()?;
     let mut node = FormationNode::open(&swarm, ros, arguments.member.as_deref())?;
+    let member = arguments.member.clone();
+    let namespace = Some(node.namespace().to_owned());
+    let about = About { member, namespace, ..arguments.swarm.about("node", &swarm) };
+    let recording = arguments.record.open(&about, false)?;
+    if let Some(recording) = &recording {
+        node.record(recording.sink()).map_err(NodeError::from)?;
+    }
     let control = node.control();
     tracing::info!(
         "`{}`: {} robots at {:.1} Hz",
@@ -38,6 +49,7 @@ pub fn node(arguments: &NodeArguments, ros: &RosArguments) -> Result<ExitCode, R
         1.0 / control.period()
     );
     node.run(&interrupt_flag());
+    print(&close(recording)?);
     Ok(ExitCode::SUCCESS)
 }
 

@@ -19,12 +19,15 @@ use flockform::export::checkpoint::{self, Asked, Checkpoint};
 use flockform::export::{
     Energies, ExportError, OutputFolder, Results, Summary, Timings, VtkSeries, write_all,
 };
+use flockform::record::About;
+use flockform::record::body::BodyTape;
 use flockform::scene::{Scene, bundled};
 use flockform::trade::{Chosen, choose};
 
 use super::checkpoint::{CheckpointArguments, Keeper, Kept, Left};
 use super::output::OutputArguments;
 use super::progress::Progress;
+use super::recording::{RecordArguments, close};
 use super::{FAILED, Refusal, SceneArguments, print};
 
 #[derive(Debug, Args)]
@@ -39,6 +42,8 @@ pub struct RunArguments {
     output: OutputArguments,
     #[command(flatten)]
     checkpoints: CheckpointArguments,
+    #[command(flatten)]
+    record: RecordArguments,
     /// Run at most this many steps (the same as --set stop.steps=N)
     #[arg(long, value_name = "N", requires = "scene")]
     steps: Option<usize>,
@@ -71,11 +76,17 @@ fn run_here(arguments: &RunArguments) -> Result<ExitCode, Refusal> {
     tracing::info!("planned {} particles of `{}` in {setup:.1?}", plan.count(), scene.name);
 
     let mut recorder = Recorder::new(&scene, &plan, &folder, left.as_ref())?;
+    let about = About { source: "run", name: scene.name.clone(), ..About::default() };
+    let recording = arguments.record.open(&about, arguments.output.force)?;
+    let mut tape = recording.as_ref().map(|one| BodyTape::new(&scene, one.sink())).transpose()?;
     let mut progress = Progress::new(arguments.output.quiet, scene.stop.steps);
     let interrupted = interrupt_flag();
     let mut keeper = Keeper::new(&arguments.checkpoints, (asked, &scene, digest), left.as_ref());
     let mut watch = |engine: &Engine, residual: f64| {
         recorder.step(engine);
+        if let Some(tape) = &mut tape {
+            tape.step(engine, residual);
+        }
         progress.step(engine.step(), residual);
         if keeper.is_due(engine.step()) && !recorder.failed() {
             keeper.keep(&mut folder, (engine, residual), recorder.kept());
@@ -90,6 +101,9 @@ fn run_here(arguments: &RunArguments) -> Result<ExitCode, Refusal> {
         }
     };
     progress.finish();
+    if let Some(tape) = tape {
+        tape.finish(&outcome.engine, outcome.residual);
+    }
 
     let elapsed = keeper.stepping();
     tracing::info!("{} steps in {elapsed:.1?}, writing", outcome.engine.step());
@@ -103,12 +117,13 @@ fn run_here(arguments: &RunArguments) -> Result<ExitCode, Refusal> {
     let results = Results { scene: &scene, outcome: &outcome, snapshots, probes, timings };
     let (_, Summary { energies, .. }) = write_all(&folder, &results)?;
     let kept = folder.commit()?;
+    let recorded = close(recording)?;
     if !is_interrupted {
         checkpoint::remove(&kept);
     }
     if !arguments.output.quiet {
         print(&words);
-        print(&closing_words(&scene, &outcome, &energies, elapsed, &kept));
+        print(&(closing_words(&scene, &outcome, &energies, elapsed, &kept) + &recorded));
     }
     Ok(exit_code(&outcome))
 }

@@ -1,6 +1,5 @@
 //! How the loop fares, for `/diagnostics`.
 
-use super::pose::PoseSource;
 use crate::ros::edge::EdgeError;
 use crate::ros::messages::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus, KeyValue};
 use crate::ros::messages::std_msgs::Header;
@@ -57,13 +56,13 @@ impl Statistics {
         due
     }
 
-    /// The report, and a new beginning for the times in it.
+    /// The report, and a new beginning for the times in it; `refused` messages were none of their type.
     pub fn message(
         &mut self,
         control: &Control,
         name: &str,
         header: Header,
-        poses: &PoseSource,
+        refused: u64,
     ) -> DiagnosticArray {
         let formation = control.formation();
         let now = header.stamp.seconds();
@@ -95,7 +94,7 @@ impl Statistics {
             pair("oldest pose [s]", format!("{:.3}", ages.fold(0.0, f64::max))),
             pair("poses rejected", rejected.to_string()),
             pair("poses lost", unheard.to_string()),
-            pair("messages refused", poses.refused().to_string()),
+            pair("messages refused", refused.to_string()),
             pair("messages not sent", self.unsent.to_string()),
             pair("robots lost", lost.join(" ")),
         ];

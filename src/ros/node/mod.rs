@@ -3,17 +3,18 @@
 //! One thread ticks at a steady rate: it takes what arrived, calls [`Control::tick`] and publishes. Everything it
 //! holds is polled; a peer that is slow, gone or wrong cannot hold it up.
 
-mod diagnostics;
+pub mod diagnostics;
 mod drive;
-mod markers;
-mod pose;
+pub mod markers;
+pub mod pose;
 mod settings;
-mod state;
+pub mod state;
+pub mod tape;
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-use super::arguments::{DiscoveryRange, NameError, RosArguments};
+use super::arguments::{DiscoveryRange, NameError, Names, RosArguments};
 use super::edge::clock::{Clock, system_time};
 use super::edge::lifecycle::{Goal, Lifecycle, Outcome};
 use super::edge::parameters::{Parameters, Refusal};
@@ -22,7 +23,7 @@ use super::edge::steady::Pace;
 use super::edge::{Edge, EdgeError, Node, Options, Publisher, Quality, Service, ServiceType, Subscription};
 use super::messages::builtin_interfaces::Time;
 use super::messages::diagnostic_msgs::DiagnosticArray;
-use super::messages::flockform_msgs::{FormationState, SetFormationRequest, SetFormationResponse};
+use super::messages::flockform_msgs::{FormationState, LoopEvent, SetFormationRequest, SetFormationResponse};
 use super::messages::geometry_msgs::{Pose, PoseStamped};
 use super::messages::std_msgs::Header;
 use super::messages::visualization_msgs::MarkerArray;
@@ -34,6 +35,7 @@ use diagnostics::Statistics;
 use drive::Drive;
 use pose::PoseSource;
 use settings::Settings;
+use tape::{Sink, Tape};
 
 /// Name of the node unless `__node` says otherwise.
 pub const NAME: &str = "flockform";
@@ -86,6 +88,10 @@ pub struct FormationNode {
     statistics: Statistics,
     frame_id: String,
     swarm: Swarm,
+    names: Names,
+    tape: Option<Tape>,
+    /// What the tape was last told.
+    was_active: bool,
     // Dropped after all that was made from it.
     _node: Node,
 }
@@ -160,6 +166,9 @@ impl FormationNode {
             statistics: Statistics::default(),
             frame_id: raw.frame_id.clone(),
             swarm: swarm.clone(),
+            tape: None,
+            was_active: false,
+            names,
             leaders,
             targets,
             drives,
@@ -175,6 +184,17 @@ impl FormationNode {
             this.lifecycle.autostart(now, &mut |goal| act(control, goal));
         }
         Ok(this)
+    }
+
+    /// Gives a copy of everything from now on to `sink`.
+    ///
+    /// # Errors
+    /// A name that no topic can have.
+    pub fn record(&mut self, sink: Sink) -> Result<(), NameError> {
+        let mut tape = Tape::new(&self.names, &self.frame_id, sink)?;
+        tape.parameters(self.clock.now().unwrap_or_else(system_time), &self.control);
+        self.tape = Some(tape);
+        Ok(())
     }
 
     /// Ticks until `stop` is set.
@@ -195,6 +215,11 @@ impl FormationNode {
         &self.control
     }
 
+    /// Namespace of the node and its topics.
+    pub fn namespace(&self) -> &str {
+        self.names.namespace()
+    }
+
     /// One period: what arrived, the targets, what is published.
     pub fn tick(&mut self) {
         let begun = Instant::now();
@@ -206,6 +231,7 @@ impl FormationNode {
         // Without a clock there is no age, and so nobody to be believed.
         let Some(now) = self.clock.now() else { return };
         self.hear(now);
+        self.tell_tape(now, LoopEvent::TICK, "", &[now]);
         self.control.tick(now);
         self.publish(now);
         self.statistics.tick(begun.elapsed().as_secs_f64());
@@ -215,23 +241,44 @@ impl FormationNode {
     fn answer(&mut self, now: f64) {
         let control = &mut self.control;
         self.lifecycle.poll(now, &mut |goal| act(control, goal));
+        if self.lifecycle.is_active() != self.was_active {
+            self.was_active = self.lifecycle.is_active();
+            let kind = if self.was_active { LoopEvent::ACTIVE } else { LoopEvent::INACTIVE };
+            self.tell_tape(now, kind, "", &[]);
+        }
         for change in self.parameters.poll(now) {
             self.settings.apply(&change, &mut self.control, &mut self.pace);
+            let name = if change.name == "rate" { "period" } else { &change.name };
+            let value = tape::parameters(&self.control).into_iter().find(|(one, _)| *one == name);
+            if let Some((name, value)) = value {
+                self.tell_tape(now, LoopEvent::PARAMETER, name, &[value]);
+            }
         }
+        let mut told: Vec<(u8, String, Vec<f64>)> = Vec::new();
         let outcome = |success, message: &str| std_srvs::Outcome { success, message: message.into() };
         let control = &mut self.control;
         self.stop.serve(|_| {
             control.emergency_stop();
+            told.push((LoopEvent::EMERGENCY_STOP, String::new(), Vec::new()));
             outcome(true, "everybody holds its place until ~/resume")
         });
         self.resume.serve(|_| match control.resume() {
-            true => outcome(true, "the formation goes on"),
+            true => {
+                told.push((LoopEvent::RESUME, String::new(), Vec::new()));
+                outcome(true, "the formation goes on")
+            }
             false => outcome(false, "there is no emergency stop to lift"),
         });
         self.set_formation.serve(|request| match set_formation(control, &request) {
-            Ok(message) => SetFormationResponse { success: true, message },
+            Ok(message) => {
+                told.push(as_event(&request));
+                SetFormationResponse { success: true, message }
+            }
             Err(message) => SetFormationResponse { success: false, message },
         });
+        for (kind, text, values) in told {
+            self.tell_tape(now, kind, &text, &values);
+        }
         // A node that was switched off in an emergency stop stays off after it.
         if !self.lifecycle.is_active() {
             self.control.set_active(false);
@@ -239,14 +286,18 @@ impl FormationNode {
     }
 
     fn hear(&mut self, now: f64) {
-        let Self { poses, control, frame_id, leaders, clock, .. } = self;
-        poses.take(frame_id, clock.is_simulated().then_some(now), &mut |member, pose| {
+        let Self { poses, control, frame_id, leaders, clock, tape, .. } = self;
+        let copies = tape.as_mut().map(|tape| (tape, now));
+        poses.take(frame_id, clock.is_simulated().then_some(now), copies, &mut |member, pose| {
             if let Err(rejection) = control.receive(member, pose, now) {
                 tracing::debug!("{}: {rejection}", control.formation().names[member]);
             }
         });
         for (member, topic) in leaders {
             if let Some((message, _)) = topic.take_last() {
+                if let Some(tape) = tape {
+                    tape.take(topic.topic(), &message, [now; 2]);
+                }
                 if !pose::is_frame(&message.header.frame_id, frame_id) {
                     tracing::warn!(
                         "{}: frame `{}` is not `{frame_id}`, which the swarm file names",
@@ -261,6 +312,12 @@ impl FormationNode {
         }
     }
 
+    fn tell_tape(&mut self, now: f64, kind: u8, text: &str, values: &[f64]) {
+        if let Some(tape) = &mut self.tape {
+            tape.event(now, kind, text, values);
+        }
+    }
+
     fn header(&self, now: f64) -> Header {
         Header { stamp: Time::from_seconds(now), frame_id: self.frame_id.clone() }
     }
@@ -269,15 +326,8 @@ impl FormationNode {
     fn publish(&mut self, now: f64) {
         let active = self.lifecycle.is_active();
         for (member, topic) in self.targets.iter().filter(|_| active) {
-            let Some(target) = self.control.target(*member) else { continue };
-            let here = self.control.position(*member).unwrap_or(target);
-            // A target says where to look too: ahead, or where the robot looks now.
-            let way = [target[0] - here[0], target[1] - here[1]];
-            let yaw = match way {
-                [0.0, 0.0] => self.control.yaw(*member).unwrap_or(0.0),
-                [x, y] => y.atan2(x),
-            };
-            let message = PoseStamped { header: self.header(now), pose: Pose::planar(target, yaw) };
+            let Some(message) = target(&self.control, *member, self.header(now)) else { continue };
+            copy(&mut self.tape, topic, &message, now);
             self.statistics.sent(topic.publish(&message));
         }
         for (member, drive) in &self.drives {
@@ -289,19 +339,44 @@ impl FormationNode {
     /// What people and their tools look at, at their pace.
     fn report(&mut self, now: f64) {
         if self.statistics.is_due(diagnostics::STATE, now, self.settings.state_rate) {
-            let state = state::message(&self.control, &self.swarm.name, self.header(now), &self.statistics);
+            let state = state::message(
+                &self.control,
+                &self.swarm.name,
+                self.header(now),
+                self.statistics.last_tick(),
+            );
+            copy(&mut self.tape, &self.state, &state, now);
             self.statistics.sent(self.state.publish(&state));
             if let Some(topic) = &self.markers {
                 let markers = markers::message(&self.control, &self.swarm.raw, &self.header(now));
+                copy(&mut self.tape, topic, &markers, now);
                 self.statistics.sent(topic.publish(&markers));
             }
         }
         if self.statistics.is_due(diagnostics::DIAGNOSTICS, now, 1.0) {
-            let message =
-                self.statistics.message(&self.control, &self.swarm.name, self.header(now), &self.poses);
+            let (header, refused) = (self.header(now), self.poses.refused());
+            let message = self.statistics.message(&self.control, &self.swarm.name, header, refused);
+            copy(&mut self.tape, &self.diagnostics, &message, now);
             self.statistics.sent(self.diagnostics.publish(&message));
         }
     }
+}
+
+fn copy<M: super::edge::Message>(tape: &mut Option<Tape>, topic: &Publisher<M>, message: &M, now: f64) {
+    if let Some(tape) = tape {
+        tape.take(topic.topic(), message, [now; 2]);
+    }
+}
+
+/// Where a member is sent: the place, and where to look, which is ahead, or where the robot looks now.
+pub fn target(control: &Control, member: usize, header: Header) -> Option<PoseStamped> {
+    let target = control.target(member)?;
+    let here = control.position(member).unwrap_or(target);
+    let yaw = match [target[0] - here[0], target[1] - here[1]] {
+        [0.0, 0.0] => control.yaw(member).unwrap_or(0.0),
+        [x, y] => y.atan2(x),
+    };
+    Some(PoseStamped { header, pose: Pose::planar(target, yaw) })
 }
 
 /// What a transition of the lifecycle asks for.
@@ -343,7 +418,21 @@ pub fn options(arguments: &RosArguments) -> Options {
 /// Names of topics under the rules given to a node.
 pub type TopicOf<'a> = &'a dyn Fn(&str, usize) -> Result<String, NodeError>;
 
-fn set_formation(control: &mut Control, request: &SetFormationRequest) -> Result<String, String> {
+/// A request that was granted, for a tape.
+fn as_event(request: &SetFormationRequest) -> (u8, String, Vec<f64>) {
+    if !request.name.is_empty() {
+        return (LoopEvent::MANOEUVRE, request.name.clone(), Vec::new());
+    }
+    let SetFormationRequest { translate, rotate, stretch, shear, duration, .. } = *request;
+    let values = [translate[0], translate[1], rotate, stretch[0], stretch[1], shear[0], shear[1], duration];
+    (LoopEvent::POSTURE, String::new(), values.to_vec())
+}
+
+/// Moves the leaders, as the service asks for it.
+///
+/// # Errors
+/// Why they do not move.
+pub fn set_formation(control: &mut Control, request: &SetFormationRequest) -> Result<String, String> {
     if !control.formation().is_led_here() {
         return Err("the leaders are moved by a scene's program".into());
     }

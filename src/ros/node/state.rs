@@ -1,6 +1,5 @@
 //! The formation's state as a message.
 
-use super::diagnostics::Statistics;
 use crate::flock::points::distance;
 use crate::ros::messages::flockform_msgs::{FormationState, MemberState};
 use crate::ros::messages::geometry_msgs::{Point, Vector3};
@@ -9,8 +8,8 @@ use crate::swarm::control::{Control, Mode, NEIGHBOUR_LOST, POSE_REJECTED, TRIMME
 use crate::swarm::safety::Flags;
 use crate::swarm::watch::Health;
 
-/// What the last tick left.
-pub fn message(control: &Control, name: &str, header: Header, statistics: &Statistics) -> FormationState {
+/// What the last tick left, which took `elapsed` \[s\].
+pub fn message(control: &Control, name: &str, header: Header, elapsed: f64) -> FormationState {
     let formation = control.formation();
     let measures = control.measures();
     let settled = control.settled();
@@ -53,7 +52,7 @@ pub fn message(control: &Control, name: &str, header: Header, statistics: &Stati
         clearance: clearances.iter().copied().fold(f64::INFINITY, f64::min),
         pe1_sum: measures.pe1.iter().sum(),
         strain_max: measures.strain.iter().flatten().map(|strain| strain.largest()).fold(0.0, f64::max),
-        elapsed: statistics.last_tick(),
+        elapsed,
         members,
     }
 }
