@@ -191,6 +191,7 @@ impl<'a> Recorder<'a> {
             None => Some(VtkSeries::create(folder)?),
             Some(left) => Some(left.frames(folder, every)?),
         };
+        let frames = frames.map(|frames| frames.with_material(scene.material));
         Ok(Self {
             scene,
             snapshots: left.map_or_else(Vec::new, |left| left.checkpoint.snapshots.to_vec()),

@@ -54,6 +54,9 @@ impl Reader {
     /// A file that cannot be read or is no MCAP file.
     pub fn open(path: &Path) -> Result<Self, RecordError> {
         let bytes = std::fs::read(path).map_err(RecordError::io("read", path))?;
+        if !bytes.starts_with(mcap::MAGIC) {
+            return Err(RecordError::NoMcap { path: path.to_owned(), source: mcap::McapError::BadMagic });
+        }
         let this = Self { path: path.to_owned(), bytes };
         this.records()?;
         Ok(this)

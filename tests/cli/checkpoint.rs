@@ -82,7 +82,7 @@ fn killed_until_done(folder: &Path, random: &mut impl FnMut() -> f64, whole: Dur
             // There is something to go on from; the rest is chance.
             wait_for(&folder.join("o.unfinished"));
         }
-        let deadline = Instant::now() + whole.mul_f64(random());
+        let deadline = Instant::now() + whole.mul_f64(1.5 * random());
         while Instant::now() < deadline && child.try_wait().expect("a child").is_none() {
             std::thread::sleep(Duration::from_millis(1));
         }
