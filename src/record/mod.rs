@@ -15,6 +15,7 @@ pub mod flight;
 pub mod replay;
 mod shared;
 mod tape;
+mod topics;
 
 use std::path::PathBuf;
 

@@ -9,18 +9,17 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
+use super::topics::{Heard, stamped, topics};
 use super::{Entry, Reader, RecordError};
 use crate::flock::points::distance;
-use crate::ros::arguments::Names;
 use crate::ros::messages::builtin_interfaces::Time;
 use crate::ros::messages::flockform_msgs::{LoopEvent, SetFormationRequest};
-use crate::ros::messages::geometry_msgs::{self, PoseArray, PoseStamped, PoseWithCovarianceStamped};
-use crate::ros::messages::nav_msgs::Odometry;
+use crate::ros::messages::geometry_msgs::{self, PoseArray, PoseStamped};
 use crate::ros::messages::std_msgs::Header;
-use crate::ros::node::tape::{EVENTS, parameters, set_parameter};
-use crate::ros::node::{NAME, pose, set_formation};
+use crate::ros::node::leaders::set_formation;
+use crate::ros::node::pose;
+use crate::ros::node::tape::{parameters, set_parameter};
 use crate::scene::swarm::Swarm;
-use crate::scene::swarm::raw::RawPoseType;
 use crate::swarm::control::Control;
 
 /// How a replay went.
@@ -123,17 +122,6 @@ pub fn replay(reader: &Reader, swarm: &Swarm, tolerance: f64) -> Result<Report, 
         robots: replay.robots,
         damage,
     })
-}
-
-/// What a topic means to the loop.
-#[derive(Clone, Copy)]
-enum Heard {
-    Events,
-    Pose(usize),
-    /// Of all robots, in their order.
-    Poses,
-    Leader(usize),
-    Target(usize),
 }
 
 struct Replay {
@@ -357,46 +345,6 @@ impl Replay {
             }
         }
     }
-}
-
-fn stamped(entry: &Entry) -> Option<(Header, geometry_msgs::Pose)> {
-    let plain = || entry.decode::<PoseStamped>().map(|message| (message.header, message.pose));
-    let uncertain =
-        || entry.decode::<PoseWithCovarianceStamped>().map(|message| (message.header, message.pose.pose));
-    let odometry = || entry.decode::<Odometry>().map(|message| (message.header, message.pose.pose));
-    plain().or_else(uncertain).or_else(odometry)
-}
-
-/// What the recorded topics mean to this swarm, and whether the loop's events are among them. The node may have had
-/// another name, and its robots' topics other beginnings.
-fn topics(
-    reader: &Reader,
-    swarm: &Swarm,
-    control: &Control,
-    namespace: &str,
-) -> Result<(BTreeMap<String, Heard>, bool), RecordError> {
-    let names = Names::new(NAME, namespace, &[])?;
-    let raw = &swarm.raw.node;
-    let leaf = EVENTS.trim_start_matches('~');
-    let mut topics = BTreeMap::new();
-    reader.each(&mut |entry| {
-        if &*entry.kind == "flockform_msgs/LoopEvent" && entry.topic.ends_with(leaf) {
-            topics.insert(entry.topic.to_string(), Heard::Events);
-        }
-    })?;
-    let has_events = !topics.is_empty();
-    if raw.pose_type == RawPoseType::PoseArray {
-        topics.insert(names.topic(&raw.pose_topic)?, Heard::Poses);
-    }
-    let default = crate::scene::swarm::raw::RawNode::default().pose_topic;
-    for (m, name) in control.formation().names.iter().enumerate() {
-        let of = |pattern: &str| names.topic(&pattern.replace("{name}", name));
-        let pattern = if raw.pose_type == RawPoseType::PoseArray { &default } else { &raw.pose_topic };
-        topics.insert(of(pattern)?, Heard::Pose(m));
-        topics.insert(of("/{name}/leader_pose")?, Heard::Leader(m));
-        topics.insert(of(&raw.target_topic)?, Heard::Target(m));
-    }
-    Ok((topics, has_events))
 }
 
 /// Reads a recording and replays it.

@@ -1,5 +1,8 @@
 //! A recorded flight flies again as it flew.
 
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
 use flockform::record::replay::replay_file;
 use flockform::record::{Reader, RecordError};
 
@@ -78,4 +81,45 @@ fn what_cannot_be_replayed_is_refused_by_name() {
     assert!(!folder.path().join("p").exists());
     let error = Reader::open(&folder.path().join("thesis.mcap")).err().expect("no MCAP");
     assert!(matches!(error, RecordError::NoMcap { .. }));
+}
+
+/// Sends a child the signal that Ctrl-C would.
+#[cfg(unix)]
+fn interrupt(child: &mut std::process::Child) {
+    let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill is there");
+    assert!(sent.success() && child.wait().expect("ends").success());
+}
+
+#[cfg(unix)]
+#[test]
+fn a_live_node_s_recording_replays_to_the_bit_with_the_parameters_it_was_given() {
+    let folder = temporary();
+    let domain = (101 + std::process::id() % 101).to_string();
+    let start = |arguments: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_flockform"));
+        command.args(arguments).current_dir(folder.path()).env("ROS_DOMAIN_ID", &domain);
+        command.env("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST").stdout(Stdio::null()).stderr(Stdio::null());
+        command.spawn().expect("the program starts")
+    };
+    let mut robots = start(&["robots", "square"]);
+    let given = ["--ros-args", "-p", "speed_limit:=0.4", "-p", "rate:=30.0"];
+    let mut node = start(&[&["node", "square", "--record", "live.mcap"][..], &given].concat());
+    // Several chunks on the disk: poses have come, targets have gone.
+    let part = folder.path().join("live.mcap.part");
+    let patience = Instant::now();
+    while std::fs::metadata(&part).map_or(0, |part| part.len()) < 100_000 {
+        assert!(patience.elapsed() < Duration::from_secs(120), "nothing is recorded");
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    interrupt(&mut node);
+    interrupt(&mut robots);
+    let replayed = |set: &[String]| {
+        replay_file(&folder.path().join("live.mcap"), None, set, 0.0).expect("readable, and closed")
+    };
+    let report = replayed(&[]);
+    assert_eq!(report.damage, None);
+    assert!(report.holds() && report.ticks > 10, "{report:?}");
+    assert!(report.robots.iter().all(|robot| robot.recorded > 0), "{report:?}");
+    // What is changed today is not undone by what was given then.
+    assert!(!replayed(&["limits.speed=0.1".to_owned()]).holds());
 }
