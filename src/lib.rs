@@ -20,6 +20,7 @@
 //! * `swarm` (feature `swarm`): formations of robots: targets by the same rule, made safe; flights of simulated robots.
 //! * `ros` (feature `ros`): the same over ROS 2: arguments, messages, parameters, lifecycle, the node.
 //! * `shm` (feature `shm`): the same over shared memory, without a copy; a body under way for others to look at.
+//! * `record` (feature `record`): recordings of flights and runs for Foxglove and `ros2 bag`, and their replay.
 //! * `bench` (feature `bench`): how fast sweeps and solvers are, beside what the machine and others can do.
 //!
 //! ```
@@ -48,6 +49,8 @@ pub mod compare;
 pub mod export;
 #[cfg(feature = "fem")]
 pub mod fem;
+#[cfg(feature = "record")]
+pub mod record;
 #[cfg(feature = "ros")]
 pub mod ros;
 #[cfg(feature = "shm")]

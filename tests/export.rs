@@ -251,7 +251,7 @@ fn array<const SIZE: usize>(frame: Node<'_, '_>, name: &str) -> Vec<[u8; SIZE]> 
 }
 
 #[test]
-fn a_frame_holds_every_particle_and_the_bonds_that_live() {
+fn a_frame_holds_every_particle_and_every_bond_with_its_state() {
     let parent = tempfile::tempdir().expect("a folder");
     let run = Run::of("notched-plate", &["stop.steps=30", "record.figures=[]"]);
     let engine = &run.outcome.engine;
@@ -268,8 +268,10 @@ fn a_frame_holds_every_particle_and_the_bonds_that_live() {
     assert_eq!(points, engine.roles().len());
     // Every pair is seen from both ends here.
     let pairs = engine.interaction().neighbours.index.len() / 2;
-    let lines = pairs - engine.breaks().len();
+    let lines = pairs;
     assert!(!engine.breaks().is_empty());
+    let broken = array::<1>(piece, "broken").iter().filter(|state| **state == [1]).count();
+    assert_eq!(broken, engine.breaks().len());
     assert_eq!(cells, points + lines);
     let integers = |name| array::<8>(piece, name).into_iter().map(i64::from_le_bytes).collect::<Vec<_>>();
     let floats = |name| array::<8>(piece, name).into_iter().map(f64::from_le_bytes).collect::<Vec<_>>();
@@ -285,6 +287,9 @@ fn a_frame_holds_every_particle_and_the_bonds_that_live() {
     assert_eq!((places.len(), places[3 * points - 2]), (3 * points, engine.present().y[points - 1]));
     assert_eq!(floats("displacement").len(), 3 * points);
     assert_eq!(floats("pe1")[points / 2], engine.pe1(points / 2));
+    let strain = engine.strain(points / 2).expect("inside the body");
+    assert_eq!(floats("strain")[3 * (points / 2)..][..3], strain.components);
+    assert_eq!(floats("stretch").len(), cells);
     let leaders = engine.roles().iter().filter(|&&role| role == Role::Leader).count();
     assert_eq!(array::<1>(piece, "role").iter().filter(|role| **role == [1]).count(), leaders);
 

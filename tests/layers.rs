@@ -108,3 +108,8 @@ fn ros_is_an_edge_of_the_swarm() {
 fn shared_memory_is_an_edge_of_the_swarm_and_of_the_continuum() {
     assert_imports_only("shm", &["scene", "continuum", "flock", "swarm"]);
 }
+
+#[test]
+fn recordings_stand_on_the_edge_and_know_nothing_of_figures() {
+    assert_imports_only("record", &["scene", "continuum", "flock", "swarm", "ros"]);
+}

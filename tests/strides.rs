@@ -89,7 +89,7 @@ fn what_is_swept_is_what_moves_and_the_plan_foresees_it() {
     let scene =
         scene("tension", &["frame=\"none\"", grid, "stop.steps=20", "record.probes=[]", "record.figures=[]"]);
     let (outcome, _) = assert_same(&scene, &|_| usize::MAX, "a long strip");
-    let swept = outcome.engine.share_swept();
+    let swept = outcome.engine.activity().share_computed();
     // All once, to find out that they stand still; and of 400 columns half of 20 on average, whole bands.
     assert!((0.05..0.15).contains(&swept), "{swept}");
     let plan = plan(&scene);

@@ -1,5 +1,6 @@
 //! The command line: what can be asked for, and who answers.
 
+mod checkpoint;
 mod compare;
 mod gallery;
 mod install;
@@ -7,6 +8,8 @@ mod material;
 mod node;
 mod output;
 mod progress;
+mod recording;
+mod replay;
 mod run;
 mod stability;
 mod swarm;
@@ -52,7 +55,7 @@ pub struct Arguments {
 pub enum Command {
     /// Run a continuum scene and write its results and figures
     #[command(
-        after_help = "Example:\n  flockform run tension --out /tmp/tension --set stop.steps=800 --set frame=immediate"
+        after_help = "Examples:\n  flockform run tension --out /tmp/tension --set stop.steps=800 --set frame=immediate\n  flockform run --resume /tmp/tension"
     )]
     Run(run::RunArguments),
     /// Hold a scene's rule against finite elements on the same body
@@ -77,6 +80,12 @@ pub enum Command {
                       Exit codes: 0 flown and every declared bound held, 1 a bound broken or interrupted, 2 bad input."
     )]
     Swarm(swarm::SwarmArguments),
+    /// Fly a recorded flight again and say where today's targets differ from the recorded ones
+    #[command(
+        after_help = "Examples:\n  flockform swarm gap --record gap.mcap\n  flockform replay gap.mcap\n  flockform replay gap.mcap --set limits.speed=0.5 --tolerance 0.01\n\n\
+                      Exit codes: 0 no target is farther off than the tolerance, 1 some are, 2 bad input."
+    )]
+    Replay(replay::ReplayArguments),
     /// Keep a swarm in formation over ROS 2 or shared memory: poses in, safe targets out
     #[command(
         after_help = "Example:\n  flockform node square --ros-args -r __ns:=/fleet -p speed_limit:=0.5\n  flockform node square --member robot_3\n  flockform node square --transport shm"
@@ -241,6 +250,10 @@ pub enum Refusal {
     NoNode,
     #[error("{0}")]
     Export(#[from] export::ExportError),
+    #[error("{0}")]
+    Record(#[from] flockform::record::RecordError),
+    #[error("{0}")]
+    Checkpoint(#[from] export::checkpoint::CheckpointError),
     #[error(
         "there is no {what} file and no bundled {what} `{name}`\n  help: the nearest bundled {what} is `{nearest}`; `flockform {what}s` lists them all"
     )]
@@ -312,6 +325,7 @@ pub fn dispatch(command: Command, ros: &RosArguments) -> Result<ExitCode, Refusa
         Command::Trade(arguments) => return trade::trade(&arguments),
         Command::Stability(arguments) => return stability::stability(&arguments),
         Command::Swarm(arguments) => return swarm::swarm(&arguments),
+        Command::Replay(arguments) => return replay::replay(&arguments),
         Command::Node(arguments) => return node::node(&arguments, ros),
         Command::Robots(arguments) => return node::robots(&arguments, ros),
         Command::Scenes => list(bundled::SCENES, |scene| Ok(scene.load(&[])?.raw.title))?,

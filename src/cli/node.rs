@@ -3,16 +3,18 @@
 use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
+use flockform::record::About;
 use flockform::ros::arguments::RosArguments;
-use flockform::ros::node::FormationNode;
+use flockform::ros::node::{FormationNode, NodeError};
 use flockform::ros::robots::RobotNodes;
 use flockform::scene::swarm::Swarm;
 use flockform::shm::{self, Domain, SimulatedRobots};
 use flockform::swarm::control::Control;
 
-use super::Refusal;
+use super::recording::{RecordArguments, close};
 use super::run::interrupt_flag;
 use super::swarm::SwarmFileArguments;
+use super::{Refusal, print};
 
 /// What lies between the node and the robots.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
@@ -34,6 +36,8 @@ pub struct NodeArguments {
     /// Be the node of this robot alone: hear nobody but it and its neighbours, and send it alone targets
     #[arg(long, value_name = "NAME")]
     member: Option<String>,
+    #[command(flatten)]
+    record: RecordArguments,
 }
 
 #[derive(Debug, Args)]
@@ -48,15 +52,23 @@ pub struct RobotsArguments {
 /// Keeps a formation until it is interrupted.
 pub fn node(arguments: &NodeArguments, ros: &RosArguments) -> Result<ExitCode, Refusal> {
     let swarm = arguments.swarm.load()?;
-    let member = arguments.member.as_deref();
+    let name = arguments.member.as_deref();
     match arguments.transport {
         Transport::Ros2 => {
-            let mut node = FormationNode::open(&swarm, ros, member)?;
+            let mut node = FormationNode::open(&swarm, ros, name)?;
+            let (member, namespace) = (arguments.member.clone(), Some(node.namespace().to_owned()));
+            let about = About { member, namespace, ..arguments.swarm.about("node", &swarm) };
+            let recording = arguments.record.open(&about, false)?;
+            if let Some(recording) = &recording {
+                node.record(recording.sink()).map_err(NodeError::from)?;
+            }
             announce(&swarm, node.control());
             node.run(&interrupt_flag());
+            print(&close(recording)?);
         }
         Transport::Shm => {
-            let mut node = shm::FormationNode::open(&swarm, &Domain::from_environment()?, member)?;
+            arguments.record.require_none("--transport shm")?;
+            let mut node = shm::FormationNode::open(&swarm, &Domain::from_environment()?, name)?;
             announce(&swarm, node.control());
             node.run(&interrupt_flag())?;
         }

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use flockform::export::{ExportError, OutputFolder};
+use flockform::export::{ExportError, OutputFolder, unfinished};
 
 #[derive(Debug, Args)]
 pub struct OutputArguments {
@@ -15,7 +15,7 @@ pub struct OutputArguments {
     pub quiet: bool,
     /// Replace an earlier output of flockform in DIR
     #[arg(long)]
-    force: bool,
+    pub force: bool,
 }
 
 /// Whether there shall be a report.html.
@@ -36,7 +36,9 @@ impl OutputArguments {
 
 /// The first of out/NAME, out/NAME-2, ... that is not taken.
 fn free_folder(name: &str) -> PathBuf {
-    let taken = |path: &Path| path.read_dir().is_ok_and(|mut entries| entries.next().is_some());
+    let taken = |path: &Path| {
+        path.read_dir().is_ok_and(|mut entries| entries.next().is_some()) || unfinished(path).exists()
+    };
     let numbered = (2..).map(|n| PathBuf::from(format!("out/{name}-{n}")));
     std::iter::once(PathBuf::from(format!("out/{name}")))
         .chain(numbered)

@@ -1,4 +1,4 @@
-//! `flockform run`: plan, step, record, write.
+//! `flockform run`: plan, step, record, write; or go on where an earlier run was killed.
 
 use std::cell::Cell;
 use std::ops::ControlFlow;
@@ -11,34 +11,48 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use flockform::compare::run::plan;
 use flockform::continuum::engine::Engine;
+use flockform::continuum::engine::state::digest;
 use flockform::continuum::equilibrium::come_to_rest_watched;
 use flockform::continuum::plan::Plan;
 use flockform::continuum::record::{ProbeSeries, Snapshot};
-use flockform::continuum::run::{Outcome, StopReason, Watch};
+use flockform::continuum::run::{Outcome, StopReason, Watch, resume};
+use flockform::export::checkpoint::{self, Asked, Checkpoint};
 use flockform::export::report::stage::Stage;
 use flockform::export::report::{self, RunRecorder};
 use flockform::export::{
     Energies, ExportError, OutputFolder, Results, Summary, Timings, VtkSeries, write_all,
 };
-use flockform::scene::Scene;
+use flockform::record::About;
+use flockform::record::body::BodyTape;
+use flockform::scene::{Scene, bundled};
 use flockform::shm::Domain;
 use flockform::shm::positions::Positions;
 use flockform::trade::{Chosen, choose};
 
+use super::checkpoint::{CheckpointArguments, Keeper, Kept, Left};
 use super::output::{OutputArguments, ReportArguments};
 use super::progress::Progress;
+use super::recording::{RecordArguments, close};
 use super::{FAILED, Refusal, SceneArguments, print};
 
 #[derive(Debug, Args)]
 pub struct RunArguments {
-    #[command(flatten)]
-    scene: SceneArguments,
+    /// Name of a bundled scene (see `flockform scenes`) or path of a scene file; --resume knows it
+    #[arg(required_unless_present = "resume")]
+    scene: Option<String>,
+    /// Override a key of the scene, validated like the file: lattice.spacing=0.5, roles\[1\].from=30
+    #[arg(long = "set", value_name = "KEY.PATH=VALUE", requires = "scene")]
+    set: Vec<String>,
     #[command(flatten)]
     output: OutputArguments,
     #[command(flatten)]
     report: ReportArguments,
+    #[command(flatten)]
+    checkpoints: CheckpointArguments,
+    #[command(flatten)]
+    record: RecordArguments,
     /// Run at most this many steps (the same as --set stop.steps=N)
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", requires = "scene")]
     steps: Option<usize>,
     /// Threads to use [default: the machine's]; results are the same to the bit for any number
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
@@ -57,40 +71,66 @@ pub fn run(arguments: &RunArguments) -> Result<ExitCode, Refusal> {
 
 fn run_here(arguments: &RunArguments) -> Result<ExitCode, Refusal> {
     let start = Instant::now();
-    let steps = arguments.steps.map(|steps| format!("stop.steps={steps}"));
-    let scene = arguments.scene.load(steps.clone())?;
-    let load = |more: &[String]| arguments.scene.load_scene(&[steps.as_slice(), more].concat());
-    let Chosen { scene, words } = choose(scene, &load)?;
+    let left = arguments.checkpoints.left()?;
+    let asked = arguments.asked(left.as_ref());
+    let words_of = SceneArguments { scene: asked.scene.clone(), set: asked.set.clone() };
+    let Chosen { scene, words } = choose(words_of.load([])?, &|more: &[String]| words_of.load_scene(more))?;
     let plan = plan(&scene)?;
     let shown = arguments.publish.as_ref();
     let open = |name: &String| Positions::open(&Domain::from_environment()?, name, plan.count());
     let mut shown = shown.map(open).transpose()?;
-    let folder = arguments.output.folder(&scene.name)?;
+    let digest = digest(&plan);
+    left.as_ref().map_or(Ok(()), |left| left.require_of(&scene, digest))?;
+    let mut folder = match &left {
+        Some(left) => left.open()?,
+        None => arguments.output.folder(&scene.name)?,
+    };
     let setup = start.elapsed();
     tracing::info!("planned {} particles of `{}` in {setup:.1?}", plan.count(), scene.name);
 
-    let mut recorder = Recorder::new(&scene, &plan, &folder)?;
+    let mut recorder = Recorder::new(&scene, &plan, &folder, left.as_ref())?;
     recorder.reports = !arguments.report.no_report;
+    let about = About { source: "run", name: scene.name.clone(), ..About::default() };
+    let recording = arguments.record.open(&about, arguments.output.force)?;
+    let mut tape = recording.as_ref().map(|one| BodyTape::new(&scene, one.sink())).transpose()?;
     let mut progress = Progress::new(arguments.output.quiet, scene.stop.steps);
     let interrupted = interrupt_flag();
-    let stepping = Instant::now();
-    let looks = Looks::new(&scene, &plan, shown.is_some());
+    let looks = Looks::new(&scene, &plan, shown.is_some() || tape.is_some());
+    let mut keeper = Keeper::new(&arguments.checkpoints, (asked, &scene, digest), left.as_ref());
     let mut see = |engine: &Engine, residual: f64| {
         recorder.step(engine);
         looks.film.set(recorder.film.as_ref().map(|film| film.next(engine.step())));
         if let Some(shown) = &mut shown {
             shown.show(engine);
         }
+        if let Some(tape) = &mut tape {
+            tape.step(engine, residual);
+        }
         progress.step(engine.step(), residual);
+        if keeper.is_due(engine.step()) && !recorder.failed() {
+            keeper.keep(&mut folder, (engine, residual), recorder.kept());
+        }
         let stop = recorder.failed() || interrupted.load(Ordering::Relaxed);
         if stop { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
     let watch = Watch { next: &|step| looks.after(step), see: &mut see };
-    let outcome = come_to_rest_watched(&scene, plan, watch)?;
+    let outcome = match left.map(|left| left.checkpoint) {
+        None => come_to_rest_watched(&scene, plan, watch)?,
+        Some(Checkpoint { engine, residual, .. }) => {
+            resume(plan, engine, residual, watch).map_err(|error| Left::foreign(&folder, &error))?
+        }
+    };
     progress.finish();
+    if let Some(tape) = tape {
+        tape.finish(&outcome.engine, outcome.residual);
+    }
 
-    let elapsed = stepping.elapsed();
+    let elapsed = keeper.stepping();
     tracing::info!("{} steps in {elapsed:.1?}, writing", outcome.engine.step());
+    let is_interrupted = outcome.reason == StopReason::Interrupted;
+    if is_interrupted {
+        keeper.leave(&folder, (&outcome.engine, outcome.residual), &recorder.kept());
+    }
     let on_the_way = recorder.writing;
     let records = recorder.finish(&outcome)?;
     let timings = Timings { setup, steps: elapsed.saturating_sub(on_the_way), output: records.writing };
@@ -102,11 +142,35 @@ fn run_here(arguments: &RunArguments) -> Result<ExitCode, Refusal> {
     }
     let Summary { energies, .. } = summary;
     let kept = folder.commit()?;
+    let recorded = close(recording)?;
+    if !is_interrupted {
+        checkpoint::remove(&kept);
+    }
     if !arguments.output.quiet {
         print(&words);
-        print(&closing_words(&scene, &outcome, &energies, elapsed, &kept));
+        print(&(closing_words(&scene, &outcome, &energies, elapsed, &kept) + &recorded));
     }
     Ok(exit_code(&outcome))
+}
+
+impl RunArguments {
+    /// What shall be run, in words that mean the same in any folder.
+    fn asked(&self, left: Option<&Left>) -> Asked {
+        let force = self.output.force;
+        match (&self.scene, left) {
+            (None, Some(left)) => left.checkpoint.asked.clone(),
+            (None, None) => unreachable!("a scene is required without --resume"),
+            (Some(scene), _) => {
+                let place = Path::new(scene);
+                let in_full = std::path::absolute(place).ok().filter(|_| place.exists());
+                let is_path = bundled(scene).is_none();
+                let named = in_full.filter(|_| is_path).map(|path| path.display().to_string());
+                let steps = self.steps.map(|steps| format!("stop.steps={steps}"));
+                let set = self.set.iter().cloned().chain(steps).collect();
+                Asked { scene: named.unwrap_or_else(|| scene.clone()), set, force }
+            }
+        }
+    }
 }
 
 /// Set by Ctrl-C and by SIGTERM; the run then stops at the next step.
@@ -169,19 +233,37 @@ struct Records {
 }
 
 impl<'a> Recorder<'a> {
-    fn new(scene: &'a Scene, plan: &Plan, folder: &OutputFolder) -> Result<Self, ExportError> {
+    fn new(
+        scene: &'a Scene,
+        plan: &Plan,
+        folder: &OutputFolder,
+        left: Option<&Left>,
+    ) -> Result<Self, ExportError> {
         // A body that is not stepped has no history.
         let probed: &[usize] = if scene.raw.equilibrium.is_some() { &[] } else { &plan.probes };
+        let new_probes = || probed.iter().map(|&particle| ProbeSeries::new(particle)).collect();
+        let every = scene.record.vtk_every;
+        let frames = match left {
+            _ if every == 0 => None,
+            None => Some(VtkSeries::create(folder)?),
+            Some(left) => Some(left.frames(folder, every)?),
+        };
+        let frames = frames.map(|frames| frames.with_material(scene.material));
         Ok(Self {
             scene,
-            snapshots: Vec::new(),
-            probes: probed.iter().map(|&particle| ProbeSeries::new(particle)).collect(),
-            frames: (scene.record.vtk_every > 0).then(|| VtkSeries::create(folder)).transpose()?,
+            snapshots: left.map_or_else(Vec::new, |left| left.checkpoint.snapshots.to_vec()),
+            probes: left.map_or_else(new_probes, |left| left.checkpoint.probes.to_vec()),
+            frames,
             reports: true,
             film: None,
             failure: None,
             writing: Duration::ZERO,
         })
+    }
+
+    /// For a checkpoint.
+    fn kept(&mut self) -> Kept<'_> {
+        Kept { snapshots: &self.snapshots, probes: &self.probes, frames: self.frames.as_mut() }
     }
 
     fn step(&mut self, engine: &Engine) {
@@ -246,7 +328,9 @@ fn closing_words(
         StopReason::Equilibrium => "in equilibrium".to_owned(),
         StopReason::Unsettled => "the solver ended short of its tolerance".to_owned(),
         StopReason::Steps => "all steps done".to_owned(),
-        StopReason::Interrupted => "interrupted: what there was is written".to_owned(),
+        StopReason::Interrupted => {
+            "interrupted: what there was is written, `flockform run --resume` goes on".to_owned()
+        }
         StopReason::Diverged(divergence) => format!("{divergence}; the last good state is written"),
     };
     let mut words = format!(

@@ -1,5 +1,6 @@
 //! `flockform swarm`: flies a swarm file without middleware.
 
+use std::cell::RefCell;
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::process::ExitCode;
@@ -9,11 +10,14 @@ use std::time::Instant;
 use clap::Args;
 use flockform::export::flight::write_flight;
 use flockform::export::report::{self, FlightRecorder};
+use flockform::record::About;
+use flockform::record::flight::FlightTape;
 use flockform::scene::bundled::{self, bundled_swarm};
 use flockform::scene::swarm::Swarm;
-use flockform::swarm::flight::{Flight, FlightReport, fly};
+use flockform::swarm::flight::{Flight, FlightReport, fly_heard};
 
 use super::output::{OutputArguments, ReportArguments};
+use super::recording::{RecordArguments, close};
 use super::run::interrupt_flag;
 use super::{FAILED, Refusal, print, scene_path};
 
@@ -35,6 +39,23 @@ impl SwarmFileArguments {
         let path = scene_path("swarm", &self.swarm, bundled::SWARMS)?;
         Ok(Swarm::from_file(Path::new(&path), &self.set)?)
     }
+
+    /// What a recording has to say of the swarm.
+    pub fn about(&self, source: &'static str, swarm: &Swarm) -> About {
+        let path = Path::new(&self.swarm);
+        let bundled = bundled_swarm(&self.swarm);
+        let text =
+            bundled.map_or_else(|| std::fs::read_to_string(path).ok(), |one| Some(one.text.to_owned()));
+        let folder = path.parent().filter(|_| bundled.is_none());
+        About {
+            source,
+            name: swarm.name.clone(),
+            swarm: text,
+            set: self.set.clone(),
+            folder: folder.and_then(|folder| std::path::absolute(folder.join(".")).ok()),
+            ..About::default()
+        }
+    }
 }
 
 #[derive(Debug, Args)]
@@ -45,6 +66,8 @@ pub struct SwarmArguments {
     output: OutputArguments,
     #[command(flatten)]
     report: ReportArguments,
+    #[command(flatten)]
+    record: RecordArguments,
     /// Print flight.json's report instead of words
     #[arg(long, conflicts_with = "quiet")]
     json: bool,
@@ -53,12 +76,25 @@ pub struct SwarmArguments {
 /// Flies a swarm and writes what came of it.
 pub fn swarm(arguments: &SwarmArguments) -> Result<ExitCode, Refusal> {
     let swarm = arguments.swarm.load()?;
-    let at_start = Flight::new(&swarm)?;
-    let mut recorder = (!arguments.report.no_report).then(|| FlightRecorder::new(&at_start));
+    let flight = Flight::new(&swarm)?;
+    let mut recorder = (!arguments.report.no_report).then(|| FlightRecorder::new(&flight));
     let folder = arguments.output.folder(&swarm.name)?;
+    let recording = arguments.record.open(&arguments.swarm.about("swarm", &swarm), arguments.output.force)?;
+    let tape =
+        recording.as_ref().map(|one| FlightTape::new(&swarm, flight.control(), one.sink())).transpose()?;
+    let tape = RefCell::new(tape);
     let interrupted = interrupt_flag();
     let start = Instant::now();
-    let (record, report) = fly(&swarm, &mut |flight, _| {
+    let mut hear = |member, pose| {
+        if let Some(tape) = &mut *tape.borrow_mut() {
+            tape.hear(member, pose);
+        }
+    };
+    let (record, report) = fly_heard(&swarm, &mut hear, &mut |flight, _| {
+        if let Some(tape) = &mut *tape.borrow_mut() {
+            // When the period began that has just been flown.
+            tape.tick(flight.control(), (flight.fleet().period() - 1) as f64 * swarm.raw.control.period);
+        }
         recorder.iter_mut().for_each(|recorder| recorder.watch(flight));
         if interrupted.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     })?;
@@ -69,10 +105,11 @@ pub fn swarm(arguments: &SwarmArguments) -> Result<ExitCode, Refusal> {
         report::flight::write(&folder, &swarm, &record, &report, stage)?;
     }
     let kept = folder.commit()?;
+    let recorded = close(recording)?;
     if arguments.json {
         print(&format!("{:#}\n", serde_json::json!(report)));
     } else if !arguments.output.quiet {
-        print(&words(&report, seconds, &kept));
+        print(&(words(&report, seconds, &kept) + &recorded));
     }
     let broken_off = interrupted.load(Ordering::Relaxed);
     Ok(if report.holds() && !broken_off { ExitCode::SUCCESS } else { ExitCode::from(FAILED) })

@@ -1,6 +1,7 @@
 //! The engine: one step of a planned body.
 
 mod several;
+pub mod state;
 
 use super::layout::RoleChange;
 use super::movement::Movement;
@@ -220,7 +221,7 @@ impl Engine {
 
     /// Takes the last step back: positions as before it. Bonds that broke in it stay broken.
     pub fn take_back(&mut self) {
-        self.return_to(self.step - 1, &self.previous.clone());
+        self.return_to(self.step - 1, &self.previous.clone(), self.activity.clone());
     }
 
     /// Whether a role change or a leader's motion is still to come, so that rest is no equilibrium.

@@ -3,6 +3,7 @@
 //! [`plan::Plan`] lays the scene out as arrays and index lists and says what it makes the program
 //! model; [`engine::Engine`] steps them; [`run::run`] is the loop around it, and whoever wants to see
 //! the body on the way (a recorder, a progress bar, an interrupt) gives it a closure to call.
+//! [`engine::state`] takes an engine out on its way and puts it back, for checkpoints.
 //! [`layout`] is the body before anybody moves; [`equilibrium`] goes straight to rest instead of stepping.
 
 pub mod engine;
@@ -15,4 +16,5 @@ pub mod plan;
 pub mod record;
 pub mod report;
 pub mod run;
+mod stored;
 mod weights;

@@ -1,15 +1,20 @@
 //! What is kept of a run: whole configurations at some steps, a few particles at every step.
 
+use serde::{Deserialize, Serialize};
+
 use super::engine::Engine;
+use super::stored;
 use crate::flock::points::Points;
 use crate::flock::role::Role;
 
 /// A whole configuration at one step; arrays of shape \[count\].
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Snapshot {
     pub step: usize,
     /// Present positions \[length, world frame\].
+    #[serde(with = "stored::points")]
     pub positions: Points,
+    #[serde(with = "stored::roles")]
     pub roles: Vec<Role>,
     /// First pseudo-energy \[length^2\].
     pub pe1: Vec<f64>,
@@ -42,10 +47,11 @@ impl Snapshot {
 }
 
 /// The history of one particle: entry `t` is step `t`, the start included.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct ProbeSeries {
     /// Index of the particle.
     pub particle: usize,
+    #[serde(with = "stored::points")]
     pub positions: Points,
     pub pe1: Vec<f64>,
     pub pe2: Vec<f64>,

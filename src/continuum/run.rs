@@ -3,11 +3,13 @@
 use std::ops::ControlFlow;
 
 use super::engine::Engine;
+use super::engine::state::{EngineState, WrongState};
 use super::movement::{Movement, farthest, first_lost};
 use super::plan::Plan;
 use crate::flock::interaction::Weights;
 use crate::flock::points::{Points, distance};
 use crate::flock::rules::{FeedbackReference, Mean};
+use crate::scene::Stop;
 use crate::solve::equilibrium::Solved;
 use crate::solve::sweep::Order;
 
@@ -87,14 +89,56 @@ pub fn run(plan: Plan, see: &mut dyn FnMut(&Engine, f64) -> ControlFlow<()>) -> 
 
 /// Runs a plan to its end, seen at those steps alone that `watch` names. The results are the same to the bit.
 pub fn run_watched(plan: Plan, watch: Watch<'_>) -> Outcome {
-    let stop = plan.stop;
-    // Both over the spacing, as the movement is.
-    let bound = stop.growth * plan.diagonal / plan.body.lattice.spacing();
-    let mut engine = Engine::new(plan);
-    let mut strides = Strides::new(&engine, stop.tolerance, bound);
-    let mut residual = f64::INFINITY;
-    let mut interrupted = (watch.see)(&engine, residual).is_break();
+    let bounds = Bounds::of(&plan);
+    let engine = Engine::new(plan);
+    let residual = f64::INFINITY;
+    let interrupted = (watch.see)(&engine, residual).is_break();
+    go_on(engine, (residual, interrupted), &bounds, watch)
+}
+
+/// Runs a plan on from where an earlier run of it was, to the same end bit by bit. `residual` is the one that
+/// was seen with the state; `watch` sees the engine after new steps.
+///
+/// # Errors
+/// A state of another body.
+pub fn resume(
+    plan: Plan,
+    state: EngineState,
+    residual: f64,
+    watch: Watch<'_>,
+) -> Result<Outcome, WrongState> {
+    let bounds = Bounds::of(&plan);
+    Ok(go_on(state.engine(plan)?, (residual, false), &bounds, watch))
+}
+
+/// What ends a run.
+struct Bounds {
+    stop: Stop,
+    /// Largest displacement over the spacing, as the movement is.
+    growth: f64,
+}
+
+impl Bounds {
+    fn of(plan: &Plan) -> Self {
+        let growth = plan.stop.growth * plan.diagonal / plan.body.lattice.spacing();
+        Self { stop: plan.stop, growth }
+    }
+}
+
+fn go_on(
+    mut engine: Engine,
+    (mut residual, mut interrupted): (f64, bool),
+    Bounds { stop, growth }: &Bounds,
+    watch: Watch<'_>,
+) -> Outcome {
+    let mut strides = Strides::new(&engine, stop.tolerance, *growth);
+    let settled = |residual: f64, engine: &Engine| {
+        stop.tolerance.is_some_and(|tolerance| residual <= tolerance) && !engine.is_scheduled()
+    };
     let reason = loop {
+        if settled(residual, &engine) {
+            break StopReason::Equilibrium;
+        }
         if interrupted {
             break StopReason::Interrupted;
         }
@@ -105,18 +149,14 @@ pub fn run_watched(plan: Plan, watch: Watch<'_>) -> Outcome {
         let most = look - engine.step();
         strides.advance(&mut engine, most);
         let movement = engine.movement();
-        if let Some(divergence) = divergence(&engine, &movement, bound) {
+        if let Some(divergence) = divergence(&engine, &movement, *growth) {
             engine.take_back();
             break StopReason::Diverged(divergence);
         }
         strides.displacement = movement.largest_displacement;
         residual = movement.largest_move;
-        let settled = stop.tolerance.is_some_and(|tolerance| residual <= tolerance) && !engine.is_scheduled();
-        if settled || engine.step() == look {
+        if engine.step() == look || settled(residual, &engine) {
             interrupted = (watch.see)(&engine, residual).is_break();
-        }
-        if settled {
-            break StopReason::Equilibrium;
         }
     };
     Outcome { engine, reason, residual, solved: None }
@@ -140,7 +180,14 @@ impl Strides {
     fn new(engine: &Engine, tolerance: Option<f64>, bound: f64) -> Self {
         let contracts = engine.steps_at_once(1) > 0 && engine.rests_at_reference();
         let start = Points::default();
-        Self { tolerance, displacement: 0.0, bound, contracts, start, singly: 0 }
+        Self {
+            tolerance,
+            displacement: engine.movement().largest_displacement,
+            bound,
+            contracts,
+            start,
+            singly: 0,
+        }
     }
 
     /// Takes at most `most` steps, and at least one.
@@ -157,12 +204,12 @@ impl Strides {
             engine.advance_by(count, None);
             return;
         };
-        let step = engine.step();
+        let (step, activity) = (engine.step(), engine.activity().clone());
         self.start.clone_from(engine.present());
         let told = engine.advance_by(count, Some(tolerance * spacing * (1.0 + 1e-9)));
         // The last one is looked at by whoever called.
         if told[..count - 1].contains(&false) {
-            engine.return_to(step, &self.start);
+            engine.return_to(step, &self.start, activity);
             self.singly = count - 1;
             engine.advance();
         }

@@ -16,6 +16,15 @@ pub enum ExportError {
     NotAFolder(PathBuf),
     #[error("{:?} does not name a folder that could be made: give --out a name", .0.display().to_string())]
     Unnamed(PathBuf),
+    #[error(
+        "{} holds a run that was not finished: continue it with `flockform run --resume {}`, discard it with --force, or give another --out",
+        .0.display(), .0.display()
+    )]
+    Unfinished(PathBuf),
+    #[error("{} is being written by another flockform that still runs: wait for it, or give another --out", .0.display())]
+    Busy(PathBuf),
+    #[error("{} is missing, which the checkpoint beside it needs: start the run again", .0.display())]
+    MissingFrame(PathBuf),
     #[error("cannot {action} {}: {source}", .path.display())]
     Io { action: &'static str, path: PathBuf, source: io::Error },
     #[error("the figure {} cannot be rendered: {reason}", .path.display())]

@@ -2,17 +2,19 @@
 //!
 //! Everything is written into a hidden folder beside the one asked for, `.NAME.partial-PID`, which takes
 //! the name only when the last file is closed. Whoever kills a run finds the former outputs or
-//! nothing in their place, never half of the new ones.
+//! nothing in their place, never half of the new ones. A run that keeps checkpoints stands in the open
+//! meanwhile, as `NAME.unfinished`, and whoever takes it up again reopens that ([`OutputFolder::reopen`]).
 
 use std::ffi::OsString;
-use std::fs;
+use std::fs::{self, File, TryLockError};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use super::error::ExportError;
-use super::summary;
+use super::{checkpoint, summary};
 
-/// A folder being filled. Dropped without [`OutputFolder::commit`], it leaves nothing behind.
+/// A folder being filled. Dropped without [`OutputFolder::commit`] or [`OutputFolder::keep_unfinished`], it
+/// leaves nothing behind.
 #[derive(Debug)]
 pub struct OutputFolder {
     out: PathBuf,
@@ -20,6 +22,8 @@ pub struct OutputFolder {
     force: bool,
     /// Whether what was written outlives this value.
     is_kept: bool,
+    /// Holds others off an unfinished folder, for as long as this program lives.
+    lock: Option<File>,
 }
 
 /// What stands where the outputs shall go.
@@ -35,19 +39,49 @@ impl OutputFolder {
     /// A folder that is not empty is refused without `force`; with it, one that this program did not
     /// write. A file in the place, and a parent that cannot be written to, are refused too.
     pub fn create(out: &Path, force: bool) -> Result<Self, ExportError> {
-        if out.file_name().is_none() {
-            return Err(ExportError::Unnamed(out.to_owned()));
-        }
-        // A symbolic link stays one: what it leads to is replaced. And the place must not move with the
-        // working directory.
-        let out = if out.is_symlink() { fs::canonicalize(out) } else { std::path::absolute(out) }
-            .map_err(ExportError::io("find", out))?;
+        let out = in_full(out)?;
         standing(&out, force)?;
         if let Some(parent) = out.parent() {
             fs::create_dir_all(parent).map_err(ExportError::io("create", parent))?;
         }
+        make_way(&unfinished(&out), force)?;
         let partial = create_beside(&out, "partial")?;
-        Ok(Self { out, partial, force, is_kept: false })
+        Ok(Self { out, partial, force, is_kept: false, lock: None })
+    }
+
+    /// The folder that a run to `out` has left unfinished; `force` as in [`OutputFolder::create`].
+    ///
+    /// # Errors
+    /// A folder that a program is still filling.
+    pub fn reopen(out: &Path, force: bool) -> Result<Self, ExportError> {
+        let out = in_full(out)?;
+        let partial = unfinished(&out);
+        let lock = lock(&partial)?;
+        Ok(Self { out, partial, force, is_kept: true, lock })
+    }
+
+    /// Lets what is written outlive this program, in the open, as `NAME.unfinished`. Paths given before are
+    /// of the former name.
+    ///
+    /// # Errors
+    /// Stays under the former name where the new one is taken.
+    pub fn keep_unfinished(&mut self) -> Result<(), ExportError> {
+        let open = unfinished(&self.out);
+        if self.partial == open {
+            return Ok(());
+        }
+        if open.exists() {
+            return Err(ExportError::Unfinished(open));
+        }
+        let lock = lock(&self.partial)?;
+        rename(&self.partial, &open)?;
+        (self.partial, self.is_kept, self.lock) = (open, true, lock);
+        Ok(())
+    }
+
+    /// Where everything stands until [`OutputFolder::commit`].
+    pub fn folder(&self) -> &Path {
+        &self.partial
     }
 
     /// Where to write the output of this name.
@@ -100,6 +134,45 @@ impl Drop for OutputFolder {
         {
             tracing::warn!("unfinished outputs are left in {}: {error}", self.partial.display());
         }
+    }
+}
+
+/// Where a run to `out` stands while it keeps checkpoints.
+pub fn unfinished(out: &Path) -> PathBuf {
+    let mut name = out.file_name().unwrap_or_default().to_owned();
+    name.push(".unfinished");
+    out.with_file_name(name)
+}
+
+fn in_full(out: &Path) -> Result<PathBuf, ExportError> {
+    if out.file_name().is_none() {
+        return Err(ExportError::Unnamed(out.to_owned()));
+    }
+    // A symbolic link stays one: what it leads to is replaced. And the place must not move with the
+    // working directory.
+    let found = if out.is_symlink() { fs::canonicalize(out) } else { std::path::absolute(out) };
+    found.map_err(ExportError::io("find", out))
+}
+
+/// Discards a run that was killed, where that is asked for.
+fn make_way(unfinished: &Path, force: bool) -> Result<(), ExportError> {
+    if !unfinished.join(checkpoint::FILE).exists() {
+        return Ok(());
+    }
+    if !force {
+        return Err(ExportError::Unfinished(unfinished.to_owned()));
+    }
+    let _lock = lock(unfinished)?;
+    fs::remove_dir_all(unfinished).map_err(ExportError::io("discard", unfinished))
+}
+
+/// The system lets go of it when the program ends, however it ends. `None` on a file system without locks.
+fn lock(folder: &Path) -> Result<Option<File>, ExportError> {
+    let Ok(file) = File::open(folder) else { return Ok(None) };
+    match file.try_lock() {
+        Ok(()) => Ok(Some(file)),
+        Err(TryLockError::WouldBlock) => Err(ExportError::Busy(folder.to_owned())),
+        Err(TryLockError::Error(_)) => Ok(None),
     }
 }
 

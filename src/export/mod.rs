@@ -11,6 +11,7 @@
 //! | `breaks.csv` | every broken bond, with its step and place |
 //! | `steps.pvd`, `steps/*.vtu` | frames for ParaView |
 //! | `report.html` | the run as a page ([`report`]) |
+//! | `checkpoint` | in an unfinished or interrupted run: all it takes to go on |
 //! | `configuration_*`, `pe1_*`, `probes` | figures, as SVG and as the PNG rendered from it |
 //!
 //! A page for people to look at is written beside them ([`report`]), and a gallery of such pages.
@@ -49,6 +50,7 @@
 //! ```
 
 mod bonds;
+pub mod checkpoint;
 #[cfg(feature = "fem")]
 pub mod comparison;
 pub mod csv;
@@ -77,7 +79,7 @@ use crate::flock::strain::Strain;
 use crate::scene::Scene;
 pub use error::ExportError;
 use figures::Subject;
-pub use folder::OutputFolder;
+pub use folder::{OutputFolder, unfinished};
 pub use summary::{BrokenBonds, Counts, Energies, Equilibrium, FirstBreak, Seconds, Summary, Timings};
 pub use vtk::VtkSeries;
 

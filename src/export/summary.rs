@@ -160,7 +160,7 @@ impl Summary {
                 _ => None,
             },
             residual: Some(outcome.residual).filter(|residual| residual.is_finite()),
-            share_swept: outcome.solved.is_none().then(|| outcome.engine.share_swept()),
+            share_swept: outcome.solved.is_none().then(|| outcome.engine.activity().share_computed()),
             equilibrium: outcome.solved.as_ref().map(Equilibrium::of),
             energies: Energies { pe1, pe2, largest_strain },
             broken_bonds: broken_bonds(&outcome.engine),

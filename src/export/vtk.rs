@@ -1,10 +1,13 @@
 //! VTK for ParaView: `steps/step_000020.vtu` at every recorded step, `steps.pvd` that lists them.
 //!
-//! An unstructured grid of the present configuration. Its cells are the particles, as vertices, and the
-//! bonds that live, as lines, so that a crack shows as what is missing. Point data: `id` from 1,
-//! `role` (0 follower, 1 leader, 2 clamped, 3 frame, 4 ghost), `displacement` \[length\], `pe1`
-//! \[length^2\], `pe2` \[length\]. Arrays are base64 within the XML: a number costs 11 bytes, loses
-//! nothing, and the file stays well-formed, which raw appended data would not.
+//! An unstructured grid of the present configuration. Its cells are the particles, as vertices, and the bonds, as
+//! lines; cell data `broken` (1 or 0; threshold it to see a crack as what is missing) and `stretch` (length over that
+//! in the reference configuration, less one \[1\]), both 0 for a particle. Point data: `id` from 1, `role`
+//! (0 follower, 1 leader, 2 clamped, 3 frame, 4 ghost), `displacement` \[length\], `pe1` \[length^2\], `pe2`
+//! \[length\], `strain` (xx, yy, xy) \[1\] and `rotation` \[rad\] of a particle's surroundings, and where the scene has
+//! a material `stress` (xx, yy, xy) and `von_mises` \[force / length^2\], in the axes of the reference configuration;
+//! NaN for who sees too few. Arrays are base64 within the XML: a number costs 11 bytes, loses nothing, and the file
+//! stays well-formed, which raw appended data would not.
 
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
@@ -12,11 +15,15 @@ use std::path::{Path, PathBuf};
 
 use base64::engine::general_purpose::STANDARD;
 use base64::write::EncoderWriter;
+use rayon::prelude::*;
 
 use super::error::{ExportError, write_file};
 use super::{OutputFolder, bonds};
 use crate::continuum::engine::Engine;
+use crate::flock::points::{Points, distance};
 use crate::flock::role::Role;
+use crate::flock::strain::Strain;
+use crate::material::elastic::Elastic;
 
 const FOLDER: &str = "steps";
 const VERTEX: u8 = 1;
@@ -28,19 +35,67 @@ pub struct VtkSeries {
     collection: PathBuf,
     folder: PathBuf,
     frames: Vec<(usize, PathBuf)>,
+    /// How many of them are known to be on the disk.
+    synced: usize,
+    material: Option<Elastic>,
 }
 
 impl VtkSeries {
     pub fn create(folder: &OutputFolder) -> Result<Self, ExportError> {
         let steps = folder.path(FOLDER);
         fs::create_dir_all(&steps).map_err(ExportError::io("create", &steps))?;
-        Ok(Self { collection: folder.path("steps.pvd"), folder: steps, frames: Vec::new() })
+        let (collection, frames) = (folder.path("steps.pvd"), Vec::new());
+        Ok(Self { collection, folder: steps, frames, synced: 0, material: None })
+    }
+
+    /// Tells the stress in a body of this material.
+    pub fn with_material(self, material: Option<Elastic>) -> Self {
+        Self { material, ..self }
+    }
+
+    /// Goes on after the frames of these `steps`, which an earlier run has written below `from`.
+    ///
+    /// # Errors
+    /// A frame that is not there.
+    pub fn resume(
+        folder: &OutputFolder,
+        from: &Path,
+        steps: impl IntoIterator<Item = usize>,
+    ) -> Result<Self, ExportError> {
+        let mut series = Self::create(folder)?;
+        for step in steps {
+            let (former, path) =
+                (from.join(FOLDER).join(file_name(step)), series.folder.join(file_name(step)));
+            if !former.is_file() {
+                return Err(ExportError::MissingFrame(former));
+            }
+            if former != path {
+                fs::copy(&former, &path).map_err(ExportError::io("copy a frame to", &path))?;
+            }
+            series.frames.push((step, path));
+        }
+        Ok(series)
+    }
+
+    /// Follows a folder that has taken another name.
+    pub fn moved(&mut self, folder: &OutputFolder) {
+        (self.collection, self.folder) = (folder.path("steps.pvd"), folder.path(FOLDER));
+        self.frames.iter_mut().for_each(|(step, path)| *path = self.folder.join(file_name(*step)));
+    }
+
+    /// Brings the frames to the disk, so that a checkpoint may count on them.
+    pub fn sync(&mut self) -> Result<(), ExportError> {
+        for (_, path) in &self.frames[self.synced..] {
+            File::open(path).and_then(|file| file.sync_all()).map_err(ExportError::io("write", path))?;
+        }
+        self.synced = self.frames.len();
+        Ok(())
     }
 
     /// Writes the engine's present state.
     pub fn write(&mut self, engine: &Engine) -> Result<(), ExportError> {
         let path = self.folder.join(file_name(engine.step()));
-        write_frame(&path, engine).map_err(ExportError::io("write", &path))?;
+        write_frame(&path, engine, self.material.as_ref()).map_err(ExportError::io("write", &path))?;
         self.frames.push((engine.step(), path));
         Ok(())
     }
@@ -75,9 +130,10 @@ fn role_number(role: Role) -> u8 {
     }
 }
 
-fn write_frame(path: &Path, engine: &Engine) -> io::Result<()> {
+fn write_frame(path: &Path, engine: &Engine, material: Option<&Elastic>) -> io::Result<()> {
     let mut out = BufWriter::new(File::create(path)?);
-    let lines = live_bonds(engine);
+    let bonds: Vec<(usize, [u32; 2])> = bonds::listed_once(&engine.interaction().neighbours).collect();
+    let lines: Vec<[u32; 2]> = bonds.iter().map(|(_, pair)| *pair).collect();
     let points = engine.present().len();
     writeln!(out, "<?xml version=\"1.0\"?>")?;
     let attributes = "type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\"";
@@ -86,7 +142,8 @@ fn write_frame(path: &Path, engine: &Engine) -> io::Result<()> {
     writeln!(out, "<!-- step {}; role: {roles} -->", engine.step())?;
     writeln!(out, "<UnstructuredGrid>")?;
     writeln!(out, "<Piece NumberOfPoints=\"{points}\" NumberOfCells=\"{}\">", points + lines.len())?;
-    write_point_data(&mut out, engine)?;
+    write_point_data(&mut out, engine, material)?;
+    write_cell_data(&mut out, engine, &bonds)?;
     writeln!(out, "<Points>")?;
     let places = engine.present().iter().flat_map(|[x, y]| [x, y, 0.0]);
     vectors(&mut out, "Points", points, places)?;
@@ -96,7 +153,7 @@ fn write_frame(path: &Path, engine: &Engine) -> io::Result<()> {
     out.flush()
 }
 
-fn write_point_data(out: &mut impl Write, engine: &Engine) -> io::Result<()> {
+fn write_point_data(out: &mut impl Write, engine: &Engine, material: Option<&Elastic>) -> io::Result<()> {
     let points = engine.present().len();
     writeln!(out, "<PointData Scalars=\"pe1\" Vectors=\"displacement\">")?;
     integers(out, "id", points, 1..=points as i64)?;
@@ -107,7 +164,40 @@ fn write_point_data(out: &mut impl Write, engine: &Engine) -> io::Result<()> {
     vectors(out, "displacement", points, displacement)?;
     floats(out, "pe1", points, (0..points).map(|i| engine.pe1(i)))?;
     floats(out, "pe2", points, (0..points).map(|i| engine.pe2(i)))?;
+    let strains: Vec<Option<Strain>> = (0..points).into_par_iter().map(|i| engine.strain(i)).collect();
+    let components = |strain: &Option<Strain>| strain.map_or([f64::NAN; 3], |strain| strain.components);
+    plane_tensors(out, "strain", points, strains.iter().map(components))?;
+    let rotation = |strain: &Option<Strain>| strain.map_or(f64::NAN, |strain| strain.rotation);
+    floats(out, "rotation", points, strains.iter().map(rotation))?;
+    if let Some(material) = material {
+        // The material takes the engineering shear, twice the tensor's.
+        let engineering = |strain: &Option<Strain>| {
+            let [xx, yy, xy] = components(strain);
+            [xx, yy, 2.0 * xy]
+        };
+        let stress = strains.iter().map(|strain| material.stress(engineering(strain)));
+        plane_tensors(out, "stress", points, stress)?;
+        let von_mises = strains.iter().map(|strain| material.von_mises(engineering(strain)));
+        floats(out, "von_mises", points, von_mises)?;
+    }
     writeln!(out, "</PointData>")
+}
+
+fn write_cell_data(out: &mut impl Write, engine: &Engine, bonds: &[(usize, [u32; 2])]) -> io::Result<()> {
+    let points = engine.present().len();
+    let interaction = engine.interaction();
+    let is_broken =
+        |&(bond, _): &(usize, _)| interaction.bonds.as_ref().is_some_and(|bonds| bonds.is_broken(bond));
+    let length = |of: &Points, [a, b]: [u32; 2]| distance(of.get(a as usize), of.get(b as usize));
+    let stretch = |&(_, pair): &(usize, [u32; 2])| {
+        length(engine.present(), pair) / length(&engine.body().reference, pair) - 1.0
+    };
+    let cells = points + bonds.len();
+    writeln!(out, "<CellData Scalars=\"broken\">")?;
+    let broken = bonds.iter().map(|bond| u8::from(is_broken(bond)));
+    bytes(out, "broken", cells, std::iter::repeat_n(0, points).chain(broken))?;
+    floats(out, "stretch", cells, std::iter::repeat_n(0.0, points).chain(bonds.iter().map(stretch)))?;
+    writeln!(out, "</CellData>")
 }
 
 fn write_cells(out: &mut impl Write, points: usize, lines: &[[u32; 2]]) -> io::Result<()> {
@@ -121,13 +211,16 @@ fn write_cells(out: &mut impl Write, points: usize, lines: &[[u32; 2]]) -> io::R
     writeln!(out, "</Cells>")
 }
 
-fn live_bonds(engine: &Engine) -> Vec<[u32; 2]> {
-    let interaction = engine.interaction();
-    let is_live = |bond: usize| interaction.bonds.as_ref().is_none_or(|bonds| !bonds.is_broken(bond));
-    bonds::listed_once(&interaction.neighbours)
-        .filter(|&(bond, _)| is_live(bond))
-        .map(|(_, pair)| pair)
-        .collect()
+/// Symmetric tensors in the plane: xx, yy, xy.
+fn plane_tensors(
+    out: &mut impl Write,
+    name: &str,
+    points: usize,
+    tensors: impl Iterator<Item = [f64; 3]>,
+) -> io::Result<()> {
+    let names = "ComponentName0=\"xx\" ComponentName1=\"yy\" ComponentName2=\"xy\"";
+    let attributes = format!("type=\"Float64\" Name=\"{name}\" NumberOfComponents=\"3\" {names}");
+    array(out, &attributes, 3 * points, tensors.flatten().map(f64::to_le_bytes))
 }
 
 fn vectors(

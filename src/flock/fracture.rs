@@ -103,6 +103,12 @@ impl Bonds {
         self.any_broken
     }
 
+    /// Breaks the bonds that `is_broken` names and mends all others.
+    pub fn set_broken(&mut self, is_broken: impl Fn(usize) -> bool) {
+        self.broken.iter_mut().enumerate().for_each(|(bond, broken)| *broken = is_broken(bond));
+        self.any_broken = self.broken.contains(&true);
+    }
+
     /// Breaks every live bond past the threshold and appends it, once per pair, to `breaks`.
     /// Bonds to the frame never break: it is no matter.
     pub fn break_stretched(

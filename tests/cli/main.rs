@@ -1,5 +1,6 @@
 //! The program as a person meets it: what it prints, what it writes, and how it refuses.
 
+mod checkpoint;
 mod compare;
 mod install;
 mod material;

@@ -6,6 +6,5 @@ mod package;
 mod payloads;
 mod reference;
 mod sample;
-mod standard;
 mod structs;
 mod wire;

@@ -3,9 +3,10 @@
 use std::path::PathBuf;
 
 use flockform::ros::messages::builtin_interfaces::{Duration, Time};
+use flockform::ros::messages::definitions;
 use flockform::ros::messages::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus, KeyValue};
 use flockform::ros::messages::flockform_msgs::{
-    FormationState, MemberState, SetFormationRequest, SetFormationResponse,
+    FormationState, LoopEvent, MemberState, SetFormationRequest, SetFormationResponse,
 };
 use flockform::ros::messages::geometry_msgs::*;
 use flockform::ros::messages::nav_msgs::Odometry;
@@ -17,9 +18,9 @@ use flockform::ros::messages::visualization_msgs::{Marker, MarkerArray, MeshFile
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
+use crate::definition;
 use crate::sample::{Shape, sample};
 use crate::wire::{decode, encode};
-use crate::{definition, standard};
 
 /// A struct of the crate, filled: what there is to hold against its definition.
 pub struct Filled {
@@ -85,6 +86,7 @@ pub fn every_struct() -> Vec<Filled> {
         MarkerArray,
         MemberState,
         FormationState,
+        LoopEvent,
     ];
     all.push(filled::<SetFormationRequest>("flockform_msgs/SetFormation_Request".into()));
     all.push(filled::<SetFormationResponse>("flockform_msgs/SetFormation_Response".into()));
@@ -111,7 +113,7 @@ pub fn text(file: &str) -> String {
 
 /// Every definition there is a struct for, by `package/Name`.
 fn every_definition() -> Vec<(String, definition::Definition)> {
-    let mut all: Vec<_> = standard::DEFINITIONS
+    let mut all: Vec<_> = definitions::STANDARD
         .iter()
         .map(|(name, text)| (name.to_string(), definition::parse(text)))
         .collect();
@@ -170,6 +172,10 @@ fn every_constant_has_the_value_of_its_definition() {
         (
             "flockform_msgs/FormationState",
             constants![FormationState: RUNNING, HOLDING, EMERGENCY_STOPPED, INACTIVE],
+        ),
+        (
+            "flockform_msgs/LoopEvent",
+            constants![LoopEvent: TICK, ACTIVE, INACTIVE, EMERGENCY_STOP, RESUME, MANOEUVRE, POSTURE, PARAMETER],
         ),
     ];
     for (name, definition) in every_definition() {

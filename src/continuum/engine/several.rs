@@ -2,7 +2,7 @@
 
 use super::{Engine, Led as Leader};
 use crate::flock::points::{Points, distance};
-use crate::solve::sweep::{Led, MOST_STEPS};
+use crate::solve::sweep::{Activity, Led, MOST_STEPS};
 
 impl Engine {
     /// How many steps, at most `most`, can be taken by [`Engine::advance_by`] from here; 0 where the next one
@@ -38,11 +38,17 @@ impl Engine {
         told
     }
 
-    /// Puts the body back to where it stood at an earlier step, with the same roles.
-    pub fn return_to(&mut self, step: usize, places: &Points) {
+    /// Puts the body back to where it stood at an earlier step, with the same roles, as if it had not gone on.
+    pub fn return_to(&mut self, step: usize, places: &Points, activity: Activity) {
         self.step = step;
         self.present.clone_from(places);
+        self.activity = activity;
         self.activity.forget();
+    }
+
+    /// What was swept so far.
+    pub fn activity(&self) -> &Activity {
+        &self.activity
     }
 
     /// How far from its reference place a leader gets in the next steps at most \[length\].
@@ -66,10 +72,5 @@ impl Engine {
         let near = 1e-9 * self.body.lattice.spacing();
         let rests = |j: usize| distance(self.interaction.target(j, reference), reference.get(j)) <= near;
         self.body.matter().all(rests)
-    }
-
-    /// Share of the updates of the steps so far that were computed \[1\]: where nothing moves, nothing is swept.
-    pub fn share_swept(&self) -> f64 {
-        self.activity.share_computed()
     }
 }

@@ -86,7 +86,28 @@ impl FormationState {
     pub const INACTIVE: u8 = 3;
 }
 
-super::messages!("flockform_msgs": MemberState, FormationState);
+/// What a formation's loop is told besides poses, and when it ticks: for recordings.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct LoopEvent {
+    pub header: Header,
+    /// [`LoopEvent::TICK`] to [`LoopEvent::PARAMETER`].
+    pub kind: u8,
+    pub text: String,
+    pub values: Vec<f64>,
+}
+
+impl LoopEvent {
+    pub const TICK: u8 = 0;
+    pub const ACTIVE: u8 = 1;
+    pub const INACTIVE: u8 = 2;
+    pub const EMERGENCY_STOP: u8 = 3;
+    pub const RESUME: u8 = 4;
+    pub const MANOEUVRE: u8 = 5;
+    pub const POSTURE: u8 = 6;
+    pub const PARAMETER: u8 = 7;
+}
+
+super::messages!("flockform_msgs": MemberState, FormationState, LoopEvent);
 
 /// What the service `SetFormation` is asked.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

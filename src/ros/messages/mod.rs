@@ -6,6 +6,7 @@
 //! right-handed; REP 105: frames).
 
 pub mod builtin_interfaces;
+pub mod definitions;
 pub mod diagnostic_msgs;
 pub mod flockform_msgs;
 pub mod geometry_msgs;

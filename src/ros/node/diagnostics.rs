@@ -56,7 +56,7 @@ impl Statistics {
         due
     }
 
-    /// The report, and a new beginning for the times in it.
+    /// The report, and a new beginning for the times in it; `refused` messages were none of their type.
     pub fn message(
         &mut self,
         control: &Control,

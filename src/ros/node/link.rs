@@ -1,6 +1,7 @@
 //! The loop's end over ROS 2: poses and places of leaders in, `PoseStamped` targets out.
 
 use super::pose::{PoseSource, is_frame};
+use super::tape::Tape;
 use super::{NodeError, TopicOf};
 use crate::ros::edge::{EdgeError, Node, Publisher, Quality, Subscription};
 use crate::ros::messages::builtin_interfaces::Time;
@@ -19,6 +20,8 @@ pub struct Link {
     targets: Vec<Option<Publisher<PoseStamped>>>,
     frame_id: String,
     simulated_time: bool,
+    /// Gets a copy of what goes through.
+    pub tape: Option<Tape>,
 }
 
 impl Link {
@@ -42,7 +45,7 @@ impl Link {
             targets[m] = Some(node.publisher(&topic(&raw.target_topic, m)?, Quality::reliable(1))?);
         }
         let poses = PoseSource::open(node, raw, &part.heard, topic)?;
-        Ok(Self { poses, leaders, targets, frame_id: raw.frame_id.clone(), simulated_time })
+        Ok(Self { poses, leaders, targets, frame_id: raw.frame_id.clone(), simulated_time, tape: None })
     }
 }
 
@@ -50,10 +53,14 @@ impl ControllerEnd for Link {
     type Error = EdgeError;
 
     fn hear(&mut self, now: f64, hear: &mut dyn FnMut(Heard)) {
-        let now = self.simulated_time.then_some(now);
-        self.poses.take(&self.frame_id, now, &mut |member, pose| hear(Heard::Pose(member, pose)));
+        let simulated = self.simulated_time.then_some(now);
+        let copies = self.tape.as_mut().map(|tape| (tape, now));
+        self.poses.take(&self.frame_id, simulated, copies, &mut |m, pose| hear(Heard::Pose(m, pose)));
         for (member, topic) in &self.leaders {
             let Some((message, _)) = topic.take_last() else { continue };
+            if let Some(tape) = &mut self.tape {
+                tape.take(topic.topic(), &message, [now; 2]);
+            }
             if is_frame(&message.header.frame_id, &self.frame_id) {
                 let place = message.pose.position;
                 hear(Heard::Leader(*member, [place.x, place.y]));
@@ -73,9 +80,12 @@ impl ControllerEnd for Link {
         let mut outcome = Ok(());
         for target in targets {
             let Some(topic) = &self.targets[target.member] else { continue };
-            let pose = Pose::planar(target.position, target.yaw);
+            let message = message(target, header.clone());
+            if let Some(tape) = &mut self.tape {
+                tape.take(topic.topic(), &message, [now; 2]);
+            }
             // Who does not take its own keeps nobody else from theirs.
-            outcome = outcome.and(topic.publish(&PoseStamped { header: header.clone(), pose }));
+            outcome = outcome.and(topic.publish(&message));
         }
         outcome
     }
@@ -83,4 +93,9 @@ impl ControllerEnd for Link {
     fn refused(&self) -> u64 {
         self.poses.refused() + self.leaders.iter().map(|(_, topic)| topic.refused()).sum::<u64>()
     }
+}
+
+/// A target as a message.
+pub fn message(target: &Target, header: Header) -> PoseStamped {
+    PoseStamped { header, pose: Pose::planar(target.position, target.yaw) }
 }

@@ -3,18 +3,20 @@
 //! One thread ticks at a steady rate: it takes what arrived, calls [`Control::tick`] and publishes. Everything it
 //! holds is polled; a peer that is slow, gone or wrong cannot hold it up.
 
-mod diagnostics;
+pub mod diagnostics;
 mod drive;
+pub mod leaders;
 mod link;
-mod markers;
-mod pose;
+pub mod markers;
+pub mod pose;
 mod settings;
-mod state;
+pub mod state;
+pub mod tape;
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-use super::arguments::{DiscoveryRange, NameError, RosArguments};
+use super::arguments::{DiscoveryRange, NameError, Names, RosArguments};
 use super::edge::clock::Clock;
 use super::edge::lifecycle::{Goal, Lifecycle, Outcome};
 use super::edge::parameters::{Parameters, Refusal};
@@ -22,20 +24,22 @@ use super::edge::services::std_srvs;
 use super::edge::{Edge, EdgeError, Node, Options, Publisher, Quality, Service, ServiceType};
 use super::messages::builtin_interfaces::Time;
 use super::messages::diagnostic_msgs::DiagnosticArray;
-use super::messages::flockform_msgs::{FormationState, SetFormationRequest, SetFormationResponse};
+use super::messages::flockform_msgs::{FormationState, LoopEvent, SetFormationRequest, SetFormationResponse};
+use super::messages::geometry_msgs::PoseStamped;
 use super::messages::std_msgs::Header;
 use super::messages::visualization_msgs::MarkerArray;
-use crate::flock::manoeuvre::{Leg, Manoeuvre, Posture};
 use crate::scene::SceneError;
 use crate::scene::swarm::Swarm;
 use crate::swarm::control::Control;
 use crate::swarm::control::part::{Part, PartError};
 use crate::swarm::pace::{Pace, system_time};
-use crate::swarm::transport::{ControllerEnd, listen, targets};
+use crate::swarm::transport::{ControllerEnd, listen, target_of, targets};
 use diagnostics::Statistics;
 use drive::Drive;
+use leaders::{as_event, set_formation};
 pub use link::Link;
 use settings::Settings;
+use tape::{Sink, Tape};
 
 /// Name of the node unless `__node` says otherwise.
 pub const NAME: &str = "flockform";
@@ -85,6 +89,9 @@ pub struct FormationNode {
     statistics: Statistics,
     frame_id: String,
     swarm: Swarm,
+    names: Names,
+    /// What the tape of the link was last told.
+    was_active: bool,
     // Dropped after all that was made from it.
     _node: Node,
 }
@@ -137,6 +144,8 @@ impl FormationNode {
             statistics: Statistics::default(),
             frame_id: raw.frame_id.clone(),
             swarm: swarm.clone(),
+            was_active: false,
+            names,
             drives,
             clock,
             settings,
@@ -150,6 +159,17 @@ impl FormationNode {
             this.lifecycle.autostart(now, &mut |goal| act(control, goal));
         }
         Ok(this)
+    }
+
+    /// Gives a copy of everything from now on to `sink`.
+    ///
+    /// # Errors
+    /// A name that no topic can have.
+    pub fn record(&mut self, sink: Sink) -> Result<(), NameError> {
+        let mut tape = Tape::new(&self.names, &self.frame_id, sink)?;
+        tape.parameters(self.clock.now().unwrap_or_else(system_time), &self.control);
+        self.link.tape = Some(tape);
+        Ok(())
     }
 
     /// Ticks until `stop` is set.
@@ -170,6 +190,11 @@ impl FormationNode {
         &self.control
     }
 
+    /// Namespace of the node and its topics.
+    pub fn namespace(&self) -> &str {
+        self.names.namespace()
+    }
+
     /// One period: what arrived, the targets, what is published.
     pub fn tick(&mut self) {
         let begun = Instant::now();
@@ -181,6 +206,7 @@ impl FormationNode {
         // Without a clock there is no age, and so nobody to be believed.
         let Some(now) = self.clock.now() else { return };
         listen(&mut self.control, &mut self.link, now);
+        self.tell_tape(now, LoopEvent::TICK, "", &[now]);
         self.control.tick(now);
         self.publish(now);
         self.statistics.tick(begun.elapsed().as_secs_f64());
@@ -190,26 +216,53 @@ impl FormationNode {
     fn answer(&mut self, now: f64) {
         let control = &mut self.control;
         self.lifecycle.poll(now, &mut |goal| act(control, goal));
+        if self.lifecycle.is_active() != self.was_active {
+            self.was_active = self.lifecycle.is_active();
+            let kind = if self.was_active { LoopEvent::ACTIVE } else { LoopEvent::INACTIVE };
+            self.tell_tape(now, kind, "", &[]);
+        }
         for change in self.parameters.poll(now) {
             self.settings.apply(&change, &mut self.control, &mut self.pace);
+            let name = if change.name == "rate" { "period" } else { &change.name };
+            let value = tape::parameters(&self.control).into_iter().find(|(one, _)| *one == name);
+            if let Some((name, value)) = value {
+                self.tell_tape(now, LoopEvent::PARAMETER, name, &[value]);
+            }
         }
+        let mut told: Vec<(u8, String, Vec<f64>)> = Vec::new();
         let outcome = |success, message: &str| std_srvs::Outcome { success, message: message.into() };
         let control = &mut self.control;
         self.stop.serve(|_| {
             control.emergency_stop();
+            told.push((LoopEvent::EMERGENCY_STOP, String::new(), Vec::new()));
             outcome(true, "everybody holds its place until ~/resume")
         });
         self.resume.serve(|_| match control.resume() {
-            true => outcome(true, "the formation goes on"),
+            true => {
+                told.push((LoopEvent::RESUME, String::new(), Vec::new()));
+                outcome(true, "the formation goes on")
+            }
             false => outcome(false, "there is no emergency stop to lift"),
         });
         self.set_formation.serve(|request| match set_formation(control, &request) {
-            Ok(message) => SetFormationResponse { success: true, message },
+            Ok(message) => {
+                told.push(as_event(&request));
+                SetFormationResponse { success: true, message }
+            }
             Err(message) => SetFormationResponse { success: false, message },
         });
+        for (kind, text, values) in told {
+            self.tell_tape(now, kind, &text, &values);
+        }
         // A node that was switched off in an emergency stop stays off after it.
         if !self.lifecycle.is_active() {
             self.control.set_active(false);
+        }
+    }
+
+    fn tell_tape(&mut self, now: f64, kind: u8, text: &str, values: &[f64]) {
+        if let Some(tape) = &mut self.link.tape {
+            tape.event(now, kind, text, values);
         }
     }
 
@@ -232,23 +285,38 @@ impl FormationNode {
     /// What people and their tools look at, at their pace.
     fn report(&mut self, now: f64) {
         if self.statistics.is_due(diagnostics::STATE, now, self.settings.state_rate) {
-            let state = state::message(&self.control, &self.swarm.name, self.header(now), &self.statistics);
+            let state = state::message(
+                &self.control,
+                &self.swarm.name,
+                self.header(now),
+                self.statistics.last_tick(),
+            );
+            copy(&mut self.link.tape, &self.state, &state, now);
             self.statistics.sent(self.state.publish(&state));
             if let Some(topic) = &self.markers {
                 let markers = markers::message(&self.control, &self.swarm.raw, &self.header(now));
+                copy(&mut self.link.tape, topic, &markers, now);
                 self.statistics.sent(topic.publish(&markers));
             }
         }
         if self.statistics.is_due(diagnostics::DIAGNOSTICS, now, 1.0) {
-            let message = self.statistics.message(
-                &self.control,
-                &self.swarm.name,
-                self.header(now),
-                self.link.refused(),
-            );
+            let (header, refused) = (self.header(now), self.link.refused());
+            let message = self.statistics.message(&self.control, &self.swarm.name, header, refused);
+            copy(&mut self.link.tape, &self.diagnostics, &message, now);
             self.statistics.sent(self.diagnostics.publish(&message));
         }
     }
+}
+
+fn copy<M: super::edge::Message>(tape: &mut Option<Tape>, topic: &Publisher<M>, message: &M, now: f64) {
+    if let Some(tape) = tape {
+        tape.take(topic.topic(), message, [now; 2]);
+    }
+}
+
+/// Where a member is sent, as a message.
+pub fn target(control: &Control, member: usize, header: Header) -> Option<PoseStamped> {
+    target_of(control, member).map(|target| link::message(&target, header))
 }
 
 /// What a transition of the lifecycle asks for.
@@ -269,37 +337,3 @@ pub fn options(arguments: &RosArguments) -> Options {
 
 /// Names of topics under the rules given to a node.
 pub type TopicOf<'a> = &'a dyn Fn(&str, usize) -> Result<String, NodeError>;
-
-fn set_formation(control: &mut Control, request: &SetFormationRequest) -> Result<String, String> {
-    if !control.formation().is_led_here() {
-        return Err("the leaders are moved by a scene's program".into());
-    }
-    let time = control.program_time();
-    if !request.name.is_empty() {
-        let manoeuvre = control.formation().manoeuvre(&request.name, time);
-        let manoeuvre = manoeuvre.ok_or_else(|| {
-            let known: Vec<&str> =
-                control.formation().manoeuvres.iter().map(|manoeuvre| manoeuvre.name.as_str()).collect();
-            format!("there is no manoeuvre `{}`; there are: {}", request.name, known.join(", "))
-        })?;
-        control.begin(&manoeuvre);
-        return Ok(format!("manoeuvre `{}`, {} s", request.name, manoeuvre.duration()));
-    }
-    let SetFormationRequest { translate, rotate, stretch, shear, duration, .. } = *request;
-    let numbers = [translate[0], translate[1], rotate, stretch[0], stretch[1], shear[0], shear[1], duration];
-    if !numbers.iter().all(|number| number.is_finite()) {
-        return Err("a number is not finite".into());
-    }
-    if duration <= 0.0 {
-        return Err(format!("duration = {duration} s: give a positive one"));
-    }
-    if stretch[0] * stretch[1] == shear[0] * shear[1] {
-        return Err("stretch and shear would bring everybody onto one line or point".into());
-    }
-    let about = control.formation().middle();
-    let posture = Posture { translate, rotate, stretch, shear };
-    let from = control.formation().posture(about, time);
-    let leg = Leg { seconds: duration, hold: 0.0, posture };
-    control.begin(&Manoeuvre { about, from, legs: vec![leg] });
-    Ok(format!("under way for {duration} s"))
-}

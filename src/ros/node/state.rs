@@ -1,6 +1,5 @@
 //! The formation's state as a message.
 
-use super::diagnostics::Statistics;
 use crate::ros::messages::flockform_msgs::{FormationState, MemberState};
 use crate::ros::messages::geometry_msgs::{Point, Vector3};
 use crate::ros::messages::std_msgs::Header;
@@ -8,8 +7,8 @@ use crate::swarm::control::state::FormationState as State;
 use crate::swarm::control::{Control, Mode};
 use crate::swarm::watch::Health;
 
-/// What the last tick left.
-pub fn message(control: &Control, name: &str, header: Header, statistics: &Statistics) -> FormationState {
+/// What the last tick left, which took `elapsed` \[s\].
+pub fn message(control: &Control, name: &str, header: Header, elapsed: f64) -> FormationState {
     let state = State::of(control);
     let names = &control.formation().names;
     let members = state.members.iter().zip(names).map(|(member, name)| MemberState {
@@ -41,7 +40,7 @@ pub fn message(control: &Control, name: &str, header: Header, statistics: &Stati
         clearance: state.clearance,
         pe1_sum: state.pe1_sum,
         strain_max: state.strain_max,
-        elapsed: statistics.last_tick(),
+        elapsed,
         members: members.collect(),
     }
 }

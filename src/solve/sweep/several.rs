@@ -17,6 +17,7 @@
 use std::ops::Range;
 
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use crate::flock::neighbourhood::Neighbours;
 use crate::flock::real::Real;
@@ -43,7 +44,7 @@ impl Led<'_> {
 }
 
 /// Which bands changed in the last step, and what was swept so far.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Activity {
     /// For each coordinate and band; empty where nothing is known.
     changed: [Vec<bool>; 2],

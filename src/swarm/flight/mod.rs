@@ -13,6 +13,7 @@ use std::ops::ControlFlow;
 
 use super::control::Control;
 use super::robots::Robot;
+use super::watch::Pose;
 use crate::continuum::engine::Engine;
 use crate::continuum::plan::Plan;
 use crate::flock::points::distance;
@@ -70,9 +71,15 @@ impl Flight {
 
     /// Flies one period.
     pub fn step(&mut self) {
+        self.step_heard(&mut |_, _| {});
+    }
+
+    /// Flies one period; `hear` is shown what the control hears.
+    pub fn step_heard(&mut self, hear: &mut dyn FnMut(usize, Pose)) {
         let now = self.fleet.time();
         let control = &mut self.control;
         self.fleet.say(now, &mut |member, pose| {
+            hear(member, pose);
             // What is turned away is counted by the watch.
             let _ = control.receive(member, pose, now);
         });
@@ -99,11 +106,23 @@ pub fn fly(
     swarm: &Swarm,
     watch: &mut dyn FnMut(&Flight, &Sample) -> ControlFlow<()>,
 ) -> Result<(Record, FlightReport), SceneError> {
+    fly_heard(swarm, &mut |_, _| {}, watch)
+}
+
+/// As [`fly`]; `hear` is shown the poses that the control hears, before `watch` sees the period.
+///
+/// # Errors
+/// As [`Flight::new`].
+pub fn fly_heard(
+    swarm: &Swarm,
+    hear: &mut dyn FnMut(usize, Pose),
+    watch: &mut dyn FnMut(&Flight, &Sample) -> ControlFlow<()>,
+) -> Result<(Record, FlightReport), SceneError> {
     let mut flight = Flight::new(swarm)?;
     let mut record = Record::new(swarm, &flight);
     while flight.fleet.period() < flight.periods() {
         let before = flight.fleet.places();
-        flight.step();
+        flight.step_heard(hear);
         let sample = record.take(&flight, &before);
         if watch(&flight, &sample).is_break() {
             break;

@@ -97,17 +97,18 @@ pub fn serve<E: ControllerEnd>(
 
 /// The targets of the last tick.
 pub fn targets(control: &Control, part: &Part) -> Vec<Target> {
-    let target = |&member: &usize| {
-        let position = control.target(member)?;
-        let here = control.position(member).unwrap_or(position);
-        // A target says where to look too: ahead, or where the robot looks now.
-        let yaw = match [position[0] - here[0], position[1] - here[1]] {
-            [0.0, 0.0] => control.yaw(member).unwrap_or(0.0),
-            [x, y] => y.atan2(x),
-        };
-        Some(Target { member, position, yaw })
+    part.mine.iter().filter_map(|&member| target_of(control, member)).collect()
+}
+
+/// Where the last tick sends a member, and where it shall look: ahead, or where it looks now.
+pub fn target_of(control: &Control, member: usize) -> Option<Target> {
+    let position = control.target(member)?;
+    let here = control.position(member).unwrap_or(position);
+    let yaw = match [position[0] - here[0], position[1] - here[1]] {
+        [0.0, 0.0] => control.yaw(member).unwrap_or(0.0),
+        [x, y] => y.atan2(x),
     };
-    part.mine.iter().filter_map(target).collect()
+    Some(Target { member, position, yaw })
 }
 
 /// One period of simulated robots: everybody goes towards the newest of its `goals` \[m\], and says where it is at

@@ -1,6 +1,7 @@
-//! The definitions of the standard messages (ROS 2 Jazzy), without their comments.
+//! The definitions of the messages as text, for whoever has to be told what a payload is: recordings carry them.
 
-pub const DEFINITIONS: &[(&str, &str)] = &[
+/// Of the standard messages (ROS 2 Jazzy), without their comments, by `package/Name`.
+pub const STANDARD: &[(&str, &str)] = &[
     ("builtin_interfaces/Time", "int32 sec\nuint32 nanosec"),
     ("builtin_interfaces/Duration", "int32 sec\nuint32 nanosec"),
     ("std_msgs/Header", "builtin_interfaces/Time stamp\nstring frame_id"),
@@ -85,3 +86,83 @@ pub const DEFINITIONS: &[(&str, &str)] = &[
     ),
     ("visualization_msgs/MarkerArray", "Marker[] markers"),
 ];
+
+/// Of our own messages.
+pub const OWN: &[(&str, &str)] = &[
+    ("flockform_msgs/FormationState", include_str!("../../../msgs/flockform_msgs/msg/FormationState.msg")),
+    ("flockform_msgs/LoopEvent", include_str!("../../../msgs/flockform_msgs/msg/LoopEvent.msg")),
+    ("flockform_msgs/MemberState", include_str!("../../../msgs/flockform_msgs/msg/MemberState.msg")),
+];
+
+/// A message's definition followed by those of all messages that it contains, each after a line of equal signs
+/// and one that names it, as rosbag2 and Foxglove expect it (the encoding `ros2msg`). `None` for a message that
+/// has no definition here.
+pub fn concatenated(name: &str) -> Option<String> {
+    let mut text = trimmed(definition(name)?);
+    let mut named = vec![name.to_owned()];
+    let mut open = contained(name);
+    while !open.is_empty() {
+        let next = open.remove(0);
+        if named.contains(&next) {
+            continue;
+        }
+        let rule = "=".repeat(80);
+        text += &format!("{rule}\nMSG: {next}\n{}", trimmed(definition(&next)?));
+        open.extend(contained(&next));
+        named.push(next);
+    }
+    Some(text)
+}
+
+fn definition(name: &str) -> Option<&'static str> {
+    STANDARD.iter().chain(OWN).find(|(one, _)| *one == name).map(|(_, text)| *text)
+}
+
+fn trimmed(text: &str) -> String {
+    text.trim_end().lines().map(|line| format!("{}\n", line.trim())).collect()
+}
+
+/// The messages that are fields of a message; types without a package are of its own.
+fn contained(name: &str) -> Vec<String> {
+    let own = name.split('/').next().unwrap_or_default();
+    let kind = |line: &str| {
+        let kind = line.split('#').next()?.split_whitespace().next()?;
+        let kind = kind.split(['[', '<']).next()?.to_owned();
+        // Messages begin with a capital, numbers and texts do not.
+        let is_message = kind.rsplit('/').next()?.starts_with(|c: char| c.is_ascii_uppercase());
+        is_message.then(|| if kind.contains('/') { kind } else { format!("{own}/{kind}") })
+    };
+    definition(name).unwrap_or_default().lines().filter_map(kind).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_definition_brings_all_that_it_contains_and_each_once() {
+        let text = concatenated("geometry_msgs/PoseStamped").expect("known");
+        let parts: Vec<&str> = text.split(&"=".repeat(80)).collect();
+        assert!(parts[0].starts_with("std_msgs/Header header\nPose pose\n"), "{text}");
+        let named: Vec<&str> =
+            parts[1..].iter().map(|part| part.trim().lines().next().expect("a name")).collect();
+        assert_eq!(
+            named,
+            [
+                "MSG: std_msgs/Header",
+                "MSG: geometry_msgs/Pose",
+                "MSG: builtin_interfaces/Time",
+                "MSG: geometry_msgs/Point",
+                "MSG: geometry_msgs/Quaternion",
+            ]
+        );
+    }
+
+    #[test]
+    fn every_message_has_all_its_parts() {
+        for (name, _) in STANDARD.iter().chain(OWN) {
+            assert!(concatenated(name).is_some(), "{name}");
+        }
+        assert_eq!(concatenated("geometry_msgs/Wrench"), None);
+    }
+}

@@ -1,0 +1,248 @@
+//! Checkpoints of a stepped run: when one is due, and how a run is taken up again.
+
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+use std::time::{Duration, Instant};
+
+use clap::Args;
+use flockform::continuum::engine::Engine;
+use flockform::continuum::engine::state::EngineState;
+use flockform::continuum::record::{ProbeSeries, Snapshot};
+use flockform::export::checkpoint::{Asked, Checkpoint, CheckpointError};
+use flockform::export::{ExportError, OutputFolder, VtkSeries, unfinished};
+use flockform::scene::Scene;
+
+#[derive(Debug, Args)]
+pub struct CheckpointArguments {
+    /// Keep a checkpoint every so often, to go on from if the run is killed: 60s, 10min, 2h, 5000steps or
+    /// never; may be given twice
+    #[arg(long, value_name = "INTERVAL", default_value = "60s")]
+    checkpoint_every: Vec<Interval>,
+    /// Go on with the run to this --out that was killed or interrupted; its results are the same to the bit
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["out", "force", "record"])]
+    pub resume: Option<PathBuf>,
+}
+
+/// How long a killed run may have gone on for nothing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Interval {
+    Time(Duration),
+    Steps(usize),
+    Never,
+}
+
+impl FromStr for Interval {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong = || {
+            format!("`{text}` is no interval: give a number above 0 with ms, s, min, h or steps, or never")
+        };
+        let text = text.trim();
+        if text == "never" {
+            return Ok(Interval::Never);
+        }
+        let unit = text.find(|c: char| c.is_ascii_alphabetic() && c != 'e').ok_or_else(wrong)?;
+        let (number, unit) = (text[..unit].trim(), &text[unit..]);
+        if matches!(unit, "steps" | "step") {
+            let steps: usize = number.parse().map_err(|_| wrong())?;
+            return if steps > 0 { Ok(Interval::Steps(steps)) } else { Err(wrong()) };
+        }
+        let seconds = match unit {
+            "ms" => 1e-3,
+            "s" => 1.0,
+            "min" => 60.0,
+            "h" => 3600.0,
+            _ => return Err(wrong()),
+        };
+        let number: f64 = number.parse().map_err(|_| wrong())?;
+        let time = Duration::try_from_secs_f64(number * seconds).map_err(|_| wrong())?;
+        if time.is_zero() { Err(wrong()) } else { Ok(Interval::Time(time)) }
+    }
+}
+
+impl CheckpointArguments {
+    /// The run to go on with, if that is asked for.
+    pub fn left(&self) -> Result<Option<Left>, CheckpointError> {
+        self.resume.as_deref().map(Left::find).transpose()
+    }
+}
+
+/// A run that was killed or interrupted.
+pub struct Left {
+    pub checkpoint: Checkpoint<'static>,
+    /// Where it stands.
+    folder: PathBuf,
+    /// Where its results shall go.
+    out: PathBuf,
+}
+
+impl Left {
+    /// A killed run stands beside the place of its results, an interrupted one in it.
+    fn find(dir: &Path) -> Result<Self, CheckpointError> {
+        let stem = dir.file_stem().filter(|_| dir.extension().is_some_and(|ending| ending == "unfinished"));
+        let out = stem.map_or_else(|| dir.to_owned(), |stem| dir.with_file_name(stem));
+        for folder in [unfinished(&out), out.clone()] {
+            if let Some(checkpoint) = Checkpoint::read(&folder)? {
+                return Ok(Self { checkpoint, folder, out });
+            }
+        }
+        Err(CheckpointError::Nothing { unfinished: unfinished(&out), out })
+    }
+
+    /// Refuses to go on with another scene.
+    pub fn require_of(&self, scene: &Scene, digest: u64) -> Result<(), CheckpointError> {
+        self.checkpoint.require_of(&self.folder, scene, digest)
+    }
+
+    /// The folder to go on filling.
+    pub fn open(&self) -> Result<OutputFolder, ExportError> {
+        if self.folder == self.out {
+            return OutputFolder::create(&self.out, true);
+        }
+        OutputFolder::reopen(&self.out, self.checkpoint.asked.force)
+    }
+
+    /// The frames that were written before the checkpoint.
+    pub fn frames(&self, folder: &OutputFolder, every: usize) -> Result<VtkSeries, ExportError> {
+        let from = if self.folder == self.out { &self.out } else { folder.folder() };
+        VtkSeries::resume(folder, from, (0..=self.checkpoint.engine.step()).step_by(every))
+    }
+
+    /// What an engine that does not fit is refused with.
+    pub fn foreign(folder: &OutputFolder, what: &dyn std::error::Error) -> CheckpointError {
+        CheckpointError::Foreign { path: folder.folder().to_owned(), what: what.to_string() }
+    }
+}
+
+/// What a recorder has kept so far.
+pub struct Kept<'a> {
+    pub snapshots: &'a [Snapshot],
+    pub probes: &'a [ProbeSeries],
+    pub frames: Option<&'a mut VtkSeries>,
+}
+
+/// Writes checkpoints when they are due.
+pub struct Keeper<'a> {
+    every: &'a [Interval],
+    asked: Asked,
+    scene: &'a Scene,
+    digest: u64,
+    start: Instant,
+    /// Time that earlier runs have taken.
+    before: Duration,
+    last: Instant,
+    last_step: usize,
+}
+
+impl<'a> Keeper<'a> {
+    pub fn new(
+        arguments: &'a CheckpointArguments,
+        (asked, scene, digest): (Asked, &'a Scene, u64),
+        left: Option<&Left>,
+    ) -> Self {
+        let (before, last_step) = left
+            .map_or((Duration::ZERO, 0), |left| (left.checkpoint.stepping, left.checkpoint.engine.step()));
+        let start = Instant::now();
+        Self {
+            every: &arguments.checkpoint_every,
+            asked,
+            scene,
+            digest,
+            start,
+            before,
+            last: start,
+            last_step,
+        }
+    }
+
+    /// Time taken for the steps by this run and those before it.
+    pub fn stepping(&self) -> Duration {
+        self.before + self.start.elapsed()
+    }
+
+    pub fn is_due(&self, step: usize) -> bool {
+        // A solved body has no way to go on.
+        self.scene.equilibrium.is_none()
+            && self.every.iter().any(|interval| match interval {
+                Interval::Time(time) => self.last.elapsed() >= *time,
+                Interval::Steps(steps) => step >= self.last_step + steps,
+                Interval::Never => false,
+            })
+    }
+
+    /// Keeps the run as it is now, to be gone on with if it is killed. One that cannot be written does not end
+    /// the run.
+    pub fn keep(&mut self, folder: &mut OutputFolder, engine: (&Engine, f64), mut kept: Kept<'_>) {
+        (self.last_step, self.last) = (engine.0.step(), Instant::now());
+        if let Err(error) = self.try_to_keep(folder, engine, &mut kept) {
+            tracing::warn!("no checkpoint at step {}: {error}", self.last_step);
+            return;
+        }
+        let took = self.last.elapsed();
+        tracing::debug!("checkpoint of step {} in {took:.1?}", self.last_step);
+        self.last = Instant::now();
+    }
+
+    fn try_to_keep(
+        &self,
+        folder: &mut OutputFolder,
+        engine: (&Engine, f64),
+        kept: &mut Kept<'_>,
+    ) -> Result<(), ExportError> {
+        if let Some(frames) = &mut kept.frames {
+            frames.sync()?;
+        }
+        // Before the folder takes its name: that one is never without a checkpoint.
+        self.write(folder, engine, kept)?;
+        folder.keep_unfinished()?;
+        if let Some(frames) = &mut kept.frames {
+            frames.moved(folder);
+        }
+        Ok(())
+    }
+
+    /// Leaves a checkpoint among the results of an interrupted run.
+    pub fn leave(&self, folder: &OutputFolder, engine: (&Engine, f64), kept: &Kept<'_>) {
+        let is_asked = self.every.iter().any(|interval| *interval != Interval::Never);
+        if self.scene.equilibrium.is_some() || !is_asked {
+            return;
+        }
+        if let Err(error) = self.write(folder, engine, kept) {
+            tracing::warn!("the interrupted run cannot be resumed: {error}");
+        }
+    }
+
+    fn write(
+        &self,
+        folder: &OutputFolder,
+        (engine, residual): (&Engine, f64),
+        kept: &Kept<'_>,
+    ) -> Result<(), ExportError> {
+        let of = (&self.asked, self.scene, self.digest);
+        let recorded = (kept.snapshots, kept.probes);
+        let state = (EngineState::of(engine), residual);
+        Checkpoint::new(of, state, recorded, self.stepping()).write(folder.folder())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_interval_is_a_number_with_its_unit() {
+        let read = |text: &str| text.parse::<Interval>();
+        assert_eq!(read("60s"), Ok(Interval::Time(Duration::from_secs(60))));
+        assert_eq!(read("1.5 min"), Ok(Interval::Time(Duration::from_secs(90))));
+        assert_eq!(read("2h"), Ok(Interval::Time(Duration::from_secs(7200))));
+        assert_eq!(read("250ms"), Ok(Interval::Time(Duration::from_millis(250))));
+        assert_eq!(read("1e3s"), Ok(Interval::Time(Duration::from_secs(1000))));
+        assert_eq!(read("500steps"), Ok(Interval::Steps(500)));
+        assert_eq!(read("never"), Ok(Interval::Never));
+        for wrong in ["", "60", "0s", "-1s", "nan s", "0steps", "1.5steps", "3weeks", "1e400s", "s"] {
+            let error = read(wrong).expect_err(wrong);
+            assert!(error.contains("min, h or steps"), "{error}");
+        }
+    }
+}

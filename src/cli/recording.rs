@@ -1,0 +1,38 @@
+//! `--record FILE.mcap`: a recording beside what a command does.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use flockform::record::Shared;
+use flockform::record::{About, RecordError, Recording};
+
+#[derive(Debug, Args)]
+pub struct RecordArguments {
+    /// Record what is heard, told and sent as an MCAP file, for Foxglove, `ros2 bag play` and `flockform replay`
+    #[arg(long, value_name = "FILE.mcap")]
+    record: Option<PathBuf>,
+}
+
+impl RecordArguments {
+    /// The recording, if one is asked for; a file in its place is replaced with `force` alone.
+    pub fn open(&self, about: &About, force: bool) -> Result<Option<Shared>, RecordError> {
+        let path = self.record.as_deref();
+        Ok(path.map(|path| Recording::create(path, about, force)).transpose()?.map(Shared::new))
+    }
+
+    /// Refuses a recording of what has none.
+    pub fn require_none(&self, what: &'static str) -> Result<(), RecordError> {
+        match &self.record {
+            None => Ok(()),
+            Some(_) => Err(RecordError::NotRecorded { what }),
+        }
+    }
+}
+
+/// Closes a recording; what was recorded, in words.
+pub fn close(shared: Option<Shared>) -> Result<String, RecordError> {
+    let Some(recording) = shared.and_then(|shared| shared.take()) else { return Ok(String::new()) };
+    let messages = recording.messages();
+    let path = recording.finish()?;
+    Ok(format!("{messages} messages recorded in {}\n", path.display()))
+}

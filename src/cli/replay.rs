@@ -1,0 +1,83 @@
+//! `flockform replay`: a recorded flight through today's loop.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Args;
+use flockform::record::Reader;
+use flockform::record::replay::{Report, recorded_swarm, replay as fly_again};
+
+use super::swarm::SwarmFileArguments;
+use super::{FAILED, Refusal, print};
+
+#[derive(Debug, Args)]
+pub struct ReplayArguments {
+    /// An MCAP file that --record, or `ros2 bag record -s mcap`, has written
+    recording: PathBuf,
+    /// Bundled swarm or swarm file to fly by [default: the one in the recording]
+    #[arg(long, value_name = "SWARM")]
+    swarm: Option<String>,
+    /// Override a key of the swarm, after those of the recording
+    #[arg(long = "set", value_name = "KEY.PATH=VALUE")]
+    set: Vec<String>,
+    /// Largest distance of a target from the recorded one that is none \[m\]
+    #[arg(long, value_name = "METRES", default_value = "1e-6", value_parser = tolerance)]
+    tolerance: f64,
+    /// Print JSON instead of a table
+    #[arg(long)]
+    json: bool,
+}
+
+fn tolerance(text: &str) -> Result<f64, String> {
+    let number: Option<f64> = text.parse().ok().filter(|number: &f64| number.is_finite() && *number >= 0.0);
+    number.ok_or_else(|| "give a distance in metres, 0 or more".to_owned())
+}
+
+/// Replays a flight and says where today's targets are others than the recorded ones.
+pub fn replay(arguments: &ReplayArguments) -> Result<ExitCode, Refusal> {
+    let reader = Reader::open(&arguments.recording)?;
+    let swarm = match &arguments.swarm {
+        Some(swarm) => SwarmFileArguments { swarm: swarm.clone(), set: arguments.set.clone() }.load()?,
+        None => recorded_swarm(&reader, &arguments.set)?,
+    };
+    let report = fly_again(&reader, &swarm, arguments.tolerance)?;
+    if arguments.json {
+        print(&format!("{:#}\n", serde_json::json!(report)));
+    } else {
+        print(&words(&report));
+    }
+    Ok(if report.holds() { ExitCode::SUCCESS } else { ExitCode::from(FAILED) })
+}
+
+fn words(report: &Report) -> String {
+    let mut words = format!(
+        "{}: {} ticks and {} poses of `{}` replayed\n",
+        report.recording.display(),
+        report.ticks,
+        report.poses,
+        report.swarm
+    );
+    if let Some(damage) = &report.damage {
+        words += &format!("caution: the file breaks off: {damage}\n");
+    }
+    let width = report.robots.iter().map(|robot| robot.name.len()).max().unwrap_or(0).max(5);
+    words += &format!(
+        "{:width$}  {:>8}  {:>7}  {:>7}  {:>12}  {:>12}  {:>12}\n",
+        "robot", "targets", "differ", "missing", "largest [m]", "at [s]", "first at [s]"
+    );
+    let time = |time: Option<f64>| time.map_or("-".to_owned(), |time| format!("{time:.3}"));
+    for robot in &report.robots {
+        words += &format!(
+            "{:width$}  {:>8}  {:>7}  {:>7}  {:>12.3e}  {:>12}  {:>12}\n",
+            robot.name,
+            robot.recorded,
+            robot.differ,
+            robot.only_recorded + robot.only_replayed,
+            robot.largest,
+            time(robot.largest_at),
+            time(robot.first_at)
+        );
+    }
+    let verdict = if report.holds() { "within" } else { "NOT within" };
+    words + &format!("largest difference {:e} m, {verdict} {:e} m\n", report.largest(), report.tolerance)
+}

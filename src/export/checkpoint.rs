@@ -1,0 +1,381 @@
+//! `checkpoint`: a stepped run on its way, so that a killed one can go on ([`crate::continuum::run::resume`]).
+//!
+//! | bytes | what |
+//! |---|---|
+//! | 8 | `FLOCKFRM` |
+//! | 4 | version of this layout, little-endian |
+//! | 8 | length of the payload |
+//! | 4 | CRC-32 of the payload |
+//! | rest | the payload: [`Checkpoint`] in [postcard](https://postcard.jamesmunns.com)'s wire format (numbers \[f64\] as their 8 bytes, little-endian) |
+//!
+//! It is written beside its place, brought to the disk and then renamed, so that there is always a whole one.
+
+use std::borrow::Cow;
+use std::fs::{self, File};
+use std::io::{ErrorKind, Write};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use super::error::ExportError;
+use crate::continuum::engine::state::EngineState;
+use crate::continuum::record::{ProbeSeries, Snapshot};
+use crate::scene::Scene;
+
+/// Its name in the folder of the run.
+pub const FILE: &str = "checkpoint";
+const PART: &str = "checkpoint.part";
+const MAGIC: [u8; 8] = *b"FLOCKFRM";
+const VERSION: u32 = 1;
+const HEADER: usize = 24;
+const PROGRAM_VERSION: &str = env!("CARGO_PKG_VERSION");
+
+/// A run on its way: what it was asked, where it is, and what it has recorded.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Checkpoint<'a> {
+    /// Version of the program: another one may round otherwise.
+    program: Cow<'a, str>,
+    pub asked: Asked,
+    /// The scene as JSON, overrides and defaults included.
+    scene: String,
+    /// [`crate::continuum::engine::state::digest`] of the plan.
+    digest: u64,
+    pub engine: EngineState,
+    /// Largest one-step motion over the spacing, at the last step; infinite before the first.
+    pub residual: f64,
+    pub snapshots: Cow<'a, [Snapshot]>,
+    pub probes: Cow<'a, [ProbeSeries]>,
+    /// Time taken for the steps so far.
+    pub stepping: Duration,
+}
+
+/// What the program was told, so that it need not be told again.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Asked {
+    /// Name of a bundled scene, or the absolute path of a file.
+    pub scene: String,
+    /// Overrides, as given.
+    pub set: Vec<String>,
+    /// Whether former outputs may be replaced.
+    pub force: bool,
+}
+
+/// Why a run cannot go on from a checkpoint.
+#[derive(Debug, thiserror::Error)]
+pub enum CheckpointError {
+    #[error(
+        "there is nothing to resume: neither {} nor {} holds a checkpoint\n  help: start the run again; one that ends by itself leaves none, and the first is written after --checkpoint-every",
+        .unfinished.display(), .out.display()
+    )]
+    Nothing { unfinished: PathBuf, out: PathBuf },
+    #[error("{} cannot be read: {source}", .path.display())]
+    Unreadable { path: PathBuf, source: std::io::Error },
+    #[error("{} is no checkpoint of flockform\n  help: give the folder of a run; remove the file to start again", .path.display())]
+    NotOne { path: PathBuf },
+    #[error(
+        "{} is truncated: it has {found} bytes of {needed}\n  help: restore it from a copy, or remove it and start the run again",
+        .path.display()
+    )]
+    Truncated { path: PathBuf, found: u64, needed: u64 },
+    #[error(
+        "{} is corrupted: {what}\n  help: restore it from a copy, or remove it and start the run again",
+        .path.display()
+    )]
+    Corrupted { path: PathBuf, what: String },
+    #[error(
+        "{} is of {found}, this is {known}: the same bits cannot be promised\n  help: resume with the program that wrote it, or remove it and start the run again",
+        .path.display()
+    )]
+    Version { path: PathBuf, found: String, known: String },
+    #[error(
+        "{} belongs to another scene: {what}\n  help: resume with the scene that was run, or start this one with another --out",
+        .path.display()
+    )]
+    Foreign { path: PathBuf, what: String },
+}
+
+impl<'a> Checkpoint<'a> {
+    /// Of a run whose plan had this `digest`.
+    pub fn new(
+        (asked, scene, digest): (&Asked, &Scene, u64),
+        (engine, residual): (EngineState, f64),
+        (snapshots, probes): (&'a [Snapshot], &'a [ProbeSeries]),
+        stepping: Duration,
+    ) -> Self {
+        Self {
+            program: Cow::Borrowed(PROGRAM_VERSION),
+            asked: asked.clone(),
+            scene: as_json(scene),
+            digest,
+            engine,
+            residual,
+            snapshots: Cow::Borrowed(snapshots),
+            probes: Cow::Borrowed(probes),
+            stepping,
+        }
+    }
+
+    /// Takes the place of the former checkpoint in the folder when it is whole on the disk.
+    pub fn write(&self, folder: &Path) -> Result<(), ExportError> {
+        let (part, path) = (folder.join(PART), folder.join(FILE));
+        let bytes = self.bytes().map_err(ExportError::io("write", &path))?;
+        let write = || {
+            let mut file = File::create(&part)?;
+            file.write_all(&bytes)?;
+            file.sync_all()?;
+            fs::rename(&part, &path)?;
+            sync_folder(folder)
+        };
+        write().map_err(ExportError::io("write", &path))
+    }
+
+    fn bytes(&self) -> std::io::Result<Vec<u8>> {
+        let blank = vec![0; HEADER];
+        let mut bytes = postcard::to_extend(self, blank).map_err(std::io::Error::other)?;
+        let length = (bytes.len() - HEADER) as u64;
+        let sum = crc32fast::hash(&bytes[HEADER..]);
+        bytes[..8].copy_from_slice(&MAGIC);
+        bytes[8..12].copy_from_slice(&VERSION.to_le_bytes());
+        bytes[12..20].copy_from_slice(&length.to_le_bytes());
+        bytes[20..24].copy_from_slice(&sum.to_le_bytes());
+        Ok(bytes)
+    }
+
+    /// Refuses to go on with another scene, or with files of it that have changed.
+    ///
+    /// # Errors
+    /// [`CheckpointError::Foreign`] names the first key that differs.
+    pub fn require_of(&self, folder: &Path, scene: &Scene, digest: u64) -> Result<(), CheckpointError> {
+        let path = folder.join(FILE);
+        let now = as_json(scene);
+        if self.scene != now {
+            let parsed = |text: &str| serde_json::from_str::<Value>(text).unwrap_or_default();
+            let differs = first_difference(&parsed(&self.scene), &parsed(&now), String::new());
+            let what = differs.unwrap_or_else(|| "it is written otherwise".to_owned());
+            return Err(CheckpointError::Foreign { path, what });
+        }
+        if self.digest != digest {
+            let what =
+                "the keys are the same, but the body, or a file that the scene names, is not".to_owned();
+            return Err(CheckpointError::Foreign { path, what });
+        }
+        Ok(())
+    }
+}
+
+impl Checkpoint<'static> {
+    /// Reads the checkpoint of a folder; `None` if there is none.
+    ///
+    /// # Errors
+    /// One that cannot be read, is not whole, or was written by another version.
+    pub fn read(folder: &Path) -> Result<Option<Self>, CheckpointError> {
+        let path = folder.join(FILE);
+        match fs::read(&path) {
+            Ok(bytes) => Self::of_bytes(&path, &bytes).map(Some),
+            Err(source) if source.kind() == ErrorKind::NotFound => Ok(None),
+            Err(source) => Err(CheckpointError::Unreadable { path, source }),
+        }
+    }
+
+    fn of_bytes(path: &Path, bytes: &[u8]) -> Result<Self, CheckpointError> {
+        let path = || path.to_owned();
+        let begins = bytes.len().min(MAGIC.len());
+        if bytes[..begins] != MAGIC[..begins] {
+            return Err(CheckpointError::NotOne { path: path() });
+        }
+        if bytes.len() < HEADER {
+            let (found, needed) = (bytes.len() as u64, HEADER as u64);
+            return Err(CheckpointError::Truncated { path: path(), found, needed });
+        }
+        let four = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().expect("four bytes"));
+        let version = four(8);
+        if version != VERSION {
+            let (found, known) = (format!("layout {version}"), format!("layout {VERSION}"));
+            return Err(CheckpointError::Version { path: path(), found, known });
+        }
+        let length = u64::from_le_bytes(bytes[12..20].try_into().expect("eight bytes"));
+        let (found, needed) = (bytes.len() as u64, length.saturating_add(HEADER as u64));
+        if found < needed {
+            return Err(CheckpointError::Truncated { path: path(), found, needed });
+        }
+        let corrupted = |what: &str| CheckpointError::Corrupted { path: path(), what: what.to_owned() };
+        if found > needed {
+            return Err(corrupted("bytes follow its end"));
+        }
+        if crc32fast::hash(&bytes[HEADER..]) != four(20) {
+            return Err(corrupted("its checksum is another"));
+        }
+        // The version comes first, since another one may hold other things behind it.
+        let program: &str = postcard::take_from_bytes(&bytes[HEADER..])
+            .map(|(program, _)| program)
+            .map_err(|_| corrupted("it names no version of flockform"))?;
+        if program != PROGRAM_VERSION {
+            let (found, known) = (format!("flockform {program}"), format!("flockform {PROGRAM_VERSION}"));
+            return Err(CheckpointError::Version { path: path(), found, known });
+        }
+        postcard::from_bytes(&bytes[HEADER..])
+            .map_err(|error| corrupted(&format!("its checksum is right, but {error}")))
+    }
+}
+
+/// Removes what checkpoints have left in a folder.
+pub fn remove(folder: &Path) {
+    for name in [PART, FILE] {
+        match fs::remove_file(folder.join(name)) {
+            Err(error) if error.kind() != ErrorKind::NotFound => {
+                tracing::warn!("{} is left in {}: {error}", name, folder.display());
+            }
+            _ => {}
+        }
+    }
+}
+
+/// A name that was given in a folder outlives a power cut only when the folder itself is on the disk.
+fn sync_folder(folder: &Path) -> std::io::Result<()> {
+    if cfg!(unix) { File::open(folder)?.sync_all() } else { Ok(()) }
+}
+
+fn as_json(scene: &Scene) -> String {
+    serde_json::to_string(&scene.raw).expect("a scene was read from text")
+}
+
+/// The first key with another value, and both values.
+fn first_difference(then: &Value, now: &Value, key: String) -> Option<String> {
+    if then == now {
+        return None;
+    }
+    let at = |name: &str| if key.is_empty() { name.to_owned() } else { format!("{key}.{name}") };
+    match (then, now) {
+        (Value::Object(a), Value::Object(b)) => {
+            let names = a.keys().chain(b.keys().filter(|name| !a.contains_key(*name)));
+            names.into_iter().find_map(|name| {
+                let of = |map: &serde_json::Map<_, _>| map.get(name).cloned().unwrap_or_default();
+                first_difference(&of(a), &of(b), at(name))
+            })
+        }
+        (Value::Array(a), Value::Array(b)) if a.len() == b.len() => {
+            let pairs = a.iter().zip(b).enumerate();
+            pairs.into_iter().find_map(|(n, (a, b))| first_difference(a, b, format!("{key}[{n}]")))
+        }
+        _ => Some(format!("`{key}` was {}, is {}", shortly(then), shortly(now))),
+    }
+}
+
+fn shortly(value: &Value) -> String {
+    let text = value.to_string();
+    match text.char_indices().nth(60) {
+        Some((end, _)) => format!("{}...", &text[..end]),
+        None => text,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::continuum::engine::Engine;
+    use crate::continuum::engine::state::digest;
+    use crate::continuum::plan::Plan;
+    use crate::scene::bundled;
+
+    fn scene(sets: &[&str]) -> Scene {
+        let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
+        bundled("tension").expect("bundled").load(&sets).expect("valid")
+    }
+
+    fn written(folder: &Path) -> (EngineState, Vec<u8>) {
+        let scene = scene(&[]);
+        let plan = Plan::new(&scene).expect("fits");
+        let sum = digest(&plan);
+        let mut engine = Engine::new(plan);
+        let mut probe = ProbeSeries::new(66);
+        for _ in 0..25 {
+            engine.advance();
+            probe.record(&engine);
+        }
+        let asked = Asked { scene: "tension".into(), set: vec!["a.b=1".into()], force: false };
+        let state = EngineState::of(&engine);
+        let (snapshots, probes) = ([Snapshot::of(&engine)], [probe]);
+        let checkpoint = Checkpoint::new(
+            (&asked, &scene, sum),
+            (state.clone(), f64::INFINITY),
+            (&snapshots, &probes),
+            Duration::from_millis(1500),
+        );
+        checkpoint.write(folder).expect("written");
+        (state, fs::read(folder.join(FILE)).expect("there"))
+    }
+
+    #[test]
+    fn what_is_written_is_read_back_to_the_bit() {
+        let folder = tempfile::tempdir().expect("a folder");
+        assert!(Checkpoint::read(folder.path()).expect("readable").is_none());
+        let (state, _) = written(folder.path());
+        let read = Checkpoint::read(folder.path()).expect("readable").expect("there");
+        assert_eq!(read.engine, state);
+        assert_eq!(read.residual, f64::INFINITY);
+        assert_eq!(read.stepping, Duration::from_millis(1500));
+        assert_eq!((read.snapshots.len(), read.probes[0].pe1.len()), (1, 25));
+        assert_eq!(read.snapshots[0].step, 25);
+        let left: Vec<_> = fs::read_dir(folder.path()).expect("readable").flatten().collect();
+        assert_eq!(left.len(), 1, "{left:?}");
+    }
+
+    #[test]
+    fn every_truncation_and_every_flipped_bit_is_refused() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let (_, bytes) = written(folder.path());
+        let path = folder.path().join(FILE);
+        for length in (0..bytes.len()).step_by(97).chain(0..40) {
+            let error = Checkpoint::of_bytes(&path, &bytes[..length]).expect_err("truncated");
+            assert!(matches!(error, CheckpointError::Truncated { .. }), "{length}: {error}");
+        }
+        for at in (0..bytes.len()).step_by(61).chain(0..40) {
+            let mut bytes = bytes.clone();
+            bytes[at] ^= 0x10;
+            let error = Checkpoint::of_bytes(&path, &bytes).expect_err("corrupted").to_string();
+            let expected = match at {
+                0..8 => "is no checkpoint of flockform",
+                8..12 => "layout",
+                12..20 => "",
+                _ => "is corrupted: its checksum is another",
+            };
+            assert!(error.contains(expected) && error.contains("help:"), "byte {at}: {error}");
+        }
+        let longer = [&bytes[..], &[0]].concat();
+        let error = Checkpoint::of_bytes(&path, &longer).expect_err("too long").to_string();
+        assert!(error.contains("bytes follow its end"), "{error}");
+    }
+
+    #[test]
+    fn another_program_s_checkpoint_is_refused_by_its_version() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let (_, mut bytes) = written(folder.path());
+        // The payload begins with the length of the version and the version.
+        assert_eq!(&bytes[HEADER + 1..HEADER + 1 + PROGRAM_VERSION.len()], PROGRAM_VERSION.as_bytes());
+        bytes[HEADER + 1] = b'9';
+        let sum = crc32fast::hash(&bytes[HEADER..]);
+        bytes[20..24].copy_from_slice(&sum.to_le_bytes());
+        let error = Checkpoint::of_bytes(&folder.path().join(FILE), &bytes).expect_err("other").to_string();
+        assert!(error.contains("flockform 9.") && error.contains(PROGRAM_VERSION), "{error}");
+    }
+
+    #[test]
+    fn a_foreign_scene_is_refused_by_its_key() {
+        let folder = tempfile::tempdir().expect("a folder");
+        written(folder.path());
+        let read = Checkpoint::read(folder.path()).expect("readable").expect("there");
+        let held = |sets: &[&str]| {
+            let scene = scene(sets);
+            read.require_of(folder.path(), &scene, digest(&Plan::new(&scene).expect("fits")))
+        };
+        held(&[]).expect("the same");
+        let error = held(&["lattice.spacing=2.0"]).expect_err("another").to_string();
+        assert!(error.contains("`lattice.spacing` was 1.0, is 2.0"), "{error}");
+        let error = held(&["roles[1].motion.per_step=[0.5, 0.0]"]).expect_err("another").to_string();
+        assert!(error.contains("`roles[1].motion.per_step[0]` was 0.6, is 0.5"), "{error}");
+        let error = read.require_of(folder.path(), &scene(&[]), 0).expect_err("changed file").to_string();
+        assert!(error.contains("a file that the scene names"), "{error}");
+    }
+}

@@ -1,0 +1,209 @@
+//! A continuum run as messages: its particles as poses, markers and, for small bodies, members of a formation.
+//!
+//! A step is a twentieth of a second, so that players show twenty of them a second.
+
+use super::RecordError;
+use crate::continuum::engine::Engine;
+use crate::flock::points::distance;
+use crate::flock::role::Role;
+use crate::flock::strain::Strain;
+use crate::ros::arguments::Names;
+use crate::ros::messages::builtin_interfaces::Time;
+use crate::ros::messages::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus, KeyValue};
+use crate::ros::messages::flockform_msgs::{FormationState, MemberState};
+use crate::ros::messages::geometry_msgs::{Point, Pose, PoseArray, Vector3};
+use crate::ros::messages::std_msgs::{ColorRGBA, Header};
+use crate::ros::messages::visualization_msgs::{Marker, MarkerArray};
+use crate::ros::node::NAME;
+use crate::ros::node::tape::{Sink, Tape};
+use crate::scene::Scene;
+
+/// \[s\]
+pub const STEP: f64 = 0.05;
+/// Steps recorded at most, unless the scene says how often.
+const FRAMES: usize = 500;
+/// Larger bodies are recorded without what a player could not show of them: members, then bonds.
+const MOST_MEMBERS: usize = 5_000;
+const MOST_BONDS: usize = 200_000;
+/// Strain at which a bond has its full colour \[1\].
+const FULL_STRAIN: f64 = 0.3;
+
+/// Writes down a run, step by step.
+pub struct BodyTape {
+    tape: Tape,
+    name: String,
+    every: usize,
+    solved: bool,
+    last: Option<usize>,
+    poses: String,
+    markers: String,
+    state: String,
+    diagnostics: String,
+}
+
+impl BodyTape {
+    /// Every `record.vtk_every` steps, or about 500 of them all.
+    ///
+    /// # Errors
+    /// None for the names of this program.
+    pub fn new(scene: &Scene, sink: Sink) -> Result<Self, RecordError> {
+        let names = Names::new(NAME, "/", &[])?;
+        let every = match scene.record.vtk_every {
+            0 => scene.stop.steps.div_ceil(FRAMES).max(1),
+            every => every,
+        };
+        Ok(Self {
+            tape: Tape::new(&names, "world", sink)?,
+            name: scene.name.clone(),
+            solved: scene.equilibrium.is_some(),
+            every,
+            last: None,
+            poses: names.topic("~/poses")?,
+            markers: names.topic("~/markers")?,
+            state: names.topic("~/state")?,
+            diagnostics: names.topic("/diagnostics")?,
+        })
+    }
+
+    /// A step; most are passed over.
+    pub fn step(&mut self, engine: &Engine, residual: f64) {
+        if self.solved || engine.step().is_multiple_of(self.every) {
+            self.take(engine, residual);
+        }
+    }
+
+    /// The last step is always recorded.
+    pub fn finish(mut self, engine: &Engine, residual: f64) {
+        if self.last != Some(engine.step()) {
+            self.take(engine, residual);
+        }
+    }
+
+    fn take(&mut self, engine: &Engine, residual: f64) {
+        self.last = Some(engine.step());
+        let time = engine.step() as f64 * STEP;
+        let header = Header { stamp: Time::from_seconds(time), frame_id: "world".into() };
+        let times = [time; 2];
+        let poses = engine.present().iter().map(|place| Pose::planar(place, 0.0)).collect();
+        self.tape.take(&self.poses, &PoseArray { header: header.clone(), poses }, times);
+        self.tape.take(&self.markers, &markers(engine, &header), times);
+        self.tape.take(&self.state, &state(engine, &self.name, header.clone()), times);
+        self.tape.take(&self.diagnostics, &diagnostics(engine, &self.name, header, residual), times);
+    }
+}
+
+fn point([x, y]: [f64; 2]) -> Point {
+    Point { x, y, z: 0.0 }
+}
+
+fn colour(role: Role) -> ColorRGBA {
+    let (r, g, b, a) = match role {
+        Role::Follower => (0.13, 0.38, 0.75, 1.0),
+        Role::Leader => (0.91, 0.13, 0.11, 1.0),
+        Role::Clamped => (0.1, 0.1, 0.1, 1.0),
+        Role::Frame | Role::Ghost => (0.6, 0.63, 0.65, 0.5),
+    };
+    ColorRGBA { r, g, b, a }
+}
+
+fn markers(engine: &Engine, header: &Header) -> MarkerArray {
+    let spacing = engine.body().lattice.spacing();
+    let size = 0.4 * spacing;
+    let particles = Marker {
+        header: header.clone(),
+        ns: "particles".into(),
+        r#type: Marker::POINTS,
+        scale: Vector3 { x: size, y: size, z: 0.0 },
+        points: engine.present().iter().map(point).collect(),
+        colors: engine.roles().iter().map(|&role| colour(role)).collect(),
+        ..Marker::default()
+    };
+    let mut all = vec![particles];
+    if engine.interaction().neighbours.index.len() <= MOST_BONDS {
+        all.push(bonds(engine, header, 0.08 * spacing));
+    }
+    MarkerArray { markers: all }
+}
+
+/// Every bond that lives, blue where it is too short, red where it is too long.
+fn bonds(engine: &Engine, header: &Header, width: f64) -> Marker {
+    let (present, reference) = (engine.present(), &engine.body().reference);
+    let mut marker = Marker {
+        header: header.clone(),
+        ns: "bonds".into(),
+        r#type: Marker::LINE_LIST,
+        scale: Vector3 { x: width, y: 0.0, z: 0.0 },
+        ..Marker::default()
+    };
+    let interaction = engine.interaction();
+    for j in 0..present.len() {
+        let once = |&k: &usize| k > j || !interaction.neighbours.of(k).contains(&(j as u32));
+        for k in interaction.live_neighbours(j).filter(once) {
+            let rest = distance(reference.get(j), reference.get(k));
+            let length = distance(present.get(j), present.get(k));
+            let part = ((length / rest - 1.0) / FULL_STRAIN).clamp(-1.0, 1.0) as f32;
+            let grey = 0.6 * (1.0 - part.abs());
+            let (long, short) = (0.6 + 0.3 * part, 0.6 - 0.3 * part);
+            let (r, b) = if part >= 0.0 { (long, grey) } else { (grey, short) };
+            marker.points.extend([point(present.get(j)), point(present.get(k))]);
+            marker.colors.extend([ColorRGBA { r, g: grey, b, a: 0.9 }; 2]);
+        }
+    }
+    marker
+}
+
+fn state(engine: &Engine, name: &str, header: Header) -> FormationState {
+    let body: Vec<usize> = (0..engine.present().len()).filter(|&i| engine.roles()[i].is_body()).collect();
+    let strains: Vec<Option<Strain>> = body.iter().map(|&i| engine.strain(i)).collect();
+    let members = body.iter().zip(&strains).filter(|_| body.len() <= MOST_MEMBERS);
+    FormationState {
+        header,
+        formation: name.to_owned(),
+        tick: engine.step() as u64,
+        mode: FormationState::RUNNING,
+        formation_error: f64::NAN,
+        clearance: f64::INFINITY,
+        pe1_sum: body.iter().map(|&i| engine.pe1(i)).sum(),
+        strain_max: strains.iter().flatten().map(Strain::largest).fold(0.0, f64::max),
+        elapsed: 0.0,
+        members: members.map(|(&i, strain)| member(engine, i, *strain)).collect(),
+    }
+}
+
+fn member(engine: &Engine, i: usize, strain: Option<Strain>) -> MemberState {
+    let [x, y] = engine.displacement(i);
+    let nowhere = Point { x: f64::NAN, y: f64::NAN, z: f64::NAN };
+    MemberState {
+        name: (i + 1).to_string(),
+        role: if engine.roles()[i] == Role::Follower { MemberState::FOLLOWER } else { MemberState::LEADER },
+        health: MemberState::FRESH,
+        position: point(engine.present().get(i)),
+        target: nowhere,
+        settled: nowhere,
+        displacement: Vector3 { x, y, z: 0.0 },
+        pe1: engine.pe1(i),
+        strain: strain.map_or([f64::NAN; 3], |strain| strain.components),
+        rotation: strain.map_or(f64::NAN, |strain| strain.rotation),
+        age: 0.0,
+        clearance: f64::INFINITY,
+        to_settled: f64::NAN,
+        flags: 0,
+    }
+}
+
+fn diagnostics(engine: &Engine, name: &str, header: Header, residual: f64) -> DiagnosticArray {
+    let pair = |key: &str, value: String| KeyValue { key: key.into(), value };
+    let values = vec![
+        pair("step", engine.step().to_string()),
+        pair("residual [1]", format!("{residual:e}")),
+        pair("broken bonds", engine.breaks().len().to_string()),
+    ];
+    let status = DiagnosticStatus {
+        level: DiagnosticStatus::OK,
+        name: "flockform: run".into(),
+        message: "stepping".into(),
+        hardware_id: name.to_owned(),
+        values,
+    };
+    DiagnosticArray { header, status: vec![status] }
+}

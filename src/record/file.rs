@@ -1,0 +1,171 @@
+//! Writes an MCAP file: schemas and channels as they are met, an index at the end.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::{Path, PathBuf};
+
+use mcap::records::{MessageHeader, Metadata};
+use mcap::{Attachment, WriteOptions, Writer};
+
+use super::RecordError;
+use crate::ros::messages::builtin_interfaces::Time;
+use crate::ros::messages::definitions;
+use crate::ros::node::tape::Taped;
+
+/// Name of the metadata record that says what was recorded.
+pub const METADATA: &str = "flockform";
+/// Name of the attachment that is the swarm file.
+pub const SWARM: &str = "swarm.toml";
+/// Bytes before compression that are written at once: what a killed program loses.
+const CHUNK: u64 = 256 << 10;
+
+/// What was recorded.
+#[derive(Clone, Debug, Default)]
+pub struct About {
+    /// Command of the program.
+    pub source: &'static str,
+    /// Name of the swarm or scene.
+    pub name: String,
+    /// Text of the swarm file.
+    pub swarm: Option<String>,
+    /// Overrides of it, as given.
+    pub set: Vec<String>,
+    /// Where files that it names are looked up.
+    pub folder: Option<PathBuf>,
+    /// The robot that the loop was alone for.
+    pub member: Option<String>,
+    /// Namespace of the node.
+    pub namespace: Option<String>,
+}
+
+/// A recording under way.
+pub struct Recording {
+    path: PathBuf,
+    part: PathBuf,
+    writer: Writer<BufWriter<File>>,
+    channels: BTreeMap<String, (u16, u32)>,
+    failure: Option<mcap::McapError>,
+    messages: u64,
+}
+
+impl Recording {
+    /// # Errors
+    /// A file of this name, without `force`; a folder that cannot be written to.
+    pub fn create(path: &Path, about: &About, force: bool) -> Result<Self, RecordError> {
+        let name = path.file_name().ok_or_else(|| RecordError::Unnamed(path.to_owned()))?;
+        if path.is_dir() || (path.exists() && !force) {
+            return Err(RecordError::Taken(path.to_owned()));
+        }
+        let mut part = name.to_owned();
+        part.push(".part");
+        let part = path.with_file_name(part);
+        let io = RecordError::io;
+        if let Some(folder) = path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
+            std::fs::create_dir_all(folder).map_err(io("create", folder))?;
+        }
+        let file = File::create(&part).map_err(io("create", &part))?;
+        let options = WriteOptions::new()
+            .profile("ros2")
+            .library(concat!("flockform ", env!("CARGO_PKG_VERSION")))
+            .chunk_size(Some(CHUNK))
+            // The loop that is recorded may have the machine's cores for itself.
+            .compression_threads(0);
+        let write = |source| RecordError::Write { path: part.clone(), source };
+        let mut writer = options.create(BufWriter::new(file)).map_err(write)?;
+        describe(&mut writer, about).map_err(write)?;
+        let (path, channels) = (path.to_owned(), BTreeMap::new());
+        Ok(Self { path, part, writer, channels, failure: None, messages: 0 })
+    }
+
+    /// Adds a message. After one that cannot be written no other is tried: [`Recording::finish`] says why.
+    pub fn write(&mut self, taped: &Taped<'_>) {
+        if self.failure.is_some() {
+            return;
+        }
+        if let Err(error) = self.try_to_write(taped) {
+            tracing::warn!("the recording {} ends here: {error}", self.path.display());
+            self.failure = Some(error);
+        }
+    }
+
+    fn try_to_write(&mut self, taped: &Taped<'_>) -> Result<(), mcap::McapError> {
+        if !self.channels.contains_key(taped.topic) {
+            let channel = add_channel(&mut self.writer, taped)?;
+            self.channels.insert(taped.topic.to_owned(), (channel, 0));
+        }
+        let Some((channel_id, sequence)) = self.channels.get_mut(taped.topic) else { return Ok(()) };
+        let header = MessageHeader {
+            channel_id: *channel_id,
+            sequence: *sequence,
+            log_time: nanoseconds(taped.time),
+            publish_time: nanoseconds(taped.published),
+        };
+        *sequence = sequence.wrapping_add(1);
+        self.messages += 1;
+        self.writer.write_to_known_channel(&header, taped.payload)
+    }
+
+    /// Messages so far.
+    pub fn messages(&self) -> u64 {
+        self.messages
+    }
+
+    /// Closes the file and gives it its name.
+    ///
+    /// # Errors
+    /// What could not be written; what could stands in `NAME.part`.
+    pub fn finish(mut self) -> Result<PathBuf, RecordError> {
+        let write = |source| RecordError::Write { path: self.part.clone(), source };
+        if let Some(failure) = self.failure.take() {
+            return Err(write(failure));
+        }
+        self.writer.finish().map_err(write)?;
+        let file = self.writer.into_inner();
+        let synced = file.into_inner().map_err(|error| error.into_error()).and_then(|file| file.sync_all());
+        let (part, path) = (self.part, self.path);
+        let io = |action| RecordError::io(action, &path);
+        synced.map_err(io("write"))?;
+        std::fs::rename(&part, &path).map_err(io("rename the recording to"))?;
+        Ok(path)
+    }
+}
+
+/// Of a time in \[s\], as the header stamps of the messages have it.
+fn nanoseconds(seconds: f64) -> u64 {
+    let Time { sec, nanosec } = Time::from_seconds(seconds);
+    u64::try_from(sec).unwrap_or(0) * 1_000_000_000 + u64::from(nanosec)
+}
+
+fn add_channel(writer: &mut Writer<BufWriter<File>>, taped: &Taped<'_>) -> Result<u16, mcap::McapError> {
+    let Taped { package, name, topic, .. } = taped;
+    let definition = definitions::concatenated(&format!("{package}/{name}")).unwrap_or_default();
+    let schema = writer.add_schema(&format!("{package}/msg/{name}"), "ros2msg", definition.as_bytes())?;
+    writer.add_channel(schema, topic, "cdr", &BTreeMap::new())
+}
+
+fn describe(writer: &mut Writer<BufWriter<File>>, about: &About) -> Result<(), mcap::McapError> {
+    let mut metadata: BTreeMap<String, String> = [
+        ("version", env!("CARGO_PKG_VERSION").to_owned()),
+        ("source", about.source.to_owned()),
+        ("name", about.name.clone()),
+        ("set", serde_json::to_string(&about.set).unwrap_or_default()),
+    ]
+    .map(|(key, value)| (key.to_owned(), value))
+    .into();
+    let folder = about.folder.as_ref().map(|folder| folder.display().to_string());
+    for (key, value) in [("member", &about.member), ("namespace", &about.namespace), ("folder", &folder)] {
+        if let Some(value) = value {
+            metadata.insert(key.to_owned(), value.clone());
+        }
+    }
+    writer.write_metadata(&Metadata { name: METADATA.to_owned(), metadata })?;
+    let Some(swarm) = &about.swarm else { return Ok(()) };
+    writer.attach(&Attachment {
+        log_time: 0,
+        create_time: 0,
+        name: SWARM.to_owned(),
+        media_type: "application/toml".to_owned(),
+        data: swarm.as_bytes().into(),
+    })
+}

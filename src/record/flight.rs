@@ -1,0 +1,130 @@
+//! What the node of a simulated flight would hear, be told and say.
+
+use super::RecordError;
+use crate::ros::arguments::{NameError, Names};
+use crate::ros::messages::builtin_interfaces::Time;
+use crate::ros::messages::flockform_msgs::LoopEvent;
+use crate::ros::messages::geometry_msgs::{self, PoseStamped, PoseWithCovariance, PoseWithCovarianceStamped};
+use crate::ros::messages::nav_msgs::Odometry;
+use crate::ros::messages::std_msgs::Header;
+use crate::ros::node::diagnostics::{self, Statistics};
+use crate::ros::node::tape::{Sink, Tape};
+use crate::ros::node::{NAME, markers, state, target};
+use crate::scene::swarm::Swarm;
+use crate::scene::swarm::raw::{RawNode, RawPoseType};
+use crate::swarm::control::Control;
+use crate::swarm::watch::Pose;
+
+/// States and markers a second, as of a node that is told nothing else \[Hz\].
+const STATES: f64 = 10.0;
+const DIAGNOSTICS: f64 = 1.0;
+
+/// Writes down a flight, period by period.
+pub struct FlightTape {
+    tape: Tape,
+    swarm: Swarm,
+    topics: Topics,
+    heard: Vec<(usize, Pose)>,
+    statistics: Statistics,
+    begun: bool,
+}
+
+/// Names of topics; of robots by number.
+struct Topics {
+    poses: Vec<String>,
+    targets: Vec<String>,
+    state: String,
+    markers: String,
+    diagnostics: String,
+}
+
+impl FlightTape {
+    /// # Errors
+    /// A robot whose name no topic can have.
+    pub fn new(swarm: &Swarm, control: &Control, sink: Sink) -> Result<Self, RecordError> {
+        let names = Names::new(NAME, "/", &[])?;
+        let raw = &swarm.raw.node;
+        let pattern = match raw.pose_type {
+            // One message for all would say of all what the channels have delivered of one.
+            RawPoseType::PoseArray => RawNode::default().pose_topic,
+            _ => raw.pose_topic.clone(),
+        };
+        let of_robots = |pattern: &str| -> Result<Vec<String>, NameError> {
+            let all = control.formation().names.iter();
+            all.map(|name| names.topic(&pattern.replace("{name}", name))).collect()
+        };
+        Ok(Self {
+            tape: Tape::new(&names, &raw.frame_id, sink)?,
+            topics: Topics {
+                poses: of_robots(&pattern)?,
+                targets: of_robots(&raw.target_topic)?,
+                state: names.topic("~/state")?,
+                markers: names.topic("~/markers")?,
+                diagnostics: names.topic("/diagnostics")?,
+            },
+            swarm: swarm.clone(),
+            heard: Vec::new(),
+            statistics: Statistics::default(),
+            begun: false,
+        })
+    }
+
+    /// A pose that the channels have delivered.
+    pub fn hear(&mut self, member: usize, pose: Pose) {
+        self.heard.push((member, pose));
+    }
+
+    /// A period that was computed at `now` \[s\].
+    pub fn tick(&mut self, control: &Control, now: f64) {
+        if !std::mem::replace(&mut self.begun, true) {
+            self.tape.parameters(now, control);
+            self.tape.event(now, LoopEvent::ACTIVE, "", &[]);
+        }
+        for (member, pose) in std::mem::take(&mut self.heard) {
+            self.pose(member, &pose, now);
+        }
+        self.tape.event(now, LoopEvent::TICK, "", &[now]);
+        let header =
+            || Header { stamp: Time::from_seconds(now), frame_id: self.swarm.raw.node.frame_id.clone() };
+        for (member, topic) in self.topics.targets.iter().enumerate() {
+            if let Some(message) = target(control, member, header()) {
+                self.tape.take(topic, &message, [now; 2]);
+            }
+        }
+        // A simulated tick takes no time of the flight, and what it takes of ours is another every time.
+        self.statistics.tick(0.0);
+        if self.statistics.is_due(diagnostics::STATE, now, STATES) {
+            let message = state::message(control, &self.swarm.name, header(), 0.0);
+            self.tape.take(&self.topics.state, &message, [now; 2]);
+            if self.swarm.raw.node.markers {
+                let message = markers::message(control, &self.swarm.raw, &header());
+                self.tape.take(&self.topics.markers, &message, [now; 2]);
+            }
+        }
+        if self.statistics.is_due(diagnostics::DIAGNOSTICS, now, DIAGNOSTICS) {
+            let message = self.statistics.message(control, &self.swarm.name, header(), 0);
+            self.tape.take(&self.topics.diagnostics, &message, [now; 2]);
+        }
+    }
+
+    fn pose(&mut self, member: usize, pose: &Pose, now: f64) {
+        let raw = &self.swarm.raw.node;
+        let frame_id = if pose.frame_is_right { raw.frame_id.clone() } else { "elsewhere".into() };
+        let header = Header { stamp: Time::from_seconds(pose.stamp), frame_id };
+        let planar = geometry_msgs::Pose::planar(pose.position, pose.yaw);
+        let uncertain = || PoseWithCovariance { pose: planar, ..PoseWithCovariance::default() };
+        let (tape, topic, times) = (&mut self.tape, &self.topics.poses[member], [now; 2]);
+        match raw.pose_type {
+            RawPoseType::PoseStamped | RawPoseType::PoseArray => {
+                tape.take(topic, &PoseStamped { header, pose: planar }, times);
+            }
+            RawPoseType::PoseWithCovarianceStamped => {
+                tape.take(topic, &PoseWithCovarianceStamped { header, pose: uncertain() }, times);
+            }
+            RawPoseType::Odometry => {
+                let message = Odometry { header, pose: uncertain(), ..Odometry::default() };
+                tape.take(topic, &message, times);
+            }
+        }
+    }
+}

@@ -1,0 +1,363 @@
+//! Flies a recorded flight again: its poses through today's loop, today's targets beside the recorded ones.
+//!
+//! A recording of this program says when the loop ticked and what it was told, so that the same program gives the
+//! same targets to the bit. One that `ros2 bag record` has written of poses and targets alone is replayed as far as
+//! it goes: a tick is taken to be where a new stamp of targets appears.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+
+use super::topics::{Heard, stamped, topics};
+use super::{Entry, Reader, RecordError};
+use crate::flock::points::distance;
+use crate::ros::messages::builtin_interfaces::Time;
+use crate::ros::messages::flockform_msgs::{LoopEvent, SetFormationRequest};
+use crate::ros::messages::geometry_msgs::{self, PoseArray, PoseStamped};
+use crate::ros::messages::std_msgs::Header;
+use crate::ros::node::leaders::set_formation;
+use crate::ros::node::pose;
+use crate::ros::node::tape::{parameters, set_parameter};
+use crate::scene::swarm::Swarm;
+use crate::swarm::control::Control;
+
+/// How a replay went.
+#[derive(Clone, Debug, Serialize, PartialEq)]
+pub struct Report {
+    pub recording: PathBuf,
+    pub swarm: String,
+    /// Periods replayed.
+    pub ticks: u64,
+    pub poses: u64,
+    /// Differences beyond this count \[m\].
+    pub tolerance: f64,
+    pub robots: Vec<RobotDifference>,
+    /// What is wrong with the end of the file, if anything is.
+    pub damage: Option<String>,
+}
+
+/// Of one robot; distances in \[m\], times as recorded in \[s\].
+#[derive(Clone, Debug, Default, Serialize, PartialEq)]
+pub struct RobotDifference {
+    pub name: String,
+    /// Targets recorded.
+    pub recorded: u64,
+    /// Targets of which recording and replay differ by more than the tolerance.
+    pub differ: u64,
+    /// Targets that only the recording has, and that only the replay has.
+    pub only_recorded: u64,
+    pub only_replayed: u64,
+    pub largest: f64,
+    /// When the difference was largest.
+    pub largest_at: Option<f64>,
+    /// When it was first beyond the tolerance.
+    pub first_at: Option<f64>,
+}
+
+impl RobotDifference {
+    fn holds(&self) -> bool {
+        self.differ == 0 && self.only_recorded == 0 && self.only_replayed == 0
+    }
+}
+
+impl Report {
+    /// Whether no target is farther off than the tolerance, and none is missing.
+    pub fn holds(&self) -> bool {
+        self.robots.iter().all(RobotDifference::holds)
+    }
+
+    /// The largest difference of all \[m\].
+    pub fn largest(&self) -> f64 {
+        self.robots.iter().map(|robot| robot.largest).fold(0.0, f64::max)
+    }
+}
+
+/// The swarm that a recording carries, with `set` over its own overrides.
+///
+/// # Errors
+/// A recording without a swarm; what the overrides make of it.
+pub fn recorded_swarm(reader: &Reader, set: &[String]) -> Result<Swarm, RecordError> {
+    let described = reader.described()?;
+    let text = described.swarm.ok_or_else(|| RecordError::NoSwarm(reader.path().to_owned()))?;
+    let of = |key: &str| described.metadata.get(key).cloned();
+    let given: Vec<String> = of("set").and_then(|set| serde_json::from_str(&set).ok()).unwrap_or_default();
+    let (name, folder) = (of("name").unwrap_or_default(), of("folder").map(PathBuf::from));
+    let file = format!("{}: {}", reader.path().display(), super::file::SWARM);
+    let overrides = [&given[..], set].concat();
+    Ok(Swarm::parse(&name, &file, &text, &overrides, folder.as_deref())?)
+}
+
+/// Replays a recording with this swarm.
+///
+/// # Errors
+/// A recording that has no poses or no targets of this swarm's robots.
+pub fn replay(reader: &Reader, swarm: &Swarm, tolerance: f64) -> Result<Report, RecordError> {
+    let mut replay = Replay::new(reader, swarm, tolerance)?;
+    let damage = reader.each(&mut |entry| replay.see(entry))?;
+    if damage.is_none() {
+        // Of a file that breaks off, the last tick may not be whole.
+        replay.compare();
+    }
+    let unusable = |what: &str, help: &str| {
+        let (path, what, help) = (reader.path().to_owned(), what.to_owned(), help.to_owned());
+        Err(RecordError::Unusable { path, what, help })
+    };
+    if let Some(refusal) = replay.refusal {
+        return unusable(&refusal, "give the swarm file that was flown with --swarm");
+    }
+    let help = "its topics are not those that the swarm file's [node] names; give another --swarm, or --set node.pose_topic=...";
+    if replay.poses == 0 {
+        return unusable("it has no poses of this swarm's robots", help);
+    }
+    if replay.robots.iter().all(|robot| robot.recorded == 0) {
+        return unusable("it has no targets of this swarm's robots", help);
+    }
+    Ok(Report {
+        recording: reader.path().to_owned(),
+        swarm: swarm.name.clone(),
+        ticks: replay.ticks,
+        poses: replay.poses,
+        tolerance,
+        robots: replay.robots,
+        damage,
+    })
+}
+
+struct Replay {
+    control: Control,
+    /// The parameters that the file and the overrides of the recording gave.
+    as_recorded: Vec<(&'static str, f64)>,
+    topics: BTreeMap<String, Heard>,
+    frame_id: String,
+    heard_of: Vec<usize>,
+    mine: Vec<bool>,
+    tolerance: f64,
+    has_events: bool,
+    /// Whether the robots were: their time begins at 0, which says of a real one that it has none.
+    is_simulated: bool,
+    active: bool,
+    begun: bool,
+    /// Poses since the last tick: whose, header, pose, arrival \[s\].
+    waiting: Vec<(usize, Header, geometry_msgs::Pose, f64)>,
+    /// Times of ticks by what a stamp makes of them: a simulation's times are finer than nanoseconds.
+    exact: BTreeMap<Time, f64>,
+    now: f64,
+    ticks: u64,
+    poses: u64,
+    /// Targets of the last tick, today's and recorded.
+    today: Vec<Option<[f64; 2]>>,
+    recorded: Vec<Option<[f64; 2]>>,
+    stamp: Option<Time>,
+    robots: Vec<RobotDifference>,
+    refusal: Option<String>,
+}
+
+impl Replay {
+    fn new(reader: &Reader, swarm: &Swarm, tolerance: f64) -> Result<Self, RecordError> {
+        let described = reader.described()?;
+        let mut control = Control::new(swarm)?;
+        let before = match &described.swarm {
+            Some(_) => Control::new(&recorded_swarm(reader, &[])?)?,
+            None => control.clone(),
+        };
+        let count = control.formation().count();
+        let member = described.metadata.get("member").and_then(|name| control.formation().number(name));
+        let mut heard_of: Vec<usize> = (0..count).collect();
+        if let Some(m) = member {
+            heard_of = control.formation().depends_on(m);
+            heard_of.push(m);
+            heard_of.sort_unstable();
+        }
+        control.listen_to(&heard_of);
+        control.set_active(false);
+        let namespace = described.metadata.get("namespace").map_or("/", String::as_str);
+        let (topics, has_events) = topics(reader, swarm, &control, namespace)?;
+        let robot = |name: &String| RobotDifference { name: name.clone(), ..RobotDifference::default() };
+        Ok(Self {
+            as_recorded: parameters(&before).to_vec(),
+            robots: control.formation().names.iter().map(robot).collect(),
+            mine: (0..count).map(|m| member.is_none_or(|one| one == m)).collect(),
+            frame_id: swarm.raw.node.frame_id.clone(),
+            active: !has_events,
+            today: vec![None; count],
+            recorded: vec![None; count],
+            control,
+            topics,
+            heard_of,
+            tolerance,
+            has_events,
+            is_simulated: described.metadata.get("source").is_some_and(|source| source == "swarm"),
+            begun: false,
+            waiting: Vec::new(),
+            exact: BTreeMap::new(),
+            now: 0.0,
+            ticks: 0,
+            poses: 0,
+            stamp: None,
+            refusal: None,
+        })
+    }
+
+    fn see(&mut self, entry: &Entry) {
+        match self.topics.get(&*entry.topic) {
+            None => {}
+            Some(Heard::Events) => {
+                if let Some(event) = entry.decode() {
+                    self.event(&event);
+                }
+            }
+            Some(&Heard::Pose(member)) => {
+                if let Some((header, pose)) = stamped(entry) {
+                    self.waiting.push((member, header, pose, entry.published));
+                }
+            }
+            Some(Heard::Poses) => {
+                let Some(PoseArray { header, poses }) = entry.decode() else { return };
+                for &member in &self.heard_of {
+                    if let Some(&pose) = poses.get(member) {
+                        self.waiting.push((member, header.clone(), pose, entry.published));
+                    }
+                }
+            }
+            Some(&Heard::Leader(member)) => {
+                let Some(PoseStamped { header, pose: told }) = entry.decode() else { return };
+                if pose::is_frame(&header.frame_id, &self.frame_id) {
+                    self.control.tell(member, [told.position.x, told.position.y]);
+                }
+            }
+            Some(&Heard::Target(member)) => {
+                let Some(PoseStamped { header, pose }) = entry.decode() else { return };
+                if !self.has_events && self.stamp != Some(header.stamp) {
+                    self.stamp = Some(header.stamp);
+                    self.tick(header.stamp.seconds());
+                }
+                self.recorded[member] = Some([pose.position.x, pose.position.y]);
+            }
+        }
+    }
+
+    fn event(&mut self, event: &LoopEvent) {
+        let text = &event.text;
+        match (event.kind, &event.values[..]) {
+            (LoopEvent::TICK, &[now]) => self.tick(now),
+            (LoopEvent::ACTIVE, _) => {
+                self.active = true;
+                self.control.set_active(true);
+            }
+            (LoopEvent::INACTIVE, _) => {
+                self.active = false;
+                self.control.set_active(false);
+            }
+            (LoopEvent::EMERGENCY_STOP, _) => self.control.emergency_stop(),
+            (LoopEvent::RESUME, _) => {
+                self.control.resume();
+            }
+            (LoopEvent::MANOEUVRE, _) => {
+                let request = SetFormationRequest { name: text.clone(), ..SetFormationRequest::default() };
+                self.move_leaders(&request);
+            }
+            (LoopEvent::POSTURE, &[tx, ty, rotate, sx, sy, hx, hy, duration]) => {
+                let (translate, stretch, shear) = ([tx, ty], [sx, sy], [hx, hy]);
+                let name = String::new();
+                self.move_leaders(&SetFormationRequest { name, translate, rotate, stretch, shear, duration });
+            }
+            (LoopEvent::PARAMETER, &[value]) => self.parameter(text, value),
+            _ => {}
+        }
+    }
+
+    /// What was given at the start gives way to what has been changed since the flight; what was changed during it
+    /// is changed again.
+    fn parameter(&mut self, name: &str, value: f64) {
+        let of = |all: &[(&str, f64)]| all.iter().find(|(one, _)| *one == name).map(|(_, value)| *value);
+        let (then, today) = (of(&self.as_recorded), of(&parameters(&self.control)));
+        let is_changed_since = then.map(f64::to_bits) != today.map(f64::to_bits);
+        if !self.begun && is_changed_since {
+            return;
+        }
+        if !set_parameter(&mut self.control, name, value) {
+            self.refusal.get_or_insert(format!("parameter {name} = {value} cannot be set"));
+        }
+    }
+
+    fn move_leaders(&mut self, request: &SetFormationRequest) {
+        if let Err(why) = set_formation(&mut self.control, request) {
+            self.refusal.get_or_insert(format!("the leaders cannot move as they did: {why}"));
+        }
+    }
+
+    fn tick(&mut self, now: f64) {
+        self.compare();
+        self.begun = true;
+        if !self.active {
+            self.control.set_active(false);
+        } else if !self.has_events {
+            self.control.set_active(true);
+        }
+        (self.now, self.ticks) = (now, self.ticks + 1);
+        self.exact.insert(Time::from_seconds(now), now);
+        for (member, header, one, arrival) in std::mem::take(&mut self.waiting) {
+            let mut pose = pose::pose(&header, &one, arrival, &self.frame_id);
+            if self.is_simulated || header.stamp != Time::default() {
+                let exact = self.exact.get(&header.stamp).copied();
+                pose.stamp = exact.unwrap_or(header.stamp.seconds());
+            }
+            // What is turned away is turned away again.
+            let _ = self.control.receive(member, pose, now);
+            self.poses += 1;
+        }
+        self.control.tick(now);
+        for (member, today) in self.today.iter_mut().enumerate() {
+            let target = self.control.target(member).filter(|_| self.active && self.mine[member]);
+            *today = target;
+        }
+    }
+
+    /// Holds the targets of the last tick against each other.
+    fn compare(&mut self) {
+        for (m, robot) in self.robots.iter_mut().enumerate() {
+            let (today, recorded) = (self.today[m].take(), self.recorded[m].take());
+            robot.recorded += u64::from(recorded.is_some());
+            let apart = match (today, recorded) {
+                (None, None) => continue,
+                // Who records from outside may have missed a target.
+                (Some(_), None) if !self.has_events => continue,
+                (Some(_), None) => {
+                    robot.only_replayed += 1;
+                    robot.first_at.get_or_insert(self.now);
+                    continue;
+                }
+                (None, Some(_)) => {
+                    robot.only_recorded += 1;
+                    robot.first_at.get_or_insert(self.now);
+                    continue;
+                }
+                (Some(today), Some(recorded)) => distance(today, recorded),
+            };
+            if apart > robot.largest {
+                (robot.largest, robot.largest_at) = (apart, Some(self.now));
+            }
+            // What is no number is no agreement.
+            if apart > self.tolerance || apart.is_nan() {
+                robot.differ += 1;
+                robot.first_at.get_or_insert(self.now);
+            }
+        }
+    }
+}
+
+/// Reads a recording and replays it.
+///
+/// # Errors
+/// As [`Reader::open`] and [`replay`].
+pub fn replay_file(
+    path: &Path,
+    swarm: Option<Swarm>,
+    set: &[String],
+    tolerance: f64,
+) -> Result<Report, RecordError> {
+    let reader = Reader::open(path)?;
+    let swarm = swarm.map_or_else(|| recorded_swarm(&reader, set), Ok)?;
+    replay(&reader, &swarm, tolerance)
+}

@@ -1,0 +1,32 @@
+//! A recording that a loop writes into, and that somebody else closes.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use super::Recording;
+use crate::ros::node::tape::Sink;
+
+/// May be cloned: it is one recording all the same.
+#[derive(Clone)]
+pub struct Shared(Arc<Mutex<Option<Recording>>>);
+
+impl Shared {
+    pub fn new(recording: Recording) -> Self {
+        Self(Arc::new(Mutex::new(Some(recording))))
+    }
+
+    /// Where a loop puts its copies.
+    pub fn sink(&self) -> Sink {
+        let shared = self.clone();
+        Box::new(move |taped| {
+            let mut open = shared.0.lock().unwrap_or_else(PoisonError::into_inner);
+            if let Some(recording) = &mut *open {
+                recording.write(taped);
+            }
+        })
+    }
+
+    /// Takes the recording back, to be closed; `None` the second time.
+    pub fn take(&self) -> Option<Recording> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).take()
+    }
+}

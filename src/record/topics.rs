@@ -1,0 +1,66 @@
+//! What the topics of a recording mean to a swarm.
+
+use std::collections::BTreeMap;
+
+use super::{Entry, Reader, RecordError};
+use crate::ros::arguments::Names;
+use crate::ros::messages::geometry_msgs::{self, PoseStamped, PoseWithCovarianceStamped};
+use crate::ros::messages::nav_msgs::Odometry;
+use crate::ros::messages::std_msgs::Header;
+use crate::ros::node::NAME;
+use crate::ros::node::tape::EVENTS;
+use crate::scene::swarm::Swarm;
+use crate::scene::swarm::raw::{RawNode, RawPoseType};
+use crate::swarm::control::Control;
+
+/// What a topic means to the loop.
+#[derive(Clone, Copy)]
+pub(super) enum Heard {
+    Events,
+    Pose(usize),
+    /// Of all robots, in their order.
+    Poses,
+    Leader(usize),
+    Target(usize),
+}
+
+/// A pose with its header, from any of the messages that carry one.
+pub(super) fn stamped(entry: &Entry) -> Option<(Header, geometry_msgs::Pose)> {
+    let plain = || entry.decode::<PoseStamped>().map(|message| (message.header, message.pose));
+    let uncertain =
+        || entry.decode::<PoseWithCovarianceStamped>().map(|message| (message.header, message.pose.pose));
+    let odometry = || entry.decode::<Odometry>().map(|message| (message.header, message.pose.pose));
+    plain().or_else(uncertain).or_else(odometry)
+}
+
+/// What the recorded topics mean to this swarm, and whether the loop's events are among them. The node may have had
+/// another name, and its robots' topics other beginnings.
+pub(super) fn topics(
+    reader: &Reader,
+    swarm: &Swarm,
+    control: &Control,
+    namespace: &str,
+) -> Result<(BTreeMap<String, Heard>, bool), RecordError> {
+    let names = Names::new(NAME, namespace, &[])?;
+    let raw = &swarm.raw.node;
+    let leaf = EVENTS.trim_start_matches('~');
+    let mut topics = BTreeMap::new();
+    reader.each(&mut |entry| {
+        if &*entry.kind == "flockform_msgs/LoopEvent" && entry.topic.ends_with(leaf) {
+            topics.insert(entry.topic.to_string(), Heard::Events);
+        }
+    })?;
+    let has_events = !topics.is_empty();
+    if raw.pose_type == RawPoseType::PoseArray {
+        topics.insert(names.topic(&raw.pose_topic)?, Heard::Poses);
+    }
+    let default = RawNode::default().pose_topic;
+    for (m, name) in control.formation().names.iter().enumerate() {
+        let of = |pattern: &str| names.topic(&pattern.replace("{name}", name));
+        let pattern = if raw.pose_type == RawPoseType::PoseArray { &default } else { &raw.pose_topic };
+        topics.insert(of(pattern)?, Heard::Pose(m));
+        topics.insert(of("/{name}/leader_pose")?, Heard::Leader(m));
+        topics.insert(of(&raw.target_topic)?, Heard::Target(m));
+    }
+    Ok((topics, has_events))
+}

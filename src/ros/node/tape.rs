@@ -1,0 +1,107 @@
+//! A copy of everything that a loop hears, is told and says, for whoever records it.
+
+use crate::ros::arguments::{NameError, Names};
+use crate::ros::edge::Message;
+use crate::ros::edge::wire::encode;
+use crate::ros::messages::builtin_interfaces::Time;
+use crate::ros::messages::flockform_msgs::LoopEvent;
+use crate::ros::messages::std_msgs::Header;
+use crate::swarm::control::Control;
+
+/// Topic of [`LoopEvent`]s, below the node's name.
+pub const EVENTS: &str = "~/events";
+
+/// What a plain CDR payload in little endian begins with.
+const ENCAPSULATION: [u8; 4] = [0, 1, 0, 0];
+
+/// A message on its way.
+#[derive(Clone, Copy, Debug)]
+pub struct Taped<'a> {
+    pub topic: &'a str,
+    /// Package and name of its type.
+    pub package: &'static str,
+    pub name: &'static str,
+    /// CDR, with its encapsulation header.
+    pub payload: &'a [u8],
+    /// By the loop's clock \[s\].
+    pub time: f64,
+    /// When it was sent, or came \[s\].
+    pub published: f64,
+}
+
+/// Takes the copies.
+pub type Sink = Box<dyn FnMut(&Taped<'_>) + Send>;
+
+/// A sink that takes messages.
+pub struct Tape {
+    sink: Sink,
+    payload: Vec<u8>,
+    events: String,
+    frame_id: String,
+}
+
+impl Tape {
+    /// For the loop of a node of this name, whose poses are in this frame.
+    ///
+    /// # Errors
+    /// A name that no topic can have.
+    pub fn new(names: &Names, frame_id: &str, sink: Sink) -> Result<Self, NameError> {
+        let events = names.topic(EVENTS)?;
+        Ok(Self { sink, payload: Vec::new(), events, frame_id: frame_id.to_owned() })
+    }
+
+    /// A message of the loop's time `time` \[s\], which was sent or came at `published` \[s\].
+    pub fn take<M: Message>(&mut self, topic: &str, message: &M, [time, published]: [f64; 2]) {
+        self.payload.clear();
+        self.payload.extend(ENCAPSULATION);
+        let mut body = Vec::new();
+        if let Err(error) = encode(message, &mut body) {
+            tracing::warn!("{topic} is not recorded: {error}");
+            return;
+        }
+        self.payload.extend(body);
+        let (package, name) = (M::PACKAGE, M::NAME);
+        (self.sink)(&Taped { topic, package, name, payload: &self.payload, time, published });
+    }
+
+    pub fn event(&mut self, time: f64, kind: u8, text: &str, values: &[f64]) {
+        let header = Header { stamp: Time::from_seconds(time), frame_id: self.frame_id.clone() };
+        let event = LoopEvent { header, kind, text: text.to_owned(), values: values.to_vec() };
+        let topic = std::mem::take(&mut self.events);
+        self.take(&topic, &event, [time; 2]);
+        self.events = topic;
+    }
+
+    /// The parameters that targets depend on, as they are.
+    pub fn parameters(&mut self, time: f64, control: &Control) {
+        for (name, value) in parameters(control) {
+            self.event(time, LoopEvent::PARAMETER, name, &[value]);
+        }
+    }
+}
+
+/// Of a loop: names and values in SI units.
+pub fn parameters(control: &Control) -> [(&'static str, f64); 5] {
+    let limits = control.limits();
+    [
+        ("period", control.period()),
+        ("damping", control.damping()),
+        ("speed_limit", limits.speed),
+        ("acceleration_limit", limits.acceleration),
+        ("clearance", limits.clearance),
+    ]
+}
+
+/// Gives a loop a value as [`parameters`] names it; false for a name or a value that is none.
+pub fn set_parameter(control: &mut Control, name: &str, value: f64) -> bool {
+    let mut limits = control.limits().clone();
+    match name {
+        "period" if value > 0.0 => control.set_period(value),
+        "damping" => control.set_damping(value),
+        "speed_limit" => limits.speed = value,
+        "acceleration_limit" => limits.acceleration = value,
+        "clearance" => limits.clearance = value,
+        _ => return false,
+    }
+    limits == *control.limits() || control.set_limits(limits).is_ok()
+}

@@ -1,0 +1,219 @@
+//! `flockform run --resume`: a killed run goes on as if nothing had been.
+
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use crate::program::*;
+
+/// Fracture, with probes, figures and frames: everything that a run keeps.
+const RUN: [&str; 8] =
+    ["run", "fracture", "--out", "o", "--set", "record.vtk_every=25", "--set", "record.figures=[50, 150]"];
+
+fn start(arguments: &[&str], folder: &Path) -> Child {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_flockform"));
+    command
+        .args(arguments)
+        .current_dir(folder)
+        .env_remove("RUST_LOG")
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped());
+    command.spawn().expect("the program starts")
+}
+
+/// Every file below a folder, by its path in it; what a summary says of times left out.
+fn contents(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
+    let mut found = Vec::new();
+    let mut open = vec![folder.to_owned()];
+    while let Some(next) = open.pop() {
+        for entry in std::fs::read_dir(&next).expect("readable") {
+            let path = entry.expect("readable").path();
+            if path.is_dir() {
+                open.push(path);
+                continue;
+            }
+            let mut bytes = std::fs::read(&path).expect("readable");
+            if path.ends_with("summary.json") {
+                let mut summary: serde_json::Value = serde_json::from_slice(&bytes).expect("JSON");
+                summary["timings"] = serde_json::Value::Null;
+                bytes = summary.to_string().into_bytes();
+            }
+            found.push((path.strip_prefix(folder).expect("below it").to_owned(), bytes));
+        }
+    }
+    found.sort();
+    found
+}
+
+fn assert_same(folder: &Path, whole: &[(PathBuf, Vec<u8>)], when: &str) {
+    let found = contents(folder);
+    let names = |all: &[(PathBuf, Vec<u8>)]| all.iter().map(|(path, _)| path.clone()).collect::<Vec<_>>();
+    assert_eq!(names(&found), names(whole), "{when}");
+    for ((path, bytes), (_, expected)) in found.iter().zip(whole) {
+        assert!(bytes == expected, "{when}: {} differs", path.display());
+    }
+}
+
+fn wait_for(path: &Path) {
+    let patience = Instant::now();
+    while !path.exists() {
+        assert!(patience.elapsed() < Duration::from_secs(60), "{} never came", path.display());
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+/// A run without end, killed when it has kept a checkpoint.
+fn killed(folder: &Path) {
+    let endless = ["--set", "stop.steps=100000000", "--checkpoint-every", "1steps"];
+    let mut child = start(&[&["run", "tension", "--out", "o"][..], &endless].concat(), folder);
+    wait_for(&folder.join("o.unfinished"));
+    child.kill().expect("kills");
+    child.wait().expect("ends");
+}
+
+/// Kills a run, and the runs that go on with it, until one is done.
+fn killed_until_done(folder: &Path, random: &mut impl FnMut() -> f64, whole: Duration) -> usize {
+    let resume: &[&str] = &["run", "--resume", "o", "-q", "--checkpoint-every", "5ms"];
+    let first = [&RUN[..], &["-q", "--checkpoint-every", "5ms"]].concat();
+    for kills in 0..50 {
+        let arguments = if folder.join("o.unfinished").exists() { resume } else { &first };
+        let mut child = start(arguments, folder);
+        if arguments != resume {
+            // There is something to go on from; the rest is chance.
+            wait_for(&folder.join("o.unfinished"));
+        }
+        let deadline = Instant::now() + whole.mul_f64(1.5 * random());
+        while Instant::now() < deadline && child.try_wait().expect("a child").is_none() {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        let _ = child.kill();
+        let output = child.wait_with_output().expect("ends");
+        if output.status.success() {
+            return kills;
+        }
+        assert_eq!(output.status.code(), None, "{}", text(&output.stderr));
+    }
+    panic!("never done");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_run_killed_at_random_and_resumed_leaves_the_files_of_a_whole_one() {
+    let kills: usize = std::env::var("FLOCKFORM_KILLS").map_or(6, |kills| kills.parse().expect("a number"));
+    let folder = temporary();
+    let begun = Instant::now();
+    let output = flockform(&RUN, folder.path());
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let took = begun.elapsed();
+    let whole = contents(&folder.path().join("o"));
+    let mut state = 7_u64;
+    let mut random = move || {
+        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (state >> 11) as f64 / (1_u64 << 53) as f64
+    };
+    let mut killed = 0;
+    while killed < kills {
+        let folder = temporary();
+        killed += killed_until_done(folder.path(), &mut random, took);
+        assert_same(&folder.path().join("o"), &whole, &format!("after {killed} kills"));
+        assert!(!folder.path().join("o.unfinished").exists());
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupted_run_goes_on_from_its_own_output() {
+    let folder = temporary();
+    let steps = ["--set", "stop.steps=20000", "--set", "record.vtk_every=4000"];
+    let run = |out: &'static str| [&["run", "tension", "-q", "--out", out][..], &steps].concat();
+    assert!(flockform(&run("whole"), folder.path()).status.success());
+    let whole = contents(&folder.path().join("whole"));
+    let child = start(&run("o"), folder.path());
+    std::thread::sleep(Duration::from_millis(150));
+    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill").success());
+    let status = child.wait_with_output().expect("ends").status;
+    if status.code() == Some(1) {
+        assert!(folder.path().join("o/checkpoint").is_file());
+        let output = flockform(&["run", "--resume", "o", "-q"], folder.path());
+        assert!(output.status.success(), "{}", text(&output.stderr));
+    }
+    assert_same(&folder.path().join("o"), &whole, "after an interrupt");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_checkpoint_that_cannot_be_gone_on_from_is_refused_by_name_and_left_alone() {
+    let folder = temporary();
+    killed(folder.path());
+    let path = folder.path().join("o.unfinished/checkpoint");
+    let good = std::fs::read(&path).expect("there");
+    let refused = |bytes: &[u8], arguments: &[&str], words: &[&str]| {
+        std::fs::write(&path, bytes).expect("written");
+        let output = flockform(arguments, folder.path());
+        let said = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {said}");
+        for word in words {
+            assert!(said.contains(word), "{arguments:?} does not say `{word}`:\n{said}");
+        }
+        assert!(std::fs::read(&path).expect("there") == bytes, "{arguments:?} changed it");
+        assert!(!folder.path().join("o").exists());
+    };
+    let resume = ["run", "--resume", "o"];
+    refused(&good[..good.len() - 1], &resume, &["o.unfinished/checkpoint is truncated", "help:"]);
+    let mut flipped = good.clone();
+    flipped[good.len() / 2] ^= 1;
+    refused(&flipped, &resume, &["o.unfinished/checkpoint is corrupted", "help:"]);
+    let mut newer = good.clone();
+    newer[8] = 99;
+    refused(&newer, &resume, &["is of layout 99, this is layout 1", "help:"]);
+    refused(b"thesis", &resume, &["is no checkpoint of flockform"]);
+    let foreign = ["run", "fracture", "--resume", "o"];
+    refused(&good, &foreign, &["belongs to another scene", "`title` was", "help:"]);
+    let others =
+        ["run", "tension", "--set", "stop.steps=100000000", "--set", "frame=mirror", "--resume", "o"];
+    refused(&good, &others, &["belongs to another scene", "`frame` was \"lagged\", is \"mirror\""]);
+}
+
+#[cfg(unix)]
+#[test]
+fn an_unfinished_run_is_in_nobody_s_way_unless_it_is_discarded() {
+    let folder = temporary();
+    killed(folder.path());
+    let again = ["run", "tension", "--out", "o", "-q"];
+    let output = flockform(&again, folder.path());
+    assert_eq!(output.status.code(), Some(2));
+    let said = text(&output.stderr);
+    assert!(said.contains("--resume") && said.contains("--force"), "{said}");
+    let output = flockform(&[&again[..], &["--force"]].concat(), folder.path());
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    assert!(!folder.path().join("o.unfinished").exists() && folder.path().join("o/final.csv").is_file());
+}
+
+#[cfg(unix)]
+#[test]
+fn a_run_that_still_runs_is_not_resumed_by_another() {
+    let folder = temporary();
+    let endless = ["--set", "stop.steps=100000000", "--checkpoint-every", "1steps"];
+    let mut child = start(&[&["run", "tension", "--out", "o"][..], &endless].concat(), folder.path());
+    wait_for(&folder.path().join("o.unfinished"));
+    let output = flockform(&["run", "--resume", "o"], folder.path());
+    child.kill().expect("kills");
+    child.wait().expect("ends");
+    assert_eq!(output.status.code(), Some(2));
+    assert!(text(&output.stderr).contains("still runs"), "{}", text(&output.stderr));
+}
+
+#[test]
+fn nothing_to_resume_is_said_and_what_a_checkpoint_says_is_not_said_again() {
+    let folder = temporary();
+    let refused = |arguments: &[&str], word: &str| {
+        let output = flockform(arguments, folder.path());
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+        assert!(text(&output.stderr).contains(word), "{arguments:?}: {}", text(&output.stderr));
+    };
+    refused(&["run", "--resume", "nowhere"], "nothing to resume");
+    refused(&["run", "--resume", "o", "--out", "p"], "--out");
+    refused(&["run", "--resume", "o", "--steps", "3"], "SCENE");
+    refused(&["run", "tension", "--checkpoint-every", "often"], "min, h or steps");
+    assert_eq!(std::fs::read_dir(folder.path()).expect("readable").count(), 0);
+}

@@ -1,0 +1,116 @@
+//! What others read in our files is what we wrote.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use flockform::record::{Entry, Reader};
+use flockform::ros::messages::diagnostic_msgs::DiagnosticArray;
+use flockform::ros::messages::flockform_msgs::{FormationState, LoopEvent};
+use flockform::ros::messages::geometry_msgs::{PoseArray, PoseStamped, PoseWithCovarianceStamped};
+use flockform::ros::messages::nav_msgs::Odometry;
+use flockform::ros::messages::visualization_msgs::MarkerArray;
+
+use crate::program::*;
+
+/// A message of any type that recordings have.
+fn as_json(entry: &Entry) -> serde_json::Value {
+    macro_rules! any {
+        ($($message:ty),+) => {{
+            $(if let Some(message) = entry.decode::<$message>() {
+                return serde_json::to_value(&message).expect("plain data");
+            })+
+            panic!("{} is of a type that no recording has: {}", entry.topic, entry.kind)
+        }};
+    }
+    any!(
+        PoseStamped,
+        PoseWithCovarianceStamped,
+        Odometry,
+        PoseArray,
+        MarkerArray,
+        FormationState,
+        LoopEvent,
+        DiagnosticArray
+    )
+}
+
+/// Writes down what stands in a recording; topics and how many messages each has.
+fn expected(recording: &Path, into: &Path) -> Vec<(String, usize)> {
+    let mut out = std::io::BufWriter::new(std::fs::File::create(into).expect("a file"));
+    let mut topics: Vec<(String, usize)> = Vec::new();
+    let damage = Reader::open(recording).expect("readable").each(&mut |entry| {
+        let kind = entry.kind.replace('/', "/msg/");
+        let line = serde_json::json!({"topic": &*entry.topic, "type": kind, "message": as_json(entry)});
+        writeln!(out, "{line}").expect("written");
+        match topics.iter_mut().find(|(topic, _)| **topic == *entry.topic) {
+            Some((_, count)) => *count += 1,
+            None => topics.push((entry.topic.to_string(), 1)),
+        }
+    });
+    assert_eq!(damage.expect("readable"), None);
+    topics
+}
+
+fn python(script: &str, arguments: &[&Path]) {
+    let python = std::env::var("FLOCKFORM_PYTHON").unwrap_or_else(|_| "python3".into());
+    let script = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/recording").join(script);
+    let output = Command::new(python).arg(script).args(arguments).output().expect("Python is there");
+    let said = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{said}");
+    println!("{said}");
+}
+
+#[test]
+fn a_flight_s_recording_has_the_topics_of_the_live_node() {
+    let folder = temporary();
+    let calm = ["--set", "flight.duration=2.0", "--set", "flight.bounds={}"];
+    let flight = [&["swarm", "square", "-q", "--out", "o", "--record", "f.mcap"][..], &calm].concat();
+    says(0, &flight, folder.path());
+    let topics = expected(&folder.path().join("f.mcap"), &folder.path().join("f.jsonl"));
+    let count = |topic: &str| topics.iter().find(|(one, _)| one == topic).map(|(_, count)| *count);
+    let ticks = count("/robot_1/target_pose").expect("targets");
+    assert_eq!(count("/robot_25/pose"), Some(ticks));
+    // Before the ticks come five parameters and the start.
+    assert_eq!(count("/flockform/events"), Some(ticks + 6));
+    assert!(count("/flockform/state").is_some() && count("/flockform/markers").is_some(), "{topics:?}");
+    assert!(count("/diagnostics").is_some(), "{topics:?}");
+    assert!(!folder.path().join("f.mcap.part").exists());
+}
+
+#[test]
+#[ignore = "needs Python with mcap, mcap-ros2-support and rosbags: see main.rs"]
+fn mcap_and_rosbags_decode_every_message_to_the_values_written() {
+    let odometry = ["--set", "node.pose_type=odometry"];
+    let covariance = ["--set", "node.pose_type=pose-with-covariance-stamped"];
+    let recordings: [&[&str]; 4] = [
+        &["swarm", "square", "--set", "flight.duration=3.0", "--set", "flight.bounds={}"],
+        &[&["swarm", "gap", "--set", "flight.duration=1.0", "--set", "flight.bounds={}"][..], &odometry]
+            .concat(),
+        &[&["swarm", "liar", "--set", "flight.duration=2.0", "--set", "flight.bounds={}"][..], &covariance]
+            .concat(),
+        &["run", "fracture", "--set", "record.vtk_every=20"],
+    ];
+    for arguments in recordings {
+        let folder = temporary();
+        says(0, &[arguments, &["-q", "--out", "o", "--record", "r.mcap"]].concat(), folder.path());
+        let (recording, lines) = (folder.path().join("r.mcap"), folder.path().join("r.jsonl"));
+        assert!(expected(&recording, &lines).len() >= 4);
+        python("read_mcap.py", &[&recording, &lines]);
+    }
+}
+
+#[test]
+#[ignore = "needs Python with meshio: see main.rs"]
+fn meshio_reads_in_the_last_frame_what_stands_in_the_final_table() {
+    let runs: [&[&str]; 3] = [
+        &["run", "fracture", "--set", "record.vtk_every=50"],
+        &["run", "beam-loaded", "--set", "record.vtk_every=1"],
+        &["run", "tension", "--steps", "30", "--set", "record.vtk_every=10"],
+    ];
+    for arguments in runs {
+        let folder = temporary();
+        says(0, &[arguments, &["-q", "--out", "o"]].concat(), folder.path());
+        python("read_vtk.py", &[&folder.path().join("o")]);
+    }
+}
