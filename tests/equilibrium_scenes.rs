@@ -103,7 +103,7 @@ fn a_body_turned_by_a_right_angle_is_not_strained_by_the_corotated_rule() {
     let roles = format!("roles=[{},{}]", turned("left"), turned("right"));
     for lattice in LATTICES {
         let name = format!("lattice-{lattice}");
-        for how in ["stop.tolerance=1e-14", "equilibrium={tolerance=1e-12}"] {
+        for how in ["stop.tolerance=1e-14", "equilibrium={tolerance=1e-13}"] {
             let overrides = [MATERIAL, COROTATED, CELLS, &roles, how, "stop.steps=100000"];
             let outcome = ended(&load(&name, &overrides));
             let engine = &outcome.engine;
