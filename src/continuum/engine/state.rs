@@ -211,7 +211,7 @@ mod tests {
     use std::ops::ControlFlow;
 
     use super::*;
-    use crate::continuum::run::{Outcome, Watch, resume, run};
+    use crate::continuum::run::{Outcome, StopReason, Watch, resume, run};
     use crate::scene::{Scene, bundled};
 
     fn scene(name: &str, sets: &[&str]) -> Scene {
@@ -223,8 +223,12 @@ mod tests {
         Plan::new(scene).expect("can be laid out")
     }
 
-    fn bits(outcome: &Outcome) -> (EngineState, u64, String) {
-        (EngineState::of(&outcome.engine), outcome.residual.to_bits(), format!("{:?}", outcome.reason))
+    /// The state, and what depends on who is seen: PE1 and the residual, then how the run ended.
+    fn bits(outcome: &Outcome) -> (EngineState, Vec<u64>, String) {
+        let engine = &outcome.engine;
+        let pe1 = (0..engine.body().count()).map(|i| engine.pe1(i));
+        let numbers = pe1.chain([outcome.residual]).map(f64::to_bits).collect();
+        (EngineState::of(engine), numbers, format!("{:?}", outcome.reason))
     }
 
     /// Runs whole, and again broken off at every one of `at`, through bytes.
@@ -280,8 +284,9 @@ mod tests {
 
     #[test]
     fn a_run_that_had_come_to_rest_takes_no_further_step() {
-        let scene = scene("tension", &["stop.tolerance=1e-3"]);
+        let scene = scene("tension", &["stop.tolerance=1e-3", "stop.steps=20000"]);
         let whole = run(plan(&scene), &mut |_, _| ControlFlow::Continue(()));
+        assert_eq!(whole.reason, StopReason::Equilibrium);
         let state = EngineState::of(&whole.engine);
         let watch = Watch { next: &|step| step + 1, see: &mut |_, _| ControlFlow::Continue(()) };
         let resumed = resume(plan(&scene), state, whole.residual, watch);
