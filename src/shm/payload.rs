@@ -141,7 +141,7 @@ payload! {
     }
 }
 
-#[expect(clippy::derivable_impls, reason = "iceoryx2 asks for it; a header always gets its values")]
+/// iceoryx2 asks for one; a slice's header always gets its values.
 impl Default for Header {
     fn default() -> Self {
         Self { sequence: 0, step: 0, stamp: 0.0 }

@@ -61,6 +61,10 @@ impl Transport for Ros2 {
     type Controller = Served;
     type Robots = Robots;
 
+    fn newest_waits(&self) -> bool {
+        false
+    }
+
     fn count(&self) -> usize {
         control_of(&self.swarm).0.formation().count()
     }

@@ -70,6 +70,11 @@ pub trait Transport {
 
     /// A robots' end, made anew.
     fn robots(&mut self) -> Self::Robots;
+
+    /// Whether what was said last is there at once; a network takes its time, and may lose it.
+    fn newest_waits(&self) -> bool {
+        true
+    }
 }
 
 /// All poses that arrived since the last call.

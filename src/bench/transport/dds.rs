@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use super::measure::{End, Open, Samples, Work, exchange};
+use super::measure::{End, Ends, Samples, Work, exchange};
 use super::{DDS_ROUNDS, Effort, Report};
 use crate::ros::edge::{Edge, Node, Options, Publisher, Quality, Subscription};
 use crate::ros::messages::builtin_interfaces::Time;
@@ -107,7 +107,7 @@ pub fn measure(effort: &Effort, report: &mut Report) {
     }
 }
 
-fn open(poses: usize) -> Result<(Box<dyn End>, Open), String> {
+fn open(poses: usize) -> Result<Ends, String> {
     let near = Dds::open(poses, ["out", "back"])?;
     let far = Dds::open(poses, ["back", "out"])?;
     near.meet()?;

@@ -14,7 +14,7 @@ use iceoryx2::prelude::{AllocationStrategy, Node, ipc};
 use iceoryx2::sample::Sample;
 use iceoryx2::sample_mut::SampleMut;
 
-use super::measure::{End, Open};
+use super::measure::{End, Ends};
 use super::pose;
 use crate::shm::channel::{Filled, Slice};
 use crate::shm::payload::Pose;
@@ -28,12 +28,12 @@ pub const SOCKET: &str = "Unix socket";
 /// A way, by name.
 pub struct Way {
     pub name: &'static str,
-    open: fn(usize) -> Result<(Box<dyn End>, Open), String>,
+    open: fn(usize) -> Result<Ends, String>,
 }
 
 impl Way {
     /// Both ends, for messages of so many poses.
-    pub fn open(&self, poses: usize) -> Result<(Box<dyn End>, Open), String> {
+    pub fn open(&self, poses: usize) -> Result<Ends, String> {
         (self.open)(poses)
     }
 }
@@ -69,7 +69,7 @@ struct Channel {
     poses: usize,
 }
 
-fn open_channel(poses: usize) -> Result<(Box<dyn End>, Open), String> {
+fn open_channel(poses: usize) -> Result<Ends, String> {
     let (to_far, from_near) = channel();
     let (to_near, from_far) = channel();
     let end = move |to, from| Channel { to, from, own: Vec::new(), arrived: Vec::new(), poses };
@@ -136,7 +136,7 @@ impl Ours {
     }
 }
 
-fn open_ours(poses: usize) -> Result<(Box<dyn End>, Open), String> {
+fn open_ours(poses: usize) -> Result<Ends, String> {
     let domain = domain()?;
     let near = Ours::open(&domain, poses, ["out", "back"])?;
     let far = move || Ok(Box::new(Ours::open(&domain, poses, ["back", "out"])?) as Box<dyn End>);
@@ -223,7 +223,7 @@ impl Raw {
     }
 }
 
-fn open_raw(poses: usize) -> Result<(Box<dyn End>, Open), String> {
+fn open_raw(poses: usize) -> Result<Ends, String> {
     let domain = domain()?;
     let near = Raw::open(&domain, poses, ["out", "back"])?;
     let far = move || Ok(Box::new(Raw::open(&domain, poses, ["back", "out"])?) as Box<dyn End>);
@@ -275,7 +275,7 @@ struct Socket {
     poses: usize,
 }
 
-fn open_socket(poses: usize) -> Result<(Box<dyn End>, Open), String> {
+fn open_socket(poses: usize) -> Result<Ends, String> {
     let (near, far) = UnixStream::pair().map_err(words)?;
     let end = move |stream| Socket {
         stream,
