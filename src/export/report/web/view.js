@@ -143,6 +143,12 @@ export class View {
   }
 
   drawUnder() {
+    // Drawn again only when something of it changed: a frame of a film moves nothing here but the ways.
+    const { camera, turned, factor, layers, frame } = this.show;
+    const seen = [camera, turned, this.width, this.height, this.ratio, themeText("card")];
+    const key = JSON.stringify(layers.ways ? [...seen, factor, frame] : seen);
+    if (key === this.below) return;
+    this.below = key;
     const pen = this.pen(this.under);
     pen.fillStyle = themeText("card");
     pen.fillRect(0, 0, this.width, this.height);
@@ -237,6 +243,9 @@ export class View {
   }
 
   drawOver() {
+    const isEmpty = this.kept < 0 && this.marked < 0 && !(this.show.layers.cracks && this.body.brokenBonds());
+    if (isEmpty && this.isClear && this.over.width === this.clearWidth) return;
+    [this.isClear, this.clearWidth] = [isEmpty, this.over.width];
     const pen = this.pen(this.over);
     if (this.show.layers.cracks) this.drawCracks(pen);
     for (const [particle, width] of [[this.kept, 3], [this.marked, 2]]) {
