@@ -6,7 +6,7 @@
 //! attachment is the swarm file. So [`replay`] needs nothing else to fly the same flight again and to say where
 //! today's targets are others.
 //!
-//! * [`file`]: the writer. The file has its name when it is whole; until then it is `NAME.part`.
+//! * [`mod@file`]: the writer. The file has its name when it is whole; until then it is `NAME.part`.
 
 pub mod body;
 pub mod file;
