@@ -289,6 +289,9 @@ fn note(film: &Film, outcome: &Outcome) -> String {
             ),
         }
     };
+    if let Some(first) = film.times.first().filter(|&&first| first > 0.0 && outcome.solved.is_none()) {
+        note += &format!(" This run was taken up at step {first}; what came before is not shown.");
+    }
     note += &format!(
         " Displacements are kept to {bits} bits of each frame's range; PE1, strain and stress are computed from them."
     );
