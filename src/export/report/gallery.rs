@@ -30,7 +30,10 @@ pub struct Exhibit {
 impl Exhibit {
     /// `notes` are those of the scene or swarm: their first sentence is told.
     pub fn new(kind: &'static str, name: &str, title: &str, notes: &str) -> Self {
-        let mut sentence = notes.split_inclusive(". ").next().unwrap_or_default().trim().to_owned();
+        // A point before a number or a small letter belongs to an abbreviation.
+        let is_end = |&(at, _): &(usize, &str)| notes[at + 2..].starts_with(char::is_uppercase);
+        let end = notes.match_indices(". ").find(is_end).map_or(notes.len(), |(at, _)| at + 1);
+        let mut sentence = notes[..end].trim().to_owned();
         if sentence.chars().count() > LONGEST {
             sentence = sentence.chars().take(LONGEST).collect::<String>();
             sentence.truncate(sentence.rfind(' ').unwrap_or(sentence.len()));
@@ -121,7 +124,7 @@ mod tests {
     #[test]
     fn an_exhibit_tells_the_first_sentence_and_cuts_a_long_one_between_words() {
         let of = |notes: &str| Exhibit::new("scenes", "a", "A", notes).sentence;
-        assert_eq!(of("It is 1.5 wide. And more. "), "It is 1.5 wide.");
+        assert_eq!(of("It is 1.5 wide (Eq. 1). And more. "), "It is 1.5 wide (Eq. 1).");
         let long = of(&"word ".repeat(100));
         assert!(long.ends_with("word \u{2026}") && long.chars().count() <= LONGEST + 2, "{long}");
     }
