@@ -9,6 +9,7 @@ use flockform::continuum::engine::Engine;
 use flockform::continuum::engine::state::EngineState;
 use flockform::continuum::record::{ProbeSeries, Snapshot};
 use flockform::export::checkpoint::{Asked, Checkpoint, CheckpointError};
+use flockform::export::report::RunRecorder;
 use flockform::export::{ExportError, OutputFolder, VtkSeries, unfinished};
 use flockform::scene::Scene;
 
@@ -119,6 +120,7 @@ impl Left {
 pub struct Kept<'a> {
     pub snapshots: &'a [Snapshot],
     pub probes: &'a [ProbeSeries],
+    pub film: Option<&'a RunRecorder>,
     pub frames: Option<&'a mut VtkSeries>,
 }
 
@@ -220,7 +222,7 @@ impl<'a> Keeper<'a> {
         kept: &Kept<'_>,
     ) -> Result<(), ExportError> {
         let of = (&self.asked, self.scene, self.digest);
-        let recorded = (kept.snapshots, kept.probes);
+        let recorded = (kept.snapshots, kept.probes, kept.film.map(RunRecorder::footage));
         let state = (EngineState::of(engine), residual);
         Checkpoint::new(of, state, recorded, self.stepping()).write(folder.folder())
     }

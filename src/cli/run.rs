@@ -18,7 +18,7 @@ use flockform::continuum::record::{ProbeSeries, Snapshot};
 use flockform::continuum::run::{Outcome, StopReason, Watch, resume};
 use flockform::export::checkpoint::{self, Asked, Checkpoint};
 use flockform::export::report::stage::Stage;
-use flockform::export::report::{self, RunRecorder};
+use flockform::export::report::{self, Footage, RunRecorder};
 use flockform::export::{
     Energies, ExportError, OutputFolder, Results, Summary, Timings, VtkSeries, write_all,
 };
@@ -220,6 +220,8 @@ struct Recorder<'a> {
     /// Whether there shall be a `report.html`, and what it shows.
     reports: bool,
     film: Option<RunRecorder>,
+    /// What an earlier run has kept for it.
+    footage: Option<Footage<'static>>,
     failure: Option<ExportError>,
     writing: Duration,
 }
@@ -256,6 +258,7 @@ impl<'a> Recorder<'a> {
             frames,
             reports: true,
             film: None,
+            footage: left.and_then(|left| left.checkpoint.film.clone()),
             failure: None,
             writing: Duration::ZERO,
         })
@@ -263,7 +266,12 @@ impl<'a> Recorder<'a> {
 
     /// For a checkpoint.
     fn kept(&mut self) -> Kept<'_> {
-        Kept { snapshots: &self.snapshots, probes: &self.probes, frames: self.frames.as_mut() }
+        Kept {
+            snapshots: &self.snapshots,
+            probes: &self.probes,
+            film: self.film.as_ref(),
+            frames: self.frames.as_mut(),
+        }
     }
 
     fn step(&mut self, engine: &Engine) {
@@ -276,7 +284,7 @@ impl<'a> Recorder<'a> {
         }
         if self.reports {
             let start = Instant::now();
-            RunRecorder::watch(&mut self.film, engine);
+            RunRecorder::watch(&mut self.film, &mut self.footage, engine);
             self.writing += start.elapsed();
         }
     }

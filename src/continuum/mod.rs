@@ -16,5 +16,5 @@ pub mod plan;
 pub mod record;
 pub mod report;
 pub mod run;
-mod stored;
+pub(crate) mod stored;
 mod weights;

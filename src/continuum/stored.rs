@@ -1,7 +1,7 @@
 //! How the flock's types stand in a checkpoint: the core itself knows no format.
 
 /// Positions, as two arrays of numbers.
-pub(super) mod points {
+pub(crate) mod points {
     use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
     use crate::flock::points::Points;
@@ -20,7 +20,7 @@ pub(super) mod points {
 }
 
 /// Roles, as their place in [`Role::ALL`](crate::flock::role::Role::ALL).
-pub(super) mod roles {
+pub(crate) mod roles {
     use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
     use crate::flock::role::Role;
@@ -39,7 +39,7 @@ pub(super) mod roles {
 }
 
 /// Broken bonds: step, pair, place, length.
-pub(super) mod breaks {
+pub(crate) mod breaks {
     use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
     use crate::flock::fracture::Break;

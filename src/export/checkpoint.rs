@@ -20,6 +20,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::error::ExportError;
+use super::report::Footage;
 use crate::continuum::engine::state::EngineState;
 use crate::continuum::record::{ProbeSeries, Snapshot};
 use crate::scene::Scene;
@@ -47,6 +48,8 @@ pub struct Checkpoint<'a> {
     pub residual: f64,
     pub snapshots: Cow<'a, [Snapshot]>,
     pub probes: Cow<'a, [ProbeSeries]>,
+    /// Of the report, where there is to be one.
+    pub film: Option<Footage<'a>>,
     /// Time taken for the steps so far.
     pub stepping: Duration,
 }
@@ -101,7 +104,7 @@ impl<'a> Checkpoint<'a> {
     pub fn new(
         (asked, scene, digest): (&Asked, &Scene, u64),
         (engine, residual): (EngineState, f64),
-        (snapshots, probes): (&'a [Snapshot], &'a [ProbeSeries]),
+        (snapshots, probes, film): (&'a [Snapshot], &'a [ProbeSeries], Option<Footage<'a>>),
         stepping: Duration,
     ) -> Self {
         Self {
@@ -113,6 +116,7 @@ impl<'a> Checkpoint<'a> {
             residual,
             snapshots: Cow::Borrowed(snapshots),
             probes: Cow::Borrowed(probes),
+            film,
             stepping,
         }
     }
@@ -300,7 +304,7 @@ mod tests {
         let checkpoint = Checkpoint::new(
             (&asked, &scene, sum),
             (state.clone(), f64::INFINITY),
-            (&snapshots, &probes),
+            (&snapshots, &probes, None),
             Duration::from_millis(1500),
         );
         checkpoint.write(folder).expect("written");

@@ -24,15 +24,17 @@ impl Threshold {
         }
     }
 
-    /// Whether a bond whose present and reference length have these squares is so much shorter than the
-    /// threshold that rounding cannot matter; squares that overflow or vanish are never far.
+    /// Whether a bond may have passed the threshold: not if its square is so much less that rounding cannot
+    /// matter; squares that overflow or vanish never tell.
     #[inline]
-    fn is_far(self, [length, rest]: [f64; 2]) -> bool {
+    fn is_near(self, (reference, present): (&Points, &Points), j: usize, k: usize) -> bool {
+        let length = square_of_distance(present, j, k);
         let limit = match self {
             Threshold::Distance(df) => df * df,
-            Threshold::Stretch(ratio) => ratio * ratio * rest,
+            Threshold::Stretch(ratio) => ratio * ratio * square_of_distance(reference, j, k),
         };
-        length < limit * (1.0 - NEAR_THRESHOLD) && length > f64::MIN_POSITIVE / NEAR_THRESHOLD
+        let is_far = length < limit * (1.0 - NEAR_THRESHOLD) && length > f64::MIN_POSITIVE / NEAR_THRESHOLD;
+        !is_far
     }
 }
 
@@ -121,10 +123,16 @@ impl Bonds {
     ) {
         let Some(threshold) = self.threshold else { return };
         let is_mutual = self.is_mutual;
-        self.break_where(step, neighbours, (reference, present), breaks, |j, k| {
+        let is_suspect = |j: usize, k: u32| {
             // What both see, the lower one looks after.
+            (!is_mutual || j < k as usize) && threshold.is_near((reference, present), j, k as usize)
+        };
+        // Most steps break nothing: a look at the squares tells.
+        let suspects =
+            (0..neighbours.count()).filter(|&j| neighbours.of(j).iter().any(|&k| is_suspect(j, k)));
+        let suspects: Vec<usize> = suspects.collect();
+        self.break_among(suspects, step, neighbours, (reference, present), breaks, |j, k| {
             (!is_mutual || j < k)
-                && !threshold.is_far([present, reference].map(|at| square_of_distance(at, j, k)))
                 && roles[k].is_body()
                 && threshold.is_passed(
                     distance(present.get(j), present.get(k)),
@@ -168,7 +176,20 @@ impl Bonds {
         breaks: &mut Vec<Break>,
         breaks_now: impl Fn(usize, usize) -> bool,
     ) {
-        for j in 0..neighbours.count() {
+        self.break_among(0..neighbours.count(), step, neighbours, (reference, present), breaks, breaks_now);
+    }
+
+    /// Breaks the bonds of these particles, ascending, of which it is told that they break now.
+    fn break_among(
+        &mut self,
+        particles: impl IntoIterator<Item = usize>,
+        step: usize,
+        neighbours: &Neighbours,
+        (reference, present): (&Points, &Points),
+        breaks: &mut Vec<Break>,
+        breaks_now: impl Fn(usize, usize) -> bool,
+    ) {
+        for j in particles {
             for bond in neighbours.bonds(j) {
                 let k = neighbours.index[bond] as usize;
                 if self.broken[bond] || !breaks_now(j, k) {

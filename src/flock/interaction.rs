@@ -112,6 +112,10 @@ impl Interaction {
         };
         let broken = self.bonds.as_ref().filter(|bonds| bonds.any_broken());
         match (broken, &self.weights) {
+            (Some(bonds), Weights::Equal) if rule.mean == Mean::Barycentre => {
+                let seen = self.places_with_ghosts(particle, present, bonds);
+                rule.target(&own, seen.map(|(_, place)| Neighbour::at(place)))
+            }
             (Some(bonds), _) => rule.target(&own, self.seen_with_ghosts(particle, present, bonds)),
             (None, Weights::Matrix(weights)) if rule.mean == SMALL => {
                 let seen = self.neighbours.of(particle).iter().map(|&k| present.get(k as usize));
@@ -204,13 +208,24 @@ impl Interaction {
         present: &'a Points,
         bonds: &'a Bonds,
     ) -> impl Iterator<Item = Neighbour> + Clone + 'a {
+        self.places_with_ghosts(particle, present, bonds)
+            .map(move |(bond, place)| self.neighbour(particle, bond, place))
+    }
+
+    /// Bonds and where their ends are seen.
+    fn places_with_ghosts<'a>(
+        &'a self,
+        particle: usize,
+        present: &'a Points,
+        bonds: &'a Bonds,
+    ) -> impl Iterator<Item = (usize, [f64; 2])> + Clone + 'a {
         self.neighbours.bonds(particle).filter_map(move |bond| {
-            let position = if bonds.is_broken(bond) {
+            let place = if bonds.is_broken(bond) {
                 bonds.ghost(particle, bond, &self.neighbours, &self.reference, present)?
             } else {
                 present.get(self.neighbours.index[bond] as usize)
             };
-            Some(self.neighbour(particle, bond, position))
+            Some((bond, place))
         })
     }
 

@@ -20,6 +20,7 @@ use std::ops::Range;
 pub use kernel::Plane;
 
 use super::neighbourhood::Neighbours;
+use super::points::Points;
 use super::real::Real;
 
 /// Shorter runs are not worth the set-up of one.
@@ -73,11 +74,13 @@ struct Run {
     /// Where the particles in its gaps begin in `kept`, and how many they are.
     kept: u32,
     gaps: u32,
+    /// Whether anyone in it has a rest offset: where edges alone do, the others' zeros need not be read.
+    rests: bool,
 }
 
 impl Stencil {
-    /// Compresses the lists of the particles that follow.
-    pub fn compile(neighbours: &Neighbours, follows: &[bool]) -> Self {
+    /// Compresses the lists of the particles that follow; `rest` are their rest offsets, if they have any.
+    pub fn compile(neighbours: &Neighbours, follows: &[bool], rest: Option<&Points>) -> Self {
         let reach = reach(neighbours, follows);
         let is_local = reach <= LARGEST_BAND / 3;
         // Three columns of a lattice, which are swept abreast; cut where a run ends anyway.
@@ -88,7 +91,8 @@ impl Stencil {
         while j < follows.len() {
             let len = run_length(neighbours, follows, j, size);
             if follows[j] && len >= SHORTEST_RUN {
-                stencil.push_run(neighbours, j, len, follows.len() <= IN_CACHE);
+                let rests = rest.is_some_and(|rest| (j..j + len).any(|j| rest.get(j) != [0.0; 2]));
+                stencil.push_run(neighbours, (j, len, rests), follows.len() <= IN_CACHE);
             } else if follows[j] {
                 stencil.listed.extend(j as u32..(j + len) as u32);
             }
@@ -111,7 +115,7 @@ impl Stencil {
         self.bands.push(Band { particle: particle as u32, run, listed, followers: 0 });
     }
 
-    fn push_run(&mut self, neighbours: &Neighbours, j: usize, len: usize, bridge: bool) {
+    fn push_run(&mut self, neighbours: &Neighbours, (j, len, rests): (usize, usize, bool), bridge: bool) {
         let (stencil, size) = self.distances_of(neighbours, j);
         let first_of_band = self.bands.last().map_or(0, |band| band.run as usize);
         let kept = self.kept.len();
@@ -127,11 +131,12 @@ impl Stencil {
                 self.kept.extend(still);
                 last.gaps += (self.kept.len() - kept) as u32;
                 last.len = (j + len) as u32 - last.start;
+                last.rests |= rests;
                 return;
             }
         }
         let (start, len, kept) = (j as u32, len as u32, kept as u32);
-        self.runs.push(Run { start, len, stencil, neighbours: size, kept, gaps: 0 });
+        self.runs.push(Run { start, len, stencil, neighbours: size, kept, gaps: 0, rests });
     }
 
     pub fn band_count(&self) -> usize {

@@ -176,7 +176,7 @@ fn square_single(side: usize, steps_together: usize) -> Subject {
     let body = Body::square(side, &FIRST);
     let follows: Vec<bool> = body.roles.iter().map(|&role| role == Role::Follower).collect();
     let neighbours = body.interaction.neighbours;
-    let stencil = Stencil::compile(&neighbours, &follows);
+    let stencil = Stencil::compile(&neighbours, &follows, None);
     let followers = follows.iter().filter(|&&follows| follows).count();
     let single = |values: &[f64]| values.iter().map(|&value| f32::of(value)).collect::<Vec<f32>>();
     let mut even = [single(&body.present.x), single(&body.present.y)];

@@ -98,7 +98,7 @@ impl Bare {
         let follows: Vec<bool> = plan.roles.iter().map(|&role| role == Role::Follower).collect();
         let present: Points = stirred(&plan.body.reference).collect();
         Self {
-            stencil: Stencil::compile(&plan.interaction.neighbours, &follows),
+            stencil: Stencil::compile(&plan.interaction.neighbours, &follows, None),
             next: present.clone(),
             present,
         }

@@ -3,6 +3,8 @@
 //! Frames are kept at an interval that doubles whenever there are too many: every other one is then let go,
 //! so memory is bounded and the kept ones are evenly spaced.
 
+use serde::{Deserialize, Serialize};
+
 use super::track::Track;
 
 /// Frames that a report keeps at most: about as many as a slider of a page can tell apart.
@@ -19,7 +21,7 @@ pub struct Channel {
 }
 
 /// One moment.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Frame {
     /// Number of the step or period.
     pub step: usize,
@@ -94,6 +96,11 @@ impl Frames {
         };
         let tracks = self.channels.iter().zip(values).enumerate().map(track).collect();
         self.kept.push(Frame { step, tracks });
+    }
+
+    /// Goes on from frames that were kept at an interval before.
+    pub fn go_on(&mut self, kept: Vec<Frame>, interval: usize) {
+        (self.kept, self.interval) = (kept, interval);
     }
 
     pub fn kept(&self) -> &[Frame] {

@@ -28,7 +28,7 @@ pub mod trade;
 #[cfg(feature = "swarm")]
 pub use flight::FlightRecorder;
 pub use page::{Page, Table};
-pub use run::RunRecorder;
+pub use run::{Footage, RunRecorder};
 
 use encode::EncodedFrames;
 use frames::Frames;

@@ -1,21 +1,24 @@
 //! The report of a run: the body step by step, its probes, its summary and its scene.
 
+use std::borrow::Cow;
 use std::path::PathBuf;
 
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use super::super::bonds::listed_once;
 use super::super::error::ExportError;
 use super::super::figures::SERIES;
 use super::super::{OutputFolder, Results, Summary};
 use super::encoded;
-use super::frames::{Channel, Frames, MOST_FRAMES};
+use super::frames::{Channel, Frame, Frames, MOST_FRAMES};
 use super::page::{Page, number, scene_text};
 use super::plot::{self, Plot, PlotAxis, PlotSeries};
 use super::stage::{self, Clock, Film, Quantity, Stage, Stress};
 use crate::continuum::engine::Engine;
 use crate::continuum::record::Snapshot;
 use crate::continuum::run::{Outcome, StopReason};
+use crate::continuum::stored;
 use crate::flock::role::Role;
 use crate::flock::rules::{Mean, Rotation};
 use crate::flock::strain::Strain;
@@ -34,6 +37,18 @@ const COLOUR_BITS: u32 = 12;
 const MOST_EXACT: usize = 250_000;
 /// Frames of a body whose equilibrium was solved for, on its way from no load to all of it.
 const LOAD_FRAMES: usize = 20;
+
+/// What a recorder has kept of a run so far, for a checkpoint.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Footage<'a> {
+    frames: Cow<'a, [Frame]>,
+    interval: usize,
+    #[serde(with = "stored::roles")]
+    first_roles: Vec<Role>,
+    #[serde(with = "stored::roles")]
+    roles: Vec<Role>,
+    changes: Vec<[u32; 3]>,
+}
 
 /// Keeps the frames of a run while it goes on.
 #[derive(Debug)]
@@ -63,13 +78,28 @@ impl RunRecorder {
         Self { frames, first_roles: roles.clone(), roles, changes: Vec::new(), values }
     }
 
-    /// Looks at a step; `recorder` is made at the first.
-    pub fn watch(recorder: &mut Option<Self>, engine: &Engine) {
+    /// Looks at a step; `recorder` is made at the first, and goes on from the footage of an earlier one.
+    pub fn watch(recorder: &mut Option<Self>, earlier: &mut Option<Footage<'_>>, engine: &Engine) {
         let recorder = recorder.get_or_insert_with(|| Self::new(engine));
+        if let Some(Footage { frames, interval, first_roles, roles, changes }) = earlier.take() {
+            recorder.frames.go_on(frames.into_owned(), interval);
+            (recorder.first_roles, recorder.roles, recorder.changes) = (first_roles, roles, changes);
+        }
         if recorder.frames.wants(engine.step()) {
             recorder.take(engine, 1.0);
             let values: Vec<&[f64]> = recorder.values.iter().map(Vec::as_slice).collect();
             recorder.frames.keep(engine.step(), &values);
+        }
+    }
+
+    /// What was kept so far.
+    pub fn footage(&self) -> Footage<'_> {
+        Footage {
+            frames: Cow::Borrowed(self.frames.kept()),
+            interval: self.frames.interval(),
+            first_roles: self.first_roles.clone(),
+            roles: self.roles.clone(),
+            changes: self.changes.clone(),
         }
     }
 

@@ -3,6 +3,8 @@
 //! A quantum that is a power of two is shared by frames of like range, so that a particle at rest has the same
 //! code in each and costs nothing once frames are told as differences.
 
+use serde::{Deserialize, Serialize};
+
 /// Quanta no coarser than the range asks for are kept through this many halvings of the range: frames then
 /// keep sharing them.
 const HYSTERESIS: i32 = 2;
@@ -13,7 +15,7 @@ const EXACT_BITS: i32 = 52;
 
 /// Codes of a quantity, shape \[count\]: the value is `(base + code) 2^exponent`, and the largest code says
 /// that there is none.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Track {
     pub exponent: i32,
     pub base: i64,

@@ -165,7 +165,7 @@ fn sweep_part<T: Real, const N: usize, const W: usize>(
 ) {
     let distances = &distances[run.stencil as usize..][..run.neighbours as usize];
     let (len, at) = (to - from, from - plane.seen_from);
-    let rest = plane.rest.map(|rest| &rest[from..to]);
+    let rest = plane.rest.filter(|_| run.rests).map(|rest| &rest[from..to]);
     let target = &mut plane.next[from - plane.begin..to - plane.begin];
     let seen = |distance: isize| &plane.present[at.wrapping_add_signed(distance)..][..len];
     if N == ANY {
@@ -255,7 +255,7 @@ mod tests {
         let present: Vec<f64> = (0..1000).map(|i| f64::from(i * i % 991) / 7.0 - 50.0).collect();
         let distances = [-30, 2, 1, -1, 30, 7];
         for len in [1, 2, 3, 4, 5, 7, 61, 300] {
-            let runs = [Run { start: 37, len, stencil: 0, neighbours: 6, kept: 0, gaps: 0 }];
+            let runs = [Run { start: 37, len, stencil: 0, neighbours: 6, kept: 0, gaps: 0, rests: true }];
             let swept = |sweep: fn(&[Run], (&[isize], &[u32]), usize, &mut Plane<'_, f64>)| {
                 let mut next = vec![0.0; 1000];
                 let (present, rest) = (&present[..], Some(&present[..]));
@@ -279,7 +279,7 @@ mod tests {
     #[test]
     fn what_stands_in_a_gap_stays_there() {
         let present: Vec<f32> = (0..100).map(|i| i as f32).collect();
-        let runs = [Run { start: 10, len: 60, stencil: 0, neighbours: 3, kept: 1, gaps: 2 }];
+        let runs = [Run { start: 10, len: 60, stencil: 0, neighbours: 3, kept: 1, gaps: 2, rests: false }];
         let mut next = vec![-1.0; 70];
         let mut plane = Plane { seen_from: 0, present: &present, rest: None, begin: 5, next: &mut next };
         sweep(&runs, (&[-3, 2, 4], &[99, 30, 31]), 64, &mut plane);

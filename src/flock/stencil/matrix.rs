@@ -127,17 +127,19 @@ fn sweep_in_lanes<const W: usize>(start: usize, body: &Body<'_>, x: &mut [f64], 
 #[inline(always)]
 fn sweep_lanes<const W: usize>(j: usize, first: usize, body: &Body<'_>, x: &mut [f64], y: &mut [f64]) {
     let (list, blocks) = (body.neighbours.of(first), body.weights.of(first));
-    let mut sum = [[0.0; W]; 2];
-    for (n, (&k, block)) in list.iter().zip(blocks).enumerate() {
-        let from = k as usize + (j - first);
-        let pulls = apply(block, [lanes(&body.present.x, from), lanes(&body.present.y, from)]);
-        sum = if n == 0 { pulls } else { plus(sum, pulls) };
+    // Negative zero is what adding the first neighbour to changes no bit.
+    let mut sum = [[-0.0; W]; 2];
+    for (&k, block) in list.iter().zip(blocks) {
+        add(block, body.present, k as usize + (j - first), &mut sum);
     }
     // Zero is added as well: the rule does, and it makes 0.0 of -0.0.
-    sum = plus(sum, body.rest.map_or([[0.0; W]; 2], |rest| [lanes(&rest.x, j), lanes(&rest.y, j)]));
+    let rest: [[f64; W]; 2] = body.rest.map_or([[0.0; W]; 2], |rest| [lanes(&rest.x, j), lanes(&rest.y, j)]);
+    for k in 0..W {
+        sum[0][k] += rest[0][k];
+        sum[1][k] += rest[1][k];
+    }
     if let Some(forces) = body.forces {
-        let compliance = body.weights.compliance(first);
-        sum = plus(sum, apply(&compliance, [lanes(&forces.x, j), lanes(&forces.y, j)]));
+        add(&body.weights.compliance(first), forces, j, &mut sum);
     }
     if body.damping != 1.0 {
         let here: [[f64; W]; 2] = [lanes(&body.present.x, j), lanes(&body.present.y, j)];
@@ -151,15 +153,18 @@ fn sweep_lanes<const W: usize>(j: usize, first: usize, body: &Body<'_>, x: &mut 
     y.copy_from_slice(&sum[1]);
 }
 
+/// Adds `block * vector` of the vectors from number `from` on.
 #[inline(always)]
-fn apply<const W: usize>(block: &Block, [x, y]: [[f64; W]; 2]) -> [[f64; W]; 2] {
-    let row = |[a, b]: [f64; 2]| std::array::from_fn(|k| a * x[k] + b * y[k]);
-    [row(block[0]), row(block[1])]
-}
-
-#[inline(always)]
-fn plus<const W: usize>(a: [[f64; W]; 2], b: [[f64; W]; 2]) -> [[f64; W]; 2] {
-    [0, 1].map(|axis| std::array::from_fn(|k| a[axis][k] + b[axis][k]))
+fn add<const W: usize>(block: &Block, vectors: &Points, from: usize, sum: &mut [[f64; W]; 2]) {
+    let x: [f64; W] = lanes(&vectors.x, from);
+    let y: [f64; W] = lanes(&vectors.y, from);
+    let [[xx, xy], [yx, yy]] = *block;
+    for k in 0..W {
+        sum[0][k] += xx * x[k] + xy * y[k];
+    }
+    for k in 0..W {
+        sum[1][k] += yx * x[k] + yy * y[k];
+    }
 }
 
 #[inline(always)]

@@ -2,7 +2,6 @@ use super::super::body::{Body, Cut};
 use super::super::interaction::{Interaction, Weights};
 use super::super::lattice::{Lattice, LatticeKind};
 use super::super::neighbourhood::Neighbourhood;
-use super::super::points::Points;
 use super::super::rules::Rule;
 use super::super::shape::Shape;
 use super::*;
@@ -73,7 +72,7 @@ fn compare(interaction: &Interaction, held: impl Fn(usize) -> bool, what: &str) 
     const MARK: f64 = 12345.0;
     let count = interaction.reference.len();
     let follows: Vec<bool> = (0..count).map(|j| !held(j)).collect();
-    let stencil = Stencil::compile(&interaction.neighbours, &follows);
+    let stencil = Stencil::compile(&interaction.neighbours, &follows, interaction.rest.as_ref());
     let present = rough(count, 1);
     let mut next = Points { x: vec![MARK; count], y: vec![MARK; count] };
     sweep(&stencil, interaction, &present, &mut next);
@@ -149,7 +148,11 @@ fn a_mean_of_negative_zeros_and_a_particle_without_neighbours_give_the_bits_of_t
         rest: None,
         bonds: None,
     };
-    let stencil = Stencil::compile(&interaction.neighbours, &[true; 22]);
+    let stencil = Stencil::compile(
+        &interaction.neighbours,
+        &[true; 22],
+        Some(&Points { x: vec![1.0; 22], y: vec![1.0; 22] }),
+    );
     assert!(stencil.share_in_runs() > 0.9);
     let negative = || vec![-0.0; 22];
     let present = Points { x: negative(), y: negative() };

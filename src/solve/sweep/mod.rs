@@ -72,7 +72,8 @@ impl Sweep {
         let follows = followers(roles);
         let Interaction { rule, neighbours, weights, .. } = interaction;
         let plain = rule.is_plain_barycentre() && matches!(weights, Weights::Equal);
-        let stencil = (plain && update == Update::default()).then(|| Stencil::compile(neighbours, &follows));
+        let stencil = (plain && update == Update::default())
+            .then(|| Stencil::compile(neighbours, &follows, interaction.rest.as_ref()));
         let matrices = match weights {
             Weights::Matrix(weights) if *rule == Rule::MATERIAL && update.order == Order::Synchronous => {
                 let chunk = chunk_size(follows.len());

@@ -113,25 +113,27 @@ impl<T: Real> Steps<'_, T> {
         let rows = Rows { even, odd, flags: &mut flags };
         let mut seen = Seen { computed: 0, farther: vec![false; self.count] };
         let cuts = self.cuts(bands);
+        if cuts.len() == 2 {
+            let front = Front { steps: self, axis, stretch: 0..bands, rows };
+            front.run(|_| 0..bands, &mut seen);
+            keep_last(&flags, levels, changed);
+            return seen;
+        }
         let segments: Vec<Range<usize>> = cuts.windows(2).map(|ends| ends[0]..ends[1]).collect();
         let shrinking = |segment: &Range<usize>, level: usize| {
             let from = if segment.start == 0 { 0 } else { segment.start + level };
             from..if segment.end == bands { bands } else { segment.end - level }
         };
         self.take_fronts(axis, rows, &segments, shrinking, &mut seen);
-        if segments.len() > 1 {
-            let rows = Rows { even, odd, flags: &mut flags };
-            let inner = &cuts[1..cuts.len() - 1];
-            let wedges: Vec<Range<usize>> = inner.iter().map(|cut| cut - levels..cut + levels).collect();
-            let growing = |wedge: &Range<usize>, level: usize| {
-                let cut = wedge.start + levels;
-                cut - level..cut + level
-            };
-            self.take_fronts(axis, rows, &wedges, growing, &mut seen);
-        }
-        for (flags, changed) in flags.chunks(levels).zip(changed) {
-            *changed = flags[self.count];
-        }
+        let rows = Rows { even, odd, flags: &mut flags };
+        let inner = &cuts[1..cuts.len() - 1];
+        let wedges: Vec<Range<usize>> = inner.iter().map(|cut| cut - levels..cut + levels).collect();
+        let growing = |wedge: &Range<usize>, level: usize| {
+            let cut = wedge.start + levels;
+            cut - level..cut + level
+        };
+        self.take_fronts(axis, rows, &wedges, growing, &mut seen);
+        keep_last(&flags, levels, changed);
         seen
     }
 
@@ -152,21 +154,19 @@ impl<T: Real> Steps<'_, T> {
         range: impl Fn(&Range<usize>, usize) -> Range<usize> + Sync,
         seen: &mut Seen,
     ) {
-        if let [stretch] = stretches {
-            let front = Front { steps: self, axis, stretch: stretch.clone(), rows };
-            return seen.add(front.run(|level| range(stretch, level)));
-        }
         let fronts: Vec<_> = rows
             .part(stretches, self.stencil, self.count + 1)
             .into_iter()
             .zip(stretches)
             .map(|(rows, stretch)| Front { steps: self, axis, stretch: stretch.clone(), rows })
             .collect();
-        let all: Vec<Seen> = fronts
-            .into_par_iter()
-            .zip(stretches)
-            .map(|(front, stretch)| front.run(|level| range(stretch, level)))
-            .collect();
+        let run = |front: Front<'_, T>| {
+            let stretch = front.stretch.clone();
+            let mut seen = Seen { computed: 0, farther: vec![false; self.count] };
+            front.run(|level| range(&stretch, level), &mut seen);
+            seen
+        };
+        let all: Vec<Seen> = fronts.into_par_iter().map(run).collect();
         all.into_iter().for_each(|one| seen.add(one));
     }
 }
@@ -212,6 +212,13 @@ impl<'a, T> Rows<'a, T> {
     }
 }
 
+/// Which bands changed in the last step.
+fn keep_last(flags: &[bool], levels: usize, changed: &mut [bool]) {
+    for (flags, changed) in flags.chunks(levels).zip(changed) {
+        *changed = flags[levels - 1];
+    }
+}
+
 /// Cuts `range` out of a slice, which goes on behind it.
 fn take_part<'a, T>(slice: &mut &'a mut [T], range: Range<usize>) -> &'a mut [T] {
     let (head, tail) = std::mem::take(slice).split_at_mut(range.end);
@@ -228,28 +235,25 @@ struct Front<'a, T> {
 }
 
 impl<T: Real> Front<'_, T> {
-    /// Runs through the bands; `range` names those that take a level.
-    fn run(mut self, range: impl Fn(usize) -> Range<usize>) -> Seen {
+    /// Runs through the bands; `range` names those that take a level, whose ends move by one band a level or not at all.
+    fn run(mut self, range: impl Fn(usize) -> Range<usize>, seen: &mut Seen) {
         let count = self.steps.count;
-        let mut seen = Seen { computed: 0, farther: vec![false; count] };
         // No band may get ahead of the one behind it if nothing binds who sees whom.
         if !self.steps.stencil.is_local() {
             for level in 1..=count {
-                range(level).for_each(|band| self.sweep(level, band, &mut seen));
+                range(level).for_each(|band| self.sweep(level, band, seen));
             }
-            return seen;
+            return;
         }
-        let ranges: Vec<Range<usize>> = (1..=count).map(range).collect();
-        let first = ranges.iter().zip(1..).map(|(r, level)| r.start + level).min().unwrap_or(0);
-        let last = ranges.iter().zip(1..).map(|(r, level)| r.end + level).max().unwrap_or(0);
+        let (one, all) = (range(1), range(count));
+        let (first, last) = ((one.start + 1).min(all.start + count), (one.end + 1).max(all.end + count));
         for at in first..last {
-            for (range, level) in ranges.iter().zip(1..) {
-                if at >= level && range.contains(&(at - level)) {
-                    self.sweep(level, at - level, &mut seen);
+            for level in 1..=count.min(at) {
+                if range(level).contains(&(at - level)) {
+                    self.sweep(level, at - level, seen);
                 }
             }
         }
-        seen
     }
 
     /// Takes step number `level` of a band.
@@ -410,15 +414,29 @@ mod tests {
     #[test]
     fn steps_taken_together_have_the_bits_of_single_ones_for_any_threads() {
         for kind in LatticeKind::SAMPLES {
-            let case = Case::new(kind, 120, 61);
-            for counts in [&[16usize, 16, 9][..], &[1, 2, 3, 16, 5, 14], &[1; 41]] {
-                let expected = case.singly(41);
-                for threads in [1, 2, 3, 8] {
+            // Long enough to be cut for the threads, and for one and several wedges at the cuts.
+            let case = Case::new(kind, 3600, 61);
+            let expected = case.singly(25);
+            for counts in [&[16usize, 9][..], &[1, 2, 3, 16, 3], &[1; 25]] {
+                for threads in [1, 2, 4, 8] {
                     let (places, _) = case.together(counts, threads);
                     assert!(bits(&places) == bits(&expected), "{kind:?} {counts:?}, {threads} threads");
                 }
             }
         }
+    }
+
+    #[test]
+    fn threads_beyond_two_cut_the_body_in_segments() {
+        let case = Case::new(LatticeKind::Square { spacing: 1.0 }, 3600, 61);
+        let sweep = Sweep::compile(Update::default(), &case.interaction, &case.roles);
+        let (stencil, neighbours) = (sweep.stencil.as_ref().expect("plain"), &case.interaction.neighbours);
+        let segments = |threads| {
+            let (led, count, farther) = (Led::NOBODY, 16, None);
+            let steps = Steps::<f64> { stencil, neighbours, rest: None, led, count, farther, threads };
+            steps.cuts(stencil.band_count()).len() - 1
+        };
+        assert_eq!([1, 2, 4, 8].map(segments), [1, 1, 2, 4]);
     }
 
     #[test]
