@@ -197,7 +197,8 @@ impl<'a> Looks<'a> {
     fn new(scene: &'a Scene, plan: &Plan, every: bool) -> Self {
         let every = every || !plan.probes.is_empty();
         let most = if every { 1 } else { (UPDATES_BETWEEN_LOOKS / plan.count()).max(1) };
-        Self { scene, most, film: Cell::new(None) }
+        // The report has yet to say what it wants: the next one.
+        Self { scene, most, film: Cell::new(Some(0)) }
     }
 
     fn after(&self, step: usize) -> usize {
