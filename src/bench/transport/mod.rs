@@ -8,7 +8,7 @@
 //!   arrived when the receiver can read it where it lies. Who copies or encodes pays for it here.
 //! * **filled and read**: writing every pose into the message and adding all of them up at the other side count too.
 //!
-//! The ways ([`ways`], and [`dds`] with feature `ros`): a channel of the standard library that hands a vector over,
+//! The ways (`ways`, and `dds` with feature `ros`): a channel of the standard library that hands a vector over,
 //! iceoryx2 as it comes, our [`shm`](crate::shm) on top of it as the node uses it, a Unix socket, and DDS over loopback
 //! as the node uses it (polled every 50 us). Nobody spins: on cores that others use too, who spins waits for itself.
 //!

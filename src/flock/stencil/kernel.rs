@@ -31,9 +31,12 @@ pub struct Plane<'a, T> {
     pub next: &'a mut [T],
 }
 
+/// Index distances, and particles in gaps.
+type Tables<'a> = (&'a [isize], &'a [u32]);
+
 /// Computes one coordinate of runs that all have the same number of neighbours, `tile` particles of each at a
 /// time (a power of two).
-pub fn sweep<T: Real>(runs: &[Run], tables: (&[isize], &[u32]), tile: usize, plane: &mut Plane<'_, T>) {
+pub fn sweep<T: Real>(runs: &[Run], tables: Tables<'_>, tile: usize, plane: &mut Plane<'_, T>) {
     let sweep = match runs.first().map_or(0, |run| run.neighbours) {
         3 => sweep_alike::<T, 3>,
         4 => sweep_alike::<T, 4>,
@@ -53,7 +56,7 @@ const ANY: usize = 0;
 
 fn sweep_alike<T: Real, const N: usize>(
     runs: &[Run],
-    tables: (&[isize], &[u32]),
+    tables: Tables<'_>,
     tile: usize,
     plane: &mut Plane<'_, T>,
 ) {
@@ -78,7 +81,7 @@ fn sweep_alike<T: Real, const N: usize>(
 #[target_feature(enable = "avx512f")]
 fn sweep_avx512<T: Real, const N: usize>(
     runs: &[Run],
-    tables: (&[isize], &[u32]),
+    tables: Tables<'_>,
     tile: usize,
     plane: &mut Plane<'_, T>,
 ) {
@@ -92,7 +95,7 @@ fn sweep_avx512<T: Real, const N: usize>(
 #[target_feature(enable = "avx2")]
 fn sweep_avx2<T: Real, const N: usize>(
     runs: &[Run],
-    tables: (&[isize], &[u32]),
+    tables: Tables<'_>,
     tile: usize,
     plane: &mut Plane<'_, T>,
 ) {
@@ -106,7 +109,7 @@ fn sweep_avx2<T: Real, const N: usize>(
 #[inline(always)]
 fn sweep_in_lanes<T: Real, const N: usize, const W: usize>(
     runs: &[Run],
-    (distances, kept): (&[isize], &[u32]),
+    (distances, kept): Tables<'_>,
     tile: usize,
     plane: &mut Plane<'_, T>,
 ) {
@@ -250,13 +253,15 @@ fn means_of_any<'a, T: Real>(
 mod tests {
     use super::*;
 
+    type Loops = fn(&[Run], Tables<'_>, usize, &mut Plane<'_, f64>);
+
     #[test]
     fn the_width_of_the_vectors_changes_no_bit() {
         let present: Vec<f64> = (0..1000).map(|i| f64::from(i * i % 991) / 7.0 - 50.0).collect();
         let distances = [-30, 2, 1, -1, 30, 7];
         for len in [1, 2, 3, 4, 5, 7, 61, 300] {
             let runs = [Run { start: 37, len, stencil: 0, neighbours: 6, kept: 0, gaps: 0, rests: true }];
-            let swept = |sweep: fn(&[Run], (&[isize], &[u32]), usize, &mut Plane<'_, f64>)| {
+            let swept = |sweep: Loops| {
                 let mut next = vec![0.0; 1000];
                 let (present, rest) = (&present[..], Some(&present[..]));
                 let mut plane = Plane { seen_from: 0, present, rest, begin: 0, next: &mut next };

@@ -376,7 +376,7 @@ mod tests {
         let most = (0..neighbours.count()).map(|j| neighbours.of(j).len()).max().expect("particles");
         let starts: Vec<u32> = (0..=most as u32 + 1).map(|n| n * n.saturating_sub(1) / 2).collect();
         let blocks: Vec<Block> = (0..starts[most + 1])
-            .map(|k| f64::from(k))
+            .map(f64::from)
             .map(|k| [[0.1 + 0.01 * k.sin(), 0.02 * k.cos()], [0.03 * (2.0 * k).sin(), 0.1 - 0.01 * k.cos()]])
             .collect();
         interaction.weights = Weights::Matrix(MatrixWeights {
