@@ -110,6 +110,20 @@ fn every_lattice_and_neighbourhood_gives_the_bits_of_the_rule() {
 }
 
 #[test]
+fn the_rest_offset_of_a_single_particle_is_added() {
+    let square = LatticeKind::Square { spacing: 1.0 };
+    let mut interaction =
+        lay(square, &Cut::Count { columns: 20, rows: 20 }, &Neighbourhood::First { keep: None });
+    for column in [1, 9, 18] {
+        let mut rest = Points::zeros(400);
+        rest.set(20 * column + 7, [0.5, -0.25]);
+        interaction.rest = Some(rest);
+        let share = compare(&interaction, |_| false, "one with an offset");
+        assert!(share > 0.8, "{share}");
+    }
+}
+
+#[test]
 fn numbers_of_neighbours_without_loops_of_their_own_give_the_bits_of_the_rule() {
     for kind in LatticeKind::SAMPLES.into_iter().filter(|kind| !matches!(kind, LatticeKind::Honeycomb { .. }))
     {

@@ -455,6 +455,19 @@ mod tests {
     }
 
     #[test]
+    fn motion_that_comes_from_either_end_is_met_in_time() {
+        let mut case = Case::new(LatticeKind::Square { spacing: 1.0 }, 300, 61);
+        for led in [(0..61).collect::<Vec<usize>>(), (0..61).chain(299 * 61..300 * 61).collect()] {
+            case.roles.fill(Role::Follower);
+            led.iter().for_each(|&i| case.roles[i] = Role::Leader);
+            case.led = led;
+            let (places, activity) = case.together(&[16, 16, 16, 9], 1);
+            assert!(bits(&places) == bits(&case.singly(57)));
+            assert!(activity.share_computed() < 0.5, "{}", activity.share_computed());
+        }
+    }
+
+    #[test]
     fn a_body_in_which_some_see_far_is_stepped_all_the_same() {
         let mut case = Case::new(LatticeKind::Square { spacing: 1.0 }, 5000, 61);
         // The far end hears of the near one.
