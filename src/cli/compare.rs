@@ -9,6 +9,7 @@ use flockform::compare::run::{Compared, compare as compare_scene};
 use flockform::continuum::run::StopReason;
 use flockform::export::comparison::{ComparisonReport, write_comparison};
 use flockform::export::report;
+use flockform::flock::rules::{Mean, Rotation};
 use flockform::scene::Scene;
 
 use super::output::{OutputArguments, ReportArguments};
@@ -74,5 +75,11 @@ fn words(scene: &Scene, compared: &Compared) -> String {
         None => format!("{} steps", outcome.engine.step()),
     };
     let nodes = truth.mesh().node_count();
-    format!("{}: the rule by {way}, {end}; truth on {nodes} nodes\n{}", scene.name, compared.comparison)
+    let mut words =
+        format!("{}: the rule by {way}, {end}; truth on {nodes} nodes\n{}", scene.name, compared.comparison);
+    if matches!(scene.mean, Mean::Material { rotation: Rotation::Corotated }) {
+        words +=
+            "the truth is of small rotations, the rule is not: where the body turns, they differ by that\n";
+    }
+    words
 }

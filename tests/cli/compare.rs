@@ -24,6 +24,15 @@ fn a_table_is_printed_and_the_results_stand_in_a_numbered_folder() {
 }
 
 #[test]
+fn a_rule_of_large_rotations_is_told_from_a_truth_of_small_ones() {
+    let folder = temporary();
+    let words = "the truth is of small rotations";
+    let turned = compare(folder.path(), &["--set", "rule.mean={kind=\"material\",rotation=\"corotated\"}"]);
+    assert!(turned.contains(words), "{turned}");
+    assert!(!compare(folder.path(), &[]).contains(words));
+}
+
+#[test]
 fn json_is_the_file_and_quiet_is_quiet() {
     let folder = temporary();
     let said = compare(folder.path(), &["--json", "--out", "here"]);
