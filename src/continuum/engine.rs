@@ -1,6 +1,6 @@
 //! The engine: one step of a planned body.
 
-mod several;
+pub(super) mod several;
 pub mod state;
 
 use super::layout::RoleChange;
@@ -54,6 +54,15 @@ struct Led {
     /// Step before the first one led.
     since: usize,
     base: [f64; 2],
+}
+
+impl Led {
+    /// Where its program has it after so many steps \[length\].
+    fn place(&self, changes: &[RoleChange], step: usize) -> Option<[f64; 2]> {
+        let motion = changes[self.change].motion.as_ref()?;
+        let [dx, dy] = motion.displacement((step - self.since) as f64, self.which, self.base);
+        Some([self.base[0] + dx, self.base[1] + dy])
+    }
 }
 
 /// Buffers of a neighbourhood that is found anew at every step.
@@ -339,9 +348,9 @@ impl Engine {
 
     fn move_leaders(&mut self) {
         for led in &self.leaders {
-            let Some(motion) = &self.changes[led.change].motion else { continue };
-            let [dx, dy] = motion.displacement((self.step - led.since) as f64, led.which, led.base);
-            self.previous.set(led.particle, [led.base[0] + dx, led.base[1] + dy]);
+            if let Some(place) = led.place(&self.changes, self.step) {
+                self.previous.set(led.particle, place);
+            }
         }
         for (particle, place) in self.guided.drain(..) {
             self.previous.set(particle, place);

@@ -1,5 +1,6 @@
 //! How far motion can have come: one neighbour a step.
 
+use super::engine::several::looks_at_every_step;
 use super::plan::Plan;
 use crate::flock::neighbourhood::Neighbours;
 use crate::solve::sweep::Sweep;
@@ -8,10 +9,8 @@ use crate::solve::sweep::Sweep;
 /// are known to change nothing and are left out. `None` where every update is made: the sweep of this scene does not
 /// look for what stands still.
 pub fn share_reached(plan: &Plan) -> Option<f64> {
-    let looks = plan.body.frame.is_some()
-        || plan.present_radius.is_some()
-        || plan.interaction.bonds.as_ref().is_some_and(|bonds| bonds.threshold.is_some())
-        || plan.changes.iter().any(|change| change.when.is_some());
+    let Plan { body, interaction, changes, .. } = plan;
+    let looks = looks_at_every_step(body, plan.present_radius.is_some(), interaction, changes);
     if looks || !Sweep::compile(plan.update, &plan.interaction, &plan.roles).takes_several() {
         return None;
     }

@@ -1,6 +1,9 @@
 //! Several steps of a body at once, where nothing in between depends on how it stands.
 
 use super::{Engine, Led as Leader};
+use crate::continuum::layout::RoleChange;
+use crate::flock::body::Body;
+use crate::flock::interaction::Interaction;
 use crate::flock::points::{Points, distance};
 use crate::solve::sweep::{Activity, Led, MOST_STEPS};
 
@@ -9,10 +12,8 @@ impl Engine {
     /// must be taken by [`Engine::advance`]: a frame, bonds that may break, neighbours found anew and roles
     /// that change look at every step.
     pub fn steps_at_once(&self, most: usize) -> usize {
-        let looks = self.body.frame.is_some()
-            || self.present_neighbours.is_some()
-            || self.interaction.bonds.as_ref().is_some_and(|bonds| bonds.threshold.is_some())
-            || self.changes.iter().any(|change| change.when.is_some());
+        let finds_neighbours = self.present_neighbours.is_some();
+        let looks = looks_at_every_step(&self.body, finds_neighbours, &self.interaction, &self.changes);
         if looks || !self.guided.is_empty() || !self.sweep.takes_several() {
             return 0;
         }
@@ -26,10 +27,7 @@ impl Engine {
     pub fn advance_by(&mut self, count: usize, farther: Option<f64>) -> Vec<bool> {
         let (leaders, changes, step) = (&self.leaders, &self.changes, self.step);
         let place = |which: usize, level: usize| {
-            let Leader { change, which, since, base, .. } = leaders[which];
-            let motion = changes[change].motion.as_ref().expect("leaders have a motion");
-            let [dx, dy] = motion.displacement((step + level - since) as f64, which, base);
-            [base[0] + dx, base[1] + dy]
+            leaders[which].place(changes, step + level).expect("leaders have a motion")
         };
         let led = Led { particles: &self.led, place: &place };
         let places = (&mut self.present, &mut self.previous);
@@ -54,11 +52,9 @@ impl Engine {
     /// How far from its reference place a leader gets in the next steps at most \[length\].
     pub fn leaders_reach(&self, steps: usize) -> f64 {
         let farthest = |leader: &Leader| {
-            let Some(motion) = &self.changes[leader.change].motion else { return 0.0 };
+            let reference = self.body.reference.get(leader.particle);
             let far = |step: usize| {
-                let [dx, dy] = motion.displacement((step - leader.since) as f64, leader.which, leader.base);
-                let place = [leader.base[0] + dx, leader.base[1] + dy];
-                distance(place, self.body.reference.get(leader.particle))
+                leader.place(&self.changes, step).map_or(0.0, |place| distance(place, reference))
             };
             (self.step + 1..=self.step + steps).map(far).fold(0.0, f64::max)
         };
@@ -73,4 +69,17 @@ impl Engine {
         let rests = |j: usize| distance(self.interaction.target(j, reference), reference.get(j)) <= near;
         self.body.matter().all(rests)
     }
+}
+
+/// Whether something of a body depends on how it stands in each step: then steps are taken one at a time.
+pub fn looks_at_every_step(
+    body: &Body,
+    finds_neighbours: bool,
+    interaction: &Interaction,
+    changes: &[RoleChange],
+) -> bool {
+    body.frame.is_some()
+        || finds_neighbours
+        || interaction.bonds.as_ref().is_some_and(|bonds| bonds.threshold.is_some())
+        || changes.iter().any(|change| change.when.is_some())
 }
