@@ -179,8 +179,7 @@ impl Sweep {
         let stencil = self.stencil.as_ref().expect("a sweep that takes several steps has a stencil");
         let rest = interaction.rest.as_ref().map(|rest| [&rest.x[..], &rest.y[..]]);
         let threads = if is_parallel(present.len()) { rayon::current_num_threads() } else { 1 };
-        let steps =
-            Steps { stencil, neighbours: &interaction.neighbours, rest, led, count, farther, threads };
+        let steps = Steps { stencil, rest, led, count, farther, threads };
         let even = [&mut present.x[..], &mut present.y[..]];
         let farther = steps.take(activity, even, [&mut next.x[..], &mut next.y[..]]);
         if count % 2 == 1 {
@@ -265,7 +264,7 @@ fn sweep_whole(stencil: &Stencil, interaction: &Interaction, present: &Points, n
             Plane { seen_from: 0, present: &present.y, rest: rest_y, begin, next: y },
         ];
         planes.iter_mut().for_each(|plane| stencil.sweep_runs(bands.clone(), TILE, plane));
-        stencil.sweep_listed(bands, &interaction.neighbours, &mut planes);
+        stencil.sweep_listed(bands, &mut planes);
     };
     match pieces.len() {
         0 | 1 => pieces.into_iter().for_each(work),

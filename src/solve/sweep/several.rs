@@ -19,7 +19,6 @@ use std::ops::Range;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::flock::neighbourhood::Neighbours;
 use crate::flock::real::Real;
 use crate::flock::stencil::{Plane, Stencil};
 
@@ -75,7 +74,6 @@ impl Activity {
 #[derive(Clone, Copy)]
 pub struct Steps<'a, T> {
     pub stencil: &'a Stencil,
-    pub neighbours: &'a Neighbours,
     pub rest: Option<[&'a [T]; 2]>,
     pub led: Led<'a>,
     /// How many, from 1 to [`MOST_STEPS`].
@@ -276,7 +274,7 @@ impl<T: Real> Front<'_, T> {
             let rest = steps.rest.map(|rest| rest[*axis]);
             let mut plane = [Plane { seen_from: origin, present, rest, begin: origin, next: &mut *next }];
             stencil.sweep_runs(band..band + 1, tile, &mut plane[0]);
-            stencil.sweep_listed(band..band + 1, steps.neighbours, &mut plane);
+            stencil.sweep_listed(band..band + 1, &mut plane);
             seen.computed += stencil.followers(band) as u64;
             let (before, after) = (&present[particles.clone()], &next[particles]);
             changed = differ(before, after);
@@ -392,9 +390,8 @@ mod tests {
                 let place = |which: usize, level: usize| self.place(which, done + level);
                 let led = Led { particles: &self.led, place: &place };
                 let rest = self.interaction.rest.as_ref().map(|rest| [&rest.x[..], &rest.y[..]]);
-                let (stencil, neighbours) =
-                    (sweep.stencil.as_ref().expect("plain"), &self.interaction.neighbours);
-                let steps = Steps { stencil, neighbours, rest, led, count, farther: None, threads };
+                let stencil = sweep.stencil.as_ref().expect("plain");
+                let steps = Steps { stencil, rest, led, count, farther: None, threads };
                 let even = [&mut present.x[..], &mut present.y[..]];
                 let odd = [&mut next.x[..], &mut next.y[..]];
                 pool.install(|| steps.take(&mut activity, even, odd));
