@@ -55,6 +55,7 @@ pub struct Stencil {
     kept: Vec<u32>,
     /// Whether nobody sees beyond the next band.
     is_local: bool,
+    followers: usize,
 }
 
 /// Where a band begins; it ends where the next one begins.
@@ -114,6 +115,7 @@ impl Stencil {
         for band in 0..stencil.band_count() {
             let count = stencil.particles(band..band + 1).filter(|&j| follows[j]).count();
             stencil.bands[band].followers = count as u32;
+            stencil.followers += count;
         }
         stencil
     }
@@ -170,10 +172,14 @@ impl Stencil {
         self.bands[band].followers as usize
     }
 
+    /// How many particles follow in all.
+    pub fn all_followers(&self) -> usize {
+        self.followers
+    }
+
     /// Share of the following particles that need no neighbour list.
     pub fn share_in_runs(&self) -> f64 {
-        let followers: u64 = self.bands.iter().map(|band| u64::from(band.followers)).sum();
-        (followers - self.lists.particles() as u64) as f64 / followers.max(1) as f64
+        (self.followers - self.lists.particles()) as f64 / self.followers.max(1) as f64
     }
 
     /// Computes one coordinate of the targets of those in some bands that follow without lists, `tile` of a

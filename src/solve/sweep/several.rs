@@ -32,6 +32,12 @@ pub const MOST_STEPS: usize = 16;
 /// Particles of a column swept before it is the next one's turn, if several steps are taken together, or one.
 const TILES: [usize; 2] = [512, 64];
 
+/// Particles up to which a body, one coordinate of it, stays in the second cache from step to step.
+const FRONT_FROM: usize = 1 << 16;
+
+/// Bands swept in one go where each step is taken by itself: enough for what is asked of each band not to count.
+const MOST_BANDS: usize = 8;
+
 /// Who is led from outside while several steps are taken.
 #[derive(Clone, Copy)]
 pub struct Led<'a> {
@@ -92,7 +98,6 @@ impl<T: Real> Steps<'_, T> {
     /// `even`, which holds the present positions; the other holds those one step before. For each step, whether somebody
     /// moved farther in it than asked along an axis.
     pub fn take(&self, activity: &mut Activity, even: [&mut [T]; 2], odd: [&mut [T]; 2]) -> Vec<bool> {
-        let bands = self.stencil.band_count();
         let ([changed_x, changed_y], [even_x, even_y], [odd_x, odd_y]) = (&mut activity.changed, even, odd);
         let seen = if self.stencil.share_in_runs() < 0.5 {
             // A list that has been read serves both coordinates.
@@ -106,8 +111,7 @@ impl<T: Real> Steps<'_, T> {
             x.add(y);
             x
         };
-        let followers: usize = (0..bands).map(|band| self.stencil.followers(band)).sum();
-        activity.due += 2 * (followers * self.count) as u64;
+        activity.due += 2 * (self.stencil.all_followers() * self.count) as u64;
         activity.computed += seen.computed;
         seen.farther
     }
@@ -207,6 +211,13 @@ struct Rows<'a, T, const P: usize> {
 }
 
 impl<'a, T, const P: usize> Rows<'a, T, P> {
+    /// The rows that a level reads, those it writes, and the flags.
+    #[allow(clippy::type_complexity)]
+    fn at(&mut self, level: usize) -> (&[&'a mut [T]; P], &mut [&'a mut [T]; P], &mut [bool]) {
+        let Self { even, odd, flags } = self;
+        if level % 2 == 1 { (even, odd, flags) } else { (odd, even, flags) }
+    }
+
     fn lend(&mut self) -> Rows<'_, T, P> {
         let Self { even, odd, flags } = self;
         let (even, odd) = (even.each_mut().map(|row| &mut **row), odd.each_mut().map(|row| &mut **row));
@@ -252,60 +263,89 @@ impl<T: Real, const P: usize> Front<'_, T, P> {
     /// Runs through the bands; `range` names those that take a level, whose ends move by one band a level or not at all.
     fn run(mut self, range: impl Fn(usize) -> Range<usize>, seen: &mut Seen) {
         let count = self.steps.count;
-        // No band may get ahead of the one behind it if nothing binds who sees whom.
-        if !self.steps.stencil.is_local() {
-            for level in 1..=count {
-                range(level).for_each(|band| self.sweep(level, band, seen));
-            }
+        // No band may get ahead of the one behind it if nothing binds who sees whom; a single step has no front; and
+        // what the second cache holds needs none.
+        if count == 1 || !self.steps.stencil.is_local() || self.rows.even[0].len() <= FRONT_FROM {
+            (1..=count).for_each(|level| self.sweep(level, range(level), seen));
             return;
         }
         let (one, all) = (range(1), range(count));
         let (first, last) = ((one.start + 1).min(all.start + count), (one.end + 1).max(all.end + count));
         for at in first..last {
             for level in 1..=count.min(at) {
-                if range(level).contains(&(at - level)) {
-                    self.sweep(level, at - level, seen);
+                let band = at - level;
+                if range(level).contains(&band) {
+                    self.sweep(level, band..band + 1, seen);
                 }
             }
         }
     }
 
-    /// Takes step number `level` of a band.
-    fn sweep(&mut self, level: usize, band: usize, seen: &mut Seen) {
+    /// Takes step number `level` of some bands, those that may change.
+    fn sweep(&mut self, level: usize, bands: Range<usize>, seen: &mut Seen) {
+        let mut from = bands.start;
+        while from < bands.end {
+            let most = bands.end.min(from + MOST_BANDS);
+            let still = (from..most).find(|&band| !self.may_change(level, band));
+            let to = still.unwrap_or(most);
+            if from < to {
+                self.sweep_all(level, from..to, seen);
+            }
+            if let Some(still) = still {
+                self.rows.flags[(still - self.stretch.start) * (self.steps.count + 1) + level] = false;
+            }
+            from = still.map_or(most, |still| still + 1);
+        }
+    }
+
+    /// Puts those of a band who are led in their places; whether one of them moves, or somebody that the band sees did
+    /// in the step before.
+    fn may_change(&mut self, level: usize, band: usize) -> bool {
         let Self { steps, axes, stretch, rows } = self;
         let (stencil, levels) = (steps.stencil, steps.count + 1);
         let origin = stencil.particles(stretch.clone()).start;
-        let all = stencil.particles(band..band + 1);
-        let particles = all.start - origin..all.end - origin;
-        let (present, next) =
-            if level % 2 == 1 { (&rows.even, &mut rows.odd) } else { (&rows.odd, &mut rows.even) };
-        let mut must = false;
-        for ((&axis, present), next) in axes.iter().zip(present).zip(&mut *next) {
-            must |= place_led(&steps.led, axis, level, all.clone(), (origin, present, next));
+        let (present, next, flags) = rows.at(level);
+        let mut moves = false;
+        for ((&axis, present), next) in axes.iter().zip(present).zip(next) {
+            moves |= place_led(
+                &steps.led,
+                axis,
+                level,
+                stencil.particles(band..band + 1),
+                (origin, present, next),
+            );
         }
-        let flag = |band: usize| rows.flags[(band - stretch.start) * levels + level - 1];
+        let moved = |band: usize| flags[(band - stretch.start) * levels + level - 1];
         let beside = band.saturating_sub(1).max(stretch.start)..(band + 2).min(stretch.end);
-        must |= if stencil.is_local() { beside.into_iter().any(flag) } else { stretch.clone().any(flag) };
-        let mut changed = false;
-        if must {
-            let tile = TILES[usize::from(steps.count == 1)];
-            let mut axis = axes.iter().zip(present);
-            let mut planes = next.each_mut().map(|next| {
-                let (&axis, present) = axis.next().expect("as many as rows");
-                let rest = steps.rest.map(|rest| rest[axis]);
-                Plane { seen_from: origin, present, rest, begin: origin, next }
-            });
-            planes.iter_mut().for_each(|plane| stencil.sweep_runs(band..band + 1, tile, plane));
-            stencil.sweep_listed(band..band + 1, &mut planes);
-            seen.computed += (P * stencil.followers(band)) as u64;
-            let farther = &mut seen.farther[level - 1];
-            for plane in planes {
+        moves || if stencil.is_local() { beside.into_iter().any(moved) } else { stretch.clone().any(moved) }
+    }
+
+    fn sweep_all(&mut self, level: usize, bands: Range<usize>, seen: &mut Seen) {
+        let Self { steps, axes, stretch, rows } = self;
+        let (stencil, levels) = (steps.stencil, steps.count + 1);
+        let origin = stencil.particles(stretch.clone()).start;
+        let tile = TILES[usize::from(steps.count == 1)];
+        let (present, next, flags) = rows.at(level);
+        let mut axis = axes.iter().zip(present);
+        let mut planes = next.each_mut().map(|next| {
+            let (&axis, present) = axis.next().expect("as many as rows");
+            Plane { seen_from: origin, present, rest: steps.rest.map(|rest| rest[axis]), begin: origin, next }
+        });
+        planes.iter_mut().for_each(|plane| stencil.sweep_runs(bands.clone(), tile, plane));
+        stencil.sweep_listed(bands.clone(), &mut planes);
+        let farther = &mut seen.farther[level - 1];
+        for band in bands {
+            let particles = stencil.particles(band..band + 1);
+            let particles = particles.start - origin..particles.end - origin;
+            let mut changed = false;
+            for plane in &planes {
                 let (before, after) = (&plane.present[particles.clone()], &plane.next[particles.clone()]);
                 changed = changed || differ(before, after);
                 *farther = *farther || steps.farther.is_some_and(|limit| is_farther(before, after, limit));
             }
+            seen.computed += (P * stencil.followers(band)) as u64;
+            flags[(band - stretch.start) * levels + level] = changed;
         }
-        rows.flags[(band - stretch.start) * levels + level] = changed;
     }
 }
 
@@ -335,6 +375,10 @@ const PIECE: usize = 64;
 
 /// Whether any bit differs.
 fn differ<T: Real>(before: &[T], after: &[T]) -> bool {
+    let middle = before.len() / 2;
+    if before.get(middle).map(|value| value.bits()) != after.get(middle).map(|value| value.bits()) {
+        return true;
+    }
     let mut pieces = before.chunks(PIECE).zip(after.chunks(PIECE));
     pieces.any(|(a, b)| a.iter().zip(b).fold(0, |bits, (a, b)| bits | (a.bits() ^ b.bits())) != 0)
 }
