@@ -1,10 +1,14 @@
 //! Fracture (the paper's Choices 5 and 6): a pair stretched past a threshold never influences each
 //! other again, and ghosts stand in for what was lost.
 
+pub mod torn;
+mod watch;
+
 use super::neighbourhood::Neighbours;
 use super::points::{Points, distance};
 use super::role::Role;
 use super::shape::{Segment, segments_cross};
+use watch::Watch;
 
 /// When a bond breaks.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,30 +22,16 @@ pub enum Threshold {
 impl Threshold {
     /// Whether a bond of reference length `rest` breaks at `length` \[length\].
     pub fn is_passed(self, length: f64, rest: f64) -> bool {
+        length > self.limit(rest)
+    }
+
+    /// Greatest length of a bond of reference length `rest` that holds \[length\].
+    fn limit(self, rest: f64) -> f64 {
         match self {
-            Threshold::Distance(df) => length > df,
-            Threshold::Stretch(ratio) => length > ratio * rest,
+            Threshold::Distance(df) => df,
+            Threshold::Stretch(ratio) => ratio * rest,
         }
     }
-
-    /// Whether a bond may have passed the threshold: not if its square is so much less that rounding cannot
-    /// matter; squares that overflow or vanish never tell.
-    #[inline]
-    fn is_near(self, (reference, present): (&Points, &Points), j: usize, k: usize) -> bool {
-        let length = square_of_distance(present, j, k);
-        let limit = match self {
-            Threshold::Distance(df) => df * df,
-            Threshold::Stretch(ratio) => ratio * ratio * square_of_distance(reference, j, k),
-        };
-        let is_far = length < limit * (1.0 - NEAR_THRESHOLD) && length > f64::MIN_POSITIVE / NEAR_THRESHOLD;
-        !is_far
-    }
-}
-
-#[inline]
-fn square_of_distance(at: &Points, j: usize, k: usize) -> f64 {
-    let (x, y) = (at.x[j] - at.x[k], at.y[j] - at.y[k]);
-    x * x + y * y
 }
 
 /// What a particle sees in the place of a neighbour it has lost.
@@ -79,10 +69,18 @@ pub struct Bonds {
     any_broken: bool,
     /// Whether everybody is seen by those they see.
     is_mutual: bool,
+    /// The bonds that may still break, compiled when they are first looked at.
+    watch: Option<Watch>,
 }
 
-/// Part of a threshold within which a bond is measured exactly: far more than the rounding of a square.
-const NEAR_THRESHOLD: f64 = 1e-9;
+/// Where a particle sees the ghost of a neighbour.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum StandIn {
+    /// At this offset from its own place \[length\].
+    Offset([f64; 2]),
+    /// Opposite to this particle.
+    Opposite(usize),
+}
 
 impl Bonds {
     pub fn new(threshold: Option<Threshold>, ghosts: Ghosts, neighbours: &Neighbours) -> Self {
@@ -94,6 +92,7 @@ impl Bonds {
             broken: vec![false; neighbours.index.len()],
             any_broken: false,
             is_mutual: (0..neighbours.count()).all(seen_by),
+            watch: None,
         }
     }
 
@@ -109,10 +108,16 @@ impl Bonds {
     pub fn set_broken(&mut self, is_broken: impl Fn(usize) -> bool) {
         self.broken.iter_mut().enumerate().for_each(|(bond, broken)| *broken = is_broken(bond));
         self.any_broken = self.broken.contains(&true);
+        self.watch = None;
+    }
+
+    /// Whether a particle has lost a bond.
+    pub fn is_torn(&self, particle: usize, neighbours: &Neighbours) -> bool {
+        self.any_broken && self.broken[neighbours.bonds(particle)].contains(&true)
     }
 
     /// Breaks every live bond past the threshold and appends it, once per pair, to `breaks`.
-    /// Bonds to the frame never break: it is no matter.
+    /// Bonds to the frame never break: it is no matter. Give the same `neighbours` and `reference` every time.
     pub fn break_stretched(
         &mut self,
         step: usize,
@@ -123,15 +128,14 @@ impl Bonds {
     ) {
         let Some(threshold) = self.threshold else { return };
         let is_mutual = self.is_mutual;
-        let is_suspect = |j: usize, k: u32| {
-            // What both see, the lower one looks after.
-            (!is_mutual || j < k as usize) && threshold.is_near((reference, present), j, k as usize)
-        };
+        let known = self.watch.take().filter(|watch| watch.threshold() == threshold);
+        let watch = known
+            .unwrap_or_else(|| Watch::compile(threshold, neighbours, reference, |bond| !self.broken[bond]));
         // Most steps break nothing: a look at the squares tells.
-        let suspects =
-            (0..neighbours.count()).filter(|&j| neighbours.of(j).iter().any(|&k| is_suspect(j, k)));
-        let suspects: Vec<usize> = suspects.collect();
+        let suspects = watch.suspects(present);
+        self.watch = Some(watch);
         self.break_among(suspects, step, neighbours, (reference, present), breaks, |j, k| {
+            // What both see, the lower one looks after.
             (!is_mutual || j < k)
                 && roles[k].is_body()
                 && threshold.is_passed(
@@ -201,6 +205,10 @@ impl Bonds {
                 if let Some(back) = back.filter(|_| self.is_mutual) {
                     self.broken[back] = true;
                 }
+                if let Some(watch) = self.watch.as_mut().filter(|_| back.is_none_or(|back| self.broken[back]))
+                {
+                    watch.forget([j, k]);
+                }
                 // Seen from both ends where both list it, recorded from the lower one.
                 if j < k || back.is_none() {
                     let (a, b) = (reference.get(j), reference.get(k));
@@ -225,13 +233,25 @@ impl Bonds {
         reference: &Points,
         present: &Points,
     ) -> Option<[f64; 2]> {
+        let here = present.get(j);
+        self.stand_in(j, bond, neighbours, reference).map(|stand_in| match stand_in {
+            StandIn::Offset(lost) => [here[0] + lost[0], here[1] + lost[1]],
+            StandIn::Opposite(k) => [2.0 * here[0] - present.x[k], 2.0 * here[1] - present.y[k]],
+        })
+    }
+
+    fn stand_in(
+        &self,
+        j: usize,
+        bond: usize,
+        neighbours: &Neighbours,
+        reference: &Points,
+    ) -> Option<StandIn> {
         let offset = |k: usize| [reference.x[k] - reference.x[j], reference.y[k] - reference.y[j]];
         let lost = offset(neighbours.index[bond] as usize);
-        let here = present.get(j);
-        let at_lattice_offset = [here[0] + lost[0], here[1] + lost[1]];
         match self.ghosts {
             Ghosts::None => None,
-            Ghosts::Lattice => Some(at_lattice_offset),
+            Ghosts::Lattice => Some(StandIn::Offset(lost)),
             Ghosts::Mirrored => {
                 let size = lost[0].hypot(lost[1]);
                 let opposite = neighbours.bonds(j).filter(|&other| !self.broken[other]).find_map(|other| {
@@ -239,9 +259,7 @@ impl Bonds {
                     let [x, y] = offset(k);
                     ((x + lost[0]).hypot(y + lost[1]) <= 1e-6 * size).then_some(k)
                 });
-                Some(opposite.map_or(at_lattice_offset, |k| {
-                    [2.0 * here[0] - present.x[k], 2.0 * here[1] - present.y[k]]
-                }))
+                Some(opposite.map_or(StandIn::Offset(lost), StandIn::Opposite))
             }
         }
     }

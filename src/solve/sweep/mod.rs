@@ -8,10 +8,13 @@
 
 mod several;
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 pub use several::{Activity, Led, MOST_STEPS, Steps};
 
+use crate::flock::fracture::torn::Torn;
 use crate::flock::frame::Frame;
 use crate::flock::interaction::{Interaction, Weights};
 use crate::flock::points::Points;
@@ -62,7 +65,9 @@ pub struct Sweep {
     stencil: Option<Stencil>,
     /// Present where the rule is a material and nothing else.
     matrices: Option<MatrixStencil>,
-    /// Followers with a broken bond, whom no stencil fits, ascending.
+    /// Followers with a broken bond, whom the stencil does not fit.
+    torn: Torn,
+    /// The same where no stencil is: whom the matrices do not fit, ascending.
     aside: Vec<u32>,
 }
 
@@ -81,18 +86,23 @@ impl Sweep {
             }
             _ => None,
         };
-        let mut sweep =
-            Self { update, followers: count(&follows), follows, stencil, matrices, aside: Vec::new() };
+        let bands = stencil.iter().flat_map(|s| (0..s.band_count()).map(|band| s.particles(band..band + 1)));
+        let (torn, aside) = (Torn::new(bands), Vec::new());
+        let mut sweep = Self { update, followers: count(&follows), follows, stencil, matrices, torn, aside };
         if let Some(bonds) = interaction.bonds.as_ref().filter(|bonds| bonds.any_broken()) {
-            let is_torn = |j: &usize| neighbours.bonds(*j).any(|bond| bonds.is_broken(bond));
-            sweep.set_aside((0..neighbours.count()).filter(is_torn));
+            let is_torn = |&j: &usize| bonds.is_torn(j, neighbours);
+            sweep.set_aside((0..neighbours.count()).filter(is_torn), interaction);
         }
         sweep
     }
 
-    /// Sweeps these one by one from now on: they have lost a bond.
-    pub fn set_aside(&mut self, particles: impl IntoIterator<Item = usize>) {
+    /// Sweeps these by themselves from now on: they have lost a bond.
+    pub fn set_aside(&mut self, particles: impl IntoIterator<Item = usize>, interaction: &Interaction) {
         let follows = &self.follows;
+        if let (Some(_), Some(bonds)) = (&self.stencil, &interaction.bonds) {
+            self.torn.renew(particles, follows, (bonds, &interaction.neighbours, &interaction.reference));
+            return;
+        }
         self.aside.extend(particles.into_iter().filter(|&j| follows[j]).map(|j| j as u32));
         self.aside.sort_unstable();
         self.aside.dedup();
@@ -101,8 +111,8 @@ impl Sweep {
     /// For neighbours that change at every step: nothing is compiled from them.
     pub fn uncompiled(update: Update, roles: &[Role]) -> Self {
         let follows = followers(roles);
-        let (stencil, matrices, aside) = (None, None, Vec::new());
-        Self { update, followers: count(&follows), follows, stencil, matrices, aside }
+        let (stencil, matrices, torn, aside) = (None, None, Torn::default(), Vec::new());
+        Self { update, followers: count(&follows), follows, stencil, matrices, torn, aside }
     }
 
     /// Share of the followers swept without neighbour lists.
@@ -121,8 +131,7 @@ impl Sweep {
         next: &mut Points,
     ) {
         if let Some(stencil) = &self.stencil {
-            sweep_whole(stencil, interaction, present, next);
-            self.step_aside(interaction, present, next);
+            sweep_whole(stencil, &self.torn, interaction, present, next);
         } else if let Some(matrices) = &self.matrices {
             let Weights::Matrix(weights) = &interaction.weights else {
                 unreachable!("compiled from matrices")
@@ -155,7 +164,7 @@ impl Sweep {
         }
     }
 
-    /// Those whom no stencil fits; what one left in their places is written over.
+    /// Those whom no matrices fit; what these left in their places is written over.
     fn step_aside(&self, interaction: &Interaction, present: &Points, next: &mut Points) {
         let moved = |&j: &u32| (j, self.moved(j as usize, interaction, present));
         if self.aside.len() >= ASIDE_IN_PARALLEL && rayon::current_num_threads() > 1 {
@@ -196,7 +205,7 @@ impl Sweep {
 
     /// Whether [`Sweep::steps`] can take the steps.
     pub fn takes_several(&self) -> bool {
-        self.stencil.is_some() && self.aside.is_empty()
+        self.stencil.is_some() && self.torn.is_empty()
     }
 
     fn moved(&self, j: usize, interaction: &Interaction, seen: &Points) -> [f64; 2] {
@@ -242,7 +251,13 @@ fn for_chunks(points: &mut Points, work: impl Fn(usize, &mut [f64], &mut [f64]) 
 }
 
 /// One step of everybody, in pieces of whole bands.
-fn sweep_whole(stencil: &Stencil, interaction: &Interaction, present: &Points, next: &mut Points) {
+fn sweep_whole(
+    stencil: &Stencil,
+    torn: &Torn,
+    interaction: &Interaction,
+    present: &Points,
+    next: &mut Points,
+) {
     let bands = stencil.band_count();
     let size = if is_parallel(present.len()) { chunk_size(present.len()) } else { usize::MAX };
     let mut pieces = Vec::new();
@@ -259,13 +274,18 @@ fn sweep_whole(stencil: &Stencil, interaction: &Interaction, present: &Points, n
     }
     let [rest_x, rest_y] = [0, 1]
         .map(|axis| interaction.rest.as_ref().map(|rest| if axis == 0 { &rest.x[..] } else { &rest.y[..] }));
-    let work = |(bands, begin, x, y): (std::ops::Range<usize>, usize, &mut [f64], &mut [f64])| {
+    let work = |(bands, begin, x, y): (Range<usize>, usize, &mut [f64], &mut [f64])| {
         let mut planes = [
             Plane { seen_from: 0, present: &present.x, rest: rest_x, begin, next: x },
             Plane { seen_from: 0, present: &present.y, rest: rest_y, begin, next: y },
         ];
-        planes.iter_mut().for_each(|plane| stencil.sweep_runs(bands.clone(), TILE, plane));
-        stencil.sweep_listed(bands, &interaction.neighbours, &mut planes);
+        let mut sweep = |bands: Range<usize>| {
+            planes.iter_mut().for_each(|plane| stencil.sweep_runs(bands.clone(), TILE, plane));
+            stencil.sweep_listed(bands.clone(), &interaction.neighbours, &mut planes);
+            torn.sweep(bands, &interaction.reference, &mut planes);
+        };
+        // The torn are swept over, and then again while what they see is in the caches.
+        if torn.is_empty() { sweep(bands) } else { bands.for_each(|band| sweep(band..band + 1)) }
     };
     match pieces.len() {
         0 | 1 => pieces.into_iter().for_each(work),
@@ -413,7 +433,7 @@ mod tests {
             interaction.bonds = Some(bonds);
             assert_compiled_as_uncompiled(&interaction, &roles, Update::default());
             let sweep = Sweep::compile(Update::default(), &interaction, &roles);
-            assert!(sweep.aside.len() > 500 && sweep.aside.len() < 5000, "{}", sweep.aside.len());
+            assert!(sweep.torn.len() > 500 && sweep.torn.len() < 5000, "{}", sweep.torn.len());
         }
     }
 }
