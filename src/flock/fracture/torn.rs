@@ -1,9 +1,10 @@
 //! The plain barycentre of particles that have lost neighbours: over those who are left and the ghosts.
 //!
-//! Along a crack consecutive particles have mostly lost the same neighbours, so that they are swept as runs, like those
-//! of a [stencil](super::super::stencil) but for what stands in for the lost. Whoever is alone in this is a run of
-//! one. The sums are those of [`Interaction::target`](super::super::interaction::Interaction::target) in the same
-//! order: the bits are the same. What broke renews the runs of its band alone.
+//! Along a crack consecutive particles have mostly lost the same neighbours: they are swept as runs, like those of a
+//! [stencil](super::super::stencil) but for what stands in for the lost. The others are grouped by what they see, so that
+//! nothing is decided particle by particle. The sums are those of
+//! [`Interaction::target`](super::super::interaction::Interaction::target) in the same order: the bits are the same.
+//! What broke renews its band alone.
 
 use std::ops::Range;
 
@@ -12,9 +13,18 @@ use super::super::points::Points;
 use super::super::stencil::Plane;
 use super::{Bonds, StandIn};
 
-/// Particles that are summed up together in short runs and in long ones; one by one in still shorter ones.
+/// Fewest particles of a run, which are summed up so many at a time.
 const SHORT: usize = 8;
+
+/// The same of a long run.
 const LONG: usize = 64;
+
+/// Particles of a group that are summed up together.
+const SCATTERED: usize = 16;
+
+/// So many of the last groups are looked through for one that a particle fits into: an irregular body has as many as
+/// particles.
+const GROUPS_TRIED: usize = 32;
 
 /// The followers that have lost a neighbour, as runs, band by band.
 #[derive(Clone, Debug, Default)]
@@ -22,29 +32,33 @@ pub struct Torn {
     bands: Vec<Band>,
 }
 
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 struct Band {
     particles: Range<usize>,
-    runs: Vec<Run>,
-    /// What each run sees, one after the other.
+    /// Consecutive ones that see the same.
+    runs: Vec<Alike>,
+    /// Others that see the same, by their places in `members`.
+    groups: Vec<Alike>,
+    members: Vec<u32>,
+    /// What those of each run and group see, one after the other.
     seen: Vec<Seen>,
 }
 
 #[derive(Clone, Debug)]
-struct Run {
+struct Alike {
     particles: Range<usize>,
-    /// Where what it sees lies in the band's `seen`.
+    /// Where what they see lies in the band's `seen`.
     seen: Range<usize>,
 }
 
-/// One of those that a particle of a run sees; distances are of indices.
+/// One of those that the particles of a run or group see; distances are of indices.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Seen {
     /// A neighbour.
     At(isize),
-    /// The ghost of a neighbour, at an offset that is the same in the whole run \[length\].
+    /// The ghost of a neighbour, at an offset that is the same for all \[length\].
     Offset(isize, [f64; 2]),
-    /// The ghost of a neighbour, at its reference offset: that of a run's particles may differ by rounding.
+    /// The ghost of a neighbour, at its reference offset, which differs between them by rounding.
     Reference(isize),
     /// The mirror image of a neighbour.
     Opposite(isize),
@@ -58,7 +72,9 @@ impl Seen {
                 let same = of_a.map(f64::to_bits) == of_b.map(f64::to_bits);
                 Some(if same { self } else { Seen::Reference(a) })
             }
-            (Seen::Reference(a), Seen::Offset(b, _)) => (a == b).then_some(self),
+            (Seen::Reference(a), Seen::Offset(b, _)) | (Seen::Offset(a, _), Seen::Reference(b)) => {
+                (a == b).then_some(Seen::Reference(a))
+            }
             _ => (self == other).then_some(self),
         }
     }
@@ -67,17 +83,18 @@ impl Seen {
 impl Torn {
     /// Nobody yet, in these bands one after the other.
     pub fn new(bands: impl Iterator<Item = Range<usize>>) -> Self {
-        let empty = |particles| Band { particles, runs: Vec::new(), seen: Vec::new() };
+        let empty = |particles| Band { particles, ..Band::default() };
         Self { bands: bands.map(empty).collect() }
     }
 
     pub fn is_empty(&self) -> bool {
-        self.bands.iter().all(|band| band.runs.is_empty())
+        self.bands.iter().all(|band| band.runs.is_empty() && band.members.is_empty())
     }
 
     /// How many particles.
     pub fn len(&self) -> usize {
-        self.bands.iter().flat_map(|band| &band.runs).map(|run| run.particles.len()).sum()
+        let in_runs = |band: &Band| band.runs.iter().map(|run| run.particles.len()).sum::<usize>();
+        self.bands.iter().map(|band| in_runs(band) + band.members.len()).sum()
     }
 
     /// Finds the runs anew where these particles are, who have lost a bond since.
@@ -93,12 +110,10 @@ impl Torn {
         stale.dedup();
         for band in stale {
             let band = &mut self.bands[band];
-            band.runs.clear();
-            band.seen.clear();
-            let torn = |&j: &usize| follows[j] && bonds.is_torn(j, neighbours);
-            for j in band.particles.clone().filter(torn) {
-                band.push(j, seen_by(j, bonds, neighbours, reference));
-            }
+            let is_torn = |&j: &usize| follows[j] && bonds.is_torn(j, neighbours);
+            let torn: Vec<usize> = band.particles.clone().filter(is_torn).collect();
+            *band = Band { particles: band.particles.clone(), ..Band::default() };
+            band.compile(&torn, |j| seen_by(j, bonds, neighbours, reference));
         }
     }
 
@@ -137,22 +152,58 @@ fn seen_by<'a>(
     })
 }
 
+/// If all that some see can stand for what another sees as well, makes it so.
+fn shares(known: &mut [Seen], seen: &[Seen]) -> bool {
+    let fits = known.len() == seen.len() && known.iter().zip(seen).all(|(a, &b)| a.shared(b).is_some());
+    if fits {
+        known.iter_mut().zip(seen).for_each(|(a, &b)| *a = a.shared(b).unwrap_or(*a));
+    }
+    fits
+}
+
 impl Band {
-    /// Adds the next particle, to the last run if it fits there.
-    fn push(&mut self, j: usize, seen: impl Iterator<Item = Seen> + Clone) {
-        let last = self.runs.last_mut().filter(|last| last.particles.end == j);
-        if let Some(last) = last {
-            let known = &mut self.seen[last.seen.clone()];
-            let shared = || known.iter().zip(seen.clone()).map(|(&a, b)| a.shared(b));
-            if seen.clone().count() == known.len() && shared().all(|shared| shared.is_some()) {
-                known.iter_mut().zip(seen).for_each(|(a, b)| *a = a.shared(b).unwrap_or(*a));
-                last.particles.end = j + 1;
-                return;
+    /// Parts the torn particles, ascending, into runs and groups.
+    fn compile<S: Iterator<Item = Seen>>(&mut self, torn: &[usize], seen_by: impl Fn(usize) -> S) {
+        let mut groups: Vec<(Vec<Seen>, Vec<u32>)> = Vec::new();
+        let mut at = 0;
+        while at < torn.len() {
+            let mut known: Vec<Seen> = seen_by(torn[at]).collect();
+            let begin = at;
+            at += 1;
+            while at < torn.len()
+                && torn[at] == torn[at - 1] + 1
+                && shares(&mut known, &seen_by(torn[at]).collect::<Vec<_>>())
+            {
+                at += 1;
+            }
+            if at - begin >= SHORT {
+                let seen = self.keep(&known);
+                self.runs.push(Alike { particles: torn[begin]..torn[at - 1] + 1, seen });
+                continue;
+            }
+            let members = torn[begin..at].iter().map(|&j| j as u32);
+            match groups
+                .iter_mut()
+                .rev()
+                .take(GROUPS_TRIED)
+                .find_map(|(of, members)| shares(of, &known).then_some(members))
+            {
+                Some(known) => known.extend(members),
+                None => groups.push((known, members.collect())),
             }
         }
+        for (seen, members) in groups {
+            let begin = self.members.len();
+            self.members.extend(members);
+            let seen = self.keep(&seen);
+            self.groups.push(Alike { particles: begin..self.members.len(), seen });
+        }
+    }
+
+    fn keep(&mut self, seen: &[Seen]) -> Range<usize> {
         let begin = self.seen.len();
-        self.seen.extend(seen);
-        self.runs.push(Run { particles: j..j + 1, seen: begin..self.seen.len() });
+        self.seen.extend_from_slice(seen);
+        begin..self.seen.len()
     }
 }
 
@@ -171,82 +222,110 @@ fn sweep_avx2(bands: &[Band], reference: &Points, planes: &mut [Plane<'_, f64>; 
 #[inline(always)]
 fn sweep_bands(bands: &[Band], reference: &Points, planes: &mut [Plane<'_, f64>; 2]) {
     for band in bands {
-        for run in &band.runs {
-            let seen = &band.seen[run.seen.clone()];
+        for Alike { particles, seen } in &band.runs {
             for (axis, plane) in planes.iter_mut().enumerate() {
-                let body = (axis, if axis == 0 { &reference.x[..] } else { &reference.y[..] });
-                match run.particles.len() {
-                    0..SHORT => sweep_pieces::<1>(run.particles.clone(), seen, body, plane),
-                    SHORT..LONG => sweep_pieces::<SHORT>(run.particles.clone(), seen, body, plane),
-                    _ => sweep_pieces::<LONG>(run.particles.clone(), seen, body, plane),
+                let look = Look { seen: &band.seen[seen.clone()], axis, reference };
+                if particles.len() < LONG {
+                    sweep_run::<SHORT>(particles.clone(), look, plane);
+                } else {
+                    sweep_run::<LONG>(particles.clone(), look, plane);
                 }
             }
         }
-    }
-}
-
-/// `W` particles at a time, and no fewer.
-#[inline(always)]
-fn sweep_pieces<const W: usize>(
-    particles: Range<usize>,
-    seen: &[Seen],
-    body: (usize, &[f64]),
-    plane: &mut Plane<'_, f64>,
-) {
-    for from in particles.clone().step_by(W) {
-        // The last ones overlap those before them, which come out the same again.
-        sweep_piece::<W>(from.min(particles.end - W), seen, body, plane);
-    }
-}
-
-/// What [`Rule::target`](super::super::rules::Rule::target) computes: the rest offset is added to the mean, also where
-/// it is zero, which makes 0.0 of -0.0; whoever sees nobody stays.
-#[inline(always)]
-fn sweep_piece<const W: usize>(
-    from: usize,
-    seen: &[Seen],
-    (axis, reference): (usize, &[f64]),
-    plane: &mut Plane<'_, f64>,
-) {
-    let (present, at) = (plane.present, from - plane.seen_from);
-    let seen_at = |distance| lanes::<W>(present, at.wrapping_add_signed(distance));
-    let here = seen_at(0);
-    let target = &mut plane.next[from - plane.begin..][..W];
-    if seen.is_empty() {
-        target.copy_from_slice(here);
-        return;
-    }
-    let mut sum = [-0.0; W];
-    for &seen in seen {
-        match seen {
-            Seen::At(distance) => {
-                let there = seen_at(distance);
-                (0..W).for_each(|k| sum[k] += there[k]);
-            }
-            Seen::Offset(_, lost) => (0..W).for_each(|k| sum[k] += here[k] + lost[axis]),
-            Seen::Reference(distance) => {
-                let there = lanes::<W>(reference, from.wrapping_add_signed(distance));
-                let own = lanes::<W>(reference, from);
-                (0..W).for_each(|k| sum[k] += here[k] + (there[k] - own[k]));
-            }
-            Seen::Opposite(distance) => {
-                let there = seen_at(distance);
-                (0..W).for_each(|k| sum[k] += 2.0 * here[k] - there[k]);
+        for Alike { particles, seen } in &band.groups {
+            for (axis, plane) in planes.iter_mut().enumerate() {
+                let look = Look { seen: &band.seen[seen.clone()], axis, reference };
+                sweep_group(&band.members[particles.clone()], look, plane);
             }
         }
     }
-    let count = seen.len() as f64;
-    if seen.len().is_power_of_two() {
-        // The same number to the bit, and no division.
-        (0..W).for_each(|k| sum[k] *= 1.0 / count);
-    } else {
-        (0..W).for_each(|k| sum[k] /= count);
-    }
-    let rest = plane.rest.map_or([0.0; W], |rest| *lanes(rest, from));
-    (0..W).for_each(|k| target[k] = sum[k] + rest[k]);
 }
 
+/// At least `W` particles, `W` at a time.
 #[inline(always)]
-fn lanes<const W: usize>(slice: &[f64], at: usize) -> &[f64; W] {
-    slice[at..at + W].try_into().expect("as many as asked for")
+fn sweep_run<const W: usize>(particles: Range<usize>, look: Look<'_>, plane: &mut Plane<'_, f64>) {
+    for from in particles.clone().step_by(W) {
+        // The last ones overlap those before them, which come out the same again.
+        let from = from.min(particles.end - W);
+        let lanes = |of: &[f64], first: usize, distance: isize| -> [f64; W] {
+            let at = (from - first).wrapping_add_signed(distance);
+            of[at..at + W].try_into().expect("as many as asked for")
+        };
+        let targets = look.targets(lanes, plane);
+        plane.next[from - plane.begin..][..W].copy_from_slice(&targets.0);
+    }
+}
+
+/// Not compiled for wide vectors, which would gather what they hold more slowly than it is loaded.
+#[inline(never)]
+fn sweep_group(particles: &[u32], look: Look<'_>, plane: &mut Plane<'_, f64>) {
+    for piece in particles.chunks(SCATTERED) {
+        // A last piece too short is filled up with one of its own.
+        let mut which = [piece[0] as usize; SCATTERED];
+        which.iter_mut().zip(piece).for_each(|(which, &j)| *which = j as usize);
+        let lanes = |of: &[f64], first: usize, distance: isize| {
+            which.map(|j| of[(j - first).wrapping_add_signed(distance)])
+        };
+        let targets = look.targets(lanes, plane);
+        piece.iter().zip(targets.0).for_each(|(&j, target)| plane.next[j as usize - plane.begin] = target);
+    }
+}
+
+/// Numbers of so many particles, each vector of them within one cache line.
+#[repr(align(64))]
+struct Lanes<const W: usize>([f64; W]);
+
+/// What some particles see of one coordinate.
+#[derive(Clone, Copy)]
+struct Look<'a> {
+    seen: &'a [Seen],
+    axis: usize,
+    reference: &'a Points,
+}
+
+impl Look<'_> {
+    /// What [`Rule::target`](super::super::rules::Rule::target) computes: the rest offset is added to the mean, also
+    /// where it is zero, which makes 0.0 of -0.0; whoever sees nobody stays. `of` reads numbers, those of particle
+    /// number `first` first, at a distance of indices from the particles.
+    #[inline(always)]
+    fn targets<const W: usize>(
+        &self,
+        of: impl Fn(&[f64], usize, isize) -> [f64; W],
+        plane: &Plane<'_, f64>,
+    ) -> Lanes<W> {
+        let present = |distance| of(plane.present, plane.seen_from, distance);
+        let here = present(0);
+        if self.seen.is_empty() {
+            return Lanes(here);
+        }
+        let reference = if self.axis == 0 { &self.reference.x } else { &self.reference.y };
+        let mut sum = Lanes([-0.0; W]);
+        for &seen in self.seen {
+            match seen {
+                Seen::At(distance) => {
+                    let there = present(distance);
+                    (0..W).for_each(|k| sum.0[k] += there[k]);
+                }
+                Seen::Offset(_, lost) => (0..W).for_each(|k| sum.0[k] += here[k] + lost[self.axis]),
+                Seen::Reference(distance) => {
+                    let [there, own] = [distance, 0].map(|distance| of(reference, 0, distance));
+                    (0..W).for_each(|k| sum.0[k] += here[k] + (there[k] - own[k]));
+                }
+                Seen::Opposite(distance) => {
+                    let there = present(distance);
+                    (0..W).for_each(|k| sum.0[k] += 2.0 * here[k] - there[k]);
+                }
+            }
+        }
+        let count = self.seen.len() as f64;
+        if self.seen.len().is_power_of_two() {
+            // The same number to the bit, and no division.
+            (0..W).for_each(|k| sum.0[k] *= 1.0 / count);
+        } else {
+            (0..W).for_each(|k| sum.0[k] /= count);
+        }
+        let rest = plane.rest.map_or([0.0; W], |rest| of(rest, 0, 0));
+        (0..W).for_each(|k| sum.0[k] += rest[k]);
+        sum
+    }
 }
