@@ -1,6 +1,8 @@
 //! Fracture (the paper's Choices 5 and 6): a pair stretched past a threshold never influences each
 //! other again, and ghosts stand in for what was lost.
 
+#[cfg(test)]
+mod tests;
 pub mod torn;
 mod watch;
 
@@ -260,84 +262,6 @@ impl Bonds {
                     ((x + lost[0]).hypot(y + lost[1]) <= 1e-6 * size).then_some(k)
                 });
                 Some(opposite.map_or(StandIn::Offset(lost), StandIn::Opposite))
-            }
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Three particles in a row; the outer two see the middle one, which sees both.
-    fn row() -> (Neighbours, Points) {
-        let neighbours = Neighbours::from_lists([vec![1], vec![0, 2], vec![1]]);
-        (neighbours, [[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]].into_iter().collect())
-    }
-
-    #[test]
-    fn a_bond_past_the_distance_breaks_once_and_for_both() {
-        let (neighbours, reference) = row();
-        let mut bonds = Bonds::new(Some(Threshold::Distance(1.5)), Ghosts::None, &neighbours);
-        let mut present = reference.clone();
-        present.x[2] = 3.0;
-        let mut breaks = Vec::new();
-        let roles = [Role::Follower; 3];
-        bonds.break_stretched(4, &neighbours, (&reference, &present), &roles, &mut breaks);
-        bonds.break_stretched(5, &neighbours, (&reference, &reference), &roles, &mut breaks);
-        assert_eq!(breaks, [Break { step: 4, pair: [1, 2], place: [1.5, 0.0], length: 2.0 }]);
-        assert_eq!((0..4).map(|b| bonds.is_broken(b)).collect::<Vec<_>>(), [false, false, true, true]);
-    }
-
-    #[test]
-    fn a_stretch_threshold_is_relative_to_the_bond() {
-        assert!(Threshold::Stretch(1.5).is_passed(3.1, 2.0));
-        assert!(!Threshold::Stretch(1.5).is_passed(2.9, 2.0));
-    }
-
-    #[test]
-    fn each_kind_of_ghost_stands_in_its_own_place() {
-        let (neighbours, reference) = row();
-        let mut present = reference.clone();
-        present.x[0] = -0.5;
-        present.x[1] = 1.25;
-        let ghost = |ghosts| {
-            let mut bonds = Bonds::new(None, ghosts, &neighbours);
-            bonds.cut(([1.5, -1.0], [1.5, 1.0]), &neighbours, &reference, &mut Vec::new());
-            bonds.ghost(1, 2, &neighbours, &reference, &present)
-        };
-        assert_eq!(ghost(Ghosts::Lattice), Some([2.25, 0.0]));
-        assert_eq!(ghost(Ghosts::Mirrored), Some([3.0, 0.0]));
-        assert_eq!(ghost(Ghosts::None), None);
-    }
-
-    #[test]
-    fn a_ghost_loses_all_its_bonds() {
-        let (neighbours, reference) = row();
-        let mut bonds = Bonds::new(None, Ghosts::Lattice, &neighbours);
-        let roles = [Role::Follower, Role::Ghost, Role::Follower];
-        let mut breaks = Vec::new();
-        bonds.release_ghosts(2, &neighbours, (&reference, &reference), &roles, &mut breaks);
-        assert_eq!(breaks.len(), 2);
-        assert!((0..4).all(|b| bonds.is_broken(b)));
-    }
-
-    #[test]
-    fn a_bond_is_measured_exactly_where_a_square_would_not_tell() {
-        // At the threshold to the last bit, just beyond it, and where squares overflow or vanish.
-        for scale in [1e-200, 1.0, 1e200] {
-            let neighbours = Neighbours::from_lists([vec![1], vec![0]]);
-            let reference: Points = [[0.0, 0.0], [scale, 0.0]].into_iter().collect();
-            for threshold in [Threshold::Distance(1.3 * scale), Threshold::Stretch(1.3)] {
-                let limit = 1.3 * scale;
-                for (length, breaks) in [(limit, false), (limit.next_up(), true), (0.99 * limit, false)] {
-                    let present: Points = [[0.0, 0.0], [0.0, length]].into_iter().collect();
-                    let mut bonds = Bonds::new(Some(threshold), Ghosts::None, &neighbours);
-                    let (roles, mut broken) = ([Role::Follower; 2], Vec::new());
-                    bonds.break_stretched(1, &neighbours, (&reference, &present), &roles, &mut broken);
-                    assert_eq!(broken.len(), usize::from(breaks), "{threshold:?} {length:e}");
-                    assert!(bonds.is_broken(0) == breaks && bonds.is_broken(1) == breaks);
-                }
             }
         }
     }

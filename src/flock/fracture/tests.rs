@@ -38,7 +38,7 @@ fn lay(kind: LatticeKind, neighbourhood: &Neighbourhood, origin: [f64; 2]) -> In
     }
 }
 
-/// The bodies that the tests go over: lists seen by both, and lists of which some are seen by one alone.
+/// The bodies that the tests go over: lattices, and lattices a bit out of place where some are seen without seeing.
 fn bodies() -> impl Iterator<Item = (String, Interaction)> {
     let neighbourhoods = [
         Neighbourhood::First { keep: None },
@@ -50,6 +50,7 @@ fn bodies() -> impl Iterator<Item = (String, Interaction)> {
             [false, true].map(|one_sided| {
                 let mut body = lay(kind, &neighbourhood, [0.0, 0.0]);
                 if one_sided {
+                    body.reference = Draws(3).points(&body.reference, 0.1).into();
                     let lists = (0..body.neighbours.count())
                         .map(|j| if j % 31 == 7 { Vec::new() } else { body.neighbours.of(j).to_vec() });
                     body.neighbours = Neighbours::from_lists(lists);
@@ -69,8 +70,8 @@ fn break_one_by_one(
     roles: &[Role],
 ) -> Vec<Break> {
     let back = |j: usize, k: usize| neighbours.bonds(k).find(|&bond| neighbours.index[bond] as usize == j);
-    let all_mutual = (0..neighbours.count())
-        .all(|j| neighbours.of(j).iter().all(|&k| back(j, k as usize).is_some()));
+    let all_mutual =
+        (0..neighbours.count()).all(|j| neighbours.of(j).iter().all(|&k| back(j, k as usize).is_some()));
     let mut breaks = Vec::new();
     for j in 0..neighbours.count() {
         for bond in neighbours.bonds(j) {
@@ -185,7 +186,13 @@ fn a_bond_at_its_limit_to_the_bit_holds_and_beyond_it_breaks_wherever_it_lies_in
 }
 
 /// Sweeps the torn in two pieces and compares every bit with the rule; nobody else is touched. Gives how many are torn.
-fn compare_targets(torn: &Torn, body: &Interaction, follows: &[bool], draws: &mut Draws, what: &str) -> usize {
+fn compare_targets(
+    torn: &Torn,
+    body: &Interaction,
+    follows: &[bool],
+    draws: &mut Draws,
+    what: &str,
+) -> usize {
     const MARK: f64 = 12345.0;
     let Interaction { neighbours, reference, .. } = body;
     let bonds = body.bonds.as_ref().expect("has bonds");
@@ -194,7 +201,7 @@ fn compare_targets(torn: &Torn, body: &Interaction, follows: &[bool], draws: &mu
     (0..count).step_by(9).for_each(|j| present.x[j] = -0.0);
     let rests = body.rest.as_ref().map(|rest| [&rest.x[..], &rest.y[..]]);
     let mut next = Points { x: vec![MARK; count], y: vec![MARK; count] };
-    let middle = torn.particles(0..BANDS / 2).end;
+    let middle = BANDS / 2 * count / BANDS;
     let (low, high) = (next.x.split_at_mut(middle), next.y.split_at_mut(middle));
     // The second piece sees no more than the second half of the first.
     let reach = (0..count).flat_map(|j| neighbours.of(j).iter().map(move |&k| j.abs_diff(k as usize))).max();
@@ -212,7 +219,11 @@ fn compare_targets(torn: &Torn, body: &Interaction, follows: &[bool], draws: &mu
     let is_torn = |j: usize| follows[j] && bonds.is_torn(j, neighbours);
     for j in 0..count {
         let expected = if is_torn(j) { body.target(j, &present) } else { [MARK; 2] };
-        assert_eq!(next.get(j).map(f64::to_bits), expected.map(f64::to_bits), "{what}, particle {j}: {expected:?}");
+        assert_eq!(
+            next.get(j).map(f64::to_bits),
+            expected.map(f64::to_bits),
+            "{what}, particle {j}: {expected:?}"
+        );
     }
     let torn_ones = (0..count).filter(|&j| is_torn(j)).count();
     assert_eq!(torn.len(), torn_ones, "{what}");
@@ -247,12 +258,86 @@ fn torn_particles_are_swept_to_the_bits_of_the_rule_as_cracks_spread() {
             }
             // Here and there, half of all, and all.
             for share in [0.05, 0.5, 1.0] {
-                let draw: Vec<bool> = (0..body.neighbours.index.len()).map(|_| draws.next() < share).collect();
+                let draw: Vec<bool> =
+                    (0..body.neighbours.index.len()).map(|_| draws.next() < share).collect();
                 bonds.set_broken(|bond| draw[bond]);
                 let places = (&bonds, &body.neighbours, &*body.reference);
                 torn.renew(0..count, &follows, places);
                 body.bonds = Some(bonds.clone());
                 compare_targets(&torn, &body, &follows, &mut draws, &what);
+            }
+        }
+    }
+}
+
+/// Three particles in a row; the outer two see the middle one, which sees both.
+fn row() -> (Neighbours, Points) {
+    let neighbours = Neighbours::from_lists([vec![1], vec![0, 2], vec![1]]);
+    (neighbours, [[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]].into_iter().collect())
+}
+
+#[test]
+fn a_bond_past_the_distance_breaks_once_and_for_both() {
+    let (neighbours, reference) = row();
+    let mut bonds = Bonds::new(Some(Threshold::Distance(1.5)), Ghosts::None, &neighbours);
+    let mut present = reference.clone();
+    present.x[2] = 3.0;
+    let mut breaks = Vec::new();
+    let roles = [Role::Follower; 3];
+    bonds.break_stretched(4, &neighbours, (&reference, &present), &roles, &mut breaks);
+    bonds.break_stretched(5, &neighbours, (&reference, &reference), &roles, &mut breaks);
+    assert_eq!(breaks, [Break { step: 4, pair: [1, 2], place: [1.5, 0.0], length: 2.0 }]);
+    assert_eq!((0..4).map(|b| bonds.is_broken(b)).collect::<Vec<_>>(), [false, false, true, true]);
+}
+
+#[test]
+fn a_stretch_threshold_is_relative_to_the_bond() {
+    assert!(Threshold::Stretch(1.5).is_passed(3.1, 2.0));
+    assert!(!Threshold::Stretch(1.5).is_passed(2.9, 2.0));
+}
+
+#[test]
+fn each_kind_of_ghost_stands_in_its_own_place() {
+    let (neighbours, reference) = row();
+    let mut present = reference.clone();
+    present.x[0] = -0.5;
+    present.x[1] = 1.25;
+    let ghost = |ghosts| {
+        let mut bonds = Bonds::new(None, ghosts, &neighbours);
+        bonds.cut(([1.5, -1.0], [1.5, 1.0]), &neighbours, &reference, &mut Vec::new());
+        bonds.ghost(1, 2, &neighbours, &reference, &present)
+    };
+    assert_eq!(ghost(Ghosts::Lattice), Some([2.25, 0.0]));
+    assert_eq!(ghost(Ghosts::Mirrored), Some([3.0, 0.0]));
+    assert_eq!(ghost(Ghosts::None), None);
+}
+
+#[test]
+fn a_ghost_loses_all_its_bonds() {
+    let (neighbours, reference) = row();
+    let mut bonds = Bonds::new(None, Ghosts::Lattice, &neighbours);
+    let roles = [Role::Follower, Role::Ghost, Role::Follower];
+    let mut breaks = Vec::new();
+    bonds.release_ghosts(2, &neighbours, (&reference, &reference), &roles, &mut breaks);
+    assert_eq!(breaks.len(), 2);
+    assert!((0..4).all(|b| bonds.is_broken(b)));
+}
+
+#[test]
+fn a_bond_is_measured_exactly_where_a_square_would_not_tell() {
+    // At the threshold to the last bit, just beyond it, and where squares overflow or vanish.
+    for scale in [1e-200, 1.0, 1e200] {
+        let neighbours = Neighbours::from_lists([vec![1], vec![0]]);
+        let reference: Points = [[0.0, 0.0], [scale, 0.0]].into_iter().collect();
+        for threshold in [Threshold::Distance(1.3 * scale), Threshold::Stretch(1.3)] {
+            let limit = 1.3 * scale;
+            for (length, breaks) in [(limit, false), (limit.next_up(), true), (0.99 * limit, false)] {
+                let present: Points = [[0.0, 0.0], [0.0, length]].into_iter().collect();
+                let mut bonds = Bonds::new(Some(threshold), Ghosts::None, &neighbours);
+                let (roles, mut broken) = ([Role::Follower; 2], Vec::new());
+                bonds.break_stretched(1, &neighbours, (&reference, &present), &roles, &mut broken);
+                assert_eq!(broken.len(), usize::from(breaks), "{threshold:?} {length:e}");
+                assert!(bonds.is_broken(0) == breaks && bonds.is_broken(1) == breaks);
             }
         }
     }

@@ -372,7 +372,7 @@ mod tests {
         assert!(swept(&compiled) == swept(&Sweep::uncompiled(Update::default(), &roles)));
     }
 
-    fn assert_compiled_as_uncompiled(interaction: &Interaction, roles: &[Role], update: Update) {
+    fn assert_as_uncompiled(compiled: &Sweep, interaction: &Interaction, roles: &[Role]) {
         let reference = &interaction.reference;
         let present: Points =
             reference.iter().map(|[x, y]| [x * 1.01 + 0.1 * y.sin(), y - 0.02 * x]).collect();
@@ -381,9 +381,8 @@ mod tests {
             sweep.step(interaction, None, &present, &mut next);
             bits(&next)
         };
-        let compiled = Sweep::compile(update, interaction, roles);
         assert!(compiled.stencil.is_some() || compiled.matrices.is_some());
-        assert!(swept(&compiled) == swept(&Sweep::uncompiled(update, roles)));
+        assert!(swept(compiled) == swept(&Sweep::uncompiled(compiled.update, roles)));
     }
 
     #[test]
@@ -412,11 +411,11 @@ mod tests {
         for update in [Update::default(), gentle] {
             interaction.rest = None;
             interaction.forces = None;
-            assert_compiled_as_uncompiled(&interaction, &roles, update);
+            assert_as_uncompiled(&Sweep::compile(update, &interaction, &roles), &interaction, &roles);
             interaction.keep_rest();
             interaction.forces =
                 Some(interaction.reference.iter().map(|[x, y]| [y.cos(), 0.1 * x]).collect());
-            assert_compiled_as_uncompiled(&interaction, &roles, update);
+            assert_as_uncompiled(&Sweep::compile(update, &interaction, &roles), &interaction, &roles);
         }
     }
 
@@ -427,13 +426,22 @@ mod tests {
         let mut roles = vec![Role::Follower; interaction.reference.len()];
         roles[..301].fill(Role::Clamped);
         for ghosts in [Ghosts::Lattice, Ghosts::Mirrored, Ghosts::None] {
-            let mut bonds = Bonds::new(None, ghosts, &interaction.neighbours);
+            interaction.bonds = None;
+            let mut sweep = Sweep::compile(Update::default(), &interaction, &roles);
+            assert!(sweep.takes_several());
+            let (mut bonds, mut breaks) = (Bonds::new(None, ghosts, &interaction.neighbours), Vec::new());
             let (reference, neighbours) = (&interaction.reference, &interaction.neighbours);
-            bonds.cut(([100.0, -400.0], [130.0, 400.0]), neighbours, reference, &mut Vec::new());
+            bonds.cut(([100.0, -400.0], [130.0, 400.0]), neighbours, reference, &mut breaks);
             interaction.bonds = Some(bonds);
-            assert_compiled_as_uncompiled(&interaction, &roles, Update::default());
-            let sweep = Sweep::compile(Update::default(), &interaction, &roles);
+            assert_as_uncompiled(
+                &Sweep::compile(Update::default(), &interaction, &roles),
+                &interaction,
+                &roles,
+            );
+            sweep.set_aside(breaks.iter().flat_map(|b| b.pair).map(|j| j as usize), &interaction);
+            assert_as_uncompiled(&sweep, &interaction, &roles);
             assert!(sweep.torn.len() > 500 && sweep.torn.len() < 5000, "{}", sweep.torn.len());
+            assert!(!sweep.takes_several());
         }
     }
 }
