@@ -243,7 +243,7 @@ fn torn_particles_are_swept_to_the_bits_of_the_rule_as_cracks_spread() {
             body.rest = (ghosts != Ghosts::None).then(|| draws.points(&Points::zeros(count), 0.1));
             let mut bonds = Bonds::new(None, ghosts, &body.neighbours);
             let mut torn = Torn::new((0..BANDS).map(|band| band * count / BANDS..(band + 1) * count / BANDS));
-            assert!(torn.is_empty() && torn.len() == 0);
+            assert!(torn.is_empty());
             let cuts: [Segment; 3] =
                 [([-3.3, -90.0], [-3.3, 90.0]), ([-90.0, 1.2], [90.0, 1.4]), ([0.0, 0.0], [90.0, 80.0])];
             for cut in cuts {
