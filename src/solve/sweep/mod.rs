@@ -188,8 +188,7 @@ impl Sweep {
         let stencil = self.stencil.as_ref().expect("a sweep that takes several steps has a stencil");
         let rest = interaction.rest.as_ref().map(|rest| [&rest.x[..], &rest.y[..]]);
         let threads = if is_parallel(present.len()) { rayon::current_num_threads() } else { 1 };
-        let steps =
-            Steps { stencil, neighbours: &interaction.neighbours, rest, led, count, farther, threads };
+        let steps = Steps { stencil, rest, led, count, farther, threads };
         let even = [&mut present.x[..], &mut present.y[..]];
         let farther = steps.take(activity, even, [&mut next.x[..], &mut next.y[..]]);
         if count % 2 == 1 {
@@ -281,7 +280,7 @@ fn sweep_whole(
         ];
         let mut sweep = |bands: Range<usize>| {
             planes.iter_mut().for_each(|plane| stencil.sweep_runs(bands.clone(), TILE, plane));
-            stencil.sweep_listed(bands.clone(), &interaction.neighbours, &mut planes);
+            stencil.sweep_listed(bands.clone(), &mut planes);
             torn.sweep(bands, &interaction.reference, &mut planes);
         };
         // The torn are swept over, and then again while what they see is in the caches.
