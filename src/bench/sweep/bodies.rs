@@ -293,8 +293,8 @@ fn fracture(side: usize, cracked: bool) -> Subject {
         steps_together: 1,
         followers,
         bonds_watched,
-        // Each index once, and the reference as the positions.
-        bytes_per_update: BYTES_PER_UPDATE + 4.0 * 4.0 + 16.0,
+        // The positions once more, to look at the bonds.
+        bytes_per_update: BYTES_PER_UPDATE + 16.0,
         is_shared: false,
         step: Box::new(step),
     }

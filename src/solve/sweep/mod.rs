@@ -8,10 +8,13 @@
 
 mod several;
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 pub use several::{Activity, Led, MOST_STEPS, Steps};
 
+use crate::flock::fracture::torn::Torn;
 use crate::flock::frame::Frame;
 use crate::flock::interaction::{Interaction, Weights};
 use crate::flock::points::Points;
@@ -62,7 +65,9 @@ pub struct Sweep {
     stencil: Option<Stencil>,
     /// Present where the rule is a material and nothing else.
     matrices: Option<MatrixStencil>,
-    /// Followers with a broken bond, whom no stencil fits, ascending.
+    /// Followers with a broken bond, whom the stencil does not fit.
+    torn: Torn,
+    /// The same where no stencil is: whom the matrices do not fit, ascending.
     aside: Vec<u32>,
 }
 
@@ -81,18 +86,23 @@ impl Sweep {
             }
             _ => None,
         };
-        let mut sweep =
-            Self { update, followers: count(&follows), follows, stencil, matrices, aside: Vec::new() };
+        let bands = stencil.iter().flat_map(|s| (0..s.band_count()).map(|band| s.particles(band..band + 1)));
+        let (torn, aside) = (Torn::new(bands), Vec::new());
+        let mut sweep = Self { update, followers: count(&follows), follows, stencil, matrices, torn, aside };
         if let Some(bonds) = interaction.bonds.as_ref().filter(|bonds| bonds.any_broken()) {
-            let is_torn = |j: &usize| neighbours.bonds(*j).any(|bond| bonds.is_broken(bond));
-            sweep.set_aside((0..neighbours.count()).filter(is_torn));
+            let is_torn = |&j: &usize| bonds.is_torn(j, neighbours);
+            sweep.set_aside((0..neighbours.count()).filter(is_torn), interaction);
         }
         sweep
     }
 
-    /// Sweeps these one by one from now on: they have lost a bond.
-    pub fn set_aside(&mut self, particles: impl IntoIterator<Item = usize>) {
+    /// Sweeps these by themselves from now on: they have lost a bond.
+    pub fn set_aside(&mut self, particles: impl IntoIterator<Item = usize>, interaction: &Interaction) {
         let follows = &self.follows;
+        if let (Some(_), Some(bonds)) = (&self.stencil, &interaction.bonds) {
+            self.torn.renew(particles, follows, (bonds, &interaction.neighbours, &interaction.reference));
+            return;
+        }
         self.aside.extend(particles.into_iter().filter(|&j| follows[j]).map(|j| j as u32));
         self.aside.sort_unstable();
         self.aside.dedup();
@@ -101,8 +111,8 @@ impl Sweep {
     /// For neighbours that change at every step: nothing is compiled from them.
     pub fn uncompiled(update: Update, roles: &[Role]) -> Self {
         let follows = followers(roles);
-        let (stencil, matrices, aside) = (None, None, Vec::new());
-        Self { update, followers: count(&follows), follows, stencil, matrices, aside }
+        let (stencil, matrices, torn, aside) = (None, None, Torn::default(), Vec::new());
+        Self { update, followers: count(&follows), follows, stencil, matrices, torn, aside }
     }
 
     /// Share of the followers swept without neighbour lists.
@@ -121,8 +131,7 @@ impl Sweep {
         next: &mut Points,
     ) {
         if let Some(stencil) = &self.stencil {
-            sweep_whole(stencil, interaction, present, next);
-            self.step_aside(interaction, present, next);
+            sweep_whole(stencil, &self.torn, interaction, present, next);
         } else if let Some(matrices) = &self.matrices {
             let Weights::Matrix(weights) = &interaction.weights else {
                 unreachable!("compiled from matrices")
@@ -155,7 +164,7 @@ impl Sweep {
         }
     }
 
-    /// Those whom no stencil fits; what one left in their places is written over.
+    /// Those whom no matrices fit; what these left in their places is written over.
     fn step_aside(&self, interaction: &Interaction, present: &Points, next: &mut Points) {
         let moved = |&j: &u32| (j, self.moved(j as usize, interaction, present));
         if self.aside.len() >= ASIDE_IN_PARALLEL && rayon::current_num_threads() > 1 {
@@ -195,7 +204,7 @@ impl Sweep {
 
     /// Whether [`Sweep::steps`] can take the steps.
     pub fn takes_several(&self) -> bool {
-        self.stencil.is_some() && self.aside.is_empty()
+        self.stencil.is_some() && self.torn.is_empty()
     }
 
     fn moved(&self, j: usize, interaction: &Interaction, seen: &Points) -> [f64; 2] {
@@ -241,7 +250,13 @@ fn for_chunks(points: &mut Points, work: impl Fn(usize, &mut [f64], &mut [f64]) 
 }
 
 /// One step of everybody, in pieces of whole bands.
-fn sweep_whole(stencil: &Stencil, interaction: &Interaction, present: &Points, next: &mut Points) {
+fn sweep_whole(
+    stencil: &Stencil,
+    torn: &Torn,
+    interaction: &Interaction,
+    present: &Points,
+    next: &mut Points,
+) {
     let bands = stencil.band_count();
     let size = if is_parallel(present.len()) { chunk_size(present.len()) } else { usize::MAX };
     let mut pieces = Vec::new();
@@ -258,13 +273,18 @@ fn sweep_whole(stencil: &Stencil, interaction: &Interaction, present: &Points, n
     }
     let [rest_x, rest_y] = [0, 1]
         .map(|axis| interaction.rest.as_ref().map(|rest| if axis == 0 { &rest.x[..] } else { &rest.y[..] }));
-    let work = |(bands, begin, x, y): (std::ops::Range<usize>, usize, &mut [f64], &mut [f64])| {
+    let work = |(bands, begin, x, y): (Range<usize>, usize, &mut [f64], &mut [f64])| {
         let mut planes = [
             Plane { seen_from: 0, present: &present.x, rest: rest_x, begin, next: x },
             Plane { seen_from: 0, present: &present.y, rest: rest_y, begin, next: y },
         ];
-        planes.iter_mut().for_each(|plane| stencil.sweep_runs(bands.clone(), TILE, plane));
-        stencil.sweep_listed(bands, &mut planes);
+        let mut sweep = |bands: Range<usize>| {
+            planes.iter_mut().for_each(|plane| stencil.sweep_runs(bands.clone(), TILE, plane));
+            stencil.sweep_listed(bands.clone(), &mut planes);
+            torn.sweep(bands, &interaction.reference, &mut planes);
+        };
+        // The torn are swept over, and then again while what they see is in the caches.
+        if torn.is_empty() { sweep(bands) } else { bands.for_each(|band| sweep(band..band + 1)) }
     };
     match pieces.len() {
         0 | 1 => pieces.into_iter().for_each(work),
@@ -351,7 +371,7 @@ mod tests {
         assert!(swept(&compiled) == swept(&Sweep::uncompiled(Update::default(), &roles)));
     }
 
-    fn assert_compiled_as_uncompiled(interaction: &Interaction, roles: &[Role], update: Update) {
+    fn assert_as_uncompiled(compiled: &Sweep, interaction: &Interaction, roles: &[Role]) {
         let reference = &interaction.reference;
         let present: Points =
             reference.iter().map(|[x, y]| [x * 1.01 + 0.1 * y.sin(), y - 0.02 * x]).collect();
@@ -360,9 +380,8 @@ mod tests {
             sweep.step(interaction, None, &present, &mut next);
             bits(&next)
         };
-        let compiled = Sweep::compile(update, interaction, roles);
         assert!(compiled.stencil.is_some() || compiled.matrices.is_some());
-        assert!(swept(&compiled) == swept(&Sweep::uncompiled(update, roles)));
+        assert!(swept(compiled) == swept(&Sweep::uncompiled(compiled.update, roles)));
     }
 
     #[test]
@@ -391,11 +410,11 @@ mod tests {
         for update in [Update::default(), gentle] {
             interaction.rest = None;
             interaction.forces = None;
-            assert_compiled_as_uncompiled(&interaction, &roles, update);
+            assert_as_uncompiled(&Sweep::compile(update, &interaction, &roles), &interaction, &roles);
             interaction.keep_rest();
             interaction.forces =
                 Some(interaction.reference.iter().map(|[x, y]| [y.cos(), 0.1 * x]).collect());
-            assert_compiled_as_uncompiled(&interaction, &roles, update);
+            assert_as_uncompiled(&Sweep::compile(update, &interaction, &roles), &interaction, &roles);
         }
     }
 
@@ -406,13 +425,22 @@ mod tests {
         let mut roles = vec![Role::Follower; interaction.reference.len()];
         roles[..301].fill(Role::Clamped);
         for ghosts in [Ghosts::Lattice, Ghosts::Mirrored, Ghosts::None] {
-            let mut bonds = Bonds::new(None, ghosts, &interaction.neighbours);
+            interaction.bonds = None;
+            let mut sweep = Sweep::compile(Update::default(), &interaction, &roles);
+            assert!(sweep.takes_several());
+            let (mut bonds, mut breaks) = (Bonds::new(None, ghosts, &interaction.neighbours), Vec::new());
             let (reference, neighbours) = (&interaction.reference, &interaction.neighbours);
-            bonds.cut(([100.0, -400.0], [130.0, 400.0]), neighbours, reference, &mut Vec::new());
+            bonds.cut(([100.0, -400.0], [130.0, 400.0]), neighbours, reference, &mut breaks);
             interaction.bonds = Some(bonds);
-            assert_compiled_as_uncompiled(&interaction, &roles, Update::default());
-            let sweep = Sweep::compile(Update::default(), &interaction, &roles);
-            assert!(sweep.aside.len() > 500 && sweep.aside.len() < 5000, "{}", sweep.aside.len());
+            assert_as_uncompiled(
+                &Sweep::compile(Update::default(), &interaction, &roles),
+                &interaction,
+                &roles,
+            );
+            sweep.set_aside(breaks.iter().flat_map(|b| b.pair).map(|j| j as usize), &interaction);
+            assert_as_uncompiled(&sweep, &interaction, &roles);
+            assert!(sweep.torn.len() > 500 && sweep.torn.len() < 5000, "{}", sweep.torn.len());
+            assert!(!sweep.takes_several());
         }
     }
 }
