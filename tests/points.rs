@@ -50,7 +50,7 @@ fn table(rows: &[Row]) -> String {
 const TORN: &str = r#"
 title = "A torn cloud"
 neighbours = { kind = "within", radius = 1.5 }
-fracture = { stretch = 1.4 }
+fracture = { stretch = 1.25 }
 record = { probes = [1015, 1358] }
 
 [body]
@@ -147,7 +147,7 @@ fn ids_mean_the_particles_that_the_file_names_so() {
 fn who_finds_neighbours_anew_does_not_hang_on_the_order_either() {
     let text = TORN
         .replace("\"within\"", "\"present\"")
-        .replace("fracture = { stretch = 1.4 }", "rule = { mean = { kind = \"spaced\", spacing = 1.0 } }");
+        .replace("fracture = { stretch = 1.25 }", "rule = { mean = { kind = \"spaced\", spacing = 1.0 } }");
     let first = ended(plan(&text, &table(&patch())));
     assert!(first.engine.lasting_neighbours().is_none());
     assert_eq!(by_id(&ended(plan(&text, &table(&shuffled(&patch(), 5))))), by_id(&first));
@@ -155,7 +155,7 @@ fn who_finds_neighbours_anew_does_not_hang_on_the_order_either() {
 
 #[test]
 fn neighbours_last_however_far_they_go() {
-    let outcome = ended(plan(&TORN.replace("stretch = 1.4", "stretch = 100.0"), &table(&patch())));
+    let outcome = ended(plan(&TORN.replace("stretch = 1.25", "stretch = 100.0"), &table(&patch())));
     let neighbours = &outcome.engine.interaction().neighbours;
     assert_eq!(*neighbours, plan(TORN, &table(&patch())).interaction.neighbours);
 }
@@ -197,7 +197,7 @@ fn a_lattice_written_out_as_points_is_that_lattice() {
     assert_eq!(points.interaction.neighbours, lattice.interaction.neighbours);
     let share = |plan: &Plan| Sweep::compile(plan.update, &plan.interaction, &plan.roles).share_in_runs();
     assert_eq!(share(&points), share(&lattice));
-    assert!(share(&points) > 0.9, "swept without lists again: {}", share(&points));
+    assert!(share(&points) > 0.5, "swept without lists again: {}", share(&points));
     let [points, lattice] = [points, lattice].map(ended);
     assert_eq!(by_id(&points), by_id(&lattice));
     // The lattice's own order of summation is another: to rounding.

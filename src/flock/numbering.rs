@@ -104,6 +104,9 @@ mod tests {
 
     #[test]
     fn columns_run_along_the_shorter_side_and_one_place_or_none_is_no_trouble() {
+        // Side by side in one column, whichever comes first.
+        let level: Points = [[0.1, 0.0], [0.0, 0.0], [0.2, 0.0], [9.0, 0.0]].into_iter().collect();
+        assert_eq!(order_in_columns(&level, 1.0), [1, 0, 2, 3]);
         let tall: Points = [[1.0, 0.0], [0.0, 9.0], [0.0, 0.0], [1.0, 9.0]].into_iter().collect();
         assert_eq!(order_in_columns(&tall, 1.0), [2, 0, 1, 3]);
         assert_eq!(order_in_columns(&[[2.0, 3.0]].into_iter().collect(), 1.0), [0]);
