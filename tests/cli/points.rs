@@ -105,6 +105,9 @@ fn tables_and_frames_have_the_ids_and_the_order_of_the_file() {
         assert_eq!([number(&row[2]), number(&row[3])], place(id));
     }
 
+    let drawn = std::fs::read_to_string(out.join("probes.svg")).expect("written");
+    assert!(drawn.contains(">5301<") && drawn.contains(">5016<"));
+
     let breaks = records(&out.join("breaks.csv"));
     assert!(!breaks.is_empty());
     for row in &breaks {
