@@ -35,13 +35,9 @@ impl Cloud {
     /// # Errors
     /// A radius that holds too many.
     pub fn new(points: Points, ids: Vec<u32>, radius: f64) -> Result<Self, BodyError> {
-        // The spacing is the same in any order, and a third of the time is enough for one in which those near each
-        // other in space are so in memory.
-        let places: Points =
-            order_in_columns(&points, radius).iter().map(|&row| points.get(row as usize)).collect();
-        let neighbours = within(&places, radius)?;
+        let neighbours = within(&points, radius)?;
         let nearest = |i: usize| {
-            let apart = neighbours.of(i).iter().map(|&k| distance(places.get(i), places.get(k as usize)));
+            let apart = neighbours.of(i).iter().map(|&k| distance(points.get(i), points.get(k as usize)));
             apart.fold(f64::INFINITY, f64::min)
         };
         let mut apart: Vec<f64> = (0..points.len()).map(nearest).filter(|apart| apart.is_finite()).collect();
