@@ -285,7 +285,7 @@ impl<'a> Recorder<'a> {
         }
         if self.reports {
             let start = Instant::now();
-            RunRecorder::watch(&mut self.film, &mut self.footage, engine);
+            RunRecorder::open(&mut self.film, &mut self.footage, engine).watch(engine);
             self.writing += start.elapsed();
         }
     }
@@ -319,6 +319,10 @@ impl<'a> Recorder<'a> {
             frames.finish()?;
         }
         let start = Instant::now();
+        if self.reports {
+            // A run that is gone on with from its last step has seen none.
+            RunRecorder::open(&mut self.film, &mut self.footage, engine);
+        }
         let stage = self.film.map(|film| film.stage(self.scene, outcome));
         let writing = self.writing + start.elapsed();
         Ok(Records { snapshots: self.snapshots, probes: self.probes, stage, writing })

@@ -337,7 +337,8 @@ impl Engine {
         bonds.break_stretched(self.step, &self.interaction.neighbours, places, &self.roles, &mut self.breaks);
         if self.breaks.len() > known {
             tracing::debug!("step {}: {} bonds break", self.step, self.breaks.len() - known);
-            self.sweep.set_aside(self.breaks[known..].iter().flat_map(|b| b.pair).map(|j| j as usize));
+            let torn = self.breaks[known..].iter().flat_map(|b| b.pair).map(|j| j as usize);
+            self.sweep.set_aside(torn, &self.interaction);
         }
     }
 

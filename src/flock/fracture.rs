@@ -1,10 +1,16 @@
 //! Fracture (the paper's Choices 5 and 6): a pair stretched past a threshold never influences each
 //! other again, and ghosts stand in for what was lost.
 
+#[cfg(test)]
+mod tests;
+pub mod torn;
+mod watch;
+
 use super::neighbourhood::Neighbours;
 use super::points::{Points, distance};
 use super::role::Role;
 use super::shape::{Segment, segments_cross};
+use watch::Watch;
 
 /// When a bond breaks.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,30 +24,16 @@ pub enum Threshold {
 impl Threshold {
     /// Whether a bond of reference length `rest` breaks at `length` \[length\].
     pub fn is_passed(self, length: f64, rest: f64) -> bool {
+        length > self.limit(rest)
+    }
+
+    /// Greatest length of a bond of reference length `rest` that holds \[length\].
+    fn limit(self, rest: f64) -> f64 {
         match self {
-            Threshold::Distance(df) => length > df,
-            Threshold::Stretch(ratio) => length > ratio * rest,
+            Threshold::Distance(df) => df,
+            Threshold::Stretch(ratio) => ratio * rest,
         }
     }
-
-    /// Whether a bond may have passed the threshold: not if its square is so much less that rounding cannot
-    /// matter; squares that overflow or vanish never tell.
-    #[inline]
-    fn is_near(self, (reference, present): (&Points, &Points), j: usize, k: usize) -> bool {
-        let length = square_of_distance(present, j, k);
-        let limit = match self {
-            Threshold::Distance(df) => df * df,
-            Threshold::Stretch(ratio) => ratio * ratio * square_of_distance(reference, j, k),
-        };
-        let is_far = length < limit * (1.0 - NEAR_THRESHOLD) && length > f64::MIN_POSITIVE / NEAR_THRESHOLD;
-        !is_far
-    }
-}
-
-#[inline]
-fn square_of_distance(at: &Points, j: usize, k: usize) -> f64 {
-    let (x, y) = (at.x[j] - at.x[k], at.y[j] - at.y[k]);
-    x * x + y * y
 }
 
 /// What a particle sees in the place of a neighbour it has lost.
@@ -79,10 +71,18 @@ pub struct Bonds {
     any_broken: bool,
     /// Whether everybody is seen by those they see.
     is_mutual: bool,
+    /// The bonds that may still break, compiled when they are first looked at.
+    watch: Option<Watch>,
 }
 
-/// Part of a threshold within which a bond is measured exactly: far more than the rounding of a square.
-const NEAR_THRESHOLD: f64 = 1e-9;
+/// Where a particle sees the ghost of a neighbour.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum StandIn {
+    /// At this offset from its own place \[length\].
+    Offset([f64; 2]),
+    /// Opposite to this particle.
+    Opposite(usize),
+}
 
 impl Bonds {
     pub fn new(threshold: Option<Threshold>, ghosts: Ghosts, neighbours: &Neighbours) -> Self {
@@ -94,6 +94,7 @@ impl Bonds {
             broken: vec![false; neighbours.index.len()],
             any_broken: false,
             is_mutual: (0..neighbours.count()).all(seen_by),
+            watch: None,
         }
     }
 
@@ -109,10 +110,16 @@ impl Bonds {
     pub fn set_broken(&mut self, is_broken: impl Fn(usize) -> bool) {
         self.broken.iter_mut().enumerate().for_each(|(bond, broken)| *broken = is_broken(bond));
         self.any_broken = self.broken.contains(&true);
+        self.watch = None;
+    }
+
+    /// Whether a particle has lost a bond.
+    pub fn is_torn(&self, particle: usize, neighbours: &Neighbours) -> bool {
+        self.any_broken && self.broken[neighbours.bonds(particle)].contains(&true)
     }
 
     /// Breaks every live bond past the threshold and appends it, once per pair, to `breaks`.
-    /// Bonds to the frame never break: it is no matter.
+    /// Bonds to the frame never break: it is no matter. Give the same `neighbours` and `reference` every time.
     pub fn break_stretched(
         &mut self,
         step: usize,
@@ -123,15 +130,14 @@ impl Bonds {
     ) {
         let Some(threshold) = self.threshold else { return };
         let is_mutual = self.is_mutual;
-        let is_suspect = |j: usize, k: u32| {
-            // What both see, the lower one looks after.
-            (!is_mutual || j < k as usize) && threshold.is_near((reference, present), j, k as usize)
-        };
+        let known = self.watch.take().filter(|watch| watch.threshold() == threshold);
+        let watch = known
+            .unwrap_or_else(|| Watch::compile(threshold, neighbours, reference, |bond| !self.broken[bond]));
         // Most steps break nothing: a look at the squares tells.
-        let suspects =
-            (0..neighbours.count()).filter(|&j| neighbours.of(j).iter().any(|&k| is_suspect(j, k)));
-        let suspects: Vec<usize> = suspects.collect();
+        let suspects = watch.suspects(present);
+        self.watch = Some(watch);
         self.break_among(suspects, step, neighbours, (reference, present), breaks, |j, k| {
+            // What both see, the lower one looks after.
             (!is_mutual || j < k)
                 && roles[k].is_body()
                 && threshold.is_passed(
@@ -201,6 +207,10 @@ impl Bonds {
                 if let Some(back) = back.filter(|_| self.is_mutual) {
                     self.broken[back] = true;
                 }
+                if let Some(watch) = self.watch.as_mut().filter(|_| back.is_none_or(|back| self.broken[back]))
+                {
+                    watch.forget([j, k]);
+                }
                 // Seen from both ends where both list it, recorded from the lower one.
                 if j < k || back.is_none() {
                     let (a, b) = (reference.get(j), reference.get(k));
@@ -225,13 +235,25 @@ impl Bonds {
         reference: &Points,
         present: &Points,
     ) -> Option<[f64; 2]> {
+        let here = present.get(j);
+        self.stand_in(j, bond, neighbours, reference).map(|stand_in| match stand_in {
+            StandIn::Offset(lost) => [here[0] + lost[0], here[1] + lost[1]],
+            StandIn::Opposite(k) => [2.0 * here[0] - present.x[k], 2.0 * here[1] - present.y[k]],
+        })
+    }
+
+    fn stand_in(
+        &self,
+        j: usize,
+        bond: usize,
+        neighbours: &Neighbours,
+        reference: &Points,
+    ) -> Option<StandIn> {
         let offset = |k: usize| [reference.x[k] - reference.x[j], reference.y[k] - reference.y[j]];
         let lost = offset(neighbours.index[bond] as usize);
-        let here = present.get(j);
-        let at_lattice_offset = [here[0] + lost[0], here[1] + lost[1]];
         match self.ghosts {
             Ghosts::None => None,
-            Ghosts::Lattice => Some(at_lattice_offset),
+            Ghosts::Lattice => Some(StandIn::Offset(lost)),
             Ghosts::Mirrored => {
                 let size = lost[0].hypot(lost[1]);
                 let opposite = neighbours.bonds(j).filter(|&other| !self.broken[other]).find_map(|other| {
@@ -239,87 +261,7 @@ impl Bonds {
                     let [x, y] = offset(k);
                     ((x + lost[0]).hypot(y + lost[1]) <= 1e-6 * size).then_some(k)
                 });
-                Some(opposite.map_or(at_lattice_offset, |k| {
-                    [2.0 * here[0] - present.x[k], 2.0 * here[1] - present.y[k]]
-                }))
-            }
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Three particles in a row; the outer two see the middle one, which sees both.
-    fn row() -> (Neighbours, Points) {
-        let neighbours = Neighbours::from_lists([vec![1], vec![0, 2], vec![1]]);
-        (neighbours, [[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]].into_iter().collect())
-    }
-
-    #[test]
-    fn a_bond_past_the_distance_breaks_once_and_for_both() {
-        let (neighbours, reference) = row();
-        let mut bonds = Bonds::new(Some(Threshold::Distance(1.5)), Ghosts::None, &neighbours);
-        let mut present = reference.clone();
-        present.x[2] = 3.0;
-        let mut breaks = Vec::new();
-        let roles = [Role::Follower; 3];
-        bonds.break_stretched(4, &neighbours, (&reference, &present), &roles, &mut breaks);
-        bonds.break_stretched(5, &neighbours, (&reference, &reference), &roles, &mut breaks);
-        assert_eq!(breaks, [Break { step: 4, pair: [1, 2], place: [1.5, 0.0], length: 2.0 }]);
-        assert_eq!((0..4).map(|b| bonds.is_broken(b)).collect::<Vec<_>>(), [false, false, true, true]);
-    }
-
-    #[test]
-    fn a_stretch_threshold_is_relative_to_the_bond() {
-        assert!(Threshold::Stretch(1.5).is_passed(3.1, 2.0));
-        assert!(!Threshold::Stretch(1.5).is_passed(2.9, 2.0));
-    }
-
-    #[test]
-    fn each_kind_of_ghost_stands_in_its_own_place() {
-        let (neighbours, reference) = row();
-        let mut present = reference.clone();
-        present.x[0] = -0.5;
-        present.x[1] = 1.25;
-        let ghost = |ghosts| {
-            let mut bonds = Bonds::new(None, ghosts, &neighbours);
-            bonds.cut(([1.5, -1.0], [1.5, 1.0]), &neighbours, &reference, &mut Vec::new());
-            bonds.ghost(1, 2, &neighbours, &reference, &present)
-        };
-        assert_eq!(ghost(Ghosts::Lattice), Some([2.25, 0.0]));
-        assert_eq!(ghost(Ghosts::Mirrored), Some([3.0, 0.0]));
-        assert_eq!(ghost(Ghosts::None), None);
-    }
-
-    #[test]
-    fn a_ghost_loses_all_its_bonds() {
-        let (neighbours, reference) = row();
-        let mut bonds = Bonds::new(None, Ghosts::Lattice, &neighbours);
-        let roles = [Role::Follower, Role::Ghost, Role::Follower];
-        let mut breaks = Vec::new();
-        bonds.release_ghosts(2, &neighbours, (&reference, &reference), &roles, &mut breaks);
-        assert_eq!(breaks.len(), 2);
-        assert!((0..4).all(|b| bonds.is_broken(b)));
-    }
-
-    #[test]
-    fn a_bond_is_measured_exactly_where_a_square_would_not_tell() {
-        // At the threshold to the last bit, just beyond it, and where squares overflow or vanish.
-        for scale in [1e-200, 1.0, 1e200] {
-            let neighbours = Neighbours::from_lists([vec![1], vec![0]]);
-            let reference: Points = [[0.0, 0.0], [scale, 0.0]].into_iter().collect();
-            for threshold in [Threshold::Distance(1.3 * scale), Threshold::Stretch(1.3)] {
-                let limit = 1.3 * scale;
-                for (length, breaks) in [(limit, false), (limit.next_up(), true), (0.99 * limit, false)] {
-                    let present: Points = [[0.0, 0.0], [0.0, length]].into_iter().collect();
-                    let mut bonds = Bonds::new(Some(threshold), Ghosts::None, &neighbours);
-                    let (roles, mut broken) = ([Role::Follower; 2], Vec::new());
-                    bonds.break_stretched(1, &neighbours, (&reference, &present), &roles, &mut broken);
-                    assert_eq!(broken.len(), usize::from(breaks), "{threshold:?} {length:e}");
-                    assert!(bonds.is_broken(0) == breaks && bonds.is_broken(1) == breaks);
-                }
+                Some(opposite.map_or(StandIn::Offset(lost), StandIn::Opposite))
             }
         }
     }

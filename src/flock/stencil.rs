@@ -11,6 +11,7 @@
 //! steps while a few bands are in the caches, and leave out those where nothing moves.
 
 mod kernel;
+mod lists;
 pub mod matrix;
 #[cfg(test)]
 mod tests;
@@ -18,6 +19,7 @@ mod tests;
 use std::ops::Range;
 
 pub use kernel::Plane;
+use lists::Lists;
 
 use super::neighbourhood::Neighbours;
 use super::points::Points;
@@ -46,13 +48,14 @@ const GAPS: [usize; 2] = [6, kernel::MOST_KEPT];
 pub struct Stencil {
     bands: Vec<Band>,
     runs: Vec<Run>,
-    listed: Vec<u32>,
+    lists: Lists,
     /// Index distances of all runs, one stencil after the other.
     distances: Vec<isize>,
     /// Particles in gaps of runs that keep what stands there.
     kept: Vec<u32>,
     /// Whether nobody sees beyond the next band.
     is_local: bool,
+    followers: usize,
 }
 
 /// Where a band begins; it ends where the next one begins.
@@ -60,7 +63,8 @@ pub struct Stencil {
 struct Band {
     particle: u32,
     run: u32,
-    listed: u32,
+    /// The first group of its lists.
+    group: u32,
     followers: u32,
 }
 
@@ -87,45 +91,55 @@ impl Stencil {
         let size = if is_local { (reach * 5 / 2).max(SMALLEST_BAND) } else { LARGEST_BAND };
         let mut stencil = Self { is_local, ..Self::default() };
         let mut j = 0;
+        let mut listed = Vec::new();
         stencil.open_band(0);
         while j < follows.len() {
             let len = run_length(neighbours, follows, j, size);
             if follows[j] && len >= SHORTEST_RUN {
                 let rests = rest.is_some_and(|rest| (j..j + len).any(|j| rest.get(j) != [0.0; 2]));
-                stencil.push_run(neighbours, (j, len, rests), follows.len() <= IN_CACHE);
+                let bridge = follows.len() <= IN_CACHE;
+                stencil.push_run(neighbours, (j, len, rests), bridge.then_some(&listed));
             } else if follows[j] {
-                stencil.listed.extend(j as u32..(j + len) as u32);
+                listed.extend(j as u32..(j + len) as u32);
             }
             j += len;
             let begin = stencil.bands.last().map_or(0, |band| band.particle as usize);
             if j - begin >= size && j < follows.len() {
+                stencil.lists.push_band(neighbours, &listed);
+                listed.clear();
                 stencil.open_band(j);
             }
         }
+        stencil.lists.push_band(neighbours, &listed);
         stencil.open_band(follows.len());
         for band in 0..stencil.band_count() {
             let count = stencil.particles(band..band + 1).filter(|&j| follows[j]).count();
             stencil.bands[band].followers = count as u32;
+            stencil.followers += count;
         }
         stencil
     }
 
     fn open_band(&mut self, particle: usize) {
-        let (run, listed) = (self.runs.len() as u32, self.listed.len() as u32);
-        self.bands.push(Band { particle: particle as u32, run, listed, followers: 0 });
+        let (run, group) = (self.runs.len() as u32, self.lists.group_count() as u32);
+        self.bands.push(Band { particle: particle as u32, run, group, followers: 0 });
     }
 
-    fn push_run(&mut self, neighbours: &Neighbours, (j, len, rests): (usize, usize, bool), bridge: bool) {
+    /// Adds a run, or makes the band's last one longer if those `listed` in the band are given.
+    fn push_run(
+        &mut self,
+        neighbours: &Neighbours,
+        (j, len, rests): (usize, usize, bool),
+        listed: Option<&Vec<u32>>,
+    ) {
         let (stencil, size) = self.distances_of(neighbours, j);
         let first_of_band = self.bands.last().map_or(0, |band| band.run as usize);
         let kept = self.kept.len();
-        if bridge && self.runs.len() > first_of_band {
-            let listed_from = self.bands.last().map_or(0, |band| band.listed as usize);
+        if let Some(listed) = listed.filter(|_| self.runs.len() > first_of_band) {
             let last = self.runs.last_mut().expect("the band has one");
             let gap = (last.start + last.len)..j as u32;
             // Those in the gap who follow by lists are computed after the runs; the others must not change.
-            let lists = &self.listed[listed_from..];
-            let still = gap.clone().filter(|i| lists.binary_search(i).is_err());
+            let still = gap.clone().filter(|i| listed.binary_search(i).is_err());
             let alike = (last.stencil, last.neighbours) == (stencil, size) && gap.len() <= GAPS[0];
             if alike && last.gaps as usize + still.clone().count() <= GAPS[1] {
                 self.kept.extend(still);
@@ -158,10 +172,14 @@ impl Stencil {
         self.bands[band].followers as usize
     }
 
+    /// How many particles follow in all.
+    pub fn all_followers(&self) -> usize {
+        self.followers
+    }
+
     /// Share of the following particles that need no neighbour list.
     pub fn share_in_runs(&self) -> f64 {
-        let followers: u64 = self.bands.iter().map(|band| u64::from(band.followers)).sum();
-        (followers - self.listed.len() as u64) as f64 / followers.max(1) as f64
+        (self.followers - self.lists.particles()) as f64 / self.followers.max(1) as f64
     }
 
     /// Computes one coordinate of the targets of those in some bands that follow without lists, `tile` of a
@@ -174,20 +192,9 @@ impl Stencil {
     }
 
     /// Computes some coordinates of the targets of those in some bands that follow by lists.
-    pub fn sweep_listed<T: Real, const N: usize>(
-        &self,
-        bands: Range<usize>,
-        neighbours: &Neighbours,
-        planes: &mut [Plane<'_, T>; N],
-    ) {
-        let listed = self.bands[bands.start].listed as usize..self.bands[bands.end].listed as usize;
-        for &j in &self.listed[listed] {
-            let (j, list) = (j as usize, neighbours.of(j as usize));
-            let targets = listed_targets(list, planes, j);
-            for (plane, target) in planes.iter_mut().zip(targets) {
-                plane.next[j - plane.begin] = target;
-            }
-        }
+    pub fn sweep_listed<T: Real, const P: usize>(&self, bands: Range<usize>, planes: &mut [Plane<'_, T>; P]) {
+        let groups = self.bands[bands.start].group as usize..self.bands[bands.end].group as usize;
+        self.lists.sweep(groups, planes);
     }
 
     /// Finds or adds the index distances of particle `j`.
@@ -227,21 +234,4 @@ fn is_translate(neighbours: &Neighbours, j: usize, k: usize) -> bool {
     let (a, b) = (neighbours.of(j), neighbours.of(k));
     let shift = (k - j) as u32;
     !a.is_empty() && a.len() == b.len() && a.iter().zip(b).all(|(&a, &b)| a + shift == b)
-}
-
-/// What [`Rule::target`](super::rules::Rule::target) computes: the rest offset is added to the mean,
-/// also where it is zero, which makes 0.0 of -0.0.
-#[inline]
-fn listed_targets<T: Real, const N: usize>(list: &[u32], planes: &[Plane<'_, T>; N], j: usize) -> [T; N] {
-    if list.is_empty() {
-        return std::array::from_fn(|n| planes[n].present[j - planes[n].seen_from]);
-    }
-    let mut sums = [T::of(-0.0); N];
-    for &k in list {
-        for (sum, plane) in sums.iter_mut().zip(planes) {
-            *sum += plane.present[k as usize - plane.seen_from];
-        }
-    }
-    let count = T::of(list.len() as f64);
-    std::array::from_fn(|n| sums[n] / count + planes[n].rest.map_or(T::default(), |rest| rest[j]))
 }

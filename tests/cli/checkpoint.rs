@@ -134,6 +134,33 @@ fn a_run_killed_at_random_and_resumed_leaves_the_files_of_a_whole_one() {
 
 #[cfg(unix)]
 #[test]
+fn a_run_killed_while_it_writes_its_results_leaves_all_of_them_when_resumed() {
+    let folder = temporary();
+    let every = [&RUN[..], &["-q", "--checkpoint-every", "1steps"]].concat();
+    assert!(flockform(&RUN, folder.path()).status.success());
+    let whole = contents(&folder.path().join("o"));
+    let unfinished = folder.path().join("o.unfinished");
+    // The first of the results; pictures, which take longest, come after it.
+    let first_result = unfinished.join("final.csv");
+    for _ in 0..20 {
+        std::fs::remove_dir_all(folder.path().join("o")).expect("there");
+        let mut child = start(&every, folder.path());
+        while !first_result.exists() && child.try_wait().expect("a child").is_none() {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        child.kill().expect("kills");
+        child.wait().expect("ends");
+        if unfinished.exists() {
+            break;
+        }
+    }
+    let output = flockform(&["run", "--resume", "o", "-q"], folder.path());
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    assert_same(&folder.path().join("o"), &whole, "resumed from the last step");
+}
+
+#[cfg(unix)]
+#[test]
 fn an_interrupted_run_goes_on_from_its_own_output() {
     let folder = temporary();
     let steps = ["--set", "stop.steps=20000", "--set", "record.vtk_every=4000"];

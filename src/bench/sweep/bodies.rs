@@ -185,9 +185,8 @@ fn square_single(side: usize, steps_together: usize) -> Subject {
         let mut to_go = steps;
         while to_go > 0 {
             let count = to_go.min(steps_together);
-            let (neighbours, threads) = (&neighbours, rayon::current_num_threads());
-            let (stencil, led) = (&stencil, Led::NOBODY);
-            let steps = Steps { stencil, neighbours, rest: None, led, count, farther: None, threads };
+            let (stencil, led, threads) = (&stencil, Led::NOBODY, rayon::current_num_threads());
+            let steps = Steps { stencil, rest: None, led, count, farther: None, threads };
             let rows = |[x, y]: &mut [Vec<f32>; 2]| [std::mem::take(x), std::mem::take(y)];
             let ([mut ex, mut ey], [mut ox, mut oy]) = (rows(&mut even), rows(&mut odd));
             steps.take(&mut Activity::default(), [&mut ex, &mut ey], [&mut ox, &mut oy]);
@@ -294,8 +293,8 @@ fn fracture(side: usize, cracked: bool) -> Subject {
         steps_together: 1,
         followers,
         bonds_watched,
-        // Each index once, and the reference as the positions.
-        bytes_per_update: BYTES_PER_UPDATE + 4.0 * 4.0 + 16.0,
+        // The positions once more, to look at the bonds.
+        bytes_per_update: BYTES_PER_UPDATE + 16.0,
         is_shared: false,
         step: Box::new(step),
     }

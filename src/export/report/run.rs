@@ -78,17 +78,26 @@ impl RunRecorder {
         Self { frames, first_roles: roles.clone(), roles, changes: Vec::new(), values }
     }
 
-    /// Looks at a step; `recorder` is made at the first, and goes on from the footage of an earlier one.
-    pub fn watch(recorder: &mut Option<Self>, earlier: &mut Option<Footage<'_>>, engine: &Engine) {
+    /// The recorder, made if there is none yet; it goes on from the footage of an earlier one.
+    pub fn open<'a>(
+        recorder: &'a mut Option<Self>,
+        earlier: &mut Option<Footage<'_>>,
+        engine: &Engine,
+    ) -> &'a mut Self {
         let recorder = recorder.get_or_insert_with(|| Self::new(engine));
         if let Some(Footage { frames, interval, first_roles, roles, changes }) = earlier.take() {
             recorder.frames.go_on(frames.into_owned(), interval);
             (recorder.first_roles, recorder.roles, recorder.changes) = (first_roles, roles, changes);
         }
-        if recorder.frames.wants(engine.step()) {
-            recorder.take(engine, 1.0);
-            let values: Vec<&[f64]> = recorder.values.iter().map(Vec::as_slice).collect();
-            recorder.frames.keep(engine.step(), &values);
+        recorder
+    }
+
+    /// Looks at a step.
+    pub fn watch(&mut self, engine: &Engine) {
+        if self.frames.wants(engine.step()) {
+            self.take(engine, 1.0);
+            let values: Vec<&[f64]> = self.values.iter().map(Vec::as_slice).collect();
+            self.frames.keep(engine.step(), &values);
         }
     }
 

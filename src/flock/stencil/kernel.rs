@@ -192,14 +192,17 @@ fn fill<T: Real, const N: usize, const W: usize>(seen: &[&[T]; N], rest: Option<
         }
         return;
     }
+    // From the second on they are stored at whole vectors: a store across two cache lines takes as long as two, and
+    // these are what bodies within the caches wait for. Where two overlap, the same comes out again.
     let mut at = 0;
-    while at + W <= len {
+    let mut aligned = W - (target.as_ptr() as usize / size_of::<T>()) % W;
+    loop {
         fill_lanes::<T, N, W>(seen, rest, at, target);
-        at += W;
-    }
-    if at < len {
-        // The last ones overlap those before them, which come out the same again.
-        fill_lanes::<T, N, W>(seen, rest, len - W, target);
+        if at + W == len {
+            return;
+        }
+        at = aligned.min(len - W);
+        aligned += W;
     }
 }
 

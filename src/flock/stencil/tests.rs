@@ -62,7 +62,7 @@ fn sweep(stencil: &Stencil, interaction: &Interaction, present: &Points, next: &
             },
         ];
         planes.iter_mut().for_each(|plane| stencil.sweep_runs(piece.clone(), 64, plane));
-        stencil.sweep_listed(piece, &interaction.neighbours, &mut planes);
+        stencil.sweep_listed(piece, &mut planes);
     }
 }
 

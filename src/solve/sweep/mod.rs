@@ -7,11 +7,16 @@
 //! it (Gauss-Seidel).
 
 mod several;
+#[cfg(test)]
+mod tests;
+
+use std::ops::Range;
 
 use rayon::prelude::*;
 
 pub use several::{Activity, Led, MOST_STEPS, Steps};
 
+use crate::flock::fracture::torn::Torn;
 use crate::flock::frame::Frame;
 use crate::flock::interaction::{Interaction, Weights};
 use crate::flock::points::Points;
@@ -62,7 +67,9 @@ pub struct Sweep {
     stencil: Option<Stencil>,
     /// Present where the rule is a material and nothing else.
     matrices: Option<MatrixStencil>,
-    /// Followers with a broken bond, whom no stencil fits, ascending.
+    /// Followers with a broken bond, whom the stencil does not fit.
+    torn: Torn,
+    /// The same where no stencil is: whom the matrices do not fit, ascending.
     aside: Vec<u32>,
 }
 
@@ -81,18 +88,23 @@ impl Sweep {
             }
             _ => None,
         };
-        let mut sweep =
-            Self { update, followers: count(&follows), follows, stencil, matrices, aside: Vec::new() };
+        let bands = stencil.iter().flat_map(|s| (0..s.band_count()).map(|band| s.particles(band..band + 1)));
+        let (torn, aside) = (Torn::new(bands), Vec::new());
+        let mut sweep = Self { update, followers: count(&follows), follows, stencil, matrices, torn, aside };
         if let Some(bonds) = interaction.bonds.as_ref().filter(|bonds| bonds.any_broken()) {
-            let is_torn = |j: &usize| neighbours.bonds(*j).any(|bond| bonds.is_broken(bond));
-            sweep.set_aside((0..neighbours.count()).filter(is_torn));
+            let is_torn = |&j: &usize| bonds.is_torn(j, neighbours);
+            sweep.set_aside((0..neighbours.count()).filter(is_torn), interaction);
         }
         sweep
     }
 
-    /// Sweeps these one by one from now on: they have lost a bond.
-    pub fn set_aside(&mut self, particles: impl IntoIterator<Item = usize>) {
+    /// Sweeps these by themselves from now on: they have lost a bond.
+    pub fn set_aside(&mut self, particles: impl IntoIterator<Item = usize>, interaction: &Interaction) {
         let follows = &self.follows;
+        if let (Some(_), Some(bonds)) = (&self.stencil, &interaction.bonds) {
+            self.torn.renew(particles, follows, (bonds, &interaction.neighbours, &interaction.reference));
+            return;
+        }
         self.aside.extend(particles.into_iter().filter(|&j| follows[j]).map(|j| j as u32));
         self.aside.sort_unstable();
         self.aside.dedup();
@@ -101,8 +113,8 @@ impl Sweep {
     /// For neighbours that change at every step: nothing is compiled from them.
     pub fn uncompiled(update: Update, roles: &[Role]) -> Self {
         let follows = followers(roles);
-        let (stencil, matrices, aside) = (None, None, Vec::new());
-        Self { update, followers: count(&follows), follows, stencil, matrices, aside }
+        let (stencil, matrices, torn, aside) = (None, None, Torn::default(), Vec::new());
+        Self { update, followers: count(&follows), follows, stencil, matrices, torn, aside }
     }
 
     /// Share of the followers swept without neighbour lists.
@@ -121,8 +133,7 @@ impl Sweep {
         next: &mut Points,
     ) {
         if let Some(stencil) = &self.stencil {
-            sweep_whole(stencil, interaction, present, next);
-            self.step_aside(interaction, present, next);
+            sweep_whole(stencil, &self.torn, interaction, present, next);
         } else if let Some(matrices) = &self.matrices {
             let Weights::Matrix(weights) = &interaction.weights else {
                 unreachable!("compiled from matrices")
@@ -155,7 +166,7 @@ impl Sweep {
         }
     }
 
-    /// Those whom no stencil fits; what one left in their places is written over.
+    /// Those whom no matrices fit; what these left in their places is written over.
     fn step_aside(&self, interaction: &Interaction, present: &Points, next: &mut Points) {
         let moved = |&j: &u32| (j, self.moved(j as usize, interaction, present));
         if self.aside.len() >= ASIDE_IN_PARALLEL && rayon::current_num_threads() > 1 {
@@ -179,8 +190,7 @@ impl Sweep {
         let stencil = self.stencil.as_ref().expect("a sweep that takes several steps has a stencil");
         let rest = interaction.rest.as_ref().map(|rest| [&rest.x[..], &rest.y[..]]);
         let threads = if is_parallel(present.len()) { rayon::current_num_threads() } else { 1 };
-        let steps =
-            Steps { stencil, neighbours: &interaction.neighbours, rest, led, count, farther, threads };
+        let steps = Steps { stencil, rest, led, count, farther, threads };
         let even = [&mut present.x[..], &mut present.y[..]];
         let farther = steps.take(activity, even, [&mut next.x[..], &mut next.y[..]]);
         if count % 2 == 1 {
@@ -196,7 +206,7 @@ impl Sweep {
 
     /// Whether [`Sweep::steps`] can take the steps.
     pub fn takes_several(&self) -> bool {
-        self.stencil.is_some() && self.aside.is_empty()
+        self.stencil.is_some() && self.torn.is_empty()
     }
 
     fn moved(&self, j: usize, interaction: &Interaction, seen: &Points) -> [f64; 2] {
@@ -242,7 +252,13 @@ fn for_chunks(points: &mut Points, work: impl Fn(usize, &mut [f64], &mut [f64]) 
 }
 
 /// One step of everybody, in pieces of whole bands.
-fn sweep_whole(stencil: &Stencil, interaction: &Interaction, present: &Points, next: &mut Points) {
+fn sweep_whole(
+    stencil: &Stencil,
+    torn: &Torn,
+    interaction: &Interaction,
+    present: &Points,
+    next: &mut Points,
+) {
     let bands = stencil.band_count();
     let size = if is_parallel(present.len()) { chunk_size(present.len()) } else { usize::MAX };
     let mut pieces = Vec::new();
@@ -259,161 +275,21 @@ fn sweep_whole(stencil: &Stencil, interaction: &Interaction, present: &Points, n
     }
     let [rest_x, rest_y] = [0, 1]
         .map(|axis| interaction.rest.as_ref().map(|rest| if axis == 0 { &rest.x[..] } else { &rest.y[..] }));
-    let work = |(bands, begin, x, y): (std::ops::Range<usize>, usize, &mut [f64], &mut [f64])| {
+    let work = |(bands, begin, x, y): (Range<usize>, usize, &mut [f64], &mut [f64])| {
         let mut planes = [
             Plane { seen_from: 0, present: &present.x, rest: rest_x, begin, next: x },
             Plane { seen_from: 0, present: &present.y, rest: rest_y, begin, next: y },
         ];
-        planes.iter_mut().for_each(|plane| stencil.sweep_runs(bands.clone(), TILE, plane));
-        stencil.sweep_listed(bands, &interaction.neighbours, &mut planes);
+        let mut sweep = |bands: Range<usize>| {
+            planes.iter_mut().for_each(|plane| stencil.sweep_runs(bands.clone(), TILE, plane));
+            stencil.sweep_listed(bands.clone(), &mut planes);
+            torn.sweep(bands, &interaction.reference, &mut planes);
+        };
+        // The torn are swept over, and then again while what they see is in the caches.
+        if torn.is_empty() { sweep(bands) } else { bands.for_each(|band| sweep(band..band + 1)) }
     };
     match pieces.len() {
         0 | 1 => pieces.into_iter().for_each(work),
         _ => pieces.into_par_iter().for_each(work),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::flock::body::{Body, Cut};
-    use crate::flock::lattice::{Lattice, LatticeKind};
-    use crate::flock::neighbourhood::Neighbourhood;
-    use crate::flock::rules::Mean;
-
-    /// Large enough to be swept in parallel, and of no whole number of chunks.
-    fn body(rule: Rule) -> Interaction {
-        let lattice = Lattice::new(LatticeKind::Hexagonal { spacing: 1.0 }, [0.0, 0.0], 0.1);
-        let cut = Cut::Count { columns: 263, rows: 301 };
-        let (body, neighbours) = Body::build(lattice, &cut, &Neighbourhood::Second, None).expect("fits");
-        let reference = body.reference;
-        let mut interaction = Interaction {
-            rule,
-            reference,
-            neighbours,
-            weights: Weights::Equal,
-            forces: None,
-            rest: None,
-            bonds: None,
-        };
-        interaction.keep_rest();
-        interaction
-    }
-
-    fn bits(points: &Points) -> Vec<u64> {
-        points.x.iter().chain(&points.y).map(|value| value.to_bits()).collect()
-    }
-
-    fn after_steps(interaction: &Interaction, roles: &[Role], threads: usize) -> Points {
-        let sweep = Sweep::compile(Update::default(), interaction, roles);
-        let mut present = Points::clone(&interaction.reference);
-        for i in (0..present.len()).step_by(101) {
-            present.x[i] += 1.0 + (i % 13) as f64 / 7.0;
-        }
-        let mut next = present.clone();
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
-        pool.install(|| {
-            for _ in 0..3 {
-                sweep.step(interaction, None, &present, &mut next);
-                std::mem::swap(&mut present, &mut next);
-            }
-        });
-        present
-    }
-
-    #[test]
-    fn any_number_of_threads_gives_the_same_bits() {
-        let weighted = Rule { mean: Mean::Distance { power: 1.0 }, ..Rule::BARYCENTRE };
-        for rule in [Rule::BARYCENTRE, weighted] {
-            let interaction = body(rule);
-            assert!(interaction.reference.len() > PARALLEL_FROM);
-            let mut roles = vec![Role::Follower; interaction.reference.len()];
-            roles[..301].fill(Role::Clamped);
-            let one = bits(&after_steps(&interaction, &roles, 1));
-            for threads in [2, 4] {
-                assert!(bits(&after_steps(&interaction, &roles, threads)) == one, "{threads} threads");
-            }
-        }
-    }
-
-    #[test]
-    fn a_compiled_sweep_gives_the_bits_of_an_uncompiled_one() {
-        let interaction = body(Rule::BARYCENTRE);
-        let mut roles = vec![Role::Follower; interaction.reference.len()];
-        roles.iter_mut().step_by(7919).for_each(|role| *role = Role::Leader);
-        let present: Points = interaction.reference.iter().map(|[x, y]| [x * 1.01, y - 0.02 * x]).collect();
-        let compiled = Sweep::compile(Update::default(), &interaction, &roles);
-        assert!(compiled.share_in_runs() > 0.95, "{}", compiled.share_in_runs());
-        let swept = |sweep: &Sweep| {
-            let mut next = present.clone();
-            sweep.step(&interaction, None, &present, &mut next);
-            bits(&next)
-        };
-        assert!(swept(&compiled) == swept(&Sweep::uncompiled(Update::default(), &roles)));
-    }
-
-    fn assert_compiled_as_uncompiled(interaction: &Interaction, roles: &[Role], update: Update) {
-        let reference = &interaction.reference;
-        let present: Points =
-            reference.iter().map(|[x, y]| [x * 1.01 + 0.1 * y.sin(), y - 0.02 * x]).collect();
-        let swept = |sweep: &Sweep| {
-            let mut next = present.clone();
-            sweep.step(interaction, None, &present, &mut next);
-            bits(&next)
-        };
-        let compiled = Sweep::compile(update, interaction, roles);
-        assert!(compiled.stencil.is_some() || compiled.matrices.is_some());
-        assert!(swept(&compiled) == swept(&Sweep::uncompiled(update, roles)));
-    }
-
-    #[test]
-    fn a_compiled_sweep_of_a_material_gives_the_bits_of_an_uncompiled_one() {
-        use crate::flock::block::Block;
-        use crate::flock::interaction::MatrixWeights;
-        let mut interaction = body(Rule::MATERIAL);
-        let neighbours = &interaction.neighbours;
-        // A class for each number of neighbours, of matrices without any symmetry.
-        let most = (0..neighbours.count()).map(|j| neighbours.of(j).len()).max().expect("particles");
-        let starts: Vec<u32> = (0..=most as u32 + 1).map(|n| n * n.saturating_sub(1) / 2).collect();
-        let blocks: Vec<Block> = (0..starts[most + 1])
-            .map(f64::from)
-            .map(|k| [[0.1 + 0.01 * k.sin(), 0.02 * k.cos()], [0.03 * (2.0 * k).sin(), 0.1 - 0.01 * k.cos()]])
-            .collect();
-        interaction.weights = Weights::Matrix(MatrixWeights {
-            class: (0..neighbours.count()).map(|j| neighbours.of(j).len() as u32).collect(),
-            starts,
-            stiffness: blocks.clone(),
-            blocks,
-            compliance: (0..=most).map(|n| [[0.1 * n as f64, 0.2], [0.3, 0.4]]).collect(),
-        });
-        let mut roles = vec![Role::Follower; interaction.reference.len()];
-        roles.iter_mut().step_by(7919).for_each(|role| *role = Role::Leader);
-        let gentle = Update { damping: 0.7, ..Update::default() };
-        for update in [Update::default(), gentle] {
-            interaction.rest = None;
-            interaction.forces = None;
-            assert_compiled_as_uncompiled(&interaction, &roles, update);
-            interaction.keep_rest();
-            interaction.forces =
-                Some(interaction.reference.iter().map(|[x, y]| [y.cos(), 0.1 * x]).collect());
-            assert_compiled_as_uncompiled(&interaction, &roles, update);
-        }
-    }
-
-    #[test]
-    fn a_cracked_body_is_swept_to_the_bits_of_one_by_one() {
-        use crate::flock::fracture::{Bonds, Ghosts};
-        let mut interaction = body(Rule::BARYCENTRE);
-        let mut roles = vec![Role::Follower; interaction.reference.len()];
-        roles[..301].fill(Role::Clamped);
-        for ghosts in [Ghosts::Lattice, Ghosts::Mirrored, Ghosts::None] {
-            let mut bonds = Bonds::new(None, ghosts, &interaction.neighbours);
-            let (reference, neighbours) = (&interaction.reference, &interaction.neighbours);
-            bonds.cut(([100.0, -400.0], [130.0, 400.0]), neighbours, reference, &mut Vec::new());
-            interaction.bonds = Some(bonds);
-            assert_compiled_as_uncompiled(&interaction, &roles, Update::default());
-            let sweep = Sweep::compile(Update::default(), &interaction, &roles);
-            assert!(sweep.aside.len() > 500 && sweep.aside.len() < 5000, "{}", sweep.aside.len());
-        }
     }
 }

@@ -14,12 +14,14 @@
 //! A band that did not change in a step, beside others that did not either, will not change in the next:
 //! it is left out. So a body costs what of it moves.
 
+#[cfg(test)]
+mod tests;
+
 use std::ops::Range;
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::flock::neighbourhood::Neighbours;
 use crate::flock::real::Real;
 use crate::flock::stencil::{Plane, Stencil};
 
@@ -29,6 +31,12 @@ pub const MOST_STEPS: usize = 16;
 
 /// Particles of a column swept before it is the next one's turn, if several steps are taken together, or one.
 const TILES: [usize; 2] = [512, 64];
+
+/// Particles up to which a body, one coordinate of it, stays in the second cache from step to step.
+const FRONT_FROM: usize = 1 << 16;
+
+/// Bands swept in one go where each step is taken by itself: enough for what is asked of each band not to count.
+const MOST_BANDS: usize = 8;
 
 /// Who is led from outside while several steps are taken.
 #[derive(Clone, Copy)]
@@ -75,7 +83,6 @@ impl Activity {
 #[derive(Clone, Copy)]
 pub struct Steps<'a, T> {
     pub stencil: &'a Stencil,
-    pub neighbours: &'a Neighbours,
     pub rest: Option<[&'a [T]; 2]>,
     pub led: Led<'a>,
     /// How many, from 1 to [`MOST_STEPS`].
@@ -91,65 +98,77 @@ impl<T: Real> Steps<'_, T> {
     /// `even`, which holds the present positions; the other holds those one step before. For each step, whether somebody
     /// moved farther in it than asked along an axis.
     pub fn take(&self, activity: &mut Activity, even: [&mut [T]; 2], odd: [&mut [T]; 2]) -> Vec<bool> {
-        let bands = self.stencil.band_count();
-        let [changed_x, changed_y] = &mut activity.changed;
-        let ([even_x, even_y], [odd_x, odd_y]) = (even, odd);
-        let mut x = || self.take_axis(0, changed_x, even_x, odd_x);
-        let mut y = || self.take_axis(1, changed_y, even_y, odd_y);
-        let (x, y) = if self.threads > 1 { rayon::join(x, y) } else { (x(), y()) };
-        let followers: usize = (0..bands).map(|band| self.stencil.followers(band)).sum();
-        activity.due += 2 * (followers * self.count) as u64;
-        activity.computed += x.computed + y.computed;
-        x.farther.iter().zip(y.farther).map(|(x, y)| *x || y).collect()
+        let ([changed_x, changed_y], [even_x, even_y], [odd_x, odd_y]) = (&mut activity.changed, even, odd);
+        let seen = if self.stencil.share_in_runs() < 0.5 {
+            // A list that has been read serves both coordinates.
+            let even_odd = ([even_x, even_y], [odd_x, odd_y]);
+            self.take_axes([0, 1], [changed_x, changed_y], even_odd, self.threads)
+        } else {
+            let threads = self.threads.div_ceil(2);
+            let mut x = || self.take_axes([0], [changed_x], ([even_x], [odd_x]), threads);
+            let mut y = || self.take_axes([1], [changed_y], ([even_y], [odd_y]), threads);
+            let (mut x, y) = if self.threads > 1 { rayon::join(x, y) } else { (x(), y()) };
+            x.add(y);
+            x
+        };
+        activity.due += 2 * (self.stencil.all_followers() * self.count) as u64;
+        activity.computed += seen.computed;
+        seen.farther
     }
 
-    fn take_axis(&self, axis: usize, changed: &mut Vec<bool>, even: &mut [T], odd: &mut [T]) -> Seen {
+    fn take_axes<const P: usize>(
+        &self,
+        axes: [usize; P],
+        mut changed: [&mut Vec<bool>; P],
+        (even, odd): ([&mut [T]; P], [&mut [T]; P]),
+        threads: usize,
+    ) -> Seen {
         let (bands, levels) = (self.stencil.band_count(), self.count + 1);
-        changed.resize(bands, true);
         let mut flags = vec![false; bands * levels];
-        for (flags, changed) in flags.chunks_mut(levels).zip(&*changed) {
-            flags[0] = *changed;
+        for changed in &mut changed {
+            changed.resize(bands, true);
+            flags.iter_mut().step_by(levels).zip(&**changed).for_each(|(flag, changed)| *flag |= changed);
         }
-        let rows = Rows { even, odd, flags: &mut flags };
         let mut seen = Seen { computed: 0, farther: vec![false; self.count] };
-        let cuts = self.cuts(bands);
+        let mut rows = Rows { even, odd, flags: &mut flags };
+        let cuts = self.cuts(bands, threads);
         if cuts.len() == 2 {
-            let front = Front { steps: self, axis, stretch: 0..bands, rows };
-            front.run(|_| 0..bands, &mut seen);
-            keep_last(&flags, levels, changed);
-            return seen;
+            Front { steps: self, axes, stretch: 0..bands, rows: rows.lend() }.run(|_| 0..bands, &mut seen);
+        } else {
+            let segments: Vec<Range<usize>> = cuts.windows(2).map(|ends| ends[0]..ends[1]).collect();
+            let shrinking = |segment: &Range<usize>, level: usize| {
+                let from = if segment.start == 0 { 0 } else { segment.start + level };
+                from..if segment.end == bands { bands } else { segment.end - level }
+            };
+            self.take_fronts(axes, rows.lend(), &segments, shrinking, &mut seen);
+            let inner = &cuts[1..cuts.len() - 1];
+            let wedges: Vec<Range<usize>> = inner.iter().map(|cut| cut - levels..cut + levels).collect();
+            let growing = |wedge: &Range<usize>, level: usize| {
+                let cut = wedge.start + levels;
+                cut - level..cut + level
+            };
+            self.take_fronts(axes, rows.lend(), &wedges, growing, &mut seen);
         }
-        let segments: Vec<Range<usize>> = cuts.windows(2).map(|ends| ends[0]..ends[1]).collect();
-        let shrinking = |segment: &Range<usize>, level: usize| {
-            let from = if segment.start == 0 { 0 } else { segment.start + level };
-            from..if segment.end == bands { bands } else { segment.end - level }
-        };
-        self.take_fronts(axis, rows, &segments, shrinking, &mut seen);
-        let rows = Rows { even, odd, flags: &mut flags };
-        let inner = &cuts[1..cuts.len() - 1];
-        let wedges: Vec<Range<usize>> = inner.iter().map(|cut| cut - levels..cut + levels).collect();
-        let growing = |wedge: &Range<usize>, level: usize| {
-            let cut = wedge.start + levels;
-            cut - level..cut + level
-        };
-        self.take_fronts(axis, rows, &wedges, growing, &mut seen);
-        keep_last(&flags, levels, changed);
+        for changed in changed {
+            let last = flags.iter().skip(self.count).step_by(levels);
+            last.zip(changed).for_each(|(flag, changed)| *changed = *flag);
+        }
         seen
     }
 
     /// Where the body is cut for the threads, its ends included.
-    fn cuts(&self, bands: usize) -> Vec<usize> {
-        // Half of them are at the other coordinate. A segment must outlast the steps, and a wedge fit in.
+    fn cuts(&self, bands: usize, threads: usize) -> Vec<usize> {
+        // A segment must outlast the steps, and a wedge fit in.
         let most = if self.stencil.is_local() { bands / (3 * (self.count + 1)) } else { 1 };
-        let segments = self.threads.div_ceil(2).clamp(1, most.max(1));
+        let segments = threads.clamp(1, most.max(1));
         (0..=segments).map(|k| k * bands / segments).collect()
     }
 
     /// Takes the steps in disjoint stretches of bands at once; `range` says which bands of a stretch take a step.
-    fn take_fronts(
+    fn take_fronts<const P: usize>(
         &self,
-        axis: usize,
-        rows: Rows<'_, T>,
+        axes: [usize; P],
+        rows: Rows<'_, T, P>,
         stretches: &[Range<usize>],
         range: impl Fn(&Range<usize>, usize) -> Range<usize> + Sync,
         seen: &mut Seen,
@@ -158,9 +177,9 @@ impl<T: Real> Steps<'_, T> {
             .part(stretches, self.stencil, self.count + 1)
             .into_iter()
             .zip(stretches)
-            .map(|(rows, stretch)| Front { steps: self, axis, stretch: stretch.clone(), rows })
+            .map(|(rows, stretch)| Front { steps: self, axes, stretch: stretch.clone(), rows })
             .collect();
-        let run = |front: Front<'_, T>| {
+        let run = |front: Front<'_, T, P>| {
             let stretch = front.stretch.clone();
             let mut seen = Seen { computed: 0, farther: vec![false; self.count] };
             front.run(|level| range(&stretch, level), &mut seen);
@@ -184,14 +203,27 @@ impl Seen {
     }
 }
 
-/// One coordinate of a stretch of bands, and for each band and level whether it changed.
-struct Rows<'a, T> {
-    even: &'a mut [T],
-    odd: &'a mut [T],
+/// Some coordinates of a stretch of bands, and for each band and level whether it changed.
+struct Rows<'a, T, const P: usize> {
+    even: [&'a mut [T]; P],
+    odd: [&'a mut [T]; P],
     flags: &'a mut [bool],
 }
 
-impl<'a, T> Rows<'a, T> {
+impl<'a, T, const P: usize> Rows<'a, T, P> {
+    /// The rows that a level reads, those it writes, and the flags.
+    #[allow(clippy::type_complexity)]
+    fn at(&mut self, level: usize) -> (&[&'a mut [T]; P], &mut [&'a mut [T]; P], &mut [bool]) {
+        let Self { even, odd, flags } = self;
+        if level % 2 == 1 { (even, odd, flags) } else { (odd, even, flags) }
+    }
+
+    fn lend(&mut self) -> Rows<'_, T, P> {
+        let Self { even, odd, flags } = self;
+        let (even, odd) = (even.each_mut().map(|row| &mut **row), odd.each_mut().map(|row| &mut **row));
+        Rows { even, odd, flags }
+    }
+
     /// The rows of some stretches, ascending and apart.
     fn part(self, stretches: &[Range<usize>], stencil: &Stencil, levels: usize) -> Vec<Self> {
         let Rows { mut even, mut odd, mut flags } = self;
@@ -201,21 +233,14 @@ impl<'a, T> Rows<'a, T> {
             let particles = stencil.particles(stretch.clone());
             let of_particles = particles.start - particle..particles.end - particle;
             let part = Rows {
-                even: take_part(&mut even, of_particles.clone()),
-                odd: take_part(&mut odd, of_particles),
+                even: even.each_mut().map(|row| take_part(row, of_particles.clone())),
+                odd: odd.each_mut().map(|row| take_part(row, of_particles.clone())),
                 flags: take_part(&mut flags, (stretch.start - band) * levels..(stretch.end - band) * levels),
             };
             parts.push(part);
             (particle, band) = (particles.end, stretch.end);
         }
         parts
-    }
-}
-
-/// Which bands changed in the last step.
-fn keep_last(flags: &[bool], levels: usize, changed: &mut [bool]) {
-    for (flags, changed) in flags.chunks(levels).zip(changed) {
-        *changed = flags[levels - 1];
     }
 }
 
@@ -226,64 +251,101 @@ fn take_part<'a, T>(slice: &mut &'a mut [T], range: Range<usize>) -> &'a mut [T]
     &mut head[range.start..]
 }
 
-/// The steps of one coordinate in a stretch of bands.
-struct Front<'a, T> {
+/// The steps of some coordinates in a stretch of bands.
+struct Front<'a, T, const P: usize> {
     steps: &'a Steps<'a, T>,
-    axis: usize,
+    axes: [usize; P],
     stretch: Range<usize>,
-    rows: Rows<'a, T>,
+    rows: Rows<'a, T, P>,
 }
 
-impl<T: Real> Front<'_, T> {
+impl<T: Real, const P: usize> Front<'_, T, P> {
     /// Runs through the bands; `range` names those that take a level, whose ends move by one band a level or not at all.
     fn run(mut self, range: impl Fn(usize) -> Range<usize>, seen: &mut Seen) {
         let count = self.steps.count;
-        // No band may get ahead of the one behind it if nothing binds who sees whom.
-        if !self.steps.stencil.is_local() {
-            for level in 1..=count {
-                range(level).for_each(|band| self.sweep(level, band, seen));
-            }
+        // No band may get ahead of the one behind it if nothing binds who sees whom; a single step has no front; and
+        // what the second cache holds needs none.
+        if count == 1 || !self.steps.stencil.is_local() || self.rows.even[0].len() <= FRONT_FROM {
+            (1..=count).for_each(|level| self.sweep(level, range(level), seen));
             return;
         }
         let (one, all) = (range(1), range(count));
         let (first, last) = ((one.start + 1).min(all.start + count), (one.end + 1).max(all.end + count));
         for at in first..last {
             for level in 1..=count.min(at) {
-                if range(level).contains(&(at - level)) {
-                    self.sweep(level, at - level, seen);
+                let band = at - level;
+                if range(level).contains(&band) {
+                    self.sweep(level, band..band + 1, seen);
                 }
             }
         }
     }
 
-    /// Takes step number `level` of a band.
-    fn sweep(&mut self, level: usize, band: usize, seen: &mut Seen) {
-        let Self { steps, axis, stretch, rows } = self;
+    /// Takes step number `level` of some bands, those that may change.
+    fn sweep(&mut self, level: usize, bands: Range<usize>, seen: &mut Seen) {
+        let mut from = bands.start;
+        while from < bands.end {
+            let most = bands.end.min(from + MOST_BANDS);
+            let still = (from..most).find(|&band| !self.may_change(level, band));
+            let to = still.unwrap_or(most);
+            if from < to {
+                self.sweep_all(level, from..to, seen);
+            }
+            if let Some(still) = still {
+                self.rows.flags[(still - self.stretch.start) * (self.steps.count + 1) + level] = false;
+            }
+            from = still.map_or(most, |still| still + 1);
+        }
+    }
+
+    /// Puts those of a band who are led in their places; whether one of them moves, or somebody that the band sees did
+    /// in the step before.
+    fn may_change(&mut self, level: usize, band: usize) -> bool {
+        let Self { steps, axes, stretch, rows } = self;
         let (stencil, levels) = (steps.stencil, steps.count + 1);
         let origin = stencil.particles(stretch.clone()).start;
-        let all = stencil.particles(band..band + 1);
-        let particles = all.start - origin..all.end - origin;
-        let (present, next) =
-            if level % 2 == 1 { (&*rows.even, &mut *rows.odd) } else { (&*rows.odd, &mut *rows.even) };
-        let is_led = place_led(&steps.led, *axis, level, all, (origin, present, &mut *next));
-        let flag = |band: usize| rows.flags[(band - stretch.start) * levels + level - 1];
-        let beside = band.saturating_sub(1).max(stretch.start)..(band + 2).min(stretch.end);
-        let is_moved =
-            if stencil.is_local() { beside.into_iter().any(flag) } else { stretch.clone().any(flag) };
-        let mut changed = false;
-        if is_led || is_moved {
-            let tile = TILES[usize::from(steps.count == 1)];
-            let rest = steps.rest.map(|rest| rest[*axis]);
-            let mut plane = [Plane { seen_from: origin, present, rest, begin: origin, next: &mut *next }];
-            stencil.sweep_runs(band..band + 1, tile, &mut plane[0]);
-            stencil.sweep_listed(band..band + 1, steps.neighbours, &mut plane);
-            seen.computed += stencil.followers(band) as u64;
-            let (before, after) = (&present[particles.clone()], &next[particles]);
-            changed = differ(before, after);
-            let farther = &mut seen.farther[level - 1];
-            *farther = *farther || steps.farther.is_some_and(|limit| is_farther(before, after, limit));
+        let (present, next, flags) = rows.at(level);
+        let mut moves = false;
+        for ((&axis, present), next) in axes.iter().zip(present).zip(next) {
+            moves |= place_led(
+                &steps.led,
+                axis,
+                level,
+                stencil.particles(band..band + 1),
+                (origin, present, next),
+            );
         }
-        rows.flags[(band - stretch.start) * levels + level] = changed;
+        let moved = |band: usize| flags[(band - stretch.start) * levels + level - 1];
+        let beside = band.saturating_sub(1).max(stretch.start)..(band + 2).min(stretch.end);
+        moves || if stencil.is_local() { beside.into_iter().any(moved) } else { stretch.clone().any(moved) }
+    }
+
+    fn sweep_all(&mut self, level: usize, bands: Range<usize>, seen: &mut Seen) {
+        let Self { steps, axes, stretch, rows } = self;
+        let (stencil, levels) = (steps.stencil, steps.count + 1);
+        let origin = stencil.particles(stretch.clone()).start;
+        let tile = TILES[usize::from(steps.count == 1)];
+        let (present, next, flags) = rows.at(level);
+        let mut axis = axes.iter().zip(present);
+        let mut planes = next.each_mut().map(|next| {
+            let (&axis, present) = axis.next().expect("as many as rows");
+            Plane { seen_from: origin, present, rest: steps.rest.map(|rest| rest[axis]), begin: origin, next }
+        });
+        planes.iter_mut().for_each(|plane| stencil.sweep_runs(bands.clone(), tile, plane));
+        stencil.sweep_listed(bands.clone(), &mut planes);
+        let farther = &mut seen.farther[level - 1];
+        for band in bands {
+            let particles = stencil.particles(band..band + 1);
+            let particles = particles.start - origin..particles.end - origin;
+            let mut changed = false;
+            for plane in &planes {
+                let (before, after) = (&plane.present[particles.clone()], &plane.next[particles.clone()]);
+                changed = changed || differ(before, after);
+                *farther = *farther || steps.farther.is_some_and(|limit| is_farther(before, after, limit));
+            }
+            seen.computed += (P * stencil.followers(band)) as u64;
+            flags[(band - stretch.start) * levels + level] = changed;
+        }
     }
 }
 
@@ -313,6 +375,10 @@ const PIECE: usize = 64;
 
 /// Whether any bit differs.
 fn differ<T: Real>(before: &[T], after: &[T]) -> bool {
+    let middle = before.len() / 2;
+    if before.get(middle).map(|value| value.bits()) != after.get(middle).map(|value| value.bits()) {
+        return true;
+    }
     let mut pieces = before.chunks(PIECE).zip(after.chunks(PIECE));
     pieces.any(|(a, b)| a.iter().zip(b).fold(0, |bits, (a, b)| bits | (a.bits() ^ b.bits())) != 0)
 }
@@ -322,180 +388,4 @@ fn is_farther<T: Real>(before: &[T], after: &[T], limit: f64) -> bool {
     let mut pieces = before.chunks(PIECE).zip(after.chunks(PIECE));
     pieces
         .any(|(a, b)| a.iter().zip(b).fold(false, |far, (a, b)| far | ((b.wide() - a.wide()).abs() > limit)))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::super::{Sweep, Update};
-    use super::*;
-    use crate::flock::body::{Body, Cut};
-    use crate::flock::interaction::{Interaction, Weights};
-    use crate::flock::lattice::{Lattice, LatticeKind};
-    use crate::flock::neighbourhood::Neighbourhood;
-    use crate::flock::points::Points;
-    use crate::flock::role::Role;
-    use crate::flock::rules::Rule;
-
-    struct Case {
-        interaction: Interaction,
-        roles: Vec<Role>,
-        led: Vec<usize>,
-    }
-
-    impl Case {
-        fn new(kind: LatticeKind, columns: usize, rows: usize) -> Self {
-            let lattice = Lattice::new(kind, [0.0, 0.0], 0.1);
-            let cut = Cut::Count { columns: columns as u32, rows: rows as u32 };
-            let first = Neighbourhood::First { keep: None };
-            let (body, neighbours) = Body::build(lattice, &cut, &first, None).expect("fits");
-            let reference = body.reference;
-            let mut roles = vec![Role::Follower; reference.len()];
-            let held = rows.min(reference.len() / 4);
-            roles[..held].fill(Role::Clamped);
-            let led: Vec<usize> = (reference.len() - held..reference.len()).step_by(2).collect();
-            led.iter().for_each(|&i| roles[i] = Role::Leader);
-            let (rule, weights) = (Rule::BARYCENTRE, Weights::Equal);
-            let mut interaction =
-                Interaction { rule, reference, neighbours, weights, forces: None, rest: None, bonds: None };
-            interaction.keep_rest();
-            Self { interaction, roles, led }
-        }
-
-        fn place(&self, which: usize, step: usize) -> [f64; 2] {
-            let [x, y] = self.interaction.reference.get(self.led[which]);
-            [x + 0.1 * step.min(9) as f64, y + 0.003 * (which * step.min(20)) as f64]
-        }
-
-        /// Where everybody is, and was before the last step, after single steps of everybody.
-        fn singly(&self, steps: usize) -> [Points; 2] {
-            let sweep = Sweep::compile(Update::default(), &self.interaction, &self.roles);
-            let mut present = Points::clone(&self.interaction.reference);
-            let mut next = present.clone();
-            for step in 1..=steps {
-                for which in 0..self.led.len() {
-                    next.set(self.led[which], self.place(which, step));
-                }
-                sweep.step(&self.interaction, None, &present, &mut next);
-                std::mem::swap(&mut present, &mut next);
-            }
-            [present, next]
-        }
-
-        /// The same by so many steps at once.
-        fn together(&self, counts: &[usize], threads: usize) -> ([Points; 2], Activity) {
-            let sweep = Sweep::compile(Update::default(), &self.interaction, &self.roles);
-            let mut present = Points::clone(&self.interaction.reference);
-            let mut next = present.clone();
-            let (mut activity, mut done) = (Activity::default(), 0);
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
-            for &count in counts {
-                let place = |which: usize, level: usize| self.place(which, done + level);
-                let led = Led { particles: &self.led, place: &place };
-                let rest = self.interaction.rest.as_ref().map(|rest| [&rest.x[..], &rest.y[..]]);
-                let (stencil, neighbours) =
-                    (sweep.stencil.as_ref().expect("plain"), &self.interaction.neighbours);
-                let steps = Steps { stencil, neighbours, rest, led, count, farther: None, threads };
-                let even = [&mut present.x[..], &mut present.y[..]];
-                let odd = [&mut next.x[..], &mut next.y[..]];
-                pool.install(|| steps.take(&mut activity, even, odd));
-                if count % 2 == 1 {
-                    std::mem::swap(&mut present, &mut next);
-                }
-                done += count;
-            }
-            ([present, next], activity)
-        }
-    }
-
-    fn bits(places: &[Points; 2]) -> Vec<u64> {
-        places.iter().flat_map(|p| p.x.iter().chain(&p.y)).map(|value| value.to_bits()).collect()
-    }
-
-    #[test]
-    fn steps_taken_together_have_the_bits_of_single_ones_for_any_threads() {
-        for kind in LatticeKind::SAMPLES {
-            // Long enough to be cut for the threads, and for one and several wedges at the cuts.
-            let case = Case::new(kind, 3600, 61);
-            let expected = case.singly(25);
-            for counts in [&[16usize, 9][..], &[1, 2, 3, 16, 3], &[1; 25]] {
-                for threads in [1, 2, 4, 8] {
-                    let (places, _) = case.together(counts, threads);
-                    assert!(bits(&places) == bits(&expected), "{kind:?} {counts:?}, {threads} threads");
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn threads_beyond_two_cut_the_body_in_segments() {
-        let case = Case::new(LatticeKind::Square { spacing: 1.0 }, 3600, 61);
-        let sweep = Sweep::compile(Update::default(), &case.interaction, &case.roles);
-        let (stencil, neighbours) = (sweep.stencil.as_ref().expect("plain"), &case.interaction.neighbours);
-        let segments = |threads| {
-            let (led, count, farther) = (Led::NOBODY, 16, None);
-            let steps = Steps::<f64> { stencil, neighbours, rest: None, led, count, farther, threads };
-            steps.cuts(stencil.band_count()).len() - 1
-        };
-        assert_eq!([1, 2, 4, 8].map(segments), [1, 1, 2, 4]);
-    }
-
-    #[test]
-    fn only_what_moves_is_swept_and_the_bits_are_the_same() {
-        let square = LatticeKind::Square { spacing: 1.0 };
-        let case = Case::new(square, 300, 61);
-        let (places, activity) = case.together(&[16; 4], 1);
-        assert!(bits(&places) == bits(&case.singly(64)));
-        // The front is 64 of 300 columns in.
-        let share = activity.share_computed();
-        assert!(share > 0.05 && share < 0.3, "{share}");
-        // Nobody led, and everything at rest: the first step finds out, and no other is made.
-        let resting = Case { led: Vec::new(), ..case };
-        let (_, activity) = resting.together(&[1, 16, 16], 2);
-        assert_eq!(activity.share_computed(), 1.0 / 33.0);
-    }
-
-    #[test]
-    fn motion_that_comes_from_either_end_is_met_in_time() {
-        let mut case = Case::new(LatticeKind::Square { spacing: 1.0 }, 300, 61);
-        for led in [(0..61).collect::<Vec<usize>>(), (0..61).chain(299 * 61..300 * 61).collect()] {
-            case.roles.fill(Role::Follower);
-            led.iter().for_each(|&i| case.roles[i] = Role::Leader);
-            case.led = led;
-            let (places, activity) = case.together(&[16, 16, 16, 9], 1);
-            assert!(bits(&places) == bits(&case.singly(57)));
-            assert!(activity.share_computed() < 0.5, "{}", activity.share_computed());
-        }
-    }
-
-    #[test]
-    fn a_body_in_which_some_see_far_is_stepped_all_the_same() {
-        let mut case = Case::new(LatticeKind::Square { spacing: 1.0 }, 5000, 61);
-        // The far end hears of the near one.
-        let last = case.interaction.reference.len() as u32 - 70;
-        let lists: Vec<Vec<u32>> = (0..case.interaction.reference.len())
-            .map(|j| {
-                case.interaction.neighbours.of(j).iter().copied().chain((j == 70).then_some(last)).collect()
-            })
-            .collect();
-        case.interaction.neighbours = Neighbours::from_lists(lists);
-        case.interaction.rest = None;
-        case.interaction.keep_rest();
-        let (places, activity) = case.together(&[16, 4], 3);
-        assert!(bits(&places) == bits(&case.singly(20)));
-        assert_eq!(activity.share_computed(), 1.0);
-    }
-
-    #[test]
-    fn it_is_told_in_which_steps_somebody_moved_farther_than_asked() {
-        let case = Case::new(LatticeKind::Square { spacing: 1.0 }, 12, 12);
-        let sweep = Sweep::compile(Update::default(), &case.interaction, &case.roles);
-        let mut present = Points::clone(&case.interaction.reference);
-        let mut next = present.clone();
-        let place = |which: usize, level: usize| case.place(which, if level < 3 { 0 } else { 1 });
-        let led = Led { particles: &case.led, place: &place };
-        let places = (&mut present, &mut next);
-        let farther = sweep.steps(&case.interaction, places, (5, led, Some(0.09)), &mut Activity::default());
-        // The leaders jump by 0.1 in the third; whoever follows moves by less.
-        assert_eq!(farther, [false, false, true, false, false]);
-    }
 }

@@ -1,0 +1,331 @@
+//! The plain barycentre of particles that have lost neighbours: over those who are left and the ghosts.
+//!
+//! Along a crack consecutive particles have mostly lost the same neighbours: they are swept as runs, like those of a
+//! [stencil](super::super::stencil) but for what stands in for the lost. The others are grouped by what they see, so that
+//! nothing is decided particle by particle. The sums are those of
+//! [`Interaction::target`](super::super::interaction::Interaction::target) in the same order: the bits are the same.
+//! What broke renews its band alone.
+
+use std::ops::Range;
+
+use super::super::neighbourhood::Neighbours;
+use super::super::points::Points;
+use super::super::stencil::Plane;
+use super::{Bonds, StandIn};
+
+/// Fewest particles of a run, which are summed up so many at a time.
+const SHORT: usize = 8;
+
+/// The same of a long run.
+const LONG: usize = 64;
+
+/// Particles of a group that are summed up together.
+const SCATTERED: usize = 16;
+
+/// So many of the last groups are looked through for one that a particle fits into: an irregular body has as many as
+/// particles.
+const GROUPS_TRIED: usize = 32;
+
+/// The followers that have lost a neighbour, as runs, band by band.
+#[derive(Clone, Debug, Default)]
+pub struct Torn {
+    bands: Vec<Band>,
+}
+
+#[derive(Clone, Debug, Default)]
+struct Band {
+    particles: Range<usize>,
+    /// Consecutive ones that see the same.
+    runs: Vec<Alike>,
+    /// Others that see the same, by their places in `members`.
+    groups: Vec<Alike>,
+    members: Vec<u32>,
+    /// What those of each run and group see, one after the other.
+    seen: Vec<Seen>,
+}
+
+#[derive(Clone, Debug)]
+struct Alike {
+    particles: Range<usize>,
+    /// Where what they see lies in the band's `seen`.
+    seen: Range<usize>,
+}
+
+/// One of those that the particles of a run or group see; distances are of indices.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Seen {
+    /// A neighbour.
+    At(isize),
+    /// The ghost of a neighbour, at an offset that is the same for all \[length\].
+    Offset(isize, [f64; 2]),
+    /// The ghost of a neighbour, at its reference offset, which differs between them by rounding.
+    Reference(isize),
+    /// The mirror image of a neighbour.
+    Opposite(isize),
+}
+
+impl Seen {
+    /// What stands for both this, seen by some, and `other`, seen by the next particle.
+    fn shared(self, other: Seen) -> Option<Seen> {
+        match (self, other) {
+            (Seen::Offset(a, of_a), Seen::Offset(b, of_b)) if a == b => {
+                let same = of_a.map(f64::to_bits) == of_b.map(f64::to_bits);
+                Some(if same { self } else { Seen::Reference(a) })
+            }
+            (Seen::Reference(a), Seen::Offset(b, _)) | (Seen::Offset(a, _), Seen::Reference(b)) => {
+                (a == b).then_some(Seen::Reference(a))
+            }
+            _ => (self == other).then_some(self),
+        }
+    }
+}
+
+impl Torn {
+    /// Nobody yet, in these bands one after the other.
+    pub fn new(bands: impl Iterator<Item = Range<usize>>) -> Self {
+        let empty = |particles| Band { particles, ..Band::default() };
+        Self { bands: bands.map(empty).collect() }
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.bands.iter().all(|band| band.runs.is_empty() && band.members.is_empty())
+    }
+
+    /// How many particles.
+    pub fn len(&self) -> usize {
+        let in_runs = |band: &Band| band.runs.iter().map(|run| run.particles.len()).sum::<usize>();
+        self.bands.iter().map(|band| in_runs(band) + band.members.len()).sum()
+    }
+
+    /// Finds the runs anew where these particles are, who have lost a bond since.
+    pub fn renew(
+        &mut self,
+        particles: impl IntoIterator<Item = usize>,
+        follows: &[bool],
+        (bonds, neighbours, reference): (&Bonds, &Neighbours, &Points),
+    ) {
+        let band_of = |j| self.bands.partition_point(|band| band.particles.end <= j);
+        let mut stale: Vec<usize> = particles.into_iter().map(band_of).collect();
+        stale.sort_unstable();
+        stale.dedup();
+        for band in stale {
+            let band = &mut self.bands[band];
+            let is_torn = |&j: &usize| follows[j] && bonds.is_torn(j, neighbours);
+            let torn: Vec<usize> = band.particles.clone().filter(is_torn).collect();
+            *band = Band { particles: band.particles.clone(), ..Band::default() };
+            band.compile(&torn, |j| seen_by(j, bonds, neighbours, reference));
+        }
+    }
+
+    /// Computes both coordinates of the targets of those in some bands, whatever stands there.
+    pub fn sweep(&self, bands: Range<usize>, reference: &Points, planes: &mut [Plane<'_, f64>; 2]) {
+        let bands = &self.bands[bands];
+        #[cfg(target_arch = "x86_64")]
+        if is_x86_feature_detected!("avx512f") {
+            // SAFETY: the processor has AVX-512, which is all that the callee asks for.
+            return unsafe { sweep_avx512(bands, reference, planes) };
+        } else if is_x86_feature_detected!("avx2") {
+            // SAFETY: the processor has AVX2, which is all that the callee asks for.
+            return unsafe { sweep_avx2(bands, reference, planes) };
+        }
+        sweep_bands(bands, reference, planes);
+    }
+}
+
+/// What a particle sees, in the order in which it is summed.
+fn seen_by<'a>(
+    j: usize,
+    bonds: &'a Bonds,
+    neighbours: &'a Neighbours,
+    reference: &'a Points,
+) -> impl Iterator<Item = Seen> + Clone + 'a {
+    let distance = move |k: usize| k as isize - j as isize;
+    neighbours.bonds(j).filter_map(move |bond| {
+        let there = distance(neighbours.index[bond] as usize);
+        if !bonds.is_broken(bond) {
+            return Some(Seen::At(there));
+        }
+        Some(match bonds.stand_in(j, bond, neighbours, reference)? {
+            StandIn::Offset(lost) => Seen::Offset(there, lost),
+            StandIn::Opposite(k) => Seen::Opposite(distance(k)),
+        })
+    })
+}
+
+/// If all that some see can stand for what another sees as well, makes it so.
+fn shares(known: &mut [Seen], seen: &[Seen]) -> bool {
+    let fits = known.len() == seen.len() && known.iter().zip(seen).all(|(a, &b)| a.shared(b).is_some());
+    if fits {
+        known.iter_mut().zip(seen).for_each(|(a, &b)| *a = a.shared(b).unwrap_or(*a));
+    }
+    fits
+}
+
+impl Band {
+    /// Parts the torn particles, ascending, into runs and groups.
+    fn compile<S: Iterator<Item = Seen>>(&mut self, torn: &[usize], seen_by: impl Fn(usize) -> S) {
+        let mut groups: Vec<(Vec<Seen>, Vec<u32>)> = Vec::new();
+        let mut at = 0;
+        while at < torn.len() {
+            let mut known: Vec<Seen> = seen_by(torn[at]).collect();
+            let begin = at;
+            at += 1;
+            while at < torn.len()
+                && torn[at] == torn[at - 1] + 1
+                && shares(&mut known, &seen_by(torn[at]).collect::<Vec<_>>())
+            {
+                at += 1;
+            }
+            if at - begin >= SHORT {
+                let seen = self.keep(&known);
+                self.runs.push(Alike { particles: torn[begin]..torn[at - 1] + 1, seen });
+                continue;
+            }
+            let members = torn[begin..at].iter().map(|&j| j as u32);
+            match groups
+                .iter_mut()
+                .rev()
+                .take(GROUPS_TRIED)
+                .find_map(|(of, members)| shares(of, &known).then_some(members))
+            {
+                Some(known) => known.extend(members),
+                None => groups.push((known, members.collect())),
+            }
+        }
+        for (seen, members) in groups {
+            let begin = self.members.len();
+            self.members.extend(members);
+            let seen = self.keep(&seen);
+            self.groups.push(Alike { particles: begin..self.members.len(), seen });
+        }
+    }
+
+    fn keep(&mut self, seen: &[Seen]) -> Range<usize> {
+        let begin = self.seen.len();
+        self.seen.extend_from_slice(seen);
+        begin..self.seen.len()
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f")]
+fn sweep_avx512(bands: &[Band], reference: &Points, planes: &mut [Plane<'_, f64>; 2]) {
+    sweep_bands(bands, reference, planes);
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn sweep_avx2(bands: &[Band], reference: &Points, planes: &mut [Plane<'_, f64>; 2]) {
+    sweep_bands(bands, reference, planes);
+}
+
+#[inline(always)]
+fn sweep_bands(bands: &[Band], reference: &Points, planes: &mut [Plane<'_, f64>; 2]) {
+    for band in bands {
+        for Alike { particles, seen } in &band.runs {
+            for (axis, plane) in planes.iter_mut().enumerate() {
+                let look = Look { seen: &band.seen[seen.clone()], axis, reference };
+                if particles.len() < LONG {
+                    sweep_run::<SHORT>(particles.clone(), look, plane);
+                } else {
+                    sweep_run::<LONG>(particles.clone(), look, plane);
+                }
+            }
+        }
+        for Alike { particles, seen } in &band.groups {
+            for (axis, plane) in planes.iter_mut().enumerate() {
+                let look = Look { seen: &band.seen[seen.clone()], axis, reference };
+                sweep_group(&band.members[particles.clone()], look, plane);
+            }
+        }
+    }
+}
+
+/// At least `W` particles, `W` at a time.
+#[inline(always)]
+fn sweep_run<const W: usize>(particles: Range<usize>, look: Look<'_>, plane: &mut Plane<'_, f64>) {
+    for from in particles.clone().step_by(W) {
+        // The last ones overlap those before them, which come out the same again.
+        let from = from.min(particles.end - W);
+        let lanes = |of: &[f64], first: usize, distance: isize| -> [f64; W] {
+            let at = (from - first).wrapping_add_signed(distance);
+            of[at..at + W].try_into().expect("as many as asked for")
+        };
+        let targets = look.targets(lanes, plane);
+        plane.next[from - plane.begin..][..W].copy_from_slice(&targets.0);
+    }
+}
+
+/// Not compiled for wide vectors, which would gather what they hold more slowly than it is loaded.
+#[inline(never)]
+fn sweep_group(particles: &[u32], look: Look<'_>, plane: &mut Plane<'_, f64>) {
+    for piece in particles.chunks(SCATTERED) {
+        // A last piece too short is filled up with one of its own.
+        let mut which = [piece[0] as usize; SCATTERED];
+        which.iter_mut().zip(piece).for_each(|(which, &j)| *which = j as usize);
+        let lanes = |of: &[f64], first: usize, distance: isize| {
+            which.map(|j| of[(j - first).wrapping_add_signed(distance)])
+        };
+        let targets = look.targets(lanes, plane);
+        piece.iter().zip(targets.0).for_each(|(&j, target)| plane.next[j as usize - plane.begin] = target);
+    }
+}
+
+/// Numbers of so many particles, each vector of them within one cache line.
+#[repr(align(64))]
+struct Lanes<const W: usize>([f64; W]);
+
+/// What some particles see of one coordinate.
+#[derive(Clone, Copy)]
+struct Look<'a> {
+    seen: &'a [Seen],
+    axis: usize,
+    reference: &'a Points,
+}
+
+impl Look<'_> {
+    /// What [`Rule::target`](super::super::rules::Rule::target) computes: the rest offset is added to the mean, also
+    /// where it is zero, which makes 0.0 of -0.0; whoever sees nobody stays. `of` reads numbers, those of particle
+    /// number `first` first, at a distance of indices from the particles.
+    #[inline(always)]
+    fn targets<const W: usize>(
+        &self,
+        of: impl Fn(&[f64], usize, isize) -> [f64; W],
+        plane: &Plane<'_, f64>,
+    ) -> Lanes<W> {
+        let present = |distance| of(plane.present, plane.seen_from, distance);
+        let here = present(0);
+        if self.seen.is_empty() {
+            return Lanes(here);
+        }
+        let reference = if self.axis == 0 { &self.reference.x } else { &self.reference.y };
+        let mut sum = Lanes([-0.0; W]);
+        for &seen in self.seen {
+            match seen {
+                Seen::At(distance) => {
+                    let there = present(distance);
+                    (0..W).for_each(|k| sum.0[k] += there[k]);
+                }
+                Seen::Offset(_, lost) => (0..W).for_each(|k| sum.0[k] += here[k] + lost[self.axis]),
+                Seen::Reference(distance) => {
+                    let [there, own] = [distance, 0].map(|distance| of(reference, 0, distance));
+                    (0..W).for_each(|k| sum.0[k] += here[k] + (there[k] - own[k]));
+                }
+                Seen::Opposite(distance) => {
+                    let there = present(distance);
+                    (0..W).for_each(|k| sum.0[k] += 2.0 * here[k] - there[k]);
+                }
+            }
+        }
+        let count = self.seen.len() as f64;
+        if self.seen.len().is_power_of_two() {
+            // The same number to the bit, and no division.
+            (0..W).for_each(|k| sum.0[k] *= 1.0 / count);
+        } else {
+            (0..W).for_each(|k| sum.0[k] /= count);
+        }
+        let rest = plane.rest.map_or([0.0; W], |rest| of(rest, 0, 0));
+        (0..W).for_each(|k| sum.0[k] += rest[k]);
+        sum
+    }
+}

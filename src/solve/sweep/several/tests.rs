@@ -1,0 +1,195 @@
+use super::super::{Sweep, Update};
+use super::*;
+use crate::flock::body::{Body, Cut};
+use crate::flock::interaction::{Interaction, Weights};
+use crate::flock::lattice::{Lattice, LatticeKind};
+use crate::flock::neighbourhood::{Neighbourhood, Neighbours};
+use crate::flock::points::Points;
+use crate::flock::role::Role;
+use crate::flock::rules::Rule;
+
+struct Case {
+    interaction: Interaction,
+    roles: Vec<Role>,
+    led: Vec<usize>,
+}
+
+impl Case {
+    fn new(kind: LatticeKind, columns: usize, rows: usize) -> Self {
+        let lattice = Lattice::new(kind, [0.0, 0.0], 0.1);
+        let cut = Cut::Count { columns: columns as u32, rows: rows as u32 };
+        let first = Neighbourhood::First { keep: None };
+        let (body, neighbours) = Body::build(lattice, &cut, &first, None).expect("fits");
+        let reference = body.reference;
+        let mut roles = vec![Role::Follower; reference.len()];
+        let held = rows.min(reference.len() / 4);
+        roles[..held].fill(Role::Clamped);
+        let led: Vec<usize> = (reference.len() - held..reference.len()).step_by(2).collect();
+        led.iter().for_each(|&i| roles[i] = Role::Leader);
+        let (rule, weights) = (Rule::BARYCENTRE, Weights::Equal);
+        let mut interaction =
+            Interaction { rule, reference, neighbours, weights, forces: None, rest: None, bonds: None };
+        interaction.keep_rest();
+        Self { interaction, roles, led }
+    }
+
+    fn place(&self, which: usize, step: usize) -> [f64; 2] {
+        let [x, y] = self.interaction.reference.get(self.led[which]);
+        [x + 0.1 * step.min(9) as f64, y + 0.003 * (which * step.min(20)) as f64]
+    }
+
+    /// Where everybody is, and was before the last step, after single steps of everybody.
+    fn singly(&self, steps: usize) -> [Points; 2] {
+        let sweep = Sweep::compile(Update::default(), &self.interaction, &self.roles);
+        let mut present = Points::clone(&self.interaction.reference);
+        let mut next = present.clone();
+        for step in 1..=steps {
+            for which in 0..self.led.len() {
+                next.set(self.led[which], self.place(which, step));
+            }
+            sweep.step(&self.interaction, None, &present, &mut next);
+            std::mem::swap(&mut present, &mut next);
+        }
+        [present, next]
+    }
+
+    /// The same by so many steps at once.
+    fn together(&self, counts: &[usize], threads: usize) -> ([Points; 2], Activity) {
+        let sweep = Sweep::compile(Update::default(), &self.interaction, &self.roles);
+        let mut present = Points::clone(&self.interaction.reference);
+        let mut next = present.clone();
+        let (mut activity, mut done) = (Activity::default(), 0);
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+        for &count in counts {
+            let place = |which: usize, level: usize| self.place(which, done + level);
+            let led = Led { particles: &self.led, place: &place };
+            let rest = self.interaction.rest.as_ref().map(|rest| [&rest.x[..], &rest.y[..]]);
+            let stencil = sweep.stencil.as_ref().expect("plain");
+            let steps = Steps { stencil, rest, led, count, farther: None, threads };
+            let even = [&mut present.x[..], &mut present.y[..]];
+            let odd = [&mut next.x[..], &mut next.y[..]];
+            pool.install(|| steps.take(&mut activity, even, odd));
+            if count % 2 == 1 {
+                std::mem::swap(&mut present, &mut next);
+            }
+            done += count;
+        }
+        ([present, next], activity)
+    }
+}
+
+fn bits(places: &[Points; 2]) -> Vec<u64> {
+    places.iter().flat_map(|p| p.x.iter().chain(&p.y)).map(|value| value.to_bits()).collect()
+}
+
+#[test]
+fn steps_taken_together_have_the_bits_of_single_ones_for_any_threads() {
+    for kind in LatticeKind::SAMPLES {
+        // Long enough to be cut for the threads, and for one and several wedges at the cuts.
+        let case = Case::new(kind, 3600, 61);
+        let expected = case.singly(25);
+        for counts in [&[16usize, 9][..], &[1, 2, 3, 16, 3], &[1; 25]] {
+            for threads in [1, 2, 4, 8] {
+                let (places, _) = case.together(counts, threads);
+                assert!(bits(&places) == bits(&expected), "{kind:?} {counts:?}, {threads} threads");
+            }
+        }
+    }
+}
+
+#[test]
+fn threads_beyond_one_a_coordinate_cut_the_body_in_segments() {
+    let case = Case::new(LatticeKind::Square { spacing: 1.0 }, 3600, 61);
+    let sweep = Sweep::compile(Update::default(), &case.interaction, &case.roles);
+    let stencil = sweep.stencil.as_ref().expect("plain");
+    let segments = |threads| {
+        let (led, count, farther) = (Led::NOBODY, 16, None);
+        let steps = Steps::<f64> { stencil, rest: None, led, count, farther, threads };
+        steps.cuts(stencil.band_count(), threads.div_ceil(2)).len() - 1
+    };
+    assert_eq!([1, 2, 4, 8].map(segments), [1, 1, 2, 4]);
+}
+
+#[test]
+fn only_what_moves_is_swept_and_the_bits_are_the_same() {
+    let square = LatticeKind::Square { spacing: 1.0 };
+    let case = Case::new(square, 300, 61);
+    let (places, activity) = case.together(&[16; 4], 1);
+    assert!(bits(&places) == bits(&case.singly(64)));
+    // The front is 64 of 300 columns in.
+    let share = activity.share_computed();
+    assert!(share > 0.05 && share < 0.3, "{share}");
+    // Nobody led, and everything at rest: the first step finds out, and no other is made.
+    let resting = Case { led: Vec::new(), ..case };
+    let (_, activity) = resting.together(&[1, 16, 16], 2);
+    assert_eq!(activity.share_computed(), 1.0 / 33.0);
+}
+
+#[test]
+fn motion_that_comes_from_either_end_is_met_in_time() {
+    let mut case = Case::new(LatticeKind::Square { spacing: 1.0 }, 300, 61);
+    for led in [(0..61).collect::<Vec<usize>>(), (0..61).chain(299 * 61..300 * 61).collect()] {
+        case.roles.fill(Role::Follower);
+        led.iter().for_each(|&i| case.roles[i] = Role::Leader);
+        case.led = led;
+        let (places, activity) = case.together(&[16, 16, 16, 9], 1);
+        assert!(bits(&places) == bits(&case.singly(57)));
+        assert!(activity.share_computed() < 0.5, "{}", activity.share_computed());
+    }
+}
+
+#[test]
+fn a_body_in_which_some_see_far_is_stepped_all_the_same() {
+    let mut case = Case::new(LatticeKind::Square { spacing: 1.0 }, 5000, 61);
+    // The far end hears of the near one.
+    let last = case.interaction.reference.len() as u32 - 70;
+    let lists: Vec<Vec<u32>> = (0..case.interaction.reference.len())
+        .map(|j| case.interaction.neighbours.of(j).iter().copied().chain((j == 70).then_some(last)).collect())
+        .collect();
+    case.interaction.neighbours = Neighbours::from_lists(lists);
+    case.interaction.rest = None;
+    case.interaction.keep_rest();
+    let (places, activity) = case.together(&[16, 4], 3);
+    assert!(bits(&places) == bits(&case.singly(20)));
+    assert_eq!(activity.share_computed(), 1.0);
+}
+
+#[test]
+fn lists_are_swept_together_to_the_bits_of_single_steps_for_any_threads() {
+    // Jumbled lists, of which no run is made.
+    let mut case = Case::new(LatticeKind::Hexagonal { spacing: 1.0 }, 3600, 31);
+    let lists = (0..case.interaction.reference.len()).map(|j| {
+        let mut list = case.interaction.neighbours.of(j).to_vec();
+        let turn = j % list.len();
+        list.rotate_left(turn);
+        list
+    });
+    case.interaction.neighbours = Neighbours::from_lists(lists);
+    case.interaction.rest = None;
+    case.interaction.keep_rest();
+    let stencil = |case: &Case| {
+        let sweep = Sweep::compile(Update::default(), &case.interaction, &case.roles);
+        sweep.stencil.expect("plain").share_in_runs()
+    };
+    assert_eq!(stencil(&case), 0.0);
+    let expected = case.singly(25);
+    for threads in [1, 2, 5] {
+        let (places, activity) = case.together(&[16, 9], threads);
+        assert!(bits(&places) == bits(&expected), "{threads} threads");
+        assert!(activity.share_computed() < 0.5);
+    }
+}
+
+#[test]
+fn it_is_told_in_which_steps_somebody_moved_farther_than_asked() {
+    let case = Case::new(LatticeKind::Square { spacing: 1.0 }, 12, 12);
+    let sweep = Sweep::compile(Update::default(), &case.interaction, &case.roles);
+    let mut present = Points::clone(&case.interaction.reference);
+    let mut next = present.clone();
+    let place = |which: usize, level: usize| case.place(which, if level < 3 { 0 } else { 1 });
+    let led = Led { particles: &case.led, place: &place };
+    let places = (&mut present, &mut next);
+    let farther = sweep.steps(&case.interaction, places, (5, led, Some(0.09)), &mut Activity::default());
+    // The leaders jump by 0.1 in the third; whoever follows moves by less.
+    assert_eq!(farther, [false, false, true, false, false]);
+}

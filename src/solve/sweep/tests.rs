@@ -1,0 +1,143 @@
+use super::*;
+use crate::flock::body::{Body, Cut};
+use crate::flock::lattice::{Lattice, LatticeKind};
+use crate::flock::neighbourhood::Neighbourhood;
+use crate::flock::rules::Mean;
+
+/// Large enough to be swept in parallel, and of no whole number of chunks.
+fn body(rule: Rule) -> Interaction {
+    let lattice = Lattice::new(LatticeKind::Hexagonal { spacing: 1.0 }, [0.0, 0.0], 0.1);
+    let cut = Cut::Count { columns: 263, rows: 301 };
+    let (body, neighbours) = Body::build(lattice, &cut, &Neighbourhood::Second, None).expect("fits");
+    let reference = body.reference;
+    let mut interaction = Interaction {
+        rule,
+        reference,
+        neighbours,
+        weights: Weights::Equal,
+        forces: None,
+        rest: None,
+        bonds: None,
+    };
+    interaction.keep_rest();
+    interaction
+}
+
+fn bits(points: &Points) -> Vec<u64> {
+    points.x.iter().chain(&points.y).map(|value| value.to_bits()).collect()
+}
+
+fn after_steps(interaction: &Interaction, roles: &[Role], threads: usize) -> Points {
+    let sweep = Sweep::compile(Update::default(), interaction, roles);
+    let mut present = Points::clone(&interaction.reference);
+    for i in (0..present.len()).step_by(101) {
+        present.x[i] += 1.0 + (i % 13) as f64 / 7.0;
+    }
+    let mut next = present.clone();
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+    pool.install(|| {
+        for _ in 0..3 {
+            sweep.step(interaction, None, &present, &mut next);
+            std::mem::swap(&mut present, &mut next);
+        }
+    });
+    present
+}
+
+#[test]
+fn any_number_of_threads_gives_the_same_bits() {
+    let weighted = Rule { mean: Mean::Distance { power: 1.0 }, ..Rule::BARYCENTRE };
+    for rule in [Rule::BARYCENTRE, weighted] {
+        let interaction = body(rule);
+        assert!(interaction.reference.len() > PARALLEL_FROM);
+        let mut roles = vec![Role::Follower; interaction.reference.len()];
+        roles[..301].fill(Role::Clamped);
+        let one = bits(&after_steps(&interaction, &roles, 1));
+        for threads in [2, 4] {
+            assert!(bits(&after_steps(&interaction, &roles, threads)) == one, "{threads} threads");
+        }
+    }
+}
+
+#[test]
+fn a_compiled_sweep_gives_the_bits_of_an_uncompiled_one() {
+    let interaction = body(Rule::BARYCENTRE);
+    let mut roles = vec![Role::Follower; interaction.reference.len()];
+    roles.iter_mut().step_by(7919).for_each(|role| *role = Role::Leader);
+    let present: Points = interaction.reference.iter().map(|[x, y]| [x * 1.01, y - 0.02 * x]).collect();
+    let compiled = Sweep::compile(Update::default(), &interaction, &roles);
+    assert!(compiled.share_in_runs() > 0.95, "{}", compiled.share_in_runs());
+    let swept = |sweep: &Sweep| {
+        let mut next = present.clone();
+        sweep.step(&interaction, None, &present, &mut next);
+        bits(&next)
+    };
+    assert!(swept(&compiled) == swept(&Sweep::uncompiled(Update::default(), &roles)));
+}
+
+fn assert_as_uncompiled(compiled: &Sweep, interaction: &Interaction, roles: &[Role]) {
+    let reference = &interaction.reference;
+    let present: Points = reference.iter().map(|[x, y]| [x * 1.01 + 0.1 * y.sin(), y - 0.02 * x]).collect();
+    let swept = |sweep: &Sweep| {
+        let mut next = present.clone();
+        sweep.step(interaction, None, &present, &mut next);
+        bits(&next)
+    };
+    assert!(compiled.stencil.is_some() || compiled.matrices.is_some());
+    assert!(swept(compiled) == swept(&Sweep::uncompiled(compiled.update, roles)));
+}
+
+#[test]
+fn a_compiled_sweep_of_a_material_gives_the_bits_of_an_uncompiled_one() {
+    use crate::flock::block::Block;
+    use crate::flock::interaction::MatrixWeights;
+    let mut interaction = body(Rule::MATERIAL);
+    let neighbours = &interaction.neighbours;
+    // A class for each number of neighbours, of matrices without any symmetry.
+    let most = (0..neighbours.count()).map(|j| neighbours.of(j).len()).max().expect("particles");
+    let starts: Vec<u32> = (0..=most as u32 + 1).map(|n| n * n.saturating_sub(1) / 2).collect();
+    let blocks: Vec<Block> = (0..starts[most + 1])
+        .map(f64::from)
+        .map(|k| [[0.1 + 0.01 * k.sin(), 0.02 * k.cos()], [0.03 * (2.0 * k).sin(), 0.1 - 0.01 * k.cos()]])
+        .collect();
+    interaction.weights = Weights::Matrix(MatrixWeights {
+        class: (0..neighbours.count()).map(|j| neighbours.of(j).len() as u32).collect(),
+        starts,
+        stiffness: blocks.clone(),
+        blocks,
+        compliance: (0..=most).map(|n| [[0.1 * n as f64, 0.2], [0.3, 0.4]]).collect(),
+    });
+    let mut roles = vec![Role::Follower; interaction.reference.len()];
+    roles.iter_mut().step_by(7919).for_each(|role| *role = Role::Leader);
+    let gentle = Update { damping: 0.7, ..Update::default() };
+    for update in [Update::default(), gentle] {
+        interaction.rest = None;
+        interaction.forces = None;
+        assert_as_uncompiled(&Sweep::compile(update, &interaction, &roles), &interaction, &roles);
+        interaction.keep_rest();
+        interaction.forces = Some(interaction.reference.iter().map(|[x, y]| [y.cos(), 0.1 * x]).collect());
+        assert_as_uncompiled(&Sweep::compile(update, &interaction, &roles), &interaction, &roles);
+    }
+}
+
+#[test]
+fn a_cracked_body_is_swept_to_the_bits_of_one_by_one() {
+    use crate::flock::fracture::{Bonds, Ghosts};
+    let mut interaction = body(Rule::BARYCENTRE);
+    let mut roles = vec![Role::Follower; interaction.reference.len()];
+    roles[..301].fill(Role::Clamped);
+    for ghosts in [Ghosts::Lattice, Ghosts::Mirrored, Ghosts::None] {
+        interaction.bonds = None;
+        let mut sweep = Sweep::compile(Update::default(), &interaction, &roles);
+        assert!(sweep.takes_several());
+        let (mut bonds, mut breaks) = (Bonds::new(None, ghosts, &interaction.neighbours), Vec::new());
+        let (reference, neighbours) = (&interaction.reference, &interaction.neighbours);
+        bonds.cut(([100.0, -400.0], [130.0, 400.0]), neighbours, reference, &mut breaks);
+        interaction.bonds = Some(bonds);
+        assert_as_uncompiled(&Sweep::compile(Update::default(), &interaction, &roles), &interaction, &roles);
+        sweep.set_aside(breaks.iter().flat_map(|b| b.pair).map(|j| j as usize), &interaction);
+        assert_as_uncompiled(&sweep, &interaction, &roles);
+        assert!(sweep.torn.len() > 500 && sweep.torn.len() < 5000, "{}", sweep.torn.len());
+        assert!(!sweep.takes_several());
+    }
+}

@@ -1,0 +1,152 @@
+//! The same bits over threads, kernels and blockings, and those that are written down here.
+
+use flockform::flock::body::{Body, Cut};
+use flockform::flock::interaction::{Interaction, Weights};
+use flockform::flock::lattice::{Lattice, LatticeKind};
+use flockform::flock::neighbourhood::{Neighbourhood, Neighbours};
+use flockform::flock::points::Points;
+use flockform::flock::role::Role;
+use flockform::flock::rules::Rule;
+use flockform::solve::sweep::{Activity, Led, MOST_STEPS, Sweep, Update};
+
+const STEPS: usize = 50;
+
+/// Columns of the body, of so many rows each: enough for threads to share it, and for a front to run through it.
+const SIDES: [usize; 2] = [1301, 67];
+
+/// A body held on the left and pulled on the right.
+struct Pulled {
+    interaction: Interaction,
+    roles: Vec<Role>,
+    led: Vec<usize>,
+}
+
+impl Pulled {
+    fn new(kind: LatticeKind) -> Self {
+        let cut = Cut::Count { columns: SIDES[0] as u32, rows: SIDES[1] as u32 };
+        let lattice = Lattice::new(kind, [0.0; 2], 0.0);
+        let (body, neighbours) =
+            Body::build(lattice, &cut, &Neighbourhood::First { keep: None }, None).expect("fits");
+        let reference = body.reference;
+        let mut roles = vec![Role::Follower; reference.len()];
+        roles[..SIDES[1]].fill(Role::Clamped);
+        let led: Vec<usize> = (reference.len() - SIDES[1]..reference.len()).collect();
+        led.iter().for_each(|&i| roles[i] = Role::Leader);
+        let (rule, weights) = (Rule::BARYCENTRE, Weights::Equal);
+        let mut interaction =
+            Interaction { rule, reference, neighbours, weights, forces: None, rest: None, bonds: None };
+        interaction.keep_rest();
+        Self { interaction, roles, led }
+    }
+
+    /// Where a leader stands; nothing but sums and products, which every machine rounds alike.
+    fn place(&self, which: usize, step: usize) -> [f64; 2] {
+        let [x, y] = self.interaction.reference.get(self.led[which]);
+        [x + 0.25 * step.min(9) as f64, y + 0.001 * (which * step.min(30)) as f64]
+    }
+
+    /// Everybody displaced, so that every particle moves in every step.
+    fn start(&self) -> Points {
+        let far = |i: usize| f64::from((i * 7919 % 1013) as u32) / 1024.0;
+        self.interaction
+            .reference
+            .iter()
+            .enumerate()
+            .map(|(i, [x, y])| [x + far(i), y - far(i + 5)])
+            .collect()
+    }
+
+    /// By one step at a time, which `step` takes.
+    fn singly(&self, mut step: impl FnMut(&Points, &mut Points)) -> u64 {
+        let mut present = self.start();
+        let mut next = present.clone();
+        for number in 1..=STEPS {
+            (0..self.led.len()).for_each(|which| next.set(self.led[which], self.place(which, number)));
+            step(&present, &mut next);
+            std::mem::swap(&mut present, &mut next);
+        }
+        hash(&present)
+    }
+
+    /// By at most so many steps together.
+    fn together(&self, most: usize) -> u64 {
+        let sweep = Sweep::compile(Update::default(), &self.interaction, &self.roles);
+        let (mut present, mut activity, mut done) = (self.start(), Activity::default(), 0);
+        let mut next = present.clone();
+        while done < STEPS {
+            let count = most.min(STEPS - done);
+            let place = |which: usize, level: usize| self.place(which, done + level);
+            let led = Led { particles: &self.led, place: &place };
+            sweep.steps(&self.interaction, (&mut present, &mut next), (count, led, None), &mut activity);
+            done += count;
+        }
+        hash(&present)
+    }
+
+    /// The rule, written down once more with nothing but its formula.
+    fn by_the_formula(&self, present: &Points, next: &mut Points) {
+        let Interaction { neighbours, rest, .. } = &self.interaction;
+        for j in (0..present.len()).filter(|&j| self.roles[j] == Role::Follower) {
+            let list = neighbours.of(j);
+            let sum = list.iter().fold([-0.0; 2], |[x, y], &k| {
+                let [kx, ky] = present.get(k as usize);
+                [x + kx, y + ky]
+            });
+            let [rx, ry] = rest.as_ref().map_or([0.0; 2], |rest| rest.get(j));
+            next.set(j, [sum[0] / list.len() as f64 + rx, sum[1] / list.len() as f64 + ry]);
+        }
+    }
+}
+
+/// FNV-1a over the bits of all coordinates.
+fn hash(points: &Points) -> u64 {
+    let bytes = points.x.iter().chain(&points.y).flat_map(|value| value.to_bits().to_le_bytes());
+    bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
+}
+
+fn assert_golden(body: &Pulled, golden: u64) {
+    let uncompiled = Sweep::uncompiled(Update::default(), &body.roles);
+    let compiled = Sweep::compile(Update::default(), &body.interaction, &body.roles);
+    let mut all =
+        vec![("the formula".to_owned(), body.singly(|present, next| body.by_the_formula(present, next)))];
+    for threads in [1, 2, 4, 7] {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+        pool.install(|| {
+            let by = |sweep: &Sweep| {
+                body.singly(|present, next| sweep.step(&body.interaction, None, present, next))
+            };
+            all.push((format!("one by one, {threads} threads"), by(&uncompiled)));
+            all.push((format!("compiled, {threads} threads"), by(&compiled)));
+            for most in [1, 2, 7, MOST_STEPS] {
+                all.push((format!("{most} steps together, {threads} threads"), body.together(most)));
+            }
+        });
+    }
+    for (how, hash) in all {
+        assert_eq!(format!("{hash:016x}"), format!("{golden:016x}"), "{how}");
+    }
+}
+
+#[test]
+fn a_square_lattice_has_the_golden_bits_over_threads_kernels_and_blockings() {
+    assert_golden(&Pulled::new(LatticeKind::Square { spacing: 1.0 }), 0x44bd_d77f_bf35_9fdd);
+}
+
+#[test]
+fn a_hexagonal_lattice_has_the_golden_bits_over_threads_kernels_and_blockings() {
+    assert_golden(&Pulled::new(LatticeKind::Hexagonal { spacing: 1.0 }), 0xd4ff_9009_568e_52dc);
+}
+
+#[test]
+fn a_body_of_lists_has_the_golden_bits_over_threads_kernels_and_blockings() {
+    // Jumbled lists, of which no run is made, and which are summed in another order.
+    let mut body = Pulled::new(LatticeKind::Hexagonal { spacing: 1.0 });
+    let lists = (0..body.interaction.reference.len()).map(|j| {
+        let mut list = body.interaction.neighbours.of(j).to_vec();
+        let turn = j % list.len();
+        list.rotate_left(turn);
+        list
+    });
+    body.interaction.neighbours = Neighbours::from_lists(lists);
+    assert_golden(&body, 0xfb80_a299_92df_f9ff);
+}
