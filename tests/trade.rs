@@ -70,7 +70,7 @@ fn the_setting_chosen_for_an_accuracy_has_it() {
         let compared = compare(&scene, None, &mut |_, _| ControlFlow::Continue(())).expect("compares");
         let error = compared.comparison.displacement_rel_l2;
         assert!(error <= bound, "{accuracy}: {error}");
-        let RawLattice::Square { spacing, .. } = scene.raw.lattice else { panic!("square") };
+        let Some(RawLattice::Square { spacing, .. }) = scene.raw.lattice else { panic!("square") };
         spacings.push(spacing);
     }
     assert!(spacings[0] > spacings[1] && spacings[1] > spacings[2], "no finer than needed: {spacings:?}");

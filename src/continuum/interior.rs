@@ -20,6 +20,11 @@ pub fn material(scene: &Scene) -> Result<MaterialReport, SceneError> {
         let report = MaterialReport::of_material(&scene.lattice, elastic);
         return report.map_err(|error| scene.refuse("material", error.to_string(), remedy(&error)));
     }
+    if scene.is_of_points() {
+        let message = "a body of points has no lattice: no particle's neighbours stand for all";
+        let help = "ask about a lattice: flockform material --lattice hexagonal --neighbours first";
+        return Err(scene.refuse("body.shape", message, help));
+    }
     check_homogeneous(scene)?;
     let (scalar, name) = (scalar_crystal(scene)?, rule_name(scene));
     let (crystal, at_rest) = match scene.mean {
@@ -224,7 +229,9 @@ pub(super) fn cautions(scene: &Scene) -> Vec<String> {
 /// The rule and its waves, where the answer is not known beforehand: a mean with positive weights is
 /// stable, and an update that does not overshoot it never grows.
 fn waves_in_doubt(scene: &Scene) -> Option<(Crystal, Zone)> {
-    if scene.mean != Mean::Barycentre || matches!(scene.neighbourhood, Neighbourhood::Present { .. }) {
+    let is_of_lattice =
+        !scene.is_of_points() && !matches!(scene.neighbourhood, Neighbourhood::Present { .. });
+    if scene.mean != Mean::Barycentre || !is_of_lattice {
         return None;
     }
     let crystal = scalar_crystal(scene).ok()?;

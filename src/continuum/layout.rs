@@ -9,7 +9,7 @@ use crate::flock::role::Role;
 use crate::flock::rules::Mean;
 use crate::material::cells::{Cells, without_loose_sites};
 use crate::material::loads::{LoadError, Loads, Traction};
-use crate::scene::{Condition, LeaderMotion, Load, RoleEntry, Scene, SceneError, SceneRegion};
+use crate::scene::{BodySource, Condition, LeaderMotion, Load, RoleEntry, Scene, SceneError, SceneRegion};
 
 /// Where finite elements have points of the body: their displacements \[length\] at these reference
 /// places \[length\], shape \[count\].
@@ -42,9 +42,7 @@ impl Layout {
     /// neighbourhood that does not fit the lattice.
     pub fn new(scene: &Scene) -> Result<Self, SceneError> {
         require_in_range(scene)?;
-        let (body, neighbours) =
-            Body::build(scene.lattice.clone(), &scene.cut, &scene.neighbourhood, scene.frame)
-                .map_err(|error| refuse_body(scene, &error))?;
+        let (body, neighbours) = body_of(scene).map_err(|error| refuse_body(scene, &error))?;
         require_resolved(scene, &body)?;
         let layout = match scene.mean {
             Mean::Material { .. } => {
@@ -190,7 +188,7 @@ impl Layout {
             None => return Ok(None),
             Some(LeaderMotion::Program(motion)) => return Ok(Some(motion.clone())),
             Some(LeaderMotion::Table { rows, steps }) => {
-                let of_rows = rows.of(particles, reference, self.body.lattice.spacing());
+                let of_rows = rows.of(particles, &self.body);
                 let displacements = of_rows.map_err(|message| {
                     let key = format!("roles[{entry_number}].motion.file");
                     let help = "give every particle of the region a row, or narrow the region";
@@ -204,6 +202,16 @@ impl Layout {
             }
         };
         Ok(Some(Motion::Table { displacements, steps: steps as f64 }))
+    }
+}
+
+fn body_of(scene: &Scene) -> Result<(Body, Neighbours), BodyError> {
+    match (&scene.body, &scene.neighbourhood) {
+        (BodySource::Cut(cut), neighbourhood) => {
+            Body::build(scene.lattice.clone(), cut, neighbourhood, scene.frame)
+        }
+        (BodySource::Points(cloud), Neighbourhood::Within { radius }) => Body::of_cloud(cloud, Some(*radius)),
+        (BodySource::Points(cloud), _) => Body::of_cloud(cloud, None),
     }
 }
 
@@ -239,8 +247,16 @@ fn require_in_range(scene: &Scene) -> Result<(), SceneError> {
         Some(side) => {
             let message = format!("particles {side:e} apart: no double holds the squares of such lengths");
             let help = "use another unit of length, with distances from 1e-152 to 1e152";
-            Err(scene.refuse("lattice", message, help))
+            Err(scene.refuse(key_of_spacing(scene), message, help))
         }
+    }
+}
+
+/// The key that says how far apart particles are.
+fn key_of_spacing(scene: &Scene) -> &'static str {
+    match scene.body {
+        BodySource::Cut(_) => "lattice",
+        BodySource::Points(_) => "body.shape",
     }
 }
 
@@ -265,6 +281,10 @@ fn require_resolved(scene: &Scene, body: &Body) -> Result<(), SceneError> {
 
 fn refuse_body(scene: &Scene, error: &BodyError) -> SceneError {
     let (key, help) = match error {
+        BodyError::Alone { .. } => {
+            ("neighbours.radius", "use a wider radius, or leave the point out of the file")
+        }
+        BodyError::TooManyNeighbours { .. } => ("neighbours.radius", "use a smaller radius"),
         BodyError::Neighbourhood(_) => ("neighbours", "choose a neighbourhood that the lattice has"),
         BodyError::TooLarge { .. } => ("body.shape", "use a wider spacing or a smaller shape"),
         _ => ("body.shape", "use a smaller spacing or a larger shape"),
@@ -275,18 +295,25 @@ fn refuse_body(scene: &Scene, error: &BodyError) -> SceneError {
 fn check_ids(scene: &Scene, key: &str, region: &SceneRegion, body: &Body) -> Result<(), SceneError> {
     let SceneRegion::Known(Region::Ids(ids)) = region else { return Ok(()) };
     for (n, &id) in ids.iter().enumerate() {
-        let message = match body.is_frame.get(id.wrapping_sub(1)) {
+        let message = match body.particle(id).map(|i| body.is_frame[i]) {
             Some(false) => continue,
             Some(true) => format!("particle {id} belongs to the frame, whose role is fixed"),
-            None => format!("there is no particle {id}: ids run from 1 to {}", body.count()),
+            None => no_particle(id, body),
         };
-        return Err(scene.refuse(
-            &format!("{key}.ids[{n}]"),
-            message,
-            "`flockform plan` prints the numbering",
-        ));
+        let help = match body.numbering {
+            Some(_) => "ids are those of the body's file, or the numbers of its rows",
+            None => "`flockform plan` prints the numbering",
+        };
+        return Err(scene.refuse(&format!("{key}.ids[{n}]"), message, help));
     }
     Ok(())
+}
+
+/// Why nobody has this id.
+pub(super) fn no_particle(id: usize, body: &Body) -> String {
+    let ids = body.rows().map(|i| body.id(i));
+    let (low, high) = ids.fold((usize::MAX, 0), |(low, high), id| (low.min(id), high.max(id)));
+    format!("there is no particle {id}: ids run from {low} to {high}")
 }
 
 fn known_region(region: &SceneRegion, body: &Body) -> Region {

@@ -1,6 +1,6 @@
 //! From a scene to the arrays that an engine steps, with the checks that need the body.
 
-use super::layout::{Layout, RoleChange, Truth};
+use super::layout::{Layout, RoleChange, Truth, no_particle};
 use super::weights;
 use crate::flock::body::Body;
 use crate::flock::fracture::{Bonds, Break, Ghosts};
@@ -163,7 +163,8 @@ fn require_carried(
         let Some(i) = (0..leads.len()).find(|&i| !leads[i] && forces.get(i) != [0.0; 2]) else {
             return Ok(());
         };
-        let message = format!("particle {} follows by a rule without a stiffness: no load moves it", i + 1);
+        let message =
+            format!("particle {} follows by a rule without a stiffness: no load moves it", layout.body.id(i));
         let help =
             "use rule.mean.kind = \"material\", or load leaders alone (which steers the truth they follow)";
         return Err(scene.refuse("loads", message, help));
@@ -220,11 +221,11 @@ fn interaction(
 }
 
 fn probes(scene: &Scene, body: &Body) -> Result<Vec<usize>, SceneError> {
-    for (n, &id) in scene.record.probes.iter().enumerate() {
-        if id == 0 || id > body.count() {
-            let message = format!("there is no particle {id}: ids run from 1 to {}", body.count());
-            return Err(scene.refuse(&format!("record.probes[{n}]"), message, "name a particle of the body"));
-        }
-    }
-    Ok(scene.record.probes.iter().map(|id| id - 1).collect())
+    let probe = |(n, &id): (usize, &usize)| {
+        body.particle(id).ok_or_else(|| {
+            let message = no_particle(id, body);
+            scene.refuse(&format!("record.probes[{n}]"), message, "name a particle of the body")
+        })
+    };
+    scene.record.probes.iter().enumerate().map(probe).collect()
 }

@@ -145,11 +145,12 @@ fn facts(scene: &Scene, plan: &Plan) -> Result<Vec<(String, String)>, SceneError
     };
     let bonds = neighbour_entries(plan);
     let unit = scene.unit();
-    let lattice = format!(
-        "{}, nearest sites {:.6} {unit} apart",
-        plan.body.lattice.name(),
-        plan.body.lattice.spacing()
-    );
+    let apart = plan.body.lattice.spacing();
+    let lattice = if scene.is_of_points() {
+        format!("none: points, the nearest {apart:.6} {unit} apart in the median")
+    } else {
+        format!("{}, nearest sites {apart:.6} {unit} apart", plan.body.lattice.name())
+    };
     let swept = match scene.equilibrium {
         Some(_) => None,
         None => Some([

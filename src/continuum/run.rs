@@ -44,7 +44,7 @@ impl StopReason {
 pub struct Divergence {
     /// Step at which it was seen; the engine holds the state before it.
     pub step: usize,
-    /// Id of the particle, counted from 1.
+    /// Id of the particle.
     pub particle: usize,
     pub what: String,
     pub likely_cause: String,
@@ -227,7 +227,8 @@ fn divergence(engine: &Engine, movement: &Movement, bound: f64) -> Option<Diverg
     } else {
         return None;
     };
-    Some(Divergence { step: engine.step(), particle: particle + 1, what, likely_cause: likely_cause(engine) })
+    let particle = engine.body().id(particle);
+    Some(Divergence { step: engine.step(), particle, what, likely_cause: likely_cause(engine) })
 }
 
 /// The likeliest reason, from what the rule contains.

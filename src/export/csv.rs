@@ -2,7 +2,7 @@
 //! `breaks.csv`, every broken bond; `residuals.csv`, how a solver came to rest.
 //!
 //! Ids count from 1, columns and rows from the lowest site, frame included, which is the paper's
-//! numbering. Numbers are the shortest that read back as the same.
+//! numbering; a body given as points has its own ids and order, and no columns. Numbers are the shortest that read back as the same.
 
 use std::path::PathBuf;
 
@@ -19,8 +19,8 @@ use crate::flock::strain::Strain;
 #[derive(Serialize)]
 struct FinalRow {
     id: usize,
-    column: i64,
-    row: i64,
+    column: Option<i64>,
+    row: Option<i64>,
     role: &'static str,
     #[serde(rename = "X")]
     reference_x: f64,
@@ -75,10 +75,11 @@ pub fn write_final(
 ) -> Result<PathBuf, ExportError> {
     let lowest = |axis: usize| body.sites.iter().map(|site| i64::from(site[axis])).min().unwrap_or(0);
     let (first_column, first_row) = (lowest(0), lowest(1));
-    let rows = (0..body.count()).map(|i| FinalRow {
-        id: i + 1,
-        column: i64::from(body.sites[i][0]) - first_column + 1,
-        row: i64::from(body.sites[i][1]) - first_row + 1,
+    let on_lattice = |place: i64| Some(place).filter(|_| body.numbering.is_none());
+    let rows = body.rows().map(|i| FinalRow {
+        id: body.id(i),
+        column: on_lattice(i64::from(body.sites[i][0]) - first_column + 1),
+        row: on_lattice(i64::from(body.sites[i][1]) - first_row + 1),
         role: last.roles[i].name(),
         reference_x: body.reference.x[i],
         reference_y: body.reference.y[i],
@@ -99,14 +100,11 @@ pub fn write_final(
 /// length at which it broke \[length\].
 pub fn write_breaks(folder: &OutputFolder, body: &Body, breaks: &[Break]) -> Result<PathBuf, ExportError> {
     let along = body.along();
-    let rows = breaks.iter().map(|one| BreakRow {
-        step: one.step,
-        id_a: one.pair[0] as usize + 1,
-        id_b: one.pair[1] as usize + 1,
-        reference_x: one.place[0],
-        reference_y: one.place[1],
-        along: along(one.place),
-        length: one.length,
+    let rows = breaks.iter().map(|one| {
+        let [id_a, id_b] = body.ids(one.pair);
+        let [reference_x, reference_y] = one.place;
+        let (step, along, length) = (one.step, along(one.place), one.length);
+        BreakRow { step, id_a, id_b, reference_x, reference_y, along, length }
     });
     write(folder, "breaks.csv", rows)
 }
@@ -118,12 +116,17 @@ pub fn write_residuals(folder: &OutputFolder, residuals: &[f64]) -> Result<PathB
 }
 
 /// Writes the probed particles step by step.
-pub fn write_probes(folder: &OutputFolder, probes: &[ProbeSeries]) -> Result<PathBuf, ExportError> {
+pub fn write_probes(
+    folder: &OutputFolder,
+    body: &Body,
+    probes: &[ProbeSeries],
+) -> Result<PathBuf, ExportError> {
     let steps = probes.iter().map(|probe| probe.positions.len()).max().unwrap_or(0);
     let rows = (0..steps).flat_map(|step| {
         probes.iter().filter(move |probe| step < probe.positions.len()).map(move |probe| {
             let [x, y] = probe.positions.get(step);
-            ProbeRow { step, id: probe.particle + 1, x, y, pe1: probe.pe1[step], pe2: probe.pe2[step] }
+            let id = body.id(probe.particle);
+            ProbeRow { step, id, x, y, pe1: probe.pe1[step], pe2: probe.pe2[step] }
         })
     });
     write(folder, "probes.csv", rows)

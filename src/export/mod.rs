@@ -110,7 +110,7 @@ pub fn write_all(
     let largest_strain = strains.iter().flatten().map(Strain::largest).reduce(f64::max);
     let mut written = vec![csv::write_final(folder, engine.body(), &last, &strains)?];
     if !results.probes.is_empty() {
-        written.push(csv::write_probes(folder, results.probes)?);
+        written.push(csv::write_probes(folder, engine.body(), results.probes)?);
     }
     if !engine.breaks().is_empty() {
         written.push(csv::write_breaks(folder, engine.body(), engine.breaks())?);

@@ -97,7 +97,7 @@ pub struct BrokenBonds {
     pub count: usize,
     /// Those of them that were broken before the first step: cuts and ghosts of the scene.
     pub before_the_start: usize,
-    /// The first to break in a step; among several, the one with the lowest particle.
+    /// The first to break in a step; among several, the one that is first in `breaks.csv`.
     pub first: Option<FirstBreak>,
 }
 
@@ -225,7 +225,7 @@ fn broken_bonds(engine: &Engine) -> BrokenBonds {
         before_the_start: breaks.iter().filter(|one| one.step == 0).count(),
         first: first.map(|one| FirstBreak {
             step: one.step,
-            pair: one.pair.map(|particle| particle as usize + 1),
+            pair: engine.body().ids(one.pair),
             place: one.place,
             along: engine.body().along()(one.place),
         }),

@@ -2,7 +2,7 @@
 //!
 //! An unstructured grid of the present configuration. Its cells are the particles, as vertices, and the bonds, as
 //! lines; cell data `broken` (1 or 0; threshold it to see a crack as what is missing) and `stretch` (length over that
-//! in the reference configuration, less one \[1\]), both 0 for a particle. Point data: `id` from 1, `role`
+//! in the reference configuration, less one \[1\]), both 0 for a particle. Points are in the user's order. Point data: `id`, `role`
 //! (0 follower, 1 leader, 2 clamped, 3 frame, 4 ghost), `displacement` \[length\], `pe1` \[length^2\], `pe2`
 //! \[length\], `strain` (xx, yy, xy) \[1\] and `rotation` \[rad\] of a particle's surroundings, and where the scene has
 //! a material `stress` (xx, yy, xy) and `von_mises` \[force / length^2\], in the axes of the reference configuration;
@@ -20,6 +20,7 @@ use rayon::prelude::*;
 use super::error::{ExportError, write_file};
 use super::{OutputFolder, bonds};
 use crate::continuum::engine::Engine;
+use crate::flock::body::Body;
 use crate::flock::points::{Points, distance};
 use crate::flock::role::Role;
 use crate::flock::strain::Strain;
@@ -133,7 +134,7 @@ fn role_number(role: Role) -> u8 {
 fn write_frame(path: &Path, engine: &Engine, material: Option<&Elastic>) -> io::Result<()> {
     let mut out = BufWriter::new(File::create(path)?);
     let bonds: Vec<(usize, [u32; 2])> = bonds::listed_once(&engine.interaction().neighbours).collect();
-    let lines: Vec<[u32; 2]> = bonds.iter().map(|(_, pair)| *pair).collect();
+    let lines = lines(engine.body(), &bonds);
     let points = engine.present().len();
     writeln!(out, "<?xml version=\"1.0\"?>")?;
     let attributes = "type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\"";
@@ -145,7 +146,7 @@ fn write_frame(path: &Path, engine: &Engine, material: Option<&Elastic>) -> io::
     write_point_data(&mut out, engine, material)?;
     write_cell_data(&mut out, engine, &bonds)?;
     writeln!(out, "<Points>")?;
-    let places = engine.present().iter().flat_map(|[x, y]| [x, y, 0.0]);
+    let places = engine.body().rows().map(|i| engine.present().get(i)).flat_map(|[x, y]| [x, y, 0.0]);
     vectors(&mut out, "Points", points, places)?;
     writeln!(out, "</Points>")?;
     write_cells(&mut out, points, &lines)?;
@@ -153,18 +154,30 @@ fn write_frame(path: &Path, engine: &Engine, material: Option<&Elastic>) -> io::
     out.flush()
 }
 
+/// Points at the ends of the bonds.
+fn lines(body: &Body, bonds: &[(usize, [u32; 2])]) -> Vec<[u32; 2]> {
+    let mut pairs: Vec<[u32; 2]> = bonds.iter().map(|(_, pair)| *pair).collect();
+    if body.numbering.is_some() {
+        let mut row_of = vec![0; body.count()];
+        body.rows().zip(0..).for_each(|(particle, row)| row_of[particle] = row);
+        pairs.iter_mut().flatten().for_each(|end| *end = row_of[*end as usize]);
+    }
+    pairs
+}
+
 fn write_point_data(out: &mut impl Write, engine: &Engine, material: Option<&Elastic>) -> io::Result<()> {
-    let points = engine.present().len();
+    let (points, body) = (engine.present().len(), engine.body());
     writeln!(out, "<PointData Scalars=\"pe1\" Vectors=\"displacement\">")?;
-    integers(out, "id", points, 1..=points as i64)?;
-    let roles = engine.roles().iter().map(|&role| role_number(role));
+    integers(out, "id", points, body.rows().map(|i| body.id(i) as i64))?;
+    let roles = body.rows().map(|i| role_number(engine.roles()[i]));
     bytes(out, "role", points, roles)?;
-    let moved = engine.present().iter().zip(engine.body().reference.iter());
+    let moved = body.rows().map(|i| (engine.present().get(i), body.reference.get(i)));
     let displacement = moved.flat_map(|(now, initial)| [now[0] - initial[0], now[1] - initial[1], 0.0]);
     vectors(out, "displacement", points, displacement)?;
-    floats(out, "pe1", points, (0..points).map(|i| engine.pe1(i)))?;
-    floats(out, "pe2", points, (0..points).map(|i| engine.pe2(i)))?;
-    let strains: Vec<Option<Strain>> = (0..points).into_par_iter().map(|i| engine.strain(i)).collect();
+    floats(out, "pe1", points, body.rows().map(|i| engine.pe1(i)))?;
+    floats(out, "pe2", points, body.rows().map(|i| engine.pe2(i)))?;
+    let strains: Vec<Option<Strain>> =
+        (0..points).into_par_iter().map(|row| engine.strain(body.in_row(row))).collect();
     let components = |strain: &Option<Strain>| strain.map_or([f64::NAN; 3], |strain| strain.components);
     plane_tensors(out, "strain", points, strains.iter().map(components))?;
     let rotation = |strain: &Option<Strain>| strain.map_or(f64::NAN, |strain| strain.rotation);

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::frame::{Frame, FrameRule};
 use super::lattice::{Lattice, LatticeKind, Site};
 use super::neighbourhood::{Neighbourhood, NeighbourhoodError, Neighbours};
+use super::numbering::Numbering;
 use super::points::Points;
 use super::shape::Shape;
 
@@ -30,12 +31,17 @@ pub enum BodyError {
         "the body falls into {parts} parts that are no neighbours of each other: particle {first} and particle {second} are not connected"
     )]
     Disconnected { parts: usize, first: usize, second: usize },
+    #[error("particle {id} at ({}, {}) has no neighbour within {radius}", .place[0], .place[1])]
+    Alone { id: usize, place: [f64; 2], radius: f64 },
+    #[error("within {radius} the particles have about {about} neighbours in all, at most {limit} are kept")]
+    TooManyNeighbours { radius: f64, about: u64, limit: u64 },
     #[error(transparent)]
     Neighbourhood(#[from] NeighbourhoodError),
 }
 
 /// Particles in the paper's numbering: column by column, from the bottom, the frame included.
-/// Indices count from 0 here and ids from 1 in files and messages.
+/// Indices count from 0 here and ids from 1 in files and messages; particles given as points have the ids and, in
+/// files, the order that they were given with.
 #[derive(Clone, Debug)]
 pub struct Body {
     pub lattice: Lattice,
@@ -46,6 +52,8 @@ pub struct Body {
     /// Whether the particle belongs to the frame, shape \[count\].
     pub is_frame: Vec<bool>,
     pub frame: Option<Frame>,
+    /// What the user calls particles that were given as points; they lie on no lattice.
+    pub numbering: Option<Arc<Numbering>>,
 }
 
 /// More lattice sites than this are refused before memory is asked for.
@@ -79,7 +87,7 @@ impl Body {
             offsets.iter().filter_map(move |offset| map.index([site[0] + offset[0], site[1] + offset[1]]))
         }));
         let frame = frame.map(|rule| Frame::build(rule, &lattice, &sites, &is_frame, |site| map.index(site)));
-        Ok((Self { lattice, sites, reference, is_frame, frame }, neighbours))
+        Ok((Self { lattice, sites, reference, is_frame, frame, numbering: None }, neighbours))
     }
 
     /// Particles that lie on no lattice. Of one they keep the `spacing` \[length\]; their sites are a row, in
@@ -91,7 +99,37 @@ impl Body {
             is_frame: vec![false; places.len()],
             reference: Arc::new(places),
             frame: None,
+            numbering: None,
         }
+    }
+
+    /// What the user calls a particle.
+    pub fn id(&self, particle: usize) -> usize {
+        self.numbering.as_ref().map_or(particle + 1, |numbering| numbering.id(particle) as usize)
+    }
+
+    /// What the user calls the two ends of a bond, the lower first.
+    pub fn ids(&self, pair: [u32; 2]) -> [usize; 2] {
+        let [a, b] = pair.map(|particle| self.id(particle as usize));
+        [a.min(b), a.max(b)]
+    }
+
+    /// The particle that the user calls so.
+    pub fn particle(&self, id: usize) -> Option<usize> {
+        match &self.numbering {
+            Some(numbering) => numbering.particle(id),
+            None => id.checked_sub(1).filter(|&particle| particle < self.count()),
+        }
+    }
+
+    /// The particle in a row of the user's list, which is the order in which files and messages have them.
+    pub fn in_row(&self, row: usize) -> usize {
+        self.numbering.as_ref().map_or(row, |numbering| numbering.in_row(row))
+    }
+
+    /// All particles in the order in which files and messages have them.
+    pub fn rows(&self) -> impl ExactSizeIterator<Item = usize> + Clone + '_ {
+        (0..self.count()).map(|row| self.in_row(row))
     }
 
     pub fn count(&self) -> usize {
@@ -127,7 +165,8 @@ impl Body {
                 let mut parts: Vec<u32> = self.matter().map(|i| labels[i]).collect();
                 parts.sort_unstable();
                 parts.dedup();
-                Err(BodyError::Disconnected { parts: parts.len(), first: first + 1, second: second + 1 })
+                let [first, second] = [first, second].map(|i| self.id(i));
+                Err(BodyError::Disconnected { parts: parts.len(), first, second })
             }
         }
     }

@@ -1,7 +1,7 @@
 //! The core: particles, lattices, neighbourhoods and the flocking rule.
 //!
 //! Pure computation: no input or output, no clock, no threads of its own, no other room of this
-//! crate. A [`body::Body`] is cut from a lattice; an [`interaction::Interaction`] says who sees whom
+//! crate. A [`body::Body`] is cut from a lattice or given as points; an [`interaction::Interaction`] says who sees whom
 //! through which rule; its `target` is the function that moves particles and robots alike.
 //!
 //! Source: R. dell'Erba, "Flocking rules governing swarm robot as tool to describe continuum
@@ -9,7 +9,7 @@
 
 pub mod block;
 pub mod body;
-pub mod curve;
+pub mod cloud;
 pub mod fracture;
 pub mod frame;
 pub mod grid;
@@ -18,6 +18,7 @@ pub mod lattice;
 pub mod manoeuvre;
 pub mod motion;
 pub mod neighbourhood;
+pub mod numbering;
 pub mod points;
 pub mod pseudo_energy;
 pub mod real;

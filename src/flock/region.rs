@@ -22,7 +22,7 @@ pub enum Region {
         centre: [f64; 2],
         radius: f64,
     },
-    /// The particles with these ids, counted from 1.
+    /// The particles with these ids.
     Ids(Vec<usize>),
     /// Every particle that lacks a neighbour: the outline of the body, holes included.
     Boundary,
@@ -65,7 +65,7 @@ impl Region {
             Region::Disc { centre, radius } => {
                 matter.filter(|&i| distance(place(i), *centre) <= radius + tolerance).collect()
             }
-            Region::Ids(ids) => matter.filter(|i| ids.contains(&(i + 1))).collect(),
+            Region::Ids(ids) => matter.filter(|&i| ids.contains(&body.id(i))).collect(),
             Region::Boundary => {
                 let complete = matter.clone().map(|i| neighbours.of(i).len()).max().unwrap_or(0);
                 let lacks = |i: usize| {

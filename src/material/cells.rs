@@ -201,6 +201,7 @@ pub fn without_loose_sites(body: &Body, neighbours: &Neighbours) -> (Body, Neigh
         reference: Arc::new(keep.iter().map(|&i| body.reference.get(i)).collect()),
         is_frame: vec![false; keep.len()],
         frame: None,
+        numbering: None,
     };
     let seen = |&i: &usize| neighbours.of(i).iter().filter_map(|&j| renumbered[j as usize]);
     (kept, Neighbours::from_lists(keep.iter().map(seen)), cells)

@@ -84,7 +84,8 @@ impl BodyTape {
         let time = engine.step() as f64 * STEP;
         let header = Header { stamp: Time::from_seconds(time), frame_id: "world".into() };
         let times = [time; 2];
-        let poses = engine.present().iter().map(|place| Pose::planar(place, 0.0)).collect();
+        let present = engine.present();
+        let poses = engine.body().rows().map(|i| Pose::planar(present.get(i), 0.0)).collect();
         self.tape.take(&self.poses, &PoseArray { header: header.clone(), poses }, times);
         self.tape.take(&self.markers, &markers(engine, &header), times);
         self.tape.take(&self.state, &state(engine, &self.name, header.clone()), times);
@@ -114,8 +115,8 @@ fn markers(engine: &Engine, header: &Header) -> MarkerArray {
         ns: "particles".into(),
         r#type: Marker::POINTS,
         scale: Vector3 { x: size, y: size, z: 0.0 },
-        points: engine.present().iter().map(point).collect(),
-        colors: engine.roles().iter().map(|&role| colour(role)).collect(),
+        points: engine.body().rows().map(|i| point(engine.present().get(i))).collect(),
+        colors: engine.body().rows().map(|i| colour(engine.roles()[i])).collect(),
         ..Marker::default()
     };
     let mut all = vec![particles];
@@ -153,7 +154,7 @@ fn bonds(engine: &Engine, header: &Header, width: f64) -> Marker {
 }
 
 fn state(engine: &Engine, name: &str, header: Header) -> FormationState {
-    let body: Vec<usize> = (0..engine.present().len()).filter(|&i| engine.roles()[i].is_body()).collect();
+    let body: Vec<usize> = engine.body().rows().filter(|&i| engine.roles()[i].is_body()).collect();
     let strains: Vec<Option<Strain>> = body.iter().map(|&i| engine.strain(i)).collect();
     let members = body.iter().zip(&strains).filter(|_| body.len() <= MOST_MEMBERS);
     FormationState {
@@ -174,7 +175,7 @@ fn member(engine: &Engine, i: usize, strain: Option<Strain>) -> MemberState {
     let [x, y] = engine.displacement(i);
     let nowhere = Point { x: f64::NAN, y: f64::NAN, z: f64::NAN };
     MemberState {
-        name: (i + 1).to_string(),
+        name: engine.body().id(i).to_string(),
         role: if engine.roles()[i] == Role::Follower { MemberState::FOLLOWER } else { MemberState::LEADER },
         health: MemberState::FRESH,
         position: point(engine.present().get(i)),

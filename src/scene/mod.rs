@@ -7,12 +7,16 @@
 
 pub mod bundled;
 pub mod document;
+pub mod points;
 pub mod raw;
 pub mod swarm;
 pub mod table;
 pub mod validate;
 
+use std::sync::Arc;
+
 use crate::flock::body::Cut;
+use crate::flock::cloud::Cloud;
 use crate::flock::fracture::{Ghosts, Threshold};
 use crate::flock::frame::FrameRule;
 use crate::flock::lattice::Lattice;
@@ -38,8 +42,9 @@ pub struct Scene {
     pub name: String,
     /// The scene as written, overrides and defaults included.
     pub raw: RawScene,
+    /// Of a body of points a lattice that is as wide, which stands in for its spacing alone.
     pub lattice: Lattice,
-    pub cut: Cut,
+    pub body: BodySource,
     pub frame: Option<FrameRule>,
     pub neighbourhood: Neighbourhood,
     pub mean: Mean,
@@ -74,10 +79,24 @@ impl Scene {
         self.roles.iter().position(|entry| matches!(entry.motion, Some(LeaderMotion::Truth { .. })))
     }
 
+    /// Whether the body was given as points instead of cut from a lattice.
+    pub fn is_of_points(&self) -> bool {
+        matches!(self.body, BodySource::Points(_))
+    }
+
     /// The unit of length, for axes and tables.
     pub fn unit(&self) -> &str {
         &self.raw.unit
     }
+}
+
+/// Where the particles of the body come from.
+#[derive(Clone, Debug, PartialEq)]
+pub enum BodySource {
+    /// Cut from the lattice.
+    Cut(Cut),
+    /// Given one by one.
+    Points(Arc<Cloud>),
 }
 
 /// Fixed weights of neighbours.
@@ -200,7 +219,7 @@ pub struct Equilibrium {
 /// What is kept of the run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Record {
-    /// Ids, counted from 1.
+    /// Ids.
     pub probes: Vec<usize>,
     pub figures: Vec<usize>,
     pub vtk_every: usize,

@@ -1,6 +1,7 @@
 //! Displacements of leaders from a CSV file.
 
-use crate::flock::points::{Points, distance};
+use crate::flock::body::Body;
+use crate::flock::points::distance;
 
 /// Rows of a displacement file, and how they name their particle.
 #[derive(Clone, Debug, PartialEq)]
@@ -61,18 +62,19 @@ impl DisplacementTable {
     ///
     /// # Errors
     /// A sentence that names the first particle without a row.
-    pub fn of(&self, particles: &[usize], reference: &Points, spacing: f64) -> Result<Vec<[f64; 2]>, String> {
+    pub fn of(&self, particles: &[usize], body: &Body) -> Result<Vec<[f64; 2]>, String> {
+        let near = 1e-6 * body.lattice.spacing();
         particles
             .iter()
             .map(|&i| {
-                let place = reference.get(i);
+                let (place, id) = (body.reference.get(i), body.id(i));
                 let row = match self {
-                    Self::ById(rows) => rows.iter().find(|(id, _)| *id == i + 1).map(|row| row.1),
+                    Self::ById(rows) => rows.iter().find(|row| row.0 == id).map(|row| row.1),
                     Self::ByPlace(rows) => {
-                        rows.iter().find(|(at, _)| distance(*at, place) <= 1e-6 * spacing).map(|row| row.1)
+                        rows.iter().find(|(at, _)| distance(*at, place) <= near).map(|row| row.1)
                     }
                 };
-                row.ok_or_else(|| format!("no row for particle {} at ({}, {})", i + 1, place[0], place[1]))
+                row.ok_or_else(|| format!("no row for particle {id} at ({}, {})", place[0], place[1]))
             })
             .collect()
     }
@@ -84,12 +86,12 @@ mod tests {
 
     #[test]
     fn rows_are_matched_by_place_or_by_id() {
-        let reference: Points = [[10.0, 10.0], [11.0, 10.0]].into_iter().collect();
+        let body = Body::of_places([[10.0, 10.0], [11.0, 10.0]].into_iter().collect(), 1.0);
         let by_place = DisplacementTable::parse("x,y,ux,uy\n11,10,0.5,-1\n10,10,0,0\n", 2.0).expect("reads");
-        assert_eq!(by_place.of(&[0, 1], &reference, 1.0), Ok(vec![[0.0, 0.0], [1.0, -2.0]]));
+        assert_eq!(by_place.of(&[0, 1], &body), Ok(vec![[0.0, 0.0], [1.0, -2.0]]));
         let by_id = DisplacementTable::parse("id,ux,uy\n2,3,4\n", 1.0).expect("reads");
-        assert_eq!(by_id.of(&[1], &reference, 1.0), Ok(vec![[3.0, 4.0]]));
-        assert_eq!(by_id.of(&[0], &reference, 1.0), Err("no row for particle 1 at (10, 10)".into()));
+        assert_eq!(by_id.of(&[1], &body), Ok(vec![[3.0, 4.0]]));
+        assert_eq!(by_id.of(&[0], &body), Err("no row for particle 1 at (10, 10)".into()));
     }
 
     #[test]

@@ -43,11 +43,10 @@ impl Positions {
         if self.writer.readers() == 0 {
             return;
         }
-        let (present, roles) = (engine.present(), engine.roles());
-        let particle = |i: usize| Particle {
-            id: i as u32 + 1,
-            role: code(roles[i]),
-            position: [present.x[i], present.y[i]],
+        let (present, roles, body) = (engine.present(), engine.roles(), engine.body());
+        let particle = |row: usize| {
+            let i = body.in_row(row);
+            Particle { id: body.id(i) as u32, role: code(roles[i]), position: [present.x[i], present.y[i]] }
         };
         if let Err(error) = self.writer.send(system_time(), step as u64, present.len(), particle) {
             if self.unsent == 0 {

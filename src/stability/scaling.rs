@@ -109,7 +109,7 @@ pub fn toml(value: &Value) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::bundled;
+    use crate::scene::{BodySource, bundled};
 
     #[test]
     fn every_bundled_scene_is_the_same_scene_in_another_unit() {
@@ -119,7 +119,8 @@ mod tests {
             assert_eq!(scaled.lattice.spacing(), 4.0 * scene.lattice.spacing(), "{}", one.name);
             let [here, there] = [&scene, &scaled].map(|s| {
                 use crate::flock::body::Body;
-                let built = Body::build(s.lattice.clone(), &s.cut, &s.neighbourhood, s.frame);
+                let BodySource::Cut(cut) = &s.body else { panic!("{}: a bundled body is cut", one.name) };
+                let built = Body::build(s.lattice.clone(), cut, &s.neighbourhood, s.frame);
                 built.expect("builds").0.reference.clone()
             });
             assert_eq!(here.len(), there.len(), "{}", one.name);

@@ -157,7 +157,7 @@ impl Subject {
                 let message = format!(
                     "particle {} follows in a part of the body where nobody leads or is clamped: nothing brings it \
                      back to rest, and every damping and feedback is marginal",
-                    i + 1
+                    body.id(i)
                 );
                 Err(scene.refuse("roles", message, help))
             }

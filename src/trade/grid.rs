@@ -105,14 +105,19 @@ pub fn body_overrides(scene: &Scene, rule: RuleChoice, part: f64) -> Vec<String>
         return overrides;
     }
     match scene.raw.lattice {
-        RawLattice::Square { spacing, .. }
-        | RawLattice::Hexagonal { spacing, .. }
-        | RawLattice::Honeycomb { spacing, .. } => {
+        None => {}
+        Some(
+            RawLattice::Square { spacing, .. }
+            | RawLattice::Hexagonal { spacing, .. }
+            | RawLattice::Honeycomb { spacing, .. },
+        ) => {
             overrides.push(format!("lattice.spacing={:?}", part * spacing));
         }
-        RawLattice::Rectangular { a, b, .. }
-        | RawLattice::CentredRectangular { a, b, .. }
-        | RawLattice::Oblique { a, b, .. } => {
+        Some(
+            RawLattice::Rectangular { a, b, .. }
+            | RawLattice::CentredRectangular { a, b, .. }
+            | RawLattice::Oblique { a, b, .. },
+        ) => {
             overrides.extend([("a", a), ("b", b)].map(|(key, v)| format!("lattice.{key}={:?}", part * v)));
         }
     }

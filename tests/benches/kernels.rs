@@ -6,11 +6,11 @@
 use divan::Bencher;
 use divan::counter::ItemsCount;
 use flockform::flock::body::{Body, Cut};
-use flockform::flock::curve::order_along_curve;
 use flockform::flock::fracture::{Bonds, Ghosts, Threshold};
 use flockform::flock::interaction::{Interaction, Weights};
 use flockform::flock::lattice::{Lattice, LatticeKind};
 use flockform::flock::neighbourhood::Neighbourhood;
+use flockform::flock::numbering::order_in_columns;
 use flockform::flock::points::Points;
 use flockform::flock::role::Role;
 use flockform::flock::rules::{Mean, Rule};
@@ -87,7 +87,7 @@ fn bonds_that_do_not_break(bencher: Bencher, side: u32) {
 }
 
 #[divan::bench(args = SIDES)]
-fn order_along_a_curve(bencher: Bencher, side: u32) {
+fn order_in_columns_of_cells(bencher: Bencher, side: u32) {
     let (_, _, present) = body(side, Rule::BARYCENTRE, &Neighbourhood::First { keep: None });
-    bencher.counter(ItemsCount::new(present.len())).bench_local(|| order_along_curve(&present));
+    bencher.counter(ItemsCount::new(present.len())).bench_local(|| order_in_columns(&present, 1.0));
 }

@@ -1,6 +1,6 @@
 //! The program itself, and a place to run it in.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 pub fn flockform(arguments: &[&str], folder: &Path) -> Output {
@@ -18,4 +18,15 @@ pub fn text(bytes: &[u8]) -> String {
 
 pub fn temporary() -> tempfile::TempDir {
     tempfile::tempdir().expect("a temporary folder")
+}
+
+/// Everything below a folder, hidden files included.
+pub fn files(folder: &Path) -> Vec<PathBuf> {
+    let Ok(entries) = std::fs::read_dir(folder) else { return Vec::new() };
+    entries
+        .flat_map(|entry| {
+            let path = entry.expect("readable").path();
+            if path.is_dir() { files(&path) } else { vec![path] }
+        })
+        .collect()
 }

@@ -1,21 +1,10 @@
 //! `flockform run`, `scenes`, `plan`, `schema`, `trade` and `bench`, and what they refuse.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 use std::time::{Duration, Instant};
 
 use crate::program::*;
-
-/// Everything below a folder, hidden files included.
-fn files(folder: &Path) -> Vec<PathBuf> {
-    let Ok(entries) = std::fs::read_dir(folder) else { return Vec::new() };
-    entries
-        .flat_map(|entry| {
-            let path = entry.expect("readable").path();
-            if path.is_dir() { files(&path) } else { vec![path] }
-        })
-        .collect()
-}
 
 /// Runs and expects a refusal: exit code 2, these words, nothing on disk.
 fn refused(arguments: &[&str], words: &[&str]) {

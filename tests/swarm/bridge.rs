@@ -117,7 +117,7 @@ fn a_recorded_run_is_flown_step_by_step() {
     }
     let folder = tempfile::tempdir().expect("a folder");
     let output = OutputFolder::create(&folder.path().join("run"), false).expect("a folder");
-    write_probes(&output, &probes).expect("written");
+    write_probes(&output, engine.body(), &probes).expect("written");
     let kept = output.commit().expect("kept");
     let file = folder.path().join("flown.toml");
     std::fs::write(&file, "title = \"flown\"\n[scene]\nname = \"tension\"\nrecording = \"run/probes.csv\"\n")

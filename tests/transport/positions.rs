@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use flockform::continuum::engine::Engine;
 use flockform::continuum::plan::Plan;
+use flockform::scene::Scene;
 use flockform::scene::bundled::bundled;
 use flockform::shm::positions::{Positions, read};
 
@@ -38,6 +39,26 @@ fn a_reader_sees_every_step_of_the_body_to_the_bit() {
         }
     }
     assert!(reader.take().is_none());
+}
+
+#[test]
+fn a_body_given_as_points_is_shown_by_its_ids_and_in_the_order_of_its_file() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let rows = [(40, [2.0, 0.0]), (7, [0.0, 0.5]), (300, [1.0, 0.0]), (8, [0.0, 0.0])];
+    let table = rows.map(|(id, [x, y])| format!("{id},{x},{y}\n")).concat();
+    std::fs::write(folder.path().join("cloud.csv"), format!("id,x,y\n{table}")).expect("written");
+    let text = "title = \"points\"\nneighbours = { kind = \"within\", radius = 1.2 }\n\
+                body = { shape = { kind = \"points\", file = \"cloud.csv\" } }\n";
+    let scene = Scene::parse("points", "points.toml", text, &[], Some(folder.path())).expect("valid");
+    let engine = Engine::new(Plan::new(&scene).expect("planned"));
+    let name = domain_name();
+    let peer = domain(&name).join("test").expect("shared memory");
+    let mut shown = open(&name, &engine);
+    let reader = read(&peer, "body").expect("a reader");
+    shown.show(&engine);
+    let slice = reader.take().expect("the step");
+    let seen: Vec<(u32, [f64; 2])> = slice.iter().map(|one| (one.id, one.position)).collect();
+    assert_eq!(seen, rows);
 }
 
 #[test]

@@ -3,11 +3,11 @@
 use std::time::Instant;
 
 use crate::flock::block::Block;
-use crate::flock::curve::order_along_curve;
 use crate::flock::fracture::{Bonds, Ghosts, Threshold};
 use crate::flock::interaction::{Interaction, MatrixWeights, Weights};
 use crate::flock::lattice::{Lattice, LatticeKind};
 use crate::flock::neighbourhood::{Neighbourhood, Neighbours};
+use crate::flock::numbering::order_in_columns;
 use crate::flock::points::Points;
 use crate::flock::real::Real;
 use crate::flock::role::Role;
@@ -23,7 +23,7 @@ pub const INTACT: &str = "fracture on, intact";
 pub const CRACKED: &str = "fracture on, cracked";
 const SPATIAL: &str = "lists of a hexagonal lattice";
 const RANDOM: &str = "the same in random order";
-const RENUMBERED: &str = "the same renumbered along a curve";
+const RENUMBERED: &str = "the same renumbered in columns";
 
 /// Bytes that one update moves when no cache holds the body: `x` and `y`, each read, written and
 /// fetched for writing.
@@ -309,7 +309,7 @@ fn lists(side: usize, order: &'static str) -> Subject {
     }
     if order == RENUMBERED {
         let shuffled = reorder(&points, &rank);
-        rank = order_along_curve(&shuffled).into_iter().map(|i| rank[i as usize]).collect();
+        rank = order_in_columns(&shuffled, 1.0).into_iter().map(|i| rank[i as usize]).collect();
     }
     // `rank` names the old number of each new one.
     let mut new = vec![0; rank.len()];

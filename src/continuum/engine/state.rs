@@ -178,6 +178,10 @@ pub fn digest(plan: &Plan) -> u64 {
         change.particles.iter().for_each(|&particle| digest.bytes(&(particle as u64).to_le_bytes()));
     }
     probes.iter().for_each(|&probe| digest.bytes(&(probe as u64).to_le_bytes()));
+    if body.numbering.is_some() {
+        // What was written of the run until now has these ids, in this order.
+        body.rows().for_each(|i| digest.bytes(&(body.id(i) as u64).to_le_bytes()));
+    }
     digest.0
 }
 

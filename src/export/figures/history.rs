@@ -35,7 +35,7 @@ pub fn probes(subject: &Subject<'_>, probes: &[ProbeSeries]) -> String {
         "probed particles, by id".into()
     };
     let heading = Heading { title: subject.title.into(), note, legend: Vec::new() };
-    let ids: Vec<String> = shown.iter().map(|probe| (probe.particle + 1).to_string()).collect();
+    let ids: Vec<String> = shown.iter().map(|probe| subject.body.id(probe.particle).to_string()).collect();
     let panels = panels(subject, shown);
     let last = shown.iter().map(|probe| probe.positions.len()).max().unwrap_or(0).saturating_sub(1);
     let right = 14.0 + ids.iter().map(|id| text_width(id, LABEL_TEXT)).fold(0.0, f64::max) + 6.0;

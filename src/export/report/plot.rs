@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::super::figures::SERIES;
 use super::super::figures::chart::{Axis, Chart, Series, Style};
 use crate::continuum::record::ProbeSeries;
-use crate::flock::points::Points;
+use crate::flock::body::Body;
 
 /// Points of a line that a page can show; a longer one keeps the extremes of each stretch.
 const MOST_POINTS: usize = 1500;
@@ -90,8 +90,8 @@ impl Plot {
 
 /// Displacements and PE1 of the probed particles against the step; a chart in which nothing happens is left
 /// out.
-pub fn of_probes(probes: &[ProbeSeries], reference: &Points, unit: &str) -> Vec<Plot> {
-    let shown = &probes[..probes.len().min(MOST_LINES)];
+pub fn of_probes(probes: &[ProbeSeries], body: &Body, unit: &str) -> Vec<Plot> {
+    let (shown, reference) = (&probes[..probes.len().min(MOST_LINES)], &body.reference);
     let mut note = "probed particles, by id".to_owned();
     if shown.len() < probes.len() {
         note = format!("the first {} of {} {note}", shown.len(), probes.len());
@@ -111,7 +111,7 @@ pub fn of_probes(probes: &[ProbeSeries], reference: &Points, unit: &str) -> Vec<
         x: PlotAxis { quantity: "step".into(), unit: String::new(), log: false },
         y: PlotAxis { quantity: quantity.into(), unit: unit.into(), log: false },
         series: (shown.iter().zip(SERIES))
-            .map(|(probe, colour)| probe_line(probe, colour, &values(probe)))
+            .map(|(probe, colour)| probe_line(body.id(probe.particle), colour, &values(probe)))
             .collect(),
         landmarks: Vec::new(),
         follows_clock: true,
@@ -123,9 +123,9 @@ pub fn of_probes(probes: &[ProbeSeries], reference: &Points, unit: &str) -> Vec<
     quantities.into_iter().map(plot).filter(happens).collect()
 }
 
-fn probe_line(probe: &ProbeSeries, colour: &str, values: &[f64]) -> PlotSeries {
+fn probe_line(id: usize, colour: &str, values: &[f64]) -> PlotSeries {
     let line: Vec<[f64; 2]> = values.iter().enumerate().map(|(step, &value)| [step as f64, value]).collect();
-    let (name, points) = ((probe.particle + 1).to_string(), thinned(&line));
+    let (name, points) = (id.to_string(), thinned(&line));
     PlotSeries { name, colour: colour.into(), style: "line", points, labels: Vec::new() }
 }
 

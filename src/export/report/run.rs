@@ -173,6 +173,9 @@ impl RunRecorder {
         let mut stage = Stage::new(film(scene, engine, is_solved));
         stage.set_reference(&engine.body().reference);
         stage.set_roles(&self.first_roles, &self.changes);
+        if let Some(numbering) = &engine.body().numbering {
+            stage.set_ids((0..engine.body().count()).map(|i| numbering.id(i)));
+        }
         // Bonds and cells of those whose neighbours change would say who were neighbours once.
         if engine.lasting_neighbours().is_some() {
             set_bonds(&mut stage, engine, is_solved);
@@ -282,7 +285,7 @@ pub fn write(
     stage: Stage,
 ) -> Result<PathBuf, ExportError> {
     let (scene, outcome) = (results.scene, results.outcome);
-    let mut plots = plot::of_probes(results.probes, &outcome.engine.body().reference, scene.unit());
+    let mut plots = plot::of_probes(results.probes, outcome.engine.body(), scene.unit());
     plots.extend(outcome.solved.as_ref().map(|solved| residuals(&solved.residuals)));
     let page = Page {
         title: scene.raw.title.clone(),

@@ -133,6 +133,11 @@ impl Stage {
         self.put("Y", doubles(reference.y.iter().copied()));
     }
 
+    /// Ids, where they are not the numbers from 1 on.
+    pub fn set_ids(&mut self, ids: impl Iterator<Item = u32>) {
+        self.put("ids", integers(ids, 1));
+    }
+
     /// Roles at first, and `[step, particle, role]` of every change.
     pub fn set_roles(&mut self, first: &[Role], changes: &[[u32; 3]]) {
         self.put("roles", integers(first.iter().map(|&role| number(role)), 1));

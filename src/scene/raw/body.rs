@@ -1,4 +1,4 @@
-//! The body as written: its lattice and its shape.
+//! The body as written: its lattice and its shape, or its points.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -72,7 +72,7 @@ pub enum RawLattice {
     },
 }
 
-/// The body that is cut from the lattice.
+/// The body that is cut from the lattice, or given as points.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawBody {
@@ -118,6 +118,17 @@ pub enum RawShape {
         /// Corners in order, either way round; the last joins the first [length].
         #[schemars(length(min = 3))]
         vertices: Vec<[f64; 2]>,
+    },
+    /// No shape but the particles themselves, in any order. The body has no lattice, `neighbours` have to be of the kind
+    /// `within` or `present`, and what is measured in spacings takes the median distance to the nearest particle.
+    Points {
+        /// Path, relative to the scene file, of a CSV file with the columns `x`, `y` and, if the particles have ids of
+        /// their own, `id` (otherwise the numbers of the rows, from 1); outputs have the same ids and the same order.
+        file: String,
+        /// Multiplies every coordinate [1].
+        #[serde(default = "super::defaults::one")]
+        #[schemars(extend("exclusiveMinimum" = 0))]
+        scale: f64,
     },
     /// The sheet-type tensile specimen of ASTM E8/E8M (200 x 20 mm, gauge 57 x 12.5 mm, fillet 12.5 mm),
     /// its axis along y from y = 0, centred on x = 0.

@@ -32,7 +32,9 @@ pub struct RawScene {
     /// Name of the unit of length, for axes and tables.
     #[serde(default = "defaults::unit")]
     pub unit: String,
-    pub lattice: RawLattice,
+    /// What the body is cut from; a body of points has none.
+    #[serde(default)]
+    pub lattice: Option<RawLattice>,
     pub body: RawBody,
     /// The shell around the body that gives edge particles their full neighbourhood.
     #[serde(default)]

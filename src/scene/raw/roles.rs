@@ -66,7 +66,8 @@ pub enum RawRegion {
     },
     /// The particles with these ids.
     Ids {
-        /// Counted from 1, column by column from the bottom, the frame included [1].
+        /// Counted from 1, column by column from the bottom, the frame included; of a body of points, those of its
+        /// file [1].
         #[schemars(length(min = 1))]
         ids: Vec<usize>,
     },

@@ -11,7 +11,7 @@ use crate::flock::rules::Rule;
 use crate::scene::document::Document;
 use crate::scene::document::problem::SceneError;
 use crate::scene::raw::{
-    RawBody, RawFrame, RawLattice, RawMean, RawRecord, RawScene, RawStop, RawUpdate, RawWeights,
+    RawBody, RawFrame, RawLattice, RawMean, RawRecord, RawScene, RawShape, RawStop, RawUpdate, RawWeights,
 };
 use crate::scene::validate::{self as scene_checks, File, Refuse};
 use crate::scene::{Scene, bundled};
@@ -68,6 +68,10 @@ fn shape(
     match (&raw.scene, &raw.lattice, &raw.body) {
         (None, None, None) if raw.robots.is_empty() => Err(refuse("robots", "nobody flies".into(), help)),
         (None, None, None) => Ok(Shape::Places(rule_of_places(raw, refuse)?)),
+        (None, _, Some(RawBody { shape: RawShape::Points { .. }, .. })) => {
+            let message = "robots are no body of points".into();
+            Err(refuse("body.shape", message, "give each robot's place in [[robots]]"))
+        }
         (None, Some(lattice), Some(body)) if raw.robots.is_empty() => {
             let scene = body_scene(raw, lattice, body);
             if raw.links.is_some() {
@@ -92,7 +96,7 @@ fn body_scene(raw: &RawSwarm, lattice: &RawLattice, body: &RawBody) -> RawScene 
         title: raw.title.clone(),
         notes: String::new(),
         unit: "m".into(),
-        lattice: lattice.clone(),
+        lattice: Some(lattice.clone()),
         body: body.clone(),
         frame: raw.frame,
         neighbours: raw.neighbours.clone(),
@@ -140,6 +144,10 @@ fn bridged(
     if scene.equilibrium.is_some() {
         let message = format!("scene `{}` goes straight to rest: there is nothing to fly", scene.name);
         return Err(refuse("scene.name", message, "use a scene without [equilibrium], which is stepped"));
+    }
+    if scene.is_of_points() {
+        let message = format!("scene `{}` has a body of points, which robots cannot be", scene.name);
+        return Err(refuse("scene.name", message, "give each robot's place in [[robots]]"));
     }
     match &bridge.recording {
         Some(_) if !raw.robots.is_empty() => {

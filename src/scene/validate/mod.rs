@@ -3,14 +3,16 @@
 
 mod equilibrium;
 mod material;
+mod points;
 pub(super) mod roles;
 
 use std::path::Path;
+use std::sync::Arc;
 
 use super::document::Document;
 use super::document::problem::{Place, Problem, SceneError};
 use super::raw::*;
-use super::{Fracture, PoissonTerm, Record, Scene, Stop, Weights};
+use super::{BodySource, Fracture, PoissonTerm, Record, Scene, Stop, Weights};
 use crate::flock::body::Cut;
 use crate::flock::fracture::{Ghosts, Threshold};
 use crate::flock::frame::FrameRule;
@@ -93,8 +95,7 @@ pub(super) fn validate(
     if is_asked && raw.rule.mean.is_none() && raw.material.is_some() {
         raw.rule.mean = Some(RawMean::Material { rotation: RawRotation::Small });
     }
-    let shape = shape(&raw.body, refuse)?;
-    let lattice = lattice(&raw, shape.as_ref());
+    let (body, lattice) = body(&raw, folder, refuse)?;
     let spacing = lattice.spacing();
     let neighbourhood = material::neighbourhood(&raw, &lattice);
     check_present_neighbours(&raw, refuse)?;
@@ -111,7 +112,7 @@ pub(super) fn validate(
         .collect::<Result<_, _>>()?;
     Ok(Scene {
         name: name.to_owned(),
-        cut: cut(&raw.body, shape),
+        body,
         frame: frame(raw.frame),
         neighbourhood,
         mean: mean(raw.rule.mean.as_ref().unwrap_or(&RawMean::Barycentre), spacing, refuse)?,
@@ -154,8 +155,26 @@ pub(super) fn validate(
     })
 }
 
-fn lattice(raw: &RawScene, shape: Option<&Shape>) -> Lattice {
-    let (kind, orientation) = match raw.lattice {
+/// The body's particles, and the lattice that they are on or that stands in for their spacing.
+fn body(
+    raw: &RawScene,
+    folder: Option<&Path>,
+    refuse: Refuse<'_>,
+) -> Result<(BodySource, Lattice), SceneError> {
+    if let Some(cloud) = points::cloud(raw, folder, refuse)? {
+        let lattice = Lattice::new(LatticeKind::Square { spacing: cloud.spacing }, [0.0; 2], 0.0);
+        return Ok((BodySource::Points(Arc::new(cloud)), lattice));
+    }
+    let shape = shape(&raw.body, refuse)?;
+    let Some(lattice) = lattice(raw, shape.as_ref()) else {
+        let help = "add `lattice = { kind = \"square\", spacing = 1.0 }`, or give the body as points";
+        return Err(refuse("lattice", "is missing".into(), help));
+    };
+    Ok((BodySource::Cut(cut(&raw.body, shape)), lattice))
+}
+
+fn lattice(raw: &RawScene, shape: Option<&Shape>) -> Option<Lattice> {
+    let (kind, orientation) = match *raw.lattice.as_ref()? {
         RawLattice::Square { spacing, orientation } => (LatticeKind::Square { spacing }, orientation),
         RawLattice::Rectangular { a, b, orientation } => (LatticeKind::Rectangular { a, b }, orientation),
         RawLattice::CentredRectangular { a, b, orientation } => {
@@ -168,7 +187,7 @@ fn lattice(raw: &RawScene, shape: Option<&Shape>) -> Lattice {
         RawLattice::Honeycomb { spacing, orientation } => (LatticeKind::Honeycomb { spacing }, orientation),
     };
     let anchor = raw.body.anchor.unwrap_or_else(|| shape.map_or([0.0; 2], Shape::anchor));
-    Lattice::new(kind, anchor, orientation.to_radians())
+    Some(Lattice::new(kind, anchor, orientation.to_radians()))
 }
 
 /// The shape with its holes; `None` for a rectangle by count.
@@ -183,7 +202,7 @@ fn shape(body: &RawBody, refuse: Refuse<'_>) -> Result<Option<Shape>, SceneError
     let mut holes = Vec::new();
     for (k, hole) in body.holes.iter().enumerate() {
         let key = format!("body.holes[{k}]");
-        let message = "a hole has to have a shape of its own, not a count of sites".into();
+        let message = "a hole has to have a shape of its own, not a count of sites or points".into();
         let help = "use kind = \"rectangle\", \"disc\" or \"polygon\"";
         holes.push(solid(hole, &key, refuse)?.ok_or_else(|| refuse(&key, message, help))?);
     }
@@ -193,7 +212,7 @@ fn shape(body: &RawBody, refuse: Refuse<'_>) -> Result<Option<Shape>, SceneError
 
 fn solid(raw: &RawShape, key: &str, refuse: Refuse<'_>) -> Result<Option<Shape>, SceneError> {
     Ok(Some(match raw {
-        RawShape::Grid { .. } => return Ok(None),
+        RawShape::Grid { .. } | RawShape::Points { .. } => return Ok(None),
         RawShape::Rectangle { min, max } => {
             ordered_box(key, *min, *max, refuse)?;
             Shape::Rectangle { min: *min, max: *max }

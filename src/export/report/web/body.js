@@ -21,6 +21,7 @@ export class Body {
     const named = (name) => this.prefix + name;
     this.X = await doubles(named("X"));
     this.Y = await doubles(named("Y"));
+    this.ids = await integers(named("ids"), 1);
     this.firstRoles = Uint8Array.from(await integers(named("roles"), 1));
     this.roleChanges = await integers(named("role-changes"), 3);
     await this.openBonds(named);
@@ -89,13 +90,14 @@ export class Body {
   }
 
   name(particle) {
-    return this.film.names[particle] ?? String(particle + 1);
+    return this.film.names[particle] ?? String(this.ids[particle] ?? particle + 1);
   }
 
   find(name) {
     const named = this.film.names.indexOf(name);
     if (named >= 0) return named;
     const id = Number(name);
+    if (this.ids.length) return this.ids.indexOf(id);
     return Number.isInteger(id) && id >= 1 && id <= this.count ? id - 1 : -1;
   }
 

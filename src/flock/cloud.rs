@@ -1,0 +1,138 @@
+//! Bodies given as a list of points instead of cut from a lattice.
+
+use std::sync::Arc;
+
+use super::body::{Body, BodyError};
+use super::grid::CellGrid;
+use super::neighbourhood::Neighbours;
+use super::numbering::{Numbering, order_in_columns};
+use super::points::{Points, distance};
+
+/// Points in the order in which their user has them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Cloud {
+    /// Reference positions \[length\], shape \[count\]; finite, and no two the same.
+    pub points: Points,
+    /// What the user calls them, shape \[count\]; no two the same.
+    pub ids: Vec<u32>,
+    /// The median of the distances to the nearest other point \[length\].
+    pub spacing: f64,
+}
+
+/// Neighbours within this part more than a radius count as within it, so that the places of a lattice, which are
+/// rounded, have the neighbours that the lattice has.
+const MARGIN: f64 = 1e-9;
+
+/// More neighbour entries than this are refused before memory is asked for: 4 GiB.
+const MOST_ENTRIES: u64 = 1 << 30;
+
+/// Points that are asked how many others they see before all are.
+const SAMPLES: usize = 1000;
+
+impl Cloud {
+    /// `radius` is that of the neighbourhood \[length\]: nobody is looked for beyond it.
+    ///
+    /// # Errors
+    /// A radius that holds too many.
+    pub fn new(points: Points, ids: Vec<u32>, radius: f64) -> Result<Self, BodyError> {
+        let neighbours = within(&points, radius)?;
+        let nearest = |i: usize| {
+            let apart = neighbours.of(i).iter().map(|&k| distance(points.get(i), points.get(k as usize)));
+            apart.fold(f64::INFINITY, f64::min)
+        };
+        let mut apart: Vec<f64> = (0..points.len()).map(nearest).filter(|apart| apart.is_finite()).collect();
+        let middle = apart.len() / 2;
+        // Where nobody sees anybody the radius is all that is known.
+        let spacing =
+            if apart.is_empty() { radius } else { *apart.select_nth_unstable_by(middle, f64::total_cmp).1 };
+        Ok(Self { points, ids, spacing })
+    }
+}
+
+impl Body {
+    /// The particles of a cloud, in an order that sweeps go through quickly; ids stay the user's. Their neighbours are
+    /// those within `radius` \[length\] in the reference configuration, in order of index; nobody has any without one.
+    ///
+    /// # Errors
+    /// A radius that holds too many, or none for some particle.
+    pub fn of_cloud(cloud: &Cloud, radius: Option<f64>) -> Result<(Self, Neighbours), BodyError> {
+        let Cloud { points, ids, spacing } = cloud;
+        let order = order_in_columns(points, *spacing);
+        let places: Points = order.iter().map(|&row| points.get(row as usize)).collect();
+        let neighbours = match radius {
+            Some(radius) => within(&places, radius)?,
+            None => Neighbours::from_lists(places.iter().map(|_| [])),
+        };
+        let body = Self {
+            numbering: Some(Arc::new(Numbering::new(&order, ids))),
+            ..Self::of_places(places, *spacing)
+        };
+        match radius.zip((0..body.count()).find(|&i| neighbours.of(i).is_empty())) {
+            // A body of one particle has nobody to see.
+            Some((radius, i)) if body.count() > 1 => {
+                Err(BodyError::Alone { id: body.id(i), place: body.reference.get(i), radius })
+            }
+            _ => Ok((body, neighbours)),
+        }
+    }
+}
+
+fn within(points: &Points, radius: f64) -> Result<Neighbours, BodyError> {
+    let (reach, all) = (radius * (1.0 + MARGIN), vec![true; points.len()]);
+    let mut grid = CellGrid::default();
+    grid.fill(points, &all, reach);
+    let (mut seen, every) = (Vec::new(), points.len().div_ceil(SAMPLES).max(1));
+    let sampled = (0..points.len()).step_by(every);
+    sampled.clone().for_each(|i| grid.within(points, i, reach, &mut seen));
+    let about = seen.len() as u64 * points.len() as u64 / sampled.len().max(1) as u64;
+    if about > MOST_ENTRIES {
+        return Err(BodyError::TooManyNeighbours { radius, about, limit: MOST_ENTRIES });
+    }
+    let mut neighbours = Neighbours::default();
+    neighbours.rebuild_within(&mut grid, points, &all, reach);
+    Ok(neighbours)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn square(side: usize) -> Points {
+        (0..side * side).map(|i| [0.1 * (i / side) as f64, 0.1 * (i % side) as f64]).collect()
+    }
+
+    #[test]
+    fn the_places_of_a_lattice_see_its_first_neighbours_in_spite_of_rounding() {
+        let points = square(12);
+        let ids = (1..=144).rev().collect();
+        let cloud = Cloud::new(points, ids, 0.1).expect("a cloud");
+        assert!((cloud.spacing - 0.1).abs() < 1e-15);
+        let (body, neighbours) = Body::of_cloud(&cloud, Some(0.1)).expect("a body");
+        assert_eq!(neighbours.index.len(), 4 * 12 * 11);
+        for i in 0..body.count() {
+            assert!(neighbours.of(i).is_sorted(), "ascending, so that a sweep reads on");
+            // The ids went backwards.
+            let row = 144 - body.id(i);
+            assert_eq!(body.reference.get(i), cloud.points.get(row));
+            assert_eq!((body.particle(body.id(i)), body.in_row(row)), (Some(i), i));
+        }
+    }
+
+    #[test]
+    fn a_few_odd_points_do_not_change_the_spacing_and_one_alone_is_refused_as_a_particle() {
+        let odd = [[0.05, 0.049], [0.05, 0.05], [9.0, 9.0]];
+        let points: Points = square(5).iter().chain(odd).collect();
+        let cloud = Cloud::new(points, (1..=28).collect(), 0.15).expect("a cloud");
+        assert!((cloud.spacing - 0.1).abs() < 1e-15);
+        let error = Body::of_cloud(&cloud, Some(0.15)).expect_err("alone");
+        assert_eq!(error, BodyError::Alone { id: 28, place: [9.0, 9.0], radius: 0.15 });
+        assert!(Body::of_cloud(&cloud, None).expect("found at every step").1.index.is_empty());
+    }
+
+    #[test]
+    fn a_radius_that_holds_a_large_body_many_times_over_is_refused() {
+        let points = square(200);
+        let error = Cloud::new(points, (1..=40_000).collect(), 100.0).expect_err("too many");
+        assert!(matches!(error, BodyError::TooManyNeighbours { about: 1_599_960_000, .. }), "{error}");
+    }
+}
