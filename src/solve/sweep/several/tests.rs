@@ -33,6 +33,20 @@ impl Case {
         Self { interaction, roles, led }
     }
 
+    /// The same with each list in another order, so that no run is made.
+    fn jumbled(mut self) -> Self {
+        let lists = (0..self.interaction.reference.len()).map(|j| {
+            let mut list = self.interaction.neighbours.of(j).to_vec();
+            let turn = j % list.len();
+            list.rotate_left(turn);
+            list
+        });
+        self.interaction.neighbours = Neighbours::from_lists(lists);
+        self.interaction.rest = None;
+        self.interaction.keep_rest();
+        self
+    }
+
     fn place(&self, which: usize, step: usize) -> [f64; 2] {
         let [x, y] = self.interaction.reference.get(self.led[which]);
         [x + 0.1 * step.min(9) as f64, y + 0.003 * (which * step.min(20)) as f64]
@@ -156,17 +170,7 @@ fn a_body_in_which_some_see_far_is_stepped_all_the_same() {
 
 #[test]
 fn lists_are_swept_together_to_the_bits_of_single_steps_for_any_threads() {
-    // Jumbled lists, of which no run is made.
-    let mut case = Case::new(LatticeKind::Hexagonal { spacing: 1.0 }, 3600, 31);
-    let lists = (0..case.interaction.reference.len()).map(|j| {
-        let mut list = case.interaction.neighbours.of(j).to_vec();
-        let turn = j % list.len();
-        list.rotate_left(turn);
-        list
-    });
-    case.interaction.neighbours = Neighbours::from_lists(lists);
-    case.interaction.rest = None;
-    case.interaction.keep_rest();
+    let case = Case::new(LatticeKind::Hexagonal { spacing: 1.0 }, 3600, 31).jumbled();
     let stencil = |case: &Case| {
         let sweep = Sweep::compile(Update::default(), &case.interaction, &case.roles);
         sweep.stencil.expect("plain").share_in_runs()
@@ -192,4 +196,50 @@ fn it_is_told_in_which_steps_somebody_moved_farther_than_asked() {
     let farther = sweep.steps(&case.interaction, places, (5, led, Some(0.09)), &mut Activity::default());
     // The leaders jump by 0.1 in the third; whoever follows moves by less.
     assert_eq!(farther, [false, false, true, false, false]);
+}
+
+#[test]
+fn it_is_told_of_whoever_moved_far_wherever_that_was() {
+    for axis in [0, 1] {
+        let case = Case::new(LatticeKind::Square { spacing: 1.0 }, 300, 61);
+        let sweep = Sweep::compile(Update::default(), &case.interaction, &case.roles);
+        let mut present = Points::clone(&case.interaction.reference);
+        let far = 61 * 5 + 30;
+        let [x, y] = present.get(far);
+        present.set(far, if axis == 0 { [x + 1.0, y] } else { [x, y + 1.0] });
+        let (mut next, places) = (present.clone(), &mut present);
+        let farther = sweep.steps(
+            &case.interaction,
+            (places, &mut next),
+            (4, Led::NOBODY, Some(0.3)),
+            &mut Activity::default(),
+        );
+        assert_eq!(farther[..2], [true, false], "axis {axis}");
+    }
+}
+
+#[test]
+fn lists_where_one_coordinate_alone_moves_are_swept() {
+    let case = Case::new(LatticeKind::Square { spacing: 1.0 }, 300, 61);
+    let still = Case { led: Vec::new(), ..case.jumbled() };
+    for axis in [0, 1] {
+        let sweep = Sweep::compile(Update::default(), &still.interaction, &still.roles);
+        let mut start = Points::clone(&still.interaction.reference);
+        let displaced = 61 * 150 + 30;
+        let [x, y] = start.get(displaced);
+        start.set(displaced, if axis == 0 { [x + 1.0, y] } else { [x, y + 1.0] });
+        let (mut singly, mut next) = (start.clone(), start.clone());
+        for _ in 0..8 {
+            sweep.step(&still.interaction, None, &singly, &mut next);
+            std::mem::swap(&mut singly, &mut next);
+        }
+        let (mut together, mut activity) = (start.clone(), Activity::default());
+        let mut next = start;
+        for count in [1, 3, 4] {
+            let places = (&mut together, &mut next);
+            sweep.steps(&still.interaction, places, (count, Led::NOBODY, None), &mut activity);
+        }
+        assert_eq!(together, singly, "axis {axis}");
+        assert!(activity.share_computed() < 0.5);
+    }
 }
