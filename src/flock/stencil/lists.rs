@@ -95,35 +95,52 @@ struct Alike<'a> {
 }
 
 impl Alike<'_> {
-    /// What [`Rule::target`](crate::flock::rules::Rule::target) computes: the rest offset is added to the mean,
-    /// also where it is zero, which makes 0.0 of -0.0.
     fn sweep<T: Real, const N: usize, const P: usize>(&self, planes: &mut [Plane<'_, T>; P]) {
         self.assert_within(planes);
-        let (lists, _) = self.index.as_chunks::<N>();
-        // What a plane says is kept out of the loop, which would read it again after every store.
+        match planes.each_ref().map(|plane| plane.rest) {
+            rests if rests.iter().all(Option::is_none) => self.fill::<T, N, P>(planes, |_| [T::default(); P]),
+            rests => {
+                self.fill::<T, N, P>(planes, |j| rests.map(|rest| rest.map_or(T::default(), |rest| rest[j])))
+            }
+        }
+    }
+
+    /// What [`Rule::target`](crate::flock::rules::Rule::target) computes: the rest offset is added to the mean,
+    /// also where it is zero, which makes 0.0 of -0.0.
+    #[inline(always)]
+    fn fill<T: Real, const N: usize, const P: usize>(
+        &self,
+        planes: &mut [Plane<'_, T>; P],
+        rest: impl Fn(usize) -> [T; P],
+    ) {
         let is_large = planes.iter().any(|plane| plane.present.len() > IN_CACHE);
-        let mut planes = planes.each_mut().map(|plane| {
-            let first = plane.present.as_ptr().wrapping_sub(plane.seen_from);
-            (first, plane.rest, plane.begin, &mut *plane.next)
-        });
+        // Where particle number 0 would stand: what a plane says would be read again after every store.
+        let present = planes.each_ref().map(|plane| plane.present.as_ptr().wrapping_sub(plane.seen_from));
+        let next = planes.each_mut().map(|plane| plane.next.as_mut_ptr().wrapping_sub(plane.begin));
+        let (lists, _) = self.index.as_chunks::<N>();
         for (&j, list) in self.particles.iter().zip(lists) {
             let j = j as usize;
-            let farthest = list.iter().max().map_or(0, |&k| k as usize);
             if is_large {
+                let farthest = list.iter().max().map_or(0, |&k| k as usize);
                 prefetch(std::ptr::from_ref(list).wrapping_add(AHEAD[1]));
+                present.iter().for_each(|present| prefetch(present.wrapping_add(farthest + AHEAD[0])));
+                next.iter().for_each(|next| prefetch(next.wrapping_add(j + AHEAD[0])));
             }
-            for (first, rest, begin, next) in &mut planes {
-                if is_large {
-                    prefetch(first.wrapping_add(farthest + AHEAD[0]));
-                    prefetch(next.as_ptr().wrapping_add(j - *begin + AHEAD[0]));
+            let mut sum = [T::default(); P];
+            for (k, &there) in list.iter().enumerate() {
+                for (sum, present) in sum.iter_mut().zip(&present) {
+                    // SAFETY: `seen` bounds every index of the group from both sides, being taken from these very lists
+                    // when they were copied (they never change), and it was asserted to lie within the plane.
+                    let value = unsafe { *present.wrapping_add(there as usize) };
+                    *sum = if k == 0 { value } else { *sum + value };
                 }
-                // SAFETY: `seen` bounds every index of the group from both sides, being taken from these very lists
-                // when they were copied (they never change), and it was just asserted to lie within the plane.
-                // Measured: half as fast again as with a check of each.
-                let value = |k: usize| unsafe { *first.wrapping_add(list[k] as usize) };
-                let sum = (1..N).fold(value(0), |sum, k| sum + value(k));
-                let rest = rest.map_or(T::default(), |rest| rest[j]);
-                next[j - *begin] = sum / T::of(N as f64) + rest;
+            }
+            let rest = rest(j);
+            for p in 0..P {
+                let target = sum[p] / T::of(N as f64) + rest[p];
+                // SAFETY: the particles ascend, and the first and the last were asserted to lie within the plane. Measured,
+                // with the above: lists are swept 1.5 times as fast as with a check of each index.
+                unsafe { *next[p].wrapping_add(j) = target };
             }
         }
     }
@@ -147,9 +164,12 @@ impl Alike<'_> {
 
     fn assert_within<T, const P: usize>(&self, planes: &[Plane<'_, T>; P]) {
         let [first, last] = self.seen.map(|k| k as usize);
+        let swept = [self.particles.first(), self.particles.last()].map(|j| j.map_or(0, |&j| j as usize));
         for plane in planes {
             let end = plane.seen_from + plane.present.len();
             assert!(plane.seen_from <= first && last < end, "a list names a particle beyond the plane");
+            let end = plane.begin + plane.next.len();
+            assert!(plane.begin <= swept[0] && swept[1] < end, "a particle beyond the plane has a list");
         }
     }
 }
@@ -191,6 +211,12 @@ mod tests {
     #[should_panic(expected = "beyond the plane")]
     fn a_particle_behind_the_end_of_what_is_there_is_never_read() {
         sweep(&[vec![1], vec![0, 2]], &[0, 1], &[20.0, 30.0], 0);
+    }
+
+    #[test]
+    #[should_panic(expected = "has a list")]
+    fn nothing_is_written_behind_the_end_of_what_is_there() {
+        sweep(&vec![vec![0]; 12], &[1, 9], &[20.0, 30.0], 0);
     }
 
     #[test]
