@@ -29,14 +29,14 @@ use super::real::Real;
 const SHORTEST_RUN: usize = 8;
 
 /// Fewest particles in a band: less is not worth looking after.
-const SMALLEST_BAND: usize = 1 << 10;
+const SMALLEST_BAND: usize = 1 << 11;
 
 /// Most particles in a band, and how far particles may see for bands to be made: beyond that they are of
 /// this size and bound nothing.
 const LARGEST_BAND: usize = 1 << 17;
 
 /// Most particles of a body that counts as within the caches: 8 MiB in four arrays. Its columns are swept one
-/// after the other, and gaps between them swept over.
+/// after the other, and gaps between them swept over; and it is swept step by step, which streams best.
 const IN_CACHE: usize = 1 << 18;
 
 /// Longest gap between two runs that is swept over rather than stopped at, and most particles in the gaps of
@@ -160,6 +160,11 @@ impl Stencil {
     /// Whether no particle sees farther than into the bands beside its own.
     pub fn is_local(&self) -> bool {
         self.is_local
+    }
+
+    /// Whether the caches hold the whole body.
+    pub fn is_in_cache(&self) -> bool {
+        self.bands.last().is_none_or(|end| end.particle as usize <= IN_CACHE)
     }
 
     /// The particles of some bands.

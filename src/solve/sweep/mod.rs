@@ -189,7 +189,7 @@ impl Sweep {
     ) -> Vec<bool> {
         let stencil = self.stencil.as_ref().expect("a sweep that takes several steps has a stencil");
         let rest = interaction.rest.as_ref().map(|rest| [&rest.x[..], &rest.y[..]]);
-        let threads = if is_parallel(present.len()) { rayon::current_num_threads() } else { 1 };
+        let threads = rayon::current_num_threads();
         let steps = Steps { stencil, rest, led, count, farther, threads };
         let even = [&mut present.x[..], &mut present.y[..]];
         let farther = steps.take(activity, even, [&mut next.x[..], &mut next.y[..]]);

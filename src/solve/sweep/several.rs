@@ -22,6 +22,7 @@ use std::ops::Range;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use super::PARALLEL_FROM;
 use crate::flock::real::Real;
 use crate::flock::stencil::{Plane, Stencil};
 
@@ -31,9 +32,6 @@ pub const MOST_STEPS: usize = 16;
 
 /// Particles of a column swept before it is the next one's turn, if several steps are taken together, or one.
 const TILES: [usize; 2] = [512, 64];
-
-/// Particles up to which a body, one coordinate of it, stays in the second cache from step to step.
-const FRONT_FROM: usize = 1 << 16;
 
 /// Bands swept in one go where each step is taken by itself: enough for what is asked of each band not to count.
 const MOST_BANDS: usize = 8;
@@ -89,7 +87,7 @@ pub struct Steps<'a, T> {
     pub count: usize,
     /// Where it is asked after each step whether somebody moved farther than this \[length\].
     pub farther: Option<f64>,
-    /// Threads to share the work among.
+    /// Threads to share the work among, if the body is worth it.
     pub threads: usize,
 }
 
@@ -99,21 +97,22 @@ impl<T: Real> Steps<'_, T> {
     /// moved farther in it than asked along an axis.
     pub fn take(&self, activity: &mut Activity, even: [&mut [T]; 2], odd: [&mut [T]; 2]) -> Vec<bool> {
         let ([changed_x, changed_y], [even_x, even_y], [odd_x, odd_y]) = (&mut activity.changed, even, odd);
+        let threads = if even_x.len() < PARALLEL_FROM { 1 } else { self.threads };
         let seen = if self.stencil.share_in_runs() < 0.5 {
             // A list that has been read serves both coordinates.
             let even_odd = ([even_x, even_y], [odd_x, odd_y]);
-            self.take_axes([0, 1], [changed_x, changed_y], even_odd, self.threads)
+            self.take_axes([0, 1], [changed_x, changed_y], even_odd, threads)
         } else {
-            let threads = self.threads.div_ceil(2);
-            let mut x = || self.take_axes([0], [changed_x], ([even_x], [odd_x]), threads);
-            let mut y = || self.take_axes([1], [changed_y], ([even_y], [odd_y]), threads);
-            let (mut x, y) = if self.threads > 1 { rayon::join(x, y) } else { (x(), y()) };
+            let each = threads.div_ceil(2);
+            let mut x = || self.take_axes([0], [changed_x], ([even_x], [odd_x]), each);
+            let mut y = || self.take_axes([1], [changed_y], ([even_y], [odd_y]), each);
+            let (mut x, y) = if threads > 1 { rayon::join(x, y) } else { (x(), y()) };
             x.add(y);
             x
         };
         activity.due += 2 * (self.stencil.all_followers() * self.count) as u64;
         activity.computed += seen.computed;
-        seen.farther
+        seen.farther[..self.count].to_vec()
     }
 
     fn take_axes<const P: usize>(
@@ -129,7 +128,7 @@ impl<T: Real> Steps<'_, T> {
             changed.resize(bands, true);
             flags.iter_mut().step_by(levels).zip(&**changed).for_each(|(flag, changed)| *flag |= changed);
         }
-        let mut seen = Seen { computed: 0, farther: vec![false; self.count] };
+        let mut seen = Seen::default();
         let mut rows = Rows { even, odd, flags: &mut flags };
         let cuts = self.cuts(bands, threads);
         if cuts.len() == 2 {
@@ -181,7 +180,7 @@ impl<T: Real> Steps<'_, T> {
             .collect();
         let run = |front: Front<'_, T, P>| {
             let stretch = front.stretch.clone();
-            let mut seen = Seen { computed: 0, farther: vec![false; self.count] };
+            let mut seen = Seen::default();
             front.run(|level| range(&stretch, level), &mut seen);
             seen
         };
@@ -191,9 +190,10 @@ impl<T: Real> Steps<'_, T> {
 }
 
 /// What was seen on the way.
+#[derive(Default)]
 struct Seen {
     computed: u64,
-    farther: Vec<bool>,
+    farther: [bool; MOST_STEPS],
 }
 
 impl Seen {
@@ -264,8 +264,8 @@ impl<T: Real, const P: usize> Front<'_, T, P> {
     fn run(mut self, range: impl Fn(usize) -> Range<usize>, seen: &mut Seen) {
         let count = self.steps.count;
         // No band may get ahead of the one behind it if nothing binds who sees whom; a single step has no front; and
-        // what the second cache holds needs none.
-        if count == 1 || !self.steps.stencil.is_local() || self.rows.even[0].len() <= FRONT_FROM {
+        // what the caches hold needs none.
+        if count == 1 || !self.steps.stencil.is_local() || self.steps.stencil.is_in_cache() {
             (1..=count).for_each(|level| self.sweep(level, range(level), seen));
             return;
         }
@@ -357,6 +357,9 @@ fn place_led<T: Real>(
     band: Range<usize>,
     (origin, present, next): (usize, &[T], &mut [T]),
 ) -> bool {
+    if led.particles.is_empty() {
+        return false;
+    }
     let from = led.particles.partition_point(|&particle| particle < band.start);
     let mut moved = false;
     for (which, &particle) in led.particles.iter().enumerate().skip(from) {

@@ -100,7 +100,7 @@ fn bits(places: &[Points; 2]) -> Vec<u64> {
 fn steps_taken_together_have_the_bits_of_single_ones_for_any_threads() {
     for kind in LatticeKind::SAMPLES {
         // Long enough to be cut for the threads, and for one and several wedges at the cuts.
-        let case = Case::new(kind, 3600, 61);
+        let case = Case::new(kind, 9000, 61);
         let expected = case.singly(25);
         for counts in [&[16usize, 9][..], &[1, 2, 3, 16, 3], &[1; 25]] {
             for threads in [1, 2, 4, 8] {
@@ -113,7 +113,7 @@ fn steps_taken_together_have_the_bits_of_single_ones_for_any_threads() {
 
 #[test]
 fn threads_beyond_one_a_coordinate_cut_the_body_in_segments() {
-    let case = Case::new(LatticeKind::Square { spacing: 1.0 }, 3600, 61);
+    let case = Case::new(LatticeKind::Square { spacing: 1.0 }, 9000, 61);
     let sweep = Sweep::compile(Update::default(), &case.interaction, &case.roles);
     let stencil = sweep.stencil.as_ref().expect("plain");
     let segments = |threads| {
@@ -141,8 +141,8 @@ fn only_what_moves_is_swept_and_the_bits_are_the_same() {
 
 #[test]
 fn motion_that_comes_from_either_end_is_met_in_time() {
-    let mut case = Case::new(LatticeKind::Square { spacing: 1.0 }, 300, 61);
-    for led in [(0..61).collect::<Vec<usize>>(), (0..61).chain(299 * 61..300 * 61).collect()] {
+    let mut case = Case::new(LatticeKind::Square { spacing: 1.0 }, 600, 61);
+    for led in [(0..61).collect::<Vec<usize>>(), (0..61).chain(599 * 61..600 * 61).collect()] {
         case.roles.fill(Role::Follower);
         led.iter().for_each(|&i| case.roles[i] = Role::Leader);
         case.led = led;
@@ -170,7 +170,7 @@ fn a_body_in_which_some_see_far_is_stepped_all_the_same() {
 
 #[test]
 fn lists_are_swept_together_to_the_bits_of_single_steps_for_any_threads() {
-    let case = Case::new(LatticeKind::Hexagonal { spacing: 1.0 }, 3600, 31).jumbled();
+    let case = Case::new(LatticeKind::Hexagonal { spacing: 1.0 }, 9000, 31).jumbled();
     let stencil = |case: &Case| {
         let sweep = Sweep::compile(Update::default(), &case.interaction, &case.roles);
         sweep.stencil.expect("plain").share_in_runs()
