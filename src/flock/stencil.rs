@@ -28,8 +28,11 @@ use super::real::Real;
 /// Shorter runs are not worth the set-up of one.
 const SHORTEST_RUN: usize = 8;
 
-/// Fewest particles in a band: less is not worth looking after.
-const SMALLEST_BAND: usize = 1 << 11;
+/// Fewest particles in a band of a small body, and of a large one: less is not worth looking after.
+const SMALLEST_BAND: [usize; 2] = [1 << 10, 1 << 11];
+
+/// Bands that a body has before they become larger.
+const FEW_BANDS: usize = 1 << 7;
 
 /// Most particles in a band, and how far particles may see for bands to be made: beyond that they are of
 /// this size and bound nothing.
@@ -87,8 +90,9 @@ impl Stencil {
     pub fn compile(neighbours: &Neighbours, follows: &[bool], rest: Option<&Points>) -> Self {
         let reach = reach(neighbours, follows);
         let is_local = reach <= LARGEST_BAND / 3;
+        let smallest = (follows.len() / FEW_BANDS).clamp(SMALLEST_BAND[0], SMALLEST_BAND[1]);
         // Three columns of a lattice, which are swept abreast; cut where a run ends anyway.
-        let size = if is_local { (reach * 5 / 2).max(SMALLEST_BAND) } else { LARGEST_BAND };
+        let size = if is_local { (reach * 5 / 2).max(smallest) } else { LARGEST_BAND };
         let mut stencil = Self { is_local, ..Self::default() };
         let mut j = 0;
         let mut listed = Vec::new();
