@@ -1,6 +1,7 @@
 //! The same bits over threads, kernels and blockings, and those that are written down here.
 
 use flockform::flock::body::{Body, Cut};
+use flockform::flock::frame::{Frame, FrameRule};
 use flockform::flock::interaction::{Interaction, Weights};
 use flockform::flock::lattice::{Lattice, LatticeKind};
 use flockform::flock::neighbourhood::{Neighbourhood, Neighbours};
@@ -17,26 +18,29 @@ const SIDES: [usize; 2] = [4003, 67];
 /// A body held on the left and pulled on the right.
 struct Pulled {
     interaction: Interaction,
+    frame: Option<Frame>,
     roles: Vec<Role>,
     led: Vec<usize>,
 }
 
 impl Pulled {
-    fn new(kind: LatticeKind) -> Self {
+    fn new(kind: LatticeKind, frame: Option<FrameRule>) -> Self {
         let cut = Cut::Count { columns: SIDES[0] as u32, rows: SIDES[1] as u32 };
         let lattice = Lattice::new(kind, [0.0; 2], 0.0);
         let (body, neighbours) =
-            Body::build(lattice, &cut, &Neighbourhood::First { keep: None }, None).expect("fits");
-        let reference = body.reference;
+            Body::build(lattice, &cut, &Neighbourhood::First { keep: None }, frame).expect("fits");
+        let (reference, frame) = (body.reference, body.frame);
         let mut roles = vec![Role::Follower; reference.len()];
-        roles[..SIDES[1]].fill(Role::Clamped);
-        let led: Vec<usize> = (reference.len() - SIDES[1]..reference.len()).collect();
+        frame.iter().flat_map(|frame| &frame.points).for_each(|&point| roles[point as usize] = Role::Frame);
+        let mut matter: Vec<usize> = (0..reference.len()).filter(|&i| roles[i] == Role::Follower).collect();
+        let led = matter.split_off(matter.len() - SIDES[1]);
+        matter[..SIDES[1]].iter().for_each(|&i| roles[i] = Role::Clamped);
         led.iter().for_each(|&i| roles[i] = Role::Leader);
         let (rule, weights) = (Rule::BARYCENTRE, Weights::Equal);
         let mut interaction =
             Interaction { rule, reference, neighbours, weights, forces: None, rest: None, bonds: None };
         interaction.keep_rest();
-        Self { interaction, roles, led }
+        Self { interaction, frame, roles, led }
     }
 
     /// Where a leader stands; nothing but sums and products, which every machine rounds alike.
@@ -77,7 +81,8 @@ impl Pulled {
             let count = most.min(STEPS - done);
             let place = |which: usize, level: usize| self.place(which, done + level);
             let led = Led { particles: &self.led, place: &place };
-            sweep.steps(&self.interaction, (&mut present, &mut next), (count, led, None), &mut activity);
+            let (frame, places) = (self.frame.as_ref(), (&mut present, &mut next));
+            sweep.steps(&self.interaction, frame, places, (count, led, None), &mut activity);
             done += count;
         }
         hash(&present)
@@ -94,6 +99,19 @@ impl Pulled {
             });
             let [rx, ry] = rest.as_ref().map_or([0.0; 2], |rest| rest.get(j));
             next.set(j, [sum[0] / list.len() as f64 + rx, sum[1] / list.len() as f64 + ry]);
+        }
+        // A point of the frame is displaced as those it serves were.
+        let reference = &self.interaction.reference;
+        let Some(frame) = &self.frame else { return };
+        for (k, &point) in frame.points.iter().enumerate() {
+            let served = frame.served_by(k);
+            let sum = served.iter().fold([0.0; 2], |[x, y], &s| {
+                let ([sx, sy], [rx, ry]) = (present.get(s as usize), reference.get(s as usize));
+                [x + (sx - rx), y + (sy - ry)]
+            });
+            let [rx, ry] = reference.get(point as usize);
+            let count = served.len() as f64;
+            next.set(point as usize, [rx + sum[0] / count, ry + sum[1] / count]);
         }
     }
 }
@@ -113,7 +131,7 @@ fn assert_golden(body: &Pulled, golden: u64) {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
         pool.install(|| {
             let by = |sweep: &Sweep| {
-                body.singly(|present, next| sweep.step(&body.interaction, None, present, next))
+                body.singly(|present, next| sweep.step(&body.interaction, body.frame.as_ref(), present, next))
             };
             all.push((format!("one by one, {threads} threads"), by(&uncompiled)));
             all.push((format!("compiled, {threads} threads"), by(&compiled)));
@@ -129,18 +147,26 @@ fn assert_golden(body: &Pulled, golden: u64) {
 
 #[test]
 fn a_square_lattice_has_the_golden_bits_over_threads_kernels_and_blockings() {
-    assert_golden(&Pulled::new(LatticeKind::Square { spacing: 1.0 }), 0x5078_b4e9_416c_7a8d);
+    assert_golden(&Pulled::new(LatticeKind::Square { spacing: 1.0 }, None), 0x5078_b4e9_416c_7a8d);
 }
 
 #[test]
 fn a_hexagonal_lattice_has_the_golden_bits_over_threads_kernels_and_blockings() {
-    assert_golden(&Pulled::new(LatticeKind::Hexagonal { spacing: 1.0 }), 0x79ec_950d_d986_0e8f);
+    assert_golden(&Pulled::new(LatticeKind::Hexagonal { spacing: 1.0 }, None), 0x79ec_950d_d986_0e8f);
+}
+
+#[test]
+fn a_body_in_a_frame_has_the_golden_bits_over_threads_kernels_and_blockings() {
+    assert_golden(
+        &Pulled::new(LatticeKind::Square { spacing: 1.0 }, Some(FrameRule::Lagged)),
+        0xc9f0_8167_a1f0_fe3d,
+    );
 }
 
 #[test]
 fn a_body_of_lists_has_the_golden_bits_over_threads_kernels_and_blockings() {
     // Jumbled lists, of which no run is made, and which are summed in another order.
-    let mut body = Pulled::new(LatticeKind::Hexagonal { spacing: 1.0 });
+    let mut body = Pulled::new(LatticeKind::Hexagonal { spacing: 1.0 }, None);
     let lists = (0..body.interaction.reference.len()).map(|j| {
         let mut list = body.interaction.neighbours.of(j).to_vec();
         let turn = j % list.len();

@@ -2,6 +2,7 @@
 
 use std::ops::ControlFlow;
 
+use flockform::continuum::engine::Engine;
 use flockform::continuum::plan::Plan;
 use flockform::continuum::report::PlanReport;
 use flockform::continuum::run::{Outcome, Watch, run, run_watched};
@@ -66,8 +67,8 @@ fn leaders_on_their_way_and_roles_that_change_are_met_at_their_steps() {
     // Pulled 12 units and let go: nothing would be left to see if the motion had gone on, or not begun.
     let first = outcome.engine.displacement(99);
     assert!(first[0] > 0.01 && first[0] < 6.0, "{first:?}");
-    // A frame, fracture and terms that look at every step are stepped one at a time.
-    for name in ["tension", "fracture-hexagonal", "feedback-grow"] {
+    // A frame that looks after the sweep, fracture and terms that look at every step are stepped one at a time.
+    for name in ["tension-immediate", "fracture-hexagonal", "feedback-grow"] {
         let bundled = bundled(name).expect("bundled");
         let scene = bundled.load(&["stop.steps=60".into()]).unwrap_or_else(|error| panic!("{error}"));
         assert_same(&scene, &|_| usize::MAX, name);
@@ -95,4 +96,13 @@ fn what_is_swept_is_what_moves_and_the_plan_foresees_it() {
     let plan = plan(&scene);
     let report = PlanReport::new(&scene, &plan).expect("a plan").to_string();
     assert!(report.contains("about 3 % of the updates"), "{report}");
+}
+
+#[test]
+fn a_frame_that_looks_before_the_sweep_is_taken_along() {
+    let scene = scene("tension", &["stop.steps=300"]);
+    assert_same(&scene, &|_| usize::MAX, "the paper's frame");
+    let steps_at_once = |scene: &Scene| Engine::new(plan(scene)).steps_at_once(16);
+    assert_eq!(steps_at_once(&scene), 16);
+    assert_eq!(steps_at_once(&bundled("tension-immediate").expect("bundled").load(&[]).expect("valid")), 0);
 }

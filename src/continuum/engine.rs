@@ -26,6 +26,8 @@ pub struct Engine {
     interaction: Interaction,
     update: Update,
     sweep: Sweep,
+    /// Whether the sweep takes several steps of this body, its frame included.
+    takes_several: bool,
     roles: Vec<Role>,
     changes: Vec<RoleChange>,
     /// By particle.
@@ -83,6 +85,7 @@ impl Engine {
         });
         let mut engine = Self {
             sweep: Sweep::uncompiled(update, &roles),
+            takes_several: false,
             present: Points::clone(&body.reference),
             previous: Points::clone(&body.reference),
             body,
@@ -328,6 +331,7 @@ impl Engine {
         } else {
             Sweep::compile(self.update, &self.interaction, &self.roles)
         };
+        self.takes_several = self.sweep.takes_several(self.body.frame.as_ref());
     }
 
     fn break_bonds(&mut self) {
@@ -337,6 +341,7 @@ impl Engine {
         bonds.break_stretched(self.step, &self.interaction.neighbours, places, &self.roles, &mut self.breaks);
         if self.breaks.len() > known {
             tracing::debug!("step {}: {} bonds break", self.step, self.breaks.len() - known);
+            self.takes_several = false;
             let torn = self.breaks[known..].iter().flat_map(|b| b.pair).map(|j| j as usize);
             self.sweep.set_aside(torn, &self.interaction);
         }

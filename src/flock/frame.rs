@@ -7,8 +7,12 @@
 //! `Mirror` continues the body beyond its edge by serving the particle opposite across that
 //! nearest one, so that the edge sees what an interior particle would.
 
+use std::ops::Range;
+
 use super::lattice::{Lattice, Site};
 use super::points::Points;
+use super::real::Real;
+use super::stencil::Plane;
 
 /// Whom a frame point serves, and when it looks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,7 +45,7 @@ impl FrameRule {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frame {
     pub rule: FrameRule,
-    /// Particle index of each frame point, shape \[points\].
+    /// Particle index of each frame point, ascending, shape \[points\].
     pub points: Vec<u32>,
     starts: Vec<u32>,
     served: Vec<u32>,
@@ -95,6 +99,32 @@ impl Frame {
         }
         let count = served.len().max(1) as f64;
         [x / count, y / count]
+    }
+
+    /// How many places away the farthest particle is that a frame point serves.
+    pub fn reach(&self) -> usize {
+        let farthest = |k: usize| {
+            self.served_by(k).iter().map(|&s| s.abs_diff(self.points[k]) as usize).max().unwrap_or(0)
+        };
+        (0..self.len()).map(farthest).max().unwrap_or(0)
+    }
+
+    /// One coordinate of what [`Frame::follow`] does for the frame points among some particles, by a rule that looks
+    /// before the sweep; `reference` is that coordinate of the whole body.
+    pub fn follow_plane<T: Real>(&self, particles: Range<usize>, reference: &[T], plane: &mut Plane<'_, T>) {
+        let from = self.points.partition_point(|&point| (point as usize) < particles.start);
+        for (k, &point) in self.points.iter().enumerate().skip(from) {
+            let point = point as usize;
+            if point >= particles.end {
+                break;
+            }
+            let served = self.served_by(k);
+            let mut sum = T::default();
+            for &s in served {
+                sum += plane.present[s as usize - plane.seen_from] - reference[s as usize];
+            }
+            plane.next[point - plane.begin] = reference[point] + sum / T::of(served.len().max(1) as f64);
+        }
     }
 
     /// Moves every frame point of `next` by the displacements seen in `before`, the positions before

@@ -161,6 +161,12 @@ impl Stencil {
         self.bands.len().saturating_sub(1)
     }
 
+    /// Whether particles so many places apart are in one band or in bands beside each other, wherever they are.
+    pub fn are_near(&self, apart: usize) -> bool {
+        let inner = 1..self.band_count().saturating_sub(1);
+        !self.is_local || inner.into_iter().all(|band| self.particles(band..band + 1).len() >= apart)
+    }
+
     /// Whether no particle sees farther than into the bands beside its own.
     pub fn is_local(&self) -> bool {
         self.is_local

@@ -72,7 +72,7 @@ fn sixteen_steps_together(bencher: Bencher, side: u32) {
     let (mut next, mut activity) = (present.clone(), Activity::default());
     bencher.counter(ItemsCount::new(16 * sweep.followers())).bench_local(|| {
         let places = (&mut present, &mut next);
-        sweep.steps(&interaction, places, (16, Led::NOBODY, None), &mut activity)
+        sweep.steps(&interaction, None, places, (16, Led::NOBODY, None), &mut activity)
     });
 }
 

@@ -146,7 +146,13 @@ impl Body {
                 } else {
                     let count = to_go.min(steps_together);
                     let whole = &mut Activity::default();
-                    sweep.steps(&interaction, (&mut present, &mut next), (count, Led::NOBODY, None), whole);
+                    sweep.steps(
+                        &interaction,
+                        None,
+                        (&mut present, &mut next),
+                        (count, Led::NOBODY, None),
+                        whole,
+                    );
                     to_go -= count;
                 }
             }
@@ -186,7 +192,7 @@ fn square_single(side: usize, steps_together: usize) -> Subject {
         while to_go > 0 {
             let count = to_go.min(steps_together);
             let (stencil, led, threads) = (&stencil, Led::NOBODY, rayon::current_num_threads());
-            let steps = Steps { stencil, rest: None, led, count, farther: None, threads };
+            let steps = Steps { stencil, rest: None, frame: None, led, count, farther: None, threads };
             let rows = |[x, y]: &mut [Vec<f32>; 2]| [std::mem::take(x), std::mem::take(y)];
             let ([mut ex, mut ey], [mut ox, mut oy]) = (rows(&mut even), rows(&mut odd));
             steps.take(&mut Activity::default(), [&mut ex, &mut ey], [&mut ox, &mut oy]);

@@ -2,19 +2,18 @@
 
 use super::{Engine, Led as Leader};
 use crate::continuum::layout::RoleChange;
-use crate::flock::body::Body;
 use crate::flock::interaction::Interaction;
 use crate::flock::points::{Points, distance};
 use crate::solve::sweep::{Activity, Led, MOST_STEPS};
 
 impl Engine {
     /// How many steps, at most `most`, can be taken by [`Engine::advance_by`] from here; 0 where the next one
-    /// must be taken by [`Engine::advance`]: a frame, bonds that may break, neighbours found anew and roles
-    /// that change look at every step.
+    /// must be taken by [`Engine::advance`]: a frame that looks after the sweep, bonds that may break, neighbours
+    /// found anew and roles that change look at every step.
     pub fn steps_at_once(&self, most: usize) -> usize {
         let finds_neighbours = self.present_neighbours.is_some();
-        let looks = looks_at_every_step(&self.body, finds_neighbours, &self.interaction, &self.changes);
-        if looks || !self.guided.is_empty() || !self.sweep.takes_several() {
+        let looks = looks_at_every_step(finds_neighbours, &self.interaction, &self.changes);
+        if looks || !self.guided.is_empty() || !self.takes_several {
             return 0;
         }
         let to_come = self.changes.iter().map(|change| change.from).filter(|&from| from > self.step.max(1));
@@ -31,7 +30,9 @@ impl Engine {
         };
         let led = Led { particles: &self.led, place: &place };
         let places = (&mut self.present, &mut self.previous);
-        let told = self.sweep.steps(&self.interaction, places, (count, led, farther), &mut self.activity);
+        let frame = self.body.frame.as_ref();
+        let told =
+            self.sweep.steps(&self.interaction, frame, places, (count, led, farther), &mut self.activity);
         self.step += count;
         told
     }
@@ -73,13 +74,11 @@ impl Engine {
 
 /// Whether something of a body depends on how it stands in each step: then steps are taken one at a time.
 pub fn looks_at_every_step(
-    body: &Body,
     finds_neighbours: bool,
     interaction: &Interaction,
     changes: &[RoleChange],
 ) -> bool {
-    body.frame.is_some()
-        || finds_neighbours
+    finds_neighbours
         || interaction.bonds.as_ref().is_some_and(|bonds| bonds.threshold.is_some())
         || changes.iter().any(|change| change.when.is_some())
 }

@@ -14,7 +14,7 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-pub use several::{Activity, Led, MOST_STEPS, Steps};
+pub use several::{Activity, Following, Led, MOST_STEPS, Steps};
 
 use crate::flock::fracture::torn::Torn;
 use crate::flock::frame::Frame;
@@ -177,12 +177,12 @@ impl Sweep {
         }
     }
 
-    /// Takes up to [`MOST_STEPS`] steps at once, for bodies without a frame whose sweep [`Sweep::takes_several`]; the bits are
-    /// those of single steps. `next` must hold the positions before the last step, but for those who are led. For
+    /// Takes up to [`MOST_STEPS`] steps at once, by a sweep that [`Sweep::takes_several`]; the bits are those of single steps. `next` must hold the positions before the last step, but for those who are led. For
     /// each step, whether somebody moved farther in it than `farther` \[length\] along an axis.
     pub fn steps(
         &self,
         interaction: &Interaction,
+        frame: Option<&Frame>,
         (present, next): (&mut Points, &mut Points),
         (count, led, farther): (usize, Led<'_>, Option<f64>),
         activity: &mut Activity,
@@ -190,7 +190,9 @@ impl Sweep {
         let stencil = self.stencil.as_ref().expect("a sweep that takes several steps has a stencil");
         let rest = interaction.rest.as_ref().map(|rest| [&rest.x[..], &rest.y[..]]);
         let threads = rayon::current_num_threads();
-        let steps = Steps { stencil, rest, led, count, farther, threads };
+        let reference = [&interaction.reference.x[..], &interaction.reference.y[..]];
+        let frame = frame.map(|frame| Following { frame, reference });
+        let steps = Steps { stencil, rest, frame, led, count, farther, threads };
         let even = [&mut present.x[..], &mut present.y[..]];
         let farther = steps.take(activity, even, [&mut next.x[..], &mut next.y[..]]);
         if count % 2 == 1 {
@@ -204,9 +206,14 @@ impl Sweep {
         self.followers
     }
 
-    /// Whether [`Sweep::steps`] can take the steps.
-    pub fn takes_several(&self) -> bool {
-        self.stencil.is_some() && self.torn.is_empty()
+    /// Whether [`Sweep::steps`] can take the steps of a body with this frame, if it has one: not if something looks at a
+    /// step as it ends.
+    pub fn takes_several(&self, frame: Option<&Frame>) -> bool {
+        let keeps_up = |frame: &Frame, stencil: &Stencil| {
+            frame.rule.looks_before_the_sweep() && stencil.are_near(frame.reach())
+        };
+        self.torn.is_empty()
+            && self.stencil.as_ref().is_some_and(|stencil| frame.is_none_or(|frame| keeps_up(frame, stencil)))
     }
 
     fn moved(&self, j: usize, interaction: &Interaction, seen: &Points) -> [f64; 2] {

@@ -23,6 +23,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::PARALLEL_FROM;
+use crate::flock::frame::Frame;
 use crate::flock::real::Real;
 use crate::flock::stencil::{Plane, Stencil};
 
@@ -47,6 +48,13 @@ pub struct Led<'a> {
 
 impl Led<'_> {
     pub const NOBODY: Led<'static> = Led { particles: &[], place: &|_, _| [f64::NAN; 2] };
+}
+
+/// A frame that looks before the sweep, and where it stands around the body at rest \[length\].
+#[derive(Clone, Copy)]
+pub struct Following<'a, T> {
+    pub frame: &'a Frame,
+    pub reference: [&'a [T]; 2],
 }
 
 /// Which bands changed in the last step, and what was swept so far.
@@ -82,6 +90,7 @@ impl Activity {
 pub struct Steps<'a, T> {
     pub stencil: &'a Stencil,
     pub rest: Option<[&'a [T]; 2]>,
+    pub frame: Option<Following<'a, T>>,
     pub led: Led<'a>,
     /// How many, from 1 to [`MOST_STEPS`].
     pub count: usize,
@@ -333,6 +342,11 @@ impl<T: Real, const P: usize> Front<'_, T, P> {
         });
         planes.iter_mut().for_each(|plane| stencil.sweep_runs(bands.clone(), tile, plane));
         stencil.sweep_listed(bands.clone(), &mut planes);
+        if let Some(Following { frame, reference }) = steps.frame {
+            for (plane, &axis) in planes.iter_mut().zip(&*axes) {
+                frame.follow_plane(stencil.particles(bands.clone()), reference[axis], plane);
+            }
+        }
         let farther = &mut seen.farther[level - 1];
         for band in bands {
             let particles = stencil.particles(band..band + 1);

@@ -129,7 +129,7 @@ fn a_cracked_body_is_swept_to_the_bits_of_one_by_one() {
     for ghosts in [Ghosts::Lattice, Ghosts::Mirrored, Ghosts::None] {
         interaction.bonds = None;
         let mut sweep = Sweep::compile(Update::default(), &interaction, &roles);
-        assert!(sweep.takes_several());
+        assert!(sweep.takes_several(None));
         let (mut bonds, mut breaks) = (Bonds::new(None, ghosts, &interaction.neighbours), Vec::new());
         let (reference, neighbours) = (&interaction.reference, &interaction.neighbours);
         bonds.cut(([100.0, -400.0], [130.0, 400.0]), neighbours, reference, &mut breaks);
@@ -138,6 +138,6 @@ fn a_cracked_body_is_swept_to_the_bits_of_one_by_one() {
         sweep.set_aside(breaks.iter().flat_map(|b| b.pair).map(|j| j as usize), &interaction);
         assert_as_uncompiled(&sweep, &interaction, &roles);
         assert!(sweep.torn.len() > 500 && sweep.torn.len() < 5000, "{}", sweep.torn.len());
-        assert!(!sweep.takes_several());
+        assert!(!sweep.takes_several(None));
     }
 }

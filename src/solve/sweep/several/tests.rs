@@ -79,7 +79,7 @@ impl Case {
             let led = Led { particles: &self.led, place: &place };
             let rest = self.interaction.rest.as_ref().map(|rest| [&rest.x[..], &rest.y[..]]);
             let stencil = sweep.stencil.as_ref().expect("plain");
-            let steps = Steps { stencil, rest, led, count, farther: None, threads };
+            let steps = Steps { stencil, rest, frame: None, led, count, farther: None, threads };
             let even = [&mut present.x[..], &mut present.y[..]];
             let odd = [&mut next.x[..], &mut next.y[..]];
             pool.install(|| steps.take(&mut activity, even, odd));
@@ -118,7 +118,7 @@ fn threads_beyond_one_a_coordinate_cut_the_body_in_segments() {
     let stencil = sweep.stencil.as_ref().expect("plain");
     let segments = |threads| {
         let (led, count, farther) = (Led::NOBODY, 16, None);
-        let steps = Steps::<f64> { stencil, rest: None, led, count, farther, threads };
+        let steps = Steps::<f64> { stencil, rest: None, frame: None, led, count, farther, threads };
         steps.cuts(stencil.band_count(), threads.div_ceil(2)).len() - 1
     };
     assert_eq!([1, 2, 4, 8].map(segments), [1, 1, 2, 4]);
@@ -193,7 +193,8 @@ fn it_is_told_in_which_steps_somebody_moved_farther_than_asked() {
     let place = |which: usize, level: usize| case.place(which, if level < 3 { 0 } else { 1 });
     let led = Led { particles: &case.led, place: &place };
     let places = (&mut present, &mut next);
-    let farther = sweep.steps(&case.interaction, places, (5, led, Some(0.09)), &mut Activity::default());
+    let farther =
+        sweep.steps(&case.interaction, None, places, (5, led, Some(0.09)), &mut Activity::default());
     // The leaders jump by 0.1 in the third; whoever follows moves by less.
     assert_eq!(farther, [false, false, true, false, false]);
 }
@@ -210,6 +211,7 @@ fn it_is_told_of_whoever_moved_far_wherever_that_was() {
         let (mut next, places) = (present.clone(), &mut present);
         let farther = sweep.steps(
             &case.interaction,
+            None,
             (places, &mut next),
             (4, Led::NOBODY, Some(0.3)),
             &mut Activity::default(),
@@ -237,7 +239,7 @@ fn lists_where_one_coordinate_alone_moves_are_swept() {
         let mut next = start;
         for count in [1, 3, 4] {
             let places = (&mut together, &mut next);
-            sweep.steps(&still.interaction, places, (count, Led::NOBODY, None), &mut activity);
+            sweep.steps(&still.interaction, None, places, (count, Led::NOBODY, None), &mut activity);
         }
         assert_eq!(together, singly, "axis {axis}");
         assert!(activity.share_computed() < 0.5);
