@@ -94,6 +94,11 @@ fn outputs_that_are_not_committed_leave_nothing_behind() {
     assert!(hidden.len() == 1 && hidden[0].starts_with(".out.partial-"), "{hidden:?}");
     drop(folder);
     assert!(names_in(parent.path()).is_empty());
+    // Nor the folders made for them, but for those in which somebody has put something meanwhile.
+    let deep = OutputFolder::create(&parent.path().join("runs/today/out"), false).expect("created");
+    std::fs::write(parent.path().join("runs/note"), "mine").expect("written");
+    drop(deep);
+    assert_eq!(names_in(&parent.path().join("runs")), ["note"]);
 }
 
 #[test]

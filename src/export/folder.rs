@@ -20,6 +20,8 @@ pub struct OutputFolder {
     out: PathBuf,
     partial: PathBuf,
     force: bool,
+    /// Folders above it that were made for it, the innermost first.
+    made: Vec<PathBuf>,
     /// Whether what was written outlives this value.
     is_kept: bool,
     /// Holds others off an unfinished folder, for as long as this program lives.
@@ -41,12 +43,14 @@ impl OutputFolder {
     pub fn create(out: &Path, force: bool) -> Result<Self, ExportError> {
         let out = in_full(out)?;
         standing(&out, force)?;
-        if let Some(parent) = out.parent() {
+        make_way(&unfinished(&out), force)?;
+        let above = out.ancestors().skip(1).take_while(|folder| !folder.exists());
+        let made: Vec<PathBuf> = above.map(Path::to_owned).collect();
+        if let Some(parent) = made.first() {
             fs::create_dir_all(parent).map_err(ExportError::io("create", parent))?;
         }
-        make_way(&unfinished(&out), force)?;
         let partial = create_beside(&out, "partial")?;
-        Ok(Self { out, partial, force, is_kept: false, lock: None })
+        Ok(Self { out, partial, force, made, is_kept: false, lock: None })
     }
 
     /// The folder that a run to `out` has left unfinished; `force` as in [`OutputFolder::create`].
@@ -57,7 +61,7 @@ impl OutputFolder {
         let out = in_full(out)?;
         let partial = unfinished(&out);
         let lock = lock(&partial)?;
-        Ok(Self { out, partial, force, is_kept: true, lock })
+        Ok(Self { out, partial, force, made: Vec::new(), is_kept: true, lock })
     }
 
     /// Lets what is written outlive this program, in the open, as `NAME.unfinished`. Paths given before are
@@ -129,11 +133,14 @@ impl OutputFolder {
 
 impl Drop for OutputFolder {
     fn drop(&mut self) {
-        if !self.is_kept
-            && let Err(error) = fs::remove_dir_all(&self.partial)
-        {
+        if self.is_kept {
+            return;
+        }
+        if let Err(error) = fs::remove_dir_all(&self.partial) {
             tracing::warn!("unfinished outputs are left in {}: {error}", self.partial.display());
         }
+        // Not those in which somebody has put something meanwhile.
+        let _ = self.made.iter().try_for_each(fs::remove_dir);
     }
 }
 
