@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use super::measure::{End, Ends, Samples, Work, exchange};
-use super::{DDS_ROUNDS, Effort, Report};
+use super::{DDS_TURNS, Effort, Report};
 use crate::ros::edge::{Edge, Node, Options, Publisher, Quality, Subscription};
 use crate::ros::messages::builtin_interfaces::Time;
 use crate::ros::messages::geometry_msgs::{Pose, PoseArray};
@@ -96,8 +96,8 @@ pub fn measure(effort: &Effort, report: &mut Report) {
         for &poses in effort.sizes {
             let mut samples = Samples::default();
             let measured = open(poses).and_then(|(near, far)| {
-                let rounds = effort.rounds.min(DDS_ROUNDS * effort.rounds / effort.turns);
-                exchange(near, far, work, rounds, 2.0 * effort.seconds, &mut samples)
+                let (rounds, seconds) = (DDS_TURNS * effort.rounds, DDS_TURNS as f64 * effort.seconds);
+                exchange(near, far, work, rounds, seconds, &mut samples)
             });
             match measured {
                 Ok(()) => report.cases.push(samples.case(NAME, work, poses)),
