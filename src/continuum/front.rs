@@ -11,8 +11,8 @@ use crate::solve::sweep::Sweep;
 pub fn share_reached(plan: &Plan) -> Option<f64> {
     let Plan { body, interaction, changes, .. } = plan;
     let looks = looks_at_every_step(plan.present_radius.is_some(), interaction, changes);
-    let sweep = Sweep::compile(plan.update, &plan.interaction, &plan.roles);
-    if looks || !sweep.takes_several(body.frame.as_ref()) {
+    let sweep = || Sweep::compile(plan.update, &plan.interaction, &plan.roles);
+    if looks || !sweep().takes_several(body.frame.as_ref()) {
         return None;
     }
     let steps = plan.stop.steps;
@@ -58,18 +58,20 @@ fn first_motions(plan: &Plan, steps: usize) -> Vec<usize> {
 /// Who sees each particle: the frame sees those it serves.
 fn seen_by(plan: &Plan) -> Neighbours {
     let neighbours = &plan.interaction.neighbours;
-    let lists = (0..plan.count()).flat_map(|j| neighbours.of(j).iter().map(move |&k| (j as u32, k)));
-    let points = plan.body.frame.iter().flat_map(|frame| (0..frame.len()).map(move |k| (frame, k)));
-    let served =
-        points.flat_map(|(frame, k)| frame.served_by(k).iter().map(move |&served| (frame.points[k], served)));
-    let pairs: Vec<(u32, u32)> = lists.chain(served).collect();
+    let pairs = || {
+        let lists = (0..plan.count()).flat_map(|j| neighbours.of(j).iter().map(move |&k| (j as u32, k)));
+        let points = plan.body.frame.iter().flat_map(|frame| (0..frame.len()).map(move |k| (frame, k)));
+        let served = points
+            .flat_map(|(frame, k)| frame.served_by(k).iter().map(move |&served| (frame.points[k], served)));
+        lists.chain(served)
+    };
     let mut starts = vec![0u32; plan.count() + 1];
-    pairs.iter().for_each(|&(_, seen)| starts[seen as usize + 1] += 1);
+    pairs().for_each(|(_, seen)| starts[seen as usize + 1] += 1);
     for k in 0..plan.count() {
         starts[k + 1] += starts[k];
     }
-    let (mut next, mut index) = (starts.clone(), vec![0; pairs.len()]);
-    for (who, seen) in pairs {
+    let (mut next, mut index) = (starts.clone(), vec![0; starts[plan.count()] as usize]);
+    for (who, seen) in pairs() {
         index[next[seen as usize] as usize] = who;
         next[seen as usize] += 1;
     }

@@ -88,17 +88,18 @@ impl Frame {
         &self.served[self.starts[k] as usize..self.starts[k + 1] as usize]
     }
 
+    /// Mean of a number that belongs to each particle which frame point number `k` serves.
+    fn mean_of_served<T: Real>(&self, k: usize, of: impl Fn(usize) -> T) -> T {
+        let served = self.served_by(k);
+        let mut sum = T::default();
+        served.iter().for_each(|&s| sum += of(s as usize));
+        sum / T::of(served.len().max(1) as f64)
+    }
+
     /// Displacement of frame point number `k` when the body stands at `seen` \[length\].
     pub fn displacement(&self, k: usize, reference: &Points, seen: &Points) -> [f64; 2] {
-        let served = self.served_by(k);
-        let (mut x, mut y) = (0.0, 0.0);
-        for &s in served {
-            let s = s as usize;
-            x += seen.x[s] - reference.x[s];
-            y += seen.y[s] - reference.y[s];
-        }
-        let count = served.len().max(1) as f64;
-        [x / count, y / count]
+        let along = |seen: &[f64], reference: &[f64]| self.mean_of_served(k, |s| seen[s] - reference[s]);
+        [along(&seen.x, &reference.x), along(&seen.y, &reference.y)]
     }
 
     /// How many places away the farthest particle is that a frame point serves.
@@ -118,12 +119,8 @@ impl Frame {
             if point >= particles.end {
                 break;
             }
-            let served = self.served_by(k);
-            let mut sum = T::default();
-            for &s in served {
-                sum += plane.present[s as usize - plane.seen_from] - reference[s as usize];
-            }
-            plane.next[point - plane.begin] = reference[point] + sum / T::of(served.len().max(1) as f64);
+            let moved = |s: usize| plane.present[s - plane.seen_from] - reference[s];
+            plane.next[point - plane.begin] = reference[point] + self.mean_of_served(k, moved);
         }
     }
 
