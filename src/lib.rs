@@ -7,8 +7,8 @@
 //! The rooms, in the direction data flows:
 //!
 //! * [`scene`]: a TOML file becomes a validated [`scene::Scene`]; nothing downstream re-checks it.
-//! * [`flock`]: the core. Lattices, bodies, neighbourhoods, rules, frames, fracture. Pure, and it
-//!   imports no other room.
+//! * [`geometry`]: shapes of the plane and their outlines. It imports no other room.
+//! * [`flock`]: the core. Lattices, bodies, neighbourhoods, rules, frames, fracture. Pure.
 //! * [`solve`]: sweeps over the flock's interaction, their spectra, and the solvers for equilibrium.
 //! * [`material`]: rule weights from Young's modulus and Poisson's ratio, and what material a rule is.
 //! * [`continuum`]: plans a scene, steps it or goes straight to rest, and hands what happens to an observer.
@@ -36,6 +36,7 @@
 
 pub mod continuum;
 pub mod flock;
+pub mod geometry;
 pub mod material;
 pub mod scene;
 pub mod solve;

@@ -40,13 +40,19 @@ fn assert_imports_only(room: &str, allowed: &[&str]) {
 }
 
 #[test]
-fn flock_imports_no_other_room() {
-    assert_imports_only("flock", &[]);
+fn geometry_imports_no_other_room() {
+    assert_imports_only("geometry", &[]);
 }
 
 #[test]
-fn flock_has_no_features_no_clock_and_no_threads() {
-    for file in rust_files(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src/flock")) {
+fn flock_imports_geometry_alone() {
+    assert_imports_only("flock", &["geometry"]);
+}
+
+#[test]
+fn geometry_and_flock_have_no_features_no_clock_and_no_threads() {
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    for file in ["geometry", "flock"].iter().flat_map(|room| rust_files(&source.join(room))) {
         let text = std::fs::read_to_string(&file).expect("readable");
         for word in ["feature =", "std::time", "std::thread", "std::fs", "std::io", "rayon", "serde"] {
             assert!(!text.contains(word), "{} uses {word}", file.display());
@@ -55,48 +61,48 @@ fn flock_has_no_features_no_clock_and_no_threads() {
 }
 
 #[test]
-fn solve_imports_the_flock_alone() {
-    assert_imports_only("solve", &["flock"]);
+fn solve_imports_the_flock_and_geometry() {
+    assert_imports_only("solve", &["geometry", "flock"]);
 }
 
 #[test]
-fn the_finite_elements_know_no_other_room() {
-    assert_imports_only("fem", &[]);
+fn the_finite_elements_know_geometry_alone() {
+    assert_imports_only("fem", &["geometry"]);
 }
 
 #[test]
-fn material_imports_the_flock_alone() {
-    assert_imports_only("material", &["flock"]);
+fn material_imports_the_flock_and_geometry() {
+    assert_imports_only("material", &["geometry", "flock"]);
 }
 
 #[test]
 fn scene_knows_nothing_of_hosts_and_outputs() {
-    assert_imports_only("scene", &["flock", "solve", "material"]);
+    assert_imports_only("scene", &["geometry", "flock", "solve", "material"]);
 }
 
 #[test]
 fn continuum_knows_nothing_of_outputs() {
-    assert_imports_only("continuum", &["flock", "solve", "scene", "material"]);
+    assert_imports_only("continuum", &["geometry", "flock", "solve", "scene", "material"]);
 }
 
 #[test]
 fn the_comparison_knows_nothing_of_outputs() {
-    assert_imports_only("compare", &["scene", "continuum", "flock", "material", "solve", "fem"]);
+    assert_imports_only("compare", &["geometry", "scene", "continuum", "flock", "material", "solve", "fem"]);
 }
 
 #[test]
 fn trade_stands_on_compare_and_knows_nothing_of_outputs() {
-    assert_imports_only("trade", &["scene", "continuum", "flock", "solve", "compare"]);
+    assert_imports_only("trade", &["geometry", "scene", "continuum", "flock", "solve", "compare"]);
 }
 
 #[test]
 fn stability_knows_nothing_of_outputs() {
-    assert_imports_only("stability", &["scene", "continuum", "flock", "material", "solve"]);
+    assert_imports_only("stability", &["geometry", "scene", "continuum", "flock", "material", "solve"]);
 }
 
 #[test]
 fn the_swarm_knows_nothing_of_middleware_and_outputs() {
-    assert_imports_only("swarm", &["scene", "continuum", "flock", "material", "solve"]);
+    assert_imports_only("swarm", &["geometry", "scene", "continuum", "flock", "material", "solve"]);
 }
 
 #[test]

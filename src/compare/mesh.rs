@@ -71,7 +71,7 @@ impl TruthMesh {
             cut.cell(&corners);
         }
         let (kind, mut carriers) =
-            (if cells.corners == 4 { CellKind::Quad4 } else { CellKind::Tri3 }, cut.carriers);
+            (if cells.most_corners() == 4 { CellKind::Quad4 } else { CellKind::Tri3 }, cut.carriers);
         let (x, y) = (0..carriers.count()).map(|node| carriers.interpolate(node, reference).into()).unzip();
         let mesh = Mesh::new(kind, x, y, cut.elements)?.promoted();
         carriers.promote(&mesh);
@@ -111,7 +111,7 @@ impl TruthMesh {
 
 /// About how many nodes the mesh will have.
 fn expected_nodes(cells: &Cells, refine: usize) -> usize {
-    let of_cell = match cells.corners {
+    let of_cell = match cells.most_corners() {
         3 => 2,
         4 => 4,
         _ => 12,

@@ -7,7 +7,7 @@ use super::lattice::{Lattice, LatticeKind, Site};
 use super::neighbourhood::{Neighbourhood, NeighbourhoodError, Neighbours};
 use super::numbering::Numbering;
 use super::points::Points;
-use super::shape::Shape;
+use crate::geometry::shape::Shape;
 
 /// What is cut from the lattice.
 #[derive(Clone, Debug, PartialEq)]

@@ -9,7 +9,7 @@ mod watch;
 use super::neighbourhood::Neighbours;
 use super::points::{Points, distance};
 use super::role::Role;
-use super::shape::{Segment, segments_cross};
+use crate::geometry::shape::{Segment, segments_cross};
 use watch::Watch;
 
 /// When a bond breaks.

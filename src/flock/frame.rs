@@ -159,8 +159,8 @@ mod tests {
     use super::super::body::{Body, Cut};
     use super::super::lattice::LatticeKind;
     use super::super::neighbourhood::Neighbourhood;
-    use super::super::shape::Shape;
     use super::*;
+    use crate::geometry::shape::Shape;
 
     fn framed(
         kind: LatticeKind,

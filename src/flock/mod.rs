@@ -25,7 +25,5 @@ pub mod real;
 pub mod region;
 pub mod role;
 pub mod rules;
-pub mod shape;
-pub mod specimen;
 pub mod stencil;
 pub mod strain;

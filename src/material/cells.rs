@@ -13,18 +13,18 @@ use crate::flock::points::Points;
 
 use super::stiffness::mean_strain;
 
-/// Cells of one kind of polygon, in compressed form. Corners run counter-clockwise.
+/// Cells of any polygons, in compressed form. Corners run counter-clockwise.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cells {
-    /// Corners of every cell: 3, 4 or 6 on lattices.
-    pub corners: usize,
-    /// Particles at the corners, shape \[count, corners\].
+    /// Where the corners of each cell begin in `index`, shape \[count + 1\].
+    pub starts: Vec<u32>,
+    /// Particles at the corners, cell by cell.
     pub index: Vec<u32>,
     /// Which of `shapes` each cell has, shape \[count\].
     pub kind: Vec<u32>,
-    /// Corners relative to the first \[length\], shape \[kinds, corners\]. A lattice has one or two; they come
-    /// from the lattice's vectors, not from differences of positions, so a body far from the origin
-    /// loses no digits.
+    /// Corners relative to the first \[length\], shape \[kinds, corners of the kind\]. A lattice has one or two;
+    /// they come from the lattice's vectors, not from differences of positions, so a body far from the origin
+    /// loses no digits. Cells that an outline has cut follow them, one shape each.
     pub shapes: Vec<Vec<[f64; 2]>>,
 }
 
@@ -56,24 +56,15 @@ impl Cells {
     /// All cells whose corners `lookup` knows, in the order of `sites`.
     pub fn of_sites(lattice: &Lattice, sites: &[Site], lookup: impl Fn(Site) -> Option<u32>) -> Self {
         let templates = templates(lattice);
-        let corners = templates[0].len();
-        let mut cells = Self {
-            corners,
-            index: Vec::new(),
-            kind: Vec::new(),
-            shapes: templates
-                .iter()
-                .map(|t| t.iter().map(|&corner| lattice.vector(corner)).collect())
-                .collect(),
-        };
-        let mut found = Vec::with_capacity(corners);
+        let shape = |t: &Vec<Site>| t.iter().map(|&corner| lattice.vector(corner)).collect();
+        let mut cells = Self::of_kinds(templates.iter().map(shape).collect());
+        let mut found = Vec::new();
         for &[i, j] in sites.iter().filter(|&&site| lattice.sublattice(site) == 0) {
             for (kind, template) in templates.iter().enumerate() {
                 found.clear();
                 found.extend(template.iter().map_while(|corner| lookup([i + corner[0], j + corner[1]])));
-                if found.len() == corners {
-                    cells.index.extend(&found);
-                    cells.kind.push(kind as u32);
+                if found.len() == template.len() {
+                    cells.push(&found, kind as u32);
                 }
             }
         }
@@ -93,17 +84,34 @@ impl Cells {
         Self { kind: (0..self.count() as u32).collect(), shapes, ..self.clone() }
     }
 
+    /// No cells yet, of these kinds: corners relative to the first \[length\], shape \[kinds, corners of the kind\].
+    pub fn of_kinds(shapes: Vec<Vec<[f64; 2]>>) -> Self {
+        Self { starts: vec![0], index: Vec::new(), kind: Vec::new(), shapes }
+    }
+
+    /// Adds a cell with these particles at its corners, of one of the kinds in `shapes`.
+    pub fn push(&mut self, corners: &[u32], kind: u32) {
+        self.index.extend(corners);
+        self.starts.push(self.index.len() as u32);
+        self.kind.push(kind);
+    }
+
     pub fn count(&self) -> usize {
         self.kind.len()
     }
 
-    /// Particles at the corners of a cell, counter-clockwise, shape \[corners\].
-    pub fn of(&self, cell: usize) -> &[u32] {
-        &self.index[cell * self.corners..(cell + 1) * self.corners]
+    /// Most corners of a cell; 0 without cells.
+    pub fn most_corners(&self) -> usize {
+        self.iter().map(<[u32]>::len).max().unwrap_or(0)
     }
 
-    pub fn iter(&self) -> impl Iterator<Item = &[u32]> {
-        self.index.chunks_exact(self.corners)
+    /// Particles at the corners of a cell, counter-clockwise, shape \[corners\].
+    pub fn of(&self, cell: usize) -> &[u32] {
+        &self.index[self.starts[cell] as usize..self.starts[cell + 1] as usize]
+    }
+
+    pub fn iter(&self) -> impl ExactSizeIterator<Item = &[u32]> + Clone {
+        self.starts.windows(2).map(|ends| &self.index[ends[0] as usize..ends[1] as usize])
     }
 
     /// Corners of a cell relative to the first \[length\], shape \[corners\].
@@ -122,9 +130,11 @@ impl Cells {
         }
         let mut next = starts.clone();
         let mut cell = vec![0; self.index.len()];
-        for (place, &i) in self.index.iter().enumerate() {
-            cell[next[i as usize] as usize] = (place / self.corners) as u32;
-            next[i as usize] += 1;
+        for (number, corners) in self.iter().enumerate() {
+            for &i in corners {
+                cell[next[i as usize] as usize] = number as u32;
+                next[i as usize] += 1;
+            }
         }
         Incidence { starts, cell }
     }
@@ -273,7 +283,7 @@ mod tests {
                     assert!((area(on_points.shape(cell)) - cell_area).abs() < 1e-12, "{kind:?}");
                 }
                 // One lattice cell for each particle: as many cells as fill its Voronoi area.
-                let around_each = cells.corners as f64 * body.lattice.cell_area() / cell_area;
+                let around_each = cells.most_corners() as f64 * body.lattice.cell_area() / cell_area;
                 let incidence = cells.incidence(body.count());
                 let most = (0..body.count()).map(|i| incidence.of(i).len()).max();
                 assert_eq!(most, Some(around_each.round() as usize), "{kind:?}");

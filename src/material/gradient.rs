@@ -317,7 +317,7 @@ mod tests {
 
     #[test]
     fn weights_are_the_same_both_ways_and_every_particle_has_a_positive_total_on_any_body() {
-        use crate::flock::shape::Shape;
+        use crate::geometry::shape::Shape;
         for lattice in lattices() {
             let weights = GradientWeights::new(&lattice, 3.0 * widest(&lattice)).expect("fits");
             let disc = |radius: f64, x: f64| Shape::Disc { centre: [x, 0.3], radius };

@@ -257,8 +257,9 @@ mod tests {
         // Sites around a hole make a cell in the hole too: keep those asked for.
         let keep: Vec<usize> =
             (0..cells.count()).filter(|&c| of.contains(&sites[cells.of(c)[0] as usize])).collect();
-        cells.index = keep.iter().flat_map(|&c| cells.of(c).to_vec()).collect();
-        cells.kind.truncate(keep.len());
+        let all = std::mem::replace(&mut cells, Cells::of_kinds(Vec::new()));
+        keep.iter().for_each(|&c| cells.push(all.of(c), all.kind[c]));
+        cells.shapes = all.shapes;
         (cells, sites.iter().map(|&site| lattice.position(site)).collect(), sites)
     }
 

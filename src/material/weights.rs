@@ -291,7 +291,7 @@ impl Assembly<'_> {
                         particle: particle + 1,
                         missing: corner as usize + 1,
                         neighbours: self.most_neighbours(),
-                        corners: cells.corners,
+                        corners: corners.len(),
                     });
                 };
                 let entry = |a: usize, b: usize| -factor * k[(2 * own + a, 2 * other + b)];

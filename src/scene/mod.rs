@@ -25,7 +25,7 @@ use crate::flock::neighbourhood::Neighbourhood;
 use crate::flock::region::{Region, Side};
 use crate::flock::role::Role;
 use crate::flock::rules::{Axis, Feedback, Mean};
-use crate::flock::shape::Segment;
+use crate::geometry::shape::Segment;
 use crate::material::elastic::Elastic;
 use crate::solve::equilibrium::Request;
 use crate::solve::sweep::Update;

@@ -6,7 +6,7 @@
 use flockform::flock::body::Cut;
 use flockform::flock::lattice::{Lattice, LatticeKind};
 use flockform::flock::points::Points;
-use flockform::flock::shape::Shape;
+use flockform::geometry::shape::Shape;
 use flockform::material::loads::{Loads, Traction};
 use flockform::material::weights::MaterialWeights;
 

@@ -4,7 +4,7 @@ use flockform::flock::body::{Body, Cut};
 use flockform::flock::lattice::Lattice;
 use flockform::flock::neighbourhood::Neighbourhood;
 use flockform::flock::points::Points;
-use flockform::flock::shape::Shape;
+use flockform::geometry::shape::Shape;
 use flockform::material::cells::{Cells, without_loose_sites};
 use flockform::material::mechanism::Mechanism;
 use flockform::material::weights::{MaterialWeights, WeightsError};

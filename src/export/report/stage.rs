@@ -153,8 +153,11 @@ impl Stage {
     }
 
     pub fn set_cells(&mut self, cells: &Cells) {
-        self.film.corners = cells.corners;
-        self.put("cells", integers(cells.index.iter().copied(), cells.corners));
+        // The page draws polygons of as many corners each: those with fewer repeat their last.
+        let most = cells.most_corners();
+        let filled = |cell: &[u32]| (0..most).map(|k| cell[k.min(cell.len() - 1)]).collect::<Vec<_>>();
+        self.film.corners = most;
+        self.put("cells", integers(cells.iter().flat_map(filled), most));
     }
 
     /// A column known to the last bit at the end; NaN where there is nothing.

@@ -3,10 +3,10 @@ use super::super::interaction::{Interaction, Weights};
 use super::super::lattice::{Lattice, LatticeKind};
 use super::super::neighbourhood::Neighbourhood;
 use super::super::rules::Rule;
-use super::super::shape::Shape;
 use super::super::stencil::Plane;
 use super::torn::Torn;
 use super::*;
+use crate::geometry::shape::Shape;
 
 /// Numbers in 0..1 that look random.
 struct Draws(u64);

@@ -3,8 +3,8 @@ use super::super::interaction::{Interaction, Weights};
 use super::super::lattice::{Lattice, LatticeKind};
 use super::super::neighbourhood::Neighbourhood;
 use super::super::rules::Rule;
-use super::super::shape::Shape;
 use super::*;
+use crate::geometry::shape::Shape;
 
 /// Numbers that look random, of very different sizes and both signs, with zeros of both signs.
 fn rough(count: usize, seed: u64) -> Points {

@@ -19,8 +19,8 @@ use crate::flock::frame::FrameRule;
 use crate::flock::lattice::{Lattice, LatticeKind};
 use crate::flock::neighbourhood::Neighbourhood;
 use crate::flock::rules::{Axis, Feedback, FeedbackReference, Mean, Origin};
-use crate::flock::shape::{Segment, Shape};
-use crate::flock::specimen::Specimen;
+use crate::geometry::shape::{Segment, Shape};
+use crate::geometry::specimen::Specimen;
 use crate::material::cells;
 use crate::solve::sweep::{Order, Update};
 

@@ -15,7 +15,7 @@ use parry2d::shape::{Ball, Segment};
 
 use super::cell::HalfPlane;
 use super::limits::{Place, SafetyError};
-use crate::flock::shape::segments_cross;
+use crate::geometry::shape::segments_cross;
 
 /// A solid \[m, world frame\].
 #[derive(Clone, Debug, PartialEq)]

@@ -1,0 +1,8 @@
+//! Shapes of the plane, and the outlines that bound them.
+//!
+//! Lengths are in the unit of whoever made the shape, in the world frame; angles in radians, counter-clockwise.
+
+pub mod outline;
+pub mod portion;
+pub mod shape;
+pub mod specimen;
