@@ -105,9 +105,7 @@ pub fn of_plan(scene: &Scene, plan: &Plan) -> Result<System, SceneError> {
 fn refuse_corotated(scene: &Scene, error: &CorotatedError) -> SceneError {
     let (key, help) = match error {
         CorotatedError::Solve(error) => return refuse(scene, error),
-        CorotatedError::NotSymmetric { .. } => {
-            ("equilibrium.solver", "take direct, or leave the solver out: \"auto\" does")
-        }
+        CorotatedError::DoubleOnly => ("equilibrium.precision", "use \"f64\", or leave the precision out"),
         CorotatedError::Feedback => ("rule.feedback", "leave it out: it does not move the place of rest"),
         CorotatedError::Unsettled { .. } => {
             ("equilibrium", "load it less, or leave [equilibrium] out to step there")

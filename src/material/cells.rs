@@ -6,12 +6,15 @@
 
 use std::sync::Arc;
 
+use nalgebra::DMatrix;
+
 use crate::flock::body::Body;
 use crate::flock::lattice::{Lattice, LatticeKind, Site};
 use crate::flock::neighbourhood::{Neighbourhood, Neighbours};
 use crate::flock::points::Points;
 
-use super::stiffness::mean_strain;
+use super::elastic::Voigt;
+use super::stiffness::{ShapeError, cut_cell, element, mean_strain};
 
 /// Cells of any polygons, in compressed form. Corners run counter-clockwise.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,6 +29,8 @@ pub struct Cells {
     /// they come from the lattice's vectors, not from differences of positions, so a body far from the origin
     /// loses no digits. Cells that an outline has cut follow them, one shape each.
     pub shapes: Vec<Vec<[f64; 2]>>,
+    /// How many of the shapes are whole cells; those after them are polygons that an outline has cut.
+    pub whole: usize,
 }
 
 /// A corner of cells at a particle: which cells, and the particle's place among their corners.
@@ -73,7 +78,7 @@ impl Cells {
 
     /// The same cells with their corners at these points \[length\], each with a shape of its own.
     pub fn on_points(&self, points: &Points) -> Self {
-        let shapes = self
+        let shapes: Vec<Vec<[f64; 2]>> = self
             .iter()
             .map(|cell| {
                 let [x0, y0] = points.get(cell[0] as usize);
@@ -81,12 +86,21 @@ impl Cells {
                 cell.iter().map(relative).collect()
             })
             .collect();
-        Self { kind: (0..self.count() as u32).collect(), shapes, ..self.clone() }
+        Self { kind: (0..self.count() as u32).collect(), whole: shapes.len(), shapes, ..self.clone() }
     }
 
     /// No cells yet, of these kinds: corners relative to the first \[length\], shape \[kinds, corners of the kind\].
     pub fn of_kinds(shapes: Vec<Vec<[f64; 2]>>) -> Self {
-        Self { starts: vec![0], index: Vec::new(), kind: Vec::new(), shapes }
+        Self { starts: vec![0], index: Vec::new(), kind: Vec::new(), whole: shapes.len(), shapes }
+    }
+
+    /// Stiffness of the cells of a kind \[force / length\]; see [`element`] and [`cut_cell`].
+    ///
+    /// # Errors
+    /// As [`element`].
+    pub fn element(&self, kind: usize, stiffness: &Voigt) -> Result<DMatrix<f64>, ShapeError> {
+        let shape = &self.shapes[kind];
+        if kind < self.whole { element(shape, stiffness) } else { cut_cell(shape, stiffness) }
     }
 
     /// Adds a cell with these particles at its corners, of one of the kinds in `shapes`.
