@@ -327,7 +327,7 @@ proptest! {
             let rule = Rule { mean: Mean::Material { rotation: Rotation::Corotated }, ..Rule::BARYCENTRE };
             let load = Some(Load { force, compliance: [[0.0; 2]; 2] });
             let cells = elements.iter().zip(&slots).map(|(element, slots)| CellAround { element, factor: 1.5, own: 0, slots });
-            rule.target_by_cells(&Own { present, reference: [0.0; 2], rest: [0.0; 2], load }, cells, corner)
+            rule.target_by_cells(&Own { present, reference: [0.0; 2], rest: [0.0; 2], load }, cells, [false; 2], corner)
         };
         let go = |p: [f64; 2]| { let [x, y] = turned(p); [x + shift[0], y + shift[1]] };
         let (before, after) = (target(&|p| p, push), target(&go, turned(push)));

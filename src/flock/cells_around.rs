@@ -42,6 +42,12 @@ impl CellsAround {
         self.starts.push(self.cells.len() as u32);
     }
 
+    /// Adds a class with the cells of another.
+    pub fn copy_class(&mut self, class: usize) {
+        self.cells.extend_from_within(self.starts[class] as usize..self.starts[class + 1] as usize);
+        self.end_class();
+    }
+
     /// The cells around a particle of a class, in the order in which they are summed.
     pub fn of(&self, class: usize) -> impl Iterator<Item = CellAround<'_>> + Clone {
         self.cells[self.starts[class] as usize..self.starts[class + 1] as usize].iter().map(|cell| {

@@ -85,6 +85,34 @@ impl MatrixWeights {
         self.starts[class] as usize..self.starts[class + 1] as usize
     }
 
+    /// Gives a particle a class of its own, in which the components that are `held` stay where they are and the other
+    /// one moves as if they did.
+    pub fn hold(&mut self, particle: usize, held: [bool; 2]) {
+        let range = self.range(particle);
+        let stiffness: Vec<Block> = self.stiffness[range].to_vec();
+        let diagonal = stiffness.iter().fold(Block::default(), |sum, block| plus(&sum, block));
+        let mut compliance = Block::default();
+        match held {
+            [false, true] => compliance[0][0] = 1.0 / diagonal[0][0],
+            [true, false] => compliance[1][1] = 1.0 / diagonal[1][1],
+            _ => {}
+        }
+        if let Some(cells) = &mut self.cells {
+            cells.copy_class(self.class[particle] as usize);
+        }
+        self.class[particle] = self.compliance.len() as u32;
+        self.compliance.push(compliance);
+        self.blocks.extend(stiffness.iter().map(|block| product(&compliance, block)));
+        self.stiffness.extend(stiffness);
+        self.starts.push(self.blocks.len() as u32);
+    }
+
+    /// The components of a particle that the rule keeps where its rest offset says: those that no force moves.
+    pub fn held(&self, particle: usize) -> [bool; 2] {
+        let compliance = self.compliance(particle);
+        [0, 1].map(|axis| compliance[axis][axis] == 0.0)
+    }
+
     pub fn compliance(&self, particle: usize) -> Block {
         self.compliance[self.class[particle] as usize]
     }
@@ -123,8 +151,8 @@ impl Interaction {
             load: self.load(particle),
         };
         if let (COROTATED, Weights::Matrix(weights)) = (rule.mean, &self.weights) {
-            let cells = weights.cells_around(particle);
-            return rule.target_by_cells(&own, cells, |slot| self.corner(particle, slot, present));
+            let (cells, held) = (weights.cells_around(particle), weights.held(particle));
+            return rule.target_by_cells(&own, cells, held, |slot| self.corner(particle, slot, present));
         }
         let broken = self.bonds.as_ref().filter(|bonds| bonds.any_broken());
         match (broken, &self.weights) {
@@ -217,8 +245,9 @@ impl Interaction {
         let corner = |slot| self.corner(particle, slot, present);
         invert(&pull(cells.clone(), corner).1)?;
         let (present, reference) = (present.get(particle), self.reference.get(particle));
-        let own = Own { present, reference, rest: [0.0; 2], load: self.load(particle) };
-        Some(self.rule.target_by_cells(&own, cells, corner))
+        let rest = self.rest.as_ref().map_or([0.0; 2], |rest| rest.get(particle));
+        let own = Own { present, reference, rest, load: self.load(particle) };
+        Some(self.rule.target_by_cells(&own, cells, weights.held(particle), corner))
     }
 
     /// A neighbour, seen from where the particle is.
@@ -235,9 +264,8 @@ impl Interaction {
     /// Computes and keeps the rest offsets of the reference configuration; none are kept where all
     /// are zero, so that a body that needs none does not pay for them.
     pub fn keep_rest(&mut self) {
-        // Cells that have not moved pull nothing, to the last bit.
-        if self.rule.mean == COROTATED {
-            self.rest = None;
+        if let (COROTATED, Weights::Matrix(weights)) = (self.rule.mean, &self.weights) {
+            self.rest = rest_of_cells(weights, &self.reference);
             return;
         }
         let rest: Points = (0..self.reference.len())
@@ -307,6 +335,16 @@ impl Interaction {
             matrix: self.weights.matrix(particle, bond - self.neighbours.starts[particle] as usize),
         }
     }
+}
+
+/// Cells that have not moved pull nothing, to the last bit; what is left are held components.
+fn rest_of_cells(weights: &MatrixWeights, reference: &Points) -> Option<Points> {
+    let place = |i: usize| {
+        let (held, at) = (weights.held(i), reference.get(i));
+        [0, 1].map(|axis| if held[axis] { at[axis] } else { 0.0 })
+    };
+    let any = (0..reference.len()).any(|i| weights.held(i) != [false; 2]);
+    any.then(|| (0..reference.len()).map(place).collect())
 }
 
 #[cfg(test)]

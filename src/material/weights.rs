@@ -265,7 +265,7 @@ impl Assembly<'_> {
 
     /// `None` where cells differ in more than their kind, or do not fit the pattern.
     fn pattern(&self, particle: usize) -> Option<Pattern> {
-        if self.factor.is_some() || self.cells.shapes.len() > 2 {
+        if self.factor.is_some() {
             return None;
         }
         let seen = self.neighbours.of(particle);

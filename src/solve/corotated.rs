@@ -15,7 +15,7 @@ use rayon::prelude::*;
 use super::equilibrium::{
     Choice, Precision, Request, SolveError, Solved, Solver, System, solve as solve_linear,
 };
-use super::linear::NotLinear;
+use super::linear::{NotLinear, outlier_places};
 use super::operator::{Operator, OperatorError, Row};
 use crate::flock::block::{Block, apply, plus};
 use crate::flock::body::Body;
@@ -85,7 +85,8 @@ pub fn choose(followers: usize, request: &Request) -> Result<(Solver, String), C
 }
 
 /// The equilibrium with the particles that do not follow displaced by `way(1)` \[length\], shape \[count\];
-/// `way(part)` is where they are after that part of the way.
+/// `way(part)` is where they are after that part of the way. `held_axes` are single components of followers that are
+/// held, shape \[count\]\[x, y\], or empty; `way` says where they are as well.
 ///
 /// # Errors
 /// As [`solve_linear`]; names the part of the way from which on the rotations do not settle.
@@ -93,6 +94,7 @@ pub fn solve(
     interaction: &Interaction,
     body: &Body,
     follows: Vec<bool>,
+    held_axes: Vec<[bool; 2]>,
     way: &(dyn Fn(f64) -> Points + Sync),
     request: &Request,
 ) -> Result<Solved, CorotatedError> {
@@ -109,7 +111,7 @@ pub fn solve(
     let followers = follows.iter().filter(|&&follows| follows).count();
     let (solver, why) = choose(followers, request)?;
     let step = Request { solver: Choice::This(solver), tolerance: OF_A_STEP, ..*request };
-    let rule = Corotated { interaction, weights, body, follows, way, step };
+    let rule = Corotated { interaction, weights, body, follows, held_axes, way, step };
     let mut newton = Newton {
         rule: &rule,
         size: rule.size(),
@@ -141,6 +143,7 @@ struct Corotated<'a> {
     weights: &'a MatrixWeights,
     body: &'a Body,
     follows: Vec<bool>,
+    held_axes: Vec<[bool; 2]>,
     way: &'a (dyn Fn(f64) -> Points + Sync),
     /// How a linear system is solved.
     step: Request,
@@ -187,6 +190,20 @@ impl Corotated<'_> {
         Some(Local { force, diagonal, blocks, turn: turn? })
     }
 
+    /// Components of a particle that are not given.
+    fn free(&self, i: usize) -> [bool; 2] {
+        let held = self.held_axes.get(i).copied().unwrap_or_default();
+        held.map(|held| self.follows[i] && !held)
+    }
+
+    /// Puts what is not free where it is.
+    fn hold(&self, u: &mut Points, held: &Points) {
+        for i in 0..u.len() {
+            let (free, at, there) = (self.free(i), u.get(i), held.get(i));
+            u.set(i, [0, 1].map(|axis| if free[axis] { at[axis] } else { there[axis] }));
+        }
+    }
+
     fn load(&self, i: usize) -> [f64; 2] {
         self.interaction.forces.as_ref().map_or([0.0; 2], |forces| forces.get(i))
     }
@@ -202,8 +219,8 @@ impl Corotated<'_> {
         let left = |(i, local): (usize, &Option<Local>)| match local {
             None => [0.0; 2],
             Some(local) => {
-                let load = self.load(i);
-                [local.force[0] + part * load[0], local.force[1] + part * load[1]]
+                let (load, free) = (self.load(i), self.free(i));
+                [0, 1].map(|axis| if free[axis] { local.force[axis] + part * load[axis] } else { 0.0 })
             }
         };
         let left = locals.iter().enumerate().map(left).collect();
@@ -212,8 +229,8 @@ impl Corotated<'_> {
 
     /// The force at the start, all followers at zero and all cells in the axes of the reference.
     fn size(&self) -> f64 {
-        let mut u = (self.way)(1.0);
-        (0..u.len()).filter(|&i| self.follows[i]).for_each(|i| u.set(i, [0.0; 2]));
+        let mut u = Points::zeros(self.follows.len());
+        self.hold(&mut u, &(self.way)(1.0));
         let followers = (0..u.len()).filter(|&i| self.follows[i]);
         let all: Points = followers
             .map(|i| {
@@ -222,7 +239,8 @@ impl Corotated<'_> {
                 for (&j, block) in others {
                     add(&mut force, apply(block, minus(u.get(j as usize), u.get(i))));
                 }
-                force
+                let free = self.free(i);
+                [0, 1].map(|axis| if free[axis] { force[axis] } else { 0.0 })
             })
             .collect();
         norm(&all)
@@ -244,7 +262,8 @@ impl Corotated<'_> {
             }
             row
         };
-        Operator::from_rows(&self.body.sites, grid, self.follows.clone(), row)
+        let operator = Operator::from_rows(&self.body.sites, grid, self.follows.clone(), row)?;
+        Ok(operator.with_held_axes(self.held_axes.clone()).with_outliers(outlier_places(self.body)))
     }
 }
 
@@ -294,7 +313,7 @@ impl Newton<'_> {
         let mut best = f64::INFINITY;
         for _ in 0..MOST_STEPS {
             self.step(&mut u, (&locals, left), std::mem::replace(&mut led, Points::zeros(now.len())))?;
-            (0..u.len()).filter(|&i| !rule.follows[i]).for_each(|i| u.set(i, now.get(i)));
+            rule.hold(&mut u, &now);
             let Some(found) = rule.forces(&u, after) else { return Ok(None) };
             (locals, left) = found;
             let residual = norm(&left) / self.size;

@@ -73,7 +73,7 @@ impl Beam {
     pub fn solved_by(&self, solver: Solver) -> Solved {
         let way = |_: f64| Points::zeros(self.body.count());
         let request = Request { solver: Choice::This(solver), tolerance: 1e-12, ..Request::default() };
-        corotated::solve(&self.interaction, &self.body, self.follows.clone(), &way, &request)
+        corotated::solve(&self.interaction, &self.body, self.follows.clone(), Vec::new(), &way, &request)
             .unwrap_or_else(|error| panic!("{error}"))
     }
 

@@ -30,6 +30,7 @@
 //! `x_i <- x_i + D^-1 (sum of f_i + load)`, `D = sum R K_ii R'`. A body turned by any angle moves as the unturned one does,
 //! in turned axes; where rotations are small this is the plain material rule.
 
+use super::Own;
 use crate::flock::block::{Block, apply, inverse, plus, product, transposed};
 
 /// What a cell resists.
@@ -237,16 +238,26 @@ pub fn pull<'a>(
     })
 }
 
-/// The target of a particle at `present` \[length, world frame\] under a load \[force\]; `None` where no cell holds it.
+/// The target of a particle under a load \[force\]; `None` where no cell holds it. Components that are `held` are where its
+/// rest offset says.
 pub fn target<'a>(
-    present: [f64; 2],
+    own: &Own,
     load: [f64; 2],
     cells: impl Iterator<Item = CellAround<'a>>,
+    held: [bool; 2],
     neighbour: impl Fn(usize) -> Corner,
 ) -> Option<[f64; 2]> {
     let (force, hold) = pull(cells, neighbour);
-    let [x, y] = apply(&inverse(&hold)?, [force[0] + load[0], force[1] + load[1]]);
-    Some([present[0] + x, present[1] + y])
+    let force = [force[0] + load[0], force[1] + load[1]];
+    if held == [false; 2] {
+        let [x, y] = apply(&inverse(&hold)?, force);
+        return Some([own.present[0] + x, own.present[1] + y]);
+    }
+    let component = |axis: usize| match held[axis] {
+        true => own.rest[axis],
+        false => own.present[axis] + force[axis] / hold[axis][axis],
+    };
+    Some([component(0), component(1)])
 }
 
 /// `R' (X + u)`.

@@ -123,15 +123,17 @@ impl Rule {
 
     /// The target by a corotated material: where the forces of the `cells` around the particle and its load leave it,
     /// its neighbours staying. `neighbour` gives the place of each neighbour from that of the particle. The reference
-    /// configuration is at rest to the last bit. Weights and rest offsets are not looked at.
+    /// configuration is at rest to the last bit. Components that are `held` stay where the rest offset has them;
+    /// weights, and other rest offsets, are not looked at.
     pub fn target_by_cells<'a>(
         &self,
         own: &Own,
         cells: impl Iterator<Item = CellAround<'a>>,
+        held: [bool; 2],
         neighbour: impl Fn(usize) -> Corner,
     ) -> [f64; 2] {
         let load = own.load.map_or([0.0; 2], |load| load.force);
-        match corotated::target(own.present, load, cells, neighbour) {
+        match corotated::target(own, load, cells, held, neighbour) {
             Some(target) => self.with_terms(own, target),
             None => own.present,
         }
