@@ -38,6 +38,7 @@ pub struct Beam {
     pub body: Body,
     pub interaction: Interaction,
     pub follows: Vec<bool>,
+    pub held_axes: Vec<[bool; 2]>,
 }
 
 impl Beam {
@@ -46,9 +47,7 @@ impl Beam {
         let shape = Shape::Rectangle { min: [0.0, -0.5], max: [length, 0.5] };
         let outline = Outline::of_shape(&shape).expect("a rectangle");
         let fitted = fit(&Lattice::new(kind, [0.0, -0.5], 0.0), &outline).expect("fits");
-        let (mut body, cells) = (fitted.body, fitted.cells);
-        // Factorised and swept in any order: the place of a particle in a row of sites says which it is.
-        body.sites = (0..body.count() as i32).map(|i| [i, 0]).collect();
+        let (body, cells) = (fitted.body, fitted.cells);
         let at = |x: f64, i: u32| (body.reference.x[i as usize] - x).abs() < 1e-9;
         let sides = cells.boundary_sides(&cells.incidence(body.count())).into_iter();
         let end = sides.filter(|&[a, b]| at(length, a) && at(length, b));
@@ -67,14 +66,40 @@ impl Beam {
             bonds: None,
         };
         let follows = (0..body.count() as u32).map(|i| !at(0.0, i)).collect();
-        Self { body, interaction, follows }
+        Self { body, interaction, follows, held_axes: Vec::new() }
+    }
+
+    /// The same held along x alone at its left end, and at its lowest particle altogether: as a plane of symmetry.
+    pub fn on_rollers(mut self) -> Self {
+        let places = &self.body.reference;
+        let lowest = (0..self.body.count())
+            .filter(|&i| !self.follows[i])
+            .min_by(|&a, &b| places.y[a].total_cmp(&places.y[b]));
+        self.held_axes = vec![[false; 2]; self.body.count()];
+        for i in (0..self.body.count()).filter(|&i| Some(i) != lowest) {
+            if !std::mem::replace(&mut self.follows[i], true) {
+                self.held_axes[i] = [true, false];
+                if let Weights::Matrix(weights) = &mut self.interaction.weights {
+                    weights.hold(i, [true, false]);
+                }
+            }
+        }
+        self.interaction.keep_rest();
+        self
     }
 
     pub fn solved_by(&self, solver: Solver) -> Solved {
         let way = |_: f64| Points::zeros(self.body.count());
         let request = Request { solver: Choice::This(solver), tolerance: 1e-12, ..Request::default() };
-        corotated::solve(&self.interaction, &self.body, self.follows.clone(), Vec::new(), &way, &request)
-            .unwrap_or_else(|error| panic!("{error}"))
+        corotated::solve(
+            &self.interaction,
+            &self.body,
+            self.follows.clone(),
+            self.held_axes.clone(),
+            &way,
+            &request,
+        )
+        .unwrap_or_else(|error| panic!("{error}"))
     }
 
     pub fn load(&self, i: usize) -> [f64; 2] {
