@@ -124,20 +124,6 @@ impl Layout {
         scene.roles.iter().enumerate().map(change).collect()
     }
 
-    /// Forces of the scene's loads on the particles \[force\], shape \[count\]; `None` without loads.
-    ///
-    /// # Errors
-    /// Names the load that has nothing to act on.
-    pub fn forces(&self, scene: &Scene) -> Result<Option<Points>, SceneError> {
-        let mut all = self.forces_by_load(scene)?.into_iter();
-        let Some(mut sum) = all.next() else { return Ok(None) };
-        for forces in all {
-            sum.x.iter_mut().zip(&forces.x).for_each(|(sum, f)| *sum += f);
-            sum.y.iter_mut().zip(&forces.y).for_each(|(sum, f)| *sum += f);
-        }
-        Ok(Some(sum))
-    }
-
     /// Forces of each of the scene's loads on the particles \[force\], shape \[loads\]\[count\]; none without a
     /// material.
     ///
