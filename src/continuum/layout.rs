@@ -58,7 +58,10 @@ impl Layout {
             Some((fitted, outline)) if !is_all_lattice(&fitted.body) => {
                 let Fitted { body, cells } = fitted;
                 require_resolved(scene, &body)?;
-                let neighbours = cells.mates(body.count());
+                let neighbours = match &scene.material {
+                    Some(elastic) => cells.neighbours(body.count(), elastic),
+                    None => cells.mates(body.count()),
+                };
                 Self { body, neighbours, cells: Some(cells), outline: Some(outline) }
             }
             of_lattice => Self::of_whole_cells(scene, of_lattice)?,

@@ -7,7 +7,7 @@ use super::cells_around::CellsAround;
 use super::fracture::Bonds;
 use super::neighbourhood::Neighbours;
 use super::points::Points;
-use super::rules::{CellAround, Corner, Load, Mean, Neighbour, OWN, Own, Rotation, Rule, pull};
+use super::rules::{CellAround, Corner, Load, Mean, Neighbour, OWN, Own, PatchCell, Rotation, Rule, pull};
 
 /// The arrays and index lists that a sweep runs over; it knows particles, not lattices.
 #[derive(Clone, Debug)]
@@ -77,6 +77,15 @@ impl MatrixWeights {
     pub fn cells_around(&self, particle: usize) -> impl Iterator<Item = CellAround<'_>> + Clone {
         let class = self.class[particle] as usize;
         self.cells.iter().flat_map(move |cells| cells.of(class))
+    }
+
+    /// The patches that a particle feels, whose dilatations are averaged: stiffness \[force / length^3\] and cells.
+    pub fn patches_around(
+        &self,
+        particle: usize,
+    ) -> impl Iterator<Item = (f64, impl Iterator<Item = PatchCell<'_>> + Clone)> + Clone {
+        let class = self.class[particle] as usize;
+        self.cells.iter().flat_map(move |cells| cells.patches_of(class))
     }
 
     #[inline]
@@ -151,8 +160,8 @@ impl Interaction {
             load: self.load(particle),
         };
         if let (COROTATED, Weights::Matrix(weights)) = (rule.mean, &self.weights) {
-            let (cells, held) = (weights.cells_around(particle), weights.held(particle));
-            return rule.target_by_cells(&own, cells, held, |slot| self.corner(particle, slot, present));
+            let pulled = self.pulled(weights, particle, present);
+            return rule.target_by_cells(&own, pulled, weights.held(particle));
         }
         let broken = self.bonds.as_ref().filter(|bonds| bonds.any_broken());
         match (broken, &self.weights) {
@@ -177,14 +186,13 @@ impl Interaction {
     /// Force of a material on a particle when all stand at `present` \[force, world frame\]: on one that rests, minus its
     /// load; on one that is held, minus its load and its reaction. Zero for a rule that is no material.
     pub fn force(&self, particle: usize, present: &Points) -> [f64; 2] {
-        let corner = |slot| self.corner(particle, slot, present);
         match &self.weights {
             Weights::Matrix(weights) if self.rule.mean == COROTATED => {
-                pull(weights.cells_around(particle), corner).0
+                self.pulled(weights, particle, present).0
             }
             Weights::Matrix(weights) => {
                 weights.stiffness_of(particle).iter().enumerate().fold([0.0; 2], |sum, (slot, block)| {
-                    let [x, y] = apply(block, corner(slot).displacement);
+                    let [x, y] = apply(block, self.corner(particle, slot, present).displacement);
                     [sum[0] + x, sum[1] + y]
                 })
             }
@@ -242,12 +250,20 @@ impl Interaction {
         let near = self.neighbours.of(particle);
         let kept = |slot: &u32| *slot == OWN || keeps(near[*slot as usize] as usize);
         let cells = weights.cells_around(particle).filter(|cell| cell.slots.iter().all(kept));
-        let corner = |slot| self.corner(particle, slot, present);
-        invert(&pull(cells.clone(), corner).1)?;
-        let (present, reference) = (present.get(particle), self.reference.get(particle));
+        let patches = weights.patches_around(particle);
+        let patches = patches.filter(|(_, cells)| cells.clone().all(|(_, slots)| slots.iter().all(kept)));
+        let pulled = pull(cells, patches, |slot| self.corner(particle, slot, present));
+        invert(&pulled.1)?;
         let rest = self.rest.as_ref().map_or([0.0; 2], |rest| rest.get(particle));
+        let (present, reference) = (present.get(particle), self.reference.get(particle));
         let own = Own { present, reference, rest, load: self.load(particle) };
-        Some(self.rule.target_by_cells(&own, cells, weights.held(particle), corner))
+        Some(self.rule.target_by_cells(&own, pulled, weights.held(particle)))
+    }
+
+    /// Force of the cells around a particle, and what holds it.
+    fn pulled(&self, weights: &MatrixWeights, particle: usize, present: &Points) -> ([f64; 2], Block) {
+        let (cells, patches) = (weights.cells_around(particle), weights.patches_around(particle));
+        pull(cells, patches, |slot| self.corner(particle, slot, present))
     }
 
     /// A neighbour, seen from where the particle is.

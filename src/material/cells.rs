@@ -13,8 +13,8 @@ use crate::flock::lattice::{Lattice, LatticeKind, Site};
 use crate::flock::neighbourhood::{Neighbourhood, Neighbours};
 use crate::flock::points::Points;
 
-use super::elastic::Voigt;
-use super::stiffness::{ShapeError, area, cut_cell, cut_load_shares, element, load_shares, mean_strain};
+use super::elastic::Elastic;
+use super::stiffness::{ShapeError, area, cut_load_shares, element_of, load_shares, mean_strain};
 use crate::geometry::outline::{Outline, OutlineError};
 
 /// Cells of any polygons, in compressed form. Corners run counter-clockwise.
@@ -95,13 +95,13 @@ impl Cells {
         Self { starts: vec![0], index: Vec::new(), kind: Vec::new(), whole: shapes.len(), shapes }
     }
 
-    /// Stiffness of the cells of a kind \[force / length\]; see [`element`] and [`cut_cell`].
+    /// Stiffness of the cells of a kind \[force / length\]: what each has to itself in this material; see
+    /// [`element_of`] and [`super::dilatation`].
     ///
     /// # Errors
-    /// As [`element`].
-    pub fn element(&self, kind: usize, stiffness: &Voigt) -> Result<DMatrix<f64>, ShapeError> {
-        let shape = &self.shapes[kind];
-        if kind < self.whole { element(shape, stiffness) } else { cut_cell(shape, stiffness) }
+    /// As [`element`](super::stiffness::element).
+    pub fn element(&self, kind: usize, elastic: &Elastic) -> Result<DMatrix<f64>, ShapeError> {
+        element_of(&self.shapes[kind], elastic, kind >= self.whole)
     }
 
     /// The part of a load per area that falls to each corner of the cells of a kind \[length^2\]; see [`load_shares`].
@@ -160,8 +160,26 @@ impl Cells {
         Incidence { starts, cell }
     }
 
+    /// For each of `particles` particles those that it feels in this material, in order of index: those it shares a cell
+    /// with, and where dilatations are averaged over cells ([`Elastic::averaged_dilatation`]) their mates as well.
+    pub fn neighbours(&self, particles: usize, elastic: &Elastic) -> Neighbours {
+        let mates = self.mates(particles);
+        if elastic.averaged_dilatation().is_none() {
+            return mates;
+        }
+        Neighbours::from_lists((0..particles).map(|i| {
+            let near = mates.of(i);
+            let mut all: Vec<u32> =
+                near.iter().flat_map(|&j| mates.of(j as usize)).chain(near).copied().collect();
+            all.sort_unstable();
+            all.dedup();
+            all.retain(|&j| j as usize != i);
+            all
+        }))
+    }
+
     /// For each of `particles` particles those it shares a cell with, in order of index: the fewest
-    /// neighbours that carry the material.
+    /// neighbours that carry a material.
     pub fn mates(&self, particles: usize) -> Neighbours {
         let incidence = self.incidence(particles);
         Neighbours::from_lists((0..particles).map(|i| {
@@ -296,6 +314,18 @@ pub fn neighbourhood(lattice: &Lattice) -> Neighbourhood {
     }
 }
 
+/// The neighbourhood that this material needs: [`neighbourhood`], and the mates of those as well where dilatations are
+/// averaged over cells ([`Elastic::averaged_dilatation`]).
+pub fn neighbourhood_of(lattice: &Lattice, elastic: &Elastic) -> Neighbourhood {
+    match lattice.kind() {
+        _ if elastic.averaged_dilatation().is_none() => neighbourhood(lattice),
+        LatticeKind::Square { .. } | LatticeKind::Rectangular { .. } => Neighbourhood::Ring { radius: 2 },
+        // Farthest are the ends of two diagonals of hexagons that meet at 120 degrees.
+        LatticeKind::Honeycomb { spacing } => Neighbourhood::Within { radius: 3.5 * spacing },
+        _ => Neighbourhood::Second,
+    }
+}
+
 /// The cells that belong to a site of sublattice 0: corners as offsets from that site, the site itself
 /// first, counter-clockwise in the plane. Every cell of the lattice belongs to one site.
 pub fn templates(lattice: &Lattice) -> Vec<Vec<Site>> {
@@ -333,6 +363,7 @@ fn angle(lattice: &Lattice, offset: Site) -> f64 {
 mod tests {
     use super::*;
     use crate::flock::body::Cut;
+    use crate::material::elastic::{Constants, Plane};
     use crate::material::stiffness::area;
 
     fn body(kind: LatticeKind, orientation: f64) -> (Body, Neighbours) {
@@ -370,6 +401,26 @@ mod tests {
             let mut asked = neighbours.of(fullest).to_vec();
             asked.sort_unstable();
             assert_eq!(asked, mates.of(fullest), "{kind:?}");
+        }
+    }
+
+    #[test]
+    fn a_material_that_averages_dilatations_has_the_mates_of_mates_for_neighbours() {
+        let constants = |poisson| Constants::Isotropic { young: 1.0, poisson, plane: Plane::Strain };
+        let elastic = |poisson| Elastic::new(constants(poisson), 1.0).expect("admissible");
+        for kind in LatticeKind::SAMPLES {
+            let lattice = Lattice::new(kind, [5.0, -3.0], 0.4);
+            let cut = Cut::Count { columns: 15, rows: 15 };
+            for poisson in [0.3, 0.49] {
+                let near = neighbourhood_of(&lattice, &elastic(poisson));
+                let (body, neighbours) = Body::build(lattice.clone(), &cut, &near, None).expect("builds");
+                let cells = Cells::of_body(&body);
+                let needed = cells.neighbours(body.count(), &elastic(poisson));
+                let fullest = (0..body.count()).max_by_key(|&i| needed.of(i).len()).expect("particles");
+                let mut asked = neighbours.of(fullest).to_vec();
+                asked.sort_unstable();
+                assert_eq!(asked, needed.of(fullest), "{kind:?}");
+            }
         }
     }
 

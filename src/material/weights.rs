@@ -6,6 +6,7 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::cells::{Cells, Incidence};
+use super::dilatation::{patches, shares};
 use super::elastic::Elastic;
 use super::mechanism::{Mechanism, require_rigid};
 use super::stiffness::{ShapeError, mean_gradients};
@@ -55,6 +56,10 @@ pub enum WeightsError {
         if *.corners == 4 { "the cell's diagonal pairs are missing" } else { "the cell's stiffness is cut" }
     )]
     MissingNeighbour { particle: usize, missing: usize, neighbours: usize, corners: usize },
+    #[error(
+        "{neighbours} neighbours cannot carry a dilatation averaged over cells: particles {particle} and {missing} have cells that meet at a particle, but are no neighbours"
+    )]
+    MissingMate { particle: usize, missing: usize, neighbours: usize },
     #[error(transparent)]
     Mechanism(#[from] Mechanism),
     #[error("cell {cell} (counted from 1): {reason}")]
@@ -89,7 +94,7 @@ impl MaterialWeights {
     }
 
     /// Weights of cells at any points, with a stiffness factor for each cell where given, shape
-    /// \[cells\] (a contrast of materials, damage). Neighbours are [`Cells::mates`].
+    /// \[cells\] (a contrast of materials, damage). Neighbours are [`Cells::neighbours`].
     pub fn on_points(
         cells: &Cells,
         reference: &Points,
@@ -99,7 +104,8 @@ impl MaterialWeights {
         let cells = cells.on_points(reference);
         let incidence = cells.incidence(reference.len());
         require_rigid(&cells, &incidence, reference, |_| true)?;
-        Self::gather(&cells, &incidence, cells.mates(reference.len()), elastic, factor)
+        let neighbours = cells.neighbours(reference.len(), elastic);
+        Self::gather(&cells, &incidence, neighbours, elastic, factor)
     }
 
     fn gather(
@@ -111,7 +117,18 @@ impl MaterialWeights {
     ) -> Result<Self, WeightsError> {
         check_factor(cells, factor)?;
         let elements = elements(cells, elastic)?;
-        let assembly = Assembly { cells, incidence, neighbours: &neighbours, elements, factor };
+        let (shares, lambda) = (shares(cells), elastic.averaged_dilatation());
+        let gradients = cells.shapes.iter().map(|shape| mean_gradients(shape)).collect();
+        let assembly = Assembly {
+            cells,
+            incidence,
+            neighbours: &neighbours,
+            elements,
+            shares,
+            gradients,
+            lambda,
+            factor,
+        };
         let (class, first) = assembly.classes();
         // Every row is summed over its own cells in their order: the same bits on any number of threads.
         // Collected before looking: the first error in the order of particles, not the first to be found.
@@ -195,7 +212,7 @@ fn check_factor(cells: &Cells, factor: Option<&[f64]>) -> Result<(), WeightsErro
 /// Element stiffness of each shape.
 fn elements(cells: &Cells, elastic: &Elastic) -> Result<Vec<DMatrix<f64>>, WeightsError> {
     let of_kind = |kind: usize| {
-        cells.element(kind, elastic.stiffness()).map_err(|reason| {
+        cells.element(kind, elastic).map_err(|reason| {
             let cell = cells.kind.iter().position(|&k| k as usize == kind).map_or(0, |cell| cell + 1);
             WeightsError::Shape { cell, reason }
         })
@@ -209,13 +226,24 @@ struct Assembly<'a> {
     cells: &'a Cells,
     incidence: &'a Incidence,
     neighbours: &'a Neighbours,
+    /// By kind: stiffness, share of area of a corner, mean gradients.
     elements: Vec<DMatrix<f64>>,
+    shares: Vec<f64>,
+    gradients: Vec<Vec<[f64; 2]>>,
+    /// What resists averaged dilatations \[force / length\].
+    lambda: Option<f64>,
     factor: Option<&'a [f64]>,
 }
 
 /// What tells the classes apart: which corner of which kind of cell the particle is, and where among its
-/// neighbours the other corners are, packed; and how many neighbours there are.
-type Pattern = (u128, u32);
+/// neighbours the other corners are; and how many neighbours there are.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+enum Pattern {
+    /// Of the cells around the particle, packed.
+    Packed(u128, u32),
+    /// Of those around its mates as well.
+    Long(Box<[u8]>),
+}
 
 impl Assembly<'_> {
     /// Class of each particle, and the first particle of each class.
@@ -227,7 +255,7 @@ impl Assembly<'_> {
             // Each pattern of the chunk with the first particle that has it; none has its own class.
             let mut first: Vec<(Option<Pattern>, usize)> = Vec::new();
             let of_particle = |i: usize| match self.pattern(i) {
-                Some(pattern) => *known.entry(pattern).or_insert_with(|| {
+                Some(pattern) => *known.entry(pattern.clone()).or_insert_with(|| {
                     first.push((Some(pattern), i));
                     first.len() as u32 - 1
                 }),
@@ -268,6 +296,9 @@ impl Assembly<'_> {
         if self.factor.is_some() {
             return None;
         }
+        if self.lambda.is_some() {
+            return self.long_pattern(particle);
+        }
         let seen = self.neighbours.of(particle);
         let mut packed: u128 = 1;
         let mut push = |value: usize, bits: u32| {
@@ -284,7 +315,78 @@ impl Assembly<'_> {
                 push(seen.iter().position(|&j| j == corner)?, 5)?;
             }
         }
-        Some((packed, seen.len() as u32))
+        Some(Pattern::Packed(packed, seen.len() as u32))
+    }
+
+    /// The pattern of all cells that a particle feels through averaged dilatations; none beside cells that an outline has
+    /// cut, which are of many kinds.
+    fn long_pattern(&self, particle: usize) -> Option<Pattern> {
+        let mut pattern = vec![u8::try_from(self.neighbours.of(particle).len()).ok()?];
+        for mate in self.patch_centres(particle) {
+            for cell in self.around(mate) {
+                pattern.push(u8::try_from(self.cells.kind[cell]).ok().filter(|&kind| kind < 2)?);
+                for slot in self.slots(particle, cell) {
+                    pattern.push(if slot? == OWN { u8::MAX } else { u8::try_from(slot?).ok()? });
+                }
+            }
+            pattern.push(u8::MAX);
+        }
+        Some(Pattern::Long(pattern.into()))
+    }
+
+    /// A particle and those it shares a cell with, ascending: the middles of the patches that it feels.
+    fn patch_centres(&self, particle: usize) -> Vec<usize> {
+        let corners = self.around(particle).flat_map(|cell| self.cells.of(cell));
+        let mut centres: Vec<usize> = corners.map(|&corner| corner as usize).collect();
+        centres.sort_unstable();
+        centres.dedup();
+        centres
+    }
+
+    /// The patches that a particle feels: stiffness \[force / length^3\] and cells. Alike for all particles that feel a patch.
+    fn patches(&self, particle: usize) -> Vec<(f64, Vec<usize>)> {
+        let Some(lambda) = self.lambda else { return Vec::new() };
+        let around = self
+            .patch_centres(particle)
+            .into_iter()
+            .flat_map(|centre| patches(self.incidence, self.factor, centre));
+        let felt =
+            around.filter(|patch| patch.iter().any(|&cell| self.cells.of(cell).contains(&(particle as u32))));
+        let with_stiffness = |patch: Vec<usize>| {
+            let area: f64 = patch.iter().map(|&cell| self.shares[self.cells.kind[cell] as usize]).sum();
+            (lambda * self.factor(patch[0]) / area, patch)
+        };
+        felt.map(with_stiffness).collect()
+    }
+
+    /// What the averaged dilatations add to the row of a particle: `k v_i v_j'` for each patch, `v` the sum over its cells
+    /// of share times mean gradient. The sums run in the same order for either of two particles: no bit of `K_ij` differs
+    /// from that of the transpose of `K_ji`.
+    fn add_patches(&self, particle: usize, blocks: &mut [Block]) -> Result<(), WeightsError> {
+        for (stiffness, patch) in self.patches(particle) {
+            let mut v: Vec<(u32, [f64; 2])> = Vec::new();
+            for &cell in &patch {
+                let kind = self.cells.kind[cell] as usize;
+                for (corner, slot) in self.slots(particle, cell).into_iter().enumerate() {
+                    let slot = slot.ok_or_else(|| WeightsError::MissingMate {
+                        particle: particle + 1,
+                        missing: self.cells.of(cell)[corner] as usize + 1,
+                        neighbours: self.most_neighbours(),
+                    })?;
+                    let [x, y] = self.gradients[kind][corner].map(|g| self.shares[kind] * g);
+                    match v.iter_mut().find(|(known, _)| *known == slot) {
+                        Some((_, sum)) => *sum = [sum[0] + x, sum[1] + y],
+                        None => v.push((slot, [x, y])),
+                    }
+                }
+            }
+            let own = v.iter().find(|(slot, _)| *slot == OWN).map_or([0.0; 2], |(_, v)| *v);
+            for &(slot, other) in v.iter().filter(|(slot, _)| *slot != OWN) {
+                let block = own.map(|a| other.map(|b| -stiffness * (a * b)));
+                blocks[slot as usize] = plus(&blocks[slot as usize], &block);
+            }
+        }
+        Ok(())
     }
 
     /// The row of one particle; refuses a particle that does not see a corner of its cells.
@@ -309,6 +411,7 @@ impl Assembly<'_> {
                 blocks[slot] = plus(&blocks[slot], &[[entry(0, 0), entry(0, 1)], [entry(1, 0), entry(1, 1)]]);
             }
         }
+        self.add_patches(particle, &mut blocks)?;
         let diagonal = blocks.iter().fold(Block::default(), |sum, block| plus(&sum, block));
         let inverse = match inverse(&diagonal) {
             Some(inverse) => inverse,
@@ -336,25 +439,39 @@ impl Assembly<'_> {
         self.cells.of(cell).iter().map(slot).collect()
     }
 
-    /// The cells around one particle of each class, all of whose corners it sees.
-    fn cells_around(&self, first: &[usize]) -> CellsAround {
-        let kinds = self.elements.iter().zip(&self.cells.shapes);
-        let elements = kinds.map(|(k, shape)| {
-            let entry = |a: usize, b: usize| {
-                let (a, b) = (2 * a, 2 * b);
+    /// What the kinds of cells resist, for a rule that turns with them.
+    fn elements(&self) -> Vec<Element> {
+        let of_kind = |(kind, k): (usize, &DMatrix<f64>)| {
+            let corners = self.gradients[kind].len();
+            let block = |n: usize| {
+                let (a, b) = (2 * (n / corners), 2 * (n % corners));
                 [[k[(a, b)], k[(a, b + 1)]], [k[(a + 1, b)], k[(a + 1, b + 1)]]]
             };
-            let corners = shape.len();
-            let stiffness = (0..corners * corners).map(|n| entry(n / corners, n % corners)).collect();
-            Element { stiffness, gradients: mean_gradients(shape) }
-        });
-        let mut around = CellsAround::new(elements.collect());
+            Element {
+                stiffness: (0..corners * corners).map(block).collect(),
+                gradients: self.gradients[kind].clone(),
+                share: self.shares[kind],
+            }
+        };
+        self.elements.iter().enumerate().map(of_kind).collect()
+    }
+
+    /// The cells and patches around one particle of each class, all of whose corners it sees.
+    fn cells_around(&self, first: &[usize]) -> CellsAround {
+        let mut around = CellsAround::new(self.elements());
         for &particle in first {
+            let slots = |cell: usize| -> Vec<u32> {
+                self.slots(particle, cell).into_iter().map(Option::unwrap_or_default).collect()
+            };
             for cell in self.around(particle) {
-                let slots: Vec<u32> =
-                    self.slots(particle, cell).into_iter().map(Option::unwrap_or_default).collect();
+                let slots = slots(cell);
                 let own = slots.iter().position(|&slot| slot == OWN).unwrap_or_default();
                 around.push(self.cells.kind[cell], own, &slots, self.factor(cell));
+            }
+            for (stiffness, patch) in self.patches(particle) {
+                let cells: Vec<(u32, Vec<u32>)> =
+                    patch.into_iter().map(|cell| (self.cells.kind[cell], slots(cell))).collect();
+                around.push_patch(stiffness, &cells);
             }
             around.end_class();
         }

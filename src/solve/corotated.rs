@@ -21,7 +21,7 @@ use crate::flock::block::{Block, apply, plus};
 use crate::flock::body::Body;
 use crate::flock::interaction::{Interaction, MatrixWeights, Weights};
 use crate::flock::points::Points;
-use crate::flock::rules::{Corner, Mean, OWN, Rotation, Turn};
+use crate::flock::rules::{Corner, Mean, OWN, Rotation, Turn, patch_row};
 
 /// Newton steps of one increment.
 const MOST_STEPS: usize = 16;
@@ -186,6 +186,14 @@ impl Corotated<'_> {
                 *sum = plus(sum, &scaled(block));
             }
             turn = turn.or(Some(row.turn));
+        }
+        for (stiffness, cells) in self.weights.patches_around(i) {
+            let row = patch_row(stiffness, cells, |slot| self.corner(i, slot, u))?;
+            add(&mut force, row.force);
+            for (slot, block) in row.tangent {
+                let sum = if slot == OWN { &mut diagonal } else { &mut blocks[slot as usize] };
+                *sum = plus(sum, &block);
+            }
         }
         Some(Local { force, diagonal, blocks, turn: turn? })
     }

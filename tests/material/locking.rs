@@ -1,0 +1,97 @@
+//! Plane strain near nu = 1/2: displacements are as good as at nu = 0.3, on every lattice.
+
+use flockform::flock::lattice::{Lattice, LatticeKind};
+use flockform::flock::points::Points;
+use flockform::geometry::outline::Outline;
+use flockform::geometry::shape::Shape;
+use flockform::material::elastic::{Constants, Elastic, Plane};
+use flockform::material::fit::fit;
+use flockform::material::loads::{Loads, Traction};
+use flockform::material::weights::MaterialWeights;
+
+use crate::support::*;
+
+const SPACINGS: [fn(f64) -> LatticeKind; 6] = [
+    |h| LatticeKind::Square { spacing: h },
+    |h| LatticeKind::Rectangular { a: h, b: 0.8 * h },
+    |h| LatticeKind::CentredRectangular { a: h, b: h },
+    |h| LatticeKind::Hexagonal { spacing: h },
+    |h| LatticeKind::Oblique { a: h, b: h, angle: 70f64.to_radians() },
+    |h| LatticeKind::Honeycomb { spacing: h / 3f64.sqrt() },
+];
+
+fn slice(poisson: f64) -> Elastic {
+    let constants = Constants::Isotropic { young: 1000.0, poisson, plane: Plane::Strain };
+    Elastic::new(constants, 1.0).expect("admissible")
+}
+
+/// A displacement in equilibrium, and the stress (xx, yy, xy) that it has.
+type Exact<'a> = &'a dyn Fn([f64; 2]) -> ([f64; 2], [f64; 3]);
+
+/// Relative L2 error on a rectangle led by an exact solution along its left side and loaded by it along the others.
+fn error(kind: LatticeKind, [min, max]: [[f64; 2]; 2], elastic: &Elastic, exact: Exact) -> f64 {
+    let outline = Outline::of_shape(&Shape::Rectangle { min, max }).expect("a rectangle");
+    let fitted = fit(&Lattice::new(kind, min, 0.0), &outline).expect("fits");
+    let (body, cells) = (fitted.body, fitted.cells);
+    let neighbours = cells.neighbours(body.count(), elastic);
+    let weights = MaterialWeights::assemble(&cells, &body, neighbours, elastic).expect("assembles");
+    let is_led = |i: usize| body.reference.x[i] < min[0] + 1e-9;
+    let sides = cells.boundary_sides(&cells.incidence(body.count())).into_iter();
+    let free = sides.filter(|side| !side.iter().all(|&i| is_led(i as usize)));
+    let tractions = free.map(|side| {
+        let [a, b] = side.map(|i| body.reference.get(i as usize));
+        let length = (b[0] - a[0]).hypot(b[1] - a[1]);
+        let n = [(b[1] - a[1]) / length, (a[0] - b[0]) / length];
+        let traction = |p: [f64; 2]| {
+            let (_, [xx, yy, xy]) = exact(p);
+            [xx * n[0] + xy * n[1], xy * n[0] + yy * n[1]]
+        };
+        Traction { side, at_ends: [traction(a), traction(b)] }
+    });
+    let loads = Loads { tractions: tractions.collect(), ..Loads::default() };
+    let forces = loads.on_particles(&cells, &body.reference).expect("fits");
+    let truth: Points = body.reference.iter().map(|p| exact(p).0).collect();
+    let leads: Vec<bool> = (0..body.count()).map(is_led).collect();
+    let found = equilibrium(&weights, &leads, &forces, &truth);
+    relative_l2(&found, &truth, |_| true)
+}
+
+/// A piece of a thick ring under pressure (Lame): `s_r = a - b / r^2`, `s_t = a + b / r^2`.
+fn ring(poisson: f64, [x, y]: [f64; 2]) -> ([f64; 2], [f64; 3]) {
+    let (a, b, square) = (1.0, 16.0, x * x + y * y);
+    let scale = (1.0 + poisson) / 1000.0;
+    let outwards = scale * ((1.0 - 2.0 * poisson) * a + b / square);
+    let (c, s) = ((x * x - y * y) / square, 2.0 * x * y / square);
+    ([outwards * x, outwards * y], [a - b / square * c, a + b / square * c, -b / square * s])
+}
+
+/// A slice bent by its end (Timoshenko), of length 8 and depth 2.
+fn bent(poisson: f64, [x, y]: [f64; 2]) -> ([f64; 2], [f64; 3]) {
+    let (young, nu) = (1000.0 / (1.0 - poisson * poisson), poisson / (1.0 - poisson));
+    let (length, depth, load, inertia) = (8.0, 2.0, 1.0, 2.0 / 3.0);
+    let p = load / (6.0 * young * inertia);
+    let u = -p * y * ((6.0 * length - 3.0 * x) * x + (2.0 + nu) * (y * y - depth * depth / 4.0));
+    let bending = 3.0 * nu * y * y * (length - x) + (3.0 * length - x) * x * x;
+    let v = p * (bending + (4.0 + 5.0 * nu) * depth * depth * x / 4.0);
+    let shear = load / (2.0 * inertia) * (depth * depth / 4.0 - y * y);
+    ([u, v], [-load * (length - x) * y / inertia, 0.0, shear])
+}
+
+#[test]
+fn no_lattice_locks_near_incompressibility() {
+    for (name, bounds, exact) in [
+        ("ring", [[2.0, -1.0], [6.0, 3.0]], ring as fn(f64, [f64; 2]) -> ([f64; 2], [f64; 3])),
+        ("bent", [[0.0, -1.0], [8.0, 1.0]], bent),
+    ] {
+        for spacings in SPACINGS {
+            let of = |poisson: f64| error(spacings(0.25), bounds, &slice(poisson), &|p| exact(poisson, p));
+            let errors = [0.3, 0.4, 0.41, 0.49, 0.499, 0.4999].map(of);
+            println!(
+                "{name} {:?}: {:.2?} e-3, ratio {:.2}",
+                spacings(1.0),
+                errors.map(|e| 1e3 * e),
+                errors[5] / errors[0]
+            );
+        }
+    }
+}
