@@ -312,7 +312,7 @@ proptest! {
             let corners = [[0.0, 0.0], place(k), place((k + 1) % count)];
             let stiffness = triangle(&corners, elastic.stiffness()).expect("a cell");
             let block = |n: usize| [0, 1].map(|a| [0, 1].map(|b| stiffness[(2 * (n / 3) + a, 2 * (n % 3) + b)]));
-            Element { stiffness: (0..9).map(block).collect(), gradients: mean_gradients(&corners), share: 0.0 }
+            Element { stiffness: (0..9).map(block).collect(), gradients: mean_gradients(&corners) }
         }).collect();
         let slots: Vec<[u32; 3]> = (0..count).map(|k| [OWN, k as u32, ((k + 1) % count) as u32]).collect();
         let (sin, cos) = angle.sin_cos();

@@ -31,6 +31,7 @@ struct PatchPart {
     element: u32,
     /// Where its corners begin in `slots`.
     corners: u32,
+    share: f64,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -55,11 +56,12 @@ impl CellsAround {
         self.slots.extend(slots);
     }
 
-    /// Adds a patch to the class at hand: its stiffness \[force / length^3\], and kind and corners of its cells.
-    pub fn push_patch(&mut self, stiffness: f64, cells: &[(u32, Vec<u32>)]) {
+    /// Adds a patch to the class at hand: its stiffness \[force / length^3\], and its cells: kind, share of area
+    /// \[length^2\] and corners.
+    pub fn push_patch(&mut self, stiffness: f64, cells: impl Iterator<Item = (u32, f64, Vec<u32>)>) {
         let begin = self.patch_cells.len() as u32;
-        for (element, slots) in cells {
-            self.patch_cells.push(PatchPart { element: *element, corners: self.slots.len() as u32 });
+        for (element, share, slots) in cells {
+            self.patch_cells.push(PatchPart { element, corners: self.slots.len() as u32, share });
             self.slots.extend(slots);
         }
         self.patches.push(Patch { stiffness, cells: [begin, self.patch_cells.len() as u32] });
@@ -87,7 +89,8 @@ impl CellsAround {
             let cells = &self.patch_cells[patch.cells[0] as usize..patch.cells[1] as usize];
             let cell = |cell: &PatchPart| {
                 let element = &self.elements[cell.element as usize];
-                (element, &self.slots[cell.corners as usize..][..element.corners()])
+                let slots = &self.slots[cell.corners as usize..][..element.corners()];
+                PatchCell { element, share: cell.share, slots }
             };
             (patch.stiffness, cells.iter().map(cell))
         })

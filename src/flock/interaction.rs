@@ -251,7 +251,7 @@ impl Interaction {
         let kept = |slot: &u32| *slot == OWN || keeps(near[*slot as usize] as usize);
         let cells = weights.cells_around(particle).filter(|cell| cell.slots.iter().all(kept));
         let patches = weights.patches_around(particle);
-        let patches = patches.filter(|(_, cells)| cells.clone().all(|(_, slots)| slots.iter().all(kept)));
+        let patches = patches.filter(|(_, cells)| cells.clone().all(|cell| cell.slots.iter().all(kept)));
         let pulled = pull(cells, patches, |slot| self.corner(particle, slot, present));
         invert(&pulled.1)?;
         let rest = self.rest.as_ref().map_or([0.0; 2], |rest| rest.get(particle));

@@ -320,8 +320,8 @@ pub fn neighbourhood_of(lattice: &Lattice, elastic: &Elastic) -> Neighbourhood {
     match lattice.kind() {
         _ if elastic.averaged_dilatation().is_none() => neighbourhood(lattice),
         LatticeKind::Square { .. } | LatticeKind::Rectangular { .. } => Neighbourhood::Ring { radius: 2 },
-        // Farthest are the ends of two diagonals of hexagons that meet at 120 degrees.
-        LatticeKind::Honeycomb { spacing } => Neighbourhood::Within { radius: 3.5 * spacing },
+        // The farthest are sqrt(13) spacings away, those after them 4.
+        LatticeKind::Honeycomb { spacing } => Neighbourhood::Within { radius: 3.7 * spacing },
         _ => Neighbourhood::Second,
     }
 }

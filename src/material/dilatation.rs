@@ -1,14 +1,22 @@
 //! Dilatations averaged over the cells around a particle: what keeps a nearly incompressible material from locking.
 //!
-//! Cells resist their own strain with all of the stiffness but Lame's lambda. That resists, for each particle `p`, the mean
-//! dilatation of the cells around it, each cell counting by the share `A_c / n_c` that a corner has of its area:
+//! Cells resist their own strain with all of the stiffness but Lame's lambda. That resists the mean dilatation of patches,
+//! each of which is the cells around a particle `p` inside the body:
 //!
 //! ```text
-//! W = sum_p lambda / (2 M_p) (sum_c A_c / n_c div_c u)^2      M_p = sum_c A_c / n_c
+//! W = sum_p lambda / (2 M_p) (sum_c w_c div_c u)^2      M_p = sum_c w_c      w_c = A_c / (patches that the cell is in)
 //! ```
 //!
-//! where `div_c u` is the trace of the cell's mean strain, or, of a cell that has turned, that of its stretch less 2. The
-//! cells around a particle are averaged as far as they are of one material: across an interface the dilatation jumps.
+//! where `div_c u` is the trace of the cell's mean strain, or, of a cell that has turned, that of its stretch less 2. Every
+//! cell counts with all of its area, so that the patch test holds.
+//!
+//! Particles on the edge have a patch only where a cell has no corner inside. With a patch for each of them, as the
+//! literature has it, rows of triangles lock all the same: averaged over both sides, changes of height of every other row
+//! add up to conditions at either edge that cannot both hold in a bent strip of an odd number of rows. Measured on a
+//! slice bent by its end, hexagonal, nine rows, relative L2 of the displacement at nu = 0.49, 0.499, 0.4999: 2.8, 3.6,
+//! 8.4 %; without the patches of the edge 2.5, 2.6, 2.6 %. It also rids led edges of pressures that alternate.
+//!
+//! The cells around a particle are averaged as far as they are of one material: across an interface the dilatation jumps.
 //! See [`Elastic::averaged_dilatation`] for the source and for when this is done.
 
 use super::cells::{Cells, Incidence};
@@ -16,49 +24,79 @@ use super::elastic::Elastic;
 use super::stiffness::area;
 use crate::flock::points::Points;
 
-/// The cells around `particle` in groups of one stiffness `factor`, in the order of cells.
-pub fn patches(incidence: &Incidence, factor: Option<&[f64]>, particle: usize) -> Vec<Vec<usize>> {
-    let around = incidence.of(particle).iter().map(|&cell| cell as usize);
-    let Some(factor) = factor else { return vec![around.collect()] };
-    let mut patches: Vec<Vec<usize>> = Vec::new();
-    for cell in around {
-        match patches.iter_mut().find(|patch| factor[patch[0]] == factor[cell]) {
-            Some(patch) => patch.push(cell),
-            None => patches.push(vec![cell]),
-        }
+/// Which cells are averaged together.
+#[derive(Clone, Debug)]
+pub struct Patches<'a> {
+    cells: &'a Cells,
+    incidence: &'a Incidence,
+    /// Whether a particle is on the edge of the body, shape \[count\].
+    on_edge: Vec<bool>,
+    /// Area by kind of cell \[length^2\].
+    areas: Vec<f64>,
+}
+
+impl<'a> Patches<'a> {
+    pub fn new(cells: &'a Cells, incidence: &'a Incidence, count: usize) -> Self {
+        let mut on_edge = vec![false; count];
+        cells.boundary_sides(incidence).into_iter().flatten().for_each(|i| on_edge[i as usize] = true);
+        Self { cells, incidence, on_edge, areas: cells.shapes.iter().map(|shape| area(shape)).collect() }
     }
-    patches
-}
 
-/// The share that a corner of each kind of cell has of its area \[length^2\], shape \[kinds\].
-pub fn shares(cells: &Cells) -> Vec<f64> {
-    cells.shapes.iter().map(|shape| area(shape) / shape.len() as f64).collect()
-}
-
-/// Mean dilatation of the cells around each particle \[1\], and their shares of area \[length^2\], shape \[count\]; of one
-/// material throughout.
-fn at_particles(cells: &Cells, strains: &[[f64; 3]], count: usize) -> (Vec<f64>, Vec<f64>) {
-    let shares = shares(cells);
-    let (mut mean, mut measure) = (vec![0.0; count], vec![0.0; count]);
-    for (cell, corners) in cells.iter().enumerate() {
-        let share = shares[cells.kind[cell] as usize];
-        for &corner in corners {
-            mean[corner as usize] += share * (strains[cell][0] + strains[cell][1]);
-            measure[corner as usize] += share;
-        }
+    /// The particles in the middles of the patches that a cell belongs to.
+    pub fn middles(&self, cell: usize) -> impl Iterator<Item = usize> + '_ {
+        let corners = self.cells.of(cell);
+        let any = corners.iter().any(|&i| !self.on_edge[i as usize]);
+        corners.iter().map(|&i| i as usize).filter(move |&i| !(any && self.on_edge[i]))
     }
-    mean.iter_mut().zip(&measure).filter(|(_, m)| **m > 0.0).for_each(|(sum, m)| *sum /= m);
-    (mean, measure)
+
+    /// The area with which a cell counts in each of its patches \[length^2\].
+    pub fn share(&self, cell: usize) -> f64 {
+        self.areas[self.cells.kind[cell] as usize] / self.middles(cell).count() as f64
+    }
+
+    /// The patches around a particle, in groups of one stiffness `factor`: their cells, in order.
+    pub fn around(&self, particle: usize, factor: Option<&[f64]>) -> Vec<Vec<usize>> {
+        let around = self.incidence.of(particle).iter().map(|&cell| cell as usize);
+        let mut patches: Vec<Vec<usize>> = Vec::new();
+        for cell in around.filter(|&cell| self.middles(cell).any(|i| i == particle)) {
+            let alike =
+                |patch: &&mut Vec<usize>| factor.is_none_or(|factor| factor[patch[0]] == factor[cell]);
+            match patches.iter_mut().find(alike) {
+                Some(patch) => patch.push(cell),
+                None => patches.push(vec![cell]),
+            }
+        }
+        patches
+    }
+
+    /// Mean dilatation of the patch around each particle \[1\], and its area \[length^2\], shape \[count\]; zero where there
+    /// is none. One material throughout.
+    fn means(&self, strains: &[[f64; 3]]) -> (Vec<f64>, Vec<f64>) {
+        let mut mean = vec![0.0; self.on_edge.len()];
+        let mut measure = mean.clone();
+        for (cell, strain) in strains.iter().enumerate() {
+            let share = self.share(cell);
+            for middle in self.middles(cell) {
+                mean[middle] += share * (strain[0] + strain[1]);
+                measure[middle] += share;
+            }
+        }
+        mean.iter_mut().zip(&measure).filter(|(_, m)| **m > 0.0).for_each(|(sum, m)| *sum /= m);
+        (mean, measure)
+    }
 }
 
-/// Mean strain of each cell as [`Cells::strains`] has it; where the material averages dilatations, with the mean of those at
-/// the cell's corners in place of its own, which means nothing there: the pressure would jump from cell to cell.
+/// Mean strain of each cell as [`Cells::strains`] has it; where the material averages dilatations, with the mean of those of
+/// the cell's patches in place of its own, which means nothing there: the pressure would jump from cell to cell.
 pub fn strains(cells: &Cells, elastic: &Elastic, displacement: &Points) -> Vec<[f64; 3]> {
     let mut strains = cells.strains(displacement);
     if elastic.averaged_dilatation().is_some() {
-        let (mean, _) = at_particles(cells, &strains, displacement.len());
-        for (strain, corners) in strains.iter_mut().zip(cells.iter()) {
-            let averaged = corners.iter().map(|&i| mean[i as usize]).sum::<f64>() / corners.len() as f64;
+        let incidence = cells.incidence(displacement.len());
+        let patches = Patches::new(cells, &incidence, displacement.len());
+        let (mean, _) = patches.means(&strains);
+        for (cell, strain) in strains.iter_mut().enumerate() {
+            let count = patches.middles(cell).count() as f64;
+            let averaged = patches.middles(cell).map(|i| mean[i]).sum::<f64>() / count;
             let add = 0.5 * (averaged - strain[0] - strain[1]);
             *strain = [strain[0] + add, strain[1] + add, strain[2]];
         }
@@ -69,6 +107,8 @@ pub fn strains(cells: &Cells, elastic: &Elastic, displacement: &Points) -> Vec<[
 /// Energy of the averaged dilatations \[force length\]; zero where the material averages none.
 pub fn energy(cells: &Cells, elastic: &Elastic, displacement: &Points) -> f64 {
     let Some(lambda) = elastic.averaged_dilatation() else { return 0.0 };
-    let (mean, measure) = at_particles(cells, &cells.strains(displacement), displacement.len());
+    let incidence = cells.incidence(displacement.len());
+    let patches = Patches::new(cells, &incidence, displacement.len());
+    let (mean, measure) = patches.means(&cells.strains(displacement));
     0.5 * lambda * mean.iter().zip(&measure).map(|(mean, measure)| measure * mean * mean).sum::<f64>()
 }

@@ -6,7 +6,7 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::cells::{Cells, Incidence};
-use super::dilatation::{patches, shares};
+use super::dilatation::Patches;
 use super::elastic::Elastic;
 use super::mechanism::{Mechanism, require_rigid};
 use super::stiffness::{ShapeError, mean_gradients};
@@ -117,18 +117,12 @@ impl MaterialWeights {
     ) -> Result<Self, WeightsError> {
         check_factor(cells, factor)?;
         let elements = elements(cells, elastic)?;
-        let (shares, lambda) = (shares(cells), elastic.averaged_dilatation());
+        let averaged = elastic
+            .averaged_dilatation()
+            .map(|lambda| (lambda, Patches::new(cells, incidence, neighbours.count())));
         let gradients = cells.shapes.iter().map(|shape| mean_gradients(shape)).collect();
-        let assembly = Assembly {
-            cells,
-            incidence,
-            neighbours: &neighbours,
-            elements,
-            shares,
-            gradients,
-            lambda,
-            factor,
-        };
+        let assembly =
+            Assembly { cells, incidence, neighbours: &neighbours, elements, gradients, averaged, factor };
         let (class, first) = assembly.classes();
         // Every row is summed over its own cells in their order: the same bits on any number of threads.
         // Collected before looking: the first error in the order of particles, not the first to be found.
@@ -226,13 +220,25 @@ struct Assembly<'a> {
     cells: &'a Cells,
     incidence: &'a Incidence,
     neighbours: &'a Neighbours,
-    /// By kind: stiffness, share of area of a corner, mean gradients.
+    /// By kind: stiffness and mean gradients.
     elements: Vec<DMatrix<f64>>,
-    shares: Vec<f64>,
     gradients: Vec<Vec<[f64; 2]>>,
-    /// What resists averaged dilatations \[force / length\].
-    lambda: Option<f64>,
+    /// What resists averaged dilatations \[force / length\], and over which cells they are averaged.
+    averaged: Option<(f64, Patches<'a>)>,
     factor: Option<&'a [f64]>,
+}
+
+/// Cells whose dilatations are averaged.
+struct Patch {
+    /// Lambda over the area \[force / length^3\].
+    stiffness: f64,
+    parts: Vec<Part>,
+}
+
+struct Part {
+    cell: usize,
+    /// \[length^2\]
+    share: f64,
 }
 
 /// What tells the classes apart: which corner of which kind of cell the particle is, and where among its
@@ -296,7 +302,7 @@ impl Assembly<'_> {
         if self.factor.is_some() {
             return None;
         }
-        if self.lambda.is_some() {
+        if self.averaged.is_some() {
             return self.long_pattern(particle);
         }
         let seen = self.neighbours.of(particle);
@@ -322,50 +328,51 @@ impl Assembly<'_> {
     /// cut, which are of many kinds.
     fn long_pattern(&self, particle: usize) -> Option<Pattern> {
         let mut pattern = vec![u8::try_from(self.neighbours.of(particle).len()).ok()?];
-        for mate in self.patch_centres(particle) {
-            for cell in self.around(mate) {
-                pattern.push(u8::try_from(self.cells.kind[cell]).ok().filter(|&kind| kind < 2)?);
-                for slot in self.slots(particle, cell) {
-                    pattern.push(if slot? == OWN { u8::MAX } else { u8::try_from(slot?).ok()? });
-                }
+        let mut push = |cell: usize, count: usize| {
+            pattern.push(u8::try_from(self.cells.kind[cell]).ok().filter(|&kind| kind < 2)?);
+            pattern.push(u8::try_from(count).ok()?);
+            for slot in self.slots(particle, cell) {
+                pattern.push(if slot? == OWN { u8::MAX } else { u8::try_from(slot?).ok()? });
             }
-            pattern.push(u8::MAX);
+            Some(())
+        };
+        self.around(particle).try_for_each(|cell| push(cell, 0))?;
+        for patch in self.patches(particle) {
+            for (k, part) in patch.parts.iter().enumerate() {
+                // Patches begin where their number of cells is told; the share tells how many patches a cell is in.
+                let (_, averaged) = self.averaged.as_ref()?;
+                push(part.cell, 8 * averaged.middles(part.cell).count() + usize::from(k == 0))?;
+            }
         }
         Some(Pattern::Long(pattern.into()))
     }
 
-    /// A particle and those it shares a cell with, ascending: the middles of the patches that it feels.
-    fn patch_centres(&self, particle: usize) -> Vec<usize> {
-        let corners = self.around(particle).flat_map(|cell| self.cells.of(cell));
-        let mut centres: Vec<usize> = corners.map(|&corner| corner as usize).collect();
-        centres.sort_unstable();
-        centres.dedup();
-        centres
-    }
-
-    /// The patches that a particle feels: stiffness \[force / length^3\] and cells. Alike for all particles that feel a patch.
-    fn patches(&self, particle: usize) -> Vec<(f64, Vec<usize>)> {
-        let Some(lambda) = self.lambda else { return Vec::new() };
-        let around = self
-            .patch_centres(particle)
-            .into_iter()
-            .flat_map(|centre| patches(self.incidence, self.factor, centre));
-        let felt =
-            around.filter(|patch| patch.iter().any(|&cell| self.cells.of(cell).contains(&(particle as u32))));
-        let with_stiffness = |patch: Vec<usize>| {
-            let area: f64 = patch.iter().map(|&cell| self.shares[self.cells.kind[cell] as usize]).sum();
-            (lambda * self.factor(patch[0]) / area, patch)
+    /// The patches that a particle feels, alike for all particles that feel one.
+    fn patches(&self, particle: usize) -> Vec<Patch> {
+        let Some((lambda, patches)) = &self.averaged else { return Vec::new() };
+        let mut middles: Vec<usize> = self.around(particle).flat_map(|cell| patches.middles(cell)).collect();
+        middles.sort_unstable();
+        middles.dedup();
+        let around = middles.into_iter().flat_map(|middle| patches.around(middle, self.factor));
+        let own = |cell: &usize| self.cells.of(*cell).contains(&(particle as u32));
+        let felt = around.filter(|patch| patch.iter().any(own));
+        let of_cells = |cells: Vec<usize>| {
+            let factor = self.factor(cells[0]);
+            let part = |cell: usize| Part { cell, share: patches.share(cell) };
+            let parts: Vec<Part> = cells.into_iter().map(part).collect();
+            let area: f64 = parts.iter().map(|part| part.share).sum();
+            Patch { stiffness: lambda * factor / area, parts }
         };
-        felt.map(with_stiffness).collect()
+        felt.map(of_cells).collect()
     }
 
     /// What the averaged dilatations add to the row of a particle: `k v_i v_j'` for each patch, `v` the sum over its cells
     /// of share times mean gradient. The sums run in the same order for either of two particles: no bit of `K_ij` differs
     /// from that of the transpose of `K_ji`.
     fn add_patches(&self, particle: usize, blocks: &mut [Block]) -> Result<(), WeightsError> {
-        for (stiffness, patch) in self.patches(particle) {
+        for Patch { stiffness, parts } in self.patches(particle) {
             let mut v: Vec<(u32, [f64; 2])> = Vec::new();
-            for &cell in &patch {
+            for Part { cell, share } in parts {
                 let kind = self.cells.kind[cell] as usize;
                 for (corner, slot) in self.slots(particle, cell).into_iter().enumerate() {
                     let slot = slot.ok_or_else(|| WeightsError::MissingMate {
@@ -373,7 +380,7 @@ impl Assembly<'_> {
                         missing: self.cells.of(cell)[corner] as usize + 1,
                         neighbours: self.most_neighbours(),
                     })?;
-                    let [x, y] = self.gradients[kind][corner].map(|g| self.shares[kind] * g);
+                    let [x, y] = self.gradients[kind][corner].map(|g| share * g);
                     match v.iter_mut().find(|(known, _)| *known == slot) {
                         Some((_, sum)) => *sum = [sum[0] + x, sum[1] + y],
                         None => v.push((slot, [x, y])),
@@ -450,7 +457,6 @@ impl Assembly<'_> {
             Element {
                 stiffness: (0..corners * corners).map(block).collect(),
                 gradients: self.gradients[kind].clone(),
-                share: self.shares[kind],
             }
         };
         self.elements.iter().enumerate().map(of_kind).collect()
@@ -468,10 +474,9 @@ impl Assembly<'_> {
                 let own = slots.iter().position(|&slot| slot == OWN).unwrap_or_default();
                 around.push(self.cells.kind[cell], own, &slots, self.factor(cell));
             }
-            for (stiffness, patch) in self.patches(particle) {
-                let cells: Vec<(u32, Vec<u32>)> =
-                    patch.into_iter().map(|cell| (self.cells.kind[cell], slots(cell))).collect();
-                around.push_patch(stiffness, &cells);
+            for Patch { stiffness, parts } in self.patches(particle) {
+                let of_part = |part: &Part| (self.cells.kind[part.cell], part.share, slots(part.cell));
+                around.push_patch(stiffness, parts.iter().map(of_part));
             }
             around.end_class();
         }

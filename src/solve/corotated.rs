@@ -25,6 +25,8 @@ use crate::flock::rules::{Corner, Mean, OWN, Rotation, Turn, patch_row};
 
 /// Newton steps of one increment.
 const MOST_STEPS: usize = 16;
+/// Steps in a row that do not halve the residual after which rounding is taken to have the last word.
+const STALLED: usize = 2;
 /// Linear systems of a whole way.
 const MOST_SOLVES: usize = 500;
 /// Least part of the way taken at once.
@@ -318,7 +320,7 @@ impl Newton<'_> {
         let mut led: Points = u.iter().zip(now.iter()).map(|(here, there)| minus(there, here)).collect();
         let Some((mut locals, mut left)) = rule.forces(&u, after) else { return Ok(None) };
         let turns: Vec<Option<Turn>> = locals.iter().map(|l| l.as_ref().map(|l| l.turn)).collect();
-        let mut best = f64::INFINITY;
+        let (mut best, mut stalled) = (f64::INFINITY, 0);
         for _ in 0..MOST_STEPS {
             self.step(&mut u, (&locals, left), std::mem::replace(&mut led, Points::zeros(now.len())))?;
             rule.hold(&mut u, &now);
@@ -326,12 +328,12 @@ impl Newton<'_> {
             (locals, left) = found;
             let residual = norm(&left) / self.size;
             self.residuals.push(residual);
-            // Where rounding has the last word, another step does not make it less.
-            if residual <= goal || (residual <= ON_THE_WAY && residual > 0.5 * best) {
-                best = best.min(residual);
+            // Where rounding has the last word, further steps do not make it less.
+            stalled = if residual > 0.5 * best { stalled + 1 } else { 0 };
+            best = best.min(residual);
+            if residual <= goal || (residual <= ON_THE_WAY && stalled == STALLED) {
                 break;
             }
-            best = best.min(residual);
             if residual.is_nan() || residual > 1e6 {
                 return Ok(None);
             }

@@ -2,7 +2,7 @@
 //!
 //! A nearly incompressible material resists, instead of the dilatation of each cell, the mean one of the cells around each
 //! particle, a *patch*; room `material` says why. The dilatation of a cell is the trace of its stretch less 2, `q_c - 2`, which
-//! no rotation changes. With `w_c` the share that a corner has of the cell's area, a patch stores
+//! no rotation changes. With `w_c` the share of a cell's area that counts for the patch, a patch stores
 //!
 //! ```text
 //! W = k t^2 / 2      t = sum_c w_c (q_c - 2)      force on a particle: -k t v      v = sum_c w_c R_c g
@@ -13,9 +13,15 @@
 use super::corotated::{Corner, Element, OWN};
 use crate::flock::block::{Block, plus};
 
-/// A cell of a patch: what it resists, and which of the particle's neighbours each of its corners is, shape \[corners\];
-/// [`OWN`] for itself.
-pub type PatchCell<'a> = (&'a Element, &'a [u32]);
+/// A cell of a patch that a particle feels.
+#[derive(Clone, Copy, Debug)]
+pub struct PatchCell<'a> {
+    pub element: &'a Element,
+    /// `w`, the area with which it counts \[length^2\].
+    pub share: f64,
+    /// Which of the particle's neighbours each of its corners is, shape \[corners\]; [`OWN`] for itself.
+    pub slots: &'a [u32],
+}
 
 /// What one patch does to a particle, and how that changes.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -38,12 +44,12 @@ pub fn pull<'a>(
     neighbour: impl Fn(usize) -> Corner,
 ) -> Option<([f64; 2], Block)> {
     let (mut dilatation, mut v) = (0.0, [0.0; 2]);
-    for (element, slots) in cells {
+    for PatchCell { element, share, slots } in cells {
         let turn = element.turn(|corner| corner_of(slots[corner], &neighbour))?;
-        dilatation += element.share * turn.growth();
+        dilatation += share * turn.growth();
         if let Some(own) = slots.iter().position(|&slot| slot == OWN) {
             let [x, y] = turn.forth(element.gradients[own]);
-            v = [v[0] + element.share * x, v[1] + element.share * y];
+            v = [v[0] + share * x, v[1] + share * y];
         }
     }
     let hold = [0, 1].map(|a| [0, 1].map(|b| k * v[a] * v[b]));
@@ -61,24 +67,24 @@ pub fn row<'a>(
         Some((_, sum)) => *sum = [sum[0] + x, sum[1] + y],
         None => v.push((slot, [x, y])),
     };
-    for (element, slots) in cells.clone() {
+    for PatchCell { element, share, slots } in cells.clone() {
         let turn = element.turn(|corner| corner_of(slots[corner], &neighbour))?;
-        dilatation += element.share * turn.growth();
+        dilatation += share * turn.growth();
         for (&slot, &gradient) in slots.iter().zip(&element.gradients) {
-            add_to(slot, turn.forth(gradient).map(|g| element.share * g));
+            add_to(slot, turn.forth(gradient).map(|g| share * g));
         }
     }
     let own = v.iter().find(|(slot, _)| *slot == OWN).map_or([0.0; 2], |(_, v)| *v);
     let outer = |by: f64, a: [f64; 2], b: [f64; 2]| a.map(|a| b.map(|b| by * a * b));
     let mut tangent: Vec<(u32, Block)> = v.iter().map(|&(slot, v)| (slot, outer(k, own, v))).collect();
-    for (element, slots) in cells {
+    for PatchCell { element, share, slots } in cells {
         let turn = element.turn(|corner| corner_of(slots[corner], &neighbour))?;
         let Some(at) = slots.iter().position(|&slot| slot == OWN) else { continue };
         let across = |corner: usize| {
             let [x, y] = turn.forth(element.gradients[corner]);
             [-y, x]
         };
-        let by = k * dilatation * element.share / turn.trace();
+        let by = k * dilatation * share / turn.trace();
         for (corner, slot) in slots.iter().enumerate() {
             if let Some((_, block)) = tangent.iter_mut().find(|(known, _)| known == slot) {
                 *block = plus(block, &outer(by, across(at), across(corner)));
@@ -87,3 +93,6 @@ pub fn row<'a>(
     }
     Some(PatchRow { force: own.map(|v| -k * dilatation * v), tangent })
 }
+
+#[cfg(test)]
+mod tests;

@@ -41,8 +41,6 @@ pub struct Element {
     pub stiffness: Vec<Block>,
     /// Mean gradients of the corners' shape functions \[1 / length\], shape \[corners\].
     pub gradients: Vec<[f64; 2]>,
-    /// Area over the number of corners \[length^2\].
-    pub share: f64,
 }
 
 /// A corner of a cell, seen from any point that belongs to the cell.

@@ -18,7 +18,7 @@ fn quadrilateral() -> (Element, Vec<[f64; 2]>) {
             stiffness[4 * i + j] = plus(&stiffness[4 * i + j], &block);
         }
     }
-    (Element { stiffness, gradients: (0..4).map(gradient).collect(), share: twice / 8.0 }, corners)
+    (Element { stiffness, gradients: (0..4).map(gradient).collect() }, corners)
 }
 
 /// Displacements far from small: a turn by 130 degrees, a shift and a strain of some 20 %.
