@@ -107,6 +107,14 @@ pub enum FemError {
         /// What the linear-algebra library said.
         reason: String,
     },
+    /// Curves of an outline, or supports in the body, too close to each other for triangles between them.
+    #[error("no triangles fit between the curves near ({x}, {y}): they come too close to each other")]
+    Unmeshable {
+        /// Abscissa \[m\].
+        x: f64,
+        /// Ordinate \[m\].
+        y: f64,
+    },
     /// A point at which a value was asked for lies in no cell.
     #[error("point {index} at ({x}, {y}) lies outside the mesh")]
     OutsideMesh {

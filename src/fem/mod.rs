@@ -30,14 +30,18 @@
 //! (which cell holds a point), `error`.
 
 mod assemble;
+mod curves;
+mod delaunay;
 mod element;
 mod error;
 mod locate;
 mod material;
 mod mesh;
+mod outline_mesh;
 mod problem;
 mod recover;
 mod shapes;
+mod size;
 mod solution;
 mod solve;
 
@@ -45,6 +49,7 @@ pub use element::CellKind;
 pub use error::FemError;
 pub use material::{Material, Orthotropic, Plane, Stress};
 pub use mesh::{Mesh, Side};
+pub use outline_mesh::{MeshRequest, OutlineMesh, OutlineSide};
 pub use problem::{Axis, Fixed, PointForce, Problem, Traction};
 pub use solution::Solution;
 pub use solve::solve;
