@@ -8,6 +8,9 @@ type Point = [f64; 2];
 /// Points nearer than this part of the body's size are one.
 pub(crate) const MERGED: f64 = 1e-6;
 
+/// Grading at the end of a line, which is the edge of something that is held.
+const LINE_END: f64 = 0.75;
+
 /// A line that a mesh follows.
 #[derive(Debug, Clone)]
 pub(crate) struct Curve {
@@ -82,14 +85,33 @@ impl Curves {
             }
         }
         for inner in outer..self.curves.len() {
+            let piece = &self.curves[inner].piece;
+            cuts[inner][0].1 = self.of_line_end(outer, inner, piece.from, piece.tangent(0.0));
+            cuts[inner][1].1 = self.of_line_end(outer, inner, piece.to, piece.tangent(1.0).map(|v| -v));
             for other in (0..self.curves.len()).filter(|&other| other < outer || other > inner) {
                 for [t, s] in meetings(&self.curves[inner].piece, &self.curves[other].piece, near) {
-                    cuts[inner].push((t, 0.0));
-                    cuts[other].push((s, 0.0));
+                    let grading = if other < outer { LINE_END } else { 0.0 };
+                    cuts[inner].push((t, grading));
+                    cuts[other].push((s, grading));
                 }
             }
         }
         cuts
+    }
+
+    /// Cells shrink towards the end of a line, unless it is closed or another line goes on there; `inward` is the
+    /// direction from the end into the line.
+    fn of_line_end(&self, outer: usize, line: usize, end: Point, inward: Point) -> f64 {
+        let near = MERGED * self.size;
+        let goes_on = |other: &Curve| {
+            let ends = [(other.piece.from, other.piece.tangent(0.0)), {
+                (other.piece.to, other.piece.tangent(1.0).map(|v| -v))
+            }];
+            ends.iter().any(|(at, to)| distance(*at, end) <= near && to[0] * inward[0] + to[1] * inward[1] < -0.9)
+        };
+        let others = self.curves[outer..].iter().enumerate().filter(|&(k, _)| outer + k != line);
+        let own = &self.curves[line].piece;
+        if own.from == own.to || others.map(|(_, other)| other).any(goes_on) { 0.0 } else { LINE_END }
     }
 
     /// Points close to a curve lie on it, others become junctions of their own.

@@ -99,6 +99,30 @@ pub enum FemError {
         /// The node that moves most in the softest motion.
         node: usize,
     },
+    /// A support of a shape that lies beside the body.
+    #[error("support {index} holds no point of the body")]
+    EmptySupport {
+        /// Place in the list of supports, from 0.
+        index: usize,
+    },
+    /// Too few supports: the part of a shape around a place can move as a rigid body.
+    #[error("the part of the body around ({x}, {y}) is not held: it is free to {motion}")]
+    Unheld {
+        /// Abscissa \[m\].
+        x: f64,
+        /// Ordinate \[m\].
+        y: f64,
+        /// "translate along x", "translate along y" or "rotate".
+        motion: &'static str,
+    },
+    /// A shape that is soft beyond what a double resolves.
+    #[error("the body is soft beyond what a double resolves, most of all near ({x}, {y})")]
+    Soft {
+        /// Abscissa \[m\].
+        x: f64,
+        /// Ordinate \[m\].
+        y: f64,
+    },
     /// The sparse factorisation could not be carried out: the factor does not fit in memory.
     #[error("sparse factorisation of {unknowns} unknowns failed: {reason}")]
     Factorisation {

@@ -40,6 +40,8 @@ mod mesh;
 mod outline_mesh;
 mod problem;
 mod recover;
+mod shape_problem;
+mod shape_solve;
 mod shapes;
 mod size;
 mod solution;
@@ -51,5 +53,9 @@ pub use material::{Material, Orthotropic, Plane, Stress};
 pub use mesh::{Mesh, Side};
 pub use outline_mesh::{MeshRequest, OutlineMesh, OutlineSide};
 pub use problem::{Axis, Fixed, PointForce, Problem, Traction};
+pub use shape_problem::{
+    Field, Holding, PlaneRegion, PortionTraction, ShapeProblem, Support, TractionField,
+};
+pub use shape_solve::{Effort, EstimatedError, Level, Reaction, ShapeSolution, solve_shape};
 pub use solution::Solution;
 pub use solve::solve;

@@ -67,7 +67,16 @@ impl Solution {
     /// [`FemError::Length`] if `x` and `y` differ in length; [`FemError::OutsideMesh`] names the first
     /// point that lies in no cell.
     pub fn displacements_at(&self, x: &[f64], y: &[f64]) -> Result<Vec<[f64; 2]>, FemError> {
-        self.at_places(x, y, |cell, shape| shape.interpolate(&self.of_cell(cell)[..self.mesh.kind().nodes()]))
+        self.displacements_within(x, y, 0.0)
+    }
+
+    /// The same, where points no further outside than `reach` \[m\] take the nearest cell, continued to them.
+    ///
+    /// # Errors
+    /// As for [`Solution::displacements_at`].
+    pub fn displacements_within(&self, x: &[f64], y: &[f64], reach: f64) -> Result<Vec<[f64; 2]>, FemError> {
+        let n = self.mesh.kind().nodes();
+        self.at_places(x, y, reach, |cell, shape| shape.interpolate(&self.of_cell(cell)[..n]))
     }
 
     /// The recovered stress of [`Solution::stress_at_points`] at each point (x, y) \[m\] of the undeformed
@@ -76,10 +85,18 @@ impl Solution {
     /// # Errors
     /// As for [`Solution::displacements_at`].
     pub fn recovered_at(&self, x: &[f64], y: &[f64]) -> Result<Vec<Stress>, FemError> {
+        self.recovered_within(x, y, 0.0)
+    }
+
+    /// The same, where points no further outside than `reach` \[m\] take the nearest cell, continued to them.
+    ///
+    /// # Errors
+    /// As for [`Solution::displacements_at`].
+    pub fn recovered_within(&self, x: &[f64], y: &[f64], reach: f64) -> Result<Vec<Stress>, FemError> {
         let at_nodes = self.stress_at_points();
         let all = |component: fn(&Stress) -> f64| at_nodes.iter().map(component).collect::<Vec<f64>>();
         let (xx, yy, xy, zz) = (all(|s| s.xx), all(|s| s.yy), all(|s| s.xy), all(|s| s.zz));
-        self.at_places(x, y, |cell, shape| {
+        self.at_places(x, y, reach, |cell, shape| {
             let n = self.mesh.kind().nodes();
             let [in_x, in_y] = shape.interpolate(&self.mesh.gather(cell, &xx, &yy)[..n]);
             let [shear, out] = shape.interpolate(&self.mesh.gather(cell, &xy, &zz)[..n]);
@@ -92,6 +109,7 @@ impl Solution {
         &self,
         x: &[f64],
         y: &[f64],
+        reach: f64,
         value: impl Fn(usize, &Shape) -> T,
     ) -> Result<Vec<T>, FemError> {
         if x.len() != y.len() {
@@ -99,7 +117,10 @@ impl Solution {
         }
         let locator = Locator::new(&self.mesh);
         let at = |(index, (&x, &y)): (usize, (&f64, &f64))| {
-            let (cell, place) = locator.find([x, y]).ok_or(FemError::OutsideMesh { index, x, y })?;
+            let (cell, place) = locator
+                .find([x, y])
+                .or_else(|| if reach > 0.0 { locator.nearest([x, y], reach) } else { None })
+                .ok_or(FemError::OutsideMesh { index, x, y })?;
             Ok(value(cell, &self.mesh.kind().shape(place)))
         };
         x.iter().zip(y).enumerate().map(at).collect()
@@ -168,7 +189,7 @@ impl Solution {
     }
 
     /// Nodal displacements of a cell, padded.
-    fn of_cell(&self, cell: usize) -> [[f64; 2]; super::element::MAX_NODES] {
+    pub(crate) fn of_cell(&self, cell: usize) -> [[f64; 2]; super::element::MAX_NODES] {
         self.mesh.gather(cell, &self.ux, &self.uy)
     }
 
