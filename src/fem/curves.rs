@@ -75,12 +75,14 @@ impl Curves {
 
     /// Where curves are cut, as places along each with a grading: their ends, and where lines meet anything.
     fn cuts(&self, outline: &Outline, outer: usize, near: f64) -> Vec<Vec<(f64, f64)>> {
-        let mut cuts: Vec<Vec<(f64, f64)>> = self.curves.iter().map(|_| vec![(0.0, 0.0), (1.0, 0.0)]).collect();
+        let mut cuts: Vec<Vec<(f64, f64)>> =
+            self.curves.iter().map(|_| vec![(0.0, 0.0), (1.0, 0.0)]).collect();
         for (k, curve) in self.curves[..outer].iter().enumerate() {
             if let Some([ring, number]) = curve.on_outline {
                 let count = outline.rings()[ring].len();
                 let before = outline.piece(ring, (number + count - 1) % count);
-                let grading = if curve.piece.begins_at_corner { of_corner(before, &curve.piece) } else { 0.0 };
+                let grading =
+                    if curve.piece.begins_at_corner { of_corner(before, &curve.piece) } else { 0.0 };
                 cuts[k][0].1 = grading;
             }
         }
@@ -107,7 +109,8 @@ impl Curves {
             let ends = [(other.piece.from, other.piece.tangent(0.0)), {
                 (other.piece.to, other.piece.tangent(1.0).map(|v| -v))
             }];
-            ends.iter().any(|(at, to)| distance(*at, end) <= near && to[0] * inward[0] + to[1] * inward[1] < -0.9)
+            ends.iter()
+                .any(|(at, to)| distance(*at, end) <= near && to[0] * inward[0] + to[1] * inward[1] < -0.9)
         };
         let others = self.curves[outer..].iter().enumerate().filter(|&(k, _)| outer + k != line);
         let own = &self.curves[line].piece;
@@ -135,7 +138,7 @@ impl Curves {
         }
     }
 
-    fn cut(&mut self, outline: &Outline, outer: usize, curve: usize, cuts: &mut Vec<(f64, f64)>, near: f64) {
+    fn cut(&mut self, outline: &Outline, outer: usize, curve: usize, cuts: &mut [(f64, f64)], near: f64) {
         let piece = self.curves[curve].piece;
         cuts.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut kept: Vec<(f64, f64)> = Vec::new();
@@ -278,7 +281,11 @@ mod tests {
         let across = Piece::edge([-1.0, 2.0], [5.0, 2.0]);
         let curves = Curves::new(&plate(), &[across], &[], &[]);
         assert!((inner_length(&curves) - 2.0).abs() < 1e-12);
-        assert_eq!(curves.spans.len(), 4 + 2 + 2 + 2, "both uprights, the circle and the line are cut in two");
+        assert_eq!(
+            curves.spans.len(),
+            4 + 2 + 2 + 2,
+            "both uprights, the circle and the line are cut in two"
+        );
         let along = Piece::edge([1.0, 0.0], [3.0, 0.0]);
         let curves = Curves::new(&plate(), &[along], &[], &[]);
         assert_eq!(inner_length(&curves), 0.0, "a line on the outline is the outline");

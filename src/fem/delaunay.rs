@@ -258,7 +258,8 @@ impl Mesher<'_> {
             let ends = [a.from, a.to].into_iter().flat_map(|p| [b.from, b.to].map(|q| distance(p, q)));
             ends.fold(f64::INFINITY, f64::min) < 1e-6 * length.max(self.curves.size)
         };
-        is_tip || of_a.iter().any(|&p| of_b.iter().any(|&q| p != q && meet(p, q) && is_sharp(self.curves, p, q)))
+        is_tip
+            || of_a.iter().any(|&p| of_b.iter().any(|&q| p != q && meet(p, q) && is_sharp(self.curves, p, q)))
     }
 
     fn mend(&mut self, triangle: [usize; 3]) -> Result<(), FemError> {
@@ -307,7 +308,8 @@ impl Mesher<'_> {
             let (p, q) = (edge.from().index(), edge.to().index());
             let Some((ends, _)) = self.stretch(p, q) else { continue };
             let (p, q) = (self.at(p).at, self.at(q).at);
-            let inside = (p[0] - centre[0]) * (q[0] - centre[0]) + (p[1] - centre[1]) * (q[1] - centre[1]) < 0.0;
+            let inside =
+                (p[0] - centre[0]) * (q[0] - centre[0]) + (p[1] - centre[1]) * (q[1] - centre[1]) < 0.0;
             if inside && found.is_none_or(|(length, _)| distance(p, q) > length) {
                 found = Some((distance(p, q), ends));
             }

@@ -161,7 +161,9 @@ impl OutlineMesh {
                 let node = *middles.entry([a.min(b), a.max(b)]).or_insert_with(|| {
                     let [mx, my] = match on_curve {
                         Some(Stretch { curve, t }) => curves[*curve].piece.point(0.5 * (t[0] + t[1])),
-                        None => [0.5 * (x[a as usize] + x[b as usize]), 0.5 * (y[a as usize] + y[b as usize])],
+                        None => {
+                            [0.5 * (x[a as usize] + x[b as usize]), 0.5 * (y[a as usize] + y[b as usize])]
+                        }
                     };
                     x.push(mx);
                     y.push(my);
@@ -240,7 +242,10 @@ mod tests {
             (with(vec![disc(20.0, 20.0, 4.0)]), 20.0),
             (with(vec![disc(20.0, 20.0, 19.7)]), 15.0),
             (with(vec![disc(10.0, 20.0, 4.0), disc(18.2, 20.0, 4.0), disc(30.0, 30.0, 0.1)]), 15.0),
-            (Shape::WithHoles { body: Box::new(disc(0.0, 0.0, 2.0)), holes: vec![disc(0.0, 0.0, 1.0)] }, 20.0),
+            (
+                Shape::WithHoles { body: Box::new(disc(0.0, 0.0, 2.0)), holes: vec![disc(0.0, 0.0, 1.0)] },
+                20.0,
+            ),
             (Shape::Specimen(Specimen::e8_sheet(1.0)), 15.0),
             (Shape::Specimen(Specimen { lying: true, ..Specimen::d638_type_i(0.1) }), 15.0),
             (Shape::Polygon { vertices: vec![[0.0, 0.0], [48.0, 44.0], [48.0, 60.0], [0.0, 44.0]] }, 15.0),
@@ -259,8 +264,11 @@ mod tests {
             assert!(sharpest(mesh.mesh()) > least, "{shape:?}: {}", sharpest(mesh.mesh()));
             let mut off = Vec::new();
             for level in 0..2 {
-                let length: f64 =
-                    mesh.sides().iter().map(|s| (s.t[1] - s.t[0]) * outline.piece(s.ring, s.piece).length()).sum();
+                let length: f64 = mesh
+                    .sides()
+                    .iter()
+                    .map(|s| (s.t[1] - s.t[0]) * outline.piece(s.ring, s.piece).length())
+                    .sum();
                 assert!((length / outline.length() - 1.0).abs() < 1e-12, "{shape:?} {level}: {length}");
                 assert_eq!(mesh.sides().len(), mesh.mesh().boundary().len(), "{shape:?}");
                 off.push((area(mesh.mesh()) / outline.area() - 1.0).abs());
@@ -279,12 +287,8 @@ mod tests {
         let across = Piece::edge([-5.0, 30.0], [50.0, 30.0]);
         let place = Place { ring: 0, piece: 1, t: 0.3 };
         let points = [([33.3, 7.7], 0.5), ([40.0, 3.0], 0.75)];
-        let request = MeshRequest {
-            lines: &[circle, across],
-            places: &[(place, 0.75)],
-            points: &points,
-            cells: 300,
-        };
+        let request =
+            MeshRequest { lines: &[circle, across], places: &[(place, 0.75)], points: &points, cells: 300 };
         let mesh = OutlineMesh::new(&outline, &request).unwrap().refined().unwrap();
         let nodes = |inside: &dyn Fn(f64, f64) -> bool| mesh.mesh().nodes_where(inside).len();
         for p in [[33.3, 7.7], [40.0, 3.0], [40.0, 12.0]] {

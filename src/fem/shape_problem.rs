@@ -46,6 +46,9 @@ pub enum Holding {
     Point(Point),
 }
 
+/// Which support prescribes each component of each node, shape \[nodes\].
+pub(crate) type Holders = Vec<[Option<usize>; 2]>;
+
 /// A support: prescribed displacements.
 pub struct Support<'a> {
     /// Where.
@@ -164,12 +167,12 @@ impl<'a> ShapeProblem<'a> {
         Err(FemError::OutsideMesh { index, x: at[0], y: at[1] })
     }
 
-    /// The problem on a mesh, and which support prescribes each component of each node.
+    /// The problem on a mesh.
     ///
     /// # Errors
     /// [`FemError::EmptySupport`] for a support that holds no node, [`FemError::OutsideMesh`] for a point force
     /// or a held point outside the body.
-    pub(crate) fn on_mesh(&self, mesh: &OutlineMesh) -> Result<(Problem, Vec<[Option<usize>; 2]>), FemError> {
+    pub(crate) fn on_mesh(&self, mesh: &OutlineMesh) -> Result<(Problem, Holders), FemError> {
         let mut problem = Problem::new(mesh.mesh().clone(), self.material);
         let mut holder = vec![[None; 2]; mesh.mesh().node_count()];
         for (number, support) in self.supports.iter().enumerate() {
@@ -193,13 +196,16 @@ impl<'a> ShapeProblem<'a> {
             }
         }
         for traction in &self.tractions {
-            for side in mesh.sides().iter().filter(|side| self.has(&traction.on, side.ring, side.piece, side.t)) {
+            for side in
+                mesh.sides().iter().filter(|side| self.has(&traction.on, side.ring, side.piece, side.t))
+            {
                 problem.tractions.push(Traction::sampled(mesh.mesh(), side.side, &traction.traction));
             }
         }
         for (index, &(at, force)) in self.point_forces.iter().enumerate() {
             let at = self.on_body(index, at)?;
-            let node = self.node_at(mesh.mesh(), at).ok_or(FemError::OutsideMesh { index, x: at[0], y: at[1] })?;
+            let node =
+                self.node_at(mesh.mesh(), at).ok_or(FemError::OutsideMesh { index, x: at[0], y: at[1] })?;
             problem.forces.push(PointForce { node: node as u32, force });
         }
         problem.body_force = self.body_force;

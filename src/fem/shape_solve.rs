@@ -5,6 +5,8 @@
 //! A 210 (1911) 307); p is observed from the last two distances, and never taken as higher than what quadratic
 //! triangles have on smooth bodies: 3 in displacement, 4 in energy.
 
+use std::collections::BTreeMap;
+
 use super::error::FemError;
 use super::locate::invert;
 use super::material::Stress;
@@ -22,13 +24,13 @@ pub struct Effort {
     pub target: f64,
     /// Meshes of more nodes are not solved on, unless there are no three coarser ones. Default: 100 000.
     pub most_nodes: usize,
-    /// Cells of the coarsest mesh, besides those that singular points add. Default: 150.
+    /// Cells of the coarsest mesh, besides those that singular points add. Default: 80.
     pub cells: usize,
 }
 
 impl Default for Effort {
     fn default() -> Self {
-        Self { target: 1e-4, most_nodes: 100_000, cells: 150 }
+        Self { target: 1e-4, most_nodes: 100_000, cells: 80 }
     }
 }
 
@@ -221,12 +223,33 @@ impl ShapeSolution {
         self.solution.displacements_within(&x, &y, self.reach)
     }
 
-    /// Stress [N/m2] at points \[m\] of the undeformed body, recovered from the cells around, shape \[points\].
+    /// Stress [N/m2] at points \[m\] of the undeformed body, shape \[points\]: inside recovered from the cells around
+    /// ([`Solution::stress_at_points`]), on the boundary, where that has cells on one side only and is less accurate
+    /// than the cells themselves, the mean of the cells that have a side there.
     ///
     /// # Errors
     /// As [`ShapeSolution::displacements_at`].
     pub fn stress_at(&self, points: &[Point]) -> Result<Vec<Stress>, FemError> {
         let (x, y): (Vec<f64>, Vec<f64>) = points.iter().map(|p| (p[0], p[1])).unzip();
-        self.solution.recovered_within(&x, &y, self.reach)
+        self.solution.interpolated_within(&self.nodal_stress(), &x, &y, self.reach)
+    }
+
+    fn nodal_stress(&self) -> Vec<Stress> {
+        let (mesh, mut stress) = (self.solution.mesh(), self.solution.stress_at_points());
+        let mut sums: BTreeMap<u32, (Stress, f64)> = BTreeMap::new();
+        for side in mesh.boundary() {
+            for local in mesh.kind().side_nodes(side.side as usize) {
+                let node = mesh.cell(side.cell as usize)[local];
+                let own = self.solution.stress_at_node(side.cell as usize, local);
+                let (sum, count) = sums.entry(node).or_default();
+                let Stress { xx, yy, xy, zz } = *sum;
+                *sum = Stress { xx: xx + own.xx, yy: yy + own.yy, xy: xy + own.xy, zz: zz + own.zz };
+                *count += 1.0;
+            }
+        }
+        for (node, (Stress { xx, yy, xy, zz }, n)) in sums {
+            stress[node as usize] = Stress { xx: xx / n, yy: yy / n, xy: xy / n, zz: zz / n };
+        }
+        stress
     }
 }

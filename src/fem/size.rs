@@ -14,9 +14,9 @@ type Point = [f64; 2];
 /// Growth of the size with the distance from something small.
 pub(crate) const GROWTH: f64 = 0.4;
 /// Angle of an arc that one cell covers at most \[rad\].
-const TURN: f64 = TAU / 20.0;
+const TURN: f64 = TAU / 16.0;
 /// Size over distance close to a singular point.
-const STEEPEST: f64 = 0.6;
+const STEEPEST: f64 = 0.8;
 /// Smallest cell at a singular point over the reach of the singularity, where that is a quarter of the body.
 const DEEPEST: f64 = 3e-4;
 
@@ -63,7 +63,7 @@ impl<'c> Sizes<'c> {
         let foreign = self.curves.spans.iter().filter(|span| !span.ends.contains(&junction));
         let near_span = foreign.map(|span| self.distance(span, own.at)).fold(f64::INFINITY, f64::min);
         let reach = (0.5 * apart.min(near_span)).min(4.0 * self.most).min(self.curves.size);
-        let far = self.smooth(own.at).min(0.4 * reach);
+        let far = self.smooth(own.at).min(0.5 * reach);
         let share = DEEPEST * (0.25 * self.curves.size / reach).powi(2);
         let near = reach * share.clamp(DEEPEST, 0.1);
         Some(Singular { at: own.at, reach, grading: own.grading, far, near })

@@ -93,7 +93,17 @@ impl Solution {
     /// # Errors
     /// As for [`Solution::displacements_at`].
     pub fn recovered_within(&self, x: &[f64], y: &[f64], reach: f64) -> Result<Vec<Stress>, FemError> {
-        let at_nodes = self.stress_at_points();
+        self.interpolated_within(&self.stress_at_points(), x, y, reach)
+    }
+
+    /// Stress known at the nodes, shape \[nodes\], at points; as [`Solution::recovered_within`].
+    pub(crate) fn interpolated_within(
+        &self,
+        at_nodes: &[Stress],
+        x: &[f64],
+        y: &[f64],
+        reach: f64,
+    ) -> Result<Vec<Stress>, FemError> {
         let all = |component: fn(&Stress) -> f64| at_nodes.iter().map(component).collect::<Vec<f64>>();
         let (xx, yy, xy, zz) = (all(|s| s.xx), all(|s| s.yy), all(|s| s.xy), all(|s| s.zz));
         self.at_places(x, y, reach, |cell, shape| {
@@ -142,6 +152,14 @@ impl Solution {
     /// Von Mises stress of [`Solution::stress_at_points`] [N/m2], shape \[nodes\].
     pub fn von_mises_at_points(&self) -> Vec<f64> {
         self.stress_at_points().iter().map(Stress::von_mises).collect()
+    }
+
+    /// Stress at a node of a cell by that cell alone; `local` is the node's number in the cell.
+    pub(crate) fn stress_at_node(&self, cell: usize, local: usize) -> Stress {
+        let kind = self.mesh.kind();
+        let shape = kind.shape(kind.reference_nodes()[local]);
+        let (n, at, u) = (kind.nodes(), self.mesh.positions(cell), self.of_cell(cell));
+        self.material.stress(shape.gradient(&at[..n]).strain(&u[..n]))
     }
 
     /// Elastic energy \[J\]: half the integral of stress times strain over the volume.
