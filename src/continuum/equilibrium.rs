@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 
 use super::engine::Engine;
-use super::layout::held;
+use super::layout::{held, held_components};
 use super::plan::Plan;
 use super::run::{Outcome, StopReason, Watch, run_watched};
 use crate::flock::points::{Points, distance};
@@ -90,7 +90,8 @@ fn held_after(plan: &Plan, steps: f64) -> Points {
 /// Names the part of the rule that is not linear.
 pub fn of_plan(scene: &Scene, plan: &Plan) -> Result<System, SceneError> {
     let held = held_after(plan, plan.stop.steps as f64);
-    system(&plan.interaction, &plan.body, follows(plan), held).map_err(|error| {
+    let components = held_components(&plan.changes, &plan.body, plan.stop.steps as f64);
+    system(&plan.interaction, &plan.body, follows(plan), held, &components).map_err(|error| {
         let (key, help) = match error {
             NotLinear::Rule { .. } => {
                 ("rule.mean", "leave [equilibrium] out: sweeps find where such a rule comes to rest")

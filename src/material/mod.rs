@@ -21,11 +21,13 @@
 //! * [`elastic`]: engineering constants, refused where no stable material has them, to the 3x3
 //!   stiffness of the sheet.
 //! * [`cells`]: the cells of a body: rectangles, triangles or hexagons between its particles.
+//! * [`fit`]: bodies whose outline is kept: cells that the shape cuts, along it.
 //! * [`stiffness`]: what one cell resists: bilinear quadrilateral, constant-strain triangle, and the
 //!   lowest-order virtual element for any polygon.
 //! * [`mechanism`]: whether the cells hold the body together, or a hinge lets it fold.
 //! * [`weights`]: cells and neighbours to `K_ij`, `D_i` and `W_ij`, kept by class of particles.
-//! * [`loads`]: tractions, point forces and a body force to the forces `f_i`.
+//! * [`outline_loads`]: what acts on the outline, on particles or on all of the body to the forces `f_i`; [`loads`]: the
+//!   same for tractions given side by side.
 //! * [`homogenise`]: the way back, from the weights of an interior particle, matrices or scalars, to
 //!   the material that they are.
 //! * [`zone`]: over all waves on the lattice: is the rule stable, and how much must a synchronous
@@ -53,10 +55,12 @@
 
 pub mod cells;
 pub mod elastic;
+pub mod fit;
 pub mod gradient;
 pub mod homogenise;
 pub mod loads;
 pub mod mechanism;
+pub mod outline_loads;
 pub mod report;
 pub mod stiffness;
 pub mod weights;
