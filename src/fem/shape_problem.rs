@@ -17,6 +17,9 @@ type Point = [f64; 2];
 const AT_SUPPORT: f64 = 0.75;
 const AT_LOAD: f64 = 0.5;
 
+/// The mesh is not graded towards more single points than this: each counts for little among so many.
+const MOST_GRADED: usize = 16;
+
 /// A displacement \[m\] or a force of the place \[m\].
 pub type Field<'a> = Box<dyn Fn(Point) -> Point + 'a>;
 
@@ -146,13 +149,15 @@ impl<'a> ShapeProblem<'a> {
 
     /// Points that have to be nodes, moved onto the outline where they are a little outside.
     pub(crate) fn points(&self) -> Result<Vec<(Point, f64)>, FemError> {
-        let held = self.supports.iter().filter_map(|support| match support.on {
-            Holding::Point(at) => Some((at, AT_SUPPORT)),
+        let held: Vec<Point> = self.supports.iter().filter_map(|support| match support.on {
+            Holding::Point(at) => Some(at),
             _ => None,
-        });
-        let pulled = self.point_forces.iter().map(|&(at, _)| (at, AT_SUPPORT));
+        }).collect();
+        let of_held = if held.len() <= MOST_GRADED { AT_SUPPORT } else { 0.0 };
+        let grading = if self.point_forces.len() <= MOST_GRADED { AT_SUPPORT } else { 0.0 };
+        let pulled = self.point_forces.iter().map(|&(at, _)| (at, grading));
         let on_body = |(index, (at, grading)): (usize, (Point, f64))| Ok((self.on_body(index, at)?, grading));
-        held.chain(pulled).enumerate().map(on_body).collect()
+        held.into_iter().map(|at| (at, of_held)).chain(pulled).enumerate().map(on_body).collect()
     }
 
     /// The place of the body that a point stands for.

@@ -22,7 +22,7 @@ type Point = [f64; 2];
 pub struct Effort {
     /// Relative L2 error of the displacement at which refinement ends \[1\]. Default: 1e-4.
     pub target: f64,
-    /// Meshes of more nodes are not solved on, unless there are no three coarser ones. Default: 100 000.
+    /// Meshes of more nodes are not solved on, unless fewer than three are smaller. Default: 100 000.
     pub most_nodes: usize,
     /// Cells of the coarsest mesh, besides those that singular points add. Default: 80.
     pub cells: usize,
@@ -93,7 +93,9 @@ pub fn solve_shape(problem: &ShapeProblem<'_>, effort: &Effort) -> Result<ShapeS
         levels.push(Level { nodes: mesh.mesh().node_count(), energy: solution.strain_energy(), change });
         let error = estimate(&levels);
         let is_enough = levels.len() >= 3 && error.displacement <= effort.target;
-        let is_all = levels.len() >= 3 && 4 * mesh.mesh().node_count() > effort.most_nodes;
+        // Singular points by the hundred make even the coarsest mesh a large one.
+        let is_large = mesh.mesh().node_count() > effort.most_nodes;
+        let is_all = is_large || levels.len() >= 3 && 4 * mesh.mesh().node_count() > effort.most_nodes;
         if is_enough || is_all {
             let reactions = reactions(problem.supports.len(), &on_mesh, &holder, &solution);
             return Ok(ShapeSolution { solution, levels, error, reactions, reach: problem.reach });
@@ -219,8 +221,16 @@ impl ShapeSolution {
     /// # Errors
     /// [`FemError::OutsideMesh`] names the first point further outside.
     pub fn displacements_at(&self, points: &[Point]) -> Result<Vec<Point>, FemError> {
+        self.displacements_within(points, self.reach)
+    }
+
+    /// The same for points no further outside than another `reach` \[m\].
+    ///
+    /// # Errors
+    /// As [`ShapeSolution::displacements_at`].
+    pub fn displacements_within(&self, points: &[Point], reach: f64) -> Result<Vec<Point>, FemError> {
         let (x, y): (Vec<f64>, Vec<f64>) = points.iter().map(|p| (p[0], p[1])).unzip();
-        self.solution.displacements_within(&x, &y, self.reach)
+        self.solution.displacements_within(&x, &y, reach)
     }
 
     /// Stress [N/m2] at points \[m\] of the undeformed body, shape \[points\]: inside recovered from the cells around
@@ -230,8 +240,16 @@ impl ShapeSolution {
     /// # Errors
     /// As [`ShapeSolution::displacements_at`].
     pub fn stress_at(&self, points: &[Point]) -> Result<Vec<Stress>, FemError> {
+        self.stress_within(points, self.reach)
+    }
+
+    /// The same for points no further outside than another `reach` \[m\].
+    ///
+    /// # Errors
+    /// As [`ShapeSolution::displacements_at`].
+    pub fn stress_within(&self, points: &[Point], reach: f64) -> Result<Vec<Stress>, FemError> {
         let (x, y): (Vec<f64>, Vec<f64>) = points.iter().map(|p| (p[0], p[1])).unzip();
-        self.solution.interpolated_within(&self.nodal_stress(), &x, &y, self.reach)
+        self.solution.interpolated_within(&self.nodal_stress(), &x, &y, reach)
     }
 
     fn nodal_stress(&self) -> Vec<Stress> {

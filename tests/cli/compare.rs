@@ -5,7 +5,7 @@ use std::path::Path;
 use crate::program::*;
 
 fn compare(folder: &Path, more: &[&str]) -> String {
-    let arguments = [&["compare", "beam", "--refine", "2"], more].concat();
+    let arguments = [&["compare", "beam", "--truth-error", "0.01"], more].concat();
     let output = flockform(&arguments, folder);
     assert!(output.status.success(), "{arguments:?}: {}", text(&output.stderr));
     text(&output.stdout)
@@ -49,7 +49,7 @@ fn what_cannot_be_compared_is_refused_with_exit_code_2_and_leaves_nothing() {
     let folder = temporary();
     for (arguments, words) in [
         (vec!["compare", "tension"], "the scene has none"),
-        (vec!["compare", "beam", "--refine", "0"], "--refine"),
+        (vec!["compare", "beam", "--truth-error", "0"], "--truth-error"),
         (vec!["compare", "beam", "--set", "neighbours.kind=first"], "cannot carry shear coupling"),
         (vec!["compare", "beem"], "nearest bundled scene is `beam`"),
     ] {

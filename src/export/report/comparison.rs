@@ -128,10 +128,14 @@ fn facts(scene: &Scene, report: &ComparisonReport) -> Vec<(String, String)> {
         ("Rule".into(), format!("by {way}: {}", rule.stop_reason)),
         (
             "Truth".into(),
-            format!(
-                "finite elements, {} nodes, each side of a cell in {} parts",
-                report.truth.nodes, report.truth.refine
-            ),
+            match report.truth.stated_error {
+                Some(error) => format!(
+                    "finite elements on the shape, {} nodes, own error {} %",
+                    report.truth.nodes,
+                    number(100.0 * error)
+                ),
+                None => format!("finite elements on the shape, {} nodes", report.truth.nodes),
+            },
         ),
         (
             "Compared".into(),
