@@ -55,7 +55,11 @@ pub fn truth_of(scene: &Scene, effort: &Effort) -> Result<SceneTruth, SceneError
     let Some(elastic) = scene.material else { return Err(without_material(scene)) };
     let Some(outline) = &layout.outline else {
         let message = "the truth is that of a shape, and the body has no outline that bounds one";
-        return Err(scene.refuse("body.shape", message, "give a shape that is one piece and crosses itself nowhere"));
+        return Err(scene.refuse(
+            "body.shape",
+            message,
+            "give a shape that is one piece and crosses itself nowhere",
+        ));
     };
     let changes = layout.role_changes(scene, None)?;
     let supports = supports(scene, &layout, outline, &changes, scene.stop.steps as f64)?;

@@ -116,7 +116,8 @@ fn between(known: &[(Point, Point)], p: Point) -> Point {
     for &(_, second) in by_distance.iter().skip(1).take(8) {
         let (other, v) = known[second];
         let length = distance(at, other);
-        let share = ((p[0] - at[0]) * (other[0] - at[0]) + (p[1] - at[1]) * (other[1] - at[1])) / (length * length);
+        let share =
+            ((p[0] - at[0]) * (other[0] - at[0]) + (p[1] - at[1]) * (other[1] - at[1])) / (length * length);
         let foot = [0, 1].map(|k| at[k] + share * (other[k] - at[k]));
         if share > 0.0 && distance(foot, p) <= 0.05 * length {
             return [0, 1].map(|k| u[k] + share * (v[k] - u[k]));
@@ -157,14 +158,18 @@ impl Picked<'_> {
     ) -> Result<Option<Holding>, SceneError> {
         let on_outline = || self.layout.portions(scene, &format!("roles[{entry}]"), region);
         let known = match region {
-            SceneRegion::Outline(_) | SceneRegion::Outermost(_) => return Ok(Some(Holding::Portions(on_outline()?))),
+            SceneRegion::Outline(_) | SceneRegion::Outermost(_) => {
+                return Ok(Some(Holding::Portions(on_outline()?)));
+            }
             SceneRegion::Known(known) => known,
         };
         let near = ON_OUTLINE * self.spacing();
-        let (min, max) = all.iter().map(|&i| self.at(i)).fold(
-            ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]),
-            |(low, high), p| ([0, 1].map(|k| p[k].min(low[k])), [0, 1].map(|k| p[k].max(high[k]))),
-        );
+        let (min, max) = all
+            .iter()
+            .map(|&i| self.at(i))
+            .fold(([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]), |(low, high), p| {
+                ([0, 1].map(|k| p[k].min(low[k])), [0, 1].map(|k| p[k].max(high[k])))
+            });
         let has_cell = self.has_whole_cell(all);
         let is_outer = all.iter().all(|&i| self.outline.nearest(self.at(i)).1 <= near);
         let along = |selection: Selection| {
@@ -196,7 +201,8 @@ impl Picked<'_> {
     /// Lines between particles that share a side of a cell, and points.
     fn one_by_one(&self) -> Vec<Holding> {
         let inside: BTreeSet<u32> = self.particles.iter().map(|&i| i as u32).collect();
-        let sides = self.layout.cells.as_ref().map_or_else(BTreeSet::new, |cells| sides_within(cells, &inside));
+        let sides =
+            self.layout.cells.as_ref().map_or_else(BTreeSet::new, |cells| sides_within(cells, &inside));
         let near = ON_OUTLINE * self.spacing();
         let mut joined: BTreeSet<u32> = BTreeSet::new();
         let (mut portions, mut segments) = (Vec::new(), Vec::new());
@@ -240,7 +246,10 @@ fn joined_portions(mut portions: Vec<Portion>) -> Vec<Portion> {
     let mut joined: Vec<Portion> = Vec::new();
     for portion in portions {
         match joined.last_mut() {
-            Some(last) if (last.ring, last.piece) == (portion.ring, portion.piece) && portion.t[0] <= last.t[1] + 1e-9 => {
+            Some(last)
+                if (last.ring, last.piece) == (portion.ring, portion.piece)
+                    && portion.t[0] <= last.t[1] + 1e-9 =>
+            {
                 last.t[1] = last.t[1].max(portion.t[1]);
             }
             _ => joined.push(portion),

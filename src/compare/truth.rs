@@ -79,7 +79,8 @@ impl Truth {
         let solution = solve_shape(&problem, effort)?;
         let is_within = |p: Point| outline.contains(p) || outline.nearest(p).1 <= OUTSIDE * spacing;
         let is_known: Vec<bool> = reference.iter().map(is_within).collect();
-        let places: Vec<Point> = reference.iter().zip(&is_known).filter(|(_, known)| **known).map(|(p, _)| p).collect();
+        let places: Vec<Point> =
+            reference.iter().zip(&is_known).filter(|(_, known)| **known).map(|(p, _)| p).collect();
         let mut found = solution.displacements_within(&places, spacing)?.into_iter();
         let of = |&known: &bool| if known { found.next().unwrap_or_default() } else { [0.0; 2] };
         let displacement = is_known.iter().map(of).collect();

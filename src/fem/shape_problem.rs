@@ -149,10 +149,14 @@ impl<'a> ShapeProblem<'a> {
 
     /// Points that have to be nodes, moved onto the outline where they are a little outside.
     pub(crate) fn points(&self) -> Result<Vec<(Point, f64)>, FemError> {
-        let held: Vec<Point> = self.supports.iter().filter_map(|support| match support.on {
-            Holding::Point(at) => Some(at),
-            _ => None,
-        }).collect();
+        let held: Vec<Point> = self
+            .supports
+            .iter()
+            .filter_map(|support| match support.on {
+                Holding::Point(at) => Some(at),
+                _ => None,
+            })
+            .collect();
         let of_held = if held.len() <= MOST_GRADED { AT_SUPPORT } else { 0.0 };
         let grading = if self.point_forces.len() <= MOST_GRADED { AT_SUPPORT } else { 0.0 };
         let pulled = self.point_forces.iter().map(|&(at, _)| (at, grading));

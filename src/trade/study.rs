@@ -108,7 +108,9 @@ fn finest_truth(load: Load<'_>, scene: &Scene, grid: &Grid) -> Result<SceneTruth
     let fits = |truth: &SceneTruth| truth.layout.body.count() <= grid.most_particles;
     for &spacing in spacings.iter().filter(|&&spacing| spacing <= 1.0) {
         let finer = load(&body_overrides(scene, RuleChoice::Material, spacing));
-        if let Some(truth) = finer.ok().and_then(|scene| truth_of(&scene, &Effort::default()).ok()).filter(fits) {
+        if let Some(truth) =
+            finer.ok().and_then(|scene| truth_of(&scene, &Effort::default()).ok()).filter(fits)
+        {
             return Ok(truth);
         }
     }
@@ -158,7 +160,7 @@ fn measure(scene: &Scene, truth: &Truth, setting: Setting, particles: usize, rep
 }
 
 /// Relative L2 distance of the followers from where the truth has them; `None` where it has none of them.
-fn error_of(outcome: &RunOutcome, truth: &Truth) -> Option<f64> {
+pub(super) fn error_of(outcome: &RunOutcome, truth: &Truth) -> Option<f64> {
     let engine = &outcome.engine;
     let reference = &engine.body().reference;
     let followers = (0..reference.len()).filter(|&i| engine.roles()[i] == Role::Follower);

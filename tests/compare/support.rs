@@ -51,5 +51,6 @@ pub fn largest_difference(a: &Points, b: &Points) -> f64 {
 pub fn compared(name: &str, overrides: &[&str]) -> Compared {
     let overrides: Vec<String> = overrides.iter().map(|&text| text.into()).collect();
     let scene = bundled(name).expect("bundled").load(&overrides).unwrap_or_else(|e| panic!("{e}"));
-    compare(&scene, &Effort::default(), &mut |_, _| ControlFlow::Continue(())).unwrap_or_else(|e| panic!("{e}"))
+    compare(&scene, &Effort::default(), &mut |_, _| ControlFlow::Continue(()))
+        .unwrap_or_else(|e| panic!("{e}"))
 }

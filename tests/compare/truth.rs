@@ -71,7 +71,8 @@ fn a_body_of_whole_cells_is_held_against_the_shape_and_not_against_itself() {
 
 #[test]
 fn regions_of_whole_cells_hold_from_their_first_particle_to_their_last() {
-    let block = "roles=[{ region = { kind = \"box\", min = [9.0, 9.0], max = [13.4, 30.0] }, role = \"clamped\" }]";
+    let block =
+        "roles=[{ region = { kind = \"box\", min = [9.0, 9.0], max = [13.4, 30.0] }, role = \"clamped\" }]";
     let found = truth("beam-loaded", &[block]);
     let places = [[12.9, 15.0], [13.0, 20.0], [13.3, 15.0]].into_iter().collect();
     let moved = found.truth.displacements_at(&places).unwrap_or_else(|e| panic!("{e}"));
@@ -82,8 +83,10 @@ fn regions_of_whole_cells_hold_from_their_first_particle_to_their_last() {
 #[test]
 fn particles_picked_one_by_one_hold_the_lines_between_them() {
     let column: Vec<String> = (1..=12).map(|id| id.to_string()).collect();
-    let ids =
-        format!("roles=[{{ region = {{ kind = \"ids\", ids = [{}] }}, role = \"clamped\" }}]", column.join(", "));
+    let ids = format!(
+        "roles=[{{ region = {{ kind = \"ids\", ids = [{}] }}, role = \"clamped\" }}]",
+        column.join(", ")
+    );
     let (edge, by_id) = (truth("beam-loaded", &[]), truth("beam-loaded", &[&ids]));
     let off = largest_difference(&edge.truth.displacement, &by_id.truth.displacement);
     assert!(off < 1e-9, "{off}");
