@@ -7,6 +7,7 @@
 //! * [`truth`]: what holds and what pulls the shape, to the truth's displacement and stress.
 //! * [`run`]: both of a scene, measured; [`run::plan()`] is how a scene is planned whose leaders the truth leads.
 //! * [`measures`]: two displacements of one body to the numbers that tell them apart.
+//! * [`split`]: which part of an error is the solver's, the outline's and the cells'.
 //!
 //! ```
 //! use std::ops::ControlFlow;
@@ -25,5 +26,6 @@
 
 pub mod measures;
 pub mod run;
+pub mod split;
 pub mod supports;
 pub mod truth;

@@ -4,6 +4,7 @@ use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
 use super::measures::{Comparison, Sides, von_mises};
+use super::split::ErrorParts;
 use super::supports::supports;
 use super::truth::{Setting, Truth, TruthError};
 use crate::continuum::engine::Engine;
@@ -110,6 +111,8 @@ pub fn compare(
         .map_err(|shape| scene.refuse("lattice", shape.to_string(), "use a lattice less slender"))?;
     comparison.seconds_rule = time.as_secs_f64();
     comparison.seconds_truth = truth.time.as_secs_f64();
+    comparison.truth_stated_rel_l2 = Some(truth.truth.error().displacement).filter(|error| error.is_finite());
+    comparison.parts = ErrorParts::of(scene, &truth, &rule, &follows)?;
     let von_mises_rule = von_mises(&cells, elastic, &rule);
     let von_mises_truth = von_mises(&cells, elastic, known);
     Ok(Compared { comparison, outcome, truth, cells, rule, von_mises_rule, von_mises_truth })
@@ -174,7 +177,7 @@ fn require_known(scene: &Scene, truth: &Truth, changes: &[RoleChange]) -> Result
     Ok(())
 }
 
-fn refused(scene: &Scene, error: &TruthError) -> SceneError {
+pub(super) fn refused(scene: &Scene, error: &TruthError) -> SceneError {
     let (key, help) = match error {
         TruthError::Mechanism { .. } => {
             ("roles", "clamp at least two particles of every part, or lead them by a motion of their own")

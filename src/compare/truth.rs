@@ -8,6 +8,7 @@ use crate::fem::{
 };
 use crate::flock::points::Points;
 use crate::geometry::outline::Outline;
+use crate::geometry::portion::Portion;
 use crate::material::elastic::{Constants, Elastic, Plane};
 use crate::material::outline_loads::Load;
 
@@ -71,11 +72,24 @@ impl Truth {
     /// # Errors
     /// Names the place at which the shape is not held, or what keeps it from being meshed.
     pub fn solve(setting: Setting<'_>, effort: &Effort) -> Result<Self, TruthError> {
+        Self::solve_with(setting, Vec::<(_, fn(Point, Point) -> Point)>::new(), effort)
+    }
+
+    /// The same with more that pushes portions of the outline \[force / length\], as a function of place and normal.
+    pub(super) fn solve_with<'a>(
+        setting: Setting<'a>,
+        more: Vec<(Vec<Portion>, impl Fn(Point, Point) -> Point + 'a)>,
+        effort: &Effort,
+    ) -> Result<Self, TruthError> {
         let Setting { outline, reference, spacing, elastic, supports, loads } = setting;
         let mut problem = ShapeProblem::new(outline, material(elastic)?);
         problem.reach = OUTSIDE * spacing;
         problem.supports = supports;
-        pull(&mut problem, loads, reference, elastic.thickness());
+        let thickness = elastic.thickness();
+        pull(&mut problem, loads, reference, thickness);
+        for (portions, push) in more {
+            problem.pull(portions, move |p, n| push(p, n).map(|f| f / thickness));
+        }
         let solution = solve_shape(&problem, effort)?;
         let is_within = |p: Point| outline.contains(p) || outline.nearest(p).1 <= OUTSIDE * spacing;
         let is_known: Vec<bool> = reference.iter().map(is_within).collect();

@@ -84,8 +84,8 @@ fn the_material_rule_led_by_the_truth_is_within_half_a_percent_of_it() {
         let found = errors(name, &[]);
         assert!(found[0] < displacement && found[1] < von_mises, "{name}: {found:?}");
     }
-    assert_errors("beam", &[], [0.0038, 0.0192], 3e-4);
-    assert_errors("beam-hexagonal", &[], [0.0093, 0.040], 1e-3);
+    assert_errors("beam", &[], [0.0039, 0.0197], 3e-4);
+    assert_errors("beam-hexagonal", &[], [0.0039, 0.030], 1e-3);
 }
 
 #[test]
@@ -100,8 +100,8 @@ fn the_papers_rule_has_its_large_errors_whatever_the_neighbours() {
     assert_errors("beam-paper-ring", &[], [0.264, 0.76], 0.01);
     assert_errors("beam-paper-second", &[], [0.264, 0.75], 0.01);
     assert_errors("beam-paper-reduced", &[], [0.437, 1.450], 0.01);
-    assert_errors("beam-paper-hexagonal", &[], [0.259, 0.758], 0.01);
-    assert_errors("beam-paper-hexagonal-reduced", &[], [0.259, 0.725], 0.01);
+    assert_errors("beam-paper-hexagonal", &[], [0.235, 0.799], 0.01);
+    assert_errors("beam-paper-hexagonal-reduced", &[], [0.237, 0.770], 0.01);
     for (name, von_mises) in [("beam-paper-5", 5.85), ("beam-paper-10", 12.37)] {
         let found = errors(name, &[]);
         assert!((found[1] - von_mises).abs() < 0.01, "{name}: {found:?}");

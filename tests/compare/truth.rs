@@ -2,7 +2,9 @@
 
 use std::ops::ControlFlow;
 
+use flockform::compare::measures::Comparison;
 use flockform::compare::run::{SceneTruth, compare, truth_of};
+use flockform::compare::split::ErrorParts;
 use flockform::fem::Effort;
 use flockform::scene::{Scene, bundled};
 
@@ -56,17 +58,34 @@ fn cooks_membrane_has_the_published_displacement_in_truth() {
     assert!((tip / 23.965 - 1.0).abs() < 3e-4, "{tip}");
 }
 
+fn measured(overrides: &[&str]) -> Comparison {
+    let scene = load("beam-loaded", overrides);
+    let found = compare(&scene, &Effort::default(), &mut |_, _| ControlFlow::Continue(()));
+    let found = found.unwrap_or_else(|e| panic!("{e}")).comparison;
+    println!("{overrides:?}\n{found}");
+    found
+}
+
 #[test]
-fn a_body_of_whole_cells_is_held_against_the_shape_and_not_against_itself() {
-    let compared = |outline: &str| {
-        let scene = load("beam-loaded", &[COOK.as_slice(), &[outline]].concat());
-        let found = compare(&scene, &Effort::default(), &mut |_, _| ControlFlow::Continue(()));
-        found.unwrap_or_else(|e| panic!("{e}")).comparison.displacement_rel_l2
-    };
+fn a_body_of_whole_cells_is_held_against_the_shape_and_its_outline_is_blamed() {
+    let compared = |outline: &str| measured(&[COOK.as_slice(), &[outline]].concat());
     let (staircase, fitted) = (compared("body.outline=\"lattice\""), compared("body.outline=\"fitted\""));
-    println!("staircase {staircase:.3}, fitted {fitted:.4}");
-    assert!(staircase > 0.2, "the staircase is {staircase} off");
-    assert!(fitted < 0.05, "fitted {fitted} off");
+    assert!(staircase.displacement_rel_l2 > 0.2, "{staircase}");
+    assert!(fitted.displacement_rel_l2 < 0.05, "{fitted}");
+    let [of_staircase, of_fitted] = [&staircase, &fitted].map(|found| found.parts.outline.expect("told"));
+    assert!(of_staircase > 0.1 && of_fitted < 1e-9, "{of_staircase} {of_fitted}");
+    let solver = fitted.parts.solver.expect("told");
+    assert!(solver < 1e-4 && (fitted.parts.discretisation.expect("told") / fitted.displacement_rel_l2 - 1.0).abs() < 0.01);
+}
+
+#[test]
+fn chords_for_arcs_and_a_coarse_tolerance_are_told_from_the_cells() {
+    let hole = "body={ shape = { kind = \"rectangle\", max = [20.0, 12.0] }, holes = [{ kind = \"disc\", centre = [9.0, 6.0], radius = 2.5 }] }";
+    let found = measured(&[hole, "equilibrium={ solver = \"conjugate-gradients\", tolerance = 1e-2 }"]);
+    let ErrorParts { discretisation, outline, solver } = found.parts;
+    let (outline, solver) = (outline.expect("told"), solver.expect("told"));
+    assert!(outline > 1e-5 && outline < 0.01 && solver > 1e-4, "{found}");
+    assert!(discretisation.expect("told") < found.displacement_rel_l2 + outline + solver);
 }
 
 #[test]
