@@ -25,8 +25,7 @@ pub fn along_outline(body: &Body, neighbours: &Neighbours, weights: &MatrixWeigh
     members.iter().for_each(|&i| is_member[i] = true);
     let mut fresh = members.clone();
     for _ in 0..RINGS {
-        let around: Vec<usize> =
-            fresh.iter().flat_map(|&i| neighbours.of(i)).map(|&j| j as usize).collect();
+        let around: Vec<usize> = fresh.iter().flat_map(|&i| neighbours.of(i)).map(|&j| j as usize).collect();
         fresh.clear();
         for j in around {
             if !std::mem::replace(&mut is_member[j], true) {

@@ -15,8 +15,8 @@ use crate::flock::rules::{Axis, Mean, Poisson, Rule};
 use crate::geometry::outline::Outline;
 use crate::material::cells::Cells;
 use crate::material::mechanism::require_held;
-use crate::scene::{Scene, SceneError, Stop};
 use crate::material::outline_loads::{Resultant, sum};
+use crate::scene::{Scene, SceneError, Stop};
 use crate::solve::linear::HeldComponent;
 use crate::solve::sweep::{Order, Update};
 

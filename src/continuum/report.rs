@@ -200,7 +200,8 @@ fn outline_facts(scene: &Scene, plan: &Plan) -> Vec<(String, String)> {
         facts.extend(pieces(outline, MOST_PIECES).into_iter().map(|line| ("  piece".to_owned(), line)));
     }
     for (k, Resultant { force, moment }) in plan.resultants.iter().enumerate() {
-        let value = format!("force ({:.6e}, {:.6e}), moment {moment:.6e} about the origin", force[0], force[1]);
+        let value =
+            format!("force ({:.6e}, {:.6e}), moment {moment:.6e} about the origin", force[0], force[1]);
         facts.push((format!("loads[{k}]"), value));
     }
     facts
