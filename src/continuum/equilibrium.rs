@@ -11,7 +11,7 @@ use crate::flock::role::Role;
 use crate::scene::{Scene, SceneError};
 use crate::solve::corotated::{self, CorotatedError};
 use crate::solve::equilibrium::{Request, SolveError, Solved, Solver, System, choose, solve};
-use crate::solve::linear::{NotLinear, system};
+use crate::solve::linear::{HeldComponent, NotLinear, system};
 
 /// Runs a plan to its end as its scene asks: stepping, or straight to the equilibrium. `see` sees each step of
 /// a stepped run as [`run`](super::run::run) shows it, and of a solved one the end.
@@ -45,8 +45,9 @@ pub fn come_to_rest_watched(scene: &Scene, plan: Plan, watch: Watch<'_>) -> Resu
 pub fn settle(scene: &Scene, request: &Request, plan: Plan) -> Result<Outcome, SceneError> {
     let solved = if corotated::is_corotated(&plan.interaction) {
         let steps = steps_of_the_way(&plan) as f64;
-        let way = |part: f64| held_after(&plan, part * steps);
-        corotated::solve(&plan.interaction, &plan.body, follows(&plan), &way, request)
+        let way = |part: f64| way_after(&plan, part * steps);
+        let axes = held_axes(&plan);
+        corotated::solve(&plan.interaction, &plan.body, follows(&plan), axes, &way, request)
             .map_err(|error| refuse_corotated(scene, &error))?
     } else {
         let system = of_plan(scene, &plan)?;
@@ -84,6 +85,25 @@ fn held_after(plan: &Plan, steps: f64) -> Points {
     held(&plan.changes, &plan.body, steps).into_iter().map(at_rest).collect()
 }
 
+/// The same with the single components that are held of followers.
+fn way_after(plan: &Plan, steps: f64) -> Points {
+    let mut held = held_after(plan, steps);
+    for HeldComponent { particle, axis, displacement } in held_components(&plan.changes, &plan.body, steps) {
+        let mut place = held.get(particle);
+        place[axis as usize] = displacement;
+        held.set(particle, place);
+    }
+    held
+}
+
+/// Single components that are held of followers, shape \[count\]\[x, y\]; empty without any.
+fn held_axes(plan: &Plan) -> Vec<[bool; 2]> {
+    let components = held_components(&plan.changes, &plan.body, 0.0);
+    let mut axes = vec![[false; 2]; if components.is_empty() { 0 } else { plan.count() }];
+    components.iter().for_each(|held| axes[held.particle][held.axis as usize] = true);
+    axes
+}
+
 /// The linear system of a plan: leaders where they are at the last step.
 ///
 /// # Errors
@@ -106,9 +126,7 @@ pub fn of_plan(scene: &Scene, plan: &Plan) -> Result<System, SceneError> {
 fn refuse_corotated(scene: &Scene, error: &CorotatedError) -> SceneError {
     let (key, help) = match error {
         CorotatedError::Solve(error) => return refuse(scene, error),
-        CorotatedError::NotSymmetric { .. } => {
-            ("equilibrium.solver", "take direct, or leave the solver out: \"auto\" does")
-        }
+        CorotatedError::DoubleOnly => ("equilibrium.precision", "use \"f64\", or leave the precision out"),
         CorotatedError::Feedback => ("rule.feedback", "leave it out: it does not move the place of rest"),
         CorotatedError::Unsettled { .. } => {
             ("equilibrium", "load it less, or leave [equilibrium] out to step there")

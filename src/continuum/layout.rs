@@ -54,7 +54,7 @@ impl Layout {
         require_in_range(scene)?;
         let fitted = fitted(scene)?;
         let layout = match fitted {
-            Some((fitted, outline)) if !is_all_lattice(&fitted.body) => {
+            Some((fitted, outline)) if !is_all_whole(&fitted.cells) => {
                 let Fitted { body, cells } = fitted;
                 require_resolved(scene, &body)?;
                 let neighbours = cells.mates(body.count());
@@ -121,20 +121,6 @@ impl Layout {
             Ok(RoleChange { particles, role, axis, from, when, motion })
         };
         scene.roles.iter().enumerate().map(change).collect()
-    }
-
-    /// Forces of the scene's loads on the particles \[force\], shape \[count\]; `None` without loads.
-    ///
-    /// # Errors
-    /// Names the load that has nothing to act on.
-    pub fn forces(&self, scene: &Scene) -> Result<Option<Points>, SceneError> {
-        let mut all = self.forces_by_load(scene)?.into_iter();
-        let Some(mut sum) = all.next() else { return Ok(None) };
-        for forces in all {
-            sum.x.iter_mut().zip(&forces.x).for_each(|(sum, f)| *sum += f);
-            sum.y.iter_mut().zip(&forces.y).for_each(|(sum, f)| *sum += f);
-        }
-        Ok(Some(sum))
     }
 
     /// Forces of each of the scene's loads on the particles \[force\], shape \[loads\]\[count\]; none without a
@@ -549,9 +535,9 @@ fn refuse_outline(scene: &Scene, error: &OutlineError) -> SceneError {
     scene.refuse(&key, error.to_string(), help)
 }
 
-/// Whether every particle stands where the lattice has it.
-fn is_all_lattice(body: &Body) -> bool {
-    body.outline.as_ref().is_none_or(|outline| outline.regular == body.count())
+/// Whether the outline cuts no cell: then the body is that of the lattice.
+fn is_all_whole(cells: &Cells) -> bool {
+    cells.shapes.len() == cells.whole
 }
 
 /// Deep enough for a staggered edge: less than one period of the lattice's rows across the side.

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use super::damping::along_outline;
 use super::layout::{Layout, RoleChange, Truth, held_components, no_particle};
 use super::weights;
 use crate::flock::body::Body;
@@ -14,9 +15,10 @@ use crate::flock::rules::{Axis, Mean, Poisson, Rule};
 use crate::geometry::outline::Outline;
 use crate::material::cells::Cells;
 use crate::material::mechanism::require_held;
+use crate::material::outline_loads::{Resultant, sum};
 use crate::scene::{Scene, SceneError, Stop};
 use crate::solve::linear::HeldComponent;
-use crate::solve::sweep::Update;
+use crate::solve::sweep::{Order, Update};
 
 /// Everything an engine needs; nothing of it refers to the scene file.
 #[derive(Clone, Debug)]
@@ -41,6 +43,8 @@ pub struct Plan {
     pub cells: Option<Cells>,
     /// The outline of the body's shape, where it has one.
     pub outline: Option<Outline>,
+    /// Of each load of the scene, in its order.
+    pub resultants: Vec<Resultant>,
 }
 
 impl Plan {
@@ -68,7 +72,10 @@ impl Plan {
     fn lay_out(scene: &Scene, truth: Option<Truth<'_>>) -> Result<Self, SceneError> {
         let layout = Layout::new(scene)?;
         let changes = layout.role_changes(scene, truth)?;
-        let forces = layout.forces(scene)?;
+        let by_load = layout.forces_by_load(scene)?;
+        let reference = &layout.body.reference;
+        let resultants = by_load.iter().map(|f| Resultant::of(reference.iter().zip(f.iter()))).collect();
+        let forces = sum(by_load);
         require_carried(scene, &layout, &changes, forces.as_ref())?;
         let Layout { body, neighbours, cells, outline } = layout;
         let follows = ever_follow(&body, &changes);
@@ -76,12 +83,13 @@ impl Plan {
         if let Weights::Matrix(weights) = &mut weights {
             hold_components(weights, &held_components(&changes, &body, 0.0));
         }
+        let update = update(scene, &body, &neighbours, &weights);
         let interaction = interaction(scene, &body, neighbours, weights, forces);
         let probes = probes(scene, &body)?;
         let roles = body.is_frame.iter().map(|&f| if f { Role::Frame } else { Role::Follower }).collect();
         let (low, high) = body.bounds();
         let mut plan = Self {
-            update: scene.update,
+            update,
             present_radius: match scene.neighbourhood {
                 Neighbourhood::Present { radius } => Some(radius),
                 _ => None,
@@ -95,6 +103,7 @@ impl Plan {
             probes,
             cells,
             outline,
+            resultants,
             body,
             interaction,
         };
@@ -116,6 +125,7 @@ impl Plan {
             probes: Vec::new(),
             cells: None,
             outline: None,
+            resultants: Vec::new(),
             body,
             interaction,
             update,
@@ -205,6 +215,18 @@ fn hold_components(weights: &mut MatrixWeights, held: &[HeldComponent]) {
         axes.entry(component.particle).or_default()[component.axis as usize] = true;
     }
     axes.into_iter().for_each(|(particle, held)| weights.hold(particle, held));
+}
+
+/// The update as written; unless its damping is, a fitted body's is what its outline allows.
+fn update(scene: &Scene, body: &Body, neighbours: &Neighbours, weights: &Weights) -> Update {
+    let Update { order, damping } = scene.update;
+    let is_open = scene.raw.update.damping.is_none() && order == Order::Synchronous;
+    match weights {
+        Weights::Matrix(weights) if is_open && scene.equilibrium.is_none() => {
+            Update { order, damping: along_outline(body, neighbours, weights, damping) }
+        }
+        _ => scene.update,
+    }
 }
 
 fn interaction(

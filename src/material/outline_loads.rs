@@ -213,6 +213,16 @@ impl<'a> Loader<'a> {
     }
 }
 
+/// The sum of several loads' forces on the particles; `None` of none.
+pub fn sum(by_load: Vec<Points>) -> Option<Points> {
+    let add = |mut sum: Points, next: Points| {
+        sum.x.iter_mut().zip(&next.x).for_each(|(sum, f)| *sum += f);
+        sum.y.iter_mut().zip(&next.y).for_each(|(sum, f)| *sum += f);
+        sum
+    };
+    by_load.into_iter().reduce(add)
+}
+
 fn push(forces: &mut Points, particle: u32, [x, y]: [f64; 2]) {
     forces.x[particle as usize] += x;
     forces.y[particle as usize] += y;
@@ -340,7 +350,7 @@ mod tests {
                 let expected = [2.0 * length, -3.0 * length, -3.0 * length * 8.5 - 2.0 * length * 4.0];
                 let off = [found.force[0], found.force[1], found.moment];
                 assert!((0..3).all(|k| (off[k] - expected[k]).abs() < 1e-11 * 300.0), "{label}: {found:?}");
-                let part = Selection::Box { min: [0.0, 2.5], max: [20.0, 5.5] };
+                let part = Selection::Box { min: [1.0, 2.5], max: [20.0, 5.5] };
                 let found = add(part, Push::Traction([1.0, 0.0]), None);
                 // Both the edge and the hole lie in the box.
                 let hole = 2.0 * (1.5f64 / 1.7).asin() * 2.0 * 1.7;
