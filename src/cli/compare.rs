@@ -70,7 +70,7 @@ pub fn compare(arguments: &CompareArguments) -> Result<ExitCode, Refusal> {
 
 /// How the rule's run ended, and the table.
 fn words(scene: &Scene, compared: &Compared) -> String {
-    let (outcome, truth) = (&compared.outcome, compared.truth.truth.mesh());
+    let outcome = &compared.outcome;
     let residual = outcome.residual;
     let end = match &outcome.reason {
         StopReason::Equilibrium => "at rest".to_owned(),
@@ -83,9 +83,9 @@ fn words(scene: &Scene, compared: &Compared) -> String {
         Some(solved) => format!("{}, {} iterations", solved.solver, solved.iterations),
         None => format!("{} steps", outcome.engine.step()),
     };
-    let nodes = truth.mesh().node_count();
+    let nodes = compared.truth.truth.nodes();
     let mut words =
-        format!("{}: the rule by {way}, {end}; truth on {nodes} nodes\n{}", scene.name, compared.comparison);
+        format!("{}: the rule by {way}, {end}; truth of the shape on {nodes} nodes\n{}", scene.name, compared.comparison);
     if matches!(scene.mean, Mean::Material { rotation: Rotation::Corotated }) {
         words +=
             "the truth is of small rotations, the rule is not: where the body turns, they differ by that\n";

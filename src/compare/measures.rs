@@ -130,7 +130,10 @@ fn ratio(error: f64, size: f64) -> f64 {
 
 impl fmt::Display for Comparison {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let percent = |part: f64| format!("{:.3} %", 100.0 * part);
+        let percent = |part: f64| match 100.0 * part {
+            small if small > 0.0 && small < 1e-3 => format!("{small:.1e} %"),
+            part => format!("{part:.3} %"),
+        };
         let largest =
             format!("{:.4e} ({} of the largest)", self.displacement_max, percent(self.displacement_max_rel));
         let energies = format!("{:.5e}, truth {:.5e}", self.strain_energy_rule, self.strain_energy_truth);

@@ -84,7 +84,7 @@ fn chords_for_arcs_and_a_coarse_tolerance_are_told_from_the_cells() {
     let found = measured(&[hole, "equilibrium={ solver = \"conjugate-gradients\", tolerance = 1e-2 }"]);
     let ErrorParts { discretisation, outline, solver } = found.parts;
     let (outline, solver) = (outline.expect("told"), solver.expect("told"));
-    assert!(outline > 1e-5 && outline < 0.01 && solver > 1e-4, "{found}");
+    assert!(outline > 1e-3 && outline < 0.02 && solver > 1e-6, "{found}");
     assert!(discretisation.expect("told") < found.displacement_rel_l2 + outline + solver);
 }
 
