@@ -11,6 +11,7 @@ use crate::compare::run::{SceneTruth, plan_led_by, truth_of};
 use crate::continuum::equilibrium::settle;
 use crate::continuum::run::Outcome;
 use crate::fem::Effort;
+use crate::flock::role::Role;
 use crate::flock::rules::{Mean, Rotation};
 use crate::scene::raw::{RawMean, RawRegion};
 use crate::scene::{Scene, SceneError};
@@ -134,8 +135,18 @@ impl<'a> Body<'a> {
         let request = scene.equilibrium.map(|asked| asked.request).unwrap_or_default();
         let outcome: Outcome = settle(&scene, &request, plan_led_by(&scene, &self.truth.truth)?)?;
         let own = self.truth.truth.error().displacement;
-        // Without followers there is nothing to be wrong.
-        let error = error_of(&outcome, &self.truth.truth).unwrap_or(0.0) + own;
+        let follows = outcome.engine.roles().contains(&Role::Follower);
+        let error = match error_of(&outcome, &self.truth.truth) {
+            Some(error) => error + own,
+            // Without followers there is nothing to be wrong; else some are where the truth is not.
+            None => {
+                if follows {
+                    f64::INFINITY
+                } else {
+                    0.0
+                }
+            }
+        };
         let converged = outcome.solved.as_ref().is_some_and(|solved| solved.converged);
         Ok(Solved { scene, error, converged, particles: outcome.engine.body().count() })
     }

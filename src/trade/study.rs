@@ -11,7 +11,7 @@ use crate::compare::truth::Truth;
 use crate::continuum::equilibrium::settle;
 use crate::continuum::run::Outcome as RunOutcome;
 use crate::fem::Effort;
-use crate::flock::points::distance;
+use crate::flock::points::{Points, distance};
 use crate::flock::role::Role;
 use crate::scene::{Scene, SceneError};
 
@@ -51,6 +51,8 @@ pub struct Study {
     /// Nodes of the truth that errors are measured against, and the time it took \[s\].
     pub truth_nodes: usize,
     pub truth_seconds: f64,
+    /// Relative L2 error that the truth states of its own displacement \[1\]; `None` where it cannot.
+    pub truth_stated_error: Option<f64>,
     pub repeats: usize,
     pub points: Vec<Point>,
 }
@@ -70,6 +72,7 @@ pub fn run(load: Load<'_>, grid: &Grid, tell: &mut dyn FnMut(&Setting)) -> Resul
         title: scene.raw.title.clone(),
         truth_nodes: truth.truth.nodes(),
         truth_seconds: truth.time.as_secs_f64(),
+        truth_stated_error: Some(truth.truth.error().displacement).filter(|error| error.is_finite()),
         repeats: grid.repeats,
         points: Vec::new(),
     };
@@ -164,14 +167,15 @@ pub(super) fn error_of(outcome: &RunOutcome, truth: &Truth) -> Option<f64> {
     let engine = &outcome.engine;
     let reference = &engine.body().reference;
     let followers = (0..reference.len()).filter(|&i| engine.roles()[i] == Role::Follower);
-    let places = followers.clone().map(|i| reference.get(i)).collect();
+    let places: Points = followers.clone().map(|i| reference.get(i)).collect();
     let known = truth.displacements_at(&places).ok()?;
     let (mut off, mut size) = (0.0, 0.0);
     for (i, t) in followers.zip(known.iter()) {
         off += distance(engine.displacement(i), t).powi(2);
         size += t[0] * t[0] + t[1] * t[1];
     }
-    Some((off / size).sqrt()).filter(|error| error.is_finite())
+    let error = if off == 0.0 { 0.0 } else { f64::sqrt(off / size) };
+    (places.len() > 0 && error.is_finite()).then_some(error)
 }
 
 /// Less than this is rounding, or luck.
@@ -209,7 +213,11 @@ const ASKED: [f64; 4] = [0.3, 0.1, 0.01, 0.001];
 impl fmt::Display for Study {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "{}: {} settings, {} runs each", self.title, self.points.len(), self.repeats)?;
-        writeln!(f, "truth: {} nodes, {:.3} s", self.truth_nodes, self.truth_seconds)?;
+        write!(f, "truth: {} nodes, {:.3} s", self.truth_nodes, self.truth_seconds)?;
+        match self.truth_stated_error {
+            Some(error) => writeln!(f, ", states an error of {:.1e} % of its own", 100.0 * error)?,
+            None => writeln!(f)?,
+        }
         for asked in ASKED {
             match self.cheapest(asked) {
                 Some(point) => writeln!(
@@ -263,6 +271,7 @@ mod tests {
             title: String::new(),
             truth_nodes: 1,
             truth_seconds: 0.0,
+            truth_stated_error: None,
             repeats: 1,
             points,
         };
