@@ -14,7 +14,6 @@ use crate::geometry::outline::{Outline, OutlineError, Place};
 use crate::geometry::portion::{Portion, Selection};
 use crate::material::cells::{Cells, neighbourhood, without_loose_sites};
 use crate::material::fit::{FitError, Fitted, fit};
-use crate::material::loads::{Loads, Traction};
 use crate::material::outline_loads::{self, Loader, OutlineLoad, Push};
 use crate::scene::{BodySource, Condition, LeaderMotion, Load, RoleEntry, Scene, SceneError, SceneRegion};
 use crate::solve::linear::HeldComponent;
@@ -273,54 +272,6 @@ impl Layout {
             })
         };
         candidates.into_iter().filter(|(_, place)| is_on(place)).map(|(i, _)| i).collect()
-    }
-
-    /// The scene's loads on the sides and particles that they act on; none without a material.
-    ///
-    /// # Errors
-    /// Names a load whose region holds no particle or no side.
-    pub fn loads(&self, scene: &Scene) -> Result<Loads, SceneError> {
-        let mut loads = Loads::default();
-        let (Some(cells), Some(elastic)) = (&self.cells, &scene.material) else { return Ok(loads) };
-        let thickness = elastic.thickness();
-        for (k, load) in scene.loads.iter().enumerate() {
-            match load {
-                Load::Outline { region, push: Push::Traction(traction), .. } => {
-                    let sides = self.boundary_sides(scene, k, region, cells)?;
-                    let traction = traction.map(|t| t * thickness);
-                    loads.tractions.extend(sides.into_iter().map(|side| Traction::uniform(side, traction)));
-                }
-                Load::Outline { .. } => {}
-                Load::Force { region, force } => {
-                    let particles = self.pick(scene, &format!("loads[{k}]"), region)?;
-                    loads.forces.extend(particles.into_iter().map(|i| (i as u32, *force)));
-                }
-                Load::Body { force } => {
-                    loads.body = [0, 1].map(|axis| loads.body[axis] + thickness * force[axis]);
-                }
-            }
-        }
-        Ok(loads)
-    }
-
-    /// Sides of the boundary both of whose particles are in the region.
-    fn boundary_sides(
-        &self,
-        scene: &Scene,
-        load: usize,
-        region: &SceneRegion,
-        cells: &Cells,
-    ) -> Result<Vec<[u32; 2]>, SceneError> {
-        let key = format!("loads[{load}]");
-        let mut inside = vec![false; self.body.count()];
-        self.pick(scene, &key, region)?.into_iter().for_each(|i| inside[i] = true);
-        let mut sides = cells.boundary_sides(&cells.incidence(self.body.count()));
-        sides.retain(|side| side.iter().all(|&i| inside[i as usize]));
-        if sides.is_empty() {
-            let message = "no side of the boundary has both its particles in this region";
-            return Err(scene.refuse(&format!("{key}.region"), message, "move or widen the region"));
-        }
-        Ok(sides)
     }
 
     /// Particles of the region that stands at `key`.

@@ -10,6 +10,7 @@ use crate::compare::run::{SceneTruth, plan_led_by, truth_of};
 use crate::compare::truth::Truth;
 use crate::continuum::equilibrium::settle;
 use crate::continuum::run::Outcome as RunOutcome;
+use crate::fem::Effort;
 use crate::flock::points::distance;
 use crate::flock::role::Role;
 use crate::scene::{Scene, SceneError};
@@ -67,7 +68,7 @@ pub fn run(load: Load<'_>, grid: &Grid, tell: &mut dyn FnMut(&Setting)) -> Resul
     let mut study = Study {
         name: scene.name.clone(),
         title: scene.raw.title.clone(),
-        truth_nodes: truth.truth.mesh().mesh().node_count(),
+        truth_nodes: truth.truth.nodes(),
         truth_seconds: truth.time.as_secs_f64(),
         repeats: grid.repeats,
         points: Vec::new(),
@@ -107,11 +108,13 @@ fn finest_truth(load: Load<'_>, scene: &Scene, grid: &Grid) -> Result<SceneTruth
     let fits = |truth: &SceneTruth| truth.layout.body.count() <= grid.most_particles;
     for &spacing in spacings.iter().filter(|&&spacing| spacing <= 1.0) {
         let finer = load(&body_overrides(scene, RuleChoice::Material, spacing));
-        if let Some(truth) = finer.ok().and_then(|scene| truth_of(&scene, None).ok()).filter(fits) {
+        if let Some(truth) =
+            finer.ok().and_then(|scene| truth_of(&scene, &Effort::default()).ok()).filter(fits)
+        {
             return Ok(truth);
         }
     }
-    truth_of(scene, None)
+    truth_of(scene, &Effort::default())
 }
 
 fn refused(rule: RuleChoice, spacing: f64, error: &SceneError) -> Point {
@@ -157,7 +160,7 @@ fn measure(scene: &Scene, truth: &Truth, setting: Setting, particles: usize, rep
 }
 
 /// Relative L2 distance of the followers from where the truth has them; `None` where it has none of them.
-fn error_of(outcome: &RunOutcome, truth: &Truth) -> Option<f64> {
+pub(super) fn error_of(outcome: &RunOutcome, truth: &Truth) -> Option<f64> {
     let engine = &outcome.engine;
     let reference = &engine.body().reference;
     let followers = (0..reference.len()).filter(|&i| engine.roles()[i] == Role::Follower);
