@@ -8,9 +8,11 @@
 
 pub mod engine;
 pub mod equilibrium;
+pub mod forces;
 mod front;
 pub mod interior;
 pub mod layout;
+pub mod mechanics;
 pub mod movement;
 pub mod plan;
 pub mod record;

@@ -11,7 +11,7 @@ use crate::flock::role::Role;
 use crate::flock::rules::{Axis, Mean, Poisson, Rule};
 use crate::material::cells::Cells;
 use crate::material::mechanism::require_held;
-use crate::scene::{Scene, SceneError, Stop};
+use crate::scene::{LoadSteps, Scene, SceneError, Stop};
 use crate::solve::sweep::Update;
 
 /// Everything an engine needs; nothing of it refers to the scene file.
@@ -35,6 +35,8 @@ pub struct Plan {
     pub probes: Vec<usize>,
     /// Between the particles, where the scene has a material.
     pub cells: Option<Cells>,
+    /// Steps over which the loads grow; they act from the first one on where there is no ramp.
+    pub ramp: Option<usize>,
 }
 
 impl Plan {
@@ -85,6 +87,10 @@ impl Plan {
             diagonal: distance(low, high).max(body.lattice.spacing()),
             probes,
             cells,
+            ramp: match scene.load_steps {
+                Some(LoadSteps::Stepped { ramp, .. }) => ramp,
+                _ => None,
+            },
             body,
             interaction,
         };
@@ -105,6 +111,7 @@ impl Plan {
             diagonal: distance(low, high).max(body.lattice.spacing()),
             probes: Vec::new(),
             cells: None,
+            ramp: None,
             body,
             interaction,
             update,

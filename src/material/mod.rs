@@ -59,6 +59,7 @@ pub mod loads;
 pub mod mechanism;
 pub mod report;
 pub mod stiffness;
+pub mod stress;
 pub mod weights;
 pub mod zone;
 

@@ -11,6 +11,7 @@ pub mod points;
 pub mod raw;
 pub mod swarm;
 pub mod table;
+pub mod units;
 pub mod validate;
 
 use std::sync::Arc;
@@ -64,6 +65,8 @@ pub struct Scene {
     pub stop: Stop,
     /// How the equilibrium is found, where the scene is not stepped.
     pub equilibrium: Option<Equilibrium>,
+    /// In which parts loads and motions come, where the scene says so.
+    pub load_steps: Option<LoadSteps>,
     pub record: Record,
     document: Document,
 }
@@ -214,6 +217,15 @@ pub struct Equilibrium {
     pub request: Request,
     /// Relative error of the followers' displacements that is asked for \[1\].
     pub accuracy: Option<f64>,
+}
+
+/// In which parts loads and leaders' motions come.
+#[derive(Clone, Debug, PartialEq)]
+pub enum LoadSteps {
+    /// Each part solved to equilibrium: parts of the whole, from 0 to 1, in their order \[1\].
+    Solved(Vec<f64>),
+    /// The loads grow over `ramp` steps of the sweep, or act from the first one on; a row is kept `every` so many.
+    Stepped { ramp: Option<usize>, every: usize },
 }
 
 /// What is kept of the run.

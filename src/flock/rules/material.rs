@@ -62,6 +62,11 @@ impl Turn {
         self.size
     }
 
+    /// \[rad\], counter-clockwise, from -pi to pi.
+    pub fn angle(self) -> f64 {
+        self.sin.atan2(self.cos)
+    }
+
     /// Cosine of the angle between two turns.
     pub fn cosine_to(self, other: Self) -> f64 {
         self.cos * other.cos + self.sin * other.sin

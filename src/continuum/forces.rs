@@ -1,0 +1,218 @@
+//! Forces within a body whose rule is a material, and the reactions of what holds it.
+//!
+//! The neighbours of particle `i` pull it with `sum_j K_ij (u_j - u_i)`. A follower at rest is in balance: that pull
+//! and the load on it cancel. On a particle that is led or clamped they do not; what is missing is the force of
+//! whatever holds it, its reaction.
+
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use super::engine::Engine;
+use crate::flock::block::apply;
+use crate::flock::interaction::{Interaction, Weights};
+use crate::flock::points::Points;
+use crate::flock::role::Role;
+use crate::flock::rules::{Mean, Rotation, Turn};
+
+/// A force and its moments; moments are positive counter-clockwise. Their arms end where the particles were in the
+/// reference configuration under small rotations, and where they are at present if the rule is corotated.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Resultant {
+    /// \[force\]
+    pub force: [f64; 2],
+    /// About the origin of the coordinates \[force length\].
+    pub moment_about_origin: f64,
+}
+
+/// What the loads on a body add up to.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LoadResultant {
+    #[serde(flatten)]
+    pub resultant: Resultant,
+    /// Mean displacement along the resultant, each particle weighted by its part of the load: the displacement in
+    /// which the resultant does the work of the load \[length\]. Absent where the forces cancel.
+    pub displacement: Option<f64>,
+}
+
+/// What holds the particles of an entry of `roles`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Reaction {
+    /// The key of the entry, such as `roles[0]`.
+    pub key: String,
+    /// `clamped` or `leader`.
+    pub role: String,
+    /// How many particles it holds; one that a later entry names too counts there.
+    pub particles: usize,
+    /// Middle of these particles in the reference configuration \[length\].
+    pub centre: [f64; 2],
+    /// Their mean displacement \[length\].
+    pub displacement: [f64; 2],
+    /// Force on the body \[force\].
+    pub force: [f64; 2],
+    /// About `centre` \[force length\].
+    pub moment: f64,
+    /// About the origin of the coordinates \[force length\].
+    pub moment_about_origin: f64,
+}
+
+/// Force of the neighbours on a particle \[force\] under these displacements of all \[length\]; `None` where the rule
+/// has no stiffness.
+pub fn internal_force(interaction: &Interaction, particle: usize, displacement: &Points) -> Option<[f64; 2]> {
+    let (Weights::Matrix(weights), Mean::Material { rotation }) = (&interaction.weights, interaction.rule.mean)
+    else {
+        return None;
+    };
+    let reference = &interaction.reference;
+    let from = |points: &Points, j: &u32| minus(points.get(*j as usize), points.get(particle));
+    // Where each neighbour was from the particle, and how far it has moved from there.
+    let around = interaction.neighbours.of(particle).iter().map(|j| (from(reference, j), from(displacement, j)));
+    let pulled = |stretch: &dyn Fn([f64; 2], [f64; 2]) -> [f64; 2]| {
+        let blocks = weights.stiffness_of(particle).iter().zip(around.clone());
+        blocks.fold([0.0; 2], |sum, (block, (then, by))| plus(sum, apply(block, stretch(then, by))))
+    };
+    Some(match rotation {
+        Rotation::Small => pulled(&|_, by| by),
+        // In the axes in which the rule finds the particle's target.
+        Rotation::Corotated => match Turn::fit(around.clone().map(|(then, by)| (then, plus(then, by)))) {
+            Some(turn) => turn.forth(pulled(&|then, by| minus(turn.back(plus(then, by)), then))),
+            None => [0.0; 2],
+        },
+    })
+}
+
+/// The forces of a body at its present places.
+#[derive(Clone, Debug)]
+pub struct Forces {
+    /// Of the neighbours on each particle \[force\], shape \[count\].
+    pub internal: Points,
+    /// Of the loads on each particle \[force\], shape \[count\].
+    pub loads: Points,
+    /// \[length\], shape \[count\].
+    pub displacement: Points,
+    /// Where forces act, for their moments \[length\], shape \[count\].
+    places: Points,
+}
+
+impl Forces {
+    /// `None` where the rule has no stiffness.
+    pub fn of(engine: &Engine) -> Option<Self> {
+        let (interaction, present) = (engine.interaction(), engine.present());
+        let displacement = engine.displacements();
+        let internal = |i| internal_force(interaction, i, &displacement);
+        let internal: Option<Vec<[f64; 2]>> = (0..present.len()).into_par_iter().map(internal).collect();
+        let places = match interaction.rule.mean {
+            Mean::Material { rotation: Rotation::Corotated } => present.clone(),
+            _ => Points::clone(&interaction.reference),
+        };
+        let loads = interaction.forces.clone().unwrap_or_else(|| Points::zeros(present.len()));
+        Some(Self { internal: internal?.into_iter().collect(), loads, displacement, places })
+    }
+
+    /// What nothing of the body balances on a particle \[force\]: on one that is held, less its reaction.
+    pub fn left_on(&self, particle: usize) -> [f64; 2] {
+        plus(self.internal.get(particle), self.loads.get(particle))
+    }
+
+    /// The force of what holds a particle on it \[force\].
+    pub fn reaction(&self, particle: usize) -> [f64; 2] {
+        self.left_on(particle).map(|force| -force)
+    }
+
+    /// Reactions of the entries of `roles` that hold particles at present, in their order.
+    pub fn reactions(&self, engine: &Engine) -> Vec<Reaction> {
+        let entries = (0..engine.changes().len()).zip(held(engine));
+        entries.filter(|(_, held)| !held.is_empty()).map(|(k, held)| self.reaction_of(engine, k, &held)).collect()
+    }
+
+    fn reaction_of(&self, engine: &Engine, entry: usize, held: &[usize]) -> Reaction {
+        let mean = |points: &Points| held.iter().map(|&i| points.get(i)).collect::<Points>().middle();
+        let centre = mean(&engine.body().reference);
+        
+        let force = held.iter().fold([0.0; 2], |sum, &i| plus(sum, self.reaction(i)));
+        let moment = |about: [f64; 2]| {
+            let of = |&i: &usize| cross(minus(self.places.get(i), about), self.reaction(i));
+            held.iter().map(of).sum::<f64>()
+        };
+        Reaction {
+            key: format!("roles[{entry}]"),
+            role: engine.changes()[entry].role.name().to_owned(),
+            particles: held.len(),
+            centre,
+            displacement: mean(&self.displacement),
+            force,
+            moment: moment(centre),
+            moment_about_origin: moment([0.0; 2]),
+        }
+    }
+
+    /// What the loads add up to; `None` without loads.
+    pub fn load(&self, engine: &Engine) -> Option<LoadResultant> {
+        engine.interaction().forces.as_ref()?;
+        let force = self.loads.iter().fold([0.0; 2], plus);
+        let moments = self.places.iter().zip(self.loads.iter()).map(|(at, force)| cross(at, force));
+        let resultant = Resultant { force, moment_about_origin: moments.sum() };
+        let size = f64::hypot(force[0], force[1]);
+        let most: f64 = self.loads.iter().map(|[x, y]| f64::hypot(x, y)).sum();
+        // Forces that cancel leave rounding.
+        let displacement = (size > 1e-9 * most).then(|| self.work_of_loads() / size);
+        Some(LoadResultant { resultant, displacement })
+    }
+
+    /// The loads, as they are now, times the displacements \[force length\].
+    pub fn work_of_loads(&self) -> f64 {
+        self.loads.iter().zip(self.displacement.iter()).map(|(force, by)| dot(force, by)).sum()
+    }
+
+    /// The reactions, as they are now, times the displacements \[force length\].
+    pub fn work_of_supports(&self, engine: &Engine) -> f64 {
+        let held = (0..engine.roles().len()).filter(|&i| is_held(engine.roles()[i]));
+        held.map(|i| dot(self.reaction(i), self.displacement.get(i))).sum()
+    }
+
+    /// The largest force that is left on a follower \[force\]: none where the body is at rest.
+    pub fn largest_left(&self, engine: &Engine) -> f64 {
+        let followers = (0..engine.roles().len()).filter(|&i| engine.roles()[i] == Role::Follower);
+        followers.map(|i| self.left_on(i)).map(|[x, y]| f64::hypot(x, y)).fold(0.0, f64::max)
+    }
+}
+
+fn is_held(role: Role) -> bool {
+    matches!(role, Role::Leader | Role::Clamped)
+}
+
+/// The particles that each role change holds at present: the last one that named them, by its step.
+pub fn held(engine: &Engine) -> Vec<Vec<usize>> {
+    let (changes, roles) = (engine.changes(), engine.roles());
+    let mut order: Vec<usize> = (0..changes.len()).filter(|&k| is_held(changes[k].role)).collect();
+    order.retain(|&k| changes[k].from <= engine.step().max(1));
+    order.sort_by_key(|&k| changes[k].from);
+    let mut holder = vec![None; roles.len()];
+    for k in order {
+        for &i in changes[k].particles.iter().filter(|&&i| roles[i] == changes[k].role) {
+            holder[i] = Some(k);
+        }
+    }
+    let mut held = vec![Vec::new(); changes.len()];
+    for (i, k) in holder.into_iter().enumerate() {
+        if let Some(k) = k {
+            held[k].push(i);
+        }
+    }
+    held
+}
+
+fn plus(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
+    [a[0] + b[0], a[1] + b[1]]
+}
+
+fn minus(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
+    [a[0] - b[0], a[1] - b[1]]
+}
+
+fn dot(a: [f64; 2], b: [f64; 2]) -> f64 {
+    a[0] * b[0] + a[1] * b[1]
+}
+
+fn cross(a: [f64; 2], b: [f64; 2]) -> f64 {
+    a[0] * b[1] - a[1] * b[0]
+}
