@@ -7,6 +7,7 @@ use super::lattice::{Lattice, LatticeKind, Site};
 use super::neighbourhood::{Neighbourhood, NeighbourhoodError, Neighbours};
 use super::numbering::Numbering;
 use super::points::Points;
+use crate::geometry::outline::Place;
 use crate::geometry::shape::Shape;
 
 /// What is cut from the lattice.
@@ -54,12 +55,28 @@ pub struct Body {
     pub frame: Option<Frame>,
     /// What the user calls particles that were given as points; they lie on no lattice.
     pub numbering: Option<Arc<Numbering>>,
+    /// Which particles stand on the outline of the shape that the body was fitted to; of a body of whole cells,
+    /// which keeps no outline, nothing.
+    pub outline: Option<Arc<OutlineParticles>>,
+}
+
+/// The particles of a body that was fitted to an outline.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OutlineParticles {
+    /// How many particles stand at sites of the lattice: the first ones. The others stand along the outline, in its
+    /// order, and have [`Body::ALONG_OUTLINE`] for a column.
+    pub regular: usize,
+    /// Where each particle is on the outline, shape \[count\]; `None` for those inside.
+    pub places: Vec<Option<Place>>,
 }
 
 /// More lattice sites than this are refused before memory is asked for.
 const MOST_SITES: u64 = 1 << 28;
 
 impl Body {
+    /// Column of the particles that stand along the outline and at no site: beyond all columns of the lattice.
+    pub const ALONG_OUTLINE: i32 = 1 << 30;
+
     /// Cuts the body, adds the frame where a rule for it is given, and lists who sees whom.
     pub fn build(
         lattice: Lattice,
@@ -87,7 +104,7 @@ impl Body {
             offsets.iter().filter_map(move |offset| map.index([site[0] + offset[0], site[1] + offset[1]]))
         }));
         let frame = frame.map(|rule| Frame::build(rule, &lattice, &sites, &is_frame, |site| map.index(site)));
-        Ok((Self { lattice, sites, reference, is_frame, frame, numbering: None }, neighbours))
+        Ok((Self { lattice, sites, reference, is_frame, frame, numbering: None, outline: None }, neighbours))
     }
 
     /// Particles that lie on no lattice. Of one they keep the `spacing` \[length\]; their sites are a row, in
@@ -100,6 +117,7 @@ impl Body {
             reference: Arc::new(places),
             frame: None,
             numbering: None,
+            outline: None,
         }
     }
 

@@ -212,6 +212,7 @@ pub fn without_loose_sites(body: &Body, neighbours: &Neighbours) -> (Body, Neigh
         is_frame: vec![false; keep.len()],
         frame: None,
         numbering: None,
+        outline: None,
     };
     let seen = |&i: &usize| neighbours.of(i).iter().filter_map(|&j| renumbered[j as usize]);
     (kept, Neighbours::from_lists(keep.iter().map(seen)), cells)

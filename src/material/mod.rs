@@ -21,6 +21,7 @@
 //! * [`elastic`]: engineering constants, refused where no stable material has them, to the 3x3
 //!   stiffness of the sheet.
 //! * [`cells`]: the cells of a body: rectangles, triangles or hexagons between its particles.
+//! * [`fit`]: bodies whose outline is kept: cells that the shape cuts, along it.
 //! * [`stiffness`]: what one cell resists: bilinear quadrilateral, constant-strain triangle, and the
 //!   lowest-order virtual element for any polygon.
 //! * [`mechanism`]: whether the cells hold the body together, or a hinge lets it fold.
@@ -53,6 +54,7 @@
 
 pub mod cells;
 pub mod elastic;
+pub mod fit;
 pub mod gradient;
 pub mod homogenise;
 pub mod loads;

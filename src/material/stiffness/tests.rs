@@ -153,3 +153,79 @@ fn what_is_no_cell_is_refused() {
     assert_eq!(element(&[o, o, o], &c), Err(ShapeError::NoArea));
     assert_eq!(element(&[o, x, [0.2, 0.2], y], &c), Err(ShapeError::Folded { corner: 2 }));
 }
+
+/// Cells as outlines leave them: with corners in straight sides, not convex, almost triangles, slender.
+fn cut_shapes() -> Vec<Vec<[f64; 2]>> {
+    let mut shapes = shapes();
+    shapes.extend([
+        vec![[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]],
+        vec![[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [0.0, 1.0]],
+        vec![[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0]],
+        vec![[0.0, 0.0], [2.0, 0.0], [0.6, 0.5], [0.0, 2.0]],
+        vec![[0.0, 0.0], [1.0, 0.0], [1.0, 1e-6], [0.0, 1.0]],
+        vec![[0.0, 0.0], [9.0, 0.0], [9.0, 0.5], [9.0, 1.0], [4.0, 1.0], [0.0, 1.0]],
+    ]);
+    shapes.push((0..13).map(|k| [k as f64, 0.0]).chain([[6.0, 9.0]]).collect());
+    shapes
+}
+
+#[test]
+fn a_cut_cell_is_free_in_three_ways_and_gives_a_constant_strain_its_energy() {
+    let strain = Vector3::new(0.3, -0.2, 0.5);
+    for corners in cut_shapes() {
+        for c in sheets() {
+            let k = cut_cell(&corners, &c).expect("a cell");
+            assert_eq!(k, k.transpose());
+            let mut values: Vec<f64> = k.symmetric_eigenvalues().iter().copied().collect();
+            values.sort_by(f64::total_cmp);
+            let scale = values[values.len() - 1];
+            assert!(values[..3].iter().all(|v| v.abs() < 1e-12 * scale), "{corners:?}");
+            assert!(values[3] > 1e-12 * scale, "{corners:?}: {values:?}");
+            let u = moved(&corners, |[x, y]| [0.3 * x + 0.4 * y, 0.1 * x - 0.2 * y]);
+            let exact = area(&corners) * strain.dot(&(c * strain));
+            assert!((u.dot(&(&k * &u)) - exact).abs() < 1e-12 * exact, "{corners:?}");
+        }
+    }
+}
+
+#[test]
+fn a_cut_rectangle_is_bent_about_its_own_axes_as_the_continuum_is() {
+    for plane in [Plane::Stress, Plane::Strain] {
+        let constants = Constants::Isotropic { young: 1.0, poisson: 0.3, plane };
+        let c = *Elastic::new(constants, 1.0).expect("admissible").stiffness();
+        let modulus = if plane == Plane::Stress { 1.0 } else { 1.0 / (1.0 - 0.09) };
+        for [a, b] in [[1.0, 1.0], [3.0, 1.0], [0.5, 1.7]] {
+            let corners = [[-a, -b], [a, -b], [a, b], [-a, b]];
+            let k = cut_cell(&corners, &c).expect("a cell");
+            let hourglass = moved(&corners, |[x, y]| [x * y, 0.0]);
+            let exact = modulus * 4.0 / 3.0 * a * b * b * b;
+            assert!((hourglass.dot(&(&k * &hourglass)) - exact).abs() < 1e-13 * exact, "{a} x {b}");
+        }
+    }
+}
+
+#[test]
+fn a_triangle_is_no_different_for_being_cut_and_a_hexagon_is_not_bound() {
+    let c = sheets()[0];
+    let triangle = [[0.0, 0.0], [1.0, 0.2], [0.3, 0.9]];
+    assert_eq!(cut_cell(&triangle, &c), element(&triangle, &c));
+    let moments = |m: usize| {
+        let corner = |k: usize| (std::f64::consts::TAU * (k as f64 + 0.5) / m as f64).sin_cos().into();
+        second_moments(&(0..m).rev().map(corner).collect::<Vec<_>>())
+    };
+    assert!((least_residual(&moments(6)) - 0.8 * moments(6)[(0, 0)]).abs() < 1e-14);
+    assert!(0.75 > 1.7 * least_residual(&moments(6)));
+}
+
+#[test]
+fn an_almost_triangular_polygon_is_not_resisted_without_bound() {
+    let c = sheets()[0];
+    let regular = element(&cut_shapes()[6], &c).expect("a hexagon").amax();
+    for far in [0.1, 1e-3, 1e-6] {
+        // A triangle two of whose corners are cut off.
+        let corners = [[0.0, 0.0], [1.0 - far, 0.0], [1.0, far], [far, 1.0], [0.0, 1.0 - far]];
+        for k in [polygon(&corners, &c), cut_cell(&corners, &c)] {
+            assert!(k.expect("a cell").amax() < 4.0 * regular, "{far}");
+        }
+    }
+}

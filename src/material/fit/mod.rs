@@ -1,0 +1,271 @@
+//! Bodies whose outline is kept: a lattice inside, cells cut by the shape along its outline.
+//!
+//! 1. `sites`: lattice points nearer to the outline than [`SNAP`] move onto it, to a corner if one is as near.
+//! 2. `cut`: the outline cuts the cells that it passes; corners, and where it crosses the sides of cells, are
+//!    particles too. Arcs become chords between particles that lie on the arc.
+//! 3. `tidy`: a part of a cell smaller than [`LEAST_AREA`] joins its neighbour, and a side along the outline
+//!    shorter than [`LEAST_SIDE`] shrinks to one particle.
+//!
+//! Everything else stays lattice. Distances are measured in the least altitude `w` over all triples of corners of a
+//! cell: since twice [`SNAP`] is less than 1, no triple changes its orientation when its corners move, so that
+//! every moved cell stays convex and no two particles meet. Moving points rather than cutting near them is the idea
+//! of isosurface stuffing (F. Labelle and J. R. Shewchuk, ACM Transactions on Graphics 26, 2007).
+//!
+//! The bounds on area and side hold as long as the shape allows: two true corners nearer to each other than the
+//! bound are kept as they are, and a shape narrower than the spacing is refused.
+
+mod cut;
+mod narrow;
+mod near;
+mod sites;
+#[cfg(test)]
+mod tests;
+mod tidy;
+
+use std::sync::Arc;
+
+use self::cut::{Faces, Node};
+use self::sites::Sites;
+use super::cells::{Cells, templates};
+use super::stiffness::area;
+use crate::flock::body::{Body, OutlineParticles};
+use crate::flock::lattice::{Lattice, Site};
+use crate::flock::points::{Points, distance};
+use crate::geometry::outline::{Outline, Place};
+
+/// Lattice points this near to the outline move onto it, in least altitudes of a cell.
+const SNAP: f64 = 0.4;
+/// Least area of a cell that the outline cuts, in areas of a whole one.
+pub const LEAST_AREA: f64 = 0.4;
+/// Least distance of two particles along the outline, in least altitudes of a cell.
+pub const LEAST_SIDE: f64 = 0.4;
+
+/// Distances below this part of the spacing are rounding.
+const ROUNDING: f64 = 1e-7;
+/// A lattice point this near to the outline, in spacings, lies on it and stays where the lattice has it.
+const STAYS: f64 = 1e-11;
+
+/// Why a lattice cannot be fitted to an outline.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum FitError {
+    #[error(
+        "the shape is {width:.6} wide near ({:.6}, {:.6}), less than the spacing of the lattice, which is {spacing:.6}",
+        .place[0], .place[1]
+    )]
+    Narrow { width: f64, spacing: f64, place: [f64; 2] },
+    #[error(
+        "near ({:.6}, {:.6}) the outline has details that cells of the lattice, {spacing:.6} apart, cannot follow",
+        .place[0], .place[1]
+    )]
+    Detail { spacing: f64, place: [f64; 2] },
+    #[error("the shape has more than {limit} lattice sites in its bounds")]
+    TooLarge { limit: u64 },
+}
+
+/// A body with its outline and its cells.
+#[derive(Clone, Debug)]
+pub struct Fitted {
+    /// Particles at lattice sites in the order of sites, then those along the outline that stand at none.
+    pub body: Body,
+    /// Whole cells of the lattice, then those that the outline has cut or bent.
+    pub cells: Cells,
+}
+
+/// How well cells keep to the lattice's: the least over all cells.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Quality {
+    /// Area over that of a whole cell \[1\].
+    pub area: f64,
+    /// Length of a side over the least altitude of a whole cell \[1\].
+    pub side: f64,
+    /// Least extent over the least altitude of a whole cell \[1\].
+    pub width: f64,
+}
+
+/// The measures of a lattice's cells.
+#[derive(Clone, Debug)]
+struct Scale {
+    templates: Vec<Vec<Site>>,
+    /// Least altitude over all triples of corners \[length\].
+    altitude: f64,
+    /// Largest distance of two corners \[length\].
+    diameter: f64,
+    /// \[length^2\]
+    area: f64,
+    /// \[length\]
+    spacing: f64,
+}
+
+impl Scale {
+    fn of(lattice: &Lattice) -> Self {
+        let templates = templates(lattice);
+        let corners: Vec<[f64; 2]> = templates[0].iter().map(|&site| lattice.vector(site)).collect();
+        let pairs = || (0..corners.len()).flat_map(|a| (0..a).map(move |b| (a, b)));
+        let apart = |(a, b): (usize, usize)| distance(corners[a], corners[b]);
+        let altitude = |(a, b, c): (usize, usize, usize)| {
+            let twice = 2.0 * area(&[corners[a], corners[b], corners[c]]).abs();
+            twice / apart((a, b)).max(apart((b, c))).max(apart((a, c)))
+        };
+        let triples = pairs().flat_map(|(a, b)| (0..b).map(move |c| (a, b, c)));
+        Self {
+            altitude: triples.map(altitude).fold(f64::INFINITY, f64::min),
+            diameter: pairs().map(apart).fold(0.0, f64::max),
+            area: area(&corners),
+            spacing: lattice.spacing(),
+            templates,
+        }
+    }
+}
+
+/// Fits a lattice to an outline.
+///
+/// # Errors
+/// A shape, or a detail of it, that is too narrow for the spacing, with its place.
+pub fn fit(lattice: &Lattice, outline: &Outline) -> Result<Fitted, FitError> {
+    let scale = Scale::of(lattice);
+    narrow::require_wide(outline, scale.spacing, scale.diameter)?;
+    let sites = Sites::find(lattice, outline, &scale)?;
+    let mut faces = cut::cut(lattice, outline, &scale, &sites)?;
+    tidy::tidy(&mut faces, &scale);
+    Ok(Assembly { lattice, scale: &scale, sites: &sites, faces: &faces }.body())
+}
+
+impl Fitted {
+    /// The least of each measure over all cells.
+    pub fn quality(&self) -> Quality {
+        let scale = Scale::of(&self.body.lattice);
+        let mut least = Quality { area: f64::INFINITY, side: f64::INFINITY, width: f64::INFINITY };
+        // Shapes that no cell has any more are no part of it.
+        let mut used = vec![false; self.cells.shapes.len()];
+        self.cells.kind.iter().for_each(|&kind| used[kind as usize] = true);
+        for shape in self.cells.shapes.iter().zip(used).filter_map(|(shape, used)| used.then_some(shape)) {
+            let count = shape.len();
+            least.area = least.area.min(area(shape) / scale.area);
+            for k in 0..count {
+                let (a, b) = (shape[k], shape[(k + 1) % count]);
+                let length = distance(a, b);
+                let normal = [(b[1] - a[1]) / length, (a[0] - b[0]) / length];
+                let along = shape.iter().map(|p| normal[0] * p[0] + normal[1] * p[1]);
+                let (low, high) =
+                    along.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+                least.side = least.side.min(length / scale.altitude);
+                least.width = least.width.min((high - low) / scale.altitude);
+            }
+        }
+        least
+    }
+}
+
+/// What a body is put together from.
+struct Assembly<'a> {
+    lattice: &'a Lattice,
+    scale: &'a Scale,
+    sites: &'a Sites,
+    faces: &'a Faces,
+}
+
+impl Assembly<'_> {
+    fn body(&self) -> Fitted {
+        let mut used = vec![false; self.faces.nodes.len()];
+        self.faces.cells().flat_map(|(corners, _)| corners).for_each(|&node| used[node as usize] = true);
+        for (number, near) in self.sites.near().iter().enumerate() {
+            used[number] |= self.is_in_far_cell(near.site);
+        }
+        // Lattice sites near the outline that are in cells, and those far from it, in the order of sites.
+        let near = self.faces.nodes.iter().zip(&used).filter(|(_, used)| **used);
+        let near = near.filter_map(|(node, _)| node.site);
+        let mut sites: Vec<Site> = self.sites.far_inside().chain(near).collect();
+        sites.sort_unstable();
+        let regular = sites.len();
+        let index = |site: Site| sites.binary_search(&site).map_or(u32::MAX, |i| i as u32);
+        let mut along: Vec<(Place, u32)> = Vec::new();
+        let mut particle = vec![u32::MAX; self.faces.nodes.len()];
+        for (number, node) in self.faces.nodes.iter().enumerate().filter(|(number, _)| used[*number]) {
+            match (node.site, node.place) {
+                (Some(site), _) => particle[number] = index(site),
+                (None, Some(place)) => along.push((place, number as u32)),
+                (None, None) => unreachable!("a node stands at a site or on the outline"),
+            }
+        }
+        along.sort_by(|(a, _), (b, _)| order(a, b));
+        for (k, (_, node)) in along.iter().enumerate() {
+            particle[*node as usize] = (regular + k) as u32;
+        }
+        let place = |node: &Node| node.point;
+        let reference: Points = sites
+            .iter()
+            .map(|&site| self.lattice.position(site))
+            .chain(along.iter().map(|&(_, node)| place(&self.faces.nodes[node as usize])))
+            .collect();
+        let mut places = vec![None; reference.len()];
+        for (number, node) in self.faces.nodes.iter().enumerate().filter(|(number, _)| used[*number]) {
+            places[particle[number] as usize] = node.place;
+        }
+        let cells = self.cells(&sites, &particle, &reference);
+        let step = if self.lattice.is_site([0, 1]) { 1 } else { 2 };
+        sites.extend((0..along.len() as i32).map(|k| [Body::ALONG_OUTLINE, k * step]));
+        let body = Body {
+            lattice: self.lattice.clone(),
+            is_frame: vec![false; sites.len()],
+            sites,
+            reference: Arc::new(reference),
+            frame: None,
+            numbering: None,
+            outline: Some(Arc::new(OutlineParticles { regular, places })),
+        };
+        Fitted { body, cells }
+    }
+
+    /// Whether a cell that is too far from the outline to be cut is inside.
+    fn is_far_cell(&self, [i, j]: Site, kind: usize) -> bool {
+        let inside = |corner: &Site| self.sites.is_inside([i + corner[0], j + corner[1]]);
+        !self.faces.is_candidate([i, j], kind) && self.scale.templates[kind].iter().all(inside)
+    }
+
+    fn is_in_far_cell(&self, [i, j]: Site) -> bool {
+        let bases = |kind: usize| {
+            let corners = self.scale.templates[kind].iter().map(move |corner| [i - corner[0], j - corner[1]]);
+            corners.filter(|&base| self.lattice.is_site(base) && self.lattice.sublattice(base) == 0)
+        };
+        let is_base = |kind: usize| bases(kind).any(|base| self.is_far_cell(base, kind));
+        self.sites.is_inside([i, j]) && (0..self.scale.templates.len()).any(is_base)
+    }
+
+    /// Whole cells by their first corner, then the others.
+    fn cells(&self, sites: &[Site], particle: &[u32], reference: &Points) -> Cells {
+        let shape = |t: &Vec<Site>| t.iter().map(|&corner| self.lattice.vector(corner)).collect();
+        let mut cells = Cells::of_kinds(self.scale.templates.iter().map(shape).collect());
+        let index = |site: Site| sites.binary_search(&site).ok().map(|i| i as u32);
+        let mut corners = Vec::new();
+        for &[i, j] in sites.iter().filter(|&&site| self.lattice.sublattice(site) == 0) {
+            for (kind, template) in self.scale.templates.iter().enumerate() {
+                if self.faces.is_whole([i, j], kind) || self.is_far_cell([i, j], kind) {
+                    corners.clear();
+                    corners.extend(template.iter().filter_map(|c| index([i + c[0], j + c[1]])));
+                    cells.push(&corners, kind as u32);
+                }
+            }
+        }
+        for (nodes, _) in self.faces.cells().filter(|(_, whole)| !whole) {
+            corners.clear();
+            corners.extend(nodes.iter().map(|&node| particle[node as usize]));
+            // Begin with the lowest number: how a cell was found does not show.
+            let lowest = (0..corners.len()).min_by_key(|&k| corners[k]).unwrap_or_default();
+            corners.rotate_left(lowest);
+            let [x, y] = reference.get(corners[0] as usize);
+            let relative = |&i: &u32| {
+                let [px, py] = reference.get(i as usize);
+                [px - x, py - y]
+            };
+            let kind = cells.shapes.len() as u32;
+            cells.shapes.push(corners.iter().map(relative).collect());
+            cells.push(&corners, kind);
+        }
+        cells
+    }
+}
+
+/// Along the outline: loop by loop, piece by piece.
+fn order(a: &Place, b: &Place) -> std::cmp::Ordering {
+    (a.ring, a.piece).cmp(&(b.ring, b.piece)).then(a.t.total_cmp(&b.t))
+}

@@ -1,0 +1,126 @@
+use std::collections::HashMap;
+
+use super::*;
+use crate::flock::lattice::LatticeKind;
+use crate::geometry::shape::Shape;
+
+/// Uniform numbers from 0 to 1, the same ones every time.
+pub struct Noise(pub u64);
+
+impl Noise {
+    pub fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    fn star(&mut self, centre: [f64; 2], [least, most]: [f64; 2], corners: usize) -> Vec<[f64; 2]> {
+        let at = |k: usize, noise: &mut Self| {
+            let angle = std::f64::consts::TAU * (k as f64 + 0.6 * noise.next()) / corners as f64;
+            let radius = least + (most - least) * noise.next();
+            [centre[0] + radius * angle.cos(), centre[1] + radius * angle.sin()]
+        };
+        (0..corners).map(|k| at(k, self)).collect()
+    }
+
+    /// A star with a hole, about 14 across.
+    pub fn polygon_with_hole(&mut self) -> Vec<Vec<[f64; 2]>> {
+        let centre = [3.0 * self.next(), 3.0 * self.next()];
+        let (outer, inner) = (5 + (5.0 * self.next()) as usize, 3 + (4.0 * self.next()) as usize);
+        vec![self.star(centre, [4.5, 8.0], outer), self.star(centre, [1.2, 2.2], inner)]
+    }
+}
+
+/// The six lattices as the prototype has them.
+pub const KINDS: [LatticeKind; 6] = [
+    LatticeKind::Square { spacing: 1.0 },
+    LatticeKind::Rectangular { a: 1.0, b: 0.8 },
+    LatticeKind::CentredRectangular { a: 1.2, b: 1.0 },
+    LatticeKind::Hexagonal { spacing: 1.0 },
+    LatticeKind::Oblique { a: 1.0, b: 1.0, angle: 1.22 },
+    LatticeKind::Honeycomb { spacing: 0.577_350_269_189_625_8 },
+];
+
+fn total_area(fitted: &Fitted) -> f64 {
+    fitted.cells.kind.iter().map(|&kind| area(&fitted.cells.shapes[kind as usize])).sum()
+}
+
+/// Every side is shared by two cells that have it the other way round, or lies on the outline.
+fn require_closed(fitted: &Fitted, label: &str) {
+    let mut sides: HashMap<[u32; 2], usize> = HashMap::new();
+    for cell in 0..fitted.cells.count() {
+        for side in fitted.cells.sides(cell) {
+            *sides.entry(side).or_default() += 1;
+        }
+    }
+    let places = &fitted.body.outline.as_ref().expect("fitted").places;
+    for (&[a, b], &count) in &sides {
+        assert_eq!(count, 1, "{label}: side {a}-{b} twice the same way");
+        if !sides.contains_key(&[b, a]) {
+            for end in [a, b] {
+                assert!(places[end as usize].is_some(), "{label}: particle {end} of a free side is inside");
+            }
+        }
+    }
+    let lone = fitted.cells.incidence(fitted.body.count());
+    assert!((0..fitted.body.count()).all(|i| !lone.of(i).is_empty()), "{label}: a particle in no cell");
+}
+
+#[test]
+fn polygons_with_holes_are_kept_exactly_on_every_lattice_in_any_direction() {
+    let mut noise = Noise(7);
+    let (mut least, mut fits, mut refused) = (Quality { area: 9.0, side: 9.0, width: 9.0 }, 0, Vec::new());
+    for round in 0..120 {
+        let kind = KINDS[round % 6];
+        let polygons = noise.polygon_with_hole();
+        let lattice = Lattice::new(kind, [noise.next(), noise.next()], 3.0 * noise.next());
+        let outline = Outline::of_polygons(&polygons).expect("an outline");
+        let label = format!("round {round}, {kind:?}");
+        let fitted = match fit(&lattice, &outline) {
+            Ok(fitted) => fitted,
+            Err(error) => {
+                refused.push(format!("{label}: {error}"));
+                continue;
+            }
+        };
+        fits += 1;
+        require_closed(&fitted, &label);
+        let off = (total_area(&fitted) / outline.area() - 1.0).abs();
+        assert!(off < 1e-13, "{label}: area off by {off:e}");
+        let quality = fitted.quality();
+        least = Quality {
+            area: least.area.min(quality.area),
+            side: least.side.min(quality.side),
+            width: least.width.min(quality.width),
+        };
+        assert!(quality.area > 0.39, "{label}: {quality:?}");
+    }
+    println!("{fits} fits, {least:?}, refused {refused:#?}");
+    assert!(fits > 100);
+}
+
+#[test]
+fn a_rectangle_of_whole_cells_is_the_lattice_itself() {
+    let lattice = Lattice::new(LatticeKind::Square { spacing: 0.1 }, [0.3, 0.1], 0.0);
+    let shape = Shape::Rectangle { min: [0.3, 0.1], max: [1.3, 0.7] };
+    let fitted = fit(&lattice, &Outline::of_shape(&shape).expect("an outline")).expect("fits");
+    assert_eq!(fitted.body.count(), 11 * 7);
+    assert_eq!(fitted.body.outline.expect("fitted").regular, 77);
+    assert_eq!(fitted.cells.shapes.len(), 1);
+}
+
+#[test]
+fn a_disc_with_a_hole_is_kept_to_the_sagitta_of_its_chords() {
+    for kind in KINDS {
+        let lattice = Lattice::new(kind, [0.1, 0.2], 0.4);
+        let shape = Shape::WithHoles {
+            body: Box::new(Shape::Disc { centre: [0.0; 2], radius: 9.0 }),
+            holes: vec![Shape::Disc { centre: [2.0, 1.0], radius: 2.0 }],
+        };
+        let outline = Outline::of_shape(&shape).expect("an outline");
+        let fitted = fit(&lattice, &outline).expect("fits");
+        require_closed(&fitted, &format!("{kind:?}"));
+        let off = total_area(&fitted) / outline.area() - 1.0;
+        assert!(off.abs() < 0.005, "{kind:?} {off}");
+        assert!(fitted.quality().area > 0.39, "{kind:?} {:?}", fitted.quality());
+    }
+}
