@@ -14,21 +14,14 @@ use crate::flock::points::Points;
 use crate::flock::role::Role;
 use crate::flock::rules::{Mean, Rotation, Turn};
 
-/// A force and its moments; moments are positive counter-clockwise. Their arms end where the particles were in the
-/// reference configuration under small rotations, and where they are at present if the rule is corotated.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Resultant {
+/// What the loads on a body add up to. Moments are positive counter-clockwise; their arms end where the particles were
+/// in the reference configuration under small rotations, and where they are at present if the rule is corotated.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LoadResultant {
     /// \[force\]
     pub force: [f64; 2],
     /// About the origin of the coordinates \[force length\].
     pub moment_about_origin: f64,
-}
-
-/// What the loads on a body add up to.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct LoadResultant {
-    #[serde(flatten)]
-    pub resultant: Resultant,
     /// Mean displacement along the resultant, each particle weighted by its part of the load: the displacement in
     /// which the resultant does the work of the load \[length\]. Absent where the forces cancel.
     pub displacement: Option<f64>,
@@ -58,14 +51,16 @@ pub struct Reaction {
 /// Force of the neighbours on a particle \[force\] under these displacements of all \[length\]; `None` where the rule
 /// has no stiffness.
 pub fn internal_force(interaction: &Interaction, particle: usize, displacement: &Points) -> Option<[f64; 2]> {
-    let (Weights::Matrix(weights), Mean::Material { rotation }) = (&interaction.weights, interaction.rule.mean)
+    let (Weights::Matrix(weights), Mean::Material { rotation }) =
+        (&interaction.weights, interaction.rule.mean)
     else {
         return None;
     };
     let reference = &interaction.reference;
     let from = |points: &Points, j: &u32| minus(points.get(*j as usize), points.get(particle));
     // Where each neighbour was from the particle, and how far it has moved from there.
-    let around = interaction.neighbours.of(particle).iter().map(|j| (from(reference, j), from(displacement, j)));
+    let around =
+        interaction.neighbours.of(particle).iter().map(|j| (from(reference, j), from(displacement, j)));
     let pulled = |stretch: &dyn Fn([f64; 2], [f64; 2]) -> [f64; 2]| {
         let blocks = weights.stiffness_of(particle).iter().zip(around.clone());
         blocks.fold([0.0; 2], |sum, (block, (then, by))| plus(sum, apply(block, stretch(then, by))))
@@ -121,13 +116,16 @@ impl Forces {
     /// Reactions of the entries of `roles` that hold particles at present, in their order.
     pub fn reactions(&self, engine: &Engine) -> Vec<Reaction> {
         let entries = (0..engine.changes().len()).zip(held(engine));
-        entries.filter(|(_, held)| !held.is_empty()).map(|(k, held)| self.reaction_of(engine, k, &held)).collect()
+        entries
+            .filter(|(_, held)| !held.is_empty())
+            .map(|(k, held)| self.reaction_of(engine, k, &held))
+            .collect()
     }
 
     fn reaction_of(&self, engine: &Engine, entry: usize, held: &[usize]) -> Reaction {
         let mean = |points: &Points| held.iter().map(|&i| points.get(i)).collect::<Points>().middle();
         let centre = mean(&engine.body().reference);
-        
+
         let force = held.iter().fold([0.0; 2], |sum, &i| plus(sum, self.reaction(i)));
         let moment = |about: [f64; 2]| {
             let of = |&i: &usize| cross(minus(self.places.get(i), about), self.reaction(i));
@@ -147,20 +145,19 @@ impl Forces {
 
     /// What the loads add up to; `None` without loads.
     pub fn load(&self, engine: &Engine) -> Option<LoadResultant> {
-        engine.interaction().forces.as_ref()?;
-        let force = self.loads.iter().fold([0.0; 2], plus);
+        let whole = engine.whole_load()?;
+        let sum = |forces: &Points| forces.iter().fold([0.0; 2], plus);
         let moments = self.places.iter().zip(self.loads.iter()).map(|(at, force)| cross(at, force));
-        let resultant = Resultant { force, moment_about_origin: moments.sum() };
-        let size = f64::hypot(force[0], force[1]);
-        let most: f64 = self.loads.iter().map(|[x, y]| f64::hypot(x, y)).sum();
+        let [x, y] = sum(whole);
+        let (size, most) = (f64::hypot(x, y), whole.iter().map(|[x, y]| f64::hypot(x, y)).sum::<f64>());
         // Forces that cancel leave rounding.
-        let displacement = (size > 1e-9 * most).then(|| self.work_of_loads() / size);
-        Some(LoadResultant { resultant, displacement })
+        let displacement = (size > 1e-9 * most).then(|| work(whole, &self.displacement) / size);
+        Some(LoadResultant { force: sum(&self.loads), moment_about_origin: moments.sum(), displacement })
     }
 
     /// The loads, as they are now, times the displacements \[force length\].
     pub fn work_of_loads(&self) -> f64 {
-        self.loads.iter().zip(self.displacement.iter()).map(|(force, by)| dot(force, by)).sum()
+        work(&self.loads, &self.displacement)
     }
 
     /// The reactions, as they are now, times the displacements \[force length\].
@@ -174,6 +171,10 @@ impl Forces {
         let followers = (0..engine.roles().len()).filter(|&i| engine.roles()[i] == Role::Follower);
         followers.map(|i| self.left_on(i)).map(|[x, y]| f64::hypot(x, y)).fold(0.0, f64::max)
     }
+}
+
+fn work(forces: &Points, displacement: &Points) -> f64 {
+    forces.iter().zip(displacement.iter()).map(|(force, by)| dot(force, by)).sum()
 }
 
 fn is_held(role: Role) -> bool {

@@ -3,12 +3,12 @@
 use serde::{Deserialize, Serialize};
 
 use super::engine::Engine;
-use super::forces::{Forces, LoadResultant, Reaction, Resultant};
+use super::forces::{Forces, LoadResultant, Reaction};
 use crate::flock::points::Points;
 use crate::flock::rules::{Mean, Rotation};
 use crate::material::cells::Cells;
 use crate::material::elastic::Elastic;
-use crate::material::stress::{self, Stress};
+use crate::material::stress::{self, StressState};
 
 /// Strain beyond which small rotations and strains are a caution \[1\].
 const SMALL_STRAIN: f64 = 0.1;
@@ -19,7 +19,7 @@ const SMALL_TURN: f64 = std::f64::consts::PI / 18.0;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Mechanics {
     /// Of each entry of `loads`, where it is known.
-    pub loads: Vec<Resultant>,
+    pub loads: Vec<LoadResultant>,
     /// Of all loads together.
     pub load: Option<LoadResultant>,
     /// Of each entry of `roles` that holds particles; empty where the rule has no stiffness.
@@ -63,21 +63,27 @@ pub struct Peak {
 #[derive(Clone, Debug)]
 pub struct Stresses {
     /// NaN in cells across which a bond is broken, shape \[cells\].
-    pub cells: Vec<Stress>,
+    pub cells: Vec<StressState>,
     /// `None` for a particle in no whole cell, shape \[count\].
-    pub particles: Vec<Option<Stress>>,
+    pub particles: Vec<Option<StressState>>,
 }
 
 impl Stresses {
     /// Under these displacements \[length\], these pairs of particles being parted; `None` without cells.
-    pub fn of(engine: &Engine, elastic: &Elastic, displacement: &Points, broken: &[[u32; 2]]) -> Option<Self> {
+    pub fn of(
+        engine: &Engine,
+        elastic: &Elastic,
+        displacement: &Points,
+        broken: &[[u32; 2]],
+    ) -> Option<Self> {
         let cells = engine.cells()?;
         let mut of_cells = stress::of_cells(cells, elastic, displacement, rotation(engine));
         let torn = torn(cells, displacement.len(), broken);
         for (stress, _) in of_cells.iter_mut().zip(&torn).filter(|(_, torn)| **torn) {
-            *stress = Stress { strain: [f64::NAN; 3], components: [f64::NAN; 3], von_mises: f64::NAN };
+            *stress = StressState { strain: [f64::NAN; 3], components: [f64::NAN; 3], von_mises: f64::NAN };
         }
-        let particles = stress::at_particles(cells, elastic, &of_cells, displacement.len(), |cell| !torn[cell]);
+        let particles =
+            stress::at_particles(cells, elastic, &of_cells, displacement.len(), |cell| !torn[cell]);
         Some(Self { cells: of_cells, particles })
     }
 
@@ -90,7 +96,7 @@ impl Stresses {
     fn peak(&self, engine: &Engine, cells: &Cells) -> Option<Peak> {
         let finite = self.cells.iter().enumerate().filter(|(_, stress)| stress.von_mises.is_finite());
         // The first of several.
-        let higher = |best: Option<(usize, f64)>, (cell, stress): (usize, &Stress)| match best {
+        let higher = |best: Option<(usize, f64)>, (cell, stress): (usize, &StressState)| match best {
             Some((_, most)) if most >= stress.von_mises => best,
             _ => Some((cell, stress.von_mises)),
         };
@@ -109,7 +115,8 @@ impl Mechanics {
         let cells = engine.cells()?;
         let forces = Forces::of(engine);
         let u = engine.displacements();
-        let finite = |values: &mut dyn Iterator<Item = f64>| values.filter(|v| v.is_finite()).fold(0.0, f64::max);
+        let finite =
+            |values: &mut dyn Iterator<Item = f64>| values.filter(|v| v.is_finite()).fold(0.0, f64::max);
         Some(Self {
             loads: Vec::new(),
             load: forces.as_ref().and_then(|forces| forces.load(engine)),
@@ -121,7 +128,7 @@ impl Mechanics {
             }),
             unbalanced: forces.as_ref().map(|forces| forces.largest_left(engine)),
             largest_von_mises: stresses.peak(engine, cells),
-            largest_strain: finite(&mut stresses.cells.iter().map(Stress::largest_strain)),
+            largest_strain: finite(&mut stresses.cells.iter().map(StressState::largest_strain)),
             largest_turn: finite(&mut stress::turns(cells, &u).map(f64::abs)),
         })
     }

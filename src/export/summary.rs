@@ -1,6 +1,7 @@
 //! `summary.json`: what was run, how it ended, in numbers.
 
 use std::collections::BTreeMap;
+use std::fmt;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -9,11 +10,14 @@ use serde::Serialize;
 use super::error::{ExportError, write_file};
 use super::{OutputFolder, bonds};
 use crate::continuum::engine::Engine;
+use crate::continuum::forces::Reaction;
+use crate::continuum::mechanics::{Mechanics, Peak};
 use crate::continuum::record::Snapshot;
 use crate::continuum::run::{Outcome, StopReason};
 use crate::flock::role::Role;
 use crate::scene::Scene;
 use crate::scene::raw::RawScene;
+use crate::scene::units::Units;
 use crate::solve::equilibrium::Solved;
 
 pub(super) const PROGRAM: &str = env!("CARGO_PKG_NAME");
@@ -62,6 +66,12 @@ pub struct Summary {
     /// How the equilibrium was found, unless it was stepped to.
     pub equilibrium: Option<Equilibrium>,
     pub energies: Energies,
+    /// Reactions, loads, energy and stress, where the scene has a material.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mechanics: Option<Measured>,
+    /// What the user should know of the result.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub cautions: Vec<String>,
     pub broken_bonds: BrokenBonds,
     pub timings: Seconds,
     /// The scene, its defaults and overrides included.
@@ -112,6 +122,14 @@ pub struct FirstBreak {
     pub along: f64,
 }
 
+/// What a testing machine would read off the body, and in which units.
+#[derive(Clone, Debug, Serialize, PartialEq)]
+pub struct Measured {
+    pub units: Units,
+    #[serde(flatten)]
+    pub mechanics: Mechanics,
+}
+
 /// What the solver did.
 #[derive(Clone, Debug, Serialize, PartialEq)]
 pub struct Equilibrium {
@@ -147,6 +165,8 @@ impl Summary {
         timings: Timings,
     ) -> Self {
         let [pe1, pe2] = last.energies();
+        let engine = &outcome.engine;
+        let mechanics = scene.material.as_ref().and_then(|elastic| Mechanics::of(engine, elastic));
         Self {
             program: PROGRAM,
             version: env!("CARGO_PKG_VERSION"),
@@ -163,6 +183,8 @@ impl Summary {
             share_swept: outcome.solved.is_none().then(|| outcome.engine.activity().share_computed()),
             equilibrium: outcome.solved.as_ref().map(Equilibrium::of),
             energies: Energies { pe1, pe2, largest_strain },
+            cautions: mechanics.as_ref().map_or_else(Vec::new, |mechanics| mechanics.cautions(engine)),
+            mechanics: mechanics.map(|mechanics| Measured { units: Units::of(scene), mechanics }),
             broken_bonds: broken_bonds(&outcome.engine),
             timings: Seconds {
                 setup_s: timings.setup.as_secs_f64(),
@@ -179,6 +201,61 @@ impl Summary {
         text.push('\n');
         write_file(&path, text)?;
         Ok(path)
+    }
+}
+
+impl fmt::Display for Measured {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { units, mechanics } = self;
+        let (force, moment, length) = (&units.force, &units.moment, &units.length);
+        let pair = |[x, y]: [f64; 2]| format!("({}, {})", short(x), short(y));
+        if !mechanics.reactions.is_empty() {
+            writeln!(f, "reactions, force [{force}] and moment [{moment}] on the body:")?;
+        }
+        for reaction in &mechanics.reactions {
+            let Reaction { key, role, particles, centre, force, moment, moment_about_origin, .. } = reaction;
+            let moments = format!(
+                "{} about {} {length}, {} about the origin",
+                short(*moment),
+                pair(*centre),
+                short(*moment_about_origin)
+            );
+            writeln!(f, "  {key} ({role}, {particles} particles)  {}, moment {moments}", pair(*force))?;
+        }
+        if let Some(load) = &mechanics.load {
+            let about = short(load.moment_about_origin);
+            writeln!(
+                f,
+                "loads in all  {} {force}, moment {about} {moment} about the origin",
+                pair(load.force)
+            )?;
+        }
+        let work = mechanics.work.map_or_else(String::new, |work| {
+            format!("; work of the loads {}, of the supports {}", short(work.loads), short(work.supports))
+        });
+        writeln!(f, "strain energy {} {moment}{work}", short(mechanics.strain_energy))?;
+        if let Some(Peak { von_mises, cell, place, .. }) = &mechanics.largest_von_mises {
+            let stress = &units.stress;
+            let value = short(*von_mises);
+            writeln!(
+                f,
+                "largest von Mises stress {value} {stress}, in cell {cell} at {} {length}",
+                pair(*place)
+            )?;
+        }
+        Ok(())
+    }
+}
+
+/// Five digits.
+fn short(value: f64) -> String {
+    match value.abs() {
+        0.0 => "0".into(),
+        size if (1e-3..1e5).contains(&size) => {
+            let decimals = (4 - size.log10().floor() as i32).clamp(0, 7) as usize;
+            format!("{value:.decimals$}")
+        }
+        _ => format!("{value:.4e}"),
     }
 }
 

@@ -15,7 +15,7 @@ use crate::flock::rules::{Rotation, Turn};
 
 /// The state of a cell, or of the cells around a particle.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Stress {
+pub struct StressState {
     /// Mean strain (xx, yy, engineering xy) \[1\].
     pub strain: [f64; 3],
     /// xx, yy, xy \[force / length^2\].
@@ -24,7 +24,7 @@ pub struct Stress {
     pub von_mises: f64,
 }
 
-impl Stress {
+impl StressState {
     fn of(strain: [f64; 3], elastic: &Elastic) -> Self {
         Self { strain, components: elastic.stress(strain), von_mises: elastic.von_mises(strain) }
     }
@@ -37,10 +37,15 @@ impl Stress {
 }
 
 /// Stress in each cell, at its centre on a quadrilateral, under these displacements \[length\], shape \[cells\].
-pub fn of_cells(cells: &Cells, elastic: &Elastic, displacement: &Points, rotation: Rotation) -> Vec<Stress> {
+pub fn of_cells(
+    cells: &Cells,
+    elastic: &Elastic,
+    displacement: &Points,
+    rotation: Rotation,
+) -> Vec<StressState> {
     let of_cell = |cell: usize| {
         let local = local(cells, cell, displacement, rotation);
-        Stress::of(mean_strain(cells.shape(cell), |k| local[k]), elastic)
+        StressState::of(mean_strain(cells.shape(cell), |k| local[k]), elastic)
     };
     (0..cells.count()).into_par_iter().map(of_cell).collect()
 }
@@ -50,10 +55,10 @@ pub fn of_cells(cells: &Cells, elastic: &Elastic, displacement: &Points, rotatio
 pub fn at_particles(
     cells: &Cells,
     elastic: &Elastic,
-    of_cells: &[Stress],
+    of_cells: &[StressState],
     particles: usize,
     counts: impl Fn(usize) -> bool,
-) -> Vec<Option<Stress>> {
+) -> Vec<Option<StressState>> {
     let mut sums = vec![([0.0; 3], 0.0); particles];
     let areas: Vec<f64> = cells.shapes.iter().map(|shape| area(shape)).collect();
     for (cell, corners) in cells.iter().enumerate().filter(|&(cell, _)| counts(cell)) {
@@ -65,7 +70,7 @@ pub fn at_particles(
         }
     }
     let mean = |(sum, whole): ([f64; 3], f64)| {
-        (whole > 0.0).then(|| Stress::of(sum.map(|component| component / whole), elastic))
+        (whole > 0.0).then(|| StressState::of(sum.map(|component| component / whole), elastic))
     };
     sums.into_iter().map(mean).collect()
 }
@@ -125,7 +130,8 @@ fn relative(cells: &Cells, cell: usize, displacement: &Points) -> Vec<[f64; 2]> 
 
 /// The turn of a cell's corners about their middle; `None` where they are all in one point.
 fn turn(shape: &[[f64; 2]], relative: &[[f64; 2]]) -> Option<Turn> {
-    let middle = |points: &[[f64; 2]]| [0, 1].map(|k| points.iter().map(|p| p[k]).sum::<f64>() / points.len() as f64);
+    let middle =
+        |points: &[[f64; 2]]| [0, 1].map(|k| points.iter().map(|p| p[k]).sum::<f64>() / points.len() as f64);
     let (centre, moved) = (middle(shape), middle(relative));
     Turn::fit(shape.iter().zip(relative).map(|(then, by)| {
         let then = [then[0] - centre[0], then[1] - centre[1]];
@@ -147,7 +153,7 @@ mod tests {
         let (body, _) =
             Body::build(lattice, &Cut::Count { columns: 5, rows: 6 }, &near, None).expect("builds");
         let cells = Cells::of_body(&body);
-        let constants = Constants::Isotropic { young: 1000.0, poisson: 0.3, plane: Plane::Stress };
+        let constants = Constants::Isotropic { young: 1000.0, poisson: 0.3, plane: Plane::StressState };
         (body, cells, Elastic::new(constants, 0.5).expect("admissible"))
     }
 
@@ -172,7 +178,10 @@ mod tests {
                 for stress in found.iter().chain(around.iter().flatten()) {
                     let [xx, yy, xy] = stress.components;
                     // The turn that is nearest to all corners is not quite that of the stretch.
-                    assert!((xx - 2.0).abs() < 2e-3 && yy.abs() < 2e-3 && xy.abs() < 2e-3, "{kind:?} {stress:?}");
+                    assert!(
+                        (xx - 2.0).abs() < 2e-3 && yy.abs() < 2e-3 && xy.abs() < 2e-3,
+                        "{kind:?} {stress:?}"
+                    );
                     assert!((stress.von_mises - 2.0).abs() < 2e-3, "{kind:?} {stress:?}");
                 }
                 let covered: f64 = (0..cells.count()).map(|cell| area(cells.shape(cell))).sum();

@@ -47,7 +47,8 @@ impl Units {
                 moment: times("³"),
             };
         };
-        let named = FORCES.iter().find(|(of_stress, of_length, _)| (*of_stress, *of_length) == (stress, length));
+        let named =
+            FORCES.iter().find(|(of_stress, of_length, _)| (*of_stress, *of_length) == (stress, length));
         let (force, moment) = match named {
             Some((.., force)) => ((*force).to_owned(), format!("{force} {length}")),
             None => (format!("{stress} {length}²"), format!("{stress} {length}³")),

@@ -30,6 +30,11 @@ impl Engine {
         self.load.factor
     }
 
+    /// All of the scene's loads \[force\], shape \[count\]; `None` without loads.
+    pub fn whole_load(&self) -> Option<&Points> {
+        self.load.whole.as_ref().or(self.interaction.forces.as_ref())
+    }
+
     /// Puts this part of the scene's loads on the body \[1\].
     pub fn set_load_factor(&mut self, factor: f64) {
         if factor == self.load.factor {

@@ -155,7 +155,8 @@ impl Engine {
 /// FNV-1a (G. Fowler, L. C. Noll, K.-P. Vo). Not secure against forgery.
 pub fn digest(plan: &Plan) -> u64 {
     let mut digest = Fnv(0xcbf2_9ce4_8422_2325);
-    let Plan { body, interaction, update, present_radius, roles, changes, cuts, stop, probes, ramp, .. } = plan;
+    let Plan { body, interaction, update, present_radius, roles, changes, cuts, stop, probes, ramp, .. } =
+        plan;
     digest.points(&body.reference);
     digest.text(&format!("{update:?} {present_radius:?} {stop:?} {:?} {cuts:?}", interaction.rule));
     roles.iter().for_each(|role| digest.text(role.name()));

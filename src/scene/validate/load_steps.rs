@@ -28,9 +28,7 @@ fn solved(asked: &RawLoadSteps, refuse: Refuse<'_>) -> Result<LoadSteps, SceneEr
         return Err(refuse(&format!("load_steps.{key}"), message, help));
     }
     match (asked.increments, &asked.schedule) {
-        (Some(count), None) => {
-            Ok(LoadSteps::Solved((1..=count).map(|n| n as f64 / count as f64).collect()))
-        }
+        (Some(count), None) => Ok(LoadSteps::Solved((1..=count).map(|n| n as f64 / count as f64).collect())),
         (None, Some(parts)) => {
             if let Some(n) = parts.iter().position(|part| !(0.0..=1.0).contains(part)) {
                 let message = format!("a part is from 0 to 1, and this one is {}", parts[n]);
@@ -40,7 +38,8 @@ fn solved(asked: &RawLoadSteps, refuse: Refuse<'_>) -> Result<LoadSteps, SceneEr
             Ok(LoadSteps::Solved(parts.clone()))
         }
         (given, _) => {
-            let message = if given.is_some() { "gives both increments and a schedule" } else { "gives no parts" };
+            let message =
+                if given.is_some() { "gives both increments and a schedule" } else { "gives no parts" };
             let help = "give either increments = 10 or schedule = [0.5, 1.0, 0.5]";
             Err(refuse("load_steps", message.into(), help))
         }
@@ -66,7 +65,11 @@ fn stepped(raw: &RawScene, asked: &RawLoadSteps, refuse: Refuse<'_>) -> Result<L
                 "the run ends at step {}, before the loads are all there at step {}",
                 raw.stop.steps, ramp.steps
             );
-            return Err(refuse(&format!("{key}.steps"), message, "raise stop.steps, or let the ramp end earlier"));
+            return Err(refuse(
+                &format!("{key}.steps"),
+                message,
+                "raise stop.steps, or let the ramp end earlier",
+            ));
         }
     } else if asked.every.is_none() {
         let help = "give ramp = { steps = 100 }, every = 10 or both";
