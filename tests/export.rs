@@ -9,7 +9,9 @@ use base64::engine::general_purpose::STANDARD;
 use flockform::continuum::plan::Plan;
 use flockform::continuum::record::{ProbeSeries, Snapshot};
 use flockform::continuum::run::{Outcome, run};
-use flockform::export::{ExportError, OutputFolder, Results, Timings, VtkSeries, figures, write_all};
+use flockform::export::{
+    Drawing, ExportError, OutputFolder, Results, Timings, VtkSeries, figures, write_all,
+};
 use flockform::flock::role::Role;
 use flockform::scene::{Scene, bundled};
 use resvg::tiny_skia::Pixmap;
@@ -52,9 +54,10 @@ impl Run {
             outcome: &self.outcome,
             snapshots: &self.snapshots,
             probes: &self.probes,
+            load_steps: &[],
             timings: Timings::default(),
         };
-        let (written, _) = write_all(&folder, &results)?;
+        let (written, _) = write_all(&folder, &results, Drawing::default())?;
         assert!(written.iter().all(|path| path.is_file()), "{written:?}");
         folder.commit().map(|_| ())
     }
@@ -431,8 +434,8 @@ fn the_png_is_the_svg_at_full_width_with_its_text() {
     let parent = tempfile::tempdir().expect("a folder");
     let run = Run::of("tension", &["stop.steps=1", "record.figures=[1]"]);
     let svg = figures::configuration(&run.subject(), &run.snapshots[0]);
-    let [svg_path, png_path] =
-        figures::write(&svg, &parent.path().join("configuration_0001")).expect("written");
+    let written = figures::write(&svg, &parent.path().join("configuration_0001")).expect("written");
+    let [svg_path, png_path] = &written[..] else { panic!("{written:?}") };
     assert_eq!(fs::read_to_string(svg_path).expect("readable"), svg);
     let png = Pixmap::decode_png(&fs::read(png_path).expect("readable")).expect("a PNG");
     let figure = Document::parse(&svg).expect("well-formed");

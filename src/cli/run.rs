@@ -388,7 +388,7 @@ fn closing_words(scene: &Scene, outcome: &Outcome, summary: &Summary, elapsed: D
     let mut words = format!(
         "{}: {} {}, residual {:.2e}, {how} ({:.2} s)\n",
         scene.name,
-        if steps_are_increments(scene) { "increment" } else { "step" },
+        scene.counts(),
         engine.step(),
         outcome.residual,
         elapsed.as_secs_f64()
@@ -429,11 +429,6 @@ fn closing_words(scene: &Scene, outcome: &Outcome, summary: &Summary, elapsed: D
     }
     words += &summary.mechanics.as_ref().map_or_else(String::new, Measured::to_string);
     words + &summary.cautions.iter().map(|caution| format!("caution: {caution}\n")).collect::<String>()
-}
-
-/// Whether the steps of a run are equilibria.
-fn steps_are_increments(scene: &Scene) -> bool {
-    matches!(scene.load_steps, Some(LoadSteps::Solved(_)))
 }
 
 fn where_to_look(kept: &Path) -> String {

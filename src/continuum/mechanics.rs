@@ -154,7 +154,8 @@ impl Mechanics {
 fn strain_energy(engine: &Engine, elastic: &Elastic, forces: Option<&Forces>, u: &Points) -> f64 {
     if let (Some(forces), Rotation::Small) = (forces, rotation(engine)) {
         let work = forces.internal.iter().zip(u.iter()).map(|(f, u)| f[0] * u[0] + f[1] * u[1]);
-        return -0.5 * work.sum::<f64>();
+        // Without the sign of a zero.
+        return 0.0 - 0.5 * work.sum::<f64>();
     }
     let of_cells = engine.cells().map(|cells| stress::strain_energy(cells, elastic, u, rotation(engine)));
     of_cells.and_then(Result::ok).unwrap_or(f64::NAN)

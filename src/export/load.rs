@@ -14,7 +14,7 @@
 
 use std::path::PathBuf;
 
-use csv::Writer;
+use csv::WriterBuilder;
 
 use super::OutputFolder;
 use super::error::ExportError;
@@ -28,12 +28,13 @@ use crate::scene::units::Units;
 /// Writes a row for each step that was kept.
 pub fn write_load(folder: &OutputFolder, scene: &Scene, steps: &[LoadStep]) -> Result<PathBuf, ExportError> {
     let path = folder.path("load.csv");
-    let mut writer = Writer::from_path(&path).map_err(ExportError::io("write", &path))?;
+    let failed = |error: csv::Error| ExportError::io("write", &path)(error);
+    let mut writer = WriterBuilder::new().has_headers(false).from_path(&path).map_err(failed)?;
     let keys = keys(steps);
     let has_load = steps.iter().any(|step| step.mechanics.load.is_some());
-    writer.write_record(header(scene, &keys, has_load)).map_err(ExportError::io("write", &path))?;
+    writer.write_record(header(scene, &keys, has_load)).map_err(failed)?;
     for step in steps {
-        writer.write_record(row(step, &keys, has_load)).map_err(ExportError::io("write", &path))?;
+        writer.serialize((step.step, row(step, &keys, has_load))).map_err(failed)?;
     }
     writer.flush().map_err(ExportError::io("write", &path))?;
     Ok(path)
@@ -54,7 +55,7 @@ fn keys(steps: &[LoadStep]) -> Vec<&str> {
 }
 
 fn header(scene: &Scene, keys: &[&str], has_load: bool) -> Vec<String> {
-    let mut names = vec![counted(scene).to_owned(), "factor".to_owned()];
+    let mut names = vec![scene.counts().to_owned(), "factor".to_owned()];
     if has_load {
         names.extend(["fx", "fy", "moment", "displacement"].map(|name| format!("load.{name}")));
     }
@@ -65,12 +66,7 @@ fn header(scene: &Scene, keys: &[&str], has_load: bool) -> Vec<String> {
     names
 }
 
-/// What rows count.
-fn counted(scene: &Scene) -> &'static str {
-    if scene.equilibrium.is_some() { "increment" } else { "step" }
-}
-
-fn row(step: &LoadStep, keys: &[&str], has_load: bool) -> Vec<String> {
+fn row(step: &LoadStep, keys: &[&str], has_load: bool) -> Vec<Option<f64>> {
     let mechanics = &step.mechanics;
     let mut numbers: Vec<Option<f64>> = vec![Some(step.factor)];
     if has_load {
@@ -92,8 +88,7 @@ fn row(step: &LoadStep, keys: &[&str], has_load: bool) -> Vec<String> {
     }
     let peak = mechanics.largest_von_mises.as_ref().map(|peak| peak.von_mises);
     numbers.extend([Some(mechanics.strain_energy), peak]);
-    let text = |number: Option<f64>| number.map_or_else(String::new, |number| number.to_string());
-    std::iter::once(step.step.to_string()).chain(numbers.into_iter().map(text)).collect()
+    numbers
 }
 
 /// Load over displacement: of the loads along their resultant, and of each region that is moved along the way that it
@@ -109,10 +104,8 @@ pub fn chart<'a>(scene: &Scene, units: &'a Units, steps: &[LoadStep]) -> Option<
     let axis = |quantity, unit| Axis { quantity, unit, is_log: false };
     (!series.is_empty()).then(|| Chart {
         title: scene.raw.title.clone(),
-        note: format!(
-            "force over mean displacement, both along the load or the motion; a ring is {} of load.csv",
-            if scene.equilibrium.is_some() { "an increment" } else { "a row" }
-        ),
+        note: "force over mean displacement, both along the load or the motion; a ring is a row of load.csv"
+            .into(),
         axes: [axis("displacement", units.length.as_str()), axis("force", units.force.as_str())],
         series,
         landmarks: Vec::new(),

@@ -208,7 +208,9 @@ impl fmt::Display for Measured {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { units, mechanics } = self;
         let (force, moment, length) = (&units.force, &units.moment, &units.length);
-        let pair = |[x, y]: [f64; 2]| format!("({}, {})", short(x), short(y));
+        // Rounding of the larger component is no number of the smaller one.
+        let shown = |value: f64, beside: f64| if value.abs() < 1e-9 * beside.abs() { 0.0 } else { value };
+        let pair = |[x, y]: [f64; 2]| format!("({}, {})", short(shown(x, y)), short(shown(y, x)));
         if !mechanics.reactions.is_empty() {
             writeln!(f, "reactions, force [{force}] and moment [{moment}] on the body:")?;
         }

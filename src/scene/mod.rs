@@ -87,6 +87,14 @@ impl Scene {
         matches!(self.body, BodySource::Points(_))
     }
 
+    /// What a run counts: `increment` where it solves one part of the load after the other, else `step`.
+    pub fn counts(&self) -> &'static str {
+        match self.load_steps {
+            Some(LoadSteps::Solved(_)) => "increment",
+            _ => "step",
+        }
+    }
+
     /// The unit of length, for axes and tables.
     pub fn unit(&self) -> &str {
         &self.raw.unit

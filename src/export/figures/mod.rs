@@ -50,6 +50,8 @@ pub struct Subject<'a> {
     pub body: &'a Body,
     /// The bonds of the body; `None` where neighbours are found anew at every step.
     pub neighbours: Option<&'a Neighbours>,
+    /// What is counted on the way: `step` or `increment`.
+    pub counts: &'static str,
 }
 
 impl<'a> Subject<'a> {
@@ -59,6 +61,7 @@ impl<'a> Subject<'a> {
             unit: scene.unit(),
             body: engine.body(),
             neighbours: engine.lasting_neighbours(),
+            counts: scene.counts(),
         }
     }
 }

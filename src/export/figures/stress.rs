@@ -44,7 +44,8 @@ pub fn stress(
     let range = shown.iter().fold([f64::INFINITY, 0.0], |[low, high], (_, v)| [low.min(*v), v.max(high)]);
     let bands = Bands::around(range[0].min(range[1]), range[1], NOISE * range[1]);
     let axes = page::window(&places, drawn(), subject.body.lattice.spacing());
-    let mut note = format!("von Mises stress in the cells, {}{}", page::note(snapshot), told(factor));
+    let mut note =
+        format!("von Mises stress in the cells, {}{}", page::note(subject, snapshot), told(factor));
     let is_raster = shown.len() > MOST_CELLS;
     if is_raster {
         note += &format!("; {} cells drawn as squares of their largest value", shown.len());

@@ -220,8 +220,7 @@ fn film(scene: &Scene, engine: &Engine, is_solved: bool) -> Film {
     quantities.push(Quantity::new("strain", "largest strain", ""));
     let clock = match is_solved {
         true => Clock { quantity: "load", unit: "%" },
-        false if scene.equilibrium.is_some() => Clock { quantity: "increment", unit: "" },
-        false => Clock { quantity: "step", unit: "" },
+        false => Clock { quantity: scene.counts(), unit: "" },
     };
     Film {
         noun: "particle",
@@ -347,12 +346,12 @@ fn note(film: &Film, outcome: &Outcome, is_solved: bool) -> String {
             "Solved for its rest, not stepped: {frames} frames in even parts of the displacement, as under a load that grows evenly."
         )
     } else {
-        let steps = outcome.engine.step();
+        let (steps, counts) = (outcome.engine.step(), film.clock.quantity);
         let between = film.times.get(1).zip(film.times.first()).map_or(1.0, |(second, first)| second - first);
         match between as usize {
-            0 | 1 => format!("Every step is shown: {frames} frames."),
+            0 | 1 => format!("Every {counts} is shown: {frames} frames."),
             every => format!(
-                "Of {steps} steps one in {every} is shown, {frames} frames (a page keeps at most {MOST_FRAMES}, fewer of a body whose frames are large); bonds that broke in between show at the next."
+                "Of {steps} {counts}s one in {every} is shown, {frames} frames (a page keeps at most {MOST_FRAMES}, fewer of a body whose frames are large); bonds that broke in between show at the next."
             ),
         }
     };
