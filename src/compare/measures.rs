@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use crate::flock::points::{Points, distance};
 use crate::material::cells::Cells;
 use crate::material::elastic::Elastic;
-use crate::material::stiffness::{ShapeError, element};
+use crate::material::stiffness::ShapeError;
 
 /// A rule's displacements beside the true ones. Keys ending in `_rel` and `_rel_l2` are fractions \[1\].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -92,8 +92,8 @@ pub fn von_mises(cells: &Cells, elastic: &Elastic, displacement: &Points) -> Vec
 
 /// Strain energy of the cells \[force length\] under displacements \[length\] of their corners.
 pub fn strain_energy(cells: &Cells, elastic: &Elastic, displacement: &Points) -> Result<f64, ShapeError> {
-    let elements: Result<Vec<_>, _> =
-        cells.shapes.iter().map(|shape| element(shape, elastic.stiffness())).collect();
+    let kinds = 0..cells.shapes.len();
+    let elements: Result<Vec<_>, _> = kinds.map(|kind| cells.element(kind, elastic.stiffness())).collect();
     let elements = elements?;
     let of_cell = |(cell, &kind): (&[u32], &u32)| {
         // Relative to the first corner: a translation must not cost digits.

@@ -37,6 +37,8 @@ pub struct Engine {
     leaders: Vec<Led>,
     /// The particles of `leaders`.
     led: Vec<usize>,
+    /// Single components that are led, by axis.
+    led_components: Vec<(Led, usize)>,
     /// Where particles that are led from outside will be after the next step.
     guided: Vec<(usize, [f64; 2])>,
     present: Points,
@@ -85,7 +87,9 @@ struct PresentNeighbours {
 
 impl Engine {
     pub fn new(plan: Plan) -> Self {
-        let Plan { body, interaction, update, present_radius, roles, changes, cuts, cells, ramp, .. } = plan;
+        let Plan {
+            body, interaction, update, present_radius, roles, changes, cuts, cells, loads, ramp, ..
+        } = plan;
         let present_neighbours = present_radius.map(|radius| PresentNeighbours {
             radius,
             grid: CellGrid::default(),
@@ -103,13 +107,14 @@ impl Engine {
             changes,
             leaders: Vec::new(),
             led: Vec::new(),
+            led_components: Vec::new(),
             guided: Vec::new(),
             breaks: cuts,
             present_neighbours,
             activity: Activity::default(),
             step: 0,
             cells,
-            load: Load::new(ramp),
+            load: Load::new(ramp, loads),
             settled: None,
         };
         engine.follow_ramp();
@@ -117,7 +122,10 @@ impl Engine {
         for change in 0..engine.changes.len() {
             if engine.changes[change].from <= 1 && engine.changes[change].when.is_none() {
                 let all: Vec<usize> = (0..engine.changes[change].particles.len()).collect();
-                engine.start_leading(change, &all, 0);
+                match engine.changes[change].axis {
+                    None => engine.start_leading(change, &all, 0),
+                    Some(axis) => engine.lead_components(change, axis as usize),
+                }
             }
         }
         engine.after_role_change();
@@ -216,6 +224,7 @@ impl Engine {
             self.previous.clone_from(&self.present);
         }
         self.move_leaders();
+        self.move_components();
         self.sweep.step(&self.interaction, self.body.frame.as_ref(), &self.present, &mut self.previous);
         std::mem::swap(&mut self.present, &mut self.previous);
         self.activity.forget();
@@ -275,14 +284,8 @@ impl Engine {
         let waits = |change: &RoleChange| change.when.is_none() && change.from > self.step.max(1);
         self.changes.iter().any(waits)
             || self.load.is_growing(self.step)
-            || self.leaders.iter().any(|led| {
-                let duration = self.changes[led.change].motion.as_ref().map(|motion| motion.duration());
-                match duration {
-                    None => false,
-                    Some(None) => true,
-                    Some(Some(duration)) => led.since + duration > self.step,
-                }
-            })
+            || self.leaders.iter().any(|led| self.goes_on(led))
+            || self.moves_components()
     }
 
     /// Looks over the last step.
@@ -338,6 +341,45 @@ impl Engine {
             self.leaders.sort_unstable_by_key(|led| led.particle);
         }
         self.led = self.leaders.iter().map(|led| led.particle).collect();
+    }
+
+    /// Puts one component of a change's particles under its motion.
+    fn lead_components(&mut self, change: usize, axis: usize) {
+        let RoleChange { particles, motion, .. } = &self.changes[change];
+        if motion.is_some() {
+            let base = |particle: usize| self.body.reference.get(particle);
+            let led = |(which, &particle): (usize, &usize)| {
+                (Led { particle, change, which, since: 0, base: base(particle) }, axis)
+            };
+            self.led_components.extend(particles.iter().enumerate().map(led));
+        }
+    }
+
+    /// The rule keeps held components where their rest offsets say.
+    fn move_components(&mut self) {
+        let Some(rest) = &mut self.interaction.rest else { return };
+        for (led, axis) in &self.led_components {
+            if let Some(place) = led.place(&self.changes, self.step) {
+                let mut offset = rest.get(led.particle);
+                offset[*axis] = place[*axis];
+                rest.set(led.particle, offset);
+            }
+        }
+    }
+
+    /// Whether the motion of a single component goes on after this step.
+    fn moves_components(&self) -> bool {
+        self.led_components.iter().any(|(led, _)| self.goes_on(led))
+    }
+
+    /// Whether a leader's motion goes on after this step.
+    fn goes_on(&self, led: &Led) -> bool {
+        let duration = self.changes[led.change].motion.as_ref().map(|motion| motion.duration());
+        match duration {
+            None => false,
+            Some(None) => true,
+            Some(Some(duration)) => led.since + duration > self.step,
+        }
     }
 
     fn after_role_change(&mut self) {

@@ -5,7 +5,7 @@ mod increments;
 use std::ops::ControlFlow;
 
 use super::engine::Engine;
-use super::layout::held;
+use super::layout::{held, held_components};
 use super::plan::Plan;
 use super::run::{Outcome, StopReason, Watch, run_watched};
 use crate::flock::points::{Points, distance};
@@ -107,7 +107,8 @@ pub fn of_plan(scene: &Scene, plan: &Plan) -> Result<System, SceneError> {
 /// The same with the leaders where they are after so many steps.
 fn of_plan_after(scene: &Scene, plan: &Plan, steps: f64) -> Result<System, SceneError> {
     let held = held_after(plan, steps);
-    system(&plan.interaction, &plan.body, follows(plan), held).map_err(|error| {
+    let components = held_components(&plan.changes, &plan.body, steps);
+    system(&plan.interaction, &plan.body, follows(plan), held, &components).map_err(|error| {
         let (key, help) = match error {
             NotLinear::Rule { .. } => {
                 ("rule.mean", "leave [equilibrium] out: sweeps find where such a rule comes to rest")

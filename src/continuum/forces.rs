@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::engine::Engine;
+use super::layout::RoleChange;
 use crate::flock::block::apply;
 use crate::flock::interaction::{Interaction, Weights};
 use crate::flock::points::Points;
@@ -115,20 +116,16 @@ impl Forces {
 
     /// Reactions of the entries of `roles` that hold particles at present, in their order.
     pub fn reactions(&self, engine: &Engine) -> Vec<Reaction> {
-        let entries = (0..engine.changes().len()).zip(held(engine));
-        entries
-            .filter(|(_, held)| !held.is_empty())
-            .map(|(k, held)| self.reaction_of(engine, k, &held))
-            .collect()
+        let entries = held(engine).into_iter().enumerate().filter(|(_, held)| !held.is_empty());
+        entries.map(|(k, held)| self.reaction_of(engine, k, &held)).collect()
     }
 
-    fn reaction_of(&self, engine: &Engine, entry: usize, held: &[usize]) -> Reaction {
-        let mean = |points: &Points| held.iter().map(|&i| points.get(i)).collect::<Points>().middle();
+    fn reaction_of(&self, engine: &Engine, entry: usize, held: &[Held]) -> Reaction {
+        let mean =
+            |points: &Points| held.iter().map(|one| points.get(one.particle)).collect::<Points>().middle();
         let centre = mean(&engine.body().reference);
-
-        let force = held.iter().fold([0.0; 2], |sum, &i| plus(sum, self.reaction(i)));
         let moment = |about: [f64; 2]| {
-            let of = |&i: &usize| cross(minus(self.places.get(i), about), self.reaction(i));
+            let of = |one: &Held| cross(minus(self.places.get(one.particle), about), self.held_by(*one));
             held.iter().map(of).sum::<f64>()
         };
         Reaction {
@@ -137,22 +134,38 @@ impl Forces {
             particles: held.len(),
             centre,
             displacement: mean(&self.displacement),
-            force,
+            force: held.iter().fold([0.0; 2], |sum, &one| plus(sum, self.held_by(one))),
             moment: moment(centre),
             moment_about_origin: moment([0.0; 2]),
         }
     }
 
+    /// The reaction along the components that are held.
+    fn held_by(&self, one: Held) -> [f64; 2] {
+        let reaction = self.reaction(one.particle);
+        [0, 1].map(|axis| if one.axes[axis] { reaction[axis] } else { 0.0 })
+    }
+
     /// What the loads add up to; `None` without loads.
     pub fn load(&self, engine: &Engine) -> Option<LoadResultant> {
-        let whole = engine.whole_load()?;
-        let sum = |forces: &Points| forces.iter().fold([0.0; 2], plus);
-        let moments = self.places.iter().zip(self.loads.iter()).map(|(at, force)| cross(at, force));
-        let [x, y] = sum(whole);
+        engine.whole_load().map(|whole| self.resultant(engine, whole))
+    }
+
+    /// What each load adds up to.
+    pub fn each_load(&self, engine: &Engine) -> Vec<LoadResultant> {
+        engine.each_load().iter().map(|whole| self.resultant(engine, whole)).collect()
+    }
+
+    /// Of the part of a load that is on the body.
+    fn resultant(&self, engine: &Engine, whole: &Points) -> LoadResultant {
+        let factor = engine.load_factor();
+        let [x, y] = whole.iter().fold([0.0; 2], plus);
+        let moments = self.places.iter().zip(whole.iter()).map(|(at, force)| cross(at, force));
         let (size, most) = (f64::hypot(x, y), whole.iter().map(|[x, y]| f64::hypot(x, y)).sum::<f64>());
         // Forces that cancel leave rounding.
         let displacement = (size > 1e-9 * most).then(|| work(whole, &self.displacement) / size);
-        Some(LoadResultant { force: sum(&self.loads), moment_about_origin: moments.sum(), displacement })
+        let force = [factor * x, factor * y];
+        LoadResultant { force, moment_about_origin: factor * moments.sum::<f64>(), displacement }
     }
 
     /// The loads, as they are now, times the displacements \[force length\].
@@ -162,14 +175,24 @@ impl Forces {
 
     /// The reactions, as they are now, times the displacements \[force length\].
     pub fn work_of_supports(&self, engine: &Engine) -> f64 {
-        let held = (0..engine.roles().len()).filter(|&i| is_held(engine.roles()[i]));
-        held.map(|i| dot(self.reaction(i), self.displacement.get(i))).sum()
+        let work = |one: Held| dot(self.held_by(one), self.displacement.get(one.particle));
+        held(engine).into_iter().flatten().map(work).sum()
     }
 
-    /// The largest force that is left on a follower \[force\]: none where the body is at rest.
+    /// The largest force that is left on a follower, along components that are free \[force\]: none where the body is
+    /// at rest.
     pub fn largest_left(&self, engine: &Engine) -> f64 {
-        let followers = (0..engine.roles().len()).filter(|&i| engine.roles()[i] == Role::Follower);
-        followers.map(|i| self.left_on(i)).map(|[x, y]| f64::hypot(x, y)).fold(0.0, f64::max)
+        let mut free = vec![[true; 2]; engine.roles().len()];
+        for Held { particle, axes } in held(engine).into_iter().flatten() {
+            (0..2).filter(|&axis| axes[axis]).for_each(|axis| free[particle][axis] = false);
+        }
+        let left = |i: usize| {
+            let left = self.left_on(i);
+            let [x, y] = [0, 1].map(|axis| if free[i][axis] { left[axis] } else { 0.0 });
+            f64::hypot(x, y)
+        };
+        let followers = (0..free.len()).filter(|&i| engine.roles()[i] == Role::Follower);
+        followers.map(left).fold(0.0, f64::max)
     }
 }
 
@@ -177,26 +200,39 @@ fn work(forces: &Points, displacement: &Points) -> f64 {
     forces.iter().zip(displacement.iter()).map(|(force, by)| dot(force, by)).sum()
 }
 
-fn is_held(role: Role) -> bool {
-    matches!(role, Role::Leader | Role::Clamped)
+/// A particle that is held along these axes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Held {
+    pub particle: usize,
+    pub axes: [bool; 2],
 }
 
-/// The particles that each role change holds at present: the last one that named them, by its step.
-pub fn held(engine: &Engine) -> Vec<Vec<usize>> {
+/// What each role change holds at present, shape \[changes\]: of several that name a particle or a component of it the
+/// last one, by its step.
+pub fn held(engine: &Engine) -> Vec<Vec<Held>> {
     let (changes, roles) = (engine.changes(), engine.roles());
-    let mut order: Vec<usize> = (0..changes.len()).filter(|&k| is_held(changes[k].role)).collect();
-    order.retain(|&k| changes[k].from <= engine.step().max(1));
+    let mut order: Vec<usize> =
+        (0..changes.len()).filter(|&k| changes[k].from <= engine.step().max(1)).collect();
     order.sort_by_key(|&k| changes[k].from);
-    let mut holder = vec![None; roles.len()];
+    let mut holder = vec![[None; 2]; roles.len()];
     for k in order {
-        for &i in changes[k].particles.iter().filter(|&&i| roles[i] == changes[k].role) {
-            holder[i] = Some(k);
+        let RoleChange { particles, role, axis, .. } = &changes[k];
+        // A particle of which one component is held follows along the other.
+        let present = if axis.is_some() { Role::Follower } else { *role };
+        for &i in particles.iter().filter(|&&i| roles[i] == present) {
+            match axis {
+                Some(axis) => holder[i][*axis as usize] = Some(k),
+                None if matches!(role, Role::Leader | Role::Clamped) => holder[i] = [Some(k); 2],
+                None => holder[i] = [None; 2],
+            }
         }
     }
     let mut held = vec![Vec::new(); changes.len()];
-    for (i, k) in holder.into_iter().enumerate() {
-        if let Some(k) = k {
-            held[k].push(i);
+    for (particle, by) in holder.into_iter().enumerate() {
+        let mut entries: Vec<usize> = by.into_iter().flatten().collect();
+        entries.dedup();
+        for k in entries {
+            held[k].push(Held { particle, axes: by.map(|holder| holder == Some(k)) });
         }
     }
     held

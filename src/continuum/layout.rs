@@ -1,15 +1,22 @@
 //! From a scene to its body: particles, who sees whom, the cells between them, and who has which role.
 
-use crate::flock::body::{Body, BodyError};
+use std::collections::BTreeMap;
+
+use crate::flock::body::{Body, BodyError, Cut};
 use crate::flock::motion::Motion;
 use crate::flock::neighbourhood::{Neighbourhood, Neighbours};
 use crate::flock::points::{Points, distance};
 use crate::flock::region::{Region, Side};
 use crate::flock::role::Role;
-use crate::flock::rules::Mean;
+use crate::flock::rules::{Axis, Mean};
+use crate::geometry::outline::{Outline, OutlineError, Place};
+use crate::geometry::portion::{Portion, Selection};
 use crate::material::cells::{Cells, without_loose_sites};
-use crate::material::loads::{LoadError, Loads, Traction};
+use crate::material::fit::{FitError, Fitted, fit};
+use crate::material::loads::{Loads, Traction};
+use crate::material::outline_loads::{self, Loader, OutlineLoad, Push};
 use crate::scene::{BodySource, Condition, LeaderMotion, Load, RoleEntry, Scene, SceneError, SceneRegion};
+use crate::solve::linear::HeldComponent;
 
 /// Where finite elements have points of the body: their displacements \[length\] at these reference
 /// places \[length\], shape \[count\].
@@ -22,6 +29,8 @@ pub struct Layout {
     pub neighbours: Neighbours,
     /// Between the particles, where the scene has a material.
     pub cells: Option<Cells>,
+    /// The outline of the body's shape; none where the shape has none that bounds an area, and for points.
+    pub outline: Option<Outline>,
 }
 
 /// A role that some particles take.
@@ -29,6 +38,8 @@ pub struct Layout {
 pub struct RoleChange {
     pub particles: Vec<usize>,
     pub role: Role,
+    /// The one component that is held or led while the particles follow along the other.
+    pub axis: Option<Axis>,
     /// First step at which it holds.
     pub from: usize,
     pub when: Option<Condition>,
@@ -42,26 +53,15 @@ impl Layout {
     /// neighbourhood that does not fit the lattice.
     pub fn new(scene: &Scene) -> Result<Self, SceneError> {
         require_in_range(scene)?;
-        let (body, neighbours) = body_of(scene).map_err(|error| refuse_body(scene, &error))?;
-        require_resolved(scene, &body)?;
-        let layout = match scene.mean {
-            Mean::Material { .. } => {
-                // Sites in no cell carry nothing; they stick out of a curved edge.
-                let (body, neighbours, cells) = without_loose_sites(&body, &neighbours);
-                if body.count() == 0 {
-                    let message = "the body has no cell of the lattice, so there is no material";
-                    return Err(scene.refuse(
-                        "body.shape",
-                        message,
-                        "use a smaller spacing or a larger shape",
-                    ));
-                }
-                Self { body, neighbours, cells: Some(cells) }
+        let fitted = fitted(scene)?;
+        let layout = match fitted {
+            Some((fitted, outline)) if !is_all_lattice(&fitted.body) => {
+                let Fitted { body, cells } = fitted;
+                require_resolved(scene, &body)?;
+                let neighbours = cells.mates(body.count());
+                Self { body, neighbours, cells: Some(cells), outline: Some(outline) }
             }
-            _ => {
-                let cells = scene.material.as_ref().map(|_| Cells::of_body(&body));
-                Self { body, neighbours, cells }
-            }
+            of_lattice => Self::of_whole_cells(scene, of_lattice)?,
         };
         if !matches!(scene.neighbourhood, Neighbourhood::Present { .. }) {
             layout.body.require_connected(&layout.neighbours).map_err(|error| {
@@ -71,6 +71,38 @@ impl Layout {
             })?;
         }
         Ok(layout)
+    }
+
+    /// A body of whole cells, or of particles alone; one that fits its outline as it is keeps that.
+    fn of_whole_cells(scene: &Scene, fitted: Option<(Fitted, Outline)>) -> Result<Self, SceneError> {
+        let (body, neighbours) = body_of(scene).map_err(|error| refuse_body(scene, &error))?;
+        require_resolved(scene, &body)?;
+        let (mut body, neighbours, cells) = match scene.mean {
+            Mean::Material { .. } => {
+                // Sites in no cell carry nothing; they stick out of a curved edge.
+                let (body, neighbours, cells) = without_loose_sites(&body, &neighbours);
+                if body.count() == 0 {
+                    let message = "the body has no cell of the lattice, so there is no material";
+                    let help = "use a smaller spacing or a larger shape";
+                    return Err(scene.refuse("body.shape", message, help));
+                }
+                (body, neighbours, Some(cells))
+            }
+            _ => {
+                let cells = scene.material.as_ref().map(|_| Cells::of_body(&body));
+                (body, neighbours, cells)
+            }
+        };
+        let outline = match (&scene.body, &cells, fitted) {
+            (_, _, Some((fitted, outline))) if fitted.body.sites == body.sites => {
+                body.outline = fitted.body.outline;
+                Some(outline)
+            }
+            (BodySource::Cut(Cut::Shape(shape)), ..) => Outline::of_shape(shape).ok(),
+            (BodySource::Cut(Cut::Count { .. }), Some(cells), _) => cells.outline(&body.reference).ok(),
+            _ => None,
+        };
+        Ok(Self { body, neighbours, cells, outline })
     }
 
     /// Who takes which role when, in the order in which it is written. Leaders led by the truth have no
@@ -86,7 +118,8 @@ impl Layout {
         let change = |(k, entry): (usize, &RoleEntry)| {
             let particles = self.pick(scene, &format!("roles[{k}]"), &entry.region)?;
             let motion = self.motion(scene, k, entry, &particles, truth)?;
-            Ok(RoleChange { particles, role: entry.role, from: entry.from, when: entry.when, motion })
+            let RoleEntry { role, axis, from, when, .. } = *entry;
+            Ok(RoleChange { particles, role, axis, from, when, motion })
         };
         scene.roles.iter().enumerate().map(change).collect()
     }
@@ -96,17 +129,156 @@ impl Layout {
     /// # Errors
     /// Names the load that has nothing to act on.
     pub fn forces(&self, scene: &Scene) -> Result<Option<Points>, SceneError> {
-        let Some(cells) = &self.cells else { return Ok(None) };
+        Ok(total(&self.forces_by_load(scene)?))
+    }
+
+    /// Forces of each of the scene's loads on the particles \[force\], shape \[loads\]\[count\]; none without a
+    /// material.
+    ///
+    /// # Errors
+    /// Names the load that has nothing to act on.
+    pub fn forces_by_load(&self, scene: &Scene) -> Result<Vec<Points>, SceneError> {
+        let Some(cells) = &self.cells else { return Ok(Vec::new()) };
         if scene.loads.is_empty() {
-            return Ok(None);
+            return Ok(Vec::new());
         }
-        self.loads(scene)?.on_particles(cells, &self.body.reference).map(Some).map_err(|error| {
-            let help = match error {
-                LoadError::NotFinite => "give finite numbers",
-                _ => "move the region onto particles that belong to cells",
-            };
-            scene.refuse("loads", error.to_string(), help)
+        let loader = Loader::new(cells, &self.body, self.outline.as_ref());
+        let of_load = |k: usize| {
+            let mut forces = Points::zeros(self.body.count());
+            loader.add(&self.load(scene, k)?, &mut forces).map_err(|error| {
+                let help = match error {
+                    outline_loads::LoadError::NotFinite => "give finite numbers",
+                    _ => "move the region onto particles that belong to cells",
+                };
+                scene.refuse(&format!("loads[{k}]"), error.to_string(), help)
+            })?;
+            Ok(forces)
+        };
+        (0..scene.loads.len()).map(of_load).collect()
+    }
+
+    /// What one of the scene's loads acts on.
+    ///
+    /// # Errors
+    /// Names a load whose region holds no particle or no part of the outline.
+    pub fn load(&self, scene: &Scene, number: usize) -> Result<outline_loads::Load, SceneError> {
+        let thickness = scene.material.as_ref().map_or(1.0, |elastic| elastic.thickness());
+        let key = format!("loads[{number}]");
+        Ok(match &scene.loads[number] {
+            Load::Outline { region, push, profile } => {
+                let portions = self.portions(scene, &key, region)?;
+                let push = match push {
+                    Push::Traction(traction) => Push::Traction(traction.map(|t| t * thickness)),
+                    Push::Pressure(pressure) => Push::Pressure(pressure * thickness),
+                };
+                outline_loads::Load::Outline(OutlineLoad { portions, push, profile: *profile })
+            }
+            Load::Force { region, force } => {
+                let particles = self.pick(scene, &key, region)?;
+                let particles = particles.into_iter().map(|i| i as u32).collect();
+                outline_loads::Load::Particles { particles, force: *force }
+            }
+            Load::Body { force } => outline_loads::Load::Body(force.map(|f| f * thickness)),
         })
+    }
+
+    /// The parts of the outline in the region that stands at `key`.
+    ///
+    /// # Errors
+    /// Names a region without any, and a shape that has no outline.
+    pub fn portions(
+        &self,
+        scene: &Scene,
+        key: &str,
+        region: &SceneRegion,
+    ) -> Result<Vec<Portion>, SceneError> {
+        let key = format!("{key}.region");
+        check_ids(scene, &key, region, &self.body)?;
+        let Some(outline) = &self.outline else {
+            let message = "the shape has no outline that bounds one area: it crosses or touches itself";
+            return Err(scene.refuse("body.shape", message, "mend the shape and its holes"));
+        };
+        check_pieces(scene, &key, region, outline)?;
+        let portions = self.portions_of(region, outline);
+        if portions.is_empty() {
+            let (low, high) = outline.bounds();
+            let message = format!(
+                "no part of the outline lies in this region; the shape spans [{}, {}] to [{}, {}]",
+                low[0], low[1], high[0], high[1]
+            );
+            let help = "move or widen the region; a curved side needs a depth";
+            return Err(scene.refuse(&key, message, help));
+        }
+        Ok(portions)
+    }
+
+    fn portions_of(&self, region: &SceneRegion, outline: &Outline) -> Vec<Portion> {
+        let spacing = self.body.lattice.spacing();
+        let grain = 1e-9 * spacing;
+        let (low, high) = outline.bounds();
+        let band = |side: Side, depth: f64| {
+            let (mut min, mut max) = (low, high);
+            match side {
+                Side::Left => max[0] = low[0] + depth,
+                Side::Right => min[0] = high[0] - depth,
+                Side::Bottom => max[1] = low[1] + depth,
+                Side::Top => min[1] = high[1] - depth,
+            }
+            outline.portions(&Selection::Box { min, max }, grain)
+        };
+        match region {
+            SceneRegion::Outline(selection) => outline.portions(selection, grain),
+            SceneRegion::Outermost(side) => match band(*side, 0.0) {
+                // Across the ends of a flat side the depth of rounding reaches around its corners.
+                flat if flat.iter().any(|portion| portion.length(outline) > 1e-6 * spacing) => {
+                    flat.into_iter().filter(|portion| portion.length(outline) > 1e-6 * spacing).collect()
+                }
+                _ => band(*side, outermost_depth(*side, &self.body)),
+            },
+            SceneRegion::Known(region) => match region {
+                Region::All | Region::Boundary => outline.portions(&Selection::All, grain),
+                Region::Edge { side, depth } => band(*side, *depth),
+                Region::Box { min, max } => outline.portions(&Selection::Box { min: *min, max: *max }, grain),
+                Region::Disc { centre, radius } => {
+                    outline.portions(&Selection::Disc { centre: *centre, radius: *radius }, grain)
+                }
+                Region::Ids(_) => self.portions_between(&region.pick(&self.body, &self.neighbours), outline),
+            },
+        }
+    }
+
+    /// The outline along those sides of the cells' boundary both of whose particles are given.
+    fn portions_between(&self, particles: &[usize], outline: &Outline) -> Vec<Portion> {
+        let Some(cells) = &self.cells else { return Vec::new() };
+        let mut inside = vec![false; self.body.count()];
+        particles.iter().for_each(|&i| inside[i] = true);
+        let sides = cells.boundary_sides(&cells.incidence(self.body.count())).into_iter();
+        let sides = sides.filter(|side| side.iter().all(|&i| inside[i as usize]));
+        let ends = sides.map(|side| side.map(|i| self.body.reference.get(i as usize)));
+        let grain = 1e-9 * self.body.lattice.spacing();
+        ends.flat_map(|[from, to]| outline.portions(&Selection::Between { from, to }, grain)).collect()
+    }
+
+    /// The particles on parts of the outline, or, of a body of whole cells, nearest to them, ascending.
+    fn pick_along(&self, selection: &Selection, outline: &Outline) -> Vec<usize> {
+        let near = 1e-6 * self.body.lattice.spacing();
+        let portions = outline.portions(selection, 0.0);
+        let candidates: Vec<(usize, Place)> = match &self.body.outline {
+            Some(known) => (0..self.body.count()).filter_map(|i| Some((i, known.places[i]?))).collect(),
+            None => {
+                let boundary = Region::Boundary.pick(&self.body, &self.neighbours).into_iter();
+                boundary.map(|i| (i, outline.nearest(self.body.reference.get(i)).0)).collect()
+            }
+        };
+        let is_on = |place: &Place| {
+            let p = outline.point(*place);
+            portions.iter().any(|portion| {
+                let piece = outline.piece(portion.ring, portion.piece);
+                let t = piece.nearest(p).clamp(portion.t[0], portion.t[1]);
+                distance(piece.point(t), p) <= near
+            })
+        };
+        candidates.into_iter().filter(|(_, place)| is_on(place)).map(|(i, _)| i).collect()
     }
 
     /// The scene's loads on the sides and particles that they act on; none without a material.
@@ -119,11 +291,12 @@ impl Layout {
         let thickness = elastic.thickness();
         for (k, load) in scene.loads.iter().enumerate() {
             match load {
-                Load::Traction { region, traction } => {
+                Load::Outline { region, push: Push::Traction(traction), .. } => {
                     let sides = self.boundary_sides(scene, k, region, cells)?;
                     let traction = traction.map(|t| t * thickness);
                     loads.tractions.extend(sides.into_iter().map(|side| Traction::uniform(side, traction)));
                 }
+                Load::Outline { .. } => {}
                 Load::Force { region, force } => {
                     let particles = self.pick(scene, &format!("loads[{k}]"), region)?;
                     loads.forces.extend(particles.into_iter().map(|i| (i as u32, *force)));
@@ -163,7 +336,18 @@ impl Layout {
     pub fn pick(&self, scene: &Scene, key: &str, region: &SceneRegion) -> Result<Vec<usize>, SceneError> {
         let key = format!("{key}.region");
         check_ids(scene, &key, region, &self.body)?;
-        let particles = known_region(region, &self.body).pick(&self.body, &self.neighbours);
+        let particles = match (region, &self.outline) {
+            (SceneRegion::Outline(selection), Some(outline)) => {
+                check_pieces(scene, &key, region, outline)?;
+                self.pick_along(selection, outline)
+            }
+            (SceneRegion::Outline(_), None) => {
+                let message = "the body has no outline of its own";
+                return Err(scene.refuse(&key, message, "pick the particles by place or by id"));
+            }
+            (SceneRegion::Known(region), _) => region.pick(&self.body, &self.neighbours),
+            (SceneRegion::Outermost(side), _) => self.outermost(*side),
+        };
         if particles.is_empty() {
             let (low, high) = self.body.bounds();
             let message = format!(
@@ -173,6 +357,19 @@ impl Layout {
             return Err(scene.refuse(&key, message, "move or widen the region"));
         }
         Ok(particles)
+    }
+
+    /// The particles at the outermost coordinate on a side; of a body that has no flat side there, those about half
+    /// a spacing deep.
+    fn outermost(&self, side: Side) -> Vec<usize> {
+        let within = |depth: f64| Region::Edge { side, depth }.pick(&self.body, &self.neighbours);
+        if self.body.outline.is_some() {
+            let flat = within(1e-6 * self.body.lattice.spacing());
+            if flat.len() > 1 {
+                return flat;
+            }
+        }
+        within(outermost_depth(side, &self.body))
     }
 
     fn motion(
@@ -205,6 +402,17 @@ impl Layout {
     }
 }
 
+/// The forces of all loads together \[force\], shape \[count\]; `None` without loads.
+pub fn total(loads: &[Points]) -> Option<Points> {
+    let (first, others) = loads.split_first()?;
+    let mut sum = first.clone();
+    for forces in others {
+        sum.x.iter_mut().zip(&forces.x).for_each(|(sum, f)| *sum += f);
+        sum.y.iter_mut().zip(&forces.y).for_each(|(sum, f)| *sum += f);
+    }
+    Some(sum)
+}
+
 fn body_of(scene: &Scene) -> Result<(Body, Neighbours), BodyError> {
     match (&scene.body, &scene.neighbourhood) {
         (BodySource::Cut(cut), neighbourhood) => {
@@ -220,7 +428,7 @@ fn body_of(scene: &Scene) -> Result<(Body, Neighbours), BodyError> {
 pub fn held(changes: &[RoleChange], body: &Body, step: f64) -> Vec<Option<[f64; 2]>> {
     let mut held = vec![None; body.count()];
     for change in changes.iter().filter(|change| change.from <= 1 && change.when.is_none()) {
-        for (which, &i) in change.particles.iter().enumerate() {
+        for (which, &i) in change.particles.iter().enumerate().filter(|_| change.axis.is_none()) {
             let base = body.reference.get(i);
             held[i] = match (change.role, &change.motion) {
                 (Role::Leader, Some(motion)) => Some(motion.displacement(step, which, base)),
@@ -230,6 +438,30 @@ pub fn held(changes: &[RoleChange], body: &Body, step: f64) -> Vec<Option<[f64; 
         }
     }
     held
+}
+
+/// The single components that are held at `step`, by particle and axis; later roles win, and none of a particle that is
+/// held altogether.
+pub fn held_components(changes: &[RoleChange], body: &Body, step: f64) -> Vec<HeldComponent> {
+    let mut components: BTreeMap<(usize, usize), f64> = BTreeMap::new();
+    for change in changes.iter().filter(|change| change.from <= 1 && change.when.is_none()) {
+        for (which, &i) in change.particles.iter().enumerate() {
+            let Some(axis) = change.axis else {
+                components.retain(|(particle, _), _| *particle != i);
+                continue;
+            };
+            let moved = match &change.motion {
+                Some(motion) => motion.displacement(step, which, body.reference.get(i)),
+                None => [0.0; 2],
+            };
+            components.insert((i, axis as usize), moved[axis as usize]);
+        }
+    }
+    let component = |((particle, axis), displacement)| {
+        let axis = if axis == 0 { Axis::X } else { Axis::Y };
+        HeldComponent { particle, axis, displacement }
+    };
+    components.into_iter().map(component).collect()
 }
 
 /// Least spacing over the distance of two doubles at the body's largest coordinate: six digits of a
@@ -316,11 +548,64 @@ pub(super) fn no_particle(id: usize, body: &Body) -> String {
     format!("there is no particle {id}: ids run from {low} to {high}")
 }
 
-fn known_region(region: &SceneRegion, body: &Body) -> Region {
-    match region {
-        SceneRegion::Known(region) => region.clone(),
-        SceneRegion::Outermost(side) => Region::Edge { side: *side, depth: outermost_depth(*side, body) },
+/// Refuses a hole or a piece that the outline does not have.
+fn check_pieces(scene: &Scene, key: &str, region: &SceneRegion, outline: &Outline) -> Result<(), SceneError> {
+    let SceneRegion::Outline(Selection::Pieces { ring, pieces, .. }) = region else { return Ok(()) };
+    let rings = outline.rings();
+    if *ring >= rings.len() {
+        let message = match rings.len() - 1 {
+            0 => "the body has no holes".to_owned(),
+            holes => format!("there is no hole {ring}: the body has {holes}"),
+        };
+        return Err(scene.refuse(&format!("{key}.hole"), message, "count body.holes from 1"));
     }
+    let has = |number: usize| rings[*ring].iter().any(|piece| piece.number == number);
+    match pieces.iter().position(|&number| !has(number)) {
+        None => Ok(()),
+        Some(k) => {
+            let most = rings[*ring].iter().map(|piece| piece.number + 1).max().unwrap_or(0);
+            let message = format!("there is no piece {}: they run from 1 to {most}", pieces[k] + 1);
+            Err(scene.refuse(&format!("{key}.pieces[{k}]"), message, "`flockform plan` prints the pieces"))
+        }
+    }
+}
+
+/// The body fitted to its outline, where the scene asks for that.
+///
+/// # Errors
+/// Names what in the shape has no outline that cells can follow.
+fn fitted(scene: &Scene) -> Result<Option<(Fitted, Outline)>, SceneError> {
+    let (true, BodySource::Cut(Cut::Shape(shape))) = (scene.is_fitted, &scene.body) else { return Ok(None) };
+    let outline = Outline::of_shape(shape).map_err(|error| refuse_outline(scene, &error))?;
+    let fitted = fit(&scene.lattice, &outline).map_err(|error| {
+        let help = match error {
+            FitError::TooLarge { .. } => "use a wider spacing or a smaller shape",
+            _ => "use a smaller spacing, leave the detail out, or set body.outline = \"lattice\"",
+        };
+        scene.refuse("body.shape", error.to_string(), help)
+    })?;
+    Ok(Some((fitted, outline)))
+}
+
+fn refuse_outline(scene: &Scene, error: &OutlineError) -> SceneError {
+    let (key, help) = match error {
+        OutlineError::Touching { rings: [_, hole], .. }
+        | OutlineError::Outside { hole, .. }
+        | OutlineError::Nested { inner: hole, .. } => (
+            format!("body.holes[{}]", hole - 1),
+            "keep holes inside and apart, draw a notch as part of a polygon, or set body.outline = \"lattice\"",
+        ),
+        OutlineError::SelfCrossing { ring, .. } | OutlineError::NoArea { ring } => {
+            let key = if *ring == 0 { "body.shape".into() } else { format!("body.holes[{}]", ring - 1) };
+            (key, "give its corners in order, once around")
+        }
+    };
+    scene.refuse(&key, error.to_string(), help)
+}
+
+/// Whether every particle stands where the lattice has it.
+fn is_all_lattice(body: &Body) -> bool {
+    body.outline.as_ref().is_none_or(|outline| outline.regular == body.count())
 }
 
 /// Deep enough for a staggered edge: less than one period of the lattice's rows across the side.

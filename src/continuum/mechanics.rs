@@ -18,7 +18,7 @@ const SMALL_TURN: f64 = std::f64::consts::PI / 18.0;
 /// Forces, energy and stress of a body with a material.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Mechanics {
-    /// Of each entry of `loads`, where it is known.
+    /// Of each entry of `loads`; empty where the rule has no stiffness.
     pub loads: Vec<LoadResultant>,
     /// Of all loads together.
     pub load: Option<LoadResultant>,
@@ -118,7 +118,7 @@ impl Mechanics {
         let finite =
             |values: &mut dyn Iterator<Item = f64>| values.filter(|v| v.is_finite()).fold(0.0, f64::max);
         Some(Self {
-            loads: Vec::new(),
+            loads: forces.as_ref().map_or_else(Vec::new, |forces| forces.each_load(engine)),
             load: forces.as_ref().and_then(|forces| forces.load(engine)),
             reactions: forces.as_ref().map_or_else(Vec::new, |forces| forces.reactions(engine)),
             strain_energy: strain_energy(engine, elastic, forces.as_ref(), &u),

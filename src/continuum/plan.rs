@@ -1,17 +1,21 @@
 //! From a scene to the arrays that an engine steps, with the checks that need the body.
 
-use super::layout::{Layout, RoleChange, Truth, no_particle};
+use std::collections::BTreeMap;
+
+use super::layout::{Layout, RoleChange, Truth, held_components, no_particle, total};
 use super::weights;
 use crate::flock::body::Body;
 use crate::flock::fracture::{Bonds, Break, Ghosts};
-use crate::flock::interaction::{Interaction, Weights};
+use crate::flock::interaction::{Interaction, MatrixWeights, Weights};
 use crate::flock::neighbourhood::{Neighbourhood, Neighbours};
 use crate::flock::points::{Points, distance};
 use crate::flock::role::Role;
 use crate::flock::rules::{Axis, Mean, Poisson, Rule};
+use crate::geometry::outline::Outline;
 use crate::material::cells::Cells;
 use crate::material::mechanism::require_held;
 use crate::scene::{LoadSteps, Scene, SceneError, Stop};
+use crate::solve::linear::HeldComponent;
 use crate::solve::sweep::Update;
 
 /// Everything an engine needs; nothing of it refers to the scene file.
@@ -35,8 +39,12 @@ pub struct Plan {
     pub probes: Vec<usize>,
     /// Between the particles, where the scene has a material.
     pub cells: Option<Cells>,
+    /// Forces of each load on the particles \[force\], shape \[loads\]\[count\]; their sum is the interaction's.
+    pub loads: Vec<Points>,
     /// Steps over which the loads grow; they act from the first one on where there is no ramp.
     pub ramp: Option<usize>,
+    /// The outline of the body's shape, where it has one.
+    pub outline: Option<Outline>,
 }
 
 impl Plan {
@@ -64,11 +72,15 @@ impl Plan {
     fn lay_out(scene: &Scene, truth: Option<Truth<'_>>) -> Result<Self, SceneError> {
         let layout = Layout::new(scene)?;
         let changes = layout.role_changes(scene, truth)?;
-        let forces = layout.forces(scene)?;
+        let loads = layout.forces_by_load(scene)?;
+        let forces = total(&loads);
         require_carried(scene, &layout, &changes, forces.as_ref())?;
-        let Layout { body, neighbours, cells } = layout;
+        let Layout { body, neighbours, cells, outline } = layout;
         let follows = ever_follow(&body, &changes);
-        let weights = weights::of_body(scene, &body, &neighbours, cells.as_ref(), &follows)?;
+        let mut weights = weights::of_body(scene, &body, &neighbours, cells.as_ref(), &follows)?;
+        if let Weights::Matrix(weights) = &mut weights {
+            hold_components(weights, &held_components(&changes, &body, 0.0));
+        }
         let interaction = interaction(scene, &body, neighbours, weights, forces);
         let probes = probes(scene, &body)?;
         let roles = body.is_frame.iter().map(|&f| if f { Role::Frame } else { Role::Follower }).collect();
@@ -87,10 +99,12 @@ impl Plan {
             diagonal: distance(low, high).max(body.lattice.spacing()),
             probes,
             cells,
+            loads,
             ramp: match scene.load_steps {
                 Some(LoadSteps::Stepped { ramp, .. }) => ramp,
                 _ => None,
             },
+            outline,
             body,
             interaction,
         };
@@ -111,7 +125,9 @@ impl Plan {
             diagonal: distance(low, high).max(body.lattice.spacing()),
             probes: Vec::new(),
             cells: None,
+            loads: Vec::new(),
             ramp: None,
+            outline: None,
             body,
             interaction,
             update,
@@ -133,7 +149,9 @@ impl Plan {
 
     /// Roles without a condition that hold from the first step are those the plan starts with.
     fn take_first_roles(&mut self) {
-        for change in self.changes.iter().filter(|change| change.from <= 1 && change.when.is_none()) {
+        let at_once =
+            |change: &&RoleChange| change.from <= 1 && change.when.is_none() && change.axis.is_none();
+        for change in self.changes.iter().filter(at_once) {
             for &i in &change.particles {
                 self.roles[i] = change.role;
             }
@@ -144,7 +162,7 @@ impl Plan {
 /// Who follows at any time: all but those who are led or clamped from the start and for good, shape \[count\].
 fn ever_follow(body: &Body, changes: &[RoleChange]) -> Vec<bool> {
     let mut follows: Vec<bool> = body.is_frame.iter().map(|frame| !frame).collect();
-    for change in changes {
+    for change in changes.iter().filter(|change| change.axis.is_none()) {
         let at_once = change.from <= 1 && change.when.is_none();
         for &i in &change.particles {
             follows[i] = change.role == Role::Follower || (follows[i] && !at_once);
@@ -161,13 +179,18 @@ fn require_carried(
     forces: Option<&Points>,
 ) -> Result<(), SceneError> {
     let (Some(cells), Some(forces)) = (&layout.cells, forces) else { return Ok(()) };
-    let mut leads = vec![false; layout.body.count()];
+    let mut leads = vec![[false; 2]; layout.body.count()];
     for change in changes.iter().filter(|change| change.from <= 1 && change.when.is_none()) {
         let is_led = matches!(change.role, Role::Leader | Role::Clamped);
-        change.particles.iter().for_each(|&i| leads[i] = is_led);
+        for &i in &change.particles {
+            match change.axis {
+                None => leads[i] = [is_led; 2],
+                Some(axis) => leads[i][axis as usize] = is_led,
+            }
+        }
     }
     if !matches!(scene.mean, Mean::Material { .. }) {
-        let Some(i) = (0..leads.len()).find(|&i| !leads[i] && forces.get(i) != [0.0; 2]) else {
+        let Some(i) = (0..leads.len()).find(|&i| leads[i] != [true; 2] && forces.get(i) != [0.0; 2]) else {
             return Ok(());
         };
         let message =
@@ -178,8 +201,22 @@ fn require_carried(
     }
     let incidence = cells.incidence(layout.body.count());
     require_held(cells, &incidence, &layout.body.reference, &leads).map_err(|mechanism| {
-        scene.refuse("roles", mechanism.to_string(), "clamp or lead at least two particles of every part")
+        scene.refuse(
+            "roles",
+            mechanism.to_string(),
+            "clamp or lead at least two particles of every part, or components that keep it from moving",
+        )
     })
+}
+
+/// Takes held components out of the rule: the particles keep them, and what is left of their weights moves the other
+/// component alone. Solvers are told of them by themselves ([`crate::solve::linear::system`]).
+fn hold_components(weights: &mut MatrixWeights, held: &[HeldComponent]) {
+    let mut axes: BTreeMap<usize, [bool; 2]> = BTreeMap::new();
+    for component in held {
+        axes.entry(component.particle).or_default()[component.axis as usize] = true;
+    }
+    axes.into_iter().for_each(|(particle, held)| weights.hold(particle, held));
 }
 
 fn interaction(

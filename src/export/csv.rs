@@ -2,7 +2,7 @@
 //! `breaks.csv`, every broken bond; `residuals.csv`, how a solver came to rest.
 //!
 //! Ids count from 1, columns and rows from the lowest site, frame included, which is the paper's
-//! numbering; a body given as points has its own ids and order, and no columns. Numbers are the shortest that read back as the same.
+//! numbering; a body given as points has its own ids and order, and no columns; nor have particles along an outline. Numbers are the shortest that read back as the same.
 
 use std::path::PathBuf;
 
@@ -87,13 +87,14 @@ pub fn write_final(
     stresses: Option<&[Option<StressState>]>,
 ) -> Result<PathBuf, ExportError> {
     let stress = |i: usize, k: usize| stresses.map(|all| all[i].map(|stress| stress.components[k]));
-    let lowest = |axis: usize| body.sites.iter().map(|site| i64::from(site[axis])).min().unwrap_or(0);
+    let of_lattice = |i: usize| body.numbering.is_none() && body.sites[i][0] != Body::ALONG_OUTLINE;
+    let at_sites = (0..body.count()).filter(|&i| of_lattice(i)).map(|i| body.sites[i]);
+    let lowest = |axis: usize| at_sites.clone().map(|site| i64::from(site[axis])).min().unwrap_or(0);
     let (first_column, first_row) = (lowest(0), lowest(1));
-    let on_lattice = |place: i64| Some(place).filter(|_| body.numbering.is_none());
     let rows = body.rows().map(|i| FinalRow {
         id: body.id(i),
-        column: on_lattice(i64::from(body.sites[i][0]) - first_column + 1),
-        row: on_lattice(i64::from(body.sites[i][1]) - first_row + 1),
+        column: of_lattice(i).then(|| i64::from(body.sites[i][0]) - first_column + 1),
+        row: of_lattice(i).then(|| i64::from(body.sites[i][1]) - first_row + 1),
         role: last.roles[i].name(),
         reference_x: body.reference.x[i],
         reference_y: body.reference.y[i],

@@ -6,6 +6,7 @@
 //! | `factor` | part of the loads that is on the body \[1\] |
 //! | `load.fx`, `load.fy`, `load.moment` | resultant of the loads, and its moment about the origin |
 //! | `load.displacement` | mean displacement along the resultant, weighted by the loads; empty where they cancel |
+//! | `loads[k].fx`, ... | the same of each load by itself, where there are several |
 //! | `roles[k].ux`, `.uy` | mean displacement of what the entry of `roles` holds |
 //! | `roles[k].fx`, `.fy`, `.moment` | its reaction, and the moment of that about the region's middle at rest |
 //! | `strain_energy`, `von_mises` | in all, and the largest of any cell |
@@ -30,11 +31,10 @@ pub fn write_load(folder: &OutputFolder, scene: &Scene, steps: &[LoadStep]) -> R
     let path = folder.path("load.csv");
     let failed = |error: csv::Error| ExportError::io("write", &path)(error);
     let mut writer = WriterBuilder::new().has_headers(false).from_path(&path).map_err(failed)?;
-    let keys = keys(steps);
-    let has_load = steps.iter().any(|step| step.mechanics.load.is_some());
-    writer.write_record(header(scene, &keys, has_load)).map_err(failed)?;
+    let (loads, keys) = (loads(steps), keys(steps));
+    writer.write_record(header(scene, &loads, &keys)).map_err(failed)?;
     for step in steps {
-        writer.serialize((step.step, row(step, &keys, has_load))).map_err(failed)?;
+        writer.serialize((step.step, row(step, &loads, &keys))).map_err(failed)?;
     }
     writer.flush().map_err(ExportError::io("write", &path))?;
     Ok(path)
@@ -54,10 +54,20 @@ fn keys(steps: &[LoadStep]) -> Vec<&str> {
     keys
 }
 
-fn header(scene: &Scene, keys: &[&str], has_load: bool) -> Vec<String> {
+/// Loads that have columns: all together (`None`) and, of several, each.
+fn loads(steps: &[LoadStep]) -> Vec<Option<usize>> {
+    let Some(mechanics) = steps.first().map(|step| &step.mechanics).filter(|one| one.load.is_some()) else {
+        return Vec::new();
+    };
+    let each = if mechanics.loads.len() > 1 { mechanics.loads.len() } else { 0 };
+    std::iter::once(None).chain((0..each).map(Some)).collect()
+}
+
+fn header(scene: &Scene, loads: &[Option<usize>], keys: &[&str]) -> Vec<String> {
     let mut names = vec![scene.counts().to_owned(), "factor".to_owned()];
-    if has_load {
-        names.extend(["fx", "fy", "moment", "displacement"].map(|name| format!("load.{name}")));
+    for load in loads {
+        let key = load.map_or_else(|| "load".to_owned(), |k| format!("loads[{k}]"));
+        names.extend(["fx", "fy", "moment", "displacement"].map(|name| format!("{key}.{name}")));
     }
     for key in keys {
         names.extend(["ux", "uy", "fx", "fy", "moment"].map(|name| format!("{key}.{name}")));
@@ -66,11 +76,11 @@ fn header(scene: &Scene, keys: &[&str], has_load: bool) -> Vec<String> {
     names
 }
 
-fn row(step: &LoadStep, keys: &[&str], has_load: bool) -> Vec<Option<f64>> {
+fn row(step: &LoadStep, loads: &[Option<usize>], keys: &[&str]) -> Vec<Option<f64>> {
     let mechanics = &step.mechanics;
     let mut numbers: Vec<Option<f64>> = vec![Some(step.factor)];
-    if has_load {
-        let load = mechanics.load.as_ref();
+    for load in loads {
+        let load = load.map_or(mechanics.load.as_ref(), |k| mechanics.loads.get(k));
         let [fx, fy] = [0, 1].map(|k| load.map(|load| load.force[k]));
         let moment = load.map(|load| load.moment_about_origin);
         numbers.extend([fx, fy, moment, load.and_then(|load| load.displacement)]);

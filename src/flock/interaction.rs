@@ -73,6 +73,25 @@ impl MatrixWeights {
         self.starts[class] as usize..self.starts[class + 1] as usize
     }
 
+    /// Gives a particle a class of its own, in which the components that are `held` stay where they are and the other
+    /// one moves as if they did.
+    pub fn hold(&mut self, particle: usize, held: [bool; 2]) {
+        let range = self.range(particle);
+        let stiffness: Vec<Block> = self.stiffness[range].to_vec();
+        let diagonal = stiffness.iter().fold(Block::default(), |sum, block| plus(&sum, block));
+        let mut compliance = Block::default();
+        match held {
+            [false, true] => compliance[0][0] = 1.0 / diagonal[0][0],
+            [true, false] => compliance[1][1] = 1.0 / diagonal[1][1],
+            _ => {}
+        }
+        self.class[particle] = self.compliance.len() as u32;
+        self.compliance.push(compliance);
+        self.blocks.extend(stiffness.iter().map(|block| product(&compliance, block)));
+        self.stiffness.extend(stiffness);
+        self.starts.push(self.blocks.len() as u32);
+    }
+
     pub fn compliance(&self, particle: usize) -> Block {
         self.compliance[self.class[particle] as usize]
     }

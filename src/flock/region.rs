@@ -66,6 +66,10 @@ impl Region {
                 matter.filter(|&i| distance(place(i), *centre) <= radius + tolerance).collect()
             }
             Region::Ids(ids) => matter.filter(|&i| ids.contains(&body.id(i))).collect(),
+            Region::Boundary if body.outline.is_some() => {
+                let known = body.outline.iter().flat_map(|outline| outline.places.iter().enumerate());
+                known.filter_map(|(i, place)| place.map(|_| i)).collect()
+            }
             Region::Boundary => {
                 let complete = matter.clone().map(|i| neighbours.of(i).len()).max().unwrap_or(0);
                 let lacks = |i: usize| {

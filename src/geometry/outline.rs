@@ -22,6 +22,9 @@ pub struct Piece {
     pub arc: Option<Arc>,
     /// Whether it meets the piece before it at a corner, which every description of the shape has to keep.
     pub begins_at_corner: bool,
+    /// Its number in the description of the shape, from 0: which vertex of a polygon it begins at, whichever way round
+    /// the polygon was given.
+    pub number: usize,
 }
 
 /// A part of a circle.
@@ -87,7 +90,7 @@ const NOTHING: f64 = 1e-9;
 impl Piece {
     /// The straight edge between two corners \[length\].
     pub fn edge(from: Point, to: Point) -> Self {
-        Self { from, to, arc: None, begins_at_corner: true }
+        Self { from, to, arc: None, begins_at_corner: true, number: 0 }
     }
 
     /// The arc about `centre` from one angle over another \[rad\].
@@ -97,7 +100,7 @@ impl Piece {
         let whole = sweep.abs() >= TAU;
         let to = if whole { from } else { at(start + sweep) };
         let arc = Some(Arc { centre, radius, start, sweep });
-        Self { from, to, arc, begins_at_corner: !whole }
+        Self { from, to, arc, begins_at_corner: !whole, number: 0 }
     }
 
     /// The place a share `t` of the way along \[length\].
@@ -436,14 +439,16 @@ fn ring_of(shape: &Shape) -> Vec<Piece> {
 
 /// The edges of a polygon, counter-clockwise; corners that fall together are one.
 fn edges(vertices: &[Point]) -> Vec<Piece> {
-    let mut corners = vertices.to_vec();
-    corners.dedup();
-    if corners.len() > 1 && corners.first() == corners.last() {
+    let mut corners: Vec<(usize, Point)> = vertices.iter().copied().enumerate().collect();
+    corners.dedup_by_key(|(_, corner)| *corner);
+    if corners.len() > 1 && corners[0].1 == corners[corners.len() - 1].1 {
         corners.pop();
     }
-    let count = corners.len();
-    let ring: Vec<Piece> = (0..count).map(|k| Piece::edge(corners[k], corners[(k + 1) % count])).collect();
-    counter_clockwise(ring)
+    let edge = |k: usize| {
+        let ((number, from), (_, to)) = (corners[k], corners[(k + 1) % corners.len()]);
+        Piece { number, ..Piece::edge(from, to) }
+    };
+    counter_clockwise((0..corners.len()).map(edge).collect())
 }
 
 fn counter_clockwise(ring: Vec<Piece>) -> Vec<Piece> {
@@ -506,6 +511,7 @@ fn profile(specimen: &Specimen) -> Vec<Piece> {
         Piece { begins_at_corner, ..piece.reversed() }
     }));
     ring.push(Piece::edge([-wide, 0.0], [wide, 0.0]));
+    ring.iter_mut().enumerate().for_each(|(number, piece)| piece.number = number);
     if !lying {
         return ring;
     }

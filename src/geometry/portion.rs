@@ -30,7 +30,7 @@ pub enum Selection {
     Pieces {
         /// The loop: 0 is the outer one, then holes in their order.
         ring: usize,
-        /// Numbers of the pieces, from 0; all of them where empty.
+        /// Numbers of the pieces as the shape describes them ([`Piece::number`]), from 0; all of them where empty.
         pieces: Vec<usize>,
         /// Of arcs alone, what lies between these directions from their centres, counter-clockwise \[rad\].
         angles: Option<[f64; 2]>,
@@ -84,13 +84,13 @@ impl Outline {
                 within(&|piece| within_disc(piece, *centre, radius + grain))
             }
             Selection::Pieces { ring, pieces, angles } => {
-                let is_asked = |p: usize| pieces.is_empty() || pieces.contains(&p);
+                let is_asked = |number: usize| pieces.is_empty() || pieces.contains(&number);
                 let stretches = |piece: &Piece| match (angles, &piece.arc) {
                     (None, _) => vec![[0.0, 1.0]],
                     (Some(_), None) => Vec::new(),
                     (Some([from, to]), Some(arc)) => between_angles(arc, *from, *to),
                 };
-                let of_ring = self.pieces().filter(|&(r, p, _)| r == *ring && is_asked(p));
+                let of_ring = self.pieces().filter(|(r, _, piece)| r == ring && is_asked(piece.number));
                 let portions = |(ring, number, piece): (usize, usize, &Piece)| {
                     stretches(piece).into_iter().map(move |t| Portion { ring, piece: number, t })
                 };

@@ -6,12 +6,16 @@
 
 use std::sync::Arc;
 
+use nalgebra::DMatrix;
+
 use crate::flock::body::Body;
 use crate::flock::lattice::{Lattice, LatticeKind, Site};
 use crate::flock::neighbourhood::{Neighbourhood, Neighbours};
 use crate::flock::points::Points;
 
-use super::stiffness::mean_strain;
+use super::elastic::Voigt;
+use super::stiffness::{ShapeError, area, cut_cell, cut_load_shares, element, load_shares, mean_strain};
+use crate::geometry::outline::{Outline, OutlineError};
 
 /// Cells of any polygons, in compressed form. Corners run counter-clockwise.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,6 +30,8 @@ pub struct Cells {
     /// they come from the lattice's vectors, not from differences of positions, so a body far from the origin
     /// loses no digits. Cells that an outline has cut follow them, one shape each.
     pub shapes: Vec<Vec<[f64; 2]>>,
+    /// How many of the shapes are whole cells; those after them are polygons that an outline has cut.
+    pub whole: usize,
 }
 
 /// A corner of cells at a particle: which cells, and the particle's place among their corners.
@@ -73,7 +79,7 @@ impl Cells {
 
     /// The same cells with their corners at these points \[length\], each with a shape of its own.
     pub fn on_points(&self, points: &Points) -> Self {
-        let shapes = self
+        let shapes: Vec<Vec<[f64; 2]>> = self
             .iter()
             .map(|cell| {
                 let [x0, y0] = points.get(cell[0] as usize);
@@ -81,12 +87,27 @@ impl Cells {
                 cell.iter().map(relative).collect()
             })
             .collect();
-        Self { kind: (0..self.count() as u32).collect(), shapes, ..self.clone() }
+        Self { kind: (0..self.count() as u32).collect(), whole: shapes.len(), shapes, ..self.clone() }
     }
 
     /// No cells yet, of these kinds: corners relative to the first \[length\], shape \[kinds, corners of the kind\].
     pub fn of_kinds(shapes: Vec<Vec<[f64; 2]>>) -> Self {
-        Self { starts: vec![0], index: Vec::new(), kind: Vec::new(), shapes }
+        Self { starts: vec![0], index: Vec::new(), kind: Vec::new(), whole: shapes.len(), shapes }
+    }
+
+    /// Stiffness of the cells of a kind \[force / length\]; see [`element`] and [`cut_cell`].
+    ///
+    /// # Errors
+    /// As [`element`].
+    pub fn element(&self, kind: usize, stiffness: &Voigt) -> Result<DMatrix<f64>, ShapeError> {
+        let shape = &self.shapes[kind];
+        if kind < self.whole { element(shape, stiffness) } else { cut_cell(shape, stiffness) }
+    }
+
+    /// The part of a load per area that falls to each corner of the cells of a kind \[length^2\]; see [`load_shares`].
+    pub fn load_shares(&self, kind: usize) -> Vec<f64> {
+        let shape = &self.shapes[kind];
+        if kind < self.whole { load_shares(shape) } else { cut_load_shares(shape) }
     }
 
     /// Adds a cell with these particles at its corners, of one of the kinds in `shapes`.
@@ -169,6 +190,54 @@ impl Cells {
     pub fn boundary_sides(&self, incidence: &Incidence) -> Vec<[u32; 2]> {
         let sides = (0..self.count()).flat_map(|cell| self.sides(cell));
         sides.filter(|&side| self.across(incidence, side).is_none()).collect()
+    }
+
+    /// The ways around the body and its holes, each from a particle back to it, the body to the left, shape
+    /// \[ways\]\[particles + 1\].
+    pub fn boundary_ways(&self, particles: usize) -> Vec<Vec<u32>> {
+        let mut onwards: Vec<Vec<u32>> = vec![Vec::new(); particles];
+        for [a, b] in self.boundary_sides(&self.incidence(particles)) {
+            onwards[a as usize].push(b);
+        }
+        let mut ways = Vec::new();
+        for start in 0..particles {
+            while let Some(mut here) = onwards[start].pop() {
+                let mut way = vec![start as u32, here];
+                while let Some(next) = onwards[here as usize].pop() {
+                    way.push(next);
+                    here = next;
+                }
+                ways.push(way);
+            }
+        }
+        ways
+    }
+
+    /// The outline of the cells, sides in one line taken for one edge.
+    ///
+    /// # Errors
+    /// Cells that hang together by a corner, or in several parts, have no outline.
+    pub fn outline(&self, reference: &Points) -> Result<Outline, OutlineError> {
+        let straight = |way: &Vec<u32>| {
+            let at = |k: usize| reference.get(way[k % (way.len() - 1)] as usize);
+            let turns = |&k: &usize| {
+                let (a, b, c) = (at(k + way.len() - 2), at(k), at(k + 1));
+                let (u, v) = ([b[0] - a[0], b[1] - a[1]], [c[0] - b[0], c[1] - b[1]]);
+                let turn = u[0] * v[1] - u[1] * v[0];
+                turn.abs() > 1e-9 * u[0].hypot(u[1]) * v[0].hypot(v[1])
+            };
+            (0..way.len() - 1).filter(turns).map(at).collect::<Vec<_>>()
+        };
+        let mut polygons: Vec<Vec<[f64; 2]>> =
+            self.boundary_ways(reference.len()).iter().map(straight).collect();
+        // The outer one is the largest, which bounds all others.
+        let size = |polygon: &Vec<[f64; 2]>| if polygon.len() < 3 { 0.0 } else { area(polygon).abs() };
+        let outer = (0..polygons.len()).max_by(|&a, &b| size(&polygons[a]).total_cmp(&size(&polygons[b])));
+        polygons.swap(0, outer.unwrap_or(0));
+        if polygons.is_empty() {
+            return Err(OutlineError::NoArea { ring: 0 });
+        }
+        Outline::of_polygons(&polygons)
     }
 
     /// Mean strain of each cell (xx, yy, engineering xy) \[1\] under these displacements \[length\], shape

@@ -2,7 +2,6 @@
 //! displacement that the cells can have.
 
 use super::cells::Cells;
-use super::stiffness::load_shares;
 use crate::flock::points::Points;
 
 /// A traction on one side of the boundary, linear from end to end.
@@ -55,7 +54,7 @@ impl Loads {
             forces.y[particle as usize] += force[1];
         };
         if self.body != [0.0; 2] {
-            let shares: Vec<Vec<f64>> = cells.shapes.iter().map(|shape| load_shares(shape)).collect();
+            let shares: Vec<Vec<f64>> = (0..cells.shapes.len()).map(|kind| cells.load_shares(kind)).collect();
             for (cell, &kind) in cells.iter().zip(&cells.kind) {
                 for (&particle, share) in cell.iter().zip(&shares[kind as usize]) {
                     add(particle, self.body.map(|b| b * share));

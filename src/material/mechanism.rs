@@ -6,7 +6,7 @@
 //! particles that they share, and the body is refused if that linkage can move other than as a whole.
 //! A hinge between parts that are pinned elsewhere too is harmless and passes.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, Matrix3, Vector3};
 
 use super::cells::{Cells, Incidence};
 use crate::flock::points::Points;
@@ -31,6 +31,10 @@ pub enum Mechanism {
         "a mechanism: the part of the body to which particle {particle} belongs is held at one particle only and turns about it"
     )]
     Turns { particle: usize },
+    #[error(
+        "a mechanism: the part of the body to which particle {particle} belongs can slide or turn along the components that are left free"
+    )]
+    Slides { particle: usize },
 }
 
 /// Linkages of more parts than this are not analysed: a hinge among them counts as a mechanism.
@@ -65,30 +69,35 @@ pub fn require_rigid(
     linkage.require_no_turning(reference, &[])
 }
 
-/// Refuses a body that the `held` particles (the leaders) do not keep from moving as a whole or in
-/// part, shape \[count\]: some part of it has no leader, or can turn about the only one.
+/// Refuses a body that the `held` components of its particles (leaders, clamps, rollers) do not keep from moving as a
+/// whole or in part, shape \[count\]\[x, y\]: some part of it is not held, or can turn or slide.
 pub fn require_held(
     cells: &Cells,
     incidence: &Incidence,
     reference: &Points,
-    held: &[bool],
+    held: &[[bool; 2]],
 ) -> Result<(), Mechanism> {
     let linkage = Linkage::of(cells, incidence, reference.len());
     let groups = linkage.groups();
-    let mut leaders = vec![0usize; linkage.parts];
+    let mut members: Vec<Vec<usize>> = vec![Vec::new(); linkage.parts];
     let mut first = vec![usize::MAX; linkage.parts];
     for (i, &held) in held.iter().enumerate() {
         let Some(&cell) = incidence.of(i).first() else { continue };
         let group = groups[linkage.part[cell as usize]];
-        leaders[group] += usize::from(held);
+        if held != [false; 2] {
+            members[group].push(i);
+        }
         first[group] = first[group].min(i);
     }
-    let weak = (0..linkage.parts).filter(|&group| first[group] != usize::MAX);
-    for group in weak {
+    for group in (0..linkage.parts).filter(|&group| first[group] != usize::MAX) {
         let particle = first[group] + 1;
-        match leaders[group] {
-            0 => return Err(Mechanism::Loose { particle }),
-            1 => return Err(Mechanism::Turns { particle }),
+        let members = &members[group];
+        let whole = members.iter().filter(|&&i| held[i] == [true; 2]).count();
+        match (members.len(), whole) {
+            (0, _) => return Err(Mechanism::Loose { particle }),
+            (1, 1) => return Err(Mechanism::Turns { particle }),
+            (_, 2..) => {}
+            _ if free_motions(reference, held, members) > 0 => return Err(Mechanism::Slides { particle }),
             _ => {}
         }
     }
@@ -96,11 +105,33 @@ pub fn require_held(
         return Ok(());
     }
     let grounded: Vec<(usize, usize)> = (0..reference.len())
-        .filter(|&i| held[i])
+        .filter(|&i| held[i] == [true; 2])
         .flat_map(|i| incidence.of(i).iter().map(move |&cell| (i, cell)))
         .map(|(i, cell)| (i, linkage.part[cell as usize]))
         .collect();
     linkage.require_no_turning(reference, &grounded)
+}
+
+/// Rigid motions (two translations, one turn) that the held components of these particles leave.
+fn free_motions(reference: &Points, held: &[[bool; 2]], members: &[usize]) -> usize {
+    let centre = members.iter().fold([0.0; 2], |[x, y], &i| {
+        let p = reference.get(i);
+        [x + p[0] / members.len() as f64, y + p[1] / members.len() as f64]
+    });
+    let from = |i: usize| [0, 1].map(|k| reference.get(i)[k] - centre[k]);
+    let size = members.iter().map(|&i| from(i)[0].hypot(from(i)[1])).fold(f64::MIN_POSITIVE, f64::max);
+    let rows = members.iter().flat_map(|&i| {
+        let [x, y] = from(i).map(|v| v / size);
+        let components = [[1.0, 0.0, -y], [0.0, 1.0, x]].into_iter().zip(held[i]);
+        components.filter_map(|(row, held)| held.then_some(row))
+    });
+    let gram = rows.fold(Matrix3::zeros(), |sum, row| {
+        let row = Vector3::from(row);
+        sum + row * row.transpose()
+    });
+    let values = gram.symmetric_eigenvalues();
+    let most = values.max();
+    values.iter().filter(|value| **value <= 1e-9 * most).count()
 }
 
 impl Linkage {
@@ -270,7 +301,7 @@ mod tests {
 
     fn held(of: &[Site], leaders: &[Site]) -> Result<(), Mechanism> {
         let (cells, reference, sites) = squares(of);
-        let held: Vec<bool> = sites.iter().map(|site| leaders.contains(site)).collect();
+        let held: Vec<[bool; 2]> = sites.iter().map(|site| [leaders.contains(site); 2]).collect();
         require_held(&cells, &cells.incidence(reference.len()), &reference, &held)
     }
 

@@ -26,7 +26,8 @@
 //!   lowest-order virtual element for any polygon.
 //! * [`mechanism`]: whether the cells hold the body together, or a hinge lets it fold.
 //! * [`weights`]: cells and neighbours to `K_ij`, `D_i` and `W_ij`, kept by class of particles.
-//! * [`loads`]: tractions, point forces and a body force to the forces `f_i`.
+//! * [`outline_loads`]: what acts on the outline, on particles or on all of the body to the forces `f_i`; [`loads`]: the
+//!   same for tractions given side by side.
 //! * [`homogenise`]: the way back, from the weights of an interior particle, matrices or scalars, to
 //!   the material that they are.
 //! * [`zone`]: over all waves on the lattice: is the rule stable, and how much must a synchronous
@@ -59,6 +60,7 @@ pub mod gradient;
 pub mod homogenise;
 pub mod loads;
 pub mod mechanism;
+pub mod outline_loads;
 pub mod report;
 pub mod stiffness;
 pub mod stress;

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::cells::{Cells, Incidence};
 use super::elastic::Elastic;
 use super::mechanism::{Mechanism, require_rigid};
-use super::stiffness::{ShapeError, element};
+use super::stiffness::ShapeError;
 use crate::flock::block::{Block, apply, inverse, plus, product};
 use crate::flock::body::Body;
 use crate::flock::interaction::MatrixWeights;
@@ -184,7 +184,7 @@ fn check_factor(cells: &Cells, factor: Option<&[f64]>) -> Result<(), WeightsErro
 /// Element stiffness of each shape.
 fn elements(cells: &Cells, elastic: &Elastic) -> Result<Vec<DMatrix<f64>>, WeightsError> {
     let of_kind = |kind: usize| {
-        element(&cells.shapes[kind], elastic.stiffness()).map_err(|reason| {
+        cells.element(kind, elastic.stiffness()).map_err(|reason| {
             let cell = cells.kind.iter().position(|&k| k as usize == kind).map_or(0, |cell| cell + 1);
             WeightsError::Shape { cell, reason }
         })
@@ -254,7 +254,7 @@ impl Assembly<'_> {
 
     /// `None` where cells differ in more than their kind, or do not fit the pattern.
     fn pattern(&self, particle: usize) -> Option<Pattern> {
-        if self.factor.is_some() || self.cells.shapes.len() > 2 {
+        if self.factor.is_some() {
             return None;
         }
         let seen = self.neighbours.of(particle);

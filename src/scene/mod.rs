@@ -26,8 +26,10 @@ use crate::flock::neighbourhood::Neighbourhood;
 use crate::flock::region::{Region, Side};
 use crate::flock::role::Role;
 use crate::flock::rules::{Axis, Feedback, Mean};
+use crate::geometry::portion::Selection;
 use crate::geometry::shape::Segment;
 use crate::material::elastic::Elastic;
+use crate::material::outline_loads::{Profile, Push};
 use crate::solve::equilibrium::Request;
 use crate::solve::sweep::Update;
 
@@ -46,6 +48,8 @@ pub struct Scene {
     /// Of a body of points a lattice that is as wide, which stands in for its spacing alone.
     pub lattice: Lattice,
     pub body: BodySource,
+    /// Whether the body keeps the outline of its shape.
+    pub is_fitted: bool,
     pub frame: Option<FrameRule>,
     pub neighbourhood: Neighbourhood,
     pub mean: Mean,
@@ -136,8 +140,8 @@ pub struct PoissonTerm {
 /// Something that pushes the body.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Load {
-    /// On every side of the boundary between two particles of the region \[force / length^2\].
-    Traction { region: SceneRegion, traction: [f64; 2] },
+    /// On the part of the outline in the region; stresses \[force / length^2\].
+    Outline { region: SceneRegion, push: Push, profile: Option<Profile> },
     /// On each particle of the region \[force\].
     Force { region: SceneRegion, force: [f64; 2] },
     /// On all of the body \[force / length^3\].
@@ -149,6 +153,8 @@ pub enum Load {
 pub struct RoleEntry {
     pub region: SceneRegion,
     pub role: Role,
+    /// The one component that is held or led; both where `None`.
+    pub axis: Option<Axis>,
     /// First step at which it holds.
     pub from: usize,
     pub when: Option<Condition>,
@@ -161,6 +167,8 @@ pub enum SceneRegion {
     Known(Region),
     /// The outermost particles on a side, half a spacing deep.
     Outermost(Side),
+    /// A part of the outline of the shape, and the particles on it.
+    Outline(Selection),
 }
 
 /// A condition on one particle.

@@ -25,13 +25,23 @@ pub enum NotLinear {
     Operator(#[from] OperatorError),
 }
 
+/// A component of a particle that is held while the particle follows along the other.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HeldComponent {
+    pub particle: usize,
+    pub axis: Axis,
+    /// \[length\]
+    pub displacement: f64,
+}
+
 /// The equilibrium that the rule asks for, with the held particles (those that do not follow) displaced
-/// by `held` \[length\], shape \[count\]; what it holds for followers and frame points is not looked at.
+/// by `held` \[length\], shape \[count\]; what it holds for followers and frame points is not looked at; `components` are held of followers.
 pub fn system(
     interaction: &Interaction,
     body: &Body,
     follows: Vec<bool>,
-    held: Points,
+    mut held: Points,
+    components: &[HeldComponent],
 ) -> Result<System, NotLinear> {
     require_linear(interaction)?;
     let lattice = &body.lattice;
@@ -53,7 +63,22 @@ pub fn system(
         }
         _ => Operator::from_rows(&body.sites, grid, follows, |i| linear.row(i))?,
     };
+    let mut held_axes = vec![[false; 2]; if components.is_empty() { 0 } else { body.count() }];
+    for component in components.iter().filter(|component| operator.follows()[component.particle]) {
+        let axis = component.axis as usize;
+        held_axes[component.particle][axis] = true;
+        let mut place = held.get(component.particle);
+        place[axis] = component.displacement;
+        held.set(component.particle, place);
+    }
+    let operator = operator.with_held_axes(held_axes).with_outliers(outlier_places(body));
     Ok(System::new(operator, forces, held))
+}
+
+/// Where the particles along the outline are, in columns and rows of the lattice.
+pub(super) fn outlier_places(body: &Body) -> Vec<[f64; 2]> {
+    let outliers = body.outline.as_ref().map_or(body.count()..body.count(), |o| o.regular..body.count());
+    outliers.map(|i| body.lattice.grid_coordinates(body.reference.get(i))).collect()
 }
 
 fn require_linear(interaction: &Interaction) -> Result<(), NotLinear> {

@@ -17,7 +17,7 @@ use std::collections::HashMap;
 
 pub use columns::{Columns, Segment};
 pub use kernel::{Stencils, Task, array, array_mut, pass};
-pub use matrix::{HELD, Matrix};
+pub use matrix::{HELD, Matrix, leads_to_outlier};
 
 use crate::flock::block::{Block, transposed};
 use crate::flock::lattice::Site;
@@ -58,6 +58,19 @@ pub struct Operator {
     pub(super) follows: Vec<bool>,
     /// Vectors from a site to that of the next column and of the next row \[length\].
     pub(super) grid: [[f64; 2]; 2],
+    pub(super) outliers: Outliers,
+    /// Components of single particles that are held while they follow along the other, shape \[count\]; empty
+    /// where there are none.
+    pub(super) held_axes: Vec<[bool; 2]>,
+}
+
+/// Particles that stand along an outline and at no site; they are numbered after all others.
+#[derive(Clone, Debug, Default)]
+pub struct Outliers {
+    /// Index of the first one.
+    pub first: usize,
+    /// Where they are, in columns and rows, shape \[count - first\].
+    pub places: Vec<[f64; 2]>,
 }
 
 impl Operator {
@@ -83,7 +96,8 @@ impl Operator {
             return Err(OperatorError::NoClass { particle: i + 1, class: class[i], rows: rows.len() });
         }
         let columns = Columns::new(sites.iter().copied(), |_| true);
-        let operator = Self { columns, class, rows, follows, grid };
+        let outliers = Outliers { first: count, places: Vec::new() };
+        let operator = Self { columns, class, rows, follows, grid, outliers, held_axes: Vec::new() };
         operator.check_rows()?;
         Ok(operator)
     }
@@ -110,6 +124,29 @@ impl Operator {
             };
         }
         Self::new(sites, grid, class, rows, follows)
+    }
+
+    /// The same with its last particles at these places, in columns and rows: those along an outline.
+    pub fn with_outliers(mut self, places: Vec<[f64; 2]>) -> Self {
+        self.outliers = Outliers { first: self.count() - places.len(), places };
+        self
+    }
+
+    /// The same with single components held of followers, shape \[count\]\[x, y\]; their rows for these components are
+    /// the held displacement itself.
+    pub fn with_held_axes(mut self, held: Vec<[bool; 2]>) -> Self {
+        self.held_axes =
+            if held.contains(&[true, false]) || held.contains(&[false, true]) || held.contains(&[true; 2]) {
+                held
+            } else {
+                Vec::new()
+            };
+        self
+    }
+
+    /// The components of a particle that are held while it follows.
+    pub fn held_axes(&self, particle: usize) -> [bool; 2] {
+        self.held_axes.get(particle).copied().unwrap_or_default()
     }
 
     pub fn count(&self) -> usize {

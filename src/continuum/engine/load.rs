@@ -9,13 +9,15 @@ pub(super) struct Load {
     /// Steps over which the loads grow, where they do.
     ramp: Option<usize>,
     factor: f64,
+    /// The whole of each load \[force\], shape \[loads\]\[count\].
+    each: Vec<Points>,
     /// \[force\], shape \[count\]; only where the factor has been another than 1.
     whole: Option<Points>,
 }
 
 impl Load {
-    pub fn new(ramp: Option<usize>) -> Self {
-        Self { ramp, factor: 1.0, whole: None }
+    pub fn new(ramp: Option<usize>, each: Vec<Points>) -> Self {
+        Self { ramp, factor: 1.0, each, whole: None }
     }
 
     /// Whether more of the loads is to come after this step.
@@ -33,6 +35,11 @@ impl Engine {
     /// All of the scene's loads \[force\], shape \[count\]; `None` without loads.
     pub fn whole_load(&self) -> Option<&Points> {
         self.load.whole.as_ref().or(self.interaction.forces.as_ref())
+    }
+
+    /// The whole of each of the scene's loads \[force\], shape \[loads\]\[count\].
+    pub fn each_load(&self) -> &[Points] {
+        &self.load.each
     }
 
     /// Puts this part of the scene's loads on the body \[1\].

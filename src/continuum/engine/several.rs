@@ -13,7 +13,7 @@ impl Engine {
     pub fn steps_at_once(&self, most: usize) -> usize {
         let finds_neighbours = self.present_neighbours.is_some();
         let looks = looks_at_every_step(finds_neighbours, &self.interaction, &self.changes);
-        if looks || !self.guided.is_empty() || !self.takes_several {
+        if looks || !self.guided.is_empty() || !self.takes_several || self.moves_components() {
             return 0;
         }
         let to_come = self.changes.iter().map(|change| change.from).filter(|&from| from > self.step.max(1));

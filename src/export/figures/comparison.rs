@@ -140,37 +140,17 @@ fn legend(pair: &Pair<'_>, is_dotted: bool) -> Vec<Key> {
     first.into_iter().chain(led).chain([undeformed]).collect()
 }
 
-/// The body's boundary with its corners at `places`.
+/// The body's boundary with its corners at `places`, in one piece each, or the dashes of a line would begin anew at every
+/// particle.
 fn draw_outline(svg: &mut Svg, axes: &Axes, pair: &Pair<'_>, places: &Points, stroke: &str) {
     let mut path = Path::default();
-    for way in boundary(pair.cells, places.len()) {
+    for way in pair.cells.boundary_ways(places.len()) {
         let way: Vec<[f64; 2]> = way.iter().map(|&i| axes.place(places.get(i as usize))).collect();
         if way.iter().flatten().all(|value| value.is_finite()) {
             path.polyline(way);
         }
     }
     svg.path(&path, format_args!("class=\"outline\" fill=\"none\" {stroke} stroke-linejoin=\"round\""));
-}
-
-/// The ways around the body and its holes, each from a particle back to it. In one piece each, or the
-/// dashes of a line would begin anew at every particle.
-fn boundary(cells: &Cells, particles: usize) -> Vec<Vec<u32>> {
-    let mut onwards: Vec<Vec<u32>> = vec![Vec::new(); particles];
-    for [a, b] in cells.boundary_sides(&cells.incidence(particles)) {
-        onwards[a as usize].push(b);
-    }
-    let mut ways = Vec::new();
-    for start in 0..particles {
-        while let Some(mut here) = onwards[start].pop() {
-            let mut way = vec![start as u32, here];
-            while let Some(next) = onwards[here as usize].pop() {
-                way.push(next);
-                here = next;
-            }
-            ways.push(way);
-        }
-    }
-    ways
 }
 
 /// Rings where the truth is, dots where the rule is, and a line from each to the other.
@@ -211,7 +191,7 @@ mod tests {
             let near = neighbourhood(&lattice);
             let (body, _) = Body::build(lattice, &Cut::Shape(shape.clone()), &near, None).expect("builds");
             let mut cells = Cells::of_body(&body);
-            let whole = boundary(&cells, body.count());
+            let whole = cells.boundary_ways(body.count());
             assert_eq!(whole.len(), 1, "{kind:?}");
             // A cell that touches no side of the boundary.
             let inner = |cell: &usize| cells.of(*cell).iter().all(|corner| !whole[0].contains(corner));
@@ -222,7 +202,7 @@ mod tests {
             for (cell, kept) in all.iter().enumerate().filter(|(cell, _)| *cell != hole) {
                 cells.push(kept, all.kind[cell]);
             }
-            let ways = boundary(&cells, body.count());
+            let ways = cells.boundary_ways(body.count());
             let closed = ways.iter().filter(|way| way.first() == way.last()).count();
             assert_eq!((ways.len(), closed), (2, 2), "{kind:?}");
             assert_eq!(ways.iter().map(Vec::len).sum::<usize>(), whole[0].len() + corners + 1);

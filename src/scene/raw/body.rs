@@ -80,10 +80,24 @@ pub struct RawBody {
     /// Shapes taken out of the body; particles on their rims stay.
     #[serde(default)]
     pub holes: Vec<RawShape>,
+    /// Whether the body keeps the outline of its shape; `fitted` for the rule `material`, `lattice` for others.
+    #[serde(default)]
+    pub outline: Option<RawOutline>,
     /// Where the lattice has a site [length]. Unless given: the lower left corner of the shape's
     /// bounds, the centre of a disc, or the end of a specimen's axis.
     #[serde(default)]
     pub anchor: Option<[f64; 2]>,
+}
+
+/// How a body follows the outline of its shape.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum RawOutline {
+    /// Particles stand on the outline, arcs become chords between them, and the cells along it are what the shape
+    /// leaves of them. For the rule `material` alone.
+    Fitted,
+    /// The body is made of whole cells of the lattice, and its outline is a staircase.
+    Lattice,
 }
 
 /// A region of the plane; its boundary belongs to it.

@@ -54,11 +54,23 @@ pub enum RawPlane {
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum RawLoad {
-    /// On every side of the boundary between two particles of the region.
+    /// On the part of the outline that lies in the region, along fixed directions.
     Traction {
         region: RawRegion,
         /// Along x and y [force / length^2].
         traction: [f64; 2],
+        /// How it varies along the outline; not at all unless given.
+        #[serde(default)]
+        profile: Option<RawProfile>,
+    },
+    /// On the part of the outline that lies in the region, along its normal.
+    Pressure {
+        region: RawRegion,
+        /// Positive pushes into the body [force / length^2].
+        pressure: f64,
+        /// How it varies along the outline; not at all unless given.
+        #[serde(default)]
+        profile: Option<RawProfile>,
     },
     /// On each particle of the region.
     Force {
@@ -71,6 +83,18 @@ pub enum RawLoad {
         /// Along x and y [force / length^3].
         force: [f64; 2],
     },
+}
+
+/// Multiplies a load by a factor that is linear along a line, from one point to another and beyond.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawProfile {
+    /// Where the first factor holds [length].
+    pub from: [f64; 2],
+    /// Where the second factor holds [length].
+    pub to: [f64; 2],
+    /// At `from` and at `to` [1].
+    pub factors: [f64; 2],
 }
 
 /// Finds where the followers come to rest under the leaders' places at step `stop.steps`, instead of

@@ -3,6 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::RawAxis;
 use crate::flock::motion::Interpolation;
 
 /// A role for the particles of a region.
@@ -11,6 +12,10 @@ use crate::flock::motion::Interpolation;
 pub struct RawRoles {
     pub region: RawRegion,
     pub role: RawRole,
+    /// The one component that is held or led, for rollers and planes of symmetry; the particle follows along the
+    /// other. Both unless given. For the rule `material` with small rotations.
+    #[serde(default)]
+    pub axis: Option<RawAxis>,
     /// First step at which the role holds [step]; 0 and 1 both mean from the start.
     #[serde(default)]
     pub from: usize,
@@ -73,6 +78,23 @@ pub enum RawRegion {
     },
     /// Every particle that lacks a neighbour: the outline, rims of holes included.
     Boundary {},
+    /// A part of the outline of the body's shape, or the particles on it. `flockform plan` prints its pieces.
+    Outline {
+        /// The outline of this hole, counted from 1 in the order of `body.holes`; the outer one unless given [1].
+        #[serde(default)]
+        hole: Option<usize>,
+        /// Numbers of its edges and arcs, counted from 1; all of them unless given. Those of a polygon begin at its
+        /// vertices, those of a rectangle are bottom, right, top and left [1].
+        #[serde(default)]
+        pieces: Vec<usize>,
+        /// Of arcs alone: between these directions from their centres, counter-clockwise [degree].
+        #[serde(default)]
+        angles: Option<[f64; 2]>,
+        /// Instead of all of the above: from the place of the outline nearest to the first point to that nearest to
+        /// the second, the shorter way [length].
+        #[serde(default)]
+        between: Option<[[f64; 2]; 2]>,
+    },
 }
 
 /// A side of the body.

@@ -7,6 +7,7 @@ use crate::flock::rules::Rotation;
 use crate::material::cells;
 use crate::material::elastic::{Constants, Elastic, ElasticError, Plane};
 use crate::material::homogenise::Crystal;
+use crate::material::outline_loads::{Profile, Push};
 use crate::scene::Load;
 use crate::scene::document::problem::SceneError;
 use crate::scene::raw::*;
@@ -132,12 +133,71 @@ pub fn loads(raw: &[RawLoad], refuse: Refuse<'_>) -> Result<Vec<Load>, SceneErro
     let load = |(k, load): (usize, &RawLoad)| {
         let region = |region| roles::region(&format!("loads[{k}]"), region, refuse);
         Ok(match load {
-            RawLoad::Traction { region: r, traction } => {
-                Load::Traction { region: region(r)?, traction: *traction }
-            }
+            RawLoad::Traction { region: r, traction, profile: p } => Load::Outline {
+                region: region(r)?,
+                push: Push::Traction(*traction),
+                profile: profile(k, p, refuse)?,
+            },
+            RawLoad::Pressure { region: r, pressure, profile: p } => Load::Outline {
+                region: region(r)?,
+                push: Push::Pressure(*pressure),
+                profile: profile(k, p, refuse)?,
+            },
             RawLoad::Force { region: r, force } => Load::Force { region: region(r)?, force: *force },
             RawLoad::Body { force } => Load::Body { force: *force },
         })
     };
     raw.iter().enumerate().map(load).collect()
+}
+
+fn profile(load: usize, raw: &Option<RawProfile>, refuse: Refuse<'_>) -> Result<Option<Profile>, SceneError> {
+    match raw {
+        Some(RawProfile { from, to, .. }) if from == to => {
+            let message = format!("from = to = [{}, {}]: nothing can vary along no length", from[0], from[1]);
+            Err(refuse(&format!("loads[{load}].profile.to"), message, "give another point"))
+        }
+        given => Ok(given.map(|RawProfile { from, to, factors }| Profile { from, to, factors })),
+    }
+}
+
+/// Whether the body keeps its outline: as written, or what suits the rule.
+pub fn is_fitted(raw: &RawScene, refuse: Refuse<'_>) -> Result<bool, SceneError> {
+    let has_outline = !matches!(raw.body.shape, RawShape::Grid { .. } | RawShape::Points { .. });
+    match raw.body.outline {
+        None => Ok(is_material(raw) && has_outline),
+        Some(RawOutline::Lattice) => Ok(false),
+        Some(RawOutline::Fitted) if !is_material(raw) => {
+            let message = "cells that the outline cuts carry a material, which this rule has not".into();
+            Err(refuse(
+                "body.outline",
+                message,
+                "use rule.mean.kind = \"material\", or outline = \"lattice\"",
+            ))
+        }
+        Some(RawOutline::Fitted) if !has_outline => {
+            let message = "a body by count or by points has no outline of its own".into();
+            Err(refuse("body.outline", message, "give a shape with lengths, such as kind = \"rectangle\""))
+        }
+        Some(RawOutline::Fitted) => Ok(true),
+    }
+}
+
+/// Single components are held in the small-rotation material alone: other rules have no force to leave free.
+pub fn check_axes(raw: &RawScene, refuse: Refuse<'_>) -> Result<(), SceneError> {
+    let Some(k) = raw.roles.iter().position(|entry| entry.axis.is_some()) else { return Ok(()) };
+    let key = format!("roles[{k}].axis");
+    let small = matches!(raw.rule.mean, Some(RawMean::Material { rotation: RawRotation::Small }));
+    if !small {
+        let message = "one component can be held in a material with small rotations only".into();
+        return Err(refuse(&key, message, "use rule.mean = { kind = \"material\" }, or leave axis out"));
+    }
+    let entry = &raw.roles[k];
+    if !matches!(entry.role, RawRole::Clamped | RawRole::Leader) {
+        return Err(refuse(&key, "only clamped and led particles have an axis".into(), "leave axis out"));
+    }
+    if entry.from > 1 || entry.when.is_some() {
+        let message = "a component is held from the start and for good".into();
+        return Err(refuse(&key, message, "leave `from` and `when` out, or axis"));
+    }
+    Ok(())
 }

@@ -105,6 +105,8 @@ pub(super) fn validate(
     let elastic = material::elastic(&raw.material, refuse)?;
     let equilibrium = equilibrium::equilibrium(&raw, refuse)?;
     let load_steps = load_steps::load_steps(&raw, refuse)?;
+    let is_fitted = material::is_fitted(&raw, refuse)?;
+    material::check_axes(&raw, refuse)?;
     check_gradient(&raw, refuse)?;
     let roles = raw
         .roles
@@ -115,6 +117,7 @@ pub(super) fn validate(
     Ok(Scene {
         name: name.to_owned(),
         body,
+        is_fitted,
         frame: frame(raw.frame),
         neighbourhood,
         mean: mean(raw.rule.mean.as_ref().unwrap_or(&RawMean::Barycentre), spacing, refuse)?,

@@ -6,6 +6,8 @@ use super::{Refuse, ordered_box};
 use crate::flock::motion::{Keyframe, Motion};
 use crate::flock::region::{Region, Side};
 use crate::flock::role::Role;
+use crate::flock::rules::Axis;
+use crate::geometry::portion::Selection;
 use crate::scene::document::problem::SceneError;
 use crate::scene::raw::*;
 use crate::scene::table::DisplacementTable;
@@ -37,7 +39,12 @@ pub fn role_entry(
     }
     let when = raw.when.as_ref().map(|when| condition(key, when, refuse)).transpose()?;
     let motion = raw.motion.as_ref().map(|motion| leader_motion(key, motion, folder, refuse)).transpose()?;
-    Ok(RoleEntry { region: region(key, &raw.region, refuse)?, role, from: raw.from.max(1), when, motion })
+    let axis = raw.axis.map(|axis| match axis {
+        RawAxis::X => Axis::X,
+        RawAxis::Y => Axis::Y,
+    });
+    let region = region(key, &raw.region, refuse)?;
+    Ok(RoleEntry { region, role, axis, from: raw.from.max(1), when, motion })
 }
 
 pub fn region(key: &str, raw: &RawRegion, refuse: Refuse<'_>) -> Result<SceneRegion, SceneError> {
@@ -58,7 +65,41 @@ pub fn region(key: &str, raw: &RawRegion, refuse: Refuse<'_>) -> Result<SceneReg
         RawRegion::Disc { centre, radius } => Region::Disc { centre: *centre, radius: *radius },
         RawRegion::Ids { ids } => Region::Ids(ids.clone()),
         RawRegion::Boundary {} => Region::Boundary,
+        RawRegion::Outline { hole, pieces, angles, between } => {
+            return outline_region(key, (*hole, pieces), *angles, *between, refuse).map(SceneRegion::Outline);
+        }
     }))
+}
+
+fn outline_region(
+    key: &str,
+    (hole, pieces): (Option<usize>, &[usize]),
+    angles: Option<[f64; 2]>,
+    between: Option<[[f64; 2]; 2]>,
+    refuse: Refuse<'_>,
+) -> Result<Selection, SceneError> {
+    if let Some([from, to]) = between {
+        if hole.is_some() || !pieces.is_empty() || angles.is_some() {
+            let message = "the two points say all: hole, pieces and angles cannot go with them".into();
+            return Err(refuse(&format!("{key}.region.between"), message, "leave the others out"));
+        }
+        return Ok(Selection::Between { from, to });
+    }
+    if hole == Some(0) || pieces.contains(&0) {
+        let which = if hole == Some(0) { "hole" } else { "pieces" };
+        let message = "holes and pieces are counted from 1".into();
+        return Err(refuse(&format!("{key}.region.{which}"), message, "`flockform plan` prints the pieces"));
+    }
+    if let Some([from, to]) = angles.filter(|[from, to]| from >= to) {
+        let message = format!("{from} is not below {to}");
+        let help = "give the lower angle first; beyond 360 degrees is allowed: [300, 420]";
+        return Err(refuse(&format!("{key}.region.angles"), message, help));
+    }
+    Ok(Selection::Pieces {
+        ring: hole.unwrap_or(0),
+        pieces: pieces.iter().map(|piece| piece - 1).collect(),
+        angles: angles.map(|angles| angles.map(f64::to_radians)),
+    })
 }
 
 fn condition(key: &str, raw: &RawWhen, refuse: Refuse<'_>) -> Result<Condition, SceneError> {

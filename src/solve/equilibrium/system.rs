@@ -45,13 +45,36 @@ impl System {
     /// The followers' displacements with those of the held particles.
     pub(super) fn with_held(&self, found: Field<f64>) -> Points {
         let mut displacement = Points { x: found.x, y: found.y };
-        for i in (0..displacement.len()).filter(|&i| !self.operator.follows()[i]) {
-            displacement.set(i, self.held.get(i));
+        for i in 0..displacement.len() {
+            let held = self.held.get(i);
+            if !self.operator.follows()[i] {
+                displacement.set(i, held);
+                continue;
+            }
+            match self.operator.held_axes(i) {
+                [false, false] => {}
+                [x, y] => {
+                    let found = displacement.get(i);
+                    displacement
+                        .set(i, [if x { held[0] } else { found[0] }, if y { held[1] } else { found[1] }]);
+                }
+            }
         }
         displacement
     }
 
-    /// `f + K_FL u_L` for the followers, zero for the others.
+    /// What is known beforehand of a particle's displacement \[length\]: zero in unknown components, `None` where all
+    /// are unknown.
+    fn held_part(&self, particle: usize) -> Option<[f64; 2]> {
+        let held = self.held.get(particle);
+        match (self.operator.follows()[particle], self.operator.held_axes(particle)) {
+            (false, _) => Some(held),
+            (true, [false, false]) => None,
+            (true, [x, y]) => Some([if x { held[0] } else { 0.0 }, if y { held[1] } else { 0.0 }]),
+        }
+    }
+
+    /// `f + K_FL u_L` for the followers, zero for the others and in held components.
     fn right_side(&self, matrix: &Matrix) -> Field<f64> {
         let operator = &self.operator;
         let mut right = Field { x: self.forces.x.clone(), y: self.forces.y.clone() };
@@ -63,11 +86,20 @@ impl System {
             }
             for (offset, block) in &operator.rows()[stretch.class as usize].entries {
                 let first = operator.index_of(stretch.site, *offset);
-                for (k, i) in range.clone().enumerate().filter(|(k, _)| !operator.follows()[first + k]) {
-                    let [x, y] = apply(block, self.held.get(first + k));
+                for (k, i) in range.clone().enumerate() {
+                    let Some(held) = self.held_part(first + k) else { continue };
+                    let [x, y] = apply(block, held);
                     right.x[i] += x;
                     right.y[i] += y;
                 }
+            }
+            for i in range {
+                let [x, y] = operator.held_axes(i);
+                let Some(held) = self.held_part(i).filter(|_| x || y) else { continue };
+                let diagonal = &operator.rows()[stretch.class as usize].diagonal;
+                let [fx, fy] = apply(diagonal, held);
+                right.x[i] = if x { 0.0 } else { right.x[i] - fx };
+                right.y[i] = if y { 0.0 } else { right.y[i] - fy };
             }
         }
         for (i, _) in matrix.class.iter().enumerate().filter(|(_, class)| **class == HELD) {

@@ -1,6 +1,7 @@
 //! Which particle stands at a site, without a map: the numbering runs column by column from the bottom,
 //! so a column is a few stretches of evenly spaced rows with ascending indices.
 
+use crate::flock::body::Body;
 use crate::flock::lattice::Site;
 
 /// Particles of one column whose rows are evenly spaced.
@@ -24,7 +25,12 @@ pub struct Columns {
     segments: Vec<Segment>,
     /// Index of the first particle of each column, whether in a segment or not, shape \[columns + 1\].
     begins: Vec<u32>,
+    /// Segments of the particles along an outline, which are numbered after all columns.
+    outliers: Vec<Segment>,
 }
+
+/// Column of the particles along an outline.
+const OUTLIERS: i32 = Body::ALONG_OUTLINE;
 
 impl Columns {
     /// Segments of the particles for which `counts` holds; `sites` ascend.
@@ -37,15 +43,19 @@ impl Columns {
         let mut last: Option<Site> = None;
         let mut count = 0;
         for (index, site) in sites.enumerate() {
-            columns.open(site[0], index);
-            count = index + 1;
+            let is_outlier = site[0] == OUTLIERS;
+            if !is_outlier {
+                columns.open(site[0], index);
+                count = index + 1;
+            }
             if !counts(index) {
                 last = None;
                 continue;
             }
-            match columns.segments.last_mut() {
+            let segments = if is_outlier { &mut columns.outliers } else { &mut columns.segments };
+            match segments.last_mut() {
                 Some(segment) if last == Some([site[0], site[1].wrapping_sub(step)]) => segment.len += 1,
-                _ => columns.segments.push(Segment { row: site[1], start: index as u32, len: 1 }),
+                _ => segments.push(Segment { row: site[1], start: index as u32, len: 1 }),
             }
             last = Some(site);
         }
@@ -65,7 +75,7 @@ impl Columns {
         }
     }
 
-    /// Numbers of the columns.
+    /// Numbers of the columns of the lattice.
     pub fn range(&self) -> std::ops::Range<i32> {
         self.first..self.first + self.begins.len() as i32 - 1
     }
@@ -80,6 +90,9 @@ impl Columns {
 
     /// Segments of a column, from the bottom; none where there is no such column.
     pub fn of(&self, column: i32) -> &[Segment] {
+        if column == OUTLIERS {
+            return &self.outliers;
+        }
         if !self.range().contains(&column) {
             return &[];
         }
@@ -87,9 +100,14 @@ impl Columns {
         &self.segments[self.starts[c] as usize..self.starts[c + 1] as usize]
     }
 
+    /// Numbers of all columns, that of the particles along an outline last.
+    fn all(&self) -> impl Iterator<Item = i32> + Clone {
+        self.range().chain([OUTLIERS])
+    }
+
     /// Column, and segment, of every segment in order.
     pub fn iter(&self) -> impl Iterator<Item = (i32, Segment)> + '_ {
-        self.range().flat_map(|column| self.of(column).iter().map(move |&segment| (column, segment)))
+        self.all().flat_map(|column| self.of(column).iter().map(move |&segment| (column, segment)))
     }
 
     /// Columns, and rows, from the first to the last that has a particle.
@@ -104,7 +122,7 @@ impl Columns {
         let of_segment = move |column: i32, segment: Segment| {
             (0..segment.len as i32).map(move |k| [column, segment.row + self.step * k])
         };
-        self.range().flat_map(move |column| {
+        self.all().flat_map(move |column| {
             self.of(column).iter().flat_map(move |&segment| of_segment(column, segment))
         })
     }
@@ -127,7 +145,8 @@ impl Columns {
     }
 
     /// Index bounds of groups of whole columns of at least `size` particles but for the last, with the
-    /// number of the column that each begins with: `[begin of the first, ..., end of the last]`.
+    /// number of the column that each begins with: `[begin of the first, ..., end of the last]`. Particles along an
+    /// outline are groups without columns.
     pub fn groups(&self, size: usize, count: usize) -> (Vec<usize>, Vec<i32>) {
         let (mut bounds, mut columns) = (vec![0], vec![self.first]);
         for (c, &begin) in self.begins[..self.begins.len() - 1].iter().enumerate() {
@@ -136,8 +155,12 @@ impl Columns {
                 columns.push(self.first + c as i32);
             }
         }
-        bounds.push(count);
-        columns.push(self.range().end);
+        let regular = self.begins.last().map_or(0, |&end| end as usize);
+        let outliers = (regular..count).step_by(size);
+        for bound in outliers.chain([count]).filter(|&bound| bound > 0) {
+            bounds.push(bound);
+            columns.push(self.range().end);
+        }
         (bounds, columns)
     }
 }

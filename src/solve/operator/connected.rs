@@ -1,7 +1,7 @@
 //! Whether every follower feels somebody who is held, through whatever chain of neighbours.
 
+use super::Operator;
 use super::matrix::{HELD, Matrix};
-use super::{Operator, Site};
 
 /// Sweeps to and fro before single particles are followed: almost every body is done after one.
 const SWEEPS: usize = 8;
@@ -24,25 +24,34 @@ impl Operator {
 
     /// Follows every connection from those already reached.
     fn spread(&self, matrix: &Matrix, reached: &mut [bool]) {
-        let mut offsets: Vec<Site> = matrix.rows.iter().flat_map(|r| &r.entries).map(|&(o, _)| o).collect();
-        offsets.sort_unstable();
-        offsets.dedup();
-        let sites: Vec<(Site, usize)> = matrix
-            .columns
-            .sites()
-            .filter_map(|site| matrix.columns.find(site).map(|(index, _)| (site, index)))
-            .collect();
-        let mut fresh: Vec<Site> =
-            sites.iter().filter(|&&(_, i)| reached[i]).map(|&(site, _)| site).collect();
-        while let Some([column, row]) = fresh.pop() {
-            for &offset in &offsets {
-                let back = [column - offset[0], row - offset[1]];
-                let Some((there, _)) = matrix.columns.find(back) else { continue };
-                let sees =
-                    matrix.rows[matrix.class[there] as usize].entries.iter().any(|(o, _)| *o == offset);
-                if sees && !reached[there] {
-                    reached[there] = true;
-                    fresh.push(back);
+        let connections = || {
+            matrix.runs().iter().flat_map(|run| {
+                let of = |k: u32| {
+                    let i = (run.start + k) as usize;
+                    let others = matrix.distances(run)[1..].iter();
+                    others.map(move |&distance| (i as u32, i.wrapping_add_signed(distance as isize)))
+                };
+                (0..run.len).flat_map(of)
+            })
+        };
+        // For each particle those that feel it, in compressed form.
+        let mut starts = vec![0u32; reached.len() + 1];
+        connections().for_each(|(_, felt)| starts[felt + 1] += 1);
+        for i in 0..reached.len() {
+            starts[i + 1] += starts[i];
+        }
+        let mut next = starts.clone();
+        let mut feels = vec![0u32; starts[reached.len()] as usize];
+        for (i, felt) in connections() {
+            feels[next[felt] as usize] = i;
+            next[felt] += 1;
+        }
+        let mut fresh: Vec<u32> = (0..reached.len() as u32).filter(|&i| reached[i as usize]).collect();
+        while let Some(felt) = fresh.pop() {
+            let those = starts[felt as usize] as usize..starts[felt as usize + 1] as usize;
+            for &i in &feels[those] {
+                if !std::mem::replace(&mut reached[i as usize], true) {
+                    fresh.push(i);
                 }
             }
         }

@@ -4,7 +4,10 @@
 use std::collections::HashMap;
 
 use super::columns::Columns;
-use super::{Operator, Row, Stretch, add};
+use super::{Operator, Outliers, Row, Stretch, add};
+use crate::flock::block::Block;
+use crate::flock::body::Body;
+use crate::flock::lattice::Site;
 
 /// Class of particles that do not follow.
 pub const HELD: u32 = u32::MAX;
@@ -39,6 +42,7 @@ pub struct Matrix {
     pub group_columns: Vec<i32>,
     /// First run of each group, shape \[groups + 1\].
     group_runs: Vec<usize>,
+    pub outliers: Outliers,
 }
 
 impl Matrix {
@@ -54,7 +58,9 @@ impl Matrix {
             bounds,
             group_columns,
             group_runs: Vec::new(),
+            outliers: Outliers::default(),
         };
+        matrix.outliers.first = matrix.class.len();
         matrix.find_runs();
         let first = |&bound: &usize| matrix.runs.partition_point(|run| (run.start as usize) < bound);
         matrix.group_runs = matrix.bounds.iter().map(first).collect();
@@ -72,23 +78,31 @@ impl Matrix {
             let entries = &operator.rows[full as usize].entries;
             let firsts: Vec<usize> =
                 entries.iter().map(|(offset, _)| operator.index_of(stretch.site, *offset)).collect();
-            let free = firsts.iter().all(|&j| operator.follows[j..j + len].iter().all(|&follows| follows));
+            let is_whole = |i: usize| operator.follows[i] && operator.held_axes(i) == [false; 2];
+            let own = (start..start + len).all(is_whole);
+            let free = own && firsts.iter().all(|&j| (j..j + len).all(is_whole));
             if free {
                 class[start..start + len].fill(full);
                 continue;
             }
             for k in 0..len {
-                let keep: Vec<bool> = firsts.iter().map(|&j| operator.follows[j + k]).collect();
-                class[start + k] = *known.entry((full, keep)).or_insert_with_key(|(full, keep)| {
-                    let mut row = operator.rows[*full as usize].clone();
-                    let mut kept = keep.iter();
-                    row.entries.retain(|_| kept.next() == Some(&true));
-                    rows.push(row);
-                    rows.len() as u32 - 1
-                });
+                // Which components of the particle itself and of its neighbours are unknowns.
+                let unknown = |i: usize| {
+                    let held = operator.held_axes(i);
+                    if operator.follows[i] { held.map(|held| !held) } else { [false; 2] }
+                };
+                let ends = std::iter::once(start).chain(firsts.iter().copied());
+                let free: Vec<[bool; 2]> = ends.map(|first| unknown(first + k)).collect();
+                let follows: Vec<bool> = firsts.iter().map(|&j| operator.follows[j + k]).collect();
+                class[start + k] =
+                    *known.entry((full, free, follows)).or_insert_with_key(|(full, free, follows)| {
+                        rows.push(without_held(&operator.rows[*full as usize], free, follows));
+                        rows.len() as u32 - 1
+                    });
             }
         }
-        Self::compile(columns, class, rows)
+        let outliers = operator.outliers.clone();
+        Self { outliers, ..Self::compile(columns, class, rows) }
     }
 
     pub fn count(&self) -> usize {
@@ -115,9 +129,10 @@ impl Matrix {
         &self.distances[run.distances as usize..][..entries + 1]
     }
 
-    /// Most columns and rows that an entry reaches.
+    /// Most columns and rows that an entry between two sites of the lattice reaches.
     pub fn reach(&self) -> [i32; 2] {
         let entries = self.rows.iter().flat_map(|row| &row.entries);
+        let entries = entries.filter(|(offset, _)| !leads_to_outlier(*offset));
         entries.fold([0, 0], |far, (o, _)| [far[0].max(o[0].abs()), far[1].max(o[1].abs())])
     }
 
@@ -158,4 +173,26 @@ impl Matrix {
             }
         }
     }
+}
+
+/// Whether an offset leads from a site of the lattice to a particle along an outline, or back.
+pub fn leads_to_outlier([columns, _]: Site) -> bool {
+    columns.abs() > Body::ALONG_OUTLINE / 2
+}
+
+/// A row in unknown components alone: `free` are those of the particle itself and of each neighbour, of which only
+/// those that follow have a place in the matrix. A held component keeps its place on the diagonal and is moved by
+/// nothing.
+fn without_held(row: &Row, free: &[[bool; 2]], follows: &[bool]) -> Row {
+    let own = free[0];
+    let keep = |block: &Block, other: [bool; 2]| -> Block {
+        std::array::from_fn(|a| std::array::from_fn(|b| if own[a] && other[b] { block[a][b] } else { 0.0 }))
+    };
+    let mut diagonal = keep(&row.diagonal, own);
+    for axis in (0..2).filter(|&axis| !own[axis]) {
+        diagonal[axis][axis] = row.diagonal[axis][axis];
+    }
+    let entries = row.entries.iter().zip(&free[1..]).zip(follows).filter(|(_, follows)| **follows);
+    let entries = entries.map(|(((offset, block), other), _)| (*offset, keep(block, *other)));
+    Row { diagonal, entries: entries.collect() }
 }

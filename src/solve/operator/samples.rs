@@ -3,7 +3,7 @@
 use super::{Operator, Row};
 use crate::flock::block::{Block, plus};
 use crate::flock::body::{Body, Cut};
-use crate::flock::lattice::{Lattice, LatticeKind};
+use crate::flock::lattice::{Lattice, LatticeKind, Site};
 use crate::flock::neighbourhood::Neighbourhood;
 
 /// Symmetric as a whole and positive, though its blocks are not symmetric: springs along and across each
@@ -42,4 +42,42 @@ fn spring([x, y]: [f64; 2]) -> Block {
         [along * x * x + across * y * y, (along - across) * x * y],
         [(along - across) * x * y, along * y * y + across * x * x],
     ]
+}
+
+/// The same operator with some of its particles along an outline: numbered last, at no site, somewhat beside where they
+/// were; of some of the others one component is held.
+pub fn with_outliers(operator: &Operator) -> Operator {
+    let sites: Vec<Site> = operator.columns.sites().collect();
+    let is_outlier = |i: usize| i % 7 == 3;
+    let order: Vec<usize> = (0..sites.len())
+        .filter(|&i| !is_outlier(i))
+        .chain((0..sites.len()).filter(|&i| is_outlier(i)))
+        .collect();
+    let regular = (0..sites.len()).filter(|&i| !is_outlier(i)).count();
+    let step = operator.columns.step();
+    let new_site = |number: usize| match number.checked_sub(regular) {
+        None => sites[order[number]],
+        Some(k) => [Body::ALONG_OUTLINE, k as i32 * step],
+    };
+    let mut number = vec![0; sites.len()];
+    order.iter().enumerate().for_each(|(new, &old)| number[old] = new);
+    let new_sites: Vec<Site> = (0..sites.len()).map(new_site).collect();
+    let row = |new: usize| {
+        let old = order[new];
+        let offset = |offset: Site| {
+            let other = operator.index_of(sites[old], offset);
+            let there = new_sites[number[other]];
+            [there[0] - new_sites[new][0], there[1] - new_sites[new][1]]
+        };
+        let row = operator.row(old);
+        Row { diagonal: row.diagonal, entries: row.entries.iter().map(|&(o, b)| (offset(o), b)).collect() }
+    };
+    let follows = order.iter().map(|&old| operator.follows()[old]).collect();
+    let beside = |k: usize| 0.3 * (k as f64 * 0.618).fract() - 0.1;
+    let place =
+        |&old: &usize| [f64::from(sites[old][0]) + beside(old), f64::from(sites[old][1]) - beside(3 * old)];
+    let places = order[regular..].iter().map(place).collect();
+    let held = (0..sites.len()).map(|new| [new % 23 == 11, new % 31 == 5]).collect();
+    let made = Operator::from_rows(&new_sites, operator.grid, follows, row).expect("an operator");
+    made.with_outliers(places).with_held_axes(held)
 }

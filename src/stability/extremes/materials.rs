@@ -142,7 +142,7 @@ pub fn contrast(solver: Solver, contrast: f64) -> Outcome {
     interaction.keep_rest();
     let follows: Vec<bool> = body.reference.iter().map(|[x, _]| x > 0.0 && x < end).collect();
     let held: Points = body.reference.iter().map(|[x, _]| [if x == end { 1.0 } else { 0.0 }, 0.0]).collect();
-    let system = match system(&interaction, &body, follows, held) {
+    let system = match system(&interaction, &body, follows, held, &[]) {
         Ok(system) => system,
         Err(error) => return Outcome::Refused { message: error.to_string() },
     };

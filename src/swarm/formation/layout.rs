@@ -118,7 +118,14 @@ fn of_body(swarm: &Swarm, scene: &Scene) -> Result<Formation, SceneError> {
     let mut led = scene.clone();
     if !ids.is_empty() {
         let region = SceneRegion::Known(Region::Ids(ids));
-        led.roles.push(RoleEntry { region, role: Role::Leader, from: 1, when: None, motion: None });
+        led.roles.push(RoleEntry {
+            region,
+            role: Role::Leader,
+            axis: None,
+            from: 1,
+            when: None,
+            motion: None,
+        });
     }
     let mut formation = of_scene(swarm, Plan::new(&led)?, false);
     (formation.names, formation.leads) = (names, leads);

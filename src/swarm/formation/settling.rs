@@ -39,7 +39,7 @@ impl Settling {
             return None;
         }
         let held = Points::zeros(roles.len());
-        let system = system(engine.interaction(), engine.body(), follows.clone(), held).ok()?;
+        let system = system(engine.interaction(), engine.body(), follows.clone(), held, &[]).ok()?;
         let mut number = vec![None; roles.len()];
         followers.iter().enumerate().for_each(|(n, &i)| number[i] = Some(n));
         leaders.iter().enumerate().for_each(|(n, &i)| number[i] = Some(n));

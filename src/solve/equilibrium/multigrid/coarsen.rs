@@ -3,12 +3,13 @@
 //! A row of it depends on nothing but the classes of the particles within a node's reach, so every
 //! different pattern of them is a class, and its row is computed once.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
-use super::transfer::Transfer;
+use super::transfer::{Transfer, parents_of_place};
 use crate::flock::block::{Block, plus};
+use crate::flock::body::Body;
 use crate::flock::lattice::Site;
-use crate::solve::operator::{Columns, HELD, Matrix, Row};
+use crate::solve::operator::{Columns, HELD, Matrix, Row, leads_to_outlier};
 
 /// How much coarser the first grid is than the lattice, in particles per node.
 const FIRST_RATIO: f64 = 4.0;
@@ -44,18 +45,115 @@ pub fn next_steps(spacing: [f64; 2]) -> [i32; 2] {
 /// The matrix of the coarse grid.
 pub fn coarsen(fine: &Matrix, transfer: Transfer) -> Matrix {
     let mut patterns = Patterns::new(transfer);
-    let (mut sites, mut class) = (Vec::new(), Vec::new());
+    let singles = Singles::new(fine, transfer);
+    let mut nodes: Vec<(Site, u32)> = Vec::new();
     let across = transfer.steps[0];
     let columns = fine.columns.range();
     for column in columns.start.div_euclid(across)..=(columns.end - 1).div_euclid(across) + 1 {
-        patterns.column(fine, column, |row, number| {
-            sites.push([column, row]);
-            class.push(number);
-        });
+        let is_single = |row: i32| singles.nodes.contains_key(&[column, row]);
+        patterns.column(fine, column, is_single, |row, number| nodes.push(([column, row], number)));
     }
-    let rows = patterns.by_class.iter().map(|pattern| galerkin(fine, transfer, pattern)).collect();
-    let columns = Columns::new(sites.iter().copied(), |_| true);
-    Matrix::compile(columns, class, rows)
+    let patterns = patterns.by_class;
+    let mut rows: Vec<Row> = patterns.iter().map(|pattern| galerkin(fine, transfer, pattern)).collect();
+    if !singles.nodes.is_empty() {
+        for &node in singles.nodes.keys() {
+            nodes.push((node, rows.len() as u32));
+            rows.push(singles.row(node));
+        }
+        nodes.sort_unstable();
+    }
+    let columns = Columns::new(nodes.iter().map(|&(site, _)| site), |_| true);
+    Matrix::compile(columns, nodes.into_iter().map(|(_, class)| class).collect(), rows)
+}
+
+/// Nodes near particles that stand at no site, whose rows are summed one by one.
+struct Singles<'a> {
+    fine: &'a Matrix,
+    transfer: Transfer,
+    /// The particles at no site that have a share in each node.
+    nodes: BTreeMap<Site, Vec<(usize, f64)>>,
+}
+
+impl<'a> Singles<'a> {
+    fn new(fine: &'a Matrix, transfer: Transfer) -> Self {
+        let mut nodes: BTreeMap<Site, Vec<(usize, f64)>> = BTreeMap::new();
+        let first = fine.outliers.first;
+        for (k, &place) in fine.outliers.places.iter().enumerate() {
+            if fine.class[first + k] == HELD {
+                continue;
+            }
+            for (node, share) in parents_of_place(place, transfer.steps).into_iter().filter(|(_, s)| *s > 0.0)
+            {
+                nodes.entry(node).or_default().push((first + k, share));
+            }
+        }
+        // Nodes with a share in a particle that feels one of these feel it through that.
+        if !nodes.is_empty() {
+            let leads: Vec<bool> = fine
+                .rows
+                .iter()
+                .map(|row| row.entries.iter().any(|(offset, _)| leads_to_outlier(*offset)))
+                .collect();
+            for site in fine.columns.sites().filter(|[column, _]| *column != Body::ALONG_OUTLINE) {
+                let Some((i, _)) = fine.columns.find(site) else { continue };
+                if leads[fine.class[i] as usize] {
+                    parents(site, transfer.steps).for_each(|node| {
+                        nodes.entry(node).or_default();
+                    });
+                }
+            }
+        }
+        Self { fine, transfer, nodes }
+    }
+
+    /// Shares of the nodes in a particle that stands at a site or at none.
+    fn parents(&self, site: Site, i: usize) -> Vec<(Site, f64)> {
+        let [across, along] = self.transfer.steps;
+        match i.checked_sub(self.fine.outliers.first) {
+            Some(k) => {
+                let shares = parents_of_place(self.fine.outliers.places[k], self.transfer.steps);
+                shares.into_iter().filter(|(_, share)| *share > 0.0).collect()
+            }
+            None => parents(site, self.transfer.steps)
+                .map(|node| {
+                    let at = [site[0] - node[0] * across, site[1] - node[1] * along];
+                    (node, hat(at[0], across) * hat(at[1], along))
+                })
+                .collect(),
+        }
+    }
+
+    /// The row of `P' K P` at a node.
+    fn row(&self, node: Site) -> Row {
+        let [across, along] = self.transfer.steps;
+        let columns = &self.fine.columns;
+        let (first, step) = (self.fine.outliers.first, columns.step());
+        let near = |k: usize, step: i32| node[k] * step - step + 1..node[k] * step + step;
+        let window = near(0, across).flat_map(|i| near(1, along).map(move |j| [i, j]));
+        let at_sites = window.filter_map(|site| {
+            let (i, _) = columns.find(site)?;
+            let at = [site[0] - node[0] * across, site[1] - node[1] * along];
+            Some((site, i, hat(at[0], across) * hat(at[1], along)))
+        });
+        let outliers = self.nodes[&node].iter();
+        let outliers =
+            outliers.map(|&(i, share)| ([Body::ALONG_OUTLINE, (i - first) as i32 * step], i, share));
+        let mut sums: BTreeMap<Site, Block> = BTreeMap::new();
+        for (site, i, share) in at_sites.chain(outliers) {
+            let row = &self.fine.rows[self.fine.class[i] as usize];
+            let negative = |block: &Block| block.map(|row| row.map(|value| -value));
+            let entries = row.entries.iter().map(|(offset, block)| (*offset, negative(block)));
+            for (offset, block) in std::iter::once(([0, 0], row.diagonal)).chain(entries) {
+                let there = [site[0] + offset[0], site[1] + offset[1]];
+                let Some((j, _)) = columns.find(there) else { continue };
+                for (other, part) in self.parents(there, j) {
+                    let sum = sums.entry([other[0] - node[0], other[1] - node[1]]).or_default();
+                    *sum = plus(sum, &block.map(|row| row.map(|value| share * part * value)));
+                }
+            }
+        }
+        into_row(sums)
+    }
 }
 
 /// The different surroundings of nodes: classes of the fine particles within reach, column by column.
@@ -74,7 +172,13 @@ impl Patterns {
     }
 
     /// Hands out the row and the class of each node of a coarse column.
-    fn column(&mut self, fine: &Matrix, number: i32, mut node: impl FnMut(i32, u32)) {
+    fn column(
+        &mut self,
+        fine: &Matrix,
+        number: i32,
+        is_single: impl Fn(i32) -> bool,
+        mut node: impl FnMut(i32, u32),
+    ) {
         let [across, along] = self.transfer.steps;
         let within = number * across - across + 1..number * across + across;
         let bounds = within.clone().filter_map(|i| fine.columns.rows_of(i));
@@ -94,6 +198,10 @@ impl Patterns {
         let reach = 2 * along as usize - 1;
         let (mut pattern, mut before) = (Vec::new(), HELD);
         for row in first..=last {
+            if is_single(row) {
+                before = HELD;
+                continue;
+            }
             let at = ((row - first) * along) as usize;
             let alike = before != HELD && {
                 let known = self.by_class[before as usize].chunks_exact(reach);
@@ -125,7 +233,7 @@ fn galerkin(fine: &Matrix, transfer: Transfer, pattern: &[u32]) -> Row {
     let [across, along] = transfer.steps;
     let reach = 2 * along - 1;
     // Ordered by offset, so that the row does not depend on how it was summed.
-    let mut sums: std::collections::BTreeMap<Site, Block> = std::collections::BTreeMap::new();
+    let mut sums: BTreeMap<Site, Block> = BTreeMap::new();
     for (k, &class) in pattern.iter().enumerate().filter(|(_, class)| **class != HELD) {
         let own = [k as i32 / reach - across + 1, k as i32 % reach - along + 1];
         let share = hat(own[0], across) * hat(own[1], along);
@@ -142,6 +250,10 @@ fn galerkin(fine: &Matrix, transfer: Transfer, pattern: &[u32]) -> Row {
             }
         }
     }
+    into_row(sums)
+}
+
+fn into_row(mut sums: BTreeMap<Site, Block>) -> Row {
     let diagonal = sums.remove(&[0, 0]).unwrap_or_default();
     let entries = sums.into_iter().map(|(offset, block)| (offset, block.map(|row| row.map(|v| -v))));
     Row { diagonal, entries: entries.filter(|(_, block)| *block != Block::default()).collect() }

@@ -35,8 +35,21 @@ impl Plan {
     fn new(matrix: &Matrix) -> Self {
         let mut nodes: Vec<(Site, u32)> = sites(matrix);
         let [across, along] = matrix.columns.extent();
-        if across < along {
-            nodes.sort_unstable_by_key(|&([column, row], _)| [row, column]);
+        if matrix.outliers.places.is_empty() {
+            if across < along {
+                nodes.sort_unstable_by_key(|&([column, row], _)| [row, column]);
+            }
+        } else {
+            // Particles along an outline belong among those beside them.
+            let place = |&(site, node): &(Site, u32)| {
+                let outlier = (node as usize).checked_sub(matrix.outliers.first);
+                let [i, j] = outlier.map_or(site.map(f64::from), |k| matrix.outliers.places[k]);
+                if across < along { [j, i] } else { [i, j] }
+            };
+            nodes.sort_by(|a, b| {
+                let (p, q) = (place(a), place(b));
+                p[0].total_cmp(&q[0]).then(p[1].total_cmp(&q[1]))
+            });
         }
         let mut place = vec![0; matrix.count()];
         nodes.iter().enumerate().for_each(|(at, &(_, node))| place[node as usize] = at as u32);

@@ -23,7 +23,7 @@ mod transfer;
 use std::time::Instant;
 
 use self::envelope::Envelope;
-use self::transfer::Transfer;
+use self::transfer::{OutlierShares, Transfer};
 use super::conjugate_gradients::{Preconditioner, iterate, iterate_single, single_scale};
 use super::steps::for_groups;
 use super::system::Prepared;
@@ -78,6 +78,7 @@ struct Cycle<'a> {
 /// A coarser level, and how it is reached.
 struct Level {
     transfer: Transfer,
+    outliers: OutlierShares,
     matrix: Matrix,
     stencils: Stencils<f32>,
     weights: [f64; 2],
@@ -168,10 +169,10 @@ fn descend(here: &Smoothed<'_>, vectors: &mut Vectors, below: &mut [Level], coar
     steps::smooth(matrix, stencils, weights[1], (u, f), v);
     steps::residual(matrix, stencils, (v, f), u);
     let levels = (matrix, &next.matrix);
-    next.transfer.restrict(levels, u, &mut next.vectors.f);
+    next.transfer.restrict(levels, &next.outliers, u, &mut next.vectors.f);
     let view = Smoothed { matrix: &next.matrix, stencils: &next.stencils, weights: next.weights };
     descend(&view, &mut next.vectors, further, coarsest);
-    next.transfer.prolong(levels, &next.vectors.v, v);
+    next.transfer.prolong(levels, &next.outliers, &next.vectors.v, v);
     steps::smooth(matrix, stencils, weights[1], (v, f), u);
     steps::smooth(matrix, stencils, weights[0], (u, f), v);
 }
@@ -182,7 +183,8 @@ impl Level {
         let stencils = Stencils::new(&matrix.rows, scale);
         let weights = weights(&matrix, &stencils)?;
         let vectors = Vectors::new(matrix.count());
-        Some(Self { transfer, matrix, stencils, weights, vectors })
+        let outliers = OutlierShares::new(fine, &matrix, transfer);
+        Some(Self { transfer, outliers, matrix, stencils, weights, vectors })
     }
 }
 

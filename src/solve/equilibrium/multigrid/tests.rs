@@ -2,11 +2,11 @@
 
 use super::coarsen::{coarsen, first_steps, next_steps};
 use super::envelope::Envelope;
-use super::transfer::Transfer;
+use super::transfer::{OutlierShares, Transfer};
 use super::*;
 use crate::flock::lattice::{Lattice, LatticeKind, Site};
 use crate::solve::operator::HELD;
-use crate::solve::operator::samples::operator;
+use crate::solve::operator::samples::{operator, with_outliers};
 
 fn dense(matrix: &Matrix) -> Vec<Vec<f64>> {
     let stencils = Stencils::<f64>::new(&matrix.rows, 1.0);
@@ -40,16 +40,24 @@ fn product(a: &[f64], b: &[f64]) -> f64 {
 /// Every way a lattice may be coarsened, and the matrices above and below.
 fn each_coarsening(test: impl Fn(LatticeKind, &Matrix, &Matrix, Transfer)) {
     for kind in LatticeKind::SAMPLES {
-        let operator = operator(kind, 11, 13, |i| i < 9 || i == 50);
-        let fine = Matrix::of_followers(&operator);
-        let lattice = Lattice::new(kind, [0.0; 2], 0.2);
-        let first = first_steps([lattice.vector([1, 0]), lattice.vector([0, 1])], particles_per_site(&fine));
-        for steps in [first, [2, 2], [1, 2], [2, 1], [3, 4]] {
-            let transfer = Transfer { steps };
-            let coarse = coarsen(&fine, transfer);
-            test(kind, &fine, &coarse, transfer);
-            // And again, from a grid without gaps.
-            test(kind, &coarse, &coarsen(&coarse, Transfer { steps: [2, 2] }), Transfer { steps: [2, 2] });
+        let regular = operator(kind, 11, 13, |i| i < 9 || i == 50);
+        let operators = [with_outliers(&regular), regular];
+        for fine in operators.iter().map(Matrix::of_followers) {
+            let lattice = Lattice::new(kind, [0.0; 2], 0.2);
+            let first =
+                first_steps([lattice.vector([1, 0]), lattice.vector([0, 1])], particles_per_site(&fine));
+            for steps in [first, [2, 2], [1, 2], [2, 1], [3, 4]] {
+                let transfer = Transfer { steps };
+                let coarse = coarsen(&fine, transfer);
+                test(kind, &fine, &coarse, transfer);
+                // And again, from a grid without gaps.
+                test(
+                    kind,
+                    &coarse,
+                    &coarsen(&coarse, Transfer { steps: [2, 2] }),
+                    Transfer { steps: [2, 2] },
+                );
+            }
         }
     }
 }
@@ -60,7 +68,7 @@ fn the_coarse_operator_is_the_triple_product() {
         let k = dense(fine);
         let p = columns(coarse.count(), |unit| {
             let mut out = Field::zeros(fine.count());
-            transfer.prolong((fine, coarse), unit, &mut out);
+            transfer.prolong((fine, coarse), &OutlierShares::new(fine, coarse, transfer), unit, &mut out);
             out
         });
         let coarse = dense(coarse);
@@ -80,12 +88,12 @@ fn restriction_is_the_transpose_of_interpolation() {
     each_coarsening(|kind, fine, coarse, transfer| {
         let p = columns(coarse.count(), |unit| {
             let mut out = Field::zeros(fine.count());
-            transfer.prolong((fine, coarse), unit, &mut out);
+            transfer.prolong((fine, coarse), &OutlierShares::new(fine, coarse, transfer), unit, &mut out);
             out
         });
         let r = columns(fine.count(), |unit| {
             let mut out = Field::zeros(coarse.count());
-            transfer.restrict((fine, coarse), unit, &mut out);
+            transfer.restrict((fine, coarse), &OutlierShares::new(fine, coarse, transfer), unit, &mut out);
             out
         });
         for (i, row) in r.iter().enumerate().filter(|(i, _)| fine.class[i % fine.count()] != HELD) {
@@ -107,10 +115,12 @@ fn the_coarse_space_contains_translations_rotations_and_uniform_strains() {
             (nodes.x[node], nodes.y[node]) = (x as f32, y as f32);
         }
         let mut found = Field::zeros(fine.count());
-        transfer.prolong((fine, coarse), &nodes, &mut found);
+        transfer.prolong((fine, coarse), &OutlierShares::new(fine, coarse, transfer), &nodes, &mut found);
         for site in fine.columns.sites() {
             let (i, _) = fine.columns.find(site).expect("a follower");
-            let (found, expected) = (found.get(i), affine(site.map(f64::from)));
+            let outlier = i.checked_sub(fine.outliers.first);
+            let place = outlier.map_or(site.map(f64::from), |k| fine.outliers.places[k]);
+            let (found, expected) = (found.get(i), affine(place));
             let error = (0..2).map(|k| (f64::from(found[k]) - expected[k]).abs()).fold(0.0, f64::max);
             assert!(error < 1e-5, "{kind:?} {transfer:?} {site:?}: {error}");
         }
@@ -168,13 +178,14 @@ fn the_envelope_refuses_what_is_not_positive_and_leaves_out_what_is_nothing() {
     let mut nodes = Field::<f32>::zeros(coarse.count());
     nodes.x.iter_mut().enumerate().for_each(|(k, x)| *x = (k as f32 * 0.4).sin());
     let mut exact = Field::zeros(fine.count());
-    transfer.prolong((&fine, &coarse), &nodes, &mut exact);
+    let none = OutlierShares::default();
+    transfer.prolong((&fine, &coarse), &none, &nodes, &mut exact);
     let (mut f, mut coarse_f) = (Field::zeros(fine.count()), Field::zeros(coarse.count()));
     steps::apply(&fine, &Stencils::<f32>::new(&fine.rows, 1.0), &exact, &mut f);
-    transfer.restrict((&fine, &coarse), &f, &mut coarse_f);
+    transfer.restrict((&fine, &coarse), &none, &f, &mut coarse_f);
     let (mut solved, mut found) = (Field::zeros(coarse.count()), Field::zeros(fine.count()));
     factor.solve((&coarse_f.x, &coarse_f.y), (&mut solved.x, &mut solved.y));
-    transfer.prolong((&fine, &coarse), &solved, &mut found);
+    transfer.prolong((&fine, &coarse), &none, &solved, &mut found);
     let worst = (0..40).map(|i| (found.x[i] - exact.x[i]).abs()).fold(0.0, f32::max);
     assert!(worst < 1e-3 && exact.x.iter().any(|x| x.abs() > 0.2), "{worst}");
 }

@@ -4,9 +4,10 @@
 //! particle or not. Places are affine in column and row on every lattice, so displacements that are
 //! affine, rotations among them, are reproduced to rounding.
 
+use crate::flock::lattice::Site;
 use crate::solve::equilibrium::steps::for_groups;
 use crate::solve::field::{Field, Part, View};
-use crate::solve::operator::{Columns, Matrix, Segment};
+use crate::solve::operator::{Columns, HELD, Matrix, Segment};
 
 /// Between the particles of one matrix and the nodes of the next.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -59,6 +60,68 @@ impl Column {
     }
 }
 
+/// What the particles along an outline, which stand at no site, have of the coarse nodes around their places.
+#[derive(Clone, Debug, Default)]
+pub struct OutlierShares {
+    /// Index of the first of them in the fine matrix.
+    first: usize,
+    /// Nodes and shares of each, shape \[outliers\].
+    parents: Vec<[(u32, f32); 4]>,
+    /// The same by nodes: node, particle, share; ascending.
+    children: Vec<(u32, u32, f32)>,
+}
+
+impl OutlierShares {
+    pub fn new(fine: &Matrix, coarse: &Matrix, transfer: Transfer) -> Self {
+        let first = fine.outliers.first;
+        let mut shares = Self { first, ..Self::default() };
+        for (k, &place) in fine.outliers.places.iter().enumerate() {
+            let is_held = fine.class[first + k] == HELD;
+            let nodes = parents_of_place(place, transfer.steps).map(|(site, share)| {
+                let node = coarse.columns.find(site).filter(|_| !is_held && share > 0.0);
+                node.map_or((0, 0.0), |(node, _)| (node as u32, share as f32))
+            });
+            let used = nodes.iter().filter(|(_, share)| *share > 0.0);
+            shares.children.extend(used.map(|&(node, share)| (node, (first + k) as u32, share)));
+            shares.parents.push(nodes);
+        }
+        shares.children.sort_by_key(|&(node, particle, _)| (node, particle));
+        shares
+    }
+
+    fn restrict(&self, from: &Field<f32>, to: &mut Part<'_, f32>) {
+        let range = to.range();
+        let begin = self.children.partition_point(|&(node, ..)| (node as usize) < range.start);
+        let of_range = self.children[begin..].iter().take_while(|(node, ..)| (*node as usize) < range.end);
+        for &(node, particle, share) in of_range {
+            let at = node as usize - range.start;
+            to.x[at] += share * from.x[particle as usize];
+            to.y[at] += share * from.y[particle as usize];
+        }
+    }
+
+    fn prolong(&self, from: &Field<f32>, to: &mut Part<'_, f32>) {
+        let range = to.range();
+        for i in range.start.max(self.first)..range.end {
+            for &(node, share) in self.parents.get(i - self.first).into_iter().flatten() {
+                to.x[i - range.start] += share * from.x[node as usize];
+                to.y[i - range.start] += share * from.y[node as usize];
+            }
+        }
+    }
+}
+
+/// The coarse nodes around a place in fine columns and rows, and its shares of them, which are linear both ways.
+pub fn parents_of_place(place: [f64; 2], steps: [i32; 2]) -> [(Site, f64); 4] {
+    let at = [0, 1].map(|k| place[k] / f64::from(steps[k]));
+    let node = at.map(f64::floor);
+    let beyond = [0, 1].map(|k| at[k] - node[k]);
+    [[0, 0], [0, 1], [1, 0], [1, 1]].map(|[i, j]: [i32; 2]| {
+        let share = |k: usize, up: i32| if up == 1 { beyond[k] } else { 1.0 - beyond[k] };
+        ([node[0] as i32 + i, node[1] as i32 + j], share(0, i) * share(1, j))
+    })
+}
+
 impl Transfer {
     /// Share of the node `steps` away that a place `at` away from the other has.
     fn weight(self, axis: usize, at: i32) -> f32 {
@@ -66,7 +129,13 @@ impl Transfer {
     }
 
     /// `coarse = P' fine`.
-    pub fn restrict(self, (fine, coarse): (&Matrix, &Matrix), from: &Field<f32>, to: &mut Field<f32>) {
+    pub fn restrict(
+        self,
+        (fine, coarse): (&Matrix, &Matrix),
+        outliers: &OutlierShares,
+        from: &Field<f32>,
+        to: &mut Field<f32>,
+    ) {
         for_groups(to.parts(&coarse.bounds), |group, mut to| {
             let mut column = Column::new();
             for number in coarse.group_columns[group]..coarse.group_columns[group + 1] {
@@ -75,6 +144,7 @@ impl Transfer {
                     self.contract(segment, &column, &mut to);
                 }
             }
+            outliers.restrict(from, &mut to);
         });
     }
 
@@ -123,7 +193,13 @@ impl Transfer {
     }
 
     /// `fine += P coarse`.
-    pub fn prolong(self, (fine, coarse): (&Matrix, &Matrix), from: &Field<f32>, to: &mut Field<f32>) {
+    pub fn prolong(
+        self,
+        (fine, coarse): (&Matrix, &Matrix),
+        outliers: &OutlierShares,
+        from: &Field<f32>,
+        to: &mut Field<f32>,
+    ) {
         for_groups(to.parts(&fine.bounds), |group, mut to| {
             let mut column = Column::new();
             for number in fine.group_columns[group]..fine.group_columns[group + 1] {
@@ -142,6 +218,7 @@ impl Transfer {
                     self.expand(segment, fine.columns.step(), &column, &mut to);
                 }
             }
+            outliers.prolong(from, &mut to);
         });
     }
 

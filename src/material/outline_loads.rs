@@ -1,0 +1,394 @@
+//! Loads to the forces on particles.
+//!
+//! What acts on the outline is integrated along the true outline, arcs included, and handed to the side of the cells'
+//! boundary that is nearest: each force to the two particles of the side, so that resultant and moment are kept. On a
+//! body that is fitted to its outline the sides are the outline, and the forces do the same work as the load in every
+//! displacement that the cells can have; on a body of whole cells they replace the load by an equivalent one.
+
+use std::collections::HashMap;
+
+use super::cells::Cells;
+use crate::flock::body::Body;
+use crate::flock::points::{Points, distance};
+use crate::geometry::outline::{Outline, Place};
+use crate::geometry::portion::Portion;
+
+/// Something that acts along an outline.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Push {
+    /// Along x and y \[force / length\]: stress times the thickness of the sheet.
+    Traction([f64; 2]),
+    /// Against the outward normal \[force / length\].
+    Pressure(f64),
+}
+
+/// A factor that is linear along a line \[1\].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Profile {
+    /// Where the first factor holds \[length\].
+    pub from: [f64; 2],
+    /// Where the second factor holds \[length\].
+    pub to: [f64; 2],
+    /// At `from` and at `to` \[1\].
+    pub factors: [f64; 2],
+}
+
+/// A load on parts of an outline.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OutlineLoad {
+    pub portions: Vec<Portion>,
+    pub push: Push,
+    pub profile: Option<Profile>,
+}
+
+/// Something that pushes on a body.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Load {
+    Outline(OutlineLoad),
+    /// The same force on each of these particles \[force\].
+    Particles {
+        particles: Vec<u32>,
+        force: [f64; 2],
+    },
+    /// On every cell alike \[force / length^2\]: weight per volume times the thickness of the sheet.
+    Body([f64; 2]),
+}
+
+/// Why a load cannot be put on a body. Particles are named by their ids, which count from 1.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum LoadError {
+    #[error("a force acts on particle {particle}, but it belongs to no cell")]
+    NoCell { particle: usize },
+    #[error("the cells have no boundary for a load to act on")]
+    NoBoundary,
+    #[error("a load must be finite")]
+    NotFinite,
+}
+
+/// A load's sum of forces and their moment about the origin of the coordinates.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Resultant {
+    /// \[force\]
+    pub force: [f64; 2],
+    /// Counter-clockwise \[force length\].
+    pub moment: f64,
+}
+
+impl Resultant {
+    /// Of forces \[force\] at places \[length\].
+    pub fn of(forces: impl IntoIterator<Item = ([f64; 2], [f64; 2])>) -> Self {
+        forces.into_iter().fold(Self::default(), |sum, ([x, y], [fx, fy])| Self {
+            force: [sum.force[0] + fx, sum.force[1] + fy],
+            moment: sum.moment + x * fy - y * fx,
+        })
+    }
+}
+
+impl Profile {
+    fn at(&self, p: [f64; 2]) -> f64 {
+        let along = [0, 1].map(|k| self.to[k] - self.from[k]);
+        let off = [0, 1].map(|k| p[k] - self.from[k]);
+        let share = (off[0] * along[0] + off[1] * along[1]) / (along[0] * along[0] + along[1] * along[1]);
+        self.factors[0] + share * (self.factors[1] - self.factors[0])
+    }
+}
+
+impl OutlineLoad {
+    /// What acts at a point \[length\] of the outline with this outward normal \[force / length\].
+    pub fn at(&self, point: [f64; 2], normal: [f64; 2]) -> [f64; 2] {
+        let factor = self.profile.map_or(1.0, |profile| profile.at(point));
+        match self.push {
+            Push::Traction(traction) => traction.map(|t| factor * t),
+            Push::Pressure(pressure) => normal.map(|n| -factor * pressure * n),
+        }
+    }
+
+    /// Forces \[force\] at places \[length\] that stand for the load: Gauss points of stretches that end at `breaks`
+    /// and are no longer than `grain` \[length\].
+    fn forces(&self, outline: &Outline, breaks: &[Place], grain: f64) -> Vec<([f64; 2], [f64; 2])> {
+        let mut forces = Vec::new();
+        for &Portion { ring, piece, t: [from, to] } in &self.portions {
+            let on = outline.piece(ring, piece);
+            let here = breaks.iter().filter(|b| (b.ring, b.piece) == (ring, piece) && b.t > from && b.t < to);
+            let mut ends: Vec<f64> = here.map(|b| b.t).chain([from, to]).collect();
+            ends.sort_by(f64::total_cmp);
+            for pair in ends.windows(2) {
+                let (begin, share) = (pair[0], pair[1] - pair[0]);
+                let angle = on.arc.map_or(0.0, |arc| arc.sweep.abs() * share);
+                let count = (share * on.length() / grain).ceil().max((angle / MOST_ANGLE).ceil()).max(1.0);
+                for k in 0..count as usize {
+                    for (at, weight) in GAUSS {
+                        let t = begin + share * (k as f64 + at) / count;
+                        let (point, normal) = (on.point(t), on.normal(t));
+                        let length = weight * share * on.length() / count;
+                        forces.push((point, self.at(point, normal).map(|f| f * length)));
+                    }
+                }
+            }
+        }
+        forces
+    }
+}
+
+/// Arcs are integrated in stretches of at most this angle \[rad\]: to 13 digits.
+const MOST_ANGLE: f64 = 0.1;
+
+/// Gauss points of the unit interval, of degree 5: places and weights.
+const GAUSS: [(f64, f64); 3] =
+    [(0.112_701_665_379_258_3, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.887_298_334_620_741_7, 5.0 / 18.0)];
+
+/// Puts loads on the particles of a body.
+#[derive(Debug)]
+pub struct Loader<'a> {
+    cells: &'a Cells,
+    body: &'a Body,
+    /// The outline of the body's shape; only loads on it need one.
+    outline: Option<&'a Outline>,
+    sides: SideGrid,
+}
+
+impl<'a> Loader<'a> {
+    pub fn new(cells: &'a Cells, body: &'a Body, outline: Option<&'a Outline>) -> Self {
+        Self { cells, body, outline, sides: SideGrid::new(cells, &body.reference, body.lattice.spacing()) }
+    }
+
+    /// Adds the forces of a load to those on the particles \[force\], shape \[count\].
+    ///
+    /// # Errors
+    /// A load that acts on nothing, or is not finite.
+    pub fn add(&self, load: &Load, forces: &mut Points) -> Result<(), LoadError> {
+        match load {
+            Load::Outline(load) => self.add_along_outline(load, forces)?,
+            Load::Particles { particles, force } => {
+                let incidence = self.cells.incidence(self.body.count());
+                for &i in particles {
+                    if incidence.of(i as usize).is_empty() {
+                        return Err(LoadError::NoCell { particle: self.body.id(i as usize) });
+                    }
+                    push(forces, i, *force);
+                }
+            }
+            Load::Body(force) => {
+                let shares: Vec<Vec<f64>> =
+                    (0..self.cells.shapes.len()).map(|kind| self.cells.load_shares(kind)).collect();
+                for (cell, &kind) in self.cells.iter().zip(&self.cells.kind) {
+                    for (&particle, share) in cell.iter().zip(&shares[kind as usize]) {
+                        push(forces, particle, force.map(|b| b * share));
+                    }
+                }
+            }
+        }
+        let is_finite = forces.iter().flatten().all(f64::is_finite);
+        if is_finite { Ok(()) } else { Err(LoadError::NotFinite) }
+    }
+
+    fn add_along_outline(&self, load: &OutlineLoad, forces: &mut Points) -> Result<(), LoadError> {
+        let Some(outline) = self.outline else { return Err(LoadError::NoBoundary) };
+        let spacing = self.body.lattice.spacing();
+        let (breaks, grain): (Vec<Place>, f64) = match &self.body.outline {
+            Some(known) => (known.places.iter().flatten().copied().collect(), f64::INFINITY),
+            None => (Vec::new(), 0.25 * spacing),
+        };
+        for (point, force) in load.forces(outline, &breaks, grain) {
+            let side = self.sides.nearest(point, &self.body.reference).ok_or(LoadError::NoBoundary)?;
+            self.attach(point, force, side, forces);
+        }
+        Ok(())
+    }
+
+    /// Replaces a force at a point \[length\] by forces on the ends of a side: shares of it where the point's foot is on
+    /// the side, and a couple across the side for what that leaves of the moment.
+    fn attach(&self, point: [f64; 2], force: [f64; 2], [a, b]: [u32; 2], forces: &mut Points) {
+        let (from, to) = (self.body.reference.get(a as usize), self.body.reference.get(b as usize));
+        let along = [0, 1].map(|k| to[k] - from[k]);
+        let square = along[0] * along[0] + along[1] * along[1];
+        let off = [0, 1].map(|k| point[k] - from[k]);
+        let t = ((off[0] * along[0] + off[1] * along[1]) / square).clamp(0.0, 1.0);
+        let arm = [0, 1].map(|k| off[k] - t * along[k]);
+        let moment = arm[0] * force[1] - arm[1] * force[0];
+        // A force c across the side at its end and -c at its beginning have the moment |c| times the length.
+        let couple = [-along[1], along[0]].map(|n| n * moment / square);
+        push(forces, a, [0, 1].map(|k| (1.0 - t) * force[k] - couple[k]));
+        push(forces, b, [0, 1].map(|k| t * force[k] + couple[k]));
+    }
+}
+
+fn push(forces: &mut Points, particle: u32, [x, y]: [f64; 2]) {
+    forces.x[particle as usize] += x;
+    forces.y[particle as usize] += y;
+}
+
+/// Sides of the cells' boundary in square buckets.
+#[derive(Debug)]
+struct SideGrid {
+    /// \[length\]
+    bucket: f64,
+    sides: Vec<[u32; 2]>,
+    buckets: HashMap<[i64; 2], Vec<u32>>,
+}
+
+impl SideGrid {
+    fn new(cells: &Cells, reference: &Points, bucket: f64) -> Self {
+        let sides = cells.boundary_sides(&cells.incidence(reference.len()));
+        let mut grid = Self { bucket, sides, buckets: HashMap::new() };
+        for (number, side) in grid.sides.iter().enumerate() {
+            let [a, b] = side.map(|i| reference.get(i as usize));
+            let low = grid.key([0, 1].map(|k| a[k].min(b[k])));
+            let high = grid.key([0, 1].map(|k| a[k].max(b[k])));
+            for key in (low[0]..=high[0]).flat_map(|i| (low[1]..=high[1]).map(move |j| [i, j])) {
+                grid.buckets.entry(key).or_default().push(number as u32);
+            }
+        }
+        grid
+    }
+
+    fn key(&self, p: [f64; 2]) -> [i64; 2] {
+        p.map(|v| (v / self.bucket).floor() as i64)
+    }
+
+    /// The side nearest to a point \[length\].
+    fn nearest(&self, p: [f64; 2], reference: &Points) -> Option<[u32; 2]> {
+        let [i, j] = self.key(p);
+        let mut best: Option<(f64, u32)> = None;
+        // Ring by ring: what is in a farther ring is farther than what a nearer one has.
+        for reach in 0..MOST_RINGS {
+            if best.is_some_and(|(near, _)| near <= (reach - 1).max(0) as f64 * self.bucket) {
+                break;
+            }
+            let ring = (-reach..=reach).flat_map(|di| (-reach..=reach).map(move |dj| [di, dj]));
+            for [di, dj] in ring.filter(|[di, dj]| di.abs().max(dj.abs()) == reach) {
+                for &number in self.buckets.get(&[i + di, j + dj]).into_iter().flatten() {
+                    let [a, b] = self.sides[number as usize].map(|i| reference.get(i as usize));
+                    let apart = distance_to_segment(p, a, b);
+                    if best.is_none_or(|(near, known)| (apart, number) < (near, known)) {
+                        best = Some((apart, number));
+                    }
+                }
+            }
+        }
+        best.map(|(_, number)| self.sides[number as usize])
+    }
+}
+
+/// Rings of buckets searched: the boundary of the cells is never farther from the outline than that.
+const MOST_RINGS: i64 = 64;
+
+fn distance_to_segment(p: [f64; 2], a: [f64; 2], b: [f64; 2]) -> f64 {
+    let along = [0, 1].map(|k| b[k] - a[k]);
+    let off = [0, 1].map(|k| p[k] - a[k]);
+    let square = along[0] * along[0] + along[1] * along[1];
+    let t = ((off[0] * along[0] + off[1] * along[1]) / square).clamp(0.0, 1.0);
+    distance(p, [0, 1].map(|k| a[k] + t * along[k]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flock::body::Cut;
+    use crate::flock::lattice::{Lattice, LatticeKind};
+    use crate::geometry::portion::Selection;
+    use crate::geometry::shape::Shape;
+    use crate::material::cells::{neighbourhood, without_loose_sites};
+    use crate::material::fit::fit;
+    use crate::material::stiffness::area;
+
+    fn shape() -> Shape {
+        Shape::WithHoles {
+            body: Box::new(Shape::Polygon {
+                vertices: vec![[0.0, 0.0], [9.0, 1.0], [8.0, 7.0], [2.0, 8.0], [-1.0, 4.0]],
+            }),
+            holes: vec![Shape::Disc { centre: [4.0, 4.0], radius: 1.7 }],
+        }
+    }
+
+    /// The body of a shape, fitted or of whole cells.
+    fn body(kind: LatticeKind, fitted: bool) -> (Body, Cells, Outline) {
+        let lattice = Lattice::new(kind, [0.2, 0.1], 0.7);
+        let outline = Outline::of_shape(&shape()).expect("an outline");
+        if fitted {
+            let fitted = fit(&lattice, &outline).expect("fits");
+            return (fitted.body, fitted.cells, outline);
+        }
+        let near = neighbourhood(&lattice);
+        let (body, seen) = Body::build(lattice, &Cut::Shape(shape()), &near, None).expect("builds");
+        let (body, _, cells) = without_loose_sites(&body, &seen);
+        (body, cells, outline)
+    }
+
+    fn resultant(forces: &Points, body: &Body) -> Resultant {
+        Resultant::of(body.reference.iter().zip(forces.iter()))
+    }
+
+    #[test]
+    fn loads_on_the_outline_keep_resultant_and_moment_on_every_lattice_fitted_or_not() {
+        for kind in LatticeKind::SAMPLES {
+            for fitted in [true, false] {
+                let (body, cells, outline) = body(kind, fitted);
+                let loader = Loader::new(&cells, &body, Some(&outline));
+                let add = |selection: Selection, push: Push, profile: Option<Profile>| {
+                    let portions = outline.portions(&selection, 1e-9);
+                    let mut forces = Points::zeros(body.count());
+                    let load = Load::Outline(OutlineLoad { portions, push, profile });
+                    loader.add(&load, &mut forces).expect("fits");
+                    resultant(&forces, &body)
+                };
+                let label = format!("{kind:?} fitted {fitted}");
+                // The edge from (9, 1) to (8, 7), whole and its part between two heights.
+                let edge = || Selection::Pieces { ring: 0, pieces: vec![1], angles: None };
+                let found = add(edge(), Push::Traction([2.0, -3.0]), None);
+                let length = 37f64.sqrt();
+                let expected = [2.0 * length, -3.0 * length, -3.0 * length * 8.5 - 2.0 * length * 4.0];
+                let off = [found.force[0], found.force[1], found.moment];
+                assert!((0..3).all(|k| (off[k] - expected[k]).abs() < 1e-11 * 300.0), "{label}: {found:?}");
+                let part = Selection::Box { min: [1.0, 2.5], max: [20.0, 5.5] };
+                let found = add(part, Push::Traction([1.0, 0.0]), None);
+                // Both the edge and the hole lie in the box.
+                let hole = 2.0 * (1.5f64 / 1.7).asin() * 2.0 * 1.7;
+                assert!((found.force[0] - length / 2.0 - hole).abs() < 1e-7, "{label}: {found:?}");
+                // A pressure in a hole has no resultant; one that grows with y pushes as it lifts a swimmer.
+                let rim = || Selection::Pieces { ring: 1, pieces: vec![], angles: None };
+                let found = add(rim(), Push::Pressure(5.0), None);
+                assert!(found.force.iter().all(|f| f.abs() < 1e-10) && found.moment.abs() < 1e-10, "{label}");
+                let depth = Profile { from: [0.0, 0.0], to: [0.0, 1.0], factors: [0.0, 1.0] };
+                let found = add(rim(), Push::Pressure(1.0), Some(depth));
+                let disc = std::f64::consts::PI * 1.7 * 1.7;
+                assert!((found.force[1] - disc).abs() < 1e-10 && found.force[0].abs() < 1e-10, "{label}");
+                assert!((found.moment - 4.0 * disc).abs() < 1e-9, "{label}: {found:?}");
+                let all = add(Selection::All, Push::Pressure(1.0), None);
+                assert!(all.force.iter().all(|f| f.abs() < 1e-10) && all.moment.abs() < 1e-9, "{label}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_body_force_adds_up_to_force_per_area_times_area() {
+        for kind in LatticeKind::SAMPLES {
+            for fitted in [true, false] {
+                let (body, cells, outline) = body(kind, fitted);
+                let total: f64 = cells.kind.iter().map(|&k| area(&cells.shapes[k as usize])).sum();
+                let mut forces = Points::zeros(body.count());
+                let loader = Loader::new(&cells, &body, Some(&outline));
+                loader.add(&Load::Body([0.0, -3.0]), &mut forces).expect("fits");
+                let found = resultant(&forces, &body);
+                assert!((found.force[1] + 3.0 * total).abs() < 1e-11 * total, "{kind:?}");
+                assert_eq!(found.force[0], 0.0);
+            }
+        }
+    }
+
+    #[test]
+    fn loads_on_what_is_not_there_are_refused() {
+        let (body, mut cells, outline) = body(LatticeKind::Square { spacing: 1.0 }, true);
+        let add = |cells: &Cells, load: &Load| {
+            Loader::new(cells, &body, Some(&outline)).add(load, &mut Points::zeros(body.count()))
+        };
+        let push = |force: f64| Load::Particles { particles: vec![0], force: [force, 0.0] };
+        assert_eq!(add(&cells, &push(f64::NAN)), Err(LoadError::NotFinite));
+        assert_eq!(add(&cells, &push(1.0)), Ok(()));
+        cells = Cells::of_kinds(Vec::new());
+        assert_eq!(add(&cells, &push(1.0)), Err(LoadError::NoCell { particle: 1 }));
+        let portions = outline.portions(&Selection::All, 1e-9);
+        let around = Load::Outline(OutlineLoad { portions, push: Push::Pressure(1.0), profile: None });
+        assert_eq!(add(&cells, &around), Err(LoadError::NoBoundary));
+    }
+}
