@@ -224,13 +224,11 @@ impl fmt::Display for Measured {
             );
             writeln!(f, "  {key} ({role}, {particles} particles)  {}, moment {moments}", pair(*force))?;
         }
-        if let Some(load) = &mechanics.load {
+        let each = mechanics.loads.iter().enumerate().map(|(k, load)| (format!("loads[{k}]"), load));
+        let all = mechanics.load.iter().filter(|_| mechanics.loads.len() != 1);
+        for (name, load) in each.chain(all.map(|load| ("loads in all".to_owned(), load))) {
             let about = short(load.moment_about_origin);
-            writeln!(
-                f,
-                "loads in all  {} {force}, moment {about} {moment} about the origin",
-                pair(load.force)
-            )?;
+            writeln!(f, "{name}  {} {force}, moment {about} {moment} about the origin", pair(load.force))?;
         }
         let work = mechanics.work.map_or_else(String::new, |work| {
             format!("; work of the loads {}, of the supports {}", short(work.loads), short(work.supports))
@@ -251,13 +249,13 @@ impl fmt::Display for Measured {
 
 /// Five digits.
 fn short(value: f64) -> String {
-    match value.abs() {
-        0.0 => "0".into(),
-        size if (1e-3..1e5).contains(&size) => {
-            let decimals = (4 - size.log10().floor() as i32).clamp(0, 7) as usize;
-            format!("{value:.decimals$}")
-        }
-        _ => format!("{value:.4e}"),
+    let text = format!("{value:.4e}");
+    // After rounding: 99.999999 has an exponent of 2.
+    let exponent = text.split_once('e').and_then(|(_, exponent)| exponent.parse::<i32>().ok());
+    match exponent {
+        _ if value == 0.0 => "0".into(),
+        Some(exponent @ -3..=4) => format!("{value:.*}", (4 - exponent) as usize),
+        _ => text,
     }
 }
 

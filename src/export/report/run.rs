@@ -182,7 +182,8 @@ impl RunRecorder {
         // Bonds and cells of those whose neighbours change would say who were neighbours once.
         if engine.lasting_neighbours().is_some() {
             set_bonds(&mut stage, engine, is_solved);
-            let cells = Cells::of_body(engine.body());
+            let cells =
+                engine.cells().map_or_else(|| Cow::Owned(Cells::of_body(engine.body())), Cow::Borrowed);
             if cells.count() > 0 {
                 stage.set_cells(&cells);
             }
