@@ -124,14 +124,6 @@ impl Layout {
         scene.roles.iter().enumerate().map(change).collect()
     }
 
-    /// Forces of the scene's loads on the particles \[force\], shape \[count\]; `None` without loads.
-    ///
-    /// # Errors
-    /// Names the load that has nothing to act on.
-    pub fn forces(&self, scene: &Scene) -> Result<Option<Points>, SceneError> {
-        Ok(total(&self.forces_by_load(scene)?))
-    }
-
     /// Forces of each of the scene's loads on the particles \[force\], shape \[loads\]\[count\]; none without a
     /// material.
     ///
@@ -400,17 +392,6 @@ impl Layout {
         };
         Ok(Some(Motion::Table { displacements, steps: steps as f64 }))
     }
-}
-
-/// The forces of all loads together \[force\], shape \[count\]; `None` without loads.
-pub fn total(loads: &[Points]) -> Option<Points> {
-    let (first, others) = loads.split_first()?;
-    let mut sum = first.clone();
-    for forces in others {
-        sum.x.iter_mut().zip(&forces.x).for_each(|(sum, f)| *sum += f);
-        sum.y.iter_mut().zip(&forces.y).for_each(|(sum, f)| *sum += f);
-    }
-    Some(sum)
 }
 
 fn body_of(scene: &Scene) -> Result<(Body, Neighbours), BodyError> {

@@ -6,6 +6,8 @@
 //! [`engine::state`] takes an engine out on its way and puts it back, for checkpoints.
 //! [`layout`] is the body before anybody moves; [`equilibrium`] goes straight to rest instead of stepping.
 
+mod damping;
+pub mod deviation;
 pub mod engine;
 pub mod equilibrium;
 pub mod forces;

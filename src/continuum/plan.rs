@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use super::layout::{Layout, RoleChange, Truth, held_components, no_particle, total};
+use super::damping::along_outline;
+use super::layout::{Layout, RoleChange, Truth, held_components, no_particle};
 use super::weights;
 use crate::flock::body::Body;
 use crate::flock::fracture::{Bonds, Break, Ghosts};
@@ -14,9 +15,10 @@ use crate::flock::rules::{Axis, Mean, Poisson, Rule};
 use crate::geometry::outline::Outline;
 use crate::material::cells::Cells;
 use crate::material::mechanism::require_held;
+use crate::material::outline_loads::{Resultant, sum};
 use crate::scene::{LoadSteps, Scene, SceneError, Stop};
 use crate::solve::linear::HeldComponent;
-use crate::solve::sweep::Update;
+use crate::solve::sweep::{Order, Update};
 
 /// Everything an engine needs; nothing of it refers to the scene file.
 #[derive(Clone, Debug)]
@@ -45,6 +47,8 @@ pub struct Plan {
     pub ramp: Option<usize>,
     /// The outline of the body's shape, where it has one.
     pub outline: Option<Outline>,
+    /// Of each load of the scene, in its order.
+    pub resultants: Vec<Resultant>,
 }
 
 impl Plan {
@@ -73,7 +77,9 @@ impl Plan {
         let layout = Layout::new(scene)?;
         let changes = layout.role_changes(scene, truth)?;
         let loads = layout.forces_by_load(scene)?;
-        let forces = total(&loads);
+        let reference = &layout.body.reference;
+        let resultants = loads.iter().map(|f| Resultant::of(reference.iter().zip(f.iter()))).collect();
+        let forces = sum(loads.clone());
         require_carried(scene, &layout, &changes, forces.as_ref())?;
         let Layout { body, neighbours, cells, outline } = layout;
         let follows = ever_follow(&body, &changes);
@@ -81,12 +87,13 @@ impl Plan {
         if let Weights::Matrix(weights) = &mut weights {
             hold_components(weights, &held_components(&changes, &body, 0.0));
         }
+        let update = update(scene, &body, &neighbours, &weights);
         let interaction = interaction(scene, &body, neighbours, weights, forces);
         let probes = probes(scene, &body)?;
         let roles = body.is_frame.iter().map(|&f| if f { Role::Frame } else { Role::Follower }).collect();
         let (low, high) = body.bounds();
         let mut plan = Self {
-            update: scene.update,
+            update,
             present_radius: match scene.neighbourhood {
                 Neighbourhood::Present { radius } => Some(radius),
                 _ => None,
@@ -105,6 +112,7 @@ impl Plan {
                 _ => None,
             },
             outline,
+            resultants,
             body,
             interaction,
         };
@@ -128,6 +136,7 @@ impl Plan {
             loads: Vec::new(),
             ramp: None,
             outline: None,
+            resultants: Vec::new(),
             body,
             interaction,
             update,
@@ -217,6 +226,18 @@ fn hold_components(weights: &mut MatrixWeights, held: &[HeldComponent]) {
         axes.entry(component.particle).or_default()[component.axis as usize] = true;
     }
     axes.into_iter().for_each(|(particle, held)| weights.hold(particle, held));
+}
+
+/// The update as written; unless its damping is, a fitted body's is what its outline allows.
+fn update(scene: &Scene, body: &Body, neighbours: &Neighbours, weights: &Weights) -> Update {
+    let Update { order, damping } = scene.update;
+    let is_open = scene.raw.update.damping.is_none() && order == Order::Synchronous;
+    match weights {
+        Weights::Matrix(weights) if is_open && scene.equilibrium.is_none() => {
+            Update { order, damping: along_outline(body, neighbours, weights, damping) }
+        }
+        _ => scene.update,
+    }
 }
 
 fn interaction(

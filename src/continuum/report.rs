@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use super::deviation::{Deviation, pieces};
 use super::equilibrium::foresee;
 use super::front::share_reached;
 use super::interior;
@@ -10,6 +11,7 @@ use crate::flock::fracture::Threshold;
 use crate::flock::interaction::Weights;
 use crate::flock::role::Role;
 use crate::flock::rules::{FeedbackReference, Mean, Rotation};
+use crate::material::outline_loads::Resultant;
 use crate::scene::{LoadSteps, Scene, SceneError, Weights as SceneWeights};
 use crate::solve::sweep::{Order, Sweep};
 
@@ -186,13 +188,56 @@ fn facts(scene: &Scene, plan: &Plan) -> Result<Vec<(String, String)>, SceneError
             format!("about {:.0} % of the updates: motion spreads by one neighbour a step", 100.0 * share),
         )
     });
+    let outline = outline_facts(scene, plan);
     let last = [("memory", format!("about {}", readable_bytes(memory(plan)))), ("stops", stop)];
     let facts = first.into_iter().chain(swept.into_iter().flatten()).chain(moving).chain(last);
-    Ok(facts.map(|(name, value)| (name.to_owned(), value)).collect())
+    Ok(facts.map(|(name, value)| (name.to_owned(), value)).chain(outline).collect())
+}
+
+/// Parts of the shape's area, and of its size, beyond which a body that differs from it is worth a caution.
+const DEVIATES: f64 = 0.01;
+
+/// Pieces of an outline that are listed.
+const MOST_PIECES: usize = 16;
+
+/// How near the body is to its shape, the outline's pieces, and what each load adds up to.
+fn outline_facts(scene: &Scene, plan: &Plan) -> Vec<(String, String)> {
+    let mut facts = Vec::new();
+    if let Some(deviation) = Deviation::of(plan) {
+        let kind = if scene.is_fitted { "fitted" } else { "lattice" };
+        let value = format!(
+            "{kind}: area off by {:.1e} %, boundary at most {:.2e} {} from the shape's",
+            100.0 * deviation.area,
+            deviation.distance,
+            scene.unit()
+        );
+        facts.push(("outline".to_owned(), value));
+    }
+    if let (Some(outline), true) = (&plan.outline, scene.is_fitted) {
+        facts.extend(pieces(outline, MOST_PIECES).into_iter().map(|line| ("  piece".to_owned(), line)));
+    }
+    for (k, Resultant { force, moment }) in plan.resultants.iter().enumerate() {
+        let value =
+            format!("force ({:.6e}, {:.6e}), moment {moment:.6e} about the origin", force[0], force[1]);
+        facts.push((format!("loads[{k}]"), value));
+    }
+    facts
 }
 
 fn cautions(scene: &Scene, plan: &Plan) -> Vec<String> {
     let mut cautions = Vec::new();
+    if let Some(deviation) = Deviation::of(plan)
+        && (deviation.area.abs() > DEVIATES || deviation.distance_rel > DEVIATES)
+    {
+        cautions.push(format!(
+            "the body is not the shape: its area is {:+.2} % off and its boundary lies up to {:.3} {} from the outline; \
+             use {}",
+            100.0 * deviation.area,
+            deviation.distance,
+            scene.unit(),
+            if scene.is_fitted { "a smaller spacing" } else { "body.outline = \"fitted\" or a smaller spacing" }
+        ));
+    }
     let rule = plan.interaction.rule;
     let undamped = plan.update.order == Order::Synchronous && plan.update.damping == 1.0;
     if undamped && matches!(rule.mean, Mean::Distance { power } if power > 0.0) {

@@ -213,6 +213,16 @@ impl<'a> Loader<'a> {
     }
 }
 
+/// The sum of several loads' forces on the particles; `None` of none.
+pub fn sum(by_load: Vec<Points>) -> Option<Points> {
+    let add = |mut sum: Points, next: Points| {
+        sum.x.iter_mut().zip(&next.x).for_each(|(sum, f)| *sum += f);
+        sum.y.iter_mut().zip(&next.y).for_each(|(sum, f)| *sum += f);
+        sum
+    };
+    by_load.into_iter().reduce(add)
+}
+
 fn push(forces: &mut Points, particle: u32, [x, y]: [f64; 2]) {
     forces.x[particle as usize] += x;
     forces.y[particle as usize] += y;

@@ -20,6 +20,7 @@ use crate::flock::frame::FrameRule;
 use crate::flock::lattice::{Lattice, LatticeKind};
 use crate::flock::neighbourhood::Neighbourhood;
 use crate::flock::rules::{Axis, Feedback, FeedbackReference, Mean, Origin};
+use crate::geometry::outline::Piece;
 use crate::geometry::shape::{Segment, Shape};
 use crate::geometry::specimen::Specimen;
 use crate::material::cells;
@@ -225,6 +226,7 @@ fn solid(raw: &RawShape, key: &str, refuse: Refuse<'_>) -> Result<Option<Shape>,
         }
         RawShape::Disc { centre, radius } => Shape::Disc { centre: *centre, radius: *radius },
         RawShape::Polygon { vertices } => Shape::Polygon { vertices: vertices.clone() },
+        RawShape::Path { from, steps } => path(*from, steps, key, refuse)?,
         RawShape::E8Sheet { scale, lying } => {
             Shape::Specimen(Specimen { lying: *lying, ..Specimen::e8_sheet(*scale) })
         }
@@ -232,6 +234,49 @@ fn solid(raw: &RawShape, key: &str, refuse: Refuse<'_>) -> Result<Option<Shape>,
             Shape::Specimen(Specimen { lying: *lying, ..Specimen::d638_type_i(*scale) })
         }
     }))
+}
+
+/// How much farther from its end than from its beginning the centre of an arc may be, over the radius.
+const ROUND: f64 = 1e-6;
+
+fn path(from: [f64; 2], steps: &[RawStep], key: &str, refuse: Refuse<'_>) -> Result<Shape, SceneError> {
+    let away = |p: [f64; 2], q: [f64; 2]| (p[0] - q[0]).hypot(p[1] - q[1]);
+    let mut pieces = Vec::new();
+    let mut at = from;
+    for (k, step) in steps.iter().enumerate() {
+        match step.centre {
+            Some(centre) => {
+                let radii = [away(at, centre), away(step.to, centre)];
+                let is_round = (radii[0] - radii[1]).abs() <= ROUND * radii[0];
+                if !is_round {
+                    let message =
+                        format!("the arc begins {} from its centre and ends {} from it", radii[0], radii[1]);
+                    let help = "move the centre, or the end, so that both are the radius";
+                    return Err(refuse(&format!("{key}.steps[{k}].centre"), message, help));
+                }
+                pieces.push(Piece::arc_between(at, step.to, centre, step.clockwise));
+            }
+            None if at == step.to => {
+                let message = "the edge has no length".into();
+                return Err(refuse(&format!("{key}.steps[{k}].to"), message, "give its other end"));
+            }
+            None => pieces.push(Piece::edge(at, step.to)),
+        }
+        at = step.to;
+    }
+    if at != from {
+        pieces.push(Piece::edge(at, from));
+    }
+    // Where pieces go on in the same direction there is no corner to keep.
+    let count = pieces.len();
+    for k in 0..count {
+        let (before, after) = (pieces[(k + count - 1) % count].tangent(1.0), pieces[k].tangent(0.0));
+        let turn = before[0] * after[1] - before[1] * after[0];
+        let is_smooth = turn.abs() < ROUND && before[0] * after[0] + before[1] * after[1] > 0.0;
+        pieces[k].begins_at_corner = count > 1 && !is_smooth;
+        pieces[k].number = k;
+    }
+    Ok(Shape::Path { pieces })
 }
 
 fn ordered_box(key: &str, min: [f64; 2], max: [f64; 2], refuse: Refuse<'_>) -> Result<(), SceneError> {

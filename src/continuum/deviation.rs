@@ -1,0 +1,74 @@
+//! How far a body is from the shape that its scene asks for.
+
+use super::plan::Plan;
+use crate::flock::points::distance;
+use crate::geometry::outline::Outline;
+use crate::material::cells::Cells;
+use crate::material::stiffness::area;
+
+/// Distances from sides to pieces that are computed at most: beyond, some of the sides stand for all.
+const MOST_DISTANCES: usize = 10_000_000;
+
+/// What a body's cells leave out of its shape, or add to it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Deviation {
+    /// Area of the cells over that of the shape, less one \[1\].
+    pub area: f64,
+    /// Largest distance of the cells' boundary from the outline \[length\].
+    pub distance: f64,
+    /// The same over the square root of the shape's area \[1\].
+    pub distance_rel: f64,
+}
+
+impl Deviation {
+    /// Of a planned body that has cells and an outline.
+    pub fn of(plan: &Plan) -> Option<Self> {
+        let (cells, outline) = (plan.cells.as_ref()?, plan.outline.as_ref()?);
+        let whole = outline.area();
+        let shapes: Vec<f64> = cells.shapes.iter().map(|shape| area(shape)).collect();
+        let covered: f64 = cells.kind.iter().map(|&kind| shapes[kind as usize]).sum();
+        let distance = farthest(plan, cells, outline);
+        Some(Self { area: covered / whole - 1.0, distance, distance_rel: distance / whole.sqrt() })
+    }
+}
+
+/// Largest distance of ends and middles of the boundary's sides from the outline \[length\].
+fn farthest(plan: &Plan, cells: &Cells, outline: &Outline) -> f64 {
+    let reference = &plan.body.reference;
+    let sides = cells.boundary_sides(&cells.incidence(reference.len()));
+    let pieces = outline.pieces().count();
+    let stride = (sides.len().saturating_mul(3 * pieces) / MOST_DISTANCES).max(1);
+    let off = |side: &[u32; 2]| {
+        let [a, b] = side.map(|i| reference.get(i as usize));
+        let middle = [0, 1].map(|k| 0.5 * (a[k] + b[k]));
+        [a, middle].into_iter().map(|p| outline.nearest(p).1).fold(0.0, f64::max)
+    };
+    sides.iter().step_by(stride).map(off).fold(0.0, f64::max)
+}
+
+/// The pieces of an outline as a scene names them, a line each, at most so many.
+pub fn pieces(outline: &Outline, most: usize) -> Vec<String> {
+    let point = |[x, y]: [f64; 2]| format!("({x:.6}, {y:.6})").replace(".000000", "");
+    let mut lines: Vec<(usize, usize, String)> = outline
+        .pieces()
+        .map(|(ring, _, piece)| {
+            let hole = if ring == 0 { String::new() } else { format!("hole {ring}, ") };
+            let ends = format!("from {} to {}", point(piece.from), point(piece.to));
+            let what = match &piece.arc {
+                None => format!("edge {ends}"),
+                Some(arc) if distance(piece.from, piece.to) == 0.0 => {
+                    format!("circle about {}, radius {:.6}", point(arc.centre), arc.radius)
+                }
+                Some(arc) => format!("arc about {}, radius {:.6}, {ends}", point(arc.centre), arc.radius),
+            };
+            (ring, piece.number, format!("{hole}{}: {what}", piece.number + 1))
+        })
+        .collect();
+    lines.sort();
+    let left_out = lines.len().saturating_sub(most);
+    let mut lines: Vec<String> = lines.into_iter().take(most).map(|(.., line)| line).collect();
+    if left_out > 0 {
+        lines.push(format!("and {left_out} more"));
+    }
+    lines
+}
