@@ -201,8 +201,8 @@ fn what_has_no_equilibrium_to_solve_for_is_refused_with_its_place() {
     for (overrides, words) in [
         (vec![asked, "rule.mean={kind=\"distance\"}"], "rule.mean = { kind = \"distance\" }"),
         (
-            vec!["equilibrium={solver=\"multigrid\"}", MATERIAL, CELLS, COROTATED],
-            "axes that turn from particle to particle",
+            vec!["equilibrium={solver=\"multigrid\",precision=\"f32\"}", MATERIAL, CELLS, COROTATED],
+            "in double precision",
         ),
         (vec![asked, MATERIAL, CELLS, COROTATED, "rule.feedback={factor=-0.1}"], "rule.feedback"),
         (vec![asked, "roles[0].from=7"], "roles[0].from"),

@@ -8,8 +8,11 @@ use flockform::continuum::run::run;
 use flockform::flock::motion::Motion;
 use flockform::flock::points::Points;
 use flockform::flock::rules::{
-    Axis, Feedback, FeedbackReference, Load, Mean, Neighbour, Origin, Own, Poisson, Rotation, Rule,
+    Axis, CellAround, Corner, Element, Feedback, FeedbackReference, Load, Mean, Neighbour, OWN, Origin, Own,
+    Poisson, Rotation, Rule,
 };
+use flockform::material::elastic::{Constants, Elastic};
+use flockform::material::stiffness::{mean_gradients, triangle};
 use flockform::scene::bundled::SCENES;
 use flockform::scene::{Scene, bundled};
 use proptest::prelude::*;
@@ -263,12 +266,11 @@ proptest! {
     }
 
     #[test]
-    fn a_material_moves_with_its_neighbours_and_a_corotated_one_turns_with_them(
-        places in prop::collection::vec((prop::array::uniform2(-1.0..1.0f64), prop::array::uniform2(-0.1..0.1f64)), 3..8),
+    fn a_material_moves_with_its_neighbours(
+        places in prop::collection::vec(prop::array::uniform2(-1.0..1.0f64), 3..8),
         blocks in prop::collection::vec(prop::array::uniform4(-1.0..1.0f64), 8),
         here in prop::array::uniform2(-0.5..0.5f64),
         shift in prop::array::uniform2(-5.0..5.0f64),
-        angle in -3.1..3.1f64,
         push in prop::array::uniform2(-1.0..1.0f64),
     ) {
         // Any weights that sum to the identity.
@@ -278,32 +280,60 @@ proptest! {
         let rest = &matrices[..count - 1];
         let last = [[1.0 - sum(0, 0, rest), -sum(0, 1, rest)], [-sum(1, 0, rest), 1.0 - sum(1, 1, rest)]];
         matrices[count - 1] = last;
-        let (sin, cos) = angle.sin_cos();
-        let turned = |[x, y]: [f64; 2]| [cos * x - sin * y + shift[0], sin * x + cos * y + shift[1]];
-        let moved = |[x, y]: [f64; 2]| [x + shift[0], y + shift[1]];
-        let load = |force: [f64; 2]| Some(Load { force, compliance: [[0.3, 0.1], [0.1, 0.2]] });
-        let seen = |go: &dyn Fn([f64; 2]) -> [f64; 2]| -> Vec<Neighbour> {
-            let one = |k: usize| {
-                let (reference, off) = places[k];
-                let position = go([reference[0] + off[0], reference[1] + off[1]]);
-                Neighbour { reference, matrix: matrices[k], ..Neighbour::at(position) }
-            };
-            (0..count).map(one).collect()
+        let load = Some(Load { force: push, compliance: [[0.3, 0.1], [0.1, 0.2]] });
+        let target = |by: [f64; 2]| {
+            let moved = |[x, y]: [f64; 2]| [x + by[0], y + by[1]];
+            let one = |k: usize| Neighbour { matrix: matrices[k], ..Neighbour::at(moved(places[k])) };
+            let seen: Vec<Neighbour> = (0..count).map(one).collect();
+            let own = Own { present: moved(here), reference: here, rest: [0.02, -0.01], load };
+            Rule::MATERIAL.target(&own, seen.into_iter())
         };
-        for (rotation, go, pushed) in [
-            (Rotation::Small, &moved as &dyn Fn([f64; 2]) -> [f64; 2], push),
-            (Rotation::Corotated, &moved, push),
-            (Rotation::Corotated, &turned, [cos * push[0] - sin * push[1], sin * push[0] + cos * push[1]]),
-        ] {
-            let rule = Rule { mean: Mean::Material { rotation }, ..Rule::BARYCENTRE };
-            let still = |p: [f64; 2]| p;
-            let one = |present, force| Own { present, reference: here, rest: [0.02, -0.01], load: load(force) };
-            let before = rule.target(&one(here, push), seen(&still).into_iter());
-            let after = rule.target(&one(go(here), pushed), seen(go).into_iter());
-            let expected = go(before);
-            let apart = (after[0] - expected[0]).hypot(after[1] - expected[1]);
-            prop_assert!(apart < 1e-11, "{rotation:?}: {after:?}, not {expected:?}");
-        }
+        let (before, after) = (target([0.0; 2]), target(shift));
+        let apart = (after[0] - before[0] - shift[0]).hypot(after[1] - before[1] - shift[1]);
+        prop_assert!(apart < 1e-11, "{after:?}");
+    }
+
+    #[test]
+    fn a_corotated_material_turns_with_its_neighbours(
+        around in prop::collection::vec((0.5..1.5f64, prop::array::uniform2(-0.1..0.1f64)), 4..8),
+        shift in prop::array::uniform2(-5.0..5.0f64),
+        angle in -3.1..3.1f64,
+        push in prop::array::uniform2(-1.0..1.0f64),
+    ) {
+        // Triangles of an orthotropic material all around a particle at the origin.
+        let count = around.len();
+        let place = |k: usize| {
+            let (sin, cos) = (std::f64::consts::TAU * k as f64 / count as f64).sin_cos();
+            [around[k].0 * cos, around[k].0 * sin]
+        };
+        let fibres = Constants::Orthotropic { young: [9.0, 1.0], poisson_12: 0.4, shear: 0.6, angle: 0.5 };
+        let elastic = Elastic::new(fibres, 1.0).expect("admissible");
+        let elements: Vec<Element> = (0..count).map(|k| {
+            let corners = [[0.0, 0.0], place(k), place((k + 1) % count)];
+            let stiffness = triangle(&corners, elastic.stiffness()).expect("a cell");
+            let block = |n: usize| [0, 1].map(|a| [0, 1].map(|b| stiffness[(2 * (n / 3) + a, 2 * (n % 3) + b)]));
+            Element { stiffness: (0..9).map(block).collect(), gradients: mean_gradients(&corners) }
+        }).collect();
+        let slots: Vec<[u32; 3]> = (0..count).map(|k| [OWN, k as u32, ((k + 1) % count) as u32]).collect();
+        let (sin, cos) = angle.sin_cos();
+        let turned = |[x, y]: [f64; 2]| [cos * x - sin * y, sin * x + cos * y];
+        let target = |go: &dyn Fn([f64; 2]) -> [f64; 2], force: [f64; 2]| {
+            let present = go([0.0; 2]);
+            let corner = |k: usize| {
+                let (reference, off) = (place(k), around[k].1);
+                let now = go([reference[0] + off[0], reference[1] + off[1]]);
+                Corner { reference, displacement: [0, 1].map(|d| now[d] - present[d] - reference[d]) }
+            };
+            let rule = Rule { mean: Mean::Material { rotation: Rotation::Corotated }, ..Rule::BARYCENTRE };
+            let load = Some(Load { force, compliance: [[0.0; 2]; 2] });
+            let cells = elements.iter().zip(&slots).map(|(element, slots)| CellAround { element, factor: 1.5, own: 0, slots });
+            rule.target_by_cells(&Own { present, reference: [0.0; 2], rest: [0.0; 2], load }, cells, [false; 2], corner)
+        };
+        let go = |p: [f64; 2]| { let [x, y] = turned(p); [x + shift[0], y + shift[1]] };
+        let (before, after) = (target(&|p| p, push), target(&go, turned(push)));
+        let expected = go(before);
+        let apart = (after[0] - expected[0]).hypot(after[1] - expected[1]);
+        prop_assert!(before[0].hypot(before[1]) > 0.0 && apart < 1e-11, "{after:?}, not {expected:?}");
     }
 
     #[test]

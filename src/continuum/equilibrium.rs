@@ -13,7 +13,7 @@ use crate::flock::role::Role;
 use crate::scene::{LoadSteps, Scene, SceneError};
 use crate::solve::corotated::{self, CorotatedError, Way};
 use crate::solve::equilibrium::{Request, SolveError, Solved, Solver, System, choose, solve};
-use crate::solve::linear::{NotLinear, system};
+use crate::solve::linear::{HeldComponent, NotLinear, system};
 
 /// Runs a plan to its end as its scene asks: stepping, or straight to the equilibrium under the whole load. `see` sees each step of
 /// a stepped run as [`run`](super::run::run) shows it, and of a solved one the end.
@@ -57,8 +57,9 @@ fn come_to_whole_load(scene: &Scene, plan: Plan, watch: Watch<'_>) -> Result<Out
 pub fn settle(scene: &Scene, request: &Request, plan: Plan) -> Result<Outcome, SceneError> {
     let solved = if corotated::is_corotated(&plan.interaction) {
         let steps = steps_of_the_way(&plan) as f64;
-        let way = Way { held: &|part| held_after(&plan, part * steps), start: None, end: 1.0 };
-        corotated::solve(&plan.interaction, &plan.body, follows(&plan), &way, request)
+        let way = Way { held: &|part| way_after(&plan, part * steps), start: None, end: 1.0 };
+        let axes = held_axes(&plan);
+        corotated::solve(&plan.interaction, &plan.body, follows(&plan), axes, &way, request)
             .map_err(|error| refuse_corotated(scene, &error))?
     } else {
         let system = of_plan(scene, &plan)?;
@@ -96,6 +97,25 @@ fn held_after(plan: &Plan, steps: f64) -> Points {
     held(&plan.changes, &plan.body, steps).into_iter().map(at_rest).collect()
 }
 
+/// The same with the single components that are held of followers.
+fn way_after(plan: &Plan, steps: f64) -> Points {
+    let mut held = held_after(plan, steps);
+    for HeldComponent { particle, axis, displacement } in held_components(&plan.changes, &plan.body, steps) {
+        let mut place = held.get(particle);
+        place[axis as usize] = displacement;
+        held.set(particle, place);
+    }
+    held
+}
+
+/// Single components that are held of followers, shape \[count\]\[x, y\]; empty without any.
+fn held_axes(plan: &Plan) -> Vec<[bool; 2]> {
+    let components = held_components(&plan.changes, &plan.body, 0.0);
+    let mut axes = vec![[false; 2]; if components.is_empty() { 0 } else { plan.count() }];
+    components.iter().for_each(|held| axes[held.particle][held.axis as usize] = true);
+    axes
+}
+
 /// The linear system of a plan: leaders where they are at the last step.
 ///
 /// # Errors
@@ -123,9 +143,7 @@ fn of_plan_after(scene: &Scene, plan: &Plan, steps: f64) -> Result<System, Scene
 fn refuse_corotated(scene: &Scene, error: &CorotatedError) -> SceneError {
     let (key, help) = match error {
         CorotatedError::Solve(error) => return refuse(scene, error),
-        CorotatedError::NotSymmetric { .. } => {
-            ("equilibrium.solver", "take direct, or leave the solver out: \"auto\" does")
-        }
+        CorotatedError::DoubleOnly => ("equilibrium.precision", "use \"f64\", or leave the precision out"),
         CorotatedError::Feedback => ("rule.feedback", "leave it out: it does not move the place of rest"),
         CorotatedError::Unsettled { .. } => {
             ("equilibrium", "load it less, or leave [equilibrium] out to step there")

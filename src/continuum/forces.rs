@@ -1,6 +1,6 @@
 //! Forces within a body whose rule is a material, and the reactions of what holds it.
 //!
-//! The neighbours of particle `i` pull it with `sum_j K_ij (u_j - u_i)`. A follower at rest is in balance: that pull
+//! The neighbours of a particle pull it (see [`Interaction::force_under`](crate::flock::interaction::Interaction::force_under)). A follower at rest is in balance: that pull
 //! and the load on it cancel. On a particle that is led or clamped they do not; what is missing is the force of
 //! whatever holds it, its reaction.
 
@@ -9,11 +9,10 @@ use serde::{Deserialize, Serialize};
 
 use super::engine::Engine;
 use super::layout::RoleChange;
-use crate::flock::block::apply;
-use crate::flock::interaction::{Interaction, Weights};
+use crate::flock::interaction::Weights;
 use crate::flock::points::Points;
 use crate::flock::role::Role;
-use crate::flock::rules::{Mean, Rotation, Turn};
+use crate::flock::rules::{Mean, Rotation};
 
 /// What the loads on a body add up to. Moments are positive counter-clockwise; their arms end where the particles were
 /// in the reference configuration under small rotations, and where they are at present if the rule is corotated.
@@ -49,33 +48,6 @@ pub struct Reaction {
     pub moment_about_origin: f64,
 }
 
-/// Force of the neighbours on a particle \[force\] under these displacements of all \[length\]; `None` where the rule
-/// has no stiffness.
-pub fn internal_force(interaction: &Interaction, particle: usize, displacement: &Points) -> Option<[f64; 2]> {
-    let (Weights::Matrix(weights), Mean::Material { rotation }) =
-        (&interaction.weights, interaction.rule.mean)
-    else {
-        return None;
-    };
-    let reference = &interaction.reference;
-    let from = |points: &Points, j: &u32| minus(points.get(*j as usize), points.get(particle));
-    // Where each neighbour was from the particle, and how far it has moved from there.
-    let around =
-        interaction.neighbours.of(particle).iter().map(|j| (from(reference, j), from(displacement, j)));
-    let pulled = |stretch: &dyn Fn([f64; 2], [f64; 2]) -> [f64; 2]| {
-        let blocks = weights.stiffness_of(particle).iter().zip(around.clone());
-        blocks.fold([0.0; 2], |sum, (block, (then, by))| plus(sum, apply(block, stretch(then, by))))
-    };
-    Some(match rotation {
-        Rotation::Small => pulled(&|_, by| by),
-        // In the axes in which the rule finds the particle's target.
-        Rotation::Corotated => match Turn::fit(around.clone().map(|(then, by)| (then, plus(then, by)))) {
-            Some(turn) => turn.forth(pulled(&|then, by| minus(turn.back(plus(then, by)), then))),
-            None => [0.0; 2],
-        },
-    })
-}
-
 /// The forces of a body at its present places.
 #[derive(Clone, Debug)]
 pub struct Forces {
@@ -94,14 +66,17 @@ impl Forces {
     pub fn of(engine: &Engine) -> Option<Self> {
         let (interaction, present) = (engine.interaction(), engine.present());
         let displacement = engine.displacements();
-        let internal = |i| internal_force(interaction, i, &displacement);
-        let internal: Option<Vec<[f64; 2]>> = (0..present.len()).into_par_iter().map(internal).collect();
+        if !matches!(interaction.weights, Weights::Matrix(_)) {
+            return None;
+        }
+        let internal = |i| interaction.force_under(i, &displacement);
+        let internal: Vec<[f64; 2]> = (0..present.len()).into_par_iter().map(internal).collect();
         let places = match interaction.rule.mean {
             Mean::Material { rotation: Rotation::Corotated } => present.clone(),
             _ => Points::clone(&interaction.reference),
         };
         let loads = interaction.forces.clone().unwrap_or_else(|| Points::zeros(present.len()));
-        Some(Self { internal: internal?.into_iter().collect(), loads, displacement, places })
+        Some(Self { internal: internal.into_iter().collect(), loads, displacement, places })
     }
 
     /// What nothing of the body balances on a particle \[force\]: on one that is held, less its reaction.

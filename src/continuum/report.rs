@@ -7,6 +7,7 @@ use super::equilibrium::foresee;
 use super::front::share_reached;
 use super::interior;
 use super::plan::Plan;
+use crate::flock::cells_around::CellsAround;
 use crate::flock::fracture::Threshold;
 use crate::flock::interaction::Weights;
 use crate::flock::role::Role;
@@ -286,7 +287,10 @@ fn memory(plan: &Plan) -> usize {
         + match &plan.interaction.weights {
             Weights::Equal => 0,
             Weights::Scalar(weights) => 8 * weights.len(),
-            Weights::Matrix(weights) => 4 * count + 32 * weights.blocks.len(),
+            Weights::Matrix(weights) => {
+                let cells = weights.cells.as_ref().map_or(0, CellsAround::bytes);
+                4 * count + 32 * weights.blocks.len() + cells
+            }
         }
         + present(plan.interaction.forces.is_some(), 16 * count)
         + present(plan.interaction.rest.is_some(), 16 * count)

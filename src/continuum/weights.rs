@@ -6,7 +6,7 @@ use crate::flock::interaction::Weights;
 use crate::flock::lattice::Site;
 use crate::flock::neighbourhood::Neighbours;
 use crate::flock::points::distance;
-use crate::flock::rules::Mean;
+use crate::flock::rules::{Mean, Rotation};
 use crate::material::cells::Cells;
 use crate::material::elastic::Elastic;
 use crate::material::weights::{MaterialWeights, WeightsError};
@@ -68,7 +68,12 @@ fn of_material(
     elastic: &Elastic,
 ) -> Result<Weights, SceneError> {
     let material = MaterialWeights::assemble(cells, body, neighbours.clone(), elastic);
-    material.map(|material| Weights::Matrix(material.weights())).map_err(|error| {
+    let corotated = scene.mean == Mean::Material { rotation: Rotation::Corotated };
+    let weights = |material: MaterialWeights| match corotated {
+        true => material.corotated_weights(),
+        false => material.weights(),
+    };
+    material.map(|material| Weights::Matrix(weights(material))).map_err(|error| {
         let (key, help) = match &error {
             WeightsError::MissingNeighbour { .. } => (
                 "neighbours",

@@ -2,11 +2,12 @@
 
 use std::sync::Arc;
 
-use super::block::{Block, IDENTITY, inverse as invert, plus, product};
+use super::block::{Block, IDENTITY, apply, inverse as invert, plus, product};
+use super::cells_around::CellsAround;
 use super::fracture::Bonds;
 use super::neighbourhood::Neighbours;
 use super::points::Points;
-use super::rules::{Load, Mean, Neighbour, Own, Rotation, Rule};
+use super::rules::{CellAround, Corner, Load, Mean, Neighbour, OWN, Own, Rotation, Rule, pull};
 
 /// The arrays and index lists that a sweep runs over; it knows particles, not lattices.
 #[derive(Clone, Debug)]
@@ -26,6 +27,9 @@ pub struct Interaction {
 
 /// The material that looks at nothing but weights and positions.
 const SMALL: Mean = Mean::Material { rotation: Rotation::Small };
+
+/// The material that looks at the cells around a particle.
+const COROTATED: Mean = Mean::Material { rotation: Rotation::Corotated };
 
 /// Fixed weights of the neighbours.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -53,6 +57,8 @@ pub struct MatrixWeights {
     pub stiffness: Vec<Block>,
     /// `D_i^-1` \[length / force\], shape \[classes\].
     pub compliance: Vec<Block>,
+    /// The cells around the particles of each class, for a corotated rule alone.
+    pub cells: Option<CellsAround>,
 }
 
 impl MatrixWeights {
@@ -65,6 +71,12 @@ impl MatrixWeights {
     /// Stiffnesses of a particle, parallel to its neighbours.
     pub fn stiffness_of(&self, particle: usize) -> &[Block] {
         &self.stiffness[self.range(particle)]
+    }
+
+    /// The cells around a particle; none for a rule that does not turn with them.
+    pub fn cells_around(&self, particle: usize) -> impl Iterator<Item = CellAround<'_>> + Clone {
+        let class = self.class[particle] as usize;
+        self.cells.iter().flat_map(move |cells| cells.of(class))
     }
 
     #[inline]
@@ -85,11 +97,20 @@ impl MatrixWeights {
             [true, false] => compliance[1][1] = 1.0 / diagonal[1][1],
             _ => {}
         }
+        if let Some(cells) = &mut self.cells {
+            cells.copy_class(self.class[particle] as usize);
+        }
         self.class[particle] = self.compliance.len() as u32;
         self.compliance.push(compliance);
         self.blocks.extend(stiffness.iter().map(|block| product(&compliance, block)));
         self.stiffness.extend(stiffness);
         self.starts.push(self.blocks.len() as u32);
+    }
+
+    /// The components of a particle that the rule keeps where its rest offset says: those that no force moves.
+    pub fn held(&self, particle: usize) -> [bool; 2] {
+        let compliance = self.compliance(particle);
+        [0, 1].map(|axis| compliance[axis][axis] == 0.0)
     }
 
     pub fn compliance(&self, particle: usize) -> Block {
@@ -129,6 +150,10 @@ impl Interaction {
             rest: self.rest.as_ref().map_or([0.0; 2], |rest| rest.get(particle)),
             load: self.load(particle),
         };
+        if let (COROTATED, Weights::Matrix(weights)) = (rule.mean, &self.weights) {
+            let (cells, held) = (weights.cells_around(particle), weights.held(particle));
+            return rule.target_by_cells(&own, cells, held, |slot| self.corner(particle, slot, present));
+        }
         let broken = self.bonds.as_ref().filter(|bonds| bonds.any_broken());
         match (broken, &self.weights) {
             (Some(bonds), Weights::Equal) if rule.mean == Mean::Barycentre => {
@@ -149,6 +174,38 @@ impl Interaction {
         }
     }
 
+    /// Force of a material on a particle when all stand at `present` \[force, world frame\]: on one that rests, minus its
+    /// load; on one that is held, minus its load and its reaction. Zero for a rule that is no material.
+    pub fn force(&self, particle: usize, present: &Points) -> [f64; 2] {
+        self.force_from(particle, |slot| self.corner(particle, slot, present))
+    }
+
+    /// The same when all are displaced by so much from their reference places \[length\]: to more digits where that is
+    /// little.
+    pub fn force_under(&self, particle: usize, displacement: &Points) -> [f64; 2] {
+        let from =
+            |points: &Points, j: usize| [points.x[j] - points.x[particle], points.y[j] - points.y[particle]];
+        self.force_from(particle, |slot| {
+            let j = self.neighbours.of(particle)[slot] as usize;
+            Corner { reference: from(&self.reference, j), displacement: from(displacement, j) }
+        })
+    }
+
+    fn force_from(&self, particle: usize, corner: impl Fn(usize) -> Corner + Copy) -> [f64; 2] {
+        match &self.weights {
+            Weights::Matrix(weights) if self.rule.mean == COROTATED => {
+                pull(weights.cells_around(particle), corner).0
+            }
+            Weights::Matrix(weights) => {
+                weights.stiffness_of(particle).iter().enumerate().fold([0.0; 2], |sum, (slot, block)| {
+                    let [x, y] = apply(block, corner(slot).displacement);
+                    [sum[0] + x, sum[1] + y]
+                })
+            }
+            Weights::Equal | Weights::Scalar(_) => [0.0; 2],
+        }
+    }
+
     /// Target position of `particle` by those of its neighbours alone whom `keeps` names: of the others nothing
     /// is known, or nothing believed. What the lost ones carried the others carry, so that the reference
     /// configuration stays at rest; `None` where too few are left to say where to go.
@@ -166,6 +223,9 @@ impl Interaction {
                 .map(|(neighbour, _)| neighbour)
         };
         kept(present).next()?;
+        if let (COROTATED, Weights::Matrix(weights)) = (self.rule.mean, &self.weights) {
+            return self.target_by_whole_cells(weights, particle, present, keeps);
+        }
         let share = match &self.weights {
             Weights::Matrix(_) => {
                 invert(&kept(present).fold(Block::default(), |sum, n| plus(&sum, &n.matrix)))?
@@ -185,9 +245,43 @@ impl Interaction {
         Some(self.rule.target(&own, kept(present).map(shared)))
     }
 
+    /// By those cells of which `keeps` leaves every corner; `None` where they do not hold the particle.
+    fn target_by_whole_cells(
+        &self,
+        weights: &MatrixWeights,
+        particle: usize,
+        present: &Points,
+        keeps: impl Fn(usize) -> bool,
+    ) -> Option<[f64; 2]> {
+        let near = self.neighbours.of(particle);
+        let kept = |slot: &u32| *slot == OWN || keeps(near[*slot as usize] as usize);
+        let cells = weights.cells_around(particle).filter(|cell| cell.slots.iter().all(kept));
+        let corner = |slot| self.corner(particle, slot, present);
+        invert(&pull(cells.clone(), corner).1)?;
+        let (present, reference) = (present.get(particle), self.reference.get(particle));
+        let rest = self.rest.as_ref().map_or([0.0; 2], |rest| rest.get(particle));
+        let own = Own { present, reference, rest, load: self.load(particle) };
+        Some(self.rule.target_by_cells(&own, cells, weights.held(particle), corner))
+    }
+
+    /// A neighbour, seen from where the particle is.
+    fn corner(&self, particle: usize, slot: usize, present: &Points) -> Corner {
+        let other = self.neighbours.of(particle)[slot] as usize;
+        let from = |points: &Points| {
+            let ([x, y], [x0, y0]) = (points.get(other), points.get(particle));
+            [x - x0, y - y0]
+        };
+        let (reference, now) = (from(&self.reference), from(present));
+        Corner { reference, displacement: [now[0] - reference[0], now[1] - reference[1]] }
+    }
+
     /// Computes and keeps the rest offsets of the reference configuration; none are kept where all
     /// are zero, so that a body that needs none does not pay for them.
     pub fn keep_rest(&mut self) {
+        if let (COROTATED, Weights::Matrix(weights)) = (self.rule.mean, &self.weights) {
+            self.rest = rest_of_cells(weights, &self.reference);
+            return;
+        }
         let rest: Points = (0..self.reference.len())
             .map(|j| self.rule.rest_offset(self.reference.get(j), self.seen(j, &self.reference)))
             .collect();
@@ -251,11 +345,20 @@ impl Interaction {
     fn neighbour(&self, particle: usize, bond: usize, position: [f64; 2]) -> Neighbour {
         Neighbour {
             position,
-            reference: self.reference.get(self.neighbours.index[bond] as usize),
             weight: self.weights.scalar(bond),
             matrix: self.weights.matrix(particle, bond - self.neighbours.starts[particle] as usize),
         }
     }
+}
+
+/// Cells that have not moved pull nothing, to the last bit; what is left are held components.
+fn rest_of_cells(weights: &MatrixWeights, reference: &Points) -> Option<Points> {
+    let place = |i: usize| {
+        let (held, at) = (weights.held(i), reference.get(i));
+        [0, 1].map(|axis| if held[axis] { at[axis] } else { 0.0 })
+    };
+    let any = (0..reference.len()).any(|i| weights.held(i) != [false; 2]);
+    any.then(|| (0..reference.len()).map(place).collect())
 }
 
 #[cfg(test)]
@@ -274,6 +377,7 @@ mod tests {
             blocks: vec![first, second],
             stiffness: vec![first, second],
             compliance: vec![[[0.5, 0.1], [0.1, 0.3]]],
+            cells: None,
         };
         let mut interaction = Interaction {
             rule: Rule { mean: SMALL, ..Rule::BARYCENTRE },

@@ -9,6 +9,7 @@
 
 pub mod block;
 pub mod body;
+pub mod cells_around;
 pub mod cloud;
 pub mod fracture;
 pub mod frame;

@@ -175,7 +175,7 @@ fn mean(corners: &[[f64; 2]]) -> [f64; 2] {
 
 /// Mean over the cell of the gradient of each corner's shape function \[1/length\]: by the divergence
 /// theorem an integral over the sides, on which every element here is linear.
-fn mean_gradients(corners: &[[f64; 2]]) -> Vec<[f64; 2]> {
+pub fn mean_gradients(corners: &[[f64; 2]]) -> Vec<[f64; 2]> {
     let (m, twice) = (corners.len(), 2.0 * area(corners));
     (0..m)
         .map(|k| {

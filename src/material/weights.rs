@@ -8,12 +8,14 @@ use rayon::prelude::*;
 use super::cells::{Cells, Incidence};
 use super::elastic::Elastic;
 use super::mechanism::{Mechanism, require_rigid};
-use super::stiffness::ShapeError;
+use super::stiffness::{ShapeError, mean_gradients};
 use crate::flock::block::{Block, apply, inverse, plus, product};
 use crate::flock::body::Body;
+use crate::flock::cells_around::CellsAround;
 use crate::flock::interaction::MatrixWeights;
 use crate::flock::neighbourhood::Neighbours;
 use crate::flock::points::Points;
+use crate::flock::rules::{Element, OWN};
 
 /// Particles whose classes one thread finds at a time.
 const CHUNK: usize = 1 << 14;
@@ -29,6 +31,8 @@ pub struct MaterialWeights {
     pub class: Vec<u32>,
     /// One row for each class, shape \[classes\].
     pub rows: Vec<Row>,
+    /// The cells around the particles of each class.
+    pub cells: CellsAround,
 }
 
 /// What the particles of a class feel.
@@ -111,9 +115,10 @@ impl MaterialWeights {
         let (class, first) = assembly.classes();
         // Every row is summed over its own cells in their order: the same bits on any number of threads.
         // Collected before looking: the first error in the order of particles, not the first to be found.
-        let rows: Vec<Result<Row, WeightsError>> = first.into_par_iter().map(|i| assembly.row(i)).collect();
+        let rows: Vec<Result<Row, WeightsError>> = first.par_iter().map(|&i| assembly.row(i)).collect();
         let rows = rows.into_iter().collect::<Result<_, _>>()?;
-        Ok(Self { neighbours, class, rows })
+        let cells = assembly.cells_around(&first);
+        Ok(Self { neighbours, class, rows, cells })
     }
 
     pub fn count(&self) -> usize {
@@ -140,6 +145,7 @@ impl MaterialWeights {
             blocks: Vec::new(),
             stiffness: Vec::new(),
             compliance: self.rows.iter().map(|row| row.inverse).collect(),
+            cells: None,
         };
         for row in &self.rows {
             weights.blocks.extend(row.blocks.iter().map(|block| product(&row.inverse, block)));
@@ -147,6 +153,11 @@ impl MaterialWeights {
             weights.starts.push(weights.blocks.len() as u32);
         }
         weights
+    }
+
+    /// The weights of a corotated rule: those of [`MaterialWeights::weights`] and the cells around each particle.
+    pub fn corotated_weights(&self) -> MatrixWeights {
+        MatrixWeights { cells: Some(self.cells.clone()), ..self.weights() }
     }
 
     /// Force of the neighbours on a particle, `sum_j K_ij (u_j - u_i)` \[force\], under displacements
@@ -278,22 +289,22 @@ impl Assembly<'_> {
 
     /// The row of one particle; refuses a particle that does not see a corner of its cells.
     fn row(&self, particle: usize) -> Result<Row, WeightsError> {
-        let (cells, seen) = (self.cells, self.neighbours.of(particle));
-        let around = self.incidence.of(particle);
+        let seen = self.neighbours.of(particle);
         let mut blocks = vec![Block::default(); seen.len()];
-        for cell in around.iter().map(|&cell| cell as usize) {
-            let (corners, k) = (cells.of(cell), &self.elements[cells.kind[cell] as usize]);
-            let factor = self.factor.map_or(1.0, |factor| factor[cell]);
-            let own = corners.iter().position(|&corner| corner as usize == particle).unwrap_or_default();
-            for (other, &corner) in corners.iter().enumerate().filter(|&(other, _)| other != own) {
-                let Some(slot) = seen.iter().position(|&j| j == corner) else {
+        for cell in self.around(particle) {
+            let (k, slots) = (&self.elements[self.cells.kind[cell] as usize], self.slots(particle, cell));
+            let factor = self.factor(cell);
+            let own = slots.iter().position(|&slot| slot == Some(OWN)).unwrap_or_default();
+            for (other, slot) in slots.into_iter().enumerate().filter(|&(other, _)| other != own) {
+                let Some(slot) = slot else {
                     return Err(WeightsError::MissingNeighbour {
                         particle: particle + 1,
-                        missing: corner as usize + 1,
+                        missing: self.cells.of(cell)[other] as usize + 1,
                         neighbours: self.most_neighbours(),
-                        corners: corners.len(),
+                        corners: self.cells.of(cell).len(),
                     });
                 };
+                let slot = slot as usize;
                 let entry = |a: usize, b: usize| -factor * k[(2 * own + a, 2 * other + b)];
                 blocks[slot] = plus(&blocks[slot], &[[entry(0, 0), entry(0, 1)], [entry(1, 0), entry(1, 1)]]);
             }
@@ -301,9 +312,52 @@ impl Assembly<'_> {
         let diagonal = blocks.iter().fold(Block::default(), |sum, block| plus(&sum, block));
         let inverse = match inverse(&diagonal) {
             Some(inverse) => inverse,
-            None if around.is_empty() => Block::default(),
+            None if self.around(particle).next().is_none() => Block::default(),
             None => return Err(WeightsError::Singular { particle: particle + 1 }),
         };
         Ok(Row { blocks, diagonal, inverse })
+    }
+
+    fn around(&self, particle: usize) -> impl Iterator<Item = usize> {
+        self.incidence.of(particle).iter().map(|&cell| cell as usize)
+    }
+
+    fn factor(&self, cell: usize) -> f64 {
+        self.factor.map_or(1.0, |factor| factor[cell])
+    }
+
+    /// Which neighbour of a particle each corner of a cell is, [`OWN`] for itself, shape \[corners\].
+    fn slots(&self, particle: usize, cell: usize) -> Vec<Option<u32>> {
+        let seen = self.neighbours.of(particle);
+        let slot = |&corner: &u32| match corner as usize == particle {
+            true => Some(OWN),
+            false => seen.iter().position(|&j| j == corner).map(|slot| slot as u32),
+        };
+        self.cells.of(cell).iter().map(slot).collect()
+    }
+
+    /// The cells around one particle of each class, all of whose corners it sees.
+    fn cells_around(&self, first: &[usize]) -> CellsAround {
+        let kinds = self.elements.iter().zip(&self.cells.shapes);
+        let elements = kinds.map(|(k, shape)| {
+            let entry = |a: usize, b: usize| {
+                let (a, b) = (2 * a, 2 * b);
+                [[k[(a, b)], k[(a, b + 1)]], [k[(a + 1, b)], k[(a + 1, b + 1)]]]
+            };
+            let corners = shape.len();
+            let stiffness = (0..corners * corners).map(|n| entry(n / corners, n % corners)).collect();
+            Element { stiffness, gradients: mean_gradients(shape) }
+        });
+        let mut around = CellsAround::new(elements.collect());
+        for &particle in first {
+            for cell in self.around(particle) {
+                let slots: Vec<u32> =
+                    self.slots(particle, cell).into_iter().map(Option::unwrap_or_default).collect();
+                let own = slots.iter().position(|&slot| slot == OWN).unwrap_or_default();
+                around.push(self.cells.kind[cell], own, &slots, self.factor(cell));
+            }
+            around.end_class();
+        }
+        around
     }
 }

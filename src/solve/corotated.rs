@@ -1,28 +1,27 @@
-//! Where a corotated material comes to rest: Newton's method on the rule's own targets.
+//! Where a corotated material comes to rest: Newton's method on the energy of its cells.
 //!
-//! With `R_i` the turn of the neighbours of particle `i`, the force that is left on it is
-//! `g_i = R_i h_i + f_i`, `h_i = sum_j K_ij (R_i' (x_j - x_i) - (X_j - X_i))`: `D_i`, in turned axes, times
-//! how far the rule's target is from it. The turn depends on the neighbours alone, so `-dg` is an operator
-//! over the same neighbours, with blocks `R_i K_ij R_i' + v_i w_ij'`; `w_ij = S R_i (X_j - X_i) / m_i` is what
-//! a neighbour's move adds to the angle, `v_i = S R_i h_i - R_i sum_j K_ij S R_i' (x_j - x_i)` what the angle
-//! does to the force, `S` a quarter turn and `m_i` the size of [`Turn`]'s fit.
+//! The force on a particle is minus the gradient of the energy that the cells around it store (see
+//! [`crate::flock::rules::Element`]), and the tangent is its second derivative: a symmetric operator over the rule's own
+//! neighbours. It is positive definite wherever the body rests stably, so every solver will do; on the way to there it need
+//! not be, and an increment whose system has no positive solution is taken in smaller parts.
 //!
-//! Turns that differ from neighbour to neighbour leave no symmetry: the linear systems are factorised, or swept.
-//! Leaders go their way and loads grow in increments, halved where Newton's method does not settle or a
-//! particle turns too far at once: that keeps to the equilibrium that the unstrained body grows into.
+//! Leaders go their way and loads grow in increments, halved where Newton's method does not settle or a cell turns too far
+//! at once: that keeps to the equilibrium that the unstrained body grows into.
 
 use std::time::{Duration, Instant};
 
+use rayon::prelude::*;
+
 use super::equilibrium::{
-    Choice, Precision, Request, SolveError, Solved, Solver, System, choose_unsymmetric, solve as solve_linear,
+    Choice, Precision, Request, SolveError, Solved, Solver, System, solve as solve_linear,
 };
-use super::linear::NotLinear;
+use super::linear::{NotLinear, outlier_places};
 use super::operator::{Operator, OperatorError, Row};
 use crate::flock::block::{Block, apply, plus};
 use crate::flock::body::Body;
 use crate::flock::interaction::{Interaction, MatrixWeights, Weights};
 use crate::flock::points::Points;
-use crate::flock::rules::{Mean, Rotation, Turn};
+use crate::flock::rules::{Corner, Mean, OWN, Rotation, Turn};
 
 /// Newton steps of one increment.
 const MOST_STEPS: usize = 16;
@@ -32,7 +31,7 @@ const MOST_SOLVES: usize = 500;
 const LEAST_STRIDE: f64 = 1.0 / 1024.0;
 /// Residual at which the next increment may begin.
 const ON_THE_WAY: f64 = 1e-3;
-/// Cosine of the largest turn of a particle in one increment: 60 degrees.
+/// Cosine of the largest turn of a cell in one increment: 60 degrees.
 const LEAST_COSINE: f64 = 0.5;
 /// Residual of each linear system: more digits than a Newton step has.
 const OF_A_STEP: f64 = 1e-5;
@@ -46,10 +45,8 @@ pub enum CorotatedError {
     Solve(#[from] SolveError),
     #[error("feedback is a term of the sweep, which the corotated equilibrium does not have")]
     Feedback,
-    #[error(
-        "{solver} needs neighbours that feel each other alike, and axes that turn from particle to particle leave none; direct, gauss-seidel and jacobi do not ask for it"
-    )]
-    NotSymmetric { solver: Solver },
+    #[error("Newton's method on a corotated material computes in double precision only")]
+    DoubleOnly,
     #[error(
         "the rotations do not settle beyond {:.1} % of the way of leaders and loads ({solves} systems solved): the body snaps, buckles or is torn there",
         100.0 * part
@@ -62,29 +59,36 @@ pub fn is_corotated(interaction: &Interaction) -> bool {
     interaction.rule.mean == Mean::Material { rotation: Rotation::Corotated }
 }
 
+/// Followers up to which a factorisation is taken: the rows of the tangent differ from particle to particle, which
+/// multigrid on a lattice gains nothing from.
+const DIRECT_UP_TO: usize = 200_000;
+
 /// The solver of the linear systems, and why.
 ///
 /// # Errors
-/// If the one asked for needs symmetry, or single precision is asked for.
+/// If single precision is asked for.
 pub fn choose(followers: usize, request: &Request) -> Result<(Solver, String), CorotatedError> {
     let (solver, why) = match request.solver {
         Choice::This(solver) => (solver, "asked for".into()),
-        Choice::Auto => choose_unsymmetric(followers, "axes turn from particle to particle"),
+        Choice::Auto if cfg!(feature = "fem") && followers <= DIRECT_UP_TO => {
+            (Solver::Direct, format!("{followers} followers are few enough to factorise"))
+        }
+        Choice::Auto => (
+            Solver::Multigrid,
+            format!("the number of its iterations does not grow with {followers} followers"),
+        ),
     };
-    if solver.needs_symmetry() {
-        return Err(CorotatedError::NotSymmetric { solver });
-    }
     if request.precision == Precision::F32 {
-        return Err(SolveError::DoubleOnly { solver }.into());
+        return Err(CorotatedError::DoubleOnly);
     }
     Ok((solver, format!("{why}; once a step of Newton's method, until the rotations settle")))
 }
 
 /// How leaders and loads get to where they are.
 pub struct Way<'a> {
-    /// Where those who do not follow are after a part of the whole way \[length\], shape \[count\]; as much of the
+    /// Where what is held is after a part of the whole way \[length\], shape \[count\]; as much of the
     /// loads is then on the body.
-    pub held: &'a dyn Fn(f64) -> Points,
+    pub held: &'a (dyn Fn(f64) -> Points + Sync),
     /// The equilibrium to start from and the part that it belongs to; the reference and 0 where there is none.
     pub start: Option<(&'a Points, f64)>,
     /// The part to come to \[1\].
@@ -99,7 +103,8 @@ impl Way<'_> {
     }
 }
 
-/// The equilibrium at the end of the way.
+/// The equilibrium at the end of the way. `held_axes` are single components of followers that are held, shape
+/// \[count\]\[x, y\], or empty; the way says where they are as well.
 ///
 /// # Errors
 /// As [`solve_linear`]; names the part of the way from which on the rotations do not settle.
@@ -107,6 +112,7 @@ pub fn solve(
     interaction: &Interaction,
     body: &Body,
     follows: Vec<bool>,
+    held_axes: Vec<[bool; 2]>,
     way: &Way<'_>,
     request: &Request,
 ) -> Result<Solved, CorotatedError> {
@@ -123,7 +129,7 @@ pub fn solve(
     let followers = follows.iter().filter(|&&follows| follows).count();
     let (solver, why) = choose(followers, request)?;
     let step = Request { solver: Choice::This(solver), tolerance: OF_A_STEP, ..*request };
-    let rule = Corotated { interaction, weights, body, follows, way, step };
+    let rule = Corotated { interaction, weights, body, follows, held_axes, way, step };
     let mut newton = Newton {
         rule: &rule,
         size: rule.size(),
@@ -155,54 +161,65 @@ struct Corotated<'a> {
     weights: &'a MatrixWeights,
     body: &'a Body,
     follows: Vec<bool>,
+    held_axes: Vec<[bool; 2]>,
     way: &'a Way<'a>,
     /// How a linear system is solved.
     step: Request,
 }
 
-/// A particle among its neighbours.
+/// What the cells around a particle do to it.
 struct Local {
-    turn: Turn,
-    /// `g` without the load.
+    /// Without the load.
     force: [f64; 2],
-    /// What a small turn adds to the force.
-    by_angle: [f64; 2],
-}
-
-fn quarter([x, y]: [f64; 2]) -> [f64; 2] {
-    [-y, x]
+    /// Second derivatives of the energy: to itself, and to its neighbours.
+    diagonal: Block,
+    blocks: Vec<Block>,
+    /// Of one of its cells.
+    turn: Turn,
 }
 
 impl Corotated<'_> {
-    /// Neighbours of a particle: index, stiffness, and where they are from it in the reference and, displaced
-    /// by `u`, now.
-    fn around<'b>(
-        &'b self,
-        i: usize,
-        u: &'b Points,
-    ) -> impl Iterator<Item = (usize, &'b Block, [f64; 2], [f64; 2])> + Clone {
-        let reference = &self.interaction.reference;
-        let others = self.interaction.neighbours.of(i).iter().zip(self.weights.stiffness_of(i));
-        others.map(move |(&j, block)| {
-            let j = j as usize;
-            let then = minus(reference.get(j), reference.get(i));
-            let by = minus(u.get(j), u.get(i));
-            (j, block, then, [then[0] + by[0], then[1] + by[1]])
-        })
+    /// A neighbour from where a particle is, both displaced by `u`.
+    fn corner(&self, i: usize, slot: usize, u: &Points) -> Corner {
+        let (reference, j) = (&self.interaction.reference, self.interaction.neighbours.of(i)[slot] as usize);
+        Corner {
+            reference: minus(reference.get(j), reference.get(i)),
+            displacement: minus(u.get(j), u.get(i)),
+        }
     }
 
-    /// `None` where the neighbours have no direction left.
-    fn local(&self, i: usize, u: &Points, turn: Option<Turn>) -> Option<Local> {
-        let pairs = self.around(i, u).map(|(_, _, then, now)| (then, now));
-        let turn = turn.map_or_else(|| Turn::fit(pairs), Some)?;
-        let (mut pull, mut swing) = ([0.0; 2], [0.0; 2]);
-        for (_, block, then, now) in self.around(i, u) {
-            let back = turn.back(now);
-            add(&mut pull, apply(block, minus(back, then)));
-            add(&mut swing, apply(block, quarter(back)));
+    /// `None` where a cell has no direction left.
+    fn local(&self, i: usize, u: &Points) -> Option<Local> {
+        let mut force = [0.0; 2];
+        let mut diagonal = Block::default();
+        let mut blocks = vec![Block::default(); self.interaction.neighbours.of(i).len()];
+        let mut turn = None;
+        for cell in self.weights.cells_around(i) {
+            let corner = |slot| self.corner(i, slot, u);
+            let row = cell.element.row(cell.own, |k| cell.corner(k, corner))?;
+            let scaled = |block: &Block| block.map(|row| row.map(|entry| cell.factor * entry));
+            add(&mut force, row.force.map(|f| cell.factor * f));
+            for (&slot, block) in cell.slots.iter().zip(&row.tangent) {
+                let sum = if slot == OWN { &mut diagonal } else { &mut blocks[slot as usize] };
+                *sum = plus(sum, &scaled(block));
+            }
+            turn = turn.or(Some(row.turn));
         }
-        let force = turn.forth(pull);
-        Some(Local { turn, force, by_angle: minus(quarter(force), turn.forth(swing)) })
+        Some(Local { force, diagonal, blocks, turn: turn? })
+    }
+
+    /// Components of a particle that are not given.
+    fn free(&self, i: usize) -> [bool; 2] {
+        let held = self.held_axes.get(i).copied().unwrap_or_default();
+        held.map(|held| self.follows[i] && !held)
+    }
+
+    /// Puts what is not free where it is.
+    fn hold(&self, u: &mut Points, held: &Points) {
+        for i in 0..u.len() {
+            let (free, at, there) = (self.free(i), u.get(i), held.get(i));
+            u.set(i, [0, 1].map(|axis| if free[axis] { at[axis] } else { there[axis] }));
+        }
     }
 
     fn load(&self, i: usize) -> [f64; 2] {
@@ -211,54 +228,60 @@ impl Corotated<'_> {
 
     /// The force left on every follower after `part` of the way; zero on the others.
     fn forces(&self, u: &Points, part: f64) -> Option<(Vec<Option<Local>>, Points)> {
-        let mut left = Points::zeros(u.len());
-        let mut locals = Vec::with_capacity(u.len());
-        for i in 0..u.len() {
-            if !self.follows[i] {
-                locals.push(None);
-                continue;
+        let of_particle = |i: usize| match self.follows[i] {
+            false => Some(None),
+            true => self.local(i, u).map(Some),
+        };
+        let locals: Vec<Option<Local>> =
+            (0..u.len()).into_par_iter().map(of_particle).collect::<Option<_>>()?;
+        let left = |(i, local): (usize, &Option<Local>)| match local {
+            None => [0.0; 2],
+            Some(local) => {
+                let (load, free) = (self.load(i), self.free(i));
+                [0, 1].map(|axis| if free[axis] { local.force[axis] + part * load[axis] } else { 0.0 })
             }
-            let local = self.local(i, u, None)?;
-            let load = self.load(i);
-            left.set(i, [local.force[0] + part * load[0], local.force[1] + part * load[1]]);
-            locals.push(Some(local));
-        }
+        };
+        let left = locals.iter().enumerate().map(left).collect();
         Some((locals, left))
     }
 
-    /// The force at the start, all followers at zero and everybody in the axes of the reference.
+    /// The force at the start, all followers at zero and all cells in the axes of the reference.
     fn size(&self) -> f64 {
-        let mut u = (self.way.held)(1.0);
-        (0..u.len()).filter(|&i| self.follows[i]).for_each(|i| u.set(i, [0.0; 2]));
+        let mut u = Points::zeros(self.follows.len());
+        self.hold(&mut u, &(self.way.held)(1.0));
         let followers = (0..u.len()).filter(|&i| self.follows[i]);
         let all: Points = followers
             .map(|i| {
-                let force = self.local(i, &u, Some(Turn::NONE)).map_or([f64::NAN; 2], |local| local.force);
-                let load = self.load(i);
-                [force[0] + load[0], force[1] + load[1]]
+                let mut force = self.load(i);
+                let others = self.interaction.neighbours.of(i).iter().zip(self.weights.stiffness_of(i));
+                for (&j, block) in others {
+                    add(&mut force, apply(block, minus(u.get(j as usize), u.get(i))));
+                }
+                let free = self.free(i);
+                [0, 1].map(|axis| if free[axis] { force[axis] } else { 0.0 })
             })
             .collect();
         norm(&all)
     }
 
-    /// `-dg` at these places: forces per displacement.
-    fn tangent(&self, u: &Points, locals: &[Option<Local>]) -> Result<Operator, OperatorError> {
+    /// Second derivatives of the energy: forces per displacement.
+    fn tangent(&self, locals: &[Option<Local>]) -> Result<Operator, OperatorError> {
         let lattice = &self.body.lattice;
         let grid = [lattice.vector([1, 0]), lattice.vector([0, 1])];
         let row = |i: usize| {
-            let mut row = Row::default();
-            let Some(local) = &locals[i] else { return row };
-            for (j, block, then, _) in self.around(i, u) {
-                let [x, y] = quarter(local.turn.forth(then)).map(|w| w / local.turn.size());
-                let [a, b] = local.by_angle;
-                let block = plus(&local.turn.turned(block), &[[a * x, a * y], [b * x, b * y]]);
-                let (here, there) = (self.body.sites[i], self.body.sites[j]);
-                row.diagonal = plus(&row.diagonal, &block);
-                row.entries.push(([there[0] - here[0], there[1] - here[1]], block));
+            let Some(local) = &locals[i] else { return Row::default() };
+            let mut row = Row { diagonal: local.diagonal, entries: Vec::new() };
+            for (&j, block) in self.interaction.neighbours.of(i).iter().zip(&local.blocks) {
+                if *block != Block::default() {
+                    let (here, there) = (self.body.sites[i], self.body.sites[j as usize]);
+                    let offset = [there[0] - here[0], there[1] - here[1]];
+                    row.entries.push((offset, block.map(|row| row.map(|entry| -entry))));
+                }
             }
             row
         };
-        Operator::from_rows(&self.body.sites, grid, self.follows.clone(), row)
+        let operator = Operator::from_rows(&self.body.sites, grid, self.follows.clone(), row)?;
+        Ok(operator.with_held_axes(self.held_axes.clone()).with_outliers(outlier_places(self.body)))
     }
 }
 
@@ -310,7 +333,7 @@ impl Newton<'_> {
         let mut best = f64::INFINITY;
         for _ in 0..MOST_STEPS {
             self.step(&mut u, (&locals, left), std::mem::replace(&mut led, Points::zeros(now.len())))?;
-            (0..u.len()).filter(|&i| !rule.follows[i]).for_each(|i| u.set(i, now.get(i)));
+            rule.hold(&mut u, &now);
             let Some(found) = rule.forces(&u, after) else { return Ok(None) };
             (locals, left) = found;
             let residual = norm(&left) / self.size;
@@ -341,7 +364,7 @@ impl Newton<'_> {
         led: Points,
     ) -> Result<(), CorotatedError> {
         let begin = Instant::now();
-        let operator = self.rule.tangent(u, locals).map_err(NotLinear::Operator)?;
+        let operator = self.rule.tangent(locals).map_err(NotLinear::Operator)?;
         let system = System::new(operator, left, led);
         let assembled = begin.elapsed();
         let solved = solve_linear(&system, &self.rule.step)?;

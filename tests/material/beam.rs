@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use flockform::flock::body::{Body, Cut};
+use flockform::flock::cells_around::CellsAround;
 use flockform::flock::lattice::Lattice;
 use flockform::flock::neighbourhood::{Neighbourhood, Neighbours};
 use flockform::flock::points::Points;
@@ -104,7 +105,8 @@ fn the_barycentre_on_the_beam_has_the_errors_of_the_paper() {
         Row { blocks: vec![one; degree], diagonal, inverse }
     };
     let rows = (0..body.count()).map(row).collect();
-    let weights = MaterialWeights { class: (0..body.count() as u32).collect(), rows, neighbours };
+    let class = (0..body.count() as u32).collect();
+    let weights = MaterialWeights { class, rows, neighbours, cells: CellsAround::default() };
     let leads = end_columns(&body);
     let found = equilibrium(&weights, &leads, &Points::zeros(body.count()), &truth);
     let displacement = relative_l2(&found, &truth, |i| !leads[i]);

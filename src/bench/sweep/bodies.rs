@@ -260,6 +260,7 @@ fn material(side: usize) -> Subject {
         stiffness: blocks.clone(),
         blocks,
         compliance: vec![[[1.0, 0.0], [0.0, 1.0]]; 2],
+        cells: None,
     });
     body.subject(MATERIAL, BYTES_PER_UPDATE, 1)
 }

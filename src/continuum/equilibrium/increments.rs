@@ -1,7 +1,9 @@
 //! Equilibria on the way: loads and leaders' motions in parts, each solved from where the last one left the body.
 
 use super::{Outcome, Plan, StopReason, Watch, steps_of_the_way};
-use super::{farthest_from_target, follows, held_after, of_plan_after, reason, refuse, refuse_corotated};
+use super::{
+    farthest_from_target, follows, held_axes, of_plan_after, reason, refuse, refuse_corotated, way_after,
+};
 use crate::continuum::engine::Engine;
 use crate::continuum::engine::load::scaled;
 use crate::flock::points::Points;
@@ -78,8 +80,9 @@ fn settle_at(
         let system = of_plan_after(scene, plan, part * steps).map_err(Failure::Refused)?;
         return solve(&system, request).map_err(|error| Failure::Refused(refuse(scene, &error)));
     }
-    let way = Way { held: &|part| held_after(plan, part * steps), start, end: part };
-    let solved = corotated::solve(&plan.interaction, &plan.body, follows(plan), &way, request);
+    let way = Way { held: &|part| way_after(plan, part * steps), start, end: part };
+    let axes = held_axes(plan);
+    let solved = corotated::solve(&plan.interaction, &plan.body, follows(plan), axes, &way, request);
     solved.map_err(|error| match error {
         CorotatedError::Unsettled { .. } if start.is_some() => Failure::Lost(error.to_string()),
         _ => Failure::Refused(refuse_corotated(scene, &error)),

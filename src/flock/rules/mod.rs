@@ -6,6 +6,7 @@
 //! file of its own.
 
 mod barycentre;
+mod corotated;
 mod distance;
 mod feedback;
 mod material;
@@ -15,8 +16,9 @@ mod spaced;
 
 use super::block::{Block, IDENTITY, apply};
 
+pub use corotated::{CellAround, CellRow, Corner, Element, OWN, Turn, pull};
 pub use feedback::{Feedback, FeedbackReference};
-pub use material::{Rotation, Turn};
+pub use material::Rotation;
 pub use poisson::{Axis, Poisson};
 pub use power::Origin;
 
@@ -25,8 +27,6 @@ pub use power::Origin;
 pub struct Neighbour {
     /// Present position \[length, world frame\].
     pub position: [f64; 2],
-    /// Position in the reference configuration \[length, world frame\]; only a corotated rule looks.
-    pub reference: [f64; 2],
     /// Fixed weight; 1 where the scene gives none.
     pub weight: f64,
     /// Fixed weight of a material; only [`Mean::Material`] looks.
@@ -37,7 +37,7 @@ impl Neighbour {
     /// A neighbour that counts once.
     #[inline]
     pub fn at(position: [f64; 2]) -> Self {
-        Self { position, reference: position, weight: 1.0, matrix: IDENTITY }
+        Self { position, weight: 1.0, matrix: IDENTITY }
     }
 }
 
@@ -74,7 +74,8 @@ pub enum Mean {
     /// The mean of the places at `spacing` \[length\] from each neighbour, towards the particle,
     /// weighted by this power of the present distance.
     Spaced { spacing: f64, power: f64 },
-    /// Weighted by the neighbours' matrices, which sum to the identity: a rule that is a material.
+    /// Weighted by the neighbours' matrices, which sum to the identity: a rule that is a material. Corotated it looks at
+    /// the cells between them instead: see [`Rule::target_by_cells`].
     Material { rotation: Rotation },
 }
 
@@ -104,9 +105,8 @@ impl Rule {
     /// is computed from nothing. Finite input gives finite output unless the result itself overflows.
     #[inline]
     pub fn target(&self, own: &Own, neighbours: impl Iterator<Item = Neighbour> + Clone) -> [f64; 2] {
-        let turn = self.turn(own, neighbours.clone());
-        match self.mean(own.present, turn, neighbours) {
-            Some(mean) => self.completed(own, turn, mean),
+        match self.mean(own.present, neighbours) {
+            Some(mean) => self.completed(own, mean),
             None => own.present,
         }
     }
@@ -116,23 +116,42 @@ impl Rule {
     #[inline]
     pub fn target_of_material(&self, own: &Own, pairs: impl Iterator<Item = (Block, [f64; 2])>) -> [f64; 2] {
         match material::mean(pairs) {
-            Some(mean) => self.completed(own, None, mean),
+            Some(mean) => self.completed(own, mean),
+            None => own.present,
+        }
+    }
+
+    /// The target by a corotated material: where the forces of the `cells` around the particle and its load leave it,
+    /// its neighbours staying. `neighbour` gives the place of each neighbour from that of the particle. The reference
+    /// configuration is at rest to the last bit. Components that are `held` stay where the rest offset has them;
+    /// weights, and other rest offsets, are not looked at.
+    pub fn target_by_cells<'a>(
+        &self,
+        own: &Own,
+        cells: impl Iterator<Item = CellAround<'a>>,
+        held: [bool; 2],
+        neighbour: impl Fn(usize) -> Corner,
+    ) -> [f64; 2] {
+        let load = own.load.map_or([0.0; 2], |load| load.force);
+        match corotated::target(own, load, cells, held, neighbour) {
+            Some(target) => self.with_terms(own, target),
             None => own.present,
         }
     }
 
     /// The target from the bare mean: rest offset, load and terms added.
     #[inline]
-    fn completed(&self, own: &Own, turn: Option<Turn>, mean: [f64; 2]) -> [f64; 2] {
-        let rest = turn.map_or(own.rest, |turn| turn.forth(own.rest));
-        let mut target = [mean[0] + rest[0], mean[1] + rest[1]];
+    fn completed(&self, own: &Own, mean: [f64; 2]) -> [f64; 2] {
+        let mut target = [mean[0] + own.rest[0], mean[1] + own.rest[1]];
         if let Some(Load { force, compliance }) = &own.load {
-            let push = match turn {
-                None => apply(compliance, *force),
-                Some(turn) => turn.forth(apply(compliance, turn.back(*force))),
-            };
+            let push = apply(compliance, *force);
             target = [target[0] + push[0], target[1] + push[1]];
         }
+        self.with_terms(own, target)
+    }
+
+    #[inline]
+    fn with_terms(&self, own: &Own, mut target: [f64; 2]) -> [f64; 2] {
         if let Some(poisson) = &self.poisson {
             poisson.add(own, &mut target);
         }
@@ -142,20 +161,11 @@ impl Rule {
         target
     }
 
-    /// The turn of the neighbours about the particle, where the rule looks for it.
-    fn turn(&self, own: &Own, neighbours: impl Iterator<Item = Neighbour>) -> Option<Turn> {
-        match self.mean {
-            Mean::Material { rotation: Rotation::Corotated } => Turn::of(own, neighbours),
-            _ => None,
-        }
-    }
-
     /// The bare mean, before any term; `None` without neighbours or without any weight.
     #[inline]
     fn mean(
         &self,
         present: [f64; 2],
-        turn: Option<Turn>,
         neighbours: impl Iterator<Item = Neighbour> + Clone,
     ) -> Option<[f64; 2]> {
         match self.mean {
@@ -163,10 +173,7 @@ impl Rule {
             Mean::Distance { power } => distance::mean(power, present, neighbours),
             Mean::Power { exponent, origin } => power::mean(exponent, origin, neighbours),
             Mean::Spaced { spacing, power } => spaced::mean(spacing, power, present, neighbours),
-            Mean::Material { .. } => match turn {
-                Some(turn) => material::turned_mean(turn, neighbours),
-                None => material::mean(neighbours.map(|n| (n.matrix, n.position))),
-            },
+            Mean::Material { .. } => material::mean(neighbours.map(|n| (n.matrix, n.position))),
         }
     }
 
@@ -182,7 +189,7 @@ impl Rule {
         reference: [f64; 2],
         neighbours: impl Iterator<Item = Neighbour> + Clone,
     ) -> [f64; 2] {
-        let Some(mean) = self.mean(reference, None, neighbours) else { return [0.0; 2] };
+        let Some(mean) = self.mean(reference, neighbours) else { return [0.0; 2] };
         [0, 1].map(|k| exact_difference(reference[k], mean[k]))
     }
 }

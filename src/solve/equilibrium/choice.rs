@@ -32,7 +32,7 @@ pub fn choose(system: &System, request: &Request) -> (Solver, String) {
 }
 
 /// The solver for so many followers whose operator has no symmetry, for the reason given.
-pub fn choose_unsymmetric(followers: usize, because: &str) -> (Solver, String) {
+fn choose_unsymmetric(followers: usize, because: &str) -> (Solver, String) {
     if cfg!(feature = "fem") && followers <= UNSYMMETRIC_UP_TO {
         (Solver::Direct, format!("{because}, and {followers} followers are few enough to factorise"))
     } else {

@@ -31,7 +31,7 @@ mod system;
 
 use std::time::{Duration, Instant};
 
-pub use choice::{choose, choose_unsymmetric};
+pub use choice::choose;
 pub use error::SolveError;
 pub use system::System;
 

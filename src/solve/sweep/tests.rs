@@ -106,6 +106,7 @@ fn a_compiled_sweep_of_a_material_gives_the_bits_of_an_uncompiled_one() {
         stiffness: blocks.clone(),
         blocks,
         compliance: (0..=most).map(|n| [[0.1 * n as f64, 0.2], [0.3, 0.4]]).collect(),
+        cells: None,
     });
     let mut roles = vec![Role::Follower; interaction.reference.len()];
     roles.iter_mut().step_by(7919).for_each(|role| *role = Role::Leader);

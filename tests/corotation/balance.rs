@@ -1,0 +1,123 @@
+//! Action is reaction, and rest is a minimum of an energy.
+
+use flockform::flock::interaction::Weights;
+use flockform::flock::points::{Points, distance};
+use flockform::flock::rules::Corner;
+use flockform::solve::equilibrium::Solver;
+
+use crate::support::*;
+
+/// Sum of forces and their moment about the origin, at these places.
+fn resultant(forces: impl Iterator<Item = ([f64; 2], [f64; 2])>) -> [f64; 3] {
+    forces.fold([0.0; 3], |[x, y, m], (place, f)| [x + f[0], y + f[1], m + place[0] * f[1] - place[1] * f[0]])
+}
+
+#[test]
+fn reactions_carry_the_load_and_its_moment_in_the_deformed_state() {
+    for kind in KINDS {
+        for elastic in [sheet(12.0, 0.3), fibres()] {
+            let length = 8.0;
+            let load = [0.002, 0.02];
+            let beam = Beam::new(kind(0.25), length, &elastic, load);
+            let solved = beam.solved_by(Solver::Direct);
+            let at = beam.moved(&solved.displacement);
+            assert!(beam.of_the_end(&solved.displacement)[1] > 0.2 * length, "bends far");
+            let held = (0..at.len()).filter(|&i| !beam.follows[i]);
+            let reactions = resultant(held.map(|i| {
+                let (force, load) = (beam.interaction.force(i, &at), beam.load(i));
+                (at.get(i), [-force[0] - load[0], -force[1] - load[1]])
+            }));
+            let loads = resultant((0..at.len()).map(|i| (at.get(i), beam.load(i))));
+            let [x, y, m] = [0, 1, 2].map(|k| reactions[k] + loads[k]);
+            let size = load[0].hypot(load[1]);
+            assert!(x.abs().max(y.abs()) < 1e-8 * size && m.abs() < 1e-8 * size * length, "{x} {y} {m}");
+        }
+    }
+}
+
+fn energy(beam: &Beam, at: &Points) -> f64 {
+    let Weights::Matrix(weights) = &beam.interaction.weights else { panic!("a material") };
+    let from = |points: &Points, i: usize, j: usize| {
+        let (a, b) = (points.get(i), points.get(j));
+        [b[0] - a[0], b[1] - a[1]]
+    };
+    let stored: f64 = (0..at.len())
+        .flat_map(|i| weights.cells_around(i).map(move |cell| (i, cell)))
+        .filter(|(_, cell)| cell.own == 0)
+        .map(|(i, cell)| {
+            let neighbour = |slot: usize| {
+                let j = beam.interaction.neighbours.of(i)[slot] as usize;
+                let (reference, now) = (from(&beam.body.reference, i, j), from(at, i, j));
+                Corner { reference, displacement: [now[0] - reference[0], now[1] - reference[1]] }
+            };
+            cell.element.energy(|k| cell.corner(k, neighbour)).expect("has a direction")
+        })
+        .sum();
+    let work = (0..at.len()).map(|i| {
+        let (x, f) = (at.get(i), beam.load(i));
+        x[0] * f[0] + x[1] * f[1]
+    });
+    stored - work.sum::<f64>()
+}
+
+#[test]
+fn rest_is_a_minimum_of_the_energy() {
+    for kind in KINDS {
+        for elastic in [sheet(12.0, 0.3), fibres()] {
+            let beam = Beam::new(kind(0.5), 6.0, &elastic, [0.01, 0.03]);
+            let solved = beam.solved_by(Solver::Direct);
+            let at = beam.moved(&solved.displacement);
+            let least = energy(&beam, &at);
+            for seed in 0..20 {
+                for size in [1e-3, 3e-2] {
+                    let mut other = at.clone();
+                    for i in (0..at.len()).filter(|&i| beam.follows[i]) {
+                        let by = |k: usize| size * ((7 * i + 13 * k + 29 * seed) as f64).sin();
+                        other.set(i, [at.x[i] + by(0), at.y[i] + by(1)]);
+                    }
+                    assert!(energy(&beam, &other) > least, "{seed} {size}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn every_solver_and_the_sweeps_find_the_same_rest() {
+    for kind in KINDS {
+        let beam = |rollers: bool| {
+            let beam = Beam::new(kind(0.5), 4.0, &sheet(12.0, 0.3), [0.02, 0.06]);
+            if rollers { beam.on_rollers() } else { beam }
+        };
+        for beam in [beam(false), beam(true)] {
+            let solved = beam.solved_by(Solver::Direct);
+            for solver in
+                [Solver::ConjugateGradients, Solver::Chebyshev, Solver::GaussSeidel, Solver::Multigrid]
+            {
+                let other = beam.solved_by(solver).displacement;
+                let apart = other.iter().zip(solved.displacement.iter()).map(|(a, b)| distance(a, b));
+                assert!(apart.fold(0.0, f64::max) < 1e-9, "{solver}");
+            }
+            let (at, swept) = (beam.moved(&solved.displacement), swept(&beam));
+            let apart = swept.iter().zip(at.iter()).map(|(a, b)| distance(a, b)).fold(0.0, f64::max);
+            assert!(apart < 1e-8, "{apart}");
+        }
+    }
+}
+
+/// Where sweeps come to rest that move one particle after the other to its target.
+fn swept(beam: &Beam) -> Points {
+    let mut places = (*beam.body.reference).clone();
+    for _ in 0..400_000 {
+        let mut farthest = 0.0f64;
+        for i in (0..places.len()).filter(|&i| beam.follows[i]) {
+            let target = beam.interaction.target(i, &places);
+            farthest = farthest.max(distance(target, places.get(i)));
+            places.set(i, target);
+        }
+        if farthest < 1e-13 {
+            return places;
+        }
+    }
+    panic!("the sweeps do not settle")
+}
