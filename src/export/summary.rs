@@ -36,6 +36,9 @@ pub(super) const FLIGHT: &str = "flight.json";
 /// What a gallery writes in the place of a summary.
 pub(super) const GALLERY: &str = "gallery.json";
 
+/// Part of the forces on a body that may be left on a follower of one at rest \[1\].
+const AT_REST: f64 = 1e-6;
+
 /// How long the parts of a run took.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Timings {
@@ -218,7 +221,7 @@ impl fmt::Display for Measured {
             let Reaction { key, role, particles, centre, force, moment, moment_about_origin, .. } = reaction;
             let moments = format!(
                 "{} about {} {length}, {} about the origin",
-                short(*moment),
+                short(shown(*moment, *moment_about_origin)),
                 pair(*centre),
                 short(*moment_about_origin)
             );
@@ -234,6 +237,12 @@ impl fmt::Display for Measured {
             format!("; work of the loads {}, of the supports {}", short(work.loads), short(work.supports))
         });
         writeln!(f, "strain energy {} {moment}{work}", short(mechanics.strain_energy))?;
+        let sizes = mechanics.reactions.iter().map(|reaction| reaction.force);
+        let sizes = sizes.chain(mechanics.load.map(|load| load.force)).map(|[x, y]| x.hypot(y));
+        let largest = sizes.fold(0.0, f64::max);
+        if let Some(left) = mechanics.unbalanced.filter(|left| *left > AT_REST * largest) {
+            writeln!(f, "not at rest: a follower is pushed by {} {force} that nothing balances", short(left))?;
+        }
         if let Some(Peak { von_mises, cell, place, .. }) = &mechanics.largest_von_mises {
             let stress = &units.stress;
             let value = short(*von_mises);

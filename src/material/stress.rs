@@ -150,7 +150,7 @@ mod tests {
         let (body, _) =
             Body::build(lattice, &Cut::Count { columns: 5, rows: 6 }, &near, None).expect("builds");
         let cells = Cells::of_body(&body);
-        let constants = Constants::Isotropic { young: 1000.0, poisson: 0.3, plane: Plane::StressState };
+        let constants = Constants::Isotropic { young: 1000.0, poisson: 0.3, plane: Plane::Stress };
         (body, cells, Elastic::new(constants, 0.5).expect("admissible"))
     }
 
