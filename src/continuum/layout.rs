@@ -55,7 +55,7 @@ impl Layout {
         require_in_range(scene)?;
         let fitted = fitted(scene)?;
         let layout = match fitted {
-            Some((fitted, outline)) if !is_all_lattice(&fitted.body) => {
+            Some((fitted, outline)) if !is_all_whole(&fitted.cells) => {
                 let Fitted { body, cells } = fitted;
                 require_resolved(scene, &body)?;
                 let neighbours = cells.mates(body.count());
@@ -584,9 +584,9 @@ fn refuse_outline(scene: &Scene, error: &OutlineError) -> SceneError {
     scene.refuse(&key, error.to_string(), help)
 }
 
-/// Whether every particle stands where the lattice has it.
-fn is_all_lattice(body: &Body) -> bool {
-    body.outline.as_ref().is_none_or(|outline| outline.regular == body.count())
+/// Whether the outline cuts no cell: then the body is that of the lattice.
+fn is_all_whole(cells: &Cells) -> bool {
+    cells.shapes.len() == cells.whole
 }
 
 /// Deep enough for a staggered edge: less than one period of the lattice's rows across the side.
