@@ -57,9 +57,9 @@ fn come_to_whole_load(scene: &Scene, plan: Plan, watch: Watch<'_>) -> Result<Out
 pub fn settle(scene: &Scene, request: &Request, plan: Plan) -> Result<Outcome, SceneError> {
     let solved = if corotated::is_corotated(&plan.interaction) {
         let steps = steps_of_the_way(&plan) as f64;
-        let way = Way { held: &|part| way_after(&plan, part * steps), start: None, end: 1.0 };
+        let held = |part: f64| way_after(&plan, part * steps);
         let axes = held_axes(&plan);
-        corotated::solve(&plan.interaction, &plan.body, follows(&plan), axes, &way, request)
+        corotated::solve(&plan.interaction, &plan.body, follows(&plan), axes, &Way::whole(&held), request)
             .map_err(|error| refuse_corotated(scene, &error))?
     } else {
         let system = of_plan(scene, &plan)?;

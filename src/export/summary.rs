@@ -241,7 +241,11 @@ impl fmt::Display for Measured {
         let sizes = sizes.chain(mechanics.load.map(|load| load.force)).map(|[x, y]| x.hypot(y));
         let largest = sizes.fold(0.0, f64::max);
         if let Some(left) = mechanics.unbalanced.filter(|left| *left > AT_REST * largest) {
-            writeln!(f, "not at rest: a follower is pushed by {} {force} that nothing balances", short(left))?;
+            writeln!(
+                f,
+                "not at rest: a follower is pushed by {} {force} that nothing balances",
+                short(left)
+            )?;
         }
         if let Some(Peak { von_mises, cell, place, .. }) = &mechanics.largest_von_mises {
             let stress = &units.stress;

@@ -95,7 +95,12 @@ pub struct Way<'a> {
     pub end: f64,
 }
 
-impl Way<'_> {
+impl<'a> Way<'a> {
+    /// From the reference to the end.
+    pub fn whole(held: &'a (dyn Fn(f64) -> Points + Sync)) -> Self {
+        Self { held, start: None, end: 1.0 }
+    }
+
     /// Part of the whole way after a part of this one.
     fn part(&self, of_this: f64) -> f64 {
         let start = self.start.map_or(0.0, |(_, part)| part);
