@@ -75,6 +75,7 @@ fn words(scene: &Scene, compared: &Compared) -> String {
     let end = match &outcome.reason {
         StopReason::Equilibrium => "at rest".to_owned(),
         StopReason::Unsettled => format!("not at rest: the solver ended at a residual of {residual:.2e}"),
+        StopReason::Stuck(why) => format!("not {why}; the last equilibrium is compared"),
         StopReason::Steps => format!("all steps done, residual {residual:.2e}"),
         StopReason::Interrupted => "interrupted: compared as far as it came".to_owned(),
         StopReason::Diverged(divergence) => format!("{divergence}; the last good state is compared"),

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::flock::body::{Body, BodyError, Cut};
+use crate::flock::lattice::Site;
 use crate::flock::motion::Motion;
 use crate::flock::neighbourhood::{Neighbourhood, Neighbours};
 use crate::flock::points::{Points, distance};
@@ -11,7 +12,7 @@ use crate::flock::role::Role;
 use crate::flock::rules::{Axis, Mean};
 use crate::geometry::outline::{Outline, OutlineError, Place};
 use crate::geometry::portion::{Portion, Selection};
-use crate::material::cells::{Cells, without_loose_sites};
+use crate::material::cells::{Cells, neighbourhood, without_loose_sites};
 use crate::material::fit::{FitError, Fitted, fit};
 use crate::material::outline_loads::{self, Loader, OutlineLoad, Push};
 use crate::scene::{BodySource, Condition, LeaderMotion, Load, RoleEntry, Scene, SceneError, SceneRegion};
@@ -57,6 +58,7 @@ impl Layout {
             Some((fitted, outline)) if !is_all_whole(&fitted.cells) => {
                 let Fitted { body, cells } = fitted;
                 require_resolved(scene, &body)?;
+                require_cell_neighbours(scene)?;
                 let neighbours = cells.mates(body.count());
                 Self { body, neighbours, cells: Some(cells), outline: Some(outline) }
             }
@@ -533,6 +535,27 @@ fn refuse_outline(scene: &Scene, error: &OutlineError) -> SceneError {
         }
     };
     scene.refuse(&key, error.to_string(), help)
+}
+
+/// Refuses neighbours as written that leave out some of those with whom a particle shares a cell.
+fn require_cell_neighbours(scene: &Scene) -> Result<(), SceneError> {
+    let refuse = |message: String| {
+        let help = "use kind = \"cells\", or leave the neighbours out: the rule takes those that it needs";
+        scene.refuse("neighbours", message, help)
+    };
+    let offsets = |neighbourhood: &Neighbourhood| {
+        neighbourhood.offsets(&scene.lattice).map_err(|error| refuse(error.to_string()))
+    };
+    let (given, needed) = (offsets(&scene.neighbourhood)?, offsets(&neighbourhood(&scene.lattice))?);
+    let has_all = |(given, needed): (&Vec<Site>, &Vec<Site>)| needed.iter().all(|site| given.contains(site));
+    if given.iter().zip(&needed).all(has_all) {
+        return Ok(());
+    }
+    Err(refuse(format!(
+        "{} neighbours cannot carry shear coupling: particles share a cell but are no neighbours, so the cell's \
+         stiffness is cut",
+        given[0].len()
+    )))
 }
 
 /// Whether the outline cuts no cell: then the body is that of the lattice.

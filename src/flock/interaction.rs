@@ -177,7 +177,21 @@ impl Interaction {
     /// Force of a material on a particle when all stand at `present` \[force, world frame\]: on one that rests, minus its
     /// load; on one that is held, minus its load and its reaction. Zero for a rule that is no material.
     pub fn force(&self, particle: usize, present: &Points) -> [f64; 2] {
-        let corner = |slot| self.corner(particle, slot, present);
+        self.force_from(particle, |slot| self.corner(particle, slot, present))
+    }
+
+    /// The same when all are displaced by so much from their reference places \[length\]: to more digits where that is
+    /// little.
+    pub fn force_under(&self, particle: usize, displacement: &Points) -> [f64; 2] {
+        let from =
+            |points: &Points, j: usize| [points.x[j] - points.x[particle], points.y[j] - points.y[particle]];
+        self.force_from(particle, |slot| {
+            let j = self.neighbours.of(particle)[slot] as usize;
+            Corner { reference: from(&self.reference, j), displacement: from(displacement, j) }
+        })
+    }
+
+    fn force_from(&self, particle: usize, corner: impl Fn(usize) -> Corner + Copy) -> [f64; 2] {
         match &self.weights {
             Weights::Matrix(weights) if self.rule.mean == COROTATED => {
                 pull(weights.cells_around(particle), corner).0

@@ -65,6 +65,7 @@ pub mod outline_loads;
 pub mod recovery;
 pub mod report;
 pub mod stiffness;
+pub mod stress;
 pub mod weights;
 pub mod zone;
 

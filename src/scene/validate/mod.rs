@@ -2,6 +2,7 @@
 //! checks that concern several keys at once.
 
 mod equilibrium;
+mod load_steps;
 mod material;
 mod points;
 pub(super) mod roles;
@@ -104,6 +105,7 @@ pub(super) fn validate(
     check_truth(&raw, refuse)?;
     let elastic = material::elastic(&raw.material, refuse)?;
     let equilibrium = equilibrium::equilibrium(&raw, refuse)?;
+    let load_steps = load_steps::load_steps(&raw, refuse)?;
     let is_fitted = material::is_fitted(&raw, refuse)?;
     material::check_axes(&raw, refuse)?;
     check_gradient(&raw, refuse)?;
@@ -121,6 +123,7 @@ pub(super) fn validate(
         neighbourhood,
         mean: mean(raw.rule.mean.as_ref().unwrap_or(&RawMean::Barycentre), spacing, refuse)?,
         equilibrium,
+        load_steps,
         weights: weights(&raw.rule.weights, refuse)?,
         // Neighbours found anew every step have no reference configuration to be at rest in.
         keeps_rest: raw.rule.rest == RawRest::Kept
