@@ -85,8 +85,10 @@ fn words(scene: &Scene, compared: &Compared) -> String {
         None => format!("{} steps", outcome.engine.step()),
     };
     let nodes = compared.truth.truth.nodes();
-    let mut words =
-        format!("{}: the rule by {way}, {end}; truth of the shape on {nodes} nodes\n{}", scene.name, compared.comparison);
+    let mut words = format!(
+        "{}: the rule by {way}, {end}; truth of the shape on {nodes} nodes\n{}",
+        scene.name, compared.comparison
+    );
     if matches!(scene.mean, Mean::Material { rotation: Rotation::Corotated }) {
         words +=
             "the truth is of small rotations, the rule is not: where the body turns, they differ by that\n";

@@ -43,7 +43,12 @@ impl ErrorParts {
     ///
     /// # Errors
     /// Names what in the scene has no plan; a part that cannot be computed is left out.
-    pub fn of(scene: &Scene, truth: &SceneTruth, rule: &Points, follows: &[bool]) -> Result<Self, SceneError> {
+    pub fn of(
+        scene: &Scene,
+        truth: &SceneTruth,
+        rule: &Points,
+        follows: &[bool],
+    ) -> Result<Self, SceneError> {
         let own = equilibrium(scene, &truth.truth);
         let cells = truth_of_cells(scene, truth)?;
         let known = &truth.truth.displacement;
@@ -145,13 +150,15 @@ fn carried(portions: &[Portion], from: &Outline, to: &Outline) -> Vec<Portion> {
         };
         let facing = from.pieces().filter(|(.., piece)| faces(piece)).map(|(ring, number, _)| [ring, number]);
         let Some((place, _)) = from.nearest_among(p, facing) else { return false };
-        let mut here = portions.iter().filter(|portion| (portion.ring, portion.piece) == (place.ring, place.piece));
+        let mut here =
+            portions.iter().filter(|portion| (portion.ring, portion.piece) == (place.ring, place.piece));
         here.any(|portion| portion.t[0] <= place.t && place.t <= portion.t[1])
     };
     let mut found = Vec::new();
     for (ring, number, piece) in to.pieces() {
         let middle = |k: usize| (k as f64 + 0.5) / SAMPLES as f64;
-        let inside: Vec<bool> = (0..SAMPLES).map(|k| belongs(piece.point(middle(k)), piece.normal(middle(k)))).collect();
+        let inside: Vec<bool> =
+            (0..SAMPLES).map(|k| belongs(piece.point(middle(k)), piece.normal(middle(k)))).collect();
         let mut begin = inside[0].then_some(0.0);
         for k in 1..SAMPLES {
             if inside[k] == inside[k - 1] {
@@ -180,7 +187,8 @@ mod tests {
     #[test]
     fn portions_are_carried_to_the_sides_of_a_staircase() {
         let slope = Outline::of_polygons(&[vec![[0.0, 0.0], [4.0, 0.0], [4.0, 4.0]]]).unwrap();
-        let stairs = [[1.0, 0.0], [4.0, 0.0], [4.0, 3.0], [3.0, 3.0], [3.0, 2.0], [2.0, 2.0], [2.0, 1.0], [1.0, 1.0]];
+        let stairs =
+            [[1.0, 0.0], [4.0, 0.0], [4.0, 3.0], [3.0, 3.0], [3.0, 2.0], [2.0, 2.0], [2.0, 1.0], [1.0, 1.0]];
         let stairs = Outline::of_polygons(&[stairs.to_vec()]).unwrap();
         let found = carried(&[Portion::whole(0, 2)], &slope, &stairs);
         let length: f64 = found.iter().map(|portion| portion.length(&stairs)).sum();

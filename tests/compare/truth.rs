@@ -75,7 +75,10 @@ fn a_body_of_whole_cells_is_held_against_the_shape_and_its_outline_is_blamed() {
     let [of_staircase, of_fitted] = [&staircase, &fitted].map(|found| found.parts.outline.expect("told"));
     assert!(of_staircase > 0.1 && of_fitted < 1e-9, "{of_staircase} {of_fitted}");
     let solver = fitted.parts.solver.expect("told");
-    assert!(solver < 1e-4 && (fitted.parts.discretisation.expect("told") / fitted.displacement_rel_l2 - 1.0).abs() < 0.01);
+    assert!(
+        solver < 1e-4
+            && (fitted.parts.discretisation.expect("told") / fitted.displacement_rel_l2 - 1.0).abs() < 0.01
+    );
 }
 
 #[test]
