@@ -9,7 +9,9 @@ use base64::engine::general_purpose::STANDARD;
 use flockform::continuum::plan::Plan;
 use flockform::continuum::record::{ProbeSeries, Snapshot};
 use flockform::continuum::run::{Outcome, run};
-use flockform::export::{ExportError, OutputFolder, Results, Timings, VtkSeries, figures, write_all};
+use flockform::export::{
+    Drawing, ExportError, OutputFolder, Results, Timings, VtkSeries, figures, write_all,
+};
 use flockform::flock::role::Role;
 use flockform::scene::{Scene, bundled};
 use resvg::tiny_skia::Pixmap;
@@ -52,9 +54,10 @@ impl Run {
             outcome: &self.outcome,
             snapshots: &self.snapshots,
             probes: &self.probes,
+            load_steps: &[],
             timings: Timings::default(),
         };
-        let (written, _) = write_all(&folder, &results)?;
+        let (written, _) = write_all(&folder, &results, Drawing::default())?;
         assert!(written.iter().all(|path| path.is_file()), "{written:?}");
         folder.commit().map(|_| ())
     }
@@ -305,6 +308,55 @@ fn a_frame_holds_every_particle_and_every_bond_with_its_state() {
     assert!(folder.path(entry.attribute("file").expect("a file")).is_file());
 }
 
+/// The last frame of a run by this scene, as text.
+fn last_frame(run: &Run, parent: &Path) -> String {
+    let engine = &run.outcome.engine;
+    let folder = OutputFolder::create(&parent.join("out"), false).expect("created");
+    let mut series = VtkSeries::create(&folder).expect("created").with_material(run.scene.material);
+    series.write(engine).expect("written");
+    let files = series.finish().expect("finished");
+    fs::read_to_string(&files[1]).expect("readable")
+}
+
+#[test]
+fn a_frame_of_a_material_has_its_cells_filled_with_stress() {
+    let parent = tempfile::tempdir().expect("a folder");
+    let run = Run::of("beam-loaded", &["lattice={kind=\"hexagonal\",spacing=1.0}"]);
+    let text = last_frame(&run, parent.path());
+    let document = Document::parse(&text).expect("well-formed");
+    let piece = document.descendants().find(|node| node.has_tag_name("Piece")).expect("a piece");
+    let cells = run.outcome.engine.cells().expect("a material");
+    assert_eq!(piece.attribute("NumberOfCells"), Some(cells.count().to_string().as_str()));
+    let types: Vec<u8> = array::<1>(piece, "types").into_iter().flatten().collect();
+    let expected = |corners: &[u32]| match corners.len() {
+        3 => 5,
+        4 => 9,
+        _ => 7,
+    };
+    assert_eq!(types, cells.iter().map(expected).collect::<Vec<u8>>());
+    let corners: Vec<i64> = array::<8>(piece, "connectivity").into_iter().map(i64::from_le_bytes).collect();
+    assert_eq!(corners, cells.index.iter().map(|&i| i64::from(i)).collect::<Vec<_>>());
+    let data = piece.descendants().find(|node| node.has_tag_name("CellData")).expect("cell data");
+    let stress: Vec<f64> = array::<8>(data, "von_mises").into_iter().map(f64::from_le_bytes).collect();
+    assert!(stress.len() == cells.count() && stress.iter().all(|stress| stress.is_finite()), "{stress:?}");
+}
+
+#[test]
+fn a_frame_of_the_paper_s_rule_with_a_material_has_particles_bonds_and_cells() {
+    let parent = tempfile::tempdir().expect("a folder");
+    let run = Run::of("grips", &["stop.steps=1", "rule={}"]);
+    let text = last_frame(&run, parent.path());
+    let document = Document::parse(&text).expect("well-formed");
+    let piece = document.descendants().find(|node| node.has_tag_name("Piece")).expect("a piece");
+    let types: Vec<u8> = array::<1>(piece, "types").into_iter().flatten().collect();
+    let engine = &run.outcome.engine;
+    let count = |kind: u8| types.iter().filter(|one| **one == kind).count();
+    assert_eq!(count(1), engine.roles().len());
+    assert_eq!(count(3), engine.interaction().neighbours.index.len() / 2);
+    assert_eq!(count(9), engine.cells().expect("a material").count());
+    assert_eq!(array::<8>(piece, "von_mises").len(), engine.roles().len());
+}
+
 fn groups<'a, 'input>(
     figure: &'a Document<'input>,
     class: &'a str,
@@ -431,8 +483,8 @@ fn the_png_is_the_svg_at_full_width_with_its_text() {
     let parent = tempfile::tempdir().expect("a folder");
     let run = Run::of("tension", &["stop.steps=1", "record.figures=[1]"]);
     let svg = figures::configuration(&run.subject(), &run.snapshots[0]);
-    let [svg_path, png_path] =
-        figures::write(&svg, &parent.path().join("configuration_0001")).expect("written");
+    let written = figures::write(&svg, &parent.path().join("configuration_0001")).expect("written");
+    let [svg_path, png_path] = &written[..] else { panic!("{written:?}") };
     assert_eq!(fs::read_to_string(svg_path).expect("readable"), svg);
     let png = Pixmap::decode_png(&fs::read(png_path).expect("readable")).expect("a PNG");
     let figure = Document::parse(&svg).expect("well-formed");

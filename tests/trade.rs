@@ -3,6 +3,7 @@
 use std::ops::ControlFlow;
 
 use flockform::compare::run::compare;
+use flockform::fem::Effort;
 use flockform::scene::raw::RawLattice;
 use flockform::scene::{Scene, SceneError, bundled};
 use flockform::solve::equilibrium::{Precision, Solver};
@@ -67,13 +68,64 @@ fn the_setting_chosen_for_an_accuracy_has_it() {
     let mut spacings = Vec::new();
     for (accuracy, bound) in [("5%", 0.05), ("1 %", 0.01), ("0.002", 0.002)] {
         let scene = chosen("beam-loaded", &[], accuracy).unwrap_or_else(|error| panic!("{error}"));
-        let compared = compare(&scene, None, &mut |_, _| ControlFlow::Continue(())).expect("compares");
+        let compared =
+            compare(&scene, &Effort::default(), &mut |_, _| ControlFlow::Continue(())).expect("compares");
         let error = compared.comparison.displacement_rel_l2;
         assert!(error <= bound, "{accuracy}: {error}");
         let Some(RawLattice::Square { spacing, .. }) = scene.raw.lattice else { panic!("square") };
         spacings.push(spacing);
     }
     assert!(spacings[0] > spacings[1] && spacings[1] > spacings[2], "no finer than needed: {spacings:?}");
+}
+
+const HEXAGONAL: &str = "lattice={ kind = \"hexagonal\", spacing = 1.0 }";
+const HONEYCOMB_LATTICE: &str = "lattice={ kind = \"honeycomb\", spacing = 1.0 }";
+const TURNED: &str = "lattice={ kind = \"square\", spacing = 1.0, orientation = 30.0 }";
+const SLENDER: &str = "body={ shape = { kind = \"rectangle\", max = [40.0, 1.0] } }";
+const ODD: &str = "body={ shape = { kind = \"rectangle\", max = [10.0, 1.9] } }";
+const HALF: &str = "lattice={ kind = \"square\", spacing = 0.5 }";
+const HOLE: &str = "body={ shape = { kind = \"rectangle\", max = [20.0, 12.0] }, holes = [{ kind = \"disc\", centre = [9.0, 6.0], radius = 2.5 }] }";
+const L_SHAPE: &str = "body={ shape = { kind = \"polygon\", vertices = [[0.0, 0.0], [12.0, 0.0], [12.0, 5.0], [5.0, 5.0], [5.0, 12.0], [0.0, 12.0]] } }";
+const STIFF: &str = "material={ kind = \"isotropic\", young = 1000.0, poisson = 0.45, plane = \"strain\" }";
+const WEIGHT: &str = "loads=[{ kind = \"body\", force = [0.0, -1.0] }]";
+
+#[test]
+fn what_is_delivered_is_at_most_what_was_asked() {
+    let cases: [(&str, &[&str], &str, f64); 10] = [
+        ("beam-loaded", &[SLENDER, HALF], "5%", 0.05),
+        ("beam-loaded", &[SLENDER, HALF], "2%", 0.02),
+        ("beam-loaded", &[ODD, HALF], "5%", 0.05),
+        ("beam-loaded", &[HEXAGONAL], "2%", 0.02),
+        ("beam-loaded", &[HONEYCOMB_LATTICE], "3%", 0.03),
+        ("beam-loaded", &[TURNED], "2%", 0.02),
+        ("beam-loaded", &[HOLE, TURNED], "2%", 0.02),
+        ("beam-loaded", &[L_SHAPE, HEXAGONAL, WEIGHT], "3%", 0.03),
+        ("beam-loaded", &[STIFF], "3%", 0.03),
+        ("grips", &[HEXAGONAL], "0.5%", 0.005),
+    ];
+    for (name, overrides, asked, bound) in cases {
+        let scene =
+            chosen(name, overrides, asked).unwrap_or_else(|error| panic!("{overrides:?} {asked}: {error}"));
+        let effort = Effort { target: 1e-6, ..Effort::default() };
+        let found = compare(&scene, &effort, &mut |_, _| ControlFlow::Continue(()));
+        let found = found.unwrap_or_else(|error| panic!("{overrides:?}: {error}"));
+        let (error, particles) = (found.comparison.displacement_rel_l2, found.rule.len());
+        let request = scene.equilibrium.expect("solved for").request;
+        println!("{name} {overrides:?} {asked}: {error:.5}, {particles} particles, {request:?}");
+        assert!(error <= bound, "{name} {overrides:?} {asked}: {error}");
+        let solved = found.outcome.solved.as_ref().expect("solved");
+        assert!(solved.converged, "{name} {overrides:?} {asked} ends short of its tolerance");
+    }
+}
+
+#[test]
+fn an_accuracy_that_the_truth_itself_lacks_is_refused_with_that_reason() {
+    let pinned = "roles=[{ region = { kind = \"ids\", ids = [1, 12] }, role = \"clamped\" }]";
+    let message = chosen("beam-loaded", &[pinned], "1%").expect_err("refused").to_string();
+    assert!(
+        message.contains("the truth states an error of") && message.contains("single points"),
+        "{message}"
+    );
 }
 
 #[test]
@@ -97,16 +149,11 @@ fn an_accuracy_that_cannot_be_had_is_refused_with_the_reason() {
         (refused("grips", &[], "much"), "more than 0 and less than 1"),
         (refused("lattice-square", &[], "1%"), "the scene has none"),
         (refused("beam-loaded", &["record.probes=[3]"], "1%"), "these ids are other particles"),
-        (refused("lattice-honeycomb", &HONEYCOMB, "0.1%"), "after 5 halvings of the spacing"),
+        (refused("beam-loaded", &["lattice.spacing=2.75"], "0.0001"), "after 5 halvings of the spacing"),
+        (refused("beam-loaded", &[COROTATED], "1%"), "this rule is of large ones"),
     ] {
         assert!(message.contains(words) && message.contains("help: "), "{message}");
     }
 }
 
-const HONEYCOMB: [&str; 4] = [
-    "material={kind=\"isotropic\",young=1.0,poisson=0.3}",
-    "rule.mean={kind=\"material\"}",
-    "neighbours={kind=\"cells\"}",
-    "roles=[{region={kind=\"edge\",side=\"left\",depth=2.0},role=\"clamped\"},\
-     {region={kind=\"edge\",side=\"right\",depth=2.0},role=\"leader\",motion={kind=\"velocity\",per_step=[0.01,0.0]}}]",
-];
+const COROTATED: &str = "rule.mean={kind=\"material\",rotation=\"corotated\"}";

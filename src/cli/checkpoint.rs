@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use flockform::continuum::engine::Engine;
 use flockform::continuum::engine::state::EngineState;
-use flockform::continuum::record::{ProbeSeries, Snapshot};
+use flockform::continuum::record::{LoadStep, ProbeSeries, Snapshot};
 use flockform::export::checkpoint::{Asked, Checkpoint, CheckpointError};
 use flockform::export::report::RunRecorder;
 use flockform::export::{ExportError, OutputFolder, VtkSeries, unfinished};
@@ -120,6 +120,7 @@ impl Left {
 pub struct Kept<'a> {
     pub snapshots: &'a [Snapshot],
     pub probes: &'a [ProbeSeries],
+    pub load_steps: &'a [LoadStep],
     pub film: Option<&'a RunRecorder>,
     pub frames: Option<&'a mut VtkSeries>,
 }
@@ -222,7 +223,8 @@ impl<'a> Keeper<'a> {
         kept: &Kept<'_>,
     ) -> Result<(), ExportError> {
         let of = (&self.asked, self.scene, self.digest);
-        let recorded = (kept.snapshots, kept.probes, kept.film.map(RunRecorder::footage));
+        let film = kept.film.map(RunRecorder::footage);
+        let recorded = (kept.snapshots, kept.probes, kept.load_steps, film);
         let state = (EngineState::of(engine), residual);
         Checkpoint::new(of, state, recorded, self.stepping()).write(folder.folder())
     }

@@ -9,6 +9,7 @@ use flockform::compare::run::{Compared, compare as compare_scene};
 use flockform::continuum::run::StopReason;
 use flockform::export::comparison::{ComparisonReport, write_comparison};
 use flockform::export::report;
+use flockform::fem::Effort;
 use flockform::flock::rules::{Mean, Rotation};
 use flockform::scene::Scene;
 
@@ -25,21 +26,29 @@ pub struct CompareArguments {
     output: OutputArguments,
     #[command(flatten)]
     report: ReportArguments,
-    /// Cut each side of a cell into N parts for the truth [default: as many as make it exact enough]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
-    refine: Option<u16>,
+    /// Refine the truth until it states at most this relative error of its own displacement
+    #[arg(long, value_name = "E", default_value_t = Effort::default().target, value_parser = part_of_one)]
+    truth_error: f64,
     /// Print compare.json instead of a table
     #[arg(long, conflicts_with = "quiet")]
     json: bool,
+}
+
+fn part_of_one(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value > 0.0 && value < 1.0 => Ok(value),
+        _ => Err("give a number more than 0 and less than 1".into()),
+    }
 }
 
 /// Compares a scene's rule with its truth, prints the measures and writes what comes of it.
 pub fn compare(arguments: &CompareArguments) -> Result<ExitCode, Refusal> {
     let scene = arguments.scene.load(None)?;
     let folder = arguments.output.folder(&format!("{}-compare", scene.name))?;
+    let effort = Effort { target: arguments.truth_error, ..Effort::default() };
     let mut progress = Progress::new(arguments.output.quiet, scene.stop.steps);
     let interrupted = interrupt_flag();
-    let compared = compare_scene(&scene, arguments.refine.map(usize::from), &mut |engine, residual| {
+    let compared = compare_scene(&scene, &effort, &mut |engine, residual| {
         progress.step(engine.step(), residual);
         if interrupted.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     })?;
@@ -61,11 +70,12 @@ pub fn compare(arguments: &CompareArguments) -> Result<ExitCode, Refusal> {
 
 /// How the rule's run ended, and the table.
 fn words(scene: &Scene, compared: &Compared) -> String {
-    let (outcome, truth) = (&compared.outcome, compared.truth.truth.mesh());
+    let outcome = &compared.outcome;
     let residual = outcome.residual;
     let end = match &outcome.reason {
         StopReason::Equilibrium => "at rest".to_owned(),
         StopReason::Unsettled => format!("not at rest: the solver ended at a residual of {residual:.2e}"),
+        StopReason::Stuck(why) => format!("not {why}; the last equilibrium is compared"),
         StopReason::Steps => format!("all steps done, residual {residual:.2e}"),
         StopReason::Interrupted => "interrupted: compared as far as it came".to_owned(),
         StopReason::Diverged(divergence) => format!("{divergence}; the last good state is compared"),
@@ -74,9 +84,11 @@ fn words(scene: &Scene, compared: &Compared) -> String {
         Some(solved) => format!("{}, {} iterations", solved.solver, solved.iterations),
         None => format!("{} steps", outcome.engine.step()),
     };
-    let nodes = truth.mesh().node_count();
-    let mut words =
-        format!("{}: the rule by {way}, {end}; truth on {nodes} nodes\n{}", scene.name, compared.comparison);
+    let nodes = compared.truth.truth.nodes();
+    let mut words = format!(
+        "{}: the rule by {way}, {end}; truth of the shape on {nodes} nodes\n{}",
+        scene.name, compared.comparison
+    );
     if matches!(scene.mean, Mean::Material { rotation: Rotation::Corotated }) {
         words +=
             "the truth is of small rotations, the rule is not: where the body turns, they differ by that\n";

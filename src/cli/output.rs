@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::Args;
+use clap::{Args, ValueEnum};
+use flockform::export::figures::Formats;
 use flockform::export::{ExportError, OutputFolder, unfinished};
 
 #[derive(Debug, Args)]
@@ -24,6 +25,33 @@ pub struct ReportArguments {
     /// Write no report.html, and keep no frames for it
     #[arg(long)]
     pub no_report: bool,
+}
+
+/// Which figures there shall be.
+#[derive(Debug, Args)]
+pub struct FigureArguments {
+    /// Files to draw figures as; none leaves the tables, the summary and report.html
+    #[arg(long, value_name = "FORMATS", value_enum, default_value = "all")]
+    figures: Figures,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Figures {
+    None,
+    Png,
+    Svg,
+    All,
+}
+
+impl FigureArguments {
+    pub fn formats(&self) -> Formats {
+        match self.figures {
+            Figures::None => Formats::None,
+            Figures::Png => Formats::Png,
+            Figures::Svg => Formats::Svg,
+            Figures::All => Formats::All,
+        }
+    }
 }
 
 impl OutputArguments {

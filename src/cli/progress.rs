@@ -1,12 +1,60 @@
 //! How a run shows where it is: a bar on a terminal, plain lines in a pipe.
 
 use std::io::IsTerminal;
+use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
 
 /// Time between two plain lines, so that a log of a long run stays short.
 const BETWEEN_LINES: Duration = Duration::from_secs(5);
+
+/// How many figures are drawn: a bar on a terminal; in a pipe a line where it takes long.
+pub enum Drawn {
+    Silent,
+    Bar(ProgressBar),
+    Lines { last: Mutex<Instant> },
+}
+
+impl Drawn {
+    pub fn new(quiet: bool) -> Self {
+        if quiet {
+            return Drawn::Silent;
+        }
+        if !std::io::stderr().is_terminal() {
+            return Drawn::Lines { last: Mutex::new(Instant::now()) };
+        }
+        let style = ProgressStyle::with_template("{bar:32} drawing figure {pos}/{len}");
+        let bar = ProgressBar::new(0);
+        bar.set_style(style.expect("the template is fixed and right"));
+        Drawn::Bar(bar)
+    }
+
+    /// Called from any thread.
+    pub fn show(&self, done: usize, of: usize) {
+        match self {
+            Drawn::Silent => {}
+            Drawn::Bar(bar) => {
+                bar.set_length(of as u64);
+                bar.set_position(done as u64);
+            }
+            Drawn::Lines { last } => {
+                if let Ok(mut last) = last.lock()
+                    && last.elapsed() >= BETWEEN_LINES
+                {
+                    eprintln!("drawing: {done} of {of} figures");
+                    *last = Instant::now();
+                }
+            }
+        }
+    }
+
+    pub fn finish(self) {
+        if let Drawn::Bar(bar) = self {
+            bar.finish_and_clear();
+        }
+    }
+}
 
 pub enum Progress {
     Silent,

@@ -14,24 +14,24 @@ use flockform::continuum::engine::Engine;
 use flockform::continuum::engine::state::digest;
 use flockform::continuum::equilibrium::come_to_rest_watched;
 use flockform::continuum::plan::Plan;
-use flockform::continuum::record::{ProbeSeries, Snapshot};
+use flockform::continuum::record::{LoadStep, ProbeSeries, Snapshot};
 use flockform::continuum::run::{Outcome, StopReason, Watch, resume};
 use flockform::export::checkpoint::{self, Asked, Checkpoint};
 use flockform::export::report::stage::Stage;
-use flockform::export::report::{self, Footage, RunRecorder};
+use flockform::export::report::{self, Footage, RunRecorder, page};
 use flockform::export::{
-    Energies, ExportError, OutputFolder, Results, Summary, Timings, VtkSeries, write_all,
+    Drawing, ExportError, Measured, OutputFolder, Results, Summary, Timings, VtkSeries, write_all,
 };
 use flockform::record::About;
 use flockform::record::body::BodyTape;
-use flockform::scene::{Scene, bundled};
+use flockform::scene::{LoadSteps, Scene, bundled};
 use flockform::shm::Domain;
 use flockform::shm::positions::Positions;
 use flockform::trade::{Chosen, choose};
 
 use super::checkpoint::{CheckpointArguments, Keeper, Kept, Left};
-use super::output::{OutputArguments, ReportArguments};
-use super::progress::Progress;
+use super::output::{FigureArguments, OutputArguments, ReportArguments};
+use super::progress::{Drawn, Progress};
 use super::recording::{RecordArguments, close};
 use super::{FAILED, Refusal, SceneArguments, print};
 
@@ -47,6 +47,8 @@ pub struct RunArguments {
     output: OutputArguments,
     #[command(flatten)]
     report: ReportArguments,
+    #[command(flatten)]
+    figures: FigureArguments,
     #[command(flatten)]
     checkpoints: CheckpointArguments,
     #[command(flatten)]
@@ -93,7 +95,7 @@ fn run_here(arguments: &RunArguments) -> Result<ExitCode, Refusal> {
     let about = About { source: "run", name: scene.name.clone(), ..About::default() };
     let recording = arguments.record.open(&about, arguments.output.force)?;
     let mut tape = recording.as_ref().map(|one| BodyTape::new(&scene, one.sink())).transpose()?;
-    let mut progress = Progress::new(arguments.output.quiet, scene.stop.steps);
+    let mut progress = Progress::new(arguments.output.quiet, steps_of(&scene));
     let interrupted = interrupt_flag();
     let looks = Looks::new(&scene, &plan, shown.is_some() || tape.is_some());
     let mut keeper = Keeper::new(&arguments.checkpoints, (asked, &scene, digest), left.as_ref());
@@ -133,14 +135,18 @@ fn run_here(arguments: &RunArguments) -> Result<ExitCode, Refusal> {
     }
     let on_the_way = recorder.writing;
     let records = recorder.finish(&outcome)?;
-    let timings = Timings { setup, steps: elapsed.saturating_sub(on_the_way), output: records.writing };
-    let (snapshots, probes) = (&records.snapshots, &records.probes);
-    let results = Results { scene: &scene, outcome: &outcome, snapshots, probes, timings };
-    let (_, summary) = write_all(&folder, &results)?;
-    if let Some(stage) = records.stage {
+    let Records { snapshots, probes, load_steps, stage, writing } = records;
+    let timings = Timings { setup, steps: elapsed.saturating_sub(on_the_way), output: writing };
+    let (snapshots, probes, load_steps) = (&snapshots[..], &probes[..], &load_steps[..]);
+    let results = Results { scene: &scene, outcome: &outcome, snapshots, probes, load_steps, timings };
+    let drawn = Drawn::new(arguments.output.quiet);
+    let show = |done: usize, of: usize| drawn.show(done, of);
+    let drawing = Drawing { formats: arguments.figures.formats(), progress: &show };
+    let (_, summary) = write_all(&folder, &results, drawing)?;
+    drawn.finish();
+    if let Some(stage) = stage {
         report::run::write(&folder, &results, &summary, stage)?;
     }
-    let Summary { energies, .. } = summary;
     let kept = folder.commit()?;
     let recorded = close(recording)?;
     if !is_interrupted {
@@ -148,7 +154,7 @@ fn run_here(arguments: &RunArguments) -> Result<ExitCode, Refusal> {
     }
     if !arguments.output.quiet {
         print(&words);
-        print(&(closing_words(&scene, &outcome, &energies, elapsed, &kept) + &recorded));
+        print(&(closing_words(&scene, &outcome, &summary, elapsed) + &where_to_look(&kept) + &recorded));
     }
     Ok(exit_code(&outcome))
 }
@@ -204,8 +210,26 @@ impl<'a> Looks<'a> {
     fn after(&self, step: usize) -> usize {
         let record = &self.scene.record;
         let figure = record.figures.iter().copied().filter(|&figure| figure > step).min();
-        let vtk = (record.vtk_every > 0).then(|| (step / record.vtk_every + 1) * record.vtk_every);
-        [figure, vtk, self.film.get()].into_iter().flatten().fold(step + self.most, usize::min)
+        let next = |every: usize| (step / every + 1) * every;
+        let vtk = (record.vtk_every > 0).then(|| next(record.vtk_every));
+        let load = load_every(self.scene).map(next);
+        [figure, vtk, load, self.film.get()].into_iter().flatten().fold(step + self.most, usize::min)
+    }
+}
+
+/// Steps, or increments, that a run takes at most.
+fn steps_of(scene: &Scene) -> usize {
+    match &scene.load_steps {
+        Some(LoadSteps::Solved(parts)) => parts.len(),
+        _ => scene.stop.steps,
+    }
+}
+
+/// Steps from one row of `load.csv` to the next, where there is one.
+fn load_every(scene: &Scene) -> Option<usize> {
+    match scene.load_steps.as_ref()? {
+        LoadSteps::Solved(_) => Some(1),
+        LoadSteps::Stepped { every, .. } => Some(*every),
     }
 }
 
@@ -217,6 +241,7 @@ struct Recorder<'a> {
     scene: &'a Scene,
     snapshots: Vec<Snapshot>,
     probes: Vec<ProbeSeries>,
+    load_steps: Vec<LoadStep>,
     frames: Option<VtkSeries>,
     /// Whether there shall be a `report.html`, and what it shows.
     reports: bool,
@@ -231,6 +256,7 @@ struct Recorder<'a> {
 struct Records {
     snapshots: Vec<Snapshot>,
     probes: Vec<ProbeSeries>,
+    load_steps: Vec<LoadStep>,
     stage: Option<Stage>,
     writing: Duration,
 }
@@ -243,7 +269,8 @@ impl<'a> Recorder<'a> {
         left: Option<&Left>,
     ) -> Result<Self, ExportError> {
         // A body that is not stepped has no history.
-        let probed: &[usize] = if scene.raw.equilibrium.is_some() { &[] } else { &plan.probes };
+        let is_solved_at_once = scene.equilibrium.is_some() && scene.load_steps.is_none();
+        let probed: &[usize] = if is_solved_at_once { &[] } else { &plan.probes };
         let new_probes = || probed.iter().map(|&particle| ProbeSeries::new(particle)).collect();
         let every = scene.record.vtk_every;
         let frames = match left {
@@ -256,6 +283,7 @@ impl<'a> Recorder<'a> {
             scene,
             snapshots: left.map_or_else(Vec::new, |left| left.checkpoint.snapshots.to_vec()),
             probes: left.map_or_else(new_probes, |left| left.checkpoint.probes.to_vec()),
+            load_steps: left.map_or_else(Vec::new, |left| left.checkpoint.load_steps.to_vec()),
             frames,
             reports: true,
             film: None,
@@ -270,6 +298,7 @@ impl<'a> Recorder<'a> {
         Kept {
             snapshots: &self.snapshots,
             probes: &self.probes,
+            load_steps: &self.load_steps,
             film: self.film.as_ref(),
             frames: self.frames.as_mut(),
         }
@@ -280,6 +309,9 @@ impl<'a> Recorder<'a> {
         if self.scene.record.figures.contains(&engine.step()) {
             self.snapshots.push(Snapshot::of(engine));
         }
+        if load_every(self.scene).is_some_and(|every| engine.step().is_multiple_of(every)) {
+            self.measure(engine);
+        }
         if self.frames.is_some() && engine.step().is_multiple_of(self.scene.record.vtk_every) {
             self.write_frame(engine);
         }
@@ -288,6 +320,11 @@ impl<'a> Recorder<'a> {
             RunRecorder::open(&mut self.film, &mut self.footage, engine).watch(engine);
             self.writing += start.elapsed();
         }
+    }
+
+    fn measure(&mut self, engine: &Engine) {
+        let measured = self.scene.material.as_ref().and_then(|elastic| LoadStep::of(engine, elastic));
+        self.load_steps.extend(measured);
     }
 
     fn write_frame(&mut self, engine: &Engine) {
@@ -309,6 +346,9 @@ impl<'a> Recorder<'a> {
         if self.snapshots.last().is_none_or(|last| last.step != step) {
             self.snapshots.push(Snapshot::of(engine));
         }
+        if load_every(self.scene).is_some() && self.load_steps.last().is_none_or(|last| last.step != step) {
+            self.measure(engine);
+        }
         if self.frames.is_some() && !self.failed() && !step.is_multiple_of(self.scene.record.vtk_every) {
             self.write_frame(engine);
         }
@@ -325,30 +365,30 @@ impl<'a> Recorder<'a> {
         }
         let stage = self.film.map(|film| film.stage(self.scene, outcome));
         let writing = self.writing + start.elapsed();
-        Ok(Records { snapshots: self.snapshots, probes: self.probes, stage, writing })
+        let Self { snapshots, probes, load_steps, .. } = self;
+        Ok(Records { snapshots, probes, load_steps, stage, writing })
     }
 }
 
-fn closing_words(
-    scene: &Scene,
-    outcome: &Outcome,
-    energies: &Energies,
-    elapsed: Duration,
-    kept: &Path,
-) -> String {
+fn closing_words(scene: &Scene, outcome: &Outcome, summary: &Summary, elapsed: Duration) -> String {
     let engine = &outcome.engine;
     let how = match &outcome.reason {
         StopReason::Equilibrium => "in equilibrium".to_owned(),
         StopReason::Unsettled => "the solver ended short of its tolerance".to_owned(),
+        StopReason::Stuck(why) => format!("not {why}"),
         StopReason::Steps => "all steps done".to_owned(),
+        StopReason::Interrupted if outcome.solved.is_some() => {
+            "interrupted: what there was is written".to_owned()
+        }
         StopReason::Interrupted => {
             "interrupted: what there was is written, `flockform run --resume` goes on".to_owned()
         }
         StopReason::Diverged(divergence) => format!("{divergence}; the last good state is written"),
     };
     let mut words = format!(
-        "{}: step {}, residual {:.2e}, {how} ({:.2} s)\n",
+        "{}: {} {}, residual {:.2e}, {how} ({:.2} s)\n",
         scene.name,
+        scene.counts(),
         engine.step(),
         outcome.residual,
         elapsed.as_secs_f64()
@@ -370,8 +410,8 @@ fn closing_words(
     }
     words += &format!(
         "PE1 {:.4e} {unit}^2 in all, largest strain {:.4e}\n",
-        energies.pe1,
-        energies.largest_strain.unwrap_or(0.0),
+        summary.energies.pe1,
+        summary.energies.largest_strain.unwrap_or(0.0),
         unit = scene.unit(),
     );
     let broken: Vec<_> = engine.breaks().iter().filter(|b| b.step > 0).collect();
@@ -387,12 +427,21 @@ fn closing_words(
             100.0 * engine.body().along()(first.place)
         );
     }
-    words + &format!("results in {}\n", kept.display())
+    words += &summary.mechanics.as_ref().map_or_else(String::new, Measured::to_string);
+    words + &summary.cautions.iter().map(|caution| format!("caution: {caution}\n")).collect::<String>()
+}
+
+fn where_to_look(kept: &Path) -> String {
+    let report = kept.join(page::FILE);
+    let report = report.is_file().then(|| format!("open {}\n", report.display()));
+    format!("results in {}\n{}", kept.display(), report.unwrap_or_default())
 }
 
 pub fn exit_code(outcome: &Outcome) -> ExitCode {
     match outcome.reason {
         StopReason::Equilibrium | StopReason::Steps => ExitCode::SUCCESS,
-        StopReason::Unsettled | StopReason::Interrupted | StopReason::Diverged(_) => ExitCode::from(FAILED),
+        StopReason::Unsettled | StopReason::Stuck(_) | StopReason::Interrupted | StopReason::Diverged(_) => {
+            ExitCode::from(FAILED)
+        }
     }
 }

@@ -8,6 +8,7 @@ use std::fmt;
 use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 
+use super::split::ErrorParts;
 use crate::flock::points::{Points, distance};
 use crate::material::cells::Cells;
 use crate::material::dilatation;
@@ -19,6 +20,10 @@ use crate::material::stiffness::ShapeError;
 pub struct Comparison {
     /// Relative L2 error of the displacement over the followers: sqrt(sum |u - t|^2 / sum |t|^2).
     pub displacement_rel_l2: f64,
+    /// What of it the cells, their outline and the solver leave.
+    pub parts: ErrorParts,
+    /// Relative L2 error that the truth states of its own displacement; `None` where it was solved on one mesh alone.
+    pub truth_stated_rel_l2: Option<f64>,
     /// Largest distance between where the rule and the truth have a follower \[length\].
     pub displacement_max: f64,
     /// The same over the largest true displacement of a follower.
@@ -52,7 +57,7 @@ pub struct Sides<'a> {
 }
 
 impl Comparison {
-    /// Measures the distance; times are left at zero.
+    /// Measures the distance; its parts are left open and times at zero.
     ///
     /// # Errors
     /// A cell that has no stiffness; those of lattices all have one.
@@ -71,6 +76,8 @@ impl Comparison {
         let energy_truth = strain_energy(cells, elastic, truth)?;
         Ok(Self {
             displacement_rel_l2: ratio(norm(&off), norm(&size)),
+            parts: ErrorParts::default(),
+            truth_stated_rel_l2: None,
             displacement_max: largest(&off),
             displacement_max_rel: ratio(largest(&off), largest(&size)),
             von_mises_rel_l2: ratio(norm(&stress_off), norm(&stress[1])),
@@ -126,12 +133,20 @@ fn ratio(error: f64, size: f64) -> f64 {
 
 impl fmt::Display for Comparison {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let percent = |part: f64| format!("{:.3} %", 100.0 * part);
+        let percent = |part: f64| match 100.0 * part {
+            small if small > 0.0 && small < 1e-3 => format!("{small:.1e} %"),
+            part => format!("{part:.3} %"),
+        };
         let largest =
             format!("{:.4e} ({} of the largest)", self.displacement_max, percent(self.displacement_max_rel));
         let energies = format!("{:.5e}, truth {:.5e}", self.strain_energy_rule, self.strain_energy_truth);
+        let part = |part: Option<f64>| part.map_or("not told".to_owned(), percent);
         let rows = [
             ("displacement, relative L2", percent(self.displacement_rel_l2)),
+            ("  of which discretisation", part(self.parts.discretisation)),
+            ("  of which outline", part(self.parts.outline)),
+            ("  of which solver", part(self.parts.solver)),
+            ("truth's own error, stated", part(self.truth_stated_rel_l2)),
             ("displacement, largest error", largest),
             ("von Mises, relative L2", percent(self.von_mises_rel_l2)),
             ("energy norm of the error", percent(self.energy_rel)),

@@ -4,13 +4,15 @@ use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
 use super::measures::{Comparison, Sides, von_mises};
-use super::mesh::{MeshError, TruthMesh};
+use super::split::ErrorParts;
+use super::supports::supports;
 use super::truth::{Setting, Truth, TruthError};
 use crate::continuum::engine::Engine;
 use crate::continuum::equilibrium::come_to_rest;
-use crate::continuum::layout::{Layout, RoleChange, held};
+use crate::continuum::layout::{Layout, RoleChange};
 use crate::continuum::plan::Plan;
 use crate::continuum::run::Outcome;
+use crate::fem::{Effort, FemError};
 use crate::flock::points::Points;
 use crate::flock::role::Role;
 use crate::material::cells::Cells;
@@ -45,30 +47,27 @@ pub struct Compared {
 /// Solves for the truth of a scene: clamped particles and leaders with a motion of their own are held where
 /// they are at step `stop.steps`, leaders led by the truth are as free as the followers.
 ///
-/// `refine` is how many parts each side of a cell is cut into;
-/// [`TruthMesh::default_refinement`] unless given.
-///
 /// # Errors
-/// Names the key of the scene for which there is no truth: no material, a body that nothing holds, a body
-/// too large for the refinement, a leader that is in no cell.
-pub fn truth_of(scene: &Scene, refine: Option<usize>) -> Result<SceneTruth, SceneError> {
+/// Names the key of the scene for which there is no truth: no material, a body without an outline, a body that nothing
+/// holds, a leader outside the shape.
+pub fn truth_of(scene: &Scene, effort: &Effort) -> Result<SceneTruth, SceneError> {
     let start = Instant::now();
     let layout = Layout::new(scene)?;
-    let (Some(cells), Some(elastic)) = (&layout.cells, scene.material) else {
-        let help = "add [material] with kind = \"isotropic\", young and poisson";
+    let Some(elastic) = scene.material else { return Err(without_material(scene)) };
+    let Some(outline) = &layout.outline else {
+        let message = "the truth is that of a shape, and the body has no outline that bounds one";
         return Err(scene.refuse(
-            "material",
-            "the truth is that of a material, and the scene has none",
-            help,
+            "body.shape",
+            message,
+            "give a shape that is one piece and crosses itself nowhere",
         ));
     };
     let changes = layout.role_changes(scene, None)?;
-    let held = held(&changes, &layout.body, scene.stop.steps as f64);
-    let loads = layout.loads(scene)?;
-    let reference = &layout.body.reference;
-    let setting = Setting { cells, reference, elastic: &elastic, held: &held, loads: &loads };
-    let refine = refine.unwrap_or_else(|| TruthMesh::default_refinement(cells));
-    let truth = Truth::solve(&setting, refine).map_err(|error| refused(scene, &error))?;
+    let supports = supports(scene, &layout, outline, &changes, scene.stop.steps as f64)?;
+    let loads = (0..scene.loads.len()).map(|k| layout.load(scene, k)).collect::<Result<Vec<_>, _>>()?;
+    let (reference, spacing) = (&layout.body.reference, layout.body.lattice.spacing());
+    let setting = Setting { outline, reference, spacing, elastic: &elastic, supports, loads: &loads };
+    let truth = Truth::solve(setting, effort).map_err(|error| refused(scene, &error))?;
     require_known(scene, &truth, &changes)?;
     Ok(SceneTruth { truth, layout, elastic, time: start.elapsed() })
 }
@@ -80,7 +79,7 @@ pub fn truth_of(scene: &Scene, refine: Option<usize>) -> Result<SceneTruth, Scen
 pub fn plan(scene: &Scene) -> Result<Plan, SceneError> {
     match scene.truth_led() {
         None => Plan::new(scene),
-        Some(_) => plan_led_by(scene, &truth_of(scene, None)?.truth),
+        Some(_) => plan_led_by(scene, &truth_of(scene, &Effort::default())?.truth),
     }
 }
 
@@ -91,11 +90,11 @@ pub fn plan(scene: &Scene) -> Result<Plan, SceneError> {
 /// Names the key of a scene that has no truth, or none that its end could be held against.
 pub fn compare(
     scene: &Scene,
-    refine: Option<usize>,
+    effort: &Effort,
     watch: &mut dyn FnMut(&Engine, f64) -> ControlFlow<()>,
 ) -> Result<Compared, SceneError> {
     require_comparable(scene)?;
-    let truth = truth_of(scene, refine)?;
+    let truth = truth_of(scene, effort)?;
     let start = Instant::now();
     let plan = plan_led_by(scene, &truth.truth)?;
     let cells = plan.cells.clone().unwrap_or_else(|| Cells::of_body(&plan.body));
@@ -112,6 +111,8 @@ pub fn compare(
         .map_err(|shape| scene.refuse("lattice", shape.to_string(), "use a lattice less slender"))?;
     comparison.seconds_rule = time.as_secs_f64();
     comparison.seconds_truth = truth.time.as_secs_f64();
+    comparison.truth_stated_rel_l2 = Some(truth.truth.error().displacement).filter(|error| error.is_finite());
+    comparison.parts = ErrorParts::of(scene, &truth, &rule, &follows)?;
     let von_mises_rule = von_mises(&cells, elastic, &rule);
     let von_mises_truth = von_mises(&cells, elastic, known);
     Ok(Compared { comparison, outcome, truth, cells, rule, von_mises_rule, von_mises_truth })
@@ -164,32 +165,28 @@ fn without_material(scene: &Scene) -> SceneError {
     scene.refuse("material", "the truth is that of a material, and the scene has none", help)
 }
 
-/// Particles in no cell cannot be led by a truth that does not know them.
+/// Particles outside the shape cannot be led by a truth that does not know them.
 fn require_known(scene: &Scene, truth: &Truth, changes: &[RoleChange]) -> Result<(), SceneError> {
     for (k, change) in changes.iter().enumerate() {
         let is_led = matches!(scene.roles[k].motion, Some(LeaderMotion::Truth { .. }));
         if let Some(i) = change.particles.iter().find(|&&i| is_led && !truth.knows(i)) {
-            let message =
-                format!("particle {} is in no cell of the lattice: the truth does not know it", i + 1);
+            let message = format!("particle {} is outside the shape: the truth does not know it", i + 1);
             return Err(scene.refuse(&format!("roles[{k}].region"), message, "narrow the region"));
         }
     }
     Ok(())
 }
 
-fn refused(scene: &Scene, error: &TruthError) -> SceneError {
+pub(super) fn refused(scene: &Scene, error: &TruthError) -> SceneError {
     let (key, help) = match error {
         TruthError::Mechanism { .. } => {
             ("roles", "clamp at least two particles of every part, or lead them by a motion of their own")
         }
-        TruthError::Singular { .. } | TruthError::Mesh(MeshError::NoCells) => {
-            ("body.shape", "use a smaller spacing or a larger shape")
+        TruthError::Singular { .. } => ("body.shape", "use a larger shape, or hold it in more places"),
+        TruthError::Fem(FemError::Unmeshable { .. } | FemError::InvertedCell { .. }) => {
+            ("body.shape", "keep corners, holes and supports further apart")
         }
-        TruthError::Mesh(MeshError::TooLarge { .. }) => {
-            ("body.shape", "use a wider spacing, a smaller shape or a lower --refine")
-        }
-        TruthError::Mesh(MeshError::NotRefined) => ("body.shape", "give --refine 1 or more"),
-        TruthError::Load(_) => ("loads", "move the load onto particles that belong to cells"),
+        TruthError::Fem(FemError::EmptySupport { .. }) => ("roles", "move the region onto the body"),
         _ => ("material", "use constants, lattice and loads less far apart"),
     };
     scene.refuse(key, error.to_string(), help)

@@ -1,108 +1,139 @@
-//! What elasticity says of a body: held particles and loads to the displacement and stress everywhere.
+//! What elasticity says of a shape: supports and loads to the displacement and stress everywhere.
+//!
+//! The truth is solved on a mesh of the shape, which knows nothing of the lattice; the particles are asked for
+//! afterwards.
 
-use std::collections::HashMap;
-
-use super::mesh::{MeshError, TruthMesh};
-use crate::fem::{self, FemError, PointForce, Problem, Side, Solution, Stress, solve};
+use crate::fem::{
+    self, Effort, EstimatedError, FemError, Level, ShapeProblem, ShapeSolution, Stress, Support, solve_shape,
+};
 use crate::flock::points::Points;
-use crate::material::cells::Cells;
+use crate::geometry::outline::Outline;
+use crate::geometry::portion::Portion;
 use crate::material::elastic::{Constants, Elastic, Plane};
-use crate::material::loads::{LoadError, Loads};
+use crate::material::outline_loads::Load;
 
-/// A body with what holds it and what pulls it. Arrays follow the particles, shape \[particles\].
-#[derive(Clone, Copy, Debug)]
+type Point = [f64; 2];
+
+/// Particles this part of the spacing outside the outline are still on it: they stand on it but for rounding.
+const OUTSIDE: f64 = 1e-3;
+
+/// A shape with what holds it and what pulls it.
 pub struct Setting<'a> {
-    pub cells: &'a Cells,
-    /// Where the particles are \[length\].
+    pub outline: &'a Outline,
+    /// Where the particles are \[length\], shape \[particles\].
     pub reference: &'a Points,
+    /// Distance of neighbouring particles \[length\].
+    pub spacing: f64,
     pub elastic: &'a Elastic,
-    /// Displacements \[length\] of the particles that are led or clamped.
-    ///
-    /// Between two held particles that share a side of a cell, the side follows them in a straight line; a
-    /// cell all of whose corners are held follows them throughout. A particle held by itself is held at
-    /// a point: its neighbourhood then yields the more, the finer the truth is.
-    pub held: &'a [Option<[f64; 2]>],
-    /// Tractions are linear along their sides. A force on a particle acts at a point: there, and only
-    /// there, the truth grows with the logarithm of the refinement.
-    pub loads: &'a Loads,
+    pub supports: Vec<Support<'a>>,
+    /// On the outline, over the thickness of the sheet. A force on a particle acts at a point: there, and only there, the
+    /// truth grows with the logarithm of the refinement.
+    pub loads: &'a [Load],
 }
 
-/// The displacement of a body in equilibrium.
+/// The displacement of a shape in equilibrium.
 #[derive(Clone, Debug)]
 pub struct Truth {
-    /// Displacement of each particle \[length\], shape \[particles\]; zero for those in no cell, which the
-    /// truth knows nothing of.
+    /// Displacement of each particle \[length\], shape \[particles\]; zero for those outside the shape.
     pub displacement: Points,
-    mesh: TruthMesh,
-    solution: Solution,
+    is_known: Vec<bool>,
+    solution: ShapeSolution,
+    spacing: f64,
 }
 
-/// Why there is no truth. Particles are named by their ids, which count from 1.
+/// Why there is no truth.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum TruthError {
-    #[error(transparent)]
-    Mesh(#[from] MeshError),
-    #[error("{given} held displacements were given for {particles} particles")]
-    HeldCount { given: usize, particles: usize },
-    #[error(transparent)]
-    Load(#[from] LoadError),
     #[error(
-        "the truth has no equilibrium: the part of the body with particle {particle} is not held and free to {motion}"
+        "the truth has no equilibrium: the part of the body around ({:.6}, {:.6}) is not held and free to {motion}", .place[0], .place[1]
     )]
-    Mechanism { particle: usize, motion: &'static str },
+    Mechanism { place: Point, motion: &'static str },
     #[error(
-        "the truth has no equilibrium: the body is soft beyond what a double resolves, most of all at particle {particle}; parts that hang together by one particle turn about it as on a hinge"
+        "the truth has no equilibrium: the body is soft beyond what a double resolves, most of all near ({:.6}, {:.6})", .place[0], .place[1]
     )]
-    Singular { particle: usize },
+    Singular { place: Point },
     #[error("the truth cannot be computed: {0}")]
     Fem(FemError),
 }
 
+impl From<FemError> for TruthError {
+    fn from(error: FemError) -> Self {
+        match error {
+            FemError::Unheld { x, y, motion } => Self::Mechanism { place: [x, y], motion },
+            FemError::Soft { x, y } => Self::Singular { place: [x, y] },
+            other => Self::Fem(other),
+        }
+    }
+}
+
 impl Truth {
-    /// Solves on a mesh of this refinement; see [`TruthMesh::default_refinement`].
+    /// Solves until the truth's own error is what `effort` asks for.
     ///
     /// # Errors
-    /// Names the particle at which the body is not held, the load that has no place, or what the mesh
-    /// lacks.
-    pub fn solve(setting: &Setting<'_>, refine: usize) -> Result<Self, TruthError> {
-        let particles = setting.reference.len();
-        if setting.held.len() != particles {
-            return Err(TruthError::HeldCount { given: setting.held.len(), particles });
-        }
-        // For its checks: a load that particles cannot take has no place on their body either.
-        setting.loads.on_particles(setting.cells, setting.reference)?;
-        let mesh = TruthMesh::new(setting.cells, setting.reference, refine)?;
-        let material = material(setting.elastic).map_err(TruthError::Fem)?;
-        let mut problem = Problem::new(mesh.mesh().clone(), material);
-        hold(&mut problem, &mesh, setting.held);
-        pull(&mut problem, &mesh, setting);
-        let solution = solve(&problem).map_err(|error| at_particle(error, &mesh))?;
-        let at_node = |node: usize| [solution.ux()[node], solution.uy()[node]];
-        let displacement = (0..particles).map(|i| mesh.node_of(i).map_or([0.0; 2], at_node)).collect();
-        Ok(Self { displacement, mesh, solution })
+    /// Names the place at which the shape is not held, or what keeps it from being meshed.
+    pub fn solve(setting: Setting<'_>, effort: &Effort) -> Result<Self, TruthError> {
+        Self::solve_with(setting, Vec::<(_, fn(Point, Point) -> Point)>::new(), effort)
     }
 
-    pub fn mesh(&self) -> &TruthMesh {
-        &self.mesh
+    /// The same with more that pushes portions of the outline \[force / length\], as a function of place and normal.
+    pub(super) fn solve_with<'a>(
+        setting: Setting<'a>,
+        more: Vec<(Vec<Portion>, impl Fn(Point, Point) -> Point + 'a)>,
+        effort: &Effort,
+    ) -> Result<Self, TruthError> {
+        let Setting { outline, reference, spacing, elastic, supports, loads } = setting;
+        let mut problem = ShapeProblem::new(outline, material(elastic)?);
+        problem.reach = OUTSIDE * spacing;
+        problem.supports = supports;
+        let thickness = elastic.thickness();
+        pull(&mut problem, loads, reference, thickness);
+        for (portions, push) in more {
+            problem.pull(portions, move |p, n| push(p, n).map(|f| f / thickness));
+        }
+        let solution = solve_shape(&problem, effort)?;
+        let is_within = |p: Point| outline.contains(p) || outline.nearest(p).1 <= OUTSIDE * spacing;
+        let is_known: Vec<bool> = reference.iter().map(is_within).collect();
+        let places: Vec<Point> =
+            reference.iter().zip(&is_known).filter(|(_, known)| **known).map(|(p, _)| p).collect();
+        let mut found = solution.displacements_within(&places, spacing)?.into_iter();
+        let of = |&known: &bool| if known { found.next().unwrap_or_default() } else { [0.0; 2] };
+        let displacement = is_known.iter().map(of).collect();
+        Ok(Self { displacement, is_known, solution, spacing })
     }
 
     /// The finite-element solution itself.
-    pub fn solution(&self) -> &Solution {
+    pub fn solution(&self) -> &ShapeSolution {
         &self.solution
     }
 
-    /// Whether the particle is a corner of a cell, so that the truth knows where it goes.
-    pub fn knows(&self, particle: usize) -> bool {
-        self.mesh.node_of(particle).is_some()
+    /// The error that the truth states of itself.
+    pub fn error(&self) -> EstimatedError {
+        self.solution.error()
     }
 
-    /// Displacement \[length\] at points \[length\] of the undeformed body, shape \[points\].
+    /// The meshes that it was solved on, the coarsest first.
+    pub fn levels(&self) -> &[Level] {
+        self.solution.levels()
+    }
+
+    /// Nodes of the finest mesh.
+    pub fn nodes(&self) -> usize {
+        self.solution.solution().mesh().node_count()
+    }
+
+    /// Whether the particle is in the shape, so that the truth knows where it goes.
+    pub fn knows(&self, particle: usize) -> bool {
+        self.is_known[particle]
+    }
+
+    /// Displacement \[length\] at points \[length\] of the undeformed shape, or less than a spacing outside it, shape
+    /// \[points\].
     ///
     /// # Errors
-    /// Names the first point that lies in no cell.
+    /// Names the first point further outside.
     pub fn displacements_at(&self, points: &Points) -> Result<Points, TruthError> {
-        let found = self.solution.displacements_at(&points.x, &points.y).map_err(TruthError::Fem)?;
-        Ok(found.into_iter().collect())
+        let places: Vec<Point> = points.iter().collect();
+        Ok(self.solution.displacements_within(&places, self.spacing)?.into_iter().collect())
     }
 
     /// Strain energy \[force length\].
@@ -110,12 +141,15 @@ impl Truth {
         self.solution.strain_energy()
     }
 
-    /// Von Mises stress \[force / length^2\] of the truth itself at the centres of the body's cells, recovered
-    /// from the small elements, shape \[cells\]. What a rule is measured against is coarser: the stress that
-    /// the cells have if their corners go where the truth takes them ([`super::measures::von_mises`]).
-    pub fn von_mises_at(&self, centres: &Points) -> Result<Vec<f64>, TruthError> {
-        let stress = self.solution.recovered_at(&centres.x, &centres.y).map_err(TruthError::Fem)?;
-        Ok(stress.iter().map(Stress::von_mises).collect())
+    /// Von Mises stress \[force / length^2\] of the truth itself at places of the shape or less than a spacing outside
+    /// it, shape \[places\]. What a rule is measured against is coarser: the stress that the cells have if their
+    /// corners go where the truth takes them ([`super::measures::von_mises`]).
+    ///
+    /// # Errors
+    /// Names the first place further outside.
+    pub fn von_mises_at(&self, places: &Points) -> Result<Vec<f64>, TruthError> {
+        let places: Vec<Point> = places.iter().collect();
+        Ok(self.solution.stress_within(&places, self.spacing)?.iter().map(Stress::von_mises).collect())
     }
 }
 
@@ -135,65 +169,20 @@ fn material(elastic: &Elastic) -> Result<fem::Material, FemError> {
     }
 }
 
-/// Prescribes every node all of whose carriers are held.
-fn hold(problem: &mut Problem, mesh: &TruthMesh, held: &[Option<[f64; 2]>]) {
-    let field: Points = held.iter().map(|u| u.unwrap_or_default()).collect();
-    for node in 0..mesh.mesh().node_count() {
-        if mesh.carriers(node).all(|(particle, _)| held[particle as usize].is_some()) {
-            let u = mesh.interpolate(node, &field);
-            problem.prescribe(&[node as u32], |_, _| u);
+/// Finite elements take forces per area and per volume.
+fn pull<'a>(problem: &mut ShapeProblem<'a>, loads: &'a [Load], reference: &Points, thickness: f64) {
+    for load in loads {
+        match load {
+            Load::Outline(load) => {
+                problem.pull(load.portions.clone(), move |p, n| load.at(p, n).map(|t| t / thickness));
+            }
+            Load::Particles { particles, force } => {
+                let at = particles.iter().map(|&i| (reference.get(i as usize), *force));
+                problem.point_forces.extend(at);
+            }
+            Load::Body(force) => {
+                problem.body_force = [0, 1].map(|axis| problem.body_force[axis] + force[axis] / thickness);
+            }
         }
-    }
-}
-
-fn pull(problem: &mut Problem, mesh: &TruthMesh, setting: &Setting<'_>) {
-    // The finite elements take forces per volume and per area.
-    let thickness = setting.elastic.thickness();
-    problem.body_force = setting.loads.body.map(|b| b / thickness);
-    let on_node = |&(particle, force): &(u32, [f64; 2])| {
-        mesh.node_of(particle as usize).map(|node| PointForce { node: node as u32, force })
-    };
-    problem.forces.extend(setting.loads.forces.iter().filter_map(on_node));
-    let parts = if setting.loads.tractions.is_empty() { HashMap::new() } else { parts_of_sides(mesh) };
-    for traction in &setting.loads.tractions {
-        let [a, b] = traction.side;
-        let [from, to] = traction.side.map(|i| setting.reference.get(i as usize));
-        let (along, [at_a, at_b]) = ([to[0] - from[0], to[1] - from[1]], traction.at_ends);
-        let square = along[0] * along[0] + along[1] * along[1];
-        let at = |[x, y]: [f64; 2]| {
-            let t = ((x - from[0]) * along[0] + (y - from[1]) * along[1]) / square;
-            [0, 1].map(|k| ((1.0 - t) * at_a[k] + t * at_b[k]) / thickness)
-        };
-        let sides = parts.get(&[a.min(b), a.max(b)]).map_or(&[][..], Vec::as_slice);
-        problem.pull_with(sides, |point, _| at(point));
-    }
-}
-
-/// The sides of small elements that make up each side of a cell on the boundary, by its end particles,
-/// the lower first.
-fn parts_of_sides(mesh: &TruthMesh) -> HashMap<[u32; 2], Vec<Side>> {
-    let mut parts: HashMap<[u32; 2], Vec<Side>> = HashMap::new();
-    for side in mesh.mesh().boundary() {
-        let nodes = mesh.mesh().cell(side.cell as usize);
-        // A boundary side lies on a side of a cell, so its middle has that side's ends for carriers.
-        let middle = nodes[mesh.mesh().kind().corners() + side.side as usize] as usize;
-        let mut ends = mesh.carriers(middle).map(|(particle, _)| particle);
-        if let (Some(a), Some(b)) = (ends.next(), ends.next()) {
-            parts.entry([a.min(b), a.max(b)]).or_default().push(side);
-        }
-    }
-    parts
-}
-
-/// Nodes mean nothing to whoever wrote the scene; the particle that counts most at the node does.
-fn at_particle(error: FemError, mesh: &TruthMesh) -> TruthError {
-    let nearest = |node: usize| {
-        let largest = mesh.carriers(node).max_by(|a, b| a.1.total_cmp(&b.1));
-        largest.map_or(0, |(particle, _)| particle as usize + 1)
-    };
-    match error {
-        FemError::Mechanism { node, motion } => TruthError::Mechanism { particle: nearest(node), motion },
-        FemError::Singular { node } => TruthError::Singular { particle: nearest(node) },
-        other => TruthError::Fem(other),
     }
 }

@@ -1,5 +1,6 @@
 //! The engine: one step of a planned body.
 
+pub(super) mod load;
 pub(super) mod several;
 pub mod state;
 
@@ -16,8 +17,10 @@ use crate::flock::pseudo_energy::{pe1, pe2};
 use crate::flock::role::Role;
 use crate::flock::rules::Rule;
 use crate::flock::strain::{Strain, strain};
+use crate::material::cells::Cells;
 use crate::scene::Quantity;
 use crate::solve::sweep::{Activity, Order, Sweep, Update};
+use load::Load;
 
 /// A body on its way; positions in \[length, world frame\], shape \[count\].
 #[derive(Clone, Debug)]
@@ -46,6 +49,11 @@ pub struct Engine {
     /// Where something moved in the last step.
     activity: Activity,
     step: usize,
+    /// Between the particles, where the scene has a material.
+    cells: Option<Cells>,
+    load: Load,
+    /// Displacements of a body that was put to rest \[length\]; positions have lost their last digits.
+    settled: Option<Points>,
 }
 
 /// A particle under a leader's program.
@@ -79,7 +87,9 @@ struct PresentNeighbours {
 
 impl Engine {
     pub fn new(plan: Plan) -> Self {
-        let Plan { body, interaction, update, present_radius, roles, changes, cuts, .. } = plan;
+        let Plan {
+            body, interaction, update, present_radius, roles, changes, cuts, cells, loads, ramp, ..
+        } = plan;
         let present_neighbours = present_radius.map(|radius| PresentNeighbours {
             radius,
             grid: CellGrid::default(),
@@ -103,7 +113,11 @@ impl Engine {
             present_neighbours,
             activity: Activity::default(),
             step: 0,
+            cells,
+            load: Load::new(ramp, loads),
+            settled: None,
         };
+        engine.follow_ramp();
         // The plan has given the roles that hold from the start; their motions begin here.
         for change in 0..engine.changes.len() {
             if engine.changes[change].from <= 1 && engine.changes[change].when.is_none() {
@@ -139,6 +153,16 @@ impl Engine {
         &self.roles
     }
 
+    /// Role changes in the order they were written.
+    pub fn changes(&self) -> &[RoleChange] {
+        &self.changes
+    }
+
+    /// Cells between the particles, where the scene has a material.
+    pub fn cells(&self) -> Option<&Cells> {
+        self.cells.as_ref()
+    }
+
     pub fn update(&self) -> Update {
         self.update
     }
@@ -151,6 +175,13 @@ impl Engine {
     pub fn displacement(&self, particle: usize) -> [f64; 2] {
         let ([x, y], [px, py]) = (self.present.get(particle), self.body.reference.get(particle));
         [x - px, y - py]
+    }
+
+    /// Where everybody is from their places in the reference configuration \[length\], shape \[count\]: to the digits
+    /// of the solver in a body that was put to rest and has not moved since.
+    pub fn displacements(&self) -> Points {
+        let of = |i| self.displacement(i);
+        self.settled.clone().unwrap_or_else(|| (0..self.present.len()).map(of).collect())
     }
 
     pub fn previous(&self) -> &Points {
@@ -184,6 +215,8 @@ impl Engine {
             return;
         }
         self.step += 1;
+        self.settled = None;
+        self.follow_ramp();
         self.take_roles();
         self.break_bonds();
         self.find_present_neighbours();
@@ -201,6 +234,7 @@ impl Engine {
     /// Puts particles where they have been seen \[length\], in place of where the last step sent them; frame
     /// points follow. A body whose particles are seen where they were sent goes on as if nobody had looked.
     pub fn observe(&mut self, seen: impl IntoIterator<Item = (usize, [f64; 2])>) {
+        self.settled = None;
         for (particle, place) in seen {
             self.present.set(particle, place);
         }
@@ -235,6 +269,8 @@ impl Engine {
             frame.follow(reference, &seen, &mut self.present);
         }
         self.previous.clone_from(&self.present);
+        // A frame stands where the body leaves it, which no solver says.
+        self.settled = self.body.frame.is_none().then(|| displacement.clone());
         self.activity.forget();
     }
 
@@ -247,6 +283,7 @@ impl Engine {
     pub fn is_scheduled(&self) -> bool {
         let waits = |change: &RoleChange| change.when.is_none() && change.from > self.step.max(1);
         self.changes.iter().any(waits)
+            || self.load.is_growing(self.step)
             || self.leaders.iter().any(|led| self.goes_on(led))
             || self.moves_components()
     }

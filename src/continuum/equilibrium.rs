@@ -1,5 +1,7 @@
 //! Straight to rest: the equilibrium under the leaders' places at the last step, without stepping there.
 
+mod increments;
+
 use std::ops::ControlFlow;
 
 use super::engine::Engine;
@@ -8,12 +10,12 @@ use super::plan::Plan;
 use super::run::{Outcome, StopReason, Watch, run_watched};
 use crate::flock::points::{Points, distance};
 use crate::flock::role::Role;
-use crate::scene::{Scene, SceneError};
-use crate::solve::corotated::{self, CorotatedError};
+use crate::scene::{LoadSteps, Scene, SceneError};
+use crate::solve::corotated::{self, CorotatedError, Way};
 use crate::solve::equilibrium::{Request, SolveError, Solved, Solver, System, choose, solve};
 use crate::solve::linear::{HeldComponent, NotLinear, system};
 
-/// Runs a plan to its end as its scene asks: stepping, or straight to the equilibrium. `see` sees each step of
+/// Runs a plan to its end as its scene asks: stepping, or straight to the equilibrium under the whole load. `see` sees each step of
 /// a stepped run as [`run`](super::run::run) shows it, and of a solved one the end.
 ///
 /// # Errors
@@ -23,14 +25,24 @@ pub fn come_to_rest(
     plan: Plan,
     see: &mut dyn FnMut(&Engine, f64) -> ControlFlow<()>,
 ) -> Result<Outcome, SceneError> {
-    come_to_rest_watched(scene, plan, Watch { next: &|step| step + 1, see })
+    come_to_whole_load(scene, plan, Watch { next: &|step| step + 1, see })
 }
 
-/// The same, seen at those steps alone that `watch` names.
+/// The same, seen at those steps alone that `watch` names. Where the scene's `[load_steps]` asks for equilibria on the
+/// way, the steps are these.
 ///
 /// # Errors
 /// As [`come_to_rest`].
 pub fn come_to_rest_watched(scene: &Scene, plan: Plan, watch: Watch<'_>) -> Result<Outcome, SceneError> {
+    match (&scene.equilibrium, &scene.load_steps) {
+        (Some(asked), Some(LoadSteps::Solved(parts))) => {
+            increments::settle_each(scene, &asked.request, plan, parts, watch)
+        }
+        _ => come_to_whole_load(scene, plan, watch),
+    }
+}
+
+fn come_to_whole_load(scene: &Scene, plan: Plan, watch: Watch<'_>) -> Result<Outcome, SceneError> {
     let Some(asked) = &scene.equilibrium else { return Ok(run_watched(plan, watch)) };
     let outcome = settle(scene, &asked.request, plan)?;
     // There is nothing left to break off.
@@ -45,9 +57,9 @@ pub fn come_to_rest_watched(scene: &Scene, plan: Plan, watch: Watch<'_>) -> Resu
 pub fn settle(scene: &Scene, request: &Request, plan: Plan) -> Result<Outcome, SceneError> {
     let solved = if corotated::is_corotated(&plan.interaction) {
         let steps = steps_of_the_way(&plan) as f64;
-        let way = |part: f64| way_after(&plan, part * steps);
+        let held = |part: f64| way_after(&plan, part * steps);
         let axes = held_axes(&plan);
-        corotated::solve(&plan.interaction, &plan.body, follows(&plan), axes, &way, request)
+        corotated::solve(&plan.interaction, &plan.body, follows(&plan), axes, &Way::whole(&held), request)
             .map_err(|error| refuse_corotated(scene, &error))?
     } else {
         let system = of_plan(scene, &plan)?;
@@ -109,8 +121,13 @@ fn held_axes(plan: &Plan) -> Vec<[bool; 2]> {
 /// # Errors
 /// Names the part of the rule that is not linear.
 pub fn of_plan(scene: &Scene, plan: &Plan) -> Result<System, SceneError> {
-    let held = held_after(plan, plan.stop.steps as f64);
-    let components = held_components(&plan.changes, &plan.body, plan.stop.steps as f64);
+    of_plan_after(scene, plan, plan.stop.steps as f64)
+}
+
+/// The same with the leaders where they are after so many steps.
+fn of_plan_after(scene: &Scene, plan: &Plan, steps: f64) -> Result<System, SceneError> {
+    let held = held_after(plan, steps);
+    let components = held_components(&plan.changes, &plan.body, steps);
     system(&plan.interaction, &plan.body, follows(plan), held, &components).map_err(|error| {
         let (key, help) = match error {
             NotLinear::Rule { .. } => {
@@ -146,8 +163,12 @@ fn outcome(plan: Plan, solved: Solved) -> Outcome {
     let mut engine = Engine::new(plan);
     engine.settle(step, &solved.displacement);
     let residual = farthest_from_target(&engine) / spacing;
-    let reason = if solved.is_at_rest() { StopReason::Equilibrium } else { StopReason::Unsettled };
+    let reason = reason(&solved);
     Outcome { engine, reason, residual, solved: Some(solved) }
+}
+
+fn reason(solved: &Solved) -> StopReason {
+    if solved.is_at_rest() { StopReason::Equilibrium } else { StopReason::Unsettled }
 }
 
 /// How far the follower farthest from its target is from it \[length\].

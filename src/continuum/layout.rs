@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::flock::body::{Body, BodyError, Cut};
+use crate::flock::lattice::Site;
 use crate::flock::motion::Motion;
 use crate::flock::neighbourhood::{Neighbourhood, Neighbours};
 use crate::flock::points::{Points, distance};
@@ -11,9 +12,8 @@ use crate::flock::role::Role;
 use crate::flock::rules::{Axis, Mean};
 use crate::geometry::outline::{Outline, OutlineError, Place};
 use crate::geometry::portion::{Portion, Selection};
-use crate::material::cells::{Cells, without_loose_sites};
+use crate::material::cells::{Cells, neighbourhood, neighbourhood_of, without_loose_sites};
 use crate::material::fit::{FitError, Fitted, fit};
-use crate::material::loads::{Loads, Traction};
 use crate::material::outline_loads::{self, Loader, OutlineLoad, Push};
 use crate::scene::{BodySource, Condition, LeaderMotion, Load, RoleEntry, Scene, SceneError, SceneRegion};
 use crate::solve::linear::HeldComponent;
@@ -55,9 +55,10 @@ impl Layout {
         require_in_range(scene)?;
         let fitted = fitted(scene)?;
         let layout = match fitted {
-            Some((fitted, outline)) if !is_all_lattice(&fitted.body) => {
+            Some((fitted, outline)) if !is_all_whole(&fitted.cells) => {
                 let Fitted { body, cells } = fitted;
                 require_resolved(scene, &body)?;
+                require_cell_neighbours(scene)?;
                 let neighbours = match &scene.material {
                     Some(elastic) => cells.neighbours(body.count(), elastic),
                     None => cells.mates(body.count()),
@@ -274,54 +275,6 @@ impl Layout {
             })
         };
         candidates.into_iter().filter(|(_, place)| is_on(place)).map(|(i, _)| i).collect()
-    }
-
-    /// The scene's loads on the sides and particles that they act on; none without a material.
-    ///
-    /// # Errors
-    /// Names a load whose region holds no particle or no side.
-    pub fn loads(&self, scene: &Scene) -> Result<Loads, SceneError> {
-        let mut loads = Loads::default();
-        let (Some(cells), Some(elastic)) = (&self.cells, &scene.material) else { return Ok(loads) };
-        let thickness = elastic.thickness();
-        for (k, load) in scene.loads.iter().enumerate() {
-            match load {
-                Load::Outline { region, push: Push::Traction(traction), .. } => {
-                    let sides = self.boundary_sides(scene, k, region, cells)?;
-                    let traction = traction.map(|t| t * thickness);
-                    loads.tractions.extend(sides.into_iter().map(|side| Traction::uniform(side, traction)));
-                }
-                Load::Outline { .. } => {}
-                Load::Force { region, force } => {
-                    let particles = self.pick(scene, &format!("loads[{k}]"), region)?;
-                    loads.forces.extend(particles.into_iter().map(|i| (i as u32, *force)));
-                }
-                Load::Body { force } => {
-                    loads.body = [0, 1].map(|axis| loads.body[axis] + thickness * force[axis]);
-                }
-            }
-        }
-        Ok(loads)
-    }
-
-    /// Sides of the boundary both of whose particles are in the region.
-    fn boundary_sides(
-        &self,
-        scene: &Scene,
-        load: usize,
-        region: &SceneRegion,
-        cells: &Cells,
-    ) -> Result<Vec<[u32; 2]>, SceneError> {
-        let key = format!("loads[{load}]");
-        let mut inside = vec![false; self.body.count()];
-        self.pick(scene, &key, region)?.into_iter().for_each(|i| inside[i] = true);
-        let mut sides = cells.boundary_sides(&cells.incidence(self.body.count()));
-        sides.retain(|side| side.iter().all(|&i| inside[i as usize]));
-        if sides.is_empty() {
-            let message = "no side of the boundary has both its particles in this region";
-            return Err(scene.refuse(&format!("{key}.region"), message, "move or widen the region"));
-        }
-        Ok(sides)
     }
 
     /// Particles of the region that stands at `key`.
@@ -587,9 +540,34 @@ fn refuse_outline(scene: &Scene, error: &OutlineError) -> SceneError {
     scene.refuse(&key, error.to_string(), help)
 }
 
-/// Whether every particle stands where the lattice has it.
-fn is_all_lattice(body: &Body) -> bool {
-    body.outline.as_ref().is_none_or(|outline| outline.regular == body.count())
+/// Refuses neighbours as written that leave out some of those with whom a particle shares a cell.
+fn require_cell_neighbours(scene: &Scene) -> Result<(), SceneError> {
+    let refuse = |message: String| {
+        let help = "use kind = \"cells\", or leave the neighbours out: the rule takes those that it needs";
+        scene.refuse("neighbours", message, help)
+    };
+    let offsets = |neighbourhood: &Neighbourhood| {
+        neighbourhood.offsets(&scene.lattice).map_err(|error| refuse(error.to_string()))
+    };
+    let needed = match &scene.material {
+        Some(elastic) => neighbourhood_of(&scene.lattice, elastic),
+        None => neighbourhood(&scene.lattice),
+    };
+    let (given, needed) = (offsets(&scene.neighbourhood)?, offsets(&needed)?);
+    let has_all = |(given, needed): (&Vec<Site>, &Vec<Site>)| needed.iter().all(|site| given.contains(site));
+    if given.iter().zip(&needed).all(has_all) {
+        return Ok(());
+    }
+    Err(refuse(format!(
+        "{} neighbours cannot carry shear coupling: particles share a cell but are no neighbours, so the cell's \
+         stiffness is cut",
+        given[0].len()
+    )))
+}
+
+/// Whether the outline cuts no cell: then the body is that of the lattice.
+fn is_all_whole(cells: &Cells) -> bool {
+    cells.shapes.len() == cells.whole
 }
 
 /// Deep enough for a staggered edge: less than one period of the lattice's rows across the side.

@@ -16,7 +16,7 @@ use crate::geometry::outline::Outline;
 use crate::material::cells::Cells;
 use crate::material::mechanism::require_held;
 use crate::material::outline_loads::{Resultant, sum};
-use crate::scene::{Scene, SceneError, Stop};
+use crate::scene::{LoadSteps, Scene, SceneError, Stop};
 use crate::solve::linear::HeldComponent;
 use crate::solve::sweep::{Order, Update};
 
@@ -41,6 +41,10 @@ pub struct Plan {
     pub probes: Vec<usize>,
     /// Between the particles, where the scene has a material.
     pub cells: Option<Cells>,
+    /// Forces of each load on the particles \[force\], shape \[loads\]\[count\]; their sum is the interaction's.
+    pub loads: Vec<Points>,
+    /// Steps over which the loads grow; they act from the first one on where there is no ramp.
+    pub ramp: Option<usize>,
     /// The outline of the body's shape, where it has one.
     pub outline: Option<Outline>,
     /// Of each load of the scene, in its order.
@@ -72,10 +76,10 @@ impl Plan {
     fn lay_out(scene: &Scene, truth: Option<Truth<'_>>) -> Result<Self, SceneError> {
         let layout = Layout::new(scene)?;
         let changes = layout.role_changes(scene, truth)?;
-        let by_load = layout.forces_by_load(scene)?;
+        let loads = layout.forces_by_load(scene)?;
         let reference = &layout.body.reference;
-        let resultants = by_load.iter().map(|f| Resultant::of(reference.iter().zip(f.iter()))).collect();
-        let forces = sum(by_load);
+        let resultants = loads.iter().map(|f| Resultant::of(reference.iter().zip(f.iter()))).collect();
+        let forces = sum(loads.clone());
         require_carried(scene, &layout, &changes, forces.as_ref())?;
         let Layout { body, neighbours, cells, outline } = layout;
         let follows = ever_follow(&body, &changes);
@@ -102,6 +106,11 @@ impl Plan {
             diagonal: distance(low, high).max(body.lattice.spacing()),
             probes,
             cells,
+            loads,
+            ramp: match scene.load_steps {
+                Some(LoadSteps::Stepped { ramp, .. }) => ramp,
+                _ => None,
+            },
             outline,
             resultants,
             body,
@@ -124,6 +133,8 @@ impl Plan {
             diagonal: distance(low, high).max(body.lattice.spacing()),
             probes: Vec::new(),
             cells: None,
+            loads: Vec::new(),
+            ramp: None,
             outline: None,
             resultants: Vec::new(),
             body,

@@ -1,11 +1,14 @@
-//! What is kept of a run: whole configurations at some steps, a few particles at every step.
+//! What is kept of a run: whole configurations at some steps, a few particles at every step, what a load that
+//! changes does.
 
 use serde::{Deserialize, Serialize};
 
 use super::engine::Engine;
+use super::mechanics::Mechanics;
 use super::stored;
 use crate::flock::points::Points;
 use crate::flock::role::Role;
+use crate::material::elastic::Elastic;
 
 /// A whole configuration at one step; arrays of shape \[count\].
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -66,5 +69,23 @@ impl ProbeSeries {
         self.positions.push(engine.present().get(self.particle));
         self.pe1.push(engine.pe1(self.particle));
         self.pe2.push(engine.pe2(self.particle));
+    }
+}
+
+/// A body with a material under part of its load.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LoadStep {
+    /// Steps or increments taken.
+    pub step: usize,
+    /// Part of the scene's loads that is on the body \[1\].
+    pub factor: f64,
+    pub mechanics: Mechanics,
+}
+
+impl LoadStep {
+    /// `None` without cells.
+    pub fn of(engine: &Engine, elastic: &Elastic) -> Option<Self> {
+        let mechanics = Mechanics::of(engine, elastic)?;
+        Some(Self { step: engine.step(), factor: engine.load_factor(), mechanics })
     }
 }

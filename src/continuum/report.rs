@@ -13,7 +13,7 @@ use crate::flock::interaction::Weights;
 use crate::flock::role::Role;
 use crate::flock::rules::{FeedbackReference, Mean, Rotation};
 use crate::material::outline_loads::Resultant;
-use crate::scene::{Scene, SceneError, Weights as SceneWeights};
+use crate::scene::{LoadSteps, Scene, SceneError, Weights as SceneWeights};
 use crate::solve::sweep::{Order, Sweep};
 
 /// A plan in words and numbers.
@@ -61,6 +61,10 @@ impl PlanReport {
             many => format!("{many} loads"),
         });
         self.models_or_not(forces, "loads", "nothing pushes the body but its leaders");
+        if scene.material.is_some() {
+            let parts = scene.load_steps.as_ref().map(load_steps);
+            self.models_or_not(parts, "load_steps", "loads and motions are not measured on the way");
+        }
         let frame = scene.frame.map(|frame| {
             let points = plan.body.frame.as_ref().map_or(0, |frame| frame.len());
             format!("{} frame of {points} points", frame.name())
@@ -115,6 +119,19 @@ impl PlanReport {
             Some(what) => self.models(what, key),
             None => self.left_out.push((key.to_owned(), because.to_owned())),
         }
+    }
+}
+
+/// In which parts the load comes.
+fn load_steps(steps: &LoadSteps) -> String {
+    match steps {
+        LoadSteps::Solved(parts) => {
+            format!("{} increments of load and motion, each solved to equilibrium", parts.len())
+        }
+        LoadSteps::Stepped { ramp: Some(ramp), every } => {
+            format!("loads that grow until step {ramp}, a row of load.csv every {every} steps")
+        }
+        LoadSteps::Stepped { ramp: None, every } => format!("a row of load.csv every {every} steps"),
     }
 }
 

@@ -20,6 +20,8 @@ pub enum StopReason {
     Equilibrium,
     /// The solver ended short of its tolerance.
     Unsettled,
+    /// There is no equilibrium, or none that was found, for the next part of the load: why.
+    Stuck(String),
     /// The scene's number of steps was reached.
     Steps,
     /// Whoever watched asked for it.
@@ -32,6 +34,7 @@ impl StopReason {
         match self {
             StopReason::Equilibrium => "equilibrium",
             StopReason::Unsettled => "unsettled",
+            StopReason::Stuck(_) => "stuck",
             StopReason::Steps => "steps",
             StopReason::Interrupted => "interrupted",
             StopReason::Diverged(_) => "diverged",

@@ -22,14 +22,14 @@ use serde_json::Value;
 use super::error::ExportError;
 use super::report::Footage;
 use crate::continuum::engine::state::EngineState;
-use crate::continuum::record::{ProbeSeries, Snapshot};
+use crate::continuum::record::{LoadStep, ProbeSeries, Snapshot};
 use crate::scene::Scene;
 
 /// Its name in the folder of the run.
 pub const FILE: &str = "checkpoint";
 const PART: &str = "checkpoint.part";
 const MAGIC: [u8; 8] = *b"FLOCKFRM";
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 const HEADER: usize = 24;
 const PROGRAM_VERSION: &str = env!("CARGO_PKG_VERSION");
 
@@ -48,11 +48,15 @@ pub struct Checkpoint<'a> {
     pub residual: f64,
     pub snapshots: Cow<'a, [Snapshot]>,
     pub probes: Cow<'a, [ProbeSeries]>,
+    pub load_steps: Cow<'a, [LoadStep]>,
     /// Of the report, where there is to be one.
     pub film: Option<Footage<'a>>,
     /// Time taken for the steps so far.
     pub stepping: Duration,
 }
+
+/// What a run has kept until now.
+type Recorded<'a> = (&'a [Snapshot], &'a [ProbeSeries], &'a [LoadStep], Option<Footage<'a>>);
 
 /// What the program was told, so that it need not be told again.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -104,7 +108,7 @@ impl<'a> Checkpoint<'a> {
     pub fn new(
         (asked, scene, digest): (&Asked, &Scene, u64),
         (engine, residual): (EngineState, f64),
-        (snapshots, probes, film): (&'a [Snapshot], &'a [ProbeSeries], Option<Footage<'a>>),
+        (snapshots, probes, load_steps, film): Recorded<'a>,
         stepping: Duration,
     ) -> Self {
         Self {
@@ -116,6 +120,7 @@ impl<'a> Checkpoint<'a> {
             residual,
             snapshots: Cow::Borrowed(snapshots),
             probes: Cow::Borrowed(probes),
+            load_steps: Cow::Borrowed(load_steps),
             film,
             stepping,
         }
@@ -304,7 +309,7 @@ mod tests {
         let checkpoint = Checkpoint::new(
             (&asked, &scene, sum),
             (state.clone(), f64::INFINITY),
-            (&snapshots, &probes, None),
+            (&snapshots, &probes, &[], None),
             Duration::from_millis(1500),
         );
         checkpoint.write(folder).expect("written");

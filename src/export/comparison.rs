@@ -13,6 +13,7 @@ use crate::compare::measures::Comparison;
 use crate::compare::run::Compared;
 use crate::scene::Scene;
 use crate::scene::raw::RawScene;
+use crate::scene::units::Units;
 
 /// The contents of `compare.json`; lengths in the scene's unit, infinities as `null`.
 #[derive(Clone, Debug, Serialize)]
@@ -44,9 +45,14 @@ pub struct RuleEnd {
 /// What the truth was computed on.
 #[derive(Clone, Copy, Debug, Serialize, PartialEq)]
 pub struct TruthSize {
-    /// Parts into which each side of a cell was cut.
-    pub refine: usize,
+    /// Of the finest of its meshes.
     pub nodes: usize,
+    /// Meshes that it was solved on.
+    pub levels: usize,
+    /// What it states of its own displacement, relative L2, and of its strain energy, relative; `null` where a body so
+    /// full of corners was solved on one mesh alone \[1\].
+    pub stated_error: Option<f64>,
+    pub stated_energy_error: Option<f64>,
     /// Of the finite elements themselves \[force length\].
     pub strain_energy: f64,
 }
@@ -59,7 +65,7 @@ struct ParticleRow {
     role: &'static str,
     ux_rule: f64,
     uy_rule: f64,
-    /// Empty where the truth does not know the particle: it is in no cell.
+    /// Empty where the truth does not know the particle: it is outside the shape.
     ux_truth: Option<f64>,
     uy_truth: Option<f64>,
 }
@@ -89,8 +95,10 @@ impl ComparisonReport {
                 iterations: outcome.solved.as_ref().map(|solved| solved.iterations),
             },
             truth: TruthSize {
-                refine: truth.mesh().refine(),
-                nodes: truth.mesh().mesh().node_count(),
+                nodes: truth.nodes(),
+                levels: truth.levels().len(),
+                stated_error: Some(truth.error().displacement).filter(|error| error.is_finite()),
+                stated_energy_error: Some(truth.error().energy).filter(|error| error.is_finite()),
                 strain_energy: truth.strain_energy(),
             },
             scene: scene.raw.clone(),
@@ -111,7 +119,7 @@ pub fn write_comparison(
 ) -> Result<Vec<PathBuf>, ExportError> {
     let mut written = vec![write_particles(folder, compared)?, write_cells(folder, compared)?];
     let body = compared.outcome.engine.body();
-    let stress_unit = format!("force/{}²", scene.unit());
+    let stress_unit = Units::of(scene).stress;
     let pair = Pair {
         title: &scene.raw.title,
         unit: scene.unit(),

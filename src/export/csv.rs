@@ -15,6 +15,7 @@ use crate::continuum::record::{ProbeSeries, Snapshot};
 use crate::flock::body::Body;
 use crate::flock::fracture::Break;
 use crate::flock::strain::Strain;
+use crate::material::stress::StressState;
 
 #[derive(Serialize)]
 struct FinalRow {
@@ -34,6 +35,15 @@ struct FinalRow {
     strain_yy: Option<f64>,
     strain_xy: Option<f64>,
     rotation: Option<f64>,
+    /// Absent without a material, empty for a particle in no cell.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    stress_xx: Option<Option<f64>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    stress_yy: Option<Option<f64>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    stress_xy: Option<Option<f64>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    von_mises: Option<Option<f64>>,
 }
 
 #[derive(Serialize)]
@@ -66,13 +76,17 @@ struct ResidualRow {
 }
 
 /// Writes every particle at the end: reference and present place \[length\], PE1 \[length^2\], PE2 \[length\], the
-/// strain \[1\] and the rotation \[rad\] of its surroundings, empty where it sees too few.
+/// strain \[1\] and the rotation \[rad\] of its surroundings, empty where it sees too few. Where the scene has a material,
+/// `stresses` follow \[force / length^2\]: the mean over the particle's cells, each weighted by its area, and the von
+/// Mises stress of that mean. Such a mean lies below a peak at a free edge or a notch.
 pub fn write_final(
     folder: &OutputFolder,
     body: &Body,
     last: &Snapshot,
     strains: &[Option<Strain>],
+    stresses: Option<&[Option<StressState>]>,
 ) -> Result<PathBuf, ExportError> {
+    let stress = |i: usize, k: usize| stresses.map(|all| all[i].map(|stress| stress.components[k]));
     let of_lattice = |i: usize| body.numbering.is_none() && body.sites[i][0] != Body::ALONG_OUTLINE;
     let at_sites = (0..body.count()).filter(|&i| of_lattice(i)).map(|i| body.sites[i]);
     let lowest = |axis: usize| at_sites.clone().map(|site| i64::from(site[axis])).min().unwrap_or(0);
@@ -92,6 +106,10 @@ pub fn write_final(
         strain_yy: strains[i].map(|strain| strain.components[1]),
         strain_xy: strains[i].map(|strain| strain.components[2]),
         rotation: strains[i].map(|strain| strain.rotation),
+        stress_xx: stress(i, 0),
+        stress_yy: stress(i, 1),
+        stress_xy: stress(i, 2),
+        von_mises: stresses.map(|all| all[i].map(|stress| stress.von_mises)),
     });
     write(folder, "final.csv", rows)
 }

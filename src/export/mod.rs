@@ -4,15 +4,16 @@
 //!
 //! | file | what |
 //! |---|---|
-//! | `summary.json` | program, scene, counts, how it ended, energies, first break, timings |
+//! | `summary.json` | program, scene, counts, how it ended, energies, reactions, largest stress, first break, timings |
 //! | `final.csv` | every particle at the end |
 //! | `probes.csv` | the probed particles at every step |
 //! | `residuals.csv`, `residuals` | how near the solver came, iteration by iteration, where one was used |
+//! | `load.csv`, `load` | what a load that changes does ([`load`]), where the scene has `[load_steps]` |
 //! | `breaks.csv` | every broken bond, with its step and place |
 //! | `steps.pvd`, `steps/*.vtu` | frames for ParaView |
 //! | `report.html` | the run as a page ([`report`]) |
 //! | `checkpoint` | in an unfinished or interrupted run: all it takes to go on |
-//! | `configuration_*`, `pe1_*`, `probes` | figures, as SVG and as the PNG rendered from it |
+//! | `configuration_*`, `pe1_*`, `von_mises_*`, `probes` | figures, as SVG and as the PNG rendered from it |
 //!
 //! A page for people to look at is written beside them ([`report`]), and a gallery of such pages.
 //!
@@ -26,7 +27,7 @@
 //! use std::ops::ControlFlow;
 //! use std::path::Path;
 //! use flockform::continuum::{plan::Plan, record::Snapshot, run::run};
-//! use flockform::export::{OutputFolder, Results, Timings, VtkSeries, write_all};
+//! use flockform::export::{Drawing, OutputFolder, Results, Timings, VtkSeries, write_all};
 //!
 //! let scene = flockform::scene::bundled("fracture").expect("bundled").load(&[])?;
 //! let folder = OutputFolder::create(Path::new("out/fracture"), false)?;
@@ -43,8 +44,9 @@
 //! });
 //! frames.finish()?;
 //! let timings = Timings::default();
-//! let results = Results { scene: &scene, outcome: &outcome, snapshots: &snapshots, probes: &[], timings };
-//! write_all(&folder, &results)?;
+//! let (probes, load_steps) = (&[], &[]);
+//! let results = Results { scene: &scene, outcome: &outcome, snapshots: &snapshots, probes, load_steps, timings };
+//! write_all(&folder, &results, Drawing::default())?;
 //! println!("written to {}", folder.commit()?.display());
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -59,6 +61,7 @@ pub mod figures;
 #[cfg(feature = "swarm")]
 pub mod flight;
 mod folder;
+pub mod load;
 pub mod report;
 pub mod stability;
 mod summary;
@@ -69,18 +72,24 @@ pub mod transport;
 mod vtk;
 
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
 use rayon::prelude::*;
 
-use crate::continuum::record::{ProbeSeries, Snapshot};
+use crate::continuum::mechanics::Stresses;
+use crate::continuum::record::{LoadStep, ProbeSeries, Snapshot};
 use crate::continuum::run::Outcome;
+use crate::flock::points::Points;
 use crate::flock::strain::Strain;
 use crate::scene::Scene;
+use crate::scene::units::Units;
 pub use error::ExportError;
-use figures::Subject;
+use figures::{Formats, Subject};
 pub use folder::{OutputFolder, unfinished};
-pub use summary::{BrokenBonds, Counts, Energies, Equilibrium, FirstBreak, Seconds, Summary, Timings};
+pub use summary::{
+    BrokenBonds, Counts, Energies, Equilibrium, FirstBreak, Measured, Seconds, Summary, Timings,
+};
 pub use vtk::VtkSeries;
 
 /// What a run leaves to be written at its end.
@@ -91,7 +100,23 @@ pub struct Results<'a> {
     /// The configurations to draw.
     pub snapshots: &'a [Snapshot],
     pub probes: &'a [ProbeSeries],
+    /// What a load that changes has done, where the scene has such.
+    pub load_steps: &'a [LoadStep],
     pub timings: Timings,
+}
+
+/// How figures are drawn.
+#[derive(Clone, Copy)]
+pub struct Drawing<'a> {
+    pub formats: Formats,
+    /// Called with how many figures are drawn, of how many: before the first and after each, from any thread.
+    pub progress: &'a (dyn Fn(usize, usize) + Sync),
+}
+
+impl Default for Drawing<'_> {
+    fn default() -> Self {
+        Self { formats: Formats::All, progress: &|_, _| {} }
+    }
 }
 
 /// Writes tables, figures and, last, the summary, which tells how long the others took. Returns the
@@ -102,13 +127,16 @@ pub struct Results<'a> {
 pub fn write_all(
     folder: &OutputFolder,
     results: &Results<'_>,
+    drawing: Drawing<'_>,
 ) -> Result<(Vec<PathBuf>, Summary), ExportError> {
     let start = Instant::now();
     let engine = &results.outcome.engine;
     let last = Snapshot::of(engine);
     let strains: Vec<_> = (0..engine.body().count()).into_par_iter().map(|i| engine.strain(i)).collect();
     let largest_strain = strains.iter().flatten().map(Strain::largest).reduce(f64::max);
-    let mut written = vec![csv::write_final(folder, engine.body(), &last, &strains)?];
+    let stresses = results.scene.material.as_ref().and_then(|elastic| Stresses::at_present(engine, elastic));
+    let stresses = stresses.as_ref().map(|stresses| &stresses.particles[..]);
+    let mut written = vec![csv::write_final(folder, engine.body(), &last, &strains, stresses)?];
     if !results.probes.is_empty() {
         written.push(csv::write_probes(folder, engine.body(), results.probes)?);
     }
@@ -117,11 +145,13 @@ pub fn write_all(
     }
     if let Some(solved) = &results.outcome.solved {
         written.push(csv::write_residuals(folder, &solved.residuals)?);
-        let title = &results.scene.raw.title;
-        let chart = figures::chart::residuals(title, solved.solver.name(), &solved.residuals);
-        written.extend(figures::write(&chart, &folder.path("residuals"))?);
     }
-    written.extend(write_figures(folder, results)?);
+    if !results.load_steps.is_empty() {
+        written.push(load::write_load(folder, results.scene, results.load_steps)?);
+    }
+    if drawing.formats != Formats::None {
+        written.extend(draw_all(folder, results, drawing)?);
+    }
     let mut timings = results.timings;
     timings.output += start.elapsed();
     let summary = Summary::new(results.scene, results.outcome, &last, largest_strain, timings);
@@ -129,26 +159,59 @@ pub fn write_all(
     Ok((written, summary))
 }
 
-fn write_figures(folder: &OutputFolder, results: &Results<'_>) -> Result<Vec<PathBuf>, ExportError> {
+/// A figure still to be drawn, and its file without ending.
+type Figure<'a> = (String, Box<dyn Fn() -> String + Send + Sync + 'a>);
+
+fn draw_all(
+    folder: &OutputFolder,
+    results: &Results<'_>,
+    drawing: Drawing<'_>,
+) -> Result<Vec<PathBuf>, ExportError> {
     let scene = results.scene;
-    let subject = Subject::of(scene, &results.outcome.engine);
-    let of_snapshots: Result<Vec<_>, _> = results
-        .snapshots
+    let (subject, units) = (Subject::of(scene, &results.outcome.engine), Units::of(scene));
+    let figures = figures_of(results, &subject, &units);
+    let drawn = AtomicUsize::new(0);
+    (drawing.progress)(0, figures.len());
+    let written: Result<Vec<_>, _> = figures
         .par_iter()
-        .map(|snapshot| {
-            let path = |what: &str| folder.path(format!("{what}_{:04}", snapshot.step));
-            let configuration = figures::configuration(&subject, snapshot);
-            let pe1 = figures::pe1(&subject, snapshot);
-            let written = [
-                figures::write(&configuration, &path("configuration"))?,
-                figures::write(&pe1, &path("pe1"))?,
-            ];
-            Ok(written.concat())
+        .map(|(name, draw)| {
+            let written = figures::write_as(&draw(), &folder.path(name), drawing.formats);
+            (drawing.progress)(drawn.fetch_add(1, Ordering::Relaxed) + 1, figures.len());
+            written
         })
         .collect();
-    let mut written = of_snapshots?.concat();
-    if !results.probes.is_empty() {
-        written.extend(figures::write(&figures::probes(&subject, results.probes), &folder.path("probes"))?);
+    Ok(written?.concat())
+}
+
+fn figures_of<'a>(results: &'a Results<'_>, subject: &'a Subject<'_>, units: &'a Units) -> Vec<Figure<'a>> {
+    let Results { scene, outcome, snapshots, probes, load_steps, .. } = *results;
+    let mut figures: Vec<Figure<'a>> = Vec::new();
+    for snapshot in snapshots {
+        let name = |what: &str| format!("{what}_{:04}", snapshot.step);
+        figures.push((name("configuration"), Box::new(move || figures::configuration(subject, snapshot))));
+        figures.push((name("pe1"), Box::new(move || figures::pe1(subject, snapshot))));
+        if let (Some(cells), Some(elastic)) = (outcome.engine.cells(), &scene.material) {
+            let draw = move || {
+                let moved = |(now, then): ([f64; 2], [f64; 2])| [now[0] - then[0], now[1] - then[1]];
+                let places = snapshot.positions.iter().zip(subject.body.reference.iter());
+                let displacement: Points = places.map(moved).collect();
+                let found = Stresses::of(&outcome.engine, elastic, &displacement, &snapshot.broken);
+                let stresses = found.map_or_else(Vec::new, |found| found.cells);
+                figures::stress(subject, snapshot, cells, &stresses, &units.stress)
+            };
+            figures.push((name("von_mises"), Box::new(draw)));
+        }
     }
-    Ok(written)
+    if !probes.is_empty() {
+        figures.push(("probes".into(), Box::new(move || figures::probes(subject, probes))));
+    }
+    if let Some(solved) = &outcome.solved {
+        let title = &scene.raw.title;
+        let draw = move || figures::chart::residuals(title, solved.solver.name(), &solved.residuals);
+        figures.push(("residuals".into(), Box::new(draw)));
+    }
+    if let Some(chart) = load::chart(scene, units, load_steps) {
+        figures.push(("load".into(), Box::new(move || figures::chart::draw(&chart))));
+    }
+    figures
 }

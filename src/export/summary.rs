@@ -1,6 +1,7 @@
 //! `summary.json`: what was run, how it ended, in numbers.
 
 use std::collections::BTreeMap;
+use std::fmt;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -9,11 +10,14 @@ use serde::Serialize;
 use super::error::{ExportError, write_file};
 use super::{OutputFolder, bonds};
 use crate::continuum::engine::Engine;
+use crate::continuum::forces::Reaction;
+use crate::continuum::mechanics::{Mechanics, Peak};
 use crate::continuum::record::Snapshot;
 use crate::continuum::run::{Outcome, StopReason};
 use crate::flock::role::Role;
 use crate::scene::Scene;
 use crate::scene::raw::RawScene;
+use crate::scene::units::Units;
 use crate::solve::equilibrium::Solved;
 
 pub(super) const PROGRAM: &str = env!("CARGO_PKG_NAME");
@@ -31,6 +35,9 @@ pub(super) const FLIGHT: &str = "flight.json";
 
 /// What a gallery writes in the place of a summary.
 pub(super) const GALLERY: &str = "gallery.json";
+
+/// Part of the forces on a body that may be left on a follower of one at rest \[1\].
+const AT_REST: f64 = 1e-6;
 
 /// How long the parts of a run took.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -62,6 +69,12 @@ pub struct Summary {
     /// How the equilibrium was found, unless it was stepped to.
     pub equilibrium: Option<Equilibrium>,
     pub energies: Energies,
+    /// Reactions, loads, energy and stress, where the scene has a material.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mechanics: Option<Measured>,
+    /// What the user should know of the result.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub cautions: Vec<String>,
     pub broken_bonds: BrokenBonds,
     pub timings: Seconds,
     /// The scene, its defaults and overrides included.
@@ -112,6 +125,14 @@ pub struct FirstBreak {
     pub along: f64,
 }
 
+/// What a testing machine would read off the body, and in which units.
+#[derive(Clone, Debug, Serialize, PartialEq)]
+pub struct Measured {
+    pub units: Units,
+    #[serde(flatten)]
+    pub mechanics: Mechanics,
+}
+
 /// What the solver did.
 #[derive(Clone, Debug, Serialize, PartialEq)]
 pub struct Equilibrium {
@@ -147,6 +168,8 @@ impl Summary {
         timings: Timings,
     ) -> Self {
         let [pe1, pe2] = last.energies();
+        let engine = &outcome.engine;
+        let mechanics = scene.material.as_ref().and_then(|elastic| Mechanics::of(engine, elastic));
         Self {
             program: PROGRAM,
             version: env!("CARGO_PKG_VERSION"),
@@ -163,6 +186,8 @@ impl Summary {
             share_swept: outcome.solved.is_none().then(|| outcome.engine.activity().share_computed()),
             equilibrium: outcome.solved.as_ref().map(Equilibrium::of),
             energies: Energies { pe1, pe2, largest_strain },
+            cautions: mechanics.as_ref().map_or_else(Vec::new, |mechanics| mechanics.cautions(engine)),
+            mechanics: mechanics.map(|mechanics| Measured { units: Units::of(scene), mechanics }),
             broken_bonds: broken_bonds(&outcome.engine),
             timings: Seconds {
                 setup_s: timings.setup.as_secs_f64(),
@@ -179,6 +204,71 @@ impl Summary {
         text.push('\n');
         write_file(&path, text)?;
         Ok(path)
+    }
+}
+
+impl fmt::Display for Measured {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { units, mechanics } = self;
+        let (force, moment, length) = (&units.force, &units.moment, &units.length);
+        // Rounding of the larger component is no number of the smaller one.
+        let shown = |value: f64, beside: f64| if value.abs() < 1e-9 * beside.abs() { 0.0 } else { value };
+        let pair = |[x, y]: [f64; 2]| format!("({}, {})", short(shown(x, y)), short(shown(y, x)));
+        if !mechanics.reactions.is_empty() {
+            writeln!(f, "reactions, force [{force}] and moment [{moment}] on the body:")?;
+        }
+        for reaction in &mechanics.reactions {
+            let Reaction { key, role, particles, centre, force, moment, moment_about_origin, .. } = reaction;
+            let moments = format!(
+                "{} about {} {length}, {} about the origin",
+                short(shown(*moment, *moment_about_origin)),
+                pair(*centre),
+                short(*moment_about_origin)
+            );
+            writeln!(f, "  {key} ({role}, {particles} particles)  {}, moment {moments}", pair(*force))?;
+        }
+        let each = mechanics.loads.iter().enumerate().map(|(k, load)| (format!("loads[{k}]"), load));
+        let all = mechanics.load.iter().filter(|_| mechanics.loads.len() != 1);
+        for (name, load) in each.chain(all.map(|load| ("loads in all".to_owned(), load))) {
+            let about = short(load.moment_about_origin);
+            writeln!(f, "{name}  {} {force}, moment {about} {moment} about the origin", pair(load.force))?;
+        }
+        let work = mechanics.work.map_or_else(String::new, |work| {
+            format!("; work of the loads {}, of the supports {}", short(work.loads), short(work.supports))
+        });
+        writeln!(f, "strain energy {} {moment}{work}", short(mechanics.strain_energy))?;
+        let sizes = mechanics.reactions.iter().map(|reaction| reaction.force);
+        let sizes = sizes.chain(mechanics.load.map(|load| load.force)).map(|[x, y]| x.hypot(y));
+        let largest = sizes.fold(0.0, f64::max);
+        if let Some(left) = mechanics.unbalanced.filter(|left| *left > AT_REST * largest) {
+            writeln!(
+                f,
+                "not at rest: a follower is pushed by {} {force} that nothing balances",
+                short(left)
+            )?;
+        }
+        if let Some(Peak { von_mises, cell, place, .. }) = &mechanics.largest_von_mises {
+            let stress = &units.stress;
+            let value = short(*von_mises);
+            writeln!(
+                f,
+                "largest von Mises stress {value} {stress}, in cell {cell} at {} {length}",
+                pair(*place)
+            )?;
+        }
+        Ok(())
+    }
+}
+
+/// Five digits.
+fn short(value: f64) -> String {
+    let text = format!("{value:.4e}");
+    // After rounding: 99.999999 has an exponent of 2.
+    let exponent = text.split_once('e').and_then(|(_, exponent)| exponent.parse::<i32>().ok());
+    match exponent {
+        _ if value == 0.0 => "0".into(),
+        Some(exponent @ -3..=4) => format!("{value:.*}", (4 - exponent) as usize),
+        _ => text,
     }
 }
 

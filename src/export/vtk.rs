@@ -1,13 +1,19 @@
 //! VTK for ParaView: `steps/step_000020.vtu` at every recorded step, `steps.pvd` that lists them.
 //!
-//! An unstructured grid of the present configuration. Its cells are the particles, as vertices, and the bonds, as
-//! lines; cell data `broken` (1 or 0; threshold it to see a crack as what is missing) and `stretch` (length over that
-//! in the reference configuration, less one \[1\]), both 0 for a particle. Points are in the user's order. Point data: `id`, `role`
-//! (0 follower, 1 leader, 2 clamped, 3 frame, 4 ghost), `displacement` \[length\], `pe1` \[length^2\], `pe2`
-//! \[length\], `strain` (xx, yy, xy) \[1\] and `rotation` \[rad\] of a particle's surroundings, and where the scene has
-//! a material `stress` (xx, yy, xy) and `von_mises` \[force / length^2\], in the axes of the reference configuration;
-//! NaN for who sees too few. Arrays are base64 within the XML: a number costs 11 bytes, loses nothing, and the file
-//! stays well-formed, which raw appended data would not.
+//! An unstructured grid of the present configuration. Where the scene has a material, its cells are those between the
+//! particles, as triangles, quadrilaterals or polygons, so that a viewer fills them with colour; a rule that is the
+//! material has no others. Under the paper's rules particles, as vertices, and bonds, as lines, come before them. Cell
+//! data `broken` (1 or 0; threshold it to see a crack as what is missing) and `stretch` (length over that in the
+//! reference configuration, less one \[1\]), both 0 for all but bonds, and with a material `stress` (xx, yy, xy) and
+//! `von_mises` \[force / length^2\]: of a cell its own, NaN where a bond across it is broken; of a particle that of the
+//! point data; of a bond the mean of its ends.
+//!
+//! Points are in the user's order. Point data: `id`, `role` (0 follower, 1 leader, 2 clamped, 3 frame, 4 ghost),
+//! `displacement` \[length\], `pe1` \[length^2\], `pe2` \[length\], `strain` (xx, yy, xy) \[1\] and `rotation` \[rad\] of a
+//! particle's surroundings, NaN for one that sees too few, and with a material `stress` and `von_mises` as in
+//! `final.csv`: the mean over the particle's cells. Stresses are in the axes of the reference configuration. Arrays are
+//! base64 within the XML: a number costs 11 bytes, loses nothing, and the file stays well-formed, which raw appended
+//! data would not.
 
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
@@ -20,15 +26,22 @@ use rayon::prelude::*;
 use super::error::{ExportError, write_file};
 use super::{OutputFolder, bonds};
 use crate::continuum::engine::Engine;
+use crate::continuum::mechanics::Stresses;
 use crate::flock::body::Body;
+use crate::flock::interaction::Weights;
 use crate::flock::points::{Points, distance};
 use crate::flock::role::Role;
 use crate::flock::strain::Strain;
+use crate::material::cells::Cells;
 use crate::material::elastic::Elastic;
+use crate::material::stress::StressState;
 
 const FOLDER: &str = "steps";
 const VERTEX: u8 = 1;
 const LINE: u8 = 3;
+const TRIANGLE: u8 = 5;
+const POLYGON: u8 = 7;
+const QUADRILATERAL: u8 = 9;
 
 /// Writes frames while a run goes on; none is kept in memory.
 #[derive(Debug)]
@@ -133,8 +146,8 @@ fn role_number(role: Role) -> u8 {
 
 fn write_frame(path: &Path, engine: &Engine, material: Option<&Elastic>) -> io::Result<()> {
     let mut out = BufWriter::new(File::create(path)?);
-    let bonds: Vec<(usize, [u32; 2])> = bonds::listed_once(&engine.interaction().neighbours).collect();
-    let lines = lines(engine.body(), &bonds);
+    let grid = Grid::of(engine);
+    let stresses = material.and_then(|elastic| Stresses::at_present(engine, elastic));
     let points = engine.present().len();
     writeln!(out, "<?xml version=\"1.0\"?>")?;
     let attributes = "type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\"";
@@ -142,30 +155,19 @@ fn write_frame(path: &Path, engine: &Engine, material: Option<&Elastic>) -> io::
     let roles = Role::ALL.map(|role| format!("{} {}", role_number(role), role.name())).join(", ");
     writeln!(out, "<!-- step {}; role: {roles} -->", engine.step())?;
     writeln!(out, "<UnstructuredGrid>")?;
-    writeln!(out, "<Piece NumberOfPoints=\"{points}\" NumberOfCells=\"{}\">", points + lines.len())?;
-    write_point_data(&mut out, engine, material)?;
-    write_cell_data(&mut out, engine, &bonds)?;
+    writeln!(out, "<Piece NumberOfPoints=\"{points}\" NumberOfCells=\"{}\">", grid.count())?;
+    write_point_data(&mut out, engine, stresses.as_ref())?;
+    grid.write_data(&mut out, engine, stresses.as_ref())?;
     writeln!(out, "<Points>")?;
     let places = engine.body().rows().map(|i| engine.present().get(i)).flat_map(|[x, y]| [x, y, 0.0]);
     vectors(&mut out, "Points", points, places)?;
     writeln!(out, "</Points>")?;
-    write_cells(&mut out, points, &lines)?;
+    grid.write(&mut out, engine.body())?;
     writeln!(out, "</Piece>\n</UnstructuredGrid>\n</VTKFile>")?;
     out.flush()
 }
 
-/// Points at the ends of the bonds.
-fn lines(body: &Body, bonds: &[(usize, [u32; 2])]) -> Vec<[u32; 2]> {
-    let mut pairs: Vec<[u32; 2]> = bonds.iter().map(|(_, pair)| *pair).collect();
-    if body.numbering.is_some() {
-        let mut row_of = vec![0; body.count()];
-        body.rows().zip(0..).for_each(|(particle, row)| row_of[particle] = row);
-        pairs.iter_mut().flatten().for_each(|end| *end = row_of[*end as usize]);
-    }
-    pairs
-}
-
-fn write_point_data(out: &mut impl Write, engine: &Engine, material: Option<&Elastic>) -> io::Result<()> {
+fn write_point_data(out: &mut impl Write, engine: &Engine, stresses: Option<&Stresses>) -> io::Result<()> {
     let (points, body) = (engine.present().len(), engine.body());
     writeln!(out, "<PointData Scalars=\"pe1\" Vectors=\"displacement\">")?;
     integers(out, "id", points, body.rows().map(|i| body.id(i) as i64))?;
@@ -182,46 +184,120 @@ fn write_point_data(out: &mut impl Write, engine: &Engine, material: Option<&Ela
     plane_tensors(out, "strain", points, strains.iter().map(components))?;
     let rotation = |strain: &Option<Strain>| strain.map_or(f64::NAN, |strain| strain.rotation);
     floats(out, "rotation", points, strains.iter().map(rotation))?;
-    if let Some(material) = material {
-        // The material takes the engineering shear, twice the tensor's.
-        let engineering = |strain: &Option<Strain>| {
-            let [xx, yy, xy] = components(strain);
-            [xx, yy, 2.0 * xy]
-        };
-        let stress = strains.iter().map(|strain| material.stress(engineering(strain)));
-        plane_tensors(out, "stress", points, stress)?;
-        let von_mises = strains.iter().map(|strain| material.von_mises(engineering(strain)));
-        floats(out, "von_mises", points, von_mises)?;
+    if let Some(stresses) = stresses {
+        write_stresses(out, points, body.rows().map(|i| at_particle(stresses, i)))?;
     }
     writeln!(out, "</PointData>")
 }
 
-fn write_cell_data(out: &mut impl Write, engine: &Engine, bonds: &[(usize, [u32; 2])]) -> io::Result<()> {
-    let points = engine.present().len();
-    let interaction = engine.interaction();
-    let is_broken =
-        |&(bond, _): &(usize, _)| interaction.bonds.as_ref().is_some_and(|bonds| bonds.is_broken(bond));
-    let length = |of: &Points, [a, b]: [u32; 2]| distance(of.get(a as usize), of.get(b as usize));
-    let stretch = |&(_, pair): &(usize, [u32; 2])| {
-        length(engine.present(), pair) / length(&engine.body().reference, pair) - 1.0
-    };
-    let cells = points + bonds.len();
-    writeln!(out, "<CellData Scalars=\"broken\">")?;
-    let broken = bonds.iter().map(|bond| u8::from(is_broken(bond)));
-    bytes(out, "broken", cells, std::iter::repeat_n(0, points).chain(broken))?;
-    floats(out, "stretch", cells, std::iter::repeat_n(0.0, points).chain(bonds.iter().map(stretch)))?;
-    writeln!(out, "</CellData>")
+/// Components and von Mises stress, NaN for a particle in no whole cell \[force / length^2\].
+fn at_particle(stresses: &Stresses, particle: usize) -> [f64; 4] {
+    stresses.particles[particle].map_or([f64::NAN; 4], |stress| with_von_mises(&stress))
 }
 
-fn write_cells(out: &mut impl Write, points: usize, lines: &[[u32; 2]]) -> io::Result<()> {
-    writeln!(out, "<Cells>")?;
-    let ends = lines.iter().flatten().map(|&i| i64::from(i));
-    integers(out, "connectivity", points + 2 * lines.len(), (0..points as i64).chain(ends))?;
-    let line_ends = (1..=lines.len()).map(|n| (points + 2 * n) as i64);
-    integers(out, "offsets", points + lines.len(), (1..=points as i64).chain(line_ends))?;
-    let types = std::iter::repeat_n(VERTEX, points).chain(std::iter::repeat_n(LINE, lines.len()));
-    bytes(out, "types", points + lines.len(), types)?;
-    writeln!(out, "</Cells>")
+fn with_von_mises(stress: &StressState) -> [f64; 4] {
+    let [xx, yy, xy] = stress.components;
+    [xx, yy, xy, stress.von_mises]
+}
+
+fn write_stresses(
+    out: &mut impl Write,
+    count: usize,
+    stresses: impl Iterator<Item = [f64; 4]> + Clone,
+) -> io::Result<()> {
+    plane_tensors(out, "stress", count, stresses.clone().map(|[xx, yy, xy, _]| [xx, yy, xy]))?;
+    floats(out, "von_mises", count, stresses.map(|stress| stress[3]))
+}
+
+/// The cells of the file, in their order.
+struct Grid<'a> {
+    /// Particles, as vertices: all or none.
+    vertices: usize,
+    /// Bonds, with their places in the neighbours' index list.
+    bonds: Vec<(usize, [u32; 2])>,
+    polygons: Option<&'a Cells>,
+}
+
+impl<'a> Grid<'a> {
+    fn of(engine: &'a Engine) -> Self {
+        let (interaction, polygons) = (engine.interaction(), engine.cells());
+        // Those of a material lie over one another, and none breaks.
+        if polygons.is_some() && matches!(interaction.weights, Weights::Matrix(_)) {
+            return Self { vertices: 0, bonds: Vec::new(), polygons };
+        }
+        let bonds = bonds::listed_once(&interaction.neighbours).collect();
+        Self { vertices: engine.present().len(), bonds, polygons }
+    }
+
+    fn polygons(&self) -> impl Iterator<Item = &'a [u32]> + Clone {
+        self.polygons.into_iter().flat_map(Cells::iter)
+    }
+
+    fn count(&self) -> usize {
+        self.vertices + self.bonds.len() + self.polygons.map_or(0, Cells::count)
+    }
+
+    fn write_data(
+        &self,
+        out: &mut impl Write,
+        engine: &Engine,
+        stresses: Option<&Stresses>,
+    ) -> io::Result<()> {
+        let bonds = engine.interaction().bonds.as_ref();
+        let is_broken = |&(bond, _): &(usize, _)| bonds.is_some_and(|bonds| bonds.is_broken(bond));
+        let length = |of: &Points, [a, b]: [u32; 2]| distance(of.get(a as usize), of.get(b as usize));
+        let stretch = |&(_, pair): &(usize, [u32; 2])| {
+            length(engine.present(), pair) / length(&engine.body().reference, pair) - 1.0
+        };
+        let (cells, polygons) = (self.count(), self.polygons.map_or(0, Cells::count));
+        let scalars = if self.bonds.is_empty() && stresses.is_some() { "von_mises" } else { "broken" };
+        writeln!(out, "<CellData Scalars=\"{scalars}\">")?;
+        let broken = self.bonds.iter().map(|bond| u8::from(is_broken(bond)));
+        let (before, after) = (std::iter::repeat_n(0, self.vertices), std::iter::repeat_n(0, polygons));
+        bytes(out, "broken", cells, before.chain(broken).chain(after))?;
+        let (before, after) = (std::iter::repeat_n(0.0, self.vertices), std::iter::repeat_n(0.0, polygons));
+        floats(out, "stretch", cells, before.chain(self.bonds.iter().map(stretch)).chain(after))?;
+        if let Some(stresses) = stresses {
+            let particles = engine.body().rows().take(self.vertices).map(|i| at_particle(stresses, i));
+            let between = |&(_, pair): &(usize, [u32; 2])| {
+                let [a, b] = pair.map(|end| at_particle(stresses, end as usize));
+                std::array::from_fn(|k| 0.5 * (a[k] + b[k]))
+            };
+            let own = stresses.cells.iter().map(with_von_mises);
+            write_stresses(out, cells, particles.chain(self.bonds.iter().map(between)).chain(own))?;
+        }
+        writeln!(out, "</CellData>")
+    }
+
+    fn write(&self, out: &mut impl Write, body: &Body) -> io::Result<()> {
+        let mut row_of = vec![0; body.count()];
+        body.rows().zip(0..).for_each(|(particle, row)| row_of[particle] = row);
+        let row = |&particle: &u32| row_of[particle as usize];
+        let bonds = || self.bonds.iter().flat_map(|(_, pair)| pair);
+        let corners = self.polygons.map_or(0, |cells| cells.index.len());
+        writeln!(out, "<Cells>")?;
+        let connected =
+            (0..self.vertices as i64).chain(bonds().map(row)).chain(self.polygons().flatten().map(row));
+        integers(out, "connectivity", self.vertices + 2 * self.bonds.len() + corners, connected)?;
+        let sizes = std::iter::repeat_n(1, self.vertices)
+            .chain(std::iter::repeat_n(2, self.bonds.len()))
+            .chain(self.polygons().map(<[u32]>::len));
+        let ends = sizes.scan(0, |end, size| {
+            *end += size as i64;
+            Some(*end)
+        });
+        integers(out, "offsets", self.count(), ends)?;
+        let kind = |cell: &[u32]| match cell.len() {
+            3 => TRIANGLE,
+            4 => QUADRILATERAL,
+            _ => POLYGON,
+        };
+        let types = std::iter::repeat_n(VERTEX, self.vertices)
+            .chain(std::iter::repeat_n(LINE, self.bonds.len()))
+            .chain(self.polygons().map(kind));
+        bytes(out, "types", self.count(), types)?;
+        writeln!(out, "</Cells>")
+    }
 }
 
 /// Symmetric tensors in the plane: xx, yy, xy.

@@ -108,6 +108,17 @@ impl CellKind {
         }
     }
 
+    /// A point of the reference cell near to a reference point, itself if it is in the cell.
+    pub(crate) fn clamped(self, [xi, eta]: [f64; 2]) -> [f64; 2] {
+        if self.corners() == 4 {
+            return [xi.clamp(-1.0, 1.0), eta.clamp(-1.0, 1.0)];
+        }
+        let [xi, eta] = [xi.max(0.0), eta.max(0.0)];
+        let beyond = (xi + eta - 1.0).max(0.0);
+        let xi = (xi - 0.5 * beyond).clamp(0.0, 1.0);
+        [xi, eta.min(1.0 - xi)]
+    }
+
     /// Shape functions and derivatives at a reference point.
     pub(crate) fn shape(self, [xi, eta]: [f64; 2]) -> Shape {
         match self {

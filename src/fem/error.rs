@@ -99,6 +99,30 @@ pub enum FemError {
         /// The node that moves most in the softest motion.
         node: usize,
     },
+    /// A support of a shape that lies beside the body.
+    #[error("support {index} holds no point of the body")]
+    EmptySupport {
+        /// Place in the list of supports, from 0.
+        index: usize,
+    },
+    /// Too few supports: the part of a shape around a place can move as a rigid body.
+    #[error("the part of the body around ({x}, {y}) is not held: it is free to {motion}")]
+    Unheld {
+        /// Abscissa \[m\].
+        x: f64,
+        /// Ordinate \[m\].
+        y: f64,
+        /// "translate along x", "translate along y" or "rotate".
+        motion: &'static str,
+    },
+    /// A shape that is soft beyond what a double resolves.
+    #[error("the body is soft beyond what a double resolves, most of all near ({x}, {y})")]
+    Soft {
+        /// Abscissa \[m\].
+        x: f64,
+        /// Ordinate \[m\].
+        y: f64,
+    },
     /// The sparse factorisation could not be carried out: the factor does not fit in memory.
     #[error("sparse factorisation of {unknowns} unknowns failed: {reason}")]
     Factorisation {
@@ -106,6 +130,14 @@ pub enum FemError {
         unknowns: usize,
         /// What the linear-algebra library said.
         reason: String,
+    },
+    /// Curves of an outline, or supports in the body, too close to each other for triangles between them.
+    #[error("no triangles fit between the curves near ({x}, {y}): they come too close to each other")]
+    Unmeshable {
+        /// Abscissa \[m\].
+        x: f64,
+        /// Ordinate \[m\].
+        y: f64,
     },
     /// A point at which a value was asked for lies in no cell.
     #[error("point {index} at ({x}, {y}) lies outside the mesh")]

@@ -55,30 +55,56 @@ impl<'m> Locator<'m> {
         let [i, j] = self.bin(p);
         let bin = j * self.bins[0] + i;
         let cells = &self.cells[self.starts[bin]..self.starts[bin + 1]];
-        cells.iter().find_map(|&cell| Some((cell as usize, self.invert(cell as usize, p)?)))
+        cells.iter().find_map(|&cell| {
+            let place = invert(self.mesh, cell as usize, p)?;
+            self.mesh.kind().contains(place, SLACK).then_some((cell as usize, place))
+        })
     }
 
-    fn invert(&self, cell: usize, p: [f64; 2]) -> Option<[f64; 2]> {
+    /// The cell nearest to a point that is in none, with reference coordinates that continue it to the point; `None`
+    /// if it is further away than `reach` \[m\].
+    pub fn nearest(&self, p: [f64; 2], reach: f64) -> Option<(usize, [f64; 2])> {
         let kind = self.mesh.kind();
-        let at = self.mesh.positions(cell);
-        let at = &at[..kind.nodes()];
-        let mut r = kind.reference_centre();
-        for _ in 0..STEPS {
-            let shape = kind.shape(r);
-            let q = shape.interpolate(at);
-            let ([dx, dy], j) = ([p[0] - q[0], p[1] - q[1]], shape.jacobian(at));
-            let det = j[0][0] * j[1][1] - j[0][1] * j[1][0];
-            let step = [(j[1][1] * dx - j[0][1] * dy) / det, (j[0][0] * dy - j[1][0] * dx) / det];
-            r = [r[0] + step[0], r[1] + step[1]];
-            if !(r[0].abs() < 1e3 && r[1].abs() < 1e3) {
-                return None;
-            }
-            if step[0].abs().max(step[1].abs()) < 0.1 * SLACK {
-                return kind.contains(r, SLACK).then_some(r);
+        let (first, last) = (self.bin(p.map(|v| v - reach)), self.bin(p.map(|v| v + reach)));
+        let mut best: Option<(f64, usize, [f64; 2])> = None;
+        for j in first[1]..=last[1] {
+            for bin in (first[0]..=last[0]).map(|i| j * self.bins[0] + i) {
+                for &cell in &self.cells[self.starts[bin]..self.starts[bin + 1]] {
+                    let Some(place) = invert(self.mesh, cell as usize, p) else { continue };
+                    let at = self.mesh.positions(cell as usize);
+                    let within = kind.shape(kind.clamped(place)).interpolate(&at[..kind.nodes()]);
+                    let apart = (p[0] - within[0]).hypot(p[1] - within[1]);
+                    if apart <= reach && best.is_none_or(|(least, ..)| apart < least) {
+                        best = Some((apart, cell as usize, place));
+                    }
+                }
             }
         }
-        None
+        best.map(|(_, cell, place)| (cell, place))
     }
+}
+
+/// Reference coordinates of a point \[m\] in a cell, which need not hold it; `None` if there are none nearby.
+pub(crate) fn invert(mesh: &Mesh, cell: usize, p: [f64; 2]) -> Option<[f64; 2]> {
+    let kind = mesh.kind();
+    let at = mesh.positions(cell);
+    let at = &at[..kind.nodes()];
+    let mut r = kind.reference_centre();
+    for _ in 0..STEPS {
+        let shape = kind.shape(r);
+        let q = shape.interpolate(at);
+        let ([dx, dy], j) = ([p[0] - q[0], p[1] - q[1]], shape.jacobian(at));
+        let det = j[0][0] * j[1][1] - j[0][1] * j[1][0];
+        let step = [(j[1][1] * dx - j[0][1] * dy) / det, (j[0][0] * dy - j[1][0] * dx) / det];
+        r = [r[0] + step[0], r[1] + step[1]];
+        if !(r[0].abs() < 1e3 && r[1].abs() < 1e3) {
+            return None;
+        }
+        if step[0].abs().max(step[1].abs()) < 0.1 * SLACK {
+            return Some(r);
+        }
+    }
+    None
 }
 
 fn bounds(points: impl Iterator<Item = (f64, f64)>) -> ([f64; 2], [f64; 2]) {

@@ -25,19 +25,46 @@
 //! # Ok::<(), flockform::fem::FemError>(())
 //! ```
 //!
-//! Files: `mesh` and `shapes` (the body), `element` (shape functions, quadrature), `material`, `problem`
+//! A body can also be given by its shape alone: a [`ShapeProblem`] has the outline, holds and pulls parts of it, and
+//! [`solve_shape()`] meshes it, refines, and states its own error.
+//!
+//! ```
+//! use flockform::fem::{Effort, Material, Plane, ShapeProblem, solve_shape};
+//! use flockform::geometry::outline::Outline;
+//! use flockform::geometry::portion::Portion;
+//!
+//! // Cook's membrane: the left edge clamped, the right edge under shear of resultant 1.
+//! let outline = Outline::of_polygons(&[vec![[0.0, 0.0], [48.0, 44.0], [48.0, 60.0], [0.0, 44.0]]]).expect("an outline");
+//! let material = Material::isotropic(1.0, 1.0 / 3.0, Plane::Stress, 1.0)?;
+//! let mut membrane = ShapeProblem::new(&outline, material);
+//! membrane.hold(vec![Portion::whole(0, 3)], |_| [0.0, 0.0]);
+//! membrane.pull(vec![Portion::whole(0, 1)], |_, _| [0.0, 1.0 / 16.0]);
+//! let solved = solve_shape(&membrane, &Effort::default())?;
+//! assert!((solved.displacements_at(&[[48.0, 52.0]])?[0][1] / 23.965 - 1.0).abs() < 1e-3);
+//! assert!(solved.error().displacement < 1e-4);
+//! # Ok::<(), flockform::fem::FemError>(())
+//! ```
+//!
+//! Files: `mesh` and `shapes` (the body), `outline_mesh` with `curves`, `size` and `delaunay` (a mesh of a shape),
+//! `shape_problem` and `shape_solve` (a shape, solved), `element` (shape functions, quadrature), `material`, `problem`
 //! (what is asked), `assemble` and `solve` (K u = f), `solution` and `recover` (what follows), `locate`
 //! (which cell holds a point), `error`.
 
 mod assemble;
+mod curves;
+mod delaunay;
 mod element;
 mod error;
 mod locate;
 mod material;
 mod mesh;
+mod outline_mesh;
 mod problem;
 mod recover;
+mod shape_problem;
+mod shape_solve;
 mod shapes;
+mod size;
 mod solution;
 mod solve;
 
@@ -45,6 +72,9 @@ pub use element::CellKind;
 pub use error::FemError;
 pub use material::{Material, Orthotropic, Plane, Stress};
 pub use mesh::{Mesh, Side};
+pub use outline_mesh::{MeshRequest, OutlineMesh, OutlineSide};
 pub use problem::{Axis, Fixed, PointForce, Problem, Traction};
+pub use shape_problem::{Field, Holding, PlaneRegion, PortionTraction, ShapeProblem, Support, TractionField};
+pub use shape_solve::{Effort, EstimatedError, Level, Reaction, ShapeSolution, solve_shape};
 pub use solution::Solution;
 pub use solve::solve;

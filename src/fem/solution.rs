@@ -67,7 +67,16 @@ impl Solution {
     /// [`FemError::Length`] if `x` and `y` differ in length; [`FemError::OutsideMesh`] names the first
     /// point that lies in no cell.
     pub fn displacements_at(&self, x: &[f64], y: &[f64]) -> Result<Vec<[f64; 2]>, FemError> {
-        self.at_places(x, y, |cell, shape| shape.interpolate(&self.of_cell(cell)[..self.mesh.kind().nodes()]))
+        self.displacements_within(x, y, 0.0)
+    }
+
+    /// The same, where points no further outside than `reach` \[m\] take the nearest cell, continued to them.
+    ///
+    /// # Errors
+    /// As for [`Solution::displacements_at`].
+    pub fn displacements_within(&self, x: &[f64], y: &[f64], reach: f64) -> Result<Vec<[f64; 2]>, FemError> {
+        let n = self.mesh.kind().nodes();
+        self.at_places(x, y, reach, |cell, shape| shape.interpolate(&self.of_cell(cell)[..n]))
     }
 
     /// The recovered stress of [`Solution::stress_at_points`] at each point (x, y) \[m\] of the undeformed
@@ -76,10 +85,28 @@ impl Solution {
     /// # Errors
     /// As for [`Solution::displacements_at`].
     pub fn recovered_at(&self, x: &[f64], y: &[f64]) -> Result<Vec<Stress>, FemError> {
-        let at_nodes = self.stress_at_points();
+        self.recovered_within(x, y, 0.0)
+    }
+
+    /// The same, where points no further outside than `reach` \[m\] take the nearest cell, continued to them.
+    ///
+    /// # Errors
+    /// As for [`Solution::displacements_at`].
+    pub fn recovered_within(&self, x: &[f64], y: &[f64], reach: f64) -> Result<Vec<Stress>, FemError> {
+        self.interpolated_within(&self.stress_at_points(), x, y, reach)
+    }
+
+    /// Stress known at the nodes, shape \[nodes\], at points; as [`Solution::recovered_within`].
+    pub(crate) fn interpolated_within(
+        &self,
+        at_nodes: &[Stress],
+        x: &[f64],
+        y: &[f64],
+        reach: f64,
+    ) -> Result<Vec<Stress>, FemError> {
         let all = |component: fn(&Stress) -> f64| at_nodes.iter().map(component).collect::<Vec<f64>>();
         let (xx, yy, xy, zz) = (all(|s| s.xx), all(|s| s.yy), all(|s| s.xy), all(|s| s.zz));
-        self.at_places(x, y, |cell, shape| {
+        self.at_places(x, y, reach, |cell, shape| {
             let n = self.mesh.kind().nodes();
             let [in_x, in_y] = shape.interpolate(&self.mesh.gather(cell, &xx, &yy)[..n]);
             let [shear, out] = shape.interpolate(&self.mesh.gather(cell, &xy, &zz)[..n]);
@@ -92,6 +119,7 @@ impl Solution {
         &self,
         x: &[f64],
         y: &[f64],
+        reach: f64,
         value: impl Fn(usize, &Shape) -> T,
     ) -> Result<Vec<T>, FemError> {
         if x.len() != y.len() {
@@ -99,7 +127,10 @@ impl Solution {
         }
         let locator = Locator::new(&self.mesh);
         let at = |(index, (&x, &y)): (usize, (&f64, &f64))| {
-            let (cell, place) = locator.find([x, y]).ok_or(FemError::OutsideMesh { index, x, y })?;
+            let (cell, place) = locator
+                .find([x, y])
+                .or_else(|| if reach > 0.0 { locator.nearest([x, y], reach) } else { None })
+                .ok_or(FemError::OutsideMesh { index, x, y })?;
             Ok(value(cell, &self.mesh.kind().shape(place)))
         };
         x.iter().zip(y).enumerate().map(at).collect()
@@ -121,6 +152,14 @@ impl Solution {
     /// Von Mises stress of [`Solution::stress_at_points`] [N/m2], shape \[nodes\].
     pub fn von_mises_at_points(&self) -> Vec<f64> {
         self.stress_at_points().iter().map(Stress::von_mises).collect()
+    }
+
+    /// Stress at a node of a cell by that cell alone; `local` is the node's number in the cell.
+    pub(crate) fn stress_at_node(&self, cell: usize, local: usize) -> Stress {
+        let kind = self.mesh.kind();
+        let shape = kind.shape(kind.reference_nodes()[local]);
+        let (n, at, u) = (kind.nodes(), self.mesh.positions(cell), self.of_cell(cell));
+        self.material.stress(shape.gradient(&at[..n]).strain(&u[..n]))
     }
 
     /// Elastic energy \[J\]: half the integral of stress times strain over the volume.
@@ -168,7 +207,7 @@ impl Solution {
     }
 
     /// Nodal displacements of a cell, padded.
-    fn of_cell(&self, cell: usize) -> [[f64; 2]; super::element::MAX_NODES] {
+    pub(crate) fn of_cell(&self, cell: usize) -> [[f64; 2]; super::element::MAX_NODES] {
         self.mesh.gather(cell, &self.ux, &self.uy)
     }
 

@@ -186,13 +186,28 @@ impl Interaction {
     /// Force of a material on a particle when all stand at `present` \[force, world frame\]: on one that rests, minus its
     /// load; on one that is held, minus its load and its reaction. Zero for a rule that is no material.
     pub fn force(&self, particle: usize, present: &Points) -> [f64; 2] {
+        self.force_from(particle, |slot| self.corner(particle, slot, present))
+    }
+
+    /// The same when all are displaced by so much from their reference places \[length\]: to more digits where that is
+    /// little.
+    pub fn force_under(&self, particle: usize, displacement: &Points) -> [f64; 2] {
+        let from =
+            |points: &Points, j: usize| [points.x[j] - points.x[particle], points.y[j] - points.y[particle]];
+        self.force_from(particle, |slot| {
+            let j = self.neighbours.of(particle)[slot] as usize;
+            Corner { reference: from(&self.reference, j), displacement: from(displacement, j) }
+        })
+    }
+
+    fn force_from(&self, particle: usize, corner: impl Fn(usize) -> Corner + Copy) -> [f64; 2] {
         match &self.weights {
             Weights::Matrix(weights) if self.rule.mean == COROTATED => {
-                self.pulled(weights, particle, present).0
+                pull(weights.cells_around(particle), weights.patches_around(particle), corner).0
             }
             Weights::Matrix(weights) => {
                 weights.stiffness_of(particle).iter().enumerate().fold([0.0; 2], |sum, (slot, block)| {
-                    let [x, y] = apply(block, self.corner(particle, slot, present).displacement);
+                    let [x, y] = apply(block, corner(slot).displacement);
                     [sum[0] + x, sum[1] + y]
                 })
             }

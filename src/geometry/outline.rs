@@ -103,6 +103,22 @@ impl Piece {
         Self { from, to, arc, begins_at_corner: !whole, number: 0 }
     }
 
+    /// The arc from one point to another about `centre` \[length\], which is as far from both; the whole circle if they
+    /// are one.
+    pub fn arc_between(from: Point, to: Point, centre: Point, clockwise: bool) -> Self {
+        let [start, end] = [from, to].map(|p| (p[1] - centre[1]).atan2(p[0] - centre[0]));
+        let left = if from == to { TAU } else { (end - start).rem_euclid(TAU) };
+        let sweep = if clockwise && from != to {
+            left - TAU
+        } else if clockwise {
+            -TAU
+        } else {
+            left
+        };
+        let arc = Some(Arc { centre, radius: distance(from, centre), start, sweep });
+        Self { from, to, arc, begins_at_corner: from != to, number: 0 }
+    }
+
     /// The place a share `t` of the way along \[length\].
     pub fn point(&self, t: f64) -> Point {
         match &self.arc {
@@ -307,8 +323,7 @@ impl Outline {
 
     /// Whether `p` lies inside: in the polygon of the chords, or else in a segment between a chord and its arc.
     pub fn contains(&self, p: Point) -> bool {
-        let changes = |piece: &Piece| u8::from(crosses_ray(piece, p)) + u8::from(is_in_segment(piece, p));
-        self.pieces().map(|(.., piece)| changes(piece)).fold(0, |sum: u8, next| sum ^ (next & 1)) == 1
+        is_inside(self.pieces().map(|(.., piece)| piece), p)
     }
 
     fn check(&self) -> Result<(), OutlineError> {
@@ -411,6 +426,12 @@ fn folds_back(a: [Point; 2], b: [Point; 2], near: f64) -> bool {
     a.iter().any(|&p| reaches(p, b)) || b.iter().any(|&p| reaches(p, a))
 }
 
+/// Whether closed loops of pieces go around `p` an odd number of times.
+pub fn is_inside<'a>(pieces: impl Iterator<Item = &'a Piece>, p: Point) -> bool {
+    let changes = |piece: &Piece| u8::from(crosses_ray(piece, p)) + u8::from(is_in_segment(piece, p));
+    pieces.map(changes).fold(0, |sum: u8, next| sum ^ (next & 1)) == 1
+}
+
 /// Whether the chord of a piece crosses the ray from `p` to the right.
 fn crosses_ray(piece: &Piece, [x, y]: Point) -> bool {
     let ([ax, ay], [bx, by]) = (piece.from, piece.to);
@@ -432,6 +453,7 @@ fn ring_of(shape: &Shape) -> Vec<Piece> {
         Shape::Rectangle { min, max } => edges(&[*min, [max[0], min[1]], *max, [min[0], max[1]]]),
         Shape::Disc { centre, radius } => vec![Piece::arc(*centre, *radius, 0.0, TAU)],
         Shape::Polygon { vertices } => edges(vertices),
+        Shape::Path { pieces } => counter_clockwise(pieces.clone()),
         Shape::Specimen(specimen) => profile(specimen),
         Shape::WithHoles { body, .. } => ring_of(body),
     }

@@ -1,5 +1,6 @@
 //! Regions of the plane from which a body is cut (the paper's samples and ASTM specimens).
 
+use super::outline::{Piece, is_inside};
 use super::specimen::Specimen;
 
 /// A solid region \[length, world frame\]; its boundary belongs to it, within the tolerance given to
@@ -17,6 +18,10 @@ pub enum Shape {
     /// Vertices in order, either way round; the last joins the first.
     Polygon {
         vertices: Vec<[f64; 2]>,
+    },
+    /// Edges and arcs, each beginning where the one before ends, in a closed loop either way round.
+    Path {
+        pieces: Vec<Piece>,
     },
     Specimen(Specimen),
     /// The first shape without the others, whose boundaries stay with the body.
@@ -37,6 +42,7 @@ impl Shape {
                 (point[0] - centre[0]).hypot(point[1] - centre[1]) <= radius + tolerance
             }
             Shape::Polygon { vertices } => polygon_contains(vertices, point, tolerance),
+            Shape::Path { pieces } => path_contains(pieces, point, tolerance),
             Shape::Specimen(specimen) => specimen.contains(point, tolerance),
             Shape::WithHoles { body, holes } => {
                 body.contains(point, tolerance) && !holes.iter().any(|hole| hole.contains(point, -tolerance))
@@ -54,6 +60,12 @@ impl Shape {
                     ([low[0].min(v[0]), low[1].min(v[1])], [high[0].max(v[0]), high[1].max(v[1])])
                 })
             }
+            Shape::Path { pieces } => pieces
+                .iter()
+                .map(Piece::bounds)
+                .fold(([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]), |(low, high), (l, h)| {
+                    ([0, 1].map(|k| l[k].min(low[k])), [0, 1].map(|k| h[k].max(high[k])))
+                }),
             Shape::Specimen(specimen) => specimen.bounds(),
             Shape::WithHoles { body, .. } => body.bounds(),
         }
@@ -85,6 +97,17 @@ fn polygon_contains(vertices: &[[f64; 2]], [x, y]: [f64; 2], tolerance: f64) -> 
         }
         nearest = nearest.min(segment_distance([x, y], [ax, ay], [bx, by]));
     }
+    if tolerance >= 0.0 { inside || nearest <= tolerance } else { inside && nearest > -tolerance }
+}
+
+/// As [`polygon_contains`], with arcs as they are.
+fn path_contains(pieces: &[Piece], [x, y]: [f64; 2], tolerance: f64) -> bool {
+    let inside = is_inside(pieces.iter(), [x, y]);
+    let away = |piece: &Piece| {
+        let [px, py] = piece.point(piece.nearest([x, y]));
+        (px - x).hypot(py - y)
+    };
+    let nearest = pieces.iter().map(away).fold(f64::INFINITY, f64::min);
     if tolerance >= 0.0 { inside || nearest <= tolerance } else { inside && nearest > -tolerance }
 }
 

@@ -1,7 +1,7 @@
 //! The cells between the particles of a body: what the material fills.
 //!
-//! A square or rectangular lattice has rectangles, a hexagonal, centred rectangular or oblique one the
-//! two triangles of its Delaunay tessellation, the honeycomb its hexagons. A cell exists where all its
+//! A square or rectangular lattice has rectangles, a centred rectangular one rhombs, an oblique one parallelograms, a
+//! hexagonal one triangles, the honeycomb its hexagons. A cell exists where all its
 //! corners are particles of the body; the frame, which stands for the world outside, has no cells.
 
 use std::sync::Arc;
@@ -9,7 +9,7 @@ use std::sync::Arc;
 use nalgebra::DMatrix;
 
 use crate::flock::body::Body;
-use crate::flock::lattice::{Lattice, LatticeKind, Site};
+use crate::flock::lattice::{Lattice, LatticeKind, Site, ring};
 use crate::flock::neighbourhood::{Neighbourhood, Neighbours};
 use crate::flock::points::Points;
 
@@ -307,23 +307,48 @@ pub fn without_loose_sites(body: &Body, neighbours: &Neighbours) -> (Body, Neigh
 
 /// The neighbourhood that a material needs: everybody with whom a particle shares a cell.
 pub fn neighbourhood(lattice: &Lattice) -> Neighbourhood {
-    match lattice.kind() {
-        LatticeKind::Square { .. } | LatticeKind::Rectangular { .. } => Neighbourhood::Ring { radius: 1 },
-        LatticeKind::Honeycomb { spacing } => Neighbourhood::Within { radius: 2.0 * spacing },
-        _ => Neighbourhood::First { keep: None },
-    }
+    cells_away(lattice, 1)
 }
 
 /// The neighbourhood that this material needs: [`neighbourhood`], and the mates of those as well where dilatations are
 /// averaged over cells ([`Elastic::averaged_dilatation`]).
 pub fn neighbourhood_of(lattice: &Lattice, elastic: &Elastic) -> Neighbourhood {
-    match lattice.kind() {
-        _ if elastic.averaged_dilatation().is_none() => neighbourhood(lattice),
-        LatticeKind::Square { .. } | LatticeKind::Rectangular { .. } => Neighbourhood::Ring { radius: 2 },
+    cells_away(lattice, if elastic.averaged_dilatation().is_some() { 2 } else { 1 })
+}
+
+/// Those that are one cell away, or two.
+fn cells_away(lattice: &Lattice, cells: i32) -> Neighbourhood {
+    match (lattice.kind(), cells) {
+        (LatticeKind::Square { .. } | LatticeKind::Rectangular { .. }, _) => {
+            Neighbourhood::Ring { radius: cells }
+        }
+        (LatticeKind::Honeycomb { spacing }, 1) => Neighbourhood::Within { radius: 2.0 * spacing },
         // The farthest are sqrt(13) spacings away, those after them 4.
-        LatticeKind::Honeycomb { spacing } => Neighbourhood::Within { radius: 3.7 * spacing },
-        _ => Neighbourhood::Second,
+        (LatticeKind::Honeycomb { spacing }, _) => Neighbourhood::Within { radius: 3.7 * spacing },
+        (LatticeKind::Hexagonal { .. }, 1) => Neighbourhood::First { keep: None },
+        (LatticeKind::Hexagonal { .. }, _) => Neighbourhood::Second,
+        (LatticeKind::CentredRectangular { .. } | LatticeKind::Oblique { .. }, _) => {
+            let mut offsets = ring(&shortest_translations(lattice), cells);
+            lattice.sort_nearest_first(&mut offsets);
+            Neighbourhood::Offsets(offsets)
+        }
     }
+}
+
+/// Two translations of the lattice that span its cells, as short as can be; the shorter first.
+fn shortest_translations(lattice: &Lattice) -> [Site; 2] {
+    let near = lattice.first_neighbours(0);
+    let length = |&site: &Site| {
+        let [x, y] = lattice.vector(site);
+        x.hypot(y)
+    };
+    // Opposite neighbours come in pairs, nearest first; on a rhombic lattice its sides, not the diagonal, span a cell.
+    let mut pairs: Vec<Site> = near.iter().copied().filter(|site| *site > [0, 0]).collect();
+    pairs.sort_by(|a, b| length(a).total_cmp(&length(b)));
+    if let LatticeKind::CentredRectangular { .. } = lattice.kind() {
+        return [[1, -1], [1, 1]];
+    }
+    [pairs[0], pairs[1]]
 }
 
 /// The cells that belong to a site of sublattice 0: corners as offsets from that site, the site itself
@@ -338,7 +363,11 @@ pub fn templates(lattice: &Lattice) -> Vec<Vec<Site>> {
             let hexagon = [[2, 0], [1, 1], [-1, 1], [-2, 0], [-1, -1], [1, -1]];
             vec![hexagon.map(|[i, j]| [i - 2, j]).to_vec()]
         }
-        _ => {
+        LatticeKind::CentredRectangular { .. } | LatticeKind::Oblique { .. } => {
+            let [p, q] = shortest_translations(lattice);
+            vec![vec![[0, 0], p, [p[0] + q[0], p[1] + q[1]], q]]
+        }
+        LatticeKind::Hexagonal { .. } => {
             let mut around = lattice.first_neighbours(0);
             around.sort_by(|&a, &b| angle(lattice, a).total_cmp(&angle(lattice, b)));
             let triangle = |k: usize| vec![[0, 0], around[k], around[k + 1]];

@@ -11,6 +11,7 @@ pub mod points;
 pub mod raw;
 pub mod swarm;
 pub mod table;
+pub mod units;
 pub mod validate;
 
 use std::sync::Arc;
@@ -68,6 +69,8 @@ pub struct Scene {
     pub stop: Stop,
     /// How the equilibrium is found, where the scene is not stepped.
     pub equilibrium: Option<Equilibrium>,
+    /// In which parts loads and motions come, where the scene says so.
+    pub load_steps: Option<LoadSteps>,
     pub record: Record,
     document: Document,
 }
@@ -86,6 +89,14 @@ impl Scene {
     /// Whether the body was given as points instead of cut from a lattice.
     pub fn is_of_points(&self) -> bool {
         matches!(self.body, BodySource::Points(_))
+    }
+
+    /// What a run counts: `increment` where it solves one part of the load after the other, else `step`.
+    pub fn counts(&self) -> &'static str {
+        match self.load_steps {
+            Some(LoadSteps::Solved(_)) => "increment",
+            _ => "step",
+        }
     }
 
     /// The unit of length, for axes and tables.
@@ -222,6 +233,15 @@ pub struct Equilibrium {
     pub request: Request,
     /// Relative error of the followers' displacements that is asked for \[1\].
     pub accuracy: Option<f64>,
+}
+
+/// In which parts loads and leaders' motions come.
+#[derive(Clone, Debug, PartialEq)]
+pub enum LoadSteps {
+    /// Each part solved to equilibrium: parts of the whole, from 0 to 1, in their order \[1\].
+    Solved(Vec<f64>),
+    /// The loads grow over `ramp` steps of the sweep, or act from the first one on; a row is kept `every` so many.
+    Stepped { ramp: Option<usize>, every: usize },
 }
 
 /// What is kept of the run.

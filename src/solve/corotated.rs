@@ -86,9 +86,32 @@ pub fn choose(followers: usize, request: &Request) -> Result<(Solver, String), C
     Ok((solver, format!("{why}; once a step of Newton's method, until the rotations settle")))
 }
 
-/// The equilibrium with the particles that do not follow displaced by `way(1)` \[length\], shape \[count\];
-/// `way(part)` is where they are after that part of the way. `held_axes` are single components of followers that are
-/// held, shape \[count\]\[x, y\], or empty; `way` says where they are as well.
+/// How leaders and loads get to where they are.
+pub struct Way<'a> {
+    /// Where what is held is after a part of the whole way \[length\], shape \[count\]; as much of the
+    /// loads is then on the body.
+    pub held: &'a (dyn Fn(f64) -> Points + Sync),
+    /// The equilibrium to start from and the part that it belongs to; the reference and 0 where there is none.
+    pub start: Option<(&'a Points, f64)>,
+    /// The part to come to \[1\].
+    pub end: f64,
+}
+
+impl<'a> Way<'a> {
+    /// From the reference to the end.
+    pub fn whole(held: &'a (dyn Fn(f64) -> Points + Sync)) -> Self {
+        Self { held, start: None, end: 1.0 }
+    }
+
+    /// Part of the whole way after a part of this one.
+    fn part(&self, of_this: f64) -> f64 {
+        let start = self.start.map_or(0.0, |(_, part)| part);
+        if of_this == 1.0 { self.end } else { start + of_this * (self.end - start) }
+    }
+}
+
+/// The equilibrium at the end of the way. `held_axes` are single components of followers that are held, shape
+/// \[count\]\[x, y\], or empty; the way says where they are as well.
 ///
 /// # Errors
 /// As [`solve_linear`]; names the part of the way from which on the rotations do not settle.
@@ -97,7 +120,7 @@ pub fn solve(
     body: &Body,
     follows: Vec<bool>,
     held_axes: Vec<[bool; 2]>,
-    way: &(dyn Fn(f64) -> Points + Sync),
+    way: &Way<'_>,
     request: &Request,
 ) -> Result<Solved, CorotatedError> {
     let Weights::Matrix(weights) = &interaction.weights else {
@@ -121,7 +144,7 @@ pub fn solve(
         times: [Duration::ZERO; 2],
         last_step: f64::INFINITY,
     };
-    let displacement = if newton.size == 0.0 { way(1.0) } else { newton.go(tolerance)? };
+    let displacement = if newton.size == 0.0 { (way.held)(way.end) } else { newton.go(tolerance)? };
     let residuals = if newton.size == 0.0 { vec![0.0] } else { newton.residuals };
     let converged = residuals.last().is_some_and(|last| *last <= 2.0 * tolerance);
     // Where rounding has the last word, the last step is made of what it left.
@@ -146,7 +169,7 @@ struct Corotated<'a> {
     body: &'a Body,
     follows: Vec<bool>,
     held_axes: Vec<[bool; 2]>,
-    way: &'a (dyn Fn(f64) -> Points + Sync),
+    way: &'a Way<'a>,
     /// How a linear system is solved.
     step: Request,
 }
@@ -240,7 +263,7 @@ impl Corotated<'_> {
     /// The force at the start, all followers at zero and all cells in the axes of the reference.
     fn size(&self) -> f64 {
         let mut u = Points::zeros(self.follows.len());
-        self.hold(&mut u, &(self.way)(1.0));
+        self.hold(&mut u, &(self.way.held)(1.0));
         let followers = (0..u.len()).filter(|&i| self.follows[i]);
         let all: Points = followers
             .map(|i| {
@@ -291,12 +314,14 @@ struct Newton<'a> {
 
 impl Newton<'_> {
     fn go(&mut self, tolerance: f64) -> Result<Points, CorotatedError> {
-        let mut u = Points::zeros(self.rule.follows.len());
+        let way = self.rule.way;
+        let mut u =
+            way.start.map_or_else(|| Points::zeros(self.rule.follows.len()), |(start, _)| start.clone());
         let (mut done, mut stride) = (0.0, 1.0);
         while done < 1.0 {
             let part = f64::min(done + stride, 1.0);
             let goal = if part == 1.0 { tolerance } else { tolerance.max(ON_THE_WAY) };
-            match self.increment(&u, part, goal) {
+            match self.increment(&u, way.part(part), goal) {
                 Ok(Some(next)) => (u, done, stride) = (next, part, 2.0 * stride),
                 Ok(None) => stride = 0.5 * (part - done),
                 // What is wrong with the unstrained body is wrong with the scene.
@@ -305,7 +330,7 @@ impl Newton<'_> {
             }
             let solves = self.residuals.len() - 1;
             if done < 1.0 && (stride < LEAST_STRIDE || solves >= MOST_SOLVES) {
-                return Err(CorotatedError::Unsettled { part: done, solves });
+                return Err(CorotatedError::Unsettled { part: way.part(done), solves });
             }
         }
         Ok(u)
@@ -315,7 +340,7 @@ impl Newton<'_> {
     fn increment(&mut self, from: &Points, after: f64, goal: f64) -> Result<Option<Points>, CorotatedError> {
         let rule = self.rule;
         let mut u = from.clone();
-        let now = (rule.way)(after);
+        let now = (rule.way.held)(after);
         // The leaders' move is part of the first step, so that the followers go with them.
         let mut led: Points = u.iter().zip(now.iter()).map(|(here, there)| minus(there, here)).collect();
         let Some((mut locals, mut left)) = rule.forces(&u, after) else { return Ok(None) };

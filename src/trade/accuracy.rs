@@ -1,28 +1,33 @@
-//! The cheapest setting for an accuracy, found without a truth.
+//! The cheapest setting for an accuracy, measured against the truth of the scene's shape.
 //!
-//! What the studies show (`flockform trade`): the paper's rule ends at an error that no spacing removes, the
-//! material rule's falls with the spacing, and a solver's tolerance a hundredth of the accuracy is not seen
-//! in the result. The rule, the tolerance and the precision follow from that (see the scene's
-//! validation); what is left is the spacing. It is halved until two bodies agree: where the error falls with
-//! the power `p` of the spacing, that of the finer is their distance over `2^p - 1` (L. F. Richardson, 1911).
-
-use std::collections::HashMap;
+//! What the studies show (`flockform trade`): the paper's rule ends at an error that no spacing removes, the material
+//! rule's falls with the spacing. So the spacing is halved until the rule, solved as far as doubles go, is near enough
+//! to the truth; then the coarsest tolerance and, where they suffice, singles are taken that leave it so. Every error is
+//! that of a solved body, to which the truth's own is added: what is delivered is what was measured.
 
 use super::grid::{RuleChoice, body_overrides};
-use super::study::Load;
-use crate::compare::run::plan;
+use super::study::{Load, error_of};
+use crate::compare::run::{SceneTruth, plan_led_by, truth_of};
 use crate::continuum::equilibrium::settle;
 use crate::continuum::run::Outcome;
-use crate::flock::points::distance;
+use crate::fem::Effort;
 use crate::flock::role::Role;
+use crate::flock::rules::{Mean, Rotation};
 use crate::scene::raw::{RawMean, RawRegion};
 use crate::scene::{Scene, SceneError};
-
-/// A little below what corners of clamped ends let through; smooth bodies have 2.
-const ORDER: f64 = 1.5;
+use crate::solve::equilibrium::{Precision, Request};
 
 /// Halvings tried before giving up.
 const MOST_HALVINGS: u32 = 5;
+
+/// Bodies of more particles are not tried.
+const MOST_PARTICLES: usize = 400_000;
+
+/// Residual over load beyond which nothing of a solver's own error is left to see.
+const TIGHT: f64 = 1e-9;
+
+/// Of the accuracy, how much the truth's own error may use up.
+const OF_TRUTH: f64 = 0.05;
 
 /// A scene in the setting that was chosen.
 #[derive(Debug)]
@@ -37,7 +42,7 @@ pub struct Chosen {
 /// with more overrides.
 ///
 /// # Errors
-/// Names what keeps the scene from being refined, or how near it came.
+/// Names what keeps the scene from being refined or held against a truth, or how near it came.
 pub fn choose(scene: Scene, load: Load<'_>) -> Result<Chosen, SceneError> {
     let Some(accuracy) = scene.equilibrium.and_then(|asked| asked.accuracy) else {
         return Ok(Chosen { scene, words: String::new() });
@@ -46,55 +51,177 @@ pub fn choose(scene: Scene, load: Load<'_>) -> Result<Chosen, SceneError> {
         let words = format!("accuracy {} %: the paper's rule at the written spacing\n", 100.0 * accuracy);
         return Ok(Chosen { scene, words });
     }
-    let at = |part: f64| {
-        let scene = load(&body_overrides(&scene, RuleChoice::Material, part))?;
-        let settled = rest(&scene)?;
-        Ok::<_, SceneError>((scene, settled))
-    };
-    // A body too coarse to be one says nothing.
-    let mut coarse = at(2.0).ok().map(|(_, settled)| settled);
+    require_small_rotations(&scene)?;
     let mut nearest = f64::INFINITY;
+    let mut particles = 0;
     for halvings in 0..=MOST_HALVINGS {
         let part = 0.5f64.powi(halvings as i32);
         if halvings > 0 {
             require_refinable(&scene)?;
-        }
-        let (finer, settled) = at(part)?;
-        let apart = coarse.as_ref().and_then(|coarse| apart(coarse, &settled));
-        if let Some(apart) = apart {
-            nearest = apart / (2f64.powf(ORDER) - 1.0);
-            if nearest <= accuracy {
-                let words = words(&finer, accuracy, part, nearest);
-                return Ok(Chosen { scene: finer, words });
+            // Half the spacing is four times as many.
+            if 4 * particles > MOST_PARTICLES {
+                break;
             }
         }
-        coarse = Some(settled);
+        let body = Body::new(&scene, load, part, accuracy)?;
+        let solved =
+            body.solve(&[format!("equilibrium.tolerance={TIGHT:e}"), DOUBLES.into(), ANY_SOLVER.into()])?;
+        particles = solved.particles;
+        nearest = solved.error;
+        if nearest <= accuracy {
+            return body.cheapest(accuracy, solved.error);
+        }
     }
-    let message = if nearest.is_finite() {
-        format!(
-            "the estimated error is still {:.2} % after {MOST_HALVINGS} halvings of the spacing",
-            100.0 * nearest
-        )
-    } else {
-        "no two bodies have particles in the same places, so their error cannot be estimated".into()
-    };
+    let message = format!(
+        "the error is still {:.2} % at {particles} particles, after {MOST_HALVINGS} halvings of the spacing or as many as \
+         {MOST_PARTICLES} particles allow",
+        100.0 * nearest
+    );
     let help = "ask for less, write a smaller spacing, or leave the accuracy out and set the tolerance";
     Err(scene.refuse("equilibrium.accuracy", message, help))
 }
 
-fn words(scene: &Scene, accuracy: f64, part: f64, estimate: f64) -> String {
+const ANY_SOLVER: &str = "equilibrium.solver=\"auto\"";
+const DOUBLES: &str = "equilibrium.precision=\"f64\"";
+
+/// The scene at one spacing.
+struct Body<'a> {
+    load: Load<'a>,
+    overrides: Vec<String>,
+    part: f64,
+    /// As the scene's accuracy has it.
+    asked: Request,
+    /// Whether the scene leaves them open.
+    is_open: [bool; 2],
+    scene: Scene,
+    truth: SceneTruth,
+}
+
+/// A body at rest: how far it is from the truth, the truth's own error included \[1\].
+struct Solved {
+    scene: Scene,
+    error: f64,
+    converged: bool,
+    particles: usize,
+}
+
+impl<'a> Body<'a> {
+    fn new(scene: &Scene, load: Load<'a>, part: f64, accuracy: f64) -> Result<Self, SceneError> {
+        let overrides = body_overrides(scene, RuleChoice::Material, part);
+        let scene = load(&overrides)?;
+        let effort = Effort { target: (OF_TRUTH * accuracy).min(1e-3), ..Effort::default() };
+        let truth = truth_of(&scene, &effort)?;
+        let own = truth.truth.error().displacement;
+        if own > 0.5 * accuracy {
+            let message = format!(
+                "the truth itself is not known so well: on {} nodes the truth states an error of {:.4} % of its own, and where \
+                 single points hold or push a body it always will",
+                truth.truth.nodes(),
+                100.0 * own
+            );
+            let help = "hold and push edges instead of points, or ask for less";
+            return Err(scene.refuse("equilibrium.accuracy", message, help));
+        }
+        let asked = scene.equilibrium.map(|asked| asked.request).unwrap_or_default();
+        let raw = scene.raw.equilibrium.as_ref();
+        let is_open =
+            [raw.is_none_or(|raw| raw.tolerance.is_none()), raw.is_none_or(|raw| raw.precision.is_none())];
+        Ok(Self { load, overrides, part, asked, is_open, scene, truth })
+    }
+
+    /// Solves for this body with more overrides.
+    fn solve(&self, more: &[String]) -> Result<Solved, SceneError> {
+        let scene = (self.load)(&[&self.overrides, more].concat())?;
+        let request = scene.equilibrium.map(|asked| asked.request).unwrap_or_default();
+        let outcome: Outcome = settle(&scene, &request, plan_led_by(&scene, &self.truth.truth)?)?;
+        let own = self.truth.truth.error().displacement;
+        let follows = outcome.engine.roles().contains(&Role::Follower);
+        let error = match error_of(&outcome, &self.truth.truth) {
+            Some(error) => error + own,
+            // Without followers there is nothing to be wrong; else some are where the truth is not.
+            None => {
+                if follows {
+                    f64::INFINITY
+                } else {
+                    0.0
+                }
+            }
+        };
+        let converged = outcome.solved.as_ref().is_some_and(|solved| solved.converged);
+        Ok(Solved { scene, error, converged, particles: outcome.engine.body().count() })
+    }
+
+    /// The coarsest tolerance and precision that keep the accuracy and are reached.
+    fn cheapest(&self, accuracy: f64, best: f64) -> Result<Chosen, SceneError> {
+        let mut last = String::new();
+        for more in self.solver_settings() {
+            // Singles may fail where doubles do not.
+            let solved = match self.solve(&more) {
+                Ok(solved) => solved,
+                Err(error) => {
+                    last =
+                        error.problems().first().map_or_else(String::new, |problem| problem.message.clone());
+                    continue;
+                }
+            };
+            if solved.converged && solved.error <= accuracy {
+                let words = words(&solved, accuracy, self.part);
+                return Ok(Chosen { scene: solved.scene, words });
+            }
+            last = match solved.converged {
+                true => format!("the last one tried leaves {:.2} %", 100.0 * solved.error),
+                false => "the last one tried ends short of its tolerance".into(),
+            };
+        }
+        let message = format!(
+            "the spacing is fine enough ({:.2} %), but no tolerance and precision that the solver reaches keep it so: {last}",
+            100.0 * best
+        );
+        let help = "choose another solver, or leave solver, tolerance and precision out";
+        Err(self.scene.refuse("equilibrium.accuracy", message, help))
+    }
+
+    /// Tolerances and precisions as overrides, the cheapest first; what the scene writes stays.
+    fn solver_settings(&self) -> Vec<Vec<String>> {
+        let [tolerance_is_open, precision_is_open] = self.is_open;
+        let doubles: Vec<String> = if precision_is_open { vec![DOUBLES.into()] } else { Vec::new() };
+        let mut settings = Vec::new();
+        if self.asked.precision == Precision::F32 || !precision_is_open {
+            settings.push(Vec::new());
+        }
+        if precision_is_open {
+            settings.push(doubles.clone());
+        }
+        if tolerance_is_open {
+            let tighter = |factor: f64| {
+                format!("equilibrium.tolerance={:e}", (factor * self.asked.tolerance).max(TIGHT))
+            };
+            settings.extend([1e-2, 1e-4].map(|factor| [&doubles[..], &[tighter(factor)]].concat()));
+        }
+        settings
+    }
+}
+
+fn words(solved: &Solved, accuracy: f64, part: f64) -> String {
     let spacing = match part {
         1.0 => "the written spacing".to_owned(),
         _ => format!("{part} of the written spacing"),
     };
-    let request = scene.equilibrium.map(|asked| asked.request).unwrap_or_default();
+    let request = solved.scene.equilibrium.map(|asked| asked.request).unwrap_or_default();
     format!(
-        "accuracy {} %: material rule at {spacing} (estimated error {:.3} %), tolerance {:e}, {:?}\n",
+        "accuracy {} %: material rule at {spacing} (error {:.3} % against finite elements on the shape), tolerance {:e}, {:?}\n",
         100.0 * accuracy,
-        100.0 * estimate,
+        100.0 * solved.error,
         request.tolerance,
         request.precision
     )
+}
+
+/// The truth is of small rotations.
+fn require_small_rotations(scene: &Scene) -> Result<(), SceneError> {
+    let Mean::Material { rotation: Rotation::Corotated, .. } = scene.mean else { return Ok(()) };
+    let message = "an accuracy is held against elasticity at small rotations, and this rule is of large ones";
+    Err(scene.refuse("equilibrium.accuracy", message, "leave the accuracy out, or take rotation = \"small\""))
 }
 
 /// Ids name other particles in a finer body.
@@ -108,32 +235,4 @@ fn require_refinable(scene: &Scene) -> Result<(), SceneError> {
     };
     let message = "the accuracy takes a finer body, in which these ids are other particles";
     Err(scene.refuse(&key, message, "pick particles by place, write a smaller spacing, or ask for less"))
-}
-
-fn rest(scene: &Scene) -> Result<Outcome, SceneError> {
-    let request = scene.equilibrium.map(|asked| asked.request).unwrap_or_default();
-    settle(scene, &request, plan(scene)?)
-}
-
-/// Relative L2 distance of two bodies at the coarse one's followers that the fine one has too; `None` where
-/// it has less than half of them.
-fn apart(coarse: &Outcome, fine: &Outcome) -> Option<f64> {
-    let body = fine.engine.body();
-    let grain = 1e-3 * body.lattice.spacing();
-    let cell = |p: [f64; 2]| p.map(|v| (v / grain).round() as i64);
-    let places: HashMap<[i64; 2], usize> =
-        (0..body.count()).map(|i| (cell(body.reference.get(i)), i)).collect();
-    let reference = &coarse.engine.body().reference;
-    let followers = (0..reference.len()).filter(|&i| coarse.engine.roles()[i] == Role::Follower);
-    let (mut off, mut size, mut met, mut all) = (0.0, 0.0, 0usize, 0usize);
-    for i in followers {
-        all += 1;
-        let Some(&j) = places.get(&cell(reference.get(i))) else { continue };
-        let (u, v) = (coarse.engine.displacement(i), fine.engine.displacement(j));
-        off += distance(u, v).powi(2);
-        size += v[0] * v[0] + v[1] * v[1];
-        met += 1;
-    }
-    let enough = all > 0 && 2 * met >= all;
-    enough.then(|| if off == 0.0 { 0.0 } else { (off / size).sqrt() })
 }

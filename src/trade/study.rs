@@ -10,7 +10,8 @@ use crate::compare::run::{SceneTruth, plan_led_by, truth_of};
 use crate::compare::truth::Truth;
 use crate::continuum::equilibrium::settle;
 use crate::continuum::run::Outcome as RunOutcome;
-use crate::flock::points::distance;
+use crate::fem::Effort;
+use crate::flock::points::{Points, distance};
 use crate::flock::role::Role;
 use crate::scene::{Scene, SceneError};
 
@@ -50,6 +51,8 @@ pub struct Study {
     /// Nodes of the truth that errors are measured against, and the time it took \[s\].
     pub truth_nodes: usize,
     pub truth_seconds: f64,
+    /// Relative L2 error that the truth states of its own displacement \[1\]; `None` where it cannot.
+    pub truth_stated_error: Option<f64>,
     pub repeats: usize,
     pub points: Vec<Point>,
 }
@@ -67,8 +70,9 @@ pub fn run(load: Load<'_>, grid: &Grid, tell: &mut dyn FnMut(&Setting)) -> Resul
     let mut study = Study {
         name: scene.name.clone(),
         title: scene.raw.title.clone(),
-        truth_nodes: truth.truth.mesh().mesh().node_count(),
+        truth_nodes: truth.truth.nodes(),
         truth_seconds: truth.time.as_secs_f64(),
+        truth_stated_error: Some(truth.truth.error().displacement).filter(|error| error.is_finite()),
         repeats: grid.repeats,
         points: Vec::new(),
     };
@@ -107,11 +111,13 @@ fn finest_truth(load: Load<'_>, scene: &Scene, grid: &Grid) -> Result<SceneTruth
     let fits = |truth: &SceneTruth| truth.layout.body.count() <= grid.most_particles;
     for &spacing in spacings.iter().filter(|&&spacing| spacing <= 1.0) {
         let finer = load(&body_overrides(scene, RuleChoice::Material, spacing));
-        if let Some(truth) = finer.ok().and_then(|scene| truth_of(&scene, None).ok()).filter(fits) {
+        if let Some(truth) =
+            finer.ok().and_then(|scene| truth_of(&scene, &Effort::default()).ok()).filter(fits)
+        {
             return Ok(truth);
         }
     }
-    truth_of(scene, None)
+    truth_of(scene, &Effort::default())
 }
 
 fn refused(rule: RuleChoice, spacing: f64, error: &SceneError) -> Point {
@@ -157,18 +163,19 @@ fn measure(scene: &Scene, truth: &Truth, setting: Setting, particles: usize, rep
 }
 
 /// Relative L2 distance of the followers from where the truth has them; `None` where it has none of them.
-fn error_of(outcome: &RunOutcome, truth: &Truth) -> Option<f64> {
+pub(super) fn error_of(outcome: &RunOutcome, truth: &Truth) -> Option<f64> {
     let engine = &outcome.engine;
     let reference = &engine.body().reference;
     let followers = (0..reference.len()).filter(|&i| engine.roles()[i] == Role::Follower);
-    let places = followers.clone().map(|i| reference.get(i)).collect();
+    let places: Points = followers.clone().map(|i| reference.get(i)).collect();
     let known = truth.displacements_at(&places).ok()?;
     let (mut off, mut size) = (0.0, 0.0);
     for (i, t) in followers.zip(known.iter()) {
         off += distance(engine.displacement(i), t).powi(2);
         size += t[0] * t[0] + t[1] * t[1];
     }
-    Some((off / size).sqrt()).filter(|error| error.is_finite())
+    let error = if off == 0.0 { 0.0 } else { f64::sqrt(off / size) };
+    (places.len() > 0 && error.is_finite()).then_some(error)
 }
 
 /// Less than this is rounding, or luck.
@@ -206,7 +213,11 @@ const ASKED: [f64; 4] = [0.3, 0.1, 0.01, 0.001];
 impl fmt::Display for Study {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "{}: {} settings, {} runs each", self.title, self.points.len(), self.repeats)?;
-        writeln!(f, "truth: {} nodes, {:.3} s", self.truth_nodes, self.truth_seconds)?;
+        write!(f, "truth: {} nodes, {:.3} s", self.truth_nodes, self.truth_seconds)?;
+        match self.truth_stated_error {
+            Some(error) => writeln!(f, ", states an error of {:.1e} % of its own", 100.0 * error)?,
+            None => writeln!(f)?,
+        }
         for asked in ASKED {
             match self.cheapest(asked) {
                 Some(point) => writeln!(
@@ -260,6 +271,7 @@ mod tests {
             title: String::new(),
             truth_nodes: 1,
             truth_seconds: 0.0,
+            truth_stated_error: None,
             repeats: 1,
             points,
         };

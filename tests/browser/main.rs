@@ -181,7 +181,7 @@ fn a_swarms_report_shows_its_robots_where_robots_csv_has_them() {
 #[test]
 #[ignore = "needs Chromium, Node, playwright-core and axe-core: see tests/browser/main.rs"]
 fn a_comparison_shows_rule_and_truth_beside_each_other() {
-    let report = Report::of(&["compare", "beam-paper", "--refine", "2"]);
+    let report = Report::of(&["compare", "beam-paper", "--truth-error", "0.01"]);
     let seen = report.tour(&json!({ "hover": [40] }));
     assert_sound(&seen);
     assert_film_works(&seen, 4);

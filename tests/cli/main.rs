@@ -4,6 +4,7 @@ mod checkpoint;
 mod compare;
 mod install;
 mod material;
+mod measured;
 mod points;
 mod program;
 mod report;

@@ -15,7 +15,7 @@ fn every_command_with_an_outcome_leaves_a_report_unless_told_not_to() {
     let folder = temporary();
     for (words, stages, charts) in [
         (vec!["run", "tension"], 1, 3),
-        (vec!["compare", "beam", "--refine", "2"], 2, 0),
+        (vec!["compare", "beam", "--truth-error", "0.01"], 2, 0),
         (vec!["swarm", "square"], 1, 2),
         (vec!["trade", "beam", "--quick"], 0, 1),
         (vec!["stability", "tension", "--quick", "--no-extremes"], 0, 2),

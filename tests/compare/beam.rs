@@ -1,12 +1,13 @@
 //! The truth against the reference files.
 
 use std::path::Path;
-use std::time::Instant;
 
 use flockform::compare::measures::{Comparison, Sides};
-use flockform::compare::mesh::TruthMesh;
+use flockform::compare::run::{SceneTruth, truth_of};
+use flockform::fem::Effort;
 use flockform::flock::body::Body;
 use flockform::flock::points::Points;
+use flockform::scene::bundled;
 
 use crate::support::*;
 
@@ -30,24 +31,20 @@ fn reference(aspect: u32, body: &Body) -> Points {
 }
 
 /// Distance of the truth from the reference, by the measures of a comparison.
-fn distance_from_reference(aspect: u32, refine: Option<usize>) -> Comparison {
-    let (body, cells) = beam(aspect);
-    let refine = refine.unwrap_or_else(|| TruthMesh::default_refinement(&cells));
-    let start = Instant::now();
-    let truth = beam_truth(&body, &cells, refine);
-    let seconds = start.elapsed().as_secs_f64();
+fn distance_from_reference(name: &str, aspect: u32) -> Comparison {
+    let scene = bundled(name).expect("bundled").load(&[]).unwrap_or_else(|e| panic!("{e}"));
+    let SceneTruth { truth, layout, elastic, time } =
+        truth_of(&scene, &Effort::default()).unwrap_or_else(|e| panic!("{e}"));
+    let (body, cells) = (&layout.body, layout.cells.as_ref().expect("has cells"));
     let follows: Vec<bool> = body.reference.x.iter().map(|&x| x > 10.5).collect();
-    let sides = Sides {
-        cells: &cells,
-        elastic: &polypropylene(),
-        rule: &truth.displacement,
-        truth: &reference(aspect, &body),
-        follows: &follows,
-    };
+    let known = reference(aspect, body);
+    let sides =
+        Sides { cells, elastic: &elastic, rule: &truth.displacement, truth: &known, follows: &follows };
     let found = Comparison::of(&sides).expect("measures");
     println!(
-        "aspect {aspect}, refine {refine}, {} nodes: displacement {:.2e}, von Mises {:.2e}, energy {:.2e}, {seconds:.2} s",
-        truth.mesh().mesh().node_count(),
+        "aspect {aspect}, {} nodes, stated {:.1e}: displacement {:.2e}, von Mises {:.2e}, energy {:.2e}, {time:?}",
+        truth.nodes(),
+        truth.error().displacement,
         found.displacement_rel_l2,
         found.von_mises_rel_l2,
         found.energy_rel
@@ -58,21 +55,9 @@ fn distance_from_reference(aspect: u32, refine: Option<usize>) -> Comparison {
 #[test]
 #[ignore = "needs ../shared/reference"]
 fn the_truth_of_the_beam_is_that_of_the_reference() {
-    for aspect in [1, 5, 10] {
-        let found = distance_from_reference(aspect, None);
+    for (name, aspect) in [("beam-loaded", 1), ("beam-5", 5), ("beam-10", 10)] {
+        let found = distance_from_reference(name, aspect);
         assert!(found.displacement_rel_l2 < 5e-4 && found.von_mises_rel_l2 < 1e-3, "{aspect}: {found}");
-    }
-}
-
-#[test]
-#[ignore = "prints a table for choosing the default refinement; needs ../shared/reference"]
-fn the_truth_of_the_beam_by_refinement() {
-    for refine in [1, 2, 3, 4, 6, 8, 12, 16] {
-        distance_from_reference(1, Some(refine));
-    }
-    for refine in [1, 2, 3, 4, 6] {
-        distance_from_reference(5, Some(refine));
-        distance_from_reference(10, Some(refine));
     }
 }
 
@@ -99,8 +84,8 @@ fn the_material_rule_led_by_the_truth_is_within_half_a_percent_of_it() {
         let found = errors(name, &[]);
         assert!(found[0] < displacement && found[1] < von_mises, "{name}: {found:?}");
     }
-    assert_errors("beam", &[], [0.0038, 0.0192], 3e-4);
-    assert_errors("beam-hexagonal", &[], [0.0093, 0.040], 1e-3);
+    assert_errors("beam", &[], [0.0039, 0.0197], 3e-4);
+    assert_errors("beam-hexagonal", &[], [0.0039, 0.0239], 1e-3);
 }
 
 #[test]
@@ -115,8 +100,8 @@ fn the_papers_rule_has_its_large_errors_whatever_the_neighbours() {
     assert_errors("beam-paper-ring", &[], [0.264, 0.76], 0.01);
     assert_errors("beam-paper-second", &[], [0.264, 0.75], 0.01);
     assert_errors("beam-paper-reduced", &[], [0.437, 1.450], 0.01);
-    assert_errors("beam-paper-hexagonal", &[], [0.259, 0.758], 0.01);
-    assert_errors("beam-paper-hexagonal-reduced", &[], [0.259, 0.725], 0.01);
+    assert_errors("beam-paper-hexagonal", &[], [0.235, 0.799], 0.01);
+    assert_errors("beam-paper-hexagonal-reduced", &[], [0.237, 0.770], 0.01);
     for (name, von_mises) in [("beam-paper-5", 5.85), ("beam-paper-10", 12.37)] {
         let found = errors(name, &[]);
         assert!((found[1] - von_mises).abs() < 0.01, "{name}: {found:?}");

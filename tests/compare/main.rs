@@ -2,7 +2,6 @@
 
 mod beam;
 mod measured;
-mod mesh;
 #[cfg(feature = "export")]
 mod outputs;
 mod refusals;

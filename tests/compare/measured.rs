@@ -103,7 +103,7 @@ fn the_table_names_every_measure_and_json_has_the_six_keys() {
     let found = compare(&cells, &scaled(&truth, 1.1), &truth, &vec![true; body.count()]);
     let table = found.to_string();
     assert!(table.contains("displacement, relative L2    10.000 %"), "{table}");
-    assert_eq!(table.lines().count(), 8);
+    assert_eq!(table.lines().count(), 12);
     let json = serde_json::to_value(found).expect("numbers");
     for key in [
         "displacement_rel_l2",

@@ -3,13 +3,12 @@
 use std::ops::ControlFlow;
 
 use flockform::compare::run::{Compared, compare};
-use flockform::compare::truth::{Setting, Truth};
+use flockform::fem::Effort;
 use flockform::flock::body::{Body, Cut};
 use flockform::flock::lattice::{Lattice, LatticeKind};
 use flockform::flock::points::Points;
 use flockform::material::cells::{Cells, neighbourhood, without_loose_sites};
 use flockform::material::elastic::{Constants, Elastic, Plane};
-use flockform::material::loads::{Loads, Traction};
 use flockform::scene::bundled;
 
 pub const KINDS: [LatticeKind; 6] = [
@@ -44,48 +43,14 @@ pub fn sample(kind: LatticeKind) -> (Body, Cells) {
     build(Lattice::new(kind, [3.0, -2.0], 0.3), 7, 7)
 }
 
-/// The body of the paper's beam: 12 points over its depth, unit spacing, from 10 to 21.
-pub fn beam(aspect: u32) -> (Body, Cells) {
-    build(Lattice::new(KINDS[0], [10.0, 10.0], 0.0), 11 * aspect + 1, 12)
-}
-
-/// Particles on a free side.
-pub fn on_boundary(cells: &Cells, count: usize) -> Vec<bool> {
-    let mut boundary = vec![false; count];
-    for [a, b] in cells.boundary_sides(&cells.incidence(count)) {
-        (boundary[a as usize], boundary[b as usize]) = (true, true);
-    }
-    boundary
-}
-
 pub fn largest_difference(a: &Points, b: &Points) -> f64 {
     a.iter().zip(b.iter()).map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1])).fold(0.0, f64::max)
-}
-
-pub fn polypropylene() -> Elastic {
-    let constants = Constants::Isotropic { young: 1000.0, poisson: 0.33, plane: Plane::Stress };
-    Elastic::new(constants, 1.0).expect("admissible")
-}
-
-/// The paper's beam: the left column clamped, 50 per length upwards on the right.
-pub fn beam_truth(body: &Body, cells: &Cells, refine: usize) -> Truth {
-    let (low, high) = body.bounds();
-    let x = |i: u32| body.reference.x[i as usize];
-    let held: Vec<Option<[f64; 2]>> =
-        body.reference.x.iter().map(|&x| (x == low[0]).then_some([0.0; 2])).collect();
-    let sides = cells.boundary_sides(&cells.incidence(body.count()));
-    let end = sides.into_iter().filter(|&[a, b]| x(a) == high[0] && x(b) == high[0]);
-    let tractions = end.map(|side| Traction::uniform(side, [0.0, 50.0])).collect();
-    let loads = Loads { tractions, ..Loads::default() };
-    let elastic = polypropylene();
-    let setting =
-        Setting { cells, reference: &body.reference, elastic: &elastic, held: &held, loads: &loads };
-    Truth::solve(&setting, refine).expect("solves")
 }
 
 /// What the rule of a bundled scene makes of its body, with changes.
 pub fn compared(name: &str, overrides: &[&str]) -> Compared {
     let overrides: Vec<String> = overrides.iter().map(|&text| text.into()).collect();
     let scene = bundled(name).expect("bundled").load(&overrides).unwrap_or_else(|e| panic!("{e}"));
-    compare(&scene, Some(4), &mut |_, _| ControlFlow::Continue(())).unwrap_or_else(|e| panic!("{e}"))
+    compare(&scene, &Effort::default(), &mut |_, _| ControlFlow::Continue(()))
+        .unwrap_or_else(|e| panic!("{e}"))
 }

@@ -101,7 +101,7 @@ impl Beam {
             &self.body,
             self.follows.clone(),
             self.held_axes.clone(),
-            &way,
+            &corotated::Way::whole(&way),
             &request,
         )
         .unwrap_or_else(|error| panic!("{error}"))

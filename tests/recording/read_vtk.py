@@ -5,6 +5,7 @@ against final.csv.
 """
 
 import csv
+import json
 import math
 import sys
 import xml.etree.ElementTree as xml
@@ -37,6 +38,10 @@ def hold(rows, points, data, where):
             same(data[name][i], number(row[name]), f"{where}, {name} of {i + 1}")
         for k, name in enumerate(("strain_xx", "strain_yy", "strain_xy")):
             same(data["strain"][i][k], number(row[name]), f"{where}, {name} of {i + 1}")
+        if "von_mises" in row:
+            same(data["von_mises"][i], number(row["von_mises"]), f"{where}, von_mises of {i + 1}")
+            for k, name in enumerate(("stress_xx", "stress_yy", "stress_xy")):
+                same(data["stress"][i][k], number(row[name]), f"{where}, {name} of {i + 1}")
 
 
 def main(folder):
@@ -46,18 +51,28 @@ def main(folder):
     last = folder / frames[-1].get("file")
     mesh = meshio.read(last)
     hold(rows, mesh.points, mesh.point_data, "meshio")
-    states = {block.type: mesh.cell_data["broken"][k] for k, block in enumerate(mesh.cells)}
-    assert len(states["vertex"]) == len(rows)
+    kinds = {kind: [k for k, block in enumerate(mesh.cells) if block.type == kind] for kind in ("vertex", "line")}
+    lines = sum(len(mesh.cells[k].data) for k in kinds["line"])
+    polygons = [k for k in range(len(mesh.cells)) if k not in kinds["vertex"] + kinds["line"]]
+    if kinds["vertex"] or not polygons:
+        assert sum(len(mesh.cells[k].data) for k in kinds["vertex"]) == len(rows)
     breaks = folder / "breaks.csv"
     broken = len(list(csv.DictReader(breaks.open()))) if breaks.exists() else 0
-    assert int(sum(states["line"])) == broken, (sum(states["line"]), broken)
+    found = sum(int(mesh.cell_data["broken"][k].sum()) for k in kinds["line"])
+    assert found == broken, (found, broken)
+    if "von_mises" in mesh.cell_data:
+        assert polygons
+        # The largest of any cell is the one that the summary names.
+        peak = json.loads((folder / "summary.json").read_text())["mechanics"]["largest_von_mises"]["von_mises"]
+        same(max(float(mesh.cell_data["von_mises"][k].max()) for k in polygons), peak, "largest von Mises stress")
     if "stress" in mesh.point_data:
         # sqrt(xx^2 - xx yy + yy^2 + 3 xy^2) in plane stress.
         for i, (xx, yy, xy) in enumerate(mesh.point_data["stress"]):
             expected = math.sqrt(xx * xx - xx * yy + yy * yy + 3 * xy * xy)
             found = float(mesh.point_data["von_mises"][i])
             assert math.isclose(found, expected, rel_tol=1e-12) or math.isnan(expected), (i, found, expected)
-    words = f"{len(frames)} frames, {len(rows)} points, {len(states['line'])} bonds, {broken} broken"
+    cells = sum(len(mesh.cells[k].data) for k in polygons)
+    words = f"{len(frames)} frames, {len(rows)} points, {lines} bonds, {broken} broken, {cells} cells"
     try:
         import pyvista
     except ImportError:

@@ -34,12 +34,15 @@ impl Engine {
         let told =
             self.sweep.steps(&self.interaction, frame, places, (count, led, farther), &mut self.activity);
         self.step += count;
+        self.settled = None;
         told
     }
 
     /// Puts the body back to where it stood at an earlier step, with the same roles, as if it had not gone on.
     pub fn return_to(&mut self, step: usize, places: &Points, activity: Activity) {
         self.step = step;
+        self.settled = None;
+        self.follow_ramp();
         self.present.clone_from(places);
         self.activity = activity;
         self.activity.forget();

@@ -101,6 +101,7 @@ impl EngineState {
         let led =
             |Leading { particle, change, which, since, base }| Led { particle, change, which, since, base };
         engine.step = self.step;
+        engine.follow_ramp();
         engine.present = self.present;
         engine.previous = self.previous;
         engine.roles = self.roles;
@@ -154,7 +155,8 @@ impl Engine {
 /// FNV-1a (G. Fowler, L. C. Noll, K.-P. Vo). Not secure against forgery.
 pub fn digest(plan: &Plan) -> u64 {
     let mut digest = Fnv(0xcbf2_9ce4_8422_2325);
-    let Plan { body, interaction, update, present_radius, roles, changes, cuts, stop, probes, .. } = plan;
+    let Plan { body, interaction, update, present_radius, roles, changes, cuts, stop, probes, ramp, .. } =
+        plan;
     digest.points(&body.reference);
     digest.text(&format!("{update:?} {present_radius:?} {stop:?} {:?} {cuts:?}", interaction.rule));
     roles.iter().for_each(|role| digest.text(role.name()));
@@ -169,6 +171,9 @@ pub fn digest(plan: &Plan) -> u64 {
         }
     }
     interaction.forces.iter().chain(&interaction.rest).for_each(|points| digest.points(points));
+    if let Some(ramp) = ramp {
+        digest.text(&format!("ramp {ramp}"));
+    }
     if let Some(bonds) = &interaction.bonds {
         digest.text(&format!("{:?} {:?}", bonds.threshold, bonds.ghosts));
     }
@@ -274,6 +279,22 @@ mod tests {
         // Without a frame only what moves is swept, and what is known of that comes back too.
         let free = ["frame=none", "record.probes=[]", "stop.steps=45"];
         continues_to_the_same_end("tension", &free, &[0, 1, 7, 20, 21, 45]);
+    }
+
+    #[test]
+    fn a_load_that_grows_goes_on_growing() {
+        let growing = [
+            "frame=none",
+            "neighbours={kind=\"cells\"}",
+            "material={kind=\"isotropic\",young=1000.0,poisson=0.33}",
+            "rule={mean={kind=\"material\"}}",
+            "roles=[{region={kind=\"edge\",side=\"left\"},role=\"clamped\"}]",
+            "loads=[{kind=\"body\",force=[0.0,-1.0]}]",
+            "record={}",
+            "stop.steps=60",
+            "load_steps={ramp={steps=40}}",
+        ];
+        continues_to_the_same_end("tension", &growing, &[0, 1, 39, 40, 60]);
     }
 
     #[test]

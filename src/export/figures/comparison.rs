@@ -65,20 +65,9 @@ pub fn overlay(pair: &Pair<'_>) -> String {
 }
 
 impl Pair<'_> {
-    /// Times what displacements are drawn: 1, or 1, 2, 5 times a power of ten for those too small to be
-    /// seen and those so large that the body would be lost beside them.
+    /// See [`enlargement`].
     pub(super) fn factor(&self) -> f64 {
-        let size = |u: [f64; 2]| u[0].hypot(u[1]);
-        let largest =
-            self.drawn().map(|i| size(self.truth.get(i))).filter(|u| u.is_finite()).fold(0.0, f64::max);
-        let (low, high) = self.reference.bounds(self.drawn()).unwrap_or_default();
-        let part = largest / (high[0] - low[0]).max(high[1] - low[1]);
-        if !part.is_normal() || (SEEN..=LOST).contains(&part) {
-            return 1.0;
-        }
-        let wanted = if part < SEEN { 4.0 * SEEN } else { 0.5 * LOST } / part;
-        let decade = 10f64.powf(wanted.log10().floor());
-        [5.0, 2.0].map(|m| m * decade).into_iter().find(|&factor| factor <= wanted).unwrap_or(decade)
+        enlargement(self.reference, self.truth, || self.drawn())
     }
 
     /// The particles that are matter: the frame and ghosts are no part of the truth.
@@ -107,6 +96,26 @@ impl Pair<'_> {
         let longest = (high[0] - low[0]).max(high[1] - low[1]);
         axes(low, high, (0.02 * longest).max(0.6 * self.spacing))
     }
+}
+
+/// Times what displacements are drawn: 1, or 1, 2, 5 times a power of ten for those too small to be
+/// seen and those so large that the body would be lost beside them.
+pub(super) fn enlargement<D: Iterator<Item = usize>>(
+    reference: &Points,
+    displacement: &Points,
+    drawn: impl Fn() -> D,
+) -> f64 {
+    let size = |u: [f64; 2]| u[0].hypot(u[1]);
+    let sizes = drawn().map(|i| size(displacement.get(i)));
+    let largest = sizes.filter(|u| u.is_finite()).fold(0.0, f64::max);
+    let (low, high) = reference.bounds(drawn()).unwrap_or_default();
+    let part = largest / (high[0] - low[0]).max(high[1] - low[1]);
+    if !part.is_normal() || (SEEN..=LOST).contains(&part) {
+        return 1.0;
+    }
+    let wanted = if part < SEEN { 4.0 * SEEN } else { 0.5 * LOST } / part;
+    let decade = 10f64.powf(wanted.log10().floor());
+    [5.0, 2.0].map(|m| m * decade).into_iter().find(|&factor| factor <= wanted).unwrap_or(decade)
 }
 
 /// How the note ends: times what displacements are drawn.

@@ -29,7 +29,7 @@ pub fn configuration(subject: &Subject<'_>, snapshot: &Snapshot) -> String {
     let is_raster = count > MOST_DOTS;
     let mut heading = Heading {
         title: subject.title.into(),
-        note: page::note(snapshot),
+        note: page::note(subject, snapshot),
         legend: legend(snapshot, is_raster),
     };
     if is_raster {

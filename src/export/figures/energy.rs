@@ -30,7 +30,7 @@ pub fn pe1(subject: &Subject<'_>, snapshot: &Snapshot) -> String {
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
     let bands = Bands::around(low, high, (NOISE_IN_SPACINGS * spacing).powi(2));
     let axes = page::window(&snapshot.positions, drawn.iter().copied(), spacing);
-    let note = format!("first pseudo-energy, {}", page::note(snapshot));
+    let note = format!("first pseudo-energy, {}", page::note(subject, snapshot));
     let mut heading = Heading { title: subject.title.into(), note, legend: Vec::new() };
     let is_raster = drawn.len() > MOST_DOTS;
     if is_raster {

@@ -1,7 +1,7 @@
 //! Figures: each is drawn once, as SVG, and its PNG is rendered from that very SVG.
 //!
 //! [`configuration()`]: the body at a step, in the paper's colours. [`pe1`]: filled contours of the first
-//! pseudo-energy over it. [`probes`]: the history of a few particles. [`overlay`] and [`von_mises()`]: what a
+//! pseudo-energy over it. [`stress()`]: the von Mises stress of its cells. [`probes`]: the history of a few particles. [`overlay`] and [`von_mises()`]: what a
 //! rule makes of a body beside the truth. Axes of bodies are equal, and every axis carries its unit. SVG is
 //! written directly: a figure here is circles, lines and paths, and what matters is where they go.
 
@@ -20,6 +20,7 @@ mod history;
 mod page;
 mod png;
 mod raster;
+mod stress;
 mod svg;
 mod ticks;
 mod von_mises;
@@ -36,6 +37,7 @@ pub use comparison::{Pair, overlay};
 pub use configuration::configuration;
 pub use energy::pe1;
 pub use history::probes;
+pub use stress::stress;
 pub use svg::INK;
 pub use von_mises::von_mises;
 
@@ -48,6 +50,8 @@ pub struct Subject<'a> {
     pub body: &'a Body,
     /// The bonds of the body; `None` where neighbours are found anew at every step.
     pub neighbours: Option<&'a Neighbours>,
+    /// What is counted on the way: `step` or `increment`.
+    pub counts: &'static str,
 }
 
 impl<'a> Subject<'a> {
@@ -57,6 +61,7 @@ impl<'a> Subject<'a> {
             unit: scene.unit(),
             body: engine.body(),
             neighbours: engine.lasting_neighbours(),
+            counts: scene.counts(),
         }
     }
 }
@@ -72,12 +77,36 @@ pub(super) fn render(svg: &str, width: u32) -> Result<Vec<u8>, String> {
     png::render(svg, width)
 }
 
+/// Which files a figure is written as.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Formats {
+    /// No figures at all.
+    None,
+    Png,
+    Svg,
+    #[default]
+    All,
+}
+
 /// Writes `PATH.svg` and `PATH.png`; `path` has no ending.
-pub fn write(svg: &str, path: &Path) -> Result<[PathBuf; 2], ExportError> {
-    let [svg_path, png_path] = ["svg", "png"].map(|ending| path.with_extension(ending));
-    write_file(&svg_path, svg)?;
-    let png = png::render(svg, PNG_WIDTH)
-        .map_err(|reason| ExportError::Figure { path: png_path.clone(), reason })?;
-    write_file(&png_path, png)?;
-    Ok([svg_path, png_path])
+pub fn write(svg: &str, path: &Path) -> Result<Vec<PathBuf>, ExportError> {
+    write_as(svg, path, Formats::All)
+}
+
+/// The same as these files alone.
+pub fn write_as(svg: &str, path: &Path, formats: Formats) -> Result<Vec<PathBuf>, ExportError> {
+    let mut written = Vec::new();
+    if matches!(formats, Formats::Svg | Formats::All) {
+        let path = path.with_extension("svg");
+        write_file(&path, svg)?;
+        written.push(path);
+    }
+    if matches!(formats, Formats::Png | Formats::All) {
+        let path = path.with_extension("png");
+        let png = png::render(svg, PNG_WIDTH)
+            .map_err(|reason| ExportError::Figure { path: path.clone(), reason })?;
+        write_file(&path, png)?;
+        written.push(path);
+    }
+    Ok(written)
 }

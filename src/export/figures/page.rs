@@ -1,5 +1,6 @@
 //! A sheet with one plot of the body on it.
 
+use super::Subject;
 use super::axes::{Axes, Measure};
 use super::heading::Heading;
 use super::svg::Svg;
@@ -40,13 +41,13 @@ pub fn window(positions: &Points, drawn: impl Iterator<Item = usize>, spacing: f
 }
 
 /// `step 20`, and how many bonds are broken.
-pub fn note(snapshot: &Snapshot) -> String {
+pub fn note(subject: &Subject<'_>, snapshot: &Snapshot) -> String {
     let broken = match snapshot.broken.len() {
         0 => String::new(),
         1 => ", 1 broken bond".into(),
         count => format!(", {count} broken bonds"),
     };
-    format!("step {}{broken}", snapshot.step)
+    format!("{} {}{broken}", subject.counts, snapshot.step)
 }
 
 /// Of a long line, what a sheet can show: the ends and extremes within each half pixel.

@@ -8,6 +8,8 @@ use super::svg::{Anchor, INK, Path, Svg, text_width};
 use super::ticks::Ticks;
 use crate::flock::points::Points;
 
+/// Name of the third panel and of its scale.
+const DIFFERENCE: &str = "|rule \u{2212} truth|";
 /// Shades of the colour bar: more than the eye tells apart.
 const SHADES: usize = 96;
 /// Stress above the scale: no colour of viridis.
@@ -25,8 +27,9 @@ const NAME_TEXT: f64 = 13.0;
 const TICK_TEXT: f64 = 12.0;
 const BAR_WIDTH: f64 = 16.0;
 const BAR_GAP: f64 = 20.0;
+const BETWEEN_BARS: f64 = 26.0;
 
-/// Rule, truth and the size of their difference at the centres of the cells, on one scale; `rule` and
+/// Rule and truth at the centres of the cells on one scale, and the size of their difference on its own; `rule` and
 /// `truth` are \[force / length^2\], shape \[cells\].
 pub fn von_mises(pair: &Pair<'_>, rule: &[f64], truth: &[f64]) -> String {
     let factor = pair.factor();
@@ -35,9 +38,9 @@ pub fn von_mises(pair: &Pair<'_>, rule: &[f64], truth: &[f64]) -> String {
     let panels = [
         Panel { name: "rule", stress: rule, places: &by_rule },
         Panel { name: "truth", stress: truth, places: &in_truth },
-        Panel { name: "|rule \u{2212} truth|", stress: &apart, places: &in_truth },
+        Panel { name: DIFFERENCE, stress: &apart, places: &in_truth },
     ];
-    let scale = Scale::of(rule, truth);
+    let scales = [Scale::of(rule, truth), Scale::of_difference(&apart)];
     let places = || [&by_rule, &in_truth];
     let row = pair.window(places(), |low, high, margin| Axes::fitted(low, high, margin, IN_ROW));
     let is_row = row.size[0] < 1.6 * row.size[1];
@@ -51,7 +54,7 @@ pub fn von_mises(pair: &Pair<'_>, rule: &[f64], truth: &[f64]) -> String {
         note: format!("von Mises stress at the centres of the cells{}", told(factor)),
         legend: Vec::new(),
     };
-    Sheet { axes, is_row, scale, heading }.draw(pair, &panels)
+    Sheet { axes, is_row, scales, heading }.draw(pair, &panels)
 }
 
 /// One body filled with one field.
@@ -64,6 +67,7 @@ struct Panel<'a> {
 
 /// From zero stress to the end of the scale.
 struct Scale {
+    name: &'static str,
     end: f64,
     /// The largest stress, if it lies above the end.
     above: Option<f64>,
@@ -76,12 +80,18 @@ impl Scale {
         let (by_rule, in_truth) = (largest(rule), largest(truth));
         let end = if in_truth == 0.0 { by_rule } else { by_rule.min(HEADROOM * in_truth).max(in_truth) };
         let end = if end > 0.0 { end } else { 1.0 };
-        // The difference, no larger than the larger of the two, keeps to what they keep to.
         Self {
+            name: "von Mises stress",
             end,
             above: Some(by_rule).filter(|&largest| largest > end),
             ticks: Ticks::within(0.0, end, 10.0),
         }
+    }
+
+    fn of_difference(apart: &[f64]) -> Self {
+        let largest = apart.iter().copied().filter(|s| s.is_finite()).fold(0.0, f64::max);
+        let end = if largest > 0.0 { largest } else { 1.0 };
+        Self { name: DIFFERENCE, end, above: None, ticks: Ticks::within(0.0, end, 5.0) }
     }
 
     fn shade(&self, stress: f64) -> usize {
@@ -131,16 +141,16 @@ impl Scale {
             svg.text([text, y], Anchor::Start, TICK_TEXT, INK, &self.ticks.label(value));
         }
         let name_x = text + self.widest_label() + 16.0;
-        let name = self.ticks.axis_name("von Mises stress", unit);
+        let name = self.ticks.axis_name(self.name, unit);
         svg.upward_text([name_x, top + height / 2.0], NAME_TEXT, &name);
     }
 }
 
-/// Three panels in a row or stacked, one bar beside them.
+/// Three panels in a row or stacked; beside them the bar of the first two, and below it that of the third.
 struct Sheet {
     axes: Axes,
     is_row: bool,
-    scale: Scale,
+    scales: [Scale; 2],
     heading: Heading,
 }
 
@@ -150,7 +160,7 @@ impl Sheet {
         let [width, height] = self.axes.size;
         let step = if self.is_row { [width + GAP, 0.0] } else { [0.0, height + NAME + 8.0] };
         let block = [width + 2.0 * step[0], height + 2.0 * step[1]];
-        let sheet_width = left + block[0] + self.scale.room();
+        let sheet_width = left + block[0] + self.scales[0].room().max(self.scales[1].room());
         let top = self.heading.height(sheet_width) + NAME - 4.0;
         let mut svg = Svg::new(sheet_width, top + block[1] + Axes::BELOW);
         self.heading.draw(&mut svg, sheet_width);
@@ -158,8 +168,13 @@ impl Sheet {
             self.axes.corner = [left + n as f64 * step[0], top + n as f64 * step[1]];
             self.draw_panel(&mut svg, pair, panel, n);
         }
+        // Stacked panels are three, the last of them the difference.
+        let share = if self.is_row { 0.5 } else { 2.0 / 3.0 };
+        let first = share * (block[1] + BETWEEN_BARS) - BETWEEN_BARS;
         let bar = [left + block[0] + BAR_GAP, top];
-        self.scale.draw(&mut svg, bar, block[1], pair.stress_unit);
+        self.scales[0].draw(&mut svg, bar, first, pair.stress_unit);
+        let below = [bar[0], top + first + BETWEEN_BARS];
+        self.scales[1].draw(&mut svg, below, block[1] - first - BETWEEN_BARS, pair.stress_unit);
         svg.finish()
     }
 
@@ -172,7 +187,7 @@ impl Sheet {
             let corners: Vec<[f64; 2]> =
                 cell.iter().map(|&i| axes.place(panel.places.get(i as usize))).collect();
             if stress.is_finite() && corners.iter().flatten().all(|value| value.is_finite()) {
-                paths[self.scale.shade(stress)].polygon(corners);
+                paths[self.scales[usize::from(number == 2)].shade(stress)].polygon(corners);
             }
         }
         // A hairline of its own colour around each cell covers the seams between cells.

@@ -12,6 +12,7 @@ use super::stage::{Clock, Film, Quantity, Stage};
 use crate::compare::run::Compared;
 use crate::flock::points::Points;
 use crate::scene::Scene;
+use crate::scene::units::Units;
 
 /// Frames on the way from no displacement to all of it.
 const FRAMES: usize = 20;
@@ -81,7 +82,7 @@ fn stage(
         clock: Clock { quantity: "displacement", unit: "%" },
         spacing: engine.body().lattice.spacing(),
         quantities: vec![
-            Quantity::new("von_mises", "von Mises stress", format!("force/{unit}²")),
+            Quantity::new("von_mises", "von Mises stress", Units::of(scene).stress),
             Quantity::new("error", "error: distance of rule and truth", unit),
         ],
         linear: true,
@@ -128,10 +129,14 @@ fn facts(scene: &Scene, report: &ComparisonReport) -> Vec<(String, String)> {
         ("Rule".into(), format!("by {way}: {}", rule.stop_reason)),
         (
             "Truth".into(),
-            format!(
-                "finite elements, {} nodes, each side of a cell in {} parts",
-                report.truth.nodes, report.truth.refine
-            ),
+            match report.truth.stated_error {
+                Some(error) => format!(
+                    "finite elements on the shape, {} nodes, own error {} %",
+                    report.truth.nodes,
+                    number(100.0 * error)
+                ),
+                None => format!("finite elements on the shape, {} nodes", report.truth.nodes),
+            },
         ),
         (
             "Compared".into(),
@@ -148,8 +153,13 @@ fn facts(scene: &Scene, report: &ComparisonReport) -> Vec<(String, String)> {
 fn measures(report: &ComparisonReport) -> Table {
     let c = &report.comparison;
     let percent = |part: f64| format!("{} %", number(100.0 * part));
+    let part = |part: Option<f64>| part.map_or("not told".to_owned(), percent);
     let rows = [
         ("Displacement, relative L2", percent(c.displacement_rel_l2)),
+        ("… of which discretisation", part(c.parts.discretisation)),
+        ("… of which outline of the cells", part(c.parts.outline)),
+        ("… of which solver", part(c.parts.solver)),
+        ("The truth's own error, stated", part(c.truth_stated_rel_l2)),
         ("Displacement, largest error over the largest", percent(c.displacement_max_rel)),
         ("Von Mises stress, relative L2", percent(c.von_mises_rel_l2)),
         ("Energy norm of the error", percent(c.energy_rel)),

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::super::bonds::listed_once;
 use super::super::error::ExportError;
 use super::super::figures::SERIES;
+use super::super::load;
 use super::super::{OutputFolder, Results, Summary};
 use super::encoded;
 use super::frames::{Channel, Frame, Frames, MOST_FRAMES};
@@ -16,6 +17,7 @@ use super::page::{Page, number, scene_text};
 use super::plot::{self, Plot, PlotAxis, PlotSeries};
 use super::stage::{self, Clock, Film, Quantity, Stage, Stress};
 use crate::continuum::engine::Engine;
+use crate::continuum::mechanics::Stresses;
 use crate::continuum::record::Snapshot;
 use crate::continuum::run::{Outcome, StopReason};
 use crate::continuum::stored;
@@ -24,7 +26,9 @@ use crate::flock::rules::{Mean, Rotation};
 use crate::flock::strain::Strain;
 use crate::material::cells::Cells;
 use crate::material::elastic::{Constants, Elastic, Plane};
+use crate::material::stress::StressState;
 use crate::scene::Scene;
+use crate::scene::units::Units;
 
 /// Up to so many particles everything has the bits from which the strains of a body that turns far are still
 /// exact; larger bodies have those that a screen can show.
@@ -117,10 +121,9 @@ impl RunRecorder {
         self.frames.next(step)
     }
 
-    /// The frame of the end, which is exact whatever its step; of a body that was solved for, the way there.
-    fn finish(&mut self, outcome: &Outcome) {
-        let engine = &outcome.engine;
-        if outcome.solved.is_some() {
+    /// The frame of the end, which is exact whatever its step; of a body that was solved for at once, the way there.
+    fn finish(&mut self, engine: &Engine, is_solved: bool) {
+        if is_solved {
             self.frames = Frames::new(self.frames.count, self.frames.channels.clone());
             for frame in 0..=LOAD_FRAMES {
                 self.take(engine, frame as f64 / LOAD_FRAMES as f64);
@@ -167,9 +170,9 @@ impl RunRecorder {
 
     /// The film of the run.
     pub fn stage(mut self, scene: &Scene, outcome: &Outcome) -> Stage {
-        self.finish(outcome);
         let engine = &outcome.engine;
-        let is_solved = outcome.solved.is_some();
+        let is_solved = is_solved_at_once(scene, outcome);
+        self.finish(engine, is_solved);
         let mut stage = Stage::new(film(scene, engine, is_solved));
         stage.set_reference(&engine.body().reference);
         stage.set_roles(&self.first_roles, &self.changes);
@@ -179,7 +182,8 @@ impl RunRecorder {
         // Bonds and cells of those whose neighbours change would say who were neighbours once.
         if engine.lasting_neighbours().is_some() {
             set_bonds(&mut stage, engine, is_solved);
-            let cells = Cells::of_body(engine.body());
+            let cells =
+                engine.cells().map_or_else(|| Cow::Owned(Cells::of_body(engine.body())), Cow::Borrowed);
             if cells.count() > 0 {
                 stage.set_cells(&cells);
             }
@@ -199,6 +203,11 @@ impl RunRecorder {
     }
 }
 
+/// Whether nothing is known of the way to the equilibrium.
+fn is_solved_at_once(scene: &Scene, outcome: &Outcome) -> bool {
+    outcome.solved.is_some() && scene.load_steps.is_none()
+}
+
 fn film(scene: &Scene, engine: &Engine, is_solved: bool) -> Film {
     let unit = scene.unit();
     let mut quantities =
@@ -207,11 +216,13 @@ fn film(scene: &Scene, engine: &Engine, is_solved: bool) -> Film {
     // At rest nothing moves.
     quantities.retain(|quantity| quantity.key != "pe2" || !is_solved);
     if stress.is_some() {
-        quantities.push(Quantity::new("von_mises", "von Mises stress", format!("force/{unit}²")));
+        quantities.push(Quantity::new("von_mises", "von Mises stress", Units::of(scene).stress));
     }
     quantities.push(Quantity::new("strain", "largest strain", ""));
-    let clock =
-        if is_solved { Clock { quantity: "load", unit: "%" } } else { Clock { quantity: "step", unit: "" } };
+    let clock = match is_solved {
+        true => Clock { quantity: "load", unit: "%" },
+        false => Clock { quantity: scene.counts(), unit: "" },
+    };
     Film {
         noun: "particle",
         unit: unit.into(),
@@ -272,6 +283,17 @@ fn add_exact(stage: &mut Stage, scene: &Scene, engine: &Engine) {
     }
     let rotation = |strain: &Option<Strain>| strain.map_or(f64::NAN, |strain| strain.rotation);
     add("rotation", "rotation", "rad", &mut strains.iter().map(rotation));
+    let stresses = scene.material.as_ref().and_then(|elastic| Stresses::at_present(engine, elastic));
+    if let Some(Stresses { particles, .. }) = stresses {
+        let unit = Units::of(scene).stress;
+        let of = |number: fn(&StressState) -> f64| {
+            particles.iter().map(move |stress| stress.as_ref().map_or(f64::NAN, number))
+        };
+        add("stress_xx", "stress xx", &unit, &mut of(|stress| stress.components[0]));
+        add("stress_yy", "stress yy", &unit, &mut of(|stress| stress.components[1]));
+        add("stress_xy", "stress xy", &unit, &mut of(|stress| stress.components[2]));
+        add("von_mises", "von Mises stress", &unit, &mut of(|stress| stress.von_mises));
+    }
 }
 
 /// Writes `report.html`.
@@ -286,12 +308,14 @@ pub fn write(
 ) -> Result<PathBuf, ExportError> {
     let (scene, outcome) = (results.scene, results.outcome);
     let mut plots = plot::of_probes(results.probes, outcome.engine.body(), scene.unit());
+    let units = Units::of(scene);
+    plots.extend(load::chart(scene, &units, results.load_steps).map(|chart| Plot::of(&chart, false)));
     plots.extend(outcome.solved.as_ref().map(|solved| residuals(&solved.residuals)));
     let page = Page {
         title: scene.raw.title.clone(),
         command: format!("flockform run {}", scene.name),
         verdict: Some(verdict(outcome)),
-        note: note(&stage.film, outcome),
+        note: note(&stage.film, outcome, is_solved_at_once(scene, outcome)),
         stages: vec![stage],
         plots,
         facts: facts(scene, outcome, summary),
@@ -308,30 +332,31 @@ fn verdict(outcome: &Outcome) -> (bool, String) {
         StopReason::Equilibrium => (true, format!("in equilibrium at step {step}")),
         StopReason::Steps => (true, format!("all {step} steps done")),
         StopReason::Unsettled => (false, "the solver ended short of its tolerance".into()),
+        StopReason::Stuck(why) => (false, format!("in equilibrium at increment {step}, but not {why}")),
         StopReason::Interrupted => (false, format!("interrupted at step {step}")),
         StopReason::Diverged(divergence) => (false, divergence.to_string()),
     }
 }
 
 /// What the frames are, and what is not among them.
-fn note(film: &Film, outcome: &Outcome) -> String {
+fn note(film: &Film, outcome: &Outcome, is_solved: bool) -> String {
     let frames = film.times.len();
     let bits = film.channels.first().map_or(0, |channel| channel.bits);
-    let mut note = if outcome.solved.is_some() {
+    let mut note = if is_solved {
         format!(
             "Solved for its rest, not stepped: {frames} frames in even parts of the displacement, as under a load that grows evenly."
         )
     } else {
-        let steps = outcome.engine.step();
+        let (steps, counts) = (outcome.engine.step(), film.clock.quantity);
         let between = film.times.get(1).zip(film.times.first()).map_or(1.0, |(second, first)| second - first);
         match between as usize {
-            0 | 1 => format!("Every step is shown: {frames} frames."),
+            0 | 1 => format!("Every {counts} is shown: {frames} frames."),
             every => format!(
-                "Of {steps} steps one in {every} is shown, {frames} frames (a page keeps at most {MOST_FRAMES}, fewer of a body whose frames are large); bonds that broke in between show at the next."
+                "Of {steps} {counts}s one in {every} is shown, {frames} frames (a page keeps at most {MOST_FRAMES}, fewer of a body whose frames are large); bonds that broke in between show at the next."
             ),
         }
     };
-    if let Some(first) = film.times.first().filter(|&&first| first > 0.0 && outcome.solved.is_none()) {
+    if let Some(first) = film.times.first().filter(|&&first| first > 0.0 && !is_solved) {
         note += &format!(" This run was taken up at step {first}; what came before is not shown.");
     }
     note += &format!(
@@ -390,6 +415,15 @@ fn facts(scene: &Scene, outcome: &Outcome, summary: &Summary) -> Vec<(String, St
     fact("PE1 in all", format!("{} {unit}²", number(summary.energies.pe1)));
     if let Some(strain) = summary.energies.largest_strain {
         fact("Largest strain", number(strain));
+    }
+    if let Some(measured) = &summary.mechanics {
+        // As the program says it at its end.
+        for line in measured.to_string().lines() {
+            fact("Mechanics", line.trim().to_owned());
+        }
+    }
+    for caution in &summary.cautions {
+        fact("Caution", caution.clone());
     }
     let broken = summary.broken_bonds;
     if broken.count > 0 {

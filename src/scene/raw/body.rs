@@ -100,6 +100,20 @@ pub enum RawOutline {
     Lattice,
 }
 
+/// An edge or an arc of a path.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawStep {
+    /// Where it ends [length].
+    pub to: [f64; 2],
+    /// The centre of an arc, as far from its beginning as from its end; an edge has none [length].
+    #[serde(default)]
+    pub centre: Option<[f64; 2]>,
+    /// Whether the arc runs clockwise.
+    #[serde(default)]
+    pub clockwise: bool,
+}
+
 /// A region of the plane; its boundary belongs to it.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
@@ -132,6 +146,13 @@ pub enum RawShape {
         /// Corners in order, either way round; the last joins the first [length].
         #[schemars(length(min = 3))]
         vertices: Vec<[f64; 2]>,
+    },
+    /// Edges and arcs in order, either way round; an edge joins the end of the last to the beginning.
+    Path {
+        /// Where the first one begins [length].
+        from: [f64; 2],
+        #[schemars(length(min = 1))]
+        steps: Vec<RawStep>,
     },
     /// No shape but the particles themselves, in any order. The body has no lattice, `neighbours` have to be of the kind
     /// `within` or `present`, and what is measured in spacings takes the median distance to the nearest particle.

@@ -8,6 +8,7 @@
 #![allow(rustdoc::broken_intra_doc_links)]
 
 mod body;
+mod load_steps;
 mod material;
 mod roles;
 mod rule;
@@ -16,6 +17,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use body::*;
+pub use load_steps::*;
 pub use material::*;
 pub use roles::*;
 pub use rule::*;
@@ -32,6 +34,10 @@ pub struct RawScene {
     /// Name of the unit of length, for axes and tables.
     #[serde(default = "defaults::unit")]
     pub unit: String,
+    /// Name of the unit of stress, in which Young's modulus and tractions are given, for axes and tables. With
+    /// that of length it gives the unit of force: "Pa" and "m" give N, "MPa" and "mm" too.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stress_unit: Option<String>,
     /// What the body is cut from; a body of points has none.
     #[serde(default)]
     pub lattice: Option<RawLattice>,
@@ -64,6 +70,8 @@ pub struct RawScene {
     pub stop: RawStop,
     #[serde(default)]
     pub equilibrium: Option<RawEquilibrium>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub load_steps: Option<RawLoadSteps>,
     #[serde(default)]
     pub record: RawRecord,
 }

@@ -96,6 +96,7 @@ fn body_scene(raw: &RawSwarm, lattice: &RawLattice, body: &RawBody) -> RawScene 
         title: raw.title.clone(),
         notes: String::new(),
         unit: "m".into(),
+        stress_unit: None,
         lattice: Some(lattice.clone()),
         body: body.clone(),
         frame: raw.frame,
@@ -109,6 +110,7 @@ fn body_scene(raw: &RawSwarm, lattice: &RawLattice, body: &RawBody) -> RawScene 
         cuts: Vec::new(),
         stop: RawStop::default(),
         equilibrium: None,
+        load_steps: None,
         record: RawRecord::default(),
     }
 }

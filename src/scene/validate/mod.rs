@@ -2,6 +2,7 @@
 //! checks that concern several keys at once.
 
 mod equilibrium;
+mod load_steps;
 mod material;
 mod points;
 pub(super) mod roles;
@@ -19,6 +20,7 @@ use crate::flock::frame::FrameRule;
 use crate::flock::lattice::{Lattice, LatticeKind};
 use crate::flock::neighbourhood::Neighbourhood;
 use crate::flock::rules::{Axis, Feedback, FeedbackReference, Mean, Origin};
+use crate::geometry::outline::Piece;
 use crate::geometry::shape::{Segment, Shape};
 use crate::geometry::specimen::Specimen;
 use crate::material::elastic::Elastic;
@@ -103,6 +105,7 @@ pub(super) fn validate(
     let elastic = material::elastic(&raw.material, refuse)?;
     let neighbourhood = material::neighbourhood(&raw, &lattice, elastic.as_ref());
     let equilibrium = equilibrium::equilibrium(&raw, refuse)?;
+    let load_steps = load_steps::load_steps(&raw, refuse)?;
     let is_fitted = material::is_fitted(&raw, refuse)?;
     material::check_axes(&raw, refuse)?;
     check_gradient(&raw, refuse)?;
@@ -120,6 +123,7 @@ pub(super) fn validate(
         neighbourhood,
         mean: mean(raw.rule.mean.as_ref().unwrap_or(&RawMean::Barycentre), spacing, refuse)?,
         equilibrium,
+        load_steps,
         weights: weights(&raw.rule.weights, refuse)?,
         // Neighbours found anew every step have no reference configuration to be at rest in.
         keeps_rest: raw.rule.rest == RawRest::Kept
@@ -222,6 +226,7 @@ fn solid(raw: &RawShape, key: &str, refuse: Refuse<'_>) -> Result<Option<Shape>,
         }
         RawShape::Disc { centre, radius } => Shape::Disc { centre: *centre, radius: *radius },
         RawShape::Polygon { vertices } => Shape::Polygon { vertices: vertices.clone() },
+        RawShape::Path { from, steps } => path(*from, steps, key, refuse)?,
         RawShape::E8Sheet { scale, lying } => {
             Shape::Specimen(Specimen { lying: *lying, ..Specimen::e8_sheet(*scale) })
         }
@@ -229,6 +234,49 @@ fn solid(raw: &RawShape, key: &str, refuse: Refuse<'_>) -> Result<Option<Shape>,
             Shape::Specimen(Specimen { lying: *lying, ..Specimen::d638_type_i(*scale) })
         }
     }))
+}
+
+/// How much farther from its end than from its beginning the centre of an arc may be, over the radius.
+const ROUND: f64 = 1e-6;
+
+fn path(from: [f64; 2], steps: &[RawStep], key: &str, refuse: Refuse<'_>) -> Result<Shape, SceneError> {
+    let away = |p: [f64; 2], q: [f64; 2]| (p[0] - q[0]).hypot(p[1] - q[1]);
+    let mut pieces = Vec::new();
+    let mut at = from;
+    for (k, step) in steps.iter().enumerate() {
+        match step.centre {
+            Some(centre) => {
+                let radii = [away(at, centre), away(step.to, centre)];
+                let is_round = (radii[0] - radii[1]).abs() <= ROUND * radii[0];
+                if !is_round {
+                    let message =
+                        format!("the arc begins {} from its centre and ends {} from it", radii[0], radii[1]);
+                    let help = "move the centre, or the end, so that both are the radius";
+                    return Err(refuse(&format!("{key}.steps[{k}].centre"), message, help));
+                }
+                pieces.push(Piece::arc_between(at, step.to, centre, step.clockwise));
+            }
+            None if at == step.to => {
+                let message = "the edge has no length".into();
+                return Err(refuse(&format!("{key}.steps[{k}].to"), message, "give its other end"));
+            }
+            None => pieces.push(Piece::edge(at, step.to)),
+        }
+        at = step.to;
+    }
+    if at != from {
+        pieces.push(Piece::edge(at, from));
+    }
+    // Where pieces go on in the same direction there is no corner to keep.
+    let count = pieces.len();
+    for k in 0..count {
+        let (before, after) = (pieces[(k + count - 1) % count].tangent(1.0), pieces[k].tangent(0.0));
+        let turn = before[0] * after[1] - before[1] * after[0];
+        let is_smooth = turn.abs() < ROUND && before[0] * after[0] + before[1] * after[1] > 0.0;
+        pieces[k].begins_at_corner = count > 1 && !is_smooth;
+        pieces[k].number = k;
+    }
+    Ok(Shape::Path { pieces })
 }
 
 fn ordered_box(key: &str, min: [f64; 2], max: [f64; 2], refuse: Refuse<'_>) -> Result<(), SceneError> {

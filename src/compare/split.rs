@@ -1,0 +1,200 @@
+//! Where an error comes from: the solver, the outline of the cells, the cells themselves.
+//!
+//! Between the rule's run and the truth of the shape stand two more displacements of the same body: the rule's own
+//! equilibrium, solved as far as doubles go, and the truth of the shape that the cells have, whose outline is made of
+//! their sides. The three steps from one to the next are what the solver, the cells and their outline leave.
+
+use serde::{Deserialize, Serialize};
+
+use super::run::{SceneTruth, plan_led_by, refused};
+use super::supports::supports;
+use super::truth::{Setting, Truth};
+use crate::continuum::equilibrium::settle;
+use crate::fem::{Effort, Holding};
+use crate::flock::points::{Points, distance};
+use crate::geometry::outline::{Outline, Piece};
+use crate::geometry::portion::Portion;
+use crate::material::outline_loads::{Load, OutlineLoad};
+use crate::scene::{Scene, SceneError};
+use crate::solve::equilibrium::{Precision, Request};
+
+type Point = [f64; 2];
+
+/// Residual over load beyond which nothing of a solver's error is left to see.
+const TIGHT: f64 = 1e-10;
+
+/// An outline of more sides than this is not meshed to tell what it costs.
+const MOST_SIDES: usize = 600;
+
+/// Parts of an error, each relative to the truth in the L2 norm over the followers \[1\]; they need not add up. `None`
+/// where a part cannot be told.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ErrorParts {
+    /// From the rule's equilibrium to the truth of the shape of its cells.
+    pub discretisation: Option<f64>,
+    /// From there to the truth of the shape itself.
+    pub outline: Option<f64>,
+    /// From the run's end to the rule's equilibrium.
+    pub solver: Option<f64>,
+}
+
+impl ErrorParts {
+    /// The parts of the error of displacements `rule` \[length\], shape \[particles\], at those that follow.
+    ///
+    /// # Errors
+    /// Names what in the scene has no plan; a part that cannot be computed is left out.
+    pub fn of(
+        scene: &Scene,
+        truth: &SceneTruth,
+        rule: &Points,
+        follows: &[bool],
+    ) -> Result<Self, SceneError> {
+        let own = equilibrium(scene, &truth.truth);
+        let cells = truth_of_cells(scene, truth)?;
+        let known = &truth.truth.displacement;
+        let apart = |a: &Points, b: &Points| {
+            let (mut off, mut size) = (0.0, 0.0);
+            for i in (0..follows.len()).filter(|&i| follows[i]) {
+                off += distance(a.get(i), b.get(i)).powi(2);
+                size += distance(known.get(i), [0.0; 2]).powi(2);
+            }
+            if off == 0.0 { 0.0 } else { (off / size).sqrt() }
+        };
+        Ok(Self {
+            discretisation: cells.as_ref().map(|cells| apart(own.as_ref().unwrap_or(rule), cells)),
+            outline: cells.as_ref().map(|cells| apart(cells, known)),
+            solver: own.as_ref().map(|own| apart(rule, own)),
+        })
+    }
+}
+
+/// Where the rule comes to rest, if that can be solved for.
+fn equilibrium(scene: &Scene, truth: &Truth) -> Option<Points> {
+    let request = Request { tolerance: TIGHT, precision: Precision::F64, ..Request::default() };
+    let outcome = settle(scene, &request, plan_led_by(scene, truth).ok()?).ok()?;
+    let is_known = outcome.solved.as_ref().is_some_and(|solved| solved.is_at_rest());
+    let engine = &outcome.engine;
+    is_known.then(|| (0..engine.body().count()).map(|i| engine.displacement(i)).collect())
+}
+
+/// The truth of the shape that the cells have; the same where that is the shape itself.
+fn truth_of_cells(scene: &Scene, truth: &SceneTruth) -> Result<Option<Points>, SceneError> {
+    let layout = &truth.layout;
+    let (Some(outline), Some(cells)) = (&layout.outline, &layout.cells) else { return Ok(None) };
+    let reference = &layout.body.reference;
+    let Ok(of_cells) = cells.outline(reference) else { return Ok(None) };
+    let agrees = |a: f64, b: f64| (a - b).abs() <= 1e-9 * b;
+    if agrees(of_cells.area(), outline.area()) && agrees(of_cells.length(), outline.length()) {
+        return Ok(Some(truth.truth.displacement.clone()));
+    }
+    if of_cells.pieces().count() > MOST_SIDES {
+        return Ok(None);
+    }
+    let changes = layout.role_changes(scene, None)?;
+    let mut supports = supports(scene, layout, outline, &changes, scene.stop.steps as f64)?;
+    for support in &mut supports {
+        if let Holding::Portions(portions) = &mut support.on {
+            *portions = carried(portions, outline, &of_cells);
+        }
+    }
+    supports.retain(|support| !matches!(&support.on, Holding::Portions(portions) if portions.is_empty()));
+    let loads = (0..scene.loads.len()).map(|k| layout.load(scene, k)).collect::<Result<Vec<_>, _>>()?;
+    let spacing = layout.body.lattice.spacing();
+    let setting = Setting {
+        outline: &of_cells,
+        reference,
+        spacing,
+        elastic: &truth.elastic,
+        supports,
+        loads: &loads.iter().filter(|load| !matches!(load, Load::Outline(_))).cloned().collect::<Vec<_>>(),
+    };
+    let pushed = loads.iter().filter_map(|load| match load {
+        Load::Outline(load) => Some((carried(&load.portions, outline, &of_cells), pushed(load, outline))),
+        _ => None,
+    });
+    match Truth::solve_with(setting, pushed.collect(), &Effort::default()) {
+        Ok(found) => Ok(Some(found.displacement)),
+        // What keeps the shape of the cells from having a truth says nothing of the shape itself.
+        Err(error) => {
+            tracing::debug!("{}", refused(scene, &error));
+            Ok(None)
+        }
+    }
+}
+
+/// A load of the true outline, per length of a side that stands for it \[force / length\]: as much of it as the side
+/// hides when looked at along the true normal.
+fn pushed<'a>(load: &'a OutlineLoad, outline: &'a Outline) -> impl Fn(Point, Point) -> Point + 'a {
+    move |p, normal| {
+        let pieces = load.portions.iter().map(|portion| [portion.ring, portion.piece]);
+        let Some((place, _)) = outline.nearest_among(p, pieces) else { return [0.0; 2] };
+        let piece = outline.piece(place.ring, place.piece);
+        let own = piece.normal(place.t);
+        let share = (normal[0] * own[0] + normal[1] * own[1]).max(0.0);
+        load.at(piece.point(place.t), own).map(|f| share * f)
+    }
+}
+
+/// Parts in which a piece is asked for where its places belong.
+const SAMPLES: usize = 24;
+
+/// Sides whose normal is turned further than this from the outline's stand for another part of it: a cosine \[1\].
+const TURNED: f64 = 0.3;
+
+/// The parts of another outline whose nearest places on an outline that faces the same way lie in portions of it.
+fn carried(portions: &[Portion], from: &Outline, to: &Outline) -> Vec<Portion> {
+    let belongs = |p: Point, normal: Point| {
+        let faces = |piece: &Piece| {
+            let own = piece.normal(piece.nearest(p));
+            own[0] * normal[0] + own[1] * normal[1] > TURNED
+        };
+        let facing = from.pieces().filter(|(.., piece)| faces(piece)).map(|(ring, number, _)| [ring, number]);
+        let Some((place, _)) = from.nearest_among(p, facing) else { return false };
+        let mut here =
+            portions.iter().filter(|portion| (portion.ring, portion.piece) == (place.ring, place.piece));
+        here.any(|portion| portion.t[0] <= place.t && place.t <= portion.t[1])
+    };
+    let mut found = Vec::new();
+    for (ring, number, piece) in to.pieces() {
+        let middle = |k: usize| (k as f64 + 0.5) / SAMPLES as f64;
+        let inside: Vec<bool> =
+            (0..SAMPLES).map(|k| belongs(piece.point(middle(k)), piece.normal(middle(k)))).collect();
+        let mut begin = inside[0].then_some(0.0);
+        for k in 1..SAMPLES {
+            if inside[k] == inside[k - 1] {
+                continue;
+            }
+            let (mut a, mut b) = (middle(k - 1), middle(k));
+            for _ in 0..40 {
+                let half = 0.5 * (a + b);
+                let is_before = belongs(piece.point(half), piece.normal(half)) == inside[k - 1];
+                if is_before { a = half } else { b = half }
+            }
+            match begin.take() {
+                Some(from) => found.push(Portion { ring, piece: number, t: [from, a] }),
+                None => begin = Some(b),
+            }
+        }
+        found.extend(begin.map(|from| Portion { ring, piece: number, t: [from, 1.0] }));
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn portions_are_carried_to_the_sides_of_a_staircase() {
+        let slope = Outline::of_polygons(&[vec![[0.0, 0.0], [4.0, 0.0], [4.0, 4.0]]]).unwrap();
+        let stairs =
+            [[1.0, 0.0], [4.0, 0.0], [4.0, 3.0], [3.0, 3.0], [3.0, 2.0], [2.0, 2.0], [2.0, 1.0], [1.0, 1.0]];
+        let stairs = Outline::of_polygons(&[stairs.to_vec()]).unwrap();
+        let found = carried(&[Portion::whole(0, 2)], &slope, &stairs);
+        let length: f64 = found.iter().map(|portion| portion.length(&stairs)).sum();
+        assert!((length - 6.0).abs() < 1e-6, "all steps of the stairs: {length}");
+        let right = carried(&[Portion { ring: 0, piece: 1, t: [0.25, 0.5] }], &slope, &stairs);
+        let length: f64 = right.iter().map(|portion| portion.length(&stairs)).sum();
+        assert!((length - 1.0).abs() < 1e-6, "{length}");
+    }
+}

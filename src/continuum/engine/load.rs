@@ -1,0 +1,68 @@
+//! How much of the scene's loads is on the body.
+
+use super::Engine;
+use crate::flock::points::Points;
+
+/// The part of the loads that acts, and the whole of them.
+#[derive(Clone, Debug)]
+pub(super) struct Load {
+    /// Steps over which the loads grow, where they do.
+    ramp: Option<usize>,
+    factor: f64,
+    /// The whole of each load \[force\], shape \[loads\]\[count\].
+    each: Vec<Points>,
+    /// \[force\], shape \[count\]; only where the factor has been another than 1.
+    whole: Option<Points>,
+}
+
+impl Load {
+    pub fn new(ramp: Option<usize>, each: Vec<Points>) -> Self {
+        Self { ramp, factor: 1.0, each, whole: None }
+    }
+
+    /// Whether more of the loads is to come after this step.
+    pub fn is_growing(&self, step: usize) -> bool {
+        self.ramp.is_some_and(|ramp| step < ramp)
+    }
+}
+
+impl Engine {
+    /// Part of the scene's loads that is on the body now \[1\].
+    pub fn load_factor(&self) -> f64 {
+        self.load.factor
+    }
+
+    /// All of the scene's loads \[force\], shape \[count\]; `None` without loads.
+    pub fn whole_load(&self) -> Option<&Points> {
+        self.load.whole.as_ref().or(self.interaction.forces.as_ref())
+    }
+
+    /// The whole of each of the scene's loads \[force\], shape \[loads\]\[count\].
+    pub fn each_load(&self) -> &[Points] {
+        &self.load.each
+    }
+
+    /// Puts this part of the scene's loads on the body \[1\].
+    pub fn set_load_factor(&mut self, factor: f64) {
+        if factor == self.load.factor {
+            return;
+        }
+        self.load.factor = factor;
+        if let Some(forces) = &mut self.interaction.forces {
+            let whole = self.load.whole.get_or_insert_with(|| forces.clone());
+            *forces = scaled(whole, factor);
+        }
+    }
+
+    /// Brings the loads to what they are at this step, where they grow.
+    pub(super) fn follow_ramp(&mut self) {
+        if let Some(ramp) = self.load.ramp {
+            self.set_load_factor((self.step as f64 / ramp as f64).min(1.0));
+        }
+    }
+}
+
+/// Every force times `factor`; all of them to the bit at 1.
+pub fn scaled(forces: &Points, factor: f64) -> Points {
+    forces.iter().map(|[x, y]| [factor * x, factor * y]).collect()
+}

@@ -1,0 +1,90 @@
+//! Equilibria on the way: loads and leaders' motions in parts, each solved from where the last one left the body.
+
+use super::{Outcome, Plan, StopReason, Watch, steps_of_the_way};
+use super::{
+    farthest_from_target, follows, held_axes, of_plan_after, reason, refuse, refuse_corotated, way_after,
+};
+use crate::continuum::engine::Engine;
+use crate::continuum::engine::load::scaled;
+use crate::flock::points::Points;
+use crate::scene::{Scene, SceneError};
+use crate::solve::corotated::{self, CorotatedError, Way};
+use crate::solve::equilibrium::{Request, Solved, solve};
+
+/// Why a part of the way cannot be gone.
+enum Failure {
+    Refused(SceneError),
+    /// The equilibrium is lost on the way.
+    Lost(String),
+}
+
+/// Solves each part of the way in turn. `watch` sees the unloaded body and then every equilibrium, as step 1, 2, ...;
+/// where one is not found, the run ends with the last.
+///
+/// # Errors
+/// As [`super::settle`]: what is wrong with the scene and not with the size of the load.
+pub(super) fn settle_each(
+    scene: &Scene,
+    request: &Request,
+    mut plan: Plan,
+    parts: &[f64],
+    watch: Watch<'_>,
+) -> Result<Outcome, SceneError> {
+    let whole = plan.interaction.forces.clone();
+    let spacing = plan.body.lattice.spacing();
+    let mut engine = Engine::new(plan.clone());
+    engine.set_load_factor(0.0);
+    let mut outcome =
+        Outcome { engine, reason: StopReason::Equilibrium, residual: f64::INFINITY, solved: None };
+    let mut interrupted = (watch.see)(&outcome.engine, outcome.residual).is_break();
+    let mut last = 0.0;
+    for (n, &part) in parts.iter().enumerate() {
+        if interrupted {
+            outcome.reason = StopReason::Interrupted;
+            break;
+        }
+        let start = outcome.solved.as_ref().map(|solved| (&solved.displacement, last));
+        let solved = match settle_at(scene, request, (&mut plan, whole.as_ref()), start, part) {
+            Ok(solved) => solved,
+            Err(Failure::Refused(error)) => return Err(error),
+            Err(Failure::Lost(why)) => {
+                outcome.reason = StopReason::Stuck(format!("at {part} of the load: {why}"));
+                break;
+            }
+        };
+        outcome.engine.settle(n + 1, &solved.displacement);
+        outcome.engine.set_load_factor(part);
+        outcome.residual = farthest_from_target(&outcome.engine) / spacing;
+        outcome.reason = reason(&solved);
+        outcome.solved = Some(solved);
+        interrupted = (watch.see)(&outcome.engine, outcome.residual).is_break();
+        last = part;
+        if outcome.reason == StopReason::Unsettled {
+            break;
+        }
+    }
+    Ok(outcome)
+}
+
+/// The equilibrium under this part of loads and motions.
+fn settle_at(
+    scene: &Scene,
+    request: &Request,
+    (plan, whole): (&mut Plan, Option<&Points>),
+    start: Option<(&Points, f64)>,
+    part: f64,
+) -> Result<Solved, Failure> {
+    let steps = steps_of_the_way(plan) as f64;
+    if !corotated::is_corotated(&plan.interaction) {
+        plan.interaction.forces = whole.map(|whole| scaled(whole, part));
+        let system = of_plan_after(scene, plan, part * steps).map_err(Failure::Refused)?;
+        return solve(&system, request).map_err(|error| Failure::Refused(refuse(scene, &error)));
+    }
+    let way = Way { held: &|part| way_after(plan, part * steps), start, end: part };
+    let axes = held_axes(plan);
+    let solved = corotated::solve(&plan.interaction, &plan.body, follows(plan), axes, &way, request);
+    solved.map_err(|error| match error {
+        CorotatedError::Unsettled { .. } if start.is_some() => Failure::Lost(error.to_string()),
+        _ => Failure::Refused(refuse_corotated(scene, &error)),
+    })
+}

@@ -1,0 +1,185 @@
+//! What a testing machine would read off a body: reactions, load, strain energy, stress.
+
+use serde::{Deserialize, Serialize};
+
+use super::engine::Engine;
+use super::forces::{Forces, LoadResultant, Reaction};
+use crate::flock::points::Points;
+use crate::flock::rules::{Mean, Rotation};
+use crate::material::cells::Cells;
+use crate::material::elastic::Elastic;
+use crate::material::stress::{self, StressState};
+
+/// Strain beyond which small rotations and strains are a caution \[1\].
+const SMALL_STRAIN: f64 = 0.1;
+/// Turn of a cell beyond which they are \[rad\]: 10 degrees, whose cosine is off by 1.5 %.
+const SMALL_TURN: f64 = std::f64::consts::PI / 18.0;
+
+/// Forces, energy and stress of a body with a material.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Mechanics {
+    /// Of each entry of `loads`; empty where the rule has no stiffness.
+    pub loads: Vec<LoadResultant>,
+    /// Of all loads together.
+    pub load: Option<LoadResultant>,
+    /// Of each entry of `roles` that holds particles; empty where the rule has no stiffness.
+    pub reactions: Vec<Reaction>,
+    /// \[force length\]
+    pub strain_energy: f64,
+    /// Absent where the rule has no stiffness.
+    pub work: Option<Work>,
+    /// The largest force left on a follower \[force\]: how far the body is from rest.
+    pub unbalanced: Option<f64>,
+    pub largest_von_mises: Option<Peak>,
+    /// The principal strain largest in size of any cell, as the rule measures strain \[1\].
+    pub largest_strain: f64,
+    /// The largest turn of a cell \[rad\].
+    pub largest_turn: f64,
+}
+
+/// Forces at their last value times displacements \[force length\]. In equilibrium under small rotations the strain
+/// energy is half of the sum of both.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Work {
+    pub loads: f64,
+    /// Of the reactions: of leaders that were moved.
+    pub supports: f64,
+}
+
+/// The cell with the largest von Mises stress.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Peak {
+    /// \[force / length^2\]
+    pub von_mises: f64,
+    /// Number of the cell, counted from 1.
+    pub cell: usize,
+    /// Middle of the cell in the reference configuration \[length\].
+    pub place: [f64; 2],
+    /// Ids of the particles at its corners.
+    pub particles: Vec<usize>,
+}
+
+/// Stress of a body, cell by cell and around each particle.
+#[derive(Clone, Debug)]
+pub struct Stresses {
+    /// NaN in cells across which a bond is broken, shape \[cells\].
+    pub cells: Vec<StressState>,
+    /// `None` for a particle in no whole cell, shape \[count\].
+    pub particles: Vec<Option<StressState>>,
+}
+
+impl Stresses {
+    /// Under these displacements \[length\], these pairs of particles being parted; `None` without cells.
+    pub fn of(
+        engine: &Engine,
+        elastic: &Elastic,
+        displacement: &Points,
+        broken: &[[u32; 2]],
+    ) -> Option<Self> {
+        let cells = engine.cells()?;
+        let mut of_cells = stress::of_cells(cells, elastic, displacement, rotation(engine));
+        let torn = torn(cells, displacement.len(), broken);
+        for (stress, _) in of_cells.iter_mut().zip(&torn).filter(|(_, torn)| **torn) {
+            *stress = StressState { strain: [f64::NAN; 3], components: [f64::NAN; 3], von_mises: f64::NAN };
+        }
+        let particles =
+            stress::at_particles(cells, elastic, &of_cells, displacement.len(), |cell| !torn[cell]);
+        Some(Self { cells: of_cells, particles })
+    }
+
+    /// At the engine's present places.
+    pub fn at_present(engine: &Engine, elastic: &Elastic) -> Option<Self> {
+        let broken: Vec<[u32; 2]> = engine.breaks().iter().map(|one| one.pair).collect();
+        Self::of(engine, elastic, &engine.displacements(), &broken)
+    }
+
+    fn peak(&self, engine: &Engine, cells: &Cells) -> Option<Peak> {
+        let finite = self.cells.iter().enumerate().filter(|(_, stress)| stress.von_mises.is_finite());
+        // The first of several.
+        let higher = |best: Option<(usize, f64)>, (cell, stress): (usize, &StressState)| match best {
+            Some((_, most)) if most >= stress.von_mises => best,
+            _ => Some((cell, stress.von_mises)),
+        };
+        let (cell, von_mises) = finite.fold(None, higher)?;
+        let corners = cells.of(cell);
+        let places: Points = corners.iter().map(|&i| engine.body().reference.get(i as usize)).collect();
+        let particles = corners.iter().map(|&i| engine.body().id(i as usize)).collect();
+        Some(Peak { von_mises, cell: cell + 1, place: places.middle(), particles })
+    }
+}
+
+impl Mechanics {
+    /// At the engine's present places; `None` without a material.
+    pub fn of(engine: &Engine, elastic: &Elastic) -> Option<Self> {
+        let stresses = Stresses::at_present(engine, elastic)?;
+        let cells = engine.cells()?;
+        let forces = Forces::of(engine);
+        let u = engine.displacements();
+        let finite =
+            |values: &mut dyn Iterator<Item = f64>| values.filter(|v| v.is_finite()).fold(0.0, f64::max);
+        Some(Self {
+            loads: forces.as_ref().map_or_else(Vec::new, |forces| forces.each_load(engine)),
+            load: forces.as_ref().and_then(|forces| forces.load(engine)),
+            reactions: forces.as_ref().map_or_else(Vec::new, |forces| forces.reactions(engine)),
+            strain_energy: strain_energy(engine, elastic, forces.as_ref(), &u),
+            work: forces.as_ref().map(|forces| Work {
+                loads: forces.work_of_loads(),
+                supports: forces.work_of_supports(engine),
+            }),
+            unbalanced: forces.as_ref().map(|forces| forces.largest_left(engine)),
+            largest_von_mises: stresses.peak(engine, cells),
+            largest_strain: finite(&mut stresses.cells.iter().map(StressState::largest_strain)),
+            largest_turn: finite(&mut stress::turns(cells, &u).map(f64::abs)),
+        })
+    }
+
+    /// What the user should know of the result.
+    pub fn cautions(&self, engine: &Engine) -> Vec<String> {
+        let is_small = matches!(engine.interaction().rule.mean, Mean::Material { rotation: Rotation::Small });
+        let is_beyond = self.largest_strain > SMALL_STRAIN || self.largest_turn > SMALL_TURN;
+        if !(is_small && is_beyond) {
+            return Vec::new();
+        }
+        vec![format!(
+            "strains of up to {:.0} % and turns of up to {:.0} degrees under rotation = \"small\", which is right for \
+             small ones (10 %, 10 degrees): displacements and forces are proportional to the load, as they are no more \
+             in a body that is bent so far; rotation = \"corotated\" follows the turns",
+            100.0 * self.largest_strain,
+            self.largest_turn.to_degrees()
+        )]
+    }
+}
+
+/// By the rule's own forces under small rotations, else from the cells.
+fn strain_energy(engine: &Engine, elastic: &Elastic, forces: Option<&Forces>, u: &Points) -> f64 {
+    if let (Some(forces), Rotation::Small) = (forces, rotation(engine)) {
+        let work = forces.internal.iter().zip(u.iter()).map(|(f, u)| f[0] * u[0] + f[1] * u[1]);
+        // Without the sign of a zero.
+        return 0.0 - 0.5 * work.sum::<f64>();
+    }
+    let of_cells = engine.cells().map(|cells| stress::strain_energy(cells, elastic, u, rotation(engine)));
+    of_cells.and_then(Result::ok).unwrap_or(f64::NAN)
+}
+
+/// Which turns of a cell are no strain.
+fn rotation(engine: &Engine) -> Rotation {
+    match engine.interaction().rule.mean {
+        Mean::Material { rotation } => rotation,
+        _ => Rotation::Small,
+    }
+}
+
+/// Whether two corners of each cell are parted.
+fn torn(cells: &Cells, particles: usize, broken: &[[u32; 2]]) -> Vec<bool> {
+    let mut torn = vec![false; cells.count()];
+    if broken.is_empty() {
+        return torn;
+    }
+    let incidence = cells.incidence(particles);
+    for &[a, b] in broken {
+        for &cell in incidence.of(a as usize).iter().filter(|&&cell| cells.of(cell as usize).contains(&b)) {
+            torn[cell as usize] = true;
+        }
+    }
+    torn
+}

@@ -1,0 +1,94 @@
+//! The von Mises stress of a body, cell by cell, where its cells are.
+
+use super::Subject;
+use super::axes::Axes;
+use super::bands::Bands;
+use super::comparison::{enlargement, told};
+use super::heading::Heading;
+use super::page;
+use super::raster::Raster;
+use super::svg::{Path, Svg};
+use crate::continuum::record::Snapshot;
+use crate::flock::points::Points;
+use crate::material::cells::Cells;
+use crate::material::stress::StressState;
+
+/// More cells than this are drawn as a raster.
+const MOST_CELLS: usize = 60_000;
+/// Stress below this part of the largest is rounding.
+const NOISE: f64 = 1e-9;
+
+/// Every whole cell in the colour of its von Mises stress, in its place or, where displacements could not be seen or
+/// the body would be lost beside them, in the place of a displacement so many times as large, which the heading says.
+pub fn stress(
+    subject: &Subject<'_>,
+    snapshot: &Snapshot,
+    cells: &Cells,
+    stresses: &[StressState],
+    unit: &str,
+) -> String {
+    let reference = &subject.body.reference;
+    let drawn = || (0..snapshot.roles.len()).filter(|&i| snapshot.roles[i].is_body());
+    let moved = |(now, then): ([f64; 2], [f64; 2])| [now[0] - then[0], now[1] - then[1]];
+    let displacement: Points = snapshot.positions.iter().zip(reference.iter()).map(moved).collect();
+    let factor = enlargement(reference, &displacement, drawn);
+    let place = |(then, by): ([f64; 2], [f64; 2])| [then[0] + factor * by[0], then[1] + factor * by[1]];
+    let places: Points = reference.iter().zip(displacement.iter()).map(place).collect();
+    let shown: Vec<(&[u32], f64)> = cells
+        .iter()
+        .zip(stresses.iter().map(|stress| stress.von_mises))
+        .filter(|(cell, value)| {
+            value.is_finite() && cell.iter().all(|&i| places.get(i as usize).iter().all(|v| v.is_finite()))
+        })
+        .collect();
+    let range = shown.iter().fold([f64::INFINITY, 0.0], |[low, high], (_, v)| [low.min(*v), v.max(high)]);
+    let bands = Bands::around(range[0].min(range[1]), range[1], NOISE * range[1]);
+    let axes = page::window(&places, drawn(), subject.body.lattice.spacing());
+    let mut note =
+        format!("von Mises stress in the cells, {}{}", page::note(subject, snapshot), told(factor));
+    let is_raster = shown.len() > MOST_CELLS;
+    if is_raster {
+        note += &format!("; {} cells drawn as squares of their largest value", shown.len());
+    }
+    let heading = Heading { title: subject.title.into(), note, legend: Vec::new() };
+    page::with_body(&heading, axes, subject.unit, bands.bar_room(), |svg, axes| {
+        if is_raster {
+            draw_raster(svg, axes, &places, &shown, &bands, subject.body.lattice.spacing());
+        } else {
+            draw_cells(svg, axes, &places, &shown, &bands);
+        }
+        let top_right = [axes.corner[0] + axes.size[0], axes.corner[1]];
+        bands.draw_bar(svg, top_right, axes.size[1], "von Mises stress", unit);
+    })
+}
+
+fn draw_cells(svg: &mut Svg, axes: &Axes, places: &Points, shown: &[(&[u32], f64)], bands: &Bands) {
+    let mut paths = vec![Path::default(); bands.count()];
+    for (cell, value) in shown {
+        paths[bands.of(*value)].polygon(cell.iter().map(|&i| axes.place(places.get(i as usize))));
+    }
+    // A hairline of its own colour around each cell covers the seams between cells.
+    for (band, path) in paths.iter().enumerate().filter(|(_, path)| !path.is_empty()) {
+        let colour = bands.colour(band);
+        let line = "stroke-width=\"0.4\" stroke-linejoin=\"round\"";
+        svg.path(path, format_args!("class=\"cells\" fill=\"{colour}\" stroke=\"{colour}\" {line}"));
+    }
+}
+
+fn draw_raster(
+    svg: &mut Svg,
+    axes: &Axes,
+    places: &Points,
+    shown: &[(&[u32], f64)],
+    bands: &Bands,
+    spacing: f64,
+) {
+    let mut raster = Raster::over(axes, spacing);
+    for (cell, value) in shown {
+        let corners: Points = cell.iter().map(|&i| places.get(i as usize)).collect();
+        raster.drop(axes.place(corners.middle()), *value);
+    }
+    for (band, path) in raster.paths(bands.count(), |value| bands.of(value)).iter().enumerate() {
+        svg.path(path, format_args!("fill=\"{}\" shape-rendering=\"crispEdges\"", bands.colour(band)));
+    }
+}

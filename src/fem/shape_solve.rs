@@ -1,0 +1,273 @@
+//! The displacement of a shape in equilibrium, with an estimate of its own error.
+//!
+//! The body is solved on nested meshes ([`OutlineMesh`]). Where the error falls with the power p of the size of
+//! cells, that of the finest is the distance to the one before over 2^p - 1 (L. F. Richardson, Phil. Trans. R. Soc.
+//! A 210 (1911) 307); p is observed from the last two distances, and never taken as higher than what quadratic
+//! triangles have on smooth bodies: 3 in displacement, 4 in energy.
+
+use std::collections::BTreeMap;
+
+use super::error::FemError;
+use super::locate::invert;
+use super::material::Stress;
+use super::outline_mesh::{MeshRequest, OutlineMesh};
+use super::shape_problem::ShapeProblem;
+use super::solution::Solution;
+use super::solve::solve;
+
+type Point = [f64; 2];
+
+/// How far a solution goes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Effort {
+    /// Relative L2 error of the displacement at which refinement ends \[1\]. Default: 1e-4.
+    pub target: f64,
+    /// Meshes of more nodes are not solved on, unless fewer than three are smaller. Default: 100 000.
+    pub most_nodes: usize,
+    /// Cells of the coarsest mesh, besides those that singular points add. Default: 80.
+    pub cells: usize,
+}
+
+impl Default for Effort {
+    fn default() -> Self {
+        Self { target: 1e-4, most_nodes: 100_000, cells: 80 }
+    }
+}
+
+/// One of the nested meshes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Level {
+    pub nodes: usize,
+    /// Strain energy \[J\].
+    pub energy: f64,
+    /// Relative L2 distance of the displacement from that of the level before \[1\]; zero on the first.
+    pub change: f64,
+}
+
+/// What a solution says of its own error.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EstimatedError {
+    /// Of the displacement, relative, in the L2 norm over the body's area \[1\].
+    pub displacement: f64,
+    /// Of the strain energy, relative \[1\].
+    pub energy: f64,
+    /// The power of the size of cells with which the displacement's error was seen to fall.
+    pub order: f64,
+}
+
+/// What a support takes up, acting on the body.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Reaction {
+    /// \[N\]
+    pub force: Point,
+    /// About the origin of the coordinates \[N m\].
+    pub moment: f64,
+}
+
+/// A solved shape.
+#[derive(Debug, Clone)]
+pub struct ShapeSolution {
+    solution: Solution,
+    levels: Vec<Level>,
+    error: EstimatedError,
+    reactions: Vec<Reaction>,
+    reach: f64,
+}
+
+/// Solves a shape on finer and finer meshes until its error is estimated to be at the target.
+///
+/// # Errors
+/// What keeps the shape from being meshed ([`FemError::Unmeshable`], [`FemError::InvertedCell`]); a support
+/// without a node ([`FemError::EmptySupport`]), a point outside ([`FemError::OutsideMesh`]); a body that is not
+/// held ([`FemError::Unheld`], [`FemError::Soft`]); input that is not finite; memory.
+pub fn solve_shape(problem: &ShapeProblem<'_>, effort: &Effort) -> Result<ShapeSolution, FemError> {
+    let (lines, places, points) = (problem.lines(), problem.places(), problem.points()?);
+    let request = MeshRequest { lines: &lines, places: &places, points: &points, cells: effort.cells };
+    let mut mesh = OutlineMesh::new(problem.outline, &request)?;
+    let mut levels: Vec<Level> = Vec::new();
+    let mut last: Option<Solution> = None;
+    loop {
+        let (on_mesh, holder) = problem.on_mesh(&mesh)?;
+        let solution = solve(&on_mesh).map_err(|error| at_place(error, &mesh))?;
+        let change = last.as_ref().map_or(0.0, |coarse| change(coarse, &solution));
+        levels.push(Level { nodes: mesh.mesh().node_count(), energy: solution.strain_energy(), change });
+        let error = estimate(&levels);
+        let is_enough = levels.len() >= 3 && error.displacement <= effort.target;
+        // Singular points by the hundred make even the coarsest mesh a large one.
+        let is_large = mesh.mesh().node_count() > effort.most_nodes;
+        let is_all = is_large || levels.len() >= 3 && 4 * mesh.mesh().node_count() > effort.most_nodes;
+        if is_enough || is_all {
+            let reactions = reactions(problem.supports.len(), &on_mesh, &holder, &solution);
+            return Ok(ShapeSolution { solution, levels, error, reactions, reach: problem.reach });
+        }
+        mesh = mesh.refined()?;
+        last = Some(solution);
+    }
+}
+
+/// Names the place instead of the node, which means nothing outside.
+fn at_place(error: FemError, mesh: &OutlineMesh) -> FemError {
+    let at = |node: usize| (mesh.mesh().x()[node], mesh.mesh().y()[node]);
+    match error {
+        FemError::Mechanism { node, motion } => {
+            let (x, y) = at(node);
+            FemError::Unheld { x, y, motion }
+        }
+        FemError::Singular { node } => {
+            let (x, y) = at(node);
+            FemError::Soft { x, y }
+        }
+        other => other,
+    }
+}
+
+/// Relative L2 distance of two levels: cell k of the coarse one became the cells 4k to 4k + 3 of the fine one.
+fn change(coarse: &Solution, fine: &Solution) -> f64 {
+    let (mesh, rule) = (fine.mesh(), fine.mesh().kind().stress_rule());
+    let (mut off, mut size) = (0.0, 0.0);
+    for cell in 0..mesh.cell_count() {
+        let (at, u) = (mesh.positions(cell), fine.of_cell(cell));
+        let parent = cell / 4;
+        let before = coarse.of_cell(parent);
+        for (shape, weight) in &rule.points {
+            let area = weight * shape.determinant(&at[..6]);
+            let (p, u) = (shape.interpolate(&at[..6]), shape.interpolate(&u[..6]));
+            let Some(place) = invert(coarse.mesh(), parent, p) else { continue };
+            let v = coarse.mesh().kind().shape(place).interpolate(&before[..6]);
+            off += area * ((u[0] - v[0]).powi(2) + (u[1] - v[1]).powi(2));
+            size += area * (u[0] * u[0] + u[1] * u[1]);
+        }
+    }
+    ratio(off.sqrt(), size.sqrt())
+}
+
+/// No difference is none, whatever it is measured by.
+fn ratio(difference: f64, size: f64) -> f64 {
+    if difference == 0.0 { 0.0 } else { difference / size }
+}
+
+fn estimate(levels: &[Level]) -> EstimatedError {
+    let changes: Vec<f64> = levels.iter().skip(1).map(|level| level.change).collect();
+    let energies: Vec<f64> = levels
+        .windows(2)
+        .map(|pair| ratio((pair[1].energy - pair[0].energy).abs(), pair[1].energy.abs()))
+        .collect();
+    let (displacement, order) = richardson(&changes, 3.0);
+    let (energy, _) = richardson(&energies, 4.0);
+    EstimatedError { displacement, energy, order }
+}
+
+/// The error that the last of a series of distances leaves, and the order with which they fall.
+fn richardson(distances: &[f64], highest: f64) -> (f64, f64) {
+    let (last, order) = match *distances {
+        [] => return (f64::INFINITY, 0.0),
+        [only] => (only, 1.0),
+        [.., before, last] => (last, if last > 0.0 { (before / last).log2() } else { highest }),
+    };
+    // Slower than the square root of the size: what is left may be as much as what has gone.
+    let order = order.clamp(0.5, highest);
+    (last / (2f64.powf(order) - 1.0), order)
+}
+
+fn reactions(
+    supports: usize,
+    problem: &super::Problem,
+    holder: &[[Option<usize>; 2]],
+    solution: &Solution,
+) -> Vec<Reaction> {
+    let (forces, loads) = (solution.nodal_forces(), super::assemble::nodal_loads(problem));
+    let mut reactions = vec![Reaction::default(); supports];
+    for (node, holders) in holder.iter().enumerate() {
+        let lever = [-solution.mesh().y()[node], solution.mesh().x()[node]];
+        for axis in 0..2 {
+            if let Some(support) = holders[axis] {
+                let force = forces[node][axis] - loads[node][axis];
+                reactions[support].force[axis] += force;
+                reactions[support].moment += lever[axis] * force;
+            }
+        }
+    }
+    reactions
+}
+
+impl ShapeSolution {
+    /// The solution on the finest mesh.
+    pub fn solution(&self) -> &Solution {
+        &self.solution
+    }
+
+    /// The meshes solved on, the coarsest first.
+    pub fn levels(&self) -> &[Level] {
+        &self.levels
+    }
+
+    pub fn error(&self) -> EstimatedError {
+        self.error
+    }
+
+    /// Of each support, in the order of the problem's.
+    pub fn reactions(&self) -> &[Reaction] {
+        &self.reactions
+    }
+
+    /// Strain energy \[J\].
+    pub fn strain_energy(&self) -> f64 {
+        self.levels.last().map_or(0.0, |level| level.energy)
+    }
+
+    /// Displacement \[m\] at points \[m\] of the undeformed body, shape \[points\]; points outside it, but nearer than
+    /// the problem's reach, take that of the nearest cell, continued to them.
+    ///
+    /// # Errors
+    /// [`FemError::OutsideMesh`] names the first point further outside.
+    pub fn displacements_at(&self, points: &[Point]) -> Result<Vec<Point>, FemError> {
+        self.displacements_within(points, self.reach)
+    }
+
+    /// The same for points no further outside than another `reach` \[m\].
+    ///
+    /// # Errors
+    /// As [`ShapeSolution::displacements_at`].
+    pub fn displacements_within(&self, points: &[Point], reach: f64) -> Result<Vec<Point>, FemError> {
+        let (x, y): (Vec<f64>, Vec<f64>) = points.iter().map(|p| (p[0], p[1])).unzip();
+        self.solution.displacements_within(&x, &y, reach)
+    }
+
+    /// Stress [N/m2] at points \[m\] of the undeformed body, shape \[points\]: inside recovered from the cells around
+    /// ([`Solution::stress_at_points`]), on the boundary, where that has cells on one side only and is less accurate
+    /// than the cells themselves, the mean of the cells that have a side there.
+    ///
+    /// # Errors
+    /// As [`ShapeSolution::displacements_at`].
+    pub fn stress_at(&self, points: &[Point]) -> Result<Vec<Stress>, FemError> {
+        self.stress_within(points, self.reach)
+    }
+
+    /// The same for points no further outside than another `reach` \[m\].
+    ///
+    /// # Errors
+    /// As [`ShapeSolution::displacements_at`].
+    pub fn stress_within(&self, points: &[Point], reach: f64) -> Result<Vec<Stress>, FemError> {
+        let (x, y): (Vec<f64>, Vec<f64>) = points.iter().map(|p| (p[0], p[1])).unzip();
+        self.solution.interpolated_within(&self.nodal_stress(), &x, &y, reach)
+    }
+
+    fn nodal_stress(&self) -> Vec<Stress> {
+        let (mesh, mut stress) = (self.solution.mesh(), self.solution.stress_at_points());
+        let mut sums: BTreeMap<u32, (Stress, f64)> = BTreeMap::new();
+        for side in mesh.boundary() {
+            for local in mesh.kind().side_nodes(side.side as usize) {
+                let node = mesh.cell(side.cell as usize)[local];
+                let own = self.solution.stress_at_node(side.cell as usize, local);
+                let (sum, count) = sums.entry(node).or_default();
+                let Stress { xx, yy, xy, zz } = *sum;
+                *sum = Stress { xx: xx + own.xx, yy: yy + own.yy, xy: xy + own.xy, zz: zz + own.zz };
+                *count += 1.0;
+            }
+        }
+        for (node, (Stress { xx, yy, xy, zz }, n)) in sums {
+            stress[node as usize] = Stress { xx: xx / n, yy: yy / n, xy: xy / n, zz: zz / n };
+        }
+        stress
+    }
+}

@@ -1,0 +1,208 @@
+//! What the cells of a body carry: strain, stress and strain energy, cell by cell and around each particle.
+//!
+//! Under small rotations a cell's strain is its mean strain in the axes of the plane. Corotated, the cell is first
+//! turned back by the rotation of its mean deformation gradient, as the rule does, so that a body turned by any angle is
+//! not strained; strain and stress are then those in the axes of the reference configuration.
+
+use nalgebra::DVector;
+use rayon::prelude::*;
+
+use super::cells::Cells;
+use super::elastic::Elastic;
+use super::stiffness::{ShapeError, area, element, mean_gradients, mean_strain};
+use crate::flock::points::Points;
+use crate::flock::rules::Rotation;
+
+/// The state of a cell, or of the cells around a particle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StressState {
+    /// Mean strain (xx, yy, engineering xy) \[1\].
+    pub strain: [f64; 3],
+    /// xx, yy, xy \[force / length^2\].
+    pub components: [f64; 3],
+    /// \[force / length^2\]
+    pub von_mises: f64,
+}
+
+impl StressState {
+    fn of(strain: [f64; 3], elastic: &Elastic) -> Self {
+        Self { strain, components: elastic.stress(strain), von_mises: elastic.von_mises(strain) }
+    }
+
+    /// The principal strain largest in size \[1\].
+    pub fn largest_strain(&self) -> f64 {
+        let [xx, yy, xy] = self.strain;
+        (0.5 * (xx + yy)).abs() + f64::hypot(0.5 * (xx - yy), 0.5 * xy)
+    }
+}
+
+/// Stress in each cell, at its centre on a quadrilateral, under these displacements \[length\], shape \[cells\].
+pub fn of_cells(
+    cells: &Cells,
+    elastic: &Elastic,
+    displacement: &Points,
+    rotation: Rotation,
+) -> Vec<StressState> {
+    let of_cell = |cell: usize| {
+        let local = local(cells, cell, displacement, rotation);
+        StressState::of(mean_strain(cells.shape(cell), |k| local[k]), elastic)
+    };
+    (0..cells.count()).into_par_iter().map(of_cell).collect()
+}
+
+/// Stress around each of `particles` particles: the mean over its cells, each weighted by its area. That smooths
+/// peaks, at free edges most of all. `None` for particles in no cell, and in those left out by `counts` alone.
+pub fn at_particles(
+    cells: &Cells,
+    elastic: &Elastic,
+    of_cells: &[StressState],
+    particles: usize,
+    counts: impl Fn(usize) -> bool,
+) -> Vec<Option<StressState>> {
+    let mut sums = vec![([0.0; 3], 0.0); particles];
+    let areas: Vec<f64> = cells.shapes.iter().map(|shape| area(shape)).collect();
+    for (cell, corners) in cells.iter().enumerate().filter(|&(cell, _)| counts(cell)) {
+        let weight = areas[cells.kind[cell] as usize];
+        for &corner in corners {
+            let (sum, whole) = &mut sums[corner as usize];
+            sum.iter_mut().zip(of_cells[cell].strain).for_each(|(sum, strain)| *sum += weight * strain);
+            *whole += weight;
+        }
+    }
+    let mean = |(sum, whole): ([f64; 3], f64)| {
+        (whole > 0.0).then(|| StressState::of(sum.map(|component| component / whole), elastic))
+    };
+    sums.into_iter().map(mean).collect()
+}
+
+/// Strain energy of the cells \[force length\] under displacements \[length\] of their corners.
+///
+/// # Errors
+/// A cell that has no stiffness; those of lattices all have one.
+pub fn strain_energy(
+    cells: &Cells,
+    elastic: &Elastic,
+    displacement: &Points,
+    rotation: Rotation,
+) -> Result<f64, ShapeError> {
+    let elements: Result<Vec<_>, _> =
+        cells.shapes.iter().map(|shape| element(shape, elastic.stiffness())).collect();
+    let elements = elements?;
+    let of_cell = |cell: usize| {
+        let local = local(cells, cell, displacement, rotation);
+        let u = DVector::from_iterator(2 * local.len(), local.into_iter().flatten());
+        0.5 * u.dot(&(&elements[cells.kind[cell] as usize] * &u))
+    };
+    Ok((0..cells.count()).map(of_cell).sum())
+}
+
+/// How far each cell is turned \[rad\], shape \[cells\].
+pub fn turns<'a>(cells: &'a Cells, displacement: &'a Points) -> impl Iterator<Item = f64> + 'a {
+    (0..cells.count()).map(move |cell| turn(cells.shape(cell), &relative(cells, cell, displacement)))
+}
+
+/// Displacement of a cell's corners in the axes that turn with the cell, less that of the first \[length\].
+fn local(cells: &Cells, cell: usize, displacement: &Points, rotation: Rotation) -> Vec<[f64; 2]> {
+    let shape = cells.shape(cell);
+    let mut local = relative(cells, cell, displacement);
+    if rotation == Rotation::Corotated {
+        let (sin, cos) = turn(shape, &local).sin_cos();
+        for (moved, [x, y]) in local.iter_mut().zip(shape) {
+            let [u, v] = [x + moved[0], y + moved[1]];
+            *moved = [cos * u + sin * v - x, cos * v - sin * u - y];
+        }
+    }
+    local
+}
+
+/// Displacement of a cell's corners less that of the first \[length\]: a translation must not cost digits.
+fn relative(cells: &Cells, cell: usize, displacement: &Points) -> Vec<[f64; 2]> {
+    let corners = cells.of(cell);
+    let first = displacement.get(corners[0] as usize);
+    let relative = |&i: &u32| {
+        let u = displacement.get(i as usize);
+        [u[0] - first[0], u[1] - first[1]]
+    };
+    corners.iter().map(relative).collect()
+}
+
+/// The rotation of the mean deformation gradient \[rad\].
+fn turn(shape: &[[f64; 2]], displacement: &[[f64; 2]]) -> f64 {
+    let (mut skew, mut trace) = (0.0, 2.0);
+    for ([gx, gy], [u, v]) in mean_gradients(shape).into_iter().zip(displacement) {
+        skew += gx * v - gy * u;
+        trace += gx * u + gy * v;
+    }
+    skew.atan2(trace)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flock::body::{Body, Cut};
+    use crate::flock::lattice::{Lattice, LatticeKind};
+    use crate::material::cells::neighbourhood;
+    use crate::material::elastic::{Constants, Plane};
+
+    fn sheet(kind: LatticeKind) -> (Body, Cells, Elastic) {
+        let lattice = Lattice::new(kind, [3.0, 1.0], 0.3);
+        let near = neighbourhood(&lattice);
+        let (body, _) =
+            Body::build(lattice, &Cut::Count { columns: 5, rows: 6 }, &near, None).expect("builds");
+        let cells = Cells::of_body(&body);
+        let constants = Constants::Isotropic { young: 1000.0, poisson: 0.3, plane: Plane::Stress };
+        (body, cells, Elastic::new(constants, 0.5).expect("admissible"))
+    }
+
+    /// Uniaxial tension of 2 along x, then a turn by `angle`.
+    fn pulled(body: &Body, angle: f64) -> Points {
+        let (sin, cos) = angle.sin_cos();
+        let place = |[x, y]: [f64; 2]| {
+            let [a, b] = [x * (1.0 + 2e-3), y * (1.0 - 0.6e-3)];
+            [cos * a - sin * b - x, sin * a + cos * b - y]
+        };
+        body.reference.iter().map(place).collect()
+    }
+
+    #[test]
+    fn uniaxial_tension_has_its_stress_in_every_cell_and_particle_of_every_lattice() {
+        for kind in LatticeKind::SAMPLES {
+            let (body, cells, elastic) = sheet(kind);
+            for (angle, rotation) in [(0.0, Rotation::Small), (2.0, Rotation::Corotated)] {
+                let u = pulled(&body, angle);
+                let found = of_cells(&cells, &elastic, &u, rotation);
+                let around = at_particles(&cells, &elastic, &found, body.count(), |_| true);
+                for stress in found.iter().chain(around.iter().flatten()) {
+                    let [xx, yy, xy] = stress.components;
+                    assert!(
+                        (xx - 2.0).abs() < 1e-11 && yy.abs() < 1e-11 && xy.abs() < 1e-11,
+                        "{kind:?} {stress:?}"
+                    );
+                    assert!((stress.von_mises - 2.0).abs() < 1e-11, "{kind:?} {stress:?}");
+                }
+                let covered: f64 = (0..cells.count()).map(|cell| area(cells.shape(cell))).sum();
+                let expected = 0.5 * 2.0 * 2e-3 * 0.5 * covered;
+                let energy = strain_energy(&cells, &elastic, &u, rotation).expect("cells");
+                assert!((energy / expected - 1.0).abs() < 1e-11, "{kind:?}: {energy}, expected {expected}");
+                assert!(turns(&cells, &u).all(|turn| (turn - angle).abs() < 1e-12));
+            }
+        }
+    }
+
+    #[test]
+    fn a_particle_has_the_mean_of_its_cells_by_area() {
+        let mut cells = Cells::of_kinds(vec![
+            vec![[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]],
+            vec![[0.0, 0.0], [3.0, 0.0], [3.0, 1.0], [0.0, 1.0]],
+        ]);
+        cells.push(&[0, 1, 4, 3], 0);
+        cells.push(&[1, 2, 5, 4], 1);
+        let (_, _, elastic) = sheet(LatticeKind::SAMPLES[0]);
+        let stretched: Points = [0.0, 1e-3, 1e-3, 0.0, 1e-3, 1e-3].into_iter().map(|u| [u, 0.0]).collect();
+        let found = of_cells(&cells, &elastic, &stretched, Rotation::Small);
+        let around = at_particles(&cells, &elastic, &found, 7, |_| true);
+        let xx = |i: usize| around[i].expect("in a cell").strain[0];
+        assert!((xx(0) - 1e-3).abs() < 1e-15 && (xx(1) - 0.25e-3).abs() < 1e-15 && xx(5).abs() < 1e-15);
+        assert_eq!(around[6], None);
+    }
+}

@@ -1,0 +1,73 @@
+//! What numbers are measured in, as text for tables, pictures and words.
+
+use super::Scene;
+
+/// Units by name. A scene names that of length and may name that of stress; the others follow.
+#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
+pub struct Units {
+    pub length: String,
+    /// Of Young's modulus, tractions and stresses.
+    pub stress: String,
+    pub force: String,
+    /// Of moments, energies and work.
+    pub moment: String,
+}
+
+/// Stress times the square of a length that has a name of its own.
+const FORCES: [(&str, &str, &str); 14] = [
+    ("Pa", "m", "N"),
+    ("kPa", "m", "kN"),
+    ("MPa", "m", "MN"),
+    ("GPa", "m", "GN"),
+    ("kPa", "mm", "mN"),
+    ("MPa", "mm", "N"),
+    ("GPa", "mm", "kN"),
+    ("Pa", "mm", "µN"),
+    ("N/mm^2", "mm", "N"),
+    ("N/mm²", "mm", "N"),
+    ("N/m^2", "m", "N"),
+    ("N/m²", "m", "N"),
+    ("psi", "in", "lbf"),
+    ("ksi", "in", "kip"),
+];
+
+impl Units {
+    pub fn of(scene: &Scene) -> Self {
+        Self::new(scene.unit(), scene.raw.stress_unit.as_deref())
+    }
+
+    fn new(length: &str, stress: Option<&str>) -> Self {
+        let Some(stress) = stress else {
+            // Whatever Young's modulus is given in.
+            let times = |power: &str| format!("unit of young × {length}{power}");
+            return Self {
+                length: length.into(),
+                stress: "unit of young".into(),
+                force: times("²"),
+                moment: times("³"),
+            };
+        };
+        let named =
+            FORCES.iter().find(|(of_stress, of_length, _)| (*of_stress, *of_length) == (stress, length));
+        let (force, moment) = match named {
+            Some((.., force)) => ((*force).to_owned(), format!("{force} {length}")),
+            None => (format!("{stress} {length}²"), format!("{stress} {length}³")),
+        };
+        Self { length: length.into(), stress: stress.into(), force, moment }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_unit_of_force_follows_from_those_of_stress_and_length() {
+        let force = |stress: Option<&str>, length: &str| Units::new(length, stress).force;
+        assert_eq!(force(Some("Pa"), "m"), "N");
+        assert_eq!(force(Some("MPa"), "mm"), "N");
+        assert_eq!(force(Some("bar"), "cm"), "bar cm²");
+        assert_eq!(force(None, "m"), "unit of young × m²");
+        assert_eq!(Units::new("m", Some("Pa")).moment, "N m");
+    }
+}

@@ -1,0 +1,333 @@
+//! What a testing machine would read off a run: reactions, load steps, stress; and which figures are drawn.
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+
+use crate::program::*;
+
+/// A bar of 4 x 2 m that is pulled to the right; without contraction, so that the clamped end does not disturb.
+const BAR: &str = r#"
+title = "A bar under tension"
+unit = "m"
+stress_unit = "Pa"
+[lattice]
+kind = "square"
+spacing = 0.5
+[body]
+shape = { kind = "rectangle", min = [0.0, 0.0], max = [4.0, 2.0] }
+[material]
+kind = "isotropic"
+young = 210e9
+poisson = 0.0
+thickness = 1e-3
+[rule]
+mean = { kind = "material" }
+[[roles]]
+region = { kind = "edge", side = "left" }
+role = "clamped"
+"#;
+
+const PULL: &str = r#"
+[[loads]]
+kind = "traction"
+region = { kind = "edge", side = "right" }
+traction = [50e3, 0.0]
+"#;
+
+/// The right end is led by 0.004 m instead, a strain of 1e-3.
+const LEAD: &str = r#"
+[[roles]]
+region = { kind = "edge", side = "right" }
+role = "leader"
+motion = { kind = "keyframes", frames = [{ step = 10, displacement = [0.004, 0.0] }] }
+[stop]
+steps = 10
+"#;
+
+const SOLVED: &str = "[equilibrium]\nsolver = \"direct\"\n";
+
+/// Runs a scene of these parts without figures, which must end with this exit code; what it said, and its folder.
+fn run(parts: &[&str], more: &[&str], code: i32) -> (tempfile::TempDir, String) {
+    let folder = temporary();
+    std::fs::write(folder.path().join("bar.toml"), parts.concat()).expect("written");
+    let arguments = [&["run", "bar.toml", "--out", "o", "--no-report"][..], more].concat();
+    let output = flockform(&arguments, folder.path());
+    let said = text(&output.stdout) + &text(&output.stderr);
+    assert_eq!(output.status.code(), Some(code), "{said}");
+    (folder, said)
+}
+
+fn bundled(scene: &str, sets: &[&str]) -> (tempfile::TempDir, String) {
+    let folder = temporary();
+    let mut arguments = vec!["run", scene, "--out", "o", "--no-report", "--figures", "none"];
+    sets.iter().for_each(|set| arguments.extend(["--set", set]));
+    let output = flockform(&arguments, folder.path());
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    (folder, text(&output.stdout))
+}
+
+fn summary(folder: &Path) -> Value {
+    let text = std::fs::read_to_string(folder.join("o/summary.json")).expect("written");
+    serde_json::from_str(&text).expect("valid JSON")
+}
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
+}
+
+/// The columns of a table by name; what is empty is NaN.
+fn table(path: PathBuf) -> HashMap<String, Vec<f64>> {
+    let mut reader = csv::Reader::from_path(path).expect("readable");
+    let names: Vec<String> = reader.headers().expect("a header").iter().map(str::to_owned).collect();
+    let mut columns: HashMap<String, Vec<f64>> =
+        names.iter().map(|name| (name.clone(), Vec::new())).collect();
+    for row in reader.records() {
+        for (name, text) in names.iter().zip(row.expect("a row").iter()) {
+            columns.get_mut(name).expect("a column").push(text.parse().unwrap_or(f64::NAN));
+        }
+    }
+    columns
+}
+
+fn near(found: f64, expected: f64, size: f64) -> bool {
+    (found - expected).abs() <= 1e-8 * size
+}
+
+#[test]
+fn the_clamp_of_the_loaded_beam_returns_force_and_moment_of_the_load_and_the_energy_is_half_the_work() {
+    let (folder, said) = bundled("beam-loaded", &[]);
+    let measured = summary(folder.path())["mechanics"].clone();
+    let (reaction, load) = (&measured["reactions"][0], &measured["load"]);
+    assert_eq!((&reaction["key"], &reaction["role"]), (&"roles[0]".into(), &"clamped".into()));
+    for (k, expected) in [(0, 0.0), (1, 550.0)] {
+        assert!(near(number(&load["force"][k]), expected, 550.0), "{load}");
+        assert!(near(number(&reaction["force"][k]), -expected, 550.0), "{reaction}");
+    }
+    // Half of the beam's 11 on either side of its middle height, the load 11 from the clamp, 21 from the origin.
+    assert!(near(number(&load["moment_about_origin"]), 550.0 * 21.0, 11550.0), "{load}");
+    assert!(near(number(&reaction["moment_about_origin"]), -550.0 * 21.0, 11550.0), "{reaction}");
+    assert!(near(number(&reaction["moment"]), -550.0 * 11.0, 6050.0), "{reaction}");
+    let (energy, work) = (number(&measured["strain_energy"]), number(&measured["work"]["loads"]));
+    assert!(energy > 0.0 && near(2.0 * energy, work, work), "{energy} {work}");
+    assert_eq!(number(&measured["work"]["supports"]), 0.0);
+    assert!(number(&measured["unbalanced"]) < 1e-6);
+    for words in ["reactions, force [unit of young × m²]", "roles[0] (clamped, 12 particles)  (0, -550.00)"]
+    {
+        assert!(said.contains(words), "no `{words}` in\n{said}");
+    }
+    // A third of strain is not small.
+    let cautions = summary(folder.path())["cautions"].clone();
+    assert!(
+        cautions[0].as_str().is_some_and(|caution| caution.contains("strains of up to 30 %")),
+        "{cautions}"
+    );
+    assert!(said.contains("caution: strains of up to 30 %"), "{said}");
+}
+
+#[test]
+fn a_bar_in_uniaxial_tension_has_the_stress_of_its_load_everywhere() {
+    let (folder, said) = run(&[BAR, PULL, SOLVED], &["--figures", "none"], 0);
+    let summary = summary(folder.path());
+    let measured = &summary["mechanics"];
+    assert!(near(number(&measured["largest_von_mises"]["von_mises"]), 50e3, 50e3), "{measured}");
+    // 50 kPa on 2 m x 1 mm.
+    assert!(near(number(&measured["reactions"][0]["force"][0]), -100.0, 100.0), "{measured}");
+    assert_eq!(measured["units"]["force"], "N");
+    assert!(
+        said.contains("force [N] and moment [N m]") && said.contains("von Mises stress 50000 Pa"),
+        "{said}"
+    );
+    assert!(!said.contains("caution") && summary["cautions"].is_null(), "{said}");
+    let end = table(folder.path().join("o/final.csv"));
+    assert_eq!(end["von_mises"].len(), 45);
+    for (name, expected) in [("stress_xx", 50e3), ("stress_yy", 0.0), ("stress_xy", 0.0), ("von_mises", 50e3)]
+    {
+        assert!(end[name].iter().all(|found| near(*found, expected, 50e3)), "{name}: {:?}", end[name]);
+    }
+}
+
+#[test]
+fn a_led_region_returns_its_force_and_the_supports_do_the_work() {
+    let (folder, _) = run(&[BAR, LEAD, SOLVED], &["--figures", "none"], 0);
+    let measured = summary(folder.path())["mechanics"].clone();
+    // E times the strain of 1e-3 on 2 m x 1 mm.
+    let force = 210e9 * 1e-3 * 2e-3;
+    let [clamped, led] = [0, 1].map(|k| measured["reactions"][k].clone());
+    assert!(
+        near(number(&led["force"][0]), force, force) && near(number(&clamped["force"][0]), -force, force)
+    );
+    assert!(near(number(&led["displacement"][0]), 0.004, 0.004), "{led}");
+    let work = number(&measured["work"]["supports"]);
+    assert!(near(work, 0.004 * force, work) && near(2.0 * number(&measured["strain_energy"]), work, work));
+    assert!(measured["load"].is_null(), "{measured}");
+}
+
+#[test]
+fn a_roller_returns_force_along_its_axis_alone_and_every_load_has_its_own_resultant() {
+    let rollers = r#"
+[[roles]]
+region = { kind = "edge", side = "left" }
+role = "clamped"
+axis = "x"
+[[roles]]
+region = { kind = "edge", side = "bottom" }
+role = "clamped"
+axis = "y"
+[[loads]]
+kind = "body"
+force = [0.0, -25e3]
+"#;
+    let (bar, _) = BAR.split_once("[[roles]]").expect("has a clamp");
+    let bar = bar.replace("poisson = 0.0", "poisson = 0.3");
+    let (folder, said) = run(&[&bar, PULL, rollers, SOLVED], &["--figures", "none"], 0);
+    let measured = summary(folder.path())["mechanics"].clone();
+    // 25 kPa/m on 8 m2 x 1 mm weigh 200 N.
+    for (k, force) in [(0, [-100.0, 0.0]), (1, [0.0, 200.0])] {
+        let reaction = &measured["reactions"][k];
+        assert!((0..2).all(|axis| near(number(&reaction["force"][axis]), force[axis], 200.0)), "{reaction}");
+    }
+    for (k, force) in [(0, [100.0, 0.0]), (1, [0.0, -200.0])] {
+        let load = &measured["loads"][k];
+        assert!((0..2).all(|axis| near(number(&load["force"][axis]), force[axis], 200.0)), "{load}");
+    }
+    assert!(number(&measured["unbalanced"]) < 1e-5, "{measured}");
+    for words in ["loads[0]  (100.00, 0) N", "loads[1]  (0, -200.00) N", "loads in all"] {
+        assert!(said.contains(words), "no `{words}` in\n{said}");
+    }
+}
+
+#[test]
+fn increments_of_a_linear_body_lie_on_a_line_and_a_schedule_comes_back() {
+    let (folder, said) = bundled("beam-loaded", &["load_steps={increments=4}"]);
+    assert!(said.contains("increment 4"), "{said}");
+    let rows = table(folder.path().join("o/load.csv"));
+    assert_eq!(rows["increment"], [0.0, 1.0, 2.0, 3.0, 4.0]);
+    assert_eq!(rows["factor"], [0.0, 0.25, 0.5, 0.75, 1.0]);
+    for (name, power) in
+        [("load.fy", 1), ("load.displacement", 1), ("roles[0].fy", 1), ("von_mises", 1), ("strain_energy", 2)]
+    {
+        let last = rows[name][4];
+        assert!(last != 0.0, "{name}");
+        for (found, part) in rows[name].iter().zip(&rows["factor"]) {
+            assert!(near(*found, last * part.powi(power), last.abs()), "{name} at {part}: {found}");
+        }
+    }
+    let (turned, _) = bundled(
+        "beam-loaded",
+        &[
+            "load_steps={schedule=[0.5, 1.0, 0.5, 0.0]}",
+            "rule.mean.rotation=corotated",
+            "equilibrium.tolerance=1e-11",
+        ],
+    );
+    let rows = table(turned.path().join("o/load.csv"));
+    let by = &rows["load.displacement"];
+    assert!(near(by[1], by[3], by[2]) && near(by[4], 0.0, by[2]), "unloading goes the way back: {by:?}");
+    assert!(by[2] < 1.98 * by[1], "a bent beam is stiffer: {by:?}");
+    for (reaction, load) in rows["roles[0].fy"].iter().zip(&rows["load.fy"]) {
+        assert!(near(*reaction, -load, 550.0), "action is reaction: {reaction} {load}");
+    }
+    assert_eq!(summary(turned.path())["steps"], 4);
+}
+
+#[test]
+fn a_schedule_that_ends_with_the_whole_load_ends_where_the_load_at_once_does() {
+    let sets = ["rule.mean.rotation=corotated", "equilibrium.tolerance=1e-10"];
+    let (at_once, _) = bundled("beam-loaded", &sets);
+    let (in_parts, _) =
+        bundled("beam-loaded", &[sets[0], sets[1], "load_steps={schedule=[0.3, 0.1, 0.8, 1.0]}"]);
+    let [at_once, in_parts] = [at_once, in_parts].map(|folder| table(folder.path().join("o/final.csv")));
+    for (a, b) in at_once["y"].iter().zip(&in_parts["y"]) {
+        assert!((a - b).abs() < 1e-7, "{a} {b}");
+    }
+}
+
+#[test]
+fn a_load_follows_the_steps_of_a_sweep_and_leaders_are_measured_on_their_way() {
+    let steps = "[stop]\nsteps = 400\n[load_steps]\nramp = { steps = 200 }\nevery = 50\n";
+    let (folder, _) = run(&[BAR, PULL, steps], &["--figures", "none"], 0);
+    let rows = table(folder.path().join("o/load.csv"));
+    assert_eq!(rows["step"], [0.0, 50.0, 100.0, 150.0, 200.0, 250.0, 300.0, 350.0, 400.0]);
+    assert_eq!(rows["factor"], [0.0, 0.25, 0.5, 0.75, 1.0, 1.0, 1.0, 1.0, 1.0]);
+    assert!(near(rows["load.fx"][2], 50.0, 100.0) && near(rows["load.fx"][8], 100.0, 100.0), "{rows:?}");
+    // What is not yet at rest is said to be so: the clamp has not heard of the whole load.
+    let (reaction, left) =
+        (rows["roles[0].fx"][8], number(&summary(folder.path())["mechanics"]["unbalanced"]));
+    assert!(reaction > -100.0 && left > 0.0, "{reaction} {left}");
+    let (folder, _) = run(&[BAR, LEAD, "[load_steps]\nevery = 5\n"], &["--figures", "none"], 0);
+    let rows = table(folder.path().join("o/load.csv"));
+    assert!(rows["step"].len() == 3 && near(rows["roles[1].ux"][1], 0.002, 0.002), "{rows:?}");
+}
+
+#[test]
+fn load_steps_that_make_no_sense_are_refused_by_name() {
+    let refused = |parts: &[&str], words: &[&str]| {
+        let (_folder, said) = run(parts, &[], 2);
+        for word in words {
+            assert!(said.contains(word), "no `{word}` in\n{said}");
+        }
+    };
+    let steps = |keys: &str| format!("[load_steps]\n{keys}\n");
+    refused(&[BAR, PULL, SOLVED, &steps("ramp = { steps = 3 }")], &["load_steps.ramp", "increments"]);
+    refused(&[BAR, PULL, SOLVED, &steps("")], &["gives no parts", "increments = 10"]);
+    refused(&[BAR, PULL, SOLVED, &steps("increments = 3\nschedule = [1.0]")], &["both", "either"]);
+    refused(
+        &[BAR, PULL, SOLVED, &steps("schedule = [0.5, 1.5]")],
+        &["load_steps.schedule[1]", "from 0 to 1"],
+    );
+    refused(&[BAR, PULL, SOLVED, &steps("schedule = []")], &["load_steps.schedule"]);
+    refused(&[BAR, PULL, SOLVED, &steps("increments = 0")], &["load_steps.increments"]);
+    refused(&[BAR, PULL, &steps("increments = 3")], &["load_steps.increments", "add [equilibrium]"]);
+    refused(&[BAR, PULL, &steps("ramp = { steps = 3000 }")], &["load_steps.ramp.steps", "stop.steps"]);
+    refused(&[BAR, LEAD, &steps("ramp = { steps = 3 }")], &["no load that could grow", "every"]);
+    refused(&[BAR, PULL, &steps("")], &["says nothing", "every"]);
+    let folder = temporary();
+    let output = flockform(&["run", "tension", "--set", "load_steps={every=5}"], folder.path());
+    assert_eq!(output.status.code(), Some(2));
+    assert!(text(&output.stderr).contains("add [material]"), "{}", text(&output.stderr));
+}
+
+#[test]
+fn a_body_that_finds_no_rest_under_more_load_keeps_what_it_had() {
+    let sets = ["rule.mean.rotation=corotated", "loads[0].traction=[0.0, 1e7]"];
+    let parts = "load_steps={schedule=[1e-6, 1.0]}";
+    let folder = temporary();
+    let mut arguments = vec!["run", "beam-loaded", "--out", "o", "--no-report", "--figures", "none"];
+    sets.iter().chain([&parts]).for_each(|set| arguments.extend(["--set", set]));
+    let output = flockform(&arguments, folder.path());
+    let said = text(&output.stdout);
+    assert_eq!(output.status.code(), Some(1), "{said}{}", text(&output.stderr));
+    assert!(said.contains("increment 1,") && said.contains("not at 1 of the load"), "{said}");
+    assert_eq!(summary(folder.path())["stop_reason"], "stuck");
+    assert_eq!(table(folder.path().join("o/load.csv"))["factor"], [0.0, 1e-6]);
+}
+
+#[test]
+fn figures_are_drawn_as_the_files_asked_for_and_the_report_is_named() {
+    let drawn = |formats: &str| {
+        let (folder, said) = run(&[BAR, PULL, SOLVED], &["--figures", formats], 0);
+        assert!(!said.contains("report.html"), "{said}");
+        let count = |ending: &str| {
+            let is = |path: &&PathBuf| path.extension().is_some_and(|found| found == ending);
+            files(&folder.path().join("o")).iter().filter(is).count()
+        };
+        (count("svg"), count("png"), folder)
+    };
+    for (formats, svg, png) in [("none", 0, 0), ("svg", 4, 0), ("png", 0, 4), ("all", 4, 4)] {
+        let (found_svg, found_png, _folder) = drawn(formats);
+        assert_eq!((found_svg, found_png), (svg, png), "{formats}");
+    }
+    let (.., folder) = drawn("svg");
+    // A strain of 1e-7 is drawn so that it is seen, and the heading says so.
+    let picture = std::fs::read_to_string(folder.path().join("o/von_mises_1000.svg")).expect("drawn");
+    assert!(picture.contains("displacements enlarged") && picture.contains("von Mises stress"), "{picture}");
+    let folder = temporary();
+    let output = flockform(&["run", "tension", "--steps", "2", "--figures", "none"], folder.path());
+    let said = text(&output.stdout);
+    assert!(said.contains("open ") && said.contains("out/tension/report.html"), "{said}");
+    assert!(folder.path().join("out/tension/report.html").is_file());
+    let output = flockform(&["run", "tension", "--figures", "gif"], folder.path());
+    assert_eq!(output.status.code(), Some(2));
+}

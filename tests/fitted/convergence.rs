@@ -1,0 +1,139 @@
+//! Displacements of second order on every lattice in any direction: a ring under pressure, a plate with a hole, a bent beam.
+
+use crate::support::{KINDS, error, lattice, scene, scene_in, solved, table};
+
+const ORIENTATIONS: [f64; 12] = [0.0, 7.5, 15.0, 22.5, 30.0, 37.5, 45.0, 52.5, 60.0, 67.5, 75.0, 82.5];
+
+/// Order between spacings 0.5 and 0.25 of the errors' root mean square over the orientations.
+fn order(kind: &str, error_at: impl Fn(f64, f64) -> f64) -> (f64, [f64; 2]) {
+    let rms = [0.5, 0.25].map(|h| {
+        let squares = ORIENTATIONS.map(|orientation| error_at(h, orientation).powi(2));
+        (squares.iter().sum::<f64>() / ORIENTATIONS.len() as f64).sqrt()
+    });
+    ((rms[0] / rms[1]).log2(), rms)
+}
+
+#[test]
+fn a_ring_under_pressure_converges_with_order_two() {
+    // G. Lame's ring from 4 to 10 in plane strain; a quarter of it.
+    let parts = r#"
+material = { kind = "isotropic", young = 1000.0, poisson = 0.3, plane = "strain" }
+roles = [
+    { region = { kind = "outline", pieces = [1] }, role = "clamped", axis = "y" },
+    { region = { kind = "outline", pieces = [3] }, role = "clamped", axis = "x" },
+]
+loads = [{ kind = "pressure", region = { kind = "outline", pieces = [4] }, pressure = 10.0 }]
+[body.shape]
+kind = "path"
+from = [4.0, 0.0]
+steps = [
+    { to = [10.0, 0.0] },
+    { to = [0.0, 10.0], centre = [0.0, 0.0] },
+    { to = [0.0, 4.0] },
+    { to = [4.0, 0.0], centre = [0.0, 0.0], clockwise = true },
+]
+"#;
+    let (young, nu, a, b, p) = (1000.0, 0.3, 4.0f64, 10.0f64, 10.0);
+    let factor = (1.0 + nu) * p * a * a / (young * (b * b - a * a));
+    let exact = |[x, y]: [f64; 2]| {
+        let r = x.hypot(y);
+        let u = factor * ((1.0 - 2.0 * nu) * r + b * b / r);
+        [u * x / r, u * y / r]
+    };
+    for kind in KINDS {
+        let (order, errors) = order(kind, |h, orientation| {
+            let scene = scene(&lattice(kind, h, orientation), parts).expect("a scene");
+            let (plan, outcome) = solved(&scene);
+            error(&plan, &outcome, exact)
+        });
+        assert!(order >= 1.8, "{kind}: order {order}, errors {errors:?}");
+    }
+}
+
+#[test]
+fn a_plate_with_a_hole_converges_with_order_two() {
+    // G. Kirsch's hole of radius 4 in a quarter of a plate, whose outer edges are led by the exact displacement.
+    let parts = r#"
+material = { kind = "isotropic", young = 1000.0, poisson = 0.3 }
+roles = [
+    { region = { kind = "outline", pieces = [1] }, role = "clamped", axis = "y" },
+    { region = { kind = "outline", pieces = [4] }, role = "clamped", axis = "x" },
+    { region = { kind = "outline", pieces = [2, 3] }, role = "leader", motion = { kind = "csv", file = "exact.csv" } },
+]
+[body.shape]
+kind = "path"
+from = [4.0, 0.0]
+steps = [
+    { to = [12.0, 0.0] },
+    { to = [12.0, 12.0] },
+    { to = [0.0, 12.0] },
+    { to = [0.0, 4.0] },
+    { to = [4.0, 0.0], centre = [0.0, 0.0], clockwise = true },
+]
+"#;
+    let (young, nu, a, tension) = (1000.0, 0.3, 4.0f64, 10.0);
+    let (shear, kappa) = (young / (2.0 * (1.0 + nu)), (3.0 - nu) / (1.0 + nu));
+    let exact = |[x, y]: [f64; 2]| {
+        let (r, t) = (x.hypot(y), y.atan2(x));
+        let scale = tension * a / (8.0 * shear);
+        let (q, c) = (a / r, a * a * a / (r * r * r));
+        [
+            scale
+                * (r / a * (kappa + 1.0) * t.cos() + 2.0 * q * ((1.0 + kappa) * t.cos() + (3.0 * t).cos())
+                    - 2.0 * c * (3.0 * t).cos()),
+            scale
+                * (r / a * (kappa - 3.0) * t.sin() + 2.0 * q * ((1.0 - kappa) * t.sin() + (3.0 * t).sin())
+                    - 2.0 * c * (3.0 * t).sin()),
+        ]
+    };
+    let folder = tempfile::tempdir().expect("a folder");
+    for kind in KINDS {
+        let (order, errors) = order(kind, |h, orientation| {
+            let lattice = lattice(kind, h, orientation);
+            let file = folder.path().join("exact.csv");
+            // Where the particles are is known once the body is laid out, which does not look at the motion.
+            let still = parts.replace(
+                "{ kind = \"csv\", file = \"exact.csv\" }",
+                "{ kind = \"velocity\", per_step = [0.0, 0.0] }",
+            );
+            let laid_out = solved(&scene(&lattice, &still).expect("a scene")).0;
+            table(&file, &laid_out.body.reference, exact, |[x, y]| x.max(y) > 11.999);
+            let scene =
+                scene_in(&lattice, parts, Some(folder.path())).unwrap_or_else(|error| panic!("{error}"));
+            let (plan, outcome) = solved(&scene);
+            error(&plan, &outcome, exact)
+        });
+        assert!(order >= 1.8, "{kind}: order {order}, errors {errors:?}");
+    }
+}
+
+#[test]
+fn a_bent_beam_converges_with_order_two() {
+    let parts = r#"
+body = { shape = { kind = "rectangle", min = [0.0, -2.0], max = [12.0, 2.0] } }
+material = { kind = "isotropic", young = 1000.0, poisson = 0.3 }
+roles = [{ region = { kind = "edge", side = "left" }, role = "leader", motion = { kind = "csv", file = "exact.csv" } }]
+loads = [{ kind = "traction", region = { kind = "edge", side = "right" }, traction = [10.0, 0.0], profile = { from = [12.0, 0.0], to = [12.0, 1.0], factors = [0.0, 1.0] } }]
+"#;
+    let exact = |[x, y]: [f64; 2]| {
+        let curvature = 10.0 / 1000.0;
+        [curvature * x * y, -0.5 * curvature * (x * x + 0.3 * y * y)]
+    };
+    let folder = tempfile::tempdir().expect("a folder");
+    for kind in KINDS {
+        let (order, errors) = order(kind, |h, orientation| {
+            let lattice = lattice(kind, h, orientation);
+            let still = parts.replace(
+                "{ kind = \"csv\", file = \"exact.csv\" }",
+                "{ kind = \"velocity\", per_step = [0.0, 0.0] }",
+            );
+            let laid_out = solved(&scene(&lattice, &still).expect("a scene")).0;
+            table(&folder.path().join("exact.csv"), &laid_out.body.reference, exact, |[x, _]| x < 1e-6);
+            let scene =
+                scene_in(&lattice, parts, Some(folder.path())).unwrap_or_else(|error| panic!("{error}"));
+            let (plan, outcome) = solved(&scene);
+            error(&plan, &outcome, exact)
+        });
+        assert!(order >= 1.8 || errors[1] < 1e-9, "{kind}: order {order}, errors {errors:?}");
+    }
+}

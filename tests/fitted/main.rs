@@ -1,0 +1,6 @@
+//! Bodies that keep their outline: what they promise, against closed forms, published figures and exact resultants.
+
+mod benchmarks;
+mod convergence;
+mod outlines;
+mod support;

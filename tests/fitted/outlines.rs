@@ -1,0 +1,107 @@
+//! Any polygon with a hole, on any lattice in any direction: areas, resultants, uniform strains, quality.
+
+use flockform::flock::lattice::{Lattice, LatticeKind};
+use flockform::flock::points::Points;
+use flockform::geometry::outline::Outline;
+use flockform::geometry::portion::Selection;
+use flockform::material::elastic::{Constants, Elastic, Plane};
+use flockform::material::fit::{Fitted, LEAST_AREA, LEAST_SIDE, fit};
+use flockform::material::outline_loads::{Load, Loader, OutlineLoad, Push, Resultant};
+use flockform::material::stiffness::area;
+use flockform::material::weights::MaterialWeights;
+
+/// Uniform numbers from 0 to 1, the same ones every time.
+struct Noise(u64);
+
+impl Noise {
+    fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    fn star(&mut self, centre: [f64; 2], [least, most]: [f64; 2], corners: usize) -> Vec<[f64; 2]> {
+        let corner = |k: usize| {
+            let angle = std::f64::consts::TAU * (k as f64 + 0.6 * self.next()) / corners as f64;
+            let radius = least + (most - least) * self.next();
+            [centre[0] + radius * angle.cos(), centre[1] + radius * angle.sin()]
+        };
+        (0..corners).map(corner).collect()
+    }
+
+    fn polygon_with_hole(&mut self) -> Outline {
+        let centre = [3.0 * self.next(), 3.0 * self.next()];
+        let (outer, inner) = (5 + (5.0 * self.next()) as usize, 3 + (4.0 * self.next()) as usize);
+        let polygons = [self.star(centre, [4.5, 8.0], outer), self.star(centre, [1.2, 2.2], inner)];
+        Outline::of_polygons(&polygons).expect("an outline")
+    }
+
+    fn fitted(&mut self, kind: LatticeKind) -> (Outline, Fitted) {
+        let outline = self.polygon_with_hole();
+        let lattice = Lattice::new(kind, [self.next(), self.next()], 3.0 * self.next());
+        let fitted = fit(&lattice, &outline).expect("fits");
+        (outline, fitted)
+    }
+}
+
+const KINDS: [LatticeKind; 6] = [
+    LatticeKind::Square { spacing: 1.0 },
+    LatticeKind::Rectangular { a: 1.0, b: 0.8 },
+    LatticeKind::CentredRectangular { a: 1.0, b: 1.0 },
+    LatticeKind::Hexagonal { spacing: 1.0 },
+    LatticeKind::Oblique { a: 1.0, b: 1.0, angle: 1.22 },
+    LatticeKind::Honeycomb { spacing: 0.577_350_269_189_625_8 },
+];
+
+#[test]
+fn five_hundred_polygons_with_holes_pass_the_patch_test_with_exact_areas_and_resultants() {
+    let mut noise = Noise(2021);
+    let steel = Constants::Isotropic { young: 1000.0, poisson: 0.3, plane: Plane::Stress };
+    let elastic = Elastic::new(steel, 1.0).expect("admissible");
+    let affine = |[x, y]: [f64; 2]| [2e-3 * x - 1e-3 * y, 0.5e-3 * x + 3e-3 * y];
+    let [xx, yy, xy] = elastic.stress([2e-3, 3e-3, -0.5e-3]);
+    for round in 0..500 {
+        let kind = KINDS[round % 6];
+        let (outline, Fitted { body, cells }) = noise.fitted(kind);
+        let label = format!("round {round}, {kind:?}");
+        let total: f64 = cells.kind.iter().map(|&k| area(&cells.shapes[k as usize])).sum();
+        assert!((total / outline.area() - 1.0).abs() < 1e-12, "{label}: area");
+        let quality = Fitted { body: body.clone(), cells: cells.clone() }.quality();
+        assert!(
+            quality.area >= LEAST_AREA - 1e-9 && quality.side >= LEAST_SIDE - 1e-9,
+            "{label}: {quality:?}"
+        );
+        assert!(quality.width > 0.3, "{label}: {quality:?}");
+
+        // The tractions of a uniform stress on every piece balance the stiffness of the uniform strain everywhere.
+        let loader = Loader::new(&cells, &body, Some(&outline));
+        let mut loads = Points::zeros(body.count());
+        for (ring, pieces) in outline.rings().iter().enumerate() {
+            for piece in pieces {
+                let [nx, ny] = piece.normal(0.5);
+                let traction = [xx * nx + xy * ny, xy * nx + yy * ny];
+                let only = Selection::Pieces { ring, pieces: vec![piece.number], angles: None };
+                let portions = outline.portions(&only, 1e-9);
+                let load = OutlineLoad { portions, push: Push::Traction(traction), profile: None };
+                let mut forces = Points::zeros(body.count());
+                loader.add(&Load::Outline(load), &mut forces).expect("fits");
+                let Resultant { force, moment } = Resultant::of(body.reference.iter().zip(forces.iter()));
+                let (length, middle) = (piece.length(), piece.point(0.5));
+                let exact = middle[0] * traction[1] - middle[1] * traction[0];
+                let off = (0..2).map(|k| (force[k] - length * traction[k]).abs()).fold(0.0, f64::max);
+                assert!(off < 1e-12 * length * 10.0 && (moment - length * exact).abs() < 1e-10, "{label}");
+                for i in 0..body.count() {
+                    let (sum, more) = (loads.get(i), forces.get(i));
+                    loads.set(i, [sum[0] + more[0], sum[1] + more[1]]);
+                }
+            }
+        }
+        let near = cells.mates(body.count());
+        let weights = MaterialWeights::assemble(&cells, &body, near, &elastic).expect("holds together");
+        let moved: Points = body.reference.iter().map(affine).collect();
+        for i in 0..body.count() {
+            let (pull, load) = (weights.force(i, &moved), loads.get(i));
+            let left = (pull[0] + load[0]).hypot(pull[1] + load[1]);
+            assert!(left < 1e-11, "{label}: {left:e} is left on particle {i}");
+        }
+    }
+}
