@@ -1,13 +1,15 @@
 //! Plane strain near nu = 1/2: displacements are as good as at nu = 0.3, on every lattice.
 
+use flockform::flock::body::{Body, Cut};
 use flockform::flock::lattice::{Lattice, LatticeKind};
 use flockform::flock::points::Points;
 use flockform::geometry::outline::Outline;
 use flockform::geometry::shape::Shape;
+use flockform::material::cells::{neighbourhood_of, without_loose_sites};
 use flockform::material::elastic::{Constants, Elastic, Plane};
 use flockform::material::fit::fit;
 use flockform::material::loads::{Loads, Traction};
-use flockform::material::weights::MaterialWeights;
+use flockform::material::weights::{MaterialWeights, WeightsError};
 
 use crate::support::*;
 
@@ -91,4 +93,56 @@ fn no_lattice_locks_near_incompressibility() {
             assert!(errors.iter().all(|error| error / errors[0] < 1.6), "{name} {kind:?}: {errors:?}");
         }
     }
+}
+
+#[test]
+fn averaged_dilatations_pass_the_patch_test_and_pull_back_alike() {
+    let elastic = slice(0.4999);
+    for spacings in SPACINGS {
+        let shape = Shape::Disc { centre: [0.3, 0.1], radius: 2.0 };
+        let outline = Outline::of_shape(&shape).expect("a disc");
+        let fitted = fit(&Lattice::new(spacings(0.4), [0.0; 2], 0.3), &outline).expect("fits");
+        let (body, cells) = (fitted.body, fitted.cells);
+        let near = cells.neighbours(body.count(), &elastic);
+        let weights = MaterialWeights::assemble(&cells, &body, near, &elastic).expect("assembles");
+        let affine: Points =
+            body.reference.iter().map(|[x, y]| [0.3 * x + 0.4 * y, 0.1 * x - 0.2 * y]).collect();
+        let on_edge = on_boundary(&cells, body.count());
+        for i in 0..body.count() {
+            let scale = weights.of(i).diagonal[0][0];
+            let [x, y] = weights.force(i, &affine);
+            assert!(on_edge[i] || x.hypot(y) < 1e-11 * scale, "{x} {y}");
+            for (j, block) in weights.bonds(i) {
+                let back = weights.bonds(j).find(|(k, _)| *k == i).expect("is felt back").1;
+                let apart =
+                    (0..4).map(|k| (block[k / 2][k % 2] - back[k % 2][k / 2]).abs()).fold(0.0, f64::max);
+                assert!(apart < 1e-12 * scale, "{i} {j}");
+            }
+        }
+    }
+}
+
+#[test]
+fn rows_of_averaged_dilatations_are_kept_by_class_on_a_lattice() {
+    let elastic = slice(0.49);
+    for kind in KINDS {
+        let classes = |size: u32| {
+            let lattice = Lattice::new(kind, [0.0; 2], 0.0);
+            let near = neighbourhood_of(&lattice, &elastic);
+            let cut = Cut::Count { columns: size, rows: size };
+            let (body, neighbours) = Body::build(lattice, &cut, &near, None).expect("builds");
+            let (body, neighbours, cells) = without_loose_sites(&body, &neighbours);
+            MaterialWeights::assemble(&cells, &body, neighbours, &elastic).expect("assembles").rows.len()
+        };
+        let (small, large) = (classes(20), classes(30));
+        assert!(small == large && small < 200, "{kind:?}: {small} {large}");
+    }
+}
+
+#[test]
+fn neighbours_one_cell_away_cannot_carry_an_averaged_dilatation() {
+    let (body, neighbours, cells) = sample(KINDS[0], 0.0);
+    let refused = MaterialWeights::assemble(&cells, &body, neighbours, &slice(0.49));
+    let Err(error @ WeightsError::MissingMate { .. }) = refused else { panic!("{refused:?}") };
+    assert!(error.to_string().contains("8 neighbours cannot carry a dilatation"), "{error}");
 }
