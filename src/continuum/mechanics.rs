@@ -184,7 +184,9 @@ fn strain_energy(engine: &Engine, elastic: &Elastic, forces: Option<&Forces>, u:
 fn recovered(engine: &Engine, elastic: &Elastic, of_cells: &[StressState]) -> Vec<(usize, StressState)> {
     let (Some(edge), Some(cells)) = (engine.free_edge(), engine.cells()) else { return Vec::new() };
     let (body, factor) = (engine.body(), engine.load_factor());
-    let spacing = body.lattice.spacing();
+    let lattice = &body.lattice;
+    // The sites of a honeycomb are nearer to each other than its cells are wide.
+    let spacing = lattice.spacing().max((lattice.cell_area() * lattice.sublattices() as f64).sqrt());
     let bucket = |p: [f64; 2]| p.map(|v| (v / (REACH * spacing)).floor() as i64);
     let mut cells_in: HashMap<[i64; 2], Vec<CellStress>> = HashMap::new();
     let centres = cells.centroids(&body.reference);
