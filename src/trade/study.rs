@@ -7,10 +7,10 @@ use serde::Serialize;
 
 use super::grid::{Grid, RuleChoice, Setting, body_overrides, settings, solver_overrides};
 use crate::compare::run::{SceneTruth, plan_led_by, truth_of};
+use crate::compare::truth::Effort;
 use crate::compare::truth::Truth;
 use crate::continuum::equilibrium::settle;
 use crate::continuum::run::Outcome as RunOutcome;
-use crate::fem::Effort;
 use crate::flock::points::{Points, distance};
 use crate::flock::role::Role;
 use crate::scene::{Scene, SceneError};
