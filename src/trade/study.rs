@@ -175,7 +175,7 @@ pub(super) fn error_of(outcome: &RunOutcome, truth: &Truth) -> Option<f64> {
         size += t[0] * t[0] + t[1] * t[1];
     }
     let error = if off == 0.0 { 0.0 } else { f64::sqrt(off / size) };
-    (places.len() > 0 && error.is_finite()).then_some(error)
+    (!places.is_empty() && error.is_finite()).then_some(error)
 }
 
 /// Less than this is rounding, or luck.
