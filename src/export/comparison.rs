@@ -13,6 +13,7 @@ use crate::compare::measures::Comparison;
 use crate::compare::run::Compared;
 use crate::scene::Scene;
 use crate::scene::raw::RawScene;
+use crate::scene::units::Units;
 
 /// The contents of `compare.json`; lengths in the scene's unit, infinities as `null`.
 #[derive(Clone, Debug, Serialize)]
@@ -118,7 +119,7 @@ pub fn write_comparison(
 ) -> Result<Vec<PathBuf>, ExportError> {
     let mut written = vec![write_particles(folder, compared)?, write_cells(folder, compared)?];
     let body = compared.outcome.engine.body();
-    let stress_unit = format!("force/{}²", scene.unit());
+    let stress_unit = Units::of(scene).stress;
     let pair = Pair {
         title: &scene.raw.title,
         unit: scene.unit(),

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::cells::Cells;
 use super::elastic::Elastic;
-use super::stiffness::{ShapeError, area, element, mean_gradients, mean_strain};
+use super::stiffness::{ShapeError, area, mean_gradients, mean_strain};
 use crate::flock::points::Points;
 use crate::flock::rules::Rotation;
 
@@ -25,6 +25,11 @@ pub struct StressState {
 }
 
 impl StressState {
+    /// Of a stress (xx, yy, xy) \[force / length^2\].
+    pub fn of_stress(stress: [f64; 3], elastic: &Elastic) -> Self {
+        Self::of(elastic.strain(stress), elastic)
+    }
+
     fn of(strain: [f64; 3], elastic: &Elastic) -> Self {
         Self { strain, components: elastic.stress(strain), von_mises: elastic.von_mises(strain) }
     }
@@ -85,8 +90,8 @@ pub fn strain_energy(
     displacement: &Points,
     rotation: Rotation,
 ) -> Result<f64, ShapeError> {
-    let elements: Result<Vec<_>, _> =
-        cells.shapes.iter().map(|shape| element(shape, elastic.stiffness())).collect();
+    let kinds = 0..cells.shapes.len();
+    let elements: Result<Vec<_>, _> = kinds.map(|kind| cells.element(kind, elastic.stiffness())).collect();
     let elements = elements?;
     let of_cell = |cell: usize| {
         let local = local(cells, cell, displacement, rotation);

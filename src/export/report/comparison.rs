@@ -12,6 +12,7 @@ use super::stage::{Clock, Film, Quantity, Stage};
 use crate::compare::run::Compared;
 use crate::flock::points::Points;
 use crate::scene::Scene;
+use crate::scene::units::Units;
 
 /// Frames on the way from no displacement to all of it.
 const FRAMES: usize = 20;
@@ -81,7 +82,7 @@ fn stage(
         clock: Clock { quantity: "displacement", unit: "%" },
         spacing: engine.body().lattice.spacing(),
         quantities: vec![
-            Quantity::new("von_mises", "von Mises stress", format!("force/{unit}²")),
+            Quantity::new("von_mises", "von Mises stress", Units::of(scene).stress),
             Quantity::new("error", "error: distance of rule and truth", unit),
         ],
         linear: true,

@@ -145,8 +145,8 @@ export class View {
   drawUnder() {
     // Drawn again only when something of it changed: a frame of a film moves nothing here but the ways.
     const { camera, turned, factor, layers, frame } = this.show;
-    const seen = [camera, turned, this.width, this.height, this.ratio, themeText("card")];
-    const key = JSON.stringify(layers.ways ? [...seen, factor, frame] : seen);
+    const seen = [camera, turned, factor, this.width, this.height, this.ratio, themeText("card")];
+    const key = JSON.stringify(layers.ways ? [...seen, frame] : seen);
     if (key === this.below) return;
     this.below = key;
     const pen = this.pen(this.under);
@@ -204,6 +204,9 @@ export class View {
     between.forEach((y) => pen.fillText(words(this.show.turned ? -y : y), 5, this.pixel([0, y])[1] - 3));
     pen.fillText(named(h), this.width - pen.measureText(named(h)).width - 6, 14);
     pen.fillText(named(v), 5, 14);
+    // A saved picture says it too.
+    const { factor } = this.show;
+    if (factor !== 1) pen.fillText(`displacements × ${words(factor)}`, 60, 14);
   }
 
   // The way of everybody up to now.
