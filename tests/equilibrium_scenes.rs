@@ -257,7 +257,7 @@ fn what_cannot_carry_a_material_is_refused_with_the_reason() {
         ("body.shape={kind=\"grid\",columns=5,rows=1}", "no cell"),
         (
             "loads=[{kind=\"traction\",region={kind=\"disc\",centre=[4.0,4.0],radius=0.1},traction=[1.0,0.0]}]",
-            "no side",
+            "no part of the outline",
         ),
     ] {
         let message = with(&[more]);

@@ -95,7 +95,7 @@ impl Comparison {
 /// Von Mises stress at the centres of cells \[force / length^2\] whose corners are displaced by
 /// `displacement` \[length\], shape \[cells\]: on a quadrilateral by the bilinear formula.
 pub fn von_mises(cells: &Cells, elastic: &Elastic, displacement: &Points) -> Vec<f64> {
-    let strains = dilatation::strains(cells, elastic, displacement);
+    let strains = dilatation::averaged(cells, elastic, cells.strains(displacement), displacement.len());
     strains.into_iter().map(|strain| elastic.von_mises(strain)).collect()
 }
 
@@ -115,7 +115,7 @@ pub fn strain_energy(cells: &Cells, elastic: &Elastic, displacement: &Points) ->
         0.5 * u.dot(&(&elements[kind as usize] * &u))
     };
     let own: f64 = cells.iter().zip(&cells.kind).map(of_cell).sum();
-    Ok(own + dilatation::energy(cells, elastic, displacement))
+    Ok(own + dilatation::energy(cells, elastic, &cells.strains(displacement), displacement.len()))
 }
 
 fn norm(values: &[f64]) -> f64 {

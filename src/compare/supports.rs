@@ -258,9 +258,12 @@ fn joined_portions(mut portions: Vec<Portion>) -> Vec<Portion> {
     joined
 }
 
+/// From where to where along its line, and its ends.
+type Stretch = ([f64; 2], [Point; 2]);
+
 /// Segments on one line that touch are one.
 fn merged(segments: Vec<[Point; 2]>, near: f64) -> Vec<[Point; 2]> {
-    let mut lines: BTreeMap<[i64; 2], Vec<([f64; 2], [Point; 2])>> = BTreeMap::new();
+    let mut lines: BTreeMap<[i64; 2], Vec<Stretch>> = BTreeMap::new();
     for [from, to] in segments {
         let length = distance(from, to);
         let mut along = [0, 1].map(|k| (to[k] - from[k]) / length);
@@ -276,7 +279,7 @@ fn merged(segments: Vec<[Point; 2]>, near: f64) -> Vec<[Point; 2]> {
     let mut found = Vec::new();
     for (_, mut on_line) in lines {
         on_line.sort_by(|a, b| a.0[0].total_cmp(&b.0[0]));
-        let mut last: Option<([f64; 2], [Point; 2])> = None;
+        let mut last: Option<Stretch> = None;
         for (range, ends) in on_line {
             last = match last {
                 Some((whole, [from, to])) if range[0] <= whole[1] + near => {

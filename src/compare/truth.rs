@@ -3,8 +3,9 @@
 //! The truth is solved on a mesh of the shape, which knows nothing of the lattice; the particles are asked for
 //! afterwards.
 
+pub use crate::fem::Effort;
 use crate::fem::{
-    self, Effort, EstimatedError, FemError, Level, ShapeProblem, ShapeSolution, Stress, Support, solve_shape,
+    self, EstimatedError, FemError, Level, ShapeProblem, ShapeSolution, Stress, Support, solve_shape,
 };
 use crate::flock::points::Points;
 use crate::geometry::outline::Outline;

@@ -4,6 +4,9 @@ pub(super) mod load;
 pub(super) mod several;
 pub mod state;
 
+use std::sync::Arc;
+
+use super::free_edge::FreeEdge;
 use super::layout::RoleChange;
 use super::movement::Movement;
 use super::plan::Plan;
@@ -51,6 +54,7 @@ pub struct Engine {
     step: usize,
     /// Between the particles, where the scene has a material.
     cells: Option<Cells>,
+    free_edge: Option<Arc<FreeEdge>>,
     load: Load,
     /// Displacements of a body that was put to rest \[length\]; positions have lost their last digits.
     settled: Option<Points>,
@@ -88,7 +92,18 @@ struct PresentNeighbours {
 impl Engine {
     pub fn new(plan: Plan) -> Self {
         let Plan {
-            body, interaction, update, present_radius, roles, changes, cuts, cells, loads, ramp, ..
+            body,
+            interaction,
+            update,
+            present_radius,
+            roles,
+            changes,
+            cuts,
+            cells,
+            loads,
+            ramp,
+            free_edge,
+            ..
         } = plan;
         let present_neighbours = present_radius.map(|radius| PresentNeighbours {
             radius,
@@ -114,6 +129,7 @@ impl Engine {
             activity: Activity::default(),
             step: 0,
             cells,
+            free_edge,
             load: Load::new(ramp, loads),
             settled: None,
         };
@@ -156,6 +172,11 @@ impl Engine {
     /// Role changes in the order they were written.
     pub fn changes(&self) -> &[RoleChange] {
         &self.changes
+    }
+
+    /// What is known of the tractions along the outline, where stress can be recovered from it.
+    pub fn free_edge(&self) -> Option<&FreeEdge> {
+        self.free_edge.as_deref()
     }
 
     /// Cells between the particles, where the scene has a material.

@@ -1,13 +1,18 @@
 //! What a testing machine would read off a body: reactions, load, strain energy, stress.
 
+use std::collections::HashMap;
+
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::engine::Engine;
 use super::forces::{Forces, LoadResultant, Reaction};
-use crate::flock::points::Points;
+use crate::flock::points::{Points, distance};
 use crate::flock::rules::{Mean, Rotation};
 use crate::material::cells::Cells;
 use crate::material::elastic::Elastic;
+use crate::material::recovery::{CellStress, KnownTraction, REACH, stress_at};
+use crate::material::stiffness::area;
 use crate::material::stress::{self, StressState};
 
 /// Strain beyond which small rotations and strains are a caution \[1\].
@@ -46,16 +51,16 @@ pub struct Work {
     pub supports: f64,
 }
 
-/// The cell with the largest von Mises stress.
+/// Where the largest von Mises stress is: in a cell, or at a particle on a free edge.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Peak {
     /// \[force / length^2\]
     pub von_mises: f64,
-    /// Number of the cell, counted from 1.
-    pub cell: usize,
-    /// Middle of the cell in the reference configuration \[length\].
+    /// Number of the cell, counted from 1; none for a particle.
+    pub cell: Option<usize>,
+    /// Middle of the cell, or the particle, in the reference configuration \[length\].
     pub place: [f64; 2],
-    /// Ids of the particles at its corners.
+    /// Ids of the particles at its corners, or of the particle.
     pub particles: Vec<usize>,
 }
 
@@ -66,6 +71,9 @@ pub struct Stresses {
     pub cells: Vec<StressState>,
     /// `None` for a particle in no whole cell, shape \[count\].
     pub particles: Vec<Option<StressState>>,
+    /// Particles along a fitted outline whose stress is recovered from cells and known tractions
+    /// ([`crate::material::recovery`]); that of the others is the mean of their cells.
+    pub recovered: Vec<usize>,
 }
 
 impl Stresses {
@@ -82,9 +90,14 @@ impl Stresses {
         for (stress, _) in of_cells.iter_mut().zip(&torn).filter(|(_, torn)| **torn) {
             *stress = StressState { strain: [f64::NAN; 3], components: [f64::NAN; 3], von_mises: f64::NAN };
         }
-        let particles =
+        let mut particles =
             stress::at_particles(cells, elastic, &of_cells, displacement.len(), |cell| !torn[cell]);
-        Some(Self { cells: of_cells, particles })
+        let recovered = if broken.is_empty() { recovered(engine, elastic, &of_cells) } else { Vec::new() };
+        for &(i, stress) in &recovered {
+            particles[i] = Some(stress);
+        }
+        let recovered = recovered.into_iter().map(|(i, _)| i).collect();
+        Some(Self { cells: of_cells, particles, recovered })
     }
 
     /// At the engine's present places.
@@ -101,10 +114,16 @@ impl Stresses {
             _ => Some((cell, stress.von_mises)),
         };
         let (cell, von_mises) = finite.fold(None, higher)?;
+        let known = self.recovered.iter().filter_map(|&i| Some((i, self.particles[i]?.von_mises)));
+        let at_edge = known.reduce(|best, next| if next.1 > best.1 { next } else { best });
+        if let Some((particle, von_mises)) = at_edge.filter(|(_, at_edge)| *at_edge > von_mises) {
+            let place = engine.body().reference.get(particle);
+            return Some(Peak { von_mises, cell: None, place, particles: vec![engine.body().id(particle)] });
+        }
         let corners = cells.of(cell);
         let places: Points = corners.iter().map(|&i| engine.body().reference.get(i as usize)).collect();
         let particles = corners.iter().map(|&i| engine.body().id(i as usize)).collect();
-        Some(Peak { von_mises, cell: cell + 1, place: places.middle(), particles })
+        Some(Peak { von_mises, cell: Some(cell + 1), place: places.middle(), particles })
     }
 }
 
@@ -159,6 +178,48 @@ fn strain_energy(engine: &Engine, elastic: &Elastic, forces: Option<&Forces>, u:
     }
     let of_cells = engine.cells().map(|cells| stress::strain_energy(cells, elastic, u, rotation(engine)));
     of_cells.and_then(Result::ok).unwrap_or(f64::NAN)
+}
+
+/// Stress of the particles along a fitted outline, from the cells near them and the tractions that are known there.
+fn recovered(engine: &Engine, elastic: &Elastic, of_cells: &[StressState]) -> Vec<(usize, StressState)> {
+    let (Some(edge), Some(cells)) = (engine.free_edge(), engine.cells()) else { return Vec::new() };
+    let (body, factor) = (engine.body(), engine.load_factor());
+    let lattice = &body.lattice;
+    // The sites of a honeycomb are nearer to each other than its cells are wide.
+    let spacing = lattice.spacing().max((lattice.cell_area() * lattice.sublattices() as f64).sqrt());
+    let bucket = |p: [f64; 2]| p.map(|v| (v / (REACH * spacing)).floor() as i64);
+    let mut cells_in: HashMap<[i64; 2], Vec<CellStress>> = HashMap::new();
+    let centres = cells.centroids(&body.reference);
+    for (cell, centroid) in centres.iter().enumerate() {
+        let (area, stress) = (area(cells.shape(cell)), of_cells[cell].components);
+        cells_in.entry(bucket(centroid)).or_default().push(CellStress { centroid, area, stress });
+    }
+    let mut tractions_in: HashMap<[i64; 2], Vec<KnownTraction>> = HashMap::new();
+    for known in &edge.tractions {
+        let known = KnownTraction { value: factor * known.value, ..*known };
+        tractions_in.entry(bucket(known.point)).or_default().push(known);
+    }
+    let recover = |&i: &usize| {
+        let point = body.reference.get(i);
+        let [x, y] = bucket(point);
+        let around = || (x - 1..=x + 1).flat_map(|x| (y - 1..=y + 1).map(move |y| [x, y]));
+        let near = |p: [f64; 2]| distance(p, point) < REACH * spacing;
+        let cells: Vec<CellStress> = around()
+            .filter_map(|b| cells_in.get(&b))
+            .flatten()
+            .filter(|c| near(c.centroid))
+            .copied()
+            .collect();
+        let tractions: Vec<KnownTraction> = around()
+            .filter_map(|b| tractions_in.get(&b))
+            .flatten()
+            .filter(|t| near(t.point))
+            .copied()
+            .collect();
+        let stress = stress_at(point, spacing, &cells, &tractions)?;
+        Some((i, StressState::of_stress(stress, elastic)))
+    };
+    edge.particles.par_iter().filter_map(recover).collect()
 }
 
 /// Which turns of a cell are no strain.

@@ -11,6 +11,7 @@ pub mod deviation;
 pub mod engine;
 pub mod equilibrium;
 pub mod forces;
+pub mod free_edge;
 mod front;
 pub mod interior;
 pub mod layout;

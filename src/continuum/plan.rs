@@ -1,8 +1,10 @@
 //! From a scene to the arrays that an engine steps, with the checks that need the body.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use super::damping::along_outline;
+use super::free_edge::FreeEdge;
 use super::layout::{Layout, RoleChange, Truth, held_components, no_particle};
 use super::weights;
 use crate::flock::body::Body;
@@ -11,11 +13,11 @@ use crate::flock::interaction::{Interaction, MatrixWeights, Weights};
 use crate::flock::neighbourhood::{Neighbourhood, Neighbours};
 use crate::flock::points::{Points, distance};
 use crate::flock::role::Role;
-use crate::flock::rules::{Axis, Mean, Poisson, Rule};
+use crate::flock::rules::{Axis, Mean, Poisson, Rotation, Rule};
 use crate::geometry::outline::Outline;
 use crate::material::cells::Cells;
 use crate::material::mechanism::require_held;
-use crate::material::outline_loads::{Resultant, sum};
+use crate::material::outline_loads::{Load, Resultant, sum};
 use crate::scene::{LoadSteps, Scene, SceneError, Stop};
 use crate::solve::linear::HeldComponent;
 use crate::solve::sweep::{Order, Update};
@@ -47,6 +49,8 @@ pub struct Plan {
     pub ramp: Option<usize>,
     /// The outline of the body's shape, where it has one.
     pub outline: Option<Outline>,
+    /// Of a body fitted to its outline, in an isotropic material with small rotations.
+    pub free_edge: Option<Arc<FreeEdge>>,
     /// Of each load of the scene, in its order.
     pub resultants: Vec<Resultant>,
 }
@@ -80,7 +84,9 @@ impl Plan {
         let reference = &layout.body.reference;
         let resultants = loads.iter().map(|f| Resultant::of(reference.iter().zip(f.iter()))).collect();
         let forces = sum(loads.clone());
-        require_carried(scene, &layout, &changes, forces.as_ref())?;
+        let leads = held_axes(&layout.body, &changes);
+        require_carried(scene, &layout, &leads, forces.as_ref())?;
+        let free_edge = free_edge(scene, &layout, &leads)?.map(Arc::new);
         let Layout { body, neighbours, cells, outline } = layout;
         let follows = ever_follow(&body, &changes);
         let mut weights = weights::of_body(scene, &body, &neighbours, cells.as_ref(), &follows)?;
@@ -112,6 +118,7 @@ impl Plan {
                 _ => None,
             },
             outline,
+            free_edge,
             resultants,
             body,
             interaction,
@@ -136,6 +143,7 @@ impl Plan {
             loads: Vec::new(),
             ramp: None,
             outline: None,
+            free_edge: None,
             resultants: Vec::new(),
             body,
             interaction,
@@ -180,15 +188,23 @@ fn ever_follow(body: &Body, changes: &[RoleChange]) -> Vec<bool> {
     follows
 }
 
-/// A load on a follower needs a rule with a stiffness, and a body that cannot get away.
-fn require_carried(
-    scene: &Scene,
-    layout: &Layout,
-    changes: &[RoleChange],
-    forces: Option<&Points>,
-) -> Result<(), SceneError> {
-    let (Some(cells), Some(forces)) = (&layout.cells, forces) else { return Ok(()) };
-    let mut leads = vec![[false; 2]; layout.body.count()];
+/// What is known of the tractions along the outline, where stress can be recovered from it.
+fn free_edge(scene: &Scene, layout: &Layout, held: &[[bool; 2]]) -> Result<Option<FreeEdge>, SceneError> {
+    let small = scene.mean == Mean::Material { rotation: Rotation::Small };
+    let (Some(elastic), Some(cells), Some(outline)) = (&scene.material, &layout.cells, &layout.outline)
+    else {
+        return Ok(None);
+    };
+    if !small || !elastic.is_isotropic() {
+        return Ok(None);
+    }
+    let loads: Vec<Load> = (0..scene.loads.len()).map(|k| layout.load(scene, k)).collect::<Result<_, _>>()?;
+    Ok(FreeEdge::of((&layout.body, cells), outline, (&loads, elastic.thickness()), held))
+}
+
+/// Components that are led or clamped from the start, shape \[count\]\[x, y\].
+fn held_axes(body: &Body, changes: &[RoleChange]) -> Vec<[bool; 2]> {
+    let mut leads = vec![[false; 2]; body.count()];
     for change in changes.iter().filter(|change| change.from <= 1 && change.when.is_none()) {
         let is_led = matches!(change.role, Role::Leader | Role::Clamped);
         for &i in &change.particles {
@@ -198,6 +214,17 @@ fn require_carried(
             }
         }
     }
+    leads
+}
+
+/// A load on a follower needs a rule with a stiffness, and a body that cannot get away.
+fn require_carried(
+    scene: &Scene,
+    layout: &Layout,
+    leads: &[[bool; 2]],
+    forces: Option<&Points>,
+) -> Result<(), SceneError> {
+    let (Some(cells), Some(forces)) = (&layout.cells, forces) else { return Ok(()) };
     if !matches!(scene.mean, Mean::Material { .. }) {
         let Some(i) = (0..leads.len()).find(|&i| leads[i] != [true; 2] && forces.get(i) != [0.0; 2]) else {
             return Ok(());
@@ -209,7 +236,7 @@ fn require_carried(
         return Err(scene.refuse("loads", message, help));
     }
     let incidence = cells.incidence(layout.body.count());
-    require_held(cells, &incidence, &layout.body.reference, &leads).map_err(|mechanism| {
+    require_held(cells, &incidence, &layout.body.reference, leads).map_err(|mechanism| {
         scene.refuse(
             "roles",
             mechanism.to_string(),

@@ -247,14 +247,15 @@ impl fmt::Display for Measured {
                 short(left)
             )?;
         }
-        if let Some(Peak { von_mises, cell, place, .. }) = &mechanics.largest_von_mises {
+        if let Some(Peak { von_mises, cell, place, particles }) = &mechanics.largest_von_mises {
             let stress = &units.stress;
+            let in_what = match (cell, particles.first()) {
+                (Some(cell), _) => format!("in cell {cell}"),
+                (None, Some(id)) => format!("at the edge, particle {id},"),
+                (None, None) => String::new(),
+            };
             let value = short(*von_mises);
-            writeln!(
-                f,
-                "largest von Mises stress {value} {stress}, in cell {cell} at {} {length}",
-                pair(*place)
-            )?;
+            writeln!(f, "largest von Mises stress {value} {stress}, {in_what} at {} {length}", pair(*place))?;
         }
         Ok(())
     }

@@ -14,7 +14,7 @@ use crate::flock::neighbourhood::{Neighbourhood, Neighbours};
 use crate::flock::points::Points;
 
 use super::elastic::Elastic;
-use super::stiffness::{ShapeError, area, cut_load_shares, element_of, load_shares, mean_strain};
+use super::stiffness::{ShapeError, area, centroid, cut_load_shares, element_of, load_shares, mean_strain};
 use crate::geometry::outline::{Outline, OutlineError};
 
 /// Cells of any polygons, in compressed form. Corners run counter-clockwise.
@@ -266,6 +266,16 @@ impl Cells {
             mean_strain(self.shape(cell), at_corner)
         };
         (0..self.count()).map(strain).collect()
+    }
+
+    /// Centre of gravity of each cell \[length\], shape \[count\].
+    pub fn centroids(&self, reference: &Points) -> Points {
+        let of_kind: Vec<[f64; 2]> = self.shapes.iter().map(|shape| centroid(shape)).collect();
+        let place = |(cell, &kind): (&[u32], &u32)| {
+            let ([x, y], [dx, dy]) = (reference.get(cell[0] as usize), of_kind[kind as usize]);
+            [x + dx, y + dy]
+        };
+        self.iter().zip(&self.kind).map(place).collect()
     }
 
     /// Centre of each cell, the mean of its corners \[length\], shape \[count\].

@@ -22,7 +22,6 @@
 use super::cells::{Cells, Incidence};
 use super::elastic::Elastic;
 use super::stiffness::area;
-use crate::flock::points::Points;
 
 /// Which cells are averaged together.
 #[derive(Clone, Debug)]
@@ -86,17 +85,17 @@ impl<'a> Patches<'a> {
     }
 }
 
-/// Mean strain of each cell as [`Cells::strains`] has it; where the material averages dilatations, with the mean of those of
-/// the cell's patches in place of its own, which means nothing there: the pressure would jump from cell to cell.
-pub fn strains(cells: &Cells, elastic: &Elastic, displacement: &Points) -> Vec<[f64; 3]> {
-    let mut strains = cells.strains(displacement);
+/// These mean strains of cells \[1\], shape \[cells, 3\], for the stress that they have: where the material averages dilatations,
+/// each with the mean of those of its patches in place of its own, which means nothing there (the pressure would jump
+/// from cell to cell). `count` is that of the particles.
+pub fn averaged(cells: &Cells, elastic: &Elastic, mut strains: Vec<[f64; 3]>, count: usize) -> Vec<[f64; 3]> {
     if elastic.averaged_dilatation().is_some() {
-        let incidence = cells.incidence(displacement.len());
-        let patches = Patches::new(cells, &incidence, displacement.len());
+        let incidence = cells.incidence(count);
+        let patches = Patches::new(cells, &incidence, count);
         let (mean, _) = patches.means(&strains);
         for (cell, strain) in strains.iter_mut().enumerate() {
-            let count = patches.middles(cell).count() as f64;
-            let averaged = patches.middles(cell).map(|i| mean[i]).sum::<f64>() / count;
+            let middles = patches.middles(cell).count() as f64;
+            let averaged = patches.middles(cell).map(|i| mean[i]).sum::<f64>() / middles;
             let add = 0.5 * (averaged - strain[0] - strain[1]);
             *strain = [strain[0] + add, strain[1] + add, strain[2]];
         }
@@ -104,11 +103,10 @@ pub fn strains(cells: &Cells, elastic: &Elastic, displacement: &Points) -> Vec<[
     strains
 }
 
-/// Energy of the averaged dilatations \[force length\]; zero where the material averages none.
-pub fn energy(cells: &Cells, elastic: &Elastic, displacement: &Points) -> f64 {
+/// Energy \[force length\] of the averaged dilatations of cells of these mean strains; zero where the material averages none.
+pub fn energy(cells: &Cells, elastic: &Elastic, strains: &[[f64; 3]], count: usize) -> f64 {
     let Some(lambda) = elastic.averaged_dilatation() else { return 0.0 };
-    let incidence = cells.incidence(displacement.len());
-    let patches = Patches::new(cells, &incidence, displacement.len());
-    let (mean, measure) = patches.means(&cells.strains(displacement));
+    let incidence = cells.incidence(count);
+    let (mean, measure) = Patches::new(cells, &incidence, count).means(strains);
     0.5 * lambda * mean.iter().zip(&measure).map(|(mean, measure)| measure * mean * mean).sum::<f64>()
 }

@@ -134,6 +134,18 @@ impl Elastic {
         (self.stiffness * Vector3::from(strain) / self.thickness).into()
     }
 
+    /// The strain (xx, yy, engineering xy) \[1\] under an in-plane stress (xx, yy, xy) \[force / length^2\].
+    pub fn strain(&self, stress: [f64; 3]) -> [f64; 3] {
+        let forces = Vector3::from(stress) * self.thickness;
+        // An admissible stiffness is positive definite.
+        self.stiffness.cholesky().map_or([f64::NAN; 3], |factor| factor.solve(&forces).into())
+    }
+
+    /// Whether the material is the same in every direction.
+    pub fn is_isotropic(&self) -> bool {
+        matches!(self.constants, Constants::Isotropic { .. })
+    }
+
     /// Von Mises stress \[force / length^2\] under a strain (xx, yy, engineering xy) \[1\]; in plane strain
     /// with the stress across the thickness that keeps the faces from parting.
     pub fn von_mises(&self, strain: [f64; 3]) -> f64 {

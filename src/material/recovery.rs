@@ -16,9 +16,9 @@ const DEGREE: usize = 3;
 /// Cells within so many spacings take part.
 pub const REACH: f64 = 3.5;
 /// Weight of a known traction against that of a cell of average size.
-const TRACTION_WEIGHT: f64 = 2.0;
+const TRACTION_WEIGHT: f64 = 4.0;
 /// Fewer cells than this say too little.
-const FEWEST_CELLS: usize = 12;
+const FEWEST_CELLS: usize = 6;
 /// Unknowns of the fit.
 const UNKNOWNS: usize = 4 * DEGREE + 3;
 

@@ -341,7 +341,8 @@ fn bending_stiffness(corners: &[[f64; 2]], stiffness: &Voigt, rest: &DMatrix<f64
     continuum / cell
 }
 
-fn centroid(corners: &[[f64; 2]]) -> [f64; 2] {
+/// Centre of gravity of a polygon \[length\].
+pub fn centroid(corners: &[[f64; 2]]) -> [f64; 2] {
     let o = corners[0];
     let sum = (1..corners.len() - 1).fold([0.0; 2], |sum, k| {
         let (a, b) = (corners[k], corners[k + 1]);

@@ -8,8 +8,9 @@ use nalgebra::DVector;
 use rayon::prelude::*;
 
 use super::cells::Cells;
+use super::dilatation;
 use super::elastic::Elastic;
-use super::stiffness::{ShapeError, area, element, mean_gradients, mean_strain};
+use super::stiffness::{ShapeError, area, mean_gradients, mean_strain};
 use crate::flock::points::Points;
 use crate::flock::rules::Rotation;
 
@@ -25,6 +26,11 @@ pub struct StressState {
 }
 
 impl StressState {
+    /// Of a stress (xx, yy, xy) \[force / length^2\].
+    pub fn of_stress(stress: [f64; 3], elastic: &Elastic) -> Self {
+        Self::of(elastic.strain(stress), elastic)
+    }
+
     fn of(strain: [f64; 3], elastic: &Elastic) -> Self {
         Self { strain, components: elastic.stress(strain), von_mises: elastic.von_mises(strain) }
     }
@@ -43,9 +49,15 @@ pub fn of_cells(
     displacement: &Points,
     rotation: Rotation,
 ) -> Vec<StressState> {
+    let strains = strains(cells, displacement, rotation);
+    let strains = dilatation::averaged(cells, elastic, strains, displacement.len());
+    strains.into_par_iter().map(|strain| StressState::of(strain, elastic)).collect()
+}
+
+fn strains(cells: &Cells, displacement: &Points, rotation: Rotation) -> Vec<[f64; 3]> {
     let of_cell = |cell: usize| {
         let local = local(cells, cell, displacement, rotation);
-        StressState::of(mean_strain(cells.shape(cell), |k| local[k]), elastic)
+        mean_strain(cells.shape(cell), |k| local[k])
     };
     (0..cells.count()).into_par_iter().map(of_cell).collect()
 }
@@ -85,15 +97,20 @@ pub fn strain_energy(
     displacement: &Points,
     rotation: Rotation,
 ) -> Result<f64, ShapeError> {
-    let elements: Result<Vec<_>, _> =
-        cells.shapes.iter().map(|shape| element(shape, elastic.stiffness())).collect();
+    let kinds = 0..cells.shapes.len();
+    let elements: Result<Vec<_>, _> = kinds.map(|kind| cells.element(kind, elastic)).collect();
     let elements = elements?;
     let of_cell = |cell: usize| {
         let local = local(cells, cell, displacement, rotation);
         let u = DVector::from_iterator(2 * local.len(), local.into_iter().flatten());
         0.5 * u.dot(&(&elements[cells.kind[cell] as usize] * &u))
     };
-    Ok((0..cells.count()).map(of_cell).sum())
+    let own: f64 = (0..cells.count()).map(of_cell).sum();
+    if elastic.averaged_dilatation().is_none() {
+        return Ok(own);
+    }
+    let strains = strains(cells, displacement, rotation);
+    Ok(own + dilatation::energy(cells, elastic, &strains, displacement.len()))
 }
 
 /// How far each cell is turned \[rad\], shape \[cells\].

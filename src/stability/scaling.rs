@@ -9,7 +9,8 @@ const TABLES: [&str; 9] =
     ["lattice", "body", "neighbours", "rule", "material", "loads", "roles", "fracture", "cuts"];
 
 /// Keys of lengths, wherever they stand.
-const LENGTHS: [&str; 19] = [
+const LENGTHS: [&str; 20] = [
+    "between",
     "spacing",
     "a",
     "b",
@@ -71,7 +72,7 @@ fn power(table: &Map<String, Value>, name: &str, parent: &str) -> Option<i32> {
         ("radius", Some("ring"), _) => None,
         ("force", Some("force"), _) => Some(2),
         ("force", Some("body"), _) => Some(-1),
-        ("from", _, "cuts") => Some(1),
+        ("from", _, "cuts" | "profile") | ("from", Some("path"), _) => Some(1),
         ("above" | "below", ..) => {
             Some(if table.get("quantity").and_then(Value::as_str) == Some("pe1") { 2 } else { 1 })
         }

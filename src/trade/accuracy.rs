@@ -8,9 +8,9 @@
 use super::grid::{RuleChoice, body_overrides};
 use super::study::{Load, error_of};
 use crate::compare::run::{SceneTruth, plan_led_by, truth_of};
+use crate::compare::truth::Effort;
 use crate::continuum::equilibrium::settle;
 use crate::continuum::run::Outcome;
-use crate::fem::Effort;
 use crate::flock::role::Role;
 use crate::flock::rules::{Mean, Rotation};
 use crate::scene::raw::{RawMean, RawRegion};

@@ -7,10 +7,10 @@ use serde::Serialize;
 
 use super::grid::{Grid, RuleChoice, Setting, body_overrides, settings, solver_overrides};
 use crate::compare::run::{SceneTruth, plan_led_by, truth_of};
+use crate::compare::truth::Effort;
 use crate::compare::truth::Truth;
 use crate::continuum::equilibrium::settle;
 use crate::continuum::run::Outcome as RunOutcome;
-use crate::fem::Effort;
 use crate::flock::points::{Points, distance};
 use crate::flock::role::Role;
 use crate::scene::{Scene, SceneError};
@@ -175,7 +175,7 @@ pub(super) fn error_of(outcome: &RunOutcome, truth: &Truth) -> Option<f64> {
         size += t[0] * t[0] + t[1] * t[1];
     }
     let error = if off == 0.0 { 0.0 } else { f64::sqrt(off / size) };
-    (places.len() > 0 && error.is_finite()).then_some(error)
+    (!places.is_empty() && error.is_finite()).then_some(error)
 }
 
 /// Less than this is rounding, or luck.

@@ -1,5 +1,8 @@
 //! Published figures: Cook's membrane, and the rows of a table of bodies that whole cells get wrong.
 
+use flockform::continuum::mechanics::Stresses;
+use flockform::flock::points::distance;
+
 use crate::support::{KINDS, lattice, on_right_edge, scene, solved};
 
 const COOK: &str = r#"
@@ -70,4 +73,25 @@ loads = [{ kind = "traction", region = { kind = "edge", side = "right" }, tracti
     let (force, inertia, shear) = (1.9, 1.9f64.powi(3) / 12.0, 1000.0 / 2.6);
     let beam = force * 1000.0 / (3.0 * 1000.0 * inertia) + 1.2 * force * 10.0 / (shear * 1.9);
     assert!((tip / beam - 1.0).abs() < 0.02, "{tip} {beam}");
+}
+
+#[test]
+fn the_crown_of_a_hole_carries_its_published_stress() {
+    // A quarter of a plate 40 x 40 with a hole of radius 4: 3.36 times the tension (as `flockform run plate-hole`).
+    let bundled = flockform::scene::bundled("plate-hole").expect("bundled");
+    for kind in KINDS {
+        for (h, bound) in [(0.5, 0.03), (0.25, 0.02)] {
+            for orientation in [0.0, 20.0] {
+                let scene =
+                    bundled.load(&[lattice(kind, h, orientation)]).unwrap_or_else(|error| panic!("{error}"));
+                let (plan, outcome) = solved(&scene);
+                let elastic = scene.material.as_ref().expect("a material");
+                let stresses = Stresses::at_present(&outcome.engine, elastic).expect("a material");
+                let crown = [0.0, 4.0];
+                let at = (0..plan.count()).find(|&i| distance(plan.body.reference.get(i), crown) < 1e-9);
+                let stress = stresses.particles[at.expect("a corner")].expect("in cells").components[0];
+                assert!((stress / 3.36 - 1.0).abs() < bound, "{kind}, {h}, {orientation} degrees: {stress}");
+            }
+        }
+    }
 }

@@ -5,7 +5,7 @@ use crate::support::{KINDS, error, lattice, scene, scene_in, solved, table};
 const ORIENTATIONS: [f64; 12] = [0.0, 7.5, 15.0, 22.5, 30.0, 37.5, 45.0, 52.5, 60.0, 67.5, 75.0, 82.5];
 
 /// Order between spacings 0.5 and 0.25 of the errors' root mean square over the orientations.
-fn order(kind: &str, error_at: impl Fn(f64, f64) -> f64) -> (f64, [f64; 2]) {
+fn order(error_at: impl Fn(f64, f64) -> f64) -> (f64, [f64; 2]) {
     let rms = [0.5, 0.25].map(|h| {
         let squares = ORIENTATIONS.map(|orientation| error_at(h, orientation).powi(2));
         (squares.iter().sum::<f64>() / ORIENTATIONS.len() as f64).sqrt()
@@ -41,7 +41,7 @@ steps = [
         [u * x / r, u * y / r]
     };
     for kind in KINDS {
-        let (order, errors) = order(kind, |h, orientation| {
+        let (order, errors) = order(|h, orientation| {
             let scene = scene(&lattice(kind, h, orientation), parts).expect("a scene");
             let (plan, outcome) = solved(&scene);
             error(&plan, &outcome, exact)
@@ -88,7 +88,7 @@ steps = [
     };
     let folder = tempfile::tempdir().expect("a folder");
     for kind in KINDS {
-        let (order, errors) = order(kind, |h, orientation| {
+        let (order, errors) = order(|h, orientation| {
             let lattice = lattice(kind, h, orientation);
             let file = folder.path().join("exact.csv");
             // Where the particles are is known once the body is laid out, which does not look at the motion.
@@ -121,7 +121,7 @@ loads = [{ kind = "traction", region = { kind = "edge", side = "right" }, tracti
     };
     let folder = tempfile::tempdir().expect("a folder");
     for kind in KINDS {
-        let (order, errors) = order(kind, |h, orientation| {
+        let (order, errors) = order(|h, orientation| {
             let lattice = lattice(kind, h, orientation);
             let still = parts.replace(
                 "{ kind = \"csv\", file = \"exact.csv\" }",

@@ -3,12 +3,14 @@
 use flockform::flock::body::{Body, Cut};
 use flockform::flock::lattice::{Lattice, LatticeKind};
 use flockform::flock::points::Points;
+use flockform::flock::rules::Rotation;
 use flockform::geometry::outline::Outline;
 use flockform::geometry::shape::Shape;
 use flockform::material::cells::{neighbourhood_of, without_loose_sites};
 use flockform::material::elastic::{Constants, Elastic, Plane};
 use flockform::material::fit::fit;
 use flockform::material::loads::{Loads, Traction};
+use flockform::material::stress::strain_energy;
 use flockform::material::weights::{MaterialWeights, WeightsError};
 
 use crate::support::*;
@@ -107,6 +109,9 @@ fn averaged_dilatations_pass_the_patch_test_and_pull_back_alike() {
         let weights = MaterialWeights::assemble(&cells, &body, near, &elastic).expect("assembles");
         let affine: Points =
             body.reference.iter().map(|[x, y]| [0.3 * x + 0.4 * y, 0.1 * x - 0.2 * y]).collect();
+        let wavy: Points = body.reference.iter().map(|[x, y]| [(2.0 * x).sin() * y, x * y]).collect();
+        let stored = strain_energy(&cells, &elastic, &wavy, Rotation::Small).expect("has a stiffness");
+        assert!((stored / weights.energy(&wavy) - 1.0).abs() < 1e-9, "{stored}");
         let on_edge = on_boundary(&cells, body.count());
         for i in 0..body.count() {
             let scale = weights.of(i).diagonal[0][0];

@@ -59,7 +59,12 @@ fn draw_contours(
     let sample = |&i: &u32| (axes.place(snapshot.positions.get(i as usize)), snapshot.pe1[i as usize]);
     let mut patches: Vec<Vec<Sample>> = Vec::new();
     // Where neighbours are found anew at every step the faces of the lattice mean nothing.
-    let faces = subject.neighbours.map_or_else(Vec::new, |_| faces(subject.body, is_drawn, &snapshot.broken));
+    let faces = match (subject.cells, subject.neighbours) {
+        // Along an outline that was kept cells have other shapes.
+        (Some(cells), _) if subject.body.outline.is_some() => cells.iter().map(<[u32]>::to_vec).collect(),
+        (_, Some(_)) => faces(subject.body, is_drawn, &snapshot.broken),
+        _ => Vec::new(),
+    };
     for face in faces {
         face.iter().for_each(|&corner| is_alone[corner as usize] = false);
         patches.push(face.iter().map(sample).collect());

@@ -31,6 +31,7 @@ use super::error::{ExportError, write_file};
 use crate::continuum::engine::Engine;
 use crate::flock::body::Body;
 use crate::flock::neighbourhood::Neighbours;
+use crate::material::cells::Cells;
 use crate::scene::Scene;
 pub use colour::SERIES;
 pub use comparison::{Pair, overlay};
@@ -50,6 +51,8 @@ pub struct Subject<'a> {
     pub body: &'a Body,
     /// The bonds of the body; `None` where neighbours are found anew at every step.
     pub neighbours: Option<&'a Neighbours>,
+    /// Between the particles, where the scene has a material.
+    pub cells: Option<&'a Cells>,
     /// What is counted on the way: `step` or `increment`.
     pub counts: &'static str,
 }
@@ -61,6 +64,7 @@ impl<'a> Subject<'a> {
             unit: scene.unit(),
             body: engine.body(),
             neighbours: engine.lasting_neighbours(),
+            cells: engine.cells(),
             counts: scene.counts(),
         }
     }

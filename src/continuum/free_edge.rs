@@ -1,0 +1,80 @@
+//! What is known of the traction along a fitted body's outline, for the recovery of stress there.
+
+use crate::flock::body::Body;
+use crate::geometry::outline::{Outline, Place};
+use crate::material::cells::Cells;
+use crate::material::outline_loads::{Load, OutlineLoad};
+use crate::material::recovery::KnownTraction;
+
+/// Distances from sides to pieces that are computed at most: beyond, no stress is recovered.
+const MOST_DISTANCES: usize = 20_000_000;
+
+/// Sine of the turn to the right from which a corner is an inner one, where stress has no largest value.
+const INNER: f64 = -1e-6;
+
+/// The outline of a body in an isotropic material, for [`crate::material::recovery`].
+#[derive(Clone, Debug, Default)]
+pub struct FreeEdge {
+    pub tractions: Vec<KnownTraction>,
+    /// Particles on the outline that are at no inner corner.
+    pub particles: Vec<usize>,
+}
+
+impl FreeEdge {
+    /// Tractions of the loads, and none elsewhere, in the middle of each side of the boundary, along those components that
+    /// are not held at both its ends; `held` has them by particle, shape \[count\]\[x, y\].
+    pub fn of(
+        (body, cells): (&Body, &Cells),
+        outline: &Outline,
+        (loads, thickness): (&[Load], f64),
+        held: &[[bool; 2]],
+    ) -> Option<Self> {
+        let places = &body.outline.as_ref()?.places;
+        let sides = cells.boundary_sides(&cells.incidence(body.count()));
+        let fits = sides.len().saturating_mul(outline.pieces().count()) <= MOST_DISTANCES;
+        let outlined = |load: &Load| match load {
+            Load::Outline(load) => Some(Some(load.clone())),
+            Load::Particles { .. } => Some(None),
+            // A body force is in equilibrium with no field of the recovery.
+            Load::Body(force) => (*force == [0.0; 2]).then_some(None),
+        };
+        let loads: Option<Vec<Option<OutlineLoad>>> = loads.iter().map(outlined).collect();
+        let loads: Vec<OutlineLoad> = loads.filter(|_| fits)?.into_iter().flatten().collect();
+        let mut edge = Self::default();
+        for [a, b] in sides {
+            let [from, to] = [a, b].map(|i| body.reference.get(i as usize));
+            let (place, _) = outline.nearest([0, 1].map(|k| 0.5 * (from[k] + to[k])));
+            let piece = outline.piece(place.ring, place.piece);
+            let (point, normal) = (piece.point(place.t), piece.normal(place.t));
+            let acting = loads.iter().filter(|load| acts_at(load, &place)).map(|load| load.at(point, normal));
+            let traction = acting.fold([0.0; 2], |sum, t| [0, 1].map(|k| sum[k] + t[k] / thickness));
+            for axis in (0..2).filter(|&axis| ![a, b].iter().all(|&i| held[i as usize][axis])) {
+                let direction = if axis == 0 { [1.0, 0.0] } else { [0.0, 1.0] };
+                edge.tractions.push(KnownTraction { point, normal, direction, value: traction[axis] });
+            }
+        }
+        let on_outline = places.iter().enumerate().filter_map(|(i, place)| Some((i, (*place)?)));
+        edge.particles =
+            on_outline.filter(|(_, place)| !is_inner_corner(outline, place)).map(|(i, _)| i).collect();
+        Some(edge)
+    }
+}
+
+fn acts_at(load: &OutlineLoad, place: &Place) -> bool {
+    let holds = |portion: &crate::geometry::portion::Portion| {
+        (portion.ring, portion.piece) == (place.ring, place.piece)
+            && (portion.t[0]..=portion.t[1]).contains(&place.t)
+    };
+    load.portions.iter().any(holds)
+}
+
+fn is_inner_corner(outline: &Outline, place: &Place) -> bool {
+    let ring = &outline.rings()[place.ring];
+    let (before, after) = match place.t {
+        0.0 => ((place.piece + ring.len() - 1) % ring.len(), place.piece),
+        1.0 => (place.piece, (place.piece + 1) % ring.len()),
+        _ => return false,
+    };
+    let (a, b) = (ring[before].tangent(1.0), ring[after].tangent(0.0));
+    a[0] * b[1] - a[1] * b[0] < INNER
+}
