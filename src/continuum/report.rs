@@ -7,7 +7,6 @@ use super::equilibrium::foresee;
 use super::front::share_reached;
 use super::interior;
 use super::plan::Plan;
-use crate::flock::cells_around::CellsAround;
 use crate::flock::fracture::Threshold;
 use crate::flock::interaction::Weights;
 use crate::flock::role::Role;
@@ -288,7 +287,7 @@ fn memory(plan: &Plan) -> usize {
             Weights::Equal => 0,
             Weights::Scalar(weights) => 8 * weights.len(),
             Weights::Matrix(weights) => {
-                let cells = weights.cells.as_ref().map_or(0, CellsAround::bytes);
+                let cells = weights.cells.as_ref().map_or(0, |cells| cells.bytes());
                 4 * count + 32 * weights.blocks.len() + cells
             }
         }

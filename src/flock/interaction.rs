@@ -58,7 +58,7 @@ pub struct MatrixWeights {
     /// `D_i^-1` \[length / force\], shape \[classes\].
     pub compliance: Vec<Block>,
     /// The cells around the particles of each class, for a corotated rule alone.
-    pub cells: Option<CellsAround>,
+    pub cells: Option<Box<CellsAround>>,
 }
 
 impl MatrixWeights {

@@ -166,7 +166,7 @@ impl MaterialWeights {
 
     /// The weights of a corotated rule: those of [`MaterialWeights::weights`] and the cells around each particle.
     pub fn corotated_weights(&self) -> MatrixWeights {
-        MatrixWeights { cells: Some(self.cells.clone()), ..self.weights() }
+        MatrixWeights { cells: Some(Box::new(self.cells.clone())), ..self.weights() }
     }
 
     /// Force of the neighbours on a particle, `sum_j K_ij (u_j - u_i)` \[force\], under displacements

@@ -18,12 +18,11 @@ fn element(corners: &[usize]) -> Element {
     Element { stiffness: vec![Block::default(); n * n], gradients: (0..n).map(gradient).collect() }
 }
 
-/// What the patch does to a particle when all stand at `now`; neighbours have the numbers of particles.
-fn felt(
-    own: usize,
-    now: &[[f64; 2]; 5],
-    reads: &dyn Fn(&mut dyn Iterator<Item = PatchCell<'_>>, &[PatchCell<'_>], &dyn Fn(usize) -> Corner),
-) {
+/// Looks at a patch as a particle sees it: its cells, and its neighbours by the numbers of particles.
+type Look<'a> = &'a dyn Fn(&[PatchCell<'_>], &dyn Fn(usize) -> Corner);
+
+/// Shows the patch to `look` as the particle `own` sees it when all stand at `now`.
+fn felt(own: usize, now: &[[f64; 2]; 5], look: Look<'_>) {
     let elements = CELLS.map(element);
     let slots =
         CELLS.map(|cell| cell.iter().map(|&i| if i == own { OWN } else { i as u32 }).collect::<Vec<_>>());
@@ -34,23 +33,25 @@ fn felt(
         let (reference, now) = (from(&PLACES), from(now));
         Corner { reference, displacement: [now[0] - reference[0], now[1] - reference[1]] }
     };
-    reads(&mut cells.clone().into_iter(), &cells, &corner);
+    look(&cells, &corner);
 }
 
 fn force(own: usize, now: &[[f64; 2]; 5]) -> [f64; 2] {
     let found = std::cell::Cell::new([0.0; 2]);
-    felt(own, now, &|cells, _, corner| found.set(pull(7.0, cells, corner).expect("has directions").0));
+    felt(own, now, &|cells, corner| {
+        found.set(pull(7.0, cells.iter().copied(), corner).expect("has directions").0);
+    });
     found.get()
 }
 
 #[test]
 fn forces_balance_and_change_as_the_tangent_says() {
     let (mut sum, mut moment) = ([0.0; 2], 0.0);
-    for own in 0..5 {
+    for (own, place) in NOW.iter().enumerate() {
         let here = force(own, &NOW);
         sum = [sum[0] + here[0], sum[1] + here[1]];
-        moment += NOW[own][0] * here[1] - NOW[own][1] * here[0];
-        felt(own, &NOW, &|_, cells, corner| {
+        moment += place[0] * here[1] - place[1] * here[0];
+        felt(own, &NOW, &|cells, corner| {
             let row = row(7.0, cells.iter().copied(), corner).expect("has directions");
             assert!((0..2).all(|d| (row.force[d] - here[d]).abs() < 1e-14));
             for (slot, block) in row.tangent {
@@ -79,7 +80,7 @@ fn forces_balance_and_change_as_the_tangent_says() {
 fn the_tangent_is_symmetric() {
     let blocks = std::cell::RefCell::new(vec![[[[0.0; 2]; 2]; 5]; 5]);
     for own in 0..5 {
-        felt(own, &NOW, &|_, cells, corner| {
+        felt(own, &NOW, &|cells, corner| {
             for (slot, block) in row(7.0, cells.iter().copied(), corner).expect("has directions").tangent {
                 blocks.borrow_mut()[own][if slot == OWN { own } else { slot as usize }] = block;
             }
