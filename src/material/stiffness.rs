@@ -6,7 +6,8 @@
 //!
 //! * Triangle: constant strain (M. J. Turner et al., 1956).
 //! * Quadrilateral: bilinear, 2x2 Gauss points (O. C. Zienkiewicz and R. L. Taylor, *The Finite
-//!   Element Method*, vol. 1). Plane strain near nu = 1/2 locks it, as it does the triangle.
+//!   Element Method*, vol. 1). Plane strain near nu = 1/2 would lock it, as it would the triangle:
+//!   see [`super::dilatation`].
 //! * Any other polygon: the virtual element of lowest order (L. Beirao da Veiga, F. Brezzi and
 //!   L. D. Marini, *Virtual elements for linear elasticity problems*, SIAM J. Numer. Anal. 51, 2013; in the
 //!   form of A. L. Gain, C. Talischi and G. H. Paulino, CMAME 282, 2014). See [`polygon`].
