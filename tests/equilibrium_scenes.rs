@@ -129,6 +129,33 @@ fn a_corotated_material_is_solved_to_where_it_is_swept_on_every_lattice() {
 }
 
 #[test]
+fn a_nearly_incompressible_material_is_solved_by_every_solver_to_where_it_is_swept() {
+    let rubber = "material={kind=\"isotropic\",young=1000.0,poisson=0.49,plane=\"strain\"}";
+    let pushed = "loads=[{kind=\"body\",force=[3.0,-5.0]}]";
+    for lattice in LATTICES {
+        let name = format!("lattice-{lattice}");
+        for mean in [BY_MATERIAL, COROTATED] {
+            let overrides = [rubber, mean, CELLS, pushed];
+            if lattice == "square" || lattice == "hexagonal" {
+                assert_alike(&name, &overrides, 1e-7);
+            }
+            let by = |solver: &str| {
+                let asked = format!("equilibrium={{solver=\"{solver}\",tolerance=1e-11}}");
+                ended(&load(&name, &[&overrides[..], &[&asked]].concat()))
+            };
+            let direct = by("direct");
+            for solver in ["multigrid", "conjugate-gradients", "gauss-seidel"] {
+                let other = by(solver);
+                let solved = other.solved.as_ref().expect("solved");
+                assert!(solved.converged, "{name} {mean} {solver}: {:?}", solved.residuals.last());
+                let apart = farthest_apart(&direct, &other);
+                assert!(apart < 1e-7, "{name} {mean} {solver}: {apart}");
+            }
+        }
+    }
+}
+
+#[test]
 fn a_corotated_cantilever_bends_as_far_as_it_is_swept_and_newton_s_steps_are_few() {
     let roles = "roles=[{region={kind=\"edge\",side=\"left\"},role=\"clamped\"}]";
     let load = "loads=[{kind=\"traction\",region={kind=\"edge\",side=\"right\"},traction=[0.0,-20.0]}]";

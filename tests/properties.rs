@@ -9,7 +9,7 @@ use flockform::flock::motion::Motion;
 use flockform::flock::points::Points;
 use flockform::flock::rules::{
     Axis, CellAround, Corner, Element, Feedback, FeedbackReference, Load, Mean, Neighbour, OWN, Origin, Own,
-    Poisson, Rotation, Rule,
+    PatchCell, Poisson, Rotation, Rule, pull,
 };
 use flockform::material::elastic::{Constants, Elastic};
 use flockform::material::stiffness::{mean_gradients, triangle};
@@ -327,7 +327,9 @@ proptest! {
             let rule = Rule { mean: Mean::Material { rotation: Rotation::Corotated }, ..Rule::BARYCENTRE };
             let load = Some(Load { force, compliance: [[0.0; 2]; 2] });
             let cells = elements.iter().zip(&slots).map(|(element, slots)| CellAround { element, factor: 1.5, own: 0, slots });
-            rule.target_by_cells(&Own { present, reference: [0.0; 2], rest: [0.0; 2], load }, cells, [false; 2], corner)
+            let patches = std::iter::empty::<(f64, std::iter::Empty<PatchCell>)>();
+            let own = Own { present, reference: [0.0; 2], rest: [0.0; 2], load };
+            rule.target_by_cells(&own, pull(cells, patches, corner), [false; 2])
         };
         let go = |p: [f64; 2]| { let [x, y] = turned(p); [x + shift[0], y + shift[1]] };
         let (before, after) = (target(&|p| p, push), target(&go, turned(push)));

@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 use super::split::ErrorParts;
 use crate::flock::points::{Points, distance};
 use crate::material::cells::Cells;
+use crate::material::dilatation;
 use crate::material::elastic::Elastic;
 use crate::material::stiffness::ShapeError;
 
@@ -94,13 +95,14 @@ impl Comparison {
 /// Von Mises stress at the centres of cells \[force / length^2\] whose corners are displaced by
 /// `displacement` \[length\], shape \[cells\]: on a quadrilateral by the bilinear formula.
 pub fn von_mises(cells: &Cells, elastic: &Elastic, displacement: &Points) -> Vec<f64> {
-    cells.strains(displacement).into_iter().map(|strain| elastic.von_mises(strain)).collect()
+    let strains = dilatation::averaged(cells, elastic, cells.strains(displacement), displacement.len());
+    strains.into_iter().map(|strain| elastic.von_mises(strain)).collect()
 }
 
 /// Strain energy of the cells \[force length\] under displacements \[length\] of their corners.
 pub fn strain_energy(cells: &Cells, elastic: &Elastic, displacement: &Points) -> Result<f64, ShapeError> {
     let kinds = 0..cells.shapes.len();
-    let elements: Result<Vec<_>, _> = kinds.map(|kind| cells.element(kind, elastic.stiffness())).collect();
+    let elements: Result<Vec<_>, _> = kinds.map(|kind| cells.element(kind, elastic)).collect();
     let elements = elements?;
     let of_cell = |(cell, &kind): (&[u32], &u32)| {
         // Relative to the first corner: a translation must not cost digits.
@@ -112,7 +114,8 @@ pub fn strain_energy(cells: &Cells, elastic: &Elastic, displacement: &Points) ->
         let u = DVector::from_iterator(2 * cell.len(), cell.iter().flat_map(relative));
         0.5 * u.dot(&(&elements[kind as usize] * &u))
     };
-    Ok(cells.iter().zip(&cells.kind).map(of_cell).sum())
+    let own: f64 = cells.iter().zip(&cells.kind).map(of_cell).sum();
+    Ok(own + dilatation::energy(cells, elastic, &cells.strains(displacement), displacement.len()))
 }
 
 fn norm(values: &[f64]) -> f64 {

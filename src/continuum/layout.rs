@@ -12,7 +12,7 @@ use crate::flock::role::Role;
 use crate::flock::rules::{Axis, Mean};
 use crate::geometry::outline::{Outline, OutlineError, Place};
 use crate::geometry::portion::{Portion, Selection};
-use crate::material::cells::{Cells, neighbourhood, without_loose_sites};
+use crate::material::cells::{Cells, neighbourhood, neighbourhood_of, without_loose_sites};
 use crate::material::fit::{FitError, Fitted, fit};
 use crate::material::outline_loads::{self, Loader, OutlineLoad, Push};
 use crate::scene::{BodySource, Condition, LeaderMotion, Load, RoleEntry, Scene, SceneError, SceneRegion};
@@ -59,7 +59,10 @@ impl Layout {
                 let Fitted { body, cells } = fitted;
                 require_resolved(scene, &body)?;
                 require_cell_neighbours(scene)?;
-                let neighbours = cells.mates(body.count());
+                let neighbours = match &scene.material {
+                    Some(elastic) => cells.neighbours(body.count(), elastic),
+                    None => cells.mates(body.count()),
+                };
                 Self { body, neighbours, cells: Some(cells), outline: Some(outline) }
             }
             of_lattice => Self::of_whole_cells(scene, of_lattice)?,
@@ -546,7 +549,11 @@ fn require_cell_neighbours(scene: &Scene) -> Result<(), SceneError> {
     let offsets = |neighbourhood: &Neighbourhood| {
         neighbourhood.offsets(&scene.lattice).map_err(|error| refuse(error.to_string()))
     };
-    let (given, needed) = (offsets(&scene.neighbourhood)?, offsets(&neighbourhood(&scene.lattice))?);
+    let needed = match &scene.material {
+        Some(elastic) => neighbourhood_of(&scene.lattice, elastic),
+        None => neighbourhood(&scene.lattice),
+    };
+    let (given, needed) = (offsets(&scene.neighbourhood)?, offsets(&needed)?);
     let has_all = |(given, needed): (&Vec<Site>, &Vec<Site>)| needed.iter().all(|site| given.contains(site));
     if given.iter().zip(&needed).all(has_all) {
         return Ok(());

@@ -255,13 +255,19 @@ fn hold_components(weights: &mut MatrixWeights, held: &[HeldComponent]) {
     axes.into_iter().for_each(|(particle, held)| weights.hold(particle, held));
 }
 
-/// The update as written; unless its damping is, a fitted body's is what its outline allows.
+/// Part of the damping for small strains that suits cells which turn: those that are strained by some ten percent resist
+/// more than they do at rest. Measured on lattices bent by 50 degrees while loads push them, the worst an oblique one:
+/// undiminished it does not settle, 0.95 settles after growing tenfold, 0.75 at once.
+const OF_TURNED_CELLS: f64 = 0.75;
+
+/// The update as written; unless its damping is, a fitted body's is what its outline allows, and less where cells turn.
 fn update(scene: &Scene, body: &Body, neighbours: &Neighbours, weights: &Weights) -> Update {
     let Update { order, damping } = scene.update;
     let is_open = scene.raw.update.damping.is_none() && order == Order::Synchronous;
     match weights {
         Weights::Matrix(weights) if is_open && scene.equilibrium.is_none() => {
-            Update { order, damping: along_outline(body, neighbours, weights, damping) }
+            let turned = if weights.cells.is_some() { OF_TURNED_CELLS } else { 1.0 };
+            Update { order, damping: turned * along_outline(body, neighbours, weights, damping) }
         }
         _ => scene.update,
     }

@@ -75,7 +75,7 @@ fn of_material(
     };
     material.map(|material| Weights::Matrix(weights(material))).map_err(|error| {
         let (key, help) = match &error {
-            WeightsError::MissingNeighbour { .. } => (
+            WeightsError::MissingNeighbour { .. } | WeightsError::MissingMate { .. } => (
                 "neighbours",
                 "use kind = \"cells\", or leave the neighbours out: the rule takes those that it needs",
             ),

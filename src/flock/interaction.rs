@@ -7,7 +7,7 @@ use super::cells_around::CellsAround;
 use super::fracture::Bonds;
 use super::neighbourhood::Neighbours;
 use super::points::Points;
-use super::rules::{CellAround, Corner, Load, Mean, Neighbour, OWN, Own, Rotation, Rule, pull};
+use super::rules::{CellAround, Corner, Load, Mean, Neighbour, OWN, Own, PatchCell, Rotation, Rule, pull};
 
 /// The arrays and index lists that a sweep runs over; it knows particles, not lattices.
 #[derive(Clone, Debug)]
@@ -77,6 +77,15 @@ impl MatrixWeights {
     pub fn cells_around(&self, particle: usize) -> impl Iterator<Item = CellAround<'_>> + Clone {
         let class = self.class[particle] as usize;
         self.cells.iter().flat_map(move |cells| cells.of(class))
+    }
+
+    /// The patches that a particle feels, whose dilatations are averaged: stiffness \[force / length^3\] and cells.
+    pub fn patches_around(
+        &self,
+        particle: usize,
+    ) -> impl Iterator<Item = (f64, impl Iterator<Item = PatchCell<'_>> + Clone)> + Clone {
+        let class = self.class[particle] as usize;
+        self.cells.iter().flat_map(move |cells| cells.patches_of(class))
     }
 
     #[inline]
@@ -151,8 +160,8 @@ impl Interaction {
             load: self.load(particle),
         };
         if let (COROTATED, Weights::Matrix(weights)) = (rule.mean, &self.weights) {
-            let (cells, held) = (weights.cells_around(particle), weights.held(particle));
-            return rule.target_by_cells(&own, cells, held, |slot| self.corner(particle, slot, present));
+            let pulled = self.pulled(weights, particle, present);
+            return rule.target_by_cells(&own, pulled, weights.held(particle));
         }
         let broken = self.bonds.as_ref().filter(|bonds| bonds.any_broken());
         match (broken, &self.weights) {
@@ -194,7 +203,7 @@ impl Interaction {
     fn force_from(&self, particle: usize, corner: impl Fn(usize) -> Corner + Copy) -> [f64; 2] {
         match &self.weights {
             Weights::Matrix(weights) if self.rule.mean == COROTATED => {
-                pull(weights.cells_around(particle), corner).0
+                pull(weights.cells_around(particle), weights.patches_around(particle), corner).0
             }
             Weights::Matrix(weights) => {
                 weights.stiffness_of(particle).iter().enumerate().fold([0.0; 2], |sum, (slot, block)| {
@@ -256,12 +265,20 @@ impl Interaction {
         let near = self.neighbours.of(particle);
         let kept = |slot: &u32| *slot == OWN || keeps(near[*slot as usize] as usize);
         let cells = weights.cells_around(particle).filter(|cell| cell.slots.iter().all(kept));
-        let corner = |slot| self.corner(particle, slot, present);
-        invert(&pull(cells.clone(), corner).1)?;
-        let (present, reference) = (present.get(particle), self.reference.get(particle));
+        let patches = weights.patches_around(particle);
+        let patches = patches.filter(|(_, cells)| cells.clone().all(|cell| cell.slots.iter().all(kept)));
+        let pulled = pull(cells, patches, |slot| self.corner(particle, slot, present));
+        invert(&pulled.1)?;
         let rest = self.rest.as_ref().map_or([0.0; 2], |rest| rest.get(particle));
+        let (present, reference) = (present.get(particle), self.reference.get(particle));
         let own = Own { present, reference, rest, load: self.load(particle) };
-        Some(self.rule.target_by_cells(&own, cells, weights.held(particle), corner))
+        Some(self.rule.target_by_cells(&own, pulled, weights.held(particle)))
+    }
+
+    /// Force of the cells around a particle, and what holds it.
+    fn pulled(&self, weights: &MatrixWeights, particle: usize, present: &Points) -> ([f64; 2], Block) {
+        let (cells, patches) = (weights.cells_around(particle), weights.patches_around(particle));
+        pull(cells, patches, |slot| self.corner(particle, slot, present))
     }
 
     /// A neighbour, seen from where the particle is.
@@ -362,111 +379,4 @@ fn rest_of_cells(weights: &MatrixWeights, reference: &Points) -> Option<Points> 
 }
 
 #[cfg(test)]
-mod tests {
-    use super::super::rules::{Axis, Poisson};
-    use super::*;
-
-    /// Three particles that see each other by matrices with no symmetry to hide behind.
-    fn triangle() -> (Interaction, Points) {
-        let reference: Points = [[0.0, 0.0], [1.0, 0.25], [0.5, 1.0]].into_iter().collect();
-        let first: Block = [[0.7, -0.2], [0.1, 0.4]];
-        let second: Block = [[0.3, 0.2], [-0.1, 0.6]];
-        let weights = MatrixWeights {
-            class: vec![0; 3],
-            starts: vec![0, 2],
-            blocks: vec![first, second],
-            stiffness: vec![first, second],
-            compliance: vec![[[0.5, 0.1], [0.1, 0.3]]],
-            cells: None,
-        };
-        let mut interaction = Interaction {
-            rule: Rule { mean: SMALL, ..Rule::BARYCENTRE },
-            reference: reference.into(),
-            neighbours: Neighbours::from_lists([[1, 2], [2, 0], [0, 1]]),
-            weights: Weights::Matrix(weights),
-            forces: Some([[1.0, 0.0], [0.0, -2.0], [0.3, 0.3]].into_iter().collect()),
-            rest: None,
-            bonds: None,
-        };
-        interaction.keep_rest();
-        let present = [[0.1, 0.0], [1.1, 0.3], [0.4, 0.9]].into_iter().collect();
-        (interaction, present)
-    }
-
-    #[test]
-    fn a_target_among_all_neighbours_is_the_target() {
-        let (material, present) = triangle();
-        let weights = Weights::Scalar(vec![1.0, 3.0, 0.5, 2.0, 1.0, 1.0]);
-        let mut scalar = Interaction { rule: Rule::BARYCENTRE, weights, forces: None, ..material };
-        scalar.keep_rest();
-        for i in 0..3 {
-            let target = scalar.target_among(i, &present, |_| true).expect("has neighbours");
-            assert_eq!(target.map(f64::to_bits), scalar.target(i, &present).map(f64::to_bits));
-        }
-    }
-
-    #[test]
-    fn whoever_is_lost_leaves_the_rest_where_it_was() {
-        let (mut material, present) = triangle();
-        material.forces = None;
-        let mut scalar = Interaction { rule: Rule::BARYCENTRE, weights: Weights::Equal, ..material.clone() };
-        scalar.keep_rest();
-        for interaction in [&material, &scalar] {
-            let reference = &interaction.reference;
-            let here = interaction.target_among(0, reference, |k| k != 2).expect("one is left");
-            assert!(crate::flock::points::distance(here, reference.get(0)) < 1e-15, "{here:?}");
-            assert_eq!(interaction.target_among(0, reference, |_| false), None);
-            // The one that is left is followed wherever it goes.
-            let target = interaction.target_among(0, &present, |k| k == 1).expect("one is left");
-            let moved = [0, 1].map(|axis| target[axis] - reference.get(0)[axis]);
-            let led = [0, 1].map(|axis| present.get(1)[axis] - reference.get(1)[axis]);
-            assert!(crate::flock::points::distance(moved, led) < 1e-15, "{moved:?} {led:?}");
-        }
-    }
-
-    #[test]
-    fn the_short_way_to_a_material_s_target_gives_the_bits_of_the_rule() {
-        let (interaction, present) = triangle();
-        for i in 0..3 {
-            let own = Own {
-                present: present.get(i),
-                reference: interaction.reference.get(i),
-                rest: interaction.rest.as_ref().expect("kept").get(i),
-                load: interaction.load(i),
-            };
-            let by_rule = interaction.rule.target(&own, interaction.seen(i, &present));
-            assert_eq!(interaction.target(i, &present).map(f64::to_bits), by_rule.map(f64::to_bits));
-        }
-    }
-
-    #[test]
-    fn the_short_way_to_a_plain_mean_gives_the_bits_of_the_rule() {
-        let (material, present) = triangle();
-        let with_rest = |rule: Rule| {
-            let (weights, neighbours) =
-                (Weights::Equal, Neighbours::from_lists([vec![1, 2, 2, 1, 0, 2, 0, 0], vec![0], vec![]]));
-            let mut interaction = Interaction { rule, weights, neighbours, forces: None, ..material.clone() };
-            interaction.keep_rest();
-            interaction
-        };
-        let across = Poisson { k: 0.3, pull: Axis::X, centre: 0.2, half_width: 1.5, exponent: 1.0 };
-        let composed = Rule { poisson: Some(across), ..Rule::BARYCENTRE };
-        // Negative zeros, and what rounds: a short way with other operations would show.
-        let zeros: Points = [[-0.0, 1e3 / 7.0], [-0.0, 0.1], [-0.0, 7e-3 / 3.0]].into_iter().collect();
-        for interaction in [with_rest(Rule::BARYCENTRE), with_rest(composed)] {
-            for points in [&present, &zeros] {
-                for i in 0..3 {
-                    let own = Own {
-                        present: points.get(i),
-                        reference: interaction.reference.get(i),
-                        rest: interaction.rest.as_ref().map_or([0.0; 2], |rest| rest.get(i)),
-                        load: None,
-                    };
-                    let by_rule = interaction.rule.target(&own, interaction.seen(i, points));
-                    let short = interaction.target(i, points);
-                    assert_eq!(short.map(f64::to_bits), by_rule.map(f64::to_bits), "{i}");
-                }
-            }
-        }
-    }
-}
+mod tests;

@@ -13,10 +13,8 @@ use crate::flock::lattice::{Lattice, LatticeKind, Site, ring};
 use crate::flock::neighbourhood::{Neighbourhood, Neighbours};
 use crate::flock::points::Points;
 
-use super::elastic::Voigt;
-use super::stiffness::{
-    ShapeError, area, centroid, cut_cell, cut_load_shares, element, load_shares, mean_strain,
-};
+use super::elastic::Elastic;
+use super::stiffness::{ShapeError, area, centroid, cut_load_shares, element_of, load_shares, mean_strain};
 use crate::geometry::outline::{Outline, OutlineError};
 
 /// Cells of any polygons, in compressed form. Corners run counter-clockwise.
@@ -97,13 +95,13 @@ impl Cells {
         Self { starts: vec![0], index: Vec::new(), kind: Vec::new(), whole: shapes.len(), shapes }
     }
 
-    /// Stiffness of the cells of a kind \[force / length\]; see [`element`] and [`cut_cell`].
+    /// Stiffness of the cells of a kind \[force / length\]: what each has to itself in this material; see
+    /// [`element_of`] and [`super::dilatation`].
     ///
     /// # Errors
-    /// As [`element`].
-    pub fn element(&self, kind: usize, stiffness: &Voigt) -> Result<DMatrix<f64>, ShapeError> {
-        let shape = &self.shapes[kind];
-        if kind < self.whole { element(shape, stiffness) } else { cut_cell(shape, stiffness) }
+    /// As [`element`](super::stiffness::element).
+    pub fn element(&self, kind: usize, elastic: &Elastic) -> Result<DMatrix<f64>, ShapeError> {
+        element_of(&self.shapes[kind], elastic, kind >= self.whole)
     }
 
     /// The part of a load per area that falls to each corner of the cells of a kind \[length^2\]; see [`load_shares`].
@@ -162,8 +160,26 @@ impl Cells {
         Incidence { starts, cell }
     }
 
+    /// For each of `particles` particles those that it feels in this material, in order of index: those it shares a cell
+    /// with, and where dilatations are averaged over cells ([`Elastic::averaged_dilatation`]) their mates as well.
+    pub fn neighbours(&self, particles: usize, elastic: &Elastic) -> Neighbours {
+        let mates = self.mates(particles);
+        if elastic.averaged_dilatation().is_none() {
+            return mates;
+        }
+        Neighbours::from_lists((0..particles).map(|i| {
+            let near = mates.of(i);
+            let mut all: Vec<u32> =
+                near.iter().flat_map(|&j| mates.of(j as usize)).chain(near).copied().collect();
+            all.sort_unstable();
+            all.dedup();
+            all.retain(|&j| j as usize != i);
+            all
+        }))
+    }
+
     /// For each of `particles` particles those it shares a cell with, in order of index: the fewest
-    /// neighbours that carry the material.
+    /// neighbours that carry a material.
     pub fn mates(&self, particles: usize) -> Neighbours {
         let incidence = self.incidence(particles);
         Neighbours::from_lists((0..particles).map(|i| {
@@ -301,12 +317,28 @@ pub fn without_loose_sites(body: &Body, neighbours: &Neighbours) -> (Body, Neigh
 
 /// The neighbourhood that a material needs: everybody with whom a particle shares a cell.
 pub fn neighbourhood(lattice: &Lattice) -> Neighbourhood {
-    match lattice.kind() {
-        LatticeKind::Square { .. } | LatticeKind::Rectangular { .. } => Neighbourhood::Ring { radius: 1 },
-        LatticeKind::Honeycomb { spacing } => Neighbourhood::Within { radius: 2.0 * spacing },
-        LatticeKind::Hexagonal { .. } => Neighbourhood::First { keep: None },
-        LatticeKind::CentredRectangular { .. } | LatticeKind::Oblique { .. } => {
-            let mut offsets = ring(&shortest_translations(lattice), 1);
+    cells_away(lattice, 1)
+}
+
+/// The neighbourhood that this material needs: [`neighbourhood`], and the mates of those as well where dilatations are
+/// averaged over cells ([`Elastic::averaged_dilatation`]).
+pub fn neighbourhood_of(lattice: &Lattice, elastic: &Elastic) -> Neighbourhood {
+    cells_away(lattice, if elastic.averaged_dilatation().is_some() { 2 } else { 1 })
+}
+
+/// Those that are one cell away, or two.
+fn cells_away(lattice: &Lattice, cells: i32) -> Neighbourhood {
+    match (lattice.kind(), cells) {
+        (LatticeKind::Square { .. } | LatticeKind::Rectangular { .. }, _) => {
+            Neighbourhood::Ring { radius: cells }
+        }
+        (LatticeKind::Honeycomb { spacing }, 1) => Neighbourhood::Within { radius: 2.0 * spacing },
+        // The farthest are sqrt(13) spacings away, those after them 4.
+        (LatticeKind::Honeycomb { spacing }, _) => Neighbourhood::Within { radius: 3.7 * spacing },
+        (LatticeKind::Hexagonal { .. }, 1) => Neighbourhood::First { keep: None },
+        (LatticeKind::Hexagonal { .. }, _) => Neighbourhood::Second,
+        (LatticeKind::CentredRectangular { .. } | LatticeKind::Oblique { .. }, _) => {
+            let mut offsets = ring(&shortest_translations(lattice), cells);
             lattice.sort_nearest_first(&mut offsets);
             Neighbourhood::Offsets(offsets)
         }
@@ -367,74 +399,4 @@ fn angle(lattice: &Lattice, offset: Site) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::flock::body::Cut;
-    use crate::material::stiffness::area;
-
-    fn body(kind: LatticeKind, orientation: f64) -> (Body, Neighbours) {
-        let lattice = Lattice::new(kind, [5.0, -3.0], orientation);
-        let neighbourhood = neighbourhood(&lattice);
-        Body::build(lattice, &Cut::Count { columns: 9, rows: 9 }, &neighbourhood, None).expect("builds")
-    }
-
-    #[test]
-    fn cells_run_counter_clockwise_and_each_particle_has_its_share_of_them() {
-        for kind in LatticeKind::SAMPLES {
-            for orientation in [0.0, 2.0] {
-                let (body, _) = body(kind, orientation);
-                let cells = Cells::of_body(&body);
-                let on_points = cells.on_points(&body.reference);
-                let cell_area = area(cells.shape(0));
-                for cell in 0..cells.count() {
-                    assert!((area(on_points.shape(cell)) - cell_area).abs() < 1e-12, "{kind:?}");
-                }
-                // One lattice cell for each particle: as many cells as fill its Voronoi area.
-                let around_each = cells.most_corners() as f64 * body.lattice.cell_area() / cell_area;
-                let incidence = cells.incidence(body.count());
-                let most = (0..body.count()).map(|i| incidence.of(i).len()).max();
-                assert_eq!(most, Some(around_each.round() as usize), "{kind:?}");
-            }
-        }
-    }
-
-    #[test]
-    fn mates_are_the_neighbourhood_that_the_room_asks_for() {
-        for kind in LatticeKind::SAMPLES {
-            let (body, neighbours) = body(kind, 0.4);
-            let mates = Cells::of_body(&body).mates(body.count());
-            let fullest = (0..body.count()).max_by_key(|&i| mates.of(i).len()).expect("particles");
-            let mut asked = neighbours.of(fullest).to_vec();
-            asked.sort_unstable();
-            assert_eq!(asked, mates.of(fullest), "{kind:?}");
-        }
-    }
-
-    #[test]
-    fn a_frame_has_no_cells() {
-        let lattice = Lattice::new(LatticeKind::SAMPLES[0], [0.0; 2], 0.0);
-        let frame = crate::flock::frame::FrameRule::Lagged;
-        let cut = Cut::Count { columns: 4, rows: 3 };
-        let (body, _) =
-            Body::build(lattice, &cut, &Neighbourhood::Ring { radius: 1 }, Some(frame)).expect("builds");
-        let cells = Cells::of_body(&body);
-        assert_eq!(cells.count(), 6);
-        assert!(cells.index.iter().all(|&i| !body.is_frame[i as usize]));
-    }
-
-    #[test]
-    fn the_boundary_of_a_rectangle_runs_around_it_once() {
-        let (body, _) = body(LatticeKind::SAMPLES[0], 0.0);
-        let cells = Cells::of_body(&body);
-        let sides = cells.boundary_sides(&cells.incidence(body.count()));
-        assert_eq!(sides.len(), 32);
-        let enclosed: f64 = sides
-            .iter()
-            .map(|&[a, b]| {
-                let (a, b) = (body.reference.get(a as usize), body.reference.get(b as usize));
-                0.5 * (a[0] * b[1] - a[1] * b[0])
-            })
-            .sum();
-        assert!((enclosed - 64.0).abs() < 1e-12);
-    }
-}
+mod tests;

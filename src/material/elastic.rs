@@ -33,6 +33,9 @@ pub enum Constants {
     Orthotropic { young: [f64; 2], poisson_12: f64, shear: f64, angle: f64 },
 }
 
+/// Poisson's ratio in plane strain above which dilatations are averaged: see [`Elastic::averaged_dilatation`].
+const LOCKS_ABOVE: f64 = 0.4;
+
 /// Why constants make no stable material.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ElasticError {
@@ -94,6 +97,36 @@ impl Elastic {
     /// Stiffness of the whole thickness \[force / length\].
     pub fn stiffness(&self) -> &Voigt {
         &self.stiffness
+    }
+
+    /// What resists a dilatation averaged over the cells around a particle, instead of that of each cell: Lame's lambda times
+    /// the thickness \[force / length\]. `None` where each cell resists its own.
+    ///
+    /// Towards nu = 1/2 in plane strain lambda grows without bound, and cells that each keep their area have too few
+    /// ways left to deform: they lock. One condition for each particle leaves enough, on triangles, quadrilaterals and
+    /// polygons alike (J. Bonet and A. J. Burton, *A simple average nodal pressure tetrahedral element for incompressible
+    /// and nearly incompressible dynamic explicit applications*, Comm. Numer. Meth. Eng. 14, 1998; the patches of E. A. de
+    /// Souza Neto, F. M. Andrade Pires and D. R. J. Owen, IJNME 62, 2005, are groups of cells instead). It takes neighbours
+    /// two cells away, so it is used above nu = 0.4 alone, in plane strain.
+    pub fn averaged_dilatation(&self) -> Option<f64> {
+        match self.constants {
+            Constants::Isotropic { poisson, plane: Plane::Strain, .. } if poisson > LOCKS_ABOVE => {
+                Some(self.stiffness[(0, 1)])
+            }
+            _ => None,
+        }
+    }
+
+    /// The stiffness less what resists dilatation by [`Elastic::averaged_dilatation`] \[force / length\]: all of it where
+    /// that is none.
+    pub fn stiffness_of_cells(&self) -> Voigt {
+        match self.averaged_dilatation() {
+            None => self.stiffness,
+            Some(_) => {
+                let shear = self.stiffness[(2, 2)];
+                Matrix3::from_diagonal(&Vector3::new(2.0 * shear, 2.0 * shear, shear))
+            }
+        }
     }
 
     /// In-plane stress (xx, yy, xy) \[force / length^2\] under a strain (xx, yy, engineering xy) \[1\].

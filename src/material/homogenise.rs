@@ -22,7 +22,8 @@ use nalgebra::{Complex, DMatrix, Matrix2, Matrix3, Vector2};
 use super::Block;
 use super::cells::templates;
 use super::elastic::{Elastic, Voigt};
-use super::stiffness::{ShapeError, element};
+use super::stiffness::{ShapeError, area, element_of, mean_gradients};
+use crate::flock::block::plus;
 use crate::flock::lattice::{Lattice, Site};
 
 /// A neighbour of an interior particle.
@@ -156,19 +157,19 @@ impl Crystal {
         let mut blocks: Vec<Vec<(Site, Block)>> = vec![Vec::new(); lattice.sublattices()];
         for template in templates(lattice) {
             let shape: Vec<[f64; 2]> = template.iter().map(|&corner| lattice.vector(corner)).collect();
-            let k = element(&shape, elastic.stiffness())?;
+            let k = element_of(&shape, elastic, false)?;
             for (a, own) in template.iter().enumerate() {
                 let row = &mut blocks[lattice.sublattice(*own)];
                 for (b, other) in template.iter().enumerate().filter(|&(b, _)| b != a) {
                     let offset = [other[0] - own[0], other[1] - own[1]];
-                    let slot = row.iter().position(|(o, _)| *o == offset).unwrap_or_else(|| {
-                        row.push((offset, [[0.0; 2]; 2]));
-                        row.len() - 1
-                    });
-                    for (x, y) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
-                        row[slot].1[x][y] -= k[(2 * a + x, 2 * b + y)];
-                    }
+                    let entry = |x: usize, y: usize| -k[(2 * a + x, 2 * b + y)];
+                    add(row, offset, &[[entry(0, 0), entry(0, 1)], [entry(1, 0), entry(1, 1)]]);
                 }
+            }
+        }
+        if let Some(lambda) = elastic.averaged_dilatation() {
+            for (sublattice, row) in blocks.iter_mut().enumerate() {
+                add_averaged(lattice, lambda, lattice.site_of_sublattice(sublattice), row);
             }
         }
         let bonds = blocks.iter().enumerate().map(|(sublattice, row)| {
@@ -320,6 +321,51 @@ impl Crystal {
             [along, across]
         };
         Ok(modes.map(|p| p.dot(&(fourth * p)) / p.dot(&(second * p))))
+    }
+}
+
+fn add(row: &mut Vec<(Site, Block)>, offset: Site, block: &Block) {
+    match row.iter_mut().find(|(known, _)| *known == offset) {
+        Some((_, sum)) => *sum = plus(sum, block),
+        None => row.push((offset, *block)),
+    }
+}
+
+/// Corners of the cells around a site of an infinite lattice.
+fn cells_around(lattice: &Lattice, site: Site) -> Vec<Vec<Site>> {
+    let mut cells = Vec::new();
+    for template in templates(lattice) {
+        for own in template.iter().filter(|own| lattice.sublattice(**own) == lattice.sublattice(site)) {
+            cells.push(template.iter().map(|c| [c[0] + site[0] - own[0], c[1] + site[1] - own[1]]).collect());
+        }
+    }
+    cells
+}
+
+/// What averaged dilatations add to the bonds of a site inside the body: see [`super::dilatation`].
+fn add_averaged(lattice: &Lattice, lambda: f64, own: Site, row: &mut Vec<(Site, Block)>) {
+    let mut middles: Vec<Site> = cells_around(lattice, own).concat();
+    middles.sort_unstable();
+    middles.dedup();
+    for middle in middles {
+        let (mut total, mut v) = (0.0, Vec::<(Site, [f64; 2])>::new());
+        for corners in cells_around(lattice, middle) {
+            let shape: Vec<[f64; 2]> = corners.iter().map(|&corner| lattice.vector(corner)).collect();
+            let share = area(&shape) / shape.len() as f64;
+            total += share;
+            for (&corner, [x, y]) in corners.iter().zip(mean_gradients(&shape)) {
+                let [x, y] = [share * x, share * y];
+                match v.iter_mut().find(|(known, _)| *known == corner) {
+                    Some((_, sum)) => *sum = [sum[0] + x, sum[1] + y],
+                    None => v.push((corner, [x, y])),
+                }
+            }
+        }
+        let of_own = v.iter().find(|(site, _)| *site == own).map_or([0.0; 2], |(_, v)| *v);
+        for (site, other) in v.into_iter().filter(|(site, _)| *site != own) {
+            let block = of_own.map(|a| other.map(|b| -lambda / total * a * b));
+            add(row, [site[0] - own[0], site[1] - own[1]], &block);
+        }
     }
 }
 

@@ -24,6 +24,7 @@
 //! * [`fit`]: bodies whose outline is kept: cells that the shape cuts, along it.
 //! * [`stiffness`]: what one cell resists: bilinear quadrilateral, constant-strain triangle, and the
 //!   lowest-order virtual element for any polygon.
+//! * [`dilatation`]: near nu = 1/2, the mean over the cells around a particle in place of each cell's own.
 //! * [`mechanism`]: whether the cells hold the body together, or a hinge lets it fold.
 //! * [`weights`]: cells and neighbours to `K_ij`, `D_i` and `W_ij`, kept by class of particles.
 //! * [`outline_loads`]: what acts on the outline, on particles or on all of the body to the forces `f_i`; [`loads`]: the
@@ -55,6 +56,7 @@
 //! ```
 
 pub mod cells;
+pub mod dilatation;
 pub mod elastic;
 pub mod fit;
 pub mod gradient;

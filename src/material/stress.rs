@@ -8,6 +8,7 @@ use nalgebra::DVector;
 use rayon::prelude::*;
 
 use super::cells::Cells;
+use super::dilatation;
 use super::elastic::Elastic;
 use super::stiffness::{ShapeError, area, mean_gradients, mean_strain};
 use crate::flock::points::Points;
@@ -48,9 +49,15 @@ pub fn of_cells(
     displacement: &Points,
     rotation: Rotation,
 ) -> Vec<StressState> {
+    let strains = strains(cells, displacement, rotation);
+    let strains = dilatation::averaged(cells, elastic, strains, displacement.len());
+    strains.into_par_iter().map(|strain| StressState::of(strain, elastic)).collect()
+}
+
+fn strains(cells: &Cells, displacement: &Points, rotation: Rotation) -> Vec<[f64; 3]> {
     let of_cell = |cell: usize| {
         let local = local(cells, cell, displacement, rotation);
-        StressState::of(mean_strain(cells.shape(cell), |k| local[k]), elastic)
+        mean_strain(cells.shape(cell), |k| local[k])
     };
     (0..cells.count()).into_par_iter().map(of_cell).collect()
 }
@@ -91,14 +98,19 @@ pub fn strain_energy(
     rotation: Rotation,
 ) -> Result<f64, ShapeError> {
     let kinds = 0..cells.shapes.len();
-    let elements: Result<Vec<_>, _> = kinds.map(|kind| cells.element(kind, elastic.stiffness())).collect();
+    let elements: Result<Vec<_>, _> = kinds.map(|kind| cells.element(kind, elastic)).collect();
     let elements = elements?;
     let of_cell = |cell: usize| {
         let local = local(cells, cell, displacement, rotation);
         let u = DVector::from_iterator(2 * local.len(), local.into_iter().flatten());
         0.5 * u.dot(&(&elements[cells.kind[cell] as usize] * &u))
     };
-    Ok((0..cells.count()).map(of_cell).sum())
+    let own: f64 = (0..cells.count()).map(of_cell).sum();
+    if elastic.averaged_dilatation().is_none() {
+        return Ok(own);
+    }
+    let strains = strains(cells, displacement, rotation);
+    Ok(own + dilatation::energy(cells, elastic, &strains, displacement.len()))
 }
 
 /// How far each cell is turned \[rad\], shape \[cells\].

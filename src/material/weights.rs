@@ -1,24 +1,23 @@
 //! Cells and neighbours to the 2x2 weights of the rule.
 
-use std::collections::HashMap;
+mod assembly;
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
+use assembly::Assembly;
+
 use super::cells::{Cells, Incidence};
+use super::dilatation::Patches;
 use super::elastic::Elastic;
 use super::mechanism::{Mechanism, require_rigid};
 use super::stiffness::{ShapeError, mean_gradients};
-use crate::flock::block::{Block, apply, inverse, plus, product};
+use crate::flock::block::{Block, apply, product};
 use crate::flock::body::Body;
 use crate::flock::cells_around::CellsAround;
 use crate::flock::interaction::MatrixWeights;
 use crate::flock::neighbourhood::Neighbours;
 use crate::flock::points::Points;
-use crate::flock::rules::{Element, OWN};
-
-/// Particles whose classes one thread finds at a time.
-const CHUNK: usize = 1 << 14;
 
 /// The material as seen by each particle. A row depends only on the cells around its particle, so
 /// particles fall into a few classes that share one; particles of a frame have neither cells nor
@@ -55,6 +54,10 @@ pub enum WeightsError {
         if *.corners == 4 { "the cell's diagonal pairs are missing" } else { "the cell's stiffness is cut" }
     )]
     MissingNeighbour { particle: usize, missing: usize, neighbours: usize, corners: usize },
+    #[error(
+        "{neighbours} neighbours cannot carry a dilatation averaged over cells: particles {particle} and {missing} have cells that meet at a particle, but are no neighbours"
+    )]
+    MissingMate { particle: usize, missing: usize, neighbours: usize },
     #[error(transparent)]
     Mechanism(#[from] Mechanism),
     #[error("cell {cell} (counted from 1): {reason}")]
@@ -89,7 +92,7 @@ impl MaterialWeights {
     }
 
     /// Weights of cells at any points, with a stiffness factor for each cell where given, shape
-    /// \[cells\] (a contrast of materials, damage). Neighbours are [`Cells::mates`].
+    /// \[cells\] (a contrast of materials, damage). Neighbours are [`Cells::neighbours`].
     pub fn on_points(
         cells: &Cells,
         reference: &Points,
@@ -99,7 +102,8 @@ impl MaterialWeights {
         let cells = cells.on_points(reference);
         let incidence = cells.incidence(reference.len());
         require_rigid(&cells, &incidence, reference, |_| true)?;
-        Self::gather(&cells, &incidence, cells.mates(reference.len()), elastic, factor)
+        let neighbours = cells.neighbours(reference.len(), elastic);
+        Self::gather(&cells, &incidence, neighbours, elastic, factor)
     }
 
     fn gather(
@@ -111,7 +115,12 @@ impl MaterialWeights {
     ) -> Result<Self, WeightsError> {
         check_factor(cells, factor)?;
         let elements = elements(cells, elastic)?;
-        let assembly = Assembly { cells, incidence, neighbours: &neighbours, elements, factor };
+        let averaged = elastic
+            .averaged_dilatation()
+            .map(|lambda| (lambda, Patches::new(cells, incidence, neighbours.count())));
+        let gradients = cells.shapes.iter().map(|shape| mean_gradients(shape)).collect();
+        let assembly =
+            Assembly { cells, incidence, neighbours: &neighbours, elements, gradients, averaged, factor };
         let (class, first) = assembly.classes();
         // Every row is summed over its own cells in their order: the same bits on any number of threads.
         // Collected before looking: the first error in the order of particles, not the first to be found.
@@ -195,169 +204,11 @@ fn check_factor(cells: &Cells, factor: Option<&[f64]>) -> Result<(), WeightsErro
 /// Element stiffness of each shape.
 fn elements(cells: &Cells, elastic: &Elastic) -> Result<Vec<DMatrix<f64>>, WeightsError> {
     let of_kind = |kind: usize| {
-        cells.element(kind, elastic.stiffness()).map_err(|reason| {
+        cells.element(kind, elastic).map_err(|reason| {
             let cell = cells.kind.iter().position(|&k| k as usize == kind).map_or(0, |cell| cell + 1);
             WeightsError::Shape { cell, reason }
         })
     };
     let outcomes: Vec<_> = (0..cells.shapes.len()).into_par_iter().map(of_kind).collect();
     outcomes.into_iter().collect()
-}
-
-/// What the rows are put together from.
-struct Assembly<'a> {
-    cells: &'a Cells,
-    incidence: &'a Incidence,
-    neighbours: &'a Neighbours,
-    elements: Vec<DMatrix<f64>>,
-    factor: Option<&'a [f64]>,
-}
-
-/// What tells the classes apart: which corner of which kind of cell the particle is, and where among its
-/// neighbours the other corners are, packed; and how many neighbours there are.
-type Pattern = (u128, u32);
-
-impl Assembly<'_> {
-    /// Class of each particle, and the first particle of each class.
-    fn classes(&self) -> (Vec<u32>, Vec<usize>) {
-        let count = self.neighbours.count();
-        let chunks: Vec<usize> = (0..count).step_by(CHUNK).collect();
-        let of_chunk = |&begin: &usize| {
-            let mut known: HashMap<Pattern, u32> = HashMap::new();
-            // Each pattern of the chunk with the first particle that has it; none has its own class.
-            let mut first: Vec<(Option<Pattern>, usize)> = Vec::new();
-            let of_particle = |i: usize| match self.pattern(i) {
-                Some(pattern) => *known.entry(pattern).or_insert_with(|| {
-                    first.push((Some(pattern), i));
-                    first.len() as u32 - 1
-                }),
-                None => {
-                    first.push((None, i));
-                    first.len() as u32 - 1
-                }
-            };
-            let class: Vec<u32> = (begin..count.min(begin + CHUNK)).map(of_particle).collect();
-            (class, first)
-        };
-        let found: Vec<_> = chunks.par_iter().map(of_chunk).collect();
-        let mut known: HashMap<Pattern, u32> = HashMap::new();
-        let (mut class, mut first) = (Vec::with_capacity(count), Vec::new());
-        for (of_chunk, first_of_chunk) in found {
-            let mut add = |i: usize| {
-                first.push(i);
-                first.len() as u32 - 1
-            };
-            let global: Vec<u32> = first_of_chunk
-                .into_iter()
-                .map(|(pattern, i)| match pattern {
-                    Some(pattern) => *known.entry(pattern).or_insert_with(|| add(i)),
-                    None => add(i),
-                })
-                .collect();
-            class.extend(of_chunk.into_iter().map(|local| global[local as usize]));
-        }
-        (class, first)
-    }
-
-    fn most_neighbours(&self) -> usize {
-        (0..self.neighbours.count()).map(|i| self.neighbours.of(i).len()).max().unwrap_or(0)
-    }
-
-    /// `None` where cells differ in more than their kind, or do not fit the pattern.
-    fn pattern(&self, particle: usize) -> Option<Pattern> {
-        if self.factor.is_some() {
-            return None;
-        }
-        let seen = self.neighbours.of(particle);
-        let mut packed: u128 = 1;
-        let mut push = |value: usize, bits: u32| {
-            let fits = packed.leading_zeros() >= bits && value >> bits == 0;
-            packed = (packed << bits) | value as u128;
-            fits.then_some(())
-        };
-        for cell in self.incidence.of(particle).iter().map(|&cell| cell as usize) {
-            let corners = self.cells.of(cell);
-            let own = corners.iter().position(|&corner| corner as usize == particle)?;
-            push(self.cells.kind[cell] as usize, 1)?;
-            push(own, 3)?;
-            for &corner in corners.iter().filter(|&&corner| corner as usize != particle) {
-                push(seen.iter().position(|&j| j == corner)?, 5)?;
-            }
-        }
-        Some((packed, seen.len() as u32))
-    }
-
-    /// The row of one particle; refuses a particle that does not see a corner of its cells.
-    fn row(&self, particle: usize) -> Result<Row, WeightsError> {
-        let seen = self.neighbours.of(particle);
-        let mut blocks = vec![Block::default(); seen.len()];
-        for cell in self.around(particle) {
-            let (k, slots) = (&self.elements[self.cells.kind[cell] as usize], self.slots(particle, cell));
-            let factor = self.factor(cell);
-            let own = slots.iter().position(|&slot| slot == Some(OWN)).unwrap_or_default();
-            for (other, slot) in slots.into_iter().enumerate().filter(|&(other, _)| other != own) {
-                let Some(slot) = slot else {
-                    return Err(WeightsError::MissingNeighbour {
-                        particle: particle + 1,
-                        missing: self.cells.of(cell)[other] as usize + 1,
-                        neighbours: self.most_neighbours(),
-                        corners: self.cells.of(cell).len(),
-                    });
-                };
-                let slot = slot as usize;
-                let entry = |a: usize, b: usize| -factor * k[(2 * own + a, 2 * other + b)];
-                blocks[slot] = plus(&blocks[slot], &[[entry(0, 0), entry(0, 1)], [entry(1, 0), entry(1, 1)]]);
-            }
-        }
-        let diagonal = blocks.iter().fold(Block::default(), |sum, block| plus(&sum, block));
-        let inverse = match inverse(&diagonal) {
-            Some(inverse) => inverse,
-            None if self.around(particle).next().is_none() => Block::default(),
-            None => return Err(WeightsError::Singular { particle: particle + 1 }),
-        };
-        Ok(Row { blocks, diagonal, inverse })
-    }
-
-    fn around(&self, particle: usize) -> impl Iterator<Item = usize> {
-        self.incidence.of(particle).iter().map(|&cell| cell as usize)
-    }
-
-    fn factor(&self, cell: usize) -> f64 {
-        self.factor.map_or(1.0, |factor| factor[cell])
-    }
-
-    /// Which neighbour of a particle each corner of a cell is, [`OWN`] for itself, shape \[corners\].
-    fn slots(&self, particle: usize, cell: usize) -> Vec<Option<u32>> {
-        let seen = self.neighbours.of(particle);
-        let slot = |&corner: &u32| match corner as usize == particle {
-            true => Some(OWN),
-            false => seen.iter().position(|&j| j == corner).map(|slot| slot as u32),
-        };
-        self.cells.of(cell).iter().map(slot).collect()
-    }
-
-    /// The cells around one particle of each class, all of whose corners it sees.
-    fn cells_around(&self, first: &[usize]) -> CellsAround {
-        let kinds = self.elements.iter().zip(&self.cells.shapes);
-        let elements = kinds.map(|(k, shape)| {
-            let entry = |a: usize, b: usize| {
-                let (a, b) = (2 * a, 2 * b);
-                [[k[(a, b)], k[(a, b + 1)]], [k[(a + 1, b)], k[(a + 1, b + 1)]]]
-            };
-            let corners = shape.len();
-            let stiffness = (0..corners * corners).map(|n| entry(n / corners, n % corners)).collect();
-            Element { stiffness, gradients: mean_gradients(shape) }
-        });
-        let mut around = CellsAround::new(elements.collect());
-        for &particle in first {
-            for cell in self.around(particle) {
-                let slots: Vec<u32> =
-                    self.slots(particle, cell).into_iter().map(Option::unwrap_or_default).collect();
-                let own = slots.iter().position(|&slot| slot == OWN).unwrap_or_default();
-                around.push(self.cells.kind[cell], own, &slots, self.factor(cell));
-            }
-            around.end_class();
-        }
-        around
-    }
 }

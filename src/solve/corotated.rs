@@ -21,10 +21,12 @@ use crate::flock::block::{Block, apply, plus};
 use crate::flock::body::Body;
 use crate::flock::interaction::{Interaction, MatrixWeights, Weights};
 use crate::flock::points::Points;
-use crate::flock::rules::{Corner, Mean, OWN, Rotation, Turn};
+use crate::flock::rules::{Corner, Mean, OWN, Rotation, Turn, patch_row};
 
 /// Newton steps of one increment.
 const MOST_STEPS: usize = 16;
+/// Steps in a row that do not halve the residual after which rounding is taken to have the last word.
+const STALLED: usize = 2;
 /// Linear systems of a whole way.
 const MOST_SOLVES: usize = 500;
 /// Least part of the way taken at once.
@@ -210,6 +212,14 @@ impl Corotated<'_> {
             }
             turn = turn.or(Some(row.turn));
         }
+        for (stiffness, cells) in self.weights.patches_around(i) {
+            let row = patch_row(stiffness, cells, |slot| self.corner(i, slot, u))?;
+            add(&mut force, row.force);
+            for (slot, block) in row.tangent {
+                let sum = if slot == OWN { &mut diagonal } else { &mut blocks[slot as usize] };
+                *sum = plus(sum, &block);
+            }
+        }
         Some(Local { force, diagonal, blocks, turn: turn? })
     }
 
@@ -335,7 +345,7 @@ impl Newton<'_> {
         let mut led: Points = u.iter().zip(now.iter()).map(|(here, there)| minus(there, here)).collect();
         let Some((mut locals, mut left)) = rule.forces(&u, after) else { return Ok(None) };
         let turns: Vec<Option<Turn>> = locals.iter().map(|l| l.as_ref().map(|l| l.turn)).collect();
-        let mut best = f64::INFINITY;
+        let (mut best, mut stalled) = (f64::INFINITY, 0);
         for _ in 0..MOST_STEPS {
             self.step(&mut u, (&locals, left), std::mem::replace(&mut led, Points::zeros(now.len())))?;
             rule.hold(&mut u, &now);
@@ -343,12 +353,12 @@ impl Newton<'_> {
             (locals, left) = found;
             let residual = norm(&left) / self.size;
             self.residuals.push(residual);
-            // Where rounding has the last word, another step does not make it less.
-            if residual <= goal || (residual <= ON_THE_WAY && residual > 0.5 * best) {
-                best = best.min(residual);
+            // Where rounding has the last word, further steps do not make it less.
+            stalled = if residual > 0.5 * best { stalled + 1 } else { 0 };
+            best = best.min(residual);
+            if residual <= goal || (residual <= ON_THE_WAY && stalled == STALLED) {
                 break;
             }
-            best = best.min(residual);
             if residual.is_nan() || residual > 1e6 {
                 return Ok(None);
             }

@@ -15,7 +15,7 @@ fn resultant(forces: impl Iterator<Item = ([f64; 2], [f64; 2])>) -> [f64; 3] {
 #[test]
 fn reactions_carry_the_load_and_its_moment_in_the_deformed_state() {
     for kind in KINDS {
-        for elastic in [sheet(12.0, 0.3), fibres()] {
+        for elastic in [sheet(12.0, 0.3), fibres(), slice(12.0, 0.49)] {
             let length = 8.0;
             let load = [0.002, 0.02];
             let beam = Beam::new(kind(0.25), length, &elastic, load);
@@ -30,7 +30,12 @@ fn reactions_carry_the_load_and_its_moment_in_the_deformed_state() {
             let loads = resultant((0..at.len()).map(|i| (at.get(i), beam.load(i))));
             let [x, y, m] = [0, 1, 2].map(|k| reactions[k] + loads[k]);
             let size = load[0].hypot(load[1]);
-            assert!(x.abs().max(y.abs()) < 1e-8 * size && m.abs() < 1e-8 * size * length, "{x} {y} {m}");
+            assert!(
+                x.abs().max(y.abs()) < 1e-8 * size && m.abs() < 1e-8 * size * length,
+                "{:?}: {x} {y} {m}, {:?}",
+                kind(0.25),
+                solved.residuals
+            );
         }
     }
 }
@@ -85,15 +90,11 @@ fn rest_is_a_minimum_of_the_energy() {
 #[test]
 fn every_solver_and_the_sweeps_find_the_same_rest() {
     for kind in KINDS {
-        let beam = |rollers: bool| {
-            let beam = Beam::new(kind(0.5), 4.0, &sheet(12.0, 0.3), [0.02, 0.06]);
-            if rollers { beam.on_rollers() } else { beam }
-        };
-        for beam in [beam(false), beam(true)] {
+        let beam = |length, elastic| Beam::new(kind(0.5), length, &elastic, [0.02, 0.06]);
+        let (plain, averaged) = (beam(3.0, sheet(12.0, 0.3)), beam(2.0, slice(12.0, 0.45)));
+        for beam in [plain, averaged, beam(3.0, sheet(12.0, 0.3)).on_rollers()] {
             let solved = beam.solved_by(Solver::Direct);
-            for solver in
-                [Solver::ConjugateGradients, Solver::Chebyshev, Solver::GaussSeidel, Solver::Multigrid]
-            {
+            for solver in [Solver::ConjugateGradients, Solver::GaussSeidel, Solver::Multigrid] {
                 let other = beam.solved_by(solver).displacement;
                 let apart = other.iter().zip(solved.displacement.iter()).map(|(a, b)| distance(a, b));
                 assert!(apart.fold(0.0, f64::max) < 1e-9, "{solver}");

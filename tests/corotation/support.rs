@@ -28,6 +28,11 @@ pub fn sheet(young: f64, poisson: f64) -> Elastic {
     Elastic::new(Constants::Isotropic { young, poisson, plane: Plane::Stress }, 1.0).expect("admissible")
 }
 
+/// Plane strain: near nu = 1/2 its dilatations are averaged.
+pub fn slice(young: f64, poisson: f64) -> Elastic {
+    Elastic::new(Constants::Isotropic { young, poisson, plane: Plane::Strain }, 1.0).expect("admissible")
+}
+
 pub fn fibres() -> Elastic {
     let constants = Constants::Orthotropic { young: [9.0, 1.0], poisson_12: 0.4, shear: 0.6, angle: 0.5 };
     Elastic::new(constants, 1.0).expect("admissible")
@@ -54,8 +59,8 @@ impl Beam {
         let tractions = end.map(|side| Traction::uniform(side, load)).collect();
         let forces =
             Loads { tractions, ..Loads::default() }.on_particles(&cells, &body.reference).expect("fits");
-        let mates = cells.mates(body.count());
-        let weights = MaterialWeights::assemble(&cells, &body, mates, elastic).expect("holds");
+        let near = cells.neighbours(body.count(), elastic);
+        let weights = MaterialWeights::assemble(&cells, &body, near, elastic).expect("holds");
         let interaction = Interaction {
             rule: Rule { mean: Mean::Material { rotation: Rotation::Corotated }, ..Rule::BARYCENTRE },
             reference: body.reference.clone(),

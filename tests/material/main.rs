@@ -2,6 +2,7 @@
 
 mod beam;
 mod cantilever;
+mod locking;
 mod patch;
 mod refusals;
 mod support;

@@ -31,6 +31,7 @@
 //! in turned axes; where rotations are small this is the plain material rule.
 
 use super::Own;
+use super::averaged::{self, PatchCell};
 use crate::flock::block::{Block, apply, inverse, plus, product, transposed};
 
 /// What a cell resists.
@@ -60,14 +61,30 @@ pub struct Turn {
     versed: f64,
     /// Trace of the stretch: 2 in the reference.
     trace: f64,
+    /// That less 2, with all its digits.
+    growth: f64,
 }
 
 impl Turn {
-    fn of_gradient(skew: f64, trace: f64) -> Option<Self> {
+    /// From `F21 - F12` and `F11 + F22 - 2`.
+    fn of_gradient(skew: f64, dilatation: f64) -> Option<Self> {
+        let trace = 2.0 + dilatation;
         let size = f64::hypot(skew, trace);
         let (cos, sin) = (trace / size, skew / size);
-        let versed = if trace > 0.0 { -sin * (skew / (size + trace)) } else { cos - 1.0 };
-        (size > 0.0 && size.is_finite()).then_some(Self { cos, sin, versed, trace: size })
+        let is_forward = trace > 0.0;
+        let versed = if is_forward { -sin * (skew / (size + trace)) } else { cos - 1.0 };
+        let growth = if is_forward { dilatation + skew * (skew / (size + trace)) } else { size - 2.0 };
+        (size > 0.0 && size.is_finite()).then_some(Self { cos, sin, versed, trace: size, growth })
+    }
+
+    /// Trace of the stretch \[1\].
+    pub fn trace(self) -> f64 {
+        self.trace
+    }
+
+    /// Trace of the stretch less 2: the dilatation \[1\].
+    pub fn growth(self) -> f64 {
+        self.growth
     }
 
     /// Cosine of the angle between two turns.
@@ -115,13 +132,13 @@ impl Element {
 
     /// The rotation of the cell; `None` where it has no direction left, all corners in one point.
     pub fn turn(&self, corner: impl Fn(usize) -> Corner) -> Option<Turn> {
-        let (mut skew, mut trace) = (0.0, 2.0);
+        let (mut skew, mut dilatation) = (0.0, 0.0);
         for (k, &[gx, gy]) in self.gradients.iter().enumerate() {
             let [u, v] = corner(k).displacement;
             skew += gx * v - gy * u;
-            trace += gx * u + gy * v;
+            dilatation += gx * u + gy * v;
         }
-        Turn::of_gradient(skew, trace)
+        Turn::of_gradient(skew, dilatation)
     }
 
     /// The force of the cell on the corner `own` \[force, world frame\], and its rotation; `None` as [`Element::turn`].
@@ -227,27 +244,24 @@ impl CellAround<'_> {
     }
 }
 
-/// Force of its cells on a particle \[force, world frame\], and `D` \[force / length\]; a cell that has collapsed to a point
-/// adds nothing.
-pub fn pull<'a>(
+/// Force of its cells and patches on a particle \[force, world frame\], and `D` \[force / length\]; a cell that has collapsed
+/// to a point adds nothing.
+pub fn pull<'a, P: Iterator<Item = PatchCell<'a>>>(
     cells: impl Iterator<Item = CellAround<'a>>,
+    patches: impl Iterator<Item = (f64, P)>,
     neighbour: impl Fn(usize) -> Corner,
 ) -> ([f64; 2], Block) {
-    cells.filter_map(|cell| cell.pull(&neighbour)).fold(Default::default(), |(sum, holds), (force, hold)| {
+    let cells = cells.filter_map(|cell| cell.pull(&neighbour));
+    let patches = patches.filter_map(|(k, cells)| averaged::pull(k, cells, &neighbour));
+    cells.chain(patches).fold(Default::default(), |(sum, holds), (force, hold)| {
         ([sum[0] + force[0], sum[1] + force[1]], plus(&holds, &hold))
     })
 }
 
-/// The target of a particle under a load \[force\]; `None` where no cell holds it. Components that are `held` are where its
-/// rest offset says.
-pub fn target<'a>(
-    own: &Own,
-    load: [f64; 2],
-    cells: impl Iterator<Item = CellAround<'a>>,
-    held: [bool; 2],
-    neighbour: impl Fn(usize) -> Corner,
-) -> Option<[f64; 2]> {
-    let (force, hold) = pull(cells, neighbour);
+/// The target of a particle under this force of its cells and its load, held by `hold`; `None` where nothing holds it.
+/// Components that are `held` are where its rest offset says.
+pub fn target(own: &Own, (force, hold): ([f64; 2], Block), held: [bool; 2]) -> Option<[f64; 2]> {
+    let load = own.load.map_or([0.0; 2], |load| load.force);
     let force = [force[0] + load[0], force[1] + load[1]];
     if held == [false; 2] {
         let [x, y] = apply(&inverse(&hold)?, force);

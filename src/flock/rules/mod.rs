@@ -5,6 +5,7 @@
 //! the rest offset, the Poisson term (Eq. 2) and feedback (Eq. 4), in that order. Each stands in a
 //! file of its own.
 
+mod averaged;
 mod barycentre;
 mod corotated;
 mod distance;
@@ -16,6 +17,7 @@ mod spaced;
 
 use super::block::{Block, IDENTITY, apply};
 
+pub use averaged::{PatchCell, PatchRow, row as patch_row};
 pub use corotated::{CellAround, CellRow, Corner, Element, OWN, Turn, pull};
 pub use feedback::{Feedback, FeedbackReference};
 pub use material::Rotation;
@@ -121,19 +123,12 @@ impl Rule {
         }
     }
 
-    /// The target by a corotated material: where the forces of the `cells` around the particle and its load leave it,
-    /// its neighbours staying. `neighbour` gives the place of each neighbour from that of the particle. The reference
-    /// configuration is at rest to the last bit. Components that are `held` stay where the rest offset has them;
-    /// weights, and other rest offsets, are not looked at.
-    pub fn target_by_cells<'a>(
-        &self,
-        own: &Own,
-        cells: impl Iterator<Item = CellAround<'a>>,
-        held: [bool; 2],
-        neighbour: impl Fn(usize) -> Corner,
-    ) -> [f64; 2] {
-        let load = own.load.map_or([0.0; 2], |load| load.force);
-        match corotated::target(own, load, cells, held, neighbour) {
+    /// The target by a corotated material: where the force of the cells around the particle and its load leave it, its
+    /// neighbours staying; `pulled` is what [`pull`] says of them. The reference configuration is at rest to the last
+    /// bit. Components that are `held` stay where the rest offset has them; weights, and other rest offsets, are not
+    /// looked at.
+    pub fn target_by_cells(&self, own: &Own, pulled: ([f64; 2], Block), held: [bool; 2]) -> [f64; 2] {
+        match corotated::target(own, pulled, held) {
             Some(target) => self.with_terms(own, target),
             None => own.present,
         }

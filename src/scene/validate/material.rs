@@ -57,11 +57,19 @@ pub fn rotation(raw: RawRotation) -> Rotation {
 }
 
 /// The neighbourhood as written, or what the rule needs where none is.
-pub fn neighbourhood(raw: &RawScene, lattice: &Lattice) -> Neighbourhood {
+pub fn neighbourhood(raw: &RawScene, lattice: &Lattice, elastic: Option<&Elastic>) -> Neighbourhood {
     match &raw.neighbours {
-        Some(neighbours) => super::neighbourhood(neighbours, lattice),
-        None if is_material(raw) => cells::neighbourhood(lattice),
+        Some(neighbours) => super::neighbourhood(neighbours, lattice, elastic),
+        None if is_material(raw) => of_cells(lattice, elastic),
         None => Neighbourhood::First { keep: None },
+    }
+}
+
+/// The neighbours that the cells of this material need, or any material.
+pub fn of_cells(lattice: &Lattice, elastic: Option<&Elastic>) -> Neighbourhood {
+    match elastic {
+        Some(elastic) => cells::neighbourhood_of(lattice, elastic),
+        None => cells::neighbourhood(lattice),
     }
 }
 

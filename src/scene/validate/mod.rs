@@ -23,7 +23,7 @@ use crate::flock::rules::{Axis, Feedback, FeedbackReference, Mean, Origin};
 use crate::geometry::outline::Piece;
 use crate::geometry::shape::{Segment, Shape};
 use crate::geometry::specimen::Specimen;
-use crate::material::cells;
+use crate::material::elastic::Elastic;
 use crate::solve::sweep::{Order, Update};
 
 impl Scene {
@@ -99,11 +99,11 @@ pub(super) fn validate(
     }
     let (body, lattice) = body(&raw, folder, refuse)?;
     let spacing = lattice.spacing();
-    let neighbourhood = material::neighbourhood(&raw, &lattice);
     check_present_neighbours(&raw, refuse)?;
     material::check_rule(&raw, refuse)?;
     check_truth(&raw, refuse)?;
     let elastic = material::elastic(&raw.material, refuse)?;
+    let neighbourhood = material::neighbourhood(&raw, &lattice, elastic.as_ref());
     let equilibrium = equilibrium::equilibrium(&raw, refuse)?;
     let load_steps = load_steps::load_steps(&raw, refuse)?;
     let is_fitted = material::is_fitted(&raw, refuse)?;
@@ -307,11 +307,11 @@ fn frame(raw: RawFrame) -> Option<FrameRule> {
     }
 }
 
-fn neighbourhood(raw: &RawNeighbours, lattice: &Lattice) -> Neighbourhood {
+fn neighbourhood(raw: &RawNeighbours, lattice: &Lattice, elastic: Option<&Elastic>) -> Neighbourhood {
     match raw {
         RawNeighbours::First { keep } => Neighbourhood::First { keep: *keep },
         RawNeighbours::Ring { radius } => Neighbourhood::Ring { radius: *radius },
-        RawNeighbours::Cells {} => cells::neighbourhood(lattice),
+        RawNeighbours::Cells {} => material::of_cells(lattice, elastic),
         RawNeighbours::Second {} => Neighbourhood::Second,
         RawNeighbours::Straight {} => Neighbourhood::Straight,
         RawNeighbours::Offsets { offsets } => Neighbourhood::Offsets(offsets.clone()),

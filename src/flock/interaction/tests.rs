@@ -1,0 +1,106 @@
+use super::super::rules::{Axis, Poisson};
+use super::*;
+
+/// Three particles that see each other by matrices with no symmetry to hide behind.
+fn triangle() -> (Interaction, Points) {
+    let reference: Points = [[0.0, 0.0], [1.0, 0.25], [0.5, 1.0]].into_iter().collect();
+    let first: Block = [[0.7, -0.2], [0.1, 0.4]];
+    let second: Block = [[0.3, 0.2], [-0.1, 0.6]];
+    let weights = MatrixWeights {
+        class: vec![0; 3],
+        starts: vec![0, 2],
+        blocks: vec![first, second],
+        stiffness: vec![first, second],
+        compliance: vec![[[0.5, 0.1], [0.1, 0.3]]],
+        cells: None,
+    };
+    let mut interaction = Interaction {
+        rule: Rule { mean: SMALL, ..Rule::BARYCENTRE },
+        reference: reference.into(),
+        neighbours: Neighbours::from_lists([[1, 2], [2, 0], [0, 1]]),
+        weights: Weights::Matrix(weights),
+        forces: Some([[1.0, 0.0], [0.0, -2.0], [0.3, 0.3]].into_iter().collect()),
+        rest: None,
+        bonds: None,
+    };
+    interaction.keep_rest();
+    let present = [[0.1, 0.0], [1.1, 0.3], [0.4, 0.9]].into_iter().collect();
+    (interaction, present)
+}
+
+#[test]
+fn a_target_among_all_neighbours_is_the_target() {
+    let (material, present) = triangle();
+    let weights = Weights::Scalar(vec![1.0, 3.0, 0.5, 2.0, 1.0, 1.0]);
+    let mut scalar = Interaction { rule: Rule::BARYCENTRE, weights, forces: None, ..material };
+    scalar.keep_rest();
+    for i in 0..3 {
+        let target = scalar.target_among(i, &present, |_| true).expect("has neighbours");
+        assert_eq!(target.map(f64::to_bits), scalar.target(i, &present).map(f64::to_bits));
+    }
+}
+
+#[test]
+fn whoever_is_lost_leaves_the_rest_where_it_was() {
+    let (mut material, present) = triangle();
+    material.forces = None;
+    let mut scalar = Interaction { rule: Rule::BARYCENTRE, weights: Weights::Equal, ..material.clone() };
+    scalar.keep_rest();
+    for interaction in [&material, &scalar] {
+        let reference = &interaction.reference;
+        let here = interaction.target_among(0, reference, |k| k != 2).expect("one is left");
+        assert!(crate::flock::points::distance(here, reference.get(0)) < 1e-15, "{here:?}");
+        assert_eq!(interaction.target_among(0, reference, |_| false), None);
+        // The one that is left is followed wherever it goes.
+        let target = interaction.target_among(0, &present, |k| k == 1).expect("one is left");
+        let moved = [0, 1].map(|axis| target[axis] - reference.get(0)[axis]);
+        let led = [0, 1].map(|axis| present.get(1)[axis] - reference.get(1)[axis]);
+        assert!(crate::flock::points::distance(moved, led) < 1e-15, "{moved:?} {led:?}");
+    }
+}
+
+#[test]
+fn the_short_way_to_a_material_s_target_gives_the_bits_of_the_rule() {
+    let (interaction, present) = triangle();
+    for i in 0..3 {
+        let own = Own {
+            present: present.get(i),
+            reference: interaction.reference.get(i),
+            rest: interaction.rest.as_ref().expect("kept").get(i),
+            load: interaction.load(i),
+        };
+        let by_rule = interaction.rule.target(&own, interaction.seen(i, &present));
+        assert_eq!(interaction.target(i, &present).map(f64::to_bits), by_rule.map(f64::to_bits));
+    }
+}
+
+#[test]
+fn the_short_way_to_a_plain_mean_gives_the_bits_of_the_rule() {
+    let (material, present) = triangle();
+    let with_rest = |rule: Rule| {
+        let (weights, neighbours) =
+            (Weights::Equal, Neighbours::from_lists([vec![1, 2, 2, 1, 0, 2, 0, 0], vec![0], vec![]]));
+        let mut interaction = Interaction { rule, weights, neighbours, forces: None, ..material.clone() };
+        interaction.keep_rest();
+        interaction
+    };
+    let across = Poisson { k: 0.3, pull: Axis::X, centre: 0.2, half_width: 1.5, exponent: 1.0 };
+    let composed = Rule { poisson: Some(across), ..Rule::BARYCENTRE };
+    // Negative zeros, and what rounds: a short way with other operations would show.
+    let zeros: Points = [[-0.0, 1e3 / 7.0], [-0.0, 0.1], [-0.0, 7e-3 / 3.0]].into_iter().collect();
+    for interaction in [with_rest(Rule::BARYCENTRE), with_rest(composed)] {
+        for points in [&present, &zeros] {
+            for i in 0..3 {
+                let own = Own {
+                    present: points.get(i),
+                    reference: interaction.reference.get(i),
+                    rest: interaction.rest.as_ref().map_or([0.0; 2], |rest| rest.get(i)),
+                    load: None,
+                };
+                let by_rule = interaction.rule.target(&own, interaction.seen(i, points));
+                let short = interaction.target(i, points);
+                assert_eq!(short.map(f64::to_bits), by_rule.map(f64::to_bits), "{i}");
+            }
+        }
+    }
+}

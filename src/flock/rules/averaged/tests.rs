@@ -1,0 +1,92 @@
+use super::*;
+
+const PLACES: [[f64; 2]; 5] = [[0.0, 0.0], [1.1, 0.2], [0.9, 1.0], [-0.1, 0.8], [0.7, -0.9]];
+/// Turned by 80 degrees, shifted and strained.
+const NOW: [[f64; 2]; 5] = [[3.1, 1.0], [3.05, 2.2], [2.25, 2.0], [2.3, 0.85], [4.1, 1.7]];
+
+/// A quadrilateral and a triangle that share a side, by particles.
+const CELLS: [&[usize]; 2] = [&[0, 1, 2, 3], &[0, 4, 1]];
+
+fn element(corners: &[usize]) -> Element {
+    let n = corners.len();
+    let at = |k: usize| PLACES[corners[k % n]];
+    let twice: f64 = (0..n).map(|k| at(k)[0] * at(k + 1)[1] - at(k)[1] * at(k + 1)[0]).sum();
+    let gradient = |k: usize| {
+        let ([x0, y0], [x1, y1]) = (at(k + n - 1), at(k + 1));
+        [(y1 - y0) / twice, (x0 - x1) / twice]
+    };
+    Element { stiffness: vec![Block::default(); n * n], gradients: (0..n).map(gradient).collect() }
+}
+
+/// What the patch does to a particle when all stand at `now`; neighbours have the numbers of particles.
+fn felt(
+    own: usize,
+    now: &[[f64; 2]; 5],
+    reads: &dyn Fn(&mut dyn Iterator<Item = PatchCell<'_>>, &[PatchCell<'_>], &dyn Fn(usize) -> Corner),
+) {
+    let elements = CELLS.map(element);
+    let slots =
+        CELLS.map(|cell| cell.iter().map(|&i| if i == own { OWN } else { i as u32 }).collect::<Vec<_>>());
+    let cells: Vec<PatchCell> =
+        (0..2).map(|k| PatchCell { element: &elements[k], share: [0.4, 0.3][k], slots: &slots[k] }).collect();
+    let corner = |i: usize| {
+        let from = |places: &[[f64; 2]; 5]| [0, 1].map(|d| places[i][d] - places[own][d]);
+        let (reference, now) = (from(&PLACES), from(now));
+        Corner { reference, displacement: [now[0] - reference[0], now[1] - reference[1]] }
+    };
+    reads(&mut cells.clone().into_iter(), &cells, &corner);
+}
+
+fn force(own: usize, now: &[[f64; 2]; 5]) -> [f64; 2] {
+    let found = std::cell::Cell::new([0.0; 2]);
+    felt(own, now, &|cells, _, corner| found.set(pull(7.0, cells, corner).expect("has directions").0));
+    found.get()
+}
+
+#[test]
+fn forces_balance_and_change_as_the_tangent_says() {
+    let (mut sum, mut moment) = ([0.0; 2], 0.0);
+    for own in 0..5 {
+        let here = force(own, &NOW);
+        sum = [sum[0] + here[0], sum[1] + here[1]];
+        moment += NOW[own][0] * here[1] - NOW[own][1] * here[0];
+        felt(own, &NOW, &|_, cells, corner| {
+            let row = row(7.0, cells.iter().copied(), corner).expect("has directions");
+            assert!((0..2).all(|d| (row.force[d] - here[d]).abs() < 1e-14));
+            for (slot, block) in row.tangent {
+                let other = if slot == OWN { own } else { slot as usize };
+                for e in 0..2 {
+                    let shifted = |by: f64| {
+                        let mut now = NOW;
+                        now[other][e] += by;
+                        force(own, &now)
+                    };
+                    let (ahead, behind) = (shifted(1e-5), shifted(-1e-5));
+                    for d in 0..2 {
+                        let numeric = (behind[d] - ahead[d]) / 2e-5;
+                        assert!((block[d][e] - numeric).abs() < 1e-8, "{own} {other}: {block:?}");
+                    }
+                }
+            }
+        });
+    }
+    let size = force(0, &NOW);
+    assert!(size[0].hypot(size[1]) > 0.1, "{size:?}");
+    assert!(sum[0].hypot(sum[1]) < 1e-13 && moment.abs() < 1e-12, "{sum:?} {moment}");
+}
+
+#[test]
+fn the_tangent_is_symmetric() {
+    let blocks = std::cell::RefCell::new(vec![[[[0.0; 2]; 2]; 5]; 5]);
+    for own in 0..5 {
+        felt(own, &NOW, &|_, cells, corner| {
+            for (slot, block) in row(7.0, cells.iter().copied(), corner).expect("has directions").tangent {
+                blocks.borrow_mut()[own][if slot == OWN { own } else { slot as usize }] = block;
+            }
+        });
+    }
+    let blocks = blocks.into_inner();
+    for (i, j) in (0..5).flat_map(|i| (0..5).map(move |j| (i, j))) {
+        assert!((0..4).all(|k| (blocks[i][j][k / 2][k % 2] - blocks[j][i][k % 2][k / 2]).abs() < 1e-14));
+    }
+}
