@@ -1,14 +1,18 @@
 //! Any polygon with a hole, on any lattice in any direction: areas, resultants, uniform strains, quality.
 
+use flockform::flock::body::{Body, Cut};
 use flockform::flock::lattice::{Lattice, LatticeKind};
 use flockform::flock::points::Points;
 use flockform::geometry::outline::Outline;
 use flockform::geometry::portion::Selection;
+use flockform::geometry::shape::Shape;
+use flockform::material::cells::{Cells, neighbourhood, without_loose_sites};
 use flockform::material::elastic::{Constants, Elastic, Plane};
-use flockform::material::fit::{Fitted, LEAST_AREA, LEAST_SIDE, fit};
+use flockform::material::fit::{Fitted, LEAST_AREA, LEAST_SIDE, LEAST_WIDTH, fit};
 use flockform::material::outline_loads::{Load, Loader, OutlineLoad, Push, Resultant};
 use flockform::material::stiffness::area;
 use flockform::material::weights::MaterialWeights;
+use nalgebra::DMatrix;
 
 /// Uniform numbers from 0 to 1, the same ones every time.
 struct Noise(u64);
@@ -70,7 +74,7 @@ fn five_hundred_polygons_with_holes_pass_the_patch_test_with_exact_areas_and_res
             quality.area >= LEAST_AREA - 1e-9 && quality.side >= LEAST_SIDE - 1e-9,
             "{label}: {quality:?}"
         );
-        assert!(quality.width > 0.3, "{label}: {quality:?}");
+        assert!(quality.width > LEAST_WIDTH - 1e-9, "{label}: {quality:?}");
 
         // The tractions of a uniform stress on every piece balance the stiffness of the uniform strain everywhere.
         let loader = Loader::new(&cells, &body, Some(&outline));
@@ -104,4 +108,57 @@ fn five_hundred_polygons_with_holes_pass_the_patch_test_with_exact_areas_and_res
             assert!(left < 1e-11, "{label}: {left:e} is left on particle {i}");
         }
     }
+}
+
+/// Condition number of a body's stiffness without its rigid motions, and the square of its highest frequency with the
+/// masses lumped at the particles \[1\].
+fn spectrum(cells: &Cells, count: usize, elastic: &Elastic) -> [f64; 2] {
+    let (mut k, mut mass) = (DMatrix::<f64>::zeros(2 * count, 2 * count), vec![0.0; count]);
+    for (cell, &kind) in cells.iter().zip(&cells.kind) {
+        let element = cells.element(kind as usize, elastic.stiffness()).expect("a cell");
+        let share = area(&cells.shapes[kind as usize]) / cell.len() as f64;
+        for (a, &i) in cell.iter().enumerate() {
+            mass[i as usize] += share;
+            for (b, &j) in cell.iter().enumerate() {
+                for (p, q) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+                    k[(2 * i as usize + p, 2 * j as usize + q)] += element[(2 * a + p, 2 * b + q)];
+                }
+            }
+        }
+    }
+    let mut values: Vec<f64> = k.clone().symmetric_eigenvalues().iter().copied().collect();
+    values.sort_by(f64::total_cmp);
+    let scaled =
+        DMatrix::from_fn(2 * count, 2 * count, |a, b| k[(a, b)] / (mass[a / 2] * mass[b / 2]).sqrt());
+    [values[2 * count - 1] / values[3], scaled.symmetric_eigenvalues().max()]
+}
+
+#[test]
+fn cut_cells_cost_at_most_three_times_the_condition_and_nine_times_the_highest_frequency_squared() {
+    let mut noise = Noise(99);
+    let steel = Constants::Isotropic { young: 1.0, poisson: 0.3, plane: Plane::Stress };
+    let elastic = Elastic::new(steel, 1.0).expect("admissible");
+    let mut worst = [0.0f64; 2];
+    for round in 0..24 {
+        let kind = KINDS[round % 6];
+        let (outline, fitted) = noise.fitted(kind);
+        let corners = |ring: usize| outline.rings()[ring].iter().map(|piece| piece.from).collect::<Vec<_>>();
+        let shape = Shape::WithHoles {
+            body: Box::new(Shape::Polygon { vertices: corners(0) }),
+            holes: vec![Shape::Polygon { vertices: corners(1) }],
+        };
+        let lattice = fitted.body.lattice.clone();
+        let near = neighbourhood(&lattice);
+        let (body, seen) = Body::build(lattice, &Cut::Shape(shape), &near, None).expect("builds");
+        let (whole, _, whole_cells) = without_loose_sites(&body, &seen);
+        let fitted = spectrum(&fitted.cells, fitted.body.count(), &elastic);
+        let whole = spectrum(&whole_cells, whole.count(), &elastic);
+        let ratio = [fitted[0] / whole[0], fitted[1] / whole[1]];
+        assert!(ratio[0] < 3.0 && ratio[1] < 9.0, "round {round}, {kind:?}: {ratio:?}");
+        worst = [worst[0].max(ratio[0]), worst[1].max(ratio[1])];
+    }
+    println!(
+        "at most {:.2} times the condition, {:.2} times the highest frequency squared",
+        worst[0], worst[1]
+    );
 }

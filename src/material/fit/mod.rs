@@ -3,7 +3,7 @@
 //! 1. `sites`: lattice points nearer to the outline than [`SNAP`] move onto it, to a corner if one is as near.
 //! 2. `cut`: the outline cuts the cells that it passes; corners, and where it crosses the sides of cells, are
 //!    particles too. Arcs become chords between particles that lie on the arc.
-//! 3. `tidy`: a part of a cell smaller than [`LEAST_AREA`] joins its neighbour, and a side along the outline
+//! 3. `tidy`: a part of a cell smaller than [`LEAST_AREA`] or narrower than [`LEAST_WIDTH`] joins its neighbour, and a side along the outline
 //!    shorter than [`LEAST_SIDE`] shrinks to one particle.
 //!
 //! Everything else stays lattice. Distances are measured in the least altitude `w` over all triples of corners of a
@@ -37,6 +37,8 @@ use crate::geometry::outline::{Outline, Place};
 const SNAP: f64 = 0.4;
 /// Least area of a cell that the outline cuts, in areas of a whole one.
 pub const LEAST_AREA: f64 = 0.4;
+/// Least extent of a cell that the outline cuts, across one of its sides, in least altitudes of a whole one.
+pub const LEAST_WIDTH: f64 = 0.45;
 /// Least distance of two particles along the outline, in least altitudes of a cell.
 pub const LEAST_SIDE: f64 = 0.4;
 

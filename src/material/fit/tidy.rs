@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use super::cut::Faces;
-use super::{LEAST_AREA, LEAST_SIDE, Scale};
+use super::{LEAST_AREA, LEAST_SIDE, LEAST_WIDTH, Scale};
 use crate::flock::points::distance;
 
 /// One makes work for the other: after a few rounds nothing is left to do.
@@ -14,7 +14,7 @@ const AREA_CHANGE: f64 = 0.02;
 
 pub fn tidy(faces: &mut Faces, scale: &Scale) {
     for _ in 0..ROUNDS {
-        let merged = merge(faces, LEAST_AREA * scale.area);
+        let merged = merge(faces, LEAST_AREA * scale.area, LEAST_WIDTH * scale.altitude);
         let shrunk = shrink(faces, LEAST_SIDE * scale.altitude);
         if merged + shrunk == 0 {
             break;
@@ -31,8 +31,23 @@ fn area(faces: &Faces, corners: &[u32]) -> f64 {
     (1..corners.len()).map(|k| 0.5 * cross(from(at(k)), from(at(k + 1)))).sum()
 }
 
-/// Joins faces smaller than `least` \[length^2\] with the neighbour along the longest common line.
-fn merge(faces: &mut Faces, least: f64) -> usize {
+/// Least extent of a face across one of its sides \[length\].
+fn width(faces: &Faces, corners: &[u32]) -> f64 {
+    let at = |k: usize| faces.nodes[corners[k % corners.len()] as usize].point;
+    let across = |k: usize| {
+        let (a, b) = (at(k), at(k + 1));
+        let length = distance(a, b);
+        let off = |p: [f64; 2]| ((b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0])) / length;
+        let (low, high) =
+            (0..corners.len()).map(|k| off(at(k))).fold((0.0f64, 0.0f64), |(l, h), v| (l.min(v), h.max(v)));
+        high - low
+    };
+    (0..corners.len()).map(across).fold(f64::INFINITY, f64::min)
+}
+
+/// Joins faces smaller than `least` \[length^2\] or narrower than `narrow` \[length\] with the neighbour along the
+/// longest common line.
+fn merge(faces: &mut Faces, least: f64, narrow: f64) -> usize {
     let mut owner: HashMap<[u32; 2], usize> = HashMap::new();
     for (number, face) in faces.faces.iter().enumerate() {
         ways(face).for_each(|way| {
@@ -42,12 +57,13 @@ fn merge(faces: &mut Faces, least: f64) -> usize {
     let mut small: Vec<(f64, usize)> = (0..faces.faces.len())
         .filter(|&face| !faces.faces[face].is_empty())
         .map(|face| (area(faces, &faces.faces[face]), face))
-        .filter(|(area, _)| *area < least)
+        .filter(|&(area, face)| area < least || width(faces, &faces.faces[face]) < narrow)
         .collect();
     small.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     let mut merged = 0;
     for (_, face) in small {
-        if faces.faces[face].is_empty() || area(faces, &faces.faces[face]) >= least {
+        let is_fine = |corners: &[u32]| area(faces, corners) >= least && width(faces, corners) >= narrow;
+        if faces.faces[face].is_empty() || is_fine(&faces.faces[face]) {
             continue;
         }
         let mut common: Vec<(usize, f64)> = Vec::new();
