@@ -115,7 +115,7 @@ fn five_hundred_polygons_with_holes_pass_the_patch_test_with_exact_areas_and_res
 fn spectrum(cells: &Cells, count: usize, elastic: &Elastic) -> [f64; 2] {
     let (mut k, mut mass) = (DMatrix::<f64>::zeros(2 * count, 2 * count), vec![0.0; count]);
     for (cell, &kind) in cells.iter().zip(&cells.kind) {
-        let element = cells.element(kind as usize, elastic.stiffness()).expect("a cell");
+        let element = cells.element(kind as usize, elastic).expect("a cell");
         let share = area(&cells.shapes[kind as usize]) / cell.len() as f64;
         for (a, &i) in cell.iter().enumerate() {
             mass[i as usize] += share;
