@@ -140,7 +140,7 @@ impl fmt::Display for Comparison {
         let largest =
             format!("{:.4e} ({} of the largest)", self.displacement_max, percent(self.displacement_max_rel));
         let energies = format!("{:.5e}, truth {:.5e}", self.strain_energy_rule, self.strain_energy_truth);
-        let part = |part: Option<f64>| part.map_or("not told".to_owned(), percent);
+        let part = |part: Option<f64>| part.map_or("not known".to_owned(), percent);
         let rows = [
             ("displacement, relative L2", percent(self.displacement_rel_l2)),
             ("  of which discretisation", part(self.parts.discretisation)),

@@ -246,7 +246,7 @@ fn require_carried(
 }
 
 /// Takes held components out of the rule: the particles keep them, and what is left of their weights moves the other
-/// component alone. Solvers are told of them by themselves ([`crate::solve::linear::system`]).
+/// component alone. Solvers take them separately ([`crate::solve::linear::system`]).
 fn hold_components(weights: &mut MatrixWeights, held: &[HeldComponent]) {
     let mut axes: BTreeMap<usize, [bool; 2]> = BTreeMap::new();
     for component in held {

@@ -7,6 +7,7 @@ use super::lattice::{Lattice, LatticeKind, Site};
 use super::neighbourhood::{Neighbourhood, NeighbourhoodError, Neighbours};
 use super::numbering::Numbering;
 use super::points::Points;
+use super::window::Window;
 use crate::geometry::outline::Place;
 use crate::geometry::shape::Shape;
 
@@ -221,26 +222,23 @@ const FRAME: u32 = u32::MAX - 2;
 
 /// A window of the integer grid: what stands at each pair of integers, then its particle's index.
 struct SiteMap {
-    low: Site,
-    columns: i64,
-    rows: i64,
+    window: Window,
     cells: Vec<u32>,
 }
 
 impl SiteMap {
     fn cut(lattice: &Lattice, cut: &Cut, margin: Site) -> Result<Self, BodyError> {
         let (low, high) = window(lattice, cut)?;
-        let low = [low[0] - margin[0], low[1] - margin[1]];
-        let (columns, rows) =
-            (i64::from(high[0] + margin[0] - low[0]) + 1, i64::from(high[1] + margin[1] - low[1]) + 1);
-        if columns as u64 * rows as u64 > MOST_SITES {
+        let wider = |site: Site, by: i32| [site[0] + by * margin[0], site[1] + by * margin[1]];
+        let window = Window::new(wider(low, -1), wider(high, 1));
+        if window.count() > MOST_SITES {
             return Err(BodyError::TooLarge { limit: MOST_SITES });
         }
-        let mut map = Self { low, columns, rows, cells: vec![NOTHING; (columns * rows) as usize] };
+        let mut map = Self { window, cells: vec![NOTHING; window.count() as usize] };
         let tolerance = 1e-9 * lattice.spacing();
         let mut found = false;
         for cell in 0..map.cells.len() {
-            let site = map.site(cell);
+            let site = map.window.site(cell);
             let inside = lattice.is_site(site)
                 && match cut {
                     Cut::Count { columns, rows } => {
@@ -272,10 +270,10 @@ impl SiteMap {
     /// Marks every site that a body particle reaches and that is no body particle.
     fn mark_frame(&mut self, lattice: &Lattice, shell: &[Vec<Site>]) {
         for cell in (0..self.cells.len()).filter(|&cell| self.cells[cell] == BODY).collect::<Vec<_>>() {
-            let site = self.site(cell);
+            let site = self.window.site(cell);
             for offset in &shell[lattice.sublattice(site)] {
                 let there = [site[0] + offset[0], site[1] + offset[1]];
-                if let Some(cell) = self.cell(there)
+                if let Some(cell) = self.window.number(there)
                     && self.cells[cell] == NOTHING
                     && lattice.is_site(there)
                 {
@@ -292,7 +290,7 @@ impl SiteMap {
             let mark = self.cells[cell];
             if mark != NOTHING {
                 self.cells[cell] = sites.len() as u32;
-                sites.push(self.site(cell));
+                sites.push(self.window.site(cell));
                 is_frame.push(mark == FRAME);
             }
         }
@@ -300,17 +298,7 @@ impl SiteMap {
     }
 
     fn index(&self, site: Site) -> Option<u32> {
-        self.cell(site).map(|cell| self.cells[cell]).filter(|&index| index != NOTHING)
-    }
-
-    fn site(&self, cell: usize) -> Site {
-        [self.low[0] + (cell as i64 / self.rows) as i32, self.low[1] + (cell as i64 % self.rows) as i32]
-    }
-
-    fn cell(&self, [i, j]: Site) -> Option<usize> {
-        let (column, row) = (i64::from(i) - i64::from(self.low[0]), i64::from(j) - i64::from(self.low[1]));
-        let inside = (0..self.columns).contains(&column) && (0..self.rows).contains(&row);
-        inside.then_some((column * self.rows + row) as usize)
+        self.window.number(site).map(|cell| self.cells[cell]).filter(|&index| index != NOTHING)
     }
 }
 

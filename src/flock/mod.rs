@@ -28,3 +28,4 @@ pub mod role;
 pub mod rules;
 pub mod stencil;
 pub mod strain;
+pub mod window;

@@ -1,6 +1,6 @@
 //! Shapes of the plane, and the outlines that bound them.
 //!
-//! Lengths are in the unit of whoever made the shape, in the world frame; angles in radians, counter-clockwise.
+//! Lengths are in the unit of the shape's description, in the world frame; angles in radians, counter-clockwise.
 
 pub mod outline;
 pub mod portion;

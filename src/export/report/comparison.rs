@@ -153,7 +153,7 @@ fn facts(scene: &Scene, report: &ComparisonReport) -> Vec<(String, String)> {
 fn measures(report: &ComparisonReport) -> Table {
     let c = &report.comparison;
     let percent = |part: f64| format!("{} %", number(100.0 * part));
-    let part = |part: Option<f64>| part.map_or("not told".to_owned(), percent);
+    let part = |part: Option<f64>| part.map_or("not known".to_owned(), percent);
     let rows = [
         ("Displacement, relative L2", percent(c.displacement_rel_l2)),
         ("… of which discretisation", part(c.parts.discretisation)),

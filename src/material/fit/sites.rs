@@ -4,6 +4,7 @@ use super::near::stretches;
 use super::{FitError, SNAP, STAYS, Scale};
 use crate::flock::lattice::{Lattice, Site};
 use crate::flock::points::distance;
+use crate::flock::window::Window;
 use crate::geometry::outline::{Outline, Place};
 
 /// More sites than this are refused before memory is asked for.
@@ -33,9 +34,7 @@ pub struct NearSite {
 /// The sites in the bounds of an outline.
 #[derive(Debug)]
 pub struct Sites {
-    low: Site,
-    columns: i64,
-    rows: i64,
+    window: Window,
     /// Number of each site near the outline in `near`, or one of the marks below.
     marks: Vec<u32>,
     near: Vec<NearSite>,
@@ -67,12 +66,12 @@ impl Sites {
 
     /// Number of a site near the outline.
     pub fn number(&self, site: Site) -> Option<u32> {
-        self.cell(site).map(|cell| self.marks[cell]).filter(|&mark| mark < UNKNOWN)
+        self.window.number(site).map(|cell| self.marks[cell]).filter(|&mark| mark < UNKNOWN)
     }
 
     /// Whether a site is inside and not on the outline.
     pub fn is_inside(&self, site: Site) -> bool {
-        match self.cell(site).map(|cell| self.marks[cell]) {
+        match self.window.number(site).map(|cell| self.marks[cell]) {
             None | Some(FAR_OUTSIDE | UNKNOWN) => false,
             Some(FAR_INSIDE) => true,
             Some(number) => self.near[number as usize].state == State::Inside,
@@ -81,7 +80,9 @@ impl Sites {
 
     /// Sites inside that are far from the outline, ascending.
     pub fn far_inside(&self) -> impl Iterator<Item = Site> + '_ {
-        (0..self.marks.len()).filter(|&cell| self.marks[cell] == FAR_INSIDE).map(|cell| self.site(cell))
+        (0..self.marks.len())
+            .filter(|&cell| self.marks[cell] == FAR_INSIDE)
+            .map(|cell| self.window.site(cell))
     }
 
     fn window(lattice: &Lattice, outline: &Outline) -> Result<Self, FitError> {
@@ -97,15 +98,14 @@ impl Sites {
         if !fits {
             return Err(FitError::TooLarge { limit: MOST_SITES });
         }
-        let [columns, rows] = [0, 1].map(|k| (highs[k] - lows[k]) as i64 + 1);
-        let marks = vec![FAR_OUTSIDE; (columns * rows) as usize];
-        Ok(Self { low: lows.map(|v| v as i32), columns, rows, marks, near: Vec::new() })
+        let window = Window::new(lows.map(|v| v as i32), highs.map(|v| v as i32));
+        Ok(Self { window, marks: vec![FAR_OUTSIDE; window.count() as usize], near: Vec::new() })
     }
 
     /// Marks the sites inside, column by column: between crossings of the outline, whose arcs may be taken for
     /// short chords, as sites near them are looked at again.
     fn mark_inside(&mut self, lattice: &Lattice, outline: &Outline, scale: &Scale) {
-        let mut crossings: Vec<Vec<f64>> = vec![Vec::new(); self.columns as usize];
+        let mut crossings: Vec<Vec<f64>> = vec![Vec::new(); self.window.columns as usize];
         for (.., piece) in outline.pieces() {
             let count = match &piece.arc {
                 None => 1,
@@ -119,7 +119,7 @@ impl Sites {
                 for column in first..last {
                     let share = (column as f64 - from[0]) / (to[0] - from[0]);
                     let row = from[1] + share * (to[1] - from[1]);
-                    crossings[(column - i64::from(self.low[0])) as usize].push(row);
+                    crossings[(column - i64::from(self.window.low[0])) as usize].push(row);
                 }
                 from = to;
             }
@@ -128,8 +128,8 @@ impl Sites {
             rows.sort_by(f64::total_cmp);
             for pair in rows.chunks_exact(2) {
                 for row in pair[0].ceil() as i64..=pair[1].floor() as i64 {
-                    let cell = column as i64 * self.rows + row - i64::from(self.low[1]);
-                    if lattice.is_site(self.site(cell as usize)) {
+                    let cell = column as i64 * self.window.rows + row - i64::from(self.window.low[1]);
+                    if lattice.is_site(self.window.site(cell as usize)) {
                         self.marks[cell as usize] = FAR_INSIDE;
                     }
                 }
@@ -157,7 +157,9 @@ impl Sites {
                     least..=most
                 };
                 for site in range(0).flat_map(|i| range(1).map(move |j| [i, j])) {
-                    let Some(cell) = self.cell(site).filter(|_| lattice.is_site(site)) else { continue };
+                    let Some(cell) = self.window.number(site).filter(|_| lattice.is_site(site)) else {
+                        continue;
+                    };
                     let point = lattice.position(site);
                     let t = piece.nearest(point);
                     let apart = distance(piece.point(t), point);
@@ -221,16 +223,6 @@ impl Sites {
                 one.state = if is_left(outline, place, home) { State::Inside } else { State::Outside };
             }
         }
-    }
-
-    fn site(&self, cell: usize) -> Site {
-        [self.low[0] + (cell as i64 / self.rows) as i32, self.low[1] + (cell as i64 % self.rows) as i32]
-    }
-
-    fn cell(&self, [i, j]: Site) -> Option<usize> {
-        let (column, row) = (i64::from(i) - i64::from(self.low[0]), i64::from(j) - i64::from(self.low[1]));
-        let inside = (0..self.columns).contains(&column) && (0..self.rows).contains(&row);
-        inside.then_some((column * self.rows + row) as usize)
     }
 }
 

@@ -69,7 +69,7 @@ fn require_closed(fitted: &Fitted, label: &str) {
 fn polygons_with_holes_are_kept_exactly_on_every_lattice_in_any_direction() {
     let mut noise = Noise(7);
     let (mut least, mut fits, mut refused) = (Quality { area: 9.0, side: 9.0, width: 9.0 }, 0, Vec::new());
-    for round in 0..120 {
+    for round in 0..36 {
         let kind = KINDS[round % 6];
         let polygons = noise.polygon_with_hole();
         let lattice = Lattice::new(kind, [noise.next(), noise.next()], 3.0 * noise.next());
@@ -94,8 +94,7 @@ fn polygons_with_holes_are_kept_exactly_on_every_lattice_in_any_direction() {
         };
         assert!(quality.area > 0.39, "{label}: {quality:?}");
     }
-    println!("{fits} fits, {least:?}, refused {refused:#?}");
-    assert!(fits > 100);
+    assert_eq!(fits, 36, "{refused:#?}");
 }
 
 #[test]
