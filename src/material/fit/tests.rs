@@ -123,3 +123,13 @@ fn a_disc_with_a_hole_is_kept_to_the_sagitta_of_its_chords() {
         assert!(fitted.quality().area > 0.39, "{kind:?} {:?}", fitted.quality());
     }
 }
+
+#[test]
+fn a_row_of_small_parts_does_not_end_in_one_cell() {
+    let lattice = Lattice::new(LatticeKind::Honeycomb { spacing: 0.1 / 3f64.sqrt() }, [2.0, -1.0], 0.0);
+    let shape = Shape::Rectangle { min: [2.0, -1.0], max: [6.0, 3.0] };
+    let fitted = fit(&lattice, &Outline::of_shape(&shape).expect("an outline")).expect("fits");
+    // Two hexagons that share a side have ten corners; an outline may add some.
+    assert!(fitted.cells.most_corners() <= 12, "{}", fitted.cells.most_corners());
+    assert!(fitted.quality().area > 0.39);
+}

@@ -14,7 +14,7 @@ const AREA_CHANGE: f64 = 0.02;
 
 pub fn tidy(faces: &mut Faces, scale: &Scale) {
     for _ in 0..ROUNDS {
-        let merged = merge(faces, LEAST_AREA * scale.area, LEAST_WIDTH * scale.altitude);
+        let merged = merge(faces, scale);
         let shrunk = shrink(faces, LEAST_SIDE * scale.altitude);
         if merged + shrunk == 0 {
             break;
@@ -45,9 +45,10 @@ fn width(faces: &Faces, corners: &[u32]) -> f64 {
     (0..corners.len()).map(across).fold(f64::INFINITY, f64::min)
 }
 
-/// Joins faces smaller than `least` \[length^2\] or narrower than `narrow` \[length\] with the neighbour along the
-/// longest common line.
-fn merge(faces: &mut Faces, least: f64, narrow: f64) -> usize {
+/// Joins faces that are too small or too narrow with the neighbour along the longest common line.
+fn merge(faces: &mut Faces, scale: &Scale) -> usize {
+    let (least, narrow) = (LEAST_AREA * scale.area, LEAST_WIDTH * scale.altitude);
+    let whole = 1.01 * scale.area;
     let mut owner: HashMap<[u32; 2], usize> = HashMap::new();
     for (number, face) in faces.faces.iter().enumerate() {
         ways(face).for_each(|way| {
@@ -75,8 +76,12 @@ fn merge(faces: &mut Faces, least: f64, narrow: f64) -> usize {
                 None => common.push((other, length)),
             }
         }
-        common.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-        let joined = common.into_iter().find_map(|(other, _)| {
+        // Cells that have taken in another one already come last, or a row of small parts would end in one cell.
+        let is_large = |other: usize| area(faces, &faces.faces[other]) > whole;
+        let mut common: Vec<(bool, usize, f64)> =
+            common.into_iter().map(|(other, length)| (is_large(other), other, length)).collect();
+        common.sort_by(|a, b| a.0.cmp(&b.0).then(b.2.total_cmp(&a.2)).then(a.1.cmp(&b.1)));
+        let joined = common.into_iter().find_map(|(_, other, _)| {
             let joined = join(&faces.faces[face], &faces.faces[other])?;
             is_simple(faces, &joined).then_some((other, joined))
         });

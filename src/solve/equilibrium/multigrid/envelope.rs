@@ -6,6 +6,8 @@ use crate::solve::operator::Matrix;
 /// Pivots below this share of their diagonal are rounding: what they stand for moves nothing that the
 /// others do not move already, and stays put.
 const NOTHING: f64 = 1e-11;
+/// The same below particles along an outline: nodes at the edge share few of them and hardly differ.
+const NOTHING_AT_OUTLINE: f64 = 1e-8;
 
 /// `L` of `K = L L'` by rows, each from its first entry that is not zero to the diagonal.
 #[derive(Clone, Debug)]
@@ -79,8 +81,9 @@ fn index(matrix: &Matrix, site: Site, offset: Site) -> usize {
 }
 
 impl Envelope {
-    /// Factorises a matrix, its rows multiplied by `scale`; `None` if it is not positive.
-    pub fn new(matrix: &Matrix, scale: f64) -> Option<Self> {
+    /// Factorises a matrix, its rows multiplied by `scale`; `None` if it is not positive. `has_outline` says whether the
+    /// finest level has particles at no site.
+    pub fn new(matrix: &Matrix, scale: f64, has_outline: bool) -> Option<Self> {
         let plan = Plan::new(matrix);
         let unknowns = plan.first.len();
         let mut factor = Self {
@@ -104,7 +107,7 @@ impl Envelope {
                 }
             }
         }
-        factor.eliminate().then_some(factor)
+        factor.eliminate(if has_outline { NOTHING_AT_OUTLINE } else { NOTHING }).then_some(factor)
     }
 
     fn entry(&mut self, row: usize, column: usize) -> &mut f64 {
@@ -117,7 +120,7 @@ impl Envelope {
         &self.values[begin + from..begin + to]
     }
 
-    fn eliminate(&mut self) -> bool {
+    fn eliminate(&mut self, nothing: f64) -> bool {
         for i in 0..self.first.len() {
             let first = self.first[i] as usize;
             for j in first..=i {
@@ -128,9 +131,9 @@ impl Envelope {
                 let rest = *entry - sum;
                 if j < i {
                     *entry = rest / pivot;
-                } else if rest > NOTHING * *entry {
+                } else if rest > nothing * *entry {
                     *entry = rest.sqrt();
-                } else if rest >= -NOTHING * entry.abs() {
+                } else if rest >= -nothing * entry.abs() {
                     // Divided by infinity, the unknown and its part in all others vanish.
                     *entry = f64::INFINITY;
                 } else {

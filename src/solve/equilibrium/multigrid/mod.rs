@@ -133,7 +133,8 @@ impl<'a> Cycle<'a> {
             cycle.levels.push(level);
         }
         let coarsest = cycle.levels.last().map_or(matrix, |level| &level.matrix);
-        cycle.coarsest = Some(Envelope::new(coarsest, scale).ok_or(not_positive)?);
+        cycle.coarsest =
+            Some(Envelope::new(coarsest, scale, !matrix.outliers.places.is_empty()).ok_or(not_positive)?);
         Ok(cycle)
     }
 

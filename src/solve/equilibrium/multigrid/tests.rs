@@ -133,7 +133,7 @@ fn the_envelope_solves_what_it_factorised() {
     for kind in LatticeKind::SAMPLES {
         for (columns, rows) in [(9, 21), (21, 9)] {
             let matrix = Matrix::of_followers(&operator(kind, columns, rows, |i| i < 5 || i == 40));
-            let mut factor = Envelope::new(&matrix, 1.0).expect("positive");
+            let mut factor = Envelope::new(&matrix, 1.0, false).expect("positive");
             let mut exact = Field::<f32>::zeros(matrix.count());
             for (i, _) in matrix.class.iter().enumerate().filter(|(_, class)| **class != HELD) {
                 exact.x[i] = (i as f32 * 0.7).sin();
@@ -155,7 +155,7 @@ fn the_envelope_refuses_what_is_not_positive_and_leaves_out_what_is_nothing() {
     for row in &mut matrix.rows {
         row.diagonal[1][1] -= 2.0;
     }
-    assert!(Envelope::new(&matrix, 1.0).is_none());
+    assert!(Envelope::new(&matrix, 1.0, false).is_none());
     // A strip one particle wide between two columns of nodes: they are twice as many as can move.
     let sites: Vec<Site> = (0..40).map(|j| [1, j]).collect();
     let row = |j: usize| {
@@ -173,7 +173,7 @@ fn the_envelope_refuses_what_is_not_positive_and_leaves_out_what_is_nothing() {
     let fine = Matrix::of_followers(&strip);
     let transfer = Transfer { steps: [2, 2] };
     let coarse = coarsen(&fine, transfer);
-    let mut factor = Envelope::new(&coarse, 1.0).expect("not negative");
+    let mut factor = Envelope::new(&coarse, 1.0, false).expect("not negative");
     // The force of a displacement that the coarse grid can have, on the coarse grid.
     let mut nodes = Field::<f32>::zeros(coarse.count());
     nodes.x.iter_mut().enumerate().for_each(|(k, x)| *x = (k as f32 * 0.4).sin());
