@@ -96,7 +96,7 @@ pub fn quadrilateral(corners: &[[f64; 2]], stiffness: &Voigt) -> Result<DMatrix<
 /// four axes half a right angle apart are summed, cell and continuum, and made equal. Bending costs
 /// Young's modulus, so `alpha` stays finite where the bulk modulus grows without bound (plane
 /// strain towards nu = 1/2) and such cells do not lock; four axes are enough for the sum not to
-/// depend on how the axes are turned. It is bounded: see [`least_residual`].
+/// depend on how the axes are turned. It is bounded: see `least_residual`.
 pub fn polygon(corners: &[[f64; 2]], stiffness: &Voigt) -> Result<DMatrix<f64>, ShapeError> {
     resistance(corners, stiffness, |corners| stabilisation(corners, stiffness))
 }
@@ -124,8 +124,8 @@ fn stabilisation(corners: &[[f64; 2]], stiffness: &Voigt) -> DMatrix<f64> {
 ///
 /// As [`polygon`], but what is not affine is resisted by a tensor for each corner, `T = E (tr J - J) / q`: `J` are the
 /// second moments of the cell's area, `q` is the larger of the two ways in which the residuals of the harmonic
-/// quadratics `xy` and `(x^2 - y^2) / 2` at the corners add up (see [`least_residual`] for its bound), `E` is
-/// [`bending_modulus`]. A rectangle bent about its own axes, up to 3.6 times as long as wide, then
+/// quadratics `xy` and `(x^2 - y^2) / 2` at the corners add up (see `least_residual` for its bound), `E` is
+/// `bending_modulus`. A rectangle bent about its own axes, up to 3.6 times as long as wide, then
 /// stores exactly what it does in the continuum; triangles have no residual and are those of constant strain.
 ///
 /// # Errors

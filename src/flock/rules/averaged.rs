@@ -56,7 +56,7 @@ pub fn pull<'a>(
     Some((v.map(|v| -k * dilatation * v), hold))
 }
 
-/// [`pull`] with its derivatives: `k v_i v_j' + k t sum_c w_c (R S g_i) (R S g_j)' / q_c`, `S` a quarter turn; symmetric.
+/// `pull` with its derivatives: `k v_i v_j' + k t sum_c w_c (R S g_i) (R S g_j)' / q_c`, `S` a quarter turn; symmetric.
 pub fn row<'a>(
     k: f64,
     cells: impl Iterator<Item = PatchCell<'a>> + Clone,

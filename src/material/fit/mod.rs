@@ -34,7 +34,7 @@ use crate::flock::points::{Points, distance};
 use crate::geometry::outline::{Outline, Place};
 
 /// Lattice points this near to the outline move onto it, in least altitudes of a cell.
-const SNAP: f64 = 0.4;
+pub const SNAP: f64 = 0.4;
 /// Least area of a cell that the outline cuts, in areas of a whole one.
 pub const LEAST_AREA: f64 = 0.4;
 /// Least extent of a cell that the outline cuts, across one of its sides, in least altitudes of a whole one.
