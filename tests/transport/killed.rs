@@ -39,8 +39,11 @@ fn a_reader_killed_while_it_holds_slices_holds_nobody_up_and_leaves_its_place() 
         assert_eq!(writer.readers(), 1);
         reader.kill();
         (0..200).for_each(|_| send(&mut writer));
-        peer.clean_up();
-        assert_eq!(writer.readers(), 0, "its place is free again");
+        // The system lets go of what a killed process held in its own time.
+        until("its place is free again", || {
+            peer.clean_up();
+            (writer.readers() == 0).then_some(())
+        });
     }
 }
 
