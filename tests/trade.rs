@@ -91,7 +91,7 @@ const WEIGHT: &str = "loads=[{ kind = \"body\", force = [0.0, -1.0] }]";
 
 #[test]
 fn what_is_delivered_is_at_most_what_was_asked() {
-    let cases: [(&str, &[&str], &str, f64); 10] = [
+    let cases: [(&str, &[&str], &str, f64); 20] = [
         ("beam-loaded", &[SLENDER, HALF], "5%", 0.05),
         ("beam-loaded", &[SLENDER, HALF], "2%", 0.02),
         ("beam-loaded", &[ODD, HALF], "5%", 0.05),
@@ -102,6 +102,16 @@ fn what_is_delivered_is_at_most_what_was_asked() {
         ("beam-loaded", &[L_SHAPE, HEXAGONAL, WEIGHT], "3%", 0.03),
         ("beam-loaded", &[STIFF], "3%", 0.03),
         ("grips", &[HEXAGONAL], "0.5%", 0.005),
+        ("cook", &[], "2%", 0.02),
+        ("cook", &["lattice={ kind = \"hexagonal\", spacing = 2.0, orientation = 20.0 }"], "2%", 0.02),
+        ("cook", &["lattice={ kind = \"honeycomb\", spacing = 1.5 }"], "1%", 0.01),
+        ("ring", &[], "1%", 0.01),
+        ("ring", &["lattice={ kind = \"oblique\", a = 1.0, b = 1.0, angle = 70.0 }"], "2%", 0.02),
+        ("ring", &["material.poisson=0.49", "lattice={ kind = \"square\", spacing = 1.0 }"], "3%", 0.03),
+        ("plate-hole", &["lattice={ kind = \"square\", spacing = 1.0, orientation = 30.0 }"], "1%", 0.01),
+        ("plate-hole", &["lattice={ kind = \"centred-rectangular\", a = 1.5, b = 1.5 }"], "1%", 0.01),
+        ("l-bracket", &["lattice={ kind = \"square\", spacing = 8.0 }"], "3%", 0.03),
+        ("l-bracket", &["lattice={ kind = \"hexagonal\", spacing = 8.0 }"], "3%", 0.03),
     ];
     for (name, overrides, asked, bound) in cases {
         let scene =

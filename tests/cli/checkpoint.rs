@@ -91,8 +91,12 @@ fn killed_until_done(folder: &Path, random: &mut impl FnMut() -> f64, whole: Dur
         let arguments = if folder.join("o.unfinished").exists() { resume } else { &first };
         let mut child = start(arguments, folder);
         if arguments != resume {
-            // There is something to go on from; the rest is chance.
-            wait_for(&folder.join("o.unfinished"));
+            // There is something to go on from, or nothing left to do; the rest is chance.
+            let patience = Instant::now();
+            while !folder.join("o.unfinished").exists() && child.try_wait().expect("a child").is_none() {
+                assert!(patience.elapsed() < Duration::from_secs(60), "no checkpoint ever came");
+                std::thread::sleep(Duration::from_millis(1));
+            }
         }
         let deadline = Instant::now() + whole.mul_f64(1.5 * random());
         while Instant::now() < deadline && child.try_wait().expect("a child").is_none() {
