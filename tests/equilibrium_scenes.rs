@@ -143,12 +143,13 @@ fn a_nearly_incompressible_material_is_solved_by_every_solver_to_where_it_is_swe
                 let asked = format!("equilibrium={{solver=\"{solver}\",tolerance=1e-11}}");
                 ended(&load(&name, &[&overrides[..], &[&asked]].concat()))
             };
-            let direct = by("direct");
-            for solver in ["multigrid", "conjugate-gradients", "gauss-seidel"] {
+            let swept = by("gauss-seidel");
+            let direct = cfg!(feature = "fem").then_some("direct");
+            for solver in ["multigrid", "conjugate-gradients"].into_iter().chain(direct) {
                 let other = by(solver);
                 let solved = other.solved.as_ref().expect("solved");
                 assert!(solved.converged, "{name} {mean} {solver}: {:?}", solved.residuals.last());
-                let apart = farthest_apart(&direct, &other);
+                let apart = farthest_apart(&swept, &other);
                 assert!(apart < 1e-7, "{name} {mean} {solver}: {apart}");
             }
         }
