@@ -31,7 +31,8 @@ pub fn stress(
     let drawn = || (0..snapshot.roles.len()).filter(|&i| snapshot.roles[i].is_body());
     let moved = |(now, then): ([f64; 2], [f64; 2])| [now[0] - then[0], now[1] - then[1]];
     let displacement: Points = snapshot.positions.iter().zip(reference.iter()).map(moved).collect();
-    let factor = enlargement(reference, &displacement, drawn);
+    // Large displacements are drawn as they are: a bent body is to look as bent as it is.
+    let factor = enlargement(reference, &displacement, drawn).max(1.0);
     let place = |(then, by): ([f64; 2], [f64; 2])| [then[0] + factor * by[0], then[1] + factor * by[1]];
     let places: Points = reference.iter().zip(displacement.iter()).map(place).collect();
     let shown: Vec<(&[u32], f64)> = cells
