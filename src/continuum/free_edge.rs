@@ -16,7 +16,7 @@ const INNER: f64 = -1e-6;
 #[derive(Clone, Debug, Default)]
 pub struct FreeEdge {
     pub tractions: Vec<KnownTraction>,
-    /// Particles on the outline that are at no inner corner.
+    /// Particles on the outline that are at no inner corner and not held altogether.
     pub particles: Vec<usize>,
 }
 
@@ -54,8 +54,10 @@ impl FreeEdge {
             }
         }
         let on_outline = places.iter().enumerate().filter_map(|(i, place)| Some((i, (*place)?)));
-        edge.particles =
-            on_outline.filter(|(_, place)| !is_inner_corner(outline, place)).map(|(i, _)| i).collect();
+        // Where everything is held no traction is known.
+        let is_recovered =
+            |(i, place): &(usize, Place)| held[*i] != [true; 2] && !is_inner_corner(outline, place);
+        edge.particles = on_outline.filter(is_recovered).map(|(i, _)| i).collect();
         Some(edge)
     }
 }
