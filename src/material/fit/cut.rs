@@ -8,7 +8,7 @@ use std::collections::HashMap;
 
 use super::near::{Buckets, meetings};
 use super::sites::{NearSite, Sites, State};
-use super::{FitError, ROUNDING, Scale, order};
+use super::{FitError, ROUNDING, Scale, is_kept_corner, order};
 use crate::flock::lattice::{Lattice, Site};
 use crate::flock::points::distance;
 use crate::geometry::outline::{Outline, Place};
@@ -148,7 +148,7 @@ impl<'a> Cutter<'a> {
 
     fn is_corner(&self, place: &Place) -> bool {
         let [ring, piece] = self.corner_key(place);
-        (place.t == 0.0 || place.t == 1.0) && self.outline.piece(ring, piece).begins_at_corner
+        (place.t == 0.0 || place.t == 1.0) && is_kept_corner(self.outline, self.scale, [ring, piece])
     }
 
     /// The piece that begins at an end of a piece.
@@ -253,8 +253,8 @@ impl<'a> Cutter<'a> {
         let ends = [(0.0, place.piece), (1.0, (place.piece + 1) % count)];
         let piece = self.outline.piece(place.ring, place.piece);
         let corner = ends.into_iter().find_map(|(t, at)| {
-            let is_there =
-                distance(piece.point(t), point) < near && self.outline.piece(place.ring, at).begins_at_corner;
+            let is_there = distance(piece.point(t), point) < near
+                && is_kept_corner(self.outline, self.scale, [place.ring, at]);
             is_there.then_some([place.ring, at])
         });
         let beside = self.beside.get(&key).cloned().unwrap_or_default();
@@ -292,7 +292,7 @@ impl<'a> Cutter<'a> {
         let all: Vec<[usize; 2]> = self
             .outline
             .pieces()
-            .filter(|(.., piece)| piece.begins_at_corner)
+            .filter(|&(ring, piece, _)| is_kept_corner(self.outline, self.scale, [ring, piece]))
             .map(|(ring, piece, _)| [ring, piece])
             .collect();
         for key in all {

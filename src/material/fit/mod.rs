@@ -119,6 +119,20 @@ impl Scale {
     }
 }
 
+/// Turn \[rad\] below which a corner between pieces shorter than cells may be is one of the many of a curve.
+const FLAT: f64 = 0.35;
+
+/// Whether a piece begins at a corner that a particle has to stand on: one that turns sharply, or that lies between
+/// pieces of some length. The vertices of a curve drawn with finer edges than the lattice has are none.
+fn is_kept_corner(outline: &Outline, scale: &Scale, [ring, piece]: [usize; 2]) -> bool {
+    let pieces = &outline.rings()[ring];
+    let (before, after) = (&pieces[(piece + pieces.len() - 1) % pieces.len()], &pieces[piece]);
+    let (a, b) = (before.tangent(1.0), after.tangent(0.0));
+    let turn = (a[0] * b[1] - a[1] * b[0]).atan2(a[0] * b[0] + a[1] * b[1]).abs();
+    let is_long = before.length().min(after.length()) >= LEAST_SIDE * scale.altitude;
+    after.begins_at_corner && (turn > FLAT || is_long)
+}
+
 /// Fits a lattice to an outline.
 ///
 /// # Errors

@@ -1,7 +1,7 @@
 //! Which sites of a lattice are inside an outline, and which move onto it.
 
 use super::near::stretches;
-use super::{FitError, SNAP, STAYS, Scale};
+use super::{FitError, SNAP, STAYS, Scale, is_kept_corner};
 use crate::flock::lattice::{Lattice, Site};
 use crate::flock::points::distance;
 use crate::flock::window::Window;
@@ -51,7 +51,7 @@ impl Sites {
         sites.find_near(lattice, outline, scale);
         let corners: Vec<(Place, [f64; 2])> = outline
             .pieces()
-            .filter(|(.., piece)| piece.begins_at_corner)
+            .filter(|&(ring, piece, _)| is_kept_corner(outline, scale, [ring, piece]))
             .map(|(ring, piece, at)| (Place { ring, piece, t: 0.0 }, at.from))
             .collect();
         sites.snap_to_corners(lattice, &corners, scale);

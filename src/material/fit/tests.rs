@@ -133,3 +133,22 @@ fn a_row_of_small_parts_does_not_end_in_one_cell() {
     assert!(fitted.cells.most_corners() <= 12, "{}", fitted.cells.most_corners());
     assert!(fitted.quality().area > 0.39);
 }
+
+#[test]
+fn a_curve_drawn_with_finer_edges_than_the_lattice_has_is_a_curve() {
+    let corner = |k: usize| {
+        let angle = std::f64::consts::TAU * k as f64 / 20_000.0;
+        let radius = 9.0 * (1.0 + 0.05 * (10.0 * angle).sin());
+        [radius * angle.cos(), radius * angle.sin()]
+    };
+    let outline = Outline::of_polygons(&[(0..20_000).map(corner).collect()]).expect("an outline");
+    for kind in KINDS {
+        let fitted = fit(&Lattice::new(kind, [0.1, 0.2], 0.4), &outline).expect("fits");
+        require_closed(&fitted, &format!("{kind:?}"));
+        assert!(fitted.cells.most_corners() < 16, "{kind:?}: {}", fitted.cells.most_corners());
+        assert!(
+            fitted.quality().area > 0.39 && (total_area(&fitted) / outline.area() - 1.0).abs() < 0.01,
+            "{kind:?}"
+        );
+    }
+}
