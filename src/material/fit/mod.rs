@@ -38,7 +38,7 @@ pub const SNAP: f64 = 0.4;
 /// Least area of a cell that the outline cuts, in areas of a whole one.
 pub const LEAST_AREA: f64 = 0.4;
 /// Least extent of a cell that the outline cuts, across one of its sides, in least altitudes of a whole one.
-pub const LEAST_WIDTH: f64 = 0.45;
+pub const LEAST_WIDTH: f64 = 0.3;
 /// Least distance of two particles along the outline, in least altitudes of a cell.
 pub const LEAST_SIDE: f64 = 0.4;
 

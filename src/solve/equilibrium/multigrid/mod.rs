@@ -40,6 +40,8 @@ const ACROSS: i32 = 5;
 
 /// Lanczos steps for the largest eigenvalue of each level, and what its estimate is raised by.
 const ESTIMATE: usize = 12;
+/// The same where an outline has cut cells: the largest eigenvalue may belong to a few particles there, which are found late.
+const ESTIMATE_AT_OUTLINE: usize = 40;
 const SAFETY: f64 = 1.04;
 
 /// Largest over smallest eigenvalue that the smoother is to dampen; what is below is left to the coarser
@@ -101,7 +103,8 @@ impl Vectors {
 /// Weights of two sweeps that dampen all eigenvalues from a share of the largest to the largest best;
 /// `None` if the matrix is not positive.
 fn weights(matrix: &Matrix, stencils: &Stencils<f32>) -> Option<[f64; 2]> {
-    let high = SAFETY * lanczos::largest(matrix, stencils, ESTIMATE);
+    let steps = if matrix.outliers.places.is_empty() { ESTIMATE } else { ESTIMATE_AT_OUTLINE };
+    let high = SAFETY * lanczos::largest(matrix, stencils, steps);
     let low = high / SMOOTHED;
     let weight = |k: f64| {
         let node = (std::f64::consts::PI * k / 4.0).cos();
