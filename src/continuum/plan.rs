@@ -83,7 +83,7 @@ impl Plan {
         let loads = layout.forces_by_load(scene)?;
         let reference = &layout.body.reference;
         let resultants = loads.iter().map(|f| Resultant::of(reference.iter().zip(f.iter()))).collect();
-        let forces = sum(loads.clone());
+        let forces = sum(&loads);
         let leads = held_axes(&layout.body, &changes);
         require_carried(scene, &layout, &leads, forces.as_ref())?;
         let free_edge = free_edge(scene, &layout, &leads)?.map(Arc::new);

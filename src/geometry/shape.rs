@@ -111,7 +111,8 @@ fn path_contains(pieces: &[Piece], [x, y]: [f64; 2], tolerance: f64) -> bool {
     if tolerance >= 0.0 { inside || nearest <= tolerance } else { inside && nearest > -tolerance }
 }
 
-fn segment_distance(p: [f64; 2], a: [f64; 2], b: [f64; 2]) -> f64 {
+/// Distance of a point from the segment between two others \[length\].
+pub fn segment_distance(p: [f64; 2], a: [f64; 2], b: [f64; 2]) -> f64 {
     let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
     let length = dx.hypot(dy);
     // Along the segment from 0 at `a` to 1 at `b`; a segment of no length is its point.

@@ -9,9 +9,10 @@ use std::collections::HashMap;
 
 use super::cells::Cells;
 use crate::flock::body::Body;
-use crate::flock::points::{Points, distance};
+use crate::flock::points::Points;
 use crate::geometry::outline::{Outline, Place};
 use crate::geometry::portion::Portion;
+use crate::geometry::shape::segment_distance;
 
 /// Something that acts along an outline.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -214,13 +215,14 @@ impl<'a> Loader<'a> {
 }
 
 /// The sum of several loads' forces on the particles; `None` of none.
-pub fn sum(by_load: Vec<Points>) -> Option<Points> {
-    let add = |mut sum: Points, next: Points| {
+pub fn sum(by_load: &[Points]) -> Option<Points> {
+    let (first, others) = by_load.split_first()?;
+    let add = |mut sum: Points, next: &Points| {
         sum.x.iter_mut().zip(&next.x).for_each(|(sum, f)| *sum += f);
         sum.y.iter_mut().zip(&next.y).for_each(|(sum, f)| *sum += f);
         sum
     };
-    by_load.into_iter().reduce(add)
+    Some(others.iter().fold(first.clone(), add))
 }
 
 fn push(forces: &mut Points, particle: u32, [x, y]: [f64; 2]) {
@@ -269,7 +271,7 @@ impl SideGrid {
             for [di, dj] in ring.filter(|[di, dj]| di.abs().max(dj.abs()) == reach) {
                 for &number in self.buckets.get(&[i + di, j + dj]).into_iter().flatten() {
                     let [a, b] = self.sides[number as usize].map(|i| reference.get(i as usize));
-                    let apart = distance_to_segment(p, a, b);
+                    let apart = segment_distance(p, a, b);
                     if best.is_none_or(|(near, known)| (apart, number) < (near, known)) {
                         best = Some((apart, number));
                     }
@@ -282,14 +284,6 @@ impl SideGrid {
 
 /// Rings of buckets searched: the boundary of the cells is never farther from the outline than that.
 const MOST_RINGS: i64 = 64;
-
-fn distance_to_segment(p: [f64; 2], a: [f64; 2], b: [f64; 2]) -> f64 {
-    let along = [0, 1].map(|k| b[k] - a[k]);
-    let off = [0, 1].map(|k| p[k] - a[k]);
-    let square = along[0] * along[0] + along[1] * along[1];
-    let t = ((off[0] * along[0] + off[1] * along[1]) / square).clamp(0.0, 1.0);
-    distance(p, [0, 1].map(|k| a[k] + t * along[k]))
-}
 
 #[cfg(test)]
 mod tests {

@@ -68,9 +68,13 @@ impl Faces {
 ///
 /// # Errors
 /// A place where the outline has finer details than cells can follow.
-pub fn cut(lattice: &Lattice, outline: &Outline, scale: &Scale, sites: &Sites) -> Result<Faces, FitError> {
+pub fn cut(
+    (lattice, outline, buckets): (&Lattice, &Outline, &Buckets),
+    scale: &Scale,
+    sites: &Sites,
+) -> Result<Faces, FitError> {
     let mut cutter = Cutter::new(lattice, outline, scale, sites);
-    cutter.cross_sides();
+    cutter.cross_sides(buckets);
     cutter.add_corners()?;
     cutter.chain()?;
     cutter.faces()
@@ -200,8 +204,7 @@ impl<'a> Cutter<'a> {
     }
 
     /// Nodes where the outline crosses the sides of cells.
-    fn cross_sides(&mut self) {
-        let buckets = Buckets::new(self.outline, self.scale.diameter);
+    fn cross_sides(&mut self, buckets: &Buckets) {
         let mut keys: Vec<SideKey> = self.beside.keys().copied().collect();
         keys.sort_unstable();
         for key in keys {

@@ -25,6 +25,7 @@ mod tidy;
 use std::sync::Arc;
 
 use self::cut::{Faces, Node};
+use self::near::Buckets;
 use self::sites::Sites;
 use super::cells::{Cells, templates};
 use super::stiffness::area;
@@ -139,9 +140,10 @@ fn is_kept_corner(outline: &Outline, scale: &Scale, [ring, piece]: [usize; 2]) -
 /// A shape, or a detail of it, that is too narrow for the spacing, with its place.
 pub fn fit(lattice: &Lattice, outline: &Outline) -> Result<Fitted, FitError> {
     let scale = Scale::of(lattice);
-    narrow::require_wide(outline, scale.spacing, scale.diameter)?;
+    let buckets = Buckets::new(outline, scale.diameter);
+    narrow::require_wide(outline, &buckets, scale.spacing)?;
     let sites = Sites::find(lattice, outline, &scale)?;
-    let mut faces = cut::cut(lattice, outline, &scale, &sites)?;
+    let mut faces = cut::cut((lattice, outline, &buckets), &scale, &sites)?;
     tidy::tidy(&mut faces, &scale);
     Ok(Assembly { lattice, scale: &scale, sites: &sites, faces: &faces }.body())
 }

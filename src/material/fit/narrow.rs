@@ -8,8 +8,7 @@ use crate::geometry::outline::Outline;
 ///
 /// # Errors
 /// The first place where the opposite side is nearer than the spacing.
-pub fn require_wide(outline: &Outline, spacing: f64, side: f64) -> Result<(), FitError> {
-    let buckets = Buckets::new(outline, side);
+pub fn require_wide(outline: &Outline, buckets: &Buckets, spacing: f64) -> Result<(), FitError> {
     for (ring, number, piece) in outline.pieces() {
         let count = (2.0 * piece.length() / spacing).ceil().clamp(1.0, 1e8) as usize;
         let pieces = outline.rings()[ring].len();
