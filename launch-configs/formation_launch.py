@@ -41,6 +41,8 @@ def generate_launch_description():
             arguments=["robots", swarm],
             parameters=[{"publish_clock": use_sim_time}],
             output="screen",
+            respawn=True,
+            respawn_delay=2.0,
         ),
         Node(
             package="flockform",
@@ -48,5 +50,7 @@ def generate_launch_description():
             arguments=["node", swarm],
             parameters=[LaunchConfiguration("parameters"), {"use_sim_time": use_sim_time}],
             output="screen",
+            respawn=True,
+            respawn_delay=2.0,
         ),
     ])

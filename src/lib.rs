@@ -9,7 +9,8 @@
 //! * [`scene`]: a TOML file becomes a validated [`scene::Scene`]; nothing downstream re-checks it.
 //! * [`geometry`]: shapes of the plane and their outlines. It imports no other room.
 //! * [`flock`]: the core. Lattices, bodies, neighbourhoods, rules, frames, fracture. Pure.
-//! * [`solve`]: sweeps over the flock's interaction, their spectra, and the solvers for equilibrium.
+//! * [`sweep`]: the rule compiled for a body, and its steps: the one room with vectors and the schedule of threads.
+//! * [`solve`]: spectra of sweeps, and the solvers for equilibrium.
 //! * [`material`]: rule weights from Young's modulus and Poisson's ratio, and what material a rule is.
 //! * [`continuum`]: plans a scene, steps it or goes straight to rest, and hands what happens to an observer.
 //! * [`stability`]: when a body grows instead of coming to rest, foretold and found; the extremes.
@@ -41,6 +42,7 @@ pub mod material;
 pub mod scene;
 pub mod solve;
 pub mod stability;
+pub mod sweep;
 
 #[cfg(feature = "bench")]
 pub mod bench;

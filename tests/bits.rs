@@ -8,7 +8,7 @@ use flockform::flock::neighbourhood::{Neighbourhood, Neighbours};
 use flockform::flock::points::Points;
 use flockform::flock::role::Role;
 use flockform::flock::rules::Rule;
-use flockform::solve::sweep::{Activity, Led, MOST_STEPS, Sweep, Update};
+use flockform::sweep::{Activity, Led, MOST_STEPS, Sweep, Update};
 
 const STEPS: usize = 50;
 
@@ -123,7 +123,7 @@ fn hash(points: &Points) -> u64 {
 }
 
 fn assert_golden(body: &Pulled, golden: u64) {
-    let uncompiled = Sweep::uncompiled(Update::default(), &body.roles);
+    let uncompiled = Sweep::uncompiled(Update::default(), &body.interaction, &body.roles);
     let compiled = Sweep::compile(Update::default(), &body.interaction, &body.roles);
     let mut all =
         vec![("the formula".to_owned(), body.singly(|present, next| body.by_the_formula(present, next)))];

@@ -2,8 +2,8 @@
 //! solution states is the error that it has.
 
 use flockform::fem::{
-    Effort, FemError, Holding, Material, Plane, PlaneRegion, ShapeProblem, ShapeSolution, Support,
-    solve_shape,
+    Effort, FemError, Holding, Material, Orthotropic, Plane, PlaneRegion, ShapeProblem, ShapeSolution,
+    Strain, Support, solve_shape,
 };
 use flockform::geometry::outline::Outline;
 use flockform::geometry::portion::{Portion, Selection};
@@ -350,4 +350,73 @@ fn bodies_that_are_not_held_and_supports_beside_them_are_refused_by_name() {
     problem.supports.truncate(1);
     problem.supports.push(hold_at([5.0, 0.0], [true; 2], |_| [0.0; 2]));
     assert_eq!(solve(&problem), Err(FemError::OutsideMesh { index: 1, x: 5.0, y: 0.0 }));
+}
+
+/// A cantilever of depth 1 bent by a dead load across its end, `a = P L^2 / E I`; its deflection and shortening over
+/// its length, the middle of its end taken, and the solution.
+fn bent_far(length: f64, a: f64, effort: &Effort) -> ([f64; 2], ShapeSolution) {
+    let outline = outline(&Shape::Rectangle { min: [0.0, -0.5], max: [length, 0.5] });
+    let mut problem =
+        ShapeProblem::new(&outline, Material::isotropic(12.0e6, 0.0, Plane::Stress, 1.0).unwrap());
+    problem.strain = Strain::Stretch;
+    problem.hold(pieces(&outline, 0, &[3]), |_| [0.0; 2]);
+    problem.pull(pieces(&outline, 0, &[1]), move |_, _| [0.0, a * 1e6 / (length * length)]);
+    let solved = solve_shape(&problem, effort).unwrap();
+    let [u, w] = solved.displacements_at(&[[length, 0.0]]).unwrap()[0];
+    ([w / length, -u / length], solved)
+}
+
+#[test]
+fn a_strip_that_bends_far_is_the_elastica() {
+    // K. E. Bisshopp and D. C. Drucker, Q. Appl. Math. 3, 1945; digits of K. Mattiasson, 1981. The strip is not thin
+    // without limit: shear and stretch are of the order of (depth / length)^2.
+    let effort = Effort { target: 1e-4, cells: 200, ..Effort::default() };
+    for (a, w, u) in [(1.0, 0.30172, 0.05643), (5.0, 0.71379, 0.38763), (10.0, 0.81061, 0.55500)] {
+        let ([deflection, shortening], solved) = bent_far(100.0, a, &effort);
+        println!(
+            "a = {a}: w {deflection:.5} (off {:.1e}), u {shortening:.5} (off {:.1e}); {:?} {:?}",
+            deflection / w - 1.0,
+            shortening / u - 1.0,
+            solved.error(),
+            solved.levels()
+        );
+        assert!((deflection / w - 1.0).abs() < 3e-4 && (shortening / u - 1.0).abs() < 3e-4);
+        assert!(solved.error().displacement < 1e-4);
+        // The clamp returns the load, and its moment where the end has gone.
+        let (reaction, load) = (solved.reactions()[0], a * 1e6 / 1e4);
+        let arm = 100.0 * (1.0 - shortening);
+        assert!(reaction.force[0].abs() < 1e-6 * load && (reaction.force[1] / load + 1.0).abs() < 1e-6);
+        assert!((reaction.moment / (load * arm) + 1.0).abs() < 1e-6, "{reaction:?}");
+    }
+}
+
+#[test]
+fn a_body_that_is_turned_and_stretched_at_its_rim_has_the_stress_of_the_stretch_alone() {
+    let sheet = Orthotropic { e1: 10.0, e2: 2.0, nu12: 0.3, g12: 1.5 };
+    let material = Material::orthotropic(sheet, 0.6, 0.7).unwrap();
+    let exact = material.stress([0.04, -0.02, 0.03]);
+    let (outer, hole) = random_polygon(3);
+    let outline = Outline::of_polygons(&[outer, hole]).unwrap();
+    for angle in [0.3f64, 0.9, std::f64::consts::PI] {
+        let (sin, cos) = angle.sin_cos();
+        let moved = move |[x, y]: Point| {
+            let [a, b] = [1.04 * x + 0.015 * y, 0.015 * x + 0.98 * y];
+            [cos * a - sin * b - x, sin * a + cos * b - y]
+        };
+        let mut problem = ShapeProblem::new(&outline, material);
+        problem.strain = Strain::Stretch;
+        problem.hold(portions(&outline, &Selection::All), moved);
+        let solved = solve_shape(&problem, &Effort { cells: 40, ..Effort::default() });
+        if angle > 3.0 {
+            // In a straight line to the other side the rim would crush the body half way.
+            assert!(matches!(solved.err(), Some(FemError::Lost { part }) if part > 0.0 && part < 0.6));
+            continue;
+        }
+        let solved = solved.unwrap();
+        assert!(error(&solved, |x, y| moved([x, y])) < 1e-9, "{angle}");
+        for s in solved.solution().stress_at_cells() {
+            let off = [s.xx - exact.xx, s.yy - exact.yy, s.xy - exact.xy];
+            assert!(off.iter().all(|v| v.abs() < 1e-8), "{angle}: {s:?}, not {exact:?}");
+        }
+    }
 }

@@ -61,8 +61,13 @@ fn geometry_and_flock_have_no_features_no_clock_and_no_threads() {
 }
 
 #[test]
-fn solve_imports_the_flock_and_geometry() {
-    assert_imports_only("solve", &["geometry", "flock"]);
+fn sweep_imports_the_flock_alone() {
+    assert_imports_only("sweep", &["geometry", "flock"]);
+}
+
+#[test]
+fn solve_stands_on_the_flock_and_its_sweeps() {
+    assert_imports_only("solve", &["geometry", "flock", "sweep"]);
 }
 
 #[test]
@@ -77,32 +82,38 @@ fn material_imports_the_flock_and_geometry() {
 
 #[test]
 fn scene_knows_nothing_of_hosts_and_outputs() {
-    assert_imports_only("scene", &["geometry", "flock", "solve", "material"]);
+    assert_imports_only("scene", &["geometry", "flock", "solve", "material", "sweep"]);
 }
 
 #[test]
 fn continuum_knows_nothing_of_outputs() {
-    assert_imports_only("continuum", &["geometry", "flock", "solve", "scene", "material"]);
+    assert_imports_only("continuum", &["geometry", "flock", "solve", "scene", "material", "sweep"]);
 }
 
 #[test]
 fn the_comparison_knows_nothing_of_outputs() {
-    assert_imports_only("compare", &["geometry", "scene", "continuum", "flock", "material", "solve", "fem"]);
+    assert_imports_only(
+        "compare",
+        &["geometry", "scene", "continuum", "flock", "material", "solve", "fem", "sweep"],
+    );
 }
 
 #[test]
 fn trade_stands_on_compare_and_knows_nothing_of_outputs() {
-    assert_imports_only("trade", &["geometry", "scene", "continuum", "flock", "solve", "compare"]);
+    assert_imports_only("trade", &["geometry", "scene", "continuum", "flock", "solve", "compare", "sweep"]);
 }
 
 #[test]
 fn stability_knows_nothing_of_outputs() {
-    assert_imports_only("stability", &["geometry", "scene", "continuum", "flock", "material", "solve"]);
+    assert_imports_only(
+        "stability",
+        &["geometry", "scene", "continuum", "flock", "material", "solve", "sweep"],
+    );
 }
 
 #[test]
 fn the_swarm_knows_nothing_of_middleware_and_outputs() {
-    assert_imports_only("swarm", &["geometry", "scene", "continuum", "flock", "material", "solve"]);
+    assert_imports_only("swarm", &["geometry", "scene", "continuum", "flock", "material", "solve", "sweep"]);
 }
 
 #[test]
@@ -118,4 +129,32 @@ fn shared_memory_is_an_edge_of_the_swarm_and_of_the_continuum() {
 #[test]
 fn recordings_stand_on_the_edge_and_know_nothing_of_figures() {
     assert_imports_only("record", &["scene", "continuum", "flock", "swarm", "ros"]);
+}
+
+/// Files of `src` that contain a word.
+fn files_with(word: &str) -> Vec<String> {
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let has = |file: &PathBuf| std::fs::read_to_string(file).expect("readable").contains(word);
+    let name = |file: PathBuf| file.strip_prefix(&source).expect("in src").display().to_string();
+    let mut files: Vec<String> = rust_files(&source).into_iter().filter(has).map(name).collect();
+    files.sort();
+    files
+}
+
+#[test]
+fn the_width_of_vectors_is_chosen_in_one_place() {
+    // The neighbour query is written in vectors itself.
+    assert_eq!(files_with("target_feature(enable"), ["flock/grid/candidates.rs", "flock/lanes.rs"]);
+}
+
+#[test]
+fn unsafe_code_stands_where_it_was_measured_to_pay_or_where_the_system_is_called() {
+    let known = [
+        "flock/grid/candidates.rs",
+        "flock/lanes.rs",
+        "ros/edge/door.rs",
+        "ros/edge/pulse.rs",
+        "sweep/gathers.rs",
+    ];
+    assert_eq!(files_with("unsafe {"), known);
 }

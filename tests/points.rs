@@ -9,7 +9,7 @@ use flockform::continuum::engine::state::digest;
 use flockform::continuum::plan::Plan;
 use flockform::continuum::run::{Outcome, run};
 use flockform::scene::{Scene, SceneError};
-use flockform::solve::sweep::Sweep;
+use flockform::sweep::Sweep;
 
 /// An id and a place.
 type Row = (u32, [f64; 2]);

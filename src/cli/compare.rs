@@ -10,8 +10,9 @@ use flockform::continuum::run::StopReason;
 use flockform::export::comparison::{ComparisonReport, write_comparison};
 use flockform::export::report;
 use flockform::fem::Effort;
-use flockform::flock::rules::{Mean, Rotation};
+use flockform::flock::rules::Rotation;
 use flockform::scene::Scene;
+use flockform::trade::{Chosen, choose};
 
 use super::output::{OutputArguments, ReportArguments};
 use super::progress::Progress;
@@ -43,7 +44,8 @@ fn part_of_one(text: &str) -> Result<f64, String> {
 
 /// Compares a scene's rule with its truth, prints the measures and writes what comes of it.
 pub fn compare(arguments: &CompareArguments) -> Result<ExitCode, Refusal> {
-    let scene = arguments.scene.load(None)?;
+    let open = &arguments.scene;
+    let Chosen { scene, words: chosen } = choose(open.load(None)?, &|more: &[String]| open.load_scene(more))?;
     let folder = arguments.output.folder(&format!("{}-compare", scene.name))?;
     let effort = Effort { target: arguments.truth_error, ..Effort::default() };
     let mut progress = Progress::new(arguments.output.quiet, scene.stop.steps);
@@ -63,7 +65,7 @@ pub fn compare(arguments: &CompareArguments) -> Result<ExitCode, Refusal> {
     if arguments.json {
         print(&format!("{:#}\n", serde_json::json!(report)));
     } else if !arguments.output.quiet {
-        print(&format!("{}results in {}\n", words(&scene, &compared), kept.display()));
+        print(&format!("{chosen}{}results in {}\n", words(&scene, &compared), kept.display()));
     }
     Ok(exit_code(&compared.outcome))
 }
@@ -89,9 +91,11 @@ fn words(scene: &Scene, compared: &Compared) -> String {
         "{}: the rule by {way}, {end}; truth of the shape on {nodes} nodes\n{}",
         scene.name, compared.comparison
     );
-    if matches!(scene.mean, Mean::Material { rotation: Rotation::Corotated }) {
-        words +=
-            "the truth is of small rotations, the rule is not: where the body turns, they differ by that\n";
+    if scene.rotation() == Rotation::Corotated {
+        words += "rule and truth follow the body's turns: strain is its stretch, stress is in axes that turn with it\n";
+    }
+    for told in &compared.places {
+        words += &told.to_string();
     }
     words
 }

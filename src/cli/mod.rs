@@ -12,9 +12,11 @@ mod recording;
 mod replay;
 mod run;
 mod stability;
+mod supervise;
 mod swarm;
 mod trade;
 
+use std::fmt::{self, Debug};
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -24,11 +26,14 @@ use clap_complete::Shell;
 use flockform::compare::run::plan;
 use flockform::continuum::report::PlanReport;
 use flockform::ros::arguments::{RosArgumentError, RosArguments, Severity};
+use flockform::ros::edge::escaped;
 use flockform::ros::node::NodeError;
 use flockform::scene::{self, Bundled, Scene, SceneError, bundled};
 use flockform::shm::ShmError;
 use flockform::{bench, export};
 use node::Transport;
+use tracing::field::Field;
+use tracing_subscriber::fmt::format;
 
 /// Exit code of a run that started and failed: diverged or interrupted.
 pub const FAILED: u8 = 1;
@@ -88,7 +93,8 @@ pub enum Command {
     Replay(replay::ReplayArguments),
     /// Keep a swarm in formation over ROS 2 or shared memory: poses in, safe targets out
     #[command(
-        after_help = "Example:\n  flockform node square --ros-args -r __ns:=/fleet -p speed_limit:=0.5\n  flockform node square --member robot_3\n  flockform node square --transport shm"
+        after_help = "Example:\n  flockform node square --ros-args -r __ns:=/fleet -p speed_limit:=0.5\n  flockform node square --member robot_3\n  flockform node square --transport shm\n\n\
+                      Exit codes: 0 ended as asked, 2 bad input, 70 the middleware is gone and cannot be started again."
     )]
     Node(node::NodeArguments),
     /// Be the robots of a swarm file, simulated, over ROS 2 or shared memory
@@ -240,6 +246,8 @@ pub enum Refusal {
     Scene(#[from] SceneError),
     #[error("{0}")]
     Node(#[from] NodeError),
+    #[error("cannot start a process to do the work: {0}")]
+    Supervise(std::io::Error),
     #[error("{0}")]
     Shm(#[from] ShmError),
     #[error("{0}")]
@@ -302,6 +310,7 @@ pub fn arguments() -> Result<(Arguments, RosArguments), Refusal> {
 /// Logs go to standard error; `RUST_LOG` wins over `--log-level`, and that over `-v`.
 pub fn start_log(verbose: u8, ros: &RosArguments) {
     let level = match ros.logging.level_of("flockform") {
+        _ if !ros.logging.stdout => "off",
         None | Some(Severity::Unset) => {
             ["warn", "flockform=info", "flockform=debug", "trace"][usize::from(verbose.min(3))]
         }
@@ -311,11 +320,23 @@ pub fn start_log(verbose: u8, ros: &RosArguments) {
         Some(Severity::Error | Severity::Fatal) => "flockform=error",
     };
     // The middleware reports every peer that comes and goes as a warning.
-    let level = format!("{level},rustdds=error,ros2_client=error");
+    let level = match level {
+        "off" => level.to_owned(),
+        _ => format!("{level},rustdds=error,ros2_client=error"),
+    };
     let filter = tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| level.into());
     let colours = std::io::stderr().is_terminal();
     let log = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr);
-    log.with_ansi(colours).without_time().init();
+    log.with_ansi(colours).fmt_fields(format::debug_fn(field)).without_time().init();
+}
+
+/// A field of a log line, on its line whatever is in it: much of it comes from files and from the network.
+fn field(line: &mut format::Writer<'_>, field: &Field, value: &dyn Debug) -> fmt::Result {
+    if field.name() != "message" {
+        write!(line, " {field}=")?;
+    }
+    // Longer than any line of our own.
+    write!(line, "{}", escaped(&format!("{value:?}"), 2000))
 }
 
 pub fn dispatch(command: Command, ros: &RosArguments) -> Result<ExitCode, Refusal> {

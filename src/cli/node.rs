@@ -5,6 +5,7 @@ use std::process::ExitCode;
 use clap::{Args, ValueEnum};
 use flockform::record::About;
 use flockform::ros::arguments::RosArguments;
+use flockform::ros::edge::pulse::MIDDLEWARE_GONE;
 use flockform::ros::node::{FormationNode, NodeError};
 use flockform::ros::robots::RobotNodes;
 use flockform::scene::swarm::Swarm;
@@ -13,6 +14,7 @@ use flockform::swarm::control::Control;
 
 use super::recording::{RecordArguments, close};
 use super::run::interrupt_flag;
+use super::supervise::{Life, supervise};
 use super::swarm::SwarmFileArguments;
 use super::{Refusal, print};
 
@@ -49,24 +51,47 @@ pub struct RobotsArguments {
     pub transport: Transport,
 }
 
+/// Exit code of a node or robots that ran.
+fn ended(well: bool) -> ExitCode {
+    if well { ExitCode::SUCCESS } else { ExitCode::from(MIDDLEWARE_GONE) }
+}
+
+/// In the process that does the work its life, which shared memory needs none of; in the one that outlives it the
+/// code to end with.
+fn life(transport: Transport) -> Result<Result<Option<Life>, ExitCode>, Refusal> {
+    match transport {
+        Transport::Shm => Ok(Ok(None)),
+        Transport::Ros2 => Ok(supervise().map_err(Refusal::Supervise)?.map(Some)),
+    }
+}
+
 /// Keeps a formation until it is interrupted.
 pub fn node(arguments: &NodeArguments, ros: &RosArguments) -> Result<ExitCode, Refusal> {
+    let life = match life(arguments.transport)? {
+        Ok(life) => life,
+        Err(code) => return Ok(code),
+    };
     let swarm = arguments.swarm.load()?;
     let name = arguments.member.as_deref();
-    match arguments.transport {
-        Transport::Ros2 => {
+    match life {
+        Some(mut life) => {
             let mut node = FormationNode::open(&swarm, ros, name)?;
             let (member, namespace) = (arguments.member.clone(), Some(node.namespace().to_owned()));
             let about = About { member, namespace, ..arguments.swarm.about("node", &swarm) };
-            let recording = arguments.record.open(&about, false)?;
+            let recording = arguments.record.open(&about, false, life.number())?;
             if let Some(recording) = &recording {
                 node.record(recording.sink()).map_err(NodeError::from)?;
             }
             announce(&swarm, node.control());
-            node.run(&interrupt_flag());
+            if let Some(left) = life.left() {
+                node.restore(left);
+            }
+            node.watch_middleware().map_err(NodeError::from)?;
+            let well = node.run_while(&interrupt_flag(), &mut |node| life.tell(|| node.kept()));
             print(&close(recording)?);
+            return Ok(ended(well));
         }
-        Transport::Shm => {
+        None => {
             arguments.record.require_none("--transport shm")?;
             let mut node = shm::FormationNode::open(&swarm, &Domain::from_environment()?, name)?;
             announce(&swarm, node.control());
@@ -83,15 +108,23 @@ fn announce(swarm: &Swarm, control: &Control) {
 
 /// Flies simulated robots until they are interrupted.
 pub fn robots(arguments: &RobotsArguments, ros: &RosArguments) -> Result<ExitCode, Refusal> {
+    let life = match life(arguments.transport)? {
+        Ok(life) => life,
+        Err(code) => return Ok(code),
+    };
     let swarm = arguments.swarm.load()?;
     let announce = |count| tracing::info!("`{}`: {count} simulated robots", swarm.name);
-    match arguments.transport {
-        Transport::Ros2 => {
+    match life {
+        Some(mut life) => {
             let mut robots = RobotNodes::open(&swarm, ros)?;
             announce(robots.fleet().robots().len());
-            robots.run(&interrupt_flag());
+            if let Some(left) = life.left() {
+                robots.restore(&left);
+            }
+            robots.watch_middleware().map_err(NodeError::from)?;
+            return Ok(ended(robots.run_while(&interrupt_flag(), &mut |robots| life.tell(|| robots.kept()))));
         }
-        Transport::Shm => {
+        None => {
             let mut robots = SimulatedRobots::open(&swarm, &Domain::from_environment()?)?;
             announce(robots.fleet().robots().len());
             robots.run(&interrupt_flag())?;

@@ -14,10 +14,14 @@ pub struct RecordArguments {
 }
 
 impl RecordArguments {
-    /// The recording, if one is asked for; a file in its place is replaced with `force` alone.
-    pub fn open(&self, about: &About, force: bool) -> Result<Option<Shared>, RecordError> {
-        let path = self.record.as_deref();
-        Ok(path.map(|path| Recording::create(path, about, force)).transpose()?.map(Shared::new))
+    /// The recording, if one is asked for; a file in its place is replaced with `force` alone. A process that goes on
+    /// where another ended leaves that one's file (`.mcap.part`) and writes FILE.2.mcap, and so on.
+    pub fn open(&self, about: &About, force: bool, life: u32) -> Result<Option<Shared>, RecordError> {
+        let path = self.record.as_ref().map(|path| match life {
+            1 => path.clone(),
+            _ => path.with_extension(format!("{life}.mcap")),
+        });
+        Ok(path.map(|path| Recording::create(&path, about, force)).transpose()?.map(Shared::new))
     }
 
     /// Refuses a recording of what has none.

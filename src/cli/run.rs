@@ -93,7 +93,7 @@ fn run_here(arguments: &RunArguments) -> Result<ExitCode, Refusal> {
     let mut recorder = Recorder::new(&scene, &plan, &folder, left.as_ref())?;
     recorder.reports = !arguments.report.no_report;
     let about = About { source: "run", name: scene.name.clone(), ..About::default() };
-    let recording = arguments.record.open(&about, arguments.output.force)?;
+    let recording = arguments.record.open(&about, arguments.output.force, 1)?;
     let mut tape = recording.as_ref().map(|one| BodyTape::new(&scene, one.sink())).transpose()?;
     let mut progress = Progress::new(arguments.output.quiet, steps_of(&scene));
     let interrupted = interrupt_flag();

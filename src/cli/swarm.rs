@@ -79,7 +79,8 @@ pub fn swarm(arguments: &SwarmArguments) -> Result<ExitCode, Refusal> {
     let flight = Flight::new(&swarm)?;
     let mut recorder = (!arguments.report.no_report).then(|| FlightRecorder::new(&flight));
     let folder = arguments.output.folder(&swarm.name)?;
-    let recording = arguments.record.open(&arguments.swarm.about("swarm", &swarm), arguments.output.force)?;
+    let recording =
+        arguments.record.open(&arguments.swarm.about("swarm", &swarm), arguments.output.force, 1)?;
     let tape =
         recording.as_ref().map(|one| FlightTape::new(&swarm, flight.control(), one.sink())).transpose()?;
     let tape = RefCell::new(tape);

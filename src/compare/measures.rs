@@ -5,15 +5,15 @@
 
 use std::fmt;
 
-use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 
 use super::split::ErrorParts;
 use crate::flock::points::{Points, distance};
+use crate::flock::rules::Rotation;
 use crate::material::cells::Cells;
-use crate::material::dilatation;
 use crate::material::elastic::Elastic;
 use crate::material::stiffness::ShapeError;
+use crate::material::stress::{self, energy_between, strain_energy};
 
 /// A rule's displacements beside the true ones. Keys ending in `_rel` and `_rel_l2` are fractions \[1\].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -49,6 +49,8 @@ pub struct Comparison {
 pub struct Sides<'a> {
     pub cells: &'a Cells,
     pub elastic: &'a Elastic,
+    /// Which turns of a cell are no strain.
+    pub rotation: Rotation,
     /// Displacements \[length\].
     pub rule: &'a Points,
     pub truth: &'a Points,
@@ -62,18 +64,18 @@ impl Comparison {
     /// # Errors
     /// A cell that has no stiffness; those of lattices all have one.
     pub fn of(sides: &Sides<'_>) -> Result<Self, ShapeError> {
-        let Sides { cells, elastic, rule, truth, follows } = *sides;
+        let Sides { cells, elastic, rotation, rule, truth, follows } = *sides;
         let followers = || (0..follows.len()).filter(|&i| follows[i]);
         let zero = [0.0; 2];
         let apart =
             |a: &Points, b: &Points| followers().map(|i| distance(a.get(i), b.get(i))).collect::<Vec<_>>();
         let still: Points = std::iter::repeat_n(zero, truth.len()).collect();
         let (off, size) = (apart(rule, truth), apart(truth, &still));
-        let stress = [rule, truth].map(|u| von_mises(cells, elastic, u));
+        let stress = [rule, truth].map(|u| von_mises(cells, elastic, u, rotation));
         let stress_off: Vec<f64> =
             stress[0].iter().zip(&stress[1]).map(|(rule, truth)| rule - truth).collect();
-        let error: Points = rule.iter().zip(truth.iter()).map(|(u, t)| [u[0] - t[0], u[1] - t[1]]).collect();
-        let energy_truth = strain_energy(cells, elastic, truth)?;
+        let energy_truth = strain_energy(cells, elastic, truth, rotation)?;
+        let energy_apart = energy_between(cells, elastic, [rule, truth], rotation)?;
         Ok(Self {
             displacement_rel_l2: ratio(norm(&off), norm(&size)),
             parts: ErrorParts::default(),
@@ -81,8 +83,8 @@ impl Comparison {
             displacement_max: largest(&off),
             displacement_max_rel: ratio(largest(&off), largest(&size)),
             von_mises_rel_l2: ratio(norm(&stress_off), norm(&stress[1])),
-            energy_rel: ratio(strain_energy(cells, elastic, &error)?, energy_truth).sqrt(),
-            strain_energy_rule: strain_energy(cells, elastic, rule)?,
+            energy_rel: ratio(energy_apart, energy_truth).sqrt(),
+            strain_energy_rule: strain_energy(cells, elastic, rule, rotation)?,
             strain_energy_truth: energy_truth,
             followers: off.len(),
             cells: cells.count(),
@@ -94,28 +96,9 @@ impl Comparison {
 
 /// Von Mises stress at the centres of cells \[force / length^2\] whose corners are displaced by
 /// `displacement` \[length\], shape \[cells\]: on a quadrilateral by the bilinear formula.
-pub fn von_mises(cells: &Cells, elastic: &Elastic, displacement: &Points) -> Vec<f64> {
-    let strains = dilatation::averaged(cells, elastic, cells.strains(displacement), displacement.len());
-    strains.into_iter().map(|strain| elastic.von_mises(strain)).collect()
-}
-
-/// Strain energy of the cells \[force length\] under displacements \[length\] of their corners.
-pub fn strain_energy(cells: &Cells, elastic: &Elastic, displacement: &Points) -> Result<f64, ShapeError> {
-    let kinds = 0..cells.shapes.len();
-    let elements: Result<Vec<_>, _> = kinds.map(|kind| cells.element(kind, elastic)).collect();
-    let elements = elements?;
-    let of_cell = |(cell, &kind): (&[u32], &u32)| {
-        // Relative to the first corner: a translation must not cost digits.
-        let first = displacement.get(cell[0] as usize);
-        let relative = |&i: &u32| {
-            let u = displacement.get(i as usize);
-            [u[0] - first[0], u[1] - first[1]]
-        };
-        let u = DVector::from_iterator(2 * cell.len(), cell.iter().flat_map(relative));
-        0.5 * u.dot(&(&elements[kind as usize] * &u))
-    };
-    let own: f64 = cells.iter().zip(&cells.kind).map(of_cell).sum();
-    Ok(own + dilatation::energy(cells, elastic, &cells.strains(displacement), displacement.len()))
+pub fn von_mises(cells: &Cells, elastic: &Elastic, displacement: &Points, rotation: Rotation) -> Vec<f64> {
+    let of_cells = stress::of_cells(cells, elastic, displacement, rotation);
+    of_cells.into_iter().map(|stress| stress.von_mises).collect()
 }
 
 fn norm(values: &[f64]) -> f64 {

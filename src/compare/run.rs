@@ -4,12 +4,14 @@ use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
 use super::measures::{Comparison, Sides, von_mises};
+use super::places::{Told, told};
 use super::split::ErrorParts;
 use super::supports::supports;
 use super::truth::{Setting, Truth, TruthError};
 use crate::continuum::engine::Engine;
 use crate::continuum::equilibrium::come_to_rest;
 use crate::continuum::layout::{Layout, RoleChange};
+use crate::continuum::places::at_places;
 use crate::continuum::plan::Plan;
 use crate::continuum::run::Outcome;
 use crate::fem::{Effort, FemError};
@@ -42,6 +44,8 @@ pub struct Compared {
     /// \[force / length^2\], shape \[cells\].
     pub von_mises_rule: Vec<f64>,
     pub von_mises_truth: Vec<f64>,
+    /// At the scene's `record.places`.
+    pub places: Vec<Told>,
 }
 
 /// Solves for the truth of a scene: clamped particles and leaders with a motion of their own are held where
@@ -64,9 +68,21 @@ pub fn truth_of(scene: &Scene, effort: &Effort) -> Result<SceneTruth, SceneError
     };
     let changes = layout.role_changes(scene, None)?;
     let supports = supports(scene, &layout, outline, &changes, scene.stop.steps as f64)?;
-    let loads = (0..scene.loads.len()).map(|k| layout.load(scene, k)).collect::<Result<Vec<_>, _>>()?;
+    let loads = layout.loads(scene)?;
     let (reference, spacing) = (&layout.body.reference, layout.body.lattice.spacing());
-    let setting = Setting { outline, reference, spacing, elastic: &elastic, supports, loads: &loads };
+    let materials: Vec<Elastic> = scene.inclusions.iter().map(|part| part.material).collect();
+    let inclusions = layout.partition.as_ref().map(|partition| (partition, &materials[..]));
+    let rotation = scene.rotation();
+    let setting = Setting {
+        outline,
+        inclusions,
+        reference,
+        spacing,
+        elastic: &elastic,
+        rotation,
+        supports,
+        loads: &loads,
+    };
     let truth = Truth::solve(setting, effort).map_err(|error| refused(scene, &error))?;
     require_known(scene, &truth, &changes)?;
     Ok(SceneTruth { truth, layout, elastic, time: start.elapsed() })
@@ -106,16 +122,18 @@ pub fn compare(
     let followed = |(i, &role): (usize, &Role)| role == Role::Follower && truth.truth.knows(i);
     let follows: Vec<bool> = engine.roles().iter().enumerate().map(followed).collect();
     let (elastic, known) = (&truth.elastic, &truth.truth.displacement);
-    let sides = Sides { cells: &cells, elastic, rule: &rule, truth: known, follows: &follows };
+    let rotation = scene.rotation();
+    let sides = Sides { cells: &cells, elastic, rotation, rule: &rule, truth: known, follows: &follows };
     let mut comparison = Comparison::of(&sides)
         .map_err(|shape| scene.refuse("lattice", shape.to_string(), "use a lattice less slender"))?;
     comparison.seconds_rule = time.as_secs_f64();
     comparison.seconds_truth = truth.time.as_secs_f64();
     comparison.truth_stated_rel_l2 = Some(truth.truth.error().displacement).filter(|error| error.is_finite());
     comparison.parts = ErrorParts::of(scene, &truth, &rule, &follows)?;
-    let von_mises_rule = von_mises(&cells, elastic, &rule);
-    let von_mises_truth = von_mises(&cells, elastic, known);
-    Ok(Compared { comparison, outcome, truth, cells, rule, von_mises_rule, von_mises_truth })
+    let von_mises_rule = von_mises(&cells, elastic, &rule, rotation);
+    let von_mises_truth = von_mises(&cells, elastic, known, rotation);
+    let places = told(at_places(scene, engine), &truth.truth).map_err(|error| refused(scene, &error))?;
+    Ok(Compared { comparison, outcome, truth, cells, rule, von_mises_rule, von_mises_truth, places })
 }
 
 /// The plan of a scene, its leaders led by this truth of its body or of a finer one; a leader that the truth
@@ -187,6 +205,7 @@ pub(super) fn refused(scene: &Scene, error: &TruthError) -> SceneError {
             ("body.shape", "keep corners, holes and supports further apart")
         }
         TruthError::Fem(FemError::EmptySupport { .. }) => ("roles", "move the region onto the body"),
+        TruthError::Fem(FemError::Lost { .. }) => ("loads", "load it less, or lead it there"),
         _ => ("material", "use constants, lattice and loads less far apart"),
     };
     scene.refuse(key, error.to_string(), help)

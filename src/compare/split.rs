@@ -87,7 +87,8 @@ fn truth_of_cells(scene: &Scene, truth: &SceneTruth) -> Result<Option<Points>, S
     if agrees(of_cells.area(), outline.area()) && agrees(of_cells.length(), outline.length()) {
         return Ok(Some(truth.truth.displacement.clone()));
     }
-    if of_cells.pieces().count() > MOST_SIDES {
+    // Edges of inclusions that end on the outline do not end on that of the cells.
+    if of_cells.pieces().count() > MOST_SIDES || layout.partition.is_some() {
         return Ok(None);
     }
     let changes = layout.role_changes(scene, None)?;
@@ -98,13 +99,15 @@ fn truth_of_cells(scene: &Scene, truth: &SceneTruth) -> Result<Option<Points>, S
         }
     }
     supports.retain(|support| !matches!(&support.on, Holding::Portions(portions) if portions.is_empty()));
-    let loads = (0..scene.loads.len()).map(|k| layout.load(scene, k)).collect::<Result<Vec<_>, _>>()?;
+    let loads = layout.loads(scene)?;
     let spacing = layout.body.lattice.spacing();
     let setting = Setting {
         outline: &of_cells,
+        inclusions: None,
         reference,
         spacing,
         elastic: &truth.elastic,
+        rotation: scene.rotation(),
         supports,
         loads: &loads.iter().filter(|load| !matches!(load, Load::Outline(_))).cloned().collect::<Vec<_>>(),
     };

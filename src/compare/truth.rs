@@ -5,10 +5,12 @@
 
 pub use crate::fem::Effort;
 use crate::fem::{
-    self, EstimatedError, FemError, Level, ShapeProblem, ShapeSolution, Stress, Support, solve_shape,
+    self, EstimatedError, FemError, Level, ShapeProblem, ShapeSolution, Strain, Stress, Support, solve_shape,
 };
 use crate::flock::points::Points;
+use crate::flock::rules::Rotation;
 use crate::geometry::outline::Outline;
+use crate::geometry::partition::Partition;
 use crate::geometry::portion::Portion;
 use crate::material::elastic::{Constants, Elastic, Plane};
 use crate::material::outline_loads::Load;
@@ -21,11 +23,15 @@ const OUTSIDE: f64 = 1e-3;
 /// A shape with what holds it and what pulls it.
 pub struct Setting<'a> {
     pub outline: &'a Outline,
+    /// The outline with the edges of inclusions, and what these are made of, where there are any.
+    pub inclusions: Option<(&'a Partition, &'a [Elastic])>,
     /// Where the particles are \[length\], shape \[particles\].
     pub reference: &'a Points,
     /// Distance of neighbouring particles \[length\].
     pub spacing: f64,
     pub elastic: &'a Elastic,
+    /// Whether the body may turn far.
+    pub rotation: Rotation,
     pub supports: Vec<Support<'a>>,
     /// On the outline, over the thickness of the sheet. A force on a particle acts at a point: there, and only there, the
     /// truth grows with the logarithm of the refinement.
@@ -82,8 +88,18 @@ impl Truth {
         more: Vec<(Vec<Portion>, impl Fn(Point, Point) -> Point + 'a)>,
         effort: &Effort,
     ) -> Result<Self, TruthError> {
-        let Setting { outline, reference, spacing, elastic, supports, loads } = setting;
+        let Setting { outline, inclusions, reference, spacing, elastic, rotation, supports, loads } = setting;
         let mut problem = ShapeProblem::new(outline, material(elastic)?);
+        if let Some((partition, elastics)) = inclusions {
+            let of_region = |(region, elastic): (&'a Outline, &Elastic)| Ok((region, material(elastic)?));
+            let all: Result<_, FemError> = partition.regions().iter().zip(elastics).map(of_region).collect();
+            problem.inclusions = all?;
+            problem.interfaces = partition.lines().copied().collect();
+        }
+        problem.strain = match rotation {
+            Rotation::Small => Strain::Small,
+            Rotation::Corotated => Strain::Stretch,
+        };
         problem.reach = OUTSIDE * spacing;
         problem.supports = supports;
         let thickness = elastic.thickness();
@@ -142,15 +158,23 @@ impl Truth {
         self.solution.strain_energy()
     }
 
-    /// Von Mises stress \[force / length^2\] of the truth itself at places of the shape or less than a spacing outside
-    /// it, shape \[places\]. What a rule is measured against is coarser: the stress that the cells have if their
+    /// Von Mises stress \[force / length^2\] there.
+    ///
+    /// # Errors
+    /// As [`Truth::stress_at`].
+    pub fn von_mises_at(&self, places: &Points) -> Result<Vec<f64>, TruthError> {
+        Ok(self.stress_at(places)?.iter().map(Stress::von_mises).collect())
+    }
+
+    /// Stress \[force / length^2\] of the truth itself at places of the shape or less than a spacing outside
+    /// it, shape \[places\]; of a body that turns, in axes that turn with it. What a rule is measured against is coarser: the stress that the cells have if their
     /// corners go where the truth takes them ([`super::measures::von_mises`]).
     ///
     /// # Errors
     /// Names the first place further outside.
-    pub fn von_mises_at(&self, places: &Points) -> Result<Vec<f64>, TruthError> {
+    pub fn stress_at(&self, places: &Points) -> Result<Vec<Stress>, TruthError> {
         let places: Vec<Point> = places.iter().collect();
-        Ok(self.solution.stress_within(&places, self.spacing)?.iter().map(Stress::von_mises).collect())
+        Ok(self.solution.stress_within(&places, self.spacing)?)
     }
 }
 

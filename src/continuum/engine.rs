@@ -6,9 +6,10 @@ pub mod state;
 
 use std::sync::Arc;
 
-use super::free_edge::FreeEdge;
+use super::free_edge::{Edge, FreeEdge};
 use super::layout::RoleChange;
 use super::movement::Movement;
+use super::path::Path;
 use super::plan::Plan;
 use crate::flock::body::Body;
 use crate::flock::fracture::Break;
@@ -22,7 +23,7 @@ use crate::flock::rules::Rule;
 use crate::flock::strain::{Strain, strain};
 use crate::material::cells::Cells;
 use crate::scene::Quantity;
-use crate::solve::sweep::{Activity, Order, Sweep, Update};
+use crate::sweep::{Activity, Order, Sweep, Update};
 use load::Load;
 
 /// A body on its way; positions in \[length, world frame\], shape \[count\].
@@ -58,6 +59,8 @@ pub struct Engine {
     load: Load,
     /// Displacements of a body that was put to rest \[length\]; positions have lost their last digits.
     settled: Option<Points>,
+    /// Of a body that is put to rest part by part.
+    path: Option<Path>,
 }
 
 /// A particle under a leader's program.
@@ -111,7 +114,7 @@ impl Engine {
             members: roles.iter().map(|role| role.is_body()).collect(),
         });
         let mut engine = Self {
-            sweep: Sweep::uncompiled(update, &roles),
+            sweep: Sweep::uncompiled(update, &interaction, &roles),
             takes_several: false,
             present: Points::clone(&body.reference),
             previous: Points::clone(&body.reference),
@@ -132,6 +135,7 @@ impl Engine {
             free_edge,
             load: Load::new(ramp, loads),
             settled: None,
+            path: None,
         };
         engine.follow_ramp();
         // The plan has given the roles that hold from the start; their motions begin here.
@@ -175,8 +179,8 @@ impl Engine {
     }
 
     /// What is known of the tractions along the outline, where stress can be recovered from it.
-    pub fn free_edge(&self) -> Option<&FreeEdge> {
-        self.free_edge.as_deref()
+    pub fn free_edge(&self) -> Option<&Edge> {
+        self.free_edge.as_ref()?.of(&self.body, self.cells.as_ref()?)
     }
 
     /// Cells between the particles, where the scene has a material.
@@ -293,6 +297,18 @@ impl Engine {
         // A frame stands where the body leaves it, which no solver says.
         self.settled = self.body.frame.is_none().then(|| displacement.clone());
         self.activity.forget();
+    }
+
+    /// Counts the way to the equilibrium that the body was put to, under the load that is on it now, as gone.
+    pub fn go_on(&mut self) {
+        let mut path = self.path.take().unwrap_or_default();
+        path.go_on(self);
+        self.path = Some(path);
+    }
+
+    /// The equilibria that it has come through; `None` for a body that is stepped, or put to rest at once.
+    pub fn path(&self) -> Option<&Path> {
+        self.path.as_ref()
     }
 
     /// Takes the last step back: positions as before it. Bonds that broke in it stay broken.
@@ -425,7 +441,7 @@ impl Engine {
     fn compile_sweep(&mut self) {
         self.activity.forget();
         self.sweep = if self.present_neighbours.is_some() {
-            Sweep::uncompiled(self.update, &self.roles)
+            Sweep::uncompiled(self.update, &self.interaction, &self.roles)
         } else {
             Sweep::compile(self.update, &self.interaction, &self.roles)
         };

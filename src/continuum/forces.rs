@@ -150,8 +150,16 @@ impl Forces {
 
     /// The reactions, as they are now, times the displacements \[force length\].
     pub fn work_of_supports(&self, engine: &Engine) -> f64 {
-        let work = |one: Held| dot(self.held_by(one), self.displacement.get(one.particle));
-        held(engine).into_iter().flatten().map(work).sum()
+        work(&self.supports(engine), &self.displacement)
+    }
+
+    /// The reaction on each particle along what is held of it \[force\], shape \[count\].
+    pub fn supports(&self, engine: &Engine) -> Points {
+        let mut supports = Points::zeros(self.internal.len());
+        for one in held(engine).into_iter().flatten() {
+            supports.set(one.particle, plus(supports.get(one.particle), self.held_by(one)));
+        }
+        supports
     }
 
     /// The largest force that is left on a follower, along components that are free \[force\]: none where the body is

@@ -1,5 +1,7 @@
 //! What is known of the traction along a fitted body's outline, for the recovery of stress there.
 
+use std::sync::OnceLock;
+
 use crate::flock::body::Body;
 use crate::geometry::outline::{Outline, Place};
 use crate::material::cells::Cells;
@@ -12,25 +14,45 @@ const MOST_DISTANCES: usize = 20_000_000;
 /// Sine of the turn to the right from which a corner is an inner one, where stress has no largest value.
 const INNER: f64 = -1e-6;
 
-/// The outline of a body in an isotropic material, for [`crate::material::recovery`].
-#[derive(Clone, Debug, Default)]
+/// The outline of a body and what acts on it. What follows is found when it is first asked for, which tables and pictures of
+/// stress do and solvers do not.
+#[derive(Clone, Debug)]
 pub struct FreeEdge {
+    outline: Outline,
+    loads: Vec<Load>,
+    /// \[length\]
+    thickness: f64,
+    /// Components that are held, shape \[count\]\[x, y\].
+    held: Vec<[bool; 2]>,
+    edge: OnceLock<Option<Edge>>,
+}
+
+/// The outline of a body, for [`crate::material::recovery`].
+#[derive(Clone, Debug, Default)]
+pub struct Edge {
     pub tractions: Vec<KnownTraction>,
+    /// Which cell each of them acts on.
+    pub cells: Vec<u32>,
     /// Particles on the outline that are at no inner corner and not held altogether.
     pub particles: Vec<usize>,
 }
 
 impl FreeEdge {
+    pub fn new(outline: Outline, (loads, thickness): (Vec<Load>, f64), held: Vec<[bool; 2]>) -> Self {
+        Self { outline, loads, thickness, held, edge: OnceLock::new() }
+    }
+
     /// Tractions of the loads, and none elsewhere, in the middle of each side of the boundary, along those components that
-    /// are not held at both its ends; `held` has them by particle, shape \[count\]\[x, y\].
-    pub fn of(
-        (body, cells): (&Body, &Cells),
-        outline: &Outline,
-        (loads, thickness): (&[Load], f64),
-        held: &[[bool; 2]],
-    ) -> Option<Self> {
+    /// are not held at both its ends. `None` where they are not known or too many.
+    pub fn of(&self, body: &Body, cells: &Cells) -> Option<&Edge> {
+        self.edge.get_or_init(|| self.found(body, cells)).as_ref()
+    }
+
+    fn found(&self, body: &Body, cells: &Cells) -> Option<Edge> {
+        let (outline, held) = (&self.outline, &self.held);
         let places = &body.outline.as_ref()?.places;
-        let sides = cells.boundary_sides(&cells.incidence(body.count()));
+        let incidence = cells.incidence(body.count());
+        let sides = cells.boundary_sides(&incidence);
         let fits = sides.len().saturating_mul(outline.pieces().count()) <= MOST_DISTANCES;
         let outlined = |load: &Load| match load {
             Load::Outline(load) => Some(Some(load.clone())),
@@ -38,19 +60,22 @@ impl FreeEdge {
             // A body force is in equilibrium with no field of the recovery.
             Load::Body(force) => (*force == [0.0; 2]).then_some(None),
         };
-        let loads: Option<Vec<Option<OutlineLoad>>> = loads.iter().map(outlined).collect();
+        let loads: Option<Vec<Option<OutlineLoad>>> = self.loads.iter().map(outlined).collect();
         let loads: Vec<OutlineLoad> = loads.filter(|_| fits)?.into_iter().flatten().collect();
-        let mut edge = Self::default();
+        let mut edge = Edge::default();
         for [a, b] in sides {
             let [from, to] = [a, b].map(|i| body.reference.get(i as usize));
             let (place, _) = outline.nearest([0, 1].map(|k| 0.5 * (from[k] + to[k])));
             let piece = outline.piece(place.ring, place.piece);
             let (point, normal) = (piece.point(place.t), piece.normal(place.t));
             let acting = loads.iter().filter(|load| acts_at(load, &place)).map(|load| load.at(point, normal));
-            let traction = acting.fold([0.0; 2], |sum, t| [0, 1].map(|k| sum[k] + t[k] / thickness));
+            let traction = acting.fold([0.0; 2], |sum, t| [0, 1].map(|k| sum[k] + t[k] / self.thickness));
+            let around = incidence.of(a as usize).iter();
+            let cell = around.copied().find(|&cell| cells.of(cell as usize).contains(&b))?;
             for axis in (0..2).filter(|&axis| ![a, b].iter().all(|&i| held[i as usize][axis])) {
                 let direction = if axis == 0 { [1.0, 0.0] } else { [0.0, 1.0] };
                 edge.tractions.push(KnownTraction { point, normal, direction, value: traction[axis] });
+                edge.cells.push(cell);
             }
         }
         let on_outline = places.iter().enumerate().filter_map(|(i, place)| Some((i, (*place)?)));

@@ -3,7 +3,7 @@
 use super::engine::several::looks_at_every_step;
 use super::plan::Plan;
 use crate::flock::neighbourhood::Neighbours;
-use crate::solve::sweep::Sweep;
+use crate::sweep::Sweep;
 
 /// Share of the followers' updates that the motion of the leaders can reach within `stop.steps` \[1\]; the others
 /// are known to change nothing and are left out. `None` where every update is made: the sweep of this scene does not
@@ -12,7 +12,8 @@ pub fn share_reached(plan: &Plan) -> Option<f64> {
     let Plan { body, interaction, changes, .. } = plan;
     let looks = looks_at_every_step(plan.present_radius.is_some(), interaction, changes);
     let sweep = || Sweep::compile(plan.update, &plan.interaction, &plan.roles);
-    if looks || !sweep().takes_several(body.frame.as_ref()) {
+    // A load moves all of a body at once.
+    if looks || interaction.forces.is_some() || !sweep().takes_several(body.frame.as_ref()) {
         return None;
     }
     let steps = plan.stop.steps;

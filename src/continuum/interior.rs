@@ -9,7 +9,7 @@ use crate::material::homogenise::{Bond, Crystal, HomogeniseError};
 use crate::material::report::MaterialReport;
 use crate::material::zone::Zone;
 use crate::scene::{Scene, SceneError, Weights};
-use crate::solve::sweep::Order;
+use crate::sweep::Order;
 
 /// What material a scene's rule is.
 ///

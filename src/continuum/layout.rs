@@ -11,9 +11,10 @@ use crate::flock::region::{Region, Side};
 use crate::flock::role::Role;
 use crate::flock::rules::{Axis, Mean};
 use crate::geometry::outline::{Outline, OutlineError, Place};
+use crate::geometry::partition::{Partition, PartitionError};
 use crate::geometry::portion::{Portion, Selection};
 use crate::material::cells::{Cells, neighbourhood, neighbourhood_of, without_loose_sites};
-use crate::material::fit::{FitError, Fitted, fit};
+use crate::material::fit::{FitError, Fitted, fit_regions};
 use crate::material::outline_loads::{self, Loader, OutlineLoad, Push};
 use crate::scene::{BodySource, Condition, LeaderMotion, Load, RoleEntry, Scene, SceneError, SceneRegion};
 use crate::solve::linear::HeldComponent;
@@ -31,6 +32,8 @@ pub struct Layout {
     pub cells: Option<Cells>,
     /// The outline of the body's shape; none where the shape has none that bounds an area, and for points.
     pub outline: Option<Outline>,
+    /// The outline with the edges of inclusions, where there are any.
+    pub partition: Option<Partition>,
 }
 
 /// A role that some particles take.
@@ -55,15 +58,18 @@ impl Layout {
         require_in_range(scene)?;
         let fitted = fitted(scene)?;
         let layout = match fitted {
-            Some((fitted, outline)) if !is_all_whole(&fitted.cells) => {
-                let Fitted { body, cells } = fitted;
+            Some((fitted, partition)) if !is_all_whole(&fitted.cells) => {
+                let Fitted { body, mut cells } = fitted;
+                cells.inclusions = scene.inclusions.iter().map(|part| part.material).collect();
                 require_resolved(scene, &body)?;
                 require_cell_neighbours(scene)?;
                 let neighbours = match &scene.material {
                     Some(elastic) => cells.neighbours(body.count(), elastic),
                     None => cells.mates(body.count()),
                 };
-                Self { body, neighbours, cells: Some(cells), outline: Some(outline) }
+                let outline = Some(partition.outline().clone());
+                let partition = Some(partition).filter(|_| !scene.inclusions.is_empty());
+                Self { body, neighbours, cells: Some(cells), outline, partition }
             }
             of_lattice => Self::of_whole_cells(scene, of_lattice)?,
         };
@@ -78,10 +84,10 @@ impl Layout {
     }
 
     /// A body of whole cells, or of particles alone; one that fits its outline as it is keeps that.
-    fn of_whole_cells(scene: &Scene, fitted: Option<(Fitted, Outline)>) -> Result<Self, SceneError> {
+    fn of_whole_cells(scene: &Scene, fitted: Option<(Fitted, Partition)>) -> Result<Self, SceneError> {
         let (body, neighbours) = body_of(scene).map_err(|error| refuse_body(scene, &error))?;
         require_resolved(scene, &body)?;
-        let (mut body, neighbours, cells) = match scene.mean {
+        let (mut body, neighbours, mut cells) = match scene.mean {
             Mean::Material { .. } => {
                 // Sites in no cell carry nothing; they stick out of a curved edge.
                 let (body, neighbours, cells) = without_loose_sites(&body, &neighbours);
@@ -97,16 +103,31 @@ impl Layout {
                 (body, neighbours, cells)
             }
         };
-        let outline = match (&scene.body, &cells, fitted) {
-            (_, _, Some((fitted, outline))) if fitted.body.sites == body.sites => {
+        let (outline, partition) = match (&scene.body, &cells, fitted) {
+            (_, _, Some((fitted, partition))) if fitted.body.sites == body.sites => {
                 body.outline = fitted.body.outline;
-                Some(outline)
+                (Some(partition.outline().clone()), Some(partition))
             }
-            (BodySource::Cut(Cut::Shape(shape)), ..) => Outline::of_shape(shape).ok(),
-            (BodySource::Cut(Cut::Count { .. }), Some(cells), _) => cells.outline(&body.reference).ok(),
-            _ => None,
+            (BodySource::Cut(Cut::Shape(shape)), ..) => match Outline::of_shape(shape) {
+                Ok(outline) => {
+                    let partition = divided(scene, &outline)?;
+                    (Some(partition.outline().clone()), Some(partition))
+                }
+                Err(error) if !scene.inclusions.is_empty() => return Err(refuse_outline(scene, &error)),
+                Err(_) => (None, None),
+            },
+            (BodySource::Cut(Cut::Count { .. }), Some(cells), _) => {
+                (cells.outline(&body.reference).ok(), None)
+            }
+            _ => (None, None),
         };
-        Ok(Self { body, neighbours, cells, outline })
+        let partition = partition.filter(|_| !scene.inclusions.is_empty());
+        if let (Some(cells), Some(partition)) = (&mut cells, &partition) {
+            let regions = scene.inclusions.len() + 1;
+            cells.divide(&body.reference, regions, |p| partition.region(p));
+            cells.inclusions = scene.inclusions.iter().map(|part| part.material).collect();
+        }
+        Ok(Self { body, neighbours, cells, outline, partition })
     }
 
     /// Who takes which role when, in the order in which it is written. Leaders led by the truth have no
@@ -133,15 +154,19 @@ impl Layout {
     ///
     /// # Errors
     /// Names the load that has nothing to act on.
-    pub fn forces_by_load(&self, scene: &Scene) -> Result<Vec<Points>, SceneError> {
+    pub fn forces_by_load(
+        &self,
+        scene: &Scene,
+        loads: &[outline_loads::Load],
+    ) -> Result<Vec<Points>, SceneError> {
         let Some(cells) = &self.cells else { return Ok(Vec::new()) };
-        if scene.loads.is_empty() {
+        if loads.is_empty() {
             return Ok(Vec::new());
         }
         let loader = Loader::new(cells, &self.body, self.outline.as_ref());
         let of_load = |k: usize| {
             let mut forces = Points::zeros(self.body.count());
-            loader.add(&self.load(scene, k)?, &mut forces).map_err(|error| {
+            loader.add(&loads[k], &mut forces).map_err(|error| {
                 let help = match error {
                     outline_loads::LoadError::NotFinite => "give finite numbers",
                     _ => "move the region onto particles that belong to cells",
@@ -150,14 +175,18 @@ impl Layout {
             })?;
             Ok(forces)
         };
-        (0..scene.loads.len()).map(of_load).collect()
+        (0..loads.len()).map(of_load).collect()
     }
 
-    /// What one of the scene's loads acts on.
+    /// What each of the scene's loads acts on, in their order.
     ///
     /// # Errors
     /// Names a load whose region holds no particle or no part of the outline.
-    pub fn load(&self, scene: &Scene, number: usize) -> Result<outline_loads::Load, SceneError> {
+    pub fn loads(&self, scene: &Scene) -> Result<Vec<outline_loads::Load>, SceneError> {
+        (0..scene.loads.len()).map(|k| self.load(scene, k)).collect()
+    }
+
+    fn load(&self, scene: &Scene, number: usize) -> Result<outline_loads::Load, SceneError> {
         let thickness = scene.material.as_ref().map_or(1.0, |elastic| elastic.thickness());
         let key = format!("loads[{number}]");
         Ok(match &scene.loads[number] {
@@ -511,17 +540,37 @@ fn check_pieces(scene: &Scene, key: &str, region: &SceneRegion, outline: &Outlin
 ///
 /// # Errors
 /// Names what in the shape has no outline that cells can follow.
-fn fitted(scene: &Scene) -> Result<Option<(Fitted, Outline)>, SceneError> {
+fn fitted(scene: &Scene) -> Result<Option<(Fitted, Partition)>, SceneError> {
     let (true, BodySource::Cut(Cut::Shape(shape))) = (scene.is_fitted, &scene.body) else { return Ok(None) };
     let outline = Outline::of_shape(shape).map_err(|error| refuse_outline(scene, &error))?;
-    let fitted = fit(&scene.lattice, &outline).map_err(|error| {
+    let partition = divided(scene, &outline)?;
+    let fitted = fit_regions(&scene.lattice, &partition).map_err(|error| {
         let help = match error {
             FitError::TooLarge { .. } => "use a wider spacing or a smaller shape",
             _ => "use a smaller spacing, leave the detail out, or set body.outline = \"lattice\"",
         };
         scene.refuse("body.shape", error.to_string(), help)
     })?;
-    Ok(Some((fitted, outline)))
+    Ok(Some((fitted, partition)))
+}
+
+/// The outline with the edges of the scene's inclusions.
+///
+/// # Errors
+/// Names an inclusion that has no outline, or no part of the body.
+fn divided(scene: &Scene, outline: &Outline) -> Result<Partition, SceneError> {
+    let shapes: Vec<_> = scene.inclusions.iter().map(|part| part.shape.clone()).collect();
+    Partition::new(outline, &shapes).map_err(|error| {
+        let (message, region, help) = match &error {
+            PartitionError::Outline { region, reason } => {
+                (reason.to_string(), region, "give its corners in order, once around")
+            }
+            PartitionError::Outside { region } => {
+                ("it has no part of the body".to_owned(), region, "move it into the body, or leave it out")
+            }
+        };
+        scene.refuse(&format!("body.inclusions[{}].shape", region - 1), message, help)
+    })
 }
 
 fn refuse_outline(scene: &Scene, error: &OutlineError) -> SceneError {
@@ -549,7 +598,7 @@ fn require_cell_neighbours(scene: &Scene) -> Result<(), SceneError> {
     let offsets = |neighbourhood: &Neighbourhood| {
         neighbourhood.offsets(&scene.lattice).map_err(|error| refuse(error.to_string()))
     };
-    let needed = match &scene.material {
+    let needed = match scene.farthest_seeing() {
         Some(elastic) => neighbourhood_of(&scene.lattice, elastic),
         None => neighbourhood(&scene.lattice),
     };

@@ -7,11 +7,12 @@ use serde::{Deserialize, Serialize};
 
 use super::engine::Engine;
 use super::forces::{Forces, LoadResultant, Reaction};
+use super::path::Path;
 use crate::flock::points::{Points, distance};
 use crate::flock::rules::{Mean, Rotation};
 use crate::material::cells::Cells;
 use crate::material::elastic::Elastic;
-use crate::material::recovery::{CellStress, KnownTraction, REACH, stress_at};
+use crate::material::recovery::{CellStress, Fields, KnownTraction, REACH, stress_at};
 use crate::material::stiffness::area;
 use crate::material::stress::{self, StressState};
 
@@ -33,6 +34,9 @@ pub struct Mechanics {
     pub strain_energy: f64,
     /// Absent where the rule has no stiffness.
     pub work: Option<Work>,
+    /// What has been done on the way, summed up from equilibrium to equilibrium ([`super::path`]): in a body that stores
+    /// all of it the strain energy. Absent where there were none.
+    pub work_done: Option<Work>,
     /// The largest force left on a follower \[force\]: how far the body is from rest.
     pub unbalanced: Option<f64>,
     pub largest_von_mises: Option<Peak>,
@@ -44,7 +48,7 @@ pub struct Mechanics {
 
 /// Forces at their last value times displacements \[force length\]. In equilibrium under small rotations the strain
 /// energy is half of the sum of both.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Work {
     pub loads: f64,
     /// Of the reactions: of leaders that were moved.
@@ -92,7 +96,10 @@ impl Stresses {
         }
         let mut particles =
             stress::at_particles(cells, elastic, &of_cells, displacement.len(), |cell| !torn[cell]);
-        let recovered = if broken.is_empty() { recovered(engine, elastic, &of_cells) } else { Vec::new() };
+        let recovered = match broken {
+            [] => recovered(engine, elastic, &of_cells, displacement),
+            _ => Vec::new(),
+        };
         for &(i, stress) in &recovered {
             particles[i] = Some(stress);
         }
@@ -145,6 +152,7 @@ impl Mechanics {
                 loads: forces.work_of_loads(),
                 supports: forces.work_of_supports(engine),
             }),
+            work_done: engine.path().map(Path::done),
             unbalanced: forces.as_ref().map(|forces| forces.largest_left(engine)),
             largest_von_mises: stresses.peak(engine, cells),
             largest_strain: finite(&mut stresses.cells.iter().map(StressState::largest_strain)),
@@ -181,42 +189,59 @@ fn strain_energy(engine: &Engine, elastic: &Elastic, forces: Option<&Forces>, u:
 }
 
 /// Stress of the particles along a fitted outline, from the cells near them and the tractions that are known there.
-fn recovered(engine: &Engine, elastic: &Elastic, of_cells: &[StressState]) -> Vec<(usize, StressState)> {
+/// Of a body that turns all of them are taken in axes that turn with it, in which a stress is in equilibrium but for terms of
+/// the size of the strain.
+fn recovered(
+    engine: &Engine,
+    elastic: &Elastic,
+    of_cells: &[StressState],
+    displacement: &Points,
+) -> Vec<(usize, StressState)> {
     let (Some(edge), Some(cells)) = (engine.free_edge(), engine.cells()) else { return Vec::new() };
     let (body, factor) = (engine.body(), engine.load_factor());
     let lattice = &body.lattice;
     // The sites of a honeycomb are nearer to each other than its cells are wide.
     let spacing = lattice.spacing().max((lattice.cell_area() * lattice.sublattices() as f64).sqrt());
     let bucket = |p: [f64; 2]| p.map(|v| (v / (REACH * spacing)).floor() as i64);
-    let mut cells_in: HashMap<[i64; 2], Vec<CellStress>> = HashMap::new();
+    let mut cells_in: HashMap<[i64; 2], Vec<(u32, CellStress)>> = HashMap::new();
     let centres = cells.centroids(&body.reference);
     for (cell, centroid) in centres.iter().enumerate() {
         let (area, stress) = (area(cells.shape(cell)), of_cells[cell].components);
-        cells_in.entry(bucket(centroid)).or_default().push(CellStress { centroid, area, stress });
+        let region = cells.region_of(cell);
+        cells_in.entry(bucket(centroid)).or_default().push((region, CellStress { centroid, area, stress }));
     }
     let mut tractions_in: HashMap<[i64; 2], Vec<KnownTraction>> = HashMap::new();
-    for known in &edge.tractions {
-        let known = KnownTraction { value: factor * known.value, ..*known };
+    let turns: Option<Vec<f64>> =
+        (rotation(engine) == Rotation::Corotated).then(|| stress::turns(cells, displacement).collect());
+    for (known, &cell) in edge.tractions.iter().zip(&edge.cells) {
+        let (sin, cos) = turns.as_ref().map_or(0.0, |turns| turns[cell as usize]).sin_cos();
+        let [x, y] = known.direction;
+        let direction = [cos * x + sin * y, cos * y - sin * x];
+        let known = KnownTraction { value: factor * known.value, direction, ..*known };
         tractions_in.entry(bucket(known.point)).or_default().push(known);
     }
+    let fields: Vec<Fields> = std::iter::once(elastic).chain(&cells.inclusions).map(Fields::of).collect();
     let recover = |&i: &usize| {
         let point = body.reference.get(i);
         let [x, y] = bucket(point);
         let around = || (x - 1..=x + 1).flat_map(|x| (y - 1..=y + 1).map(move |y| [x, y]));
         let near = |p: [f64; 2]| distance(p, point) < REACH * spacing;
-        let cells: Vec<CellStress> = around()
-            .filter_map(|b| cells_in.get(&b))
-            .flatten()
-            .filter(|c| near(c.centroid))
-            .copied()
-            .collect();
+        let around_here = around().filter_map(|b| cells_in.get(&b)).flatten();
+        let (regions, cells_here): (Vec<u32>, Vec<CellStress>) =
+            around_here.filter(|(_, cell)| near(cell.centroid)).copied().unzip();
+        // Across an interface no one field goes on.
+        let region = *regions.first()?;
+        if regions.iter().any(|&other| other != region) {
+            return None;
+        }
+        let elastic = cells.material_of_region(region, elastic);
         let tractions: Vec<KnownTraction> = around()
             .filter_map(|b| tractions_in.get(&b))
             .flatten()
             .filter(|t| near(t.point))
             .copied()
             .collect();
-        let stress = stress_at(point, spacing, &cells, &tractions)?;
+        let stress = stress_at((point, spacing), &fields[region as usize], &cells_here, &tractions)?;
         Some((i, StressState::of_stress(stress, elastic)))
     };
     edge.particles.par_iter().filter_map(recover).collect()

@@ -17,6 +17,8 @@ pub mod interior;
 pub mod layout;
 pub mod mechanics;
 pub mod movement;
+pub mod path;
+pub mod places;
 pub mod plan;
 pub mod record;
 pub mod report;

@@ -6,21 +6,21 @@ use std::sync::Arc;
 use super::damping::along_outline;
 use super::free_edge::FreeEdge;
 use super::layout::{Layout, RoleChange, Truth, held_components, no_particle};
-use super::weights;
+use super::{places, weights};
 use crate::flock::body::Body;
 use crate::flock::fracture::{Bonds, Break, Ghosts};
 use crate::flock::interaction::{Interaction, MatrixWeights, Weights};
 use crate::flock::neighbourhood::{Neighbourhood, Neighbours};
 use crate::flock::points::{Points, distance};
 use crate::flock::role::Role;
-use crate::flock::rules::{Axis, Mean, Poisson, Rotation, Rule};
+use crate::flock::rules::{Axis, Mean, Poisson, Rule};
 use crate::geometry::outline::Outline;
 use crate::material::cells::Cells;
 use crate::material::mechanism::require_held;
 use crate::material::outline_loads::{Load, Resultant, sum};
 use crate::scene::{LoadSteps, Scene, SceneError, Stop};
 use crate::solve::linear::HeldComponent;
-use crate::solve::sweep::{Order, Update};
+use crate::sweep::{Order, Update};
 
 /// Everything an engine needs; nothing of it refers to the scene file.
 #[derive(Clone, Debug)]
@@ -49,7 +49,7 @@ pub struct Plan {
     pub ramp: Option<usize>,
     /// The outline of the body's shape, where it has one.
     pub outline: Option<Outline>,
-    /// Of a body fitted to its outline, in an isotropic material with small rotations.
+    /// Of a body fitted to its outline whose rule is a material.
     pub free_edge: Option<Arc<FreeEdge>>,
     /// Of each load of the scene, in its order.
     pub resultants: Vec<Resultant>,
@@ -80,14 +80,15 @@ impl Plan {
     fn lay_out(scene: &Scene, truth: Option<Truth<'_>>) -> Result<Self, SceneError> {
         let layout = Layout::new(scene)?;
         let changes = layout.role_changes(scene, truth)?;
-        let loads = layout.forces_by_load(scene)?;
+        let acting = if layout.cells.is_some() { layout.loads(scene)? } else { Vec::new() };
+        let loads = layout.forces_by_load(scene, &acting)?;
         let reference = &layout.body.reference;
         let resultants = loads.iter().map(|f| Resultant::of(reference.iter().zip(f.iter()))).collect();
         let forces = sum(&loads);
         let leads = held_axes(&layout.body, &changes);
         require_carried(scene, &layout, &leads, forces.as_ref())?;
-        let free_edge = free_edge(scene, &layout, &leads)?.map(Arc::new);
-        let Layout { body, neighbours, cells, outline } = layout;
+        let free_edge = free_edge(scene, &layout, &acting, &leads).map(Arc::new);
+        let Layout { body, neighbours, cells, outline, .. } = layout;
         let follows = ever_follow(&body, &changes);
         let mut weights = weights::of_body(scene, &body, &neighbours, cells.as_ref(), &follows)?;
         if let Weights::Matrix(weights) = &mut weights {
@@ -96,6 +97,7 @@ impl Plan {
         let update = update(scene, &body, &neighbours, &weights);
         let interaction = interaction(scene, &body, neighbours, weights, forces);
         let probes = probes(scene, &body)?;
+        places::around(scene, cells.as_ref(), &body.reference)?;
         let roles = body.is_frame.iter().map(|&f| if f { Role::Frame } else { Role::Follower }).collect();
         let (low, high) = body.bounds();
         let mut plan = Self {
@@ -188,18 +190,11 @@ fn ever_follow(body: &Body, changes: &[RoleChange]) -> Vec<bool> {
     follows
 }
 
-/// What is known of the tractions along the outline, where stress can be recovered from it.
-fn free_edge(scene: &Scene, layout: &Layout, held: &[[bool; 2]]) -> Result<Option<FreeEdge>, SceneError> {
-    let small = scene.mean == Mean::Material { rotation: Rotation::Small };
-    let (Some(elastic), Some(cells), Some(outline)) = (&scene.material, &layout.cells, &layout.outline)
-    else {
-        return Ok(None);
-    };
-    if !small || !elastic.is_isotropic() {
-        return Ok(None);
-    }
-    let loads: Vec<Load> = (0..scene.loads.len()).map(|k| layout.load(scene, k)).collect::<Result<_, _>>()?;
-    Ok(FreeEdge::of((&layout.body, cells), outline, (&loads, elastic.thickness()), held))
+/// What acts along the outline, where stress can be recovered from it.
+fn free_edge(scene: &Scene, layout: &Layout, loads: &[Load], held: &[[bool; 2]]) -> Option<FreeEdge> {
+    let (elastic, outline) = (scene.material.as_ref()?, layout.outline.as_ref()?);
+    let is_ruled = matches!(scene.mean, Mean::Material { .. }) && layout.body.outline.is_some();
+    is_ruled.then(|| FreeEdge::new(outline.clone(), (loads.to_vec(), elastic.thickness()), held.to_vec()))
 }
 
 /// Components that are led or clamped from the start, shape \[count\]\[x, y\].

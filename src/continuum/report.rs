@@ -12,8 +12,9 @@ use crate::flock::interaction::Weights;
 use crate::flock::role::Role;
 use crate::flock::rules::{FeedbackReference, Mean, Rotation};
 use crate::material::outline_loads::Resultant;
+use crate::material::stiffness::area;
 use crate::scene::{LoadSteps, Scene, SceneError, Weights as SceneWeights};
-use crate::solve::sweep::{Order, Sweep};
+use crate::sweep::{Order, Sweep};
 
 /// A plan in words and numbers.
 #[derive(Clone, Debug, PartialEq)]
@@ -32,12 +33,13 @@ impl PlanReport {
     /// # Errors
     /// Names what keeps the scene from having the equilibrium it asks for.
     pub fn new(scene: &Scene, plan: &Plan) -> Result<Self, SceneError> {
+        let deviation = Deviation::of(plan);
         let mut report = Self {
             title: format!("{}: {}", scene.name, scene.raw.title),
-            facts: facts(scene, plan)?,
+            facts: facts(scene, plan, deviation.as_ref())?,
             modelled: Vec::new(),
             left_out: Vec::new(),
-            cautions: cautions(scene, plan),
+            cautions: cautions(scene, plan, deviation.as_ref()),
         };
         report.capabilities(scene, plan);
         Ok(report)
@@ -61,6 +63,7 @@ impl PlanReport {
         });
         self.models_or_not(forces, "loads", "nothing pushes the body but its leaders");
         if scene.material.is_some() {
+            self.models_or_not(inclusions(scene, plan), "body.inclusions", "the body is of one material");
             let parts = scene.load_steps.as_ref().map(load_steps);
             self.models_or_not(parts, "load_steps", "loads and motions are not measured on the way");
         }
@@ -121,6 +124,19 @@ impl PlanReport {
     }
 }
 
+/// How much of the body is of other materials.
+fn inclusions(scene: &Scene, plan: &Plan) -> Option<String> {
+    let cells = plan.cells.as_ref().filter(|cells| !cells.inclusions.is_empty())?;
+    let mut areas = vec![0.0; cells.inclusions.len() + 1];
+    let of_kind: Vec<f64> = cells.shapes.iter().map(|shape| area(shape)).collect();
+    cells.kind.iter().for_each(|&k| areas[cells.region[k as usize] as usize] += of_kind[k as usize]);
+    let whole: f64 = areas.iter().sum();
+    let shares: Vec<String> =
+        areas[1..].iter().map(|area| format!("{:.4} %", 100.0 * area / whole)).collect();
+    let edges = if scene.is_fitted { "fitted edges" } else { "edges along whole cells" };
+    Some(format!("{} of the area of other materials, with {edges}", shares.join(", ")))
+}
+
 /// In which parts the load comes.
 fn load_steps(steps: &LoadSteps) -> String {
     match steps {
@@ -134,7 +150,11 @@ fn load_steps(steps: &LoadSteps) -> String {
     }
 }
 
-fn facts(scene: &Scene, plan: &Plan) -> Result<Vec<(String, String)>, SceneError> {
+fn facts(
+    scene: &Scene,
+    plan: &Plan,
+    deviation: Option<&Deviation>,
+) -> Result<Vec<(String, String)>, SceneError> {
     let of = |role: Role| plan.roles.iter().filter(|&&r| r == role).count();
     let roles: Vec<String> = Role::ALL
         .iter()
@@ -188,7 +208,7 @@ fn facts(scene: &Scene, plan: &Plan) -> Result<Vec<(String, String)>, SceneError
             format!("about {:.0} % of the updates: motion spreads by one neighbour a step", 100.0 * share),
         )
     });
-    let outline = outline_facts(scene, plan);
+    let outline = outline_facts(scene, plan, deviation);
     let last = [("memory", format!("about {}", readable_bytes(memory(plan)))), ("stops", stop)];
     let facts = first.into_iter().chain(swept.into_iter().flatten()).chain(moving).chain(last);
     Ok(facts.map(|(name, value)| (name.to_owned(), value)).chain(outline).collect())
@@ -201,9 +221,9 @@ const DEVIATES: f64 = 0.01;
 const MOST_PIECES: usize = 16;
 
 /// How near the body is to its shape, the outline's pieces, and what each load adds up to.
-fn outline_facts(scene: &Scene, plan: &Plan) -> Vec<(String, String)> {
+fn outline_facts(scene: &Scene, plan: &Plan, deviation: Option<&Deviation>) -> Vec<(String, String)> {
     let mut facts = Vec::new();
-    if let Some(deviation) = Deviation::of(plan) {
+    if let Some(deviation) = deviation {
         let kind = if scene.is_fitted { "fitted" } else { "lattice" };
         let value = format!(
             "{kind}: area off by {:.1e} %, boundary at most {:.2e} {} from the shape's",
@@ -224,9 +244,9 @@ fn outline_facts(scene: &Scene, plan: &Plan) -> Vec<(String, String)> {
     facts
 }
 
-fn cautions(scene: &Scene, plan: &Plan) -> Vec<String> {
+fn cautions(scene: &Scene, plan: &Plan, deviation: Option<&Deviation>) -> Vec<String> {
     let mut cautions = Vec::new();
-    if let Some(deviation) = Deviation::of(plan)
+    if let Some(deviation) = deviation
         && (deviation.area.abs() > DEVIATES || deviation.distance_rel > DEVIATES)
     {
         cautions.push(format!(

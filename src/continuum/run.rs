@@ -3,6 +3,7 @@
 use std::ops::ControlFlow;
 
 use super::engine::Engine;
+use super::engine::several::Reach;
 use super::engine::state::{EngineState, WrongState};
 use super::movement::{Movement, farthest, first_lost};
 use super::plan::Plan;
@@ -11,7 +12,7 @@ use crate::flock::points::{Points, distance};
 use crate::flock::rules::{FeedbackReference, Mean};
 use crate::scene::Stop;
 use crate::solve::equilibrium::Solved;
-use crate::solve::sweep::Order;
+use crate::sweep::Order;
 
 /// Why a run ended.
 #[derive(Clone, Debug, PartialEq)]
@@ -171,8 +172,8 @@ struct Strides {
     /// Largest distance from the reference place over the spacing \[1\]: of anybody now, and that no body may pass.
     displacement: f64,
     bound: f64,
-    /// Whether a mean takes nobody farther from the reference than somebody is.
-    contracts: bool,
+    /// How far a step takes particles from the reference, if that is known.
+    reach: Option<Reach>,
     /// Where a stride began, if it may have gone too far.
     start: Points,
     /// Steps to be taken one at a time.
@@ -181,13 +182,13 @@ struct Strides {
 
 impl Strides {
     fn new(engine: &Engine, tolerance: Option<f64>, bound: f64) -> Self {
-        let contracts = engine.steps_at_once(1) > 0 && engine.rests_at_reference();
+        let reach = if engine.steps_at_once(1) > 0 { engine.reach_of_a_step() } else { None };
         let start = Points::default();
         Self {
             tolerance,
             displacement: engine.movement().largest_displacement,
             bound,
-            contracts,
+            reach,
             start,
             singly: 0,
         }
@@ -195,10 +196,13 @@ impl Strides {
 
     /// Takes at most `most` steps, and at least one.
     fn advance(&mut self, engine: &mut Engine, most: usize) {
-        let count = if self.contracts && self.singly == 0 { engine.steps_at_once(most) } else { 0 };
+        let count = if self.singly == 0 { self.reach.map_or(0, |_| engine.steps_at_once(most)) } else { 0 };
         let spacing = engine.body().lattice.spacing();
-        let reach = self.displacement.max(engine.leaders_reach(count) / spacing);
-        // Along each axis a mean stays within what there was; along both at once, within the diagonal.
+        let from = self.displacement * spacing;
+        let reach = self.reach.map_or(f64::INFINITY, |reach| {
+            reach.after(count, from.max(engine.leaders_reach(count))) / spacing
+        });
+        // That is along each axis; along both at once, within the diagonal.
         if count < 2 || reach * std::f64::consts::SQRT_2 * (1.0 + 1e-9) > self.bound {
             self.singly = self.singly.saturating_sub(1);
             return engine.advance();

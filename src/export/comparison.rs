@@ -10,6 +10,7 @@ use super::error::{ExportError, write_file};
 use super::figures::{self, Pair};
 use super::{OutputFolder, summary};
 use crate::compare::measures::Comparison;
+use crate::compare::places::Told;
 use crate::compare::run::Compared;
 use crate::scene::Scene;
 use crate::scene::raw::RawScene;
@@ -26,6 +27,9 @@ pub struct ComparisonReport {
     pub comparison: Comparison,
     pub rule: RuleEnd,
     pub truth: TruthSize,
+    /// At the scene's `record.places`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub places: Vec<Told>,
     /// The scene, its defaults and overrides included.
     pub scene: RawScene,
 }
@@ -101,6 +105,7 @@ impl ComparisonReport {
                 stated_energy_error: Some(truth.error().energy).filter(|error| error.is_finite()),
                 strain_energy: truth.strain_energy(),
             },
+            places: compared.places.clone(),
             scene: scene.raw.clone(),
         }
     }

@@ -9,6 +9,7 @@
 //! | `loads[k].fx`, ... | the same of each load by itself, where there are several |
 //! | `roles[k].ux`, `.uy` | mean displacement of what the entry of `roles` holds |
 //! | `roles[k].fx`, `.fy`, `.moment` | its reaction, and the moment of that about the region's middle at rest |
+//! | `work.loads`, `work.supports` | done since the unloaded body, by the trapezoid rule; empty where steps are swept |
 //! | `strain_energy`, `von_mises` | in all, and the largest of any cell |
 //!
 //! Columns of loads and reactions are there where the scene has such. Units are those of `summary.json`.
@@ -22,6 +23,7 @@ use super::error::ExportError;
 use super::figures::SERIES;
 use super::figures::chart::{Axis, Chart, Series, Style};
 use crate::continuum::forces::Reaction;
+use crate::continuum::mechanics::Work;
 use crate::continuum::record::LoadStep;
 use crate::scene::Scene;
 use crate::scene::units::Units;
@@ -72,7 +74,7 @@ fn header(scene: &Scene, loads: &[Option<usize>], keys: &[&str]) -> Vec<String> 
     for key in keys {
         names.extend(["ux", "uy", "fx", "fy", "moment"].map(|name| format!("{key}.{name}")));
     }
-    names.extend(["strain_energy", "von_mises"].map(str::to_owned));
+    names.extend(["work.loads", "work.supports", "strain_energy", "von_mises"].map(str::to_owned));
     names
 }
 
@@ -97,7 +99,10 @@ fn row(step: &LoadStep, loads: &[Option<usize>], keys: &[&str]) -> Vec<Option<f6
         ]);
     }
     let peak = mechanics.largest_von_mises.as_ref().map(|peak| peak.von_mises);
-    numbers.extend([Some(mechanics.strain_energy), peak]);
+    // The row of the unloaded body comes before any work.
+    let done = mechanics.work_done.or((step.step == 0).then(Work::default));
+    let [by_loads, by_supports] = [done.map(|work| work.loads), done.map(|work| work.supports)];
+    numbers.extend([by_loads, by_supports, Some(mechanics.strain_energy), peak]);
     numbers
 }
 

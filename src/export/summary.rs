@@ -12,6 +12,7 @@ use super::{OutputFolder, bonds};
 use crate::continuum::engine::Engine;
 use crate::continuum::forces::Reaction;
 use crate::continuum::mechanics::{Mechanics, Peak};
+use crate::continuum::places::{AtPlace, at_places};
 use crate::continuum::record::Snapshot;
 use crate::continuum::run::{Outcome, StopReason};
 use crate::flock::role::Role;
@@ -131,6 +132,9 @@ pub struct Measured {
     pub units: Units,
     #[serde(flatten)]
     pub mechanics: Mechanics,
+    /// At the scene's `record.places`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub places: Vec<AtPlace>,
 }
 
 /// What the solver did.
@@ -187,7 +191,11 @@ impl Summary {
             equilibrium: outcome.solved.as_ref().map(Equilibrium::of),
             energies: Energies { pe1, pe2, largest_strain },
             cautions: mechanics.as_ref().map_or_else(Vec::new, |mechanics| mechanics.cautions(engine)),
-            mechanics: mechanics.map(|mechanics| Measured { units: Units::of(scene), mechanics }),
+            mechanics: mechanics.map(|mechanics| Measured {
+                units: Units::of(scene),
+                mechanics,
+                places: at_places(scene, engine),
+            }),
             broken_bonds: broken_bonds(&outcome.engine),
             timings: Seconds {
                 setup_s: timings.setup.as_secs_f64(),
@@ -209,7 +217,7 @@ impl Summary {
 
 impl fmt::Display for Measured {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { units, mechanics } = self;
+        let Self { units, mechanics, places } = self;
         let (force, moment, length) = (&units.force, &units.moment, &units.length);
         // Rounding of the larger component is no number of the smaller one.
         let shown = |value: f64, beside: f64| if value.abs() < 1e-9 * beside.abs() { 0.0 } else { value };
@@ -236,7 +244,14 @@ impl fmt::Display for Measured {
         let work = mechanics.work.map_or_else(String::new, |work| {
             format!("; work of the loads {}, of the supports {}", short(work.loads), short(work.supports))
         });
-        writeln!(f, "strain energy {} {moment}{work}", short(mechanics.strain_energy))?;
+        let done = mechanics.work_done.map_or_else(String::new, |work| {
+            format!(
+                "; done on the way by the loads {}, by the supports {}",
+                short(work.loads),
+                short(work.supports)
+            )
+        });
+        writeln!(f, "strain energy {} {moment}{work}{done}", short(mechanics.strain_energy))?;
         let sizes = mechanics.reactions.iter().map(|reaction| reaction.force);
         let sizes = sizes.chain(mechanics.load.map(|load| load.force)).map(|[x, y]| x.hypot(y));
         let largest = sizes.fold(0.0, f64::max);
@@ -256,6 +271,11 @@ impl fmt::Display for Measured {
             };
             let value = short(*von_mises);
             writeln!(f, "largest von Mises stress {value} {stress}, {in_what} at {} {length}", pair(*place))?;
+        }
+        for AtPlace { place, displacement, stress: [xx, yy, xy], von_mises } in places {
+            let ([xx, yy, xy, von_mises], unit) = ([*xx, *yy, *xy, *von_mises].map(short), &units.stress);
+            let moved = format!("at {} {length}: moved by {} {length}", pair(*place), pair(*displacement));
+            writeln!(f, "{moved}, stress ({xx}, {yy}, {xy}) {unit}, von Mises {von_mises} {unit}")?;
         }
         Ok(())
     }

@@ -9,6 +9,8 @@
 use super::element::{GAUSS_3, Gradient, MAX_NODES, side_shape};
 use super::mesh::Mesh;
 use super::problem::{Problem, along_side};
+use super::solution::Solution;
+use super::strain::Strain;
 
 /// Number of displacement components of the largest cell.
 const MAX_DOFS: usize = 2 * MAX_NODES;
@@ -32,6 +34,26 @@ pub(crate) struct System {
 
 /// Builds the reduced system; `prescribed` as from [`Problem::prescribed`].
 pub(crate) fn assemble(problem: &Problem, prescribed: &[Option<f64>]) -> System {
+    assemble_for(problem, prescribed, &nodal_loads(problem), None)
+}
+
+/// The system of a step from a displacement: its tangent, the forces \[N\] that are left there, shape \[nodes\], and
+/// the steps of prescribed components.
+pub(crate) fn assemble_at(
+    problem: &Problem,
+    steps: &[Option<f64>],
+    left: &[[f64; 2]],
+    at: &Solution,
+) -> System {
+    assemble_for(problem, steps, left, Some(at))
+}
+
+fn assemble_for(
+    problem: &Problem,
+    prescribed: &[Option<f64>],
+    forces: &[[f64; 2]],
+    at: Option<&Solution>,
+) -> System {
     let mut count = 0;
     let mut number = || {
         count += 1;
@@ -39,11 +61,10 @@ pub(crate) fn assemble(problem: &Problem, prescribed: &[Option<f64>]) -> System 
     };
     let unknown: Vec<_> = prescribed.iter().map(|p| p.is_none().then(&mut number)).collect();
     let (starts, rows) = pattern(&problem.mesh, &unknown, count);
-    let forces = nodal_loads(problem);
     let load = (0..unknown.len()).filter(|&c| unknown[c].is_some()).map(|c| forces[c / 2][c % 2]).collect();
     let values = vec![0.0; rows.len()];
     let mut system = System { unknown, starts, rows, values, load };
-    system.add_cells(problem, prescribed);
+    system.add_cells(problem, prescribed, at);
     system
 }
 
@@ -70,15 +91,23 @@ fn pattern(mesh: &Mesh, unknown: &[Option<usize>], count: usize) -> (Vec<usize>,
 }
 
 impl System {
-    fn add_cells(&mut self, problem: &Problem, prescribed: &[Option<f64>]) {
+    fn add_cells(&mut self, problem: &Problem, prescribed: &[Option<f64>], solved: Option<&Solution>) {
         let (mesh, n) = (&problem.mesh, problem.mesh.kind().nodes());
         let rule = mesh.kind().stiffness_rule();
         for cell in 0..mesh.cell_count() {
             let at = mesh.positions(cell);
             let mut k = [[0.0; MAX_DOFS]; MAX_DOFS];
+            let material = problem.inclusions.material(cell, &problem.material);
             for (shape, weight) in &rule.points {
                 let g = shape.gradient(&at[..n]);
-                add_stiffness(&mut k, &g, n, problem.material.stiffness(), weight * g.det);
+                let (d, weight) = (material.stiffness(), weight * g.det);
+                match solved {
+                    None => add_stiffness(&mut k, &g, n, d, weight),
+                    Some(solved) => {
+                        let h = g.of(&solved.of_cell(cell)[..n]);
+                        add_tangent(&mut k, &g, n, &Strain::Stretch.tangent(h, d), weight);
+                    }
+                }
             }
             let mut component = [0; MAX_DOFS];
             for (a, &node) in mesh.cell(cell).iter().enumerate() {
@@ -118,6 +147,17 @@ fn add_stiffness(k: &mut CellMatrix, g: &Gradient, n: usize, d: &[[f64; 3]; 3], 
             k[2 * a + 1][2 * b] += g.dy[a] * sx[1] + g.dx[a] * sx[2];
             k[2 * a][2 * b + 1] += g.dx[a] * sy[0] + g.dy[a] * sy[2];
             k[2 * a + 1][2 * b + 1] += g.dy[a] * sy[1] + g.dx[a] * sy[2];
+        }
+    }
+}
+
+/// Adds `weight` times the second derivatives of the energy density `d`, by the gradient (xx, xy, yx, yy).
+fn add_tangent(k: &mut CellMatrix, g: &Gradient, n: usize, d: &[[f64; 4]; 4], weight: f64) {
+    for (b, j) in (0..n).flat_map(|b| [(b, 0), (b, 1)]) {
+        let (bx, by) = (weight * g.dx[b], weight * g.dy[b]);
+        let s: [f64; 4] = std::array::from_fn(|r| d[r][2 * j] * bx + d[r][2 * j + 1] * by);
+        for (a, i) in (b..n).flat_map(|a| [(a, 0), (a, 1)]) {
+            k[2 * a + i][2 * b + j] += g.dx[a] * s[2 * i] + g.dy[a] * s[2 * i + 1];
         }
     }
 }

@@ -306,15 +306,16 @@ impl Shape {
 }
 
 impl Gradient {
-    /// Strain [exx, eyy, gxy] (engineering shear) of nodal displacements `u`, shape \[nodes\].
-    pub fn strain(&self, u: &[[f64; 2]]) -> [f64; 3] {
-        let mut e = [0.0; 3];
-        for (a, u) in u.iter().enumerate() {
-            e[0] += self.dx[a] * u[0];
-            e[1] += self.dy[a] * u[1];
-            e[2] += self.dy[a] * u[0] + self.dx[a] * u[1];
+    /// Gradient (xx, xy, yx, yy) of nodal displacements `u`, shape \[nodes\].
+    pub fn of(&self, u: &[[f64; 2]]) -> [f64; 4] {
+        let mut h = [0.0; 4];
+        // Relative to the first node: a translation must not cost digits.
+        for (a, v) in u.iter().enumerate() {
+            let u = [v[0] - u[0][0], v[1] - u[0][1]];
+            let [dx, dy] = [self.dx[a], self.dy[a]];
+            h = [h[0] + dx * u[0], h[1] + dy * u[0], h[2] + dx * u[1], h[3] + dy * u[1]];
         }
-        e
+        h
     }
 }
 

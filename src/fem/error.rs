@@ -123,6 +123,15 @@ pub enum FemError {
         /// Ordinate \[m\].
         y: f64,
     },
+    /// A body that turns has no equilibrium, or none that is found on the way, beyond a part of its loads and motions.
+    #[error(
+        "no equilibrium is found beyond {:.1} % of the loads and motions: the body snaps, buckles or is torn there",
+        100.0 * part
+    )]
+    Lost {
+        /// The part up to which there is one \[1\].
+        part: f64,
+    },
     /// The sparse factorisation could not be carried out: the factor does not fit in memory.
     #[error("sparse factorisation of {unknowns} unknowns failed: {reason}")]
     Factorisation {

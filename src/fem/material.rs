@@ -38,6 +38,27 @@ pub struct Material {
     thickness: f64,
 }
 
+/// Parts of a body that are of other materials.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Inclusions {
+    materials: Vec<Material>,
+    /// By cell of the mesh: 0 is none, others count from 1; empty where there are no inclusions.
+    of_cell: Vec<u32>,
+}
+
+impl Inclusions {
+    /// Materials, and by cell of the mesh which of them it is of: 0 is none, others count from 1.
+    pub fn new(materials: Vec<Material>, of_cell: Vec<u32>) -> Self {
+        Self { materials, of_cell }
+    }
+
+    /// What a cell is made of, where `body` is what the body is made of outside its inclusions.
+    pub fn material<'a>(&'a self, cell: usize, body: &'a Material) -> &'a Material {
+        let number = self.of_cell.get(cell).copied().unwrap_or(0);
+        number.checked_sub(1).map_or(body, |k| &self.materials[k as usize])
+    }
+}
+
 /// Stress at a point, components along the axes of the mesh [N/m2].
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Stress {

@@ -47,7 +47,8 @@
 //!
 //! Files: `mesh` and `shapes` (the body), `outline_mesh` with `curves`, `size` and `delaunay` (a mesh of a shape),
 //! `shape_problem` and `shape_solve` (a shape, solved), `element` (shape functions, quadrature), `material`, `problem`
-//! (what is asked), `assemble` and `solve` (K u = f), `solution` and `recover` (what follows), `locate`
+//! (what is asked), `strain` (small, or of bodies that turn), `assemble` and `solve` (K u = f), `newton` (the same where
+//! bodies turn), `solution` and `recover` (what follows), `locate`
 //! (which cell holds a point), `error`.
 
 mod assemble;
@@ -58,6 +59,7 @@ mod error;
 mod locate;
 mod material;
 mod mesh;
+mod newton;
 mod outline_mesh;
 mod problem;
 mod recover;
@@ -67,10 +69,11 @@ mod shapes;
 mod size;
 mod solution;
 mod solve;
+mod strain;
 
 pub use element::CellKind;
 pub use error::FemError;
-pub use material::{Material, Orthotropic, Plane, Stress};
+pub use material::{Inclusions, Material, Orthotropic, Plane, Stress};
 pub use mesh::{Mesh, Side};
 pub use outline_mesh::{MeshRequest, OutlineMesh, OutlineSide};
 pub use problem::{Axis, Fixed, PointForce, Problem, Traction};
@@ -78,3 +81,4 @@ pub use shape_problem::{Field, Holding, PlaneRegion, PortionTraction, ShapeProbl
 pub use shape_solve::{Effort, EstimatedError, Level, Reaction, ShapeSolution, solve_shape};
 pub use solution::Solution;
 pub use solve::solve;
+pub use strain::Strain;

@@ -2,8 +2,9 @@
 
 use super::element::{GAUSS_3, side_shape};
 use super::error::FemError;
-use super::material::Material;
+use super::material::{Inclusions, Material};
 use super::mesh::{Mesh, Side};
+use super::strain::Strain;
 
 /// A displacement component.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -77,7 +78,7 @@ pub(crate) fn along_side(mesh: &Mesh, side: Side, s: f64) -> ([f64; 2], [f64; 2]
     (point, tangent)
 }
 
-/// A plane elastic body in equilibrium, small strain. All lists start empty; the order of their entries
+/// A plane elastic body in equilibrium. All lists start empty; the order of their entries
 /// changes nothing but rounding.
 #[derive(Debug, Clone)]
 pub struct Problem {
@@ -85,6 +86,10 @@ pub struct Problem {
     pub mesh: Mesh,
     /// What it is made of, the same everywhere.
     pub material: Material,
+    /// What counts as strain; loads keep direction and place of application wherever the body turns.
+    pub strain: Strain,
+    /// Cells of other materials; none unless given.
+    pub inclusions: Inclusions,
     /// Prescribed displacements. The same component may appear twice with the same value.
     pub fixed: Vec<Fixed>,
     /// Forces on sides.
@@ -99,7 +104,9 @@ impl Problem {
     /// A body with nothing held and nothing that pulls.
     pub fn new(mesh: Mesh, material: Material) -> Problem {
         let (fixed, tractions, forces) = (Vec::new(), Vec::new(), Vec::new());
-        Problem { mesh, material, fixed, tractions, forces, body_force: [0.0; 2] }
+        let inclusions = Inclusions::default();
+        let strain = Strain::Small;
+        Problem { mesh, material, inclusions, strain, fixed, tractions, forces, body_force: [0.0; 2] }
     }
 
     /// Holds one component of `nodes` at `value` \[m\].

@@ -4,9 +4,10 @@ use std::f64::consts::TAU;
 
 use super::curves::{MERGED, distance};
 use super::error::FemError;
-use super::material::Material;
+use super::material::{Inclusions, Material};
 use super::outline_mesh::OutlineMesh;
 use super::problem::{Fixed, PointForce, Problem, Traction};
+use super::strain::Strain;
 use super::{Axis, Mesh};
 use crate::geometry::outline::{Outline, Piece, Place};
 use crate::geometry::portion::Portion;
@@ -68,11 +69,17 @@ pub struct PortionTraction<'a> {
     pub traction: TractionField<'a>,
 }
 
-/// A plane elastic body in equilibrium at small strain, given by its shape. Where supports overlap the later one
+/// A plane elastic body in equilibrium, given by its shape. Where supports overlap the later one
 /// holds; loads add up.
 pub struct ShapeProblem<'a> {
     pub outline: &'a Outline,
     pub material: Material,
+    /// What counts as strain.
+    pub strain: Strain,
+    /// Parts that are of other materials; the later one counts where they overlap.
+    pub inclusions: Vec<(&'a Outline, Material)>,
+    /// Lines inside the body along which materials meet. They may not overlap.
+    pub interfaces: Vec<Piece>,
     pub supports: Vec<Support<'a>>,
     pub tractions: Vec<PortionTraction<'a>>,
     /// Forces \[N\] at points \[m\]. The displacement has no limit at the point itself.
@@ -89,6 +96,9 @@ impl<'a> ShapeProblem<'a> {
         ShapeProblem {
             outline,
             material,
+            strain: Strain::Small,
+            inclusions: Vec::new(),
+            interfaces: Vec::new(),
             supports: Vec::new(),
             tractions: Vec::new(),
             point_forces: Vec::new(),
@@ -108,7 +118,7 @@ impl<'a> ShapeProblem<'a> {
         self.tractions.push(PortionTraction { on, traction: Box::new(traction) });
     }
 
-    /// Lines that the mesh follows: the edges of regions that are held, and segments.
+    /// Lines that the mesh follows: the edges of inclusions and of regions that are held, and segments.
     pub(crate) fn lines(&self) -> Vec<Piece> {
         let of_support = |support: &Support<'_>| match &support.on {
             Holding::Region(PlaneRegion::Box { min: [a, b], max: [c, d] }) => {
@@ -121,7 +131,7 @@ impl<'a> ShapeProblem<'a> {
             Holding::Segment([from, to]) => vec![Piece::edge(*from, *to)],
             _ => Vec::new(),
         };
-        self.supports.iter().flat_map(of_support).collect()
+        self.interfaces.iter().copied().chain(self.supports.iter().flat_map(of_support)).collect()
     }
 
     /// Ends of portions, with the grading of the mesh there.
@@ -161,7 +171,21 @@ impl<'a> ShapeProblem<'a> {
         let grading = if self.point_forces.len() <= MOST_GRADED { AT_SUPPORT } else { 0.0 };
         let pulled = self.point_forces.iter().map(|&(at, _)| (at, grading));
         let on_body = |(index, (at, grading)): (usize, (Point, f64))| Ok((self.on_body(index, at)?, grading));
-        held.into_iter().map(|at| (at, of_held)).chain(pulled).enumerate().map(on_body).collect()
+        // Stress is singular, though less so, where the edge of an inclusion turns or ends.
+        let corners: Vec<Point> = self
+            .interfaces
+            .iter()
+            .flat_map(|piece| [piece.from, piece.to].into_iter().filter(|_| piece.begins_at_corner))
+            .collect();
+        let of_corners = if corners.len() <= 2 * MOST_GRADED { AT_LOAD } else { 0.0 };
+        let corners = corners.into_iter().map(|at| (at, of_corners));
+        held.into_iter()
+            .map(|at| (at, of_held))
+            .chain(pulled)
+            .chain(corners)
+            .enumerate()
+            .map(on_body)
+            .collect()
     }
 
     /// The place of the body that a point stands for.
@@ -183,6 +207,7 @@ impl<'a> ShapeProblem<'a> {
     /// or a held point outside the body.
     pub(crate) fn on_mesh(&self, mesh: &OutlineMesh) -> Result<(Problem, Holders), FemError> {
         let mut problem = Problem::new(mesh.mesh().clone(), self.material);
+        problem.inclusions = self.inclusions_on(mesh.mesh());
         let mut holder = vec![[None; 2]; mesh.mesh().node_count()];
         for (number, support) in self.supports.iter().enumerate() {
             let nodes = self.nodes(number, &support.on, mesh)?;
@@ -217,8 +242,23 @@ impl<'a> ShapeProblem<'a> {
                 self.node_at(mesh.mesh(), at).ok_or(FemError::OutsideMesh { index, x: at[0], y: at[1] })?;
             problem.forces.push(PointForce { node: node as u32, force });
         }
-        problem.body_force = self.body_force;
+        (problem.body_force, problem.strain) = (self.body_force, self.strain);
         Ok((problem, holder))
+    }
+
+    /// Which cells are of other materials, by the middle of each.
+    fn inclusions_on(&self, mesh: &Mesh) -> Inclusions {
+        if self.inclusions.is_empty() {
+            return Inclusions::default();
+        }
+        let of_cell = |cell: usize| {
+            let at = mesh.positions(cell);
+            let middle = [0, 1].map(|k| (at[0][k] + at[1][k] + at[2][k]) / 3.0);
+            let last = (0..self.inclusions.len()).rev().find(|&k| self.inclusions[k].0.contains(middle));
+            last.map_or(0, |k| k as u32 + 1)
+        };
+        let materials = self.inclusions.iter().map(|(_, material)| *material).collect();
+        Inclusions::new(materials, (0..mesh.cell_count()).map(of_cell).collect())
     }
 
     /// Whether the middle of a stretch of a piece lies in one of the portions.

@@ -10,10 +10,12 @@ use std::collections::BTreeMap;
 use super::error::FemError;
 use super::locate::invert;
 use super::material::Stress;
+use super::mesh::Mesh;
 use super::outline_mesh::{MeshRequest, OutlineMesh};
 use super::shape_problem::ShapeProblem;
 use super::solution::Solution;
-use super::solve::solve;
+use super::solve::solve_near;
+use super::strain::Strain;
 
 type Point = [f64; 2];
 
@@ -79,17 +81,47 @@ pub struct ShapeSolution {
 /// # Errors
 /// What keeps the shape from being meshed ([`FemError::Unmeshable`], [`FemError::InvertedCell`]); a support
 /// without a node ([`FemError::EmptySupport`]), a point outside ([`FemError::OutsideMesh`]); a body that is not
-/// held ([`FemError::Unheld`], [`FemError::Soft`]); input that is not finite; memory.
+/// held ([`FemError::Unheld`], [`FemError::Soft`]) or, if it turns, has no equilibrium ([`FemError::Lost`]); input that is
+/// not finite; memory.
 pub fn solve_shape(problem: &ShapeProblem<'_>, effort: &Effort) -> Result<ShapeSolution, FemError> {
-    let (lines, places, points) = (problem.lines(), problem.places(), problem.points()?);
+    match refine(problem, effort, true) {
+        Err(FemError::Lost { .. }) => refine(problem, effort, false),
+        found => found,
+    }
+}
+
+/// Stress has no bound where a clamp ends. Cells that bear a finite one at most, as those of bodies that turn do, are crushed
+/// there by a large load as soon as they are small enough: then the finest mesh is taken on which none is, and meshes
+/// that are not graded towards such places have more of these.
+fn refine(problem: &ShapeProblem<'_>, effort: &Effort, is_graded: bool) -> Result<ShapeSolution, FemError> {
+    let (lines, mut places, mut points) = (problem.lines(), problem.places(), problem.points()?);
+    if !is_graded {
+        places.iter_mut().for_each(|(_, grading)| *grading = 0.0);
+        points.iter_mut().for_each(|(_, grading)| *grading = 0.0);
+    }
     let request = MeshRequest { lines: &lines, places: &places, points: &points, cells: effort.cells };
     let mut mesh = OutlineMesh::new(problem.outline, &request)?;
     let mut levels: Vec<Level> = Vec::new();
-    let mut last: Option<Solution> = None;
+    let mut last: Option<(Solution, Vec<Reaction>)> = None;
+    let solved = |(solution, reactions), levels: Vec<Level>| {
+        let error = estimate(&levels);
+        ShapeSolution { solution, levels, error, reactions, reach: problem.reach }
+    };
     loop {
         let (on_mesh, holder) = problem.on_mesh(&mesh)?;
-        let solution = solve(&on_mesh).map_err(|error| at_place(error, &mesh))?;
-        let change = last.as_ref().map_or(0.0, |coarse| change(coarse, &solution));
+        let turns = problem.strain == Strain::Stretch;
+        let start = last.as_ref().filter(|_| turns).map(|(coarse, _)| carried(coarse, &on_mesh.mesh));
+        let solution = match (solve_near(&on_mesh, start), last) {
+            (Err(FemError::Lost { .. }), Some(coarser)) if levels.len() >= 2 => {
+                return Ok(solved(coarser, levels));
+            }
+            (found, coarser) => {
+                last = coarser;
+                found.map_err(|error| at_place(error, &mesh))?
+            }
+        };
+        let change = last.as_ref().map_or(0.0, |(coarse, _)| change(coarse, &solution));
+        let reactions = reactions(problem.supports.len(), &on_mesh, &holder, &solution);
         levels.push(Level { nodes: mesh.mesh().node_count(), energy: solution.strain_energy(), change });
         let error = estimate(&levels);
         let is_enough = levels.len() >= 3 && error.displacement <= effort.target;
@@ -97,11 +129,10 @@ pub fn solve_shape(problem: &ShapeProblem<'_>, effort: &Effort) -> Result<ShapeS
         let is_large = mesh.mesh().node_count() > effort.most_nodes;
         let is_all = is_large || levels.len() >= 3 && 4 * mesh.mesh().node_count() > effort.most_nodes;
         if is_enough || is_all {
-            let reactions = reactions(problem.supports.len(), &on_mesh, &holder, &solution);
-            return Ok(ShapeSolution { solution, levels, error, reactions, reach: problem.reach });
+            return Ok(solved((solution, reactions), levels));
         }
         mesh = mesh.refined()?;
-        last = Some(solution);
+        last = Some((solution, reactions));
     }
 }
 
@@ -121,7 +152,23 @@ fn at_place(error: FemError, mesh: &OutlineMesh) -> FemError {
     }
 }
 
-/// Relative L2 distance of two levels: cell k of the coarse one became the cells 4k to 4k + 3 of the fine one.
+/// A displacement at the components of the next finer mesh: cell k of the coarse one became the cells 4k to 4k + 3 of
+/// that.
+fn carried(coarse: &Solution, mesh: &Mesh) -> Vec<f64> {
+    let mut u = vec![0.0; 2 * mesh.node_count()];
+    for cell in 0..mesh.cell_count() {
+        let before = coarse.of_cell(cell / 4);
+        for (&node, p) in mesh.cell(cell).iter().zip(mesh.positions(cell)) {
+            if let Some(place) = invert(coarse.mesh(), cell / 4, p) {
+                let at = mesh.kind().shape(place).interpolate(&before[..mesh.kind().nodes()]);
+                u[2 * node as usize..][..2].copy_from_slice(&at);
+            }
+        }
+    }
+    u
+}
+
+/// Relative L2 distance of two levels.
 fn change(coarse: &Solution, fine: &Solution) -> f64 {
     let (mesh, rule) = (fine.mesh(), fine.mesh().kind().stress_rule());
     let (mut off, mut size) = (0.0, 0.0);
@@ -178,7 +225,12 @@ fn reactions(
     let (forces, loads) = (solution.nodal_forces(), super::assemble::nodal_loads(problem));
     let mut reactions = vec![Reaction::default(); supports];
     for (node, holders) in holder.iter().enumerate() {
-        let lever = [-solution.mesh().y()[node], solution.mesh().x()[node]];
+        // Loads on a body that turns act where it has them go.
+        let [x, y] = match problem.strain {
+            Strain::Small => [0.0; 2],
+            Strain::Stretch => [solution.ux()[node], solution.uy()[node]],
+        };
+        let lever = [-solution.mesh().y()[node] - y, solution.mesh().x()[node] + x];
         for axis in 0..2 {
             if let Some(support) = holders[axis] {
                 let force = forces[node][axis] - loads[node][axis];

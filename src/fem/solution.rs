@@ -3,14 +3,17 @@
 use super::element::{Gradient, Rule, Shape};
 use super::error::FemError;
 use super::locate::Locator;
-use super::material::{Material, Stress};
+use super::material::{Inclusions, Material, Stress};
 use super::mesh::Mesh;
+use super::strain::Strain;
 
 /// A displacement field on a mesh with its material.
 #[derive(Debug, Clone)]
 pub struct Solution {
     mesh: Mesh,
     material: Material,
+    strain: Strain,
+    inclusions: Inclusions,
     ux: Vec<f64>,
     uy: Vec<f64>,
 }
@@ -37,7 +40,19 @@ impl Solution {
         if let Some(index) = (0..ux.len()).find(|&i| !(ux[i].is_finite() && uy[i].is_finite())) {
             return Err(FemError::NotFinite { what: "displacement of node", index });
         }
-        Ok(Solution { mesh, material, ux, uy })
+        let (strain, inclusions) = (Strain::Small, Inclusions::default());
+        Ok(Solution { mesh, material, strain, inclusions, ux, uy })
+    }
+
+    /// The same displacements, another strain.
+    pub fn with_strain(self, strain: Strain) -> Solution {
+        Solution { strain, ..self }
+    }
+
+    /// What counts as strain. Of stretches, strain and stress are those in axes that turn with the body, from the
+    /// mesh's.
+    pub fn strain(&self) -> Strain {
+        self.strain
     }
 
     /// The undeformed mesh.
@@ -45,7 +60,17 @@ impl Solution {
         &self.mesh
     }
 
-    /// The material.
+    /// The same field where some cells are of other materials.
+    pub(super) fn with_inclusions(self, inclusions: Inclusions) -> Self {
+        Solution { inclusions, ..self }
+    }
+
+    /// What a cell is made of.
+    fn material_of(&self, cell: usize) -> &Material {
+        self.inclusions.material(cell, &self.material)
+    }
+
+    /// The material, outside inclusions.
     pub fn material(&self) -> &Material {
         &self.material
     }
@@ -159,28 +184,42 @@ impl Solution {
         let kind = self.mesh.kind();
         let shape = kind.shape(kind.reference_nodes()[local]);
         let (n, at, u) = (kind.nodes(), self.mesh.positions(cell), self.of_cell(cell));
-        self.material.stress(shape.gradient(&at[..n]).strain(&u[..n]))
+        self.material_of(cell).stress(self.strain.of(shape.gradient(&at[..n]).of(&u[..n])))
     }
 
     /// Elastic energy \[J\]: half the integral of stress times strain over the volume.
     pub fn strain_energy(&self) -> f64 {
         let mut sum = 0.0;
-        self.for_each_point(|_, _, strain, stress, volume| {
+        self.for_each_point(|cell, _, h, volume| {
+            let strain = self.strain.of(h);
+            let stress = self.material_of(cell).stress(strain);
             let work = stress.xx * strain[0] + stress.yy * strain[1] + stress.xy * strain[2];
             sum += 0.5 * volume * work;
         });
         sum
     }
 
-    /// Force that must act on each node to keep this displacement, K u \[N\], shape \[nodes\]: the applied
+    /// How far the surroundings of each quadrature point are turned \[rad\], in an order that depends on the mesh alone.
+    pub(crate) fn turns(&self) -> Vec<f64> {
+        let mut turns = Vec::new();
+        self.for_each_point(|_, _, h, _| turns.push(Strain::turn(h)));
+        turns
+    }
+
+    /// Force that must act on each node to keep this displacement \[N\], shape \[nodes\]: the applied
     /// load at free nodes, load plus reaction at held ones.
     pub fn nodal_forces(&self) -> Vec<[f64; 2]> {
         let mut force = vec![[0.0; 2]; self.mesh.node_count()];
-        self.for_each_point(|cell, gradient, _, s, volume| {
+        self.for_each_point(|cell, gradient, h, volume| {
+            let (stress, slope) = (self.material_of(cell).stress(self.strain.of(h)), self.strain.slope(h));
+            // Energy by gradient: the first stress of G. Piola and G. Kirchhoff.
+            let p: [f64; 4] = std::array::from_fn(|i| {
+                volume * (slope[0][i] * stress.xx + slope[1][i] * stress.yy + slope[2][i] * stress.xy)
+            });
             for (a, &node) in self.mesh.cell(cell).iter().enumerate() {
-                let (dx, dy) = (volume * gradient.dx[a], volume * gradient.dy[a]);
-                force[node as usize][0] += dx * s.xx + dy * s.xy;
-                force[node as usize][1] += dy * s.yy + dx * s.xy;
+                let (dx, dy) = (gradient.dx[a], gradient.dy[a]);
+                force[node as usize][0] += dx * p[0] + dy * p[1];
+                force[node as usize][1] += dx * p[2] + dy * p[3];
             }
         });
         force
@@ -214,24 +253,18 @@ impl Solution {
     /// Stress at the points of `rule` in one cell.
     pub(crate) fn stress_in(&self, cell: usize, rule: &Rule) -> impl Iterator<Item = Stress> {
         let (n, at, u) = (self.mesh.kind().nodes(), self.mesh.positions(cell), self.of_cell(cell));
-        rule.points.iter().map(move |(s, _)| self.material.stress(s.gradient(&at[..n]).strain(&u[..n])))
+        let strain = move |s: &Shape| self.strain.of(s.gradient(&at[..n]).of(&u[..n]));
+        rule.points.iter().map(move |(s, _)| self.material_of(cell).stress(strain(s)))
     }
 
-    /// Calls `visit(cell, gradient, strain, stress, volume)` at every stiffness quadrature point.
-    fn for_each_point(&self, mut visit: impl FnMut(usize, &Gradient, [f64; 3], Stress, f64)) {
+    /// Calls `visit(cell, gradient, gradient of the displacement, volume)` at every stiffness quadrature point.
+    fn for_each_point(&self, mut visit: impl FnMut(usize, &Gradient, [f64; 4], f64)) {
         let (n, rule) = (self.mesh.kind().nodes(), self.mesh.kind().stiffness_rule());
         for cell in 0..self.mesh.cell_count() {
             let (at, u) = (self.mesh.positions(cell), self.of_cell(cell));
             for (shape, weight) in &rule.points {
                 let g = shape.gradient(&at[..n]);
-                let strain = g.strain(&u[..n]);
-                visit(
-                    cell,
-                    &g,
-                    strain,
-                    self.material.stress(strain),
-                    self.material.thickness() * weight * g.det,
-                );
+                visit(cell, &g, g.of(&u[..n]), self.material.thickness() * weight * g.det);
             }
         }
     }

@@ -2,9 +2,10 @@
 //! and the detection of bodies that are not held.
 
 use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::cholesky::ldlt::factor::{LdltError, LdltRegularization};
 use faer::linalg::cholesky::llt::factor::LltError;
 use faer::sparse::linalg::cholesky::{
-    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
+    CholeskySymbolicParams, LdltRef, LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
 };
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, MatMut, Par, Side};
@@ -12,8 +13,10 @@ use faer::{Conj, MatMut, Par, Side};
 use super::assemble::{System, assemble};
 use super::error::FemError;
 use super::mesh::Mesh;
+use super::newton::solve_turning;
 use super::problem::Problem;
 use super::solution::Solution;
+use super::strain::Strain;
 
 /// Below this ratio of the softest motion's stiffness to the stiffness of the single components, at most
 /// two digits of the answer would be left: the matrix counts as singular.
@@ -27,11 +30,21 @@ const SINGULAR: f64 = 1e-14;
 /// # Errors
 /// [`FemError::NoSuch`], [`FemError::NotFinite`] and [`FemError::Conflict`] for input that makes no
 /// sense; [`FemError::Mechanism`] for a part that rigid motion leaves free; [`FemError::Singular`] for
-/// parts that hang together by hinges; [`FemError::Factorisation`] if memory does not suffice.
+/// parts that hang together by hinges; [`FemError::Lost`] for a body that turns and has no equilibrium under all of its
+/// loads; [`FemError::Factorisation`] if memory does not suffice.
 pub fn solve(problem: &Problem) -> Result<Solution, FemError> {
+    solve_near(problem, None)
+}
+
+/// The same for a body of which displacements near its equilibrium are known \[m\], shape [2 * nodes], which helps where
+/// it turns.
+pub(crate) fn solve_near(problem: &Problem, start: Option<Vec<f64>>) -> Result<Solution, FemError> {
     problem.check()?;
     let prescribed = problem.prescribed()?;
     check_rigid_motion(&problem.mesh, &prescribed)?;
+    if problem.strain == Strain::Stretch {
+        return solve_turning(problem, &prescribed, start);
+    }
     let system = assemble(problem, &prescribed);
     let unknowns = if system.load.is_empty() { Vec::new() } else { solve_reduced(&system)? };
     let component = |c: usize| match system.unknown[c] {
@@ -41,7 +54,8 @@ pub fn solve(problem: &Problem) -> Result<Solution, FemError> {
     let nodes = 0..problem.mesh.node_count();
     let ux = nodes.clone().map(|i| component(2 * i)).collect();
     let uy = nodes.map(|i| component(2 * i + 1)).collect();
-    Solution::from_displacements(problem.mesh.clone(), problem.material, ux, uy)
+    let solution = Solution::from_displacements(problem.mesh.clone(), problem.material, ux, uy)?;
+    Ok(solution.with_inclusions(problem.inclusions.clone()))
 }
 
 /// A part (cells joined through nodes) is held if x and y are prescribed somewhere in it, and if no point
@@ -99,17 +113,29 @@ struct Factor {
     symbolic: SymbolicCholesky<usize>,
     values: Vec<f64>,
     memory: MemBuffer,
+    is_definite: bool,
 }
 
 fn solve_reduced(system: &System) -> Result<Vec<f64>, FemError> {
-    let mut factor = factorise(system)?;
+    let mut factor = factorise(system, true)?;
     check_softest_motion(system, &mut factor)?;
     let mut u = system.load.clone();
     factor.solve(&mut u);
     Ok(u)
 }
 
-fn factorise(system: &System) -> Result<Factor, FemError> {
+/// The same for a tangent that need not be positive definite: where a clamp ends, the stress of a fine mesh passes what
+/// any material bears, and a few cells there give way.
+pub(crate) fn solve_tangent(system: &System) -> Result<Vec<f64>, FemError> {
+    let mut u = system.load.clone();
+    if !u.is_empty() {
+        factorise(system, false)?.solve(&mut u);
+    }
+    Ok(u)
+}
+
+/// L L' of a positive definite matrix, else L D L' without pivots.
+fn factorise(system: &System, is_definite: bool) -> Result<Factor, FemError> {
     let n = system.load.len();
     let failed = |e: &dyn std::fmt::Debug| FemError::Factorisation { unknowns: n, reason: format!("{e:?}") };
     let pattern = SymbolicSparseColMatRef::new_checked(n, n, &system.starts, None, &system.rows);
@@ -120,37 +146,56 @@ fn factorise(system: &System) -> Result<Factor, FemError> {
     let mut values = Vec::new();
     values.try_reserve_exact(symbolic.len_val()).map_err(|e| failed(&e))?;
     values.resize(symbolic.len_val(), 0.0);
-    let need = symbolic
-        .factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default())
-        .or(symbolic.solve_in_place_scratch::<f64>(1, Par::Seq));
+    let need = match is_definite {
+        true => symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default()),
+        false => symbolic.factorize_numeric_ldlt_scratch::<f64>(Par::Seq, Default::default()),
+    };
+    let need = need.or(symbolic.solve_in_place_scratch::<f64>(1, Par::Seq));
     let mut memory = MemBuffer::try_new(need).map_err(|e| failed(&e))?;
-    symbolic
-        .factorize_numeric_llt(
-            &mut values,
-            matrix,
-            Side::Lower,
-            Default::default(),
-            Par::Seq,
-            MemStack::new(&mut memory),
-            Default::default(),
-        )
-        .map_err(|LltError::NonPositivePivot { index }| {
-            let unknown = symbolic.perm().map_or(index, |p| p.arrays().0[index]);
-            FemError::Singular { node: node_of(system, unknown) }
-        })?;
-    Ok(Factor { symbolic, values, memory })
+    let (stack, side) = (MemStack::new(&mut memory), Side::Lower);
+    let at = match is_definite {
+        true => {
+            let done = symbolic.factorize_numeric_llt(
+                &mut values,
+                matrix,
+                side,
+                Default::default(),
+                Par::Seq,
+                stack,
+                Default::default(),
+            );
+            done.err().map(|LltError::NonPositivePivot { index }| index)
+        }
+        false => {
+            let done = symbolic.factorize_numeric_ldlt(
+                &mut values,
+                matrix,
+                side,
+                LdltRegularization::default(),
+                Par::Seq,
+                stack,
+                Default::default(),
+            );
+            done.err().map(|LdltError::ZeroPivot { index }| index)
+        }
+    };
+    if let Some(index) = at {
+        let unknown = symbolic.perm().map_or(index, |p| p.arrays().0[index]);
+        return Err(FemError::Singular { node: node_of(system, unknown) });
+    }
+    Ok(Factor { symbolic, values, memory, is_definite })
 }
 
 impl Factor {
     /// Overwrites `rhs` with the solution.
     fn solve(&mut self, rhs: &mut [f64]) {
         let n = rhs.len();
-        LltRef::new(&self.symbolic, &self.values).solve_in_place_with_conj(
-            Conj::No,
-            MatMut::from_column_major_slice_mut(rhs, n, 1),
-            Par::Seq,
-            MemStack::new(&mut self.memory),
-        );
+        let rhs = MatMut::from_column_major_slice_mut(rhs, n, 1);
+        let (symbolic, values, stack) = (&self.symbolic, &self.values[..], MemStack::new(&mut self.memory));
+        match self.is_definite {
+            true => LltRef::new(symbolic, values).solve_in_place_with_conj(Conj::No, rhs, Par::Seq, stack),
+            false => LdltRef::new(symbolic, values).solve_in_place_with_conj(Conj::No, rhs, Par::Seq, stack),
+        }
     }
 }
 

@@ -2,8 +2,7 @@
 //! other again, and ghosts stand in for what was lost.
 
 #[cfg(test)]
-mod tests;
-pub mod torn;
+pub(crate) mod tests;
 mod watch;
 
 use super::neighbourhood::Neighbours;
@@ -77,7 +76,7 @@ pub struct Bonds {
 
 /// Where a particle sees the ghost of a neighbour.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum StandIn {
+pub(crate) enum StandIn {
     /// At this offset from its own place \[length\].
     Offset([f64; 2]),
     /// Opposite to this particle.
@@ -242,7 +241,7 @@ impl Bonds {
         })
     }
 
-    fn stand_in(
+    pub(crate) fn stand_in(
         &self,
         j: usize,
         bond: usize,

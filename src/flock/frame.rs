@@ -7,12 +7,9 @@
 //! `Mirror` continues the body beyond its edge by serving the particle opposite across that
 //! nearest one, so that the edge sees what an interior particle would.
 
-use std::ops::Range;
-
 use super::lattice::{Lattice, Site};
 use super::points::Points;
 use super::real::Real;
-use super::stencil::Plane;
 
 /// Whom a frame point serves, and when it looks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -89,7 +86,7 @@ impl Frame {
     }
 
     /// Mean of a number that belongs to each particle which frame point number `k` serves.
-    fn mean_of_served<T: Real>(&self, k: usize, of: impl Fn(usize) -> T) -> T {
+    pub fn mean_of_served<T: Real>(&self, k: usize, of: impl Fn(usize) -> T) -> T {
         let served = self.served_by(k);
         let mut sum = T::default();
         served.iter().for_each(|&s| sum += of(s as usize));
@@ -108,20 +105,6 @@ impl Frame {
             self.served_by(k).iter().map(|&s| s.abs_diff(self.points[k]) as usize).max().unwrap_or(0)
         };
         (0..self.len()).map(farthest).max().unwrap_or(0)
-    }
-
-    /// One coordinate of what [`Frame::follow`] does for the frame points among some particles, by a rule that looks
-    /// before the sweep; `reference` is that coordinate of the whole body.
-    pub fn follow_plane<T: Real>(&self, particles: Range<usize>, reference: &[T], plane: &mut Plane<'_, T>) {
-        let from = self.points.partition_point(|&point| (point as usize) < particles.start);
-        for (k, &point) in self.points.iter().enumerate().skip(from) {
-            let point = point as usize;
-            if point >= particles.end {
-                break;
-            }
-            let moved = |s: usize| plane.present[s - plane.seen_from] - reference[s];
-            plane.next[point - plane.begin] = reference[point] + self.mean_of_served(k, moved);
-        }
     }
 
     /// Moves every frame point of `next` by the displacements seen in `before`, the positions before

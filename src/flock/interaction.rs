@@ -174,8 +174,8 @@ impl Interaction {
                 let seen = self.neighbours.of(particle).iter().map(|&k| present.get(k as usize));
                 rule.target_of_material(&own, weights.of(particle).iter().copied().zip(seen))
             }
-            // A plain mean looks at places alone: the same bits without fetching the rest.
-            (None, Weights::Equal) if rule.mean == Mean::Barycentre => {
+            // Without weights a mean looks at places alone: the same bits without fetching the rest.
+            (None, Weights::Equal) => {
                 let seen = self.neighbours.of(particle).iter().map(|&k| present.get(k as usize));
                 rule.target(&own, seen.map(Neighbour::at))
             }

@@ -2,7 +2,9 @@
 //!
 //! Lengths are in the unit of the shape's description, in the world frame; angles in radians, counter-clockwise.
 
+pub mod meeting;
 pub mod outline;
+pub mod partition;
 pub mod portion;
 pub mod shape;
 pub mod specimen;

@@ -208,6 +208,13 @@ impl Piece {
         chord + segment
     }
 
+    /// The part between two shares of the way along.
+    pub fn part(&self, [begin, end]: [f64; 2]) -> Self {
+        let part =
+            |arc: Arc| Arc { start: arc.start + begin * arc.sweep, sweep: (end - begin) * arc.sweep, ..arc };
+        Self { from: self.point(begin), to: self.point(end), arc: self.arc.map(part), ..*self }
+    }
+
     fn reversed(&self) -> Self {
         let arc = self.arc.map(|arc| Arc { start: arc.start + arc.sweep, sweep: -arc.sweep, ..arc });
         Self { from: self.to, to: self.from, arc, ..*self }
@@ -256,16 +263,19 @@ impl Outline {
         Ok(outline)
     }
 
+    /// The same outline, its pieces divided.
+    pub(super) fn with_rings(&self, rings: Vec<Vec<Piece>>) -> Self {
+        Self { rings }
+    }
+
     /// Loops of pieces, the outer one first, shape \[loops\].
     pub fn rings(&self) -> &[Vec<Piece>] {
         &self.rings
     }
 
     /// Every piece with the number of its loop and its own.
-    pub fn pieces<'a>(&'a self) -> impl Iterator<Item = (usize, usize, &'a Piece)> {
-        let of_ring =
-            |(r, ring): (usize, &'a Vec<Piece>)| ring.iter().enumerate().map(move |(p, piece)| (r, p, piece));
-        self.rings.iter().enumerate().flat_map(of_ring)
+    pub fn pieces(&self) -> impl Iterator<Item = (usize, usize, &Piece)> {
+        numbered(&self.rings)
     }
 
     pub fn piece(&self, ring: usize, piece: usize) -> &Piece {
@@ -426,6 +436,12 @@ fn folds_back(a: [Point; 2], b: [Point; 2], near: f64) -> bool {
     a.iter().any(|&p| reaches(p, b)) || b.iter().any(|&p| reaches(p, a))
 }
 
+/// Every piece of some loops or lines with the number of its loop and its own.
+pub(super) fn numbered(rings: &[Vec<Piece>]) -> impl Iterator<Item = (usize, usize, &Piece)> {
+    let of_ring = |(r, ring): (usize, &'_ Vec<Piece>)| (0..ring.len()).map(move |p| (r, p));
+    rings.iter().enumerate().flat_map(of_ring).map(|(r, p)| (r, p, &rings[r][p]))
+}
+
 /// Whether closed loops of pieces go around `p` an odd number of times.
 pub fn is_inside<'a>(pieces: impl Iterator<Item = &'a Piece>, p: Point) -> bool {
     let changes = |piece: &Piece| u8::from(crosses_ray(piece, p)) + u8::from(is_in_segment(piece, p));
@@ -554,7 +570,7 @@ fn minus(a: Point, b: Point) -> Point {
     [a[0] - b[0], a[1] - b[1]]
 }
 
-fn distance(a: Point, b: Point) -> f64 {
+pub(super) fn distance(a: Point, b: Point) -> f64 {
     (a[0] - b[0]).hypot(a[1] - b[1])
 }
 

@@ -32,6 +32,11 @@ pub struct Cells {
     pub shapes: Vec<Vec<[f64; 2]>>,
     /// How many of the shapes are whole cells; those after them are polygons that an outline has cut.
     pub whole: usize,
+    /// Which region of the body the cells of each kind lie in, shape \[kinds\]: 0 is of the body's own material, those after
+    /// it are of `inclusions`.
+    pub region: Vec<u32>,
+    /// Materials of regions 1 and on, shape \[regions - 1\].
+    pub inclusions: Vec<Elastic>,
 }
 
 /// A corner of cells at a particle: which cells, and the particle's place among their corners.
@@ -62,8 +67,7 @@ impl Cells {
     /// All cells whose corners `lookup` knows, in the order of `sites`.
     pub fn of_sites(lattice: &Lattice, sites: &[Site], lookup: impl Fn(Site) -> Option<u32>) -> Self {
         let templates = templates(lattice);
-        let shape = |t: &Vec<Site>| t.iter().map(|&corner| lattice.vector(corner)).collect();
-        let mut cells = Self::of_kinds(templates.iter().map(shape).collect());
+        let mut cells = Self::of_lattice(lattice, 1);
         let mut found = Vec::new();
         for &[i, j] in sites.iter().filter(|&&site| lattice.sublattice(site) == 0) {
             for (kind, template) in templates.iter().enumerate() {
@@ -87,12 +91,38 @@ impl Cells {
                 cell.iter().map(relative).collect()
             })
             .collect();
-        Self { kind: (0..self.count() as u32).collect(), whole: shapes.len(), shapes, ..self.clone() }
+        let region = self.kind.iter().map(|&kind| self.region[kind as usize]).collect();
+        Self { kind: (0..self.count() as u32).collect(), whole: shapes.len(), shapes, region, ..self.clone() }
+    }
+
+    /// No cells yet, of the kinds that a lattice has: the cells that belong to a site, in each of so many regions.
+    pub fn of_lattice(lattice: &Lattice, regions: usize) -> Self {
+        let shape = |t: &Vec<Site>| t.iter().map(|&corner| lattice.vector(corner)).collect();
+        let shapes: Vec<Vec<[f64; 2]>> = templates(lattice).iter().map(shape).collect();
+        let region = (0..regions as u32).flat_map(|region| vec![region; shapes.len()]).collect();
+        let shapes = (0..regions).flat_map(|_| shapes.clone()).collect();
+        Self { region, ..Self::of_kinds(shapes) }
+    }
+
+    /// A kind of cells that an outline has cut: corners relative to the first \[length\].
+    pub fn add_kind(&mut self, shape: Vec<[f64; 2]>, region: usize) -> u32 {
+        self.shapes.push(shape);
+        self.region.push(region as u32);
+        self.shapes.len() as u32 - 1
     }
 
     /// No cells yet, of these kinds: corners relative to the first \[length\], shape \[kinds, corners of the kind\].
     pub fn of_kinds(shapes: Vec<Vec<[f64; 2]>>) -> Self {
-        Self { starts: vec![0], index: Vec::new(), kind: Vec::new(), whole: shapes.len(), shapes }
+        let region = vec![0; shapes.len()];
+        Self {
+            starts: vec![0],
+            index: Vec::new(),
+            kind: Vec::new(),
+            whole: shapes.len(),
+            shapes,
+            region,
+            inclusions: Vec::new(),
+        }
     }
 
     /// Stiffness of the cells of a kind \[force / length\]: what each has to itself in this material; see
@@ -101,7 +131,44 @@ impl Cells {
     /// # Errors
     /// As [`element`](super::stiffness::element).
     pub fn element(&self, kind: usize, elastic: &Elastic) -> Result<DMatrix<f64>, ShapeError> {
-        element_of(&self.shapes[kind], elastic, kind >= self.whole)
+        element_of(&self.shapes[kind], self.material(kind, elastic), kind >= self.whole)
+    }
+
+    /// What the cells of a kind are made of, where `body` is what the body is made of outside its inclusions.
+    pub fn material<'a>(&'a self, kind: usize, body: &'a Elastic) -> &'a Elastic {
+        self.material_of_region(self.region[kind], body)
+    }
+
+    /// What a region is made of.
+    pub fn material_of_region<'a>(&'a self, region: u32, body: &'a Elastic) -> &'a Elastic {
+        region.checked_sub(1).map_or(body, |k| &self.inclusions[k as usize])
+    }
+
+    /// The region that a cell lies in.
+    pub fn region_of(&self, cell: usize) -> u32 {
+        self.region[self.kind[cell] as usize]
+    }
+
+    /// What a cell is made of.
+    pub fn material_of<'a>(&'a self, cell: usize, body: &'a Elastic) -> &'a Elastic {
+        self.material(self.kind[cell] as usize, body)
+    }
+
+    /// Whether dilatations are averaged over cells anywhere ([`Elastic::averaged_dilatation`]).
+    pub fn average_dilatations(&self, body: &Elastic) -> bool {
+        std::iter::once(body).chain(&self.inclusions).any(|part| part.averaged_dilatation().is_some())
+    }
+
+    /// Divides whole cells of a lattice into regions, by the middle of each \[length\].
+    pub fn divide(&mut self, reference: &Points, regions: usize, region: impl Fn([f64; 2]) -> usize) {
+        let kinds = self.shapes.len();
+        let centres = self.centroids(reference);
+        for (kind, centre) in self.kind.iter_mut().zip(centres.iter()) {
+            *kind += (region(centre) * kinds) as u32;
+        }
+        self.shapes = (0..regions).flat_map(|_| self.shapes.clone()).collect();
+        self.region = (0..regions as u32).flat_map(|region| vec![region; kinds]).collect();
+        self.whole = self.shapes.len();
     }
 
     /// The part of a load per area that falls to each corner of the cells of a kind \[length^2\]; see [`load_shares`].
@@ -164,7 +231,7 @@ impl Cells {
     /// with, and where dilatations are averaged over cells ([`Elastic::averaged_dilatation`]) their mates as well.
     pub fn neighbours(&self, particles: usize, elastic: &Elastic) -> Neighbours {
         let mates = self.mates(particles);
-        if elastic.averaged_dilatation().is_none() {
+        if !self.average_dilatations(elastic) {
             return mates;
         }
         Neighbours::from_lists((0..particles).map(|i| {

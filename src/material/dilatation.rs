@@ -16,7 +16,8 @@
 //! slice bent by its end, hexagonal, nine rows, relative L2 of the displacement at nu = 0.49, 0.499, 0.4999: 2.8, 3.6,
 //! 8.4 %; without the patches of the edge 2.5, 2.6, 2.6 %. It also rids led edges of pressures that alternate.
 //!
-//! The cells around a particle are averaged as far as they are of one material: across an interface the dilatation jumps.
+//! The cells around a particle are averaged as far as they are of one material: across an interface the dilatation jumps, and
+//! to either side the interface is an edge.
 //! See [`Elastic::averaged_dilatation`] for the source and for when this is done.
 
 use super::cells::{Cells, Incidence};
@@ -28,22 +29,45 @@ use super::stiffness::area;
 pub struct Patches<'a> {
     cells: &'a Cells,
     incidence: &'a Incidence,
-    /// Whether a particle is on the edge of the body, shape \[count\].
+    /// Whether a particle is on the edge of the body, or of one of its regions, shape \[count\].
     on_edge: Vec<bool>,
     /// Area by kind of cell \[length^2\].
     areas: Vec<f64>,
+    /// What resists averaged dilatations, by region \[force / length\].
+    lambda: Vec<Option<f64>>,
 }
 
 impl<'a> Patches<'a> {
-    pub fn new(cells: &'a Cells, incidence: &'a Incidence, count: usize) -> Self {
+    /// `None` where no material of the body averages dilatations; `elastic` is that outside inclusions.
+    pub fn new(cells: &'a Cells, incidence: &'a Incidence, count: usize, elastic: &Elastic) -> Option<Self> {
+        let materials = std::iter::once(elastic).chain(&cells.inclusions);
+        let lambda: Vec<Option<f64>> = materials.map(Elastic::averaged_dilatation).collect();
+        lambda.iter().any(Option::is_some).then_some(())?;
         let mut on_edge = vec![false; count];
         cells.boundary_sides(incidence).into_iter().flatten().for_each(|i| on_edge[i as usize] = true);
-        Self { cells, incidence, on_edge, areas: cells.shapes.iter().map(|shape| area(shape)).collect() }
+        if !cells.inclusions.is_empty() {
+            let region = |&cell: &u32| cells.region_of(cell as usize);
+            for (i, on_edge) in on_edge.iter_mut().enumerate() {
+                let around = incidence.of(i);
+                *on_edge |= around.windows(2).any(|pair| region(&pair[0]) != region(&pair[1]));
+            }
+        }
+        let areas = cells.shapes.iter().map(|shape| area(shape)).collect();
+        Some(Self { cells, incidence, on_edge, areas, lambda })
+    }
+
+    /// What resists the averaged dilatation of a cell \[force / length\]; `None` where it resists its own.
+    pub fn lambda(&self, cell: usize) -> Option<f64> {
+        self.lambda[self.region(cell)]
+    }
+
+    fn region(&self, cell: usize) -> usize {
+        self.cells.region_of(cell) as usize
     }
 
     /// The particles in the middles of the patches that a cell belongs to.
     pub fn middles(&self, cell: usize) -> impl Iterator<Item = usize> + '_ {
-        let corners = self.cells.of(cell);
+        let corners = self.lambda(cell).map_or(&[][..], |_| self.cells.of(cell));
         let any = corners.iter().any(|&i| !self.on_edge[i as usize]);
         corners.iter().map(|&i| i as usize).filter(move |&i| !(any && self.on_edge[i]))
     }
@@ -53,13 +77,15 @@ impl<'a> Patches<'a> {
         self.areas[self.cells.kind[cell] as usize] / self.middles(cell).count() as f64
     }
 
-    /// The patches around a particle, in groups of one stiffness `factor`: their cells, in order.
+    /// The patches around a particle, in groups of one material and one stiffness `factor`: their cells, in order.
     pub fn around(&self, particle: usize, factor: Option<&[f64]>) -> Vec<Vec<usize>> {
         let around = self.incidence.of(particle).iter().map(|&cell| cell as usize);
         let mut patches: Vec<Vec<usize>> = Vec::new();
         for cell in around.filter(|&cell| self.middles(cell).any(|i| i == particle)) {
-            let alike =
-                |patch: &&mut Vec<usize>| factor.is_none_or(|factor| factor[patch[0]] == factor[cell]);
+            let alike = |patch: &&mut Vec<usize>| {
+                self.region(patch[0]) == self.region(cell)
+                    && factor.is_none_or(|factor| factor[patch[0]] == factor[cell])
+            };
             match patches.iter_mut().find(alike) {
                 Some(patch) => patch.push(cell),
                 None => patches.push(vec![cell]),
@@ -68,20 +94,25 @@ impl<'a> Patches<'a> {
         patches
     }
 
-    /// Mean dilatation of the patch around each particle \[1\], and its area \[length^2\], shape \[count\]; zero where there
-    /// is none. One material throughout.
+    /// Mean dilatation of the patch around each particle in each region \[1\], and its area \[length^2\], shape
+    /// \[count\]\[regions\]; zero where there is none.
     fn means(&self, strains: &[[f64; 3]]) -> (Vec<f64>, Vec<f64>) {
-        let mut mean = vec![0.0; self.on_edge.len()];
+        let mut mean = vec![0.0; self.on_edge.len() * self.lambda.len()];
         let mut measure = mean.clone();
         for (cell, strain) in strains.iter().enumerate() {
             let share = self.share(cell);
-            for middle in self.middles(cell) {
-                mean[middle] += share * (strain[0] + strain[1]);
-                measure[middle] += share;
+            for patch in self.middles(cell).map(|middle| self.patch(middle, cell)) {
+                mean[patch] += share * (strain[0] + strain[1]);
+                measure[patch] += share;
             }
         }
         mean.iter_mut().zip(&measure).filter(|(_, m)| **m > 0.0).for_each(|(sum, m)| *sum /= m);
         (mean, measure)
+    }
+
+    /// Number of the patch around a particle that a cell belongs to.
+    fn patch(&self, middle: usize, cell: usize) -> usize {
+        middle * self.lambda.len() + self.region(cell)
     }
 }
 
@@ -89,13 +120,14 @@ impl<'a> Patches<'a> {
 /// each with the mean of those of its patches in place of its own, which means nothing there (the pressure would jump
 /// from cell to cell). `count` is that of the particles.
 pub fn averaged(cells: &Cells, elastic: &Elastic, mut strains: Vec<[f64; 3]>, count: usize) -> Vec<[f64; 3]> {
-    if elastic.averaged_dilatation().is_some() {
-        let incidence = cells.incidence(count);
-        let patches = Patches::new(cells, &incidence, count);
+    let incidence = cells.incidence(count);
+    if let Some(patches) = Patches::new(cells, &incidence, count, elastic) {
         let (mean, _) = patches.means(&strains);
-        for (cell, strain) in strains.iter_mut().enumerate() {
+        for (cell, strain) in
+            strains.iter_mut().enumerate().filter(|&(cell, _)| patches.lambda(cell).is_some())
+        {
             let middles = patches.middles(cell).count() as f64;
-            let averaged = patches.middles(cell).map(|i| mean[i]).sum::<f64>() / middles;
+            let averaged = patches.middles(cell).map(|i| mean[patches.patch(i, cell)]).sum::<f64>() / middles;
             let add = 0.5 * (averaged - strain[0] - strain[1]);
             *strain = [strain[0] + add, strain[1] + add, strain[2]];
         }
@@ -105,8 +137,13 @@ pub fn averaged(cells: &Cells, elastic: &Elastic, mut strains: Vec<[f64; 3]>, co
 
 /// Energy \[force length\] of the averaged dilatations of cells of these mean strains; zero where the material averages none.
 pub fn energy(cells: &Cells, elastic: &Elastic, strains: &[[f64; 3]], count: usize) -> f64 {
-    let Some(lambda) = elastic.averaged_dilatation() else { return 0.0 };
     let incidence = cells.incidence(count);
-    let (mean, measure) = Patches::new(cells, &incidence, count).means(strains);
-    0.5 * lambda * mean.iter().zip(&measure).map(|(mean, measure)| measure * mean * mean).sum::<f64>()
+    let Some(patches) = Patches::new(cells, &incidence, count, elastic) else { return 0.0 };
+    let (mean, measure) = patches.means(strains);
+    let regions = patches.lambda.len();
+    let of_region = |(region, lambda): (usize, &Option<f64>)| {
+        let all = mean.iter().zip(&measure).skip(region).step_by(regions);
+        lambda.unwrap_or(0.0) * all.map(|(mean, measure)| measure * mean * mean).sum::<f64>()
+    };
+    0.5 * patches.lambda.iter().enumerate().map(of_region).sum::<f64>()
 }

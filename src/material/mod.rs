@@ -31,6 +31,7 @@
 //!   same for tractions given side by side.
 //! * [`homogenise`]: the way back, from the weights of an interior particle, matrices or scalars, to
 //!   the material that they are.
+//! * [`place`]: any place of a body, from the particles around it.
 //! * [`recovery`]: stress at the outline from the stress of the cells.
 //! * [`zone`]: over all waves on the lattice: is the rule stable, and how much must a synchronous
 //!   update be damped?
@@ -64,6 +65,7 @@ pub mod homogenise;
 pub mod loads;
 pub mod mechanism;
 pub mod outline_loads;
+pub mod place;
 pub mod recovery;
 pub mod report;
 pub mod stiffness;

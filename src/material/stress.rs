@@ -51,7 +51,8 @@ pub fn of_cells(
 ) -> Vec<StressState> {
     let strains = strains(cells, displacement, rotation);
     let strains = dilatation::averaged(cells, elastic, strains, displacement.len());
-    strains.into_par_iter().map(|strain| StressState::of(strain, elastic)).collect()
+    let of_cell = |(cell, strain)| StressState::of(strain, cells.material_of(cell, elastic));
+    strains.into_par_iter().enumerate().map(of_cell).collect()
 }
 
 fn strains(cells: &Cells, displacement: &Points, rotation: Rotation) -> Vec<[f64; 3]> {
@@ -63,7 +64,8 @@ fn strains(cells: &Cells, displacement: &Points, rotation: Rotation) -> Vec<[f64
 }
 
 /// Stress around each of `particles` particles: the mean over its cells, each weighted by its area. That smooths
-/// peaks, at free edges most of all. `None` for particles in no cell, and in those left out by `counts` alone.
+/// peaks, at free edges most of all. Where materials meet, stress jumps: there it is the mean on the side where von Mises
+/// stress is larger. `None` for particles in no cell, and in those left out by `counts` alone.
 pub fn at_particles(
     cells: &Cells,
     elastic: &Elastic,
@@ -71,6 +73,30 @@ pub fn at_particles(
     particles: usize,
     counts: impl Fn(usize) -> bool,
 ) -> Vec<Option<StressState>> {
+    let regions = cells.inclusions.len() + 1;
+    let mut stresses = vec![None; particles];
+    for region in 0..regions as u32 {
+        let within = |cell: usize| cells.region_of(cell) == region && counts(cell);
+        let means = region_means(cells, (elastic, region), of_cells, particles, within);
+        for (known, mean) in stresses.iter_mut().zip(means) {
+            let larger = |known: &StressState, mean: &StressState| mean.von_mises > known.von_mises;
+            if known.as_ref().is_none_or(|known| mean.as_ref().is_some_and(|mean| larger(known, mean))) {
+                *known = mean;
+            }
+        }
+    }
+    stresses
+}
+
+/// Means over the cells of one region that count.
+fn region_means(
+    cells: &Cells,
+    (elastic, region): (&Elastic, u32),
+    of_cells: &[StressState],
+    particles: usize,
+    counts: impl Fn(usize) -> bool,
+) -> Vec<Option<StressState>> {
+    let elastic = cells.material_of_region(region, elastic);
     let mut sums = vec![([0.0; 3], 0.0); particles];
     let areas: Vec<f64> = cells.shapes.iter().map(|shape| area(shape)).collect();
     for (cell, corners) in cells.iter().enumerate().filter(|&(cell, _)| counts(cell)) {
@@ -97,20 +123,36 @@ pub fn strain_energy(
     displacement: &Points,
     rotation: Rotation,
 ) -> Result<f64, ShapeError> {
+    let rest = Points::zeros(displacement.len());
+    energy_between(cells, elastic, [displacement, &rest], rotation)
+}
+
+/// Strain energy of the cells \[force length\] under the difference of two displacements \[length\] of their corners, each
+/// taken in axes that turn with its own cells where the rotation is such.
+///
+/// # Errors
+/// As [`strain_energy`].
+pub fn energy_between(
+    cells: &Cells,
+    elastic: &Elastic,
+    displacements: [&Points; 2],
+    rotation: Rotation,
+) -> Result<f64, ShapeError> {
     let kinds = 0..cells.shapes.len();
     let elements: Result<Vec<_>, _> = kinds.map(|kind| cells.element(kind, elastic)).collect();
     let elements = elements?;
     let of_cell = |cell: usize| {
-        let local = local(cells, cell, displacement, rotation);
-        let u = DVector::from_iterator(2 * local.len(), local.into_iter().flatten());
+        let [a, b] = displacements.map(|u| local(cells, cell, u, rotation).into_iter().flatten());
+        let u = DVector::from_vec(a.zip(b).map(|(a, b)| a - b).collect());
         0.5 * u.dot(&(&elements[cells.kind[cell] as usize] * &u))
     };
     let own: f64 = (0..cells.count()).map(of_cell).sum();
-    if elastic.averaged_dilatation().is_none() {
+    if !cells.average_dilatations(elastic) {
         return Ok(own);
     }
-    let strains = strains(cells, displacement, rotation);
-    Ok(own + dilatation::energy(cells, elastic, &strains, displacement.len()))
+    let [mut apart, other] = displacements.map(|u| strains(cells, u, rotation));
+    apart.iter_mut().zip(other).for_each(|(a, b)| *a = std::array::from_fn(|k| a[k] - b[k]));
+    Ok(own + dilatation::energy(cells, elastic, &apart, displacements[0].len()))
 }
 
 /// How far each cell is turned \[rad\], shape \[cells\].

@@ -115,9 +115,7 @@ impl MaterialWeights {
     ) -> Result<Self, WeightsError> {
         check_factor(cells, factor)?;
         let elements = elements(cells, elastic)?;
-        let averaged = elastic
-            .averaged_dilatation()
-            .map(|lambda| (lambda, Patches::new(cells, incidence, neighbours.count())));
+        let averaged = Patches::new(cells, incidence, neighbours.count(), elastic);
         let gradients = cells.shapes.iter().map(|shape| mean_gradients(shape)).collect();
         let assembly =
             Assembly { cells, incidence, neighbours: &neighbours, elements, gradients, averaged, factor };

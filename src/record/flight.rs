@@ -102,7 +102,7 @@ impl FlightTape {
             }
         }
         if self.statistics.is_due(diagnostics::DIAGNOSTICS, now, DIAGNOSTICS) {
-            let message = self.statistics.message(control, &self.swarm.name, header(), 0);
+            let message = self.statistics.message(control, &self.swarm.name, header(), 0, &[]);
             self.tape.take(&self.topics.diagnostics, &message, [now; 2]);
         }
     }

@@ -4,9 +4,13 @@
 //! delay, loss and faults happens here, so the node that keeps the formation sees it as it would see it in
 //! the world.
 
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use serde::{Deserialize, Serialize};
+
 use super::arguments::{Names, RosArguments, Value};
+use super::edge::pulse::Pulse;
 use super::edge::{Edge, EdgeError, Node, Publisher, Quality, Subscription};
 use super::messages::builtin_interfaces::Time;
 use super::messages::geometry_msgs::{
@@ -24,6 +28,7 @@ use crate::swarm::control::Control;
 use crate::swarm::flight::Fleet;
 use crate::swarm::formation::Formation;
 use crate::swarm::pace::{Pace, system_time};
+use crate::swarm::robots::Robot;
 use crate::swarm::transport::{RobotsEnd, fly};
 use crate::swarm::watch::Pose;
 
@@ -34,6 +39,16 @@ pub struct RobotNodes {
     goals: Vec<Option<[f64; 2]>>,
     link: Link,
     frames: Publisher<TFMessage>,
+    /// Of the watchdog, where there is one.
+    pulse: Option<Arc<Pulse>>,
+}
+
+/// What of the robots outlasts their process.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+pub struct KeptRobots {
+    robots: Vec<Robot>,
+    goals: Vec<Option<[f64; 2]>>,
+    period: u64,
 }
 
 /// The robots' end over ROS 2: a node for each.
@@ -43,6 +58,8 @@ pub struct Link {
     poses: Poses,
     clock: Option<Publisher<Clock>>,
     frame_id: String,
+    /// Whether a target came since last asked.
+    was_sent: bool,
     // Dropped after all that was made from them.
     nodes: Vec<Node>,
 }
@@ -95,7 +112,7 @@ impl Link {
         let clock =
             is_set("publish_clock").then(|| first.publisher("/clock", Quality::BEST_EFFORT)).transpose()?;
         let names = formation.names.clone();
-        Ok(Self { names, targets, poses, clock, frame_id: raw.frame_id.clone(), nodes })
+        Ok(Self { names, targets, poses, clock, frame_id: raw.frame_id.clone(), was_sent: false, nodes })
     }
 }
 
@@ -111,6 +128,7 @@ impl RobotNodes {
             frames: link.nodes[0].publisher("/tf", Quality::reliable(100))?,
             pace: Pace::new(1.0 / control.period()),
             goals: vec![None; formation.count()],
+            pulse: None,
             fleet,
             link,
         })
@@ -118,10 +136,45 @@ impl RobotNodes {
 
     /// Flies until `stop` is set.
     pub fn run(&mut self, stop: &AtomicBool) {
+        self.run_while(stop, &mut |_| true);
+    }
+
+    /// As [`FormationNode::run_while`](super::node::FormationNode::run_while).
+    pub fn run_while(&mut self, stop: &AtomicBool, look: &mut dyn FnMut(&Self) -> bool) -> bool {
         while !stop.load(Ordering::Relaxed) {
             self.pace.wait();
             self.tick();
+            if let Some(pulse) = &self.pulse {
+                pulse.hears(std::mem::take(&mut self.link.was_sent));
+            }
+            if self.pulse.as_ref().is_some_and(|pulse| pulse.is_given_up()) {
+                return false;
+            }
+            if !look(self) {
+                break;
+            }
         }
+        true
+    }
+
+    /// As [`FormationNode::watch_middleware`](super::node::FormationNode::watch_middleware).
+    ///
+    /// # Errors
+    /// A computer that gives no socket or thread.
+    pub fn watch_middleware(&mut self) -> Result<(), EdgeError> {
+        self.pulse = Some(self.link.nodes[0].watch()?);
+        Ok(())
+    }
+
+    pub fn kept(&self) -> KeptRobots {
+        let (robots, period) = (self.fleet.robots().to_vec(), self.fleet.period());
+        KeptRobots { robots, goals: self.goals.clone(), period }
+    }
+
+    /// Goes on from what another process left.
+    pub fn restore(&mut self, kept: &KeptRobots) {
+        self.fleet.restore(&kept.robots, kept.period);
+        self.goals.iter_mut().zip(&kept.goals).for_each(|(goal, kept)| *goal = *kept);
     }
 
     pub fn fleet(&self) -> &Fleet {
@@ -130,10 +183,12 @@ impl RobotNodes {
 
     /// One period: targets in, poses out.
     pub fn tick(&mut self) {
-        let Self { fleet, goals, link, .. } = self;
+        let Self { fleet, goals, link, pulse, .. } = self;
         // Who publishes the time begins it.
         let own_time = link.clock.is_some();
         let now = |fleet: &Fleet| if own_time { fleet.time() } else { system_time() };
+        let pulse = pulse.clone();
+        let _inside = pulse.as_ref().map(|pulse| pulse.inside());
         let sent = fly(fleet, goals, link, now).and_then(|()| self.say_frames());
         if let Err(error) = sent {
             tracing::debug!("{error}");
@@ -162,6 +217,7 @@ impl RobotsEnd for Link {
     fn targets(&mut self, go: &mut dyn FnMut(usize, [f64; 2])) {
         for (member, topic) in self.targets.iter().enumerate() {
             if let Some((message, _)) = topic.take_last() {
+                self.was_sent = true;
                 go(member, [message.pose.position.x, message.pose.position.y]);
             }
         }

@@ -25,13 +25,13 @@ use crate::flock::motion::Motion;
 use crate::flock::neighbourhood::Neighbourhood;
 use crate::flock::region::{Region, Side};
 use crate::flock::role::Role;
-use crate::flock::rules::{Axis, Feedback, Mean};
+use crate::flock::rules::{Axis, Feedback, Mean, Rotation};
 use crate::geometry::portion::Selection;
-use crate::geometry::shape::Segment;
+use crate::geometry::shape::{Segment, Shape};
 use crate::material::elastic::Elastic;
 use crate::material::outline_loads::{Profile, Push};
 use crate::solve::equilibrium::Request;
-use crate::solve::sweep::Update;
+use crate::sweep::Update;
 
 pub use bundled::{Bundled, bundled};
 pub use document::Document;
@@ -61,6 +61,8 @@ pub struct Scene {
     pub update: Update,
     /// What the body is made of, where the scene says so.
     pub material: Option<Elastic>,
+    /// Parts of the body that are of another material; the later one counts where they overlap.
+    pub inclusions: Vec<Inclusion>,
     pub loads: Vec<Load>,
     pub roles: Vec<RoleEntry>,
     pub fracture: Option<Fracture>,
@@ -86,6 +88,19 @@ impl Scene {
         self.roles.iter().position(|entry| matches!(entry.motion, Some(LeaderMotion::Truth { .. })))
     }
 
+    /// Which of the materials of the body sees farthest.
+    pub fn farthest_seeing(&self) -> Option<&Elastic> {
+        farthest_seeing(self.material.as_ref(), &self.inclusions)
+    }
+
+    /// Which turns of the body are no strain.
+    pub fn rotation(&self) -> Rotation {
+        match self.mean {
+            Mean::Material { rotation } => rotation,
+            _ => Rotation::Small,
+        }
+    }
+
     /// Whether the body was given as points instead of cut from a lattice.
     pub fn is_of_points(&self) -> bool {
         matches!(self.body, BodySource::Points(_))
@@ -105,6 +120,12 @@ impl Scene {
     }
 }
 
+/// Of what a body and its inclusions are made of: what needs neighbours that are farthest away.
+fn farthest_seeing<'a>(body: Option<&'a Elastic>, inclusions: &'a [Inclusion]) -> Option<&'a Elastic> {
+    let mut all = body.into_iter().chain(inclusions.iter().map(|part| &part.material));
+    all.find(|elastic| elastic.averaged_dilatation().is_some()).or(body)
+}
+
 /// Where the particles of the body come from.
 #[derive(Clone, Debug, PartialEq)]
 pub enum BodySource {
@@ -112,6 +133,13 @@ pub enum BodySource {
     Cut(Cut),
     /// Given one by one.
     Points(Arc<Cloud>),
+}
+
+/// A part of the body that is of another material.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Inclusion {
+    pub shape: Shape,
+    pub material: Elastic,
 }
 
 /// Fixed weights of neighbours.
@@ -249,6 +277,8 @@ pub enum LoadSteps {
 pub struct Record {
     /// Ids.
     pub probes: Vec<usize>,
+    /// \[length\]
+    pub places: Vec<[f64; 2]>,
     pub figures: Vec<usize>,
     pub vtk_every: usize,
 }

@@ -10,6 +10,7 @@ use super::link::Controller;
 use super::payload::{Command, Formation, Member};
 use super::{Capacity, Domain, Peer, Reader, ShmError, Writer, wait};
 use crate::scene::swarm::Swarm;
+use crate::scene::swarm::raw::RawCommands;
 use crate::swarm::control::part::Part;
 use crate::swarm::control::state::{FormationState, MemberState};
 use crate::swarm::control::{Control, Mode};
@@ -33,6 +34,8 @@ pub struct FormationNode {
     part: Part,
     end: Controller,
     commands: Reader<Command>,
+    /// Whose word counts.
+    orders: RawCommands,
     state: Writer<Formation>,
     members: Writer<Member>,
     missed: u64,
@@ -55,6 +58,7 @@ impl FormationNode {
         Ok(Self {
             pace: Pace::new(1.0 / control.period()),
             end: Controller::open(&peer, space, &control, &part)?,
+            orders: swarm.raw.node.commands,
             commands: Reader::open(&peer, space, COMMANDS, capacity)?,
             state: Writer::open(&peer, space, STATE, capacity, 1)?,
             members: Writer::open(&peer, space, MEMBERS, capacity, control.formation().count())?,
@@ -123,11 +127,13 @@ impl FormationNode {
         while let Some(slice) = self.commands.take() {
             for command in slice.iter() {
                 match command.kind {
-                    Command::EMERGENCY_STOP => self.control.emergency_stop(),
-                    Command::RESUME => {
+                    Command::EMERGENCY_STOP if self.orders.may_stop() => self.control.emergency_stop(),
+                    Command::RESUME if self.orders.may_do_all() => {
                         self.control.resume();
                     }
-                    other => tracing::warn!("{}: there is no command {other}", self.commands.service()),
+                    other => {
+                        tracing::warn!("{}: command {other} is none, or not allowed", self.commands.service())
+                    }
                 }
             }
         }

@@ -1,4 +1,4 @@
-//! Sweeps and spectra over the flock's interaction, and the solvers for equilibrium.
+//! Spectra of sweeps over the flock's interaction, and the solvers for equilibrium.
 
 pub mod affine_weights;
 pub mod arnoldi;
@@ -8,4 +8,3 @@ pub mod field;
 pub mod linear;
 pub mod operator;
 pub mod spectrum;
-pub mod sweep;

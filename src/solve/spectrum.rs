@@ -5,12 +5,12 @@
 //! where they lag they are what the sweep remembers of the step before, and A is not symmetric.
 
 use super::arnoldi::{Accuracy, Ritz, Wanted, eigenvalues};
-use super::sweep::{Sweep, Update};
 use crate::flock::frame::Frame;
 use crate::flock::interaction::Interaction;
 use crate::flock::points::Points;
 use crate::flock::role::Role;
 use crate::flock::rules::{Mean, Rotation};
+use crate::sweep::{Sweep, Update};
 
 /// The largest modulus of an eigenvalue.
 #[derive(Clone, Copy, Debug, PartialEq)]

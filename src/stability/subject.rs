@@ -8,7 +8,7 @@ use crate::flock::role::Role;
 use crate::flock::rules::{Feedback, FeedbackReference, Mean, Rotation};
 use crate::scene::{Scene, SceneError};
 use crate::solve::spectrum::{Ends, SpectralRadius, radius_from_one, spectral_ends, spectral_radius};
-use crate::solve::sweep::Order;
+use crate::sweep::Order;
 
 /// What is varied.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]

@@ -11,7 +11,7 @@ use serde::Serialize;
 use super::subject::{Parameter, Subject};
 use crate::flock::rules::FeedbackReference;
 use crate::solve::spectrum::Ends;
-use crate::solve::sweep::Order;
+use crate::sweep::Order;
 
 /// Which end of the stable range.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]

@@ -12,7 +12,6 @@ use crate::compare::truth::Effort;
 use crate::continuum::equilibrium::settle;
 use crate::continuum::run::Outcome;
 use crate::flock::role::Role;
-use crate::flock::rules::{Mean, Rotation};
 use crate::scene::raw::{RawMean, RawRegion};
 use crate::scene::{Scene, SceneError};
 use crate::solve::equilibrium::{Precision, Request};
@@ -51,7 +50,6 @@ pub fn choose(scene: Scene, load: Load<'_>) -> Result<Chosen, SceneError> {
         let words = format!("accuracy {} %: the paper's rule at the written spacing\n", 100.0 * accuracy);
         return Ok(Chosen { scene, words });
     }
-    require_small_rotations(&scene)?;
     let mut nearest = f64::INFINITY;
     let mut particles = 0;
     for halvings in 0..=MOST_HALVINGS {
@@ -215,13 +213,6 @@ fn words(solved: &Solved, accuracy: f64, part: f64) -> String {
         request.tolerance,
         request.precision
     )
-}
-
-/// The truth is of small rotations.
-fn require_small_rotations(scene: &Scene) -> Result<(), SceneError> {
-    let Mean::Material { rotation: Rotation::Corotated, .. } = scene.mean else { return Ok(()) };
-    let message = "an accuracy is held against elasticity at small rotations, and this rule is of large ones";
-    Err(scene.refuse("equilibrium.accuracy", message, "leave the accuracy out, or take rotation = \"small\""))
 }
 
 /// Ids name other particles in a finer body.

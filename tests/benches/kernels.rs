@@ -14,7 +14,7 @@ use flockform::flock::numbering::order_in_columns;
 use flockform::flock::points::Points;
 use flockform::flock::role::Role;
 use flockform::flock::rules::{Mean, Rule};
-use flockform::solve::sweep::{Activity, Led, Sweep, Update};
+use flockform::sweep::{Activity, Led, Sweep, Update};
 
 const SIDES: [u32; 3] = [12, 128, 512];
 

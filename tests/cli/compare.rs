@@ -24,12 +24,44 @@ fn a_table_is_printed_and_the_results_stand_in_a_numbered_folder() {
 }
 
 #[test]
-fn a_rule_of_large_rotations_is_told_from_a_truth_of_small_ones() {
+fn a_truth_of_large_rotations_is_told_from_one_of_small_ones() {
     let folder = temporary();
-    let words = "the truth is of small rotations";
+    let words = "rule and truth follow the body's turns";
     let turned = compare(folder.path(), &["--set", "rule.mean={kind=\"material\",rotation=\"corotated\"}"]);
     assert!(turned.contains(words), "{turned}");
     assert!(!compare(folder.path(), &[]).contains(words));
+}
+
+#[test]
+fn places_that_a_scene_names_are_told_beside_the_truth_s() {
+    let folder = temporary();
+    let output = flockform(&["compare", "cook", "--out", "o", "--no-report"], folder.path());
+    let said = text(&output.stdout);
+    assert!(output.status.success() && said.contains("at (48, 52): rule, truth"), "{said}");
+    let file = std::fs::read_to_string(folder.path().join("o/compare.json")).expect("written");
+    let told = &serde_json::from_str::<serde_json::Value>(&file).expect("JSON")["places"][0];
+    for who in ["rule", "truth"] {
+        let rise = told[who]["displacement"][1].as_f64().expect("a number");
+        assert!((rise / 23.965 - 1.0).abs() < 0.003, "{told}");
+    }
+    let output = flockform(&["compare", "cook", "--set", "record.places=[[0.0, 50.0]]"], folder.path());
+    assert_eq!(output.status.code(), Some(2));
+    let said = text(&output.stderr);
+    assert!(said.contains("record.places[0]") && said.contains("away from the body"), "{said}");
+}
+
+#[test]
+fn an_accuracy_is_met_before_the_comparison() {
+    let folder = temporary();
+    let arguments =
+        ["compare", "beam-loaded", "--out", "o", "--no-report", "--set", "equilibrium.accuracy=1%"];
+    let output = flockform(&arguments, folder.path());
+    let said = text(&output.stdout);
+    assert!(said.starts_with("accuracy 1 %: material rule at 0.5 of the written spacing"), "{said}");
+    let file = std::fs::read_to_string(folder.path().join("o/compare.json")).expect("written");
+    let error =
+        serde_json::from_str::<serde_json::Value>(&file).expect("JSON")["displacement_rel_l2"].as_f64();
+    assert!(error.is_some_and(|error| error < 0.01), "{error:?}");
 }
 
 #[test]

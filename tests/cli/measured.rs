@@ -128,9 +128,17 @@ fn the_clamp_of_the_loaded_beam_returns_force_and_moment_of_the_load_and_the_ene
 
 #[test]
 fn a_bar_in_uniaxial_tension_has_the_stress_of_its_load_everywhere() {
-    let (folder, said) = run(&[BAR, PULL, SOLVED], &["--figures", "none"], 0);
+    let place = "[record]\nplaces = [[2.1, 1.3]]\n";
+    let (folder, said) = run(&[BAR, PULL, SOLVED, place], &["--figures", "none"], 0);
     let summary = summary(folder.path());
     let measured = &summary["mechanics"];
+    let told = &measured["places"][0];
+    assert!(
+        near(number(&told["stress"][0]), 50e3, 50e3) && near(number(&told["von_mises"]), 50e3, 50e3),
+        "{told}"
+    );
+    assert!(near(number(&told["displacement"][0]), 50e3 / 210e9 * 2.1, 1e-6), "{told}");
+    assert!(said.contains("at (2.1000, 1.3000) m: moved by ("), "{said}");
     assert!(near(number(&measured["largest_von_mises"]["von_mises"]), 50e3, 50e3), "{measured}");
     // 50 kPa on 2 m x 1 mm.
     assert!(near(number(&measured["reactions"][0]["force"][0]), -100.0, 100.0), "{measured}");
@@ -205,9 +213,14 @@ fn increments_of_a_linear_body_lie_on_a_line_and_a_schedule_comes_back() {
     let rows = table(folder.path().join("o/load.csv"));
     assert_eq!(rows["increment"], [0.0, 1.0, 2.0, 3.0, 4.0]);
     assert_eq!(rows["factor"], [0.0, 0.25, 0.5, 0.75, 1.0]);
-    for (name, power) in
-        [("load.fy", 1), ("load.displacement", 1), ("roles[0].fy", 1), ("von_mises", 1), ("strain_energy", 2)]
-    {
+    for (name, power) in [
+        ("load.fy", 1),
+        ("load.displacement", 1),
+        ("roles[0].fy", 1),
+        ("von_mises", 1),
+        ("strain_energy", 2),
+        ("work.loads", 2),
+    ] {
         let last = rows[name][4];
         assert!(last != 0.0, "{name}");
         for (found, part) in rows[name].iter().zip(&rows["factor"]) {
@@ -230,6 +243,46 @@ fn increments_of_a_linear_body_lie_on_a_line_and_a_schedule_comes_back() {
         assert!(near(*reaction, -load, 550.0), "action is reaction: {reaction} {load}");
     }
     assert_eq!(summary(turned.path())["steps"], 4);
+}
+
+#[test]
+fn work_done_on_the_way_is_the_energy_that_a_body_bent_far_stores() {
+    let stored = |scene: &str, sets: &[&str]| {
+        let (folder, said) = bundled(scene, sets);
+        assert!(said.contains("done on the way by the loads"), "{said}");
+        let measured = summary(folder.path())["mechanics"].clone();
+        let done = ["loads", "supports"].map(|who| number(&measured["work_done"][who]));
+        let rows = table(folder.path().join("o/load.csv"));
+        assert!(near(rows["work.loads"].last().copied().expect("a row"), done[0], done[0].abs()));
+        assert_eq!((rows["work.loads"][0], rows["work.supports"][0]), (0.0, 0.0));
+        (number(&measured["strain_energy"]), done)
+    };
+    let far = ["lattice.spacing=0.5", "equilibrium.tolerance=1e-10"];
+    let off = ["load_steps={increments=10}", "load_steps={increments=20}", "load_steps={increments=40}"].map(
+        |parts| {
+            let (energy, [loads, supports]) = stored("elastica", &[far[0], far[1], parts]);
+            assert!(supports.abs() < 1e-9 * energy, "a clamp does none: {supports}");
+            loads / energy - 1.0
+        },
+    );
+    println!("{off:?}");
+    assert!(off[0].abs() < 0.03 && off[2].abs() < 0.002, "{off:?}");
+    assert!((0..2).all(|k| (off[k] / off[k + 1]).log2() > 1.7), "the trapezoid's order is 2: {off:?}");
+    // Led instead of pushed, the supports do it; and what was done is given back.
+    let led = [
+        far[0],
+        far[1],
+        "loads=[]",
+        "roles=[{ region = { kind = \"edge\", side = \"left\" }, role = \"clamped\" }, \
+         { region = { kind = \"edge\", side = \"right\" }, role = \"leader\", \
+         motion = { kind = \"velocity\", per_step = [0.0, 6.0] } }]",
+    ];
+    let (energy, [loads, supports]) =
+        stored("elastica", &[&led[..], &["load_steps={increments=40}"]].concat());
+    assert!(loads == 0.0 && (supports / energy - 1.0).abs() < 0.005, "{supports} {energy}");
+    let back = "load_steps={schedule=[0.2, 0.4, 0.6, 0.8, 1.0, 0.8, 0.6, 0.4, 0.2, 0.0]}";
+    let (left, [loads, _]) = stored("elastica", &[far[0], far[1], back]);
+    assert!(left.abs() < 1e-9 * energy && loads.abs() < 1e-6 * energy, "{left} {loads}");
 }
 
 #[test]

@@ -7,6 +7,7 @@ use flockform::compare::run::{SceneTruth, truth_of};
 use flockform::fem::Effort;
 use flockform::flock::body::Body;
 use flockform::flock::points::Points;
+use flockform::flock::rules::Rotation;
 use flockform::scene::bundled;
 
 use crate::support::*;
@@ -38,8 +39,14 @@ fn distance_from_reference(name: &str, aspect: u32) -> Comparison {
     let (body, cells) = (&layout.body, layout.cells.as_ref().expect("has cells"));
     let follows: Vec<bool> = body.reference.x.iter().map(|&x| x > 10.5).collect();
     let known = reference(aspect, body);
-    let sides =
-        Sides { cells, elastic: &elastic, rule: &truth.displacement, truth: &known, follows: &follows };
+    let sides = Sides {
+        cells,
+        elastic: &elastic,
+        rotation: Rotation::Small,
+        rule: &truth.displacement,
+        truth: &known,
+        follows: &follows,
+    };
     let found = Comparison::of(&sides).expect("measures");
     println!(
         "aspect {aspect}, {} nodes, stated {:.1e}: displacement {:.2e}, von Mises {:.2e}, energy {:.2e}, {time:?}",

@@ -6,4 +6,5 @@ mod measured;
 mod outputs;
 mod refusals;
 mod support;
+mod table;
 mod truth;

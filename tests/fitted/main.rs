@@ -2,5 +2,7 @@
 
 mod benchmarks;
 mod convergence;
+mod inclusions;
+mod iterations;
 mod outlines;
 mod support;

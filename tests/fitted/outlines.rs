@@ -15,10 +15,10 @@ use flockform::material::weights::MaterialWeights;
 use nalgebra::DMatrix;
 
 /// Uniform numbers from 0 to 1, the same ones every time.
-struct Noise(u64);
+pub struct Noise(pub u64);
 
 impl Noise {
-    fn next(&mut self) -> f64 {
+    pub fn next(&mut self) -> f64 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 11) as f64 / (1u64 << 53) as f64
     }
@@ -47,7 +47,7 @@ impl Noise {
     }
 }
 
-const KINDS: [LatticeKind; 6] = [
+pub const KINDS: [LatticeKind; 6] = [
     LatticeKind::Square { spacing: 1.0 },
     LatticeKind::Rectangular { a: 1.0, b: 0.8 },
     LatticeKind::CentredRectangular { a: 1.0, b: 1.0 },
@@ -134,7 +134,7 @@ fn spectrum(cells: &Cells, count: usize, elastic: &Elastic) -> [f64; 2] {
 }
 
 #[test]
-fn cut_cells_cost_at_most_three_times_the_condition_and_nine_times_the_highest_frequency_squared() {
+fn cut_cells_cost_at_most_three_times_the_condition_and_eight_times_the_highest_frequency_squared() {
     let mut noise = Noise(99);
     let steel = Constants::Isotropic { young: 1.0, poisson: 0.3, plane: Plane::Stress };
     let elastic = Elastic::new(steel, 1.0).expect("admissible");
@@ -154,7 +154,7 @@ fn cut_cells_cost_at_most_three_times_the_condition_and_nine_times_the_highest_f
         let fitted = spectrum(&fitted.cells, fitted.body.count(), &elastic);
         let whole = spectrum(&whole_cells, whole.count(), &elastic);
         let ratio = [fitted[0] / whole[0], fitted[1] / whole[1]];
-        assert!(ratio[0] < 3.0 && ratio[1] < 9.0, "round {round}, {kind:?}: {ratio:?}");
+        assert!(ratio[0] < 3.0 && ratio[1] < 8.0, "round {round}, {kind:?}: {ratio:?}");
         worst = [worst[0].max(ratio[0]), worst[1].max(ratio[1])];
     }
     println!(

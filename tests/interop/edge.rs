@@ -151,7 +151,7 @@ fn a_peer_gets_and_sets_parameters_within_their_bounds() {
     store.declare(Declaration::new("rate", 50.0).range(1.0..=500.0), None).expect("declared once");
     let mut parameters = Parameters::new(&swarm, store).expect("services");
     let mut changes = Vec::new();
-    let found = findings("parameters", domain, || changes.extend(parameters.poll(0.0)));
+    let found = findings("parameters", domain, || changes.extend(parameters.poll(0.0, None)));
     assert_eq!(
         found[..3],
         [json!({"names": ["rate"]}), json!({"rate": 50.0}), json!({"successful": true, "reason": ""}),]
@@ -173,7 +173,7 @@ fn a_peer_drives_the_lifecycle() {
     let domain = domain();
     let swarm = node(domain);
     let mut lifecycle = Lifecycle::new(&swarm).expect("services");
-    let found = findings("lifecycle", domain, || lifecycle.poll(0.0, &mut |_| Outcome::Success));
+    let found = findings("lifecycle", domain, || lifecycle.poll(0.0, &|_| true, &mut |_| Outcome::Success));
     let expected = [
         json!({"state": "unconfigured"}),
         json!({"success": false, "state": "unconfigured"}),

@@ -21,7 +21,6 @@ fn the_environment_gives_domain_range_and_middleware() {
     for (value, range) in [
         ("LOCALHOST", DiscoveryRange::Localhost),
         ("SUBNET", DiscoveryRange::Subnet),
-        ("OFF", DiscoveryRange::Off),
         ("SYSTEM_DEFAULT", DiscoveryRange::SystemDefault),
         ("", DiscoveryRange::Subnet),
     ] {
@@ -35,10 +34,19 @@ fn the_environment_gives_domain_range_and_middleware() {
     assert_eq!(localhost_only("0"), DiscoveryRange::Subnet);
     let wrong = environment(&[("ROS_AUTOMATIC_DISCOVERY_RANGE", "localhost")]).expect_err("wrong case");
     assert!(wrong.to_string().contains("LOCALHOST, SUBNET or SYSTEM_DEFAULT"), "{wrong}");
-    let more = environment(&[("RMW_IMPLEMENTATION", "rmw_cyclonedds_cpp"), ("ROS_STATIC_PEERS", "a;b;")]);
-    let more = more.expect("valid");
-    assert_eq!(more.middleware.as_deref(), Some("rmw_cyclonedds_cpp"));
-    assert_eq!(more.static_peers, ["a", "b"]);
+    let more = environment(&[("RMW_IMPLEMENTATION", "rmw_cyclonedds_cpp"), ("ROS_STATIC_PEERS", ";")]);
+    assert_eq!(more.expect("valid").middleware.as_deref(), Some("rmw_cyclonedds_cpp"));
+}
+
+#[test]
+fn what_cannot_be_honoured_is_refused_with_a_remedy() {
+    for (variable, value, remedy) in [
+        ("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF", "LOCALHOST"),
+        ("ROS_STATIC_PEERS", "10.0.0.7;robot", "unset it"),
+    ] {
+        let error = environment(&[(variable, value)]).expect_err(value).to_string();
+        assert!(error.contains(&format!("{variable}={value}")) && error.contains(remedy), "{error}");
+    }
 }
 
 #[test]

@@ -85,18 +85,30 @@ fn what_ros_does_not_understand_is_refused_by_name_with_a_remedy() {
 }
 
 #[test]
-fn logging_and_enclave_are_read_and_the_last_word_counts() {
+fn logging_is_read_and_the_last_word_counts() {
     let logging = ros("--log-level debug --log-level WARN --log-level a.b:=ERROR --log-level a.b:=fatal \
                        --disable-rosout-logs --disable-stdout-logs --enable-stdout-logs \
-                       --disable-external-lib-logs --log-config-file log.config --log-file-name run")
+                       --disable-external-lib-logs")
     .logging;
     assert_eq!(logging.level, Some(Severity::Warn));
     assert_eq!(logging.level_of("a.b"), Some(Severity::Fatal));
     assert_eq!(logging.level_of("other"), Some(Severity::Warn));
-    assert_eq!((logging.rosout, logging.stdout, logging.external_library), (false, true, false));
-    assert_eq!(logging.config_file, Some("log.config".into()));
-    assert_eq!(logging.file_name, Some("run".into()));
-    assert_eq!(ros("-e /a --enclave /b").enclave, Some("/b".into()));
+    assert!(logging.stdout);
+    assert!(!ros("--disable-stdout-logs -e /").logging.stdout);
     assert_eq!(ros("").logging.level, None);
-    assert!(ros("").logging.rosout);
+}
+
+#[test]
+fn what_this_node_does_not_have_is_refused_and_not_ignored() {
+    for line in [
+        "-e /talker",
+        "--enclave talker",
+        "--log-config-file log.config",
+        "--log-file-name run",
+        "--enable-rosout-logs",
+        "--enable-external-lib-logs",
+    ] {
+        let message = refusal(line);
+        assert!(message.contains(line) && message.contains("leave it out"), "{line}: {message}");
+    }
 }

@@ -35,7 +35,7 @@ fn a_lifecycle_is_driven_from_outside() {
     assert_eq!(done, [Goal::Configure, Goal::Activate]);
     assert!(lifecycle.is_active());
 
-    let mut tick = || lifecycle.poll(2.0, &mut |_| Outcome::Success);
+    let mut tick = || lifecycle.poll(2.0, &|_| true, &mut |_| Outcome::Success);
     let current = call::<GetState>(&state, &Empty, &mut tick).current_state;
     assert_eq!(current, lifecycle_msgs::State { id: 3, label: "active".into() });
     assert_eq!(call::<GetAvailableStates>(&states, &Empty, &mut tick).available_states.len(), 11);

@@ -3,6 +3,7 @@
 //! The tests share the participants and take turns: DDS discovery is slow on a busy computer, and each
 //! participant costs sockets and threads. Every wait is bounded.
 
+mod commands;
 mod formation;
 mod graph;
 mod interfaces;

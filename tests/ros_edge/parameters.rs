@@ -44,7 +44,7 @@ fn parameters_are_got_and_described_from_outside() {
         let types = client::<GetParameterTypes>(&mut peers, mapping, "/described/get_parameter_types");
         let describe = client::<DescribeParameters>(&mut peers, mapping, "/described/describe_parameters");
         let list = client::<ListParameters>(&mut peers, mapping, "/described/list_parameters");
-        let mut tick = || assert_eq!(parameters.poll(0.0), []);
+        let mut tick = || assert_eq!(parameters.poll(0.0, None), []);
         let some = names(&["rate", "none"]);
         let got = call::<GetParameters>(&get, &some, &mut tick).values;
         assert_eq!(got, [Value::Double(50.0).to_wire(), rcl_interfaces::ParameterValue::default()]);
@@ -85,7 +85,7 @@ fn parameters_are_set_from_outside_within_their_bounds() {
         ("none", Value::Bool(true)),
     ]);
     let mut changes = Vec::new();
-    let mut tick = || changes.extend(parameters.poll(3.5));
+    let mut tick = || changes.extend(parameters.poll(3.5, None));
     let results = call::<SetParameters>(&set, &wanted, &mut tick).results;
     let reasons: Vec<&str> = results.iter().map(|result| result.reason.as_str()).collect();
     assert!(results[0].successful, "{reasons:?}");

@@ -12,8 +12,9 @@ use crate::flock::points::Points;
 use crate::flock::real::Real;
 use crate::flock::role::Role;
 use crate::flock::rules::Rule;
-use crate::flock::stencil::Stencil;
-use crate::solve::sweep::{Activity, Led, MOST_STEPS, Steps, Sweep, Update};
+use crate::sweep::rows::Rows;
+use crate::sweep::terms::Terms;
+use crate::sweep::{Activity, Led, MOST_STEPS, Steps, Sweep, Update};
 
 pub const LOOP: &str = "a plain compiled loop";
 pub const PLAIN: &str = "barycentre, 4 neighbours";
@@ -181,8 +182,8 @@ fn square(side: usize, steps_together: usize) -> Subject {
 fn square_single(side: usize, steps_together: usize) -> Subject {
     let body = Body::square(side, &FIRST);
     let follows: Vec<bool> = body.roles.iter().map(|&role| role == Role::Follower).collect();
-    let neighbours = body.interaction.neighbours;
-    let stencil = Stencil::compile(&neighbours, &follows, None);
+    let unoffset = Interaction { rest: None, ..body.interaction };
+    let rows = Rows::compile(&unoffset, &follows).expect("a barycentre");
     let followers = follows.iter().filter(|&&follows| follows).count();
     let single = |values: &[f64]| values.iter().map(|&value| f32::of(value)).collect::<Vec<f32>>();
     let mut even = [single(&body.present.x), single(&body.present.y)];
@@ -191,10 +192,11 @@ fn square_single(side: usize, steps_together: usize) -> Subject {
         let mut to_go = steps;
         while to_go > 0 {
             let count = to_go.min(steps_together);
-            let (stencil, led, threads) = (&stencil, Led::NOBODY, rayon::current_num_threads());
-            let steps = Steps { stencil, rest: None, frame: None, led, count, farther: None, threads };
-            let rows = |[x, y]: &mut [Vec<f32>; 2]| [std::mem::take(x), std::mem::take(y)];
-            let ([mut ex, mut ey], [mut ox, mut oy]) = (rows(&mut even), rows(&mut odd));
+            let (rows, led, threads) = (&rows, Led::NOBODY, rayon::current_num_threads());
+            let (terms, rest, force, frame) = (Terms::NONE, None, None, None);
+            let steps = Steps { rows, terms, rest, force, frame, led, count, farther: None, threads };
+            let taken = |[x, y]: &mut [Vec<f32>; 2]| [std::mem::take(x), std::mem::take(y)];
+            let ([mut ex, mut ey], [mut ox, mut oy]) = (taken(&mut even), taken(&mut odd));
             steps.take(&mut Activity::default(), [&mut ex, &mut ey], [&mut ox, &mut oy]);
             (even, odd) = ([ex, ey], [ox, oy]);
             if count % 2 == 1 {

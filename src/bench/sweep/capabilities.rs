@@ -7,11 +7,13 @@ use serde::Serialize;
 use super::super::machine::median;
 use crate::continuum::engine::Engine;
 use crate::continuum::plan::Plan;
-use crate::continuum::record::Snapshot;
+use crate::continuum::record::{ProbeSeries, Snapshot};
 use crate::flock::points::Points;
 use crate::flock::role::Role;
-use crate::flock::stencil::{Plane, Stencil};
 use crate::scene;
+use crate::sweep::kernel::Component;
+use crate::sweep::rows::Rows;
+use crate::sweep::terms::Terms;
 
 /// A step of the engine beside the bare loops over the same body.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -24,16 +26,32 @@ pub struct Capability {
     pub over_bare_loops: f64,
 }
 
-/// What is named, and the keys that name it.
-const NAMED: [(&str, &[&str]); 8] = [
-    ("nothing named", &[]),
-    ("fracture", &["fracture={stretch=3.0}"]),
-    ("feedback", &["rule.feedback={factor=-0.1,reference=\"previous\"}"]),
-    ("Poisson term", &["rule.poisson={k=1e-6,pull=\"x\"}"]),
-    ("frame", &["frame=\"lagged\""]),
-    ("ghosts", &["roles=[{region={kind=\"edge\",side=\"left\"},role=\"ghost\"}]"]),
-    ("recording each step", &[]),
-    ("neighbours by radius", &["neighbours={kind=\"within\",radius=1.5}"]),
+/// What is recorded in each step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Recorded {
+    Nothing,
+    Probes(usize),
+    Everything,
+}
+
+use Recorded::{Everything, Nothing, Probes};
+
+/// What is named, the keys that name it, and what is recorded.
+const NAMED: [(&str, &[&str], Recorded); 14] = [
+    ("nothing named", &[], Nothing),
+    ("fracture", &["fracture={stretch=3.0}"], Nothing),
+    ("feedback, to the step before", &["rule.feedback={factor=-0.1,reference=\"previous\"}"], Nothing),
+    ("feedback, to the start", &["rule.feedback={factor=-0.1,reference=\"initial\"}"], Nothing),
+    ("Poisson term", &["rule.poisson={k=1e-6,pull=\"x\"}"], Nothing),
+    ("damping", &["update.damping=0.9"], Nothing),
+    ("weights", &["rule.weights={kind=\"list\",values=[1.0,2.0,1.5,0.5]}"], Nothing),
+    ("lagged frame", &["frame=\"lagged\""], Nothing),
+    ("immediate frame", &["frame=\"immediate\""], Nothing),
+    ("mirrored frame", &["frame=\"mirror\""], Nothing),
+    ("ghosts", &["roles=[{region={kind=\"edge\",side=\"left\"},role=\"ghost\"}]"], Nothing),
+    ("100 probes in each step", &[], Probes(100)),
+    ("recording each step", &[], Everything),
+    ("neighbours by radius", &["neighbours={kind=\"within\",radius=1.5}"], Nothing),
 ];
 
 /// Times steps of a square body of so many particles along each side, with each capability.
@@ -42,10 +60,9 @@ pub fn measure(side: usize, repetitions: usize, seconds: f64) -> Vec<Capability>
     let steps = bare.steps_in(seconds);
     NAMED
         .iter()
-        .map(|&(name, keys)| {
+        .map(|&(name, keys, recorded)| {
             let mut engine = Engine::new(plan(side, keys));
-            let records = name == "recording each step";
-            let mut time = || time(&mut engine, steps, records);
+            let mut time = || time(&mut engine, steps, recorded);
             time();
             let (mut times, mut ratios): (Vec<f64>, Vec<f64>) = (0..repetitions)
                 .map(|_| (bare.time(steps), time()))
@@ -72,23 +89,27 @@ fn stirred(reference: &Points) -> impl Iterator<Item = [f64; 2]> + '_ {
     reference.iter().map(|[x, y]| [x + 0.01 * (0.1 * y).sin(), y + 0.01 * (0.1 * x).sin()])
 }
 
-fn time(engine: &mut Engine, steps: usize, records: bool) -> f64 {
+fn time(engine: &mut Engine, steps: usize, recorded: Recorded) -> f64 {
     let reference = engine.body().reference.clone();
     engine.observe(stirred(&reference).enumerate());
+    let count = if let Probes(count) = recorded { count.min(reference.len()) } else { 0 };
+    let apart = reference.len() / count.max(1);
+    let mut probes: Vec<ProbeSeries> = (0..count).map(|k| ProbeSeries::new(k * apart)).collect();
     let (begin, mut kept) = (Instant::now(), None);
     for _ in 0..steps {
         engine.advance();
-        if records {
+        probes.iter_mut().for_each(|probe| probe.record(engine));
+        if recorded == Everything {
             kept = Some(Snapshot::of(engine));
         }
     }
-    std::hint::black_box(kept);
+    std::hint::black_box((kept, probes));
     begin.elapsed().as_secs_f64() / steps as f64
 }
 
 /// The loops and nothing else.
 struct Bare {
-    stencil: Stencil,
+    rows: Rows,
     present: Points,
     next: Points,
 }
@@ -98,7 +119,7 @@ impl Bare {
         let follows: Vec<bool> = plan.roles.iter().map(|&role| role == Role::Follower).collect();
         let present: Points = stirred(&plan.body.reference).collect();
         Self {
-            stencil: Stencil::compile(&plan.interaction.neighbours, &follows, None),
+            rows: Rows::compile(&plan.interaction, &follows).expect("a barycentre"),
             next: present.clone(),
             present,
         }
@@ -112,11 +133,12 @@ impl Bare {
     fn time(&mut self, steps: usize) -> f64 {
         let begin = Instant::now();
         for _ in 0..steps {
-            let bands = 0..self.stencil.band_count();
-            let Self { stencil, present, next } = self;
-            for (present, next) in [(&present.x, &mut next.x), (&present.y, &mut next.y)] {
-                let mut plane = Plane { seen_from: 0, present, rest: None, begin: 0, next };
-                stencil.sweep_runs(bands.clone(), 64, &mut plane);
+            let bands = 0..self.rows.band_count();
+            let Self { rows, present, next } = self;
+            for (axis, present, next) in [(0, &present.x, &mut next.x), (1, &present.y, &mut next.y)] {
+                let component =
+                    Component { axis, seen_from: 0, present, rest: None, force: None, begin: 0, next };
+                rows.sweep(bands.clone(), 64, &mut [component], &Terms::NONE);
             }
             std::mem::swap(present, next);
         }

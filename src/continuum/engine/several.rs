@@ -4,7 +4,7 @@ use super::{Engine, Led as Leader};
 use crate::continuum::layout::RoleChange;
 use crate::flock::interaction::Interaction;
 use crate::flock::points::{Points, distance};
-use crate::solve::sweep::{Activity, Led, MOST_STEPS};
+use crate::sweep::{Activity, Led, MOST_STEPS};
 
 impl Engine {
     /// How many steps, at most `most`, can be taken by [`Engine::advance_by`] from here; 0 where the next one
@@ -13,7 +13,8 @@ impl Engine {
     pub fn steps_at_once(&self, most: usize) -> usize {
         let finds_neighbours = self.present_neighbours.is_some();
         let looks = looks_at_every_step(finds_neighbours, &self.interaction, &self.changes);
-        if looks || !self.guided.is_empty() || !self.takes_several || self.moves_components() {
+        let waits = looks || !self.guided.is_empty() || !self.takes_several || self.moves_components();
+        if waits || self.load.is_growing(self.step) {
             return 0;
         }
         let to_come = self.changes.iter().map(|change| change.from).filter(|&from| from > self.step.max(1));
@@ -65,13 +66,29 @@ impl Engine {
         self.leaders.iter().map(farthest).fold(0.0, f64::max)
     }
 
-    /// Whether everybody's target in the reference configuration is where they stand, to rounding. A mean then
-    /// takes nobody farther from there, along an axis, than somebody is already.
-    pub fn rests_at_reference(&self) -> bool {
+    /// How far from the reference a step can take a particle if before it none is farther than 1, and how far if none has
+    /// moved \[length\]; `None` where nothing is known.
+    pub fn reach_of_a_step(&self) -> Option<Reach> {
         let reference = &self.body.reference;
-        let near = 1e-9 * self.body.lattice.spacing();
-        let rests = |j: usize| distance(self.interaction.target(j, reference), reference.get(j)) <= near;
-        self.body.matter().all(rests)
+        let moved = |j: usize| distance(self.interaction.target(j, reference), reference.get(j));
+        let gain = self.sweep.gain()?.max(1.0);
+        Some(Reach { gain, offset: self.body.matter().map(moved).fold(0.0, f64::max) })
+    }
+}
+
+/// A bound on what a step does.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reach {
+    /// How many times as far from the reference a particle gets as any was \[1\].
+    pub gain: f64,
+    /// What is added by loads, and by rest offsets that are missing \[length\].
+    pub offset: f64,
+}
+
+impl Reach {
+    /// How far particles get in so many steps that begin no farther than `from` \[length\], while leaders keep within that.
+    pub fn after(&self, steps: usize, from: f64) -> f64 {
+        (0..steps).fold(from, |reach, _| self.gain * reach + self.offset)
     }
 }
 

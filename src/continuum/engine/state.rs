@@ -12,7 +12,7 @@ use crate::flock::fracture::Break;
 use crate::flock::interaction::Weights;
 use crate::flock::points::Points;
 use crate::flock::role::Role;
-use crate::solve::sweep::Activity;
+use crate::sweep::Activity;
 
 /// Everything that steps have changed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

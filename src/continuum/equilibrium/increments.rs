@@ -54,6 +54,7 @@ pub(super) fn settle_each(
         };
         outcome.engine.settle(n + 1, &solved.displacement);
         outcome.engine.set_load_factor(part);
+        outcome.engine.go_on();
         outcome.residual = farthest_from_target(&outcome.engine) / spacing;
         outcome.reason = reason(&solved);
         outcome.solved = Some(solved);

@@ -212,7 +212,9 @@ fn film(scene: &Scene, engine: &Engine, is_solved: bool) -> Film {
     let unit = scene.unit();
     let mut quantities =
         vec![Quantity::new("pe1", "PE1", format!("{unit}²")), Quantity::new("pe2", "PE2", unit)];
-    let stress = scene.material.as_ref().map(|elastic| stress(elastic, scene.mean));
+    // The page has one material for all particles; of inclusions it shows the stress at the end alone.
+    let elastic = scene.material.as_ref().filter(|_| scene.inclusions.is_empty());
+    let stress = elastic.map(|elastic| stress(elastic, scene.mean));
     // At rest nothing moves.
     quantities.retain(|quantity| quantity.key != "pe2" || !is_solved);
     if stress.is_some() {

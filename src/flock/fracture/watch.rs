@@ -7,6 +7,7 @@
 
 use std::ops::Range;
 
+use super::super::lanes::{ARITHMETIC, InLanes, in_lanes};
 use super::super::neighbourhood::Neighbours;
 use super::super::points::{Points, distance};
 use super::Threshold;
@@ -119,15 +120,21 @@ impl Watch {
     }
 
     fn look(&self, present: &Points, suspects: &mut Vec<usize>) {
-        #[cfg(target_arch = "x86_64")]
-        if is_x86_feature_detected!("avx512f") {
-            // SAFETY: the processor has AVX-512, which is all that the callee asks for.
-            return unsafe { look_avx512(&self.blocks, present, suspects) };
-        } else if is_x86_feature_detected!("avx2") {
-            // SAFETY: the processor has AVX2, which is all that the callee asks for.
-            return unsafe { look_avx2(&self.blocks, present, suspects) };
-        }
-        look_over(&self.blocks, present, suspects);
+        in_lanes::<8, ARITHMETIC>(Looks { blocks: &self.blocks, present, suspects });
+    }
+}
+
+/// Spans to look over, in pieces of a width of their own.
+struct Looks<'a> {
+    blocks: &'a [Vec<Span>],
+    present: &'a Points,
+    suspects: &'a mut Vec<usize>,
+}
+
+impl InLanes for Looks<'_> {
+    #[inline(always)]
+    fn run<const W: usize>(self) {
+        look_over(self.blocks, self.present, self.suspects);
     }
 }
 
@@ -179,18 +186,6 @@ impl Block {
         self.open.swap(0, 1);
         self.open[1].clear();
     }
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f")]
-fn look_avx512(blocks: &[Vec<Span>], present: &Points, suspects: &mut Vec<usize>) {
-    look_over(blocks, present, suspects);
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn look_avx2(blocks: &[Vec<Span>], present: &Points, suspects: &mut Vec<usize>) {
-    look_over(blocks, present, suspects);
 }
 
 #[inline(always)]

@@ -1,7 +1,7 @@
 //! Points that may be near those of one cell, and the test of who is.
 //!
 //! Most of a neighbour query is this test: three candidates for every neighbour. It is compiled twice,
-//! as the loops of [`stencil`](crate::flock::stencil) are.
+//! as the loops of [`lanes`](crate::flock::lanes) are.
 
 use std::ops::Range;
 

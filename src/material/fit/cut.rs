@@ -2,16 +2,20 @@
 //!
 //! The outline becomes a chain of chords between nodes: its corners, the lattice points on it, and where it crosses
 //! the sides of cells. Two nodes that follow each other along the outline share a cell, so that every cell is cut
-//! by itself; nodes on its sides are shared with its neighbours, and the parts fit together by construction.
+//! by itself; nodes on its sides are shared with its neighbours, and the parts fit together by construction. Lines inside,
+//! along which regions of the body meet, cut in the same way, and both parts stay.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
-use super::near::{Buckets, meetings};
+use super::near::Buckets;
 use super::sites::{NearSite, Sites, State};
 use super::{FitError, ROUNDING, Scale, is_kept_corner, order};
 use crate::flock::lattice::{Lattice, Site};
 use crate::flock::points::distance;
-use crate::geometry::outline::{Outline, Place};
+use crate::geometry::meeting::meetings;
+use crate::geometry::outline::Place;
+use crate::geometry::partition::Partition;
+use crate::material::stiffness::{area, centroid};
 
 /// A corner of cells near the outline.
 #[derive(Clone, Copy, Debug)]
@@ -26,25 +30,34 @@ pub struct Node {
     pub site: Option<Site>,
 }
 
+/// What is left of a cell near the outline.
+#[derive(Clone, Debug, Default)]
+pub struct Face {
+    /// Nodes, counter-clockwise; none of a face that became part of another.
+    pub corners: Vec<u32>,
+    /// Of a whole cell of the lattice: its first site, and which of its cells.
+    pub whole: Option<(Site, u32)>,
+    /// The region of the body that it lies in.
+    pub region: usize,
+}
+
 /// The cells near the outline, as far as they are inside.
 #[derive(Debug)]
 pub struct Faces {
     pub nodes: Vec<Node>,
-    /// Corners of each face, counter-clockwise; none of those that became part of another.
-    pub faces: Vec<Vec<u32>>,
-    /// Of faces that are whole cells of the lattice: their first site, and which of its cells.
-    pub whole: Vec<Option<(Site, u32)>>,
+    pub faces: Vec<Face>,
+    /// Sides along lines inside, either way.
+    pub interfaces: HashSet<[u32; 2]>,
     /// Every cell near the outline, whether anything is left of it or not.
     candidates: HashMap<(Site, u32), u32>,
-    /// Cells near the outline that are still whole.
-    still_whole: HashMap<(Site, u32), ()>,
+    /// Cells near the outline that are still whole, and their regions.
+    still_whole: HashMap<(Site, u32), usize>,
 }
 
 impl Faces {
-    /// Faces that are left, and whether they are whole cells.
-    pub fn cells(&self) -> impl Iterator<Item = (&Vec<u32>, bool)> {
-        let present = self.faces.iter().zip(&self.whole).filter(|(face, _)| !face.is_empty());
-        present.map(|(face, whole)| (face, whole.is_some()))
+    /// Faces that are left.
+    pub fn cells(&self) -> impl Iterator<Item = &Face> {
+        self.faces.iter().filter(|face| !face.corners.is_empty())
     }
 
     /// Whether the cell was near enough to the outline to be looked at.
@@ -52,16 +65,60 @@ impl Faces {
         self.candidates.contains_key(&(site, kind as u32))
     }
 
-    /// Whether the cell was looked at and is whole.
-    pub fn is_whole(&self, site: Site, kind: usize) -> bool {
-        self.still_whole.contains_key(&(site, kind as u32))
+    /// The region of a cell that was looked at and is whole.
+    pub fn whole(&self, site: Site, kind: usize) -> Option<usize> {
+        self.still_whole.get(&(site, kind as u32)).copied()
     }
 
     /// To be called when the faces are final.
     pub fn note_whole(&mut self) {
-        let present = self.faces.iter().zip(&self.whole).filter(|(face, _)| !face.is_empty());
-        self.still_whole = present.filter_map(|(_, whole)| whole.map(|cell| (cell, ()))).collect();
+        let whole = self.cells().filter_map(|face| Some((face.whole?, face.region)));
+        self.still_whole = whole.collect();
     }
+
+    /// Gives each face its region. Faces that share a side that is no interface are of one; what tells which is the middle of
+    /// the largest of them, which is far from any line.
+    fn find_regions(&mut self, outline: &Partition) {
+        if outline.regions().is_empty() {
+            return;
+        }
+        let mut owner: HashMap<[u32; 2], usize> = HashMap::new();
+        for (number, face) in self.faces.iter().enumerate() {
+            ways(&face.corners).for_each(|way| {
+                owner.insert(way, number);
+            });
+        }
+        let mut seen = vec![false; self.faces.len()];
+        for first in 0..self.faces.len() {
+            let mut group = Vec::new();
+            let mut open = vec![first];
+            while let Some(face) = open.pop() {
+                if std::mem::replace(&mut seen[face], true) {
+                    continue;
+                }
+                group.push(face);
+                let across = ways(&self.faces[face].corners).filter(|way| !self.interfaces.contains(way));
+                open.extend(across.filter_map(|[a, b]| owner.get(&[b, a])));
+            }
+            let points = |face: &usize| -> Vec<[f64; 2]> {
+                self.faces[*face].corners.iter().map(|&node| self.nodes[node as usize].point).collect()
+            };
+            let size = |face: &usize| area(&points(face));
+            if let Some(largest) = group.iter().max_by(|a, b| size(a).total_cmp(&size(b))) {
+                let (points, o) =
+                    (points(largest), self.nodes[self.faces[*largest].corners[0] as usize].point);
+                let relative: Vec<[f64; 2]> = points.iter().map(|p| [p[0] - o[0], p[1] - o[1]]).collect();
+                let middle = centroid(&relative);
+                let region = outline.region([o[0] + middle[0], o[1] + middle[1]]);
+                group.into_iter().for_each(|face| self.faces[face].region = region);
+            }
+        }
+    }
+}
+
+/// Sides of a face.
+pub fn ways(face: &[u32]) -> impl Iterator<Item = [u32; 2]> + '_ {
+    (0..face.len()).map(|k| [face[k], face[(k + 1) % face.len()]])
 }
 
 /// Cuts the cells near the outline.
@@ -69,7 +126,7 @@ impl Faces {
 /// # Errors
 /// A place where the outline has finer details than cells can follow.
 pub fn cut(
-    (lattice, outline, buckets): (&Lattice, &Outline, &Buckets),
+    (lattice, outline, buckets): (&Lattice, &Partition, &Buckets),
     scale: &Scale,
     sites: &Sites,
 ) -> Result<Faces, FitError> {
@@ -86,8 +143,10 @@ struct Candidate {
     kind: u32,
     /// Lattice points at its corners, counter-clockwise.
     corners: Vec<Site>,
-    /// Chords through its inside, in the outline's direction.
+    /// Chords of the outline through its inside, in the outline's direction.
     chords: Vec<[u32; 2]>,
+    /// Chords of lines inside.
+    lines: Vec<[u32; 2]>,
     /// Whether a side between two nodes is a part of the outline: with the cell inside, or outside.
     along: Vec<([u32; 2], bool)>,
 }
@@ -97,7 +156,7 @@ type SideKey = [Site; 2];
 
 struct Cutter<'a> {
     lattice: &'a Lattice,
-    outline: &'a Outline,
+    outline: &'a Partition,
     scale: &'a Scale,
     sites: &'a Sites,
     nodes: Vec<Node>,
@@ -111,10 +170,12 @@ struct Cutter<'a> {
     cuts: HashMap<SideKey, Vec<(f64, u32)>>,
     /// Nodes of corners, by loop and piece.
     corners: HashMap<[usize; 2], u32>,
+    /// Sides along lines inside, either way.
+    interfaces: HashSet<[u32; 2]>,
 }
 
 impl<'a> Cutter<'a> {
-    fn new(lattice: &'a Lattice, outline: &'a Outline, scale: &'a Scale, sites: &'a Sites) -> Self {
+    fn new(lattice: &'a Lattice, outline: &'a Partition, scale: &'a Scale, sites: &'a Sites) -> Self {
         let mut cutter = Self {
             lattice,
             outline,
@@ -127,6 +188,7 @@ impl<'a> Cutter<'a> {
             beside: HashMap::new(),
             cuts: HashMap::new(),
             corners: HashMap::new(),
+            interfaces: HashSet::new(),
         };
         cutter.lattice_nodes();
         cutter.collect_candidates();
@@ -140,10 +202,11 @@ impl<'a> Cutter<'a> {
                 State::On { place, moved } => (Some(place), moved),
                 State::Inside | State::Outside => (None, false),
             };
-            let corner = place.filter(|place| self.is_corner(place)).map(|place| self.corner_key(&place));
+            let corner = place.filter(|place| self.is_corner(place)).map(|place| self.outline.corner(&place));
             if let Some(key) = corner {
                 self.corners.insert(key, number as u32);
             }
+            let place = corner.map(|[ring, piece]| Place { ring, piece, t: 0.0 }).or(place);
             let site = (!moved).then_some(near.site);
             self.nodes.push(Node { point: near.point, place, is_corner: corner.is_some(), site });
             self.cells_of.push(Vec::new());
@@ -151,14 +214,8 @@ impl<'a> Cutter<'a> {
     }
 
     fn is_corner(&self, place: &Place) -> bool {
-        let [ring, piece] = self.corner_key(place);
-        (place.t == 0.0 || place.t == 1.0) && is_kept_corner(self.outline, self.scale, [ring, piece])
-    }
-
-    /// The piece that begins at an end of a piece.
-    fn corner_key(&self, place: &Place) -> [usize; 2] {
-        let count = self.outline.rings()[place.ring].len();
-        [place.ring, if place.t == 1.0 { (place.piece + 1) % count } else { place.piece }]
+        (place.t == 0.0 || place.t == 1.0)
+            && is_kept_corner(self.outline, self.scale, self.outline.corner(place))
     }
 
     fn collect_candidates(&mut self) {
@@ -188,7 +245,8 @@ impl<'a> Cutter<'a> {
                 let key = side_key(corner, corners[(k + 1) % corners.len()]);
                 self.beside.entry(key).or_default().push(number);
             }
-            self.candidates.push(Candidate { site, kind, corners, chords: Vec::new(), along: Vec::new() });
+            let [chords, lines] = [Vec::new(), Vec::new()];
+            self.candidates.push(Candidate { site, kind, corners, chords, lines, along: Vec::new() });
         }
     }
 
@@ -227,15 +285,11 @@ impl<'a> Cutter<'a> {
     fn is_at_end(&self, end: &Node, crossing: &Place) -> bool {
         let Some(place) = end.place else { return false };
         let piece = self.outline.piece(crossing.ring, crossing.piece);
-        let count = self.outline.rings()[place.ring].len();
-        let same = place.ring == crossing.ring && {
-            let ends_here = |p: usize| {
-                (p == place.piece)
-                    || (place.t == 0.0 && (p + 1) % count == place.piece)
-                    || (place.t == 1.0 && p == (place.piece + 1) % count)
-            };
-            ends_here(crossing.piece)
-        };
+        let is_end = place.t == 0.0 || place.t == 1.0;
+        let corner = is_end.then(|| self.outline.corner(&place));
+        let ends_here = |t: f64| corner == Some(self.outline.corner(&Place { t, ..*crossing }));
+        let same =
+            [place.ring, place.piece] == [crossing.ring, crossing.piece] || ends_here(0.0) || ends_here(1.0);
         let apart = distance(piece.point(crossing.t), end.point);
         match &piece.arc {
             // A straight piece meets the side once: at its end.
@@ -252,13 +306,11 @@ impl<'a> Cutter<'a> {
         if known.into_iter().any(|&(_, node)| distance(self.nodes[node as usize].point, point) < near) {
             return;
         }
-        let count = self.outline.rings()[place.ring].len();
-        let ends = [(0.0, place.piece), (1.0, (place.piece + 1) % count)];
         let piece = self.outline.piece(place.ring, place.piece);
-        let corner = ends.into_iter().find_map(|(t, at)| {
-            let is_there = distance(piece.point(t), point) < near
-                && is_kept_corner(self.outline, self.scale, [place.ring, at]);
-            is_there.then_some([place.ring, at])
+        let corner = [0.0, 1.0].into_iter().find_map(|t| {
+            let corner = self.outline.corner(&Place { t, ..place });
+            let is_there = distance(piece.point(t), point) < near;
+            (is_there && is_kept_corner(self.outline, self.scale, corner)).then_some(corner)
         });
         let beside = self.beside.get(&key).cloned().unwrap_or_default();
         let node = match corner {
@@ -295,8 +347,9 @@ impl<'a> Cutter<'a> {
         let all: Vec<[usize; 2]> = self
             .outline
             .pieces()
-            .filter(|&(ring, piece, _)| is_kept_corner(self.outline, self.scale, [ring, piece]))
             .map(|(ring, piece, _)| [ring, piece])
+            .filter(|&corner| self.outline.named(corner) == corner)
+            .filter(|&corner| is_kept_corner(self.outline, self.scale, corner))
             .collect();
         for key in all {
             if self.corners.contains_key(&key) {
@@ -358,46 +411,54 @@ impl<'a> Cutter<'a> {
         (inside, sides)
     }
 
-    /// Gives every chord of the outline to the cell that it cuts, or to the side that it runs along.
+    /// Gives every chord of the outline and of the lines inside to the cell that it cuts, or to the side that it runs along.
     fn chain(&mut self) -> Result<(), FitError> {
         let mut chain: Vec<(Place, u32)> = Vec::new();
         for (number, node) in self.nodes.iter().enumerate() {
             if let Some(place) = node.place {
-                let place = if node.is_corner || place.t == 1.0 {
-                    let [ring, piece] = self.corner_key(&place);
-                    Place { ring, piece, t: 0.0 }
-                } else {
-                    place
-                };
-                chain.push((place, number as u32));
+                let [ring, piece] = self.outline.corner(&place);
+                let is_end = node.is_corner || place.t == 1.0;
+                chain.push((if is_end { Place { ring, piece, t: 0.0 } } else { place }, number as u32));
             }
         }
         chain.sort_by(|(a, x), (b, y)| order(a, b).then(x.cmp(y)));
-        for ring in 0..self.outline.rings().len() {
+        for (ring, pieces) in self.outline.rings().iter().enumerate() {
             let from = chain.partition_point(|(place, _)| place.ring < ring);
             let to = chain.partition_point(|(place, _)| place.ring <= ring);
             let mut nodes: Vec<u32> = chain[from..to].iter().map(|&(_, node)| node).collect();
+            // The ends of a line are corners of something else.
+            let end = |piece: usize| self.corners.get(&self.outline.named([ring, piece])).copied();
+            if self.outline.is_closed(ring) {
+                nodes.extend(nodes.first().copied());
+            } else {
+                nodes.splice(0..0, end(0));
+                nodes.extend(end(pieces.len()));
+            }
             nodes.dedup();
             // Nothing of a loop that a cell has all to itself shows in the lattice.
-            let start = self.outline.rings()[ring][0].from;
-            if nodes.len() < 3 {
-                return Err(self.detail(start));
+            let least = if self.outline.is_closed(ring) { 4 } else { 2 };
+            if nodes.len() < least {
+                return Err(self.detail(pieces[0].from));
             }
-            for k in 0..nodes.len() {
-                self.add_chord([nodes[k], nodes[(k + 1) % nodes.len()]])?;
+            for pair in nodes.windows(2) {
+                self.add_chord([pair[0], pair[1]], self.outline.is_bounding(ring))?;
             }
         }
         Ok(())
     }
 
-    fn add_chord(&mut self, [from, to]: [u32; 2]) -> Result<(), FitError> {
+    fn add_chord(&mut self, [from, to]: [u32; 2], is_bounding: bool) -> Result<(), FitError> {
         let (a, b) = (&self.cells_of[from as usize], &self.cells_of[to as usize]);
         let common: Vec<u32> = a.iter().filter(|cell| b.contains(cell)).copied().collect();
         let detail = self.detail(self.nodes[from as usize].point);
+        if !is_bounding {
+            self.interfaces.extend([[from, to], [to, from]]);
+        }
         match common[..] {
             [] => Err(detail),
             [cell] if !self.follow_each_other(cell, [from, to]) => {
-                self.candidates[cell as usize].chords.push([from, to]);
+                let candidate = &mut self.candidates[cell as usize];
+                if is_bounding { &mut candidate.chords } else { &mut candidate.lines }.push([from, to]);
                 Ok(())
             }
             _ => {
@@ -405,9 +466,10 @@ impl<'a> Cutter<'a> {
                     let is_inside = self.boundary(cell).windows(2).any(|pair| pair == [from, to]);
                     let is_outside = self.boundary(cell).windows(2).any(|pair| pair == [to, from]);
                     match (is_inside, is_outside) {
+                        (false, false) => return Err(detail),
+                        _ if !is_bounding => {}
                         (true, _) => self.candidates[cell as usize].along.push(([from, to], true)),
                         (_, true) => self.candidates[cell as usize].along.push(([to, from], false)),
-                        _ => return Err(detail),
                     }
                 }
                 Ok(())
@@ -437,32 +499,36 @@ impl<'a> Cutter<'a> {
 
     fn faces(mut self) -> Result<Faces, FitError> {
         let mut faces = Vec::new();
-        let mut whole = Vec::new();
         for cell in 0..self.candidates.len() as u32 {
             let boundary = self.boundary(cell);
             let candidate = &self.candidates[cell as usize];
-            let parts = if candidate.chords.is_empty() {
-                vec![boundary[..boundary.len() - 1].to_vec()]
+            let is_cut = !(candidate.chords.is_empty() && candidate.lines.is_empty());
+            let parts = if is_cut {
+                let chords: Vec<[u32; 2]> =
+                    candidate.chords.iter().chain(&candidate.lines).copied().collect();
+                self.parts(&boundary, &chords)
             } else {
-                self.parts(&boundary, &candidate.chords)
+                vec![boundary[..boundary.len() - 1].to_vec()]
             };
-            for part in parts {
-                if !self.is_inside(candidate, &part)? {
+            for corners in parts {
+                if !self.is_inside(candidate, &corners)? {
                     continue;
                 }
-                if (1..part.len()).any(|k| part[..k].contains(&part[k])) {
-                    return Err(self.detail(self.nodes[part[0] as usize].point));
+                if (1..corners.len()).any(|k| corners[..k].contains(&corners[k])) {
+                    return Err(self.detail(self.nodes[corners[0] as usize].point));
                 }
                 let stays = |&node: &u32| self.nodes[node as usize].site.is_some();
-                let is_whole = candidate.chords.is_empty()
-                    && part.len() == candidate.corners.len()
-                    && part.iter().all(stays);
-                whole.push(is_whole.then_some((candidate.site, candidate.kind)));
-                faces.push(part);
+                let is_whole =
+                    !is_cut && corners.len() == candidate.corners.len() && corners.iter().all(stays);
+                let whole = is_whole.then_some((candidate.site, candidate.kind));
+                faces.push(Face { corners, whole, region: 0 });
             }
         }
         let candidates = std::mem::take(&mut self.known);
-        let mut faces = Faces { nodes: self.nodes, faces, whole, candidates, still_whole: HashMap::new() };
+        let interfaces = std::mem::take(&mut self.interfaces);
+        let nodes = self.nodes;
+        let mut faces = Faces { nodes, faces, interfaces, candidates, still_whole: HashMap::new() };
+        faces.find_regions(self.outline);
         faces.note_whole();
         Ok(faces)
     }
@@ -538,7 +604,7 @@ impl<'a> Cutter<'a> {
             let p = self.nodes[node as usize].point;
             [x + p[0], y + p[1]]
         });
-        Ok(self.outline.contains(sum.map(|v| v / part.len() as f64)))
+        Ok(self.outline.outline().contains(sum.map(|v| v / part.len() as f64)))
     }
 }
 

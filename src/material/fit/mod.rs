@@ -3,8 +3,8 @@
 //! 1. `sites`: lattice points nearer to the outline than [`SNAP`] move onto it, to a corner if one is as near.
 //! 2. `cut`: the outline cuts the cells that it passes; corners, and where it crosses the sides of cells, are
 //!    particles too. Arcs become chords between particles that lie on the arc.
-//! 3. `tidy`: a part of a cell smaller than [`LEAST_AREA`] or narrower than [`LEAST_WIDTH`] joins its neighbour, and a side along the outline
-//!    shorter than [`LEAST_SIDE`] shrinks to one particle.
+//! 3. `tidy`: a part of a cell smaller than [`LEAST_AREA`], narrower than [`LEAST_WIDTH`] or dented joins the neighbour that makes
+//!    the most compact cell with it, and a side along the outline shorter than [`LEAST_SIDE`] shrinks to one particle.
 //!
 //! Everything else stays lattice. Distances are measured in the least altitude `w` over all triples of corners of a
 //! cell: since twice [`SNAP`] is less than 1, no triple changes its orientation when its corners move, so that
@@ -33,6 +33,7 @@ use crate::flock::body::{Body, OutlineParticles};
 use crate::flock::lattice::{Lattice, Site};
 use crate::flock::points::{Points, distance};
 use crate::geometry::outline::{Outline, Place};
+use crate::geometry::partition::Partition;
 
 /// Lattice points this near to the outline move onto it, in least altitudes of a cell.
 pub const SNAP: f64 = 0.4;
@@ -61,6 +62,11 @@ pub enum FitError {
         .place[0], .place[1]
     )]
     Detail { spacing: f64, place: [f64; 2] },
+    #[error(
+        "hole {hole} is {width:.6} across, less than the spacing of the lattice, which is {spacing:.6}; it is near ({:.6}, {:.6})",
+        .place[0], .place[1]
+    )]
+    SmallHole { hole: usize, width: f64, spacing: f64, place: [f64; 2] },
     #[error("the shape has more than {limit} lattice sites in its bounds")]
     TooLarge { limit: u64 },
 }
@@ -123,9 +129,13 @@ impl Scale {
 /// Turn \[rad\] below which a corner between pieces shorter than cells may be is one of the many of a curve.
 const FLAT: f64 = 0.35;
 
-/// Whether a piece begins at a corner that a particle has to stand on: one that turns sharply, or that lies between
-/// pieces of some length. The vertices of a curve drawn with finer edges than the lattice has are none.
-fn is_kept_corner(outline: &Outline, scale: &Scale, [ring, piece]: [usize; 2]) -> bool {
+/// Whether a particle has to stand on a corner: one that turns sharply, or that lies between pieces of some length, or
+/// where a line ends. The vertices of a curve drawn with finer edges than the lattice has are none.
+fn is_kept_corner(outline: &Partition, scale: &Scale, corner: [usize; 2]) -> bool {
+    if outline.is_junction(corner) {
+        return true;
+    }
+    let [ring, piece] = corner;
     let pieces = &outline.rings()[ring];
     let (before, after) = (&pieces[(piece + pieces.len() - 1) % pieces.len()], &pieces[piece]);
     let (a, b) = (before.tangent(1.0), after.tangent(0.0));
@@ -134,18 +144,27 @@ fn is_kept_corner(outline: &Outline, scale: &Scale, [ring, piece]: [usize; 2]) -
     after.begins_at_corner && (turn > FLAT || is_long)
 }
 
-/// Fits a lattice to an outline.
+/// Fits a lattice to the outline of a body.
 ///
 /// # Errors
 /// A shape, or a detail of it, that is too narrow for the spacing, with its place.
 pub fn fit(lattice: &Lattice, outline: &Outline) -> Result<Fitted, FitError> {
+    fit_regions(lattice, &Partition::whole(outline))
+}
+
+/// Fits a lattice to the outline of a body and to the lines inside along which its regions meet. What the regions are made
+/// of is for [`Cells::inclusions`].
+///
+/// # Errors
+/// As [`fit`].
+pub fn fit_regions(lattice: &Lattice, outline: &Partition) -> Result<Fitted, FitError> {
     let scale = Scale::of(lattice);
     let buckets = Buckets::new(outline, scale.diameter);
     narrow::require_wide(outline, &buckets, scale.spacing)?;
     let sites = Sites::find(lattice, outline, &scale)?;
     let mut faces = cut::cut((lattice, outline, &buckets), &scale, &sites)?;
     tidy::tidy(&mut faces, &scale);
-    Ok(Assembly { lattice, scale: &scale, sites: &sites, faces: &faces }.body())
+    Ok(Assembly { lattice, outline, scale: &scale, sites: &sites, faces: &faces }.body())
 }
 
 impl Fitted {
@@ -177,6 +196,7 @@ impl Fitted {
 /// What a body is put together from.
 struct Assembly<'a> {
     lattice: &'a Lattice,
+    outline: &'a Partition,
     scale: &'a Scale,
     sites: &'a Sites,
     faces: &'a Faces,
@@ -185,7 +205,7 @@ struct Assembly<'a> {
 impl Assembly<'_> {
     fn body(&self) -> Fitted {
         let mut used = vec![false; self.faces.nodes.len()];
-        self.faces.cells().flat_map(|(corners, _)| corners).for_each(|&node| used[node as usize] = true);
+        self.faces.cells().flat_map(|face| &face.corners).for_each(|&node| used[node as usize] = true);
         for (number, near) in self.sites.near().iter().enumerate() {
             used[number] |= self.is_in_far_cell(near.site);
         }
@@ -217,7 +237,9 @@ impl Assembly<'_> {
             .collect();
         let mut places = vec![None; reference.len()];
         for (number, node) in self.faces.nodes.iter().enumerate().filter(|(number, _)| used[*number]) {
-            places[particle[number] as usize] = node.place;
+            // Only what bounds the body is its outline.
+            places[particle[number] as usize] =
+                node.place.filter(|place| self.outline.is_bounding(place.ring));
         }
         let cells = self.cells(&sites, &particle, &reference);
         let step = if self.lattice.is_site([0, 1]) { 1 } else { 2 };
@@ -251,22 +273,27 @@ impl Assembly<'_> {
 
     /// Whole cells by their first corner, then the others.
     fn cells(&self, sites: &[Site], particle: &[u32], reference: &Points) -> Cells {
-        let shape = |t: &Vec<Site>| t.iter().map(|&corner| self.lattice.vector(corner)).collect();
-        let mut cells = Cells::of_kinds(self.scale.templates.iter().map(shape).collect());
+        let mut cells = Cells::of_lattice(self.lattice, self.outline.regions().len() + 1);
         let index = |site: Site| sites.binary_search(&site).ok().map(|i| i as u32);
         let mut corners = Vec::new();
         for &[i, j] in sites.iter().filter(|&&site| self.lattice.sublattice(site) == 0) {
             for (kind, template) in self.scale.templates.iter().enumerate() {
-                if self.faces.is_whole([i, j], kind) || self.is_far_cell([i, j], kind) {
+                let region = match self.faces.whole([i, j], kind) {
+                    None if self.is_far_cell([i, j], kind) => {
+                        self.sites.region(template.iter().map(|c| [i + c[0], j + c[1]]))
+                    }
+                    region => region,
+                };
+                if let Some(region) = region {
                     corners.clear();
                     corners.extend(template.iter().filter_map(|c| index([i + c[0], j + c[1]])));
-                    cells.push(&corners, kind as u32);
+                    cells.push(&corners, (region * self.scale.templates.len() + kind) as u32);
                 }
             }
         }
-        for (nodes, _) in self.faces.cells().filter(|(_, whole)| !whole) {
+        for face in self.faces.cells().filter(|face| face.whole.is_none()) {
             corners.clear();
-            corners.extend(nodes.iter().map(|&node| particle[node as usize]));
+            corners.extend(face.corners.iter().map(|&node| particle[node as usize]));
             // Begin with the lowest number: how a cell was found does not show.
             let lowest = (0..corners.len()).min_by_key(|&k| corners[k]).unwrap_or_default();
             corners.rotate_left(lowest);
@@ -275,8 +302,7 @@ impl Assembly<'_> {
                 let [px, py] = reference.get(i as usize);
                 [px - x, py - y]
             };
-            let kind = cells.shapes.len() as u32;
-            cells.shapes.push(corners.iter().map(relative).collect());
+            let kind = cells.add_kind(corners.iter().map(relative).collect(), face.region);
             cells.push(&corners, kind);
         }
         cells

@@ -1,31 +1,49 @@
 //! Whether a shape is everywhere as wide as the lattice is fine.
 
-use super::FitError;
-use super::near::{Buckets, meetings};
-use crate::geometry::outline::Outline;
+use super::near::Buckets;
+use super::{FitError, ROUNDING};
+use crate::flock::points::distance;
+use crate::geometry::meeting::meetings;
+use crate::geometry::outline::Piece;
+use crate::geometry::partition::Partition;
 
-/// Looks across the shape from places half a spacing apart along its outline.
+/// Looks across the shape, and across its regions, from places half a spacing apart along the outline and the lines inside.
 ///
 /// # Errors
-/// The first place where the opposite side is nearer than the spacing.
-pub fn require_wide(outline: &Outline, buckets: &Buckets, spacing: f64) -> Result<(), FitError> {
+/// A hole smaller than the spacing; the first place where the opposite side is nearer than that.
+pub fn require_wide(outline: &Partition, buckets: &Buckets, spacing: f64) -> Result<(), FitError> {
+    for hole in 1..outline.outline().rings().len() {
+        let pieces = &outline.rings()[hole];
+        let across = |k: usize| {
+            let ends = pieces.iter().map(Piece::bounds).map(|(low, high)| [low[k], high[k]]);
+            ends.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]).map_or(0.0, |[low, high]| high - low)
+        };
+        let width = across(0).max(across(1));
+        if width < spacing {
+            return Err(FitError::SmallHole { hole, width, spacing, place: pieces[0].from });
+        }
+    }
     for (ring, number, piece) in outline.pieces() {
         let count = (2.0 * piece.length() / spacing).ceil().clamp(1.0, 1e8) as usize;
-        let pieces = outline.rings()[ring].len();
-        let beside = [number, (number + 1) % pieces, (number + pieces - 1) % pieces];
+        // What meets at a corner is as narrow as the corner is sharp.
+        let ends = [0.0, 1.0].map(|t| piece.point(t));
+        let is_end = |p: [f64; 2]| ends.iter().any(|end| distance(*end, p) < ROUNDING * spacing);
+        let is_beside = |other: &Piece| is_end(other.from) || is_end(other.to);
+        let sides: &[f64] = if outline.is_bounding(ring) { &[-1.0] } else { &[-1.0, 1.0] };
         for t in (0..count).map(|k| (k as f64 + 0.5) / count as f64) {
             let (place, normal) = (piece.point(t), piece.normal(t));
-            let across = [0, 1].map(|k| place[k] - spacing * normal[k]);
-            for [other_ring, other] in buckets.around(place, across, 0.0) {
-                // What meets at a corner is as narrow as the corner is sharp.
-                let is_beside = other_ring == ring && beside.contains(&other);
-                if is_beside && (other != number || piece.arc.is_none()) {
-                    continue;
-                }
-                let opposite = meetings(place, across, outline.piece(other_ring, other));
-                let opposite = opposite.into_iter().map(|[s, _]| s).filter(|s| *s > 1e-6 && *s < 1.0 - 1e-6);
-                if let Some(share) = opposite.reduce(f64::min) {
-                    return Err(FitError::Narrow { width: share * spacing, spacing, place });
+            for across in sides.iter().map(|side| [0, 1].map(|k| place[k] + side * spacing * normal[k])) {
+                for [other_ring, other] in buckets.around(place, across, 0.0) {
+                    let is_same = [other_ring, other] == [ring, number];
+                    let other = outline.piece(other_ring, other);
+                    if if is_same { piece.arc.is_none() } else { is_beside(other) } {
+                        continue;
+                    }
+                    let opposite = meetings(place, across, other).into_iter().map(|[s, _]| s);
+                    let opposite = opposite.filter(|s| *s > 1e-6 && *s < 1.0 - 1e-6);
+                    if let Some(share) = opposite.reduce(f64::min) {
+                        return Err(FitError::Narrow { width: share * spacing, spacing, place });
+                    }
                 }
             }
         }

@@ -1,8 +1,9 @@
-//! Which pieces of an outline are near: a grid of buckets.
+//! Which pieces of an outline and of the lines inside are near: a grid of buckets.
 
 use std::collections::HashMap;
 
-use crate::geometry::outline::{Outline, Piece};
+use crate::geometry::outline::Piece;
+use crate::geometry::partition::Partition;
 
 /// Pieces by the buckets that they pass.
 #[derive(Debug)]
@@ -28,8 +29,8 @@ pub fn stretches(piece: &Piece, length: f64) -> impl Iterator<Item = ([f64; 2], 
 
 impl Buckets {
     /// Buckets of this side \[length\].
-    pub fn new(outline: &Outline, side: f64) -> Self {
-        let mut buckets = Self { side, origin: outline.bounds().0, pieces: HashMap::new() };
+    pub fn new(outline: &Partition, side: f64) -> Self {
+        let mut buckets = Self { side, origin: outline.outline().bounds().0, pieces: HashMap::new() };
         for (ring, number, piece) in outline.pieces() {
             for (low, high) in stretches(piece, side) {
                 let [from, to] = [low, high].map(|p| buckets.bucket(p));
@@ -58,47 +59,5 @@ impl Buckets {
         found.sort_unstable();
         found.dedup();
         found
-    }
-}
-
-/// Where the segment from `a` to `b` meets a piece: shares of the way along either, from 0 to 1.
-pub fn meetings(a: [f64; 2], b: [f64; 2], piece: &Piece) -> Vec<[f64; 2]> {
-    let along = [b[0] - a[0], b[1] - a[1]];
-    let cross = |u: [f64; 2], v: [f64; 2]| u[0] * v[1] - u[1] * v[0];
-    let within = |s: &f64| (0.0..=1.0).contains(s);
-    match &piece.arc {
-        None => {
-            let other = [piece.to[0] - piece.from[0], piece.to[1] - piece.from[1]];
-            let off = [piece.from[0] - a[0], piece.from[1] - a[1]];
-            let turn = cross(along, other);
-            let parallel = 1e-12 * along[0].hypot(along[1]) * other[0].hypot(other[1]);
-            if turn.abs() <= parallel {
-                return Vec::new();
-            }
-            let (s, t) = (cross(off, other) / turn, cross(off, along) / turn);
-            let slack = 1e-12;
-            let is_on = within(&s) && (-slack..=1.0 + slack).contains(&t);
-            if is_on { vec![[s, t.clamp(0.0, 1.0)]] } else { Vec::new() }
-        }
-        Some(arc) => {
-            let off = [a[0] - arc.centre[0], a[1] - arc.centre[1]];
-            let dot = |u: [f64; 2], v: [f64; 2]| u[0] * v[0] + u[1] * v[1];
-            let (p, q) = (dot(along, along), dot(off, along));
-            let r = (off[0].hypot(off[1]) - arc.radius) * (off[0].hypot(off[1]) + arc.radius);
-            let under = q * q - p * r;
-            if under <= 0.0 {
-                return Vec::new();
-            }
-            let root = under.sqrt();
-            let of = |s: f64| {
-                let point = [a[0] + s * along[0], a[1] + s * along[1]];
-                let t = piece.nearest(point);
-                let at = piece.point(t);
-                // Beyond the ends of the arc its circle goes on.
-                let is_on = (at[0] - point[0]).hypot(at[1] - point[1]) <= 1e-9 * arc.radius;
-                is_on.then_some([s, t])
-            };
-            [(-q - root) / p, (root - q) / p].into_iter().filter(within).filter_map(of).collect()
-        }
     }
 }

@@ -1,4 +1,4 @@
-//! Which sites of a lattice are inside an outline, and which move onto it.
+//! Which sites of a lattice are inside an outline, and which move onto it or onto the lines inside.
 
 use super::near::stretches;
 use super::{FitError, SNAP, STAYS, Scale, is_kept_corner};
@@ -6,6 +6,7 @@ use crate::flock::lattice::{Lattice, Site};
 use crate::flock::points::distance;
 use crate::flock::window::Window;
 use crate::geometry::outline::{Outline, Place};
+use crate::geometry::partition::Partition;
 
 /// More sites than this are refused before memory is asked for.
 const MOST_SITES: u64 = 1 << 28;
@@ -38,6 +39,19 @@ pub struct Sites {
     /// Number of each site near the outline in `near`, or one of the marks below.
     marks: Vec<u32>,
     near: Vec<NearSite>,
+    /// Region of each site, where the body has several; only of those far from any line it is exact.
+    regions: Vec<u16>,
+}
+
+/// What tells on which side of the outline a site is.
+#[derive(Clone, Copy)]
+struct Bound {
+    /// The place of the outline nearest to it, if within reach.
+    place: Option<Place>,
+    /// \[length\]
+    apart: f64,
+    /// Whether it is inside if not.
+    was: bool,
 }
 
 const FAR_OUTSIDE: u32 = u32::MAX;
@@ -45,17 +59,26 @@ const FAR_INSIDE: u32 = u32::MAX - 1;
 const UNKNOWN: u32 = u32::MAX - 2;
 
 impl Sites {
-    pub fn find(lattice: &Lattice, outline: &Outline, scale: &Scale) -> Result<Self, FitError> {
-        let mut sites = Self::window(lattice, outline)?;
-        sites.mark_inside(lattice, outline, scale);
-        sites.find_near(lattice, outline, scale);
+    pub fn find(lattice: &Lattice, outline: &Partition, scale: &Scale) -> Result<Self, FitError> {
+        let mut sites = Self::window(lattice, outline.outline())?;
+        for cell in sites.inside(lattice, outline.outline(), scale) {
+            sites.marks[cell] = FAR_INSIDE;
+        }
+        for (k, region) in outline.regions().iter().enumerate() {
+            sites.regions.resize(sites.marks.len(), 0);
+            for cell in sites.inside(lattice, region, scale) {
+                sites.regions[cell] = k as u16 + 1;
+            }
+        }
+        let bounds = sites.find_near(lattice, outline, scale);
         let corners: Vec<(Place, [f64; 2])> = outline
             .pieces()
+            .filter(|&(ring, piece, _)| outline.named([ring, piece]) == [ring, piece])
             .filter(|&(ring, piece, _)| is_kept_corner(outline, scale, [ring, piece]))
             .map(|(ring, piece, at)| (Place { ring, piece, t: 0.0 }, at.from))
             .collect();
         sites.snap_to_corners(lattice, &corners, scale);
-        sites.snap(lattice, outline, scale);
+        sites.snap(lattice, outline, scale, &bounds);
         Ok(sites)
     }
 
@@ -76,6 +99,17 @@ impl Sites {
             Some(FAR_INSIDE) => true,
             Some(number) => self.near[number as usize].state == State::Inside,
         }
+    }
+
+    /// The region of a cell with these corners, of which one at least is far from any line.
+    pub fn region(&self, mut corners: impl Iterator<Item = Site>) -> Option<usize> {
+        if self.regions.is_empty() {
+            return Some(0);
+        }
+        corners.find_map(|site| {
+            let cell = self.window.number(site).filter(|&cell| self.marks[cell] == FAR_INSIDE)?;
+            Some(self.regions[cell] as usize)
+        })
     }
 
     /// Sites inside that are far from the outline, ascending.
@@ -99,13 +133,15 @@ impl Sites {
             return Err(FitError::TooLarge { limit: MOST_SITES });
         }
         let window = Window::new(lows.map(|v| v as i32), highs.map(|v| v as i32));
-        Ok(Self { window, marks: vec![FAR_OUTSIDE; window.count() as usize], near: Vec::new() })
+        let marks = vec![FAR_OUTSIDE; window.count() as usize];
+        Ok(Self { window, marks, near: Vec::new(), regions: Vec::new() })
     }
 
-    /// Marks the sites inside, column by column: between crossings of the outline, whose arcs may be taken for
-    /// short chords, as sites near them are looked at again.
-    fn mark_inside(&mut self, lattice: &Lattice, outline: &Outline, scale: &Scale) {
+    /// The sites inside an outline, column by column: between its crossings, where arcs may be taken for short chords, as
+    /// sites near them are looked at again.
+    fn inside(&self, lattice: &Lattice, outline: &Outline, scale: &Scale) -> Vec<usize> {
         let mut crossings: Vec<Vec<f64>> = vec![Vec::new(); self.window.columns as usize];
+        let low = self.window.low.map(i64::from);
         for (.., piece) in outline.pieces() {
             let count = match &piece.arc {
                 None => 1,
@@ -116,31 +152,35 @@ impl Sites {
             for k in 1..=count {
                 let to = at(k);
                 let (first, last) = (from[0].min(to[0]).ceil() as i64, from[0].max(to[0]).ceil() as i64);
-                for column in first..last {
+                for column in first.max(low[0])..last.min(low[0] + self.window.columns) {
                     let share = (column as f64 - from[0]) / (to[0] - from[0]);
                     let row = from[1] + share * (to[1] - from[1]);
-                    crossings[(column - i64::from(self.window.low[0])) as usize].push(row);
+                    crossings[(column - low[0]) as usize].push(row);
                 }
                 from = to;
             }
         }
+        let mut inside = Vec::new();
         for (column, mut rows) in crossings.into_iter().enumerate() {
             rows.sort_by(f64::total_cmp);
             for pair in rows.chunks_exact(2) {
-                for row in pair[0].ceil() as i64..=pair[1].floor() as i64 {
-                    let cell = column as i64 * self.window.rows + row - i64::from(self.window.low[1]);
-                    if lattice.is_site(self.window.site(cell as usize)) {
-                        self.marks[cell as usize] = FAR_INSIDE;
-                    }
+                let last = (pair[1].floor() as i64).min(low[1] + self.window.rows - 1);
+                for row in (pair[0].ceil() as i64).max(low[1])..=last {
+                    let cell = (column as i64 * self.window.rows + row - low[1]) as usize;
+                    inside.extend(Some(cell).filter(|&cell| lattice.is_site(self.window.site(cell))));
                 }
             }
         }
+        inside
     }
 
-    /// Finds the sites within reach of the outline, with their nearest places.
-    fn find_near(&mut self, lattice: &Lattice, outline: &Outline, scale: &Scale) {
-        let reach = scale.diameter + SNAP * scale.altitude;
+    /// Finds the sites within reach of the outline and of the lines inside, with their nearest places. Returns what tells
+    /// the side of the outline that each is on.
+    fn find_near(&mut self, lattice: &Lattice, outline: &Partition, scale: &Scale) -> Vec<Bound> {
+        // Far enough for the whole cells that small parts of cut ones may join.
+        let reach = 1.5 * scale.diameter + SNAP * scale.altitude;
         let mut distances: Vec<f64> = Vec::new();
+        let mut bounds: Vec<Bound> = Vec::new();
         for (ring, number, piece) in outline.pieces() {
             for (low, high) in stretches(piece, scale.diameter) {
                 let corners = [
@@ -168,20 +208,24 @@ impl Sites {
                     }
                     let place = Place { ring, piece: number, t };
                     let state = State::On { place, moved: true };
-                    match self.marks[cell] {
-                        mark if mark >= UNKNOWN => {
-                            self.marks[cell] = self.near.len() as u32;
-                            self.near.push(NearSite { site, state, point });
-                            distances.push(apart);
-                        }
-                        known if apart < distances[known as usize] => {
-                            (self.near[known as usize].state, distances[known as usize]) = (state, apart);
-                        }
-                        _ => {}
+                    let mark = self.marks[cell];
+                    let known = if mark >= UNKNOWN { self.near.len() } else { mark as usize };
+                    if mark >= UNKNOWN {
+                        self.marks[cell] = known as u32;
+                        self.near.push(NearSite { site, state, point });
+                        distances.push(apart);
+                        bounds.push(Bound { place: None, apart: f64::INFINITY, was: mark == FAR_INSIDE });
+                    } else if apart < distances[known] {
+                        (self.near[known].state, distances[known]) = (state, apart);
+                    }
+                    let bound = &mut bounds[known];
+                    if outline.is_bounding(ring) && apart < bound.apart {
+                        *bound = Bound { place: Some(place), apart, ..*bound };
                     }
                 }
             }
         }
+        bounds
     }
 
     fn snap_to_corners(&mut self, lattice: &Lattice, corners: &[(Place, [f64; 2])], scale: &Scale) {
@@ -208,10 +252,10 @@ impl Sites {
         }
     }
 
-    /// Moves what is near enough onto the outline; of the others says on which side they are.
-    fn snap(&mut self, lattice: &Lattice, outline: &Outline, scale: &Scale) {
+    /// Moves what is near enough onto the outline or a line; of the others says on which side of the outline they are.
+    fn snap(&mut self, lattice: &Lattice, outline: &Partition, scale: &Scale, bounds: &[Bound]) {
         let snap = SNAP * scale.altitude;
-        for one in &mut self.near {
+        for (one, bound) in self.near.iter_mut().zip(bounds) {
             let State::On { place, .. } = one.state else { continue };
             let (home, target) = (lattice.position(one.site), outline.point(place));
             let apart = distance(target, home);
@@ -220,7 +264,9 @@ impl Sites {
                 one.state = State::On { place, moved };
                 one.point = if moved { target } else { home };
             } else {
-                one.state = if is_left(outline, place, home) { State::Inside } else { State::Outside };
+                let outline = outline.outline();
+                let inside = bound.place.map_or(bound.was, |place| is_left(outline, place, home));
+                one.state = if inside { State::Inside } else { State::Outside };
             }
         }
     }

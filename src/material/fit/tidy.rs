@@ -1,9 +1,9 @@
-//! Small parts join their neighbours, short sides shrink to one particle.
+//! Small parts join their neighbours, particles that nothing needs any more go, short sides shrink to one particle.
 
 use std::collections::HashMap;
 
-use super::cut::Faces;
-use super::{LEAST_AREA, LEAST_SIDE, LEAST_WIDTH, Scale};
+use super::cut::{Face, Faces, ways};
+use super::{LEAST_AREA, LEAST_SIDE, LEAST_WIDTH, ROUNDING, Scale};
 use crate::flock::points::distance;
 
 /// One makes work for the other: after a few rounds nothing is left to do.
@@ -15,6 +15,7 @@ const AREA_CHANGE: f64 = 0.02;
 pub fn tidy(faces: &mut Faces, scale: &Scale) {
     for _ in 0..ROUNDS {
         let merged = merge(faces, scale);
+        drop_idle(faces);
         let shrunk = shrink(faces, LEAST_SIDE * scale.altitude);
         if merged + shrunk == 0 {
             break;
@@ -35,76 +36,109 @@ fn area(faces: &Faces, corners: &[u32]) -> f64 {
 fn width(faces: &Faces, corners: &[u32]) -> f64 {
     let at = |k: usize| faces.nodes[corners[k % corners.len()] as usize].point;
     let across = |k: usize| {
-        let (a, b) = (at(k), at(k + 1));
-        let length = distance(a, b);
-        let off = |p: [f64; 2]| ((b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0])) / length;
-        let (low, high) =
-            (0..corners.len()).map(|k| off(at(k))).fold((0.0f64, 0.0f64), |(l, h), v| (l.min(v), h.max(v)));
+        let off = (0..corners.len()).map(|l| off_line([at(k), at(k + 1)], at(l)));
+        let (low, high) = off.fold((0.0f64, 0.0f64), |(l, h), v| (l.min(v), h.max(v)));
         high - low
     };
     (0..corners.len()).map(across).fold(f64::INFINITY, f64::min)
 }
 
-/// Joins faces that are too small or too narrow with the neighbour along the longest common line.
+/// Distance of a point to the left of the line from `a` to `b` \[length\].
+fn off_line([a, b]: [[f64; 2]; 2], p: [f64; 2]) -> f64 {
+    ((b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0])) / distance(a, b)
+}
+
+/// Whether a face is a quadrilateral with a dent: its corner there has little mass and much to hold it, up to 25 times the
+/// highest frequency squared of whole cells.
+fn is_dart(faces: &Faces, corners: &[u32]) -> bool {
+    let at = |k: usize| faces.nodes[corners[k % 4] as usize].point;
+    let is_dent = |k: usize| {
+        let line = [at(k), at(k + 2)];
+        off_line(line, at(k + 1)) > ROUNDING * distance(line[0], line[1])
+    };
+    corners.len() == 4 && (0..4).any(is_dent)
+}
+
+/// How compact a face is: its area over the square of its circumference \[1\].
+fn compactness(faces: &Faces, corners: &[u32]) -> f64 {
+    let length = |[a, b]: [u32; 2]| distance(faces.nodes[a as usize].point, faces.nodes[b as usize].point);
+    area(faces, corners) / ways(corners).map(length).sum::<f64>().powi(2)
+}
+
+/// Joins each face that is too small, too narrow or dented with the neighbour of its region that makes the most compact face with it. By
+/// the longest common line rows of small parts would join each other to long strips, whose particles move against each
+/// other at next to no cost.
 fn merge(faces: &mut Faces, scale: &Scale) -> usize {
     let (least, narrow) = (LEAST_AREA * scale.area, LEAST_WIDTH * scale.altitude);
-    let whole = 1.01 * scale.area;
     let mut owner: HashMap<[u32; 2], usize> = HashMap::new();
     for (number, face) in faces.faces.iter().enumerate() {
-        ways(face).for_each(|way| {
+        ways(&face.corners).for_each(|way| {
             owner.insert(way, number);
         });
     }
+    let is_fine = |faces: &Faces, corners: &[u32]| {
+        area(faces, corners) >= least && width(faces, corners) >= narrow && !is_dart(faces, corners)
+    };
     let mut small: Vec<(f64, usize)> = (0..faces.faces.len())
-        .filter(|&face| !faces.faces[face].is_empty())
-        .map(|face| (area(faces, &faces.faces[face]), face))
-        .filter(|&(area, face)| area < least || width(faces, &faces.faces[face]) < narrow)
+        .filter(|&face| {
+            let corners = &faces.faces[face].corners;
+            !corners.is_empty() && !is_fine(faces, corners)
+        })
+        .map(|face| (area(faces, &faces.faces[face].corners), face))
         .collect();
     small.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     let mut merged = 0;
     for (_, face) in small {
-        let is_fine = |corners: &[u32]| area(faces, corners) >= least && width(faces, corners) >= narrow;
-        if faces.faces[face].is_empty() || is_fine(&faces.faces[face]) {
+        let Face { corners, region, .. } = &faces.faces[face];
+        if corners.is_empty() || is_fine(faces, corners) {
             continue;
         }
-        let mut common: Vec<(usize, f64)> = Vec::new();
-        for [a, b] in ways(&faces.faces[face]) {
-            let Some(&other) = owner.get(&[b, a]) else { continue };
-            let length = distance(faces.nodes[a as usize].point, faces.nodes[b as usize].point);
-            match common.iter_mut().find(|(known, _)| *known == other) {
-                Some((_, sum)) => *sum += length,
-                None => common.push((other, length)),
-            }
-        }
-        // Cells that have taken in another one already come last, or a row of small parts would end in one cell.
-        let is_large = |other: usize| area(faces, &faces.faces[other]) > whole;
-        let mut common: Vec<(bool, usize, f64)> =
-            common.into_iter().map(|(other, length)| (is_large(other), other, length)).collect();
-        common.sort_by(|a, b| a.0.cmp(&b.0).then(b.2.total_cmp(&a.2)).then(a.1.cmp(&b.1)));
-        let joined = common.into_iter().find_map(|(_, other, _)| {
-            let joined = join(&faces.faces[face], &faces.faces[other])?;
-            is_simple(faces, &joined).then_some((other, joined))
+        let mut beside: Vec<usize> = ways(corners).filter_map(|[a, b]| owner.get(&[b, a]).copied()).collect();
+        beside.sort_unstable();
+        beside.dedup();
+        beside.retain(|&other| faces.faces[other].region == *region);
+        let joined = beside.into_iter().filter_map(|other| {
+            let joined = join(corners, &faces.faces[other].corners)?;
+            is_simple(faces, &joined).then(|| (compactness(faces, &joined), other, joined))
         });
-        if let Some((other, joined)) = joined {
+        if let Some((_, other, joined)) = joined.reduce(|a, b| if b.0 > a.0 { b } else { a }) {
             for number in [face, other] {
-                ways(&faces.faces[number]).for_each(|way| {
+                ways(&faces.faces[number].corners).for_each(|way| {
                     owner.remove(&way);
                 });
             }
             ways(&joined).for_each(|way| {
                 owner.insert(way, other);
             });
-            faces.faces[face].clear();
-            faces.faces[other] = joined;
-            faces.whole[other] = None;
+            faces.faces[face].corners.clear();
+            let region = faces.faces[other].region;
+            faces.faces[other] = Face { corners: joined, whole: None, region };
             merged += 1;
         }
     }
     merged
 }
 
-fn ways(face: &[u32]) -> impl Iterator<Item = [u32; 2]> + '_ {
-    (0..face.len()).map(|k| [face[k], face[(k + 1) % face.len()]])
+/// Takes particles out of the middle of straight sides along the outline, once all cells there have joined to one:
+/// they would move along the side at next to no cost, which takes an equilibrium many iterations to find.
+fn drop_idle(faces: &mut Faces) {
+    let mut cells = vec![0u32; faces.nodes.len()];
+    faces.cells().flat_map(|face| &face.corners).for_each(|&node| cells[node as usize] += 1);
+    for Face { corners: face, whole, .. } in &mut faces.faces {
+        let mut k = 0;
+        while k < face.len() && face.len() > 3 {
+            let beside = [face[(k + face.len() - 1) % face.len()], face[(k + 1) % face.len()]];
+            let node = &faces.nodes[face[k] as usize];
+            let line = beside.map(|node| faces.nodes[node as usize].point);
+            let is_needed = cells[face[k] as usize] > 1 || node.is_corner || node.place.is_none();
+            if is_needed || off_line(line, node.point).abs() > ROUNDING * distance(line[0], line[1]) {
+                k += 1;
+            } else {
+                face.remove(k);
+                *whole = None;
+            }
+        }
+    }
 }
 
 /// The loop around two faces; `None` where they touch in more than one line.
@@ -146,7 +180,7 @@ fn shrink(faces: &mut Faces, least: f64) -> usize {
     let mut around: HashMap<u32, Vec<usize>> = HashMap::new();
     let mut sides: HashMap<[u32; 2], usize> = HashMap::new();
     for (number, face) in faces.faces.iter().enumerate() {
-        for [a, b] in ways(face) {
+        for [a, b] in ways(&face.corners) {
             around.entry(a).or_default().push(number);
             *sides.entry([a.min(b), a.max(b)]).or_default() += 1;
         }
@@ -156,8 +190,8 @@ fn shrink(faces: &mut Faces, least: f64) -> usize {
     };
     let mut short: Vec<(f64, [u32; 2])> = sides
         .into_iter()
-        // A side with cells on both sides joins two strands of the outline, or a particle inside with it.
-        .filter(|&(_, cells)| cells == 1)
+        // Any other side with cells on both sides joins two strands of the outline, or a particle inside with it.
+        .filter(|(side, cells)| *cells == 1 || faces.interfaces.contains(side))
         .map(|(side, _)| (length(faces, side), side))
         .filter(|(length, _)| *length < least)
         .collect();
@@ -170,7 +204,7 @@ fn shrink(faces: &mut Faces, least: f64) -> usize {
         };
         let (gone, kept) = if rank(a) > rank(b) { (b, a) } else { (a, b) };
         let is_side = around.get(&gone).is_some_and(|cells| {
-            cells.iter().any(|&cell| ways(&faces.faces[cell]).any(|w| w == [a, b] || w == [b, a]))
+            cells.iter().any(|&cell| ways(&faces.faces[cell].corners).any(|w| w == [a, b] || w == [b, a]))
         });
         if !is_side || faces.nodes[gone as usize].is_corner {
             continue;
@@ -183,10 +217,11 @@ fn shrink(faces: &mut Faces, least: f64) -> usize {
 /// Puts one node in the place of another in all faces around it, unless that spoils one of them.
 fn replace(faces: &mut Faces, around: &mut HashMap<u32, Vec<usize>>, gone: u32, kept: u32) -> bool {
     let cells = around.get(&gone).cloned().unwrap_or_default();
-    let (mut before, mut after) = (0.0, 0.0);
+    // Of each region around: the area before, and by how much it changes.
+    let mut areas: HashMap<usize, [f64; 2]> = HashMap::new();
     let mut changed = Vec::new();
     for &cell in &cells {
-        let old = &faces.faces[cell];
+        let Face { corners: old, region, .. } = &faces.faces[cell];
         let mut new: Vec<u32> = old.iter().map(|&node| if node == gone { kept } else { node }).collect();
         new.dedup();
         if new.len() > 1 && new.first() == new.last() {
@@ -196,22 +231,29 @@ fn replace(faces: &mut Faces, around: &mut HashMap<u32, Vec<usize>>, gone: u32, 
         if (vanishes && old.len() > 3) || (!vanishes && !is_simple(faces, &new)) {
             return false;
         }
-        before += area(faces, old);
-        after += if vanishes { 0.0 } else { area(faces, &new) };
+        let [before, change] = areas.entry(*region).or_default();
+        *before += area(faces, old);
+        *change += if vanishes { 0.0 } else { area(faces, &new) } - area(faces, old);
         changed.push((cell, if vanishes { Vec::new() } else { new }));
     }
-    if (after - before).abs() > AREA_CHANGE * before {
+    if areas.values().any(|[before, change]| change.abs() > AREA_CHANGE * before) {
         return false;
     }
     for (cell, new) in changed {
+        for [a, b] in ways(&faces.faces[cell].corners) {
+            let moved = [a, b].map(|node| if node == gone { kept } else { node });
+            if moved != [a, b] && faces.interfaces.contains(&[a, b]) {
+                faces.interfaces.extend([moved, [moved[1], moved[0]]]);
+            }
+        }
         if new.is_empty() {
-            for node in std::mem::take(&mut faces.faces[cell]) {
+            for node in std::mem::take(&mut faces.faces[cell].corners) {
                 around.entry(node).or_default().retain(|&other| other != cell);
             }
             continue;
         }
-        faces.faces[cell] = new;
-        faces.whole[cell] = None;
+        let region = faces.faces[cell].region;
+        faces.faces[cell] = Face { corners: new, whole: None, region };
         let known = around.entry(kept).or_default();
         if !known.contains(&cell) {
             known.push(cell);

@@ -24,8 +24,8 @@ pub(super) struct Assembly<'a> {
     /// By kind: stiffness and mean gradients.
     pub elements: Vec<DMatrix<f64>>,
     pub gradients: Vec<Vec<[f64; 2]>>,
-    /// What resists averaged dilatations \[force / length\], and over which cells they are averaged.
-    pub averaged: Option<(f64, Patches<'a>)>,
+    /// Over which cells dilatations are averaged.
+    pub averaged: Option<Patches<'a>>,
     pub factor: Option<&'a [f64]>,
 }
 
@@ -116,7 +116,8 @@ impl Assembly<'_> {
         for cell in self.incidence.of(particle).iter().map(|&cell| cell as usize) {
             let corners = self.cells.of(cell);
             let own = corners.iter().position(|&corner| corner as usize == particle)?;
-            push(self.cells.kind[cell] as usize, 1)?;
+            // Of six triangles, the most, just what 128 bits hold.
+            push(self.cells.kind[cell] as usize, 8)?;
             push(own, 3)?;
             for &corner in corners.iter().filter(|&&corner| corner as usize != particle) {
                 push(seen.iter().position(|&j| j == corner)?, 5)?;
@@ -130,7 +131,8 @@ impl Assembly<'_> {
     fn long_pattern(&self, particle: usize) -> Option<Pattern> {
         let mut pattern = vec![u8::try_from(self.neighbours.of(particle).len()).ok()?];
         let mut push = |cell: usize, count: usize| {
-            pattern.push(u8::try_from(self.cells.kind[cell]).ok().filter(|&kind| kind < 2)?);
+            let whole = |kind: &u8| usize::from(*kind) < self.cells.whole;
+            pattern.push(u8::try_from(self.cells.kind[cell]).ok().filter(whole)?);
             pattern.push(u8::try_from(count).ok()?);
             for slot in self.slots(particle, cell) {
                 pattern.push(if slot? == OWN { u8::MAX } else { u8::try_from(slot?).ok()? });
@@ -141,7 +143,7 @@ impl Assembly<'_> {
         for patch in self.patches(particle) {
             for (k, part) in patch.parts.iter().enumerate() {
                 // Patches begin where their number of cells is told; the share tells how many patches a cell is in.
-                let (_, averaged) = self.averaged.as_ref()?;
+                let averaged = self.averaged.as_ref()?;
                 push(part.cell, 8 * averaged.middles(part.cell).count() + usize::from(k == 0))?;
             }
         }
@@ -150,7 +152,7 @@ impl Assembly<'_> {
 
     /// The patches that a particle feels, alike for all particles that feel one.
     fn patches(&self, particle: usize) -> Vec<Patch> {
-        let Some((lambda, patches)) = &self.averaged else { return Vec::new() };
+        let Some(patches) = &self.averaged else { return Vec::new() };
         let mut middles: Vec<usize> = self.around(particle).flat_map(|cell| patches.middles(cell)).collect();
         middles.sort_unstable();
         middles.dedup();
@@ -158,11 +160,11 @@ impl Assembly<'_> {
         let own = |cell: &usize| self.cells.of(*cell).contains(&(particle as u32));
         let felt = around.filter(|patch| patch.iter().any(own));
         let of_cells = |cells: Vec<usize>| {
-            let factor = self.factor(cells[0]);
+            let lambda = patches.lambda(cells[0]).unwrap_or(0.0) * self.factor(cells[0]);
             let part = |cell: usize| Part { cell, share: patches.share(cell) };
             let parts: Vec<Part> = cells.into_iter().map(part).collect();
             let area: f64 = parts.iter().map(|part| part.share).sum();
-            Patch { stiffness: lambda * factor / area, parts }
+            Patch { stiffness: lambda / area, parts }
         };
         felt.map(of_cells).collect()
     }

@@ -9,8 +9,6 @@ pub const LARGEST_DOMAIN: u16 = 232;
 /// How far nodes look for each other.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum DiscoveryRange {
-    /// No discovery at all.
-    Off,
     /// This machine only.
     Localhost,
     /// Whoever multicast reaches.
@@ -28,8 +26,6 @@ pub struct Environment {
     /// How far to discover (`ROS_LOCALHOST_ONLY` before `ROS_AUTOMATIC_DISCOVERY_RANGE`)
     /// \[default: subnet\].
     pub discovery: DiscoveryRange,
-    /// Hosts to discover besides (`ROS_STATIC_PEERS`, separated by `;`), as typed.
-    pub static_peers: Vec<String>,
     /// The middleware of the nodes around (`RMW_IMPLEMENTATION`), as typed: it decides how services
     /// are called.
     pub middleware: Option<String>,
@@ -39,7 +35,8 @@ impl Environment {
     /// Reads the variables through `look_up`; an empty one counts as not set.
     ///
     /// # Errors
-    /// A domain that is no whole number from 0 to 232, an unknown discovery range, enforced security.
+    /// A domain that is no whole number from 0 to 232, an unknown discovery range, and what this node cannot do:
+    /// discovery that is off, peers by address, enforced security.
     pub fn read(look_up: &dyn Fn(&str) -> Option<String>) -> Result<Self, RosArgumentError> {
         let variable = |name: &str| look_up(name).filter(|value| !value.is_empty());
         refuse_enforced_security(&variable)?;
@@ -50,10 +47,17 @@ impl Environment {
             Some(range) => read_range(range)?,
             None => DiscoveryRange::default(),
         };
-        let static_peers = variable("ROS_STATIC_PEERS").unwrap_or_default();
-        let static_peers =
-            static_peers.split(';').filter(|peer| !peer.is_empty()).map(String::from).collect();
-        Ok(Self { domain, discovery, static_peers, middleware: variable("RMW_IMPLEMENTATION") })
+        if let Some(value) =
+            variable("ROS_STATIC_PEERS").filter(|peers| peers.split(';').any(|p| !p.is_empty()))
+        {
+            return Err(RosArgumentError::Environment {
+                variable: "ROS_STATIC_PEERS",
+                value,
+                reason: "this node finds peers by multicast and on this computer, not by address",
+                help: "unset it for this process and let multicast reach the peers, or run it beside them",
+            });
+        }
+        Ok(Self { domain, discovery, middleware: variable("RMW_IMPLEMENTATION") })
     }
 }
 
@@ -69,7 +73,14 @@ fn read_domain(value: String) -> Result<u16, RosArgumentError> {
 
 fn read_range(value: String) -> Result<DiscoveryRange, RosArgumentError> {
     Ok(match value.as_str() {
-        "OFF" => DiscoveryRange::Off,
+        "OFF" => {
+            return Err(RosArgumentError::Environment {
+                variable: "ROS_AUTOMATIC_DISCOVERY_RANGE",
+                value,
+                reason: "a node that looks for nobody, not even on this computer, has nobody to fly with",
+                help: "set LOCALHOST for this computer alone, or use --transport shm, which opens no socket",
+            });
+        }
         "LOCALHOST" => DiscoveryRange::Localhost,
         "SUBNET" => DiscoveryRange::Subnet,
         "SYSTEM_DEFAULT" => DiscoveryRange::SystemDefault,
@@ -78,7 +89,7 @@ fn read_range(value: String) -> Result<DiscoveryRange, RosArgumentError> {
                 variable: "ROS_AUTOMATIC_DISCOVERY_RANGE",
                 value,
                 reason: "is no discovery range",
-                help: "set OFF, LOCALHOST, SUBNET or SYSTEM_DEFAULT, or unset it for SUBNET",
+                help: "set LOCALHOST, SUBNET or SYSTEM_DEFAULT, or unset it for SUBNET",
             });
         }
     })

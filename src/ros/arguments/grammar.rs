@@ -66,11 +66,30 @@ impl RosArguments {
                 self.logging.take_level(&rule)?;
             }
             "--log-config-file" => {
-                self.logging.config_file = Some(value("the path of a configuration file")?.into());
+                return Err(no_log_library(&flag, value("the path of a configuration file")?));
             }
-            "--log-file-name" => self.logging.file_name = Some(value("a file name prefix")?),
-            "-e" | "--enclave" => self.enclave = Some(value("a security enclave /PATH")?),
+            "--log-file-name" => return Err(no_log_library(&flag, value("a file name prefix")?)),
+            "-e" | "--enclave" => match value("a security enclave /PATH")?.as_str() {
+                // The one that every node is in without being told.
+                "/" => {}
+                enclave => {
+                    return Err(RosArgumentError::Rule {
+                        flag: flag.clone(),
+                        rule: enclave.into(),
+                        reason: "this node speaks unsecured DDS and has no keys of an enclave".into(),
+                        help: "leave it out; who must be kept out has to be kept off the network",
+                    });
+                }
+            },
             switch if switch_of(&mut self.logging, switch) => {}
+            "--enable-rosout-logs" | "--enable-external-lib-logs" => {
+                return Err(RosArgumentError::Rule {
+                    flag: flag.clone(),
+                    rule: String::new(),
+                    reason: "this node logs to the console alone".into(),
+                    help: "leave it out, and keep the console's output",
+                });
+            }
             _ => return Err(unknown(flag)),
         }
         Ok(())
@@ -96,14 +115,23 @@ fn switch_of(logging: &mut Logging, flag: &str) -> bool {
         (_, Some(name)) => (false, name),
         _ => return false,
     };
-    let switch = match name {
-        "rosout-logs" => &mut logging.rosout,
-        "stdout-logs" => &mut logging.stdout,
-        "external-lib-logs" => &mut logging.external_library,
+    match name {
+        "stdout-logs" => logging.stdout = on,
+        // There are none.
+        "rosout-logs" | "external-lib-logs" => return !on,
         _ => return false,
-    };
-    *switch = on;
+    }
     true
+}
+
+fn no_log_library(flag: &str, rule: String) -> RosArgumentError {
+    let reason = "this node logs to the console alone".into();
+    RosArgumentError::Rule {
+        flag: flag.into(),
+        rule,
+        reason,
+        help: "leave it out, and keep the console's output",
+    }
 }
 
 fn unknown(flag: String) -> RosArgumentError {

@@ -1,7 +1,5 @@
 //! What is logged, and to where.
 
-use std::path::PathBuf;
-
 use super::RosArgumentError;
 
 /// Severity of a log message, as `rcutils` names them.
@@ -23,29 +21,13 @@ pub struct Logging {
     pub level: Option<Severity>,
     /// Least severity of single loggers, in the order given; the last one of a name counts.
     pub loggers: Vec<(String, Severity)>,
-    /// Configuration of an external logging library; there is none in this program.
-    pub config_file: Option<PathBuf>,
-    /// Prefix of log files of an external logging library; there is none in this program.
-    pub file_name: Option<String>,
-    /// Logs go to `/rosout` \[default: true\].
-    pub rosout: bool,
     /// Logs go to the console \[default: true\].
     pub stdout: bool,
-    /// Logs go to an external logging library \[default: true\].
-    pub external_library: bool,
 }
 
 impl Default for Logging {
     fn default() -> Self {
-        Self {
-            level: None,
-            loggers: Vec::new(),
-            config_file: None,
-            file_name: None,
-            rosout: true,
-            stdout: true,
-            external_library: true,
-        }
+        Self { level: None, loggers: Vec::new(), stdout: true }
     }
 }
 

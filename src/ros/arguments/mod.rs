@@ -53,8 +53,6 @@ pub struct RosArguments {
     pub parameter_files: Vec<PathBuf>,
     /// What is logged, and to where.
     pub logging: Logging,
-    /// Security enclave (`-e`), kept as typed; this node speaks unsecured DDS.
-    pub enclave: Option<String>,
     /// What the environment says.
     pub environment: Environment,
 }

@@ -14,8 +14,15 @@ use ros2_client::dds::rustdds::{
 use ros2_client::entities_info::{NodeEntitiesInfo, ParticipantEntitiesInfo};
 use ros2_client::{Gid, NodeName};
 
+use super::participant::Reader;
+use super::topic::{Taken, next};
+use super::wire::decode;
+
 /// How often the watcher looks \[s\]. Nodes announced within one look go out as one sample.
 const LOOK: Duration = Duration::from_millis(20);
+
+/// Announcements taken in one look \[1\].
+const MOST_AT_ONCE: usize = 64;
 
 /// First twelve bytes of a GUID: the participant.
 pub(super) fn prefix(guid: GUID) -> [u8; 12] {
@@ -37,6 +44,8 @@ struct State {
     /// Node's fully qualified name to what it owns.
     nodes: BTreeMap<String, Owned>,
     nodes_changed: bool,
+    /// Other participants' nodes that bear names of ours.
+    twins: BTreeMap<[u8; 12], Vec<String>>,
 }
 
 struct Owned {
@@ -93,6 +102,33 @@ impl Graph {
             .is_some_and(|all| all.iter().any(|&guid| prefix(guid) == participant))
     }
 
+    /// Nodes of others that bear this name \[1\].
+    pub fn twins(&self, node: &str) -> usize {
+        self.state().twins.values().flatten().filter(|name| *name == node).count()
+    }
+
+    /// Another participant told what nodes it has.
+    fn hear(&self, info: &ParticipantEntitiesInfo, own: GUID) {
+        let from: [u8; 12] = std::array::from_fn(|i| info.gid().to_bytes16()[i]);
+        if from == prefix(own) {
+            return;
+        }
+        let mut state = self.state();
+        let names = info.nodes().iter().map(NodeEntitiesInfo::fully_qualified_name);
+        let ours: Vec<String> = names.filter(|name| state.nodes.contains_key(name)).collect();
+        let known = state.twins.get(&from).map_or(&[][..], |all| all);
+        for name in ours.iter().filter(|name| !known.contains(name)) {
+            tracing::error!(
+                "another node is called {name}: both take its commands and both move its robots; end one of them, or \
+                 give it another name (-r __node:=NAME) or namespace"
+            );
+        }
+        match ours.is_empty() {
+            true => state.twins.remove(&from),
+            false => state.twins.insert(from, ours),
+        };
+    }
+
     fn note(&self, event: DomainParticipantStatusEvent) {
         use DomainParticipantStatusEvent as Event;
         let mut state = self.state();
@@ -109,6 +145,7 @@ impl Graph {
             Event::ParticipantLost { id, .. } => {
                 let gone: &[u8] = id.as_ref();
                 state.matched.values_mut().for_each(|all| all.retain(|&guid| prefix(guid) != gone));
+                state.twins.retain(|from, _| from != gone);
             }
             Event::RemoteReaderQosIncompatible { local_writer: local, .. }
             | Event::RemoteWriterQosIncompatible { local_reader: local, .. } => {
@@ -152,12 +189,13 @@ impl Watcher {
         participant: &DomainParticipant,
         guid: GUID,
         writer: DataWriterCdr<ParticipantEntitiesInfo>,
+        reader: Reader,
     ) -> std::io::Result<Self> {
         let (stop, stopped) = channel();
         let listener = participant.status_listener();
         let thread = std::thread::Builder::new()
             .name("ros graph".into())
-            .spawn(move || watch(&graph, &listener, guid, &writer, &stopped))?;
+            .spawn(move || watch(&graph, &listener, guid, &writer, &reader, &stopped))?;
         Ok(Self { stop: Some(stop), thread: Some(thread) })
     }
 }
@@ -177,12 +215,25 @@ fn watch(
     listener: &DomainParticipantStatusListener,
     guid: GUID,
     writer: &DataWriterCdr<ParticipantEntitiesInfo>,
+    reader: &Reader,
     stopped: &Receiver<()>,
 ) {
     use ros2_client::dds::rustdds::RTPSEntity;
     while stopped.recv_timeout(LOOK) == Err(RecvTimeoutError::Timeout) {
-        while let Some(event) = listener.try_recv_status() {
+        // As many as RustDDS keeps for us.
+        for event in std::iter::from_fn(|| listener.try_recv_status()).take(2048) {
             graph.note(event);
+        }
+        for _ in 0..MOST_AT_ONCE {
+            let payload = match next(reader) {
+                Taken::Nothing => break,
+                Taken::Unreadable => continue,
+                Taken::Sample(sample) => sample.payload,
+            };
+            // Names that are none are nobody's twin.
+            if let Ok(info) = decode::<ParticipantEntitiesInfo>(&payload.bytes, payload.order) {
+                graph.hear(&info, guid);
+            }
         }
         if let Some(news) = graph.news(guid, writer.guid())
             && let Err(error) = writer.write(news, Some(Timestamp::now()))

@@ -2,25 +2,31 @@
 //!
 //! Everything here is polled. A node's loop is one thread that takes what arrived once per tick and
 //! publishes; no call below waits for the network. RustDDS (through ros2-client) does the protocol on its
-//! own threads, and one more thread of ours watches who is there.
+//! own threads; one more thread of ours watches who is there, one hands over what is sent.
 //!
 //! * [`participant`]: an [`Edge`] is one DDS participant; [`Node`]s of one process share it.
 //! * [`topic`]: publishers and subscriptions; [`quality`]: what they promise each other.
 //! * [`service`]: services that answer peers on Fast DDS and on Cyclone DDS alike.
 //! * [`parameters`], [`lifecycle`]: what ROS 2 expects of a node, as pure cores and their services.
+//! * [`pulse`]: whether the middleware still lives.
+//! * [`said()`]: text from the network, fit to be shown.
 //! * [`clock`]: system time or the simulator's.
 //!
 //! Times are seconds since the Unix epoch as `f64`.
 
 pub mod clock;
+mod door;
 mod graph;
 pub mod lifecycle;
 pub mod loopback;
 pub mod message;
 pub mod names;
+mod outbox;
 pub mod parameters;
 pub mod participant;
+pub mod pulse;
 pub mod quality;
+mod said;
 pub mod service;
 pub mod services;
 pub mod topic;
@@ -29,6 +35,7 @@ pub mod wire;
 pub use message::{Message, ServiceType};
 pub use participant::{Edge, Node, Options};
 pub use quality::Quality;
+pub use said::{escaped, said};
 pub use service::{RequestId, Service};
 pub use topic::{Publisher, Stamps, Subscription};
 

@@ -14,6 +14,8 @@ use ros2_client::dds::rustdds::{
 };
 
 use super::graph::{Graph, Watcher};
+use super::outbox::{Outbox, Outlet};
+use super::pulse::{self, Pulse};
 use super::wire::{Payload, Verbatim};
 use super::{EdgeError, Message, Publisher, Quality, Service, ServiceType, Subscription, names};
 
@@ -49,6 +51,7 @@ const LEAVING: Duration = Duration::from_secs(3);
 pub(super) struct Shared {
     // Fields drop in this order: the watcher holds the participant too.
     watcher: Option<Watcher>,
+    pub outbox: Outbox,
     publisher: DdsPublisher,
     subscriber: DdsSubscriber,
     participant: Option<DomainParticipant>,
@@ -72,9 +75,30 @@ impl Edge {
             builder = builder.with_only_networks([IpAddr::from([127, 0, 0, 1])]);
         }
         let refused = |reason: String| EdgeError::Participant { domain, reason };
+        let before = super::door::sockets().unwrap_or_default();
         let participant = builder.build().map_err(|error| refused(error.to_string()))?;
+        match super::door::guard(&before, options.loopback_only) {
+            Ok(_) => {}
+            // Nobody is let in who was to be kept out.
+            Err(error) if options.loopback_only => {
+                return Err(refused(format!("the kernel cannot keep other computers out: {error}")));
+            }
+            Err(error) => {
+                tracing::warn!("packets are not filtered before the middleware reads them: {error}")
+            }
+        }
         let shared = Shared::join(participant).map_err(|error| refused(error.to_string()))?;
         Ok(Self { shared: Arc::new(shared) })
+    }
+
+    pub(super) fn with_participant<T>(
+        &self,
+        open: impl FnOnce(&Shared, &DomainParticipant) -> Result<T, EdgeError>,
+    ) -> Result<T, EdgeError> {
+        // It is taken out when the last of us is dropped.
+        let closed =
+            || EdgeError::Endpoint { topic: "participant".into(), reason: "the edge is closed".into() };
+        open(&self.shared, self.shared.participant.as_ref().ok_or_else(closed)?)
     }
 
     /// A node of this participant.
@@ -105,11 +129,15 @@ impl Shared {
             TopicKind::NoKey,
         )?;
         let writer = publisher.create_datawriter_no_key_cdr(&announcements, None)?;
+        // Whoever was here before us announced itself before we came.
+        let policies = Quality::transient_local(1).policies();
+        let reader = subscriber.create_simple_datareader_no_key(&announcements, Some(policies))?;
         let graph = Arc::new(Graph::default());
         let guid = participant.guid();
-        let watcher = Watcher::start(graph.clone(), &participant, guid, writer)?;
+        let watcher = Watcher::start(graph.clone(), &participant, guid, writer, reader)?;
         Ok(Self {
             watcher: Some(watcher),
+            outbox: Outbox::start()?,
             publisher,
             subscriber,
             participant: Some(participant),
@@ -131,14 +159,14 @@ impl Shared {
             .map_err(|error| refused(error.to_string()))
     }
 
-    fn reader(&self, topic: &str, kind: &str, quality: Quality) -> Result<Reader, EdgeError> {
+    pub fn reader(&self, topic: &str, kind: &str, quality: Quality) -> Result<Reader, EdgeError> {
         let policies = quality.policies();
         let dds = self.topic(topic, kind, &policies)?;
         patiently(|| self.subscriber.create_simple_datareader_no_key(&dds, Some(policies.clone())))
             .map_err(|error| EdgeError::Endpoint { topic: topic.to_owned(), reason: error.to_string() })
     }
 
-    fn writer(&self, topic: &str, kind: &str, quality: Quality) -> Result<Writer, EdgeError> {
+    pub fn writer(&self, topic: &str, kind: &str, quality: Quality) -> Result<Writer, EdgeError> {
         let policies = quality.policies();
         let dds = self.topic(topic, kind, &policies)?;
         patiently(|| self.publisher.create_datawriter_no_key(&dds, Some(policies.clone())))
@@ -164,6 +192,7 @@ fn patiently<T, E: std::fmt::Display>(mut create: impl FnMut() -> Result<T, E>) 
 impl Drop for Shared {
     fn drop(&mut self) {
         self.watcher.take();
+        self.outbox.close();
         let (done, finished) = channel();
         let participant = self.participant.take();
         // RustDDS joins its threads without a limit; ours is not kept by a thread of its that hangs.
@@ -189,6 +218,19 @@ impl Node {
         &self.name
     }
 
+    /// Has a watchdog end the process when the middleware is dead or deaf: see [`pulse`].
+    ///
+    /// # Errors
+    /// A computer that gives no socket or thread.
+    pub fn watch(&self) -> Result<Arc<Pulse>, EdgeError> {
+        Edge { shared: self.shared.clone() }.with_participant(pulse::start)
+    }
+
+    /// Other nodes of this name that others announce \[1\]. ROS 2 lets them all be, and each answers for all.
+    pub fn twins(&self) -> usize {
+        self.shared.graph.twins(&self.name)
+    }
+
     /// Fully qualified name of a private name: `~/leaf`.
     pub fn private(&self, leaf: &str) -> String {
         format!("{}/{leaf}", self.name)
@@ -209,7 +251,8 @@ impl Node {
         let kind = names::dds_message(M::PACKAGE, M::NAME);
         let writer = self.shared.writer(&names::dds_topic(topic), &kind, quality)?;
         self.shared.graph.add_writer(&self.name, writer.guid(), topic);
-        Ok(Publisher::new(topic.to_owned(), writer, self.shared.clone()))
+        let outlet = Outlet::new(topic, writer, quality.depth);
+        Ok(Publisher::new(topic.to_owned(), outlet, self.shared.clone()))
     }
 
     /// A subscription on a fully qualified topic.
@@ -241,7 +284,8 @@ impl Node {
         let reader = self.shared.reader(&requests, &request, Service::<S>::QUALITY)?;
         self.shared.graph.add_writer(&self.name, writer.guid(), name);
         self.shared.graph.add_reader(&self.name, reader.guid(), name);
-        Ok(Service::new(name.to_owned(), reader, writer, self.shared.clone()))
+        let outlet = Outlet::new(name, writer, Service::<S>::QUALITY.depth);
+        Ok(Service::new(name.to_owned(), reader, outlet, self.shared.clone()))
     }
 }
 

@@ -14,13 +14,14 @@ use std::time::{Duration, Instant};
 
 use ros2_client::RmwRequestId;
 use ros2_client::dds::rustdds::rpc::SampleIdentity;
-use ros2_client::dds::rustdds::{GUID, RTPSEntity, SequenceNumber, Timestamp, WriteOptionsBuilder};
+use ros2_client::dds::rustdds::{GUID, SequenceNumber, Timestamp, WriteOptionsBuilder};
 
 use super::graph::prefix;
-use super::participant::{Reader, Shared, Writer};
+use super::outbox::Outlet;
+use super::participant::{Reader, Shared};
 use super::topic::{Taken, next};
 use super::wire::{BadPayload, Order, Payload, decode, encode};
-use super::{EdgeError, Quality, ServiceType};
+use super::{EdgeError, Quality, ServiceType, said};
 
 /// Bytes before a request or reply of Cyclone DDS.
 const HEADER: usize = 16;
@@ -48,7 +49,7 @@ enum Mark {
 pub struct Service<S: ServiceType> {
     name: String,
     reader: Reader,
-    writer: Writer,
+    outlet: Arc<Outlet>,
     shared: Arc<Shared>,
     waiting: RefCell<VecDeque<Waiting<S::Request>>>,
     refused: Cell<u64>,
@@ -66,9 +67,9 @@ impl<S: ServiceType> Service<S> {
     /// What ROS 2 gives services: every sample counts, none is kept for late joiners.
     pub const QUALITY: Quality = Quality::reliable(10);
 
-    pub(super) fn new(name: String, reader: Reader, writer: Writer, shared: Arc<Shared>) -> Self {
+    pub(super) fn new(name: String, reader: Reader, outlet: Arc<Outlet>, shared: Arc<Shared>) -> Self {
         let waiting = RefCell::new(VecDeque::new());
-        Self { name, reader, writer, shared, waiting, refused: Cell::new(0), kind: PhantomData }
+        Self { name, reader, outlet, shared, waiting, refused: Cell::new(0), kind: PhantomData }
     }
 
     /// The next request and whom to answer, or none. Payloads that are no request are skipped and counted.
@@ -77,7 +78,7 @@ impl<S: ServiceType> Service<S> {
         let mut waiting = self.waiting.borrow_mut();
         let ready = waiting.iter().position(|asked| {
             asked.client == prefix(self.shared.guid())
-                || self.shared.graph.matches_participant(self.writer.guid(), asked.client)
+                || self.shared.graph.matches_participant(self.outlet.guid(), asked.client)
                 || asked.since.elapsed() > PATIENCE
         })?;
         waiting.remove(ready).map(|asked| (asked.id, asked.request))
@@ -107,7 +108,7 @@ impl<S: ServiceType> Service<S> {
     /// Answers a request, without waiting.
     ///
     /// # Errors
-    /// Clients that have not acknowledged earlier replies for long, or a participant that is gone.
+    /// What became of replies before: clients that have not acknowledged for long, a middleware that takes none.
     pub fn reply(&self, id: &RequestId, response: &S::Response) -> Result<(), EdgeError> {
         let refused = |reason: String| EdgeError::Send { topic: self.name.clone(), reason };
         let options = WriteOptionsBuilder::new().source_timestamp(Timestamp::now());
@@ -124,10 +125,7 @@ impl<S: ServiceType> Service<S> {
         encode(response, &mut body).map_err(refused)?;
         bytes.append(&mut body);
         let payload = Payload { order: Order::Little, bytes };
-        self.writer
-            .write_with_options(payload, options.build())
-            .map(|_| ())
-            .map_err(|error| refused(error.to_string()))
+        self.shared.outbox.post(&self.outlet, payload, options.build())
     }
 
     /// Answers the requests that wait, without waiting. A reply that cannot be sent is logged.
@@ -143,7 +141,11 @@ impl<S: ServiceType> Service<S> {
     fn refuse(&self, reason: &str) {
         let before = self.refused.replace(self.refused.get() + 1);
         if before == 0 {
-            tracing::warn!("{}: a request was refused: {reason} (only the first is reported)", self.name);
+            tracing::warn!(
+                "{}: a request was refused: {} (only the first is reported)",
+                self.name,
+                said(reason)
+            );
         }
     }
 
@@ -155,7 +157,7 @@ impl<S: ServiceType> Service<S> {
     /// Clients elsewhere that can ask and be answered \[1\].
     pub fn matched(&self) -> usize {
         let graph = &self.shared.graph;
-        graph.matched(self.reader.guid()).min(graph.matched(self.writer.guid()))
+        graph.matched(self.reader.guid()).min(graph.matched(self.outlet.guid()))
     }
 
     pub fn name(&self) -> &str {

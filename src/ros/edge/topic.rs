@@ -4,11 +4,12 @@ use std::cell::Cell;
 use std::marker::PhantomData;
 use std::sync::Arc;
 
-use ros2_client::dds::rustdds::{RTPSEntity, Timestamp};
+use ros2_client::dds::rustdds::{Timestamp, WriteOptionsBuilder};
 
-use super::participant::{Reader, Shared, Writer};
+use super::outbox::Outlet;
+use super::participant::{Reader, Shared};
 use super::wire::{Payload, decode};
-use super::{EdgeError, Message};
+use super::{EdgeError, Message, said};
 
 /// When a sample was sent and when it came.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,29 +23,30 @@ pub struct Stamps {
 /// Sends messages of one type on one topic.
 pub struct Publisher<M> {
     topic: String,
-    writer: Writer,
+    outlet: Arc<Outlet>,
     shared: Arc<Shared>,
     kind: PhantomData<fn(M)>,
 }
 
 impl<M: Message> Publisher<M> {
-    pub(super) fn new(topic: String, writer: Writer, shared: Arc<Shared>) -> Self {
-        Self { topic, writer, shared, kind: PhantomData }
+    pub(super) fn new(topic: String, outlet: Arc<Outlet>, shared: Arc<Shared>) -> Self {
+        Self { topic, outlet, shared, kind: PhantomData }
     }
 
     /// Sends one message to whoever matches, without waiting.
     ///
     /// # Errors
-    /// A reliable topic whose peers have not acknowledged for long, or a participant that is gone.
+    /// What became of messages before: peers that have not acknowledged for long, a middleware that takes none.
     pub fn publish(&self, message: &M) -> Result<(), EdgeError> {
         let refused = |reason: String| EdgeError::Send { topic: self.topic.clone(), reason };
         let payload = Payload::of(message).map_err(refused)?;
-        self.writer.write(payload, Some(Timestamp::now())).map_err(|error| refused(error.to_string()))
+        let options = WriteOptionsBuilder::new().source_timestamp(Timestamp::now()).build();
+        self.shared.outbox.post(&self.outlet, payload, options)
     }
 
     /// Subscriptions elsewhere that receive this \[1\].
     pub fn matched(&self) -> usize {
-        self.shared.graph.matched(self.writer.guid())
+        self.shared.graph.matched(self.outlet.guid())
     }
 
     pub fn topic(&self) -> &str {
@@ -103,7 +105,11 @@ impl<M: Message> Subscription<M> {
     fn refuse(&self, reason: &str) {
         let before = self.refused.replace(self.refused.get() + 1);
         if before == 0 {
-            tracing::warn!("{}: a message was refused: {reason} (only the first is reported)", self.topic);
+            tracing::warn!(
+                "{}: a message was refused: {} (only the first is reported)",
+                self.topic,
+                said(reason)
+            );
         }
     }
 

@@ -56,13 +56,15 @@ impl Statistics {
         due
     }
 
-    /// The report, and a new beginning for the times in it; `refused` messages were none of their type.
+    /// The report, and a new beginning for the times in it; `refused` messages were none of their type, `troubles` are
+    /// those of the network.
     pub fn message(
         &mut self,
         control: &Control,
         name: &str,
         header: Header,
         refused: u64,
+        troubles: &[String],
     ) -> DiagnosticArray {
         let formation = control.formation();
         let now = header.stamp.seconds();
@@ -78,6 +80,7 @@ impl Statistics {
         let rate = self.since.filter(|&since| now > since).map(|since| self.ticks as f64 / (now - since));
         let (level, message) = match (control.mode(), lost.len(), missed) {
             (Mode::EmergencyStopped, ..) => (DiagnosticStatus::ERROR, "emergency stop".to_owned()),
+            _ if !troubles.is_empty() => (DiagnosticStatus::ERROR, troubles.join("; ")),
             (_, all, _) if all == formation.count() => (DiagnosticStatus::ERROR, "nobody is heard".into()),
             (_, 1.., _) => {
                 (DiagnosticStatus::WARN, format!("{} of {} robots lost", lost.len(), formation.count()))

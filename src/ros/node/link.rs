@@ -3,7 +3,7 @@
 use super::pose::{PoseSource, is_frame};
 use super::tape::Tape;
 use super::{NodeError, TopicOf};
-use crate::ros::edge::{EdgeError, Node, Publisher, Quality, Subscription};
+use crate::ros::edge::{EdgeError, Node, Publisher, Quality, Subscription, said};
 use crate::ros::messages::builtin_interfaces::Time;
 use crate::ros::messages::geometry_msgs::{Pose, PoseStamped};
 use crate::ros::messages::std_msgs::Header;
@@ -20,6 +20,8 @@ pub struct Link {
     targets: Vec<Option<Publisher<PoseStamped>>>,
     frame_id: String,
     simulated_time: bool,
+    /// Places of leaders in another frame.
+    misframed: u64,
     /// Gets a copy of what goes through.
     pub tape: Option<Tape>,
 }
@@ -45,7 +47,15 @@ impl Link {
             targets[m] = Some(node.publisher(&topic(&raw.target_topic, m)?, Quality::reliable(1))?);
         }
         let poses = PoseSource::open(node, raw, &part.heard, topic)?;
-        Ok(Self { poses, leaders, targets, frame_id: raw.frame_id.clone(), simulated_time, tape: None })
+        Ok(Self {
+            poses,
+            leaders,
+            targets,
+            frame_id: raw.frame_id.clone(),
+            simulated_time,
+            misframed: 0,
+            tape: None,
+        })
     }
 }
 
@@ -65,12 +75,15 @@ impl ControllerEnd for Link {
                 let place = message.pose.position;
                 hear(Heard::Leader(*member, [place.x, place.y]));
             } else {
-                tracing::warn!(
-                    "{}: frame `{}` is not `{}`, which the swarm file names",
-                    topic.topic(),
-                    message.header.frame_id,
-                    self.frame_id
-                );
+                if self.misframed == 0 {
+                    tracing::warn!(
+                        "{}: frame `{}` is not `{}`, which the swarm file names (only the first is reported)",
+                        topic.topic(),
+                        said(&message.header.frame_id),
+                        self.frame_id
+                    );
+                }
+                self.misframed += 1;
             }
         }
     }
@@ -91,7 +104,9 @@ impl ControllerEnd for Link {
     }
 
     fn refused(&self) -> u64 {
-        self.poses.refused() + self.leaders.iter().map(|(_, topic)| topic.refused()).sum::<u64>()
+        self.misframed
+            + self.poses.refused()
+            + self.leaders.iter().map(|(_, topic)| topic.refused()).sum::<u64>()
     }
 }
 

@@ -1,10 +1,12 @@
 //! `flockform node`: the control loop over ROS 2.
 //!
-//! One thread ticks at a steady rate: it takes what arrived, calls [`Control::tick`] and publishes. Everything it
-//! holds is polled; a peer that is slow, gone or wrong cannot hold it up.
+//! One thread ticks at a steady rate: it takes what arrived, calls [`Control::tick`] and lays what it publishes into
+//! bounded queues. Everything it holds is polled; a peer that is slow, gone or wrong cannot hold it up, and a
+//! middleware that does ends the process ([`pulse`](super::edge::pulse)).
 
 pub mod diagnostics;
 mod drive;
+mod kept;
 pub mod leaders;
 mod link;
 pub mod markers;
@@ -13,13 +15,15 @@ mod settings;
 pub mod state;
 pub mod tape;
 
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use super::arguments::{DiscoveryRange, NameError, Names, RosArguments};
 use super::edge::clock::Clock;
-use super::edge::lifecycle::{Goal, Lifecycle, Outcome};
-use super::edge::parameters::{Parameters, Refusal};
+use super::edge::lifecycle::{Goal, Lifecycle, Outcome, Transition};
+use super::edge::parameters::{Change, Parameters, Refusal};
+use super::edge::pulse::Pulse;
 use super::edge::services::std_srvs;
 use super::edge::{Edge, EdgeError, Node, Options, Publisher, Quality, Service, ServiceType};
 use super::messages::builtin_interfaces::Time;
@@ -36,6 +40,7 @@ use crate::swarm::pace::{Pace, system_time};
 use crate::swarm::transport::{ControllerEnd, listen, target_of, targets};
 use diagnostics::Statistics;
 use drive::Drive;
+pub use kept::KeptNode;
 use leaders::{as_event, set_formation};
 pub use link::Link;
 use settings::Settings;
@@ -92,8 +97,10 @@ pub struct FormationNode {
     names: Names,
     /// What the tape of the link was last told.
     was_active: bool,
+    /// Of the watchdog, where there is one.
+    pulse: Option<Arc<Pulse>>,
     // Dropped after all that was made from it.
-    _node: Node,
+    node: Node,
 }
 
 impl FormationNode {
@@ -110,6 +117,7 @@ impl FormationNode {
         let node = edge.node(names.namespace(), names.node_name())?;
 
         let (mut settings, store) = settings::declare(&control, arguments, &names.fully_qualified())?;
+        check_commands(swarm, settings.autostart)?;
         let mut pace = Pace::new(settings.rate);
         settings.apply_all(&store, &mut control, &mut pace);
         let clock = if settings.use_sim_time { Clock::simulated(&node)? } else { Clock::system() };
@@ -145,12 +153,13 @@ impl FormationNode {
             frame_id: raw.frame_id.clone(),
             swarm: swarm.clone(),
             was_active: false,
+            pulse: None,
             names,
             drives,
             clock,
             settings,
             control,
-            _node: node,
+            node,
         };
         this.control.set_active(false);
         if this.settings.autostart {
@@ -172,18 +181,45 @@ impl FormationNode {
         Ok(())
     }
 
+    /// Has a watchdog end this process when the middleware is dead or deaf: for programs that are started again.
+    ///
+    /// # Errors
+    /// A computer that gives no socket or thread.
+    pub fn watch_middleware(&mut self) -> Result<(), EdgeError> {
+        self.pulse = Some(self.node.watch()?);
+        Ok(())
+    }
+
     /// Ticks until `stop` is set.
     pub fn run(&mut self, stop: &AtomicBool) {
+        self.run_while(stop, &mut |_| true);
+    }
+
+    /// Ticks until `stop` is set or `look`, which is shown the node after each tick, has seen enough; false if the
+    /// watchdog came first.
+    pub fn run_while(&mut self, stop: &AtomicBool, look: &mut dyn FnMut(&Self) -> bool) -> bool {
         while !stop.load(Ordering::Relaxed) {
             let missed = self.pace.wait();
             self.statistics.missed += missed;
             self.tick();
+            if let Some(pulse) = &self.pulse {
+                pulse.hears(self.part.heard.iter().any(|&m| self.control.health(m).is_usable()));
+            }
+            if self.pulse.as_ref().is_some_and(|pulse| pulse.is_given_up()) {
+                self.control.set_active(false);
+                self.say(self.clock.now().unwrap_or_else(system_time), false);
+                return false;
+            }
+            if !look(self) {
+                break;
+            }
         }
         let now = self.clock.now().unwrap_or_else(system_time);
         let control = &mut self.control;
         self.lifecycle.shut_down(now, &mut |goal| act(control, goal));
         // Robots that are driven by velocities would go on for ever.
         self.publish(now);
+        true
     }
 
     pub fn control(&self) -> &Control {
@@ -198,6 +234,8 @@ impl FormationNode {
     /// One period: what arrived, the targets, what is published.
     pub fn tick(&mut self) {
         let begun = Instant::now();
+        let pulse = self.pulse.clone();
+        let inside = pulse.as_ref().map(|pulse| pulse.inside());
         if let Some(jump) = self.clock.poll() {
             tracing::warn!("time went back by {jump} s: waiting for poses of the new time");
         }
@@ -206,6 +244,7 @@ impl FormationNode {
         // Without a clock there is no age, and so nobody to be believed.
         let Some(now) = self.clock.now() else { return };
         listen(&mut self.control, &mut self.link, now);
+        drop(inside);
         self.tell_tape(now, LoopEvent::TICK, "", &[now]);
         self.control.tick(now);
         self.publish(now);
@@ -213,38 +252,57 @@ impl FormationNode {
         self.report(now);
     }
 
-    fn answer(&mut self, now: f64) {
-        let control = &mut self.control;
-        self.lifecycle.poll(now, &mut |goal| act(control, goal));
-        if self.lifecycle.is_active() != self.was_active {
-            self.was_active = self.lifecycle.is_active();
-            let kind = if self.was_active { LoopEvent::ACTIVE } else { LoopEvent::INACTIVE };
-            self.tell_tape(now, kind, "", &[]);
-        }
-        for change in self.parameters.poll(now) {
-            self.settings.apply(&change, &mut self.control, &mut self.pace);
+    fn apply(&mut self, changes: &[Change], now: f64) {
+        for change in changes {
+            self.settings.apply(change, &mut self.control, &mut self.pace);
             let name = if change.name == "rate" { "period" } else { &change.name };
             let value = tape::parameters(&self.control).into_iter().find(|(one, _)| *one == name);
             if let Some((name, value)) = value {
                 self.tell_tape(now, LoopEvent::PARAMETER, name, &[value]);
             }
         }
+    }
+
+    fn answer(&mut self, now: f64) {
+        let commands = self.swarm.raw.node.commands;
+        let not_allowed = format!("the swarm file has node.commands = \"{}\"", commands.name());
+        let may_switch = |edge: &Transition| {
+            commands.may_do_all() || (commands.may_stop() && ["deactivate", "shutdown"].contains(&edge.label))
+        };
+        let control = &mut self.control;
+        self.lifecycle.poll(now, &may_switch, &mut |goal| act(control, goal));
+        if self.lifecycle.is_active() != self.was_active {
+            self.was_active = self.lifecycle.is_active();
+            let kind = if self.was_active { LoopEvent::ACTIVE } else { LoopEvent::INACTIVE };
+            self.tell_tape(now, kind, "", &[]);
+        }
+        let locked = (!commands.may_do_all()).then_some(not_allowed.as_str());
+        let changes = self.parameters.poll(now, locked);
+        self.apply(&changes, now);
         let mut told: Vec<(u8, String, Vec<f64>)> = Vec::new();
         let outcome = |success, message: &str| std_srvs::Outcome { success, message: message.into() };
         let control = &mut self.control;
         self.stop.serve(|_| {
+            if !commands.may_stop() {
+                return outcome(false, &not_allowed);
+            }
             control.emergency_stop();
             told.push((LoopEvent::EMERGENCY_STOP, String::new(), Vec::new()));
             outcome(true, "everybody holds its place until ~/resume")
         });
-        self.resume.serve(|_| match control.resume() {
+        self.resume.serve(|_| match commands.may_do_all() && control.resume() {
+            _ if !commands.may_do_all() => outcome(false, &not_allowed),
             true => {
                 told.push((LoopEvent::RESUME, String::new(), Vec::new()));
                 outcome(true, "the formation goes on")
             }
             false => outcome(false, "there is no emergency stop to lift"),
         });
-        self.set_formation.serve(|request| match set_formation(control, &request) {
+        let mut set = |request: &SetFormationRequest| match locked {
+            Some(reason) => Err(reason.to_owned()),
+            None => set_formation(control, request),
+        };
+        self.set_formation.serve(|request| match set(&request) {
             Ok(message) => {
                 told.push(as_event(&request));
                 SetFormationResponse { success: true, message }
@@ -260,6 +318,17 @@ impl FormationNode {
         }
     }
 
+    /// What is wrong with the network around the node.
+    fn troubles(&self) -> Vec<String> {
+        let twins = self.node.twins();
+        let twin = |of: &str| format!("{twins} other node{of} the name {}", self.node.name());
+        match twins {
+            0 => Vec::new(),
+            1 => vec![twin(" has")],
+            _ => vec![twin("s have")],
+        }
+    }
+
     fn tell_tape(&mut self, now: f64, kind: u8, text: &str, values: &[f64]) {
         if let Some(tape) = &mut self.link.tape {
             tape.event(now, kind, text, values);
@@ -272,7 +341,10 @@ impl FormationNode {
 
     /// Targets while the node is active; velocities always, which are zero while it is not.
     fn publish(&mut self, now: f64) {
-        let active = self.lifecycle.is_active();
+        self.say(now, self.lifecycle.is_active());
+    }
+
+    fn say(&mut self, now: f64, active: bool) {
         if active {
             self.statistics.sent(self.link.send(now, &targets(&self.control, &self.part)));
         }
@@ -301,7 +373,9 @@ impl FormationNode {
         }
         if self.statistics.is_due(diagnostics::DIAGNOSTICS, now, 1.0) {
             let (header, refused) = (self.header(now), self.link.refused());
-            let message = self.statistics.message(&self.control, &self.swarm.name, header, refused);
+            let troubles = self.troubles();
+            let message =
+                self.statistics.message(&self.control, &self.swarm.name, header, refused, &troubles);
             copy(&mut self.link.tape, &self.diagnostics, &message, now);
             self.statistics.sent(self.diagnostics.publish(&message));
         }
@@ -317,6 +391,16 @@ fn copy<M: super::edge::Message>(tape: &mut Option<Tape>, topic: &Publisher<M>, 
 /// Where a member is sent, as a message.
 pub fn target(control: &Control, member: usize, header: Header) -> Option<PoseStamped> {
     target_of(control, member).map(|target| link::message(&target, header))
+}
+
+/// Refuses a node that nobody could make active.
+fn check_commands(swarm: &Swarm, autostart: bool) -> Result<(), SceneError> {
+    let commands = swarm.raw.node.commands;
+    if autostart || commands.may_do_all() {
+        return Ok(());
+    }
+    let what = format!("\"{}\" lets nobody make the node active, and autostart is false", commands.name());
+    Err(swarm.refuse("node.commands", what, "leave the parameter autostart true, or allow \"all\""))
 }
 
 /// What a transition of the lifecycle asks for.

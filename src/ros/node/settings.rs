@@ -27,20 +27,16 @@ pub fn declare(
     node: &str,
 ) -> Result<(Settings, Store), NodeError> {
     let limits = control.limits();
-    let finite = |limit: f64| if limit.is_finite() { limit } else { NONE };
     let declarations = [
         Declaration::new("rate", 1.0 / control.period()).range(1.0..=500.0).describe("targets a second [Hz]"),
         Declaration::new("state_rate", 10.0)
             .range(0.1..=100.0)
             .describe("formation states and markers a second, at most one a target [Hz]"),
-        Declaration::new("speed_limit", finite(limits.speed))
-            .range(0.0..=1000.0)
-            .describe("highest speed of a robot; 0 for none [m/s]"),
-        Declaration::new("acceleration_limit", finite(limits.acceleration))
-            .range(0.0..=1000.0)
-            .describe("highest acceleration of a robot; 0 for none [m/s^2]"),
+        at_most("speed_limit", limits.speed).describe("highest speed of a robot [m/s]"),
+        at_most("acceleration_limit", limits.acceleration)
+            .describe("highest acceleration of a robot [m/s^2]"),
         Declaration::new("clearance", limits.clearance)
-            .range(0.0..=1000.0)
+            .range(limits.clearance..=limits.clearance.max(1000.0))
             .describe("free space kept between two robots, or a robot and an obstacle [m]"),
         Declaration::new("damping", control.damping())
             .range(0.0..=2.0)
@@ -70,6 +66,18 @@ pub fn declare(
         autostart: flag("autostart"),
     };
     Ok((settings, store))
+}
+
+/// A limit that can be tightened and not loosened: the swarm file's word is the last, whoever asks.
+fn at_most(name: &str, limit: f64) -> Declaration {
+    if limit == f64::INFINITY {
+        let words = "0 for none, as the swarm file has it";
+        return Declaration::new(name, NONE).range(NONE..=1000.0).checked(words, |_, _| Ok(()));
+    }
+    Declaration::new(name, limit).range(0.0..=limit).checked("above 0", |_, value| match value.as_double() {
+        Some(number) if number > 0.0 => Ok(()),
+        _ => Err("0 would be no limit, and the swarm file sets one".into()),
+    })
 }
 
 impl Settings {

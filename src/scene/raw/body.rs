@@ -3,6 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::RawMaterial;
+
 /// The five plane Bravais lattices and the honeycomb.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
@@ -80,6 +82,10 @@ pub struct RawBody {
     /// Shapes taken out of the body; particles on their rims stay.
     #[serde(default)]
     pub holes: Vec<RawShape>,
+    /// Parts of another material, for the rule `material`. They may overlap (the later one counts), touch the outline of the
+    /// body and leave it. With the outline `fitted`, particles stand on their edges.
+    #[serde(default)]
+    pub inclusions: Vec<RawInclusion>,
     /// Whether the body keeps the outline of its shape; `fitted` for the rule `material`, `lattice` for others.
     #[serde(default)]
     pub outline: Option<RawOutline>,
@@ -87,6 +93,15 @@ pub struct RawBody {
     /// bounds, the centre of a disc, or the end of a specimen's axis.
     #[serde(default)]
     pub anchor: Option<[f64; 2]>,
+}
+
+/// A part of the body that is of another material.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawInclusion {
+    pub shape: RawShape,
+    /// Of the body's plane, stress or strain, and as thick.
+    pub material: RawMaterial,
 }
 
 /// How a body follows the outline of its shape.

@@ -163,6 +163,10 @@ pub struct RawRecord {
     /// Ids of the particles whose coordinates and pseudo-energies are kept at every step.
     #[serde(default)]
     pub probes: Vec<usize>,
+    /// Places of the undeformed body [x, y] whose displacement and stress at the end `run` tells, and `compare` beside the
+    /// truth's; needs a material [length].
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub places: Vec<[f64; 2]>,
     /// Steps at which the configuration is drawn (the last step always is) [step].
     #[serde(default)]
     pub figures: Vec<usize>,

@@ -8,15 +8,15 @@ use crate::material::cells;
 use crate::material::elastic::{Constants, Elastic, ElasticError, Plane};
 use crate::material::homogenise::Crystal;
 use crate::material::outline_loads::{Profile, Push};
-use crate::scene::Load;
 use crate::scene::document::problem::SceneError;
 use crate::scene::raw::*;
+use crate::scene::{Inclusion, Load};
 
 /// Part of the largest damping at which no wave grows: room for edges, whose rows are not a wave's.
 const OF_DAMPING_LIMIT: f64 = 0.9;
 
-pub fn elastic(raw: &Option<RawMaterial>, refuse: Refuse<'_>) -> Result<Option<Elastic>, SceneError> {
-    let Some(raw) = raw else { return Ok(None) };
+/// The constants of the material written at `at`.
+pub fn elastic(raw: &RawMaterial, at: &str, refuse: Refuse<'_>) -> Result<Elastic, SceneError> {
     let (constants, thickness) = match *raw {
         RawMaterial::Isotropic { young, poisson, plane, thickness } => {
             let plane = match plane {
@@ -33,20 +33,66 @@ pub fn elastic(raw: &Option<RawMaterial>, refuse: Refuse<'_>) -> Result<Option<E
     let refused = |error: ElasticError| {
         let (key, help) = match &error {
             ElasticError::NotPositive { name, .. } => match *name {
-                "the thickness" => ("material.thickness", "give a positive thickness"),
-                name if name.contains("hear") => ("material.shear", "give a positive modulus"),
-                _ => ("material.young", "give a positive modulus"),
+                "the thickness" => (".thickness", "give a positive thickness"),
+                name if name.contains("hear") => (".shear", "give a positive modulus"),
+                _ => (".young", "give a positive modulus"),
             },
-            ElasticError::Poisson { .. } => ("material.poisson", "give a ratio inside the range"),
+            ElasticError::Poisson { .. } => (".poisson", "give a ratio inside the range"),
             ElasticError::PoissonOrthotropic { .. } => {
-                ("material.poisson_12", "give a smaller ratio, or the moduli in the other order")
+                (".poisson_12", "give a smaller ratio, or the moduli in the other order")
             }
-            ElasticError::Angle { .. } => ("material.angle", "give an angle in degrees"),
-            ElasticError::Range => ("material", "give the constants in larger or smaller units"),
+            ElasticError::Angle { .. } => (".angle", "give an angle in degrees"),
+            ElasticError::Range => ("", "give the constants in larger or smaller units"),
         };
-        refuse(key, error.to_string(), help)
+        refuse(&format!("{at}{key}"), error.to_string(), help)
     };
-    Elastic::new(constants, thickness).map(Some).map_err(refused)
+    Elastic::new(constants, thickness).map_err(refused)
+}
+
+/// Parts of the body that are of another material.
+pub fn inclusions(
+    raw: &RawScene,
+    body: Option<&Elastic>,
+    refuse: Refuse<'_>,
+) -> Result<Vec<Inclusion>, SceneError> {
+    let inclusion = |(k, part): (usize, &RawInclusion)| {
+        let key = format!("body.inclusions[{k}]");
+        let refuse_part =
+            |at: &str, message: &str, help: &str| refuse(&format!("{key}{at}"), message.into(), help);
+        let Some(body) = body.filter(|_| is_material(raw)) else {
+            let help = "use rule.mean.kind = \"material\" with [material], or leave the inclusions out";
+            return Err(refuse_part("", "a part of another material needs a rule that is a material", help));
+        };
+        if matches!(raw.body.shape, RawShape::Grid { .. }) {
+            let help = "give the body as kind = \"rectangle\" with min and max";
+            return Err(refuse_part("", "a rectangle by count takes no inclusions", help));
+        }
+        let at = format!("{key}.shape");
+        let shape = super::solid(&part.shape, &at, refuse)?.ok_or_else(|| {
+            let help = "use kind = \"rectangle\", \"disc\", \"polygon\" or \"path\"";
+            refuse(
+                &at,
+                "an inclusion has to have a shape of its own, not a count of sites or points".into(),
+                help,
+            )
+        })?;
+        let material = elastic(&part.material, &format!("{key}.material"), refuse)?;
+        if material.thickness() != body.thickness() {
+            let message =
+                format!("the body is {} thick, and this part {}", body.thickness(), material.thickness());
+            let help = "give both the same thickness; for a thicker part multiply its moduli instead";
+            return Err(refuse_part(".material.thickness", &message, help));
+        }
+        let is_strain = |elastic: &Elastic| {
+            matches!(elastic.constants(), Constants::Isotropic { plane: Plane::Strain, .. })
+        };
+        if is_strain(&material) != is_strain(body) {
+            let message = "one part is in plane stress and the other in plane strain";
+            return Err(refuse_part(".material", message, "give both the same plane"));
+        }
+        Ok(Inclusion { shape, material })
+    };
+    raw.body.inclusions.iter().enumerate().map(inclusion).collect()
 }
 
 pub fn rotation(raw: RawRotation) -> Rotation {
@@ -78,13 +124,19 @@ pub fn is_material(raw: &RawScene) -> bool {
 }
 
 /// The damping as written; unless it is, 1, or what keeps every wave of a material from growing.
-pub fn damping(raw: &RawScene, lattice: &Lattice, elastic: Option<&Elastic>) -> f64 {
+pub fn damping(raw: &RawScene, lattice: &Lattice, body: Option<&Elastic>, inclusions: &[Inclusion]) -> f64 {
     let synchronous = raw.update.order == RawOrder::Synchronous;
-    let limit = || {
-        let elastic = elastic.filter(|_| is_material(raw) && synchronous)?;
+    let limit = |elastic: &Elastic| {
         Crystal::material(lattice, elastic).ok()?.zone().ok().map(|zone| zone.damping_limit)
     };
-    raw.update.damping.unwrap_or_else(|| limit().map_or(1.0, |limit| (OF_DAMPING_LIMIT * limit).min(1.0)))
+    let of_waves = || {
+        let body = body.filter(|_| is_material(raw) && synchronous);
+        let all = body.into_iter().flat_map(|body| {
+            std::iter::once(body).chain(inclusions.iter().map(|part| &part.material)).filter_map(limit)
+        });
+        all.fold(1.0, |least: f64, limit| least.min(OF_DAMPING_LIMIT * limit))
+    };
+    raw.update.damping.unwrap_or_else(of_waves)
 }
 
 /// A material lives in cells: it has no bonds to break, no need of a frame, and weights of its own.

@@ -24,7 +24,7 @@ use crate::geometry::outline::Piece;
 use crate::geometry::shape::{Segment, Shape};
 use crate::geometry::specimen::Specimen;
 use crate::material::elastic::Elastic;
-use crate::solve::sweep::{Order, Update};
+use crate::sweep::{Order, Update};
 
 impl Scene {
     /// Reads a scene file from disk; `overrides` are `KEY.PATH=VALUE` texts applied on top.
@@ -102,8 +102,10 @@ pub(super) fn validate(
     check_present_neighbours(&raw, refuse)?;
     material::check_rule(&raw, refuse)?;
     check_truth(&raw, refuse)?;
-    let elastic = material::elastic(&raw.material, refuse)?;
-    let neighbourhood = material::neighbourhood(&raw, &lattice, elastic.as_ref());
+    let elastic = raw.material.as_ref().map(|raw| material::elastic(raw, "material", refuse)).transpose()?;
+    let inclusions = material::inclusions(&raw, elastic.as_ref(), refuse)?;
+    let farthest = crate::scene::farthest_seeing(elastic.as_ref(), &inclusions);
+    let neighbourhood = material::neighbourhood(&raw, &lattice, farthest);
     let equilibrium = equilibrium::equilibrium(&raw, refuse)?;
     let load_steps = load_steps::load_steps(&raw, refuse)?;
     let is_fitted = material::is_fitted(&raw, refuse)?;
@@ -143,16 +145,18 @@ pub(super) fn validate(
                 RawOrder::Synchronous => Order::Synchronous,
                 RawOrder::Sequential => Order::Sequential,
             },
-            damping: material::damping(&raw, &lattice, elastic.as_ref()),
+            damping: material::damping(&raw, &lattice, elastic.as_ref(), &inclusions),
         },
         loads: material::loads(&raw.loads, refuse)?,
         material: elastic,
+        inclusions,
         roles,
         fracture: fracture(&raw.fracture, refuse)?,
         cuts: cuts(&raw.cuts, refuse)?,
         stop: Stop { steps: raw.stop.steps, tolerance: raw.stop.tolerance, growth: raw.stop.growth },
         record: Record {
             probes: raw.record.probes.clone(),
+            places: raw.record.places.clone(),
             figures: raw.record.figures.clone(),
             vtk_every: raw.record.vtk_every,
         },

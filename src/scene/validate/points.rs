@@ -54,6 +54,12 @@ fn refuse_what_needs_a_lattice(raw: &RawScene, refuse: Refuse<'_>) -> Result<(),
         ("body.holes", !raw.body.holes.is_empty(), "holes are cut out of a lattice", {
             "leave the points in the hole out of the file"
         }),
+        (
+            "body.inclusions",
+            !raw.body.inclusions.is_empty(),
+            "a material lives in the cells of a lattice",
+            cut,
+        ),
         ("body.anchor", raw.body.anchor.is_some(), "the anchor is a site of a lattice", {
             "move the points, or leave this out"
         }),

@@ -20,7 +20,7 @@ use crate::flock::points::Points;
 use crate::flock::role::Role;
 use crate::flock::rules::Rule;
 use crate::solve::spectrum::{SpectralRadius, spectral_radius};
-use crate::solve::sweep::Update;
+use crate::sweep::Update;
 use nearest::{Unreachable, nearest};
 
 /// Weights of all bonds.

@@ -7,7 +7,9 @@ pub mod part;
 mod setup;
 pub mod state;
 
-use super::formation::{Formation, Measures, Seen};
+use serde::{Deserialize, Serialize};
+
+use super::formation::{Formation, KeptLead, Measures, Seen};
 use super::resilience::trim;
 use super::safety::{self, Filter, Flags, Limits, SafetyError};
 use super::watch::{Health, Pose, Rejection, Watch};
@@ -34,6 +36,17 @@ pub const TRIMMED: u32 = 1 << 17;
 /// A pose was turned away since the last tick.
 pub const POSE_REJECTED: u32 = 1 << 18;
 
+/// What of a loop outlasts its process.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+pub struct KeptControl {
+    is_stopped: bool,
+    /// \[s\]
+    program_time: f64,
+    /// Periods that the programs have run.
+    periods: u64,
+    leads: Vec<Option<KeptLead>>,
+}
+
 /// The loop's state. Members by number, positions in \[m\], world frame, times in \[s\].
 #[derive(Clone)]
 pub struct Control {
@@ -50,6 +63,8 @@ pub struct Control {
     run: u64,
     /// Time run before that \[s\].
     run_before: f64,
+    /// Periods run since the beginning.
+    periods: u64,
     /// Whether every leader that is listened to has been heard once.
     begun: bool,
     /// Whose poses can come at all.
@@ -76,6 +91,7 @@ impl Control {
     pub fn new(swarm: &Swarm) -> Result<Self, SceneError> {
         let formation = Formation::lay_out(swarm)?;
         let (period, count) = (swarm.raw.control.period, formation.count());
+        setup::check_commands(swarm, &formation)?;
         let liars = setup::liars(swarm, &formation)?;
         let filter = setup::filter(swarm, &formation)?;
         let watch = setup::watch(swarm, &formation, filter.limits().speed);
@@ -89,6 +105,7 @@ impl Control {
             ticks: 0,
             run: 0,
             run_before: 0.0,
+            periods: 0,
             begun: false,
             listens: vec![true; count],
             now: 0.0,
@@ -168,9 +185,11 @@ impl Control {
         verdict
     }
 
-    /// Gives a leader that is moved from outside its next place \[m\]; false if it is not one.
+    /// Gives a leader that is moved from outside its next place \[m\]; false if it is not one, or the place lies
+    /// where no pose would be believed.
     pub fn tell(&mut self, member: usize, place: [f64; 2]) -> bool {
-        place.iter().all(|value| value.is_finite()) && self.formation.tell(member, place)
+        let watch = self.watch.limits();
+        distance(place, watch.centre) <= watch.range && self.formation.tell(member, place)
     }
 
     /// Moves all leaders by a manoeuvre from the next tick on.
@@ -200,6 +219,24 @@ impl Control {
     pub fn set_active(&mut self, active: bool) {
         if self.mode != Mode::EmergencyStopped {
             self.mode = if active { Mode::Running } else { Mode::Inactive };
+        }
+    }
+
+    pub fn kept(&self) -> KeptControl {
+        KeptControl {
+            is_stopped: self.mode == Mode::EmergencyStopped,
+            program_time: self.program_time(),
+            periods: self.periods,
+            leads: self.formation.kept_leads(),
+        }
+    }
+
+    /// Goes on from what a loop of the same swarm left; an emergency stop holds everybody where it is seen next.
+    pub fn restore(&mut self, kept: KeptControl) {
+        (self.run_before, self.run, self.periods) = (kept.program_time, 0, kept.periods);
+        self.formation.restore(kept.leads, kept.periods);
+        if kept.is_stopped {
+            self.emergency_stop();
         }
     }
 
@@ -276,6 +313,7 @@ impl Control {
             return;
         }
         self.run += 1;
+        self.periods += 1;
         let time = self.program_time();
         let seen = Seen { present: &self.present, usable: &self.usable, known: &self.known };
         self.formation.advance(&seen, time, self.sweeps, &mut self.wanted);

@@ -29,6 +29,23 @@ pub fn liars(swarm: &Swarm, formation: &Formation) -> Result<usize, SceneError> 
     Ok(liars)
 }
 
+/// Refuses leaders that wait for somebody's word in a swarm that takes nobody's.
+///
+/// # Errors
+/// Names the key.
+pub fn check_commands(swarm: &Swarm, formation: &Formation) -> Result<(), SceneError> {
+    let commands = swarm.raw.node.commands;
+    match formation.told().next() {
+        Some(leader) if !commands.may_do_all() => {
+            let name = &formation.names[leader];
+            let what =
+                format!("\"{}\" lets nobody lead `{name}`, whose program is external", commands.name());
+            Err(swarm.refuse("node.commands", what, "give the leader a program of its own, or allow \"all\""))
+        }
+        _ => Ok(()),
+    }
+}
+
 /// Which poses are believed; nobody is taken for faster than ten times the speed limit unless the file says so.
 pub fn watch(swarm: &Swarm, formation: &Formation, speed: f64) -> WatchLimits {
     let (poses, period) = (&swarm.raw.poses, swarm.raw.control.period);

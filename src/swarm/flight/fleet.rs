@@ -53,6 +53,12 @@ impl Fleet {
         &self.robots
     }
 
+    /// Goes on with robots as they were after so many periods; others than there are stay away.
+    pub fn restore(&mut self, robots: &[Robot], period: u64) {
+        self.robots.iter_mut().zip(robots).for_each(|(robot, kept)| *robot = *kept);
+        self.period = period;
+    }
+
     pub fn model(&self) -> &Model {
         &self.model
     }

@@ -17,7 +17,7 @@ use crate::scene::swarm::raw::RawLinks;
 use crate::scene::swarm::{Program, Recording, Shape, Swarm, Who};
 use crate::scene::{RoleEntry, Scene, SceneError, SceneRegion};
 use crate::solve::affine_weights;
-use crate::solve::sweep::Update;
+use crate::sweep::Update;
 
 impl Formation {
     /// # Errors

@@ -5,6 +5,7 @@
 //! have been put where the robots were seen.
 
 mod inside;
+mod kept;
 mod layout;
 mod links;
 mod settling;
@@ -19,8 +20,9 @@ use crate::flock::role::Role;
 use crate::flock::rules::Mean;
 use crate::flock::strain::{Strain, strain};
 use crate::scene::swarm::NamedManoeuvre;
-use crate::solve::sweep::Order;
 use crate::swarm::resilience::{Trim, supported};
+use crate::sweep::Order;
+pub use kept::KeptLead;
 use settling::Settling;
 
 /// Members are named by their number, from 0; positions in \[m\], world frame.

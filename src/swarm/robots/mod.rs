@@ -12,8 +12,10 @@ pub use double_integrator::DoubleIntegrator;
 pub use integrator::Integrator;
 pub use unicycle::Unicycle;
 
+use serde::{Deserialize, Serialize};
+
 /// Where a robot is and how it moves.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize)]
 pub struct Robot {
     /// \[m, world frame\]
     pub position: [f64; 2],

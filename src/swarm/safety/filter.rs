@@ -199,6 +199,11 @@ impl Filter {
         if self.limits.speed.is_finite() && age > 0.0 { self.limits.speed * age } else { 0.0 }
     }
 
+    /// Whether a member of this radius \[m\] may stand at a place.
+    pub fn is_fenced_in(&self, place: [f64; 2], radius: f64) -> bool {
+        self.fence.is_empty() || self.fence.distance(place) >= radius
+    }
+
     /// Free space between each member's rim and the nearest rim of another member or border of an
     /// obstacle \[m\], negative where they overlap; infinite for a member without a pose and for one
     /// that has nothing around it. For reports: it takes the square of the number of members.

@@ -58,12 +58,34 @@ impl Lifecycle {
         }
     }
 
-    /// Answers what was asked since the last tick, doing with `act` what transitions ask for. `now` \[s\]
-    /// stamps the events.
-    pub fn poll(&mut self, now: f64, act: &mut dyn FnMut(Goal) -> Outcome) {
+    /// Takes the node to a state that it had before, by the edges that lead there.
+    pub fn go_to(&mut self, goal: State, now: f64, act: &mut dyn FnMut(Goal) -> Outcome) {
+        // No way is longer, and where there is none nothing happens.
+        for _ in 0..3 {
+            let label = match (self.state(), goal) {
+                (State::Unconfigured, State::Inactive | State::Active) => "configure",
+                (State::Inactive, State::Active) => "activate",
+                (State::Active, State::Inactive | State::Unconfigured) => "deactivate",
+                (State::Inactive, State::Unconfigured) => "cleanup",
+                (_, State::Finalized) => "shutdown",
+                _ => return,
+            };
+            let Some(edge) = self.machine.asked(0, label) else { return };
+            self.run(edge, now, act);
+        }
+    }
+
+    /// Answers what was asked since the last tick, doing with `act` what those transitions ask for that `may` be asked
+    /// from outside. `now` \[s\] stamps the events.
+    pub fn poll(
+        &mut self,
+        now: f64,
+        may: &dyn Fn(&Transition) -> bool,
+        act: &mut dyn FnMut(Goal) -> Outcome,
+    ) {
         while let Some((id, request)) = self.change.take() {
             let asked = request.transition;
-            let edge = self.machine.asked(asked.id, &asked.label);
+            let edge = self.machine.asked(asked.id, &asked.label).filter(may);
             let success = edge.is_some_and(|edge| self.run(edge, now, act));
             if let Err(error) = self.change.reply(&id, &msgs::ChangeStateResponse { success }) {
                 tracing::warn!("{error}");

@@ -3,6 +3,7 @@
 use std::ops::RangeInclusive;
 
 use super::Value;
+use crate::ros::edge::said;
 use crate::ros::edge::services::rcl_interfaces::{FloatingPointRange, IntegerRange, ParameterDescriptor};
 
 /// A validator: `Err` with the reason refuses a value.
@@ -121,7 +122,7 @@ impl Declaration {
         let value = value.widened(&self.value);
         if value.kind() != self.value.kind() {
             let (expected, found) = (self.value.kind_name(), value.kind_name());
-            return Err(Refusal::Type { name: name(), expected, found, value: value.to_string() });
+            return Err(Refusal::Type { name: name(), expected, found, value: said(&value.to_string()) });
         }
         if matches!(&value, Value::Double(number) if number.is_nan()) {
             return Err(Refusal::NotANumber { name: name() });

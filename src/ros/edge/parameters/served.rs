@@ -2,7 +2,7 @@
 
 use super::{Change, Declaration, Refusal, Store, Value};
 use crate::ros::edge::services::{Time, rcl_interfaces as msgs};
-use crate::ros::edge::{EdgeError, Node, Publisher, Quality, Service};
+use crate::ros::edge::{EdgeError, Node, Publisher, Quality, Service, said};
 
 /// A node's parameters and the services `~/get_parameters`, `~/set_parameters`,
 /// `~/set_parameters_atomically`, `~/list_parameters`, `~/describe_parameters`, `~/get_parameter_types`, with
@@ -49,6 +49,11 @@ impl Parameters {
         self.store.get(name)
     }
 
+    /// Names and values, by name.
+    pub fn iter(&self) -> impl Iterator<Item = (&str, &Value)> {
+        self.store.iter()
+    }
+
     /// Sets one from inside; the next [`Parameters::poll`] returns and announces it.
     ///
     /// # Errors
@@ -57,19 +62,27 @@ impl Parameters {
         self.store.set(name, Some(value.into()))
     }
 
-    /// Answers what was asked since the last tick and returns what changed. `now` \[s\] stamps the event.
-    pub fn poll(&mut self, now: f64) -> Vec<Change> {
+    /// Answers what was asked since the last tick and returns what changed. `now` \[s\] stamps the event. With a
+    /// reason in `locked` nobody outside may set any.
+    pub fn poll(&mut self, now: f64, locked: Option<&str>) -> Vec<Change> {
         self.answer_questions();
+        let may = |name: &str| match locked {
+            Some(reason) => Err(Refusal::Vetoed { name: said(name), reason: reason.into() }),
+            None => Ok(()),
+        };
         self.set.serve(|request| {
             let set = |parameter: msgs::Parameter| {
-                result(self.store.set(&parameter.name, Value::from_wire(parameter.value)))
+                let name = parameter.name;
+                result(may(&name).and_then(|()| self.store.set(&name, Value::from_wire(parameter.value))))
             };
             msgs::SetParametersResponse { results: request.parameters.into_iter().map(set).collect() }
         });
         self.set_atomically.serve(|request| {
             let wanted = |parameter: msgs::Parameter| (parameter.name, Value::from_wire(parameter.value));
-            let settings = request.parameters.into_iter().map(wanted).collect();
-            msgs::SetParametersAtomicallyResponse { result: result(self.store.set_atomically(settings)) }
+            let settings: Vec<_> = request.parameters.into_iter().map(wanted).collect();
+            let set = may(settings.first().map_or("", |(name, _)| name));
+            let set = set.and_then(|()| self.store.set_atomically(settings));
+            msgs::SetParametersAtomicallyResponse { result: result(set) }
         });
         let changes = self.store.take_changes();
         self.announce(&changes, now);

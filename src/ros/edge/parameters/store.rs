@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use super::Value;
 use super::declaration::{Declaration, Refusal};
+use crate::ros::edge::said;
 use crate::ros::edge::services::rcl_interfaces::ParameterDescriptor;
 
 /// A parameter that changed.
@@ -72,7 +73,7 @@ impl Store {
     }
 
     fn admit(&self, name: &str, value: Option<Value>) -> Result<Value, Refusal> {
-        let declaration = self.declared.get(name).ok_or_else(|| Refusal::Undeclared { name: name.into() })?;
+        let declaration = self.declared.get(name).ok_or_else(|| Refusal::Undeclared { name: said(name) })?;
         if declaration.read_only {
             return Err(Refusal::ReadOnly { name: name.into() });
         }

@@ -28,6 +28,9 @@ pub struct RawNode {
     /// Publishes `visualization_msgs/MarkerArray` on `~/markers`.
     #[serde(default = "defaults::yes")]
     pub markers: bool,
+    /// What anybody on the network may tell the node to do.
+    #[serde(default)]
+    pub commands: RawCommands,
 }
 
 impl Default for RawNode {
@@ -40,7 +43,41 @@ impl Default for RawNode {
             velocity: None,
             velocity_topic: defaults::velocity_topic(),
             markers: true,
+            commands: RawCommands::default(),
         }
+    }
+}
+
+/// Whose word counts while the node runs. The limits of the file hold whatever is allowed here: they can be
+/// tightened from outside and never loosened.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum RawCommands {
+    /// Nobody's: services refuse, parameters are read-only, leaders are moved by the file's programs alone.
+    None,
+    /// Emergency stop, and the lifecycle's way out of active.
+    StopOnly,
+    /// All services, parameters, and the topics of leaders that are led from outside.
+    #[default]
+    All,
+}
+
+impl RawCommands {
+    /// As the file writes it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::StopOnly => "stop-only",
+            Self::All => "all",
+        }
+    }
+
+    pub fn may_stop(self) -> bool {
+        self != Self::None
+    }
+
+    pub fn may_do_all(self) -> bool {
+        self == Self::All
     }
 }
 

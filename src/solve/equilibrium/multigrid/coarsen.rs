@@ -3,7 +3,8 @@
 //! A row of it depends on nothing but the classes of the particles within a node's reach, so every
 //! different pattern of them is a class, and its row is computed once.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::HashMap;
+use std::ops::Range;
 
 use super::transfer::{Transfer, parents_of_place};
 use crate::flock::block::{Block, plus};
@@ -45,20 +46,27 @@ pub fn next_steps(spacing: [f64; 2]) -> [i32; 2] {
 /// The matrix of the coarse grid.
 pub fn coarsen(fine: &Matrix, transfer: Transfer) -> Matrix {
     let mut patterns = Patterns::new(transfer);
-    let singles = Singles::new(fine, transfer);
+    let mut singles = Singles::new(fine, transfer);
     let mut nodes: Vec<(Site, u32)> = Vec::new();
     let across = transfer.steps[0];
     let columns = fine.columns.range();
+    let mut left = singles.nodes.iter().peekable();
     for column in columns.start.div_euclid(across)..=(columns.end - 1).div_euclid(across) + 1 {
-        let is_single = |row: i32| singles.nodes.contains_key(&[column, row]);
+        // Nodes are asked about in their order.
+        let is_single = |row: i32| {
+            while left.next_if(|(node, _)| *node < [column, row]).is_some() {}
+            left.peek().is_some_and(|(node, _)| *node == [column, row])
+        };
         patterns.column(fine, column, is_single, |row, number| nodes.push(([column, row], number)));
     }
+    let mut sums = Sums::default();
     let patterns = patterns.by_class;
-    let mut rows: Vec<Row> = patterns.iter().map(|pattern| galerkin(fine, transfer, pattern)).collect();
+    let mut rows: Vec<Row> =
+        patterns.iter().map(|pattern| galerkin(fine, transfer, pattern, &mut sums)).collect();
     if !singles.nodes.is_empty() {
-        for &node in singles.nodes.keys() {
+        for (node, outliers) in std::mem::take(&mut singles.nodes) {
             nodes.push((node, rows.len() as u32));
-            rows.push(singles.row(node));
+            rows.push(singles.row(node, outliers, &mut sums));
         }
         nodes.sort_unstable();
     }
@@ -66,93 +74,132 @@ pub fn coarsen(fine: &Matrix, transfer: Transfer) -> Matrix {
     Matrix::compile(columns, nodes.into_iter().map(|(_, class)| class).collect(), rows)
 }
 
+/// Blocks by site, added up. They are few, so that looking through them all is faster than any map.
+#[derive(Default)]
+struct Sums(Vec<(Site, Block)>);
+
+impl Sums {
+    fn add(&mut self, site: Site, share: f64, block: &Block) {
+        let block = block.map(|row| row.map(|value| share * value));
+        match self.0.iter_mut().find(|(known, _)| *known == site) {
+            Some((_, sum)) => *sum = plus(sum, &block),
+            None => self.0.push((site, block)),
+        }
+    }
+
+    /// The row that has been added up by offsets; ordered, so that it does not depend on how it was summed.
+    fn row(&mut self) -> Row {
+        self.0.sort_unstable_by_key(|(offset, _)| *offset);
+        let mut row = Row::default();
+        for (offset, block) in self.0.drain(..).filter(|(_, block)| *block != Block::default()) {
+            match offset {
+                [0, 0] => row.diagonal = block,
+                _ => row.entries.push((offset, block.map(|row| row.map(|v| -v)))),
+            }
+        }
+        row
+    }
+}
+
 /// Nodes near particles that stand at no site, whose rows are summed one by one.
 struct Singles<'a> {
     fine: &'a Matrix,
     transfer: Transfer,
-    /// The particles at no site that have a share in each node.
-    nodes: BTreeMap<Site, Vec<(usize, f64)>>,
+    /// Their sites, ascending, and where the particles at no site that have a share in each lie in `shares`.
+    nodes: Vec<(Site, Range<usize>)>,
+    shares: Vec<(usize, f64)>,
+    /// Rows of `K P` by nodes, each computed when it is first asked for: up to four nodes have a share in one.
+    halves: Vec<(Site, Block)>,
+    /// Where that of each particle lies, shape \[count\].
+    half: Vec<Range<u32>>,
 }
 
 impl<'a> Singles<'a> {
     fn new(fine: &'a Matrix, transfer: Transfer) -> Self {
-        let mut nodes: BTreeMap<Site, Vec<(usize, f64)>> = BTreeMap::new();
-        let first = fine.outliers.first;
-        for (k, &place) in fine.outliers.places.iter().enumerate() {
-            if fine.class[first + k] == HELD {
-                continue;
-            }
-            for (node, share) in parents_of_place(place, transfer.steps).into_iter().filter(|(_, s)| *s > 0.0)
-            {
-                nodes.entry(node).or_default().push((first + k, share));
-            }
-        }
-        // Nodes with a share in a particle that feels one of these feel it through that.
-        if !nodes.is_empty() {
-            let leads: Vec<bool> = fine
-                .rows
-                .iter()
-                .map(|row| row.entries.iter().any(|(offset, _)| leads_to_outlier(*offset)))
-                .collect();
-            for site in fine.columns.sites().filter(|[column, _]| *column != Body::ALONG_OUTLINE) {
-                let Some((i, _)) = fine.columns.find(site) else { continue };
-                if leads[fine.class[i] as usize] {
-                    parents(site, transfer.steps).for_each(|node| {
-                        nodes.entry(node).or_default();
-                    });
+        let (mut nodes, mut shares, mut half) = (Vec::new(), Vec::new(), Vec::new());
+        if !fine.outliers.places.is_empty() {
+            half.resize(fine.count(), 0..0);
+            let mut found: Vec<(Site, Option<usize>, f64)> = Vec::new();
+            let leads = |row: &Row| row.entries.iter().any(|(offset, _)| leads_to_outlier(*offset));
+            let leads: Vec<bool> = fine.rows.iter().map(leads).collect();
+            for (column, segment) in fine.columns.iter() {
+                for k in 0..segment.len as i32 {
+                    let i = segment.start as usize + k as usize;
+                    let site = [column, segment.row + fine.columns.step() * k];
+                    match i.checked_sub(fine.outliers.first) {
+                        Some(outlier) => {
+                            let parents = parents_of_place(fine.outliers.places[outlier], transfer.steps);
+                            let parents = parents.into_iter().filter(|(_, share)| *share > 0.0);
+                            found.extend(parents.map(|(node, share)| (node, Some(i), share)));
+                        }
+                        // Nodes with a share in a particle that feels one of these feel it through that.
+                        None if leads[fine.class[i] as usize] => {
+                            found.extend(parents(site, transfer.steps).map(|node| (node, None, 0.0)));
+                        }
+                        None => {}
+                    }
                 }
             }
-        }
-        Self { fine, transfer, nodes }
-    }
-
-    /// Shares of the nodes in a particle that stands at a site or at none.
-    fn parents(&self, site: Site, i: usize) -> Vec<(Site, f64)> {
-        let [across, along] = self.transfer.steps;
-        match i.checked_sub(self.fine.outliers.first) {
-            Some(k) => {
-                let shares = parents_of_place(self.fine.outliers.places[k], self.transfer.steps);
-                shares.into_iter().filter(|(_, share)| *share > 0.0).collect()
+            found.sort_unstable_by_key(|&(node, particle, _)| (node, particle));
+            for of_node in found.chunk_by(|a, b| a.0 == b.0) {
+                let begin = shares.len();
+                shares.extend(of_node.iter().filter_map(|&(_, particle, share)| Some((particle?, share))));
+                nodes.push((of_node[0].0, begin..shares.len()));
             }
-            None => parents(site, self.transfer.steps)
-                .map(|node| {
-                    let at = [site[0] - node[0] * across, site[1] - node[1] * along];
-                    (node, hat(at[0], across) * hat(at[1], along))
-                })
-                .collect(),
         }
+        Self { fine, transfer, nodes, shares, halves: Vec::new(), half }
     }
 
     /// The row of `P' K P` at a node.
-    fn row(&self, node: Site) -> Row {
+    fn row(&mut self, node: Site, outliers: Range<usize>, sums: &mut Sums) -> Row {
         let [across, along] = self.transfer.steps;
-        let columns = &self.fine.columns;
-        let (first, step) = (self.fine.outliers.first, columns.step());
+        let (first, step) = (self.fine.outliers.first, self.fine.columns.step());
         let near = |k: usize, step: i32| node[k] * step - step + 1..node[k] * step + step;
-        let window = near(0, across).flat_map(|i| near(1, along).map(move |j| [i, j]));
-        let at_sites = window.filter_map(|site| {
-            let (i, _) = columns.find(site)?;
-            let at = [site[0] - node[0] * across, site[1] - node[1] * along];
-            Some((site, i, hat(at[0], across) * hat(at[1], along)))
-        });
-        let outliers = self.nodes[&node].iter();
-        let outliers =
-            outliers.map(|&(i, share)| ([Body::ALONG_OUTLINE, (i - first) as i32 * step], i, share));
-        let mut sums: BTreeMap<Site, Block> = BTreeMap::new();
-        for (site, i, share) in at_sites.chain(outliers) {
-            let row = &self.fine.rows[self.fine.class[i] as usize];
-            let negative = |block: &Block| block.map(|row| row.map(|value| -value));
-            let entries = row.entries.iter().map(|(offset, block)| (*offset, negative(block)));
-            for (offset, block) in std::iter::once(([0, 0], row.diagonal)).chain(entries) {
-                let there = [site[0] + offset[0], site[1] + offset[1]];
-                let Some((j, _)) = columns.find(there) else { continue };
-                for (other, part) in self.parents(there, j) {
-                    let sum = sums.entry([other[0] - node[0], other[1] - node[1]]).or_default();
-                    *sum = plus(sum, &block.map(|row| row.map(|value| share * part * value)));
-                }
+        for column in near(0, across) {
+            for row in near(1, along) {
+                let Some((i, _)) = self.fine.columns.find([column, row]) else { continue };
+                let share = hat(column - node[0] * across, across) * hat(row - node[1] * along, along);
+                self.add_half(node, [column, row], (i, share), sums);
             }
         }
-        into_row(sums)
+        for at in outliers {
+            let (i, share) = self.shares[at];
+            self.add_half(node, [Body::ALONG_OUTLINE, (i - first) as i32 * step], (i, share), sums);
+        }
+        sums.row()
+    }
+
+    /// Adds a particle's row of `K P` by offsets from a node that has a share in it.
+    fn add_half(&mut self, node: Site, site: Site, (i, share): (usize, f64), sums: &mut Sums) {
+        if self.half[i].is_empty() {
+            let mut half = Sums(Vec::new());
+            let row = &self.fine.rows[self.fine.class[i] as usize];
+            self.add_parents(site, 1.0, &row.diagonal, &mut half);
+            for (offset, block) in &row.entries {
+                self.add_parents([site[0] + offset[0], site[1] + offset[1]], -1.0, block, &mut half);
+            }
+            let begin = self.halves.len();
+            self.halves.append(&mut half.0);
+            self.half[i] = begin as u32..self.halves.len() as u32;
+        }
+        let Range { start, end } = self.half[i];
+        for (other, block) in &self.halves[start as usize..end as usize] {
+            sums.add([other[0] - node[0], other[1] - node[1]], share, block);
+        }
+    }
+
+    /// Adds a block by the nodes that have a share in the particle at a site.
+    fn add_parents(&self, site: Site, sign: f64, block: &Block, sums: &mut Sums) {
+        let place = if site[0] == Body::ALONG_OUTLINE {
+            self.fine.outliers.places[(site[1] / self.fine.columns.step()) as usize]
+        } else {
+            site.map(f64::from)
+        };
+        for (node, share) in parents_of_place(place, self.transfer.steps) {
+            if share > 0.0 {
+                sums.add(node, sign * share, block);
+            }
+        }
     }
 }
 
@@ -176,7 +223,7 @@ impl Patterns {
         &mut self,
         fine: &Matrix,
         number: i32,
-        is_single: impl Fn(i32) -> bool,
+        mut is_single: impl FnMut(i32) -> bool,
         mut node: impl FnMut(i32, u32),
     ) {
         let [across, along] = self.transfer.steps;
@@ -229,34 +276,23 @@ impl Patterns {
 }
 
 /// The row of `P' K P` at a node with these surroundings.
-fn galerkin(fine: &Matrix, transfer: Transfer, pattern: &[u32]) -> Row {
+fn galerkin(fine: &Matrix, transfer: Transfer, pattern: &[u32], sums: &mut Sums) -> Row {
     let [across, along] = transfer.steps;
     let reach = 2 * along - 1;
-    // Ordered by offset, so that the row does not depend on how it was summed.
-    let mut sums: BTreeMap<Site, Block> = BTreeMap::new();
     for (k, &class) in pattern.iter().enumerate().filter(|(_, class)| **class != HELD) {
         let own = [k as i32 / reach - across + 1, k as i32 % reach - along + 1];
         let share = hat(own[0], across) * hat(own[1], along);
         let row = &fine.rows[class as usize];
-        let negative = |block: &Block| block.map(|row| row.map(|value| -value));
-        let entries = row.entries.iter().map(|(offset, block)| (*offset, negative(block)));
-        for (offset, block) in std::iter::once(([0, 0], row.diagonal)).chain(entries) {
+        let entries = row.entries.iter().map(|(offset, block)| (*offset, block, -share));
+        for (offset, block, share) in std::iter::once(([0, 0], &row.diagonal, share)).chain(entries) {
             let there = [own[0] + offset[0], own[1] + offset[1]];
             for node in parents(there, transfer.steps) {
                 let at = [there[0] - node[0] * across, there[1] - node[1] * along];
-                let weight = share * hat(at[0], across) * hat(at[1], along);
-                let sum = sums.entry(node).or_default();
-                *sum = plus(sum, &block.map(|row| row.map(|value| weight * value)));
+                sums.add(node, share * hat(at[0], across) * hat(at[1], along), block);
             }
         }
     }
-    into_row(sums)
-}
-
-fn into_row(mut sums: BTreeMap<Site, Block>) -> Row {
-    let diagonal = sums.remove(&[0, 0]).unwrap_or_default();
-    let entries = sums.into_iter().map(|(offset, block)| (offset, block.map(|row| row.map(|v| -v))));
-    Row { diagonal, entries: entries.filter(|(_, block)| *block != Block::default()).collect() }
+    sums.row()
 }
 
 /// Value at `at` of the piecewise linear function that is 1 at 0 and 0 from `step` on.

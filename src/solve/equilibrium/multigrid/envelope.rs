@@ -6,9 +6,9 @@ use crate::solve::operator::Matrix;
 /// Pivots below this share of their diagonal are rounding: what they stand for moves nothing that the
 /// others do not move already, and stays put.
 const NOTHING: f64 = 1e-11;
-/// Below particles along an outline nodes at the edge share few of them and hardly differ: pivots that rounding has made
-/// negative by no more than this share are nothing too.
-const NEGATIVE_AT_OUTLINE: f64 = 1e-8;
+/// The same below particles along an outline, where nodes at the edge share few of them and hardly differ; those that
+/// rounding has made negative are nothing too.
+const NOTHING_AT_OUTLINE: f64 = 1e-9;
 
 /// `L` of `K = L L'` by rows, each from its first entry that is not zero to the diagonal.
 #[derive(Clone, Debug)]
@@ -108,7 +108,7 @@ impl Envelope {
                 }
             }
         }
-        factor.eliminate(if has_outline { NEGATIVE_AT_OUTLINE } else { NOTHING }).then_some(factor)
+        factor.eliminate(if has_outline { NOTHING_AT_OUTLINE } else { NOTHING }).then_some(factor)
     }
 
     fn entry(&mut self, row: usize, column: usize) -> &mut f64 {
@@ -121,7 +121,7 @@ impl Envelope {
         &self.values[begin + from..begin + to]
     }
 
-    fn eliminate(&mut self, negative: f64) -> bool {
+    fn eliminate(&mut self, nothing: f64) -> bool {
         for i in 0..self.first.len() {
             let first = self.first[i] as usize;
             for j in first..=i {
@@ -132,9 +132,9 @@ impl Envelope {
                 let rest = *entry - sum;
                 if j < i {
                     *entry = rest / pivot;
-                } else if rest > NOTHING * *entry {
+                } else if rest > nothing * *entry {
                     *entry = rest.sqrt();
-                } else if rest >= -negative * entry.abs() {
+                } else if rest >= -10.0 * nothing * entry.abs() {
                     // Divided by infinity, the unknown and its part in all others vanish.
                     *entry = f64::INFINITY;
                 } else {

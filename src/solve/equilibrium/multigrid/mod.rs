@@ -40,8 +40,6 @@ const ACROSS: i32 = 5;
 
 /// Lanczos steps for the largest eigenvalue of each level, and what its estimate is raised by.
 const ESTIMATE: usize = 12;
-/// The same where an outline has cut cells: the largest eigenvalue may belong to a few particles there, which are found late.
-const ESTIMATE_AT_OUTLINE: usize = 40;
 const SAFETY: f64 = 1.04;
 
 /// Largest over smallest eigenvalue that the smoother is to dampen; what is below is left to the coarser
@@ -72,7 +70,7 @@ struct Cycle<'a> {
     finest: Stencils<f32>,
     weights: [f64; 2],
     vectors: Vectors,
-    /// The way down from each level, the finest first.
+    /// The way down from each level, the finest first; the coarsest is not smoothed and has no weights.
     levels: Vec<Level>,
     coarsest: Option<Envelope>,
 }
@@ -103,8 +101,7 @@ impl Vectors {
 /// Weights of two sweeps that dampen all eigenvalues from a share of the largest to the largest best;
 /// `None` if the matrix is not positive.
 fn weights(matrix: &Matrix, stencils: &Stencils<f32>) -> Option<[f64; 2]> {
-    let steps = if matrix.outliers.places.is_empty() { ESTIMATE } else { ESTIMATE_AT_OUTLINE };
-    let high = SAFETY * lanczos::largest(matrix, stencils, steps);
+    let high = SAFETY * lanczos::largest(matrix, stencils, ESTIMATE);
     let low = high / SMOOTHED;
     let weight = |k: f64| {
         let node = (std::f64::consts::PI * k / 4.0).cos();
@@ -118,9 +115,9 @@ impl<'a> Cycle<'a> {
         let scale = single_scale(matrix);
         let finest = Stencils::new(&matrix.rows, scale);
         let not_positive = SolveError::NotPositive { solver: Solver::Multigrid, iteration: 0 };
-        let weights = weights(matrix, &finest).ok_or(not_positive.clone())?;
         let vectors = Vectors::new(matrix.count());
-        let mut cycle = Self { matrix, finest, weights, vectors, levels: Vec::new(), coarsest: None };
+        let mut cycle =
+            Self { matrix, finest, weights: [0.0; 2], vectors, levels: Vec::new(), coarsest: None };
         let mut spacing = grid.map(|v| v[0].hypot(v[1]));
         while !cycle.is_coarse_enough() {
             let fine = cycle.levels.last().map_or(matrix, |level| &level.matrix);
@@ -128,10 +125,13 @@ impl<'a> Cycle<'a> {
                 0 => coarsen::first_steps(grid, particles_per_site(fine)),
                 _ => coarsen::next_steps(spacing),
             };
-            let level = Level::new(fine, Transfer { steps }, scale).ok_or(not_positive.clone())?;
+            let level = Level::new(fine, Transfer { steps }, scale);
             if level.matrix.count() >= fine.count() {
                 break;
             }
+            let stencils = cycle.levels.last().map_or(&cycle.finest, |level| &level.stencils);
+            let found = weights(fine, stencils).ok_or(not_positive.clone())?;
+            *cycle.levels.last_mut().map_or(&mut cycle.weights, |level| &mut level.weights) = found;
             spacing = [0, 1].map(|k| spacing[k] * f64::from(steps[k]));
             cycle.levels.push(level);
         }
@@ -182,13 +182,12 @@ fn descend(here: &Smoothed<'_>, vectors: &mut Vectors, below: &mut [Level], coar
 }
 
 impl Level {
-    fn new(fine: &Matrix, transfer: Transfer, scale: f64) -> Option<Self> {
+    fn new(fine: &Matrix, transfer: Transfer, scale: f64) -> Self {
         let matrix = coarsen::coarsen(fine, transfer);
         let stencils = Stencils::new(&matrix.rows, scale);
-        let weights = weights(&matrix, &stencils)?;
         let vectors = Vectors::new(matrix.count());
         let outliers = OutlierShares::new(fine, &matrix, transfer);
-        Some(Self { transfer, outliers, matrix, stencils, weights, vectors })
+        Self { transfer, outliers, matrix, stencils, weights: [0.0; 2], vectors }
     }
 }
 

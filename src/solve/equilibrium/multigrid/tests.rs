@@ -129,6 +129,14 @@ fn the_coarse_space_contains_translations_rotations_and_uniform_strains() {
 }
 
 #[test]
+fn a_place_at_a_node_is_that_node_s_alone() {
+    // Places come from coordinates and have their rounding.
+    let shares = super::transfer::parents_of_place([6.0 + 1e-14, 4.0 - 1e-13], [2, 2]);
+    let taken: Vec<_> = shares.into_iter().filter(|(_, share)| *share > 0.0).collect();
+    assert_eq!(taken, [([3, 2], 1.0)]);
+}
+
+#[test]
 fn the_envelope_solves_what_it_factorised() {
     for kind in LatticeKind::SAMPLES {
         for (columns, rows) in [(9, 21), (21, 9)] {

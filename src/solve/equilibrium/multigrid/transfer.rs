@@ -111,9 +111,14 @@ impl OutlierShares {
     }
 }
 
+/// Share in a place below which a node has none: single precision hardly knows less.
+const NO_SHARE: f64 = 1e-6;
+
 /// The coarse nodes around a place in fine columns and rows, and its shares of them, which are linear both ways.
 pub fn parents_of_place(place: [f64; 2], steps: [i32; 2]) -> [(Site, f64); 4] {
-    let at = [0, 1].map(|k| place[k] / f64::from(steps[k]));
+    // A node that had but the rounding of a place would be one that nothing but rounding holds.
+    let near = |at: f64| if (at - at.round()).abs() < NO_SHARE { at.round() } else { at };
+    let at = [0, 1].map(|k| near(place[k] / f64::from(steps[k])));
     let node = at.map(f64::floor);
     let beyond = [0, 1].map(|k| at[k] - node[k]);
     [[0, 0], [0, 1], [1, 0], [1, 1]].map(|[i, j]: [i32; 2]| {

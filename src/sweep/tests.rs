@@ -2,7 +2,7 @@ use super::*;
 use crate::flock::body::{Body, Cut};
 use crate::flock::lattice::{Lattice, LatticeKind};
 use crate::flock::neighbourhood::Neighbourhood;
-use crate::flock::rules::Mean;
+use crate::flock::rules::{Mean, Rule};
 
 /// Large enough to be swept in parallel, and of no whole number of chunks.
 fn body(rule: Rule) -> Interaction {
@@ -72,7 +72,7 @@ fn a_compiled_sweep_gives_the_bits_of_an_uncompiled_one() {
         sweep.step(&interaction, None, &present, &mut next);
         bits(&next)
     };
-    assert!(swept(&compiled) == swept(&Sweep::uncompiled(Update::default(), &roles)));
+    assert!(swept(&compiled) == swept(&Sweep::uncompiled(Update::default(), &interaction, &roles)));
 }
 
 fn assert_as_uncompiled(compiled: &Sweep, interaction: &Interaction, roles: &[Role]) {
@@ -83,8 +83,10 @@ fn assert_as_uncompiled(compiled: &Sweep, interaction: &Interaction, roles: &[Ro
         sweep.step(interaction, None, &present, &mut next);
         bits(&next)
     };
-    assert!(compiled.stencil.is_some() || compiled.matrices.is_some());
-    assert!(swept(compiled) == swept(&Sweep::uncompiled(compiled.update, roles)));
+    assert!(compiled.rows.is_some());
+    let (found, expected) = (swept(compiled), swept(&Sweep::uncompiled(compiled.update, interaction, roles)));
+    let off = found.iter().zip(&expected).position(|(a, b)| a != b);
+    assert_eq!(off.map(|i| (i, f64::from_bits(found[i]), f64::from_bits(expected[i]))), None);
 }
 
 #[test]
@@ -140,5 +142,79 @@ fn a_cracked_body_is_swept_to_the_bits_of_one_by_one() {
         assert_as_uncompiled(&sweep, &interaction, &roles);
         assert!(sweep.torn.len() > 500 && sweep.torn.len() < 5000, "{}", sweep.torn.len());
         assert!(!sweep.takes_several(None));
+    }
+}
+
+/// Every term of the paper, over every kind of coefficients.
+#[test]
+fn every_affine_rule_is_compiled_to_the_bits_of_one_by_one() {
+    use crate::flock::rules::{Axis, Feedback, FeedbackReference, Poisson};
+    let poisson = Poisson { k: 0.03, pull: Axis::X, centre: 20.0, half_width: 150.0, exponent: 1.5 };
+    let across = Poisson { pull: Axis::Y, exponent: 1.0, ..poisson };
+    let feedback = |factor, reference| Some(Feedback { factor, reference });
+    let rules = [
+        Rule { feedback: feedback(-0.3, FeedbackReference::Initial), ..Rule::BARYCENTRE },
+        Rule { feedback: feedback(0.2, FeedbackReference::Previous), ..Rule::BARYCENTRE },
+        Rule { poisson: Some(poisson), ..Rule::BARYCENTRE },
+        Rule {
+            poisson: Some(across),
+            feedback: feedback(0.1, FeedbackReference::Initial),
+            mean: Mean::Barycentre,
+        },
+    ];
+    for (rule, weighs) in rules.into_iter().flat_map(|rule| [(rule, false), (rule, true)]) {
+        let mut interaction = body(rule);
+        let mut roles = vec![Role::Follower; interaction.reference.len()];
+        roles.iter_mut().step_by(7919).for_each(|role| *role = Role::Leader);
+        if weighs {
+            // By direction, one of them negative; those of one particle are its own, those of another add up to nothing.
+            let of = |j: usize| {
+                let size = interaction.neighbours.of(j).len();
+                let own = if j == 40_000 { 0.123 } else { 0.0 };
+                (0..size).map(move |k| match j {
+                    50_000 => {
+                        if k == 0 {
+                            1.0
+                        } else if k == 1 {
+                            -1.0
+                        } else {
+                            0.0
+                        }
+                    }
+                    _ => [1.0, 0.5, 2.0, -0.25, 1.5, 0.75][k % 6] + own,
+                })
+            };
+            interaction.weights = Weights::Scalar((0..roles.len()).flat_map(of).collect());
+            interaction.keep_rest();
+        }
+        for damping in [1.0, 0.7] {
+            let update = Update { damping, ..Update::default() };
+            let compiled = Sweep::compile(update, &interaction, &roles);
+            assert!(compiled.share_in_runs() > 0.95, "{rule:?}: {}", compiled.share_in_runs());
+            assert_as_uncompiled(&compiled, &interaction, &roles);
+            assert_together_as_single(&compiled, &interaction);
+        }
+    }
+}
+
+/// Several steps at once have the bits of single ones, on one thread and on more.
+fn assert_together_as_single(sweep: &Sweep, interaction: &Interaction) {
+    let start: Points =
+        interaction.reference.iter().map(|[x, y]| [x + 0.1 * y.sin(), y - 0.02 * x]).collect();
+    let (mut single, mut next) = (start.clone(), start.clone());
+    for _ in 0..7 {
+        sweep.step(interaction, None, &single, &mut next);
+        std::mem::swap(&mut single, &mut next);
+    }
+    for threads in [1, 3] {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+        let (mut present, mut next, mut activity) = (start.clone(), start.clone(), Activity::default());
+        for count in [4, 3] {
+            let places = (&mut present, &mut next);
+            pool.install(|| {
+                sweep.steps(interaction, None, places, (count, Led::NOBODY, None), &mut activity)
+            });
+        }
+        assert!(bits(&present) == bits(&single), "{threads} threads");
     }
 }

@@ -1,9 +1,8 @@
-use super::super::body::{Body, Cut};
-use super::super::interaction::{Interaction, Weights};
-use super::super::lattice::{Lattice, LatticeKind};
-use super::super::neighbourhood::Neighbourhood;
-use super::super::rules::Rule;
 use super::*;
+use crate::flock::body::{Body, Cut};
+use crate::flock::lattice::{Lattice, LatticeKind};
+use crate::flock::neighbourhood::Neighbourhood;
+use crate::flock::rules::Rule;
 use crate::geometry::shape::Shape;
 
 /// Numbers that look random, of very different sizes and both signs, with zeros of both signs.
@@ -42,46 +41,42 @@ fn disc_with_hole() -> Cut {
 }
 
 /// Sweeps all bands, in two pieces.
-fn sweep(stencil: &Stencil, interaction: &Interaction, present: &Points, next: &mut Points) {
-    let (bands, rest) = (stencil.band_count(), interaction.rest.as_ref());
+fn sweep(rows: &Rows, interaction: &Interaction, present: &Points, next: &mut Points) {
+    let (bands, rest) = (rows.band_count(), interaction.rest.as_ref());
     for piece in [0..bands / 2, bands / 2..bands] {
-        let mut planes = [
-            Plane {
-                seen_from: 0,
-                present: &present.x,
-                rest: rest.map(|r| &r.x[..]),
-                begin: 0,
-                next: &mut next.x,
-            },
-            Plane {
-                seen_from: 0,
-                present: &present.y,
-                rest: rest.map(|r| &r.y[..]),
-                begin: 0,
-                next: &mut next.y,
-            },
+        let of = |axis, present, rest, next| Component {
+            axis,
+            seen_from: 0,
+            present,
+            rest,
+            force: None,
+            begin: 0,
+            next,
+        };
+        let mut components = [
+            of(0, &present.x, rest.map(|r| &r.x[..]), &mut next.x[..]),
+            of(1, &present.y, rest.map(|r| &r.y[..]), &mut next.y[..]),
         ];
-        planes.iter_mut().for_each(|plane| stencil.sweep_runs(piece.clone(), 64, plane));
-        stencil.sweep_listed(piece, &mut planes);
+        rows.sweep(piece, 64, &mut components, &Terms::NONE);
     }
 }
 
-/// Sweeps with the stencil and compares every bit with the rule; whoever does not follow keeps its
+/// Sweeps with the rows and compares every bit with the rule; whoever does not follow keeps its
 /// mark. Gives the share in runs.
 fn compare(interaction: &Interaction, held: impl Fn(usize) -> bool, what: &str) -> f64 {
     const MARK: f64 = 12345.0;
     let count = interaction.reference.len();
     let follows: Vec<bool> = (0..count).map(|j| !held(j)).collect();
-    let stencil = Stencil::compile(&interaction.neighbours, &follows, interaction.rest.as_ref());
+    let rows = Rows::compile(interaction, &follows).expect("a barycentre");
     let present = rough(count, 1);
     let mut next = Points { x: vec![MARK; count], y: vec![MARK; count] };
-    sweep(&stencil, interaction, &present, &mut next);
+    sweep(&rows, interaction, &present, &mut next);
     for (j, &follows) in follows.iter().enumerate() {
         let expected = if follows { interaction.target(j, &present) } else { [MARK; 2] };
         let bits = |point: [f64; 2]| point.map(f64::to_bits);
         assert_eq!(bits(next.get(j)), bits(expected), "particle {j} of {count}, {what}: {expected:?}");
     }
-    stencil.share_in_runs()
+    rows.share_in_runs()
 }
 
 #[test]
@@ -162,19 +157,17 @@ fn a_mean_of_negative_zeros_and_a_particle_without_neighbours_give_the_bits_of_t
         rest: None,
         bonds: None,
     };
-    let stencil = Stencil::compile(
-        &interaction.neighbours,
-        &[true; 22],
-        Some(&Points { x: vec![1.0; 22], y: vec![1.0; 22] }),
-    );
-    assert!(stencil.share_in_runs() > 0.9);
+    let all_rest =
+        Interaction { rest: Some(Points { x: vec![1.0; 22], y: vec![1.0; 22] }), ..interaction.clone() };
+    let rows = Rows::compile(&all_rest, &[true; 22]).expect("a barycentre");
+    assert!(rows.share_in_runs() > 0.9);
     let negative = || vec![-0.0; 22];
     let present = Points { x: negative(), y: negative() };
     let positive = Some(Points::zeros(22));
     for rest in [None, Some(present.clone()), positive] {
         let interaction = Interaction { rest, ..interaction.clone() };
         let mut next = Points { x: vec![7.0; 22], y: vec![7.0; 22] };
-        sweep(&stencil, &interaction, &present, &mut next);
+        sweep(&rows, &interaction, &present, &mut next);
         for j in 0..22 {
             let bits = |point: [f64; 2]| point.map(f64::to_bits);
             assert_eq!(bits(next.get(j)), bits(interaction.target(j, &present)), "particle {j}");

@@ -23,9 +23,11 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::PARALLEL_FROM;
+use super::kernel::Component;
+use super::rows::Rows;
+use super::terms::Terms;
 use crate::flock::frame::Frame;
 use crate::flock::real::Real;
-use crate::flock::stencil::{Plane, Stencil};
 
 /// Most steps taken together: more gain nothing, their front no longer fits the second cache. Measured on
 /// 4096 squared: 4 steps are 1.75 times, 8 steps 2.1, 16 steps 2.2 and 32 steps 2.2 times as fast as one at a time.
@@ -88,8 +90,11 @@ impl Activity {
 /// What several steps are taken by.
 #[derive(Clone, Copy)]
 pub struct Steps<'a, T> {
-    pub stencil: &'a Stencil,
+    pub rows: &'a Rows,
+    pub terms: Terms<'a, T>,
     pub rest: Option<[&'a [T]; 2]>,
+    /// Loads, where the rows are of a material.
+    pub force: Option<[&'a [T]; 2]>,
     pub frame: Option<Following<'a, T>>,
     pub led: Led<'a>,
     /// How many, from 1 to [`MOST_STEPS`].
@@ -107,7 +112,7 @@ impl<T: Real> Steps<'_, T> {
     pub fn take(&self, activity: &mut Activity, even: [&mut [T]; 2], odd: [&mut [T]; 2]) -> Vec<bool> {
         let ([changed_x, changed_y], [even_x, even_y], [odd_x, odd_y]) = (&mut activity.changed, even, odd);
         let threads = if even_x.len() < PARALLEL_FROM { 1 } else { self.threads };
-        let seen = if self.stencil.share_in_runs() < 0.5 {
+        let seen = if self.rows.share_in_runs() < 0.5 || self.rows.couples(&self.terms) {
             // A list that has been read serves both coordinates.
             let even_odd = ([even_x, even_y], [odd_x, odd_y]);
             self.take_axes([0, 1], [changed_x, changed_y], even_odd, threads)
@@ -119,7 +124,7 @@ impl<T: Real> Steps<'_, T> {
             x.add(y);
             x
         };
-        activity.due += 2 * (self.stencil.all_followers() * self.count) as u64;
+        activity.due += 2 * (self.rows.all_followers() * self.count) as u64;
         activity.computed += seen.computed;
         seen.farther[..self.count].to_vec()
     }
@@ -131,14 +136,14 @@ impl<T: Real> Steps<'_, T> {
         (even, odd): ([&mut [T]; P], [&mut [T]; P]),
         threads: usize,
     ) -> Seen {
-        let (bands, levels) = (self.stencil.band_count(), self.count + 1);
+        let (bands, levels) = (self.rows.band_count(), self.count + 1);
         let mut flags = vec![false; bands * levels];
         for changed in &mut changed {
             changed.resize(bands, true);
             flags.iter_mut().step_by(levels).zip(&**changed).for_each(|(flag, changed)| *flag |= changed);
         }
         let mut seen = Seen::default();
-        let mut rows = Rows { even, odd, flags: &mut flags };
+        let mut rows = Stretch { even, odd, flags: &mut flags };
         let cuts = self.cuts(bands, threads);
         if cuts.len() == 2 {
             Front { steps: self, axes, stretch: 0..bands, rows: rows.lend() }.run(|_| 0..bands, &mut seen);
@@ -167,7 +172,7 @@ impl<T: Real> Steps<'_, T> {
     /// Where the body is cut for the threads, its ends included.
     fn cuts(&self, bands: usize, threads: usize) -> Vec<usize> {
         // A segment must outlast the steps, and a wedge fit in.
-        let most = if self.stencil.is_local() { bands / (3 * (self.count + 1)) } else { 1 };
+        let most = if self.rows.is_local() { bands / (3 * (self.count + 1)) } else { 1 };
         let segments = threads.clamp(1, most.max(1));
         (0..=segments).map(|k| k * bands / segments).collect()
     }
@@ -176,13 +181,13 @@ impl<T: Real> Steps<'_, T> {
     fn take_fronts<const P: usize>(
         &self,
         axes: [usize; P],
-        rows: Rows<'_, T, P>,
+        rows: Stretch<'_, T, P>,
         stretches: &[Range<usize>],
         range: impl Fn(&Range<usize>, usize) -> Range<usize> + Sync,
         seen: &mut Seen,
     ) {
         let fronts: Vec<_> = rows
-            .part(stretches, self.stencil, self.count + 1)
+            .part(stretches, self.rows, self.count + 1)
             .into_iter()
             .zip(stretches)
             .map(|(rows, stretch)| Front { steps: self, axes, stretch: stretch.clone(), rows })
@@ -213,13 +218,13 @@ impl Seen {
 }
 
 /// Some coordinates of a stretch of bands, and for each band and level whether it changed.
-struct Rows<'a, T, const P: usize> {
+struct Stretch<'a, T, const P: usize> {
     even: [&'a mut [T]; P],
     odd: [&'a mut [T]; P],
     flags: &'a mut [bool],
 }
 
-impl<'a, T, const P: usize> Rows<'a, T, P> {
+impl<'a, T, const P: usize> Stretch<'a, T, P> {
     /// The rows that a level reads, those it writes, and the flags.
     #[allow(clippy::type_complexity)]
     fn at(&mut self, level: usize) -> (&[&'a mut [T]; P], &mut [&'a mut [T]; P], &mut [bool]) {
@@ -227,21 +232,21 @@ impl<'a, T, const P: usize> Rows<'a, T, P> {
         if level % 2 == 1 { (even, odd, flags) } else { (odd, even, flags) }
     }
 
-    fn lend(&mut self) -> Rows<'_, T, P> {
+    fn lend(&mut self) -> Stretch<'_, T, P> {
         let Self { even, odd, flags } = self;
         let (even, odd) = (even.each_mut().map(|row| &mut **row), odd.each_mut().map(|row| &mut **row));
-        Rows { even, odd, flags }
+        Stretch { even, odd, flags }
     }
 
     /// The rows of some stretches, ascending and apart.
-    fn part(self, stretches: &[Range<usize>], stencil: &Stencil, levels: usize) -> Vec<Self> {
-        let Rows { mut even, mut odd, mut flags } = self;
+    fn part(self, stretches: &[Range<usize>], of: &Rows, levels: usize) -> Vec<Self> {
+        let Stretch { mut even, mut odd, mut flags } = self;
         let (mut particle, mut band) = (0, 0);
         let mut parts = Vec::with_capacity(stretches.len());
         for stretch in stretches {
-            let particles = stencil.particles(stretch.clone());
+            let particles = of.particles(stretch.clone());
             let of_particles = particles.start - particle..particles.end - particle;
-            let part = Rows {
+            let part = Stretch {
                 even: even.each_mut().map(|row| take_part(row, of_particles.clone())),
                 odd: odd.each_mut().map(|row| take_part(row, of_particles.clone())),
                 flags: take_part(&mut flags, (stretch.start - band) * levels..(stretch.end - band) * levels),
@@ -265,7 +270,7 @@ struct Front<'a, T, const P: usize> {
     steps: &'a Steps<'a, T>,
     axes: [usize; P],
     stretch: Range<usize>,
-    rows: Rows<'a, T, P>,
+    rows: Stretch<'a, T, P>,
 }
 
 impl<T: Real, const P: usize> Front<'_, T, P> {
@@ -274,7 +279,7 @@ impl<T: Real, const P: usize> Front<'_, T, P> {
         let count = self.steps.count;
         // No band may get ahead of the one behind it if nothing binds who sees whom; a single step has no front; and
         // what the caches hold needs none.
-        if count == 1 || !self.steps.stencil.is_local() || self.steps.stencil.is_in_cache() {
+        if count == 1 || !self.steps.rows.is_local() || self.steps.rows.is_in_cache() {
             (1..=count).for_each(|level| self.sweep(level, range(level), seen));
             return;
         }
@@ -311,8 +316,8 @@ impl<T: Real, const P: usize> Front<'_, T, P> {
     /// in the step before.
     fn may_change(&mut self, level: usize, band: usize) -> bool {
         let Self { steps, axes, stretch, rows } = self;
-        let (stencil, levels) = (steps.stencil, steps.count + 1);
-        let origin = stencil.particles(stretch.clone()).start;
+        let (compiled, levels) = (steps.rows, steps.count + 1);
+        let origin = compiled.particles(stretch.clone()).start;
         let (present, next, flags) = rows.at(level);
         let mut moves = false;
         for ((&axis, present), next) in axes.iter().zip(present).zip(next) {
@@ -320,46 +325,65 @@ impl<T: Real, const P: usize> Front<'_, T, P> {
                 &steps.led,
                 axis,
                 level,
-                stencil.particles(band..band + 1),
+                compiled.particles(band..band + 1),
                 (origin, present, next),
             );
         }
         let moved = |band: usize| flags[(band - stretch.start) * levels + level - 1];
         let beside = band.saturating_sub(1).max(stretch.start)..(band + 2).min(stretch.end);
-        moves || if stencil.is_local() { beside.into_iter().any(moved) } else { stretch.clone().any(moved) }
+        moves || if compiled.is_local() { beside.into_iter().any(moved) } else { stretch.clone().any(moved) }
     }
 
     fn sweep_all(&mut self, level: usize, bands: Range<usize>, seen: &mut Seen) {
         let Self { steps, axes, stretch, rows } = self;
-        let (stencil, levels) = (steps.stencil, steps.count + 1);
-        let origin = stencil.particles(stretch.clone()).start;
+        let (compiled, levels) = (steps.rows, steps.count + 1);
+        let origin = compiled.particles(stretch.clone()).start;
         let tile = TILES[usize::from(steps.count == 1)];
         let (present, next, flags) = rows.at(level);
         let mut axis = axes.iter().zip(present);
-        let mut planes = next.each_mut().map(|next| {
+        let mut components = next.each_mut().map(|next| {
             let (&axis, present) = axis.next().expect("as many as rows");
-            Plane { seen_from: origin, present, rest: steps.rest.map(|rest| rest[axis]), begin: origin, next }
+            let (rest, force) = (steps.rest.map(|rest| rest[axis]), steps.force.map(|force| force[axis]));
+            Component { axis, seen_from: origin, present, rest, force, begin: origin, next }
         });
-        planes.iter_mut().for_each(|plane| stencil.sweep_runs(bands.clone(), tile, plane));
-        stencil.sweep_listed(bands.clone(), &mut planes);
+        compiled.sweep(bands.clone(), tile, &mut components, &steps.terms);
         if let Some(Following { frame, reference }) = steps.frame {
-            for (plane, &axis) in planes.iter_mut().zip(&*axes) {
-                frame.follow_plane(stencil.particles(bands.clone()), reference[axis], plane);
+            for (component, &axis) in components.iter_mut().zip(&*axes) {
+                follow(frame, compiled.particles(bands.clone()), reference[axis], component);
             }
         }
         let farther = &mut seen.farther[level - 1];
         for band in bands {
-            let particles = stencil.particles(band..band + 1);
+            let particles = compiled.particles(band..band + 1);
             let particles = particles.start - origin..particles.end - origin;
             let mut changed = false;
-            for plane in &planes {
-                let (before, after) = (&plane.present[particles.clone()], &plane.next[particles.clone()]);
+            for of in &components {
+                let (before, after) = (&of.present[particles.clone()], &of.next[particles.clone()]);
                 changed = changed || differ(before, after);
                 *farther = *farther || steps.farther.is_some_and(|limit| is_farther(before, after, limit));
             }
-            seen.computed += (P * stencil.followers(band)) as u64;
+            seen.computed += (P * compiled.followers(band)) as u64;
             flags[(band - stretch.start) * levels + level] = changed;
         }
+    }
+}
+
+/// One coordinate of what [`Frame::follow`] does for the frame points among some particles, by a rule that looks
+/// before the sweep; `reference` is that coordinate of the whole body.
+fn follow<T: Real>(
+    frame: &Frame,
+    particles: Range<usize>,
+    reference: &[T],
+    component: &mut Component<'_, T>,
+) {
+    let from = frame.points.partition_point(|&point| (point as usize) < particles.start);
+    for (k, &point) in frame.points.iter().enumerate().skip(from) {
+        let point = point as usize;
+        if point >= particles.end {
+            break;
+        }
+        let moved = |s: usize| component.present[s - component.seen_from] - reference[s];
+        component.next[point - component.begin] = reference[point] + frame.mean_of_served(k, moved);
     }
 }
 

@@ -78,8 +78,10 @@ impl Case {
             let place = |which: usize, level: usize| self.place(which, done + level);
             let led = Led { particles: &self.led, place: &place };
             let rest = self.interaction.rest.as_ref().map(|rest| [&rest.x[..], &rest.y[..]]);
-            let stencil = sweep.stencil.as_ref().expect("plain");
-            let steps = Steps { stencil, rest, frame: None, led, count, farther: None, threads };
+            let (rows, terms) = (sweep.rows.as_ref().expect("affine"), sweep.terms.of(&self.interaction));
+            let force = self.interaction.forces.as_ref().map(|force| [&force.x[..], &force.y[..]]);
+            let frame = None;
+            let steps = Steps { rows, terms, rest, force, frame, led, count, farther: None, threads };
             let even = [&mut present.x[..], &mut present.y[..]];
             let odd = [&mut next.x[..], &mut next.y[..]];
             pool.install(|| steps.take(&mut activity, even, odd));
@@ -115,11 +117,12 @@ fn steps_taken_together_have_the_bits_of_single_ones_for_any_threads() {
 fn threads_beyond_one_a_coordinate_cut_the_body_in_segments() {
     let case = Case::new(LatticeKind::Square { spacing: 1.0 }, 9000, 61);
     let sweep = Sweep::compile(Update::default(), &case.interaction, &case.roles);
-    let stencil = sweep.stencil.as_ref().expect("plain");
+    let rows = sweep.rows.as_ref().expect("affine");
     let segments = |threads| {
         let (led, count, farther) = (Led::NOBODY, 16, None);
-        let steps = Steps::<f64> { stencil, rest: None, frame: None, led, count, farther, threads };
-        steps.cuts(stencil.band_count(), threads.div_ceil(2)).len() - 1
+        let (terms, rest, force, frame) = (Terms::NONE, None, None, None);
+        let steps = Steps::<f64> { rows, terms, rest, force, frame, led, count, farther, threads };
+        steps.cuts(rows.band_count(), threads.div_ceil(2)).len() - 1
     };
     assert_eq!([1, 2, 4, 8].map(segments), [1, 1, 2, 4]);
 }
@@ -171,11 +174,11 @@ fn a_body_in_which_some_see_far_is_stepped_all_the_same() {
 #[test]
 fn lists_are_swept_together_to_the_bits_of_single_steps_for_any_threads() {
     let case = Case::new(LatticeKind::Hexagonal { spacing: 1.0 }, 9000, 31).jumbled();
-    let stencil = |case: &Case| {
+    let compiled = |case: &Case| {
         let sweep = Sweep::compile(Update::default(), &case.interaction, &case.roles);
-        sweep.stencil.expect("plain").share_in_runs()
+        sweep.rows.expect("affine").share_in_runs()
     };
-    assert_eq!(stencil(&case), 0.0);
+    assert_eq!(compiled(&case), 0.0);
     let expected = case.singly(25);
     for threads in [1, 2, 5] {
         let (places, activity) = case.together(&[16, 9], threads);

@@ -1,17 +1,21 @@
 //! The plain barycentre of particles that have lost neighbours: over those who are left and the ghosts.
 //!
 //! Along a crack consecutive particles have mostly lost the same neighbours: they are swept as runs, like those of a
-//! [stencil](super::super::stencil) but for what stands in for the lost. The others are grouped by what they see, so that
+//! [rows](super::rows) but for what stands in for the lost. The others are grouped by what they see, so that
 //! nothing is decided particle by particle. The sums are those of
-//! [`Interaction::target`](super::super::interaction::Interaction::target) in the same order: the bits are the same.
+//! [`Interaction::target`](crate::flock::interaction::Interaction::target) in the same order: the bits are the same.
 //! What broke renews its band alone.
+
+#[cfg(test)]
+mod tests;
 
 use std::ops::Range;
 
-use super::super::neighbourhood::Neighbours;
-use super::super::points::Points;
-use super::super::stencil::Plane;
-use super::{Bonds, StandIn};
+use super::kernel::Component;
+use crate::flock::fracture::{Bonds, StandIn};
+use crate::flock::lanes::{ARITHMETIC, InLanes, in_lanes};
+use crate::flock::neighbourhood::Neighbours;
+use crate::flock::points::Points;
 
 /// Fewest particles of a run, which are summed up so many at a time.
 const SHORT: usize = 8;
@@ -118,17 +122,8 @@ impl Torn {
     }
 
     /// Computes both coordinates of the targets of those in some bands, whatever stands there.
-    pub fn sweep(&self, bands: Range<usize>, reference: &Points, planes: &mut [Plane<'_, f64>; 2]) {
-        let bands = &self.bands[bands];
-        #[cfg(target_arch = "x86_64")]
-        if is_x86_feature_detected!("avx512f") {
-            // SAFETY: the processor has AVX-512, which is all that the callee asks for.
-            return unsafe { sweep_avx512(bands, reference, planes) };
-        } else if is_x86_feature_detected!("avx2") {
-            // SAFETY: the processor has AVX2, which is all that the callee asks for.
-            return unsafe { sweep_avx2(bands, reference, planes) };
-        }
-        sweep_bands(bands, reference, planes);
+    pub fn sweep(&self, bands: Range<usize>, reference: &Points, components: &mut [Component<'_, f64>; 2]) {
+        in_lanes::<8, ARITHMETIC>(Torns { bands: &self.bands[bands], reference, components });
     }
 }
 
@@ -207,35 +202,37 @@ impl Band {
     }
 }
 
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f")]
-fn sweep_avx512(bands: &[Band], reference: &Points, planes: &mut [Plane<'_, f64>; 2]) {
-    sweep_bands(bands, reference, planes);
+/// The torn of some bands, whose numbers of particles say how many are summed up at a time.
+struct Torns<'a, 'b> {
+    bands: &'a [Band],
+    reference: &'a Points,
+    components: &'a mut [Component<'b, f64>; 2],
 }
 
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn sweep_avx2(bands: &[Band], reference: &Points, planes: &mut [Plane<'_, f64>; 2]) {
-    sweep_bands(bands, reference, planes);
+impl InLanes for Torns<'_, '_> {
+    #[inline(always)]
+    fn run<const W: usize>(self) {
+        sweep_bands(self.bands, self.reference, self.components);
+    }
 }
 
 #[inline(always)]
-fn sweep_bands(bands: &[Band], reference: &Points, planes: &mut [Plane<'_, f64>; 2]) {
+fn sweep_bands(bands: &[Band], reference: &Points, components: &mut [Component<'_, f64>; 2]) {
     for band in bands {
         for Alike { particles, seen } in &band.runs {
-            for (axis, plane) in planes.iter_mut().enumerate() {
+            for (axis, component) in components.iter_mut().enumerate() {
                 let look = Look { seen: &band.seen[seen.clone()], axis, reference };
                 if particles.len() < LONG {
-                    sweep_run::<SHORT>(particles.clone(), look, plane);
+                    sweep_run::<SHORT>(particles.clone(), look, component);
                 } else {
-                    sweep_run::<LONG>(particles.clone(), look, plane);
+                    sweep_run::<LONG>(particles.clone(), look, component);
                 }
             }
         }
         for Alike { particles, seen } in &band.groups {
-            for (axis, plane) in planes.iter_mut().enumerate() {
+            for (axis, component) in components.iter_mut().enumerate() {
                 let look = Look { seen: &band.seen[seen.clone()], axis, reference };
-                sweep_group(&band.members[particles.clone()], look, plane);
+                sweep_group(&band.members[particles.clone()], look, component);
             }
         }
     }
@@ -243,7 +240,7 @@ fn sweep_bands(bands: &[Band], reference: &Points, planes: &mut [Plane<'_, f64>;
 
 /// At least `W` particles, `W` at a time.
 #[inline(always)]
-fn sweep_run<const W: usize>(particles: Range<usize>, look: Look<'_>, plane: &mut Plane<'_, f64>) {
+fn sweep_run<const W: usize>(particles: Range<usize>, look: Look<'_>, component: &mut Component<'_, f64>) {
     for from in particles.clone().step_by(W) {
         // The last ones overlap those before them, which come out the same again.
         let from = from.min(particles.end - W);
@@ -251,14 +248,14 @@ fn sweep_run<const W: usize>(particles: Range<usize>, look: Look<'_>, plane: &mu
             let at = (from - first).wrapping_add_signed(distance);
             of[at..at + W].try_into().expect("as many as asked for")
         };
-        let targets = look.targets(lanes, plane);
-        plane.next[from - plane.begin..][..W].copy_from_slice(&targets.0);
+        let targets = look.targets(lanes, component);
+        component.next[from - component.begin..][..W].copy_from_slice(&targets.0);
     }
 }
 
 /// Not compiled for wide vectors, which would gather what they hold more slowly than it is loaded.
 #[inline(never)]
-fn sweep_group(particles: &[u32], look: Look<'_>, plane: &mut Plane<'_, f64>) {
+fn sweep_group(particles: &[u32], look: Look<'_>, component: &mut Component<'_, f64>) {
     for piece in particles.chunks(SCATTERED) {
         // A last piece too short is filled up with one of its own.
         let mut which = [piece[0] as usize; SCATTERED];
@@ -266,8 +263,11 @@ fn sweep_group(particles: &[u32], look: Look<'_>, plane: &mut Plane<'_, f64>) {
         let lanes = |of: &[f64], first: usize, distance: isize| {
             which.map(|j| of[(j - first).wrapping_add_signed(distance)])
         };
-        let targets = look.targets(lanes, plane);
-        piece.iter().zip(targets.0).for_each(|(&j, target)| plane.next[j as usize - plane.begin] = target);
+        let targets = look.targets(lanes, component);
+        piece
+            .iter()
+            .zip(targets.0)
+            .for_each(|(&j, target)| component.next[j as usize - component.begin] = target);
     }
 }
 
@@ -284,16 +284,16 @@ struct Look<'a> {
 }
 
 impl Look<'_> {
-    /// What [`Rule::target`](super::super::rules::Rule::target) computes: the rest offset is added to the mean, also
+    /// What [`Rule::target`](crate::flock::rules::Rule::target) computes: the rest offset is added to the mean, also
     /// where it is zero, which makes 0.0 of -0.0; whoever sees nobody stays. `of` reads numbers, those of particle
     /// number `first` first, at a distance of indices from the particles.
     #[inline(always)]
     fn targets<const W: usize>(
         &self,
         of: impl Fn(&[f64], usize, isize) -> [f64; W],
-        plane: &Plane<'_, f64>,
+        component: &Component<'_, f64>,
     ) -> Lanes<W> {
-        let present = |distance| of(plane.present, plane.seen_from, distance);
+        let present = |distance| of(component.present, component.seen_from, distance);
         let here = present(0);
         if self.seen.is_empty() {
             return Lanes(here);
@@ -324,7 +324,7 @@ impl Look<'_> {
         } else {
             (0..W).for_each(|k| sum.0[k] /= count);
         }
-        let rest = plane.rest.map_or([0.0; W], |rest| of(rest, 0, 0));
+        let rest = component.rest.map_or([0.0; W], |rest| of(rest, 0, 0));
         (0..W).for_each(|k| sum.0[k] += rest[k]);
         sum
     }

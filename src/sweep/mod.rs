@@ -6,24 +6,35 @@
 //! the particles one after the other in their numbering, each seeing the new places of those before
 //! it (Gauss-Seidel).
 
-mod several;
+//!
+//! * [`rows`]: a rule compiled for a body, as runs and gathers with coefficients.
+//! * `kernel`, `gathers`: the loops over rows; `terms`: what is made of a mean while it is in the registers.
+//! * `schedule`: which bands take which step when, on which thread.
+//! * `torn`: particles that have lost bonds.
+
+mod gathers;
+pub mod kernel;
+pub mod rows;
+mod schedule;
+pub mod terms;
 #[cfg(test)]
 mod tests;
+pub mod torn;
 
 use std::ops::Range;
 
 use rayon::prelude::*;
 
-pub use several::{Activity, Following, Led, MOST_STEPS, Steps};
+pub use schedule::{Activity, Following, Led, MOST_STEPS, Steps};
 
-use crate::flock::fracture::torn::Torn;
 use crate::flock::frame::Frame;
 use crate::flock::interaction::{Interaction, Weights};
 use crate::flock::points::Points;
 use crate::flock::role::Role;
-use crate::flock::rules::Rule;
-use crate::flock::stencil::matrix::{self, MatrixStencil};
-use crate::flock::stencil::{Plane, Stencil};
+use kernel::Component;
+use rows::Rows;
+use terms::Compiled;
+use torn::Torn;
 
 /// Who sees whose new position within one step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -63,34 +74,26 @@ pub struct Sweep {
     update: Update,
     follows: Vec<bool>,
     followers: usize,
-    /// Present where the rule is the plain barycentre.
-    stencil: Option<Stencil>,
-    /// Present where the rule is a material and nothing else.
-    matrices: Option<MatrixStencil>,
-    /// Followers with a broken bond, whom the stencil does not fit.
+    /// Present where the mean is affine in the positions and the sweep synchronous.
+    rows: Option<Rows>,
+    terms: Compiled,
+    /// Followers with a broken bond, whom the rows do not fit, where the rule is the plain barycentre.
     torn: Torn,
-    /// The same where no stencil is: whom the matrices do not fit, ascending.
+    /// The same where it is not, ascending: they are swept one by one.
     aside: Vec<u32>,
 }
 
 impl Sweep {
     /// Compile anew whenever roles or neighbours change; whoever loses a bond is [set aside](Sweep::set_aside).
     pub fn compile(update: Update, interaction: &Interaction, roles: &[Role]) -> Self {
-        let follows = followers(roles);
-        let Interaction { rule, neighbours, weights, .. } = interaction;
-        let plain = rule.is_plain_barycentre() && matches!(weights, Weights::Equal);
-        let stencil = (plain && update == Update::default())
-            .then(|| Stencil::compile(neighbours, &follows, interaction.rest.as_ref()));
-        let matrices = match weights {
-            Weights::Matrix(weights) if *rule == Rule::MATERIAL && update.order == Order::Synchronous => {
-                let chunk = chunk_size(follows.len());
-                Some(MatrixStencil::compile(neighbours, weights, &follows, chunk))
-            }
-            _ => None,
-        };
-        let bands = stencil.iter().flat_map(|s| (0..s.band_count()).map(|band| s.particles(band..band + 1)));
-        let (torn, aside) = (Torn::new(bands), Vec::new());
-        let mut sweep = Self { update, followers: count(&follows), follows, stencil, matrices, torn, aside };
+        let mut sweep = Self::uncompiled(update, interaction, roles);
+        if update.order == Order::Synchronous {
+            sweep.rows = Rows::compile(interaction, &sweep.follows);
+        }
+        let neighbours = &interaction.neighbours;
+        if let Some(rows) = sweep.rows.as_ref().filter(|_| sweep.is_plain(interaction)) {
+            sweep.torn = Torn::new((0..rows.band_count()).map(|band| rows.particles(band..band + 1)));
+        }
         if let Some(bonds) = interaction.bonds.as_ref().filter(|bonds| bonds.any_broken()) {
             let is_torn = |&j: &usize| bonds.is_torn(j, neighbours);
             sweep.set_aside((0..neighbours.count()).filter(is_torn), interaction);
@@ -98,10 +101,29 @@ impl Sweep {
         sweep
     }
 
+    /// For neighbours that change at every step: nothing is compiled from them.
+    pub fn uncompiled(update: Update, interaction: &Interaction, roles: &[Role]) -> Self {
+        let follows: Vec<bool> = roles.iter().map(|&role| role == Role::Follower).collect();
+        Self {
+            update,
+            followers: follows.iter().filter(|&&follows| follows).count(),
+            follows,
+            rows: None,
+            terms: Compiled::new(update, interaction),
+            torn: Torn::default(),
+            aside: Vec::new(),
+        }
+    }
+
+    /// Whether targets are nothing but means of neighbours that count the same.
+    fn is_plain(&self, interaction: &Interaction) -> bool {
+        self.terms.is_empty() && matches!(interaction.weights, Weights::Equal)
+    }
+
     /// Sweeps these by themselves from now on: they have lost a bond.
     pub fn set_aside(&mut self, particles: impl IntoIterator<Item = usize>, interaction: &Interaction) {
         let follows = &self.follows;
-        if let (Some(_), Some(bonds)) = (&self.stencil, &interaction.bonds) {
+        if let (Some(_), Some(bonds), true) = (&self.rows, &interaction.bonds, self.is_plain(interaction)) {
             self.torn.renew(particles, follows, (bonds, &interaction.neighbours, &interaction.reference));
             return;
         }
@@ -110,20 +132,13 @@ impl Sweep {
         self.aside.dedup();
     }
 
-    /// For neighbours that change at every step: nothing is compiled from them.
-    pub fn uncompiled(update: Update, roles: &[Role]) -> Self {
-        let follows = followers(roles);
-        let (stencil, matrices, torn, aside) = (None, None, Torn::default(), Vec::new());
-        Self { update, followers: count(&follows), follows, stencil, matrices, torn, aside }
-    }
-
     /// Share of the followers swept without neighbour lists.
     pub fn share_in_runs(&self) -> f64 {
-        self.stencil.as_ref().map_or(0.0, Stencil::share_in_runs)
+        self.rows.as_ref().map_or(0.0, Rows::share_in_runs)
     }
 
     /// Writes the followers' next positions, then the frame's. Leaders must stand in `next` already;
-    /// whoever neither follows nor is frame keeps what stands there. The sequential sweep starts from
+    /// what neither follows nor is frame keeps what stands there. The sequential sweep starts from
     /// what `next` holds, so it must hold the present positions.
     pub fn step(
         &self,
@@ -132,22 +147,8 @@ impl Sweep {
         present: &Points,
         next: &mut Points,
     ) {
-        if let Some(stencil) = &self.stencil {
-            sweep_whole(stencil, &self.torn, interaction, present, next);
-        } else if let Some(matrices) = &self.matrices {
-            let Weights::Matrix(weights) = &interaction.weights else {
-                unreachable!("compiled from matrices")
-            };
-            let Interaction { neighbours, forces, rest, .. } = interaction;
-            let (forces, rest, damping) = (forces.as_ref(), rest.as_ref(), self.update.damping);
-            let body = matrix::Body { neighbours, weights, forces, rest, present, damping };
-            for_chunks(next, |chunk, x, y| {
-                let begin = chunk * chunk_size(present.len());
-                for &j in matrices.sweep_chunk(chunk, &body, (&mut *x, &mut *y)) {
-                    let i = j as usize - begin;
-                    [x[i], y[i]] = self.moved(j as usize, interaction, present);
-                }
-            });
+        if let Some(rows) = &self.rows {
+            self.sweep_whole(rows, interaction, present, next);
             self.step_aside(interaction, present, next);
         } else if self.update.order == Order::Synchronous {
             for_chunks(next, |chunk, x, y| {
@@ -166,7 +167,7 @@ impl Sweep {
         }
     }
 
-    /// Those whom no matrices fit; what these left in their places is written over.
+    /// Those whom the rows do not fit any more; what these left in their places is written over.
     fn step_aside(&self, interaction: &Interaction, present: &Points, next: &mut Points) {
         let moved = |&j: &u32| (j, self.moved(j as usize, interaction, present));
         if self.aside.len() >= ASIDE_IN_PARALLEL && rayon::current_num_threads() > 1 {
@@ -187,12 +188,14 @@ impl Sweep {
         (count, led, farther): (usize, Led<'_>, Option<f64>),
         activity: &mut Activity,
     ) -> Vec<bool> {
-        let stencil = self.stencil.as_ref().expect("a sweep that takes several steps has a stencil");
-        let rest = interaction.rest.as_ref().map(|rest| [&rest.x[..], &rest.y[..]]);
+        let rows = self.rows.as_ref().expect("a sweep that takes several steps has rows");
+        let (rest, force) = (interaction.rest.as_ref(), interaction.forces.as_ref());
+        let [rest, force] = [rest, force].map(|points| points.map(|points| [&points.x[..], &points.y[..]]));
         let threads = rayon::current_num_threads();
         let reference = [&interaction.reference.x[..], &interaction.reference.y[..]];
         let frame = frame.map(|frame| Following { frame, reference });
-        let steps = Steps { stencil, rest, frame, led, count, farther, threads };
+        let terms = self.terms.of(interaction);
+        let steps = Steps { rows, terms, rest, force, frame, led, count, farther, threads };
         let even = [&mut present.x[..], &mut present.y[..]];
         let farther = steps.take(activity, even, [&mut next.x[..], &mut next.y[..]]);
         if count % 2 == 1 {
@@ -209,11 +212,56 @@ impl Sweep {
     /// Whether [`Sweep::steps`] can take the steps of a body with this frame, if it has one: not if something looks at a
     /// step as it ends.
     pub fn takes_several(&self, frame: Option<&Frame>) -> bool {
-        let keeps_up = |frame: &Frame, stencil: &Stencil| {
-            frame.rule.looks_before_the_sweep() && stencil.are_near(frame.reach())
-        };
+        let keeps_up =
+            |frame: &Frame, rows: &Rows| frame.rule.looks_before_the_sweep() && rows.are_near(frame.reach());
         self.torn.is_empty()
-            && self.stencil.as_ref().is_some_and(|stencil| frame.is_none_or(|frame| keeps_up(frame, stencil)))
+            && self.aside.is_empty()
+            && self.rows.as_ref().is_some_and(|rows| frame.is_none_or(|frame| keeps_up(frame, rows)))
+    }
+
+    /// How many times as far from the reference a step may take a particle as any was that it sees, but for loads and
+    /// leaders \[1\].
+    pub fn gain(&self) -> Option<f64> {
+        self.rows.as_ref().map(|rows| self.terms.gain(rows.gain()))
+    }
+
+    /// One step of all rows, in pieces of whole bands.
+    fn sweep_whole(&self, rows: &Rows, interaction: &Interaction, present: &Points, next: &mut Points) {
+        let bands = rows.band_count();
+        let size = if is_parallel(present.len()) { chunk_size(present.len()) } else { usize::MAX };
+        let mut pieces = Vec::new();
+        let (mut x, mut y) = (&mut next.x[..], &mut next.y[..]);
+        let mut first = 0;
+        for band in 0..bands {
+            let particles = rows.particles(first..band + 1);
+            if particles.len() >= size || band + 1 == bands {
+                let (head_x, tail_x) = x.split_at_mut(particles.len());
+                let (head_y, tail_y) = y.split_at_mut(particles.len());
+                pieces.push((first..band + 1, particles.start, head_x, head_y));
+                (x, y, first) = (tail_x, tail_y, band + 1);
+            }
+        }
+        let (rest, force) = (interaction.rest.as_ref(), interaction.forces.as_ref());
+        let terms = self.terms.of(interaction);
+        let work = |(bands, begin, next_x, next_y): (Range<usize>, usize, &mut [f64], &mut [f64])| {
+            let mut components = [(0, next_x), (1, next_y)].map(|(axis, next)| {
+                let of = |points| coordinates(points, axis);
+                let (present, rest, force) = (of(present), rest.map(of), force.map(of));
+                Component { axis, seen_from: 0, present, rest, force, begin, next }
+            });
+            if self.torn.is_empty() {
+                return rows.sweep(bands, TILE, &mut components, &terms);
+            }
+            // The torn are swept over, and then again while what they see is in the caches.
+            for band in bands {
+                rows.sweep(band..band + 1, TILE, &mut components, &terms);
+                self.torn.sweep(band..band + 1, &interaction.reference, &mut components);
+            }
+        };
+        match pieces.len() {
+            0 | 1 => pieces.into_iter().for_each(work),
+            _ => pieces.into_par_iter().for_each(work),
+        }
     }
 
     fn moved(&self, j: usize, interaction: &Interaction, seen: &Points) -> [f64; 2] {
@@ -227,12 +275,8 @@ impl Sweep {
     }
 }
 
-fn followers(roles: &[Role]) -> Vec<bool> {
-    roles.iter().map(|&role| role == Role::Follower).collect()
-}
-
-fn count(follows: &[bool]) -> usize {
-    follows.iter().filter(|&&follows| follows).count()
+fn coordinates(points: &Points, axis: usize) -> &[f64] {
+    if axis == 0 { &points.x } else { &points.y }
 }
 
 /// Particles per piece of work in a body of so many: every thread gets several.
@@ -255,48 +299,5 @@ fn for_chunks(points: &mut Points, work: impl Fn(usize, &mut [f64], &mut [f64]) 
             .for_each(|(chunk, (x, y))| work(chunk, x, y));
     } else {
         x.chunks_mut(size).zip(y.chunks_mut(size)).enumerate().for_each(|(chunk, (x, y))| work(chunk, x, y));
-    }
-}
-
-/// One step of everybody, in pieces of whole bands.
-fn sweep_whole(
-    stencil: &Stencil,
-    torn: &Torn,
-    interaction: &Interaction,
-    present: &Points,
-    next: &mut Points,
-) {
-    let bands = stencil.band_count();
-    let size = if is_parallel(present.len()) { chunk_size(present.len()) } else { usize::MAX };
-    let mut pieces = Vec::new();
-    let (mut x, mut y) = (&mut next.x[..], &mut next.y[..]);
-    let mut first = 0;
-    for band in 0..bands {
-        let particles = stencil.particles(first..band + 1);
-        if particles.len() >= size || band + 1 == bands {
-            let (head_x, tail_x) = x.split_at_mut(particles.len());
-            let (head_y, tail_y) = y.split_at_mut(particles.len());
-            pieces.push((first..band + 1, particles.start, head_x, head_y));
-            (x, y, first) = (tail_x, tail_y, band + 1);
-        }
-    }
-    let [rest_x, rest_y] = [0, 1]
-        .map(|axis| interaction.rest.as_ref().map(|rest| if axis == 0 { &rest.x[..] } else { &rest.y[..] }));
-    let work = |(bands, begin, x, y): (Range<usize>, usize, &mut [f64], &mut [f64])| {
-        let mut planes = [
-            Plane { seen_from: 0, present: &present.x, rest: rest_x, begin, next: x },
-            Plane { seen_from: 0, present: &present.y, rest: rest_y, begin, next: y },
-        ];
-        let mut sweep = |bands: Range<usize>| {
-            planes.iter_mut().for_each(|plane| stencil.sweep_runs(bands.clone(), TILE, plane));
-            stencil.sweep_listed(bands.clone(), &mut planes);
-            torn.sweep(bands, &interaction.reference, &mut planes);
-        };
-        // The torn are swept over, and then again while what they see is in the caches.
-        if torn.is_empty() { sweep(bands) } else { bands.for_each(|band| sweep(band..band + 1)) }
-    };
-    match pieces.len() {
-        0 | 1 => pieces.into_iter().for_each(work),
-        _ => pieces.into_par_iter().for_each(work),
     }
 }

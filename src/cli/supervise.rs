@@ -1,0 +1,209 @@
+//! A process that outlives the one that does the work, and starts another when that one ends.
+//!
+//! Whoever reaches a node's ports can end its middleware (see `ros::edge::pulse`), and no thread of a process outlives
+//! a full memory. So `node` and `robots` are two processes: this one holds no socket and hardly any memory; its child
+//! does the work and tells it its state ten times a second, over the socket that is the child's standard input. A
+//! child that ends without having been asked to, or falls silent, is followed by another at once, which gets that
+//! state first. The alternative, a middleware in a process of its own under a loop that goes on, would be back no
+//! sooner, because finding the peers again takes the time, and a loop without a middleware has nobody to hear.
+
+use std::io::{BufRead, BufReader, ErrorKind, Read, Write};
+use std::os::fd::OwnedFd;
+use std::os::unix::net::UnixStream;
+use std::process::{Child, Command, ExitCode, Stdio};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, channel};
+use std::time::{Duration, Instant};
+
+use flockform::ros::edge::pulse::MIDDLEWARE_GONE;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+use super::run::interrupt_flag;
+
+/// Number of a child, from 1, in the environment.
+const LIFE: &str = "FLOCKFORM_LIFE";
+/// How often a child tells its state \[s\].
+const TELLING: Duration = Duration::from_millis(100);
+/// How long a child that has spoken may be silent \[s\].
+const SILENCE: Duration = Duration::from_millis(1500);
+/// How often the child is looked at \[s\].
+const LOOK: Duration = Duration::from_millis(10);
+/// How long a child that was asked to end may take \[s\].
+const LEAVING: Duration = Duration::from_secs(8);
+/// Children in a row that end without a word before we give up \[1\].
+const SPEECHLESS: u32 = 5;
+/// Longest wait before the next child, after several short lives \[s\].
+const REST: Duration = Duration::from_secs(1);
+
+/// A child's end of its socket.
+pub struct Life {
+    number: u32,
+    socket: Option<UnixStream>,
+    /// What of the last state has not gone out yet.
+    unsent: Vec<u8>,
+    told: Option<Instant>,
+}
+
+/// Runs this program again as a child, and another whenever one ends for no reason of its own; returns in the child,
+/// and in this process with the code of the last.
+pub fn supervise() -> std::io::Result<Result<Life, ExitCode>> {
+    match std::env::var(LIFE).ok().and_then(|number| number.parse().ok()) {
+        Some(number) => Ok(Ok(Life::take_up(number)?)),
+        None => lead().map(Err),
+    }
+}
+
+fn lead() -> std::io::Result<ExitCode> {
+    let stop = interrupt_flag();
+    let (mut state, mut speechless, mut rest) = (b"null\n".to_vec(), 0, Duration::ZERO);
+    for number in 1_u32.. {
+        let begun = Instant::now();
+        let (mut child, lines) = start(number, &state)?;
+        let (code, last) = follow(&mut child, lines, &stop)?;
+        speechless = if last.is_some() { 0 } else { speechless + 1 };
+        state = last.unwrap_or(state);
+        match code {
+            // Done, interrupted, or refused: another would do the same.
+            Some(code @ 0..=2) => return Ok(ExitCode::from(code)),
+            _ if stop.load(Ordering::Relaxed) => return Ok(ExitCode::SUCCESS),
+            _ if speechless == SPEECHLESS => break,
+            _ => {}
+        }
+        let why = code.map_or("was ended".to_owned(), |code| format!("ended with code {code}"));
+        tracing::error!(
+            "process {number} {why} after {:.1} s: another goes on",
+            begun.elapsed().as_secs_f64()
+        );
+        // The first comes at once; whoever dies again and again leaves the machine to others in between.
+        rest = if begun.elapsed() > Duration::from_secs(5) {
+            Duration::ZERO
+        } else {
+            (2 * rest).clamp(LOOK, REST)
+        };
+        std::thread::sleep(rest);
+    }
+    tracing::error!("{SPEECHLESS} processes in a row ended before they had begun");
+    Ok(ExitCode::from(MIDDLEWARE_GONE))
+}
+
+/// Starts a child and tells it the state.
+fn start(number: u32, state: &[u8]) -> std::io::Result<(Child, Lines)> {
+    let (ours, theirs) = UnixStream::pair()?;
+    let child = Command::new(std::env::current_exe()?)
+        .args(std::env::args_os().skip(1))
+        .env(LIFE, number.to_string())
+        .stdin(Stdio::from(OwnedFd::from(theirs)))
+        .spawn()?;
+    let (say, lines) = channel();
+    let (reader, mut writer, state) = (BufReader::new(ours.try_clone()?), ours.try_clone()?, state.to_vec());
+    std::thread::spawn(move || {
+        // A child that is gone is noticed by its end.
+        let _ = writer.write_all(&state);
+        for line in reader.split(b'\n').map_while(Result::ok) {
+            if say.send(line).is_err() {
+                return;
+            }
+        }
+    });
+    Ok((child, (ours, lines)))
+}
+
+type Lines = (UnixStream, Receiver<Vec<u8>>);
+
+/// Waits for the end of a child: its exit code, if it gave one, and the last state it told.
+fn follow(
+    child: &mut Child,
+    (socket, lines): Lines,
+    stop: &AtomicBool,
+) -> std::io::Result<(Option<u8>, Option<Vec<u8>>)> {
+    let (mut last, mut heard, mut asked): (Option<Vec<u8>>, Instant, Option<Instant>) =
+        (None, Instant::now(), None);
+    let mut before = Instant::now();
+    loop {
+        for mut line in lines.try_iter() {
+            line.push(b'\n');
+            (last, heard) = (Some(line), Instant::now());
+        }
+        if let Some(status) = child.try_wait()? {
+            // What it told just before.
+            while let Ok(mut line) = lines.recv_timeout(LOOK) {
+                line.push(b'\n');
+                last = Some(line);
+            }
+            return Ok((status.code().and_then(|code| u8::try_from(code).ok()), last));
+        }
+        // Our own absence is not the child's silence.
+        heard += before.elapsed().saturating_sub(10 * LOOK);
+        before = Instant::now();
+        if asked.is_none() && stop.load(Ordering::Relaxed) {
+            // It reads the end of its input.
+            let _ = socket.shutdown(std::net::Shutdown::Write);
+            asked = Some(Instant::now());
+        }
+        let is_silent = last.is_some() && asked.is_none() && heard.elapsed() > SILENCE;
+        if is_silent || asked.is_some_and(|asked| asked.elapsed() > LEAVING) {
+            tracing::error!("the process does not answer and is ended");
+            child.kill()?;
+        }
+        std::thread::sleep(LOOK);
+    }
+}
+
+impl Life {
+    fn take_up(number: u32) -> std::io::Result<Self> {
+        use std::os::fd::AsFd;
+        let socket = UnixStream::from(std::io::stdin().as_fd().try_clone_to_owned()?);
+        Ok(Self { number, socket: Some(socket), unsent: Vec::new(), told: None })
+    }
+
+    /// From 1.
+    pub fn number(&self) -> u32 {
+        self.number
+    }
+
+    /// The state that the process before us told last.
+    pub fn left<T: DeserializeOwned>(&mut self) -> Option<T> {
+        let socket = self.socket.as_ref()?;
+        let mut line = Vec::new();
+        let patience = socket.set_read_timeout(Some(Duration::from_secs(2)));
+        let read = patience.and_then(|()| BufReader::new(socket).read_until(b'\n', &mut line));
+        let told = socket.set_nonblocking(true).and(read);
+        match told.map_err(|error| error.to_string()).and_then(|_| parse(&line)) {
+            Ok(left) => left,
+            Err(error) => {
+                tracing::warn!(
+                    "what the process before this one left cannot be read ({error}): starting anew"
+                );
+                None
+            }
+        }
+    }
+
+    /// Tells the state, if it is time to; says false when nobody listens any more and it is time to end.
+    pub fn tell<T: Serialize>(&mut self, state: impl FnOnce() -> T) -> bool {
+        if self.told.is_some_and(|told| told.elapsed() < TELLING) {
+            return true;
+        }
+        let Some(socket) = &mut self.socket else { return true };
+        self.told = Some(Instant::now());
+        if self.unsent.is_empty()
+            && let Ok(line) = serde_json::to_vec(&state())
+        {
+            self.unsent = line;
+            self.unsent.push(b'\n');
+        }
+        let goes_on =
+            |error: &std::io::Error| matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted);
+        match socket.write(&self.unsent) {
+            Ok(count) => drop(self.unsent.drain(..count)),
+            Err(error) if goes_on(&error) => {}
+            Err(_) => return false,
+        }
+        !matches!(socket.read(&mut [0]), Ok(0))
+    }
+}
+
+fn parse<T: DeserializeOwned>(line: &[u8]) -> Result<Option<T>, String> {
+    serde_json::from_slice(line).map_err(|error| error.to_string())
+}

@@ -1,0 +1,58 @@
+//! Work that loads and supports do on a body while it goes from one equilibrium to the next.
+//!
+//! By the trapezoid rule: mean force times way between two equilibria, particle by particle. In a body that stores what is
+//! done to it, the sum from the unloaded body on is the strain energy, up to an error that falls with the square of the
+//! increments. A body that is stepped is at rest nowhere on its way, and nothing is summed up.
+
+use super::engine::Engine;
+use super::forces::Forces;
+use super::mechanics::Work;
+use crate::flock::points::Points;
+
+/// From the unloaded body to the last equilibrium.
+#[derive(Clone, Debug, Default)]
+pub struct Path {
+    done: Work,
+    last: Option<Acting>,
+}
+
+/// What acts on each particle \[force\], and where it has gone \[length\], shape \[count\].
+#[derive(Clone, Debug)]
+struct Acting {
+    loads: Points,
+    supports: Points,
+    displacement: Points,
+}
+
+impl Path {
+    pub fn done(&self) -> Work {
+        self.done
+    }
+
+    /// Adds the way to where the engine's body is at rest now.
+    pub fn go_on(&mut self, engine: &Engine) {
+        let Some(forces) = Forces::of(engine) else { return };
+        let now = Acting {
+            supports: forces.supports(engine),
+            loads: forces.loads,
+            displacement: forces.displacement,
+        };
+        let rest = || Points::zeros(now.displacement.len());
+        let unloaded = || Acting { loads: rest(), supports: rest(), displacement: rest() };
+        let last = self.last.take().unwrap_or_else(unloaded);
+        let way = |i: usize| {
+            let ([x, y], [a, b]) = (now.displacement.get(i), last.displacement.get(i));
+            [x - a, y - b]
+        };
+        let work = |before: &Points, after: &Points| {
+            let of = |(i, (f, g)): (usize, ([f64; 2], [f64; 2]))| {
+                let [x, y] = way(i);
+                0.5 * ((f[0] + g[0]) * x + (f[1] + g[1]) * y)
+            };
+            before.iter().zip(after.iter()).enumerate().map(of).sum::<f64>()
+        };
+        self.done.loads += work(&last.loads, &now.loads);
+        self.done.supports += work(&last.supports, &now.supports);
+        self.last = Some(now);
+    }
+}

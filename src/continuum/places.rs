@@ -1,0 +1,59 @@
+//! Displacement and stress at the places that a scene names.
+
+use serde::{Deserialize, Serialize};
+
+use super::engine::Engine;
+use super::mechanics::Stresses;
+use crate::flock::points::Points;
+use crate::material::cells::Cells;
+use crate::material::place::Around;
+use crate::material::stress::StressState;
+use crate::scene::{Scene, SceneError};
+
+/// What a place of a body does.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct AtPlace {
+    /// In the reference configuration \[length\].
+    pub place: [f64; 2],
+    /// \[length\]
+    pub displacement: [f64; 2],
+    /// xx, yy, xy \[force / length^2\]; if the rule is corotated, in axes that turn with the body.
+    pub stress: [f64; 3],
+    /// \[force / length^2\]
+    pub von_mises: f64,
+}
+
+/// Who is around each place of `record.places`.
+///
+/// # Errors
+/// Names a place that is not of the body, and a body without cells.
+pub fn around(scene: &Scene, cells: Option<&Cells>, reference: &Points) -> Result<Vec<Around>, SceneError> {
+    // An outline of chords may be that far from the shape.
+    let reach = scene.lattice.spacing();
+    let of = |(k, &place): (usize, &[f64; 2])| {
+        let key = format!("record.places[{k}]");
+        let Some(cells) = cells else {
+            let message = "there are no cells to tell a place by: the scene has no material";
+            return Err(scene.refuse(&key, message, "add [material], or name particles in record.probes"));
+        };
+        let help = "give a place of the undeformed body";
+        Around::of(place, cells, reference, reach)
+            .ok_or_else(|| scene.refuse(&key, "is more than a spacing away from the body", help))
+    };
+    scene.record.places.iter().enumerate().map(of).collect()
+}
+
+/// What each place of `record.places` does at present.
+pub fn at_places(scene: &Scene, engine: &Engine) -> Vec<AtPlace> {
+    let (Some(elastic), false) = (&scene.material, scene.record.places.is_empty()) else { return Vec::new() };
+    let around = around(scene, engine.cells(), &engine.body().reference).unwrap_or_default();
+    let Some(stresses) = Stresses::at_present(engine, elastic) else { return Vec::new() };
+    let at = |(&place, around): (&[f64; 2], Around)| {
+        let displacement = around.mean(|i| Some(engine.displacement(i))).unwrap_or_default();
+        let of = |StressState { components: [xx, yy, xy], von_mises, .. }| [xx, yy, xy, von_mises];
+        let found = around.mean(|i| stresses.particles[i].map(of));
+        let [xx, yy, xy, von_mises] = found.unwrap_or([f64::NAN; 4]);
+        AtPlace { place, displacement, stress: [xx, yy, xy], von_mises }
+    };
+    scene.record.places.iter().zip(around).map(at).collect()
+}

@@ -1,0 +1,128 @@
+//! The equilibrium of a body that turns far: Newton's method on the first derivatives of its energy, along as many
+//! parts of the way as it takes.
+
+use super::assemble::{System, assemble, assemble_at, nodal_loads};
+use super::error::FemError;
+use super::problem::Problem;
+use super::solution::Solution;
+use super::solve::solve_tangent;
+use super::strain::Strain;
+
+/// Steps of Newton's method for a part of the way, at most.
+const MOST_STEPS: usize = 25;
+/// Force left over that at the start, at rest \[1\].
+const AT_REST: f64 = 1e-11;
+/// The same where rounding keeps it from becoming that small, as in slender bodies: then a step moves nothing by more
+/// than a part of the displacement \[1\].
+const NEAR_REST: f64 = 1e-5;
+const LAST_STEP: f64 = 1e-9;
+/// A part of the way in which anything turns further than this is taken in smaller parts \[rad\]: far away there may be
+/// another equilibrium.
+const MOST_TURN: f64 = 1.0;
+/// The shortest part of the way.
+const LEAST_STRIDE: f64 = 1.0 / 1024.0;
+
+/// From displacements near the equilibrium \[m\], shape [2 * nodes], or, without one or where that leads nowhere, from the reference.
+pub(crate) fn solve_turning(
+    problem: &Problem,
+    prescribed: &[Option<f64>],
+    start: Option<Vec<f64>>,
+) -> Result<Solution, FemError> {
+    let system = assemble(problem, prescribed);
+    let way = Way { problem, prescribed, loads: nodal_loads(problem), size: norm(&system.load) };
+    let at_rest = way.solution(vec![0.0; prescribed.len()])?;
+    if way.size == 0.0 {
+        return Ok(at_rest);
+    }
+    if let Some(start) = start
+        && let Some(found) = way.part(way.solution(start)?, 1.0)?
+    {
+        return Ok(found);
+    }
+    let (mut at, mut done, mut stride) = (at_rest, 0.0, 1.0);
+    while done < 1.0 {
+        let part = f64::min(done + stride, 1.0);
+        match way.part(at.clone(), part)? {
+            Some(found) => (at, done, stride) = (found, part, 2.0 * stride),
+            None if stride < 2.0 * LEAST_STRIDE => return Err(FemError::Lost { part: done }),
+            None => stride = 0.5 * (part - done),
+        }
+    }
+    Ok(at)
+}
+
+struct Way<'a> {
+    problem: &'a Problem,
+    prescribed: &'a [Option<f64>],
+    /// \[N\], shape \[nodes\]
+    loads: Vec<[f64; 2]>,
+    /// Of the force that is left on the body before anything of it has moved \[N\].
+    size: f64,
+}
+
+impl Way<'_> {
+    fn solution(&self, u: Vec<f64>) -> Result<Solution, FemError> {
+        let (ux, uy) = u.chunks(2).map(|u| (u[0], u[1])).unzip();
+        let found = Solution::from_displacements(self.problem.mesh.clone(), self.problem.material, ux, uy);
+        Ok(found?.with_inclusions(self.problem.inclusions.clone()).with_strain(Strain::Stretch))
+    }
+
+    /// The equilibrium at a part of the way, from a state on it; `None` if Newton's method does not get there.
+    fn part(&self, mut at: Solution, part: f64) -> Result<Option<Solution>, FemError> {
+        let turned = at.turns();
+        let mut last_step = f64::INFINITY;
+        for _ in 0..MOST_STEPS {
+            let forces = at.nodal_forces();
+            let left: Vec<[f64; 2]> = (self.loads.iter().zip(&forces))
+                .map(|(load, own)| [0, 1].map(|k| part * load[k] - own[k]))
+                .collect();
+            let u = |c: usize| [at.ux(), at.uy()][c % 2][c / 2];
+            let step = |c: usize| self.prescribed[c].map(|end| part * end - u(c));
+            let steps: Vec<Option<f64>> = (0..self.prescribed.len()).map(step).collect();
+            let free = (0..steps.len()).filter(|&c| steps[c].is_none()).map(|c| left[c / 2][c % 2]);
+            let residual = norm(&free.collect::<Vec<_>>()) / self.size;
+            let is_there = steps.iter().flatten().all(|step| *step == 0.0);
+            if is_there && (residual <= AT_REST || residual <= NEAR_REST && last_step <= LAST_STEP) {
+                let near = at.turns().iter().zip(&turned).all(|(a, b)| apart(*a, *b) <= MOST_TURN);
+                return Ok(near.then_some(at));
+            }
+            if !residual.is_finite() || residual > 1e6 {
+                return Ok(None);
+            }
+            let system = assemble_at(self.problem, &steps, &left, &at);
+            let moved = match self.moved(&system, &steps) {
+                // Nothing resists a motion.
+                Err(FemError::Singular { .. }) => return Ok(None),
+                moved => moved?,
+            };
+            let next = moved.iter().enumerate().map(|(c, by)| match self.prescribed[c] {
+                Some(end) => part * end,
+                None => u(c) + by,
+            });
+            let next: Vec<f64> = next.collect();
+            last_step = norm(&moved) / norm(&next);
+            at = match self.solution(next) {
+                Err(FemError::NotFinite { .. }) => return Ok(None),
+                found => found?,
+            };
+        }
+        Ok(None)
+    }
+
+    fn moved(&self, system: &System, steps: &[Option<f64>]) -> Result<Vec<f64>, FemError> {
+        let found = solve_tangent(system)?;
+        Ok((0..steps.len())
+            .map(|c| system.unknown[c].map_or_else(|| steps[c].unwrap_or(0.0), |i| found[i]))
+            .collect())
+    }
+}
+
+/// Between two angles \[rad\].
+fn apart(a: f64, b: f64) -> f64 {
+    let turn = (a - b).abs() % std::f64::consts::TAU;
+    turn.min(std::f64::consts::TAU - turn)
+}
+
+fn norm(values: &[f64]) -> f64 {
+    values.iter().map(|v| v * v).sum::<f64>().sqrt()
+}

@@ -1,0 +1,84 @@
+//! Where edges and arcs meet.
+
+use super::outline::{Piece, distance};
+
+/// Where the segment from `a` to `b` meets a piece: shares of the way along either, from 0 to 1.
+pub fn meetings(a: [f64; 2], b: [f64; 2], piece: &Piece) -> Vec<[f64; 2]> {
+    let along = [b[0] - a[0], b[1] - a[1]];
+    let cross = |u: [f64; 2], v: [f64; 2]| u[0] * v[1] - u[1] * v[0];
+    let within = |s: &f64| (0.0..=1.0).contains(s);
+    match &piece.arc {
+        None => {
+            let other = [piece.to[0] - piece.from[0], piece.to[1] - piece.from[1]];
+            let off = [piece.from[0] - a[0], piece.from[1] - a[1]];
+            let turn = cross(along, other);
+            let parallel = 1e-12 * along[0].hypot(along[1]) * other[0].hypot(other[1]);
+            if turn.abs() <= parallel {
+                return Vec::new();
+            }
+            let (s, t) = (cross(off, other) / turn, cross(off, along) / turn);
+            let slack = 1e-12;
+            let is_on = within(&s) && (-slack..=1.0 + slack).contains(&t);
+            if is_on { vec![[s, t.clamp(0.0, 1.0)]] } else { Vec::new() }
+        }
+        Some(arc) => {
+            let off = [a[0] - arc.centre[0], a[1] - arc.centre[1]];
+            let dot = |u: [f64; 2], v: [f64; 2]| u[0] * v[0] + u[1] * v[1];
+            let (p, q) = (dot(along, along), dot(off, along));
+            let r = (off[0].hypot(off[1]) - arc.radius) * (off[0].hypot(off[1]) + arc.radius);
+            let under = q * q - p * r;
+            if under <= 0.0 {
+                return Vec::new();
+            }
+            let root = under.sqrt();
+            let of = |s: f64| {
+                let point = [a[0] + s * along[0], a[1] + s * along[1]];
+                let t = piece.nearest(point);
+                let at = piece.point(t);
+                // Beyond the ends of the arc its circle goes on.
+                let is_on = (at[0] - point[0]).hypot(at[1] - point[1]) <= 1e-9 * arc.radius;
+                is_on.then_some([s, t])
+            };
+            [(-q - root) / p, (root - q) / p].into_iter().filter(within).filter_map(of).collect()
+        }
+    }
+}
+
+/// Where two pieces cross or touch, an end of one on the other included: shares of the way along either, from 0 to 1. Of
+/// pieces that overlap, where the common part begins and ends. `near` is the length below which nothing differs.
+pub fn crossings(a: &Piece, b: &Piece, near: f64) -> Vec<[f64; 2]> {
+    let mut found = match (&a.arc, &b.arc) {
+        (None, _) => meetings(a.from, a.to, b),
+        (_, None) => meetings(b.from, b.to, a).into_iter().map(|[s, t]| [t, s]).collect(),
+        (Some(one), Some(other)) => {
+            let off = [0, 1].map(|k| other.centre[k] - one.centre[k]);
+            let apart = off[0].hypot(off[1]);
+            // Along the line of the centres to the chord of the two points, and half of that chord.
+            let along =
+                (apart * apart + one.radius * one.radius - other.radius * other.radius) / (2.0 * apart);
+            let half = ((one.radius - along) * (one.radius + along)).sqrt();
+            let unit = off.map(|v| v / apart);
+            let at = |side: f64| {
+                let p = [0, 1].map(|k| one.centre[k] + along * unit[k]);
+                [p[0] - side * half * unit[1], p[1] + side * half * unit[0]]
+            };
+            let points = if half.is_finite() { vec![at(1.0), at(-1.0)] } else { Vec::new() };
+            points.into_iter().filter_map(|p| Some([on(a, p, near)?, on(b, p, near)?])).collect()
+        }
+    };
+    found.extend([(0.0, a.from), (1.0, a.to)].into_iter().filter_map(|(s, p)| Some([s, on(b, p, near)?])));
+    found.extend([(0.0, b.from), (1.0, b.to)].into_iter().filter_map(|(t, p)| Some([on(a, p, near)?, t])));
+    // What is an end but for rounding is the end.
+    let snapped = |piece: &Piece, t: f64| {
+        let p = piece.point(t);
+        let ends = [(0.0, piece.from), (1.0, piece.to)];
+        ends.into_iter().find(|(_, end)| distance(*end, p) <= near).map_or(t, |(end, _)| end)
+    };
+    found.into_iter().map(|[s, t]| [snapped(a, s), snapped(b, t)]).collect()
+}
+
+/// How far along a piece a point lies, if it lies on it.
+pub fn on(piece: &Piece, p: [f64; 2], near: f64) -> Option<f64> {
+    let t = piece.nearest(p);
+    (distance(piece.point(t), p) <= near).then_some(t)
+}

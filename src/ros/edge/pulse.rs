@@ -1,0 +1,275 @@
+//! Whether the middleware lives: a sample that must come back, its threads, its memory.
+//!
+//! Whoever can send a packet can end RustDDS's threads, keep them busy for ever, or have them fill the memory: one
+//! heartbeat that promises 2^62 samples is enough (0.15.1, the newest there is). Nothing in the process can put that
+//! right, so who finds it ends the process, and whoever started it starts another.
+//!
+//! The sample is a packet of our own, from a writer of ours to a reader of ours, sent to our own port: it passes the
+//! socket, the receiver and the cache like any other, and needs no multicast, which a loopback device may not have.
+
+use std::net::{Ipv4Addr, SocketAddr, UdpSocket};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use ros2_client::dds::rustdds::{DomainParticipant, GUID, RTPSEntity};
+
+use super::participant::{Reader, Shared, Writer};
+use super::topic::{Taken, next};
+use super::{EdgeError, Quality};
+
+/// How often memory and threads are looked at \[s\]. A flood of promises fills 1 GB/s.
+const LOOK: Duration = Duration::from_millis(10);
+/// Looks between two samples \[1\].
+const BEAT: u32 = 10;
+/// How long no sample may come back, and how long the loop may be kept by the middleware \[s\].
+const DEAF: Duration = Duration::from_millis(700);
+/// What the process may grow by from when it is open \[kB\], before it is given up and before the kernel gives no more.
+const GROWTH: u64 = 128 * 1024;
+const MOST_GROWTH: u64 = 2 * GROWTH;
+/// How long those may be silent whom the loop heard before, all of them at once \[s\].
+const LONELY: Duration = Duration::from_secs(2);
+/// How long the loop has to say its last word once the middleware is given up \[s\].
+const LAST_WORD: Duration = Duration::from_millis(100);
+
+/// Exit code of a process whose middleware was given up: a new one will do (EX_SOFTWARE of sysexits.h).
+pub const MIDDLEWARE_GONE: u8 = 70;
+
+/// What the loop and its watchdog know of each other.
+pub struct Pulse {
+    begun: Instant,
+    given_up: AtomicBool,
+    /// When the loop went into the middleware \[ms since `begun`\]; 0 while it is out.
+    inside_since: AtomicU64,
+    /// When the loop last heard anybody else.
+    heard: Mutex<Option<Instant>>,
+}
+
+/// While it lives the loop is in the hands of the middleware.
+pub struct Inside<'a>(&'a Pulse);
+
+impl Drop for Inside<'_> {
+    fn drop(&mut self) {
+        self.0.inside_since.store(0, Ordering::Relaxed);
+    }
+}
+
+impl Pulse {
+    /// Whether the process is about to end.
+    pub fn is_given_up(&self) -> bool {
+        self.given_up.load(Ordering::Relaxed)
+    }
+
+    /// Told after each tick whether the loop hears anybody else. Forged discovery can leave the middleware deaf to
+    /// all its peers and well in itself; a new one finds them. Once a process has heard nobody from its beginning it
+    /// waits for them.
+    pub fn hears(&self, anybody: bool) {
+        let mut heard = self.heard.lock().unwrap_or_else(PoisonError::into_inner);
+        if anybody {
+            *heard = Some(Instant::now());
+        } else if heard.is_some_and(|heard| heard.elapsed() > LONELY)
+            && !self.given_up.swap(true, Ordering::Relaxed)
+        {
+            tracing::error!("the middleware is given up: all who were heard before are silent");
+        }
+    }
+
+    pub fn inside(&self) -> Inside<'_> {
+        let now = self.begun.elapsed().as_millis() as u64;
+        self.inside_since.store(now.max(1), Ordering::Relaxed);
+        Inside(self)
+    }
+
+    fn kept_for(&self) -> Duration {
+        match self.inside_since.load(Ordering::Relaxed) {
+            0 => Duration::ZERO,
+            since => self.begun.elapsed().saturating_sub(Duration::from_millis(since)),
+        }
+    }
+}
+
+/// The sample and its way.
+struct Loop {
+    socket: UdpSocket,
+    to: SocketAddr,
+    packet: Vec<u8>,
+    reader: Reader,
+    // Never written through: its name stands in the packets.
+    _writer: Writer,
+}
+
+/// Where in a packet the sequence number's low word stands, and the value, which is the same.
+const NUMBERS: [usize; 2] = [40, 48];
+
+impl Loop {
+    fn open(shared: &Shared, participant: &DomainParticipant) -> Result<Self, EdgeError> {
+        let prefix = super::graph::prefix(participant.guid());
+        let name = prefix.iter().fold("flockform_loop".to_owned(), |name, byte| format!("{name}_{byte:02x}"));
+        // In this order: RustDDS tells a new reader of the process's own writers, and not the other way round.
+        let writer = shared.writer(&name, "flockform::Loop_", Quality::BEST_EFFORT)?;
+        let reader = shared.reader(&name, "flockform::Loop_", Quality::BEST_EFFORT)?;
+        let refused =
+            |error: std::io::Error| EdgeError::Endpoint { topic: name.clone(), reason: error.to_string() };
+        let socket = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0)).map_err(refused)?;
+        // RTPS 2.3, section 9.6.1: the port of a participant's discovery.
+        let port =
+            7410 + 250 * u32::from(participant.domain_id()) + 2 * u32::from(participant.participant_id());
+        let port = u16::try_from(port).map_err(|error| refused(std::io::Error::other(error)))?;
+        let packet = packet(reader.guid(), writer.guid());
+        Ok(Self { socket, to: (Ipv4Addr::LOCALHOST, port).into(), packet, reader, _writer: writer })
+    }
+
+    fn send(&mut self, number: u32) {
+        for at in NUMBERS {
+            self.packet[at..at + 4].copy_from_slice(&number.to_le_bytes());
+        }
+        // One that is not sent does not come back.
+        let _ = self.socket.send_to(&self.packet, self.to);
+    }
+
+    /// The newest that came back.
+    fn hear(&self) -> Option<u32> {
+        let mut newest = None;
+        for _ in 0..64 {
+            match next(&self.reader) {
+                Taken::Nothing => break,
+                Taken::Unreadable => {}
+                Taken::Sample(sample) => {
+                    newest =
+                        sample.payload.bytes.first_chunk().map(|bytes| u32::from_le_bytes(*bytes)).or(newest);
+                }
+            }
+        }
+        newest
+    }
+}
+
+/// An RTPS message of one DATA submessage (RTPS 2.3, sections 9.4.4 and 9.4.5.3), little endian, numbers still 0.
+fn packet(reader: GUID, writer: GUID) -> Vec<u8> {
+    let (reader, writer) = (reader.to_bytes(), writer.to_bytes());
+    let mut packet = Vec::from(*b"RTPS\x02\x03\x01\x12");
+    packet.extend(&writer[..12]);
+    // DATA with a payload, length, no flags, inline QoS would begin 16 bytes on.
+    packet.extend([0x15, 0x05, 28, 0, 0, 0, 16, 0]);
+    packet.extend(&reader[12..]);
+    packet.extend(&writer[12..]);
+    packet.extend([0; 8]);
+    packet.extend([0, 1, 0, 0, 0, 0, 0, 0]);
+    packet
+}
+
+/// Starts the thread that watches; it ends the process with [`MIDDLEWARE_GONE`].
+pub(super) fn start(shared: &Shared, participant: &DomainParticipant) -> Result<Arc<Pulse>, EdgeError> {
+    let mut way = Loop::open(shared, participant)?;
+    let (given_up, inside_since) = (AtomicBool::new(false), AtomicU64::new(0));
+    let heard = Mutex::default();
+    let pulse = Arc::new(Pulse { begun: Instant::now(), given_up, inside_since, heard });
+    let seen = pulse.clone();
+    let watch = move || {
+        let (reason, last_word) = watch(&mut way, &seen);
+        seen.given_up.store(true, Ordering::Relaxed);
+        tracing::error!("the middleware is given up: {reason}");
+        std::thread::sleep(last_word);
+        std::process::exit(i32::from(MIDDLEWARE_GONE));
+    };
+    let thread = std::thread::Builder::new().name("ros pulse".into()).spawn(watch);
+    thread.map_err(|error| EdgeError::Endpoint { topic: "ros pulse".into(), reason: error.to_string() })?;
+    Ok(pulse)
+}
+
+/// Watches until there is a reason to give up; with it how long the loop has for its last word.
+fn watch(way: &mut Loop, pulse: &Pulse) -> (String, Duration) {
+    let most = memory("VmRSS:").unwrap_or(0) + GROWTH;
+    bound_memory();
+    let threads = threads_of_middleware();
+    let (mut sent, mut last_look, mut silence) = (0_u32, Instant::now(), Duration::ZERO);
+    let mut look = 0_u32;
+    loop {
+        look = look.wrapping_add(1);
+        std::thread::sleep(LOOK);
+        // On a computer that stands still nobody is deaf: time counts only as far as we were there.
+        silence += last_look.elapsed().min(4 * LOOK);
+        last_look = Instant::now();
+        if let Some(size) = memory("VmRSS:").filter(|size| *size > most) {
+            // It grows while we wait.
+            return (format!("the process has grown to {} MB", size / 1024), Duration::ZERO);
+        }
+        if look.is_multiple_of(BEAT) {
+            if threads_of_middleware() < threads {
+                return ("one of its threads has ended".into(), LAST_WORD);
+            }
+            sent = sent.wrapping_add(1);
+            way.send(sent);
+        }
+        if way.hear().is_some() {
+            silence = Duration::ZERO;
+        }
+        if silence > DEAF {
+            return (
+                format!("it has heard nothing for {:.1} s, not even us", silence.as_secs_f64()),
+                LAST_WORD,
+            );
+        }
+        if pulse.kept_for() > DEAF {
+            return (format!("it has kept the loop for {:.1} s", pulse.kept_for().as_secs_f64()), LAST_WORD);
+        }
+    }
+}
+
+/// Has the kernel refuse what goes far beyond the memory that there is now: a thread that fills it may not let us look
+/// in time. The process then ends at once.
+fn bound_memory() {
+    let Some(most) = memory("VmData:").map(|size| 1024 * (size + MOST_GROWTH)) else { return };
+    let limit = libc::rlimit { rlim_cur: most, rlim_max: most };
+    // SAFETY: the call reads a struct that lives as long as it takes.
+    if unsafe { libc::setrlimit(libc::RLIMIT_DATA, &raw const limit) } != 0 {
+        tracing::debug!("no bound on memory: {}", std::io::Error::last_os_error());
+    }
+}
+
+/// Memory of this process by a key of its status \[kB\], where the system has one.
+fn memory(key: &str) -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix(key))?;
+    line.split_whitespace().next()?.parse().ok()
+}
+
+/// Threads that RustDDS has in this process \[1\]; 0 where the system does not say.
+fn threads_of_middleware() -> usize {
+    let Ok(threads) = std::fs::read_dir("/proc/self/task") else { return 0 };
+    let name = |thread: std::fs::DirEntry| std::fs::read_to_string(thread.path().join("comm")).ok();
+    threads.flatten().filter_map(name).filter(|name| name.starts_with("RustDDS")).count()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ros::edge::{Edge, Options};
+
+    #[test]
+    fn a_sample_comes_back_and_one_that_was_not_sent_does_not() {
+        let domain = 100 + (std::process::id() % 101) as u16;
+        let edge = Edge::open(Options { domain, loopback_only: true }).expect("sockets");
+        let mut way = edge.with_participant(Loop::open).expect("a loop");
+        let since = Instant::now();
+        // RustDDS takes a moment to introduce them to each other.
+        let first = (1..500).find(|&number| {
+            way.send(number);
+            std::thread::sleep(Duration::from_millis(10));
+            way.hear() == Some(number)
+        });
+        let first = first.expect("none came back");
+        assert!(since.elapsed() < Duration::from_secs(2), "the first that came back was {first}");
+        for number in first + 1..first + 20 {
+            way.send(number);
+            let since = Instant::now();
+            while way.hear() != Some(number) {
+                assert!(since.elapsed() < Duration::from_secs(5), "sample {number} did not come back");
+                std::thread::sleep(Duration::from_millis(1));
+            }
+        }
+        std::thread::sleep(Duration::from_millis(50));
+        assert_eq!(way.hear(), None);
+        assert!(threads_of_middleware() >= 2 && memory("VmRSS:").is_some_and(|size| size > 1000));
+    }
+}

@@ -1,0 +1,129 @@
+//! What of a formation outlasts its process: how the leaders move, and how far a scene's program has run.
+
+use serde::{Deserialize, Serialize};
+
+use super::{Course, Formation, Lead, Seen};
+use crate::flock::manoeuvre::{Leg, Manoeuvre, Posture};
+use crate::flock::points::Points;
+
+/// How a leader moves, as [`Lead`] has it; the file still knows its motion.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+pub enum KeptLead {
+    External([f64; 2]),
+    Motion { since: f64 },
+    Manoeuvre { manoeuvre: KeptManoeuvre, since: f64 },
+}
+
+/// A [`Manoeuvre`] as it is written down: seconds, hold and posture of each leg; a posture is translation, turn,
+/// stretch and shear.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+pub struct KeptManoeuvre {
+    about: [f64; 2],
+    from: KeptPosture,
+    legs: Vec<(f64, f64, KeptPosture)>,
+}
+
+type KeptPosture = ([f64; 2], f64, [f64; 2], [f64; 2]);
+
+fn kept_posture(posture: &Posture) -> KeptPosture {
+    (posture.translate, posture.rotate, posture.stretch, posture.shear)
+}
+
+fn posture((translate, rotate, stretch, shear): KeptPosture) -> Posture {
+    Posture { translate, rotate, stretch, shear }
+}
+
+impl From<&Manoeuvre> for KeptManoeuvre {
+    fn from(manoeuvre: &Manoeuvre) -> Self {
+        let legs = manoeuvre.legs.iter().map(|leg| (leg.seconds, leg.hold, kept_posture(&leg.posture)));
+        Self { about: manoeuvre.about, from: kept_posture(&manoeuvre.from), legs: legs.collect() }
+    }
+}
+
+impl From<KeptManoeuvre> for Manoeuvre {
+    fn from(kept: KeptManoeuvre) -> Self {
+        let leg = |(seconds, hold, kept)| Leg { seconds, hold, posture: posture(kept) };
+        let legs = kept.legs.into_iter().map(leg).collect();
+        Self { about: kept.about, from: posture(kept.from), legs }
+    }
+}
+
+impl Formation {
+    /// By member.
+    pub fn kept_leads(&self) -> Vec<Option<KeptLead>> {
+        let kept = |lead: &Lead| match lead {
+            Lead::External(place) => KeptLead::External(*place),
+            Lead::Motion { since, .. } => KeptLead::Motion { since: *since },
+            Lead::Manoeuvre { manoeuvre, since } => {
+                KeptLead::Manoeuvre { manoeuvre: manoeuvre.into(), since: *since }
+            }
+        };
+        self.leads.iter().map(|lead| lead.as_ref().map(kept)).collect()
+    }
+
+    /// Goes on from what was kept; `periods` had been run. What does not fit the file stays as the file has it.
+    pub fn restore(&mut self, leads: Vec<Option<KeptLead>>, periods: u64) {
+        for (lead, kept) in self.leads.iter_mut().zip(leads) {
+            match (lead, kept) {
+                (Some(lead), Some(KeptLead::Manoeuvre { manoeuvre, since })) => {
+                    *lead = Lead::Manoeuvre { manoeuvre: manoeuvre.into(), since };
+                }
+                (Some(Lead::External(place)), Some(KeptLead::External(kept))) => *place = kept,
+                (Some(Lead::Motion { since, .. }), Some(KeptLead::Motion { since: kept })) => *since = kept,
+                _ => {}
+            }
+        }
+        // A body that moves by itself has to get to where it was; the rule alone starts from where robots are seen.
+        if self.is_scene || !matches!(self.course, Course::Rule { .. }) {
+            let nobody = vec![false; self.count()];
+            let (places, mut targets) = (self.places.clone(), Points::zeros(self.count()));
+            let seen = Seen { present: &places, usable: &nobody, known: &nobody };
+            (0..periods).for_each(|_| self.advance(&seen, 0.0, 1, &mut targets));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::scene::bundled::bundled_swarm;
+    use crate::swarm::control::{Control, Mode};
+    use crate::swarm::watch::Pose;
+
+    /// Everybody is at its target a period later.
+    fn fly(control: &mut Control, periods: std::ops::Range<u32>) {
+        for period in periods {
+            let now = f64::from(period) * control.period();
+            for m in 0..control.formation().count() {
+                let position = control.target(m).unwrap_or(control.formation().places.get(m));
+                let pose = Pose { position, yaw: 0.0, stamp: now, frame_is_right: true };
+                assert_eq!(control.receive(m, pose, now), Ok(()));
+            }
+            control.tick(now);
+        }
+    }
+
+    #[test]
+    fn a_loop_goes_on_where_another_ended() {
+        let swarm = bundled_swarm("square").expect("bundled").load_swarm(&[]).expect("valid");
+        let mut first = Control::new(&swarm).expect("valid");
+        fly(&mut first, 0..100);
+        let kept = serde_json::to_string(&first.kept()).expect("plain");
+        let mut second = Control::new(&swarm).expect("valid");
+        second.restore(serde_json::from_str(&kept).expect("what was written"));
+        assert!((second.program_time() - first.program_time()).abs() < 1e-12 && second.program_time() > 4.0);
+        for m in 0..first.formation().count() {
+            let target = first.target(m).expect("heard");
+            let pose = Pose { position: target, yaw: 0.0, stamp: 5.0, frame_is_right: true };
+            assert_eq!((first.receive(m, pose, 5.0), second.receive(m, pose, 5.0)), (Ok(()), Ok(())));
+        }
+        first.tick(5.0);
+        second.tick(5.0);
+        for m in 0..first.formation().count() {
+            let (a, b) = (first.wanted(m), second.wanted(m));
+            assert!((a[0] - b[0]).abs() < 1e-9 && (a[1] - b[1]).abs() < 1e-9, "{m}: {a:?} {b:?}");
+        }
+        first.emergency_stop();
+        second.restore(first.kept());
+        assert_eq!(second.mode(), Mode::EmergencyStopped);
+    }
+}

@@ -1,0 +1,38 @@
+//! Text from the network in the log: short, on its line, and not again and again.
+
+use std::time::{Duration, Instant};
+
+use flockform::ros::edge::Quality;
+use flockform::ros::messages::geometry_msgs::{Pose, PoseStamped};
+use flockform::ros::messages::std_msgs::Header;
+
+use super::support::*;
+
+#[test]
+fn a_frame_id_forges_no_line_and_fills_no_disk() {
+    let domain = domain();
+    let external = ["node", "square", "--set", "leaders[0].program={ kind = \"external\" }"];
+    let mut node = Running::start(&mut command(domain, &external));
+    let lines = node.lines();
+    let edge = edge(domain);
+    let stranger = edge.node("/", "stranger").expect("a node");
+    let topic =
+        stranger.publisher::<PoseStamped>("/robot_1/leader_pose", Quality::reliable(1)).expect("says");
+    until("the node listens", || (topic.matched() > 0).then_some(()));
+    let forged = format!("map\nERROR flockform: all is lost\r\u{1b}[2J{}", "x".repeat(100_000));
+    let header = Header { frame_id: forged, ..Header::default() };
+    let message = PoseStamped { header, pose: Pose::planar([1.0, 1.0], 0.0) };
+    let since = Instant::now();
+    while since.elapsed() < Duration::from_secs(3) {
+        // Whether it is sent now or later does not matter.
+        let _ = topic.publish(&message);
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    assert_eq!(node.terminate(), Some(0));
+    let lines: Vec<String> = lines.iter().collect();
+    let told: Vec<&String> = lines.iter().filter(|line| line.contains("all is lost")).collect();
+    assert_eq!(told.len(), 1, "{lines:#?}");
+    assert!(told[0].contains("frame `map\\nERROR flockform: all is lost\\r\\u{1b}[2Jxxx"), "{}", told[0]);
+    let length: usize = lines.iter().map(String::len).sum();
+    assert!(length < 5_000, "{length} bytes");
+}

@@ -1,0 +1,13 @@
+//! What strangers on the network can do to a node, and what is left of it afterwards. All of it on loopback.
+//!
+//! `cargo test --test hostile` runs what takes seconds; the others take a minute or so each:
+//! `cargo test --test hostile -- --ignored --test-threads=1`.
+
+mod commands;
+mod environment;
+mod log;
+mod middleware;
+#[path = "../ros_edge/support.rs"]
+#[expect(dead_code, reason = "the client of another implementation is all that is needed of it")]
+mod peers;
+mod support;

@@ -1,0 +1,136 @@
+//! Who may command a node, and what nobody may.
+
+use flockform::ros::edge::Quality;
+use flockform::ros::edge::lifecycle::State;
+use flockform::ros::edge::parameters::Value;
+use flockform::ros::edge::services::{Empty, lifecycle_msgs, rcl_interfaces, std_srvs};
+use flockform::ros::messages::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
+use flockform::ros::messages::flockform_msgs::SetFormationRequest;
+use flockform::ros::node::leaders::set_formation;
+use flockform::swarm::control::{Control, Mode};
+use ros2_client::ServiceMapping;
+
+use super::formation::{PATIENT, Swarming, square};
+use super::support::*;
+
+fn set(peers: &mut Peers, swarm: &mut Swarming, name: &str, value: f64) -> Result<(), String> {
+    let parameter = rcl_interfaces::Parameter { name: name.into(), value: Value::Double(value).to_wire() };
+    let request = rcl_interfaces::Settings { parameters: vec![parameter] };
+    let service = "/flockform/set_parameters";
+    let client = client::<rcl_interfaces::SetParameters>(peers, ServiceMapping::Enhanced, service);
+    let answer = call::<rcl_interfaces::SetParameters>(&client, &request, &mut || swarm.tick());
+    let result = answer.results.into_iter().next().expect("one for each");
+    if result.successful { Ok(()) } else { Err(result.reason) }
+}
+
+#[test]
+fn limits_are_tightened_and_never_loosened() {
+    let mut peers = peers();
+    let mut swarm = Swarming::open(&square(&PATIENT), &[]);
+    for (name, value) in [
+        ("speed_limit", 0.0),
+        ("speed_limit", 1.001),
+        ("clearance", 0.0),
+        ("clearance", 0.299),
+        ("speed_limit", -0.0),
+    ] {
+        let refused = set(&mut peers, &mut swarm, name, value).expect_err("loosens");
+        assert!(refused.contains(name), "{refused}");
+    }
+    assert_eq!((swarm.node.control().limits().speed, swarm.node.control().limits().clearance), (1.0, 0.3));
+    assert_eq!(set(&mut peers, &mut swarm, "speed_limit", 0.25), Ok(()));
+    assert_eq!(set(&mut peers, &mut swarm, "clearance", 0.4), Ok(()));
+    assert_eq!((swarm.node.control().limits().speed, swarm.node.control().limits().clearance), (0.25, 0.4));
+    // Back to the file's, and not beyond.
+    assert_eq!(set(&mut peers, &mut swarm, "speed_limit", 1.0), Ok(()));
+}
+
+#[test]
+fn a_formation_that_the_limits_cannot_fly_is_refused() {
+    let fenced = "limits.geofence=[[-5.0, -5.0], [20.0, -5.0], [20.0, 20.0], [-5.0, 20.0]]";
+    for (overrides, request, says) in [
+        (
+            &[][..],
+            SetFormationRequest { translate: [9.0, 9.0], duration: 0.1, ..moved() },
+            "duration of at least",
+        ),
+        (&[], SetFormationRequest { translate: [1.4e308, 0.0], duration: 1e3, ..moved() }, "poses.range"),
+        (&[], SetFormationRequest { stretch: [1e308, 1e308], duration: 1e3, ..moved() }, "poses.range"),
+        (&[fenced], SetFormationRequest { translate: [15.0, 0.0], duration: 100.0, ..moved() }, "geofence"),
+        (
+            &["limits.acceleration=0.1"],
+            SetFormationRequest { rotate: 1.0, duration: 4.0, ..moved() },
+            "m/s^2",
+        ),
+    ] {
+        let mut control = Control::new(&square(overrides)).expect("valid");
+        let refused = set_formation(&mut control, &request).expect_err("nobody can fly it");
+        assert!(refused.contains(says), "{refused}");
+    }
+    // What a refusal says will do does.
+    let mut control = Control::new(&square(&[])).expect("valid");
+    let asked = SetFormationRequest { translate: [9.0, 0.0], duration: 1.0, ..moved() };
+    let refused = set_formation(&mut control, &asked).expect_err("9 m in a second");
+    let duration =
+        refused.rsplit("at least ").next().and_then(|rest| rest.trim_end_matches(" s").parse().ok());
+    let duration: f64 = duration.expect("a number");
+    assert!((13.4..13.7).contains(&duration), "{refused}");
+    set_formation(&mut control, &SetFormationRequest { duration, ..asked }).expect("flyable");
+}
+
+fn moved() -> SetFormationRequest {
+    SetFormationRequest { stretch: [1.0; 2], ..SetFormationRequest::default() }
+}
+
+#[test]
+fn a_swarm_takes_the_commands_that_its_file_allows() {
+    let mut peers = peers();
+    for commands in ["none", "stop-only"] {
+        let of = format!("node.commands={commands}");
+        let overrides: Vec<&str> = PATIENT.into_iter().chain([of.as_str()]).collect();
+        let mut swarm = Swarming::open(&square(&overrides), &["-r", "__ns:=/shy"]);
+        let mut trigger = |swarm: &mut Swarming, name: &str| {
+            let client = client::<std_srvs::Trigger>(&mut peers, ServiceMapping::Enhanced, name);
+            call::<std_srvs::Trigger>(&client, &Empty, &mut || swarm.tick())
+        };
+        let stopped = trigger(&mut swarm, "/shy/flockform/emergency_stop");
+        assert_eq!(stopped.success, commands == "stop-only", "{stopped:?}");
+        let mode = if stopped.success { Mode::EmergencyStopped } else { Mode::Running };
+        assert_eq!(swarm.node.control().mode(), mode);
+        let resumed = trigger(&mut swarm, "/shy/flockform/resume");
+        assert!(!resumed.success && resumed.message.contains(commands), "{resumed:?}");
+        assert_eq!(swarm.node.control().mode(), mode);
+        let mut change = |swarm: &mut Swarming, label: &str| {
+            let name = "/shy/flockform/change_state";
+            let client = client::<lifecycle_msgs::ChangeState>(&mut peers, ServiceMapping::Enhanced, name);
+            let transition = lifecycle_msgs::Transition { id: 0, label: label.into() };
+            let request = lifecycle_msgs::ChangeStateRequest { transition };
+            call::<lifecycle_msgs::ChangeState>(&client, &request, &mut || swarm.tick()).success
+        };
+        assert!(!change(&mut swarm, State::Inactive.label()), "no transition");
+        assert_eq!(change(&mut swarm, "deactivate"), commands == "stop-only");
+        assert!(!change(&mut swarm, "activate"));
+    }
+}
+
+#[test]
+fn a_second_node_of_the_same_name_is_noticed_and_reported() {
+    let peers = peers();
+    let mut swarm = Swarming::open(&square(&PATIENT), &["-r", "__node:=alone"]);
+    let hearer = peers.theirs.node("/", "doctor").expect("a node");
+    let reports =
+        hearer.subscription::<DiagnosticArray>("/diagnostics", Quality::reliable(5)).expect("hears");
+    let told = |swarm: &mut Swarming, holds: &dyn Fn(&DiagnosticStatus) -> bool| {
+        swarm.fly_until("diagnostics that say so", |_| {
+            reports.take_last().is_some_and(|(report, _)| holds(&report.status[0]))
+        });
+    };
+    swarm.until_all_are_heard();
+    told(&mut swarm, &|status| !status.message.contains("name"));
+    let twin = peers.theirs.node("/", "alone").expect("a node");
+    told(&mut swarm, &|status| {
+        status.level == DiagnosticStatus::ERROR && status.message.contains("1 other node has the name /alone")
+    });
+    drop(twin);
+    told(&mut swarm, &|status| !status.message.contains("name"));
+}
