@@ -2,12 +2,12 @@
 
 use flockform::flock::body::{Body, Cut};
 use flockform::flock::frame::{Frame, FrameRule};
-use flockform::flock::interaction::{Interaction, Weights};
 use flockform::flock::lattice::{Lattice, LatticeKind};
+use flockform::flock::law::{Flock, Weights};
 use flockform::flock::neighbourhood::{Neighbourhood, Neighbours};
-use flockform::flock::points::Points;
 use flockform::flock::role::Role;
 use flockform::flock::rules::Rule;
+use flockform::flock::vectors::Vectors;
 use flockform::sweep::{Activity, Led, MOST_STEPS, Sweep, Update};
 
 const STEPS: usize = 50;
@@ -17,7 +17,7 @@ const SIDES: [usize; 2] = [4003, 67];
 
 /// A body held on the left and pulled on the right.
 struct Pulled {
-    interaction: Interaction,
+    flock: Flock,
     frame: Option<Frame>,
     roles: Vec<Role>,
     led: Vec<usize>,
@@ -37,31 +37,25 @@ impl Pulled {
         matter[..SIDES[1]].iter().for_each(|&i| roles[i] = Role::Clamped);
         led.iter().for_each(|&i| roles[i] = Role::Leader);
         let (rule, weights) = (Rule::BARYCENTRE, Weights::Equal);
-        let mut interaction =
-            Interaction { rule, reference, neighbours, weights, forces: None, rest: None, bonds: None };
-        interaction.keep_rest();
-        Self { interaction, frame, roles, led }
+        let mut flock = Flock { rule, reference, neighbours, weights, forces: None, rest: None, bonds: None };
+        flock.keep_rest();
+        Self { flock, frame, roles, led }
     }
 
     /// Where a leader stands; nothing but sums and products, which every machine rounds alike.
     fn place(&self, which: usize, step: usize) -> [f64; 2] {
-        let [x, y] = self.interaction.reference.get(self.led[which]);
+        let [x, y] = self.flock.reference.get(self.led[which]);
         [x + 0.25 * step.min(9) as f64, y + 0.001 * (which * step.min(30)) as f64]
     }
 
     /// Everybody displaced, so that every particle moves in every step.
-    fn start(&self) -> Points {
+    fn start(&self) -> Vectors {
         let far = |i: usize| f64::from((i * 7919 % 1013) as u32) / 1024.0;
-        self.interaction
-            .reference
-            .iter()
-            .enumerate()
-            .map(|(i, [x, y])| [x + far(i), y - far(i + 5)])
-            .collect()
+        self.flock.reference.iter().enumerate().map(|(i, [x, y])| [x + far(i), y - far(i + 5)]).collect()
     }
 
     /// By one step at a time, which `step` takes.
-    fn singly(&self, mut step: impl FnMut(&Points, &mut Points)) -> u64 {
+    fn singly(&self, mut step: impl FnMut(&Vectors, &mut Vectors)) -> u64 {
         let mut present = self.start();
         let mut next = present.clone();
         for number in 1..=STEPS {
@@ -74,7 +68,7 @@ impl Pulled {
 
     /// By at most so many steps together.
     fn together(&self, most: usize) -> u64 {
-        let sweep = Sweep::compile(Update::default(), &self.interaction, &self.roles);
+        let sweep = Sweep::compile(Update::default(), &self.flock, &self.roles);
         let (mut present, mut activity, mut done) = (self.start(), Activity::default(), 0);
         let mut next = present.clone();
         while done < STEPS {
@@ -82,15 +76,15 @@ impl Pulled {
             let place = |which: usize, level: usize| self.place(which, done + level);
             let led = Led { particles: &self.led, place: &place };
             let (frame, places) = (self.frame.as_ref(), (&mut present, &mut next));
-            sweep.steps(&self.interaction, frame, places, (count, led, None), &mut activity);
+            sweep.steps(&self.flock, frame, places, (count, led, None), &mut activity);
             done += count;
         }
         hash(&present)
     }
 
     /// The rule, written down once more with nothing but its formula.
-    fn by_the_formula(&self, present: &Points, next: &mut Points) {
-        let Interaction { neighbours, rest, .. } = &self.interaction;
+    fn by_the_formula(&self, present: &Vectors, next: &mut Vectors) {
+        let Flock { neighbours, rest, .. } = &self.flock;
         for j in (0..present.len()).filter(|&j| self.roles[j] == Role::Follower) {
             let list = neighbours.of(j);
             let sum = list.iter().fold([-0.0; 2], |[x, y], &k| {
@@ -101,7 +95,7 @@ impl Pulled {
             next.set(j, [sum[0] / list.len() as f64 + rx, sum[1] / list.len() as f64 + ry]);
         }
         // A point of the frame is displaced as those it serves were.
-        let reference = &self.interaction.reference;
+        let reference = &self.flock.reference;
         let Some(frame) = &self.frame else { return };
         for (k, &point) in frame.points.iter().enumerate() {
             let served = frame.served_by(k);
@@ -117,21 +111,21 @@ impl Pulled {
 }
 
 /// FNV-1a over the bits of all coordinates.
-fn hash(points: &Points) -> u64 {
+fn hash(points: &Vectors) -> u64 {
     let bytes = points.x.iter().chain(&points.y).flat_map(|value| value.to_bits().to_le_bytes());
     bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
 }
 
 fn assert_golden(body: &Pulled, golden: u64) {
-    let uncompiled = Sweep::uncompiled(Update::default(), &body.interaction, &body.roles);
-    let compiled = Sweep::compile(Update::default(), &body.interaction, &body.roles);
+    let uncompiled = Sweep::uncompiled(Update::default(), &body.flock, &body.roles);
+    let compiled = Sweep::compile(Update::default(), &body.flock, &body.roles);
     let mut all =
         vec![("the formula".to_owned(), body.singly(|present, next| body.by_the_formula(present, next)))];
     for threads in [1, 2, 4, 7] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
         pool.install(|| {
             let by = |sweep: &Sweep| {
-                body.singly(|present, next| sweep.step(&body.interaction, body.frame.as_ref(), present, next))
+                body.singly(|present, next| sweep.step(&body.flock, body.frame.as_ref(), present, next))
             };
             all.push((format!("one by one, {threads} threads"), by(&uncompiled)));
             all.push((format!("compiled, {threads} threads"), by(&compiled)));
@@ -167,12 +161,12 @@ fn a_body_in_a_frame_has_the_golden_bits_over_threads_kernels_and_blockings() {
 fn a_body_of_lists_has_the_golden_bits_over_threads_kernels_and_blockings() {
     // Jumbled lists, of which no run is made, and which are summed in another order.
     let mut body = Pulled::new(LatticeKind::Hexagonal { spacing: 1.0 }, None);
-    let lists = (0..body.interaction.reference.len()).map(|j| {
-        let mut list = body.interaction.neighbours.of(j).to_vec();
+    let lists = (0..body.flock.reference.len()).map(|j| {
+        let mut list = body.flock.neighbours.of(j).to_vec();
         let turn = j % list.len();
         list.rotate_left(turn);
         list
     });
-    body.interaction.neighbours = Neighbours::from_lists(lists);
+    body.flock.neighbours = Neighbours::from_lists(lists);
     assert_golden(&body, 0x6cd8_abab_582a_a092);
 }

@@ -2,10 +2,10 @@
 
 use std::ops::ControlFlow;
 
-use flockform::continuum::equilibrium::come_to_rest;
+use flockform::continuum::equilibrium::run_to_equilibrium;
 use flockform::continuum::plan::Plan;
 use flockform::continuum::run::{Outcome, StopReason};
-use flockform::flock::points::distance;
+use flockform::flock::vectors::distance;
 use flockform::scene::{Scene, bundled};
 use flockform::solve::equilibrium::Precision;
 
@@ -16,14 +16,15 @@ fn load(name: &str, overrides: &[&str]) -> Scene {
 
 fn ended(scene: &Scene) -> Outcome {
     let plan = Plan::new(scene).unwrap_or_else(|error| panic!("{error}"));
-    come_to_rest(scene, plan, &mut |_, _| ControlFlow::Continue(())).unwrap_or_else(|error| panic!("{error}"))
+    run_to_equilibrium(scene, plan, &mut |_, _| ControlFlow::Continue(()))
+        .unwrap_or_else(|error| panic!("{error}"))
 }
 
 fn refusal(name: &str, overrides: &[&str]) -> String {
     let overrides: Vec<String> = overrides.iter().map(|o| (*o).to_owned()).collect();
     let end = bundled(name).expect("bundled").load(&overrides).and_then(|scene| {
         let plan = Plan::new(&scene)?;
-        come_to_rest(&scene, plan, &mut |_, _| ControlFlow::Continue(()))
+        run_to_equilibrium(&scene, plan, &mut |_, _| ControlFlow::Continue(()))
     });
     end.expect_err("refused").to_string()
 }
@@ -69,7 +70,7 @@ fn the_barycentre_is_solved_to_where_it_is_swept_with_any_frame_and_neighbourhoo
          {region={kind=\"edge\",side=\"right\"},role=\"leader\",\
           motion={kind=\"affine\",about=[0.0,0.0],stretch=[1.3,1.1],steps=2}}]"];
     for frame in ["none", "lagged", "immediate", "mirror"] {
-        for neighbours in ["{kind=\"first\"}", "{kind=\"ring\",radius=1}", "{kind=\"second\"}"] {
+        for neighbours in ["{kind=\"first\"}", "{kind=\"chebyshev\",radius=1}", "{kind=\"second\"}"] {
             let overrides = [format!("frame={frame}"), format!("neighbours={neighbours}")];
             let overrides: Vec<&str> =
                 overrides.iter().map(String::as_str).chain(pulled).chain(["record.probes=[]"]).collect();

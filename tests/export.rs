@@ -275,7 +275,7 @@ fn a_frame_holds_every_particle_and_every_bond_with_its_state() {
     let (points, cells) = (count("NumberOfPoints"), count("NumberOfCells"));
     assert_eq!(points, engine.roles().len());
     // Every pair is seen from both ends here.
-    let pairs = engine.interaction().neighbours.index.len() / 2;
+    let pairs = engine.flock().neighbours.index.len() / 2;
     let lines = pairs;
     assert!(!engine.breaks().is_empty());
     let broken = array::<1>(piece, "broken").iter().filter(|state| **state == [1]).count();
@@ -352,7 +352,7 @@ fn a_frame_of_the_paper_s_rule_with_a_material_has_particles_bonds_and_cells() {
     let engine = &run.outcome.engine;
     let count = |kind: u8| types.iter().filter(|one| **one == kind).count();
     assert_eq!(count(1), engine.roles().len());
-    assert_eq!(count(3), engine.interaction().neighbours.index.len() / 2);
+    assert_eq!(count(3), engine.flock().neighbours.index.len() / 2);
     assert_eq!(count(9), engine.cells().expect("a material").count());
     assert_eq!(array::<8>(piece, "von_mises").len(), engine.roles().len());
 }

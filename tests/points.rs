@@ -156,8 +156,8 @@ fn who_finds_neighbours_anew_does_not_hang_on_the_order_either() {
 #[test]
 fn neighbours_last_however_far_they_go() {
     let outcome = ended(plan(&TORN.replace("stretch = 1.25", "stretch = 100.0"), &table(&patch())));
-    let neighbours = &outcome.engine.interaction().neighbours;
-    assert_eq!(*neighbours, plan(TORN, &table(&patch())).interaction.neighbours);
+    let neighbours = &outcome.engine.flock().neighbours;
+    assert_eq!(*neighbours, plan(TORN, &table(&patch())).flock.neighbours);
 }
 
 /// A square lattice whose neighbours come in the order of their numbers, pulled.
@@ -194,8 +194,8 @@ fn a_lattice_written_out_as_points_is_that_lattice() {
     }
     let points = plan(&text, &table(&shuffled(&rows, 11)));
     assert_eq!(points.body.reference, lattice.body.reference, "the order is the lattice's own");
-    assert_eq!(points.interaction.neighbours, lattice.interaction.neighbours);
-    let share = |plan: &Plan| Sweep::compile(plan.update, &plan.interaction, &plan.roles).share_in_runs();
+    assert_eq!(points.flock.neighbours, lattice.flock.neighbours);
+    let share = |plan: &Plan| Sweep::compile(plan.update, &plan.flock, &plan.roles).share_in_runs();
     assert_eq!(share(&points), share(&lattice));
     assert!(share(&points) > 0.5, "swept without lists again: {}", share(&points));
     let [points, lattice] = [points, lattice].map(ended);

@@ -6,11 +6,11 @@ use std::sync::Arc;
 use flockform::continuum::plan::Plan;
 use flockform::continuum::run::run;
 use flockform::flock::motion::Motion;
-use flockform::flock::points::Points;
 use flockform::flock::rules::{
-    Axis, CellAround, Corner, Element, Feedback, FeedbackReference, Load, Mean, Neighbour, OWN, Origin, Own,
-    PatchCell, Poisson, Rotation, Rule, pull,
+    Axis, CellAround, Corner, Element, Feedback, FeedbackReference, Load, Mean, Neighbour, OWN, Origin,
+    ParticleState, PatchCell, Poisson, Rotation, Rule, pull,
 };
+use flockform::flock::vectors::Vectors;
 use flockform::material::elastic::{Constants, Elastic};
 use flockform::material::stiffness::{mean_gradients, triangle};
 use flockform::scene::bundled::SCENES;
@@ -86,13 +86,13 @@ impl Rigid {
 
     /// The same scene, drawn elsewhere and turned.
     fn of_plan(&self, mut plan: Plan) -> Plan {
-        let reference: Points = plan.body.reference.iter().map(|point| self.apply(point)).collect();
+        let reference: Vectors = plan.body.reference.iter().map(|point| self.apply(point)).collect();
         plan.body.reference = Arc::new(reference);
-        plan.interaction.reference = plan.body.reference.clone();
-        if plan.interaction.rest.is_some() {
-            plan.interaction.keep_rest();
+        plan.flock.reference = plan.body.reference.clone();
+        if plan.flock.rest.is_some() {
+            plan.flock.keep_rest();
         }
-        if let Some(poisson) = &mut plan.interaction.rule.poisson {
+        if let Some(poisson) = &mut plan.flock.rule.poisson {
             poisson.centre += self.shift[1];
         }
         for change in &mut plan.changes {
@@ -104,7 +104,7 @@ impl Rigid {
     }
 }
 
-fn end(plan: Plan) -> Points {
+fn end(plan: Plan) -> Vectors {
     run(plan, &mut |_, _| ControlFlow::Continue(())).engine.present().clone()
 }
 
@@ -199,8 +199,8 @@ fn neighbours(coordinate: impl Strategy<Value = f64> + Clone) -> impl Strategy<V
     })
 }
 
-fn own(present: [f64; 2]) -> Own {
-    Own { present, reference: present, rest: [0.0; 2], load: None }
+fn own(present: [f64; 2]) -> ParticleState {
+    ParticleState { present, reference: present, rest: [0.0; 2], load: None }
 }
 
 proptest! {
@@ -258,10 +258,10 @@ proptest! {
         let present = if at_neighbour { seen[0].position } else { present };
         let rule = Rule {
             mean,
-            poisson: Some(Poisson { k, pull: Axis::X, centre: 0.0, half_width: 2.0, exponent }),
+            poisson: Some(Poisson { k, axis: Axis::X, centre: 0.0, half_width: 2.0, exponent }),
             feedback: Some(Feedback { factor, reference: FeedbackReference::Initial }),
         };
-        let target = rule.target(&Own { present, reference: [0.0, 1.0], rest: [0.1, 0.0], load: None }, seen.iter().copied());
+        let target = rule.target(&ParticleState { present, reference: [0.0, 1.0], rest: [0.1, 0.0], load: None }, seen.iter().copied());
         prop_assert!(!target[0].is_nan() && !target[1].is_nan(), "{rule:?}: {target:?}");
     }
 
@@ -285,7 +285,7 @@ proptest! {
             let moved = |[x, y]: [f64; 2]| [x + by[0], y + by[1]];
             let one = |k: usize| Neighbour { matrix: matrices[k], ..Neighbour::at(moved(places[k])) };
             let seen: Vec<Neighbour> = (0..count).map(one).collect();
-            let own = Own { present: moved(here), reference: here, rest: [0.02, -0.01], load };
+            let own = ParticleState { present: moved(here), reference: here, rest: [0.02, -0.01], load };
             Rule::MATERIAL.target(&own, seen.into_iter())
         };
         let (before, after) = (target([0.0; 2]), target(shift));
@@ -328,7 +328,7 @@ proptest! {
             let load = Some(Load { force, compliance: [[0.0; 2]; 2] });
             let cells = elements.iter().zip(&slots).map(|(element, slots)| CellAround { element, factor: 1.5, own: 0, slots });
             let patches = std::iter::empty::<(f64, std::iter::Empty<PatchCell>)>();
-            let own = Own { present, reference: [0.0; 2], rest: [0.0; 2], load };
+            let own = ParticleState { present, reference: [0.0; 2], rest: [0.0; 2], load };
             rule.target_by_cells(&own, pull(cells, patches, corner), [false; 2])
         };
         let go = |p: [f64; 2]| { let [x, y] = turned(p); [x + shift[0], y + shift[1]] };

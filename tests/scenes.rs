@@ -6,8 +6,8 @@ use flockform::continuum::engine::Engine;
 use flockform::continuum::plan::Plan;
 use flockform::continuum::report::PlanReport;
 use flockform::continuum::run::{Outcome, StopReason, run};
-use flockform::flock::points::distance;
 use flockform::flock::role::Role;
+use flockform::flock::vectors::distance;
 use flockform::scene::{Scene, bundled};
 
 fn scene(name: &str, overrides: &[&str]) -> Scene {

@@ -2,8 +2,8 @@
 
 use std::ops::ControlFlow;
 
+use flockform::continuum::bulk_response;
 use flockform::continuum::engine::Engine;
-use flockform::continuum::interior;
 use flockform::continuum::plan::Plan;
 use flockform::continuum::report::PlanReport;
 use flockform::continuum::run::{StopReason, run};
@@ -135,7 +135,7 @@ fn the_paper_s_neighbours_of_neighbours_have_a_negative_length_squared_and_no_la
         "stop.tolerance=1e-12",
         "stop.steps=400000",
     ]);
-    let report = interior::material(&paper).expect("a material");
+    let report = bulk_response::material(&paper).expect("a material");
     assert_eq!(report.gradient.effect, Effect::Softens);
     // A chain of the rows' sums, 3 at 1 and 1 at 2: l^2 = -(3 + 16) / (12 (3 + 4)).
     assert!((report.gradient.longitudinal_x + 19.0 / 84.0).abs() < 1e-12);
@@ -174,7 +174,7 @@ fn what_cannot_be_a_stable_second_gradient_is_refused_with_the_remedy() {
         (vec!["rule.weights.length=0.3"], vec!["rule.weights.length", "too short", "0.3803 or more"]),
         (vec!["rule.weights.length=2e4"], vec!["10000 times", "shorter"]),
         (vec!["rule.weights.length=0"], vec!["rule.weights.length", "greater than 0"]),
-        (vec!["neighbours={kind=\"second\"}"], vec!["neighbours", "straight"]),
+        (vec!["neighbours={kind=\"second\"}"], vec!["neighbours", "collinear"]),
         (vec!["rule.mean={kind=\"distance\"}"], vec!["rule.mean", "barycentre"]),
         (vec!["fracture={stretch=1.5}"], vec!["fracture", "leave fracture out"]),
         (

@@ -2,7 +2,7 @@
 
 use flockform::continuum::engine::Engine;
 use flockform::continuum::plan::Plan;
-use flockform::flock::points::Points;
+use flockform::flock::vectors::Vectors;
 use flockform::scene::{Scene, SceneError, bundled};
 use flockform::solve::spectrum::scatter;
 use flockform::stability::bisection::{Effort, growth};
@@ -265,7 +265,7 @@ fn extremes_end_right_or_refused() {
 }
 
 /// The body after some steps from a disturbance, in units of a power of two.
-fn stepped(name: &str, overrides: &[&str], factor: f64) -> Points {
+fn stepped(name: &str, overrides: &[&str], factor: f64) -> Vectors {
     let spacing = format!("lattice.spacing={factor:e}");
     let plan = Plan::new(&load(name, &[overrides, &[&spacing]].concat()).expect("loads")).expect("plans");
     let mut engine = Engine::new(plan);
@@ -298,7 +298,7 @@ fn a_linear_run_in_other_units_has_the_same_bits() {
         for power in [-490, -30, 1, 30, 490] {
             let factor = f64::from(power).exp2();
             let there = stepped("tension", overrides, factor);
-            let bits = |points: &Points, by: f64| -> Vec<u64> {
+            let bits = |points: &Vectors, by: f64| -> Vec<u64> {
                 points.x.iter().chain(&points.y).map(|v| (by * v).to_bits()).collect()
             };
             assert_eq!(bits(&here, factor), bits(&there, 1.0), "{overrides:?} times 2^{power}");

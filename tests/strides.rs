@@ -77,7 +77,7 @@ fn leaders_on_their_way_and_roles_that_change_are_met_at_their_steps() {
 
 #[test]
 fn a_body_that_leaves_its_bounds_is_caught_at_the_same_step() {
-    let overrides = ["frame=\"none\"", "stop.growth=0.2", "record.probes=[]"];
+    let overrides = ["frame=\"none\"", "stop.divergence_ratio=0.2", "record.probes=[]"];
     let scene = scene("tension", &overrides);
     let (outcome, _) = assert_same(&scene, &|_| usize::MAX, "pulled out of its bounds");
     assert_eq!(outcome.reason.name(), "diverged");

@@ -1,6 +1,6 @@
 //! The safety filter on whole scenes: nobody comes nearer than declared, and who can arrive does.
 
-use flockform::flock::points::{Points, distance};
+use flockform::flock::vectors::{Vectors, distance};
 use flockform::swarm::robots::{DoubleIntegrator, Model, Robot};
 use flockform::swarm::safety::{Filter, Flags, Limits, Obstacle, Obstacles, Patience, Seen};
 use rand::{RngExt, SeedableRng};
@@ -10,10 +10,10 @@ use rand_pcg::Pcg64Mcg;
 struct World {
     filter: Filter,
     radii: Vec<f64>,
-    present: Points,
-    goals: Points,
+    present: Vectors,
+    goals: Vectors,
     period: f64,
-    safe: Points,
+    safe: Vectors,
     flags: Vec<Flags>,
 }
 
@@ -27,7 +27,7 @@ impl World {
             present: ways.iter().map(|way| way[0]).collect(),
             goals: ways.iter().map(|way| way[1]).collect(),
             period: 0.1,
-            safe: Points::default(),
+            safe: Vectors::default(),
             flags: vec![Flags::default(); ways.len()],
         }
     }
@@ -216,7 +216,7 @@ fn random_world(random: &mut Pcg64Mcg, speed: f64, scale: f64) -> (World, Obstac
     let obstacles = Obstacles::new(&solids).expect("solids");
     let clearance = scale * anywhere(0.0, 0.2);
     let wanted = anywhere(3.0, 13.0) as usize;
-    let (mut radii, mut present) = (Vec::<f64>::new(), Points::default());
+    let (mut radii, mut present) = (Vec::<f64>::new(), Vectors::default());
     for _ in 0..50 * wanted {
         let (place, radius) = ([anywhere(0.0, side), anywhere(0.0, side)], scale * anywhere(0.0, 0.3));
         let apart = |k: usize| distance(present.get(k), place) >= radii[k] + radius + clearance;
@@ -231,7 +231,7 @@ fn random_world(random: &mut Pcg64Mcg, speed: f64, scale: f64) -> (World, Obstac
     let goals = (0..radii.len()).map(|_| [anywhere(0.0, side), anywhere(0.0, side)]).collect();
     let count = radii.len();
     let filter = Filter::new(limits(speed, clearance), radii.clone(), obstacles.clone()).expect("limits");
-    let (safe, flags) = (Points::default(), vec![Flags::default(); count]);
+    let (safe, flags) = (Vectors::default(), vec![Flags::default(); count]);
     (World { filter, radii, present, goals, period: 0.3, safe, flags }, obstacles)
 }
 
@@ -459,7 +459,7 @@ fn velocity_changes_no_faster_than_allowed_and_a_robot_stops_at_its_goal() {
             ..world.filter.limits().clone()
         })
         .expect("limits");
-    let mut velocity = Points::zeros(1);
+    let mut velocity = Vectors::zeros(1);
     let mut fastest = 0.0_f64;
     for tick in 0..300 {
         if tick == 40 {
@@ -490,7 +490,7 @@ fn a_robot_that_brakes_at_its_targets_gets_up_to_speed_and_still_stops_before_th
     let mut robot = Robot::at([0.0, 0.0], 0.0);
     let mut fastest = 0.0_f64;
     for _ in 0..200 {
-        let velocity: Points = [robot.velocity].into_iter().collect();
+        let velocity: Vectors = [robot.velocity].into_iter().collect();
         let seen = Seen { present: &world.present, known: &[true], ages: &[0.0], velocity: Some(&velocity) };
         world.filter.apply(&seen, &world.goals, world.period, &mut world.safe, &mut world.flags);
         robot.step(&model, world.safe.get(0), world.period);

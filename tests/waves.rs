@@ -28,7 +28,7 @@ fn hops_from_leaders(plan: &Plan) -> Vec<Option<usize>> {
         let reached: Vec<usize> = (0..plan.count())
             .filter(|&i| plan.roles[i] == Role::Follower && hops[i].is_none())
             .filter(|&i| {
-                let neighbours = plan.interaction.neighbours.of(i);
+                let neighbours = plan.flock.neighbours.of(i);
                 neighbours.iter().any(|&k| hops[k as usize] == Some(distance - 1))
             })
             .collect();
@@ -79,7 +79,7 @@ fn released(overrides: &[&str]) -> (Plan, Vec<Role>) {
 }
 
 fn radius_of(plan: &Plan, roles: &[Role]) -> SpectralRadius {
-    spectral_radius(&plan.interaction, plan.body.frame.as_ref(), roles, plan.update, 200_000).expect("linear")
+    spectral_radius(&plan.flock, plan.body.frame.as_ref(), roles, plan.update, 200_000).expect("linear")
 }
 
 #[test]
@@ -137,7 +137,7 @@ fn threshold(frame: &str, mut low: f64, mut high: f64) -> f64 {
     let (mut plan, roles) = released(&[frame]);
     for _ in 0..20 {
         let factor = (low + high) / 2.0;
-        plan.interaction.rule.feedback = Some(Feedback { factor, reference: FeedbackReference::Initial });
+        plan.flock.rule.feedback = Some(Feedback { factor, reference: FeedbackReference::Initial });
         *if radius_of(&plan, &roles).radius < 1.0 { &mut low } else { &mut high } = factor;
     }
     (low + high) / 2.0
@@ -176,7 +176,7 @@ fn the_feedback_threshold_is_that_of_a_clamped_chain_with_a_free_end() {
 fn the_spectrum_of_the_sweep_with_feedback_is_that_without_scaled() {
     let (mut plan, roles) = released(&["frame=none", "record.probes=[]"]);
     let bare = radius_of(&plan, &roles).radius;
-    plan.interaction.rule = Rule {
+    plan.flock.rule = Rule {
         feedback: Some(Feedback { factor: -0.4, reference: FeedbackReference::Initial }),
         ..Rule::BARYCENTRE
     };

@@ -8,7 +8,7 @@ use clap::Args;
 use flockform::continuum::engine::Engine;
 use flockform::continuum::engine::state::EngineState;
 use flockform::continuum::record::{LoadStep, ProbeSeries, Snapshot};
-use flockform::export::checkpoint::{Asked, Checkpoint, CheckpointError};
+use flockform::export::checkpoint::{Checkpoint, CheckpointError, RunRequest};
 use flockform::export::report::RunRecorder;
 use flockform::export::{ExportError, OutputFolder, VtkSeries, unfinished};
 use flockform::scene::Scene;
@@ -64,13 +64,13 @@ impl FromStr for Interval {
 
 impl CheckpointArguments {
     /// The run to go on with, if that is asked for.
-    pub fn left(&self) -> Result<Option<Left>, CheckpointError> {
-        self.resume.as_deref().map(Left::find).transpose()
+    pub fn left(&self) -> Result<Option<ResumedRun>, CheckpointError> {
+        self.resume.as_deref().map(ResumedRun::find).transpose()
     }
 }
 
 /// A run that was killed or interrupted.
-pub struct Left {
+pub struct ResumedRun {
     pub checkpoint: Checkpoint<'static>,
     /// Where it stands.
     folder: PathBuf,
@@ -78,7 +78,7 @@ pub struct Left {
     out: PathBuf,
 }
 
-impl Left {
+impl ResumedRun {
     /// A killed run stands beside the place of its results, an interrupted one in it.
     fn find(dir: &Path) -> Result<Self, CheckpointError> {
         let stem = dir.file_stem().filter(|_| dir.extension().is_some_and(|ending| ending == "unfinished"));
@@ -117,18 +117,18 @@ impl Left {
 }
 
 /// What a recorder has kept so far.
-pub struct Kept<'a> {
+pub struct Recorded<'a> {
     pub snapshots: &'a [Snapshot],
     pub probes: &'a [ProbeSeries],
     pub load_steps: &'a [LoadStep],
-    pub film: Option<&'a RunRecorder>,
+    pub animation: Option<&'a RunRecorder>,
     pub frames: Option<&'a mut VtkSeries>,
 }
 
 /// Writes checkpoints when they are due.
-pub struct Keeper<'a> {
+pub struct Checkpointer<'a> {
     every: &'a [Interval],
-    asked: Asked,
+    asked: RunRequest,
     scene: &'a Scene,
     digest: u64,
     start: Instant,
@@ -138,11 +138,11 @@ pub struct Keeper<'a> {
     last_step: usize,
 }
 
-impl<'a> Keeper<'a> {
+impl<'a> Checkpointer<'a> {
     pub fn new(
         arguments: &'a CheckpointArguments,
-        (asked, scene, digest): (Asked, &'a Scene, u64),
-        left: Option<&Left>,
+        (asked, scene, digest): (RunRequest, &'a Scene, u64),
+        left: Option<&ResumedRun>,
     ) -> Self {
         let (before, last_step) = left
             .map_or((Duration::ZERO, 0), |left| (left.checkpoint.stepping, left.checkpoint.engine.step()));
@@ -176,7 +176,7 @@ impl<'a> Keeper<'a> {
 
     /// Keeps the run as it is now, to be gone on with if it is killed. One that cannot be written does not end
     /// the run.
-    pub fn keep(&mut self, folder: &mut OutputFolder, engine: (&Engine, f64), mut kept: Kept<'_>) {
+    pub fn keep(&mut self, folder: &mut OutputFolder, engine: (&Engine, f64), mut kept: Recorded<'_>) {
         (self.last_step, self.last) = (engine.0.step(), Instant::now());
         if let Err(error) = self.try_to_keep(folder, engine, &mut kept) {
             tracing::warn!("no checkpoint at step {}: {error}", self.last_step);
@@ -191,7 +191,7 @@ impl<'a> Keeper<'a> {
         &self,
         folder: &mut OutputFolder,
         engine: (&Engine, f64),
-        kept: &mut Kept<'_>,
+        kept: &mut Recorded<'_>,
     ) -> Result<(), ExportError> {
         if let Some(frames) = &mut kept.frames {
             frames.sync()?;
@@ -206,7 +206,7 @@ impl<'a> Keeper<'a> {
     }
 
     /// Leaves a checkpoint among the results of an interrupted run.
-    pub fn leave(&self, folder: &OutputFolder, engine: (&Engine, f64), kept: &Kept<'_>) {
+    pub fn leave(&self, folder: &OutputFolder, engine: (&Engine, f64), kept: &Recorded<'_>) {
         let is_asked = self.every.iter().any(|interval| *interval != Interval::Never);
         if self.scene.equilibrium.is_some() || !is_asked {
             return;
@@ -220,11 +220,11 @@ impl<'a> Keeper<'a> {
         &self,
         folder: &OutputFolder,
         (engine, residual): (&Engine, f64),
-        kept: &Kept<'_>,
+        kept: &Recorded<'_>,
     ) -> Result<(), ExportError> {
         let of = (&self.asked, self.scene, self.digest);
-        let film = kept.film.map(RunRecorder::footage);
-        let recorded = (kept.snapshots, kept.probes, kept.load_steps, film);
+        let animation = kept.animation.map(RunRecorder::animation_state);
+        let recorded = (kept.snapshots, kept.probes, kept.load_steps, animation);
         let state = (EngineState::of(engine), residual);
         Checkpoint::new(of, state, recorded, self.stepping()).write(folder.folder())
     }

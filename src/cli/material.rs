@@ -3,7 +3,7 @@
 mod neighbours;
 
 use clap::{Args, ValueEnum};
-use flockform::continuum::interior;
+use flockform::continuum::bulk_response;
 use flockform::flock::lattice::{Lattice, LatticeKind};
 use flockform::material::elastic::{Constants, Elastic, ElasticError, Plane};
 use flockform::material::gradient::{GradientWeights, layer_note};
@@ -82,7 +82,7 @@ struct ConstantArguments {
     shear: Option<f64>,
     /// Angle of the fibres from x in degrees [default: 0]
     #[arg(long, value_name = "DEGREES", requires = "shear", allow_negative_numbers = true)]
-    fibres: Option<f64>,
+    fiber_angle: Option<f64>,
     /// What is assumed across the thickness [default: stress]
     #[arg(long, requires = "young", conflicts_with = "shear")]
     plane: Option<PlaneName>,
@@ -127,7 +127,7 @@ pub fn answer(arguments: &MaterialArguments) -> Result<String, Refusal> {
     let report = match &arguments.scene {
         Some(scene) => {
             let scene = SceneArguments { scene: scene.clone(), set: arguments.set.clone() }.load([])?;
-            interior::material(&scene)?
+            bulk_response::material(&scene)?
         }
         None => {
             let lattice = arguments.lattice.lattice()?;
@@ -142,7 +142,7 @@ pub fn answer(arguments: &MaterialArguments) -> Result<String, Refusal> {
 
 fn of_material(lattice: &Lattice, elastic: &Elastic) -> Result<MaterialReport, WrongOption> {
     MaterialReport::of_material(lattice, elastic)
-        .map_err(|error| wrong("--lattice", error.to_string(), interior::remedy(&error)))
+        .map_err(|error| wrong("--lattice", error.to_string(), bulk_response::remedy(&error)))
 }
 
 fn of_rule(
@@ -161,7 +161,7 @@ fn of_rule(
     let weights = weights.map(|text| neighbours::weights(text, lattice, &offsets)).transpose()?;
     Crystal::scalar(lattice, &offsets, weights.as_deref())
         .and_then(|crystal| MaterialReport::of_rule(lattice, name.to_owned(), &crystal))
-        .map_err(|error| wrong(option, error.to_string(), interior::remedy(&error)))
+        .map_err(|error| wrong(option, error.to_string(), bulk_response::remedy(&error)))
 }
 
 fn second_gradient(
@@ -169,7 +169,7 @@ fn second_gradient(
     who: Option<&str>,
     length: &str,
 ) -> Result<MaterialReport, WrongOption> {
-    if who.is_some_and(|who| who != "straight") {
+    if who.is_some_and(|who| who != "collinear") {
         let message = "a second gradient reaches the sites behind the first neighbours";
         return Err(wrong("--neighbours", message, "leave it out, or give --neighbours straight"));
     }
@@ -265,7 +265,7 @@ impl ConstantArguments {
                 Constants::Isotropic { young, poisson, plane }
             }
             (&[along, across], Some(shear)) => {
-                let angle = self.fibres.unwrap_or(0.0).to_radians();
+                let angle = self.fiber_angle.unwrap_or(0.0).to_radians();
                 Constants::Orthotropic { young: [along, across], poisson_12: poisson, shear, angle }
             }
             (young, shear) => {
@@ -294,7 +294,7 @@ fn place(error: &ElasticError) -> (&'static str, &'static str) {
             ("--poisson", "give a ratio inside the range; rubber is 0.49 to 0.4999")
         }
         ElasticError::PoissonOrthotropic { .. } => ("--poisson", "give a ratio inside the range"),
-        ElasticError::Angle { .. } => ("--fibres", "give degrees"),
+        ElasticError::Angle { .. } => ("--fiber-angle", "give degrees"),
         ElasticError::Range => ("--young", "use units in which the constants are of ordinary size"),
     }
 }

@@ -21,7 +21,8 @@ use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use clap::{Args, CommandFactory, Parser, Subcommand};
+use clap::error::{ContextKind, ContextValue};
+use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 use flockform::compare::run::plan;
 use flockform::continuum::report::PlanReport;
@@ -70,7 +71,7 @@ pub enum Command {
     Compare(compare::CompareArguments),
     /// What accuracy costs: run a scene by many rules, spacings and solvers against finite elements
     #[command(
-        after_help = "Example:\n  flockform trade grips --out /tmp/trade\n  flockform trade beam-loaded --most-particles 5000"
+        after_help = "Example:\n  flockform trade grips --out /tmp/trade\n  flockform trade beam-loaded --max-particles 5000"
     )]
     Trade(trade::TradeArguments),
     /// When a scene's body grows instead of coming to rest, foretold and found, and what holds at the extremes
@@ -107,12 +108,12 @@ pub enum Command {
         after_help = "Example:\n  flockform gallery --out /tmp/gallery\n  flockform gallery tension gap"
     )]
     Gallery(gallery::GalleryArguments),
-    /// List the bundled swarms
-    #[command(after_help = "Example:\n  flockform swarms")]
-    Swarms,
-    /// List the bundled scenes
-    #[command(after_help = "Example:\n  flockform scenes")]
-    Scenes,
+    /// List what is bundled, a line each
+    #[command(after_help = "Examples:\n  flockform list scenes\n  flockform list swarms")]
+    List {
+        /// Scenes or swarms
+        what: Listed,
+    },
     /// Say what a scene makes the program model and what it leaves out, without running it
     #[command(after_help = "Example:\n  flockform plan fracture --set lattice.a=5.0")]
     Plan(SceneArguments),
@@ -120,7 +121,7 @@ pub enum Command {
     #[command(
         after_help = "Examples:\n  flockform material --lattice square\n  flockform material --lattice hexagonal --neighbours second\n  \
                       flockform material --lattice hexagonal --young 210e9 --poisson 0.3 --thickness 1e-3\n  \
-                      flockform material --lattice square --young 9,1 --poisson 0.4 --shear 0.6 --fibres 30\n  \
+                      flockform material --lattice square --young 9,1 --poisson 0.4 --shear 0.6 --fiber-angle 30\n  \
                       flockform material second-gradient --json"
     )]
     Material(material::MaterialArguments),
@@ -148,6 +149,21 @@ pub enum Command {
     #[command(subcommand)]
     Bench(BenchCommand),
 }
+
+/// What `list` lists.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum Listed {
+    Scenes,
+    Swarms,
+}
+
+/// Commands and options that had another name once.
+const RENAMED: [(&str, &str); 4] = [
+    ("scenes", "list scenes"),
+    ("swarms", "list swarms"),
+    ("--fibres", "--fiber-angle"),
+    ("--most-particles", "--max-particles"),
+];
 
 #[derive(Debug, Subcommand)]
 pub enum BenchCommand {
@@ -201,7 +217,7 @@ pub enum BenchCommand {
 /// Which scene, with which changes.
 #[derive(Debug, Args)]
 pub struct SceneArguments {
-    /// Name of a bundled scene (see `flockform scenes`) or path of a scene file
+    /// Name of a bundled scene (see `flockform list scenes`) or path of a scene file
     pub scene: String,
     /// Override a key of the scene, validated like the file: lattice.spacing=0.5, roles\[1\].from=30
     #[arg(long = "set", value_name = "KEY.PATH=VALUE")]
@@ -256,6 +272,10 @@ pub enum Refusal {
         "--ros-args: this command is no ROS 2 node\n  help: leave them out, or use `flockform node` or `flockform robots` without --transport shm"
     )]
     NoNode,
+    #[error(
+        "`{then}` is called `{now}` now\n  help: `flockform --help` lists every command, and `--help` after one its options"
+    )]
+    Renamed { then: &'static str, now: &'static str },
     #[error("{0}")]
     Export(#[from] export::ExportError),
     #[error("{0}")]
@@ -263,7 +283,7 @@ pub enum Refusal {
     #[error("{0}")]
     Checkpoint(#[from] export::checkpoint::CheckpointError),
     #[error(
-        "there is no {what} file and no bundled {what} `{name}`\n  help: the nearest bundled {what} is `{nearest}`; `flockform {what}s` lists them all"
+        "there is no {what} file and no bundled {what} `{name}`\n  help: the nearest bundled {what} is `{nearest}`; `flockform list {what}s` lists them all"
     )]
     NotBundled { what: &'static str, name: String, nearest: &'static str },
     #[error(
@@ -298,13 +318,23 @@ pub fn arguments() -> Result<(Arguments, RosArguments), Refusal> {
         Err(error) => (all, Err(error)),
         Ok((rest, ros)) => (rest, Ok(ros)),
     };
-    let arguments = Arguments::parse_from(rest);
+    let arguments = Arguments::try_parse_from(rest).map_err(|error| match renamed(&error) {
+        Some((then, now)) => Refusal::Renamed { then, now },
+        None => error.exit(),
+    })?;
     match arguments.command {
         Command::Node(node::NodeArguments { transport: Transport::Ros2, .. })
         | Command::Robots(node::RobotsArguments { transport: Transport::Ros2, .. }) => Ok((arguments, ros?)),
         _ if is_asked => Err(Refusal::NoNode),
         _ => Ok((arguments, RosArguments::default())),
     }
+}
+
+/// The command or option that the command line calls by its old name.
+fn renamed(error: &clap::Error) -> Option<(&'static str, &'static str)> {
+    let kinds = [ContextKind::InvalidSubcommand, ContextKind::InvalidArg];
+    let wrong = kinds.into_iter().find_map(|kind| error.get(kind))?;
+    RENAMED.into_iter().find(|(then, _)| matches!(wrong, ContextValue::String(word) if word == then))
 }
 
 /// Logs go to standard error; `RUST_LOG` wins over `--log-level`, and that over `-v`.
@@ -349,9 +379,13 @@ pub fn dispatch(command: Command, ros: &RosArguments) -> Result<ExitCode, Refusa
         Command::Replay(arguments) => return replay::replay(&arguments),
         Command::Node(arguments) => return node::node(&arguments, ros),
         Command::Robots(arguments) => return node::robots(&arguments, ros),
-        Command::Scenes => list(bundled::SCENES, |scene| Ok(scene.load(&[])?.raw.title))?,
+        Command::List { what: Listed::Scenes } => {
+            list(bundled::SCENES, |scene| Ok(scene.load(&[])?.raw.title))?
+        }
+        Command::List { what: Listed::Swarms } => {
+            list(bundled::SWARMS, |swarm| Ok(swarm.load_swarm(&[])?.raw.title))?;
+        }
         Command::Gallery(arguments) => return gallery::gallery(&arguments),
-        Command::Swarms => list(bundled::SWARMS, |swarm| Ok(swarm.load_swarm(&[])?.raw.title))?,
         Command::Install(arguments) => return install::install(&arguments),
         Command::Plan(arguments) => {
             let scene = arguments.load([])?;

@@ -12,24 +12,24 @@ use clap::Args;
 use flockform::compare::run::plan;
 use flockform::continuum::engine::Engine;
 use flockform::continuum::engine::state::digest;
-use flockform::continuum::equilibrium::come_to_rest_watched;
+use flockform::continuum::equilibrium::run_to_equilibrium_watched;
 use flockform::continuum::plan::Plan;
 use flockform::continuum::record::{LoadStep, ProbeSeries, Snapshot};
 use flockform::continuum::run::{Outcome, StopReason, Watch, resume};
-use flockform::export::checkpoint::{self, Asked, Checkpoint};
-use flockform::export::report::stage::Stage;
-use flockform::export::report::{self, Footage, RunRecorder, page};
+use flockform::export::checkpoint::{self, Checkpoint, RunRequest};
+use flockform::export::report::view::View;
+use flockform::export::report::{self, AnimationState, RunRecorder, page};
 use flockform::export::{
     Drawing, ExportError, Measured, OutputFolder, Results, Summary, Timings, VtkSeries, write_all,
 };
 use flockform::record::About;
-use flockform::record::body::BodyTape;
+use flockform::record::body::BodyMessages;
 use flockform::scene::{LoadSteps, Scene, bundled};
 use flockform::shm::Domain;
 use flockform::shm::positions::Positions;
 use flockform::trade::{Chosen, choose};
 
-use super::checkpoint::{CheckpointArguments, Keeper, Kept, Left};
+use super::checkpoint::{CheckpointArguments, Checkpointer, Recorded, ResumedRun};
 use super::output::{FigureArguments, OutputArguments, ReportArguments};
 use super::progress::{Drawn, Progress};
 use super::recording::{RecordArguments, close};
@@ -37,7 +37,7 @@ use super::{FAILED, Refusal, SceneArguments, print};
 
 #[derive(Debug, Args)]
 pub struct RunArguments {
-    /// Name of a bundled scene (see `flockform scenes`) or path of a scene file; --resume knows it
+    /// Name of a bundled scene (see `flockform list scenes`) or path of a scene file; --resume knows it
     #[arg(required_unless_present = "resume")]
     scene: Option<String>,
     /// Override a key of the scene, validated like the file: lattice.spacing=0.5, roles\[1\].from=30
@@ -94,44 +94,44 @@ fn run_here(arguments: &RunArguments) -> Result<ExitCode, Refusal> {
     recorder.reports = !arguments.report.no_report;
     let about = About { source: "run", name: scene.name.clone(), ..About::default() };
     let recording = arguments.record.open(&about, arguments.output.force, 1)?;
-    let mut tape = recording.as_ref().map(|one| BodyTape::new(&scene, one.sink())).transpose()?;
+    let mut messages = recording.as_ref().map(|one| BodyMessages::new(&scene, one.sink())).transpose()?;
     let mut progress = Progress::new(arguments.output.quiet, steps_of(&scene));
     let interrupted = interrupt_flag();
-    let looks = Looks::new(&scene, &plan, shown.is_some() || tape.is_some());
-    let mut keeper = Keeper::new(&arguments.checkpoints, (asked, &scene, digest), left.as_ref());
+    let looks = Looks::new(&scene, &plan, shown.is_some() || messages.is_some());
+    let mut checkpointer = Checkpointer::new(&arguments.checkpoints, (asked, &scene, digest), left.as_ref());
     let mut see = |engine: &Engine, residual: f64| {
         recorder.step(engine);
-        looks.film.set(recorder.film.as_ref().map(|film| film.next(engine.step())));
+        looks.animation.set(recorder.animation.as_ref().map(|animation| animation.next(engine.step())));
         if let Some(shown) = &mut shown {
             shown.show(engine);
         }
-        if let Some(tape) = &mut tape {
-            tape.step(engine, residual);
+        if let Some(messages) = &mut messages {
+            messages.step(engine, residual);
         }
         progress.step(engine.step(), residual);
-        if keeper.is_due(engine.step()) && !recorder.failed() {
-            keeper.keep(&mut folder, (engine, residual), recorder.kept());
+        if checkpointer.is_due(engine.step()) && !recorder.failed() {
+            checkpointer.keep(&mut folder, (engine, residual), recorder.kept());
         }
         let stop = recorder.failed() || interrupted.load(Ordering::Relaxed);
         if stop { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
     let watch = Watch { next: &|step| looks.after(step), see: &mut see };
     let outcome = match left.map(|left| left.checkpoint) {
-        None => come_to_rest_watched(&scene, plan, watch)?,
+        None => run_to_equilibrium_watched(&scene, plan, watch)?,
         Some(Checkpoint { engine, residual, .. }) => {
-            resume(plan, engine, residual, watch).map_err(|error| Left::foreign(&folder, &error))?
+            resume(plan, engine, residual, watch).map_err(|error| ResumedRun::foreign(&folder, &error))?
         }
     };
     progress.finish();
-    if let Some(tape) = tape {
-        tape.finish(&outcome.engine, outcome.residual);
+    if let Some(messages) = messages {
+        messages.finish(&outcome.engine, outcome.residual);
     }
 
-    let elapsed = keeper.stepping();
+    let elapsed = checkpointer.stepping();
     tracing::info!("{} steps in {elapsed:.1?}, writing", outcome.engine.step());
     let is_interrupted = outcome.reason == StopReason::Interrupted;
     if is_interrupted {
-        keeper.leave(&folder, (&outcome.engine, outcome.residual), &recorder.kept());
+        checkpointer.leave(&folder, (&outcome.engine, outcome.residual), &recorder.kept());
     }
     let on_the_way = recorder.writing;
     let records = recorder.finish(&outcome)?;
@@ -161,7 +161,7 @@ fn run_here(arguments: &RunArguments) -> Result<ExitCode, Refusal> {
 
 impl RunArguments {
     /// What shall be run, in words that mean the same in any folder.
-    fn asked(&self, left: Option<&Left>) -> Asked {
+    fn asked(&self, left: Option<&ResumedRun>) -> RunRequest {
         let force = self.output.force;
         match (&self.scene, left) {
             (None, Some(left)) => left.checkpoint.asked.clone(),
@@ -173,7 +173,7 @@ impl RunArguments {
                 let named = in_full.filter(|_| is_path).map(|path| path.display().to_string());
                 let steps = self.steps.map(|steps| format!("stop.steps={steps}"));
                 let set = self.set.iter().cloned().chain(steps).collect();
-                Asked { scene: named.unwrap_or_else(|| scene.clone()), set, force }
+                RunRequest { scene: named.unwrap_or_else(|| scene.clone()), set, force }
             }
         }
     }
@@ -195,7 +195,7 @@ struct Looks<'a> {
     /// Most steps between two looks.
     most: usize,
     /// The next step that the report shows.
-    film: Cell<Option<usize>>,
+    animation: Cell<Option<usize>>,
 }
 
 impl<'a> Looks<'a> {
@@ -204,7 +204,7 @@ impl<'a> Looks<'a> {
         let every = every || !plan.probes.is_empty();
         let most = if every { 1 } else { (UPDATES_BETWEEN_LOOKS / plan.count()).max(1) };
         // The report has yet to say what it wants: the next one.
-        Self { scene, most, film: Cell::new(Some(0)) }
+        Self { scene, most, animation: Cell::new(Some(0)) }
     }
 
     fn after(&self, step: usize) -> usize {
@@ -213,7 +213,7 @@ impl<'a> Looks<'a> {
         let next = |every: usize| (step / every + 1) * every;
         let vtk = (record.vtk_every > 0).then(|| next(record.vtk_every));
         let load = load_every(self.scene).map(next);
-        [figure, vtk, load, self.film.get()].into_iter().flatten().fold(step + self.most, usize::min)
+        [figure, vtk, load, self.animation.get()].into_iter().flatten().fold(step + self.most, usize::min)
     }
 }
 
@@ -245,9 +245,9 @@ struct Recorder<'a> {
     frames: Option<VtkSeries>,
     /// Whether there shall be a `report.html`, and what it shows.
     reports: bool,
-    film: Option<RunRecorder>,
+    animation: Option<RunRecorder>,
     /// What an earlier run has kept for it.
-    footage: Option<Footage<'static>>,
+    animation_state: Option<AnimationState<'static>>,
     failure: Option<ExportError>,
     writing: Duration,
 }
@@ -257,7 +257,7 @@ struct Records {
     snapshots: Vec<Snapshot>,
     probes: Vec<ProbeSeries>,
     load_steps: Vec<LoadStep>,
-    stage: Option<Stage>,
+    stage: Option<View>,
     writing: Duration,
 }
 
@@ -266,7 +266,7 @@ impl<'a> Recorder<'a> {
         scene: &'a Scene,
         plan: &Plan,
         folder: &OutputFolder,
-        left: Option<&Left>,
+        left: Option<&ResumedRun>,
     ) -> Result<Self, ExportError> {
         // A body that is not stepped has no history.
         let is_solved_at_once = scene.equilibrium.is_some() && scene.load_steps.is_none();
@@ -286,20 +286,20 @@ impl<'a> Recorder<'a> {
             load_steps: left.map_or_else(Vec::new, |left| left.checkpoint.load_steps.to_vec()),
             frames,
             reports: true,
-            film: None,
-            footage: left.and_then(|left| left.checkpoint.film.clone()),
+            animation: None,
+            animation_state: left.and_then(|left| left.checkpoint.animation.clone()),
             failure: None,
             writing: Duration::ZERO,
         })
     }
 
     /// For a checkpoint.
-    fn kept(&mut self) -> Kept<'_> {
-        Kept {
+    fn kept(&mut self) -> Recorded<'_> {
+        Recorded {
             snapshots: &self.snapshots,
             probes: &self.probes,
             load_steps: &self.load_steps,
-            film: self.film.as_ref(),
+            animation: self.animation.as_ref(),
             frames: self.frames.as_mut(),
         }
     }
@@ -317,7 +317,7 @@ impl<'a> Recorder<'a> {
         }
         if self.reports {
             let start = Instant::now();
-            RunRecorder::open(&mut self.film, &mut self.footage, engine).watch(engine);
+            RunRecorder::open(&mut self.animation, &mut self.animation_state, engine).watch(engine);
             self.writing += start.elapsed();
         }
     }
@@ -361,9 +361,9 @@ impl<'a> Recorder<'a> {
         let start = Instant::now();
         if self.reports {
             // A run that is gone on with from its last step has seen none.
-            RunRecorder::open(&mut self.film, &mut self.footage, engine);
+            RunRecorder::open(&mut self.animation, &mut self.animation_state, engine);
         }
-        let stage = self.film.map(|film| film.stage(self.scene, outcome));
+        let stage = self.animation.map(|animation| animation.stage(self.scene, outcome));
         let writing = self.writing + start.elapsed();
         let Self { snapshots, probes, load_steps, .. } = self;
         Ok(Records { snapshots, probes, load_steps, stage, writing })

@@ -11,7 +11,7 @@ use clap::Args;
 use flockform::export::flight::write_flight;
 use flockform::export::report::{self, FlightRecorder};
 use flockform::record::About;
-use flockform::record::flight::FlightTape;
+use flockform::record::flight::FlightMessages;
 use flockform::scene::bundled::{self, bundled_swarm};
 use flockform::scene::swarm::Swarm;
 use flockform::swarm::flight::{Flight, FlightReport, fly_heard};
@@ -24,7 +24,7 @@ use super::{FAILED, Refusal, print, scene_path};
 /// Which swarm, with which changes.
 #[derive(Debug, Args)]
 pub struct SwarmFileArguments {
-    /// Name of a bundled swarm (see `flockform swarms`) or path of a swarm file
+    /// Name of a bundled swarm (see `flockform list swarms`) or path of a swarm file
     pub swarm: String,
     /// Override a key of the swarm, validated like the file: limits.speed=0.5, leaders\[0\].program.kind=external
     #[arg(long = "set", value_name = "KEY.PATH=VALUE")]
@@ -81,20 +81,22 @@ pub fn swarm(arguments: &SwarmArguments) -> Result<ExitCode, Refusal> {
     let folder = arguments.output.folder(&swarm.name)?;
     let recording =
         arguments.record.open(&arguments.swarm.about("swarm", &swarm), arguments.output.force, 1)?;
-    let tape =
-        recording.as_ref().map(|one| FlightTape::new(&swarm, flight.control(), one.sink())).transpose()?;
-    let tape = RefCell::new(tape);
+    let messages = recording
+        .as_ref()
+        .map(|one| FlightMessages::new(&swarm, flight.control(), one.sink()))
+        .transpose()?;
+    let messages = RefCell::new(messages);
     let interrupted = interrupt_flag();
     let start = Instant::now();
     let mut hear = |member, pose| {
-        if let Some(tape) = &mut *tape.borrow_mut() {
-            tape.hear(member, pose);
+        if let Some(messages) = &mut *messages.borrow_mut() {
+            messages.hear(member, pose);
         }
     };
     let (record, report) = fly_heard(&swarm, &mut hear, &mut |flight, _| {
-        if let Some(tape) = &mut *tape.borrow_mut() {
+        if let Some(messages) = &mut *messages.borrow_mut() {
             // When the period began that has just been flown.
-            tape.tick(flight.control(), (flight.fleet().period() - 1) as f64 * swarm.raw.control.period);
+            messages.tick(flight.control(), (flight.fleet().period() - 1) as f64 * swarm.raw.control.period);
         }
         recorder.iter_mut().for_each(|recorder| recorder.watch(flight));
         if interrupted.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }

@@ -23,8 +23,8 @@ pub struct TradeArguments {
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u16).range(1..))]
     repeats: u16,
     /// Leave out bodies of more particles than this
-    #[arg(long, value_name = "N", default_value_t = Grid::default().most_particles)]
-    most_particles: usize,
+    #[arg(long, value_name = "N", default_value_t = Grid::default().max_particles)]
+    max_particles: usize,
     /// A few settings, once each: shows that it works, measures nothing worth quoting
     #[arg(long)]
     quick: bool,
@@ -38,8 +38,8 @@ pub fn trade(arguments: &TradeArguments) -> Result<ExitCode, Refusal> {
     let grid = if arguments.quick {
         Grid::quick()
     } else {
-        let (repeats, most_particles) = (usize::from(arguments.repeats), arguments.most_particles);
-        Grid { repeats, most_particles, ..Grid::default() }
+        let (repeats, max_particles) = (usize::from(arguments.repeats), arguments.max_particles);
+        Grid { repeats, max_particles, ..Grid::default() }
     };
     // Asked for first, so that a misspelt name is a misspelt name.
     let name = arguments.scene.load([])?.name;

@@ -8,8 +8,8 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 
 use super::split::ErrorParts;
-use crate::flock::points::{Points, distance};
 use crate::flock::rules::Rotation;
+use crate::flock::vectors::{Vectors, distance};
 use crate::material::cells::Cells;
 use crate::material::elastic::Elastic;
 use crate::material::stiffness::ShapeError;
@@ -52,8 +52,8 @@ pub struct Sides<'a> {
     /// Which turns of a cell are no strain.
     pub rotation: Rotation,
     /// Displacements \[length\].
-    pub rule: &'a Points,
-    pub truth: &'a Points,
+    pub rule: &'a Vectors,
+    pub truth: &'a Vectors,
     /// Who is free to go elsewhere than the truth: the followers that are in a cell.
     pub follows: &'a [bool],
 }
@@ -68,8 +68,8 @@ impl Comparison {
         let followers = || (0..follows.len()).filter(|&i| follows[i]);
         let zero = [0.0; 2];
         let apart =
-            |a: &Points, b: &Points| followers().map(|i| distance(a.get(i), b.get(i))).collect::<Vec<_>>();
-        let still: Points = std::iter::repeat_n(zero, truth.len()).collect();
+            |a: &Vectors, b: &Vectors| followers().map(|i| distance(a.get(i), b.get(i))).collect::<Vec<_>>();
+        let still: Vectors = std::iter::repeat_n(zero, truth.len()).collect();
         let (off, size) = (apart(rule, truth), apart(truth, &still));
         let stress = [rule, truth].map(|u| von_mises(cells, elastic, u, rotation));
         let stress_off: Vec<f64> =
@@ -96,7 +96,7 @@ impl Comparison {
 
 /// Von Mises stress at the centres of cells \[force / length^2\] whose corners are displaced by
 /// `displacement` \[length\], shape \[cells\]: on a quadrilateral by the bilinear formula.
-pub fn von_mises(cells: &Cells, elastic: &Elastic, displacement: &Points, rotation: Rotation) -> Vec<f64> {
+pub fn von_mises(cells: &Cells, elastic: &Elastic, displacement: &Vectors, rotation: Rotation) -> Vec<f64> {
     let of_cells = stress::of_cells(cells, elastic, displacement, rotation);
     of_cells.into_iter().map(|stress| stress.von_mises).collect()
 }

@@ -4,7 +4,7 @@
 //! turns, by finite elements on a mesh that knows nothing of the lattice, fine enough that what it states of its own error does not show in the measures.
 //!
 //! * [`supports`]: the roles of particles to what holds the shape.
-//! * [`truth`]: what holds and what pulls the shape, to the truth's displacement and stress.
+//! * [`mod@reference`]: what holds and what pulls the shape, to its displacement and stress.
 //! * [`run`]: both of a scene, measured; [`run::plan()`] is how a scene is planned whose leaders the truth leads.
 //! * [`measures`]: two displacements of one body to the numbers that tell them apart.
 //! * [`places`]: both at the places that a scene names.
@@ -27,7 +27,7 @@
 
 pub mod measures;
 pub mod places;
+pub mod reference;
 pub mod run;
 pub mod split;
 pub mod supports;
-pub mod truth;

@@ -4,9 +4,9 @@ use std::fmt;
 
 use serde::Serialize;
 
-use super::truth::{Truth, TruthError};
+use super::reference::{Reference, ReferenceError};
 use crate::continuum::places::AtPlace;
-use crate::flock::points::Points;
+use crate::flock::vectors::Vectors;
 
 /// One place of the body: what the rule makes of it, and the truth.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -19,8 +19,8 @@ pub struct Told {
 ///
 /// # Errors
 /// Names a place outside the shape.
-pub fn told(rule: Vec<AtPlace>, truth: &Truth) -> Result<Vec<Told>, TruthError> {
-    let places: Points = rule.iter().map(|at| at.place).collect();
+pub fn told(rule: Vec<AtPlace>, truth: &Reference) -> Result<Vec<Told>, ReferenceError> {
+    let places: Vectors = rule.iter().map(|at| at.place).collect();
     let (moved, stress) = (truth.displacements_at(&places)?, truth.stress_at(&places)?);
     let of = |((rule, displacement), stress): ((AtPlace, [f64; 2]), crate::fem::Stress)| {
         let in_plane = [stress.xx, stress.yy, stress.xy];

@@ -5,18 +5,18 @@ use std::time::{Duration, Instant};
 
 use super::measures::{Comparison, Sides, von_mises};
 use super::places::{Told, told};
+use super::reference::{Reference, ReferenceError, Setting};
 use super::split::ErrorParts;
 use super::supports::supports;
-use super::truth::{Setting, Truth, TruthError};
 use crate::continuum::engine::Engine;
-use crate::continuum::equilibrium::come_to_rest;
+use crate::continuum::equilibrium::run_to_equilibrium;
 use crate::continuum::layout::{Layout, RoleChange};
 use crate::continuum::places::at_places;
 use crate::continuum::plan::Plan;
 use crate::continuum::run::Outcome;
 use crate::fem::{Effort, FemError};
-use crate::flock::points::Points;
 use crate::flock::role::Role;
+use crate::flock::vectors::Vectors;
 use crate::material::cells::Cells;
 use crate::material::elastic::Elastic;
 use crate::scene::{LeaderMotion, Scene, SceneError};
@@ -24,7 +24,7 @@ use crate::scene::{LeaderMotion, Scene, SceneError};
 /// The truth of a scene's body in its material, under its loads and whoever does not follow.
 #[derive(Clone, Debug)]
 pub struct SceneTruth {
-    pub truth: Truth,
+    pub truth: Reference,
     pub layout: Layout,
     pub elastic: Elastic,
     /// Time to the solution.
@@ -39,7 +39,7 @@ pub struct Compared {
     pub truth: SceneTruth,
     pub cells: Cells,
     /// Displacements by the rule \[length\], shape \[particles\]; the true ones are the truth's.
-    pub rule: Points,
+    pub rule: Vectors,
     /// At the centres of the cells, the corners displaced by the rule and in truth
     /// \[force / length^2\], shape \[cells\].
     pub von_mises_rule: Vec<f64>,
@@ -83,7 +83,7 @@ pub fn truth_of(scene: &Scene, effort: &Effort) -> Result<SceneTruth, SceneError
         supports,
         loads: &loads,
     };
-    let truth = Truth::solve(setting, effort).map_err(|error| refused(scene, &error))?;
+    let truth = Reference::solve(setting, effort).map_err(|error| refused(scene, &error))?;
     require_known(scene, &truth, &changes)?;
     Ok(SceneTruth { truth, layout, elastic, time: start.elapsed() })
 }
@@ -100,7 +100,7 @@ pub fn plan(scene: &Scene) -> Result<Plan, SceneError> {
 }
 
 /// Runs the rule of a scene to its end and measures where it has the body against where the truth has it.
-/// `watch` sees the run as [`come_to_rest`] shows it.
+/// `watch` sees the run as [`run_to_equilibrium`] shows it.
 ///
 /// # Errors
 /// Names the key of a scene that has no truth, or none that its end could be held against.
@@ -114,11 +114,11 @@ pub fn compare(
     let start = Instant::now();
     let plan = plan_led_by(scene, &truth.truth)?;
     let cells = plan.cells.clone().unwrap_or_else(|| Cells::of_body(&plan.body));
-    let outcome = come_to_rest(scene, plan, watch)?;
+    let outcome = run_to_equilibrium(scene, plan, watch)?;
     let time = start.elapsed();
 
     let engine = &outcome.engine;
-    let rule: Points = (0..engine.body().count()).map(|i| engine.displacement(i)).collect();
+    let rule: Vectors = (0..engine.body().count()).map(|i| engine.displacement(i)).collect();
     let followed = |(i, &role): (usize, &Role)| role == Role::Follower && truth.truth.knows(i);
     let follows: Vec<bool> = engine.roles().iter().enumerate().map(followed).collect();
     let (elastic, known) = (&truth.elastic, &truth.truth.displacement);
@@ -141,7 +141,7 @@ pub fn compare(
 ///
 /// # Errors
 /// As [`Plan::new`].
-pub fn plan_led_by(scene: &Scene, truth: &Truth) -> Result<Plan, SceneError> {
+pub fn plan_led_by(scene: &Scene, truth: &Reference) -> Result<Plan, SceneError> {
     Plan::with_truth(scene, &|places| match truth.displacements_at(places) {
         Ok(found) => found.iter().collect(),
         Err(_) => vec![[f64::NAN; 2]; places.len()],
@@ -184,9 +184,9 @@ fn without_material(scene: &Scene) -> SceneError {
 }
 
 /// Particles outside the shape cannot be led by a truth that does not know them.
-fn require_known(scene: &Scene, truth: &Truth, changes: &[RoleChange]) -> Result<(), SceneError> {
+fn require_known(scene: &Scene, truth: &Reference, changes: &[RoleChange]) -> Result<(), SceneError> {
     for (k, change) in changes.iter().enumerate() {
-        let is_led = matches!(scene.roles[k].motion, Some(LeaderMotion::Truth { .. }));
+        let is_led = matches!(scene.roles[k].motion, Some(LeaderMotion::Reference { .. }));
         if let Some(i) = change.particles.iter().find(|&&i| is_led && !truth.knows(i)) {
             let message = format!("particle {} is outside the shape: the truth does not know it", i + 1);
             return Err(scene.refuse(&format!("roles[{k}].region"), message, "narrow the region"));
@@ -195,17 +195,17 @@ fn require_known(scene: &Scene, truth: &Truth, changes: &[RoleChange]) -> Result
     Ok(())
 }
 
-pub(super) fn refused(scene: &Scene, error: &TruthError) -> SceneError {
+pub(super) fn refused(scene: &Scene, error: &ReferenceError) -> SceneError {
     let (key, help) = match error {
-        TruthError::Mechanism { .. } => {
+        ReferenceError::Mechanism { .. } => {
             ("roles", "clamp at least two particles of every part, or lead them by a motion of their own")
         }
-        TruthError::Singular { .. } => ("body.shape", "use a larger shape, or hold it in more places"),
-        TruthError::Fem(FemError::Unmeshable { .. } | FemError::InvertedCell { .. }) => {
+        ReferenceError::Singular { .. } => ("body.shape", "use a larger shape, or hold it in more places"),
+        ReferenceError::Fem(FemError::Unmeshable { .. } | FemError::InvertedCell { .. }) => {
             ("body.shape", "keep corners, holes and supports further apart")
         }
-        TruthError::Fem(FemError::EmptySupport { .. }) => ("roles", "move the region onto the body"),
-        TruthError::Fem(FemError::Lost { .. }) => ("loads", "load it less, or lead it there"),
+        ReferenceError::Fem(FemError::EmptySupport { .. }) => ("roles", "move the region onto the body"),
+        ReferenceError::Fem(FemError::Lost { .. }) => ("loads", "load it less, or lead it there"),
         _ => ("material", "use constants, lattice and loads less far apart"),
     };
     scene.refuse(key, error.to_string(), help)

@@ -6,12 +6,12 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::reference::{Reference, Setting};
 use super::run::{SceneTruth, plan_led_by, refused};
 use super::supports::supports;
-use super::truth::{Setting, Truth};
-use crate::continuum::equilibrium::settle;
+use crate::continuum::equilibrium::solve_equilibrium;
 use crate::fem::{Effort, Holding};
-use crate::flock::points::{Points, distance};
+use crate::flock::vectors::{Vectors, distance};
 use crate::geometry::outline::{Outline, Piece};
 use crate::geometry::portion::Portion;
 use crate::material::outline_loads::{Load, OutlineLoad};
@@ -46,13 +46,13 @@ impl ErrorParts {
     pub fn of(
         scene: &Scene,
         truth: &SceneTruth,
-        rule: &Points,
+        rule: &Vectors,
         follows: &[bool],
     ) -> Result<Self, SceneError> {
         let own = equilibrium(scene, &truth.truth);
         let cells = truth_of_cells(scene, truth)?;
         let known = &truth.truth.displacement;
-        let apart = |a: &Points, b: &Points| {
+        let apart = |a: &Vectors, b: &Vectors| {
             let (mut off, mut size) = (0.0, 0.0);
             for i in (0..follows.len()).filter(|&i| follows[i]) {
                 off += distance(a.get(i), b.get(i)).powi(2);
@@ -69,16 +69,16 @@ impl ErrorParts {
 }
 
 /// Where the rule comes to rest, if that can be solved for.
-fn equilibrium(scene: &Scene, truth: &Truth) -> Option<Points> {
+fn equilibrium(scene: &Scene, truth: &Reference) -> Option<Vectors> {
     let request = Request { tolerance: TIGHT, precision: Precision::F64, ..Request::default() };
-    let outcome = settle(scene, &request, plan_led_by(scene, truth).ok()?).ok()?;
+    let outcome = solve_equilibrium(scene, &request, plan_led_by(scene, truth).ok()?).ok()?;
     let is_known = outcome.solved.as_ref().is_some_and(|solved| solved.is_at_rest());
     let engine = &outcome.engine;
     is_known.then(|| (0..engine.body().count()).map(|i| engine.displacement(i)).collect())
 }
 
 /// The truth of the shape that the cells have; the same where that is the shape itself.
-fn truth_of_cells(scene: &Scene, truth: &SceneTruth) -> Result<Option<Points>, SceneError> {
+fn truth_of_cells(scene: &Scene, truth: &SceneTruth) -> Result<Option<Vectors>, SceneError> {
     let layout = &truth.layout;
     let (Some(outline), Some(cells)) = (&layout.outline, &layout.cells) else { return Ok(None) };
     let reference = &layout.body.reference;
@@ -115,7 +115,7 @@ fn truth_of_cells(scene: &Scene, truth: &SceneTruth) -> Result<Option<Points>, S
         Load::Outline(load) => Some((carried(&load.portions, outline, &of_cells), pushed(load, outline))),
         _ => None,
     });
-    match Truth::solve_with(setting, pushed.collect(), &Effort::default()) {
+    match Reference::solve_with(setting, pushed.collect(), &Effort::default()) {
         Ok(found) => Ok(Some(found.displacement)),
         // What keeps the shape of the cells from having a truth says nothing of the shape itself.
         Err(error) => {

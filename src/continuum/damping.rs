@@ -6,7 +6,7 @@
 
 use crate::flock::block::apply;
 use crate::flock::body::Body;
-use crate::flock::interaction::MatrixWeights;
+use crate::flock::law::MatrixWeights;
 use crate::flock::neighbourhood::Neighbours;
 
 /// Rings of neighbours around the particles along the outline that the iteration covers.

@@ -1,7 +1,7 @@
 //! How far a body is from the shape that its scene asks for.
 
 use super::plan::Plan;
-use crate::flock::points::distance;
+use crate::flock::vectors::distance;
 use crate::geometry::outline::Outline;
 use crate::material::cells::Cells;
 use crate::material::stiffness::area;

@@ -14,13 +14,13 @@ use super::plan::Plan;
 use crate::flock::body::Body;
 use crate::flock::fracture::Break;
 use crate::flock::grid::CellGrid;
-use crate::flock::interaction::Interaction;
+use crate::flock::law::Flock;
 use crate::flock::neighbourhood::Neighbours;
-use crate::flock::points::{Points, distance};
 use crate::flock::pseudo_energy::{pe1, pe2};
 use crate::flock::role::Role;
 use crate::flock::rules::Rule;
 use crate::flock::strain::{Strain, strain};
+use crate::flock::vectors::{Vectors, distance};
 use crate::material::cells::Cells;
 use crate::scene::Quantity;
 use crate::sweep::{Activity, Order, Sweep, Update};
@@ -30,7 +30,7 @@ use load::Load;
 #[derive(Clone, Debug)]
 pub struct Engine {
     body: Body,
-    interaction: Interaction,
+    flock: Flock,
     update: Update,
     sweep: Sweep,
     /// Whether the sweep takes several steps of this body, its frame included.
@@ -45,9 +45,9 @@ pub struct Engine {
     led_components: Vec<(Led, usize)>,
     /// Where particles that are led from outside will be after the next step.
     guided: Vec<(usize, [f64; 2])>,
-    present: Points,
+    present: Vectors,
     /// The positions before the last step; the next ones are written over them.
-    previous: Points,
+    previous: Vectors,
     breaks: Vec<Break>,
     present_neighbours: Option<PresentNeighbours>,
     /// Where something moved in the last step.
@@ -58,7 +58,7 @@ pub struct Engine {
     free_edge: Option<Arc<FreeEdge>>,
     load: Load,
     /// Displacements of a body that was put to rest \[length\]; positions have lost their last digits.
-    settled: Option<Points>,
+    settled: Option<Vectors>,
     /// Of a body that is put to rest part by part.
     path: Option<Path>,
 }
@@ -96,7 +96,7 @@ impl Engine {
     pub fn new(plan: Plan) -> Self {
         let Plan {
             body,
-            interaction,
+            flock,
             update,
             present_radius,
             roles,
@@ -114,12 +114,12 @@ impl Engine {
             members: roles.iter().map(|role| role.is_body()).collect(),
         });
         let mut engine = Self {
-            sweep: Sweep::uncompiled(update, &interaction, &roles),
+            sweep: Sweep::uncompiled(update, &flock, &roles),
             takes_several: false,
-            present: Points::clone(&body.reference),
-            previous: Points::clone(&body.reference),
+            present: Vectors::clone(&body.reference),
+            previous: Vectors::clone(&body.reference),
             body,
-            interaction,
+            flock,
             update,
             roles,
             changes,
@@ -160,13 +160,13 @@ impl Engine {
         &self.body
     }
 
-    pub fn interaction(&self) -> &Interaction {
-        &self.interaction
+    pub fn flock(&self) -> &Flock {
+        &self.flock
     }
 
     /// The neighbour lists, unless they are found anew at every step.
     pub fn lasting_neighbours(&self) -> Option<&Neighbours> {
-        self.present_neighbours.is_none().then_some(&self.interaction.neighbours)
+        self.present_neighbours.is_none().then_some(&self.flock.neighbours)
     }
 
     pub fn roles(&self) -> &[Role] {
@@ -192,7 +192,7 @@ impl Engine {
         self.update
     }
 
-    pub fn present(&self) -> &Points {
+    pub fn present(&self) -> &Vectors {
         &self.present
     }
 
@@ -204,12 +204,12 @@ impl Engine {
 
     /// Where everybody is from their places in the reference configuration \[length\], shape \[count\]: to the digits
     /// of the solver in a body that was put to rest and has not moved since.
-    pub fn displacements(&self) -> Points {
+    pub fn displacements(&self) -> Vectors {
         let of = |i| self.displacement(i);
         self.settled.clone().unwrap_or_else(|| (0..self.present.len()).map(of).collect())
     }
 
-    pub fn previous(&self) -> &Points {
+    pub fn previous(&self) -> &Vectors {
         &self.previous
     }
 
@@ -220,7 +220,7 @@ impl Engine {
 
     /// PE1 of one particle \[length^2\]; zero for the frame and for ghosts, which see nobody.
     pub fn pe1(&self, particle: usize) -> f64 {
-        pe1(&self.interaction, particle, &self.present)
+        pe1(&self.flock, particle, &self.present)
     }
 
     /// PE2 of one particle \[length\].
@@ -230,7 +230,7 @@ impl Engine {
 
     /// What became of one particle's surroundings; `None` for those who see too few.
     pub fn strain(&self, particle: usize) -> Option<Strain> {
-        strain(&self.interaction, particle, &self.present)
+        strain(&self.flock, particle, &self.present)
     }
 
     /// Moves the body by one step.
@@ -250,7 +250,7 @@ impl Engine {
         }
         self.move_leaders();
         self.move_components();
-        self.sweep.step(&self.interaction, self.body.frame.as_ref(), &self.present, &mut self.previous);
+        self.sweep.step(&self.flock, self.body.frame.as_ref(), &self.present, &mut self.previous);
         std::mem::swap(&mut self.present, &mut self.previous);
         self.activity.forget();
         self.activity.count_whole(self.sweep.followers());
@@ -277,14 +277,14 @@ impl Engine {
 
     /// Follows by another rule from the next step on.
     pub fn set_rule(&mut self, rule: Rule, damping: f64) {
-        self.interaction.rule = rule;
+        self.flock.rule = rule;
         self.update.damping = damping;
         self.compile_sweep();
     }
 
     /// Puts the body where everybody is displaced by `displacement` \[length\], shape \[count\], as if it had
     /// come to rest there by `step`; frame points copy whom they serve.
-    pub fn settle(&mut self, step: usize, displacement: &Points) {
+    pub fn settle(&mut self, step: usize, displacement: &Vectors) {
         self.step = step;
         let reference = &self.body.reference;
         let place = |(here, by): ([f64; 2], [f64; 2])| [here[0] + by[0], here[1] + by[1]];
@@ -312,7 +312,7 @@ impl Engine {
     }
 
     /// Takes the last step back: positions as before it. Bonds that broke in it stay broken.
-    pub fn take_back(&mut self) {
+    pub fn undo_step(&mut self) {
         self.return_to(self.step - 1, &self.previous.clone(), self.activity.clone());
     }
 
@@ -394,7 +394,7 @@ impl Engine {
 
     /// The rule keeps held components where their rest offsets say.
     fn move_components(&mut self) {
-        let Some(rest) = &mut self.interaction.rest else { return };
+        let Some(rest) = &mut self.flock.rest else { return };
         for (led, axis) in &self.led_components {
             if let Some(place) = led.place(&self.changes, self.step) {
                 let mut offset = rest.get(led.particle);
@@ -422,15 +422,9 @@ impl Engine {
     fn after_role_change(&mut self) {
         // Whoever is not moved any more must stand still in both buffers.
         self.previous.clone_from(&self.present);
-        if let Some(bonds) = &mut self.interaction.bonds {
+        if let Some(bonds) = &mut self.flock.bonds {
             let places = (&*self.body.reference, &self.present);
-            bonds.release_ghosts(
-                self.step,
-                &self.interaction.neighbours,
-                places,
-                &self.roles,
-                &mut self.breaks,
-            );
+            bonds.release_ghosts(self.step, &self.flock.neighbours, places, &self.roles, &mut self.breaks);
         }
         if let Some(present) = &mut self.present_neighbours {
             present.members = self.roles.iter().map(|role| role.is_body()).collect();
@@ -441,29 +435,29 @@ impl Engine {
     fn compile_sweep(&mut self) {
         self.activity.forget();
         self.sweep = if self.present_neighbours.is_some() {
-            Sweep::uncompiled(self.update, &self.interaction, &self.roles)
+            Sweep::uncompiled(self.update, &self.flock, &self.roles)
         } else {
-            Sweep::compile(self.update, &self.interaction, &self.roles)
+            Sweep::compile(self.update, &self.flock, &self.roles)
         };
         self.takes_several = self.sweep.takes_several(self.body.frame.as_ref());
     }
 
     fn break_bonds(&mut self) {
-        let Some(bonds) = &mut self.interaction.bonds else { return };
+        let Some(bonds) = &mut self.flock.bonds else { return };
         let known = self.breaks.len();
         let places = (&*self.body.reference, &self.present);
-        bonds.break_stretched(self.step, &self.interaction.neighbours, places, &self.roles, &mut self.breaks);
+        bonds.break_stretched(self.step, &self.flock.neighbours, places, &self.roles, &mut self.breaks);
         if self.breaks.len() > known {
             tracing::debug!("step {}: {} bonds break", self.step, self.breaks.len() - known);
             self.takes_several = false;
             let torn = self.breaks[known..].iter().flat_map(|b| b.pair).map(|j| j as usize);
-            self.sweep.set_aside(torn, &self.interaction);
+            self.sweep.set_aside(torn, &self.flock);
         }
     }
 
     fn find_present_neighbours(&mut self) {
         let Some(PresentNeighbours { radius, grid, members }) = &mut self.present_neighbours else { return };
-        self.interaction.neighbours.rebuild_within(grid, &self.present, members, *radius);
+        self.flock.neighbours.rebuild_within(grid, &self.present, members, *radius);
     }
 
     fn move_leaders(&mut self) {

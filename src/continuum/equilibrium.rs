@@ -8,8 +8,8 @@ use super::engine::Engine;
 use super::layout::{held, held_components};
 use super::plan::Plan;
 use super::run::{Outcome, StopReason, Watch, run_watched};
-use crate::flock::points::{Points, distance};
 use crate::flock::role::Role;
+use crate::flock::vectors::{Vectors, distance};
 use crate::scene::{LoadSteps, Scene, SceneError};
 use crate::solve::corotated::{self, CorotatedError, Way};
 use crate::solve::equilibrium::{Request, SolveError, Solved, Solver, System, choose, solve};
@@ -19,8 +19,8 @@ use crate::solve::linear::{HeldComponent, NotLinear, system};
 /// a stepped run as [`run`](super::run::run) shows it, and of a solved one the end.
 ///
 /// # Errors
-/// As [`settle`]; a scene that is stepped has none.
-pub fn come_to_rest(
+/// As [`solve_equilibrium`]; a scene that is stepped has none.
+pub fn run_to_equilibrium(
     scene: &Scene,
     plan: Plan,
     see: &mut dyn FnMut(&Engine, f64) -> ControlFlow<()>,
@@ -32,8 +32,12 @@ pub fn come_to_rest(
 /// way, the steps are these.
 ///
 /// # Errors
-/// As [`come_to_rest`].
-pub fn come_to_rest_watched(scene: &Scene, plan: Plan, watch: Watch<'_>) -> Result<Outcome, SceneError> {
+/// As [`run_to_equilibrium`].
+pub fn run_to_equilibrium_watched(
+    scene: &Scene,
+    plan: Plan,
+    watch: Watch<'_>,
+) -> Result<Outcome, SceneError> {
     match (&scene.equilibrium, &scene.load_steps) {
         (Some(asked), Some(LoadSteps::Solved(parts))) => {
             increments::settle_each(scene, &asked.request, plan, parts, watch)
@@ -44,7 +48,7 @@ pub fn come_to_rest_watched(scene: &Scene, plan: Plan, watch: Watch<'_>) -> Resu
 
 fn come_to_whole_load(scene: &Scene, plan: Plan, watch: Watch<'_>) -> Result<Outcome, SceneError> {
     let Some(asked) = &scene.equilibrium else { return Ok(run_watched(plan, watch)) };
-    let outcome = settle(scene, &asked.request, plan)?;
+    let outcome = solve_equilibrium(scene, &asked.request, plan)?;
     // There is nothing left to break off.
     let _ = (watch.see)(&outcome.engine, outcome.residual);
     Ok(outcome)
@@ -54,12 +58,12 @@ fn come_to_whole_load(scene: &Scene, plan: Plan, watch: Watch<'_>) -> Result<Out
 ///
 /// # Errors
 /// Names what in the scene has no equilibrium, or none that the solver asked for can find.
-pub fn settle(scene: &Scene, request: &Request, plan: Plan) -> Result<Outcome, SceneError> {
-    let solved = if corotated::is_corotated(&plan.interaction) {
+pub fn solve_equilibrium(scene: &Scene, request: &Request, plan: Plan) -> Result<Outcome, SceneError> {
+    let solved = if corotated::is_corotated(&plan.flock) {
         let steps = steps_of_the_way(&plan) as f64;
         let held = |part: f64| way_after(&plan, part * steps);
         let axes = held_axes(&plan);
-        corotated::solve(&plan.interaction, &plan.body, follows(&plan), axes, &Way::whole(&held), request)
+        corotated::solve(&plan.flock, &plan.body, follows(&plan), axes, &Way::whole(&held), request)
             .map_err(|error| refuse_corotated(scene, &error))?
     } else {
         let system = of_plan(scene, &plan)?;
@@ -71,9 +75,9 @@ pub fn settle(scene: &Scene, request: &Request, plan: Plan) -> Result<Outcome, S
 /// The solver that would be taken, and why.
 ///
 /// # Errors
-/// As [`settle`], as far as can be told without solving.
-pub fn foresee(scene: &Scene, request: &Request, plan: &Plan) -> Result<(Solver, String), SceneError> {
-    if corotated::is_corotated(&plan.interaction) {
+/// As [`solve_equilibrium`], as far as can be told without solving.
+pub fn select_solver(scene: &Scene, request: &Request, plan: &Plan) -> Result<(Solver, String), SceneError> {
+    if corotated::is_corotated(&plan.flock) {
         let followers = follows(plan).into_iter().filter(|&follows| follows).count();
         return corotated::choose(followers, request).map_err(|error| refuse_corotated(scene, &error));
     }
@@ -92,13 +96,13 @@ fn steps_of_the_way(plan: &Plan) -> usize {
 }
 
 /// Where those who do not follow are after so many steps; zero for the others \[length\], shape \[count\].
-fn held_after(plan: &Plan, steps: f64) -> Points {
+fn held_after(plan: &Plan, steps: f64) -> Vectors {
     let at_rest = |d: Option<[f64; 2]>| d.unwrap_or_default();
     held(&plan.changes, &plan.body, steps).into_iter().map(at_rest).collect()
 }
 
 /// The same with the single components that are held of followers.
-fn way_after(plan: &Plan, steps: f64) -> Points {
+fn way_after(plan: &Plan, steps: f64) -> Vectors {
     let mut held = held_after(plan, steps);
     for HeldComponent { particle, axis, displacement } in held_components(&plan.changes, &plan.body, steps) {
         let mut place = held.get(particle);
@@ -128,7 +132,7 @@ pub fn of_plan(scene: &Scene, plan: &Plan) -> Result<System, SceneError> {
 fn of_plan_after(scene: &Scene, plan: &Plan, steps: f64) -> Result<System, SceneError> {
     let held = held_after(plan, steps);
     let components = held_components(&plan.changes, &plan.body, steps);
-    system(&plan.interaction, &plan.body, follows(plan), held, &components).map_err(|error| {
+    system(&plan.flock, &plan.body, follows(plan), held, &components).map_err(|error| {
         let (key, help) = match error {
             NotLinear::Rule { .. } => {
                 ("rule.mean", "leave [equilibrium] out: sweeps find where such a rule comes to rest")
@@ -173,8 +177,8 @@ fn reason(solved: &Solved) -> StopReason {
 
 /// How far the follower farthest from its target is from it \[length\].
 fn farthest_from_target(engine: &Engine) -> f64 {
-    let present: &Points = engine.present();
+    let present: &Vectors = engine.present();
     let follows = |&i: &usize| engine.roles()[i] == Role::Follower;
-    let apart = |i: usize| distance(engine.interaction().target(i, present), present.get(i));
+    let apart = |i: usize| distance(engine.flock().target(i, present), present.get(i));
     (0..present.len()).filter(follows).map(apart).fold(0.0, f64::max)
 }

@@ -1,6 +1,6 @@
 //! Forces within a body whose rule is a material, and the reactions of what holds it.
 //!
-//! The neighbours of a particle pull it (see [`Interaction::force_under`](crate::flock::interaction::Interaction::force_under)). A follower at rest is in balance: that pull
+//! The neighbours of a particle pull it (see [`Flock::force_under`](crate::flock::law::Flock::force_under)). A follower at rest is in balance: that pull
 //! and the load on it cancel. On a particle that is led or clamped they do not; what is missing is the force of
 //! whatever holds it, its reaction.
 
@@ -9,10 +9,10 @@ use serde::{Deserialize, Serialize};
 
 use super::engine::Engine;
 use super::layout::RoleChange;
-use crate::flock::interaction::Weights;
-use crate::flock::points::Points;
+use crate::flock::law::Weights;
 use crate::flock::role::Role;
 use crate::flock::rules::{Mean, Rotation};
+use crate::flock::vectors::Vectors;
 
 /// What the loads on a body add up to. Moments are positive counter-clockwise; their arms end where the particles were
 /// in the reference configuration under small rotations, and where they are at present if the rule is corotated.
@@ -52,30 +52,30 @@ pub struct Reaction {
 #[derive(Clone, Debug)]
 pub struct Forces {
     /// Of the neighbours on each particle \[force\], shape \[count\].
-    pub internal: Points,
+    pub internal: Vectors,
     /// Of the loads on each particle \[force\], shape \[count\].
-    pub loads: Points,
+    pub loads: Vectors,
     /// \[length\], shape \[count\].
-    pub displacement: Points,
+    pub displacement: Vectors,
     /// Where forces act, for their moments \[length\], shape \[count\].
-    places: Points,
+    places: Vectors,
 }
 
 impl Forces {
     /// `None` where the rule has no stiffness.
     pub fn of(engine: &Engine) -> Option<Self> {
-        let (interaction, present) = (engine.interaction(), engine.present());
+        let (flock, present) = (engine.flock(), engine.present());
         let displacement = engine.displacements();
-        if !matches!(interaction.weights, Weights::Matrix(_)) {
+        if !matches!(flock.weights, Weights::Matrix(_)) {
             return None;
         }
-        let internal = |i| interaction.force_under(i, &displacement);
+        let internal = |i| flock.force_under(i, &displacement);
         let internal: Vec<[f64; 2]> = (0..present.len()).into_par_iter().map(internal).collect();
-        let places = match interaction.rule.mean {
+        let places = match flock.rule.mean {
             Mean::Material { rotation: Rotation::Corotated } => present.clone(),
-            _ => Points::clone(&interaction.reference),
+            _ => Vectors::clone(&flock.reference),
         };
-        let loads = interaction.forces.clone().unwrap_or_else(|| Points::zeros(present.len()));
+        let loads = flock.forces.clone().unwrap_or_else(|| Vectors::zeros(present.len()));
         Some(Self { internal: internal.into_iter().collect(), loads, displacement, places })
     }
 
@@ -97,7 +97,7 @@ impl Forces {
 
     fn reaction_of(&self, engine: &Engine, entry: usize, held: &[Held]) -> Reaction {
         let mean =
-            |points: &Points| held.iter().map(|one| points.get(one.particle)).collect::<Points>().middle();
+            |points: &Vectors| held.iter().map(|one| points.get(one.particle)).collect::<Vectors>().middle();
         let centre = mean(&engine.body().reference);
         let moment = |about: [f64; 2]| {
             let of = |one: &Held| cross(minus(self.places.get(one.particle), about), self.held_by(*one));
@@ -132,7 +132,7 @@ impl Forces {
     }
 
     /// Of the part of a load that is on the body.
-    fn resultant(&self, engine: &Engine, whole: &Points) -> LoadResultant {
+    fn resultant(&self, engine: &Engine, whole: &Vectors) -> LoadResultant {
         let factor = engine.load_factor();
         let [x, y] = whole.iter().fold([0.0; 2], plus);
         let moments = self.places.iter().zip(whole.iter()).map(|(at, force)| cross(at, force));
@@ -154,8 +154,8 @@ impl Forces {
     }
 
     /// The reaction on each particle along what is held of it \[force\], shape \[count\].
-    pub fn supports(&self, engine: &Engine) -> Points {
-        let mut supports = Points::zeros(self.internal.len());
+    pub fn supports(&self, engine: &Engine) -> Vectors {
+        let mut supports = Vectors::zeros(self.internal.len());
         for one in held(engine).into_iter().flatten() {
             supports.set(one.particle, plus(supports.get(one.particle), self.held_by(one)));
         }
@@ -179,7 +179,7 @@ impl Forces {
     }
 }
 
-fn work(forces: &Points, displacement: &Points) -> f64 {
+fn work(forces: &Vectors, displacement: &Vectors) -> f64 {
     forces.iter().zip(displacement.iter()).map(|(force, by)| dot(force, by)).sum()
 }
 

@@ -6,10 +6,10 @@ use crate::flock::body::{Body, BodyError, Cut};
 use crate::flock::lattice::Site;
 use crate::flock::motion::Motion;
 use crate::flock::neighbourhood::{Neighbourhood, Neighbours};
-use crate::flock::points::{Points, distance};
 use crate::flock::region::{Region, Side};
 use crate::flock::role::Role;
 use crate::flock::rules::{Axis, Mean};
+use crate::flock::vectors::{Vectors, distance};
 use crate::geometry::outline::{Outline, OutlineError, Place};
 use crate::geometry::partition::{Partition, PartitionError};
 use crate::geometry::portion::{Portion, Selection};
@@ -21,7 +21,7 @@ use crate::solve::linear::HeldComponent;
 
 /// Where finite elements have points of the body: their displacements \[length\] at these reference
 /// places \[length\], shape \[count\].
-pub type Truth<'a> = &'a dyn Fn(&Points) -> Vec<[f64; 2]>;
+pub type Truth<'a> = &'a dyn Fn(&Vectors) -> Vec<[f64; 2]>;
 
 /// A body laid out, before anybody moves.
 #[derive(Clone, Debug)]
@@ -65,7 +65,7 @@ impl Layout {
                 require_cell_neighbours(scene)?;
                 let neighbours = match &scene.material {
                     Some(elastic) => cells.neighbours(body.count(), elastic),
-                    None => cells.mates(body.count()),
+                    None => cells.cell_neighbours(body.count()),
                 };
                 let outline = Some(partition.outline().clone());
                 let partition = Some(partition).filter(|_| !scene.inclusions.is_empty());
@@ -73,7 +73,7 @@ impl Layout {
             }
             of_lattice => Self::of_whole_cells(scene, of_lattice)?,
         };
-        if !matches!(scene.neighbourhood, Neighbourhood::Present { .. }) {
+        if !matches!(scene.neighbourhood, Neighbourhood::Dynamic { .. }) {
             layout.body.require_connected(&layout.neighbours).map_err(|error| {
                 let help =
                     "close the gap, use a wider neighbourhood, or run the parts as scenes of their own";
@@ -158,14 +158,14 @@ impl Layout {
         &self,
         scene: &Scene,
         loads: &[outline_loads::Load],
-    ) -> Result<Vec<Points>, SceneError> {
+    ) -> Result<Vec<Vectors>, SceneError> {
         let Some(cells) = &self.cells else { return Ok(Vec::new()) };
         if loads.is_empty() {
             return Ok(Vec::new());
         }
         let loader = Loader::new(cells, &self.body, self.outline.as_ref());
         let of_load = |k: usize| {
-            let mut forces = Points::zeros(self.body.count());
+            let mut forces = Vectors::zeros(self.body.count());
             loader.add(&loads[k], &mut forces).map_err(|error| {
                 let help = match error {
                     outline_loads::LoadError::NotFinite => "give finite numbers",
@@ -370,7 +370,7 @@ impl Layout {
                 })?;
                 (displacements, *steps)
             }
-            Some(LeaderMotion::Truth { steps }) => {
+            Some(LeaderMotion::Reference { steps }) => {
                 let Some(truth) = truth else { return Ok(None) };
                 (truth(&particles.iter().map(|&i| reference.get(i)).collect()), *steps)
             }
@@ -461,7 +461,7 @@ fn key_of_spacing(scene: &Scene) -> &'static str {
 /// Refuses a body whose places, or small displacements from them, doubles cannot tell apart.
 fn require_resolved(scene: &Scene, body: &Body) -> Result<(), SceneError> {
     let spacing = body.lattice.spacing();
-    let Points { x, y } = &*body.reference;
+    let Vectors { x, y } = &*body.reference;
     let farthest = x.iter().chain(y).fold(0.0, |most: f64, v| most.max(v.abs()));
     let grain = farthest.next_up() - farthest;
     // Not a number where the body reaches beyond the doubles.

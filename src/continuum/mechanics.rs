@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 use super::engine::Engine;
 use super::forces::{Forces, LoadResultant, Reaction};
 use super::path::Path;
-use crate::flock::points::{Points, distance};
 use crate::flock::rules::{Mean, Rotation};
+use crate::flock::vectors::{Vectors, distance};
 use crate::material::cells::Cells;
 use crate::material::elastic::Elastic;
 use crate::material::recovery::{CellStress, Fields, KnownTraction, REACH, stress_at};
@@ -85,7 +85,7 @@ impl Stresses {
     pub fn of(
         engine: &Engine,
         elastic: &Elastic,
-        displacement: &Points,
+        displacement: &Vectors,
         broken: &[[u32; 2]],
     ) -> Option<Self> {
         let cells = engine.cells()?;
@@ -128,7 +128,7 @@ impl Stresses {
             return Some(Peak { von_mises, cell: None, place, particles: vec![engine.body().id(particle)] });
         }
         let corners = cells.of(cell);
-        let places: Points = corners.iter().map(|&i| engine.body().reference.get(i as usize)).collect();
+        let places: Vectors = corners.iter().map(|&i| engine.body().reference.get(i as usize)).collect();
         let particles = corners.iter().map(|&i| engine.body().id(i as usize)).collect();
         Some(Peak { von_mises, cell: Some(cell + 1), place: places.middle(), particles })
     }
@@ -162,7 +162,7 @@ impl Mechanics {
 
     /// What the user should know of the result.
     pub fn cautions(&self, engine: &Engine) -> Vec<String> {
-        let is_small = matches!(engine.interaction().rule.mean, Mean::Material { rotation: Rotation::Small });
+        let is_small = matches!(engine.flock().rule.mean, Mean::Material { rotation: Rotation::Small });
         let is_beyond = self.largest_strain > SMALL_STRAIN || self.largest_turn > SMALL_TURN;
         if !(is_small && is_beyond) {
             return Vec::new();
@@ -178,7 +178,7 @@ impl Mechanics {
 }
 
 /// By the rule's own forces under small rotations, else from the cells.
-fn strain_energy(engine: &Engine, elastic: &Elastic, forces: Option<&Forces>, u: &Points) -> f64 {
+fn strain_energy(engine: &Engine, elastic: &Elastic, forces: Option<&Forces>, u: &Vectors) -> f64 {
     if let (Some(forces), Rotation::Small) = (forces, rotation(engine)) {
         let work = forces.internal.iter().zip(u.iter()).map(|(f, u)| f[0] * u[0] + f[1] * u[1]);
         // Without the sign of a zero.
@@ -195,7 +195,7 @@ fn recovered(
     engine: &Engine,
     elastic: &Elastic,
     of_cells: &[StressState],
-    displacement: &Points,
+    displacement: &Vectors,
 ) -> Vec<(usize, StressState)> {
     let (Some(edge), Some(cells)) = (engine.free_edge(), engine.cells()) else { return Vec::new() };
     let (body, factor) = (engine.body(), engine.load_factor());
@@ -249,7 +249,7 @@ fn recovered(
 
 /// Which turns of a cell are no strain.
 fn rotation(engine: &Engine) -> Rotation {
-    match engine.interaction().rule.mean {
+    match engine.flock().rule.mean {
         Mean::Material { rotation } => rotation,
         _ => Rotation::Small,
     }

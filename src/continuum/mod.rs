@@ -6,14 +6,14 @@
 //! [`engine::state`] takes an engine out on its way and puts it back, for checkpoints.
 //! [`layout`] is the body before anybody moves; [`equilibrium`] goes straight to rest instead of stepping.
 
+mod active_share;
+pub mod bulk_response;
 mod damping;
 pub mod deviation;
 pub mod engine;
 pub mod equilibrium;
 pub mod forces;
 pub mod free_edge;
-mod front;
-pub mod interior;
 pub mod layout;
 pub mod mechanics;
 pub mod movement;
@@ -23,5 +23,5 @@ pub mod plan;
 pub mod record;
 pub mod report;
 pub mod run;
-pub(crate) mod stored;
+pub(crate) mod serde_impls;
 mod weights;

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::flock::points::{Points, distance};
+use crate::flock::vectors::{Vectors, distance};
 
 /// The largest distances of a step over the lattice's spacing \[1\].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,7 +23,7 @@ const LANES: usize = 8;
 
 impl Movement {
     /// Looks over a step from `previous` to `present`.
-    pub fn of(present: &Points, previous: &Points, reference: &Points, spacing: f64) -> Self {
+    pub fn of(present: &Vectors, previous: &Vectors, reference: &Vectors, spacing: f64) -> Self {
         let pieces = present.len().div_ceil(PIECE);
         let all = [present, previous, reference];
         let one = |piece: usize| Squares::of(all, piece * PIECE, spacing.recip());
@@ -43,8 +43,8 @@ impl Movement {
     }
 
     /// For positions that are lost or so far away that a square overflows.
-    fn exactly([present, previous, reference]: [&Points; 3], spacing: f64) -> Self {
-        let largest = |from: &Points| {
+    fn exactly([present, previous, reference]: [&Vectors; 3], spacing: f64) -> Self {
+        let largest = |from: &Vectors| {
             (0..present.len()).map(|i| distance(present.get(i), from.get(i)) / spacing).fold(0.0, f64::max)
         };
         Self {
@@ -56,12 +56,12 @@ impl Movement {
 }
 
 /// Index of the first particle whose position is not finite.
-pub fn first_lost(present: &Points) -> Option<usize> {
+pub fn first_lost(present: &Vectors) -> Option<usize> {
     present.iter().position(|[x, y]| !(x.is_finite() && y.is_finite()))
 }
 
 /// Index of the particle farthest from its reference place, the first of several.
-pub fn farthest(present: &Points, reference: &Points) -> usize {
+pub fn farthest(present: &Vectors, reference: &Vectors) -> usize {
     let from_reference = |i: usize| distance(present.get(i), reference.get(i));
     let farther = |best: usize, i: usize| if from_reference(i) > from_reference(best) { i } else { best };
     (0..present.len()).fold(0, farther)
@@ -85,7 +85,7 @@ impl Squares {
         }
     }
 
-    fn of([present, previous, reference]: [&Points; 3], begin: usize, scale: f64) -> Self {
+    fn of([present, previous, reference]: [&Vectors; 3], begin: usize, scale: f64) -> Self {
         let piece = begin..(begin + PIECE).min(present.len());
         let [x, y] = [&present.x[piece.clone()], &present.y[piece.clone()]];
         let [px, py] = [&previous.x[piece.clone()], &previous.y[piece.clone()]];
@@ -117,7 +117,7 @@ impl Squares {
 mod tests {
     use super::*;
 
-    fn line(count: usize) -> Points {
+    fn line(count: usize) -> Vectors {
         (0..count).map(|i| [i as f64, 0.0]).collect()
     }
 
@@ -150,7 +150,7 @@ mod tests {
     #[test]
     fn distances_whose_squares_overflow_or_vanish_are_still_told() {
         for scale in [1e200, 1e-200] {
-            let reference: Points = line(9).iter().map(|[x, y]| [x * scale, y]).collect();
+            let reference: Vectors = line(9).iter().map(|[x, y]| [x * scale, y]).collect();
             let mut present = reference.clone();
             present.y[4] = 3.0 * scale;
             let movement = Movement::of(&present, &reference, &reference, scale);

@@ -7,7 +7,7 @@
 use super::engine::Engine;
 use super::forces::Forces;
 use super::mechanics::Work;
-use crate::flock::points::Points;
+use crate::flock::vectors::Vectors;
 
 /// From the unloaded body to the last equilibrium.
 #[derive(Clone, Debug, Default)]
@@ -19,9 +19,9 @@ pub struct Path {
 /// What acts on each particle \[force\], and where it has gone \[length\], shape \[count\].
 #[derive(Clone, Debug)]
 struct Acting {
-    loads: Points,
-    supports: Points,
-    displacement: Points,
+    loads: Vectors,
+    supports: Vectors,
+    displacement: Vectors,
 }
 
 impl Path {
@@ -37,14 +37,14 @@ impl Path {
             loads: forces.loads,
             displacement: forces.displacement,
         };
-        let rest = || Points::zeros(now.displacement.len());
+        let rest = || Vectors::zeros(now.displacement.len());
         let unloaded = || Acting { loads: rest(), supports: rest(), displacement: rest() };
         let last = self.last.take().unwrap_or_else(unloaded);
         let way = |i: usize| {
             let ([x, y], [a, b]) = (now.displacement.get(i), last.displacement.get(i));
             [x - a, y - b]
         };
-        let work = |before: &Points, after: &Points| {
+        let work = |before: &Vectors, after: &Vectors| {
             let of = |(i, (f, g)): (usize, ([f64; 2], [f64; 2]))| {
                 let [x, y] = way(i);
                 0.5 * ((f[0] + g[0]) * x + (f[1] + g[1]) * y)

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::engine::Engine;
 use super::mechanics::Stresses;
-use crate::flock::points::Points;
+use crate::flock::vectors::Vectors;
 use crate::material::cells::Cells;
 use crate::material::place::Around;
 use crate::material::stress::StressState;
@@ -27,7 +27,7 @@ pub struct AtPlace {
 ///
 /// # Errors
 /// Names a place that is not of the body, and a body without cells.
-pub fn around(scene: &Scene, cells: Option<&Cells>, reference: &Points) -> Result<Vec<Around>, SceneError> {
+pub fn around(scene: &Scene, cells: Option<&Cells>, reference: &Vectors) -> Result<Vec<Around>, SceneError> {
     // An outline of chords may be that far from the shape.
     let reach = scene.lattice.spacing();
     let of = |(k, &place): (usize, &[f64; 2])| {

@@ -9,11 +9,11 @@ use super::layout::{Layout, RoleChange, Truth, held_components, no_particle};
 use super::{places, weights};
 use crate::flock::body::Body;
 use crate::flock::fracture::{Bonds, Break, Ghosts};
-use crate::flock::interaction::{Interaction, MatrixWeights, Weights};
+use crate::flock::law::{Flock, MatrixWeights, Weights};
 use crate::flock::neighbourhood::{Neighbourhood, Neighbours};
-use crate::flock::points::{Points, distance};
 use crate::flock::role::Role;
 use crate::flock::rules::{Axis, Mean, Poisson, Rule};
+use crate::flock::vectors::{Vectors, distance};
 use crate::geometry::outline::Outline;
 use crate::material::cells::Cells;
 use crate::material::mechanism::require_held;
@@ -26,7 +26,7 @@ use crate::sweep::{Order, Update};
 #[derive(Clone, Debug)]
 pub struct Plan {
     pub body: Body,
-    pub interaction: Interaction,
+    pub flock: Flock,
     pub update: Update,
     /// Radius within which neighbours are found anew at every step \[length\].
     pub present_radius: Option<f64>,
@@ -43,8 +43,8 @@ pub struct Plan {
     pub probes: Vec<usize>,
     /// Between the particles, where the scene has a material.
     pub cells: Option<Cells>,
-    /// Forces of each load on the particles \[force\], shape \[loads\]\[count\]; their sum is the interaction's.
-    pub loads: Vec<Points>,
+    /// Forces of each load on the particles \[force\], shape \[loads\]\[count\]; their sum is the flock's.
+    pub loads: Vec<Vectors>,
     /// Steps over which the loads grow; they act from the first one on where there is no ramp.
     pub ramp: Option<usize>,
     /// The outline of the body's shape, where it has one.
@@ -95,7 +95,7 @@ impl Plan {
             hold_components(weights, &held_components(&changes, &body, 0.0));
         }
         let update = update(scene, &body, &neighbours, &weights);
-        let interaction = interaction(scene, &body, neighbours, weights, forces);
+        let flock = flock(scene, &body, neighbours, weights, forces);
         let probes = probes(scene, &body)?;
         places::around(scene, cells.as_ref(), &body.reference)?;
         let roles = body.is_frame.iter().map(|&f| if f { Role::Frame } else { Role::Follower }).collect();
@@ -103,7 +103,7 @@ impl Plan {
         let mut plan = Self {
             update,
             present_radius: match scene.neighbourhood {
-                Neighbourhood::Present { radius } => Some(radius),
+                Neighbourhood::Dynamic { radius } => Some(radius),
                 _ => None,
             },
             roles,
@@ -123,22 +123,22 @@ impl Plan {
             free_edge,
             resultants,
             body,
-            interaction,
+            flock,
         };
         plan.make_cuts(scene);
         plan.take_first_roles();
         Ok(plan)
     }
 
-    /// Particles on no lattice, who see each other through `interaction`; those with another role than to follow
+    /// Particles on no lattice, who see each other through `flock`; those with another role than to follow
     /// are led from outside.
-    pub fn of_places(body: Body, interaction: Interaction, roles: Vec<Role>, update: Update) -> Self {
+    pub fn of_places(body: Body, flock: Flock, roles: Vec<Role>, update: Update) -> Self {
         let (low, high) = body.bounds();
         Self {
             present_radius: None,
             changes: Vec::new(),
             cuts: Vec::new(),
-            stop: Stop { steps: usize::MAX, tolerance: None, growth: f64::INFINITY },
+            stop: Stop { steps: usize::MAX, tolerance: None, divergence_ratio: f64::INFINITY },
             diagonal: distance(low, high).max(body.lattice.spacing()),
             probes: Vec::new(),
             cells: None,
@@ -148,7 +148,7 @@ impl Plan {
             free_edge: None,
             resultants: Vec::new(),
             body,
-            interaction,
+            flock,
             update,
             roles,
         }
@@ -159,9 +159,9 @@ impl Plan {
     }
 
     fn make_cuts(&mut self, scene: &Scene) {
-        if let Some(bonds) = &mut self.interaction.bonds {
+        if let Some(bonds) = &mut self.flock.bonds {
             for &ends in &scene.cuts {
-                bonds.cut(ends, &self.interaction.neighbours, &self.body.reference, &mut self.cuts);
+                bonds.cut(ends, &self.flock.neighbours, &self.body.reference, &mut self.cuts);
             }
         }
     }
@@ -217,7 +217,7 @@ fn require_carried(
     scene: &Scene,
     layout: &Layout,
     leads: &[[bool; 2]],
-    forces: Option<&Points>,
+    forces: Option<&Vectors>,
 ) -> Result<(), SceneError> {
     let (Some(cells), Some(forces)) = (&layout.cells, forces) else { return Ok(()) };
     if !matches!(scene.mean, Mean::Material { .. }) {
@@ -268,23 +268,23 @@ fn update(scene: &Scene, body: &Body, neighbours: &Neighbours, weights: &Weights
     }
 }
 
-fn interaction(
+fn flock(
     scene: &Scene,
     body: &Body,
     neighbours: Neighbours,
     weights: Weights,
-    forces: Option<Points>,
-) -> Interaction {
+    forces: Option<Vectors>,
+) -> Flock {
     let (low, high) = body.bounds();
     let poisson = scene.poisson.map(|term| {
-        let across = match term.pull {
+        let across = match term.axis {
             Axis::X => 1,
             Axis::Y => 0,
         };
         let half_width = (high[across] - low[across]) / 2.0;
         Poisson {
             k: term.k,
-            pull: term.pull,
+            axis: term.axis,
             centre: term.centre.unwrap_or((low[across] + high[across]) / 2.0),
             half_width: if half_width > 0.0 { half_width } else { body.lattice.spacing() },
             exponent: term.exponent,
@@ -298,7 +298,7 @@ fn interaction(
             scene.fracture.map_or((None, Ghosts::Lattice), |fracture| (fracture.threshold, fracture.ghosts));
         Bonds::new(threshold, ghosts, &neighbours)
     });
-    let mut interaction = Interaction {
+    let mut flock = Flock {
         rule: Rule { mean: scene.mean, poisson, feedback: scene.feedback },
         reference: body.reference.clone(),
         neighbours,
@@ -308,9 +308,9 @@ fn interaction(
         bonds,
     };
     if scene.keeps_rest {
-        interaction.keep_rest();
+        flock.keep_rest();
     }
-    interaction
+    flock
 }
 
 fn probes(scene: &Scene, body: &Body) -> Result<Vec<usize>, SceneError> {

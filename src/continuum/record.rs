@@ -5,9 +5,9 @@ use serde::{Deserialize, Serialize};
 
 use super::engine::Engine;
 use super::mechanics::Mechanics;
-use super::stored;
-use crate::flock::points::Points;
+use super::serde_impls;
 use crate::flock::role::Role;
+use crate::flock::vectors::Vectors;
 use crate::material::elastic::Elastic;
 
 /// A whole configuration at one step; arrays of shape \[count\].
@@ -15,9 +15,9 @@ use crate::material::elastic::Elastic;
 pub struct Snapshot {
     pub step: usize,
     /// Present positions \[length, world frame\].
-    #[serde(with = "stored::points")]
-    pub positions: Points,
-    #[serde(with = "stored::roles")]
+    #[serde(with = "serde_impls::points")]
+    pub positions: Vectors,
+    #[serde(with = "serde_impls::roles")]
     pub roles: Vec<Role>,
     /// First pseudo-energy \[length^2\].
     pub pe1: Vec<f64>,
@@ -54,8 +54,8 @@ impl Snapshot {
 pub struct ProbeSeries {
     /// Index of the particle.
     pub particle: usize,
-    #[serde(with = "stored::points")]
-    pub positions: Points,
+    #[serde(with = "serde_impls::points")]
+    pub positions: Vectors,
     pub pe1: Vec<f64>,
     pub pe2: Vec<f64>,
 }

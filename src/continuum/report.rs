@@ -2,13 +2,13 @@
 
 use std::fmt;
 
+use super::active_share::active_share;
+use super::bulk_response;
 use super::deviation::{Deviation, pieces};
-use super::equilibrium::foresee;
-use super::front::share_reached;
-use super::interior;
+use super::equilibrium::select_solver;
 use super::plan::Plan;
 use crate::flock::fracture::Threshold;
-use crate::flock::interaction::Weights;
+use crate::flock::law::Weights;
 use crate::flock::role::Role;
 use crate::flock::rules::{FeedbackReference, Mean, Rotation};
 use crate::material::outline_loads::Resultant;
@@ -46,7 +46,7 @@ impl PlanReport {
     }
 
     fn capabilities(&mut self, scene: &Scene, plan: &Plan) {
-        let rule = plan.interaction.rule;
+        let rule = plan.flock.rule;
         let mean = match rule.mean {
             Mean::Barycentre => "barycentre (Eq. 1)".to_owned(),
             Mean::Distance { power } => format!("mean weighted by distance^{power} (Eq. 3)"),
@@ -57,7 +57,7 @@ impl PlanReport {
             Mean::Material { rotation: Rotation::Corotated } => "material (corotated)".to_owned(),
         };
         self.models(mean, "rule.mean");
-        let forces = plan.interaction.forces.as_ref().map(|_| match scene.loads.len() {
+        let forces = plan.flock.forces.as_ref().map(|_| match scene.loads.len() {
             1 => "1 load".to_owned(),
             many => format!("{many} loads"),
         });
@@ -76,10 +76,9 @@ impl PlanReport {
             _ => "edge particles have fewer neighbours",
         };
         self.models_or_not(frame, "frame", free);
-        let rest =
-            plan.interaction.rest.as_ref().map(|_| "rest offsets for unbalanced neighbourhoods".to_owned());
+        let rest = plan.flock.rest.as_ref().map(|_| "rest offsets for unbalanced neighbourhoods".to_owned());
         self.models_or_not(rest, "rule.rest", "every neighbourhood is balanced, or rule.rest is \"literal\"");
-        let weights = match &plan.interaction.weights {
+        let weights = match &plan.flock.weights {
             Weights::Equal => None,
             Weights::Scalar(_) => Some(match scene.weights {
                 Some(SceneWeights::Gradient { length }) => {
@@ -99,14 +98,14 @@ impl PlanReport {
         self.models_or_not(poisson, "rule.poisson", "x and y do not act on each other");
         let feedback = rule.feedback.map(|f| format!("feedback (Eq. 4), fd = {}", f.factor));
         self.models_or_not(feedback, "rule.feedback", "targets are not overshot");
-        let fracture = plan.interaction.bonds.as_ref().map(|bonds| match bonds.threshold {
+        let fracture = plan.flock.bonds.as_ref().map(|bonds| match bonds.threshold {
             Some(Threshold::Distance(df)) => format!("fracture past df = {df} {}", scene.unit()),
             Some(Threshold::Stretch(ratio)) => format!("fracture past {ratio} times a bond's length"),
             None => "broken bonds (no threshold: only cuts and ghosts break them)".to_owned(),
         });
         self.models_or_not(fracture, "fracture", "no bond can break");
         let anew = plan.present_radius.map(|r| format!("neighbours found anew at every step within {r}"));
-        self.models_or_not(anew, "neighbours.kind = \"present\"", "neighbours are those of the reference");
+        self.models_or_not(anew, "neighbours.kind = \"dynamic\"", "neighbours are those of the reference");
         let vtk = (scene.record.vtk_every > 0)
             .then(|| format!("ParaView files every {} steps", scene.record.vtk_every));
         self.models_or_not(vtk, "record.vtk_every", "no ParaView files are written");
@@ -161,14 +160,14 @@ fn facts(
         .filter(|&&role| of(role) > 0)
         .map(|&role| format!("{} {}", of(role), role.name()))
         .collect();
-    let sweep = Sweep::compile(plan.update, &plan.interaction, &plan.roles);
+    let sweep = Sweep::compile(plan.update, &plan.flock, &plan.roles);
     let order = match plan.update.order {
         Order::Synchronous => "synchronous",
         Order::Sequential => "sequential",
     };
     let stop = match (&scene.equilibrium, plan.stop.tolerance) {
         (Some(asked), _) => {
-            let (solver, why) = foresee(scene, &asked.request, plan)?;
+            let (solver, why) = select_solver(scene, &asked.request, plan)?;
             let spacing = match asked.accuracy {
                 Some(part) => {
                     format!("; for an accuracy of {} % the run may halve the spacing", 100.0 * part)
@@ -202,7 +201,7 @@ fn facts(
         ("lattice", lattice),
         ("neighbour entries", format!("{bonds} ({:.2} a particle)", bonds as f64 / plan.count() as f64)),
     ];
-    let moving = share_reached(plan).filter(|_| scene.equilibrium.is_none()).map(|share| {
+    let moving = active_share(plan).filter(|_| scene.equilibrium.is_none()).map(|share| {
         (
             "computed",
             format!("about {:.0} % of the updates: motion spreads by one neighbour a step", 100.0 * share),
@@ -258,7 +257,7 @@ fn cautions(scene: &Scene, plan: &Plan, deviation: Option<&Deviation>) -> Vec<St
             if scene.is_fitted { "a smaller spacing" } else { "body.outline = \"fitted\" or a smaller spacing" }
         ));
     }
-    let rule = plan.interaction.rule;
+    let rule = plan.flock.rule;
     let undamped = plan.update.order == Order::Synchronous && plan.update.damping == 1.0;
     if undamped && matches!(rule.mean, Mean::Distance { power } if power > 0.0) {
         cautions.push(
@@ -276,7 +275,7 @@ fn cautions(scene: &Scene, plan: &Plan, deviation: Option<&Deviation>) -> Vec<St
             "the barycentre of whoever is near keeps no distance: the body contracts; use rule.mean.kind = \"spaced\"".into(),
         );
     }
-    cautions.extend(interior::cautions(scene));
+    cautions.extend(bulk_response::cautions(scene));
     let led = |role: &Role| matches!(role, Role::Leader | Role::Clamped);
     if !plan.roles.iter().any(led) && scene.roles.iter().all(|entry| !led(&entry.role)) {
         cautions.push("nobody leads: the body relaxes by itself".into());
@@ -288,7 +287,7 @@ fn cautions(scene: &Scene, plan: &Plan, deviation: Option<&Deviation>) -> Vec<St
 /// radius holds at the reference density.
 fn neighbour_entries(plan: &Plan) -> usize {
     match plan.present_radius {
-        None => plan.interaction.neighbours.index.len(),
+        None => plan.flock.neighbours.index.len(),
         Some(radius) => {
             let within = std::f64::consts::PI * radius * radius / plan.body.lattice.cell_area();
             (plan.count() as f64 * within.min(plan.count() as f64)) as usize
@@ -303,7 +302,7 @@ fn memory(plan: &Plan) -> usize {
     let present = |is: bool, bytes: usize| if is { bytes } else { 0 };
     count * (3 * 16 + 3 + 8 + 4)
         + bonds * 4
-        + match &plan.interaction.weights {
+        + match &plan.flock.weights {
             Weights::Equal => 0,
             Weights::Scalar(weights) => 8 * weights.len(),
             Weights::Matrix(weights) => {
@@ -311,9 +310,9 @@ fn memory(plan: &Plan) -> usize {
                 4 * count + 32 * weights.blocks.len() + cells
             }
         }
-        + present(plan.interaction.forces.is_some(), 16 * count)
-        + present(plan.interaction.rest.is_some(), 16 * count)
-        + present(plan.interaction.bonds.is_some(), bonds)
+        + present(plan.flock.forces.is_some(), 16 * count)
+        + present(plan.flock.rest.is_some(), 16 * count)
+        + present(plan.flock.bonds.is_some(), bonds)
         + present(plan.present_radius.is_some(), 8 * count)
 }
 

@@ -7,9 +7,9 @@ use super::engine::several::Reach;
 use super::engine::state::{EngineState, WrongState};
 use super::movement::{Movement, farthest, first_lost};
 use super::plan::Plan;
-use crate::flock::interaction::Weights;
-use crate::flock::points::{Points, distance};
+use crate::flock::law::Weights;
 use crate::flock::rules::{FeedbackReference, Mean};
+use crate::flock::vectors::{Vectors, distance};
 use crate::scene::Stop;
 use crate::solve::equilibrium::Solved;
 use crate::sweep::Order;
@@ -97,7 +97,7 @@ pub fn run_watched(plan: Plan, watch: Watch<'_>) -> Outcome {
     let engine = Engine::new(plan);
     let residual = f64::INFINITY;
     let interrupted = (watch.see)(&engine, residual).is_break();
-    go_on(engine, (residual, interrupted), &bounds, watch)
+    run_loop(engine, (residual, interrupted), &bounds, watch)
 }
 
 /// Runs a plan on from where an earlier run of it was, to the same end bit by bit. `residual` is the one that
@@ -112,30 +112,30 @@ pub fn resume(
     watch: Watch<'_>,
 ) -> Result<Outcome, WrongState> {
     let bounds = Bounds::of(&plan);
-    Ok(go_on(state.engine(plan)?, (residual, false), &bounds, watch))
+    Ok(run_loop(state.engine(plan)?, (residual, false), &bounds, watch))
 }
 
 /// What ends a run.
 struct Bounds {
     stop: Stop,
     /// Largest displacement over the spacing, as the movement is.
-    growth: f64,
+    divergence_ratio: f64,
 }
 
 impl Bounds {
     fn of(plan: &Plan) -> Self {
-        let growth = plan.stop.growth * plan.diagonal / plan.body.lattice.spacing();
-        Self { stop: plan.stop, growth }
+        let divergence_ratio = plan.stop.divergence_ratio * plan.diagonal / plan.body.lattice.spacing();
+        Self { stop: plan.stop, divergence_ratio }
     }
 }
 
-fn go_on(
+fn run_loop(
     mut engine: Engine,
     (mut residual, mut interrupted): (f64, bool),
-    Bounds { stop, growth }: &Bounds,
+    Bounds { stop, divergence_ratio }: &Bounds,
     watch: Watch<'_>,
 ) -> Outcome {
-    let mut strides = Strides::new(&engine, stop.tolerance, *growth);
+    let mut batch = StepBatch::new(&engine, stop.tolerance, *divergence_ratio);
     let settled = |residual: f64, engine: &Engine| {
         stop.tolerance.is_some_and(|tolerance| residual <= tolerance) && !engine.is_scheduled()
     };
@@ -151,13 +151,13 @@ fn go_on(
         }
         let look = (watch.next)(engine.step()).clamp(engine.step() + 1, stop.steps);
         let most = look - engine.step();
-        strides.advance(&mut engine, most);
+        batch.advance(&mut engine, most);
         let movement = engine.movement();
-        if let Some(divergence) = divergence(&engine, &movement, *growth) {
-            engine.take_back();
+        if let Some(divergence) = divergence(&engine, &movement, *divergence_ratio) {
+            engine.undo_step();
             break StopReason::Diverged(divergence);
         }
-        strides.displacement = movement.largest_displacement;
+        batch.displacement = movement.largest_displacement;
         residual = movement.largest_move;
         if engine.step() == look || settled(residual, &engine) {
             interrupted = (watch.see)(&engine, residual).is_break();
@@ -167,7 +167,7 @@ fn go_on(
 }
 
 /// Takes as many steps at once as can be known to hold neither the last one nor a divergence.
-struct Strides {
+struct StepBatch {
     tolerance: Option<f64>,
     /// Largest distance from the reference place over the spacing \[1\]: of anybody now, and that no body may pass.
     displacement: f64,
@@ -175,28 +175,29 @@ struct Strides {
     /// How far a step takes particles from the reference, if that is known.
     reach: Option<Reach>,
     /// Where a stride began, if it may have gone too far.
-    start: Points,
+    start: Vectors,
     /// Steps to be taken one at a time.
-    singly: usize,
+    single_steps: usize,
 }
 
-impl Strides {
+impl StepBatch {
     fn new(engine: &Engine, tolerance: Option<f64>, bound: f64) -> Self {
         let reach = if engine.steps_at_once(1) > 0 { engine.reach_of_a_step() } else { None };
-        let start = Points::default();
+        let start = Vectors::default();
         Self {
             tolerance,
             displacement: engine.movement().largest_displacement,
             bound,
             reach,
             start,
-            singly: 0,
+            single_steps: 0,
         }
     }
 
     /// Takes at most `most` steps, and at least one.
     fn advance(&mut self, engine: &mut Engine, most: usize) {
-        let count = if self.singly == 0 { self.reach.map_or(0, |_| engine.steps_at_once(most)) } else { 0 };
+        let count =
+            if self.single_steps == 0 { self.reach.map_or(0, |_| engine.steps_at_once(most)) } else { 0 };
         let spacing = engine.body().lattice.spacing();
         let from = self.displacement * spacing;
         let reach = self.reach.map_or(f64::INFINITY, |reach| {
@@ -204,7 +205,7 @@ impl Strides {
         });
         // That is along each axis; along both at once, within the diagonal.
         if count < 2 || reach * std::f64::consts::SQRT_2 * (1.0 + 1e-9) > self.bound {
-            self.singly = self.singly.saturating_sub(1);
+            self.single_steps = self.single_steps.saturating_sub(1);
             return engine.advance();
         }
         let Some(tolerance) = self.tolerance else {
@@ -217,7 +218,7 @@ impl Strides {
         // The last one is looked at by whoever called.
         if told[..count - 1].contains(&false) {
             engine.return_to(step, &self.start, activity);
-            self.singly = count - 1;
+            self.single_steps = count - 1;
             engine.advance();
         }
     }
@@ -230,7 +231,7 @@ fn divergence(engine: &Engine, movement: &Movement, bound: f64) -> Option<Diverg
     } else if movement.largest_displacement > bound {
         let far = farthest(present, reference);
         let apart = distance(present.get(far), reference.get(far));
-        (far, format!("is {apart:.3e} from its reference place, more than stop.growth allows"))
+        (far, format!("is {apart:.3e} from its reference place, more than stop.divergence_ratio allows"))
     } else {
         return None;
     };
@@ -240,7 +241,7 @@ fn divergence(engine: &Engine, movement: &Movement, bound: f64) -> Option<Diverg
 
 /// The likeliest reason, from what the rule contains.
 fn likely_cause(engine: &Engine) -> String {
-    let rule = engine.interaction().rule;
+    let rule = engine.flock().rule;
     let damping = engine.update().damping;
     let overshoot = rule.feedback.map(|f| (f.factor, f.reference));
     if let Some((factor, FeedbackReference::Initial)) = overshoot {
@@ -265,8 +266,8 @@ fn likely_cause(engine: &Engine) -> String {
     if matches!(rule.mean, Mean::Distance { .. }) && engine.update().order == Order::Synchronous {
         return "weights that grow with distance are marginal in a synchronous update; use update.order = \"sequential\" or update.damping = 0.5".into();
     }
-    if matches!(engine.interaction().weights, Weights::Scalar(_)) {
+    if matches!(engine.flock().weights, Weights::Scalar(_)) {
         return "weights of both signs; give weights that are not negative".into();
     }
-    "a leader leaves the body behind; check the leaders' motions, or raise stop.growth".into()
+    "a leader leaves the body behind; check the leaders' motions, or raise stop.divergence_ratio".into()
 }

@@ -1,12 +1,12 @@
 //! Fixed weights of the neighbours, from what the scene says of them and of its material.
 
-use super::interior::{self, gradient};
+use super::bulk_response::{self, gradient};
 use crate::flock::body::Body;
-use crate::flock::interaction::Weights;
 use crate::flock::lattice::Site;
+use crate::flock::law::Weights;
 use crate::flock::neighbourhood::Neighbours;
-use crate::flock::points::distance;
 use crate::flock::rules::{Mean, Rotation};
+use crate::flock::vectors::distance;
 use crate::material::cells::Cells;
 use crate::material::elastic::Elastic;
 use crate::material::weights::{MaterialWeights, WeightsError};
@@ -40,7 +40,7 @@ pub fn of_body(
         }
         Some(FixedWeights::List(values)) => {
             let offsets = scene.neighbourhood.offsets(&scene.lattice).unwrap_or_default();
-            interior::check_count(scene, values, &offsets)?;
+            bulk_response::check_count(scene, values, &offsets)?;
             Ok(Weights::Scalar(listed_weights(values, &offsets, body, neighbours)))
         }
         Some(FixedWeights::Solved) => {
@@ -52,7 +52,7 @@ pub fn of_body(
         }
         Some(FixedWeights::Gradient { length }) => {
             let gradient = gradient(scene, *length)?;
-            interior::require_damped(scene, &gradient)?;
+            bulk_response::require_damped(scene, &gradient)?;
             let weights = gradient.of_body(body, neighbours);
             require_joined(scene, body, neighbours, &weights)?;
             Ok(Weights::Scalar(weights))

@@ -20,7 +20,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::error::ExportError;
-use super::report::Footage;
+use super::report::AnimationState;
 use crate::continuum::engine::state::EngineState;
 use crate::continuum::record::{LoadStep, ProbeSeries, Snapshot};
 use crate::scene::Scene;
@@ -38,7 +38,7 @@ const PROGRAM_VERSION: &str = env!("CARGO_PKG_VERSION");
 pub struct Checkpoint<'a> {
     /// Version of the program: another one may round otherwise.
     program: Cow<'a, str>,
-    pub asked: Asked,
+    pub asked: RunRequest,
     /// The scene as JSON, overrides and defaults included.
     scene: String,
     /// [`crate::continuum::engine::state::digest`] of the plan.
@@ -50,17 +50,17 @@ pub struct Checkpoint<'a> {
     pub probes: Cow<'a, [ProbeSeries]>,
     pub load_steps: Cow<'a, [LoadStep]>,
     /// Of the report, where there is to be one.
-    pub film: Option<Footage<'a>>,
+    pub animation: Option<AnimationState<'a>>,
     /// Time taken for the steps so far.
     pub stepping: Duration,
 }
 
 /// What a run has kept until now.
-type Recorded<'a> = (&'a [Snapshot], &'a [ProbeSeries], &'a [LoadStep], Option<Footage<'a>>);
+type Recorded<'a> = (&'a [Snapshot], &'a [ProbeSeries], &'a [LoadStep], Option<AnimationState<'a>>);
 
 /// What the program was told, so that it need not be told again.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Asked {
+pub struct RunRequest {
     /// Name of a bundled scene, or the absolute path of a file.
     pub scene: String,
     /// Overrides, as given.
@@ -106,9 +106,9 @@ pub enum CheckpointError {
 impl<'a> Checkpoint<'a> {
     /// Of a run whose plan had this `digest`.
     pub fn new(
-        (asked, scene, digest): (&Asked, &Scene, u64),
+        (asked, scene, digest): (&RunRequest, &Scene, u64),
         (engine, residual): (EngineState, f64),
-        (snapshots, probes, load_steps, film): Recorded<'a>,
+        (snapshots, probes, load_steps, animation): Recorded<'a>,
         stepping: Duration,
     ) -> Self {
         Self {
@@ -121,7 +121,7 @@ impl<'a> Checkpoint<'a> {
             snapshots: Cow::Borrowed(snapshots),
             probes: Cow::Borrowed(probes),
             load_steps: Cow::Borrowed(load_steps),
-            film,
+            animation,
             stepping,
         }
     }
@@ -303,7 +303,7 @@ mod tests {
             engine.advance();
             probe.record(&engine);
         }
-        let asked = Asked { scene: "tension".into(), set: vec!["a.b=1".into()], force: false };
+        let asked = RunRequest { scene: "tension".into(), set: vec!["a.b=1".into()], force: false };
         let state = EngineState::of(&engine);
         let (snapshots, probes) = ([Snapshot::of(&engine)], [probe]);
         let checkpoint = Checkpoint::new(

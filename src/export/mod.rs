@@ -80,8 +80,8 @@ use rayon::prelude::*;
 use crate::continuum::mechanics::Stresses;
 use crate::continuum::record::{LoadStep, ProbeSeries, Snapshot};
 use crate::continuum::run::Outcome;
-use crate::flock::points::Points;
 use crate::flock::strain::Strain;
+use crate::flock::vectors::Vectors;
 use crate::scene::Scene;
 use crate::scene::units::Units;
 pub use error::ExportError;
@@ -194,7 +194,7 @@ fn figures_of<'a>(results: &'a Results<'_>, subject: &'a Subject<'_>, units: &'a
             let draw = move || {
                 let moved = |(now, then): ([f64; 2], [f64; 2])| [now[0] - then[0], now[1] - then[1]];
                 let places = snapshot.positions.iter().zip(subject.body.reference.iter());
-                let displacement: Points = places.map(moved).collect();
+                let displacement: Vectors = places.map(moved).collect();
                 let found = Stresses::of(&outcome.engine, elastic, &displacement, &snapshot.broken);
                 let stresses = found.map_or_else(Vec::new, |found| found.cells);
                 figures::stress(subject, snapshot, cells, &stresses, &units.stress)

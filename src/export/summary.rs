@@ -324,7 +324,7 @@ fn counts(engine: &Engine) -> Counts {
         clamped: of(Role::Clamped),
         ghosts: of(Role::Ghost),
         frame: of(Role::Frame),
-        neighbour_pairs: bonds::pairs(&engine.interaction().neighbours).count(),
+        neighbour_pairs: bonds::pairs(&engine.flock().neighbours).count(),
     }
 }
 

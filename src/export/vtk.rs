@@ -28,10 +28,10 @@ use super::{OutputFolder, bonds};
 use crate::continuum::engine::Engine;
 use crate::continuum::mechanics::Stresses;
 use crate::flock::body::Body;
-use crate::flock::interaction::Weights;
-use crate::flock::points::{Points, distance};
+use crate::flock::law::Weights;
 use crate::flock::role::Role;
 use crate::flock::strain::Strain;
+use crate::flock::vectors::{Vectors, distance};
 use crate::material::cells::Cells;
 use crate::material::elastic::Elastic;
 use crate::material::stress::StressState;
@@ -220,12 +220,12 @@ struct Grid<'a> {
 
 impl<'a> Grid<'a> {
     fn of(engine: &'a Engine) -> Self {
-        let (interaction, polygons) = (engine.interaction(), engine.cells());
+        let (flock, polygons) = (engine.flock(), engine.cells());
         // Those of a material lie over one another, and none breaks.
-        if polygons.is_some() && matches!(interaction.weights, Weights::Matrix(_)) {
+        if polygons.is_some() && matches!(flock.weights, Weights::Matrix(_)) {
             return Self { vertices: 0, bonds: Vec::new(), polygons };
         }
-        let bonds = bonds::listed_once(&interaction.neighbours).collect();
+        let bonds = bonds::listed_once(&flock.neighbours).collect();
         Self { vertices: engine.present().len(), bonds, polygons }
     }
 
@@ -243,9 +243,9 @@ impl<'a> Grid<'a> {
         engine: &Engine,
         stresses: Option<&Stresses>,
     ) -> io::Result<()> {
-        let bonds = engine.interaction().bonds.as_ref();
+        let bonds = engine.flock().bonds.as_ref();
         let is_broken = |&(bond, _): &(usize, _)| bonds.is_some_and(|bonds| bonds.is_broken(bond));
-        let length = |of: &Points, [a, b]: [u32; 2]| distance(of.get(a as usize), of.get(b as usize));
+        let length = |of: &Vectors, [a, b]: [u32; 2]| distance(of.get(a as usize), of.get(b as usize));
         let stretch = |&(_, pair): &(usize, [u32; 2])| {
             length(engine.present(), pair) / length(&engine.body().reference, pair) - 1.0
         };

@@ -6,7 +6,7 @@ use super::frame::{Frame, FrameRule};
 use super::lattice::{Lattice, LatticeKind, Site};
 use super::neighbourhood::{Neighbourhood, NeighbourhoodError, Neighbours};
 use super::numbering::Numbering;
-use super::points::Points;
+use super::vectors::Vectors;
 use super::window::Window;
 use crate::geometry::outline::Place;
 use crate::geometry::shape::Shape;
@@ -49,8 +49,8 @@ pub struct Body {
     pub lattice: Lattice,
     /// Column and row of each particle, shape \[count\].
     pub sites: Vec<Site>,
-    /// Reference positions \[length\], shape \[count\]; shared with the interaction.
-    pub reference: Arc<Points>,
+    /// Reference positions \[length\], shape \[count\]; shared with the flock.
+    pub reference: Arc<Vectors>,
     /// Whether the particle belongs to the frame, shape \[count\].
     pub is_frame: Vec<bool>,
     pub frame: Option<Frame>,
@@ -98,7 +98,7 @@ impl Body {
             map.mark_frame(&lattice, &shell);
         }
         let (sites, is_frame) = map.number();
-        let reference: Arc<Points> = Arc::new(sites.iter().map(|&site| lattice.position(site)).collect());
+        let reference: Arc<Vectors> = Arc::new(sites.iter().map(|&site| lattice.position(site)).collect());
         let map = &map;
         let neighbours = Neighbours::from_lists(sites.iter().zip(&is_frame).map(|(&site, &is_frame)| {
             let offsets: &[Site] = if is_frame { &[] } else { &offsets[lattice.sublattice(site)] };
@@ -110,7 +110,7 @@ impl Body {
 
     /// Particles that lie on no lattice. Of one they keep the `spacing` \[length\]; their sites are a row, in
     /// their order.
-    pub fn of_places(places: Points, spacing: f64) -> Self {
+    pub fn of_places(places: Vectors, spacing: f64) -> Self {
         Self {
             lattice: Lattice::new(LatticeKind::Square { spacing }, [0.0; 2], 0.0),
             sites: (0..places.len() as i32).map(|i| [i, 0]).collect(),
@@ -156,13 +156,13 @@ impl Body {
     }
 
     /// Indices of the particles that are no frame.
-    pub fn matter(&self) -> impl Iterator<Item = usize> + Clone + '_ {
+    pub fn body_particles(&self) -> impl Iterator<Item = usize> + Clone + '_ {
         (0..self.count()).filter(|&i| !self.is_frame[i])
     }
 
     /// Bounds of the body without its frame \[length\].
     pub fn bounds(&self) -> ([f64; 2], [f64; 2]) {
-        self.reference.bounds(self.matter()).unwrap_or(([0.0; 2], [0.0; 2]))
+        self.reference.bounds(self.body_particles()).unwrap_or(([0.0; 2], [0.0; 2]))
     }
 
     /// The measure of how far along the longer side of the body's bounds a place lies, from 0 to 1.
@@ -177,11 +177,11 @@ impl Body {
     /// neighbours.
     pub fn require_connected(&self, neighbours: &Neighbours) -> Result<(), BodyError> {
         let labels = self.components(neighbours);
-        let first = self.matter().next().unwrap_or(0);
-        match self.matter().find(|&i| labels[i] != labels[first]) {
+        let first = self.body_particles().next().unwrap_or(0);
+        match self.body_particles().find(|&i| labels[i] != labels[first]) {
             None => Ok(()),
             Some(second) => {
-                let mut parts: Vec<u32> = self.matter().map(|i| labels[i]).collect();
+                let mut parts: Vec<u32> = self.body_particles().map(|i| labels[i]).collect();
                 parts.sort_unstable();
                 parts.dedup();
                 let [first, second] = [first, second].map(|i| self.id(i));

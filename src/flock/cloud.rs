@@ -6,13 +6,13 @@ use super::body::{Body, BodyError};
 use super::grid::CellGrid;
 use super::neighbourhood::Neighbours;
 use super::numbering::{Numbering, order_in_columns};
-use super::points::{Points, distance};
+use super::vectors::{Vectors, distance};
 
 /// Points in the order in which their user has them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cloud {
     /// Reference positions \[length\], shape \[count\]; finite, and no two the same.
-    pub points: Points,
+    pub points: Vectors,
     /// What the user calls them, shape \[count\]; no two the same.
     pub ids: Vec<u32>,
     /// The median of the distances to the nearest other point \[length\].
@@ -34,7 +34,7 @@ impl Cloud {
     ///
     /// # Errors
     /// A radius that holds too many.
-    pub fn new(points: Points, ids: Vec<u32>, radius: f64) -> Result<Self, BodyError> {
+    pub fn new(points: Vectors, ids: Vec<u32>, radius: f64) -> Result<Self, BodyError> {
         let neighbours = within(&points, radius)?;
         let nearest = |i: usize| {
             let apart = neighbours.of(i).iter().map(|&k| distance(points.get(i), points.get(k as usize)));
@@ -58,7 +58,7 @@ impl Body {
     pub fn of_cloud(cloud: &Cloud, radius: Option<f64>) -> Result<(Self, Neighbours), BodyError> {
         let Cloud { points, ids, spacing } = cloud;
         let order = order_in_columns(points, *spacing);
-        let places: Points = order.iter().map(|&row| points.get(row as usize)).collect();
+        let places: Vectors = order.iter().map(|&row| points.get(row as usize)).collect();
         let neighbours = match radius {
             Some(radius) => within(&places, radius)?,
             None => Neighbours::from_lists(places.iter().map(|_| [])),
@@ -77,7 +77,7 @@ impl Body {
     }
 }
 
-fn within(points: &Points, radius: f64) -> Result<Neighbours, BodyError> {
+fn within(points: &Vectors, radius: f64) -> Result<Neighbours, BodyError> {
     let (reach, all) = (radius * (1.0 + MARGIN), vec![true; points.len()]);
     let mut grid = CellGrid::default();
     grid.fill(points, &all, reach);
@@ -97,7 +97,7 @@ fn within(points: &Points, radius: f64) -> Result<Neighbours, BodyError> {
 mod tests {
     use super::*;
 
-    fn square(side: usize) -> Points {
+    fn square(side: usize) -> Vectors {
         (0..side * side).map(|i| [0.1 * (i / side) as f64, 0.1 * (i % side) as f64]).collect()
     }
 
@@ -121,7 +121,7 @@ mod tests {
     #[test]
     fn a_few_odd_points_do_not_change_the_spacing_and_one_alone_is_refused_as_a_particle() {
         let odd = [[0.05, 0.049], [0.05, 0.05], [9.0, 9.0]];
-        let points: Points = square(5).iter().chain(odd).collect();
+        let points: Vectors = square(5).iter().chain(odd).collect();
         let cloud = Cloud::new(points, (1..=28).collect(), 0.15).expect("a cloud");
         assert!((cloud.spacing - 0.1).abs() < 1e-15);
         let error = Body::of_cloud(&cloud, Some(0.15)).expect_err("alone");

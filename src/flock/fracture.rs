@@ -6,8 +6,8 @@ pub(crate) mod tests;
 mod watch;
 
 use super::neighbourhood::Neighbours;
-use super::points::{Points, distance};
 use super::role::Role;
+use super::vectors::{Vectors, distance};
 use crate::geometry::shape::{Segment, segments_cross};
 use watch::Watch;
 
@@ -123,7 +123,7 @@ impl Bonds {
         &mut self,
         step: usize,
         neighbours: &Neighbours,
-        (reference, present): (&Points, &Points),
+        (reference, present): (&Vectors, &Vectors),
         roles: &[Role],
         breaks: &mut Vec<Break>,
     ) {
@@ -151,7 +151,7 @@ impl Bonds {
         &mut self,
         (from, to): Segment,
         neighbours: &Neighbours,
-        reference: &Points,
+        reference: &Vectors,
         breaks: &mut Vec<Break>,
     ) {
         self.break_where(0, neighbours, (reference, reference), breaks, |j, k| {
@@ -164,7 +164,7 @@ impl Bonds {
         &mut self,
         step: usize,
         neighbours: &Neighbours,
-        (reference, present): (&Points, &Points),
+        (reference, present): (&Vectors, &Vectors),
         roles: &[Role],
         breaks: &mut Vec<Break>,
     ) {
@@ -177,7 +177,7 @@ impl Bonds {
         &mut self,
         step: usize,
         neighbours: &Neighbours,
-        (reference, present): (&Points, &Points),
+        (reference, present): (&Vectors, &Vectors),
         breaks: &mut Vec<Break>,
         breaks_now: impl Fn(usize, usize) -> bool,
     ) {
@@ -190,7 +190,7 @@ impl Bonds {
         particles: impl IntoIterator<Item = usize>,
         step: usize,
         neighbours: &Neighbours,
-        (reference, present): (&Points, &Points),
+        (reference, present): (&Vectors, &Vectors),
         breaks: &mut Vec<Break>,
         breaks_now: impl Fn(usize, usize) -> bool,
     ) {
@@ -231,8 +231,8 @@ impl Bonds {
         j: usize,
         bond: usize,
         neighbours: &Neighbours,
-        reference: &Points,
-        present: &Points,
+        reference: &Vectors,
+        present: &Vectors,
     ) -> Option<[f64; 2]> {
         let here = present.get(j);
         self.stand_in(j, bond, neighbours, reference).map(|stand_in| match stand_in {
@@ -246,7 +246,7 @@ impl Bonds {
         j: usize,
         bond: usize,
         neighbours: &Neighbours,
-        reference: &Points,
+        reference: &Vectors,
     ) -> Option<StandIn> {
         let offset = |k: usize| [reference.x[k] - reference.x[j], reference.y[k] - reference.y[j]];
         let lost = offset(neighbours.index[bond] as usize);

@@ -8,8 +8,8 @@
 //! nearest one, so that the edge sees what an interior particle would.
 
 use super::lattice::{Lattice, Site};
-use super::points::Points;
 use super::real::Real;
+use super::vectors::Vectors;
 
 /// Whom a frame point serves, and when it looks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -94,7 +94,7 @@ impl Frame {
     }
 
     /// Displacement of frame point number `k` when the body stands at `seen` \[length\].
-    pub fn displacement(&self, k: usize, reference: &Points, seen: &Points) -> [f64; 2] {
+    pub fn displacement(&self, k: usize, reference: &Vectors, seen: &Vectors) -> [f64; 2] {
         let along = |seen: &[f64], reference: &[f64]| self.mean_of_served(k, |s| seen[s] - reference[s]);
         [along(&seen.x, &reference.x), along(&seen.y, &reference.y)]
     }
@@ -109,7 +109,7 @@ impl Frame {
 
     /// Moves every frame point of `next` by the displacements seen in `before`, the positions before
     /// the sweep; where the rule does not look there, by those in `next` itself.
-    pub fn follow(&self, reference: &Points, before: &Points, next: &mut Points) {
+    pub fn follow(&self, reference: &Vectors, before: &Vectors, next: &mut Vectors) {
         for (k, &point) in self.points.iter().enumerate() {
             let seen = if self.rule.looks_before_the_sweep() { before } else { &*next };
             let [dx, dy] = self.displacement(k, reference, seen);
@@ -201,7 +201,7 @@ mod tests {
         assert_eq!(both, [[2, 3], [3, 2]]);
         let frame = body.frame.as_ref().expect("framed");
         let k = frame.points.iter().position(|&p| body.sites[p as usize] == [3, 3]).expect("a frame point");
-        let mut seen = Points::clone(&body.reference);
+        let mut seen = Vectors::clone(&body.reference);
         let at = |site: Site| body.sites.iter().position(|&s| s == site).expect("a particle");
         seen.set(at([2, 3]), [2.0 + 0.4, 3.0]);
         seen.set(at([3, 2]), [3.0, 2.0 - 0.2]);
@@ -232,7 +232,7 @@ mod tests {
         {
             let (body, _) = framed(square, shape.clone(), Neighbourhood::First { keep: None }, rule);
             let frame = body.frame.as_ref().expect("framed");
-            let shifted = |by: f64| -> Points { body.reference.iter().map(|[x, y]| [x + by, y]).collect() };
+            let shifted = |by: f64| -> Vectors { body.reference.iter().map(|[x, y]| [x + by, y]).collect() };
             let mut next = shifted(3.0);
             frame.follow(&body.reference, &shifted(1.0), &mut next);
             for &point in &frame.points {

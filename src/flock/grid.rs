@@ -4,7 +4,7 @@ mod candidates;
 
 use std::ops::Range;
 
-use super::points::Points;
+use super::vectors::Vectors;
 use candidates::{Candidates, Slots};
 
 /// Points sorted into square cells by counting; its buffers are kept between fills.
@@ -42,7 +42,7 @@ const NARROWEST: f64 = 1e-300;
 impl CellGrid {
     /// Sorts the points marked in `included` into cells at least `radius` wide \[length\].
     /// Points that are not finite are left out: nobody has them as a neighbour.
-    pub fn fill(&mut self, points: &Points, included: &[bool], radius: f64) {
+    pub fn fill(&mut self, points: &Vectors, included: &[bool], radius: f64) {
         let usable = |i: &usize| included[*i] && points.x[*i].is_finite() && points.y[*i].is_finite();
         let Some((low, high)) = points.bounds((0..points.len()).filter(usable)) else {
             (self.columns, self.rows) = (0, 0);
@@ -61,7 +61,7 @@ impl CellGrid {
         self.sort(points, (0..points.len()).filter(usable));
     }
 
-    fn sort(&mut self, points: &Points, usable: impl Iterator<Item = usize> + Clone) {
+    fn sort(&mut self, points: &Vectors, usable: impl Iterator<Item = usize> + Clone) {
         self.starts.clear();
         self.starts.resize(self.columns * self.rows + 1, 0);
         self.cells.clear();
@@ -89,7 +89,7 @@ impl CellGrid {
 
     /// Appends to `found` every other point within `radius` of `particle`, in order of index. A radius up
     /// to that of the last [`CellGrid::fill`] looks into nine cells, a larger one into more.
-    pub fn within(&self, points: &Points, particle: usize, radius: f64, found: &mut Vec<u32>) {
+    pub fn within(&self, points: &Vectors, particle: usize, radius: f64, found: &mut Vec<u32>) {
         let here = points.get(particle);
         if self.columns == 0 || !(here[0].is_finite() && here[1].is_finite()) {
             return;
@@ -196,7 +196,7 @@ impl CellGrid {
 mod tests {
     use super::*;
 
-    fn scan(points: &Points, i: usize, radius: f64) -> Vec<u32> {
+    fn scan(points: &Vectors, i: usize, radius: f64) -> Vec<u32> {
         (0..points.len())
             .filter(|&k| {
                 let (dx, dy) = (points.x[k] - points.x[i], points.y[k] - points.y[i]);
@@ -206,17 +206,17 @@ mod tests {
             .collect()
     }
 
-    fn scans(points: &Points, radius: f64) -> Vec<Vec<u32>> {
+    fn scans(points: &Vectors, radius: f64) -> Vec<Vec<u32>> {
         (0..points.len()).map(|i| scan(points, i, radius)).collect()
     }
 
-    fn all(grid: &mut CellGrid, points: &Points, radius: f64) -> Vec<Vec<u32>> {
+    fn all(grid: &mut CellGrid, points: &Vectors, radius: f64) -> Vec<Vec<u32>> {
         let (mut starts, mut index) = (vec![3], vec![9; 5]);
         grid.all_within(points.len(), radius, &mut starts, &mut index);
         starts.windows(2).map(|pair| index[pair[0] as usize..pair[1] as usize].to_vec()).collect()
     }
 
-    fn wave() -> Points {
+    fn wave() -> Vectors {
         (0..200)
             .map(|i| {
                 let t = f64::from(i);
@@ -228,7 +228,7 @@ mod tests {
     #[test]
     fn the_grid_finds_what_a_scan_finds() {
         let odd = [[1e9, 0.0], [f64::NAN, 0.0], [-4.0, f64::INFINITY]];
-        let points: Points = wave().iter().chain(odd).collect();
+        let points: Vectors = wave().iter().chain(odd).collect();
         let included = vec![true; points.len()];
         let mut grid = CellGrid::default();
         grid.fill(&points, &included, 0.8);
@@ -244,9 +244,9 @@ mod tests {
 
     #[test]
     fn a_radius_that_is_hit_exactly_and_one_beyond_squares_find_what_a_scan_finds() {
-        let lattice: Points = (0..400).map(|i| [0.1 * f64::from(i % 20), 0.1 * f64::from(i / 20)]).collect();
+        let lattice: Vectors = (0..400).map(|i| [0.1 * f64::from(i % 20), 0.1 * f64::from(i / 20)]).collect();
         for (unit, radius) in [(1.0, 0.1), (1.0, 0.5), (1e150, 1.01e149), (1e-150, 2.0e-151)] {
-            let points: Points = lattice.iter().map(|[x, y]| [unit * x, unit * y]).collect();
+            let points: Vectors = lattice.iter().map(|[x, y]| [unit * x, unit * y]).collect();
             let mut grid = CellGrid::default();
             grid.fill(&points, &[true; 400], radius);
             for i in 0..400 {

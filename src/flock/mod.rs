@@ -1,7 +1,7 @@
 //! The core: particles, lattices, neighbourhoods and the flocking rule.
 //!
 //! Pure computation: no input or output, no clock, no threads of its own, no other room of this
-//! crate. A [`body::Body`] is cut from a lattice or given as points; an [`interaction::Interaction`] says who sees whom
+//! crate. A [`body::Body`] is cut from a lattice or given as points; a [`law::Flock`] says which sees which
 //! through which rule; its `target` is the function that moves particles and robots alike.
 //!
 //! Source: R. dell'Erba, "Flocking rules governing swarm robot as tool to describe continuum
@@ -14,18 +14,18 @@ pub mod cloud;
 pub mod fracture;
 pub mod frame;
 pub mod grid;
-pub mod interaction;
 pub mod lanes;
 pub mod lattice;
+pub mod law;
 pub mod manoeuvre;
 pub mod motion;
 pub mod neighbourhood;
 pub mod numbering;
-pub mod points;
 pub mod pseudo_energy;
 pub mod real;
 pub mod region;
 pub mod role;
 pub mod rules;
 pub mod strain;
+pub mod vectors;
 pub mod window;

@@ -2,7 +2,7 @@
 
 use super::grid::CellGrid;
 use super::lattice::{Lattice, Site, ring};
-use super::points::Points;
+use super::vectors::Vectors;
 
 /// How the neighbours of a particle are chosen.
 #[derive(Clone, Debug, PartialEq)]
@@ -11,17 +11,17 @@ pub enum Neighbourhood {
     /// from the end of the order of [`Lattice::offsets_within`].
     First { keep: Option<usize> },
     /// All sites within `radius` primitive cells each way: 8 for radius 1, 24 for radius 2.
-    Ring { radius: i32 },
+    Chebyshev { radius: i32 },
     /// The first neighbours and theirs (the paper's second gradient).
     Second,
     /// The first neighbours and the sites behind them, twice as far in the same directions.
-    Straight,
+    Collinear,
     /// The sites at these offsets, in columns and rows.
     Offsets(Vec<Site>),
     /// The sites within this distance in the reference configuration \[length\].
     Within { radius: f64 },
     /// Whoever is within this distance now \[length\]: the paper's liquid and gas.
-    Present { radius: f64 },
+    Dynamic { radius: f64 },
 }
 
 /// Why a neighbourhood cannot be laid on a lattice.
@@ -41,7 +41,7 @@ pub enum NeighbourhoodError {
 
 impl Neighbourhood {
     /// Offsets to the neighbours of a site, for each sublattice, in summation order; empty for
-    /// [`Neighbourhood::Present`], whose neighbours are no function of the lattice.
+    /// [`Neighbourhood::Dynamic`], whose neighbours are no function of the lattice.
     pub fn offsets(&self, lattice: &Lattice) -> Result<Vec<Vec<Site>>, NeighbourhoodError> {
         (0..lattice.sublattices()).map(|sublattice| self.offsets_of(lattice, sublattice)).collect()
     }
@@ -62,12 +62,12 @@ impl Neighbourhood {
                 offsets.truncate(*keep);
                 offsets
             }
-            Neighbourhood::Ring { .. } if lattice.sublattices() > 1 => {
+            Neighbourhood::Chebyshev { .. } if lattice.sublattices() > 1 => {
                 return Err(NeighbourhoodError::RingOnHoneycomb);
             }
-            Neighbourhood::Ring { radius } => ring(&lattice.primitive(), *radius),
+            Neighbourhood::Chebyshev { radius } => ring(&lattice.primitive(), *radius),
             Neighbourhood::Second => neighbours_of_neighbours(lattice, sublattice),
-            Neighbourhood::Straight => straight(lattice, sublattice)?,
+            Neighbourhood::Collinear => straight(lattice, sublattice)?,
             Neighbourhood::Offsets(offsets) => {
                 let base = lattice.site_of_sublattice(sublattice);
                 if let Some(&offset) =
@@ -85,7 +85,7 @@ impl Neighbourhood {
                 }
                 offsets
             }
-            Neighbourhood::Present { .. } => Vec::new(),
+            Neighbourhood::Dynamic { .. } => Vec::new(),
         };
         lattice.sort_nearest_first(&mut offsets);
         Ok(offsets)
@@ -150,7 +150,7 @@ impl Neighbours {
 
     /// Rebuilds the lists as whoever of the `members` is within `radius` now, in order of index.
     /// Reuses the buffers: no allocation once they have grown.
-    pub fn rebuild_within(&mut self, grid: &mut CellGrid, present: &Points, members: &[bool], radius: f64) {
+    pub fn rebuild_within(&mut self, grid: &mut CellGrid, present: &Vectors, members: &[bool], radius: f64) {
         grid.fill(present, members, radius);
         grid.all_within(members.len(), radius, &mut self.starts, &mut self.index);
     }
@@ -173,10 +173,10 @@ mod tests {
         let honeycomb = LatticeKind::Honeycomb { spacing: 1.0 };
         assert_eq!(count(square, Neighbourhood::First { keep: None }), [4]);
         assert_eq!(count(square, Neighbourhood::Second), [12]);
-        assert_eq!(count(square, Neighbourhood::Straight), [8]);
-        assert_eq!(count(hexagonal, Neighbourhood::Straight), [12]);
-        assert_eq!(count(square, Neighbourhood::Ring { radius: 1 }), [8]);
-        assert_eq!(count(square, Neighbourhood::Ring { radius: 2 }), [24]);
+        assert_eq!(count(square, Neighbourhood::Collinear), [8]);
+        assert_eq!(count(hexagonal, Neighbourhood::Collinear), [12]);
+        assert_eq!(count(square, Neighbourhood::Chebyshev { radius: 1 }), [8]);
+        assert_eq!(count(square, Neighbourhood::Chebyshev { radius: 2 }), [24]);
         assert_eq!(count(hexagonal, Neighbourhood::Second), [18]);
         assert_eq!(count(hexagonal, Neighbourhood::First { keep: Some(5) }), [5]);
         assert_eq!(count(honeycomb, Neighbourhood::Second), [9, 9]);
@@ -187,8 +187,8 @@ mod tests {
     fn what_does_not_fit_the_lattice_is_refused() {
         let honeycomb = Lattice::new(LatticeKind::Honeycomb { spacing: 1.0 }, [0.0, 0.0], 0.0);
         let refused = |n: Neighbourhood| n.offsets(&honeycomb).expect_err("refused");
-        assert_eq!(refused(Neighbourhood::Ring { radius: 1 }), NeighbourhoodError::RingOnHoneycomb);
-        assert!(matches!(refused(Neighbourhood::Straight), NeighbourhoodError::NothingBehind { .. }));
+        assert_eq!(refused(Neighbourhood::Chebyshev { radius: 1 }), NeighbourhoodError::RingOnHoneycomb);
+        assert!(matches!(refused(Neighbourhood::Collinear), NeighbourhoodError::NothingBehind { .. }));
         assert!(matches!(
             refused(Neighbourhood::First { keep: Some(4) }),
             NeighbourhoodError::TooMany { .. }

@@ -1,6 +1,6 @@
 //! Bodies whose particles are given in any order: in which order they lie in memory, and what their user calls them.
 
-use super::points::Points;
+use super::vectors::Vectors;
 
 /// Width of a column in spacings. Upright columns of a lattice are at least this far apart, so that its particles,
 /// given in any order, get the lattice's own order back.
@@ -16,7 +16,7 @@ const WIDTH: f64 = 0.5;
 /// to 1.7 times as long as in the columns of a hexagonal lattice, and 1.2 to 1.3 times as long as in these columns of a
 /// jumbled cloud. There, columns two spacings wide would be another eighth faster; but they would lose the order of a
 /// lattice, which is swept without lists, four times as fast.
-pub fn order_in_columns(points: &Points, spacing: f64) -> Vec<u32> {
+pub fn order_in_columns(points: &Vectors, spacing: f64) -> Vec<u32> {
     let Some((low, high)) = points.bounds(0..points.len()) else { return Vec::new() };
     let across = usize::from(high[1] - low[1] > high[0] - low[0]);
     let width = WIDTH * spacing;
@@ -76,7 +76,7 @@ mod tests {
     use super::*;
 
     /// Every third point, then the others: 3 must not divide the count.
-    fn mixed(points: &Points) -> Points {
+    fn mixed(points: &Vectors) -> Vectors {
         (0..points.len()).map(|i| points.get(i * 3 % points.len())).collect()
     }
 
@@ -96,7 +96,7 @@ mod tests {
                 body.count()
             );
             let mixed = mixed(&body.reference);
-            let ordered: Points =
+            let ordered: Vectors =
                 order_in_columns(&mixed, spacing).iter().map(|&i| mixed.get(i as usize)).collect();
             assert!(ordered == *body.reference, "{kind:?}");
         }
@@ -105,12 +105,12 @@ mod tests {
     #[test]
     fn columns_run_along_the_shorter_side_and_one_place_or_none_is_no_trouble() {
         // Side by side in one column, whichever comes first.
-        let level: Points = [[0.1, 0.0], [0.0, 0.0], [0.2, 0.0], [9.0, 0.0]].into_iter().collect();
+        let level: Vectors = [[0.1, 0.0], [0.0, 0.0], [0.2, 0.0], [9.0, 0.0]].into_iter().collect();
         assert_eq!(order_in_columns(&level, 1.0), [1, 0, 2, 3]);
-        let tall: Points = [[1.0, 0.0], [0.0, 9.0], [0.0, 0.0], [1.0, 9.0]].into_iter().collect();
+        let tall: Vectors = [[1.0, 0.0], [0.0, 9.0], [0.0, 0.0], [1.0, 9.0]].into_iter().collect();
         assert_eq!(order_in_columns(&tall, 1.0), [2, 0, 1, 3]);
         assert_eq!(order_in_columns(&[[2.0, 3.0]].into_iter().collect(), 1.0), [0]);
-        assert!(order_in_columns(&Points::default(), 1.0).is_empty());
+        assert!(order_in_columns(&Vectors::default(), 1.0).is_empty());
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use super::body::Body;
 use super::neighbourhood::Neighbours;
-use super::points::distance;
+use super::vectors::distance;
 
 /// Which particles; the frame is never picked.
 #[derive(Clone, Debug, PartialEq)]
@@ -41,7 +41,7 @@ impl Region {
     /// Indices of the particles of `body` in the region, ascending.
     pub fn pick(&self, body: &Body, neighbours: &Neighbours) -> Vec<usize> {
         let tolerance = 1e-9 * body.lattice.spacing();
-        let matter = body.matter();
+        let matter = body.body_particles();
         let place = |i: usize| body.reference.get(i);
         match self {
             Region::All => matter.collect(),

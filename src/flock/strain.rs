@@ -5,8 +5,8 @@
 //! amorphous solids*, 1998, Eq. 2.11-2.14). With `F = R U` the rotation is that of `R`, the strain `U - 1`: a
 //! body or a formation turned by any angle is not strained.
 
-use super::interaction::Interaction;
-use super::points::Points;
+use super::law::Flock;
+use super::vectors::Vectors;
 
 /// What became of a particle's surroundings.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,9 +27,9 @@ impl Strain {
 }
 
 /// Of one particle over its live neighbours; `None` where these lie on a line, or are fewer than two.
-pub fn strain(interaction: &Interaction, particle: usize, present: &Points) -> Option<Strain> {
-    let pairs = interaction.live_neighbours(particle).map(|k| (interaction.reference.get(k), present.get(k)));
-    of_pairs((interaction.reference.get(particle), present.get(particle)), pairs)
+pub fn strain(flock: &Flock, particle: usize, present: &Vectors) -> Option<Strain> {
+    let pairs = flock.live_neighbours(particle).map(|k| (flock.reference.get(k), present.get(k)));
+    of_pairs((flock.reference.get(particle), present.get(particle)), pairs)
 }
 
 /// From places in the reference configuration and at present, of the particle and of its neighbours.

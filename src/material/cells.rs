@@ -11,7 +11,7 @@ use nalgebra::DMatrix;
 use crate::flock::body::Body;
 use crate::flock::lattice::{Lattice, LatticeKind, Site, ring};
 use crate::flock::neighbourhood::{Neighbourhood, Neighbours};
-use crate::flock::points::Points;
+use crate::flock::vectors::Vectors;
 
 use super::elastic::Elastic;
 use super::stiffness::{ShapeError, area, centroid, cut_load_shares, element_of, load_shares, mean_strain};
@@ -82,7 +82,7 @@ impl Cells {
     }
 
     /// The same cells with their corners at these points \[length\], each with a shape of its own.
-    pub fn on_points(&self, points: &Points) -> Self {
+    pub fn on_points(&self, points: &Vectors) -> Self {
         let shapes: Vec<Vec<[f64; 2]>> = self
             .iter()
             .map(|cell| {
@@ -160,7 +160,7 @@ impl Cells {
     }
 
     /// Divides whole cells of a lattice into regions, by the middle of each \[length\].
-    pub fn divide(&mut self, reference: &Points, regions: usize, region: impl Fn([f64; 2]) -> usize) {
+    pub fn divide(&mut self, reference: &Vectors, regions: usize, region: impl Fn([f64; 2]) -> usize) {
         let kinds = self.shapes.len();
         let centres = self.centroids(reference);
         for (kind, centre) in self.kind.iter_mut().zip(centres.iter()) {
@@ -228,16 +228,16 @@ impl Cells {
     }
 
     /// For each of `particles` particles those that it feels in this material, in order of index: those it shares a cell
-    /// with, and where dilatations are averaged over cells ([`Elastic::averaged_dilatation`]) their mates as well.
+    /// with, and where dilatations are averaged over cells ([`Elastic::averaged_dilatation`]) their cell_neighbours as well.
     pub fn neighbours(&self, particles: usize, elastic: &Elastic) -> Neighbours {
-        let mates = self.mates(particles);
+        let cell_neighbours = self.cell_neighbours(particles);
         if !self.average_dilatations(elastic) {
-            return mates;
+            return cell_neighbours;
         }
         Neighbours::from_lists((0..particles).map(|i| {
-            let near = mates.of(i);
+            let near = cell_neighbours.of(i);
             let mut all: Vec<u32> =
-                near.iter().flat_map(|&j| mates.of(j as usize)).chain(near).copied().collect();
+                near.iter().flat_map(|&j| cell_neighbours.of(j as usize)).chain(near).copied().collect();
             all.sort_unstable();
             all.dedup();
             all.retain(|&j| j as usize != i);
@@ -247,15 +247,15 @@ impl Cells {
 
     /// For each of `particles` particles those it shares a cell with, in order of index: the fewest
     /// neighbours that carry a material.
-    pub fn mates(&self, particles: usize) -> Neighbours {
+    pub fn cell_neighbours(&self, particles: usize) -> Neighbours {
         let incidence = self.incidence(particles);
         Neighbours::from_lists((0..particles).map(|i| {
             let cells = incidence.of(i).iter();
-            let mut mates: Vec<u32> = cells.flat_map(|&c| self.of(c as usize)).copied().collect();
-            mates.sort_unstable();
-            mates.dedup();
-            mates.retain(|&mate| mate as usize != i);
-            mates
+            let mut cell_neighbours: Vec<u32> = cells.flat_map(|&c| self.of(c as usize)).copied().collect();
+            cell_neighbours.sort_unstable();
+            cell_neighbours.dedup();
+            cell_neighbours.retain(|&mate| mate as usize != i);
+            cell_neighbours
         }))
     }
 
@@ -302,7 +302,7 @@ impl Cells {
     ///
     /// # Errors
     /// Cells that hang together by a corner, or in several parts, have no outline.
-    pub fn outline(&self, reference: &Points) -> Result<Outline, OutlineError> {
+    pub fn outline(&self, reference: &Vectors) -> Result<Outline, OutlineError> {
         let straight = |way: &Vec<u32>| {
             let at = |k: usize| reference.get(way[k % (way.len() - 1)] as usize);
             let turns = |&k: &usize| {
@@ -327,7 +327,7 @@ impl Cells {
 
     /// Mean strain of each cell (xx, yy, engineering xy) \[1\] under these displacements \[length\], shape
     /// \[count, 3\]; on a quadrilateral that is the bilinear strain at the centre.
-    pub fn strains(&self, displacement: &Points) -> Vec<[f64; 3]> {
+    pub fn strains(&self, displacement: &Vectors) -> Vec<[f64; 3]> {
         let strain = |cell: usize| {
             let at_corner = |k: usize| displacement.get(self.of(cell)[k] as usize);
             mean_strain(self.shape(cell), at_corner)
@@ -336,7 +336,7 @@ impl Cells {
     }
 
     /// Centre of gravity of each cell \[length\], shape \[count\].
-    pub fn centroids(&self, reference: &Points) -> Points {
+    pub fn centroids(&self, reference: &Vectors) -> Vectors {
         let of_kind: Vec<[f64; 2]> = self.shapes.iter().map(|shape| centroid(shape)).collect();
         let place = |(cell, &kind): (&[u32], &u32)| {
             let ([x, y], [dx, dy]) = (reference.get(cell[0] as usize), of_kind[kind as usize]);
@@ -346,7 +346,7 @@ impl Cells {
     }
 
     /// Centre of each cell, the mean of its corners \[length\], shape \[count\].
-    pub fn centres(&self, reference: &Points) -> Points {
+    pub fn centres(&self, reference: &Vectors) -> Vectors {
         let centre = |cell: &[u32]| {
             let sum = cell.iter().fold([0.0; 2], |[x, y], &i| {
                 let p = reference.get(i as usize);
@@ -387,7 +387,7 @@ pub fn neighbourhood(lattice: &Lattice) -> Neighbourhood {
     cells_away(lattice, 1)
 }
 
-/// The neighbourhood that this material needs: [`neighbourhood`], and the mates of those as well where dilatations are
+/// The neighbourhood that this material needs: [`neighbourhood`], and the cell_neighbours of those as well where dilatations are
 /// averaged over cells ([`Elastic::averaged_dilatation`]).
 pub fn neighbourhood_of(lattice: &Lattice, elastic: &Elastic) -> Neighbourhood {
     cells_away(lattice, if elastic.averaged_dilatation().is_some() { 2 } else { 1 })
@@ -397,7 +397,7 @@ pub fn neighbourhood_of(lattice: &Lattice, elastic: &Elastic) -> Neighbourhood {
 fn cells_away(lattice: &Lattice, cells: i32) -> Neighbourhood {
     match (lattice.kind(), cells) {
         (LatticeKind::Square { .. } | LatticeKind::Rectangular { .. }, _) => {
-            Neighbourhood::Ring { radius: cells }
+            Neighbourhood::Chebyshev { radius: cells }
         }
         (LatticeKind::Honeycomb { spacing }, 1) => Neighbourhood::Within { radius: 2.0 * spacing },
         // The farthest are sqrt(13) spacings away, those after them 4.

@@ -87,7 +87,7 @@ impl GradientWeights {
         if !fits {
             return Err(GradientError::NotPositive { length });
         }
-        Neighbourhood::Straight.offsets(lattice)?;
+        Neighbourhood::Collinear.offsets(lattice)?;
         // In a unit near the spacing, or the fourth powers of lengths in what follows would vanish or
         // overflow; a power of two, which changes no digit.
         let unit = lattice.spacing().log2().floor().exp2();
@@ -127,9 +127,9 @@ impl GradientWeights {
         Ok(self.crystal(lattice)?.effective()?.gradient.least)
     }
 
-    /// The rule of an interior particle, neighbours in the order of [`Neighbourhood::Straight`].
+    /// The rule of an interior particle, neighbours in the order of [`Neighbourhood::Collinear`].
     pub fn crystal(&self, lattice: &Lattice) -> Result<Crystal, GradientError> {
-        let offsets = Neighbourhood::Straight.offsets(lattice)?;
+        let offsets = Neighbourhood::Collinear.offsets(lattice)?;
         let weights = offsets[0].iter().map(|&offset| self.interior(offset)).collect();
         Ok(Crystal::scalar(lattice, &offsets, Some(&[weights]))?)
     }
@@ -323,7 +323,7 @@ mod tests {
             let disc = |radius: f64, x: f64| Shape::Disc { centre: [x, 0.3], radius };
             let shape = Shape::WithHoles { body: Box::new(disc(6.0, 0.0)), holes: vec![disc(1.5, 2.0)] };
             let (body, neighbours) =
-                Body::build(lattice, &Cut::Shape(shape), &Neighbourhood::Straight, None).expect("builds");
+                Body::build(lattice, &Cut::Shape(shape), &Neighbourhood::Collinear, None).expect("builds");
             let all = weights.of_body(&body, &neighbours);
             for i in 0..body.count() {
                 let total: f64 = neighbours.bonds(i).map(|bond| all[bond]).sum();
@@ -343,7 +343,7 @@ mod tests {
         let lattice = Lattice::new(LatticeKind::Square { spacing: 1.0 }, [0.0; 2], 0.0);
         let weights = GradientWeights::new(&lattice, 2.0).expect("fits");
         let cut = Cut::Count { columns: 3, rows: 1 };
-        let (body, neighbours) = Body::build(lattice, &cut, &Neighbourhood::Straight, None).expect("builds");
+        let (body, neighbours) = Body::build(lattice, &cut, &Neighbourhood::Collinear, None).expect("builds");
         let q = weights.directions[0].1;
         let expected = [1.0 + 2.0 * q, -q, 1.0 + 2.0 * q, 1.0 + 2.0 * q, 1.0 + 2.0 * q, -q];
         assert_eq!(weights.of_body(&body, &neighbours), expected);

@@ -2,7 +2,7 @@
 //! displacement that the cells can have.
 
 use super::cells::Cells;
-use crate::flock::points::Points;
+use crate::flock::vectors::Vectors;
 
 /// A traction on one side of the boundary, linear from end to end.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -46,9 +46,9 @@ impl Traction {
 
 impl Loads {
     /// The force on each particle \[force\], shape \[count\].
-    pub fn on_particles(&self, cells: &Cells, reference: &Points) -> Result<Points, LoadError> {
+    pub fn on_particles(&self, cells: &Cells, reference: &Vectors) -> Result<Vectors, LoadError> {
         let incidence = cells.incidence(reference.len());
-        let mut forces = Points::zeros(reference.len());
+        let mut forces = Vectors::zeros(reference.len());
         let mut add = |particle: u32, force: [f64; 2]| {
             forces.x[particle as usize] += force[0];
             forces.y[particle as usize] += force[1];
@@ -68,7 +68,8 @@ impl Loads {
             if owners != 1 {
                 return Err(LoadError::NotBoundary { ends, inside: owners > 1 });
             }
-            let length = crate::flock::points::distance(reference.get(a as usize), reference.get(b as usize));
+            let length =
+                crate::flock::vectors::distance(reference.get(a as usize), reference.get(b as usize));
             add(a, [0, 1].map(|k| length * (2.0 * at_a[k] + at_b[k]) / 6.0));
             add(b, [0, 1].map(|k| length * (at_a[k] + 2.0 * at_b[k]) / 6.0));
         }
@@ -109,7 +110,7 @@ mod tests {
         (body, cells)
     }
 
-    fn total(forces: &Points) -> [f64; 2] {
+    fn total(forces: &Vectors) -> [f64; 2] {
         [forces.x.iter().sum(), forces.y.iter().sum()]
     }
 

@@ -9,7 +9,7 @@
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
 use super::cells::{Cells, Incidence};
-use crate::flock::points::Points;
+use crate::flock::vectors::Vectors;
 
 /// How a body, or what its leaders hold of it, can move without strain. Particles are named by their
 /// ids, which count from 1.
@@ -54,7 +54,7 @@ struct Linkage {
 pub fn require_rigid(
     cells: &Cells,
     incidence: &Incidence,
-    reference: &Points,
+    reference: &Vectors,
     members: impl Fn(usize) -> bool,
 ) -> Result<(), Mechanism> {
     let orphan = (0..reference.len()).find(|&i| members(i) && incidence.of(i).is_empty());
@@ -74,7 +74,7 @@ pub fn require_rigid(
 pub fn require_held(
     cells: &Cells,
     incidence: &Incidence,
-    reference: &Points,
+    reference: &Vectors,
     held: &[[bool; 2]],
 ) -> Result<(), Mechanism> {
     let linkage = Linkage::of(cells, incidence, reference.len());
@@ -113,7 +113,7 @@ pub fn require_held(
 }
 
 /// Rigid motions (two translations, one turn) that the held components of these particles leave.
-fn free_motions(reference: &Points, held: &[[bool; 2]], members: &[usize]) -> usize {
+fn free_motions(reference: &Vectors, held: &[[bool; 2]], members: &[usize]) -> usize {
     let centre = members.iter().fold([0.0; 2], |[x, y], &i| {
         let p = reference.get(i);
         [x + p[0] / members.len() as f64, y + p[1] / members.len() as f64]
@@ -181,7 +181,7 @@ impl Linkage {
 
     /// Looks for motions of the parts that keep every pin together and every grounded (particle, part)
     /// in place, other than a motion of the whole, and names the pin that turns most.
-    fn require_no_turning(&self, reference: &Points, grounded: &[(usize, usize)]) -> Result<(), Mechanism> {
+    fn require_no_turning(&self, reference: &Vectors, grounded: &[(usize, usize)]) -> Result<(), Mechanism> {
         if self.parts > MOST_PARTS {
             return Err(Mechanism::Hinge { particle: self.hinges[0].0 + 1 });
         }
@@ -277,7 +277,7 @@ mod tests {
     use crate::flock::lattice::{Lattice, LatticeKind, Site};
 
     /// Unit squares with these lower left corners, and the sites of their particles.
-    fn squares(of: &[Site]) -> (Cells, Points, Vec<Site>) {
+    fn squares(of: &[Site]) -> (Cells, Vectors, Vec<Site>) {
         let corners = |&[i, j]: &Site| [[i, j], [i + 1, j], [i + 1, j + 1], [i, j + 1]];
         let mut sites: Vec<Site> = of.iter().flat_map(corners).collect();
         sites.sort_unstable();

@@ -9,7 +9,7 @@ use std::collections::HashMap;
 
 use super::cells::Cells;
 use crate::flock::body::Body;
-use crate::flock::points::Points;
+use crate::flock::vectors::Vectors;
 use crate::geometry::outline::{Outline, Place};
 use crate::geometry::portion::Portion;
 use crate::geometry::shape::segment_distance;
@@ -157,7 +157,7 @@ impl<'a> Loader<'a> {
     ///
     /// # Errors
     /// A load that acts on nothing, or is not finite.
-    pub fn add(&self, load: &Load, forces: &mut Points) -> Result<(), LoadError> {
+    pub fn add(&self, load: &Load, forces: &mut Vectors) -> Result<(), LoadError> {
         match load {
             Load::Outline(load) => self.add_along_outline(load, forces)?,
             Load::Particles { particles, force } => {
@@ -183,7 +183,7 @@ impl<'a> Loader<'a> {
         if is_finite { Ok(()) } else { Err(LoadError::NotFinite) }
     }
 
-    fn add_along_outline(&self, load: &OutlineLoad, forces: &mut Points) -> Result<(), LoadError> {
+    fn add_along_outline(&self, load: &OutlineLoad, forces: &mut Vectors) -> Result<(), LoadError> {
         let Some(outline) = self.outline else { return Err(LoadError::NoBoundary) };
         let spacing = self.body.lattice.spacing();
         let (breaks, grain): (Vec<Place>, f64) = match &self.body.outline {
@@ -199,7 +199,7 @@ impl<'a> Loader<'a> {
 
     /// Replaces a force at a point \[length\] by forces on the ends of a side: shares of it where the point's foot is on
     /// the side, and a couple across the side for what that leaves of the moment.
-    fn attach(&self, point: [f64; 2], force: [f64; 2], [a, b]: [u32; 2], forces: &mut Points) {
+    fn attach(&self, point: [f64; 2], force: [f64; 2], [a, b]: [u32; 2], forces: &mut Vectors) {
         let (from, to) = (self.body.reference.get(a as usize), self.body.reference.get(b as usize));
         let along = [0, 1].map(|k| to[k] - from[k]);
         let square = along[0] * along[0] + along[1] * along[1];
@@ -215,9 +215,9 @@ impl<'a> Loader<'a> {
 }
 
 /// The sum of several loads' forces on the particles; `None` of none.
-pub fn sum(by_load: &[Points]) -> Option<Points> {
+pub fn sum(by_load: &[Vectors]) -> Option<Vectors> {
     let (first, others) = by_load.split_first()?;
-    let add = |mut sum: Points, next: &Points| {
+    let add = |mut sum: Vectors, next: &Vectors| {
         sum.x.iter_mut().zip(&next.x).for_each(|(sum, f)| *sum += f);
         sum.y.iter_mut().zip(&next.y).for_each(|(sum, f)| *sum += f);
         sum
@@ -225,7 +225,7 @@ pub fn sum(by_load: &[Points]) -> Option<Points> {
     Some(others.iter().fold(first.clone(), add))
 }
 
-fn push(forces: &mut Points, particle: u32, [x, y]: [f64; 2]) {
+fn push(forces: &mut Vectors, particle: u32, [x, y]: [f64; 2]) {
     forces.x[particle as usize] += x;
     forces.y[particle as usize] += y;
 }
@@ -240,7 +240,7 @@ struct SideGrid {
 }
 
 impl SideGrid {
-    fn new(cells: &Cells, reference: &Points, bucket: f64) -> Self {
+    fn new(cells: &Cells, reference: &Vectors, bucket: f64) -> Self {
         let sides = cells.boundary_sides(&cells.incidence(reference.len()));
         let mut grid = Self { bucket, sides, buckets: HashMap::new() };
         for (number, side) in grid.sides.iter().enumerate() {
@@ -259,7 +259,7 @@ impl SideGrid {
     }
 
     /// The side nearest to a point \[length\].
-    fn nearest(&self, p: [f64; 2], reference: &Points) -> Option<[u32; 2]> {
+    fn nearest(&self, p: [f64; 2], reference: &Vectors) -> Option<[u32; 2]> {
         let [i, j] = self.key(p);
         let mut best: Option<(f64, u32)> = None;
         // Ring by ring: what is in a farther ring is farther than what a nearer one has.
@@ -319,7 +319,7 @@ mod tests {
         (body, cells, outline)
     }
 
-    fn resultant(forces: &Points, body: &Body) -> Resultant {
+    fn resultant(forces: &Vectors, body: &Body) -> Resultant {
         Resultant::of(body.reference.iter().zip(forces.iter()))
     }
 
@@ -331,7 +331,7 @@ mod tests {
                 let loader = Loader::new(&cells, &body, Some(&outline));
                 let add = |selection: Selection, push: Push, profile: Option<Profile>| {
                     let portions = outline.portions(&selection, 1e-9);
-                    let mut forces = Points::zeros(body.count());
+                    let mut forces = Vectors::zeros(body.count());
                     let load = Load::Outline(OutlineLoad { portions, push, profile });
                     loader.add(&load, &mut forces).expect("fits");
                     resultant(&forces, &body)
@@ -370,7 +370,7 @@ mod tests {
             for fitted in [true, false] {
                 let (body, cells, outline) = body(kind, fitted);
                 let total: f64 = cells.kind.iter().map(|&k| area(&cells.shapes[k as usize])).sum();
-                let mut forces = Points::zeros(body.count());
+                let mut forces = Vectors::zeros(body.count());
                 let loader = Loader::new(&cells, &body, Some(&outline));
                 loader.add(&Load::Body([0.0, -3.0]), &mut forces).expect("fits");
                 let found = resultant(&forces, &body);
@@ -384,7 +384,7 @@ mod tests {
     fn loads_on_what_is_not_there_are_refused() {
         let (body, mut cells, outline) = body(LatticeKind::Square { spacing: 1.0 }, true);
         let add = |cells: &Cells, load: &Load| {
-            Loader::new(cells, &body, Some(&outline)).add(load, &mut Points::zeros(body.count()))
+            Loader::new(cells, &body, Some(&outline)).add(load, &mut Vectors::zeros(body.count()))
         };
         let push = |force: f64| Load::Particles { particles: vec![0], force: [force, 0.0] };
         assert_eq!(add(&cells, &push(f64::NAN)), Err(LoadError::NotFinite));

@@ -1,7 +1,7 @@
 //! What a body has at any place of it, from what its particles have.
 
 use super::cells::Cells;
-use crate::flock::points::{Points, distance};
+use crate::flock::vectors::{Vectors, distance};
 
 type Point = [f64; 2];
 
@@ -16,7 +16,7 @@ pub struct Around {
 impl Around {
     /// Of a place \[length\] in a cell, or no further than `reach` \[length\] outside all of them, where the nearest point
     /// of a cell stands for it.
-    pub fn of(place: Point, cells: &Cells, reference: &Points, reach: f64) -> Option<Self> {
+    pub fn of(place: Point, cells: &Cells, reference: &Vectors, reach: f64) -> Option<Self> {
         let corners = |cell: &[u32]| cell.iter().map(|&i| reference.get(i as usize)).collect::<Vec<Point>>();
         let near = cells.iter().map(|cell| (cell, nearest(&corners(cell), place)));
         let (cell, at) = near

@@ -11,8 +11,8 @@ use super::cells::Cells;
 use super::dilatation;
 use super::elastic::Elastic;
 use super::stiffness::{ShapeError, area, mean_gradients, mean_strain};
-use crate::flock::points::Points;
 use crate::flock::rules::Rotation;
+use crate::flock::vectors::Vectors;
 
 /// The state of a cell, or of the cells around a particle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -46,7 +46,7 @@ impl StressState {
 pub fn of_cells(
     cells: &Cells,
     elastic: &Elastic,
-    displacement: &Points,
+    displacement: &Vectors,
     rotation: Rotation,
 ) -> Vec<StressState> {
     let strains = strains(cells, displacement, rotation);
@@ -55,7 +55,7 @@ pub fn of_cells(
     strains.into_par_iter().enumerate().map(of_cell).collect()
 }
 
-fn strains(cells: &Cells, displacement: &Points, rotation: Rotation) -> Vec<[f64; 3]> {
+fn strains(cells: &Cells, displacement: &Vectors, rotation: Rotation) -> Vec<[f64; 3]> {
     let of_cell = |cell: usize| {
         let local = local(cells, cell, displacement, rotation);
         mean_strain(cells.shape(cell), |k| local[k])
@@ -120,10 +120,10 @@ fn region_means(
 pub fn strain_energy(
     cells: &Cells,
     elastic: &Elastic,
-    displacement: &Points,
+    displacement: &Vectors,
     rotation: Rotation,
 ) -> Result<f64, ShapeError> {
-    let rest = Points::zeros(displacement.len());
+    let rest = Vectors::zeros(displacement.len());
     energy_between(cells, elastic, [displacement, &rest], rotation)
 }
 
@@ -135,7 +135,7 @@ pub fn strain_energy(
 pub fn energy_between(
     cells: &Cells,
     elastic: &Elastic,
-    displacements: [&Points; 2],
+    displacements: [&Vectors; 2],
     rotation: Rotation,
 ) -> Result<f64, ShapeError> {
     let kinds = 0..cells.shapes.len();
@@ -156,12 +156,12 @@ pub fn energy_between(
 }
 
 /// How far each cell is turned \[rad\], shape \[cells\].
-pub fn turns<'a>(cells: &'a Cells, displacement: &'a Points) -> impl Iterator<Item = f64> + 'a {
+pub fn turns<'a>(cells: &'a Cells, displacement: &'a Vectors) -> impl Iterator<Item = f64> + 'a {
     (0..cells.count()).map(move |cell| turn(cells.shape(cell), &relative(cells, cell, displacement)))
 }
 
 /// Displacement of a cell's corners in the axes that turn with the cell, less that of the first \[length\].
-fn local(cells: &Cells, cell: usize, displacement: &Points, rotation: Rotation) -> Vec<[f64; 2]> {
+fn local(cells: &Cells, cell: usize, displacement: &Vectors, rotation: Rotation) -> Vec<[f64; 2]> {
     let shape = cells.shape(cell);
     let mut local = relative(cells, cell, displacement);
     if rotation == Rotation::Corotated {
@@ -175,7 +175,7 @@ fn local(cells: &Cells, cell: usize, displacement: &Points, rotation: Rotation) 
 }
 
 /// Displacement of a cell's corners less that of the first \[length\]: a translation must not cost digits.
-fn relative(cells: &Cells, cell: usize, displacement: &Points) -> Vec<[f64; 2]> {
+fn relative(cells: &Cells, cell: usize, displacement: &Vectors) -> Vec<[f64; 2]> {
     let corners = cells.of(cell);
     let first = displacement.get(corners[0] as usize);
     let relative = |&i: &u32| {
@@ -214,7 +214,7 @@ mod tests {
     }
 
     /// Uniaxial tension of 2 along x, then a turn by `angle`.
-    fn pulled(body: &Body, angle: f64) -> Points {
+    fn pulled(body: &Body, angle: f64) -> Vectors {
         let (sin, cos) = angle.sin_cos();
         let place = |[x, y]: [f64; 2]| {
             let [a, b] = [x * (1.0 + 2e-3), y * (1.0 - 0.6e-3)];
@@ -257,7 +257,7 @@ mod tests {
         cells.push(&[0, 1, 4, 3], 0);
         cells.push(&[1, 2, 5, 4], 1);
         let (_, _, elastic) = sheet(LatticeKind::SAMPLES[0]);
-        let stretched: Points = [0.0, 1e-3, 1e-3, 0.0, 1e-3, 1e-3].into_iter().map(|u| [u, 0.0]).collect();
+        let stretched: Vectors = [0.0, 1e-3, 1e-3, 0.0, 1e-3, 1e-3].into_iter().map(|u| [u, 0.0]).collect();
         let found = of_cells(&cells, &elastic, &stretched, Rotation::Small);
         let around = at_particles(&cells, &elastic, &found, 7, |_| true);
         let xx = |i: usize| around[i].expect("in a cell").strain[0];

@@ -15,9 +15,9 @@ use super::stiffness::{ShapeError, mean_gradients};
 use crate::flock::block::{Block, apply, product};
 use crate::flock::body::Body;
 use crate::flock::cells_around::CellsAround;
-use crate::flock::interaction::MatrixWeights;
+use crate::flock::law::MatrixWeights;
 use crate::flock::neighbourhood::Neighbours;
-use crate::flock::points::Points;
+use crate::flock::vectors::Vectors;
 
 /// The material as seen by each particle. A row depends only on the cells around its particle, so
 /// particles fall into a few classes that share one; particles of a frame have neither cells nor
@@ -95,7 +95,7 @@ impl MaterialWeights {
     /// \[cells\] (a contrast of materials, damage). Neighbours are [`Cells::neighbours`].
     pub fn on_points(
         cells: &Cells,
-        reference: &Points,
+        reference: &Vectors,
         elastic: &Elastic,
         factor: Option<&[f64]>,
     ) -> Result<Self, WeightsError> {
@@ -169,7 +169,7 @@ impl MaterialWeights {
 
     /// Force of the neighbours on a particle, `sum_j K_ij (u_j - u_i)` \[force\], under displacements
     /// \[length\]: zero to the last bit if all move alike.
-    pub fn force(&self, particle: usize, displacement: &Points) -> [f64; 2] {
+    pub fn force(&self, particle: usize, displacement: &Vectors) -> [f64; 2] {
         let here = displacement.get(particle);
         self.bonds(particle).fold([0.0; 2], |sum, (j, block)| {
             let there = displacement.get(j);
@@ -179,7 +179,7 @@ impl MaterialWeights {
     }
 
     /// Strain energy \[force length\] under displacements \[length\].
-    pub fn energy(&self, displacement: &Points) -> f64 {
+    pub fn energy(&self, displacement: &Vectors) -> f64 {
         let work = |i: usize| {
             let ([fx, fy], [x, y]) = (self.force(i, displacement), displacement.get(i));
             fx * x + fy * y

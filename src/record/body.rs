@@ -4,9 +4,9 @@
 
 use super::RecordError;
 use crate::continuum::engine::Engine;
-use crate::flock::points::distance;
 use crate::flock::role::Role;
 use crate::flock::strain::Strain;
+use crate::flock::vectors::distance;
 use crate::ros::arguments::Names;
 use crate::ros::messages::builtin_interfaces::Time;
 use crate::ros::messages::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus, KeyValue};
@@ -15,7 +15,7 @@ use crate::ros::messages::geometry_msgs::{Point, Pose, PoseArray, Vector3};
 use crate::ros::messages::std_msgs::{ColorRGBA, Header};
 use crate::ros::messages::visualization_msgs::{Marker, MarkerArray};
 use crate::ros::node::NAME;
-use crate::ros::node::tape::{Sink, Tape};
+use crate::ros::node::recorder::{MessageRecorder, RecordSink};
 use crate::scene::Scene;
 
 /// \[s\]
@@ -29,8 +29,8 @@ const MOST_BONDS: usize = 200_000;
 const FULL_STRAIN: f64 = 0.3;
 
 /// Writes down a run, step by step.
-pub struct BodyTape {
-    tape: Tape,
+pub struct BodyMessages {
+    recorder: MessageRecorder,
     name: String,
     every: usize,
     solved: bool,
@@ -41,19 +41,19 @@ pub struct BodyTape {
     diagnostics: String,
 }
 
-impl BodyTape {
+impl BodyMessages {
     /// Every `record.vtk_every` steps, or about 500 of them all.
     ///
     /// # Errors
     /// None for the names of this program.
-    pub fn new(scene: &Scene, sink: Sink) -> Result<Self, RecordError> {
+    pub fn new(scene: &Scene, sink: RecordSink) -> Result<Self, RecordError> {
         let names = Names::new(NAME, "/", &[])?;
         let every = match scene.record.vtk_every {
             0 => scene.stop.steps.div_ceil(FRAMES).max(1),
             every => every,
         };
         Ok(Self {
-            tape: Tape::new(&names, "world", sink)?,
+            recorder: MessageRecorder::new(&names, "world", sink)?,
             name: scene.name.clone(),
             solved: scene.equilibrium.is_some(),
             every,
@@ -86,10 +86,10 @@ impl BodyTape {
         let times = [time; 2];
         let present = engine.present();
         let poses = engine.body().rows().map(|i| Pose::planar(present.get(i), 0.0)).collect();
-        self.tape.take(&self.poses, &PoseArray { header: header.clone(), poses }, times);
-        self.tape.take(&self.markers, &markers(engine, &header), times);
-        self.tape.take(&self.state, &state(engine, &self.name, header.clone()), times);
-        self.tape.take(&self.diagnostics, &diagnostics(engine, &self.name, header, residual), times);
+        self.recorder.take(&self.poses, &PoseArray { header: header.clone(), poses }, times);
+        self.recorder.take(&self.markers, &markers(engine, &header), times);
+        self.recorder.take(&self.state, &state(engine, &self.name, header.clone()), times);
+        self.recorder.take(&self.diagnostics, &diagnostics(engine, &self.name, header, residual), times);
     }
 }
 
@@ -120,7 +120,7 @@ fn markers(engine: &Engine, header: &Header) -> MarkerArray {
         ..Marker::default()
     };
     let mut all = vec![particles];
-    if engine.interaction().neighbours.index.len() <= MOST_BONDS {
+    if engine.flock().neighbours.index.len() <= MOST_BONDS {
         all.push(bonds(engine, header, 0.08 * spacing));
     }
     MarkerArray { markers: all }
@@ -136,10 +136,10 @@ fn bonds(engine: &Engine, header: &Header, width: f64) -> Marker {
         scale: Vector3 { x: width, y: 0.0, z: 0.0 },
         ..Marker::default()
     };
-    let interaction = engine.interaction();
+    let flock = engine.flock();
     for j in 0..present.len() {
-        let once = |&k: &usize| k > j || !interaction.neighbours.of(k).contains(&(j as u32));
-        for k in interaction.live_neighbours(j).filter(once) {
+        let once = |&k: &usize| k > j || !flock.neighbours.of(k).contains(&(j as u32));
+        for k in flock.live_neighbours(j).filter(once) {
             let rest = distance(reference.get(j), reference.get(k));
             let length = distance(present.get(j), present.get(k));
             let part = ((length / rest - 1.0) / FULL_STRAIN).clamp(-1.0, 1.0) as f32;

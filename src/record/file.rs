@@ -11,7 +11,7 @@ use mcap::{Attachment, WriteOptions, Writer};
 use super::RecordError;
 use crate::ros::messages::builtin_interfaces::Time;
 use crate::ros::messages::definitions;
-use crate::ros::node::tape::Taped;
+use crate::ros::node::recorder::RecordedMessage;
 
 /// Name of the metadata record that says what was recorded.
 pub const METADATA: &str = "flockform";
@@ -79,7 +79,7 @@ impl Recording {
     }
 
     /// Adds a message. After one that cannot be written no other is tried: [`Recording::finish`] says why.
-    pub fn write(&mut self, taped: &Taped<'_>) {
+    pub fn write(&mut self, taped: &RecordedMessage<'_>) {
         if self.failure.is_some() {
             return;
         }
@@ -89,7 +89,7 @@ impl Recording {
         }
     }
 
-    fn try_to_write(&mut self, taped: &Taped<'_>) -> Result<(), mcap::McapError> {
+    fn try_to_write(&mut self, taped: &RecordedMessage<'_>) -> Result<(), mcap::McapError> {
         if !self.channels.contains_key(taped.topic) {
             let channel = add_channel(&mut self.writer, taped)?;
             self.channels.insert(taped.topic.to_owned(), (channel, 0));
@@ -137,8 +137,11 @@ fn nanoseconds(seconds: f64) -> u64 {
     u64::try_from(sec).unwrap_or(0) * 1_000_000_000 + u64::from(nanosec)
 }
 
-fn add_channel(writer: &mut Writer<BufWriter<File>>, taped: &Taped<'_>) -> Result<u16, mcap::McapError> {
-    let Taped { package, name, topic, .. } = taped;
+fn add_channel(
+    writer: &mut Writer<BufWriter<File>>,
+    taped: &RecordedMessage<'_>,
+) -> Result<u16, mcap::McapError> {
+    let RecordedMessage { package, name, topic, .. } = taped;
     let definition = definitions::concatenated(&format!("{package}/{name}")).unwrap_or_default();
     let schema = writer.add_schema(&format!("{package}/msg/{name}"), "ros2msg", definition.as_bytes())?;
     writer.add_channel(schema, topic, "cdr", &BTreeMap::new())

@@ -8,7 +8,7 @@ use crate::ros::messages::geometry_msgs::{self, PoseStamped, PoseWithCovariance,
 use crate::ros::messages::nav_msgs::Odometry;
 use crate::ros::messages::std_msgs::Header;
 use crate::ros::node::diagnostics::{self, Statistics};
-use crate::ros::node::tape::{Sink, Tape};
+use crate::ros::node::recorder::{MessageRecorder, RecordSink};
 use crate::ros::node::{NAME, markers, state, target};
 use crate::scene::swarm::Swarm;
 use crate::scene::swarm::raw::{RawNode, RawPoseType};
@@ -20,8 +20,8 @@ const STATES: f64 = 10.0;
 const DIAGNOSTICS: f64 = 1.0;
 
 /// Writes down a flight, period by period.
-pub struct FlightTape {
-    tape: Tape,
+pub struct FlightMessages {
+    recorder: MessageRecorder,
     swarm: Swarm,
     topics: Topics,
     heard: Vec<(usize, Pose)>,
@@ -38,10 +38,10 @@ struct Topics {
     diagnostics: String,
 }
 
-impl FlightTape {
+impl FlightMessages {
     /// # Errors
     /// A robot whose name no topic can have.
-    pub fn new(swarm: &Swarm, control: &Control, sink: Sink) -> Result<Self, RecordError> {
+    pub fn new(swarm: &Swarm, control: &Control, sink: RecordSink) -> Result<Self, RecordError> {
         let names = Names::new(NAME, "/", &[])?;
         let raw = &swarm.raw.node;
         let pattern = match raw.pose_type {
@@ -54,7 +54,7 @@ impl FlightTape {
             all.map(|name| names.topic(&pattern.replace("{name}", name))).collect()
         };
         Ok(Self {
-            tape: Tape::new(&names, &raw.frame_id, sink)?,
+            recorder: MessageRecorder::new(&names, &raw.frame_id, sink)?,
             topics: Topics {
                 poses: of_robots(&pattern)?,
                 targets: of_robots(&raw.target_topic)?,
@@ -77,33 +77,33 @@ impl FlightTape {
     /// A period that was computed at `now` \[s\].
     pub fn tick(&mut self, control: &Control, now: f64) {
         if !std::mem::replace(&mut self.begun, true) {
-            self.tape.parameters(now, control);
-            self.tape.event(now, LoopEvent::ACTIVE, "", &[]);
+            self.recorder.parameters(now, control);
+            self.recorder.event(now, LoopEvent::ACTIVE, "", &[]);
         }
         for (member, pose) in std::mem::take(&mut self.heard) {
             self.pose(member, &pose, now);
         }
-        self.tape.event(now, LoopEvent::TICK, "", &[now]);
+        self.recorder.event(now, LoopEvent::TICK, "", &[now]);
         let header =
             || Header { stamp: Time::from_seconds(now), frame_id: self.swarm.raw.node.frame_id.clone() };
         for (member, topic) in self.topics.targets.iter().enumerate() {
             if let Some(message) = target(control, member, header()) {
-                self.tape.take(topic, &message, [now; 2]);
+                self.recorder.take(topic, &message, [now; 2]);
             }
         }
         // A simulated tick takes no time of the flight, and what it takes of ours is another every time.
         self.statistics.tick(0.0);
         if self.statistics.is_due(diagnostics::STATE, now, STATES) {
             let message = state::message(control, &self.swarm.name, header(), 0.0);
-            self.tape.take(&self.topics.state, &message, [now; 2]);
+            self.recorder.take(&self.topics.state, &message, [now; 2]);
             if self.swarm.raw.node.markers {
                 let message = markers::message(control, &self.swarm.raw, &header());
-                self.tape.take(&self.topics.markers, &message, [now; 2]);
+                self.recorder.take(&self.topics.markers, &message, [now; 2]);
             }
         }
         if self.statistics.is_due(diagnostics::DIAGNOSTICS, now, DIAGNOSTICS) {
             let message = self.statistics.message(control, &self.swarm.name, header(), 0, &[]);
-            self.tape.take(&self.topics.diagnostics, &message, [now; 2]);
+            self.recorder.take(&self.topics.diagnostics, &message, [now; 2]);
         }
     }
 
@@ -113,17 +113,17 @@ impl FlightTape {
         let header = Header { stamp: Time::from_seconds(pose.stamp), frame_id };
         let planar = geometry_msgs::Pose::planar(pose.position, pose.yaw);
         let uncertain = || PoseWithCovariance { pose: planar, ..PoseWithCovariance::default() };
-        let (tape, topic, times) = (&mut self.tape, &self.topics.poses[member], [now; 2]);
+        let (recorder, topic, times) = (&mut self.recorder, &self.topics.poses[member], [now; 2]);
         match raw.pose_type {
             RawPoseType::PoseStamped | RawPoseType::PoseArray => {
-                tape.take(topic, &PoseStamped { header, pose: planar }, times);
+                recorder.take(topic, &PoseStamped { header, pose: planar }, times);
             }
             RawPoseType::PoseWithCovarianceStamped => {
-                tape.take(topic, &PoseWithCovarianceStamped { header, pose: uncertain() }, times);
+                recorder.take(topic, &PoseWithCovarianceStamped { header, pose: uncertain() }, times);
             }
             RawPoseType::Odometry => {
                 let message = Odometry { header, pose: uncertain(), ..Odometry::default() };
-                tape.take(topic, &message, times);
+                recorder.take(topic, &message, times);
             }
         }
     }

@@ -12,16 +12,16 @@ pub mod body;
 pub mod file;
 pub mod flight;
 
+mod reader;
 pub mod replay;
 mod shared;
-mod tape;
 mod topics;
 
 use std::path::PathBuf;
 
 pub use file::{About, Recording};
+pub use reader::{Entry, Reader};
 pub use shared::Shared;
-pub use tape::{Entry, Reader};
 
 /// Why there is no recording, or none that can be read.
 #[derive(Debug, thiserror::Error)]

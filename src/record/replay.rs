@@ -11,14 +11,14 @@ use serde::Serialize;
 
 use super::topics::{Heard, stamped, topics};
 use super::{Entry, Reader, RecordError};
-use crate::flock::points::distance;
+use crate::flock::vectors::distance;
 use crate::ros::messages::builtin_interfaces::Time;
 use crate::ros::messages::flockform_msgs::{LoopEvent, SetFormationRequest};
 use crate::ros::messages::geometry_msgs::{self, PoseArray, PoseStamped};
 use crate::ros::messages::std_msgs::Header;
 use crate::ros::node::leaders::set_formation;
 use crate::ros::node::pose;
-use crate::ros::node::tape::{parameters, set_parameter};
+use crate::ros::node::recorder::{parameters, set_parameter};
 use crate::scene::swarm::Swarm;
 use crate::swarm::control::Control;
 

@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::Recording;
-use crate::ros::node::tape::Sink;
+use crate::ros::node::recorder::RecordSink;
 
 /// May be cloned: it is one recording all the same.
 #[derive(Clone)]
@@ -15,7 +15,7 @@ impl Shared {
     }
 
     /// Where a loop puts its copies.
-    pub fn sink(&self) -> Sink {
+    pub fn sink(&self) -> RecordSink {
         let shared = self.clone();
         Box::new(move |taped| {
             let mut open = shared.0.lock().unwrap_or_else(PoisonError::into_inner);

@@ -8,7 +8,7 @@ use crate::ros::messages::geometry_msgs::{self, PoseStamped, PoseWithCovarianceS
 use crate::ros::messages::nav_msgs::Odometry;
 use crate::ros::messages::std_msgs::Header;
 use crate::ros::node::NAME;
-use crate::ros::node::tape::EVENTS;
+use crate::ros::node::recorder::EVENTS;
 use crate::scene::swarm::Swarm;
 use crate::scene::swarm::raw::{RawNode, RawPoseType};
 use crate::swarm::control::Control;

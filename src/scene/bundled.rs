@@ -16,7 +16,7 @@ macro_rules! files {
     };
 }
 
-/// Every bundled scene, in the order in which `flockform scenes` lists them.
+/// Every bundled scene, in the order in which `flockform list scenes` lists them.
 pub const SCENES: &[Bundled] = files!["scenes":
     "tension",
     "tension-immediate",
@@ -66,7 +66,7 @@ pub const SCENES: &[Bundled] = files!["scenes":
     "beam-paper-hexagonal-reduced",
 ];
 
-/// Every bundled swarm, in the order in which `flockform swarms` lists them.
+/// Every bundled swarm, in the order in which `flockform list swarms` lists them.
 pub const SWARMS: &[Bundled] = files!["swarms": "square", "gap", "patch", "antipodal", "liar", "bridge"];
 
 /// The bundled swarm of this name.

@@ -85,7 +85,7 @@ impl Scene {
 
     /// Which role entry, if any, first leads particles to where finite elements have them.
     pub fn truth_led(&self) -> Option<usize> {
-        self.roles.iter().position(|entry| matches!(entry.motion, Some(LeaderMotion::Truth { .. })))
+        self.roles.iter().position(|entry| matches!(entry.motion, Some(LeaderMotion::Reference { .. })))
     }
 
     /// Which of the materials of the body sees farthest.
@@ -159,7 +159,7 @@ pub enum Weights {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PoissonTerm {
     pub k: f64,
-    pub pull: Axis,
+    pub axis: Axis,
     /// Coordinate of the central axis \[length\]; the middle of the body where `None`.
     pub centre: Option<f64>,
     pub exponent: f64,
@@ -233,7 +233,7 @@ pub enum LeaderMotion {
         steps: usize,
     },
     /// To where finite elements have the particles, in even parts over `steps`.
-    Truth {
+    Reference {
         steps: usize,
     },
 }
@@ -252,7 +252,7 @@ pub struct Stop {
     /// Largest one-step motion over spacing at which the body is in equilibrium.
     pub tolerance: Option<f64>,
     /// Displacement over the body's diagonal at which the run has diverged.
-    pub growth: f64,
+    pub divergence_ratio: f64,
 }
 
 /// How the equilibrium is found.

@@ -1,12 +1,12 @@
 //! The particles of a body from a CSV file.
 
-use crate::flock::points::Points;
+use crate::flock::vectors::Vectors;
 
 /// Particles in the order of their rows.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PointTable {
     /// \[length\], shape \[count\]; finite, and no two the same.
-    pub points: Points,
+    pub points: Vectors,
     /// The ids given, or the numbers of the rows from 1, shape \[count\]; no two the same.
     pub ids: Vec<u32>,
 }
@@ -20,7 +20,7 @@ impl PointTable {
     pub fn parse(text: &str, scale: f64) -> Result<Self, String> {
         let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes());
         let [x, y, id] = columns(reader.headers().map_err(|error| error.to_string())?)?;
-        let (mut points, mut ids, mut lines) = (Points::default(), Vec::new(), Vec::new());
+        let (mut points, mut ids, mut lines) = (Vectors::default(), Vec::new(), Vec::new());
         for (row, record) in reader.records().enumerate() {
             let record = record.map_err(|error| error.to_string())?;
             let line = record.position().map_or(row as u64 + 2, csv::Position::line);
@@ -61,7 +61,7 @@ fn columns(header: &csv::StringRecord) -> Result<[Option<usize>; 3], String> {
 }
 
 /// Refuses two points in one place and two of one name; of several pairs it names the first in the file.
-fn require_different(points: &Points, ids: &[u32], lines: &[u64]) -> Result<(), String> {
+fn require_different(points: &Vectors, ids: &[u32], lines: &[u64]) -> Result<(), String> {
     let mut order: Vec<usize> = (0..points.len()).collect();
     order.sort_unstable_by_key(|&i| (ids[i], i));
     if let Some([a, b]) = first_pair(&order, |a, b| ids[a] == ids[b]) {

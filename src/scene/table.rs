@@ -1,7 +1,7 @@
 //! Displacements of leaders from a CSV file.
 
 use crate::flock::body::Body;
-use crate::flock::points::distance;
+use crate::flock::vectors::distance;
 
 /// Rows of a displacement file, and how they name their particle.
 #[derive(Clone, Debug, PartialEq)]

@@ -5,7 +5,7 @@ use super::payload::{Leader, Pose as Wire, Target as WireTarget};
 use super::wait::Bell;
 use super::{Capacity, Peer, Reader, ShmError, Writer};
 use crate::swarm::control::Control;
-use crate::swarm::control::part::Part;
+use crate::swarm::control::scope::NodeScope;
 use crate::swarm::transport::{ControllerEnd, Heard, RobotsEnd, Target};
 use crate::swarm::watch::Pose;
 
@@ -30,7 +30,7 @@ impl Controller {
     ///
     /// # Errors
     /// As [`Reader::open`] and [`Writer::open`].
-    pub fn open(peer: &Peer, space: &str, control: &Control, part: &Part) -> Result<Self, ShmError> {
+    pub fn open(peer: &Peer, space: &str, control: &Control, part: &NodeScope) -> Result<Self, ShmError> {
         let count = control.formation().count();
         let among = |members: &[usize]| {
             let mut all = vec![false; count];

@@ -37,7 +37,7 @@ pub use node::FormationNode;
 pub use robots::SimulatedRobots;
 
 use crate::scene::SceneError;
-use crate::swarm::control::part::PartError;
+use crate::swarm::control::scope::NodeScopeError;
 
 /// Why something over shared memory could not be made or sent.
 #[derive(Debug, thiserror::Error)]
@@ -45,7 +45,7 @@ pub enum ShmError {
     #[error("{0}")]
     Swarm(#[from] SceneError),
     #[error("{0}")]
-    Part(#[from] PartError),
+    NodeScope(#[from] NodeScopeError),
     #[error(
         "{variable}={name:?} is no domain\n  help: give 1 to 32 letters, digits, `-` and `_`, or unset it for iceoryx2's own"
     )]

@@ -11,7 +11,7 @@ use super::payload::{Command, Formation, Member};
 use super::{Capacity, Domain, Peer, Reader, ShmError, Writer, wait};
 use crate::scene::swarm::Swarm;
 use crate::scene::swarm::raw::RawCommands;
-use crate::swarm::control::part::Part;
+use crate::swarm::control::scope::NodeScope;
 use crate::swarm::control::state::{FormationState, MemberState};
 use crate::swarm::control::{Control, Mode};
 use crate::swarm::pace::{Due, Pace, system_time};
@@ -31,7 +31,7 @@ const CLEANING_PERIOD: f64 = 1.0;
 pub struct FormationNode {
     pace: Pace,
     control: Control,
-    part: Part,
+    part: NodeScope,
     end: Controller,
     commands: Reader<Command>,
     /// Whose word counts.
@@ -52,7 +52,7 @@ impl FormationNode {
     /// What in the swarm file or in shared memory stands in the way.
     pub fn open(swarm: &Swarm, domain: &Domain, member: Option<&str>) -> Result<Self, ShmError> {
         let mut control = Control::new(swarm)?;
-        let part = Part::take(swarm, &mut control, member)?;
+        let part = NodeScope::take(swarm, &mut control, member)?;
         let peer = domain.join("flockform_node")?;
         let (space, capacity) = (&swarm.name, &Capacity::SWARM);
         Ok(Self {

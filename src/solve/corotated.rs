@@ -19,9 +19,9 @@ use super::linear::{NotLinear, outlier_places};
 use super::operator::{Operator, OperatorError, Row};
 use crate::flock::block::{Block, apply, plus};
 use crate::flock::body::Body;
-use crate::flock::interaction::{Interaction, MatrixWeights, Weights};
-use crate::flock::points::Points;
+use crate::flock::law::{Flock, MatrixWeights, Weights};
 use crate::flock::rules::{Corner, Mean, OWN, Rotation, Turn, patch_row};
+use crate::flock::vectors::Vectors;
 
 /// Newton steps of one increment.
 const MOST_STEPS: usize = 16;
@@ -57,8 +57,8 @@ pub enum CorotatedError {
 }
 
 /// Whether a rule is what this file is about.
-pub fn is_corotated(interaction: &Interaction) -> bool {
-    interaction.rule.mean == Mean::Material { rotation: Rotation::Corotated }
+pub fn is_corotated(flock: &Flock) -> bool {
+    flock.rule.mean == Mean::Material { rotation: Rotation::Corotated }
 }
 
 /// Followers up to which a factorisation is taken: the rows of the tangent differ from particle to particle, which
@@ -90,20 +90,20 @@ pub fn choose(followers: usize, request: &Request) -> Result<(Solver, String), C
 pub struct Way<'a> {
     /// Where what is held is after a part of the whole way \[length\], shape \[count\]; as much of the
     /// loads is then on the body.
-    pub held: &'a (dyn Fn(f64) -> Points + Sync),
+    pub held: &'a (dyn Fn(f64) -> Vectors + Sync),
     /// The equilibrium to start from and the part that it belongs to; the reference and 0 where there is none.
-    pub start: Option<(&'a Points, f64)>,
+    pub start: Option<(&'a Vectors, f64)>,
     /// The part to come to \[1\].
     pub end: f64,
 }
 
 impl<'a> Way<'a> {
     /// From the reference to the end.
-    pub fn whole(held: &'a (dyn Fn(f64) -> Points + Sync)) -> Self {
+    pub fn whole(held: &'a (dyn Fn(f64) -> Vectors + Sync)) -> Self {
         Self { held, start: None, end: 1.0 }
     }
 
-    /// Part of the whole way after a part of this one.
+    /// VectorsMut of the whole way after a part of this one.
     fn part(&self, of_this: f64) -> f64 {
         let start = self.start.map_or(0.0, |(_, part)| part);
         if of_this == 1.0 { self.end } else { start + of_this * (self.end - start) }
@@ -116,17 +116,17 @@ impl<'a> Way<'a> {
 /// # Errors
 /// As [`solve_linear`]; names the part of the way from which on the rotations do not settle.
 pub fn solve(
-    interaction: &Interaction,
+    flock: &Flock,
     body: &Body,
     follows: Vec<bool>,
     held_axes: Vec<[bool; 2]>,
     way: &Way<'_>,
     request: &Request,
 ) -> Result<Solved, CorotatedError> {
-    let Weights::Matrix(weights) = &interaction.weights else {
+    let Weights::Matrix(weights) = &flock.weights else {
         return Err(NotLinear::Rule { rule: "a material without its weights" }.into());
     };
-    if interaction.rule.feedback.is_some() {
+    if flock.rule.feedback.is_some() {
         return Err(CorotatedError::Feedback);
     }
     let tolerance = request.tolerance;
@@ -136,7 +136,7 @@ pub fn solve(
     let followers = follows.iter().filter(|&&follows| follows).count();
     let (solver, why) = choose(followers, request)?;
     let step = Request { solver: Choice::This(solver), tolerance: OF_A_STEP, ..*request };
-    let rule = Corotated { interaction, weights, body, follows, held_axes, way, step };
+    let rule = Corotated { flock, weights, body, follows, held_axes, way, step };
     let mut newton = Newton {
         rule: &rule,
         size: rule.size(),
@@ -164,7 +164,7 @@ pub fn solve(
 
 /// A corotated body and what is done to it.
 struct Corotated<'a> {
-    interaction: &'a Interaction,
+    flock: &'a Flock,
     weights: &'a MatrixWeights,
     body: &'a Body,
     follows: Vec<bool>,
@@ -187,8 +187,8 @@ struct Local {
 
 impl Corotated<'_> {
     /// A neighbour from where a particle is, both displaced by `u`.
-    fn corner(&self, i: usize, slot: usize, u: &Points) -> Corner {
-        let (reference, j) = (&self.interaction.reference, self.interaction.neighbours.of(i)[slot] as usize);
+    fn corner(&self, i: usize, slot: usize, u: &Vectors) -> Corner {
+        let (reference, j) = (&self.flock.reference, self.flock.neighbours.of(i)[slot] as usize);
         Corner {
             reference: minus(reference.get(j), reference.get(i)),
             displacement: minus(u.get(j), u.get(i)),
@@ -196,10 +196,10 @@ impl Corotated<'_> {
     }
 
     /// `None` where a cell has no direction left.
-    fn local(&self, i: usize, u: &Points) -> Option<Local> {
+    fn local(&self, i: usize, u: &Vectors) -> Option<Local> {
         let mut force = [0.0; 2];
         let mut diagonal = Block::default();
-        let mut blocks = vec![Block::default(); self.interaction.neighbours.of(i).len()];
+        let mut blocks = vec![Block::default(); self.flock.neighbours.of(i).len()];
         let mut turn = None;
         for cell in self.weights.cells_around(i) {
             let corner = |slot| self.corner(i, slot, u);
@@ -230,7 +230,7 @@ impl Corotated<'_> {
     }
 
     /// Puts what is not free where it is.
-    fn hold(&self, u: &mut Points, held: &Points) {
+    fn hold(&self, u: &mut Vectors, held: &Vectors) {
         for i in 0..u.len() {
             let (free, at, there) = (self.free(i), u.get(i), held.get(i));
             u.set(i, [0, 1].map(|axis| if free[axis] { at[axis] } else { there[axis] }));
@@ -238,11 +238,11 @@ impl Corotated<'_> {
     }
 
     fn load(&self, i: usize) -> [f64; 2] {
-        self.interaction.forces.as_ref().map_or([0.0; 2], |forces| forces.get(i))
+        self.flock.forces.as_ref().map_or([0.0; 2], |forces| forces.get(i))
     }
 
     /// The force left on every follower after `part` of the way; zero on the others.
-    fn forces(&self, u: &Points, part: f64) -> Option<(Vec<Option<Local>>, Points)> {
+    fn forces(&self, u: &Vectors, part: f64) -> Option<(Vec<Option<Local>>, Vectors)> {
         let of_particle = |i: usize| match self.follows[i] {
             false => Some(None),
             true => self.local(i, u).map(Some),
@@ -262,13 +262,13 @@ impl Corotated<'_> {
 
     /// The force at the start, all followers at zero and all cells in the axes of the reference.
     fn size(&self) -> f64 {
-        let mut u = Points::zeros(self.follows.len());
+        let mut u = Vectors::zeros(self.follows.len());
         self.hold(&mut u, &(self.way.held)(1.0));
         let followers = (0..u.len()).filter(|&i| self.follows[i]);
-        let all: Points = followers
+        let all: Vectors = followers
             .map(|i| {
                 let mut force = self.load(i);
-                let others = self.interaction.neighbours.of(i).iter().zip(self.weights.stiffness_of(i));
+                let others = self.flock.neighbours.of(i).iter().zip(self.weights.stiffness_of(i));
                 for (&j, block) in others {
                     add(&mut force, apply(block, minus(u.get(j as usize), u.get(i))));
                 }
@@ -286,7 +286,7 @@ impl Corotated<'_> {
         let row = |i: usize| {
             let Some(local) = &locals[i] else { return Row::default() };
             let mut row = Row { diagonal: local.diagonal, entries: Vec::new() };
-            for (&j, block) in self.interaction.neighbours.of(i).iter().zip(&local.blocks) {
+            for (&j, block) in self.flock.neighbours.of(i).iter().zip(&local.blocks) {
                 if *block != Block::default() {
                     let (here, there) = (self.body.sites[i], self.body.sites[j as usize]);
                     let offset = [there[0] - here[0], there[1] - here[1]];
@@ -313,10 +313,10 @@ struct Newton<'a> {
 }
 
 impl Newton<'_> {
-    fn go(&mut self, tolerance: f64) -> Result<Points, CorotatedError> {
+    fn go(&mut self, tolerance: f64) -> Result<Vectors, CorotatedError> {
         let way = self.rule.way;
         let mut u =
-            way.start.map_or_else(|| Points::zeros(self.rule.follows.len()), |(start, _)| start.clone());
+            way.start.map_or_else(|| Vectors::zeros(self.rule.follows.len()), |(start, _)| start.clone());
         let (mut done, mut stride) = (0.0, 1.0);
         while done < 1.0 {
             let part = f64::min(done + stride, 1.0);
@@ -337,17 +337,22 @@ impl Newton<'_> {
     }
 
     /// From an equilibrium on the way to that after another part of it; `None` if it does not get there.
-    fn increment(&mut self, from: &Points, after: f64, goal: f64) -> Result<Option<Points>, CorotatedError> {
+    fn increment(
+        &mut self,
+        from: &Vectors,
+        after: f64,
+        goal: f64,
+    ) -> Result<Option<Vectors>, CorotatedError> {
         let rule = self.rule;
         let mut u = from.clone();
         let now = (rule.way.held)(after);
         // The leaders' move is part of the first step, so that the followers go with them.
-        let mut led: Points = u.iter().zip(now.iter()).map(|(here, there)| minus(there, here)).collect();
+        let mut led: Vectors = u.iter().zip(now.iter()).map(|(here, there)| minus(there, here)).collect();
         let Some((mut locals, mut left)) = rule.forces(&u, after) else { return Ok(None) };
         let turns: Vec<Option<Turn>> = locals.iter().map(|l| l.as_ref().map(|l| l.turn)).collect();
         let (mut best, mut stalled) = (f64::INFINITY, 0);
         for _ in 0..MOST_STEPS {
-            self.step(&mut u, (&locals, left), std::mem::replace(&mut led, Points::zeros(now.len())))?;
+            self.step(&mut u, (&locals, left), std::mem::replace(&mut led, Vectors::zeros(now.len())))?;
             rule.hold(&mut u, &now);
             let Some(found) = rule.forces(&u, after) else { return Ok(None) };
             (locals, left) = found;
@@ -374,9 +379,9 @@ impl Newton<'_> {
     /// One step of Newton's method, the leaders moving by `led`.
     fn step(
         &mut self,
-        u: &mut Points,
-        (locals, left): (&[Option<Local>], Points),
-        led: Points,
+        u: &mut Vectors,
+        (locals, left): (&[Option<Local>], Vectors),
+        led: Vectors,
     ) -> Result<(), CorotatedError> {
         let begin = Instant::now();
         let operator = self.rule.tangent(locals).map_err(NotLinear::Operator)?;
@@ -402,6 +407,6 @@ fn add(sum: &mut [f64; 2], [x, y]: [f64; 2]) {
     *sum = [sum[0] + x, sum[1] + y];
 }
 
-fn norm(points: &Points) -> f64 {
+fn norm(points: &Vectors) -> f64 {
     points.iter().map(|[x, y]| x * x + y * y).sum::<f64>().sqrt()
 }

@@ -1,50 +1,28 @@
 //! Vectors over the particles in single or double precision, and sums over them in a fixed order.
 
-use crate::flock::points::Points;
 pub use crate::flock::real::Real;
+use crate::flock::vectors::Vectors;
 
-/// One vector in the plane for each particle, shape \[count\] each: [`Points`] of either precision.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Field<T> {
-    pub x: Vec<T>,
-    pub y: Vec<T>,
-}
-
-impl<T: Real> Field<T> {
-    pub fn zeros(count: usize) -> Self {
-        Self { x: vec![T::default(); count], y: vec![T::default(); count] }
-    }
-
-    pub fn len(&self) -> usize {
-        self.x.len()
-    }
-
-    pub fn is_empty(&self) -> bool {
-        self.x.is_empty()
-    }
-
-    pub fn of_points(points: &Points) -> Self {
+impl<T: Real> Vectors<T> {
+    /// The same numbers in this precision.
+    pub fn cast(vectors: &Vectors) -> Self {
         let cast = |values: &[f64]| values.iter().map(|&value| T::of(value)).collect();
-        Self { x: cast(&points.x), y: cast(&points.y) }
-    }
-
-    pub fn get(&self, index: usize) -> [T; 2] {
-        [self.x[index], self.y[index]]
+        Self { x: cast(&vectors.x), y: cast(&vectors.y) }
     }
 
     /// Both coordinates, whole.
-    pub fn view(&self) -> View<'_, T> {
-        View { x: &self.x, y: &self.y }
+    pub fn view(&self) -> VectorsRef<'_, T> {
+        VectorsRef { x: &self.x, y: &self.y }
     }
 
     /// Both coordinates, cut at `bounds`: ascending, from 0 to the length.
-    pub fn parts(&mut self, bounds: &[usize]) -> Vec<Part<'_, T>> {
+    pub fn parts(&mut self, bounds: &[usize]) -> Vec<VectorsMut<'_, T>> {
         let (mut x, mut y) = (&mut self.x[..], &mut self.y[..]);
         let mut parts = Vec::with_capacity(bounds.len());
         for ends in bounds.windows(2) {
             let (head_x, tail_x) = x.split_at_mut(ends[1] - ends[0]);
             let (head_y, tail_y) = y.split_at_mut(ends[1] - ends[0]);
-            parts.push(Part { begin: ends[0], x: head_x, y: head_y });
+            parts.push(VectorsMut { begin: ends[0], x: head_x, y: head_y });
             (x, y) = (tail_x, tail_y);
         }
         parts
@@ -53,12 +31,12 @@ impl<T: Real> Field<T> {
 
 /// A field to be read.
 #[derive(Clone, Copy, Debug)]
-pub struct View<'a, T> {
+pub struct VectorsRef<'a, T> {
     pub x: &'a [T],
     pub y: &'a [T],
 }
 
-impl<'a, T> View<'a, T> {
+impl<'a, T> VectorsRef<'a, T> {
     pub fn range(self, range: std::ops::Range<usize>) -> Self {
         Self { x: &self.x[range.clone()], y: &self.y[range] }
     }
@@ -66,14 +44,14 @@ impl<'a, T> View<'a, T> {
 
 /// The stretch of a field that one thread writes.
 #[derive(Debug)]
-pub struct Part<'a, T> {
+pub struct VectorsMut<'a, T> {
     /// Index of its first particle.
     pub begin: usize,
     pub x: &'a mut [T],
     pub y: &'a mut [T],
 }
 
-impl<T> Part<'_, T> {
+impl<T> VectorsMut<'_, T> {
     pub fn range(&self) -> std::ops::Range<usize> {
         self.begin..self.begin + self.x.len()
     }
@@ -98,6 +76,6 @@ fn dot_of<A: Real, B: Real>(a: &[A], b: &[B]) -> f64 {
 }
 
 /// `sum a . b` over all particles, in double precision.
-pub fn dot<A: Real, B: Real>(a: View<'_, A>, b: View<'_, B>) -> f64 {
+pub fn dot<A: Real, B: Real>(a: VectorsRef<'_, A>, b: VectorsRef<'_, B>) -> f64 {
     dot_of(a.x, b.x) + dot_of(a.y, b.y)
 }

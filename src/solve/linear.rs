@@ -9,10 +9,10 @@ use super::equilibrium::System;
 use super::operator::{Operator, OperatorError, Row};
 use crate::flock::block::{Block, IDENTITY, apply, plus, product};
 use crate::flock::body::Body;
-use crate::flock::interaction::{Interaction, Weights};
 use crate::flock::lattice::Site;
-use crate::flock::points::Points;
+use crate::flock::law::{Flock, Weights};
 use crate::flock::rules::{Axis, Feedback, FeedbackReference, Mean, Rotation, Rule};
+use crate::flock::vectors::Vectors;
 
 /// Why a rule has no operator.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -37,18 +37,18 @@ pub struct HeldComponent {
 /// The equilibrium that the rule asks for, with the held particles (those that do not follow) displaced
 /// by `held` \[length\], shape \[count\]; what it holds for followers and frame points is not looked at; `components` are held of followers.
 pub fn system(
-    interaction: &Interaction,
+    flock: &Flock,
     body: &Body,
     follows: Vec<bool>,
-    mut held: Points,
+    mut held: Vectors,
     components: &[HeldComponent],
 ) -> Result<System, NotLinear> {
-    require_linear(interaction)?;
+    require_linear(flock)?;
     let lattice = &body.lattice;
     let grid = [lattice.vector([1, 0]), lattice.vector([0, 1])];
-    let linear = Linear { interaction, body, served: served_by_frame(body) };
+    let linear = Linear { flock, body, served: served_by_frame(body) };
     let forces = (0..body.count()).map(|i| if follows[i] { linear.force(i) } else { [0.0; 2] }).collect();
-    let operator = match &interaction.weights {
+    let operator = match &flock.weights {
         // The classes of a plain material are those of its rows.
         Weights::Matrix(weights) if linear.is_plain() => {
             let mut rows = vec![Row::default(); weights.compliance.len()];
@@ -81,10 +81,10 @@ pub(super) fn outlier_places(body: &Body) -> Vec<[f64; 2]> {
     outliers.map(|i| body.lattice.grid_coordinates(body.reference.get(i))).collect()
 }
 
-fn require_linear(interaction: &Interaction) -> Result<(), NotLinear> {
-    let rule = match interaction.rule.mean {
+fn require_linear(flock: &Flock) -> Result<(), NotLinear> {
+    let rule = match flock.rule.mean {
         Mean::Barycentre | Mean::Material { rotation: Rotation::Small } => {
-            let broken = interaction.bonds.as_ref().is_some_and(|bonds| bonds.any_broken());
+            let broken = flock.bonds.as_ref().is_some_and(|bonds| bonds.any_broken());
             return if broken { Err(NotLinear::Broken) } else { Ok(()) };
         }
         Mean::Distance { .. } => "the mean weighted by distance",
@@ -106,7 +106,7 @@ fn served_by_frame(body: &Body) -> Vec<Vec<u32>> {
 }
 
 struct Linear<'a> {
-    interaction: &'a Interaction,
+    flock: &'a Flock,
     body: &'a Body,
     served: Vec<Vec<u32>>,
 }
@@ -114,32 +114,30 @@ struct Linear<'a> {
 impl Linear<'_> {
     /// Whether rows are those of the weights alone.
     fn is_plain(&self) -> bool {
-        let rule = &self.interaction.rule;
+        let rule = &self.flock.rule;
         self.served.is_empty() && rule.poisson.is_none() && overshoot(rule) == 1.0
     }
 
     /// `K_ij` of bond number `k` of a particle.
     fn stiffness(&self, particle: usize, k: usize) -> Block {
         let scaled = |by: f64| IDENTITY.map(|row| row.map(|entry| by * entry));
-        match &self.interaction.weights {
+        match &self.flock.weights {
             Weights::Equal => IDENTITY,
-            Weights::Scalar(weights) => {
-                scaled(weights[self.interaction.neighbours.bonds(particle).start + k])
-            }
+            Weights::Scalar(weights) => scaled(weights[self.flock.neighbours.bonds(particle).start + k]),
             Weights::Matrix(weights) => weights.stiffness_of(particle)[k],
         }
     }
 
     /// `D_i`.
     fn diagonal(&self, particle: usize) -> Block {
-        let bonds = 0..self.interaction.neighbours.of(particle).len();
+        let bonds = 0..self.flock.neighbours.of(particle).len();
         bonds.fold(Block::default(), |sum, k| plus(&sum, &self.stiffness(particle, k)))
     }
 
     fn row(&self, particle: usize) -> Row {
         let terms = self.terms(particle);
         let mut row = Row { diagonal: self.diagonal(particle), entries: Vec::new() };
-        for (k, &j) in self.interaction.neighbours.of(particle).iter().enumerate() {
+        for (k, &j) in self.flock.neighbours.of(particle).iter().enumerate() {
             let block = product(&terms, &self.stiffness(particle, k));
             if self.body.is_frame[j as usize] {
                 let served = &self.served[j as usize];
@@ -173,11 +171,11 @@ impl Linear<'_> {
     /// What the terms added to the mean make of it: feedback on the initial position (Eq. 4) and the
     /// Poisson term (Eq. 2).
     fn terms(&self, particle: usize) -> Block {
-        let rule = &self.interaction.rule;
+        let rule = &self.flock.rule;
         let mut terms = IDENTITY;
         if let Some(poisson) = &rule.poisson {
             let response = poisson.k * poisson.distance_from_axis(self.body.reference.get(particle));
-            match poisson.pull {
+            match poisson.axis {
                 Axis::X => terms[1][0] = response,
                 Axis::Y => terms[0][1] = response,
             }
@@ -187,16 +185,16 @@ impl Linear<'_> {
 
     /// `f_i`: the load, and what pulls where the reference is not at rest.
     fn force(&self, particle: usize) -> [f64; 2] {
-        if let (Some(forces), true) = (&self.interaction.forces, self.is_plain()) {
+        if let (Some(forces), true) = (&self.flock.forces, self.is_plain()) {
             return forces.get(particle);
         }
         let reference = &self.body.reference;
         // Over-relaxation does not move the place of rest.
-        let target = if overshoot(&self.interaction.rule) == 1.0 && self.interaction.rule.feedback.is_some() {
-            let rule = Rule { feedback: None, ..self.interaction.rule };
-            self.interaction.target_by(&rule, particle, reference)
+        let target = if overshoot(&self.flock.rule) == 1.0 && self.flock.rule.feedback.is_some() {
+            let rule = Rule { feedback: None, ..self.flock.rule };
+            self.flock.target_by(&rule, particle, reference)
         } else {
-            self.interaction.target(particle, reference)
+            self.flock.target(particle, reference)
         };
         let here = reference.get(particle);
         apply(&self.diagonal(particle), [target[0] - here[0], target[1] - here[1]])

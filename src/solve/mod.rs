@@ -1,4 +1,4 @@
-//! Spectra of sweeps over the flock's interaction, and the solvers for equilibrium.
+//! Spectra of sweeps over the rules, and the solvers for equilibrium.
 
 pub mod affine_weights;
 pub mod arnoldi;

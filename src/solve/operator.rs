@@ -16,7 +16,7 @@ mod tests;
 use std::collections::HashMap;
 
 pub use columns::{Columns, Segment};
-pub use kernel::{Stencils, Task, array, array_mut, pass};
+pub use kernel::{RowCoefficients, Task, array, array_mut, pass};
 pub use matrix::{HELD, Matrix, leads_to_outlier};
 
 use crate::flock::block::{Block, transposed};

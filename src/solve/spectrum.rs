@@ -6,10 +6,10 @@
 
 use super::arnoldi::{Accuracy, Ritz, Wanted, eigenvalues};
 use crate::flock::frame::Frame;
-use crate::flock::interaction::Interaction;
-use crate::flock::points::Points;
+use crate::flock::law::Flock;
 use crate::flock::role::Role;
 use crate::flock::rules::{Mean, Rotation};
+use crate::flock::vectors::Vectors;
 use crate::sweep::{Sweep, Update};
 
 /// The largest modulus of an eigenvalue.
@@ -42,38 +42,38 @@ pub struct Ends {
 /// `None` where the sweep is not linear (weights that depend on distance, power means, corotation) or
 /// where nobody follows.
 pub fn spectral_radius(
-    interaction: &Interaction,
+    flock: &Flock,
     frame: Option<&Frame>,
     roles: &[Role],
     update: Update,
     most_iterations: usize,
 ) -> Option<SpectralRadius> {
-    let linear = LinearSweep::new(interaction, frame, roles, update)?;
+    let linear = LinearSweep::new(flock, frame, roles, update)?;
     Some(linear.radius(Accuracy::Full, most_iterations))
 }
 
 /// [`spectral_radius`] as well as it takes to tell on which side of 1 it is, and about how far: to a
 /// hundredth of that, which far from 1 takes a fraction of the sweeps.
 pub fn radius_from_one(
-    interaction: &Interaction,
+    flock: &Flock,
     frame: Option<&Frame>,
     roles: &[Role],
     update: Update,
     most_iterations: usize,
 ) -> Option<SpectralRadius> {
-    let linear = LinearSweep::new(interaction, frame, roles, update)?;
+    let linear = LinearSweep::new(flock, frame, roles, update)?;
     Some(linear.radius(Accuracy::FromOne(0.01), most_iterations))
 }
 
 /// Ends of the sweep's spectrum; `None` as for [`spectral_radius`].
 pub fn spectral_ends(
-    interaction: &Interaction,
+    flock: &Flock,
     frame: Option<&Frame>,
     roles: &[Role],
     update: Update,
     most_iterations: usize,
 ) -> Option<Ends> {
-    let linear = LinearSweep::new(interaction, frame, roles, update)?;
+    let linear = LinearSweep::new(flock, frame, roles, update)?;
     let (found, iterations, converged) = linear.eigenvalues((Wanted::Ends, Accuracy::Full), most_iterations);
     // One of them only where nothing could be found at all.
     let (low, high) = (found[0].value, found[found.len() - 1].value);
@@ -83,33 +83,27 @@ pub fn spectral_ends(
 
 /// The sweep on displacements.
 struct LinearSweep<'a> {
-    interaction: Interaction,
+    flock: Flock,
     frame: Option<&'a Frame>,
     roles: &'a [Role],
     sweep: Sweep,
 }
 
 impl<'a> LinearSweep<'a> {
-    fn new(
-        interaction: &Interaction,
-        frame: Option<&'a Frame>,
-        roles: &'a [Role],
-        update: Update,
-    ) -> Option<Self> {
+    fn new(flock: &Flock, frame: Option<&'a Frame>, roles: &'a [Role], update: Update) -> Option<Self> {
         let linear =
-            matches!(interaction.rule.mean, Mean::Barycentre | Mean::Material { rotation: Rotation::Small });
+            matches!(flock.rule.mean, Mean::Barycentre | Mean::Material { rotation: Rotation::Small });
         if !linear || !roles.contains(&Role::Follower) {
             return None;
         }
         // Without what only shifts the place of rest: loads, rest offsets, the reference itself. The Poisson
         // term measures how far from the axis a particle is in the reference, so it needs that one.
-        let poisson = interaction.rule.poisson.is_some();
-        let reference =
-            if poisson { interaction.reference.clone() } else { Points::zeros(roles.len()).into() };
-        let rest = if poisson { interaction.rest.clone() } else { None };
-        let interaction = Interaction { reference, rest, forces: None, ..interaction.clone() };
-        let sweep = Sweep::compile(update, &interaction, roles);
-        Some(Self { interaction, frame, roles, sweep })
+        let poisson = flock.rule.poisson.is_some();
+        let reference = if poisson { flock.reference.clone() } else { Vectors::zeros(roles.len()).into() };
+        let rest = if poisson { flock.rest.clone() } else { None };
+        let flock = Flock { reference, rest, forces: None, ..flock.clone() };
+        let sweep = Sweep::compile(update, &flock, roles);
+        Some(Self { flock, frame, roles, sweep })
     }
 
     fn radius(&self, accuracy: Accuracy, most: usize) -> SpectralRadius {
@@ -120,16 +114,16 @@ impl<'a> LinearSweep<'a> {
     fn eigenvalues(&self, wanted: (Wanted, Accuracy), most: usize) -> (Vec<Ritz>, usize, bool) {
         let count = self.roles.len();
         // Of the body's own size where the reference is there, so that it does not swallow them.
-        let unit = self.interaction.rule.poisson.map_or(1.0, |poisson| poisson.half_width);
-        let base = &self.interaction.reference;
-        let mut present = Points::clone(base);
-        let mut next = Points::zeros(count);
+        let unit = self.flock.rule.poisson.map_or(1.0, |poisson| poisson.half_width);
+        let base = &self.flock.reference;
+        let mut present = Vectors::clone(base);
+        let mut next = Vectors::zeros(count);
         let mut apply = |from: &[f64], to: &mut [f64]| {
             for i in 0..count {
                 present.set(i, [base.x[i] + unit * from[2 * i], base.y[i] + unit * from[2 * i + 1]]);
             }
             next.clone_from(&present);
-            self.sweep.step(&self.interaction, self.frame, &present, &mut next);
+            self.sweep.step(&self.flock, self.frame, &present, &mut next);
             for i in 0..count {
                 to[2 * i] = (next.x[i] - base.x[i]) / unit;
                 to[2 * i + 1] = (next.y[i] - base.y[i]) / unit;

@@ -3,8 +3,8 @@
 use serde::Serialize;
 
 use super::subject::{Parameter, Subject};
-use crate::flock::points::Points;
 use crate::flock::role::Role;
+use crate::flock::vectors::Vectors;
 use crate::solve::spectrum::scatter;
 
 /// How far runs go.
@@ -83,7 +83,7 @@ pub fn growth(subject: &Subject, parameter: Parameter, value: f64, most_steps: u
     let follows = |i: usize| engine.roles()[i] == Role::Follower;
     let spacing = subject.spacing();
     let push = |k: usize| if follows(k / 2) { 0.25 * spacing * scatter(k as u64) } else { 0.0 };
-    let disturbed: Points = (0..subject.particles()).map(|i| [push(2 * i), push(2 * i + 1)]).collect();
+    let disturbed: Vectors = (0..subject.particles()).map(|i| [push(2 * i), push(2 * i + 1)]).collect();
     engine.settle(0, &disturbed);
     let mut sizes = vec![size(engine.present(), &engine.body().reference, spacing)];
     let mut settled = false;
@@ -101,7 +101,7 @@ pub fn growth(subject: &Subject, parameter: Parameter, value: f64, most_steps: u
 }
 
 /// Root of the mean square displacement over the spacing.
-fn size(present: &Points, reference: &Points, spacing: f64) -> f64 {
+fn size(present: &Vectors, reference: &Vectors, spacing: f64) -> f64 {
     let apart = |(p, r): ([f64; 2], [f64; 2])| {
         let [x, y] = [(p[0] - r[0]) / spacing, (p[1] - r[1]) / spacing];
         x * x + y * y

@@ -69,7 +69,7 @@ fn power(table: &Map<String, Value>, name: &str, parent: &str) -> Option<i32> {
     let kind = table.get("kind").and_then(Value::as_str);
     match (name, kind, parent) {
         // A number of cells.
-        ("radius", Some("ring"), _) => None,
+        ("radius", Some("chebyshev"), _) => None,
         ("force", Some("force"), _) => Some(2),
         ("force", Some("body"), _) => Some(-1),
         ("from", _, "cuts" | "profile") | ("from", Some("path"), _) => Some(1),

@@ -57,7 +57,7 @@ impl Subject {
         for role in plan.roles.iter_mut().filter(|role| **role == Role::Leader) {
             *role = Role::Clamped;
         }
-        plan.interaction.forces = None;
+        plan.flock.forces = None;
         // Runs are watched from here: neither a limit nor a tolerance ends them.
         plan.stop.tolerance = None;
         let subject = Self { plan };
@@ -68,13 +68,13 @@ impl Subject {
     /// The feedback factor or the damping as the scene has it.
     pub fn present(&self, parameter: Parameter) -> f64 {
         match parameter {
-            Parameter::Feedback => self.plan.interaction.rule.feedback.map_or(0.0, |f| f.factor),
+            Parameter::Feedback => self.plan.flock.rule.feedback.map_or(0.0, |f| f.factor),
             Parameter::Damping => self.plan.update.damping,
         }
     }
 
     pub fn feedback_reference(&self) -> FeedbackReference {
-        self.plan.interaction.rule.feedback.map_or(FeedbackReference::Initial, |f| f.reference)
+        self.plan.flock.rule.feedback.map_or(FeedbackReference::Initial, |f| f.reference)
     }
 
     pub fn order(&self) -> Order {
@@ -101,7 +101,7 @@ impl Subject {
             Parameter::Feedback => {
                 let reference = self.feedback_reference();
                 let feedback = Feedback { factor: value, reference };
-                plan.interaction.rule.feedback = (value != 0.0).then_some(feedback);
+                plan.flock.rule.feedback = (value != 0.0).then_some(feedback);
             }
             Parameter::Damping => plan.update.damping = value,
         }
@@ -122,7 +122,7 @@ impl Subject {
     pub fn radius(&self) -> SpectralRadius {
         let engine = self.engine();
         let frame = self.plan.body.frame.as_ref();
-        spectral_radius(engine.interaction(), frame, engine.roles(), engine.update(), MOST_SWEEPS)
+        spectral_radius(engine.flock(), frame, engine.roles(), engine.update(), MOST_SWEEPS)
             .expect("linear, and somebody follows")
     }
 
@@ -130,7 +130,7 @@ impl Subject {
     pub fn radius_from_one(&self) -> SpectralRadius {
         let engine = self.engine();
         let frame = self.plan.body.frame.as_ref();
-        radius_from_one(engine.interaction(), frame, engine.roles(), engine.update(), MOST_SWEEPS)
+        radius_from_one(engine.flock(), frame, engine.roles(), engine.update(), MOST_SWEEPS)
             .expect("linear, and somebody follows")
     }
 
@@ -138,14 +138,14 @@ impl Subject {
     pub fn ends(&self) -> Ends {
         let engine = self.engine();
         let frame = self.plan.body.frame.as_ref();
-        spectral_ends(engine.interaction(), frame, engine.roles(), engine.update(), MOST_SWEEPS)
+        spectral_ends(engine.flock(), frame, engine.roles(), engine.update(), MOST_SWEEPS)
             .expect("linear, and somebody follows")
     }
 
     /// Refuses followers in a part of the body that nobody leads: nothing brings them back to rest.
     fn require_held(&self, scene: &Scene) -> Result<(), SceneError> {
-        let Plan { body, interaction, roles, .. } = &self.plan;
-        let labels = body.components(&interaction.neighbours);
+        let Plan { body, flock, roles, .. } = &self.plan;
+        let labels = body.components(&flock.neighbours);
         let mut held = vec![false; labels.len()];
         for (&label, _) in labels.iter().zip(roles).filter(|(_, role)| **role == Role::Clamped) {
             held[label as usize] = true;

@@ -25,16 +25,16 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-pub use schedule::{Activity, Following, Led, MOST_STEPS, Steps};
+pub use schedule::{Activity, LaggedFrame, Led, MOST_STEPS, Steps};
 
 use crate::flock::frame::Frame;
-use crate::flock::interaction::{Interaction, Weights};
-use crate::flock::points::Points;
+use crate::flock::law::{Flock, Weights};
 use crate::flock::role::Role;
+use crate::flock::vectors::Vectors;
 use kernel::Component;
 use rows::Rows;
 use terms::Compiled;
-use torn::Torn;
+use torn::DamagedRows;
 
 /// Who sees whose new position within one step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -78,53 +78,53 @@ pub struct Sweep {
     rows: Option<Rows>,
     terms: Compiled,
     /// Followers with a broken bond, whom the rows do not fit, where the rule is the plain barycentre.
-    torn: Torn,
+    torn: DamagedRows,
     /// The same where it is not, ascending: they are swept one by one.
     aside: Vec<u32>,
 }
 
 impl Sweep {
     /// Compile anew whenever roles or neighbours change; whoever loses a bond is [set aside](Sweep::set_aside).
-    pub fn compile(update: Update, interaction: &Interaction, roles: &[Role]) -> Self {
-        let mut sweep = Self::uncompiled(update, interaction, roles);
+    pub fn compile(update: Update, flock: &Flock, roles: &[Role]) -> Self {
+        let mut sweep = Self::uncompiled(update, flock, roles);
         if update.order == Order::Synchronous {
-            sweep.rows = Rows::compile(interaction, &sweep.follows);
+            sweep.rows = Rows::compile(flock, &sweep.follows);
         }
-        let neighbours = &interaction.neighbours;
-        if let Some(rows) = sweep.rows.as_ref().filter(|_| sweep.is_plain(interaction)) {
-            sweep.torn = Torn::new((0..rows.band_count()).map(|band| rows.particles(band..band + 1)));
+        let neighbours = &flock.neighbours;
+        if let Some(rows) = sweep.rows.as_ref().filter(|_| sweep.is_plain(flock)) {
+            sweep.torn = DamagedRows::new((0..rows.band_count()).map(|band| rows.particles(band..band + 1)));
         }
-        if let Some(bonds) = interaction.bonds.as_ref().filter(|bonds| bonds.any_broken()) {
+        if let Some(bonds) = flock.bonds.as_ref().filter(|bonds| bonds.any_broken()) {
             let is_torn = |&j: &usize| bonds.is_torn(j, neighbours);
-            sweep.set_aside((0..neighbours.count()).filter(is_torn), interaction);
+            sweep.set_aside((0..neighbours.count()).filter(is_torn), flock);
         }
         sweep
     }
 
     /// For neighbours that change at every step: nothing is compiled from them.
-    pub fn uncompiled(update: Update, interaction: &Interaction, roles: &[Role]) -> Self {
+    pub fn uncompiled(update: Update, flock: &Flock, roles: &[Role]) -> Self {
         let follows: Vec<bool> = roles.iter().map(|&role| role == Role::Follower).collect();
         Self {
             update,
             followers: follows.iter().filter(|&&follows| follows).count(),
             follows,
             rows: None,
-            terms: Compiled::new(update, interaction),
-            torn: Torn::default(),
+            terms: Compiled::new(update, flock),
+            torn: DamagedRows::default(),
             aside: Vec::new(),
         }
     }
 
     /// Whether targets are nothing but means of neighbours that count the same.
-    fn is_plain(&self, interaction: &Interaction) -> bool {
-        self.terms.is_empty() && matches!(interaction.weights, Weights::Equal)
+    fn is_plain(&self, flock: &Flock) -> bool {
+        self.terms.is_empty() && matches!(flock.weights, Weights::Equal)
     }
 
     /// Sweeps these by themselves from now on: they have lost a bond.
-    pub fn set_aside(&mut self, particles: impl IntoIterator<Item = usize>, interaction: &Interaction) {
+    pub fn set_aside(&mut self, particles: impl IntoIterator<Item = usize>, flock: &Flock) {
         let follows = &self.follows;
-        if let (Some(_), Some(bonds), true) = (&self.rows, &interaction.bonds, self.is_plain(interaction)) {
-            self.torn.renew(particles, follows, (bonds, &interaction.neighbours, &interaction.reference));
+        if let (Some(_), Some(bonds), true) = (&self.rows, &flock.bonds, self.is_plain(flock)) {
+            self.torn.renew(particles, follows, (bonds, &flock.neighbours, &flock.reference));
             return;
         }
         self.aside.extend(particles.into_iter().filter(|&j| follows[j]).map(|j| j as u32));
@@ -140,36 +140,30 @@ impl Sweep {
     /// Writes the followers' next positions, then the frame's. Leaders must stand in `next` already;
     /// what neither follows nor is frame keeps what stands there. The sequential sweep starts from
     /// what `next` holds, so it must hold the present positions.
-    pub fn step(
-        &self,
-        interaction: &Interaction,
-        frame: Option<&Frame>,
-        present: &Points,
-        next: &mut Points,
-    ) {
+    pub fn step(&self, flock: &Flock, frame: Option<&Frame>, present: &Vectors, next: &mut Vectors) {
         if let Some(rows) = &self.rows {
-            self.sweep_whole(rows, interaction, present, next);
-            self.step_aside(interaction, present, next);
+            self.sweep_whole(rows, flock, present, next);
+            self.step_aside(flock, present, next);
         } else if self.update.order == Order::Synchronous {
             for_chunks(next, |chunk, x, y| {
                 let begin = chunk * chunk_size(present.len());
                 for i in (0..x.len()).filter(|i| self.follows[begin + i]) {
-                    [x[i], y[i]] = self.moved(begin + i, interaction, present);
+                    [x[i], y[i]] = self.moved(begin + i, flock, present);
                 }
             });
         } else {
             for j in (0..self.follows.len()).filter(|&j| self.follows[j]) {
-                next.set(j, self.moved(j, interaction, next));
+                next.set(j, self.moved(j, flock, next));
             }
         }
         if let Some(frame) = frame {
-            frame.follow(&interaction.reference, present, next);
+            frame.follow(&flock.reference, present, next);
         }
     }
 
     /// Those whom the rows do not fit any more; what these left in their places is written over.
-    fn step_aside(&self, interaction: &Interaction, present: &Points, next: &mut Points) {
-        let moved = |&j: &u32| (j, self.moved(j as usize, interaction, present));
+    fn step_aside(&self, flock: &Flock, present: &Vectors, next: &mut Vectors) {
+        let moved = |&j: &u32| (j, self.moved(j as usize, flock, present));
         if self.aside.len() >= ASIDE_IN_PARALLEL && rayon::current_num_threads() > 1 {
             let moved: Vec<(u32, [f64; 2])> = self.aside.par_iter().map(moved).collect();
             moved.into_iter().for_each(|(j, place)| next.set(j as usize, place));
@@ -182,19 +176,19 @@ impl Sweep {
     /// each step, whether somebody moved farther in it than `farther` \[length\] along an axis.
     pub fn steps(
         &self,
-        interaction: &Interaction,
+        flock: &Flock,
         frame: Option<&Frame>,
-        (present, next): (&mut Points, &mut Points),
+        (present, next): (&mut Vectors, &mut Vectors),
         (count, led, farther): (usize, Led<'_>, Option<f64>),
         activity: &mut Activity,
     ) -> Vec<bool> {
         let rows = self.rows.as_ref().expect("a sweep that takes several steps has rows");
-        let (rest, force) = (interaction.rest.as_ref(), interaction.forces.as_ref());
+        let (rest, force) = (flock.rest.as_ref(), flock.forces.as_ref());
         let [rest, force] = [rest, force].map(|points| points.map(|points| [&points.x[..], &points.y[..]]));
         let threads = rayon::current_num_threads();
-        let reference = [&interaction.reference.x[..], &interaction.reference.y[..]];
-        let frame = frame.map(|frame| Following { frame, reference });
-        let terms = self.terms.of(interaction);
+        let reference = [&flock.reference.x[..], &flock.reference.y[..]];
+        let frame = frame.map(|frame| LaggedFrame { frame, reference });
+        let terms = self.terms.of(flock);
         let steps = Steps { rows, terms, rest, force, frame, led, count, farther, threads };
         let even = [&mut present.x[..], &mut present.y[..]];
         let farther = steps.take(activity, even, [&mut next.x[..], &mut next.y[..]]);
@@ -226,7 +220,7 @@ impl Sweep {
     }
 
     /// One step of all rows, in pieces of whole bands.
-    fn sweep_whole(&self, rows: &Rows, interaction: &Interaction, present: &Points, next: &mut Points) {
+    fn sweep_whole(&self, rows: &Rows, flock: &Flock, present: &Vectors, next: &mut Vectors) {
         let bands = rows.band_count();
         let size = if is_parallel(present.len()) { chunk_size(present.len()) } else { usize::MAX };
         let mut pieces = Vec::new();
@@ -241,8 +235,8 @@ impl Sweep {
                 (x, y, first) = (tail_x, tail_y, band + 1);
             }
         }
-        let (rest, force) = (interaction.rest.as_ref(), interaction.forces.as_ref());
-        let terms = self.terms.of(interaction);
+        let (rest, force) = (flock.rest.as_ref(), flock.forces.as_ref());
+        let terms = self.terms.of(flock);
         let work = |(bands, begin, next_x, next_y): (Range<usize>, usize, &mut [f64], &mut [f64])| {
             let mut components = [(0, next_x), (1, next_y)].map(|(axis, next)| {
                 let of = |points| coordinates(points, axis);
@@ -255,7 +249,7 @@ impl Sweep {
             // The torn are swept over, and then again while what they see is in the caches.
             for band in bands {
                 rows.sweep(band..band + 1, TILE, &mut components, &terms);
-                self.torn.sweep(band..band + 1, &interaction.reference, &mut components);
+                self.torn.sweep(band..band + 1, &flock.reference, &mut components);
             }
         };
         match pieces.len() {
@@ -264,8 +258,8 @@ impl Sweep {
         }
     }
 
-    fn moved(&self, j: usize, interaction: &Interaction, seen: &Points) -> [f64; 2] {
-        let target = interaction.target(j, seen);
+    fn moved(&self, j: usize, flock: &Flock, seen: &Vectors) -> [f64; 2] {
+        let target = flock.target(j, seen);
         let damping = self.update.damping;
         if damping == 1.0 {
             return target;
@@ -275,7 +269,7 @@ impl Sweep {
     }
 }
 
-fn coordinates(points: &Points, axis: usize) -> &[f64] {
+fn coordinates(points: &Vectors, axis: usize) -> &[f64] {
     if axis == 0 { &points.x } else { &points.y }
 }
 
@@ -289,9 +283,9 @@ fn is_parallel(particles: usize) -> bool {
 }
 
 /// Runs `work(chunk, x, y)` on every chunk of the points, in parallel where that pays.
-fn for_chunks(points: &mut Points, work: impl Fn(usize, &mut [f64], &mut [f64]) + Sync) {
+fn for_chunks(points: &mut Vectors, work: impl Fn(usize, &mut [f64], &mut [f64]) + Sync) {
     let (parallel, size) = (is_parallel(points.len()), chunk_size(points.len()));
-    let Points { x, y } = points;
+    let Vectors { x, y } = points;
     if parallel {
         x.par_chunks_mut(size)
             .zip(y.par_chunks_mut(size))

@@ -19,11 +19,11 @@ use std::ops::Range;
 use super::gathers::Gathers;
 use super::kernel::{self, Component, MOST_KEPT, Tables};
 use super::terms::Terms;
-use crate::flock::interaction::{Interaction, Weights};
+use crate::flock::law::{Flock, Weights};
 use crate::flock::neighbourhood::Neighbours;
-use crate::flock::points::Points;
 use crate::flock::real::Real;
 use crate::flock::rules::{Mean, Rotation};
+use crate::flock::vectors::Vectors;
 
 /// Shorter runs are not worth the set-up of one.
 const SHORTEST_RUN: usize = 8;
@@ -126,10 +126,10 @@ enum Source<'a> {
 
 impl Rows {
     /// Compiles the rule for the particles that follow; `None` where its mean is not affine in the positions.
-    pub fn compile(interaction: &Interaction, follows: &[bool]) -> Option<Self> {
-        let neighbours = &interaction.neighbours;
+    pub fn compile(flock: &Flock, follows: &[bool]) -> Option<Self> {
+        let neighbours = &flock.neighbours;
         let mut starts: Vec<u32> = Vec::new();
-        let (source, coefficients, gain) = match (interaction.rule.mean, &interaction.weights) {
+        let (source, coefficients, gain) = match (flock.rule.mean, &flock.weights) {
             (Mean::Barycentre, Weights::Equal) => (Source::Equal, Coefficients::Equal, 1.0),
             (Mean::Barycentre, Weights::Scalar(weights)) => {
                 let gain = |j: usize| {
@@ -154,7 +154,7 @@ impl Rows {
             _ => return None,
         };
         let rows = Self { coefficients, gain, ..Self::default() };
-        Some(rows.compiled(neighbours, follows, source, interaction.rest.as_ref()))
+        Some(rows.compiled(neighbours, follows, source, flock.rest.as_ref()))
     }
 
     fn compiled(
@@ -162,7 +162,7 @@ impl Rows {
         neighbours: &Neighbours,
         follows: &[bool],
         source: Source<'_>,
-        rest: Option<&Points>,
+        rest: Option<&Vectors>,
     ) -> Self {
         let reach = reach(neighbours, follows);
         self.is_local = reach <= LARGEST_BAND / 3;

@@ -54,7 +54,7 @@ impl Led<'_> {
 
 /// A frame that looks before the sweep, and where it stands around the body at rest \[length\].
 #[derive(Clone, Copy)]
-pub struct Following<'a, T> {
+pub struct LaggedFrame<'a, T> {
     pub frame: &'a Frame,
     pub reference: [&'a [T]; 2],
 }
@@ -95,7 +95,7 @@ pub struct Steps<'a, T> {
     pub rest: Option<[&'a [T]; 2]>,
     /// Loads, where the rows are of a material.
     pub force: Option<[&'a [T]; 2]>,
-    pub frame: Option<Following<'a, T>>,
+    pub frame: Option<LaggedFrame<'a, T>>,
     pub led: Led<'a>,
     /// How many, from 1 to [`MOST_STEPS`].
     pub count: usize,
@@ -146,7 +146,8 @@ impl<T: Real> Steps<'_, T> {
         let mut rows = Stretch { even, odd, flags: &mut flags };
         let cuts = self.cuts(bands, threads);
         if cuts.len() == 2 {
-            Front { steps: self, axes, stretch: 0..bands, rows: rows.lend() }.run(|_| 0..bands, &mut seen);
+            Wavefront { steps: self, axes, stretch: 0..bands, rows: rows.lend() }
+                .run(|_| 0..bands, &mut seen);
         } else {
             let segments: Vec<Range<usize>> = cuts.windows(2).map(|ends| ends[0]..ends[1]).collect();
             let shrinking = |segment: &Range<usize>, level: usize| {
@@ -190,9 +191,9 @@ impl<T: Real> Steps<'_, T> {
             .part(stretches, self.rows, self.count + 1)
             .into_iter()
             .zip(stretches)
-            .map(|(rows, stretch)| Front { steps: self, axes, stretch: stretch.clone(), rows })
+            .map(|(rows, stretch)| Wavefront { steps: self, axes, stretch: stretch.clone(), rows })
             .collect();
-        let run = |front: Front<'_, T, P>| {
+        let run = |front: Wavefront<'_, T, P>| {
             let stretch = front.stretch.clone();
             let mut seen = Seen::default();
             front.run(|level| range(&stretch, level), &mut seen);
@@ -266,14 +267,14 @@ fn take_part<'a, T>(slice: &mut &'a mut [T], range: Range<usize>) -> &'a mut [T]
 }
 
 /// The steps of some coordinates in a stretch of bands.
-struct Front<'a, T, const P: usize> {
+struct Wavefront<'a, T, const P: usize> {
     steps: &'a Steps<'a, T>,
     axes: [usize; P],
     stretch: Range<usize>,
     rows: Stretch<'a, T, P>,
 }
 
-impl<T: Real, const P: usize> Front<'_, T, P> {
+impl<T: Real, const P: usize> Wavefront<'_, T, P> {
     /// Runs through the bands; `range` names those that take a level, whose ends move by one band a level or not at all.
     fn run(mut self, range: impl Fn(usize) -> Range<usize>, seen: &mut Seen) {
         let count = self.steps.count;
@@ -347,7 +348,7 @@ impl<T: Real, const P: usize> Front<'_, T, P> {
             Component { axis, seen_from: origin, present, rest, force, begin: origin, next }
         });
         compiled.sweep(bands.clone(), tile, &mut components, &steps.terms);
-        if let Some(Following { frame, reference }) = steps.frame {
+        if let Some(LaggedFrame { frame, reference }) = steps.frame {
             for (component, &axis) in components.iter_mut().zip(&*axes) {
                 follow(frame, compiled.particles(bands.clone()), reference[axis], component);
             }

@@ -4,8 +4,8 @@
 //! the same.
 
 use super::Update;
-use crate::flock::interaction::Interaction;
 use crate::flock::lanes::lanes;
+use crate::flock::law::Flock;
 use crate::flock::real::Real;
 use crate::flock::rules::{Feedback, FeedbackReference, Rule};
 
@@ -110,8 +110,8 @@ impl<T: Real> Finish<T> for Damped<'_, T> {
 }
 
 impl Compiled {
-    pub fn new(update: Update, interaction: &Interaction) -> Self {
-        let Interaction { rule, reference, .. } = interaction;
+    pub fn new(update: Update, flock: &Flock) -> Self {
+        let Flock { rule, reference, .. } = flock;
         let distance = |poisson: &crate::flock::rules::Poisson| {
             reference.iter().map(|place| poisson.distance_from_axis(place)).collect()
         };
@@ -120,10 +120,10 @@ impl Compiled {
     }
 
     /// For the body that they were compiled for.
-    pub fn of<'a>(&'a self, interaction: &'a Interaction) -> Terms<'a, f64> {
-        let reference = [&interaction.reference.x[..], &interaction.reference.y[..]];
+    pub fn of<'a>(&'a self, flock: &'a Flock) -> Terms<'a, f64> {
+        let reference = [&flock.reference.x[..], &flock.reference.y[..]];
         let contraction = |poisson: crate::flock::rules::Poisson| {
-            let along = poisson.pull as usize;
+            let along = poisson.axis as usize;
             Contraction { k: poisson.k, along, reference: reference[along], distance: &self.distance }
         };
         let overshoot = |Feedback { factor, reference: from }| Overshoot {

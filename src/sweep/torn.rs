@@ -3,7 +3,7 @@
 //! Along a crack consecutive particles have mostly lost the same neighbours: they are swept as runs, like those of a
 //! [rows](super::rows) but for what stands in for the lost. The others are grouped by what they see, so that
 //! nothing is decided particle by particle. The sums are those of
-//! [`Interaction::target`](crate::flock::interaction::Interaction::target) in the same order: the bits are the same.
+//! [`Flock::target`](crate::flock::law::Flock::target) in the same order: the bits are the same.
 //! What broke renews its band alone.
 
 #[cfg(test)]
@@ -15,7 +15,7 @@ use super::kernel::Component;
 use crate::flock::fracture::{Bonds, StandIn};
 use crate::flock::lanes::{ARITHMETIC, InLanes, in_lanes};
 use crate::flock::neighbourhood::Neighbours;
-use crate::flock::points::Points;
+use crate::flock::vectors::Vectors;
 
 /// Fewest particles of a run, which are summed up so many at a time.
 const SHORT: usize = 8;
@@ -32,7 +32,7 @@ const GROUPS_TRIED: usize = 32;
 
 /// The followers that have lost a neighbour, as runs, band by band.
 #[derive(Clone, Debug, Default)]
-pub struct Torn {
+pub struct DamagedRows {
     bands: Vec<Band>,
 }
 
@@ -45,7 +45,7 @@ struct Band {
     groups: Vec<Alike>,
     members: Vec<u32>,
     /// What those of each run and group see, one after the other.
-    seen: Vec<Seen>,
+    seen: Vec<SeenNeighbour>,
 }
 
 #[derive(Clone, Debug)]
@@ -57,7 +57,7 @@ struct Alike {
 
 /// One of those that the particles of a run or group see; distances are of indices.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Seen {
+enum SeenNeighbour {
     /// A neighbour.
     At(isize),
     /// The ghost of a neighbour, at an offset that is the same for all \[length\].
@@ -68,23 +68,24 @@ enum Seen {
     Opposite(isize),
 }
 
-impl Seen {
+impl SeenNeighbour {
     /// What stands for both this, seen by some, and `other`, seen by the next particle.
-    fn shared(self, other: Seen) -> Option<Seen> {
+    fn shared(self, other: SeenNeighbour) -> Option<SeenNeighbour> {
         match (self, other) {
-            (Seen::Offset(a, of_a), Seen::Offset(b, of_b)) if a == b => {
+            (SeenNeighbour::Offset(a, of_a), SeenNeighbour::Offset(b, of_b)) if a == b => {
                 let same = of_a.map(f64::to_bits) == of_b.map(f64::to_bits);
-                Some(if same { self } else { Seen::Reference(a) })
+                Some(if same { self } else { SeenNeighbour::Reference(a) })
             }
-            (Seen::Reference(a), Seen::Offset(b, _)) | (Seen::Offset(a, _), Seen::Reference(b)) => {
-                (a == b).then_some(Seen::Reference(a))
+            (SeenNeighbour::Reference(a), SeenNeighbour::Offset(b, _))
+            | (SeenNeighbour::Offset(a, _), SeenNeighbour::Reference(b)) => {
+                (a == b).then_some(SeenNeighbour::Reference(a))
             }
             _ => (self == other).then_some(self),
         }
     }
 }
 
-impl Torn {
+impl DamagedRows {
     /// Nobody yet, in these bands one after the other.
     pub fn new(bands: impl Iterator<Item = Range<usize>>) -> Self {
         let empty = |particles| Band { particles, ..Band::default() };
@@ -106,7 +107,7 @@ impl Torn {
         &mut self,
         particles: impl IntoIterator<Item = usize>,
         follows: &[bool],
-        (bonds, neighbours, reference): (&Bonds, &Neighbours, &Points),
+        (bonds, neighbours, reference): (&Bonds, &Neighbours, &Vectors),
     ) {
         let band_of = |j| self.bands.partition_point(|band| band.particles.end <= j);
         let mut stale: Vec<usize> = particles.into_iter().map(band_of).collect();
@@ -122,7 +123,7 @@ impl Torn {
     }
 
     /// Computes both coordinates of the targets of those in some bands, whatever stands there.
-    pub fn sweep(&self, bands: Range<usize>, reference: &Points, components: &mut [Component<'_, f64>; 2]) {
+    pub fn sweep(&self, bands: Range<usize>, reference: &Vectors, components: &mut [Component<'_, f64>; 2]) {
         in_lanes::<8, ARITHMETIC>(Torns { bands: &self.bands[bands], reference, components });
     }
 }
@@ -132,23 +133,23 @@ fn seen_by<'a>(
     j: usize,
     bonds: &'a Bonds,
     neighbours: &'a Neighbours,
-    reference: &'a Points,
-) -> impl Iterator<Item = Seen> + Clone + 'a {
+    reference: &'a Vectors,
+) -> impl Iterator<Item = SeenNeighbour> + Clone + 'a {
     let distance = move |k: usize| k as isize - j as isize;
     neighbours.bonds(j).filter_map(move |bond| {
         let there = distance(neighbours.index[bond] as usize);
         if !bonds.is_broken(bond) {
-            return Some(Seen::At(there));
+            return Some(SeenNeighbour::At(there));
         }
         Some(match bonds.stand_in(j, bond, neighbours, reference)? {
-            StandIn::Offset(lost) => Seen::Offset(there, lost),
-            StandIn::Opposite(k) => Seen::Opposite(distance(k)),
+            StandIn::Offset(lost) => SeenNeighbour::Offset(there, lost),
+            StandIn::Opposite(k) => SeenNeighbour::Opposite(distance(k)),
         })
     })
 }
 
 /// If all that some see can stand for what another sees as well, makes it so.
-fn shares(known: &mut [Seen], seen: &[Seen]) -> bool {
+fn shares(known: &mut [SeenNeighbour], seen: &[SeenNeighbour]) -> bool {
     let fits = known.len() == seen.len() && known.iter().zip(seen).all(|(a, &b)| a.shared(b).is_some());
     if fits {
         known.iter_mut().zip(seen).for_each(|(a, &b)| *a = a.shared(b).unwrap_or(*a));
@@ -158,11 +159,11 @@ fn shares(known: &mut [Seen], seen: &[Seen]) -> bool {
 
 impl Band {
     /// Parts the torn particles, ascending, into runs and groups.
-    fn compile<S: Iterator<Item = Seen>>(&mut self, torn: &[usize], seen_by: impl Fn(usize) -> S) {
-        let mut groups: Vec<(Vec<Seen>, Vec<u32>)> = Vec::new();
+    fn compile<S: Iterator<Item = SeenNeighbour>>(&mut self, torn: &[usize], seen_by: impl Fn(usize) -> S) {
+        let mut groups: Vec<(Vec<SeenNeighbour>, Vec<u32>)> = Vec::new();
         let mut at = 0;
         while at < torn.len() {
-            let mut known: Vec<Seen> = seen_by(torn[at]).collect();
+            let mut known: Vec<SeenNeighbour> = seen_by(torn[at]).collect();
             let begin = at;
             at += 1;
             while at < torn.len()
@@ -195,7 +196,7 @@ impl Band {
         }
     }
 
-    fn keep(&mut self, seen: &[Seen]) -> Range<usize> {
+    fn keep(&mut self, seen: &[SeenNeighbour]) -> Range<usize> {
         let begin = self.seen.len();
         self.seen.extend_from_slice(seen);
         begin..self.seen.len()
@@ -205,7 +206,7 @@ impl Band {
 /// The torn of some bands, whose numbers of particles say how many are summed up at a time.
 struct Torns<'a, 'b> {
     bands: &'a [Band],
-    reference: &'a Points,
+    reference: &'a Vectors,
     components: &'a mut [Component<'b, f64>; 2],
 }
 
@@ -217,11 +218,11 @@ impl InLanes for Torns<'_, '_> {
 }
 
 #[inline(always)]
-fn sweep_bands(bands: &[Band], reference: &Points, components: &mut [Component<'_, f64>; 2]) {
+fn sweep_bands(bands: &[Band], reference: &Vectors, components: &mut [Component<'_, f64>; 2]) {
     for band in bands {
         for Alike { particles, seen } in &band.runs {
             for (axis, component) in components.iter_mut().enumerate() {
-                let look = Look { seen: &band.seen[seen.clone()], axis, reference };
+                let look = RowTerms { seen: &band.seen[seen.clone()], axis, reference };
                 if particles.len() < LONG {
                     sweep_run::<SHORT>(particles.clone(), look, component);
                 } else {
@@ -231,7 +232,7 @@ fn sweep_bands(bands: &[Band], reference: &Points, components: &mut [Component<'
         }
         for Alike { particles, seen } in &band.groups {
             for (axis, component) in components.iter_mut().enumerate() {
-                let look = Look { seen: &band.seen[seen.clone()], axis, reference };
+                let look = RowTerms { seen: &band.seen[seen.clone()], axis, reference };
                 sweep_group(&band.members[particles.clone()], look, component);
             }
         }
@@ -240,7 +241,11 @@ fn sweep_bands(bands: &[Band], reference: &Points, components: &mut [Component<'
 
 /// At least `W` particles, `W` at a time.
 #[inline(always)]
-fn sweep_run<const W: usize>(particles: Range<usize>, look: Look<'_>, component: &mut Component<'_, f64>) {
+fn sweep_run<const W: usize>(
+    particles: Range<usize>,
+    look: RowTerms<'_>,
+    component: &mut Component<'_, f64>,
+) {
     for from in particles.clone().step_by(W) {
         // The last ones overlap those before them, which come out the same again.
         let from = from.min(particles.end - W);
@@ -255,7 +260,7 @@ fn sweep_run<const W: usize>(particles: Range<usize>, look: Look<'_>, component:
 
 /// Not compiled for wide vectors, which would gather what they hold more slowly than it is loaded.
 #[inline(never)]
-fn sweep_group(particles: &[u32], look: Look<'_>, component: &mut Component<'_, f64>) {
+fn sweep_group(particles: &[u32], look: RowTerms<'_>, component: &mut Component<'_, f64>) {
     for piece in particles.chunks(SCATTERED) {
         // A last piece too short is filled up with one of its own.
         let mut which = [piece[0] as usize; SCATTERED];
@@ -277,13 +282,13 @@ struct Lanes<const W: usize>([f64; W]);
 
 /// What some particles see of one coordinate.
 #[derive(Clone, Copy)]
-struct Look<'a> {
-    seen: &'a [Seen],
+struct RowTerms<'a> {
+    seen: &'a [SeenNeighbour],
     axis: usize,
-    reference: &'a Points,
+    reference: &'a Vectors,
 }
 
-impl Look<'_> {
+impl RowTerms<'_> {
     /// What [`Rule::target`](crate::flock::rules::Rule::target) computes: the rest offset is added to the mean, also
     /// where it is zero, which makes 0.0 of -0.0; whoever sees nobody stays. `of` reads numbers, those of particle
     /// number `first` first, at a distance of indices from the particles.
@@ -302,16 +307,16 @@ impl Look<'_> {
         let mut sum = Lanes([-0.0; W]);
         for &seen in self.seen {
             match seen {
-                Seen::At(distance) => {
+                SeenNeighbour::At(distance) => {
                     let there = present(distance);
                     (0..W).for_each(|k| sum.0[k] += there[k]);
                 }
-                Seen::Offset(_, lost) => (0..W).for_each(|k| sum.0[k] += here[k] + lost[self.axis]),
-                Seen::Reference(distance) => {
+                SeenNeighbour::Offset(_, lost) => (0..W).for_each(|k| sum.0[k] += here[k] + lost[self.axis]),
+                SeenNeighbour::Reference(distance) => {
                     let [there, own] = [distance, 0].map(|distance| of(reference, 0, distance));
                     (0..W).for_each(|k| sum.0[k] += here[k] + (there[k] - own[k]));
                 }
-                Seen::Opposite(distance) => {
+                SeenNeighbour::Opposite(distance) => {
                     let there = present(distance);
                     (0..W).for_each(|k| sum.0[k] += 2.0 * here[k] - there[k]);
                 }

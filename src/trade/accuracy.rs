@@ -7,9 +7,9 @@
 
 use super::grid::{RuleChoice, body_overrides};
 use super::study::{Load, error_of};
+use crate::compare::reference::Effort;
 use crate::compare::run::{SceneTruth, plan_led_by, truth_of};
-use crate::compare::truth::Effort;
-use crate::continuum::equilibrium::settle;
+use crate::continuum::equilibrium::solve_equilibrium;
 use crate::continuum::run::Outcome;
 use crate::flock::role::Role;
 use crate::scene::raw::{RawMean, RawRegion};
@@ -131,7 +131,7 @@ impl<'a> Body<'a> {
     fn solve(&self, more: &[String]) -> Result<Solved, SceneError> {
         let scene = (self.load)(&[&self.overrides, more].concat())?;
         let request = scene.equilibrium.map(|asked| asked.request).unwrap_or_default();
-        let outcome: Outcome = settle(&scene, &request, plan_led_by(&scene, &self.truth.truth)?)?;
+        let outcome: Outcome = solve_equilibrium(&scene, &request, plan_led_by(&scene, &self.truth.truth)?)?;
         let own = self.truth.truth.error().displacement;
         let follows = outcome.engine.roles().contains(&Role::Follower);
         let error = match error_of(&outcome, &self.truth.truth) {

@@ -14,7 +14,7 @@ pub struct Grid {
     pub tolerances: Vec<f64>,
     pub solvers: Vec<Solver>,
     /// Larger bodies are left out.
-    pub most_particles: usize,
+    pub max_particles: usize,
     /// Sweeps (damped Jacobi, Gauss-Seidel) of larger bodies are left out: they take forever.
     pub most_particles_to_sweep: usize,
     /// Runs of each setting; the median time counts.
@@ -27,7 +27,7 @@ impl Default for Grid {
             spacings: vec![2.0, 1.0, 0.5, 0.25, 0.125],
             tolerances: vec![1e-2, 1e-4, 1e-6, 1e-8],
             solvers: Solver::ALL.to_vec(),
-            most_particles: 20_000,
+            max_particles: 20_000,
             most_particles_to_sweep: 2_000,
             repeats: 3,
         }
@@ -41,7 +41,7 @@ impl Grid {
             spacings: vec![1.0, 0.5],
             tolerances: vec![1e-2, 1e-6],
             solvers: vec![Solver::ConjugateGradients, Solver::Multigrid],
-            most_particles: 3_000,
+            max_particles: 3_000,
             repeats: 1,
             ..Self::default()
         }

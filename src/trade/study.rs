@@ -6,13 +6,13 @@ use std::time::Instant;
 use serde::Serialize;
 
 use super::grid::{Grid, RuleChoice, Setting, body_overrides, settings, solver_overrides};
+use crate::compare::reference::Effort;
+use crate::compare::reference::Reference;
 use crate::compare::run::{SceneTruth, plan_led_by, truth_of};
-use crate::compare::truth::Effort;
-use crate::compare::truth::Truth;
-use crate::continuum::equilibrium::settle;
+use crate::continuum::equilibrium::solve_equilibrium;
 use crate::continuum::run::Outcome as RunOutcome;
-use crate::flock::points::{Points, distance};
 use crate::flock::role::Role;
+use crate::flock::vectors::{Vectors, distance};
 use crate::scene::{Scene, SceneError};
 
 /// What became of a setting.
@@ -80,7 +80,7 @@ pub fn run(load: Load<'_>, grid: &Grid, tell: &mut dyn FnMut(&Setting)) -> Resul
         for &spacing in &grid.spacings {
             let overrides = body_overrides(&scene, rule, spacing);
             let particles = match load(&overrides).and_then(|scene| plan_led_by(&scene, &truth.truth)) {
-                Ok(plan) if plan.count() <= grid.most_particles => plan.count(),
+                Ok(plan) if plan.count() <= grid.max_particles => plan.count(),
                 Ok(_) => continue,
                 Err(error) => {
                     study.points.push(refused(rule, spacing, &error));
@@ -108,7 +108,7 @@ pub fn run(load: Load<'_>, grid: &Grid, tell: &mut dyn FnMut(&Setting)) -> Resul
 fn finest_truth(load: Load<'_>, scene: &Scene, grid: &Grid) -> Result<SceneTruth, SceneError> {
     let mut spacings = grid.spacings.clone();
     spacings.sort_by(f64::total_cmp);
-    let fits = |truth: &SceneTruth| truth.layout.body.count() <= grid.most_particles;
+    let fits = |truth: &SceneTruth| truth.layout.body.count() <= grid.max_particles;
     for &spacing in spacings.iter().filter(|&&spacing| spacing <= 1.0) {
         let finer = load(&body_overrides(scene, RuleChoice::Material, spacing));
         if let Some(truth) =
@@ -131,13 +131,13 @@ fn reason(error: &SceneError) -> String {
     error.problems().first().map_or_else(String::new, |problem| problem.message.clone())
 }
 
-fn measure(scene: &Scene, truth: &Truth, setting: Setting, particles: usize, repeats: usize) -> Point {
+fn measure(scene: &Scene, truth: &Reference, setting: Setting, particles: usize, repeats: usize) -> Point {
     let mut seconds = Vec::new();
     let mut last = None;
     for _ in 0..repeats.max(1) {
         let start = Instant::now();
         let settled = plan_led_by(scene, truth).and_then(|plan| match &scene.equilibrium {
-            Some(asked) => settle(scene, &asked.request, plan),
+            Some(asked) => solve_equilibrium(scene, &asked.request, plan),
             None => Err(scene.refuse("equilibrium", "no solver is set", "set one")),
         });
         seconds.push(start.elapsed().as_secs_f64());
@@ -163,11 +163,11 @@ fn measure(scene: &Scene, truth: &Truth, setting: Setting, particles: usize, rep
 }
 
 /// Relative L2 distance of the followers from where the truth has them; `None` where it has none of them.
-pub(super) fn error_of(outcome: &RunOutcome, truth: &Truth) -> Option<f64> {
+pub(super) fn error_of(outcome: &RunOutcome, truth: &Reference) -> Option<f64> {
     let engine = &outcome.engine;
     let reference = &engine.body().reference;
     let followers = (0..reference.len()).filter(|&i| engine.roles()[i] == Role::Follower);
-    let places: Points = followers.clone().map(|i| reference.get(i)).collect();
+    let places: Vectors = followers.clone().map(|i| reference.get(i)).collect();
     let known = truth.displacements_at(&places).ok()?;
     let (mut off, mut size) = (0.0, 0.0);
     for (i, t) in followers.zip(known.iter()) {

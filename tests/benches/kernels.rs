@@ -7,13 +7,13 @@ use divan::Bencher;
 use divan::counter::ItemsCount;
 use flockform::flock::body::{Body, Cut};
 use flockform::flock::fracture::{Bonds, Ghosts, Threshold};
-use flockform::flock::interaction::{Interaction, Weights};
 use flockform::flock::lattice::{Lattice, LatticeKind};
+use flockform::flock::law::{Flock, Weights};
 use flockform::flock::neighbourhood::Neighbourhood;
 use flockform::flock::numbering::order_in_columns;
-use flockform::flock::points::Points;
 use flockform::flock::role::Role;
 use flockform::flock::rules::{Mean, Rule};
+use flockform::flock::vectors::Vectors;
 use flockform::sweep::{Activity, Led, Sweep, Update};
 
 const SIDES: [u32; 3] = [12, 128, 512];
@@ -23,7 +23,7 @@ fn main() {
 }
 
 /// A square body led all around, and where its particles are.
-fn body(side: u32, rule: Rule, neighbourhood: &Neighbourhood) -> (Interaction, Vec<Role>, Points) {
+fn body(side: u32, rule: Rule, neighbourhood: &Neighbourhood) -> (Flock, Vec<Role>, Vectors) {
     let lattice = Lattice::new(LatticeKind::Square { spacing: 1.0 }, [0.0; 2], 0.0);
     let cut = Cut::Count { columns: side, rows: side };
     let (body, neighbours) = Body::build(lattice, &cut, neighbourhood, None).expect("fits");
@@ -32,17 +32,16 @@ fn body(side: u32, rule: Rule, neighbourhood: &Neighbourhood) -> (Interaction, V
         body.sites.iter().map(|site| if edge(site) { Role::Clamped } else { Role::Follower }).collect();
     let present = body.reference.iter().map(|[x, y]| [x + 0.01 * y.sin(), y + 0.01 * x.sin()]).collect();
     let (reference, weights) = (body.reference, Weights::Equal);
-    let interaction =
-        Interaction { rule, reference, neighbours, weights, forces: None, rest: None, bonds: None };
-    (interaction, roles, present)
+    let flock = Flock { rule, reference, neighbours, weights, forces: None, rest: None, bonds: None };
+    (flock, roles, present)
 }
 
 fn bench_steps(bencher: Bencher, side: u32, rule: Rule, neighbourhood: &Neighbourhood) {
-    let (interaction, roles, mut present) = body(side, rule, neighbourhood);
-    let sweep = Sweep::compile(Update::default(), &interaction, &roles);
+    let (flock, roles, mut present) = body(side, rule, neighbourhood);
+    let sweep = Sweep::compile(Update::default(), &flock, &roles);
     let mut next = present.clone();
     bencher.counter(ItemsCount::new(sweep.followers())).bench_local(|| {
-        sweep.step(&interaction, None, &present, &mut next);
+        sweep.step(&flock, None, &present, &mut next);
         std::mem::swap(&mut present, &mut next);
     });
 }
@@ -54,7 +53,7 @@ fn barycentre_of_4(bencher: Bencher, side: u32) {
 
 #[divan::bench(args = SIDES)]
 fn barycentre_of_8(bencher: Bencher, side: u32) {
-    bench_steps(bencher, side, Rule::BARYCENTRE, &Neighbourhood::Ring { radius: 1 });
+    bench_steps(bencher, side, Rule::BARYCENTRE, &Neighbourhood::Chebyshev { radius: 1 });
 }
 
 /// A rule that no loop is compiled for.
@@ -66,20 +65,19 @@ fn distance_weights(bencher: Bencher, side: u32) {
 
 #[divan::bench(args = SIDES)]
 fn sixteen_steps_together(bencher: Bencher, side: u32) {
-    let (interaction, roles, mut present) =
-        body(side, Rule::BARYCENTRE, &Neighbourhood::First { keep: None });
-    let sweep = Sweep::compile(Update::default(), &interaction, &roles);
+    let (flock, roles, mut present) = body(side, Rule::BARYCENTRE, &Neighbourhood::First { keep: None });
+    let sweep = Sweep::compile(Update::default(), &flock, &roles);
     let (mut next, mut activity) = (present.clone(), Activity::default());
     bencher.counter(ItemsCount::new(16 * sweep.followers())).bench_local(|| {
         let places = (&mut present, &mut next);
-        sweep.steps(&interaction, None, places, (16, Led::NOBODY, None), &mut activity)
+        sweep.steps(&flock, None, places, (16, Led::NOBODY, None), &mut activity)
     });
 }
 
 #[divan::bench(args = SIDES)]
 fn bonds_that_do_not_break(bencher: Bencher, side: u32) {
-    let (interaction, roles, present) = body(side, Rule::BARYCENTRE, &Neighbourhood::First { keep: None });
-    let Interaction { neighbours, reference, .. } = &interaction;
+    let (flock, roles, present) = body(side, Rule::BARYCENTRE, &Neighbourhood::First { keep: None });
+    let Flock { neighbours, reference, .. } = &flock;
     let mut bonds = Bonds::new(Some(Threshold::Stretch(2.0)), Ghosts::Lattice, neighbours);
     bencher.counter(ItemsCount::new(neighbours.index.len() / 2)).bench_local(|| {
         bonds.break_stretched(1, neighbours, (&**reference, &present), &roles, &mut Vec::new());

@@ -71,7 +71,7 @@ fn assert_sound(seen: &Value) {
     assert!(requests.iter().all(is_own), "{requests:?}");
 }
 
-/// What holds of every film: it plays, stops, steps, scrubs to the end, zooms and looks different coloured by at least
+/// What holds of every animation: it plays, stops, steps, scrubs to the end, zooms and looks different coloured by at least
 /// `colours` of its quantities.
 fn assert_film_works(seen: &Value, colours: u64) {
     let frames = &seen["frames"];

@@ -156,7 +156,7 @@ fn weights_of_a_particle_sum_to_the_identity() {
 #[test]
 fn an_orthotropic_sheet_comes_back_along_its_fibres() {
     for lattice in LATTICES {
-        let fibres = ["--young", "9,1", "--poisson", "0.4", "--shear", "0.6", "--fibres", "30"];
+        let fibres = ["--young", "9,1", "--poisson", "0.4", "--shear", "0.6", "--fiber-angle", "30"];
         let report = json(&[lattice, &fibres].concat());
         let found = &report["material"]["engineering"];
         assert!(close(&found["angle"], 30.0, 1e-9) && close(&found["young"][0], 9.0, 1e-9), "{found}");
@@ -175,7 +175,7 @@ fn a_rule_that_no_symmetric_stress_has_says_so() {
 #[test]
 fn an_unstable_rule_says_so_and_offers_no_damping() {
     let weights = "1,1,1,1,-0.3,-0.3,-0.3,-0.3";
-    let arguments = ["--lattice", "square", "--neighbours", "straight", "--weights", weights];
+    let arguments = ["--lattice", "square", "--neighbours", "collinear", "--weights", weights];
     let report = json(&arguments);
     assert_eq!(report["waves"]["stable"], false);
     assert!(report["waves"]["damping_limit"].is_null());
@@ -198,7 +198,7 @@ fn a_second_gradient_reports_a_positive_length_squared() {
     assert!(close(&report["gradient"]["least"], 16.0 - 0.125, 1e-2), "{}", report["gradient"]);
     refused(&["--lattice", "square", "--weights", "gradient:0.3"], &["--weights", "too short"]);
     refused(&["--lattice", "honeycomb", "--weights", "gradient:3"], &["honeycomb", "Bravais"]);
-    refused(&["--lattice", "square", "--weights", "gradient:3", "--neighbours", "ring"], &["straight"]);
+    refused(&["--lattice", "square", "--weights", "gradient:3", "--neighbours", "chebyshev"], &["collinear"]);
 }
 
 #[test]
@@ -236,7 +236,7 @@ fn options_that_make_no_question_are_refused_with_the_remedy() {
     refused(&["--lattice", "square", "--neighbours", "within:1e9"], &["32 spacings"]);
     refused(&["--lattice", "square", "--neighbours", "offsets:1,0;1,0"], &["twice"]);
     refused(&["--lattice", "square", "--neighbours", "offsets:0,0"], &["not both 0"]);
-    refused(&["--lattice", "honeycomb", "--neighbours", "ring"], &["honeycomb"]);
+    refused(&["--lattice", "honeycomb", "--neighbours", "chebyshev"], &["honeycomb"]);
     refused(&["--lattice", "square", "--weights", "1,1"], &["2 weights", "4 neighbours"]);
     refused(&["--lattice", "square", "--weights", "1,1,x,1"], &["`x`"]);
     refused(&["--lattice", "square", "--weights", "-1,-1,-1,-1"], &["positive"]);
@@ -244,7 +244,7 @@ fn options_that_make_no_question_are_refused_with_the_remedy() {
     refused(&["--lattice", "square", "--weights", "nan,1,1,1"], &["finite"]);
     let cancels = "1,1,1,1,-0.25,-0.25,-0.25,-0.25";
     refused(
-        &["--lattice", "square", "--neighbours", "straight", "--weights", cancels],
+        &["--lattice", "square", "--neighbours", "collinear", "--weights", cancels],
         &["long waves cost nothing"],
     );
     refused(

@@ -328,7 +328,7 @@ fn what_needs_a_lattice_is_refused_of_a_cloud_with_the_remedy() {
     set("frame=lagged", &["frame", "use frame = \"none\""]);
     set("material={kind=\"isotropic\",young=1.0,poisson=0.3}", &["material", "cells of a lattice"]);
     set("loads=[{kind=\"body\",force=[0.0,1.0]}]", &["loads"]);
-    set("roles[1].motion={kind=\"truth\"}", &["roles[1].motion", "motion of their own"]);
+    set("roles[1].motion={kind=\"reference\"}", &["roles[1].motion", "motion of their own"]);
     set("equilibrium={}", &["equilibrium", "stop = { tolerance"]);
     set("rule.mean={kind=\"material\"}", &["rule.mean", "barycentre"]);
     set("rule.weights={kind=\"list\",values=[1.0]}", &["rule.weights", "solved"]);

@@ -245,7 +245,7 @@ fn a_killed_run_leaves_nothing_at_the_output_s_place() {
 
 #[test]
 fn a_missing_scene_is_refused_with_the_nearest_name() {
-    refused(&["run", "tensoin"], &["no bundled scene `tensoin`", "`tension`", "flockform scenes"]);
+    refused(&["run", "tensoin"], &["no bundled scene `tensoin`", "`tension`", "flockform list scenes"]);
     refused(&["run", "scenes/nowhere.toml"], &["scenes/nowhere.toml", "cannot be read"]);
     refused(&["plan", "fractur"], &["`fracture`"]);
 }
@@ -329,7 +329,7 @@ fn regions_roles_and_probes_that_miss_the_body_are_refused() {
 #[test]
 fn rules_that_contradict_themselves_are_refused() {
     refused_with("tension", &["neighbours={kind=\"first\",keep=9}"], &["4 first neighbours"]);
-    refused_with("lattice-honeycomb", &["neighbours={kind=\"ring\",radius=1}"], &["honeycomb"]);
+    refused_with("lattice-honeycomb", &["neighbours={kind=\"chebyshev\",radius=1}"], &["honeycomb"]);
     refused_with("lattice-hexagonal", &["neighbours={kind=\"offsets\",offsets=[[1,0]]}"], &["no site"]);
     refused_with("tension", &["rule.weights={kind=\"list\",values=[1,1,-1,-1]}"], &["add up to 0"]);
     refused_with("tension", &["rule.weights={kind=\"list\",values=[1,1]}"], &["2 weights", "4 neighbours"]);
@@ -368,6 +368,14 @@ fn a_broken_displacement_file_is_refused_with_its_line() {
 }
 
 #[test]
+fn old_names_are_refused_with_the_new_ones() {
+    refused(&["scenes"], &["`list scenes`"]);
+    refused(&["trade", "grips", "--most-particles", "9"], &["`--max-particles`"]);
+    refused(&["run", "tension", "--set", "stop.growth=9"], &["`divergence_ratio`"]);
+    refused(&["run", "tension", "--set", "neighbours={ kind = 'ring', radius = 1 }"], &["\"chebyshev\""]);
+}
+
+#[test]
 fn unknown_arguments_are_refused() {
     refused(&["run"], &["SCENE"]);
     refused(&["fly"], &["fly"]);
@@ -386,7 +394,7 @@ fn an_output_that_cannot_be_written_is_refused() {
 
 #[test]
 fn scenes_are_listed_with_a_line_each() {
-    let said = run_in(temporary().path(), &["scenes"]);
+    let said = run_in(temporary().path(), &["list", "scenes"]);
     assert_eq!(said.lines().count(), flockform::scene::bundled::SCENES.len());
     assert!(said.lines().all(|line| line.split_whitespace().count() > 3), "{said}");
 }
@@ -420,7 +428,7 @@ fn completions_and_help_have_what_they_promise() {
     for shell in ["bash", "zsh", "fish"] {
         assert!(run_in(folder.path(), &["completions", shell]).contains("flockform"));
     }
-    for command in ["run", "scenes", "plan", "schema", "completions", "material"] {
+    for command in ["run", "list", "plan", "schema", "completions", "material"] {
         assert!(run_in(folder.path(), &[command, "--help"]).contains("Example"), "{command}");
     }
 }

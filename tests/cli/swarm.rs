@@ -82,7 +82,7 @@ fn nodes_refuse_what_ros_cannot_mean() {
 #[test]
 fn swarms_are_listed_and_their_format_is_printed() {
     let folder = temporary();
-    let listed = flockform(&["swarms"], folder.path());
+    let listed = flockform(&["list", "swarms"], folder.path());
     assert!(listed.status.success());
     assert!(text(&listed.stdout).lines().any(|line| line.starts_with("gap ") && line.contains("hundred")));
     let schema = flockform(&["schema", "--swarm"], folder.path());

@@ -6,14 +6,14 @@ use flockform::compare::measures::{Comparison, Sides};
 use flockform::compare::run::{SceneTruth, truth_of};
 use flockform::fem::Effort;
 use flockform::flock::body::Body;
-use flockform::flock::points::Points;
 use flockform::flock::rules::Rotation;
+use flockform::flock::vectors::Vectors;
 use flockform::scene::bundled;
 
 use crate::support::*;
 
 /// Displacements of a reference file at the particles.
-fn reference(aspect: u32, body: &Body) -> Points {
+fn reference(aspect: u32, body: &Body) -> Vectors {
     // Beside the checkout, or above it where the checkout is a worktree in a folder of such.
     let name = format!("shared/reference/beam_aspect{aspect}.csv");
     let above = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().skip(1).map(|folder| folder.join(&name));
@@ -118,7 +118,7 @@ fn the_papers_rule_has_its_large_errors_whatever_the_neighbours() {
 #[test]
 fn neighbours_beyond_those_of_the_cells_change_nothing_in_the_material_rule() {
     let few = compared("beam", &[]);
-    let ring = "neighbours={ kind = \"ring\", radius = 2 }";
+    let ring = "neighbours={ kind = \"chebyshev\", radius = 2 }";
     for many in [compared("beam-second", &[]), compared("beam", &[ring])] {
         assert!(largest_difference(&few.rule, &many.rule) < 1e-6);
     }

@@ -1,8 +1,8 @@
 //! The measures are zero for equal fields and known for fields that differ in a known way.
 
 use flockform::compare::measures::{Comparison, Sides, von_mises};
-use flockform::flock::points::Points;
 use flockform::flock::rules::Rotation;
+use flockform::flock::vectors::Vectors;
 use flockform::material::cells::Cells;
 use flockform::material::elastic::Plane;
 use flockform::material::stress::strain_energy;
@@ -10,15 +10,15 @@ use flockform::material::weights::MaterialWeights;
 
 use crate::support::*;
 
-fn bent(reference: &Points) -> Points {
+fn bent(reference: &Vectors) -> Vectors {
     reference.iter().map(|[x, y]| [0.01 * x * y, -0.005 * x * x + 0.002 * y]).collect()
 }
 
-fn scaled(field: &Points, by: f64) -> Points {
+fn scaled(field: &Vectors, by: f64) -> Vectors {
     field.iter().map(|u| u.map(|u| by * u)).collect()
 }
 
-fn compare(cells: &Cells, rule: &Points, truth: &Points, follows: &[bool]) -> Comparison {
+fn compare(cells: &Cells, rule: &Vectors, truth: &Vectors, follows: &[bool]) -> Comparison {
     let elastic = sheet(1000.0, 0.33, Plane::Stress);
     Comparison::of(&Sides { cells, elastic: &elastic, rotation: Rotation::Small, rule, truth, follows })
         .expect("measures")
@@ -81,8 +81,8 @@ fn the_energy_is_that_of_the_material_weights() {
     for kind in KINDS {
         let (body, cells) = sample(kind);
         let elastic = fibres();
-        let mates = cells.mates(body.count());
-        let weights = MaterialWeights::assemble(&cells, &body, mates, &elastic).expect("assembles");
+        let cell_neighbours = cells.cell_neighbours(body.count());
+        let weights = MaterialWeights::assemble(&cells, &body, cell_neighbours, &elastic).expect("assembles");
         let field = bent(&body.reference);
         let energy = strain_energy(&cells, &elastic, &field, Rotation::Small).expect("has stiffness");
         assert!((energy / weights.energy(&field) - 1.0).abs() < 1e-11, "{kind:?}");
@@ -93,9 +93,9 @@ fn the_energy_is_that_of_the_material_weights() {
 fn a_rigid_motion_costs_no_energy_and_no_stress() {
     for kind in KINDS {
         let (body, cells) = sample(kind);
-        let turned: Points = body.reference.iter().map(|[x, y]| [5.0 - 0.3 * y, 0.3 * x - 7.0]).collect();
+        let turned: Vectors = body.reference.iter().map(|[x, y]| [5.0 - 0.3 * y, 0.3 * x - 7.0]).collect();
         // The same followed by a turn of a right angle and more.
-        let far: Points =
+        let far: Vectors =
             body.reference.iter().map(|[x, y]| [-1.6 * x - 0.8 * y, 0.8 * x - 1.6 * y]).collect();
         for (field, rotation) in [(turned, Rotation::Small), (far, Rotation::Corotated)] {
             let energy = strain_energy(&cells, &fibres(), &field, rotation).expect("has stiffness");

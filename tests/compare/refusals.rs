@@ -32,7 +32,7 @@ fn scenes_without_a_material_or_without_one_state_of_rest_are_refused() {
 
 #[test]
 fn a_body_that_the_truth_cannot_hold_is_refused_where_the_roles_stand() {
-    let free = "roles=[{ region = { kind = \"edge\", side = \"right\" }, role = \"leader\", motion = { kind = \"truth\" } }]";
+    let free = "roles=[{ region = { kind = \"edge\", side = \"right\" }, role = \"leader\", motion = { kind = \"reference\" } }]";
     refused(
         "beam-paper",
         &[free],

@@ -6,7 +6,7 @@ use flockform::compare::run::{Compared, compare};
 use flockform::fem::Effort;
 use flockform::flock::body::{Body, Cut};
 use flockform::flock::lattice::{Lattice, LatticeKind};
-use flockform::flock::points::Points;
+use flockform::flock::vectors::Vectors;
 use flockform::material::cells::{Cells, neighbourhood, without_loose_sites};
 use flockform::material::elastic::{Constants, Elastic, Plane};
 use flockform::scene::bundled;
@@ -43,7 +43,7 @@ pub fn sample(kind: LatticeKind) -> (Body, Cells) {
     build(Lattice::new(kind, [3.0, -2.0], 0.3), 7, 7)
 }
 
-pub fn largest_difference(a: &Points, b: &Points) -> f64 {
+pub fn largest_difference(a: &Vectors, b: &Vectors) -> f64 {
     a.iter().zip(b.iter()).map(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1])).fold(0.0, f64::max)
 }
 

@@ -1,8 +1,8 @@
 //! Action is reaction, and rest is a minimum of an energy.
 
-use flockform::flock::interaction::Weights;
-use flockform::flock::points::{Points, distance};
+use flockform::flock::law::Weights;
 use flockform::flock::rules::Corner;
+use flockform::flock::vectors::{Vectors, distance};
 use flockform::solve::equilibrium::Solver;
 
 use crate::support::*;
@@ -24,7 +24,7 @@ fn reactions_carry_the_load_and_its_moment_in_the_deformed_state() {
             assert!(beam.of_the_end(&solved.displacement)[1] > 0.2 * length, "bends far");
             let held = (0..at.len()).filter(|&i| !beam.follows[i]);
             let reactions = resultant(held.map(|i| {
-                let (force, load) = (beam.interaction.force(i, &at), beam.load(i));
+                let (force, load) = (beam.flock.force(i, &at), beam.load(i));
                 (at.get(i), [-force[0] - load[0], -force[1] - load[1]])
             }));
             let loads = resultant((0..at.len()).map(|i| (at.get(i), beam.load(i))));
@@ -40,9 +40,9 @@ fn reactions_carry_the_load_and_its_moment_in_the_deformed_state() {
     }
 }
 
-fn energy(beam: &Beam, at: &Points) -> f64 {
-    let Weights::Matrix(weights) = &beam.interaction.weights else { panic!("a material") };
-    let from = |points: &Points, i: usize, j: usize| {
+fn energy(beam: &Beam, at: &Vectors) -> f64 {
+    let Weights::Matrix(weights) = &beam.flock.weights else { panic!("a material") };
+    let from = |points: &Vectors, i: usize, j: usize| {
         let (a, b) = (points.get(i), points.get(j));
         [b[0] - a[0], b[1] - a[1]]
     };
@@ -51,7 +51,7 @@ fn energy(beam: &Beam, at: &Points) -> f64 {
         .filter(|(_, cell)| cell.own == 0)
         .map(|(i, cell)| {
             let neighbour = |slot: usize| {
-                let j = beam.interaction.neighbours.of(i)[slot] as usize;
+                let j = beam.flock.neighbours.of(i)[slot] as usize;
                 let (reference, now) = (from(&beam.body.reference, i, j), from(at, i, j));
                 Corner { reference, displacement: [now[0] - reference[0], now[1] - reference[1]] }
             };
@@ -107,12 +107,12 @@ fn every_solver_and_the_sweeps_find_the_same_rest() {
 }
 
 /// Where sweeps come to rest that move one particle after the other to its target.
-fn swept(beam: &Beam) -> Points {
+fn swept(beam: &Beam) -> Vectors {
     let mut places = (*beam.body.reference).clone();
     for _ in 0..400_000 {
         let mut farthest = 0.0f64;
         for i in (0..places.len()).filter(|&i| beam.follows[i]) {
-            let target = beam.interaction.target(i, &places);
+            let target = beam.flock.target(i, &places);
             farthest = farthest.max(distance(target, places.get(i)));
             places.set(i, target);
         }

@@ -1,10 +1,10 @@
 //! Beams fitted to a rectangle, clamped at one end and loaded at the other.
 
 use flockform::flock::body::Body;
-use flockform::flock::interaction::{Interaction, Weights};
 use flockform::flock::lattice::{Lattice, LatticeKind};
-use flockform::flock::points::Points;
+use flockform::flock::law::{Flock, Weights};
 use flockform::flock::rules::{Mean, Rotation, Rule};
+use flockform::flock::vectors::Vectors;
 use flockform::geometry::outline::Outline;
 use flockform::geometry::shape::Shape;
 use flockform::material::elastic::{Constants, Elastic, Plane};
@@ -41,7 +41,7 @@ pub fn fibres() -> Elastic {
 /// A beam from x = 0 to `length`, of depth 1, its left end clamped.
 pub struct Beam {
     pub body: Body,
-    pub interaction: Interaction,
+    pub flock: Flock,
     pub follows: Vec<bool>,
     pub held_axes: Vec<[bool; 2]>,
 }
@@ -61,7 +61,7 @@ impl Beam {
             Loads { tractions, ..Loads::default() }.on_particles(&cells, &body.reference).expect("fits");
         let near = cells.neighbours(body.count(), elastic);
         let weights = MaterialWeights::assemble(&cells, &body, near, elastic).expect("holds");
-        let interaction = Interaction {
+        let flock = Flock {
             rule: Rule { mean: Mean::Material { rotation: Rotation::Corotated }, ..Rule::BARYCENTRE },
             reference: body.reference.clone(),
             neighbours: weights.neighbours.clone(),
@@ -71,7 +71,7 @@ impl Beam {
             bonds: None,
         };
         let follows = (0..body.count() as u32).map(|i| !at(0.0, i)).collect();
-        Self { body, interaction, follows, held_axes: Vec::new() }
+        Self { body, flock, follows, held_axes: Vec::new() }
     }
 
     /// The same held along x alone at its left end, and at its lowest particle altogether: as a plane of symmetry.
@@ -84,20 +84,20 @@ impl Beam {
         for i in (0..self.body.count()).filter(|&i| Some(i) != lowest) {
             if !std::mem::replace(&mut self.follows[i], true) {
                 self.held_axes[i] = [true, false];
-                if let Weights::Matrix(weights) = &mut self.interaction.weights {
+                if let Weights::Matrix(weights) = &mut self.flock.weights {
                     weights.hold(i, [true, false]);
                 }
             }
         }
-        self.interaction.keep_rest();
+        self.flock.keep_rest();
         self
     }
 
     pub fn solved_by(&self, solver: Solver) -> Solved {
-        let way = |_: f64| Points::zeros(self.body.count());
+        let way = |_: f64| Vectors::zeros(self.body.count());
         let request = Request { solver: Choice::This(solver), tolerance: 1e-12, ..Request::default() };
         corotated::solve(
-            &self.interaction,
+            &self.flock,
             &self.body,
             self.follows.clone(),
             self.held_axes.clone(),
@@ -108,16 +108,16 @@ impl Beam {
     }
 
     pub fn load(&self, i: usize) -> [f64; 2] {
-        self.interaction.forces.as_ref().map_or([0.0; 2], |forces| forces.get(i))
+        self.flock.forces.as_ref().map_or([0.0; 2], |forces| forces.get(i))
     }
 
-    pub fn moved(&self, displacement: &Points) -> Points {
+    pub fn moved(&self, displacement: &Vectors) -> Vectors {
         let places = self.body.reference.iter().zip(displacement.iter());
         places.map(|([x, y], [u, v])| [x + u, y + v]).collect()
     }
 
     /// Displacement of the loaded end: the mean by the shares of the load.
-    pub fn of_the_end(&self, displacement: &Points) -> [f64; 2] {
+    pub fn of_the_end(&self, displacement: &Vectors) -> [f64; 2] {
         let (mut sum, mut all) = ([0.0; 2], 0.0);
         for (i, [u, v]) in displacement.iter().enumerate() {
             let [a, b] = self.load(i);

@@ -1,7 +1,7 @@
 //! Iterations of multigrid do not grow with the body, and bits do not depend on threads.
 
 use flockform::bench::equilibrium::beam::Plate;
-use flockform::flock::points::Points;
+use flockform::flock::vectors::Vectors;
 use flockform::solve::equilibrium::{Solver, solve};
 
 use crate::support::{FEELS, KINDS, by, solved, system};
@@ -53,7 +53,7 @@ fn odd_sizes_take_no_more_iterations_than_even_ones() {
     }
 }
 
-fn bits(points: &Points) -> Vec<u64> {
+fn bits(points: &Vectors) -> Vec<u64> {
     points.x.iter().chain(&points.y).map(|value| value.to_bits()).collect()
 }
 

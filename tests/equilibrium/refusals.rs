@@ -2,7 +2,7 @@
 
 use flockform::flock::block::Block;
 use flockform::flock::lattice::Site;
-use flockform::flock::points::Points;
+use flockform::flock::vectors::Vectors;
 use flockform::solve::equilibrium::{
     Choice, Precision, Request, SINGLE_FLOOR, SolveError, Solver, System, choose, solve,
 };
@@ -30,7 +30,7 @@ fn chain(count: i32, weigh: impl Fn(i32) -> [f64; 2]) -> System {
     let follows = (0..count).map(|i| i > 0).collect();
     let operator = Operator::from_rows(&sites, GRID, follows, row).expect("an operator");
     let forces = (0..count).map(|i| [1.0, f64::from(i)]).collect();
-    System::new(operator, forces, Points::zeros(count as usize))
+    System::new(operator, forces, Vectors::zeros(count as usize))
 }
 
 fn refused(system: &System, solver: Solver) -> SolveError {
@@ -59,7 +59,7 @@ fn an_operator_without_symmetry_names_a_pair_and_the_other_solvers_agree() {
 fn bodies_that_nothing_holds_are_refused() {
     let (plate, neighbours) = body(KINDS[3], [6, 5], plate);
     let count = plate.count();
-    let loads = || (Points::zeros(count), Points::zeros(count));
+    let loads = || (Vectors::zeros(count), Vectors::zeros(count));
     let with = |held: &dyn Fn(usize) -> bool| {
         let (forces, at) = loads();
         System::new(operator(&plate, neighbours.clone(), Feel::Material, held), forces, at)
@@ -71,7 +71,7 @@ fn bodies_that_nothing_holds_are_refused() {
     loose.forces.x[3] = f64::NAN;
     let not_finite = SolveError::NotFinite { what: "force", particle: 4 };
     assert_eq!(refused(&loose, Solver::GaussSeidel), not_finite);
-    loose.held = Points::zeros(2);
+    loose.held = Vectors::zeros(2);
     let shapes = SolveError::Shapes { forces: 9, held: 2, particles: 9 };
     assert_eq!(refused(&loose, Solver::GaussSeidel), shapes);
 }

@@ -1,7 +1,7 @@
 //! What a solve says about itself.
 
 use flockform::bench::equilibrium::beam::Plate;
-use flockform::flock::points::Points;
+use flockform::flock::vectors::Vectors;
 use flockform::solve::equilibrium::{
     Choice, Precision, Request, SINGLE_FLOOR, Solved, Solver, System, choose, solve,
 };
@@ -76,9 +76,9 @@ fn without_loads_nobody_moves_and_held_particles_are_where_they_are_held() {
     let (plate, neighbours) = body(KINDS[5], [12, 12], plate);
     let count = plate.count();
     let operator = operator(&plate, neighbours, Feel::Material, |i| i < 20);
-    let lead: Points = (0..count).map(|_| [0.25, -0.5]).collect();
-    for held in [Points::zeros(count), lead] {
-        let system = System::new(operator.clone(), Points::zeros(count), held.clone());
+    let lead: Vectors = (0..count).map(|_| [0.25, -0.5]).collect();
+    for held in [Vectors::zeros(count), lead] {
+        let system = System::new(operator.clone(), Vectors::zeros(count), held.clone());
         for solver in Solver::ALL {
             let found = solved(&system, solver, 1e-12).displacement;
             // A translation of the held particles is one of the whole body.
@@ -98,7 +98,7 @@ fn forces_of_any_size_lead_to_the_same_bits_by_every_solver() {
             let mut scaled = system.clone();
             scaled.forces.y.iter_mut().for_each(|force| *force *= scale);
             let found = solved(&scaled, solver, 1e-9).displacement;
-            let back: Points = found.iter().map(|u| u.map(|u| u / scale)).collect();
+            let back: Vectors = found.iter().map(|u| u.map(|u| u / scale)).collect();
             assert_eq!(back, usual, "{solver} at 2^{exponent}");
         }
     }

@@ -4,7 +4,7 @@ use flockform::flock::block::Block;
 use flockform::flock::body::{Body, Cut};
 use flockform::flock::lattice::{Lattice, LatticeKind};
 use flockform::flock::neighbourhood::{Neighbourhood, Neighbours};
-use flockform::flock::points::Points;
+use flockform::flock::vectors::Vectors;
 use flockform::material::cells::{Cells, neighbourhood};
 use flockform::material::elastic::{Constants, Elastic, Plane};
 use flockform::material::weights::MaterialWeights;
@@ -64,7 +64,7 @@ pub fn body(kind: LatticeKind, [columns, rows]: [u32; 2], shape: Shape) -> (Body
     let place = |[i, j]: [i32; 2]| [(f64::from(i) + 0.5) / across, (f64::from(j) + 0.5) / f64::from(rows)];
     let keep: Vec<usize> = (0..full.count()).filter(|&i| shape(place(full.sites[i]))).collect();
     body.sites = keep.iter().map(|&i| full.sites[i]).collect();
-    body.reference = keep.iter().map(|&i| full.reference.get(i)).collect::<Points>().into();
+    body.reference = keep.iter().map(|&i| full.reference.get(i)).collect::<Vectors>().into();
     body.is_frame = vec![false; keep.len()];
     keep_largest_part(&mut body);
     let neighbours = lists(&body, &near);
@@ -73,12 +73,12 @@ pub fn body(kind: LatticeKind, [columns, rows]: [u32; 2], shape: Shape) -> (Body
 
 /// The largest set of particles that cells join.
 fn keep_largest_part(body: &mut Body) {
-    let parts = body.components(&Cells::of_body(body).mates(body.count()));
+    let parts = body.components(&Cells::of_body(body).cell_neighbours(body.count()));
     let size = |part: u32| parts.iter().filter(|&&other| other == part).count();
     let largest = (0..body.count() as u32).max_by_key(|&part| size(part)).expect("particles");
     let keep: Vec<usize> = (0..body.count()).filter(|&i| parts[i] == largest).collect();
     body.sites = keep.iter().map(|&i| body.sites[i]).collect();
-    body.reference = keep.iter().map(|&i| body.reference.get(i)).collect::<Points>().into();
+    body.reference = keep.iter().map(|&i| body.reference.get(i)).collect::<Vectors>().into();
     body.is_frame = vec![false; keep.len()];
 }
 
@@ -140,7 +140,7 @@ pub fn solved(system: &System, solver: Solver, tolerance: f64) -> Solved {
 }
 
 /// Relative L2 difference of two displacements.
-pub fn difference(found: &Points, truth: &Points) -> f64 {
+pub fn difference(found: &Vectors, truth: &Vectors) -> f64 {
     let square = |p: [f64; 2]| p[0] * p[0] + p[1] * p[1];
     let error: f64 = found.iter().zip(truth.iter()).map(|(a, b)| square([a[0] - b[0], a[1] - b[1]])).sum();
     (error / truth.iter().map(square).sum::<f64>()).sqrt()

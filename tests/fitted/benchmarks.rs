@@ -1,7 +1,7 @@
 //! Published figures: Cook's membrane, and the rows of a table of bodies that whole cells get wrong.
 
 use flockform::continuum::mechanics::Stresses;
-use flockform::flock::points::distance;
+use flockform::flock::vectors::distance;
 
 use crate::support::{KINDS, lattice, on_right_edge, scene, solved};
 

@@ -2,7 +2,7 @@
 
 use flockform::continuum::plan::Plan;
 use flockform::flock::lattice::Lattice;
-use flockform::flock::points::Points;
+use flockform::flock::vectors::Vectors;
 use flockform::geometry::outline::Outline;
 use flockform::geometry::partition::Partition;
 use flockform::geometry::shape::Shape;
@@ -130,7 +130,7 @@ fn two_materials_that_meet_along_any_line_carry_uniform_stresses_on_every_lattic
             let beyond = (p.dot(&normal) - off).max(0.0);
             (near * p + (far - near) * normal * beyond).into()
         };
-        let moved: Points = body.reference.iter().map(place).collect();
+        let moved: Vectors = body.reference.iter().map(place).collect();
         let incidence = cells.incidence(body.count());
         let mut on_edge = vec![false; body.count()];
         cells.boundary_sides(&incidence).iter().flatten().for_each(|&i| on_edge[i as usize] = true);
@@ -202,8 +202,8 @@ fn a_disc_with_a_stiff_core_converges_with_order_two_on_every_lattice() {
 #[cfg(feature = "fem")]
 #[test]
 fn the_truth_of_a_disc_with_a_stiff_core_is_lames() {
+    use flockform::compare::reference::Effort;
     use flockform::compare::run::truth_of;
-    use flockform::compare::truth::Effort;
     let (exact, q) = core();
     let scene = scene(&lattice("hexagonal", 1.0, 20.0), CORE).expect("a scene");
     let found = truth_of(&scene, &Effort::default()).expect("a truth");

@@ -2,7 +2,7 @@
 
 use flockform::flock::body::{Body, Cut};
 use flockform::flock::lattice::{Lattice, LatticeKind};
-use flockform::flock::points::Points;
+use flockform::flock::vectors::Vectors;
 use flockform::geometry::outline::Outline;
 use flockform::geometry::portion::Selection;
 use flockform::geometry::shape::Shape;
@@ -78,7 +78,7 @@ fn five_hundred_polygons_with_holes_pass_the_patch_test_with_exact_areas_and_res
 
         // The tractions of a uniform stress on every piece balance the stiffness of the uniform strain everywhere.
         let loader = Loader::new(&cells, &body, Some(&outline));
-        let mut loads = Points::zeros(body.count());
+        let mut loads = Vectors::<f64>::zeros(body.count());
         for (ring, pieces) in outline.rings().iter().enumerate() {
             for piece in pieces {
                 let [nx, ny] = piece.normal(0.5);
@@ -86,7 +86,7 @@ fn five_hundred_polygons_with_holes_pass_the_patch_test_with_exact_areas_and_res
                 let only = Selection::Pieces { ring, pieces: vec![piece.number], angles: None };
                 let portions = outline.portions(&only, 1e-9);
                 let load = OutlineLoad { portions, push: Push::Traction(traction), profile: None };
-                let mut forces = Points::zeros(body.count());
+                let mut forces = Vectors::zeros(body.count());
                 loader.add(&Load::Outline(load), &mut forces).expect("fits");
                 let Resultant { force, moment } = Resultant::of(body.reference.iter().zip(forces.iter()));
                 let (length, middle) = (piece.length(), piece.point(0.5));
@@ -99,9 +99,9 @@ fn five_hundred_polygons_with_holes_pass_the_patch_test_with_exact_areas_and_res
                 }
             }
         }
-        let near = cells.mates(body.count());
+        let near = cells.cell_neighbours(body.count());
         let weights = MaterialWeights::assemble(&cells, &body, near, &elastic).expect("holds together");
-        let moved: Points = body.reference.iter().map(affine).collect();
+        let moved: Vectors = body.reference.iter().map(affine).collect();
         for i in 0..body.count() {
             let (pull, load) = (weights.force(i, &moved), loads.get(i));
             let left = (pull[0] + load[0]).hypot(pull[1] + load[1]);

@@ -1,9 +1,9 @@
 //! Scenes put together from parts, and their equilibria.
 
-use flockform::continuum::equilibrium::settle;
+use flockform::continuum::equilibrium::solve_equilibrium;
 use flockform::continuum::plan::Plan;
 use flockform::continuum::run::Outcome;
-use flockform::flock::points::Points;
+use flockform::flock::vectors::Vectors;
 use flockform::material::cells::Cells;
 use flockform::scene::{Scene, SceneError};
 
@@ -41,7 +41,7 @@ pub fn scene_in(lattice: &str, parts: &str, folder: Option<&std::path::Path>) ->
 pub fn solved(scene: &Scene) -> (Plan, Outcome) {
     let plan = Plan::new(scene).unwrap_or_else(|error| panic!("{error}"));
     let request = scene.equilibrium.expect("asked for").request;
-    let outcome = settle(scene, &request, plan.clone()).unwrap_or_else(|error| panic!("{error}"));
+    let outcome = solve_equilibrium(scene, &request, plan.clone()).unwrap_or_else(|error| panic!("{error}"));
     (plan, outcome)
 }
 
@@ -71,7 +71,7 @@ pub fn error(plan: &Plan, outcome: &Outcome, exact: impl Fn([f64; 2]) -> [f64; 2
 /// Writes a table of displacements of the particles that `leads` picks \[length\]; a scene leads them by it.
 pub fn table(
     path: &std::path::Path,
-    points: &Points,
+    points: &Vectors,
     exact: impl Fn([f64; 2]) -> [f64; 2],
     leads: impl Fn([f64; 2]) -> bool,
 ) {

@@ -3,7 +3,7 @@
 use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant};
 
-use flockform::flock::points::distance;
+use flockform::flock::vectors::distance;
 use flockform::ros::edge::services::{Empty, std_srvs};
 use flockform::ros::edge::{Edge, Node, Quality, Subscription};
 use flockform::ros::messages::flockform_msgs::FormationState;

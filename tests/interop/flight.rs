@@ -1,6 +1,6 @@
 //! The whole node between robots that a peer flies and a peer that watches.
 
-use flockform::flock::points::distance;
+use flockform::flock::vectors::distance;
 use flockform::ros::messages::flockform_msgs::{FormationState, MemberState};
 use serde_json::json;
 

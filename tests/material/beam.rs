@@ -6,7 +6,7 @@ use flockform::flock::body::{Body, Cut};
 use flockform::flock::cells_around::CellsAround;
 use flockform::flock::lattice::Lattice;
 use flockform::flock::neighbourhood::{Neighbourhood, Neighbours};
-use flockform::flock::points::Points;
+use flockform::flock::vectors::Vectors;
 use flockform::material::cells::Cells;
 use flockform::material::elastic::Elastic;
 use flockform::material::loads::{Loads, Traction};
@@ -15,7 +15,7 @@ use flockform::material::weights::{MaterialWeights, Row};
 use crate::support::*;
 
 /// Points and displacements of a reference file, and the body with the same particles in its numbering.
-fn beam(aspect: u32) -> (Body, Neighbours, Cells, Points) {
+fn beam(aspect: u32) -> (Body, Neighbours, Cells, Vectors) {
     let path =
         Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../shared/reference/beam_aspect{aspect}.csv"));
     let text = std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
@@ -39,8 +39,8 @@ fn end_columns(body: &Body) -> Vec<bool> {
     body.reference.x.iter().map(|&x| x < low[0] + 0.5 || x > high[0] - 0.5).collect()
 }
 
-fn von_mises_error(cells: &Cells, elastic: &Elastic, found: &Points, truth: &Points) -> f64 {
-    let stress = |u: &Points| cells.strains(u).into_iter().map(|e| elastic.von_mises(e)).collect::<Vec<_>>();
+fn von_mises_error(cells: &Cells, elastic: &Elastic, found: &Vectors, truth: &Vectors) -> f64 {
+    let stress = |u: &Vectors| cells.strains(u).into_iter().map(|e| elastic.von_mises(e)).collect::<Vec<_>>();
     let (found, truth) = (stress(found), stress(truth));
     let error: f64 = found.iter().zip(&truth).map(|(f, t)| (f - t).powi(2)).sum();
     (error / truth.iter().map(|t| t * t).sum::<f64>()).sqrt()
@@ -52,7 +52,7 @@ fn beam_errors(aspect: u32) -> [f64; 2] {
     let elastic = sheet(1000.0, 0.33);
     let weights = MaterialWeights::assemble(&cells, &body, neighbours, &elastic).expect("assembles");
     let leads = end_columns(&body);
-    let found = equilibrium(&weights, &leads, &Points::zeros(body.count()), &truth);
+    let found = equilibrium(&weights, &leads, &Vectors::zeros(body.count()), &truth);
     [relative_l2(&found, &truth, |i| !leads[i]), von_mises_error(&cells, &elastic, &found, &truth)]
 }
 
@@ -108,7 +108,7 @@ fn the_barycentre_on_the_beam_has_the_errors_of_the_paper() {
     let class = (0..body.count() as u32).collect();
     let weights = MaterialWeights { class, rows, neighbours, cells: CellsAround::default() };
     let leads = end_columns(&body);
-    let found = equilibrium(&weights, &leads, &Points::zeros(body.count()), &truth);
+    let found = equilibrium(&weights, &leads, &Vectors::zeros(body.count()), &truth);
     let displacement = relative_l2(&found, &truth, |i| !leads[i]);
     let von_mises = von_mises_error(&cells, &sheet(1000.0, 0.33), &found, &truth);
     println!("Eq. 1: displacement {:.3} %, von Mises {:.3} %", 100.0 * displacement, 100.0 * von_mises);

@@ -5,7 +5,7 @@
 
 use flockform::flock::body::Cut;
 use flockform::flock::lattice::{Lattice, LatticeKind};
-use flockform::flock::points::Points;
+use flockform::flock::vectors::Vectors;
 use flockform::geometry::shape::Shape;
 use flockform::material::loads::{Loads, Traction};
 use flockform::material::weights::MaterialWeights;
@@ -43,7 +43,7 @@ fn cantilever_error(rows: u32, spacings: impl Fn(f64) -> LatticeKind) -> f64 {
         .map(|[a, b]| Traction { side: [a, b], at_ends: [shear(a), shear(b)] })
         .collect();
     let forces = Loads { tractions, ..Loads::default() }.on_particles(&cells, &body.reference).expect("fits");
-    let truth: Points = body.reference.iter().map(exact).collect();
+    let truth: Vectors = body.reference.iter().map(exact).collect();
     let leads: Vec<bool> = (0..body.count() as u32).map(|i| x(i) < 1e-9).collect();
     let found = equilibrium(&weights, &leads, &forces, &truth);
     relative_l2(&found, &truth, |_| true)

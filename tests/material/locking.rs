@@ -2,8 +2,8 @@
 
 use flockform::flock::body::{Body, Cut};
 use flockform::flock::lattice::{Lattice, LatticeKind};
-use flockform::flock::points::Points;
 use flockform::flock::rules::Rotation;
+use flockform::flock::vectors::Vectors;
 use flockform::geometry::outline::Outline;
 use flockform::geometry::shape::Shape;
 use flockform::material::cells::{neighbourhood_of, without_loose_sites};
@@ -54,7 +54,7 @@ fn error(kind: LatticeKind, [min, max]: [[f64; 2]; 2], elastic: &Elastic, exact:
     });
     let loads = Loads { tractions: tractions.collect(), ..Loads::default() };
     let forces = loads.on_particles(&cells, &body.reference).expect("fits");
-    let truth: Points = body.reference.iter().map(|p| exact(p).0).collect();
+    let truth: Vectors = body.reference.iter().map(|p| exact(p).0).collect();
     let leads: Vec<bool> = (0..body.count()).map(is_led).collect();
     let found = equilibrium(&weights, &leads, &forces, &truth);
     relative_l2(&found, &truth, |_| true)
@@ -107,9 +107,9 @@ fn averaged_dilatations_pass_the_patch_test_and_pull_back_alike() {
         let (body, cells) = (fitted.body, fitted.cells);
         let near = cells.neighbours(body.count(), &elastic);
         let weights = MaterialWeights::assemble(&cells, &body, near, &elastic).expect("assembles");
-        let affine: Points =
+        let affine: Vectors =
             body.reference.iter().map(|[x, y]| [0.3 * x + 0.4 * y, 0.1 * x - 0.2 * y]).collect();
-        let wavy: Points = body.reference.iter().map(|[x, y]| [(2.0 * x).sin() * y, x * y]).collect();
+        let wavy: Vectors = body.reference.iter().map(|[x, y]| [(2.0 * x).sin() * y, x * y]).collect();
         let stored = strain_energy(&cells, &elastic, &wavy, Rotation::Small).expect("has a stiffness");
         assert!((stored / weights.energy(&wavy) - 1.0).abs() < 1e-9, "{stored}");
         let on_edge = on_boundary(&cells, body.count());

@@ -3,7 +3,7 @@
 use flockform::flock::block::{Block, plus, transposed};
 use flockform::flock::body::Cut;
 use flockform::flock::lattice::{Lattice, LatticeKind};
-use flockform::flock::points::{Points, distance};
+use flockform::flock::vectors::{Vectors, distance};
 use flockform::material::loads::{Loads, Traction};
 use flockform::material::weights::MaterialWeights;
 
@@ -13,7 +13,7 @@ fn affine([x, y]: [f64; 2]) -> [f64; 2] {
     [0.2 + 0.03 * x - 0.01 * y, -0.1 + 0.04 * x + 0.02 * y]
 }
 
-fn largest_difference(a: &Points, b: &Points) -> f64 {
+fn largest_difference(a: &Vectors, b: &Vectors) -> f64 {
     a.iter().zip(b.iter()).map(|(a, b)| (a[0] - b[0]).abs().max((a[1] - b[1]).abs())).fold(0.0, f64::max)
 }
 
@@ -23,11 +23,11 @@ fn an_affine_boundary_is_followed_exactly_on_every_lattice() {
         for elastic in [sheet(1000.0, 0.33), sheet(1.0, -0.9), fibres()] {
             let (body, neighbours, cells) = sample(kind, 0.3);
             let weights = MaterialWeights::assemble(&cells, &body, neighbours, &elastic).expect("assembles");
-            let exact: Points = body.reference.iter().map(affine).collect();
+            let exact: Vectors = body.reference.iter().map(affine).collect();
             let leads = on_boundary(&cells, body.count());
             assert!(leads.iter().filter(|&&leads| !leads).count() > 10, "{kind:?} has an interior");
             let led = (0..body.count()).map(|i| if leads[i] { exact.get(i) } else { [0.0; 2] }).collect();
-            let found = equilibrium(&weights, &leads, &Points::zeros(body.count()), &led);
+            let found = equilibrium(&weights, &leads, &Vectors::zeros(body.count()), &led);
             assert!(largest_difference(&found, &exact) < 1e-12, "{kind:?}");
             for i in (0..body.count()).filter(|&i| !leads[i]) {
                 let force = weights.force(i, &exact);
@@ -42,7 +42,7 @@ fn an_affine_boundary_is_followed_exactly_where_points_are_out_of_place() {
     for kind in KINDS {
         let (body, _, cells) = sample(kind, 0.3);
         let shift = |i: usize| [0.11 * (7.3 * i as f64).sin(), 0.11 * (3.1 * i as f64 + 1.0).sin()];
-        let points: Points = (0..body.count())
+        let points: Vectors = (0..body.count())
             .map(|i| {
                 let (p, s) = (body.reference.get(i), shift(i));
                 [p[0] + s[0], p[1] + s[1]]
@@ -50,10 +50,10 @@ fn an_affine_boundary_is_followed_exactly_where_points_are_out_of_place() {
             .collect();
         let weights =
             MaterialWeights::on_points(&cells, &points, &sheet(1000.0, 0.33), None).expect("assembles");
-        let exact: Points = points.iter().map(affine).collect();
+        let exact: Vectors = points.iter().map(affine).collect();
         let leads = on_boundary(&cells, body.count());
         let led = (0..body.count()).map(|i| if leads[i] { exact.get(i) } else { [0.0; 2] }).collect();
-        let found = equilibrium(&weights, &leads, &Points::zeros(body.count()), &led);
+        let found = equilibrium(&weights, &leads, &Vectors::zeros(body.count()), &led);
         assert!(largest_difference(&found, &exact) < 1e-12, "{kind:?}");
     }
 }
@@ -64,9 +64,9 @@ fn sweeping_the_rule_itself_reaches_the_affine_field() {
     let (body, neighbours, cells) = sample(KINDS[5], 0.0);
     let weights =
         MaterialWeights::assemble(&cells, &body, neighbours, &sheet(1000.0, 0.33)).expect("assembles");
-    let rule = interaction(&body, &weights, None);
+    let rule = flock(&body, &weights, None);
     let leads = on_boundary(&cells, body.count());
-    let goal: Points = body
+    let goal: Vectors = body
         .reference
         .iter()
         .map(|p| {
@@ -74,7 +74,7 @@ fn sweeping_the_rule_itself_reaches_the_affine_field() {
             [p[0] + u[0], p[1] + u[1]]
         })
         .collect();
-    let mut x: Points =
+    let mut x: Vectors =
         (0..body.count()).map(|i| if leads[i] { goal.get(i) } else { body.reference.get(i) }).collect();
     for _ in 0..500 {
         for i in (0..body.count()).filter(|&i| !leads[i]) {
@@ -90,8 +90,8 @@ fn rigid_motions_cost_no_force_anywhere_free_edges_included() {
         let (body, neighbours, cells) = sample(kind, 0.3);
         let weights = MaterialWeights::assemble(&cells, &body, neighbours, &fibres()).expect("assembles");
         let scale = fibres().stiffness().norm();
-        let shifted: Points = body.reference.iter().map(|_| [0.7, -1.3]).collect();
-        let turned: Points = body.reference.iter().map(|[x, y]| [-y, x]).collect();
+        let shifted: Vectors = body.reference.iter().map(|_| [0.7, -1.3]).collect();
+        let turned: Vectors = body.reference.iter().map(|[x, y]| [-y, x]).collect();
         for i in 0..body.count() {
             assert_eq!(weights.force(i, &shifted), [0.0; 2]);
             let force = weights.force(i, &turned);
@@ -135,7 +135,7 @@ fn an_edge_column_under_uniform_tension_stretches_uniformly_and_contracts_freely
             sides.into_iter().filter(pulled).map(|side| Traction::uniform(side, [50.0, 0.0])).collect();
         let forces =
             Loads { tractions, ..Loads::default() }.on_particles(&cells, &body.reference).expect("fits");
-        let exact: Points = body.reference.iter().map(|[x, y]| [0.05 * x, -0.33 * 0.05 * y]).collect();
+        let exact: Vectors = body.reference.iter().map(|[x, y]| [0.05 * x, -0.33 * 0.05 * y]).collect();
         for i in 0..body.count() {
             if body.reference.x[i] > 0.0 {
                 let (pull, load) = (weights.force(i, &exact), forces.get(i));
@@ -173,13 +173,13 @@ fn the_equilibrium_under_loads_is_the_fixed_point_of_the_rule_and_stores_half_th
         let (body, neighbours, cells) = sample(kind, 0.3);
         let weights = MaterialWeights::assemble(&cells, &body, neighbours, &fibres()).expect("assembles");
         // Loads everywhere, free edges included; three particles held.
-        let forces: Points =
+        let forces: Vectors =
             (0..body.count()).map(|i| [(1.3 * i as f64).sin(), (0.7 * i as f64).cos()]).collect();
         let leads: Vec<bool> = (0..body.count()).map(|i| i % 20 == 0).collect();
-        let held = Points::zeros(body.count());
+        let held = Vectors::zeros(body.count());
         let found = equilibrium(&weights, &leads, &forces, &held);
-        let rule = interaction(&body, &weights, Some(forces.clone()));
-        let at: Points =
+        let rule = flock(&body, &weights, Some(forces.clone()));
+        let at: Vectors =
             (0..body.count()).map(|i| [0, 1].map(|k| body.reference.get(i)[k] + found.get(i)[k])).collect();
         let size = found.x.iter().chain(&found.y).fold(1.0, |m: f64, u| m.max(u.abs()));
         let mut work = 0.0;

@@ -3,7 +3,7 @@
 use flockform::flock::body::{Body, Cut};
 use flockform::flock::lattice::Lattice;
 use flockform::flock::neighbourhood::Neighbourhood;
-use flockform::flock::points::Points;
+use flockform::flock::vectors::Vectors;
 use flockform::geometry::shape::Shape;
 use flockform::material::cells::{Cells, without_loose_sites};
 use flockform::material::mechanism::Mechanism;
@@ -36,12 +36,14 @@ const CUT: Cut = Cut::Count { columns: 6, rows: 6 };
 #[test]
 fn more_neighbours_than_cells_need_change_nothing() {
     let lattice = Lattice::new(KINDS[0], [0.0; 2], 0.0);
-    let (body, many) = Body::build(lattice, &CUT, &Neighbourhood::Ring { radius: 2 }, None).expect("builds");
+    let (body, many) =
+        Body::build(lattice, &CUT, &Neighbourhood::Chebyshev { radius: 2 }, None).expect("builds");
     let cells = Cells::of_body(&body);
     let elastic = sheet(1000.0, 0.33);
-    let few = MaterialWeights::assemble(&cells, &body, cells.mates(body.count()), &elastic).expect("fits");
+    let few = MaterialWeights::assemble(&cells, &body, cells.cell_neighbours(body.count()), &elastic)
+        .expect("fits");
     let many = MaterialWeights::assemble(&cells, &body, many, &elastic).expect("fits");
-    let field: Points = body.reference.iter().map(|[x, y]| [x * y, (x - y).sin()]).collect();
+    let field: Vectors = body.reference.iter().map(|[x, y]| [x * y, (x - y).sin()]).collect();
     for i in 0..body.count() {
         let (a, b) = (few.force(i, &field), many.force(i, &field));
         assert!((a[0] - b[0]).abs() + (a[1] - b[1]).abs() < 1e-10);

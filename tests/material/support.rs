@@ -1,11 +1,11 @@
 //! Bodies, materials and a direct solver, shared by the tests of the material rule.
 
 use flockform::flock::body::{Body, Cut};
-use flockform::flock::interaction::{Interaction, Weights};
 use flockform::flock::lattice::{Lattice, LatticeKind};
+use flockform::flock::law::{Flock, Weights};
 use flockform::flock::neighbourhood::Neighbours;
-use flockform::flock::points::Points;
 use flockform::flock::rules::{Mean, Rotation, Rule};
+use flockform::flock::vectors::Vectors;
 use flockform::material::Block;
 use flockform::material::cells::{Cells, neighbourhood, without_loose_sites};
 use flockform::material::elastic::{Constants, Elastic, Plane};
@@ -57,8 +57,8 @@ pub fn on_boundary(cells: &Cells, count: usize) -> Vec<bool> {
 }
 
 /// The rule as a host sweeps it.
-pub fn interaction(body: &Body, weights: &MaterialWeights, forces: Option<Points>) -> Interaction {
-    let mut interaction = Interaction {
+pub fn flock(body: &Body, weights: &MaterialWeights, forces: Option<Vectors>) -> Flock {
+    let mut flock = Flock {
         rule: Rule { mean: Mean::Material { rotation: Rotation::Small }, ..Rule::BARYCENTRE },
         reference: body.reference.clone(),
         neighbours: weights.neighbours.clone(),
@@ -67,8 +67,8 @@ pub fn interaction(body: &Body, weights: &MaterialWeights, forces: Option<Points
         rest: None,
         bonds: None,
     };
-    interaction.keep_rest();
-    interaction
+    flock.keep_rest();
+    flock
 }
 
 /// Followers at rest under their neighbours and loads, leaders where `displacement` has them: banded
@@ -76,9 +76,9 @@ pub fn interaction(body: &Body, weights: &MaterialWeights, forces: Option<Points
 pub fn equilibrium(
     weights: &MaterialWeights,
     leads: &[bool],
-    forces: &Points,
-    displacement: &Points,
-) -> Points {
+    forces: &Vectors,
+    displacement: &Vectors,
+) -> Vectors {
     let followers: Vec<usize> = (0..leads.len()).filter(|&i| !leads[i]).collect();
     let mut place = vec![usize::MAX; leads.len()];
     followers.iter().enumerate().for_each(|(row, &i)| place[i] = row);
@@ -135,7 +135,7 @@ fn banded_cholesky(n: usize, entries: &[(usize, usize, Block)], mut x: Vec<f64>)
     x
 }
 
-pub fn relative_l2(found: &Points, truth: &Points, counts: impl Fn(usize) -> bool) -> f64 {
+pub fn relative_l2(found: &Vectors, truth: &Vectors, counts: impl Fn(usize) -> bool) -> f64 {
     let (mut error, mut size) = (0.0, 0.0);
     for i in (0..truth.len()).filter(|&i| counts(i)) {
         let (f, t) = (found.get(i), truth.get(i));

@@ -4,7 +4,7 @@
 
 use std::time::Duration;
 
-use flockform::flock::points::distance;
+use flockform::flock::vectors::distance;
 use flockform::ros::arguments::RosArguments;
 use flockform::ros::edge::Quality;
 use flockform::ros::edge::services::{Empty, std_srvs};

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use flockform::flock::points::distance;
+use flockform::flock::vectors::distance;
 use flockform::ros::edge::Quality;
 use flockform::ros::messages::geometry_msgs::{Pose, PoseStamped, Twist, TwistStamped};
 use flockform::ros::messages::rosgraph_msgs::Clock;

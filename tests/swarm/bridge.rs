@@ -3,14 +3,14 @@
 use flockform::continuum::{engine::Engine, plan::Plan, record::ProbeSeries};
 use flockform::export::OutputFolder;
 use flockform::export::csv::write_probes;
-use flockform::flock::points::Points;
+use flockform::flock::vectors::Vectors;
 use flockform::scene;
 use flockform::scene::swarm::Swarm;
 use flockform::swarm::flight::Flight;
 
 use super::support::*;
 
-fn bits(points: &Points) -> Vec<[u64; 2]> {
+fn bits(points: &Vectors) -> Vec<[u64; 2]> {
     points.iter().map(|place| place.map(f64::to_bits)).collect()
 }
 
@@ -34,7 +34,7 @@ fn ideal_robots_fly_the_bits_of_the_continuum_run() {
             flight.step();
             engine.advance();
         }
-        let body: Points = (0..engine.body().count())
+        let body: Vectors = (0..engine.body().count())
             .filter(|&i| !engine.body().is_frame[i])
             .map(|i| engine.present().get(i))
             .collect();
@@ -45,7 +45,7 @@ fn ideal_robots_fly_the_bits_of_the_continuum_run() {
 
 #[test]
 fn node_swarm_and_continuum_give_one_target_for_the_same_positions() {
-    // Robots that were seen anywhere, not where they were sent: the targets are the interaction's own.
+    // Robots that were seen anywhere, not where they were sent: the targets are the flock's own.
     let swarm = parse("title = \"t\"\n[scene]\nname = \"shear\"\n").expect("valid");
     let mut flight = Flight::new(&swarm).expect("flies");
     let places = flight.fleet().places();
@@ -66,7 +66,7 @@ fn node_swarm_and_continuum_give_one_target_for_the_same_positions() {
             let particle = (0..seen.len())
                 .find(|&i| seen.get(i) == control.position(m).expect("seen"))
                 .expect("a particle");
-            let target = engine.interaction().target(particle, seen);
+            let target = engine.flock().target(particle, seen);
             assert_eq!(control.target(m).expect("heard").map(f64::to_bits), target.map(f64::to_bits));
             followers += 1;
         }

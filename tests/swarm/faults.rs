@@ -1,6 +1,6 @@
 //! What goes wrong with robots in flight, row by row: what the rest of the formation does.
 
-use flockform::flock::points::distance;
+use flockform::flock::vectors::distance;
 use flockform::swarm::control::{Control, NEIGHBOUR_LOST, TRIMMED};
 use flockform::swarm::flight::Flight;
 use flockform::swarm::watch::{Health, Pose};
@@ -128,7 +128,7 @@ fn one_liar_is_trimmed_on_eight_neighbours_and_leads_them_astray_without() {
             "poses.recover=1",
         ];
         if resilient {
-            overrides.push("resilience={ liars = 1 }");
+            overrides.push("resilience={ max_faulty_neighbours = 1 }");
         }
         let mut flight =
             Flight::new(&bundled("square", &overrides)).unwrap_or_else(|error| panic!("{error}"));

@@ -52,7 +52,7 @@ fn a_bad_swarm_file_is_refused_with_place_and_remedy() {
             with("[[flight.faults]]\nrobot = \"z\"\nat = 1.0\nwhat = { kind = \"silent\" }\n"),
             "flight.faults[0].robot = \"z\": there is no robot `z`",
         ),
-        (with("[resilience]\nliars = 1\n"), "`c` has 2 neighbours"),
+        (with("[resilience]\nmax_faulty_neighbours = 1\n"), "`c` has 2 neighbours"),
     ];
     for (text, expected) in cases {
         let report = refusal(&text);
@@ -70,7 +70,7 @@ fn four_neighbours_tolerate_no_liar_and_eight_one() {
              [[leaders]]\nregion = {{ kind = \"edge\", side = \"right\" }}\nprogram = {{ kind = \"external\" }}\n\
              [[leaders]]\nregion = {{ kind = \"edge\", side = \"top\" }}\nprogram = {{ kind = \"external\" }}\n\
              [[leaders]]\nregion = {{ kind = \"edge\", side = \"bottom\" }}\nprogram = {{ kind = \"external\" }}\n\
-             [resilience]\nliars = 1\n"
+             [resilience]\nmax_faulty_neighbours = 1\n"
         )
     };
     let report = refusal(&lattice("kind = \"first\""));

@@ -1,6 +1,6 @@
 //! Flights of the bundled swarms, and what they promise.
 
-use flockform::flock::points::{Points, distance};
+use flockform::flock::vectors::{Vectors, distance};
 use flockform::scene::bundled::SWARMS;
 use flockform::swarm::flight::Flight;
 
@@ -24,7 +24,7 @@ fn an_affine_manoeuvre_is_followed_exactly_through_the_gap_at_every_moment() {
         assert!(largest <= 1e-9, "{name}: {largest:e}");
         // It did go: the formation's middle is where the manoeuvre ends.
         let ends = [&record.tracks[0], record.tracks.last().expect("recorded")];
-        let middle = |places: &Points| places.x.iter().sum::<f64>() / places.len() as f64;
+        let middle = |places: &Vectors| places.x.iter().sum::<f64>() / places.len() as f64;
         assert!((middle(ends[1]) - middle(ends[0]) - 24.0).abs() < 1e-9, "{name}");
         assert!(report.clearance.expect("others") >= 0.1);
     }

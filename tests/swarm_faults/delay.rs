@@ -4,25 +4,25 @@ use std::collections::VecDeque;
 use std::f64::consts::PI;
 
 use flockform::flock::neighbourhood::Neighbourhood;
-use flockform::flock::points::Points;
+use flockform::flock::vectors::Vectors;
 
 use super::support::{barycentre, error, followers, square, stretched};
 
 /// Keeps the last positions; the oldest comes `delay` steps late.
 struct Line {
-    past: VecDeque<Points>,
+    past: VecDeque<Vectors>,
 }
 
 impl Line {
-    fn new(start: &Points, delay: usize) -> Self {
+    fn new(start: &Vectors, delay: usize) -> Self {
         Self { past: vec![start.clone(); delay + 1].into() }
     }
 
-    fn late(&self) -> &Points {
+    fn late(&self) -> &Vectors {
         &self.past[0]
     }
 
-    fn push(&mut self, present: &Points) {
+    fn push(&mut self, present: &Vectors) {
         self.past.pop_front();
         self.past.push_back(present.clone());
     }
@@ -31,13 +31,13 @@ impl Line {
 #[test]
 fn neighbours_seen_twenty_steps_late_lead_to_the_same_place() {
     let (reference, neighbours) = square(Neighbourhood::First { keep: None });
-    let interaction = barycentre(&reference, neighbours);
+    let flock = barycentre(&reference, neighbours);
     let (start, image) = stretched(&reference);
     for (delay, steps) in [(0, 600), (20, 600 * 21)] {
         let mut line = Line::new(&start, delay);
         let mut present = start.clone();
         for _ in 0..steps {
-            followers().for_each(|j| present.set(j, interaction.target(j, line.late())));
+            followers().for_each(|j| present.set(j, flock.target(j, line.late())));
             line.push(&present);
         }
         assert!(error(&present, &image) < 1e-12 * 20.0, "{} at delay {delay}", error(&present, &image));
@@ -48,7 +48,7 @@ fn neighbours_seen_twenty_steps_late_lead_to_the_same_place() {
 /// `steps`; `share` of the largest stable `e`.
 fn growth(delay: usize, share: f64, steps: usize) -> (f64, f64) {
     let (reference, neighbours) = square(Neighbourhood::First { keep: None });
-    let interaction = barycentre(&reference, neighbours);
+    let flock = barycentre(&reference, neighbours);
     let (start, image) = stretched(&reference);
     // L = I - W over the eight by eight followers.
     let largest = 1.0 + (PI / 9.0).cos();
@@ -60,7 +60,7 @@ fn growth(delay: usize, share: f64, steps: usize) -> (f64, f64) {
     for step in 0..steps {
         for j in followers() {
             let (here, seen) = (present.get(j), line.late().get(j));
-            let target = interaction.target(j, line.late());
+            let target = flock.target(j, line.late());
             present.set(j, [0, 1].map(|k| here[k] + gain * (target[k] - seen[k])));
         }
         line.push(&present);

@@ -1,7 +1,7 @@
 //! One liar: trimmed, the followers of the others keep to what honest leaders say.
 
 use flockform::flock::neighbourhood::{Neighbourhood, Neighbours};
-use flockform::flock::points::Points;
+use flockform::flock::vectors::Vectors;
 use flockform::solve::spectrum::scatter;
 use flockform::swarm::resilience::{Trim, Unsupported, supported, trim};
 
@@ -29,10 +29,10 @@ impl Flight {
         &self,
         lead: impl Fn(usize) -> [f64; 2],
         steps: usize,
-        mut see: impl FnMut(usize, &Points),
-    ) -> Points {
+        mut see: impl FnMut(usize, &Vectors),
+    ) -> Vectors {
         let start = |j: usize| [scatter(2 * j as u64), scatter(2 * j as u64 + 1)];
-        let mut present: Points =
+        let mut present: Vectors =
             (0..COUNT).map(|j| if (self.leads)(j) { lead(j) } else { start(j) }).collect();
         for step in 0..steps {
             present.set(self.liar, (self.story)(step));
@@ -48,7 +48,7 @@ impl Flight {
     }
 
     /// The mean of the displacements kept, on each axis; the own one where none is.
-    fn next(&self, member: usize, seen: &Points) -> [f64; 2] {
+    fn next(&self, member: usize, seen: &Vectors) -> [f64; 2] {
         let heard: Vec<[f64; 2]> = self.neighbours.of(member).iter().map(|&k| seen.get(k as usize)).collect();
         let (own, mut keep) = (seen.get(member), Vec::new());
         trim(Trim::PerAxis, own, &heard, self.f, &mut keep);
@@ -59,7 +59,7 @@ impl Flight {
         })
     }
 
-    fn error(&self, present: &Points, wanted: [f64; 2]) -> f64 {
+    fn error(&self, present: &Vectors, wanted: [f64; 2]) -> f64 {
         let off = |j: usize| {
             let [x, y] = present.get(j);
             (x - wanted[0]).abs().max((y - wanted[1]).abs())
@@ -69,7 +69,7 @@ impl Flight {
 }
 
 fn eight() -> Neighbours {
-    square(Neighbourhood::Ring { radius: 1 }).1
+    square(Neighbourhood::Chebyshev { radius: 1 }).1
 }
 
 fn leaders() -> Vec<bool> {
@@ -113,7 +113,7 @@ fn a_deforming_formation_stays_in_the_box_of_its_honest_leaders() {
         for liar in LIARS {
             let flight = Flight { neighbours: eight(), liar, story, f: 1, leads };
             let mut outside = 0.0f64;
-            let out = |present: &Points| {
+            let out = |present: &Vectors| {
                 let beyond = |j: usize| {
                     let d = present.get(j);
                     [0, 1].map(|k| (d[k] - high[k]).max(low[k] - d[k])).into_iter().fold(0.0, f64::max)
@@ -157,7 +157,7 @@ fn four_neighbours_trimmed_all_the_same_do_not_follow_a_column_and_eight_do() {
     let column: fn(usize) -> bool = |member| member < 10;
     let leaders: Vec<bool> = (0..COUNT).map(column).collect();
     for (neighbourhood, follow) in
-        [(Neighbourhood::First { keep: None }, false), (Neighbourhood::Ring { radius: 1 }, true)]
+        [(Neighbourhood::First { keep: None }, false), (Neighbourhood::Chebyshev { radius: 1 }, true)]
     {
         let neighbours = square(neighbourhood).1;
         assert_eq!(supported(&neighbours, &leaders, 1, Trim::PerAxis).is_ok(), follow);

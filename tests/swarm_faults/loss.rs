@@ -1,7 +1,7 @@
 //! Loss: holding what was last heard leads to the same place, a mean over whoever was heard does not.
 
 use flockform::flock::neighbourhood::{Neighbourhood, Neighbours};
-use flockform::flock::points::Points;
+use flockform::flock::vectors::Vectors;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
@@ -15,11 +15,11 @@ fn heard(rng: &mut Pcg64Mcg, neighbours: &Neighbours, loss: f64) -> Vec<bool> {
 #[test]
 fn holding_the_last_pose_leads_to_the_place_without_loss() {
     let (reference, neighbours) = square(Neighbourhood::First { keep: None });
-    let interaction = barycentre(&reference, neighbours.clone());
+    let flock = barycentre(&reference, neighbours.clone());
     for (loss, steps) in [(0.3, 1200), (0.8, 4800)] {
         let (mut present, image) = stretched(&reference);
         // What each one holds of the others.
-        let mut held: Vec<Points> = vec![present.clone(); COUNT];
+        let mut held: Vec<Vectors> = vec![present.clone(); COUNT];
         let mut rng = Pcg64Mcg::seed_from_u64(4);
         for _ in 0..steps {
             let heard = heard(&mut rng, &neighbours, loss);
@@ -29,7 +29,7 @@ fn holding_the_last_pose_leads_to_the_place_without_loss() {
                     held[j].set(k, present.get(k));
                 }
             }
-            followers().for_each(|j| present.set(j, interaction.target(j, &held[j])));
+            followers().for_each(|j| present.set(j, flock.target(j, &held[j])));
         }
         assert!(error(&present, &image) < 1e-12 * 20.0, "{} at loss {loss}", error(&present, &image));
     }
@@ -48,9 +48,9 @@ fn a_mean_over_whoever_was_heard_ends_cells_away() {
                 let bonds = neighbours.bonds(j).filter(|&bond| heard[bond]);
                 bonds.map(|bond| neighbours.index[bond]).collect::<Vec<u32>>()
             });
-            let interaction = barycentre(&reference, Neighbours::from_lists(left));
+            let flock = barycentre(&reference, Neighbours::from_lists(left));
             let seen = present.clone();
-            followers().for_each(|j| present.set(j, interaction.target(j, &seen)));
+            followers().for_each(|j| present.set(j, flock.target(j, &seen)));
             if step >= 1000 {
                 least = least.min(error(&present, &image));
             }

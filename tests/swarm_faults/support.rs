@@ -1,20 +1,20 @@
 //! A square of ten by ten robots at unit spacing, led all around.
 
 use flockform::flock::body::{Body, Cut};
-use flockform::flock::interaction::{Interaction, Weights};
 use flockform::flock::lattice::{Lattice, LatticeKind};
+use flockform::flock::law::{Flock, Weights};
 use flockform::flock::neighbourhood::{Neighbourhood, Neighbours};
-use flockform::flock::points::{Points, distance};
 use flockform::flock::rules::Rule;
+use flockform::flock::vectors::{Vectors, distance};
 use flockform::solve::spectrum::scatter;
 
 pub const COUNT: usize = 100;
 
-pub fn square(neighbourhood: Neighbourhood) -> (Points, Neighbours) {
+pub fn square(neighbourhood: Neighbourhood) -> (Vectors, Neighbours) {
     let lattice = Lattice::new(LatticeKind::Square { spacing: 1.0 }, [0.0, 0.0], 0.0);
     let cut = Cut::Count { columns: 10, rows: 10 };
     let (body, neighbours) = Body::build(lattice, &cut, &neighbourhood, None).expect("fits");
-    (Points::clone(&body.reference), neighbours)
+    (Vectors::clone(&body.reference), neighbours)
 }
 
 /// Everybody at the edge leads.
@@ -26,8 +26,8 @@ pub fn followers() -> impl Iterator<Item = usize> {
     (0..COUNT).filter(|&member| !leads(member))
 }
 
-pub fn barycentre(reference: &Points, neighbours: Neighbours) -> Interaction {
-    Interaction {
+pub fn barycentre(reference: &Vectors, neighbours: Neighbours) -> Flock {
+    Flock {
         rule: Rule::BARYCENTRE,
         reference: reference.clone().into(),
         neighbours,
@@ -40,8 +40,9 @@ pub fn barycentre(reference: &Points, neighbours: Neighbours) -> Interaction {
 
 /// Leaders where an affine map takes them, followers scattered by up to a cell about their place in the
 /// reference. With the map's image of the reference, where four neighbours bring them to rest.
-pub fn stretched(reference: &Points) -> (Points, Points) {
-    let image: Points = reference.iter().map(|[x, y]| [1.2 * x + 0.3 * y + 2.0, 0.9 * y - 0.1 * x]).collect();
+pub fn stretched(reference: &Vectors) -> (Vectors, Vectors) {
+    let image: Vectors =
+        reference.iter().map(|[x, y]| [1.2 * x + 0.3 * y + 2.0, 0.9 * y - 0.1 * x]).collect();
     let mut start = image.clone();
     for member in followers() {
         let [x, y] = reference.get(member);
@@ -51,6 +52,6 @@ pub fn stretched(reference: &Points) -> (Points, Points) {
 }
 
 /// Largest distance of a follower from where it should be \[length\].
-pub fn error(present: &Points, wanted: &Points) -> f64 {
+pub fn error(present: &Vectors, wanted: &Vectors) -> f64 {
     followers().map(|j| distance(present.get(j), wanted.get(j))).fold(0.0, f64::max)
 }

@@ -2,7 +2,7 @@
 
 use std::process::{Child, Command, Stdio};
 
-use flockform::flock::points::distance;
+use flockform::flock::vectors::distance;
 use flockform::scene::bundled::bundled_swarm;
 use flockform::scene::swarm::Swarm;
 use flockform::shm::channel::{Capacity, Reader, Slice, Writer};

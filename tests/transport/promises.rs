@@ -166,7 +166,7 @@ pub fn who_does_not_listen_holds_nobody_up(transport: &mut impl Transport) {
 pub fn a_pose_that_is_not_finite_moves_nobody(
     transport: &mut impl Transport,
     control: &mut Control,
-    part: &flockform::swarm::control::part::Part,
+    part: &flockform::swarm::control::scope::NodeScope,
 ) {
     let (mut controller, mut robots) = (transport.controller(), transport.robots());
     meet(&mut controller, &mut robots, 1);

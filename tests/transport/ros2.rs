@@ -7,7 +7,7 @@ use flockform::ros::edge::{Edge, Node, Options};
 use flockform::ros::node::Link as Controller;
 use flockform::ros::robots::Link as Robots;
 use flockform::scene::swarm::Swarm;
-use flockform::swarm::control::part::Part;
+use flockform::swarm::control::scope::NodeScope;
 use flockform::swarm::transport::{ControllerEnd, Heard, Target};
 
 use super::promises;
@@ -72,7 +72,7 @@ impl Transport for Ros2 {
     fn controller(&mut self) -> Served {
         let (control, _) = control_of(&self.swarm);
         let heard = (0..control.formation().count()).collect();
-        let part = Part { mine: self.mine.clone(), heard };
+        let part = NodeScope { mine: self.mine.clone(), heard };
         let edge = Edge::open(Options { domain: domain(), loopback_only: true }).expect("sockets");
         let node = edge.node("/", "flockform").expect("a node");
         let names = &control.formation().names;

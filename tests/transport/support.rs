@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use flockform::scene::swarm::Swarm;
 use flockform::shm::Domain;
 use flockform::swarm::control::Control;
-use flockform::swarm::control::part::Part;
+use flockform::swarm::control::scope::NodeScope;
 use flockform::swarm::transport::{ControllerEnd, Heard, RobotsEnd, Target};
 use flockform::swarm::watch::Pose;
 
@@ -47,9 +47,9 @@ pub fn row(count: usize, more: &[&str]) -> Swarm {
     Swarm::parse("row", "a test's swarm", &text, &overrides, None).expect("valid")
 }
 
-pub fn control_of(swarm: &Swarm) -> (Control, Part) {
+pub fn control_of(swarm: &Swarm) -> (Control, NodeScope) {
     let mut control = Control::new(swarm).expect("valid");
-    let part = Part::take(swarm, &mut control, None).expect("all");
+    let part = NodeScope::take(swarm, &mut control, None).expect("all");
     (control, part)
 }
 

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 
 use crate::flock::block::{Block, plus};
 use crate::flock::lattice::Site;
-use crate::flock::points::Points;
+use crate::flock::vectors::Vectors;
 use crate::material::elastic::{Constants, Elastic, Plane};
 use crate::material::stiffness::quadrilateral;
 use crate::solve::equilibrium::System;
@@ -34,7 +34,7 @@ pub struct Parts {
     class: Vec<u32>,
     rows: Vec<Row>,
     follows: Vec<bool>,
-    forces: Points,
+    forces: Vectors,
 }
 
 impl Plate {
@@ -54,7 +54,7 @@ impl Plate {
             class: Vec::new(),
             rows: Vec::new(),
             follows: Vec::new(),
-            forces: Points::default(),
+            forces: Vectors::default(),
         };
         let stiffness = cell_stiffness();
         let mut known: HashMap<[bool; 4], u32> = HashMap::new();
@@ -83,7 +83,7 @@ impl Plate {
 impl Parts {
     /// The system that a host would hand to the solvers.
     pub fn system(self) -> Result<System, OperatorError> {
-        let held = Points::zeros(self.sites.len());
+        let held = Vectors::zeros(self.sites.len());
         let grid = [[1.0, 0.0], [0.0, 1.0]];
         let operator = Operator::new(&self.sites, grid, self.class, self.rows, self.follows)?;
         Ok(System::new(operator, self.forces, held))

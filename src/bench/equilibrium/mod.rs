@@ -13,7 +13,7 @@ use serde::Serialize;
 
 use self::beam::{Parts, Plate};
 use super::machine::median;
-use crate::flock::points::Points;
+use crate::flock::vectors::Vectors;
 use crate::solve::equilibrium::{Choice, Request, SolveError, Solved, Solver, System, solve};
 use crate::solve::operator::OperatorError;
 
@@ -189,7 +189,7 @@ impl ToError {
 }
 
 /// Fewest iterations of multigrid to a relative error.
-fn iterations_to(system: &System, truth: &Points, error: f64) -> Result<usize, EquilibriumError> {
+fn iterations_to(system: &System, truth: &Vectors, error: f64) -> Result<usize, EquilibriumError> {
     for iterations in 1..MOST_ITERATIONS {
         let found = solve(system, &request(Solver::Multigrid, f64::MIN_POSITIVE, iterations))?;
         if difference(&found.displacement, truth) <= error {
@@ -199,7 +199,7 @@ fn iterations_to(system: &System, truth: &Points, error: f64) -> Result<usize, E
     Ok(MOST_ITERATIONS)
 }
 
-fn difference(found: &Points, truth: &Points) -> f64 {
+fn difference(found: &Vectors, truth: &Vectors) -> f64 {
     let pairs = || found.iter().zip(truth.iter());
     let error: f64 = pairs().map(|(a, b)| (a[0] - b[0]).powi(2) + (a[1] - b[1]).powi(2)).sum();
     let size: f64 = pairs().map(|(_, b)| b[0] * b[0] + b[1] * b[1]).sum();

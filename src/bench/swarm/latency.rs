@@ -83,7 +83,7 @@ mod over_dds {
 
     use super::super::formation;
     use super::{Case, Report};
-    use crate::flock::points::Points;
+    use crate::flock::vectors::Vectors;
     use crate::ros::arguments::{DiscoveryRange, Environment, RosArguments};
     use crate::ros::edge::{Edge, Node, Options, Publisher, Quality, Subscription};
     use crate::ros::messages::builtin_interfaces::Time;
@@ -162,7 +162,7 @@ mod over_dds {
 
     /// The robots' side.
     struct Fleet {
-        places: Points,
+        places: Vectors,
         poses: Vec<Publisher<PoseStamped>>,
         targets: Vec<Subscription<PoseStamped>>,
         frame_id: String,
@@ -234,7 +234,7 @@ mod over_dds {
             self.round += 1;
             let aside = STRIDE * (self.round % 4) as f64;
             let count = self.poses.len();
-            let here: Points = self.places.iter().map(|[x, y]| [x, y + aside]).collect();
+            let here: Vectors = self.places.iter().map(|[x, y]| [x, y + aside]).collect();
             let mut sent = Vec::with_capacity(count);
             for member in 0..count {
                 let header =

@@ -15,10 +15,10 @@ use serde::Serialize;
 use super::Effort;
 use crate::bench::machine::median;
 use crate::flock::grid::CellGrid;
-use crate::flock::interaction::{Interaction, Weights};
+use crate::flock::law::{Flock, Weights};
 use crate::flock::neighbourhood::Neighbours;
-use crate::flock::points::Points;
 use crate::flock::rules::Rule;
+use crate::flock::vectors::Vectors;
 use crate::swarm::safety::{Filter, Flags, Limits, Obstacles, Seen};
 
 /// How far robots see [m].
@@ -66,7 +66,7 @@ pub(super) fn measure(robots: usize, effort: &Effort) -> Case {
     let per_millisecond = |seconds: f64| 1e-3 * robots as f64 / seconds;
     Case {
         robots,
-        neighbours: swarm.interaction.neighbours.index.len() as f64 / robots as f64,
+        neighbours: swarm.flock.neighbours.index.len() as f64 / robots as f64,
         rule_seconds_per_tick: rule,
         rule_robots_per_millisecond: per_millisecond(rule),
         safe_seconds_per_tick: safe,
@@ -75,14 +75,14 @@ pub(super) fn measure(robots: usize, effort: &Effort) -> Case {
 }
 
 struct Swarm {
-    places: Vec<Points>,
-    interaction: Interaction,
+    places: Vec<Vectors>,
+    flock: Flock,
     grid: CellGrid,
     members: Vec<bool>,
     ages: Vec<f64>,
-    wanted: Points,
+    wanted: Vectors,
     filter: Filter,
-    safe: Points,
+    safe: Vectors,
     flags: Vec<Flags>,
     tick: usize,
 }
@@ -96,13 +96,13 @@ impl Swarm {
             sites.swap(k, random.random_range(0..=k));
         }
         let mut shaken = |site: usize| site as f64 + random.random_range(-0.35..0.35);
-        let places: Vec<Points> = (0..SETS)
+        let places: Vec<Vectors> = (0..SETS)
             .map(|_| sites.iter().map(|&site| [shaken(site / side), shaken(site % side)]).collect())
             .collect();
         let limits = Limits { speed: SPEED, clearance: CLEARANCE, ..Limits::default() };
         let filter = Filter::new(limits, vec![RADIUS; robots], Obstacles::default());
         Self {
-            interaction: Interaction {
+            flock: Flock {
                 rule: Rule::BARYCENTRE,
                 reference: places[0].clone().into(),
                 neighbours: Neighbours::default(),
@@ -114,9 +114,9 @@ impl Swarm {
             grid: CellGrid::default(),
             members: vec![true; robots],
             ages: vec![0.0; robots],
-            wanted: Points::zeros(robots),
+            wanted: Vectors::zeros(robots),
             filter: filter.expect("the numbers above are in range"),
-            safe: Points::zeros(robots),
+            safe: Vectors::zeros(robots),
             flags: vec![Flags::default(); robots],
             places,
             tick: 0,
@@ -141,10 +141,10 @@ impl Swarm {
     fn serve(&mut self, filtered: bool) {
         self.tick += 1;
         let present = &self.places[self.tick % SETS];
-        self.interaction.neighbours.rebuild_within(&mut self.grid, present, &self.members, SIGHT);
+        self.flock.neighbours.rebuild_within(&mut self.grid, present, &self.members, SIGHT);
         let led = if filtered { LED } else { 0.0 };
         for robot in 0..present.len() {
-            let [x, y] = self.interaction.target(robot, present);
+            let [x, y] = self.flock.target(robot, present);
             self.wanted.set(robot, [x + led, y]);
         }
         if filtered {
@@ -164,7 +164,7 @@ mod tests {
     fn robots_see_about_ten_and_the_filter_changes_what_they_want() {
         let mut swarm = Swarm::new(1000);
         swarm.serve(true);
-        let neighbours = swarm.interaction.neighbours.index.len();
+        let neighbours = swarm.flock.neighbours.index.len();
         assert!((9000..10_500).contains(&neighbours), "{neighbours}");
         assert!(swarm.flags.iter().all(|flags| flags.has(Flags::SPEED_LIMITED)));
         assert!(swarm.flags.iter().filter(|flags| flags.has(Flags::SEPARATED)).count() > 500);

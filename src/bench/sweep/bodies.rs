@@ -4,14 +4,14 @@ use std::time::Instant;
 
 use crate::flock::block::Block;
 use crate::flock::fracture::{Bonds, Ghosts, Threshold};
-use crate::flock::interaction::{Interaction, MatrixWeights, Weights};
 use crate::flock::lattice::{Lattice, LatticeKind};
+use crate::flock::law::{Flock, MatrixWeights, Weights};
 use crate::flock::neighbourhood::{Neighbourhood, Neighbours};
 use crate::flock::numbering::order_in_columns;
-use crate::flock::points::Points;
 use crate::flock::real::Real;
 use crate::flock::role::Role;
 use crate::flock::rules::Rule;
+use crate::flock::vectors::Vectors;
 use crate::sweep::rows::Rows;
 use crate::sweep::terms::Terms;
 use crate::sweep::{Activity, Led, MOST_STEPS, Steps, Sweep, Update};
@@ -80,7 +80,7 @@ pub fn all(sides: &[usize], other: usize) -> Vec<Make> {
         all.push(Box::new(move || square_single(side, MOST_STEPS)));
     }
     all.push(Box::new(move || {
-        let body = Body::square(other, &Neighbourhood::Ring { radius: 1 });
+        let body = Body::square(other, &Neighbourhood::Chebyshev { radius: 1 });
         body.subject(EIGHT, BYTES_PER_UPDATE, 1)
     }));
     all.push(Box::new(move || material(other)));
@@ -94,9 +94,9 @@ pub fn all(sides: &[usize], other: usize) -> Vec<Make> {
 
 struct Body {
     side: usize,
-    interaction: Interaction,
+    flock: Flock,
     roles: Vec<Role>,
-    present: Points,
+    present: Vectors,
 }
 
 impl Body {
@@ -114,46 +114,39 @@ impl Body {
             offsets.clone().take(seen).map(move |offset| particle.wrapping_add_signed(offset) as u32)
         }));
         let roles = sites().map(|site| if follows(site) { Role::Follower } else { Role::Clamped }).collect();
-        let reference: Points = sites().map(|(i, j)| lattice.position([i as i32, j as i32])).collect();
+        let reference: Vectors = sites().map(|(i, j)| lattice.position([i as i32, j as i32])).collect();
         Self::new(side, reference, neighbours, roles)
     }
 
-    fn new(side: usize, reference: Points, neighbours: Neighbours, roles: Vec<Role>) -> Self {
+    fn new(side: usize, reference: Vectors, neighbours: Neighbours, roles: Vec<Role>) -> Self {
         // Nobody at rest to the bit, so that there is something to compute everywhere.
         let waves = |[x, y]: [f64; 2]| [x + 0.01 * (0.1 * y).sin(), y + 0.01 * (0.1 * x).sin()];
         let present = reference.iter().map(waves).collect();
         let (rule, weights, reference) = (Rule::BARYCENTRE, Weights::Equal, reference.into());
-        let interaction =
-            Interaction { rule, reference, neighbours, weights, forces: None, rest: None, bonds: None };
-        Self { side, interaction, roles, present }
+        let flock = Flock { rule, reference, neighbours, weights, forces: None, rest: None, bonds: None };
+        Self { side, flock, roles, present }
     }
 
     fn sweep(&self, update: Update) -> Sweep {
-        Sweep::compile(update, &self.interaction, &self.roles)
+        Sweep::compile(update, &self.flock, &self.roles)
     }
 
     fn subject(self, name: &'static str, bytes_per_update: f64, steps_together: usize) -> Subject {
         let sweep = self.sweep(Update::default());
         let followers = sweep.followers();
-        let Self { side, interaction, mut present, .. } = self;
+        let Self { side, flock, mut present, .. } = self;
         let mut next = present.clone();
         let step = move |steps: usize| {
             let mut to_go = steps;
             while to_go > 0 {
                 if steps_together == 1 {
-                    sweep.step(&interaction, None, &present, &mut next);
+                    sweep.step(&flock, None, &present, &mut next);
                     std::mem::swap(&mut present, &mut next);
                     to_go -= 1;
                 } else {
                     let count = to_go.min(steps_together);
                     let whole = &mut Activity::default();
-                    sweep.steps(
-                        &interaction,
-                        None,
-                        (&mut present, &mut next),
-                        (count, Led::NOBODY, None),
-                        whole,
-                    );
+                    sweep.steps(&flock, None, (&mut present, &mut next), (count, Led::NOBODY, None), whole);
                     to_go -= count;
                 }
             }
@@ -182,7 +175,7 @@ fn square(side: usize, steps_together: usize) -> Subject {
 fn square_single(side: usize, steps_together: usize) -> Subject {
     let body = Body::square(side, &FIRST);
     let follows: Vec<bool> = body.roles.iter().map(|&role| role == Role::Follower).collect();
-    let unoffset = Interaction { rest: None, ..body.interaction };
+    let unoffset = Flock { rest: None, ..body.flock };
     let rows = Rows::compile(&unoffset, &follows).expect("a barycentre");
     let followers = follows.iter().filter(|&&follows| follows).count();
     let single = |values: &[f64]| values.iter().map(|&value| f32::of(value)).collect::<Vec<f32>>();
@@ -220,7 +213,7 @@ fn square_single(side: usize, steps_together: usize) -> Subject {
 
 /// What one would write without thinking of caches: for each column, for each row.
 fn plain_loop(side: usize) -> Subject {
-    let Points { x, y } = Body::square(side, &FIRST).present;
+    let Vectors { x, y } = Body::square(side, &FIRST).present;
     let mut present = [x, y];
     let mut next = present.clone();
     let step = move |steps: usize| {
@@ -252,11 +245,11 @@ fn plain_loop(side: usize) -> Subject {
 
 /// Matrices that take every place to the barycentre's, but have to be multiplied out.
 fn material(side: usize) -> Subject {
-    let mut body = Body::square(side, &Neighbourhood::Ring { radius: 1 });
+    let mut body = Body::square(side, &Neighbourhood::Chebyshev { radius: 1 });
     let blocks: Vec<Block> =
         (0..8).map(|k| f64::from(k % 2) - 0.5).map(|s| [[0.125, 0.01 * s], [0.01 * s, 0.125]]).collect();
-    body.interaction.rule = Rule::MATERIAL;
-    body.interaction.weights = Weights::Matrix(MatrixWeights {
+    body.flock.rule = Rule::MATERIAL;
+    body.flock.weights = Weights::Matrix(MatrixWeights {
         class: body.roles.iter().map(|&role| u32::from(role == Role::Follower)).collect(),
         starts: vec![0, 0, 8],
         stiffness: blocks.clone(),
@@ -270,7 +263,7 @@ fn material(side: usize) -> Subject {
 /// Bonds are looked at in every step; none breaks, and if `cracked`, many are broken.
 fn fracture(side: usize, cracked: bool) -> Subject {
     let mut body = Body::square(side, &FIRST);
-    let (neighbours, reference) = (&body.interaction.neighbours, &body.interaction.reference);
+    let (neighbours, reference) = (&body.flock.neighbours, &body.flock.reference);
     let threshold = Threshold::Stretch(3.0);
     let mut bonds = Bonds::new(Some(threshold), Ghosts::Lattice, neighbours);
     if cracked {
@@ -281,17 +274,17 @@ fn fracture(side: usize, cracked: bool) -> Subject {
             bonds.cut(([at, -far], [at, far]), neighbours, reference, &mut Vec::new());
         }
     }
-    body.interaction.bonds = Some(bonds);
-    let (roles, bonds_watched) = (body.roles.clone(), body.interaction.neighbours.index.len() / 2);
+    body.flock.bonds = Some(bonds);
+    let (roles, bonds_watched) = (body.roles.clone(), body.flock.neighbours.index.len() / 2);
     let sweep = body.sweep(Update::default());
-    let Body { mut interaction, mut present, .. } = body;
+    let Body { mut flock, mut present, .. } = body;
     let (mut next, followers) = (present.clone(), sweep.followers());
     let step = move |steps: usize| {
         for _ in 0..steps {
-            let Interaction { bonds, neighbours, reference, .. } = &mut interaction;
+            let Flock { bonds, neighbours, reference, .. } = &mut flock;
             let bonds = bonds.as_mut().expect("given above");
             bonds.break_stretched(1, neighbours, (&**reference, &present), &roles, &mut Vec::new());
-            sweep.step(&interaction, None, &present, &mut next);
+            sweep.step(&flock, None, &present, &mut next);
             std::mem::swap(&mut present, &mut next);
         }
     };
@@ -337,7 +330,7 @@ fn lists(side: usize, order: &'static str) -> Subject {
 
 /// The places of a hexagonal lattice, jumbled so little that nobody's neighbours change but no two are translates, and
 /// the lists of those inside.
-fn hexagonal(side: usize) -> (Points, Vec<Vec<u32>>) {
+fn hexagonal(side: usize) -> (Vectors, Vec<Vec<u32>>) {
     let at = |column: usize, row: usize| (column * side + row) as u32;
     let points = (0..side * side)
         .map(|i| [(i / side) as f64 * 0.75f64.sqrt(), (i % side) as f64 + 0.5 * (i / side % 2) as f64]);
@@ -363,7 +356,7 @@ fn hexagonal(side: usize) -> (Points, Vec<Vec<u32>>) {
     (points.collect(), lists.collect())
 }
 
-fn reorder(points: &Points, rank: &[u32]) -> Points {
+fn reorder(points: &Vectors, rank: &[u32]) -> Vectors {
     rank.iter().map(|&i| points.get(i as usize)).collect()
 }
 
@@ -387,15 +380,12 @@ mod tests {
         let cut = Cut::Count { columns: 9, rows: 9 };
         let (body, neighbours) = body::Body::build(lattice, &cut, &FIRST, None).expect("fits");
         let direct = Body::square(9, &FIRST);
-        assert_eq!(direct.interaction.reference, body.reference);
+        assert_eq!(direct.flock.reference, body.reference);
         let inner = (1..8).flat_map(|column| (1..8).map(move |row| 9 * column + row));
         for particle in inner {
-            assert_eq!(direct.interaction.neighbours.of(particle), neighbours.of(particle));
+            assert_eq!(direct.flock.neighbours.of(particle), neighbours.of(particle));
         }
-        assert_eq!(
-            direct.interaction.neighbours.index.len(),
-            4 * direct.sweep(Update::default()).followers()
-        );
+        assert_eq!(direct.flock.neighbours.index.len(), 4 * direct.sweep(Update::default()).followers());
     }
 
     #[test]
@@ -408,7 +398,7 @@ mod tests {
         let (points, lists) = hexagonal(20);
         for (j, list) in lists.iter().enumerate() {
             for &k in list {
-                let apart = crate::flock::points::distance(points.get(j), points.get(k as usize));
+                let apart = crate::flock::vectors::distance(points.get(j), points.get(k as usize));
                 assert!((apart - 1.0).abs() < 1e-12, "{j} sees {k}");
             }
         }

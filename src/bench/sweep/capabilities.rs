@@ -8,8 +8,8 @@ use super::super::machine::median;
 use crate::continuum::engine::Engine;
 use crate::continuum::plan::Plan;
 use crate::continuum::record::{ProbeSeries, Snapshot};
-use crate::flock::points::Points;
 use crate::flock::role::Role;
+use crate::flock::vectors::Vectors;
 use crate::scene;
 use crate::sweep::kernel::Component;
 use crate::sweep::rows::Rows;
@@ -85,7 +85,7 @@ fn plan(side: usize, keys: &[&str]) -> Plan {
     plan.unwrap_or_else(|error| panic!("the benchmark's own scene is refused: {error}"))
 }
 
-fn stirred(reference: &Points) -> impl Iterator<Item = [f64; 2]> + '_ {
+fn stirred(reference: &Vectors) -> impl Iterator<Item = [f64; 2]> + '_ {
     reference.iter().map(|[x, y]| [x + 0.01 * (0.1 * y).sin(), y + 0.01 * (0.1 * x).sin()])
 }
 
@@ -110,16 +110,16 @@ fn time(engine: &mut Engine, steps: usize, recorded: Recorded) -> f64 {
 /// The loops and nothing else.
 struct Bare {
     rows: Rows,
-    present: Points,
-    next: Points,
+    present: Vectors,
+    next: Vectors,
 }
 
 impl Bare {
     fn new(plan: &Plan) -> Self {
         let follows: Vec<bool> = plan.roles.iter().map(|&role| role == Role::Follower).collect();
-        let present: Points = stirred(&plan.body.reference).collect();
+        let present: Vectors = stirred(&plan.body.reference).collect();
         Self {
-            rows: Rows::compile(&plan.interaction, &follows).expect("a barycentre"),
+            rows: Rows::compile(&plan.flock, &follows).expect("a barycentre"),
             next: present.clone(),
             present,
         }

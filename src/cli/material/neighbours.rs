@@ -25,10 +25,10 @@ pub fn neighbourhood(text: &str, lattice: &Lattice) -> Result<Vec<Vec<Site>>, Wr
     let who = match (kind, value) {
         ("first", None) => Neighbourhood::First { keep: None },
         ("first", Some(keep)) => Neighbourhood::First { keep: Some(count(keep, 6)? as usize) },
-        ("ring", None) => Neighbourhood::Ring { radius: 1 },
-        ("ring", Some(radius)) => Neighbourhood::Ring { radius: count(radius, 8)? as i32 },
+        ("chebyshev", None) => Neighbourhood::Chebyshev { radius: 1 },
+        ("chebyshev", Some(radius)) => Neighbourhood::Chebyshev { radius: count(radius, 8)? as i32 },
         ("second", None) => Neighbourhood::Second,
-        ("straight", None) => Neighbourhood::Straight,
+        ("collinear", None) => Neighbourhood::Collinear,
         ("within", Some(radius)) => {
             let (radius, most) = (number(option, radius)?, FARTHEST * lattice.spacing());
             if radius > most {

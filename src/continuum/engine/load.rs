@@ -1,7 +1,7 @@
 //! How much of the scene's loads is on the body.
 
 use super::Engine;
-use crate::flock::points::Points;
+use crate::flock::vectors::Vectors;
 
 /// The part of the loads that acts, and the whole of them.
 #[derive(Clone, Debug)]
@@ -10,13 +10,13 @@ pub(super) struct Load {
     ramp: Option<usize>,
     factor: f64,
     /// The whole of each load \[force\], shape \[loads\]\[count\].
-    each: Vec<Points>,
+    each: Vec<Vectors>,
     /// \[force\], shape \[count\]; only where the factor has been another than 1.
-    whole: Option<Points>,
+    whole: Option<Vectors>,
 }
 
 impl Load {
-    pub fn new(ramp: Option<usize>, each: Vec<Points>) -> Self {
+    pub fn new(ramp: Option<usize>, each: Vec<Vectors>) -> Self {
         Self { ramp, factor: 1.0, each, whole: None }
     }
 
@@ -33,12 +33,12 @@ impl Engine {
     }
 
     /// All of the scene's loads \[force\], shape \[count\]; `None` without loads.
-    pub fn whole_load(&self) -> Option<&Points> {
-        self.load.whole.as_ref().or(self.interaction.forces.as_ref())
+    pub fn whole_load(&self) -> Option<&Vectors> {
+        self.load.whole.as_ref().or(self.flock.forces.as_ref())
     }
 
     /// The whole of each of the scene's loads \[force\], shape \[loads\]\[count\].
-    pub fn each_load(&self) -> &[Points] {
+    pub fn each_load(&self) -> &[Vectors] {
         &self.load.each
     }
 
@@ -48,7 +48,7 @@ impl Engine {
             return;
         }
         self.load.factor = factor;
-        if let Some(forces) = &mut self.interaction.forces {
+        if let Some(forces) = &mut self.flock.forces {
             let whole = self.load.whole.get_or_insert_with(|| forces.clone());
             *forces = scaled(whole, factor);
         }
@@ -63,6 +63,6 @@ impl Engine {
 }
 
 /// Every force times `factor`; all of them to the bit at 1.
-pub fn scaled(forces: &Points, factor: f64) -> Points {
+pub fn scaled(forces: &Vectors, factor: f64) -> Vectors {
     forces.iter().map(|[x, y]| [factor * x, factor * y]).collect()
 }

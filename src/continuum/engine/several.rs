@@ -2,8 +2,8 @@
 
 use super::{Engine, Led as Leader};
 use crate::continuum::layout::RoleChange;
-use crate::flock::interaction::Interaction;
-use crate::flock::points::{Points, distance};
+use crate::flock::law::Flock;
+use crate::flock::vectors::{Vectors, distance};
 use crate::sweep::{Activity, Led, MOST_STEPS};
 
 impl Engine {
@@ -12,7 +12,7 @@ impl Engine {
     /// found anew and roles that change look at every step.
     pub fn steps_at_once(&self, most: usize) -> usize {
         let finds_neighbours = self.present_neighbours.is_some();
-        let looks = looks_at_every_step(finds_neighbours, &self.interaction, &self.changes);
+        let looks = looks_at_every_step(finds_neighbours, &self.flock, &self.changes);
         let waits = looks || !self.guided.is_empty() || !self.takes_several || self.moves_components();
         if waits || self.load.is_growing(self.step) {
             return 0;
@@ -32,15 +32,14 @@ impl Engine {
         let led = Led { particles: &self.led, place: &place };
         let places = (&mut self.present, &mut self.previous);
         let frame = self.body.frame.as_ref();
-        let told =
-            self.sweep.steps(&self.interaction, frame, places, (count, led, farther), &mut self.activity);
+        let told = self.sweep.steps(&self.flock, frame, places, (count, led, farther), &mut self.activity);
         self.step += count;
         self.settled = None;
         told
     }
 
     /// Puts the body back to where it stood at an earlier step, with the same roles, as if it had not gone on.
-    pub fn return_to(&mut self, step: usize, places: &Points, activity: Activity) {
+    pub fn return_to(&mut self, step: usize, places: &Vectors, activity: Activity) {
         self.step = step;
         self.settled = None;
         self.follow_ramp();
@@ -70,9 +69,9 @@ impl Engine {
     /// moved \[length\]; `None` where nothing is known.
     pub fn reach_of_a_step(&self) -> Option<Reach> {
         let reference = &self.body.reference;
-        let moved = |j: usize| distance(self.interaction.target(j, reference), reference.get(j));
+        let moved = |j: usize| distance(self.flock.target(j, reference), reference.get(j));
         let gain = self.sweep.gain()?.max(1.0);
-        Some(Reach { gain, offset: self.body.matter().map(moved).fold(0.0, f64::max) })
+        Some(Reach { gain, offset: self.body.body_particles().map(moved).fold(0.0, f64::max) })
     }
 }
 
@@ -93,12 +92,8 @@ impl Reach {
 }
 
 /// Whether something of a body depends on how it stands in each step: then steps are taken one at a time.
-pub fn looks_at_every_step(
-    finds_neighbours: bool,
-    interaction: &Interaction,
-    changes: &[RoleChange],
-) -> bool {
+pub fn looks_at_every_step(finds_neighbours: bool, flock: &Flock, changes: &[RoleChange]) -> bool {
     finds_neighbours
-        || interaction.bonds.as_ref().is_some_and(|bonds| bonds.threshold.is_some())
+        || flock.bonds.as_ref().is_some_and(|bonds| bonds.threshold.is_some())
         || changes.iter().any(|change| change.when.is_some())
 }

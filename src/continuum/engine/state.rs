@@ -7,11 +7,11 @@ use serde::{Deserialize, Serialize};
 
 use super::{Engine, Led};
 use crate::continuum::plan::Plan;
-use crate::continuum::stored;
+use crate::continuum::serde_impls;
 use crate::flock::fracture::Break;
-use crate::flock::interaction::Weights;
-use crate::flock::points::Points;
+use crate::flock::law::Weights;
 use crate::flock::role::Role;
+use crate::flock::vectors::Vectors;
 use crate::sweep::Activity;
 
 /// Everything that steps have changed.
@@ -19,15 +19,15 @@ use crate::sweep::Activity;
 pub struct EngineState {
     step: usize,
     /// Positions now and before the last step \[length\], shape \[count\].
-    #[serde(with = "stored::points")]
-    present: Points,
-    #[serde(with = "stored::points")]
-    previous: Points,
-    #[serde(with = "stored::roles")]
+    #[serde(with = "serde_impls::points")]
+    present: Vectors,
+    #[serde(with = "serde_impls::points")]
+    previous: Vectors,
+    #[serde(with = "serde_impls::roles")]
     roles: Vec<Role>,
     leaders: Vec<Leading>,
     guided: Vec<(usize, [f64; 2])>,
-    #[serde(with = "stored::breaks")]
+    #[serde(with = "serde_impls::breaks")]
     breaks: Vec<Break>,
     /// Where something moved in the last step, and what was swept so far.
     activity: Activity,
@@ -63,12 +63,12 @@ impl EngineState {
             since,
             base,
         };
-        let interaction = &engine.interaction;
+        let flock = &engine.flock;
         let packed = |byte: usize, bonds: &crate::flock::fracture::Bonds| {
-            let all = 8 * byte..(8 * byte + 8).min(interaction.neighbours.index.len());
+            let all = 8 * byte..(8 * byte + 8).min(flock.neighbours.index.len());
             all.fold(0, |bits, bond| bits | u8::from(bonds.is_broken(bond)) << (bond % 8))
         };
-        let bytes = interaction.neighbours.index.len().div_ceil(8);
+        let bytes = flock.neighbours.index.len().div_ceil(8);
         Self {
             step: engine.step,
             present: engine.present.clone(),
@@ -78,10 +78,7 @@ impl EngineState {
             guided: engine.guided.clone(),
             breaks: engine.breaks.clone(),
             activity: engine.activity.clone(),
-            broken: interaction
-                .bonds
-                .as_ref()
-                .map(|bonds| (0..bytes).map(|byte| packed(byte, bonds)).collect()),
+            broken: flock.bonds.as_ref().map(|bonds| (0..bytes).map(|byte| packed(byte, bonds)).collect()),
         }
     }
 
@@ -109,10 +106,10 @@ impl EngineState {
         engine.led = engine.leaders.iter().map(|led| led.particle).collect();
         engine.guided = self.guided;
         engine.breaks = self.breaks;
-        if let (Some(bonds), Some(broken)) = (&mut engine.interaction.bonds, &self.broken) {
+        if let (Some(bonds), Some(broken)) = (&mut engine.flock.bonds, &self.broken) {
             bonds.set_broken(|bond| broken[bond / 8] >> (bond % 8) & 1 == 1);
         }
-        engine.see_again();
+        engine.rebuild_caches();
         engine.activity = self.activity;
         Ok(engine)
     }
@@ -125,8 +122,7 @@ impl EngineState {
         require("particles", self.present.len(), count)?;
         require("former places", self.previous.len(), count)?;
         require("roles", self.roles.len(), count)?;
-        let bits =
-            engine.interaction.bonds.as_ref().map(|_| engine.interaction.neighbours.index.len().div_ceil(8));
+        let bits = engine.flock.bonds.as_ref().map(|_| engine.flock.neighbours.index.len().div_ceil(8));
         require("bytes of bonds", self.broken.as_ref().map_or(0, Vec::len), bits.unwrap_or(0))?;
         for led in &self.leaders {
             require("role changes", led.change.min(engine.changes.len()), led.change)?;
@@ -138,13 +134,13 @@ impl EngineState {
 
 impl Engine {
     /// Finds again what follows from roles, bonds and positions that were put in from outside.
-    fn see_again(&mut self) {
+    fn rebuild_caches(&mut self) {
         if let Some(present) = &mut self.present_neighbours {
             present.members = self.roles.iter().map(|role| role.is_body()).collect();
             if self.step > 0 {
                 // Those of a step are found where it begins.
                 let super::PresentNeighbours { radius, grid, members } = present;
-                self.interaction.neighbours.rebuild_within(grid, &self.previous, members, *radius);
+                self.flock.neighbours.rebuild_within(grid, &self.previous, members, *radius);
             }
         }
         self.compile_sweep();
@@ -155,14 +151,13 @@ impl Engine {
 /// FNV-1a (G. Fowler, L. C. Noll, K.-P. Vo). Not secure against forgery.
 pub fn digest(plan: &Plan) -> u64 {
     let mut digest = Fnv(0xcbf2_9ce4_8422_2325);
-    let Plan { body, interaction, update, present_radius, roles, changes, cuts, stop, probes, ramp, .. } =
-        plan;
+    let Plan { body, flock, update, present_radius, roles, changes, cuts, stop, probes, ramp, .. } = plan;
     digest.points(&body.reference);
-    digest.text(&format!("{update:?} {present_radius:?} {stop:?} {:?} {cuts:?}", interaction.rule));
+    digest.text(&format!("{update:?} {present_radius:?} {stop:?} {:?} {cuts:?}", flock.rule));
     roles.iter().for_each(|role| digest.text(role.name()));
-    interaction.neighbours.starts.iter().for_each(|start| digest.bytes(&start.to_le_bytes()));
-    interaction.neighbours.index.iter().for_each(|index| digest.bytes(&index.to_le_bytes()));
-    match &interaction.weights {
+    flock.neighbours.starts.iter().for_each(|start| digest.bytes(&start.to_le_bytes()));
+    flock.neighbours.index.iter().for_each(|index| digest.bytes(&index.to_le_bytes()));
+    match &flock.weights {
         Weights::Equal => {}
         Weights::Scalar(weights) => digest.numbers(weights),
         Weights::Matrix(weights) => {
@@ -170,11 +165,11 @@ pub fn digest(plan: &Plan) -> u64 {
             weights.blocks.iter().flatten().for_each(|row| digest.numbers(row));
         }
     }
-    interaction.forces.iter().chain(&interaction.rest).for_each(|points| digest.points(points));
+    flock.forces.iter().chain(&flock.rest).for_each(|points| digest.points(points));
     if let Some(ramp) = ramp {
         digest.text(&format!("ramp {ramp}"));
     }
-    if let Some(bonds) = &interaction.bonds {
+    if let Some(bonds) = &flock.bonds {
         digest.text(&format!("{:?} {:?}", bonds.threshold, bonds.ghosts));
     }
     for change in changes {
@@ -209,7 +204,7 @@ impl Fnv {
         numbers.iter().for_each(|number| self.bytes(&number.to_bits().to_le_bytes()));
     }
 
-    fn points(&mut self, points: &Points) {
+    fn points(&mut self, points: &Vectors) {
         self.numbers(&points.x);
         self.numbers(&points.y);
     }

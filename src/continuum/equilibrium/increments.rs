@@ -6,7 +6,7 @@ use super::{
 };
 use crate::continuum::engine::Engine;
 use crate::continuum::engine::load::scaled;
-use crate::flock::points::Points;
+use crate::flock::vectors::Vectors;
 use crate::scene::{Scene, SceneError};
 use crate::solve::corotated::{self, CorotatedError, Way};
 use crate::solve::equilibrium::{Request, Solved, solve};
@@ -22,7 +22,7 @@ enum Failure {
 /// where one is not found, the run ends with the last.
 ///
 /// # Errors
-/// As [`super::settle`]: what is wrong with the scene and not with the size of the load.
+/// As [`super::solve_equilibrium`]: what is wrong with the scene and not with the size of the load.
 pub(super) fn settle_each(
     scene: &Scene,
     request: &Request,
@@ -30,7 +30,7 @@ pub(super) fn settle_each(
     parts: &[f64],
     watch: Watch<'_>,
 ) -> Result<Outcome, SceneError> {
-    let whole = plan.interaction.forces.clone();
+    let whole = plan.flock.forces.clone();
     let spacing = plan.body.lattice.spacing();
     let mut engine = Engine::new(plan.clone());
     engine.set_load_factor(0.0);
@@ -71,19 +71,19 @@ pub(super) fn settle_each(
 fn settle_at(
     scene: &Scene,
     request: &Request,
-    (plan, whole): (&mut Plan, Option<&Points>),
-    start: Option<(&Points, f64)>,
+    (plan, whole): (&mut Plan, Option<&Vectors>),
+    start: Option<(&Vectors, f64)>,
     part: f64,
 ) -> Result<Solved, Failure> {
     let steps = steps_of_the_way(plan) as f64;
-    if !corotated::is_corotated(&plan.interaction) {
-        plan.interaction.forces = whole.map(|whole| scaled(whole, part));
+    if !corotated::is_corotated(&plan.flock) {
+        plan.flock.forces = whole.map(|whole| scaled(whole, part));
         let system = of_plan_after(scene, plan, part * steps).map_err(Failure::Refused)?;
         return solve(&system, request).map_err(|error| Failure::Refused(refuse(scene, &error)));
     }
     let way = Way { held: &|part| way_after(plan, part * steps), start, end: part };
     let axes = held_axes(plan);
-    let solved = corotated::solve(&plan.interaction, &plan.body, follows(plan), axes, &way, request);
+    let solved = corotated::solve(&plan.flock, &plan.body, follows(plan), axes, &way, request);
     solved.map_err(|error| match error {
         CorotatedError::Unsettled { .. } if start.is_some() => Failure::Lost(error.to_string()),
         _ => Failure::Refused(refuse_corotated(scene, &error)),

@@ -6,8 +6,8 @@ use super::configuration::dot_radius;
 use super::heading::{Heading, Key, Mark};
 use super::page;
 use super::svg::{Path, Svg};
-use crate::flock::points::Points;
 use crate::flock::role::Role;
+use crate::flock::vectors::Vectors;
 use crate::material::cells::Cells;
 
 /// Bodies of more particles are drawn as outlines: dots would be one blot.
@@ -33,10 +33,10 @@ pub struct Pair<'a> {
     pub cells: &'a Cells,
     pub roles: &'a [Role],
     /// Where the particles are at rest \[length\].
-    pub reference: &'a Points,
+    pub reference: &'a Vectors,
     /// Displacements \[length\].
-    pub rule: &'a Points,
-    pub truth: &'a Points,
+    pub rule: &'a Vectors,
+    pub truth: &'a Vectors,
 }
 
 /// Particles where the rule has them and where the truth has them, on the same axes.
@@ -75,7 +75,7 @@ impl Pair<'_> {
         (0..self.roles.len()).filter(|&i| self.roles[i].is_body())
     }
 
-    pub(super) fn displaced(&self, displacement: &Points, factor: f64) -> Points {
+    pub(super) fn displaced(&self, displacement: &Vectors, factor: f64) -> Vectors {
         let moved = |(p, u): ([f64; 2], [f64; 2])| [p[0] + factor * u[0], p[1] + factor * u[1]];
         self.reference.iter().zip(displacement.iter()).map(moved).collect()
     }
@@ -83,11 +83,11 @@ impl Pair<'_> {
     /// The window that holds the particles at all these places.
     pub(super) fn window<'p>(
         &self,
-        places: impl IntoIterator<Item = &'p Points>,
+        places: impl IntoIterator<Item = &'p Vectors>,
         axes: impl FnOnce([f64; 2], [f64; 2], f64) -> Axes,
     ) -> Axes {
         let finite = |p: &[f64; 2]| p.iter().all(|value| value.is_finite());
-        let all: Points = places
+        let all: Vectors = places
             .into_iter()
             .flat_map(|points| self.drawn().map(|i| points.get(i)))
             .filter(finite)
@@ -101,8 +101,8 @@ impl Pair<'_> {
 /// Times what displacements are drawn: 1, or 1, 2, 5 times a power of ten for those too small to be
 /// seen and those so large that the body would be lost beside them.
 pub(super) fn enlargement<D: Iterator<Item = usize>>(
-    reference: &Points,
-    displacement: &Points,
+    reference: &Vectors,
+    displacement: &Vectors,
     drawn: impl Fn() -> D,
 ) -> f64 {
     let size = |u: [f64; 2]| u[0].hypot(u[1]);
@@ -142,7 +142,7 @@ fn legend(pair: &Pair<'_>, is_dotted: bool) -> Vec<Key> {
 
 /// The body's boundary with its corners at `places`, in one piece each, or the dashes of a line would begin anew at every
 /// particle.
-fn draw_outline(svg: &mut Svg, axes: &Axes, pair: &Pair<'_>, places: &Points, stroke: &str) {
+fn draw_outline(svg: &mut Svg, axes: &Axes, pair: &Pair<'_>, places: &Vectors, stroke: &str) {
     let mut path = Path::default();
     for way in pair.cells.boundary_ways(places.len()) {
         let way: Vec<[f64; 2]> = way.iter().map(|&i| axes.place(places.get(i as usize))).collect();
@@ -154,7 +154,7 @@ fn draw_outline(svg: &mut Svg, axes: &Axes, pair: &Pair<'_>, places: &Points, st
 }
 
 /// Rings where the truth is, dots where the rule is, and a line from each to the other.
-fn draw_particles(svg: &mut Svg, axes: &Axes, pair: &Pair<'_>, rule: &Points, truth: &Points) {
+fn draw_particles(svg: &mut Svg, axes: &Axes, pair: &Pair<'_>, rule: &Vectors, truth: &Vectors) {
     let radius = (0.75 * dot_radius(axes, pair.spacing)).min(4.2);
     let ring = (radius + 1.4).min(1.5 * radius);
     let is_seen = |i: &usize| rule.get(*i).iter().chain(&truth.get(*i)).all(|value| value.is_finite());
@@ -217,7 +217,7 @@ mod tests {
         let (body, _) = Body::build(lattice, &cut, &near, None).expect("builds");
         let cells = Cells::of_body(&body);
         for (size, factor) in [(1.0, 1.0), (0.0, 1.0), (5.9, 1.0), (1e-3, 500.0), (50.0, 0.05), (0.1, 5.0)] {
-            let moved: Points = body.reference.iter().map(|_| [0.0, size]).collect();
+            let moved: Vectors = body.reference.iter().map(|_| [0.0, size]).collect();
             let pair = Pair {
                 title: "",
                 unit: "m",

@@ -11,8 +11,8 @@ use super::svg::{Path, Svg};
 use super::{MOST_DOTS, Subject};
 use crate::continuum::record::Snapshot;
 use crate::export::bonds;
-use crate::flock::points::distance;
 use crate::flock::role::Role;
+use crate::flock::vectors::distance;
 
 /// Bodies of more particles, or bonds, are drawn without bonds, which would be a grey sheet.
 const MOST_PARTICLES_WITH_BONDS: usize = 20_000;

@@ -5,8 +5,8 @@ use super::colour;
 use super::heading::{Heading, Key, Mark};
 use super::page;
 use super::svg::{Path, Svg};
-use crate::flock::points::Points;
 use crate::flock::role::Role;
+use crate::flock::vectors::Vectors;
 use crate::scene::swarm::Swarm;
 use crate::scene::swarm::raw::RawObstacle;
 use crate::swarm::flight::{FlightReport, Record};
@@ -26,7 +26,7 @@ pub fn flight(swarm: &Swarm, record: &Record, report: &FlightReport) -> String {
     };
     let leads = |m: usize| report.per_robot[m].role != Role::Follower.name();
     let count = first.len();
-    let shown: Points = record
+    let shown: Vectors = record
         .tracks
         .iter()
         .flat_map(|places| places.iter())

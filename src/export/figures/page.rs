@@ -5,7 +5,7 @@ use super::axes::{Axes, Measure};
 use super::heading::Heading;
 use super::svg::Svg;
 use crate::continuum::record::Snapshot;
-use crate::flock::points::Points;
+use crate::flock::vectors::Vectors;
 
 /// Every figure is this wide unless its body is slender \[px\].
 pub const WIDTH: f64 = 800.0;
@@ -33,7 +33,7 @@ pub fn with_body(
 }
 
 /// The window that shows every particle that is drawn.
-pub fn window(positions: &Points, drawn: impl Iterator<Item = usize>, spacing: f64) -> Axes {
+pub fn window(positions: &Vectors, drawn: impl Iterator<Item = usize>, spacing: f64) -> Axes {
     let finite = |&i: &usize| positions.get(i).iter().all(|value| value.is_finite());
     let (low, high) = positions.bounds(drawn.filter(finite)).unwrap_or(([0.0; 2], [1.0; 2]));
     let longest = (high[0] - low[0]).max(high[1] - low[1]);

@@ -9,7 +9,7 @@ use super::page;
 use super::raster::Raster;
 use super::svg::{Path, Svg};
 use crate::continuum::record::Snapshot;
-use crate::flock::points::Points;
+use crate::flock::vectors::Vectors;
 use crate::material::cells::Cells;
 use crate::material::stress::StressState;
 
@@ -30,11 +30,11 @@ pub fn stress(
     let reference = &subject.body.reference;
     let drawn = || (0..snapshot.roles.len()).filter(|&i| snapshot.roles[i].is_body());
     let moved = |(now, then): ([f64; 2], [f64; 2])| [now[0] - then[0], now[1] - then[1]];
-    let displacement: Points = snapshot.positions.iter().zip(reference.iter()).map(moved).collect();
+    let displacement: Vectors = snapshot.positions.iter().zip(reference.iter()).map(moved).collect();
     // Large displacements are drawn as they are: a bent body is to look as bent as it is.
     let factor = enlargement(reference, &displacement, drawn).max(1.0);
     let place = |(then, by): ([f64; 2], [f64; 2])| [then[0] + factor * by[0], then[1] + factor * by[1]];
-    let places: Points = reference.iter().zip(displacement.iter()).map(place).collect();
+    let places: Vectors = reference.iter().zip(displacement.iter()).map(place).collect();
     let shown: Vec<(&[u32], f64)> = cells
         .iter()
         .zip(stresses.iter().map(|stress| stress.von_mises))
@@ -63,7 +63,7 @@ pub fn stress(
     })
 }
 
-fn draw_cells(svg: &mut Svg, axes: &Axes, places: &Points, shown: &[(&[u32], f64)], bands: &Bands) {
+fn draw_cells(svg: &mut Svg, axes: &Axes, places: &Vectors, shown: &[(&[u32], f64)], bands: &Bands) {
     let mut paths = vec![Path::default(); bands.count()];
     for (cell, value) in shown {
         paths[bands.of(*value)].polygon(cell.iter().map(|&i| axes.place(places.get(i as usize))));
@@ -79,14 +79,14 @@ fn draw_cells(svg: &mut Svg, axes: &Axes, places: &Points, shown: &[(&[u32], f64
 fn draw_raster(
     svg: &mut Svg,
     axes: &Axes,
-    places: &Points,
+    places: &Vectors,
     shown: &[(&[u32], f64)],
     bands: &Bands,
     spacing: f64,
 ) {
     let mut raster = Raster::over(axes, spacing);
     for (cell, value) in shown {
-        let corners: Points = cell.iter().map(|&i| places.get(i as usize)).collect();
+        let corners: Vectors = cell.iter().map(|&i| places.get(i as usize)).collect();
         raster.drop(axes.place(corners.middle()), *value);
     }
     for (band, path) in raster.paths(bands.count(), |value| bands.of(value)).iter().enumerate() {

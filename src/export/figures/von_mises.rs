@@ -6,7 +6,7 @@ use super::comparison::{Pair, told};
 use super::heading::Heading;
 use super::svg::{Anchor, INK, Path, Svg, text_width};
 use super::ticks::Ticks;
-use crate::flock::points::Points;
+use crate::flock::vectors::Vectors;
 
 /// Name of the third panel and of its scale.
 const DIFFERENCE: &str = "|rule \u{2212} truth|";
@@ -62,7 +62,7 @@ struct Panel<'a> {
     name: &'static str,
     /// Shape \[cells\].
     stress: &'a [f64],
-    places: &'a Points,
+    places: &'a Vectors,
 }
 
 /// From zero stress to the end of the scale.

@@ -8,9 +8,9 @@ use super::super::error::ExportError;
 use super::encoded;
 use super::frames::{Channel, Frames};
 use super::page::{Page, Table, number, scene_text};
-use super::stage::{Clock, Film, Quantity, Stage};
+use super::view::{Animation, Clock, Quantity, View};
 use crate::compare::run::Compared;
-use crate::flock::points::Points;
+use crate::flock::vectors::Vectors;
 use crate::scene::Scene;
 use crate::scene::units::Units;
 
@@ -31,11 +31,11 @@ pub fn write(
 ) -> Result<PathBuf, ExportError> {
     let truth = &compared.truth.truth;
     let known = |i: usize| if truth.knows(i) { truth.displacement.get(i) } else { [f64::NAN; 2] };
-    let truth: Points = (0..compared.rule.len()).map(known).collect();
+    let truth: Vectors = (0..compared.rule.len()).map(known).collect();
     // The frame is scaffolding of the rule, of which the truth has none.
     let roles = compared.outcome.engine.roles();
     let matter = |i: usize| if roles[i].is_body() { compared.rule.get(i) } else { [f64::NAN; 2] };
-    let rule: Points = (0..roles.len()).map(matter).collect();
+    let rule: Vectors = (0..roles.len()).map(matter).collect();
     let sides = [
         ("rule", &rule, &compared.von_mises_rule),
         ("truth (finite elements)", &truth, &compared.von_mises_truth),
@@ -69,13 +69,13 @@ fn stage(
     scene: &Scene,
     compared: &Compared,
     name: &str,
-    moved: &Points,
+    moved: &Vectors,
     stress: &[f64],
     error: &[f64],
-) -> Stage {
+) -> View {
     let engine = &compared.outcome.engine;
     let unit = scene.unit();
-    let mut stage = Stage::new(Film {
+    let mut stage = View::new(Animation {
         name: name.into(),
         noun: "particle",
         unit: unit.into(),
@@ -86,7 +86,7 @@ fn stage(
             Quantity::new("error", "error: distance of rule and truth", unit),
         ],
         linear: true,
-        ..Film::default()
+        ..Animation::default()
     });
     stage.set_reference(&engine.body().reference);
     stage.set_roles(engine.roles(), &[]);
@@ -128,7 +128,7 @@ fn facts(scene: &Scene, report: &ComparisonReport) -> Vec<(String, String)> {
     vec![
         ("Rule".into(), format!("by {way}: {}", rule.stop_reason)),
         (
-            "Truth".into(),
+            "Reference".into(),
             match report.truth.stated_error {
                 Some(error) => format!(
                     "finite elements on the shape, {} nodes, own error {} %",

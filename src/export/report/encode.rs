@@ -13,7 +13,7 @@ use flate2::write::ZlibEncoder;
 use rayon::prelude::*;
 
 use super::frames::{Frame, Frames};
-use super::track::Track;
+use super::quantized_channel::QuantizedChannel;
 
 /// Frames in one piece: the first is told without the one before, so that pieces are compressed in parallel
 /// and a page shows the first while it unpacks the others.
@@ -67,7 +67,7 @@ fn encode_group(group: &[Frame]) -> (Vec<u8>, String) {
             modes.push(mode as u8);
             told.clear();
             told.extend(differences(track, &codes[k], past, mode));
-            packer.put_planes(&told, Track::bytes(track.bits));
+            packer.put_planes(&told, QuantizedChannel::bytes(track.bits));
         }
     }
     (modes, packer.finish())
@@ -77,10 +77,10 @@ fn encode_group(group: &[Frame]) -> (Vec<u8>, String) {
 #[derive(Clone, Copy)]
 struct Past<'a> {
     codes: &'a [u32],
-    track: &'a Track,
+    track: &'a QuantizedChannel,
 }
 
-fn cheapest(track: &Track, codes: &[u32], past: Option<Past<'_>>) -> Mode {
+fn cheapest(track: &QuantizedChannel, codes: &[u32], past: Option<Past<'_>>) -> Mode {
     // Tracks in different quanta have no difference.
     let Some(past) = past.filter(|past| past.track.exponent == track.exponent) else { return Mode::Space };
     /// Enough to tell which is cheaper; every so many particles, in runs, since neighbours in the list are compared.
@@ -102,7 +102,7 @@ fn cheapest(track: &Track, codes: &[u32], past: Option<Past<'_>>) -> Mode {
 
 /// Small numbers for small differences of either sign, shape \[count\].
 fn differences<'a>(
-    track: &Track,
+    track: &QuantizedChannel,
     codes: &'a [u32],
     past: Option<Past<'a>>,
     mode: Mode,
@@ -211,8 +211,8 @@ mod tests {
                 |t: f64| (0..500).map(|i| (0.1 * f64::from(i) + t).sin() + 40.0 * t).collect::<Vec<_>>();
             let mut second = wave(0.3);
             second[7] = f64::NAN;
-            let first = Track::of(&wave(0.0), bits, None);
-            let second = Track::of(&second, bits, Some(&first));
+            let first = QuantizedChannel::of(&wave(0.0), bits, None);
+            let second = QuantizedChannel::of(&second, bits, Some(&first));
             let mut codes = [Vec::new(), Vec::new()];
             first.read(&mut codes[0]);
             second.read(&mut codes[1]);

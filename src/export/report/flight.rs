@@ -9,9 +9,9 @@ use super::encoded;
 use super::frames::{Channel, Frames};
 use super::page::{Page, Table, number, scene_text};
 use super::plot::Plot;
-use super::stage::{Clock, Film, Outline, Quantity, Stage};
-use crate::flock::points::Points;
+use super::view::{Animation, Clock, Outline, Quantity, View};
 use crate::flock::role::Role;
+use crate::flock::vectors::Vectors;
 use crate::scene::swarm::Swarm;
 use crate::swarm::flight::{Flight, FlightReport, Record};
 
@@ -24,7 +24,7 @@ const MOST_ROWS: usize = 400;
 #[derive(Debug)]
 pub struct FlightRecorder {
     frames: Frames,
-    start: Points,
+    start: Vectors,
     links: Vec<[u32; 2]>,
     leads: Vec<bool>,
     /// \[s\]
@@ -81,9 +81,9 @@ impl FlightRecorder {
         if is_last { self.frames.keep_last(period, &values) } else { self.frames.keep(period, &values) }
     }
 
-    /// The film of the flight.
-    pub fn stage(mut self, swarm: &Swarm, report: &FlightReport) -> Stage {
-        let mut stage = Stage::new(film(swarm, report));
+    /// The animation of the flight.
+    pub fn stage(mut self, swarm: &Swarm, report: &FlightReport) -> View {
+        let mut stage = View::new(animation(swarm, report));
         stage.set_reference(&self.start);
         let role = |&leads: &bool| if leads { Role::Leader } else { Role::Follower };
         stage.set_roles(&self.leads.iter().map(role).collect::<Vec<_>>(), &[]);
@@ -104,13 +104,13 @@ impl FlightRecorder {
     }
 }
 
-fn film(swarm: &Swarm, report: &FlightReport) -> Film {
+fn animation(swarm: &Swarm, report: &FlightReport) -> Animation {
     let own = |m: usize| swarm.raw.robots.get(m).and_then(|robot| robot.radius).unwrap_or(swarm.raw.radius);
     let obstacles =
         swarm.raw.obstacles.iter().map(|obstacle| Outline { kind: "obstacle", corners: outline(obstacle) });
     let fence =
         swarm.raw.limits.geofence.iter().map(|fence| Outline { kind: "fence", corners: fence.clone() });
-    Film {
+    Animation {
         noun: "robot",
         unit: "m".into(),
         clock: Clock { quantity: "time", unit: "s" },
@@ -124,7 +124,7 @@ fn film(swarm: &Swarm, report: &FlightReport) -> Film {
             Quantity::new("strain", "largest strain", ""),
         ],
         outlines: obstacles.chain(fence).collect(),
-        ..Film::default()
+        ..Animation::default()
     }
 }
 
@@ -137,7 +137,7 @@ pub fn write(
     swarm: &Swarm,
     record: &Record,
     report: &FlightReport,
-    stage: Stage,
+    stage: View,
 ) -> Result<PathBuf, ExportError> {
     let mut plots: Vec<Plot> =
         flight::charts(record, report).iter().map(|chart| Plot::of(chart, true)).collect();
@@ -156,7 +156,7 @@ pub fn write(
         title: swarm.raw.title.clone(),
         command: format!("flockform swarm {}", swarm.name),
         verdict,
-        note: note(&stage.film, report),
+        note: note(&stage.animation, report),
         stages: vec![stage],
         plots,
         facts: facts(report),
@@ -166,8 +166,8 @@ pub fn write(
     page.write(folder)
 }
 
-fn note(film: &Film, report: &FlightReport) -> String {
-    let shown = film.times.len();
+fn note(animation: &Animation, report: &FlightReport) -> String {
+    let shown = animation.times.len();
     let all = if shown as u64 > report.periods { "all".to_owned() } else { format!("{shown} of them are") };
     format!(
         "{} periods flown, {all} shown. Lines join robots that hear each other at the start. At the last frame places, ways and \

@@ -1,11 +1,11 @@
-//! The frames of a film, kept while something runs of which nobody knows how long it will take.
+//! The frames of a animation, kept while something runs of which nobody knows how long it will take.
 //!
 //! Frames are kept at an interval that doubles whenever there are too many: every other one is then let go,
 //! so memory is bounded and the kept ones are evenly spaced.
 
 use serde::{Deserialize, Serialize};
 
-use super::track::Track;
+use super::quantized_channel::QuantizedChannel;
 
 /// Frames that a report keeps at most: about as many as a slider of a page can tell apart.
 pub const MOST_FRAMES: usize = 512;
@@ -26,7 +26,7 @@ pub struct Frame {
     /// Number of the step or period.
     pub step: usize,
     /// By channel.
-    pub tracks: Vec<Track>,
+    pub tracks: Vec<QuantizedChannel>,
 }
 
 #[derive(Clone, Debug)]
@@ -42,7 +42,7 @@ pub struct Frames {
 impl Frames {
     /// For `count` particles.
     pub fn new(count: usize, channels: Vec<Channel>) -> Self {
-        let bytes: usize = channels.iter().map(|channel| Track::bytes(channel.bits)).sum();
+        let bytes: usize = channels.iter().map(|channel| QuantizedChannel::bytes(channel.bits)).sum();
         let most = (MOST_BYTES / (bytes * count).max(1)).clamp(4, MOST_FRAMES);
         Self { channels, count, kept: Vec::new(), interval: 1, most }
     }
@@ -92,7 +92,7 @@ impl Frames {
     fn push(&mut self, step: usize, values: &[&[f64]]) {
         let before = self.kept.last();
         let track = |(k, (channel, &values)): (usize, (&Channel, &&[f64]))| {
-            Track::of(values, channel.bits, before.map(|frame| &frame.tracks[k]))
+            QuantizedChannel::of(values, channel.bits, before.map(|frame| &frame.tracks[k]))
         };
         let tracks = self.channels.iter().zip(values).enumerate().map(track).collect();
         self.kept.push(Frame { step, tracks });

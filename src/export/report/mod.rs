@@ -1,9 +1,9 @@
 //! `report.html`: what became of a run, a flight, a comparison or a study, as one page that opens by double
 //! click, without network or server.
 //!
-//! A page shows bodies on the move ([`stage::Stage`]), charts ([`plot::Plot`]) and what stands in the tables. The frames of
-//! a film are kept while the run goes on ([`frames::Frames`]), at an interval that doubles when there are too many, as
-//! displacements in whole multiples of a power of two ([`track::Track`]), and written as differences, deflated
+//! A page shows bodies on the move ([`view::View`]), charts ([`plot::Plot`]) and what stands in the tables. The frames of
+//! a animation are kept while the run goes on ([`frames::Frames`]), at an interval that doubles when there are too many, as
+//! displacements in whole multiples of a power of two ([`quantized_channel::QuantizedChannel`]), and written as differences, deflated
 //! ([`encode`]). What follows from displacements (PE1, strain, stress) the page computes itself; what particles are at the
 //! end it is told to the last bit, as `final.csv` has it.
 //!
@@ -18,17 +18,17 @@ pub mod frames;
 pub mod gallery;
 pub mod page;
 pub mod plot;
+pub mod quantized_channel;
 pub mod run;
 pub mod stability;
-pub mod stage;
-pub mod track;
 #[cfg(feature = "fem")]
 pub mod trade;
+pub mod view;
 
 #[cfg(feature = "swarm")]
 pub use flight::FlightRecorder;
 pub use page::{Page, Table};
-pub use run::{Footage, RunRecorder};
+pub use run::{AnimationState, RunRecorder};
 
 use encode::EncodedFrames;
 use frames::Frames;

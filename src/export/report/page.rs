@@ -13,7 +13,7 @@ use serde_json::json;
 use super::super::OutputFolder;
 use super::super::error::{ExportError, write_file};
 use super::plot::Plot;
-use super::stage::Stage;
+use super::view::View;
 
 /// Name of the file.
 pub const FILE: &str = "report.html";
@@ -47,7 +47,7 @@ pub struct Page {
     /// How it ended, and whether that is as it should be.
     pub verdict: Option<(bool, String)>,
     /// Bodies on the move; several stand beside each other and share one clock.
-    pub stages: Vec<Stage>,
+    pub stages: Vec<View>,
     /// What the stages' frames are and what they leave out.
     pub note: String,
     pub plots: Vec<Plot>,
@@ -78,7 +78,7 @@ impl Page {
 
     /// The whole file.
     pub fn html(&self) -> String {
-        let stages: Vec<_> = self.stages.iter().map(|stage| &stage.film).collect();
+        let stages: Vec<_> = self.stages.iter().map(|stage| &stage.animation).collect();
         let data = in_script(&json!({ "stages": stages, "plots": self.plots }));
         let mut arrays = String::new();
         for (number, stage) in self.stages.iter().enumerate() {

@@ -20,7 +20,7 @@ pub struct Plot {
     pub y: PlotAxis,
     pub series: Vec<PlotSeries>,
     pub landmarks: Vec<PlotLandmark>,
-    /// Whether the horizontal axis is the clock of the page's film.
+    /// Whether the horizontal axis is the clock of the page's animation.
     pub follows_clock: bool,
 }
 

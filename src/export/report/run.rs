@@ -15,12 +15,12 @@ use super::encoded;
 use super::frames::{Channel, Frame, Frames, MOST_FRAMES};
 use super::page::{Page, number, scene_text};
 use super::plot::{self, Plot, PlotAxis, PlotSeries};
-use super::stage::{self, Clock, Film, Quantity, Stage, Stress};
+use super::view::{self, Animation, Clock, Quantity, Stress, View};
 use crate::continuum::engine::Engine;
 use crate::continuum::mechanics::Stresses;
 use crate::continuum::record::Snapshot;
 use crate::continuum::run::{Outcome, StopReason};
-use crate::continuum::stored;
+use crate::continuum::serde_impls;
 use crate::flock::role::Role;
 use crate::flock::rules::{Mean, Rotation};
 use crate::flock::strain::Strain;
@@ -44,12 +44,12 @@ const LOAD_FRAMES: usize = 20;
 
 /// What a recorder has kept of a run so far, for a checkpoint.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Footage<'a> {
+pub struct AnimationState<'a> {
     frames: Cow<'a, [Frame]>,
     interval: usize,
-    #[serde(with = "stored::roles")]
+    #[serde(with = "serde_impls::roles")]
     first_roles: Vec<Role>,
-    #[serde(with = "stored::roles")]
+    #[serde(with = "serde_impls::roles")]
     roles: Vec<Role>,
     changes: Vec<[u32; 3]>,
 }
@@ -82,14 +82,14 @@ impl RunRecorder {
         Self { frames, first_roles: roles.clone(), roles, changes: Vec::new(), values }
     }
 
-    /// The recorder, made if there is none yet; it goes on from the footage of an earlier one.
+    /// The recorder, made if there is none yet; it goes on from the animation_state of an earlier one.
     pub fn open<'a>(
         recorder: &'a mut Option<Self>,
-        earlier: &mut Option<Footage<'_>>,
+        earlier: &mut Option<AnimationState<'_>>,
         engine: &Engine,
     ) -> &'a mut Self {
         let recorder = recorder.get_or_insert_with(|| Self::new(engine));
-        if let Some(Footage { frames, interval, first_roles, roles, changes }) = earlier.take() {
+        if let Some(AnimationState { frames, interval, first_roles, roles, changes }) = earlier.take() {
             recorder.frames.go_on(frames.into_owned(), interval);
             (recorder.first_roles, recorder.roles, recorder.changes) = (first_roles, roles, changes);
         }
@@ -106,8 +106,8 @@ impl RunRecorder {
     }
 
     /// What was kept so far.
-    pub fn footage(&self) -> Footage<'_> {
-        Footage {
+    pub fn animation_state(&self) -> AnimationState<'_> {
+        AnimationState {
             frames: Cow::Borrowed(self.frames.kept()),
             interval: self.frames.interval(),
             first_roles: self.first_roles.clone(),
@@ -163,17 +163,17 @@ impl RunRecorder {
         let both = self.roles.iter().zip(engine.roles()).enumerate();
         let step = engine.step() as u32;
         self.changes.extend(
-            both.filter(|(_, (was, is))| was != is).map(|(i, (_, &is))| [step, i as u32, stage::number(is)]),
+            both.filter(|(_, (was, is))| was != is).map(|(i, (_, &is))| [step, i as u32, view::number(is)]),
         );
         self.roles.copy_from_slice(engine.roles());
     }
 
-    /// The film of the run.
-    pub fn stage(mut self, scene: &Scene, outcome: &Outcome) -> Stage {
+    /// The animation of the run.
+    pub fn stage(mut self, scene: &Scene, outcome: &Outcome) -> View {
         let engine = &outcome.engine;
         let is_solved = is_solved_at_once(scene, outcome);
         self.finish(engine, is_solved);
-        let mut stage = Stage::new(film(scene, engine, is_solved));
+        let mut stage = View::new(animation(scene, engine, is_solved));
         stage.set_reference(&engine.body().reference);
         stage.set_roles(&self.first_roles, &self.changes);
         if let Some(numbering) = &engine.body().numbering {
@@ -208,7 +208,7 @@ fn is_solved_at_once(scene: &Scene, outcome: &Outcome) -> bool {
     outcome.solved.is_some() && scene.load_steps.is_none()
 }
 
-fn film(scene: &Scene, engine: &Engine, is_solved: bool) -> Film {
+fn animation(scene: &Scene, engine: &Engine, is_solved: bool) -> Animation {
     let unit = scene.unit();
     let mut quantities =
         vec![Quantity::new("pe1", "PE1", format!("{unit}²")), Quantity::new("pe2", "PE2", unit)];
@@ -225,7 +225,7 @@ fn film(scene: &Scene, engine: &Engine, is_solved: bool) -> Film {
         true => Clock { quantity: "load", unit: "%" },
         false => Clock { quantity: scene.counts(), unit: "" },
     };
-    Film {
+    Animation {
         noun: "particle",
         unit: unit.into(),
         clock,
@@ -233,7 +233,7 @@ fn film(scene: &Scene, engine: &Engine, is_solved: bool) -> Film {
         quantities,
         linear: stress.as_ref().is_some_and(|stress| stress.linear) && scene.fracture.is_none(),
         stress,
-        ..Film::default()
+        ..Animation::default()
     }
 }
 
@@ -249,8 +249,8 @@ fn stress(elastic: &Elastic, mean: Mean) -> Stress {
 }
 
 /// Every bond with the step at which it broke; a bond without one lives.
-fn set_bonds(stage: &mut Stage, engine: &Engine, is_solved: bool) {
-    let neighbours = &engine.interaction().neighbours;
+fn set_bonds(stage: &mut View, engine: &Engine, is_solved: bool) {
+    let neighbours = &engine.flock().neighbours;
     let mut breaks: Vec<([u32; 2], u32)> =
         engine.breaks().iter().map(|one| (one.pair, one.step as u32 + 1)).collect();
     breaks.sort_unstable();
@@ -267,7 +267,7 @@ fn set_bonds(stage: &mut Stage, engine: &Engine, is_solved: bool) {
 }
 
 /// The columns of `final.csv`.
-fn add_exact(stage: &mut Stage, scene: &Scene, engine: &Engine) {
+fn add_exact(stage: &mut View, scene: &Scene, engine: &Engine) {
     let last = Snapshot::of(engine);
     let strains: Vec<Option<Strain>> =
         (0..engine.body().count()).into_par_iter().map(|i| engine.strain(i)).collect();
@@ -306,7 +306,7 @@ pub fn write(
     folder: &OutputFolder,
     results: &Results<'_>,
     summary: &Summary,
-    stage: Stage,
+    stage: View,
 ) -> Result<PathBuf, ExportError> {
     let (scene, outcome) = (results.scene, results.outcome);
     let mut plots = plot::of_probes(results.probes, outcome.engine.body(), scene.unit());
@@ -317,7 +317,7 @@ pub fn write(
         title: scene.raw.title.clone(),
         command: format!("flockform run {}", scene.name),
         verdict: Some(verdict(outcome)),
-        note: note(&stage.film, outcome, is_solved_at_once(scene, outcome)),
+        note: note(&stage.animation, outcome, is_solved_at_once(scene, outcome)),
         stages: vec![stage],
         plots,
         facts: facts(scene, outcome, summary),
@@ -341,16 +341,17 @@ fn verdict(outcome: &Outcome) -> (bool, String) {
 }
 
 /// What the frames are, and what is not among them.
-fn note(film: &Film, outcome: &Outcome, is_solved: bool) -> String {
-    let frames = film.times.len();
-    let bits = film.channels.first().map_or(0, |channel| channel.bits);
+fn note(animation: &Animation, outcome: &Outcome, is_solved: bool) -> String {
+    let frames = animation.times.len();
+    let bits = animation.channels.first().map_or(0, |channel| channel.bits);
     let mut note = if is_solved {
         format!(
             "Solved for its rest, not stepped: {frames} frames in even parts of the displacement, as under a load that grows evenly."
         )
     } else {
-        let (steps, counts) = (outcome.engine.step(), film.clock.quantity);
-        let between = film.times.get(1).zip(film.times.first()).map_or(1.0, |(second, first)| second - first);
+        let (steps, counts) = (outcome.engine.step(), animation.clock.quantity);
+        let between =
+            animation.times.get(1).zip(animation.times.first()).map_or(1.0, |(second, first)| second - first);
         match between as usize {
             0 | 1 => format!("Every {counts} is shown: {frames} frames."),
             every => format!(
@@ -358,13 +359,13 @@ fn note(film: &Film, outcome: &Outcome, is_solved: bool) -> String {
             ),
         }
     };
-    if let Some(first) = film.times.first().filter(|&&first| first > 0.0 && !is_solved) {
+    if let Some(first) = animation.times.first().filter(|&&first| first > 0.0 && !is_solved) {
         note += &format!(" This run was taken up at step {first}; what came before is not shown.");
     }
     note += &format!(
         " Displacements are kept to {bits} bits of each frame's range; PE1, strain and stress are computed from them."
     );
-    note += if film.exact.is_empty() {
+    note += if animation.exact.is_empty() {
         " The body is too large for its last numbers to be kept exactly: final.csv has them."
     } else {
         " At the last frame the numbers are those of final.csv, to the last digit."

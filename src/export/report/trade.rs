@@ -86,7 +86,7 @@ fn facts(study: &Study) -> Vec<(String, String)> {
     let settled = study.points.iter().filter(|point| point.outcome == Outcome::Settled).count();
     vec![
         ("Settings".into(), format!("{}, {settled} of them came to rest", study.points.len())),
-        ("Truth".into(), format!("{} nodes, {} s", study.truth_nodes, number(study.truth_seconds))),
+        ("Reference".into(), format!("{} nodes, {} s", study.truth_nodes, number(study.truth_seconds))),
     ]
 }
 

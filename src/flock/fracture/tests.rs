@@ -1,6 +1,6 @@
 use super::super::body::{Body, Cut};
-use super::super::interaction::{Interaction, Weights};
 use super::super::lattice::{Lattice, LatticeKind};
+use super::super::law::{Flock, Weights};
 use super::super::neighbourhood::Neighbourhood;
 use super::super::rules::Rule;
 use super::*;
@@ -15,17 +15,17 @@ impl Draws {
         (self.0 >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    pub fn points(&mut self, around: &Points, by: f64) -> Points {
+    pub fn points(&mut self, around: &Vectors, by: f64) -> Vectors {
         around.iter().map(|[x, y]| [x + by * (self.next() - 0.5), y + by * (self.next() - 0.5)]).collect()
     }
 }
 
-fn lay(kind: LatticeKind, neighbourhood: &Neighbourhood, origin: [f64; 2]) -> Interaction {
+fn lay(kind: LatticeKind, neighbourhood: &Neighbourhood, origin: [f64; 2]) -> Flock {
     let disc = |radius| Shape::Disc { centre: [0.0, 0.0], radius };
     let cut = Cut::Shape(Shape::WithHoles { body: Box::new(disc(21.0)), holes: vec![disc(5.0)] });
     let (body, neighbours) =
         Body::build(Lattice::new(kind, origin, 0.3), &cut, neighbourhood, None).expect("fits");
-    Interaction {
+    Flock {
         rule: Rule::BARYCENTRE,
         reference: body.reference,
         neighbours,
@@ -37,7 +37,7 @@ fn lay(kind: LatticeKind, neighbourhood: &Neighbourhood, origin: [f64; 2]) -> In
 }
 
 /// The bodies that the tests go over: lattices, and lattices a bit out of place where some are seen without seeing.
-pub(crate) fn bodies() -> impl Iterator<Item = (String, Interaction)> {
+pub(crate) fn bodies() -> impl Iterator<Item = (String, Flock)> {
     let neighbourhoods = [
         Neighbourhood::First { keep: None },
         Neighbourhood::First { keep: Some(3) },
@@ -64,7 +64,7 @@ fn break_one_by_one(
     broken: &mut [bool],
     (step, threshold): (usize, Threshold),
     neighbours: &Neighbours,
-    (reference, present): (&Points, &Points),
+    (reference, present): (&Vectors, &Vectors),
     roles: &[Role],
 ) -> Vec<Break> {
     let back = |j: usize, k: usize| neighbours.bonds(k).find(|&bond| neighbours.index[bond] as usize == j);
@@ -74,7 +74,7 @@ fn break_one_by_one(
     for j in 0..neighbours.count() {
         for bond in neighbours.bonds(j) {
             let k = neighbours.index[bond] as usize;
-            let between = |at: &Points| distance(at.get(j), at.get(k));
+            let between = |at: &Vectors| distance(at.get(j), at.get(k));
             let length = between(present);
             let is_looked_after = (j < k || !all_mutual) && roles[k].is_body();
             if broken[bond] || !is_looked_after || !threshold.is_passed(length, between(reference)) {
@@ -97,8 +97,8 @@ fn break_one_by_one(
 
 /// Takes some steps of random stretching, some of which no number survives, and compares with one by one. Gives how
 /// many bonds broke.
-fn compare_breaks(body: &Interaction, threshold: Threshold, scale: f64, what: &str) -> usize {
-    let Interaction { neighbours, reference, .. } = body;
+fn compare_breaks(body: &Flock, threshold: Threshold, scale: f64, what: &str) -> usize {
+    let Flock { neighbours, reference, .. } = body;
     let mut draws = Draws(11);
     let mut roles = vec![Role::Follower; neighbours.count()];
     roles.iter_mut().skip(3).step_by(17).for_each(|role| *role = Role::Frame);
@@ -145,8 +145,8 @@ fn every_body_breaks_like_one_measured_bond_by_bond() {
 fn a_body_whose_squares_overflow_or_vanish_breaks_like_one_measured_bond_by_bond() {
     let body = lay(LatticeKind::Hexagonal { spacing: 1.0 }, &Neighbourhood::First { keep: None }, [0.1, 0.7]);
     for scale in [1e-300, 1e-160, 1e-153, 1e153, 1e154, 1e200] {
-        let reference: Points = body.reference.iter().map(|[x, y]| [scale * x, scale * y]).collect();
-        let body = Interaction { reference: reference.into(), ..body.clone() };
+        let reference: Vectors = body.reference.iter().map(|[x, y]| [scale * x, scale * y]).collect();
+        let body = Flock { reference: reference.into(), ..body.clone() };
         for threshold in [Threshold::Distance(1.3 * scale), Threshold::Stretch(1.25)] {
             let count = compare_breaks(&body, threshold, scale, &format!("scaled by {scale:e}"));
             assert!(count > 100 && count < body.neighbours.index.len(), "{scale:e}: {count} broke");
@@ -160,8 +160,8 @@ fn a_bond_at_its_limit_to_the_bit_holds_and_beyond_it_breaks_wherever_it_lies_in
     let lists = (0..300u32).map(|j| if j % 2 == 0 { vec![j + 1] } else { vec![j - 1] });
     let neighbours = Neighbours::from_lists(lists);
     let long = Neighbours::from_lists((0..300u32).map(|j| vec![(j + 150) % 300]));
-    let reference: Points = (0..300).map(|j| [0.0, f64::from(j % 2)]).collect();
-    let apart: Points = (0..300).map(|j| [0.0, f64::from(j / 150)]).collect();
+    let reference: Vectors = (0..300).map(|j| [0.0, f64::from(j % 2)]).collect();
+    let apart: Vectors = (0..300).map(|j| [0.0, f64::from(j / 150)]).collect();
     for (neighbours, reference) in [(neighbours, reference), (long, apart)] {
         for which in [0, 63, 64, 127, 128, 149] {
             let upper = (0..300).filter(|&j| reference.y[j] == 1.0).nth(which).expect("150 of them");
@@ -184,7 +184,7 @@ fn a_bond_at_its_limit_to_the_bit_holds_and_beyond_it_breaks_wherever_it_lies_in
 }
 
 /// Three particles in a row; the outer two see the middle one, which sees both.
-fn row() -> (Neighbours, Points) {
+fn row() -> (Neighbours, Vectors) {
     let neighbours = Neighbours::from_lists([vec![1], vec![0, 2], vec![1]]);
     (neighbours, [[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]].into_iter().collect())
 }
@@ -241,11 +241,11 @@ fn a_bond_is_measured_exactly_where_a_square_would_not_tell() {
     // At the threshold to the last bit, just beyond it, and where squares overflow or vanish.
     for scale in [1e-200, 1.0, 1e200] {
         let neighbours = Neighbours::from_lists([vec![1], vec![0]]);
-        let reference: Points = [[0.0, 0.0], [scale, 0.0]].into_iter().collect();
+        let reference: Vectors = [[0.0, 0.0], [scale, 0.0]].into_iter().collect();
         for threshold in [Threshold::Distance(1.3 * scale), Threshold::Stretch(1.3)] {
             let limit = 1.3 * scale;
             for (length, breaks) in [(limit, false), (limit.next_up(), true), (0.99 * limit, false)] {
-                let present: Points = [[0.0, 0.0], [0.0, length]].into_iter().collect();
+                let present: Vectors = [[0.0, 0.0], [0.0, length]].into_iter().collect();
                 let mut bonds = Bonds::new(Some(threshold), Ghosts::None, &neighbours);
                 let (roles, mut broken) = ([Role::Follower; 2], Vec::new());
                 bonds.break_stretched(1, &neighbours, (&reference, &present), &roles, &mut broken);
@@ -260,7 +260,7 @@ fn a_bond_is_measured_exactly_where_a_square_would_not_tell() {
 fn a_bond_is_held_to_its_own_limit_among_others_whose_limits_are_nearly_the_same() {
     // Each bond of the row is shorter than the one before by less than what parts two spans.
     let mut at = 0.0;
-    let row: Points = (0..400)
+    let row: Vectors = (0..400)
         .map(|i| {
             at += 1.0 - 4e-7 * f64::from(i);
             [at, 0.0]
@@ -286,10 +286,10 @@ fn a_bond_whose_square_is_hardly_a_number_any_more_is_measured_exactly() {
     let neighbours = Neighbours::from_lists([vec![1], vec![0]]);
     // The square of such a length has a few bits only.
     for scale in [1e-160, 3e-162, 1.1e-161] {
-        let reference: Points = [[0.0, 0.0], [scale, 0.0]].into_iter().collect();
+        let reference: Vectors = [[0.0, 0.0], [scale, 0.0]].into_iter().collect();
         for parts in 1..2000 {
             let (length, angle) = (1.3 * scale * (1.0 + 1e-6 * f64::from(parts)), 0.01 * f64::from(parts));
-            let present: Points =
+            let present: Vectors =
                 [[0.0, 0.0], [length * angle.cos(), length * angle.sin()]].into_iter().collect();
             let mut bonds = Bonds::new(Some(Threshold::Stretch(1.3)), Ghosts::None, &neighbours);
             let (roles, mut breaks) = ([Role::Follower; 2], Vec::new());

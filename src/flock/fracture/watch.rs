@@ -9,7 +9,7 @@ use std::ops::Range;
 
 use super::super::lanes::{ARITHMETIC, InLanes, in_lanes};
 use super::super::neighbourhood::Neighbours;
-use super::super::points::{Points, distance};
+use super::super::vectors::{Vectors, distance};
 use super::Threshold;
 
 /// Particles per block: a bond that breaks is looked for in one block alone.
@@ -56,7 +56,7 @@ impl Watch {
     pub fn compile(
         threshold: Threshold,
         neighbours: &Neighbours,
-        reference: &Points,
+        reference: &Vectors,
         is_live: impl Fn(usize) -> bool,
     ) -> Self {
         let bound = |j, k| square_within(threshold.limit(distance(reference.get(j), reference.get(k))));
@@ -111,7 +111,7 @@ impl Watch {
     }
 
     /// The particles of all bonds that may have passed their limits, ascending.
-    pub fn suspects(&self, present: &Points) -> Vec<usize> {
+    pub fn suspects(&self, present: &Vectors) -> Vec<usize> {
         let mut suspects = Vec::new();
         self.look(present, &mut suspects);
         suspects.sort_unstable();
@@ -119,7 +119,7 @@ impl Watch {
         suspects
     }
 
-    fn look(&self, present: &Points, suspects: &mut Vec<usize>) {
+    fn look(&self, present: &Vectors, suspects: &mut Vec<usize>) {
         in_lanes::<8, ARITHMETIC>(Looks { blocks: &self.blocks, present, suspects });
     }
 }
@@ -127,7 +127,7 @@ impl Watch {
 /// Spans to look over, in pieces of a width of their own.
 struct Looks<'a> {
     blocks: &'a [Vec<Span>],
-    present: &'a Points,
+    present: &'a Vectors,
     suspects: &'a mut Vec<usize>,
 }
 
@@ -189,7 +189,7 @@ impl Block {
 }
 
 #[inline(always)]
-fn look_over(blocks: &[Vec<Span>], present: &Points, suspects: &mut Vec<usize>) {
+fn look_over(blocks: &[Vec<Span>], present: &Vectors, suspects: &mut Vec<usize>) {
     for (block, begin) in blocks.iter().zip((0..).step_by(BLOCK)) {
         for span in block {
             let [near, far] = span.ends(begin);

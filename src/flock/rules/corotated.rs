@@ -30,7 +30,7 @@
 //! `x_i <- x_i + D^-1 (sum of f_i + load)`, `D = sum R K_ii R'`. A body turned by any angle moves as the unturned one does,
 //! in turned axes; where rotations are small this is the plain material rule.
 
-use super::Own;
+use super::ParticleState;
 use super::averaged::{self, PatchCell};
 use crate::flock::block::{Block, apply, inverse, plus, product, transposed};
 
@@ -260,7 +260,7 @@ pub fn pull<'a, P: Iterator<Item = PatchCell<'a>>>(
 
 /// The target of a particle under this force of its cells and its load, held by `hold`; `None` where nothing holds it.
 /// Components that are `held` are where its rest offset says.
-pub fn target(own: &Own, (force, hold): ([f64; 2], Block), held: [bool; 2]) -> Option<[f64; 2]> {
+pub fn target(own: &ParticleState, (force, hold): ([f64; 2], Block), held: [bool; 2]) -> Option<[f64; 2]> {
     let load = own.load.map_or([0.0; 2], |load| load.force);
     let force = [force[0] + load[0], force[1] + load[1]];
     if held == [false; 2] {

@@ -6,7 +6,7 @@
 //! deformations need the sequential or the damped update to settle.
 
 use super::{Neighbour, barycentre};
-use crate::flock::points::distance;
+use crate::flock::vectors::distance;
 
 /// Weighted mean; where every neighbour coincides with the particle, their barycentre. For `p < 0`
 /// and neighbours that coincide with the particle it is the limit: the mean of those alone.

@@ -4,7 +4,7 @@
 //! grows as soon as |1 + fd| times the spectral radius of the sweep exceeds 1. With `MT` the
 //! previous position it is over-relaxation by the factor 1 + fd.
 
-use super::Own;
+use super::ParticleState;
 
 /// What `MT` in Eq. 4 is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,7 +25,7 @@ pub struct Feedback {
 
 impl Feedback {
     /// Moves the target past itself.
-    pub fn overshoot(&self, own: &Own, target: &mut [f64; 2]) {
+    pub fn overshoot(&self, own: &ParticleState, target: &mut [f64; 2]) {
         let from = match self.reference {
             FeedbackReference::Initial => own.reference,
             FeedbackReference::Previous => own.present,
@@ -42,7 +42,7 @@ mod tests {
 
     #[test]
     fn the_two_references_overshoot_from_different_places() {
-        let own = Own { present: [1.0, 0.0], reference: [0.0, 0.0], rest: [0.0; 2], load: None };
+        let own = ParticleState { present: [1.0, 0.0], reference: [0.0, 0.0], rest: [0.0; 2], load: None };
         let overshoot = |reference| {
             let mut target = [3.0, 0.0];
             Feedback { factor: 0.5, reference }.overshoot(&own, &mut target);

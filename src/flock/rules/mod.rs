@@ -54,7 +54,7 @@ pub struct Load {
 
 /// The particle whose target is wanted.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Own {
+pub struct ParticleState {
     /// Position before this step \[length, world frame\].
     pub present: [f64; 2],
     /// Position in the reference configuration \[length, world frame\].
@@ -106,7 +106,11 @@ impl Rule {
     /// Where the particle moves \[length, world frame\]. A particle without neighbours stays: no target
     /// is computed from nothing. Finite input gives finite output unless the result itself overflows.
     #[inline]
-    pub fn target(&self, own: &Own, neighbours: impl Iterator<Item = Neighbour> + Clone) -> [f64; 2] {
+    pub fn target(
+        &self,
+        own: &ParticleState,
+        neighbours: impl Iterator<Item = Neighbour> + Clone,
+    ) -> [f64; 2] {
         match self.mean(own.present, neighbours) {
             Some(mean) => self.completed(own, mean),
             None => own.present,
@@ -116,7 +120,11 @@ impl Rule {
     /// What [`Rule::target`] gives for a material of small rotations, which looks at nothing but pairs of
     /// weight and position: for sweeps, that have them at hand.
     #[inline]
-    pub fn target_of_material(&self, own: &Own, pairs: impl Iterator<Item = (Block, [f64; 2])>) -> [f64; 2] {
+    pub fn target_of_material(
+        &self,
+        own: &ParticleState,
+        pairs: impl Iterator<Item = (Block, [f64; 2])>,
+    ) -> [f64; 2] {
         match material::mean(pairs) {
             Some(mean) => self.completed(own, mean),
             None => own.present,
@@ -127,7 +135,12 @@ impl Rule {
     /// neighbours staying; `pulled` is what [`pull`] says of them. The reference configuration is at rest to the last
     /// bit. Components that are `held` stay where the rest offset has them; weights, and other rest offsets, are not
     /// looked at.
-    pub fn target_by_cells(&self, own: &Own, pulled: ([f64; 2], Block), held: [bool; 2]) -> [f64; 2] {
+    pub fn target_by_cells(
+        &self,
+        own: &ParticleState,
+        pulled: ([f64; 2], Block),
+        held: [bool; 2],
+    ) -> [f64; 2] {
         match corotated::target(own, pulled, held) {
             Some(target) => self.with_terms(own, target),
             None => own.present,
@@ -136,7 +149,7 @@ impl Rule {
 
     /// The target from the bare mean: rest offset, load and terms added.
     #[inline]
-    fn completed(&self, own: &Own, mean: [f64; 2]) -> [f64; 2] {
+    fn completed(&self, own: &ParticleState, mean: [f64; 2]) -> [f64; 2] {
         let mut target = [mean[0] + own.rest[0], mean[1] + own.rest[1]];
         if let Some(Load { force, compliance }) = &own.load {
             let push = apply(compliance, *force);
@@ -146,7 +159,7 @@ impl Rule {
     }
 
     #[inline]
-    fn with_terms(&self, own: &Own, mut target: [f64; 2]) -> [f64; 2] {
+    fn with_terms(&self, own: &ParticleState, mut target: [f64; 2]) -> [f64; 2] {
         if let Some(poisson) = &self.poisson {
             poisson.add(own, &mut target);
         }
@@ -218,8 +231,8 @@ mod tests {
         Mean::Spaced { spacing: 1.0, power: -4.0 },
     ];
 
-    fn own(present: [f64; 2]) -> Own {
-        Own { present, reference: present, rest: [0.0; 2], load: None }
+    fn own(present: [f64; 2]) -> ParticleState {
+        ParticleState { present, reference: present, rest: [0.0; 2], load: None }
     }
 
     #[test]
@@ -238,7 +251,7 @@ mod tests {
             let rule = Rule { mean, ..Rule::BARYCENTRE };
             let rest = rule.rest_offset(here, at(&around));
             if rest.iter().all(|r| r.is_finite()) {
-                let own = Own { present: here, reference: here, rest, load: None };
+                let own = ParticleState { present: here, reference: here, rest, load: None };
                 assert_eq!(rule.target(&own, at(&around)), here, "{mean:?}");
             }
         }

@@ -6,7 +6,7 @@
 //! together. The term is added at every step and the mean only spreads it, so the response grows
 //! with the square of the body's size in particles: choose `K` for the body at hand.
 
-use super::Own;
+use super::ParticleState;
 
 /// A coordinate axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -21,7 +21,7 @@ pub struct Poisson {
     /// `K` \[1\]: response per unit of displacement along `pull`; negative draws the sides together.
     pub k: f64,
     /// The axis whose displacement acts (the paper's x).
-    pub pull: Axis,
+    pub axis: Axis,
     /// Coordinate of the central axis across `pull` \[length\].
     pub centre: f64,
     /// Half width of the body across `pull` \[length\], greater than 0.
@@ -33,7 +33,7 @@ pub struct Poisson {
 impl Poisson {
     /// Distance function `da` \[1\] at a reference position \[length\].
     pub fn distance_from_axis(&self, reference: [f64; 2]) -> f64 {
-        let across = match self.pull {
+        let across = match self.axis {
             Axis::X => reference[1],
             Axis::Y => reference[0],
         };
@@ -42,8 +42,8 @@ impl Poisson {
     }
 
     /// Adds the term to a target whose coordinate along `pull` is the new one already.
-    pub fn add(&self, own: &Own, target: &mut [f64; 2]) {
-        let (along, across) = match self.pull {
+    pub fn add(&self, own: &ParticleState, target: &mut [f64; 2]) {
+        let (along, across) = match self.axis {
             Axis::X => (0, 1),
             Axis::Y => (1, 0),
         };
@@ -58,9 +58,9 @@ mod tests {
 
     #[test]
     fn a_pull_along_x_draws_both_sides_towards_the_axis() {
-        let poisson = Poisson { k: -0.1, pull: Axis::X, centre: 2.0, half_width: 2.0, exponent: 1.0 };
+        let poisson = Poisson { k: -0.1, axis: Axis::X, centre: 2.0, half_width: 2.0, exponent: 1.0 };
         let moved = |y: f64| {
-            let own = Own { present: [0.0, y], reference: [0.0, y], rest: [0.0; 2], load: None };
+            let own = ParticleState { present: [0.0, y], reference: [0.0, y], rest: [0.0; 2], load: None };
             let mut target = [1.0, y];
             poisson.add(&own, &mut target);
             target[1] - y

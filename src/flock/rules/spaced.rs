@@ -59,7 +59,7 @@ fn mean_at_extremes(
     neighbours: impl Iterator<Item = Neighbour> + Clone,
 ) -> Option<[f64; 2]> {
     barycentre::mean(distance::weighted(power, present, neighbours).map(|n| {
-        let apart = crate::flock::points::distance(present, n.position);
+        let apart = crate::flock::vectors::distance(present, n.position);
         let away =
             |k: usize| if apart > 0.0 { spacing * ((present[k] - n.position[k]) / apart) } else { 0.0 };
         Neighbour { position: [n.position[0] + away(0), n.position[1] + away(1)], ..n }

@@ -33,11 +33,11 @@ fn cells_run_counter_clockwise_and_each_particle_has_its_share_of_them() {
 fn mates_are_the_neighbourhood_that_the_room_asks_for() {
     for kind in LatticeKind::SAMPLES {
         let (body, neighbours) = body(kind, 0.4);
-        let mates = Cells::of_body(&body).mates(body.count());
-        let fullest = (0..body.count()).max_by_key(|&i| mates.of(i).len()).expect("particles");
+        let cell_neighbours = Cells::of_body(&body).cell_neighbours(body.count());
+        let fullest = (0..body.count()).max_by_key(|&i| cell_neighbours.of(i).len()).expect("particles");
         let mut asked = neighbours.of(fullest).to_vec();
         asked.sort_unstable();
-        assert_eq!(asked, mates.of(fullest), "{kind:?}");
+        assert_eq!(asked, cell_neighbours.of(fullest), "{kind:?}");
     }
 }
 
@@ -67,7 +67,7 @@ fn a_frame_has_no_cells() {
     let frame = crate::flock::frame::FrameRule::Lagged;
     let cut = Cut::Count { columns: 4, rows: 3 };
     let (body, _) =
-        Body::build(lattice, &cut, &Neighbourhood::Ring { radius: 1 }, Some(frame)).expect("builds");
+        Body::build(lattice, &cut, &Neighbourhood::Chebyshev { radius: 1 }, Some(frame)).expect("builds");
     let cells = Cells::of_body(&body);
     assert_eq!(cells.count(), 6);
     assert!(cells.index.iter().all(|&i| !body.is_frame[i as usize]));

@@ -11,7 +11,7 @@ use super::near::Buckets;
 use super::sites::{NearSite, Sites, State};
 use super::{FitError, ROUNDING, Scale, is_kept_corner, order};
 use crate::flock::lattice::{Lattice, Site};
-use crate::flock::points::distance;
+use crate::flock::vectors::distance;
 use crate::geometry::meeting::meetings;
 use crate::geometry::outline::Place;
 use crate::geometry::partition::Partition;

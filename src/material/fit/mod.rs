@@ -31,7 +31,7 @@ use super::cells::{Cells, templates};
 use super::stiffness::area;
 use crate::flock::body::{Body, OutlineParticles};
 use crate::flock::lattice::{Lattice, Site};
-use crate::flock::points::{Points, distance};
+use crate::flock::vectors::{Vectors, distance};
 use crate::geometry::outline::{Outline, Place};
 use crate::geometry::partition::Partition;
 
@@ -230,7 +230,7 @@ impl Assembly<'_> {
             particle[*node as usize] = (regular + k) as u32;
         }
         let place = |node: &Node| node.point;
-        let reference: Points = sites
+        let reference: Vectors = sites
             .iter()
             .map(|&site| self.lattice.position(site))
             .chain(along.iter().map(|&(_, node)| place(&self.faces.nodes[node as usize])))
@@ -272,7 +272,7 @@ impl Assembly<'_> {
     }
 
     /// Whole cells by their first corner, then the others.
-    fn cells(&self, sites: &[Site], particle: &[u32], reference: &Points) -> Cells {
+    fn cells(&self, sites: &[Site], particle: &[u32], reference: &Vectors) -> Cells {
         let mut cells = Cells::of_lattice(self.lattice, self.outline.regions().len() + 1);
         let index = |site: Site| sites.binary_search(&site).ok().map(|i| i as u32);
         let mut corners = Vec::new();

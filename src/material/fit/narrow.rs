@@ -2,7 +2,7 @@
 
 use super::near::Buckets;
 use super::{FitError, ROUNDING};
-use crate::flock::points::distance;
+use crate::flock::vectors::distance;
 use crate::geometry::meeting::meetings;
 use crate::geometry::outline::Piece;
 use crate::geometry::partition::Partition;

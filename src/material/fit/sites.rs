@@ -3,7 +3,7 @@
 use super::near::stretches;
 use super::{FitError, SNAP, STAYS, Scale, is_kept_corner};
 use crate::flock::lattice::{Lattice, Site};
-use crate::flock::points::distance;
+use crate::flock::vectors::distance;
 use crate::flock::window::Window;
 use crate::geometry::outline::{Outline, Place};
 use crate::geometry::partition::Partition;

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use super::cut::{Face, Faces, ways};
 use super::{LEAST_AREA, LEAST_SIDE, LEAST_WIDTH, ROUNDING, Scale};
-use crate::flock::points::distance;
+use crate::flock::vectors::distance;
 
 /// One makes work for the other: after a few rounds nothing is left to do.
 const ROUNDS: usize = 4;

@@ -48,7 +48,7 @@ struct Part {
 enum Pattern {
     /// Of the cells around the particle, packed.
     Packed(u128, u32),
-    /// Of those around its mates as well.
+    /// Of those around its cell_neighbours as well.
     Long(Box<[u8]>),
 }
 

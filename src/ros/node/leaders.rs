@@ -1,12 +1,12 @@
 //! How the service `~/set_formation` moves the leaders.
 
 use crate::flock::manoeuvre::{Leg, Manoeuvre, Posture};
-use crate::flock::points::distance;
+use crate::flock::vectors::distance;
 use crate::ros::edge::said;
 use crate::ros::messages::flockform_msgs::{LoopEvent, SetFormationRequest};
 use crate::swarm::control::Control;
 
-/// A request that was granted, for a tape.
+/// A request that was granted, for a recorder.
 pub fn as_event(request: &SetFormationRequest) -> (u8, String, Vec<f64>) {
     if !request.name.is_empty() {
         return (LoopEvent::MANOEUVRE, request.name.clone(), Vec::new());

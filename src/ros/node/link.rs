@@ -1,7 +1,7 @@
 //! The loop's end over ROS 2: poses and places of leaders in, `PoseStamped` targets out.
 
 use super::pose::{PoseSource, is_frame};
-use super::tape::Tape;
+use super::recorder::MessageRecorder;
 use super::{NodeError, TopicOf};
 use crate::ros::edge::{EdgeError, Node, Publisher, Quality, Subscription, said};
 use crate::ros::messages::builtin_interfaces::Time;
@@ -9,7 +9,7 @@ use crate::ros::messages::geometry_msgs::{Pose, PoseStamped};
 use crate::ros::messages::std_msgs::Header;
 use crate::scene::swarm::raw::RawNode;
 use crate::swarm::control::Control;
-use crate::swarm::control::part::Part;
+use crate::swarm::control::scope::NodeScope;
 use crate::swarm::transport::{ControllerEnd, Heard, Target};
 
 /// Topics of the members.
@@ -23,7 +23,7 @@ pub struct Link {
     /// Places of leaders in another frame.
     misframed: u64,
     /// Gets a copy of what goes through.
-    pub tape: Option<Tape>,
+    pub recorder: Option<MessageRecorder>,
 }
 
 impl Link {
@@ -33,13 +33,13 @@ impl Link {
         node: &Node,
         raw: &RawNode,
         control: &Control,
-        part: &Part,
+        part: &NodeScope,
         simulated_time: bool,
         topic: TopicOf<'_>,
     ) -> Result<Self, NodeError> {
         let formation = control.formation();
         let mut leaders = Vec::new();
-        for m in formation.told().filter(|m| part.mine.contains(m)) {
+        for m in formation.moved().filter(|m| part.mine.contains(m)) {
             leaders.push((m, node.subscription(&topic("/{name}/leader_pose", m)?, Quality::BEST_EFFORT)?));
         }
         let mut targets: Vec<_> = (0..formation.count()).map(|_| None).collect();
@@ -54,7 +54,7 @@ impl Link {
             frame_id: raw.frame_id.clone(),
             simulated_time,
             misframed: 0,
-            tape: None,
+            recorder: None,
         })
     }
 }
@@ -64,12 +64,12 @@ impl ControllerEnd for Link {
 
     fn hear(&mut self, now: f64, hear: &mut dyn FnMut(Heard)) {
         let simulated = self.simulated_time.then_some(now);
-        let copies = self.tape.as_mut().map(|tape| (tape, now));
+        let copies = self.recorder.as_mut().map(|recorder| (recorder, now));
         self.poses.take(&self.frame_id, simulated, copies, &mut |m, pose| hear(Heard::Pose(m, pose)));
         for (member, topic) in &self.leaders {
             let Some((message, _)) = topic.take_last() else { continue };
-            if let Some(tape) = &mut self.tape {
-                tape.take(topic.topic(), &message, [now; 2]);
+            if let Some(recorder) = &mut self.recorder {
+                recorder.take(topic.topic(), &message, [now; 2]);
             }
             if is_frame(&message.header.frame_id, &self.frame_id) {
                 let place = message.pose.position;
@@ -94,8 +94,8 @@ impl ControllerEnd for Link {
         for target in targets {
             let Some(topic) = &self.targets[target.member] else { continue };
             let message = message(target, header.clone());
-            if let Some(tape) = &mut self.tape {
-                tape.take(topic.topic(), &message, [now; 2]);
+            if let Some(recorder) = &mut self.recorder {
+                recorder.take(topic.topic(), &message, [now; 2]);
             }
             // Who does not take its own keeps nobody else from theirs.
             outcome = outcome.and(topic.publish(&message));

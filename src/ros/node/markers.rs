@@ -1,6 +1,6 @@
 //! What RViz and Foxglove draw: members by role, links by strain, targets, obstacles.
 
-use crate::flock::points::distance;
+use crate::flock::vectors::distance;
 use crate::ros::messages::builtin_interfaces::Duration;
 use crate::ros::messages::geometry_msgs::{Point, Pose, Vector3};
 use crate::ros::messages::std_msgs::{ColorRGBA, Header};

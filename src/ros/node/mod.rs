@@ -11,9 +11,9 @@ pub mod leaders;
 mod link;
 pub mod markers;
 pub mod pose;
+pub mod recorder;
 mod settings;
 pub mod state;
-pub mod tape;
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -35,7 +35,7 @@ use super::messages::visualization_msgs::MarkerArray;
 use crate::scene::SceneError;
 use crate::scene::swarm::Swarm;
 use crate::swarm::control::Control;
-use crate::swarm::control::part::{Part, PartError};
+use crate::swarm::control::scope::{NodeScope, NodeScopeError};
 use crate::swarm::pace::{Pace, system_time};
 use crate::swarm::transport::{ControllerEnd, listen, target_of, targets};
 use diagnostics::Statistics;
@@ -43,8 +43,8 @@ use drive::Drive;
 pub use kept::KeptNode;
 use leaders::{as_event, set_formation};
 pub use link::Link;
+use recorder::{MessageRecorder, RecordSink};
 use settings::Settings;
-use tape::{Sink, Tape};
 
 /// Name of the node unless `__node` says otherwise.
 pub const NAME: &str = "flockform";
@@ -61,7 +61,7 @@ pub enum NodeError {
     #[error("parameter {0}")]
     Parameter(#[from] Refusal),
     #[error("{0}")]
-    Part(#[from] PartError),
+    NodeScope(#[from] NodeScopeError),
 }
 
 /// The service that moves the leaders.
@@ -85,7 +85,7 @@ pub struct FormationNode {
     stop: Service<std_srvs::Trigger>,
     resume: Service<std_srvs::Trigger>,
     set_formation: Service<SetFormation>,
-    part: Part,
+    part: NodeScope,
     link: Link,
     drives: Vec<(usize, Drive)>,
     state: Publisher<FormationState>,
@@ -95,7 +95,7 @@ pub struct FormationNode {
     frame_id: String,
     swarm: Swarm,
     names: Names,
-    /// What the tape of the link was last told.
+    /// What the recorder of the link was last told.
     was_active: bool,
     /// Of the watchdog, where there is one.
     pulse: Option<Arc<Pulse>>,
@@ -110,7 +110,7 @@ impl FormationNode {
     /// What in the swarm file, the ROS arguments or the network stands in the way.
     pub fn open(swarm: &Swarm, arguments: &RosArguments, member: Option<&str>) -> Result<Self, NodeError> {
         let mut control = Control::new(swarm)?;
-        let part = Part::take(swarm, &mut control, member)?;
+        let part = NodeScope::take(swarm, &mut control, member)?;
         let namespace = member.map_or("/".into(), |name| format!("/{name}"));
         let names = arguments.names(NAME, &namespace)?;
         let edge = Edge::open(options(arguments))?;
@@ -174,10 +174,10 @@ impl FormationNode {
     ///
     /// # Errors
     /// A name that no topic can have.
-    pub fn record(&mut self, sink: Sink) -> Result<(), NameError> {
-        let mut tape = Tape::new(&self.names, &self.frame_id, sink)?;
-        tape.parameters(self.clock.now().unwrap_or_else(system_time), &self.control);
-        self.link.tape = Some(tape);
+    pub fn record(&mut self, sink: RecordSink) -> Result<(), NameError> {
+        let mut recorder = MessageRecorder::new(&self.names, &self.frame_id, sink)?;
+        recorder.parameters(self.clock.now().unwrap_or_else(system_time), &self.control);
+        self.link.recorder = Some(recorder);
         Ok(())
     }
 
@@ -256,7 +256,7 @@ impl FormationNode {
         for change in changes {
             self.settings.apply(change, &mut self.control, &mut self.pace);
             let name = if change.name == "rate" { "period" } else { &change.name };
-            let value = tape::parameters(&self.control).into_iter().find(|(one, _)| *one == name);
+            let value = recorder::parameters(&self.control).into_iter().find(|(one, _)| *one == name);
             if let Some((name, value)) = value {
                 self.tell_tape(now, LoopEvent::PARAMETER, name, &[value]);
             }
@@ -330,8 +330,8 @@ impl FormationNode {
     }
 
     fn tell_tape(&mut self, now: f64, kind: u8, text: &str, values: &[f64]) {
-        if let Some(tape) = &mut self.link.tape {
-            tape.event(now, kind, text, values);
+        if let Some(recorder) = &mut self.link.recorder {
+            recorder.event(now, kind, text, values);
         }
     }
 
@@ -363,11 +363,11 @@ impl FormationNode {
                 self.header(now),
                 self.statistics.last_tick(),
             );
-            copy(&mut self.link.tape, &self.state, &state, now);
+            copy(&mut self.link.recorder, &self.state, &state, now);
             self.statistics.sent(self.state.publish(&state));
             if let Some(topic) = &self.markers {
                 let markers = markers::message(&self.control, &self.swarm.raw, &self.header(now));
-                copy(&mut self.link.tape, topic, &markers, now);
+                copy(&mut self.link.recorder, topic, &markers, now);
                 self.statistics.sent(topic.publish(&markers));
             }
         }
@@ -376,15 +376,20 @@ impl FormationNode {
             let troubles = self.troubles();
             let message =
                 self.statistics.message(&self.control, &self.swarm.name, header, refused, &troubles);
-            copy(&mut self.link.tape, &self.diagnostics, &message, now);
+            copy(&mut self.link.recorder, &self.diagnostics, &message, now);
             self.statistics.sent(self.diagnostics.publish(&message));
         }
     }
 }
 
-fn copy<M: super::edge::Message>(tape: &mut Option<Tape>, topic: &Publisher<M>, message: &M, now: f64) {
-    if let Some(tape) = tape {
-        tape.take(topic.topic(), message, [now; 2]);
+fn copy<M: super::edge::Message>(
+    recorder: &mut Option<MessageRecorder>,
+    topic: &Publisher<M>,
+    message: &M,
+    now: f64,
+) {
+    if let Some(recorder) = recorder {
+        recorder.take(topic.topic(), message, [now; 2]);
     }
 }
 

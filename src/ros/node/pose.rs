@@ -1,6 +1,6 @@
 //! Poses as they come in: one topic a member, or one for all; four types of message.
 
-use super::tape::Tape;
+use super::recorder::MessageRecorder;
 use super::{NodeError, TopicOf};
 use crate::ros::edge::{Node, Quality, Stamps, Subscription};
 use crate::ros::messages::geometry_msgs::{self, PoseArray, PoseStamped, PoseWithCovarianceStamped};
@@ -37,12 +37,12 @@ impl PoseSource {
 
     /// Tells `hear` every pose that arrived since the last call. Under simulated time `now` \[s\] is given: the
     /// computer's, by which DDS says when a message came, then means nothing.
-    /// The messages themselves go to `tape`, with the loop's time.
+    /// The messages themselves go to `recorder`, with the loop's time.
     pub fn take(
         &self,
         frame_id: &str,
         now: Option<f64>,
-        mut tape: Option<(&mut Tape, f64)>,
+        mut recorder: Option<(&mut MessageRecorder, f64)>,
         hear: &mut dyn FnMut(usize, Pose),
     ) {
         let pose = |header: &Header, one: &geometry_msgs::Pose, stamps: Stamps| {
@@ -53,7 +53,7 @@ impl PoseSource {
                 drain(
                     all,
                     |message, stamps| pose(&message.header, &message.pose, stamps),
-                    (&mut tape, now),
+                    (&mut recorder, now),
                     hear,
                 );
             }
@@ -61,7 +61,7 @@ impl PoseSource {
                 drain(
                     all,
                     |message, stamps| pose(&message.header, &message.pose.pose, stamps),
-                    (&mut tape, now),
+                    (&mut recorder, now),
                     hear,
                 );
             }
@@ -69,13 +69,13 @@ impl PoseSource {
                 drain(
                     all,
                     |message, stamps| pose(&message.header, &message.pose.pose, stamps),
-                    (&mut tape, now),
+                    (&mut recorder, now),
                     hear,
                 );
             }
             Self::Array(topic, heard) => {
                 for (message, stamps) in std::iter::from_fn(|| topic.take()).take(MOST_AT_ONCE) {
-                    copy(&mut tape, topic.topic(), &message, stamps, now);
+                    copy(&mut recorder, topic.topic(), &message, stamps, now);
                     for &member in heard {
                         if let Some(one) = message.poses.get(member) {
                             hear(member, pose(&message.header, one, stamps));
@@ -113,26 +113,26 @@ fn each<M: crate::ros::edge::Message>(
 fn drain<M: crate::ros::edge::Message>(
     all: &[(usize, Subscription<M>)],
     pose: impl Fn(&M, Stamps) -> Pose,
-    (tape, now): (&mut Option<(&mut Tape, f64)>, Option<f64>),
+    (recorder, now): (&mut Option<(&mut MessageRecorder, f64)>, Option<f64>),
     hear: &mut dyn FnMut(usize, Pose),
 ) {
     for (member, topic) in all {
         for (message, stamps) in std::iter::from_fn(|| topic.take()).take(MOST_AT_ONCE) {
-            copy(tape, topic.topic(), &message, stamps, now);
+            copy(recorder, topic.topic(), &message, stamps, now);
             hear(*member, pose(&message, stamps));
         }
     }
 }
 
 fn copy<M: crate::ros::edge::Message>(
-    tape: &mut Option<(&mut Tape, f64)>,
+    recorder: &mut Option<(&mut MessageRecorder, f64)>,
     topic: &str,
     message: &M,
     stamps: Stamps,
     now: Option<f64>,
 ) {
-    if let Some((tape, time)) = tape {
-        tape.take(topic, message, [*time, now.unwrap_or(stamps.received)]);
+    if let Some((recorder, time)) = recorder {
+        recorder.take(topic, message, [*time, now.unwrap_or(stamps.received)]);
     }
 }
 

@@ -74,7 +74,10 @@ impl Checker<'_> {
         if choices.contains(&text.as_str()) {
             return Value::String(text.clone());
         }
-        let help = nearest(text, choices).map(|choice| format!("did you mean {choice:?}?"));
+        let help = match renamed(text, choices) {
+            Some(choice) => Some(format!("{text:?} is called {choice:?} now")),
+            None => nearest(text, choices).map(|choice| format!("did you mean {choice:?}?")),
+        };
         self.refuse(node, key, format!("must be {}", quoted_choices(choices)), help)
     }
 
@@ -163,8 +166,10 @@ impl Checker<'_> {
         }
         let known = rule.property_names();
         let free: Vec<&str> = known.iter().copied().filter(|key| entry(siblings, key).is_none()).collect();
-        let meant = nearest(name, &free);
+        let now = renamed(name, &free);
+        let meant = now.or_else(|| nearest(name, &free));
         let help = match meant {
+            Some(key) if now.is_some() => format!("it is called `{key}` now"),
             Some(key) => format!("did you mean `{key}`?"),
             None if known.is_empty() => "no keys are known here".to_owned(),
             None => format!("known keys: {}", listed(&known)),
@@ -349,6 +354,24 @@ fn kind(content: &Content) -> &'static str {
         Content::Table(_) => "a table",
         Content::Unusable { .. } => "this",
     }
+}
+
+/// Keys and choices that had another name once, with the one they have now.
+const RENAMED: [(&str, &str); 8] = [
+    ("growth", "divergence_ratio"),
+    ("kept", "balanced"),
+    ("liars", "max_faulty_neighbours"),
+    ("present", "dynamic"),
+    ("pull", "axis"),
+    ("ring", "chebyshev"),
+    ("straight", "collinear"),
+    ("truth", "reference"),
+];
+
+/// The candidate that was called `word` once.
+fn renamed<'a>(word: &str, candidates: &[&'a str]) -> Option<&'a str> {
+    let (_, now) = RENAMED.into_iter().find(|(then, _)| *then == word)?;
+    candidates.iter().copied().find(|candidate| *candidate == now)
 }
 
 /// The candidate that `word` most probably misspells or abbreviates.

@@ -145,14 +145,14 @@ pub struct RawStop {
     pub tolerance: Option<f64>,
     /// The run has diverged once a particle is farther from its reference place than this many times
     /// the body's diagonal [1].
-    #[serde(default = "defaults::growth")]
+    #[serde(default = "defaults::divergence_ratio")]
     #[schemars(extend("exclusiveMinimum" = 0))]
-    pub growth: f64,
+    pub divergence_ratio: f64,
 }
 
 impl Default for RawStop {
     fn default() -> Self {
-        Self { steps: defaults::steps(), tolerance: None, growth: defaults::growth() }
+        Self { steps: defaults::steps(), tolerance: None, divergence_ratio: defaults::divergence_ratio() }
     }
 }
 
@@ -191,7 +191,7 @@ mod defaults {
     pub fn steps() -> usize {
         1000
     }
-    pub fn growth() -> f64 {
+    pub fn divergence_ratio() -> f64 {
         1000.0
     }
     pub fn iterations() -> usize {

@@ -196,7 +196,7 @@ pub enum RawMotion {
     },
     /// To where finite elements have these particles in the scene's material under its loads, reached in
     /// even parts over a number of steps. The rest of the body can then be held against the same truth.
-    Truth {
+    Reference {
         /// Steps to get there [step].
         #[serde(default = "super::defaults::one_step")]
         #[schemars(range(min = 1))]

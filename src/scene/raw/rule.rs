@@ -17,7 +17,7 @@ pub enum RawNeighbours {
         keep: Option<usize>,
     },
     /// All sites within `radius` cells each way: 8 or 24.
-    Ring {
+    Chebyshev {
         /// Cells each way [1].
         #[schemars(range(min = 1, max = 8))]
         radius: i32,
@@ -29,7 +29,7 @@ pub enum RawNeighbours {
     Second {},
     /// The first neighbours and the sites behind them, twice as far in the same directions: what
     /// `rule.weights.kind = "gradient"` needs. The honeycomb has no such sites.
-    Straight {},
+    Collinear {},
     /// The sites at these offsets in columns and rows of the lattice.
     Offsets {
         /// Pairs of whole numbers, in the order of summation.
@@ -43,7 +43,7 @@ pub enum RawNeighbours {
         radius: f64,
     },
     /// Whoever is within a radius now, found anew at every step: the paper's liquid and gas.
-    Present {
+    Dynamic {
         /// Radius [length].
         #[schemars(extend("exclusiveMinimum" = 0))]
         radius: f64,
@@ -155,7 +155,7 @@ pub enum RawWeights {
     /// equal ones as that allows; negative only where it has to be.
     Solved {},
     /// A second gradient of prescribed length (ours): the weights of the sites behind the first
-    /// neighbours are negative. Needs `neighbours.kind = "straight"`.
+    /// neighbours are negative. Needs `neighbours.kind = "collinear"`.
     Gradient {
         /// Decay length of a boundary layer along a row of bonds: what is clamped or loaded at an edge
         /// dies off as `exp(-distance / length)`. At least 0.38 of the spacing on a square lattice; on
@@ -172,7 +172,7 @@ pub enum RawRest {
     /// Each particle adds the offset that keeps it in place while its neighbours are in theirs. Zero
     /// for a complete neighbourhood.
     #[default]
-    Kept,
+    Balanced,
     /// The formula alone: a body with missing or unbalanced neighbours draws together.
     Literal,
 }
@@ -194,7 +194,7 @@ pub struct RawPoisson {
     pub k: f64,
     /// The axis whose displacement acts.
     #[serde(default)]
-    pub pull: RawAxis,
+    pub axis: RawAxis,
     /// Coordinate of the central axis [length]; the middle of the body unless given.
     #[serde(default)]
     pub centre: Option<f64>,

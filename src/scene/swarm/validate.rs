@@ -22,7 +22,7 @@ impl Swarm {
     /// # Errors
     /// Every key that is unknown, missing, out of range or at odds with another, with its line.
     pub fn from_file(path: &Path, overrides: &[String]) -> Result<Self, SceneError> {
-        let help = "give the path of a swarm file, or a name that `flockform swarms` lists";
+        let help = "give the path of a swarm file, or a name that `flockform list swarms` lists";
         let File { name, file, text } = File::read(path, help)?;
         Self::parse(&name, &file, &text, overrides, path.parent())
     }

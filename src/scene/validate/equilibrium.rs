@@ -89,7 +89,7 @@ fn accuracy(asked: &RawAccuracy, raw: &RawScene, refuse: Refuse<'_>) -> Result<f
 fn check(raw: &RawScene, refuse: Refuse<'_>) -> Result<(), SceneError> {
     let when = raw.roles.iter().position(|entry| entry.when.is_some());
     let later = raw.roles.iter().position(|entry| entry.from > 1);
-    let present = matches!(raw.neighbours, Some(RawNeighbours::Present { .. }));
+    let present = matches!(raw.neighbours, Some(RawNeighbours::Dynamic { .. }));
     let broken = raw.fracture.is_some() || !raw.cuts.is_empty();
     let clash = [
         (when.map(|k| format!("roles[{k}].when")), "condition on the way"),

@@ -151,7 +151,7 @@ pub fn check_rule(raw: &RawScene, refuse: Refuse<'_>) -> Result<(), SceneError> 
             _ => Ok(()),
         };
     }
-    let present = matches!(raw.neighbours, Some(RawNeighbours::Present { .. }));
+    let present = matches!(raw.neighbours, Some(RawNeighbours::Dynamic { .. }));
     let ghosts = raw.roles.iter().any(|entry| entry.role == RawRole::Ghost);
     let clash = [
         ("material", raw.material.is_none(), "the rule has no material to take its weights from", {
@@ -180,7 +180,7 @@ pub fn check_rule(raw: &RawScene, refuse: Refuse<'_>) -> Result<(), SceneError> 
             "set material.poisson and leave the Poisson term out"
         }),
         ("rule.rest", raw.rule.rest == RawRest::Literal, "a material is at rest where nothing pulls it", {
-            "use rule.rest = \"kept\""
+            "use rule.rest = \"balanced\""
         }),
     ];
     match clash.into_iter().find(|(_, clashes, ..)| *clashes) {

@@ -29,7 +29,7 @@ use crate::sweep::{Order, Update};
 impl Scene {
     /// Reads a scene file from disk; `overrides` are `KEY.PATH=VALUE` texts applied on top.
     pub fn from_file(path: &Path, overrides: &[String]) -> Result<Self, SceneError> {
-        let help = "give the path of a scene file, or a name that `flockform scenes` lists";
+        let help = "give the path of a scene file, or a name that `flockform list scenes` lists";
         let File { name, file, text } = File::read(path, help)?;
         Self::parse(&name, &file, &text, overrides, path.parent())
     }
@@ -128,11 +128,11 @@ pub(super) fn validate(
         load_steps,
         weights: weights(&raw.rule.weights, refuse)?,
         // Neighbours found anew every step have no reference configuration to be at rest in.
-        keeps_rest: raw.rule.rest == RawRest::Kept
-            && !matches!(raw.neighbours, Some(RawNeighbours::Present { .. })),
+        keeps_rest: raw.rule.rest == RawRest::Balanced
+            && !matches!(raw.neighbours, Some(RawNeighbours::Dynamic { .. })),
         poisson: raw.rule.poisson.as_ref().map(|p| PoissonTerm {
             k: p.k,
-            pull: match p.pull {
+            axis: match p.axis {
                 RawAxis::X => Axis::X,
                 RawAxis::Y => Axis::Y,
             },
@@ -153,7 +153,11 @@ pub(super) fn validate(
         roles,
         fracture: fracture(&raw.fracture, refuse)?,
         cuts: cuts(&raw.cuts, refuse)?,
-        stop: Stop { steps: raw.stop.steps, tolerance: raw.stop.tolerance, growth: raw.stop.growth },
+        stop: Stop {
+            steps: raw.stop.steps,
+            tolerance: raw.stop.tolerance,
+            divergence_ratio: raw.stop.divergence_ratio,
+        },
         record: Record {
             probes: raw.record.probes.clone(),
             places: raw.record.places.clone(),
@@ -314,19 +318,19 @@ fn frame(raw: RawFrame) -> Option<FrameRule> {
 fn neighbourhood(raw: &RawNeighbours, lattice: &Lattice, elastic: Option<&Elastic>) -> Neighbourhood {
     match raw {
         RawNeighbours::First { keep } => Neighbourhood::First { keep: *keep },
-        RawNeighbours::Ring { radius } => Neighbourhood::Ring { radius: *radius },
+        RawNeighbours::Chebyshev { radius } => Neighbourhood::Chebyshev { radius: *radius },
         RawNeighbours::Cells {} => material::of_cells(lattice, elastic),
         RawNeighbours::Second {} => Neighbourhood::Second,
-        RawNeighbours::Straight {} => Neighbourhood::Straight,
+        RawNeighbours::Collinear {} => Neighbourhood::Collinear,
         RawNeighbours::Offsets { offsets } => Neighbourhood::Offsets(offsets.clone()),
         RawNeighbours::Within { radius } => Neighbourhood::Within { radius: *radius },
-        RawNeighbours::Present { radius } => Neighbourhood::Present { radius: *radius },
+        RawNeighbours::Dynamic { radius } => Neighbourhood::Dynamic { radius: *radius },
     }
 }
 
 /// Neighbours found anew at every step have no bonds, so whatever needs bonds is refused with them.
 fn check_present_neighbours(raw: &RawScene, refuse: Refuse<'_>) -> Result<(), SceneError> {
-    if !matches!(raw.neighbours, Some(RawNeighbours::Present { .. })) {
+    if !matches!(raw.neighbours, Some(RawNeighbours::Dynamic { .. })) {
         return Ok(());
     }
     let clash = [
@@ -347,7 +351,7 @@ fn check_present_neighbours(raw: &RawScene, refuse: Refuse<'_>) -> Result<(), Sc
 
 /// Leaders led by the truth need a material to compute it for.
 fn check_truth(raw: &RawScene, refuse: Refuse<'_>) -> Result<(), SceneError> {
-    let led = raw.roles.iter().position(|entry| matches!(entry.motion, Some(RawMotion::Truth { .. })));
+    let led = raw.roles.iter().position(|entry| matches!(entry.motion, Some(RawMotion::Reference { .. })));
     match led {
         Some(k) if raw.material.is_none() => Err(refuse(
             &format!("roles[{k}].motion"),
@@ -363,9 +367,9 @@ fn check_gradient(raw: &RawScene, refuse: Refuse<'_>) -> Result<(), SceneError> 
     if !matches!(raw.rule.weights, Some(RawWeights::Gradient { .. })) {
         return Ok(());
     }
-    if !matches!(raw.neighbours, Some(RawNeighbours::Straight {})) {
+    if !matches!(raw.neighbours, Some(RawNeighbours::Collinear {})) {
         let message = "weights of kind \"gradient\" reach the sites behind the first neighbours".into();
-        return Err(refuse("neighbours", message, "give `neighbours = { kind = \"straight\" }`"));
+        return Err(refuse("neighbours", message, "give `neighbours = { kind = \"collinear\" }`"));
     }
     if !matches!(raw.rule.mean, None | Some(RawMean::Barycentre)) {
         let message = "weights of kind \"gradient\" have negative parts, which this mean cannot take".into();

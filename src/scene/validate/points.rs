@@ -29,7 +29,7 @@ pub fn cloud(raw: &RawScene, folder: Option<&Path>, refuse: Refuse<'_>) -> Resul
 /// Points have neighbours by distance alone.
 fn radius(raw: &RawScene, refuse: Refuse<'_>) -> Result<f64, SceneError> {
     match &raw.neighbours {
-        Some(RawNeighbours::Within { radius } | RawNeighbours::Present { radius }) => Ok(*radius),
+        Some(RawNeighbours::Within { radius } | RawNeighbours::Dynamic { radius }) => Ok(*radius),
         given => {
             let message = match given {
                 None => "a body of points needs to be told how far its particles see",
@@ -44,7 +44,7 @@ fn radius(raw: &RawScene, refuse: Refuse<'_>) -> Result<f64, SceneError> {
 fn refuse_what_needs_a_lattice(raw: &RawScene, refuse: Refuse<'_>) -> Result<(), SceneError> {
     let of_lattice = |what: &str| format!("{what}, and a body of points has none");
     let cut = "cut the body from a lattice, or leave this out";
-    let truth = raw.roles.iter().position(|entry| matches!(entry.motion, Some(RawMotion::Truth { .. })));
+    let truth = raw.roles.iter().position(|entry| matches!(entry.motion, Some(RawMotion::Reference { .. })));
     let led = format!("roles[{}].motion", truth.unwrap_or_default());
     let weights = matches!(raw.rule.weights, Some(RawWeights::List { .. } | RawWeights::Gradient { .. }));
     let clash = [

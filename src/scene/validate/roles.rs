@@ -148,7 +148,7 @@ fn leader_motion(
         RawMotion::Sinusoid { amplitude, period, phase } => {
             Motion::Sinusoid { amplitude: *amplitude, period: *period, phase: *phase }
         }
-        RawMotion::Truth { steps } => return Ok(LeaderMotion::Truth { steps: *steps }),
+        RawMotion::Reference { steps } => return Ok(LeaderMotion::Reference { steps: *steps }),
         RawMotion::Csv { file, scale, steps } => {
             let key = format!("{key}.motion.file");
             let path = folder.unwrap_or(Path::new("")).join(file);

@@ -14,11 +14,11 @@
 
 mod nearest;
 
-use crate::flock::interaction::{Interaction, Weights};
+use crate::flock::law::{Flock, Weights};
 use crate::flock::neighbourhood::Neighbours;
-use crate::flock::points::Points;
 use crate::flock::role::Role;
 use crate::flock::rules::Rule;
+use crate::flock::vectors::Vectors;
 use crate::solve::spectrum::{SpectralRadius, spectral_radius};
 use crate::sweep::Update;
 use nearest::{Unreachable, nearest};
@@ -75,7 +75,7 @@ const MOST_AMPLIFICATION: f64 = 1000.0;
 /// Weights of every follower for the nominal places `reference` \[m\], shape \[count\]. Sums and places are
 /// met to 1e-12 of the distance to the farthest neighbour, or to a few units in the last place of the
 /// coordinates where those are coarser.
-pub fn solve(reference: &Points, neighbours: &Neighbours, follows: &[bool]) -> Result<Solved, WeightsError> {
+pub fn solve(reference: &Vectors, neighbours: &Neighbours, follows: &[bool]) -> Result<Solved, WeightsError> {
     let mut solved = Solved::default();
     for (member, &follows) in follows.iter().enumerate() {
         let count = neighbours.of(member).len();
@@ -96,7 +96,7 @@ pub fn solve(reference: &Points, neighbours: &Neighbours, follows: &[bool]) -> R
     Ok(solved)
 }
 
-fn weights_of(member: usize, reference: &Points, neighbours: &Neighbours) -> Result<Vec<f64>, WeightsError> {
+fn weights_of(member: usize, reference: &Vectors, neighbours: &Neighbours) -> Result<Vec<f64>, WeightsError> {
     let own = reference.get(member);
     let places: Vec<[f64; 2]> = neighbours.of(member).iter().map(|&k| reference.get(k as usize)).collect();
     if places.is_empty() {
@@ -125,9 +125,9 @@ pub fn settles(
 ) -> Result<SpectralRadius, WeightsError> {
     let role = |follows: &bool| if *follows { Role::Follower } else { Role::Leader };
     let roles: Vec<Role> = follows.iter().map(role).collect();
-    let interaction = Interaction {
+    let flock = Flock {
         rule: Rule::BARYCENTRE,
-        reference: Points::zeros(roles.len()).into(),
+        reference: Vectors::zeros(roles.len()).into(),
         neighbours: neighbours.clone(),
         weights: Weights::Scalar(weights.to_vec()),
         forces: None,
@@ -135,7 +135,7 @@ pub fn settles(
         bonds: None,
     };
     let nobody = SpectralRadius { radius: 0.0, iterations: 0, converged: true };
-    let found = spectral_radius(&interaction, None, &roles, Update::default(), MOST_SWEEPS).unwrap_or(nobody);
+    let found = spectral_radius(&flock, None, &roles, Update::default(), MOST_SWEEPS).unwrap_or(nobody);
     // Followers that no leader reaches keep an error for ever: exactly one, found as one to rounding.
     if found.radius < 1.0 - 1e-9 {
         Ok(found)

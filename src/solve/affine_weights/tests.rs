@@ -4,23 +4,23 @@ use super::*;
 use crate::flock::body::{Body, Cut};
 use crate::flock::lattice::{Lattice, LatticeKind};
 use crate::flock::neighbourhood::Neighbourhood;
-use crate::flock::points::distance;
+use crate::flock::vectors::distance;
 use crate::solve::spectrum::scatter;
 
 /// A patch of the lattice whose sites have at least 8 neighbours inside it.
-fn patch(kind: LatticeKind, origin: [f64; 2], orientation: f64) -> (Points, Neighbours) {
+fn patch(kind: LatticeKind, origin: [f64; 2], orientation: f64) -> (Vectors, Neighbours) {
     let neighbourhood = match kind {
         LatticeKind::Hexagonal { .. } | LatticeKind::Honeycomb { .. } => Neighbourhood::Second,
-        _ => Neighbourhood::Ring { radius: 1 },
+        _ => Neighbourhood::Chebyshev { radius: 1 },
     };
     let lattice = Lattice::new(kind, origin, orientation);
     let cut = Cut::Count { columns: 10, rows: 10 };
     let (body, neighbours) = Body::build(lattice, &cut, &neighbourhood, None).expect("fits");
-    (Points::clone(&body.reference), neighbours)
+    (Vectors::clone(&body.reference), neighbours)
 }
 
 /// How badly sum and place are missed, relative to the farthest neighbour.
-fn residual(member: usize, reference: &Points, neighbours: &Neighbours, weights: &[f64]) -> f64 {
+fn residual(member: usize, reference: &Vectors, neighbours: &Neighbours, weights: &[f64]) -> f64 {
     let own = reference.get(member);
     let (mut sum, mut place, mut spread) = (0.0, [0.0; 2], 0.0f64);
     for bond in neighbours.bonds(member) {
@@ -32,7 +32,7 @@ fn residual(member: usize, reference: &Points, neighbours: &Neighbours, weights:
     f64::max(sum - 1.0, 1.0 - sum).max(place[0].hypot(place[1]) / spread)
 }
 
-fn nearest_of(places: &Points, count: usize) -> Neighbours {
+fn nearest_of(places: &Vectors, count: usize) -> Neighbours {
     Neighbours::from_lists((0..places.len()).map(|j| {
         let mut others: Vec<u32> = (0..places.len() as u32).filter(|&k| k as usize != j).collect();
         let far = |k: &u32| distance(places.get(j), places.get(*k as usize));
@@ -43,7 +43,7 @@ fn nearest_of(places: &Points, count: usize) -> Neighbours {
 }
 
 /// In a unit square at `origin`, in no order.
-fn scattered(count: u64, seed: u64, origin: [f64; 2]) -> Points {
+fn scattered(count: u64, seed: u64, origin: [f64; 2]) -> Vectors {
     let at = |k: u64| scatter(seed * 1000 + k);
     (0..count).map(|k| [origin[0] + at(2 * k), origin[1] + at(2 * k + 1)]).collect()
 }
@@ -154,13 +154,13 @@ fn best_of_all_supports(offsets: &[[f64; 2]]) -> Option<Vec<f64>> {
 
 /// Sweeps until nothing moves, leaders where the map puts them.
 fn at_rest(
-    reference: &Points,
+    reference: &Vectors,
     neighbours: &Neighbours,
     weights: Vec<f64>,
     follows: &[bool],
     map: impl Fn([f64; 2]) -> [f64; 2],
-) -> Points {
-    let interaction = Interaction {
+) -> Vectors {
+    let flock = Flock {
         rule: Rule::BARYCENTRE,
         reference: reference.clone().into(),
         neighbours: neighbours.clone(),
@@ -176,7 +176,7 @@ fn at_rest(
     for _ in 0..3000 {
         let mut next = present.clone();
         for j in (0..follows.len()).filter(|&j| follows[j]) {
-            next.set(j, interaction.target(j, &present));
+            next.set(j, flock.target(j, &present));
         }
         present = next;
     }
@@ -207,7 +207,7 @@ fn an_affine_motion_of_the_leaders_is_followed_exactly_edges_included() {
 
 #[test]
 fn who_cannot_be_placed_is_named() {
-    let reference: Points = [[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [1.0, 1.0]].into_iter().collect();
+    let reference: Vectors = [[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [1.0, 1.0]].into_iter().collect();
     let refused = |lists: [Vec<u32>; 4]| {
         let neighbours = Neighbours::from_lists(lists);
         solve(&reference, &neighbours, &[false, false, false, true]).expect_err("refused")
@@ -221,7 +221,7 @@ fn who_cannot_be_placed_is_named() {
 
 #[test]
 fn neighbours_nearly_on_a_line_are_refused_for_what_they_would_amplify() {
-    let reference: Points = [[0.0, 0.0], [1.0, 1e-5], [2.0, 0.0], [1.0, 1.0]].into_iter().collect();
+    let reference: Vectors = [[0.0, 0.0], [1.0, 1e-5], [2.0, 0.0], [1.0, 1.0]].into_iter().collect();
     let neighbours = Neighbours::from_lists([vec![], vec![], vec![], vec![0, 1, 2]]);
     let error = solve(&reference, &neighbours, &[false, false, false, true]).expect_err("refused");
     assert!(matches!(error, WeightsError::Amplifies { member: 3, .. }), "{error}");
@@ -233,7 +233,7 @@ fn neighbours_nearly_on_a_line_are_refused_for_what_they_would_amplify() {
 
 #[test]
 fn a_chain_on_a_line_is_placed_along_it() {
-    let reference: Points = (0..5).map(|k| [0.3 * f64::from(k), 0.1 * f64::from(k)]).collect();
+    let reference: Vectors = (0..5).map(|k| [0.3 * f64::from(k), 0.1 * f64::from(k)]).collect();
     let neighbours = Neighbours::from_lists([vec![], vec![0, 2], vec![1, 4], vec![2, 4], vec![]]);
     let solved = solve(&reference, &neighbours, &[false, true, true, true, false]).expect("solved");
     assert!((solved.weights[2] - 2.0 / 3.0).abs() < 1e-12, "{:?}", solved.weights);

@@ -11,7 +11,7 @@ use super::history::History;
 use super::lanczos::Bounds;
 use super::system::Prepared;
 use super::{Found, Request, SolveError, Solver, lanczos, steps};
-use crate::solve::field::Field;
+use crate::flock::vectors::Vectors;
 
 /// Lanczos steps for the bounds.
 const ESTIMATE: usize = 60;
@@ -27,7 +27,7 @@ pub(super) fn solve(prepared: &mut Prepared, request: &Request) -> Result<Found,
         return Err(SolveError::NotPositive { solver: Solver::Chebyshev, iteration: 0 });
     }
     let (mut low, high) = (low, SAFETY * high);
-    let (mut u, mut step) = (Field::zeros(matrix.count()), Field::zeros(matrix.count()));
+    let (mut u, mut step) = (Vectors::zeros(matrix.count()), Vectors::zeros(matrix.count()));
     let mut r = right.clone();
     let set_up = begin.elapsed();
     let mut history = History::new();

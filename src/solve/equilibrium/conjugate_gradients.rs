@@ -10,8 +10,9 @@ use super::history::History;
 use super::steps::for_groups;
 use super::system::Prepared;
 use super::{Found, Precision, Request, SolveError, Solver, steps};
-use crate::solve::field::{Field, Real, View, dot};
-use crate::solve::operator::{Matrix, Stencils};
+use crate::flock::vectors::Vectors;
+use crate::solve::field::{Real, VectorsRef, dot};
+use crate::solve::operator::{Matrix, RowCoefficients};
 
 /// An approximation of `K^-1`, symmetric and positive.
 pub(super) trait Preconditioner<T: Real> {
@@ -20,7 +21,7 @@ pub(super) trait Preconditioner<T: Real> {
 
     /// `z`, an approximation of `K^-1 r / size` up to a factor; `size` is the order of magnitude of `r`.
     /// Returns `r . z` as well.
-    fn precondition(&mut self, r: &Field<T>, size: f64) -> (&Field<Self::Z>, f64);
+    fn precondition(&mut self, r: &Vectors<T>, size: f64) -> (&Vectors<Self::Z>, f64);
 }
 
 pub(super) fn solve(prepared: &mut Prepared, request: &Request) -> Result<Found, SolveError> {
@@ -29,12 +30,12 @@ pub(super) fn solve(prepared: &mut Prepared, request: &Request) -> Result<Found,
     match request.precision {
         Precision::F64 => {
             let mut jacobi =
-                BlockJacobi { matrix, stencils: &prepared.stencils, z: Field::zeros(right.len()) };
+                BlockJacobi { matrix, stencils: &prepared.stencils, z: Vectors::zeros(right.len()) };
             iterate(prepared, &prepared.stencils, right, &mut jacobi, request, Solver::ConjugateGradients)
         }
         Precision::F32 => {
-            let stencils = Stencils::<f32>::new(&matrix.rows, single_scale(matrix));
-            let mut jacobi = BlockJacobi { matrix, stencils: &stencils, z: Field::zeros(right.len()) };
+            let stencils = RowCoefficients::<f32>::new(&matrix.rows, single_scale(matrix));
+            let mut jacobi = BlockJacobi { matrix, stencils: &stencils, z: Vectors::zeros(right.len()) };
             iterate_single(prepared, &stencils, right, &mut jacobi, request, Solver::ConjugateGradients)
         }
     }
@@ -50,26 +51,26 @@ pub(super) fn single_scale(matrix: &Matrix) -> f64 {
 /// The whole iteration in single precision: right-hand side and rows scaled to about 1.
 pub(super) fn iterate_single<P: Preconditioner<f32>>(
     prepared: &Prepared,
-    stencils: &Stencils<f32>,
-    right: Field<f64>,
+    stencils: &RowCoefficients<f32>,
+    right: Vectors<f64>,
     preconditioner: &mut P,
     request: &Request,
     solver: Solver,
 ) -> Result<Found, SolveError> {
     let (scale, size) = (single_scale(&prepared.matrix), prepared.size);
     let narrow = |values: Vec<f64>| values.into_iter().map(|v| (v / size) as f32).collect();
-    let right = Field { x: narrow(right.x), y: narrow(right.y) };
+    let right = Vectors { x: narrow(right.x), y: narrow(right.y) };
     let found = iterate(prepared, stencils, right, preconditioner, request, solver)?;
     let widen = |values: Vec<f64>| values.into_iter().map(|v| v * size * scale).collect();
-    let displacement = Field { x: widen(found.displacement.x), y: widen(found.displacement.y) };
+    let displacement = Vectors { x: widen(found.displacement.x), y: widen(found.displacement.y) };
     Ok(Found { displacement, ..found })
 }
 
 /// Conjugate gradients from zero. `right` becomes the residual.
 pub(super) fn iterate<T: Real, P: Preconditioner<T>>(
     prepared: &Prepared,
-    stencils: &Stencils<T>,
-    right: Field<T>,
+    stencils: &RowCoefficients<T>,
+    right: Vectors<T>,
     preconditioner: &mut P,
     request: &Request,
     solver: Solver,
@@ -77,7 +78,7 @@ pub(super) fn iterate<T: Real, P: Preconditioner<T>>(
     let begin = Instant::now();
     let matrix = &prepared.matrix;
     let mut r = right;
-    let zeros = || Field::<T>::zeros(r.len());
+    let zeros = || Vectors::<T>::zeros(r.len());
     let (mut x, mut p, mut q) = (zeros(), zeros(), zeros());
     let at_start = dot(r.view(), r.view()).sqrt();
     let (mut size, mut rz_before) = (at_start, f64::INFINITY);
@@ -102,11 +103,11 @@ pub(super) fn iterate<T: Real, P: Preconditioner<T>>(
         history.push(solver, size / at_start)?;
     }
     let wide = |values: Vec<T>| values.into_iter().map(Real::wide).collect();
-    Ok(Found { displacement: Field { x: wide(x.x), y: wide(x.y) }, residuals: history.residuals, set_up })
+    Ok(Found { displacement: Vectors { x: wide(x.x), y: wide(x.y) }, residuals: history.residuals, set_up })
 }
 
 /// `p = size z + ratio p`.
-fn turn<T: Real, Z: Real>(matrix: &Matrix, (size, z): (f64, &Field<Z>), ratio: f64, p: &mut Field<T>) {
+fn turn<T: Real, Z: Real>(matrix: &Matrix, (size, z): (f64, &Vectors<Z>), ratio: f64, p: &mut Vectors<T>) {
     let (size, ratio) = (T::of(size), T::of(ratio));
     for_groups(p.parts(&matrix.bounds), |_, p| {
         let z = z.view().range(p.range());
@@ -122,8 +123,8 @@ fn turn<T: Real, Z: Real>(matrix: &Matrix, (size, z): (f64, &Field<Z>), ratio: f
 fn advance<T: Real>(
     matrix: &Matrix,
     step: f64,
-    (p, q): (&Field<T>, &Field<T>),
-    (x, r): (&mut Field<T>, &mut Field<T>),
+    (p, q): (&Vectors<T>, &Vectors<T>),
+    (x, r): (&mut Vectors<T>, &mut Vectors<T>),
 ) -> f64 {
     let step = T::of(step);
     let groups = x.parts(&matrix.bounds).into_iter().zip(r.parts(&matrix.bounds)).collect();
@@ -135,7 +136,7 @@ fn advance<T: Real>(
         advance(x.y, p.y);
         retreat(r.x, q.x);
         retreat(r.y, q.y);
-        let r = View { x: &*r.x, y: &*r.y };
+        let r = VectorsRef { x: &*r.x, y: &*r.y };
         dot(r, r)
     });
     sums.iter().sum()
@@ -144,20 +145,20 @@ fn advance<T: Real>(
 /// `D^-1` of the rows.
 pub(super) struct BlockJacobi<'a, T> {
     pub matrix: &'a Matrix,
-    pub stencils: &'a Stencils<T>,
-    pub z: Field<T>,
+    pub stencils: &'a RowCoefficients<T>,
+    pub z: Vectors<T>,
 }
 
 impl<T: Real> Preconditioner<T> for BlockJacobi<'_, T> {
     type Z = T;
 
-    fn precondition(&mut self, r: &Field<T>, size: f64) -> (&Field<T>, f64) {
+    fn precondition(&mut self, r: &Vectors<T>, size: f64) -> (&Vectors<T>, f64) {
         let (matrix, stencils) = (self.matrix, self.stencils);
         let sums = for_groups(self.z.parts(&matrix.bounds), |group, z| {
             let range = z.range();
-            let part = crate::solve::field::Part { begin: z.begin, x: &mut *z.x, y: &mut *z.y };
+            let part = crate::solve::field::VectorsMut { begin: z.begin, x: &mut *z.x, y: &mut *z.y };
             steps::precondition_group(matrix, stencils, (0.0, 1.0 / size), r.view(), group, part);
-            dot(View { x: &*z.x, y: &*z.y }, r.view().range(range))
+            dot(VectorsRef { x: &*z.x, y: &*z.y }, r.view().range(range))
         });
         (&self.z, sums.iter().sum())
     }

@@ -26,8 +26,8 @@ mod with_faer {
     use faer::{Conj, MatMut, Par, Side};
 
     use super::{Found, Prepared, SolveError, System};
+    use crate::flock::vectors::Vectors;
     use crate::solve::equilibrium::{Solver, steps};
-    use crate::solve::field::Field;
     use crate::solve::operator::{HELD, Matrix};
 
     pub fn solve(prepared: &mut Prepared, system: &System) -> Result<Found, SolveError> {
@@ -48,7 +48,7 @@ mod with_faer {
             set_up
         };
         let displacement = sparse.displacements(&unknowns, prepared.matrix.count());
-        let mut r = Field::zeros(prepared.matrix.count());
+        let mut r = Vectors::zeros(prepared.matrix.count());
         let fields = (&displacement, &prepared.right);
         let residual = steps::residual(&prepared.matrix, &prepared.stencils, fields, &mut r).sqrt();
         Ok(Found { displacement, residuals: vec![1.0, residual / prepared.size], set_up })
@@ -102,12 +102,12 @@ mod with_faer {
             self.starts.len() - 1
         }
 
-        fn unknowns(&self, field: &Field<f64>) -> Vec<f64> {
+        fn unknowns(&self, field: &Vectors<f64>) -> Vec<f64> {
             self.particles.iter().flat_map(|&i| field.get(i as usize)).collect()
         }
 
-        fn displacements(&self, unknowns: &[f64], count: usize) -> Field<f64> {
-            let mut field = Field::zeros(count);
+        fn displacements(&self, unknowns: &[f64], count: usize) -> Vectors<f64> {
+            let mut field = Vectors::zeros(count);
             for (pair, &i) in unknowns.chunks_exact(2).zip(&self.particles) {
                 (field.x[i as usize], field.y[i as usize]) = (pair[0], pair[1]);
             }

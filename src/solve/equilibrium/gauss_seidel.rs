@@ -9,15 +9,15 @@ use std::time::Instant;
 use super::history::History;
 use super::system::Prepared;
 use super::{Found, Request, SolveError, Solver, steps};
-use crate::solve::field::Field;
-use crate::solve::operator::{Matrix, Stencils};
+use crate::flock::vectors::Vectors;
+use crate::solve::operator::{Matrix, RowCoefficients};
 
 pub(super) fn solve(prepared: &mut Prepared, request: &Request) -> Result<Found, SolveError> {
     let begin = Instant::now();
     let Prepared { matrix, stencils, right, size, .. } = prepared;
     let colours = colours(matrix);
-    let mut u = Field::zeros(matrix.count());
-    let mut r = Field::zeros(matrix.count());
+    let mut u = Vectors::zeros(matrix.count());
+    let mut r = Vectors::zeros(matrix.count());
     let set_up = begin.elapsed();
     let mut history = History::new();
     while history.goes_on(request) {
@@ -65,7 +65,13 @@ fn colours(matrix: &Matrix) -> Vec<Vec<Coloured>> {
     colours
 }
 
-fn sweep(matrix: &Matrix, stencils: &Stencils<f64>, colour: &[Coloured], f: &Field<f64>, u: &mut Field<f64>) {
+fn sweep(
+    matrix: &Matrix,
+    stencils: &RowCoefficients<f64>,
+    colour: &[Coloured],
+    f: &Vectors<f64>,
+    u: &mut Vectors<f64>,
+) {
     for &(particle, run) in colour {
         let (i, run) = (particle as usize, &matrix.runs()[run as usize]);
         let [mut x, mut y] = f.get(i);

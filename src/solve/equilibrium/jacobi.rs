@@ -10,7 +10,7 @@ use super::history::History;
 use super::system::Prepared;
 use super::{Found, Request, SolveError, Solver, lanczos, steps};
 use crate::flock::block::{inverse, product};
-use crate::solve::field::Field;
+use crate::flock::vectors::Vectors;
 use crate::solve::operator::Matrix;
 
 /// Share of the largest damping that converges; below 1 since the eigenvalue is estimated from within,
@@ -26,7 +26,7 @@ pub(super) fn solve(prepared: &mut Prepared, request: &Request) -> Result<Found,
     let bound = largest_row(matrix);
     let largest = if *symmetric { lanczos::largest(matrix, stencils, ESTIMATE).min(bound) } else { bound };
     let weight = SHARE * 2.0 / largest;
-    let mut u = Field::zeros(matrix.count());
+    let mut u = Vectors::zeros(matrix.count());
     let mut r = right.clone();
     let set_up = begin.elapsed();
     let mut history = History::new();

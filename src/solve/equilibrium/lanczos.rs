@@ -6,8 +6,9 @@
 //! held, which lowers the largest eigenvalue by next to nothing.
 
 use super::steps::{Apply, precondition_group};
-use crate::solve::field::{Field, Part, Real, dot};
-use crate::solve::operator::{Matrix, Stencils, pass};
+use crate::flock::vectors::Vectors;
+use crate::solve::field::{Real, VectorsMut, dot};
+use crate::solve::operator::{Matrix, RowCoefficients, pass};
 
 /// Share of the first residual's square below which the next one is rounding.
 const EXHAUSTED: f64 = 1e-24;
@@ -28,17 +29,17 @@ fn samples(matrix: &Matrix) -> Vec<usize> {
 }
 
 /// The largest eigenvalue, found from below.
-pub fn largest<T: Real>(matrix: &Matrix, stencils: &Stencils<T>, steps: usize) -> f64 {
+pub fn largest<T: Real>(matrix: &Matrix, stencils: &RowCoefficients<T>, steps: usize) -> f64 {
     bounds(matrix, stencils, &samples(matrix), steps).high
 }
 
 /// Both ends of the spectrum on the whole body; the low one is found from above, and slowly.
-pub fn both<T: Real>(matrix: &Matrix, stencils: &Stencils<T>, steps: usize) -> Bounds {
+pub fn both<T: Real>(matrix: &Matrix, stencils: &RowCoefficients<T>, steps: usize) -> Bounds {
     let all: Vec<usize> = (0..matrix.groups()).collect();
     bounds(matrix, stencils, &all, steps)
 }
 
-fn bounds<T: Real>(matrix: &Matrix, stencils: &Stencils<T>, groups: &[usize], steps: usize) -> Bounds {
+fn bounds<T: Real>(matrix: &Matrix, stencils: &RowCoefficients<T>, groups: &[usize], steps: usize) -> Bounds {
     let mut krylov = Krylov::new(matrix, stencils, groups);
     let (mut diagonal, mut beside) = (Vec::new(), Vec::new());
     let (mut step_before, mut ratio) = (1.0, 0.0);
@@ -65,19 +66,19 @@ fn bounds<T: Real>(matrix: &Matrix, stencils: &Stencils<T>, groups: &[usize], st
 /// Conjugate gradients on some groups of columns, everybody else held.
 struct Krylov<'a, T> {
     matrix: &'a Matrix,
-    stencils: &'a Stencils<T>,
+    stencils: &'a RowCoefficients<T>,
     groups: &'a [usize],
-    r: Field<T>,
-    z: Field<T>,
-    p: Field<T>,
-    q: Field<T>,
+    r: Vectors<T>,
+    z: Vectors<T>,
+    p: Vectors<T>,
+    q: Vectors<T>,
     rz: f64,
 }
 
 impl<'a, T: Real> Krylov<'a, T> {
     /// Fields of zeros are not touched outside the groups, so they cost no memory there.
-    fn new(matrix: &'a Matrix, stencils: &'a Stencils<T>, groups: &'a [usize]) -> Self {
-        let zeros = || Field::zeros(matrix.count());
+    fn new(matrix: &'a Matrix, stencils: &'a RowCoefficients<T>, groups: &'a [usize]) -> Self {
+        let zeros = || Vectors::zeros(matrix.count());
         let (r, z, p, q) = (zeros(), zeros(), zeros(), zeros());
         let mut krylov = Self { matrix, stencils, groups, r, z, p, q, rz: 0.0 };
         // A fixed start without symmetry: the fractional parts of multiples of the golden ratio.
@@ -126,7 +127,7 @@ impl<'a, T: Real> Krylov<'a, T> {
         }
     }
 
-    fn product(&self, a: &Field<T>, b: &Field<T>) -> f64 {
+    fn product(&self, a: &Vectors<T>, b: &Vectors<T>) -> f64 {
         let of_group = |&group: &usize| {
             let range = self.matrix.bounds[group]..self.matrix.bounds[group + 1];
             dot(a.view().range(range.clone()), b.view().range(range))
@@ -136,13 +137,13 @@ impl<'a, T: Real> Krylov<'a, T> {
 }
 
 /// The stretch of a field that belongs to a group.
-fn part<'a, T>(field: &'a mut Field<T>, matrix: &Matrix, group: usize) -> Part<'a, T> {
+fn part<'a, T>(field: &'a mut Vectors<T>, matrix: &Matrix, group: usize) -> VectorsMut<'a, T> {
     let range = matrix.bounds[group]..matrix.bounds[group + 1];
-    Part { begin: range.start, x: &mut field.x[range.clone()], y: &mut field.y[range] }
+    VectorsMut { begin: range.start, x: &mut field.x[range.clone()], y: &mut field.y[range] }
 }
 
 /// `to = keep to + weight from`.
-fn add_times<T: Real>(to: Part<'_, T>, (keep, weight): (T, T), from: &Field<T>) {
+fn add_times<T: Real>(to: VectorsMut<'_, T>, (keep, weight): (T, T), from: &Vectors<T>) {
     let from = from.view().range(to.range());
     to.x.iter_mut().zip(from.x).for_each(|(to, &from)| *to = keep * *to + weight * from);
     to.y.iter_mut().zip(from.y).for_each(|(to, &from)| *to = keep * *to + weight * from);

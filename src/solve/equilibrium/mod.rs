@@ -35,8 +35,7 @@ pub use choice::choose;
 pub use error::SolveError;
 pub use system::System;
 
-use super::field::Field;
-use crate::flock::points::Points;
+use crate::flock::vectors::Vectors;
 use system::Prepared;
 
 /// Relative residual that no whole solve in single precision is asked to go below.
@@ -140,7 +139,7 @@ impl Default for Request {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Solved {
     /// Displacements \[length\], those of the held particles included, shape \[count\].
-    pub displacement: Points,
+    pub displacement: Vectors,
     pub solver: Solver,
     /// Why this solver.
     pub why: String,
@@ -168,7 +167,7 @@ impl Solved {
 
 /// What a solver hands back: displacements of the followers, zero elsewhere.
 struct Found {
-    displacement: Field<f64>,
+    displacement: Vectors<f64>,
     residuals: Vec<f64>,
     /// Time the solver itself spent before the first iteration.
     set_up: Duration,
@@ -254,6 +253,6 @@ fn check(system: &System, request: &Request, solver: Solver) -> Result<(), Solve
 impl Found {
     /// Without any load the followers stay where they are.
     fn nothing(count: usize) -> Self {
-        Self { displacement: Field::zeros(count), residuals: vec![0.0], set_up: Duration::ZERO }
+        Self { displacement: Vectors::zeros(count), residuals: vec![0.0], set_up: Duration::ZERO }
     }
 }

@@ -8,8 +8,9 @@
 
 use super::system::Prepared;
 use super::{Request, Solver, System, by, steps};
-use crate::solve::field::{Field, dot};
-use crate::solve::operator::{Row, Stencils};
+use crate::flock::vectors::Vectors;
+use crate::solve::field::dot;
+use crate::solve::operator::{Row, RowCoefficients};
 
 /// Roundings of a row, as far as they do not cancel.
 const ROUNDINGS: f64 = 4.0;
@@ -24,10 +25,10 @@ pub(super) fn known_to(
     prepared: &mut Prepared,
     system: &System,
     request: &Request,
-    (solver, found): (Solver, &Field<f64>),
+    (solver, found): (Solver, &Vectors<f64>),
 ) -> Option<f64> {
     let right = prepared.scaled_right(system);
-    let mut r = Field::zeros(right.len());
+    let mut r = Vectors::zeros(right.len());
     let left = steps::residual(&prepared.matrix, &prepared.stencils, (found, &right), &mut r).sqrt();
     if left > ROUNDINGS * f64::EPSILON * magnitude(prepared, found, &right) {
         return None;
@@ -38,19 +39,19 @@ pub(super) fn known_to(
     (prepared.right, prepared.size) = (r, left);
     let request = Request { tolerance: ASKED, ..*request };
     let error = by(solver, prepared, system, &request).ok()?;
-    let size = |field: &Field<f64>| dot(field.view(), field.view()).sqrt();
+    let size = |field: &Vectors<f64>| dot(field.view(), field.view()).sqrt();
     let solved = error.residuals.last().is_some_and(|last| *last <= ENOUGH);
     solved.then(|| size(&error.displacement) / size(found)).filter(|part| part.is_finite())
 }
 
 /// `| |K| |u| + |f| |`: what the terms of a residual add up to before they cancel.
-fn magnitude(prepared: &Prepared, found: &Field<f64>, right: &Field<f64>) -> f64 {
+fn magnitude(prepared: &Prepared, found: &Vectors<f64>, right: &Vectors<f64>) -> f64 {
     let rows: Vec<Row> = prepared.matrix.rows.iter().map(absolute).collect();
-    let stencils = Stencils::<f64>::new(&rows, 1.0);
+    let stencils = RowCoefficients::<f64>::new(&rows, 1.0);
     let part = |values: &[f64], sign: f64| values.iter().map(|v| sign * v.abs()).collect();
-    let u = Field { x: part(&found.x, 1.0), y: part(&found.y, 1.0) };
-    let f = Field { x: part(&right.x, -1.0), y: part(&right.y, -1.0) };
-    let mut sum = Field::zeros(found.len());
+    let u = Vectors { x: part(&found.x, 1.0), y: part(&found.y, 1.0) };
+    let f = Vectors { x: part(&right.x, -1.0), y: part(&right.y, -1.0) };
+    let mut sum = Vectors::zeros(found.len());
     steps::residual(&prepared.matrix, &stencils, (&u, &f), &mut sum).sqrt()
 }
 

@@ -4,8 +4,9 @@
 
 use rayon::prelude::*;
 
-use crate::solve::field::{Field, Part, Real, View, dot};
-use crate::solve::operator::{Matrix, Stencils, Task, array, array_mut, pass};
+use crate::flock::vectors::Vectors;
+use crate::solve::field::{Real, VectorsMut, VectorsRef, dot};
+use crate::solve::operator::{Matrix, RowCoefficients, Task, array, array_mut, pass};
 
 /// Does some work on every group, in parallel where that pays; answers in the order of groups.
 pub fn for_groups<P: Send, R: Send>(groups: Vec<P>, work: impl Fn(usize, P) -> R + Sync) -> Vec<R> {
@@ -18,7 +19,7 @@ pub fn for_groups<P: Send, R: Send>(groups: Vec<P>, work: impl Fn(usize, P) -> R
 
 /// `K u`, written to `out`.
 pub struct Apply<'a, T> {
-    pub out: Part<'a, T>,
+    pub out: VectorsMut<'a, T>,
 }
 
 impl<T: Real> Task<T> for Apply<'_, T> {
@@ -32,8 +33,8 @@ impl<T: Real> Task<T> for Apply<'_, T> {
 
 /// `f - K u`, written to `out`.
 pub struct Residual<'a, T> {
-    pub f: View<'a, T>,
-    pub out: Part<'a, T>,
+    pub f: VectorsRef<'a, T>,
+    pub out: VectorsMut<'a, T>,
 }
 
 impl<T: Real> Task<T> for Residual<'_, T> {
@@ -55,9 +56,9 @@ impl<T: Real> Task<T> for Residual<'_, T> {
 /// `u + weight D^-1 (f - K u)`, written to `out`.
 pub struct Smooth<'a, T> {
     pub weight: T,
-    pub f: View<'a, T>,
-    pub u: View<'a, T>,
-    pub out: Part<'a, T>,
+    pub f: VectorsRef<'a, T>,
+    pub u: VectorsRef<'a, T>,
+    pub out: VectorsMut<'a, T>,
 }
 
 impl<T: Real> Task<T> for Smooth<'_, T> {
@@ -79,12 +80,17 @@ impl<T: Real> Task<T> for Smooth<'_, T> {
 }
 
 /// `out = K u`; returns `u . K u`.
-pub fn apply<T: Real>(matrix: &Matrix, stencils: &Stencils<T>, u: &Field<T>, out: &mut Field<T>) -> f64 {
+pub fn apply<T: Real>(
+    matrix: &Matrix,
+    stencils: &RowCoefficients<T>,
+    u: &Vectors<T>,
+    out: &mut Vectors<T>,
+) -> f64 {
     let sums = for_groups(out.parts(&matrix.bounds), |group, out| {
         let range = out.range();
         let mut task = Apply { out };
         pass(matrix, stencils, group, u.view(), &mut task);
-        dot(View { x: task.out.x, y: task.out.y }, u.view().range(range))
+        dot(VectorsRef { x: task.out.x, y: task.out.y }, u.view().range(range))
     });
     sums.iter().sum()
 }
@@ -92,14 +98,14 @@ pub fn apply<T: Real>(matrix: &Matrix, stencils: &Stencils<T>, u: &Field<T>, out
 /// `out = f - K u`; returns its square.
 pub fn residual<T: Real>(
     matrix: &Matrix,
-    stencils: &Stencils<T>,
-    (u, f): (&Field<T>, &Field<T>),
-    out: &mut Field<T>,
+    stencils: &RowCoefficients<T>,
+    (u, f): (&Vectors<T>, &Vectors<T>),
+    out: &mut Vectors<T>,
 ) -> f64 {
     let sums = for_groups(out.parts(&matrix.bounds), |group, out| {
         let mut task = Residual { f: f.view(), out };
         pass(matrix, stencils, group, u.view(), &mut task);
-        let out = View { x: &*task.out.x, y: &*task.out.y };
+        let out = VectorsRef { x: &*task.out.x, y: &*task.out.y };
         dot(out, out)
     });
     sums.iter().sum()
@@ -108,10 +114,10 @@ pub fn residual<T: Real>(
 /// `out = u + weight D^-1 (f - K u)`.
 pub fn smooth<T: Real>(
     matrix: &Matrix,
-    stencils: &Stencils<T>,
+    stencils: &RowCoefficients<T>,
     weight: f64,
-    (u, f): (&Field<T>, &Field<T>),
-    out: &mut Field<T>,
+    (u, f): (&Vectors<T>, &Vectors<T>),
+    out: &mut Vectors<T>,
 ) {
     for_groups(out.parts(&matrix.bounds), |group, out| {
         let mut task = Smooth { weight: T::of(weight), f: f.view(), u: u.view(), out };
@@ -122,10 +128,10 @@ pub fn smooth<T: Real>(
 /// `out = keep out + weight D^-1 f`.
 pub fn precondition<T: Real>(
     matrix: &Matrix,
-    stencils: &Stencils<T>,
+    stencils: &RowCoefficients<T>,
     (keep, weight): (f64, f64),
-    f: &Field<T>,
-    out: &mut Field<T>,
+    f: &Vectors<T>,
+    out: &mut Vectors<T>,
 ) {
     for_groups(out.parts(&matrix.bounds), |group, out| {
         precondition_group(matrix, stencils, (keep, weight), f.view(), group, out);
@@ -135,11 +141,11 @@ pub fn precondition<T: Real>(
 /// One group of [`precondition`].
 pub fn precondition_group<T: Real>(
     matrix: &Matrix,
-    stencils: &Stencils<T>,
+    stencils: &RowCoefficients<T>,
     (keep, weight): (f64, f64),
-    f: View<'_, T>,
+    f: VectorsRef<'_, T>,
     group: usize,
-    out: Part<'_, T>,
+    out: VectorsMut<'_, T>,
 ) {
     let (keep, weight) = (T::of(keep), T::of(weight));
     for run in matrix.runs_of(group) {
@@ -156,7 +162,7 @@ pub fn precondition_group<T: Real>(
 }
 
 /// `u += step`.
-pub fn advance<T: Real>(matrix: &Matrix, step: &Field<T>, u: &mut Field<T>) {
+pub fn advance<T: Real>(matrix: &Matrix, step: &Vectors<T>, u: &mut Vectors<T>) {
     for_groups(u.parts(&matrix.bounds), |_, u| {
         let step = step.view().range(u.range());
         u.x.iter_mut().zip(step.x).for_each(|(u, &step)| *u += step);

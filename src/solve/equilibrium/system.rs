@@ -2,9 +2,9 @@
 
 use super::{SolveError, steps};
 use crate::flock::block::{apply, inverse};
-use crate::flock::points::Points;
-use crate::solve::field::{Field, dot};
-use crate::solve::operator::{HELD, Matrix, Operator, Stencils};
+use crate::flock::vectors::Vectors;
+use crate::solve::field::dot;
+use crate::solve::operator::{HELD, Matrix, Operator, RowCoefficients};
 use std::sync::OnceLock;
 
 /// A body's operator, the forces on it and where its held particles are.
@@ -12,14 +12,14 @@ use std::sync::OnceLock;
 pub struct System {
     pub operator: Operator,
     /// Force on each particle \[force\]; those on held ones change nothing. Shape \[count\].
-    pub forces: Points,
+    pub forces: Vectors,
     /// Displacement of each held particle \[length\]; that of followers is not looked at. Shape \[count\].
-    pub held: Points,
+    pub held: Vectors,
     asymmetric_pair: OnceLock<Option<[usize; 2]>>,
 }
 
 impl System {
-    pub fn new(operator: Operator, forces: Points, held: Points) -> Self {
+    pub fn new(operator: Operator, forces: Vectors, held: Vectors) -> Self {
         Self { operator, forces, held, asymmetric_pair: OnceLock::new() }
     }
 
@@ -43,8 +43,8 @@ impl System {
     }
 
     /// The followers' displacements with those of the held particles.
-    pub(super) fn with_held(&self, found: Field<f64>) -> Points {
-        let mut displacement = Points { x: found.x, y: found.y };
+    pub(super) fn with_held(&self, found: Vectors<f64>) -> Vectors {
+        let mut displacement = Vectors { x: found.x, y: found.y };
         for i in 0..displacement.len() {
             let held = self.held.get(i);
             if !self.operator.follows()[i] {
@@ -75,9 +75,9 @@ impl System {
     }
 
     /// `f + K_FL u_L` for the followers, zero for the others and in held components.
-    fn right_side(&self, matrix: &Matrix) -> Field<f64> {
+    fn right_side(&self, matrix: &Matrix) -> Vectors<f64> {
         let operator = &self.operator;
-        let mut right = Field { x: self.forces.x.clone(), y: self.forces.y.clone() };
+        let mut right = Vectors { x: self.forces.x.clone(), y: self.forces.y.clone() };
         for stretch in operator.stretches() {
             let range = stretch.start..stretch.start + stretch.len;
             // Only rows that owe something to a held particle were given another class.
@@ -113,9 +113,9 @@ impl System {
 /// brings them near 1: no square of a force or stiffness then over- or underflows, and no bit changes.
 pub(super) struct Prepared {
     pub matrix: Matrix,
-    pub stencils: Stencils<f64>,
+    pub stencils: RowCoefficients<f64>,
     /// Right-hand side \[1\], shape \[count\].
-    pub right: Field<f64>,
+    pub right: Vectors<f64>,
     /// `|right|` \[1\].
     pub size: f64,
     /// The powers of two that a displacement has to be multiplied by, one after the other.
@@ -150,7 +150,7 @@ impl Prepared {
             let blocks = row.entries.iter_mut().map(|(_, block)| block).chain([&mut row.diagonal]);
             blocks.flatten().flatten().for_each(|k| *k /= stiffness);
         }
-        let stencils = Stencils::new(&matrix.rows, 1.0);
+        let stencils = RowCoefficients::new(&matrix.rows, 1.0);
         let size = dot(right.view(), right.view()).sqrt();
         let symmetric = system.asymmetric_pair().is_none();
         let scales = [1.0 / stiffness, force];
@@ -161,21 +161,21 @@ impl Prepared {
 
     /// `|f - K u| / |f|` of these displacements, which is not what an iteration that never looks back takes
     /// it for.
-    pub fn residual(&self, system: &System, found: &Field<f64>) -> f64 {
+    pub fn residual(&self, system: &System, found: &Vectors<f64>) -> f64 {
         let right = self.scaled_right(system);
-        let mut r = Field::zeros(right.len());
+        let mut r = Vectors::zeros(right.len());
         steps::residual(&self.matrix, &self.stencils, (found, &right), &mut r).sqrt() / self.size
     }
 
     /// The right-hand side anew, for solvers use it up \[1\].
-    pub fn scaled_right(&self, system: &System) -> Field<f64> {
+    pub fn scaled_right(&self, system: &System) -> Vectors<f64> {
         let mut right = system.right_side(&self.matrix);
         right.x.iter_mut().chain(&mut right.y).for_each(|f| *f /= self.scales[1]);
         right
     }
 
     /// Displacements \[length\] from those of the scaled system.
-    pub fn unscaled(&self, mut found: Field<f64>) -> Field<f64> {
+    pub fn unscaled(&self, mut found: Vectors<f64>) -> Vectors<f64> {
         let [first, second] = self.scales;
         found.x.iter_mut().chain(&mut found.y).for_each(|u| *u = *u * first * second);
         found

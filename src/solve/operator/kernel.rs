@@ -9,7 +9,7 @@ use super::Row;
 use super::matrix::{Matrix, Run};
 use crate::flock::block::{Block, inverse};
 use crate::flock::lanes::{InLanes, MEMORY, in_lanes};
-use crate::solve::field::{Real, View};
+use crate::solve::field::{Real, VectorsRef};
 
 /// Particles at a time: four AVX2 vectors of single and eight of double precision, so that a block is
 /// loaded once for all of them.
@@ -19,7 +19,7 @@ const NARROW: usize = 8;
 
 /// The rows of a matrix in the precision they are applied in.
 #[derive(Clone, Debug)]
-pub struct Stencils<T> {
+pub struct RowCoefficients<T> {
     /// Where the blocks of each class begin, shape \[classes + 1\].
     starts: Vec<u32>,
     /// By class: `D`, then `-K` of each entry.
@@ -28,7 +28,7 @@ pub struct Stencils<T> {
     inverse: Vec<[T; 4]>,
 }
 
-impl<T: Real> Stencils<T> {
+impl<T: Real> RowCoefficients<T> {
     /// Rows multiplied by `scale`. A `D` without inverse is given zero: what it belongs to stays put.
     pub fn new(rows: &[Row], scale: f64) -> Self {
         let mut stencils = Self { starts: vec![0], blocks: Vec::new(), inverse: Vec::new() };
@@ -64,9 +64,9 @@ pub trait Task<T> {
 /// Hands `K u` of the particles in a group to the task.
 pub fn pass<T: Real>(
     matrix: &Matrix,
-    stencils: &Stencils<T>,
+    stencils: &RowCoefficients<T>,
     group: usize,
-    u: View<'_, T>,
+    u: VectorsRef<'_, T>,
     task: &mut impl Task<T>,
 ) {
     over_runs(matrix, stencils, matrix.runs_of(group), u, task);
@@ -75,9 +75,9 @@ pub fn pass<T: Real>(
 /// Hands `K u` of the particles in runs to the task.
 pub fn over_runs<T: Real>(
     matrix: &Matrix,
-    stencils: &Stencils<T>,
+    stencils: &RowCoefficients<T>,
     runs: &[Run],
-    u: View<'_, T>,
+    u: VectorsRef<'_, T>,
     task: &mut impl Task<T>,
 ) {
     // Measured with AVX2: the beams of the benchmark are solved 1.2 to 2.5 times as fast.
@@ -87,9 +87,9 @@ pub fn over_runs<T: Real>(
 /// Runs to go over, in pieces of a width of their own.
 struct Runs<'a, T, K> {
     matrix: &'a Matrix,
-    stencils: &'a Stencils<T>,
+    stencils: &'a RowCoefficients<T>,
     runs: &'a [Run],
-    u: View<'a, T>,
+    u: VectorsRef<'a, T>,
     task: &'a mut K,
 }
 
@@ -103,9 +103,9 @@ impl<T: Real, K: Task<T>> InLanes for Runs<'_, T, K> {
 #[inline(always)]
 fn over_runs_portable<T: Real>(
     matrix: &Matrix,
-    stencils: &Stencils<T>,
+    stencils: &RowCoefficients<T>,
     runs: &[Run],
-    u: View<'_, T>,
+    u: VectorsRef<'_, T>,
     task: &mut impl Task<T>,
 ) {
     for run in runs {
@@ -133,7 +133,7 @@ fn lanes<T: Real, const W: usize>(
     distances: &[i32],
     inverse: &[T; 4],
     at: usize,
-    u: View<'_, T>,
+    u: VectorsRef<'_, T>,
     task: &mut impl Task<T>,
 ) {
     let (mut x, mut y) = ([T::default(); W], [T::default(); W]);
@@ -164,7 +164,7 @@ pub fn array_mut<T, const W: usize>(values: &mut [T], at: usize) -> &mut [T; W] 
 mod tests {
     use super::*;
     use crate::flock::lattice::LatticeKind;
-    use crate::solve::field::Field;
+    use crate::flock::vectors::Vectors;
     use crate::solve::operator::samples::operator;
 
     struct Collect<T>(Vec<(usize, T, T)>);
@@ -177,9 +177,9 @@ mod tests {
 
     fn assert_widths_agree<T: Real>() {
         let matrix = Matrix::of_followers(&operator(LatticeKind::SAMPLES[3], 30, 143, |i| i % 211 == 0));
-        let stencils = Stencils::<T>::new(&matrix.rows, 0.7);
+        let stencils = RowCoefficients::<T>::new(&matrix.rows, 0.7);
         let noise = |i: usize| T::of((i as f64 * 0.618_033_988_749_895).fract() - 0.5);
-        let u = Field {
+        let u = Vectors {
             x: (0..matrix.count()).map(noise).collect(),
             y: (0..matrix.count()).map(|i| noise(7 * i)).collect(),
         };

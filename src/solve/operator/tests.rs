@@ -4,11 +4,11 @@ use super::samples::operator;
 use super::*;
 use crate::flock::block::apply;
 use crate::flock::lattice::LatticeKind;
-use crate::solve::field::Field;
+use crate::flock::vectors::Vectors;
 
 /// Collects `K u` and `D^-1`.
 struct Collect {
-    product: Field<f64>,
+    product: Vectors<f64>,
 }
 
 impl Task<f64> for Collect {
@@ -18,9 +18,9 @@ impl Task<f64> for Collect {
     }
 }
 
-fn noise(count: usize) -> Field<f64> {
+fn noise(count: usize) -> Vectors<f64> {
     let noise = |i: usize| (i as f64 * 0.618_033_988_749_895).fract() - 0.5;
-    Field { x: (0..count).map(noise).collect(), y: (count..2 * count).map(noise).collect() }
+    Vectors { x: (0..count).map(noise).collect(), y: (count..2 * count).map(noise).collect() }
 }
 
 #[test]
@@ -28,12 +28,12 @@ fn the_compiled_matrix_is_the_rows_over_the_followers() {
     for kind in LatticeKind::SAMPLES {
         let operator = operator(kind, 41, 53, |i| i < 30 || i % 97 == 5);
         let matrix = Matrix::of_followers(&operator);
-        let stencils = Stencils::<f64>::new(&matrix.rows, 2.0);
+        let stencils = RowCoefficients::<f64>::new(&matrix.rows, 2.0);
         let mut u = noise(operator.count());
         for i in (0..operator.count()).filter(|&i| !operator.follows()[i]) {
             (u.x[i], u.y[i]) = (0.0, 0.0);
         }
-        let mut found = Collect { product: Field::zeros(operator.count()) };
+        let mut found = Collect { product: Vectors::zeros(operator.count()) };
         (0..matrix.groups()).for_each(|group| pass(&matrix, &stencils, group, u.view(), &mut found));
         for (i, site) in operator.columns.sites().enumerate() {
             let mut expected = [0.0; 2];

@@ -1,8 +1,8 @@
 //! Bodies and leaders that are hardly there: coincident leaders, one follower, nobody to lead, far away.
 
 use super::{AT_REST, Case, End, MATERIAL, Outcome, SHEET, patch, small, worst};
-use crate::flock::points::distance;
 use crate::flock::rules::Mean;
+use crate::flock::vectors::distance;
 use crate::scene::{Scene, SceneError};
 use crate::stability::scaling;
 use crate::stability::subject::Subject;

@@ -2,10 +2,10 @@
 
 use super::{AT_REST, Case, End, MATERIAL, Outcome, SHEET, patch, plan, small, worst};
 use crate::flock::body::{Body, Cut};
-use crate::flock::interaction::{Interaction, Weights};
 use crate::flock::lattice::{Lattice, LatticeKind};
-use crate::flock::points::{Points, distance};
+use crate::flock::law::{Flock, Weights};
 use crate::flock::rules::{Mean, Rotation, Rule};
+use crate::flock::vectors::{Vectors, distance};
 use crate::material::cells::{Cells, neighbourhood};
 use crate::material::elastic::{Constants, Elastic, Plane};
 use crate::material::loads::{Loads, Traction};
@@ -75,12 +75,12 @@ fn stress(overrides: &[&str]) -> Result<Outcome, SceneError> {
     let (Some(cells), Some(elastic)) = (&plan.cells, &scene.material) else {
         return Err(scene.refuse("material", "the body has none", ""));
     };
-    let neighbours = plan.interaction.neighbours.clone();
+    let neighbours = plan.flock.neighbours.clone();
     let weights = MaterialWeights::assemble(cells, &plan.body, neighbours, elastic)
         .map_err(|error| scene.refuse("material", error.to_string(), ""))?;
     let reference = &plan.body.reference;
     let strain = [3e-3, -1e-3, 2e-3];
-    let displaced: Points =
+    let displaced: Vectors =
         reference.iter().map(|[x, y]| [strain[0] * x + strain[2] * y, strain[1] * y]).collect();
     let [xx, yy, xy] = elastic.stress(strain).map(|stress| stress * elastic.thickness());
     let outline = cells.boundary_sides(&cells.incidence(reference.len()));
@@ -130,7 +130,7 @@ pub fn contrast(solver: Solver, contrast: f64) -> Outcome {
         Err(error) => return Outcome::Refused { message: error.to_string() },
     };
     let end = f64::from(columns - 1);
-    let mut interaction = Interaction {
+    let mut flock = Flock {
         rule: Rule { mean: Mean::Material { rotation: Rotation::Small }, ..Rule::BARYCENTRE },
         reference: body.reference.clone(),
         neighbours: weights.neighbours.clone(),
@@ -139,10 +139,10 @@ pub fn contrast(solver: Solver, contrast: f64) -> Outcome {
         rest: None,
         bonds: None,
     };
-    interaction.keep_rest();
+    flock.keep_rest();
     let follows: Vec<bool> = body.reference.iter().map(|[x, _]| x > 0.0 && x < end).collect();
-    let held: Points = body.reference.iter().map(|[x, _]| [if x == end { 1.0 } else { 0.0 }, 0.0]).collect();
-    let system = match system(&interaction, &body, follows, held, &[]) {
+    let held: Vectors = body.reference.iter().map(|[x, _]| [if x == end { 1.0 } else { 0.0 }, 0.0]).collect();
+    let system = match system(&flock, &body, follows, held, &[]) {
         Ok(system) => system,
         Err(error) => return Outcome::Refused { message: error.to_string() },
     };

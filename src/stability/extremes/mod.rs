@@ -15,10 +15,10 @@ use std::ops::ControlFlow;
 use serde::Serialize;
 
 use super::Load;
-use crate::continuum::equilibrium::come_to_rest;
+use crate::continuum::equilibrium::run_to_equilibrium;
 use crate::continuum::plan::Plan;
 use crate::continuum::run::StopReason;
-use crate::flock::points::{Points, distance};
+use crate::flock::vectors::{Vectors, distance};
 use crate::scene::{LeaderMotion, Scene, SceneError};
 
 /// What became of an extreme.
@@ -105,14 +105,14 @@ pub fn run(load: Load<'_>, scene: &Scene, tell: &mut dyn FnMut(&str)) -> Vec<Cas
 /// # Errors
 /// As [`Plan::with_truth`].
 pub fn plan(scene: &Scene) -> Result<Plan, SceneError> {
-    let strained = |places: &Points| places.iter().map(|[x, y]| [0.01 * x, -0.003 * y]).collect();
+    let strained = |places: &Vectors| places.iter().map(|[x, y]| [0.01 * x, -0.003 * y]).collect();
     Plan::with_truth(scene, &strained)
 }
 
 /// A body at the end of its scene.
 struct End {
-    reference: Points,
-    present: Points,
+    reference: Vectors,
+    present: Vectors,
     spacing: f64,
 }
 
@@ -122,7 +122,7 @@ impl End {
     fn of(scene: &Scene) -> Result<Self, SceneError> {
         let plan = plan(scene)?;
         let spacing = plan.body.lattice.spacing();
-        let outcome = come_to_rest(scene, plan, &mut |_, _| ControlFlow::Continue(()))?;
+        let outcome = run_to_equilibrium(scene, plan, &mut |_, _| ControlFlow::Continue(()))?;
         match outcome.reason {
             StopReason::Diverged(divergence) => {
                 return Err(scene.refuse("", divergence.to_string(), ""));
@@ -137,7 +137,7 @@ impl End {
         }
         let engine = &outcome.engine;
         Ok(Self {
-            reference: Points::clone(&engine.body().reference),
+            reference: Vectors::clone(&engine.body().reference),
             present: engine.present().clone(),
             spacing,
         })

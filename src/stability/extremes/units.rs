@@ -47,7 +47,7 @@ fn scaled(
     base: &End,
 ) -> Result<Outcome, SceneError> {
     // Who is a neighbour now hangs on the last digit of a distance: only a power of two keeps it.
-    let present = matches!(scene.neighbourhood, Neighbourhood::Present { .. });
+    let present = matches!(scene.neighbourhood, Neighbourhood::Dynamic { .. });
     let factor = if present { factor.log2().round().exp2() } else { factor };
     let mut overrides = scaling::overrides(scene, factor);
     overrides.push(steps.to_owned());

@@ -3,7 +3,7 @@
 //! A period goes: who is heard, and where; where the rule sends each ([`Formation::advance`]); who has to do
 //! without some of its neighbours; what is safe ([`Filter`]). A member that is not heard gets no target.
 
-pub mod part;
+pub mod scope;
 mod setup;
 pub mod state;
 
@@ -14,7 +14,7 @@ use super::resilience::trim;
 use super::safety::{self, Filter, Flags, Limits, SafetyError};
 use super::watch::{Health, Pose, Rejection, Watch};
 use crate::flock::manoeuvre::Manoeuvre;
-use crate::flock::points::{Points, distance};
+use crate::flock::vectors::{Vectors, distance};
 use crate::scene::SceneError;
 use crate::scene::swarm::Swarm;
 
@@ -54,7 +54,7 @@ pub struct Control {
     watch: Watch,
     filter: Filter,
     /// Liars tolerated among a member's neighbours.
-    liars: usize,
+    max_faulty: usize,
     sweeps: usize,
     period: f64,
     mode: Mode,
@@ -70,14 +70,14 @@ pub struct Control {
     /// Whose poses can come at all.
     listens: Vec<bool>,
     now: f64,
-    present: Points,
+    present: Vectors,
     /// Velocities between the last two poses \[m/s\].
-    velocity: Points,
+    velocity: Vectors,
     known: Vec<bool>,
     usable: Vec<bool>,
     ages: Vec<f64>,
-    wanted: Points,
-    safe: Points,
+    wanted: Vectors,
+    safe: Vectors,
     /// Where members hold in an emergency stop.
     held: Vec<Option<[f64; 2]>>,
     filtered: Vec<Flags>,
@@ -92,13 +92,13 @@ impl Control {
         let formation = Formation::lay_out(swarm)?;
         let (period, count) = (swarm.raw.control.period, formation.count());
         setup::check_commands(swarm, &formation)?;
-        let liars = setup::liars(swarm, &formation)?;
+        let max_faulty = setup::max_faulty(swarm, &formation)?;
         let filter = setup::filter(swarm, &formation)?;
         let watch = setup::watch(swarm, &formation, filter.limits().speed);
         Ok(Self {
             watch: Watch::new(count, watch),
             filter,
-            liars,
+            max_faulty,
             sweeps: swarm.raw.control.sweeps,
             period,
             mode: Mode::Running,
@@ -110,7 +110,7 @@ impl Control {
             listens: vec![true; count],
             now: 0.0,
             present: formation.places.clone(),
-            velocity: Points::zeros(count),
+            velocity: Vectors::zeros(count),
             known: vec![false; count],
             usable: vec![false; count],
             ages: vec![0.0; count],
@@ -322,7 +322,7 @@ impl Control {
                 continue;
             }
             let lost = self.formation.neighbours(member).any(|k| !self.usable[k]);
-            let target = if self.liars > 0 {
+            let target = if self.max_faulty > 0 {
                 let (target, trimmed) = self.resilient_target(member, &seen);
                 self.flags[member] |= if trimmed { TRIMMED } else { 0 };
                 Some(target)
@@ -348,7 +348,7 @@ impl Control {
         let heard: Vec<usize> = self.formation.neighbours(member).filter(|&k| self.usable[k]).collect();
         let all: Vec<[f64; 2]> = heard.iter().map(|&k| displacement(k)).collect();
         let mut keep = Vec::new();
-        trim(self.formation.trim(), displacement(member), &all, self.liars, &mut keep);
+        trim(self.formation.trim(), displacement(member), &all, self.max_faulty, &mut keep);
         let here = self.present.get(member);
         let along = |axis: usize| {
             let keeps = |k: usize| heard.iter().zip(&keep).any(|(&other, keep)| other == k && keep[axis]);
@@ -401,7 +401,7 @@ impl Control {
     }
 
     /// Where each member comes to rest with the leaders as they are \[m\]; `None` where the rule is not linear.
-    pub fn settled(&self) -> Option<Points> {
+    pub fn settled(&self) -> Option<Vectors> {
         self.formation.settled(&self.seen_places())
     }
 
@@ -423,7 +423,7 @@ impl Control {
         &self.filter
     }
 
-    fn seen_places(&self) -> Points {
+    fn seen_places(&self) -> Vectors {
         let mut places = self.formation.places.clone();
         for member in (0..places.len()).filter(|&member| self.known[member]) {
             places.set(member, self.present.get(member));

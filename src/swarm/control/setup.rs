@@ -7,18 +7,18 @@ use crate::swarm::formation::Formation;
 use crate::swarm::safety::{Filter, Limits, Obstacle, Obstacles, Place, SafetyError};
 use crate::swarm::watch::WatchLimits;
 
-/// How many liars among a member's neighbours are to be tolerated.
+/// How many faulty robots among a member's neighbours are to be tolerated.
 ///
 /// # Errors
 /// Names the member that does not have the neighbours for it.
-pub fn liars(swarm: &Swarm, formation: &Formation) -> Result<usize, SceneError> {
-    let liars = swarm.raw.resilience.as_ref().map_or(0, |resilience| resilience.liars);
-    if liars == 0 {
+pub fn max_faulty(swarm: &Swarm, formation: &Formation) -> Result<usize, SceneError> {
+    let max_faulty = swarm.raw.resilience.as_ref().map_or(0, |resilience| resilience.max_faulty_neighbours);
+    if max_faulty == 0 {
         return Ok(0);
     }
-    formation.require_support(liars).map_err(|unsupported| {
+    formation.require_support(max_faulty).map_err(|unsupported| {
         let help = "lower it, widen the neighbourhood, or make more robots leaders";
-        swarm.refuse("resilience.liars", unsupported, help)
+        swarm.refuse("resilience.max_faulty_neighbours", unsupported, help)
     })?;
     if formation.affine(0.0).is_some() {
         tracing::warn!(
@@ -26,7 +26,7 @@ pub fn liars(swarm: &Swarm, formation: &Formation) -> Result<usize, SceneError> 
              stretched or sheared loses its shape somewhat"
         );
     }
-    Ok(liars)
+    Ok(max_faulty)
 }
 
 /// Refuses leaders that wait for somebody's word in a swarm that takes nobody's.
@@ -35,7 +35,7 @@ pub fn liars(swarm: &Swarm, formation: &Formation) -> Result<usize, SceneError> 
 /// Names the key.
 pub fn check_commands(swarm: &Swarm, formation: &Formation) -> Result<(), SceneError> {
     let commands = swarm.raw.node.commands;
-    match formation.told().next() {
+    match formation.moved().next() {
         Some(leader) if !commands.may_do_all() => {
             let name = &formation.names[leader];
             let what =

@@ -1,7 +1,7 @@
 //! What the last tick left, as every edge publishes it.
 
 use super::{Control, Mode, NEIGHBOUR_LOST, POSE_REJECTED, TRIMMED};
-use crate::flock::points::distance;
+use crate::flock::vectors::distance;
 use crate::swarm::safety::Flags;
 use crate::swarm::watch::Health;
 

@@ -1,7 +1,7 @@
 //! Simulated robots with what they say and what goes wrong with them; who moves them is somebody else's business.
 
 use super::faults::{self, Fault};
-use crate::flock::points::Points;
+use crate::flock::vectors::Vectors;
 use crate::scene::SceneError;
 use crate::scene::swarm::Swarm;
 use crate::scene::swarm::raw::{RawModel, RawSwarm};
@@ -74,7 +74,7 @@ impl Fleet {
     }
 
     /// Where the robots are \[m\].
-    pub fn places(&self) -> Points {
+    pub fn places(&self) -> Vectors {
         self.robots.iter().map(|robot| robot.position).collect()
     }
 

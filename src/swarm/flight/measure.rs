@@ -2,7 +2,7 @@
 //! the robots with which nothing is wrong at the time.
 
 use super::Flight;
-use crate::flock::points::{Points, distance};
+use crate::flock::vectors::{Vectors, distance};
 use crate::scene::swarm::Swarm;
 
 /// One period of a flight; distances in \[m\].
@@ -33,7 +33,7 @@ pub struct Record {
     /// Times of `tracks` \[s\].
     pub times: Vec<f64>,
     /// Places at every recorded period \[m\], shape \[recorded, members\].
-    pub tracks: Vec<Points>,
+    pub tracks: Vec<Vectors>,
     /// Length of each robot's way \[m\].
     pub ways: Vec<f64>,
     /// Least free space around each robot \[m\], shape \[members\].
@@ -57,7 +57,7 @@ impl Record {
     }
 
     /// Measures the period just flown; `before` is where the robots were as it began.
-    pub fn take(&mut self, flight: &Flight, before: &Points) -> Sample {
+    pub fn take(&mut self, flight: &Flight, before: &Vectors) -> Sample {
         let control = flight.control();
         let formation = control.formation();
         let present = flight.fleet().places();

@@ -16,7 +16,7 @@ use super::robots::Robot;
 use super::watch::Pose;
 use crate::continuum::engine::Engine;
 use crate::continuum::plan::Plan;
-use crate::flock::points::distance;
+use crate::flock::vectors::distance;
 use crate::scene::SceneError;
 use crate::scene::swarm::{Shape, Swarm};
 pub use fleet::Fleet;
@@ -154,6 +154,6 @@ fn periods(swarm: &Swarm, control: &Control) -> u64 {
 fn continuum(swarm: &Swarm) -> Result<Option<Twin>, SceneError> {
     let Shape::Scene(scene) = &swarm.shape else { return Ok(None) };
     let plan = Plan::new(scene)?;
-    let particles = plan.body.matter().collect();
+    let particles = plan.body.body_particles().collect();
     Ok(Some(Twin { engine: Engine::new(plan), particles }))
 }

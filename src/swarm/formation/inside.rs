@@ -1,13 +1,13 @@
 //! Members inside a body: how much each corner of the cell around a place has a share in it.
 
-use crate::flock::points::Points;
+use crate::flock::vectors::Vectors;
 use crate::material::cells::Cells;
 
 /// Shares of the corners of the cell that holds `place` \[length\]; `None` outside the body.
 ///
 /// Mean value coordinates (M. S. Floater, *Mean value coordinates*, 2003): they sum to one, reproduce the place,
 /// and so carry any affine motion over exactly, in triangles, rectangles and hexagons alike.
-pub fn shares(cells: &Cells, reference: &Points, place: [f64; 2]) -> Option<Vec<(u32, f64)>> {
+pub fn shares(cells: &Cells, reference: &Vectors, place: [f64; 2]) -> Option<Vec<(u32, f64)>> {
     cells.iter().find_map(|corners| {
         let at: Vec<[f64; 2]> = corners.iter().map(|&i| reference.get(i as usize)).collect();
         let weights = mean_value(&at, place)?;
@@ -16,7 +16,7 @@ pub fn shares(cells: &Cells, reference: &Points, place: [f64; 2]) -> Option<Vec<
 }
 
 /// The place that has these shares.
-pub fn place(shares: &[(u32, f64)], present: &Points) -> [f64; 2] {
+pub fn place(shares: &[(u32, f64)], present: &Vectors) -> [f64; 2] {
     shares.iter().fold([0.0; 2], |[a, b], &(i, share)| {
         let [x, y] = present.get(i as usize);
         [a + share * x, b + share * y]

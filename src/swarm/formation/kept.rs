@@ -2,9 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Course, Formation, Lead, Seen};
+use super::{Formation, Lead, Seen, TargetSource};
 use crate::flock::manoeuvre::{Leg, Manoeuvre, Posture};
-use crate::flock::points::Points;
+use crate::flock::vectors::Vectors;
 
 /// How a leader moves, as [`Lead`] has it; the file still knows its motion.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
@@ -74,9 +74,9 @@ impl Formation {
             }
         }
         // A body that moves by itself has to get to where it was; the rule alone starts from where robots are seen.
-        if self.is_scene || !matches!(self.course, Course::Rule { .. }) {
+        if self.is_scene || !matches!(self.course, TargetSource::Rule { .. }) {
             let nobody = vec![false; self.count()];
-            let (places, mut targets) = (self.places.clone(), Points::zeros(self.count()));
+            let (places, mut targets) = (self.places.clone(), Vectors::zeros(self.count()));
             let seen = Seen { present: &places, usable: &nobody, known: &nobody };
             (0..periods).for_each(|_| self.advance(&seen, 0.0, 1, &mut targets));
         }

@@ -1,16 +1,16 @@
 //! From a swarm file to its formation, with the checks that need the places.
 
-use super::{Course, Formation, Lead, inside, links, spacing_of};
+use super::{Formation, Lead, TargetSource, inside, links, spacing_of};
 use crate::continuum::engine::Engine;
 use crate::continuum::layout::Layout;
 use crate::continuum::plan::Plan;
 use crate::flock::body::Body;
-use crate::flock::interaction::{Interaction, Weights};
+use crate::flock::law::{Flock, Weights};
 use crate::flock::manoeuvre::{Manoeuvre, Posture};
-use crate::flock::points::{Points, distance};
 use crate::flock::region::Region;
 use crate::flock::role::Role;
 use crate::flock::rules::{Mean, Rule};
+use crate::flock::vectors::{Vectors, distance};
 use crate::material::cells::Cells;
 use crate::scene::raw::{RawRest, RawWeights};
 use crate::scene::swarm::raw::RawLinks;
@@ -40,7 +40,7 @@ impl Formation {
 }
 
 fn of_places(swarm: &Swarm, rule: Rule) -> Result<Formation, SceneError> {
-    let places: Points = swarm.raw.robots.iter().map(|robot| robot.place).collect();
+    let places: Vectors = swarm.raw.robots.iter().map(|robot| robot.place).collect();
     let names: Vec<String> = swarm.raw.robots.iter().map(|robot| robot.name.clone()).collect();
     let leads = leads(swarm, &names, &places, &|_, _| Ok(Vec::new()))?;
     let follows: Vec<bool> = leads.iter().map(Option::is_none).collect();
@@ -73,7 +73,7 @@ fn of_places(swarm: &Swarm, rule: Rule) -> Result<Formation, SceneError> {
         _ => Weights::Equal,
     };
     let body = Body::of_places(places.clone(), spacing);
-    let mut interaction = Interaction {
+    let mut flock = Flock {
         rule,
         reference: body.reference.clone(),
         neighbours,
@@ -82,12 +82,12 @@ fn of_places(swarm: &Swarm, rule: Rule) -> Result<Formation, SceneError> {
         rest: None,
         bonds: None,
     };
-    if swarm.raw.rule.rest == RawRest::Kept && present_radius.is_none() {
-        interaction.keep_rest();
+    if swarm.raw.rule.rest == RawRest::Balanced && present_radius.is_none() {
+        flock.keep_rest();
     }
     let roles = leads.iter().map(|lead| if lead.is_some() { Role::Leader } else { Role::Follower }).collect();
     let update = Update { damping: default_damping(rule), ..Update::default() };
-    let mut plan = Plan::of_places(body, interaction, roles, update);
+    let mut plan = Plan::of_places(body, flock, roles, update);
     plan.present_radius = present_radius;
     let radius = |k: usize| swarm.raw.robots[k].radius.unwrap_or(swarm.raw.radius);
     let mut formation = of_scene(swarm, plan, false);
@@ -106,9 +106,9 @@ fn default_damping(rule: Rule) -> f64 {
 
 fn of_body(swarm: &Swarm, scene: &Scene) -> Result<Formation, SceneError> {
     let layout = Layout::new(scene)?;
-    let members: Vec<usize> = layout.body.matter().collect();
+    let members: Vec<usize> = layout.body.body_particles().collect();
     let names = numbered(swarm, members.len());
-    let places: Points = members.iter().map(|&i| layout.body.reference.get(i)).collect();
+    let places: Vectors = members.iter().map(|&i| layout.body.reference.get(i)).collect();
     let leads = leads(swarm, &names, &places, &|k, region| {
         let picked = layout.pick(scene, &format!("leaders[{k}]"), region)?;
         Ok(picked.into_iter().filter_map(|i| members.binary_search(&i).ok()).collect())
@@ -134,9 +134,9 @@ fn of_body(swarm: &Swarm, scene: &Scene) -> Result<Formation, SceneError> {
 
 /// The members are the particles of the plan's body, its frame left out.
 fn of_scene(swarm: &Swarm, plan: Plan, is_scene: bool) -> Formation {
-    let particles: Vec<usize> = plan.body.matter().collect();
-    let places: Points = particles.iter().map(|&i| plan.body.reference.get(i)).collect();
-    let course = Course::Rule { engine: Box::new(Engine::new(plan)), particles };
+    let particles: Vec<usize> = plan.body.body_particles().collect();
+    let places: Vectors = particles.iter().map(|&i| plan.body.reference.get(i)).collect();
+    let course = TargetSource::Rule { engine: Box::new(Engine::new(plan)), particles };
     formation(swarm, numbered(swarm, places.len()), places, course, is_scene)
 }
 
@@ -157,7 +157,7 @@ fn inside_of(swarm: &Swarm, scene: &Scene) -> Result<Formation, SceneError> {
     }
     let places = swarm.raw.robots.iter().map(|robot| robot.place).collect();
     let names = swarm.raw.robots.iter().map(|robot| robot.name.clone()).collect();
-    let course = Course::Inside { engine: Box::new(Engine::new(plan)), shares };
+    let course = TargetSource::Inside { engine: Box::new(Engine::new(plan)), shares };
     let mut formation = formation(swarm, names, places, course, true);
     let radius = |k: usize| swarm.raw.robots[k].radius.unwrap_or(swarm.raw.radius);
     formation.radii = (0..formation.count()).map(radius).collect();
@@ -171,11 +171,17 @@ fn recorded(swarm: &Swarm, scene: &Scene, recording: &Recording) -> Result<Forma
         return Err(swarm.refuse("scene.recording", message, "give the recording of a run of this scene"));
     }
     let places = recording.ids.iter().map(|id| body.reference.get(id - 1)).collect();
-    let course = Course::Recorded { steps: recording.places.clone(), step: 0 };
+    let course = TargetSource::Recorded { steps: recording.places.clone(), step: 0 };
     Ok(formation(swarm, numbered(swarm, recording.ids.len()), places, course, true))
 }
 
-fn formation(swarm: &Swarm, names: Vec<String>, places: Points, course: Course, is_scene: bool) -> Formation {
+fn formation(
+    swarm: &Swarm,
+    names: Vec<String>,
+    places: Vectors,
+    course: TargetSource,
+    is_scene: bool,
+) -> Formation {
     let mut formation = Formation {
         radii: vec![swarm.raw.radius; names.len()],
         leads: vec![None; names.len()],
@@ -203,7 +209,7 @@ type Pick<'a> = &'a dyn Fn(usize, &SceneRegion) -> Result<Vec<usize>, SceneError
 fn leads(
     swarm: &Swarm,
     names: &[String],
-    places: &Points,
+    places: &Vectors,
     pick: Pick<'_>,
 ) -> Result<Vec<Option<Lead>>, SceneError> {
     let mut leads = vec![None; names.len()];
@@ -238,12 +244,12 @@ fn lead(
     program: &Program,
     name: &str,
     member: usize,
-    places: &Points,
+    places: &Vectors,
 ) -> Result<Lead, SceneError> {
     Ok(match program {
         Program::External => Lead::External(places.get(member)),
         Program::Motion(motion) => Lead::Motion { motion: motion.clone(), since: 0.0 },
-        Program::Own(tracks) => {
+        Program::ParticleState(tracks) => {
             let track = tracks.iter().find(|(known, _)| known == name).ok_or_else(|| {
                 let key = format!("leaders[{entry}].program.path");
                 swarm.refuse(
@@ -267,12 +273,12 @@ fn lead(
 /// neighbours have negative ones, and several of them together may drive each other away.
 fn require_settling(swarm: &Swarm, formation: &Formation) -> Result<(), SceneError> {
     let Some(engine) = formation.engine() else { return Ok(()) };
-    let Weights::Scalar(weights) = &engine.interaction().weights else { return Ok(()) };
-    let neighbours = &engine.interaction().neighbours;
+    let Weights::Scalar(weights) = &engine.flock().weights else { return Ok(()) };
+    let neighbours = &engine.flock().neighbours;
     let follows: Vec<bool> = engine.roles().iter().map(|&role| role == Role::Follower).collect();
     affine_weights::settles(weights, neighbours, &follows).map(drop).map_err(|error| {
         let outside = |&m: &usize| {
-            let Course::Rule { particles, .. } = &formation.course else { return false };
+            let TargetSource::Rule { particles, .. } = &formation.course else { return false };
             follows[particles[m]] && neighbours.bonds(particles[m]).any(|bond| weights[bond] < 0.0)
         };
         let names: Vec<&str> =

@@ -1,13 +1,13 @@
 //! Who sees whom among robots that stand on no lattice.
 
 use crate::flock::neighbourhood::Neighbours;
-use crate::flock::points::{Points, distance};
+use crate::flock::vectors::{Vectors, distance};
 use crate::scene::SceneError;
 use crate::scene::swarm::Swarm;
 use crate::scene::swarm::raw::RawLinks;
 
 /// Neighbours of each robot by its place, in order of number; whoever is found anew every period has none yet.
-pub fn neighbours(swarm: &Swarm, places: &Points) -> Result<Neighbours, SceneError> {
+pub fn neighbours(swarm: &Swarm, places: &Vectors) -> Result<Neighbours, SceneError> {
     let links = swarm.raw.links.clone().unwrap_or(RawLinks::Nearest { count: 6 });
     let lists: Vec<Vec<u32>> = match links {
         RawLinks::Nearest { count } => (0..places.len()).map(|i| nearest(places, i, count)).collect(),
@@ -20,16 +20,16 @@ pub fn neighbours(swarm: &Swarm, places: &Points) -> Result<Neighbours, SceneErr
     Ok(Neighbours::from_lists(lists))
 }
 
-fn others(places: &Points, i: usize) -> impl Iterator<Item = u32> {
+fn others(places: &Vectors, i: usize) -> impl Iterator<Item = u32> {
     (0..places.len() as u32).filter(move |&k| k as usize != i)
 }
 
-fn apart(places: &Points, i: usize, k: u32) -> f64 {
+fn apart(places: &Vectors, i: usize, k: u32) -> f64 {
     distance(places.get(i), places.get(k as usize))
 }
 
 /// The `count` nearest, and whoever is as near as the last of them.
-fn nearest(places: &Points, i: usize, count: usize) -> Vec<u32> {
+fn nearest(places: &Vectors, i: usize, count: usize) -> Vec<u32> {
     let mut distances: Vec<f64> = others(places, i).map(|k| apart(places, i, k)).collect();
     distances.sort_unstable_by(f64::total_cmp);
     let Some(&last) = distances.get(count.min(distances.len()).wrapping_sub(1)) else { return Vec::new() };

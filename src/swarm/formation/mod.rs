@@ -14,11 +14,11 @@ use crate::continuum::engine::Engine;
 use crate::flock::manoeuvre::{Affine, Manoeuvre, Posture};
 use crate::flock::motion::Motion;
 use crate::flock::neighbourhood::Neighbours;
-use crate::flock::points::{Points, distance};
 use crate::flock::pseudo_energy::pe1;
 use crate::flock::role::Role;
 use crate::flock::rules::Mean;
 use crate::flock::strain::{Strain, strain};
+use crate::flock::vectors::{Vectors, distance};
 use crate::scene::swarm::NamedManoeuvre;
 use crate::swarm::resilience::{Trim, supported};
 use crate::sweep::Order;
@@ -32,10 +32,10 @@ pub struct Formation {
     /// \[m\], shape \[members\].
     pub radii: Vec<f64>,
     /// Nominal places \[m\], shape \[members\].
-    pub places: Points,
+    pub places: Vectors,
     pub manoeuvres: Vec<NamedManoeuvre>,
     leads: Vec<Option<Lead>>,
-    course: Course,
+    course: TargetSource,
     spacing: f64,
     settling: Option<Settling>,
     /// Roles for which `settling` was computed.
@@ -46,7 +46,7 @@ pub struct Formation {
 
 /// Where targets come from.
 #[derive(Clone, Debug)]
-enum Course {
+enum TargetSource {
     /// The rule, over where the members were seen: member `m` is particle `particles[m]`.
     Rule { engine: Box<Engine>, particles: Vec<usize> },
     /// A body that moves by itself carries the members along: shares of its particles in each place.
@@ -58,7 +58,7 @@ enum Course {
 /// How a leader moves.
 #[derive(Clone, Debug)]
 pub enum Lead {
-    /// Told from outside; its place until it is told another.
+    /// Told from outside; its place until it is moved another.
     External([f64; 2]),
     /// From the time `since` on \[s\].
     Motion {
@@ -75,7 +75,7 @@ pub enum Lead {
 #[derive(Clone, Copy, Debug)]
 pub struct Seen<'a> {
     /// Where each was last seen \[m\], shape \[members\]; of those never seen it is not looked at.
-    pub present: &'a Points,
+    pub present: &'a Vectors,
     /// Whom the others may look at, shape \[members\].
     pub usable: &'a [bool],
     /// Who has been seen at all, shape \[members\].
@@ -103,8 +103,8 @@ impl Formation {
 
     pub fn leads(&self, member: usize) -> bool {
         match &self.course {
-            Course::Rule { engine, particles } => engine.roles()[particles[member]] != Role::Follower,
-            Course::Inside { .. } | Course::Recorded { .. } => false,
+            TargetSource::Rule { engine, particles } => engine.roles()[particles[member]] != Role::Follower,
+            TargetSource::Inside { .. } | TargetSource::Recorded { .. } => false,
         }
     }
 
@@ -115,15 +115,15 @@ impl Formation {
 
     /// Whether a member's target follows from where its neighbours were seen, whoever else has moved.
     pub fn can_be_followed_alone(&self) -> bool {
-        matches!(&self.course, Course::Rule { engine, .. } if engine.update().order == Order::Synchronous)
+        matches!(&self.course, TargetSource::Rule { engine, .. } if engine.update().order == Order::Synchronous)
     }
 
     /// Members whose positions the member's target depends on.
     pub fn depends_on(&self, member: usize) -> Vec<usize> {
-        let Course::Rule { engine, particles } = &self.course else { return Vec::new() };
+        let TargetSource::Rule { engine, particles } = &self.course else { return Vec::new() };
         let frame = engine.body().frame.as_ref();
         let mut seen = Vec::new();
-        for &k in engine.interaction().neighbours.of(particles[member]) {
+        for &k in engine.flock().neighbours.of(particles[member]) {
             let point = frame.and_then(|frame| Some((frame, frame.points.binary_search(&k).ok()?)));
             match point {
                 Some((frame, number)) => seen.extend(frame.served_by(number)),
@@ -139,7 +139,7 @@ impl Formation {
     /// Number of steps after which a scene's or a recording's program is over.
     pub fn steps(&self) -> Option<usize> {
         match &self.course {
-            Course::Recorded { steps, .. } => Some(steps.len().saturating_sub(1)),
+            TargetSource::Recorded { steps, .. } => Some(steps.len().saturating_sub(1)),
             _ => None,
         }
     }
@@ -147,21 +147,21 @@ impl Formation {
     /// The engine that moves the body, where there is one.
     pub fn engine(&self) -> Option<&Engine> {
         match &self.course {
-            Course::Rule { engine, .. } | Course::Inside { engine, .. } => Some(engine),
-            Course::Recorded { .. } => None,
+            TargetSource::Rule { engine, .. } | TargetSource::Inside { engine, .. } => Some(engine),
+            TargetSource::Recorded { .. } => None,
         }
     }
 
-    /// Leaders that are told from outside where to go.
-    pub fn told(&self) -> impl Iterator<Item = usize> + '_ {
+    /// Leaders that are moved from outside where to go.
+    pub fn moved(&self) -> impl Iterator<Item = usize> + '_ {
         (0..self.count()).filter(|&m| matches!(self.leads[m], Some(Lead::External(_))))
     }
 
-    /// Gives leaders that are told from outside a new place \[m\]; false for everybody else.
+    /// Gives leaders that are moved from outside a new place \[m\]; false for everybody else.
     pub fn tell(&mut self, member: usize, place: [f64; 2]) -> bool {
         match &mut self.leads[member] {
-            Some(Lead::External(told)) => {
-                *told = place;
+            Some(Lead::External(moved)) => {
+                *moved = place;
                 true
             }
             _ => false,
@@ -221,7 +221,7 @@ impl Formation {
     fn led_to(&self, member: usize, time: f64) -> Option<[f64; 2]> {
         let place = self.places.get(member);
         Some(match self.leads[member].as_ref()? {
-            Lead::External(told) => *told,
+            Lead::External(moved) => *moved,
             Lead::Motion { motion, since } => {
                 let [dx, dy] = motion.displacement(time - since, 0, place);
                 [place[0] + dx, place[1] + dy]
@@ -233,21 +233,21 @@ impl Formation {
     /// Moves the formation on by a period that ends at `time` \[s\]: `targets` become where the leaders' programs and
     /// the rule send the members that were seen. With more than one sweep the followers come nearer to
     /// where they would rest behind the leaders.
-    pub fn advance(&mut self, seen: &Seen<'_>, time: f64, sweeps: usize, targets: &mut Points) {
+    pub fn advance(&mut self, seen: &Seen<'_>, time: f64, sweeps: usize, targets: &mut Vectors) {
         let leads: Vec<(usize, [f64; 2])> =
             (0..self.count()).filter_map(|m| Some((m, self.led_to(m, time)?))).collect();
         match &mut self.course {
-            Course::Recorded { steps, step } => {
+            TargetSource::Recorded { steps, step } => {
                 *step = (*step + 1).min(steps.len() - 1);
                 steps[*step].iter().enumerate().for_each(|(m, &place)| targets.set(m, place));
             }
-            Course::Inside { engine, shares } => {
+            TargetSource::Inside { engine, shares } => {
                 engine.advance();
                 for (m, shares) in shares.iter().enumerate() {
                     targets.set(m, inside::place(shares, engine.present()));
                 }
             }
-            Course::Rule { engine, particles } => {
+            TargetSource::Rule { engine, particles } => {
                 let members = 0..particles.len();
                 engine
                     .observe(members.filter(|&m| seen.known[m]).map(|m| (particles[m], seen.present.get(m))));
@@ -273,12 +273,12 @@ impl Formation {
         seen: &Seen<'_>,
         keeps: impl Fn(usize) -> bool + Clone,
     ) -> Option<[f64; 2]> {
-        let Course::Rule { engine, particles } = &self.course else { return None };
+        let TargetSource::Rule { engine, particles } = &self.course else { return None };
         // The engine's state before the step, which the members' sightings were put into.
         let before = engine.previous();
         let of_particle = |i: usize| particles.binary_search(&i).ok();
-        let interaction = engine.interaction();
-        let target = interaction.target_among(particles[member], before, |i| {
+        let flock = engine.flock();
+        let target = flock.target_among(particles[member], before, |i| {
             of_particle(i).is_none_or(|m| seen.usable[m] && keeps(m))
         })?;
         let damping = engine.update().damping;
@@ -288,7 +288,7 @@ impl Formation {
 
     /// What is left out together where neighbours lie: matrices mix the axes.
     pub fn trim(&self) -> Trim {
-        match self.engine().map(|engine| engine.interaction().rule.mean) {
+        match self.engine().map(|engine| engine.flock().rule.mean) {
             Some(Mean::Material { .. }) => Trim::Whole,
             _ => Trim::PerAxis,
         }
@@ -308,17 +308,17 @@ impl Formation {
     /// The neighbours of a member among the members.
     pub fn neighbours(&self, member: usize) -> impl Iterator<Item = usize> + '_ {
         let (engine, particles) = match &self.course {
-            Course::Rule { engine, particles } => (Some(engine), &particles[..]),
+            TargetSource::Rule { engine, particles } => (Some(engine), &particles[..]),
             _ => (None, &[][..]),
         };
-        let of = engine.map_or(&[][..], |engine| engine.interaction().neighbours.of(particles[member]));
+        let of = engine.map_or(&[][..], |engine| engine.flock().neighbours.of(particles[member]));
         of.iter().filter_map(|&i| particles.binary_search(&(i as usize)).ok())
     }
 
     /// Where each member comes to rest with the leaders at `leaders` (those of `present` that lead) \[m\]; `None`
     /// where the rule is not linear.
-    pub fn settled(&self, present: &Points) -> Option<Points> {
-        let Course::Rule { particles, .. } = &self.course else { return None };
+    pub fn settled(&self, present: &Vectors) -> Option<Vectors> {
+        let TargetSource::Rule { particles, .. } = &self.course else { return None };
         let settling = self.settling.as_ref()?;
         let of_particle = |i: usize| {
             let m = particles.binary_search(&i).ok()?;
@@ -326,7 +326,7 @@ impl Formation {
             Some([now[0] - then[0], now[1] - then[1]])
         };
         let displaced = settling.displacements(of_particle);
-        let mut rest: Points = self.places.clone();
+        let mut rest: Vectors = self.places.clone();
         for (m, &i) in particles.iter().enumerate() {
             match displaced[i] {
                 Some(u) => rest.set(m, [self.places.x[m] + u[0], self.places.y[m] + u[1]]),
@@ -342,14 +342,14 @@ impl Formation {
 
     /// Goes this much of the way to each target from the next period on \[1\].
     pub fn set_damping(&mut self, damping: f64) {
-        if let Course::Rule { engine, .. } = &mut self.course {
-            engine.set_rule(engine.interaction().rule, damping);
+        if let TargetSource::Rule { engine, .. } = &mut self.course {
+            engine.set_rule(engine.flock().rule, damping);
         }
     }
 
     /// What the members suffer with all of them where `present` has them.
-    pub fn measures(&self, present: &Points) -> Measures {
-        let Course::Rule { engine, particles } = &self.course else {
+    pub fn measures(&self, present: &Vectors) -> Measures {
+        let TargetSource::Rule { engine, particles } = &self.course else {
             return Measures { pe1: vec![0.0; self.count()], strain: vec![None; self.count()] };
         };
         let mut body = engine.present().clone();
@@ -358,15 +358,15 @@ impl Formation {
             let seen = body.clone();
             frame.follow(&engine.body().reference, &seen, &mut body);
         }
-        let interaction = engine.interaction();
+        let flock = engine.flock();
         Measures {
-            pe1: particles.iter().map(|&i| pe1(interaction, i, &body)).collect(),
-            strain: particles.iter().map(|&i| strain(interaction, i, &body)).collect(),
+            pe1: particles.iter().map(|&i| pe1(flock, i, &body)).collect(),
+            strain: particles.iter().map(|&i| strain(flock, i, &body)).collect(),
         }
     }
 
     fn look_at_roles(&mut self) {
-        let Course::Rule { engine, .. } = &self.course else { return };
+        let TargetSource::Rule { engine, .. } = &self.course else { return };
         if self.settled_roles != engine.roles() {
             self.settled_roles = engine.roles().to_vec();
             self.settling = Settling::of(engine);
@@ -386,7 +386,7 @@ pub struct Measures {
 /// Largest move over the spacing at which a formation that is swept to rest is at rest.
 const SETTLED: f64 = 1e-14;
 
-fn spacing_of(places: &Points) -> f64 {
+fn spacing_of(places: &Vectors) -> f64 {
     let pairs = (0..places.len()).flat_map(|i| (0..i).map(move |j| (i, j)));
     let nearest = pairs.map(|(i, j)| distance(places.get(i), places.get(j))).fold(f64::INFINITY, f64::min);
     if nearest.is_finite() { nearest } else { 1.0 }

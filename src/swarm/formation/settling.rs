@@ -6,8 +6,8 @@
 use nalgebra::DMatrix;
 
 use crate::continuum::engine::Engine;
-use crate::flock::points::Points;
 use crate::flock::role::Role;
+use crate::flock::vectors::Vectors;
 use crate::solve::equilibrium::System;
 use crate::solve::linear::system;
 
@@ -38,8 +38,8 @@ impl Settling {
         if followers.is_empty() || followers.len() > MOST_FOLLOWERS {
             return None;
         }
-        let held = Points::zeros(roles.len());
-        let system = system(engine.interaction(), engine.body(), follows.clone(), held, &[]).ok()?;
+        let held = Vectors::zeros(roles.len());
+        let system = system(engine.flock(), engine.body(), follows.clone(), held, &[]).ok()?;
         let mut number = vec![None; roles.len()];
         followers.iter().enumerate().for_each(|(n, &i)| number[i] = Some(n));
         leaders.iter().enumerate().for_each(|(n, &i)| number[i] = Some(n));

@@ -95,7 +95,7 @@ mod tests {
 
     #[test]
     fn nothing_is_left_out_on_a_side_where_nobody_is() {
-        // Own value at the lower end: only the highest goes, and equal values are no extremes.
+        // ParticleState value at the lower end: only the highest goes, and equal values are no extremes.
         let row = [[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [0.0, 0.0]];
         assert_eq!(kept(Trim::PerAxis, [0.0; 2], &row, 1), [vec![0, 1, 3], vec![0, 1, 2, 3]]);
         assert_eq!(kept(Trim::PerAxis, [0.0; 2], &row, 9), [vec![0, 3], vec![0, 1, 2, 3]]);

@@ -126,8 +126,8 @@ mod tests {
     fn lattices_tolerate_what_they_are_known_to() {
         let (four, eight, twenty_four) = (
             square(Neighbourhood::First { keep: None }),
-            square(Neighbourhood::Ring { radius: 1 }),
-            square(Neighbourhood::Ring { radius: 2 }),
+            square(Neighbourhood::Chebyshev { radius: 1 }),
+            square(Neighbourhood::Chebyshev { radius: 2 }),
         );
         assert_eq!(most_supported(&four, &ring(), Trim::PerAxis), Some(0));
         assert_eq!(most_supported(&eight, &ring(), Trim::PerAxis), Some(1));

@@ -61,7 +61,7 @@ impl DoubleIntegrator {
 mod tests {
     use super::super::tests::DT;
     use super::*;
-    use crate::flock::points::distance;
+    use crate::flock::vectors::distance;
 
     #[test]
     fn it_keeps_its_limits_whatever_its_target_does() {

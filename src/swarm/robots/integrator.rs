@@ -31,7 +31,7 @@ impl Integrator {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::flock::points::distance;
+    use crate::flock::vectors::distance;
 
     #[test]
     fn it_keeps_its_speed_limit_and_lands_on_the_target() {

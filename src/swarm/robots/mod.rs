@@ -93,7 +93,7 @@ impl Robot {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::flock::points::distance;
+    use crate::flock::vectors::distance;
 
     pub(super) const DT: f64 = 0.05;
 

@@ -62,7 +62,7 @@ fn wrapped(angle: f64) -> f64 {
 mod tests {
     use super::super::tests::DT;
     use super::*;
-    use crate::flock::points::distance;
+    use crate::flock::vectors::distance;
 
     #[test]
     fn it_keeps_its_limits_and_to_the_straight_line() {

@@ -1,7 +1,7 @@
 //! How close robots came between two ticks, to each other and to what is solid.
 
 use super::Filter;
-use crate::flock::points::Points;
+use crate::flock::vectors::Vectors;
 
 /// Places on a robot's way at which its distance from obstacles is taken.
 const PLACES_ON_THE_WAY: u32 = 4;
@@ -9,14 +9,14 @@ const PLACES_ON_THE_WAY: u32 = 4;
 impl Filter {
     /// Least free space around each member while all went straight and evenly from `before` to `after` \[m\]:
     /// between members the least ever, to obstacles at several places on the way. Shapes \[count\].
-    pub fn clearance_on_the_way(&self, before: &Points, after: &Points, nearest: &mut Vec<f64>) {
+    pub fn clearance_on_the_way(&self, before: &Vectors, after: &Vectors, nearest: &mut Vec<f64>) {
         nearest.clear();
         nearest.extend(
             (0..after.len()).map(|m| self.obstacle_distance(before.get(m), after.get(m)) - self.radii[m]),
         );
         for a in 0..after.len() {
             for b in 0..a {
-                let apart = |points: &Points| {
+                let apart = |points: &Vectors| {
                     let (a, b) = (points.get(a), points.get(b));
                     [a[0] - b[0], a[1] - b[1]]
                 };
@@ -58,15 +58,15 @@ mod tests {
         let wall = Obstacle::Disc { centre: [2.0, 5.0], radius: 1.0 };
         let filter = Filter::new(Limits::default(), vec![0.25; 2], Obstacles::new(&[wall]).expect("solid"))
             .expect("filter");
-        let before: Points = [[0.0, 0.0], [4.0, 1.0]].into_iter().collect();
-        let after: Points = [[4.0, 0.0], [0.0, 1.0]].into_iter().collect();
+        let before: Vectors = [[0.0, 0.0], [4.0, 1.0]].into_iter().collect();
+        let after: Vectors = [[4.0, 0.0], [0.0, 1.0]].into_iter().collect();
         let mut nearest = Vec::new();
         filter.clearance_on_the_way(&before, &after, &mut nearest);
         assert_eq!(nearest, [0.5, 0.5]);
         // Alone, the disc is nearest half way.
-        let far: Points = [[4.0, 0.0], [0.0, -99.0]].into_iter().collect();
-        let gone: Points = [[0.0, -99.0]; 2].into_iter().collect();
-        let from: Points = [[0.0, 0.0], gone.get(1)].into_iter().collect();
+        let far: Vectors = [[4.0, 0.0], [0.0, -99.0]].into_iter().collect();
+        let gone: Vectors = [[0.0, -99.0]; 2].into_iter().collect();
+        let from: Vectors = [[0.0, 0.0], gone.get(1)].into_iter().collect();
         filter.clearance_on_the_way(&from, &far, &mut nearest);
         assert!((nearest[0] - 3.75).abs() < 1e-12, "{nearest:?}");
     }

@@ -7,7 +7,7 @@ use super::obstacles::Obstacles;
 use super::step::TOUCHING;
 use crate::flock::grid::CellGrid;
 use crate::flock::neighbourhood::Neighbours;
-use crate::flock::points::{Points, distance};
+use crate::flock::vectors::{Vectors, distance};
 
 /// What changed a target: bits that may stand together.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -38,13 +38,13 @@ impl Flags {
 #[derive(Clone, Copy, Debug)]
 pub struct Seen<'a> {
     /// Last known places \[m, world frame\]; not finite for a member that was never seen.
-    pub present: &'a Points,
+    pub present: &'a Vectors,
     /// Whether a member gets a target. The others are avoided where they were last seen.
     pub known: &'a [bool],
     /// Ages of the poses \[s\].
     pub ages: &'a [f64],
     /// Present velocities \[m/s\]; without them no acceleration is limited.
-    pub velocity: Option<&'a Points>,
+    pub velocity: Option<&'a Vectors>,
 }
 
 /// The safety filter of a swarm. Nothing is allocated per tick once its buffers have grown.
@@ -126,9 +126,9 @@ impl Filter {
     pub fn apply(
         &mut self,
         seen: &Seen,
-        wanted: &Points,
+        wanted: &Vectors,
         period: f64,
-        safe: &mut Points,
+        safe: &mut Vectors,
         flags: &mut [Flags],
     ) {
         let count = self.radii.len();
@@ -144,7 +144,7 @@ impl Filter {
     }
 
     /// Sorts the members for the queries to come.
-    fn meet(&mut self, seen: &Seen, wanted: &Points, period: f64) {
+    fn meet(&mut self, seen: &Seen, wanted: &Vectors, period: f64) {
         let count = self.radii.len();
         let drift = (0..count).map(|member| self.drift(seen, member)).fold(0.0, f64::max);
         let crowd = &mut self.crowd;
@@ -207,7 +207,7 @@ impl Filter {
     /// Free space between each member's rim and the nearest rim of another member or border of an
     /// obstacle \[m\], negative where they overlap; infinite for a member without a pose and for one
     /// that has nothing around it. For reports: it takes the square of the number of members.
-    pub fn clearance(&self, present: &Points, nearest: &mut Vec<f64>) {
+    pub fn clearance(&self, present: &Vectors, nearest: &mut Vec<f64>) {
         nearest.clear();
         nearest.extend(present.iter().zip(&self.radii).map(|(place, radius)| {
             let finite = place.iter().all(|value| value.is_finite());

@@ -6,7 +6,7 @@ use super::filter::{Filter, Flags, Seen};
 
 /// What a member wants at this tick and how far it can get.
 #[derive(Clone, Copy)]
-struct Errand {
+struct MotionRequest {
     /// To the wanted place \[m\], relative to the member.
     way: [f64; 2],
     /// Its length \[m\].
@@ -45,29 +45,30 @@ impl Filter {
             self.detours[member].reset();
             return (here, Flags(Flags::HELD));
         }
-        let mut errand = self.errand(seen, way, period, member);
-        let origins = self.enclose(seen, &mut errand, member);
-        let open = errand.open(errand.reach);
+        let mut request = self.request(seen, way, period, member);
+        let origins = self.enclose(seen, &mut request, member);
+        let open = request.open(request.reach);
         let mut flags = self.why(open, origins);
         let velocity = self.velocity(seen, member);
         if velocity.is_some() {
-            self.leave_room_to_brake(&mut errand, period, &mut flags);
+            self.leave_room_to_brake(&mut request, period, &mut flags);
         }
         let hindered = flags != Flags::default() || velocity.is_some();
         let goal = if !hindered && self.detours[member].is_fresh() {
             open
         } else {
-            self.around(&errand, member, &mut flags)
+            self.around(&request, member, &mut flags)
         };
         let step = match velocity {
             Some(velocity) => {
-                let step = shortened(self.steered(velocity, goal, period, &errand, &mut flags), errand.step);
-                if self.limits.brakes { self.to_rest(step, period, &errand) } else { step }
+                let step =
+                    shortened(self.steered(velocity, goal, period, &request, &mut flags), request.step);
+                if self.limits.brakes { self.to_rest(step, period, &request) } else { step }
             }
-            None => shortened(goal, errand.step),
+            None => shortened(goal, request.step),
         };
         let step = self.cast(here, step, origins, member);
-        if errand.distance > errand.step {
+        if request.distance > request.step {
             flags.0 |= Flags::SPEED_LIMITED;
         }
         // To the last bit what was wanted, where nothing speaks against it.
@@ -75,15 +76,15 @@ impl Filter {
         (target, flags)
     }
 
-    fn errand(&self, seen: &Seen, way: [f64; 2], period: f64, member: usize) -> Errand {
+    fn request(&self, seen: &Seen, way: [f64; 2], period: f64, member: usize) -> MotionRequest {
         let (step, distance) = (self.limits.speed * period, length(way));
         match self.velocity(seen, member) {
-            None => Errand { way, distance, step, reach: distance.min(step) },
+            None => MotionRequest { way, distance, step, reach: distance.min(step) },
             Some(velocity) => {
                 let most = self.limits.acceleration;
                 let top = (length(velocity) + most * period).min(self.limits.speed);
                 let reach = top * period + top * top / (2.0 * most);
-                Errand { way, distance, step: step.min(top * period), reach }
+                MotionRequest { way, distance, step: step.min(top * period), reach }
             }
         }
     }
@@ -95,14 +96,14 @@ impl Filter {
     }
 
     /// Builds the member's cell; wider where it stands in somebody's space, for it then moves away.
-    fn enclose(&mut self, seen: &Seen, errand: &mut Errand, member: usize) -> Origins {
-        let origins = self.build_cell(seen, errand.reach, member);
+    fn enclose(&mut self, seen: &Seen, request: &mut MotionRequest, member: usize) -> Origins {
+        let origins = self.build_cell(seen, request.reach, member);
         let away = self.radii[member] + self.largest_radius + self.limits.clearance;
-        if errand.reach >= away || !self.cell.planes.iter().any(|plane| plane.offset < -TOUCHING * away) {
+        if request.reach >= away || !self.cell.planes.iter().any(|plane| plane.offset < -TOUCHING * away) {
             return origins;
         }
-        errand.reach = away.min(errand.step);
-        self.build_cell(seen, errand.reach, member)
+        request.reach = away.min(request.step);
+        self.build_cell(seen, request.reach, member)
     }
 
     fn build_cell(&mut self, seen: &Seen, reach: f64, member: usize) -> Origins {
@@ -147,8 +148,8 @@ impl Filter {
     }
 
     /// The point of the cell to go to: the nearest to the wanted one or, of a detour, to its aim.
-    fn around(&mut self, errand: &Errand, member: usize, flags: &mut Flags) -> [f64; 2] {
-        let Errand { way, distance, step, reach } = *errand;
+    fn around(&mut self, request: &MotionRequest, member: usize, flags: &mut Flags) -> [f64; 2] {
+        let MotionRequest { way, distance, step, reach } = *request;
         let direct = self.cell.nearest(way, reach);
         let size = self.radii[member] + self.limits.clearance;
         // Nearer to its goal than its own size, a member waits for whoever stands there.
@@ -164,7 +165,7 @@ impl Filter {
         } else {
             direct
         };
-        let straight = self.cell.share(errand.open(scale));
+        let straight = self.cell.share(request.open(scale));
         let direct = shortened(direct, scale);
         let tick = Tick { scale, wanted: way, distance, straight, direct, moved: goal };
         detour.update(&self.limits.patience, &tick);
@@ -174,17 +175,17 @@ impl Filter {
     /// Brings the cell's borders and the end of the way as near as the member can go in a period and brake
     /// in time after it, `v T + v^2 / (2 a)` being the room: whoever kept to that at the last tick can do
     /// so at this one, as long as the borders stay.
-    fn leave_room_to_brake(&mut self, errand: &mut Errand, period: f64, flags: &mut Flags) {
+    fn leave_room_to_brake(&mut self, request: &mut MotionRequest, period: f64, flags: &mut Flags) {
         let most = self.limits.acceleration;
         let step = |room: f64| period * most * ((period * period + 2.0 * room / most).sqrt() - period);
-        let brakable = step(length(self.cell.nearest(errand.way, errand.reach)));
+        let brakable = step(length(self.cell.nearest(request.way, request.reach)));
         for plane in self.cell.planes.iter_mut().filter(|plane| plane.offset > 0.0) {
             plane.offset = step(plane.offset);
         }
-        if brakable < errand.step.min(errand.distance) {
+        if brakable < request.step.min(request.distance) {
             flags.0 |= Flags::ACCELERATION_LIMITED;
         }
-        errand.reach = errand.step.min(brakable);
+        request.reach = request.step.min(brakable);
     }
 
     /// The step nearest to a goal in the cell that changes the velocity no faster than allowed; the cell
@@ -194,7 +195,7 @@ impl Filter {
         velocity: [f64; 2],
         goal: [f64; 2],
         period: f64,
-        errand: &Errand,
+        request: &MotionRequest,
         flags: &mut Flags,
     ) -> [f64; 2] {
         let change = [goal[0] / period - velocity[0], goal[1] / period - velocity[1]];
@@ -204,16 +205,16 @@ impl Filter {
         }
         flags.0 |= Flags::ACCELERATION_LIMITED;
         let next = [(velocity[0] + held[0]) * period, (velocity[1] + held[1]) * period];
-        self.cell.nearest(next, errand.step)
+        self.cell.nearest(next, request.step)
     }
 
     /// Where a member that takes this step would come to rest after it; inside the borders as they were before
     /// room was left.
-    fn to_rest(&self, step: [f64; 2], period: f64, errand: &Errand) -> [f64; 2] {
+    fn to_rest(&self, step: [f64; 2], period: f64, request: &MotionRequest) -> [f64; 2] {
         let per_length = 1.0 / (2.0 * self.limits.acceleration * period * period);
         let mut stretch = 1.0 + length(step) * per_length;
         if length(step) > 0.0 {
-            stretch = stretch.min((errand.distance / length(step)).max(1.0));
+            stretch = stretch.min((request.distance / length(step)).max(1.0));
         }
         for plane in &self.cell.planes {
             let towards = dot(plane.normal, step);
@@ -238,7 +239,7 @@ impl Filter {
     }
 }
 
-impl Errand {
+impl MotionRequest {
     /// The straight way, or as much of it as is `most` \[m\] long.
     fn open(&self, most: f64) -> [f64; 2] {
         if self.distance <= most {

@@ -12,7 +12,7 @@
 pub mod in_process;
 
 use super::control::Control;
-use super::control::part::Part;
+use super::control::scope::NodeScope;
 use super::flight::Fleet;
 use super::watch::Pose;
 
@@ -86,7 +86,7 @@ pub fn listen<E: ControllerEnd>(control: &mut Control, end: &mut E, now: f64) {
 /// The first target that was not sent; the tick is done all the same.
 pub fn serve<E: ControllerEnd>(
     control: &mut Control,
-    part: &Part,
+    part: &NodeScope,
     end: &mut E,
     now: f64,
 ) -> Result<(), E::Error> {
@@ -96,7 +96,7 @@ pub fn serve<E: ControllerEnd>(
 }
 
 /// The targets of the last tick.
-pub fn targets(control: &Control, part: &Part) -> Vec<Target> {
+pub fn targets(control: &Control, part: &NodeScope) -> Vec<Target> {
     part.mine.iter().filter_map(|&member| target_of(control, member)).collect()
 }
 

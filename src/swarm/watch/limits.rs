@@ -1,7 +1,7 @@
 //! What is asked of a pose, and what its age means.
 
 use super::{Health, Pose, Rejection};
-use crate::flock::points::distance;
+use crate::flock::vectors::distance;
 
 /// What is asked of poses. Needs `0 < fresh <= age_limit <= stop_after`.
 #[derive(Clone, Copy, Debug, PartialEq)]

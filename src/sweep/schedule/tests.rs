@@ -1,15 +1,15 @@
 use super::super::{Sweep, Update};
 use super::*;
 use crate::flock::body::{Body, Cut};
-use crate::flock::interaction::{Interaction, Weights};
 use crate::flock::lattice::{Lattice, LatticeKind};
+use crate::flock::law::{Flock, Weights};
 use crate::flock::neighbourhood::{Neighbourhood, Neighbours};
-use crate::flock::points::Points;
 use crate::flock::role::Role;
 use crate::flock::rules::Rule;
+use crate::flock::vectors::Vectors;
 
 struct Case {
-    interaction: Interaction,
+    flock: Flock,
     roles: Vec<Role>,
     led: Vec<usize>,
 }
@@ -27,59 +27,58 @@ impl Case {
         let led: Vec<usize> = (reference.len() - held..reference.len()).step_by(2).collect();
         led.iter().for_each(|&i| roles[i] = Role::Leader);
         let (rule, weights) = (Rule::BARYCENTRE, Weights::Equal);
-        let mut interaction =
-            Interaction { rule, reference, neighbours, weights, forces: None, rest: None, bonds: None };
-        interaction.keep_rest();
-        Self { interaction, roles, led }
+        let mut flock = Flock { rule, reference, neighbours, weights, forces: None, rest: None, bonds: None };
+        flock.keep_rest();
+        Self { flock, roles, led }
     }
 
     /// The same with each list in another order, so that no run is made.
     fn jumbled(mut self) -> Self {
-        let lists = (0..self.interaction.reference.len()).map(|j| {
-            let mut list = self.interaction.neighbours.of(j).to_vec();
+        let lists = (0..self.flock.reference.len()).map(|j| {
+            let mut list = self.flock.neighbours.of(j).to_vec();
             let turn = j % list.len();
             list.rotate_left(turn);
             list
         });
-        self.interaction.neighbours = Neighbours::from_lists(lists);
-        self.interaction.rest = None;
-        self.interaction.keep_rest();
+        self.flock.neighbours = Neighbours::from_lists(lists);
+        self.flock.rest = None;
+        self.flock.keep_rest();
         self
     }
 
     fn place(&self, which: usize, step: usize) -> [f64; 2] {
-        let [x, y] = self.interaction.reference.get(self.led[which]);
+        let [x, y] = self.flock.reference.get(self.led[which]);
         [x + 0.1 * step.min(9) as f64, y + 0.003 * (which * step.min(20)) as f64]
     }
 
     /// Where everybody is, and was before the last step, after single steps of everybody.
-    fn singly(&self, steps: usize) -> [Points; 2] {
-        let sweep = Sweep::compile(Update::default(), &self.interaction, &self.roles);
-        let mut present = Points::clone(&self.interaction.reference);
+    fn one_by_one(&self, steps: usize) -> [Vectors; 2] {
+        let sweep = Sweep::compile(Update::default(), &self.flock, &self.roles);
+        let mut present = Vectors::clone(&self.flock.reference);
         let mut next = present.clone();
         for step in 1..=steps {
             for which in 0..self.led.len() {
                 next.set(self.led[which], self.place(which, step));
             }
-            sweep.step(&self.interaction, None, &present, &mut next);
+            sweep.step(&self.flock, None, &present, &mut next);
             std::mem::swap(&mut present, &mut next);
         }
         [present, next]
     }
 
     /// The same by so many steps at once.
-    fn together(&self, counts: &[usize], threads: usize) -> ([Points; 2], Activity) {
-        let sweep = Sweep::compile(Update::default(), &self.interaction, &self.roles);
-        let mut present = Points::clone(&self.interaction.reference);
+    fn together(&self, counts: &[usize], threads: usize) -> ([Vectors; 2], Activity) {
+        let sweep = Sweep::compile(Update::default(), &self.flock, &self.roles);
+        let mut present = Vectors::clone(&self.flock.reference);
         let mut next = present.clone();
         let (mut activity, mut done) = (Activity::default(), 0);
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
         for &count in counts {
             let place = |which: usize, level: usize| self.place(which, done + level);
             let led = Led { particles: &self.led, place: &place };
-            let rest = self.interaction.rest.as_ref().map(|rest| [&rest.x[..], &rest.y[..]]);
-            let (rows, terms) = (sweep.rows.as_ref().expect("affine"), sweep.terms.of(&self.interaction));
-            let force = self.interaction.forces.as_ref().map(|force| [&force.x[..], &force.y[..]]);
+            let rest = self.flock.rest.as_ref().map(|rest| [&rest.x[..], &rest.y[..]]);
+            let (rows, terms) = (sweep.rows.as_ref().expect("affine"), sweep.terms.of(&self.flock));
+            let force = self.flock.forces.as_ref().map(|force| [&force.x[..], &force.y[..]]);
             let frame = None;
             let steps = Steps { rows, terms, rest, force, frame, led, count, farther: None, threads };
             let even = [&mut present.x[..], &mut present.y[..]];
@@ -94,7 +93,7 @@ impl Case {
     }
 }
 
-fn bits(places: &[Points; 2]) -> Vec<u64> {
+fn bits(places: &[Vectors; 2]) -> Vec<u64> {
     places.iter().flat_map(|p| p.x.iter().chain(&p.y)).map(|value| value.to_bits()).collect()
 }
 
@@ -103,7 +102,7 @@ fn steps_taken_together_have_the_bits_of_single_ones_for_any_threads() {
     for kind in LatticeKind::SAMPLES {
         // Long enough to be cut for the threads, and for one and several wedges at the cuts.
         let case = Case::new(kind, 9000, 61);
-        let expected = case.singly(25);
+        let expected = case.one_by_one(25);
         for counts in [&[16usize, 9][..], &[1, 2, 3, 16, 3], &[1; 25]] {
             for threads in [1, 2, 4, 8] {
                 let (places, _) = case.together(counts, threads);
@@ -116,7 +115,7 @@ fn steps_taken_together_have_the_bits_of_single_ones_for_any_threads() {
 #[test]
 fn threads_beyond_one_a_coordinate_cut_the_body_in_segments() {
     let case = Case::new(LatticeKind::Square { spacing: 1.0 }, 9000, 61);
-    let sweep = Sweep::compile(Update::default(), &case.interaction, &case.roles);
+    let sweep = Sweep::compile(Update::default(), &case.flock, &case.roles);
     let rows = sweep.rows.as_ref().expect("affine");
     let segments = |threads| {
         let (led, count, farther) = (Led::NOBODY, 16, None);
@@ -132,7 +131,7 @@ fn only_what_moves_is_swept_and_the_bits_are_the_same() {
     let square = LatticeKind::Square { spacing: 1.0 };
     let case = Case::new(square, 300, 61);
     let (places, activity) = case.together(&[16; 4], 1);
-    assert!(bits(&places) == bits(&case.singly(64)));
+    assert!(bits(&places) == bits(&case.one_by_one(64)));
     // The front is 64 of 300 columns in.
     let share = activity.share_computed();
     assert!(share > 0.05 && share < 0.3, "{share}");
@@ -150,7 +149,7 @@ fn motion_that_comes_from_either_end_is_met_in_time() {
         led.iter().for_each(|&i| case.roles[i] = Role::Leader);
         case.led = led;
         let (places, activity) = case.together(&[16, 16, 16, 9], 1);
-        assert!(bits(&places) == bits(&case.singly(57)));
+        assert!(bits(&places) == bits(&case.one_by_one(57)));
         assert!(activity.share_computed() < 0.5, "{}", activity.share_computed());
     }
 }
@@ -159,15 +158,15 @@ fn motion_that_comes_from_either_end_is_met_in_time() {
 fn a_body_in_which_some_see_far_is_stepped_all_the_same() {
     let mut case = Case::new(LatticeKind::Square { spacing: 1.0 }, 5000, 61);
     // The far end hears of the near one.
-    let last = case.interaction.reference.len() as u32 - 70;
-    let lists: Vec<Vec<u32>> = (0..case.interaction.reference.len())
-        .map(|j| case.interaction.neighbours.of(j).iter().copied().chain((j == 70).then_some(last)).collect())
+    let last = case.flock.reference.len() as u32 - 70;
+    let lists: Vec<Vec<u32>> = (0..case.flock.reference.len())
+        .map(|j| case.flock.neighbours.of(j).iter().copied().chain((j == 70).then_some(last)).collect())
         .collect();
-    case.interaction.neighbours = Neighbours::from_lists(lists);
-    case.interaction.rest = None;
-    case.interaction.keep_rest();
+    case.flock.neighbours = Neighbours::from_lists(lists);
+    case.flock.rest = None;
+    case.flock.keep_rest();
     let (places, activity) = case.together(&[16, 4], 3);
-    assert!(bits(&places) == bits(&case.singly(20)));
+    assert!(bits(&places) == bits(&case.one_by_one(20)));
     assert_eq!(activity.share_computed(), 1.0);
 }
 
@@ -175,11 +174,11 @@ fn a_body_in_which_some_see_far_is_stepped_all_the_same() {
 fn lists_are_swept_together_to_the_bits_of_single_steps_for_any_threads() {
     let case = Case::new(LatticeKind::Hexagonal { spacing: 1.0 }, 9000, 31).jumbled();
     let compiled = |case: &Case| {
-        let sweep = Sweep::compile(Update::default(), &case.interaction, &case.roles);
+        let sweep = Sweep::compile(Update::default(), &case.flock, &case.roles);
         sweep.rows.expect("affine").share_in_runs()
     };
     assert_eq!(compiled(&case), 0.0);
-    let expected = case.singly(25);
+    let expected = case.one_by_one(25);
     for threads in [1, 2, 5] {
         let (places, activity) = case.together(&[16, 9], threads);
         assert!(bits(&places) == bits(&expected), "{threads} threads");
@@ -190,14 +189,13 @@ fn lists_are_swept_together_to_the_bits_of_single_steps_for_any_threads() {
 #[test]
 fn it_is_told_in_which_steps_somebody_moved_farther_than_asked() {
     let case = Case::new(LatticeKind::Square { spacing: 1.0 }, 12, 12);
-    let sweep = Sweep::compile(Update::default(), &case.interaction, &case.roles);
-    let mut present = Points::clone(&case.interaction.reference);
+    let sweep = Sweep::compile(Update::default(), &case.flock, &case.roles);
+    let mut present = Vectors::clone(&case.flock.reference);
     let mut next = present.clone();
     let place = |which: usize, level: usize| case.place(which, if level < 3 { 0 } else { 1 });
     let led = Led { particles: &case.led, place: &place };
     let places = (&mut present, &mut next);
-    let farther =
-        sweep.steps(&case.interaction, None, places, (5, led, Some(0.09)), &mut Activity::default());
+    let farther = sweep.steps(&case.flock, None, places, (5, led, Some(0.09)), &mut Activity::default());
     // The leaders jump by 0.1 in the third; whoever follows moves by less.
     assert_eq!(farther, [false, false, true, false, false]);
 }
@@ -206,14 +204,14 @@ fn it_is_told_in_which_steps_somebody_moved_farther_than_asked() {
 fn it_is_told_of_whoever_moved_far_wherever_that_was() {
     for axis in [0, 1] {
         let case = Case::new(LatticeKind::Square { spacing: 1.0 }, 300, 61);
-        let sweep = Sweep::compile(Update::default(), &case.interaction, &case.roles);
-        let mut present = Points::clone(&case.interaction.reference);
+        let sweep = Sweep::compile(Update::default(), &case.flock, &case.roles);
+        let mut present = Vectors::clone(&case.flock.reference);
         let far = 61 * 5 + 30;
         let [x, y] = present.get(far);
         present.set(far, if axis == 0 { [x + 1.0, y] } else { [x, y + 1.0] });
         let (mut next, places) = (present.clone(), &mut present);
         let farther = sweep.steps(
-            &case.interaction,
+            &case.flock,
             None,
             (places, &mut next),
             (4, Led::NOBODY, Some(0.3)),
@@ -228,23 +226,23 @@ fn lists_where_one_coordinate_alone_moves_are_swept() {
     let case = Case::new(LatticeKind::Square { spacing: 1.0 }, 300, 61);
     let still = Case { led: Vec::new(), ..case.jumbled() };
     for axis in [0, 1] {
-        let sweep = Sweep::compile(Update::default(), &still.interaction, &still.roles);
-        let mut start = Points::clone(&still.interaction.reference);
+        let sweep = Sweep::compile(Update::default(), &still.flock, &still.roles);
+        let mut start = Vectors::clone(&still.flock.reference);
         let displaced = 61 * 150 + 30;
         let [x, y] = start.get(displaced);
         start.set(displaced, if axis == 0 { [x + 1.0, y] } else { [x, y + 1.0] });
-        let (mut singly, mut next) = (start.clone(), start.clone());
+        let (mut one_by_one, mut next) = (start.clone(), start.clone());
         for _ in 0..8 {
-            sweep.step(&still.interaction, None, &singly, &mut next);
-            std::mem::swap(&mut singly, &mut next);
+            sweep.step(&still.flock, None, &one_by_one, &mut next);
+            std::mem::swap(&mut one_by_one, &mut next);
         }
         let (mut together, mut activity) = (start.clone(), Activity::default());
         let mut next = start;
         for count in [1, 3, 4] {
             let places = (&mut together, &mut next);
-            sweep.steps(&still.interaction, None, places, (count, Led::NOBODY, None), &mut activity);
+            sweep.steps(&still.flock, None, places, (count, Led::NOBODY, None), &mut activity);
         }
-        assert_eq!(together, singly, "axis {axis}");
+        assert_eq!(together, one_by_one, "axis {axis}");
         assert!(activity.share_computed() < 0.5);
     }
 }

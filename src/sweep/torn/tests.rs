@@ -2,25 +2,25 @@ use super::super::kernel::Component;
 use super::*;
 use crate::flock::fracture::Ghosts;
 use crate::flock::fracture::tests::{Draws, bodies};
-use crate::flock::interaction::Interaction;
+use crate::flock::law::Flock;
 use crate::geometry::shape::Segment;
 
 /// Sweeps the torn in two pieces and compares every bit with the rule; nobody else is touched. Gives how many are torn.
 fn compare_targets(
-    torn: &Torn,
-    body: &Interaction,
+    torn: &DamagedRows,
+    body: &Flock,
     follows: &[bool],
     draws: &mut Draws,
     what: &str,
 ) -> usize {
     const MARK: f64 = 12345.0;
-    let Interaction { neighbours, reference, .. } = body;
+    let Flock { neighbours, reference, .. } = body;
     let bonds = body.bonds.as_ref().expect("has bonds");
     let count = reference.len();
     let mut present = draws.points(reference, 0.7);
     (0..count).step_by(9).for_each(|j| present.x[j] = -0.0);
     let rests = body.rest.as_ref().map(|rest| [&rest.x[..], &rest.y[..]]);
-    let mut next = Points { x: vec![MARK; count], y: vec![MARK; count] };
+    let mut next = Vectors { x: vec![MARK; count], y: vec![MARK; count] };
     let middle = BANDS / 2 * count / BANDS;
     let (low, high) = (next.x.split_at_mut(middle), next.y.split_at_mut(middle));
     // The second piece sees no more than the second half of the first.
@@ -76,9 +76,10 @@ fn torn_particles_are_swept_to_the_bits_of_the_rule_as_cracks_spread() {
             let what = format!("{what}, {ghosts:?}");
             let count = body.reference.len();
             let follows: Vec<bool> = (0..count).map(|j| j % 43 != 11).collect();
-            body.rest = (ghosts != Ghosts::None).then(|| draws.points(&Points::zeros(count), 0.1));
+            body.rest = (ghosts != Ghosts::None).then(|| draws.points(&Vectors::zeros(count), 0.1));
             let mut bonds = Bonds::new(None, ghosts, &body.neighbours);
-            let mut torn = Torn::new((0..BANDS).map(|band| band * count / BANDS..(band + 1) * count / BANDS));
+            let mut torn =
+                DamagedRows::new((0..BANDS).map(|band| band * count / BANDS..(band + 1) * count / BANDS));
             assert!(torn.is_empty());
             let cuts: [Segment; 3] =
                 [([-3.3, -90.0], [-3.3, 90.0]), ([-90.0, 1.2], [90.0, 1.4]), ([0.0, 0.0], [90.0, 80.0])];

@@ -3,11 +3,11 @@
 import { doubles, integers, Frames } from "./unpack.js";
 
 export class Body {
-  constructor(film, number) {
-    this.film = film;
+  constructor(animation, number) {
+    this.animation = animation;
     this.prefix = `s${number}-`;
-    this.count = film.count;
-    this.frames = new Frames(film, this.prefix);
+    this.count = animation.count;
+    this.frames = new Frames(animation, this.prefix);
     this.dx = new Float64Array(this.count);
     this.dy = new Float64Array(this.count);
     this.fields = new Map();
@@ -26,7 +26,7 @@ export class Body {
     this.roleChanges = await integers(named("role-changes"), 3);
     await this.openBonds(named);
     await this.openCells(named);
-    for (const { key } of this.film.exact) this.exact.set(key, await doubles(named(`exact-${key}`)));
+    for (const { key } of this.animation.exact) this.exact.set(key, await doubles(named(`exact-${key}`)));
   }
 
   // Bonds in the order in which they break, those that never do last: the living ones are the end of the list.
@@ -49,7 +49,7 @@ export class Body {
 
   // Triangles in the order in which they are torn: a cell lasts as long as the bonds between its corners.
   async openCells(named) {
-    const { corners } = this.film;
+    const { corners } = this.animation;
     const index = corners ? await integers(named("cells"), corners) : new Uint32Array(0);
     const count = corners ? index.length / corners : 0;
     const dead = new Map();
@@ -86,15 +86,15 @@ export class Body {
   }
 
   get last() {
-    return this.film.times.length - 1;
+    return this.animation.times.length - 1;
   }
 
   name(particle) {
-    return this.film.names[particle] ?? String(this.ids[particle] ?? particle + 1);
+    return this.animation.names[particle] ?? String(this.ids[particle] ?? particle + 1);
   }
 
   find(name) {
-    const named = this.film.names.indexOf(name);
+    const named = this.animation.names.indexOf(name);
     if (named >= 0) return named;
     const id = Number(name);
     if (this.ids.length) return this.ids.indexOf(id);
@@ -112,7 +112,7 @@ export class Body {
   }
 
   get step() {
-    return this.film.times[this.at];
+    return this.animation.times[this.at];
   }
 
   // How many of a list sorted by step are over by now.
@@ -232,7 +232,7 @@ export class Body {
   }
 
   vonMises(out) {
-    const { stiffness, across, linear } = this.film.stress;
+    const { stiffness, across, linear } = this.animation.stress;
     const stress = (i, xx, yy, shear) => {
       const [p, q, s] = stiffness.map(([a, b, c]) => a * xx + b * yy + c * shear);
       const z = across * (p + q);
@@ -245,21 +245,21 @@ export class Body {
 
   // What is known of one particle at this frame, as [{key, label, unit, value}]; at the last frame to the last bit.
   numbers(particle) {
-    const { film } = this;
+    const { animation } = this;
     const list = [];
     const put = (key, label, unit, value) => list.push({ key, label, unit, value });
     const known = (key) => (this.at === this.last ? this.exact.get(key)?.[particle] : undefined);
     const [x, y] = [known("x") ?? this.X[particle] + this.dx[particle], known("y") ?? this.Y[particle] + this.dy[particle]];
-    put("x", "x", film.unit, x);
-    put("y", "y", film.unit, y);
-    put("ux", "x displacement", film.unit, known("ux") ?? x - this.X[particle]);
-    put("uy", "y displacement", film.unit, known("uy") ?? y - this.Y[particle]);
-    for (const { key, label, unit } of film.quantities) {
+    put("x", "x", animation.unit, x);
+    put("y", "y", animation.unit, y);
+    put("ux", "x displacement", animation.unit, known("ux") ?? x - this.X[particle]);
+    put("uy", "y displacement", animation.unit, known("uy") ?? y - this.Y[particle]);
+    for (const { key, label, unit } of animation.quantities) {
       put(key, label, unit, known(key) ?? this.field(key)[particle]);
     }
     const told = new Set(list.map((one) => one.key));
     if (this.at === this.last) {
-      for (const { key, label, unit } of film.exact) if (!told.has(key)) put(key, label, unit, known(key));
+      for (const { key, label, unit } of animation.exact) if (!told.has(key)) put(key, label, unit, known(key));
     }
     return list;
   }

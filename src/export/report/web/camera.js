@@ -38,8 +38,8 @@ export function move(dx, dy) {
 
 // Times what displacements are drawn, so that small ones are seen and, where their size is arbitrary, large ones fit.
 export function wantedFactor() {
-  const { film } = bodies[0];
-  if (film.radii.length) return 1;
+  const { animation } = bodies[0];
+  if (animation.radii.length) return 1;
   let largest = 0;
   const [low, high] = [[Infinity, Infinity], [-Infinity, -Infinity]];
   for (const body of bodies) {
@@ -55,7 +55,7 @@ export function wantedFactor() {
     }
   }
   const part = largest / Math.max(high[0] - low[0], high[1] - low[1]);
-  if (!(part > 0) || (part >= 0.02 && (part <= 0.6 || !film.linear))) return 1;
+  if (!(part > 0) || (part >= 0.02 && (part <= 0.6 || !animation.linear))) return 1;
   const wanted = (part < 0.02 ? 0.08 : 0.3) / part;
   const decade = 10 ** Math.floor(Math.log10(wanted));
   return Number(([5, 2].map((m) => m * decade).find((f) => f <= wanted) ?? decade).toPrecision(1));
@@ -64,7 +64,7 @@ export function wantedFactor() {
 // Whether a body would be a thin upright line on a wide screen.
 export function isTall() {
   const { low, high } = shown.views[0].bounds([0], 1, false);
-  return bodies[0].film.radii.length === 0 && high[1] - low[1] > 2.2 * (high[0] - low[0]);
+  return bodies[0].animation.radii.length === 0 && high[1] - low[1] > 2.2 * (high[0] - low[0]);
 }
 
 export function turn(turned) {

@@ -1,4 +1,4 @@
-// Charts as SVG: lines and points over two axes, with the film's clock as a line to drag.
+// Charts as SVG: lines and points over two axes, with the animation's clock as a line to drag.
 
 import { logTicks, ticks, words } from "./colour.js";
 
@@ -19,7 +19,7 @@ function inkOf(colour) {
 }
 
 export class Chart {
-  // `tip` shows a text at a point of the page, or hides; `seek` takes the film to a value of its clock.
+  // `tip` shows a text at a point of the page, or hides; `seek` takes the animation to a value of its clock.
   constructor(plot, parent, { tip, seek }) {
     Object.assign(this, { plot, tip, seek });
     this.hidden = new Set();

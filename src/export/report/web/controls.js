@@ -149,32 +149,32 @@ export function savePicture() {
 // Until somebody chooses layers, a field fills the body and roles are dots: each as it is read best.
 export function layersFor(quantity) {
   if (state.hasChosenLayers) return;
-  const { film, bonds, triangles } = bodies[0];
-  const filled = triangles.length > 0 && (quantity !== "role" || film.count > MOST_DOTS);
+  const { animation, bonds, triangles } = bodies[0];
+  const filled = triangles.length > 0 && (quantity !== "role" || animation.count > MOST_DOTS);
   state.layers = {
     points: !filled,
-    bonds: bonds.length > 0 && film.count <= MOST_DOTS && !filled,
+    bonds: bonds.length > 0 && animation.count <= MOST_DOTS && !filled,
     surface: filled,
     cracks: true,
-    ways: film.radii.length > 0,
+    ways: animation.radii.length > 0,
   };
   for (const [name, on] of Object.entries(state.layers)) element(`layer-${name}`).checked = on;
 }
 
 export function nameControls() {
-  const { film } = bodies[0];
-  const isSwarm = film.radii.length > 0;
+  const { animation } = bodies[0];
+  const isSwarm = animation.radii.length > 0;
   const has = { bonds: bodies[0].bonds.length > 0, surface: bodies[0].triangles.length > 0 };
   const offer = (name, is) => (element(`layer-${name}`).closest("label").hidden = !is);
   offer("bonds", has.bonds);
   offer("surface", has.surface);
   offer("cracks", bodies[0].breaks[0] < Infinity);
   offer("ways", isSwarm);
-  element("points-name").textContent = `${film.noun}s`;
+  element("points-name").textContent = `${animation.noun}s`;
   element("bonds-name").textContent = isSwarm ? "links" : "bonds";
-  element("find-name").textContent = film.noun[0].toUpperCase() + film.noun.slice(1);
+  element("find-name").textContent = animation.noun[0].toUpperCase() + animation.noun.slice(1);
   element("magnify-label").hidden = isSwarm;
-  element("find-names").replaceChildren(...film.names.map((name) => Object.assign(document.createElement("option"), { value: name })));
+  element("find-names").replaceChildren(...animation.names.map((name) => Object.assign(document.createElement("option"), { value: name })));
 }
 
 export function listenToTheme() {

@@ -1,4 +1,4 @@
-// The numbers of a particle: beside the pointer, or kept below the film.
+// The numbers of a particle: beside the pointer, or kept below the animation.
 
 import { words } from "./colour.js";
 import { draw } from "./page.js";
@@ -18,7 +18,7 @@ export function numbersOf(body, particle) {
     pair.append(Object.assign(document.createElement("dt"), { textContent: label[1] }), dd);
     list.append(pair);
   };
-  const role = body.film.role_names[body.roles()[particle]];
+  const role = body.animation.role_names[body.roles()[particle]];
   row(["role", "role"], role, role);
   for (const { key, label, unit, value } of body.numbers(particle)) {
     row([key, isUnit(unit) ? `${label} [${unit}]` : label], words(value), Number.isFinite(value) ? String(value) : "");
@@ -27,7 +27,7 @@ export function numbersOf(body, particle) {
 }
 
 export function heading(body, particle) {
-  const noun = body.film.names.length ? "" : `${body.film.noun} `;
+  const noun = body.animation.names.length ? "" : `${body.animation.noun} `;
   return Object.assign(document.createElement("strong"), { textContent: `${noun}${body.name(particle)}` });
 }
 
@@ -62,7 +62,7 @@ export function showKept() {
   box.replaceChildren(
     ...kept.flatMap((view) => {
       const title = heading(view.body, view.kept);
-      if (view.body.film.name) title.textContent += `, ${view.body.film.name}`;
+      if (view.body.animation.name) title.textContent += `, ${view.body.animation.name}`;
       return [title, numbersOf(view.body, view.kept)];
     }),
   );

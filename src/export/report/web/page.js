@@ -34,7 +34,7 @@ export function drawNow() {
 }
 
 function drawClock() {
-  const { quantity, unit } = bodies[0].film.clock;
+  const { quantity, unit } = bodies[0].animation.clock;
   const [now, end] = [shown.player.times[shown.player.frame], shown.player.times.at(-1)];
   const text = `${quantity} ${words(now)} of ${words(end)}${unit ? ` ${unit}` : ""}`;
   element("now").textContent = text;
@@ -50,9 +50,9 @@ function showFrame(frame) {
 
 async function startFilm() {
   for (const body of bodies) await body.open();
-  const { film } = bodies[0];
-  shown.player = new Player(film.times, showFrame);
-  element("time").max = String(film.times.length - 1);
+  const { animation } = bodies[0];
+  shown.player = new Player(animation.times, showFrame);
+  element("time").max = String(animation.times.length - 1);
   element("quantity").replaceChildren(
     ...quantities().map(({ key, label }) => Object.assign(document.createElement("option"), { value: key, textContent: label })),
   );
@@ -65,19 +65,19 @@ async function startFilm() {
   nameControls();
   listenToControls();
   listenToKeys();
-  choose(bodies.length > 1 || film.stress ? "von_mises" : "role");
+  choose(bodies.length > 1 || animation.stress ? "von_mises" : "role");
   const before = bodies.slice(0, -1);
   for (const body of before) await body.frames.load(() => {});
   await bodies.at(-1).frames.load((ready) => {
     const isFirst = shown.player.ready === 0;
     shown.player.ready = ready;
-    const part = Math.round((100 * ready) / film.times.length);
+    const part = Math.round((100 * ready) / animation.times.length);
     element("loading").textContent = part < 100 ? `Unpacking: ${part} %.` : "";
     if (isFirst) turn(isTall());
   });
   state.factor = wantedFactor();
   element("magnify").value = String(state.factor);
-  if (film.clock.unit === "%") shown.player.go(shown.player.last);
+  if (animation.clock.unit === "%") shown.player.go(shown.player.last);
   fit();
   drawNow();
 }
@@ -90,6 +90,6 @@ async function start() {
 }
 
 start().catch((error) => {
-  element("loading").textContent = `This page cannot show its film: ${error.message}.`;
+  element("loading").textContent = `This page cannot show its animation: ${error.message}.`;
   console.error(error);
 });

@@ -1,4 +1,4 @@
-// What particles are coloured by: quantities, their range over the film, the colour bar.
+// What particles are coloured by: quantities, their range over the animation, the colour bar.
 
 import { SHADES, palette, themeColour, themeText, ticks, viridis, words } from "./colour.js";
 import { bodies, element, shown, state } from "./shown.js";
@@ -11,13 +11,13 @@ const MOST_OF_ALL = 0.995;
 // Decades of a logarithmic scale.
 const DECADES = 4;
 
-// The quantities that can be chosen: role and displacement always, the others as the film has them.
+// The quantities that can be chosen: role and displacement always, the others as the animation has them.
 export function quantities() {
-  const { film } = bodies[0];
-  const own = film.quantities.map((one) => ({ ...one }));
+  const { animation } = bodies[0];
+  const own = animation.quantities.map((one) => ({ ...one }));
   return [
     { key: "role", label: "role", unit: "" },
-    { key: "displacement", label: "displacement", unit: film.unit },
+    { key: "displacement", label: "displacement", unit: animation.unit },
     ...own,
   ];
 }
@@ -80,7 +80,7 @@ export function shade(body, out) {
 }
 
 export function takePalette() {
-  const roles = bodies[0].film.role_names.map((name) => themeColour(name));
+  const roles = bodies[0].animation.role_names.map((name) => themeColour(name));
   state.palette =
     state.quantity === "role"
       ? palette((k) => roles[k] ?? [0, 0, 0])
@@ -92,7 +92,7 @@ export function drawScale() {
   const one = quantities().find(({ key }) => key === state.quantity);
   element("log-label").hidden = state.quantity === "role";
   if (state.quantity === "role") {
-    const { role_names: names } = bodies[0].film;
+    const { role_names: names } = bodies[0].animation;
     const counts = names.map(() => 0);
     for (const role of bodies[0].roles()) counts[role] += 1;
     const keys = names.map((name, role) => (counts[role] ? key(themeText(name), `${counts[role]} ${plural(name, counts[role])}`) : null));

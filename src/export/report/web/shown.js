@@ -4,7 +4,7 @@ import { Body } from "./body.js";
 
 export const element = (id) => document.getElementById(id);
 export const data = JSON.parse(element("data").textContent);
-export const bodies = data.stages.map((film, number) => new Body(film, number));
+export const bodies = data.stages.map((animation, number) => new Body(animation, number));
 
 export const state = {
   frame: 0,

@@ -65,33 +65,33 @@ function track(bytes, at, { count, bits, base, mode }, before) {
   return { codes, base };
 }
 
-// The frames of a film, unpacked group by group.
+// The frames of a animation, unpacked group by group.
 export class Frames {
-  constructor(film, prefix) {
-    this.film = film;
+  constructor(animation, prefix) {
+    this.animation = animation;
     this.prefix = prefix;
-    this.count = film.times.length;
+    this.count = animation.times.length;
     this.tracks = [];
     this.ready = 0;
   }
 
   // Unpacks everything; tells after each group how many frames are ready.
   async load(tell) {
-    const { film } = this;
-    const channels = film.channels.length;
-    for (let group = 0; group < film.groups; group++) {
+    const { animation } = this;
+    const channels = animation.channels.length;
+    for (let group = 0; group < animation.groups; group++) {
       const bytes = await inflated(`${this.prefix}group-${group}`);
       let at = 0;
-      const end = Math.min(this.count, (group + 1) * film.group);
+      const end = Math.min(this.count, (group + 1) * animation.group);
       for (let frame = this.ready; frame < end; frame++) {
         for (let c = 0; c < channels; c++) {
           const n = frame * channels + c;
-          const { bits } = film.channels[c];
-          const told = { count: film.count, bits, base: film.bases[n], mode: film.modes[n] };
-          const step = 2 ** film.exponents[n];
+          const { bits } = animation.channels[c];
+          const told = { count: animation.count, bits, base: animation.bases[n], mode: animation.modes[n] };
+          const step = 2 ** animation.exponents[n];
           const { codes, base } = track(bytes, at, told, this.tracks[n - channels]);
           this.tracks[n] = { codes, base, step, low: base * step, none: 2 ** bits - 1 };
-          at += film.count * Math.ceil(bits / 8);
+          at += animation.count * Math.ceil(bits / 8);
         }
       }
       this.ready = end;
@@ -102,13 +102,13 @@ export class Frames {
   }
 
   has(name) {
-    return this.film.channels.some((channel) => channel.name === name);
+    return this.animation.channels.some((channel) => channel.name === name);
   }
 
   // Writes a channel's values at a frame into `out`; NaN where there are none.
   read(name, frame, out) {
-    const c = this.film.channels.findIndex((channel) => channel.name === name);
-    const { codes, low, step, none } = this.tracks[frame * this.film.channels.length + c];
+    const c = this.animation.channels.findIndex((channel) => channel.name === name);
+    const { codes, low, step, none } = this.tracks[frame * this.animation.channels.length + c];
     for (let i = 0; i < out.length; i++) out[i] = codes[i] === none ? NaN : low + step * codes[i];
   }
 }

@@ -24,12 +24,12 @@ export class View {
     this.kept = -1;
     const figure = document.createElement("figure");
     figure.className = "view";
-    if (body.film.name) figure.append(Object.assign(document.createElement("figcaption"), { textContent: body.film.name }));
+    if (body.animation.name) figure.append(Object.assign(document.createElement("figcaption"), { textContent: body.animation.name }));
     this.box = document.createElement("div");
     this.box.className = "canvas";
     this.box.tabIndex = 0;
     this.box.setAttribute("role", "application");
-    this.box.setAttribute("aria-label", `${body.film.name || "Body"}: ${body.count} ${body.film.noun}s. Plus and minus zoom, shift with arrows moves.`);
+    this.box.setAttribute("aria-label", `${body.animation.name || "Body"}: ${body.count} ${body.animation.noun}s. Plus and minus zoom, shift with arrows moves.`);
     [this.under, this.middle, this.over] = [0, 1, 2].map(() => document.createElement("canvas"));
     this.box.append(this.under, this.middle, this.over);
     figure.append(this.box);
@@ -65,8 +65,8 @@ export class View {
       for (let i = 0; i < body.count; i++) take(body.X[i] + factor * body.dx[i], body.Y[i] + factor * body.dy[i]);
     }
     if (at >= 0) body.go(at);
-    const own = body.film.radii.length ? Math.max(...body.film.radii) : 0.5 * body.film.spacing;
-    for (const { kind, corners } of body.film.outlines) if (kind === "obstacle") corners.forEach(([x, y]) => take(x, y));
+    const own = body.animation.radii.length ? Math.max(...body.animation.radii) : 0.5 * body.animation.spacing;
+    for (const { kind, corners } of body.animation.outlines) if (kind === "obstacle") corners.forEach(([x, y]) => take(x, y));
     return { low: box.low.map((value) => value - own), high: box.high.map((value) => value + own) };
   }
 
@@ -92,7 +92,7 @@ export class View {
     this.resize();
     const { body, places, shades, radii, ratio } = this;
     body.go(show.frame);
-    const { X, Y, dx, dy, film } = body;
+    const { X, Y, dx, dy, animation } = body;
     const origin = this.shown(this.origin);
     for (let i = 0; i < body.count; i++) {
       const x = X[i] + show.factor * dx[i] - this.origin[0];
@@ -104,8 +104,8 @@ export class View {
     }
     show.shade(body, shades);
     const scale = show.camera.scale * ratio;
-    if (film.radii.length) for (let i = 0; i < body.count; i++) radii[i] = Math.max(film.radii[i] * scale, 1.5 * ratio);
-    else radii.fill(Math.min(Math.max((show.layers.surface ? 0.13 : 0.27) * film.spacing * scale, 0.7), 9 * ratio));
+    if (animation.radii.length) for (let i = 0; i < body.count; i++) radii[i] = Math.max(animation.radii[i] * scale, 1.5 * ratio);
+    else radii.fill(Math.min(Math.max((show.layers.surface ? 0.13 : 0.27) * animation.spacing * scale, 0.7), 9 * ratio));
     const bondsFrom = 2 * body.brokenBonds();
     const trianglesFrom = 3 * body.trianglesPerCell * body.tornCells();
     this.painter.draw({
@@ -143,7 +143,7 @@ export class View {
   }
 
   drawUnder() {
-    // Drawn again only when something of it changed: a frame of a film moves nothing here but the ways.
+    // Drawn again only when something of it changed: a frame of a animation moves nothing here but the ways.
     const { camera, turned, factor, layers, frame } = this.show;
     const seen = [camera, turned, factor, this.width, this.height, this.ratio, themeText("card")];
     const key = JSON.stringify(layers.ways ? [...seen, frame] : seen);
@@ -153,7 +153,7 @@ export class View {
     pen.fillStyle = themeText("card");
     pen.fillRect(0, 0, this.width, this.height);
     this.drawGrid(pen);
-    for (const { kind, corners } of this.body.film.outlines) {
+    for (const { kind, corners } of this.body.animation.outlines) {
       pen.beginPath();
       corners.forEach((corner) => pen.lineTo(...this.place(corner)));
       pen.closePath();
@@ -196,7 +196,7 @@ export class View {
     pen.stroke();
     // Turned, what lies across is y, and what goes down is x.
     const [h, v] = this.show.turned ? ["y", "x"] : ["x", "y"];
-    const { unit } = this.body.film;
+    const { unit } = this.body.animation;
     const named = (name) => (isUnit(unit) ? `${name} [${unit}]` : name);
     const inside = across.filter((x) => this.pixel([x, 0])[0] > 50 && this.pixel([x, 0])[0] < this.width - 190);
     inside.forEach((x) => pen.fillText(words(x), this.pixel([x, 0])[0] + 3, this.height - 5));
@@ -268,7 +268,7 @@ export class View {
     const broken = body.brokenBonds();
     if (!broken) return;
     pen.strokeStyle = themeText("crack");
-    pen.lineWidth = Math.min(Math.max(0.09 * body.film.spacing * show.camera.scale, 1), 2.5);
+    pen.lineWidth = Math.min(Math.max(0.09 * body.animation.spacing * show.camera.scale, 1), 2.5);
     pen.beginPath();
     for (let n = 0; n < broken; n++) {
       const [a, b] = [body.bonds[2 * n], body.bonds[2 * n + 1]];

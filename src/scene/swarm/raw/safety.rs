@@ -95,7 +95,7 @@ impl Default for RawPoses {
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawResilience {
-    /// How many liars among a robot's neighbours are tolerated [1].
+    /// How many max_faulty_neighbours among a robot's neighbours are tolerated [1].
     #[schemars(range(min = 1))]
-    pub liars: usize,
+    pub max_faulty_neighbours: usize,
 }

@@ -28,8 +28,9 @@ use super::conjugate_gradients::{Preconditioner, iterate, iterate_single, single
 use super::steps::for_groups;
 use super::system::Prepared;
 use super::{Found, Precision, Request, SolveError, Solver, lanczos, steps};
-use crate::solve::field::{Field, Real, dot};
-use crate::solve::operator::{Matrix, Stencils};
+use crate::flock::vectors::Vectors;
+use crate::solve::field::{Real, dot};
+use crate::solve::operator::{Matrix, RowCoefficients};
 
 /// Nodes of the coarsest level: fewer are not worth another level.
 const COARSEST: usize = 640;
@@ -67,9 +68,9 @@ pub(super) fn solve(prepared: &mut Prepared, request: &Request) -> Result<Found,
 /// All levels of a body.
 struct Cycle<'a> {
     matrix: &'a Matrix,
-    finest: Stencils<f32>,
+    finest: RowCoefficients<f32>,
     weights: [f64; 2],
-    vectors: Vectors,
+    vectors: LevelVectors,
     /// The way down from each level, the finest first; the coarsest is not smoothed and has no weights.
     levels: Vec<Level>,
     coarsest: Option<Envelope>,
@@ -80,27 +81,27 @@ struct Level {
     transfer: Transfer,
     outliers: OutlierShares,
     matrix: Matrix,
-    stencils: Stencils<f32>,
+    stencils: RowCoefficients<f32>,
     weights: [f64; 2],
-    vectors: Vectors,
+    vectors: LevelVectors,
 }
 
 /// What a level computes with.
-struct Vectors {
-    f: Field<f32>,
-    u: Field<f32>,
-    v: Field<f32>,
+struct LevelVectors {
+    f: Vectors<f32>,
+    u: Vectors<f32>,
+    v: Vectors<f32>,
 }
 
-impl Vectors {
+impl LevelVectors {
     fn new(count: usize) -> Self {
-        Self { f: Field::zeros(count), u: Field::zeros(count), v: Field::zeros(count) }
+        Self { f: Vectors::zeros(count), u: Vectors::zeros(count), v: Vectors::zeros(count) }
     }
 }
 
 /// Weights of two sweeps that dampen all eigenvalues from a share of the largest to the largest best;
 /// `None` if the matrix is not positive.
-fn weights(matrix: &Matrix, stencils: &Stencils<f32>) -> Option<[f64; 2]> {
+fn weights(matrix: &Matrix, stencils: &RowCoefficients<f32>) -> Option<[f64; 2]> {
     let high = SAFETY * lanczos::largest(matrix, stencils, ESTIMATE);
     let low = high / SMOOTHED;
     let weight = |k: f64| {
@@ -113,9 +114,9 @@ fn weights(matrix: &Matrix, stencils: &Stencils<f32>) -> Option<[f64; 2]> {
 impl<'a> Cycle<'a> {
     fn new(matrix: &'a Matrix, grid: [[f64; 2]; 2]) -> Result<Self, SolveError> {
         let scale = single_scale(matrix);
-        let finest = Stencils::new(&matrix.rows, scale);
+        let finest = RowCoefficients::new(&matrix.rows, scale);
         let not_positive = SolveError::NotPositive { solver: Solver::Multigrid, iteration: 0 };
-        let vectors = Vectors::new(matrix.count());
+        let vectors = LevelVectors::new(matrix.count());
         let mut cycle =
             Self { matrix, finest, weights: [0.0; 2], vectors, levels: Vec::new(), coarsest: None };
         let mut spacing = grid.map(|v| v[0].hypot(v[1]));
@@ -158,13 +159,13 @@ impl<'a> Cycle<'a> {
 /// A level's operator and smoother.
 struct Smoothed<'a> {
     matrix: &'a Matrix,
-    stencils: &'a Stencils<f32>,
+    stencils: &'a RowCoefficients<f32>,
     weights: [f64; 2],
 }
 
-fn descend(here: &Smoothed<'_>, vectors: &mut Vectors, below: &mut [Level], coarsest: &mut Envelope) {
+fn descend(here: &Smoothed<'_>, vectors: &mut LevelVectors, below: &mut [Level], coarsest: &mut Envelope) {
     let Smoothed { matrix, stencils, weights } = *here;
-    let Vectors { f, u, v } = vectors;
+    let LevelVectors { f, u, v } = vectors;
     let Some((next, further)) = below.split_first_mut() else {
         coarsest.solve((&f.x, &f.y), (&mut v.x, &mut v.y));
         return;
@@ -184,8 +185,8 @@ fn descend(here: &Smoothed<'_>, vectors: &mut Vectors, below: &mut [Level], coar
 impl Level {
     fn new(fine: &Matrix, transfer: Transfer, scale: f64) -> Self {
         let matrix = coarsen::coarsen(fine, transfer);
-        let stencils = Stencils::new(&matrix.rows, scale);
-        let vectors = Vectors::new(matrix.count());
+        let stencils = RowCoefficients::new(&matrix.rows, scale);
+        let vectors = LevelVectors::new(matrix.count());
         let outliers = OutlierShares::new(fine, &matrix, transfer);
         Self { transfer, outliers, matrix, stencils, weights: [0.0; 2], vectors }
     }
@@ -201,7 +202,7 @@ fn particles_per_site(matrix: &Matrix) -> f64 {
 impl<T: Real> Preconditioner<T> for Cycle<'_> {
     type Z = f32;
 
-    fn precondition(&mut self, r: &Field<T>, size: f64) -> (&Field<f32>, f64) {
+    fn precondition(&mut self, r: &Vectors<T>, size: f64) -> (&Vectors<f32>, f64) {
         let f = &mut self.vectors.f;
         let scale = 1.0 / size;
         for_groups(f.parts(&self.matrix.bounds), |_, f| {

@@ -9,19 +9,19 @@ use crate::solve::operator::HELD;
 use crate::solve::operator::samples::{operator, with_outliers};
 
 fn dense(matrix: &Matrix) -> Vec<Vec<f64>> {
-    let stencils = Stencils::<f64>::new(&matrix.rows, 1.0);
+    let stencils = RowCoefficients::<f64>::new(&matrix.rows, 1.0);
     columns(matrix.count(), |unit| {
-        let mut out = Field::zeros(matrix.count());
+        let mut out = Vectors::zeros(matrix.count());
         steps::apply(matrix, &stencils, unit, &mut out);
         out
     })
 }
 
 /// What a linear map makes of each unit displacement, x components first.
-fn columns<T: Real>(count: usize, map: impl Fn(&Field<T>) -> Field<T>) -> Vec<Vec<f64>> {
+fn columns<T: Real>(count: usize, map: impl Fn(&Vectors<T>) -> Vectors<T>) -> Vec<Vec<f64>> {
     (0..2 * count)
         .map(|k| {
-            let mut unit = Field::zeros(count);
+            let mut unit = Vectors::zeros(count);
             if k < count {
                 unit.x[k] = T::of(1.0)
             } else {
@@ -67,7 +67,7 @@ fn the_coarse_operator_is_the_triple_product() {
     each_coarsening(|kind, fine, coarse, transfer| {
         let k = dense(fine);
         let p = columns(coarse.count(), |unit| {
-            let mut out = Field::zeros(fine.count());
+            let mut out = Vectors::zeros(fine.count());
             transfer.prolong((fine, coarse), &OutlierShares::new(fine, coarse, transfer), unit, &mut out);
             out
         });
@@ -87,12 +87,12 @@ fn the_coarse_operator_is_the_triple_product() {
 fn restriction_is_the_transpose_of_interpolation() {
     each_coarsening(|kind, fine, coarse, transfer| {
         let p = columns(coarse.count(), |unit| {
-            let mut out = Field::zeros(fine.count());
+            let mut out = Vectors::zeros(fine.count());
             transfer.prolong((fine, coarse), &OutlierShares::new(fine, coarse, transfer), unit, &mut out);
             out
         });
         let r = columns(fine.count(), |unit| {
-            let mut out = Field::zeros(coarse.count());
+            let mut out = Vectors::zeros(coarse.count());
             transfer.restrict((fine, coarse), &OutlierShares::new(fine, coarse, transfer), unit, &mut out);
             out
         });
@@ -108,13 +108,13 @@ fn restriction_is_the_transpose_of_interpolation() {
 fn the_coarse_space_contains_translations_rotations_and_uniform_strains() {
     each_coarsening(|kind, fine, coarse, transfer| {
         let affine = |[i, j]: [f64; 2]| [0.5 - 0.3 * i + 0.7 * j, -0.25 + 0.2 * i + 0.1 * j];
-        let mut nodes = Field::zeros(coarse.count());
+        let mut nodes = Vectors::zeros(coarse.count());
         for (node, [i, j]) in coarse.columns.sites().enumerate() {
             let at = [i * transfer.steps[0], j * transfer.steps[1]].map(f64::from);
             let [x, y] = affine(at);
             (nodes.x[node], nodes.y[node]) = (x as f32, y as f32);
         }
-        let mut found = Field::zeros(fine.count());
+        let mut found = Vectors::zeros(fine.count());
         transfer.prolong((fine, coarse), &OutlierShares::new(fine, coarse, transfer), &nodes, &mut found);
         for site in fine.columns.sites() {
             let (i, _) = fine.columns.find(site).expect("a follower");
@@ -142,14 +142,14 @@ fn the_envelope_solves_what_it_factorised() {
         for (columns, rows) in [(9, 21), (21, 9)] {
             let matrix = Matrix::of_followers(&operator(kind, columns, rows, |i| i < 5 || i == 40));
             let mut factor = Envelope::new(&matrix, 1.0, false).expect("positive");
-            let mut exact = Field::<f32>::zeros(matrix.count());
+            let mut exact = Vectors::<f32>::zeros(matrix.count());
             for (i, _) in matrix.class.iter().enumerate().filter(|(_, class)| **class != HELD) {
                 exact.x[i] = (i as f32 * 0.7).sin();
                 exact.y[i] = (i as f32 * 0.3).cos();
             }
-            let mut f = Field::zeros(matrix.count());
-            steps::apply(&matrix, &Stencils::<f32>::new(&matrix.rows, 1.0), &exact, &mut f);
-            let mut found = Field::zeros(matrix.count());
+            let mut f = Vectors::zeros(matrix.count());
+            steps::apply(&matrix, &RowCoefficients::<f32>::new(&matrix.rows, 1.0), &exact, &mut f);
+            let mut found = Vectors::zeros(matrix.count());
             factor.solve((&f.x, &f.y), (&mut found.x, &mut found.y));
             let worst = (0..matrix.count()).map(|i| (found.x[i] - exact.x[i]).abs()).fold(0.0, f32::max);
             assert!(worst < 1e-3, "{kind:?}: {worst}");
@@ -183,15 +183,15 @@ fn the_envelope_refuses_what_is_not_positive_and_leaves_out_what_is_nothing() {
     let coarse = coarsen(&fine, transfer);
     let mut factor = Envelope::new(&coarse, 1.0, false).expect("not negative");
     // The force of a displacement that the coarse grid can have, on the coarse grid.
-    let mut nodes = Field::<f32>::zeros(coarse.count());
+    let mut nodes = Vectors::<f32>::zeros(coarse.count());
     nodes.x.iter_mut().enumerate().for_each(|(k, x)| *x = (k as f32 * 0.4).sin());
-    let mut exact = Field::zeros(fine.count());
+    let mut exact = Vectors::zeros(fine.count());
     let none = OutlierShares::default();
     transfer.prolong((&fine, &coarse), &none, &nodes, &mut exact);
-    let (mut f, mut coarse_f) = (Field::zeros(fine.count()), Field::zeros(coarse.count()));
-    steps::apply(&fine, &Stencils::<f32>::new(&fine.rows, 1.0), &exact, &mut f);
+    let (mut f, mut coarse_f) = (Vectors::zeros(fine.count()), Vectors::zeros(coarse.count()));
+    steps::apply(&fine, &RowCoefficients::<f32>::new(&fine.rows, 1.0), &exact, &mut f);
     transfer.restrict((&fine, &coarse), &none, &f, &mut coarse_f);
-    let (mut solved, mut found) = (Field::zeros(coarse.count()), Field::zeros(fine.count()));
+    let (mut solved, mut found) = (Vectors::zeros(coarse.count()), Vectors::zeros(fine.count()));
     factor.solve((&coarse_f.x, &coarse_f.y), (&mut solved.x, &mut solved.y));
     transfer.prolong((&fine, &coarse), &none, &solved, &mut found);
     let worst = (0..40).map(|i| (found.x[i] - exact.x[i]).abs()).fold(0.0, f32::max);

@@ -5,8 +5,9 @@
 //! affine, rotations among them, are reproduced to rounding.
 
 use crate::flock::lattice::Site;
+use crate::flock::vectors::Vectors;
 use crate::solve::equilibrium::steps::for_groups;
-use crate::solve::field::{Field, Part, View};
+use crate::solve::field::{VectorsMut, VectorsRef};
 use crate::solve::operator::{Columns, HELD, Matrix, Segment};
 
 /// Between the particles of one matrix and the nodes of the next.
@@ -38,7 +39,7 @@ impl Column {
     }
 
     /// Adds a weighted segment, as far as its rows lie within.
-    fn add(&mut self, segment: &Segment, step: i32, weight: f32, from: View<'_, f32>) {
+    fn add(&mut self, segment: &Segment, step: i32, weight: f32, from: VectorsRef<'_, f32>) {
         let skip = if segment.row < self.low { (self.low - segment.row + step - 1) / step } else { 0 };
         let row = segment.row + skip * step;
         let room = (self.low + self.x.len() as i32 - row + step - 1) / step;
@@ -89,7 +90,7 @@ impl OutlierShares {
         shares
     }
 
-    fn restrict(&self, from: &Field<f32>, to: &mut Part<'_, f32>) {
+    fn restrict(&self, from: &Vectors<f32>, to: &mut VectorsMut<'_, f32>) {
         let range = to.range();
         let begin = self.children.partition_point(|&(node, ..)| (node as usize) < range.start);
         let of_range = self.children[begin..].iter().take_while(|(node, ..)| (*node as usize) < range.end);
@@ -100,7 +101,7 @@ impl OutlierShares {
         }
     }
 
-    fn prolong(&self, from: &Field<f32>, to: &mut Part<'_, f32>) {
+    fn prolong(&self, from: &Vectors<f32>, to: &mut VectorsMut<'_, f32>) {
         let range = to.range();
         for i in range.start.max(self.first)..range.end {
             for &(node, share) in self.parents.get(i - self.first).into_iter().flatten() {
@@ -138,8 +139,8 @@ impl Transfer {
         self,
         (fine, coarse): (&Matrix, &Matrix),
         outliers: &OutlierShares,
-        from: &Field<f32>,
-        to: &mut Field<f32>,
+        from: &Vectors<f32>,
+        to: &mut Vectors<f32>,
     ) {
         for_groups(to.parts(&coarse.bounds), |group, mut to| {
             let mut column = Column::new();
@@ -158,7 +159,7 @@ impl Transfer {
         self,
         fine: &Columns,
         (coarse, number): (&Columns, i32),
-        from: View<'_, f32>,
+        from: VectorsRef<'_, f32>,
         column: &mut Column,
     ) {
         let [across, along] = self.steps;
@@ -171,7 +172,7 @@ impl Transfer {
     }
 
     /// The rows of a column that have a share in each node of a segment, weighted and added up.
-    fn contract(self, segment: &Segment, column: &Column, to: &mut Part<'_, f32>) {
+    fn contract(self, segment: &Segment, column: &Column, to: &mut VectorsMut<'_, f32>) {
         let along = self.steps[1];
         let at = segment.start as usize - to.begin;
         let begin = (segment.row * along - (along - 1) - column.low) as usize;
@@ -202,8 +203,8 @@ impl Transfer {
         self,
         (fine, coarse): (&Matrix, &Matrix),
         outliers: &OutlierShares,
-        from: &Field<f32>,
-        to: &mut Field<f32>,
+        from: &Vectors<f32>,
+        to: &mut Vectors<f32>,
     ) {
         for_groups(to.parts(&fine.bounds), |group, mut to| {
             let mut column = Column::new();
@@ -228,7 +229,7 @@ impl Transfer {
     }
 
     /// Adds what a column of nodes gives to the particles of a segment.
-    fn expand(self, segment: &Segment, step: i32, column: &Column, to: &mut Part<'_, f32>) {
+    fn expand(self, segment: &Segment, step: i32, column: &Column, to: &mut VectorsMut<'_, f32>) {
         let along = self.steps[1];
         let at = segment.start as usize - to.begin;
         let len = segment.len as usize;

@@ -16,7 +16,7 @@ const EXACT_BITS: i32 = 52;
 /// Codes of a quantity, shape \[count\]: the value is `(base + code) 2^exponent`, and the largest code says
 /// that there is none.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Track {
+pub struct QuantizedChannel {
     pub exponent: i32,
     pub base: i64,
     pub bits: u32,
@@ -25,10 +25,10 @@ pub struct Track {
     high: Vec<u8>,
 }
 
-impl Track {
+impl QuantizedChannel {
     /// Codes of `bits` bits, 2 to 24; values that are not finite have none. `before` is the same quantity in the
     /// frame before.
-    pub fn of(values: &[f64], bits: u32, before: Option<&Track>) -> Self {
+    pub fn of(values: &[f64], bits: u32, before: Option<&QuantizedChannel>) -> Self {
         let finite = values.iter().copied().filter(|value| value.is_finite());
         let (low, high) = finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
         let (low, high) = if low.is_finite() { (low, high) } else { (0.0, 0.0) };
@@ -97,13 +97,13 @@ fn exponent(low: f64, high: f64, bits: u32, before: Option<i32>) -> i32 {
 mod tests {
     use super::*;
 
-    fn code(track: &Track, particle: usize) -> u32 {
+    fn code(track: &QuantizedChannel, particle: usize) -> u32 {
         let mut codes = Vec::new();
         track.read(&mut codes);
         codes[particle]
     }
 
-    fn value(track: &Track, particle: usize) -> f64 {
+    fn value(track: &QuantizedChannel, particle: usize) -> f64 {
         (track.base + i64::from(code(track, particle))) as f64 * f64::from(track.exponent).exp2()
     }
 
@@ -112,7 +112,7 @@ mod tests {
         for bits in [12, 16, 24] {
             for (low, high) in [(-1.0, 3.0), (1e6, 1e6 + 1.0), (-3e-9, 0.0), (0.0, 1e300), (5.0, 5.0)] {
                 let values: Vec<f64> = (0..=50).map(|k| low + (high - low) * f64::from(k) / 50.0).collect();
-                let track = Track::of(&values, bits, None);
+                let track = QuantizedChannel::of(&values, bits, None);
                 let quantum = f64::from(track.exponent).exp2();
                 assert!(
                     quantum <= (2.0 * (high - low) / f64::from(none(bits) - 2)).max(1e-9),
@@ -128,17 +128,17 @@ mod tests {
 
     #[test]
     fn what_is_not_finite_has_the_code_of_nothing() {
-        let track = Track::of(&[1.0, f64::NAN, f64::INFINITY, 2.0], 12, None);
+        let track = QuantizedChannel::of(&[1.0, f64::NAN, f64::INFINITY, 2.0], 12, None);
         assert_eq!([code(&track, 1), code(&track, 2)], [none(12); 2]);
         assert!(code(&track, 3) < none(12));
     }
 
     #[test]
     fn frames_of_like_range_share_a_quantum_so_that_rest_costs_nothing() {
-        let first = Track::of(&[0.0, 0.25, 1.0], 16, None);
-        let second = Track::of(&[0.0, 0.25, 0.6], 16, Some(&first));
+        let first = QuantizedChannel::of(&[0.0, 0.25, 1.0], 16, None);
+        let second = QuantizedChannel::of(&[0.0, 0.25, 0.6], 16, Some(&first));
         assert_eq!((first.exponent, code(&first, 1)), (second.exponent, code(&second, 1)));
-        let wider = Track::of(&[0.0, 0.25, 2.7], 16, Some(&second));
+        let wider = QuantizedChannel::of(&[0.0, 0.25, 2.7], 16, Some(&second));
         assert_eq!(wider.exponent, first.exponent + 1);
     }
 }

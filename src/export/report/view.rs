@@ -5,13 +5,13 @@ use serde::Serialize;
 
 use super::encode::{EncodedFrames, GROUP, doubles, integers};
 use super::frames::{Channel, Frames};
-use crate::flock::points::Points;
 use crate::flock::role::Role;
+use crate::flock::vectors::Vectors;
 use crate::material::cells::Cells;
 
 /// What the scripts need to know.
 #[derive(Clone, Debug, Default, Serialize)]
-pub struct Film {
+pub struct Animation {
     /// Said above the canvas where several stand beside each other.
     pub name: String,
     /// `particle` or `robot`.
@@ -97,38 +97,38 @@ pub struct Outline {
     pub corners: Vec<[f64; 2]>,
 }
 
-/// A film with its arrays, each compressed text with a name.
+/// A animation with its arrays, each compressed text with a name.
 #[derive(Debug)]
-pub struct Stage {
-    pub film: Film,
+pub struct View {
+    pub animation: Animation,
     pub arrays: Vec<(String, String)>,
 }
 
-impl Stage {
-    pub fn new(film: Film) -> Self {
+impl View {
+    pub fn new(animation: Animation) -> Self {
         let role_names = Role::ALL.map(Role::name).to_vec();
-        Self { film: Film { group: GROUP, role_names, ..film }, arrays: Vec::new() }
+        Self { animation: Animation { group: GROUP, role_names, ..animation }, arrays: Vec::new() }
     }
 
     /// The frames, and the clock's value at each of them.
     pub fn set_frames(&mut self, frames: &Frames, encoded: EncodedFrames, times: Vec<f64>) {
         let tracks = || frames.kept().iter().flat_map(|frame| &frame.tracks);
         let name = |channel: &Channel| ChannelName { name: channel.name, bits: channel.bits };
-        let film = &mut self.film;
-        film.count = frames.count;
-        film.times = times;
-        film.channels = frames.channels.iter().map(name).collect();
-        film.exponents = tracks().map(|track| track.exponent).collect();
-        film.bases = tracks().map(|track| track.base).collect();
-        film.modes = encoded.modes;
-        film.groups = encoded.groups.len();
+        let animation = &mut self.animation;
+        animation.count = frames.count;
+        animation.times = times;
+        animation.channels = frames.channels.iter().map(name).collect();
+        animation.exponents = tracks().map(|track| track.exponent).collect();
+        animation.bases = tracks().map(|track| track.base).collect();
+        animation.modes = encoded.modes;
+        animation.groups = encoded.groups.len();
         for (n, text) in encoded.groups.into_iter().enumerate() {
             self.put(&format!("group-{n}"), text);
         }
     }
 
     /// Places that displacements start from \[length\].
-    pub fn set_reference(&mut self, reference: &Points) {
+    pub fn set_reference(&mut self, reference: &Vectors) {
         self.put("X", doubles(reference.x.iter().copied()));
         self.put("Y", doubles(reference.y.iter().copied()));
     }
@@ -156,14 +156,14 @@ impl Stage {
         // The page draws polygons of as many corners each: those with fewer repeat their last.
         let most = cells.most_corners();
         let filled = |cell: &[u32]| (0..most).map(|k| cell[k.min(cell.len() - 1)]).collect::<Vec<_>>();
-        self.film.corners = most;
+        self.animation.corners = most;
         self.put("cells", integers(cells.iter().flat_map(filled), most));
     }
 
     /// A column known to the last bit at the end; NaN where there is nothing.
     pub fn add_exact(&mut self, quantity: Quantity, values: impl Iterator<Item = f64>) {
         self.put(&format!("exact-{}", quantity.key), doubles(values));
-        self.film.exact.push(quantity);
+        self.animation.exact.push(quantity);
     }
 
     fn put(&mut self, name: &str, text: String) {

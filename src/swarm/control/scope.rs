@@ -5,26 +5,26 @@ use crate::scene::swarm::Swarm;
 
 /// The members that a loop serves, and those that it hears. By number, ascending.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Part {
+pub struct NodeScope {
     pub mine: Vec<usize>,
     pub heard: Vec<usize>,
 }
 
 /// Why a robot cannot be served alone.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum PartError {
+pub enum NodeScopeError {
     #[error("--member {name}: there is no such robot\n  help: they are called `{first}` to `{last}`")]
     Member { name: String, first: String, last: String },
     #[error("--member {name}: {why}\n  help: run one node for all, without --member")]
     NotAlone { name: String, why: &'static str },
 }
 
-impl Part {
+impl NodeScope {
     /// The loop's part: of this robot, or of all; the loop then expects no other poses than it hears.
     ///
     /// # Errors
     /// A name that is no robot's, or a robot whose target depends on more than its neighbours.
-    pub fn take(swarm: &Swarm, control: &mut Control, member: Option<&str>) -> Result<Self, PartError> {
+    pub fn take(swarm: &Swarm, control: &mut Control, member: Option<&str>) -> Result<Self, NodeScopeError> {
         let formation = control.formation();
         let part = match member {
             None => {
@@ -45,14 +45,14 @@ impl Part {
 }
 
 /// The number of the robot that the loop is alone for.
-fn only(swarm: &Swarm, control: &Control, name: &str) -> Result<usize, PartError> {
+fn only(swarm: &Swarm, control: &Control, name: &str) -> Result<usize, NodeScopeError> {
     let formation = control.formation();
-    let number = formation.number(name).ok_or_else(|| PartError::Member {
+    let number = formation.number(name).ok_or_else(|| NodeScopeError::Member {
         name: name.to_owned(),
         first: formation.names[0].clone(),
         last: formation.names[formation.count() - 1].clone(),
     })?;
-    let refuse = |why| Err(PartError::NotAlone { name: name.to_owned(), why });
+    let refuse = |why| Err(NodeScopeError::NotAlone { name: name.to_owned(), why });
     if swarm.raw.control.sweeps > 1 {
         return refuse("control.sweeps above 1 needs to see the whole formation");
     }

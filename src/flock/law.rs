@@ -6,21 +6,23 @@ use super::block::{Block, IDENTITY, apply, inverse as invert, plus, product};
 use super::cells_around::CellsAround;
 use super::fracture::Bonds;
 use super::neighbourhood::Neighbours;
-use super::points::Points;
-use super::rules::{CellAround, Corner, Load, Mean, Neighbour, OWN, Own, PatchCell, Rotation, Rule, pull};
+use super::rules::{
+    CellAround, Corner, Load, Mean, Neighbour, OWN, ParticleState, PatchCell, Rotation, Rule, pull,
+};
+use super::vectors::Vectors;
 
 /// The arrays and index lists that a sweep runs over; it knows particles, not lattices.
 #[derive(Clone, Debug)]
-pub struct Interaction {
+pub struct Flock {
     pub rule: Rule,
     /// Reference positions \[length\], shape \[count\].
-    pub reference: Arc<Points>,
+    pub reference: Arc<Vectors>,
     pub neighbours: Neighbours,
     pub weights: Weights,
     /// Loads on the particles of a material \[force\], shape \[count\].
-    pub forces: Option<Points>,
+    pub forces: Option<Vectors>,
     /// Rest offsets \[length\], shape \[count\]; all zero where absent.
-    pub rest: Option<Points>,
+    pub rest: Option<Vectors>,
     /// Broken bonds; none can break where absent.
     pub bonds: Option<Bonds>,
 }
@@ -144,16 +146,16 @@ impl Weights {
     }
 }
 
-impl Interaction {
+impl Flock {
     /// Target position of `particle` when all stand at `present` \[length, world frame\].
-    pub fn target(&self, particle: usize, present: &Points) -> [f64; 2] {
+    pub fn target(&self, particle: usize, present: &Vectors) -> [f64; 2] {
         self.target_by(&self.rule, particle, present)
     }
 
     /// Target position by another rule over the same neighbours and weights.
     #[inline]
-    pub fn target_by(&self, rule: &Rule, particle: usize, present: &Points) -> [f64; 2] {
-        let own = Own {
+    pub fn target_by(&self, rule: &Rule, particle: usize, present: &Vectors) -> [f64; 2] {
+        let own = ParticleState {
             present: present.get(particle),
             reference: self.reference.get(particle),
             rest: self.rest.as_ref().map_or([0.0; 2], |rest| rest.get(particle)),
@@ -185,15 +187,15 @@ impl Interaction {
 
     /// Force of a material on a particle when all stand at `present` \[force, world frame\]: on one that rests, minus its
     /// load; on one that is held, minus its load and its reaction. Zero for a rule that is no material.
-    pub fn force(&self, particle: usize, present: &Points) -> [f64; 2] {
+    pub fn force(&self, particle: usize, present: &Vectors) -> [f64; 2] {
         self.force_from(particle, |slot| self.corner(particle, slot, present))
     }
 
     /// The same when all are displaced by so much from their reference places \[length\]: to more digits where that is
     /// little.
-    pub fn force_under(&self, particle: usize, displacement: &Points) -> [f64; 2] {
+    pub fn force_under(&self, particle: usize, displacement: &Vectors) -> [f64; 2] {
         let from =
-            |points: &Points, j: usize| [points.x[j] - points.x[particle], points.y[j] - points.y[particle]];
+            |points: &Vectors, j: usize| [points.x[j] - points.x[particle], points.y[j] - points.y[particle]];
         self.force_from(particle, |slot| {
             let j = self.neighbours.of(particle)[slot] as usize;
             Corner { reference: from(&self.reference, j), displacement: from(displacement, j) }
@@ -221,7 +223,7 @@ impl Interaction {
     pub fn target_among(
         &self,
         particle: usize,
-        present: &Points,
+        present: &Vectors,
         keeps: impl Fn(usize) -> bool + Clone,
     ) -> Option<[f64; 2]> {
         let kept = |points| {
@@ -243,7 +245,7 @@ impl Interaction {
         };
         let shared = |n: Neighbour| Neighbour { matrix: product(&share, &n.matrix), ..n };
         let reference = self.reference.get(particle);
-        let own = Own {
+        let own = ParticleState {
             present: present.get(particle),
             reference,
             rest: self.rule.rest_offset(reference, kept(&self.reference).map(shared)),
@@ -259,7 +261,7 @@ impl Interaction {
         &self,
         weights: &MatrixWeights,
         particle: usize,
-        present: &Points,
+        present: &Vectors,
         keeps: impl Fn(usize) -> bool,
     ) -> Option<[f64; 2]> {
         let near = self.neighbours.of(particle);
@@ -271,20 +273,20 @@ impl Interaction {
         invert(&pulled.1)?;
         let rest = self.rest.as_ref().map_or([0.0; 2], |rest| rest.get(particle));
         let (present, reference) = (present.get(particle), self.reference.get(particle));
-        let own = Own { present, reference, rest, load: self.load(particle) };
+        let own = ParticleState { present, reference, rest, load: self.load(particle) };
         Some(self.rule.target_by_cells(&own, pulled, weights.held(particle)))
     }
 
     /// Force of the cells around a particle, and what holds it.
-    fn pulled(&self, weights: &MatrixWeights, particle: usize, present: &Points) -> ([f64; 2], Block) {
+    fn pulled(&self, weights: &MatrixWeights, particle: usize, present: &Vectors) -> ([f64; 2], Block) {
         let (cells, patches) = (weights.cells_around(particle), weights.patches_around(particle));
         pull(cells, patches, |slot| self.corner(particle, slot, present))
     }
 
     /// A neighbour, seen from where the particle is.
-    fn corner(&self, particle: usize, slot: usize, present: &Points) -> Corner {
+    fn corner(&self, particle: usize, slot: usize, present: &Vectors) -> Corner {
         let other = self.neighbours.of(particle)[slot] as usize;
-        let from = |points: &Points| {
+        let from = |points: &Vectors| {
             let ([x, y], [x0, y0]) = (points.get(other), points.get(particle));
             [x - x0, y - y0]
         };
@@ -299,7 +301,7 @@ impl Interaction {
             self.rest = rest_of_cells(weights, &self.reference);
             return;
         }
-        let rest: Points = (0..self.reference.len())
+        let rest: Vectors = (0..self.reference.len())
             .map(|j| self.rule.rest_offset(self.reference.get(j), self.seen(j, &self.reference)))
             .collect();
         let needed = rest.iter().any(|offset| offset != [0.0; 2]);
@@ -324,7 +326,7 @@ impl Interaction {
     fn seen<'a>(
         &'a self,
         particle: usize,
-        present: &'a Points,
+        present: &'a Vectors,
     ) -> impl Iterator<Item = Neighbour> + Clone + 'a {
         self.neighbours.bonds(particle).map(move |bond| {
             let position = present.get(self.neighbours.index[bond] as usize);
@@ -335,7 +337,7 @@ impl Interaction {
     fn seen_with_ghosts<'a>(
         &'a self,
         particle: usize,
-        present: &'a Points,
+        present: &'a Vectors,
         bonds: &'a Bonds,
     ) -> impl Iterator<Item = Neighbour> + Clone + 'a {
         self.places_with_ghosts(particle, present, bonds)
@@ -346,7 +348,7 @@ impl Interaction {
     fn places_with_ghosts<'a>(
         &'a self,
         particle: usize,
-        present: &'a Points,
+        present: &'a Vectors,
         bonds: &'a Bonds,
     ) -> impl Iterator<Item = (usize, [f64; 2])> + Clone + 'a {
         self.neighbours.bonds(particle).filter_map(move |bond| {
@@ -369,7 +371,7 @@ impl Interaction {
 }
 
 /// Cells that have not moved pull nothing, to the last bit; what is left are held components.
-fn rest_of_cells(weights: &MatrixWeights, reference: &Points) -> Option<Points> {
+fn rest_of_cells(weights: &MatrixWeights, reference: &Vectors) -> Option<Vectors> {
     let place = |i: usize| {
         let (held, at) = (weights.held(i), reference.get(i));
         [0, 1].map(|axis| if held[axis] { at[axis] } else { 0.0 })

@@ -1,19 +1,20 @@
 //! Positions as parallel arrays: the one layout every sweep, recorder and transport reads.
 
-/// Points in the plane [length unit of the scene, world frame], shape \[count\] each.
+/// One vector in the plane for each particle, shape \[count\] each: positions and displacements
+/// \[length unit of the scene, world frame\], forces, residuals.
 ///
 /// Parallel arrays rather than an array of pairs, so that a sweep streams one coordinate at a
 /// time and the compiler can vectorise it.
 #[derive(Debug, Default, PartialEq)]
-pub struct Points {
-    pub x: Vec<f64>,
-    pub y: Vec<f64>,
+pub struct Vectors<T = f64> {
+    pub x: Vec<T>,
+    pub y: Vec<T>,
 }
 
-impl Points {
-    /// `count` points at the origin.
+impl<T: Copy + Default> Vectors<T> {
+    /// `count` zeros.
     pub fn zeros(count: usize) -> Self {
-        Self { x: vec![0.0; count], y: vec![0.0; count] }
+        Self { x: vec![T::default(); count], y: vec![T::default(); count] }
     }
 
     pub fn len(&self) -> usize {
@@ -24,24 +25,25 @@ impl Points {
         self.x.is_empty()
     }
 
-    pub fn get(&self, index: usize) -> [f64; 2] {
+    pub fn get(&self, index: usize) -> [T; 2] {
         [self.x[index], self.y[index]]
     }
 
-    pub fn set(&mut self, index: usize, point: [f64; 2]) {
-        self.x[index] = point[0];
-        self.y[index] = point[1];
+    pub fn set(&mut self, index: usize, vector: [T; 2]) {
+        [self.x[index], self.y[index]] = vector;
     }
 
-    pub fn push(&mut self, point: [f64; 2]) {
-        self.x.push(point[0]);
-        self.y.push(point[1]);
+    pub fn push(&mut self, [x, y]: [T; 2]) {
+        self.x.push(x);
+        self.y.push(y);
     }
 
-    pub fn iter(&self) -> impl Iterator<Item = [f64; 2]> + '_ {
+    pub fn iter(&self) -> impl Iterator<Item = [T; 2]> + '_ {
         self.x.iter().zip(&self.y).map(|(&x, &y)| [x, y])
     }
+}
 
+impl Vectors {
     /// The mean of all; the origin if there are none.
     pub fn middle(&self) -> [f64; 2] {
         let sum = self.iter().fold([0.0; 2], |[a, b], [x, y]| [a + x, b + y]);
@@ -57,7 +59,7 @@ impl Points {
     }
 }
 
-impl Clone for Points {
+impl<T: Clone> Clone for Vectors<T> {
     fn clone(&self) -> Self {
         Self { x: self.x.clone(), y: self.y.clone() }
     }
@@ -69,9 +71,9 @@ impl Clone for Points {
     }
 }
 
-impl FromIterator<[f64; 2]> for Points {
-    fn from_iter<I: IntoIterator<Item = [f64; 2]>>(points: I) -> Self {
-        let (x, y) = points.into_iter().map(|[x, y]| (x, y)).unzip();
+impl<T> FromIterator<[T; 2]> for Vectors<T> {
+    fn from_iter<I: IntoIterator<Item = [T; 2]>>(vectors: I) -> Self {
+        let (x, y) = vectors.into_iter().map(|[x, y]| (x, y)).unzip();
         Self { x, y }
     }
 }

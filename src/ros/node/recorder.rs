@@ -16,7 +16,7 @@ const ENCAPSULATION: [u8; 4] = [0, 1, 0, 0];
 
 /// A message on its way.
 #[derive(Clone, Copy, Debug)]
-pub struct Taped<'a> {
+pub struct RecordedMessage<'a> {
     pub topic: &'a str,
     /// Package and name of its type.
     pub package: &'static str,
@@ -30,22 +30,22 @@ pub struct Taped<'a> {
 }
 
 /// Takes the copies.
-pub type Sink = Box<dyn FnMut(&Taped<'_>) + Send>;
+pub type RecordSink = Box<dyn FnMut(&RecordedMessage<'_>) + Send>;
 
 /// A sink that takes messages.
-pub struct Tape {
-    sink: Sink,
+pub struct MessageRecorder {
+    sink: RecordSink,
     payload: Vec<u8>,
     events: String,
     frame_id: String,
 }
 
-impl Tape {
+impl MessageRecorder {
     /// For the loop of a node of this name, whose poses are in this frame.
     ///
     /// # Errors
     /// A name that no topic can have.
-    pub fn new(names: &Names, frame_id: &str, sink: Sink) -> Result<Self, NameError> {
+    pub fn new(names: &Names, frame_id: &str, sink: RecordSink) -> Result<Self, NameError> {
         let events = names.topic(EVENTS)?;
         Ok(Self { sink, payload: Vec::new(), events, frame_id: frame_id.to_owned() })
     }
@@ -61,7 +61,7 @@ impl Tape {
         }
         self.payload.extend(body);
         let (package, name) = (M::PACKAGE, M::NAME);
-        (self.sink)(&Taped { topic, package, name, payload: &self.payload, time, published });
+        (self.sink)(&RecordedMessage { topic, package, name, payload: &self.payload, time, published });
     }
 
     pub fn event(&mut self, time: f64, kind: u8, text: &str, values: &[f64]) {

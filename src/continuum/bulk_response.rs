@@ -64,7 +64,7 @@ pub fn remedy(error: &HomogeniseError) -> &'static str {
 
 fn check_homogeneous(scene: &Scene) -> Result<(), SceneError> {
     let no_fixed = |what: &str| format!("{what} has no fixed weights, so no material");
-    let (key, message) = if let Neighbourhood::Present { .. } = scene.neighbourhood {
+    let (key, message) = if let Neighbourhood::Dynamic { .. } = scene.neighbourhood {
         ("neighbours.kind", no_fixed("a rule whose neighbours are found anew at every step"))
     } else if matches!(scene.mean, Mean::Power { .. }) {
         ("rule.mean", no_fixed("a power mean of coordinates"))
@@ -230,7 +230,7 @@ pub(super) fn cautions(scene: &Scene) -> Vec<String> {
 /// stable, and an update that does not overshoot it never grows.
 fn waves_in_doubt(scene: &Scene) -> Option<(Crystal, Zone)> {
     let is_of_lattice =
-        !scene.is_of_points() && !matches!(scene.neighbourhood, Neighbourhood::Present { .. });
+        !scene.is_of_points() && !matches!(scene.neighbourhood, Neighbourhood::Dynamic { .. });
     if scene.mean != Mean::Barycentre || !is_of_lattice {
         return None;
     }

@@ -4,18 +4,18 @@
 pub(crate) mod points {
     use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-    use crate::flock::points::Points;
+    use crate::flock::vectors::Vectors;
 
-    pub fn serialize<S: Serializer>(points: &Points, to: S) -> Result<S::Ok, S::Error> {
+    pub fn serialize<S: Serializer>(points: &Vectors, to: S) -> Result<S::Ok, S::Error> {
         (&points.x, &points.y).serialize(to)
     }
 
-    pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Points, D::Error> {
+    pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Vectors, D::Error> {
         let (x, y): (Vec<f64>, Vec<f64>) = Deserialize::deserialize(from)?;
         if x.len() != y.len() {
             return Err(serde::de::Error::custom("as many x as y"));
         }
-        Ok(Points { x, y })
+        Ok(Vectors { x, y })
     }
 }
 

@@ -7,8 +7,8 @@ pub use crate::fem::Effort;
 use crate::fem::{
     self, EstimatedError, FemError, Level, ShapeProblem, ShapeSolution, Strain, Stress, Support, solve_shape,
 };
-use crate::flock::points::Points;
 use crate::flock::rules::Rotation;
+use crate::flock::vectors::Vectors;
 use crate::geometry::outline::Outline;
 use crate::geometry::partition::Partition;
 use crate::geometry::portion::Portion;
@@ -26,7 +26,7 @@ pub struct Setting<'a> {
     /// The outline with the edges of inclusions, and what these are made of, where there are any.
     pub inclusions: Option<(&'a Partition, &'a [Elastic])>,
     /// Where the particles are \[length\], shape \[particles\].
-    pub reference: &'a Points,
+    pub reference: &'a Vectors,
     /// Distance of neighbouring particles \[length\].
     pub spacing: f64,
     pub elastic: &'a Elastic,
@@ -40,9 +40,9 @@ pub struct Setting<'a> {
 
 /// The displacement of a shape in equilibrium.
 #[derive(Clone, Debug)]
-pub struct Truth {
+pub struct Reference {
     /// Displacement of each particle \[length\], shape \[particles\]; zero for those outside the shape.
-    pub displacement: Points,
+    pub displacement: Vectors,
     is_known: Vec<bool>,
     solution: ShapeSolution,
     spacing: f64,
@@ -50,7 +50,7 @@ pub struct Truth {
 
 /// Why there is no truth.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum TruthError {
+pub enum ReferenceError {
     #[error(
         "the truth has no equilibrium: the part of the body around ({:.6}, {:.6}) is not held and free to {motion}", .place[0], .place[1]
     )]
@@ -63,7 +63,7 @@ pub enum TruthError {
     Fem(FemError),
 }
 
-impl From<FemError> for TruthError {
+impl From<FemError> for ReferenceError {
     fn from(error: FemError) -> Self {
         match error {
             FemError::Unheld { x, y, motion } => Self::Mechanism { place: [x, y], motion },
@@ -73,12 +73,12 @@ impl From<FemError> for TruthError {
     }
 }
 
-impl Truth {
+impl Reference {
     /// Solves until the truth's own error is what `effort` asks for.
     ///
     /// # Errors
     /// Names the place at which the shape is not held, or what keeps it from being meshed.
-    pub fn solve(setting: Setting<'_>, effort: &Effort) -> Result<Self, TruthError> {
+    pub fn solve(setting: Setting<'_>, effort: &Effort) -> Result<Self, ReferenceError> {
         Self::solve_with(setting, Vec::<(_, fn(Point, Point) -> Point)>::new(), effort)
     }
 
@@ -87,7 +87,7 @@ impl Truth {
         setting: Setting<'a>,
         more: Vec<(Vec<Portion>, impl Fn(Point, Point) -> Point + 'a)>,
         effort: &Effort,
-    ) -> Result<Self, TruthError> {
+    ) -> Result<Self, ReferenceError> {
         let Setting { outline, inclusions, reference, spacing, elastic, rotation, supports, loads } = setting;
         let mut problem = ShapeProblem::new(outline, material(elastic)?);
         if let Some((partition, elastics)) = inclusions {
@@ -148,7 +148,7 @@ impl Truth {
     ///
     /// # Errors
     /// Names the first point further outside.
-    pub fn displacements_at(&self, points: &Points) -> Result<Points, TruthError> {
+    pub fn displacements_at(&self, points: &Vectors) -> Result<Vectors, ReferenceError> {
         let places: Vec<Point> = points.iter().collect();
         Ok(self.solution.displacements_within(&places, self.spacing)?.into_iter().collect())
     }
@@ -161,8 +161,8 @@ impl Truth {
     /// Von Mises stress \[force / length^2\] there.
     ///
     /// # Errors
-    /// As [`Truth::stress_at`].
-    pub fn von_mises_at(&self, places: &Points) -> Result<Vec<f64>, TruthError> {
+    /// As [`Reference::stress_at`].
+    pub fn von_mises_at(&self, places: &Vectors) -> Result<Vec<f64>, ReferenceError> {
         Ok(self.stress_at(places)?.iter().map(Stress::von_mises).collect())
     }
 
@@ -172,7 +172,7 @@ impl Truth {
     ///
     /// # Errors
     /// Names the first place further outside.
-    pub fn stress_at(&self, places: &Points) -> Result<Vec<Stress>, TruthError> {
+    pub fn stress_at(&self, places: &Vectors) -> Result<Vec<Stress>, ReferenceError> {
         let places: Vec<Point> = places.iter().collect();
         Ok(self.solution.stress_within(&places, self.spacing)?)
     }
@@ -195,7 +195,7 @@ fn material(elastic: &Elastic) -> Result<fem::Material, FemError> {
 }
 
 /// Finite elements take forces per area and per volume.
-fn pull<'a>(problem: &mut ShapeProblem<'a>, loads: &'a [Load], reference: &Points, thickness: f64) {
+fn pull<'a>(problem: &mut ShapeProblem<'a>, loads: &'a [Load], reference: &Vectors, thickness: f64) {
     for load in loads {
         match load {
             Load::Outline(load) => {

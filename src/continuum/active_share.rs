@@ -8,12 +8,12 @@ use crate::sweep::Sweep;
 /// Share of the followers' updates that the motion of the leaders can reach within `stop.steps` \[1\]; the others
 /// are known to change nothing and are left out. `None` where every update is made: the sweep of this scene does not
 /// look for what stands still.
-pub fn share_reached(plan: &Plan) -> Option<f64> {
-    let Plan { body, interaction, changes, .. } = plan;
-    let looks = looks_at_every_step(plan.present_radius.is_some(), interaction, changes);
-    let sweep = || Sweep::compile(plan.update, &plan.interaction, &plan.roles);
+pub fn active_share(plan: &Plan) -> Option<f64> {
+    let Plan { body, flock, changes, .. } = plan;
+    let looks = looks_at_every_step(plan.present_radius.is_some(), flock, changes);
+    let sweep = || Sweep::compile(plan.update, &plan.flock, &plan.roles);
     // A load moves all of a body at once.
-    if looks || interaction.forces.is_some() || !sweep().takes_several(body.frame.as_ref()) {
+    if looks || flock.forces.is_some() || !sweep().takes_several(body.frame.as_ref()) {
         return None;
     }
     let steps = plan.stop.steps;
@@ -58,7 +58,7 @@ fn first_motions(plan: &Plan, steps: usize) -> Vec<usize> {
 
 /// Who sees each particle: the frame sees those it serves.
 fn seen_by(plan: &Plan) -> Neighbours {
-    let neighbours = &plan.interaction.neighbours;
+    let neighbours = &plan.flock.neighbours;
     let pairs = || {
         let lists = (0..plan.count()).flat_map(|j| neighbours.of(j).iter().map(move |&k| (j as u32, k)));
         let points = plan.body.frame.iter().flat_map(|frame| (0..frame.len()).map(move |k| (frame, k)));
