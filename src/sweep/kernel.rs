@@ -10,6 +10,7 @@
 mod means;
 
 use std::marker::PhantomData;
+use std::ops::Range;
 
 use super::rows::{Coefficients, Run};
 use super::terms::Terms;
@@ -119,25 +120,32 @@ impl<T: Real, const P: usize> Work<'_, '_, T, P> {
                 [true, true] => self.means_and::<BOTH>(),
             },
             After::Contract(..) => self.means_and::<CONTRACTED>(),
-            After::Nothing => self.means_and::<BARE>(),
+            After::Nothing => match (self.tables.coefficients, self.neighbours()) {
+                (Coefficients::Equal, 3) => self.dispatch::<Equal<3, BARE>>(),
+                (Coefficients::Equal, 5) => self.dispatch::<Equal<5, BARE>>(),
+                (Coefficients::Equal, 12) => self.dispatch::<Equal<12, BARE>>(),
+                (Coefficients::Equal, 18) => self.dispatch::<Equal<18, BARE>>(),
+                (Coefficients::Equal, 24) => self.dispatch::<Equal<24, BARE>>(),
+                _ => self.means_and::<BARE>(),
+            },
         }
     }
 
+    /// Of the most common neighbourhoods: each loop takes its time to compile.
     fn means_and<const A: u8>(self) {
-        match (self.tables.coefficients, self.runs.first().map_or(0, |run| run.neighbours)) {
-            (Coefficients::Equal, 3) => self.dispatch::<Equal<3, A>>(),
+        match (self.tables.coefficients, self.neighbours()) {
             (Coefficients::Equal, 4) => self.dispatch::<Equal<4, A>>(),
-            (Coefficients::Equal, 5) => self.dispatch::<Equal<5, A>>(),
             (Coefficients::Equal, 6) => self.dispatch::<Equal<6, A>>(),
             (Coefficients::Equal, 8) => self.dispatch::<Equal<8, A>>(),
-            (Coefficients::Equal, 12) => self.dispatch::<Equal<12, A>>(),
-            (Coefficients::Equal, 18) => self.dispatch::<Equal<18, A>>(),
-            (Coefficients::Equal, 24) => self.dispatch::<Equal<24, A>>(),
             (Coefficients::Scalar(_), 4) => self.dispatch::<Scalar<4, A>>(),
             (Coefficients::Scalar(_), 6) => self.dispatch::<Scalar<6, A>>(),
             (Coefficients::Scalar(_), 8) => self.dispatch::<Scalar<8, A>>(),
             _ => self.dispatch::<Any>(),
         }
+    }
+
+    fn neighbours(&self) -> u32 {
+        self.runs.first().map_or(0, |run| run.neighbours)
     }
 
     fn dispatch<M: Mean>(self) {
@@ -159,12 +167,7 @@ impl<M: Mean, T: Real, const P: usize> InLanes for Loops<'_, '_, M, T, P> {
         let Work { runs, tables, tile, components, after } = self.0;
         for abreast in runs.chunks(ABREAST) {
             // Runs with gaps are those of small bodies, which a tile gains nothing.
-            if abreast.iter().any(|run| run.gaps > 0) {
-                for run in abreast {
-                    over_gaps::<M, T, P, W>(run, tables, components, after);
-                }
-                continue;
-            }
+            let tile = if abreast.iter().any(|run| run.gaps > 0) { 1 << 40 } else { tile };
             let (mut corner, mut more) = (0, true);
             while more {
                 more = false;
@@ -176,7 +179,12 @@ impl<M: Mean, T: Real, const P: usize> InLanes for Loops<'_, '_, M, T, P> {
                     let (from, to) = (start.max(begin), end.min(begin + tile));
                     more |= to < end;
                     if from < to {
+                        let kept = &tables.kept[run.kept as usize..][..run.gaps as usize];
+                        let aside = (!kept.is_empty()).then(|| set_aside(kept, from..to, components));
                         fill_part::<M, T, P, W>(Part { run, tables, from, to, components, after });
+                        if let Some(aside) = aside {
+                            put_back(kept, from..to, &aside, components);
+                        }
                     }
                 }
                 corner += tile;
@@ -185,23 +193,32 @@ impl<M: Mean, T: Real, const P: usize> InLanes for Loops<'_, '_, M, T, P> {
     }
 }
 
-/// A whole run; what its gaps hold is set aside meanwhile.
-#[inline(always)]
-fn over_gaps<M: Mean, T: Real, const P: usize, const W: usize>(
-    run: &Run,
-    tables: Tables<'_>,
-    components: &mut [Component<'_, T>; P],
-    after: After<'_, T>,
-) {
-    let kept = &tables.kept[run.kept as usize..][..run.gaps as usize];
+/// What stands in the gaps of a part.
+fn set_aside<T: Real, const P: usize>(
+    kept: &[u32],
+    part: Range<usize>,
+    components: &[Component<'_, T>; P],
+) -> [[T; MOST_KEPT]; P] {
     let mut aside = [[T::default(); MOST_KEPT]; P];
-    for (aside, component) in aside.iter_mut().zip(&*components) {
-        aside.iter_mut().zip(kept).for_each(|(a, &j)| *a = component.next[j as usize - component.begin]);
+    for (aside, component) in aside.iter_mut().zip(components) {
+        for (aside, &j) in aside.iter_mut().zip(kept).filter(|(_, j)| part.contains(&(**j as usize))) {
+            *aside = component.next[j as usize - component.begin];
+        }
     }
-    let (from, to) = (run.start as usize, (run.start + run.len) as usize);
-    fill_part::<M, T, P, W>(Part { run, tables, from, to, components, after });
+    aside
+}
+
+/// Undoes what a sweep did to gaps.
+fn put_back<T: Real, const P: usize>(
+    kept: &[u32],
+    part: Range<usize>,
+    aside: &[[T; MOST_KEPT]; P],
+    components: &mut [Component<'_, T>; P],
+) {
     for (aside, component) in aside.iter().zip(components) {
-        aside.iter().zip(kept).for_each(|(&a, &j)| component.next[j as usize - component.begin] = a);
+        for (&aside, &j) in aside.iter().zip(kept).filter(|(_, j)| part.contains(&(**j as usize))) {
+            component.next[j as usize - component.begin] = aside;
+        }
     }
 }
 

@@ -8,13 +8,10 @@ use crate::flock::lattice::{Lattice, LatticeKind};
 use crate::flock::law::{Flock, MatrixWeights, Weights};
 use crate::flock::neighbourhood::{Neighbourhood, Neighbours};
 use crate::flock::numbering::order_in_columns;
-use crate::flock::real::Real;
 use crate::flock::role::Role;
 use crate::flock::rules::Rule;
 use crate::flock::vectors::Vectors;
-use crate::sweep::rows::Rows;
-use crate::sweep::terms::Terms;
-use crate::sweep::{Activity, Led, MOST_STEPS, Steps, Sweep, Update};
+use crate::sweep::{Activity, Led, MOST_STEPS, Sweep, Update};
 
 pub const LOOP: &str = "a plain compiled loop";
 pub const PLAIN: &str = "barycentre, 4 neighbours";
@@ -76,8 +73,6 @@ pub fn all(sides: &[usize], other: usize) -> Vec<Make> {
         all.push(Box::new(move || plain_loop(side)));
         all.push(Box::new(move || square(side, 1)));
         all.push(Box::new(move || square(side, MOST_STEPS)));
-        all.push(Box::new(move || square_single(side, 1)));
-        all.push(Box::new(move || square_single(side, MOST_STEPS)));
     }
     all.push(Box::new(move || {
         let body = Body::square(other, &Neighbourhood::Chebyshev { radius: 1 });
@@ -169,46 +164,6 @@ const FIRST: Neighbourhood = Neighbourhood::First { keep: None };
 
 fn square(side: usize, steps_together: usize) -> Subject {
     Body::square(side, &FIRST).subject(PLAIN, BYTES_PER_UPDATE, steps_together)
-}
-
-/// In single precision, which half the memory carries.
-fn square_single(side: usize, steps_together: usize) -> Subject {
-    let body = Body::square(side, &FIRST);
-    let follows: Vec<bool> = body.roles.iter().map(|&role| role == Role::Follower).collect();
-    let unoffset = Flock { rest: None, ..body.flock };
-    let rows = Rows::compile(&unoffset, &follows).expect("a barycentre");
-    let followers = follows.iter().filter(|&&follows| follows).count();
-    let single = |values: &[f64]| values.iter().map(|&value| f32::of(value)).collect::<Vec<f32>>();
-    let mut even = [single(&body.present.x), single(&body.present.y)];
-    let mut odd = even.clone();
-    let step = move |steps: usize| {
-        let mut to_go = steps;
-        while to_go > 0 {
-            let count = to_go.min(steps_together);
-            let (rows, led, threads) = (&rows, Led::NOBODY, rayon::current_num_threads());
-            let (terms, rest, force, frame) = (Terms::NONE, None, None, None);
-            let steps = Steps { rows, terms, rest, force, frame, led, count, farther: None, threads };
-            let taken = |[x, y]: &mut [Vec<f32>; 2]| [std::mem::take(x), std::mem::take(y)];
-            let ([mut ex, mut ey], [mut ox, mut oy]) = (taken(&mut even), taken(&mut odd));
-            steps.take(&mut Activity::default(), [&mut ex, &mut ey], [&mut ox, &mut oy]);
-            (even, odd) = ([ex, ey], [ox, oy]);
-            if count % 2 == 1 {
-                std::mem::swap(&mut even, &mut odd);
-            }
-            to_go -= count;
-        }
-    };
-    Subject {
-        name: PLAIN,
-        precision: "f32",
-        side,
-        steps_together,
-        followers,
-        bonds_watched: 0,
-        bytes_per_update: BYTES_PER_UPDATE / 2.0,
-        is_shared: true,
-        step: Box::new(step),
-    }
 }
 
 /// What one would write without thinking of caches: for each column, for each row.
