@@ -95,6 +95,10 @@ impl Gathers {
                 (Coefficients::Equal, 8) => all.sweep::<8, P>(components),
                 _ => all.sweep_of_any(size, coefficients, components),
             }
+            // A particle without neighbours stays.
+            if size > 0 {
+                all.complete(components);
+            }
         }
     }
 }
@@ -132,7 +136,6 @@ impl<T: Real> Alike<'_, T> {
         components: &mut [Component<'_, T>; P],
         rest: impl Fn(usize) -> [T; P],
     ) {
-        let is_bare = self.terms.is_empty();
         let is_large = components.iter().any(|component| component.present.len() > IN_CACHE);
         // Where particle number 0 would stand: what a component says would be read again after every store.
         let present = components.each_ref().map(|c| c.present.as_ptr().wrapping_sub(c.seen_from));
@@ -156,30 +159,36 @@ impl<T: Real> Alike<'_, T> {
                 }
             }
             let rest = rest(j);
-            let mut target: [[T; 1]; P] = std::array::from_fn(|p| [sum[p] / T::of(N as f64) + rest[p]]);
-            if !is_bare {
-                self.complete(j, components, &mut target);
-            }
             for p in 0..P {
+                let target = sum[p] / T::of(N as f64) + rest[p];
                 // SAFETY: the particles ascend, and the first and the last were asserted to lie within the component.
                 // Measured, with the above: lists are swept 1.5 times as fast as with a check of each index.
-                unsafe { *next[p].wrapping_add(j) = target[p][0] };
+                unsafe { *next[p].wrapping_add(j) = target };
             }
         }
     }
 
-    /// Makes a target of a mean.
-    #[inline(always)]
-    fn complete<const P: usize>(&self, j: usize, of: &[Component<'_, T>; P], target: &mut [[T; 1]; P]) {
+    /// Makes targets of the means.
+    fn complete<const P: usize>(&self, components: &mut [Component<'_, T>; P]) {
         if self.terms.is_empty() {
             return;
         }
-        if let (Some(along), [x, y]) = (self.terms.couples_along(), &mut target[..]) {
-            let (along, across) = if along == 0 { (x, y) } else { (y, x) };
-            self.terms.contract(j, along, across);
-        }
-        for (component, target) in of.iter().zip(target) {
-            self.terms.overshoot(component.axis, j, &component.present[j - component.seen_from..], target);
+        for &j in self.particles {
+            let j = j as usize;
+            let mut target = components.each_ref().map(|c| [c.next[j - c.begin]]);
+            if let (Some(along), [x, y]) = (self.terms.couples_along(), &mut target[..]) {
+                let (along, across) = if along == 0 { (x, y) } else { (y, x) };
+                self.terms.contract(j, along, across);
+            }
+            for (component, target) in components.iter_mut().zip(&mut target) {
+                self.terms.overshoot(
+                    component.axis,
+                    j,
+                    &component.present[j - component.seen_from..],
+                    target,
+                );
+                component.next[j - component.begin] = target[0];
+            }
         }
     }
 
@@ -193,7 +202,7 @@ impl<T: Real> Alike<'_, T> {
         for (at, &j) in self.particles.iter().enumerate() {
             let (j, list) = (j as usize, &self.index[at * size..][..size]);
             let of = |k: u32| components.each_ref().map(|c| c.present[k as usize - c.seen_from]);
-            let mut target = of(j as u32).map(|here| [here]);
+            let mut target = of(j as u32);
             if !list.is_empty() {
                 let mean = match coefficients {
                     Coefficients::Equal => weighted(list.iter().map(|&k| (T::of(1.0), of(k))), size as f64),
@@ -214,10 +223,9 @@ impl<T: Real> Alike<'_, T> {
                     let compliance = &blocks[self.rows[at] as usize..].as_chunks::<4>().0[size];
                     all = plus(all, compliance, force.map(Option::unwrap_or_default));
                 }
-                target = all.map(|target| [target]);
-                self.complete(j, components, &mut target);
+                target = all;
             }
-            for (component, [target]) in components.iter_mut().zip(target) {
+            for (component, target) in components.iter_mut().zip(target) {
                 component.next[j - component.begin] = target;
             }
         }
