@@ -171,7 +171,7 @@ fn a_literal_barycentre_without_a_frame_draws_the_body_together_and_the_rest_off
         let (low, high) = outcome.engine.present().bounds(0..400).expect("has particles");
         high[0] - low[0]
     };
-    assert_eq!(shrinks("rule.rest=kept"), 19.0);
+    assert_eq!(shrinks("rule.rest=balanced"), 19.0);
     assert!(shrinks("rule.rest=literal") < 15.0);
 }
 
