@@ -4,6 +4,8 @@
 //! computed from its neighbours' positions. That function, neighbours in and target position out,
 //! is the flocking rule, and it is written once, in [`flock`].
 //!
+//! The manual is in [`guide`]: scenes, materials, accuracy, fracture, swarms, ROS 2, performance, theory.
+//!
 //! The rooms, in the direction data flows:
 //!
 //! * [`scene`]: a TOML file becomes a validated [`scene::Scene`]; nothing downstream re-checks it.
@@ -13,14 +15,14 @@
 //! * [`solve`]: spectra of sweeps, and the solvers for equilibrium.
 //! * [`material`]: rule weights from Young's modulus and Poisson's ratio, and what material a rule is.
 //! * [`continuum`]: plans a scene, steps it or goes straight to rest, and hands what happens to an observer.
-//! * [`stability`]: when a body grows instead of coming to rest, foretold and found; the extremes.
+//! * [`stability`]: when a body grows instead of coming to rest, predicted and measured; extreme input.
 //! * `export` (feature `export`): CSV, JSON, VTK and figures, one file per format.
-//! * `fem` (feature `fem`): finite elements, the truth to hold the rules against; it knows no flock.
-//! * `compare` (feature `fem`): rule and truth on the same body, and the numbers that tell them apart.
-//! * `trade` (feature `fem`): what accuracy costs: many settings of a scene against its truth.
+//! * `fem` (feature `fem`): finite elements, the reference for the rules; it imports no flock.
+//! * `compare` (feature `fem`): rule and finite elements on the same body, and their differences.
+//! * `trade` (feature `fem`): what accuracy costs: many settings of a scene against its reference.
 //! * `swarm` (feature `swarm`): formations of robots: targets by the same rule, made safe; flights of simulated robots.
 //! * `ros` (feature `ros`): the same over ROS 2: arguments, messages, parameters, lifecycle, the node.
-//! * `shm` (feature `shm`): the same over shared memory, without a copy; a body under way for others to look at.
+//! * `shm` (feature `shm`): the same over shared memory, without a copy; a running body published to other processes.
 //! * `record` (feature `record`): recordings of flights and runs for Foxglove and `ros2 bag`, and their replay.
 //! * `bench` (feature `bench`): how fast sweeps and solvers are, beside what the machine and others can do.
 //!
@@ -38,6 +40,7 @@
 pub mod continuum;
 pub mod flock;
 pub mod geometry;
+pub mod guide;
 pub mod material;
 pub mod scene;
 pub mod solve;
@@ -62,3 +65,8 @@ pub mod shm;
 pub mod swarm;
 #[cfg(feature = "fem")]
 pub mod trade;
+
+/// The README's Rust code, compiled and run with the other doctests.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -1,6 +1,7 @@
 //! What a scene says is what happens: roles, motions, updates, fracture, stopping.
 
 use std::ops::ControlFlow;
+use std::path::Path;
 
 use flockform::continuum::engine::Engine;
 use flockform::continuum::plan::Plan;
@@ -8,6 +9,7 @@ use flockform::continuum::report::PlanReport;
 use flockform::continuum::run::{Outcome, StopReason, run};
 use flockform::flock::role::Role;
 use flockform::flock::vectors::distance;
+use flockform::scene::swarm::Swarm;
 use flockform::scene::{Scene, bundled};
 
 fn scene(name: &str, overrides: &[&str]) -> Scene {
@@ -171,7 +173,7 @@ fn a_literal_barycentre_without_a_frame_draws_the_body_together_and_the_rest_off
         let (low, high) = outcome.engine.present().bounds(0..400).expect("has particles");
         high[0] - low[0]
     };
-    assert_eq!(shrinks("rule.rest=kept"), 19.0);
+    assert_eq!(shrinks("rule.rest=balanced"), 19.0);
     assert!(shrinks("rule.rest=literal") < 15.0);
 }
 
@@ -306,4 +308,36 @@ fn a_specimen_has_the_standard_s_outline_on_every_lattice() {
             assert!(near(width(0.0, 20.0), grip), "{lattice} {shape} grip");
         }
     }
+}
+
+/// The TOML blocks of a document.
+fn toml_blocks(document: &str) -> impl Iterator<Item = &str> {
+    document.split("\n```toml\n").skip(1).map(|rest| rest.split("\n```").next().expect("a block"))
+}
+
+#[test]
+fn every_toml_block_of_readme_and_guides_is_a_scene_or_a_swarm() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let guides = std::fs::read_dir(root.join("src/guide")).expect("guides");
+    let guides = guides.map(|entry| entry.expect("readable").path());
+    let folder = tempfile::tempdir().expect("a folder");
+    let cloud: String = (0..64).map(|k| format!("{},{}\n", k / 8, k % 8)).collect();
+    std::fs::write(folder.path().join("cloud.csv"), format!("x,y\n{cloud}")).expect("written");
+    let (mut scenes, mut swarms) = (0, 0);
+    for path in guides.chain([root.join("README.md")]) {
+        let (file, document) =
+            (path.display().to_string(), std::fs::read_to_string(&path).expect("readable"));
+        for text in toml_blocks(&document) {
+            let outcome = if text.contains("\n[flight") {
+                swarms += 1;
+                Swarm::parse("guide", &file, text, &[], Some(folder.path())).map(|_| ())
+            } else {
+                scenes += 1;
+                let scene = Scene::parse("guide", &file, text, &[], Some(folder.path()));
+                scene.and_then(|scene| Plan::new(&scene)).map(|_| ())
+            };
+            outcome.unwrap_or_else(|error| panic!("{file}: {error}\nin\n{text}"));
+        }
+    }
+    assert!(scenes >= 7 && swarms >= 2, "{scenes} scenes, {swarms} swarms");
 }

@@ -1,4 +1,4 @@
-//! Thresholds foretold and found, and extremes that end right or refused.
+//! Thresholds predicted and measured, and extremes that end right or refused.
 
 use flockform::continuum::engine::Engine;
 use flockform::continuum::plan::Plan;
@@ -148,11 +148,11 @@ fn a_nonlinear_rule_has_no_threshold_but_its_extremes() {
 fn a_body_that_nobody_holds_is_refused_by_name() {
     let scene = load("tension", &["roles=[]"]).expect("loads");
     let refused = Subject::of(&scene).expect_err("free").to_string();
-    assert!(refused.contains("nobody leads or is clamped") && refused.contains("help"), "{refused}");
+    assert!(refused.contains("no leader and no clamp") && refused.contains("help"), "{refused}");
     let all = "roles=[{region={kind=\"all\"},role=\"clamped\"}]";
     let refused = Subject::of(&load("tension", &[all, "frame=none", NO_PROBES]).expect("loads"))
         .expect_err("none follow");
-    assert!(refused.to_string().contains("nobody follows"), "{refused}");
+    assert!(refused.to_string().contains("no followers"), "{refused}");
 }
 
 fn assert_none_wrong(cases: &[Case]) {
@@ -209,7 +209,7 @@ fn extremes_end_right_or_refused() {
             "spacing 1e9",
             "coincident leaders",
             "a body of one follower",
-            "nobody leads, stepped",
+            "no leaders, stepped",
             "one particle and no leader, stepped",
             "1e9 spacings from the origin",
             "nu = -0.99, plane stress:",
@@ -249,9 +249,9 @@ fn extremes_end_right_or_refused() {
             ("spacing 1e308", ""),
             ("1e12 spacings from the origin", "steps of"),
             ("1e300 spacings from the origin", "steps of"),
-            ("nobody leads, solved", "particle 1"),
-            ("nobody leads, material, solved", "particle 1"),
-            ("nobody leads, thresholds", "particle 1"),
+            ("no leaders, solved", "particle 1"),
+            ("no leaders, material, solved", "particle 1"),
+            ("no leaders, thresholds", "particle 1"),
             ("followers in a part of their own", "particle 1 and particle"),
             ("nu = -1, plane stress", "cost no energy"),
             ("nu = 0.5, plane strain", "incompressible"),

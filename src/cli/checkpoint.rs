@@ -15,16 +15,16 @@ use flockform::scene::Scene;
 
 #[derive(Debug, Args)]
 pub struct CheckpointArguments {
-    /// Keep a checkpoint every so often, to go on from if the run is killed: 60s, 10min, 2h, 5000steps or
+    /// Interval between checkpoints, from which a killed run can be resumed: 60s, 10min, 2h, 5000steps or
     /// never; may be given twice
     #[arg(long, value_name = "INTERVAL", default_value = "60s")]
     checkpoint_every: Vec<Interval>,
-    /// Go on with the run to this --out that was killed or interrupted; its results are the same to the bit
+    /// Resume the killed or interrupted run with this --out; results are the same to the bit
     #[arg(long, value_name = "DIR", conflicts_with_all = ["out", "force", "record"])]
     pub resume: Option<PathBuf>,
 }
 
-/// How long a killed run may have gone on for nothing.
+/// Most work that a killed run loses.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Interval {
     Time(Duration),

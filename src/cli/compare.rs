@@ -27,7 +27,7 @@ pub struct CompareArguments {
     output: OutputArguments,
     #[command(flatten)]
     report: ReportArguments,
-    /// Refine the truth until it states at most this relative error of its own displacement
+    /// Largest relative error of displacement that the finite elements may state of themselves
     #[arg(long, value_name = "E", default_value_t = Effort::default().target, value_parser = part_of_one)]
     truth_error: f64,
     /// Print compare.json instead of a table
@@ -94,8 +94,8 @@ fn words(scene: &Scene, compared: &Compared) -> String {
     if scene.rotation() == Rotation::Corotated {
         words += "rule and truth follow the body's turns: strain is its stretch, stress is in axes that turn with it\n";
     }
-    for told in &compared.places {
-        words += &told.to_string();
+    for place in &compared.places {
+        words += &place.to_string();
     }
     words
 }

@@ -15,14 +15,14 @@ use super::{FAILED, Refusal, print};
 
 #[derive(Debug, Args)]
 pub struct GalleryArguments {
-    /// Only these bundled scenes and swarms [default: all]
+    /// Bundled scenes and swarms to run [default: all]
     #[arg(value_name = "NAME")]
     names: Vec<String>,
     #[command(flatten)]
     output: OutputArguments,
 }
 
-/// Runs what is bundled, each in a process of its own, and writes the page.
+/// Runs the bundled scenes and swarms, each in a process of its own, and writes the page.
 pub fn gallery(arguments: &GalleryArguments) -> Result<ExitCode, Refusal> {
     let exhibits = exhibits(&arguments.names)?;
     let folder = arguments.output.folder("gallery")?;

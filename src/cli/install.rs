@@ -15,12 +15,12 @@ pub struct InstallArguments {
     /// Folder to install into: a new one, or the install folder of a workspace
     #[arg(long, value_name = "DIR")]
     prefix: PathBuf,
-    /// Replace files that are not flockform's, or were changed since it installed them
+    /// Replace files of other origin, and files changed since they were installed
     #[arg(long)]
     force: bool,
 }
 
-/// Why nothing was installed.
+/// Error installing the package.
 #[derive(Debug, thiserror::Error)]
 pub enum InstallError {
     #[error(

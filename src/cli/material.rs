@@ -16,7 +16,7 @@ use super::{Refusal, SceneArguments};
 /// constants.
 #[derive(Debug, Args)]
 pub struct MaterialArguments {
-    /// Name of a bundled scene or path of a scene file, whose rule is the question
+    /// Name of a bundled scene or path of a scene file whose rule to examine
     #[arg(conflicts_with_all = ["lattice", "neighbours", "weights", "young"])]
     scene: Option<String>,
     /// Override a key of the scene, as in `flockform run`
@@ -24,12 +24,12 @@ pub struct MaterialArguments {
     set: Vec<String>,
     #[command(flatten)]
     lattice: LatticeArguments,
-    /// Who sees whom: first, first:3, ring:1, second, straight, within:1.5, or offsets in columns and
-    /// rows, offsets:1,0;-1,0 [default: first]
-    #[arg(long, value_name = "WHO", requires = "lattice", conflicts_with = "young")]
+    /// Neighbours of a particle: first, first:3, chebyshev:1, second, collinear, within:1.5, or offsets in columns
+    /// and rows, offsets:1,0;-1,0 [default: first]
+    #[arg(long, value_name = "KIND", requires = "lattice", conflicts_with = "young")]
     neighbours: Option<String>,
-    /// One weight for each neighbour in the neighbourhood's order, 4,4,1,1; or distance:POWER; or
-    /// gradient:LENGTH, a second gradient [default: all the same, Eq. 1]
+    /// A weight for each neighbour in the neighbourhood's order, 4,4,1,1; or distance:POWER; or
+    /// gradient:LENGTH, a second gradient [default: equal weights, Eq. 1]
     #[arg(
         long,
         value_name = "WEIGHTS",
@@ -63,7 +63,7 @@ struct LatticeArguments {
     /// Angle between the edges in degrees: oblique
     #[arg(long, requires = "lattice", allow_negative_numbers = true)]
     angle: Option<f64>,
-    /// Turns the lattice against the axes, in degrees [default: 0]
+    /// Angle of the lattice from the axes, in degrees [default: 0]
     #[arg(long, value_name = "DEGREES", requires = "lattice", allow_negative_numbers = true)]
     orientation: Option<f64>,
 }
@@ -83,7 +83,7 @@ struct ConstantArguments {
     /// Angle of the fibres from x in degrees [default: 0]
     #[arg(long, value_name = "DEGREES", requires = "shear", allow_negative_numbers = true)]
     fiber_angle: Option<f64>,
-    /// What is assumed across the thickness [default: stress]
+    /// Assumption across the thickness [default: stress]
     #[arg(long, requires = "young", conflicts_with = "shear")]
     plane: Option<PlaneName>,
     /// Thickness of the sheet [default: 1]
@@ -171,7 +171,7 @@ fn second_gradient(
 ) -> Result<MaterialReport, WrongOption> {
     if who.is_some_and(|who| who != "collinear") {
         let message = "a second gradient reaches the sites behind the first neighbours";
-        return Err(wrong("--neighbours", message, "leave it out, or give --neighbours straight"));
+        return Err(wrong("--neighbours", message, "leave it out, or give --neighbours collinear"));
     }
     let length = number("--weights", length)?;
     let name = format!("second gradient of length {length}");

@@ -1,4 +1,4 @@
-//! The command line: what can be asked for, and who answers.
+//! The command line: commands, options, and the function behind each.
 
 mod checkpoint;
 mod compare;
@@ -52,72 +52,72 @@ pub const BAD_INPUT: u8 = 2;
 pub struct Arguments {
     #[command(subcommand)]
     pub command: Command,
-    /// Say more on standard error: -v information, -vv debugging, -vvv everything (RUST_LOG overrides)
+    /// Log more to standard error: -v information, -vv debugging, -vvv everything (RUST_LOG overrides)
     #[arg(short, long, action = clap::ArgAction::Count, global = true)]
     pub verbose: u8,
 }
 
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Run a continuum scene and write its results and figures
+    /// Runs a continuum scene and writes its results and figures
     #[command(
         after_help = "Examples:\n  flockform run tension --out /tmp/tension --set stop.steps=800 --set frame=immediate\n  flockform run --resume /tmp/tension"
     )]
     Run(run::RunArguments),
-    /// Hold a scene's rule against finite elements on the same body
+    /// Compares a scene's rule with finite elements on the same body
     #[command(
         after_help = "Example:\n  flockform compare beam --out /tmp/beam\n  flockform compare beam-paper --set neighbours.kind=second"
     )]
     Compare(compare::CompareArguments),
-    /// What accuracy costs: run a scene by many rules, spacings and solvers against finite elements
+    /// Measures what accuracy costs: many rules, spacings and solvers of a scene against finite elements
     #[command(
         after_help = "Example:\n  flockform trade grips --out /tmp/trade\n  flockform trade beam-loaded --max-particles 5000"
     )]
     Trade(trade::TradeArguments),
-    /// When a scene's body grows instead of coming to rest, foretold and found, and what holds at the extremes
+    /// Predicts and measures when a scene's body grows instead of coming to rest, and tests extreme input
     #[command(
         after_help = "Example:\n  flockform stability tension --out /tmp/stability\n  flockform stability beam --set update.damping=0.7 --no-extremes\n\n\
                       Exit codes: 0 predictions and runs agree and no extreme is wrong, 1 otherwise, 2 bad input."
     )]
     Stability(stability::StabilityArguments),
-    /// Fly a swarm of simulated robots, without middleware, and say how it went
+    /// Flies a swarm of simulated robots, without middleware, and reports how it went
     #[command(
         after_help = "Example:\n  flockform swarm gap --out /tmp/gap\n  flockform swarm antipodal --set limits.speed=0.5\n\n\
                       Exit codes: 0 flown and every declared bound held, 1 a bound broken or interrupted, 2 bad input."
     )]
     Swarm(swarm::SwarmArguments),
-    /// Fly a recorded flight again and say where today's targets differ from the recorded ones
+    /// Replays a recorded flight and lists where today's targets differ from the recorded ones
     #[command(
         after_help = "Examples:\n  flockform swarm gap --record gap.mcap\n  flockform replay gap.mcap\n  flockform replay gap.mcap --set limits.speed=0.5 --tolerance 0.01\n\n\
                       Exit codes: 0 no target is farther off than the tolerance, 1 some are, 2 bad input."
     )]
     Replay(replay::ReplayArguments),
-    /// Keep a swarm in formation over ROS 2 or shared memory: poses in, safe targets out
+    /// Keeps a swarm in formation over ROS 2 or shared memory: poses in, safe targets out
     #[command(
         after_help = "Example:\n  flockform node square --ros-args -r __ns:=/fleet -p speed_limit:=0.5\n  flockform node square --member robot_3\n  flockform node square --transport shm\n\n\
                       Exit codes: 0 ended as asked, 2 bad input, 70 the middleware is gone and cannot be started again."
     )]
     Node(node::NodeArguments),
-    /// Be the robots of a swarm file, simulated, over ROS 2 or shared memory
+    /// Simulates the robots of a swarm file, over ROS 2 or shared memory
     #[command(
         after_help = "Example:\n  flockform robots square --ros-args -p publish_clock:=true\n  flockform robots square --transport shm"
     )]
     Robots(node::RobotsArguments),
-    /// Run every bundled scene and swarm and build one page that leads to their reports
+    /// Runs every bundled scene and swarm and builds a page that links to their reports
     #[command(
         after_help = "Example:\n  flockform gallery --out /tmp/gallery\n  flockform gallery tension gap"
     )]
     Gallery(gallery::GalleryArguments),
-    /// List what is bundled, a line each
+    /// Lists the bundled scenes or swarms, one a line
     #[command(after_help = "Examples:\n  flockform list scenes\n  flockform list swarms")]
     List {
-        /// Scenes or swarms
+        /// What to list
         what: Listed,
     },
-    /// Say what a scene makes the program model and what it leaves out, without running it
+    /// Shows what a scene makes the program model and what it leaves out, without running it
     #[command(after_help = "Example:\n  flockform plan fracture --set lattice.a=5.0")]
     Plan(SceneArguments),
-    /// Say what material a rule is, or which weights a material takes
+    /// Computes which material a rule is, or which weights a material takes
     #[command(
         after_help = "Examples:\n  flockform material --lattice square\n  flockform material --lattice hexagonal --neighbours second\n  \
                       flockform material --lattice hexagonal --young 210e9 --poisson 0.3 --thickness 1e-3\n  \
@@ -125,19 +125,19 @@ pub enum Command {
                       flockform material second-gradient --json"
     )]
     Material(material::MaterialArguments),
-    /// Install this program as a ROS 2 package: executable, launch files, parameters, swarms
+    /// Installs this program as a ROS 2 package: executable, launch files, parameters, swarms
     #[command(
         after_help = "Example:\n  flockform install --prefix ~/flockform && source ~/flockform/setup.bash && ros2 launch flockform formation_launch.xml"
     )]
     Install(install::InstallArguments),
-    /// Print the JSON Schema of a scene file
+    /// Prints the JSON Schema of a scene file
     #[command(after_help = "Example:\n  flockform schema > scene.schema.json\n  flockform schema --swarm")]
     Schema {
-        /// Of a swarm file instead
+        /// Print that of a swarm file instead
         #[arg(long)]
         swarm: bool,
     },
-    /// Print a completion script for a shell
+    /// Prints a completion script for a shell
     #[command(
         after_help = "Example:\n  flockform completions bash > ~/.local/share/bash-completion/completions/flockform"
     )]
@@ -145,7 +145,7 @@ pub enum Command {
         /// The shell to complete for
         shell: Shell,
     },
-    /// Measure how fast this machine runs the rules
+    /// Measures how fast this machine runs the rules
     #[command(subcommand)]
     Bench(BenchCommand),
 }
@@ -167,24 +167,24 @@ const RENAMED: [(&str, &str); 4] = [
 
 #[derive(Debug, Subcommand)]
 pub enum BenchCommand {
-    /// Particle updates per second of the plain rule, beside the machine's memory bandwidth
+    /// Particle updates per second, beside the machine's memory bandwidth
     #[command(after_help = "Example:\n  flockform bench sweep --json > sweep.json")]
     Sweep {
         /// Print JSON instead of a table
         #[arg(long)]
         json: bool,
-        /// Small sizes and few repetitions: shows that it works, measures nothing worth quoting
+        /// Small sizes and few repetitions: a trial run, whose figures mean nothing
         #[arg(long)]
         quick: bool,
     },
-    /// Robots served per millisecond: neighbour query and rule, safety filter, whole tick; pose to target over loopback
+    /// Robots per millisecond for neighbour query, rule, safety filter and whole tick; pose to target over loopback
     #[cfg(feature = "swarm")]
     #[command(after_help = "Example:\n  flockform bench swarm --json > swarm.json")]
     Swarm {
         /// Print JSON instead of a table
         #[arg(long)]
         json: bool,
-        /// Small swarms and few repetitions: shows that it works, measures nothing worth quoting
+        /// Small swarms and few repetitions: a trial run, whose figures mean nothing
         #[arg(long)]
         quick: bool,
     },
@@ -194,10 +194,10 @@ pub enum BenchCommand {
         /// Print JSON instead of a table
         #[arg(long)]
         json: bool,
-        /// Small messages and few of them: shows that it works, measures nothing worth quoting
+        /// Small messages and few of them: a trial run, whose figures mean nothing
         #[arg(long)]
         quick: bool,
-        /// Folder for table and figure too; must be empty or new
+        /// Also write the table and a figure to this folder; must be empty or new
         #[arg(long, value_name = "DIR")]
         out: Option<PathBuf>,
     },
@@ -208,18 +208,18 @@ pub enum BenchCommand {
         /// Print JSON instead of a table
         #[arg(long)]
         json: bool,
-        /// Small bodies and few repetitions: shows that it works, measures nothing worth quoting
+        /// Small bodies and few repetitions: a trial run, whose figures mean nothing
         #[arg(long)]
         quick: bool,
     },
 }
 
-/// Which scene, with which changes.
+/// A scene and the changes to it.
 #[derive(Debug, Args)]
 pub struct SceneArguments {
     /// Name of a bundled scene (see `flockform list scenes`) or path of a scene file
     pub scene: String,
-    /// Override a key of the scene, validated like the file: lattice.spacing=0.5, roles\[1\].from=30
+    /// Override a key of the scene, validated like the file: `lattice.spacing=0.5`, `roles[1].from=30`
     #[arg(long = "set", value_name = "KEY.PATH=VALUE")]
     pub set: Vec<String>,
 }
@@ -243,7 +243,7 @@ impl SceneArguments {
     }
 }
 
-/// A word as a path; one that is no file is taken for the name of something bundled, misspelt.
+/// A word as a path; one that is no file is taken for a misspelt name of a bundled file.
 fn scene_path(what: &'static str, word: &str, all: &[Bundled]) -> Result<PathBuf, Refusal> {
     let path = PathBuf::from(word);
     if path.exists() || word.contains(['/', '\\', '.']) {
@@ -255,7 +255,7 @@ fn scene_path(what: &'static str, word: &str, all: &[Bundled]) -> Result<PathBuf
     Err(Refusal::NotBundled { what, name: word.to_owned(), nearest })
 }
 
-/// Why nothing was done.
+/// Reason why a command refused its input.
 #[derive(Debug, thiserror::Error)]
 pub enum Refusal {
     #[error("{0}")]
@@ -303,16 +303,16 @@ pub enum Refusal {
     Threads { threads: usize, error: rayon::ThreadPoolBuildError },
 }
 
-/// The command line, with what ROS was told split off.
+/// The command line, with the ROS arguments split off.
 ///
 /// # Errors
-/// ROS arguments that are none, or that are given to a command that is no node.
+/// Malformed ROS arguments, or ROS arguments for a command that is no node.
 pub fn arguments() -> Result<(Arguments, RosArguments), Refusal> {
     let all = std::env::args_os().map(|argument| argument.to_string_lossy().into_owned());
     let all: Vec<String> = all.collect();
     let is_asked = all.iter().any(|argument| argument == "--ros-args");
     let split = RosArguments::parse(all.clone(), &|name| std::env::var(name).ok());
-    // What is wrong with ROS's variables concerns no command that is no node.
+    // Only a node is concerned by wrong ROS variables.
     let (rest, ros) = match split {
         Err(error) if is_asked => return Err(error.into()),
         Err(error) => (all, Err(error)),

@@ -18,7 +18,7 @@ use super::supervise::{Life, supervise};
 use super::swarm::SwarmFileArguments;
 use super::{Refusal, print};
 
-/// What lies between the node and the robots.
+/// Middleware between the node and the robots.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum Transport {
     /// ROS 2: topics, services, parameters, lifecycle
@@ -32,10 +32,10 @@ pub enum Transport {
 pub struct NodeArguments {
     #[command(flatten)]
     swarm: SwarmFileArguments,
-    /// What poses and targets travel by
+    /// Middleware that carries poses and targets
     #[arg(long, value_enum, default_value_t)]
     pub transport: Transport,
-    /// Be the node of this robot alone: hear nobody but it and its neighbours, and send it alone targets
+    /// Run as the node of this robot: receive only its pose and its neighbours', and send only its target
     #[arg(long, value_name = "NAME")]
     member: Option<String>,
     #[command(flatten)]
@@ -46,7 +46,7 @@ pub struct NodeArguments {
 pub struct RobotsArguments {
     #[command(flatten)]
     swarm: SwarmFileArguments,
-    /// What poses and targets travel by
+    /// Middleware that carries poses and targets
     #[arg(long, value_enum, default_value_t)]
     pub transport: Transport,
 }

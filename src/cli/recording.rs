@@ -8,7 +8,7 @@ use flockform::record::{About, RecordError, Recording};
 
 #[derive(Debug, Args)]
 pub struct RecordArguments {
-    /// Record what is heard, told and sent as an MCAP file, for Foxglove, `ros2 bag play` and `flockform replay`
+    /// Record the messages received and sent as an MCAP file, for Foxglove, `ros2 bag play` and `flockform replay`
     #[arg(long, value_name = "FILE.mcap")]
     record: Option<PathBuf>,
 }

@@ -12,15 +12,15 @@ use super::{FAILED, Refusal, print};
 
 #[derive(Debug, Args)]
 pub struct ReplayArguments {
-    /// An MCAP file that --record, or `ros2 bag record -s mcap`, has written
+    /// MCAP file written by --record or by `ros2 bag record -s mcap`
     recording: PathBuf,
-    /// Bundled swarm or swarm file to fly by [default: the one in the recording]
+    /// Bundled swarm or swarm file to use [default: the one in the recording]
     #[arg(long, value_name = "SWARM")]
     swarm: Option<String>,
     /// Override a key of the swarm, after those of the recording
     #[arg(long = "set", value_name = "KEY.PATH=VALUE")]
     set: Vec<String>,
-    /// Largest distance of a target from the recorded one that is none \[m\]
+    /// Largest distance in metres between a target and the recorded one that counts as none
     #[arg(long, value_name = "METRES", default_value = "1e-6", value_parser = tolerance)]
     tolerance: f64,
     /// Print JSON instead of a table
@@ -33,7 +33,7 @@ fn tolerance(text: &str) -> Result<f64, String> {
     number.ok_or_else(|| "give a distance in metres, 0 or more".to_owned())
 }
 
-/// Replays a flight and says where today's targets are others than the recorded ones.
+/// Replays a flight and lists where today's targets differ from the recorded ones.
 pub fn replay(arguments: &ReplayArguments) -> Result<ExitCode, Refusal> {
     let reader = Reader::open(&arguments.recording)?;
     let swarm = match &arguments.swarm {

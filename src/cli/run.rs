@@ -37,10 +37,10 @@ use super::{FAILED, Refusal, SceneArguments, print};
 
 #[derive(Debug, Args)]
 pub struct RunArguments {
-    /// Name of a bundled scene (see `flockform list scenes`) or path of a scene file; --resume knows it
+    /// Name of a bundled scene (see `flockform list scenes`) or path of a scene file; not with --resume
     #[arg(required_unless_present = "resume")]
     scene: Option<String>,
-    /// Override a key of the scene, validated like the file: lattice.spacing=0.5, roles\[1\].from=30
+    /// Override a key of the scene, validated like the file: `lattice.spacing=0.5`, `roles[1].from=30`
     #[arg(long = "set", value_name = "KEY.PATH=VALUE", requires = "scene")]
     set: Vec<String>,
     #[command(flatten)]

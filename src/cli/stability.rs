@@ -1,4 +1,4 @@
-//! `flockform stability`: when a scene's body grows, foretold and found.
+//! `flockform stability`: when a scene's body grows, predicted and measured.
 
 use std::process::ExitCode;
 
@@ -24,7 +24,7 @@ pub struct StabilityArguments {
     /// Fewer and shorter runs: slow bodies may not settle in them
     #[arg(long)]
     quick: bool,
-    /// Leave the extremes out
+    /// Leave out the extreme inputs
     #[arg(long)]
     no_extremes: bool,
     /// Print stability.json instead of a table
@@ -32,7 +32,7 @@ pub struct StabilityArguments {
     json: bool,
 }
 
-/// Foretells and finds a scene's thresholds, runs its extremes and writes what came of it.
+/// Predicts and measures a scene's thresholds, runs its extremes and writes the results.
 pub fn stability(arguments: &StabilityArguments) -> Result<ExitCode, Refusal> {
     let effort = if arguments.quick { Effort::quick() } else { Effort::default() };
     let options = Options { effort, no_extremes: arguments.no_extremes };

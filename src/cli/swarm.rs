@@ -21,12 +21,12 @@ use super::recording::{RecordArguments, close};
 use super::run::interrupt_flag;
 use super::{FAILED, Refusal, print, scene_path};
 
-/// Which swarm, with which changes.
+/// A swarm and the changes to it.
 #[derive(Debug, Args)]
 pub struct SwarmFileArguments {
     /// Name of a bundled swarm (see `flockform list swarms`) or path of a swarm file
     pub swarm: String,
-    /// Override a key of the swarm, validated like the file: limits.speed=0.5, leaders\[0\].program.kind=external
+    /// Override a key of the swarm, validated like the file: `limits.speed=0.5`, `leaders[0].program.kind=external`
     #[arg(long = "set", value_name = "KEY.PATH=VALUE")]
     pub set: Vec<String>,
 }
@@ -40,7 +40,7 @@ impl SwarmFileArguments {
         Ok(Swarm::from_file(Path::new(&path), &self.set)?)
     }
 
-    /// What a recording has to say of the swarm.
+    /// What a recording needs to know of the swarm.
     pub fn about(&self, source: &'static str, swarm: &Swarm) -> About {
         let path = Path::new(&self.swarm);
         let bundled = bundled_swarm(&self.swarm);
@@ -68,12 +68,12 @@ pub struct SwarmArguments {
     report: ReportArguments,
     #[command(flatten)]
     record: RecordArguments,
-    /// Print flight.json's report instead of words
+    /// Print the report as JSON, as in flight.json
     #[arg(long, conflicts_with = "quiet")]
     json: bool,
 }
 
-/// Flies a swarm and writes what came of it.
+/// Flies a swarm and writes the results.
 pub fn swarm(arguments: &SwarmArguments) -> Result<ExitCode, Refusal> {
     let swarm = arguments.swarm.load()?;
     let flight = Flight::new(&swarm)?;

@@ -19,13 +19,13 @@ pub struct TradeArguments {
     output: OutputArguments,
     #[command(flatten)]
     report: ReportArguments,
-    /// Run each setting so often; the median time counts
+    /// Runs of each setting, of which the median time counts
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u16).range(1..))]
     repeats: u16,
-    /// Leave out bodies of more particles than this
+    /// Most particles of a body; larger ones are left out
     #[arg(long, value_name = "N", default_value_t = Grid::default().max_particles)]
     max_particles: usize,
-    /// A few settings, once each: shows that it works, measures nothing worth quoting
+    /// A few settings, once each: a trial run, whose figures mean nothing
     #[arg(long)]
     quick: bool,
     /// Print trade.json instead of a table

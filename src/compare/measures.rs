@@ -20,7 +20,7 @@ use crate::material::stress::{self, energy_between, strain_energy};
 pub struct Comparison {
     /// Relative L2 error of the displacement over the followers: sqrt(sum |u - t|^2 / sum |t|^2).
     pub displacement_rel_l2: f64,
-    /// What of it the cells, their outline and the solver leave.
+    /// Its parts: cells, their outline, solver.
     pub parts: ErrorParts,
     /// Relative L2 error that the truth states of its own displacement; `None` where it was solved on one mesh alone.
     pub truth_stated_rel_l2: Option<f64>,
@@ -39,7 +39,7 @@ pub struct Comparison {
     /// Particles that follow and are in a cell: those compared.
     pub followers: usize,
     pub cells: usize,
-    /// Time to the rule's equilibrium and to the truth's \[s\]; zero where nobody took it.
+    /// Time to the rule's equilibrium and to the truth's \[s\]; zero where it was not measured.
     pub seconds_rule: f64,
     pub seconds_truth: f64,
 }
@@ -54,7 +54,7 @@ pub struct Sides<'a> {
     /// Displacements \[length\].
     pub rule: &'a Vectors,
     pub truth: &'a Vectors,
-    /// Who is free to go elsewhere than the truth: the followers that are in a cell.
+    /// Particles free to depart from the truth: the followers that are in a cell.
     pub follows: &'a [bool],
 }
 

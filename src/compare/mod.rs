@@ -1,12 +1,13 @@
 //! Rule and truth side by side: how far a flocking rule is from the elasticity of the same body.
 //!
 //! The truth is plane elasticity on the shape itself, linear or, where the rule is corotated, of the stretches of a body that
-//! turns, by finite elements on a mesh that knows nothing of the lattice, fine enough that what it states of its own error does not show in the measures.
+//! turns, by finite elements on a mesh that does not use the lattice, so fine that its stated
+//! error does not show in the measures.
 //!
 //! * [`supports`]: the roles of particles to what holds the shape.
 //! * [`mod@reference`]: what holds and what pulls the shape, to its displacement and stress.
-//! * [`run`]: both of a scene, measured; [`run::plan()`] is how a scene is planned whose leaders the truth leads.
-//! * [`measures`]: two displacements of one body to the numbers that tell them apart.
+//! * [`run`]: both of a scene, measured; [`run::plan()`] plans a scene whose leaders follow the truth.
+//! * [`measures`]: the differences of two displacements of one body.
 //! * [`places`]: both at the places that a scene names.
 //! * [`split`]: which part of an error is the solver's, the outline's and the cells'.
 //!

@@ -1,4 +1,4 @@
-//! Rule and truth at the places that a scene names, in words and numbers.
+//! Rule and truth at the places that a scene names.
 
 use std::fmt;
 
@@ -8,9 +8,9 @@ use super::reference::{Reference, ReferenceError};
 use crate::continuum::places::AtPlace;
 use crate::flock::vectors::Vectors;
 
-/// One place of the body: what the rule makes of it, and the truth.
+/// Displacement and stress at one place of the body, by the rule and by the truth.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Told {
+pub struct PlaceComparison {
     pub rule: AtPlace,
     pub truth: AtPlace,
 }
@@ -19,18 +19,21 @@ pub struct Told {
 ///
 /// # Errors
 /// Names a place outside the shape.
-pub fn told(rule: Vec<AtPlace>, truth: &Reference) -> Result<Vec<Told>, ReferenceError> {
+pub fn compare_places(rule: Vec<AtPlace>, truth: &Reference) -> Result<Vec<PlaceComparison>, ReferenceError> {
     let places: Vectors = rule.iter().map(|at| at.place).collect();
     let (moved, stress) = (truth.displacements_at(&places)?, truth.stress_at(&places)?);
     let of = |((rule, displacement), stress): ((AtPlace, [f64; 2]), crate::fem::Stress)| {
         let in_plane = [stress.xx, stress.yy, stress.xy];
         let place = rule.place;
-        Told { rule, truth: AtPlace { place, displacement, stress: in_plane, von_mises: stress.von_mises() } }
+        PlaceComparison {
+            rule,
+            truth: AtPlace { place, displacement, stress: in_plane, von_mises: stress.von_mises() },
+        }
     };
     Ok(rule.into_iter().zip(moved.iter()).zip(stress).map(of).collect())
 }
 
-impl fmt::Display for Told {
+impl fmt::Display for PlaceComparison {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [x, y] = self.rule.place;
         writeln!(f, "at ({x}, {y}): rule, truth")?;

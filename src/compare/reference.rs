@@ -1,4 +1,4 @@
-//! What elasticity says of a shape: supports and loads to the displacement and stress everywhere.
+//! The elasticity of a shape: from supports and loads to displacement and stress everywhere.
 //!
 //! The truth is solved on a mesh of the shape, which knows nothing of the lattice; the particles are asked for
 //! afterwards.
@@ -25,7 +25,7 @@ pub struct Setting<'a> {
     pub outline: &'a Outline,
     /// The outline with the edges of inclusions, and what these are made of, where there are any.
     pub inclusions: Option<(&'a Partition, &'a [Elastic])>,
-    /// Where the particles are \[length\], shape \[particles\].
+    /// Places of the particles \[length\], shape \[particles\].
     pub reference: &'a Vectors,
     /// Distance of neighbouring particles \[length\].
     pub spacing: f64,
@@ -48,15 +48,15 @@ pub struct Reference {
     spacing: f64,
 }
 
-/// Why there is no truth.
+/// Error computing the truth.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ReferenceError {
     #[error(
-        "the truth has no equilibrium: the part of the body around ({:.6}, {:.6}) is not held and free to {motion}", .place[0], .place[1]
+        "the finite elements have no equilibrium: the part of the body around ({:.6}, {:.6}) is not held and free to {motion}", .place[0], .place[1]
     )]
     Mechanism { place: Point, motion: &'static str },
     #[error(
-        "the truth has no equilibrium: the body is soft beyond what a double resolves, most of all near ({:.6}, {:.6})", .place[0], .place[1]
+        "the finite elements have no equilibrium: the body is soft beyond what a double resolves, most of all near ({:.6}, {:.6})", .place[0], .place[1]
     )]
     Singular { place: Point },
     #[error("the truth cannot be computed: {0}")]

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
 use super::measures::{Comparison, Sides, von_mises};
-use super::places::{Told, told};
+use super::places::{PlaceComparison, compare_places};
 use super::reference::{Reference, ReferenceError, Setting};
 use super::split::ErrorParts;
 use super::supports::supports;
@@ -21,7 +21,7 @@ use crate::material::cells::Cells;
 use crate::material::elastic::Elastic;
 use crate::scene::{LeaderMotion, Scene, SceneError};
 
-/// The truth of a scene's body in its material, under its loads and whoever does not follow.
+/// The truth of a scene's body in its material, under its loads, clamps and leaders.
 #[derive(Clone, Debug)]
 pub struct SceneTruth {
     pub truth: Reference,
@@ -31,7 +31,7 @@ pub struct SceneTruth {
     pub time: Duration,
 }
 
-/// What a comparison leaves. Arrays follow the particles or the cells of the body.
+/// The results of a comparison. Arrays follow the particles or the cells of the body.
 #[derive(Debug)]
 pub struct Compared {
     pub comparison: Comparison,
@@ -45,7 +45,7 @@ pub struct Compared {
     pub von_mises_rule: Vec<f64>,
     pub von_mises_truth: Vec<f64>,
     /// At the scene's `record.places`.
-    pub places: Vec<Told>,
+    pub places: Vec<PlaceComparison>,
 }
 
 /// Solves for the truth of a scene: clamped particles and leaders with a motion of their own are held where
@@ -132,7 +132,8 @@ pub fn compare(
     comparison.parts = ErrorParts::of(scene, &truth, &rule, &follows)?;
     let von_mises_rule = von_mises(&cells, elastic, &rule, rotation);
     let von_mises_truth = von_mises(&cells, elastic, known, rotation);
-    let places = told(at_places(scene, engine), &truth.truth).map_err(|error| refused(scene, &error))?;
+    let places =
+        compare_places(at_places(scene, engine), &truth.truth).map_err(|error| refused(scene, &error))?;
     Ok(Compared { comparison, outcome, truth, cells, rule, von_mises_rule, von_mises_truth, places })
 }
 

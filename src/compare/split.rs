@@ -1,4 +1,4 @@
-//! Where an error comes from: the solver, the outline of the cells, the cells themselves.
+//! The sources of an error: the solver, the outline of the cells, the cells themselves.
 //!
 //! Between the rule's run and the truth of the shape stand two more displacements of the same body: the rule's own
 //! equilibrium, solved as far as doubles go, and the truth of the shape that the cells have, whose outline is made of
@@ -23,11 +23,11 @@ type Point = [f64; 2];
 /// Residual over load beyond which nothing of a solver's error is left to see.
 const TIGHT: f64 = 1e-10;
 
-/// An outline of more sides than this is not meshed to tell what it costs.
+/// An outline of more sides than this is not meshed to measure its cost.
 const MOST_SIDES: usize = 600;
 
 /// Parts of an error, each relative to the truth in the L2 norm over the followers \[1\]; they need not add up. `None`
-/// where a part cannot be told.
+/// where a part cannot be measured.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ErrorParts {
     /// From the rule's equilibrium to the truth of the shape of its cells.
@@ -68,7 +68,7 @@ impl ErrorParts {
     }
 }
 
-/// Where the rule comes to rest, if that can be solved for.
+/// The place of rest of the rule, if it can be solved for.
 fn equilibrium(scene: &Scene, truth: &Reference) -> Option<Vectors> {
     let request = Request { tolerance: TIGHT, precision: Precision::F64, ..Request::default() };
     let outcome = solve_equilibrium(scene, &request, plan_led_by(scene, truth).ok()?).ok()?;
@@ -117,7 +117,7 @@ fn truth_of_cells(scene: &Scene, truth: &SceneTruth) -> Result<Option<Vectors>, 
     });
     match Reference::solve_with(setting, pushed.collect(), &Effort::default()) {
         Ok(found) => Ok(Some(found.displacement)),
-        // What keeps the shape of the cells from having a truth says nothing of the shape itself.
+        // The shape of the cells may have no truth where the shape itself has one.
         Err(error) => {
             tracing::debug!("{}", refused(scene, &error));
             Ok(None)

@@ -22,7 +22,7 @@ type Point = [f64; 2];
 /// Particles nearer to the outline than this part of the spacing are on it.
 const ON_OUTLINE: f64 = 1e-6;
 
-/// What holds the shape at `step`: roles that hold from the start, the later ones before the earlier where they
+/// The supports of the shape at `step`: roles that hold from the start, the later ones before the earlier where they
 /// overlap. Leaders led by a truth that is not known yet hold nothing.
 ///
 /// # Errors
@@ -81,7 +81,7 @@ fn holders(changes: &[RoleChange], count: usize) -> Vec<[Option<usize>; 2]> {
     holders
 }
 
-/// Where an entry has the places that it holds \[length\].
+/// The places at which an entry holds its particles \[length\].
 fn displacement(layout: &Layout, change: &RoleChange, step: f64) -> Field<'static> {
     match &change.motion {
         None => Box::new(|_| [0.0; 2]),

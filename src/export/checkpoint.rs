@@ -55,10 +55,10 @@ pub struct Checkpoint<'a> {
     pub stepping: Duration,
 }
 
-/// What a run has kept until now.
+/// The records of a run so far.
 type Recorded<'a> = (&'a [Snapshot], &'a [ProbeSeries], &'a [LoadStep], Option<AnimationState<'a>>);
 
-/// What the program was told, so that it need not be told again.
+/// The command line of the run, which `--resume` does not repeat.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RunRequest {
     /// Name of a bundled scene, or the absolute path of a file.
@@ -69,7 +69,7 @@ pub struct RunRequest {
     pub force: bool,
 }
 
-/// Why a run cannot go on from a checkpoint.
+/// Error resuming a run from a checkpoint.
 #[derive(Debug, thiserror::Error)]
 pub enum CheckpointError {
     #[error(
@@ -214,7 +214,7 @@ impl Checkpoint<'static> {
             return Err(corrupted("bytes follow its end"));
         }
         if crc32fast::hash(&bytes[HEADER..]) != four(20) {
-            return Err(corrupted("its checksum is another"));
+            return Err(corrupted("its checksum differs"));
         }
         // The version comes first, since another one may hold other things behind it.
         let program: &str = postcard::take_from_bytes(&bytes[HEADER..])
@@ -348,7 +348,7 @@ mod tests {
                 0..8 => "is no checkpoint of flockform",
                 8..12 => "layout",
                 12..20 => "",
-                _ => "is corrupted: its checksum is another",
+                _ => "is corrupted: its checksum differs",
             };
             assert!(error.contains(expected) && error.contains("help:"), "byte {at}: {error}");
         }

@@ -10,7 +10,7 @@ use super::error::{ExportError, write_file};
 use super::figures::{self, Pair};
 use super::{OutputFolder, summary};
 use crate::compare::measures::Comparison;
-use crate::compare::places::Told;
+use crate::compare::places::PlaceComparison;
 use crate::compare::run::Compared;
 use crate::scene::Scene;
 use crate::scene::raw::RawScene;
@@ -29,7 +29,7 @@ pub struct ComparisonReport {
     pub truth: TruthSize,
     /// At the scene's `record.places`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub places: Vec<Told>,
+    pub places: Vec<PlaceComparison>,
     /// The scene, its defaults and overrides included.
     pub scene: RawScene,
 }
@@ -41,19 +41,19 @@ pub struct RuleEnd {
     pub stop_reason: &'static str,
     /// How far the follower farthest from its target is from it, over the spacing.
     pub residual: Option<f64>,
-    /// Who found the equilibrium, where it was not stepped to, and in how many iterations.
+    /// The solver that found the equilibrium, unless it was stepped to, and its iterations.
     pub solver: Option<&'static str>,
     pub iterations: Option<usize>,
 }
 
-/// What the truth was computed on.
+/// The mesh of the truth.
 #[derive(Clone, Copy, Debug, Serialize, PartialEq)]
 pub struct TruthSize {
     /// Of the finest of its meshes.
     pub nodes: usize,
     /// Meshes that it was solved on.
     pub levels: usize,
-    /// What it states of its own displacement, relative L2, and of its strain energy, relative; `null` where a body so
+    /// Its stated error of displacement, relative L2, and of strain energy, relative; `null` where a body so
     /// full of corners was solved on one mesh alone \[1\].
     pub stated_error: Option<f64>,
     pub stated_energy_error: Option<f64>,

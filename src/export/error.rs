@@ -1,4 +1,4 @@
-//! Why outputs cannot be written.
+//! Errors of writing outputs.
 
 use std::io;
 use std::path::{Path, PathBuf};

@@ -1,9 +1,9 @@
 //! The output folder: whole, or not there.
 //!
 //! Everything is written into a hidden folder beside the one asked for, `.NAME.partial-PID`, which takes
-//! the name only when the last file is closed. Whoever kills a run finds the former outputs or
-//! nothing in their place, never half of the new ones. A run that keeps checkpoints stands in the open
-//! meanwhile, as `NAME.unfinished`, and whoever takes it up again reopens that ([`OutputFolder::reopen`]).
+//! the name only when the last file is closed. A killed run leaves the former outputs or nothing in their
+//! place, never half of the new ones. A run that keeps checkpoints is visible meanwhile, as
+//! `NAME.unfinished`, which a resumed run opens again ([`OutputFolder::reopen`]).
 
 use std::ffi::OsString;
 use std::fs::{self, File, TryLockError};
@@ -28,7 +28,7 @@ pub struct OutputFolder {
     lock: Option<File>,
 }
 
-/// What stands where the outputs shall go.
+/// The present content of the place of the outputs.
 enum Standing {
     Nothing,
     EmptyFolder,
@@ -83,12 +83,12 @@ impl OutputFolder {
         Ok(())
     }
 
-    /// Where everything stands until [`OutputFolder::commit`].
+    /// The folder that holds everything until [`OutputFolder::commit`].
     pub fn folder(&self) -> &Path {
         &self.partial
     }
 
-    /// Where to write the output of this name.
+    /// Path for the output of this name.
     pub fn path(&self, name: impl AsRef<Path>) -> PathBuf {
         self.partial.join(name)
     }
@@ -96,7 +96,7 @@ impl OutputFolder {
     /// Gives the folder its name, in the place of what may be replaced.
     ///
     /// # Errors
-    /// Keeps the outputs under their temporary name, and tells it, if they cannot be moved.
+    /// Keeps the outputs under their temporary name, which the error gives, if they cannot be moved.
     pub fn commit(mut self) -> Result<PathBuf, ExportError> {
         self.is_kept = true;
         match self.take_place() {
@@ -107,7 +107,7 @@ impl OutputFolder {
 
     fn take_place(&self) -> Result<(), ExportError> {
         let Self { out, partial, .. } = self;
-        // Looked at again: a run takes time, and somebody may have written there meanwhile.
+        // Checked again: another program may have written there during the run.
         match standing(out, self.force)? {
             Standing::Nothing => rename(partial, out),
             Standing::EmptyFolder => {
@@ -139,12 +139,12 @@ impl Drop for OutputFolder {
         if let Err(error) = fs::remove_dir_all(&self.partial) {
             tracing::warn!("unfinished outputs are left in {}: {error}", self.partial.display());
         }
-        // Not those in which somebody has put something meanwhile.
+        // Not those that other programs have written to meanwhile.
         let _ = self.made.iter().try_for_each(fs::remove_dir);
     }
 }
 
-/// Where a run to `out` stands while it keeps checkpoints.
+/// The folder of a run to `out` while it keeps checkpoints.
 pub fn unfinished(out: &Path) -> PathBuf {
     let mut name = out.file_name().unwrap_or_default().to_owned();
     name.push(".unfinished");

@@ -92,7 +92,7 @@ pub use summary::{
 };
 pub use vtk::VtkSeries;
 
-/// What a run leaves to be written at its end.
+/// The results of a run that are written at its end.
 #[derive(Clone, Copy, Debug)]
 pub struct Results<'a> {
     pub scene: &'a Scene,
@@ -100,7 +100,7 @@ pub struct Results<'a> {
     /// The configurations to draw.
     pub snapshots: &'a [Snapshot],
     pub probes: &'a [ProbeSeries],
-    /// What a load that changes has done, where the scene has such.
+    /// The work of a changing load, where the scene has one.
     pub load_steps: &'a [LoadStep],
     pub timings: Timings,
 }
@@ -119,7 +119,7 @@ impl Default for Drawing<'_> {
     }
 }
 
-/// Writes tables, figures and, last, the summary, which tells how long the others took. Returns the
+/// Writes tables, figures and, last, the summary, which has the time that the others took. Returns the
 /// paths within the folder under its temporary name, and the summary.
 ///
 /// # Errors

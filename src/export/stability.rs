@@ -51,7 +51,7 @@ pub fn write_stability(folder: &OutputFolder, study: &Study) -> Result<Vec<PathB
     Ok(written)
 }
 
-/// What `stability.json` says.
+/// The content of `stability.json`.
 ///
 /// # Errors
 /// None that a study could cause.

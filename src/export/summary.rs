@@ -23,18 +23,18 @@ use crate::solve::equilibrium::Solved;
 
 pub(super) const PROGRAM: &str = env!("CARGO_PKG_NAME");
 const FILE: &str = "summary.json";
-/// What a comparison writes in the place of a summary.
+/// The file of a comparison, in place of a summary.
 pub(super) const COMPARISON: &str = "compare.json";
-/// What a trade study writes in the place of a summary.
+/// The file of a trade study, in place of a summary.
 pub(super) const TRADE: &str = "trade.json";
-/// What a stability study writes in the place of a summary.
+/// The file of a stability study, in place of a summary.
 pub(super) const STABILITY: &str = "stability.json";
-/// What a benchmark of transports writes in the place of a summary.
+/// The file of a benchmark of transports, in place of a summary.
 pub(super) const TRANSPORT: &str = "transport.json";
-/// What a flight writes in the place of a summary.
+/// The file of a flight, in place of a summary.
 pub(super) const FLIGHT: &str = "flight.json";
 
-/// What a gallery writes in the place of a summary.
+/// The file of a gallery, in place of a summary.
 pub(super) const GALLERY: &str = "gallery.json";
 
 /// Part of the forces on a body that may be left on a follower of one at rest \[1\].
@@ -73,7 +73,7 @@ pub struct Summary {
     /// Reactions, loads, energy and stress, where the scene has a material.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mechanics: Option<Measured>,
-    /// What the user should know of the result.
+    /// Cautions about the result.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub cautions: Vec<String>,
     pub broken_bonds: BrokenBonds,
@@ -102,14 +102,14 @@ pub struct Energies {
     pub pe1: f64,
     /// \[length\]
     pub pe2: f64,
-    /// The strain largest in size of any particle's surroundings \[1\]; absent where nobody sees enough others.
+    /// The strain largest in size of any particle's surroundings \[1\]; absent where every particle has too few neighbours.
     pub largest_strain: Option<f64>,
 }
 
 #[derive(Clone, Copy, Debug, Serialize, PartialEq)]
 pub struct BrokenBonds {
     pub count: usize,
-    /// Those of them that were broken before the first step: cuts and ghosts of the scene.
+    /// The number of them that were broken before the first step: cuts and ghosts of the scene.
     pub before_the_start: usize,
     /// The first to break in a step; among several, the one that is first in `breaks.csv`.
     pub first: Option<FirstBreak>,
@@ -126,7 +126,7 @@ pub struct FirstBreak {
     pub along: f64,
 }
 
-/// What a testing machine would read off the body, and in which units.
+/// The readings of a testing machine, with their units.
 #[derive(Clone, Debug, Serialize, PartialEq)]
 pub struct Measured {
     pub units: Units,
@@ -137,11 +137,11 @@ pub struct Measured {
     pub places: Vec<AtPlace>,
 }
 
-/// What the solver did.
+/// The solver and its work.
 #[derive(Clone, Debug, Serialize, PartialEq)]
 pub struct Equilibrium {
     pub solver: &'static str,
-    /// Why this one.
+    /// The reason for this solver.
     pub why: String,
     pub iterations: usize,
     pub converged: bool,
@@ -256,11 +256,7 @@ impl fmt::Display for Measured {
         let sizes = sizes.chain(mechanics.load.map(|load| load.force)).map(|[x, y]| x.hypot(y));
         let largest = sizes.fold(0.0, f64::max);
         if let Some(left) = mechanics.unbalanced.filter(|left| *left > AT_REST * largest) {
-            writeln!(
-                f,
-                "not at rest: a follower is pushed by {} {force} that nothing balances",
-                short(left)
-            )?;
+            writeln!(f, "not at rest: an unbalanced force of {} {force} acts on a follower", short(left))?;
         }
         if let Some(Peak { von_mises, cell, place, particles }) = &mechanics.largest_von_mises {
             let stress = &units.stress;

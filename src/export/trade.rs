@@ -95,12 +95,7 @@ pub fn figure(study: &Study) -> String {
         series.push(Series { name: solver.name().into(), colour, style: Style::Dots, points: material });
     }
     series.retain(|series| !series.points.is_empty());
-    series.push(Series {
-        name: "nothing is both faster and nearer".into(),
-        colour: INK,
-        style: Style::Front,
-        points: front,
-    });
+    series.push(Series { name: "Pareto-optimal".into(), colour: INK, style: Style::Front, points: front });
     draw(&Chart {
         title: study.title.clone(),
         note: format!(

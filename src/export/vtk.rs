@@ -62,7 +62,7 @@ impl VtkSeries {
         Ok(Self { collection, folder: steps, frames, synced: 0, material: None })
     }
 
-    /// Tells the stress in a body of this material.
+    /// Adds the stress in a body of this material.
     pub fn with_material(self, material: Option<Elastic>) -> Self {
         Self { material, ..self }
     }

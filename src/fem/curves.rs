@@ -73,7 +73,7 @@ impl Curves {
         all
     }
 
-    /// Where curves are cut, as places along each with a grading: their ends, and where lines meet anything.
+    /// The cuts of curves, as places along each with a grading: their ends, and where lines meet anything.
     fn cuts(&self, outline: &Outline, outer: usize, near: f64) -> Vec<Vec<(f64, f64)>> {
         let mut cuts: Vec<Vec<(f64, f64)>> =
             self.curves.iter().map(|_| vec![(0.0, 0.0), (1.0, 0.0)]).collect();
@@ -203,7 +203,7 @@ fn of_corner(before: &Piece, after: &Piece) -> f64 {
     if turn < -0.35 { 0.75 } else { 0.0 }
 }
 
-/// Where two curves meet, as places along each.
+/// The meetings of two curves, as places along each.
 fn meetings(a: &Piece, b: &Piece, near: f64) -> Vec<[f64; 2]> {
     let mut places: Vec<[f64; 2]> = Vec::new();
     let crossings = match (&a.arc, &b.arc) {

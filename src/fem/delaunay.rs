@@ -71,7 +71,7 @@ struct Mesher<'c> {
     most_vertices: usize,
 }
 
-/// What is wrong with a triangle.
+/// The defect of a triangle.
 enum Flaw {
     None,
     /// It gets a vertex at this centre of its circumscribed circle \[m\].

@@ -2,7 +2,7 @@
 
 use super::problem::Axis;
 
-/// What the finite-element room refuses, and why.
+/// Errors of the finite-element room.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FemError {
@@ -137,7 +137,7 @@ pub enum FemError {
     Factorisation {
         /// Number of unknowns.
         unknowns: usize,
-        /// What the linear-algebra library said.
+        /// The message of the linear-algebra library.
         reason: String,
     },
     /// Curves of an outline, or supports in the body, too close to each other for triangles between them.

@@ -7,7 +7,7 @@
 
 use super::error::FemError;
 
-/// What is assumed about the direction out of the plane.
+/// The assumption about the direction out of the plane.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Plane {
     /// A thin sheet, free to change its thickness: sigma_zz = 0.
@@ -52,7 +52,7 @@ impl Inclusions {
         Self { materials, of_cell }
     }
 
-    /// What a cell is made of, where `body` is what the body is made of outside its inclusions.
+    /// The material of a cell; `body` is the one outside inclusions.
     pub fn material<'a>(&'a self, cell: usize, body: &'a Material) -> &'a Material {
         let number = self.of_cell.get(cell).copied().unwrap_or(0);
         number.checked_sub(1).map_or(body, |k| &self.materials[k as usize])

@@ -1,6 +1,6 @@
 //! The truth that flocking rules are compared with: plane linear elasticity by finite elements.
 //!
-//! This room knows nothing of flocks. It takes a [`Mesh`] of triangles or quadrilaterals, linear or
+//! This room does not use flocks. It takes a [`Mesh`] of triangles or quadrilaterals, linear or
 //! quadratic, a [`Material`] in plane stress or plane strain, what is held and what pulls (a [`Problem`]),
 //! and [`solve()`]s for the displacement in equilibrium at small strain by a sparse direct factorisation.
 //! The [`Solution`] gives stress at cells and points, energy, forces, and the displacement anywhere.

@@ -20,7 +20,7 @@ type Point = [f64; 2];
 /// Shortest first part of a side that is cut towards a singular point.
 const STRONGEST_CUT: f64 = 0.25;
 
-/// What a mesh of a shape is made for.
+/// Requirements on the mesh of a shape.
 #[derive(Debug, Clone, Default)]
 pub struct MeshRequest<'a> {
     /// Lines and arcs inside the body that sides of cells shall follow, as the edge of a region that is held. They

@@ -1,4 +1,4 @@
-//! What is to be solved: a mesh, a material, what is held and what pulls.
+//! The problem to be solved: mesh, material, supports and loads.
 
 use super::element::{GAUSS_3, side_shape};
 use super::error::FemError;
@@ -84,9 +84,9 @@ pub(crate) fn along_side(mesh: &Mesh, side: Side, s: f64) -> ([f64; 2], [f64; 2]
 pub struct Problem {
     /// The body, undeformed.
     pub mesh: Mesh,
-    /// What it is made of, the same everywhere.
+    /// The material, the same everywhere.
     pub material: Material,
-    /// What counts as strain; loads keep direction and place of application wherever the body turns.
+    /// The measure of strain; loads keep direction and place of application wherever the body turns.
     pub strain: Strain,
     /// Cells of other materials; none unless given.
     pub inclusions: Inclusions,

@@ -36,7 +36,7 @@ pub enum PlaneRegion {
     Disc { centre: Point, radius: f64 },
 }
 
-/// Where a body is held.
+/// A support of a body.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Holding {
     /// Along portions of its outline.
@@ -74,7 +74,7 @@ pub struct PortionTraction<'a> {
 pub struct ShapeProblem<'a> {
     pub outline: &'a Outline,
     pub material: Material,
-    /// What counts as strain.
+    /// The measure of strain.
     pub strain: Strain,
     /// Parts that are of other materials; the later one counts where they overlap.
     pub inclusions: Vec<(&'a Outline, Material)>,

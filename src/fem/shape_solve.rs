@@ -46,7 +46,7 @@ pub struct Level {
     pub change: f64,
 }
 
-/// What a solution says of its own error.
+/// The error that a solution states of itself.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EstimatedError {
     /// Of the displacement, relative, in the L2 norm over the body's area \[1\].
@@ -57,7 +57,7 @@ pub struct EstimatedError {
     pub order: f64,
 }
 
-/// What a support takes up, acting on the body.
+/// The reaction of a support, acting on the body.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Reaction {
     /// \[N\]
@@ -79,7 +79,7 @@ pub struct ShapeSolution {
 /// Solves a shape on finer and finer meshes until its error is estimated to be at the target.
 ///
 /// # Errors
-/// What keeps the shape from being meshed ([`FemError::Unmeshable`], [`FemError::InvertedCell`]); a support
+/// Errors that keep the shape from being meshed ([`FemError::Unmeshable`], [`FemError::InvertedCell`]); a support
 /// without a node ([`FemError::EmptySupport`]), a point outside ([`FemError::OutsideMesh`]); a body that is not
 /// held ([`FemError::Unheld`], [`FemError::Soft`]) or, if it turns, has no equilibrium ([`FemError::Lost`]); input that is
 /// not finite; memory.

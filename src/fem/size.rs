@@ -99,7 +99,7 @@ impl<'c> Sizes<'c> {
         self.singular.iter().map(graded).fold(self.smooth(p), f64::min)
     }
 
-    /// Where a span is cut, as places along its curve without its ends.
+    /// The cuts of a span, as places along its curve without its ends.
     pub fn cuts(&self, span: &Span) -> Vec<f64> {
         let piece = &self.curves.curves[span.curve].piece;
         let mut leaves = Vec::new();

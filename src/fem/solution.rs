@@ -49,7 +49,7 @@ impl Solution {
         Solution { strain, ..self }
     }
 
-    /// What counts as strain. Of stretches, strain and stress are those in axes that turn with the body, from the
+    /// The measure of strain. Of stretches, strain and stress are those in axes that turn with the body, from the
     /// mesh's.
     pub fn strain(&self) -> Strain {
         self.strain
@@ -65,7 +65,7 @@ impl Solution {
         Solution { inclusions, ..self }
     }
 
-    /// What a cell is made of.
+    /// The material of a cell.
     fn material_of(&self, cell: usize) -> &Material {
         self.inclusions.material(cell, &self.material)
     }

@@ -5,7 +5,7 @@
 //! Deformations*, 1965): no turn is a strain, and the energy is half of strain times D times strain as at small turns.
 //! Gradients are given as (xx, xy, yx, yy), the displacement's component first.
 
-/// What counts as strain.
+/// The measure of strain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Strain {
     /// The symmetric part of the gradient: right as long as nothing turns by more than some degrees.

@@ -20,7 +20,7 @@ pub const SWARM: &str = "swarm.toml";
 /// Bytes before compression that are written at once: what a killed program loses.
 const CHUNK: u64 = 256 << 10;
 
-/// What was recorded.
+/// The subject of a recording.
 #[derive(Clone, Debug, Default)]
 pub struct About {
     /// Command of the program.
@@ -31,7 +31,7 @@ pub struct About {
     pub swarm: Option<String>,
     /// Overrides of it, as given.
     pub set: Vec<String>,
-    /// Where files that it names are looked up.
+    /// The folder of the files that it names.
     pub folder: Option<PathBuf>,
     /// The robot that the loop was alone for.
     pub member: Option<String>,
@@ -114,7 +114,7 @@ impl Recording {
     /// Closes the file and gives it its name.
     ///
     /// # Errors
-    /// What could not be written; what could stands in `NAME.part`.
+    /// Error writing the file; `NAME.part` has what was written before.
     pub fn finish(mut self) -> Result<PathBuf, RecordError> {
         let write = |source| RecordError::Write { path: self.part.clone(), source };
         if let Some(failure) = self.failure.take() {

@@ -1,4 +1,4 @@
-//! What the node of a simulated flight would hear, be told and say.
+//! The messages that the node of a simulated flight would receive and send.
 
 use super::RecordError;
 use crate::ros::arguments::{NameError, Names};
@@ -15,7 +15,7 @@ use crate::scene::swarm::raw::{RawNode, RawPoseType};
 use crate::swarm::control::Control;
 use crate::swarm::watch::Pose;
 
-/// States and markers a second, as of a node that is told nothing else \[Hz\].
+/// States and markers a second, as of a node with default parameters \[Hz\].
 const STATES: f64 = 10.0;
 const DIAGNOSTICS: f64 = 1.0;
 

@@ -1,10 +1,10 @@
-//! Recordings: what is heard, said and told, as an MCAP file that Foxglove and `ros2 bag play` open, and back.
+//! Recordings: the messages received and sent, as an MCAP file that Foxglove and `ros2 bag play` open, and back.
 //!
 //! A recording has the topics, types and payloads of the live node (CDR, with the definitions as `ros2msg`
 //! schemas, profile `ros2`), whether a node took part in a network, robots were simulated ([`flight`])
-//! or a body was swept ([`body`]). One topic more, `~/events`, says when the loop ticked and what it was told; an
-//! attachment is the swarm file. So [`replay`] needs nothing else to fly the same flight again and to say where
-//! today's targets are others.
+//! or a body was swept ([`body`]). One more topic, `~/events`, has the times of the loop's ticks and the commands it took; the
+//! swarm file is attached. [`replay`] needs nothing else to repeat the flight and to list where today's targets
+//! differ.
 //!
 //! * [`mod@file`]: the writer. The file has its name when it is whole; until then it is `NAME.part`.
 
@@ -23,7 +23,7 @@ pub use file::{About, Recording};
 pub use reader::{Entry, Reader};
 pub use shared::Shared;
 
-/// Why there is no recording, or none that can be read.
+/// Error writing or reading a recording.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordError {
     #[error("{} exists: remove it, or give the recording another name", .0.display())]

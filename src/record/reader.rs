@@ -1,4 +1,4 @@
-//! Reads recordings: what a loop heard, was told and said, in the order of the file.
+//! Reads recordings: the messages that a loop received and sent, in the order of the file.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -42,7 +42,7 @@ pub struct Reader {
     bytes: Vec<u8>,
 }
 
-/// What a recording says of itself.
+/// The metadata of a recording.
 #[derive(Clone, Debug, Default)]
 pub struct Described {
     pub metadata: BTreeMap<String, String>,
@@ -68,7 +68,7 @@ impl Reader {
             .map_err(|source| RecordError::NoMcap { path: self.path.clone(), source })
     }
 
-    /// What stands before the first message.
+    /// The header before the first message.
     pub fn described(&self) -> Result<Described, RecordError> {
         let mut described = Described::default();
         for record in self.records()? {

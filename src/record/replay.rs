@@ -1,6 +1,6 @@
 //! Flies a recorded flight again: its poses through today's loop, today's targets beside the recorded ones.
 //!
-//! A recording of this program says when the loop ticked and what it was told, so that the same program gives the
+//! A recording of this program has the loop's ticks and the commands it took, so that the same program gives the
 //! same targets to the bit. One that `ros2 bag record` has written of poses and targets alone is replayed as far as
 //! it goes: a tick is taken to be where a new stamp of targets appears.
 
@@ -33,7 +33,7 @@ pub struct Report {
     /// Differences beyond this count \[m\].
     pub tolerance: f64,
     pub robots: Vec<RobotDifference>,
-    /// What is wrong with the end of the file, if anything is.
+    /// The defect of the file's end, if it has one.
     pub damage: Option<String>,
 }
 
@@ -138,7 +138,7 @@ struct Replay {
     is_simulated: bool,
     active: bool,
     begun: bool,
-    /// Poses since the last tick: whose, header, pose, arrival \[s\].
+    /// Poses since the last tick: member, header, pose, arrival \[s\].
     waiting: Vec<(usize, Header, geometry_msgs::Pose, f64)>,
     /// Times of ticks by what a stamp makes of them: a simulation's times are finer than nanoseconds.
     exact: BTreeMap<Time, f64>,
@@ -221,9 +221,9 @@ impl Replay {
                 }
             }
             Some(&Heard::Leader(member)) => {
-                let Some(PoseStamped { header, pose: told }) = entry.decode() else { return };
+                let Some(PoseStamped { header, pose: place }) = entry.decode() else { return };
                 if pose::is_frame(&header.frame_id, &self.frame_id) {
-                    self.control.tell(member, [told.position.x, told.position.y]);
+                    self.control.tell(member, [place.position.x, place.position.y]);
                 }
             }
             Some(&Heard::Target(member)) => {
@@ -267,7 +267,7 @@ impl Replay {
         }
     }
 
-    /// What was given at the start gives way to what has been changed since the flight; what was changed during it
+    /// Settings given at the start give way to those changed since the flight; those changed during it
     /// is changed again.
     fn parameter(&mut self, name: &str, value: f64) {
         let of = |all: &[(&str, f64)]| all.iter().find(|(one, _)| *one == name).map(|(_, value)| *value);
@@ -303,7 +303,7 @@ impl Replay {
                 let exact = self.exact.get(&header.stamp).copied();
                 pose.stamp = exact.unwrap_or(header.stamp.seconds());
             }
-            // What is turned away is turned away again.
+            // Refused messages are refused again.
             let _ = self.control.receive(member, pose, now);
             self.poses += 1;
         }
@@ -321,7 +321,7 @@ impl Replay {
             robot.recorded += u64::from(recorded.is_some());
             let apart = match (today, recorded) {
                 (None, None) => continue,
-                // Who records from outside may have missed a target.
+                // A recorder outside the loop may have missed a target.
                 (Some(_), None) if !self.has_events => continue,
                 (Some(_), None) => {
                     robot.only_replayed += 1;
@@ -338,7 +338,7 @@ impl Replay {
             if apart > robot.largest {
                 (robot.largest, robot.largest_at) = (apart, Some(self.now));
             }
-            // What is no number is no agreement.
+            // NaN agrees with nothing.
             if apart > self.tolerance || apart.is_nan() {
                 robot.differ += 1;
                 robot.first_at.get_or_insert(self.now);

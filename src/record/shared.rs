@@ -1,4 +1,4 @@
-//! A recording that a loop writes into, and that somebody else closes.
+//! A recording that a loop writes into and its caller closes.
 
 use std::sync::{Arc, Mutex, PoisonError};
 

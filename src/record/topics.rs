@@ -1,4 +1,4 @@
-//! What the topics of a recording mean to a swarm.
+//! The meaning of a recording's topics for a swarm.
 
 use std::collections::BTreeMap;
 
@@ -13,7 +13,7 @@ use crate::scene::swarm::Swarm;
 use crate::scene::swarm::raw::{RawNode, RawPoseType};
 use crate::swarm::control::Control;
 
-/// What a topic means to the loop.
+/// The meaning of a topic for the loop.
 #[derive(Clone, Copy)]
 pub(super) enum Heard {
     Events,
@@ -33,7 +33,7 @@ pub(super) fn stamped(entry: &Entry) -> Option<(Header, geometry_msgs::Pose)> {
     plain().or_else(uncertain).or_else(odometry)
 }
 
-/// What the recorded topics mean to this swarm, and whether the loop's events are among them. The node may have had
+/// The meaning of the recorded topics for this swarm, and whether the loop's events are among them. The node may have had
 /// another name, and its robots' topics other beginnings.
 pub(super) fn topics(
     reader: &Reader,

@@ -23,7 +23,7 @@ use super::payload::{Header, Payload};
 use super::wait::Bell;
 use super::{Peer, ShmError, domain};
 
-/// How many can share a service: fixed by who makes it first.
+/// How many can share a service: fixed by the process that creates it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Capacity {
     pub writers: usize,
@@ -32,7 +32,7 @@ pub struct Capacity {
     pub queue: usize,
     /// Slices that a reader may look at at once.
     pub borrowed: usize,
-    /// Slices that a reader who comes late still gets.
+    /// Slices that a late reader still gets.
     pub history: usize,
 }
 
@@ -166,7 +166,7 @@ fn open_event(
         .open_or_create()
 }
 
-/// What an error of iceoryx2 means to a user.
+/// The meaning of an error of iceoryx2 for a user.
 fn explain<T: Payload>(
     peer: &Peer,
     service: &ServiceName,
@@ -207,7 +207,7 @@ fn explain<T: Payload>(
     ShmError::Service { service: name.to_owned(), reason: error.to_string(), help }
 }
 
-/// What the service that is there carries.
+/// The type that the existing service carries.
 fn found(peer: &Peer, service: &ServiceName) -> Option<String> {
     let details = ipc::Service::details(service, &peer.config, MessagingPattern::PublishSubscribe).ok()??;
     let types = details.static_details.publish_subscribe().message_type_details();
@@ -335,7 +335,7 @@ impl<T: Payload> DerefMut for Filled<T> {
 /// Memory of one writer at most \[bytes\], unless three slices take more.
 const MEMORY: usize = 1 << 30;
 
-/// As many slices as the capacity asks for. Large ones are fewer, and a writer whose readers hold them all leaves a
+/// As many slices as the capacity asks for. Large ones are fewer, and a writer that finds them all held by readers leaves a
 /// slice out rather than wait.
 fn slices_that_fit<T>(capacity: &Capacity, most: usize) -> usize {
     let fit = MEMORY / (most * size_of::<T>()).max(1);
@@ -367,7 +367,7 @@ impl<T: Payload> Reader<T> {
         Ok(Self { service, subscriber, bell: Rc::new(listener), refused, kind: PhantomData })
     }
 
-    /// What rings when a slice arrives.
+    /// The bell that rings when a slice arrives.
     pub fn bell(&self) -> Bell {
         Rc::clone(&self.bell)
     }

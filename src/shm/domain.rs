@@ -42,12 +42,12 @@ impl Domain {
         Ok(Self { config })
     }
 
-    /// Takes part under a name for diagnosis. What peers that died left behind is cleaned up.
+    /// Takes part under a name for diagnosis. The remains of dead peers are cleaned up.
     ///
     /// # Errors
     /// A computer that gives no shared memory.
     pub fn join(&self, name: &str) -> Result<Peer, ShmError> {
-        // Errors come back to the caller, who words them.
+        // Errors come back to the caller, which words them.
         set_log_level_from_env_or(LogLevel::Fatal);
         let refused = |reason: String| ShmError::Node { reason };
         let name = NodeName::new(name).map_err(|error| refused(error.to_string()))?;
@@ -69,7 +69,7 @@ pub struct Peer {
 }
 
 impl Peer {
-    /// What iceoryx2 knows it as, for services of one's own.
+    /// Its node of iceoryx2, for services of your own.
     pub fn node(&self) -> &Node<ipc::Service> {
         &self.node
     }

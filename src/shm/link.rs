@@ -18,7 +18,7 @@ pub struct Controller {
     poses: Reader<Wire>,
     leaders: Reader<Leader>,
     targets: Writer<WireTarget>,
-    /// Whose poses and places are taken, by member.
+    /// Members whose poses and places are taken.
     hears: Vec<bool>,
     serves: Vec<bool>,
     tick: u64,
@@ -48,7 +48,7 @@ impl Controller {
         })
     }
 
-    /// What rings when poses or places of leaders arrive.
+    /// The bell that rings when poses or places of leaders arrive.
     pub fn bells(&self) -> Vec<Bell> {
         vec![self.poses.bell(), self.leaders.bell()]
     }
@@ -121,7 +121,7 @@ impl Robots {
         })
     }
 
-    /// What rings when targets arrive.
+    /// The bell that rings when targets arrive.
     pub fn bell(&self) -> Bell {
         self.targets.bell()
     }

@@ -1,26 +1,26 @@
-//! The edge to shared memory: poses in, targets and formation state out, and a running body to look at, between
+//! The edge to shared memory: poses in, targets and formation state out, and a running body to read, between
 //! processes of one computer without a copy (iceoryx2).
 //!
-//! Every service is a pair: publish and subscribe of slices, and an event that wakes who waits for them. Who writes
-//! borrows a slice of shared memory, fills it in place and hands it over; who reads borrows it. Nobody polls, and
-//! whoever is slow or dead holds nobody up: the oldest slice in a full queue gives way.
+//! Every service is a pair: publish and subscribe of slices, and an event that wakes its subscribers. Publishers write
+//! in place in shared memory; subscribers borrow. No process polls, and a slow or dead one delays no other: the
+//! oldest slice in a full queue gives way.
 //!
 //! | service | elements | from |
 //! |---|---|---|
 //! | `flockform/SWARM/poses` | [`payload::Pose`] | the robots |
-//! | `flockform/SWARM/leaders` | [`payload::Leader`] | who moves leaders from outside |
-//! | `flockform/SWARM/commands` | [`payload::Command`] | who may stop the formation |
+//! | `flockform/SWARM/leaders` | [`payload::Leader`] | a process that moves leaders |
+//! | `flockform/SWARM/commands` | [`payload::Command`] | a process that may stop the formation |
 //! | `flockform/SWARM/targets` | [`payload::Target`] | the node |
 //! | `flockform/SWARM/state` | one [`payload::Formation`] | the node |
 //! | `flockform/SWARM/members` | [`payload::Member`] | the node |
 //! | `flockform/NAME/positions` | [`payload::Particle`] | `flockform run --publish NAME` |
 //!
 //! `SWARM` is the name of the swarm file without its ending. All carry [`payload::Header`] as user header. Types are
-//! told apart by name, and the name bears a version: another one is refused ([`ShmError::Type`]).
+//! distinguished by name, and the name bears a version: another one is refused ([`ShmError::Type`]).
 //!
 //! * [`domain`]: which processes meet. [`channel`]: a service's two sides. [`wait`]: sleeping until there is something.
 //! * [`link`]: the ends of a [`transport`](crate::swarm::transport). [`node`], [`robots`]: the loop and the robots on top.
-//! * [`positions`]: a body under way.
+//! * [`positions`]: a running body.
 
 pub mod channel;
 pub mod domain;
@@ -39,7 +39,7 @@ pub use robots::SimulatedRobots;
 use crate::scene::SceneError;
 use crate::swarm::control::scope::NodeScopeError;
 
-/// Why something over shared memory could not be made or sent.
+/// Errors of shared memory.
 #[derive(Debug, thiserror::Error)]
 pub enum ShmError {
     #[error("{0}")]

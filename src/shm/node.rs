@@ -34,7 +34,7 @@ pub struct FormationNode {
     part: NodeScope,
     end: Controller,
     commands: Reader<Command>,
-    /// Whose word counts.
+    /// The commands that are obeyed.
     orders: RawCommands,
     state: Writer<Formation>,
     members: Writer<Member>,
@@ -49,7 +49,7 @@ impl FormationNode {
     /// Takes part in the domain: for all members, or for one that hears none but itself and its neighbours.
     ///
     /// # Errors
-    /// What in the swarm file or in shared memory stands in the way.
+    /// Errors of the swarm file or of shared memory.
     pub fn open(swarm: &Swarm, domain: &Domain, member: Option<&str>) -> Result<Self, ShmError> {
         let mut control = Control::new(swarm)?;
         let part = NodeScope::take(swarm, &mut control, member)?;

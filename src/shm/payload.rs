@@ -1,7 +1,7 @@
-//! What lies in shared memory: plain structs in C's layout, the same for every language.
+//! The content of shared memory: plain structs in C's layout, the same for every language.
 //!
-//! A type's name ends in its version. Any change of a field's meaning, order or type is a new version: iceoryx2 tells
-//! types apart by name, size and alignment alone.
+//! A type's name ends in its version. Any change of a field's meaning, order or type is a new version: iceoryx2
+//! distinguishes types by name, size and alignment alone.
 
 use iceoryx2::prelude::ZeroCopySend;
 
@@ -38,7 +38,7 @@ payload! {
         stamp: f64,
     }
 
-    /// Where a robot is.
+    /// The pose of a robot.
     Pose as "FlockformPose_v1" {
         /// Number of the robot in the swarm file's order, from 0.
         member: u32,
@@ -52,18 +52,18 @@ payload! {
         stamp: f64,
     }
 
-    /// Where a robot shall go next.
+    /// The next target of a robot.
     Target as "FlockformTarget_v1" {
         /// Number of the robot in the swarm file's order, from 0.
         member: u32,
         reserved: u32,
         /// After the safety filter \[m, world frame\].
         position: [f64; 2],
-        /// Where it shall look \[rad\].
+        /// Heading to take \[rad\].
         yaw: f64,
     }
 
-    /// Where a leader that is moved from outside shall go.
+    /// The target of a leader that is moved from outside.
     Leader as "FlockformLeader_v1" {
         /// Number of the robot in the swarm file's order, from 0.
         member: u32,
@@ -72,7 +72,7 @@ payload! {
         position: [f64; 2],
     }
 
-    /// What the node shall do.
+    /// A command to the node.
     Command as "FlockformCommand_v1" {
         /// [`Command::EMERGENCY_STOP`] or [`Command::RESUME`].
         kind: u32,
@@ -183,7 +183,7 @@ impl Member {
 mod tests {
     use super::*;
 
-    /// What a peer in another language was written for.
+    /// The layout that peers in other languages rely on.
     #[test]
     fn layouts_are_those_that_peers_were_written_for() {
         use std::mem::{offset_of, size_of};

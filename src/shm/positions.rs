@@ -1,7 +1,7 @@
-//! A body under way, for other processes to look at: its positions after every step.
+//! A running body for other processes to read: its positions after every step.
 //!
 //! The positions are written once, from the engine into a slice of shared memory, and read there. A step is
-//! published to whoever reads at that moment; with nobody there it costs a look at a counter.
+//! published to the readers of that moment; without readers it costs the read of a counter.
 
 use super::payload::Particle;
 use super::{Capacity, Domain, Peer, Reader, ShmError, Writer};

@@ -26,7 +26,7 @@ const CLEANING: u64 = 50;
 
 impl SimulatedRobots {
     /// # Errors
-    /// What in the swarm file or in shared memory stands in the way.
+    /// Errors of the swarm file or of shared memory.
     pub fn open(swarm: &Swarm, domain: &Domain) -> Result<Self, ShmError> {
         let control = Control::new(swarm)?;
         let formation = control.formation();

@@ -9,10 +9,10 @@ use iceoryx2::prelude::{CallbackProgression, SignalHandlingMode, WaitSetBuilder,
 
 use super::ShmError;
 
-/// Longest sleep: what is asked to stop does so within it.
+/// Longest sleep, within which a request to stop is obeyed.
 const LONGEST: Duration = Duration::from_millis(100);
 
-/// What wakes a reader; shared, so that a loop can wait for it while it uses the reader.
+/// The bell that wakes a reader; shared, so that a loop can wait for it while it uses the reader.
 pub type Bell = Rc<Listener<ipc::Service>>;
 
 /// Calls `next` until `stop` is set: at once, whenever a bell rings (with `true`), and when the time it returned has

@@ -36,7 +36,7 @@ impl Effort {
     }
 }
 
-/// What a disturbance did.
+/// The growth of a disturbance.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Growth {
     /// Value of the parameter.
@@ -54,7 +54,7 @@ impl Growth {
     }
 }
 
-/// Where growth begins.
+/// The value at which growth begins.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Found {
     /// Middle of the last bracket.
@@ -72,7 +72,7 @@ pub struct Found {
 /// rounding of the positions.
 const FAR: f64 = 1e9;
 
-/// Steps between two looks at whether the factor has come to rest: even, since a lattice whose sites are
+/// Steps between two checks whether the factor has settled: even, since a lattice whose sites are
 /// two-coloured may swap them at every step.
 const LOOK: usize = 64;
 
@@ -93,8 +93,8 @@ pub fn growth(subject: &Subject, parameter: Parameter, value: f64, most_steps: u
         sizes.push(now);
         let gone = !(now < FAR * sizes[0] && now > sizes[0] / FAR);
         // A mode that grows may begin small: what shrinks must have shrunk, or have had the time.
-        let told = now < 1e-3 * sizes[0] || now > 1e3 * sizes[0] || 4 * sizes.len() > most_steps;
-        settled = gone || told && sizes.len() % LOOK == 1 && is_settled(&sizes);
+        let decided = now < 1e-3 * sizes[0] || now > 1e3 * sizes[0] || 4 * sizes.len() > most_steps;
+        settled = gone || decided && sizes.len() % LOOK == 1 && is_settled(&sizes);
     }
     let steps = sizes.len() - 1;
     Growth { value, per_step: factor(&sizes, steps, part(steps)), steps, settled }
@@ -134,19 +134,19 @@ fn is_settled(sizes: &[f64]) -> bool {
     (last - before).abs() <= 0.02 * (last - 1.0).abs()
 }
 
-/// Where between a value at which the body comes back and one beyond it growth begins, to `within`.
+/// The value at which growth begins, to `within`, between one at which the body comes back and one beyond it.
 /// `toward` is the direction to look in and the first stride; `None` where nothing grows for thousands of
-/// strides. `tell` is told of each value before its run.
+/// strides. `progress` is called with each value before its run.
 pub fn find(
     subject: &Subject,
     parameter: Parameter,
     (inside, toward): (f64, f64),
     (within, most_steps): (f64, usize),
-    tell: &mut dyn FnMut(f64),
+    progress: &mut dyn FnMut(f64),
 ) -> Option<Found> {
     let mut runs = Vec::new();
     let mut grows = |value: f64| {
-        tell(value);
+        progress(value);
         let run = growth(subject, parameter, value, most_steps);
         runs.push(run);
         run.grows()

@@ -1,6 +1,6 @@
-//! When a scene's body grows instead of coming to rest, foretold and found; and what holds at the extremes.
+//! When a scene's body grows instead of coming to rest, predicted and measured, and extreme input.
 //!
-//! [`thresholds`] foretells the feedback factors and the damping beyond which the sweep grows, from its
+//! [`thresholds`] predicts the feedback factors and the damping beyond which the sweep grows, from its
 //! spectrum; [`bisection`] finds them by running the body; [`extremes`] runs it, and small bodies made for
 //! the purpose, where numbers and shapes are as bad as they come. [`study::run`] does all of it.
 //!

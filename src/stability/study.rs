@@ -1,4 +1,4 @@
-//! Thresholds of a scene, foretold and found, and its extremes.
+//! Thresholds of a scene, predicted and measured, and its extremes.
 
 use std::fmt;
 
@@ -22,7 +22,7 @@ pub struct Threshold {
     pub found: Option<Found>,
     /// How far apart the two may be: a thousandth of what the sweep is from growing, or from not growing,
     /// at the parameter's neutral value (no feedback, no damping), and 1e-6 at least; where runs do not settle
-    /// 4 over the number of their steps, which is what they can tell \[1\].
+    /// 4 over the number of their steps, which is what they can resolve \[1\].
     pub tolerance: f64,
 }
 
@@ -47,7 +47,7 @@ pub struct Sweep {
     pub runs: Vec<Growth>,
 }
 
-/// What the spectrum and runs say of a linear rule.
+/// The results of spectrum and runs for a linear rule.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Linear {
     pub particles: usize,
@@ -69,7 +69,7 @@ pub struct Study {
     pub title: String,
     /// `None` where the rule is not linear or the body not held.
     pub linear: Option<Linear>,
-    /// Why there are no thresholds.
+    /// The reason why there are no thresholds.
     pub refused: Option<String>,
     pub extremes: Vec<Case>,
 }
@@ -82,22 +82,22 @@ pub struct Options {
     pub no_extremes: bool,
 }
 
-/// Foretells and finds the thresholds of a scene and runs its extremes. `tell` is told what comes next.
+/// Predicts and measures the thresholds of a scene and runs its extremes. `progress` is called with what comes next.
 ///
 /// # Errors
 /// Whatever keeps the scene from being planned; a scene without thresholds is part of the study.
-pub fn run(load: Load<'_>, options: Options, tell: &mut dyn FnMut(&str)) -> Result<Study, SceneError> {
+pub fn run(load: Load<'_>, options: Options, progress: &mut dyn FnMut(&str)) -> Result<Study, SceneError> {
     let scene = load(&[])?;
     let (linear, refused) = match Subject::of(&scene) {
-        Ok(subject) => (Some(linear(&subject, options.effort, tell)), None),
+        Ok(subject) => (Some(linear(&subject, options.effort, progress)), None),
         Err(error) if extremes::plan(&scene).is_ok() => (None, Some(error.to_string())),
         Err(error) => return Err(error),
     };
-    let extremes = if options.no_extremes { Vec::new() } else { extremes::run(load, &scene, tell) };
+    let extremes = if options.no_extremes { Vec::new() } else { extremes::run(load, &scene, progress) };
     Ok(Study { name: scene.name.clone(), title: scene.raw.title.clone(), linear, refused, extremes })
 }
 
-fn linear(subject: &Subject, effort: Effort, tell: &mut dyn FnMut(&str)) -> Linear {
+fn linear(subject: &Subject, effort: Effort, progress: &mut dyn FnMut(&str)) -> Linear {
     let here = subject.radius();
     let bare = subject.with(Parameter::Feedback, 0.0).with(Parameter::Damping, 1.0).ends();
     let asked = [
@@ -107,11 +107,11 @@ fn linear(subject: &Subject, effort: Effort, tell: &mut dyn FnMut(&str)) -> Line
     ];
     let thresholds: Vec<Threshold> = asked
         .into_iter()
-        .map(|(parameter, side)| threshold(subject, parameter, side, effort, tell))
+        .map(|(parameter, side)| threshold(subject, parameter, side, effort, progress))
         .collect();
     let sweeps = Parameter::ALL
         .into_iter()
-        .map(|parameter| sweep(subject, parameter, &thresholds, effort, tell))
+        .map(|parameter| sweep(subject, parameter, &thresholds, effort, progress))
         .collect();
     Linear {
         particles: subject.particles(),
@@ -130,10 +130,10 @@ fn threshold(
     parameter: Parameter,
     side: Side,
     effort: Effort,
-    tell: &mut dyn FnMut(&str),
+    progress: &mut dyn FnMut(&str),
 ) -> Threshold {
     let what = format!("the {} threshold of the {}", side.name(), parameter.name());
-    tell(&what);
+    progress(&what);
     let neutral = match parameter {
         Parameter::Feedback => 0.0,
         Parameter::Damping => 1.0,
@@ -143,12 +143,12 @@ fn threshold(
     let steps = effort.steps(subject.particles());
     let from = start(subject, parameter, side);
     let found = find(subject, parameter, from, (tolerance / 8.0, steps), &mut |value| {
-        tell(&format!("{what}: a run at {value}"));
+        progress(&format!("{what}: a run at {value}"));
     });
     let settled = found.as_ref().is_none_or(|found| found.settled);
     let tolerance = if settled { tolerance } else { tolerance.max(4.0 / steps as f64) };
     let predicted =
-        predict(subject, parameter, side, &mut |value| tell(&format!("{what}: the spectrum at {value}")));
+        predict(subject, parameter, side, &mut |value| progress(&format!("{what}: the spectrum at {value}")));
     Threshold { parameter, side, predicted, found, tolerance }
 }
 
@@ -158,10 +158,10 @@ fn sweep(
     parameter: Parameter,
     thresholds: &[Threshold],
     effort: Effort,
-    tell: &mut dyn FnMut(&str),
+    progress: &mut dyn FnMut(&str),
 ) -> Sweep {
     let what = format!("growth over the {}", parameter.name());
-    tell(&what);
+    progress(&what);
     let mut known: Vec<f64> = thresholds
         .iter()
         .filter(|threshold| threshold.parameter == parameter)
@@ -179,11 +179,11 @@ fn sweep(
     let runs = (0..effort.samples)
         .map(|k| range[0] + (range[1] - range[0]) * k as f64 / (effort.samples.max(2) - 1) as f64)
         .map(|value| {
-            tell(&format!("{what}: a run at {value}"));
+            progress(&format!("{what}: a run at {value}"));
             growth(subject, parameter, value, effort.steps(subject.particles()) / 4)
         })
         .collect();
-    tell(&format!("{what}: spectra"));
+    progress(&format!("{what}: spectra"));
     let spectrum = curve(subject, parameter, range, 6 * effort.samples + 1);
     Sweep { parameter, present: subject.present(parameter), spectrum, runs }
 }
@@ -257,11 +257,11 @@ impl fmt::Display for Linear {
             let shown = |value: Option<f64>| value.map_or("nowhere".into(), |v| format!("{v:.8}"));
             let apart = predicted.zip(found).map_or(String::new(), |(p, f)| format!("{:.1e}", (p - f).abs()));
             let settled = threshold.found.as_ref().is_none_or(|found| found.settled);
-            let foretold = threshold.predicted.as_ref().is_none_or(|predicted| predicted.converged);
+            let predicted_well = threshold.predicted.as_ref().is_none_or(|predicted| predicted.converged);
             let verdict = match (threshold.agrees(), settled) {
                 (false, _) => format!("  THEY DISAGREE by more than {:.1e}", threshold.tolerance),
-                (true, _) if !foretold => "  a spectrum on the way did not settle".into(),
-                (true, false) => format!("  too slow to settle: told to {:.1e}", threshold.tolerance),
+                (true, _) if !predicted_well => "  a spectrum on the way did not settle".into(),
+                (true, false) => format!("  too slow to settle: known to {:.1e}", threshold.tolerance),
                 (true, true) => String::new(),
             };
             writeln!(f, "{name:26} {:>14} {:>14} {apart:>10}{verdict}", shown(predicted), shown(found))?;

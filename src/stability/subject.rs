@@ -10,7 +10,7 @@ use crate::scene::{Scene, SceneError};
 use crate::solve::spectrum::{Ends, SpectralRadius, radius_from_one, spectral_ends, spectral_radius};
 use crate::sweep::Order;
 
-/// What is varied.
+/// The parameter that is varied.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Parameter {
@@ -33,7 +33,7 @@ impl Parameter {
 /// A linear body at rest.
 #[derive(Clone, Debug)]
 pub struct Subject {
-    /// Everybody who does not follow is clamped, nobody changes role, and there are no loads.
+    /// Particles that do not follow are clamped, roles do not change, and there are no loads.
     plan: Plan,
 }
 
@@ -46,7 +46,7 @@ impl Subject {
     /// # Errors
     /// Names what makes the rule nonlinear, and a follower that no leader holds.
     pub fn of(scene: &Scene) -> Result<Self, SceneError> {
-        // Where the truth would have its leaders is all the same: they are held at rest.
+        // The places that the truth gives its leaders do not matter: they are held at rest.
         let mut plan = Plan::with_truth(scene, &|places| vec![[0.0; 2]; places.len()])?;
         require_linear(scene, &plan)?;
         let mut changes = std::mem::take(&mut plan.changes);
@@ -123,15 +123,15 @@ impl Subject {
         let engine = self.engine();
         let frame = self.plan.body.frame.as_ref();
         spectral_radius(engine.flock(), frame, engine.roles(), engine.update(), MOST_SWEEPS)
-            .expect("linear, and somebody follows")
+            .expect("linear, with followers")
     }
 
-    /// The same as well as it takes to tell growth from decay.
+    /// The same, as accurate as distinguishing growth from decay needs.
     pub fn radius_from_one(&self) -> SpectralRadius {
         let engine = self.engine();
         let frame = self.plan.body.frame.as_ref();
         radius_from_one(engine.flock(), frame, engine.roles(), engine.update(), MOST_SWEEPS)
-            .expect("linear, and somebody follows")
+            .expect("linear, with followers")
     }
 
     /// Ends of the spectrum of its sweep.
@@ -139,10 +139,10 @@ impl Subject {
         let engine = self.engine();
         let frame = self.plan.body.frame.as_ref();
         spectral_ends(engine.flock(), frame, engine.roles(), engine.update(), MOST_SWEEPS)
-            .expect("linear, and somebody follows")
+            .expect("linear, with followers")
     }
 
-    /// Refuses followers in a part of the body that nobody leads: nothing brings them back to rest.
+    /// Refuses followers in a part of the body without leaders and clamps: nothing brings them back to rest.
     fn require_held(&self, scene: &Scene) -> Result<(), SceneError> {
         let Plan { body, flock, roles, .. } = &self.plan;
         let labels = body.components(&flock.neighbours);
@@ -155,15 +155,17 @@ impl Subject {
         match (0..labels.len()).filter(follower).find(|&i| !held[labels[i] as usize]) {
             Some(i) => {
                 let message = format!(
-                    "particle {} follows in a part of the body where nobody leads or is clamped: nothing brings it \
+                    "particle {} follows in a part of the body that has no leader and no clamp: nothing brings it \
                      back to rest, and every damping and feedback is marginal",
                     body.id(i)
                 );
                 Err(scene.refuse("roles", message, help))
             }
-            None if self.followers() == 0 => {
-                Err(scene.refuse("roles", "nobody follows: there is no sweep to be stable", help))
-            }
+            None if self.followers() == 0 => Err(scene.refuse(
+                "roles",
+                "the body has no followers, and so no sweep that could be stable",
+                help,
+            )),
             None => Ok(()),
         }
     }

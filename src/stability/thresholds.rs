@@ -1,4 +1,4 @@
-//! Thresholds foretold: where the spectral radius of the sweep passes 1.
+//! Predicted thresholds: where the spectral radius of the sweep passes 1.
 //!
 //! Of a sweep without memory whose eigenvalues `mu` (undamped, without feedback) are real and between
 //! `low` and `high`, the eigenvalues with damping `w` and feedback `fd` are `1 - w + w (1 + fd) mu`, and the
@@ -38,7 +38,7 @@ pub struct Radius {
     pub radius: f64,
 }
 
-/// Where to start from, and which way and how far to go first: for feedback the factor at which a target
+/// The start of the search, its direction and its first stride: for feedback the factor at which a target
 /// is the initial position itself, where nothing can grow.
 pub fn start(subject: &Subject, parameter: Parameter, side: Side) -> (f64, f64) {
     let toward = if side == Side::Upper { 1.0 } else { -1.0 };
@@ -50,17 +50,17 @@ pub fn start(subject: &Subject, parameter: Parameter, side: Side) -> (f64, f64) 
     }
 }
 
-/// Where the spectral radius passes 1, from the stable range outwards; `None` where it does nowhere.
-/// `tell` is told of each value before its radius is looked for.
+/// The value at which the spectral radius passes 1, from the stable range outwards; `None` where it passes nowhere.
+/// `progress` is called with each value before its radius is computed.
 pub fn predict(
     subject: &Subject,
     parameter: Parameter,
     side: Side,
-    tell: &mut dyn FnMut(f64),
+    progress: &mut dyn FnMut(f64),
 ) -> Option<Predicted> {
     let mut converged = true;
     let mut excess = |value: f64| {
-        tell(value);
+        progress(value);
         let found = subject.with(parameter, value).radius_from_one();
         converged &= found.converged;
         // Bounded: a sequential sweep can grow by 1e20 a step, and false position would creep away from there.

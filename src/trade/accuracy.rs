@@ -1,6 +1,6 @@
 //! The cheapest setting for an accuracy, measured against the truth of the scene's shape.
 //!
-//! What the studies show (`flockform trade`): the paper's rule ends at an error that no spacing removes, the material
+//! The findings of `flockform trade`: the paper's rule ends at an error that no spacing removes, the material
 //! rule's falls with the spacing. So the spacing is halved until the rule, solved as far as doubles go, is near enough
 //! to the truth; then the coarsest tolerance and, where they suffice, singles are taken that leave it so. Every error is
 //! that of a solved body, to which the truth's own is added: what is delivered is what was measured.
@@ -32,7 +32,7 @@ const OF_TRUTH: f64 = 0.05;
 #[derive(Debug)]
 pub struct Chosen {
     pub scene: Scene,
-    /// What was chosen, in words.
+    /// The choice in words.
     pub words: String,
 }
 

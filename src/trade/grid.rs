@@ -48,7 +48,7 @@ impl Grid {
     }
 }
 
-/// Whose rule.
+/// The rule of a setting.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum RuleChoice {
@@ -92,7 +92,7 @@ impl std::fmt::Display for Setting {
     }
 }
 
-/// What must be set in a scene to have this rule at this part of its spacing.
+/// Overrides that give a scene this rule at this part of its spacing.
 pub fn body_overrides(scene: &Scene, rule: RuleChoice, part: f64) -> Vec<String> {
     let mut overrides = Vec::new();
     let mean = match (rule, &scene.raw.rule.mean) {
@@ -130,7 +130,7 @@ pub fn body_overrides(scene: &Scene, rule: RuleChoice, part: f64) -> Vec<String>
     overrides
 }
 
-/// What must be set in a scene to be solved so.
+/// Overrides that have a scene solved in this way.
 pub fn solver_overrides(setting: &Setting) -> Vec<String> {
     let Setting { solver, tolerance, bits, .. } = setting;
     vec![format!("equilibrium={{solver=\"{solver}\",tolerance={tolerance:?},precision=\"f{bits}\"}}")]

@@ -1,9 +1,9 @@
-//! What accuracy costs: rule, spacing, solver, tolerance and precision of a scene against the truth.
+//! The cost of accuracy: rule, spacing, solver, tolerance and precision of a scene against the truth.
 //!
 //! A scene is run in many settings. Each is timed from the scene to the followers at rest, and its error is
 //! the relative L2 distance of the followers from the same truth, finite elements on the shape, held as the finest of the
-//! bodies. What is cheapest for an error can then be read off ([`Study::cheapest`]), and which settings no
-//! other beats in both ([`Study::front`]). [`choose`] goes the other way: from an accuracy to the setting.
+//! bodies. The result has the cheapest setting for an error ([`Study::cheapest`]) and the Pareto-optimal
+//! settings ([`Study::front`]). [`choose`] goes the other way: from an accuracy to the setting.
 
 mod accuracy;
 mod grid;

@@ -15,7 +15,7 @@ use crate::flock::role::Role;
 use crate::flock::vectors::{Vectors, distance};
 use crate::scene::{Scene, SceneError};
 
-/// What became of a setting.
+/// The outcome of a setting.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "outcome", rename_all = "kebab-case")]
 pub enum Outcome {
@@ -60,11 +60,11 @@ pub struct Study {
 /// Loads the scene with these overrides, after those that the user gave.
 pub type Load<'a> = &'a dyn Fn(&[String]) -> Result<Scene, SceneError>;
 
-/// Runs a scene in every setting of the grid. `tell` is told of each before it runs.
+/// Runs a scene in every setting of the grid. `progress` is called with each before it runs.
 ///
 /// # Errors
 /// Whatever keeps the scene from having a truth; a setting that is refused is part of the study.
-pub fn run(load: Load<'_>, grid: &Grid, tell: &mut dyn FnMut(&Setting)) -> Result<Study, SceneError> {
+pub fn run(load: Load<'_>, grid: &Grid, progress: &mut dyn FnMut(&Setting)) -> Result<Study, SceneError> {
     let scene = load(&[])?;
     let truth = finest_truth(load, &scene, grid)?;
     let mut study = Study {
@@ -88,7 +88,7 @@ pub fn run(load: Load<'_>, grid: &Grid, tell: &mut dyn FnMut(&Setting)) -> Resul
                 }
             };
             for setting in settings(grid, rule, spacing, particles) {
-                tell(&setting);
+                progress(&setting);
                 let overrides: Vec<String> =
                     overrides.iter().cloned().chain(solver_overrides(&setting)).collect();
                 study.points.push(measure(
@@ -126,7 +126,7 @@ fn refused(rule: RuleChoice, spacing: f64, error: &SceneError) -> Point {
     Point { setting, particles: 0, error: None, seconds: None, iterations: None, outcome }
 }
 
-/// What is wrong, without its place, which is in an override of the study's own.
+/// The message of an error without its place, which is in an override of the study's own.
 fn reason(error: &SceneError) -> String {
     error.problems().first().map_or_else(String::new, |problem| problem.message.clone())
 }

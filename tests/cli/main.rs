@@ -2,6 +2,7 @@
 
 mod checkpoint;
 mod compare;
+mod documents;
 mod install;
 mod material;
 mod measured;

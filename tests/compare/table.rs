@@ -1,7 +1,7 @@
 //! Bodies that cells on a lattice get wrong where nothing is done about it: what a comparison says of each, against the
 //! figure that it has to have.
 
-use flockform::compare::places::Told;
+use flockform::compare::places::PlaceComparison;
 
 use crate::support::*;
 
@@ -17,7 +17,7 @@ fn lattice(kind: &str, h: f64, orientation: f64) -> String {
 }
 
 /// What is told of the first place of a bundled scene with changes, and the error of the displacements.
-fn told(name: &str, overrides: &[&str]) -> (Told, f64) {
+fn told(name: &str, overrides: &[&str]) -> (PlaceComparison, f64) {
     let found = compared(name, overrides);
     let (at, error) = (found.places[0], found.comparison.displacement_rel_l2);
     println!("{name} {overrides:?}: {:.3} %\n{at}", 100.0 * error);

@@ -75,14 +75,14 @@ fn four_neighbours_tolerate_no_liar_and_eight_one() {
     };
     let report = refusal(&lattice("kind = \"first\""));
     assert!(report.contains("tolerate F = 1"), "{report}");
-    let swarm = parse(&lattice("kind = \"ring\"\nradius = 1")).expect("valid");
+    let swarm = parse(&lattice("kind = \"chebyshev\"\nradius = 1")).expect("valid");
     assert!(Control::new(&swarm).is_ok());
 }
 
 #[test]
 fn corners_that_follow_by_negative_weights_are_refused_and_named() {
     let text = "title = \"t\"\n[lattice]\nkind = \"square\"\nspacing = 1.0\n[body]\nshape = { kind = \"grid\", columns = 10, rows = 10 }\n\
-                [neighbours]\nkind = \"ring\"\nradius = 1\n[rule]\nweights = { kind = \"solved\" }\n\
+                [neighbours]\nkind = \"chebyshev\"\nradius = 1\n[rule]\nweights = { kind = \"solved\" }\n\
                 [[leaders]]\nregion = { kind = \"ids\", ids = [45, 56, 46] }\nprogram = { kind = \"external\" }\n";
     let report = refusal(text);
     assert!(report.contains("does not come to rest"), "{report}");

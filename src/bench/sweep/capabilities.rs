@@ -42,7 +42,7 @@ const NAMED: [(&str, &[&str], Recorded); 14] = [
     ("fracture", &["fracture={stretch=3.0}"], Nothing),
     ("feedback, to the step before", &["rule.feedback={factor=-0.1,reference=\"previous\"}"], Nothing),
     ("feedback, to the start", &["rule.feedback={factor=-0.1,reference=\"initial\"}"], Nothing),
-    ("Poisson term", &["rule.poisson={k=1e-6,pull=\"x\"}"], Nothing),
+    ("Poisson term", &["rule.poisson={k=1e-6,axis=\"x\"}"], Nothing),
     ("damping", &["update.damping=0.9"], Nothing),
     ("weights", &["rule.weights={kind=\"list\",values=[1.0,2.0,1.5,0.5]}"], Nothing),
     ("lagged frame", &["frame=\"lagged\""], Nothing),

@@ -5,7 +5,7 @@ use flockform::flock::neighbourhood::Neighbourhood;
 
 use super::{WrongOption, number, wrong};
 
-const FORMS: &str = "give first, first:3, ring:1, second, straight, within:1.5, or offsets in columns and rows, offsets:1,0;-1,0";
+const FORMS: &str = "give first, first:3, chebyshev:1, second, collinear, within:1.5, or offsets in columns and rows, offsets:1,0;-1,0";
 
 /// Farthest a neighbour may be, in spacings: more would be no neighbourhood.
 const FARTHEST: f64 = 32.0;

@@ -19,7 +19,7 @@ pub struct Axes {
     pub high: [f64; 2],
 }
 
-/// What an axis measures.
+/// The quantity of an axis.
 #[derive(Clone, Copy, Debug)]
 pub struct Measure<'a> {
     pub quantity: &'a str,
@@ -38,7 +38,7 @@ impl Axes {
         Self::fitted(low, high, margin, [680.0, 680.0 * (height / width / 2.0).clamp(1.0, 1.6)])
     }
 
-    /// Such a plot that takes no more than `room` \[px\], unless ticks could not be told apart there.
+    /// Such a plot that takes no more than `room` \[px\], unless its ticks would overlap there.
     pub fn fitted(low: [f64; 2], high: [f64; 2], margin: f64, room: [f64; 2]) -> Self {
         let extent = [0, 1].map(|k| (high[k] - low[k] + 2.0 * margin).max(f64::MIN_POSITIVE));
         let scale = (room[0] / extent[0]).min(room[1] / extent[1]);
@@ -58,7 +58,7 @@ impl Axes {
         self.size[0] / (self.high[0] - self.low[0])
     }
 
-    /// Where the data point lies on the sheet \[px\].
+    /// The place of a data point on the sheet \[px\].
     pub fn place(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let along =
             |k: usize, value: f64| (value - self.low[k]) / (self.high[k] - self.low[k]) * self.size[k];

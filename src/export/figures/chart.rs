@@ -13,7 +13,7 @@ const TEXT: f64 = 12.0;
 const TICK: f64 = 5.0;
 const GRID: &str = "#e6e8eb";
 
-/// What an axis measures, and how it is divided.
+/// The quantity of an axis, and its scale.
 #[derive(Clone, Copy, Debug)]
 pub struct Axis<'a> {
     pub quantity: &'a str,

@@ -49,7 +49,7 @@ pub fn overlay(pair: &Pair<'_>) -> String {
     if !is_dotted {
         note = "outlines by the rule and in truth".to_owned();
     }
-    note += &told(factor);
+    note += &scale_note(factor);
     let heading = Heading { title: pair.title.into(), note, legend: legend(pair, is_dotted) };
     page::with_body(&heading, axes, pair.unit, 20.0, |svg, axes| {
         let dashes = "stroke-dasharray=\"5 3\"";
@@ -118,8 +118,8 @@ pub(super) fn enlargement<D: Iterator<Item = usize>>(
     [5.0, 2.0].map(|m| m * decade).into_iter().find(|&factor| factor <= wanted).unwrap_or(decade)
 }
 
-/// How the note ends: times what displacements are drawn.
-pub(super) fn told(factor: f64) -> String {
+/// The end of the note: the factor by which displacements are enlarged.
+pub(super) fn scale_note(factor: f64) -> String {
     match factor {
         1.0 => ", displacements to scale".into(),
         small if small < 1.0 => format!(", displacements drawn at {small} of their size"),

@@ -130,7 +130,7 @@ pub(super) fn dot_radius(axes: &Axes, spacing: f64) -> f64 {
     (0.3 * spacing * axes.scale()).clamp(0.6, 8.0)
 }
 
-/// What a square of the raster shows if several fall into it: the last of these. Ends of broken bonds
+/// Marks of a square of the raster; of several that fall into one square the last of these is shown. Ends of broken bonds
 /// (`None`) must not hide the few that are led.
 const SQUARE_ORDER: [Option<Role>; 6] = [
     Some(Role::Frame),

@@ -1,4 +1,4 @@
-//! What stands above a plot: title, what is shown, legend.
+//! The head of a plot: title, subject, legend.
 
 use std::borrow::Cow;
 

@@ -1,4 +1,4 @@
-//! What a few particles went through: displacement and PE1 against the step.
+//! Displacement and PE1 of a few particles against the step.
 
 use super::Subject;
 use super::axes::{Axes, Measure};

@@ -42,7 +42,7 @@ pub use stress::stress;
 pub use svg::INK;
 pub use von_mises::von_mises;
 
-/// Whom a figure shows.
+/// The body that a figure shows.
 #[derive(Clone, Copy, Debug)]
 pub struct Subject<'a> {
     pub title: &'a str,
@@ -53,7 +53,7 @@ pub struct Subject<'a> {
     pub neighbours: Option<&'a Neighbours>,
     /// Between the particles, where the scene has a material.
     pub cells: Option<&'a Cells>,
-    /// What is counted on the way: `step` or `increment`.
+    /// The unit of the run's clock: `step` or `increment`.
     pub counts: &'static str,
 }
 

@@ -3,7 +3,7 @@
 use super::Subject;
 use super::axes::Axes;
 use super::bands::Bands;
-use super::comparison::{enlargement, told};
+use super::comparison::{enlargement, scale_note};
 use super::heading::Heading;
 use super::page;
 use super::raster::Raster;
@@ -46,7 +46,7 @@ pub fn stress(
     let bands = Bands::around(range[0].min(range[1]), range[1], NOISE * range[1]);
     let axes = page::window(&places, drawn(), subject.body.lattice.spacing());
     let mut note =
-        format!("von Mises stress in the cells, {}{}", page::note(subject, snapshot), told(factor));
+        format!("von Mises stress in the cells, {}{}", page::note(subject, snapshot), scale_note(factor));
     let is_raster = shown.len() > MOST_CELLS;
     if is_raster {
         note += &format!("; {} cells drawn as squares of their largest value", shown.len());

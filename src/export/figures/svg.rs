@@ -14,7 +14,7 @@ pub struct Svg {
     text: String,
 }
 
-/// Where a text stands against its point.
+/// The alignment of a text at its point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Anchor {
     Start,

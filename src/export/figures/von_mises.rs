@@ -2,7 +2,7 @@
 
 use super::axes::{Axes, Measure};
 use super::colour::viridis;
-use super::comparison::{Pair, told};
+use super::comparison::{Pair, scale_note};
 use super::heading::Heading;
 use super::svg::{Anchor, INK, Path, Svg, text_width};
 use super::ticks::Ticks;
@@ -10,7 +10,7 @@ use crate::flock::vectors::Vectors;
 
 /// Name of the third panel and of its scale.
 const DIFFERENCE: &str = "|rule \u{2212} truth|";
-/// Shades of the colour bar: more than the eye tells apart.
+/// Shades of the colour bar: more than the eye distinguishes.
 const SHADES: usize = 96;
 /// Stress above the scale: no colour of viridis.
 const ABOVE: &str = "#ff8f7a";
@@ -51,7 +51,7 @@ pub fn von_mises(pair: &Pair<'_>, rule: &[f64], truth: &[f64]) -> String {
     };
     let heading = Heading {
         title: pair.title.into(),
-        note: format!("von Mises stress at the centres of the cells{}", told(factor)),
+        note: format!("von Mises stress at the centres of the cells{}", scale_note(factor)),
         legend: Vec::new(),
     };
     Sheet { axes, is_row, scales, heading }.draw(pair, &panels)

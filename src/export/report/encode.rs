@@ -15,11 +15,11 @@ use rayon::prelude::*;
 use super::frames::{Frame, Frames};
 use super::quantized_channel::QuantizedChannel;
 
-/// Frames in one piece: the first is told without the one before, so that pieces are compressed in parallel
+/// Frames in one piece: the first is written without the one before, so that pieces are compressed in parallel
 /// and a page shows the first while it unpacks the others.
 pub const GROUP: usize = 16;
 
-/// What a code is told as the difference from.
+/// The value that a code is a difference from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mode {
     /// The particle before.
@@ -56,7 +56,7 @@ fn encode_group(group: &[Frame]) -> (Vec<u8>, String) {
     let channels = group.first().map_or(0, |frame| frame.tracks.len());
     let mut modes = Vec::new();
     let mut packer = Packer::new();
-    let (mut codes, mut before, mut told) =
+    let (mut codes, mut before, mut deltas) =
         (vec![Vec::new(); channels], vec![Vec::new(); channels], Vec::new());
     for (n, frame) in group.iter().enumerate() {
         std::mem::swap(&mut codes, &mut before);
@@ -65,9 +65,9 @@ fn encode_group(group: &[Frame]) -> (Vec<u8>, String) {
             let past = (n > 0).then(|| Past { codes: &before[k], track: &group[n - 1].tracks[k] });
             let mode = cheapest(track, &codes[k], past);
             modes.push(mode as u8);
-            told.clear();
-            told.extend(differences(track, &codes[k], past, mode));
-            packer.put_planes(&told, QuantizedChannel::bytes(track.bits));
+            deltas.clear();
+            deltas.extend(differences(track, &codes[k], past, mode));
+            packer.put_planes(&deltas, QuantizedChannel::bytes(track.bits));
         }
     }
     (modes, packer.finish())
@@ -83,7 +83,7 @@ struct Past<'a> {
 fn cheapest(track: &QuantizedChannel, codes: &[u32], past: Option<Past<'_>>) -> Mode {
     // Tracks in different quanta have no difference.
     let Some(past) = past.filter(|past| past.track.exponent == track.exponent) else { return Mode::Space };
-    /// Enough to tell which is cheaper; every so many particles, in runs, since neighbours in the list are compared.
+    /// Enough to decide which is cheaper; every so many particles, in runs, since neighbours in the list are compared.
     const RUN: usize = 64;
     const RUNS: usize = 64;
     let every = (codes.len() / RUNS).max(RUN);
@@ -128,7 +128,7 @@ fn zigzag(difference: u32, bits: u32) -> u32 {
     ((difference << 1) & mask) ^ (mask * is_negative)
 }
 
-/// Whole numbers as text: each told as the difference from the one `stride` before.
+/// Whole numbers as text: each written as the difference from the one `stride` before.
 pub fn integers(values: impl Iterator<Item = u32>, stride: usize) -> String {
     let values: Vec<u32> = values.collect();
     let before = |i: usize| if i < stride { 0 } else { values[i - stride] };
@@ -189,7 +189,7 @@ mod tests {
     use super::*;
     use crate::export::report::frames::Channel;
 
-    /// What `unpack.js` does, for one track.
+    /// The decoding of `unpack.js`, for one track.
     fn undo(residuals: &[u32], (bits, base): (u32, i64), past: Past<'_>, mode: Mode) -> Vec<u32> {
         let mask = (1u32 << bits) - 1;
         let shift = (past.track.base - base) as u32 & mask;
@@ -218,8 +218,8 @@ mod tests {
             second.read(&mut codes[1]);
             let past = Past { codes: &codes[0], track: &first };
             for mode in [Mode::Space, Mode::Time, Mode::Both] {
-                let told: Vec<u32> = differences(&second, &codes[1], Some(past), mode).collect();
-                assert_eq!(undo(&told, (bits, second.base), past, mode), codes[1], "{bits} {mode:?}");
+                let deltas: Vec<u32> = differences(&second, &codes[1], Some(past), mode).collect();
+                assert_eq!(undo(&deltas, (bits, second.base), past, mode), codes[1], "{bits} {mode:?}");
             }
         }
     }

@@ -1,4 +1,4 @@
-//! The report of a flight: robots, obstacles, who hears whom, and what was measured period by period.
+//! The report of a flight: robots, obstacles, links, and the measures of each period.
 
 use std::path::PathBuf;
 

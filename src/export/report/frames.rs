@@ -1,4 +1,4 @@
-//! The frames of a animation, kept while something runs of which nobody knows how long it will take.
+//! The frames of an animation, kept during a run of unknown length.
 //!
 //! Frames are kept at an interval that doubles whenever there are too many: every other one is then let go,
 //! so memory is bounded and the kept ones are evenly spaced.
@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::quantized_channel::QuantizedChannel;
 
-/// Frames that a report keeps at most: about as many as a slider of a page can tell apart.
+/// Frames that a report keeps at most: about as many as a slider of a page can address.
 pub const MOST_FRAMES: usize = 512;
 /// Memory for frames \[byte\]; bodies of millions of particles get fewer frames.
 const MOST_BYTES: usize = 400 << 20;

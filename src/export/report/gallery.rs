@@ -28,7 +28,7 @@ pub struct Exhibit {
 }
 
 impl Exhibit {
-    /// `notes` are those of the scene or swarm: their first sentence is told.
+    /// `notes` are those of the scene or swarm: their first sentence is shown.
     pub fn new(kind: &'static str, name: &str, title: &str, notes: &str) -> Self {
         // A point before a number or a small letter belongs to an abbreviation.
         let is_end = |&(at, _): &(usize, &str)| notes[at + 2..].starts_with(char::is_uppercase);

@@ -1,6 +1,6 @@
 //! The page: one file that needs no network and no server.
 //!
-//! What can be read without a script (title, summary, tables, texts) stands in the page as it is; films and
+//! Title, summary, tables and texts are in the page as they are and need no script; animations and
 //! charts are data that the scripts draw. The scripts are modules of their own, in `web/`; a page holds them one after
 //! another, without their imports, so no two may give a name of the top level to different things.
 
@@ -48,7 +48,7 @@ pub struct Page {
     pub verdict: Option<(bool, String)>,
     /// Bodies on the move; several stand beside each other and share one clock.
     pub stages: Vec<View>,
-    /// What the stages' frames are and what they leave out.
+    /// The frames that are shown, and those that are left out.
     pub note: String,
     pub plots: Vec<Plot>,
     /// Names and values.

@@ -9,7 +9,7 @@ use crate::flock::body::Body;
 
 /// Points of a line that a page can show; a longer one keeps the extremes of each stretch.
 const MOST_POINTS: usize = 1500;
-/// Probes in one chart: more lines than this cannot be told apart.
+/// Probes in one chart: more lines than this cannot be distinguished.
 const MOST_LINES: usize = SERIES.len();
 
 #[derive(Clone, Debug, Serialize)]
@@ -38,7 +38,7 @@ pub struct PlotSeries {
     /// `line`, `dots`, `rings`, `front` or `beads`.
     pub style: &'static str,
     pub points: Vec<[f64; 2]>,
-    /// What to say of each point; empty where its coordinates say all.
+    /// A label of each point; empty where its coordinates suffice.
     pub labels: Vec<String>,
 }
 

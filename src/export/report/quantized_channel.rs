@@ -1,7 +1,7 @@
 //! One quantity of every particle in one frame, as whole multiples of a power of two.
 //!
 //! A quantum that is a power of two is shared by frames of like range, so that a particle at rest has the same
-//! code in each and costs nothing once frames are told as differences.
+//! code in each and costs nothing once frames are written as differences.
 
 use serde::{Deserialize, Serialize};
 

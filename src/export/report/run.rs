@@ -35,14 +35,14 @@ use crate::scene::units::Units;
 const MOST_FINE: usize = 20_000;
 const FINE_BITS: u32 = 24;
 const COARSE_BITS: u32 = 16;
-/// Of what is only shown as a colour.
+/// Of quantities that are shown as a colour only.
 const COLOUR_BITS: u32 = 12;
-/// More particles than this are not told exactly at the end: their numbers alone would fill the page.
+/// Most particles whose final values are written exactly: those of more would fill the page.
 const MOST_EXACT: usize = 250_000;
 /// Frames of a body whose equilibrium was solved for, on its way from no load to all of it.
 const LOAD_FRAMES: usize = 20;
 
-/// What a recorder has kept of a run so far, for a checkpoint.
+/// The state of a recorder, for a checkpoint.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AnimationState<'a> {
     frames: Cow<'a, [Frame]>,
@@ -72,7 +72,7 @@ impl RunRecorder {
         let [bits, others] = if count <= MOST_FINE { [FINE_BITS; 2] } else { [COARSE_BITS, COLOUR_BITS] };
         let channel = |name, bits| Channel { name, bits };
         let mut channels = vec![channel("dx", bits), channel("dy", bits), channel("pe2", others)];
-        // Whoever finds neighbours anew is the only one who knows them.
+        // Neighbours that are found anew at every step are known to the engine alone.
         if engine.lasting_neighbours().is_none() {
             channels.extend(["pe1", "strain"].map(|name| channel(name, others)));
         }
@@ -105,7 +105,7 @@ impl RunRecorder {
         }
     }
 
-    /// What was kept so far.
+    /// The frames and rows so far.
     pub fn animation_state(&self) -> AnimationState<'_> {
         AnimationState {
             frames: Cow::Borrowed(self.frames.kept()),
@@ -179,7 +179,7 @@ impl RunRecorder {
         if let Some(numbering) = &engine.body().numbering {
             stage.set_ids((0..engine.body().count()).map(|i| numbering.id(i)));
         }
-        // Bonds and cells of those whose neighbours change would say who were neighbours once.
+        // Where neighbours change, bonds and cells would be those of the start.
         if engine.lasting_neighbours().is_some() {
             set_bonds(&mut stage, engine, is_solved);
             let cells =
@@ -260,7 +260,7 @@ fn set_bonds(stage: &mut View, engine: &Engine, is_solved: bool) {
         let found = breaks.binary_search_by_key(&pair, |one| one.0);
         pairs.push([a, b]);
         sees.push(u32::from(!neighbours.of(b as usize).contains(&a)));
-        // What is broken at rest was broken before the load.
+        // Bonds that are broken at rest were broken before the load.
         broken.push(found.map_or(0, |n| if is_solved { 1 } else { breaks[n].1 }));
     }
     stage.set_bonds(&pairs, &sees, &broken);
@@ -340,7 +340,7 @@ fn verdict(outcome: &Outcome) -> (bool, String) {
     }
 }
 
-/// What the frames are, and what is not among them.
+/// A sentence on the frames that are shown and those that are not.
 fn note(animation: &Animation, outcome: &Outcome, is_solved: bool) -> String {
     let frames = animation.times.len();
     let bits = animation.channels.first().map_or(0, |channel| channel.bits);
@@ -360,7 +360,7 @@ fn note(animation: &Animation, outcome: &Outcome, is_solved: bool) -> String {
         }
     };
     if let Some(first) = animation.times.first().filter(|&&first| first > 0.0 && !is_solved) {
-        note += &format!(" This run was taken up at step {first}; what came before is not shown.");
+        note += &format!(" This run was resumed at step {first}; earlier steps are not shown.");
     }
     note += &format!(
         " Displacements are kept to {bits} bits of each frame's range; PE1, strain and stress are computed from them."
@@ -377,7 +377,7 @@ fn residuals(residuals: &[f64]) -> Plot {
     let points = residuals.iter().enumerate().map(|(n, &residual)| [n as f64, residual]).collect();
     let axis = |quantity: &str, log| PlotAxis { quantity: quantity.into(), unit: String::new(), log };
     Plot {
-        title: "How the solver came to rest".into(),
+        title: "Convergence of the solver".into(),
         note: "residual force over the load's".into(),
         x: axis("iteration", false),
         y: axis("residual", true),

@@ -39,7 +39,7 @@ fn plot(study: &Study) -> Plot {
         }
     }
     series.retain(|series| !series.points.is_empty());
-    let front = "nothing is both faster and nearer".to_owned();
+    let front = "Pareto-optimal".to_owned();
     series.push(points(front, "ink", "front", study.front().into_iter()));
     let axis =
         |quantity: &str, unit: &str| PlotAxis { quantity: quantity.into(), unit: unit.into(), log: true };
@@ -131,7 +131,7 @@ fn tables(study: &Study) -> Vec<Table> {
         rows,
     };
     vec![
-        table("Nothing is both faster and nearer than these", study.front().into_iter().map(row).collect()),
+        table("Pareto-optimal settings", study.front().into_iter().map(row).collect()),
         table("Every setting", study.points.iter().map(row).collect()),
     ]
 }

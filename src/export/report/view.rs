@@ -9,7 +9,7 @@ use crate::flock::role::Role;
 use crate::flock::vectors::Vectors;
 use crate::material::cells::Cells;
 
-/// What the scripts need to know.
+/// The data of the scripts.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Animation {
     /// Said above the canvas where several stand beside each other.
@@ -38,7 +38,7 @@ pub struct Animation {
     pub groups: usize,
     /// By number.
     pub role_names: Vec<&'static str>,
-    /// What particles can be coloured by, besides role and displacement.
+    /// Quantities to colour particles by, besides role and displacement.
     pub quantities: Vec<Quantity>,
     /// Columns known to the last bit at the last frame.
     pub exact: Vec<Quantity>,

@@ -170,7 +170,7 @@ pub enum RawShape {
         steps: Vec<RawStep>,
     },
     /// No shape but the particles themselves, in any order. The body has no lattice, `neighbours` have to be of the kind
-    /// `within` or `present`, and what is measured in spacings takes the median distance to the nearest particle.
+    /// `within` or `dynamic`, and what is measured in spacings takes the median distance to the nearest particle.
     Points {
         /// Path, relative to the scene file, of a CSV file with the columns `x`, `y` and, if the particles have ids of
         /// their own, `id` (otherwise the numbers of the rows, from 1); outputs have the same ids and the same order.

@@ -1,4 +1,4 @@
-//! Bodies and leaders that are hardly there: coincident leaders, one follower, nobody to lead, far away.
+//! Degenerate bodies and leaders: coincident leaders, one follower, no leaders, far from the origin.
 
 use super::{AT_REST, Case, End, MATERIAL, Outcome, SHEET, patch, small, worst};
 use crate::flock::rules::Mean;
@@ -14,7 +14,7 @@ const OF_THE_RULE: &str = "a small body of its own with the scene's mean";
 const TO_A_POINT: &str = "roles=[{region={kind=\"boundary\"},role=\"leader\",motion={kind=\"affine\",about=[3.0,2.0],\
                           stretch=[0.0,0.0],steps=1}}]";
 const ONE_FOLLOWER: &str = r#"body={shape={kind="grid",columns=3,rows=3}}"#;
-const NOBODY_LEADS: &str = "roles=[]";
+const NO_LEADERS: &str = "roles=[]";
 const IN_TWO: &str = r#"body={shape={kind="rectangle",max=[8.0,3.0]},holes=[{kind="rectangle",min=[3.5,-1.0],max=[4.5,4.0]}]}"#;
 const ALONE: &str = r#"body={shape={kind="grid",columns=1,rows=1}}"#;
 
@@ -28,11 +28,11 @@ pub fn cases(scene: &Scene) -> Vec<Case> {
             OWN,
             patch(&[ONE_FOLLOWER, SHEET, MATERIAL, AT_REST], 1e-14),
         ),
-        Case::new("one particle and no leader, stepped", OWN, stays(&[ALONE, NOBODY_LEADS])),
-        Case::new("nobody leads, stepped", OWN, stays(&[NOBODY_LEADS])),
-        Case::new("nobody leads, solved", OWN, stays(&[NOBODY_LEADS, AT_REST])),
-        Case::new("nobody leads, material, solved", OWN, stays(&[NOBODY_LEADS, SHEET, MATERIAL, AT_REST])),
-        Case::new("nobody leads, thresholds", OWN, thresholds(&[NOBODY_LEADS])),
+        Case::new("one particle and no leader, stepped", OWN, stays(&[ALONE, NO_LEADERS])),
+        Case::new("no leaders, stepped", OWN, stays(&[NO_LEADERS])),
+        Case::new("no leaders, solved", OWN, stays(&[NO_LEADERS, AT_REST])),
+        Case::new("no leaders, material, solved", OWN, stays(&[NO_LEADERS, SHEET, MATERIAL, AT_REST])),
+        Case::new("no leaders, thresholds", OWN, thresholds(&[NO_LEADERS])),
         Case::new("followers in a part of their own without leaders", OWN, stays(&[IN_TWO])),
     ];
     for exponent in [9, 12, 15, 17, 300] {
@@ -52,8 +52,8 @@ pub fn cases(scene: &Scene) -> Vec<Case> {
 
 /// The scene's mean, without terms, on a small body whose outline is drawn into one point.
 fn coincident(scene: &Scene) -> Result<Outcome, SceneError> {
-    // What keeps a particle off the mean of its neighbours would keep it off the point.
-    let rest = if matches!(scene.mean, Mean::Material { .. }) { "kept" } else { "literal" };
+    // A rest offset would keep particles off the point as it keeps them off the mean of their neighbours.
+    let rest = if matches!(scene.mean, Mean::Material { .. }) { "balanced" } else { "literal" };
     let rule = &scene.raw.rule;
     let mean = serde_json::json!({ "mean": rule.mean, "weights": rule.weights, "rest": rest });
     let mut overrides = vec![TO_A_POINT.to_owned(), format!("rule={}", scaling::toml(&mean))];
@@ -68,13 +68,13 @@ fn coincident(scene: &Scene) -> Result<Outcome, SceneError> {
     collapsed(&[&overrides[..], &["stop={steps=20000,tolerance=1e-14}"]].concat())
 }
 
-/// Everybody ends in the point.
+/// Every particle ends in the point.
 fn collapsed(overrides: &[&str]) -> Result<Outcome, SceneError> {
     let scene = small(overrides)?;
     let end = End::of(&scene)?;
     let apart = |p: [f64; 2]| distance(p, [3.0, 2.0]) / end.spacing;
     let error = worst(end.present.iter().map(apart));
-    Ok(Outcome::judged(error, 1e-9, "everybody ends where the leaders are"))
+    Ok(Outcome::judged(error, 1e-9, "every particle ends where the leaders are"))
 }
 
 /// A mean that keeps its distance has no such place; it stays within reach.
@@ -82,14 +82,14 @@ fn near(overrides: &[&str]) -> Result<Outcome, SceneError> {
     let end = End::of(&small(&[overrides, &["stop.steps=200"]].concat())?)?;
     let reach = 100.0 * end.spacing;
     let error = worst(end.present.iter().map(|p| distance(p, [3.0, 2.0]) / reach));
-    Ok(Outcome::judged(error, 1.0, "everybody is somewhere within a hundred spacings"))
+    Ok(Outcome::judged(error, 1.0, "every particle stays within a hundred spacings"))
 }
 
-/// Without leaders nobody moves.
+/// Without leaders no particle moves.
 fn stays(overrides: &[&str]) -> Result<Outcome, SceneError> {
     let end = End::of(&small(&[overrides, &["stop.steps=100"]].concat())?)?;
     let error = worst((0..end.reference.len()).map(|i| distance(end.moved(i, end.spacing), [0.0; 2])));
-    Ok(Outcome::judged(error, 1e-12, "a body at rest that nobody leads stays"))
+    Ok(Outcome::judged(error, 1e-12, "a body at rest without leaders stays at rest"))
 }
 
 fn thresholds(overrides: &[&str]) -> Result<Outcome, SceneError> {
@@ -99,6 +99,6 @@ fn thresholds(overrides: &[&str]) -> Result<Outcome, SceneError> {
     Ok(Outcome::Wrong {
         error: Some(error),
         within: 0.0,
-        check: "a body that nobody holds has no threshold".into(),
+        check: "a body without clamps and leaders has no threshold".into(),
     })
 }

@@ -21,7 +21,7 @@ use crate::continuum::run::StopReason;
 use crate::flock::vectors::{Vectors, distance};
 use crate::scene::{LeaderMotion, Scene, SceneError};
 
-/// What became of an extreme.
+/// The outcome of an extreme.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "outcome", rename_all = "kebab-case")]
 pub enum Outcome {
@@ -71,7 +71,7 @@ impl fmt::Display for Outcome {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Case {
     pub name: String,
-    /// What it was run on.
+    /// The body of the case.
     pub body: String,
     #[serde(flatten)]
     pub outcome: Outcome,
@@ -87,15 +87,15 @@ impl Case {
 const THE_SCENE: &str = "the scene";
 
 /// Runs all extremes: of the scene where it has them, otherwise of small bodies made for the purpose.
-pub fn run(load: Load<'_>, scene: &Scene, tell: &mut dyn FnMut(&str)) -> Vec<Case> {
+pub fn run(load: Load<'_>, scene: &Scene, progress: &mut dyn FnMut(&str)) -> Vec<Case> {
     let mut all = Vec::new();
-    tell("extremes of the unit of length");
+    progress("extremes of the unit of length");
     all.extend(units::cases(load, scene));
-    tell("extremes of the body");
+    progress("extremes of the body");
     all.extend(bodies::cases(scene));
-    tell("extremes of the material");
+    progress("extremes of the material");
     all.extend(materials::cases(scene));
-    tell("extremes of loads and precision");
+    progress("extremes of loads and precision");
     all.extend(numbers::cases());
     all
 }
@@ -118,7 +118,7 @@ struct End {
 
 impl End {
     /// # Errors
-    /// What refuses the scene, and what says by itself that its end is none.
+    /// Refused scenes, and runs that report themselves that they have not ended.
     fn of(scene: &Scene) -> Result<Self, SceneError> {
         let plan = plan(scene)?;
         let spacing = plan.body.lattice.spacing();
@@ -194,7 +194,7 @@ fn worst(errors: impl Iterator<Item = f64>) -> f64 {
     )
 }
 
-/// A small body of ours, all of whose outline is led by a strain.
+/// A small body whose whole outline is led by a strain.
 const SMALL: &str = r#"
 title = "A small body led by its outline"
 lattice = { kind = "square", spacing = 1.0 }
@@ -209,7 +209,7 @@ motion = { kind = "affine", stretch = [1.01, 0.995], shear = [0.004, 0.002], ste
 steps = 1
 "#;
 
-/// Of what a small body is made unless the scene says so.
+/// The material of a small body unless the scene gives one.
 const SHEET: &str = r#"material={kind="isotropic",young=1000.0,poisson=0.3}"#;
 const MATERIAL: &str = r#"rule.mean={kind="material"}"#;
 const AT_REST: &str = "equilibrium={solver=\"auto\",tolerance=1e-11}";
@@ -226,6 +226,6 @@ fn patch(overrides: &[&str], within: f64) -> Result<Outcome, SceneError> {
     Ok(Outcome::judged(
         end.apart_from_motion(&scene),
         within,
-        "patch test: everybody follows the strain of the outline",
+        "patch test: every particle follows the strain of the outline",
     ))
 }

@@ -46,7 +46,7 @@ fn scaled(
     factor: f64,
     base: &End,
 ) -> Result<Outcome, SceneError> {
-    // Who is a neighbour now hangs on the last digit of a distance: only a power of two keeps it.
+    // Dynamic neighbours depend on the last digit of a distance: only a power of two keeps it.
     let present = matches!(scene.neighbourhood, Neighbourhood::Dynamic { .. });
     let factor = if present { factor.log2().round().exp2() } else { factor };
     let mut overrides = scaling::overrides(scene, factor);

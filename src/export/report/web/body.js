@@ -1,4 +1,4 @@
-// A body or swarm on the move: where everybody is at a frame, and what follows from it.
+// A moving body or swarm: positions at a frame, and the quantities computed from them.
 
 import { doubles, integers, Frames } from "./unpack.js";
 
@@ -257,9 +257,9 @@ export class Body {
     for (const { key, label, unit } of animation.quantities) {
       put(key, label, unit, known(key) ?? this.field(key)[particle]);
     }
-    const told = new Set(list.map((one) => one.key));
+    const knownKeys = new Set(list.map((one) => one.key));
     if (this.at === this.last) {
-      for (const { key, label, unit } of animation.exact) if (!told.has(key)) put(key, label, unit, known(key));
+      for (const { key, label, unit } of animation.exact) if (!knownKeys.has(key)) put(key, label, unit, known(key));
     }
     return list;
   }

@@ -146,7 +146,7 @@ export function savePicture() {
   link.click();
 }
 
-// Until somebody chooses layers, a field fills the body and roles are dots: each as it is read best.
+// Until layers are chosen, a field fills the body and roles are dots, as each is read best.
 export function layersFor(quantity) {
   if (state.hasChosenLayers) return;
   const { animation, bonds, triangles } = bodies[0];

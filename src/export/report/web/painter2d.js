@@ -2,7 +2,7 @@
 
 import { SHADES } from "./colour.js";
 
-// Shades that are told apart: each is one path.
+// Shades that are distinguished: each is one path.
 const STEPS = 64;
 
 export class PlainPainter {

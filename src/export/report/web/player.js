@@ -5,7 +5,7 @@ const WHOLE = 12;
 const FASTEST = 60;
 
 export class Player {
-  // `times` are the clock's values at the frames; `shown` is told of each new frame.
+  // `times` are the clock's values at the frames; `shown` is called at each new frame.
   constructor(times, shown) {
     Object.assign(this, { times, shown, frame: 0, ready: 0, speed: 1, playing: false, carry: 0 });
   }

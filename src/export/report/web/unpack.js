@@ -28,7 +28,7 @@ export async function doubles(id) {
   return new Float64Array(bytes.buffer);
 }
 
-// Whole numbers, each told as the difference from the one `stride` before.
+// Whole numbers, each written as the difference from the one `stride` before.
 export async function integers(id, stride) {
   const planes = await inflated(id);
   if (!planes) return new Uint32Array(0);
@@ -75,8 +75,8 @@ export class Frames {
     this.ready = 0;
   }
 
-  // Unpacks everything; tells after each group how many frames are ready.
-  async load(tell) {
+  // Unpacks everything; calls `ready` after each group with the number of frames that are ready.
+  async load(ready) {
     const { animation } = this;
     const channels = animation.channels.length;
     for (let group = 0; group < animation.groups; group++) {
@@ -87,15 +87,15 @@ export class Frames {
         for (let c = 0; c < channels; c++) {
           const n = frame * channels + c;
           const { bits } = animation.channels[c];
-          const told = { count: animation.count, bits, base: animation.bases[n], mode: animation.modes[n] };
+          const layout = { count: animation.count, bits, base: animation.bases[n], mode: animation.modes[n] };
           const step = 2 ** animation.exponents[n];
-          const { codes, base } = track(bytes, at, told, this.tracks[n - channels]);
+          const { codes, base } = track(bytes, at, layout, this.tracks[n - channels]);
           this.tracks[n] = { codes, base, step, low: base * step, none: 2 ** bits - 1 };
           at += animation.count * Math.ceil(bits / 8);
         }
       }
       this.ready = end;
-      tell(end);
+      ready(end);
       // Lets the page draw and answer in between.
       await new Promise((resume) => setTimeout(resume));
     }

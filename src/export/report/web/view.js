@@ -209,7 +209,7 @@ export class View {
     if (factor !== 1) pen.fillText(`displacements × ${words(factor)}`, 60, 14);
   }
 
-  // The way of everybody up to now.
+  // The paths up to now.
   drawWays(pen) {
     const { body, show } = this;
     if (!this.ways || this.ways.length < body.frames.ready) this.collectWays();

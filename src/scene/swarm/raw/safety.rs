@@ -95,7 +95,7 @@ impl Default for RawPoses {
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawResilience {
-    /// How many max_faulty_neighbours among a robot's neighbours are tolerated [1].
+    /// Number F of faulty neighbours that each robot tolerates [1].
     #[schemars(range(min = 1))]
     pub max_faulty_neighbours: usize,
 }

@@ -1,0 +1,51 @@
+//! The manual: how to use the program and the library, subject by subject.
+//!
+//! | guide | subject |
+//! |---|---|
+//! | [`scenes`] | the scene file: lattice, body, neighbours, rule, roles, motions; the bundled scenes |
+//! | [`materials`] | rules that are a material: loads, outlines, load steps, reactions and stresses |
+//! | [`accuracy`] | rules against finite elements, what an accuracy costs, when a body grows |
+//! | [`fracture`] | bonds that break, cuts, ghosts |
+//! | [`swarms`] | formations of robots: the swarm file, simulated flights, faults, recordings |
+//! | [`ros2`] | the ROS 2 node: topics, services, parameters, launch files |
+//! | [`security`] | who may command, what happens when robots, peers or the middleware fail |
+//! | [`shared_memory`] | the same loop between processes of one computer |
+//! | [`performance`] | how fast bodies step and settle, and how to measure it |
+//! | [`files`] | what a run writes, the report, checkpoints, exit codes |
+//! | [`theory`] | the paper's terms and equations, what they imply, where the paper leaves a choice |
+//!
+//! Every TOML example is loaded by the tests, every command line is checked against the program, and the Rust
+//! examples are doctests.
+
+#[doc = include_str!("scenes.md")]
+pub mod scenes {}
+
+#[doc = include_str!("materials.md")]
+pub mod materials {}
+
+#[doc = include_str!("accuracy.md")]
+pub mod accuracy {}
+
+#[doc = include_str!("fracture.md")]
+pub mod fracture {}
+
+#[doc = include_str!("swarms.md")]
+pub mod swarms {}
+
+#[doc = include_str!("ros2.md")]
+pub mod ros2 {}
+
+#[doc = include_str!("security.md")]
+pub mod security {}
+
+#[doc = include_str!("shared_memory.md")]
+pub mod shared_memory {}
+
+#[doc = include_str!("performance.md")]
+pub mod performance {}
+
+#[doc = include_str!("files.md")]
+pub mod files {}
+
+#[doc = include_str!("theory.md")]
+pub mod theory {}
