@@ -2,7 +2,9 @@
 
 mod checkpoint;
 mod compare;
+mod faults;
 mod install;
+mod interrupt;
 mod material;
 mod measured;
 mod points;
