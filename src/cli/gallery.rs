@@ -36,6 +36,7 @@ pub fn gallery(arguments: &GalleryArguments) -> Result<ExitCode, Refusal> {
         }
         run(exhibit, folder.path(exhibit.folder()), interrupted)?;
         if interrupted.load(Ordering::Relaxed) {
+            eprintln!("{}", interrupt::NOTHING_KEPT);
             return Ok(ExitCode::from(FAILED));
         }
     }

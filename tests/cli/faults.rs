@@ -64,7 +64,6 @@ fn control_characters_of_a_file_never_reach_the_terminal() {
 fn a_radius_beyond_everything_is_refused_at_once() {
     for sets in [
         &["neighbours={kind=\"within\",radius=1e9}"][..],
-        &["neighbours={kind=\"chebyshev\",radius=1000000000}"],
         &["neighbours={kind=\"within\",radius=300.0}", "body.shape={kind=\"grid\",columns=900,rows=900}"],
         &["neighbours={kind=\"dynamic\",radius=1e9}", "body.shape={kind=\"grid\",columns=900,rows=900}"],
     ] {

@@ -148,7 +148,7 @@ fn increments_that_are_solved_before_an_interrupt_are_kept() {
     let folder = temporary();
     let steps = "load_steps={increments=20000}";
     let mut child = start(&["run", "beam-loaded", "--out", "o", "--set", steps], folder.path());
-    wait_until_busy(&mut child, folder.path(), Duration::from_millis(500));
+    wait_until_busy(&mut child, folder.path(), Duration::from_secs(3));
     let (code, said) = ended(child, "increments");
     assert_eq!(code, Some(1), "{said}");
     let table = std::fs::read_to_string(folder.path().join("o/load.csv")).expect("kept");
