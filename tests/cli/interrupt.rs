@@ -82,7 +82,7 @@ region = { kind = "edge", side = "right" }
 role = "leader"
 motion = { kind = "velocity", per_step = [0.01, 0.0] }
 [stop]
-steps = 300
+steps = 1000000
 "#;
 
 #[test]
@@ -138,9 +138,11 @@ fn a_large_run_of_slow_steps_keeps_its_checkpoint_and_goes_on_from_it() {
     assert_eq!(code, Some(1), "{said}");
     assert!(said.contains("--resume"), "{said}");
     assert_eq!(names(folder.path()), ["large.toml", "o.unfinished"]);
-    let output = flockform(&[&["run", "--resume", "o"][..], &quietly].concat(), folder.path());
-    assert!(output.status.success(), "{}", text(&output.stderr));
-    assert_eq!(names(folder.path()), ["large.toml", "o"]);
+    let resumed = start(&[&["run", "--resume", "o"][..], &quietly].concat(), folder.path());
+    std::thread::sleep(Duration::from_secs(2));
+    let (code, said) = ended(resumed, "the same run, resumed");
+    assert_eq!(code, Some(1), "{said}");
+    assert_eq!(names(folder.path()), ["large.toml", "o.unfinished"]);
 }
 
 #[test]
