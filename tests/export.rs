@@ -119,7 +119,7 @@ fn a_folder_that_is_not_empty_is_refused_and_the_refusal_names_the_remedy() {
     assert!(refusal.to_string().contains("--force"), "{refusal}");
     // With force too: nothing says that this program wrote it.
     let refusal = OutputFolder::create(&out, true).expect_err("refused");
-    assert!(refusal.to_string().contains("does not look like an output of flockform"), "{refusal}");
+    assert!(refusal.to_string().contains("did not write"), "{refusal}");
     assert_eq!(names_in(parent.path()), ["out"]);
 }
 

@@ -45,9 +45,12 @@ fn former(parent: &Path) -> PathBuf {
     out
 }
 
+/// Puts something into a folder of outputs.
+type Adversary<'a> = &'a dyn Fn(&Path);
+
 #[test]
 fn force_removes_what_the_list_names_and_refuses_where_there_is_more() {
-    let adversaries: &[(&str, &dyn Fn(&Path))] = &[
+    let adversaries: &[(&str, Adversary<'_>)] = &[
         ("thesis.tex", &|out| fs::write(out.join("thesis.tex"), "years").expect("writable")),
         ("steps/thesis.tex", &|out| fs::write(out.join("steps/thesis.tex"), "years").expect("writable")),
         ("photos", &|out| fs::create_dir(out.join("photos")).expect("created")),
