@@ -7,10 +7,8 @@ use std::process::ExitCode;
 fn main() -> ExitCode {
     let done = cli::arguments().and_then(|(arguments, ros)| {
         cli::start_log(arguments.verbose, &ros);
+        cli::watch_interrupts();
         cli::dispatch(arguments.command, &ros)
     });
-    done.unwrap_or_else(|refusal| {
-        eprintln!("error: {refusal}");
-        ExitCode::from(cli::BAD_INPUT)
-    })
+    done.unwrap_or_else(|refusal| cli::refuse(&refusal))
 }

@@ -72,6 +72,9 @@ fn names_in(folder: &Path) -> Vec<String> {
     names
 }
 
+/// The list of what flockform wrote.
+const LIST: &str = "flockform-files.txt";
+
 fn fill(folder: &OutputFolder, file: &str) {
     fs::write(folder.path(file), r#"{"program": "flockform"}"#).expect("writable");
 }
@@ -85,7 +88,7 @@ fn outputs_stand_in_their_place_only_when_committed() {
     assert!(!out.exists());
     folder.commit().expect("committed");
     assert_eq!(names_in(&parent.path().join("runs")), ["out"]);
-    assert_eq!(names_in(&out), ["summary.json"]);
+    assert_eq!(names_in(&out), [LIST, "summary.json"]);
 }
 
 #[test]
@@ -94,7 +97,7 @@ fn outputs_that_are_not_committed_leave_nothing_behind() {
     let folder = OutputFolder::create(&parent.path().join("out"), false).expect("created");
     fill(&folder, "final.csv");
     let hidden = names_in(parent.path());
-    assert!(hidden.len() == 1 && hidden[0].starts_with(".out.partial-"), "{hidden:?}");
+    assert_eq!(hidden, [".out.partial"]);
     drop(folder);
     assert!(names_in(parent.path()).is_empty());
     // Nor the folders made for them, but for those in which somebody has put something meanwhile.
@@ -116,7 +119,7 @@ fn a_folder_that_is_not_empty_is_refused_and_the_refusal_names_the_remedy() {
     assert!(refusal.to_string().contains("--force"), "{refusal}");
     // With force too: nothing says that this program wrote it.
     let refusal = OutputFolder::create(&out, true).expect_err("refused");
-    assert!(refusal.to_string().contains("does not look like an output of flockform"), "{refusal}");
+    assert!(refusal.to_string().contains("did not write"), "{refusal}");
     assert_eq!(names_in(parent.path()), ["out"]);
 }
 
@@ -130,9 +133,9 @@ fn with_force_former_outputs_stay_until_the_new_ones_take_their_place() {
     former.commit().expect("committed");
     let folder = OutputFolder::create(&out, true).expect("may be replaced");
     fill(&folder, "summary.json");
-    assert_eq!(names_in(&out), ["former.csv", "summary.json"]);
+    assert_eq!(names_in(&out), [LIST, "former.csv", "summary.json"]);
     folder.commit().expect("committed");
-    assert_eq!(names_in(&out), ["summary.json"]);
+    assert_eq!(names_in(&out), [LIST, "summary.json"]);
     assert_eq!(names_in(parent.path()), ["out"]);
 }
 
@@ -146,7 +149,8 @@ fn outputs_are_kept_where_somebody_took_their_place_meanwhile() {
     fs::write(out.join("notes.txt"), "mine").expect("writable");
     let error = folder.commit().expect_err("refused");
     let ExportError::NotMoved { kept, .. } = &error else { panic!("{error}") };
-    assert_eq!(names_in(kept), ["summary.json"]);
+    assert_eq!(names_in(kept), [LIST, "summary.json"]);
+    assert_eq!(kept.file_name().expect("a name"), "out-2", "the next program removes hidden folders");
     assert!(error.to_string().contains(&kept.display().to_string()));
     assert_eq!(names_in(&out), ["notes.txt"]);
 }
@@ -483,7 +487,8 @@ fn the_png_is_the_svg_at_full_width_with_its_text() {
     let parent = tempfile::tempdir().expect("a folder");
     let run = Run::of("tension", &["stop.steps=1", "record.figures=[1]"]);
     let svg = figures::configuration(&run.subject(), &run.snapshots[0]);
-    let written = figures::write(&svg, &parent.path().join("configuration_0001")).expect("written");
+    let folder = OutputFolder::create(&parent.path().join("out"), false).expect("created");
+    let written = figures::write(&svg, &folder, "configuration_0001").expect("written");
     let [svg_path, png_path] = &written[..] else { panic!("{written:?}") };
     assert_eq!(fs::read_to_string(svg_path).expect("readable"), svg);
     let png = Pixmap::decode_png(&fs::read(png_path).expect("readable")).expect("a PNG");

@@ -198,22 +198,20 @@ impl<'a> Checkpointer<'a> {
         }
         // Before the folder takes its name: that one is never without a checkpoint.
         self.write(folder, engine, kept)?;
-        folder.keep_unfinished()?;
-        if let Some(frames) = &mut kept.frames {
-            frames.moved(folder);
-        }
-        Ok(())
+        folder.keep_unfinished()
     }
 
-    /// Leaves a checkpoint among the results of an interrupted run.
-    pub fn leave(&self, folder: &OutputFolder, engine: (&Engine, f64), kept: &Recorded<'_>) {
+    /// Leaves a checkpoint of the last step, and says whether there is one.
+    pub fn leave(&self, folder: &mut OutputFolder, engine: (&Engine, f64), mut kept: Recorded<'_>) -> bool {
         let is_asked = self.every.iter().any(|interval| *interval != Interval::Never);
         if self.scene.equilibrium.is_some() || !is_asked {
-            return;
+            return false;
         }
-        if let Err(error) = self.write(folder, engine, kept) {
-            tracing::warn!("the interrupted run cannot be resumed: {error}");
+        let left = self.try_to_keep(folder, engine, &mut kept);
+        if let Err(error) = &left {
+            tracing::warn!("the run could not be resumed: {error}");
         }
+        left.is_ok()
     }
 
     fn write(

@@ -2,7 +2,6 @@
 
 use std::ops::ControlFlow;
 use std::process::ExitCode;
-use std::sync::atomic::Ordering;
 
 use clap::Args;
 use flockform::compare::run::{Compared, compare as compare_scene};
@@ -16,8 +15,8 @@ use flockform::trade::{Chosen, choose};
 
 use super::output::{OutputArguments, ReportArguments};
 use super::progress::Progress;
-use super::run::{exit_code, interrupt_flag};
-use super::{Refusal, SceneArguments, print};
+use super::run::exit_code;
+use super::{Refusal, SceneArguments, interrupt, print, say};
 
 #[derive(Debug, Args)]
 pub struct CompareArguments {
@@ -49,10 +48,9 @@ pub fn compare(arguments: &CompareArguments) -> Result<ExitCode, Refusal> {
     let folder = arguments.output.folder(&format!("{}-compare", scene.name))?;
     let effort = Effort { target: arguments.truth_error, ..Effort::default() };
     let mut progress = Progress::new(arguments.output.quiet, scene.stop.steps);
-    let interrupted = interrupt_flag();
     let compared = compare_scene(&scene, &effort, &mut |engine, residual| {
         progress.step(engine.step(), residual);
-        if interrupted.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        ControlFlow::Continue(())
     })?;
     progress.finish();
 
@@ -61,11 +59,11 @@ pub fn compare(arguments: &CompareArguments) -> Result<ExitCode, Refusal> {
     if !arguments.report.no_report {
         report::comparison::write(&folder, &scene, &compared, &report)?;
     }
-    let kept = folder.commit()?;
+    let kept = interrupt::commit(folder)?;
     if arguments.json {
         print(&format!("{:#}\n", serde_json::json!(report)));
     } else if !arguments.output.quiet {
-        print(&format!("{chosen}{}results in {}\n", words(&scene, &compared), kept.display()));
+        say(&format!("{chosen}{}results in {}\n", words(&scene, &compared), kept.display()));
     }
     Ok(exit_code(&compared.outcome))
 }

@@ -1,8 +1,9 @@
 //! `flockform gallery`: every bundled scene and swarm, and one page that leads to their reports.
 
 use std::path::PathBuf;
-use std::process::{Command, ExitCode};
-use std::sync::atomic::Ordering;
+use std::process::{Command, ExitCode, Stdio};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 use clap::Args;
 use flockform::export::report::gallery::{Exhibit, write_gallery};
@@ -10,8 +11,7 @@ use flockform::export::report::page;
 use flockform::scene::{Bundled, SceneError, bundled};
 
 use super::output::OutputArguments;
-use super::run::interrupt_flag;
-use super::{FAILED, Refusal, print};
+use super::{FAILED, Refusal, interrupt, say};
 
 #[derive(Debug, Args)]
 pub struct GalleryArguments {
@@ -22,24 +22,28 @@ pub struct GalleryArguments {
     output: OutputArguments,
 }
 
+/// How often a run is looked at.
+const LOOK: Duration = Duration::from_millis(20);
+
 /// Runs the bundled scenes and swarms, each in a process of its own, and writes the page.
 pub fn gallery(arguments: &GalleryArguments) -> Result<ExitCode, Refusal> {
     let exhibits = exhibits(&arguments.names)?;
     let folder = arguments.output.folder("gallery")?;
-    let interrupted = interrupt_flag();
+    let interrupted = interrupt::keeps();
     for (n, exhibit) in exhibits.iter().enumerate() {
         if !arguments.output.quiet {
             eprintln!("{:>3} of {}  {}", n + 1, exhibits.len(), exhibit.name);
         }
-        run(exhibit, folder.path(exhibit.folder()))?;
+        run(exhibit, folder.path(exhibit.folder()), interrupted)?;
         if interrupted.load(Ordering::Relaxed) {
+            eprintln!("{}", interrupt::NOTHING_KEPT);
             return Ok(ExitCode::from(FAILED));
         }
     }
     write_gallery(&folder, &exhibits)?;
-    let kept = folder.commit()?;
+    let kept = interrupt::commit(folder)?;
     if !arguments.output.quiet {
-        print(&format!("open {}\n", kept.join("index.html").display()));
+        say(&format!("open {}\n", kept.join("index.html").display()));
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -70,13 +74,22 @@ fn exhibits(names: &[String]) -> Result<Vec<Exhibit>, Refusal> {
 }
 
 /// A run that fails by design (a body that grows without bound) has a report too; one without is no exhibit.
-fn run(exhibit: &Exhibit, out: PathBuf) -> Result<(), Refusal> {
+fn run(exhibit: &Exhibit, out: PathBuf, interrupted: &AtomicBool) -> Result<(), Refusal> {
     let failed = |reason: String| Refusal::Exhibit { name: exhibit.name.clone(), reason };
     let command = if exhibit.kind == "scenes" { "run" } else { "swarm" };
     let program = std::env::current_exe().map_err(|error| failed(error.to_string()))?;
     let mut child = Command::new(program);
-    child.args([command, &exhibit.name, "--quiet", "--out"]).arg(&out);
-    let output = child.output().map_err(|error| failed(error.to_string()))?;
+    child.args([command, &exhibit.name, "--quiet", "--out"]).arg(&out).stderr(Stdio::piped());
+    let mut child = child.spawn().map_err(|error| failed(error.to_string()))?;
+    while child.try_wait().is_ok_and(|status| status.is_none()) {
+        if interrupted.load(Ordering::Relaxed) {
+            // Its folder goes with the gallery's.
+            let _ = child.kill().and_then(|()| child.wait());
+            return Ok(());
+        }
+        std::thread::sleep(LOOK);
+    }
+    let output = child.wait_with_output().map_err(|error| failed(error.to_string()))?;
     if out.join(page::FILE).is_file() {
         return Ok(());
     }

@@ -1,14 +1,14 @@
 //! `flockform install`: this program and its files where ROS 2 tools look for a package.
 
-use std::fs;
-use std::io;
-use std::path::{Path, PathBuf};
+use std::fs::{self, File};
+use std::io::{self, Write};
+use std::path::{Component, Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
 use flockform::scene::bundled::SWARMS;
 
-use super::{Refusal, print};
+use super::{Refusal, interrupt, print};
 
 #[derive(Debug, Args)]
 pub struct InstallArguments {
@@ -68,6 +68,7 @@ const ENVIRONMENT: &[(&str, &str)] = embedded![
 ];
 
 const SHARE: &str = "share/flockform";
+const LIBRARY: &str = "lib/flockform";
 const EXECUTABLE: &str = "lib/flockform/flockform";
 /// The ament index knows a package by an empty file of its name.
 const INDEX_MARKER: &str = "share/ament_index/resource_index/packages/flockform";
@@ -75,7 +76,7 @@ const INDEX_MARKER: &str = "share/ament_index/resource_index/packages/flockform"
 const MANIFEST: &str = "share/flockform/installed-files";
 
 /// A file to install; its path is below the prefix.
-struct File {
+struct Installed {
     path: PathBuf,
     bytes: Vec<u8>,
     executable: bool,
@@ -98,6 +99,7 @@ pub fn install(arguments: &InstallArguments) -> Result<ExitCode, Refusal> {
     }
     files.push(Manifest::of(&files).into_file());
     let staged = files.iter().map(|file| Staged::write(prefix, file)).collect::<Result<Vec<_>, _>>()?;
+    let _saving = interrupt::saving();
     staged.into_iter().try_for_each(Staged::move_into_place)?;
     earlier.remove_what_is_gone(prefix, &files);
     print(&format!(
@@ -108,10 +110,10 @@ pub fn install(arguments: &InstallArguments) -> Result<ExitCode, Refusal> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn package_files() -> Result<Vec<File>, InstallError> {
+fn package_files() -> Result<Vec<Installed>, InstallError> {
     let program = std::env::current_exe().and_then(fs::read).map_err(InstallError::OwnProgram)?;
     let mut files = vec![
-        File { path: EXECUTABLE.into(), bytes: program, executable: true },
+        Installed { path: EXECUTABLE.into(), bytes: program, executable: true },
         text_file(INDEX_MARKER.into(), ""),
     ];
     let share = Path::new(SHARE);
@@ -123,12 +125,12 @@ fn package_files() -> Result<Vec<File>, InstallError> {
     Ok(files)
 }
 
-fn environment_files() -> impl Iterator<Item = File> {
+fn environment_files() -> impl Iterator<Item = Installed> {
     ENVIRONMENT.iter().map(|(place, text)| text_file(place.into(), text))
 }
 
-fn text_file(path: PathBuf, text: &str) -> File {
-    File { path, bytes: text.into(), executable: false }
+fn text_file(path: PathBuf, text: &str) -> Installed {
+    Installed { path, bytes: text.into(), executable: false }
 }
 
 /// What an earlier install left, by path below the prefix.
@@ -145,17 +147,17 @@ impl Manifest {
         Self(text.lines().filter_map(entry).collect())
     }
 
-    fn of(files: &[File]) -> Self {
+    fn of(files: &[Installed]) -> Self {
         Self(files.iter().map(|file| (checksum(&file.bytes), file.path.clone())).collect())
     }
 
-    fn into_file(self) -> File {
+    fn into_file(self) -> Installed {
         let line = |(sum, path): &(u64, PathBuf)| format!("{sum:016x} {}\n", path.display());
         text_file(MANIFEST.into(), &self.0.iter().map(line).collect::<String>())
     }
 
     /// Whether the file's place is free, or holds what was installed there or is to be.
-    fn allows(&self, prefix: &Path, file: &File) -> bool {
+    fn allows(&self, prefix: &Path, file: &Installed) -> bool {
         let place = prefix.join(&file.path);
         match fs::read(&place) {
             Ok(bytes) => bytes == file.bytes || self.has(&file.path, &bytes),
@@ -169,16 +171,27 @@ impl Manifest {
     }
 
     /// Removes files of an earlier install that are in this one no more, unless they were changed.
-    fn remove_what_is_gone(&self, prefix: &Path, files: &[File]) {
+    fn remove_what_is_gone(&self, prefix: &Path, files: &[Installed]) {
         for (_, path) in &self.0 {
             let place = prefix.join(path);
-            let is_gone = path.is_relative() && !files.iter().any(|file| file.path == *path);
+            let is_gone = is_own_place(prefix, path) && !files.iter().any(|file| file.path == *path);
             if is_gone && fs::read(&place).is_ok_and(|bytes| self.has(path, &bytes)) {
                 // A file left over does no harm.
                 let _ = fs::remove_file(place);
             }
         }
     }
+}
+
+/// Whether a path of a list leads to one of the package's own folders: whoever can write the list must not reach
+/// farther by it, with `..` or through a symbolic link.
+fn is_own_place(prefix: &Path, path: &Path) -> bool {
+    let is_plain = path.components().all(|part| matches!(part, Component::Normal(_)));
+    let is_below = |folder| path.starts_with(folder) && path != Path::new(folder);
+    let parents = path.ancestors().skip(1).take_while(|above| !above.as_os_str().is_empty());
+    is_plain
+        && [SHARE, LIBRARY].into_iter().any(is_below)
+        && parents.into_iter().all(|above| !prefix.join(above).is_symlink())
 }
 
 /// FNV-1a: tells a changed file from an installed one, and the same in every build.
@@ -195,7 +208,7 @@ struct Staged {
 }
 
 impl Staged {
-    fn write(prefix: &Path, file: &File) -> Result<Self, InstallError> {
+    fn write(prefix: &Path, file: &Installed) -> Result<Self, InstallError> {
         let place = prefix.join(&file.path);
         let name = place.file_name().unwrap_or_default().to_string_lossy();
         let beside = place.with_file_name(format!(".{name}.partial-{}", std::process::id()));
@@ -204,11 +217,14 @@ impl Staged {
         Ok(staged)
     }
 
-    fn fill(&self, file: &File) -> io::Result<()> {
+    fn fill(&self, file: &Installed) -> io::Result<()> {
         if let Some(folder) = self.place.parent() {
             fs::create_dir_all(folder)?;
         }
-        fs::write(&self.beside, &file.bytes)?;
+        // A killed install may have had this number; what else has the name, a link above all, is not written through.
+        let _ = fs::remove_file(&self.beside);
+        interrupt::removes([self.beside.clone()]);
+        File::create_new(&self.beside)?.write_all(&file.bytes)?;
         set_mode(&self.beside, if file.executable { 0o755 } else { 0o644 })
     }
 

@@ -4,6 +4,7 @@ mod checkpoint;
 mod compare;
 mod gallery;
 mod install;
+mod interrupt;
 mod material;
 mod node;
 mod output;
@@ -303,6 +304,25 @@ pub enum Refusal {
     Threads { threads: usize, error: rayon::ThreadPoolBuildError },
 }
 
+impl Refusal {
+    /// Whether the work was begun, and the machine failed it: a full disk above all.
+    fn is_failure(&self) -> bool {
+        use export::ExportError;
+        use flockform::record::RecordError;
+        let is_full = |error: &std::io::Error| {
+            use std::io::ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull};
+            matches!(error.kind(), StorageFull | QuotaExceeded | FileTooLarge)
+        };
+        match self {
+            Refusal::Export(ExportError::Io { source, .. })
+            | Refusal::Record(RecordError::Io { source, .. }) => is_full(source),
+            Refusal::Export(ExportError::NotMoved { .. }) | Refusal::Record(RecordError::Kept { .. }) => true,
+            Refusal::Record(RecordError::Write { .. }) => true,
+            _ => false,
+        }
+    }
+}
+
 /// The command line, with the ROS arguments split off.
 ///
 /// # Errors
@@ -369,6 +389,22 @@ fn field(line: &mut format::Writer<'_>, field: &Field, value: &dyn Debug) -> fmt
     write!(line, "{}", escaped(&format!("{value:?}"), 2000))
 }
 
+/// From now on an interrupt ends the program within a second.
+pub fn watch_interrupts() {
+    interrupt::watch();
+}
+
+/// Says why nothing was done, and gives the exit code; what an interrupt has broken off is no bad input.
+pub fn refuse(refusal: &Refusal) -> ExitCode {
+    interrupt::leave_to_the_end();
+    if interrupt::is_raised() {
+        eprintln!("{}", interrupt::NOTHING_KEPT);
+        return ExitCode::from(FAILED);
+    }
+    eprintln!("error: {}", on_terminal(&refusal.to_string()));
+    ExitCode::from(if refusal.is_failure() { FAILED } else { BAD_INPUT })
+}
+
 pub fn dispatch(command: Command, ros: &RosArguments) -> Result<ExitCode, Refusal> {
     match command {
         Command::Run(arguments) => return run::run(&arguments),
@@ -389,9 +425,9 @@ pub fn dispatch(command: Command, ros: &RosArguments) -> Result<ExitCode, Refusa
         Command::Install(arguments) => return install::install(&arguments),
         Command::Plan(arguments) => {
             let scene = arguments.load([])?;
-            print(&PlanReport::new(&scene, &plan(&scene)?)?.to_string());
+            say(&PlanReport::new(&scene, &plan(&scene)?)?.to_string());
         }
-        Command::Material(arguments) => print(&material::answer(&arguments)?),
+        Command::Material(arguments) => say(&material::answer(&arguments)?),
         Command::Schema { swarm: false } => print(&format!("{:#}\n", scene::validate::schema())),
         Command::Schema { swarm: true } => print(&format!("{:#}\n", scene::swarm::schema())),
         Command::Completions { shell } => {
@@ -409,12 +445,12 @@ pub fn dispatch(command: Command, ros: &RosArguments) -> Result<ExitCode, Refusa
             print(&if json { format!("{}\n", serde_json::json!(report)) } else { report.to_string() });
         }
         Command::Bench(BenchCommand::Transport { json, quick, out }) => {
-            let folder = out.map(|out| export::OutputFolder::create(&out, false)).transpose()?;
+            let folder = out.map(|out| output::create(&out, false)).transpose()?;
             let report = bench::transport::run(&bench::transport::Options { quick });
             print(&if json { format!("{}\n", serde_json::json!(report)) } else { report.to_string() });
             if let Some(folder) = folder {
                 export::transport::write_transport(&folder, &report)?;
-                folder.commit()?;
+                interrupt::commit(folder)?;
             }
         }
         #[cfg(feature = "fem")]
@@ -432,6 +468,21 @@ fn list(all: &[Bundled], title: impl Fn(&Bundled) -> Result<String, SceneError>)
         print(&format!("{:width$}  {}\n", one.name, title(one)?));
     }
     Ok(())
+}
+
+/// Prints words, some of which may come from files: no control character of theirs reaches the terminal.
+fn say(text: &str) {
+    print(&on_terminal(text));
+}
+
+/// A text whose lines stay, and whose other control characters are escaped.
+fn on_terminal(text: &str) -> String {
+    let ends = ['\n', '\t'];
+    let shown = |piece: &str| {
+        let words = piece.trim_end_matches(ends);
+        escaped(words, usize::MAX) + &piece[words.len()..]
+    };
+    text.replace("\r\n", "\n").split_inclusive(ends).map(shown).collect()
 }
 
 /// Writes to standard output; a reader that has gone away (`| head`) is no error.

@@ -12,11 +12,11 @@ use flockform::scene::swarm::Swarm;
 use flockform::shm::{self, Domain, SimulatedRobots};
 use flockform::swarm::control::Control;
 
+use super::interrupt;
 use super::recording::{RecordArguments, close};
-use super::run::interrupt_flag;
 use super::supervise::{Life, supervise};
 use super::swarm::SwarmFileArguments;
-use super::{Refusal, print};
+use super::{Refusal, say};
 
 /// Middleware between the node and the robots.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
@@ -87,15 +87,15 @@ pub fn node(arguments: &NodeArguments, ros: &RosArguments) -> Result<ExitCode, R
                 node.restore(left);
             }
             node.watch_middleware().map_err(NodeError::from)?;
-            let well = node.run_while(&interrupt_flag(), &mut |node| life.tell(|| node.kept()));
-            print(&close(recording)?);
+            let well = node.run_while(interrupt::serves(), &mut |node| life.tell(|| node.kept()));
+            say(&close(recording)?);
             return Ok(ended(well));
         }
         None => {
             arguments.record.require_none("--transport shm")?;
             let mut node = shm::FormationNode::open(&swarm, &Domain::from_environment()?, name)?;
             announce(&swarm, node.control());
-            node.run(&interrupt_flag())?;
+            node.run(interrupt::serves())?;
         }
     }
     Ok(ExitCode::SUCCESS)
@@ -122,12 +122,14 @@ pub fn robots(arguments: &RobotsArguments, ros: &RosArguments) -> Result<ExitCod
                 robots.restore(&left);
             }
             robots.watch_middleware().map_err(NodeError::from)?;
-            return Ok(ended(robots.run_while(&interrupt_flag(), &mut |robots| life.tell(|| robots.kept()))));
+            return Ok(ended(
+                robots.run_while(interrupt::serves(), &mut |robots| life.tell(|| robots.kept())),
+            ));
         }
         None => {
             let mut robots = SimulatedRobots::open(&swarm, &Domain::from_environment()?)?;
             announce(robots.fleet().robots().len());
-            robots.run(&interrupt_flag())?;
+            robots.run(interrupt::serves())?;
         }
     }
     Ok(ExitCode::SUCCESS)

@@ -4,7 +4,9 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use flockform::export::figures::Formats;
-use flockform::export::{ExportError, OutputFolder, unfinished};
+use flockform::export::{ExportError, OutputFolder};
+
+use super::interrupt;
 
 #[derive(Debug, Args)]
 pub struct OutputArguments {
@@ -54,22 +56,28 @@ impl FigureArguments {
     }
 }
 
-impl OutputArguments {
-    /// The folder asked for, or a free one of this name.
-    pub fn folder(&self, name: &str) -> Result<OutputFolder, ExportError> {
-        let out = self.out.clone().unwrap_or_else(|| free_folder(name));
-        OutputFolder::create(&out, self.force)
-    }
+/// The folder, which an interrupt leaves nothing of.
+pub fn create(out: &Path, force: bool) -> Result<OutputFolder, ExportError> {
+    let folder = OutputFolder::create(out, force)?;
+    interrupt::removes(folder.made().map(Path::to_owned));
+    Ok(folder)
 }
 
-/// The first of out/NAME, out/NAME-2, ... that is not taken.
-fn free_folder(name: &str) -> PathBuf {
-    let taken = |path: &Path| {
-        path.read_dir().is_ok_and(|mut entries| entries.next().is_some()) || unfinished(path).exists()
-    };
-    let numbered = (2..).map(|n| PathBuf::from(format!("out/{name}-{n}")));
-    std::iter::once(PathBuf::from(format!("out/{name}")))
-        .chain(numbered)
-        .find(|path| !taken(path))
-        .expect("endless")
+impl OutputArguments {
+    /// The folder asked for, or the first of out/NAME, out/NAME-2, ... that is not taken.
+    pub fn folder(&self, name: &str) -> Result<OutputFolder, ExportError> {
+        if let Some(out) = &self.out {
+            return create(out, self.force);
+        }
+        let mut path = PathBuf::from(format!("out/{name}"));
+        for n in 2.. {
+            // Making it decides: another run may want the same name at this moment.
+            match create(&path, false) {
+                Err(ExportError::NotEmpty(_) | ExportError::Unfinished(_) | ExportError::Busy(_)) => {}
+                created => return created,
+            }
+            path.set_file_name(format!("{name}-{n}"));
+        }
+        unreachable!("endless")
+    }
 }

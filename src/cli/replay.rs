@@ -8,7 +8,7 @@ use flockform::record::Reader;
 use flockform::record::replay::{Report, recorded_swarm, replay as fly_again};
 
 use super::swarm::SwarmFileArguments;
-use super::{FAILED, Refusal, print};
+use super::{FAILED, Refusal, print, say};
 
 #[derive(Debug, Args)]
 pub struct ReplayArguments {
@@ -44,7 +44,7 @@ pub fn replay(arguments: &ReplayArguments) -> Result<ExitCode, Refusal> {
     if arguments.json {
         print(&format!("{:#}\n", serde_json::json!(report)));
     } else {
-        print(&words(&report));
+        say(&words(&report));
     }
     Ok(if report.holds() { ExitCode::SUCCESS } else { ExitCode::from(FAILED) })
 }

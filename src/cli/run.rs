@@ -4,8 +4,7 @@ use std::cell::Cell;
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::process::ExitCode;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use clap::Args;
@@ -27,13 +26,14 @@ use flockform::record::body::BodyMessages;
 use flockform::scene::{LoadSteps, Scene, bundled};
 use flockform::shm::Domain;
 use flockform::shm::positions::Positions;
+use flockform::solve::interrupt::Interrupt;
 use flockform::trade::{Chosen, choose};
 
 use super::checkpoint::{CheckpointArguments, Checkpointer, Recorded, ResumedRun};
 use super::output::{FigureArguments, OutputArguments, ReportArguments};
 use super::progress::{Drawn, Progress};
 use super::recording::{RecordArguments, close};
-use super::{FAILED, Refusal, SceneArguments, print};
+use super::{FAILED, Refusal, SceneArguments, interrupt, say};
 
 #[derive(Debug, Args)]
 pub struct RunArguments {
@@ -76,7 +76,11 @@ fn run_here(arguments: &RunArguments) -> Result<ExitCode, Refusal> {
     let left = arguments.checkpoints.left()?;
     let asked = arguments.asked(left.as_ref());
     let words_of = SceneArguments { scene: asked.scene.clone(), set: asked.set.clone() };
-    let Chosen { scene, words } = choose(words_of.load([])?, &|more: &[String]| words_of.load_scene(more))?;
+    let Chosen { mut scene, words } =
+        choose(words_of.load([])?, &|more: &[String]| words_of.load_scene(more))?;
+    if let Some(equilibrium) = &mut scene.equilibrium {
+        equilibrium.request.interrupt = Interrupt::new(interrupt::flag());
+    }
     let plan = plan(&scene)?;
     let shown = arguments.publish.as_ref();
     let open = |name: &String| Positions::open(&Domain::from_environment()?, name, plan.count());
@@ -96,7 +100,7 @@ fn run_here(arguments: &RunArguments) -> Result<ExitCode, Refusal> {
     let recording = arguments.record.open(&about, arguments.output.force, 1)?;
     let mut messages = recording.as_ref().map(|one| BodyMessages::new(&scene, one.sink())).transpose()?;
     let mut progress = Progress::new(arguments.output.quiet, steps_of(&scene));
-    let interrupted = interrupt_flag();
+    let interrupted = interrupt::keeps();
     let looks = Looks::new(&scene, &plan, shown.is_some() || messages.is_some());
     let mut checkpointer = Checkpointer::new(&arguments.checkpoints, (asked, &scene, digest), left.as_ref());
     let mut see = |engine: &Engine, residual: f64| {
@@ -130,8 +134,18 @@ fn run_here(arguments: &RunArguments) -> Result<ExitCode, Refusal> {
     let elapsed = checkpointer.stepping();
     tracing::info!("{} steps in {elapsed:.1?}, writing", outcome.engine.step());
     let is_interrupted = outcome.reason == StopReason::Interrupted;
-    if is_interrupted {
-        checkpointer.leave(&folder, (&outcome.engine, outcome.residual), &recorder.kept());
+    let is_small = outcome.engine.body().count() <= QUICKLY_WRITTEN;
+    let mut saving = (is_interrupted && is_small).then(interrupt::saving);
+    if is_interrupted || elapsed > WORTH_KEEPING {
+        let _saving = interrupt::saving();
+        let is_left = checkpointer.leave(&mut folder, (&outcome.engine, outcome.residual), recorder.kept());
+        if is_left && is_interrupted && !is_small {
+            eprintln!("{}", resume_words(&folder));
+            return Ok(ExitCode::from(FAILED));
+        }
+        if is_left {
+            interrupt::says(resume_words(&folder));
+        }
     }
     let on_the_way = recorder.writing;
     let records = recorder.finish(&outcome)?;
@@ -140,23 +154,35 @@ fn run_here(arguments: &RunArguments) -> Result<ExitCode, Refusal> {
     let (snapshots, probes, load_steps) = (&snapshots[..], &probes[..], &load_steps[..]);
     let results = Results { scene: &scene, outcome: &outcome, snapshots, probes, load_steps, timings };
     let drawn = Drawn::new(arguments.output.quiet);
-    let show = |done: usize, of: usize| drawn.show(done, of);
+    let show = |done: usize, of: usize| {
+        drawn.show(done, of);
+        if interrupt::is_raised() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    };
     let drawing = Drawing { formats: arguments.figures.formats(), progress: &show };
     let (_, summary) = write_all(&folder, &results, drawing)?;
     drawn.finish();
     if let Some(stage) = stage {
         report::run::write(&folder, &results, &summary, stage)?;
     }
-    let kept = folder.commit()?;
+    let kept = interrupt::commit(folder)?;
     let recorded = close(recording)?;
+    saving.take();
     if !is_interrupted {
         checkpoint::remove(&kept);
     }
     if !arguments.output.quiet {
-        print(&words);
-        print(&(closing_words(&scene, &outcome, &summary, elapsed) + &where_to_look(&kept) + &recorded));
+        say(&words);
+        say(&(closing_words(&scene, &outcome, &summary, elapsed) + &where_to_look(&kept) + &recorded));
+    }
+    if interrupt::is_raised() && !is_interrupted {
+        eprintln!("interrupted: figures are missing, the rest is written");
+        return Ok(ExitCode::from(FAILED));
     }
     Ok(exit_code(&outcome))
+}
+
+fn resume_words(folder: &OutputFolder) -> String {
+    format!("interrupted: `flockform run --resume {}` goes on", folder.folder().display())
 }
 
 impl RunArguments {
@@ -179,32 +205,40 @@ impl RunArguments {
     }
 }
 
-/// Set by Ctrl-C and by SIGTERM; the run then stops at the next step.
-pub fn interrupt_flag() -> Arc<AtomicBool> {
-    let flag = Arc::new(AtomicBool::new(false));
-    let raised = Arc::clone(&flag);
-    if let Err(error) = ctrlc::set_handler(move || raised.store(true, Ordering::Relaxed)) {
-        tracing::warn!("an interrupt will end the program without writing results: {error}");
-    }
-    flag
-}
-
 /// At which steps a run is looked at: those that are recorded, and now and then one to show how far it is.
 struct Looks<'a> {
     scene: &'a Scene,
-    /// Most steps between two looks.
-    most: usize,
+    /// Most steps between two looks now, and ever.
+    most: Cell<usize>,
+    bound: usize,
+    /// The last look: when, and at which step.
+    last: Cell<(Instant, usize)>,
     /// The next step that the report shows.
     animation: Cell<Option<usize>>,
 }
 
 impl<'a> Looks<'a> {
-    /// If `every`, somebody wants to see each step; probes do. Otherwise about twice a second is enough.
+    /// If `every`, somebody wants to see each step; probes do. Otherwise several times a second are enough, by the
+    /// clock: how long a step takes depends on the rule.
     fn new(scene: &'a Scene, plan: &Plan, every: bool) -> Self {
         let every = every || !plan.probes.is_empty();
-        let most = if every { 1 } else { (UPDATES_BETWEEN_LOOKS / plan.count()).max(1) };
+        let bound = if every { 1 } else { (UPDATES_BETWEEN_LOOKS / plan.count()).max(1) };
+        let last = Cell::new((Instant::now(), 0));
         // The report has yet to say what it wants: the next one.
-        Self { scene, most, animation: Cell::new(Some(0)) }
+        Self { scene, most: Cell::new(1), bound, last, animation: Cell::new(Some(0)) }
+    }
+
+    /// Most steps to the next look: twice as many while all of the last ones were quickly done.
+    fn most(&self, step: usize) -> usize {
+        let (then, before) = self.last.replace((Instant::now(), step));
+        let (took, most) = (then.elapsed(), self.most.get());
+        let next = match took {
+            _ if took > BETWEEN_LOOKS => most / 2,
+            _ if took < BETWEEN_LOOKS / 4 && step - before >= most => 2 * most,
+            _ => most,
+        };
+        self.most.set(next.clamp(1, self.bound));
+        self.most.get()
     }
 
     fn after(&self, step: usize) -> usize {
@@ -213,7 +247,10 @@ impl<'a> Looks<'a> {
         let next = |every: usize| (step / every + 1) * every;
         let vtk = (record.vtk_every > 0).then(|| next(record.vtk_every));
         let load = load_every(self.scene).map(next);
-        [figure, vtk, load, self.animation.get()].into_iter().flatten().fold(step + self.most, usize::min)
+        [figure, vtk, load, self.animation.get()]
+            .into_iter()
+            .flatten()
+            .fold(step + self.most(step), usize::min)
     }
 }
 
@@ -233,8 +270,14 @@ fn load_every(scene: &Scene) -> Option<usize> {
     }
 }
 
-/// Updates of particles that take some half a second.
+/// Longest time between two looks, but for a single step that takes longer.
+const BETWEEN_LOOKS: Duration = Duration::from_millis(200);
+/// Updates of particles between two looks, at most.
 const UPDATES_BETWEEN_LOOKS: usize = 1 << 28;
+/// Particles up to which the results of an interrupted run are written at once; more are left to `--resume`.
+const QUICKLY_WRITTEN: usize = 50_000;
+/// Stepping that took longer is not lost to an interrupt while figures are drawn.
+const WORTH_KEEPING: Duration = Duration::from_secs(5);
 
 /// Keeps what the scene asks for while the run goes on.
 struct Recorder<'a> {

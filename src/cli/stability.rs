@@ -11,7 +11,7 @@ use flockform::stability::study::{Options, run};
 
 use super::output::{OutputArguments, ReportArguments};
 use super::progress::Stages;
-use super::{FAILED, Refusal, SceneArguments, print};
+use super::{FAILED, Refusal, SceneArguments, interrupt, print, say};
 
 #[derive(Debug, Args)]
 pub struct StabilityArguments {
@@ -50,11 +50,11 @@ pub fn stability(arguments: &StabilityArguments) -> Result<ExitCode, Refusal> {
     if !arguments.report.no_report {
         report::stability::write(&folder, &study)?;
     }
-    let kept = folder.commit()?;
+    let kept = interrupt::commit(folder)?;
     if arguments.json {
         print(&json(&study).unwrap_or_default());
     } else if !arguments.output.quiet {
-        print(&format!("{study}results in {}\n", kept.display()));
+        say(&format!("{study}results in {}\n", kept.display()));
     }
     Ok(if study.holds() { ExitCode::SUCCESS } else { ExitCode::from(FAILED) })
 }

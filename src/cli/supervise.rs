@@ -19,7 +19,7 @@ use flockform::ros::edge::pulse::MIDDLEWARE_GONE;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-use super::run::interrupt_flag;
+use super::interrupt;
 
 /// Number of a child, from 1, in the environment.
 const LIFE: &str = "FLOCKFORM_LIFE";
@@ -55,12 +55,12 @@ pub fn supervise() -> std::io::Result<Result<Life, ExitCode>> {
 }
 
 fn lead() -> std::io::Result<ExitCode> {
-    let stop = interrupt_flag();
+    let stop = interrupt::serves();
     let (mut state, mut speechless, mut rest) = (b"null\n".to_vec(), 0, Duration::ZERO);
     for number in 1_u32.. {
         let begun = Instant::now();
         let (mut child, lines) = start(number, &state)?;
-        let (code, last) = follow(&mut child, lines, &stop)?;
+        let (code, last) = follow(&mut child, lines, stop)?;
         speechless = if last.is_some() { 0 } else { speechless + 1 };
         state = last.unwrap_or(state);
         match code {

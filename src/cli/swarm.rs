@@ -18,8 +18,7 @@ use flockform::swarm::flight::{Flight, FlightReport, fly_heard};
 
 use super::output::{OutputArguments, ReportArguments};
 use super::recording::{RecordArguments, close};
-use super::run::interrupt_flag;
-use super::{FAILED, Refusal, print, scene_path};
+use super::{FAILED, Refusal, interrupt, print, say, scene_path};
 
 /// A swarm and the changes to it.
 #[derive(Debug, Args)]
@@ -86,7 +85,7 @@ pub fn swarm(arguments: &SwarmArguments) -> Result<ExitCode, Refusal> {
         .map(|one| FlightMessages::new(&swarm, flight.control(), one.sink()))
         .transpose()?;
     let messages = RefCell::new(messages);
-    let interrupted = interrupt_flag();
+    let interrupted = interrupt::keeps();
     let start = Instant::now();
     let mut hear = |member, pose| {
         if let Some(messages) = &mut *messages.borrow_mut() {
@@ -102,17 +101,18 @@ pub fn swarm(arguments: &SwarmArguments) -> Result<ExitCode, Refusal> {
         if interrupted.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     })?;
     let seconds = start.elapsed().as_secs_f64();
+    let _saving = interrupt::saving();
     write_flight(&folder, &swarm, &record, &report)?;
     if let Some(recorder) = recorder {
         let stage = recorder.stage(&swarm, &report);
         report::flight::write(&folder, &swarm, &record, &report, stage)?;
     }
-    let kept = folder.commit()?;
+    let kept = interrupt::commit(folder)?;
     let recorded = close(recording)?;
     if arguments.json {
         print(&format!("{:#}\n", serde_json::json!(report)));
     } else if !arguments.output.quiet {
-        print(&(words(&report, seconds, &kept) + &recorded));
+        say(&(words(&report, seconds, &kept) + &recorded));
     }
     let broken_off = interrupted.load(Ordering::Relaxed);
     Ok(if report.holds() && !broken_off { ExitCode::SUCCESS } else { ExitCode::from(FAILED) })

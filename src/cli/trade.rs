@@ -9,7 +9,7 @@ use flockform::trade::{Grid, run};
 
 use super::output::{OutputArguments, ReportArguments};
 use super::progress::Stages;
-use super::{Refusal, SceneArguments, print};
+use super::{Refusal, SceneArguments, interrupt, print, say};
 
 #[derive(Debug, Args)]
 pub struct TradeArguments {
@@ -53,11 +53,11 @@ pub fn trade(arguments: &TradeArguments) -> Result<ExitCode, Refusal> {
     if !arguments.report.no_report {
         report::trade::write(&folder, &study)?;
     }
-    let kept = folder.commit()?;
+    let kept = interrupt::commit(folder)?;
     if arguments.json {
         print(&format!("{:#}\n", serde_json::json!(study)));
     } else if !arguments.output.quiet {
-        print(&format!("{study}results in {}\n", kept.display()));
+        say(&format!("{study}results in {}\n", kept.display()));
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -7,7 +7,7 @@ use std::ops::ControlFlow;
 use super::engine::Engine;
 use super::layout::{held, held_components};
 use super::plan::Plan;
-use super::run::{Outcome, StopReason, Watch, run_watched};
+use super::run::{Outcome, StopReason, Watch, overflow, run_watched};
 use crate::flock::role::Role;
 use crate::flock::vectors::{Vectors, distance};
 use crate::scene::{LoadSteps, Scene, SceneError};
@@ -167,7 +167,7 @@ fn outcome(plan: Plan, solved: Solved) -> Outcome {
     let mut engine = Engine::new(plan);
     engine.settle(step, &solved.displacement);
     let residual = farthest_from_target(&engine) / spacing;
-    let reason = reason(&solved);
+    let reason = overflow(&engine).map_or_else(|| reason(&solved), StopReason::Diverged);
     Outcome { engine, reason, residual, solved: Some(solved) }
 }
 

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use crate::flock::body::{Body, BodyError, Cut};
 use crate::flock::lattice::Site;
 use crate::flock::motion::Motion;
-use crate::flock::neighbourhood::{Neighbourhood, Neighbours};
+use crate::flock::neighbourhood::{Neighbourhood, NeighbourhoodError, Neighbours};
 use crate::flock::region::{Region, Side};
 use crate::flock::role::Role;
 use crate::flock::rules::{Axis, Mean};
@@ -482,7 +482,11 @@ fn refuse_body(scene: &Scene, error: &BodyError) -> SceneError {
         BodyError::Alone { .. } => {
             ("neighbours.radius", "use a wider radius, or leave the point out of the file")
         }
-        BodyError::TooManyNeighbours { .. } => ("neighbours.radius", "use a smaller radius"),
+        BodyError::TooManyNeighbours { .. }
+        | BodyError::ManyNeighbours { .. }
+        | BodyError::Neighbourhood(NeighbourhoodError::TooLarge { .. }) => {
+            ("neighbours.radius", "use a smaller radius")
+        }
         BodyError::Neighbourhood(_) => ("neighbours", "choose a neighbourhood that the lattice has"),
         BodyError::TooLarge { .. } => ("body.shape", "use a wider spacing or a smaller shape"),
         _ => ("body.shape", "use a smaller spacing or a larger shape"),

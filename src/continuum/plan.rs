@@ -7,7 +7,7 @@ use super::damping::along_outline;
 use super::free_edge::FreeEdge;
 use super::layout::{Layout, RoleChange, Truth, held_components, no_particle};
 use super::{places, weights};
-use crate::flock::body::Body;
+use crate::flock::body::{Body, MOST_ENTRIES};
 use crate::flock::fracture::{Bonds, Break, Ghosts};
 use crate::flock::law::{Flock, MatrixWeights, Weights};
 use crate::flock::neighbourhood::{Neighbourhood, Neighbours};
@@ -98,6 +98,7 @@ impl Plan {
         let flock = flock(scene, &body, neighbours, weights, forces);
         let probes = probes(scene, &body)?;
         places::around(scene, cells.as_ref(), &body.reference)?;
+        require_listable(scene, &body)?;
         let roles = body.is_frame.iter().map(|&f| if f { Role::Frame } else { Role::Follower }).collect();
         let (low, high) = body.bounds();
         let mut plan = Self {
@@ -176,6 +177,20 @@ impl Plan {
             }
         }
     }
+}
+
+/// Neighbours that are found anew at every step take memory as others do.
+fn require_listable(scene: &Scene, body: &Body) -> Result<(), SceneError> {
+    let Neighbourhood::Dynamic { radius } = scene.neighbourhood else { return Ok(()) };
+    let count = body.count() as f64;
+    let within = std::f64::consts::PI * radius * radius / body.lattice.cell_area();
+    let about = count * within.min(count);
+    if about <= MOST_ENTRIES as f64 {
+        return Ok(());
+    }
+    let message =
+        format!("the particles have about {about:.1e} neighbours in all, at most {MOST_ENTRIES} are kept");
+    Err(scene.refuse("neighbours.radius", message, "use a smaller radius"))
 }
 
 /// Who follows at any time: all but those who are led or clamped from the start and for good, shape \[count\].

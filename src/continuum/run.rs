@@ -115,6 +115,9 @@ pub fn resume(
     Ok(run_loop(state.engine(plan)?, (residual, false), &bounds, watch))
 }
 
+/// Displacement beyond which sums of squares, which energies are, overflow \[length\].
+const FARTHEST: f64 = 1e150;
+
 /// What ends a run.
 struct Bounds {
     stop: Stop,
@@ -124,7 +127,8 @@ struct Bounds {
 
 impl Bounds {
     fn of(plan: &Plan) -> Self {
-        let divergence_ratio = plan.stop.divergence_ratio * plan.diagonal / plan.body.lattice.spacing();
+        let allowed = f64::min(plan.stop.divergence_ratio * plan.diagonal, FARTHEST);
+        let divergence_ratio = allowed / plan.body.lattice.spacing();
         Self { stop: plan.stop, divergence_ratio }
     }
 }
@@ -224,6 +228,11 @@ impl StepBatch {
     }
 }
 
+/// The divergence of a body that was put where its energies overflow.
+pub(super) fn overflow(engine: &Engine) -> Option<Divergence> {
+    divergence(engine, &engine.movement(), FARTHEST / engine.body().lattice.spacing())
+}
+
 fn divergence(engine: &Engine, movement: &Movement, bound: f64) -> Option<Divergence> {
     let (present, reference) = (engine.present(), &engine.body().reference);
     let (particle, what) = if let Some(lost) = (!movement.is_finite).then(|| first_lost(present)).flatten() {
@@ -231,7 +240,12 @@ fn divergence(engine: &Engine, movement: &Movement, bound: f64) -> Option<Diverg
     } else if movement.largest_displacement > bound {
         let far = farthest(present, reference);
         let apart = distance(present.get(far), reference.get(far));
-        (far, format!("is {apart:.3e} from its reference place, more than stop.divergence_ratio allows"))
+        let why = if apart > FARTHEST {
+            "so far that energies overflow"
+        } else {
+            "more than stop.divergence_ratio allows"
+        };
+        (far, format!("is {apart:.3e} from its reference place, {why}"))
     } else {
         return None;
     };

@@ -20,6 +20,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::error::ExportError;
+use super::manifest::create;
 use super::report::AnimationState;
 use crate::continuum::engine::state::EngineState;
 use crate::continuum::record::{LoadStep, ProbeSeries, Snapshot};
@@ -27,7 +28,7 @@ use crate::scene::Scene;
 
 /// Its name in the folder of the run.
 pub const FILE: &str = "checkpoint";
-const PART: &str = "checkpoint.part";
+pub(super) const PART: &str = "checkpoint.part";
 const MAGIC: [u8; 8] = *b"FLOCKFRM";
 const VERSION: u32 = 3;
 const HEADER: usize = 24;
@@ -131,13 +132,17 @@ impl<'a> Checkpoint<'a> {
         let (part, path) = (folder.join(PART), folder.join(FILE));
         let bytes = self.bytes().map_err(ExportError::io("write", &path))?;
         let write = || {
-            let mut file = File::create(&part)?;
+            let mut file = create(&part)?;
             file.write_all(&bytes)?;
             file.sync_all()?;
             fs::rename(&part, &path)?;
             sync_folder(folder)
         };
-        write().map_err(ExportError::io("write", &path))
+        write().map_err(|error| {
+            // On a full disk half of one is in the way of what is to come.
+            let _ = fs::remove_file(&part);
+            ExportError::io("write", &path)(error)
+        })
     }
 
     fn bytes(&self) -> std::io::Result<Vec<u8>> {

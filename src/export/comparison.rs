@@ -137,8 +137,8 @@ pub fn write_comparison(
         truth: &compared.truth.truth.displacement,
     };
     let stresses = figures::von_mises(&pair, &compared.von_mises_rule, &compared.von_mises_truth);
-    written.extend(figures::write(&figures::overlay(&pair), &folder.path("overlay"))?);
-    written.extend(figures::write(&stresses, &folder.path("von_mises"))?);
+    written.extend(figures::write(&figures::overlay(&pair), folder, "overlay")?);
+    written.extend(figures::write(&stresses, folder, "von_mises")?);
     let path = folder.path(summary::COMPARISON);
     let mut text = serde_json::to_string_pretty(report).map_err(ExportError::io("write", &path))?;
     text.push('\n');

@@ -11,6 +11,7 @@ use serde::Serialize;
 
 use super::OutputFolder;
 use super::error::ExportError;
+use super::manifest::create;
 use crate::continuum::record::{ProbeSeries, Snapshot};
 use crate::flock::body::Body;
 use crate::flock::fracture::Break;
@@ -157,7 +158,7 @@ pub(super) fn write(
     rows: impl Iterator<Item = impl Serialize>,
 ) -> Result<PathBuf, ExportError> {
     let path = folder.path(name);
-    let mut writer = Writer::from_path(&path).map_err(ExportError::io("write", &path))?;
+    let mut writer = Writer::from_writer(create(&path).map_err(ExportError::io("write", &path))?);
     for row in rows {
         writer.serialize(row).map_err(ExportError::io("write", &path))?;
     }

@@ -1,17 +1,24 @@
 //! Errors of writing outputs.
 
-use std::io;
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
+
+use super::manifest;
 
 #[derive(Debug, thiserror::Error)]
 pub enum ExportError {
     #[error("{} is not empty: give --force to replace it, or another --out", .0.display())]
     NotEmpty(PathBuf),
     #[error(
-        "{} does not look like an output of flockform, which has a summary.json or a compare.json: --force leaves it alone; give another --out",
-        .0.display()
+        "{} does not look like an output of flockform, which has a {}: --force leaves it alone; give another --out",
+        .0.display(), manifest::FILE
     )]
     NotOurs(PathBuf),
+    #[error(
+        "{} holds what flockform did not write: {}\n  help: --force replaces flockform's files only; move the others away, or give another --out",
+        .folder.display(), list(.files)
+    )]
+    Foreign { folder: PathBuf, files: Vec<PathBuf> },
     #[error("{} is no folder: give another --out", .0.display())]
     NotAFolder(PathBuf),
     #[error("{:?} does not name a folder that could be made: give --out a name", .0.display().to_string())]
@@ -37,11 +44,27 @@ pub enum ExportError {
 impl ExportError {
     /// For `map_err`: what was tried, and on which path.
     pub(super) fn io<E: Into<io::Error>>(action: &'static str, path: &Path) -> impl FnOnce(E) -> Self {
-        move |error| Self::Io { action, path: path.to_owned(), source: error.into() }
+        move |error| Self::Io { action, path: path.to_owned(), source: of_the_system(error.into()) }
     }
 }
 
-/// Writes a whole file.
+/// The error as the system gave it, which knows a full disk from others.
+fn of_the_system(error: io::Error) -> io::Error {
+    let inner = error.get_ref().and_then(|inner| inner.downcast_ref::<csv::Error>());
+    let code = inner.and_then(|inner| match inner.kind() {
+        csv::ErrorKind::Io(inner) => inner.raw_os_error(),
+        _ => None,
+    });
+    code.map_or(error, io::Error::from_raw_os_error)
+}
+
+fn list(paths: &[PathBuf]) -> String {
+    let names: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();
+    names.join(", ")
+}
+
+/// Writes a whole file, which is a new one.
 pub(super) fn write_file(path: &Path, contents: impl AsRef<[u8]>) -> Result<(), ExportError> {
-    std::fs::write(path, contents).map_err(ExportError::io("write", path))
+    let write = || manifest::create(path)?.write_all(contents.as_ref());
+    write().map_err(ExportError::io("write", path))
 }

@@ -52,9 +52,9 @@ pub fn write_flight(
         write(folder, "robots.csv", report.per_robot.iter())?,
         write(folder, "tracks.csv", tracks)?,
     ];
-    written.extend(figures::write(&flight_map::flight(swarm, record, report), &folder.path("flight"))?);
+    written.extend(figures::write(&flight_map::flight(swarm, record, report), folder, "flight")?);
     let errors = draw_below_each_other(&charts(record, report));
-    written.extend(figures::write(&errors, &folder.path("errors"))?);
+    written.extend(figures::write(&errors, folder, "errors")?);
     let path = folder.path(summary::FLIGHT);
     let (program, version) = (summary::PROGRAM, env!("CARGO_PKG_VERSION"));
     let whole = Report { program, version, holds: report.holds(), report, swarm: &swarm.raw };

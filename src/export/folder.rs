@@ -1,17 +1,23 @@
 //! The output folder: whole, or not there.
 //!
-//! Everything is written into a hidden folder beside the one asked for, `.NAME.partial-PID`, which takes
-//! the name only when the last file is closed. A killed run leaves the former outputs or nothing in their
-//! place, never half of the new ones. A run that keeps checkpoints is visible meanwhile, as
-//! `NAME.unfinished`, which a resumed run opens again ([`OutputFolder::reopen`]).
+//! Everything is written into a hidden folder beside the one asked for, `.NAME.partial`, which takes the name only
+//! when the last file is closed. A killed run leaves the former outputs or nothing in their place, never half of
+//! the new ones. A run that keeps checkpoints stands in the open meanwhile, as `NAME.unfinished`, and is resumed
+//! there ([`OutputFolder::reopen`]).
+//!
+//! The hidden folder is locked, so that two programs at once never fill one; what a killed program left of it is
+//! removed by the next that wants the name. A list of files ([`super::manifest`]) says what flockform wrote: nothing
+//! else is ever removed.
 
 use std::ffi::OsString;
 use std::fs::{self, File, TryLockError};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
+use super::checkpoint;
 use super::error::ExportError;
-use super::{checkpoint, summary};
+use super::manifest::{NotOurs, Ours, Written};
 
 /// A folder being filled. Dropped without [`OutputFolder::commit`] or [`OutputFolder::keep_unfinished`], it
 /// leaves nothing behind.
@@ -19,27 +25,29 @@ use super::{checkpoint, summary};
 pub struct OutputFolder {
     out: PathBuf,
     partial: PathBuf,
+    files: Arc<Written>,
     force: bool,
     /// Folders above it that were made for it, the innermost first.
     made: Vec<PathBuf>,
     /// Whether what was written outlives this value.
     is_kept: bool,
-    /// Holds others off an unfinished folder, for as long as this program lives.
-    lock: Option<File>,
+    /// Holds others off, for as long as this program lives.
+    _lock: Option<File>,
 }
 
 /// The present content of the place of the outputs.
 enum Standing {
     Nothing,
     EmptyFolder,
-    /// Outputs of an earlier run that may be replaced.
+    /// Outputs of an earlier run, all of them flockform's, that may be replaced.
     FormerOutputs,
 }
 
 impl OutputFolder {
     /// # Errors
-    /// A folder that is not empty is refused without `force`; with it, one that this program did not
-    /// write. A file in the place, and a parent that cannot be written to, are refused too.
+    /// A folder that is not empty is refused without `force`; with it, one that holds files which flockform did not
+    /// write. A file in the place, a parent that cannot be written to, and a place that another program is about to
+    /// fill are refused too.
     pub fn create(out: &Path, force: bool) -> Result<Self, ExportError> {
         let out = in_full(out)?;
         standing(&out, force)?;
@@ -49,8 +57,10 @@ impl OutputFolder {
         if let Some(parent) = made.first() {
             fs::create_dir_all(parent).map_err(ExportError::io("create", parent))?;
         }
-        let partial = create_beside(&out, "partial")?;
-        Ok(Self { out, partial, force, made, is_kept: false, lock: None })
+        let (partial, lock) = claim(&out)?;
+        put_back(&out)?;
+        let files = Arc::new(Written::open(&partial).map_err(ExportError::io("create", &partial))?);
+        Ok(Self { out, partial, files, force, made, is_kept: false, _lock: lock })
     }
 
     /// The folder that a run to `out` has left unfinished; `force` as in [`OutputFolder::create`].
@@ -60,8 +70,9 @@ impl OutputFolder {
     pub fn reopen(out: &Path, force: bool) -> Result<Self, ExportError> {
         let out = in_full(out)?;
         let partial = unfinished(&out);
-        let lock = lock(&partial)?;
-        Ok(Self { out, partial, force, made: Vec::new(), is_kept: true, lock })
+        let Locked::Free(lock) = lock(&partial) else { return Err(ExportError::Busy(partial)) };
+        let files = Arc::new(Written::open(&partial).map_err(ExportError::io("open", &partial))?);
+        Ok(Self { out, partial, files, force, made: Vec::new(), is_kept: true, _lock: lock })
     }
 
     /// Lets what is written outlive this program, in the open, as `NAME.unfinished`. Paths given before are
@@ -77,31 +88,42 @@ impl OutputFolder {
         if open.exists() {
             return Err(ExportError::Unfinished(open));
         }
-        let lock = lock(&self.partial)?;
         rename(&self.partial, &open)?;
-        (self.partial, self.is_kept, self.lock) = (open, true, lock);
+        self.files.moved(&open);
+        (self.partial, self.is_kept) = (open, true);
         Ok(())
     }
 
-    /// The folder that holds everything until [`OutputFolder::commit`].
+    /// What was made for it: the hidden folder, and the folders above it, the innermost first.
+    pub fn made(&self) -> impl Iterator<Item = &Path> {
+        std::iter::once(&self.partial).chain(&self.made).map(PathBuf::as_path)
+    }
+
+    /// Where everything stands until [`OutputFolder::commit`].
     pub fn folder(&self) -> &Path {
         &self.partial
     }
 
-    /// Path for the output of this name.
+    /// Where to write the output of this name, which `--force` may replace from now on.
     pub fn path(&self, name: impl AsRef<Path>) -> PathBuf {
-        self.partial.join(name)
+        self.files.path(name.as_ref())
+    }
+
+    /// The list of its files, for those who write after it has taken another name.
+    pub(super) fn files(&self) -> Arc<Written> {
+        Arc::clone(&self.files)
     }
 
     /// Gives the folder its name, in the place of what may be replaced.
     ///
     /// # Errors
-    /// Keeps the outputs under their temporary name, which the error gives, if they cannot be moved.
+    /// Keeps the outputs under a name beside it, and says which, if they cannot be moved.
     pub fn commit(mut self) -> Result<PathBuf, ExportError> {
+        self.files.close().map_err(ExportError::io("list the files of", &self.partial))?;
         self.is_kept = true;
         match self.take_place() {
             Ok(()) => Ok(self.out.clone()),
-            Err(error) => Err(ExportError::NotMoved { kept: self.partial.clone(), source: Box::new(error) }),
+            Err(error) => Err(ExportError::NotMoved { kept: self.step_aside(), source: Box::new(error) }),
         }
     }
 
@@ -115,19 +137,29 @@ impl OutputFolder {
                 rename(partial, out)
             }
             Standing::FormerOutputs => {
-                let aside = create_beside(out, "replaced")?;
-                let former = aside.join("former");
-                rename(out, &former)?;
+                let aside = beside(out, "replaced", 0);
+                rename(out, &aside)?;
                 let moved = rename(partial, out);
                 if moved.is_err() {
-                    rename(&former, out)?;
-                }
-                if let Err(error) = fs::remove_dir_all(&aside) {
-                    tracing::warn!("the former outputs are left in {}: {error}", aside.display());
+                    rename(&aside, out)?;
+                } else if let Err(error) = remove(&aside) {
+                    tracing::warn!("former outputs are left in {}: {error}", aside.display());
                 }
                 moved
             }
         }
+    }
+
+    /// A hidden folder is the next program's to remove: outputs that are kept stand in the open.
+    fn step_aside(&self) -> PathBuf {
+        let name = |n: u32| {
+            let mut name = self.out.file_name().unwrap_or_default().to_owned();
+            name.push(format!("-{n}"));
+            self.out.with_file_name(name)
+        };
+        // A rename does not replace a folder with anything in it.
+        let free = (2..1000).map(name).find(|free| fs::rename(&self.partial, free).is_ok());
+        free.unwrap_or_else(|| self.partial.clone())
     }
 }
 
@@ -136,7 +168,9 @@ impl Drop for OutputFolder {
         if self.is_kept {
             return;
         }
-        if let Err(error) = fs::remove_dir_all(&self.partial) {
+        if let Err(error) = fs::remove_dir_all(&self.partial)
+            && error.kind() != ErrorKind::NotFound
+        {
             tracing::warn!("unfinished outputs are left in {}: {error}", self.partial.display());
         }
         // Not those that other programs have written to meanwhile.
@@ -169,17 +203,86 @@ fn make_way(unfinished: &Path, force: bool) -> Result<(), ExportError> {
     if !force {
         return Err(ExportError::Unfinished(unfinished.to_owned()));
     }
-    let _lock = lock(unfinished)?;
-    fs::remove_dir_all(unfinished).map_err(ExportError::io("discard", unfinished))
+    let Locked::Free(_lock) = lock(unfinished) else { return Err(ExportError::Busy(unfinished.to_owned())) };
+    remove(unfinished)
 }
 
-/// The system lets go of it when the program ends, however it ends. `None` on a file system without locks.
-fn lock(folder: &Path) -> Result<Option<File>, ExportError> {
-    let Ok(file) = File::open(folder) else { return Ok(None) };
+/// Removes a folder of outputs that holds nothing else.
+fn remove(folder: &Path) -> Result<(), ExportError> {
+    let ours = Ours::in_folder(folder).map_err(|error| not_ours(folder, error))?;
+    ours.remove().map_err(ExportError::io("remove", folder))
+}
+
+fn not_ours(folder: &Path, error: NotOurs) -> ExportError {
+    match error {
+        NotOurs::NoList => ExportError::NotOurs(folder.to_owned()),
+        NotOurs::Foreign(files) => ExportError::Foreign { folder: folder.to_owned(), files },
+        NotOurs::Io(source) => ExportError::io("look into", folder)(source),
+    }
+}
+
+/// Whether a folder is in the hands of another program.
+enum Locked {
+    /// Ours now; without a lock where the file system has none.
+    Free(Option<File>),
+    Busy,
+    Gone,
+}
+
+/// The system lets go of it when the program ends, however it ends.
+fn lock(folder: &Path) -> Locked {
+    let file = match File::open(folder) {
+        Ok(file) => file,
+        Err(error) if error.kind() == ErrorKind::NotFound => return Locked::Gone,
+        Err(_) => return Locked::Free(None),
+    };
     match file.try_lock() {
-        Ok(()) => Ok(Some(file)),
-        Err(TryLockError::WouldBlock) => Err(ExportError::Busy(folder.to_owned())),
-        Err(TryLockError::Error(_)) => Ok(None),
+        Ok(()) => Locked::Free(Some(file)),
+        Err(TryLockError::WouldBlock) => Locked::Busy,
+        Err(TryLockError::Error(_)) => Locked::Free(None),
+    }
+}
+
+/// Makes the hidden folder and locks it: of several programs that want one name, one gets it.
+fn claim(out: &Path) -> Result<(PathBuf, Option<File>), ExportError> {
+    let mut attempt = 0;
+    for _ in 0..1000 {
+        let path = beside(out, "partial", attempt);
+        let is_new = match fs::create_dir(&path) {
+            Ok(()) => true,
+            Err(error) if error.kind() == ErrorKind::AlreadyExists => false,
+            Err(error) => return Err(ExportError::io("create", &path)(error)),
+        };
+        match lock(&path) {
+            Locked::Busy => return Err(ExportError::Busy(path)),
+            // It was taken for one that a killed program left, before it was locked.
+            Locked::Gone => {}
+            Locked::Free(lock) if is_new && path.exists() => return Ok((path, lock)),
+            // What a killed program left is removed; where nobody can tell, or where there is more, it stays.
+            Locked::Free(Some(_lock)) if discard(&path).is_ok() => {}
+            Locked::Free(_) => attempt += 1,
+        }
+    }
+    Err(ExportError::Busy(beside(out, "partial", 0)))
+}
+
+/// A killed program may not even have begun its list.
+fn discard(partial: &Path) -> Result<(), ExportError> {
+    fs::remove_dir(partial).or_else(|_| remove(partial))
+}
+
+/// A program that was killed while it replaced outputs has left them aside.
+fn put_back(out: &Path) -> Result<(), ExportError> {
+    let aside = beside(out, "replaced", 0);
+    match aside.exists() {
+        true if !out.exists() => rename(&aside, out),
+        true => {
+            if let Err(error) = remove(&aside) {
+                tracing::warn!("former outputs are left in {}: {error}", aside.display());
+            }
+            Ok(())
+        }
+        false => Ok(()),
     }
 }
 
@@ -194,33 +297,21 @@ fn standing(out: &Path, force: bool) -> Result<Standing, ExportError> {
     match entries.next() {
         None => Ok(Standing::EmptyFolder),
         Some(_) if !force => Err(ExportError::NotEmpty(out.to_owned())),
-        Some(_) if summary::is_in(out) => Ok(Standing::FormerOutputs),
-        Some(_) => Err(ExportError::NotOurs(out.to_owned())),
+        Some(_) => {
+            Ours::in_folder(out).map(|_| Standing::FormerOutputs).map_err(|error| not_ours(out, error))
+        }
     }
 }
 
-/// Makes a hidden folder in the same parent, hence on the same file system, so that a rename is one
-/// step.
-fn create_beside(out: &Path, what: &str) -> Result<PathBuf, ExportError> {
-    let name = |attempt: u32| {
-        let mut name = OsString::from(".");
-        name.push(out.file_name().unwrap_or_default());
-        name.push(format!(".{what}-{}", std::process::id()));
-        if attempt > 0 {
-            name.push(format!("-{attempt}"));
-        }
-        out.with_file_name(name)
-    };
-    let mut attempt = 0;
-    loop {
-        let path = name(attempt);
-        match fs::create_dir(&path) {
-            Ok(()) => return Ok(path),
-            // Process ids repeat, in containers at every start: a killed run may have left its own.
-            Err(error) if error.kind() == ErrorKind::AlreadyExists && attempt < 1000 => attempt += 1,
-            Err(error) => return Err(ExportError::io("create", &path)(error)),
-        }
+/// A hidden name in the same parent, hence on the same file system, so that a rename is one step.
+fn beside(out: &Path, what: &str, attempt: u32) -> PathBuf {
+    let mut name = OsString::from(".");
+    name.push(out.file_name().unwrap_or_default());
+    name.push(format!(".{what}"));
+    if attempt > 0 {
+        name.push(format!("-{attempt}"));
     }
+    out.with_file_name(name)
 }
 
 fn rename(from: &Path, to: &Path) -> Result<(), ExportError> {

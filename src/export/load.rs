@@ -22,6 +22,7 @@ use super::OutputFolder;
 use super::error::ExportError;
 use super::figures::SERIES;
 use super::figures::chart::{Axis, Chart, Series, Style};
+use super::manifest::create;
 use crate::continuum::forces::Reaction;
 use crate::continuum::mechanics::Work;
 use crate::continuum::record::LoadStep;
@@ -32,7 +33,8 @@ use crate::scene::units::Units;
 pub fn write_load(folder: &OutputFolder, scene: &Scene, steps: &[LoadStep]) -> Result<PathBuf, ExportError> {
     let path = folder.path("load.csv");
     let failed = |error: csv::Error| ExportError::io("write", &path)(error);
-    let mut writer = WriterBuilder::new().has_headers(false).from_path(&path).map_err(failed)?;
+    let file = create(&path).map_err(ExportError::io("write", &path))?;
+    let mut writer = WriterBuilder::new().has_headers(false).from_writer(file);
     let (loads, keys) = (loads(steps), keys(steps));
     writer.write_record(header(scene, &loads, &keys)).map_err(failed)?;
     for step in steps {

@@ -12,6 +12,7 @@
 //! | `breaks.csv` | every broken bond, with its step and place |
 //! | `steps.pvd`, `steps/*.vtu` | frames for ParaView |
 //! | `report.html` | the run as a page ([`report`]) |
+//! | `flockform-files.txt` | the files that flockform wrote, which alone `--force` replaces |
 //! | `checkpoint` | in an unfinished or interrupted run: all it takes to go on |
 //! | `configuration_*`, `pe1_*`, `von_mises_*`, `probes` | figures, as SVG and as the PNG rendered from it |
 //!
@@ -62,6 +63,7 @@ pub mod figures;
 pub mod flight;
 mod folder;
 pub mod load;
+pub(crate) mod manifest;
 pub mod report;
 pub mod stability;
 mod summary;
@@ -71,8 +73,9 @@ pub mod trade;
 pub mod transport;
 mod vtk;
 
+use std::ops::ControlFlow;
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Instant;
 
 use rayon::prelude::*;
@@ -109,13 +112,14 @@ pub struct Results<'a> {
 #[derive(Clone, Copy)]
 pub struct Drawing<'a> {
     pub formats: Formats,
-    /// Called with how many figures are drawn, of how many: before the first and after each, from any thread.
-    pub progress: &'a (dyn Fn(usize, usize) + Sync),
+    /// Called with how many figures are drawn, of how many: before the first and after each, from any thread. Once it
+    /// breaks off, no other figure is begun.
+    pub progress: &'a (dyn Fn(usize, usize) -> ControlFlow<()> + Sync),
 }
 
 impl Default for Drawing<'_> {
     fn default() -> Self {
-        Self { formats: Formats::All, progress: &|_, _| {} }
+        Self { formats: Formats::All, progress: &|_, _| ControlFlow::Continue(()) }
     }
 }
 
@@ -171,12 +175,17 @@ fn draw_all(
     let (subject, units) = (Subject::of(scene, &results.outcome.engine), Units::of(scene));
     let figures = figures_of(results, &subject, &units);
     let drawn = AtomicUsize::new(0);
-    (drawing.progress)(0, figures.len());
+    let is_broken_off = AtomicBool::new((drawing.progress)(0, figures.len()).is_break());
     let written: Result<Vec<_>, _> = figures
         .par_iter()
         .map(|(name, draw)| {
-            let written = figures::write_as(&draw(), &folder.path(name), drawing.formats);
-            (drawing.progress)(drawn.fetch_add(1, Ordering::Relaxed) + 1, figures.len());
+            if is_broken_off.load(Ordering::Relaxed) {
+                return Ok(Vec::new());
+            }
+            let written = figures::write_as(&draw(), folder, name, drawing.formats);
+            if (drawing.progress)(drawn.fetch_add(1, Ordering::Relaxed) + 1, figures.len()).is_break() {
+                is_broken_off.store(true, Ordering::Relaxed);
+            }
             written
         })
         .collect();

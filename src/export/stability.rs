@@ -42,7 +42,7 @@ pub fn write_stability(folder: &OutputFolder, study: &Study) -> Result<Vec<PathB
     let mut written = Vec::new();
     if let Some(linear) = &study.linear {
         written.push(write(folder, "growth.csv", rows(linear).into_iter())?);
-        written.extend(figures::write(&figure(study, linear), &folder.path("growth"))?);
+        written.extend(figures::write(&figure(study, linear), folder, "growth")?);
     }
     let path = folder.path(summary::STABILITY);
     let text = json(study).map_err(ExportError::io("write", &path))?;

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fmt;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Duration;
 
 use serde::Serialize;
@@ -301,14 +301,6 @@ impl Equilibrium {
             phases: solved.phases.iter().map(|(name, time)| (*name, time.as_secs_f64())).collect(),
         }
     }
-}
-
-/// Whether the folder holds a summary, or a comparison, that this program wrote.
-pub(super) fn is_in(folder: &Path) -> bool {
-    [FILE, COMPARISON, TRADE, STABILITY, TRANSPORT, FLIGHT, GALLERY].into_iter().any(|file| {
-        let text = std::fs::read_to_string(folder.join(file)).unwrap_or_default();
-        serde_json::from_str::<serde_json::Value>(&text).is_ok_and(|summary| summary["program"] == PROGRAM)
-    })
 }
 
 fn counts(engine: &Engine) -> Counts {

@@ -45,7 +45,7 @@ pub fn write_trade(folder: &OutputFolder, study: &Study) -> Result<Vec<PathBuf>,
     let front = study.front();
     let rows = study.points.iter().map(|point| row(point, front.contains(&point)));
     let mut written = vec![write(folder, "trade.csv", rows)?];
-    written.extend(figures::write(&figure(study), &folder.path("trade"))?);
+    written.extend(figures::write(&figure(study), folder, "trade")?);
     let path = folder.path(summary::TRADE);
     let report = Report { program: summary::PROGRAM, version: env!("CARGO_PKG_VERSION"), study };
     let mut text = serde_json::to_string_pretty(&report).map_err(ExportError::io("write", &path))?;

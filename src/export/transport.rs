@@ -45,7 +45,7 @@ struct Row {
 /// The first file that cannot be written.
 pub fn write_transport(folder: &OutputFolder, report: &Report) -> Result<Vec<PathBuf>, ExportError> {
     let mut written = vec![write(folder, "transport.csv", report.cases.iter().map(row))?];
-    written.extend(figures::write(&figure(report), &folder.path("transport"))?);
+    written.extend(figures::write(&figure(report), folder, "transport")?);
     let path = folder.path(summary::TRANSPORT);
     let whole = Whole { program: summary::PROGRAM, version: env!("CARGO_PKG_VERSION"), report };
     let mut text = serde_json::to_string_pretty(&whole).map_err(ExportError::io("write", &path))?;

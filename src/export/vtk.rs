@@ -16,14 +16,16 @@
 //! data would not.
 
 use std::fs::{self, File};
-use std::io::{self, BufWriter, Write};
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use base64::engine::general_purpose::STANDARD;
 use base64::write::EncoderWriter;
 use rayon::prelude::*;
 
 use super::error::{ExportError, write_file};
+use super::manifest::{Written, create, create_buffered};
 use super::{OutputFolder, bonds};
 use crate::continuum::engine::Engine;
 use crate::continuum::mechanics::Stresses;
@@ -46,9 +48,9 @@ const QUADRILATERAL: u8 = 9;
 /// Writes frames while a run goes on; none is kept in memory.
 #[derive(Debug)]
 pub struct VtkSeries {
-    collection: PathBuf,
-    folder: PathBuf,
-    frames: Vec<(usize, PathBuf)>,
+    files: Arc<Written>,
+    /// Steps that have one.
+    frames: Vec<usize>,
     /// How many of them are known to be on the disk.
     synced: usize,
     material: Option<Elastic>,
@@ -58,8 +60,7 @@ impl VtkSeries {
     pub fn create(folder: &OutputFolder) -> Result<Self, ExportError> {
         let steps = folder.path(FOLDER);
         fs::create_dir_all(&steps).map_err(ExportError::io("create", &steps))?;
-        let (collection, frames) = (folder.path("steps.pvd"), Vec::new());
-        Ok(Self { collection, folder: steps, frames, synced: 0, material: None })
+        Ok(Self { files: folder.files(), frames: Vec::new(), synced: 0, material: None })
     }
 
     /// Adds the stress in a body of this material.
@@ -78,29 +79,28 @@ impl VtkSeries {
     ) -> Result<Self, ExportError> {
         let mut series = Self::create(folder)?;
         for step in steps {
-            let (former, path) =
-                (from.join(FOLDER).join(file_name(step)), series.folder.join(file_name(step)));
+            let (former, path) = (from.join(frame(step)), series.path(step));
             if !former.is_file() {
                 return Err(ExportError::MissingFrame(former));
             }
             if former != path {
-                fs::copy(&former, &path).map_err(ExportError::io("copy a frame to", &path))?;
+                let copied = fs::read(&former).and_then(|bytes| create(&path)?.write_all(&bytes));
+                copied.map_err(ExportError::io("copy a frame to", &path))?;
             }
-            series.frames.push((step, path));
+            series.frames.push(step);
         }
         Ok(series)
     }
 
-    /// Follows a folder that has taken another name.
-    pub fn moved(&mut self, folder: &OutputFolder) {
-        (self.collection, self.folder) = (folder.path("steps.pvd"), folder.path(FOLDER));
-        self.frames.iter_mut().for_each(|(step, path)| *path = self.folder.join(file_name(*step)));
+    /// Where the frame of a step is now: a folder may take another name while it is filled.
+    fn path(&self, step: usize) -> PathBuf {
+        self.files.path(&frame(step))
     }
 
     /// Brings the frames to the disk, so that a checkpoint may count on them.
     pub fn sync(&mut self) -> Result<(), ExportError> {
-        for (_, path) in &self.frames[self.synced..] {
-            File::open(path).and_then(|file| file.sync_all()).map_err(ExportError::io("write", path))?;
+        for path in self.frames[self.synced..].iter().map(|&step| self.path(step)) {
+            File::open(&path).and_then(|file| file.sync_all()).map_err(ExportError::io("write", &path))?;
         }
         self.synced = self.frames.len();
         Ok(())
@@ -108,9 +108,9 @@ impl VtkSeries {
 
     /// Writes the engine's present state.
     pub fn write(&mut self, engine: &Engine) -> Result<(), ExportError> {
-        let path = self.folder.join(file_name(engine.step()));
+        let path = self.path(engine.step());
         write_frame(&path, engine, self.material.as_ref()).map_err(ExportError::io("write", &path))?;
-        self.frames.push((engine.step(), path));
+        self.frames.push(engine.step());
         Ok(())
     }
 
@@ -121,13 +121,18 @@ impl VtkSeries {
             "<VTKFile type=\"Collection\" version=\"1.0\" byte_order=\"LittleEndian\">\n",
             "<Collection>\n"
         ));
-        for &(step, _) in &self.frames {
+        for &step in &self.frames {
             text += &format!("<DataSet timestep=\"{step}\" file=\"{FOLDER}/{}\"/>\n", file_name(step));
         }
         text += "</Collection>\n</VTKFile>\n";
-        write_file(&self.collection, text)?;
-        Ok(std::iter::once(self.collection).chain(self.frames.into_iter().map(|(_, path)| path)).collect())
+        let collection = self.files.path(Path::new("steps.pvd"));
+        write_file(&collection, text)?;
+        Ok(std::iter::once(collection).chain(self.frames.iter().map(|&step| self.path(step))).collect())
     }
+}
+
+fn frame(step: usize) -> PathBuf {
+    Path::new(FOLDER).join(file_name(step))
 }
 
 fn file_name(step: usize) -> String {
@@ -145,7 +150,7 @@ fn role_number(role: Role) -> u8 {
 }
 
 fn write_frame(path: &Path, engine: &Engine, material: Option<&Elastic>) -> io::Result<()> {
-    let mut out = BufWriter::new(File::create(path)?);
+    let mut out = create_buffered(path)?;
     let grid = Grid::of(engine);
     let stresses = material.and_then(|elastic| Stresses::at_present(engine, elastic));
     let points = engine.present().len();

@@ -37,6 +37,8 @@ pub enum BodyError {
     Alone { id: usize, place: [f64; 2], radius: f64 },
     #[error("within {radius} the particles have about {about} neighbours in all, at most {limit} are kept")]
     TooManyNeighbours { radius: f64, about: u64, limit: u64 },
+    #[error("the particles have about {about} neighbours in all, at most {limit} are kept")]
+    ManyNeighbours { about: u64, limit: u64 },
     #[error(transparent)]
     Neighbourhood(#[from] NeighbourhoodError),
 }
@@ -74,6 +76,9 @@ pub struct OutlineParticles {
 /// More lattice sites than this are refused before memory is asked for.
 const MOST_SITES: u64 = 1 << 28;
 
+/// More neighbour entries than this are refused before memory is asked for: 4 GiB.
+pub const MOST_ENTRIES: u64 = 1 << 30;
+
 impl Body {
     /// Column of the particles that stand along the outline and at no site: beyond all columns of the lattice.
     pub const ALONG_OUTLINE: i32 = 1 << 30;
@@ -99,6 +104,11 @@ impl Body {
         }
         let (sites, is_frame) = map.number();
         let reference: Arc<Vectors> = Arc::new(sites.iter().map(|&site| lattice.position(site)).collect());
+        let most = offsets.iter().map(Vec::len).max().unwrap_or(0).min(sites.len());
+        let about = sites.len() as u64 * most as u64;
+        if about > MOST_ENTRIES {
+            return Err(BodyError::ManyNeighbours { about, limit: MOST_ENTRIES });
+        }
         let map = &map;
         let neighbours = Neighbours::from_lists(sites.iter().zip(&is_frame).map(|(&site, &is_frame)| {
             let offsets: &[Site] = if is_frame { &[] } else { &offsets[lattice.sublattice(site)] };

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::body::{Body, BodyError};
+use super::body::{Body, BodyError, MOST_ENTRIES};
 use super::grid::CellGrid;
 use super::neighbourhood::Neighbours;
 use super::numbering::{Numbering, order_in_columns};
@@ -22,9 +22,6 @@ pub struct Cloud {
 /// Neighbours within this part more than a radius count as within it, so that the places of a lattice, which are
 /// rounded, have the neighbours that the lattice has.
 const MARGIN: f64 = 1e-9;
-
-/// More neighbour entries than this are refused before memory is asked for: 4 GiB.
-const MOST_ENTRIES: u64 = 1 << 30;
 
 /// Points that are asked how many others they see before all are.
 const SAMPLES: usize = 1000;

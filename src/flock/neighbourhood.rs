@@ -1,5 +1,7 @@
 //! Whose positions a particle sees (the paper's Choice 2).
 
+use std::f64::consts::PI;
+
 use super::grid::CellGrid;
 use super::lattice::{Lattice, Site, ring};
 use super::vectors::Vectors;
@@ -37,12 +39,32 @@ pub enum NeighbourhoodError {
     NothingBehind { lattice: &'static str },
     #[error("no site lies within {radius} of another: the nearest is {spacing} away")]
     TooSmall { radius: f64, spacing: f64 },
+    #[error("a particle would see about {about:.3e} others, at most {limit} are listed")]
+    TooLarge { about: f64, limit: u32 },
 }
 
+/// Neighbours of a particle above which nothing is listed: a radius of 600 spacings.
+const MOST_OFFSETS: u32 = 1 << 20;
+
 impl Neighbourhood {
+    /// Neighbours that a particle far inside the body would have, before any is looked for; 0 where they are few.
+    fn about(&self, lattice: &Lattice) -> f64 {
+        match self {
+            Neighbourhood::Within { radius } => PI * radius * radius / lattice.cell_area(),
+            _ => 0.0,
+        }
+    }
+
     /// Offsets to the neighbours of a site, for each sublattice, in summation order; empty for
     /// [`Neighbourhood::Dynamic`], whose neighbours are no function of the lattice.
+    ///
+    /// # Errors
+    /// A neighbourhood that the lattice has not, or one so wide that it would take minutes to list.
     pub fn offsets(&self, lattice: &Lattice) -> Result<Vec<Vec<Site>>, NeighbourhoodError> {
+        let about = self.about(lattice);
+        if about > f64::from(MOST_OFFSETS) {
+            return Err(NeighbourhoodError::TooLarge { about, limit: MOST_OFFSETS });
+        }
         (0..lattice.sublattices()).map(|sublattice| self.offsets_of(lattice, sublattice)).collect()
     }
 

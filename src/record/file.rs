@@ -1,8 +1,9 @@
 //! Writes an MCAP file: schemas and channels as they are met, an index at the end.
 
 use std::collections::BTreeMap;
+use std::ffi::OsStr;
 use std::fs::File;
-use std::io::BufWriter;
+use std::io::{BufWriter, ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
 use mcap::records::{MessageHeader, Metadata};
@@ -43,6 +44,7 @@ pub struct About {
 pub struct Recording {
     path: PathBuf,
     part: PathBuf,
+    force: bool,
     writer: Writer<BufWriter<File>>,
     channels: BTreeMap<String, (u16, u32)>,
     failure: Option<mcap::McapError>,
@@ -51,20 +53,15 @@ pub struct Recording {
 
 impl Recording {
     /// # Errors
-    /// A file of this name, without `force`; a folder that cannot be written to.
+    /// A file of this name, without `force`; with it, one that is no MCAP file; a folder that cannot be written to.
     pub fn create(path: &Path, about: &About, force: bool) -> Result<Self, RecordError> {
         let name = path.file_name().ok_or_else(|| RecordError::Unnamed(path.to_owned()))?;
-        if path.is_dir() || (path.exists() && !force) {
-            return Err(RecordError::Taken(path.to_owned()));
-        }
-        let mut part = name.to_owned();
-        part.push(".part");
-        let part = path.with_file_name(part);
+        require_free(path, force)?;
         let io = RecordError::io;
         if let Some(folder) = path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
             std::fs::create_dir_all(folder).map_err(io("create", folder))?;
         }
-        let file = File::create(&part).map_err(io("create", &part))?;
+        let (part, file) = create_part(path, name)?;
         let options = WriteOptions::new()
             .profile("ros2")
             .library(concat!("flockform ", env!("CARGO_PKG_VERSION")))
@@ -75,7 +72,7 @@ impl Recording {
         let mut writer = options.create(BufWriter::new(file)).map_err(write)?;
         describe(&mut writer, about).map_err(write)?;
         let (path, channels) = (path.to_owned(), BTreeMap::new());
-        Ok(Self { path, part, writer, channels, failure: None, messages: 0 })
+        Ok(Self { path, part, force, writer, channels, failure: None, messages: 0 })
     }
 
     /// Adds a message. After one that cannot be written no other is tried: [`Recording::finish`] says why.
@@ -126,8 +123,38 @@ impl Recording {
         let (part, path) = (self.part, self.path);
         let io = |action| RecordError::io(action, &path);
         synced.map_err(io("write"))?;
+        // Looked at again: somebody may have written there meanwhile.
+        if require_free(&path, self.force).is_err() {
+            return Err(RecordError::Kept { part, path });
+        }
         std::fs::rename(&part, &path).map_err(io("rename the recording to"))?;
         Ok(path)
+    }
+}
+
+/// Refuses a place that is taken, but for a recording that may be replaced.
+fn require_free(path: &Path, force: bool) -> Result<(), RecordError> {
+    let Ok(found) = path.symlink_metadata() else { return Ok(()) };
+    if !force || !found.is_file() {
+        return Err(RecordError::Taken(path.to_owned()));
+    }
+    let mut magic = [0; mcap::MAGIC.len()];
+    let begin = File::open(path).and_then(|mut file| file.read_exact(&mut magic));
+    if begin.is_ok() && magic == *mcap::MAGIC { Ok(()) } else { Err(RecordError::NotOurs(path.to_owned())) }
+}
+
+/// A new file `NAME.part`, or `NAME.2.part` and so on: a killed program may have left its recording in the first.
+fn create_part(path: &Path, name: &OsStr) -> Result<(PathBuf, File), RecordError> {
+    let mut n = 1;
+    loop {
+        let mut part = name.to_owned();
+        part.push(if n == 1 { ".part".to_owned() } else { format!(".{n}.part") });
+        let part = path.with_file_name(part);
+        match File::create_new(&part) {
+            Ok(file) => return Ok((part, file)),
+            Err(error) if error.kind() == ErrorKind::AlreadyExists && n < 10_000 => n += 1,
+            Err(error) => return Err(RecordError::io("create", &part)(error)),
+        }
     }
 }
 

@@ -28,6 +28,13 @@ pub use shared::Shared;
 pub enum RecordError {
     #[error("{} exists: remove it, or give the recording another name", .0.display())]
     Taken(PathBuf),
+    #[error(
+        "{} is no MCAP file: --force replaces recordings only\n  help: move it away, or give the recording another name",
+        .0.display()
+    )]
+    NotOurs(PathBuf),
+    #[error("{} was taken meanwhile: the recording is complete and kept in {}", .path.display(), .part.display())]
+    Kept { part: PathBuf, path: PathBuf },
     #[error("{} does not name a file that could be made: give it a name that ends in .mcap", .0.display())]
     Unnamed(PathBuf),
     #[error("--record: {what} is not recorded\n  help: leave --record out, or use ROS 2")]

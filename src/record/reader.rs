@@ -1,11 +1,13 @@
 //! Reads recordings: the messages that a loop received and sent, in the order of the file.
 
 use std::collections::BTreeMap;
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use mcap::read::{ChunkFlattener, Options};
-use mcap::records::Record;
+use mcap::McapError;
+use mcap::records::{Record, op};
+use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
 use super::RecordError;
 use super::file::{METADATA, SWARM};
@@ -53,36 +55,76 @@ impl Reader {
     /// # Errors
     /// A file that cannot be read or is no MCAP file.
     pub fn open(path: &Path) -> Result<Self, RecordError> {
-        let bytes = std::fs::read(path).map_err(RecordError::io("read", path))?;
-        if !bytes.starts_with(mcap::MAGIC) {
-            return Err(RecordError::NoMcap { path: path.to_owned(), source: mcap::McapError::BadMagic });
+        let no_mcap = || RecordError::NoMcap { path: path.to_owned(), source: McapError::BadMagic };
+        let found = std::fs::metadata(path).map_err(RecordError::io("read", path))?;
+        // A device has no end.
+        if !found.is_file() {
+            return Err(no_mcap());
         }
-        let this = Self { path: path.to_owned(), bytes };
-        this.records()?;
-        Ok(this)
+        Self::of_bytes(path, std::fs::read(path).map_err(RecordError::io("read", path))?)
     }
 
-    fn records(&self) -> Result<ChunkFlattener<'_>, RecordError> {
-        // The file of a killed program has no end, and is worth reading nevertheless.
-        ChunkFlattener::new_with_options(&self.bytes, Options::IgnoreEndMagic | Options::ValidateChunkCrcs)
-            .map_err(|source| RecordError::NoMcap { path: self.path.clone(), source })
+    /// A recording that is in memory already; `path` is what it is called.
+    ///
+    /// # Errors
+    /// What is no MCAP file.
+    pub fn of_bytes(path: &Path, bytes: Vec<u8>) -> Result<Self, RecordError> {
+        let path = path.to_owned();
+        if !bytes.starts_with(mcap::MAGIC) {
+            return Err(RecordError::NoMcap { path, source: McapError::BadMagic });
+        }
+        Ok(Self { path, bytes })
+    }
+
+    /// Shows every record, those in chunks too, until `see` has enough or the file is damaged. A length in the file
+    /// makes nobody allocate more than the file has bytes, or [`LARGEST`].
+    fn scan(&self, see: &mut dyn FnMut(Record<'_>) -> ControlFlow<()>) -> Result<(), McapError> {
+        let options = LinearReaderOptions::default()
+            // The file of a killed program has no end, and is worth reading nevertheless.
+            .with_skip_end_magic(true)
+            .with_prevalidate_chunk_crcs(true)
+            .with_record_length_limit(self.bytes.len().max(LARGEST));
+        let mut reader = LinearReader::new_with_options(options);
+        let mut rest = &self.bytes[..];
+        while let Some(event) = reader.next_event() {
+            match event? {
+                LinearReadEvent::ReadRequest(wanted) => {
+                    let (next, further) = rest.split_at(wanted.min(rest.len()));
+                    reader.insert(next.len()).copy_from_slice(next);
+                    reader.notify_read(next.len());
+                    rest = further;
+                }
+                // The parser of the crate counts back from the end of one that is too short.
+                LinearReadEvent::Record { opcode: op::ATTACHMENT, data } if !is_attachment(data) => {
+                    return Err(McapError::UnexpectedEof);
+                }
+                LinearReadEvent::Record { data, opcode } => {
+                    if see(mcap::parse_record(opcode, data)?).is_break() {
+                        break;
+                    }
+                }
+            }
+        }
+        Ok(())
     }
 
     /// The header before the first message.
     pub fn described(&self) -> Result<Described, RecordError> {
         let mut described = Described::default();
-        for record in self.records()? {
+        // What comes before damage is as good as ever.
+        let _ = self.scan(&mut |record| {
             match record {
-                Ok(Record::Metadata(metadata)) if metadata.name == METADATA => {
+                Record::Metadata(metadata) if metadata.name == METADATA => {
                     described.metadata = metadata.metadata;
                 }
-                Ok(Record::Attachment { header, data, .. }) if header.name == SWARM => {
+                Record::Attachment { header, data, .. } if header.name == SWARM => {
                     described.swarm = Some(String::from_utf8_lossy(&data).into_owned());
                 }
-                Ok(Record::Message { .. }) | Err(_) => break,
-                Ok(_) => {}
+                Record::Message { .. } => return ControlFlow::Break(()),
+                _ => {}
             }
-        }
+            ControlFlow::Continue(())
+        });
         Ok(described)
     }
 
@@ -92,32 +134,49 @@ impl Reader {
         let mut kinds: BTreeMap<u16, Arc<str>> = BTreeMap::new();
         let mut channels: BTreeMap<u16, (Arc<str>, Arc<str>)> = BTreeMap::new();
         let mut is_closed = false;
-        for record in self.records()? {
+        let scanned = self.scan(&mut |record| {
             match record {
-                Err(error) => return Ok(Some(error.to_string())),
-                Ok(Record::Schema { header, .. }) => {
+                Record::Schema { header, .. } => {
                     kinds.insert(header.id, header.name.replace("/msg/", "/").into());
                 }
-                Ok(Record::Channel(channel)) if channel.message_encoding == "cdr" => {
+                Record::Channel(channel) if channel.message_encoding == "cdr" => {
                     if let Some(kind) = kinds.get(&channel.schema_id) {
                         channels.insert(channel.id, (channel.topic.into(), Arc::clone(kind)));
                     }
                 }
-                Ok(Record::Message { header, data }) => {
+                Record::Message { header, data } => {
                     if let Some((topic, kind)) = channels.get(&header.channel_id) {
                         let (topic, kind) = (Arc::clone(topic), Arc::clone(kind));
                         let published = header.publish_time as f64 * 1e-9;
                         see(&Entry { topic, kind, payload: data.into_owned(), published });
                     }
                 }
-                Ok(Record::DataEnd(_)) => is_closed = true,
-                Ok(_) => {}
+                Record::DataEnd(_) => is_closed = true,
+                _ => {}
             }
-        }
-        Ok((!is_closed).then(|| "it was never closed".to_owned()))
+            ControlFlow::Continue(())
+        });
+        Ok(match scanned {
+            Err(error) => Some(error.to_string()),
+            Ok(()) => (!is_closed).then(|| "it was never closed".to_owned()),
+        })
     }
 
     pub fn path(&self) -> &Path {
         &self.path
     }
+}
+
+/// Largest record or chunk that a small file may hold, uncompressed \[byte\].
+const LARGEST: usize = 64 << 20;
+
+/// Whether an attachment has room for all that comes before and after its data: two times, two strings with their
+/// lengths, the length of the data, and a checksum.
+fn is_attachment(body: &[u8]) -> bool {
+    let after_string = |from: usize| {
+        let length = body.get(from..from.checked_add(4)?)?;
+        (from + 4).checked_add(u32::from_le_bytes(length.try_into().ok()?) as usize)
+    };
+    let data = after_string(16).and_then(after_string);
+    data.and_then(|data| data.checked_add(8 + 4)).is_some_and(|end| end <= body.len())
 }

@@ -3,7 +3,8 @@
 use iceoryx2::prelude::{Config, FileName, LogLevel, Node, NodeBuilder, NodeName, SignalHandlingMode, ipc};
 use iceoryx2::prelude::{SemanticString, set_log_level_from_env_or};
 
-use super::ShmError;
+use super::folders::Folders;
+use super::{ShmError, folders};
 
 /// Names the domain, as `ROS_DOMAIN_ID` does for ROS 2.
 pub const VARIABLE: &str = "FLOCKFORM_SHM_DOMAIN";
@@ -16,14 +17,24 @@ pub struct Domain {
 }
 
 impl Domain {
-    /// The domain that the environment names.
+    /// The domain that the environment names; unless it does, iceoryx2's own, or `uUSER` where another user has that.
     ///
     /// # Errors
     /// A name that is none.
     pub fn from_environment() -> Result<Self, ShmError> {
         match std::env::var(VARIABLE) {
             Ok(name) if !name.is_empty() => Self::named(&name),
-            _ => Ok(Self { config: Config::global_config().clone() }),
+            _ => {
+                let config = Config::global_config().clone();
+                // Of several users the first has iceoryx2's own domain, the others one each.
+                match folders::is_another_s(&config) {
+                    None => Ok(Self { config }),
+                    Some(user) => {
+                        tracing::info!("another user has iceoryx2's own domain: {VARIABLE}=u{user} is taken");
+                        Self::named(&format!("u{user}"))
+                    }
+                }
+            }
         }
     }
 
@@ -51,13 +62,14 @@ impl Domain {
         set_log_level_from_env_or(LogLevel::Fatal);
         let refused = |reason: String| ShmError::Node { reason };
         let name = NodeName::new(name).map_err(|error| refused(error.to_string()))?;
+        let folders = Folders::open(&self.config);
         let node = NodeBuilder::new()
             .name(&name)
             .config(&self.config)
             .signal_handling_mode(SignalHandlingMode::Disabled)
             .create::<ipc::Service>()
             .map_err(|error| refused(error.to_string()))?;
-        Ok(Peer { node, config: self.config.clone() })
+        Ok(Peer { node, config: self.config.clone(), _folders: folders })
     }
 }
 
@@ -66,6 +78,8 @@ impl Domain {
 pub struct Peer {
     pub(super) node: Node<ipc::Service>,
     pub(super) config: Config,
+    // Dropped after the node, which has its files there.
+    _folders: Folders,
 }
 
 impl Peer {

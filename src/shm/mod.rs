@@ -24,6 +24,7 @@
 
 pub mod channel;
 pub mod domain;
+mod folders;
 pub mod link;
 pub mod node;
 pub mod payload;

@@ -326,6 +326,7 @@ impl Newton<'_> {
                 Ok(None) => stride = 0.5 * (part - done),
                 // What is wrong with the unstrained body is wrong with the scene.
                 Err(error) if self.residuals.len() == 1 => return Err(error),
+                Err(error @ CorotatedError::Solve(SolveError::Interrupted)) => return Err(error),
                 Err(_) => stride = 0.5 * (part - done),
             }
             let solves = self.residuals.len() - 1;

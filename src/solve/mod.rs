@@ -5,6 +5,7 @@ pub mod arnoldi;
 pub mod corotated;
 pub mod equilibrium;
 pub mod field;
+pub mod interrupt;
 pub mod linear;
 pub mod operator;
 pub mod spectrum;

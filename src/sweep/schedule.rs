@@ -82,8 +82,8 @@ impl Activity {
 
     /// Counts steps of a whole body of so many followers.
     pub fn count_whole(&mut self, followers: usize) {
-        self.computed += 2 * followers as u64;
-        self.due += 2 * followers as u64;
+        self.computed = self.computed.saturating_add(2 * followers as u64);
+        self.due = self.due.saturating_add(2 * followers as u64);
     }
 }
 
@@ -124,8 +124,9 @@ impl<T: Real> Steps<'_, T> {
             x.add(y);
             x
         };
-        activity.due += 2 * (self.rows.all_followers() * self.count) as u64;
-        activity.computed += seen.computed;
+        let due = 2 * (self.rows.all_followers() * self.count) as u64;
+        activity.due = activity.due.saturating_add(due);
+        activity.computed = activity.computed.saturating_add(seen.computed);
         seen.farther[..self.count].to_vec()
     }
 

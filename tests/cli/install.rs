@@ -133,3 +133,41 @@ fn a_prefix_that_cannot_be_is_refused_and_nothing_is_left() {
     assert!(text(&output.stderr).contains("cannot install"), "{}", text(&output.stderr));
     assert_eq!(files(folder.path()), BTreeSet::from(["share".to_string()]));
 }
+
+/// FNV-1a, as the list of installed files has it.
+fn checksum(bytes: &[u8]) -> String {
+    let step = |sum: u64, byte: &u8| (sum ^ u64::from(*byte)).wrapping_mul(0x100_0000_01b3);
+    format!("{:016x}", bytes.iter().fold(0xcbf2_9ce4_8422_2325, step))
+}
+
+#[test]
+fn what_an_earlier_list_names_is_removed_in_the_package_s_folders_only() {
+    let folder = temporary();
+    let prefix = folder.path().join("prefix");
+    let install = || flockform(&["install", "--prefix", "prefix"], folder.path());
+    assert!(install().status.success());
+    let write = |path: &str| std::fs::write(folder.path().join(path), "gone").expect("writable");
+    let gone = "prefix/share/flockform/gone.txt";
+    let kept = ["important.txt", "prefix/thesis.tex", "prefix/share/other.txt"];
+    kept.into_iter().chain([gone]).for_each(write);
+    #[cfg(unix)]
+    std::os::unix::fs::symlink(folder.path(), prefix.join("share/flockform/link")).expect("linked");
+    let named = [
+        "../important.txt".to_owned(),
+        "share/flockform/../../../important.txt".to_owned(),
+        "share/flockform/link/important.txt".to_owned(),
+        folder.path().join("important.txt").display().to_string(),
+        "thesis.tex".to_owned(),
+        "share/other.txt".to_owned(),
+        "share/flockform/gone.txt".to_owned(),
+    ];
+    let list = prefix.join("share/flockform/installed-files");
+    let lines = named.map(|path| format!("{} {path}\n", checksum(b"gone"))).concat();
+    std::fs::write(&list, read(&list) + &lines).expect("writable");
+    let output = install();
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    for path in kept {
+        assert_eq!(read(folder.path().join(path)), "gone", "{path}");
+    }
+    assert!(!folder.path().join(gone).exists(), "what is gone from the package goes");
+}

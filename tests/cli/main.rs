@@ -3,7 +3,9 @@
 mod checkpoint;
 mod compare;
 mod documents;
+mod faults;
 mod install;
+mod interrupt;
 mod material;
 mod measured;
 mod points;

@@ -4,6 +4,7 @@
 //! `cargo test --test hostile -- --ignored --test-threads=1`.
 
 mod commands;
+mod disk;
 mod environment;
 mod log;
 mod middleware;

@@ -83,6 +83,50 @@ fn what_cannot_be_replayed_is_refused_by_name() {
     assert!(matches!(error, RecordError::NoMcap { .. }));
 }
 
+#[test]
+fn force_replaces_recordings_and_nothing_else() {
+    let folder = temporary();
+    let short = ["--set", "flight.duration=0.5", "--set", "flight.bounds={}", "-q", "--no-report"];
+    let fly = |out: &str, more: &[&str]| {
+        let all = [&["swarm", "square", "--out", out, "--record", "flight.mcap"][..], &short, more].concat();
+        Command::new(env!("CARGO_BIN_EXE_flockform"))
+            .args(all)
+            .current_dir(folder.path())
+            .output()
+            .expect("the program starts")
+    };
+    let file = folder.path().join("flight.mcap");
+    std::fs::write(&file, "years of work").expect("writable");
+    let output = fly("a", &["--force"]);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert!(said.contains("is no MCAP file") && said.contains("help:"), "{said}");
+    assert_eq!(std::fs::read_to_string(&file).expect("there"), "years of work");
+    assert!(!folder.path().join("a").exists(), "nothing was flown");
+    std::fs::remove_file(&file).expect("there");
+    #[cfg(unix)]
+    {
+        // Neither through a link in the place of the file, nor in that of what is not finished yet.
+        let victim = folder.path().join("thesis.mcap");
+        std::fs::write(&victim, [&mcap_magic()[..], b"mine"].concat()).expect("writable");
+        std::os::unix::fs::symlink(&victim, &file).expect("linked");
+        assert_eq!(fly("b", &["--force"]).status.code(), Some(2));
+        std::fs::remove_file(&file).expect("there");
+        std::os::unix::fs::symlink(&victim, folder.path().join("flight.mcap.part")).expect("linked");
+        assert_eq!(fly("c", &[]).status.code(), Some(0));
+        assert!(std::fs::read(&victim).expect("there").ends_with(b"mine"));
+    }
+    let first = std::fs::read(&file).expect("recorded");
+    assert_eq!(fly("d", &[]).status.code(), Some(2), "not without force");
+    assert_eq!(std::fs::read(&file).expect("there"), first);
+    assert_eq!(fly("d", &["--force"]).status.code(), Some(0));
+}
+
+/// What an MCAP file begins with.
+fn mcap_magic() -> [u8; 8] {
+    *b"\x89MCAP0\r\n"
+}
+
 /// Sends a child the signal that Ctrl-C would.
 #[cfg(unix)]
 fn interrupt(child: &mut std::process::Child) {

@@ -6,6 +6,7 @@
 mod child;
 mod in_process;
 mod killed;
+mod leftovers;
 mod positions;
 mod program;
 mod promises;

@@ -124,9 +124,25 @@ impl EngineState {
         require("roles", self.roles.len(), count)?;
         let bits = engine.flock.bonds.as_ref().map(|_| engine.flock.neighbours.index.len().div_ceil(8));
         require("bytes of bonds", self.broken.as_ref().map_or(0, Vec::len), bits.unwrap_or(0))?;
+        // A number from a file is an index only when it is below what it counts.
+        let require_below = |what, found: usize, planned: usize| {
+            if found < planned { Ok(()) } else { Err(WrongState { what, found, planned }) }
+        };
         for led in &self.leaders {
-            require("role changes", led.change.min(engine.changes.len()), led.change)?;
-            require("led particles", led.particle.min(count), led.particle)?;
+            require_below("role changes", led.change, engine.changes.len())?;
+            require_below(
+                "particles of a role change",
+                led.which,
+                engine.changes[led.change].particles.len(),
+            )?;
+            require_below("led particles", led.particle, count)?;
+            require_below("steps of a leader", led.since, self.step.saturating_add(1))?;
+        }
+        for (particle, _) in &self.guided {
+            require_below("guided particles", *particle, count)?;
+        }
+        for particle in self.breaks.iter().flat_map(|one| one.pair) {
+            require_below("particles of broken bonds", particle as usize, count)?;
         }
         Ok(())
     }

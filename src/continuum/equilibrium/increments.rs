@@ -1,6 +1,6 @@
 //! Equilibria on the way: loads and leaders' motions in parts, each solved from where the last one left the body.
 
-use super::{Outcome, Plan, StopReason, Watch, steps_of_the_way};
+use super::{Outcome, Plan, StopReason, Watch, overflow, steps_of_the_way};
 use super::{
     farthest_from_target, follows, held_axes, of_plan_after, reason, refuse, refuse_corotated, way_after,
 };
@@ -9,13 +9,14 @@ use crate::continuum::engine::load::scaled;
 use crate::flock::vectors::Vectors;
 use crate::scene::{Scene, SceneError};
 use crate::solve::corotated::{self, CorotatedError, Way};
-use crate::solve::equilibrium::{Request, Solved, solve};
+use crate::solve::equilibrium::{Request, SolveError, Solved, solve};
 
 /// Why a part of the way cannot be gone.
 enum Failure {
     Refused(SceneError),
     /// The equilibrium is lost on the way.
     Lost(String),
+    Interrupted,
 }
 
 /// Solves each part of the way in turn. `watch` sees the unloaded body and then every equilibrium, as step 1, 2, ...;
@@ -47,6 +48,10 @@ pub(super) fn settle_each(
         let solved = match settle_at(scene, request, (&mut plan, whole.as_ref()), start, part) {
             Ok(solved) => solved,
             Err(Failure::Refused(error)) => return Err(error),
+            Err(Failure::Interrupted) => {
+                outcome.reason = StopReason::Interrupted;
+                break;
+            }
             Err(Failure::Lost(why)) => {
                 outcome.reason = StopReason::Stuck(format!("at {part} of the load: {why}"));
                 break;
@@ -56,11 +61,11 @@ pub(super) fn settle_each(
         outcome.engine.set_load_factor(part);
         outcome.engine.go_on();
         outcome.residual = farthest_from_target(&outcome.engine) / spacing;
-        outcome.reason = reason(&solved);
+        outcome.reason = overflow(&outcome.engine).map_or_else(|| reason(&solved), StopReason::Diverged);
         outcome.solved = Some(solved);
         interrupted = (watch.see)(&outcome.engine, outcome.residual).is_break();
         last = part;
-        if outcome.reason == StopReason::Unsettled {
+        if matches!(outcome.reason, StopReason::Unsettled | StopReason::Diverged(_)) {
             break;
         }
     }
@@ -79,12 +84,16 @@ fn settle_at(
     if !corotated::is_corotated(&plan.flock) {
         plan.flock.forces = whole.map(|whole| scaled(whole, part));
         let system = of_plan_after(scene, plan, part * steps).map_err(Failure::Refused)?;
-        return solve(&system, request).map_err(|error| Failure::Refused(refuse(scene, &error)));
+        return solve(&system, request).map_err(|error| match error {
+            SolveError::Interrupted => Failure::Interrupted,
+            error => Failure::Refused(refuse(scene, &error)),
+        });
     }
     let way = Way { held: &|part| way_after(plan, part * steps), start, end: part };
     let axes = held_axes(plan);
     let solved = corotated::solve(&plan.flock, &plan.body, follows(plan), axes, &way, request);
     solved.map_err(|error| match error {
+        CorotatedError::Solve(SolveError::Interrupted) => Failure::Interrupted,
         CorotatedError::Unsettled { .. } if start.is_some() => Failure::Lost(error.to_string()),
         _ => Failure::Refused(refuse_corotated(scene, &error)),
     })

@@ -25,8 +25,9 @@ mod svg;
 mod ticks;
 mod von_mises;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
+use super::OutputFolder;
 use super::error::{ExportError, write_file};
 use crate::continuum::engine::Engine;
 use crate::flock::body::Body;
@@ -92,21 +93,26 @@ pub enum Formats {
     All,
 }
 
-/// Writes `PATH.svg` and `PATH.png`; `path` has no ending.
-pub fn write(svg: &str, path: &Path) -> Result<Vec<PathBuf>, ExportError> {
-    write_as(svg, path, Formats::All)
+/// Writes `NAME.svg` and `NAME.png`.
+pub fn write(svg: &str, folder: &OutputFolder, name: &str) -> Result<Vec<PathBuf>, ExportError> {
+    write_as(svg, folder, name, Formats::All)
 }
 
 /// The same as these files alone.
-pub fn write_as(svg: &str, path: &Path, formats: Formats) -> Result<Vec<PathBuf>, ExportError> {
+pub fn write_as(
+    svg: &str,
+    folder: &OutputFolder,
+    name: &str,
+    formats: Formats,
+) -> Result<Vec<PathBuf>, ExportError> {
     let mut written = Vec::new();
     if matches!(formats, Formats::Svg | Formats::All) {
-        let path = path.with_extension("svg");
+        let path = folder.path(format!("{name}.svg"));
         write_file(&path, svg)?;
         written.push(path);
     }
     if matches!(formats, Formats::Png | Formats::All) {
-        let path = path.with_extension("png");
+        let path = folder.path(format!("{name}.png"));
         let png = png::render(svg, PNG_WIDTH)
             .map_err(|reason| ExportError::Figure { path: path.clone(), reason })?;
         write_file(&path, png)?;

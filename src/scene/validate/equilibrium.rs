@@ -50,7 +50,8 @@ pub fn equilibrium(raw: &RawScene, refuse: Refuse<'_>) -> Result<Option<Equilibr
         None if singles => Precision::F32,
         None => Precision::F64,
     };
-    let request = Request { solver, tolerance, most_iterations: asked.most_iterations, precision };
+    let most_iterations = asked.most_iterations;
+    let request = Request { solver, tolerance, most_iterations, precision, ..Request::default() };
     Ok(Some(Equilibrium { request, accuracy }))
 }
 

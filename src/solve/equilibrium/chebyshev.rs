@@ -30,7 +30,7 @@ pub(super) fn solve(prepared: &mut Prepared, request: &Request) -> Result<Found,
     let (mut u, mut step) = (Vectors::zeros(matrix.count()), Vectors::zeros(matrix.count()));
     let mut r = right.clone();
     let set_up = begin.elapsed();
-    let mut history = History::new();
+    let mut history = History::new(request);
     while history.goes_on(request) {
         let (begun_at, rate) = (history.iterations(), rate(low, high));
         // Half of the promised digits, and never fewer steps than it takes to gain one.

@@ -83,7 +83,7 @@ pub(super) fn iterate<T: Real, P: Preconditioner<T>>(
     let at_start = dot(r.view(), r.view()).sqrt();
     let (mut size, mut rz_before) = (at_start, f64::INFINITY);
     let set_up = begin.elapsed();
-    let mut history = History::new();
+    let mut history = History::new(request);
     while history.goes_on(request) {
         let iteration = history.iterations() + 1;
         let (z, rz) = preconditioner.precondition(&r, size);

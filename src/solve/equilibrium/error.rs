@@ -37,4 +37,6 @@ pub enum SolveError {
     NoDirect,
     #[error("the factorisation of {unknowns} unknowns failed: {reason}")]
     Factorisation { unknowns: usize, reason: String },
+    #[error("interrupted")]
+    Interrupted,
 }

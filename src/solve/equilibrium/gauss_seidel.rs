@@ -19,7 +19,7 @@ pub(super) fn solve(prepared: &mut Prepared, request: &Request) -> Result<Found,
     let mut u = Vectors::zeros(matrix.count());
     let mut r = Vectors::zeros(matrix.count());
     let set_up = begin.elapsed();
-    let mut history = History::new();
+    let mut history = History::new(request);
     while history.goes_on(request) {
         for colour in &colours {
             sweep(matrix, stencils, colour, right, &mut u);

@@ -29,7 +29,7 @@ pub(super) fn solve(prepared: &mut Prepared, request: &Request) -> Result<Found,
     let mut u = Vectors::zeros(matrix.count());
     let mut r = right.clone();
     let set_up = begin.elapsed();
-    let mut history = History::new();
+    let mut history = History::new(request);
     while history.goes_on(request) {
         steps::precondition(matrix, stencils, (1.0, weight), &r, &mut u);
         let residual = steps::residual(matrix, stencils, (&u, right), &mut r).sqrt() / *size;

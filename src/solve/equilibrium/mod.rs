@@ -35,6 +35,7 @@ pub use choice::choose;
 pub use error::SolveError;
 pub use system::System;
 
+use super::interrupt::Interrupt;
 use crate::flock::vectors::Vectors;
 use system::Prepared;
 
@@ -122,6 +123,8 @@ pub struct Request {
     pub tolerance: f64,
     pub most_iterations: usize,
     pub precision: Precision,
+    /// Ends the solve with [`SolveError::Interrupted`].
+    pub interrupt: Interrupt,
 }
 
 impl Default for Request {
@@ -131,6 +134,7 @@ impl Default for Request {
             tolerance: 1e-10,
             most_iterations: 1_000_000,
             precision: Precision::default(),
+            interrupt: Interrupt::default(),
         }
     }
 }

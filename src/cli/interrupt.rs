@@ -1,0 +1,160 @@
+//! Ctrl-C and SIGTERM: one flag, and an end within a second whatever the program is doing.
+//!
+//! Most commands have nothing to keep before they are done: the thread that hears of the signal removes what they
+//! have begun to write and ends the program, in the midst of a mesh or a factorisation too. A command that
+//! [`keeps`] results looks at the flag itself and saves them; if it has not begun to within [`GRACE`], it is ended all
+//! the same. A second signal ends any command at once.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, AtomicU8, AtomicUsize, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use flockform::export::{ExportError, OutputFolder};
+
+use super::FAILED;
+
+static RAISED: AtomicBool = AtomicBool::new(false);
+/// Whether the program is being ended by the thread of the signal.
+static ENDING: AtomicBool = AtomicBool::new(false);
+/// What becomes of the work at the first signal.
+static MODE: AtomicU8 = AtomicU8::new(ENDS);
+/// How many parts of the program ask for time to save results.
+static SAVING: AtomicUsize = AtomicUsize::new(0);
+/// What is removed in the end, and what is said.
+static LEFT: Mutex<Left> = Mutex::new(Left { paths: Vec::new(), words: None });
+
+const ENDS: u8 = 0;
+const KEEPS: u8 = 1;
+const SERVES: u8 = 2;
+
+pub const NOTHING_KEPT: &str = "interrupted: nothing is kept";
+
+/// How long work that keeps results may take to notice.
+const GRACE: Duration = Duration::from_millis(700);
+/// How long another thread may go on writing into a folder that is being removed.
+const REMOVING: Duration = Duration::from_millis(150);
+
+struct Left {
+    paths: Vec<PathBuf>,
+    words: Option<String>,
+}
+
+fn left() -> MutexGuard<'static, Left> {
+    LEFT.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Listens for signals, from now until the program ends.
+pub fn watch() {
+    let heard = || {
+        if RAISED.swap(true, Ordering::SeqCst) {
+            end();
+        }
+        match MODE.load(Ordering::SeqCst) {
+            ENDS => drop(std::thread::spawn(|| end_when_saved(Duration::ZERO))),
+            KEEPS => drop(std::thread::spawn(|| end_when_saved(GRACE))),
+            _ => {}
+        }
+    };
+    if let Err(error) = ctrlc::set_handler(heard) {
+        tracing::warn!("an interrupt will end the program without removing what it has begun: {error}");
+    }
+}
+
+/// The flag of a command that saves what it has when it is raised.
+pub fn keeps() -> &'static AtomicBool {
+    MODE.store(KEEPS, Ordering::SeqCst);
+    &RAISED
+}
+
+/// The flag of a command that goes on until it is raised, and takes its time to end well.
+pub fn serves() -> &'static AtomicBool {
+    MODE.store(SERVES, Ordering::SeqCst);
+    &RAISED
+}
+
+/// The flag alone, for what looks at it on the way.
+pub fn flag() -> &'static AtomicBool {
+    &RAISED
+}
+
+pub fn is_raised() -> bool {
+    RAISED.load(Ordering::SeqCst)
+}
+
+/// Does not return once the signal's thread ends the program: what the work finds broken then is no news.
+pub fn leave_to_the_end() {
+    while ENDING.load(Ordering::SeqCst) {
+        std::thread::sleep(GRACE);
+    }
+}
+
+/// Time to save results; what takes long must be worth it.
+pub struct Saving(());
+
+pub fn saving() -> Saving {
+    SAVING.fetch_add(1, Ordering::SeqCst);
+    Saving(())
+}
+
+impl Drop for Saving {
+    fn drop(&mut self) {
+        SAVING.fetch_sub(1, Ordering::SeqCst);
+    }
+}
+
+/// Has these files and folders removed if the program is ended; folders above others only if they are empty then.
+pub fn removes(paths: impl IntoIterator<Item = PathBuf>) {
+    left().paths.extend(paths);
+}
+
+/// What is said if the program is ended from here on.
+pub fn says(words: String) {
+    left().words = Some(words);
+}
+
+/// Gives a finished folder its name, without an end in between.
+pub fn commit(folder: OutputFolder) -> Result<PathBuf, ExportError> {
+    let _saving = saving();
+    let kept = folder.commit();
+    left().paths.clear();
+    kept
+}
+
+fn end_when_saved(grace: Duration) {
+    std::thread::sleep(grace);
+    while SAVING.load(Ordering::SeqCst) > 0 {
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    end();
+}
+
+fn end() -> ! {
+    ENDING.store(true, Ordering::SeqCst);
+    let left = left();
+    let since = Instant::now();
+    for path in &left.paths {
+        while remove(path).is_err() && since.elapsed() < REMOVING {
+            std::thread::sleep(Duration::from_millis(2));
+        }
+    }
+    // Nobody may read it any more, which must not keep the program from ending: `eprintln` would panic.
+    let _ = writeln!(std::io::stderr(), "{}", left.words.as_deref().unwrap_or(NOTHING_KEPT));
+    std::process::exit(FAILED.into())
+}
+
+/// A hidden folder is ours with all that is in it; any other must be empty.
+fn remove(path: &Path) -> std::io::Result<()> {
+    let Ok(found) = path.symlink_metadata() else { return Ok(()) };
+    let is_hidden = path.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.'));
+    match found.is_dir() {
+        false => std::fs::remove_file(path),
+        true if is_hidden => std::fs::remove_dir_all(path),
+        true => {
+            // One that somebody else has put something into stays.
+            let _ = std::fs::remove_dir(path);
+            Ok(())
+        }
+    }
+}

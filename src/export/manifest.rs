@@ -1,0 +1,178 @@
+//! `flockform-files.txt`: which files of an output folder flockform wrote, so that `--force` removes no others.
+//!
+//! One path below the folder a line, the parts separated by `/`; a folder that has a list of its own is one line. A
+//! name is added before its file is written, so that the list of a killed run is complete.
+
+use std::collections::BTreeSet;
+use std::fs::{self, File};
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use super::checkpoint;
+
+/// Its name in the folder.
+pub const FILE: &str = "flockform-files.txt";
+
+/// These come and go, and are flockform's wherever there is a list.
+const ALWAYS: [&str; 4] = [FILE, TEMPORARY, checkpoint::FILE, checkpoint::PART];
+const TEMPORARY: &str = "flockform-files.txt.part";
+
+/// Foreign files that are named; a folder may hold thousands.
+const MOST_NAMED: usize = 5;
+
+/// The list of a folder that is being filled.
+#[derive(Debug)]
+pub(super) struct Written(Mutex<State>);
+
+#[derive(Debug)]
+struct State {
+    root: PathBuf,
+    names: BTreeSet<String>,
+    list: File,
+}
+
+impl Written {
+    /// Goes on with the list of this folder, or begins one.
+    pub fn open(root: &Path) -> io::Result<Self> {
+        let names = read(root).unwrap_or_default();
+        let mut list = create(&root.join(FILE))?;
+        list.write_all(lines(&names).as_bytes())?;
+        Ok(Self(Mutex::new(State { root: root.to_owned(), names, list })))
+    }
+
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Where to write the file of this name, which is ours from now on.
+    pub fn path(&self, name: &Path) -> PathBuf {
+        let mut state = self.state();
+        let text = line(name);
+        if !ALWAYS.contains(&&*text) && state.names.insert(text.clone()) {
+            // Where this cannot be written, the file itself cannot either, and that one says so.
+            let _ = writeln!(state.list, "{text}");
+        }
+        state.root.join(name)
+    }
+
+    /// Follows the folder to its new name.
+    pub fn moved(&self, root: &Path) {
+        self.state().root = root.to_owned();
+    }
+
+    /// Writes the list of what there is in the end.
+    pub fn close(&self) -> io::Result<()> {
+        let state = self.state();
+        let is_there = |name: &&String| state.root.join(name).symlink_metadata().is_ok();
+        let names: BTreeSet<String> = state.names.iter().filter(is_there).cloned().collect();
+        let part = state.root.join(TEMPORARY);
+        create(&part)?.write_all(lines(&names).as_bytes())?;
+        fs::rename(part, state.root.join(FILE))
+    }
+}
+
+/// A new file, never one that a symbolic link leads to: what has the name is unlinked.
+pub(crate) fn create(path: &Path) -> io::Result<File> {
+    match File::create_new(path) {
+        Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {
+            fs::remove_file(path)?;
+            File::create_new(path)
+        }
+        created => created,
+    }
+}
+
+/// The same, buffered.
+pub(crate) fn create_buffered(path: &Path) -> io::Result<BufWriter<File>> {
+    create(path).map(BufWriter::new)
+}
+
+fn line(name: &Path) -> String {
+    let parts: Vec<_> = name.components().map(|part| part.as_os_str().to_string_lossy()).collect();
+    parts.join("/")
+}
+
+fn lines(names: &BTreeSet<String>) -> String {
+    names.iter().map(|name| format!("{name}\n")).collect()
+}
+
+fn read(folder: &Path) -> Option<BTreeSet<String>> {
+    let path = folder.join(FILE);
+    path.symlink_metadata().ok().filter(fs::Metadata::is_file)?;
+    Some(fs::read_to_string(path).ok()?.lines().map(str::to_owned).collect())
+}
+
+/// What a folder holds, deepest first, when all of it is flockform's.
+pub(super) struct Ours {
+    files: Vec<PathBuf>,
+    folders: Vec<PathBuf>,
+}
+
+/// Why a folder is not flockform's.
+#[derive(Debug)]
+pub(super) enum NotOurs {
+    /// It has no list.
+    NoList,
+    /// A few of the files that are not in the list.
+    Foreign(Vec<PathBuf>),
+    Io(io::Error),
+}
+
+impl Ours {
+    /// Looks through a folder; symbolic links are not followed, and are never ours.
+    pub fn in_folder(root: &Path) -> Result<Self, NotOurs> {
+        let Some(names) = read(root) else { return Err(NotOurs::NoList) };
+        let mut ours = Self { files: Vec::new(), folders: Vec::new() };
+        let mut foreign = Vec::new();
+        ours.look(root, Path::new(""), &names, &mut foreign).map_err(NotOurs::Io)?;
+        ours.folders.push(root.to_owned());
+        if foreign.is_empty() { Ok(ours) } else { Err(NotOurs::Foreign(foreign)) }
+    }
+
+    fn look(
+        &mut self,
+        root: &Path,
+        below: &Path,
+        names: &BTreeSet<String>,
+        foreign: &mut Vec<PathBuf>,
+    ) -> io::Result<()> {
+        for entry in fs::read_dir(root.join(below))? {
+            let entry = entry?;
+            let (name, kind) = (below.join(entry.file_name()), entry.file_type()?);
+            let (text, path) = (line(&name), entry.path());
+            let is_listed = names.contains(&text) || ALWAYS.contains(&&*text);
+            let prefix = format!("{text}/");
+            let leads_to_listed =
+                || names.range(prefix.clone()..).next().is_some_and(|n| n.starts_with(&prefix));
+            if kind.is_file() && is_listed {
+                self.files.push(path);
+            } else if kind.is_dir() && is_listed && path.join(FILE).exists() {
+                match Self::in_folder(&path) {
+                    Ok(inner) => {
+                        self.files.extend(inner.files);
+                        self.folders.extend(inner.folders);
+                    }
+                    Err(NotOurs::Io(error)) => return Err(error),
+                    Err(NotOurs::NoList) => foreign.push(path),
+                    Err(NotOurs::Foreign(inner)) => foreign.extend(inner),
+                }
+            } else if kind.is_dir() && (is_listed || leads_to_listed()) {
+                self.look(root, &name, names, foreign)?;
+                self.folders.push(path);
+            } else {
+                foreign.push(path);
+            }
+            if foreign.len() >= MOST_NAMED {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// Removes what was found, and nothing that has come since.
+    pub fn remove(self) -> io::Result<()> {
+        self.files.iter().try_for_each(fs::remove_file)?;
+        self.folders.iter().try_for_each(fs::remove_dir)
+    }
+}

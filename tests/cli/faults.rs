@@ -1,0 +1,79 @@
+//! What nobody asks for and somebody will meet: runs at once, values without bounds, files that write to the terminal.
+
+use std::path::Path;
+use std::process::Command;
+use std::time::{Duration, Instant};
+
+use crate::program::*;
+
+#[test]
+fn runs_that_begin_at_once_get_a_folder_each() {
+    let folder = temporary();
+    let start = || {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_flockform"));
+        command.args(["run", "tension", "-q", "--no-report", "--figures", "none"]);
+        command.current_dir(folder.path()).spawn().expect("the program starts")
+    };
+    let mut children: Vec<_> = (0..4).map(|_| start()).collect();
+    for child in &mut children {
+        assert!(child.wait().expect("ends").success());
+    }
+    for name in ["tension", "tension-2", "tension-3", "tension-4"] {
+        assert!(folder.path().join("out").join(name).join("summary.json").is_file(), "{name}");
+    }
+}
+
+#[test]
+fn values_that_overflow_end_as_a_divergence() {
+    for pull in ["1e155", "1e200", "1e308"] {
+        let folder = temporary();
+        let motion = format!("roles[1].motion.per_step=[{pull},0.0]");
+        let run = ["run", "tension", "--out", "o", "--no-report", "--figures", "none", "--set", &motion];
+        let output =
+            flockform(&[&run[..], &["--set", "stop.divergence_ratio=1e300"]].concat(), folder.path());
+        assert_eq!(output.status.code(), Some(1), "{pull}: {}", text(&output.stdout));
+        assert!(text(&output.stdout).contains("diverged"), "{pull}: {}", text(&output.stdout));
+        let summary = std::fs::read_to_string(folder.path().join("o/summary.json")).expect("written");
+        let summary: serde_json::Value = serde_json::from_str(&summary).expect("JSON");
+        assert_eq!(summary["stop_reason"], "diverged", "{pull}");
+        assert!(summary["energies"]["pe1"].is_number(), "{pull}: {}", summary["energies"]);
+    }
+}
+
+#[test]
+fn control_characters_of_a_file_never_reach_the_terminal() {
+    let folder = temporary();
+    let path = folder.path().join("a\u{1b}[2Jb.toml");
+    let scene = flockform::scene::bundled("tension").expect("bundled").text;
+    let escape = "title = \"\\u001B]0;owned\\u0007 \\u009B2J \\u202Ekcab\"\nxtitle = ";
+    let quiet = ["--no-report", "--figures", "svg", "--out", "o", "--force"];
+    for text_of_scene in [scene.replacen("title = ", escape, 1), format!("\u{1b}[2J = 1\n{scene}")] {
+        std::fs::write(&path, text_of_scene.replace("xtitle", "notes")).expect("writable");
+        let name = path.file_name().expect("a name").to_str().expect("text");
+        for command in [&["run", name][..], &["plan", name]] {
+            let more: &[&str] = if command[0] == "run" { &quiet } else { &[] };
+            let output = flockform(&[command, more].concat(), folder.path());
+            let said = text(&output.stdout) + &text(&output.stderr);
+            assert!(!said.contains(['\u{1b}', '\u{7}', '\u{9b}', '\u{202e}']), "{command:?}: {said:?}");
+            assert!(said.len() > 20, "{command:?}: {said}");
+        }
+    }
+}
+
+#[test]
+fn a_radius_beyond_everything_is_refused_at_once() {
+    for sets in [
+        &["neighbours={kind=\"within\",radius=1e9}"][..],
+        &["neighbours={kind=\"within\",radius=300.0}", "body.shape={kind=\"grid\",columns=900,rows=900}"],
+        &["neighbours={kind=\"dynamic\",radius=1e9}", "body.shape={kind=\"grid\",columns=900,rows=900}"],
+    ] {
+        let begun = Instant::now();
+        let sets: Vec<&str> = sets.iter().flat_map(|set| ["--set", set]).collect();
+        let output =
+            flockform(&[&["plan", "tension"][..], &sets, &["--set", "frame=none"]].concat(), Path::new("."));
+        let said = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{sets:?}: {said}");
+        assert!(said.contains("neighbours") && said.contains("at most"), "{sets:?}: {said}");
+        assert!(begun.elapsed() < Duration::from_secs(20), "{sets:?}: {:?}", begun.elapsed());
+    }
+}

@@ -1,0 +1,214 @@
+//! Ctrl-C: whatever the program is doing, it ends within a second, and what it leaves is whole or not there.
+
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use crate::program::*;
+
+/// Longest time from the signal to the end. The program promises one second; a machine that has other things to do
+/// takes longer to let it.
+fn patience() -> Duration {
+    let load = std::fs::read_to_string("/proc/loadavg").unwrap_or_default();
+    let load: f64 = load.split_whitespace().next().and_then(|load| load.parse().ok()).unwrap_or(0.0);
+    let cores = std::thread::available_parallelism().map_or(1, usize::from) as f64;
+    Duration::from_secs_f64(1.0 + f64::max(0.0, load / cores - 0.5))
+}
+
+fn start(arguments: &[&str], folder: &Path) -> Child {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_flockform"));
+    command.args(arguments).current_dir(folder).env_remove("RUST_LOG");
+    command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("the program starts")
+}
+
+fn interrupt(child: &Child) {
+    let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill is there");
+    assert!(sent.success());
+}
+
+/// Waits until the program is busy: it has made its hidden folder, and some time has gone by.
+fn wait_until_busy(child: &mut Child, folder: &Path, busy: Duration) {
+    let begun = Instant::now();
+    while names(folder).is_empty() {
+        assert!(begun.elapsed() < Duration::from_secs(60), "it never began");
+        assert!(child.try_wait().expect("a child").is_none(), "it ended by itself");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    std::thread::sleep(busy);
+}
+
+fn names(folder: &Path) -> Vec<String> {
+    let name = |entry: std::fs::DirEntry| entry.file_name().to_string_lossy().into_owned();
+    let mut names: Vec<String> = std::fs::read_dir(folder).expect("readable").flatten().map(name).collect();
+    names.sort();
+    names
+}
+
+/// The exit code after an interrupt, and what is said; the end comes in time.
+fn ended(mut child: Child, what: &str) -> (Option<i32>, String) {
+    assert!(child.try_wait().expect("a child").is_none(), "{what}: it ended by itself");
+    let (since, patience) = (Instant::now(), patience());
+    interrupt(&child);
+    while child.try_wait().expect("a child").is_none() {
+        if since.elapsed() > patience {
+            child.kill().expect("kills");
+            panic!("{what}: not within {patience:?}");
+        }
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let output = child.wait_with_output().expect("ended");
+    (output.status.code(), text(&output.stderr))
+}
+
+/// A body of 62,500 particles under a rule without a fast path, and none of what asks to see every step.
+const LARGE: &str = r#"
+title = "Large"
+unit = "m"
+frame = "mirror"
+[lattice]
+kind = "square"
+spacing = 1.0
+[body]
+shape = { kind = "grid", columns = 250, rows = 250 }
+[rule]
+mean = { kind = "power", exponent = 2.0 }
+[neighbours]
+kind = "first"
+[[roles]]
+region = { kind = "edge", side = "left" }
+role = "clamped"
+[[roles]]
+region = { kind = "edge", side = "right" }
+role = "leader"
+motion = { kind = "velocity", per_step = [0.01, 0.0] }
+[stop]
+steps = 1000000
+"#;
+
+#[test]
+fn whatever_leaves_nothing_ends_at_once_and_leaves_nothing() {
+    let out = ["-q", "--out", "deep/er/o"];
+    let jobs: [&[&str]; 6] = [
+        &["compare", "cook", "--truth-error", "1e-7"],
+        &["trade", "grips"],
+        &["stability", "tension"],
+        &["gallery"],
+        // A solve, and the factorisation that nothing can be asked in the midst of.
+        &[
+            "run",
+            "beam-loaded",
+            "--set",
+            "lattice.spacing=0.03",
+            "--set",
+            "equilibrium={solver=\"direct\",tolerance=1e-10}",
+        ],
+        &[
+            "run",
+            "beam-loaded",
+            "--set",
+            "lattice.spacing=0.03",
+            "--set",
+            "equilibrium={solver=\"jacobi\",tolerance=1e-14}",
+        ],
+    ];
+    for job in jobs {
+        let folder = temporary();
+        let mut child = start(&[job, &out].concat(), folder.path());
+        wait_until_busy(&mut child, folder.path(), Duration::from_millis(400));
+        let (code, said) = ended(child, &format!("{job:?}"));
+        assert_eq!(code, Some(1), "{job:?}: {said}");
+        assert!(said.contains("interrupted"), "{job:?}: {said}");
+        assert!(names(folder.path()).is_empty(), "{job:?}: {:?}", files(folder.path()));
+    }
+}
+
+#[test]
+fn a_large_run_of_slow_steps_keeps_its_checkpoint_and_goes_on_from_it() {
+    let folder = temporary();
+    std::fs::write(folder.path().join("large.toml"), LARGE).expect("writable");
+    let quietly = ["-q", "--no-report", "--figures", "none"];
+    let mut child = start(&[&["run", "large.toml", "--out", "o"][..], &quietly].concat(), folder.path());
+    let begun = Instant::now();
+    while !folder.path().join(".o.partial").exists() {
+        assert!(begun.elapsed() < Duration::from_secs(60) && child.try_wait().expect("a child").is_none());
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    std::thread::sleep(Duration::from_millis(700));
+    let (code, said) = ended(child, "a large run");
+    assert_eq!(code, Some(1), "{said}");
+    assert!(said.contains("--resume"), "{said}");
+    assert_eq!(names(folder.path()), ["large.toml", "o.unfinished"]);
+    let resumed = start(&[&["run", "--resume", "o"][..], &quietly].concat(), folder.path());
+    std::thread::sleep(Duration::from_secs(2));
+    let (code, said) = ended(resumed, "the same run, resumed");
+    assert_eq!(code, Some(1), "{said}");
+    assert_eq!(names(folder.path()), ["large.toml", "o.unfinished"]);
+}
+
+#[test]
+fn increments_that_are_solved_before_an_interrupt_are_kept() {
+    let folder = temporary();
+    let steps = "load_steps={increments=20000}";
+    let mut child = start(&["run", "beam-loaded", "--out", "o", "--set", steps], folder.path());
+    wait_until_busy(&mut child, folder.path(), Duration::from_secs(3));
+    let (code, said) = ended(child, "increments");
+    assert_eq!(code, Some(1), "{said}");
+    let table = std::fs::read_to_string(folder.path().join("o/load.csv")).expect("kept");
+    assert!(table.lines().count() > 2, "{table}");
+}
+
+#[test]
+fn a_second_interrupt_ends_at_once() {
+    let folder = temporary();
+    let endless = ["--set", "stop.steps=100000000", "--set", "record={}"];
+    let mut child = start(&[&["run", "tension", "--out", "o"][..], &endless].concat(), folder.path());
+    wait_until_busy(&mut child, folder.path(), Duration::from_millis(300));
+    interrupt(&child);
+    interrupt(&child);
+    let (code, said) = ended_after(child);
+    assert_eq!(code, Some(1), "{said}");
+    let left = names(folder.path());
+    // Whichever came first: it was all written, or a part that can be resumed, or nothing.
+    assert!(left.is_empty() || left == ["o"] || left == ["o.unfinished"], "{left:?}");
+}
+
+/// The end of a program that has its signals already.
+fn ended_after(mut child: Child) -> (Option<i32>, String) {
+    let since = Instant::now();
+    while child.try_wait().expect("a child").is_none() {
+        assert!(since.elapsed() < patience(), "not in time");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let output = child.wait_with_output().expect("ended");
+    (output.status.code(), text(&output.stderr))
+}
+
+#[test]
+fn a_program_whose_words_nobody_reads_ends_too() {
+    let folder = temporary();
+    let mut child = start(&["stability", "tension", "-q", "--out", "o"], folder.path());
+    wait_until_busy(&mut child, folder.path(), Duration::from_millis(200));
+    drop(child.stderr.take());
+    let (code, _) = ended(child, "a closed pipe");
+    assert_eq!(code, Some(1));
+    assert!(names(folder.path()).is_empty());
+}
+
+#[test]
+fn figures_are_not_worth_waiting_for() {
+    let folder = temporary();
+    let every: Vec<String> = (0..1500).map(|n| n.to_string()).collect();
+    let figures = format!("record.figures=[{}]", every.join(","));
+    let run = ["run", "tension", "--out", "o", "--no-report", "--set", "stop.steps=1500", "--set", &figures];
+    let mut child = start(&run, folder.path());
+    let begun = Instant::now();
+    let first = folder.path().join(".o.partial/final.csv");
+    while !first.exists() {
+        assert!(begun.elapsed() < Duration::from_secs(60) && child.try_wait().expect("a child").is_none());
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let (code, said) = ended(child, "figures");
+    assert_eq!(code, Some(1), "{said}");
+    let left = names(folder.path());
+    assert!(left.is_empty() || folder.path().join("o/summary.json").is_file(), "{left:?}: {said}");
+}

@@ -1,0 +1,64 @@
+//! Checkpoints whose checksum is right and whose contents are anything.
+
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::time::Duration;
+
+use flockform::continuum::engine::Engine;
+use flockform::continuum::engine::state::{EngineState, digest};
+use flockform::continuum::plan::Plan;
+use flockform::continuum::record::{ProbeSeries, Snapshot};
+use flockform::continuum::run::{Watch, resume};
+use flockform::export::checkpoint::{self, Checkpoint, RunRequest};
+use flockform::scene::{Scene, bundled};
+
+use super::*;
+
+fn scene() -> Scene {
+    bundled("tension").expect("bundled").load(&["stop.steps=40".to_owned()]).expect("valid")
+}
+
+fn good(folder: &Path) -> Vec<u8> {
+    let scene = scene();
+    let plan = Plan::new(&scene).expect("fits");
+    let sum = digest(&plan);
+    let mut engine = Engine::new(plan);
+    let mut probe = ProbeSeries::new(66);
+    for _ in 0..25 {
+        engine.advance();
+        probe.record(&engine);
+    }
+    let asked = RunRequest { scene: "tension".into(), set: Vec::new(), force: false };
+    let (snapshots, probes) = ([Snapshot::of(&engine)], [probe]);
+    let kept = (&snapshots[..], &probes[..], &[][..], None);
+    let state = (EngineState::of(&engine), 0.5);
+    Checkpoint::new((&asked, &scene, sum), state, kept, Duration::ZERO).write(folder).expect("written");
+    std::fs::read(folder.join(checkpoint::FILE)).expect("there")
+}
+
+#[test]
+fn a_damaged_checkpoint_is_gone_on_from_or_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let whole = good(folder.path());
+    let path = folder.path().join(checkpoint::FILE);
+    let (scene, before) = (scene(), peak());
+    fuzz(&damage(), |damage| {
+        // Behind the header, which says the length and the checksum of what follows.
+        let payload = damaged(&whole[24..], &damage);
+        let mut bytes = whole[..12].to_vec();
+        bytes.extend((payload.len() as u64).to_le_bytes());
+        bytes.extend(crc32fast::hash(&payload).to_le_bytes());
+        bytes.extend(payload);
+        std::fs::write(&path, bytes).expect("writable");
+        let Ok(Some(read)) = Checkpoint::read(folder.path()) else { return };
+        let plan = Plan::new(&scene).expect("fits");
+        if read.require_of(folder.path(), &scene, digest(&plan)).is_err() {
+            return;
+        }
+        let watch = Watch { next: &|step| step + 1, see: &mut |_, _| ControlFlow::Continue(()) };
+        let _ = resume(plan, read.engine, read.residual, watch);
+    });
+    if let (Some(before), Some(after)) = (before, peak()) {
+        assert!(after < before + 600_000, "{before} kB, and {after} kB afterwards");
+    }
+}

@@ -1,0 +1,88 @@
+//! What is left in shared memory and in iceoryx2's folders after a clean end, and whether two users get along.
+
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use super::support::domain_name;
+
+/// Files of a domain, wherever iceoryx2 keeps some.
+fn files(prefix: &str) -> Vec<PathBuf> {
+    let mut open = vec![PathBuf::from("/dev/shm"), PathBuf::from("/tmp/iceoryx2")];
+    let mut found = Vec::new();
+    while let Some(folder) = open.pop() {
+        for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+            if entry.file_name().to_string_lossy().starts_with(prefix) {
+                found.push(entry.path());
+            }
+            if entry.file_type().is_ok_and(|kind| kind.is_dir()) {
+                open.push(entry.path());
+            }
+        }
+    }
+    found
+}
+
+fn publish(folder: &Path, user: Option<&str>, domain: Option<&str>) -> Command {
+    let run = ["run", "tension", "--publish", "here", "-q", "--no-report", "--figures", "none", "--out", "o"];
+    let program = env!("CARGO_BIN_EXE_flockform");
+    let mut command = match user {
+        None => Command::new(program),
+        Some(user) => {
+            let mut command = Command::new("setpriv");
+            let ids = [format!("--reuid={user}"), format!("--regid={user}"), "--clear-groups".to_owned()];
+            command.args(ids).arg(program);
+            command
+        }
+    };
+    command.args(run).current_dir(folder).env_remove("FLOCKFORM_SHM_DOMAIN");
+    if let Some(domain) = domain {
+        command.env("FLOCKFORM_SHM_DOMAIN", domain);
+    }
+    command
+}
+
+#[test]
+fn a_clean_end_leaves_nothing_behind() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let domain = domain_name();
+    let output = publish(folder.path(), None, Some(&domain)).output().expect("the program starts");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert_eq!(files(&format!("{domain}_")), Vec::<PathBuf>::new());
+}
+
+/// Ends with its test.
+struct Ends(Child);
+
+impl Drop for Ends {
+    fn drop(&mut self) {
+        let _ = Command::new("kill").args(["-INT", &self.0.id().to_string()]).status();
+        let _ = self.0.wait();
+    }
+}
+
+#[test]
+#[ignore = "becomes another user, which takes root"]
+fn two_users_of_one_computer_both_run() {
+    let own = Command::new(env!("CARGO_BIN_EXE_flockform"))
+        .args(["robots", "square", "--transport", "shm"])
+        .env_remove("FLOCKFORM_SHM_DOMAIN")
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("the program starts");
+    let _own = Ends(own);
+    let begun = Instant::now();
+    while files("iox2_").is_empty() {
+        assert!(begun.elapsed() < Duration::from_secs(30), "it never began");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        std::fs::set_permissions(folder.path(), std::fs::Permissions::from_mode(0o777)).expect("ours");
+    }
+    let output = publish(folder.path(), Some("65534"), None).output().expect("setpriv is there");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert_eq!(files("u65534_"), Vec::<PathBuf>::new());
+}
