@@ -2,7 +2,7 @@
 
 use crate::scene::SceneError;
 use crate::scene::swarm::Swarm;
-use crate::scene::swarm::raw::{RawLimits, RawModel, RawObstacle};
+use crate::scene::swarm::raw::{RawFlight, RawLimits, RawModel, RawObstacle};
 use crate::swarm::formation::Formation;
 use crate::swarm::safety::{Filter, Limits, Obstacle, Obstacles, Place, SafetyError};
 use crate::swarm::watch::WatchLimits;
@@ -63,9 +63,11 @@ pub fn watch(swarm: &Swarm, formation: &Formation, speed: f64) -> WatchLimits {
 }
 
 /// What the filter holds members to, as the file says.
-fn limits(raw: &RawLimits, model: &RawModel) -> Limits {
+fn limits(raw: &RawLimits, flight: &RawFlight) -> Limits {
     Limits {
-        brakes: matches!(model, RawModel::DoubleIntegrator),
+        brakes: matches!(flight.model, RawModel::DoubleIntegrator),
+        arrives: matches!(flight.model, RawModel::Ideal),
+        deviation: flight.noise,
         speed: raw.speed.unwrap_or(f64::INFINITY),
         acceleration: raw.acceleration.unwrap_or(f64::INFINITY),
         keeps_apart: raw.clearance.is_some(),
@@ -76,7 +78,7 @@ fn limits(raw: &RawLimits, model: &RawModel) -> Limits {
 }
 
 pub fn filter(swarm: &Swarm, formation: &Formation) -> Result<Filter, SceneError> {
-    let limits = limits(&swarm.raw.limits, &swarm.raw.flight.model);
+    let limits = limits(&swarm.raw.limits, &swarm.raw.flight);
     let obstacles: Vec<Obstacle> = swarm
         .raw
         .obstacles

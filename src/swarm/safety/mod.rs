@@ -40,6 +40,7 @@
 //! It is a filter, not a planner: it goes around what is convex and may wait or wander before what is not.
 //! A member whose goal lies inside a solid circles it: keep targets out of solids.
 
+mod braking;
 mod cell;
 mod clearance;
 mod deadlock;
