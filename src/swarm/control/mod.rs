@@ -11,8 +11,8 @@ use serde::{Deserialize, Serialize};
 
 use super::formation::{Formation, KeptLead, Measures, Seen};
 use super::resilience::trim;
-use super::safety::{self, Filter, Flags, Limits, SafetyError};
 use super::robots::DoubleIntegrator;
+use super::safety::{self, Filter, Flags, Limits, SafetyError};
 use super::watch::{Gains, Health, Pose, Rejection, Track, Watch};
 use crate::flock::manoeuvre::Manoeuvre;
 use crate::flock::vectors::{Vectors, distance};
@@ -307,7 +307,7 @@ impl Control {
         }
         let active = self.mode != Mode::Inactive;
         self.follow_tracks(now);
-        let Self { present, velocity, ages, usable: known, tracked, .. } = &*self;
+        let Self { present, velocity, ages, usable: known, tracked, .. } = self;
         let seen = if self.tracks.is_empty() {
             safety::Seen { present, known, ages, velocity: Some(velocity), strays: None }
         } else {

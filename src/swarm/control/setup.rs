@@ -46,7 +46,7 @@ pub fn check_commands(swarm: &Swarm, formation: &Formation) -> Result<(), SceneE
     }
 }
 
-/// Which poses are believed; nobody is taken for faster than ten times the speed limit unless the file says so.
+/// Which poses are believed; no robot is taken for faster than the speed limit unless the file says so.
 pub fn watch(swarm: &Swarm, formation: &Formation, speed: f64) -> WatchLimits {
     let (poses, period) = (&swarm.raw.poses, swarm.raw.control.period);
     WatchLimits {
@@ -55,7 +55,7 @@ pub fn watch(swarm: &Swarm, formation: &Formation, speed: f64) -> WatchLimits {
         stop_after: poses.stop_after,
         centre: formation.middle(),
         range: poses.range,
-        jump_speed: poses.jump_speed.unwrap_or(10.0 * speed),
+        jump_speed: poses.jump_speed.unwrap_or(speed),
         recover: poses.recover as u32,
         period: Some(period),
         ..WatchLimits::default()

@@ -66,7 +66,8 @@ impl Filter {
         let end = rest(next);
         if holds(end) {
             // To the last bit the goal, where nothing but the goal bounds the step.
-            let arrives = next == wanted && length([end[0] - goal[0], end[1] - goal[1]]) <= 1e-12 * length(goal);
+            let arrives =
+                next == wanted && length([end[0] - goal[0], end[1] - goal[1]]) <= 1e-12 * length(goal);
             return if arrives && holds(goal) { goal } else { end };
         }
         flags.0 |= Flags::ACCELERATION_LIMITED;

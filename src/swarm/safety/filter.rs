@@ -158,11 +158,12 @@ impl Filter {
         }
     }
 
-    /// Cuts the way from the last target to this one, where the member is at the last one but seen where it was
-    /// before: the step from where it is seen is not the step it makes.
+    /// Cuts the way from the last target to this one, where the member is at the last one but seen elsewhere, late or
+    /// through noise: the step from where it is seen is not the step it makes. Both ends lie in the cell that its true
+    /// place has, which is convex, so the end of the shorter way does too.
     fn within_speed(&self, seen: &Seen, target: [f64; 2], period: f64, member: usize) -> [f64; 2] {
         let last = self.sent.get(member);
-        let is_late = seen.ages[member] > (1.0 - TOUCHING) * period;
+        let is_late = seen.ages[member] > (1.0 - TOUCHING) * period || self.limits.deviation > 0.0;
         if !self.limits.arrives || !is_late || !seen.known[member] || !last.iter().all(|x| x.is_finite()) {
             return target;
         }

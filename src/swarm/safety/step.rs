@@ -124,10 +124,7 @@ impl Filter {
         for k in 0..self.crowd.found.len() {
             let other = self.crowd.found[k] as usize;
             let stray = drift + self.drift(seen, other);
-            let keep = self.radii[member] + self.radii[other] + self.limits.clearance;
-            // Noise pushes apart those that are seen where they are; of old poses it is one more reason to wait.
-            let (keep, stray) =
-                if stray > 0.0 { (keep, stray + 2.0 * margin) } else { (keep + 2.0 * margin, stray) };
+            let keep = self.radii[member] + self.radii[other] + self.limits.clearance + 2.0 * margin;
             // Two at the very same place part: the lower number to the left.
             let aside = if member < other { [1.0, 0.0] } else { [-1.0, 0.0] };
             let there = seen.present.get(other);
@@ -238,7 +235,11 @@ impl Filter {
         let solids = &self.cell.planes[origins.obstacles..origins.fence];
         let disc = (self.radii[member] + self.limits.clearance) * (1.0 - CAST_TOLERANCE);
         // A member that brakes does not go straight.
-        if !self.crowd.rest.is_empty() || solids.is_empty() || disc <= 0.0 || solids.iter().any(|plane| plane.offset < 0.0) {
+        if !self.crowd.rest.is_empty()
+            || solids.is_empty()
+            || disc <= 0.0
+            || solids.iter().any(|plane| plane.offset < 0.0)
+        {
             return step;
         }
         let share = self.obstacles.free_way(here, [here[0] + step[0], here[1] + step[1]], disc);

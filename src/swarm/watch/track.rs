@@ -102,7 +102,14 @@ impl Track {
 
     /// How far the place where the robot of [`Track::at`] comes to rest may be from where it will, at three deviations
     /// of its velocity \[m\].
-    pub fn stray(&self, robot: &Robot, now: f64, dynamics: &DoubleIntegrator, gains: &Gains, period: f64) -> f64 {
+    pub fn stray(
+        &self,
+        robot: &Robot,
+        now: f64,
+        dynamics: &DoubleIntegrator,
+        gains: &Gains,
+        period: f64,
+    ) -> f64 {
         let speed = robot.velocity[0].hypot(robot.velocity[1]);
         let age = self.stamp.map_or(0.0, |stamp| (now - stamp).max(0.0));
         3.0 * (speed / dynamics.acceleration + period + age) * gains.velocity_deviation
