@@ -114,12 +114,14 @@ impl Filter {
 
     fn build_cell(&mut self, seen: &Seen, reach: f64, member: usize) -> Origins {
         self.cell.planes.clear();
+        let noise = seen.strays.map_or(0.0, |strays| strays[member]);
+        // Borders that come within reach once the noise is taken off count too.
+        let reach = reach + noise;
         self.find(seen, reach, member);
         let here = seen.present.get(member);
         let drift = self.drift(seen, member);
         let margin = self.limits.margin();
         let brakes = !self.crowd.rest.is_empty();
-        let noise = seen.strays.map_or(0.0, |strays| strays[member]);
         let rest = if brakes { self.crowd.rest[member] } else { here };
         for k in 0..self.crowd.found.len() {
             let other = self.crowd.found[k] as usize;

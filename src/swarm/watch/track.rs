@@ -14,7 +14,7 @@ use crate::flock::vectors::distance;
 use crate::swarm::robots::{DoubleIntegrator, Model, Robot};
 
 /// Deviation of what pushes a robot away from its model, in units of its acceleration limit \[1\].
-const PUSHED: f64 = 0.25;
+const PUSHED: f64 = 0.5;
 
 /// How much of a pose's surprise goes into the state, and what is left of its noise.
 #[derive(Clone, Copy, Debug, PartialEq)]
