@@ -138,7 +138,7 @@ fn fly_all(series: &Series, seed: u64, flights: usize) -> Outcome {
     let Series { model, delay, noise } = series;
     println!("{model}, {delay} late, {noise} m noise, {flights} flights: {outcome:?}");
     // Robots that stand still keep every clearance.
-    assert!(moved > 0.5 * flights as f64, "{moved} m in {flights} flights");
+    assert!(moved > 0.2 * flights as f64, "{moved} m in {flights} flights");
     outcome
 }
 

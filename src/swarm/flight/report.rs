@@ -180,7 +180,7 @@ fn verdicts(swarm: &Swarm, report: &FlightReport, record: &Record, names: &[Stri
     let farthest = |which: usize| record.farthest.iter().filter_map(move |all| all[which]);
     let largest = |which| farthest(which).max_by(|a, b| a.value.total_cmp(&b.value));
     // What kept the formation from being settled.
-    let unsettled = farthest(shape).filter(|one| one.value > bounds.settled_within).last();
+    let unsettled = farthest(shape).rfind(|one| one.value > bounds.settled_within);
     let all = [
         at_most(
             "affine_error",
@@ -188,7 +188,7 @@ fn verdicts(swarm: &Swarm, report: &FlightReport, record: &Record, names: &[Stri
             report.affine_error.map(|[most, _]| most),
             largest(affine),
         ),
-        at_most("final_error", bounds.final_error, last, farthest(shape).last()),
+        at_most("final_error", bounds.final_error, last, farthest(shape).next_back()),
         at_most("settling_time", bounds.settling_time, report.settling_time, unsettled),
         at_most("continuum_error", bounds.continuum_error, report.continuum_error, largest(continuum)),
         bounds.clearance.map(|declared| Verdict {
