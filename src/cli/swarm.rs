@@ -146,7 +146,8 @@ fn words(report: &FlightReport, seconds: f64, kept: &Path) -> String {
         },
     );
     if let Some(clearance) = report.clearance {
-        line("clearance", format!("smallest {clearance:.4} m"));
+        let closest = report.closest.as_ref().map_or(String::new(), |moment| format!(": {moment}"));
+        line("clearance", format!("smallest {clearance:.4} m{closest}"));
     }
     line("way", format!("mean {:.2} m, longest {:.2} m", report.way[0], report.way[1]));
     line("PE1", format!("largest {:.4e} m^2, at the end {:.4e} m^2", report.pe1[0], report.pe1[1]));
@@ -156,8 +157,10 @@ fn words(report: &FlightReport, seconds: f64, kept: &Path) -> String {
     }
     for verdict in &report.bounds {
         let found = verdict.found.map_or("not measured".into(), |found| format!("{found:.4e}"));
+        let worst = verdict.worst.as_ref().filter(|_| !verdict.holds);
+        let worst = worst.map_or(String::new(), |moment| format!(", by {moment}"));
         let word = if verdict.holds { "holds" } else { "BROKEN" };
-        line(verdict.bound, format!("{word}: declared {}, found {found}", verdict.declared));
+        line(verdict.bound, format!("{word}: declared {}, found {found}{worst}", verdict.declared));
     }
     words + &format!("results in {}\n", kept.display())
 }

@@ -12,7 +12,7 @@ use super::figures::chart::{Axis, Chart, Series, Style, draw_below_each_other};
 use super::figures::{self, SERIES, flight_map};
 use super::{OutputFolder, summary};
 use crate::scene::swarm::Swarm;
-use crate::swarm::flight::{FlightReport, Record, Sample};
+use crate::swarm::flight::{FlightReport, Record, Sample, Verdict};
 
 #[derive(Serialize)]
 struct Report<'a> {
@@ -64,7 +64,10 @@ pub fn write_flight(
     Ok(written)
 }
 
-/// Shape and clearance against time.
+/// Of the lines of declared bounds.
+const BOUND: &str = "#444444";
+
+/// Shape and clearance against time, with what is declared of them.
 pub(super) fn charts<'a>(record: &Record, report: &FlightReport) -> Vec<Chart<'a>> {
     let series = |name: &str, colour, of: &dyn Fn(&Sample) -> Option<f64>| {
         let points = record.samples.iter().filter_map(|s| of(s).map(|value| [s.time, value])).collect();
@@ -77,6 +80,17 @@ pub(super) fn charts<'a>(record: &Record, report: &FlightReport) -> Vec<Chart<'a
         series("from the continuum run", SERIES[2], &|s| s.continuum_error),
     ];
     let clearance = series("", SERIES[4], &|s| s.clearance.is_finite().then_some(s.clearance));
+    let end = record.samples.last().map_or(0.0, |sample| sample.time);
+    let declared = |bounds: &[&str]| -> Vec<Series> {
+        let those = report.bounds.iter().filter(|verdict| bounds.contains(&verdict.bound));
+        let line = |verdict: &Verdict| Series {
+            name: format!("declared {}", verdict.bound.replace('_', " ")),
+            colour: BOUND,
+            style: Style::Line,
+            points: vec![[0.0, verdict.declared], [end, verdict.declared]],
+        };
+        those.map(line).collect()
+    };
     let mut charts = Vec::new();
     // An ideal flight has errors of rounding, which no axis in metres would show.
     let visible = |s: &Series| s.points.iter().any(|point| point[1] > 0.0);
@@ -85,7 +99,11 @@ pub(super) fn charts<'a>(record: &Record, report: &FlightReport) -> Vec<Chart<'a
             title: report.title.clone(),
             note: "largest distance of a robot from its place".into(),
             axes: [time, Axis { quantity: "distance", unit: "m", is_log: true }],
-            series: shape.into_iter().filter(visible).collect(),
+            series: shape
+                .into_iter()
+                .chain(declared(&["affine_error", "final_error", "continuum_error"]))
+                .filter(visible)
+                .collect(),
             landmarks: Vec::new(),
         });
     }
@@ -94,7 +112,7 @@ pub(super) fn charts<'a>(record: &Record, report: &FlightReport) -> Vec<Chart<'a
             title: "Smallest free space".into(),
             note: "between two robots' rims, or a rim and an obstacle".into(),
             axes: [time, Axis { quantity: "clearance", unit: "m", is_log: false }],
-            series: vec![clearance],
+            series: [vec![clearance], declared(&["clearance"])].concat(),
             landmarks: Vec::new(),
         });
     }

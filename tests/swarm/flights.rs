@@ -119,3 +119,45 @@ fn a_square_led_all_around_settles_at_its_rate_and_late_poses_only_slow_it() {
         assert!((found - rate).abs() < 1e-6, "delay {delay}: {found}, not {rate}");
     }
 }
+
+/// Two robots that nothing keeps apart change places head on, half a metre beside each other.
+const HEAD_ON: &str = "title = \"head on\"\nradius = 0.1\n\
+    [[robots]]\nname = \"left\"\nplace = [-2.0, 0.0]\n[[robots]]\nname = \"right\"\nplace = [2.0, 0.5]\n\
+    [[robots]]\nname = \"far\"\nplace = [0.0, 9.0]\n[links]\nkind = \"nearest\"\ncount = 1\n\
+    [[leaders]]\nrobots = [\"left\"]\nprogram = { kind = \"path\", points = [{ at = 4.0, displacement = [4.0, 0.0] }] }\n\
+    [[leaders]]\nrobots = [\"right\"]\nprogram = { kind = \"path\", points = [{ at = 4.0, displacement = [-4.0, 0.0] }] }\n\
+    [[leaders]]\nrobots = [\"far\"]\nprogram = { kind = \"path\", points = [{ at = 4.0, displacement = [0.0, 1.0] }] }\n\
+    [flight]\nduration = 5.0\n[flight.bounds]\nclearance = 0.4\n";
+
+#[test]
+fn a_broken_bound_names_the_robots_the_time_and_the_place() {
+    let swarm = parse(HEAD_ON).expect("valid");
+    let (record, report) = flown(&swarm);
+    assert!(!report.holds());
+    let [verdict] = &report.bounds[..] else { panic!("{:?}", report.bounds) };
+    let moment = verdict.worst.as_ref().expect("it was measured");
+    assert_eq!(report.closest.as_ref(), Some(moment));
+    assert_eq!(moment.robots, ["left", "right"]);
+    // They pass each other half way, at half time, within the period.
+    assert!((moment.time - 2.0).abs() <= 0.051, "{moment:?}");
+    assert!(moment.x.abs() < 0.1 && (moment.y - 0.25).abs() < 1e-9, "{moment:?}");
+    assert!((report.clearance.expect("others") - 0.3).abs() < 1e-9, "{:?}", report.clearance);
+    let words = verdict.complaint().expect("broken");
+    assert!(words.contains("left and right at 2.") && words.contains("near ("), "{words}");
+    let json = serde_json::json!(report);
+    assert_eq!(json["bounds"][0]["worst"]["robots"][1], "right");
+    assert_eq!(json["closest"]["time"], moment.time);
+
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = flockform::export::OutputFolder::create(&folder.path().join("out"), false).expect("new");
+    flockform::export::flight::write_flight(&out, &swarm, &record, &report).expect("written");
+    let figure = std::fs::read_to_string(out.path("errors.svg")).expect("the figure");
+    assert!(figure.contains("declared clearance"), "the bound has a line in the chart");
+    let recorder = flockform::export::report::FlightRecorder::new(&Flight::new(&swarm).expect("flies"));
+    let stage = recorder.stage(&swarm, &report);
+    let page =
+        flockform::export::report::flight::write(&out, &swarm, &record, &report, stage).expect("written");
+    let html = std::fs::read_to_string(page).expect("the page");
+    let button = format!("<button type=\"button\" data-seek=\"{}\">", moment.time);
+    assert!(html.contains(&button), "a click leads to the moment");
+}

@@ -148,7 +148,7 @@ impl Swarm {
             self.wanted.set(robot, [x + led, y]);
         }
         if filtered {
-            let seen = Seen { present, known: &self.members, ages: &self.ages, velocity: None };
+            let seen = Seen { present, known: &self.members, ages: &self.ages, velocity: None, strays: None };
             self.filter.apply(&seen, &self.wanted, PERIOD, &mut self.safe, &mut self.flags);
             black_box(&self.safe);
         }

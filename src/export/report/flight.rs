@@ -156,6 +156,7 @@ pub fn write(
         title: swarm.raw.title.clone(),
         command: format!("flockform swarm {}", swarm.name),
         verdict,
+        moments: moments(report),
         note: note(&stage.animation, report),
         stages: vec![stage],
         plots,
@@ -164,6 +165,13 @@ pub fn write(
         texts: texts(swarm),
     };
     page.write(folder)
+}
+
+/// What broke each bound, and how close robots came.
+fn moments(report: &FlightReport) -> Vec<(String, f64)> {
+    let broken =
+        report.bounds.iter().filter_map(|verdict| Some((verdict.complaint()?, verdict.worst.as_ref()?.time)));
+    broken.collect()
 }
 
 fn note(animation: &Animation, report: &FlightReport) -> String {
@@ -198,7 +206,8 @@ fn facts(report: &FlightReport) -> Vec<(String, String)> {
     };
     fact("Settling time", settled);
     if let Some(clearance) = report.clearance {
-        fact("Smallest clearance", format!("{} m", number(clearance)));
+        let closest = report.closest.as_ref().map_or(String::new(), |moment| format!(": {moment}"));
+        fact("Smallest clearance", format!("{} m{closest}", number(clearance)));
     }
     fact("Way", format!("mean {} m, longest {} m", number(report.way[0]), number(report.way[1])));
     if report.most_lost > 0 {

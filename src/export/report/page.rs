@@ -46,6 +46,8 @@ pub struct Page {
     pub command: String,
     /// How it ended, and whether that is as it should be.
     pub verdict: Option<(bool, String)>,
+    /// What a click takes the animation's clock to, in words, and the clock's value.
+    pub moments: Vec<(String, f64)>,
     /// Bodies on the move; several stand beside each other and share one clock.
     pub stages: Vec<View>,
     /// The frames that are shown, and those that are left out.
@@ -110,7 +112,13 @@ impl Page {
     fn verdict_html(&self) -> String {
         let Some((holds, words)) = &self.verdict else { return String::new() };
         let class = if *holds { "good" } else { "bad" };
-        format!("<p class=\"verdict {class}\">{}</p>", escaped(words))
+        let moment = |(words, time): &(String, f64)| {
+            format!("<li><button type=\"button\" data-seek=\"{time}\">{}</button></li>", escaped(words))
+        };
+        let moments: String = self.moments.iter().map(moment).collect();
+        let moments =
+            if moments.is_empty() { moments } else { format!("<ul class=\"moments\">{moments}</ul>") };
+        format!("<p class=\"verdict {class}\">{}</p>{moments}", escaped(words))
     }
 
     fn facts_html(&self) -> String {

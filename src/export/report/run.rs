@@ -317,6 +317,7 @@ pub fn write(
         title: scene.raw.title.clone(),
         command: format!("flockform run {}", scene.name),
         verdict: Some(verdict(outcome)),
+        moments: Vec::new(),
         note: note(&stage.animation, outcome, is_solved_at_once(scene, outcome)),
         stages: vec![stage],
         plots,

@@ -11,8 +11,9 @@ use serde::{Deserialize, Serialize};
 
 use super::formation::{Formation, KeptLead, Measures, Seen};
 use super::resilience::trim;
+use super::robots::DoubleIntegrator;
 use super::safety::{self, Filter, Flags, Limits, SafetyError};
-use super::watch::{Health, Pose, Rejection, Watch};
+use super::watch::{Gains, Health, Pose, Rejection, Track, Watch};
 use crate::flock::manoeuvre::Manoeuvre;
 use crate::flock::vectors::{Vectors, distance};
 use crate::scene::SceneError;
@@ -47,12 +48,25 @@ pub struct KeptControl {
     leads: Vec<Option<KeptLead>>,
 }
 
+/// What the filter goes by where there are tracks.
+#[derive(Clone)]
+struct Tracked {
+    present: Vectors,
+    velocity: Vectors,
+    ages: Vec<f64>,
+    strays: Vec<f64>,
+}
+
 /// The loop's state. Members by number, positions in \[m\], world frame, times in \[s\].
 #[derive(Clone)]
 pub struct Control {
     formation: Formation,
     watch: Watch,
     filter: Filter,
+    /// Of members that take time to brake: where they are by now. Empty for others.
+    tracks: Vec<Track>,
+    /// Whose targets reach their robots from here.
+    serves: Vec<bool>,
     /// Liars tolerated among a member's neighbours.
     max_faulty: usize,
     sweeps: usize,
@@ -80,6 +94,7 @@ pub struct Control {
     safe: Vectors,
     /// Where members hold in an emergency stop.
     held: Vec<Option<[f64; 2]>>,
+    tracked: Tracked,
     filtered: Vec<Flags>,
     flags: Vec<u32>,
     rejected: Vec<bool>,
@@ -95,8 +110,11 @@ impl Control {
         let max_faulty = setup::max_faulty(swarm, &formation)?;
         let filter = setup::filter(swarm, &formation)?;
         let watch = setup::watch(swarm, &formation, filter.limits().speed);
+        let brakes = filter.limits().brakes && filter.limits().acceleration.is_finite();
         Ok(Self {
             watch: Watch::new(count, watch),
+            tracks: vec![Track::default(); if brakes { count } else { 0 }],
+            serves: vec![true; count],
             filter,
             max_faulty,
             sweeps: swarm.raw.control.sweeps,
@@ -117,6 +135,12 @@ impl Control {
             wanted: formation.places.clone(),
             safe: formation.places.clone(),
             held: vec![None; count],
+            tracked: Tracked {
+                present: formation.places.clone(),
+                velocity: Vectors::zeros(count),
+                ages: vec![0.0; count],
+                strays: vec![0.0; count],
+            },
             filtered: vec![Flags::default(); count],
             flags: vec![0; count],
             rejected: vec![false; count],
@@ -128,6 +152,12 @@ impl Control {
     pub fn listen_to(&mut self, members: &[usize]) {
         self.listens.fill(false);
         members.iter().for_each(|&member| self.listens[member] = true);
+    }
+
+    /// Sends targets to these members alone: what others do is not known from here.
+    pub fn serve(&mut self, members: &[usize]) {
+        self.serves.fill(false);
+        members.iter().for_each(|&member| self.serves[member] = true);
     }
 
     pub fn formation(&self) -> &Formation {
@@ -182,7 +212,17 @@ impl Control {
             (Ok(()), _) => self.velocity.set(member, [0.0; 2]),
             (Err(_), _) => self.rejected[member] = true,
         }
+        let (dynamics, deviation) = (self.dynamics(), self.filter.limits().deviation);
+        if let (Ok(()), Some(track)) = (&verdict, self.tracks.get_mut(member)) {
+            track.correct(&pose, &dynamics, self.period, deviation);
+        }
         verdict
+    }
+
+    /// How members that take time to brake move.
+    fn dynamics(&self) -> DoubleIntegrator {
+        let Limits { speed, acceleration, .. } = *self.filter.limits();
+        DoubleIntegrator { speed, acceleration }
     }
 
     /// Gives a leader that is moved from outside its next place \[m\]; false if it is not one, or the place lies
@@ -266,13 +306,19 @@ impl Control {
             Mode::Running => self.follow(),
         }
         let active = self.mode != Mode::Inactive;
-        let seen = safety::Seen {
-            present: &self.present,
-            known: &self.usable,
-            ages: &self.ages,
-            velocity: Some(&self.velocity),
+        self.follow_tracks(now);
+        let Self { present, velocity, ages, usable: known, tracked, .. } = self;
+        let seen = if self.tracks.is_empty() {
+            safety::Seen { present, known, ages, velocity: Some(velocity), strays: None }
+        } else {
+            let Tracked { present, velocity, ages, strays } = tracked;
+            safety::Seen { present, known, ages, velocity: Some(velocity), strays: Some(strays) }
         };
         self.filter.apply(&seen, &self.wanted, self.period, &mut self.safe, &mut self.filtered);
+        for member in 0..self.tracks.len() {
+            let target = self.target(member);
+            self.tracks[member].send(now, target);
+        }
         for (member, flags) in self.flags.iter_mut().enumerate() {
             if active && self.usable[member] {
                 *flags |= self.filtered[member].0;
@@ -294,6 +340,29 @@ impl Control {
             let age = self.watch.age(member, now).unwrap_or(0.0);
             self.ages[member] = age.min(self.watch.limits().age_limit);
             self.present.set(member, last.map_or([f64::NAN; 2], |pose| pose.position));
+        }
+    }
+
+    /// Where members that take time to brake are by now. A member of another node moves by targets that are not
+    /// known here, one that is lost by none that can be relied on: their places are as old as they are, and their
+    /// velocities older.
+    fn follow_tracks(&mut self, now: f64) {
+        let dynamics = self.dynamics();
+        let gains = Gains::of(dynamics.acceleration, self.period, self.filter.limits().deviation);
+        let Tracked { present, velocity, ages, strays } = &mut self.tracked;
+        for (member, track) in self.tracks.iter().enumerate() {
+            if self.serves[member] && self.usable[member] {
+                let robot = track.at(now, &dynamics);
+                present.set(member, robot.position);
+                velocity.set(member, robot.velocity);
+                ages[member] = 0.0;
+                strays[member] = track.stray(&robot, now, &dynamics, &gains, self.period);
+            } else {
+                present.set(member, self.present.get(member));
+                velocity.set(member, self.velocity.get(member));
+                ages[member] = 2.0 * self.ages[member] + self.period;
+                strays[member] = 0.0;
+            }
         }
     }
 

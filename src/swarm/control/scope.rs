@@ -40,6 +40,7 @@ impl NodeScope {
             }
         };
         control.listen_to(&part.heard);
+        control.serve(&part.mine);
         Ok(part)
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::scene::SceneError;
 use crate::scene::swarm::Swarm;
-use crate::scene::swarm::raw::{RawLimits, RawModel, RawObstacle};
+use crate::scene::swarm::raw::{RawFlight, RawLimits, RawModel, RawObstacle};
 use crate::swarm::formation::Formation;
 use crate::swarm::safety::{Filter, Limits, Obstacle, Obstacles, Place, SafetyError};
 use crate::swarm::watch::WatchLimits;
@@ -46,7 +46,7 @@ pub fn check_commands(swarm: &Swarm, formation: &Formation) -> Result<(), SceneE
     }
 }
 
-/// Which poses are believed; nobody is taken for faster than ten times the speed limit unless the file says so.
+/// Which poses are believed; no robot is taken for faster than the speed limit unless the file says so.
 pub fn watch(swarm: &Swarm, formation: &Formation, speed: f64) -> WatchLimits {
     let (poses, period) = (&swarm.raw.poses, swarm.raw.control.period);
     WatchLimits {
@@ -55,7 +55,7 @@ pub fn watch(swarm: &Swarm, formation: &Formation, speed: f64) -> WatchLimits {
         stop_after: poses.stop_after,
         centre: formation.middle(),
         range: poses.range,
-        jump_speed: poses.jump_speed.unwrap_or(10.0 * speed),
+        jump_speed: poses.jump_speed.unwrap_or(speed),
         recover: poses.recover as u32,
         period: Some(period),
         ..WatchLimits::default()
@@ -63,9 +63,11 @@ pub fn watch(swarm: &Swarm, formation: &Formation, speed: f64) -> WatchLimits {
 }
 
 /// What the filter holds members to, as the file says.
-fn limits(raw: &RawLimits, model: &RawModel) -> Limits {
+fn limits(raw: &RawLimits, flight: &RawFlight) -> Limits {
     Limits {
-        brakes: matches!(model, RawModel::DoubleIntegrator),
+        brakes: matches!(flight.model, RawModel::DoubleIntegrator),
+        arrives: matches!(flight.model, RawModel::Ideal),
+        deviation: flight.noise,
         speed: raw.speed.unwrap_or(f64::INFINITY),
         acceleration: raw.acceleration.unwrap_or(f64::INFINITY),
         keeps_apart: raw.clearance.is_some(),
@@ -76,7 +78,7 @@ fn limits(raw: &RawLimits, model: &RawModel) -> Limits {
 }
 
 pub fn filter(swarm: &Swarm, formation: &Formation) -> Result<Filter, SceneError> {
-    let limits = limits(&swarm.raw.limits, &swarm.raw.flight.model);
+    let limits = limits(&swarm.raw.limits, &swarm.raw.flight);
     let obstacles: Vec<Obstacle> = swarm
         .raw
         .obstacles

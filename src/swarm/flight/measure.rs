@@ -2,6 +2,7 @@
 //! the robots with which nothing is wrong at the time.
 
 use super::Flight;
+use super::moment::Extreme;
 use crate::flock::vectors::{Vectors, distance};
 use crate::scene::swarm::Swarm;
 
@@ -38,6 +39,10 @@ pub struct Record {
     pub ways: Vec<f64>,
     /// Least free space around each robot \[m\], shape \[members\].
     pub clearances: Vec<f64>,
+    /// The closest that a robot came to another, or to an obstacle.
+    pub(super) closest: Option<Extreme>,
+    /// The robot farthest from its place in each period: by the affine motion, by the rule, by the continuum.
+    pub(super) farthest: Vec<[Option<Extreme>; 3]>,
     every: usize,
     around: Vec<f64>,
 }
@@ -51,6 +56,8 @@ impl Record {
             tracks: vec![flight.fleet().places()],
             ways: vec![0.0; count],
             clearances: vec![f64::INFINITY; count],
+            closest: None,
+            farthest: Vec::new(),
             every: swarm.raw.flight.record_every,
             around: Vec::new(),
         }
@@ -68,22 +75,38 @@ impl Record {
         for (least, &now) in self.clearances.iter_mut().zip(&self.around) {
             *least = least.min(now);
         }
-        let worst = |place: &dyn Fn(usize) -> [f64; 2]| {
-            let apart = |m: usize| distance(place(m), present.get(m));
-            (0..formation.count()).filter(|&m| flight.fleet().is_sound(m)).map(apart).fold(0.0, f64::max)
+        let time = flight.fleet().time();
+        let clearance = self.around.iter().copied().fold(f64::INFINITY, f64::min);
+        if clearance < self.closest.map_or(f64::INFINITY, |closest| closest.value) {
+            self.closest = Some(closest(&self.around, clearance, &present, time));
+        }
+        let farthest = |place: &dyn Fn(usize) -> [f64; 2], sound_only: bool| {
+            let apart = |member: usize| {
+                let here = present.get(member);
+                let (value, other) = (distance(place(member), here), None);
+                Extreme { value, member, other, time, place: here }
+            };
+            let counts = |&m: &usize| !sound_only || flight.fleet().is_sound(m);
+            let all = (0..formation.count()).filter(counts).map(apart);
+            all.max_by(|a, b| a.value.total_cmp(&b.value).then(b.member.cmp(&a.member)))
         };
         let affine = formation.affine(control.program_time());
+        let affine = affine.map(|map| farthest(&|m| map.apply(formation.places.get(m)), true));
+        let rest = formation.settled(&present).map(|rest| farthest(&|m| rest.get(m), true));
+        let continuum = flight.continuum_places().map(|place| farthest(&place, false));
+        let error = |extreme: Option<Option<Extreme>>| extreme.map(|one| one.map_or(0.0, |one| one.value));
         let measures = formation.measures(&present);
         let sample = Sample {
-            time: flight.fleet().time(),
-            affine_error: affine.map(|map| worst(&|m| map.apply(formation.places.get(m)))),
-            formation_error: formation.settled(&present).map(|rest| worst(&|m| rest.get(m))),
-            clearance: self.around.iter().copied().fold(f64::INFINITY, f64::min),
-            continuum_error: flight.continuum_error(),
+            time,
+            affine_error: error(affine),
+            formation_error: error(rest),
+            clearance,
+            continuum_error: error(continuum),
             pe1: measures.pe1.iter().sum(),
             strain: measures.strain.iter().flatten().map(|s| s.largest()).fold(0.0, f64::max),
             lost: (0..formation.count()).filter(|&m| !control.health(m).is_usable()).count(),
         };
+        self.farthest.push([affine.flatten(), rest.flatten(), continuum.flatten()]);
         self.samples.push(sample);
         if (flight.fleet().period() as usize).is_multiple_of(self.every)
             || flight.fleet().period() == flight.periods()
@@ -93,4 +116,17 @@ impl Record {
         }
         sample
     }
+}
+
+/// Which robots are that close.
+fn closest(around: &[f64], value: f64, present: &Vectors, time: f64) -> Extreme {
+    let those = |&m: &usize| around[m] == value;
+    let member = (0..around.len()).find(those).unwrap_or(0);
+    let here = present.get(member);
+    // Of several pairs that are as close, the one that is.
+    let apart = |&m: &usize| distance(here, present.get(m));
+    let other = (member + 1..around.len()).filter(those).min_by(|a, b| apart(a).total_cmp(&apart(b)));
+    let there = other.map_or(here, |m| present.get(m));
+    let place = [0, 1].map(|k| 0.5 * (here[k] + there[k]));
+    Extreme { value, member, other, time, place }
 }

@@ -7,6 +7,7 @@
 mod faults;
 mod fleet;
 mod measure;
+mod moment;
 mod report;
 
 use std::ops::ControlFlow;
@@ -21,6 +22,7 @@ use crate::scene::SceneError;
 use crate::scene::swarm::{Shape, Swarm};
 pub use fleet::Fleet;
 pub use measure::{Record, Sample};
+pub use moment::Moment;
 pub use report::{FlightReport, RobotReport, Verdict};
 
 /// The continuum run of the scene that is flown.
@@ -92,9 +94,15 @@ impl Flight {
 
     /// Largest distance of a robot from its particle in the continuum run of the same scene \[m\].
     pub fn continuum_error(&self) -> Option<f64> {
+        let place = self.continuum_places()?;
+        let apart = |(m, robot): (usize, &Robot)| distance(place(m), robot.position);
+        Some(self.fleet.robots().iter().enumerate().map(apart).fold(0.0, f64::max))
+    }
+
+    /// Where the continuum run of the same scene has each robot \[m\].
+    fn continuum_places(&self) -> Option<impl Fn(usize) -> [f64; 2]> {
         let Twin { engine, particles } = self.continuum.as_ref()?;
-        let apart = |(robot, &i): (&Robot, &usize)| distance(robot.position, engine.present().get(i));
-        Some(self.fleet.robots().iter().zip(particles).map(apart).fold(0.0, f64::max))
+        Some(|m: usize| engine.present().get(particles[m]))
     }
 }
 

@@ -2,7 +2,8 @@
 
 use serde::Serialize;
 
-use super::{Flight, Record, Sample};
+use super::moment::Extreme;
+use super::{Flight, Moment, Record, Sample};
 use crate::flock::role::Role;
 use crate::scene::swarm::Swarm;
 
@@ -28,6 +29,8 @@ pub struct FlightReport {
     pub settled_within: f64,
     /// Smallest ever; absent for a single robot without obstacles.
     pub clearance: Option<f64>,
+    /// The robots that came that close, when and where.
+    pub closest: Option<Moment>,
     pub continuum_error: Option<f64>,
     /// Largest sum of PE1, and at the end \[m^2\].
     pub pe1: [f64; 2],
@@ -65,6 +68,20 @@ pub struct Verdict {
     /// Absent where there was nothing to measure, which is no success.
     pub found: Option<f64>,
     pub holds: bool,
+    /// The robots that decided it, when and where; absent where there was nothing to measure.
+    pub worst: Option<Moment>,
+}
+
+impl Verdict {
+    /// A broken bound in words: what broke it, when and where.
+    pub fn complaint(&self) -> Option<String> {
+        if self.holds {
+            return None;
+        }
+        let found = self.found.map_or("not measured".into(), |found| format!("{found:.4e}"));
+        let worst = self.worst.as_ref().map_or(String::new(), |moment| format!(": {moment}"));
+        Some(format!("{} declared {}, found {found}{worst}", self.bound, self.declared))
+    }
 }
 
 impl FlightReport {
@@ -85,6 +102,7 @@ impl FlightReport {
             formation_error: largest_and_last(samples, |s| s.formation_error),
             settling_time: settling_time(samples, formation.programs_end(), bounds.settled_within),
             settled_within: bounds.settled_within,
+            closest: record.closest.map(|closest| closest.named(&formation.names)),
             clearance: finite(samples.iter().map(|s| s.clearance).fold(f64::INFINITY, f64::min)),
             continuum_error: largest_and_last(samples, |s| s.continuum_error).map(|[largest, _]| largest),
             pe1: largest_and_last(samples, |s| Some(s.pe1)).unwrap_or_default(),
@@ -97,7 +115,7 @@ impl FlightReport {
             bounds: Vec::new(),
             per_robot: (0..formation.count()).map(|m| robot(flight, record, m)).collect(),
         };
-        report.bounds = verdicts(swarm, &report);
+        report.bounds = verdicts(swarm, &report, record, &formation.names);
         report
     }
 
@@ -142,29 +160,43 @@ fn settling_time(samples: &[Sample], programs_end: f64, within: f64) -> Option<f
     samples.get(settled).map(|sample| (sample.time - programs_end).max(0.0))
 }
 
-fn verdicts(swarm: &Swarm, report: &FlightReport) -> Vec<Verdict> {
+fn verdicts(swarm: &Swarm, report: &FlightReport, record: &Record, names: &[String]) -> Vec<Verdict> {
     let bounds = &swarm.raw.flight.bounds;
     // Rounding alone may take this much of a clearance that the filter keeps exactly.
     const ROUNDING: f64 = 1e-9;
-    let at_most = |bound, declared: Option<f64>, found: Option<f64>| {
+    let named = |extreme: Option<Extreme>| extreme.map(|extreme| extreme.named(names));
+    let at_most = |bound, declared: Option<f64>, found: Option<f64>, worst: Option<Extreme>| {
         declared.map(|declared| Verdict {
             bound,
             declared,
             found,
             holds: found.is_some_and(|found| found <= declared),
+            worst: named(worst),
         })
     };
-    let shape = report.affine_error.or(report.formation_error);
+    let [affine, rest, continuum] = [0, 1, 2];
+    let shape = if report.affine_error.is_some() { affine } else { rest };
+    let last = report.affine_error.or(report.formation_error).map(|[_, last]| last);
+    let farthest = |which: usize| record.farthest.iter().filter_map(move |all| all[which]);
+    let largest = |which| farthest(which).max_by(|a, b| a.value.total_cmp(&b.value));
+    // What kept the formation from being settled.
+    let unsettled = farthest(shape).rfind(|one| one.value > bounds.settled_within);
     let all = [
-        at_most("affine_error", bounds.affine_error, report.affine_error.map(|[largest, _]| largest)),
-        at_most("final_error", bounds.final_error, shape.map(|[_, last]| last)),
-        at_most("settling_time", bounds.settling_time, report.settling_time),
-        at_most("continuum_error", bounds.continuum_error, report.continuum_error),
+        at_most(
+            "affine_error",
+            bounds.affine_error,
+            report.affine_error.map(|[most, _]| most),
+            largest(affine),
+        ),
+        at_most("final_error", bounds.final_error, last, farthest(shape).next_back()),
+        at_most("settling_time", bounds.settling_time, report.settling_time, unsettled),
+        at_most("continuum_error", bounds.continuum_error, report.continuum_error, largest(continuum)),
         bounds.clearance.map(|declared| Verdict {
             bound: "clearance",
             declared,
             found: report.clearance,
             holds: report.clearance.is_some_and(|found| found >= declared - ROUNDING),
+            worst: named(record.closest),
         }),
     ];
     all.into_iter().flatten().collect()

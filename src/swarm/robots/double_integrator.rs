@@ -25,10 +25,7 @@ impl DoubleIntegrator {
         // The period moves it by dt (v + v') / 2, of which the half with v is settled.
         let offset = robot.offset_to(target);
         let open = [0, 1].map(|k| offset[k] - 0.5 * dt * velocity[k]);
-        let length = open[0].hypot(open[1]);
-        let wanted = self.approach(length, dt).min(self.speed);
-        let towards = if length > 0.0 { open.map(|d| d / length) } else { [0.0; 2] };
-        self.accelerate(robot, towards.map(|t| wanted * t), dt);
+        self.accelerate(robot, self.approach(open, dt), dt);
     }
 
     /// Comes to rest as soon as it can.
@@ -46,14 +43,41 @@ impl DoubleIntegrator {
         robot.position = [0, 1].map(|k| robot.position[k] + 0.5 * dt * (velocity[k] + robot.velocity[k]));
     }
 
-    /// The speed `v'` at the end of this period that covers `length` \[m\] in `v' dt / 2` and the way it
-    /// takes to brake. In units of `a dt` and `a dt^2`, a speed of `n + r`, `n` whole and `0 <= r < 1`,
-    /// takes `n (n + 1) / 2 + r (n + 1)`: whole periods of braking, the rest in the last.
-    fn approach(&self, length: f64, dt: f64) -> f64 {
+    /// The velocity `v'` \[m/s\] at the end of a period after which it can still come to rest at `open` \[m\],
+    /// counted from `v dt / 2` ahead of it, within the speed limit.
+    ///
+    /// It covers `v' dt / 2` in the period and the way it takes to brake. In units of `a dt` and `a dt^2`, a speed
+    /// of `n + r`, `n` whole and `0 <= r < 1`, takes `n (n + 1) / 2 + r (n + 1)`: whole periods of braking, the rest
+    /// in the last.
+    pub fn approach(&self, open: [f64; 2], dt: f64) -> [f64; 2] {
+        let length = open[0].hypot(open[1]);
+        if length == 0.0 {
+            return [0.0; 2];
+        }
         let unit = self.acceleration * dt;
         let way = length / (unit * dt);
         let whole = ((0.25 + 2.0 * way).sqrt() - 0.5).floor();
-        unit * (whole + (way - 0.5 * whole * (whole + 1.0)) / (whole + 1.0))
+        let speed = unit * (whole + (way - 0.5 * whole * (whole + 1.0)) / (whole + 1.0));
+        open.map(|d| speed.min(self.speed) / length * d)
+    }
+
+    /// The inverse of [`DoubleIntegrator::approach`] below the speed limit: what a period that ends with `velocity`
+    /// \[m/s\] and braking after it add to `v dt / 2` \[m\].
+    pub fn covered(&self, velocity: [f64; 2], dt: f64) -> [f64; 2] {
+        let speed = velocity[0].hypot(velocity[1]);
+        if speed == 0.0 {
+            return [0.0; 2];
+        }
+        let unit = self.acceleration * dt;
+        let whole = (speed / unit).floor();
+        let way = 0.5 * whole * (whole + 1.0) + (speed / unit - whole) * (whole + 1.0);
+        velocity.map(|v| way * unit * dt / speed * v)
+    }
+
+    /// The way from here to where it comes to rest if it brakes from `velocity` \[m/s\] now \[m\].
+    pub fn braking_way(&self, velocity: [f64; 2], dt: f64) -> [f64; 2] {
+        let covered = self.covered(velocity, dt);
+        [0, 1].map(|k| covered[k] - 0.5 * dt * velocity[k])
     }
 }
 
@@ -92,6 +116,21 @@ mod tests {
             }
             let missing = (robot.position[0] - length).abs().max(robot.velocity[0].abs());
             assert!(missing <= 1e-9, "{missing} left of {length} after {periods} periods");
+        }
+    }
+
+    #[test]
+    fn the_way_it_needs_to_brake_is_the_way_it_takes() {
+        let double = DoubleIntegrator { speed: 9.0, acceleration: 0.7 };
+        for speed in [0.0, 0.01, 0.035, 0.4, 2.3] {
+            let mut robot = Robot { velocity: [0.6 * speed, -0.8 * speed], ..Robot::at([0.0, 0.0], 0.0) };
+            let way = double.braking_way(robot.velocity, DT);
+            let again = double.approach(double.covered(robot.velocity, DT), DT);
+            assert!(distance(again, robot.velocity) < 1e-12, "{again:?} of {robot:?}");
+            for _ in 0..80 {
+                double.brake(&mut robot, DT);
+            }
+            assert!(distance(robot.position, way) < 1e-12, "{robot:?}, not at {way:?}");
         }
     }
 

@@ -136,6 +136,28 @@ pub fn shortened(way: [f64; 2], most: f64) -> [f64; 2] {
     [share * way[0], share * way[1]]
 }
 
+/// The point of a segment that is nearest to a place.
+fn foot([a, b]: [[f64; 2]; 2], place: [f64; 2]) -> [f64; 2] {
+    let (along, way) = ([b[0] - a[0], b[1] - a[1]], [place[0] - a[0], place[1] - a[1]]);
+    let square = dot(along, along);
+    let share = if square > 0.0 { (dot(along, way) / square).clamp(0.0, 1.0) } else { 0.0 };
+    [a[0] + share * along[0], a[1] + share * along[1]]
+}
+
+/// The points of two segments that are nearest to each other, of the first and of the second. Of segments that
+/// cross one end and the point of the other nearest to it: they have no distance that could be kept.
+pub fn nearest(first: [[f64; 2]; 2], second: [[f64; 2]; 2]) -> [[f64; 2]; 2] {
+    // In a plane, where segments do not cross, one of the four ends is nearest.
+    let ways = [
+        [first[0], foot(second, first[0])],
+        [foot(first, second[0]), second[0]],
+        [first[1], foot(second, first[1])],
+        [foot(first, second[1]), second[1]],
+    ];
+    let apart = |[a, b]: &[[f64; 2]; 2]| dot([b[0] - a[0], b[1] - a[1]], [b[0] - a[0], b[1] - a[1]]);
+    ways.into_iter().min_by(|a, b| apart(a).total_cmp(&apart(b))).unwrap_or(ways[0])
+}
+
 #[cfg(test)]
 mod tests {
     use std::f64::consts::{FRAC_PI_2, PI};

@@ -1,6 +1,6 @@
 //! The filter: one pass over the members, each with a cell of its own.
 
-use super::cell::{Cell, length};
+use super::cell::{Cell, length, shortened};
 use super::deadlock::Detour;
 use super::limits::{Limits, SafetyError};
 use super::obstacles::Obstacles;
@@ -43,8 +43,12 @@ pub struct Seen<'a> {
     pub known: &'a [bool],
     /// Ages of the poses \[s\].
     pub ages: &'a [f64],
-    /// Present velocities \[m/s\]; without them no acceleration is limited.
+    /// Present velocities \[m/s\]; without them no acceleration is limited. Of members that brake
+    /// ([`Limits::brakes`]) places and velocities are to be those of now, as good as they can be told.
     pub velocity: Option<&'a Vectors>,
+    /// How far the ways on which members come to rest may be off, because their velocities are not known exactly
+    /// \[m\]; not at all without it.
+    pub strays: Option<&'a [f64]>,
 }
 
 /// The safety filter of a swarm. Nothing is allocated per tick once its buffers have grown.
@@ -56,6 +60,8 @@ pub struct Filter {
     pub(super) obstacles: Obstacles,
     pub(super) fence: Obstacles,
     pub(super) detours: Vec<Detour>,
+    /// Targets of the last tick \[m\]; not finite before the first.
+    sent: Vectors,
     pub(super) crowd: Crowd,
     pub(super) cell: Cell,
 }
@@ -71,6 +77,10 @@ pub(super) struct Crowd {
     seen: Vec<bool>,
     /// Largest drift of a member from its pose \[m\].
     drift: f64,
+    /// Where each member comes to rest if it brakes now \[m\]; empty where members need no way to brake.
+    pub(super) rest: Vec<[f64; 2]>,
+    /// Longest way there \[m\].
+    longest: f64,
     /// Who is near the member in hand, in order of index.
     pub(super) found: Vec<u32>,
 }
@@ -93,6 +103,7 @@ impl Filter {
         Ok(Self {
             largest_radius: radii.iter().copied().fold(0.0, f64::max),
             detours: vec![Detour::default(); radii.len()],
+            sent: vec![[f64::NAN; 2]; radii.len()].into_iter().collect(),
             limits,
             radii,
             obstacles,
@@ -138,9 +149,27 @@ impl Filter {
         safe.clone_from(seen.present);
         for (member, flags) in flags.iter_mut().enumerate() {
             let (target, changed) = self.target(seen, wanted.get(member), period, member);
+            let target = self.within_speed(seen, target, period, member);
+            if seen.known[member] {
+                self.sent.set(member, target);
+            }
             safe.set(member, target);
             *flags = changed;
         }
+    }
+
+    /// Cuts the way from the last target to this one, where the member is at the last one but seen elsewhere, late or
+    /// through noise: the step from where it is seen is not the step it makes. Both ends lie in the cell that its true
+    /// place has, which is convex, so the end of the shorter way does too.
+    fn within_speed(&self, seen: &Seen, target: [f64; 2], period: f64, member: usize) -> [f64; 2] {
+        let last = self.sent.get(member);
+        let is_late = seen.ages[member] > (1.0 - TOUCHING) * period || self.limits.deviation > 0.0;
+        if !self.limits.arrives || !is_late || !seen.known[member] || !last.iter().all(|x| x.is_finite()) {
+            return target;
+        }
+        let way = [target[0] - last[0], target[1] - last[1]];
+        let step = shortened(way, self.limits.speed * period);
+        if step == way { target } else { [last[0] + step[0], last[1] + step[1]] }
     }
 
     /// Sorts the members for the queries to come.
@@ -151,6 +180,16 @@ impl Filter {
         crowd.drift = drift;
         crowd.seen.clear();
         crowd.seen.extend(seen.present.iter().map(|[x, y]| x.is_finite() && y.is_finite()));
+        crowd.rest.clear();
+        crowd.longest = 0.0;
+        if self.brakes(seen) {
+            for member in 0..count {
+                let rest = self.resting_place(seen, period, member);
+                let way = distance(rest, seen.present.get(member));
+                self.crowd.longest = self.crowd.longest.max(if way.is_finite() { way } else { 0.0 });
+                self.crowd.rest.push(rest);
+            }
+        }
         if count < GRID_FROM {
             return;
         }
@@ -163,7 +202,9 @@ impl Filter {
             (sum, finite, longest) = (sum + way, finite + 1.0, longest.max(way));
         }
         let reach = if finite > 0.0 { longest.min(1.5 * sum / finite) } else { 0.0 };
-        let radius = 2.0 * self.largest_radius + self.limits.clearance + 2.0 * reach + 8.0 * drift;
+        let radius = 2.0 * (self.largest_radius + self.limits.margin()) + self.limits.clearance;
+        let crowd = &mut self.crowd;
+        let radius = radius + 2.0 * (reach + crowd.longest) + 8.0 * drift;
         crowd.listed = (radius * (1.0 + TOUCHING)).clamp(f64::MIN_POSITIVE, f64::MAX);
         crowd.neighbours.rebuild_within(&mut crowd.grid, seen.present, &crowd.seen, crowd.listed);
     }
@@ -172,7 +213,7 @@ impl Filter {
     pub(super) fn find(&mut self, seen: &Seen, reach: f64, member: usize) {
         let drift = self.drift(seen, member) + self.crowd.drift;
         let radius = self.radii[member] + self.largest_radius + self.limits.clearance;
-        let radius = radius + 2.0 * reach + 4.0 * drift;
+        let radius = radius + 2.0 * (reach + self.limits.margin() + self.crowd.longest) + 4.0 * drift;
         let Crowd { grid, neighbours, listed, seen: ever_seen, found, .. } = &mut self.crowd;
         found.clear();
         if !self.limits.keeps_apart {

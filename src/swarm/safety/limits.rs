@@ -10,10 +10,16 @@ pub struct Limits {
     pub speed: f64,
     /// Highest acceleration \[m/s^2\]; default none (infinite). It takes velocities to hold it.
     pub acceleration: f64,
-    /// Whether members brake by themselves to stand still at a target, as those do whose controller goes for
-    /// positions; default no. With an acceleration limit they are sent to where they would come to rest: sent
-    /// to the end of the next step, they would begin to brake at once and never get up to speed.
+    /// Whether members take time to brake, and do so by themselves to stand still at a target, as double
+    /// integrators under a position controller do; default no. With an acceleration limit they are sent to where
+    /// they come to rest after the next step.
     pub brakes: bool,
+    /// Whether members are at their targets after a period, however far; default no. Targets of those
+    /// that are seen late then keep the speed limit among themselves.
+    pub arrives: bool,
+    /// Standard deviation of each coordinate of a pose \[m\]; default 0. Everything is kept farther away by
+    /// three deviations of each member that it concerns.
+    pub deviation: f64,
     /// Whether members are kept apart from each other at all; default yes. Without it the clearance is
     /// that from obstacles.
     pub keeps_apart: bool,
@@ -33,6 +39,8 @@ impl Default for Limits {
             speed: f64::INFINITY,
             acceleration: f64::INFINITY,
             brakes: false,
+            arrives: false,
+            deviation: 0.0,
             keeps_apart: true,
             clearance: 0.0,
             geofence: None,
@@ -86,11 +94,16 @@ impl Limits {
                 return Err(SafetyError::Limit { name, value, range: "above 0", default: "no limit" });
             }
         }
-        let value = self.clearance;
-        if !(value.is_finite() && value >= 0.0) {
-            let (name, range) = ("clearance", "from 0 up");
-            return Err(SafetyError::Limit { name, value, range, default: "0" });
+        for (name, value) in [("clearance", self.clearance), ("deviation", self.deviation)] {
+            if !(value.is_finite() && value >= 0.0) {
+                return Err(SafetyError::Limit { name, value, range: "from 0 up", default: "0" });
+            }
         }
         Ok(())
+    }
+
+    /// What a member's noise adds to all distances that it keeps \[m\].
+    pub(super) fn margin(&self) -> f64 {
+        3.0 * self.deviation
     }
 }

@@ -32,14 +32,52 @@
 //! all places where the other may be, or stays: age alone drives nobody apart. That takes poses
 //! whose ages are true and a speed limit that others keep too. For obstacles the member's own age counts.
 //!
-//! # Acceleration
-//! Given velocities, a member goes no faster than lets it brake before every border of its cell, as they
-//! stand. Borders move, since neighbours do: where one comes too fast the cell is kept and the acceleration
-//! exceeded, with [`Flags::ACCELERATION_LIMITED`] set. A robot that cannot follow is not covered.
+//! # Members that take time to brake
+//! A double integrator that stands in its cell now may be unable to stay there. What has to be kept apart are the
+//! ways on which members come to rest: straight on, the whole acceleration `a` against the velocity `v`, over periods
+//! `T` of constant acceleration `n (n + 1) T^2 a / 2 + r (n + 1) T^2 a - v T / 2` with `v = (n + r) a T`, which tends to
+//! `v^2 / (2 a)`. So for such members ([`Limits::brakes`]) the cell's borders part these ways: the half-plane is that
+//! between the nearest points of two ways `B_i`, `B_j`, and each takes half of `|B_i - B_j| - s`; obstacles and the
+//! fence likewise. A command is the place to come to rest at; the member takes the step after which it can.
+//!
+//! *Claim*: while the ways of all members are `s` apart, each has a command, and whatever the others choose the ways
+//! are `s` apart at the next tick. *Proof*: the nearest points of convex sets are parted by the normal through them,
+//! so `B_i` lies in the cell of `i`. Braking leads along `B_i`: the next way is a part of it, hence a command exists.
+//! Any command that is given has its next way's end `e` and the place `q` where it begins in the cell: `e` is tested,
+//! and `q` lies between the member's path, which is a parabola inside the triangle of `p`, `p + v T / 2` (on `B_i`, for
+//! the way to brake is no shorter) and `e`. The cell is convex, so all of the period's path and the next way lie in it.
+//! Cells of two members are `s` apart by what is said above. At rest the ways are points, so whoever starts at rest and
+//! clear is safe for good.
+//!
+//! That is a barrier certificate (U. Borrmann, L. Wang, A. D. Ames, M. Egerstedt, "Control barrier certificates for
+//! safe swarm behavior", IFAC-PapersOnLine 48(27), 2015) on each half-plane of a buffered Voronoi cell, in discrete time
+//! and with the whole way in place of the distance, so that no rate has to be chosen. It takes places and velocities of
+//! now: [`Control`](super::control::Control) has them from its members' model ([`Track`](super::watch::Track)), which is
+//! exact, however late poses are, for members that do as their model; those that do not are not covered.
+//!
+//! Members without that flag go no faster than lets them brake before every border of their cell, as it stands.
+//! Where a border comes too fast the cell is kept and the acceleration exceeded, with
+//! [`Flags::ACCELERATION_LIMITED`] set.
+//!
+//! # Noise
+//! With [`Limits::deviation`] everything is kept three deviations of each member farther away, and the ways on which
+//! members come to rest by three deviations of their ends more. Among members whose poses are not late that leaves the
+//! declared clearance in all of ten thousand random flights, where it is there to begin with. What it cannot keep:
+//! in a gap between solids that is narrower than the widened distances a member cannot tell which way is out, and noise
+//! leads it deeper; poses that are late as well carry the noise of several periods.
+//!
+//! # Liars
+//! A pose that is farther from the last one than the speed limit allows, and half a metre of noise, is not believed
+//! before several agree ([`Watch`](super::watch::Watch)); until then the member counts where it was last
+//! believed, by its age. That is all that physics says: a member that slowly claims to be elsewhere is believed, and
+//! others may meet it where it truly is. No filter can do better on what members say of themselves; it takes
+//! ranges that others measure, which no message here carries. What a liar cannot do is to bring two honest members
+//! near each other: their borders are made of their own poses alone.
 //!
 //! It is a filter, not a planner: it goes around what is convex and may wait or wander before what is not.
 //! A member whose goal lies inside a solid circles it: keep targets out of solids.
 
+mod braking;
 mod cell;
 mod clearance;
 mod deadlock;

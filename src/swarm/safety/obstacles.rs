@@ -13,7 +13,7 @@ use parry2d::partitioning::{Bvh, BvhBuildStrategy};
 use parry2d::query::{PointQuery, ShapeCastOptions, cast_shapes};
 use parry2d::shape::{Ball, Segment};
 
-use super::cell::HalfPlane;
+use super::cell::{HalfPlane, nearest};
 use super::limits::{Place, SafetyError};
 use crate::geometry::shape::segments_cross;
 
@@ -128,10 +128,10 @@ impl Obstacles {
     }
 
     /// Appends the half-planes that keep a member at `place`, finite, `keep` \[m\] away from every solid as
-    /// long as it moves no further than `reach` \[m\].
+    /// long as it moves no further than `reach` \[m\], and that it does not leave on its straight way to `rest`.
     pub(super) fn planes_near(
         &mut self,
-        place: [f64; 2],
+        [place, rest]: [[f64; 2]; 2],
         keep: f64,
         reach: f64,
         planes: &mut Vec<HalfPlane>,
@@ -148,11 +148,12 @@ impl Obstacles {
         }
         let margin = Vector::splat((keep + reach).min(LARGEST));
         let near = Aabb::new(here - margin, here + margin);
+        let way = (rest != place).then(|| Segment::new(here, vector(rest)));
         self.near.clear();
         for leaf in self.tree.intersect_aabb(&near) {
             match &self.pieces[leaf as usize] {
                 Piece::Edge { outline, .. } if self.within[*outline] => {}
-                piece => self.near.push((piece.distance(here), leaf)),
+                piece => self.near.push((piece.distance(piece.place_nearest(here, way.as_ref())), leaf)),
             }
         }
         self.near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
@@ -164,7 +165,10 @@ impl Obstacles {
             {
                 continue;
             }
-            planes.push(HalfPlane { normal: self.towards(piece, here), offset: distance - keep });
+            let from = piece.place_nearest(here, way.as_ref());
+            let normal = self.towards(piece, from);
+            let ahead = vector(normal).dot(from - here);
+            planes.push(HalfPlane { normal, offset: distance - keep + ahead });
         }
     }
 
@@ -282,6 +286,18 @@ impl Piece {
 }
 
 impl Piece {
+    /// The place on the way from `here`, where there is one, that is nearest to the piece.
+    fn place_nearest(&self, here: Vector, way: Option<&Segment>) -> Vector {
+        let Some(way) = way else { return here };
+        match self {
+            Piece::Edge { segment, .. } => {
+                let [place, _] = nearest([way.a, way.b].map(pair), [segment.a, segment.b].map(pair));
+                vector(place)
+            }
+            Piece::Disc { centre, .. } => way.project_local_point(*centre, true).point,
+        }
+    }
+
     /// Whether all of the piece is as far behind a plane as the plane's own piece, so that whoever keeps
     /// before that plane keeps its distance from this piece too: so it is with the edges of a convex
     /// polygon but the nearest.
@@ -353,6 +369,10 @@ fn check_polygon(corners: &[[f64; 2]], place: Place) -> Result<f64, SafetyError>
 
 fn vector([x, y]: [f64; 2]) -> Vector {
     Vector::new(x, y)
+}
+
+fn pair(vector: Vector) -> [f64; 2] {
+    [vector.x, vector.y]
 }
 
 /// Direction and length.

@@ -1,8 +1,9 @@
 //! One member's part of a tick: its cell, and its step within it.
 
-use super::cell::{HalfPlane, dot, length, shortened};
+use super::cell::{HalfPlane, dot, length, nearest, shortened};
 use super::deadlock::Tick;
 use super::filter::{Filter, Flags, Seen};
+use crate::geometry::shape::segments_cross;
 
 /// What a member wants at this tick and how far it can get.
 #[derive(Clone, Copy)]
@@ -50,7 +51,8 @@ impl Filter {
         let open = request.open(request.reach);
         let mut flags = self.why(open, origins);
         let velocity = self.velocity(seen, member);
-        if velocity.is_some() {
+        let brakes = !self.crowd.rest.is_empty();
+        if velocity.is_some() && !brakes {
             self.leave_room_to_brake(&mut request, period, &mut flags);
         }
         let hindered = flags != Flags::default() || velocity.is_some();
@@ -60,10 +62,9 @@ impl Filter {
             self.around(&request, member, &mut flags)
         };
         let step = match velocity {
+            Some(velocity) if brakes => self.brakable(velocity, goal, period, &mut flags),
             Some(velocity) => {
-                let step =
-                    shortened(self.steered(velocity, goal, period, &request, &mut flags), request.step);
-                if self.limits.brakes { self.to_rest(step, period, &request) } else { step }
+                shortened(self.steered(velocity, goal, period, &request, &mut flags), request.step)
             }
             None => shortened(goal, request.step),
         };
@@ -83,14 +84,19 @@ impl Filter {
             Some(velocity) => {
                 let most = self.limits.acceleration;
                 let top = (length(velocity) + most * period).min(self.limits.speed);
-                let reach = top * period + top * top / (2.0 * most);
+                let reach = if self.crowd.rest.is_empty() {
+                    top * period + top * top / (2.0 * most)
+                } else {
+                    // To the end of the longest step, and of the braking after it.
+                    0.5 * period * length(velocity) + self.braking().covered([top, 0.0], period)[0]
+                };
                 MotionRequest { way, distance, step: step.min(top * period), reach }
             }
         }
     }
 
     /// The member's velocity, where there is one and a limit that asks for it.
-    fn velocity(&self, seen: &Seen, member: usize) -> Option<[f64; 2]> {
+    pub(super) fn velocity(&self, seen: &Seen, member: usize) -> Option<[f64; 2]> {
         let velocity = seen.velocity.filter(|_| self.limits.acceleration.is_finite())?.get(member);
         velocity.iter().all(|value| value.is_finite()).then_some(velocity)
     }
@@ -102,32 +108,49 @@ impl Filter {
         if request.reach >= away || !self.cell.planes.iter().any(|plane| plane.offset < -TOUCHING * away) {
             return origins;
         }
-        request.reach = away.min(request.step);
+        request.reach = away.min(request.step).max(request.reach);
         self.build_cell(seen, request.reach, member)
     }
 
     fn build_cell(&mut self, seen: &Seen, reach: f64, member: usize) -> Origins {
         self.cell.planes.clear();
+        let noise = seen.strays.map_or(0.0, |strays| strays[member]);
+        // Borders that come within reach once the noise is taken off count too.
+        let reach = reach + noise;
         self.find(seen, reach, member);
         let here = seen.present.get(member);
         let drift = self.drift(seen, member);
+        let margin = self.limits.margin();
+        let brakes = !self.crowd.rest.is_empty();
+        let rest = if brakes { self.crowd.rest[member] } else { here };
         for k in 0..self.crowd.found.len() {
             let other = self.crowd.found[k] as usize;
             let stray = drift + self.drift(seen, other);
-            let keep = self.radii[member] + self.radii[other] + self.limits.clearance;
+            let keep = self.radii[member] + self.radii[other] + self.limits.clearance + 2.0 * margin;
             // Two at the very same place part: the lower number to the left.
             let aside = if member < other { [1.0, 0.0] } else { [-1.0, 0.0] };
-            let places = [here, seen.present.get(other), aside];
-            add_border(&mut self.cell.planes, places, keep, stray, reach);
+            let there = seen.present.get(other);
+            if brakes && (rest != here || self.crowd.rest[other] != there) {
+                let ways = [[here, rest], [there, self.crowd.rest[other]]];
+                add_border_of_ways(&mut self.cell.planes, ways, keep, stray, reach);
+            } else {
+                add_border(&mut self.cell.planes, [here, there, aside], keep, stray, reach);
+            }
         }
         let obstacles = self.cell.planes.len();
-        let radius = self.radii[member];
+        let radius = self.radii[member] + margin;
         let reach = reach + drift;
-        self.obstacles.planes_near(here, radius + self.limits.clearance, reach, &mut self.cell.planes);
+        let way = [here, rest];
+        self.obstacles.planes_near(way, radius + self.limits.clearance, reach, &mut self.cell.planes);
         let fence = self.cell.planes.len();
-        self.fence.planes_near(here, radius, reach, &mut self.cell.planes);
+        self.fence.planes_near(way, radius, reach, &mut self.cell.planes);
         for plane in &mut self.cell.planes[obstacles..] {
             plane.offset = aged(plane.offset - drift, plane.offset);
+        }
+        if noise > 0.0 {
+            for plane in &mut self.cell.planes {
+                plane.offset = aged(plane.offset - noise, plane.offset);
+            }
         }
         Origins { obstacles, fence }
     }
@@ -208,30 +231,17 @@ impl Filter {
         self.cell.nearest(next, request.step)
     }
 
-    /// Where a member that takes this step would come to rest after it; inside the borders as they were before
-    /// room was left.
-    fn to_rest(&self, step: [f64; 2], period: f64, request: &MotionRequest) -> [f64; 2] {
-        let per_length = 1.0 / (2.0 * self.limits.acceleration * period * period);
-        let mut stretch = 1.0 + length(step) * per_length;
-        if length(step) > 0.0 {
-            stretch = stretch.min((request.distance / length(step)).max(1.0));
-        }
-        for plane in &self.cell.planes {
-            let towards = dot(plane.normal, step);
-            if towards > 0.0 && plane.offset > 0.0 {
-                let room = plane.offset * (1.0 + plane.offset * per_length);
-                stretch = stretch.min((room / towards).max(1.0));
-            }
-        }
-        [stretch * step[0], stretch * step[1]]
-    }
-
     /// Cuts the step where a disc cast along it touches a solid. The cell has seen to that already: this
     /// is another algorithm's opinion. Members that start too near a solid are on their way out of it.
     fn cast(&self, here: [f64; 2], step: [f64; 2], origins: Origins, member: usize) -> [f64; 2] {
         let solids = &self.cell.planes[origins.obstacles..origins.fence];
         let disc = (self.radii[member] + self.limits.clearance) * (1.0 - CAST_TOLERANCE);
-        if solids.is_empty() || disc <= 0.0 || solids.iter().any(|plane| plane.offset < 0.0) {
+        // A member that brakes does not go straight.
+        if !self.crowd.rest.is_empty()
+            || solids.is_empty()
+            || disc <= 0.0
+            || solids.iter().any(|plane| plane.offset < 0.0)
+        {
             return step;
         }
         let share = self.obstacles.free_way(here, [here[0] + step[0], here[1] + step[1]], disc);
@@ -289,6 +299,35 @@ fn add_border(
     }
     if sine >= 1.0 {
         planes.push(HalfPlane { normal: [-normal[0], -normal[1]], offset: (-fresh).max(0.0) });
+    }
+}
+
+/// As [`add_border`], for members whose ways until they are at rest are given: the border parts the ways.
+fn add_border_of_ways(
+    planes: &mut Vec<HalfPlane>,
+    ways: [[[f64; 2]; 2]; 2],
+    keep: f64,
+    stray: f64,
+    reach: f64,
+) {
+    let here = ways[0][0];
+    let [mut near, far] = nearest(ways[0], ways[1]);
+    let mut way = [far[0] - near[0], far[1] - near[1]];
+    let [[a, b], [c, d]] = ways;
+    if length(way) < keep && segments_cross(a, b, c, d) {
+        // Away from where the other is: the ways have no distance.
+        near = here;
+        way = [c[0] - a[0], c[1] - a[1]];
+    }
+    let distance = length(way);
+    let normal = if distance > 0.0 { [way[0] / distance, way[1] / distance] } else { [1.0, 0.0] };
+    let ahead = dot(normal, [near[0] - here[0], near[1] - here[1]]);
+    let fresh = (distance - keep) / 2.0 + ahead;
+    let sine = (stray / distance).min(1.0);
+    let turned = (2.0 - 2.0 * (1.0 - sine * sine).sqrt()).sqrt() * reach;
+    let offset = aged(fresh - stray - turned, fresh);
+    if offset < reach {
+        planes.push(HalfPlane { normal, offset });
     }
 }
 

@@ -7,9 +7,11 @@
 
 mod limits;
 mod rejection;
+mod track;
 
 pub use limits::WatchLimits;
 pub use rejection::{Counts, Rejection};
+pub use track::{Gains, Track};
 
 /// A pose as it comes in.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -86,6 +86,12 @@ async function start() {
   listenToTheme();
   shown.charts = data.plots.map((plot) => new Chart(plot, element("plots"), { tip, seek: (time) => shown.player?.seek(time) }));
   if (bodies.length) await startFilm();
+  document.querySelectorAll("[data-seek]").forEach((button) =>
+    button.addEventListener("click", () => {
+      shown.player?.seek(Number(button.dataset.seek));
+      element("views").scrollIntoView({ block: "nearest" });
+    }),
+  );
   document.body.dataset.ready = "true";
 }
 

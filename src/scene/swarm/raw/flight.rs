@@ -18,7 +18,7 @@ pub struct RawFlight {
     pub seed: u64,
     #[serde(default)]
     pub model: RawModel,
-    /// Standard deviation of each coordinate of a pose [m].
+    /// Standard deviation of each coordinate of a pose [m]. Robots keep three of it farther away from everything, each.
     #[serde(default)]
     #[schemars(range(min = 0))]
     pub noise: f64,

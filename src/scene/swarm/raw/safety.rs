@@ -67,8 +67,8 @@ pub struct RawPoses {
     #[serde(default = "defaults::range")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub range: f64,
-    /// Faster than this nobody moves: a pose that says so is not believed [m/s]; ten times the speed limit
-    /// unless given.
+    /// No robot moves faster than this: a pose that says so, by more than half a metre of noise, is not believed
+    /// [m/s]; the speed limit unless given.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub jump_speed: Option<f64>,

@@ -1,5 +1,7 @@
 //! The safety filter on whole scenes: nobody comes nearer than declared, and who can arrive does.
 
+mod random_flights;
+
 use flockform::flock::vectors::{Vectors, distance};
 use flockform::swarm::robots::{DoubleIntegrator, Model, Robot};
 use flockform::swarm::safety::{Filter, Flags, Limits, Obstacle, Obstacles, Patience, Seen};
@@ -35,7 +37,7 @@ impl World {
     fn tick(&mut self) {
         let count = self.radii.len();
         let (known, ages) = (vec![true; count], vec![0.0; count]);
-        let seen = Seen { present: &self.present, known: &known, ages: &ages, velocity: None };
+        let seen = Seen { present: &self.present, known: &known, ages: &ages, velocity: None, strays: None };
         self.filter.apply(&seen, &self.goals, self.period, &mut self.safe, &mut self.flags);
         self.present.clone_from(&self.safe);
     }
@@ -373,7 +375,8 @@ fn members_without_a_pose_or_a_target_are_held_and_avoided_where_they_were_seen(
     world.goals.set(3, [f64::INFINITY, 0.0]);
     let known = [true, false, false, true];
     for _ in 0..50 {
-        let seen = Seen { present: &world.present, known: &known, ages: &[0.0; 4], velocity: None };
+        let seen =
+            Seen { present: &world.present, known: &known, ages: &[0.0; 4], velocity: None, strays: None };
         world.filter.apply(&seen, &world.goals, world.period, &mut world.safe, &mut world.flags);
         world.present.clone_from(&world.safe);
         assert!(distance(world.present.get(0), [1.0, 0.0]) >= 0.5 - 1e-9);
@@ -429,7 +432,13 @@ fn robots_that_see_each_other_late_keep_clear_all_the_same() {
                     present.set(member, world.present.get(member));
                     let mut ages = [world.period * delay as f64; 8];
                     ages[member] = 0.0;
-                    let seen = Seen { present: &present, known: &[true; 8], ages: &ages, velocity: None };
+                    let seen = Seen {
+                        present: &present,
+                        known: &[true; 8],
+                        ages: &ages,
+                        velocity: None,
+                        strays: None,
+                    };
                     filter.apply(&seen, &world.goals, world.period, &mut world.safe, &mut world.flags);
                     next.set(member, world.safe.get(member));
                 }
@@ -466,7 +475,13 @@ fn velocity_changes_no_faster_than_allowed_and_a_robot_stops_at_its_goal() {
             // Sharp right.
             world.goals.set(0, [20.0, 0.0]);
         }
-        let seen = Seen { present: &world.present, known: &[true], ages: &[0.0], velocity: Some(&velocity) };
+        let seen = Seen {
+            present: &world.present,
+            known: &[true],
+            ages: &[0.0],
+            velocity: Some(&velocity),
+            strays: None,
+        };
         world.filter.apply(&seen, &world.goals, world.period, &mut world.safe, &mut world.flags);
         let next = [0, 1].map(|k| (world.safe.get(0)[k] - world.present.get(0)[k]) / world.period);
         // A border that turns as the robot passes its corner may ask for more.
@@ -491,7 +506,13 @@ fn a_robot_that_brakes_at_its_targets_gets_up_to_speed_and_still_stops_before_th
     let mut fastest = 0.0_f64;
     for _ in 0..200 {
         let velocity: Vectors = [robot.velocity].into_iter().collect();
-        let seen = Seen { present: &world.present, known: &[true], ages: &[0.0], velocity: Some(&velocity) };
+        let seen = Seen {
+            present: &world.present,
+            known: &[true],
+            ages: &[0.0],
+            velocity: Some(&velocity),
+            strays: None,
+        };
         world.filter.apply(&seen, &world.goals, world.period, &mut world.safe, &mut world.flags);
         robot.step(&model, world.safe.get(0), world.period);
         assert!(robot.position[0] <= 5.7 + 1e-9, "into the wall: {robot:?}");

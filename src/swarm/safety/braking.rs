@@ -1,0 +1,87 @@
+//! The step of a member that takes time to brake.
+//!
+//! Such a member is safe as long as there is room for the straight way on which it comes to rest. So the cells of
+//! members that brake divide the space between these ways, not between the members: [the module's docs](super)
+//! prove that a command is then left at every tick.
+
+use super::cell::{dot, length, shortened};
+use super::filter::{Filter, Flags, Seen};
+use crate::swarm::robots::DoubleIntegrator;
+
+/// Halvings of the way from braking to what is wanted: a step is as good as to one in so many powers of two.
+const HALVINGS: usize = 12;
+
+impl Filter {
+    /// How members that brake move.
+    pub(super) fn braking(&self) -> DoubleIntegrator {
+        DoubleIntegrator { speed: self.limits.speed, acceleration: self.limits.acceleration }
+    }
+
+    /// Whether targets are made for members that brake.
+    pub(super) fn brakes(&self, seen: &Seen) -> bool {
+        self.limits.brakes && self.limits.acceleration.is_finite() && seen.velocity.is_some()
+    }
+
+    /// Where a member comes to rest if it brakes now \[m, world frame\].
+    pub(super) fn resting_place(&self, seen: &Seen, period: f64, member: usize) -> [f64; 2] {
+        let here = seen.present.get(member);
+        let way = self.velocity(seen, member).map_or([0.0; 2], |v| self.braking().braking_way(v, period));
+        [here[0] + way[0], here[1] + way[1]]
+    }
+
+    /// The place to come to rest at \[m\], relative to the member, with the step towards `goal` after which it still
+    /// can within its cell; one along which it brakes if there is none.
+    pub(super) fn brakable(
+        &self,
+        velocity: [f64; 2],
+        goal: [f64; 2],
+        period: f64,
+        flags: &mut Flags,
+    ) -> [f64; 2] {
+        let dynamics = self.braking();
+        let half = velocity.map(|v| 0.5 * period * v);
+        let rest = |next: [f64; 2]| {
+            let covered = dynamics.covered(next, period);
+            [half[0] + covered[0], half[1] + covered[1]]
+        };
+        let most = self.limits.acceleration * period;
+        let steered = |next: [f64; 2]| {
+            let change = shortened([next[0] - velocity[0], next[1] - velocity[1]], most);
+            [velocity[0] + change[0], velocity[1] + change[1]]
+        };
+        let braked = steered([0.0; 2]);
+        let wanted = dynamics.approach([goal[0] - half[0], goal[1] - half[1]], period);
+        let next = steered(wanted);
+        let stop = rest(braked);
+        // A member outside its cell goes no further out than it has to.
+        let holds = |place: [f64; 2]| {
+            let inside = |plane: &super::cell::HalfPlane| {
+                dot(plane.normal, place) <= plane.offset.max(dot(plane.normal, stop))
+            };
+            self.cell.planes.iter().all(inside)
+        };
+        if next != wanted {
+            flags.0 |= Flags::ACCELERATION_LIMITED;
+        }
+        let end = rest(next);
+        if holds(end) {
+            // To the last bit the goal, where nothing but the goal bounds the step.
+            let arrives =
+                next == wanted && length([end[0] - goal[0], end[1] - goal[1]]) <= 1e-12 * length(goal);
+            return if arrives && holds(goal) { goal } else { end };
+        }
+        flags.0 |= Flags::ACCELERATION_LIMITED;
+        let (mut kept, mut low, mut high) = (stop, 0.0, 1.0);
+        for _ in 0..HALVINGS {
+            let share = 0.5 * (low + high);
+            let between = [0, 1].map(|k| braked[k] + share * (next[k] - braked[k]));
+            let place = rest(between);
+            if holds(place) {
+                (kept, low) = (place, share);
+            } else {
+                high = share;
+            }
+        }
+        kept
+    }
+}

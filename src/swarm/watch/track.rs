@@ -1,0 +1,205 @@
+//! Where a robot that speeds up and brakes is now, and how fast: by its model, from the poses that arrived and the
+//! targets that it was sent since.
+//!
+//! Two places tell only the mean velocity between them, of some time ago. The room that a robot takes to brake
+//! grows with its present velocity, so its model is run beside it: every target moves both, and every pose corrects
+//! the model by an alpha-beta filter, whose gains are those of a steady Kalman filter for places of this noise and a
+//! robot pushed about at random (P. R. Kalata, "The tracking index: a generalized parameter for alpha-beta and
+//! alpha-beta-gamma target trackers", IEEE Transactions on Aerospace and Electronic Systems 20(2), 1984).
+
+use std::collections::VecDeque;
+
+use super::Pose;
+use crate::flock::vectors::distance;
+use crate::swarm::robots::{DoubleIntegrator, Model, Robot};
+
+/// Deviation of what pushes a robot away from its model, in units of its acceleration limit \[1\].
+const PUSHED: f64 = 0.5;
+
+/// How much of a pose's surprise goes into the state, and what is left of its noise.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gains {
+    /// Into the place \[1\].
+    pub alpha: f64,
+    /// Into the velocity, times the period \[1\].
+    pub beta: f64,
+    /// Standard deviation of each coordinate of the velocity \[m/s\].
+    pub velocity_deviation: f64,
+}
+
+impl Gains {
+    /// For a robot of this acceleration limit \[m/s^2\], a pose in every period \[s\] and the standard deviation of each
+    /// of its coordinates \[m\].
+    pub fn of(acceleration: f64, period: f64, deviation: f64) -> Self {
+        if deviation <= 0.0 {
+            // The limit is beta = 2, which would keep the error of a wrong model for ever, to and fro.
+            return Self { alpha: 1.0, beta: 1.0, velocity_deviation: 0.0 };
+        }
+        let index = PUSHED * acceleration * period * period / deviation;
+        let root = (4.0 + index - (8.0 * index + index * index).sqrt()) / 4.0;
+        let alpha = 1.0 - root * root;
+        let beta = (2.0 * (1.0 - root) * (1.0 - root)).min(1.0);
+        let share = beta * (alpha - 0.5 * beta) / (1.0 - alpha);
+        Self { alpha, beta, velocity_deviation: share.max(0.0).sqrt() * deviation / period }
+    }
+}
+
+/// The state of one robot, followed.
+#[derive(Clone, Debug)]
+pub struct Track {
+    /// At `stamp`, corrected by the pose of that time.
+    robot: Robot,
+    /// \[s\]; absent before the first pose.
+    stamp: Option<f64>,
+    /// Targets sent since, each with the time from which it holds \[s\].
+    sent: VecDeque<(f64, Option<[f64; 2]>)>,
+}
+
+/// Targets that are kept: older ones are of a robot that has long been lost.
+const MOST_SENT: usize = 1024;
+
+impl Default for Track {
+    fn default() -> Self {
+        Self { robot: Robot::at([0.0; 2], 0.0), stamp: None, sent: VecDeque::new() }
+    }
+}
+
+impl Track {
+    /// Takes in a pose that is believed; without it the robot goes on as its model does.
+    pub fn correct(&mut self, pose: &Pose, dynamics: &DoubleIntegrator, period: f64, deviation: f64) {
+        let Some(since) = self.stamp.filter(|&since| since < pose.stamp) else {
+            return self.restart(pose);
+        };
+        let expected = self.run(pose.stamp, dynamics);
+        let surprise = [0, 1].map(|k| pose.position[k] - expected.position[k]);
+        let time = (pose.stamp - since).max(period);
+        // Farther than it can have gone: whatever it is, it is no news of its velocity.
+        if distance(pose.position, expected.position) > 2.0 * dynamics.speed * time + 12.0 * deviation {
+            return self.restart(pose);
+        }
+        let gains = Gains::of(dynamics.acceleration, period, deviation);
+        self.robot = expected;
+        self.robot.position = [0, 1].map(|k| expected.position[k] + gains.alpha * surprise[k]);
+        self.robot.velocity = [0, 1].map(|k| expected.velocity[k] + gains.beta * surprise[k] / time);
+        let speed = self.robot.velocity[0].hypot(self.robot.velocity[1]);
+        if speed > dynamics.speed {
+            self.robot.velocity = self.robot.velocity.map(|v| v * dynamics.speed / speed);
+        }
+        self.stamp = Some(pose.stamp);
+        // The one that holds at that time is still needed.
+        while self.sent.get(1).is_some_and(|&(from, _)| from <= pose.stamp) {
+            self.sent.pop_front();
+        }
+    }
+
+    /// Notes the target \[m\] that holds from `now` \[s\] on; `None` where the robot is to come to rest.
+    pub fn send(&mut self, now: f64, target: Option<[f64; 2]>) {
+        if self.sent.len() == MOST_SENT {
+            self.sent.pop_front();
+        }
+        self.sent.push_back((now, target));
+    }
+
+    /// How far the place where the robot of [`Track::at`] comes to rest may be from where it will, at three deviations
+    /// of its velocity \[m\].
+    pub fn stray(
+        &self,
+        robot: &Robot,
+        now: f64,
+        dynamics: &DoubleIntegrator,
+        gains: &Gains,
+        period: f64,
+    ) -> f64 {
+        let speed = robot.velocity[0].hypot(robot.velocity[1]);
+        let age = self.stamp.map_or(0.0, |stamp| (now - stamp).max(0.0));
+        3.0 * (speed / dynamics.acceleration + period + age) * gains.velocity_deviation
+    }
+
+    /// The robot at `now` \[s\].
+    pub fn at(&self, now: f64, dynamics: &DoubleIntegrator) -> Robot {
+        self.run(now, dynamics)
+    }
+
+    fn restart(&mut self, pose: &Pose) {
+        self.robot = Robot::at(pose.position, pose.yaw);
+        self.stamp = Some(pose.stamp);
+        self.sent.retain(|&(from, _)| from >= pose.stamp);
+    }
+
+    /// The model from `stamp` until a time \[s\].
+    fn run(&self, until: f64, dynamics: &DoubleIntegrator) -> Robot {
+        let mut robot = self.robot;
+        let Some(stamp) = self.stamp else { return robot };
+        let model = Model::DoubleIntegrator(*dynamics);
+        for (k, &(from, target)) in self.sent.iter().enumerate() {
+            let end = self.sent.get(k + 1).map_or(until, |&(next, _)| next.min(until));
+            let target = target.unwrap_or(robot.position);
+            robot.step(&model, target, end - from.max(stamp));
+        }
+        robot
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PERIOD: f64 = 0.05;
+    const DYNAMICS: DoubleIntegrator = DoubleIntegrator { speed: 1.2, acceleration: 0.8 };
+
+    /// Largest error of place and velocity, behind poses so many periods late, each heard with this noise.
+    fn worst(late: usize, noise: impl Fn(usize) -> [f64; 2], deviation: f64) -> [f64; 2] {
+        let (mut robot, mut track) = (Robot::at([0.0; 2], 0.0), Track::default());
+        let mut poses = Vec::new();
+        let (mut place, mut velocity) = (0.0_f64, 0.0_f64);
+        for k in 0..400 {
+            let now = k as f64 * PERIOD;
+            let position = [0, 1].map(|axis| robot.position[axis] + noise(k)[axis]);
+            poses.push(Pose { position, yaw: 0.0, stamp: now, frame_is_right: true });
+            if k >= late {
+                track.correct(&poses[k - late], &DYNAMICS, PERIOD, deviation);
+                let found = track.at(now, &DYNAMICS);
+                place = place.max(distance(found.position, robot.position));
+                velocity = velocity.max(distance(found.velocity, robot.velocity));
+            }
+            let target = [2.0 * (0.05 * k as f64).sin(), 1.5 * (0.031 * k as f64).cos()];
+            track.send(now, Some(target));
+            robot.step(&Model::DoubleIntegrator(DYNAMICS), target, PERIOD);
+        }
+        [place, velocity]
+    }
+
+    #[test]
+    fn a_robot_that_does_as_its_model_is_known_exactly_however_late_its_poses_are() {
+        for late in [0, 1, 4] {
+            let [place, velocity] = worst(late, |_| [0.0; 2], 0.0);
+            assert!(place < 1e-12 && velocity < 1e-12, "{late}: {place:e}, {velocity:e}");
+        }
+    }
+
+    #[test]
+    fn noise_is_smoothed_to_a_fraction_of_itself() {
+        // Quasi-random, even over +-1: its deviation is 0.577.
+        let even = |k: usize, step: f64| 2.0 * (k as f64 * step).fract() - 1.0;
+        let noise = |k| [0.02 * even(k, 0.618_034), 0.02 * even(k, 0.414_214)];
+        let deviation = 0.02 * 0.577;
+        let [place, velocity] = worst(0, noise, deviation);
+        let gains = Gains::of(DYNAMICS.acceleration, PERIOD, deviation);
+        assert!(place < 2.0 * deviation, "{place}");
+        assert!(velocity < 3.0 * gains.velocity_deviation, "{velocity}: {gains:?}");
+        assert!(gains.velocity_deviation < 0.2 * deviation / PERIOD, "{gains:?}");
+    }
+
+    #[test]
+    fn a_robot_that_stands_against_its_model_is_seen_to_stand() {
+        let mut track = Track::default();
+        for k in 0..40 {
+            let now = f64::from(k) * PERIOD;
+            let pose = Pose { position: [1.0, 2.0], yaw: 0.0, stamp: now, frame_is_right: true };
+            track.correct(&pose, &DYNAMICS, PERIOD, 0.0);
+            let found = track.at(now, &DYNAMICS);
+            assert!(distance(found.velocity, [0.0; 2]) <= DYNAMICS.acceleration * PERIOD, "{found:?}");
+            track.send(now, Some([9.0, 2.0]));
+        }
+    }
+}
