@@ -5,4 +5,5 @@ mod convergence;
 mod inclusions;
 mod iterations;
 mod outlines;
+mod speed;
 mod support;
