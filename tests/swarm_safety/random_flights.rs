@@ -158,7 +158,7 @@ fn ideal_robots_keep_the_speed_limit_however_late_their_poses_are() {
 }
 
 #[test]
-#[ignore = "a quarter of an hour in a debug build: run it in a release build after changes to the filter"]
+#[ignore = "a quarter of an hour in a debug build: run it by hand, in a release build, after changes to the filter"]
 fn no_flight_of_ten_thousand_falls_below_the_declared_clearance() {
     let found: Vec<Outcome> =
         SERIES.iter().enumerate().map(|(k, series)| fly_all(series, 1 + k as u64, 10_000)).collect();
