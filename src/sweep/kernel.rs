@@ -102,6 +102,28 @@ enum After<'a, T> {
     Contract(&'a Terms<'a, T>, &'a [T], usize),
 }
 
+impl<'a, T: Real> After<'a, T> {
+    /// The terms, where there are any.
+    #[inline(always)]
+    fn terms(self) -> &'a Terms<'a, T> {
+        match self {
+            After::Nothing => unreachable!("a loop that completes means has terms"),
+            After::Overshoot(terms) | After::Contract(terms, ..) => terms,
+        }
+    }
+
+    /// The means along the axis of the Poisson term, of so many particles.
+    #[inline(always)]
+    fn along(self, from: usize, len: usize) -> &'a [T] {
+        match self {
+            After::Contract(_, along, begin) => &along[from - begin..][..len],
+            After::Nothing | After::Overshoot(_) => {
+                unreachable!("a loop that contracts has means to look at")
+            }
+        }
+    }
+}
+
 /// What loops do with means while these are in the registers: nothing, feedback, damping, both, or the Poisson
 /// term.
 const BARE: u8 = 0;

@@ -65,22 +65,24 @@ fn fill_all<T: Real, const N: usize, const P: usize, const W: usize, const A: u8
         let neighbours: [&[T]; N] = std::array::from_fn(|k| seen(distances[k]));
         let rest = component.rest.filter(|_| rests).map(|rest| &rest[from..to]);
         let target = &mut component.next[from - component.begin..to - component.begin];
-        // Loops of their own: what is not there is not asked for.
+        // Loops of their own: what is not there is not asked for. `A` alone decides, so that the others are not compiled.
         let (axis, here) = (component.axis, &component.present[at..][..len]);
-        match (part.after, A) {
-            (After::Overshoot(terms), FED) => {
-                let feedback = terms.feedback(axis, from, here);
+        match A {
+            FED => {
+                let feedback = part.after.terms().feedback(axis, from, here);
                 fill_with::<T, N, W, _>(neighbours, rest, mean, &feedback, target);
             }
-            (After::Overshoot(terms), DAMPED) => {
-                fill_with::<T, N, W, _>(neighbours, rest, mean, &terms.damping(here), target);
+            DAMPED => {
+                let damping = part.after.terms().damping(here);
+                fill_with::<T, N, W, _>(neighbours, rest, mean, &damping, target);
             }
-            (After::Overshoot(terms), BOTH) => {
+            BOTH => {
+                let terms = part.after.terms();
                 let both = (terms.feedback(axis, from, here), terms.damping(here));
                 fill_with::<T, N, W, _>(neighbours, rest, mean, &both, target);
             }
-            (After::Contract(terms, along, begin), CONTRACTED) => {
-                let contraction = terms.contraction(from, &along[from - begin..][..len]);
+            CONTRACTED => {
+                let contraction = part.after.terms().contraction(from, part.after.along(from, len));
                 fill_with::<T, N, W, _>(neighbours, rest, mean, &contraction, target);
             }
             _ => fill_with::<T, N, W, _>(neighbours, rest, mean, &(), target),
