@@ -1,4 +1,4 @@
-//! What the machine can do: the triad `a = b + s c`.
+//! The machine's memory bandwidth, by the triad `a = b + s c`.
 //!
 //! It is taken on the arrays of the largest body rather than on some of its own, because where memory
 //! lies matters: on a virtual machine the same loop over two sets of arrays was seen to differ by

@@ -23,10 +23,10 @@ pub fn active_share(plan: &Plan) -> Option<f64> {
     Some(updates / (steps as f64 * plan.count() as f64))
 }
 
-/// The step in which each particle can move first, beyond the last one for those whom nothing reaches.
+/// The step in which each particle can move first, beyond the last one for those that nothing reaches.
 fn first_motions(plan: &Plan, steps: usize) -> Vec<usize> {
     let mut begins = vec![steps + 1; plan.count()];
-    // Whoever is moved, and whoever is let go.
+    // Particles that are moved, and those that are released.
     let mut starts: Vec<(usize, usize)> = plan
         .changes
         .iter()
@@ -50,13 +50,13 @@ fn first_motions(plan: &Plan, steps: usize) -> Vec<usize> {
             break;
         }
         for &particle in &moved {
-            front.extend(seen_by.of(particle).iter().map(|&who| who as usize));
+            front.extend(seen_by.of(particle).iter().map(|&seer| seer as usize));
         }
     }
     begins
 }
 
-/// Who sees each particle: the frame sees those it serves.
+/// The particles that see each one: the frame sees those it serves.
 fn seen_by(plan: &Plan) -> Neighbours {
     let neighbours = &plan.flock.neighbours;
     let pairs = || {
@@ -72,8 +72,8 @@ fn seen_by(plan: &Plan) -> Neighbours {
         starts[k + 1] += starts[k];
     }
     let (mut next, mut index) = (starts.clone(), vec![0; starts[plan.count()] as usize]);
-    for (who, seen) in pairs() {
-        index[next[seen as usize] as usize] = who;
+    for (seer, seen) in pairs() {
+        index[next[seen as usize] as usize] = seer;
         next[seen as usize] += 1;
     }
     Neighbours { starts, index }

@@ -11,7 +11,7 @@ use crate::material::zone::Zone;
 use crate::scene::{Scene, SceneError, Weights};
 use crate::sweep::Order;
 
-/// What material a scene's rule is.
+/// The material that a scene's rule is.
 ///
 /// # Errors
 /// Refuses rules that are no homogeneous material, naming the key that makes them so.
@@ -47,7 +47,7 @@ pub fn material(scene: &Scene) -> Result<MaterialReport, SceneError> {
     Ok(report)
 }
 
-/// What to do about a rule that has no material.
+/// The remedy for a rule that is no material.
 pub fn remedy(error: &HomogeniseError) -> &'static str {
     match error {
         HomogeniseError::NotSymmetric { .. } => {
@@ -197,7 +197,7 @@ pub(super) fn require_damped(scene: &Scene, gradient: &GradientWeights) -> Resul
     ))
 }
 
-/// What the waves of a scene's fixed weights say about its run.
+/// Warnings about a run from the waves of the scene's fixed weights.
 pub(super) fn cautions(scene: &Scene) -> Vec<String> {
     // Rules that have no waves (not symmetric, say) are no error here.
     let Some((crystal, zone)) = waves_in_doubt(scene) else { return Vec::new() };

@@ -12,7 +12,7 @@ use crate::flock::neighbourhood::Neighbours;
 /// Rings of neighbours around the particles along the outline that the iteration covers.
 const RINGS: usize = 2;
 const ITERATIONS: usize = 60;
-/// What the iteration, which approaches the eigenvalue from below, is raised by.
+/// Factor on the result of the iteration, which approaches the eigenvalue from below.
 const SAFETY: f64 = 1.03;
 /// Part of the largest damping at which nothing grows.
 const OF_LIMIT: f64 = 0.9;

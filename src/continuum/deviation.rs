@@ -9,7 +9,7 @@ use crate::material::stiffness::area;
 /// Distances from sides to pieces that are computed at most: beyond, some of the sides stand for all.
 const MOST_DISTANCES: usize = 10_000_000;
 
-/// What a body's cells leave out of its shape, or add to it.
+/// The deviation of a body's cells from its shape.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Deviation {
     /// Area of the cells over that of the shape, less one \[1\].

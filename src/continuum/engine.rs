@@ -178,7 +178,7 @@ impl Engine {
         &self.changes
     }
 
-    /// What is known of the tractions along the outline, where stress can be recovered from it.
+    /// The known tractions along the outline, where stress can be recovered from it.
     pub fn free_edge(&self) -> Option<&Edge> {
         self.free_edge.as_ref()?.of(&self.body, self.cells.as_ref()?)
     }
@@ -202,7 +202,7 @@ impl Engine {
         [x - px, y - py]
     }
 
-    /// Where everybody is from their places in the reference configuration \[length\], shape \[count\]: to the digits
+    /// Displacements from the reference configuration \[length\], shape \[count\]: to the digits
     /// of the solver in a body that was put to rest and has not moved since.
     pub fn displacements(&self) -> Vectors {
         let of = |i| self.displacement(i);
@@ -218,7 +218,7 @@ impl Engine {
         &self.breaks
     }
 
-    /// PE1 of one particle \[length^2\]; zero for the frame and for ghosts, which see nobody.
+    /// PE1 of one particle \[length^2\]; zero for the frame and for ghosts, which have no neighbours.
     pub fn pe1(&self, particle: usize) -> f64 {
         pe1(&self.flock, particle, &self.present)
     }
@@ -228,7 +228,7 @@ impl Engine {
         pe2(particle, &self.present, &self.previous)
     }
 
-    /// What became of one particle's surroundings; `None` for those who see too few.
+    /// Strain of one particle's surroundings; `None` for a particle that sees too few.
     pub fn strain(&self, particle: usize) -> Option<Strain> {
         strain(&self.flock, particle, &self.present)
     }
@@ -257,7 +257,7 @@ impl Engine {
     }
 
     /// Puts particles where they have been seen \[length\], in place of where the last step sent them; frame
-    /// points follow. A body whose particles are seen where they were sent goes on as if nobody had looked.
+    /// points follow. A body whose particles are seen where they were sent goes on as if it had not been observed.
     pub fn observe(&mut self, seen: impl IntoIterator<Item = (usize, [f64; 2])>) {
         self.settled = None;
         for (particle, place) in seen {
@@ -282,8 +282,8 @@ impl Engine {
         self.compile_sweep();
     }
 
-    /// Puts the body where everybody is displaced by `displacement` \[length\], shape \[count\], as if it had
-    /// come to rest there by `step`; frame points copy whom they serve.
+    /// Displaces all particles by `displacement` \[length\], shape \[count\], as if the body had come to rest
+    /// there by `step`; frame points copy the particles that they serve.
     pub fn settle(&mut self, step: usize, displacement: &Vectors) {
         self.step = step;
         let reference = &self.body.reference;
@@ -420,7 +420,7 @@ impl Engine {
     }
 
     fn after_role_change(&mut self) {
-        // Whoever is not moved any more must stand still in both buffers.
+        // A particle that is no longer moved must agree in both buffers.
         self.previous.clone_from(&self.present);
         if let Some(bonds) = &mut self.flock.bonds {
             let places = (&*self.body.reference, &self.present);

@@ -75,7 +75,7 @@ pub fn solve_equilibrium(scene: &Scene, request: &Request, plan: Plan) -> Result
 /// The solver that would be taken, and why.
 ///
 /// # Errors
-/// As [`solve_equilibrium`], as far as can be told without solving.
+/// As [`solve_equilibrium`], as far as they are known without solving.
 pub fn select_solver(scene: &Scene, request: &Request, plan: &Plan) -> Result<(Solver, String), SceneError> {
     if corotated::is_corotated(&plan.flock) {
         let followers = follows(plan).into_iter().filter(|&follows| follows).count();
@@ -95,7 +95,7 @@ fn steps_of_the_way(plan: &Plan) -> usize {
     last.unwrap_or(0).min(plan.stop.steps)
 }
 
-/// Where those who do not follow are after so many steps; zero for the others \[length\], shape \[count\].
+/// Displacements of particles that do not follow after so many steps; zero for the others \[length\], shape \[count\].
 fn held_after(plan: &Plan, steps: f64) -> Vectors {
     let at_rest = |d: Option<[f64; 2]>| d.unwrap_or_default();
     held(&plan.changes, &plan.body, steps).into_iter().map(at_rest).collect()

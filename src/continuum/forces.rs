@@ -14,8 +14,8 @@ use crate::flock::role::Role;
 use crate::flock::rules::{Mean, Rotation};
 use crate::flock::vectors::Vectors;
 
-/// What the loads on a body add up to. Moments are positive counter-clockwise; their arms end where the particles were
-/// in the reference configuration under small rotations, and where they are at present if the rule is corotated.
+/// The resultant of the loads on a body. Moments are positive counter-clockwise; their arms end where the particles
+/// were in the reference configuration under small rotations, and where they are at present if the rule is corotated.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LoadResultant {
     /// \[force\]
@@ -27,7 +27,7 @@ pub struct LoadResultant {
     pub displacement: Option<f64>,
 }
 
-/// What holds the particles of an entry of `roles`.
+/// The reaction that holds the particles of an entry of `roles`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Reaction {
     /// The key of the entry, such as `roles[0]`.
@@ -79,7 +79,7 @@ impl Forces {
         Some(Self { internal: internal.into_iter().collect(), loads, displacement, places })
     }
 
-    /// What nothing of the body balances on a particle \[force\]: on one that is held, less its reaction.
+    /// The force that the body does not balance on a particle \[force\]: on one that is held, less its reaction.
     pub fn left_on(&self, particle: usize) -> [f64; 2] {
         plus(self.internal.get(particle), self.loads.get(particle))
     }
@@ -121,12 +121,12 @@ impl Forces {
         [0, 1].map(|axis| if one.axes[axis] { reaction[axis] } else { 0.0 })
     }
 
-    /// What the loads add up to; `None` without loads.
+    /// The resultant of all loads; `None` without loads.
     pub fn load(&self, engine: &Engine) -> Option<LoadResultant> {
         engine.whole_load().map(|whole| self.resultant(engine, whole))
     }
 
-    /// What each load adds up to.
+    /// The resultant of each load.
     pub fn each_load(&self, engine: &Engine) -> Vec<LoadResultant> {
         engine.each_load().iter().map(|whole| self.resultant(engine, whole)).collect()
     }
@@ -190,8 +190,8 @@ pub struct Held {
     pub axes: [bool; 2],
 }
 
-/// What each role change holds at present, shape \[changes\]: of several that name a particle or a component of it the
-/// last one, by its step.
+/// The particles that each role change holds at present, shape \[changes\]. Of several changes that name a particle
+/// or a component of it, the last one by its step holds it.
 pub fn held(engine: &Engine) -> Vec<Vec<Held>> {
     let (changes, roles) = (engine.changes(), engine.roles());
     let mut order: Vec<usize> =

@@ -1,4 +1,4 @@
-//! What is known of the traction along a fitted body's outline, for the recovery of stress there.
+//! The known traction along a fitted body's outline, for the recovery of stress there.
 
 use std::sync::OnceLock;
 
@@ -14,8 +14,8 @@ const MOST_DISTANCES: usize = 20_000_000;
 /// Sine of the turn to the right from which a corner is an inner one, where stress has no largest value.
 const INNER: f64 = -1e-6;
 
-/// The outline of a body and what acts on it. What follows is found when it is first asked for, which tables and pictures of
-/// stress do and solvers do not.
+/// The outline of a body and what acts on it. The [`Edge`] is found on first use: tables and pictures of stress need
+/// it, solvers do not.
 #[derive(Clone, Debug)]
 pub struct FreeEdge {
     outline: Outline,

@@ -1,4 +1,4 @@
-//! From a scene to its body: particles, who sees whom, the cells between them, and who has which role.
+//! From a scene to its body: particles, their neighbours, the cells between them, and their roles.
 
 use std::collections::BTreeMap;
 
@@ -23,7 +23,7 @@ use crate::solve::linear::HeldComponent;
 /// places \[length\], shape \[count\].
 pub type Truth<'a> = &'a dyn Fn(&Vectors) -> Vec<[f64; 2]>;
 
-/// A body laid out, before anybody moves.
+/// A body laid out, before any particle moves.
 #[derive(Clone, Debug)]
 pub struct Layout {
     pub body: Body,
@@ -130,7 +130,7 @@ impl Layout {
         Ok(Self { body, neighbours, cells, outline, partition })
     }
 
-    /// Who takes which role when, in the order in which it is written. Leaders led by the truth have no
+    /// Role changes in the order in which they are written. Leaders led by the truth have no
     /// motion where `truth` is not known.
     ///
     /// # Errors
@@ -178,7 +178,7 @@ impl Layout {
         (0..loads.len()).map(of_load).collect()
     }
 
-    /// What each of the scene's loads acts on, in their order.
+    /// The scene's loads, each with the region that it acts on, in their order.
     ///
     /// # Errors
     /// Names a load whose region holds no particle or no part of the outline.
@@ -389,7 +389,7 @@ fn body_of(scene: &Scene) -> Result<(Body, Neighbours), BodyError> {
     }
 }
 
-/// Displacement \[length\] of everybody who does not follow, at `step`; `None` for followers and for leaders
+/// Displacement \[length\] of each particle that does not follow, at `step`; `None` for followers and for leaders
 /// led by a truth that is not known, shape \[count\]. Only roles that hold from the start count.
 pub fn held(changes: &[RoleChange], body: &Body, step: f64) -> Vec<Option<[f64; 2]>> {
     let mut held = vec![None; body.count()];
@@ -458,7 +458,7 @@ fn key_of_spacing(scene: &Scene) -> &'static str {
     }
 }
 
-/// Refuses a body whose places, or small displacements from them, doubles cannot tell apart.
+/// Refuses a body whose places, or small displacements from them, doubles cannot resolve.
 fn require_resolved(scene: &Scene, body: &Body) -> Result<(), SceneError> {
     let spacing = body.lattice.spacing();
     let Vectors { x, y } = &*body.reference;
@@ -511,7 +511,7 @@ fn check_ids(scene: &Scene, key: &str, region: &SceneRegion, body: &Body) -> Res
     Ok(())
 }
 
-/// Why nobody has this id.
+/// Message that no particle has this id.
 pub(super) fn no_particle(id: usize, body: &Body) -> String {
     let ids = body.rows().map(|i| body.id(i));
     let (low, high) = ids.fold((usize::MAX, 0), |(low, high), id| (low.min(id), high.max(id)));
@@ -593,7 +593,7 @@ fn refuse_outline(scene: &Scene, error: &OutlineError) -> SceneError {
     scene.refuse(&key, error.to_string(), help)
 }
 
-/// Refuses neighbours as written that leave out some of those with whom a particle shares a cell.
+/// Refuses neighbours as written that leave out a particle sharing a cell.
 fn require_cell_neighbours(scene: &Scene) -> Result<(), SceneError> {
     let refuse = |message: String| {
         let help = "use kind = \"cells\", or leave the neighbours out: the rule takes those that it needs";

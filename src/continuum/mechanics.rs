@@ -1,4 +1,4 @@
-//! What a testing machine would read off a body: reactions, load, strain energy, stress.
+//! The readings of a testing machine on a body: reactions, load, strain energy, stress.
 
 use std::collections::HashMap;
 
@@ -34,7 +34,7 @@ pub struct Mechanics {
     pub strain_energy: f64,
     /// Absent where the rule has no stiffness.
     pub work: Option<Work>,
-    /// What has been done on the way, summed up from equilibrium to equilibrium ([`super::path`]): in a body that stores
+    /// Work done on the way, summed up from equilibrium to equilibrium ([`super::path`]): in a body that stores
     /// all of it the strain energy. Absent where there were none.
     pub work_done: Option<Work>,
     /// The largest force left on a follower \[force\]: how far the body is from rest.
@@ -160,7 +160,7 @@ impl Mechanics {
         })
     }
 
-    /// What the user should know of the result.
+    /// Warnings about the result.
     pub fn cautions(&self, engine: &Engine) -> Vec<String> {
         let is_small = matches!(engine.flock().rule.mean, Mean::Material { rotation: Rotation::Small });
         let is_beyond = self.largest_strain > SMALL_STRAIN || self.largest_turn > SMALL_TURN;

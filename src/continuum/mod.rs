@@ -1,10 +1,10 @@
 //! The continuum host: a scene is planned, stepped, watched.
 //!
 //! [`plan::Plan`] lays the scene out as arrays and index lists and says what it makes the program
-//! model; [`engine::Engine`] steps them; [`run::run`] is the loop around it, and whoever wants to see
-//! the body on the way (a recorder, a progress bar, an interrupt) gives it a closure to call.
+//! model; [`engine::Engine`] steps them; [`run::run`] is the loop around it; a recorder, a progress
+//! bar or an interrupt observes the body through a closure that it calls.
 //! [`engine::state`] takes an engine out on its way and puts it back, for checkpoints.
-//! [`layout`] is the body before anybody moves; [`equilibrium`] goes straight to rest instead of stepping.
+//! [`layout`] is the body before any particle moves; [`equilibrium`] goes straight to rest instead of stepping.
 
 mod active_share;
 pub mod bulk_response;

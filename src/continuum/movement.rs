@@ -148,7 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn distances_whose_squares_overflow_or_vanish_are_still_told() {
+    fn distances_whose_squares_overflow_or_vanish_are_still_reported() {
         for scale in [1e200, 1e-200] {
             let reference: Vectors = line(9).iter().map(|[x, y]| [x * scale, y]).collect();
             let mut present = reference.clone();

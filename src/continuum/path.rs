@@ -16,7 +16,7 @@ pub struct Path {
     last: Option<Acting>,
 }
 
-/// What acts on each particle \[force\], and where it has gone \[length\], shape \[count\].
+/// Forces on each particle \[force\] and its displacement \[length\], shape \[count\].
 #[derive(Clone, Debug)]
 struct Acting {
     loads: Vectors,

@@ -10,7 +10,7 @@ use crate::material::place::Around;
 use crate::material::stress::StressState;
 use crate::scene::{Scene, SceneError};
 
-/// What a place of a body does.
+/// Displacement and stress at a place of a body.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AtPlace {
     /// In the reference configuration \[length\].
@@ -23,7 +23,7 @@ pub struct AtPlace {
     pub von_mises: f64,
 }
 
-/// Who is around each place of `record.places`.
+/// The particles around each place of `record.places`.
 ///
 /// # Errors
 /// Names a place that is not of the body, and a body without cells.
@@ -33,7 +33,7 @@ pub fn around(scene: &Scene, cells: Option<&Cells>, reference: &Vectors) -> Resu
     let of = |(k, &place): (usize, &[f64; 2])| {
         let key = format!("record.places[{k}]");
         let Some(cells) = cells else {
-            let message = "there are no cells to tell a place by: the scene has no material";
+            let message = "there are no cells to find a place in: the scene has no material";
             return Err(scene.refuse(&key, message, "add [material], or name particles in record.probes"));
         };
         let help = "give a place of the undeformed body";
@@ -43,7 +43,7 @@ pub fn around(scene: &Scene, cells: Option<&Cells>, reference: &Vectors) -> Resu
     scene.record.places.iter().enumerate().map(of).collect()
 }
 
-/// What each place of `record.places` does at present.
+/// Displacement and stress at each place of `record.places` at present.
 pub fn at_places(scene: &Scene, engine: &Engine) -> Vec<AtPlace> {
     let (Some(elastic), false) = (&scene.material, scene.record.places.is_empty()) else { return Vec::new() };
     let around = around(scene, engine.cells(), &engine.body().reference).unwrap_or_default();

@@ -131,7 +131,7 @@ impl Plan {
         Ok(plan)
     }
 
-    /// Particles on no lattice, who see each other through `flock`; those with another role than to follow
+    /// Particles on no lattice, which see each other through `flock`; those that do not follow
     /// are led from outside.
     pub fn of_places(body: Body, flock: Flock, roles: Vec<Role>, update: Update) -> Self {
         let (low, high) = body.bounds();
@@ -193,7 +193,7 @@ fn require_listable(scene: &Scene, body: &Body) -> Result<(), SceneError> {
     Err(scene.refuse("neighbours.radius", message, "use a smaller radius"))
 }
 
-/// Who follows at any time: all but those who are led or clamped from the start and for good, shape \[count\].
+/// Which particles follow at any time: all but those led or clamped from the start and for good, shape \[count\].
 fn ever_follow(body: &Body, changes: &[RoleChange]) -> Vec<bool> {
     let mut follows: Vec<bool> = body.is_frame.iter().map(|frame| !frame).collect();
     for change in changes.iter().filter(|change| change.axis.is_none()) {
@@ -205,7 +205,7 @@ fn ever_follow(body: &Body, changes: &[RoleChange]) -> Vec<bool> {
     follows
 }
 
-/// What acts along the outline, where stress can be recovered from it.
+/// The tractions along the outline, where stress can be recovered from them.
 fn free_edge(scene: &Scene, layout: &Layout, loads: &[Load], held: &[[bool; 2]]) -> Option<FreeEdge> {
     let (elastic, outline) = (scene.material.as_ref()?, layout.outline.as_ref()?);
     let is_ruled = matches!(scene.mean, Mean::Material { .. }) && layout.body.outline.is_some();

@@ -1,5 +1,5 @@
-//! What is kept of a run: whole configurations at some steps, a few particles at every step, what a load that
-//! changes does.
+//! Records of a run: whole configurations at some steps, a few particles at every step, and the response to a load
+//! that changes.
 
 use serde::{Deserialize, Serialize};
 

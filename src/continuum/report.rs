@@ -1,4 +1,4 @@
-//! What a scene makes the program model, what it leaves out, and why.
+//! The report of a plan: what the scene models, what it leaves out, and why.
 
 use std::fmt;
 
@@ -21,11 +21,11 @@ use crate::sweep::{Order, Sweep};
 pub struct PlanReport {
     pub title: String,
     pub facts: Vec<(String, String)>,
-    /// What is modelled, and which key of the scene asks for it.
+    /// Effects that are modelled, each with the key of the scene that asks for it.
     pub modelled: Vec<(String, String)>,
-    /// What is left out, and what would ask for it.
+    /// Effects that are left out, each with the key that would ask for it.
     pub left_out: Vec<(String, String)>,
-    /// What the user should know before running.
+    /// Warnings before the run.
     pub cautions: Vec<String>,
 }
 
@@ -272,13 +272,13 @@ fn cautions(scene: &Scene, plan: &Plan, deviation: Option<&Deviation>) -> Vec<St
     }
     if plan.present_radius.is_some() && rule.mean == Mean::Barycentre {
         cautions.push(
-            "the barycentre of whoever is near keeps no distance: the body contracts; use rule.mean.kind = \"spaced\"".into(),
+            "the barycentre of all particles in range keeps no distance: the body contracts; use rule.mean.kind = \"spaced\"".into(),
         );
     }
     cautions.extend(bulk_response::cautions(scene));
     let led = |role: &Role| matches!(role, Role::Leader | Role::Clamped);
     if !plan.roles.iter().any(led) && scene.roles.iter().all(|entry| !led(&entry.role)) {
-        cautions.push("nobody leads: the body relaxes by itself".into());
+        cautions.push("no particle leads: the body relaxes by itself".into());
     }
     cautions
 }

@@ -25,7 +25,7 @@ pub enum StopReason {
     Stuck(String),
     /// The scene's number of steps was reached.
     Steps,
-    /// Whoever watched asked for it.
+    /// The watch broke the run off.
     Interrupted,
     Diverged(Divergence),
 }
@@ -75,7 +75,7 @@ pub struct Outcome {
     pub solved: Option<Solved>,
 }
 
-/// Whoever watches a run.
+/// The observer of a run.
 pub struct Watch<'a> {
     /// Given a step, the next one that is looked at. The steps in between may be taken several at once, which is
     /// several times as fast for a large body.
@@ -118,7 +118,7 @@ pub fn resume(
 /// Displacement beyond which sums of squares, which energies are, overflow \[length\].
 const FARTHEST: f64 = 1e150;
 
-/// What ends a run.
+/// The conditions that end a run.
 struct Bounds {
     stop: Stop,
     /// Largest displacement over the spacing, as the movement is.
@@ -173,7 +173,7 @@ fn run_loop(
 /// Takes as many steps at once as can be known to hold neither the last one nor a divergence.
 struct StepBatch {
     tolerance: Option<f64>,
-    /// Largest distance from the reference place over the spacing \[1\]: of anybody now, and that no body may pass.
+    /// Largest distance from the reference place over the spacing \[1\]: that of any particle now, and the bound on it.
     displacement: f64,
     bound: f64,
     /// How far a step takes particles from the reference, if that is known.
@@ -218,9 +218,9 @@ impl StepBatch {
         };
         let (step, activity) = (engine.step(), engine.activity().clone());
         self.start.clone_from(engine.present());
-        let told = engine.advance_by(count, Some(tolerance * spacing * (1.0 + 1e-9)));
-        // The last one is looked at by whoever called.
-        if told[..count - 1].contains(&false) {
+        let moved = engine.advance_by(count, Some(tolerance * spacing * (1.0 + 1e-9)));
+        // The caller looks at the last one.
+        if moved[..count - 1].contains(&false) {
             engine.return_to(step, &self.start, activity);
             self.single_steps = count - 1;
             engine.advance();

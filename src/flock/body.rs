@@ -11,7 +11,7 @@ use super::window::Window;
 use crate::geometry::outline::Place;
 use crate::geometry::shape::Shape;
 
-/// What is cut from the lattice.
+/// The sites that are cut from the lattice.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Cut {
     /// A rectangle by count: `columns` sites in a row, `rows` rows, from site (0, 0).
@@ -56,7 +56,7 @@ pub struct Body {
     /// Whether the particle belongs to the frame, shape \[count\].
     pub is_frame: Vec<bool>,
     pub frame: Option<Frame>,
-    /// What the user calls particles that were given as points; they lie on no lattice.
+    /// The user's ids of particles that were given as points; they lie on no lattice.
     pub numbering: Option<Arc<Numbering>>,
     /// Which particles stand on the outline of the shape that the body was fitted to; of a body of whole cells,
     /// which keeps no outline, nothing.
@@ -83,7 +83,7 @@ impl Body {
     /// Column of the particles that stand along the outline and at no site: beyond all columns of the lattice.
     pub const ALONG_OUTLINE: i32 = 1 << 30;
 
-    /// Cuts the body, adds the frame where a rule for it is given, and lists who sees whom.
+    /// Cuts the body, adds the frame where a rule for it is given, and lists each particle's neighbours.
     pub fn build(
         lattice: Lattice,
         cut: &Cut,
@@ -132,12 +132,12 @@ impl Body {
         }
     }
 
-    /// What the user calls a particle.
+    /// The id of a particle in files and messages.
     pub fn id(&self, particle: usize) -> usize {
         self.numbering.as_ref().map_or(particle + 1, |numbering| numbering.id(particle) as usize)
     }
 
-    /// What the user calls the two ends of a bond, the lower first.
+    /// The ids of the two ends of a bond, the lower first.
     pub fn ids(&self, pair: [u32; 2]) -> [usize; 2] {
         let [a, b] = pair.map(|particle| self.id(particle as usize));
         [a.min(b), a.max(b)]

@@ -6,7 +6,7 @@ use super::rules::{CellAround, Element, PatchCell};
 /// class and by kind of cell, not by particle.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CellsAround {
-    /// What the kinds of cells resist, shape \[kinds\].
+    /// Stiffness and mean gradients of each kind of cell, shape \[kinds\].
     pub elements: Vec<Element>,
     /// Where the cells of each class begin in `cells`, shape \[classes + 1\]; empty without classes.
     starts: Vec<u32>,

@@ -13,7 +13,7 @@ use super::vectors::{Vectors, distance};
 pub struct Cloud {
     /// Reference positions \[length\], shape \[count\]; finite, and no two the same.
     pub points: Vectors,
-    /// What the user calls them, shape \[count\]; no two the same.
+    /// The user's ids of them, shape \[count\]; no two the same.
     pub ids: Vec<u32>,
     /// The median of the distances to the nearest other point \[length\].
     pub spacing: f64,
@@ -27,7 +27,7 @@ const MARGIN: f64 = 1e-9;
 const SAMPLES: usize = 1000;
 
 impl Cloud {
-    /// `radius` is that of the neighbourhood \[length\]: nobody is looked for beyond it.
+    /// `radius` is that of the neighbourhood \[length\]: no neighbour is looked for beyond it.
     ///
     /// # Errors
     /// A radius that holds too many.
@@ -39,7 +39,7 @@ impl Cloud {
         };
         let mut apart: Vec<f64> = (0..points.len()).map(nearest).filter(|apart| apart.is_finite()).collect();
         let middle = apart.len() / 2;
-        // Where nobody sees anybody the radius is all that is known.
+        // Where no point has a neighbour the radius is all that is known.
         let spacing =
             if apart.is_empty() { radius } else { *apart.select_nth_unstable_by(middle, f64::total_cmp).1 };
         Ok(Self { points, ids, spacing })
@@ -48,7 +48,7 @@ impl Cloud {
 
 impl Body {
     /// The particles of a cloud, in an order that sweeps go through quickly; ids stay the user's. Their neighbours are
-    /// those within `radius` \[length\] in the reference configuration, in order of index; nobody has any without one.
+    /// those within `radius` \[length\] in the reference configuration, in order of index; none without one.
     ///
     /// # Errors
     /// A radius that holds too many, or none for some particle.
@@ -65,7 +65,7 @@ impl Body {
             ..Self::of_places(places, *spacing)
         };
         match radius.zip((0..body.count()).find(|&i| neighbours.of(i).is_empty())) {
-            // A body of one particle has nobody to see.
+            // The only particle of a body has no neighbour.
             Some((radius, i)) if body.count() > 1 => {
                 Err(BodyError::Alone { id: body.id(i), place: body.reference.get(i), radius })
             }

@@ -35,7 +35,7 @@ impl Threshold {
     }
 }
 
-/// What a particle sees in the place of a neighbour it has lost.
+/// The stand-in for a neighbour that a particle has lost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ghosts {
     /// A point at the original lattice offset from the particle's present position: the fragment
@@ -44,7 +44,7 @@ pub enum Ghosts {
     /// The mirror image of the opposite neighbour through the particle; where there is none, as
     /// `Lattice`.
     Mirrored,
-    /// Nothing: the mean runs over whoever is left (the literal formula, which draws the flanks of a
+    /// Nothing: the mean runs over the neighbours that are left (the literal formula, which draws the flanks of a
     /// crack together).
     None,
 }
@@ -68,7 +68,7 @@ pub struct Bonds {
     pub ghosts: Ghosts,
     broken: Vec<bool>,
     any_broken: bool,
-    /// Whether everybody is seen by those they see.
+    /// Whether every particle is a neighbour of each of its neighbours.
     is_mutual: bool,
     /// The bonds that may still break, compiled when they are first looked at.
     watch: Option<Watch>,
@@ -132,11 +132,11 @@ impl Bonds {
         let known = self.watch.take().filter(|watch| watch.threshold() == threshold);
         let watch = known
             .unwrap_or_else(|| Watch::compile(threshold, neighbours, reference, |bond| !self.broken[bond]));
-        // Most steps break nothing: a look at the squares tells.
+        // Most steps break nothing, which the squares show.
         let suspects = watch.suspects(present);
         self.watch = Some(watch);
         self.break_among(suspects, step, neighbours, (reference, present), breaks, |j, k| {
-            // What both see, the lower one looks after.
+            // A bond that both ends see is checked from the lower one alone.
             (!is_mutual || j < k)
                 && roles[k].is_body()
                 && threshold.is_passed(
@@ -184,7 +184,7 @@ impl Bonds {
         self.break_among(0..neighbours.count(), step, neighbours, (reference, present), breaks, breaks_now);
     }
 
-    /// Breaks the bonds of these particles, ascending, of which it is told that they break now.
+    /// Breaks those bonds of these particles, ascending, for which `breaks_now` holds.
     fn break_among(
         &mut self,
         particles: impl IntoIterator<Item = usize>,

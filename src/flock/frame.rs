@@ -2,7 +2,7 @@
 //! neighbourhood (the paper's Choice 4).
 //!
 //! A frame point copies the displacement of the particles it serves; where they are several it
-//! takes their average. The rules differ in whom it serves and when it looks:
+//! takes their average. The rules differ in which particles it serves and when it copies:
 //! `Lagged` and `Immediate` serve the nearest particles of the body, before and after the sweep;
 //! `Mirror` continues the body beyond its edge by serving the particle opposite across that
 //! nearest one, so that the edge sees what an interior particle would.
@@ -11,7 +11,7 @@ use super::lattice::{Lattice, Site};
 use super::real::Real;
 use super::vectors::Vectors;
 
-/// Whom a frame point serves, and when it looks.
+/// Which particles a frame point serves, and when it copies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FrameRule {
     /// The nearest particles' displacement before the sweep: the edge follows with a delay, which
@@ -49,7 +49,7 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// Finds whom each frame point serves; `index` looks a particle up by its site.
+    /// Finds the particles that each frame point serves; `index` looks a particle up by its site.
     pub fn build(
         rule: FrameRule,
         lattice: &Lattice,
@@ -217,7 +217,7 @@ mod tests {
         assert_eq!(served(&body, [3, -1]), [[3, 1]]);
         assert_eq!(served(&body, [3, -2]), [[3, 2]]);
         assert_eq!(served(&body, [-1, -1]), [[1, 1]]);
-        // A body one row deep has nobody opposite: the point shows the edge itself.
+        // A body one row deep has no particle opposite: the point shows the edge itself.
         let row = Shape::Rectangle { min: [0.0; 2], max: [5.0, 0.0] };
         let (body, _) = framed(square, row, Neighbourhood::First { keep: None }, FrameRule::Mirror);
         assert_eq!(served(&body, [3, -1]), [[3, 0]]);

@@ -25,7 +25,7 @@ pub struct CellGrid {
     starts: Vec<u32>,
     slots: Slots,
     around: Candidates,
-    /// Everybody's neighbours, unsorted, in order of cells; and where each point's begin, and how many.
+    /// Each point's neighbours, unsorted, in order of cells; and where each point's begin, and how many.
     lists: Vec<u32>,
     found: Vec<(u32, u32)>,
     /// Where each point's list ends as it is written.
@@ -41,7 +41,7 @@ const NARROWEST: f64 = 1e-300;
 
 impl CellGrid {
     /// Sorts the points marked in `included` into cells at least `radius` wide \[length\].
-    /// Points that are not finite are left out: nobody has them as a neighbour.
+    /// Points that are not finite are left out: they are neighbours of none.
     pub fn fill(&mut self, points: &Vectors, included: &[bool], radius: f64) {
         let usable = |i: &usize| included[*i] && points.x[*i].is_finite() && points.y[*i].is_finite();
         let Some((low, high)) = points.bounds((0..points.len()).filter(usable)) else {
@@ -107,7 +107,7 @@ impl CellGrid {
 
     /// Replaces the lists by those of every point within the radius of the last [`CellGrid::fill`] of
     /// each of `count` points, in order of index: what [`CellGrid::within`] finds, a cell at a time.
-    /// A point that was not included sees nobody.
+    /// A point that was not included has no neighbours.
     pub fn all_within(&mut self, count: usize, radius: f64, starts: &mut Vec<u32>, index: &mut Vec<u32>) {
         self.found.clear();
         self.found.resize(count, (0, 0));
@@ -122,7 +122,7 @@ impl CellGrid {
         self.ends.clear();
         self.ends.extend_from_slice(&starts[..count]);
         index.resize(total, 0);
-        // Who has me as a neighbour is mine: handed out in order of index, every list comes out sorted.
+        // Neighbourhood is mutual: handing each point to its neighbours, in order of index, sorts every list.
         for (particle, &(begin, found)) in self.found.iter().enumerate() {
             for &other in &self.lists[begin as usize..][..found as usize] {
                 let end = &mut self.ends[other as usize];
@@ -132,7 +132,7 @@ impl CellGrid {
         }
     }
 
-    /// Writes everybody's neighbours into `lists`, unsorted, cell after cell; returns how many.
+    /// Writes each point's neighbours into `lists`, unsorted, cell after cell; returns how many.
     fn look_around(&mut self, radius: f64) -> usize {
         let mut around = std::mem::take(&mut self.around);
         let mut lists = std::mem::take(&mut self.lists);

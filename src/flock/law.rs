@@ -1,4 +1,4 @@
-//! Who sees whom, through which rule: everything that turns present positions into a target.
+//! Neighbours, weights and rule: everything that turns present positions into a target.
 
 use std::sync::Arc;
 
@@ -217,9 +217,9 @@ impl Flock {
         }
     }
 
-    /// Target position of `particle` by those of its neighbours alone whom `keeps` names: of the others nothing
-    /// is known, or nothing believed. What the lost ones carried the others carry, so that the reference
-    /// configuration stays at rest; `None` where too few are left to say where to go.
+    /// Target position of `particle` by those of its neighbours alone that `keeps` names: the others are unknown
+    /// or not believed. Those that are left take over the share of the others, so that the reference
+    /// configuration stays at rest; `None` where too few are left to determine a target.
     pub fn target_among(
         &self,
         particle: usize,

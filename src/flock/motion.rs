@@ -35,7 +35,7 @@ pub enum Interpolation {
 }
 
 impl Motion {
-    /// Displacement after `step` steps of the leader number `which`, who started from `base` \[length\].
+    /// Displacement after `step` steps of the leader number `which`, which started from `base` \[length\].
     pub fn displacement(&self, step: f64, which: usize, base: [f64; 2]) -> [f64; 2] {
         match self {
             Motion::Velocity { per_step } => per_step.map(|v| v * step),

@@ -22,7 +22,7 @@ pub enum Neighbourhood {
     Offsets(Vec<Site>),
     /// The sites within this distance in the reference configuration \[length\].
     Within { radius: f64 },
-    /// Whoever is within this distance now \[length\]: the paper's liquid and gas.
+    /// The particles within this distance now \[length\]: the paper's liquid and gas.
     Dynamic { radius: f64 },
 }
 
@@ -170,7 +170,7 @@ impl Neighbours {
         &self.index[self.bonds(particle)]
     }
 
-    /// Rebuilds the lists as whoever of the `members` is within `radius` now, in order of index.
+    /// Rebuilds the lists as those of the `members` within `radius` now, in order of index.
     /// Reuses the buffers: no allocation once they have grown.
     pub fn rebuild_within(&mut self, grid: &mut CellGrid, present: &Vectors, members: &[bool], radius: f64) {
         grid.fill(present, members, radius);

@@ -10,8 +10,8 @@ const WIDTH: f64 = 0.5;
 /// points' bounds and are half a `spacing` \[length\] wide. The order hangs on the places alone, not on the order
 /// in which they are given.
 ///
-/// A particle's neighbours then lie in a few streams that move on as it does, as on a lattice, and nobody sees farther
-/// than a few columns. That is what sweeps live on, with lists and without. It is no space-filling curve, along
+/// A particle's neighbours then lie in a few streams that move on as it does, as on a lattice, and none lies farther
+/// away than a few columns. That is what sweeps live on, with lists and without. It is no space-filling curve, along
 /// which what is near in space is near in memory too: along Hilbert's a sweep of one to four million particles takes 1.3
 /// to 1.7 times as long as in the columns of a hexagonal lattice, and 1.2 to 1.3 times as long as in these columns of a
 /// jumbled cloud. There, columns two spacings wide would be another eighth faster; but they would lose the order of a

@@ -1,4 +1,4 @@
-//! What a particle does at a step.
+//! The roles of particles at a step.
 
 /// The kinds of particle (the paper, section 2, with `Clamped` set apart from `Leader`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]

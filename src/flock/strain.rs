@@ -8,7 +8,7 @@
 use super::law::Flock;
 use super::vectors::Vectors;
 
-/// What became of a particle's surroundings.
+/// Strain and rotation of a particle's surroundings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Strain {
     /// `xx, yy, xy` of the right stretch less one, in the axes of the reference configuration \[1\].
@@ -82,7 +82,7 @@ mod tests {
     }
 
     #[test]
-    fn stretch_and_shear_are_told_apart() {
+    fn stretch_and_shear_are_distinguished() {
         let found = of(|[x, y]| [1.1 * x, 0.8 * y]).expect("spanned");
         assert!((found.components[0] - 0.1).abs() < 1e-14 && (found.components[1] + 0.2).abs() < 1e-14);
         assert!((found.largest() - 0.2).abs() < 1e-14);

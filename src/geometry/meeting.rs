@@ -68,7 +68,7 @@ pub fn crossings(a: &Piece, b: &Piece, near: f64) -> Vec<[f64; 2]> {
     };
     found.extend([(0.0, a.from), (1.0, a.to)].into_iter().filter_map(|(s, p)| Some([s, on(b, p, near)?])));
     found.extend([(0.0, b.from), (1.0, b.to)].into_iter().filter_map(|(t, p)| Some([on(a, p, near)?, t])));
-    // What is an end but for rounding is the end.
+    // A meeting at an end but for rounding is at the end.
     let snapped = |piece: &Piece, t: f64| {
         let p = piece.point(t);
         let ends = [(0.0, piece.from), (1.0, piece.to)];

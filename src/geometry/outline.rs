@@ -1,7 +1,7 @@
 //! The outline of a shape: closed loops of straight edges and circular arcs, the shape to the left of each.
 //!
 //! The first loop bounds the shape from outside and runs counter-clockwise, the others bound its holes and run
-//! clockwise. What acts on a body or holds it does so on parts of its outline ([`super::portion`]), bodies are
+//! clockwise. Loads and supports of a body act on parts of its outline ([`super::portion`]), bodies are
 //! fitted to it, and finite elements are refined towards it.
 
 use std::f64::consts::TAU;

@@ -22,9 +22,9 @@ pub struct Portion {
 pub enum Selection {
     /// The outer loop and those of all holes.
     All,
-    /// What lies in a box, its boundary included \[length\].
+    /// The parts in a box, its boundary included \[length\].
     Box { min: Point, max: Point },
-    /// What lies in a disc, its boundary included \[length\].
+    /// The parts in a disc, its boundary included \[length\].
     Disc { centre: Point, radius: f64 },
     /// Pieces by number.
     Pieces {

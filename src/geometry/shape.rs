@@ -71,7 +71,7 @@ impl Shape {
         }
     }
 
-    /// Where a lattice is anchored unless told otherwise: the centre of a disc, the end of a
+    /// Where a lattice is anchored by default: the centre of a disc, the end of a
     /// specimen's axis, else the lower left corner of the bounds.
     pub fn anchor(&self) -> [f64; 2] {
         match self {

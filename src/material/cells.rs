@@ -134,12 +134,12 @@ impl Cells {
         element_of(&self.shapes[kind], self.material(kind, elastic), kind >= self.whole)
     }
 
-    /// What the cells of a kind are made of, where `body` is what the body is made of outside its inclusions.
+    /// The material of the cells of a kind, where `body` is that of the body outside its inclusions.
     pub fn material<'a>(&'a self, kind: usize, body: &'a Elastic) -> &'a Elastic {
         self.material_of_region(self.region[kind], body)
     }
 
-    /// What a region is made of.
+    /// The material of a region.
     pub fn material_of_region<'a>(&'a self, region: u32, body: &'a Elastic) -> &'a Elastic {
         region.checked_sub(1).map_or(body, |k| &self.inclusions[k as usize])
     }
@@ -149,7 +149,7 @@ impl Cells {
         self.region[self.kind[cell] as usize]
     }
 
-    /// What a cell is made of.
+    /// The material of a cell.
     pub fn material_of<'a>(&'a self, cell: usize, body: &'a Elastic) -> &'a Elastic {
         self.material(self.kind[cell] as usize, body)
     }
@@ -382,7 +382,7 @@ pub fn without_loose_sites(body: &Body, neighbours: &Neighbours) -> (Body, Neigh
     (kept, Neighbours::from_lists(keep.iter().map(seen)), cells)
 }
 
-/// The neighbourhood that a material needs: everybody with whom a particle shares a cell.
+/// The neighbourhood that a material needs: for each particle, all those that share a cell with it.
 pub fn neighbourhood(lattice: &Lattice) -> Neighbourhood {
     cells_away(lattice, 1)
 }

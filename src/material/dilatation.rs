@@ -33,7 +33,7 @@ pub struct Patches<'a> {
     on_edge: Vec<bool>,
     /// Area by kind of cell \[length^2\].
     areas: Vec<f64>,
-    /// What resists averaged dilatations, by region \[force / length\].
+    /// Stiffness against averaged dilatations, by region \[force / length\].
     lambda: Vec<Option<f64>>,
 }
 
@@ -56,7 +56,7 @@ impl<'a> Patches<'a> {
         Some(Self { cells, incidence, on_edge, areas, lambda })
     }
 
-    /// What resists the averaged dilatation of a cell \[force / length\]; `None` where it resists its own.
+    /// Stiffness against the averaged dilatation of a cell \[force / length\]; `None` where it resists its own.
     pub fn lambda(&self, cell: usize) -> Option<f64> {
         self.lambda[self.region(cell)]
     }

@@ -9,7 +9,7 @@ use nalgebra::{Matrix3, Vector3};
 /// Strain to membrane force, Voigt order (xx, yy, xy) \[force / length\], shape \[3, 3\].
 pub type Voigt = Matrix3<f64>;
 
-/// What is assumed across the thickness.
+/// The assumption across the thickness.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Plane {
     /// The faces are free: a thin sheet.
@@ -99,8 +99,8 @@ impl Elastic {
         &self.stiffness
     }
 
-    /// What resists a dilatation averaged over the cells around a particle, instead of that of each cell: Lame's lambda times
-    /// the thickness \[force / length\]. `None` where each cell resists its own.
+    /// Stiffness against a dilatation averaged over the cells around a particle, instead of that of each cell: Lame's
+    /// lambda times the thickness \[force / length\]. `None` where each cell resists its own.
     ///
     /// Towards nu = 1/2 in plane strain lambda grows without bound, and cells that each keep their area have too few
     /// ways left to deform: they lock. One condition for each particle leaves enough, on triangles, quadrilaterals and

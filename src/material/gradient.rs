@@ -177,7 +177,7 @@ impl GradientWeights {
     }
 }
 
-/// What the prescribed length is, beside the `l^2` of long waves that a report gives.
+/// A note on the prescribed length, beside the `l^2` of long waves that a report gives.
 pub fn layer_note(length: f64) -> String {
     format!(
         "a boundary layer along a row of bonds decays as exp(-distance / {length}): that is the prescribed length; \

@@ -245,7 +245,7 @@ impl Crystal {
         Ok(())
     }
 
-    /// What the acoustic tensor would be if nothing cancelled \[force / length\].
+    /// Size that the acoustic tensor would have if nothing cancelled \[force / length\].
     fn pull(&self) -> f64 {
         let size = |bond: &Bond| bond.block.iter().flatten().fold(0f64, |m, x| m.max(x.abs()));
         let bonds = self.bonds.iter().flatten();

@@ -13,7 +13,7 @@
 //! `X` are the reference positions, `f_i` is the load on the particle, and `K_ij` is minus the
 //! off-diagonal 2x2 block of the stiffness that the cells between the particles would have as finite
 //! elements. A fixed point of the rule is then exactly the equilibrium of those elements; the rule is
-//! one relaxation of it that needs nobody but the neighbours. Where the body ends the cells are simply
+//! one relaxation of it that needs only the neighbours. Where the body ends the cells are simply
 //! missing, and the missing cells *are* the free edge: no frame is needed.
 //!
 //! The way through the room, one file each:

@@ -1,6 +1,6 @@
 //! Loads to the forces on particles.
 //!
-//! What acts on the outline is integrated along the true outline, arcs included, and handed to the side of the cells'
+//! A load on the outline is integrated along the true outline, arcs included, and handed to the side of the cells'
 //! boundary that is nearest: each force to the two particles of the side, so that resultant and moment are kept. On a
 //! body that is fitted to its outline the sides are the outline, and the forces do the same work as the load in every
 //! displacement that the cells can have; on a body of whole cells they replace the load by an equivalent one.
@@ -95,7 +95,7 @@ impl Profile {
 }
 
 impl OutlineLoad {
-    /// What acts at a point \[length\] of the outline with this outward normal \[force / length\].
+    /// The traction at a point \[length\] of the outline with this outward normal \[force / length\].
     pub fn at(&self, point: [f64; 2], normal: [f64; 2]) -> [f64; 2] {
         let factor = self.profile.map_or(1.0, |profile| profile.at(point));
         match self.push {

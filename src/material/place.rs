@@ -1,4 +1,4 @@
-//! What a body has at any place of it, from what its particles have.
+//! Values at any place of a body, from those of its particles.
 
 use super::cells::Cells;
 use crate::flock::vectors::{Vectors, distance};

@@ -1,8 +1,8 @@
-//! What material a rule is, and which weights a material takes, in words and numbers.
+//! The material that a rule is, and the weights that a material takes, in words and numbers.
 //!
 //! A scalar rule has no force, so its stiffness has no scale: it is given in units of its shear
 //! modulus. The Poisson's ratio of an isotropic sheet is read in two ways, as that of a thin sheet
-//! (plane stress) and as that of a slice of a long body (plane strain), since the plane cannot tell
+//! (plane stress) and as that of a slice of a long body (plane strain), since the plane does not determine
 //! which it is.
 
 mod table;
@@ -23,7 +23,7 @@ const ROUNDING: f64 = 1e-9;
 #[derive(Clone, Debug, Serialize)]
 pub struct MaterialReport {
     pub lattice: LatticeFacts,
-    /// What the rule is called.
+    /// The name of the rule.
     pub rule: String,
     /// The material that was asked for; none where the question was what a rule is.
     pub asked: Option<Asked>,
@@ -35,7 +35,7 @@ pub struct MaterialReport {
     pub material: Material,
     pub gradient: Gradient,
     pub waves: Waves,
-    /// What else the reader should know.
+    /// Further notes for the reader.
     pub notes: Vec<String>,
 }
 
@@ -132,7 +132,7 @@ pub struct Gradient {
     pub effect: Effect,
 }
 
-/// What the sign of `l^2` does to short waves.
+/// The effect of the sign of `l^2` on short waves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Effect {
@@ -162,7 +162,7 @@ pub struct Waves {
 }
 
 impl MaterialReport {
-    /// What material a rule without forces is; `rule` is its name.
+    /// The material that a rule without forces is; `rule` is its name.
     pub fn of_rule(lattice: &Lattice, rule: String, crystal: &Crystal) -> Result<Self, HomogeniseError> {
         let zone = crystal.zone()?;
         let effective = crystal.effective()?;

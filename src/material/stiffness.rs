@@ -1,4 +1,4 @@
-//! What one cell resists: its element stiffness.
+//! The element stiffness of one cell.
 //!
 //! Degrees of freedom are the displacements of the corners, x and y of the first, then of the second,
 //! and so on. A stiffness in the plane does not change when the cell is scaled, so every cell is
@@ -45,7 +45,7 @@ pub fn element(corners: &[[f64; 2]], stiffness: &Voigt) -> Result<DMatrix<f64>, 
 /// Stiffness of a cell of a material whose dilatations are averaged over several cells: what each cell has to itself
 /// ([`Elastic::stiffness_of_cells`]). `cut` asks for [`cut_cell`] instead of [`element`].
 ///
-/// What a cell resists beside its mean strain is that of the whole material, which stays bounded as nu goes to 1/2;
+/// The stabilisation, beside the mean strain, is that of the whole material, which stays bounded as nu goes to 1/2;
 /// quadrilaterals are stabilised as cut cells are. Measured against the bilinear ones in a piece of a ring: on
 /// parallelograms the error at nu = 0.4999 is 1.56 times that at 0.3, not 1.67.
 ///
@@ -91,7 +91,7 @@ pub fn quadrilateral(corners: &[[f64; 2]], stiffness: &Voigt) -> Result<DMatrix<
 /// of corner displacements on affine ones. The second term does not touch affine displacements (so
 /// the patch test is exact) and resists all others (so only the three rigid motions are free).
 ///
-/// What is left to choose is `alpha`. Here it is the value for which *pure bending*, the simplest
+/// The only choice left is `alpha`. Here it is the value for which *pure bending*, the simplest
 /// displacement that is not affine, costs what it costs in the continuum: energies of bending about
 /// four axes half a right angle apart are summed, cell and continuum, and made equal. Bending costs
 /// Young's modulus, so `alpha` stays finite where the bulk modulus grows without bound (plane

@@ -1,4 +1,4 @@
-//! What the cells of a body carry: strain, stress and strain energy, cell by cell and around each particle.
+//! Strain, stress and strain energy of a body, cell by cell and around each particle.
 //!
 //! Under small rotations a cell's strain is its mean strain in the axes of the plane. Corotated, the cell is first
 //! turned back by the rotation of its mean deformation gradient, as the rule does, so that a body turned by any angle is

@@ -24,7 +24,7 @@ use crate::flock::vectors::Vectors;
 /// weights.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MaterialWeights {
-    /// Who sees whom, in the order in which it was asked for: the order of summation.
+    /// The neighbours of each particle, in the order in which they were given: the order of summation.
     pub neighbours: Neighbours,
     /// Class of each particle, shape \[count\].
     pub class: Vec<u32>,
@@ -34,7 +34,7 @@ pub struct MaterialWeights {
     pub cells: CellsAround,
 }
 
-/// What the particles of a class feel.
+/// The stiffness felt by the particles of a class.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Row {
     /// `K_ij` \[force / length\] in the order of the particle's neighbours. Zero between neighbours that
@@ -50,7 +50,7 @@ pub struct Row {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum WeightsError {
     #[error(
-        "{neighbours} neighbours cannot carry shear coupling: particles {particle} and {missing} share a cell but are no neighbours, so {}; ask for everybody with whom a particle shares a cell",
+        "{neighbours} neighbours cannot carry shear coupling: particles {particle} and {missing} share a cell but are no neighbours, so {}; ask for all particles that share a cell",
         if *.corners == 4 { "the cell's diagonal pairs are missing" } else { "the cell's stiffness is cut" }
     )]
     MissingNeighbour { particle: usize, missing: usize, neighbours: usize, corners: usize },
@@ -78,7 +78,7 @@ impl MaterialWeights {
     /// Weights of a body cut from a lattice: one material throughout.
     ///
     /// `neighbours` are those the body was built with (see [`super::cells::neighbourhood`] for the
-    /// fewest that will do); whoever shares a cell with a particle must be among them. Refuses a body
+    /// fewest that will do); every particle that shares a cell must be among them. Refuses a body
     /// that its cells do not hold together.
     pub fn assemble(
         cells: &Cells,

@@ -10,7 +10,7 @@ use nalgebra::{Complex, DMatrix};
 use super::homogenise::{Crystal, HomogeniseError};
 use crate::flock::block::{inverse, product};
 
-/// What the waves of a lattice say about its rule.
+/// Properties of a rule that the waves of its lattice show.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Zone {
     /// Whether every wave but a translation costs energy.

@@ -32,14 +32,14 @@ pub enum Wanted {
 pub enum Accuracy {
     /// To ten digits.
     Full,
-    /// To this part of how far its modulus is from 1, or to ten digits: enough to tell growth from decay.
+    /// To this part of how far its modulus is from 1, or to ten digits: enough to distinguish growth from decay.
     FromOne(f64),
 }
 
-/// What was found.
+/// The eigenvalues that were found.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Found {
-    /// One or two, as wanted; zero for the operator that makes nothing of everything.
+    /// One or two, as wanted; zero for the zero operator.
     pub eigenvalues: Vec<Ritz>,
     /// How often the operator was applied.
     pub applications: usize,
@@ -56,7 +56,7 @@ const MOST_VECTORS: usize = 240;
 const MOST_NUMBERS: usize = 1 << 25;
 
 /// Starts in which the residual has to halve: where it does not, too many eigenvalues lie as far out (those of
-/// an over-relaxed sweep stand on a circle), and no number of sweeps tells them apart.
+/// an over-relaxed sweep stand on a circle), and no number of sweeps separates them.
 const PATIENCE: usize = 8;
 
 impl Accuracy {
@@ -162,7 +162,7 @@ impl Krylov {
         if !small.iter().all(|v| v.is_finite()) {
             return None;
         }
-        // About their mean: what is told apart is what is left of a nearly idle operator.
+        // About their mean, which leaves the digits that differ between eigenvalues of a nearly idle operator.
         let mean = small.trace() / size as f64;
         let about_mean = &small - DMatrix::identity(size, size) * mean;
         let about_mean = Schur::try_new(about_mean, f64::EPSILON, 100 * size + 1000)?;
@@ -184,7 +184,7 @@ impl Krylov {
         Some((values.into_iter().map(pair).collect(), scale))
     }
 
-    /// What these combinations of the vectors add up to, real and imaginary parts alike.
+    /// The sum of these combinations of the vectors, real and imaginary parts alike.
     fn combined(&self, parts: &[DVector<Complex<f64>>]) -> Vec<f64> {
         let mut sum = vec![0.0; self.vectors[0].len()];
         for part in parts {
@@ -298,7 +298,7 @@ mod tests {
     }
 
     #[test]
-    fn an_operator_that_hardly_moves_anything_is_told_from_one_that_does_not() {
+    fn an_operator_near_the_identity_is_distinguished_from_it() {
         for power in 1..17 {
             let part = 10f64.powi(-power);
             let little = DMatrix::from_fn(120, 120, |i, j| match i.abs_diff(j) {

@@ -174,7 +174,7 @@ struct Corotated<'a> {
     step: Request,
 }
 
-/// What the cells around a particle do to it.
+/// Force and stiffness of the cells around a particle.
 struct Local {
     /// Without the load.
     force: [f64; 2],
@@ -324,7 +324,7 @@ impl Newton<'_> {
             match self.increment(&u, way.part(part), goal) {
                 Ok(Some(next)) => (u, done, stride) = (next, part, 2.0 * stride),
                 Ok(None) => stride = 0.5 * (part - done),
-                // What is wrong with the unstrained body is wrong with the scene.
+                // An error in the unstrained body is an error of the scene.
                 Err(error) if self.residuals.len() == 1 => return Err(error),
                 Err(error @ CorotatedError::Solve(SolveError::Interrupted)) => return Err(error),
                 Err(_) => stride = 0.5 * (part - done),

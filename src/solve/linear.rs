@@ -2,8 +2,8 @@
 //!
 //! Where a rule is linear in its neighbours' positions, a follower rests at `u_i = S_i sum_j W_ij u_j + c_i`.
 //! Multiplied by what its neighbours' weights add up to, `D_i`, that is a row of `K u = f`: of a scalar rule
-//! (Eq. 1) the graph Laplacian, of a material its stiffness. Frame points are no unknowns: whoever sees
-//! one sees the particles whose displacement it copies.
+//! (Eq. 1) the graph Laplacian, of a material its stiffness. Frame points are no unknowns: a particle
+//! that sees one sees the particles whose displacement it copies.
 
 use super::equilibrium::System;
 use super::operator::{Operator, OperatorError, Row};
@@ -168,7 +168,7 @@ impl Linear<'_> {
         }
     }
 
-    /// What the terms added to the mean make of it: feedback on the initial position (Eq. 4) and the
+    /// The matrix by which the terms added to the mean multiply it: feedback on the initial position (Eq. 4) and the
     /// Poisson term (Eq. 2).
     fn terms(&self, particle: usize) -> Block {
         let rule = &self.flock.rule;

@@ -270,7 +270,7 @@ pub(super) fn add(a: Site, b: Site) -> Site {
     [a[0] + b[0], a[1] + b[1]]
 }
 
-/// What two rows must share to be of one class, to the bit.
+/// The bits that two rows must share to be of one class.
 fn content(row: &Row) -> Vec<u64> {
     let blocks = |block: &Block| block.iter().flatten().map(|value| value.to_bits()).collect::<Vec<_>>();
     let mut content = blocks(&row.diagonal);

@@ -40,7 +40,7 @@ pub struct Ends {
 /// sweeps.
 ///
 /// `None` where the sweep is not linear (weights that depend on distance, power means, corotation) or
-/// where nobody follows.
+/// where no particle follows.
 pub fn spectral_radius(
     flock: &Flock,
     frame: Option<&Frame>,
@@ -52,7 +52,7 @@ pub fn spectral_radius(
     Some(linear.radius(Accuracy::Full, most_iterations))
 }
 
-/// [`spectral_radius`] as well as it takes to tell on which side of 1 it is, and about how far: to a
+/// [`spectral_radius`] as well as it takes to decide on which side of 1 it is, and about how far: to a
 /// hundredth of that, which far from 1 takes a fraction of the sweeps.
 pub fn radius_from_one(
     flock: &Flock,

@@ -11,8 +11,8 @@ use super::rows::{Coefficients, IN_CACHE};
 use super::terms::Terms;
 use crate::flock::real::Real;
 
-/// Particles that the caches are told of beforehand, and the same of lists, in bodies larger than the caches: what
-/// comes next is plain to see in the lists but not to the processor. Measured on a million particles: 1.4 times as fast.
+/// Prefetch distances in particles and in lists, for bodies larger than the caches: the processor cannot predict the
+/// addresses that the lists name. Measured on a million particles: 1.4 times as fast.
 const AHEAD: [usize; 2] = [64, 256];
 
 /// The lists of all bands, one group after the other.
@@ -128,7 +128,7 @@ impl<T: Real> Alike<'_, T> {
         }
     }
 
-    /// What [`Rule::target`](crate::flock::rules::Rule::target) computes: the rest offset is added to the mean,
+    /// Computes what [`Rule::target`](crate::flock::rules::Rule::target) does: the rest offset is added to the mean,
     /// also where it is zero, which makes 0.0 of -0.0.
     #[inline(always)]
     fn fill<const N: usize, const P: usize>(

@@ -42,7 +42,7 @@ pub struct Component<'a, T> {
     pub next: &'a mut [T],
 }
 
-/// What the rows of all runs are made of.
+/// The tables from which the rows of all runs are made.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Tables<'a> {
     /// Index distances.
@@ -92,7 +92,7 @@ struct Work<'a, 'b, T, const P: usize> {
     after: After<'a, T>,
 }
 
-/// What is made of means while they are in the first cache.
+/// The terms that complete means while they are in the first cache.
 #[derive(Clone, Copy)]
 enum After<'a, T> {
     Nothing,
@@ -124,8 +124,8 @@ impl<'a, T: Real> After<'a, T> {
     }
 }
 
-/// What loops do with means while these are in the registers: nothing, feedback, damping, both, or the Poisson
-/// term.
+/// The terms that loops apply to means while these are in the registers: none, feedback, damping, both, or the
+/// Poisson term.
 const BARE: u8 = 0;
 const FED: u8 = 1;
 const DAMPED: u8 = 2;
@@ -215,7 +215,7 @@ impl<M: Mean, T: Real, const P: usize> InLanes for Loops<'_, '_, M, T, P> {
     }
 }
 
-/// What stands in the gaps of a part.
+/// The values in the gaps of a part.
 fn set_aside<T: Real, const P: usize>(
     kept: &[u32],
     part: Range<usize>,

@@ -36,10 +36,10 @@ use rows::Rows;
 use terms::Compiled;
 use torn::DamagedRows;
 
-/// Who sees whose new position within one step.
+/// The positions, old or new, that particles see within one step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Order {
-    /// Everybody sees the old positions (the paper).
+    /// Every particle sees the old positions (the paper).
     Synchronous,
     /// Each sees the new positions of the particles numbered before it.
     Sequential,
@@ -77,14 +77,15 @@ pub struct Sweep {
     /// Present where the mean is affine in the positions and the sweep synchronous.
     rows: Option<Rows>,
     terms: Compiled,
-    /// Followers with a broken bond, whom the rows do not fit, where the rule is the plain barycentre.
+    /// Followers with a broken bond, which the rows do not fit, where the rule is the plain barycentre.
     torn: DamagedRows,
     /// The same where it is not, ascending: they are swept one by one.
     aside: Vec<u32>,
 }
 
 impl Sweep {
-    /// Compile anew whenever roles or neighbours change; whoever loses a bond is [set aside](Sweep::set_aside).
+    /// Compiles the rows, anew whenever roles or neighbours change; particles that lose a bond are
+    /// [set aside](Sweep::set_aside).
     pub fn compile(update: Update, flock: &Flock, roles: &[Role]) -> Self {
         let mut sweep = Self::uncompiled(update, flock, roles);
         if update.order == Order::Synchronous {
@@ -161,7 +162,7 @@ impl Sweep {
         }
     }
 
-    /// Those whom the rows do not fit any more; what these left in their places is written over.
+    /// Moves the particles that the rows do not fit any more; the values that the rows left there are overwritten.
     fn step_aside(&self, flock: &Flock, present: &Vectors, next: &mut Vectors) {
         let moved = |&j: &u32| (j, self.moved(j as usize, flock, present));
         if self.aside.len() >= ASIDE_IN_PARALLEL && rayon::current_num_threads() > 1 {
@@ -172,8 +173,9 @@ impl Sweep {
         }
     }
 
-    /// Takes up to [`MOST_STEPS`] steps at once, by a sweep that [`Sweep::takes_several`]; the bits are those of single steps. `next` must hold the positions before the last step, but for those who are led. For
-    /// each step, whether somebody moved farther in it than `farther` \[length\] along an axis.
+    /// Takes up to [`MOST_STEPS`] steps at once, by a sweep that [`Sweep::takes_several`]; the bits are those of single
+    /// steps. `next` must hold the positions before the last step, but for led particles. Returns for each step
+    /// whether any particle moved farther in it than `farther` \[length\] along an axis.
     pub fn steps(
         &self,
         flock: &Flock,

@@ -3,9 +3,9 @@
 //! In the lattice's numbering every interior particle of a column finds its neighbours a fixed
 //! number of places before and after itself, so a column needs one row of distances and no lists. The index
 //! lists are compressed into such *runs* wherever they allow it; edges, holes and irregular bodies
-//! keep theirs, as *gathers*. What the neighbours count is kept by class: the same for all that share it. Both ways sum
-//! in the neighbours' order and divide once, which is what [`Rule::target`](crate::flock::rules::Rule::target) does:
-//! the bits are the same.
+//! keep theirs, as *gathers*. Coefficients of neighbours are kept by class, for all particles that share it. Both ways
+//! sum in the neighbours' order and divide once, as [`Rule::target`](crate::flock::rules::Rule::target) does: the
+//! bits are the same.
 //!
 //! The particles are parted into *bands* in their numbering, at least as long as a particle sees far. A
 //! particle then sees nothing beyond the next band on either side, which is what lets a sweep take several
@@ -49,7 +49,7 @@ pub(super) const IN_CACHE: usize = 1 << 18;
 /// one run.
 const GAPS: [usize; 2] = [6, MOST_KEPT];
 
-/// What neighbours count, row after row.
+/// Coefficients of neighbours, row after row.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum Coefficients {
     /// All the same.
@@ -115,7 +115,7 @@ pub(super) struct Run {
     pub rests: bool,
 }
 
-/// What the neighbours of each particle count, before it is compiled.
+/// Coefficients of each particle's neighbours, before they are compiled.
 #[derive(Clone, Copy)]
 enum Source<'a> {
     Equal,
@@ -268,7 +268,7 @@ impl Rows {
         if let Some(listed) = listed.filter(|_| self.runs.len() > first_of_band) {
             let last = self.runs.last_mut().expect("the band has one");
             let gap = (last.start + last.len)..j as u32;
-            // Those in the gap who follow by lists are computed after the runs; the others must not change.
+            // Followers in the gap that have lists are computed after the runs; the others must not change.
             let still = gap.clone().filter(|i| listed.binary_search(i).is_err());
             let same =
                 (last.distances, last.neighbours, last.coefficients) == (distances, size, coefficients);
@@ -372,7 +372,7 @@ impl Rows {
     }
 }
 
-/// How many places away the farthest neighbour of anybody who follows is.
+/// Index distance to the farthest neighbour of any follower.
 fn reach(neighbours: &Neighbours, follows: &[bool]) -> usize {
     let farthest = |j: usize| neighbours.of(j).iter().map(|&k| j.abs_diff(k as usize)).max().unwrap_or(0);
     (0..follows.len()).filter(|&j| follows[j]).map(farthest).max().unwrap_or(0)

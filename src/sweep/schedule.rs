@@ -1,6 +1,6 @@
 //! Several steps while the particles are in the caches.
 //!
-//! A body larger than the caches is swept at the speed of its memory, once for every step. But nobody sees
+//! A body larger than the caches is swept at the speed of its memory, once for every step. But no particle sees
 //! farther than into the bands beside its own, so a band may take its next step as soon as its neighbours
 //! have taken the last: the first band takes step 1; then the second takes step 1 and the first step 2;
 //! and so on, a front of a few bands that runs through the body once for all steps together. Two arrays
@@ -39,7 +39,7 @@ const TILES: [usize; 2] = [512, 64];
 /// Bands swept in one go where each step is taken by itself: enough for what is asked of each band not to count.
 const MOST_BANDS: usize = 8;
 
-/// Who is led from outside while several steps are taken.
+/// The particles that are led from outside while several steps are taken.
 #[derive(Clone, Copy)]
 pub struct Led<'a> {
     /// Their indices, ascending.
@@ -87,7 +87,7 @@ impl Activity {
     }
 }
 
-/// What several steps are taken by.
+/// Several steps to be taken, and their input.
 #[derive(Clone, Copy)]
 pub struct Steps<'a, T> {
     pub rows: &'a Rows,
@@ -99,7 +99,7 @@ pub struct Steps<'a, T> {
     pub led: Led<'a>,
     /// How many, from 1 to [`MOST_STEPS`].
     pub count: usize,
-    /// Where it is asked after each step whether somebody moved farther than this \[length\].
+    /// Distance with which the movement of each step is compared, along each axis \[length\].
     pub farther: Option<f64>,
     /// Threads to share the work among, if the body is worth it.
     pub threads: usize,
@@ -107,8 +107,8 @@ pub struct Steps<'a, T> {
 
 impl<T: Real> Steps<'_, T> {
     /// Takes the steps. After an odd number of them the result stands in `odd`, after an even number in
-    /// `even`, which holds the present positions; the other holds those one step before. For each step, whether somebody
-    /// moved farther in it than asked along an axis.
+    /// `even`, which holds the present positions; the other holds those one step before. Returns for each step whether
+    /// any particle moved farther in it than `farther` along an axis.
     pub fn take(&self, activity: &mut Activity, even: [&mut [T]; 2], odd: [&mut [T]; 2]) -> Vec<bool> {
         let ([changed_x, changed_y], [even_x, even_y], [odd_x, odd_y]) = (&mut activity.changed, even, odd);
         let threads = if even_x.len() < PARALLEL_FROM { 1 } else { self.threads };
@@ -205,7 +205,7 @@ impl<T: Real> Steps<'_, T> {
     }
 }
 
-/// What was seen on the way.
+/// Counts and flags collected on the way.
 #[derive(Default)]
 struct Seen {
     computed: u64,
@@ -279,8 +279,8 @@ impl<T: Real, const P: usize> Wavefront<'_, T, P> {
     /// Runs through the bands; `range` names those that take a level, whose ends move by one band a level or not at all.
     fn run(mut self, range: impl Fn(usize) -> Range<usize>, seen: &mut Seen) {
         let count = self.steps.count;
-        // No band may get ahead of the one behind it if nothing binds who sees whom; a single step has no front; and
-        // what the caches hold needs none.
+        // No band may get ahead of the one behind it if nothing bounds how far particles see. A single step has no
+        // front, and a body within the caches needs none.
         if count == 1 || !self.steps.rows.is_local() || self.steps.rows.is_in_cache() {
             (1..=count).for_each(|level| self.sweep(level, range(level), seen));
             return;
@@ -314,8 +314,8 @@ impl<T: Real, const P: usize> Wavefront<'_, T, P> {
         }
     }
 
-    /// Puts those of a band who are led in their places; whether one of them moves, or somebody that the band sees did
-    /// in the step before.
+    /// Puts the led particles of a band in their places. Returns whether one of them moves, or whether a particle that
+    /// the band sees moved in the step before.
     fn may_change(&mut self, level: usize, band: usize) -> bool {
         let Self { steps, axes, stretch, rows } = self;
         let (compiled, levels) = (steps.rows, steps.count + 1);
@@ -418,7 +418,7 @@ const PIECE: usize = 64;
 
 /// Whether any bit differs.
 fn differ<T: Real>(before: &[T], after: &[T]) -> bool {
-    // One of them tells in most cases; not one at the end or the middle of a column, which may be held.
+    // One value suffices in most cases; not one at the end or the middle of a column, which may be held.
     let one = before.len() * 5 / 13;
     if before.get(one).map(|value| value.bits()) != after.get(one).map(|value| value.bits()) {
         return true;
@@ -427,7 +427,7 @@ fn differ<T: Real>(before: &[T], after: &[T]) -> bool {
     pieces.any(|(a, b)| a.iter().zip(b).fold(0, |bits, (a, b)| bits | (a.bits() ^ b.bits())) != 0)
 }
 
-/// Whether anyone moved farther than `limit`.
+/// Whether any particle moved farther than `limit`.
 fn is_farther<T: Real>(before: &[T], after: &[T], limit: f64) -> bool {
     let mut pieces = before.chunks(PIECE).zip(after.chunks(PIECE));
     pieces

@@ -1,4 +1,4 @@
-//! What is made of a mean while it is in the registers: the Poisson term, feedback, damping.
+//! The terms that complete a mean while it is in the registers: the Poisson term, feedback, damping.
 //!
 //! The same sums and products as [`Rule::target`](crate::flock::rules::Rule::target), in the same order: the bits are
 //! the same.
@@ -43,7 +43,7 @@ struct Overshoot<'a, T> {
     from: Option<[&'a [T]; 2]>,
 }
 
-/// What is made of means while they are in the registers.
+/// Completes means while they are in the registers.
 pub(super) trait Finish<T> {
     /// Of `W` particles from number `at` of a part on.
     fn lanes<const W: usize>(&self, at: usize, target: &mut [T]);

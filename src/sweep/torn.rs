@@ -1,10 +1,10 @@
-//! The plain barycentre of particles that have lost neighbours: over those who are left and the ghosts.
+//! The plain barycentre of particles that have lost neighbours: over the neighbours that are left and the ghosts.
 //!
-//! Along a crack consecutive particles have mostly lost the same neighbours: they are swept as runs, like those of a
-//! [rows](super::rows) but for what stands in for the lost. The others are grouped by what they see, so that
+//! Along a crack consecutive particles have mostly lost the same neighbours: they are swept as runs, like those of
+//! [rows](super::rows) but for the stand-ins of the lost. The others are grouped by what they see, so that
 //! nothing is decided particle by particle. The sums are those of
 //! [`Flock::target`](crate::flock::law::Flock::target) in the same order: the bits are the same.
-//! What broke renews its band alone.
+//! A broken bond renews its band alone.
 
 #[cfg(test)]
 mod tests;
@@ -44,7 +44,7 @@ struct Band {
     /// Others that see the same, by their places in `members`.
     groups: Vec<Alike>,
     members: Vec<u32>,
-    /// What those of each run and group see, one after the other.
+    /// The neighbours that each run and group sees, one list after the other.
     seen: Vec<SeenNeighbour>,
 }
 
@@ -69,7 +69,7 @@ enum SeenNeighbour {
 }
 
 impl SeenNeighbour {
-    /// What stands for both this, seen by some, and `other`, seen by the next particle.
+    /// A description that fits both this, seen by some, and `other`, seen by the next particle.
     fn shared(self, other: SeenNeighbour) -> Option<SeenNeighbour> {
         match (self, other) {
             (SeenNeighbour::Offset(a, of_a), SeenNeighbour::Offset(b, of_b)) if a == b => {
@@ -86,7 +86,7 @@ impl SeenNeighbour {
 }
 
 impl DamagedRows {
-    /// Nobody yet, in these bands one after the other.
+    /// Without particles yet, in these bands one after the other.
     pub fn new(bands: impl Iterator<Item = Range<usize>>) -> Self {
         let empty = |particles| Band { particles, ..Band::default() };
         Self { bands: bands.map(empty).collect() }
@@ -102,7 +102,7 @@ impl DamagedRows {
         self.bands.iter().map(|band| in_runs(band) + band.members.len()).sum()
     }
 
-    /// Finds the runs anew where these particles are, who have lost a bond since.
+    /// Finds the runs anew in the bands of these particles, which have lost a bond since.
     pub fn renew(
         &mut self,
         particles: impl IntoIterator<Item = usize>,
@@ -128,7 +128,7 @@ impl DamagedRows {
     }
 }
 
-/// What a particle sees, in the order in which it is summed.
+/// The neighbours and stand-ins that a particle sees, in the order of summation.
 fn seen_by<'a>(
     j: usize,
     bonds: &'a Bonds,
@@ -280,7 +280,7 @@ fn sweep_group(particles: &[u32], look: RowTerms<'_>, component: &mut Component<
 #[repr(align(64))]
 struct Lanes<const W: usize>([f64; W]);
 
-/// What some particles see of one coordinate.
+/// One coordinate of the neighbours that some particles see.
 #[derive(Clone, Copy)]
 struct RowTerms<'a> {
     seen: &'a [SeenNeighbour],
@@ -289,9 +289,9 @@ struct RowTerms<'a> {
 }
 
 impl RowTerms<'_> {
-    /// What [`Rule::target`](crate::flock::rules::Rule::target) computes: the rest offset is added to the mean, also
-    /// where it is zero, which makes 0.0 of -0.0; whoever sees nobody stays. `of` reads numbers, those of particle
-    /// number `first` first, at a distance of indices from the particles.
+    /// Computes what [`Rule::target`](crate::flock::rules::Rule::target) does: the rest offset is added to the mean,
+    /// also where it is zero, which makes 0.0 of -0.0; a particle that sees none stays. `of` reads numbers, those of
+    /// particle number `first` first, at a distance of indices from the particles.
     #[inline(always)]
     fn targets<const W: usize>(
         &self,

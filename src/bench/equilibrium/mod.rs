@@ -32,7 +32,7 @@ const BODY_BYTES: f64 = 16.0 + 8.0 + 36.0 + 4.0;
 /// A body with one coarser level, too small to leave room for that of another.
 const WARM_UP: Plate = Plate { cells: [28, 28], holes: false };
 
-/// What to measure.
+/// Options of the measurement.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Options {
     /// Small bodies and few repetitions, to see that it runs; the times mean little.
@@ -71,7 +71,7 @@ pub struct Case {
     pub to_error: Vec<ToError>,
     /// Highest resident memory during the multigrid solve above that before, the body's own arrays
     /// included: positions 16, sites 8, neighbour lists 36, classes 4 \[B\]. Absent where the system does
-    /// not tell.
+    /// not report it.
     pub bytes_per_particle: Option<f64>,
 }
 

@@ -8,7 +8,7 @@ use std::fmt;
 
 use serde::Serialize;
 
-/// What could be measured.
+/// The cases that could be measured.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Report {
     pub cases: Vec<Case>,
@@ -103,7 +103,7 @@ mod over_dds {
     /// For a target.
     const PATIENCE: Duration = Duration::from_millis(250);
 
-    /// For the first target of everybody.
+    /// For the first target of all robots.
     const DISCOVERY: Duration = Duration::from_secs(10);
 
     /// Of all rounds of a case together.

@@ -1,4 +1,4 @@
-//! What a swarm costs: robots served by a thread, the control loop's tick, and the way over the network.
+//! The costs of a swarm: robots served by a thread, the control loop's tick, and the way over the network.
 //!
 //! * [`rule`]: neighbour query and rule of all robots, and the same with the safety filter.
 //! * [`tick`]: [`Control`](crate::swarm::control::Control)'s whole tick with fresh poses.
@@ -15,14 +15,14 @@ use serde::Serialize;
 use crate::scene::SceneError;
 use crate::scene::swarm::Swarm;
 
-/// What to measure.
+/// Options of the measurement.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Options {
     /// The smallest swarms and few repetitions, to see that it runs; the times mean little.
     pub quick: bool,
 }
 
-/// What [`Options`] stand for.
+/// The amount of work that [`Options`] stand for.
 struct Effort {
     robots: &'static [usize],
     /// Robots, and how often the rule is applied in a tick.

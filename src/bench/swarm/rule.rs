@@ -46,7 +46,7 @@ const SETS: usize = 8;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Case {
     pub robots: usize,
-    /// Whom a robot sees, on average \[1\].
+    /// Neighbours of a robot, on average \[1\].
     pub neighbours: f64,
     /// Neighbour query and rule of all robots \[s\].
     pub rule_seconds_per_tick: f64,

@@ -24,7 +24,7 @@ pub struct Case {
 /// Of a tick [s].
 const PERIOD: f64 = 0.05;
 
-/// How far robots are from their places, at most [m]: so that nobody stands where the rule wants it.
+/// How far robots are from their places, at most [m]: so that none stands where the rule wants it.
 const ASIDE: f64 = 0.03;
 
 pub(super) fn measure(robots: usize, sweeps: usize, effort: &Effort) -> Case {

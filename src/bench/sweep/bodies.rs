@@ -114,7 +114,7 @@ impl Body {
     }
 
     fn new(side: usize, reference: Vectors, neighbours: Neighbours, roles: Vec<Role>) -> Self {
-        // Nobody at rest to the bit, so that there is something to compute everywhere.
+        // No particle at rest to the bit, so that there is something to compute everywhere.
         let waves = |[x, y]: [f64; 2]| [x + 0.01 * (0.1 * y).sin(), y + 0.01 * (0.1 * x).sin()];
         let present = reference.iter().map(waves).collect();
         let (rule, weights, reference) = (Rule::BARYCENTRE, Weights::Equal, reference.into());
@@ -166,7 +166,7 @@ fn square(side: usize, steps_together: usize) -> Subject {
     Body::square(side, &FIRST).subject(PLAIN, BYTES_PER_UPDATE, steps_together)
 }
 
-/// What one would write without thinking of caches: for each column, for each row.
+/// The plain loop, written without regard to caches: for each column, for each row.
 fn plain_loop(side: usize) -> Subject {
     let Vectors { x, y } = Body::square(side, &FIRST).present;
     let mut present = [x, y];
@@ -283,7 +283,7 @@ fn lists(side: usize, order: &'static str) -> Subject {
     subject
 }
 
-/// The places of a hexagonal lattice, jumbled so little that nobody's neighbours change but no two are translates, and
+/// The places of a hexagonal lattice, jumbled so little that no neighbours change but no two are translates, and
 /// the lists of those inside.
 fn hexagonal(side: usize) -> (Vectors, Vec<Vec<u32>>) {
     let at = |column: usize, row: usize| (column * side + row) as u32;

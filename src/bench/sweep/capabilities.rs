@@ -1,4 +1,4 @@
-//! What a scene pays for what it does not name, and for what it names.
+//! The costs of capabilities that a scene does not name, and of those that it names.
 
 use std::time::Instant;
 
@@ -26,7 +26,7 @@ pub struct Capability {
     pub over_bare_loops: f64,
 }
 
-/// What is recorded in each step.
+/// The record taken in each step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Recorded {
     Nothing,
@@ -36,7 +36,7 @@ enum Recorded {
 
 use Recorded::{Everything, Nothing, Probes};
 
-/// What is named, the keys that name it, and what is recorded.
+/// Each capability, the keys that name it, and what is recorded.
 const NAMED: [(&str, &[&str], Recorded); 14] = [
     ("nothing named", &[], Nothing),
     ("fracture", &["fracture={stretch=3.0}"], Nothing),

@@ -20,14 +20,14 @@ pub use capabilities::{Capability, measure as measure_capabilities};
 
 const THREADS: [usize; 2] = [1, 2];
 
-/// What to measure.
+/// Options of the measurement.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Options {
     /// Small bodies and few repetitions, to see that it runs; the times mean little.
     pub quick: bool,
 }
 
-/// What [`Options`] stand for.
+/// The amount of work that [`Options`] stand for.
 struct Effort {
     /// Particles along each side of the square bodies.
     sides: &'static [usize],
@@ -63,7 +63,7 @@ pub struct Report {
     /// One entry for each number of threads: the median over the whole run.
     pub triad: Vec<Bandwidth>,
     pub cases: Vec<Case>,
-    /// What a step of the engine costs over the bare loops, and what each capability adds where it is named.
+    /// The cost of a step of the engine over the bare loops, and that of each capability where it is named.
     pub capabilities: Vec<Capability>,
 }
 

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
-/// What is timed.
+/// The work that is timed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Work {
@@ -32,7 +32,7 @@ impl Work {
     }
 }
 
-/// One side of a way. A message bears a mark, by which an answer is told from one that came late.
+/// One side of a way. A message bears a mark, which distinguishes an answer from one that came late.
 pub trait End {
     /// Writes every pose of the next message.
     fn fill(&mut self) -> Result<(), String>;
@@ -58,7 +58,7 @@ const PATIENCE: Duration = Duration::from_secs(2);
 /// Round trips before the first that counts.
 const WARM_UP: u64 = 20;
 
-/// What was measured of one way, over several turns.
+/// Measurements of one way, over several turns.
 #[derive(Clone, Debug, Default)]
 pub struct Samples {
     round_trips: Vec<f64>,
@@ -133,7 +133,7 @@ impl Samples {
 /// Round trips between two ends, so many at most and for so long \[s\], added to `samples`.
 ///
 /// # Errors
-/// What an end says, or that the first message was not answered.
+/// The error of an end, or that the first message was not answered.
 pub fn exchange(
     mut near: Box<dyn End>,
     far: Open,
@@ -236,7 +236,7 @@ fn ask(
     Ok(warm)
 }
 
-/// Answers until it is told to stop; how long each message was under way \[s\].
+/// Answers until `stop` is set; returns how long each message was under way \[s\].
 fn answer(
     far: &mut dyn End,
     work: Work,

@@ -1,16 +1,17 @@
-//! What it costs to carry poses to another thread and back: our transport beside what it stands on and what people
+//! The cost of carrying poses to another thread and back: our transport beside what it stands on and what people
 //! would use instead, in one run.
 //!
 //! Two threads; one sends a message of so many poses, the other answers with one as large ([`measure`]). Two things
 //! are timed:
 //!
 //! * **hand-off**: the message lies ready in the sender's memory (for shared memory: in a slice of it), and counts as
-//!   arrived when the receiver can read it where it lies. Who copies or encodes pays for it here.
+//!   arrived when the receiver can read it where it lies. Copies and encoding count here.
 //! * **filled and read**: writing every pose into the message and adding all of them up at the other side count too.
 //!
 //! The ways (`ways`, and `dds` with feature `ros`): a channel of the standard library that hands a vector over,
 //! iceoryx2 as it comes, our [`shm`](crate::shm) on top of it as the node uses it, a Unix socket, and DDS over loopback
-//! as the node uses it (polled every 50 us). Nobody spins: on cores that others use too, who spins waits for itself.
+//! as the node uses it (polled every 50 us). No side spins: on shared cores a spinning thread delays the one that it
+//! waits for.
 //!
 //! All but DDS take turns within a size, several times over, so that a busy moment of the computer meets all alike.
 
@@ -26,14 +27,14 @@ use serde::Serialize;
 use crate::shm::payload::Pose;
 use measure::{Case, Samples, Work, exchange};
 
-/// What to measure.
+/// Options of the measurement.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Options {
     /// Small messages and few of them, to see that it runs; the times mean little.
     pub quick: bool,
 }
 
-/// What [`Options`] stand for.
+/// The amount of work that [`Options`] stand for.
 #[derive(Clone, Copy, Debug)]
 pub struct Effort {
     /// Poses in a message.
@@ -83,7 +84,7 @@ impl Report {
     }
 }
 
-/// A pose of a round: its number is its member, and every coordinate can be told from the others.
+/// A pose of a round: its number is its member, and every coordinate differs from the others.
 fn pose(k: usize) -> Pose {
     Pose { member: k as u32, frame: 0, position: [k as f64, 0.5], yaw: 0.25, stamp: 0.0 }
 }

@@ -79,7 +79,7 @@ fn open_channel(poses: usize) -> Result<Ends, String> {
 
 impl End for Channel {
     fn fill(&mut self) -> Result<(), String> {
-        // What arrived is written over, so that nothing is allocated.
+        // The message that arrived is written over, so that nothing is allocated.
         if self.own.is_empty() {
             self.own = std::mem::take(&mut self.arrived);
         }
@@ -145,7 +145,7 @@ fn open_ours(poses: usize) -> Result<Ends, String> {
 
 impl End for Ours {
     fn fill(&mut self) -> Result<(), String> {
-        // What was not sent goes back first: one slice at a time.
+        // A slice that was not sent goes back first: one at a time.
         self.own = None;
         self.own = Some(self.writer.fill(self.poses, pose).map_err(words)?);
         Ok(())
@@ -232,7 +232,7 @@ fn open_raw(poses: usize) -> Result<Ends, String> {
 
 impl End for Raw {
     fn fill(&mut self) -> Result<(), String> {
-        // What was not sent goes back first: one slice at a time.
+        // A slice that was not sent goes back first: one at a time.
         self.own = None;
         self.own = Some(self.publisher.loan_slice_uninit(self.poses).map_err(words)?.write_from_fn(pose));
         Ok(())

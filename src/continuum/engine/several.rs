@@ -22,8 +22,8 @@ impl Engine {
         most.min(until).min(MOST_STEPS)
     }
 
-    /// Takes so many steps, as many as [`Engine::steps_at_once`] allows; the bits are those of single ones. For each,
-    /// whether somebody is known to have moved farther in it than `farther` \[length\].
+    /// Takes so many steps, as many as [`Engine::steps_at_once`] allows; the bits are those of single ones.
+    /// Returns for each whether a particle is known to have moved farther in it than `farther` \[length\].
     pub fn advance_by(&mut self, count: usize, farther: Option<f64>) -> Vec<bool> {
         let (leaders, changes, step) = (&self.leaders, &self.changes, self.step);
         let place = |which: usize, level: usize| {
@@ -32,10 +32,10 @@ impl Engine {
         let led = Led { particles: &self.led, place: &place };
         let places = (&mut self.present, &mut self.previous);
         let frame = self.body.frame.as_ref();
-        let told = self.sweep.steps(&self.flock, frame, places, (count, led, farther), &mut self.activity);
+        let moved = self.sweep.steps(&self.flock, frame, places, (count, led, farther), &mut self.activity);
         self.step += count;
         self.settled = None;
-        told
+        moved
     }
 
     /// Puts the body back to where it stood at an earlier step, with the same roles, as if it had not gone on.
@@ -48,7 +48,7 @@ impl Engine {
         self.activity.forget();
     }
 
-    /// What was swept so far.
+    /// Activity of the sweeps so far.
     pub fn activity(&self) -> &Activity {
         &self.activity
     }
@@ -80,7 +80,7 @@ impl Engine {
 pub struct Reach {
     /// How many times as far from the reference a particle gets as any was \[1\].
     pub gain: f64,
-    /// What is added by loads, and by rest offsets that are missing \[length\].
+    /// Distance added by loads, and by rest offsets that are missing \[length\].
     pub offset: f64,
 }
 

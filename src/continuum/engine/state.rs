@@ -1,7 +1,7 @@
 //! An engine on its way, taken out and put back to the bit.
 //!
-//! What a plan says anew (the body, who sees whom, weights, loads, the leaders' motions) is no part of the
-//! state: it is planned again, and [`digest`] tells whether it came out the same.
+//! The contents of a plan (the body, its neighbours, weights, loads, the leaders' motions) are no part of the
+//! state: they are planned again, and [`digest`] shows whether they came out the same.
 
 use serde::{Deserialize, Serialize};
 
@@ -163,7 +163,7 @@ impl Engine {
     }
 }
 
-/// A fingerprint of everything in a plan that its run depends on, for telling a plan from another: 64 bits,
+/// A fingerprint of everything in a plan that its run depends on, to distinguish plans: 64 bits,
 /// FNV-1a (G. Fowler, L. C. Noll, K.-P. Vo). Not secure against forgery.
 pub fn digest(plan: &Plan) -> u64 {
     let mut digest = Fnv(0xcbf2_9ce4_8422_2325);
@@ -195,7 +195,7 @@ pub fn digest(plan: &Plan) -> u64 {
     }
     probes.iter().for_each(|&probe| digest.bytes(&(probe as u64).to_le_bytes()));
     if body.numbering.is_some() {
-        // What was written of the run until now has these ids, in this order.
+        // The files written so far have these ids, in this order.
         body.rows().for_each(|i| digest.bytes(&(body.id(i) as u64).to_le_bytes()));
     }
     digest.0
@@ -243,7 +243,7 @@ mod tests {
         Plan::new(scene).expect("can be laid out")
     }
 
-    /// The state, and what depends on who is seen: PE1 and the residual, then how the run ended.
+    /// The state, and what depends on the neighbours: PE1 and the residual, then how the run ended.
     fn bits(outcome: &Outcome) -> (EngineState, Vec<u64>, String) {
         let engine = &outcome.engine;
         let pe1 = (0..engine.body().count()).map(|i| engine.pe1(i));
@@ -337,7 +337,7 @@ mod tests {
     }
 
     #[test]
-    fn the_digest_tells_plans_apart_by_what_a_run_depends_on() {
+    fn the_digest_distinguishes_plans_by_what_a_run_depends_on() {
         let of = |sets: &[&str]| digest(&plan(&scene("tension", sets)));
         let plain = of(&[]);
         assert_eq!(plain, of(&["title=another", "record.figures=[3]"]));

@@ -59,7 +59,7 @@ pub(crate) fn bodies() -> impl Iterator<Item = (String, Flock)> {
     })
 }
 
-/// What [`Bonds::break_stretched`] does, each bond measured for itself.
+/// The same as [`Bonds::break_stretched`], each bond measured for itself.
 fn break_one_by_one(
     broken: &mut [bool],
     (step, threshold): (usize, Threshold),
@@ -237,7 +237,7 @@ fn a_ghost_loses_all_its_bonds() {
 }
 
 #[test]
-fn a_bond_is_measured_exactly_where_a_square_would_not_tell() {
+fn a_bond_is_measured_exactly_where_its_square_is_too_coarse() {
     // At the threshold to the last bit, just beyond it, and where squares overflow or vanish.
     for scale in [1e-200, 1.0, 1e200] {
         let neighbours = Neighbours::from_lists([vec![1], vec![0]]);

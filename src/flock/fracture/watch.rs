@@ -1,9 +1,9 @@
 //! The bonds that may still break, in a form that a step looks over quickly.
 //!
 //! Consecutive particles mostly have bonds of the same index distance and of nearly the same limit. Such a *span* of
-//! bonds is measured by squares, many at a time and without lists, against the least of their limits; whoever is near
-//! it is named, to be measured exactly. A pair that sees each other is watched once. What has broken is watched no
-//! more, so that a cracked body costs no more than a whole one.
+//! bonds is measured by squares, many at a time and without lists, against the least of their limits; a bond near it
+//! is named, to be measured exactly. A pair that sees each other is watched once. Broken bonds are no longer watched,
+//! so that a cracked body costs no more than a whole one.
 
 use std::ops::Range;
 
@@ -37,7 +37,7 @@ struct Span {
     /// The first particle, counted from the block's first.
     first: u16,
     len: u16,
-    /// Whom the first particle is bound to.
+    /// The particle that the first one is bound to.
     other: u32,
     /// Square below which a bond is surely within its limit \[length^2\].
     bound: f64,
@@ -146,8 +146,8 @@ fn is_bond_to(neighbours: &Neighbours, bond: usize, particle: usize) -> bool {
 /// all those bonds are measured exactly.
 fn square_within(limit: f64) -> f64 {
     let square = limit * limit;
-    let tells = limit > 0.0 && square > f64::MIN_POSITIVE / NEAR_THRESHOLD;
-    if tells { square.min(f64::MAX) * (1.0 - NEAR_THRESHOLD) } else { 0.0 }
+    let is_usable = limit > 0.0 && square > f64::MIN_POSITIVE / NEAR_THRESHOLD;
+    if is_usable { square.min(f64::MAX) * (1.0 - NEAR_THRESHOLD) } else { 0.0 }
 }
 
 /// Spans in the making.

@@ -1,4 +1,4 @@
-//! Points that may be near those of one cell, and the test of who is.
+//! Points that may be near those of one cell, and the test of which are.
 //!
 //! Most of a neighbour query is this test: three candidates for every neighbour. It is compiled twice,
 //! as the loops of [`lanes`](crate::flock::lanes) are.
@@ -35,7 +35,7 @@ impl Slots {
         (self.members[slot], self.x[slot], self.y[slot]) = (member, x, y);
     }
 
-    /// Whoever in a stretch of slots is within `radius` of a place \[length\].
+    /// The points in a stretch of slots within `radius` of a place \[length\].
     pub fn near(&self, run: Range<usize>, here: [f64; 2], radius: f64) -> impl Iterator<Item = u32> {
         let points = self.members[run.clone()].iter().zip(self.x[run.clone()].iter().zip(&self.y[run]));
         let near = points.filter(move |&(_, (&x, &y))| (x - here[0]).hypot(y - here[1]) <= radius);
@@ -80,7 +80,7 @@ impl Candidates {
         self.count + LANES
     }
 
-    /// Lists who else is within `radius` \[length\] of each of the numbers `own`, one list after the other
+    /// Lists the others within `radius` \[length\] of each of the numbers `own`, one list after the other
     /// in `lists`, which has [`Candidates::room`] for each; and how long each is.
     pub fn list_near(&mut self, own: Range<usize>, radius: f64, lists: &mut [u32], lengths: &mut Vec<u32>) {
         if !SQUARABLE.contains(&radius) {
@@ -125,7 +125,7 @@ impl Candidates {
         kept
     }
 
-    /// The same where squares cannot tell.
+    /// The same where squares are too coarse.
     #[cold]
     fn keep_exactly(&self, own: usize, radius: f64, list: &mut [u32]) -> usize {
         let Slots { members, x, y } = &self.slots;
@@ -158,7 +158,7 @@ fn bounds(radius: f64) -> [f64; 2] {
 }
 
 /// Marks whose squared distance is within the radius by 1, the others by 0; false if one of them is so
-/// near to the radius that squares cannot tell. As wide as the coordinates, for the sake of vectors.
+/// near to the radius that squares are too coarse. As wide as the coordinates, for the sake of vectors.
 #[inline(always)]
 fn mark_near((x, y): (&[f64], &[f64]), here: [f64; 2], bounds: [f64; 2], near: &mut [u64]) -> bool {
     let [surely, hardly] = bounds;
@@ -198,7 +198,7 @@ mod avx2 {
         all
     }
 
-    /// What [`Candidates::list_near_anywhere`] does.
+    /// The same as [`Candidates::list_near_anywhere`].
     #[target_feature(enable = "avx2,popcnt")]
     pub fn list_near(
         around: &Candidates,

@@ -41,7 +41,7 @@ fn a_target_among_all_neighbours_is_the_target() {
 }
 
 #[test]
-fn whoever_is_lost_leaves_the_rest_where_it_was() {
+fn losing_a_neighbour_leaves_the_particle_at_rest() {
     let (mut material, present) = triangle();
     material.forces = None;
     let mut scalar = Flock { rule: Rule::BARYCENTRE, weights: Weights::Equal, ..material.clone() };

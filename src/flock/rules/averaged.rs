@@ -23,7 +23,7 @@ pub struct PatchCell<'a> {
     pub slots: &'a [u32],
 }
 
-/// What one patch does to a particle, and how that changes.
+/// The force of one patch on a particle, and its derivatives.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PatchRow {
     /// \[force, world frame\]

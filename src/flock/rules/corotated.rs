@@ -34,7 +34,7 @@ use super::ParticleState;
 use super::averaged::{self, PatchCell};
 use crate::flock::block::{Block, apply, inverse, plus, product, transposed};
 
-/// What a cell resists.
+/// The stiffness of a cell.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Element {
     /// `K_ij` by rows \[force / length\], shape \[corners, corners\]; symmetric, and no force under a rigid motion.
@@ -111,7 +111,7 @@ impl Turn {
     }
 }
 
-/// What one corner of a cell feels, and how that changes.
+/// The force on one corner of a cell, and its derivatives.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CellRow {
     pub turn: Turn,

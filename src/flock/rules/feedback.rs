@@ -6,7 +6,7 @@
 
 use super::ParticleState;
 
-/// What `MT` in Eq. 4 is.
+/// The position `MT` in Eq. 4.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FeedbackReference {
     /// The position in the reference configuration (the paper's `MT(j, t0)`).

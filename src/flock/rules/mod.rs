@@ -117,8 +117,8 @@ impl Rule {
         }
     }
 
-    /// What [`Rule::target`] gives for a material of small rotations, which looks at nothing but pairs of
-    /// weight and position: for sweeps, that have them at hand.
+    /// The same as [`Rule::target`] for a material of small rotations, which needs only pairs of weight and
+    /// position: for sweeps, which have them at hand.
     #[inline]
     pub fn target_of_material(
         &self,

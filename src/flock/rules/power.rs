@@ -9,7 +9,7 @@
 
 use super::Neighbour;
 
-/// What coordinates are measured from.
+/// The origin from which coordinates are measured.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Origin {
     /// `margin` \[length\] below the lowest neighbour, on each axis: translation-invariant.

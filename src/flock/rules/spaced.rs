@@ -3,7 +3,7 @@
 //! `w_k = d(k,j)^p`.
 //!
 //! Not in the paper. Its barycentre has no distance that particles keep, so a drop whose neighbours
-//! are whoever is near contracts to a point; here every neighbour proposes the place at distance `a`
+//! are all particles in range contracts to a point; here every neighbour proposes the place at distance `a`
 //! from itself, as in flocking models (cohesion, separation) and position-based dynamics. With `p`
 //! well below 0 the nearest have the say, and particles do not crowd.
 

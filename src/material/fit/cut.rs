@@ -1,4 +1,4 @@
-//! What an outline leaves of the cells that it passes.
+//! Cuts the cells that an outline passes.
 //!
 //! The outline becomes a chain of chords between nodes: its corners, the lattice points on it, and where it crosses
 //! the sides of cells. Two nodes that follow each other along the outline share a cell, so that every cell is cut
@@ -30,7 +30,7 @@ pub struct Node {
     pub site: Option<Site>,
 }
 
-/// What is left of a cell near the outline.
+/// The rest of a cell near the outline.
 #[derive(Clone, Debug, Default)]
 pub struct Face {
     /// Nodes, counter-clockwise; none of a face that became part of another.
@@ -76,8 +76,8 @@ impl Faces {
         self.still_whole = whole.collect();
     }
 
-    /// Gives each face its region. Faces that share a side that is no interface are of one; what tells which is the middle of
-    /// the largest of them, which is far from any line.
+    /// Gives each face its region. Faces that share a side that is no interface are of one region: that of the middle
+    /// of the largest of them, which is far from any line.
     fn find_regions(&mut self, outline: &Partition) {
         if outline.regions().is_empty() {
             return;

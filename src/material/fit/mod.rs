@@ -152,8 +152,8 @@ pub fn fit(lattice: &Lattice, outline: &Outline) -> Result<Fitted, FitError> {
     fit_regions(lattice, &Partition::whole(outline))
 }
 
-/// Fits a lattice to the outline of a body and to the lines inside along which its regions meet. What the regions are made
-/// of is for [`Cells::inclusions`].
+/// Fits a lattice to the outline of a body and to the lines inside along which its regions meet. The materials of the
+/// regions are for [`Cells::inclusions`].
 ///
 /// # Errors
 /// As [`fit`].
@@ -193,7 +193,7 @@ impl Fitted {
     }
 }
 
-/// What a body is put together from.
+/// The parts that a body is put together from.
 struct Assembly<'a> {
     lattice: &'a Lattice,
     outline: &'a Partition,

@@ -25,7 +25,7 @@ pub fn require_wide(outline: &Partition, buckets: &Buckets, spacing: f64) -> Res
     }
     for (ring, number, piece) in outline.pieces() {
         let count = (2.0 * piece.length() / spacing).ceil().clamp(1.0, 1e8) as usize;
-        // What meets at a corner is as narrow as the corner is sharp.
+        // Pieces that meet at a corner are as narrow as the corner is sharp.
         let ends = [0.0, 1.0].map(|t| piece.point(t));
         let is_end = |p: [f64; 2]| ends.iter().any(|end| distance(*end, p) < ROUNDING * spacing);
         let is_beside = |other: &Piece| is_end(other.from) || is_end(other.to);

@@ -43,7 +43,7 @@ pub struct Sites {
     regions: Vec<u16>,
 }
 
-/// What tells on which side of the outline a site is.
+/// The data that decide on which side of the outline a site is.
 #[derive(Clone, Copy)]
 struct Bound {
     /// The place of the outline nearest to it, if within reach.
@@ -174,8 +174,8 @@ impl Sites {
         inside
     }
 
-    /// Finds the sites within reach of the outline and of the lines inside, with their nearest places. Returns what tells
-    /// the side of the outline that each is on.
+    /// Finds the sites within reach of the outline and of the lines inside, with their nearest places. Returns the
+    /// data that decide the side of the outline that each is on.
     fn find_near(&mut self, lattice: &Lattice, outline: &Partition, scale: &Scale) -> Vec<Bound> {
         // Far enough for the whole cells that small parts of cut ones may join.
         let reach = 1.5 * scale.diameter + SNAP * scale.altitude;

@@ -23,7 +23,7 @@ fn cells_around(lattice: &Lattice, site: Site) -> Vec<Vec<Site>> {
     cells
 }
 
-/// What averaged dilatations add to the bonds of a site inside the body: see [`super::dilatation`].
+/// Adds the averaged dilatations to the bonds of a site inside the body: see [`super::dilatation`].
 pub fn add_averaged(lattice: &Lattice, lambda: f64, own: Site, row: &mut Vec<(Site, Block)>) {
     let mut middles: Vec<Site> = cells_around(lattice, own).concat();
     middles.sort_unstable();

@@ -145,7 +145,7 @@ fn spring_honeycomb() -> Crystal {
 
 #[test]
 fn the_long_wave_terms_are_those_of_the_symbol() {
-    // What the two terms leave of a wave's cost is of the next order, k^4 of it.
+    // The rest of a wave's cost beyond the two terms is of the next order, k^4 of it.
     let material = |kind| Crystal::material(&lattice(kind), &sheet(3.0, 0.2, Plane::Stress)).expect("cells");
     for crystal in KINDS.into_iter().map(material).chain([spring_honeycomb()]) {
         let (second, fourth) = crystal.long_wave([0.6, 0.8]).expect("symmetric");

@@ -16,7 +16,7 @@ use crate::material::dilatation::Patches;
 /// Particles whose classes one thread finds at a time.
 const CHUNK: usize = 1 << 14;
 
-/// What the rows are put together from.
+/// The parts that the rows are put together from.
 pub(super) struct Assembly<'a> {
     pub cells: &'a Cells,
     pub incidence: &'a Incidence,
@@ -42,7 +42,7 @@ struct Part {
     share: f64,
 }
 
-/// What tells the classes apart: which corner of which kind of cell the particle is, and where among its
+/// The key of a class: which corner of which kind of cell the particle is, and where among its
 /// neighbours the other corners are; and how many neighbours there are.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 enum Pattern {
@@ -142,7 +142,7 @@ impl Assembly<'_> {
         self.around(particle).try_for_each(|cell| push(cell, 0))?;
         for patch in self.patches(particle) {
             for (k, part) in patch.parts.iter().enumerate() {
-                // Patches begin where their number of cells is told; the share tells how many patches a cell is in.
+                // The parity marks where a patch begins; the rest is the number of patches that the cell is in.
                 let averaged = self.averaged.as_ref()?;
                 push(part.cell, 8 * averaged.middles(part.cell).count() + usize::from(k == 0))?;
             }
@@ -169,7 +169,7 @@ impl Assembly<'_> {
         felt.map(of_cells).collect()
     }
 
-    /// What the averaged dilatations add to the row of a particle: `k v_i v_j'` for each patch, `v` the sum over its cells
+    /// Adds the averaged dilatations to the row of a particle: `k v_i v_j'` for each patch, `v` the sum over its cells
     /// of share times mean gradient. The sums run in the same order for either of two particles: no bit of `K_ij` differs
     /// from that of the transpose of `K_ji`.
     fn add_patches(&self, particle: usize, blocks: &mut [Block]) -> Result<(), WeightsError> {
@@ -249,7 +249,7 @@ impl Assembly<'_> {
         self.cells.of(cell).iter().map(slot).collect()
     }
 
-    /// What the kinds of cells resist, for a rule that turns with them.
+    /// The stiffness of each kind of cell, for a rule that turns with them.
     fn elements(&self) -> Vec<Element> {
         let of_kind = |(kind, k): (usize, &DMatrix<f64>)| {
             let corners = self.gradients[kind].len();

@@ -6,7 +6,7 @@
 //! irregular shapes included (Zhao, "Affine formation maneuver control of multiagent systems", IEEE TAC
 //! 63(12), 2018, calls such weights a stress). They are not negative where the own place lies among the
 //! neighbours: targets then stay in the convex hull of what was received, and the formation comes to rest
-//! as soon as everybody is linked to a leader by positive weights. Elsewhere some are negative, and then
+//! as soon as every follower is linked to a leader by positive weights. Elsewhere some are negative, and then
 //! [`settles`] must be asked: followers outside the hull of the leaders extrapolate, and on lattices a corner
 //! that follows is enough for an error to grow that no damping stops: 10 by 10 with 8 neighbours and three
 //! leaders in the middle has an eigenvalue of 1.0019, which damping only brings nearer to one. The remedy is
@@ -57,7 +57,7 @@ pub enum WeightsError {
 }
 
 impl WeightsError {
-    /// The error as a sentence about whom it is about.
+    /// The error as a sentence whose subject is the member concerned.
     pub fn told(&self, name: impl Fn(usize) -> String) -> String {
         match self {
             Self::NoNeighbours { member }
@@ -134,8 +134,8 @@ pub fn settles(
         rest: None,
         bonds: None,
     };
-    let nobody = SpectralRadius { radius: 0.0, iterations: 0, converged: true };
-    let found = spectral_radius(&flock, None, &roles, Update::default(), MOST_SWEEPS).unwrap_or(nobody);
+    let none = SpectralRadius { radius: 0.0, iterations: 0, converged: true };
+    let found = spectral_radius(&flock, None, &roles, Update::default(), MOST_SWEEPS).unwrap_or(none);
     // Followers that no leader reaches keep an error for ever: exactly one, found as one to rounding.
     if found.radius < 1.0 - 1e-9 {
         Ok(found)

@@ -141,7 +141,7 @@ fn lowest(weights: &[f64], tolerance: f64) -> Option<usize> {
     (weights[lowest] < -tolerance).then_some(lowest)
 }
 
-/// What raising one weight does while the constraints hold and those held stay at zero.
+/// The effect of raising one weight while the constraints hold and those held stay at zero.
 struct Step {
     /// Change of the weights; of the raised one its own square length.
     direction: Vec<f64>,
@@ -203,7 +203,7 @@ fn finished(constraints: &Constraints, mut weights: Vec<f64>, held: &[Held]) -> 
             free.iter().zip(change.iter()).for_each(|(&k, change)| weights[k] += change);
         }
     }
-    // What is below zero by no more than the tolerance is rounding, and so is what is hardly above it.
+    // A weight below zero by no more than the tolerance is rounding, and so is one hardly above it.
     weights.iter_mut().filter(|w| **w < 4.0 * f64::EPSILON).for_each(|w| *w = 0.0);
     weights
 }

@@ -101,7 +101,7 @@ fn the_interior_of_a_square_lattice_has_equal_weights_to_the_bit() {
 }
 
 #[test]
-fn whoever_lies_among_its_neighbours_has_no_negative_weight_and_the_nearest_to_equal() {
+fn a_particle_among_its_neighbours_has_no_negative_weight_and_the_nearest_to_equal() {
     let (mut among, mut outside) = (0, 0);
     for seed in 0..400 {
         let count = 3 + seed % 6;
@@ -190,7 +190,7 @@ fn an_affine_motion_of_the_leaders_is_followed_exactly_edges_included() {
         let (reference, neighbours) = patch(kind, [0.0, 0.0], 0.1);
         let count = reference.len();
         let alone = solve(&reference, &neighbours, &vec![true; count]).expect("solved");
-        // Whoever lies outside its neighbours leads.
+        // A particle outside its neighbours leads.
         let follows: Vec<bool> = (0..count).map(|j| !alone.negative.contains(&j)).collect();
         let solved = solve(&reference, &neighbours, &follows).expect("solved");
         let followers = follows.iter().filter(|&&f| f).count();
@@ -206,7 +206,7 @@ fn an_affine_motion_of_the_leaders_is_followed_exactly_edges_included() {
 }
 
 #[test]
-fn who_cannot_be_placed_is_named() {
+fn a_member_that_cannot_be_placed_is_named() {
     let reference: Vectors = [[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [1.0, 1.0]].into_iter().collect();
     let refused = |lists: [Vec<u32>; 4]| {
         let neighbours = Neighbours::from_lists(lists);
@@ -245,7 +245,7 @@ fn followers_that_no_leader_reaches_do_not_settle() {
     let settled = |weights: &[f64]| settles(weights, &neighbours, &[true, true, true, false]);
     let half = settled(&[0.5, 0.5, 1.0, 1.0]).expect("the leader is seen");
     assert!((half.radius - 0.5f64.sqrt()).abs() < 1e-9, "{half:?}");
-    let error = settled(&[1.0, 0.0, 1.0, 1.0]).expect_err("nobody listens to the leader");
+    let error = settled(&[1.0, 0.0, 1.0, 1.0]).expect_err("no follower sees the leader");
     assert!(
         matches!(error, WeightsError::DoesNotSettle { radius } if (radius - 1.0).abs() < 1e-9),
         "{error}"

@@ -1,5 +1,5 @@
 //! Chebyshev's semi-iteration: synchronous sweeps whose damping and memory vary, by the bounds of the
-//! spectrum of `D^-1 K`. No sums over the body are needed, so on a machine of many parts nobody waits.
+//! spectrum of `D^-1 K`. No sums over the body are needed, so on a machine of many parts none waits.
 //!
 //! R. S. Varga, *Matrix Iterative Analysis*, chapter 5. The lowest eigenvalue is estimated from above
 //! (Lanczos); where the residual shrinks more slowly than the bounds promise, the bound was too high and is

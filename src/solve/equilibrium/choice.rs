@@ -1,4 +1,4 @@
-//! What `auto` takes, and why.
+//! The solver that `auto` takes, and why.
 
 use super::{Choice, Precision, Request, Solver, System};
 

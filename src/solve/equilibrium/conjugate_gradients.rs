@@ -16,7 +16,7 @@ use crate::solve::operator::{Matrix, RowCoefficients};
 
 /// An approximation of `K^-1`, symmetric and positive.
 pub(super) trait Preconditioner<T: Real> {
-    /// What it computes in: half as wide as the iteration, or as wide.
+    /// The type that it computes in: half as wide as the iteration's, or as wide.
     type Z: Real;
 
     /// `z`, an approximation of `K^-1 r / size` up to a factor; `size` is the order of magnitude of `r`.

@@ -17,7 +17,7 @@ pub enum SolveError {
     SinglePrecision { tolerance: f64, floor: f64 },
     #[error("{solver} computes in double precision only")]
     DoubleOnly { solver: Solver },
-    #[error("nobody follows: there is nothing to solve for")]
+    #[error("no particle follows: there is nothing to solve for")]
     NothingFollows,
     #[error("particle {particle} is connected to no held particle: nothing determines where it rests")]
     Adrift { particle: usize },

@@ -33,7 +33,7 @@ pub(super) fn solve(prepared: &mut Prepared, request: &Request) -> Result<Found,
 /// A particle of a colour and the run that it belongs to.
 type Coloured = (u32, u32);
 
-/// The particles of each colour. Columns that lie closer than anybody reaches differ in colour, and so do
+/// The particles of each colour. Columns that lie closer than any particle reaches differ in colour, and so do
 /// rows.
 fn colours(matrix: &Matrix) -> Vec<Vec<Coloured>> {
     let [across, along] = matrix.reach().map(|reach| reach + 1);

@@ -2,7 +2,7 @@
 //!
 //! The coefficients of the iteration are those of Lanczos' tridiagonal matrix, whose extreme eigenvalues
 //! approach those of the operator from within (G. H. Golub and C. F. Van Loan, *Matrix Computations*,
-//! section 10.2.5). On a large body the steps are taken on a few groups of its columns with everybody else
+//! section 10.2.5). On a large body the steps are taken on a few groups of its columns with all others
 //! held, which lowers the largest eigenvalue by next to nothing.
 
 use super::steps::{Apply, precondition_group};
@@ -63,7 +63,7 @@ fn bounds<T: Real>(matrix: &Matrix, stencils: &RowCoefficients<T>, groups: &[usi
     extremes(&diagonal, &beside)
 }
 
-/// Conjugate gradients on some groups of columns, everybody else held.
+/// Conjugate gradients on some groups of columns, all others held.
 struct Krylov<'a, T> {
     matrix: &'a Matrix,
     stencils: &'a RowCoefficients<T>,

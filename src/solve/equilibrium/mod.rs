@@ -105,7 +105,7 @@ pub enum Choice {
     This(Solver),
 }
 
-/// What all vectors of a solve are computed in.
+/// The precision of all vectors of a solve.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Precision {
     #[default]
@@ -150,7 +150,7 @@ pub struct Solved {
     pub iterations: usize,
     /// Relative residual before the first iteration, which is 1, and after each.
     pub residuals: Vec<f64>,
-    /// What took how long.
+    /// The phases of the solve and how long each took.
     pub phases: Vec<(&'static str, Duration)>,
     /// Whether the tolerance was reached.
     pub converged: bool,
@@ -169,7 +169,7 @@ impl Solved {
     }
 }
 
-/// What a solver hands back: displacements of the followers, zero elsewhere.
+/// The result of a solver: displacements of the followers, zero elsewhere.
 struct Found {
     displacement: Vectors<f64>,
     residuals: Vec<f64>,
@@ -234,7 +234,7 @@ fn by(
     }
 }
 
-/// What can be refused before anything is computed.
+/// Refuses what can be refused before anything is computed.
 fn check(system: &System, request: &Request, solver: Solver) -> Result<(), SolveError> {
     let tolerance = request.tolerance;
     if request.precision == Precision::F32 {

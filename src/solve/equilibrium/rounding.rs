@@ -2,8 +2,8 @@
 //!
 //! No displacement in doubles leaves less of the load than about `eps (|K| |u| + |f|)`: on a beam a thousand times as
 //! long as high that is some 1e-5 of it, and a tolerance below cannot be met. It says nothing of the
-//! displacements either, which may be known to as many digits or to none. What the residual is worth in
-//! displacements is found by solving for it: `K e = r`, `e` being about as large as the error, since at this
+//! displacements either, which may be known to as many digits or to none. The error of the
+//! displacements is estimated by solving `K e = r`, `e` being about as large as the error, since at this
 //! level a residual is mostly rounding itself.
 
 use super::system::Prepared;

@@ -1,4 +1,4 @@
-//! What is to be solved, and what every solver starts from.
+//! The system to be solved, from which every solver starts.
 
 use super::{SolveError, steps};
 use crate::flock::block::{apply, inverse};
@@ -63,7 +63,7 @@ impl System {
         displacement
     }
 
-    /// What is known beforehand of a particle's displacement \[length\]: zero in unknown components, `None` where all
+    /// The known part of a particle's displacement \[length\]: zero in unknown components, `None` where all
     /// are unknown.
     fn held_part(&self, particle: usize) -> Option<[f64; 2]> {
         let held = self.held.get(particle);
@@ -191,7 +191,7 @@ fn power_of_two(values: impl Iterator<Item = f64>) -> f64 {
 /// The first particle, counted from 0, that its own row does not hold back.
 fn loose(matrix: &Matrix) -> Option<usize> {
     let loose: Vec<bool> = matrix.rows.iter().map(|row| inverse(&row.diagonal).is_none()).collect();
-    // A class whose every particle has a held neighbour was replaced by others, and is nobody's.
+    // A class whose every particle has a held neighbour was replaced by others, and has no particles left.
     let any = loose.contains(&true);
     let is_loose = |&class: &u32| class != HELD && loose[class as usize];
     if any { matrix.class.iter().position(is_loose) } else { None }

@@ -36,7 +36,7 @@ impl Columns {
     /// Segments of the particles for which `counts` holds; `sites` ascend.
     pub fn new(sites: impl Iterator<Item = Site> + Clone, counts: impl Fn(usize) -> bool) -> Self {
         let mut steps = sites.clone().zip(sites.clone().skip(1)).filter(|(a, b)| a[0] == b[0]);
-        // The sites of a column are evenly spaced on every lattice, so that the first few tell.
+        // The sites of a column are evenly spaced on every lattice, so that the first few suffice.
         let step = steps.by_ref().take(4096).map(|(a, b)| b[1] - a[1]).min().unwrap_or(1).max(1);
         let mut columns = Self { step, ..Self::default() };
         // The site before, if it ended a segment that may go on.

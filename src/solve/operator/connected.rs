@@ -1,4 +1,4 @@
-//! Whether every follower feels somebody who is held, through whatever chain of neighbours.
+//! Whether a chain of neighbours connects every follower to a held particle.
 
 use super::Operator;
 use super::matrix::{HELD, Matrix};
@@ -58,7 +58,7 @@ impl Operator {
     }
 }
 
-/// Whoever sees a reached particle is reached: once up and once down the numbering.
+/// Marks each particle that sees a reached one as reached: once up and once down the numbering.
 fn sweep(matrix: &Matrix, reached: &mut [bool]) {
     for up in [true, false] {
         for run in 0..matrix.runs().len() {

@@ -55,7 +55,7 @@ impl<T: Real> RowCoefficients<T> {
     }
 }
 
-/// What is made of `K u`.
+/// A computation that uses `K u`.
 pub trait Task<T> {
     /// Takes `K u` of the particles from number `at` on, whose `D^-1` is given.
     fn take<const W: usize>(&mut self, at: usize, inverse: &[T; 4], x: &[T; W], y: &[T; W]);

@@ -68,7 +68,7 @@ fn rows_that_lead_nowhere_or_are_of_no_class_are_refused() {
     let make =
         |class: Vec<u32>, rows: Vec<Row>| Operator::new(&sites, grid, class, rows, vec![true, false, true]);
     assert_eq!(
-        make(vec![0, 9, 0], vec![row([0, 1])]).expect_err("nobody there"),
+        make(vec![0, 9, 0], vec![row([0, 1])]).expect_err("no particle there"),
         OperatorError::NoNeighbour { particle: 3, offset: [0, 1] }
     );
     assert_eq!(
@@ -105,7 +105,7 @@ fn a_pair_that_does_not_feel_each_other_alike_is_found() {
 }
 
 #[test]
-fn followers_that_nobody_held_reaches_are_found_however_they_hang_together() {
+fn followers_that_no_held_particle_reaches_are_found_however_they_hang_together() {
     for kind in LatticeKind::SAMPLES {
         // Held at one corner only; tall and narrow, so that sweeps alone take long.
         let reached = operator(kind, 3, 400, |i| i == 0);

@@ -1,13 +1,13 @@
-//! Means of neighbours over a part of a run, and what is made of them while they are in the registers.
+//! Means of neighbours over a part of a run, and the terms that complete them while they are in the registers.
 
 use super::{After, BOTH, CONTRACTED, Component, DAMPED, FED, Run, Tables};
 use crate::flock::lanes::{ARITHMETIC, MEMORY, lanes};
 use crate::flock::real::Real;
 use crate::sweep::terms::Finish;
 
-/// How a mean is taken: a number of neighbours, and what they count.
+/// How a mean is taken: a number of neighbours, and their coefficients.
 pub(super) trait Mean {
-    /// What its loops wait for.
+    /// The resource that bounds its loops.
     const LOAD: bool;
 
     /// Whether the loops complete the means themselves: with feedback and damping, or with the Poisson term.
@@ -33,14 +33,14 @@ impl<'a, T: Real, const P: usize> Part<'a, '_, T, P> {
         &self.tables.distances[self.run.distances as usize..][..self.run.neighbours as usize]
     }
 
-    /// What the row of the run's class is made of.
+    /// The coefficients of the run's class, and all after them.
     #[inline(always)]
     fn coefficients(&self) -> &'a [f64] {
         &self.tables.coefficients.all()[self.run.coefficients as usize..]
     }
 }
 
-/// What the particles of a part see of one coordinate: of each neighbour as many numbers as there are targets.
+/// One coordinate as the particles of a part see it: of each neighbour as many numbers as there are targets.
 struct Seen<'a, T, const N: usize> {
     neighbours: [&'a [T]; N],
     rest: Option<&'a [T]>,

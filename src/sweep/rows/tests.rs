@@ -61,8 +61,8 @@ fn sweep(rows: &Rows, flock: &Flock, present: &Vectors, next: &mut Vectors) {
     }
 }
 
-/// Sweeps with the rows and compares every bit with the rule; whoever does not follow keeps its
-/// mark. Gives the share in runs.
+/// Sweeps with the rows and compares every bit with the rule; a particle that does not follow keeps
+/// its mark. Returns the share in runs.
 fn compare(flock: &Flock, held: impl Fn(usize) -> bool, what: &str) -> f64 {
     const MARK: f64 = 12345.0;
     let count = flock.reference.len();
@@ -145,7 +145,7 @@ fn a_body_larger_than_the_caches_gives_the_bits_of_the_rule_and_is_nearly_all_ru
 
 #[test]
 fn a_mean_of_negative_zeros_and_a_particle_without_neighbours_give_the_bits_of_the_rule() {
-    // Particles 1 to 20 see the one before them, the others nobody.
+    // Particles 1 to 20 see the one before them, the others none.
     let lists = (0..22u32).map(|j| (1..21).contains(&j).then(|| j - 1));
     let flock = Flock {
         rule: Rule::BARYCENTRE,

@@ -51,7 +51,7 @@ impl Case {
         [x + 0.1 * step.min(9) as f64, y + 0.003 * (which * step.min(20)) as f64]
     }
 
-    /// Where everybody is, and was before the last step, after single steps of everybody.
+    /// Present positions, and those before the last step, after single steps of all particles.
     fn one_by_one(&self, steps: usize) -> [Vectors; 2] {
         let sweep = Sweep::compile(Update::default(), &self.flock, &self.roles);
         let mut present = Vectors::clone(&self.flock.reference);
@@ -135,7 +135,7 @@ fn only_what_moves_is_swept_and_the_bits_are_the_same() {
     // The front is 64 of 300 columns in.
     let share = activity.share_computed();
     assert!(share > 0.05 && share < 0.3, "{share}");
-    // Nobody led, and everything at rest: the first step finds out, and no other is made.
+    // None led, and everything at rest: the first step finds that, and no other is computed.
     let resting = Case { led: Vec::new(), ..case };
     let (_, activity) = resting.together(&[1, 16, 16], 2);
     assert_eq!(activity.share_computed(), 1.0 / 33.0);
@@ -187,7 +187,7 @@ fn lists_are_swept_together_to_the_bits_of_single_steps_for_any_threads() {
 }
 
 #[test]
-fn it_is_told_in_which_steps_somebody_moved_farther_than_asked() {
+fn steps_report_whether_a_particle_moved_farther_than_the_limit() {
     let case = Case::new(LatticeKind::Square { spacing: 1.0 }, 12, 12);
     let sweep = Sweep::compile(Update::default(), &case.flock, &case.roles);
     let mut present = Vectors::clone(&case.flock.reference);
@@ -196,12 +196,12 @@ fn it_is_told_in_which_steps_somebody_moved_farther_than_asked() {
     let led = Led { particles: &case.led, place: &place };
     let places = (&mut present, &mut next);
     let farther = sweep.steps(&case.flock, None, places, (5, led, Some(0.09)), &mut Activity::default());
-    // The leaders jump by 0.1 in the third; whoever follows moves by less.
+    // The leaders jump by 0.1 in the third; followers move by less.
     assert_eq!(farther, [false, false, true, false, false]);
 }
 
 #[test]
-fn it_is_told_of_whoever_moved_far_wherever_that_was() {
+fn a_particle_that_moved_far_is_reported_wherever_it_is() {
     for axis in [0, 1] {
         let case = Case::new(LatticeKind::Square { spacing: 1.0 }, 300, 61);
         let sweep = Sweep::compile(Update::default(), &case.flock, &case.roles);

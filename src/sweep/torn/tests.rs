@@ -5,7 +5,7 @@ use crate::flock::fracture::tests::{Draws, bodies};
 use crate::flock::law::Flock;
 use crate::geometry::shape::Segment;
 
-/// Sweeps the torn in two pieces and compares every bit with the rule; nobody else is touched. Gives how many are torn.
+/// Sweeps the torn in two pieces and compares every bit with the rule; no other is touched. Returns how many are torn.
 fn compare_targets(
     torn: &DamagedRows,
     body: &Flock,

@@ -86,7 +86,7 @@ struct Level {
     vectors: LevelVectors,
 }
 
-/// What a level computes with.
+/// The vectors of a level.
 struct LevelVectors {
     f: Vectors<f32>,
     u: Vectors<f32>,

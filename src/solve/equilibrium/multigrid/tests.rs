@@ -17,7 +17,7 @@ fn dense(matrix: &Matrix) -> Vec<Vec<f64>> {
     })
 }
 
-/// What a linear map makes of each unit displacement, x components first.
+/// The images of the unit displacements under a linear map, x components first.
 fn columns<T: Real>(count: usize, map: impl Fn(&Vectors<T>) -> Vectors<T>) -> Vec<Vec<f64>> {
     (0..2 * count)
         .map(|k| {

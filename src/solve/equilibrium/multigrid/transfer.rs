@@ -17,7 +17,7 @@ pub struct Transfer {
     pub steps: [i32; 2],
 }
 
-/// Rows of one column, whether there is somebody or not.
+/// Rows of one column, whether a particle is there or not.
 struct Column {
     low: i32,
     x: Vec<f32>,
@@ -61,7 +61,7 @@ impl Column {
     }
 }
 
-/// What the particles along an outline, which stand at no site, have of the coarse nodes around their places.
+/// Shares of the particles along an outline, which stand at no site, in the coarse nodes around their places.
 #[derive(Clone, Debug, Default)]
 pub struct OutlierShares {
     /// Index of the first of them in the fine matrix.
