@@ -34,7 +34,7 @@ const VERSION: u32 = 3;
 const HEADER: usize = 24;
 const PROGRAM_VERSION: &str = env!("CARGO_PKG_VERSION");
 
-/// A run on its way: what it was asked, where it is, and what it has recorded.
+/// A run on its way: its command line, its state, and its records.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Checkpoint<'a> {
     /// Version of the program: another one may round otherwise.
@@ -50,7 +50,7 @@ pub struct Checkpoint<'a> {
     pub snapshots: Cow<'a, [Snapshot]>,
     pub probes: Cow<'a, [ProbeSeries]>,
     pub load_steps: Cow<'a, [LoadStep]>,
-    /// Of the report, where there is to be one.
+    /// State of the report, where there is to be one.
     pub animation: Option<AnimationState<'a>>,
     /// Time taken for the steps so far.
     pub stepping: Duration,
@@ -105,7 +105,7 @@ pub enum CheckpointError {
 }
 
 impl<'a> Checkpoint<'a> {
-    /// Of a run whose plan had this `digest`.
+    /// A checkpoint of a run with a plan of this `digest`.
     pub fn new(
         (asked, scene, digest): (&RunRequest, &Scene, u64),
         (engine, residual): (EngineState, f64),
@@ -234,7 +234,7 @@ impl Checkpoint<'static> {
     }
 }
 
-/// Removes what checkpoints have left in a folder.
+/// Removes the checkpoint files of a folder.
 pub fn remove(folder: &Path) {
     for name in [PART, FILE] {
         match fs::remove_file(folder.join(name)) {
@@ -322,7 +322,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_written_is_read_back_to_the_bit() {
+    fn a_checkpoint_is_read_back_to_the_bit() {
         let folder = tempfile::tempdir().expect("a folder");
         assert!(Checkpoint::read(folder.path()).expect("readable").is_none());
         let (state, _) = written(folder.path());

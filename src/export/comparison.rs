@@ -34,12 +34,12 @@ pub struct ComparisonReport {
     pub scene: RawScene,
 }
 
-/// How the rule's run ended.
+/// The end of the rule's run.
 #[derive(Clone, Copy, Debug, Serialize, PartialEq)]
 pub struct RuleEnd {
     pub steps: usize,
     pub stop_reason: &'static str,
-    /// How far the follower farthest from its target is from it, over the spacing.
+    /// Largest distance of a follower from its target, over the spacing.
     pub residual: Option<f64>,
     /// The solver that found the equilibrium, unless it was stepped to, and its iterations.
     pub solver: Option<&'static str>,
@@ -49,9 +49,9 @@ pub struct RuleEnd {
 /// The mesh of the truth.
 #[derive(Clone, Copy, Debug, Serialize, PartialEq)]
 pub struct TruthSize {
-    /// Of the finest of its meshes.
+    /// Nodes of the finest of its meshes.
     pub nodes: usize,
-    /// Meshes that it was solved on.
+    /// Number of meshes that it was solved on.
     pub levels: usize,
     /// Its stated error of displacement, relative L2, and of strain energy, relative; `null` where a body so
     /// full of corners was solved on one mesh alone \[1\].
@@ -69,7 +69,7 @@ struct ParticleRow {
     role: &'static str,
     ux_rule: f64,
     uy_rule: f64,
-    /// Empty where the truth does not know the particle: it is outside the shape.
+    /// Empty for a particle outside the shape, which has no true value.
     ux_truth: Option<f64>,
     uy_truth: Option<f64>,
 }

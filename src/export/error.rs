@@ -48,7 +48,7 @@ impl ExportError {
     }
 }
 
-/// The error as the system gave it, which knows a full disk from others.
+/// The system's own error, which distinguishes a full disk from other causes.
 fn of_the_system(error: io::Error) -> io::Error {
     let inner = error.get_ref().and_then(|inner| inner.downcast_ref::<csv::Error>());
     let code = inner.and_then(|inner| match inner.kind() {

@@ -6,7 +6,7 @@
 //! there ([`OutputFolder::reopen`]).
 //!
 //! The hidden folder is locked, so that two programs at once never fill one; what a killed program left of it is
-//! removed by the next that wants the name. A list of files ([`super::manifest`]) says what flockform wrote: nothing
+//! removed by the next that wants the name. A list of files ([`super::manifest`]) names what flockform wrote: nothing
 //! else is ever removed.
 
 use std::ffi::OsString;
@@ -94,22 +94,22 @@ impl OutputFolder {
         Ok(())
     }
 
-    /// What was made for it: the hidden folder, and the folders above it, the innermost first.
+    /// The folders made for it: the hidden folder, and the folders above it, the innermost first.
     pub fn made(&self) -> impl Iterator<Item = &Path> {
         std::iter::once(&self.partial).chain(&self.made).map(PathBuf::as_path)
     }
 
-    /// Where everything stands until [`OutputFolder::commit`].
+    /// The folder in which everything stands until [`OutputFolder::commit`].
     pub fn folder(&self) -> &Path {
         &self.partial
     }
 
-    /// Where to write the output of this name, which `--force` may replace from now on.
+    /// The path of the output of this name, which `--force` may replace from now on.
     pub fn path(&self, name: impl AsRef<Path>) -> PathBuf {
         self.files.path(name.as_ref())
     }
 
-    /// The list of its files, for those who write after it has taken another name.
+    /// The list of its files, for writers that go on after it has taken another name.
     pub(super) fn files(&self) -> Arc<Written> {
         Arc::clone(&self.files)
     }
@@ -117,7 +117,7 @@ impl OutputFolder {
     /// Gives the folder its name, in the place of what may be replaced.
     ///
     /// # Errors
-    /// Keeps the outputs under a name beside it, and says which, if they cannot be moved.
+    /// Keeps the outputs under a name beside it, and names it, if they cannot be moved.
     pub fn commit(mut self) -> Result<PathBuf, ExportError> {
         self.files.close().map_err(ExportError::io("list the files of", &self.partial))?;
         self.is_kept = true;
@@ -258,7 +258,7 @@ fn claim(out: &Path) -> Result<(PathBuf, Option<File>), ExportError> {
             // It was taken for one that a killed program left, before it was locked.
             Locked::Gone => {}
             Locked::Free(lock) if is_new && path.exists() => return Ok((path, lock)),
-            // What a killed program left is removed; where nobody can tell, or where there is more, it stays.
+            // A killed program's remains are removed, unless their origin is unclear or other files are among them.
             Locked::Free(Some(_lock)) if discard(&path).is_ok() => {}
             Locked::Free(_) => attempt += 1,
         }

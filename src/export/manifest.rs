@@ -45,12 +45,12 @@ impl Written {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Where to write the file of this name, which is ours from now on.
+    /// The path of the file of this name, which is ours from now on.
     pub fn path(&self, name: &Path) -> PathBuf {
         let mut state = self.state();
         let text = line(name);
         if !ALWAYS.contains(&&*text) && state.names.insert(text.clone()) {
-            // Where this cannot be written, the file itself cannot either, and that one says so.
+            // If this cannot be written, the file itself cannot either, and that error is reported.
             let _ = writeln!(state.list, "{text}");
         }
         state.root.join(name)
@@ -103,13 +103,13 @@ fn read(folder: &Path) -> Option<BTreeSet<String>> {
     Some(fs::read_to_string(path).ok()?.lines().map(str::to_owned).collect())
 }
 
-/// What a folder holds, deepest first, when all of it is flockform's.
+/// The contents of a folder, deepest first, when all of it is flockform's.
 pub(super) struct Ours {
     files: Vec<PathBuf>,
     folders: Vec<PathBuf>,
 }
 
-/// Why a folder is not flockform's.
+/// The reason for which a folder is not flockform's.
 #[derive(Debug)]
 pub(super) enum NotOurs {
     /// It has no list.

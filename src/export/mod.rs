@@ -108,7 +108,7 @@ pub struct Results<'a> {
     pub timings: Timings,
 }
 
-/// How figures are drawn.
+/// Options for drawing figures.
 #[derive(Clone, Copy)]
 pub struct Drawing<'a> {
     pub formats: Formats,

@@ -40,7 +40,7 @@ pub(super) const GALLERY: &str = "gallery.json";
 /// Part of the forces on a body that may be left on a follower of one at rest \[1\].
 const AT_REST: f64 = 1e-6;
 
-/// How long the parts of a run took.
+/// Times of the parts of a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Timings {
     /// From the scene file to the engine.
@@ -61,13 +61,13 @@ pub struct Summary {
     /// Steps taken.
     pub steps: usize,
     pub stop_reason: &'static str,
-    /// Where and probably why the body diverged, if it did.
+    /// The place and probable cause of divergence, if the body diverged.
     pub divergence: Option<String>,
     /// Largest one-step motion over the spacing, at the last step.
     pub residual: Option<f64>,
-    /// Share of the followers' updates that were computed \[1\]: nothing is swept where nothing moves.
+    /// Share of the followers' updates that were computed \[1\]: regions at rest are skipped.
     pub share_swept: Option<f64>,
-    /// How the equilibrium was found, unless it was stepped to.
+    /// The solution of the equilibrium, unless it was stepped to.
     pub equilibrium: Option<Equilibrium>,
     pub energies: Energies,
     /// Reactions, loads, energy and stress, where the scene has a material.

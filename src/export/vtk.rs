@@ -51,7 +51,7 @@ pub struct VtkSeries {
     files: Arc<Written>,
     /// Steps that have one.
     frames: Vec<usize>,
-    /// How many of them are known to be on the disk.
+    /// Number of them that are known to be on the disk.
     synced: usize,
     material: Option<Elastic>,
 }
@@ -92,7 +92,7 @@ impl VtkSeries {
         Ok(series)
     }
 
-    /// Where the frame of a step is now: a folder may take another name while it is filled.
+    /// The present path of a step's frame: a folder may take another name while it is filled.
     fn path(&self, step: usize) -> PathBuf {
         self.files.path(&frame(step))
     }

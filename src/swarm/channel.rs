@@ -1,6 +1,6 @@
-//! What lies between a robot and those who see it: noise, delay, loss, and what the robot itself does to
-//! deceive. Seeded, and a stream of its own for every member, so that one channel's randomness depends
-//! neither on the other members nor on who asks when.
+//! The channel between a robot and its observers: noise, delay, loss, and the false poses of a faulty robot.
+//! Every member has a seeded random stream of its own, so that one channel's randomness depends neither on
+//! the other members nor on the order of queries.
 
 use rand::RngExt;
 use rand_distr::StandardNormal;
@@ -8,7 +8,7 @@ use rand_pcg::Pcg64Mcg;
 
 use super::watch::Pose;
 
-/// How poses travel. The default channel hands everything on at once and unchanged.
+/// Parameters of a channel. The default one delivers every pose at once and unchanged.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ChannelParams {
     /// Standard deviation of each coordinate \[m\], default 0.
@@ -28,14 +28,14 @@ pub struct ChannelParams {
     pub reordering: f64,
 }
 
-/// What a robot says in the place of the truth; stamps stay true.
+/// The pose that a faulty robot sends in place of the true one; stamps stay true.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Lie {
     /// So far from where it is \[m\].
     Offset {
         by: [f64; 2],
     },
-    /// Where it was when it began to lie.
+    /// The place at which it began to lie.
     Frozen,
     /// Always this place \[m, world frame\].
     Claimed {
@@ -53,12 +53,12 @@ pub enum Lie {
     NotANumber,
 }
 
-/// What a robot sends.
+/// The kind of sender that a robot is.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Sender {
     #[default]
     Honest,
-    /// Nothing; what is on its way still arrives.
+    /// Sends nothing; poses already on their way still arrive.
     Dead,
     Lying(Lie),
 }
@@ -68,7 +68,7 @@ pub enum Sender {
 pub struct Channel {
     params: ChannelParams,
     sender: Sender,
-    /// Where the robot was when it began to lie \[m\], and when \[period\].
+    /// Place \[m\] and period at which the robot began to lie.
     lying_since: Option<([f64; 2], u64)>,
     /// A stream for each cause: what is lost does not change the noise on what is not.
     noise: Pcg64Mcg,
@@ -76,7 +76,7 @@ pub struct Channel {
     lies: Pcg64Mcg,
     /// In the order of arrival.
     on_the_way: Vec<Arrival>,
-    /// When the last pose that keeps its order arrives \[period\].
+    /// Arrival of the last pose that keeps its order \[period\].
     last_in_order: u64,
 }
 
@@ -211,7 +211,7 @@ mod tests {
         Pose { position: [period as f64, 1.0], yaw: 0.5, stamp: period as f64, frame_is_right: true }
     }
 
-    /// What arrives in each period when the member sends in every one.
+    /// The poses that arrive in each period when the member sends in every one.
     fn heard(mut channel: Channel, periods: u64) -> Vec<Vec<Pose>> {
         let mut heard = Vec::new();
         for period in 0..periods {
@@ -318,8 +318,8 @@ mod tests {
     }
 
     #[test]
-    fn each_lie_says_what_it_should() {
-        let told = |lie| {
+    fn each_lie_sends_the_poses_that_it_describes() {
+        let sent = |lie| {
             let mut channel = Channel::new(ChannelParams::default(), 1, 0);
             channel.send(0, pose(0));
             channel.set_sender(Sender::Lying(lie));
@@ -332,15 +332,15 @@ mod tests {
             assert!(poses.iter().enumerate().all(|(k, pose)| pose.stamp == k as f64));
             poses[1..].iter().map(|pose| pose.position).collect::<Vec<_>>()
         };
-        assert_eq!(told(Lie::Offset { by: [10.0, -2.0] })[3], [14.0, -1.0]);
-        assert_eq!(told(Lie::Frozen), [[1.0, 1.0]; 8]);
-        assert_eq!(told(Lie::Claimed { position: [99.0, 9.0] }), [[99.0, 9.0]; 8]);
-        assert!(told(Lie::NotANumber).iter().all(|p| p[0].is_nan() && p[1].is_nan()));
-        let swung = told(Lie::Oscillating { amplitude: [0.0, 3.0], periods: 4 });
+        assert_eq!(sent(Lie::Offset { by: [10.0, -2.0] })[3], [14.0, -1.0]);
+        assert_eq!(sent(Lie::Frozen), [[1.0, 1.0]; 8]);
+        assert_eq!(sent(Lie::Claimed { position: [99.0, 9.0] }), [[99.0, 9.0]; 8]);
+        assert!(sent(Lie::NotANumber).iter().all(|p| p[0].is_nan() && p[1].is_nan()));
+        let swung = sent(Lie::Oscillating { amplitude: [0.0, 3.0], periods: 4 });
         for (k, y) in [1.0, 4.0, 1.0, -2.0, 1.0].into_iter().enumerate() {
             assert!((swung[k][1] - y).abs() < 1e-12, "{swung:?}");
         }
-        let random = told(Lie::Random { radius: 0.5 });
+        let random = sent(Lie::Random { radius: 0.5 });
         let away = |k: usize| (random[k][0] - (k + 1) as f64).hypot(random[k][1] - 1.0);
         assert!((0..8).all(|k| away(k) <= 0.5) && away(0) != away(1));
     }

@@ -1,6 +1,6 @@
 //! The swarm host: the flocking rule moves robots, safely.
 //!
-//! [`formation`] is who flies and where the rule sends them; [`control`] is the tick that turns poses into safe
+//! [`formation`] holds the members and their targets by the rule; [`control`] is the tick that turns poses into safe
 //! targets, by [`watch`] (which poses are believed), [`resilience`] (which neighbours are) and [`safety`] (what is
 //! safe). [`flight`] closes the loop with simulated [`robots`] behind [`channel`]s; over a [`transport`] it is
 //! closed at a steady [`pace`] with real ones: within a process, over shared memory (room `shm`), over ROS 2 (room `ros`).

@@ -8,7 +8,7 @@ pub fn system_time() -> f64 {
     SystemTime::now().duration_since(UNIX_EPOCH).map_or(0.0, |since| since.as_secs_f64())
 }
 
-/// Which ticks are due, on a clock that the caller reads \[s\]. Pure: [`Pace`] sleeps by it.
+/// The schedule of ticks, on a clock that the caller reads \[s\]. Pure: [`Pace`] sleeps by it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Deadlines {
     start: f64,
@@ -18,7 +18,7 @@ pub struct Deadlines {
     missed: u64,
 }
 
-/// What to do at an instant.
+/// The action due at an instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Due {
     /// Sleep this long \[s\].
@@ -33,7 +33,7 @@ impl Deadlines {
         Self { start, period: 1.0 / rate, tick: 0, missed: 0 }
     }
 
-    /// What is due at `now`. After [`Due::Now`] the tick counts as begun.
+    /// Returns the action due at `now`. After [`Due::Now`] the tick counts as begun.
     pub fn due(&mut self, now: f64) -> Due {
         let next = self.start + self.tick as f64 * self.period;
         if now < next {
@@ -70,7 +70,7 @@ impl Pace {
         Self { origin: Instant::now(), deadlines: Deadlines::new(0.0, rate) }
     }
 
-    /// What is due now, for a loop that has something else to wait for too.
+    /// Returns the action due now, for a loop that also waits for something else.
     pub fn due(&mut self) -> Due {
         self.deadlines.due(self.origin.elapsed().as_secs_f64())
     }

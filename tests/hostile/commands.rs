@@ -25,7 +25,10 @@ fn limits_are_not_switched_off_from_the_command_line() {
 fn a_swarm_that_takes_nobody_s_word_waits_for_nobody_s() {
     let none = ["--set", "node.commands=none"];
     let external = ["--set", "leaders[0].program={ kind = \"external\" }"];
-    refused(&[none, external].concat(), &["node.commands", "\"none\" lets nobody lead `robot_1`", "help: "]);
+    refused(
+        &[none, external].concat(),
+        &["node.commands", "\"none\" forbids commands to `robot_1`", "help: "],
+    );
     let waits = ["--ros-args", "-p", "autostart:=false"];
     refused(&[&none[..], &waits].concat(), &["node.commands", "lets nobody make the node active", "help: "]);
     refused(&["--set", "node.commands=some"], &["node.commands", "stop-only"]);

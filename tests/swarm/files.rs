@@ -20,7 +20,7 @@ fn refusal(text: &str) -> String {
 fn a_bad_swarm_file_is_refused_with_place_and_remedy() {
     let with = |more: &str| format!("{PAIR}{more}");
     let cases = [
-        ("title = \"t\"\n".into(), "robots: nobody flies"),
+        ("title = \"t\"\n".into(), "robots: no robot is given"),
         (with("[limits]\nspeed = -1.0\n"), "limits.speed = -1.0: must be greater than 0 [m/s]"),
         (with("[limits]\nspede = 1.0\n"), "did you mean `speed`"),
         (with("[[robots]]\nname = \"a\"\nplace = [5.0, 5.0]\n"), "two robots are called `a`"),
@@ -40,7 +40,7 @@ fn a_bad_swarm_file_is_refused_with_place_and_remedy() {
             "limits.speed: this model of a robot needs a limit",
         ),
         (with("[limits]\nclearance = 2.0\n"), "the places of `a` and `b` are 1 m apart"),
-        (with("[links]\nkind = \"listed\"\n"), "`c` follows and sees nobody"),
+        (with("[links]\nkind = \"listed\"\n"), "`c` follows and has no neighbours"),
         (with("[rule]\nweights = { kind = \"solved\" }\n"), "`c` cannot be placed by its 2 neighbours"),
         (with("[rule]\nmean = { kind = \"material\" }\n"), "needs a lattice"),
         (with("[poses]\nage_limit = 0.01\n"), "poses would be too old before the next period"),

@@ -21,7 +21,7 @@ pub struct Axis<'a> {
     pub is_log: bool,
 }
 
-/// How a series is drawn.
+/// The style of a series.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Style {
     Line,
@@ -145,7 +145,7 @@ fn window(chart: &Chart<'_>) -> Axes {
     Axes { corner: [0.0; 2], size: [page::WIDTH, HEIGHT], low: [x[0], y[0]], high: [x[1], y[1]] }
 }
 
-/// Where ticks stand as the axes count, and what is written beside each (nothing beside a minor one).
+/// Positions of ticks as the axes count, with their labels (none for a minor tick).
 fn ticks(axis: Axis<'_>, low: f64, high: f64, most: f64) -> (Vec<(f64, String)>, String) {
     if !axis.is_log || high - low < 0.7 {
         // Within less than a decade powers of ten would leave the axis bare.
@@ -249,7 +249,7 @@ fn draw_series(svg: &mut Svg, chart: &Chart<'_>, axes: &Axes, series: &Series) {
     svg.group(attributes, |svg| places.iter().for_each(|&place| svg.circle(place, radius)));
 }
 
-/// How near a solver came to equilibrium, iteration by iteration.
+/// A solver's residual, iteration by iteration.
 pub fn residuals(title: &str, solver: &str, residuals: &[f64]) -> String {
     let points = residuals.iter().enumerate().map(|(n, &residual)| [n as f64, residual]).collect();
     draw(&Chart {

@@ -32,7 +32,7 @@ pub struct Pair<'a> {
     pub spacing: f64,
     pub cells: &'a Cells,
     pub roles: &'a [Role],
-    /// Where the particles are at rest \[length\].
+    /// Places of the particles at rest \[length\].
     pub reference: &'a Vectors,
     /// Displacements \[length\].
     pub rule: &'a Vectors,
@@ -98,7 +98,7 @@ impl Pair<'_> {
     }
 }
 
-/// Times what displacements are drawn: 1, or 1, 2, 5 times a power of ten for those too small to be
+/// The factor by which displacements are drawn: 1, or 1, 2, 5 times a power of ten for those too small to be
 /// seen and those so large that the body would be lost beside them.
 pub(super) fn enlargement<D: Iterator<Item = usize>>(
     reference: &Vectors,

@@ -81,7 +81,7 @@ fn draw_contours(
     }
 }
 
-/// Where the field is at least `level`; everywhere if there is none.
+/// The area in which the field is at least `level`; everywhere if there is none.
 fn superlevel(patches: &[Vec<Sample>], level: Option<f64>) -> Path {
     let mut path = Path::default();
     for patch in patches {

@@ -82,7 +82,7 @@ pub(super) fn render(svg: &str, width: u32) -> Result<Vec<u8>, String> {
     png::render(svg, width)
 }
 
-/// Which files a figure is written as.
+/// The files of a figure.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Formats {
     /// No figures at all.

@@ -50,7 +50,7 @@ pub fn note(subject: &Subject<'_>, snapshot: &Snapshot) -> String {
     format!("{} {}{broken}", subject.counts, snapshot.step)
 }
 
-/// Of a long line, what a sheet can show: the ends and extremes within each half pixel.
+/// The part of a long line that a sheet can show: the ends and extremes within each half pixel.
 pub fn thinned(line: &[[f64; 2]]) -> Vec<[f64; 2]> {
     if line.len() < 4 * WIDTH as usize {
         return line.to_vec();

@@ -130,7 +130,7 @@ impl Path {
     }
 }
 
-/// How far DejaVu Sans advances for each character from the space to the tilde \[1/100 of the size\].
+/// Advance of DejaVu Sans for each character from the space to the tilde \[1/100 of the size\].
 const ADVANCES: [u8; 95] = [
     32, 40, 46, 84, 64, 95, 78, 27, 39, 39, 50, 84, 32, 36, 32, 34, 64, 64, 64, 64, 64, 64, 64, 64, 64, 64,
     34, 34, 84, 84, 84, 53, 100, 68, 69, 70, 77, 63, 58, 77, 75, 29, 29, 66, 56, 86, 75, 79, 60, 79, 69, 63,

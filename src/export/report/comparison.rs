@@ -16,7 +16,7 @@ use crate::scene::units::Units;
 
 /// Frames on the way from no displacement to all of it.
 const FRAMES: usize = 20;
-/// Of every quantity.
+/// Bits of every quantity.
 const BITS: u32 = 24;
 
 /// Writes `report.html`.

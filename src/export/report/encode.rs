@@ -22,11 +22,11 @@ pub const GROUP: usize = 16;
 /// The value that a code is a difference from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mode {
-    /// The particle before.
+    /// The previous particle.
     Space = 0,
-    /// The same particle in the frame before.
+    /// The same particle in the previous frame.
     Time = 1,
-    /// How far the particle before went since the frame before.
+    /// The displacement of the previous particle since the previous frame.
     Both = 2,
 }
 
@@ -150,7 +150,7 @@ pub fn doubles(values: impl Iterator<Item = f64>) -> String {
     packer.finish()
 }
 
-/// Of deflate: mostly zeros compress as well at a lower one, in half the time.
+/// Level of deflate: mostly zeros compress as well at a lower one, in half the time.
 const LEVEL: u32 = 4;
 
 /// Deflate into memory, then base64.

@@ -15,7 +15,7 @@ use crate::flock::vectors::Vectors;
 use crate::scene::swarm::Swarm;
 use crate::swarm::flight::{Flight, FlightReport, Record};
 
-/// Of every quantity.
+/// Bits of every quantity.
 const BITS: u32 = 24;
 /// Robots beyond this get no line of their own in the page's table: robots.csv has them.
 const MOST_ROWS: usize = 400;
@@ -141,7 +141,7 @@ pub fn write(
 ) -> Result<PathBuf, ExportError> {
     let mut plots: Vec<Plot> =
         flight::charts(record, report).iter().map(|chart| Plot::of(chart, true)).collect();
-    // The figure has no page around it that says whose it is.
+    // As a figure the chart bears the flight's title; the page has that already.
     plots
         .iter_mut()
         .filter(|plot| plot.title == report.title)
@@ -167,7 +167,7 @@ pub fn write(
     page.write(folder)
 }
 
-/// What broke each bound, and how close robots came.
+/// The moments at which bounds were broken and robots came closest.
 fn moments(report: &FlightReport) -> Vec<(String, f64)> {
     let broken =
         report.bounds.iter().filter_map(|verdict| Some((verdict.complaint()?, verdict.worst.as_ref()?.time)));

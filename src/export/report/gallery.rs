@@ -12,7 +12,7 @@ use super::super::{OutputFolder, summary};
 use super::page::{FILE, STYLE, escaped, filled};
 
 const PAGE: &str = include_str!("web/gallery.html");
-/// Of a picture \[pixel\].
+/// Width of a picture \[pixel\].
 const WIDTH: u32 = 540;
 /// Longest sentence \[character\].
 const LONGEST: usize = 180;
@@ -42,7 +42,7 @@ impl Exhibit {
         Self { kind, name: name.into(), title: title.into(), sentence }
     }
 
-    /// Where its outputs are within the gallery.
+    /// The folder of its outputs within the gallery.
     pub fn folder(&self) -> String {
         format!("{}/{}", self.kind, self.name)
     }
@@ -93,7 +93,7 @@ fn card(folder: &OutputFolder, exhibit: &Exhibit) -> Result<String, ExportError>
     ))
 }
 
-/// The figure that says most: of a flight its map, of a torn body the end, of others the last one on the way.
+/// The most informative figure: of a flight its map, of a torn body the end, of others the last one on the way.
 fn picture(outputs: &Path) -> Result<PathBuf, ExportError> {
     let flight = outputs.join("flight.svg");
     if flight.is_file() {
@@ -122,7 +122,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_exhibit_tells_the_first_sentence_and_cuts_a_long_one_between_words() {
+    fn an_exhibit_shows_the_first_sentence_and_cuts_a_long_one_between_words() {
         let of = |notes: &str| Exhibit::new("scenes", "a", "A", notes).sentence;
         assert_eq!(of("It is 1.5 wide (Eq. 1). And more. "), "It is 1.5 wide (Eq. 1).");
         let long = of(&"word ".repeat(100));

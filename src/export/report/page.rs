@@ -44,9 +44,9 @@ pub struct Page {
     pub title: String,
     /// The command and the name of what it was given.
     pub command: String,
-    /// How it ended, and whether that is as it should be.
+    /// The outcome, and whether it is a success.
     pub verdict: Option<(bool, String)>,
-    /// What a click takes the animation's clock to, in words, and the clock's value.
+    /// Moments that a click takes the animation's clock to: the text, and the clock's value.
     pub moments: Vec<(String, f64)>,
     /// Bodies on the move; several stand beside each other and share one clock.
     pub stages: Vec<View>,
@@ -220,7 +220,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn whatever_a_title_holds_the_page_stays_a_page() {
+    fn a_page_stays_valid_with_any_title() {
         let title = "</script><b>{{script}}\"&".to_owned();
         let page = Page { title: title.clone(), command: "run".into(), ..Page::default() };
         let plot = Plot { title, ..crate::export::report::plot::tests_plot() };

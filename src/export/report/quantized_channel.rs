@@ -13,7 +13,7 @@ const LEAST_EXPONENT: i32 = -1000;
 /// Whole numbers up to this power of two are exact in a double, which is what the browser has.
 const EXACT_BITS: i32 = 52;
 
-/// Codes of a quantity, shape \[count\]: the value is `(base + code) 2^exponent`, and the largest code says
+/// Codes of a quantity, shape \[count\]: the value is `(base + code) 2^exponent`, and the largest code means
 /// that there is none.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct QuantizedChannel {
@@ -77,7 +77,7 @@ pub fn none(bits: u32) -> u32 {
 
 /// The finest quantum, or the one of the frame before if that is nearly as fine.
 fn exponent(low: f64, high: f64, bits: u32, before: Option<i32>) -> i32 {
-    // One code says nothing, one is lost to rounding at the ends.
+    // One code means no value, one is lost to rounding at the ends.
     let codes = f64::from(none(bits) - 2);
     // Halves, so that a range of the largest doubles stays finite.
     let range = 2.0 * (0.5 * high - 0.5 * low) / codes;
@@ -127,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_finite_has_the_code_of_nothing() {
+    fn a_value_that_is_not_finite_has_the_code_of_no_value() {
         let track = QuantizedChannel::of(&[1.0, f64::NAN, f64::INFINITY, 2.0], 12, None);
         assert_eq!([code(&track, 1), code(&track, 2)], [none(12); 2]);
         assert!(code(&track, 3) < none(12));

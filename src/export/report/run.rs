@@ -82,7 +82,7 @@ impl RunRecorder {
         Self { frames, first_roles: roles.clone(), roles, changes: Vec::new(), values }
     }
 
-    /// The recorder, made if there is none yet; it goes on from the animation_state of an earlier one.
+    /// The recorder, made if there is none yet; it goes on from the state of an earlier one.
     pub fn open<'a>(
         recorder: &'a mut Option<Self>,
         earlier: &mut Option<AnimationState<'_>>,
@@ -203,7 +203,7 @@ impl RunRecorder {
     }
 }
 
-/// Whether nothing is known of the way to the equilibrium.
+/// Whether the equilibrium was found without intermediate states.
 fn is_solved_at_once(scene: &Scene, outcome: &Outcome) -> bool {
     outcome.solved.is_some() && scene.load_steps.is_none()
 }
@@ -421,7 +421,7 @@ fn facts(scene: &Scene, outcome: &Outcome, summary: &Summary) -> Vec<(String, St
         fact("Largest strain", number(strain));
     }
     if let Some(measured) = &summary.mechanics {
-        // As the program says it at its end.
+        // As the program prints it at its end.
         for line in measured.to_string().lines() {
             fact("Mechanics", line.trim().to_owned());
         }

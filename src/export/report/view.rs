@@ -1,5 +1,5 @@
-//! A body or a swarm on the move, as data for the page: frames, bonds, cells, roles, and what is known exactly
-//! of the end.
+//! A body or a swarm on the move, as data for the page: frames, bonds, cells, roles, and the exact values
+//! at the end.
 
 use serde::Serialize;
 
@@ -16,7 +16,7 @@ pub struct Animation {
     pub name: String,
     /// `particle` or `robot`.
     pub noun: &'static str,
-    /// Of length.
+    /// Unit of length.
     pub unit: String,
     pub clock: Clock,
     pub count: usize,
@@ -46,9 +46,9 @@ pub struct Animation {
     pub corners: usize,
     /// Stress from strain, for the von Mises stress.
     pub stress: Option<Stress>,
-    /// Whether displacements scale with their cause, so that drawing them at another size is no lie.
+    /// Whether displacements scale with their cause, so that drawing them at another size is correct.
     pub linear: bool,
-    /// Closed outlines of what stands in the way and of fences.
+    /// Closed outlines of obstacles and of fences.
     pub outlines: Vec<Outline>,
 }
 
@@ -97,7 +97,7 @@ pub struct Outline {
     pub corners: Vec<[f64; 2]>,
 }
 
-/// A animation with its arrays, each compressed text with a name.
+/// An animation with its arrays, each compressed text with a name.
 #[derive(Debug)]
 pub struct View {
     pub animation: Animation,
@@ -144,7 +144,7 @@ impl View {
         self.put("role-changes", integers(changes.iter().flatten().copied(), 3));
     }
 
-    /// Pairs of neighbours; `sees` says of each whether both ends see the other (0) or only the first (1), `broken`
+    /// Pairs of neighbours; `sees` gives for each whether both ends see the other (0) or only the first (1), `broken`
     /// is one more than the step at which it broke, 0 for never.
     pub fn set_bonds(&mut self, pairs: &[[u32; 2]], sees: &[u32], broken: &[u32]) {
         self.put("bonds", integers(pairs.iter().flatten().copied(), 2));

@@ -1,4 +1,4 @@
-//! Who leads and how, with the tracks that leaders follow from a file.
+//! Leaders and their programs, with the tracks that leaders follow from a file.
 
 use std::path::Path;
 
@@ -27,7 +27,7 @@ pub fn leaders(
             }
             ([], None) => {
                 let help = "name the robots (robots = [\"r1\"]) or give a region";
-                return Err(refuse(&key, "nobody leads by this entry".into(), help));
+                return Err(refuse(&key, "this entry names no leader".into(), help));
             }
             (names, None) => Who::Names(names.to_vec()),
             (_, Some(_)) => {

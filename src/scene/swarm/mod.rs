@@ -1,6 +1,6 @@
 //! A swarm file becomes a validated [`Swarm`]: the same reading, checks and messages as a scene's.
 //!
-//! What needs the robots' places themselves (whether a name exists, say) is checked where the formation is
+//! Checks that need the robots' places (whether a name exists, say) are made where the formation is
 //! laid out, which reports through [`Swarm::refuse`] in the same form.
 
 mod leaders;
@@ -39,7 +39,7 @@ pub struct NamedManoeuvre {
     pub legs: Vec<Leg>,
 }
 
-/// What gives the robots their places.
+/// The source of the robots' places.
 #[derive(Clone, Debug)]
 pub enum Shape {
     /// The file names each, and they follow by this rule.
@@ -76,7 +76,7 @@ pub enum Who {
     Region(SceneRegion),
 }
 
-/// How leaders move; times of motions in seconds.
+/// The motion of leaders; times in seconds.
 #[derive(Clone, Debug)]
 pub enum Program {
     /// From outside.

@@ -1,4 +1,4 @@
-//! From the swarm as written to the swarm as meant, with the checks that concern several keys at once.
+//! Builds a swarm from its file, with the checks that concern several keys at once.
 
 use std::path::Path;
 
@@ -66,7 +66,9 @@ fn shape(
 ) -> Result<Shape, SceneError> {
     let help = "give one of: [[robots]] with a place each; [lattice] and [body]; [scene]";
     match (&raw.scene, &raw.lattice, &raw.body) {
-        (None, None, None) if raw.robots.is_empty() => Err(refuse("robots", "nobody flies".into(), help)),
+        (None, None, None) if raw.robots.is_empty() => {
+            Err(refuse("robots", "no robot is given".into(), help))
+        }
         (None, None, None) => Ok(Shape::Places(rule_of_places(raw, refuse)?)),
         (None, _, Some(RawBody { shape: RawShape::Points { .. }, .. })) => {
             let message = "robots are no body of points".into();

@@ -1,7 +1,7 @@
 //! The control loop's tick: poses in, safe targets out. The simulated flight and the nodes call the same one.
 //!
-//! A period goes: who is heard, and where; where the rule sends each ([`Formation::advance`]); who has to do
-//! without some of its neighbours; what is safe ([`Filter`]). A member that is not heard gets no target.
+//! A period has four parts: the members' poses; their targets by the rule ([`Formation::advance`]); new targets for
+//! members with lost or faulty neighbours; safe targets ([`Filter`]). A member whose pose is not usable gets no target.
 
 pub mod scope;
 mod setup;
@@ -19,25 +19,25 @@ use crate::flock::vectors::{Vectors, distance};
 use crate::scene::SceneError;
 use crate::scene::swarm::Swarm;
 
-/// What the loop is doing.
+/// The mode of the loop.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Mode {
     #[default]
     Running,
-    /// Everybody holds the place it had when the stop came, until it is lifted.
+    /// Every member holds the place it had when the stop came, until the stop is lifted.
     EmergencyStopped,
-    /// Nobody gets a target.
+    /// No member gets a target.
     Inactive,
 }
 
-/// What the tick did to a member, besides the flags of the filter.
+/// A neighbour's pose was not usable. This flag and the next two add to those of the filter.
 pub const NEIGHBOUR_LOST: u32 = 1 << 16;
-/// Neighbours that stray were left out.
+/// Straying neighbours were left out.
 pub const TRIMMED: u32 = 1 << 17;
-/// A pose was turned away since the last tick.
+/// A pose was rejected since the last tick.
 pub const POSE_REJECTED: u32 = 1 << 18;
 
-/// What of a loop outlasts its process.
+/// The part of a loop's state that outlasts its process.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 pub struct KeptControl {
     is_stopped: bool,
@@ -48,7 +48,7 @@ pub struct KeptControl {
     leads: Vec<Option<KeptLead>>,
 }
 
-/// What the filter goes by where there are tracks.
+/// The filter's input where there are tracks.
 #[derive(Clone)]
 struct Tracked {
     present: Vectors,
@@ -63,9 +63,9 @@ pub struct Control {
     formation: Formation,
     watch: Watch,
     filter: Filter,
-    /// Of members that take time to brake: where they are by now. Empty for others.
+    /// Present states of members that take time to brake; empty for other models.
     tracks: Vec<Track>,
-    /// Whose targets reach their robots from here.
+    /// Members whose targets this loop sends.
     serves: Vec<bool>,
     /// Liars tolerated among a member's neighbours.
     max_faulty: usize,
@@ -79,9 +79,9 @@ pub struct Control {
     run_before: f64,
     /// Periods run since the beginning.
     periods: u64,
-    /// Whether every leader that is listened to has been heard once.
+    /// Whether every leader that the loop listens to has sent a pose.
     begun: bool,
-    /// Whose poses can come at all.
+    /// Members whose poses this loop receives.
     listens: Vec<bool>,
     now: f64,
     present: Vectors,
@@ -92,7 +92,7 @@ pub struct Control {
     ages: Vec<f64>,
     wanted: Vectors,
     safe: Vectors,
-    /// Where members hold in an emergency stop.
+    /// Places that members hold in an emergency stop.
     held: Vec<Option<[f64; 2]>>,
     tracked: Tracked,
     filtered: Vec<Flags>,
@@ -154,7 +154,7 @@ impl Control {
         members.iter().for_each(|&member| self.listens[member] = true);
     }
 
-    /// Sends targets to these members alone: what others do is not known from here.
+    /// Sends targets to these members alone: the targets of others are not known here.
     pub fn serve(&mut self, members: &[usize]) {
         self.serves.fill(false);
         members.iter().for_each(|&member| self.serves[member] = true);
@@ -192,7 +192,7 @@ impl Control {
         self.period = period;
     }
 
-    /// How much of the way to its target a follower goes in a sweep \[1\].
+    /// The part of the way to its target that a follower goes in a sweep \[1\].
     pub fn damping(&self) -> f64 {
         self.formation.damping()
     }
@@ -200,7 +200,7 @@ impl Control {
     /// A pose of `member` that arrives at `now` \[s\].
     ///
     /// # Errors
-    /// Why it is not believed; it then changes nothing but the counts.
+    /// The reason for rejecting the pose, which then changes the counts alone.
     pub fn receive(&mut self, member: usize, pose: Pose, now: f64) -> Result<(), Rejection> {
         let before = self.watch.pose(member);
         let verdict = self.watch.receive(member, pose, now);
@@ -219,7 +219,7 @@ impl Control {
         verdict
     }
 
-    /// How members that take time to brake move.
+    /// The model of members that take time to brake.
     fn dynamics(&self) -> DoubleIntegrator {
         let Limits { speed, acceleration, .. } = *self.filter.limits();
         DoubleIntegrator { speed, acceleration }
@@ -238,7 +238,7 @@ impl Control {
         self.formation.begin(manoeuvre, now);
     }
 
-    /// Everybody holds its place from the next tick on, until [`Control::resume`].
+    /// Makes every member hold its place from the next tick on, until [`Control::resume`].
     pub fn emergency_stop(&mut self) {
         if self.mode != Mode::EmergencyStopped {
             self.mode = Mode::EmergencyStopped;
@@ -271,7 +271,8 @@ impl Control {
         }
     }
 
-    /// Goes on from what a loop of the same swarm left; an emergency stop holds everybody where it is seen next.
+    /// Continues from the state of an earlier loop of the same swarm; an emergency stop holds every member at its
+    /// next accepted pose.
     pub fn restore(&mut self, kept: KeptControl) {
         (self.run_before, self.run, self.periods) = (kept.program_time, 0, kept.periods);
         self.formation.restore(kept.leads, kept.periods);
@@ -290,7 +291,7 @@ impl Control {
         self.filter.set_limits(limits)
     }
 
-    /// Changes how much of the way to its target a follower goes in a sweep \[1\].
+    /// Sets the part of the way to its target that a follower goes in a sweep \[1\].
     pub fn set_damping(&mut self, damping: f64) {
         self.formation.set_damping(damping);
     }
@@ -336,16 +337,16 @@ impl Control {
             let last = self.watch.last(member);
             self.known[member] = last.is_some();
             self.usable[member] = self.watch.health(member).is_usable();
-            // Nobody knows more of a lost member than that it was there: how long ago says no more.
+            // The place of a lost member is unknown: an age beyond the limit carries no more information.
             let age = self.watch.age(member, now).unwrap_or(0.0);
             self.ages[member] = age.min(self.watch.limits().age_limit);
             self.present.set(member, last.map_or([f64::NAN; 2], |pose| pose.position));
         }
     }
 
-    /// Where members that take time to brake are by now. A member of another node moves by targets that are not
-    /// known here, one that is lost by none that can be relied on: their places are as old as they are, and their
-    /// velocities older.
+    /// Estimates the present states of members that take time to brake. The targets of a member of another node are
+    /// not known here, and a lost member need not follow its own: both keep their last poses with the age of these,
+    /// and velocities that are older still.
     fn follow_tracks(&mut self, now: f64) {
         let dynamics = self.dynamics();
         let gains = Gains::of(dynamics.acceleration, self.period, self.filter.limits().deviation);
@@ -374,7 +375,7 @@ impl Control {
     }
 
     fn follow(&mut self) {
-        // A program that ran while its leaders were still coming up would be over before they could follow it.
+        // A program that ran before its leaders were up would be over before they could follow it.
         let awaited = |m: usize| self.listens[m] && self.formation.leads(m) && !self.known[m];
         self.begun |= !(0..self.formation.count()).any(awaited);
         if !self.begun {
@@ -408,7 +409,7 @@ impl Control {
     }
 
     /// The target by those neighbours alone whose displacements do not stray from the member's own, axis by axis,
-    /// and whether any does. With nobody left on an axis the member stays where it is on that axis.
+    /// and whether any does. With no neighbour left on an axis the member stays where it is on that axis.
     fn resilient_target(&self, member: usize, seen: &Seen<'_>) -> ([f64; 2], bool) {
         let displacement = |m: usize| {
             let (now, then) = (self.present.get(m), self.formation.places.get(m));
@@ -426,22 +427,22 @@ impl Control {
         ([along(0), along(1)], keep.iter().any(|keep| *keep != [true; 2]))
     }
 
-    /// The member's safe target \[m\]; `None` for one that is not heard, and while the loop is inactive.
+    /// The member's safe target \[m\]; `None` without a usable pose, and while the loop is inactive.
     pub fn target(&self, member: usize) -> Option<[f64; 2]> {
         (self.mode != Mode::Inactive && self.usable[member]).then(|| self.safe.get(member))
     }
 
-    /// Where the rule alone would send the member \[m\].
+    /// The member's target by the rule alone \[m\].
     pub fn wanted(&self, member: usize) -> [f64; 2] {
         self.wanted.get(member)
     }
 
-    /// Where the member was last seen \[m\].
+    /// The member's last known position \[m\].
     pub fn position(&self, member: usize) -> Option<[f64; 2]> {
         self.known[member].then(|| self.present.get(member))
     }
 
-    /// Where the member looks \[rad\], while it is heard.
+    /// The member's heading \[rad\], while its pose is usable.
     pub fn yaw(&self, member: usize) -> Option<f64> {
         self.watch.pose(member).map(|pose| pose.yaw)
     }
@@ -464,17 +465,17 @@ impl Control {
         self.watch.age(member, self.now)
     }
 
-    /// What the formation suffers, from the poses of the last tick; members never seen stand at their places.
+    /// Strain and PE1 from the poses of the last tick; members never seen count at their nominal places.
     pub fn measures(&self) -> Measures {
         self.formation.measures(&self.seen_places())
     }
 
-    /// Where each member comes to rest with the leaders as they are \[m\]; `None` where the rule is not linear.
+    /// Each member's place of rest with the leaders as they are \[m\]; `None` where the rule is not linear.
     pub fn settled(&self) -> Option<Vectors> {
         self.formation.settled(&self.seen_places())
     }
 
-    /// Largest distance of a heard follower from where it comes to rest \[m\].
+    /// Largest distance of a follower with a usable pose from where it comes to rest \[m\].
     pub fn formation_error(&self) -> Option<f64> {
         let settled = self.settled()?;
         let follows = |&m: &usize| self.usable[m] && !self.formation.leads(m);

@@ -1,16 +1,16 @@
-//! Whose targets a loop computes, and whom it has to hear for them: all, or one robot's own.
+//! The members whose targets a loop computes and those whose poses it needs for that: all, or one robot's.
 
 use super::Control;
 use crate::scene::swarm::Swarm;
 
-/// The members that a loop serves, and those that it hears. By number, ascending.
+/// The members that a loop serves, and those whose poses it receives. By number, ascending.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct NodeScope {
     pub mine: Vec<usize>,
     pub heard: Vec<usize>,
 }
 
-/// Why a robot cannot be served alone.
+/// The reason for which a robot cannot be served alone.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum NodeScopeError {
     #[error("--member {name}: there is no such robot\n  help: they are called `{first}` to `{last}`")]
@@ -20,7 +20,7 @@ pub enum NodeScopeError {
 }
 
 impl NodeScope {
-    /// The loop's part: of this robot, or of all; the loop then expects no other poses than it hears.
+    /// Returns the scope of one robot, or of all, and restricts the loop to it: no other poses are expected.
     ///
     /// # Errors
     /// A name that is no robot's, or a robot whose target depends on more than its neighbours.

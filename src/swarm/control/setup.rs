@@ -1,4 +1,4 @@
-//! From the swarm file to what the loop is made of: limits, obstacles, which poses are believed.
+//! Builds the loop's parts from the swarm file: limits, obstacles, conditions on poses.
 
 use crate::scene::SceneError;
 use crate::scene::swarm::Swarm;
@@ -7,7 +7,7 @@ use crate::swarm::formation::Formation;
 use crate::swarm::safety::{Filter, Limits, Obstacle, Obstacles, Place, SafetyError};
 use crate::swarm::watch::WatchLimits;
 
-/// How many faulty robots among a member's neighbours are to be tolerated.
+/// The number of faulty robots to be tolerated among a member's neighbours.
 ///
 /// # Errors
 /// Names the member that does not have the neighbours for it.
@@ -22,14 +22,14 @@ pub fn max_faulty(swarm: &Swarm, formation: &Formation) -> Result<usize, SceneEr
     })?;
     if formation.affine(0.0).is_some() {
         tracing::warn!(
-            "robots that leave out who strays follow a common displacement exactly; a formation that is turned, \
-             stretched or sheared loses its shape somewhat"
+            "robots that leave out straying neighbours follow a common displacement exactly; a formation that is \
+             turned, stretched or sheared loses its shape somewhat"
         );
     }
     Ok(max_faulty)
 }
 
-/// Refuses leaders that wait for somebody's word in a swarm that takes nobody's.
+/// Refuses leaders that are moved from outside in a swarm that accepts no such commands.
 ///
 /// # Errors
 /// Names the key.
@@ -39,14 +39,14 @@ pub fn check_commands(swarm: &Swarm, formation: &Formation) -> Result<(), SceneE
         Some(leader) if !commands.may_do_all() => {
             let name = &formation.names[leader];
             let what =
-                format!("\"{}\" lets nobody lead `{name}`, whose program is external", commands.name());
+                format!("\"{}\" forbids commands to `{name}`, whose program is external", commands.name());
             Err(swarm.refuse("node.commands", what, "give the leader a program of its own, or allow \"all\""))
         }
         _ => Ok(()),
     }
 }
 
-/// Which poses are believed; no robot is taken for faster than the speed limit unless the file says so.
+/// The conditions on poses; no robot is assumed faster than the speed limit unless the file states it.
 pub fn watch(swarm: &Swarm, formation: &Formation, speed: f64) -> WatchLimits {
     let (poses, period) = (&swarm.raw.poses, swarm.raw.control.period);
     WatchLimits {
@@ -62,7 +62,7 @@ pub fn watch(swarm: &Swarm, formation: &Formation, speed: f64) -> WatchLimits {
     }
 }
 
-/// What the filter holds members to, as the file says.
+/// The filter's limits, from the file.
 fn limits(raw: &RawLimits, flight: &RawFlight) -> Limits {
     Limits {
         brakes: matches!(flight.model, RawModel::DoubleIntegrator),

@@ -1,11 +1,11 @@
-//! What the last tick left, as every edge publishes it.
+//! The state after the last tick, as every edge publishes it.
 
 use super::{Control, Mode, NEIGHBOUR_LOST, POSE_REJECTED, TRIMMED};
 use crate::flock::vectors::distance;
 use crate::swarm::safety::Flags;
 use crate::swarm::watch::Health;
 
-/// How the formation is.
+/// The state of the formation.
 #[derive(Clone, Debug)]
 pub struct FormationState {
     pub tick: u64,
@@ -21,7 +21,7 @@ pub struct FormationState {
     pub members: Vec<MemberState>,
 }
 
-/// How one member is. Positions in \[m, world frame\].
+/// The state of one member. Positions in \[m, world frame\].
 #[derive(Clone, Copy, Debug)]
 pub struct MemberState {
     pub leads: bool,
@@ -29,17 +29,17 @@ pub struct MemberState {
     pub position: Option<[f64; 2]>,
     /// After the safety filter.
     pub target: Option<[f64; 2]>,
-    /// Where the rule comes to rest with the leaders as they are.
+    /// Place of rest by the rule with the leaders as they are.
     pub settled: Option<[f64; 2]>,
     /// From the nominal place \[m\].
     pub displacement: Option<[f64; 2]>,
     /// \[m^2\].
     pub pe1: f64,
-    /// xx, yy, xy \[1\]; absent for those that see too few.
+    /// xx, yy, xy \[1\]; absent for members with too few neighbours.
     pub strain: Option<[f64; 3]>,
     /// \[rad\].
     pub rotation: Option<f64>,
-    /// Of the pose \[s\].
+    /// Age of the pose \[s\].
     pub age: Option<f64>,
     /// To the nearest robot or obstacle, hull to hull \[m\].
     pub clearance: f64,
@@ -116,7 +116,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_the_filter_and_the_loop_say_is_published_in_one_order() {
+    fn the_flags_of_the_filter_and_of_the_loop_are_published_in_one_order() {
         let all: u32 = PUBLISHED.iter().sum();
         assert_eq!(published_flags(all), 0b1_1111_1111);
         assert_eq!(published_flags(Flags::SPEED_LIMITED | POSE_REJECTED), 1 | 256);

@@ -1,4 +1,4 @@
-//! What goes wrong, with whom, from when to when.
+//! Faults of robots, each with its member and time span.
 
 use crate::scene::SceneError;
 use crate::scene::swarm::Swarm;

@@ -1,4 +1,4 @@
-//! Simulated robots with what they say and what goes wrong with them; who moves them is somebody else's business.
+//! Simulated robots with their channels and faults; their targets come from outside.
 
 use super::faults::{self, Fault};
 use crate::flock::vectors::Vectors;
@@ -53,7 +53,7 @@ impl Fleet {
         &self.robots
     }
 
-    /// Goes on with robots as they were after so many periods; others than there are stay away.
+    /// Continues with the states of the robots after so many periods; surplus states are ignored.
     pub fn restore(&mut self, robots: &[Robot], period: u64) {
         self.robots.iter_mut().zip(robots).for_each(|(robot, kept)| *robot = *kept);
         self.period = period;
@@ -73,12 +73,12 @@ impl Fleet {
         self.period as f64 * self.dt
     }
 
-    /// Where the robots are \[m\].
+    /// The robots' places \[m\].
     pub fn places(&self) -> Vectors {
         self.robots.iter().map(|robot| robot.position).collect()
     }
 
-    /// Whether nothing is wrong with the robot now.
+    /// Whether the robot has no fault now.
     pub fn is_sound(&self, member: usize) -> bool {
         self.fault(member).is_none()
     }
@@ -88,7 +88,7 @@ impl Fleet {
         !self.fault(member).is_some_and(Fault::stands)
     }
 
-    /// Every robot says where it is, stamped with `stamp` \[s\]; `hear` is told what the channels deliver now.
+    /// Every robot sends its pose, stamped with `stamp` \[s\]; `hear` receives the poses that the channels deliver now.
     pub fn say(&mut self, stamp: f64, hear: &mut dyn FnMut(usize, Pose)) {
         for m in 0..self.robots.len() {
             let fault = self.fault(m);
@@ -114,7 +114,7 @@ impl Fleet {
         self.period += 1;
     }
 
-    /// What is wrong with a robot now; of several things the last of the file.
+    /// The robot's present fault; of several the last in the file.
     fn fault(&self, member: usize) -> Option<&Fault> {
         let now = self.time();
         self.faults.iter().rev().find(|fault| fault.member == member && fault.holds(now))

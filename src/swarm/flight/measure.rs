@@ -1,5 +1,5 @@
-//! What is measured of a flight, from where the robots are, not from where they say they are. Errors are those of
-//! the robots with which nothing is wrong at the time.
+//! Measures of a flight, taken from the robots' true places, not from the poses they send. Errors are those of
+//! the robots without a fault at the time.
 
 use super::Flight;
 use super::moment::Extreme;
@@ -118,7 +118,7 @@ impl Record {
     }
 }
 
-/// Which robots are that close.
+/// The robots that came that close.
 fn closest(around: &[f64], value: f64, present: &Vectors, time: f64) -> Extreme {
     let those = |&m: &usize| around[m] == value;
     let member = (0..around.len()).find(those).unwrap_or(0);

@@ -1,8 +1,7 @@
 //! A simulated flight: robots, channels and the control loop in one process, without middleware, deterministic.
 //!
-//! A period goes: every robot says where it is, the channels deliver what they deliver, the control ticks, every
-//! robot goes towards its target. That is what a real swarm's period is, so what holds here is tested
-//! through the tick that flies.
+//! In a period every robot sends its pose, the channels deliver, the control ticks, and every robot goes towards
+//! its target. A real swarm's period is the same, so a simulated flight tests the tick that flies real robots.
 
 mod faults;
 mod fleet;
@@ -66,7 +65,7 @@ impl Flight {
         &self.fleet
     }
 
-    /// How many periods the flight takes.
+    /// The number of periods of the flight.
     pub fn periods(&self) -> u64 {
         self.periods
     }
@@ -76,13 +75,13 @@ impl Flight {
         self.step_heard(&mut |_, _| {});
     }
 
-    /// Flies one period; `hear` is shown what the control hears.
+    /// Flies one period; `hear` receives the poses that the control receives.
     pub fn step_heard(&mut self, hear: &mut dyn FnMut(usize, Pose)) {
         let now = self.fleet.time();
         let control = &mut self.control;
         self.fleet.say(now, &mut |member, pose| {
             hear(member, pose);
-            // What is turned away is counted by the watch.
+            // The watch counts rejected poses.
             let _ = control.receive(member, pose, now);
         });
         self.control.tick(now);
@@ -99,7 +98,7 @@ impl Flight {
         Some(self.fleet.robots().iter().enumerate().map(apart).fold(0.0, f64::max))
     }
 
-    /// Where the continuum run of the same scene has each robot \[m\].
+    /// Each robot's place in the continuum run of the same scene \[m\].
     fn continuum_places(&self) -> Option<impl Fn(usize) -> [f64; 2]> {
         let Twin { engine, particles } = self.continuum.as_ref()?;
         Some(|m: usize| engine.present().get(particles[m]))
@@ -117,7 +116,7 @@ pub fn fly(
     fly_heard(swarm, &mut |_, _| {}, watch)
 }
 
-/// As [`fly`]; `hear` is shown the poses that the control hears, before `watch` sees the period.
+/// As [`fly`]; `hear` receives the poses that the control receives, before `watch` is called for the period.
 ///
 /// # Errors
 /// As [`Flight::new`].
@@ -140,7 +139,7 @@ pub fn fly_heard(
     Ok((record, report))
 }
 
-/// As long as the file says; else as many periods as the scene has steps, or until some time after the programs.
+/// As long as the file states; else as many periods as the scene has steps, or until some time after the programs.
 fn periods(swarm: &Swarm, control: &Control) -> u64 {
     /// \[s\]
     const AFTER_THE_PROGRAMS: f64 = 10.0;
@@ -158,7 +157,7 @@ fn periods(swarm: &Swarm, control: &Control) -> u64 {
     }
 }
 
-/// The run that the flight is held against.
+/// The run that the flight is compared with.
 fn continuum(swarm: &Swarm) -> Result<Option<Twin>, SceneError> {
     let Shape::Scene(scene) = &swarm.shape else { return Ok(None) };
     let plan = Plan::new(scene)?;

@@ -1,4 +1,4 @@
-//! When and where something was at its worst, and which robots it concerns.
+//! The time and place of an extreme value, with the robots that it concerns.
 
 use std::fmt;
 

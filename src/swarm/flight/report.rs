@@ -1,4 +1,4 @@
-//! How a flight went, and whether what had to hold did.
+//! The results of a flight, and whether its declared bounds held.
 
 use serde::Serialize;
 
@@ -14,7 +14,7 @@ pub struct FlightReport {
     pub title: String,
     pub robots: usize,
     pub leaders: usize,
-    /// What the robots are.
+    /// Name of the robots' model.
     pub model: &'static str,
     /// Time flown.
     pub seconds: f64,
@@ -23,7 +23,7 @@ pub struct FlightReport {
     pub affine_error: Option<[f64; 2]>,
     /// Largest, and at the end; absent where the rule has no single place of rest.
     pub formation_error: Option<[f64; 2]>,
-    /// When the formation was within `settled_within` of its shape for good, counted from the end of the
+    /// Time after which the formation stayed within `settled_within` of its shape, counted from the end of the
     /// leaders' programs; absent where it never was.
     pub settling_time: Option<f64>,
     pub settled_within: f64,
@@ -44,7 +44,7 @@ pub struct FlightReport {
     pub per_robot: Vec<RobotReport>,
 }
 
-/// How one robot fared.
+/// The results of one robot.
 #[derive(Clone, Debug, Serialize)]
 pub struct RobotReport {
     pub name: String,
@@ -179,7 +179,7 @@ fn verdicts(swarm: &Swarm, report: &FlightReport, record: &Record, names: &[Stri
     let last = report.affine_error.or(report.formation_error).map(|[_, last]| last);
     let farthest = |which: usize| record.farthest.iter().filter_map(move |all| all[which]);
     let largest = |which| farthest(which).max_by(|a, b| a.value.total_cmp(&b.value));
-    // What kept the formation from being settled.
+    // The robot that kept the formation from being settled.
     let unsettled = farthest(shape).rfind(|one| one.value > bounds.settled_within);
     let all = [
         at_most(

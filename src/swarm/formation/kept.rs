@@ -1,4 +1,4 @@
-//! What of a formation outlasts its process: how the leaders move, and how far a scene's program has run.
+//! The part of a formation that outlasts its process: the leaders' motions, and the progress of a scene's program.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,7 +6,7 @@ use super::{Formation, Lead, Seen, TargetSource};
 use crate::flock::manoeuvre::{Leg, Manoeuvre, Posture};
 use crate::flock::vectors::Vectors;
 
-/// How a leader moves, as [`Lead`] has it; the file still knows its motion.
+/// A leader's motion, as in [`Lead`]; the motion itself stays in the swarm file.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 pub enum KeptLead {
     External([f64; 2]),
@@ -61,7 +61,7 @@ impl Formation {
         self.leads.iter().map(|lead| lead.as_ref().map(kept)).collect()
     }
 
-    /// Goes on from what was kept; `periods` had been run. What does not fit the file stays as the file has it.
+    /// Continues from kept motions after `periods` periods. A motion that does not fit the file is ignored.
     pub fn restore(&mut self, leads: Vec<Option<KeptLead>>, periods: u64) {
         for (lead, kept) in self.leads.iter_mut().zip(leads) {
             match (lead, kept) {
@@ -75,9 +75,9 @@ impl Formation {
         }
         // A body that moves by itself has to get to where it was; the rule alone starts from where robots are seen.
         if self.is_scene || !matches!(self.course, TargetSource::Rule { .. }) {
-            let nobody = vec![false; self.count()];
+            let none = vec![false; self.count()];
             let (places, mut targets) = (self.places.clone(), Vectors::zeros(self.count()));
-            let seen = Seen { present: &places, usable: &nobody, known: &nobody };
+            let seen = Seen { present: &places, usable: &none, known: &none };
             (0..periods).for_each(|_| self.advance(&seen, 0.0, 1, &mut targets));
         }
     }
@@ -89,7 +89,7 @@ mod tests {
     use crate::swarm::control::{Control, Mode};
     use crate::swarm::watch::Pose;
 
-    /// Everybody is at its target a period later.
+    /// Every robot is at its target a period later.
     fn fly(control: &mut Control, periods: std::ops::Range<u32>) {
         for period in periods {
             let now = f64::from(period) * control.period();

@@ -1,4 +1,4 @@
-//! From a swarm file to its formation, with the checks that need the places.
+//! Builds a formation from a swarm file, with the checks that need the places.
 
 use super::{Formation, Lead, TargetSource, inside, links, spacing_of};
 use crate::continuum::engine::Engine;
@@ -22,7 +22,7 @@ use crate::sweep::Update;
 impl Formation {
     /// # Errors
     /// Names the key of the swarm that cannot be laid out: a robot that does not exist, a place outside the
-    /// body, a follower whom nobody leads anywhere, weights that no neighbours can have.
+    /// body, a follower that no leader reaches, weights that do not exist for its neighbours.
     pub fn lay_out(swarm: &Swarm) -> Result<Self, SceneError> {
         let formation = match &swarm.shape {
             Shape::Places(rule) => of_places(swarm, *rule)?,
@@ -52,7 +52,7 @@ fn of_places(swarm: &Swarm, rule: Rule) -> Result<Formation, SceneError> {
     if present_radius.is_none()
         && let Some(i) = (0..places.len()).find(|&i| follows[i] && neighbours.of(i).is_empty())
     {
-        let message = format!("`{}` follows and sees nobody", names[i]);
+        let message = format!("`{}` follows and has no neighbours", names[i]);
         return Err(swarm.refuse("links", message, "widen the links, or make it a leader"));
     }
     let spacing = spacing_of(&places);
@@ -205,7 +205,7 @@ fn numbered(swarm: &Swarm, count: usize) -> Vec<String> {
 /// Members in a region, for the entry of leaders of this number.
 type Pick<'a> = &'a dyn Fn(usize, &SceneRegion) -> Result<Vec<usize>, SceneError>;
 
-/// How each member leads, if it does; later entries win.
+/// The motion of each member that leads; later entries win.
 fn leads(
     swarm: &Swarm,
     names: &[String],
@@ -284,7 +284,9 @@ fn require_settling(swarm: &Swarm, formation: &Formation) -> Result<(), SceneErr
         let names: Vec<&str> =
             (0..formation.count()).filter(outside).map(|m| formation.names[m].as_str()).collect();
         let help = match names[..] {
-            [] => "let robots lead that do not stand on one line, and that everybody is linked to".to_owned(),
+            [] => {
+                "let robots lead that do not stand on one line, and that every robot is linked to".to_owned()
+            }
             _ => format!(
                 "let these lead, which lie outside the hull of their neighbours: {}",
                 names.join(", ")

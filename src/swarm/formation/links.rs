@@ -1,4 +1,4 @@
-//! Who sees whom among robots that stand on no lattice.
+//! The neighbours of robots that stand on no lattice.
 
 use crate::flock::neighbourhood::Neighbours;
 use crate::flock::vectors::{Vectors, distance};
@@ -6,7 +6,7 @@ use crate::scene::SceneError;
 use crate::scene::swarm::Swarm;
 use crate::scene::swarm::raw::RawLinks;
 
-/// Neighbours of each robot by its place, in order of number; whoever is found anew every period has none yet.
+/// Neighbours of each robot by its place, in order of number; empty where they are found anew every period.
 pub fn neighbours(swarm: &Swarm, places: &Vectors) -> Result<Neighbours, SceneError> {
     let links = swarm.raw.links.clone().unwrap_or(RawLinks::Nearest { count: 6 });
     let lists: Vec<Vec<u32>> = match links {
@@ -28,7 +28,7 @@ fn apart(places: &Vectors, i: usize, k: u32) -> f64 {
     distance(places.get(i), places.get(k as usize))
 }
 
-/// The `count` nearest, and whoever is as near as the last of them.
+/// The `count` nearest, and all as near as the last of them.
 fn nearest(places: &Vectors, i: usize, count: usize) -> Vec<u32> {
     let mut distances: Vec<f64> = others(places, i).map(|k| apart(places, i, k)).collect();
     distances.sort_unstable_by(f64::total_cmp);

@@ -1,4 +1,4 @@
-//! A formation: who flies, where each has its place, who leads, and where the rule sends the followers.
+//! A formation: its members, their places, the leaders, and the followers' targets by the rule.
 //!
 //! Its particles are the members and, around a lattice formation with a frame, the frame's virtual points. They
 //! are moved by the engine that moves bodies: a period of a swarm is a step of a continuum whose particles
@@ -44,7 +44,7 @@ pub struct Formation {
     is_scene: bool,
 }
 
-/// Where targets come from.
+/// The source of targets.
 #[derive(Clone, Debug)]
 enum TargetSource {
     /// The rule, over where the members were seen: member `m` is particle `particles[m]`.
@@ -55,10 +55,10 @@ enum TargetSource {
     Recorded { steps: Vec<Vec<[f64; 2]>>, step: usize },
 }
 
-/// How a leader moves.
+/// The motion of a leader.
 #[derive(Clone, Debug)]
 pub enum Lead {
-    /// Told from outside; its place until it is moved another.
+    /// From outside: the place last given, at first its nominal place.
     External([f64; 2]),
     /// From the time `since` on \[s\].
     Motion {
@@ -71,14 +71,14 @@ pub enum Lead {
     },
 }
 
-/// What is known of the members as a period begins.
+/// The members' poses as a period begins.
 #[derive(Clone, Copy, Debug)]
 pub struct Seen<'a> {
-    /// Where each was last seen \[m\], shape \[members\]; of those never seen it is not looked at.
+    /// Last known places \[m\], shape \[members\]; those of members never seen are not used.
     pub present: &'a Vectors,
-    /// Whom the others may look at, shape \[members\].
+    /// Members whose poses the others may use, shape \[members\].
     pub usable: &'a [bool],
-    /// Who has been seen at all, shape \[members\].
+    /// Members that have been seen at least once, shape \[members\].
     pub known: &'a [bool],
 }
 
@@ -113,7 +113,7 @@ impl Formation {
         !self.is_scene
     }
 
-    /// Whether a member's target follows from where its neighbours were seen, whoever else has moved.
+    /// Whether a member's target follows from its neighbours' last known places alone.
     pub fn can_be_followed_alone(&self) -> bool {
         matches!(&self.course, TargetSource::Rule { engine, .. } if engine.update().order == Order::Synchronous)
     }
@@ -152,12 +152,12 @@ impl Formation {
         }
     }
 
-    /// Leaders that are moved from outside where to go.
+    /// Leaders that are moved from outside.
     pub fn moved(&self) -> impl Iterator<Item = usize> + '_ {
         (0..self.count()).filter(|&m| matches!(self.leads[m], Some(Lead::External(_))))
     }
 
-    /// Gives leaders that are moved from outside a new place \[m\]; false for everybody else.
+    /// Gives a leader that is moved from outside a new place \[m\]; false for any other member.
     pub fn tell(&mut self, member: usize, place: [f64; 2]) -> bool {
         match &mut self.leads[member] {
             Some(Lead::External(moved)) => {
@@ -204,7 +204,7 @@ impl Formation {
         leads.all(|lead| of(lead) == Some(first)).then_some(first)
     }
 
-    /// When the last program of the swarm's leaders is over \[s\].
+    /// The end of the last program of the swarm's leaders \[s\].
     pub fn programs_end(&self) -> f64 {
         let end = |lead: &Lead| match lead {
             Lead::External(_) => 0.0,
@@ -217,7 +217,7 @@ impl Formation {
         self.leads.iter().flatten().map(end).fold(0.0, f64::max)
     }
 
-    /// Where a leader's program has it at `time` \[m\].
+    /// The place of a leader at `time` by its program \[m\].
     fn led_to(&self, member: usize, time: f64) -> Option<[f64; 2]> {
         let place = self.places.get(member);
         Some(match self.leads[member].as_ref()? {
@@ -230,9 +230,9 @@ impl Formation {
         })
     }
 
-    /// Moves the formation on by a period that ends at `time` \[s\]: `targets` become where the leaders' programs and
-    /// the rule send the members that were seen. With more than one sweep the followers come nearer to
-    /// where they would rest behind the leaders.
+    /// Moves the formation on by a period that ends at `time` \[s\]: `targets` are set to the places to which the
+    /// leaders' programs and the rule send the members. With more than one sweep the followers' targets come nearer
+    /// to where they would rest behind the leaders.
     pub fn advance(&mut self, seen: &Seen<'_>, time: f64, sweeps: usize, targets: &mut Vectors) {
         let leads: Vec<(usize, [f64; 2])> =
             (0..self.count()).filter_map(|m| Some((m, self.led_to(m, time)?))).collect();
@@ -254,7 +254,7 @@ impl Formation {
                 for sweep in 0..sweeps {
                     leads.iter().for_each(|&(m, place)| engine.lead(particles[m], place));
                     engine.advance();
-                    // The first sweep tells the leaders' move to their neighbours alone.
+                    // After the first sweep the leaders' move has reached their neighbours alone.
                     if sweep > 0 && engine.movement().largest_move <= SETTLED {
                         break;
                     }
@@ -265,8 +265,8 @@ impl Formation {
         self.look_at_roles();
     }
 
-    /// The follower's target by those of its neighbours alone whom `keeps` names, as [`Formation::advance`] would
-    /// have it from where they were seen; `None` where they are too few.
+    /// The follower's target by the neighbours alone that `keeps` selects, as [`Formation::advance`] would compute it
+    /// from their last known places; `None` where they are too few.
     pub fn target_among(
         &self,
         member: usize,
@@ -286,7 +286,7 @@ impl Formation {
         Some([0, 1].map(|k| here[k] + damping * (target[k] - here[k])))
     }
 
-    /// What is left out together where neighbours lie: matrices mix the axes.
+    /// The coordinates that are left out together of faulty neighbours: matrix weights mix the axes.
     pub fn trim(&self) -> Trim {
         match self.engine().map(|engine| engine.flock().rule.mean) {
             Some(Mean::Material { .. }) => Trim::Whole,
@@ -294,7 +294,7 @@ impl Formation {
         }
     }
 
-    /// Refuses more liars among the neighbours of anyone than the formation tolerates.
+    /// Refuses more liars among the neighbours of a member than the formation tolerates.
     ///
     /// # Errors
     /// A sentence that names the robot and what it lacks.
@@ -315,8 +315,8 @@ impl Formation {
         of.iter().filter_map(|&i| particles.binary_search(&(i as usize)).ok())
     }
 
-    /// Where each member comes to rest with the leaders at `leaders` (those of `present` that lead) \[m\]; `None`
-    /// where the rule is not linear.
+    /// Each member's place of rest with the leaders at their places in `present` \[m\]; `None` where the rule is not
+    /// linear.
     pub fn settled(&self, present: &Vectors) -> Option<Vectors> {
         let TargetSource::Rule { particles, .. } = &self.course else { return None };
         let settling = self.settling.as_ref()?;
@@ -340,14 +340,14 @@ impl Formation {
         self.engine().map_or(1.0, |engine| engine.update().damping)
     }
 
-    /// Goes this much of the way to each target from the next period on \[1\].
+    /// Sets the part of the way to each target that a follower goes from the next period on \[1\].
     pub fn set_damping(&mut self, damping: f64) {
         if let TargetSource::Rule { engine, .. } = &mut self.course {
             engine.set_rule(engine.flock().rule, damping);
         }
     }
 
-    /// What the members suffer with all of them where `present` has them.
+    /// Strain and PE1 of the members at the places `present`.
     pub fn measures(&self, present: &Vectors) -> Measures {
         let TargetSource::Rule { engine, particles } = &self.course else {
             return Measures { pe1: vec![0.0; self.count()], strain: vec![None; self.count()] };
@@ -374,7 +374,7 @@ impl Formation {
     }
 }
 
-/// What the formation suffers.
+/// Strain and PE1 of the members.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Measures {
     /// \[m^2\], shape \[members\].

@@ -1,4 +1,4 @@
-//! Where a formation comes to rest: `X_F = (1 - P_FF)^-1 P_FL X_L`, the fixed point of a linear rule.
+//! The places at which a formation comes to rest: `X_F = (1 - P_FF)^-1 P_FL X_L`, the fixed point of a linear rule.
 //!
 //! The answer of every follower to a displacement of every leader is computed once, by a dense factorisation;
 //! a swarm has hundreds of members. Later a period costs a product of that with the leaders' displacements.
@@ -11,7 +11,7 @@ use crate::flock::vectors::Vectors;
 use crate::solve::equilibrium::System;
 use crate::solve::linear::system;
 
-/// More followers than this are not factorised densely: it would take seconds.
+/// Most followers for a dense factorisation: more would take seconds.
 const MOST_FOLLOWERS: usize = 600;
 
 #[derive(Clone, Debug)]
@@ -51,7 +51,7 @@ impl Settling {
         is_finite.then_some(Self { number, follows, leaders, answer, offset })
     }
 
-    /// Displacement of each follower \[m\] when leaders have those that `of_particle` says; `None` for others.
+    /// Displacement of each follower \[m\] when leaders have those that `of_particle` gives; `None` for others.
     /// Shape \[particles\].
     pub fn displacements(&self, of_particle: impl Fn(usize) -> Option<[f64; 2]>) -> Vec<Option<[f64; 2]>> {
         let mut led = DMatrix::zeros(2 * self.leaders.len(), 1);

@@ -2,33 +2,33 @@
 //!
 //! Each follower leaves out the most extreme of what it hears: of the values above its own the `f` highest,
 //! of those below the `f` lowest (LeBlanc, Zhang, Koutsoukos & Sundaram, "Resilient asymptotic consensus in
-//! robust networks", IEEE JSAC 31(4), 2013). With at most `f` liars among the neighbours of anyone, whatever
-//! is left lies between values that honest members hold, so no follower leaves the box of the honest
-//! leaders' displacements. That is said of *displacements*, present less reference: in raw coordinates the
+//! robust networks", IEEE JSAC 31(4), 2013). With at most `f` liars among the neighbours of any member, the
+//! values left lie between those of honest members, so no follower leaves the box of the honest
+//! leaders' displacements. This applies to *displacements*, present less reference: in raw coordinates the
 //! honest neighbours themselves are the extremes.
 //!
-//! What it costs: the extremes of an honest shape are left out too. A common displacement of the leaders is
+//! The cost: the extremes of an honest shape are left out too. A common displacement of the leaders is
 //! still followed exactly; a stretch or a turn is not.
 
 mod support;
 
 pub use support::{Unsupported, most_supported, supported};
 
-/// What is left out together.
+/// The coordinates that are left out together.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Trim {
     /// Each coordinate by itself, as in the paper: up to `2 f` neighbours less on each axis, not the same
     /// ones on both. For rules that treat the axes apart.
     #[default]
     PerAxis,
-    /// A neighbour that is extreme on either axis is left out on both: up to `4 f` less. What is left is
-    /// part of what the other leaves, so it is as safe; it suits matrix weights, which mix the axes, and
+    /// A neighbour that is extreme on either axis is left out on both: up to `4 f` less. The rest is
+    /// a subset of what [`Trim::PerAxis`] leaves, so it is as safe; it suits matrix weights, which mix the axes, and
     /// asks for more neighbours.
     Whole,
 }
 
-/// Says on which axes each neighbour counts, given its displacement and the follower's own \[length\].
-/// `keep` is overwritten, parallel to `displacements`; nothing may be left, and then the follower stays.
+/// Determines the axes on which each neighbour counts, given its displacement and the follower's own \[length\].
+/// `keep` is overwritten, parallel to `displacements`; all may be left out, and then the follower stays.
 /// A displacement that is not finite never counts, and is no one of the `f`.
 ///
 /// Leave out what is not kept and apply the rule to the displacements of the rest (or to their positions
@@ -94,15 +94,15 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_left_out_on_a_side_where_nobody_is() {
-        // ParticleState value at the lower end: only the highest goes, and equal values are no extremes.
+    fn no_value_is_left_out_on_an_empty_side() {
+        // Own value at the lower end: only the highest goes, and equal values are no extremes.
         let row = [[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [0.0, 0.0]];
         assert_eq!(kept(Trim::PerAxis, [0.0; 2], &row, 1), [vec![0, 1, 3], vec![0, 1, 2, 3]]);
         assert_eq!(kept(Trim::PerAxis, [0.0; 2], &row, 9), [vec![0, 3], vec![0, 1, 2, 3]]);
     }
 
     #[test]
-    fn what_is_not_finite_never_counts_and_shields_no_liar() {
+    fn a_displacement_that_is_not_finite_never_counts_and_shields_no_liar() {
         let row = [[f64::NAN, 0.0], [0.0, f64::INFINITY], [50.0, 50.0], [1.0, 1.0], [-1.0, -1.0]];
         assert_eq!(kept(Trim::PerAxis, [0.0; 2], &row, 1), [vec![3], vec![3]]);
     }

@@ -1,16 +1,16 @@
-//! How many liars a graph of neighbours tolerates.
+//! The number of liars that a graph of neighbours tolerates.
 //!
-//! Resilience of consensus in general needs (r, s)-robustness, which is hard to decide (co-NP-complete). Of
-//! followers that listen to leaders less is asked, and that is decided in one walk: strong `2 f + 1`-
+//! Resilience of consensus in general needs (r, s)-robustness, which is hard to decide (co-NP-complete).
+//! Followers of leaders need less, which one walk decides: strong `2 f + 1`-
 //! robustness with respect to the leaders (Usevitch & Panagou, "Resilient leader-follower consensus to
 //! arbitrary reference values", ACC 2018; equal to bootstrap percolation from the leaders). Then, with at
-//! most `f` liars among the neighbours of anyone, leaders included, what the honest leaders say reaches
-//! every follower: whoever hears `2 f + 1` that are right is left with one after trimming.
+//! most `f` liars among the neighbours of any member, leaders included, the honest leaders' values reach
+//! every follower: a follower with `2 f + 1` correct neighbours keeps at least one after trimming.
 
 use super::Trim;
 use crate::flock::neighbourhood::Neighbours;
 
-/// Why so many liars are not tolerated. The texts are about the member and do not name it.
+/// The reason for which so many liars are not tolerated. The texts describe the member without naming it.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Unsupported {
     #[error(
@@ -19,14 +19,14 @@ pub enum Unsupported {
     )]
     TooFewNeighbours { member: usize, neighbours: usize, needed: usize, f: usize },
     #[error(
-        "has {neighbours} neighbours of whom only {reached} are sure to learn what the leaders say, and {needed} \
-         are needed to tolerate F = {f} liars (on a lattice 8 each tolerate 1, 24 tolerate 3)"
+        "has {neighbours} neighbours of which only {reached} are sure to receive the leaders' values, and \
+         {needed} are needed to tolerate F = {f} liars (on a lattice 8 each tolerate 1, 24 tolerate 3)"
     )]
     NotReached { member: usize, neighbours: usize, reached: usize, needed: usize, f: usize },
 }
 
 impl Unsupported {
-    /// Whom it is about.
+    /// The member that the reason is about.
     pub fn member(&self) -> usize {
         match *self {
             Self::TooFewNeighbours { member, .. } | Self::NotReached { member, .. } => member,
@@ -34,8 +34,8 @@ impl Unsupported {
     }
 }
 
-/// Whether the followers, all but the `leaders`, learn what the leaders say whichever `f` of the neighbours
-/// of anyone lie. Without liars (`f` = 0) that is whether everybody is linked to a leader.
+/// Whether the leaders' values reach all followers (all members but the `leaders`), whichever `f` neighbours of
+/// each member lie. Without liars (`f` = 0) that is whether every follower is linked to a leader.
 ///
 /// [`Trim::PerAxis`] needs `2 f + 1` neighbours that are sure, [`Trim::Whole`] `4 f + 1`; with fewer the
 /// followers are as safe, but one that is left with no neighbour stays where it is.
@@ -51,7 +51,7 @@ pub fn supported(neighbours: &Neighbours, leaders: &[bool], f: usize, trim: Trim
         return Err(Unsupported::TooFewNeighbours { member, neighbours: heard(member), needed, f });
     }
     let (sure, reached) = percolate(neighbours, leaders, needed);
-    // The one that lacks least: there the remedy is smallest.
+    // The member with the fewest neighbours missing: there the remedy is smallest.
     match members()
         .filter(|&member| !sure[member])
         .max_by_key(|&member| (reached[member], usize::MAX - member))
@@ -67,16 +67,16 @@ pub fn supported(neighbours: &Neighbours, leaders: &[bool], f: usize, trim: Trim
     }
 }
 
-/// The most liars among the neighbours of anyone that are tolerated; `None` where some follower is linked
+/// The most liars among the neighbours of each member that are tolerated; `None` where some follower is linked
 /// to no leader at all.
 pub fn most_supported(neighbours: &Neighbours, leaders: &[bool], trim: Trim) -> Option<usize> {
-    // Where nobody follows nothing bounds it; more liars than neighbours say nothing.
+    // Without followers there is no bound; counts above the number of neighbours mean nothing.
     let most = (0..neighbours.count()).map(|member| neighbours.of(member).len()).max().unwrap_or(0);
     (0..=most).take_while(|&f| supported(neighbours, leaders, f, trim).is_ok()).last()
 }
 
-/// Adds to the leaders, until none is left to add, whoever has enough neighbours among those in already:
-/// who is in, and how many of each one's neighbours are.
+/// Starts from the leaders and adds members with enough neighbours in the set until none is left to add. Returns
+/// the set, and the number of each member's neighbours in it.
 fn percolate(neighbours: &Neighbours, leaders: &[bool], needed: usize) -> (Vec<bool>, Vec<usize>) {
     let count = neighbours.count();
     let mut heard_by: Vec<Vec<u32>> = vec![Vec::new(); count];
@@ -117,7 +117,7 @@ mod tests {
         (0..100).map(|member| member < 10 * count).collect()
     }
 
-    /// Everybody at the edge leads.
+    /// The leaders are the members at the edge.
     fn ring() -> Vec<bool> {
         (0..100).map(|m| [m / 10, m % 10].iter().any(|&k| k == 0 || k == 9)).collect()
     }
@@ -143,7 +143,7 @@ mod tests {
         let refusal = supported(&four, &ring(), 1, Trim::PerAxis).expect_err("two of four lead at best");
         let expected = Unsupported::NotReached { member: 11, neighbours: 4, reached: 2, needed: 3, f: 1 };
         assert_eq!(refusal, expected);
-        assert!(refusal.to_string().contains("4 neighbours of whom only 2"), "{refusal}");
+        assert!(refusal.to_string().contains("4 neighbours of which only 2"), "{refusal}");
         assert_eq!(refusal.member(), 11);
         let refusal = supported(&four, &columns(1), 2, Trim::PerAxis).expect_err("four at most");
         let expected = Unsupported::TooFewNeighbours { member: 10, neighbours: 3, needed: 5, f: 2 };
@@ -161,8 +161,8 @@ mod tests {
     }
 
     #[test]
-    fn a_neighbour_is_who_is_heard_not_who_hears() {
-        // 0 leads and hears 1; 1 hears nobody.
+    fn a_neighbour_is_the_sender_not_the_receiver() {
+        // 0 leads and receives from 1; 1 receives from no member.
         let deaf = Neighbours::from_lists([vec![1], vec![]]);
         assert!(supported(&deaf, &[true, false], 0, Trim::PerAxis).is_err());
     }

@@ -61,8 +61,8 @@ impl DoubleIntegrator {
         open.map(|d| speed.min(self.speed) / length * d)
     }
 
-    /// The inverse of [`DoubleIntegrator::approach`] below the speed limit: what a period that ends with `velocity`
-    /// \[m/s\] and braking after it add to `v dt / 2` \[m\].
+    /// The inverse of [`DoubleIntegrator::approach`] below the speed limit: the way beyond `v dt / 2` that a period
+    /// that ends with `velocity` \[m/s\] and the braking after it cover \[m\].
     pub fn covered(&self, velocity: [f64; 2], dt: f64) -> [f64; 2] {
         let speed = velocity[0].hypot(velocity[1]);
         if speed == 0.0 {

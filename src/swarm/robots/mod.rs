@@ -1,4 +1,4 @@
-//! Simulated robots: what becomes of a target within one period. One file per model.
+//! Simulated robots: the motion towards a target within one period. One file per model.
 //!
 //! Every model goes from its position towards the target and, where it stands on a straight line to it,
 //! never past it. A robot whose target is not finite comes to rest where it is.
@@ -14,7 +14,7 @@ pub use unicycle::Unicycle;
 
 use serde::{Deserialize, Serialize};
 
-/// Where a robot is and how it moves.
+/// The state of a robot.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize)]
 pub struct Robot {
     /// \[m, world frame\]
@@ -27,7 +27,7 @@ pub struct Robot {
     pub velocity: [f64; 2],
 }
 
-/// How a robot moves.
+/// The model of a robot's motion.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Model {
     /// At its target after every period.

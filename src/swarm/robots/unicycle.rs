@@ -76,7 +76,7 @@ mod tests {
                 let turned = wrapped(robot.yaw - before.yaw).abs();
                 let moved = distance(before.position, robot.position);
                 assert!(turned <= 1.3 * DT + 1e-12);
-                // What is spent on turning is not there for driving.
+                // Time spent on turning is not available for driving.
                 assert!(moved <= 0.8 * (DT - turned / 1.3) + 1e-12, "{moved} after a turn by {turned}");
                 let [x, y] = robot.offset_to(target);
                 assert!((0.6 * x - 0.8 * y).abs() < 1e-12, "off the line at {:?}", robot.position);

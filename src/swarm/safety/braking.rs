@@ -2,17 +2,17 @@
 //!
 //! Such a member is safe as long as there is room for the straight way on which it comes to rest. So the cells of
 //! members that brake divide the space between these ways, not between the members: [the module's docs](super)
-//! prove that a command is then left at every tick.
+//! prove that a command then exists at every tick.
 
 use super::cell::{dot, length, shortened};
 use super::filter::{Filter, Flags, Seen};
 use crate::swarm::robots::DoubleIntegrator;
 
-/// Halvings of the way from braking to what is wanted: a step is as good as to one in so many powers of two.
+/// Halvings of the interval between braking and the wanted velocity: a step is exact to one part in 2 to this power.
 const HALVINGS: usize = 12;
 
 impl Filter {
-    /// How members that brake move.
+    /// The model of members that brake.
     pub(super) fn braking(&self) -> DoubleIntegrator {
         DoubleIntegrator { speed: self.limits.speed, acceleration: self.limits.acceleration }
     }
@@ -22,7 +22,7 @@ impl Filter {
         self.limits.brakes && self.limits.acceleration.is_finite() && seen.velocity.is_some()
     }
 
-    /// Where a member comes to rest if it brakes now \[m, world frame\].
+    /// The place at which a member comes to rest if it brakes now \[m, world frame\].
     pub(super) fn resting_place(&self, seen: &Seen, period: f64, member: usize) -> [f64; 2] {
         let here = seen.present.get(member);
         let way = self.velocity(seen, member).map_or([0.0; 2], |v| self.braking().braking_way(v, period));
@@ -65,7 +65,7 @@ impl Filter {
         }
         let end = rest(next);
         if holds(end) {
-            // To the last bit the goal, where nothing but the goal bounds the step.
+            // The goal to the last bit, where only the goal bounds the step.
             let arrives =
                 next == wanted && length([end[0] - goal[0], end[1] - goal[1]]) <= 1e-12 * length(goal);
             return if arrives && holds(goal) { goal } else { end };

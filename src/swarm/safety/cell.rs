@@ -212,7 +212,7 @@ mod tests {
         }
 
         #[test]
-        fn whoever_stands_outside_moves_no_further_out(
+        fn a_member_outside_moves_no_further_out(
             planes in prop::collection::vec((0.0..6.3, -1.0..1.0), 1..8),
             wanted in prop::array::uniform2(-3.0..3.0),
             reach in 0.1..4.0,
@@ -239,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn whoever_stands_outside_two_half_planes_comes_back_into_both_or_stays_between() {
+    fn a_member_outside_two_half_planes_comes_back_into_both_or_stays_between() {
         let corner = cell(&[(0.0, -0.5), (FRAC_PI_2, -0.25)]);
         assert!(apart(corner.nearest([3.0, 3.0], 9.0), [-0.5, -0.25]) < 1e-12);
         let trap = cell(&[(0.0, -0.5), (PI, -0.25)]);

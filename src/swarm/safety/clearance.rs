@@ -1,4 +1,4 @@
-//! How close robots came between two ticks, to each other and to what is solid.
+//! The clearance of robots between two ticks, from each other and from solids.
 
 use super::Filter;
 use crate::flock::vectors::Vectors;

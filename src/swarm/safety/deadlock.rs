@@ -1,7 +1,7 @@
-//! The way out of a deadlock: who is blocked for some ticks keeps to the right.
+//! The way out of a deadlock: a member that is blocked for some ticks keeps to the right.
 //!
-//! Members that want to swap places stop each other: every one stands at the point of its cell that is
-//! nearest to its goal, and nobody moves. Zhou et al. (2017, section V) break the symmetry by the
+//! Members that want to swap places stop each other: each stands at the point of its cell that is
+//! nearest to its goal, and none moves. Zhou et al. (2017, section V) break the symmetry by the
 //! right-hand rule. Here a blocked member aims to the right of its goal, a quarter turn first and
 //! further back if that does not move it either, until the straight way is free again for as long as
 //! it took to give it up. The aim is projected onto the cell like any other: a detour cannot do harm.
@@ -9,11 +9,11 @@
 
 use super::cell::{dot, length};
 
-/// When a blocked member looks for a way round.
+/// Conditions for the detour of a blocked member.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Patience {
-    /// Ticks without progress before a detour, and with progress before it ends; default 3. At 0 nobody
-    /// ever makes a detour.
+    /// Ticks without progress before a detour, and with progress before it ends; default 3. At 0 no
+    /// member makes a detour.
     pub ticks: u32,
     /// Share \[1\] of the way a member could make in a tick (at most its own size) below which it is
     /// blocked; default 0.1.
@@ -31,7 +31,7 @@ impl Default for Patience {
 /// One member's memory.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Detour {
-    /// Ticks in a row that speak for a change.
+    /// Consecutive ticks in favour of a change.
     ticks: u32,
     /// Eighths of a turn to the right; 0 is straight ahead.
     turn: u8,
@@ -39,14 +39,14 @@ pub struct Detour {
     begun: f64,
 }
 
-/// What a member could do and did at a tick; all relative to it.
+/// A member's possible and actual motion at a tick; all relative to it.
 #[derive(Clone, Copy, Debug)]
 pub struct Tick {
-    /// How far it could go in open space \[m\], at most.
+    /// Largest step in open space \[m\].
     pub scale: f64,
     /// Its goal \[m\].
     pub wanted: [f64; 2],
-    /// How far that is \[m\].
+    /// Distance of the goal \[m\].
     pub distance: f64,
     /// The share of `scale` \[1\] that is free straight to the goal.
     pub straight: f64,
@@ -65,7 +65,7 @@ impl Detour {
         self.turn > 0
     }
 
-    /// Where to aim instead of `wanted` \[m\], relative to the member.
+    /// The aim in place of `wanted` \[m\], relative to the member.
     pub fn aim(self, wanted: [f64; 2]) -> [f64; 2] {
         let angle = -std::f64::consts::FRAC_PI_4 * f64::from(self.turn);
         let (sin, cos) = angle.sin_cos();
@@ -99,7 +99,7 @@ impl Detour {
         };
     }
 
-    /// Whether there is nothing to forget.
+    /// Whether the state is the initial one.
     pub fn is_fresh(self) -> bool {
         self.turn == 0 && self.ticks == 0
     }

@@ -9,7 +9,7 @@ use crate::flock::grid::CellGrid;
 use crate::flock::neighbourhood::Neighbours;
 use crate::flock::vectors::{Vectors, distance};
 
-/// What changed a target: bits that may stand together.
+/// The reasons for changing a target, as bits that may be combined.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Flags(pub u32);
 
@@ -26,7 +26,7 @@ impl Flags {
     pub const OBSTRUCTED: u32 = 16;
     /// The member keeps to the right to get around what blocks it.
     pub const RESOLVING_DEADLOCK: u32 = 32;
-    /// The member got no target: its pose is not known, or the wanted target is not finite. It stays.
+    /// The member stays without a target: its pose is not known, or the wanted target is not finite.
     pub const HELD: u32 = 64;
 
     pub fn has(self, flag: u32) -> bool {
@@ -34,7 +34,7 @@ impl Flags {
     }
 }
 
-/// What is known of the members at a tick; shapes \[count\].
+/// The members' states known at a tick; shapes \[count\].
 #[derive(Clone, Copy, Debug)]
 pub struct Seen<'a> {
     /// Last known places \[m, world frame\]; not finite for a member that was never seen.
@@ -44,14 +44,14 @@ pub struct Seen<'a> {
     /// Ages of the poses \[s\].
     pub ages: &'a [f64],
     /// Present velocities \[m/s\]; without them no acceleration is limited. Of members that brake
-    /// ([`Limits::brakes`]) places and velocities are to be those of now, as good as they can be told.
+    /// ([`Limits::brakes`]) places and velocities are to be estimates of the present ones.
     pub velocity: Option<&'a Vectors>,
-    /// How far the ways on which members come to rest may be off, because their velocities are not known exactly
-    /// \[m\]; not at all without it.
+    /// Error bounds of the ways on which members come to rest, because their velocities are not known exactly
+    /// \[m\]; zero without it.
     pub strays: Option<&'a [f64]>,
 }
 
-/// The safety filter of a swarm. Nothing is allocated per tick once its buffers have grown.
+/// The safety filter of a swarm. A tick allocates no memory once the buffers have grown.
 #[derive(Clone)]
 pub struct Filter {
     pub(super) limits: Limits,
@@ -66,22 +66,22 @@ pub struct Filter {
     pub(super) cell: Cell,
 }
 
-/// Who can be met at this tick.
+/// The members within reach at this tick.
 #[derive(Clone, Default)]
 pub(super) struct Crowd {
     grid: CellGrid,
-    /// Who is within `listed` \[m\] of whom.
+    /// Pairs of members within `listed` \[m\] of each other.
     neighbours: Neighbours,
     listed: f64,
     /// Whether a member was ever seen.
     seen: Vec<bool>,
     /// Largest drift of a member from its pose \[m\].
     drift: f64,
-    /// Where each member comes to rest if it brakes now \[m\]; empty where members need no way to brake.
+    /// Places at which members come to rest if they brake now \[m\]; empty where members need no way to brake.
     pub(super) rest: Vec<[f64; 2]>,
     /// Longest way there \[m\].
     longest: f64,
-    /// Who is near the member in hand, in order of index.
+    /// Members near the current one, in order of index.
     pub(super) found: Vec<u32>,
 }
 
@@ -128,8 +128,8 @@ impl Filter {
         Ok(())
     }
 
-    /// Safe targets \[m, world frame\] for the wanted ones over the next `period` \[s\], and what changed
-    /// them. The members are to go straight to their targets, at any pace; the speed is
+    /// Safe targets \[m, world frame\] for the wanted ones over the next `period` \[s\], with the reasons for
+    /// each change. The members are to go straight to their targets, at any pace; the speed is
     /// `|safe - present| / period` unless they brake ([`Limits::brakes`]).
     ///
     /// # Panics
@@ -193,7 +193,7 @@ impl Filter {
         if count < GRID_FROM {
             return;
         }
-        // As wide as most queries: whoever has much further to go than the mean looks by itself.
+        // As wide as most queries: a member with a way much longer than the mean queries the grid itself.
         let step = self.limits.speed * period;
         let ways =
             seen.present.iter().zip(wanted.iter()).map(|(here, there)| distance(here, there).min(step));
@@ -234,7 +234,7 @@ impl Filter {
         }
     }
 
-    /// How far a member may be from its pose \[m\].
+    /// Largest distance of a member from its pose \[m\].
     pub(super) fn drift(&self, seen: &Seen, member: usize) -> f64 {
         let age = seen.ages[member];
         if self.limits.speed.is_finite() && age > 0.0 { self.limits.speed * age } else { 0.0 }

@@ -1,8 +1,8 @@
-//! What robots must not do.
+//! The limits that robots have to keep.
 
 use super::deadlock::Patience;
 
-/// What the filter holds every member to.
+/// The limits that the filter enforces on every member.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Limits {
     /// Highest speed \[m/s\]; default none (infinite). It also bounds how far a member may have strayed
@@ -14,8 +14,8 @@ pub struct Limits {
     /// integrators under a position controller do; default no. With an acceleration limit they are sent to where
     /// they come to rest after the next step.
     pub brakes: bool,
-    /// Whether members are at their targets after a period, however far; default no. Targets of those
-    /// that are seen late then keep the speed limit among themselves.
+    /// Whether members are at their targets after a period, however far; default no. Successive targets
+    /// of members whose poses are late then keep the speed limit among themselves.
     pub arrives: bool,
     /// Standard deviation of each coordinate of a pose \[m\]; default 0. Everything is kept farther away by
     /// three deviations of each member that it concerns.
@@ -29,7 +29,7 @@ pub struct Limits {
     /// Polygon that every member's disc stays inside \[m, world frame\], vertices in order, either way
     /// round, convex or not; default none.
     pub geofence: Option<Vec<[f64; 2]>>,
-    /// When a blocked member looks for a way round; default after 3 ticks.
+    /// Conditions for a blocked member's detour; default after 3 ticks.
     pub patience: Patience,
 }
 
@@ -49,7 +49,7 @@ impl Default for Limits {
     }
 }
 
-/// Why there is no filter.
+/// Error building a filter.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SafetyError {
     #[error("limit `{name}` = {value}: give a number {range}, or leave it out for {default}")]
@@ -68,7 +68,7 @@ pub enum SafetyError {
     Disc { place: Place, radius: f64 },
 }
 
-/// Which shape an error is about.
+/// The shape that an error is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Place {
     Geofence,
@@ -102,7 +102,7 @@ impl Limits {
         Ok(())
     }
 
-    /// What a member's noise adds to all distances that it keeps \[m\].
+    /// The widening of a member's distances for its noise \[m\].
     pub(super) fn margin(&self) -> f64 {
         3.0 * self.deviation
     }

@@ -1,7 +1,7 @@
-//! Makes targets safe: whatever the rule wants, nobody comes nearer to anything than declared.
+//! The safety filter: with any targets of the rule, members keep the declared distance from each other and from solids.
 //!
-//! [`Filter::apply`] stands between the rule and whoever moves the robots. It takes present places,
-//! wanted targets and the poses' ages and gives targets that keep the [`Limits`]:
+//! [`Filter::apply`] stands between the rule and the robots. It takes present places,
+//! wanted targets and the poses' ages and returns targets that keep the [`Limits`]:
 //!
 //! * **Other members** by buffered Voronoi cells (D. Zhou, Z. Wang, S. Bandyopadhyay, M. Schwager,
 //!   "Fast, on-line collision avoidance for dynamic vehicles using buffered Voronoi cells", IEEE RA-L
@@ -21,7 +21,7 @@
 //!
 //! # Why only those in reach matter
 //! A member goes no further than `reach = min(speed * period, |wanted - p|)`: the projection onto a
-//! convex cell that holds `p` is no further from `p` than what was projected. Whoever is further away
+//! convex cell that holds `p` is no further from `p` than the projected point. A member further away
 //! than `s + 2 reach` has its border at `(d - s) / 2 >= reach`, which no point of the way touches.
 //!
 //! # Old poses
@@ -29,12 +29,12 @@
 //! off by an angle of sine `e / d` at most, and the border is at least `(sqrt(d^2 - e^2) - s - e) / 2` away;
 //! turning it costs a further `2 sin(angle / 2) reach`. The cell takes all of that off, so it lies inside
 //! every cell that the true places could have. Where that leaves nothing, the member moves only away from
-//! all places where the other may be, or stays: age alone drives nobody apart. That takes poses
-//! whose ages are true and a speed limit that others keep too. For obstacles the member's own age counts.
+//! all places where the other may be, or stays: age alone moves no member. This assumes
+//! true ages and a speed limit that all members keep. For obstacles the member's own age counts.
 //!
 //! # Members that take time to brake
-//! A double integrator that stands in its cell now may be unable to stay there. What has to be kept apart are the
-//! ways on which members come to rest: straight on, the whole acceleration `a` against the velocity `v`, over periods
+//! A double integrator that stands in its cell now may be unable to stay there. The ways on which members come to rest
+//! have to be kept apart: straight on, the whole acceleration `a` against the velocity `v`, over periods
 //! `T` of constant acceleration `n (n + 1) T^2 a / 2 + r (n + 1) T^2 a - v T / 2` with `v = (n + r) a T`, which tends to
 //! `v^2 / (2 a)`. So for such members ([`Limits::brakes`]) the cell's borders part these ways: the half-plane is that
 //! between the nearest points of two ways `B_i`, `B_j`, and each takes half of `|B_i - B_j| - s`; obstacles and the
@@ -46,14 +46,14 @@
 //! Any command that is given has its next way's end `e` and the place `q` where it begins in the cell: `e` is tested,
 //! and `q` lies between the member's path, which is a parabola inside the triangle of `p`, `p + v T / 2` (on `B_i`, for
 //! the way to brake is no shorter) and `e`. The cell is convex, so all of the period's path and the next way lie in it.
-//! Cells of two members are `s` apart by what is said above. At rest the ways are points, so whoever starts at rest and
-//! clear is safe for good.
+//! Cells of two members are `s` apart, as shown above. At rest the ways are points, so a member that starts at rest and
+//! clear stays safe.
 //!
 //! That is a barrier certificate (U. Borrmann, L. Wang, A. D. Ames, M. Egerstedt, "Control barrier certificates for
 //! safe swarm behavior", IFAC-PapersOnLine 48(27), 2015) on each half-plane of a buffered Voronoi cell, in discrete time
 //! and with the whole way in place of the distance, so that no rate has to be chosen. It takes places and velocities of
 //! now: [`Control`](super::control::Control) has them from its members' model ([`Track`](super::watch::Track)), which is
-//! exact, however late poses are, for members that do as their model; those that do not are not covered.
+//! exact, however late poses are, for members that follow their model; others are not covered.
 //!
 //! Members without that flag go no faster than lets them brake before every border of their cell, as it stands.
 //! Where a border comes too fast the cell is kept and the acceleration exceeded, with
@@ -62,17 +62,17 @@
 //! # Noise
 //! With [`Limits::deviation`] everything is kept three deviations of each member farther away, and the ways on which
 //! members come to rest by three deviations of their ends more. Among members whose poses are not late that leaves the
-//! declared clearance in all of ten thousand random flights, where it is there to begin with. What it cannot keep:
-//! in a gap between solids that is narrower than the widened distances a member cannot tell which way is out, and noise
-//! leads it deeper; poses that are late as well carry the noise of several periods.
+//! declared clearance in all of ten thousand random flights that begin with it. Two cases are not covered. In a gap
+//! between solids that is narrower than the widened distances the way out is undetermined, and noise leads a member
+//! deeper. Poses that are late as well carry the noise of several periods.
 //!
-//! # Liars
-//! A pose that is farther from the last one than the speed limit allows, and half a metre of noise, is not believed
-//! before several agree ([`Watch`](super::watch::Watch)); until then the member counts where it was last
-//! believed, by its age. That is all that physics says: a member that slowly claims to be elsewhere is believed, and
-//! others may meet it where it truly is. No filter can do better on what members say of themselves; it takes
-//! ranges that others measure, which no message here carries. What a liar cannot do is to bring two honest members
-//! near each other: their borders are made of their own poses alone.
+//! # Lying members
+//! A pose that is farther from the last one than the speed limit allows, and half a metre of noise, is not accepted
+//! before several agree ([`Watch`](super::watch::Watch)); until then the member's last accepted pose counts, by its
+//! age. Physics excludes no more: poses that drift slowly from the true place are accepted, and others may collide
+//! with the member where it truly is. No filter can do better with poses from the members themselves; it would take
+//! ranges measured by others, which no message here carries. A liar cannot bring two honest members
+//! near each other: their borders follow from their own poses alone.
 //!
 //! It is a filter, not a planner: it goes around what is convex and may wait or wander before what is not.
 //! A member whose goal lies inside a solid circles it: keep targets out of solids.

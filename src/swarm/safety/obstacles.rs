@@ -1,11 +1,11 @@
-//! What stands in the way: polygons and discs behind a tree of bounding boxes. The one file that
-//! speaks to parry.
+//! Obstacles: polygons and discs behind a tree of bounding boxes. The one file that
+//! uses parry.
 //!
 //! Solids are kept out by their borders. Outside a polygon, each edge near the member gives a
-//! half-plane, unless it lies behind that of a nearer one: the edge is convex, so it lies wholly behind
-//! the plane through its nearest point across the line to it, and whoever stays before that plane keeps its distance, however far the
-//! step. That holds for concave polygons too, since nobody gets inside without crossing an edge.
-//! Whoever starts inside is led out by the nearest point of the border, and its depth.
+//! half-plane, unless it lies behind that of a nearer one. The edge is convex, so it lies wholly behind
+//! the plane through its nearest point across the line to it. A member that stays before that plane keeps
+//! its distance, however far the step. That holds for concave polygons too, since no member gets inside
+//! without crossing an edge. A member that starts inside is led out over the nearest point of the border.
 
 use parry2d::bounding_volume::Aabb;
 use parry2d::math::{Pose, Vector};
@@ -28,13 +28,13 @@ pub enum Obstacle {
     },
 }
 
-/// Solids, ready to be asked what is near.
+/// Solids, indexed for queries by place.
 #[derive(Clone, Default)]
 pub struct Obstacles {
     pieces: Vec<Piece>,
     outlines: Vec<Outline>,
     tree: Bvh,
-    /// Whether a member stands in the outline's solid, for the member asked about last.
+    /// Whether a member stands in the outline's solid, for the member queried last.
     within: Vec<bool>,
     /// Pieces near that member, with their distances \[m\].
     near: Vec<(f64, u32)>,
@@ -58,7 +58,7 @@ struct Outline {
     anticlockwise: bool,
 }
 
-/// Coordinates up to this are told apart from nonsense \[m\]: their squares must not overflow.
+/// Largest coordinate accepted \[m\]: squares must not overflow.
 const LARGEST: f64 = 1e100;
 
 impl Obstacles {
@@ -298,8 +298,8 @@ impl Piece {
         }
     }
 
-    /// Whether all of the piece is as far behind a plane as the plane's own piece, so that whoever keeps
-    /// before that plane keeps its distance from this piece too: so it is with the edges of a convex
+    /// Whether all of the piece is as far behind a plane as the plane's own piece, so that a member that stays
+    /// before that plane keeps its distance from this piece too. This holds for the edges of a convex
     /// polygon but the nearest.
     fn is_behind(&self, plane: &HalfPlane, here: Vector, keep: f64) -> bool {
         let normal = vector(plane.normal);

@@ -5,7 +5,7 @@ use super::deadlock::Tick;
 use super::filter::{Filter, Flags, Seen};
 use crate::geometry::shape::segments_cross;
 
-/// What a member wants at this tick and how far it can get.
+/// A member's wanted way at this tick, and its reach.
 #[derive(Clone, Copy)]
 struct MotionRequest {
     /// To the wanted place \[m\], relative to the member.
@@ -14,25 +14,25 @@ struct MotionRequest {
     distance: f64,
     /// The way in one period by the limits of speed and acceleration \[m\].
     step: f64,
-    /// How far the cell has to be right \[m\]: the step, and the way it takes to brake after it.
+    /// Radius within which the cell has to be complete \[m\]: the step, and the way it takes to brake after it.
     reach: f64,
 }
 
-/// Where the planes of a cell come from, by their index: first members, then obstacles, then the fence.
+/// The origins of a cell's planes, by their index: first members, then obstacles, then the fence.
 #[derive(Clone, Copy)]
 struct Origins {
     obstacles: usize,
     fence: usize,
 }
 
-/// Of the distance to keep, how much the shape cast leaves to rounding \[1\].
+/// Share of the distance to keep that the shape cast leaves to rounding \[1\].
 const CAST_TOLERANCE: f64 = 1e-7;
 
-/// Standing in somebody's space by less than this share of the distance to keep is rounding \[1\].
+/// A violation of the distance to keep by less than this share of it is rounding \[1\].
 pub(super) const TOUCHING: f64 = 1e-9;
 
 impl Filter {
-    /// The target of one member, and what changed it.
+    /// The target of one member, with the reasons for changing it.
     pub(super) fn target(
         &mut self,
         seen: &Seen,
@@ -72,7 +72,7 @@ impl Filter {
         if request.distance > request.step {
             flags.0 |= Flags::SPEED_LIMITED;
         }
-        // To the last bit what was wanted, where nothing speaks against it.
+        // An unchanged way gives the wanted target to the last bit.
         let target = if step == way { wanted } else { [here[0] + step[0], here[1] + step[1]] };
         (target, flags)
     }
@@ -101,7 +101,7 @@ impl Filter {
         velocity.iter().all(|value| value.is_finite()).then_some(velocity)
     }
 
-    /// Builds the member's cell; wider where it stands in somebody's space, for it then moves away.
+    /// Builds the member's cell; with more reach where it stands too near to something, since it then moves away.
     fn enclose(&mut self, seen: &Seen, request: &mut MotionRequest, member: usize) -> Origins {
         let origins = self.build_cell(seen, request.reach, member);
         let away = self.radii[member] + self.largest_radius + self.limits.clearance;
@@ -155,7 +155,7 @@ impl Filter {
         Origins { obstacles, fence }
     }
 
-    /// Whose planes stand between the member and the end of its way.
+    /// The origins of the planes between the member and the end of its way.
     fn why(&self, way: [f64; 2], origins: Origins) -> Flags {
         let mut flags = Flags::default();
         for (k, plane) in self.cell.planes.iter().enumerate() {
@@ -175,7 +175,7 @@ impl Filter {
         let MotionRequest { way, distance, step, reach } = *request;
         let direct = self.cell.nearest(way, reach);
         let size = self.radii[member] + self.limits.clearance;
-        // Nearer to its goal than its own size, a member waits for whoever stands there.
+        // Nearer to its goal than its own size, a member waits for the one that stands there.
         if distance <= size || distance == 0.0 {
             self.detours[member].reset();
             return direct;
@@ -196,7 +196,7 @@ impl Filter {
     }
 
     /// Brings the cell's borders and the end of the way as near as the member can go in a period and brake
-    /// in time after it, `v T + v^2 / (2 a)` being the room: whoever kept to that at the last tick can do
+    /// in time after it, `v T + v^2 / (2 a)` being the room: a member that kept to this at the last tick can do
     /// so at this one, as long as the borders stay.
     fn leave_room_to_brake(&mut self, request: &mut MotionRequest, period: f64, flags: &mut Flags) {
         let most = self.limits.acceleration;
@@ -231,8 +231,8 @@ impl Filter {
         self.cell.nearest(next, request.step)
     }
 
-    /// Cuts the step where a disc cast along it touches a solid. The cell has seen to that already: this
-    /// is another algorithm's opinion. Members that start too near a solid are on their way out of it.
+    /// Cuts the step where a disc cast along it touches a solid. The cell prevents that already: this
+    /// is a check by another algorithm. Members that start too near a solid are on their way out of it.
     fn cast(&self, here: [f64; 2], step: [f64; 2], origins: Origins, member: usize) -> [f64; 2] {
         let solids = &self.cell.planes[origins.obstacles..origins.fence];
         let disc = (self.radii[member] + self.limits.clearance) * (1.0 - CAST_TOLERANCE);
@@ -291,7 +291,7 @@ fn add_border(
         }
         return;
     }
-    // Perhaps too near already: away from wherever the other may be, or nowhere.
+    // Perhaps too near already: away from every place where the other may be, or no move at all.
     planes.push(HalfPlane { normal, offset: fresh.min(0.0) });
     for sine in [sine, -sine] {
         let normal = [cosine * normal[0] - sine * normal[1], sine * normal[0] + cosine * normal[1]];
@@ -331,7 +331,7 @@ fn add_border_of_ways(
     }
 }
 
-/// Age alone drives nobody back: at most it keeps a member where it stands.
+/// Age alone pushes no member back: at most it keeps the member where it stands.
 fn aged(offset: f64, fresh: f64) -> f64 {
     offset.max(fresh.min(0.0))
 }

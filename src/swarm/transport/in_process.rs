@@ -7,10 +7,10 @@ use std::sync::{Arc, Mutex, PoisonError};
 use super::{ControllerEnd, Heard, RobotsEnd, Target};
 use crate::swarm::watch::Pose;
 
-/// Poses, and targets, of one member that wait to be taken at most \[1\].
+/// Most poses, and most targets, of one member that wait in a queue \[1\].
 const DEPTH: usize = 64;
 
-/// A queue for every member, where the oldest gives way.
+/// A bounded queue for every member; a full one drops its oldest entry.
 #[derive(Debug)]
 struct Queues<T> {
     members: Mutex<Vec<VecDeque<T>>>,
@@ -21,7 +21,7 @@ impl<T> Queues<T> {
         Self { members: Mutex::new((0..count).map(|_| VecDeque::new()).collect()) }
     }
 
-    /// How many of them are of no member.
+    /// Appends all; returns the number of those that belong to no member.
     fn push(&self, all: impl Iterator<Item = (usize, T)>) -> u64 {
         let mut members = self.members.lock().unwrap_or_else(PoisonError::into_inner);
         let mut strangers = 0;
@@ -58,7 +58,7 @@ struct Shared {
 #[derive(Clone, Debug)]
 pub struct Controller(Arc<Shared>);
 
-/// The robots' end; clones speak for others of them.
+/// The robots' end; each clone may serve other robots.
 #[derive(Clone, Debug)]
 pub struct Robots(Arc<Shared>);
 
@@ -74,7 +74,7 @@ pub fn join(count: usize) -> (Controller, Robots) {
 }
 
 impl Robots {
-    /// Where a leader that is moved from outside shall go \[m\].
+    /// Sends the next place of a leader that is moved from outside \[m\].
     pub fn lead(&self, member: usize, place: [f64; 2]) {
         self.0.leaders.push(std::iter::once((member, place)));
     }

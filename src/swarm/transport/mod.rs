@@ -1,12 +1,12 @@
-//! What carries poses in and targets out: one loop, whatever lies between the robots and the computer.
+//! Transports carry poses in and targets out; the loop is the same over each of them.
 //!
 //! A transport has two ends. The loop holds a [`ControllerEnd`] and calls [`serve`] once a period; robots, or
-//! those who simulate them, hold a [`RobotsEnd`] and call [`fly`]. There are three: [`in_process`] here, shared
+//! their simulation, hold a [`RobotsEnd`] and call [`fly`]. There are three: [`in_process`] here, shared
 //! memory in room `shm`, ROS 2 in room `ros`. The tests hold all of them to one list of promises:
 //!
-//! * Poses of one member come in the order they were said, or not at all: the newest matters, and a queue that is
-//!   full drops the oldest. Whoever sends never waits for whoever receives.
-//! * An end that comes late, goes away, comes back or is killed harms nobody else.
+//! * Poses of one member arrive in the order in which they were sent, or not at all: the newest matters, and a full
+//!   queue drops the oldest. A sender never waits for a receiver.
+//! * An end that comes late, goes away, comes back or is killed does not disturb the others.
 //! * A payload that is no pose of a member is left out and counted.
 
 pub mod in_process;
@@ -16,22 +16,22 @@ use super::control::scope::NodeScope;
 use super::flight::Fleet;
 use super::watch::Pose;
 
-/// What reaches the loop.
+/// A message that reaches the loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Heard {
-    /// Where a member is.
+    /// A member's pose.
     Pose(usize, Pose),
-    /// Where a leader that is moved from outside shall go \[m\].
+    /// The next place of a leader that is moved from outside \[m\].
     Leader(usize, [f64; 2]),
 }
 
-/// Where a member shall go next.
+/// A member's next target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Target {
     pub member: usize,
     /// \[m, world frame\]
     pub position: [f64; 2],
-    /// Where it shall look \[rad\].
+    /// Heading \[rad\].
     pub yaw: f64,
 }
 
@@ -39,7 +39,7 @@ pub struct Target {
 pub trait ControllerEnd {
     type Error: std::error::Error;
 
-    /// Tells `hear` all that arrived since the last call, without waiting; `now` \[s\] stamps what bears no stamp.
+    /// Passes to `hear` all that arrived since the last call, without waiting; `now` \[s\] stamps messages without one.
     fn hear(&mut self, now: f64, hear: &mut dyn FnMut(Heard));
 
     /// Sends the targets of a tick, without waiting.
@@ -48,7 +48,7 @@ pub trait ControllerEnd {
     /// The first that was not sent.
     fn send(&mut self, now: f64, targets: &[Target]) -> Result<(), Self::Error>;
 
-    /// Payloads that were none, since the beginning \[1\].
+    /// Invalid payloads since the beginning \[1\].
     fn refused(&self) -> u64;
 }
 
@@ -62,11 +62,11 @@ pub trait RobotsEnd {
     /// The first that was not sent.
     fn say(&mut self, now: f64, poses: &[(usize, Pose)]) -> Result<(), Self::Error>;
 
-    /// Tells `go` the targets that arrived since the last call \[m\]; of one member's the newest comes last.
+    /// Passes to `go` the targets that arrived since the last call \[m\]; of one member's the newest comes last.
     fn targets(&mut self, go: &mut dyn FnMut(usize, [f64; 2]));
 }
 
-/// The first half of a period: hears what arrived, and ticks.
+/// The first half of a period: receives all messages that arrived.
 pub fn listen<E: ControllerEnd>(control: &mut Control, end: &mut E, now: f64) {
     end.hear(now, &mut |heard| match heard {
         Heard::Pose(member, pose) => {
@@ -80,7 +80,7 @@ pub fn listen<E: ControllerEnd>(control: &mut Control, end: &mut E, now: f64) {
     });
 }
 
-/// One period of the loop at `now` \[s\]: what arrived, the tick, the targets of those it serves.
+/// One period of the loop at `now` \[s\]: receives, ticks and sends the targets of the members that it serves.
 ///
 /// # Errors
 /// The first target that was not sent; the tick is done all the same.
@@ -100,7 +100,7 @@ pub fn targets(control: &Control, part: &NodeScope) -> Vec<Target> {
     part.mine.iter().filter_map(|&member| target_of(control, member)).collect()
 }
 
-/// Where the last tick sends a member, and where it shall look: ahead, or where it looks now.
+/// A member's target and heading after the last tick: straight ahead, or its present heading if it stays.
 pub fn target_of(control: &Control, member: usize) -> Option<Target> {
     let position = control.target(member)?;
     let here = control.position(member).unwrap_or(position);
@@ -111,8 +111,8 @@ pub fn target_of(control: &Control, member: usize) -> Option<Target> {
     Some(Target { member, position, yaw })
 }
 
-/// One period of simulated robots: everybody goes towards the newest of its `goals` \[m\], and says where it is at
-/// the time \[s\] that `now` gives.
+/// One period of simulated robots: every robot goes towards its newest goal \[m\] and sends its pose, stamped with
+/// the time \[s\] that `now` returns.
 ///
 /// # Errors
 /// The first pose that was not sent; the robots have flown all the same.
@@ -144,7 +144,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_target_that_is_not_finite_or_of_nobody_moves_nobody() {
+    fn a_target_that_is_not_finite_or_of_no_robot_moves_no_robot() {
         let mut goals = [Some([1.0, 2.0]), None];
         aim(&mut goals, 0, [f64::NAN, 0.0]);
         aim(&mut goals, 1, [0.0, f64::INFINITY]);

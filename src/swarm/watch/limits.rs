@@ -1,28 +1,28 @@
-//! What is asked of a pose, and what its age means.
+//! The conditions that a pose has to meet, and the meaning of its age.
 
 use super::{Health, Pose, Rejection};
 use crate::flock::vectors::distance;
 
-/// What is asked of poses. Needs `0 < fresh <= age_limit <= stop_after`.
+/// The conditions that poses have to meet. Needs `0 < fresh <= age_limit <= stop_after`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WatchLimits {
     /// Up to this age a pose is fresh \[s\], default 0.25.
     pub fresh: f64,
-    /// Up to this age it is held, and older ones are turned away on arrival \[s\], default 1.
+    /// Up to this age it is held, and older ones are rejected on arrival \[s\], default 1.
     pub age_limit: f64,
     /// Beyond this age its member is stopped \[s\], default 3.
     pub stop_after: f64,
     /// Middle of where members may be \[m, world frame\], default the origin.
     pub centre: [f64; 2],
-    /// How far from there they may be \[m\], default 10 000.
+    /// Largest distance from there \[m\], default 10 000.
     pub range: f64,
-    /// How far ahead of the clock a stamp may be, and by how much the clock may be set back without
-    /// everything starting anew \[s\], default 0.1.
+    /// Most by which a stamp may be ahead of the clock, and by which the clock may be set back without a
+    /// fresh start \[s\], default 0.1.
     pub skew: f64,
-    /// Speed that no member reaches \[m/s\], default 10. What moves farther in the time between two stamps
-    /// has jumped.
+    /// Speed that no member reaches \[m/s\], default 10. A pose that moves farther in the time between two
+    /// stamps has jumped.
     pub jump_speed: f64,
-    /// How far two poses at one time may lie apart by noise \[m\], default 0.5.
+    /// Largest distance of two poses at one time, by noise \[m\], default 0.5.
     pub jump_slack: f64,
     /// So many poses in a row that agree with each other are believed after a jump or a stop \[1\], default
     /// 5; with 1 or 0 the first one is.
@@ -78,7 +78,7 @@ impl WatchLimits {
         Ok(())
     }
 
-    /// How far apart two poses are and how far they may be \[m\].
+    /// The distance of two poses, and the largest allowed \[m\].
     pub(super) fn jump(&self, from: &Pose, to: &Pose) -> (f64, f64) {
         let far = distance(from.position, to.position);
         (far, self.jump_speed * (to.stamp - from.stamp) + self.jump_slack)

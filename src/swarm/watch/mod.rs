@@ -1,9 +1,9 @@
-//! Watches over the poses that come in: which are believed, and whether a member is heard at all.
+//! Checks the poses that arrive: which are accepted, and whether a member is received at all.
 //!
 //! The newest good pose of a member is held while it is young enough, which leaves the fixed point of the
 //! rule where it is however many poses are lost in between; a member that is not heard for longer drops
-//! out. Nothing here has a clock: `now` \[s\] is handed in, in the time of the stamps. No pose that is not
-//! finite ever comes out.
+//! out. No clock is read here: `now` \[s\] is passed in, in the time of the stamps. No pose that is not
+//! finite is ever returned.
 
 mod limits;
 mod rejection;
@@ -20,21 +20,21 @@ pub struct Pose {
     pub position: [f64; 2],
     /// Heading from the x axis \[rad\].
     pub yaw: f64,
-    /// When it was measured \[s\].
+    /// Time of the measurement \[s\].
     pub stamp: f64,
-    /// Whether it is in the swarm's frame, as who received it found.
+    /// Whether it is in the swarm's frame, as its receiver determined.
     pub frame_is_right: bool,
 }
 
-/// How well a member is heard.
+/// The state of a member's poses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Health {
-    /// Nothing believed yet, or the clock has been set back.
+    /// No pose accepted yet, or the clock has been set back.
     Waiting,
     Fresh,
     /// The last pose still stands in for the present one.
     Held,
-    /// Too old to be used: no neighbour of anybody's, and its own target stays.
+    /// Too old to be used: the member counts as no other member's neighbour, and its own target stays.
     Degraded,
     /// Silent for so long that it must prove itself before it goes on.
     Stopped,
@@ -57,7 +57,7 @@ impl Health {
     }
 }
 
-/// What is known of every member.
+/// The poses accepted from every member, and its health.
 #[derive(Clone, Debug)]
 pub struct Watch {
     limits: WatchLimits,
@@ -145,8 +145,8 @@ impl Watch {
         &self.members[member].counts
     }
 
-    /// Forgets every pose when the clock is set back, or is none: what is stamped in another time says
-    /// nothing about this one.
+    /// Forgets every pose when the clock is set back or not finite: stamps of another time cannot be compared
+    /// with this one.
     fn follow_clock(&mut self, now: f64) {
         let set_back = self.clock.is_some_and(|clock| now < clock - self.limits.skew);
         if set_back || !now.is_finite() {

@@ -1,6 +1,6 @@
-//! Why a pose is not used, and how often that happened.
+//! The reasons for rejecting a pose, and how often each occurred.
 
-/// Why a pose is not used. Names no member: whoever received it knows.
+/// The reason for rejecting a pose. It does not name the member, which the receiver knows.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum Rejection {
     #[error("the {what} of a pose is not finite: its sender has lost itself, or sends uninitialised fields")]
@@ -35,7 +35,7 @@ pub enum Rejection {
     Recovering { seen: u32, recover: u32 },
 }
 
-/// What became of the poses of a member since the beginning.
+/// Counts of a member's accepted and rejected poses since the beginning.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
     pub accepted: u64,

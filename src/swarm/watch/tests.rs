@@ -148,7 +148,7 @@ fn a_stopped_member_goes_on_after_enough_good_poses_in_a_row() {
 }
 
 #[test]
-fn a_clock_set_back_makes_everybody_wait_for_new_poses() {
+fn after_a_clock_is_set_back_every_member_waits_for_new_poses() {
     let mut watch = watch();
     watch.receive(0, pose(0.0, 100.0), 100.0).expect("good");
     watch.look(99.96);

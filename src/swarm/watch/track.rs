@@ -1,7 +1,7 @@
-//! Where a robot that speeds up and brakes is now, and how fast: by its model, from the poses that arrived and the
-//! targets that it was sent since.
+//! The present place and velocity of a robot that speeds up and brakes, by its model: from the poses that arrived and
+//! the targets sent since.
 //!
-//! Two places tell only the mean velocity between them, of some time ago. The room that a robot takes to brake
+//! Two poses give only the mean velocity between them, which is already out of date. The braking distance of a robot
 //! grows with its present velocity, so its model is run beside it: every target moves both, and every pose corrects
 //! the model by an alpha-beta filter, whose gains are those of a steady Kalman filter for places of this noise and a
 //! robot pushed about at random (P. R. Kalata, "The tracking index: a generalized parameter for alpha-beta and
@@ -16,7 +16,7 @@ use crate::swarm::robots::{DoubleIntegrator, Model, Robot};
 /// Deviation of what pushes a robot away from its model, in units of its acceleration limit \[1\].
 const PUSHED: f64 = 0.5;
 
-/// How much of a pose's surprise goes into the state, and what is left of its noise.
+/// The gains by which a pose's deviation from the model corrects the state, and the noise that is left.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gains {
     /// Into the place \[1\].
@@ -73,7 +73,7 @@ impl Track {
         let expected = self.run(pose.stamp, dynamics);
         let surprise = [0, 1].map(|k| pose.position[k] - expected.position[k]);
         let time = (pose.stamp - since).max(period);
-        // Farther than it can have gone: whatever it is, it is no news of its velocity.
+        // Farther than it can have gone: the pose gives no information on its velocity.
         if distance(pose.position, expected.position) > 2.0 * dynamics.speed * time + 12.0 * deviation {
             return self.restart(pose);
         }
@@ -100,8 +100,8 @@ impl Track {
         self.sent.push_back((now, target));
     }
 
-    /// How far the place where the robot of [`Track::at`] comes to rest may be from where it will, at three deviations
-    /// of its velocity \[m\].
+    /// Bound on the error of the place at which the robot of [`Track::at`] comes to rest, at three deviations of its
+    /// velocity \[m\].
     pub fn stray(
         &self,
         robot: &Robot,

@@ -16,7 +16,7 @@ export class Body {
     this.exact = new Map();
   }
 
-  // What does not move.
+  // Loads the arrays that stay the same in every frame.
   async open() {
     const named = (name) => this.prefix + name;
     this.X = await doubles(named("X"));
@@ -115,7 +115,7 @@ export class Body {
     return this.animation.times[this.at];
   }
 
-  // How many of a list sorted by step are over by now.
+  // The number of entries of a list sorted by step that are over by now.
   over(steps) {
     let [low, high] = [0, steps.length];
     while (low < high) {
@@ -243,7 +243,7 @@ export class Body {
     for (let i = 0; i < this.count; i++) stress(i, g[4 * i], g[4 * i + 3], g[4 * i + 1] + g[4 * i + 2]);
   }
 
-  // What is known of one particle at this frame, as [{key, label, unit, value}]; at the last frame to the last bit.
+  // The quantities of one particle at this frame, as [{key, label, unit, value}]; at the last frame to the last bit.
   numbers(particle) {
     const { animation } = this;
     const list = [];

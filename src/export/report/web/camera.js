@@ -1,4 +1,4 @@
-// Where the camera is, and times what displacements are drawn.
+// The camera, and the factor of the displacements drawn.
 
 import { draw } from "./page.js";
 import { sampled } from "./scale.js";
@@ -36,7 +36,7 @@ export function move(dx, dy) {
   draw();
 }
 
-// Times what displacements are drawn, so that small ones are seen and, where their size is arbitrary, large ones fit.
+// The factor by which displacements are drawn, so that small ones are seen and, where their size is arbitrary, large ones fit.
 export function wantedFactor() {
   const { animation } = bodies[0];
   if (animation.radii.length) return 1;

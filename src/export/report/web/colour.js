@@ -8,7 +8,7 @@ const VIRIDIS = [
 
 export const SHADES = 256;
 
-// What a style sheet's variable holds, as [r, g, b].
+// The value of a style sheet's variable, as [r, g, b].
 export function themeColour(name) {
   const text = themeText(name);
   const short = text.length === 4;

@@ -1,4 +1,4 @@
-// What a reader can do: pointer, keys, buttons, layers, theme.
+// The reader's controls: pointer, keys, buttons, layers, theme.
 
 import { move, refit, turn, zoom } from "./camera.js";
 import { keep, showTip, tip } from "./numbers.js";

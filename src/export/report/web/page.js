@@ -14,7 +14,7 @@ let isAsked = false;
 
 // Draws before the next refresh, once however often it is asked for.
 export function draw() {
-  // What is printed was drawn before the page took the paper's size.
+  // For print, the drawing was made before the page took the paper's size.
   if (isAsked || shown.isPrinting) return;
   isAsked = true;
   requestAnimationFrame(() => {

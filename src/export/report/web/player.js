@@ -1,6 +1,6 @@
 // The clock: which frame is shown, and how it goes on.
 
-// Seconds in which a animation is shown whole at speed 1, and the most frames in a second.
+// Seconds in which an animation is shown whole at speed 1, and the most frames in a second.
 const WHOLE = 12;
 const FASTEST = 60;
 

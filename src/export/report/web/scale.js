@@ -1,4 +1,4 @@
-// What particles are coloured by: quantities, their range over the animation, the colour bar.
+// The colouring of particles: quantities, their range over the animation, the colour bar.
 
 import { SHADES, palette, themeColour, themeText, ticks, viridis, words } from "./colour.js";
 import { bodies, element, shown, state } from "./shown.js";

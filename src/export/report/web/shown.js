@@ -1,4 +1,4 @@
-// What the page shows: bodies with their views, charts, the clock, and what was chosen.
+// The state of the page: bodies with their views, charts, the clock, and what was chosen.
 
 import { Body } from "./body.js";
 

@@ -65,7 +65,7 @@ function track(bytes, at, { count, bits, base, mode }, before) {
   return { codes, base };
 }
 
-// The frames of a animation, unpacked group by group.
+// The frames of an animation, unpacked group by group.
 export class Frames {
   constructor(animation, prefix) {
     this.animation = animation;

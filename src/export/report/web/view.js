@@ -8,7 +8,7 @@ import { themeColour, themeText, ticks, words } from "./colour.js";
 const MOST_WAYS = 400;
 // Edges of more particles than this are too fine to be smoothed.
 const MOST_SMOOTH = 20000;
-// How near the pointer must come to a particle, in pixels.
+// Largest distance of the pointer from a particle that it names, in pixels.
 const REACH = 14;
 
 // Scenes without a unit call it so.
@@ -143,7 +143,7 @@ export class View {
   }
 
   drawUnder() {
-    // Drawn again only when something of it changed: a frame of a animation moves nothing here but the ways.
+    // Drawn again only when something of it changed: a frame of an animation moves nothing here but the ways.
     const { camera, turned, factor, layers, frame } = this.show;
     const seen = [camera, turned, factor, this.width, this.height, this.ratio, themeText("card")];
     const key = JSON.stringify(layers.ways ? [...seen, frame] : seen);

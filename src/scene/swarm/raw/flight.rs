@@ -1,11 +1,11 @@
-//! Simulated flights as written: what the robots are, what goes wrong, and what has to hold.
+//! Simulated flights as written: the robots' model, their faults, and the bounds on the results.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::defaults;
 
-/// What `flockform swarm` and `flockform robots` simulate.
+/// The simulation of `flockform swarm` and `flockform robots`.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawFlight {
@@ -22,7 +22,7 @@ pub struct RawFlight {
     #[serde(default)]
     #[schemars(range(min = 0))]
     pub noise: f64,
-    /// How late poses arrive [period].
+    /// Delay of poses [period].
     #[serde(default)]
     #[schemars(range(max = 1000))]
     pub delay: u32,
@@ -38,7 +38,7 @@ pub struct RawFlight {
     #[serde(default)]
     #[schemars(range(min = 0, max = 1))]
     pub duplicates: f64,
-    /// Where the robots are at first, instead of at their places.
+    /// Initial places of robots that do not start at their places in the formation.
     #[serde(default)]
     pub start: Vec<RawStart>,
     #[serde(default)]
@@ -70,7 +70,7 @@ impl Default for RawFlight {
     }
 }
 
-/// What a robot can do; limits are those of `[limits]`.
+/// The model of a robot; its limits are those of `[limits]`.
 #[derive(Clone, Debug, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum RawModel {
@@ -89,7 +89,7 @@ pub enum RawModel {
     DoubleIntegrator,
 }
 
-/// Where a robot is at first.
+/// The initial place of a robot.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawStart {
@@ -98,7 +98,7 @@ pub struct RawStart {
     pub place: [f64; 2],
 }
 
-/// Something that goes wrong with a robot.
+/// A fault of a robot.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawFault {
@@ -113,37 +113,37 @@ pub struct RawFault {
     pub what: RawFaultKind,
 }
 
-/// What goes wrong.
+/// Kinds of faults.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum RawFaultKind {
-    /// Moves on but is not heard.
+    /// Moves on but sends no poses.
     Silent,
-    /// Stands still and is not heard.
+    /// Stands still and sends no poses.
     Dead,
-    /// Stands still and is heard.
+    /// Stands still and sends its poses.
     Stuck,
-    /// Says it is this far from where it is.
+    /// Sends its position with this offset.
     Offset {
         /// [m]
         by: [f64; 2],
     },
-    /// Says over and over what it said last.
+    /// Sends the same position again and again.
     Frozen,
-    /// Says places at random within this distance of its own.
+    /// Sends random positions within this distance of its own.
     Random {
         /// [m]
         #[schemars(extend("exclusiveMinimum" = 0))]
         within: f64,
     },
-    /// Says what is no number.
+    /// Sends positions that are not numbers.
     NotANumber,
-    /// Speaks of another frame.
+    /// Sends poses in another frame.
     WrongFrame,
 }
 
-/// What has to hold; a flight that breaks one of these ends with exit code 1. Errors are those of the robots with
-/// which nothing is wrong at the time.
+/// Bounds on the results; a flight that breaks one of these ends with exit code 1. Errors are those of the robots
+/// without a fault at the time.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawBounds {
@@ -159,7 +159,7 @@ pub struct RawBounds {
     #[serde(default)]
     #[schemars(range(min = 0))]
     pub clearance: Option<f64>,
-    /// When the formation is within `settled_within` of its shape for good [s].
+    /// Time after which the formation stays within `settled_within` of its shape [s].
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub settling_time: Option<f64>,

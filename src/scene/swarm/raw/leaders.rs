@@ -1,4 +1,4 @@
-//! Leaders as written: who they are and how they move.
+//! Leaders as written: their names or places, and their motions.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -19,7 +19,7 @@ pub struct RawLeaders {
     pub program: RawProgram,
 }
 
-/// How leaders move; times are counted from the first period.
+/// The motion of leaders; times are counted from the first period.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum RawProgram {
@@ -33,7 +33,7 @@ pub enum RawProgram {
         #[serde(default)]
         interpolation: RawInterpolation,
     },
-    /// As a CSV file says, with the columns `t,dx,dy` (all alike) or `t,name,dx,dy`: seconds, and metres from
+    /// By a CSV file with the columns `t,dx,dy` (all alike) or `t,name,dx,dy`: seconds, and metres from
     /// the place in the formation. Straight between the rows; the last is held.
     File {
         /// Path, relative to the swarm file.
@@ -46,7 +46,7 @@ pub enum RawProgram {
     Manoeuvre { name: String },
 }
 
-/// Where a leader is at a time.
+/// A leader's place at a time.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawWaypoint {
@@ -57,8 +57,8 @@ pub struct RawWaypoint {
     pub displacement: [f64; 2],
 }
 
-/// An affine motion of the formation, leg by leg. Each leg says where the formation is at its end, starting
-/// from the nominal places; between legs the numbers go smoothly.
+/// An affine motion of the formation, leg by leg. Each leg gives the formation's posture at its end, starting
+/// from the nominal places; postures are interpolated smoothly.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawManoeuvre {
@@ -71,7 +71,7 @@ pub struct RawManoeuvre {
     pub legs: Vec<RawLeg>,
 }
 
-/// Where a manoeuvre goes.
+/// A leg of a manoeuvre.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawLeg {
@@ -82,7 +82,7 @@ pub struct RawLeg {
     #[serde(default)]
     #[schemars(range(min = 0))]
     pub hold: f64,
-    /// Where the point `about` is moved by [m].
+    /// Displacement of the point `about` [m].
     #[serde(default)]
     pub translate: [f64; 2],
     /// Turn, applied after stretch and shear [degree].

@@ -1,4 +1,4 @@
-//! A swarm file as written: what serde reads and the JSON Schema describes.
+//! A swarm file as written, as serde reads it and the JSON Schema describes it.
 //!
 //! SI throughout: metres, seconds; angles in degrees. The doc comments here are the documentation of the
 //! format: `flockform schema --swarm` prints them.
@@ -21,16 +21,16 @@ pub use leaders::*;
 pub use node::*;
 pub use safety::*;
 
-/// A swarm: who flies in what shape, who leads, by which rule the others follow, and what keeps them safe.
+/// A swarm: its robots and their formation, the leaders, the followers' rule, and the safety limits.
 ///
 /// The shape is one of: `robots` with a place each; a `lattice` and a `body` cut from it; a continuum
-/// `scene` whose particles the robots are, or inside which they have their places.
+/// `scene` whose particles are the robots, or inside which the robots have their places.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawSwarm {
-    /// One line that says what the swarm does.
+    /// One line that describes the swarm.
     pub title: String,
-    /// Where the values come from.
+    /// Sources of the values.
     #[serde(default)]
     pub notes: String,
     /// Robots one by one.
@@ -52,17 +52,17 @@ pub struct RawSwarm {
     /// Virtual points around a body that give robots at its edge their full neighbourhood.
     #[serde(default)]
     pub frame: RawFrame,
-    /// Who sees whom on a lattice; the first neighbours unless given.
+    /// Neighbours on a lattice; the first neighbours unless given.
     #[serde(default)]
     pub neighbours: Option<RawNeighbours>,
-    /// Who sees whom among robots that are given one by one; the six nearest unless given.
+    /// Neighbours of robots that are given one by one; the six nearest unless given.
     #[serde(default)]
     pub links: Option<RawLinks>,
     #[serde(default)]
     pub rule: RawRule,
     #[serde(default)]
     pub material: Option<RawMaterial>,
-    /// Who leads, and how. Robots that no entry names follow.
+    /// Leaders and their motions. Robots that no entry names follow.
     #[serde(default)]
     pub leaders: Vec<RawLeaders>,
     /// Motions of all leaders together, by name.
@@ -97,30 +97,30 @@ pub struct RawRobot {
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub radius: Option<f64>,
-    /// Whom it sees, by name; needs `links.kind = "listed"`.
+    /// Its neighbours, by name; needs `links.kind = "listed"`.
     #[serde(default)]
     pub neighbours: Vec<String>,
 }
 
-/// Who sees whom among robots that are given one by one.
+/// Neighbours of robots that are given one by one.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum RawLinks {
-    /// Those nearest in the formation; with equally near ones all of them.
+    /// The nearest in the formation; of equally near ones all.
     Nearest {
         /// [1]
         #[schemars(range(min = 1))]
         count: usize,
     },
-    /// Whoever has a place within a radius in the formation.
+    /// All robots with a place within a radius in the formation.
     Within {
         /// [m]
         #[schemars(extend("exclusiveMinimum" = 0))]
         radius: f64,
     },
-    /// Whom each robot's `neighbours` name.
+    /// The robots that each robot's `neighbours` name.
     Listed {},
-    /// Whoever is within a radius now.
+    /// All robots within a radius now, found anew every period.
     Present {
         /// [m]
         #[schemars(extend("exclusiveMinimum" = 0))]
@@ -152,8 +152,8 @@ pub struct RawControl {
     #[serde(default = "defaults::period")]
     #[schemars(range(min = 0.002, max = 1.0))]
     pub period: f64,
-    /// How often the rule is applied in a period; it stops early when nothing moves any more. With 1
-    /// each robot looks at its neighbours once, as a robot on its own can; a central node may let the whole
+    /// Applications of the rule in a period, fewer once the formation is at rest. With 1
+    /// each robot uses its neighbours' poses once, as a robot on its own can; a central node may let the whole
     /// formation come to rest behind its leaders in every period [1].
     #[serde(default = "defaults::sweeps")]
     #[schemars(range(min = 1, max = 100_000))]

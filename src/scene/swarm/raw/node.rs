@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::defaults;
 
-/// What the node subscribes to and publishes. `{name}` in a topic stands for the robot's name.
+/// Topics and messages of the node. `{name}` in a topic stands for the robot's name.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawNode {
@@ -28,7 +28,7 @@ pub struct RawNode {
     /// Publishes `visualization_msgs/MarkerArray` on `~/markers`.
     #[serde(default = "defaults::yes")]
     pub markers: bool,
-    /// What anybody on the network may tell the node to do.
+    /// Commands that the node accepts from the network.
     #[serde(default)]
     pub commands: RawCommands,
 }
@@ -48,12 +48,12 @@ impl Default for RawNode {
     }
 }
 
-/// Whose word counts while the node runs. The limits of the file hold whatever is allowed here: they can be
-/// tightened from outside and never loosened.
+/// Commands that are accepted while the node runs. The limits of the file hold in any case: commands can
+/// tighten them and never loosen them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum RawCommands {
-    /// Nobody's: services refuse, parameters are read-only, leaders are moved by the file's programs alone.
+    /// None: services refuse, parameters are read-only, leaders are moved by the file's programs alone.
     None,
     /// Emergency stop, and the lifecycle's way out of active.
     StopOnly,
@@ -63,7 +63,7 @@ pub enum RawCommands {
 }
 
 impl RawCommands {
-    /// As the file writes it.
+    /// The name in the file.
     pub fn name(self) -> &'static str {
         match self {
             Self::None => "none",

@@ -1,11 +1,11 @@
-//! What keeps a swarm safe, as written: limits, obstacles, what is believed of poses and of neighbours.
+//! Safety as written: limits, obstacles, conditions on poses, tolerance of faulty neighbours.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::defaults;
 
-/// Bounds on what is published; what is not given is not limited.
+/// Bounds on the published targets; a quantity without a bound is not limited.
 #[derive(Clone, Debug, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawLimits {
@@ -18,7 +18,7 @@ pub struct RawLimits {
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub acceleration: Option<f64>,
     /// Free space kept between the rims of two robots, and of a robot and an obstacle [m]. Without it
-    /// nobody is kept apart.
+    /// robots are not kept apart.
     #[serde(default)]
     #[schemars(range(min = 0))]
     pub clearance: Option<f64>,
@@ -46,8 +46,8 @@ pub enum RawObstacle {
     },
 }
 
-/// Which poses are believed, and for how long. A robot whose pose is too old is first held where it was seen,
-/// then nobody looks at it any more and it gets no new target, then it has to show itself anew.
+/// Conditions on poses. A robot whose pose grows old first counts at its last place. Then it
+/// is no longer used as a neighbour and gets no new target. Later it has to send several good poses to go on.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawPoses {
@@ -63,16 +63,16 @@ pub struct RawPoses {
     #[serde(default = "defaults::stop_after")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub stop_after: f64,
-    /// Farther from the formation's middle than this no pose is believed [m].
+    /// Poses farther from the formation's middle than this are rejected [m].
     #[serde(default = "defaults::range")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub range: f64,
-    /// No robot moves faster than this: a pose that says so, by more than half a metre of noise, is not believed
+    /// No robot moves faster than this: a pose that implies more, by over half a metre of noise, is rejected
     /// [m/s]; the speed limit unless given.
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub jump_speed: Option<f64>,
-    /// Consecutive poses that agree, after which a robot is believed at a new place [1].
+    /// Consecutive poses that agree, after which a robot's new place is accepted [1].
     #[serde(default = "defaults::recover")]
     #[schemars(range(min = 1))]
     pub recover: usize,
