@@ -110,13 +110,13 @@ impl ResumedRun {
         VtkSeries::resume(folder, from, (0..=self.checkpoint.engine.step()).step_by(every))
     }
 
-    /// What an engine that does not fit is refused with.
+    /// The error for an engine that does not fit the checkpoint.
     pub fn foreign(folder: &OutputFolder, what: &dyn std::error::Error) -> CheckpointError {
         CheckpointError::Foreign { path: folder.folder().to_owned(), what: what.to_string() }
     }
 }
 
-/// What a recorder has kept so far.
+/// The records so far.
 pub struct Recorded<'a> {
     pub snapshots: &'a [Snapshot],
     pub probes: &'a [ProbeSeries],

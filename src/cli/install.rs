@@ -44,7 +44,7 @@ macro_rules! embedded {
     };
 }
 
-/// What lies in `share/flockform`, beside the swarms.
+/// The files of `share/flockform`, beside the swarms.
 const SHARED: &[(&str, &str)] = embedded![
     "package.xml" from "package.xml",
     "launch/formation_launch.xml" from "launch-configs/formation_launch.xml",
@@ -59,7 +59,7 @@ const SHARED: &[(&str, &str)] = embedded![
     "msgs/flockform_msgs/srv/SetFormation.srv" from "msgs/flockform_msgs/srv/SetFormation.srv",
 ];
 
-/// What a shell sources; a workspace that has its own keeps them.
+/// Files that a shell sources; those a workspace already has are kept.
 const ENVIRONMENT: &[(&str, &str)] = embedded![
     "setup.bash" from "launch-configs/environment/setup.bash",
     "local_setup.bash" from "launch-configs/environment/setup.bash",
@@ -133,7 +133,7 @@ fn text_file(path: PathBuf, text: &str) -> Installed {
     Installed { path, bytes: text.into(), executable: false }
 }
 
-/// What an earlier install left, by path below the prefix.
+/// The files of an earlier install, by path below the prefix.
 struct Manifest(Vec<(u64, PathBuf)>);
 
 impl Manifest {
@@ -183,8 +183,8 @@ impl Manifest {
     }
 }
 
-/// Whether a path of a list leads to one of the package's own folders: whoever can write the list must not reach
-/// farther by it, with `..` or through a symbolic link.
+/// Whether a path of a list leads to one of the package's own folders. A forged list must not reach beyond them, with
+/// `..` or through a symbolic link.
 fn is_own_place(prefix: &Path, path: &Path) -> bool {
     let is_plain = path.components().all(|part| matches!(part, Component::Normal(_)));
     let is_below = |folder| path.starts_with(folder) && path != Path::new(folder);
@@ -194,7 +194,7 @@ fn is_own_place(prefix: &Path, path: &Path) -> bool {
         && parents.into_iter().all(|above| !prefix.join(above).is_symlink())
 }
 
-/// FNV-1a: tells a changed file from an installed one, and the same in every build.
+/// FNV-1a hash: distinguishes a changed file from an installed one, and is the same in every build.
 fn checksum(bytes: &[u8]) -> u64 {
     bytes
         .iter()

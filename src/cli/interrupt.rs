@@ -18,11 +18,11 @@ use super::FAILED;
 static RAISED: AtomicBool = AtomicBool::new(false);
 /// Whether the program is being ended by the thread of the signal.
 static ENDING: AtomicBool = AtomicBool::new(false);
-/// What becomes of the work at the first signal.
+/// How the first signal is handled.
 static MODE: AtomicU8 = AtomicU8::new(ENDS);
 /// How many parts of the program ask for time to save results.
 static SAVING: AtomicUsize = AtomicUsize::new(0);
-/// What is removed in the end, and what is said.
+/// Paths removed at the end, and the message printed.
 static LEFT: Mutex<Left> = Mutex::new(Left { paths: Vec::new(), words: None });
 
 const ENDS: u8 = 0;
@@ -109,7 +109,7 @@ pub fn removes(paths: impl IntoIterator<Item = PathBuf>) {
     left().paths.extend(paths);
 }
 
-/// What is said if the program is ended from here on.
+/// Sets the message printed if the program is ended from here on.
 pub fn says(words: String) {
     left().words = Some(words);
 }
@@ -139,7 +139,7 @@ fn end() -> ! {
             std::thread::sleep(Duration::from_millis(2));
         }
     }
-    // Nobody may read it any more, which must not keep the program from ending: `eprintln` would panic.
+    // A closed stderr must not keep the program from ending: `eprintln` would panic.
     let _ = writeln!(std::io::stderr(), "{}", left.words.as_deref().unwrap_or(NOTHING_KEPT));
     std::process::exit(FAILED.into())
 }
@@ -152,7 +152,7 @@ fn remove(path: &Path) -> std::io::Result<()> {
         false => std::fs::remove_file(path),
         true if is_hidden => std::fs::remove_dir_all(path),
         true => {
-            // One that somebody else has put something into stays.
+            // A folder that another program has put something into stays.
             let _ = std::fs::remove_dir(path);
             Ok(())
         }

@@ -109,7 +109,7 @@ enum PlaneName {
     Strain,
 }
 
-/// What is wrong with an option, and the remedy.
+/// A wrong option: the fault and the remedy.
 #[derive(Debug, thiserror::Error)]
 #[error("{option}: {message}\n  help: {help}")]
 pub struct WrongOption {
@@ -147,13 +147,13 @@ fn of_material(lattice: &Lattice, elastic: &Elastic) -> Result<MaterialReport, W
 
 fn of_rule(
     lattice: &Lattice,
-    who: Option<&str>,
+    given: Option<&str>,
     weights: Option<&str>,
 ) -> Result<MaterialReport, WrongOption> {
     if let Some(length) = weights.and_then(|weights| weights.strip_prefix("gradient:")) {
-        return second_gradient(lattice, who, length);
+        return second_gradient(lattice, given, length);
     }
-    let offsets = neighbours::neighbourhood(who.unwrap_or("first"), lattice)?;
+    let offsets = neighbours::neighbourhood(given.unwrap_or("first"), lattice)?;
     let (option, name) = match weights {
         None => ("--neighbours", "barycentre (Eq. 1)"),
         Some(_) => ("--weights", "barycentre with weights given"),
@@ -166,10 +166,10 @@ fn of_rule(
 
 fn second_gradient(
     lattice: &Lattice,
-    who: Option<&str>,
+    given: Option<&str>,
     length: &str,
 ) -> Result<MaterialReport, WrongOption> {
-    if who.is_some_and(|who| who != "collinear") {
+    if given.is_some_and(|kind| kind != "collinear") {
         let message = "a second gradient reaches the sites behind the first neighbours";
         return Err(wrong("--neighbours", message, "leave it out, or give --neighbours collinear"));
     }

@@ -112,7 +112,7 @@ pub enum Command {
     /// Lists the bundled scenes or swarms, one a line
     #[command(after_help = "Examples:\n  flockform list scenes\n  flockform list swarms")]
     List {
-        /// What to list
+        /// Kind of file to list
         what: Listed,
     },
     /// Shows what a scene makes the program model and what it leaves out, without running it
@@ -151,7 +151,7 @@ pub enum Command {
     Bench(BenchCommand),
 }
 
-/// What `list` lists.
+/// The kinds of file that `list` lists.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub enum Listed {
     Scenes,

@@ -62,7 +62,7 @@ pub enum Progress {
     Lines { steps: usize, last: Instant },
 }
 
-/// What a study is about to do: a line that changes on a terminal, one every few seconds in a pipe.
+/// The next stage of a study: a line that changes on a terminal, one every few seconds in a pipe.
 pub enum Stages {
     Silent,
     Spinner(ProgressBar),

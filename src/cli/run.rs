@@ -186,7 +186,7 @@ fn resume_words(folder: &OutputFolder) -> String {
 }
 
 impl RunArguments {
-    /// What shall be run, in words that mean the same in any folder.
+    /// The requested run, independent of the working folder.
     fn asked(&self, left: Option<&ResumedRun>) -> RunRequest {
         let force = self.output.force;
         match (&self.scene, left) {
@@ -218,8 +218,8 @@ struct Looks<'a> {
 }
 
 impl<'a> Looks<'a> {
-    /// If `every`, somebody wants to see each step; probes do. Otherwise several times a second are enough, by the
-    /// clock: how long a step takes depends on the rule.
+    /// Looks at each step if `every` or if there are probes. Otherwise several looks a second are enough, by the clock:
+    /// how long a step takes depends on the rule.
     fn new(scene: &'a Scene, plan: &Plan, every: bool) -> Self {
         let every = every || !plan.probes.is_empty();
         let bound = if every { 1 } else { (UPDATES_BETWEEN_LOOKS / plan.count()).max(1) };
@@ -289,13 +289,13 @@ struct Recorder<'a> {
     /// Whether there shall be a `report.html`, and what it shows.
     reports: bool,
     animation: Option<RunRecorder>,
-    /// What an earlier run has kept for it.
+    /// The state that an earlier run saved for it.
     animation_state: Option<AnimationState<'static>>,
     failure: Option<ExportError>,
     writing: Duration,
 }
 
-/// What was kept, and how long that took on the way.
+/// The records of a run, and the time spent writing them.
 struct Records {
     snapshots: Vec<Snapshot>,
     probes: Vec<ProbeSeries>,

@@ -1,11 +1,11 @@
 //! A process that outlives the one that does the work, and starts another when that one ends.
 //!
-//! Whoever reaches a node's ports can end its middleware (see `ros::edge::pulse`), and no thread of a process outlives
-//! a full memory. So `node` and `robots` are two processes: this one holds no socket and hardly any memory; its child
-//! does the work and tells it its state ten times a second, over the socket that is the child's standard input. A
-//! child that ends without having been asked to, or falls silent, is followed by another at once, which gets that
+//! A peer that reaches a node's ports can end its middleware (see `ros::edge::pulse`), and no thread of a process
+//! survives exhausted memory. So `node` and `robots` are two processes. This one holds no socket and hardly any memory;
+//! its child does the work and sends its state ten times a second, over the socket that is the child's standard input.
+//! A child that ends without having been asked to, or falls silent, is followed by another at once, which gets that
 //! state first. The alternative, a middleware in a process of its own under a loop that goes on, would be back no
-//! sooner, because finding the peers again takes the time, and a loop without a middleware has nobody to hear.
+//! sooner, because finding the peers again takes the time, and a loop without a middleware receives no poses.
 
 use std::io::{BufRead, BufReader, ErrorKind, Read, Write};
 use std::os::fd::OwnedFd;
@@ -23,8 +23,8 @@ use super::interrupt;
 
 /// Number of a child, from 1, in the environment.
 const LIFE: &str = "FLOCKFORM_LIFE";
-/// How often a child tells its state \[s\].
-const TELLING: Duration = Duration::from_millis(100);
+/// How often a child sends its state \[s\].
+const SEND_PERIOD: Duration = Duration::from_millis(100);
 /// How long a child that has spoken may be silent \[s\].
 const SILENCE: Duration = Duration::from_millis(1500);
 /// How often the child is looked at \[s\].
@@ -40,9 +40,9 @@ const REST: Duration = Duration::from_secs(1);
 pub struct Life {
     number: u32,
     socket: Option<UnixStream>,
-    /// What of the last state has not gone out yet.
+    /// The part of the last state that has not been sent yet.
     unsent: Vec<u8>,
-    told: Option<Instant>,
+    sent: Option<Instant>,
 }
 
 /// Runs this program again as a child, and another whenever one ends for no reason of its own; returns in the child,
@@ -75,7 +75,7 @@ fn lead() -> std::io::Result<ExitCode> {
             "process {number} {why} after {:.1} s: another goes on",
             begun.elapsed().as_secs_f64()
         );
-        // The first comes at once; whoever dies again and again leaves the machine to others in between.
+        // The first restart is immediate; a child that dies repeatedly is restarted after growing pauses.
         rest = if begun.elapsed() > Duration::from_secs(5) {
             Duration::ZERO
         } else {
@@ -87,7 +87,7 @@ fn lead() -> std::io::Result<ExitCode> {
     Ok(ExitCode::from(MIDDLEWARE_GONE))
 }
 
-/// Starts a child and tells it the state.
+/// Starts a child and sends it the state.
 fn start(number: u32, state: &[u8]) -> std::io::Result<(Child, Lines)> {
     let (ours, theirs) = UnixStream::pair()?;
     let child = Command::new(std::env::current_exe()?)
@@ -111,7 +111,7 @@ fn start(number: u32, state: &[u8]) -> std::io::Result<(Child, Lines)> {
 
 type Lines = (UnixStream, Receiver<Vec<u8>>);
 
-/// Waits for the end of a child: its exit code, if it gave one, and the last state it told.
+/// Waits for the end of a child: its exit code, if it gave one, and the last state it sent.
 fn follow(
     child: &mut Child,
     (socket, lines): Lines,
@@ -126,7 +126,7 @@ fn follow(
             (last, heard) = (Some(line), Instant::now());
         }
         if let Some(status) = child.try_wait()? {
-            // What it told just before.
+            // The states it sent just before its end.
             while let Ok(mut line) = lines.recv_timeout(LOOK) {
                 line.push(b'\n');
                 last = Some(line);
@@ -154,7 +154,7 @@ impl Life {
     fn take_up(number: u32) -> std::io::Result<Self> {
         use std::os::fd::AsFd;
         let socket = UnixStream::from(std::io::stdin().as_fd().try_clone_to_owned()?);
-        Ok(Self { number, socket: Some(socket), unsent: Vec::new(), told: None })
+        Ok(Self { number, socket: Some(socket), unsent: Vec::new(), sent: None })
     }
 
     /// From 1.
@@ -162,14 +162,14 @@ impl Life {
         self.number
     }
 
-    /// The state that the process before us told last.
+    /// The last state that the previous process sent.
     pub fn left<T: DeserializeOwned>(&mut self) -> Option<T> {
         let socket = self.socket.as_ref()?;
         let mut line = Vec::new();
         let patience = socket.set_read_timeout(Some(Duration::from_secs(2)));
         let read = patience.and_then(|()| BufReader::new(socket).read_until(b'\n', &mut line));
-        let told = socket.set_nonblocking(true).and(read);
-        match told.map_err(|error| error.to_string()).and_then(|_| parse(&line)) {
+        let read = socket.set_nonblocking(true).and(read);
+        match read.map_err(|error| error.to_string()).and_then(|_| parse(&line)) {
             Ok(left) => left,
             Err(error) => {
                 tracing::warn!(
@@ -180,13 +180,13 @@ impl Life {
         }
     }
 
-    /// Tells the state, if it is time to; says false when nobody listens any more and it is time to end.
+    /// Sends the state if it is due. Returns false if the socket is closed: the process should end.
     pub fn tell<T: Serialize>(&mut self, state: impl FnOnce() -> T) -> bool {
-        if self.told.is_some_and(|told| told.elapsed() < TELLING) {
+        if self.sent.is_some_and(|sent| sent.elapsed() < SEND_PERIOD) {
             return true;
         }
         let Some(socket) = &mut self.socket else { return true };
-        self.told = Some(Instant::now());
+        self.sent = Some(Instant::now());
         if self.unsent.is_empty()
             && let Ok(line) = serde_json::to_vec(&state())
         {

@@ -39,7 +39,7 @@ impl SwarmFileArguments {
         Ok(Swarm::from_file(Path::new(&path), &self.set)?)
     }
 
-    /// What a recording needs to know of the swarm.
+    /// The description of the swarm for a recording.
     pub fn about(&self, source: &'static str, swarm: &Swarm) -> About {
         let path = Path::new(&self.swarm);
         let bundled = bundled_swarm(&self.swarm);

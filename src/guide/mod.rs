@@ -8,10 +8,10 @@
 //! | [`fracture`] | bonds that break, cuts, ghosts |
 //! | [`swarms`] | formations of robots: the swarm file, simulated flights, faults, recordings |
 //! | [`ros2`] | the ROS 2 node: topics, services, parameters, launch files |
-//! | [`security`] | who may command, what happens when robots, peers or the middleware fail |
+//! | [`security`] | command permissions, failures of robots, peers and the middleware |
 //! | [`shared_memory`] | the same loop between processes of one computer |
 //! | [`performance`] | how fast bodies step and settle, and how to measure it |
-//! | [`files`] | what a run writes, the report, checkpoints, exit codes |
+//! | [`files`] | output files of a run, the report, checkpoints, exit codes |
 //! | [`theory`] | the paper's terms and equations, what they imply, where the paper leaves a choice |
 //!
 //! Every TOML example is loaded by the tests, every command line is checked against the program, and the Rust

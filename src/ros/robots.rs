@@ -1,8 +1,7 @@
 //! `flockform robots`: the simulated robots of a swarm file as ROS 2 nodes in one process.
 //!
-//! Each is a node of its own name: poses out, targets in, its frame on `/tf`. What the file says of noise,
-//! delay, loss and faults happens here, so the node that keeps the formation sees it as it would see it in
-//! the world.
+//! Each is a node of its own name: poses out, targets in, its frame on `/tf`. The noise, delay, loss
+//! and faults of the file are applied here, so the formation node receives what it would from real robots.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -43,7 +42,7 @@ pub struct RobotNodes {
     pulse: Option<Arc<Pulse>>,
 }
 
-/// What of the robots outlasts their process.
+/// The state of the robots that outlasts their process.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 pub struct KeptRobots {
     robots: Vec<Robot>,
@@ -74,7 +73,7 @@ enum Poses {
 
 impl Link {
     /// # Errors
-    /// What in the ROS arguments or the network stands in the way.
+    /// An obstacle in the ROS arguments or the network.
     pub fn open(swarm: &Swarm, formation: &Formation, arguments: &RosArguments) -> Result<Self, NodeError> {
         let edge = Edge::open(options(arguments))?;
         let raw = &swarm.raw.node;
@@ -118,7 +117,7 @@ impl Link {
 
 impl RobotNodes {
     /// # Errors
-    /// What in the swarm file, the ROS arguments or the network stands in the way.
+    /// An obstacle in the swarm file, the ROS arguments or the network.
     pub fn open(swarm: &Swarm, arguments: &RosArguments) -> Result<Self, NodeError> {
         let control = Control::new(swarm)?;
         let formation = control.formation();
@@ -184,7 +183,7 @@ impl RobotNodes {
     /// One period: targets in, poses out.
     pub fn tick(&mut self) {
         let Self { fleet, goals, link, pulse, .. } = self;
-        // Who publishes the time begins it.
+        // The publisher of the simulated time starts it.
         let own_time = link.clock.is_some();
         let now = |fleet: &Fleet| if own_time { fleet.time() } else { system_time() };
         let pulse = pulse.clone();

@@ -83,7 +83,7 @@ impl Bundled {
     /// Reads the swarm; `overrides` are `KEY.PATH=VALUE` texts applied on top.
     ///
     /// # Errors
-    /// What the overrides make of it.
+    /// Overrides that make the swarm invalid.
     pub fn load_swarm(&self, overrides: &[String]) -> Result<Swarm, SceneError> {
         Swarm::parse(self.name, &format!("{}.toml (bundled)", self.name), self.text, overrides, None)
     }

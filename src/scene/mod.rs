@@ -2,8 +2,8 @@
 //!
 //! [`document`] reads TOML and overrides and checks every key against the JSON Schema of
 //! [`raw::RawScene`]; [`validate`] turns the raw scene into this one. Errors name file, line, key, value
-//! and remedy. What needs the body itself (whether a region is empty, say) is checked by the plan,
-//! which reports through [`Scene::refuse`] in the same form.
+//! and remedy. Conditions that need the body itself (whether a region is empty, say) are checked by the
+//! plan, which reports through [`Scene::refuse`] in the same form.
 
 pub mod bundled;
 pub mod document;
@@ -59,7 +59,7 @@ pub struct Scene {
     pub poisson: Option<PoissonTerm>,
     pub feedback: Option<Feedback>,
     pub update: Update,
-    /// What the body is made of, where the scene says so.
+    /// The material of the body, if the scene gives one.
     pub material: Option<Elastic>,
     /// Parts of the body that are of another material; the later one counts where they overlap.
     pub inclusions: Vec<Inclusion>,
@@ -106,7 +106,7 @@ impl Scene {
         matches!(self.body, BodySource::Points(_))
     }
 
-    /// What a run counts: `increment` where it solves one part of the load after the other, else `step`.
+    /// The unit in which a run counts: `increment` if it solves one part of the load after the other, else `step`.
     pub fn counts(&self) -> &'static str {
         match self.load_steps {
             Some(LoadSteps::Solved(_)) => "increment",
@@ -213,7 +213,7 @@ impl Condition {
     }
 }
 
-/// What a condition looks at.
+/// The quantity that a condition tests.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
     X,
@@ -272,7 +272,7 @@ pub enum LoadSteps {
     Stepped { ramp: Option<usize>, every: usize },
 }
 
-/// What is kept of the run.
+/// The records of the run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Record {
     /// Ids.

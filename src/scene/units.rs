@@ -1,4 +1,4 @@
-//! What numbers are measured in, as text for tables, pictures and words.
+//! Units of the numbers, as text for tables, figures and messages.
 
 use super::Scene;
 
@@ -38,7 +38,7 @@ impl Units {
 
     fn new(length: &str, stress: Option<&str>) -> Self {
         let Some(stress) = stress else {
-            // Whatever Young's modulus is given in.
+            // The unit of Young's modulus, which has no name here.
             let times = |power: &str| format!("unit of young × {length}{power}");
             return Self {
                 length: length.into(),

@@ -30,6 +30,6 @@ fn a_swarm_that_takes_nobody_s_word_waits_for_nobody_s() {
         &["node.commands", "\"none\" forbids commands to `robot_1`", "help: "],
     );
     let waits = ["--ros-args", "-p", "autostart:=false"];
-    refused(&[&none[..], &waits].concat(), &["node.commands", "lets nobody make the node active", "help: "]);
+    refused(&[&none[..], &waits].concat(), &["node.commands", "lets no peer make the node active", "help: "]);
     refused(&["--set", "node.commands=some"], &["node.commands", "stop-only"]);
 }

@@ -135,7 +135,7 @@ fn robots_may_come_late_be_killed_and_come_back() {
     let state = watch.until("a state", |line| state::of(line).cloned());
     assert_eq!(state::who(&state, is_waiting).len(), 25);
     assert_eq!(state::who(&state, is_sent_nowhere).len(), 25, "nobody is sent anywhere from nothing");
-    until_diagnosed(&watch, 2, "nobody is heard");
+    until_diagnosed(&watch, 2, "no robot is heard");
 
     let names = &square.control().formation().names.clone();
     let part = |first: usize, end: usize| {
@@ -164,7 +164,7 @@ fn robots_may_come_late_be_killed_and_come_back() {
     assert_eq!(state::who(&state, is_sent_nowhere), gone);
     until_diagnosed(&watch, 1, "12 of 25 robots lost");
     drop(first);
-    until_diagnosed(&watch, 2, "nobody is heard");
+    until_diagnosed(&watch, 2, "no robot is heard");
     let state = watch.until("a state", |line| state::of(line).cloned());
     assert_eq!(state::who(&state, is_sent_nowhere).len(), 25);
 

@@ -22,7 +22,7 @@ pub fn neighbourhood(text: &str, lattice: &Lattice) -> Result<Vec<Vec<Site>>, Wr
         Ok(count) if (1..=most).contains(&count) => Ok(count),
         _ => Err(wrong(option, format!("`{value}` is not a whole number from 1 to {most}"), FORMS)),
     };
-    let who = match (kind, value) {
+    let neighbourhood = match (kind, value) {
         ("first", None) => Neighbourhood::First { keep: None },
         ("first", Some(keep)) => Neighbourhood::First { keep: Some(count(keep, 6)? as usize) },
         ("chebyshev", None) => Neighbourhood::Chebyshev { radius: 1 },
@@ -40,7 +40,7 @@ pub fn neighbourhood(text: &str, lattice: &Lattice) -> Result<Vec<Vec<Site>>, Wr
         ("offsets", Some(list)) => Neighbourhood::Offsets(offsets(list)?),
         _ => return Err(unknown()),
     };
-    who.offsets(lattice).map_err(|error| wrong(option, error.to_string(), FORMS))
+    neighbourhood.offsets(lattice).map_err(|error| wrong(option, error.to_string(), FORMS))
 }
 
 fn offsets(list: &str) -> Result<Vec<Site>, WrongOption> {

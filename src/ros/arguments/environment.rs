@@ -11,14 +11,14 @@ pub const LARGEST_DOMAIN: u16 = 232;
 pub enum DiscoveryRange {
     /// This machine only.
     Localhost,
-    /// Whoever multicast reaches.
+    /// All hosts that multicast reaches.
     #[default]
     Subnet,
-    /// Whatever the middleware does by itself.
+    /// The middleware's own default.
     SystemDefault,
 }
 
-/// What the environment says; `Default` is an empty environment.
+/// The environment variables of ROS 2; `Default` is an empty environment.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Environment {
     /// DDS domain (`ROS_DOMAIN_ID`), 0 to 232 \[default: 0\].
@@ -77,7 +77,7 @@ fn read_range(value: String) -> Result<DiscoveryRange, RosArgumentError> {
             return Err(RosArgumentError::Environment {
                 variable: "ROS_AUTOMATIC_DISCOVERY_RANGE",
                 value,
-                reason: "a node that looks for nobody, not even on this computer, has nobody to fly with",
+                reason: "the node would discover no robot, not even on this computer",
                 help: "set LOCALHOST for this computer alone, or use --transport shm, which opens no socket",
             });
         }
@@ -95,7 +95,7 @@ fn read_range(value: String) -> Result<DiscoveryRange, RosArgumentError> {
     })
 }
 
-/// Whoever enforces security must not get a node that speaks in the clear.
+/// Refuses enforced security: this node communicates unencrypted.
 fn refuse_enforced_security(variable: &dyn Fn(&str) -> Option<String>) -> Result<(), RosArgumentError> {
     let is = |name: &str, value: &str| variable(name).is_some_and(|set| set == value);
     if is("ROS_SECURITY_ENABLE", "true") && is("ROS_SECURITY_STRATEGY", "Enforce") {

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-/// What is wrong with a rule or value, and the remedy.
+/// The fault of a rule or value, and the remedy.
 pub(super) type Reason = (String, &'static str);
 
 /// Why `--ros-args` or the environment was refused.

@@ -70,14 +70,14 @@ impl RosArguments {
             }
             "--log-file-name" => return Err(no_log_library(&flag, value("a file name prefix")?)),
             "-e" | "--enclave" => match value("a security enclave /PATH")?.as_str() {
-                // The one that every node is in without being told.
+                // The default enclave of every node.
                 "/" => {}
                 enclave => {
                     return Err(RosArgumentError::Rule {
                         flag: flag.clone(),
                         rule: enclave.into(),
                         reason: "this node speaks unsecured DDS and has no keys of an enclave".into(),
-                        help: "leave it out; who must be kept out has to be kept off the network",
+                        help: "leave it out, and keep untrusted computers off the network",
                     });
                 }
             },

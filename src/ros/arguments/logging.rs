@@ -1,11 +1,11 @@
-//! What is logged, and to where.
+//! Which messages are logged, and to where.
 
 use super::RosArgumentError;
 
 /// Severity of a log message, as `rcutils` names them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Severity {
-    /// Whatever the logger's parent says.
+    /// The severity of the logger's parent.
     Unset,
     Debug,
     Info,
@@ -14,7 +14,7 @@ pub enum Severity {
     Fatal,
 }
 
-/// What is logged, and to where; `Default` is what a node does without arguments.
+/// Which messages are logged, and to where; `Default` is the behaviour without arguments.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Logging {
     /// Least severity logged, where the logger has none of its own \[default: none given\].

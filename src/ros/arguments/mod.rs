@@ -1,10 +1,9 @@
 //! ROS 2 command line arguments: `--ros-args` and the environment, read into data.
 //!
 //! The grammar is that of the design articles "ROS Command Line Arguments" and "Remapping Names"
-//! (design.ros2.org) as far as `rcl` (Jazzy) implements them. What `rcl` leaves out (wildcards and
-//! `\1` in remap rules) is refused by name, and so is every flag that is not known: a
-//! misspelt argument never passes for an ordinary one. Deprecated rules outside `--ros-args` are
-//! ordinary arguments here.
+//! (design.ros2.org) as far as `rcl` (Jazzy) implements them. Features that `rcl` leaves out (wildcards and
+//! `\1` in remap rules) are refused by name, and so is every unknown flag: a misspelt argument never
+//! passes for an ordinary one. Deprecated rules outside `--ros-args` are ordinary arguments here.
 //!
 //! ```
 //! use flockform::ros::arguments::RosArguments;
@@ -41,7 +40,7 @@ pub use names::{NameError, Names};
 pub use remap::RemapRule;
 pub use value::Value;
 
-/// What a process was told about ROS.
+/// The ROS arguments of a process.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RosArguments {
     /// Remap rules (`-r`) in the order given; the first that matches wins.
@@ -51,9 +50,9 @@ pub struct RosArguments {
     pub assignments: Vec<Assignment>,
     /// Files named by `--params-file`, in the order given.
     pub parameter_files: Vec<PathBuf>,
-    /// What is logged, and to where.
+    /// Which messages are logged, and to where.
     pub logging: Logging,
-    /// What the environment says.
+    /// The environment variables.
     pub environment: Environment,
 }
 

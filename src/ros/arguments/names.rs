@@ -14,11 +14,11 @@ pub const LONGEST_NODE_NAME: usize = 255;
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{what} `{name}`: {reason}\n  help: {help}")]
 pub struct NameError {
-    /// What kind of name it is: "node name", "namespace", ...
+    /// The kind of name: "node name", "namespace", ...
     pub what: &'static str,
     /// The whole name.
     pub name: String,
-    /// What is wrong with it, and where.
+    /// The fault, and where it is.
     pub reason: String,
     pub help: &'static str,
 }
@@ -188,7 +188,7 @@ fn check_full_name(what: &'static str, name: &str) -> Result<(), NameError> {
     Ok(())
 }
 
-/// What is wrong with one token of a name, if anything.
+/// Checks one token of a name; the error describes the fault.
 pub(super) fn check_token(token: &str) -> Result<(), String> {
     let is_allowed = |letter: char| letter.is_ascii_alphanumeric() || letter == '_';
     if token.is_empty() {

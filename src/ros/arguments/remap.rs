@@ -11,7 +11,7 @@ pub enum Scope {
     Both,
 }
 
-/// What a rule changes.
+/// The change that a rule makes.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Remap {
     /// The node's name becomes this.
@@ -63,7 +63,7 @@ impl RemapRule {
         Ok(Self { node: node.map(String::from), remap })
     }
 
-    /// What a node of this name is called by this rule, if it renames it.
+    /// The new name of this node, if this rule renames it.
     pub(super) fn new_node_name(&self, node: &str) -> Option<&str> {
         match &self.remap {
             Remap::NodeName(name) if self.is_for(node) => Some(name),

@@ -82,7 +82,7 @@ impl Value {
         })
     }
 
-    /// What a message calls this type.
+    /// The name of this type in messages.
     pub fn type_name(&self) -> &'static str {
         match self {
             Self::Bool(_) => "bool",

@@ -1,4 +1,4 @@
-//! What time it is: the computer's, or the simulator's from `/clock`.
+//! The clock: the computer's time, or the simulator's from `/clock`.
 
 use super::services::rosgraph_msgs;
 use super::{EdgeError, Node, Quality, Subscription};
@@ -14,7 +14,7 @@ struct Simulated {
     reading: Reading,
 }
 
-/// What was last heard of a simulator's time. Pure.
+/// The last received time of a simulator. Pure.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Reading {
     now: Option<f64>,

@@ -1,11 +1,11 @@
 //! Packets that the kernel keeps from the middleware: a socket filter on each port that RustDDS listens to.
 //!
-//! RustDDS opens its sockets to everybody, whatever networks it is told to use, and believes every number in a packet:
-//! it writes down one by one the samples that a heartbeat or a gap speaks of, and lays out a fragmented sample as long
-//! as its first fragment says. What it may be told is bounded here, before it is told (classic BPF, which any process
-//! may put on its own sockets: Linux, Documentation/networking/filter.rst). That is a first line, not a wall: of a
-//! packet's submessages the first [`SLOTS`] are looked at, and who forges numbers with care can still make RustDDS deaf
-//! to a peer. What gets through is what [`pulse`](super::pulse) is for.
+//! RustDDS opens its sockets to all senders, whatever networks it is configured for, and trusts every number in a
+//! packet: it lists one by one the samples that a heartbeat or a gap names, and allocates a fragmented sample as long
+//! as its first fragment claims. These numbers are bounded here, before RustDDS reads them (classic BPF, which any
+//! process may put on its own sockets: Linux, Documentation/networking/filter.rst). The filter is not complete: of a
+//! packet's submessages only the first [`SLOTS`] are checked, and carefully forged numbers can still make RustDDS deaf
+//! to a peer. [`pulse`](super::pulse) handles the rest.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -167,7 +167,7 @@ fn program(loopback_only: bool) -> Vec<SockFilter> {
     program
 }
 
-/// Looks at the submessage that begins at X and goes on to the next. What reads beyond the packet ends in a drop.
+/// Checks the submessage that begins at X and goes on to the next. A read beyond the packet drops it.
 fn slot() -> Vec<Line> {
     const NUMBERS: u8 = 0;
     const LITTLE: u8 = 1;
@@ -193,7 +193,7 @@ fn slot() -> Vec<Line> {
         If(JEQ, HEARTBEAT, Label(NUMBERS), Next),
         If(JEQ, DATA_FRAGMENT, Label(FRAGMENT), Next),
         If(JEQ, GAP, Next, Label(SKIP)),
-        // A gap from the first sample on is what a late comer is told, and costs nothing.
+        // A gap that starts at the first sample is normal for a late joiner and costs nothing.
         Do(LDX_W, 12),
         If(JEQ, 0, Next, Label(NUMBERS)),
         Do(LDX_W, 16),

@@ -1,4 +1,4 @@
-//! Who is there: which remote endpoints match ours, and what we tell others about our nodes.
+//! The ROS graph: the remote endpoints that match ours, and the announcements of our nodes.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
@@ -107,7 +107,7 @@ impl Graph {
         self.state().twins.values().flatten().filter(|name| *name == node).count()
     }
 
-    /// Another participant told what nodes it has.
+    /// Takes the announcement of the nodes of another participant.
     fn hear(&self, info: &ParticipantEntitiesInfo, own: GUID) {
         let from: [u8; 12] = std::array::from_fn(|i| info.gid().to_bytes16()[i]);
         if from == prefix(own) {
@@ -230,7 +230,7 @@ fn watch(
                 Taken::Unreadable => continue,
                 Taken::Sample(sample) => sample.payload,
             };
-            // Names that are none are nobody's twin.
+            // An unreadable announcement names no twin of ours.
             if let Ok(info) = decode::<ParticipantEntitiesInfo>(&payload.bytes, payload.order) {
                 graph.hear(&info, guid);
             }

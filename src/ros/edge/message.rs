@@ -1,4 +1,4 @@
-//! What a type needs to cross the wire: a place in the CDR encoding and the name peers know it by.
+//! Requirements on a message type: a CDR encoding and the name by which peers know it.
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;

@@ -2,7 +2,7 @@
 //!
 //! Everything here is polled. A node's loop is one thread that takes what arrived once per tick and
 //! publishes; no call below waits for the network. RustDDS (through ros2-client) does the protocol on its
-//! own threads; one more thread of ours watches who is there, one hands over what is sent.
+//! own threads; one more thread of ours tracks discovery, one writes the outgoing messages.
 //!
 //! * [`participant`]: an [`Edge`] is one DDS participant; [`Node`]s of one process share it.
 //! * [`topic`]: publishers and subscriptions; [`quality`]: what they promise each other.

@@ -1,8 +1,8 @@
-//! Messages on their way out, between whoever publishes and the middleware.
+//! Queues of outgoing messages, between publishers and the middleware.
 //!
-//! RustDDS can hold up who writes: its send window is locked while it works on what came in. So a thread of ours
-//! writes, and a publisher only lays its message into a queue of bounded length, in which the newest replaces the
-//! oldest: a target that comes late is worse than none.
+//! RustDDS can block a writing thread: its send window is locked while it processes received packets. So a thread of
+//! ours writes, and a publisher only appends its message to a queue of bounded length, in which the newest replaces
+//! the oldest: a late target is worse than none.
 
 use std::collections::VecDeque;
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -38,7 +38,7 @@ struct Queue {
     waiting: VecDeque<(Payload, WriteOptions)>,
     /// When the thread last took one, or found none.
     taken: Option<Instant>,
-    /// Why the last message was not taken, until somebody is told.
+    /// Why the last message was not taken, until a publisher receives the error.
     refused: Option<String>,
 }
 
@@ -70,7 +70,7 @@ impl Outlet {
     }
 }
 
-/// What publishers of an edge share.
+/// The outbox that the publishers of an edge share.
 pub(super) struct Outbox {
     /// A token for each message that waits.
     tokens: Option<Sender<Arc<Outlet>>>,
@@ -83,7 +83,7 @@ impl Outbox {
         let (done, emptied) = channel();
         std::thread::Builder::new().name("ros out".into()).spawn(move || {
             to_write.iter().for_each(|outlet| outlet.write_one());
-            // Nobody may be waiting for it.
+            // The receiver may be gone.
             let _ = done.send(());
         })?;
         Ok(Self { tokens: Some(tokens), emptied: Mutex::new(emptied) })
@@ -140,12 +140,12 @@ mod tests {
     use crate::ros::edge::{Edge, Options, Quality};
 
     #[test]
-    fn a_middleware_that_hangs_holds_up_nobody_and_the_newest_messages_wait() {
+    fn a_middleware_that_hangs_blocks_no_publisher_and_the_newest_messages_wait() {
         let domain = 100 + (std::process::id() % 101) as u16;
         let edge = Edge::open(Options { domain, loopback_only: true }).expect("sockets");
         let writer = edge.with_participant(|shared, _| shared.writer("rt/hangs", "T_", Quality::BEST_EFFORT));
         let outlet = Outlet::new("/hangs", writer.expect("a writer"), 1);
-        let hangs = outlet.writer.lock().expect("nobody panicked");
+        let hangs = outlet.writer.lock().expect("no thread panicked");
         let mut outbox = Outbox::start().expect("a thread");
         let since = Instant::now();
         let post =

@@ -79,7 +79,7 @@ impl Edge {
         let participant = builder.build().map_err(|error| refused(error.to_string()))?;
         match super::door::guard(&before, options.loopback_only) {
             Ok(_) => {}
-            // Nobody is let in who was to be kept out.
+            // Without the filter, packets that had to be excluded would enter.
             Err(error) if options.loopback_only => {
                 return Err(refused(format!("the kernel cannot keep other computers out: {error}")));
             }
@@ -129,7 +129,7 @@ impl Shared {
             TopicKind::NoKey,
         )?;
         let writer = publisher.create_datawriter_no_key_cdr(&announcements, None)?;
-        // Whoever was here before us announced itself before we came.
+        // Participants that were here first have already announced themselves.
         let policies = Quality::transient_local(1).policies();
         let reader = subscriber.create_simple_datareader_no_key(&announcements, Some(policies))?;
         let graph = Arc::new(Graph::default());

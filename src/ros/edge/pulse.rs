@@ -1,8 +1,8 @@
 //! Whether the middleware lives: a sample that must come back, its threads, its memory.
 //!
-//! Whoever can send a packet can end RustDDS's threads, keep them busy for ever, or have them fill the memory: one
-//! heartbeat that promises 2^62 samples is enough (0.15.1, the newest there is). Nothing in the process can put that
-//! right, so who finds it ends the process, and whoever started it starts another.
+//! Any peer that can send a packet can end RustDDS's threads, keep them busy for ever, or have them fill the memory:
+//! one heartbeat that promises 2^62 samples is enough (0.15.1, the newest there is). Nothing in the process can repair
+//! that. So the watchdog ends the process, and the supervisor starts another.
 //!
 //! The sample is a packet of our own, from a writer of ours to a reader of ours, sent to our own port: it passes the
 //! socket, the receiver and the cache like any other, and needs no multicast, which a loopback device may not have.
@@ -24,10 +24,10 @@ const LOOK: Duration = Duration::from_millis(10);
 const BEAT: u32 = 10;
 /// How long no sample may come back, and how long the loop may be kept by the middleware \[s\].
 const DEAF: Duration = Duration::from_millis(700);
-/// What the process may grow by from when it is open \[kB\], before it is given up and before the kernel gives no more.
+/// Growth of the process since opening at which it is given up, and at which the kernel refuses memory \[kB\].
 const GROWTH: u64 = 128 * 1024;
 const MOST_GROWTH: u64 = 2 * GROWTH;
-/// How long those may be silent whom the loop heard before, all of them at once \[s\].
+/// How long all peers that were heard before may be silent at once \[s\].
 const LONELY: Duration = Duration::from_secs(2);
 /// How long the loop has to say its last word once the middleware is given up \[s\].
 const LAST_WORD: Duration = Duration::from_millis(100);
@@ -35,13 +35,13 @@ const LAST_WORD: Duration = Duration::from_millis(100);
 /// Exit code of a process whose middleware was given up: a new one will do (EX_SOFTWARE of sysexits.h).
 pub const MIDDLEWARE_GONE: u8 = 70;
 
-/// What the loop and its watchdog know of each other.
+/// The state shared by the loop and its watchdog.
 pub struct Pulse {
     begun: Instant,
     given_up: AtomicBool,
     /// When the loop went into the middleware \[ms since `begun`\]; 0 while it is out.
     inside_since: AtomicU64,
-    /// When the loop last heard anybody else.
+    /// When the loop last heard a peer.
     heard: Mutex<Option<Instant>>,
 }
 
@@ -60,17 +60,16 @@ impl Pulse {
         self.given_up.load(Ordering::Relaxed)
     }
 
-    /// Told after each tick whether the loop hears anybody else. Forged discovery can leave the middleware deaf to
-    /// all its peers and well in itself; a new one finds them. Once a process has heard nobody from its beginning it
-    /// waits for them.
-    pub fn hears(&self, anybody: bool) {
+    /// Records after each tick whether the loop hears any peer. Forged discovery can leave the middleware deaf to all
+    /// its peers though otherwise sound; a new one finds them. A process that has never heard a peer waits for one.
+    pub fn hears(&self, any_peer: bool) {
         let mut heard = self.heard.lock().unwrap_or_else(PoisonError::into_inner);
-        if anybody {
+        if any_peer {
             *heard = Some(Instant::now());
         } else if heard.is_some_and(|heard| heard.elapsed() > LONELY)
             && !self.given_up.swap(true, Ordering::Relaxed)
         {
-            tracing::error!("the middleware is given up: all who were heard before are silent");
+            tracing::error!("the middleware is given up: all peers that were heard before are silent");
         }
     }
 
@@ -105,7 +104,7 @@ impl Loop {
     fn open(shared: &Shared, participant: &DomainParticipant) -> Result<Self, EdgeError> {
         let prefix = super::graph::prefix(participant.guid());
         let name = prefix.iter().fold("flockform_loop".to_owned(), |name, byte| format!("{name}_{byte:02x}"));
-        // In this order: RustDDS tells a new reader of the process's own writers, and not the other way round.
+        // In this order: RustDDS announces the process's own writers to a new reader, and not the other way round.
         let writer = shared.writer(&name, "flockform::Loop_", Quality::BEST_EFFORT)?;
         let reader = shared.reader(&name, "flockform::Loop_", Quality::BEST_EFFORT)?;
         let refused =
@@ -187,7 +186,7 @@ fn watch(way: &mut Loop, pulse: &Pulse) -> (String, Duration) {
     loop {
         look = look.wrapping_add(1);
         std::thread::sleep(LOOK);
-        // On a computer that stands still nobody is deaf: time counts only as far as we were there.
+        // A suspended computer is not a deaf middleware: only time in which this thread ran counts.
         silence += last_look.elapsed().min(4 * LOOK);
         last_look = Instant::now();
         if let Some(size) = memory("VmRSS:").filter(|size| *size > most) {

@@ -11,8 +11,8 @@ use ros2_client::dds::rustdds::{Duration, QosPolicies, QosPolicyBuilder};
 pub struct Quality {
     /// Lost samples are sent again.
     pub reliable: bool,
-    /// A late joiner gets the last samples. Publish such topics rarely and small: RustDDS trims what nobody
-    /// reads only every few seconds, and a late joiner may get more than `depth` samples.
+    /// A late joiner gets the last samples. Publish such topics rarely and small: RustDDS trims
+    /// unread samples only every few seconds, and a late joiner may get more than `depth` samples.
     pub transient_local: bool,
     /// How many samples are kept \[1\].
     pub depth: u16,
@@ -27,7 +27,7 @@ impl Quality {
         Self { reliable: true, transient_local: false, depth }
     }
 
-    /// Every sample counts, and who comes late gets the last `depth`.
+    /// Every sample counts, and a late joiner gets the last `depth`.
     pub const fn transient_local(depth: u16) -> Self {
         Self { reliable: true, transient_local: true, depth }
     }

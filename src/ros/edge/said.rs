@@ -1,4 +1,4 @@
-//! What others said, fit to be shown to people.
+//! Text from the network, escaped for display.
 
 use std::fmt::Write;
 

@@ -4,7 +4,7 @@
 //! Fast DDS the identity of the request travels beside the payload (the *enhanced* mapping of OMG's RPC
 //! over DDS); on Cyclone DDS it stands in the payload, 16 bytes before the request: half the client's GUID
 //! and a sequence number. Topics and types have the same names, so requests of both kinds arrive at one
-//! reader. Each is told apart by its own marks and answered in its own way: no setting is needed.
+//! reader. Each is recognized by its own marks and answered in its own way: no setting is needed.
 
 use std::cell::{Cell, RefCell};
 use std::collections::VecDeque;
@@ -64,7 +64,7 @@ struct Waiting<Request> {
 }
 
 impl<S: ServiceType> Service<S> {
-    /// What ROS 2 gives services: every sample counts, none is kept for late joiners.
+    /// The quality of ROS 2 services: every sample counts, none is kept for late joiners.
     pub const QUALITY: Quality = Quality::reliable(10);
 
     pub(super) fn new(name: String, reader: Reader, outlet: Arc<Outlet>, shared: Arc<Shared>) -> Self {
@@ -72,7 +72,7 @@ impl<S: ServiceType> Service<S> {
         Self { name, reader, outlet, shared, waiting, refused: Cell::new(0), kind: PhantomData }
     }
 
-    /// The next request and whom to answer, or none. Payloads that are no request are skipped and counted.
+    /// The next request and its client, or none. Payloads that are no request are skipped and counted.
     pub fn take(&self) -> Option<(RequestId, S::Request)> {
         self.receive();
         let mut waiting = self.waiting.borrow_mut();
@@ -108,7 +108,7 @@ impl<S: ServiceType> Service<S> {
     /// Answers a request, without waiting.
     ///
     /// # Errors
-    /// What became of replies before: clients that have not acknowledged for long, a middleware that takes none.
+    /// Failures of earlier replies: clients that have not acknowledged for long, a middleware that takes none.
     pub fn reply(&self, id: &RequestId, response: &S::Response) -> Result<(), EdgeError> {
         let refused = |reason: String| EdgeError::Send { topic: self.name.clone(), reason };
         let options = WriteOptionsBuilder::new().source_timestamp(Timestamp::now());
@@ -284,7 +284,7 @@ mod tests {
     }
 
     #[test]
-    fn a_request_that_names_nobody_is_answered_to_its_writer() {
+    fn a_request_that_names_no_reader_is_answered_to_its_writer() {
         let payload = little_endian(vec![0; 32]);
         let (id, _) = read::<u64>(&payload, identity(RUST, 3), None).expect("readable");
         assert_eq!(id, RequestId(Mark::Enhanced(identity(RUST, 3))));

@@ -33,10 +33,10 @@ impl<M: Message> Publisher<M> {
         Self { topic, outlet, shared, kind: PhantomData }
     }
 
-    /// Sends one message to whoever matches, without waiting.
+    /// Sends one message to the matched subscriptions, without waiting.
     ///
     /// # Errors
-    /// What became of messages before: peers that have not acknowledged for long, a middleware that takes none.
+    /// Failures of earlier messages: peers that have not acknowledged for long, a middleware that takes none.
     pub fn publish(&self, message: &M) -> Result<(), EdgeError> {
         let refused = |reason: String| EdgeError::Send { topic: self.topic.clone(), reason };
         let payload = Payload::of(message).map_err(refused)?;

@@ -41,7 +41,7 @@ pub struct BadPayload {
 /// padding and ignored.
 ///
 /// # Errors
-/// Whatever the bytes are, a value or [`BadPayload`].
+/// [`BadPayload`] for bytes that are no such value; no bytes cause a panic.
 pub fn decode<T: DeserializeOwned>(bytes: &[u8], order: Order) -> Result<T, BadPayload> {
     deserialize_from_cdr_with_rep_id::<T>(bytes, order.identifier()).map(|(value, _)| value).map_err(
         |error| BadPayload {

@@ -1,4 +1,4 @@
-//! The definitions of the messages as text, for whoever has to be told what a payload is: recordings carry them.
+//! The definitions of the messages as text: recordings carry them, so that readers can decode the payloads.
 
 /// Of the standard messages (ROS 2 Jazzy), without their comments, by `package/Name`.
 pub const STANDARD: &[(&str, &str)] = &[

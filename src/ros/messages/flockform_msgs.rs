@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::geometry_msgs::{Point, Vector3};
 use super::std_msgs::Header;
 
-/// What the formation's node knows of one member.
+/// The state of one member, as the formation's node knows it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct MemberState {
     pub name: String,
@@ -86,7 +86,7 @@ impl FormationState {
     pub const INACTIVE: u8 = 3;
 }
 
-/// What a formation's loop is told besides poses, and when it ticks: for recordings.
+/// The inputs of a formation's loop besides poses, and its ticks: for recordings.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct LoopEvent {
     pub header: Header,
@@ -109,7 +109,7 @@ impl LoopEvent {
 
 super::messages!("flockform_msgs": MemberState, FormationState, LoopEvent);
 
-/// What the service `SetFormation` is asked.
+/// Request of the service `SetFormation`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SetFormationRequest {
     /// A manoeuvre of the swarm file; empty for the numbers below.
@@ -126,7 +126,7 @@ pub struct SetFormationRequest {
     pub duration: f64,
 }
 
-/// What the service `SetFormation` answers.
+/// Response of the service `SetFormation`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SetFormationResponse {
     pub success: bool,

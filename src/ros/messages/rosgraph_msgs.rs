@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::builtin_interfaces::Time;
 
-/// What `/clock` carries.
+/// The message of `/clock`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Clock {
     pub clock: Time,

@@ -5,7 +5,7 @@ use crate::ros::messages::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus, K
 use crate::ros::messages::std_msgs::Header;
 use crate::swarm::control::{Control, Mode};
 
-/// What is published at a pace of its own.
+/// Index of a publication with its own rate.
 pub const STATE: usize = 0;
 pub const DIAGNOSTICS: usize = 1;
 
@@ -81,7 +81,7 @@ impl Statistics {
         let (level, message) = match (control.mode(), lost.len(), missed) {
             (Mode::EmergencyStopped, ..) => (DiagnosticStatus::ERROR, "emergency stop".to_owned()),
             _ if !troubles.is_empty() => (DiagnosticStatus::ERROR, troubles.join("; ")),
-            (_, all, _) if all == formation.count() => (DiagnosticStatus::ERROR, "nobody is heard".into()),
+            (_, all, _) if all == formation.count() => (DiagnosticStatus::ERROR, "no robot is heard".into()),
             (_, 1.., _) => {
                 (DiagnosticStatus::WARN, format!("{} of {} robots lost", lost.len(), formation.count()))
             }

@@ -33,7 +33,7 @@ impl Drive {
         })
     }
 
-    /// A member without a target is told to stand.
+    /// Publishes the velocity towards the target, zero for a member without one.
     pub fn publish(
         &self,
         control: &Control,

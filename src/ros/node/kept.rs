@@ -1,4 +1,4 @@
-//! What of a node outlasts its process, so that the next one goes on where it was.
+//! The state of a node that outlasts its process, so that the next process resumes from it.
 
 use serde::{Deserialize, Serialize};
 

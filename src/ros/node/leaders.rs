@@ -44,7 +44,7 @@ pub fn set_formation(control: &mut Control, request: &SetFormationRequest) -> Re
         return Err(format!("duration = {duration} s: give a positive one"));
     }
     if stretch[0] * stretch[1] == shear[0] * shear[1] {
-        return Err("stretch and shear would bring everybody onto one line or point".into());
+        return Err("stretch and shear would collapse the formation onto one line or point".into());
     }
     let about = control.formation().middle();
     let posture = Posture { translate, rotate, stretch, shear };
@@ -59,8 +59,8 @@ pub fn set_formation(control: &mut Control, request: &SetFormationRequest) -> Re
 /// Moments of a manoeuvre that are looked at.
 const LOOKS: usize = 64;
 
-/// Refuses what no robot within the limits can follow, and what leads out of where poses are believed: the filter
-/// would hold everybody back while the leaders' program goes on without them.
+/// Refuses a manoeuvre that no robot within the limits can follow, or that leads out of the range of accepted poses:
+/// the filter would hold the robots back while the leaders' program goes on without them.
 fn check_flyable(control: &Control, manoeuvre: &Manoeuvre) -> Result<(), String> {
     let (limits, formation, watch) = (control.limits(), control.formation(), control.watch().limits());
     let duration = manoeuvre.duration();

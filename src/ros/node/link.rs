@@ -97,7 +97,7 @@ impl ControllerEnd for Link {
             if let Some(recorder) = &mut self.recorder {
                 recorder.take(topic.topic(), &message, [now; 2]);
             }
-            // Who does not take its own keeps nobody else from theirs.
+            // A failure for one member does not stop the others' targets.
             outcome = outcome.and(topic.publish(&message));
         }
         outcome

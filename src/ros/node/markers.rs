@@ -1,4 +1,4 @@
-//! What RViz and Foxglove draw: members by role, links by strain, targets, obstacles.
+//! Markers for RViz and Foxglove: members by role, links by strain, targets, obstacles.
 
 use crate::flock::vectors::distance;
 use crate::ros::messages::builtin_interfaces::Duration;

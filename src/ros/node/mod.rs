@@ -95,7 +95,7 @@ pub struct FormationNode {
     frame_id: String,
     swarm: Swarm,
     names: Names,
-    /// What the recorder of the link was last told.
+    /// Whether the node was active at the last tick; a change is recorded.
     was_active: bool,
     /// Of the watchdog, where there is one.
     pulse: Option<Arc<Pulse>>,
@@ -107,7 +107,7 @@ impl FormationNode {
     /// Takes part in the network: for all members, or for one that hears none but itself and its neighbours.
     ///
     /// # Errors
-    /// What in the swarm file, the ROS arguments or the network stands in the way.
+    /// An obstacle in the swarm file, the ROS arguments or the network.
     pub fn open(swarm: &Swarm, arguments: &RosArguments, member: Option<&str>) -> Result<Self, NodeError> {
         let mut control = Control::new(swarm)?;
         let part = NodeScope::take(swarm, &mut control, member)?;
@@ -241,11 +241,11 @@ impl FormationNode {
         }
         let stamp = self.clock.now().unwrap_or_else(system_time);
         self.answer(stamp);
-        // Without a clock there is no age, and so nobody to be believed.
+        // Without a clock poses have no age, and none can be accepted.
         let Some(now) = self.clock.now() else { return };
         listen(&mut self.control, &mut self.link, now);
         drop(inside);
-        self.tell_tape(now, LoopEvent::TICK, "", &[now]);
+        self.record_event(now, LoopEvent::TICK, "", &[now]);
         self.control.tick(now);
         self.publish(now);
         self.statistics.tick(begun.elapsed().as_secs_f64());
@@ -258,7 +258,7 @@ impl FormationNode {
             let name = if change.name == "rate" { "period" } else { &change.name };
             let value = recorder::parameters(&self.control).into_iter().find(|(one, _)| *one == name);
             if let Some((name, value)) = value {
-                self.tell_tape(now, LoopEvent::PARAMETER, name, &[value]);
+                self.record_event(now, LoopEvent::PARAMETER, name, &[value]);
             }
         }
     }
@@ -274,12 +274,12 @@ impl FormationNode {
         if self.lifecycle.is_active() != self.was_active {
             self.was_active = self.lifecycle.is_active();
             let kind = if self.was_active { LoopEvent::ACTIVE } else { LoopEvent::INACTIVE };
-            self.tell_tape(now, kind, "", &[]);
+            self.record_event(now, kind, "", &[]);
         }
         let locked = (!commands.may_do_all()).then_some(not_allowed.as_str());
         let changes = self.parameters.poll(now, locked);
         self.apply(&changes, now);
-        let mut told: Vec<(u8, String, Vec<f64>)> = Vec::new();
+        let mut events: Vec<(u8, String, Vec<f64>)> = Vec::new();
         let outcome = |success, message: &str| std_srvs::Outcome { success, message: message.into() };
         let control = &mut self.control;
         self.stop.serve(|_| {
@@ -287,13 +287,13 @@ impl FormationNode {
                 return outcome(false, &not_allowed);
             }
             control.emergency_stop();
-            told.push((LoopEvent::EMERGENCY_STOP, String::new(), Vec::new()));
-            outcome(true, "everybody holds its place until ~/resume")
+            events.push((LoopEvent::EMERGENCY_STOP, String::new(), Vec::new()));
+            outcome(true, "every robot holds its place until ~/resume")
         });
         self.resume.serve(|_| match commands.may_do_all() && control.resume() {
             _ if !commands.may_do_all() => outcome(false, &not_allowed),
             true => {
-                told.push((LoopEvent::RESUME, String::new(), Vec::new()));
+                events.push((LoopEvent::RESUME, String::new(), Vec::new()));
                 outcome(true, "the formation goes on")
             }
             false => outcome(false, "there is no emergency stop to lift"),
@@ -304,13 +304,13 @@ impl FormationNode {
         };
         self.set_formation.serve(|request| match set(&request) {
             Ok(message) => {
-                told.push(as_event(&request));
+                events.push(as_event(&request));
                 SetFormationResponse { success: true, message }
             }
             Err(message) => SetFormationResponse { success: false, message },
         });
-        for (kind, text, values) in told {
-            self.tell_tape(now, kind, &text, &values);
+        for (kind, text, values) in events {
+            self.record_event(now, kind, &text, &values);
         }
         // A node that was switched off in an emergency stop stays off after it.
         if !self.lifecycle.is_active() {
@@ -318,7 +318,7 @@ impl FormationNode {
         }
     }
 
-    /// What is wrong with the network around the node.
+    /// Problems of the network around the node.
     fn troubles(&self) -> Vec<String> {
         let twins = self.node.twins();
         let twin = |of: &str| format!("{twins} other node{of} the name {}", self.node.name());
@@ -329,7 +329,7 @@ impl FormationNode {
         }
     }
 
-    fn tell_tape(&mut self, now: f64, kind: u8, text: &str, values: &[f64]) {
+    fn record_event(&mut self, now: f64, kind: u8, text: &str, values: &[f64]) {
         if let Some(recorder) = &mut self.link.recorder {
             recorder.event(now, kind, text, values);
         }
@@ -354,7 +354,7 @@ impl FormationNode {
         }
     }
 
-    /// What people and their tools look at, at their pace.
+    /// Publishes state and markers at `state_rate`, diagnostics at 1 Hz.
     fn report(&mut self, now: f64) {
         if self.statistics.is_due(diagnostics::STATE, now, self.settings.state_rate) {
             let state = state::message(
@@ -398,17 +398,17 @@ pub fn target(control: &Control, member: usize, header: Header) -> Option<PoseSt
     target_of(control, member).map(|target| link::message(&target, header))
 }
 
-/// Refuses a node that nobody could make active.
+/// Refuses a node that no peer could make active.
 fn check_commands(swarm: &Swarm, autostart: bool) -> Result<(), SceneError> {
     let commands = swarm.raw.node.commands;
     if autostart || commands.may_do_all() {
         return Ok(());
     }
-    let what = format!("\"{}\" lets nobody make the node active, and autostart is false", commands.name());
+    let what = format!("\"{}\" lets no peer make the node active, and autostart is false", commands.name());
     Err(swarm.refuse("node.commands", what, "leave the parameter autostart true, or allow \"all\""))
 }
 
-/// What a transition of the lifecycle asks for.
+/// Performs the action of a lifecycle transition.
 fn act(control: &mut Control, goal: Goal) -> Outcome {
     match goal {
         Goal::Activate => control.set_active(true),

@@ -14,7 +14,7 @@ pub enum PoseSource {
     Stamped(Vec<(usize, Subscription<PoseStamped>)>),
     WithCovariance(Vec<(usize, Subscription<PoseWithCovarianceStamped>)>),
     Odometry(Vec<(usize, Subscription<Odometry>)>),
-    /// All at once, in the order of the members; whom to listen to.
+    /// One message for all, in the order of the members; the members whose poses are read.
     Array(Box<Subscription<PoseArray>>, Vec<usize>),
 }
 
@@ -35,9 +35,9 @@ impl PoseSource {
         })
     }
 
-    /// Tells `hear` every pose that arrived since the last call. Under simulated time `now` \[s\] is given: the
-    /// computer's, by which DDS says when a message came, then means nothing.
-    /// The messages themselves go to `recorder`, with the loop's time.
+    /// Passes every pose that arrived since the last call to `hear`, and its message to `recorder` with the loop's
+    /// time. Under simulated time `now` \[s\] is given; it replaces the reception time, which DDS takes from the
+    /// computer's clock.
     pub fn take(
         &self,
         frame_id: &str,

@@ -1,4 +1,4 @@
-//! A copy of everything that a loop hears, is told and says, for whoever records it.
+//! Copies of the messages, commands and targets of a loop, for recordings.
 
 use crate::ros::arguments::{NameError, Names};
 use crate::ros::edge::Message;
@@ -11,7 +11,7 @@ use crate::swarm::control::Control;
 /// Topic of [`LoopEvent`]s, below the node's name.
 pub const EVENTS: &str = "~/events";
 
-/// What a plain CDR payload in little endian begins with.
+/// Encapsulation header of plain CDR in little endian.
 const ENCAPSULATION: [u8; 4] = [0, 1, 0, 0];
 
 /// A message on its way.

@@ -6,7 +6,7 @@ use crate::ros::edge::parameters::{Change, Declaration, Store, Value};
 use crate::swarm::control::Control;
 use crate::swarm::pace::Pace;
 
-/// What is read of the parameters where it is used.
+/// Values of the parameters that are read where they are used.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
     /// \[Hz\]
@@ -68,7 +68,7 @@ pub fn declare(
     Ok((settings, store))
 }
 
-/// A limit that can be tightened and not loosened: the swarm file's word is the last, whoever asks.
+/// A limit that can be tightened and not loosened: the swarm file's value is the upper bound for every caller.
 fn at_most(name: &str, limit: f64) -> Declaration {
     if limit == f64::INFINITY {
         let words = "0 for none, as the swarm file has it";

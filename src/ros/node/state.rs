@@ -7,7 +7,7 @@ use crate::swarm::control::state::FormationState as State;
 use crate::swarm::control::{Control, Mode};
 use crate::swarm::watch::Health;
 
-/// What the last tick left, which took `elapsed` \[s\].
+/// The state after the last tick, which took `elapsed` \[s\].
 pub fn message(control: &Control, name: &str, header: Header, elapsed: f64) -> FormationState {
     let state = State::of(control);
     let names = &control.formation().names;

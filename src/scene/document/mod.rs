@@ -51,7 +51,7 @@ pub(crate) enum Origin {
     Override(usize),
 }
 
-/// What a node holds.
+/// The content of a node.
 #[derive(Debug, Clone)]
 pub(crate) enum Content {
     Boolean(bool),

@@ -1,4 +1,4 @@
-//! What is wrong with a scene, where it stands, and what mends it.
+//! Problems of a scene: the fault, its place, and the remedy.
 
 use std::fmt;
 
@@ -46,9 +46,9 @@ pub struct Problem {
     pub key: String,
     /// The value that was found there, abbreviated; `None` where there is none to show.
     pub found: Option<String>,
-    /// What is wrong, including the allowed range or choices.
+    /// The fault, including the allowed range or choices.
     pub message: String,
-    /// What would mend it.
+    /// The remedy.
     pub help: Option<String>,
 }
 

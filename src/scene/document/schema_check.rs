@@ -325,7 +325,7 @@ fn conversion_help(node: &Node, rule: &Rule<'_>) -> Option<String> {
     }
 }
 
-/// What is wrong with a count that must lie between two bounds.
+/// The error of a count outside its two bounds, if it is outside.
 fn wrong_count(count: usize, bounds: [Option<usize>; 2], noun: &str) -> Option<String> {
     let plural = |count: usize| format!("{count} {noun}{}", if count == 1 { "" } else { "s" });
     match bounds {

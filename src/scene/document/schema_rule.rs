@@ -1,4 +1,4 @@
-//! What a JSON Schema, as schemars derives it, says about one value.
+//! The rule for one value in a JSON Schema as schemars derives it.
 
 use std::fmt;
 
@@ -33,7 +33,7 @@ pub(crate) struct Variants<'s> {
     pub(crate) all: Vec<(&'s str, Rule<'s>)>,
 }
 
-/// What becomes of keys that are not among the properties.
+/// How keys that are not among the properties are treated.
 pub(crate) enum OtherKeys<'s> {
     Refused,
     Unchecked,
@@ -228,7 +228,7 @@ impl<'s> Rule<'s> {
         }
     }
 
-    /// What is accepted, as a noun phrase.
+    /// The accepted values, as a noun phrase.
     pub(crate) fn describe(&self) -> String {
         self.describe_within(UNION_DEPTH)
     }

@@ -1,11 +1,11 @@
-//! What the body is made of, what pushes it, and how its equilibrium is found, as written.
+//! Material, loads and equilibrium solver, as written.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::RawRegion;
 
-/// What the body is made of. The rule `material` takes its weights from it, loads need it, and
+/// The material of the body. The rule `material` takes its weights from it, loads need it, and
 /// `flockform compare` gives it to the finite elements; the paper's rules do without.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
@@ -39,7 +39,7 @@ pub enum RawMaterial {
     },
 }
 
-/// What is assumed across the thickness.
+/// The assumption across the thickness.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum RawPlane {
@@ -135,7 +135,7 @@ pub enum RawAccuracy {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum RawSolver {
-    /// Whatever suits the size, the shape and the rule; `flockform plan` says which and why.
+    /// Chosen by size, shape and rule; `flockform plan` says which and why.
     #[default]
     Auto,
     /// The paper's sweep, damped by its estimated spectrum.

@@ -22,7 +22,7 @@ pub use material::*;
 pub use roles::*;
 pub use rule::*;
 
-/// A continuum scene: a body, who leads it, by which rule it follows, when it stops and what to keep.
+/// A continuum scene: a body, its leaders, the rule of its followers, when the run stops and what it records.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawScene {
@@ -38,15 +38,15 @@ pub struct RawScene {
     /// that of length it gives the unit of force: "Pa" and "m" give N, "MPa" and "mm" too.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stress_unit: Option<String>,
-    /// What the body is cut from; a body of points has none.
+    /// The lattice from which the body is cut; a body of points has none.
     #[serde(default)]
     pub lattice: Option<RawLattice>,
     pub body: RawBody,
     /// The shell around the body that gives edge particles their full neighbourhood.
     #[serde(default)]
     pub frame: RawFrame,
-    /// The first neighbours unless given; for the rule `material` all those with whom a particle shares
-    /// a cell of the lattice.
+    /// The first neighbours unless given; for the rule `material` all particles that share a cell of the
+    /// lattice.
     #[serde(default)]
     pub neighbours: Option<RawNeighbours>,
     #[serde(default)]
@@ -57,7 +57,7 @@ pub struct RawScene {
     pub loads: Vec<RawLoad>,
     #[serde(default)]
     pub update: RawUpdate,
-    /// Who is what, from when; later entries win. Particles that no entry names are followers.
+    /// Roles of the particles, and from when; later entries win. Particles that no entry names are followers.
     #[serde(default)]
     pub roles: Vec<RawRoles>,
     /// Bonds break where this is given.
@@ -107,7 +107,7 @@ pub struct RawFracture {
     pub ghosts: RawGhosts,
 }
 
-/// What a particle sees in the place of a lost neighbour.
+/// The substitute for a lost neighbour.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum RawGhosts {
@@ -156,15 +156,15 @@ impl Default for RawStop {
     }
 }
 
-/// What is kept of the run.
+/// The records of the run.
 #[derive(Clone, Debug, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawRecord {
     /// Ids of the particles whose coordinates and pseudo-energies are kept at every step.
     #[serde(default)]
     pub probes: Vec<usize>,
-    /// Places of the undeformed body [x, y] whose displacement and stress at the end `run` tells, and `compare` beside the
-    /// truth's; needs a material [length].
+    /// Places of the undeformed body [x, y] at which `run` reports displacement and stress at the end, and `compare`
+    /// sets them beside the reference's; needs a material [length].
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub places: Vec<[f64; 2]>,
     /// Steps at which the configuration is drawn (the last step always is) [step].

@@ -1,4 +1,4 @@
-//! Roles as written: who leads, from when, how.
+//! Roles as written: the leaders, their times and motions.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -27,7 +27,7 @@ pub struct RawRoles {
     pub motion: Option<RawMotion>,
 }
 
-/// What a particle does.
+/// The behaviour of a particle.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum RawRole {
@@ -120,7 +120,7 @@ pub struct RawWhen {
     pub below: Option<f64>,
 }
 
-/// What a condition looks at.
+/// The quantity that a condition tests.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum RawQuantity {

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Whose positions a particle sees.
+/// The neighbours whose positions enter the rule of a particle.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum RawNeighbours {
@@ -22,8 +22,8 @@ pub enum RawNeighbours {
         #[schemars(range(min = 1, max = 8))]
         radius: i32,
     },
-    /// Everybody with whom a particle shares a cell of the lattice, as a material needs: 8 on square and
-    /// rectangular lattices, 6 on the triangular ones, 12 on the honeycomb.
+    /// All particles that share a cell of the lattice, as a material needs: 8 on square and rectangular
+    /// lattices, 6 on the triangular ones, 12 on the honeycomb.
     Cells {},
     /// The neighbours of the neighbours too: the paper's second gradient.
     Second {},
@@ -36,13 +36,13 @@ pub enum RawNeighbours {
         #[schemars(length(min = 1))]
         offsets: Vec<[i32; 2]>,
     },
-    /// Whoever is within a radius in the reference configuration.
+    /// All particles within a radius in the reference configuration.
     Within {
         /// Radius [length].
         #[schemars(extend("exclusiveMinimum" = 0))]
         radius: f64,
     },
-    /// Whoever is within a radius now, found anew at every step: the paper's liquid and gas.
+    /// All particles within a radius now, found anew at every step: the paper's liquid and gas.
     Dynamic {
         /// Radius [length].
         #[schemars(extend("exclusiveMinimum" = 0))]
@@ -60,7 +60,7 @@ pub struct RawRule {
     /// Fixed weights of the neighbours, on top of the mean's own.
     #[serde(default)]
     pub weights: Option<RawWeights>,
-    /// What keeps a particle in place whose neighbours are not balanced around it.
+    /// The correction that keeps a particle with unbalanced neighbours in place.
     #[serde(default)]
     pub rest: RawRest,
     /// The Poisson term (Eq. 2).
@@ -123,7 +123,7 @@ pub enum RawRotation {
     Corotated,
 }
 
-/// What the coordinates of geometric and power means are measured from.
+/// The origin of the coordinates in geometric and power means.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum RawOrigin {
@@ -211,7 +211,7 @@ pub struct RawPoisson {
 pub struct RawFeedback {
     /// Feedback factor `fd` [1].
     pub factor: f64,
-    /// What `MT` is.
+    /// The position `MT` in Eq. 4.
     #[serde(default)]
     pub reference: RawFeedbackReference,
 }
@@ -240,13 +240,13 @@ pub struct RawUpdate {
     pub damping: Option<f64>,
 }
 
-/// Who sees whose new position within one step.
+/// The order of updates within one step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum RawOrder {
-    /// Everybody sees the old ones (the paper).
+    /// All particles use the old positions (the paper).
     #[default]
     Synchronous,
-    /// Each sees the new ones of the particles numbered before it.
+    /// Each uses the new positions of the particles numbered before it.
     Sequential,
 }

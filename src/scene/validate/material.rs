@@ -1,4 +1,4 @@
-//! What the body is made of and what pushes it; the checks that a rule with a material needs.
+//! Material and loads; the checks that a rule with a material needs.
 
 use super::{Refuse, roles};
 use crate::flock::lattice::Lattice;

@@ -92,7 +92,7 @@ pub(super) fn validate(
 ) -> Result<Scene, SceneError> {
     let refuse: Refuse<'_> =
         &|key, message, help| SceneError::from(document.problem(key, message, Some(help.to_owned())));
-    // Whoever asks for an accuracy and leaves the rule open gets the one that can have it.
+    // A scene that asks for an accuracy and names no rule gets the material rule, which can reach it.
     let is_asked = raw.equilibrium.as_ref().is_some_and(|asked| asked.accuracy.is_some());
     if is_asked && raw.rule.mean.is_none() && raw.material.is_some() {
         raw.rule.mean = Some(RawMean::Material { rotation: RawRotation::Small });

@@ -32,7 +32,7 @@ fn radius(raw: &RawScene, refuse: Refuse<'_>) -> Result<f64, SceneError> {
         Some(RawNeighbours::Within { radius } | RawNeighbours::Dynamic { radius }) => Ok(*radius),
         given => {
             let message = match given {
-                None => "a body of points needs to be told how far its particles see",
+                None => "a body of points must state how far its particles see",
                 Some(_) => "points are no sites of a lattice, whose neighbourhoods these are",
             };
             let help = "give `neighbours = { kind = \"within\", radius = 1.5 }`, in the unit of the points";

@@ -1,4 +1,4 @@
-//! Who leads, from when, how.
+//! Roles: the leaders, their times and motions.
 
 use std::path::Path;
 

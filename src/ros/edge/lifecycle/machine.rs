@@ -111,7 +111,7 @@ impl Transition {
     }
 }
 
-/// What a node does in a transition state.
+/// The action of a node in a transition state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Goal {
     Configure,
@@ -167,7 +167,7 @@ impl Machine {
         self.goal()
     }
 
-    /// What is to be done in the present state.
+    /// The action that the present state requires.
     pub fn goal(&self) -> Option<Goal> {
         match self.state {
             State::Configuring => Some(Goal::Configure),

@@ -97,11 +97,11 @@ impl Lifecycle {
     /// Follows an edge to the next primary state; says whether what it asks for was done.
     fn run(&mut self, edge: Transition, now: f64, act: &mut dyn FnMut(Goal) -> Outcome) -> bool {
         let Some(goal) = self.machine.begin(edge) else { return false };
-        self.tell(edge, now);
+        self.publish_event(edge, now);
         let asked = act(goal);
         let mut outcome = asked;
         while let Some(end) = self.machine.end(outcome) {
-            self.tell(end, now);
+            self.publish_event(end, now);
             // Only an error leads to one more thing to do: putting it right.
             let Some(recover) = self.machine.goal() else { break };
             outcome = act(recover);
@@ -122,7 +122,7 @@ impl Lifecycle {
         });
     }
 
-    fn tell(&self, edge: Transition, now: f64) {
+    fn publish_event(&self, edge: Transition, now: f64) {
         let msgs::TransitionDescription { transition, start_state, goal_state } = description(edge);
         let timestamp = (now * 1e9) as u64;
         let event = msgs::TransitionEvent { timestamp, transition, start_state, goal_state };

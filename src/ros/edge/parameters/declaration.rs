@@ -1,4 +1,4 @@
-//! What a parameter may be: its type, its range, its conditions. Pure.
+//! Declarations of parameters: type, range, conditions. Pure.
 
 use std::ops::RangeInclusive;
 
@@ -96,7 +96,7 @@ impl Declaration {
         self
     }
 
-    /// As others are told.
+    /// The descriptor that peers receive.
     pub(super) fn descriptor(&self) -> ParameterDescriptor {
         ParameterDescriptor {
             name: self.name.clone(),

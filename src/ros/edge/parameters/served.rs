@@ -62,8 +62,8 @@ impl Parameters {
         self.store.set(name, Some(value.into()))
     }
 
-    /// Answers what was asked since the last tick and returns what changed. `now` \[s\] stamps the event. With a
-    /// reason in `locked` nobody outside may set any.
+    /// Answers the requests since the last tick and returns the changes. `now` \[s\] stamps the event. With a reason in
+    /// `locked`, peers may set no parameter.
     pub fn poll(&mut self, now: f64, locked: Option<&str>) -> Vec<Change> {
         self.answer_questions();
         let may = |name: &str| match locked {

@@ -87,12 +87,12 @@ impl Store {
         }
     }
 
-    /// What was set since last asked, in the order it was set.
+    /// Changes since the last call, in order.
     pub fn take_changes(&mut self) -> Vec<Change> {
         std::mem::take(&mut self.changes)
     }
 
-    /// What is known of a parameter; type 0 where it is not declared.
+    /// The descriptor of a parameter; of type 0 if it is not declared.
     pub fn descriptor(&self, name: &str) -> ParameterDescriptor {
         self.declared.get(name).map_or_else(
             || ParameterDescriptor { name: name.into(), ..Default::default() },

@@ -310,7 +310,7 @@ fn a_misspelt_tag_suggests_the_nearest() {
 }
 
 #[test]
-fn a_key_of_another_variant_is_told_apart_from_an_unknown_one() {
+fn a_key_of_another_variant_is_distinguished_from_an_unknown_one() {
     let error = report("roles = [{ motion = { kind = 'square', a = 1, b = 2 } }]");
     assert!(error.contains("motion.b = 2: belongs to kind \"rectangular\", not to \"square\""), "{error}");
     let error = report("roles = [{ motion = { kind = 'disc', radius = 1, radios = 2 } }]");
