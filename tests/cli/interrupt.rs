@@ -127,17 +127,25 @@ fn a_large_run_of_slow_steps_keeps_its_checkpoint_and_goes_on_from_it() {
     let folder = temporary();
     std::fs::write(folder.path().join("large.toml"), LARGE).expect("writable");
     let quietly = ["-q", "--no-report", "--figures", "none"];
-    let mut child = start(&[&["run", "large.toml", "--out", "o"][..], &quietly].concat(), folder.path());
-    let begun = Instant::now();
-    while !folder.path().join(".o.partial").exists() {
-        assert!(begun.elapsed() < Duration::from_secs(60) && child.try_wait().expect("a child").is_none());
-        std::thread::sleep(Duration::from_millis(5));
-    }
-    std::thread::sleep(Duration::from_millis(700));
-    let (code, said) = ended(child, "a large run");
-    assert_eq!(code, Some(1), "{said}");
-    assert!(said.contains("--resume"), "{said}");
-    assert_eq!(names(folder.path()), ["large.toml", "o.unfinished"]);
+    // A step that takes longer than a second, on a machine that has other work, is ended with nothing kept: another try.
+    let kept = (0..8).any(|_| {
+        let mut child = start(&[&["run", "large.toml", "--out", "o"][..], &quietly].concat(), folder.path());
+        let begun = Instant::now();
+        while !folder.path().join(".o.partial").exists() {
+            assert!(
+                begun.elapsed() < Duration::from_secs(60) && child.try_wait().expect("a child").is_none()
+            );
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        std::thread::sleep(Duration::from_millis(700));
+        let (code, said) = ended(child, "a large run");
+        assert_eq!(code, Some(1), "{said}");
+        let is_kept = said.contains("--resume");
+        let left: &[&str] = if is_kept { &["large.toml", "o.unfinished"] } else { &["large.toml"] };
+        assert_eq!(names(folder.path()), left, "{said}");
+        is_kept
+    });
+    assert!(kept, "a large run that is interrupted never keeps its checkpoint");
     let resumed = start(&[&["run", "--resume", "o"][..], &quietly].concat(), folder.path());
     std::thread::sleep(Duration::from_secs(2));
     let (code, said) = ended(resumed, "the same run, resumed");

@@ -40,6 +40,7 @@ fn a_comparison_leaves_its_report_its_tables_and_two_figures() {
             "cells.csv",
             "compare.csv",
             "compare.json",
+            "flockform-files.txt",
             "overlay.png",
             "overlay.svg",
             "von_mises.png",
