@@ -146,7 +146,7 @@ fn ids_mean_the_particles_that_the_file_names_so() {
 #[test]
 fn who_finds_neighbours_anew_does_not_hang_on_the_order_either() {
     let text = TORN
-        .replace("\"within\"", "\"present\"")
+        .replace("\"within\"", "\"dynamic\"")
         .replace("fracture = { stretch = 1.25 }", "rule = { mean = { kind = \"spaced\", spacing = 1.0 } }");
     let first = ended(plan(&text, &table(&patch())));
     assert!(first.engine.lasting_neighbours().is_none());

@@ -116,7 +116,7 @@ pub fn resume(
 }
 
 /// Displacement beyond which sums of squares, which energies are, overflow \[length\].
-const FARTHEST: f64 = 1e150;
+const FARTHEST: f64 = 1e153;
 
 /// The conditions that end a run.
 struct Bounds {

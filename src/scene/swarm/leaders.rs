@@ -121,7 +121,7 @@ fn track(text: &str, scale: f64) -> Result<Program, String> {
     }
     let motion = |frames| Motion::Keyframes { frames, interpolation: Interpolation::Linear };
     if named {
-        return Ok(Program::ParticleState(
+        return Ok(Program::Individual(
             tracks.into_iter().map(|(name, frames)| (name, motion(frames))).collect(),
         ));
     }
@@ -139,7 +139,7 @@ mod tests {
     fn a_track_moves_all_alike_or_each_by_name() {
         let at = |program: &Program, t: f64| match program {
             Program::Motion(motion) => motion.displacement(t, 0, [0.0; 2]),
-            Program::ParticleState(tracks) => tracks[1].1.displacement(t, 0, [0.0; 2]),
+            Program::Individual(tracks) => tracks[1].1.displacement(t, 0, [0.0; 2]),
             _ => unreachable!("a track is a motion"),
         };
         let alike = track("t,dx,dy\n0,0,0\n2,1,-1\n", 2.0).expect("reads");

@@ -84,7 +84,7 @@ pub enum Program {
     /// All alike.
     Motion(Motion),
     /// Each by its own.
-    ParticleState(Vec<(String, Motion)>),
+    Individual(Vec<(String, Motion)>),
     /// By number among the swarm's manoeuvres.
     Manoeuvre(usize),
 }

@@ -249,7 +249,7 @@ fn lead(
     Ok(match program {
         Program::External => Lead::External(places.get(member)),
         Program::Motion(motion) => Lead::Motion { motion: motion.clone(), since: 0.0 },
-        Program::ParticleState(tracks) => {
+        Program::Individual(tracks) => {
             let track = tracks.iter().find(|(known, _)| known == name).ok_or_else(|| {
                 let key = format!("leaders[{entry}].program.path");
                 swarm.refuse(
