@@ -37,7 +37,7 @@ impl Pulled {
         matter[..SIDES[1]].iter().for_each(|&i| roles[i] = Role::Clamped);
         led.iter().for_each(|&i| roles[i] = Role::Leader);
         let (rule, weights) = (Rule::BARYCENTRE, Weights::Equal);
-        let mut flock = Flock { rule, reference, neighbours, weights, forces: None, rest: None, bonds: None };
+        let mut flock = Flock::new(rule, reference, neighbours, weights);
         flock.keep_rest();
         Self { flock, frame, roles, led }
     }

@@ -147,6 +147,11 @@ impl Weights {
 }
 
 impl Flock {
+    /// Without loads, rest offsets and bonds.
+    pub fn new(rule: Rule, reference: Arc<Vectors>, neighbours: Neighbours, weights: Weights) -> Self {
+        Self { rule, reference, neighbours, weights, forces: None, rest: None, bonds: None }
+    }
+
     /// Target position of `particle` when all stand at `present` \[length, world frame\].
     pub fn target(&self, particle: usize, present: &Vectors) -> [f64; 2] {
         self.target_by(&self.rule, particle, present)

@@ -123,7 +123,7 @@ impl Recording {
         let (part, path) = (self.part, self.path);
         let io = |action| RecordError::io(action, &path);
         synced.map_err(io("write"))?;
-        // Looked at again: somebody may have written there meanwhile.
+        // Checked again: another program may have written there meanwhile.
         if require_free(&path, self.force).is_err() {
             return Err(RecordError::Kept { part, path });
         }

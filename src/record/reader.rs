@@ -77,7 +77,7 @@ impl Reader {
     }
 
     /// Shows every record, those in chunks too, until `see` has enough or the file is damaged. A length in the file
-    /// makes nobody allocate more than the file has bytes, or [`LARGEST`].
+    /// never leads to an allocation larger than the file, or [`LARGEST`].
     fn scan(&self, see: &mut dyn FnMut(Record<'_>) -> ControlFlow<()>) -> Result<(), McapError> {
         let options = LinearReaderOptions::default()
             // The file of a killed program has no end, and is worth reading nevertheless.

@@ -1,4 +1,4 @@
-//! The folders in which iceoryx2 keeps its files: open to every user of the computer, and gone when nobody uses them.
+//! The folders in which iceoryx2 keeps its files: open to every user of the computer, and removed after the last use.
 //!
 //! iceoryx2 makes them its first user's alone, and leaves them. Here they are made as `/tmp` is, where each user has
 //! files of its own, and removed by the last that leaves.
@@ -42,7 +42,7 @@ impl Drop for Folders {
         let is_of_domain = |name: &String| name.starts_with(&self.prefix);
         let [root, services, nodes] = &self.folders;
         if !names(nodes).iter().any(is_of_domain) {
-            // Numbers of nodes begin anew when nobody has one.
+            // Numbers of nodes begin anew when there is no node.
             let counters = names(Path::new(SHARED_MEMORY)).into_iter().filter(|name| self.is_counter(name));
             counters.for_each(|name| drop(fs::remove_file(Path::new(SHARED_MEMORY).join(name))));
         }

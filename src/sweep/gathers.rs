@@ -20,7 +20,7 @@ const AHEAD: [usize; 2] = [64, 256];
 pub struct Gathers {
     groups: Vec<Group>,
     particles: Vec<u32>,
-    /// Where the coefficients of each of `particles` begin.
+    /// Where the coefficients of each of `particles` begin; none where all count the same.
     coefficients: Vec<u32>,
     /// The neighbours of each of `particles`.
     index: Vec<u32>,
@@ -47,15 +47,15 @@ impl Gathers {
         self.particles.len()
     }
 
-    /// Adds the particles of a band, ascending, each with its neighbours and where its coefficients begin; one without
-    /// neighbours stays.
-    pub fn push_band<'a>(&mut self, particles: &[u32], row: impl Fn(u32) -> (&'a [u32], u32)) {
-        let size = |j: u32| row(j).0.len();
-        let mut sorted = particles.to_vec();
-        sorted.sort_by_key(|&j| size(j));
+    /// Adds the particles of a band, ascending, each with its neighbours and, where they do not all count the same, where
+    /// its coefficients begin; one without neighbours stays.
+    pub fn push_band<'a>(&mut self, particles: &[u32], starts: &[u32], list: impl Fn(u32) -> &'a [u32]) {
+        let size = |k: usize| list(particles[k]).len();
+        let mut sorted: Vec<usize> = (0..particles.len()).collect();
+        sorted.sort_by_key(|&k| size(k));
         for alike in sorted.chunk_by(|&a, &b| size(a) == size(b)) {
             let index = self.index.len();
-            alike.iter().for_each(|&j| self.index.extend_from_slice(row(j).0));
+            alike.iter().for_each(|&k| self.index.extend_from_slice(list(particles[k])));
             let read = || self.index[index..].iter().copied();
             self.groups.push(Group {
                 neighbours: size(alike[0]) as u32,
@@ -63,8 +63,8 @@ impl Gathers {
                 index: index as u32,
                 seen: [read().min().unwrap_or(0), read().max().unwrap_or(0)],
             });
-            self.particles.extend_from_slice(alike);
-            self.coefficients.extend(alike.iter().map(|&j| row(j).1));
+            self.particles.extend(alike.iter().map(|&k| particles[k]));
+            self.coefficients.extend(alike.iter().filter_map(|&k| starts.get(k)));
         }
     }
 
@@ -82,7 +82,7 @@ impl Gathers {
             let particles = group.particles as usize..end;
             let size = group.neighbours as usize;
             let index = &self.index[group.index as usize..][..size * particles.len()];
-            let rows = &self.coefficients[particles.clone()];
+            let rows = self.coefficients.get(particles.clone()).unwrap_or_default();
             let all = Alike { particles: &self.particles[particles], rows, index, seen: group.seen, terms };
             match (coefficients, size) {
                 (Coefficients::Equal, 1) => all.sweep::<1, P>(components),
@@ -106,7 +106,7 @@ impl Gathers {
 /// The particles of a group and their lists, all of one length.
 struct Alike<'a, T> {
     particles: &'a [u32],
-    /// Where the coefficients of each begin.
+    /// Where the coefficients of each begin; none where all count the same.
     rows: &'a [u32],
     index: &'a [u32],
     seen: [u32; 2],
@@ -283,7 +283,7 @@ mod tests {
 
     fn sweep(index: &[Vec<u32>], particles: &[u32], present: &[f64], seen_from: usize) -> Vec<f64> {
         let mut lists = Gathers::default();
-        lists.push_band(particles, |j| (&index[j as usize], 0));
+        lists.push_band(particles, &[], |j| &index[j as usize]);
         let (begin, mut next) = (particles[0] as usize, vec![-1.0; 8]);
         let rest = (0..8).map(|j| 100.0 * f64::from(j)).collect::<Vec<_>>();
         let component =

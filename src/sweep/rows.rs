@@ -216,15 +216,15 @@ impl Rows {
     }
 
     fn close_band(&mut self, neighbours: &Neighbours, listed: &[u32], source: Source<'_>) {
-        let starts: Vec<u32> =
-            listed.iter().map(|&j| self.coefficients_of(neighbours, j as usize, source)).collect();
-        let row = |j: u32| {
-            // Without neighbours, or with weights that add up to nothing, a particle stays.
-            let list = if weighs(neighbours, j as usize, source) { neighbours.of(j as usize) } else { &[] };
-            let at = listed.binary_search(&j).map_or(0, |at| starts[at]);
-            (list, at)
+        let starts: Vec<u32> = match source {
+            Source::Equal => Vec::new(),
+            _ => listed.iter().map(|&j| self.coefficients_of(neighbours, j as usize, source)).collect(),
         };
-        self.gathers.push_band(listed, row);
+        let list = |j: u32| {
+            // Without neighbours, or with weights that add up to nothing, a particle stays.
+            if weighs(neighbours, j as usize, source) { neighbours.of(j as usize) } else { &[] }
+        };
+        self.gathers.push_band(listed, &starts, list);
     }
 
     /// Where what the neighbours of a particle count stands among the coefficients: found or added.

@@ -49,7 +49,7 @@ pub struct Led<'a> {
 }
 
 impl Led<'_> {
-    pub const NOBODY: Led<'static> = Led { particles: &[], place: &|_, _| [f64::NAN; 2] };
+    pub const NONE: Led<'static> = Led { particles: &[], place: &|_, _| [f64::NAN; 2] };
 }
 
 /// A frame that looks before the sweep, and where it stands around the body at rest \[length\].

@@ -10,8 +10,7 @@ fn body(rule: Rule) -> Flock {
     let cut = Cut::Count { columns: 263, rows: 301 };
     let (body, neighbours) = Body::build(lattice, &cut, &Neighbourhood::Second, None).expect("fits");
     let reference = body.reference;
-    let mut flock =
-        Flock { rule, reference, neighbours, weights: Weights::Equal, forces: None, rest: None, bonds: None };
+    let mut flock = Flock::new(rule, reference, neighbours, Weights::Equal);
     flock.keep_rest();
     flock
 }
@@ -203,7 +202,7 @@ fn assert_together_as_single(sweep: &Sweep, flock: &Flock) {
         let (mut present, mut next, mut activity) = (start.clone(), start.clone(), Activity::default());
         for count in [4, 3] {
             let places = (&mut present, &mut next);
-            pool.install(|| sweep.steps(flock, None, places, (count, Led::NOBODY, None), &mut activity));
+            pool.install(|| sweep.steps(flock, None, places, (count, Led::NONE, None), &mut activity));
         }
         assert!(bits(&present) == bits(&single), "{threads} threads");
     }

@@ -32,7 +32,7 @@ fn body(side: u32, rule: Rule, neighbourhood: &Neighbourhood) -> (Flock, Vec<Rol
         body.sites.iter().map(|site| if edge(site) { Role::Clamped } else { Role::Follower }).collect();
     let present = body.reference.iter().map(|[x, y]| [x + 0.01 * y.sin(), y + 0.01 * x.sin()]).collect();
     let (reference, weights) = (body.reference, Weights::Equal);
-    let flock = Flock { rule, reference, neighbours, weights, forces: None, rest: None, bonds: None };
+    let flock = Flock::new(rule, reference, neighbours, weights);
     (flock, roles, present)
 }
 
@@ -70,7 +70,7 @@ fn sixteen_steps_together(bencher: Bencher, side: u32) {
     let (mut next, mut activity) = (present.clone(), Activity::default());
     bencher.counter(ItemsCount::new(16 * sweep.followers())).bench_local(|| {
         let places = (&mut present, &mut next);
-        sweep.steps(&flock, None, places, (16, Led::NOBODY, None), &mut activity)
+        sweep.steps(&flock, None, places, (16, Led::NONE, None), &mut activity)
     });
 }
 

@@ -21,11 +21,6 @@ fn start(arguments: &[&str], folder: &Path) -> Child {
     command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("the program starts")
 }
 
-fn interrupt(child: &Child) {
-    let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill is there");
-    assert!(sent.success());
-}
-
 /// Waits until the program is busy: it has made its hidden folder, and some time has gone by.
 fn wait_until_busy(child: &mut Child, folder: &Path, busy: Duration) {
     let begun = Instant::now();
@@ -48,7 +43,7 @@ fn names(folder: &Path) -> Vec<String> {
 fn ended(mut child: Child, what: &str) -> (Option<i32>, String) {
     assert!(child.try_wait().expect("a child").is_none(), "{what}: it ended by itself");
     let (since, patience) = (Instant::now(), patience());
-    interrupt(&child);
+    signal("INT", child.id());
     while child.try_wait().expect("a child").is_none() {
         if since.elapsed() > patience {
             child.kill().expect("kills");
@@ -171,8 +166,8 @@ fn a_second_interrupt_ends_at_once() {
     let endless = ["--set", "stop.steps=100000000", "--set", "record={}"];
     let mut child = start(&[&["run", "tension", "--out", "o"][..], &endless].concat(), folder.path());
     wait_until_busy(&mut child, folder.path(), Duration::from_millis(300));
-    interrupt(&child);
-    interrupt(&child);
+    signal("INT", child.id());
+    signal("INT", child.id());
     let (code, said) = ended_after(child);
     assert_eq!(code, Some(1), "{said}");
     let left = names(folder.path());

@@ -12,5 +12,9 @@ mod points;
 mod program;
 mod report;
 mod run;
+#[path = "../common/signals.rs"]
+mod signals;
 mod stability;
 mod swarm;
+#[path = "../common/waits.rs"]
+mod waits;

@@ -3,6 +3,9 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
+pub use crate::signals::signal;
+pub use crate::waits::within;
+
 pub fn flockform(arguments: &[&str], folder: &Path) -> Output {
     Command::new(env!("CARGO_BIN_EXE_flockform"))
         .args(arguments)

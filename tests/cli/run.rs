@@ -169,11 +169,6 @@ fn long_run(folder: &Path) -> std::process::Child {
     child
 }
 
-fn signal(child: &std::process::Child, name: &str) {
-    let sent = Command::new("kill").args([name, &child.id().to_string()]).status().expect("kill is there");
-    assert!(sent.success());
-}
-
 #[cfg(unix)]
 #[test]
 fn a_solved_scene_reports_its_solver_and_how_it_came_to_rest() {
@@ -222,10 +217,10 @@ fn an_accuracy_is_met_and_told() {
 
 #[test]
 fn an_interrupt_stops_at_the_next_step_and_writes_what_there_is() {
-    for name in ["-INT", "-TERM"] {
+    for name in ["INT", "TERM"] {
         let folder = temporary();
         let child = long_run(folder.path());
-        signal(&child, name);
+        signal(name, child.id());
         let output = child.wait_with_output().expect("ends");
         assert_eq!(output.status.code(), Some(1), "{name}");
         assert!(text(&output.stdout).contains("interrupted"), "{}", text(&output.stdout));

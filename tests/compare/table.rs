@@ -16,8 +16,8 @@ fn lattice(kind: &str, h: f64, orientation: f64) -> String {
     format!("lattice={{ kind = \"{kind}\", {sizes}, orientation = {orientation:?} }}")
 }
 
-/// What is told of the first place of a bundled scene with changes, and the error of the displacements.
-fn told(name: &str, overrides: &[&str]) -> (PlaceComparison, f64) {
+/// The comparison at the first place of a bundled scene with changes, and the error of the displacements.
+fn at_first_place(name: &str, overrides: &[&str]) -> (PlaceComparison, f64) {
     let found = compared(name, overrides);
     let (at, error) = (found.places[0], found.comparison.displacement_rel_l2);
     println!("{name} {overrides:?}: {:.3} %\n{at}", 100.0 * error);
@@ -34,7 +34,7 @@ fn a_uniform_traction_is_the_stress_in_the_middle_of_a_bar_on_any_lattice() {
         ("square", 30.0),
         ("honeycomb", 90.0),
     ] {
-        let (at, error) = told("bar", &[&lattice(kind, 1.7, orientation)]);
+        let (at, error) = at_first_place("bar", &[&lattice(kind, 1.7, orientation)]);
         for found in [at.rule, at.truth] {
             let off = [found.stress[0] / 10.0 - 1.0, found.stress[1] / 10.0, found.stress[2] / 10.0];
             assert!(off.iter().all(|part| part.abs() < 1e-7), "{kind} at {orientation}: {found:?}");
@@ -46,7 +46,7 @@ fn a_uniform_traction_is_the_stress_in_the_middle_of_a_bar_on_any_lattice() {
 #[test]
 fn a_slanted_bar_on_the_square_lattice_has_the_stress_of_its_traction() {
     // 3 : 4 : 5, so that corners and traction are short numbers; without contraction the clamp does not disturb.
-    let (at, error) = told(
+    let (at, error) = at_first_place(
         "bar",
         &[
             &lattice("square", 1.0, 0.0),
@@ -69,7 +69,7 @@ fn a_slanted_bar_on_the_square_lattice_has_the_stress_of_its_traction() {
 fn cook_s_membrane_rises_by_the_published_figure_with_order_two() {
     for kind in ["square", "hexagonal", "oblique", "honeycomb"] {
         let sizes = [4.0, 2.0, 1.0, 0.5];
-        let found = sizes.map(|h| told("cook", &[&lattice(kind, h, 0.0)]));
+        let found = sizes.map(|h| at_first_place("cook", &[&lattice(kind, h, 0.0)]));
         let off = found.map(|(at, _)| at.rule.displacement[1] / 23.965 - 1.0);
         println!("{kind}: {off:.5?}");
         assert!(off[2].abs() < 0.003 && off[3].abs() < 0.001, "{kind}: {off:?}");
@@ -86,7 +86,7 @@ fn cook_s_membrane_rises_by_the_published_figure_with_order_two() {
 #[test]
 fn the_crown_of_a_hole_comes_to_its_published_stress() {
     for kind in ["square", "hexagonal", "oblique", "honeycomb"] {
-        let found = [1.0, 0.5, 0.25].map(|h| told("plate-hole", &[&lattice(kind, h, 0.0)]).0);
+        let found = [1.0, 0.5, 0.25].map(|h| at_first_place("plate-hole", &[&lattice(kind, h, 0.0)]).0);
         let off = found.map(|at| at.rule.stress[0] / 3.36 - 1.0);
         println!("{kind}: {off:.4?}");
         assert!(off[1].abs() < 0.03 && off[2].abs() < 0.02, "{kind}: {off:?}");
@@ -106,8 +106,10 @@ fn a_rectangle_that_is_no_multiple_of_the_spacing_bends_with_its_own_height() {
     let beam = 1.9 * 1000.0 / (3.0 * 1000.0 * inertia) + 1.2 * 1.9 * 10.0 / (shear * 1.9);
     let body = ["body.shape.max=[10.0, 1.9]", "record.places=[[10.0, 0.95]]"];
     for (h, bound) in [(0.5, 0.03), (0.25, 0.01)] {
-        let (at, error) =
-            told("bar", &[&[&*lattice("square", h, 0.0)], body.as_slice(), CANTILEVER.as_slice()].concat());
+        let (at, error) = at_first_place(
+            "bar",
+            &[&[&*lattice("square", h, 0.0)], body.as_slice(), CANTILEVER.as_slice()].concat(),
+        );
         let off = [at.rule, at.truth].map(|at| at.displacement[1] / beam - 1.0);
         println!("{h}: {off:.4?} of the beam's");
         // A clamp that allows no contraction is not the beam's; heights of 1.5 or 2 would be off by 103 or -14 %.
@@ -123,7 +125,7 @@ fn plane_strain_near_incompressibility_costs_no_accuracy() {
             let material = format!(
                 "material={{ kind = \"isotropic\", young = 1.0, poisson = {poisson}, plane = \"strain\" }}"
             );
-            told("cook", &[&lattice(kind, 1.0, 0.0), &material]).1
+            at_first_place("cook", &[&lattice(kind, 1.0, 0.0), &material]).1
         };
         let errors = ["0.3", "0.49", "0.499"].map(error);
         println!("{kind}: {errors:.5?}");
@@ -141,7 +143,7 @@ fn the_elastica_is_held_against_a_truth_that_turns() {
     // truth itself is up to half a percent off.
     for (a, w, u) in [(1.0, 0.30172, 0.05643), (5.0, 0.71379, 0.38763), (10.0, 0.81061, 0.55500)] {
         let load = format!("loads[0].traction=[0.0, {:?}]", a * 1000.0 / 12.0 / 400.0);
-        let (at, error) = told("elastica", &[&load, "lattice.spacing=0.0625"]);
+        let (at, error) = at_first_place("elastica", &[&load, "lattice.spacing=0.0625"]);
         for (who, found) in [("truth", at.truth), ("rule", at.rule)] {
             let off = [found.displacement[1] / 20.0 / w - 1.0, -found.displacement[0] / 20.0 / u - 1.0];
             println!("a = {a}, {who}: {off:.5?}");
@@ -154,7 +156,7 @@ fn the_elastica_is_held_against_a_truth_that_turns() {
 #[test]
 fn a_rule_of_small_rotations_is_far_from_the_elastica() {
     let small = ["rule.mean={ kind = \"material\", rotation = \"small\" }"];
-    let (at, error) = told("elastica", &small);
+    let (at, error) = at_first_place("elastica", &small);
     // P L^3 / (3 E I) of the linear beam, by rule and truth.
     for found in [at.rule, at.truth] {
         assert!((found.displacement[1] / 20.0 / (10.0 / 3.0) - 1.0).abs() < 0.01, "{at}");
@@ -181,10 +183,10 @@ fn the_crown_of_a_hole_in_an_orthotropic_plate_is_recovered_too() {
     let infinite = 1.0 + (2.0 * (2f64.sqrt() - 0.3) + 5.0).sqrt();
     let small = "body.shape={ kind = \"path\", from = [1.0, 0.0], steps = [{ to = [20.0, 0.0] }, { to = [20.0, 20.0] }, \
                  { to = [0.0, 20.0] }, { to = [0.0, 1.0] }, { to = [1.0, 0.0], centre = [0.0, 0.0], clockwise = true }] }";
-    let (at, _) = told("plate-hole", &[material, small, "record.places=[[0.0, 1.0]]"]);
+    let (at, _) = at_first_place("plate-hole", &[material, small, "record.places=[[0.0, 1.0]]"]);
     assert!((at.truth.stress[0] / infinite - 1.0).abs() < 0.015, "{at} {infinite}");
     for kind in ["square", "hexagonal", "oblique", "honeycomb"] {
-        let found = [0.5, 0.25].map(|h| told("plate-hole", &[material, &lattice(kind, h, 20.0)]).0);
+        let found = [0.5, 0.25].map(|h| at_first_place("plate-hole", &[material, &lattice(kind, h, 20.0)]).0);
         let off = found.map(|at| at.rule.stress[0] / at.truth.stress[0] - 1.0);
         println!("{kind}: {off:.4?}");
         assert!(off[0].abs() < 0.05 && off[1].abs() < 0.03, "{kind}: {off:?}");

@@ -11,4 +11,10 @@ mod middleware;
 #[path = "../ros_edge/support.rs"]
 #[expect(dead_code, reason = "the client of another implementation is all that is needed of it")]
 mod peers;
+#[path = "../common/running.rs"]
+mod running;
+#[path = "../common/signals.rs"]
+mod signals;
 mod support;
+#[path = "../common/waits.rs"]
+mod waits;

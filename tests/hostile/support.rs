@@ -2,13 +2,17 @@
 
 use std::io::Read;
 use std::net::{Ipv4Addr, UdpSocket};
-use std::process::{Child, Command, Output, Stdio};
+use std::process::{Command, Output, Stdio};
 use std::sync::atomic::{AtomicU16, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use flockform::ros::edge::{Edge, Options};
 use flockform::scene::bundled::bundled_swarm;
 use flockform::scene::swarm::Swarm;
+
+pub use crate::running::Running;
+pub use crate::signals::signal;
+use crate::waits::within;
 
 /// Another domain with every call, away from those of other runs.
 pub fn domain() -> u16 {
@@ -47,9 +51,6 @@ pub fn output(command: &mut Command) -> Output {
     Output { status: code, stdout: Vec::new(), stderr }
 }
 
-/// A process that ends with its test, whatever becomes of that.
-pub struct Running(pub Child);
-
 impl Running {
     pub fn start(command: &mut Command) -> Self {
         Self(command.spawn().expect("the binary starts"))
@@ -77,24 +78,6 @@ impl Running {
         let number = |entry: std::fs::DirEntry| entry.file_name().to_str()?.parse::<u32>().ok();
         all.filter_map(number).find(|&process| parent(process) == Some(own))
     }
-
-    /// Ends it as a user does (SIGTERM) and says with what status it ended.
-    pub fn terminate(&mut self) -> Option<i32> {
-        signal("TERM", self.0.id());
-        until("the process ends", || self.0.try_wait().expect("a child")).code()
-    }
-}
-
-impl Drop for Running {
-    fn drop(&mut self) {
-        // SIGKILL; an error means that it has ended already. The worker ends when nobody listens to it.
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
-
-pub fn signal(name: &str, process: u32) {
-    Command::new("kill").args(["-s", name, &process.to_string()]).status().expect("kill runs");
 }
 
 fn parent(process: u32) -> Option<u32> {
@@ -114,15 +97,8 @@ fn status(process: u32, key: &str) -> Option<u32> {
 pub const PATIENCE: Duration = Duration::from_secs(30);
 
 /// What `look` finds in time.
-pub fn until<T>(what: &str, mut look: impl FnMut() -> Option<T>) -> T {
-    let since = Instant::now();
-    while since.elapsed() < PATIENCE {
-        if let Some(found) = look() {
-            return found;
-        }
-        std::thread::sleep(Duration::from_millis(5));
-    }
-    panic!("{what}: not within {PATIENCE:?}");
+pub fn until<T>(what: &str, look: impl FnMut() -> Option<T>) -> T {
+    within(PATIENCE, what, look)
 }
 
 /// The port where a participant hears of others, by its number on this computer.
@@ -130,7 +106,7 @@ pub fn port(domain: u16, participant: u16) -> u16 {
     7410 + 250 * domain + 2 * participant
 }
 
-/// Somebody who only listens, in a place where participants look for others on this computer.
+/// A listener, in a place where participants look for others on this computer.
 pub struct Stranger {
     pub socket: UdpSocket,
     pub prefixes: Vec<[u8; 12]>,
@@ -155,7 +131,7 @@ impl Stranger {
         self.packets.retain(|packet| packet[8..20] != prefix);
     }
 
-    /// Whom it has heard of.
+    /// The participants it has heard of.
     pub fn listen(&mut self) {
         let mut packet = [0; 65_536];
         while let Ok(length) = self.socket.recv(&mut packet) {

@@ -17,5 +17,11 @@ mod faults;
 mod flight;
 mod load;
 mod own_network;
+#[path = "../common/running.rs"]
+mod running;
 mod services;
+#[path = "../common/signals.rs"]
+mod signals;
 mod support;
+#[path = "../common/waits.rs"]
+mod waits;

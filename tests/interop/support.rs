@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader, Write};
-use std::process::{Child, ChildStdin, Command, Stdio};
+use std::process::{ChildStdin, Command, Stdio};
 use std::sync::atomic::{AtomicU16, Ordering};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
@@ -12,6 +12,8 @@ use flockform::scene::bundled::bundled_swarm;
 use flockform::scene::swarm::Swarm;
 use flockform::swarm::control::Control;
 use serde_json::{Value as Json, json};
+
+pub use crate::running::Running;
 
 /// Discovery on a computer whose loopback device carries no multicast takes up to ten seconds.
 pub const PATIENCE: Duration = Duration::from_secs(30);
@@ -48,38 +50,6 @@ pub fn flockform(domain: u16, arguments: &[&str]) -> Running {
         .env("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
         .stdin(Stdio::null());
     Running(command.spawn().expect("the binary starts"))
-}
-
-/// A process that ends with its test, whatever becomes of that.
-pub struct Running(Child);
-
-impl Running {
-    /// Ends it as a user does (SIGTERM) and says with what status it ended.
-    pub fn terminate(&mut self) -> Option<i32> {
-        let pid = self.0.id().to_string();
-        Command::new("kill").args(["-s", "TERM", &pid]).status().expect("kill runs");
-        until("the process ends", || self.0.try_wait().expect("a child")).code()
-    }
-}
-
-impl Drop for Running {
-    fn drop(&mut self) {
-        // SIGKILL; an error means that it has ended already.
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
-
-/// What `look` finds in time.
-pub fn until<T>(what: &str, mut look: impl FnMut() -> Option<T>) -> T {
-    let since = Instant::now();
-    while since.elapsed() < PATIENCE {
-        if let Some(found) = look() {
-            return found;
-        }
-        std::thread::sleep(Duration::from_millis(5));
-    }
-    panic!("{what}: not within {PATIENCE:?}");
 }
 
 /// A peer in Python that is told and tells JSON, line by line.

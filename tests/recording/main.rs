@@ -10,3 +10,5 @@
 mod program;
 mod read_back;
 mod replays;
+#[path = "../common/signals.rs"]
+mod signals;

@@ -3,6 +3,8 @@
 use std::path::Path;
 use std::process::{Command, Output};
 
+pub use crate::signals::signal;
+
 pub fn flockform(arguments: &[&str], folder: &Path) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_flockform"));
     command.args(arguments).current_dir(folder).env_remove("RUST_LOG").output().expect("the program starts")

@@ -130,8 +130,8 @@ fn mcap_magic() -> [u8; 8] {
 /// Sends a child the signal that Ctrl-C would.
 #[cfg(unix)]
 fn interrupt(child: &mut std::process::Child) {
-    let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill is there");
-    assert!(sent.success() && child.wait().expect("ends").success());
+    signal("INT", child.id());
+    assert!(child.wait().expect("ends").success());
 }
 
 #[cfg(unix)]

@@ -12,3 +12,5 @@ mod parameters;
 mod services;
 mod support;
 mod topics;
+#[path = "../common/waits.rs"]
+mod waits;

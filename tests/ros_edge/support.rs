@@ -13,6 +13,8 @@ use ros2_client::{
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
+use crate::waits::within;
+
 /// Domain of this process, so that test runs side by side do not meet.
 pub fn domain() -> u16 {
     100 + (std::process::id() % 101) as u16
@@ -49,15 +51,8 @@ pub fn peers() -> MutexGuard<'static, Peers> {
 pub const PATIENCE: Duration = Duration::from_secs(10);
 
 /// What `look` finds within ten seconds.
-pub fn until<T>(what: &str, mut look: impl FnMut() -> Option<T>) -> T {
-    let since = Instant::now();
-    while since.elapsed() < PATIENCE {
-        if let Some(found) = look() {
-            return found;
-        }
-        std::thread::sleep(Duration::from_millis(2));
-    }
-    panic!("{what}: not within {PATIENCE:?}");
+pub fn until<T>(what: &str, look: impl FnMut() -> Option<T>) -> T {
+    within(PATIENCE, what, look)
 }
 
 /// Waits until a publisher and a subscription, each alone on its topic, see each other.

@@ -27,15 +27,7 @@ pub fn followers() -> impl Iterator<Item = usize> {
 }
 
 pub fn barycentre(reference: &Vectors, neighbours: Neighbours) -> Flock {
-    Flock {
-        rule: Rule::BARYCENTRE,
-        reference: reference.clone().into(),
-        neighbours,
-        weights: Weights::Equal,
-        forces: None,
-        rest: None,
-        bonds: None,
-    }
+    Flock::new(Rule::BARYCENTRE, reference.clone().into(), neighbours, Weights::Equal)
 }
 
 /// Leaders where an affine map takes them, followers scattered by up to a cell about their place in the

@@ -83,11 +83,10 @@ fn a_hundred_robots_swap_antipodal_places_on_a_circle() {
     }
 }
 
-#[test]
-fn a_pair_head_on_swaps() {
+/// All arrive, at a bounded speed and at any.
+fn assert_arrive(radius: f64, obstacles: &[Obstacle], ways: &[[[f64; 2]; 2]]) {
     for speed in [1.0, f64::INFINITY] {
-        let ways = [[[-5.0, 0.0], [5.0, 0.0]], [[5.0, 0.0], [-5.0, 0.0]]];
-        let mut world = World::new(limits(speed, 0.1), 0.2, &[], &ways);
+        let mut world = World::new(limits(speed, 0.1), radius, obstacles, ways);
         let ticks = world.ticks_to_arrive(1e-6, 2000);
         println!("speed {speed}: {ticks:?}");
         assert!(ticks.is_some());
@@ -95,15 +94,15 @@ fn a_pair_head_on_swaps() {
 }
 
 #[test]
+fn a_pair_head_on_swaps() {
+    assert_arrive(0.2, &[], &[[[-5.0, 0.0], [5.0, 0.0]], [[5.0, 0.0], [-5.0, 0.0]]]);
+}
+
+#[test]
 fn four_robots_cross() {
-    for speed in [1.0, f64::INFINITY] {
-        let ends = [[5.0, 0.0], [0.0, 5.0], [-5.0, 0.0], [0.0, -5.0]];
-        let ways: Vec<_> = (0..4).map(|k| [ends[k], ends[(k + 2) % 4]]).collect();
-        let mut world = World::new(limits(speed, 0.1), 0.2, &[], &ways);
-        let ticks = world.ticks_to_arrive(1e-6, 2000);
-        println!("speed {speed}: {ticks:?}");
-        assert!(ticks.is_some());
-    }
+    let ends = [[5.0, 0.0], [0.0, 5.0], [-5.0, 0.0], [0.0, -5.0]];
+    let ways: Vec<_> = (0..4).map(|k| [ends[k], ends[(k + 2) % 4]]).collect();
+    assert_arrive(0.2, &[], &ways);
 }
 
 fn rectangle(low: [f64; 2], high: [f64; 2]) -> Obstacle {
@@ -112,14 +111,8 @@ fn rectangle(low: [f64; 2], high: [f64; 2]) -> Obstacle {
 
 #[test]
 fn two_robots_pass_each_other_in_a_corridor() {
-    for speed in [1.0, f64::INFINITY] {
-        let walls = [rectangle([-4.0, 1.0], [4.0, 1.5]), rectangle([-4.0, -1.5], [4.0, -1.0])];
-        let ways = [[[-6.0, 0.0], [6.0, 0.0]], [[6.0, 0.0], [-6.0, 0.0]]];
-        let mut world = World::new(limits(speed, 0.1), 0.3, &walls, &ways);
-        let ticks = world.ticks_to_arrive(1e-6, 2000);
-        println!("speed {speed}: {ticks:?}");
-        assert!(ticks.is_some());
-    }
+    let walls = [rectangle([-4.0, 1.0], [4.0, 1.5]), rectangle([-4.0, -1.5], [4.0, -1.0])];
+    assert_arrive(0.3, &walls, &[[[-6.0, 0.0], [6.0, 0.0]], [[6.0, 0.0], [-6.0, 0.0]]]);
 }
 
 #[test]

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use super::support::domain_name;
+use super::support::{domain_name, signal};
 
 /// Files of a domain, wherever iceoryx2 keeps some.
 fn files(prefix: &str) -> Vec<PathBuf> {
@@ -56,7 +56,7 @@ struct Ends(Child);
 
 impl Drop for Ends {
     fn drop(&mut self) {
-        let _ = Command::new("kill").args(["-INT", &self.0.id().to_string()]).status();
+        signal("INT", self.0.id());
         let _ = self.0.wait();
     }
 }

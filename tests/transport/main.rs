@@ -13,4 +13,8 @@ mod promises;
 mod python;
 mod ros2;
 mod shm;
+#[path = "../common/signals.rs"]
+mod signals;
 mod support;
+#[path = "../common/waits.rs"]
+mod waits;

@@ -134,8 +134,7 @@ fn another_process_reads_a_run_of_the_program() {
         (steps.len() > 20).then_some(())
     });
     assert!(steps.windows(2).all(|pair| pair[0] < pair[1]), "{steps:?}");
-    let status = Command::new("kill").args(["-s", "TERM", &run.id().to_string()]).status();
-    assert!(status.expect("kill runs").success());
+    signal("TERM", run.id());
     let code = until("the run ends", || run.try_wait().expect("a child")).code();
     assert_eq!(code, Some(1), "interrupted, and what there was is written");
     assert!(folder.path().join("out/summary.json").exists());

@@ -94,8 +94,7 @@ impl Program {
     }
 
     fn terminate(mut self) -> Option<i32> {
-        let status = Command::new("kill").args(["-s", "TERM", &self.0.id().to_string()]).status();
-        assert!(status.expect("kill runs").success());
+        signal("TERM", self.0.id());
         until("it ends", || self.0.try_wait().expect("a child")).code()
     }
 }

@@ -1,7 +1,7 @@
 //! Formations to carry, bounded waits, domains that no other test meets.
 
 use std::sync::atomic::{AtomicU32, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use flockform::scene::swarm::Swarm;
 use flockform::shm::Domain;
@@ -10,18 +10,14 @@ use flockform::swarm::control::scope::NodeScope;
 use flockform::swarm::transport::{ControllerEnd, Heard, RobotsEnd, Target};
 use flockform::swarm::watch::Pose;
 
+pub use crate::signals::signal;
+use crate::waits::within;
+
 pub const PATIENCE: Duration = Duration::from_secs(20);
 
 /// What `look` finds in time.
-pub fn until<T>(what: &str, mut look: impl FnMut() -> Option<T>) -> T {
-    let since = Instant::now();
-    while since.elapsed() < PATIENCE {
-        if let Some(found) = look() {
-            return found;
-        }
-        std::thread::sleep(Duration::from_millis(2));
-    }
-    panic!("{what}: not within {PATIENCE:?}");
+pub fn until<T>(what: &str, look: impl FnMut() -> Option<T>) -> T {
+    within(PATIENCE, what, look)
 }
 
 /// The name of a domain of shared memory of this test alone.

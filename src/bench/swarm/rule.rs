@@ -102,15 +102,12 @@ impl Swarm {
         let limits = Limits { speed: SPEED, clearance: CLEARANCE, ..Limits::default() };
         let filter = Filter::new(limits, vec![RADIUS; robots], Obstacles::default());
         Self {
-            flock: Flock {
-                rule: Rule::BARYCENTRE,
-                reference: places[0].clone().into(),
-                neighbours: Neighbours::default(),
-                weights: Weights::Equal,
-                forces: None,
-                rest: None,
-                bonds: None,
-            },
+            flock: Flock::new(
+                Rule::BARYCENTRE,
+                places[0].clone().into(),
+                Neighbours::default(),
+                Weights::Equal,
+            ),
             grid: CellGrid::default(),
             members: vec![true; robots],
             ages: vec![0.0; robots],

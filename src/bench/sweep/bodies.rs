@@ -118,7 +118,7 @@ impl Body {
         let waves = |[x, y]: [f64; 2]| [x + 0.01 * (0.1 * y).sin(), y + 0.01 * (0.1 * x).sin()];
         let present = reference.iter().map(waves).collect();
         let (rule, weights, reference) = (Rule::BARYCENTRE, Weights::Equal, reference.into());
-        let flock = Flock { rule, reference, neighbours, weights, forces: None, rest: None, bonds: None };
+        let flock = Flock::new(rule, reference, neighbours, weights);
         Self { side, flock, roles, present }
     }
 
@@ -141,7 +141,7 @@ impl Body {
                 } else {
                     let count = to_go.min(steps_together);
                     let whole = &mut Activity::default();
-                    sweep.steps(&flock, None, (&mut present, &mut next), (count, Led::NOBODY, None), whole);
+                    sweep.steps(&flock, None, (&mut present, &mut next), (count, Led::NONE, None), whole);
                     to_go -= count;
                 }
             }

@@ -25,15 +25,7 @@ fn lay(kind: LatticeKind, neighbourhood: &Neighbourhood, origin: [f64; 2]) -> Fl
     let cut = Cut::Shape(Shape::WithHoles { body: Box::new(disc(21.0)), holes: vec![disc(5.0)] });
     let (body, neighbours) =
         Body::build(Lattice::new(kind, origin, 0.3), &cut, neighbourhood, None).expect("fits");
-    Flock {
-        rule: Rule::BARYCENTRE,
-        reference: body.reference,
-        neighbours,
-        weights: Weights::Equal,
-        forces: None,
-        rest: None,
-        bonds: None,
-    }
+    Flock::new(Rule::BARYCENTRE, body.reference, neighbours, Weights::Equal)
 }
 
 /// The bodies that the tests go over: lattices, and lattices a bit out of place where some are seen without seeing.

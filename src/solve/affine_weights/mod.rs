@@ -125,15 +125,12 @@ pub fn settles(
 ) -> Result<SpectralRadius, WeightsError> {
     let role = |follows: &bool| if *follows { Role::Follower } else { Role::Leader };
     let roles: Vec<Role> = follows.iter().map(role).collect();
-    let flock = Flock {
-        rule: Rule::BARYCENTRE,
-        reference: Vectors::zeros(roles.len()).into(),
-        neighbours: neighbours.clone(),
-        weights: Weights::Scalar(weights.to_vec()),
-        forces: None,
-        rest: None,
-        bonds: None,
-    };
+    let flock = Flock::new(
+        Rule::BARYCENTRE,
+        Vectors::zeros(roles.len()).into(),
+        neighbours.clone(),
+        Weights::Scalar(weights.to_vec()),
+    );
     let none = SpectralRadius { radius: 0.0, iterations: 0, converged: true };
     let found = spectral_radius(&flock, None, &roles, Update::default(), MOST_SWEEPS).unwrap_or(none);
     // Followers that no leader reaches keep an error for ever: exactly one, found as one to rounding.

@@ -160,15 +160,8 @@ fn at_rest(
     follows: &[bool],
     map: impl Fn([f64; 2]) -> [f64; 2],
 ) -> Vectors {
-    let flock = Flock {
-        rule: Rule::BARYCENTRE,
-        reference: reference.clone().into(),
-        neighbours: neighbours.clone(),
-        weights: Weights::Scalar(weights),
-        forces: None,
-        rest: None,
-        bonds: None,
-    };
+    let flock =
+        Flock::new(Rule::BARYCENTRE, reference.clone().into(), neighbours.clone(), Weights::Scalar(weights));
     let mut present = reference.clone();
     for j in (0..follows.len()).filter(|&j| !follows[j]) {
         present.set(j, map(reference.get(j)));

@@ -130,15 +130,12 @@ pub fn contrast(solver: Solver, contrast: f64) -> Outcome {
         Err(error) => return Outcome::Refused { message: error.to_string() },
     };
     let end = f64::from(columns - 1);
-    let mut flock = Flock {
-        rule: Rule { mean: Mean::Material { rotation: Rotation::Small }, ..Rule::BARYCENTRE },
-        reference: body.reference.clone(),
-        neighbours: weights.neighbours.clone(),
-        weights: Weights::Matrix(weights.weights()),
-        forces: None,
-        rest: None,
-        bonds: None,
-    };
+    let mut flock = Flock::new(
+        Rule { mean: Mean::Material { rotation: Rotation::Small }, ..Rule::BARYCENTRE },
+        body.reference.clone(),
+        weights.neighbours.clone(),
+        Weights::Matrix(weights.weights()),
+    );
     flock.keep_rest();
     let follows: Vec<bool> = body.reference.iter().map(|[x, _]| x > 0.0 && x < end).collect();
     let held: Vectors = body.reference.iter().map(|[x, _]| [if x == end { 1.0 } else { 0.0 }, 0.0]).collect();

@@ -73,15 +73,7 @@ fn of_places(swarm: &Swarm, rule: Rule) -> Result<Formation, SceneError> {
         _ => Weights::Equal,
     };
     let body = Body::of_places(places.clone(), spacing);
-    let mut flock = Flock {
-        rule,
-        reference: body.reference.clone(),
-        neighbours,
-        weights,
-        forces: None,
-        rest: None,
-        bonds: None,
-    };
+    let mut flock = Flock::new(rule, body.reference.clone(), neighbours, weights);
     if swarm.raw.rule.rest == RawRest::Balanced && present_radius.is_none() {
         flock.keep_rest();
     }

@@ -24,15 +24,7 @@ fn rough(count: usize, seed: u64) -> Vectors {
 fn lay(lattice: LatticeKind, cut: &Cut, neighbourhood: &Neighbourhood) -> Flock {
     let lattice = Lattice::new(lattice, [0.0, 0.0], 0.3);
     let (body, neighbours) = Body::build(lattice, cut, neighbourhood, None).expect("fits");
-    Flock {
-        rule: Rule::BARYCENTRE,
-        reference: body.reference,
-        neighbours,
-        weights: Weights::Equal,
-        forces: None,
-        rest: None,
-        bonds: None,
-    }
+    Flock::new(Rule::BARYCENTRE, body.reference, neighbours, Weights::Equal)
 }
 
 fn disc_with_hole() -> Cut {
@@ -147,15 +139,12 @@ fn a_body_larger_than_the_caches_gives_the_bits_of_the_rule_and_is_nearly_all_ru
 fn a_mean_of_negative_zeros_and_a_particle_without_neighbours_give_the_bits_of_the_rule() {
     // Particles 1 to 20 see the one before them, the others none.
     let lists = (0..22u32).map(|j| (1..21).contains(&j).then(|| j - 1));
-    let flock = Flock {
-        rule: Rule::BARYCENTRE,
-        reference: Vectors::zeros(22).into(),
-        neighbours: Neighbours::from_lists(lists),
-        weights: Weights::Equal,
-        forces: None,
-        rest: None,
-        bonds: None,
-    };
+    let flock = Flock::new(
+        Rule::BARYCENTRE,
+        Vectors::zeros(22).into(),
+        Neighbours::from_lists(lists),
+        Weights::Equal,
+    );
     let all_rest = Flock { rest: Some(Vectors { x: vec![1.0; 22], y: vec![1.0; 22] }), ..flock.clone() };
     let rows = Rows::compile(&all_rest, &[true; 22]).expect("a barycentre");
     assert!(rows.share_in_runs() > 0.9);

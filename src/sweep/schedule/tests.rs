@@ -27,7 +27,7 @@ impl Case {
         let led: Vec<usize> = (reference.len() - held..reference.len()).step_by(2).collect();
         led.iter().for_each(|&i| roles[i] = Role::Leader);
         let (rule, weights) = (Rule::BARYCENTRE, Weights::Equal);
-        let mut flock = Flock { rule, reference, neighbours, weights, forces: None, rest: None, bonds: None };
+        let mut flock = Flock::new(rule, reference, neighbours, weights);
         flock.keep_rest();
         Self { flock, roles, led }
     }
@@ -118,7 +118,7 @@ fn threads_beyond_one_a_coordinate_cut_the_body_in_segments() {
     let sweep = Sweep::compile(Update::default(), &case.flock, &case.roles);
     let rows = sweep.rows.as_ref().expect("affine");
     let segments = |threads| {
-        let (led, count, farther) = (Led::NOBODY, 16, None);
+        let (led, count, farther) = (Led::NONE, 16, None);
         let (terms, rest, force, frame) = (Terms::NONE, None, None, None);
         let steps = Steps::<f64> { rows, terms, rest, force, frame, led, count, farther, threads };
         steps.cuts(rows.band_count(), threads.div_ceil(2)).len() - 1
@@ -214,7 +214,7 @@ fn a_particle_that_moved_far_is_reported_wherever_it_is() {
             &case.flock,
             None,
             (places, &mut next),
-            (4, Led::NOBODY, Some(0.3)),
+            (4, Led::NONE, Some(0.3)),
             &mut Activity::default(),
         );
         assert_eq!(farther[..2], [true, false], "axis {axis}");
@@ -240,7 +240,7 @@ fn lists_where_one_coordinate_alone_moves_are_swept() {
         let mut next = start;
         for count in [1, 3, 4] {
             let places = (&mut together, &mut next);
-            sweep.steps(&still.flock, None, places, (count, Led::NOBODY, None), &mut activity);
+            sweep.steps(&still.flock, None, places, (count, Led::NONE, None), &mut activity);
         }
         assert_eq!(together, one_by_one, "axis {axis}");
         assert!(activity.share_computed() < 0.5);
