@@ -143,6 +143,7 @@ fn run_loop(
     let settled = |residual: f64, engine: &Engine| {
         stop.tolerance.is_some_and(|tolerance| residual <= tolerance) && !engine.is_scheduled()
     };
+    let mut look = engine.step();
     let reason = loop {
         if settled(residual, &engine) {
             break StopReason::Equilibrium;
@@ -153,7 +154,10 @@ fn run_loop(
         if engine.step() >= stop.steps {
             break StopReason::Steps;
         }
-        let look = (watch.next)(engine.step()).clamp(engine.step() + 1, stop.steps);
+        // Asked anew only once it is reached: a batch may end before it.
+        if look <= engine.step() {
+            look = (watch.next)(engine.step()).clamp(engine.step() + 1, stop.steps);
+        }
         let most = look - engine.step();
         batch.advance(&mut engine, most);
         let movement = engine.movement();
