@@ -14,6 +14,7 @@
 //! * [`sweep`]: the rule compiled for a body, and its steps: the one room with vectors and the schedule of threads.
 //! * [`solve`]: spectra of sweeps, and the solvers for equilibrium.
 //! * [`material`]: rule weights from Young's modulus and Poisson's ratio, and what material a rule is.
+//! * [`engine`]: one step of a body after the other: leaders, roles, bonds, loads; used by continuum and swarm alike.
 //! * [`continuum`]: plans a scene, steps it or goes straight to rest, and hands what happens to an observer.
 //! * [`stability`]: when a body grows instead of coming to rest, predicted and measured; extreme input.
 //! * `export` (feature `export`): CSV, JSON, VTK and figures, one file per format.
@@ -38,6 +39,7 @@
 //! ```
 
 pub mod continuum;
+pub mod engine;
 pub mod flock;
 pub mod geometry;
 pub mod guide;

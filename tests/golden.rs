@@ -2,10 +2,10 @@
 
 use std::ops::ControlFlow;
 
-use flockform::continuum::engine::Engine;
 use flockform::continuum::plan::Plan;
 use flockform::continuum::record::ProbeSeries;
 use flockform::continuum::run::run;
+use flockform::engine::Engine;
 use flockform::scene::bundled;
 
 /// What the oracle says of one frame rule.

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use std::ops::ControlFlow;
 use std::path::Path;
 
-use flockform::continuum::engine::state::digest;
+use flockform::continuum::digest::digest;
 use flockform::continuum::plan::Plan;
 use flockform::continuum::run::{Outcome, run};
 use flockform::scene::{Scene, SceneError};
@@ -124,15 +124,15 @@ fn ids_mean_the_particles_that_the_file_names_so() {
     let rows = shuffled(&patch(), 8);
     let plan = plan(TORN, &table(&rows));
     for (row, (id, place)) in rows.iter().enumerate() {
-        let i = plan.body.in_row(row);
-        assert_eq!((plan.body.id(i), plan.body.reference.get(i)), (*id as usize, *place));
-        assert_eq!(plan.body.particle(*id as usize), Some(i));
+        let i = plan.setup.body.in_row(row);
+        assert_eq!((plan.setup.body.id(i), plan.setup.body.reference.get(i)), (*id as usize, *place));
+        assert_eq!(plan.setup.body.particle(*id as usize), Some(i));
     }
-    let at = |id: usize| plan.body.particle(id).expect("named");
+    let at = |id: usize| plan.setup.body.particle(id).expect("named");
     assert_eq!(plan.probes, [at(1015), at(1358)]);
     let mut led = [at(1337), at(1344)];
     led.sort_unstable();
-    assert_eq!(plan.changes[2].particles, led);
+    assert_eq!(plan.setup.changes[2].particles, led);
     let outcome = ended(plan);
     let moved = |id: usize| {
         let (engine, i) = (&outcome.engine, outcome.engine.body().particle(id).expect("named"));
@@ -195,7 +195,8 @@ fn a_lattice_written_out_as_points_is_that_lattice() {
     let points = plan(&text, &table(&shuffled(&rows, 11)));
     assert_eq!(points.body.reference, lattice.body.reference, "the order is the lattice's own");
     assert_eq!(points.flock.neighbours, lattice.flock.neighbours);
-    let share = |plan: &Plan| Sweep::compile(plan.update, &plan.flock, &plan.roles).share_in_runs();
+    let share =
+        |plan: &Plan| Sweep::compile(plan.setup.update, &plan.setup.flock, &plan.setup.roles).share_in_runs();
     assert_eq!(share(&points), share(&lattice));
     assert!(share(&points) > 0.5, "swept without lists again: {}", share(&points));
     let [points, lattice] = [points, lattice].map(ended);

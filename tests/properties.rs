@@ -86,16 +86,16 @@ impl Rigid {
 
     /// The same scene, drawn elsewhere and turned.
     fn of_plan(&self, mut plan: Plan) -> Plan {
-        let reference: Vectors = plan.body.reference.iter().map(|point| self.apply(point)).collect();
-        plan.body.reference = Arc::new(reference);
-        plan.flock.reference = plan.body.reference.clone();
-        if plan.flock.rest.is_some() {
-            plan.flock.keep_rest();
+        let reference: Vectors = plan.setup.body.reference.iter().map(|point| self.apply(point)).collect();
+        plan.setup.body.reference = Arc::new(reference);
+        plan.setup.flock.reference = plan.setup.body.reference.clone();
+        if plan.setup.flock.rest.is_some() {
+            plan.setup.flock.keep_rest();
         }
-        if let Some(poisson) = &mut plan.flock.rule.poisson {
+        if let Some(poisson) = &mut plan.setup.flock.rule.poisson {
             poisson.centre += self.shift[1];
         }
-        for change in &mut plan.changes {
+        for change in &mut plan.setup.changes {
             if let Some(Motion::Velocity { per_step }) = &mut change.motion {
                 *per_step = self.turn(*per_step);
             }
@@ -150,8 +150,8 @@ proptest! {
             "roles[0].motion={{kind=\"affine\",rotate={rotate},stretch={stretch:?},shear={shear:?},steps=10}}"
         );
         let plan = plan(LATTICES[lattice], &[&motion, "stop={steps=4000,tolerance=1e-16}"]);
-        let program = plan.changes[0].motion.clone().expect("led");
-        let reference = plan.body.reference.clone();
+        let program = plan.setup.changes[0].motion.clone().expect("led");
+        let reference = plan.setup.body.reference.clone();
         let present = end(plan);
         for (i, (place, start)) in present.iter().zip(reference.iter()).enumerate() {
             let [dx, dy] = program.displacement(10.0, 0, start);

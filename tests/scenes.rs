@@ -3,10 +3,10 @@
 use std::ops::ControlFlow;
 use std::path::Path;
 
-use flockform::continuum::engine::Engine;
 use flockform::continuum::plan::Plan;
 use flockform::continuum::report::PlanReport;
 use flockform::continuum::run::{Outcome, StopReason, run};
+use flockform::engine::Engine;
 use flockform::flock::role::Role;
 use flockform::flock::vectors::distance;
 use flockform::scene::swarm::Swarm;
@@ -293,7 +293,7 @@ fn a_specimen_has_the_standard_s_outline_on_every_lattice() {
             let plan =
                 Plan::new(&scene(&format!("lattice-{lattice}"), &[&body])).unwrap_or_else(|e| panic!("{e}"));
             let width = |low: f64, high: f64| {
-                let reference = &plan.body.reference;
+                let reference = &plan.setup.body.reference;
                 let band = (0..plan.count()).filter(|&i| (low..high).contains(&reference.y[i]));
                 let (min, max) = reference.bounds(band).expect("not empty");
                 max[0] - min[0]

@@ -3,10 +3,10 @@
 use std::ops::ControlFlow;
 
 use flockform::continuum::bulk_response;
-use flockform::continuum::engine::Engine;
 use flockform::continuum::plan::Plan;
 use flockform::continuum::report::PlanReport;
 use flockform::continuum::run::{StopReason, run};
+use flockform::engine::Engine;
 use flockform::material::report::Effect;
 use flockform::scene::{Scene, bundled};
 

@@ -1,7 +1,7 @@
 //! Thresholds predicted and measured, and extremes that end right or refused.
 
-use flockform::continuum::engine::Engine;
 use flockform::continuum::plan::Plan;
+use flockform::engine::Engine;
 use flockform::flock::vectors::Vectors;
 use flockform::scene::{Scene, SceneError, bundled};
 use flockform::solve::spectrum::scatter;
@@ -268,7 +268,7 @@ fn extremes_end_right_or_refused() {
 fn stepped(name: &str, overrides: &[&str], factor: f64) -> Vectors {
     let spacing = format!("lattice.spacing={factor:e}");
     let plan = Plan::new(&load(name, &[overrides, &[&spacing]].concat()).expect("loads")).expect("plans");
-    let mut engine = Engine::new(plan);
+    let mut engine = Engine::new(plan.setup);
     let push = |k: usize| factor * scatter(k as u64);
     let disturbed = (0..engine.present().len()).map(|i| [push(2 * i), push(2 * i + 1)]).collect();
     engine.settle(0, &disturbed);

@@ -2,10 +2,11 @@
 
 use std::ops::ControlFlow;
 
-use flockform::continuum::engine::Engine;
 use flockform::continuum::plan::Plan;
 use flockform::continuum::report::PlanReport;
-use flockform::continuum::run::{Outcome, Watch, run, run_watched};
+use flockform::continuum::run::{Outcome, run, run_watched};
+use flockform::engine::Engine;
+use flockform::engine::observer::Observer;
 use flockform::scene::{Scene, bundled};
 
 fn scene(name: &str, overrides: &[&str]) -> Scene {
@@ -17,19 +18,27 @@ fn plan(scene: &Scene) -> Plan {
     Plan::new(scene).unwrap_or_else(|error| panic!("{error}"))
 }
 
+/// Looks at the steps that a function names, and remembers them.
+struct Looks<'a> {
+    next: &'a dyn Fn(usize) -> usize,
+    at: Vec<usize>,
+}
+
+impl Observer for Looks<'_> {
+    fn next(&mut self, step: usize) -> usize {
+        (self.next)(step)
+    }
+
+    fn see(&mut self, engine: &Engine, _: f64) -> ControlFlow<()> {
+        self.at.push(engine.step());
+        ControlFlow::Continue(())
+    }
+}
+
 fn watched(scene: &Scene, next: &dyn Fn(usize) -> usize) -> (Outcome, Vec<usize>) {
-    let mut looks = Vec::new();
-    let outcome = run_watched(
-        plan(scene),
-        Watch {
-            next,
-            see: &mut |engine, _| {
-                looks.push(engine.step());
-                ControlFlow::Continue(())
-            },
-        },
-    );
-    (outcome, looks)
+    let mut looks = Looks { next, at: Vec::new() };
+    let outcome = run_watched(plan(scene), &mut looks);
+    (outcome, looks.at)
 }
 
 fn bits(outcome: &Outcome) -> Vec<u64> {

@@ -2,9 +2,9 @@
 
 use std::ops::ControlFlow;
 
-use flockform::continuum::engine::Engine;
 use flockform::continuum::plan::Plan;
 use flockform::continuum::run::{StopReason, run};
+use flockform::engine::Engine;
 use flockform::flock::role::Role;
 use flockform::flock::rules::{Feedback, FeedbackReference, Rule};
 use flockform::scene::{Scene, bundled};
@@ -23,12 +23,12 @@ fn plan(name: &str, overrides: &[&str]) -> Plan {
 /// of followers leads there.
 fn hops_from_leaders(plan: &Plan) -> Vec<Option<usize>> {
     let mut hops: Vec<Option<usize>> =
-        plan.roles.iter().map(|&role| (role == Role::Leader).then_some(0)).collect();
+        plan.setup.roles.iter().map(|&role| (role == Role::Leader).then_some(0)).collect();
     for distance in 1..=plan.count() {
         let reached: Vec<usize> = (0..plan.count())
-            .filter(|&i| plan.roles[i] == Role::Follower && hops[i].is_none())
+            .filter(|&i| plan.setup.roles[i] == Role::Follower && hops[i].is_none())
             .filter(|&i| {
-                let neighbours = plan.flock.neighbours.of(i);
+                let neighbours = plan.setup.flock.neighbours.of(i);
                 neighbours.iter().any(|&k| hops[k as usize] == Some(distance - 1))
             })
             .collect();
@@ -73,13 +73,18 @@ fn a_particle_first_moves_at_the_step_after_its_hop_distance_on_every_lattice() 
 /// The tension sample after its release: the former leaders follow.
 fn released(overrides: &[&str]) -> (Plan, Vec<Role>) {
     let plan = plan("tension", overrides);
-    let roles =
-        plan.roles.iter().map(|&role| if role == Role::Leader { Role::Follower } else { role }).collect();
+    let roles = plan
+        .setup
+        .roles
+        .iter()
+        .map(|&role| if role == Role::Leader { Role::Follower } else { role })
+        .collect();
     (plan, roles)
 }
 
 fn radius_of(plan: &Plan, roles: &[Role]) -> SpectralRadius {
-    spectral_radius(&plan.flock, plan.body.frame.as_ref(), roles, plan.update, 200_000).expect("linear")
+    spectral_radius(&plan.setup.flock, plan.setup.body.frame.as_ref(), roles, plan.setup.update, 200_000)
+        .expect("linear")
 }
 
 #[test]
@@ -113,7 +118,7 @@ fn a_square_led_all_around_relaxes_at_the_cosine_of_its_size() {
         "body.shape={kind=\"grid\",columns=14,rows=14}",
     ];
     let plan = plan("lattice-square", &overrides);
-    let roles = plan.roles.clone();
+    let roles = plan.setup.roles.clone();
     // 12 x 12 followers.
     let expected = (std::f64::consts::PI / 13.0).cos();
     assert!((radius_of(&plan, &roles).radius - expected).abs() < 1e-6);
@@ -137,7 +142,7 @@ fn threshold(frame: &str, mut low: f64, mut high: f64) -> f64 {
     let (mut plan, roles) = released(&[frame]);
     for _ in 0..20 {
         let factor = (low + high) / 2.0;
-        plan.flock.rule.feedback = Some(Feedback { factor, reference: FeedbackReference::Initial });
+        plan.setup.flock.rule.feedback = Some(Feedback { factor, reference: FeedbackReference::Initial });
         *if radius_of(&plan, &roles).radius < 1.0 { &mut low } else { &mut high } = factor;
     }
     (low + high) / 2.0
@@ -176,7 +181,7 @@ fn the_feedback_threshold_is_that_of_a_clamped_chain_with_a_free_end() {
 fn the_spectrum_of_the_sweep_with_feedback_is_that_without_scaled() {
     let (mut plan, roles) = released(&["frame=none", "record.probes=[]"]);
     let bare = radius_of(&plan, &roles).radius;
-    plan.flock.rule = Rule {
+    plan.setup.flock.rule = Rule {
         feedback: Some(Feedback { factor: -0.4, reference: FeedbackReference::Initial }),
         ..Rule::BARYCENTRE
     };

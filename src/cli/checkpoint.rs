@@ -5,9 +5,9 @@ use std::str::FromStr;
 use std::time::{Duration, Instant};
 
 use clap::Args;
-use flockform::continuum::engine::Engine;
-use flockform::continuum::engine::state::EngineState;
 use flockform::continuum::record::{LoadStep, ProbeSeries, Snapshot};
+use flockform::engine::Engine;
+use flockform::engine::state::EngineState;
 use flockform::export::checkpoint::{Checkpoint, CheckpointError, RunRequest};
 use flockform::export::report::RunRecorder;
 use flockform::export::{ExportError, OutputFolder, VtkSeries, unfinished};

@@ -8,12 +8,13 @@ use super::places::{PlaceComparison, compare_places};
 use super::reference::{Reference, ReferenceError, Setting};
 use super::split::ErrorParts;
 use super::supports::supports;
-use crate::continuum::engine::Engine;
 use crate::continuum::equilibrium::run_to_equilibrium;
-use crate::continuum::layout::{Layout, RoleChange};
+use crate::continuum::layout::Layout;
 use crate::continuum::places::at_places;
 use crate::continuum::plan::Plan;
 use crate::continuum::run::Outcome;
+use crate::engine::Engine;
+use crate::engine::setup::RoleChange;
 use crate::fem::{Effort, FemError};
 use crate::flock::role::Role;
 use crate::flock::vectors::Vectors;
@@ -113,7 +114,7 @@ pub fn compare(
     let truth = truth_of(scene, effort)?;
     let start = Instant::now();
     let plan = plan_led_by(scene, &truth.truth)?;
-    let cells = plan.cells.clone().unwrap_or_else(|| Cells::of_body(&plan.body));
+    let cells = plan.setup.cells.clone().unwrap_or_else(|| Cells::of_body(&plan.setup.body));
     let outcome = run_to_equilibrium(scene, plan, watch)?;
     let time = start.elapsed();
 

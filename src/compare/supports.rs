@@ -6,7 +6,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::continuum::layout::{Layout, RoleChange};
+use crate::continuum::layout::Layout;
+use crate::engine::setup::RoleChange;
 use crate::fem::{Field, Holding, PlaneRegion, Support};
 use crate::flock::motion::Motion;
 use crate::flock::region::Region;

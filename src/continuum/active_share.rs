@@ -1,7 +1,7 @@
 //! How far motion can have come: one neighbour a step.
 
-use super::engine::several::looks_at_every_step;
 use super::plan::Plan;
+use crate::engine::several::looks_at_every_step;
 use crate::flock::neighbourhood::Neighbours;
 use crate::sweep::Sweep;
 
@@ -10,8 +10,8 @@ use crate::sweep::Sweep;
 /// look for what stands still.
 pub fn active_share(plan: &Plan) -> Option<f64> {
     let Plan { body, flock, changes, .. } = plan;
-    let looks = looks_at_every_step(plan.present_radius.is_some(), flock, changes);
-    let sweep = || Sweep::compile(plan.update, &plan.flock, &plan.roles);
+    let looks = looks_at_every_step(plan.setup.present_radius.is_some(), flock, changes);
+    let sweep = || Sweep::compile(plan.setup.update, &plan.setup.flock, &plan.setup.roles);
     // A load moves all of a body at once.
     if looks || flock.forces.is_some() || !sweep().takes_several(body.frame.as_ref()) {
         return None;
@@ -58,10 +58,10 @@ fn first_motions(plan: &Plan, steps: usize) -> Vec<usize> {
 
 /// The particles that see each one: the frame sees those it serves.
 fn seen_by(plan: &Plan) -> Neighbours {
-    let neighbours = &plan.flock.neighbours;
+    let neighbours = &plan.setup.flock.neighbours;
     let pairs = || {
         let lists = (0..plan.count()).flat_map(|j| neighbours.of(j).iter().map(move |&k| (j as u32, k)));
-        let points = plan.body.frame.iter().flat_map(|frame| (0..frame.len()).map(move |k| (frame, k)));
+        let points = plan.setup.body.frame.iter().flat_map(|frame| (0..frame.len()).map(move |k| (frame, k)));
         let served = points
             .flat_map(|(frame, k)| frame.served_by(k).iter().map(move |&served| (frame.points[k], served)));
         lists.chain(served)

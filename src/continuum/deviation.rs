@@ -23,7 +23,7 @@ pub struct Deviation {
 impl Deviation {
     /// Of a planned body that has cells and an outline.
     pub fn of(plan: &Plan) -> Option<Self> {
-        let (cells, outline) = (plan.cells.as_ref()?, plan.outline.as_ref()?);
+        let (cells, outline) = (plan.setup.cells.as_ref()?, plan.outline.as_ref()?);
         let whole = outline.area();
         let shapes: Vec<f64> = cells.shapes.iter().map(|shape| area(shape)).collect();
         let covered: f64 = cells.kind.iter().map(|&kind| shapes[kind as usize]).sum();
@@ -34,7 +34,7 @@ impl Deviation {
 
 /// Largest distance of ends and middles of the boundary's sides from the outline \[length\].
 fn farthest(plan: &Plan, cells: &Cells, outline: &Outline) -> f64 {
-    let reference = &plan.body.reference;
+    let reference = &plan.setup.body.reference;
     let sides = cells.boundary_sides(&cells.incidence(reference.len()));
     let pieces = outline.pieces().count();
     let stride = (sides.len().saturating_mul(3 * pieces) / MOST_DISTANCES).max(1);

@@ -4,10 +4,11 @@ mod increments;
 
 use std::ops::ControlFlow;
 
-use super::engine::Engine;
 use super::layout::{held, held_components};
 use super::plan::Plan;
-use super::run::{Outcome, StopReason, Watch, overflow, run_watched};
+use super::run::{Outcome, StopReason, overflow, run_watched};
+use crate::engine::Engine;
+use crate::engine::observer::{EachStep, Observer};
 use crate::flock::role::Role;
 use crate::flock::vectors::{Vectors, distance};
 use crate::scene::{LoadSteps, Scene, SceneError};
@@ -25,10 +26,10 @@ pub fn run_to_equilibrium(
     plan: Plan,
     see: &mut dyn FnMut(&Engine, f64) -> ControlFlow<()>,
 ) -> Result<Outcome, SceneError> {
-    come_to_whole_load(scene, plan, Watch { next: &|step| step + 1, see })
+    come_to_whole_load(scene, plan, &mut EachStep(see))
 }
 
-/// The same, seen at those steps alone that `watch` names. Where the scene's `[load_steps]` asks for equilibria on the
+/// The same, seen at those steps alone that the observer names. Where the scene's `[load_steps]` asks for equilibria on the
 /// way, the steps are these.
 ///
 /// # Errors
@@ -36,21 +37,21 @@ pub fn run_to_equilibrium(
 pub fn run_to_equilibrium_watched(
     scene: &Scene,
     plan: Plan,
-    watch: Watch<'_>,
+    observer: &mut dyn Observer,
 ) -> Result<Outcome, SceneError> {
     match (&scene.equilibrium, &scene.load_steps) {
         (Some(asked), Some(LoadSteps::Solved(parts))) => {
-            increments::settle_each(scene, &asked.request, plan, parts, watch)
+            increments::settle_each(scene, &asked.request, plan, parts, observer)
         }
-        _ => come_to_whole_load(scene, plan, watch),
+        _ => come_to_whole_load(scene, plan, observer),
     }
 }
 
-fn come_to_whole_load(scene: &Scene, plan: Plan, watch: Watch<'_>) -> Result<Outcome, SceneError> {
-    let Some(asked) = &scene.equilibrium else { return Ok(run_watched(plan, watch)) };
+fn come_to_whole_load(scene: &Scene, plan: Plan, observer: &mut dyn Observer) -> Result<Outcome, SceneError> {
+    let Some(asked) = &scene.equilibrium else { return Ok(run_watched(plan, observer)) };
     let outcome = solve_equilibrium(scene, &asked.request, plan)?;
     // There is nothing left to break off.
-    let _ = (watch.see)(&outcome.engine, outcome.residual);
+    let _ = observer.see(&outcome.engine, outcome.residual);
     Ok(outcome)
 }
 
@@ -59,12 +60,19 @@ fn come_to_whole_load(scene: &Scene, plan: Plan, watch: Watch<'_>) -> Result<Out
 /// # Errors
 /// Names what in the scene has no equilibrium, or none that the solver asked for can find.
 pub fn solve_equilibrium(scene: &Scene, request: &Request, plan: Plan) -> Result<Outcome, SceneError> {
-    let solved = if corotated::is_corotated(&plan.flock) {
+    let solved = if corotated::is_corotated(&plan.setup.flock) {
         let steps = steps_of_the_way(&plan) as f64;
         let held = |part: f64| way_after(&plan, part * steps);
         let axes = held_axes(&plan);
-        corotated::solve(&plan.flock, &plan.body, follows(&plan), axes, &Way::whole(&held), request)
-            .map_err(|error| refuse_corotated(scene, &error))?
+        corotated::solve(
+            &plan.setup.flock,
+            &plan.setup.body,
+            follows(&plan),
+            axes,
+            &Way::whole(&held),
+            request,
+        )
+        .map_err(|error| refuse_corotated(scene, &error))?
     } else {
         let system = of_plan(scene, &plan)?;
         solve(&system, request).map_err(|error| refuse(scene, &error))?
@@ -77,7 +85,7 @@ pub fn solve_equilibrium(scene: &Scene, request: &Request, plan: Plan) -> Result
 /// # Errors
 /// As [`solve_equilibrium`], as far as they are known without solving.
 pub fn select_solver(scene: &Scene, request: &Request, plan: &Plan) -> Result<(Solver, String), SceneError> {
-    if corotated::is_corotated(&plan.flock) {
+    if corotated::is_corotated(&plan.setup.flock) {
         let followers = follows(plan).into_iter().filter(|&follows| follows).count();
         return corotated::choose(followers, request).map_err(|error| refuse_corotated(scene, &error));
     }
@@ -85,12 +93,12 @@ pub fn select_solver(scene: &Scene, request: &Request, plan: &Plan) -> Result<(S
 }
 
 fn follows(plan: &Plan) -> Vec<bool> {
-    plan.roles.iter().map(|&role| role == Role::Follower).collect()
+    plan.setup.roles.iter().map(|&role| role == Role::Follower).collect()
 }
 
 /// Steps until the last leader is where it is at the last step.
 fn steps_of_the_way(plan: &Plan) -> usize {
-    let motions = plan.changes.iter().filter_map(|change| change.motion.as_ref());
+    let motions = plan.setup.changes.iter().filter_map(|change| change.motion.as_ref());
     let last = motions.map(|motion| motion.duration().unwrap_or(usize::MAX)).max();
     last.unwrap_or(0).min(plan.stop.steps)
 }
@@ -98,13 +106,15 @@ fn steps_of_the_way(plan: &Plan) -> usize {
 /// Displacements of particles that do not follow after so many steps; zero for the others \[length\], shape \[count\].
 fn held_after(plan: &Plan, steps: f64) -> Vectors {
     let at_rest = |d: Option<[f64; 2]>| d.unwrap_or_default();
-    held(&plan.changes, &plan.body, steps).into_iter().map(at_rest).collect()
+    held(&plan.setup.changes, &plan.setup.body, steps).into_iter().map(at_rest).collect()
 }
 
 /// The same with the single components that are held of followers.
 fn way_after(plan: &Plan, steps: f64) -> Vectors {
     let mut held = held_after(plan, steps);
-    for HeldComponent { particle, axis, displacement } in held_components(&plan.changes, &plan.body, steps) {
+    for HeldComponent { particle, axis, displacement } in
+        held_components(&plan.setup.changes, &plan.setup.body, steps)
+    {
         let mut place = held.get(particle);
         place[axis as usize] = displacement;
         held.set(particle, place);
@@ -114,7 +124,7 @@ fn way_after(plan: &Plan, steps: f64) -> Vectors {
 
 /// Single components that are held of followers, shape \[count\]\[x, y\]; empty without any.
 fn held_axes(plan: &Plan) -> Vec<[bool; 2]> {
-    let components = held_components(&plan.changes, &plan.body, 0.0);
+    let components = held_components(&plan.setup.changes, &plan.setup.body, 0.0);
     let mut axes = vec![[false; 2]; if components.is_empty() { 0 } else { plan.count() }];
     components.iter().for_each(|held| axes[held.particle][held.axis as usize] = true);
     axes
@@ -131,8 +141,8 @@ pub fn of_plan(scene: &Scene, plan: &Plan) -> Result<System, SceneError> {
 /// The same with the leaders where they are after so many steps.
 fn of_plan_after(scene: &Scene, plan: &Plan, steps: f64) -> Result<System, SceneError> {
     let held = held_after(plan, steps);
-    let components = held_components(&plan.changes, &plan.body, steps);
-    system(&plan.flock, &plan.body, follows(plan), held, &components).map_err(|error| {
+    let components = held_components(&plan.setup.changes, &plan.setup.body, steps);
+    system(&plan.setup.flock, &plan.setup.body, follows(plan), held, &components).map_err(|error| {
         let (key, help) = match error {
             NotLinear::Rule { .. } => {
                 ("rule.mean", "leave [equilibrium] out: sweeps find where such a rule comes to rest")
@@ -163,8 +173,8 @@ fn refuse(scene: &Scene, error: &SolveError) -> SceneError {
 }
 
 fn outcome(plan: Plan, solved: Solved) -> Outcome {
-    let (step, spacing) = (plan.stop.steps, plan.body.lattice.spacing());
-    let mut engine = Engine::new(plan);
+    let (step, spacing) = (plan.stop.steps, plan.setup.body.lattice.spacing());
+    let mut engine = Engine::new(plan.setup);
     engine.settle(step, &solved.displacement);
     let residual = farthest_from_target(&engine) / spacing;
     let reason = overflow(&engine).map_or_else(|| reason(&solved), StopReason::Diverged);

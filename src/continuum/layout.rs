@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use crate::engine::setup::RoleChange;
 use crate::flock::body::{Body, BodyError, Cut};
 use crate::flock::lattice::Site;
 use crate::flock::motion::Motion;
@@ -16,7 +17,7 @@ use crate::geometry::portion::{Portion, Selection};
 use crate::material::cells::{Cells, neighbourhood, neighbourhood_of, without_loose_sites};
 use crate::material::fit::{FitError, Fitted, fit_regions};
 use crate::material::outline_loads::{self, Loader, OutlineLoad, Push};
-use crate::scene::{BodySource, Condition, LeaderMotion, Load, RoleEntry, Scene, SceneError, SceneRegion};
+use crate::scene::{BodySource, LeaderMotion, Load, RoleEntry, Scene, SceneError, SceneRegion};
 use crate::solve::linear::HeldComponent;
 
 /// Where finite elements have points of the body: their displacements \[length\] at these reference
@@ -34,20 +35,6 @@ pub struct Layout {
     pub outline: Option<Outline>,
     /// The outline with the edges of inclusions, where there are any.
     pub partition: Option<Partition>,
-}
-
-/// A role that some particles take.
-#[derive(Clone, Debug)]
-pub struct RoleChange {
-    pub particles: Vec<usize>,
-    pub role: Role,
-    /// The one component that is held or led while the particles follow along the other.
-    pub axis: Option<Axis>,
-    /// First step at which it holds.
-    pub from: usize,
-    pub when: Option<Condition>,
-    /// How leaders move; none for those led by a truth that is not known yet.
-    pub motion: Option<Motion>,
 }
 
 impl Layout {

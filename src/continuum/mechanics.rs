@@ -5,9 +5,9 @@ use std::collections::HashMap;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::engine::Engine;
-use super::forces::{Forces, LoadResultant, Reaction};
-use super::path::Path;
+use crate::engine::Engine;
+use crate::engine::forces::{Forces, LoadResultant, Reaction};
+use crate::engine::path::{Path, Work};
 use crate::flock::rules::{Mean, Rotation};
 use crate::flock::vectors::{Vectors, distance};
 use crate::material::cells::Cells;
@@ -34,7 +34,7 @@ pub struct Mechanics {
     pub strain_energy: f64,
     /// Absent where the rule has no stiffness.
     pub work: Option<Work>,
-    /// Work done on the way, summed up from equilibrium to equilibrium ([`super::path`]): in a body that stores
+    /// Work done on the way, summed up from equilibrium to equilibrium ([`crate::engine::path`]): in a body that stores
     /// all of it the strain energy. Absent where there were none.
     pub work_done: Option<Work>,
     /// The largest force left on a follower \[force\]: how far the body is from rest.
@@ -44,15 +44,6 @@ pub struct Mechanics {
     pub largest_strain: f64,
     /// The largest turn of a cell \[rad\].
     pub largest_turn: f64,
-}
-
-/// Forces at their last value times displacements \[force length\]. In equilibrium under small rotations the strain
-/// energy is half of the sum of both.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Work {
-    pub loads: f64,
-    /// Of the reactions: of leaders that were moved.
-    pub supports: f64,
 }
 
 /// Where the largest von Mises stress is: in a cell, or at a particle on a free edge.

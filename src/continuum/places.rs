@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::engine::Engine;
 use super::mechanics::Stresses;
+use crate::engine::Engine;
 use crate::flock::vectors::Vectors;
 use crate::material::cells::Cells;
 use crate::material::place::Around;

@@ -4,53 +4,35 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::damping::along_outline;
-use super::free_edge::FreeEdge;
-use super::layout::{Layout, RoleChange, Truth, held_components, no_particle};
+use super::layout::{Layout, Truth, held_components, no_particle};
 use super::{places, weights};
+use crate::engine::setup::{RoleChange, Setup};
 use crate::flock::body::{Body, MOST_ENTRIES};
-use crate::flock::fracture::{Bonds, Break, Ghosts};
+use crate::flock::fracture::{Bonds, Ghosts};
 use crate::flock::law::{Flock, MatrixWeights, Weights};
 use crate::flock::neighbourhood::{Neighbourhood, Neighbours};
 use crate::flock::role::Role;
 use crate::flock::rules::{Axis, Mean, Poisson, Rule};
 use crate::flock::vectors::{Vectors, distance};
 use crate::geometry::outline::Outline;
-use crate::material::cells::Cells;
+use crate::material::free_edge::FreeEdge;
 use crate::material::mechanism::require_held;
 use crate::material::outline_loads::{Load, Resultant, sum};
 use crate::scene::{LoadSteps, Scene, SceneError, Stop};
 use crate::solve::linear::HeldComponent;
 use crate::sweep::{Order, Update};
 
-/// Everything an engine needs; nothing of it refers to the scene file.
+/// A scene laid out; nothing of it refers to the scene file.
 #[derive(Clone, Debug)]
 pub struct Plan {
-    pub body: Body,
-    pub flock: Flock,
-    pub update: Update,
-    /// Radius within which neighbours are found anew at every step \[length\].
-    pub present_radius: Option<f64>,
-    /// Roles before the first step, shape \[count\].
-    pub roles: Vec<Role>,
-    /// Role changes in the order they were written.
-    pub changes: Vec<RoleChange>,
-    /// Bonds cut before the first step.
-    pub cuts: Vec<Break>,
+    pub setup: Setup,
     pub stop: Stop,
     /// Diagonal of the body's bounds \[length\].
     pub diagonal: f64,
     /// Indices of the particles kept at every step.
     pub probes: Vec<usize>,
-    /// Between the particles, where the scene has a material.
-    pub cells: Option<Cells>,
-    /// Forces of each load on the particles \[force\], shape \[loads\]\[count\]; their sum is the flock's.
-    pub loads: Vec<Vectors>,
-    /// Steps over which the loads grow; they act from the first one on where there is no ramp.
-    pub ramp: Option<usize>,
     /// The outline of the body's shape, where it has one.
     pub outline: Option<Outline>,
-    /// Of a body fitted to its outline whose rule is a material.
-    pub free_edge: Option<Arc<FreeEdge>>,
     /// Of each load of the scene, in its order.
     pub resultants: Vec<Resultant>,
 }
@@ -101,80 +83,47 @@ impl Plan {
         require_listable(scene, &body)?;
         let roles = body.is_frame.iter().map(|&f| if f { Role::Frame } else { Role::Follower }).collect();
         let (low, high) = body.bounds();
-        let mut plan = Self {
-            update,
+        // A body of one particle has no extent; its spacing stands in.
+        let diagonal = distance(low, high).max(body.lattice.spacing());
+        let mut setup = Setup {
+            changes,
+            cells,
+            loads,
+            free_edge,
             present_radius: match scene.neighbourhood {
                 Neighbourhood::Dynamic { radius } => Some(radius),
                 _ => None,
             },
-            roles,
-            changes,
-            cuts: Vec::new(),
-            stop: scene.stop,
-            // A body of one particle has no extent; its spacing stands in.
-            diagonal: distance(low, high).max(body.lattice.spacing()),
-            probes,
-            cells,
-            loads,
             ramp: match scene.load_steps {
                 Some(LoadSteps::Stepped { ramp, .. }) => ramp,
                 _ => None,
             },
-            outline,
-            free_edge,
-            resultants,
-            body,
-            flock,
+            ..Setup::new(body, flock, roles, update)
         };
-        plan.make_cuts(scene);
-        plan.take_first_roles();
-        Ok(plan)
-    }
-
-    /// Particles on no lattice, which see each other through `flock`; those that do not follow
-    /// are led from outside.
-    pub fn of_places(body: Body, flock: Flock, roles: Vec<Role>, update: Update) -> Self {
-        let (low, high) = body.bounds();
-        Self {
-            present_radius: None,
-            changes: Vec::new(),
-            cuts: Vec::new(),
-            stop: Stop { steps: usize::MAX, tolerance: None, divergence_ratio: f64::INFINITY },
-            diagonal: distance(low, high).max(body.lattice.spacing()),
-            probes: Vec::new(),
-            cells: None,
-            loads: Vec::new(),
-            ramp: None,
-            outline: None,
-            free_edge: None,
-            resultants: Vec::new(),
-            body,
-            flock,
-            update,
-            roles,
-        }
+        make_cuts(&mut setup, scene);
+        take_first_roles(&mut setup);
+        Ok(Self { setup, stop: scene.stop, diagonal, probes, outline, resultants })
     }
 
     pub fn count(&self) -> usize {
-        self.body.count()
+        self.setup.body.count()
     }
+}
 
-    fn make_cuts(&mut self, scene: &Scene) {
-        if let Some(bonds) = &mut self.flock.bonds {
-            for &ends in &scene.cuts {
-                bonds.cut(ends, &self.flock.neighbours, &self.body.reference, &mut self.cuts);
-            }
+fn make_cuts(setup: &mut Setup, scene: &Scene) {
+    if let Some(bonds) = &mut setup.flock.bonds {
+        for &ends in &scene.cuts {
+            bonds.cut(ends, &setup.flock.neighbours, &setup.body.reference, &mut setup.cuts);
         }
     }
+}
 
-    /// Roles without a condition that hold from the first step are those the plan starts with.
-    fn take_first_roles(&mut self) {
-        let at_once =
-            |change: &&RoleChange| change.from <= 1 && change.when.is_none() && change.axis.is_none();
-        for change in self.changes.iter().filter(at_once) {
-            for &i in &change.particles {
-                self.roles[i] = change.role;
-            }
+/// Roles without a condition that hold from the first step are those the body starts with.
+fn take_first_roles(setup: &mut Setup) {
+    let at_once = |change: &&RoleChange| change.from <= 1 && change.when.is_none() && change.axis.is_none();
+    for change in setup.changes.iter().filter(at_once) {
+        for &i in &change.particles {
+            setup.roles[i] = change.role;
         }
     }
 }

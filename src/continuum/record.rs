@@ -3,9 +3,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::engine::Engine;
 use super::mechanics::Mechanics;
-use super::serde_impls;
+use crate::engine::Engine;
+use crate::engine::serde_impls;
 use crate::flock::role::Role;
 use crate::flock::vectors::Vectors;
 use crate::material::elastic::Elastic;

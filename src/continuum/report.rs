@@ -46,7 +46,7 @@ impl PlanReport {
     }
 
     fn capabilities(&mut self, scene: &Scene, plan: &Plan) {
-        let rule = plan.flock.rule;
+        let rule = plan.setup.flock.rule;
         let mean = match rule.mean {
             Mean::Barycentre => "barycentre (Eq. 1)".to_owned(),
             Mean::Distance { power } => format!("mean weighted by distance^{power} (Eq. 3)"),
@@ -57,7 +57,7 @@ impl PlanReport {
             Mean::Material { rotation: Rotation::Corotated } => "material (corotated)".to_owned(),
         };
         self.models(mean, "rule.mean");
-        let forces = plan.flock.forces.as_ref().map(|_| match scene.loads.len() {
+        let forces = plan.setup.flock.forces.as_ref().map(|_| match scene.loads.len() {
             1 => "1 load".to_owned(),
             many => format!("{many} loads"),
         });
@@ -68,7 +68,7 @@ impl PlanReport {
             self.models_or_not(parts, "load_steps", "loads and motions are not measured on the way");
         }
         let frame = scene.frame.map(|frame| {
-            let points = plan.body.frame.as_ref().map_or(0, |frame| frame.len());
+            let points = plan.setup.body.frame.as_ref().map_or(0, |frame| frame.len());
             format!("{} frame of {points} points", frame.name())
         });
         let free = match rule.mean {
@@ -76,9 +76,10 @@ impl PlanReport {
             _ => "edge particles have fewer neighbours",
         };
         self.models_or_not(frame, "frame", free);
-        let rest = plan.flock.rest.as_ref().map(|_| "rest offsets for unbalanced neighbourhoods".to_owned());
+        let rest =
+            plan.setup.flock.rest.as_ref().map(|_| "rest offsets for unbalanced neighbourhoods".to_owned());
         self.models_or_not(rest, "rule.rest", "every neighbourhood is balanced, or rule.rest is \"literal\"");
-        let weights = match &plan.flock.weights {
+        let weights = match &plan.setup.flock.weights {
             Weights::Equal => None,
             Weights::Scalar(_) => Some(match scene.weights {
                 Some(SceneWeights::Gradient { length }) => {
@@ -98,13 +99,14 @@ impl PlanReport {
         self.models_or_not(poisson, "rule.poisson", "x and y do not act on each other");
         let feedback = rule.feedback.map(|f| format!("feedback (Eq. 4), fd = {}", f.factor));
         self.models_or_not(feedback, "rule.feedback", "targets are not overshot");
-        let fracture = plan.flock.bonds.as_ref().map(|bonds| match bonds.threshold {
+        let fracture = plan.setup.flock.bonds.as_ref().map(|bonds| match bonds.threshold {
             Some(Threshold::Distance(df)) => format!("fracture past df = {df} {}", scene.unit()),
             Some(Threshold::Stretch(ratio)) => format!("fracture past {ratio} times a bond's length"),
             None => "broken bonds (no threshold: only cuts and ghosts break them)".to_owned(),
         });
         self.models_or_not(fracture, "fracture", "no bond can break");
-        let anew = plan.present_radius.map(|r| format!("neighbours found anew at every step within {r}"));
+        let anew =
+            plan.setup.present_radius.map(|r| format!("neighbours found anew at every step within {r}"));
         self.models_or_not(anew, "neighbours.kind = \"dynamic\"", "neighbours are those of the reference");
         let vtk = (scene.record.vtk_every > 0)
             .then(|| format!("ParaView files every {} steps", scene.record.vtk_every));
@@ -125,7 +127,7 @@ impl PlanReport {
 
 /// How much of the body is of other materials.
 fn inclusions(scene: &Scene, plan: &Plan) -> Option<String> {
-    let cells = plan.cells.as_ref().filter(|cells| !cells.inclusions.is_empty())?;
+    let cells = plan.setup.cells.as_ref().filter(|cells| !cells.inclusions.is_empty())?;
     let mut areas = vec![0.0; cells.inclusions.len() + 1];
     let of_kind: Vec<f64> = cells.shapes.iter().map(|shape| area(shape)).collect();
     cells.kind.iter().for_each(|&k| areas[cells.region[k as usize] as usize] += of_kind[k as usize]);
@@ -154,14 +156,14 @@ fn facts(
     plan: &Plan,
     deviation: Option<&Deviation>,
 ) -> Result<Vec<(String, String)>, SceneError> {
-    let of = |role: Role| plan.roles.iter().filter(|&&r| r == role).count();
+    let of = |role: Role| plan.setup.roles.iter().filter(|&&r| r == role).count();
     let roles: Vec<String> = Role::ALL
         .iter()
         .filter(|&&role| of(role) > 0)
         .map(|&role| format!("{} {}", of(role), role.name()))
         .collect();
-    let sweep = Sweep::compile(plan.update, &plan.flock, &plan.roles);
-    let order = match plan.update.order {
+    let sweep = Sweep::compile(plan.setup.update, &plan.setup.flock, &plan.setup.roles);
+    let order = match plan.setup.update.order {
         Order::Synchronous => "synchronous",
         Order::Sequential => "sequential",
     };
@@ -183,16 +185,16 @@ fn facts(
     };
     let bonds = neighbour_entries(plan);
     let unit = scene.unit();
-    let apart = plan.body.lattice.spacing();
+    let apart = plan.setup.body.lattice.spacing();
     let lattice = if scene.is_of_points() {
         format!("none: points, the nearest {apart:.6} {unit} apart in the median")
     } else {
-        format!("{}, nearest sites {apart:.6} {unit} apart", plan.body.lattice.name())
+        format!("{}, nearest sites {apart:.6} {unit} apart", plan.setup.body.lattice.name())
     };
     let swept = match scene.equilibrium {
         Some(_) => None,
         None => Some([
-            ("update", format!("{order}, damping {:.4}", plan.update.damping)),
+            ("update", format!("{order}, damping {:.4}", plan.setup.update.damping)),
             ("swept without lists", format!("{:.0} % of the followers", 100.0 * sweep.share_in_runs())),
         ]),
     };
@@ -257,8 +259,8 @@ fn cautions(scene: &Scene, plan: &Plan, deviation: Option<&Deviation>) -> Vec<St
             if scene.is_fitted { "a smaller spacing" } else { "body.outline = \"fitted\" or a smaller spacing" }
         ));
     }
-    let rule = plan.flock.rule;
-    let undamped = plan.update.order == Order::Synchronous && plan.update.damping == 1.0;
+    let rule = plan.setup.flock.rule;
+    let undamped = plan.setup.update.order == Order::Synchronous && plan.setup.update.damping == 1.0;
     if undamped && matches!(rule.mean, Mean::Distance { power } if power > 0.0) {
         cautions.push(
             "weights that grow with distance are marginal in a synchronous update: large deformations do not settle; \
@@ -270,14 +272,14 @@ fn cautions(scene: &Scene, plan: &Plan, deviation: Option<&Deviation>) -> Vec<St
     {
         cautions.push("over-relaxation in a synchronous update makes the fastest mode grow".into());
     }
-    if plan.present_radius.is_some() && rule.mean == Mean::Barycentre {
+    if plan.setup.present_radius.is_some() && rule.mean == Mean::Barycentre {
         cautions.push(
             "the barycentre of all particles in range keeps no distance: the body contracts; use rule.mean.kind = \"spaced\"".into(),
         );
     }
     cautions.extend(bulk_response::cautions(scene));
     let led = |role: &Role| matches!(role, Role::Leader | Role::Clamped);
-    if !plan.roles.iter().any(led) && scene.roles.iter().all(|entry| !led(&entry.role)) {
+    if !plan.setup.roles.iter().any(led) && scene.roles.iter().all(|entry| !led(&entry.role)) {
         cautions.push("no particle leads: the body relaxes by itself".into());
     }
     cautions
@@ -286,10 +288,10 @@ fn cautions(scene: &Scene, plan: &Plan, deviation: Option<&Deviation>) -> Vec<St
 /// Entries of the neighbour lists; where they are found anew at every step, about as many as the
 /// radius holds at the reference density.
 fn neighbour_entries(plan: &Plan) -> usize {
-    match plan.present_radius {
-        None => plan.flock.neighbours.index.len(),
+    match plan.setup.present_radius {
+        None => plan.setup.flock.neighbours.index.len(),
         Some(radius) => {
-            let within = std::f64::consts::PI * radius * radius / plan.body.lattice.cell_area();
+            let within = std::f64::consts::PI * radius * radius / plan.setup.body.lattice.cell_area();
             (plan.count() as f64 * within.min(plan.count() as f64)) as usize
         }
     }
@@ -302,7 +304,7 @@ fn memory(plan: &Plan) -> usize {
     let present = |is: bool, bytes: usize| if is { bytes } else { 0 };
     count * (3 * 16 + 3 + 8 + 4)
         + bonds * 4
-        + match &plan.flock.weights {
+        + match &plan.setup.flock.weights {
             Weights::Equal => 0,
             Weights::Scalar(weights) => 8 * weights.len(),
             Weights::Matrix(weights) => {
@@ -310,10 +312,10 @@ fn memory(plan: &Plan) -> usize {
                 4 * count + 32 * weights.blocks.len() + cells
             }
         }
-        + present(plan.flock.forces.is_some(), 16 * count)
-        + present(plan.flock.rest.is_some(), 16 * count)
-        + present(plan.flock.bonds.is_some(), bonds)
-        + present(plan.present_radius.is_some(), 8 * count)
+        + present(plan.setup.flock.forces.is_some(), 16 * count)
+        + present(plan.setup.flock.rest.is_some(), 16 * count)
+        + present(plan.setup.flock.bonds.is_some(), bonds)
+        + present(plan.setup.present_radius.is_some(), 8 * count)
 }
 
 fn readable_bytes(bytes: usize) -> String {

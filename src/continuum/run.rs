@@ -2,11 +2,12 @@
 
 use std::ops::ControlFlow;
 
-use super::engine::Engine;
-use super::engine::several::Reach;
-use super::engine::state::{EngineState, WrongState};
-use super::movement::{Movement, farthest, first_lost};
 use super::plan::Plan;
+use crate::engine::Engine;
+use crate::engine::movement::{Movement, farthest, first_lost};
+use crate::engine::observer::{EachStep, Observer};
+use crate::engine::several::Reach;
+use crate::engine::state::{EngineState, WrongState};
 use crate::flock::law::Weights;
 use crate::flock::rules::{FeedbackReference, Mean};
 use crate::flock::vectors::{Vectors, distance};
@@ -25,7 +26,7 @@ pub enum StopReason {
     Stuck(String),
     /// The scene's number of steps was reached.
     Steps,
-    /// The watch broke the run off.
+    /// An observer broke the run off.
     Interrupted,
     Diverged(Divergence),
 }
@@ -75,33 +76,23 @@ pub struct Outcome {
     pub solved: Option<Solved>,
 }
 
-/// The observer of a run.
-pub struct Watch<'a> {
-    /// Given a step, the next one that is looked at. The steps in between may be taken several at once, which is
-    /// several times as fast for a large body.
-    pub next: &'a dyn Fn(usize) -> usize,
-    /// Sees the engine before the first step (with an infinite residual), at the steps named by `next` and at the last one,
-    /// with the residual; can break the run off.
-    pub see: &'a mut dyn FnMut(&Engine, f64) -> ControlFlow<()>,
-}
-
 /// Runs a plan to its end. `see` sees the engine before the first step (with an infinite residual)
 /// and after each one, with the residual; it can break the run off.
 pub fn run(plan: Plan, see: &mut dyn FnMut(&Engine, f64) -> ControlFlow<()>) -> Outcome {
-    run_watched(plan, Watch { next: &|step| step + 1, see })
+    run_watched(plan, &mut EachStep(see))
 }
 
-/// Runs a plan to its end, seen at those steps alone that `watch` names. The results are the same to the bit.
-pub fn run_watched(plan: Plan, watch: Watch<'_>) -> Outcome {
+/// Runs a plan to its end, seen at those steps alone that the observer names. The results are the same to the bit.
+pub fn run_watched(plan: Plan, observer: &mut dyn Observer) -> Outcome {
     let bounds = Bounds::of(&plan);
-    let engine = Engine::new(plan);
+    let engine = Engine::new(plan.setup);
     let residual = f64::INFINITY;
-    let interrupted = (watch.see)(&engine, residual).is_break();
-    run_loop(engine, (residual, interrupted), &bounds, watch)
+    let interrupted = observer.see(&engine, residual).is_break();
+    run_loop(engine, (residual, interrupted), &bounds, observer)
 }
 
 /// Runs a plan on from where an earlier run of it was, to the same end bit by bit. `residual` is the one that
-/// was seen with the state; `watch` sees the engine after new steps.
+/// was seen with the state; `observer` sees the engine after new steps.
 ///
 /// # Errors
 /// A state of another body.
@@ -109,10 +100,10 @@ pub fn resume(
     plan: Plan,
     state: EngineState,
     residual: f64,
-    watch: Watch<'_>,
+    observer: &mut dyn Observer,
 ) -> Result<Outcome, WrongState> {
     let bounds = Bounds::of(&plan);
-    Ok(run_loop(state.engine(plan)?, (residual, false), &bounds, watch))
+    Ok(run_loop(state.engine(plan.setup)?, (residual, false), &bounds, observer))
 }
 
 /// Displacement beyond which sums of squares, which energies are, overflow \[length\].
@@ -128,7 +119,7 @@ struct Bounds {
 impl Bounds {
     fn of(plan: &Plan) -> Self {
         let allowed = f64::min(plan.stop.divergence_ratio * plan.diagonal, FARTHEST);
-        let divergence_ratio = allowed / plan.body.lattice.spacing();
+        let divergence_ratio = allowed / plan.setup.body.lattice.spacing();
         Self { stop: plan.stop, divergence_ratio }
     }
 }
@@ -137,7 +128,7 @@ fn run_loop(
     mut engine: Engine,
     (mut residual, mut interrupted): (f64, bool),
     Bounds { stop, divergence_ratio }: &Bounds,
-    watch: Watch<'_>,
+    observer: &mut dyn Observer,
 ) -> Outcome {
     let mut batch = StepBatch::new(&engine, stop.tolerance, *divergence_ratio);
     let settled = |residual: f64, engine: &Engine| {
@@ -156,7 +147,7 @@ fn run_loop(
         }
         // Asked anew only once it is reached: a batch may end before it.
         if look <= engine.step() {
-            look = (watch.next)(engine.step()).clamp(engine.step() + 1, stop.steps);
+            look = observer.next(engine.step()).clamp(engine.step() + 1, stop.steps);
         }
         let most = look - engine.step();
         batch.advance(&mut engine, most);
@@ -168,7 +159,7 @@ fn run_loop(
         batch.displacement = movement.largest_displacement;
         residual = movement.largest_move;
         if engine.step() == look || settled(residual, &engine) {
-            interrupted = (watch.see)(&engine, residual).is_break();
+            interrupted = observer.see(&engine, residual).is_break();
         }
     };
     Outcome { engine, reason, residual, solved: None }
@@ -289,3 +280,6 @@ fn likely_cause(engine: &Engine) -> String {
     }
     "a leader leaves the body behind; check the leaders' motions, or raise stop.divergence_ratio".into()
 }
+
+#[cfg(test)]
+mod tests;

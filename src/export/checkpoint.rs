@@ -22,8 +22,8 @@ use serde_json::Value;
 use super::error::ExportError;
 use super::manifest::create;
 use super::report::AnimationState;
-use crate::continuum::engine::state::EngineState;
 use crate::continuum::record::{LoadStep, ProbeSeries, Snapshot};
+use crate::engine::state::EngineState;
 use crate::scene::Scene;
 
 /// Its name in the folder of the run.
@@ -42,7 +42,7 @@ pub struct Checkpoint<'a> {
     pub asked: RunRequest,
     /// The scene as JSON, overrides and defaults included.
     scene: String,
-    /// [`crate::continuum::engine::state::digest`] of the plan.
+    /// [`crate::continuum::digest::digest`] of the plan.
     digest: u64,
     pub engine: EngineState,
     /// Largest one-step motion over the spacing, at the last step; infinite before the first.
@@ -288,9 +288,9 @@ fn shortly(value: &Value) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::continuum::engine::Engine;
-    use crate::continuum::engine::state::digest;
+    use crate::continuum::digest::digest;
     use crate::continuum::plan::Plan;
+    use crate::engine::Engine;
     use crate::scene::bundled;
 
     fn scene(sets: &[&str]) -> Scene {
@@ -302,7 +302,7 @@ mod tests {
         let scene = scene(&[]);
         let plan = Plan::new(&scene).expect("fits");
         let sum = digest(&plan);
-        let mut engine = Engine::new(plan);
+        let mut engine = Engine::new(plan.setup);
         let mut probe = ProbeSeries::new(66);
         for _ in 0..25 {
             engine.advance();

@@ -23,9 +23,9 @@ use super::error::ExportError;
 use super::figures::SERIES;
 use super::figures::chart::{Axis, Chart, Series, Style};
 use super::manifest::create;
-use crate::continuum::forces::Reaction;
-use crate::continuum::mechanics::Work;
 use crate::continuum::record::LoadStep;
+use crate::engine::forces::Reaction;
+use crate::engine::path::Work;
 use crate::scene::Scene;
 use crate::scene::units::Units;
 

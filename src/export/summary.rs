@@ -9,12 +9,12 @@ use serde::Serialize;
 
 use super::error::{ExportError, write_file};
 use super::{OutputFolder, bonds};
-use crate::continuum::engine::Engine;
-use crate::continuum::forces::Reaction;
 use crate::continuum::mechanics::{Mechanics, Peak};
 use crate::continuum::places::{AtPlace, at_places};
 use crate::continuum::record::Snapshot;
 use crate::continuum::run::{Outcome, StopReason};
+use crate::engine::Engine;
+use crate::engine::forces::Reaction;
 use crate::flock::role::Role;
 use crate::scene::Scene;
 use crate::scene::raw::RawScene;

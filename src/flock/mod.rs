@@ -11,6 +11,7 @@ pub mod block;
 pub mod body;
 pub mod cells_around;
 pub mod cloud;
+pub mod condition;
 pub mod fracture;
 pub mod frame;
 pub mod grid;

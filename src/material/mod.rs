@@ -60,6 +60,7 @@ pub mod cells;
 pub mod dilatation;
 pub mod elastic;
 pub mod fit;
+pub mod free_edge;
 pub mod gradient;
 pub mod homogenise;
 pub mod loads;

@@ -3,7 +3,7 @@
 //! A step is a twentieth of a second, so that players show twenty of them a second.
 
 use super::RecordError;
-use crate::continuum::engine::Engine;
+use crate::engine::Engine;
 use crate::flock::role::Role;
 use crate::flock::strain::Strain;
 use crate::flock::vectors::distance;

@@ -18,6 +18,7 @@ use std::sync::Arc;
 
 use crate::flock::body::Cut;
 use crate::flock::cloud::Cloud;
+use crate::flock::condition::Condition;
 use crate::flock::fracture::{Ghosts, Threshold};
 use crate::flock::frame::FrameRule;
 use crate::flock::lattice::Lattice;
@@ -197,30 +198,6 @@ pub enum SceneRegion {
     Outermost(Side),
     /// A part of the outline of the shape, and the particles on it.
     Outline(Selection),
-}
-
-/// A condition on one particle.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Condition {
-    pub quantity: Quantity,
-    pub above: Option<f64>,
-    pub below: Option<f64>,
-}
-
-impl Condition {
-    pub fn holds(&self, value: f64) -> bool {
-        self.above.is_none_or(|bound| value > bound) && self.below.is_none_or(|bound| value < bound)
-    }
-}
-
-/// The quantity that a condition tests.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Quantity {
-    X,
-    Y,
-    Displacement,
-    Pe1,
-    Pe2,
 }
 
 /// How leaders move.

@@ -5,7 +5,7 @@
 
 use super::payload::Particle;
 use super::{Capacity, Domain, Peer, Reader, ShmError, Writer};
-use crate::continuum::engine::Engine;
+use crate::engine::Engine;
 use crate::flock::role::Role;
 use crate::swarm::pace::system_time;
 

@@ -2,8 +2,8 @@
 
 use serde::Serialize;
 
-use crate::continuum::engine::Engine;
 use crate::continuum::plan::Plan;
+use crate::engine::Engine;
 use crate::flock::role::Role;
 use crate::flock::rules::{Feedback, FeedbackReference, Mean, Rotation};
 use crate::scene::{Scene, SceneError};
@@ -49,15 +49,15 @@ impl Subject {
         // The places that the truth gives its leaders do not matter: they are held at rest.
         let mut plan = Plan::with_truth(scene, &|places| vec![[0.0; 2]; places.len()])?;
         require_linear(scene, &plan)?;
-        let mut changes = std::mem::take(&mut plan.changes);
+        let mut changes = std::mem::take(&mut plan.setup.changes);
         changes.sort_by_key(|change| change.from);
         for change in changes.iter().filter(|change| change.when.is_none()) {
-            change.particles.iter().for_each(|&i| plan.roles[i] = change.role);
+            change.particles.iter().for_each(|&i| plan.setup.roles[i] = change.role);
         }
-        for role in plan.roles.iter_mut().filter(|role| **role == Role::Leader) {
+        for role in plan.setup.roles.iter_mut().filter(|role| **role == Role::Leader) {
             *role = Role::Clamped;
         }
-        plan.flock.forces = None;
+        plan.setup.flock.forces = None;
         // Runs are watched from here: neither a limit nor a tolerance ends them.
         plan.stop.tolerance = None;
         let subject = Self { plan };
@@ -68,17 +68,17 @@ impl Subject {
     /// The feedback factor or the damping as the scene has it.
     pub fn present(&self, parameter: Parameter) -> f64 {
         match parameter {
-            Parameter::Feedback => self.plan.flock.rule.feedback.map_or(0.0, |f| f.factor),
-            Parameter::Damping => self.plan.update.damping,
+            Parameter::Feedback => self.plan.setup.flock.rule.feedback.map_or(0.0, |f| f.factor),
+            Parameter::Damping => self.plan.setup.update.damping,
         }
     }
 
     pub fn feedback_reference(&self) -> FeedbackReference {
-        self.plan.flock.rule.feedback.map_or(FeedbackReference::Initial, |f| f.reference)
+        self.plan.setup.flock.rule.feedback.map_or(FeedbackReference::Initial, |f| f.reference)
     }
 
     pub fn order(&self) -> Order {
-        self.plan.update.order
+        self.plan.setup.update.order
     }
 
     pub fn particles(&self) -> usize {
@@ -86,12 +86,12 @@ impl Subject {
     }
 
     pub fn followers(&self) -> usize {
-        self.plan.roles.iter().filter(|&&role| role == Role::Follower).count()
+        self.plan.setup.roles.iter().filter(|&&role| role == Role::Follower).count()
     }
 
     /// Whether frame points remember the step before, so that the sweep is more than one matrix.
     pub fn has_memory(&self) -> bool {
-        self.plan.body.frame.as_ref().is_some_and(|frame| frame.rule.looks_before_the_sweep())
+        self.plan.setup.body.frame.as_ref().is_some_and(|frame| frame.rule.looks_before_the_sweep())
     }
 
     /// The same body with a parameter set.
@@ -101,9 +101,9 @@ impl Subject {
             Parameter::Feedback => {
                 let reference = self.feedback_reference();
                 let feedback = Feedback { factor: value, reference };
-                plan.flock.rule.feedback = (value != 0.0).then_some(feedback);
+                plan.setup.flock.rule.feedback = (value != 0.0).then_some(feedback);
             }
-            Parameter::Damping => plan.update.damping = value,
+            Parameter::Damping => plan.setup.update.damping = value,
         }
         Self { plan }
     }
@@ -115,13 +115,13 @@ impl Subject {
 
     /// Distance of neighbours \[length\].
     pub fn spacing(&self) -> f64 {
-        self.plan.body.lattice.spacing()
+        self.plan.setup.body.lattice.spacing()
     }
 
     /// How its sweep grows or shrinks what is left of a displacement.
     pub fn radius(&self) -> SpectralRadius {
         let engine = self.engine();
-        let frame = self.plan.body.frame.as_ref();
+        let frame = self.plan.setup.body.frame.as_ref();
         spectral_radius(engine.flock(), frame, engine.roles(), engine.update(), MOST_SWEEPS)
             .expect("linear, with followers")
     }
@@ -129,7 +129,7 @@ impl Subject {
     /// The same, as accurate as distinguishing growth from decay needs.
     pub fn radius_from_one(&self) -> SpectralRadius {
         let engine = self.engine();
-        let frame = self.plan.body.frame.as_ref();
+        let frame = self.plan.setup.body.frame.as_ref();
         radius_from_one(engine.flock(), frame, engine.roles(), engine.update(), MOST_SWEEPS)
             .expect("linear, with followers")
     }
@@ -137,7 +137,7 @@ impl Subject {
     /// Ends of the spectrum of its sweep.
     pub fn ends(&self) -> Ends {
         let engine = self.engine();
-        let frame = self.plan.body.frame.as_ref();
+        let frame = self.plan.setup.body.frame.as_ref();
         spectral_ends(engine.flock(), frame, engine.roles(), engine.update(), MOST_SWEEPS)
             .expect("linear, with followers")
     }
@@ -177,7 +177,7 @@ fn require_linear(scene: &Scene, plan: &Plan) -> Result<(), SceneError> {
         Mean::Power { .. } => ("rule.mean", "power means of coordinates"),
         Mean::Spaced { .. } => ("rule.mean", "cohesion with separation"),
         Mean::Material { rotation: Rotation::Corotated } => ("rule.mean", "axes that turn with the body"),
-        _ if plan.present_radius.is_some() => ("neighbours", "neighbours found anew at every step"),
+        _ if plan.setup.present_radius.is_some() => ("neighbours", "neighbours found anew at every step"),
         _ if scene.fracture.is_some_and(|fracture| fracture.threshold.is_some()) => {
             ("fracture", "bonds that break")
         }

@@ -56,7 +56,7 @@ fn four_neighbours_cannot_carry_a_material_and_the_reason_is_given() {
 #[test]
 fn a_run_plans_leaders_led_by_the_truth() {
     let plan = plan(&load("beam", &[])).unwrap_or_else(|e| panic!("{e}"));
-    let led = &plan.changes[1];
+    let led = &plan.setup.changes[1];
     let motion = led.motion.as_ref().expect("led");
     let tip = motion.displacement(1.0, 0, [0.0; 2]);
     // Of the lower right corner, in the reference data.

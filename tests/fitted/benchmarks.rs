@@ -48,7 +48,7 @@ loads = [{ kind = "traction", region = { kind = "edge", side = "right" }, tracti
         for orientation in [0.0, 30.0, 90.0] {
             let scene = scene(&lattice(kind, 1.7, orientation), parts).expect("a scene");
             let (plan, outcome) = solved(&scene);
-            for (i, p) in plan.body.reference.iter().enumerate() {
+            for (i, p) in plan.setup.body.reference.iter().enumerate() {
                 let u = outcome.engine.displacement(i);
                 let exact = [0.01 * p[0], -0.003 * p[1]];
                 let off = (u[0] - exact[0]).hypot(u[1] - exact[1]);
@@ -88,7 +88,8 @@ fn the_crown_of_a_hole_carries_its_published_stress() {
                 let elastic = scene.material.as_ref().expect("a material");
                 let stresses = Stresses::at_present(&outcome.engine, elastic).expect("a material");
                 let crown = [0.0, 4.0];
-                let at = (0..plan.count()).find(|&i| distance(plan.body.reference.get(i), crown) < 1e-9);
+                let at =
+                    (0..plan.count()).find(|&i| distance(plan.setup.body.reference.get(i), crown) < 1e-9);
                 let stress = stresses.particles[at.expect("a corner")].expect("in cells").components[0];
                 assert!((stress / 3.36 - 1.0).abs() < bound, "{kind}, {h}, {orientation} degrees: {stress}");
             }

@@ -32,7 +32,7 @@ fn system(kind: &str, h: f64, orientation: f64, body: &str) -> (System, f64) {
     );
     let scene = scene(&lattice(kind, h, orientation), &parts).unwrap_or_else(|error| panic!("{error}"));
     let plan = Plan::new(&scene).unwrap_or_else(|error| panic!("{error}"));
-    let along = plan.body.outline.as_ref().map_or(0, |outline| outline.places.iter().flatten().count());
+    let along = plan.setup.body.outline.as_ref().map_or(0, |outline| outline.places.iter().flatten().count());
     let share = along as f64 / plan.count() as f64;
     (of_plan(&scene, &plan).expect("linear"), share)
 }

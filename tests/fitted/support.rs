@@ -58,10 +58,10 @@ pub fn shares(cells: &Cells, count: usize) -> Vec<f64> {
 
 /// Relative L2 distance of the displacements from the exact ones, over the body's area.
 pub fn error(plan: &Plan, outcome: &Outcome, exact: impl Fn([f64; 2]) -> [f64; 2]) -> f64 {
-    let shares = shares(plan.cells.as_ref().expect("a material"), plan.count());
+    let shares = shares(plan.setup.cells.as_ref().expect("a material"), plan.count());
     let (mut off, mut size) = (0.0, 0.0);
     for (i, share) in shares.into_iter().enumerate() {
-        let (u, v) = (outcome.engine.displacement(i), exact(plan.body.reference.get(i)));
+        let (u, v) = (outcome.engine.displacement(i), exact(plan.setup.body.reference.get(i)));
         off += share * ((u[0] - v[0]).powi(2) + (u[1] - v[1]).powi(2));
         size += share * (v[0] * v[0] + v[1] * v[1]);
     }
@@ -85,7 +85,7 @@ pub fn table(
 
 /// A displacement along the right edge of a body, interpolated at a height \[length\].
 pub fn on_right_edge(plan: &Plan, outcome: &Outcome, x: f64, y: f64) -> [f64; 2] {
-    let reference = &plan.body.reference;
+    let reference = &plan.setup.body.reference;
     let on = (0..plan.count()).filter(|&i| (reference.x[i] - x).abs() < 1e-9);
     let mut on: Vec<usize> = on.collect();
     on.sort_by(|&a, &b| reference.y[a].total_cmp(&reference.y[b]));

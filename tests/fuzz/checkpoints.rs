@@ -4,11 +4,12 @@ use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::Duration;
 
-use flockform::continuum::engine::Engine;
-use flockform::continuum::engine::state::{EngineState, digest};
 use flockform::continuum::plan::Plan;
 use flockform::continuum::record::{ProbeSeries, Snapshot};
-use flockform::continuum::run::{Watch, resume};
+use flockform::continuum::run::resume;
+use flockform::engine::Engine;
+use flockform::engine::observer::EachStep;
+use flockform::engine::state::{EngineState, digest};
 use flockform::export::checkpoint::{self, Checkpoint, RunRequest};
 use flockform::scene::{Scene, bundled};
 
@@ -22,7 +23,7 @@ fn good(folder: &Path) -> Vec<u8> {
     let scene = scene();
     let plan = Plan::new(&scene).expect("fits");
     let sum = digest(&plan);
-    let mut engine = Engine::new(plan);
+    let mut engine = Engine::new(plan.setup);
     let mut probe = ProbeSeries::new(66);
     for _ in 0..25 {
         engine.advance();
@@ -55,8 +56,8 @@ fn a_damaged_checkpoint_is_gone_on_from_or_refused() {
         if read.require_of(folder.path(), &scene, digest(&plan)).is_err() {
             return;
         }
-        let watch = Watch { next: &|step| step + 1, see: &mut |_, _| ControlFlow::Continue(()) };
-        let _ = resume(plan, read.engine, read.residual, watch);
+        let _ =
+            resume(plan, read.engine, read.residual, &mut EachStep(&mut |_, _| ControlFlow::Continue(())));
     });
     if let (Some(before), Some(after)) = (before, peak()) {
         assert!(after < before + 600_000, "{before} kB, and {after} kB afterwards");

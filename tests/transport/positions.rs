@@ -3,8 +3,8 @@
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-use flockform::continuum::engine::Engine;
 use flockform::continuum::plan::Plan;
+use flockform::engine::Engine;
 use flockform::scene::Scene;
 use flockform::scene::bundled::bundled;
 use flockform::shm::positions::{Positions, read};

@@ -5,9 +5,9 @@ use std::time::Instant;
 use serde::Serialize;
 
 use super::super::machine::median;
-use crate::continuum::engine::Engine;
 use crate::continuum::plan::Plan;
 use crate::continuum::record::{ProbeSeries, Snapshot};
+use crate::engine::Engine;
 use crate::flock::role::Role;
 use crate::flock::vectors::Vectors;
 use crate::scene;
@@ -116,10 +116,10 @@ struct Bare {
 
 impl Bare {
     fn new(plan: &Plan) -> Self {
-        let follows: Vec<bool> = plan.roles.iter().map(|&role| role == Role::Follower).collect();
-        let present: Vectors = stirred(&plan.body.reference).collect();
+        let follows: Vec<bool> = plan.setup.roles.iter().map(|&role| role == Role::Follower).collect();
+        let present: Vectors = stirred(&plan.setup.body.reference).collect();
         Self {
-            rows: Rows::compile(&plan.flock, &follows).expect("a barycentre"),
+            rows: Rows::compile(&plan.setup.flock, &follows).expect("a barycentre"),
             next: present.clone(),
             present,
         }

@@ -1,11 +1,11 @@
 //! Equilibria on the way: loads and leaders' motions in parts, each solved from where the last one left the body.
 
-use super::{Outcome, Plan, StopReason, Watch, overflow, steps_of_the_way};
+use super::{Observer, Outcome, Plan, StopReason, overflow, steps_of_the_way};
 use super::{
     farthest_from_target, follows, held_axes, of_plan_after, reason, refuse, refuse_corotated, way_after,
 };
-use crate::continuum::engine::Engine;
-use crate::continuum::engine::load::scaled;
+use crate::engine::Engine;
+use crate::engine::load::scaled;
 use crate::flock::vectors::Vectors;
 use crate::scene::{Scene, SceneError};
 use crate::solve::corotated::{self, CorotatedError, Way};
@@ -19,7 +19,7 @@ enum Failure {
     Interrupted,
 }
 
-/// Solves each part of the way in turn. `watch` sees the unloaded body and then every equilibrium, as step 1, 2, ...;
+/// Solves each part of the way in turn. `observer` sees the unloaded body and then every equilibrium, as step 1, 2, ...;
 /// where one is not found, the run ends with the last.
 ///
 /// # Errors
@@ -29,15 +29,15 @@ pub(super) fn settle_each(
     request: &Request,
     mut plan: Plan,
     parts: &[f64],
-    watch: Watch<'_>,
+    observer: &mut dyn Observer,
 ) -> Result<Outcome, SceneError> {
-    let whole = plan.flock.forces.clone();
-    let spacing = plan.body.lattice.spacing();
+    let whole = plan.setup.flock.forces.clone();
+    let spacing = plan.setup.body.lattice.spacing();
     let mut engine = Engine::new(plan.clone());
     engine.set_load_factor(0.0);
     let mut outcome =
         Outcome { engine, reason: StopReason::Equilibrium, residual: f64::INFINITY, solved: None };
-    let mut interrupted = (watch.see)(&outcome.engine, outcome.residual).is_break();
+    let mut interrupted = observer.see(&outcome.engine, outcome.residual).is_break();
     let mut last = 0.0;
     for (n, &part) in parts.iter().enumerate() {
         if interrupted {
@@ -63,7 +63,7 @@ pub(super) fn settle_each(
         outcome.residual = farthest_from_target(&outcome.engine) / spacing;
         outcome.reason = overflow(&outcome.engine).map_or_else(|| reason(&solved), StopReason::Diverged);
         outcome.solved = Some(solved);
-        interrupted = (watch.see)(&outcome.engine, outcome.residual).is_break();
+        interrupted = observer.see(&outcome.engine, outcome.residual).is_break();
         last = part;
         if matches!(outcome.reason, StopReason::Unsettled | StopReason::Diverged(_)) {
             break;
@@ -81,8 +81,8 @@ fn settle_at(
     part: f64,
 ) -> Result<Solved, Failure> {
     let steps = steps_of_the_way(plan) as f64;
-    if !corotated::is_corotated(&plan.flock) {
-        plan.flock.forces = whole.map(|whole| scaled(whole, part));
+    if !corotated::is_corotated(&plan.setup.flock) {
+        plan.setup.flock.forces = whole.map(|whole| scaled(whole, part));
         let system = of_plan_after(scene, plan, part * steps).map_err(Failure::Refused)?;
         return solve(&system, request).map_err(|error| match error {
             SolveError::Interrupted => Failure::Interrupted,
@@ -91,7 +91,7 @@ fn settle_at(
     }
     let way = Way { held: &|part| way_after(plan, part * steps), start, end: part };
     let axes = held_axes(plan);
-    let solved = corotated::solve(&plan.flock, &plan.body, follows(plan), axes, &way, request);
+    let solved = corotated::solve(&plan.setup.flock, &plan.setup.body, follows(plan), axes, &way, request);
     solved.map_err(|error| match error {
         CorotatedError::Solve(SolveError::Interrupted) => Failure::Interrupted,
         CorotatedError::Unsettled { .. } if start.is_some() => Failure::Lost(error.to_string()),

@@ -29,7 +29,7 @@ use std::path::PathBuf;
 
 use super::OutputFolder;
 use super::error::{ExportError, write_file};
-use crate::continuum::engine::Engine;
+use crate::engine::Engine;
 use crate::flock::body::Body;
 use crate::flock::neighbourhood::Neighbours;
 use crate::material::cells::Cells;

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use super::{Refuse, ordered_box};
+use crate::flock::condition::{Condition, Quantity};
 use crate::flock::motion::{Keyframe, Motion};
 use crate::flock::region::{Region, Side};
 use crate::flock::role::Role;
@@ -11,7 +12,7 @@ use crate::geometry::portion::Selection;
 use crate::scene::document::problem::SceneError;
 use crate::scene::raw::*;
 use crate::scene::table::DisplacementTable;
-use crate::scene::{Condition, LeaderMotion, Quantity, RoleEntry, SceneRegion};
+use crate::scene::{LeaderMotion, RoleEntry, SceneRegion};
 
 pub fn role_entry(
     key: &str,

@@ -72,13 +72,13 @@ pub fn cases(scene: &Scene) -> Vec<Case> {
 fn stress(overrides: &[&str]) -> Result<Outcome, SceneError> {
     let scene = small(overrides)?;
     let plan = plan(&scene)?;
-    let (Some(cells), Some(elastic)) = (&plan.cells, &scene.material) else {
+    let (Some(cells), Some(elastic)) = (&plan.setup.cells, &scene.material) else {
         return Err(scene.refuse("material", "the body has none", ""));
     };
-    let neighbours = plan.flock.neighbours.clone();
-    let weights = MaterialWeights::assemble(cells, &plan.body, neighbours, elastic)
+    let neighbours = plan.setup.flock.neighbours.clone();
+    let weights = MaterialWeights::assemble(cells, &plan.setup.body, neighbours, elastic)
         .map_err(|error| scene.refuse("material", error.to_string(), ""))?;
-    let reference = &plan.body.reference;
+    let reference = &plan.setup.body.reference;
     let strain = [3e-3, -1e-3, 2e-3];
     let displaced: Vectors =
         reference.iter().map(|[x, y]| [strain[0] * x + strain[2] * y, strain[1] * y]).collect();

@@ -121,7 +121,7 @@ impl End {
     /// Refused scenes, and runs that report themselves that they have not ended.
     fn of(scene: &Scene) -> Result<Self, SceneError> {
         let plan = plan(scene)?;
-        let spacing = plan.body.lattice.spacing();
+        let spacing = plan.setup.body.lattice.spacing();
         let outcome = run_to_equilibrium(scene, plan, &mut |_, _| ControlFlow::Continue(()))?;
         match outcome.reason {
             StopReason::Diverged(divergence) => {

@@ -14,8 +14,8 @@ use std::ops::ControlFlow;
 use super::control::Control;
 use super::robots::Robot;
 use super::watch::Pose;
-use crate::continuum::engine::Engine;
 use crate::continuum::plan::Plan;
+use crate::engine::Engine;
 use crate::flock::vectors::distance;
 use crate::scene::SceneError;
 use crate::scene::swarm::{Shape, Swarm};
@@ -161,6 +161,6 @@ fn periods(swarm: &Swarm, control: &Control) -> u64 {
 fn continuum(swarm: &Swarm) -> Result<Option<Twin>, SceneError> {
     let Shape::Scene(scene) = &swarm.shape else { return Ok(None) };
     let plan = Plan::new(scene)?;
-    let particles = plan.body.body_particles().collect();
-    Ok(Some(Twin { engine: Engine::new(plan), particles }))
+    let particles = plan.setup.body.body_particles().collect();
+    Ok(Some(Twin { engine: Engine::new(plan.setup), particles }))
 }

@@ -1,9 +1,9 @@
 //! Builds a formation from a swarm file, with the checks that need the places.
 
 use super::{Formation, Lead, TargetSource, inside, links, spacing_of};
-use crate::continuum::engine::Engine;
 use crate::continuum::layout::Layout;
 use crate::continuum::plan::Plan;
+use crate::engine::Engine;
 use crate::flock::body::Body;
 use crate::flock::law::{Flock, Weights};
 use crate::flock::manoeuvre::{Manoeuvre, Posture};
@@ -80,7 +80,7 @@ fn of_places(swarm: &Swarm, rule: Rule) -> Result<Formation, SceneError> {
     let roles = leads.iter().map(|lead| if lead.is_some() { Role::Leader } else { Role::Follower }).collect();
     let update = Update { damping: default_damping(rule), ..Update::default() };
     let mut plan = Plan::of_places(body, flock, roles, update);
-    plan.present_radius = present_radius;
+    plan.setup.present_radius = present_radius;
     let radius = |k: usize| swarm.raw.robots[k].radius.unwrap_or(swarm.raw.radius);
     let mut formation = of_scene(swarm, plan, false);
     formation.radii = (0..formation.count()).map(radius).collect();
@@ -126,20 +126,20 @@ fn of_body(swarm: &Swarm, scene: &Scene) -> Result<Formation, SceneError> {
 
 /// The members are the particles of the plan's body, its frame left out.
 fn of_scene(swarm: &Swarm, plan: Plan, is_scene: bool) -> Formation {
-    let particles: Vec<usize> = plan.body.body_particles().collect();
-    let places: Vectors = particles.iter().map(|&i| plan.body.reference.get(i)).collect();
-    let course = TargetSource::Rule { engine: Box::new(Engine::new(plan)), particles };
+    let particles: Vec<usize> = plan.setup.body.body_particles().collect();
+    let places: Vectors = particles.iter().map(|&i| plan.setup.body.reference.get(i)).collect();
+    let course = TargetSource::Rule { engine: Box::new(Engine::new(plan.setup)), particles };
     formation(swarm, numbered(swarm, places.len()), places, course, is_scene)
 }
 
 fn inside_of(swarm: &Swarm, scene: &Scene) -> Result<Formation, SceneError> {
     let plan = Plan::new(scene)?;
-    let cells = Cells::of_body(&plan.body);
+    let cells = Cells::of_body(&plan.setup.body);
     let mut shares = Vec::new();
     for (k, robot) in swarm.raw.robots.iter().enumerate() {
-        let inside = inside::shares(&cells, &plan.body.reference, robot.place);
+        let inside = inside::shares(&cells, &plan.setup.body.reference, robot.place);
         shares.push(inside.ok_or_else(|| {
-            let (low, high) = plan.body.bounds();
+            let (low, high) = plan.setup.body.bounds();
             let message = format!(
                 "lies in no cell of the body, which spans [{}, {}] to [{}, {}]",
                 low[0], low[1], high[0], high[1]
@@ -149,7 +149,7 @@ fn inside_of(swarm: &Swarm, scene: &Scene) -> Result<Formation, SceneError> {
     }
     let places = swarm.raw.robots.iter().map(|robot| robot.place).collect();
     let names = swarm.raw.robots.iter().map(|robot| robot.name.clone()).collect();
-    let course = TargetSource::Inside { engine: Box::new(Engine::new(plan)), shares };
+    let course = TargetSource::Inside { engine: Box::new(Engine::new(plan.setup)), shares };
     let mut formation = formation(swarm, names, places, course, true);
     let radius = |k: usize| swarm.raw.robots[k].radius.unwrap_or(swarm.raw.radius);
     formation.radii = (0..formation.count()).map(radius).collect();

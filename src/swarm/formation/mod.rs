@@ -10,7 +10,7 @@ mod layout;
 mod links;
 mod settling;
 
-use crate::continuum::engine::Engine;
+use crate::engine::Engine;
 use crate::flock::manoeuvre::{Affine, Manoeuvre, Posture};
 use crate::flock::motion::Motion;
 use crate::flock::neighbourhood::Neighbours;

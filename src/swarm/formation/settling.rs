@@ -5,7 +5,7 @@
 
 use nalgebra::DMatrix;
 
-use crate::continuum::engine::Engine;
+use crate::engine::Engine;
 use crate::flock::role::Role;
 use crate::flock::vectors::Vectors;
 use crate::solve::equilibrium::System;

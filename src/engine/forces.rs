@@ -7,8 +7,8 @@
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::engine::Engine;
-use super::layout::RoleChange;
+use super::Engine;
+use super::setup::RoleChange;
 use crate::flock::law::Weights;
 use crate::flock::role::Role;
 use crate::flock::rules::{Mean, Rotation};

@@ -1,16 +1,23 @@
-//! The engine: one step of a planned body.
+//! The engine: a body is moved, one step after the other.
+//!
+//! A [`setup::Setup`] becomes an [`Engine`]: in each step roles change and leaders move ([`leaders`]), bonds break, loads grow ([`load`])
+//! and the rule is swept; where nothing in between depends on how the body stands, several steps are taken at once ([`several`]).
+//! An [`observer::Observer`] looks at it on its way. [`forces`] are those within a body that is a material, and what holds it;
+//! [`path`] sums up the work done between equilibria. [`state`] takes an engine out on its way and puts it back, for checkpoints.
 
-pub(super) mod load;
-pub(super) mod several;
+pub mod forces;
+mod leaders;
+mod load;
+pub mod movement;
+pub mod observer;
+pub mod path;
+pub(crate) mod serde_impls;
+pub mod setup;
+pub mod several;
 pub mod state;
 
 use std::sync::Arc;
 
-use super::free_edge::{Edge, FreeEdge};
-use super::layout::RoleChange;
-use super::movement::Movement;
-use super::path::Path;
-use super::plan::Plan;
 use crate::flock::body::Body;
 use crate::flock::fracture::Break;
 use crate::flock::grid::CellGrid;
@@ -22,9 +29,13 @@ use crate::flock::rules::Rule;
 use crate::flock::strain::{Strain, strain};
 use crate::flock::vectors::{Vectors, distance};
 use crate::material::cells::Cells;
-use crate::scene::Quantity;
+use crate::material::free_edge::{Edge, FreeEdge};
 use crate::sweep::{Activity, Order, Sweep, Update};
+use leaders::Led;
 use load::Load;
+use movement::Movement;
+use path::Path;
+use setup::{RoleChange, Setup};
 
 /// A body on its way; positions in \[length, world frame\], shape \[count\].
 #[derive(Clone, Debug)]
@@ -63,27 +74,6 @@ pub struct Engine {
     path: Option<Path>,
 }
 
-/// A particle under a leader's program.
-#[derive(Clone, Copy, Debug)]
-struct Led {
-    particle: usize,
-    /// Which role change made it a leader, and its number among that change's particles.
-    change: usize,
-    which: usize,
-    /// Step before the first one led.
-    since: usize,
-    base: [f64; 2],
-}
-
-impl Led {
-    /// Where its program has it after so many steps \[length\].
-    fn place(&self, changes: &[RoleChange], step: usize) -> Option<[f64; 2]> {
-        let motion = changes[self.change].motion.as_ref()?;
-        let [dx, dy] = motion.displacement((step - self.since) as f64, self.which, self.base);
-        Some([self.base[0] + dx, self.base[1] + dy])
-    }
-}
-
 /// Buffers of a neighbourhood that is found anew at every step.
 #[derive(Clone, Debug)]
 struct PresentNeighbours {
@@ -93,8 +83,8 @@ struct PresentNeighbours {
 }
 
 impl Engine {
-    pub fn new(plan: Plan) -> Self {
-        let Plan {
+    pub fn new(setup: Setup) -> Self {
+        let Setup {
             body,
             flock,
             update,
@@ -106,8 +96,7 @@ impl Engine {
             loads,
             ramp,
             free_edge,
-            ..
-        } = plan;
+        } = setup;
         let present_neighbours = present_radius.map(|radius| PresentNeighbours {
             radius,
             grid: CellGrid::default(),
@@ -330,95 +319,6 @@ impl Engine {
         Movement::of(&self.present, &self.previous, &self.body.reference, self.body.lattice.spacing())
     }
 
-    fn take_roles(&mut self) {
-        let mut changed = false;
-        for change in 0..self.changes.len() {
-            let taking = self.taking(change);
-            if taking.is_empty() {
-                continue;
-            }
-            for &which in &taking {
-                self.roles[self.changes[change].particles[which]] = self.changes[change].role;
-            }
-            self.start_leading(change, &taking, self.step - 1);
-            let role = self.changes[change].role.name();
-            tracing::debug!("step {}: {} particles become {role}", self.step, taking.len());
-            changed = true;
-        }
-        if changed {
-            self.after_role_change();
-        }
-    }
-
-    /// Which of a change's particles take its role at this step.
-    fn taking(&self, change: usize) -> Vec<usize> {
-        let RoleChange { particles, role, from, when, .. } = &self.changes[change];
-        match when {
-            // Those from the start hold already.
-            None if *from == self.step && *from > 1 => (0..particles.len()).collect(),
-            Some(condition) if *from <= self.step => (0..particles.len())
-                .filter(|&which| self.roles[particles[which]] != *role)
-                .filter(|&which| condition.holds(self.quantity(condition.quantity, particles[which])))
-                .collect(),
-            _ => Vec::new(),
-        }
-    }
-
-    /// Puts these particles of a change under its motion, if it has one, and under no other.
-    fn start_leading(&mut self, change: usize, taking: &[usize], since: usize) {
-        let RoleChange { particles, motion, .. } = &self.changes[change];
-        let mut taken = vec![false; self.roles.len()];
-        taking.iter().for_each(|&which| taken[particles[which]] = true);
-        self.leaders.retain(|led| !taken[led.particle]);
-        if motion.is_some() {
-            self.leaders.extend(taking.iter().map(|&which| {
-                let particle = particles[which];
-                Led { particle, change, which, since, base: self.present.get(particle) }
-            }));
-            self.leaders.sort_unstable_by_key(|led| led.particle);
-        }
-        self.led = self.leaders.iter().map(|led| led.particle).collect();
-    }
-
-    /// Puts one component of a change's particles under its motion.
-    fn lead_components(&mut self, change: usize, axis: usize) {
-        let RoleChange { particles, motion, .. } = &self.changes[change];
-        if motion.is_some() {
-            let base = |particle: usize| self.body.reference.get(particle);
-            let led = |(which, &particle): (usize, &usize)| {
-                (Led { particle, change, which, since: 0, base: base(particle) }, axis)
-            };
-            self.led_components.extend(particles.iter().enumerate().map(led));
-        }
-    }
-
-    /// The rule keeps held components where their rest offsets say.
-    fn move_components(&mut self) {
-        let Some(rest) = &mut self.flock.rest else { return };
-        for (led, axis) in &self.led_components {
-            if let Some(place) = led.place(&self.changes, self.step) {
-                let mut offset = rest.get(led.particle);
-                offset[*axis] = place[*axis];
-                rest.set(led.particle, offset);
-            }
-        }
-    }
-
-    /// Whether the motion of a single component goes on after this step.
-    fn moves_components(&self) -> bool {
-        self.led_components.iter().any(|(led, _)| self.goes_on(led))
-    }
-
-    /// Whether a leader's motion goes on after this step.
-    fn goes_on(&self, led: &Led) -> bool {
-        let duration = self.changes[led.change].motion.as_ref().map(|motion| motion.duration());
-        match duration {
-            None => false,
-            Some(None) => true,
-            Some(Some(duration)) => led.since + duration > self.step,
-        }
-    }
-
     fn after_role_change(&mut self) {
         // A particle that is no longer moved must agree in both buffers.
         self.previous.clone_from(&self.present);
@@ -458,26 +358,5 @@ impl Engine {
     fn find_present_neighbours(&mut self) {
         let Some(PresentNeighbours { radius, grid, members }) = &mut self.present_neighbours else { return };
         self.flock.neighbours.rebuild_within(grid, &self.present, members, *radius);
-    }
-
-    fn move_leaders(&mut self) {
-        for led in &self.leaders {
-            if let Some(place) = led.place(&self.changes, self.step) {
-                self.previous.set(led.particle, place);
-            }
-        }
-        for (particle, place) in self.guided.drain(..) {
-            self.previous.set(particle, place);
-        }
-    }
-
-    fn quantity(&self, quantity: Quantity, particle: usize) -> f64 {
-        match quantity {
-            Quantity::X => self.present.x[particle],
-            Quantity::Y => self.present.y[particle],
-            Quantity::Displacement => distance(self.present.get(particle), self.body.reference.get(particle)),
-            Quantity::Pe1 => self.pe1(particle),
-            Quantity::Pe2 => self.pe2(particle),
-        }
     }
 }

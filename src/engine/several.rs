@@ -1,7 +1,8 @@
 //! Several steps of a body at once, where nothing in between depends on how it stands.
 
-use super::{Engine, Led as Leader};
-use crate::continuum::layout::RoleChange;
+use super::Engine;
+use super::leaders::Led as Leader;
+use crate::engine::setup::RoleChange;
 use crate::flock::law::Flock;
 use crate::flock::vectors::{Vectors, distance};
 use crate::sweep::{Activity, Led, MOST_STEPS};

@@ -4,10 +4,20 @@
 //! done to it, the sum from the unloaded body on is the strain energy, up to an error that falls with the square of the
 //! increments. A body that is stepped is at rest nowhere on its way, and nothing is summed up.
 
-use super::engine::Engine;
+use serde::{Deserialize, Serialize};
+
+use super::Engine;
 use super::forces::Forces;
-use super::mechanics::Work;
 use crate::flock::vectors::Vectors;
+
+/// Forces at their last value times displacements \[force length\]. In equilibrium under small rotations the strain
+/// energy is half of the sum of both.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Work {
+    pub loads: f64,
+    /// Of the reactions: of leaders that were moved.
+    pub supports: f64,
+}
 
 /// From the unloaded body to the last equilibrium.
 #[derive(Clone, Debug, Default)]

@@ -1,0 +1,169 @@
+//! The records of a run: snapshots, probes, measurements, frames, and what its report shows.
+
+use std::time::{Duration, Instant};
+
+use flockform::continuum::plan::Plan;
+use flockform::continuum::record::{LoadStep, ProbeSeries, Snapshot};
+use flockform::continuum::run::Outcome;
+use flockform::engine::Engine;
+use flockform::export::report::view::View;
+use flockform::export::report::{AnimationState, RunRecorder};
+use flockform::export::{ExportError, OutputFolder, VtkSeries};
+use flockform::scene::{LoadSteps, Scene};
+
+use crate::cli::checkpoint::{Recorded, ResumedRun};
+
+/// Keeps what the scene asks for while the run goes on.
+pub struct Recorder<'a> {
+    scene: &'a Scene,
+    snapshots: Vec<Snapshot>,
+    probes: Vec<ProbeSeries>,
+    load_steps: Vec<LoadStep>,
+    frames: Option<VtkSeries>,
+    /// Whether there shall be a `report.html`, and what it shows.
+    pub reports: bool,
+    pub animation: Option<RunRecorder>,
+    /// The state that an earlier run saved for it.
+    animation_state: Option<AnimationState<'static>>,
+    failure: Option<ExportError>,
+    pub writing: Duration,
+}
+
+/// The records of a run, and the time spent writing them.
+pub struct Records {
+    pub snapshots: Vec<Snapshot>,
+    pub probes: Vec<ProbeSeries>,
+    pub load_steps: Vec<LoadStep>,
+    pub stage: Option<View>,
+    pub writing: Duration,
+}
+
+impl<'a> Recorder<'a> {
+    pub fn new(
+        scene: &'a Scene,
+        plan: &Plan,
+        folder: &OutputFolder,
+        left: Option<&ResumedRun>,
+    ) -> Result<Self, ExportError> {
+        // A body that is not stepped has no history.
+        let is_solved_at_once = scene.equilibrium.is_some() && scene.load_steps.is_none();
+        let probed: &[usize] = if is_solved_at_once { &[] } else { &plan.probes };
+        let new_probes = || probed.iter().map(|&particle| ProbeSeries::new(particle)).collect();
+        let every = scene.record.vtk_every;
+        let frames = match left {
+            _ if every == 0 => None,
+            None => Some(VtkSeries::create(folder)?),
+            Some(left) => Some(left.frames(folder, every)?),
+        };
+        let frames = frames.map(|frames| frames.with_material(scene.material));
+        Ok(Self {
+            scene,
+            snapshots: left.map_or_else(Vec::new, |left| left.checkpoint.snapshots.to_vec()),
+            probes: left.map_or_else(new_probes, |left| left.checkpoint.probes.to_vec()),
+            load_steps: left.map_or_else(Vec::new, |left| left.checkpoint.load_steps.to_vec()),
+            frames,
+            reports: true,
+            animation: None,
+            animation_state: left.and_then(|left| left.checkpoint.animation.clone()),
+            failure: None,
+            writing: Duration::ZERO,
+        })
+    }
+
+    /// For a checkpoint.
+    pub fn kept(&mut self) -> Recorded<'_> {
+        Recorded {
+            snapshots: &self.snapshots,
+            probes: &self.probes,
+            load_steps: &self.load_steps,
+            animation: self.animation.as_ref(),
+            frames: self.frames.as_mut(),
+        }
+    }
+
+    pub fn step(&mut self, engine: &Engine) {
+        self.probes.iter_mut().for_each(|probe| probe.record(engine));
+        if self.scene.record.figures.contains(&engine.step()) {
+            self.snapshots.push(Snapshot::of(engine));
+        }
+        if load_every(self.scene).is_some_and(|every| engine.step().is_multiple_of(every)) {
+            self.measure(engine);
+        }
+        if self.frames.is_some() && engine.step().is_multiple_of(self.scene.record.vtk_every) {
+            self.write_frame(engine);
+        }
+        if self.reports {
+            let start = Instant::now();
+            RunRecorder::open(&mut self.animation, &mut self.animation_state, engine).watch(engine);
+            self.writing += start.elapsed();
+        }
+    }
+
+    /// The next step, after `step`, that is kept; none before the end if there is none.
+    pub fn next(&self, step: usize) -> usize {
+        let record = &self.scene.record;
+        let figure = record.figures.iter().copied().filter(|&figure| figure > step).min();
+        let next = |every: usize| (step / every + 1) * every;
+        let vtk = (record.vtk_every > 0).then(|| next(record.vtk_every));
+        let load = load_every(self.scene).map(next);
+        // The report has yet to say what it wants: the next one.
+        let animation =
+            self.reports.then(|| self.animation.as_ref().map_or(step + 1, |animation| animation.next(step)));
+        [figure, vtk, load, animation].into_iter().flatten().min().unwrap_or(usize::MAX)
+    }
+
+    fn measure(&mut self, engine: &Engine) {
+        let measured = self.scene.material.as_ref().and_then(|elastic| LoadStep::of(engine, elastic));
+        self.load_steps.extend(measured);
+    }
+
+    fn write_frame(&mut self, engine: &Engine) {
+        let start = Instant::now();
+        if let Some(frames) = &mut self.frames {
+            self.failure = frames.write(engine).err();
+        }
+        self.writing += start.elapsed();
+    }
+
+    pub fn failed(&self) -> bool {
+        self.failure.is_some()
+    }
+
+    /// The last configuration is always drawn, and for ParaView always written.
+    pub fn finish(mut self, outcome: &Outcome) -> Result<Records, ExportError> {
+        let engine = &outcome.engine;
+        let step = engine.step();
+        if self.snapshots.last().is_none_or(|last| last.step != step) {
+            self.snapshots.push(Snapshot::of(engine));
+        }
+        if load_every(self.scene).is_some() && self.load_steps.last().is_none_or(|last| last.step != step) {
+            self.measure(engine);
+        }
+        if self.frames.is_some() && !self.failed() && !step.is_multiple_of(self.scene.record.vtk_every) {
+            self.write_frame(engine);
+        }
+        if let Some(failure) = self.failure {
+            return Err(failure);
+        }
+        if let Some(frames) = self.frames {
+            frames.finish()?;
+        }
+        let start = Instant::now();
+        if self.reports {
+            // A run that is gone on with from its last step has seen none.
+            RunRecorder::open(&mut self.animation, &mut self.animation_state, engine);
+        }
+        let stage = self.animation.map(|animation| animation.stage(self.scene, outcome));
+        let writing = self.writing + start.elapsed();
+        let Self { snapshots, probes, load_steps, .. } = self;
+        Ok(Records { snapshots, probes, load_steps, stage, writing })
+    }
+}
+
+/// Steps from one row of `load.csv` to the next, where there is one.
+fn load_every(scene: &Scene) -> Option<usize> {
+    match scene.load_steps.as_ref()? {
+        LoadSteps::Solved(_) => Some(1),
+        LoadSteps::Stepped { every, .. } => Some(*every),
+    }
+}

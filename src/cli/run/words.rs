@@ -1,0 +1,76 @@
+//! What a run says at its end.
+
+use std::path::Path;
+use std::time::Duration;
+
+use flockform::continuum::run::{Outcome, StopReason};
+use flockform::export::report::page;
+use flockform::export::{Measured, Summary};
+use flockform::scene::Scene;
+
+pub fn closing_words(scene: &Scene, outcome: &Outcome, summary: &Summary, elapsed: Duration) -> String {
+    let engine = &outcome.engine;
+    let how = match &outcome.reason {
+        StopReason::Equilibrium => "in equilibrium".to_owned(),
+        StopReason::Unsettled => "the solver ended short of its tolerance".to_owned(),
+        StopReason::Stuck(why) => format!("not {why}"),
+        StopReason::Steps => "all steps done".to_owned(),
+        StopReason::Interrupted if outcome.solved.is_some() => {
+            "interrupted: what there was is written".to_owned()
+        }
+        StopReason::Interrupted => {
+            "interrupted: what there was is written, `flockform run --resume` goes on".to_owned()
+        }
+        StopReason::Diverged(divergence) => format!("{divergence}; the last good state is written"),
+    };
+    let mut words = format!(
+        "{}: {} {}, residual {:.2e}, {how} ({:.2} s)\n",
+        scene.name,
+        scene.counts(),
+        engine.step(),
+        outcome.residual,
+        elapsed.as_secs_f64()
+    );
+    if let Some(solved) = &outcome.solved {
+        let phases: Vec<String> =
+            solved.phases.iter().map(|(name, time)| format!("{name} {:.3} s", time.as_secs_f64())).collect();
+        let rounding = solved.known_to.map_or(String::new(), |error| {
+            format!(" (what rounding leaves: displacements are known to about {error:.0e} of themselves)")
+        });
+        words += &format!(
+            "{}, {}: {} iterations to a residual force of {:.1e} of the load{rounding}, {}\n",
+            solved.solver,
+            solved.why,
+            solved.iterations,
+            solved.residuals.last().copied().unwrap_or_default(),
+            phases.join(", ")
+        );
+    }
+    words += &format!(
+        "PE1 {:.4e} {unit}^2 in all, largest strain {:.4e}\n",
+        summary.energies.pe1,
+        summary.energies.largest_strain.unwrap_or(0.0),
+        unit = scene.unit(),
+    );
+    let broken: Vec<_> = engine.breaks().iter().filter(|b| b.step > 0).collect();
+    if let (Some(first), Some(last)) = (broken.first(), broken.last()) {
+        words += &format!(
+            "{} bonds broke, from step {} to {}, the first at ({:.1}, {:.1}) {}, {:.0} % along the body\n",
+            broken.len(),
+            first.step,
+            last.step,
+            first.place[0],
+            first.place[1],
+            scene.unit(),
+            100.0 * engine.body().along()(first.place)
+        );
+    }
+    words += &summary.mechanics.as_ref().map_or_else(String::new, Measured::to_string);
+    words + &summary.cautions.iter().map(|caution| format!("caution: {caution}\n")).collect::<String>()
+}
+
+pub fn where_to_look(kept: &Path) -> String {
+    let report = kept.join(page::FILE);
+    let report = report.is_file().then(|| format!("open {}\n", report.display()));
+    format!("results in {}\n{}", kept.display(), report.unwrap_or_default())
+}

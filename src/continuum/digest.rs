@@ -1,0 +1,68 @@
+//! Whether two plans are the same.
+
+use super::plan::Plan;
+use crate::flock::law::Weights;
+use crate::flock::vectors::Vectors;
+
+/// A fingerprint of everything in a plan that its run depends on, to distinguish plans: 64 bits,
+/// FNV-1a (G. Fowler, L. C. Noll, K.-P. Vo). Not secure against forgery.
+pub fn digest(plan: &Plan) -> u64 {
+    let mut digest = Fnv(0xcbf2_9ce4_8422_2325);
+    let Plan { body, flock, update, present_radius, roles, changes, cuts, stop, probes, ramp, .. } = plan;
+    digest.points(&body.reference);
+    digest.text(&format!("{update:?} {present_radius:?} {stop:?} {:?} {cuts:?}", flock.rule));
+    roles.iter().for_each(|role| digest.text(role.name()));
+    flock.neighbours.starts.iter().for_each(|start| digest.bytes(&start.to_le_bytes()));
+    flock.neighbours.index.iter().for_each(|index| digest.bytes(&index.to_le_bytes()));
+    match &flock.weights {
+        Weights::Equal => {}
+        Weights::Scalar(weights) => digest.numbers(weights),
+        Weights::Matrix(weights) => {
+            weights.class.iter().for_each(|class| digest.bytes(&class.to_le_bytes()));
+            weights.blocks.iter().flatten().for_each(|row| digest.numbers(row));
+        }
+    }
+    flock.forces.iter().chain(&flock.rest).for_each(|points| digest.points(points));
+    if let Some(ramp) = ramp {
+        digest.text(&format!("ramp {ramp}"));
+    }
+    if let Some(bonds) = &flock.bonds {
+        digest.text(&format!("{:?} {:?}", bonds.threshold, bonds.ghosts));
+    }
+    for change in changes {
+        let what = format!("{:?} {} {:?} {:?}", change.role, change.from, change.when, change.motion);
+        digest.text(&what);
+        change.particles.iter().for_each(|&particle| digest.bytes(&(particle as u64).to_le_bytes()));
+    }
+    probes.iter().for_each(|&probe| digest.bytes(&(probe as u64).to_le_bytes()));
+    if body.numbering.is_some() {
+        // The files written so far have these ids, in this order.
+        body.rows().for_each(|i| digest.bytes(&(body.id(i) as u64).to_le_bytes()));
+    }
+    digest.0
+}
+
+struct Fnv(u64);
+
+impl Fnv {
+    fn bytes(&mut self, bytes: &[u8]) {
+        for &byte in bytes {
+            self.0 = (self.0 ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3);
+        }
+    }
+
+    /// With its length, so that two texts are not one.
+    fn text(&mut self, text: &str) {
+        self.bytes(&(text.len() as u64).to_le_bytes());
+        self.bytes(text.as_bytes());
+    }
+
+    fn numbers(&mut self, numbers: &[f64]) {
+        numbers.iter().for_each(|number| self.bytes(&number.to_bits().to_le_bytes()));
+    }
+
+    fn points(&mut self, points: &Vectors) {
+        self.numbers(&points.x);
+        self.numbers(&points.y);
+    }
+}

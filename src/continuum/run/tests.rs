@@ -1,0 +1,115 @@
+//! Runs that go on from a state of the engine.
+
+use std::ops::ControlFlow;
+
+use super::*;
+use crate::scene::{Scene, bundled};
+
+fn scene(name: &str, sets: &[&str]) -> Scene {
+    let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
+    bundled(name).expect("bundled").load(&sets).expect("valid")
+}
+
+fn plan(scene: &Scene) -> Plan {
+    Plan::new(scene).expect("can be laid out")
+}
+
+/// The state, and what depends on the neighbours: PE1 and the residual, then how the run ended.
+fn bits(outcome: &Outcome) -> (EngineState, Vec<u64>, String) {
+    let engine = &outcome.engine;
+    let pe1 = (0..engine.body().count()).map(|i| engine.pe1(i));
+    let numbers = pe1.chain([outcome.residual]).map(f64::to_bits).collect();
+    (EngineState::of(engine), numbers, format!("{:?}", outcome.reason))
+}
+
+/// Runs whole, and again broken off at every one of `at`, through bytes.
+fn continues_to_the_same_end(name: &str, sets: &[&str], at: &[usize]) {
+    let scene = scene(name, sets);
+    let whole = run(plan(&scene), &mut |_, _| ControlFlow::Continue(()));
+    for &step in at {
+        let mut kept = None;
+        let _ = run(plan(&scene), &mut |engine, residual| {
+            if engine.step() == step {
+                kept = Some((EngineState::of(engine), residual));
+                return ControlFlow::Break(());
+            }
+            ControlFlow::Continue(())
+        });
+        let (state, residual) = kept.expect("came that far");
+        let mut seen = 0;
+        let mut see = |_: &Engine, _: f64| {
+            seen += 1;
+            ControlFlow::Continue(())
+        };
+        let resumed = resume(plan(&scene), state, residual, &mut EachStep(&mut see));
+        let resumed = resumed.expect("the same body");
+        assert!(bits(&resumed) == bits(&whole), "{name} from step {step}");
+        assert_eq!(seen, whole.engine.step() - step, "{name} from step {step}: every new step is shown once");
+    }
+}
+
+#[test]
+fn a_run_taken_up_again_at_any_step_ends_with_the_same_bits() {
+    continues_to_the_same_end("tension", &["stop.steps=45"], &[0, 1, 19, 20, 21, 44, 45]);
+    continues_to_the_same_end("tension", &["stop.steps=45", "update.order=sequential"], &[1, 20, 33]);
+    continues_to_the_same_end("tension", &["stop.tolerance=1e-3"], &[20, 100]);
+    // Without a frame only what moves is swept, and what is known of that comes back too.
+    let free = ["frame=none", "record.probes=[]", "stop.steps=45"];
+    continues_to_the_same_end("tension", &free, &[0, 1, 7, 20, 21, 45]);
+}
+
+#[test]
+fn a_load_that_grows_goes_on_growing() {
+    let growing = [
+        "frame=none",
+        "neighbours={kind=\"cells\"}",
+        "material={kind=\"isotropic\",young=1000.0,poisson=0.33}",
+        "rule={mean={kind=\"material\"}}",
+        "roles=[{region={kind=\"edge\",side=\"left\"},role=\"clamped\"}]",
+        "loads=[{kind=\"body\",force=[0.0,-1.0]}]",
+        "record={}",
+        "stop.steps=60",
+        "load_steps={ramp={steps=40}}",
+    ];
+    continues_to_the_same_end("tension", &growing, &[0, 1, 39, 40, 60]);
+}
+
+#[test]
+fn broken_bonds_and_ghosts_come_back() {
+    continues_to_the_same_end("fracture", &[], &[0, 60, 100, 140]);
+}
+
+#[test]
+fn neighbours_found_anew_at_every_step_are_found_again() {
+    continues_to_the_same_end("drop", &["stop.steps=40"], &[0, 1, 20, 40]);
+}
+
+#[test]
+fn a_run_that_had_come_to_rest_takes_no_further_step() {
+    let scene = scene("tension", &["stop.tolerance=1e-3", "stop.steps=20000"]);
+    let whole = run(plan(&scene), &mut |_, _| ControlFlow::Continue(()));
+    assert_eq!(whole.reason, StopReason::Equilibrium);
+    let state = EngineState::of(&whole.engine);
+    let resumed =
+        resume(plan(&scene), state, whole.residual, &mut EachStep(&mut |_, _| ControlFlow::Continue(())));
+    assert!(bits(&resumed.expect("the same body")) == bits(&whole));
+}
+
+#[test]
+fn a_state_of_another_body_is_refused() {
+    let state = EngineState::of(&Engine::new(plan(&scene("tension", &[]))));
+    let error = state.engine(plan(&scene("fracture", &[]))).expect_err("another body");
+    assert!(error.to_string().contains("144 particles"), "{error}");
+}
+
+#[test]
+fn the_digest_distinguishes_plans_by_what_a_run_depends_on() {
+    let of = |sets: &[&str]| digest(&plan(&scene("tension", sets)));
+    let plain = of(&[]);
+    assert_eq!(plain, of(&["title=another", "record.figures=[3]"]));
+    let others =
+        ["lattice.spacing=2", "stop.steps=9", "roles[1].motion.per_step=[0.6, 1e-9]", "update.damping=0.9"];
+    for other in others {
+        assert_ne!(plain, of(&[other]), "{other}");
+    }
+}

@@ -1,0 +1,72 @@
+//! What an engine starts from.
+
+use std::sync::Arc;
+
+use crate::flock::body::Body;
+use crate::flock::condition::Condition;
+use crate::flock::fracture::Break;
+use crate::flock::law::Flock;
+use crate::flock::motion::Motion;
+use crate::flock::role::Role;
+use crate::flock::rules::Axis;
+use crate::flock::vectors::Vectors;
+use crate::material::cells::Cells;
+use crate::material::free_edge::FreeEdge;
+use crate::sweep::Update;
+
+/// Everything an engine needs.
+#[derive(Clone, Debug)]
+pub struct Setup {
+    pub body: Body,
+    pub flock: Flock,
+    pub update: Update,
+    /// Radius within which neighbours are found anew at every step \[length\].
+    pub present_radius: Option<f64>,
+    /// Roles before the first step, shape \[count\].
+    pub roles: Vec<Role>,
+    /// Role changes in the order they were written.
+    pub changes: Vec<RoleChange>,
+    /// Bonds cut before the first step.
+    pub cuts: Vec<Break>,
+    /// Between the particles, where the body has a material.
+    pub cells: Option<Cells>,
+    /// Forces of each load on the particles \[force\], shape \[loads\]\[count\]; their sum is the flock's.
+    pub loads: Vec<Vectors>,
+    /// Steps over which the loads grow; they act from the first one on where there is no ramp.
+    pub ramp: Option<usize>,
+    /// Of a body fitted to its outline whose rule is a material.
+    pub free_edge: Option<Arc<FreeEdge>>,
+}
+
+/// A role that some particles take.
+#[derive(Clone, Debug)]
+pub struct RoleChange {
+    pub particles: Vec<usize>,
+    pub role: Role,
+    /// The one component that is held or led while the particles follow along the other.
+    pub axis: Option<Axis>,
+    /// First step at which it holds.
+    pub from: usize,
+    pub when: Option<Condition>,
+    /// How leaders move; none for those led by a truth that is not known yet.
+    pub motion: Option<Motion>,
+}
+
+impl Setup {
+    /// Particles that see each other through `flock`; those that do not follow are led from outside.
+    pub fn new(body: Body, flock: Flock, roles: Vec<Role>, update: Update) -> Self {
+        Self {
+            body,
+            flock,
+            update,
+            present_radius: None,
+            roles,
+            changes: Vec::new(),
+            cuts: Vec::new(),
+            cells: None,
+            loads: Vec::new(),
+            ramp: None,
+            free_edge: None,
+        }
+    }
+}

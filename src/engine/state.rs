@@ -1,0 +1,165 @@
+//! An engine on its way, taken out and put back to the bit.
+//!
+//! The contents of a plan (the body, its neighbours, weights, loads, the leaders' motions) are no part of the
+//! state: they are planned again, and [`digest`] shows whether they came out the same.
+
+use serde::{Deserialize, Serialize};
+
+use super::Engine;
+use super::leaders::Led;
+use super::serde_impls;
+use super::setup::Setup;
+use crate::flock::fracture::Break;
+use crate::flock::law::Weights;
+use crate::flock::role::Role;
+use crate::flock::vectors::Vectors;
+use crate::sweep::Activity;
+
+/// Everything that steps have changed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct EngineState {
+    step: usize,
+    /// Positions now and before the last step \[length\], shape \[count\].
+    #[serde(with = "serde_impls::points")]
+    present: Vectors,
+    #[serde(with = "serde_impls::points")]
+    previous: Vectors,
+    #[serde(with = "serde_impls::roles")]
+    roles: Vec<Role>,
+    leaders: Vec<Leading>,
+    guided: Vec<(usize, [f64; 2])>,
+    #[serde(with = "serde_impls::breaks")]
+    breaks: Vec<Break>,
+    /// Where something moved in the last step, and what was swept so far.
+    activity: Activity,
+    /// Whether each bond is broken, eight to a byte; absent where none can break.
+    broken: Option<Vec<u8>>,
+}
+
+/// A particle under a leader's program, as the engine keeps it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+struct Leading {
+    particle: usize,
+    change: usize,
+    which: usize,
+    since: usize,
+    base: [f64; 2],
+}
+
+/// A state that belongs to another plan.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the state has {found} {what}, the plan {planned}: it belongs to another body")]
+pub struct WrongState {
+    pub what: &'static str,
+    pub found: usize,
+    pub planned: usize,
+}
+
+impl EngineState {
+    pub fn of(engine: &Engine) -> Self {
+        let leading = |&Led { particle, change, which, since, base }: &Led| Leading {
+            particle,
+            change,
+            which,
+            since,
+            base,
+        };
+        let flock = &engine.flock;
+        let packed = |byte: usize, bonds: &crate::flock::fracture::Bonds| {
+            let all = 8 * byte..(8 * byte + 8).min(flock.neighbours.index.len());
+            all.fold(0, |bits, bond| bits | u8::from(bonds.is_broken(bond)) << (bond % 8))
+        };
+        let bytes = flock.neighbours.index.len().div_ceil(8);
+        Self {
+            step: engine.step,
+            present: engine.present.clone(),
+            previous: engine.previous.clone(),
+            roles: engine.roles.clone(),
+            leaders: engine.leaders.iter().map(leading).collect(),
+            guided: engine.guided.clone(),
+            breaks: engine.breaks.clone(),
+            activity: engine.activity.clone(),
+            broken: flock.bonds.as_ref().map(|bonds| (0..bytes).map(|byte| packed(byte, bonds)).collect()),
+        }
+    }
+
+    /// Steps taken.
+    pub fn step(&self) -> usize {
+        self.step
+    }
+
+    /// The engine of this plan, in this state.
+    ///
+    /// # Errors
+    /// A state of another body. A plan with as many of everything is taken for the right one: hold its
+    /// [`digest`] against that of the plan that was run.
+    pub fn engine(self, setup: Setup) -> Result<Engine, WrongState> {
+        let mut engine = Engine::new(setup);
+        self.require_fits(&engine)?;
+        let led =
+            |Leading { particle, change, which, since, base }| Led { particle, change, which, since, base };
+        engine.step = self.step;
+        engine.follow_ramp();
+        engine.present = self.present;
+        engine.previous = self.previous;
+        engine.roles = self.roles;
+        engine.leaders = self.leaders.into_iter().map(led).collect();
+        engine.led = engine.leaders.iter().map(|led| led.particle).collect();
+        engine.guided = self.guided;
+        engine.breaks = self.breaks;
+        if let (Some(bonds), Some(broken)) = (&mut engine.flock.bonds, &self.broken) {
+            bonds.set_broken(|bond| broken[bond / 8] >> (bond % 8) & 1 == 1);
+        }
+        engine.rebuild_caches();
+        engine.activity = self.activity;
+        Ok(engine)
+    }
+
+    fn require_fits(&self, engine: &Engine) -> Result<(), WrongState> {
+        let count = engine.body.count();
+        let require = |what, found, planned| {
+            if found == planned { Ok(()) } else { Err(WrongState { what, found, planned }) }
+        };
+        require("particles", self.present.len(), count)?;
+        require("former places", self.previous.len(), count)?;
+        require("roles", self.roles.len(), count)?;
+        let bits = engine.flock.bonds.as_ref().map(|_| engine.flock.neighbours.index.len().div_ceil(8));
+        require("bytes of bonds", self.broken.as_ref().map_or(0, Vec::len), bits.unwrap_or(0))?;
+        // A number from a file is an index only when it is below what it counts.
+        let require_below = |what, found: usize, planned: usize| {
+            if found < planned { Ok(()) } else { Err(WrongState { what, found, planned }) }
+        };
+        for led in &self.leaders {
+            require_below("role changes", led.change, engine.changes.len())?;
+            require_below(
+                "particles of a role change",
+                led.which,
+                engine.changes[led.change].particles.len(),
+            )?;
+            require_below("led particles", led.particle, count)?;
+            require_below("steps of a leader", led.since, self.step.saturating_add(1))?;
+        }
+        for (particle, _) in &self.guided {
+            require_below("guided particles", *particle, count)?;
+        }
+        for particle in self.breaks.iter().flat_map(|one| one.pair) {
+            require_below("particles of broken bonds", particle as usize, count)?;
+        }
+        Ok(())
+    }
+}
+
+impl Engine {
+    /// Finds again what follows from roles, bonds and positions that were put in from outside.
+    fn rebuild_caches(&mut self) {
+        if let Some(present) = &mut self.present_neighbours {
+            present.members = self.roles.iter().map(|role| role.is_body()).collect();
+            if self.step > 0 {
+                // Those of a step are found where it begins.
+                let super::PresentNeighbours { radius, grid, members } = present;
+                self.flock.neighbours.rebuild_within(grid, &self.previous, members, *radius);
+            }
+        }
+        self.compile_sweep();
+    }
+}
