@@ -86,49 +86,60 @@ fn scene_knows_nothing_of_hosts_and_outputs() {
 }
 
 #[test]
+fn the_engine_knows_no_scene() {
+    assert_imports_only("engine", &["geometry", "flock", "material", "sweep"]);
+}
+
+#[test]
 fn continuum_knows_nothing_of_outputs() {
-    assert_imports_only("continuum", &["geometry", "flock", "solve", "scene", "material", "sweep"]);
+    assert_imports_only("continuum", &["geometry", "flock", "solve", "scene", "material", "sweep", "engine"]);
 }
 
 #[test]
 fn the_comparison_knows_nothing_of_outputs() {
     assert_imports_only(
         "compare",
-        &["geometry", "scene", "continuum", "flock", "material", "solve", "fem", "sweep"],
+        &["geometry", "scene", "continuum", "engine", "flock", "material", "solve", "fem", "sweep"],
     );
 }
 
 #[test]
 fn trade_stands_on_compare_and_knows_nothing_of_outputs() {
-    assert_imports_only("trade", &["geometry", "scene", "continuum", "flock", "solve", "compare", "sweep"]);
+    assert_imports_only(
+        "trade",
+        &["geometry", "scene", "continuum", "engine", "flock", "solve", "compare", "sweep"],
+    );
 }
 
 #[test]
 fn stability_knows_nothing_of_outputs() {
     assert_imports_only(
         "stability",
-        &["geometry", "scene", "continuum", "flock", "material", "solve", "sweep"],
+        &["geometry", "scene", "continuum", "engine", "flock", "material", "solve", "sweep"],
     );
 }
 
 #[test]
 fn the_swarm_knows_nothing_of_middleware_and_outputs() {
-    assert_imports_only("swarm", &["geometry", "scene", "continuum", "flock", "material", "solve", "sweep"]);
+    assert_imports_only(
+        "swarm",
+        &["geometry", "scene", "continuum", "engine", "flock", "material", "solve", "sweep"],
+    );
 }
 
 #[test]
 fn ros_is_an_edge_of_the_swarm() {
-    assert_imports_only("ros", &["scene", "continuum", "flock", "swarm"]);
+    assert_imports_only("ros", &["scene", "continuum", "engine", "flock", "swarm"]);
 }
 
 #[test]
 fn shared_memory_is_an_edge_of_the_swarm_and_of_the_continuum() {
-    assert_imports_only("shm", &["scene", "continuum", "flock", "swarm"]);
+    assert_imports_only("shm", &["scene", "continuum", "engine", "flock", "swarm"]);
 }
 
 #[test]
 fn recordings_stand_on_the_edge_and_know_nothing_of_figures() {
-    assert_imports_only("record", &["scene", "continuum", "flock", "swarm", "ros"]);
+    assert_imports_only("record", &["scene", "continuum", "engine", "flock", "swarm", "ros"]);
 }
 
 /// Files of `src` that contain a word.

@@ -157,7 +157,7 @@ fn who_finds_neighbours_anew_does_not_hang_on_the_order_either() {
 fn neighbours_last_however_far_they_go() {
     let outcome = ended(plan(&TORN.replace("stretch = 1.25", "stretch = 100.0"), &table(&patch())));
     let neighbours = &outcome.engine.flock().neighbours;
-    assert_eq!(*neighbours, plan(TORN, &table(&patch())).flock.neighbours);
+    assert_eq!(*neighbours, plan(TORN, &table(&patch())).setup.flock.neighbours);
 }
 
 /// A square lattice whose neighbours come in the order of their numbers, pulled.
@@ -183,7 +183,8 @@ steps = 80
 #[test]
 fn a_lattice_written_out_as_points_is_that_lattice() {
     let lattice = plan(LATTICE, "");
-    let rows: Vec<Row> = lattice.body.reference.iter().zip(1..).map(|(place, id)| (id, place)).collect();
+    let rows: Vec<Row> =
+        lattice.setup.body.reference.iter().zip(1..).map(|(place, id)| (id, place)).collect();
     let body = LATTICE.lines().find(|line| line.starts_with("body")).expect("there");
     let mut text = LATTICE.replace(body, "body = { shape = { kind = \"points\", file = \"cloud.csv\" } }");
     for (key, with) in
@@ -193,8 +194,8 @@ fn a_lattice_written_out_as_points_is_that_lattice() {
         text = text.replace(line, with);
     }
     let points = plan(&text, &table(&shuffled(&rows, 11)));
-    assert_eq!(points.body.reference, lattice.body.reference, "the order is the lattice's own");
-    assert_eq!(points.flock.neighbours, lattice.flock.neighbours);
+    assert_eq!(points.setup.body.reference, lattice.setup.body.reference, "the order is the lattice's own");
+    assert_eq!(points.setup.flock.neighbours, lattice.setup.flock.neighbours);
     let share =
         |plan: &Plan| Sweep::compile(plan.setup.update, &plan.setup.flock, &plan.setup.roles).share_in_runs();
     assert_eq!(share(&points), share(&lattice));
@@ -214,14 +215,14 @@ fn a_lattice_written_out_as_points_is_that_lattice() {
 fn a_checkpoint_belongs_to_the_order_that_the_outputs_have() {
     let rows = patch();
     let [here, there] = [rows.clone(), shuffled(&rows, 3)].map(|rows| plan(TORN, &table(&rows)));
-    assert_eq!(here.body.reference, there.body.reference);
+    assert_eq!(here.setup.body.reference, there.setup.body.reference);
     assert_ne!(digest(&here), digest(&there));
     assert_eq!(digest(&here), digest(&plan(TORN, &table(&rows))));
 }
 
 #[test]
 fn a_cloud_in_other_units_has_their_spacing() {
-    let spacing = |text: &str| plan(text, &table(&patch())).body.lattice.spacing();
+    let spacing = |text: &str| plan(text, &table(&patch())).setup.body.lattice.spacing();
     let scaled = TORN
         .replace("file = \"cloud.csv\"", "file = \"cloud.csv\", scale = 2.0")
         .replace("radius = 1.5", "radius = 3.0");

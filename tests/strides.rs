@@ -113,7 +113,7 @@ fn what_is_swept_is_what_moves_and_the_plan_foresees_it() {
 fn a_frame_that_looks_before_the_sweep_is_taken_along() {
     let scene = scene("tension", &["stop.steps=300"]);
     assert_same(&scene, &|_| usize::MAX, "the paper's frame");
-    let steps_at_once = |scene: &Scene| Engine::new(plan(scene)).steps_at_once(16);
+    let steps_at_once = |scene: &Scene| Engine::new(plan(scene).setup).steps_at_once(16);
     assert_eq!(steps_at_once(&scene), 16);
     assert_eq!(steps_at_once(&bundled("tension-immediate").expect("bundled").load(&[]).expect("valid")), 0);
 }

@@ -1,6 +1,7 @@
 //! How far motion can have come: one neighbour a step.
 
 use super::plan::Plan;
+use crate::engine::setup::Setup;
 use crate::engine::several::looks_at_every_step;
 use crate::flock::neighbourhood::Neighbours;
 use crate::sweep::Sweep;
@@ -9,9 +10,9 @@ use crate::sweep::Sweep;
 /// are known to change nothing and are left out. `None` where every update is made: the sweep of this scene does not
 /// look for what stands still.
 pub fn active_share(plan: &Plan) -> Option<f64> {
-    let Plan { body, flock, changes, .. } = plan;
-    let looks = looks_at_every_step(plan.setup.present_radius.is_some(), flock, changes);
-    let sweep = || Sweep::compile(plan.setup.update, &plan.setup.flock, &plan.setup.roles);
+    let Setup { body, flock, changes, update, roles, present_radius, .. } = &plan.setup;
+    let looks = looks_at_every_step(present_radius.is_some(), flock, changes);
+    let sweep = || Sweep::compile(*update, flock, roles);
     // A load moves all of a body at once.
     if looks || flock.forces.is_some() || !sweep().takes_several(body.frame.as_ref()) {
         return None;
@@ -28,6 +29,7 @@ fn first_motions(plan: &Plan, steps: usize) -> Vec<usize> {
     let mut begins = vec![steps + 1; plan.count()];
     // Particles that are moved, and those that are released.
     let mut starts: Vec<(usize, usize)> = plan
+        .setup
         .changes
         .iter()
         .filter(|change| change.motion.is_some() || change.from > 1)

@@ -1,6 +1,7 @@
 //! Whether two plans are the same.
 
 use super::plan::Plan;
+use crate::engine::setup::Setup;
 use crate::flock::law::Weights;
 use crate::flock::vectors::Vectors;
 
@@ -8,7 +9,8 @@ use crate::flock::vectors::Vectors;
 /// FNV-1a (G. Fowler, L. C. Noll, K.-P. Vo). Not secure against forgery.
 pub fn digest(plan: &Plan) -> u64 {
     let mut digest = Fnv(0xcbf2_9ce4_8422_2325);
-    let Plan { body, flock, update, present_radius, roles, changes, cuts, stop, probes, ramp, .. } = plan;
+    let Plan { setup, stop, probes, .. } = plan;
+    let Setup { body, flock, update, present_radius, roles, changes, cuts, ramp, .. } = setup;
     digest.points(&body.reference);
     digest.text(&format!("{update:?} {present_radius:?} {stop:?} {:?} {cuts:?}", flock.rule));
     roles.iter().for_each(|role| digest.text(role.name()));

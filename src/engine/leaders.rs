@@ -107,7 +107,7 @@ impl Engine {
     }
 
     /// Whether a leader's motion goes on after this step.
-    fn goes_on(&self, led: &Led) -> bool {
+    pub(super) fn goes_on(&self, led: &Led) -> bool {
         let duration = self.changes[led.change].motion.as_ref().map(|motion| motion.duration());
         match duration {
             None => false,

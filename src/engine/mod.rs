@@ -7,7 +7,7 @@
 
 pub mod forces;
 mod leaders;
-mod load;
+pub mod load;
 pub mod movement;
 pub mod observer;
 pub mod path;
@@ -27,7 +27,7 @@ use crate::flock::pseudo_energy::{pe1, pe2};
 use crate::flock::role::Role;
 use crate::flock::rules::Rule;
 use crate::flock::strain::{Strain, strain};
-use crate::flock::vectors::{Vectors, distance};
+use crate::flock::vectors::Vectors;
 use crate::material::cells::Cells;
 use crate::material::free_edge::{Edge, FreeEdge};
 use crate::sweep::{Activity, Order, Sweep, Update};

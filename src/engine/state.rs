@@ -10,7 +10,6 @@ use super::leaders::Led;
 use super::serde_impls;
 use super::setup::Setup;
 use crate::flock::fracture::Break;
-use crate::flock::law::Weights;
 use crate::flock::role::Role;
 use crate::flock::vectors::Vectors;
 use crate::sweep::Activity;

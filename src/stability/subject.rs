@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use crate::continuum::plan::Plan;
 use crate::engine::Engine;
+use crate::engine::setup::Setup;
 use crate::flock::role::Role;
 use crate::flock::rules::{Feedback, FeedbackReference, Mean, Rotation};
 use crate::scene::{Scene, SceneError};
@@ -110,7 +111,7 @@ impl Subject {
 
     /// The body in an engine, at rest.
     pub fn engine(&self) -> Engine {
-        Engine::new(self.plan.clone())
+        Engine::new(self.plan.setup.clone())
     }
 
     /// Distance of neighbours \[length\].
@@ -144,7 +145,7 @@ impl Subject {
 
     /// Refuses followers in a part of the body without leaders and clamps: nothing brings them back to rest.
     fn require_held(&self, scene: &Scene) -> Result<(), SceneError> {
-        let Plan { body, flock, roles, .. } = &self.plan;
+        let Setup { body, flock, roles, .. } = &self.plan.setup;
         let labels = body.components(&flock.neighbours);
         let mut held = vec![false; labels.len()];
         for (&label, _) in labels.iter().zip(roles).filter(|(_, role)| **role == Role::Clamped) {

@@ -97,7 +97,7 @@ steps = [
                 "{ kind = \"velocity\", per_step = [0.0, 0.0] }",
             );
             let laid_out = solved(&scene(&lattice, &still).expect("a scene")).0;
-            table(&file, &laid_out.body.reference, exact, |[x, y]| x.max(y) > 11.999);
+            table(&file, &laid_out.setup.body.reference, exact, |[x, y]| x.max(y) > 11.999);
             let scene =
                 scene_in(&lattice, parts, Some(folder.path())).unwrap_or_else(|error| panic!("{error}"));
             let (plan, outcome) = solved(&scene);
@@ -128,7 +128,7 @@ loads = [{ kind = "traction", region = { kind = "edge", side = "right" }, tracti
                 "{ kind = \"velocity\", per_step = [0.0, 0.0] }",
             );
             let laid_out = solved(&scene(&lattice, &still).expect("a scene")).0;
-            table(&folder.path().join("exact.csv"), &laid_out.body.reference, exact, |[x, _]| x < 1e-6);
+            table(&folder.path().join("exact.csv"), &laid_out.setup.body.reference, exact, |[x, _]| x < 1e-6);
             let scene =
                 scene_in(&lattice, parts, Some(folder.path())).unwrap_or_else(|error| panic!("{error}"));
             let (plan, outcome) = solved(&scene);

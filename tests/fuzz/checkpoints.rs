@@ -4,12 +4,13 @@ use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::Duration;
 
+use flockform::continuum::digest::digest;
 use flockform::continuum::plan::Plan;
 use flockform::continuum::record::{ProbeSeries, Snapshot};
 use flockform::continuum::run::resume;
 use flockform::engine::Engine;
 use flockform::engine::observer::EachStep;
-use flockform::engine::state::{EngineState, digest};
+use flockform::engine::state::EngineState;
 use flockform::export::checkpoint::{self, Checkpoint, RunRequest};
 use flockform::scene::{Scene, bundled};
 

@@ -1,6 +1,8 @@
 //! A continuum scene as a formation.
 
-use flockform::continuum::{engine::Engine, plan::Plan, record::ProbeSeries};
+use flockform::continuum::plan::Plan;
+use flockform::continuum::record::ProbeSeries;
+use flockform::engine::Engine;
 use flockform::export::OutputFolder;
 use flockform::export::csv::write_probes;
 use flockform::flock::vectors::Vectors;
@@ -29,7 +31,7 @@ fn ideal_robots_fly_the_bits_of_the_continuum_run() {
         let swarm = parse(&text).unwrap_or_else(|error| panic!("{error}"));
         let mut flight = Flight::new(&swarm).unwrap_or_else(|error| panic!("{error}"));
         let scene = scene::bundled(name).expect("bundled").load(&[]).expect("valid");
-        let mut engine = Engine::new(Plan::new(&scene).expect("planned"));
+        let mut engine = Engine::new(Plan::new(&scene).expect("planned").setup);
         for _ in 0..60 {
             flight.step();
             engine.advance();
@@ -108,7 +110,7 @@ fn a_recorded_run_is_flown_step_by_step() {
         .expect("bundled")
         .load(&["record.probes=[67, 68, 115]".into()])
         .expect("valid");
-    let mut engine = Engine::new(Plan::new(&scene).expect("planned"));
+    let mut engine = Engine::new(Plan::new(&scene).expect("planned").setup);
     let mut probes: Vec<ProbeSeries> = [66, 67, 114].map(ProbeSeries::new).into();
     probes.iter_mut().for_each(|probe| probe.record(&engine));
     for _ in 0..30 {

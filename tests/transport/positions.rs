@@ -14,7 +14,7 @@ use super::support::*;
 
 fn engine() -> Engine {
     let scene = bundled("tension").expect("bundled").load(&[]).expect("valid");
-    Engine::new(Plan::new(&scene).expect("planned"))
+    Engine::new(Plan::new(&scene).expect("planned").setup)
 }
 
 fn open(name: &str, engine: &Engine) -> Positions {
@@ -50,7 +50,7 @@ fn a_body_given_as_points_is_shown_by_its_ids_and_in_the_order_of_its_file() {
     let text = "title = \"points\"\nneighbours = { kind = \"within\", radius = 1.2 }\n\
                 body = { shape = { kind = \"points\", file = \"cloud.csv\" } }\n";
     let scene = Scene::parse("points", "points.toml", text, &[], Some(folder.path())).expect("valid");
-    let engine = Engine::new(Plan::new(&scene).expect("planned"));
+    let engine = Engine::new(Plan::new(&scene).expect("planned").setup);
     let name = domain_name();
     let peer = domain(&name).join("test").expect("shared memory");
     let mut shown = open(&name, &engine);

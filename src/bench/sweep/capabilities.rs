@@ -61,7 +61,7 @@ pub fn measure(side: usize, repetitions: usize, seconds: f64) -> Vec<Capability>
     NAMED
         .iter()
         .map(|&(name, keys, recorded)| {
-            let mut engine = Engine::new(plan(side, keys));
+            let mut engine = Engine::new(plan(side, keys).setup);
             let mut time = || time(&mut engine, steps, recorded);
             time();
             let (mut times, mut ratios): (Vec<f64>, Vec<f64>) = (0..repetitions)

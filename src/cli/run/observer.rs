@@ -21,19 +21,19 @@ const BETWEEN_LOOKS: Duration = Duration::from_millis(200);
 const UPDATES_BETWEEN_LOOKS: usize = 1 << 28;
 
 /// Records, publications, progress, checkpoints, and the interrupt that ends them.
-pub struct RunObserver<'a> {
+pub struct RunObserver<'a, 'f> {
     pub recorder: Recorder<'a>,
     /// Positions shown to other processes.
     pub shown: Option<Positions>,
     pub messages: Option<BodyMessages>,
     pub progress: Progress,
     pub checkpointer: Checkpointer<'a>,
-    pub folder: &'a mut OutputFolder,
+    pub folder: &'f mut OutputFolder,
     pub looks: Looks,
     pub interrupted: &'static AtomicBool,
 }
 
-impl Observer for RunObserver<'_> {
+impl Observer for RunObserver<'_, '_> {
     fn next(&mut self, step: usize) -> usize {
         self.looks.next(step).min(self.recorder.next(step))
     }

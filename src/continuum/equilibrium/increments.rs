@@ -33,7 +33,7 @@ pub(super) fn settle_each(
 ) -> Result<Outcome, SceneError> {
     let whole = plan.setup.flock.forces.clone();
     let spacing = plan.setup.body.lattice.spacing();
-    let mut engine = Engine::new(plan.clone());
+    let mut engine = Engine::new(plan.setup.clone());
     engine.set_load_factor(0.0);
     let mut outcome =
         Outcome { engine, reason: StopReason::Equilibrium, residual: f64::INFINITY, solved: None };

@@ -3,6 +3,7 @@
 use std::ops::ControlFlow;
 
 use super::*;
+use crate::continuum::digest::digest;
 use crate::scene::{Scene, bundled};
 
 fn scene(name: &str, sets: &[&str]) -> Scene {
@@ -97,8 +98,8 @@ fn a_run_that_had_come_to_rest_takes_no_further_step() {
 
 #[test]
 fn a_state_of_another_body_is_refused() {
-    let state = EngineState::of(&Engine::new(plan(&scene("tension", &[]))));
-    let error = state.engine(plan(&scene("fracture", &[]))).expect_err("another body");
+    let state = EngineState::of(&Engine::new(plan(&scene("tension", &[])).setup));
+    let error = state.engine(plan(&scene("fracture", &[])).setup).expect_err("another body");
     assert!(error.to_string().contains("144 particles"), "{error}");
 }
 

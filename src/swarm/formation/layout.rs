@@ -4,6 +4,7 @@ use super::{Formation, Lead, TargetSource, inside, links, spacing_of};
 use crate::continuum::layout::Layout;
 use crate::continuum::plan::Plan;
 use crate::engine::Engine;
+use crate::engine::setup::Setup;
 use crate::flock::body::Body;
 use crate::flock::law::{Flock, Weights};
 use crate::flock::manoeuvre::{Manoeuvre, Posture};
@@ -27,7 +28,7 @@ impl Formation {
         let formation = match &swarm.shape {
             Shape::Places(rule) => of_places(swarm, *rule)?,
             Shape::Body(scene) => of_body(swarm, scene)?,
-            Shape::Scene(scene) => of_scene(swarm, Plan::new(scene)?, true),
+            Shape::Scene(scene) => of_particles(swarm, Plan::new(scene)?.setup, true),
             Shape::Inside(scene) => inside_of(swarm, scene)?,
             Shape::Recorded(scene, recording) => recorded(swarm, scene, recording)?,
         };
@@ -79,10 +80,9 @@ fn of_places(swarm: &Swarm, rule: Rule) -> Result<Formation, SceneError> {
     }
     let roles = leads.iter().map(|lead| if lead.is_some() { Role::Leader } else { Role::Follower }).collect();
     let update = Update { damping: default_damping(rule), ..Update::default() };
-    let mut plan = Plan::of_places(body, flock, roles, update);
-    plan.setup.present_radius = present_radius;
+    let setup = Setup { present_radius, ..Setup::new(body, flock, roles, update) };
     let radius = |k: usize| swarm.raw.robots[k].radius.unwrap_or(swarm.raw.radius);
-    let mut formation = of_scene(swarm, plan, false);
+    let mut formation = of_particles(swarm, setup, false);
     formation.radii = (0..formation.count()).map(radius).collect();
     (formation.names, formation.leads) = (names, leads);
     Ok(formation)
@@ -119,16 +119,16 @@ fn of_body(swarm: &Swarm, scene: &Scene) -> Result<Formation, SceneError> {
             motion: None,
         });
     }
-    let mut formation = of_scene(swarm, Plan::new(&led)?, false);
+    let mut formation = of_particles(swarm, Plan::new(&led)?.setup, false);
     (formation.names, formation.leads) = (names, leads);
     Ok(formation)
 }
 
-/// The members are the particles of the plan's body, its frame left out.
-fn of_scene(swarm: &Swarm, plan: Plan, is_scene: bool) -> Formation {
-    let particles: Vec<usize> = plan.setup.body.body_particles().collect();
-    let places: Vectors = particles.iter().map(|&i| plan.setup.body.reference.get(i)).collect();
-    let course = TargetSource::Rule { engine: Box::new(Engine::new(plan.setup)), particles };
+/// The members are the particles of the body, its frame left out.
+fn of_particles(swarm: &Swarm, setup: Setup, is_scene: bool) -> Formation {
+    let particles: Vec<usize> = setup.body.body_particles().collect();
+    let places: Vectors = particles.iter().map(|&i| setup.body.reference.get(i)).collect();
+    let course = TargetSource::Rule { engine: Box::new(Engine::new(setup)), particles };
     formation(swarm, numbered(swarm, places.len()), places, course, is_scene)
 }
 
