@@ -16,11 +16,9 @@
 //! * [`material`]: rule weights from Young's modulus and Poisson's ratio, and what material a rule is.
 //! * [`engine`]: one step of a body after the other: leaders, roles, bonds, loads; used by continuum and swarm alike.
 //! * [`continuum`]: plans a scene, steps it or goes straight to rest, and hands what happens to an observer.
-//! * [`stability`]: when a body grows instead of coming to rest, predicted and measured; extreme input.
+//! * [`study`]: many runs of a scene: rule against finite elements, accuracy against cost, stability and its thresholds.
 //! * `export` (feature `export`): CSV, JSON, VTK and figures, one file per format.
 //! * `fem` (feature `fem`): finite elements, the reference for the rules; it imports no flock.
-//! * `compare` (feature `fem`): rule and finite elements on the same body, and their differences.
-//! * `trade` (feature `fem`): what accuracy costs: many settings of a scene against its reference.
 //! * `swarm` (feature `swarm`): formations of robots: targets by the same rule, made safe; flights of simulated robots.
 //! * `ros` (feature `ros`): the same over ROS 2: arguments, messages, parameters, lifecycle, the node.
 //! * `shm` (feature `shm`): the same over shared memory, without a copy; a running body published to other processes.
@@ -46,13 +44,11 @@ pub mod guide;
 pub mod material;
 pub mod scene;
 pub mod solve;
-pub mod stability;
+pub mod study;
 pub mod sweep;
 
 #[cfg(feature = "bench")]
 pub mod bench;
-#[cfg(feature = "fem")]
-pub mod compare;
 #[cfg(feature = "export")]
 pub mod export;
 #[cfg(feature = "fem")]
@@ -65,8 +61,6 @@ pub mod ros;
 pub mod shm;
 #[cfg(feature = "swarm")]
 pub mod swarm;
-#[cfg(feature = "fem")]
-pub mod trade;
 
 /// The README's Rust code, compiled and run with the other doctests.
 #[cfg(doctest)]

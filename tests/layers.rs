@@ -96,26 +96,10 @@ fn continuum_knows_nothing_of_outputs() {
 }
 
 #[test]
-fn the_comparison_knows_nothing_of_outputs() {
+fn studies_know_nothing_of_outputs() {
     assert_imports_only(
-        "compare",
-        &["geometry", "scene", "continuum", "engine", "flock", "material", "solve", "fem", "sweep"],
-    );
-}
-
-#[test]
-fn trade_stands_on_compare_and_knows_nothing_of_outputs() {
-    assert_imports_only(
-        "trade",
-        &["geometry", "scene", "continuum", "engine", "flock", "solve", "compare", "sweep"],
-    );
-}
-
-#[test]
-fn stability_knows_nothing_of_outputs() {
-    assert_imports_only(
-        "stability",
-        &["geometry", "scene", "continuum", "engine", "flock", "material", "solve", "sweep"],
+        "study",
+        &["geometry", "scene", "continuum", "engine", "flock", "material", "solve", "sweep", "fem"],
     );
 }
 

@@ -5,11 +5,11 @@ use flockform::engine::Engine;
 use flockform::flock::vectors::Vectors;
 use flockform::scene::{Scene, SceneError, bundled};
 use flockform::solve::spectrum::scatter;
-use flockform::stability::bisection::{Effort, growth};
-use flockform::stability::extremes::{self, Case, Outcome};
-use flockform::stability::study::{Linear, Options, Study, run};
-use flockform::stability::subject::{Parameter, Subject};
-use flockform::stability::thresholds::Side;
+use flockform::study::stability::bisection::{Effort, growth};
+use flockform::study::stability::extremes::{self, Case, Outcome};
+use flockform::study::stability::study::{Linear, Options, Study, run};
+use flockform::study::stability::subject::{Parameter, Subject};
+use flockform::study::stability::thresholds::Side;
 
 /// A body without its frame has fewer particles.
 const NO_PROBES: &str = "record.probes=[]";
@@ -36,7 +36,7 @@ fn linear(name: &str, overrides: &[&str]) -> Linear {
 /// Predicted and found, which must agree.
 fn threshold(linear: &Linear, parameter: Parameter, side: Side) -> [f64; 2] {
     let is_it = |t: &&_| -> bool {
-        let t: &flockform::stability::study::Threshold = t;
+        let t: &flockform::study::stability::study::Threshold = t;
         t.parameter == parameter && t.side == side
     };
     let one = linear.thresholds.iter().find(is_it).expect("looked for");

@@ -2,12 +2,12 @@
 
 use std::ops::ControlFlow;
 
-use flockform::compare::run::compare;
 use flockform::fem::Effort;
 use flockform::scene::raw::RawLattice;
 use flockform::scene::{Scene, SceneError, bundled};
 use flockform::solve::equilibrium::{Precision, Solver};
-use flockform::trade::{Grid, Outcome, RuleChoice, Study, choose, run};
+use flockform::study::compare::run::compare;
+use flockform::study::trade::{Grid, Outcome, RuleChoice, Study, choose, run};
 
 fn study(name: &str, grid: &Grid) -> Study {
     let scene = bundled(name).expect("bundled");

@@ -4,34 +4,27 @@ use std::ops::ControlFlow;
 use std::process::ExitCode;
 
 use clap::Args;
-use flockform::compare::run::{Compared, compare as compare_scene};
 use flockform::continuum::run::StopReason;
 use flockform::export::comparison::{ComparisonReport, write_comparison};
 use flockform::export::report;
 use flockform::fem::Effort;
 use flockform::flock::rules::Rotation;
 use flockform::scene::Scene;
-use flockform::trade::{Chosen, choose};
+use flockform::study::compare::run::{Compared, compare as compare_scene};
+use flockform::study::trade::{Chosen, choose};
 
-use super::output::{OutputArguments, ReportArguments};
+use super::Refusal;
 use super::progress::Progress;
 use super::run::exit_code;
-use super::{Refusal, SceneArguments, interrupt, print, say};
+use super::study::StudyArguments;
 
 #[derive(Debug, Args)]
 pub struct CompareArguments {
     #[command(flatten)]
-    scene: SceneArguments,
-    #[command(flatten)]
-    output: OutputArguments,
-    #[command(flatten)]
-    report: ReportArguments,
+    study: StudyArguments,
     /// Largest relative error of displacement that the finite elements may state of themselves
     #[arg(long, value_name = "E", default_value_t = Effort::default().target, value_parser = part_of_one)]
     truth_error: f64,
-    /// Print compare.json instead of a table
-    #[arg(long, conflicts_with = "quiet")]
-    json: bool,
 }
 
 fn part_of_one(text: &str) -> Result<f64, String> {
@@ -43,11 +36,11 @@ fn part_of_one(text: &str) -> Result<f64, String> {
 
 /// Compares a scene's rule with its truth, prints the measures and writes what comes of it.
 pub fn compare(arguments: &CompareArguments) -> Result<ExitCode, Refusal> {
-    let open = &arguments.scene;
+    let open = &arguments.study.scene;
     let Chosen { scene, words: chosen } = choose(open.load(None)?, &|more: &[String]| open.load_scene(more))?;
-    let folder = arguments.output.folder(&format!("{}-compare", scene.name))?;
+    let folder = arguments.study.output.folder(&format!("{}-compare", scene.name))?;
     let effort = Effort { target: arguments.truth_error, ..Effort::default() };
-    let mut progress = Progress::new(arguments.output.quiet, scene.stop.steps);
+    let mut progress = Progress::new(arguments.study.output.quiet, scene.stop.steps);
     let compared = compare_scene(&scene, &effort, &mut |engine, residual| {
         progress.step(engine.step(), residual);
         ControlFlow::Continue(())
@@ -56,15 +49,14 @@ pub fn compare(arguments: &CompareArguments) -> Result<ExitCode, Refusal> {
 
     let report = ComparisonReport::new(&scene, &compared);
     write_comparison(&folder, &scene, &compared, &report)?;
-    if !arguments.report.no_report {
+    if !arguments.study.report.no_report {
         report::comparison::write(&folder, &scene, &compared, &report)?;
     }
-    let kept = interrupt::commit(folder)?;
-    if arguments.json {
-        print(&format!("{:#}\n", serde_json::json!(report)));
-    } else if !arguments.output.quiet {
-        say(&format!("{chosen}{}results in {}\n", words(&scene, &compared), kept.display()));
-    }
+    arguments.study.finish(
+        folder,
+        || format!("{:#}\n", serde_json::json!(report)),
+        || chosen + &words(&scene, &compared),
+    )?;
     Ok(exit_code(&compared.outcome))
 }
 

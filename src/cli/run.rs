@@ -10,7 +10,6 @@ use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use clap::Args;
-use flockform::compare::run::plan;
 use flockform::continuum::digest::digest;
 use flockform::continuum::equilibrium::run_to_equilibrium_watched;
 use flockform::continuum::run::{Outcome, StopReason, resume};
@@ -23,7 +22,8 @@ use flockform::scene::{LoadSteps, Scene, bundled};
 use flockform::shm::Domain;
 use flockform::shm::positions::Positions;
 use flockform::solve::interrupt::Interrupt;
-use flockform::trade::{Chosen, choose};
+use flockform::study::compare::run::plan;
+use flockform::study::trade::{Chosen, choose};
 use observer::{Looks, RunObserver};
 use recorder::{Recorder, Records};
 use words::{closing_words, where_to_look};

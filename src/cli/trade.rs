@@ -5,20 +5,16 @@ use std::process::ExitCode;
 use clap::Args;
 use flockform::export::report;
 use flockform::export::trade::write_trade;
-use flockform::trade::{Grid, run};
+use flockform::study::trade::{Grid, run};
 
-use super::output::{OutputArguments, ReportArguments};
+use super::Refusal;
 use super::progress::Stages;
-use super::{Refusal, SceneArguments, interrupt, print, say};
+use super::study::StudyArguments;
 
 #[derive(Debug, Args)]
 pub struct TradeArguments {
     #[command(flatten)]
-    scene: SceneArguments,
-    #[command(flatten)]
-    output: OutputArguments,
-    #[command(flatten)]
-    report: ReportArguments,
+    study: StudyArguments,
     /// Runs of each setting, of which the median time counts
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u16).range(1..))]
     repeats: u16,
@@ -28,9 +24,6 @@ pub struct TradeArguments {
     /// A few settings, once each: a trial run, whose figures mean nothing
     #[arg(long)]
     quick: bool,
-    /// Print trade.json instead of a table
-    #[arg(long, conflicts_with = "quiet")]
-    json: bool,
 }
 
 /// Runs the scene in many settings and writes what each costs.
@@ -42,22 +35,17 @@ pub fn trade(arguments: &TradeArguments) -> Result<ExitCode, Refusal> {
         Grid { repeats, max_particles, ..Grid::default() }
     };
     // Asked for first, so that a misspelt name is a misspelt name.
-    let name = arguments.scene.load([])?.name;
-    let folder = arguments.output.folder(&format!("{name}-trade"))?;
-    let load = |more: &[String]| arguments.scene.load_scene(more);
-    let mut stages = Stages::new(arguments.output.quiet);
+    let name = arguments.study.scene.load([])?.name;
+    let folder = arguments.study.output.folder(&format!("{name}-trade"))?;
+    let load = |more: &[String]| arguments.study.scene.load_scene(more);
+    let mut stages = Stages::new(arguments.study.output.quiet);
     let study = run(&load, &grid, &mut |setting| stages.next(&setting.to_string()));
     stages.finish();
     let study = study?;
     write_trade(&folder, &study)?;
-    if !arguments.report.no_report {
+    if !arguments.study.report.no_report {
         report::trade::write(&folder, &study)?;
     }
-    let kept = interrupt::commit(folder)?;
-    if arguments.json {
-        print(&format!("{:#}\n", serde_json::json!(study)));
-    } else if !arguments.output.quiet {
-        say(&format!("{study}results in {}\n", kept.display()));
-    }
+    arguments.study.finish(folder, || format!("{:#}\n", serde_json::json!(study)), || study.to_string())?;
     Ok(ExitCode::SUCCESS)
 }

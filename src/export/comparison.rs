@@ -9,12 +9,12 @@ use super::csv::write;
 use super::error::{ExportError, write_file};
 use super::figures::{self, Pair};
 use super::{OutputFolder, summary};
-use crate::compare::measures::Comparison;
-use crate::compare::places::PlaceComparison;
-use crate::compare::run::Compared;
 use crate::scene::Scene;
 use crate::scene::raw::RawScene;
 use crate::scene::units::Units;
+use crate::study::compare::measures::Comparison;
+use crate::study::compare::places::PlaceComparison;
+use crate::study::compare::run::Compared;
 
 /// The contents of `compare.json`; lengths in the scene's unit, infinities as `null`.
 #[derive(Clone, Debug, Serialize)]

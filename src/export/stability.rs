@@ -10,8 +10,8 @@ use super::error::{ExportError, write_file};
 use super::figures::chart::{Axis, Chart, Landmark, Series, Style, draw_below_each_other};
 use super::figures::{self, SERIES};
 use super::{OutputFolder, summary};
-use crate::stability::bisection::Growth;
-use crate::stability::study::{Linear, Study, Sweep, Threshold};
+use crate::study::stability::bisection::Growth;
+use crate::study::stability::study::{Linear, Study, Sweep, Threshold};
 
 #[derive(Serialize)]
 struct Report<'a> {

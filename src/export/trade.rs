@@ -11,7 +11,7 @@ use super::figures::chart::{Axis, Chart, Landmark, Series, Style, draw};
 use super::figures::{self, INK, SERIES};
 use super::{OutputFolder, summary};
 use crate::solve::equilibrium::Solver;
-use crate::trade::{Outcome, Point, RuleChoice, Study};
+use crate::study::trade::{Outcome, Point, RuleChoice, Study};
 
 #[derive(Serialize)]
 struct Report<'a> {

@@ -2,13 +2,13 @@
 
 use std::path::Path;
 
-use flockform::compare::measures::{Comparison, Sides};
-use flockform::compare::run::{SceneTruth, truth_of};
 use flockform::fem::Effort;
 use flockform::flock::body::Body;
 use flockform::flock::rules::Rotation;
 use flockform::flock::vectors::Vectors;
 use flockform::scene::bundled;
+use flockform::study::compare::measures::{Comparison, Sides};
+use flockform::study::compare::run::{SceneTruth, truth_of};
 
 use crate::support::*;
 

@@ -1,12 +1,12 @@
 //! The measures are zero for equal fields and known for fields that differ in a known way.
 
-use flockform::compare::measures::{Comparison, Sides, von_mises};
 use flockform::flock::rules::Rotation;
 use flockform::flock::vectors::Vectors;
 use flockform::material::cells::Cells;
 use flockform::material::elastic::Plane;
 use flockform::material::stress::strain_energy;
 use flockform::material::weights::MaterialWeights;
+use flockform::study::compare::measures::{Comparison, Sides, von_mises};
 
 use crate::support::*;
 

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use flockform::compare::run::Compared;
 use flockform::export::comparison::{ComparisonReport, write_comparison};
 use flockform::export::{ExportError, OutputFolder};
 use flockform::scene::bundled;
+use flockform::study::compare::run::Compared;
 use resvg::usvg::roxmltree::{Document, Node};
 
 use crate::support::*;

@@ -2,9 +2,9 @@
 
 use std::ops::ControlFlow;
 
-use flockform::compare::run::{compare, plan};
 use flockform::fem::Effort;
 use flockform::scene::{Scene, bundled};
+use flockform::study::compare::run::{compare, plan};
 
 fn load(name: &str, overrides: &[&str]) -> Scene {
     let overrides: Vec<String> = overrides.iter().map(|&text| text.into()).collect();

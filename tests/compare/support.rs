@@ -2,7 +2,6 @@
 
 use std::ops::ControlFlow;
 
-use flockform::compare::run::{Compared, compare};
 use flockform::fem::Effort;
 use flockform::flock::body::{Body, Cut};
 use flockform::flock::lattice::{Lattice, LatticeKind};
@@ -10,6 +9,7 @@ use flockform::flock::vectors::Vectors;
 use flockform::material::cells::{Cells, neighbourhood, without_loose_sites};
 use flockform::material::elastic::{Constants, Elastic, Plane};
 use flockform::scene::bundled;
+use flockform::study::compare::run::{Compared, compare};
 
 pub const KINDS: [LatticeKind; 6] = [
     LatticeKind::Square { spacing: 1.0 },

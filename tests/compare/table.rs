@@ -1,7 +1,7 @@
 //! Bodies that cells on a lattice get wrong where nothing is done about it: what a comparison says of each, against the
 //! figure that it has to have.
 
-use flockform::compare::places::PlaceComparison;
+use flockform::study::compare::places::PlaceComparison;
 
 use crate::support::*;
 

@@ -2,11 +2,11 @@
 
 use std::ops::ControlFlow;
 
-use flockform::compare::measures::Comparison;
-use flockform::compare::run::{SceneTruth, compare, truth_of};
-use flockform::compare::split::ErrorParts;
 use flockform::fem::Effort;
 use flockform::scene::{Scene, bundled};
+use flockform::study::compare::measures::Comparison;
+use flockform::study::compare::run::{SceneTruth, compare, truth_of};
+use flockform::study::compare::split::ErrorParts;
 
 use crate::support::*;
 

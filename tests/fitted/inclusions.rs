@@ -202,8 +202,8 @@ fn a_disc_with_a_stiff_core_converges_with_order_two_on_every_lattice() {
 #[cfg(feature = "fem")]
 #[test]
 fn the_truth_of_a_disc_with_a_stiff_core_is_lames() {
-    use flockform::compare::reference::Effort;
-    use flockform::compare::run::truth_of;
+    use flockform::study::compare::reference::Effort;
+    use flockform::study::compare::run::truth_of;
     let (exact, q) = core();
     let scene = scene(&lattice("hexagonal", 1.0, 20.0), CORE).expect("a scene");
     let found = truth_of(&scene, &Effort::default()).expect("a truth");

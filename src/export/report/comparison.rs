@@ -9,10 +9,10 @@ use super::encoded;
 use super::frames::{Channel, Frames};
 use super::page::{Page, Table, number, scene_text};
 use super::view::{Animation, Clock, Quantity, View};
-use crate::compare::run::Compared;
 use crate::flock::vectors::Vectors;
 use crate::scene::Scene;
 use crate::scene::units::Units;
+use crate::study::compare::run::Compared;
 
 /// Frames on the way from no displacement to all of it.
 const FRAMES: usize = 20;

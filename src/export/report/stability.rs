@@ -7,8 +7,8 @@ use super::super::error::ExportError;
 use super::super::stability::panels;
 use super::page::{Page, Table, number};
 use super::plot::Plot;
-use crate::stability::extremes::Outcome;
-use crate::stability::study::Study;
+use crate::study::stability::extremes::Outcome;
+use crate::study::stability::study::Study;
 
 /// Writes `report.html`.
 ///

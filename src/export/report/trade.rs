@@ -8,7 +8,7 @@ use super::super::figures::SERIES;
 use super::page::{Page, Table, number};
 use super::plot::{Plot, PlotAxis, PlotLandmark, PlotSeries};
 use crate::solve::equilibrium::Solver;
-use crate::trade::{Outcome, Point, RuleChoice, Study};
+use crate::study::trade::{Outcome, Point, RuleChoice, Study};
 
 /// Writes `report.html`.
 ///

@@ -4,8 +4,8 @@ use super::{AT_REST, Case, End, MATERIAL, Outcome, SHEET, patch, small, worst};
 use crate::flock::rules::Mean;
 use crate::flock::vectors::distance;
 use crate::scene::{Scene, SceneError};
-use crate::stability::scaling;
-use crate::stability::subject::Subject;
+use crate::study::stability::scaling;
+use crate::study::stability::subject::Subject;
 
 const OWN: &str = "a small body of its own";
 const OF_THE_RULE: &str = "a small body of its own with the scene's mean";

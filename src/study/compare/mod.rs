@@ -13,7 +13,7 @@
 //!
 //! ```
 //! use std::ops::ControlFlow;
-//! use flockform::compare::run::compare;
+//! use flockform::study::compare::run::compare;
 //! use flockform::fem::Effort;
 //! use flockform::scene::bundled;
 //!

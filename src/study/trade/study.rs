@@ -6,14 +6,14 @@ use std::time::Instant;
 use serde::Serialize;
 
 use super::grid::{Grid, RuleChoice, Setting, body_overrides, settings, solver_overrides};
-use crate::compare::reference::Effort;
-use crate::compare::reference::Reference;
-use crate::compare::run::{SceneTruth, plan_led_by, truth_of};
 use crate::continuum::equilibrium::solve_equilibrium;
 use crate::continuum::run::Outcome as RunOutcome;
 use crate::flock::role::Role;
 use crate::flock::vectors::{Vectors, distance};
 use crate::scene::{Scene, SceneError};
+use crate::study::compare::reference::Effort;
+use crate::study::compare::reference::Reference;
+use crate::study::compare::run::{SceneTruth, plan_led_by, truth_of};
 
 /// The outcome of a setting.
 #[derive(Clone, Debug, PartialEq, Serialize)]

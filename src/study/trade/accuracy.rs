@@ -7,14 +7,14 @@
 
 use super::grid::{RuleChoice, body_overrides};
 use super::study::{Load, error_of};
-use crate::compare::reference::Effort;
-use crate::compare::run::{SceneTruth, plan_led_by, truth_of};
 use crate::continuum::equilibrium::solve_equilibrium;
 use crate::continuum::run::Outcome;
 use crate::flock::role::Role;
 use crate::scene::raw::{RawMean, RawRegion};
 use crate::scene::{Scene, SceneError};
 use crate::solve::equilibrium::{Precision, Request};
+use crate::study::compare::reference::Effort;
+use crate::study::compare::run::{SceneTruth, plan_led_by, truth_of};
 
 /// Halvings tried before giving up.
 const MOST_HALVINGS: u32 = 5;

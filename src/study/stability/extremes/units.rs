@@ -4,7 +4,7 @@ use super::{Case, End, Load, Outcome, THE_SCENE, plan};
 use crate::flock::neighbourhood::Neighbourhood;
 use crate::scene::raw::RawMotion;
 use crate::scene::{Scene, SceneError};
-use crate::stability::scaling;
+use crate::study::stability::scaling;
 
 /// Steps after which both are looked at.
 const STEPS: usize = 60;

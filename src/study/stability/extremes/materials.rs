@@ -13,8 +13,8 @@ use crate::material::weights::MaterialWeights;
 use crate::scene::{Scene, SceneError};
 use crate::solve::equilibrium::{Choice, Request, Solver, solve};
 use crate::solve::linear::system;
-use crate::stability::scaling;
-use crate::stability::subject::Subject;
+use crate::study::stability::scaling;
+use crate::study::stability::subject::Subject;
 
 const OWN: &str = "a small body of its own";
 const OF_THE_LATTICE: &str = "a small body of its own on the scene's lattice";

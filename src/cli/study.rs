@@ -1,0 +1,38 @@
+//! What the studies of a scene have in common: their arguments, and how they end.
+
+use clap::Args;
+use flockform::export::OutputFolder;
+
+use super::output::{OutputArguments, ReportArguments};
+use super::{Refusal, SceneArguments, interrupt, print, say};
+
+#[derive(Debug, Args)]
+pub struct StudyArguments {
+    #[command(flatten)]
+    pub scene: SceneArguments,
+    #[command(flatten)]
+    pub output: OutputArguments,
+    #[command(flatten)]
+    pub report: ReportArguments,
+    /// Print the results as JSON instead of a table
+    #[arg(long, conflicts_with = "quiet")]
+    json: bool,
+}
+
+impl StudyArguments {
+    /// Gives the folder its name, and prints JSON or a table.
+    pub fn finish(
+        &self,
+        folder: OutputFolder,
+        json: impl FnOnce() -> String,
+        table: impl FnOnce() -> String,
+    ) -> Result<(), Refusal> {
+        let kept = interrupt::commit(folder)?;
+        if self.json {
+            print(&json());
+        } else if !self.output.quiet {
+            say(&format!("{}results in {}\n", table(), kept.display()));
+        }
+        Ok(())
+    }
+}

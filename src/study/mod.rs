@@ -1,0 +1,11 @@
+//! Studies: many runs of a scene, held against one another or against a truth.
+//!
+//! * `compare` (feature `fem`): rule and finite elements on the same body, and their differences.
+//! * `trade` (feature `fem`): what accuracy costs: many settings of a scene against its reference.
+//! * [`stability`]: when a body grows instead of coming to rest, predicted and measured; extreme input.
+
+#[cfg(feature = "fem")]
+pub mod compare;
+pub mod stability;
+#[cfg(feature = "fem")]
+pub mod trade;
