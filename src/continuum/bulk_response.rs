@@ -66,10 +66,8 @@ fn check_homogeneous(scene: &Scene) -> Result<(), SceneError> {
     let no_fixed = |what: &str| format!("{what} has no fixed weights, so no material");
     let (key, message) = if let Neighbourhood::Dynamic { .. } = scene.neighbourhood {
         ("neighbours.kind", no_fixed("a rule whose neighbours are found anew at every step"))
-    } else if matches!(scene.mean, Mean::Power { .. }) {
-        ("rule.mean", no_fixed("a power mean of coordinates"))
-    } else if matches!(scene.mean, Mean::Spaced { .. }) {
-        ("rule.mean", no_fixed("cohesion with separation"))
+    } else if !scene.mean.is_affine() && !matches!(scene.mean, Mean::Distance { .. }) {
+        ("rule.mean", no_fixed(&format!("the rule \"{}\"", scene.mean)))
     } else if scene.poisson.is_some() {
         (
             "rule.poisson",
@@ -88,10 +86,7 @@ fn check_homogeneous(scene: &Scene) -> Result<(), SceneError> {
 }
 
 fn rule_name(scene: &Scene) -> String {
-    let mean = match scene.mean {
-        Mean::Distance { power } => format!("mean weighted by distance^{power} (Eq. 3)"),
-        _ => "barycentre (Eq. 1)".into(),
-    };
+    let mean = scene.mean.to_string();
     match &scene.weights {
         // A whole neighbourhood reproduces its particle's place by equal weights.
         None | Some(Weights::Solved) => mean,

@@ -10,7 +10,7 @@ use super::plan::Plan;
 use crate::flock::fracture::Threshold;
 use crate::flock::law::Weights;
 use crate::flock::role::Role;
-use crate::flock::rules::{FeedbackReference, Mean, Rotation};
+use crate::flock::rules::{FeedbackReference, Mean};
 use crate::material::outline_loads::Resultant;
 use crate::material::stiffness::area;
 use crate::scene::{LoadSteps, Scene, SceneError, Weights as SceneWeights};
@@ -47,16 +47,7 @@ impl PlanReport {
 
     fn capabilities(&mut self, scene: &Scene, plan: &Plan) {
         let rule = plan.setup.flock.rule;
-        let mean = match rule.mean {
-            Mean::Barycentre => "barycentre (Eq. 1)".to_owned(),
-            Mean::Distance { power } => format!("mean weighted by distance^{power} (Eq. 3)"),
-            Mean::Power { exponent: 0.0, .. } => "geometric mean".to_owned(),
-            Mean::Power { exponent, .. } => format!("power mean with exponent {exponent}"),
-            Mean::Spaced { spacing, .. } => format!("cohesion with separation at {spacing}"),
-            Mean::Material { rotation: Rotation::Small } => "material (small rotations)".to_owned(),
-            Mean::Material { rotation: Rotation::Corotated } => "material (corotated)".to_owned(),
-        };
-        self.models(mean, "rule.mean");
+        self.models(rule.mean.to_string(), "rule.mean");
         let forces = plan.setup.flock.forces.as_ref().map(|_| match scene.loads.len() {
             1 => "1 load".to_owned(),
             many => format!("{many} loads"),

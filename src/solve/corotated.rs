@@ -124,7 +124,7 @@ pub fn solve(
     request: &Request,
 ) -> Result<Solved, CorotatedError> {
     let Weights::Matrix(weights) = &flock.weights else {
-        return Err(NotLinear::Rule { rule: "a material without its weights" }.into());
+        return Err(NotLinear::Rule { rule: "a material without its weights".into() }.into());
     };
     if flock.rule.feedback.is_some() {
         return Err(CorotatedError::Feedback);

@@ -11,14 +11,14 @@ use crate::flock::block::{Block, IDENTITY, apply, plus, product};
 use crate::flock::body::Body;
 use crate::flock::lattice::Site;
 use crate::flock::law::{Flock, Weights};
-use crate::flock::rules::{Axis, Feedback, FeedbackReference, Mean, Rotation, Rule};
+use crate::flock::rules::{Axis, Feedback, FeedbackReference, Rule};
 use crate::flock::vectors::Vectors;
 
 /// Why a rule has no operator.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum NotLinear {
     #[error("{rule} is not linear in the neighbours' positions")]
-    Rule { rule: &'static str },
+    Rule { rule: String },
     #[error("broken bonds make the rule depend on present positions")]
     Broken,
     #[error(transparent)]
@@ -82,17 +82,12 @@ pub(super) fn outlier_places(body: &Body) -> Vec<[f64; 2]> {
 }
 
 fn require_linear(flock: &Flock) -> Result<(), NotLinear> {
-    let rule = match flock.rule.mean {
-        Mean::Barycentre | Mean::Material { rotation: Rotation::Small } => {
-            let broken = flock.bonds.as_ref().is_some_and(|bonds| bonds.any_broken());
-            return if broken { Err(NotLinear::Broken) } else { Ok(()) };
-        }
-        Mean::Distance { .. } => "the mean weighted by distance",
-        Mean::Power { .. } => "the power mean",
-        Mean::Spaced { .. } => "cohesion with separation",
-        Mean::Material { rotation: Rotation::Corotated } => "the corotated material",
-    };
-    Err(NotLinear::Rule { rule })
+    let mean = flock.rule.mean;
+    if !mean.is_affine() {
+        return Err(NotLinear::Rule { rule: format!("the rule \"{mean}\"") });
+    }
+    let broken = flock.bonds.as_ref().is_some_and(|bonds| bonds.any_broken());
+    if broken { Err(NotLinear::Broken) } else { Ok(()) }
 }
 
 /// The particles that each particle copies if it is a frame point, shape \[count\]; empty without a frame.

@@ -15,6 +15,8 @@ mod poisson;
 mod power;
 mod spaced;
 
+use std::fmt;
+
 use super::block::{Block, IDENTITY, apply};
 
 pub use averaged::{PatchCell, PatchRow, row as patch_row};
@@ -79,6 +81,28 @@ pub enum Mean {
     /// Weighted by the neighbours' matrices, which sum to the identity: a rule that is a material. Corotated it looks at
     /// the cells between them instead: see [`Rule::target_by_cells`].
     Material { rotation: Rotation },
+}
+
+impl Mean {
+    /// Whether its targets are affine in the neighbours' positions, by weights that do not change.
+    pub fn is_affine(&self) -> bool {
+        matches!(self, Mean::Barycentre | Mean::Material { rotation: Rotation::Small })
+    }
+}
+
+/// Its name in reports and messages.
+impl fmt::Display for Mean {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Mean::Barycentre => f.write_str("barycentre (Eq. 1)"),
+            Mean::Distance { power } => write!(f, "mean weighted by distance^{power} (Eq. 3)"),
+            Mean::Power { exponent: 0.0, .. } => f.write_str("geometric mean"),
+            Mean::Power { exponent, .. } => write!(f, "power mean with exponent {exponent}"),
+            Mean::Spaced { spacing, .. } => write!(f, "cohesion with separation at {spacing}"),
+            Mean::Material { rotation: Rotation::Small } => f.write_str("material (small rotations)"),
+            Mean::Material { rotation: Rotation::Corotated } => f.write_str("material (corotated)"),
+        }
+    }
 }
 
 /// A composed rule; what a scene does not name is `None` and not evaluated.

@@ -6,7 +6,7 @@ use crate::continuum::plan::Plan;
 use crate::engine::Engine;
 use crate::engine::setup::Setup;
 use crate::flock::role::Role;
-use crate::flock::rules::{Feedback, FeedbackReference, Mean, Rotation};
+use crate::flock::rules::{Feedback, FeedbackReference};
 use crate::scene::{Scene, SceneError};
 use crate::solve::spectrum::{Ends, SpectralRadius, radius_from_one, spectral_ends, spectral_radius};
 use crate::sweep::Order;
@@ -174,10 +174,7 @@ impl Subject {
 
 fn require_linear(scene: &Scene, plan: &Plan) -> Result<(), SceneError> {
     let (key, reason) = match scene.mean {
-        Mean::Distance { .. } => ("rule.mean", "weights that depend on the present distance"),
-        Mean::Power { .. } => ("rule.mean", "power means of coordinates"),
-        Mean::Spaced { .. } => ("rule.mean", "cohesion with separation"),
-        Mean::Material { rotation: Rotation::Corotated } => ("rule.mean", "axes that turn with the body"),
+        mean if !mean.is_affine() => ("rule.mean", &*format!("targets by the {mean}")),
         _ if plan.setup.present_radius.is_some() => ("neighbours", "neighbours found anew at every step"),
         _ if scene.fracture.is_some_and(|fracture| fracture.threshold.is_some()) => {
             ("fracture", "bonds that break")

@@ -92,7 +92,7 @@ fn of_places(swarm: &Swarm, rule: Rule) -> Result<Formation, SceneError> {
 fn default_damping(rule: Rule) -> f64 {
     match rule.mean {
         Mean::Distance { .. } | Mean::Spaced { .. } => 0.5,
-        Mean::Barycentre | Mean::Power { .. } | Mean::Material { .. } => 1.0,
+        _ => 1.0,
     }
 }
 
