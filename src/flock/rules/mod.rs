@@ -11,6 +11,7 @@ mod corotated;
 mod distance;
 mod feedback;
 mod material;
+mod median;
 mod poisson;
 mod power;
 mod spaced;
@@ -75,6 +76,8 @@ pub enum Mean {
     Distance { power: f64 },
     /// The power mean of each coordinate; exponent 0 is the geometric mean.
     Power { exponent: f64, origin: Origin },
+    /// The median of each coordinate, which outliers do not move.
+    Median,
     /// The mean of the places at `spacing` \[length\] from each neighbour, towards the particle,
     /// weighted by this power of the present distance.
     Spaced { spacing: f64, power: f64 },
@@ -98,6 +101,7 @@ impl fmt::Display for Mean {
             Mean::Distance { power } => write!(f, "mean weighted by distance^{power} (Eq. 3)"),
             Mean::Power { exponent: 0.0, .. } => f.write_str("geometric mean"),
             Mean::Power { exponent, .. } => write!(f, "power mean with exponent {exponent}"),
+            Mean::Median => f.write_str("median"),
             Mean::Spaced { spacing, .. } => write!(f, "cohesion with separation at {spacing}"),
             Mean::Material { rotation: Rotation::Small } => f.write_str("material (small rotations)"),
             Mean::Material { rotation: Rotation::Corotated } => f.write_str("material (corotated)"),
@@ -204,6 +208,7 @@ impl Rule {
             Mean::Barycentre => barycentre::mean(neighbours),
             Mean::Distance { power } => distance::mean(power, present, neighbours),
             Mean::Power { exponent, origin } => power::mean(exponent, origin, neighbours),
+            Mean::Median => median::mean(neighbours),
             Mean::Spaced { spacing, power } => spaced::mean(spacing, power, present, neighbours),
             Mean::Material { .. } => material::mean(neighbours.map(|n| (n.matrix, n.position))),
         }
@@ -244,7 +249,7 @@ mod tests {
         points.iter().map(|&position| Neighbour::at(position))
     }
 
-    const EVERY_MEAN: [Mean; 8] = [
+    const EVERY_MEAN: [Mean; 9] = [
         Mean::Barycentre,
         Mean::Distance { power: 1.0 },
         Mean::Distance { power: -2.0 },
@@ -252,6 +257,7 @@ mod tests {
         Mean::Power { exponent: 3.0, origin: Origin::Moving { margin: 1.0 } },
         Mean::Power { exponent: -1.0, origin: Origin::World },
         Mean::Power { exponent: 0.0, origin: Origin::World },
+        Mean::Median,
         Mean::Spaced { spacing: 1.0, power: -4.0 },
     ];
 

@@ -95,6 +95,8 @@ pub enum RawMean {
         #[serde(default)]
         origin: RawOrigin,
     },
+    /// The median of each coordinate: outliers among the neighbours do not move it (ours).
+    Median,
     /// The mean of the places at a distance from each neighbour: cohesion with separation (ours).
     Spaced {
         /// The distance [length].

@@ -402,6 +402,7 @@ pub(super) fn mean(raw: &RawMean, spacing: f64, refuse: Refuse<'_>) -> Result<Me
             ));
         }
         RawMean::Power { exponent, origin: from } => Mean::Power { exponent, origin: origin(from) },
+        RawMean::Median => Mean::Median,
         RawMean::Spaced { spacing, power } => Mean::Spaced { spacing, power },
         RawMean::Material { rotation } => Mean::Material { rotation: material::rotation(rotation) },
     })
