@@ -25,15 +25,18 @@
 //! * `record` (feature `record`): recordings of flights and runs for Foxglove and `ros2 bag`, and their replay.
 //! * `bench` (feature `bench`): how fast sweeps and solvers are, beside what the machine and others can do.
 //!
-//! ```
-//! use std::ops::ControlFlow;
-//! use flockform::continuum::{plan::Plan, run::run};
-//! use flockform::scene;
+//! A body in a few lines; [`Builder`] has more:
 //!
-//! let scene = scene::bundled("tension").expect("bundled").load(&["stop.steps=25".into()])?;
-//! let outcome = run(Plan::new(&scene)?, &mut |_engine, _residual| ControlFlow::Continue(()));
-//! assert_eq!(outcome.engine.step(), 25);
-//! # Ok::<(), scene::SceneError>(())
+//! ```
+//! use flockform::{Builder, LatticeKind, Side};
+//!
+//! let outcome = Builder::new(LatticeKind::Square { spacing: 1.0 })
+//!     .grid(40, 20)
+//!     .clamp(Side::Left)
+//!     .lead(Side::Right, [4.0, 0.0], 40)
+//!     .run()?;
+//! println!("{} steps, now at {:?}", outcome.engine.step(), outcome.engine.present().get(799));
+//! # Ok::<(), flockform::SceneError>(())
 //! ```
 
 pub mod continuum;
@@ -61,6 +64,14 @@ pub mod ros;
 pub mod shm;
 #[cfg(feature = "swarm")]
 pub mod swarm;
+
+pub use continuum::builder::Builder;
+pub use continuum::plan::Plan;
+pub use continuum::run::{Outcome, run};
+pub use engine::Engine;
+pub use flock::lattice::LatticeKind;
+pub use flock::region::Side;
+pub use scene::{Scene, SceneError};
 
 /// The README's Rust code, compiled and run with the other doctests.
 #[cfg(doctest)]

@@ -5,6 +5,7 @@
 //! [`layout`] is the body before any particle moves; [`equilibrium`] goes straight to rest instead of stepping.
 
 mod active_share;
+pub mod builder;
 pub mod bulk_response;
 mod damping;
 pub mod deviation;

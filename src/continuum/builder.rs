@@ -1,0 +1,192 @@
+//! Bodies put together in code, without a scene file.
+
+use std::ops::ControlFlow;
+
+use super::equilibrium::run_to_equilibrium;
+use super::plan::Plan;
+use super::run::Outcome;
+use crate::engine::Engine;
+use crate::flock::lattice::LatticeKind;
+use crate::flock::region::Side;
+use crate::scene::{Scene, SceneError};
+
+/// A body, what holds and leads it, and its rule.
+///
+/// Unless told otherwise the neighbours are the first ones, the rule is the barycentre (Eq. 1) with the rest offset, and a run
+/// ends when nothing moves by more than a millionth of the spacing in a step, at the latest after 10,000 steps.
+///
+/// ```
+/// use flockform::{Builder, LatticeKind, Side};
+///
+/// let outcome = Builder::new(LatticeKind::Hexagonal { spacing: 1.0 })
+///     .rectangle([40.0, 10.0])
+///     .clamp(Side::Left)
+///     .lead(Side::Right, [0.2, 0.0], 50)
+///     .run()?;
+/// assert_eq!(outcome.reason.name(), "equilibrium");
+/// # Ok::<(), flockform::SceneError>(())
+/// ```
+///
+/// Everything is checked when it is laid out, in the words of the program: an error names the key of the
+/// [scene format](crate::guide::scenes) and the remedy. What has no method of its own is a key of that format: [`Builder::set`].
+#[derive(Clone, Debug)]
+pub struct Builder {
+    /// Keys of the scene format with their values in TOML.
+    keys: Vec<String>,
+    roles: Vec<String>,
+}
+
+impl Builder {
+    /// A body cut from this lattice; its shape is still to be given.
+    pub fn new(lattice: LatticeKind) -> Self {
+        let lattice = match lattice {
+            LatticeKind::Square { spacing } => format!("kind=\"square\",spacing={spacing:?}"),
+            LatticeKind::Rectangular { a, b } => format!("kind=\"rectangular\",a={a:?},b={b:?}"),
+            LatticeKind::CentredRectangular { a, b } => {
+                format!("kind=\"centred-rectangular\",a={a:?},b={b:?}")
+            }
+            LatticeKind::Hexagonal { spacing } => format!("kind=\"hexagonal\",spacing={spacing:?}"),
+            LatticeKind::Oblique { a, b, angle } => {
+                format!("kind=\"oblique\",a={a:?},b={b:?},angle={:?}", angle.to_degrees())
+            }
+            LatticeKind::Honeycomb { spacing } => format!("kind=\"honeycomb\",spacing={spacing:?}"),
+        };
+        let ends = "stop={steps=10000,tolerance=1e-6}";
+        Self { keys: vec![format!("lattice={{{lattice}}}"), ends.into()], roles: Vec::new() }
+    }
+
+    /// Any key of the scene format, as on the command line: `rule.mean.kind=distance`, `frame=lagged`, `stop.steps=500`.
+    pub fn set(mut self, key_and_value: impl Into<String>) -> Self {
+        self.keys.push(key_and_value.into());
+        self
+    }
+
+    /// So many columns and rows of particles, the first at the origin.
+    pub fn grid(self, columns: u32, rows: u32) -> Self {
+        self.set(format!("body.shape={{kind=\"grid\",columns={columns},rows={rows}}}"))
+    }
+
+    /// From the origin to this corner \[length\].
+    pub fn rectangle(self, corner: [f64; 2]) -> Self {
+        self.set(format!("body.shape={{kind=\"rectangle\",max={corner:?}}}"))
+    }
+
+    /// Around the origin \[length\].
+    pub fn disc(self, radius: f64) -> Self {
+        self.set(format!("body.shape={{kind=\"disc\",radius={radius:?}}}"))
+    }
+
+    /// Through these vertices, either way round \[length\].
+    pub fn polygon(self, vertices: &[[f64; 2]]) -> Self {
+        self.set(format!("body.shape={{kind=\"polygon\",vertices={vertices:?}}}"))
+    }
+
+    /// Isotropic, in plane stress, of thickness 1; `young` \[force / length^2\] is Young's modulus, `poisson` \[1\] Poisson's ratio.
+    /// The rule becomes that of the material.
+    pub fn material(self, young: f64, poisson: f64) -> Self {
+        self.set(format!("material={{kind=\"isotropic\",young={young:?},poisson={poisson:?}}}"))
+            .set("rule.mean={kind=\"material\"}")
+    }
+
+    /// Keeps the outermost particles of a side where they are. [`Engine::lead`] moves them by hand.
+    pub fn clamp(mut self, side: Side) -> Self {
+        self.roles.push(format!("{{region={},role=\"clamped\"}}", edge(side)));
+        self
+    }
+
+    /// Leads the outermost particles of a side by a displacement \[length\], in even parts over so many steps; they stay there.
+    pub fn lead(mut self, side: Side, displacement: [f64; 2], steps: usize) -> Self {
+        let motion =
+            format!("{{kind=\"keyframes\",frames=[{{step={steps},displacement={displacement:?}}}]}}");
+        self.roles.push(format!("{{region={},role=\"leader\",motion={motion}}}", edge(side)));
+        self
+    }
+
+    /// # Errors
+    /// Names each key that is missing, out of range or at odds with another.
+    pub fn scene(&self) -> Result<Scene, SceneError> {
+        let roles = format!("roles=[{}]", self.roles.join(","));
+        // Roles first: a key that is set may change one of them.
+        let keys: Vec<String> = std::iter::once(roles).chain(self.keys.iter().cloned()).collect();
+        Scene::parse("built", "the scene", "title=\"Built in code\"", &keys, None)
+    }
+
+    /// The body in its reference configuration, to be stepped by hand.
+    ///
+    /// # Errors
+    /// As [`Builder::scene`]; a body that cannot be laid out.
+    pub fn engine(&self) -> Result<Engine, SceneError> {
+        Ok(Engine::new(Plan::new(&self.scene()?)?.setup))
+    }
+
+    /// Runs the body to its end.
+    ///
+    /// # Errors
+    /// As [`Builder::engine`].
+    pub fn run(&self) -> Result<Outcome, SceneError> {
+        let scene = self.scene()?;
+        run_to_equilibrium(&scene, Plan::new(&scene)?, &mut |_, _| ControlFlow::Continue(()))
+    }
+}
+
+fn edge(side: Side) -> String {
+    let side = match side {
+        Side::Left => "left",
+        Side::Right => "right",
+        Side::Bottom => "bottom",
+        Side::Top => "top",
+    };
+    format!("{{kind=\"edge\",side=\"{side}\"}}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::bundled;
+
+    #[test]
+    fn a_body_built_in_code_is_the_scene_that_its_keys_write() {
+        let built = Builder::new(LatticeKind::Square { spacing: 1.0 })
+            .rectangle([20.0, 5.0])
+            .clamp(Side::Left)
+            .lead(Side::Right, [1.0, 0.0], 10)
+            .material(1000.0, 0.3)
+            .set("stop.steps=40")
+            .scene()
+            .expect("a scene");
+        assert_eq!(built.stop.steps, 40);
+        assert_eq!(built.stop.tolerance, Some(1e-6));
+        assert_eq!(built.roles.len(), 2);
+        let engine = Engine::new(Plan::new(&built).expect("laid out").setup);
+        assert_eq!(engine.body().count(), 21 * 6);
+    }
+
+    #[test]
+    fn every_lattice_is_that_of_the_bundled_scene() {
+        let kinds = [
+            ("lattice-square", LatticeKind::Square { spacing: 1.0 }),
+            ("lattice-hexagonal", LatticeKind::Hexagonal { spacing: 1.0 }),
+            ("lattice-honeycomb", LatticeKind::Honeycomb { spacing: 1.0 }),
+        ];
+        for (name, kind) in kinds {
+            let bundled = bundled(name).expect("bundled").load(&[]).expect("valid");
+            let built = Builder::new(kind).grid(3, 3).scene().expect("a scene");
+            assert_eq!(built.lattice.name(), bundled.lattice.name(), "{name}");
+        }
+        let oblique = LatticeKind::Oblique { a: 1.0, b: 0.8, angle: 1.2 };
+        let built = Builder::new(oblique).grid(3, 3).scene().expect("a scene");
+        assert!((built.lattice.cell_area() - 0.8 * 1.2_f64.sin()).abs() < 1e-12);
+    }
+
+    #[test]
+    fn what_cannot_be_is_refused_by_its_key() {
+        let square = Builder::new(LatticeKind::Square { spacing: -1.0 }).grid(3, 3);
+        let said = square.scene().expect_err("no lattice").to_string();
+        assert!(said.contains("lattice.spacing") && said.contains("-1"), "{said}");
+        let shapeless = Builder::new(LatticeKind::Square { spacing: 1.0 });
+        let said = shapeless.scene().expect_err("no body").to_string();
+        assert!(said.contains("body"), "{said}");
+        let nan = Builder::new(LatticeKind::Square { spacing: 1.0 }).disc(f64::NAN);
+        assert!(nan.scene().is_err());
+    }
+}
