@@ -157,6 +157,30 @@ fn an_emergency_stop_holds_everybody_until_it_is_lifted() {
 }
 
 #[test]
+fn a_message_stops_everybody_where_the_file_allows_it() {
+    let peers = peers();
+    let speaker = peers.theirs.node("/", "red_button").expect("a node");
+    let request = speaker
+        .publisher::<Empty>("/flockform/emergency_stop_request", Quality::reliable(1))
+        .expect("speaks");
+    let deaf = [&PATIENT[..], &["node.commands=none"]].concat();
+    let mut swarm = Swarming::open(&square(&deaf), &[]);
+    swarm.until_all_are_heard();
+    for _ in 0..20 {
+        let _ = request.publish(&Empty);
+        swarm.tick();
+    }
+    assert_eq!((request.matched(), swarm.node.control().mode()), (0, Mode::Running));
+    drop(swarm);
+    let mut swarm = Swarming::open(&square(&PATIENT), &[]);
+    swarm.until_all_are_heard();
+    swarm.fly_until("a stop", |swarm| {
+        let _ = request.publish(&Empty);
+        swarm.node.control().mode() == Mode::EmergencyStopped
+    });
+}
+
+#[test]
 fn a_member_s_own_node_hears_its_neighbours_alone_and_moves_nobody_else() {
     let _peers = peers();
     let mut overrides = vec!["control.sweeps=1"];

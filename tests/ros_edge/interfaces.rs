@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use flockform::flock::vectors::distance;
 use flockform::ros::edge::Quality;
+use flockform::ros::edge::services::lifecycle_msgs;
 use flockform::ros::messages::geometry_msgs::{Pose, PoseStamped, Twist, TwistStamped};
 use flockform::ros::messages::rosgraph_msgs::Clock;
 use flockform::ros::messages::std_msgs::Header;
@@ -11,9 +12,10 @@ use flockform::ros::messages::{builtin_interfaces, geometry_msgs};
 use flockform::ros::node::FormationNode;
 use flockform::ros::robots::RobotNodes;
 use flockform::swarm::watch::Health;
+use ros2_client::ServiceMapping;
 
 use super::formation::{PATIENT, Swarming, arguments, square};
-use super::support::{peers, until};
+use super::support::{call, client, peers, until};
 
 /// A flight short enough for a test.
 const SHORT: [&str; 2] =
@@ -116,6 +118,47 @@ fn velocities_lead_to_the_targets() {
         let speed = f64::hypot(twist.linear.x, twist.linear.y);
         // Robots of this model never turn: their axes are the world's.
         (distance([twist.linear.x, twist.linear.y], expected) < 1e-9 && speed > 0.01).then_some(())
+    });
+}
+
+#[test]
+fn velocities_are_left_to_others_while_the_node_is_not_active() {
+    let mut peers = peers();
+    let hearer = peers.theirs.node("/", "idle_driver").expect("a node");
+    let plain = hearer.subscription::<Twist>("/idle/robot_7/cmd_vel", Quality::reliable(50)).expect("hears");
+    let overrides = with(&["node.velocity=\"twist\"", "node.velocity_topic=\"/idle/{name}/cmd_vel\""]);
+    let mut swarm = Swarming::open(&square(&overrides), &[]);
+    swarm.until_all_are_heard();
+    until("a velocity", || {
+        swarm.tick();
+        plain.take()
+    });
+    let client = client::<lifecycle_msgs::ChangeState>(
+        &mut peers,
+        ServiceMapping::Enhanced,
+        "/flockform/change_state",
+    );
+    let change = |swarm: &mut Swarming, label: &str| {
+        let transition = lifecycle_msgs::Transition { id: 0, label: label.into() };
+        let request = lifecycle_msgs::ChangeStateRequest { transition };
+        call::<lifecycle_msgs::ChangeState>(&client, &request, &mut || swarm.tick()).success
+    };
+    assert!(change(&mut swarm, "deactivate"));
+    // What was on its way arrives; the last of it is the zero.
+    let mut last = None;
+    for _ in 0..20 {
+        swarm.tick();
+        last = plain.take_last().map(|(twist, _)| twist).or(last);
+    }
+    assert_eq!(last, Some(Twist::default()));
+    for _ in 0..50 {
+        swarm.tick();
+        assert!(plain.take().is_none(), "a velocity of a node that is not active");
+    }
+    assert!(change(&mut swarm, "activate"));
+    until("velocities again", || {
+        swarm.tick();
+        plain.take()
     });
 }
 

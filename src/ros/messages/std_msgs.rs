@@ -1,8 +1,9 @@
-//! `std_msgs`: the header that stamped messages begin with, and colours.
+//! `std_msgs`: the header that stamped messages begin with, colours, and a message that says nothing but that it was sent.
 
 use serde::{Deserialize, Serialize};
 
 use super::builtin_interfaces::Time;
+pub use crate::ros::edge::services::Empty;
 
 /// When, and in which frame.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -22,4 +23,4 @@ pub struct ColorRGBA {
     pub a: f32,
 }
 
-super::messages!("std_msgs": Header, ColorRGBA);
+super::messages!("std_msgs": Header, ColorRGBA, Empty);

@@ -25,12 +25,12 @@ use super::edge::lifecycle::{Goal, Lifecycle, Outcome, Transition};
 use super::edge::parameters::{Change, Parameters, Refusal};
 use super::edge::pulse::Pulse;
 use super::edge::services::std_srvs;
-use super::edge::{Edge, EdgeError, Node, Options, Publisher, Quality, Service, ServiceType};
+use super::edge::{Edge, EdgeError, Node, Options, Publisher, Quality, Service, ServiceType, Subscription};
 use super::messages::builtin_interfaces::Time;
 use super::messages::diagnostic_msgs::DiagnosticArray;
 use super::messages::flockform_msgs::{FormationState, LoopEvent, SetFormationRequest, SetFormationResponse};
 use super::messages::geometry_msgs::PoseStamped;
-use super::messages::std_msgs::Header;
+use super::messages::std_msgs::{Empty, Header};
 use super::messages::visualization_msgs::MarkerArray;
 use crate::scene::SceneError;
 use crate::scene::swarm::Swarm;
@@ -83,11 +83,15 @@ pub struct FormationNode {
     parameters: Parameters,
     lifecycle: Lifecycle,
     stop: Service<std_srvs::Trigger>,
+    /// The same by topic; none where nothing may stop the node.
+    stop_requests: Option<Subscription<Empty>>,
     resume: Service<std_srvs::Trigger>,
     set_formation: Service<SetFormation>,
     part: NodeScope,
     link: Link,
     drives: Vec<(usize, Drive)>,
+    /// Whether the last velocities were those of an active node.
+    is_driving: bool,
     state: Publisher<FormationState>,
     markers: Option<Publisher<MarkerArray>>,
     diagnostics: Publisher<DiagnosticArray>,
@@ -139,6 +143,13 @@ impl FormationNode {
             parameters: Parameters::new(&node, store)?,
             lifecycle: Lifecycle::new(&node)?,
             stop: node.service(&service("emergency_stop")?)?,
+            stop_requests: raw
+                .commands
+                .may_stop()
+                .then(|| names.topic(&raw.emergency_stop_topic).map_err(NodeError::from))
+                .transpose()?
+                .map(|topic| node.subscription(&topic, Quality::reliable(1)))
+                .transpose()?,
             resume: node.service(&service("resume")?)?,
             set_formation: node.service(&service("set_formation")?)?,
             state: node.publisher(&private("state")?, Quality::reliable(5))?,
@@ -153,6 +164,7 @@ impl FormationNode {
             frame_id: raw.frame_id.clone(),
             swarm: swarm.clone(),
             was_active: false,
+            is_driving: false,
             pulse: None,
             names,
             drives,
@@ -282,12 +294,19 @@ impl FormationNode {
         let mut events: Vec<(u8, String, Vec<f64>)> = Vec::new();
         let outcome = |success, message: &str| std_srvs::Outcome { success, message: message.into() };
         let control = &mut self.control;
+        let mut stop_all = || {
+            control.emergency_stop();
+            events.push((LoopEvent::EMERGENCY_STOP, String::new(), Vec::new()));
+        };
+        if self.stop_requests.as_ref().is_some_and(|requests| requests.take_last().is_some()) {
+            tracing::warn!("emergency stop by topic");
+            stop_all();
+        }
         self.stop.serve(|_| {
             if !commands.may_stop() {
                 return outcome(false, &not_allowed);
             }
-            control.emergency_stop();
-            events.push((LoopEvent::EMERGENCY_STOP, String::new(), Vec::new()));
+            stop_all();
             outcome(true, "every robot holds its place until ~/resume")
         });
         self.resume.serve(|_| match commands.may_do_all() && control.resume() {
@@ -339,7 +358,8 @@ impl FormationNode {
         Header { stamp: Time::from_seconds(now), frame_id: self.frame_id.clone() }
     }
 
-    /// Targets while the node is active; velocities always, which are zero while it is not.
+    /// Targets and velocities while the node is active; when it ceases to be, one velocity of zero: from then on the robots are
+    /// driven by others.
     fn publish(&mut self, now: f64) {
         self.say(now, self.lifecycle.is_active());
     }
@@ -348,6 +368,10 @@ impl FormationNode {
         if active {
             self.statistics.sent(self.link.send(now, &targets(&self.control, &self.part)));
         }
+        if !active && !std::mem::take(&mut self.is_driving) {
+            return;
+        }
+        self.is_driving = active;
         for (member, drive) in &self.drives {
             let target = self.control.target(*member).filter(|_| active);
             self.statistics.sent(drive.publish(&self.control, *member, target, self.header(now)));

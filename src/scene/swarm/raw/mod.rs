@@ -209,6 +209,9 @@ pub(super) mod defaults {
     pub fn target_topic() -> String {
         "/{name}/target_pose".into()
     }
+    pub fn emergency_stop_topic() -> String {
+        "~/emergency_stop_request".into()
+    }
     pub fn velocity_topic() -> String {
         "/{name}/cmd_vel".into()
     }

@@ -25,6 +25,10 @@ pub struct RawNode {
     pub velocity: Option<RawVelocityType>,
     #[serde(default = "defaults::velocity_topic")]
     pub velocity_topic: String,
+    /// A `std_msgs/Empty` on this topic stops every robot, as the service `~/emergency_stop` does. A topic reaches the node that
+    /// flies now, whatever a client's graph remembers of earlier ones.
+    #[serde(default = "defaults::emergency_stop_topic")]
+    pub emergency_stop_topic: String,
     /// Publishes `visualization_msgs/MarkerArray` on `~/markers`.
     #[serde(default = "defaults::yes")]
     pub markers: bool,
@@ -42,6 +46,7 @@ impl Default for RawNode {
             target_topic: defaults::target_topic(),
             velocity: None,
             velocity_topic: defaults::velocity_topic(),
+            emergency_stop_topic: defaults::emergency_stop_topic(),
             markers: true,
             commands: RawCommands::default(),
         }
