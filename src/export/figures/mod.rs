@@ -7,14 +7,14 @@
 
 mod axes;
 mod bands;
-pub mod chart;
+pub(crate) mod chart;
 mod colour;
 mod comparison;
 mod configuration;
 mod energy;
 mod faces;
 #[cfg(feature = "swarm")]
-pub mod flight_map;
+pub(crate) mod flight_map;
 mod heading;
 mod history;
 mod page;
