@@ -13,7 +13,7 @@
 
 #[cfg(feature = "fem")]
 pub mod equilibrium;
-pub(crate) mod machine;
+pub mod machine;
 #[cfg(feature = "swarm")]
 pub mod swarm;
 pub mod sweep;

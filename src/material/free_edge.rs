@@ -40,8 +40,7 @@ pub struct Edge {
 
 impl FreeEdge {
     /// `loads` act on the outline of a sheet of this `thickness` \[length\]; `held` names the components of each
-    /// particle that
-    /// a support or leader holds, shape \[count\].
+    /// particle that a support or leader holds, shape \[count\].
     pub fn new(outline: Outline, (loads, thickness): (Vec<Load>, f64), held: Vec<[bool; 2]>) -> Self {
         Self { outline, loads, thickness, held, edge: OnceLock::new() }
     }

@@ -117,7 +117,7 @@ pub struct Effective {
 /// Gradient length squared `l^2` \[length^2\]: positive stiffens short waves.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GradientLength {
-    /// Of waves along x that move along x, and across it.
+    /// Of waves along x that move along x.
     pub longitudinal_x: f64,
     /// Of waves along x that move across it.
     pub transverse_x: f64,

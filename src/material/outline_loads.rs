@@ -52,8 +52,8 @@ pub enum Load {
     Outline(OutlineLoad),
     /// The same force on each of these particles \[force\].
     Particles {
-        particles: Vec<u32>,
         /// Indices of the particles.
+        particles: Vec<u32>,
         /// On each of them \[force, world frame\].
         force: [f64; 2],
     },

@@ -4,9 +4,9 @@
 //! * [`tick`]: [`Control`](crate::swarm::control::Control)'s whole tick with fresh poses.
 //! * [`latency`] (feature `ros`): from a published pose to the received target that answers it.
 
-pub(crate) mod latency;
-pub(crate) mod rule;
-pub(crate) mod tick;
+pub mod latency;
+pub mod rule;
+pub mod tick;
 
 use std::fmt;
 

@@ -16,7 +16,7 @@ use serde::Serialize;
 
 use super::machine::{Bandwidth, median, time_triad};
 use bodies::Subject;
-pub(crate) use capabilities::{Capability, measure as measure_capabilities};
+pub use capabilities::{Capability, measure as measure_capabilities};
 
 const THREADS: [usize; 2] = [1, 2];
 

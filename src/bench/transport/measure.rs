@@ -115,7 +115,7 @@ impl Samples {
         Quantiles::of(pairs.filter_map(|(a, b)| Some((*a)? / (*b)?)).collect()).p50_seconds
     }
 
-    pub fn case(self, transport: &'static str, work: Work, poses: usize) -> Case {
+    pub(crate) fn case(self, transport: &'static str, work: Work, poses: usize) -> Case {
         let messages = self.messages.max(1) as f64;
         Case {
             transport,

@@ -27,7 +27,6 @@ pub mod view;
 
 #[cfg(feature = "swarm")]
 pub use flight::FlightRecorder;
-pub use page::{Page, Table};
 pub use run::{AnimationState, RunRecorder};
 
 use encode::EncodedFrames;
