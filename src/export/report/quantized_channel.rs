@@ -51,6 +51,7 @@ impl QuantizedChannel {
         track
     }
 
+    #[cfg(test)]
     pub fn count(&self) -> usize {
         self.low.len()
     }
