@@ -23,6 +23,7 @@ const MOVED_BYTES: f64 = 32.0;
 /// Memory bandwidth of the triad on some number of threads.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Bandwidth {
+    /// Threads that share the arrays.
     pub threads: usize,
     /// The bytes the program names \[B/s\].
     pub counted_bytes_per_second: f64,

@@ -27,7 +27,9 @@ pub type Truth<'a> = &'a dyn Fn(&Vectors) -> Vec<[f64; 2]>;
 /// A body laid out, before any particle moves.
 #[derive(Clone, Debug)]
 pub struct Layout {
+    /// The particles.
     pub body: Body,
+    /// Which particle sees which.
     pub neighbours: Neighbours,
     /// Between the particles, where the scene has a material.
     pub cells: Option<Cells>,

@@ -39,6 +39,7 @@ pub struct Mechanics {
     pub work_done: Option<Work>,
     /// The largest force left on a follower \[force\]: how far the body is from rest.
     pub unbalanced: Option<f64>,
+    /// Over the cells and the particles on free edges; none where no cell has a finite stress.
     pub largest_von_mises: Option<Peak>,
     /// The principal strain largest in size of any cell, as the rule measures strain \[1\].
     pub largest_strain: f64,

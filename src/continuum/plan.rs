@@ -25,7 +25,9 @@ use crate::sweep::{Order, Update};
 /// A scene laid out; nothing of it refers to the scene file.
 #[derive(Clone, Debug)]
 pub struct Plan {
+    /// What the engine starts from.
     pub setup: Setup,
+    /// When a run ends.
     pub stop: Stop,
     /// Diagonal of the body's bounds \[length\].
     pub diagonal: f64,
@@ -105,6 +107,7 @@ impl Plan {
         Ok(Self { setup, stop: scene.stop, diagonal, probes, outline, resultants })
     }
 
+    /// Number of particles, those of the frame included.
     pub fn count(&self) -> usize {
         self.setup.body.count()
     }

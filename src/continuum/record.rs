@@ -13,10 +13,12 @@ use crate::material::elastic::Elastic;
 /// A whole configuration at one step; arrays of shape \[count\].
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Snapshot {
+    /// Steps taken so far.
     pub step: usize,
     /// Present positions \[length, world frame\].
     #[serde(with = "serde_impls::points")]
     pub positions: Vectors,
+    /// Role of each particle at this step.
     #[serde(with = "serde_impls::roles")]
     pub roles: Vec<Role>,
     /// First pseudo-energy \[length^2\].
@@ -28,6 +30,7 @@ pub struct Snapshot {
 }
 
 impl Snapshot {
+    /// The configuration in which the engine is now.
     pub fn of(engine: &Engine) -> Self {
         let count = engine.present().len();
         Self {
@@ -54,17 +57,22 @@ impl Snapshot {
 pub struct ProbeSeries {
     /// Index of the particle.
     pub particle: usize,
+    /// Present positions \[length, world frame\].
     #[serde(with = "serde_impls::points")]
     pub positions: Vectors,
+    /// First pseudo-energy \[length^2\].
     pub pe1: Vec<f64>,
+    /// Second pseudo-energy \[length\].
     pub pe2: Vec<f64>,
 }
 
 impl ProbeSeries {
+    /// A history without entries.
     pub fn new(particle: usize) -> Self {
         Self { particle, ..Self::default() }
     }
 
+    /// Appends the particle's present state; to be called once at the start and once after every step.
     pub fn record(&mut self, engine: &Engine) {
         self.positions.push(engine.present().get(self.particle));
         self.pe1.push(engine.pe1(self.particle));
@@ -79,6 +87,7 @@ pub struct LoadStep {
     pub step: usize,
     /// Part of the scene's loads that is on the body \[1\].
     pub factor: f64,
+    /// Forces, energy and stress at the last of these steps.
     pub mechanics: Mechanics,
 }
 

@@ -19,7 +19,9 @@ use crate::sweep::{Order, Sweep};
 /// A plan in words and numbers.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlanReport {
+    /// Name and title of the scene.
     pub title: String,
+    /// Name and value of everything that was laid out, for the reader.
     pub facts: Vec<(String, String)>,
     /// Effects that are modelled, each with the key of the scene that asks for it.
     pub modelled: Vec<(String, String)>,

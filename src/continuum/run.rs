@@ -28,10 +28,12 @@ pub enum StopReason {
     Steps,
     /// An observer broke the run off.
     Interrupted,
+    /// A particle left the range of numbers, or went farther than the scene allows.
     Diverged(Divergence),
 }
 
 impl StopReason {
+    /// The name in reports.
     pub fn name(&self) -> &'static str {
         match self {
             StopReason::Equilibrium => "equilibrium",
@@ -51,7 +53,9 @@ pub struct Divergence {
     pub step: usize,
     /// Id of the particle.
     pub particle: usize,
+    /// What the particle did, to follow its id in a sentence.
     pub what: String,
+    /// What most often leads to this with such a rule.
     pub likely_cause: String,
 }
 
@@ -68,7 +72,9 @@ impl std::fmt::Display for Divergence {
 /// How a run ended, with the engine in its last good state.
 #[derive(Debug)]
 pub struct Outcome {
+    /// The engine in its last good state.
     pub engine: Engine,
+    /// Why it ended.
     pub reason: StopReason,
     /// Largest one-step motion over the spacing, at the last step.
     pub residual: f64,

@@ -186,7 +186,9 @@ fn work(forces: &Vectors, displacement: &Vectors) -> f64 {
 /// A particle that is held along these axes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Held {
+    /// Index of the particle.
     pub particle: usize,
+    /// Whether it is held along x and along y.
     pub axes: [bool; 2],
 }
 

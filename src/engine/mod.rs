@@ -83,6 +83,7 @@ struct PresentNeighbours {
 }
 
 impl Engine {
+    /// The body before its first step, with the roles and the part of the loads that hold from the start.
     pub fn new(setup: Setup) -> Self {
         let Setup {
             body,
@@ -141,14 +142,17 @@ impl Engine {
         engine
     }
 
+    /// Steps taken so far.
     pub fn step(&self) -> usize {
         self.step
     }
 
+    /// The particles, their sites and their reference positions.
     pub fn body(&self) -> &Body {
         &self.body
     }
 
+    /// The rule with neighbours, weights, loads and broken bonds, as they are now.
     pub fn flock(&self) -> &Flock {
         &self.flock
     }
@@ -158,6 +162,7 @@ impl Engine {
         self.present_neighbours.is_none().then_some(&self.flock.neighbours)
     }
 
+    /// Role of each particle at this step, shape \[count\].
     pub fn roles(&self) -> &[Role] {
         &self.roles
     }
@@ -177,10 +182,12 @@ impl Engine {
         self.cells.as_ref()
     }
 
+    /// The order and the damping of the sweep.
     pub fn update(&self) -> Update {
         self.update
     }
 
+    /// Present positions \[length, world frame\], shape \[count\].
     pub fn present(&self) -> &Vectors {
         &self.present
     }
@@ -198,6 +205,7 @@ impl Engine {
         self.settled.clone().unwrap_or_else(|| (0..self.present.len()).map(of).collect())
     }
 
+    /// Positions before the last step \[length, world frame\], shape \[count\].
     pub fn previous(&self) -> &Vectors {
         &self.previous
     }

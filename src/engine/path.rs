@@ -14,6 +14,7 @@ use crate::flock::vectors::Vectors;
 /// energy is half of the sum of both.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Work {
+    /// Of the loads.
     pub loads: f64,
     /// Of the reactions: of leaders that were moved.
     pub supports: f64,
@@ -35,6 +36,7 @@ struct Acting {
 }
 
 impl Path {
+    /// The sum so far.
     pub fn done(&self) -> Work {
         self.done
     }

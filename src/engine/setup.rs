@@ -17,8 +17,11 @@ use crate::sweep::Update;
 /// Everything an engine needs.
 #[derive(Clone, Debug)]
 pub struct Setup {
+    /// The particles and their reference positions.
     pub body: Body,
+    /// The rule with neighbours, weights and loads.
     pub flock: Flock,
+    /// The order and the damping of the sweep.
     pub update: Update,
     /// Radius within which neighbours are found anew at every step \[length\].
     pub present_radius: Option<f64>,
@@ -41,12 +44,15 @@ pub struct Setup {
 /// A role that some particles take.
 #[derive(Clone, Debug)]
 pub struct RoleChange {
+    /// Indices of the particles.
     pub particles: Vec<usize>,
+    /// What they become.
     pub role: Role,
     /// The one component that is held or led while the particles follow along the other.
     pub axis: Option<Axis>,
     /// First step at which it holds.
     pub from: usize,
+    /// The condition that a particle must meet as well to take the role; none where all take it.
     pub when: Option<Condition>,
     /// How leaders move; none for those led by a truth that is not known yet.
     pub motion: Option<Motion>,

@@ -49,12 +49,16 @@ struct Leading {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the state has {found} {what}, the plan {planned}: it belongs to another body")]
 pub struct WrongState {
+    /// What is counted.
     pub what: &'static str,
+    /// How many the state has.
     pub found: usize,
+    /// How many the plan has.
     pub planned: usize,
 }
 
 impl EngineState {
+    /// The state of an engine between two steps.
     pub fn of(engine: &Engine) -> Self {
         let leading = |&Led { particle, change, which, since, base }: &Led| Leading {
             particle,

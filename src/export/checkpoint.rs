@@ -39,16 +39,21 @@ const PROGRAM_VERSION: &str = env!("CARGO_PKG_VERSION");
 pub struct Checkpoint<'a> {
     /// Version of the program: another one may round otherwise.
     program: Cow<'a, str>,
+    /// The command line of the run.
     pub asked: RunRequest,
     /// The scene as JSON, overrides and defaults included.
     scene: String,
     /// [`crate::continuum::digest::digest`] of the plan.
     digest: u64,
+    /// The engine's state after the last step.
     pub engine: EngineState,
     /// Largest one-step motion over the spacing, at the last step; infinite before the first.
     pub residual: f64,
+    /// Configurations that are to be drawn at the end.
     pub snapshots: Cow<'a, [Snapshot]>,
+    /// Histories of the probed particles so far.
     pub probes: Cow<'a, [ProbeSeries]>,
+    /// The response to the load so far, where it changes.
     pub load_steps: Cow<'a, [LoadStep]>,
     /// State of the report, where there is to be one.
     pub animation: Option<AnimationState<'a>>,
@@ -73,35 +78,79 @@ pub struct RunRequest {
 /// Error resuming a run from a checkpoint.
 #[derive(Debug, thiserror::Error)]
 pub enum CheckpointError {
+    /// Neither of the two folders has a checkpoint.
     #[error(
         "there is nothing to resume: neither {} nor {} holds a checkpoint\n  help: start the run again; one that ends by itself leaves none, and the first is written after --checkpoint-every",
         .unfinished.display(), .out.display()
     )]
-    Nothing { unfinished: PathBuf, out: PathBuf },
+    Nothing {
+        /// The folder of an unfinished run.
+        unfinished: PathBuf,
+        /// The folder of outputs.
+        out: PathBuf,
+    },
+    /// The system refuses to read the checkpoint.
     #[error("{} cannot be read: {source}", .path.display())]
-    Unreadable { path: PathBuf, source: std::io::Error },
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The file does not begin as a checkpoint does.
     #[error("{} is no checkpoint of flockform\n  help: give the folder of a run; remove the file to start again", .path.display())]
-    NotOne { path: PathBuf },
+    NotOne {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The file ends before its payload does.
     #[error(
         "{} is truncated: it has {found} bytes of {needed}\n  help: restore it from a copy, or remove it and start the run again",
         .path.display()
     )]
-    Truncated { path: PathBuf, found: u64, needed: u64 },
+    Truncated {
+        /// The file.
+        path: PathBuf,
+        /// Its size \[byte\].
+        found: u64,
+        /// The size that its header asks for \[byte\].
+        needed: u64,
+    },
+    /// The payload is not what was written.
     #[error(
         "{} is corrupted: {what}\n  help: restore it from a copy, or remove it and start the run again",
         .path.display()
     )]
-    Corrupted { path: PathBuf, what: String },
+    Corrupted {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        what: String,
+    },
+    /// Another version of the layout or of the program wrote the file.
     #[error(
         "{} is of {found}, this is {known}: the same bits cannot be promised\n  help: resume with the program that wrote it, or remove it and start the run again",
         .path.display()
     )]
-    Version { path: PathBuf, found: String, known: String },
+    Version {
+        /// The file.
+        path: PathBuf,
+        /// What wrote it.
+        found: String,
+        /// What reads it.
+        known: String,
+    },
+    /// The checkpoint is of another scene, or files that the scene names have changed.
     #[error(
         "{} belongs to another scene: {what}\n  help: resume with the scene that was run, or start this one with another --out",
         .path.display()
     )]
-    Foreign { path: PathBuf, what: String },
+    Foreign {
+        /// The file or its folder.
+        path: PathBuf,
+        /// What differs.
+        what: String,
+    },
 }
 
 impl<'a> Checkpoint<'a> {

@@ -19,13 +19,20 @@ use crate::study::compare::run::Compared;
 /// The contents of `compare.json`; lengths in the scene's unit, infinities as `null`.
 #[derive(Clone, Debug, Serialize)]
 pub struct ComparisonReport {
+    /// Name of the program.
     pub program: &'static str,
+    /// Version of the program.
     pub version: &'static str,
+    /// Short name of the scene.
     pub name: String,
+    /// Title of the scene.
     pub title: String,
+    /// How far rule and truth are apart.
     #[serde(flatten)]
     pub comparison: Comparison,
+    /// How the rule's run ended.
     pub rule: RuleEnd,
+    /// How fine the truth was solved.
     pub truth: TruthSize,
     /// At the scene's `record.places`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -37,12 +44,15 @@ pub struct ComparisonReport {
 /// The end of the rule's run.
 #[derive(Clone, Copy, Debug, Serialize, PartialEq)]
 pub struct RuleEnd {
+    /// Steps taken.
     pub steps: usize,
+    /// Why the run ended, by name.
     pub stop_reason: &'static str,
     /// Largest distance of a follower from its target, over the spacing.
     pub residual: Option<f64>,
     /// The solver that found the equilibrium, unless it was stepped to, and its iterations.
     pub solver: Option<&'static str>,
+    /// Iterations of that solver.
     pub iterations: Option<usize>,
 }
 
@@ -56,6 +66,7 @@ pub struct TruthSize {
     /// Its stated error of displacement, relative L2, and of strain energy, relative; `null` where a body so
     /// full of corners was solved on one mesh alone \[1\].
     pub stated_error: Option<f64>,
+    /// The same of the strain energy \[1\].
     pub stated_energy_error: Option<f64>,
     /// Of the finite elements themselves \[force length\].
     pub strain_energy: f64,
@@ -83,6 +94,7 @@ struct CellRow {
 }
 
 impl ComparisonReport {
+    /// The contents for a comparison of this scene.
     pub fn new(scene: &Scene, compared: &Compared) -> Self {
         let (outcome, truth) = (&compared.outcome, &compared.truth.truth);
         Self {

@@ -5,40 +5,73 @@ use std::path::{Path, PathBuf};
 
 use super::manifest;
 
+/// Why outputs were not written.
 #[derive(Debug, thiserror::Error)]
 pub enum ExportError {
+    /// A folder with something in it, which may not be replaced.
     #[error("{} is not empty: give --force to replace it, or another --out", .0.display())]
     NotEmpty(PathBuf),
+    /// A folder that would be replaced, but holds no list of files that flockform wrote.
     #[error(
         "{} does not look like an output of flockform, which has a {}: --force leaves it alone; give another --out",
         .0.display(), manifest::FILE
     )]
     NotOurs(PathBuf),
+    /// A folder of flockform that has other files too.
     #[error(
         "{} holds what flockform did not write: {}\n  help: --force replaces flockform's files only; move the others away, or give another --out",
         .folder.display(), list(.files)
     )]
-    Foreign { folder: PathBuf, files: Vec<PathBuf> },
+    Foreign {
+        /// The folder.
+        folder: PathBuf,
+        /// The other files in it.
+        files: Vec<PathBuf>,
+    },
+    /// A file where the folder of outputs belongs.
     #[error("{} is no folder: give another --out", .0.display())]
     NotAFolder(PathBuf),
+    /// A path that ends in no name.
     #[error("{:?} does not name a folder that could be made: give --out a name", .0.display().to_string())]
     Unnamed(PathBuf),
+    /// An unfinished run that would be discarded.
     #[error(
         "{} holds a run that was not finished: continue it with `flockform run --resume {}`, discard it with --force, or give another --out",
         .0.display(), .0.display()
     )]
     Unfinished(PathBuf),
+    /// Another program is writing the same outputs.
     #[error("{} is being written by another flockform that still runs: wait for it, or give another --out", .0.display())]
     Busy(PathBuf),
+    /// A checkpoint counts on a frame for ParaView that is not there.
     #[error("{} is missing, which the checkpoint beside it needs: start the run again", .0.display())]
     MissingFrame(PathBuf),
+    /// The system refuses a file or a folder.
     #[error("cannot {action} {}: {source}", .path.display())]
-    Io { action: &'static str, path: PathBuf, source: io::Error },
+    Io {
+        /// What was tried, as a verb.
+        action: &'static str,
+        /// The file or the folder.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// A figure's SVG cannot be drawn as PNG.
     #[error("the figure {} cannot be rendered: {reason}", .path.display())]
-    Figure { path: PathBuf, reason: String },
+    Figure {
+        /// The figure.
+        path: PathBuf,
+        /// What the renderer said.
+        reason: String,
+    },
     /// The outputs are whole but stand under their temporary name.
     #[error("the outputs are complete and kept in {}, but cannot be moved to their place: {source}", .kept.display())]
-    NotMoved { kept: PathBuf, source: Box<ExportError> },
+    NotMoved {
+        /// Where they are.
+        kept: PathBuf,
+        /// Why they could not be moved.
+        source: Box<ExportError>,
+    },
 }
 
 impl ExportError {

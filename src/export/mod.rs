@@ -98,19 +98,24 @@ pub use vtk::VtkSeries;
 /// The results of a run that are written at its end.
 #[derive(Clone, Copy, Debug)]
 pub struct Results<'a> {
+    /// The scene that was run.
     pub scene: &'a Scene,
+    /// How the run ended, with the engine as it then was.
     pub outcome: &'a Outcome,
     /// The configurations to draw.
     pub snapshots: &'a [Snapshot],
+    /// Histories of the probed particles.
     pub probes: &'a [ProbeSeries],
     /// The work of a changing load, where the scene has one.
     pub load_steps: &'a [LoadStep],
+    /// Times of the parts of the run so far.
     pub timings: Timings,
 }
 
 /// Options for drawing figures.
 #[derive(Clone, Copy)]
 pub struct Drawing<'a> {
+    /// The files of each figure.
     pub formats: Formats,
     /// Called with how many figures are drawn, of how many: before the first and after each, from any thread. Once it
     /// breaks off, no other figure is begun.

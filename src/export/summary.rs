@@ -45,6 +45,7 @@ const AT_REST: f64 = 1e-6;
 pub struct Timings {
     /// From the scene file to the engine.
     pub setup: Duration,
+    /// All steps, or the solve of the equilibrium.
     pub steps: Duration,
     /// Outputs written while the run went on; writing the others is added to it.
     pub output: Duration,
@@ -53,13 +54,19 @@ pub struct Timings {
 /// The contents of `summary.json`; lengths in the scene's unit, infinities as `null`.
 #[derive(Clone, Debug, Serialize)]
 pub struct Summary {
+    /// Name of the program.
     pub program: &'static str,
+    /// Version of the program.
     pub version: &'static str,
+    /// Short name of the scene.
     pub name: String,
+    /// Title of the scene.
     pub title: String,
+    /// Particles by role, and pairs of neighbours.
     pub counts: Counts,
     /// Steps taken.
     pub steps: usize,
+    /// Why the run ended, by name.
     pub stop_reason: &'static str,
     /// The place and probable cause of divergence, if the body diverged.
     pub divergence: Option<String>,
@@ -69,6 +76,7 @@ pub struct Summary {
     pub share_swept: Option<f64>,
     /// The solution of the equilibrium, unless it was stepped to.
     pub equilibrium: Option<Equilibrium>,
+    /// Pseudo-energies and strain at the end.
     pub energies: Energies,
     /// Reactions, loads, energy and stress, where the scene has a material.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -76,7 +84,9 @@ pub struct Summary {
     /// Cautions about the result.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub cautions: Vec<String>,
+    /// Bonds that are broken at the end.
     pub broken_bonds: BrokenBonds,
+    /// How long the parts of the run took.
     pub timings: Seconds,
     /// The scene, its defaults and overrides included.
     pub scene: RawScene,
@@ -85,11 +95,17 @@ pub struct Summary {
 /// Particles by their role at the end, and pairs of neighbours.
 #[derive(Clone, Copy, Debug, Serialize, PartialEq, Eq)]
 pub struct Counts {
+    /// All of them, those of the frame included.
     pub particles: usize,
+    /// Particles that take the rule's target.
     pub followers: usize,
+    /// Particles that are moved from outside.
     pub leaders: usize,
+    /// Particles that stay where they are.
     pub clamped: usize,
+    /// Particles that have left the body.
     pub ghosts: usize,
+    /// Points around the body.
     pub frame: usize,
     /// Pairs of which at least one sees the other, broken ones included.
     pub neighbour_pairs: usize,
@@ -106,8 +122,10 @@ pub struct Energies {
     pub largest_strain: Option<f64>,
 }
 
+/// What fracture has done to the body.
 #[derive(Clone, Copy, Debug, Serialize, PartialEq)]
 pub struct BrokenBonds {
+    /// Pairs of neighbours that are broken.
     pub count: usize,
     /// The number of them that were broken before the first step: cuts and ghosts of the scene.
     pub before_the_start: usize,
@@ -115,8 +133,10 @@ pub struct BrokenBonds {
     pub first: Option<FirstBreak>,
 }
 
+/// Where a body began to break.
 #[derive(Clone, Copy, Debug, Serialize, PartialEq)]
 pub struct FirstBreak {
+    /// Step at which it broke.
     pub step: usize,
     /// Ids, counted from 1.
     pub pair: [usize; 2],
@@ -129,7 +149,9 @@ pub struct FirstBreak {
 /// The readings of a testing machine, with their units.
 #[derive(Clone, Debug, Serialize, PartialEq)]
 pub struct Measured {
+    /// Units of the numbers, by name.
     pub units: Units,
+    /// The readings themselves.
     #[serde(flatten)]
     pub mechanics: Mechanics,
     /// At the scene's `record.places`.
@@ -140,10 +162,13 @@ pub struct Measured {
 /// The solver and its work.
 #[derive(Clone, Debug, Serialize, PartialEq)]
 pub struct Equilibrium {
+    /// Name of the solver.
     pub solver: &'static str,
     /// The reason for this solver.
     pub why: String,
+    /// Iterations made.
     pub iterations: usize,
+    /// Whether the tolerance was reached.
     pub converged: bool,
     /// Residual force over the load's, at the end \[1\].
     pub residual: f64,
@@ -157,8 +182,11 @@ pub struct Equilibrium {
 /// [`Timings`] in seconds.
 #[derive(Clone, Copy, Debug, Serialize, PartialEq)]
 pub struct Seconds {
+    /// From the scene file to the engine \[s\].
     pub setup_s: f64,
+    /// All steps, or the solve of the equilibrium \[s\].
     pub steps_s: f64,
+    /// Outputs \[s\].
     pub output_s: f64,
 }
 
@@ -206,6 +234,7 @@ impl Summary {
         }
     }
 
+    /// Writes `summary.json`.
     pub fn write(&self, folder: &OutputFolder) -> Result<PathBuf, ExportError> {
         let path = folder.path(FILE);
         let mut text = serde_json::to_string_pretty(self).map_err(ExportError::io("write", &path))?;

@@ -57,6 +57,7 @@ pub struct VtkSeries {
 }
 
 impl VtkSeries {
+    /// Makes the folder for the frames.
     pub fn create(folder: &OutputFolder) -> Result<Self, ExportError> {
         let steps = folder.path(FOLDER);
         fs::create_dir_all(&steps).map_err(ExportError::io("create", &steps))?;

@@ -31,9 +31,19 @@ pub type TractionField<'a> = Box<dyn Fn(Point, Point) -> Point + 'a>;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum PlaneRegion {
     /// An upright rectangle from its lowest to its highest coordinates \[m\]; it may have no width.
-    Box { min: Point, max: Point },
+    Box {
+        /// Lowest coordinates.
+        min: Point,
+        /// Highest coordinates.
+        max: Point,
+    },
     /// \[m\]
-    Disc { centre: Point, radius: f64 },
+    Disc {
+        /// Coordinates of the middle.
+        centre: Point,
+        /// Distance of the rim from the middle.
+        radius: f64,
+    },
 }
 
 /// A support of a body.
@@ -65,14 +75,18 @@ pub struct Support<'a> {
 
 /// A traction on parts of the outline.
 pub struct PortionTraction<'a> {
+    /// Where it acts.
     pub on: Vec<Portion>,
+    /// What acts there.
     pub traction: TractionField<'a>,
 }
 
 /// A plane elastic body in equilibrium, given by its shape. Where supports overlap the later one
 /// holds; loads add up.
 pub struct ShapeProblem<'a> {
+    /// The outline of the undeformed body \[m\].
     pub outline: &'a Outline,
+    /// What the body is made of, but for its inclusions.
     pub material: Material,
     /// The measure of strain.
     pub strain: Strain,
@@ -80,7 +94,9 @@ pub struct ShapeProblem<'a> {
     pub inclusions: Vec<(&'a Outline, Material)>,
     /// Lines inside the body along which materials meet. They may not overlap.
     pub interfaces: Vec<Piece>,
+    /// What holds the body.
     pub supports: Vec<Support<'a>>,
+    /// What pulls its outline.
     pub tractions: Vec<PortionTraction<'a>>,
     /// Forces \[N\] at points \[m\]. The displacement has no limit at the point itself.
     pub point_forces: Vec<(Point, Point)>,

@@ -39,6 +39,7 @@ impl Default for Effort {
 /// One of the nested meshes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Level {
+    /// Nodes of its mesh.
     pub nodes: usize,
     /// Strain energy \[J\].
     pub energy: f64,
@@ -253,6 +254,7 @@ impl ShapeSolution {
         &self.levels
     }
 
+    /// The error of the finest mesh.
     pub fn error(&self) -> EstimatedError {
         self.error
     }

@@ -3,6 +3,7 @@
 /// `block[a][b]` takes component `b` of a neighbour to component `a` of the particle.
 pub type Block = [[f64; 2]; 2];
 
+/// The block that changes no vector.
 pub const IDENTITY: Block = [[1.0, 0.0], [0.0, 1.0]];
 
 /// `block * vector`.
@@ -21,6 +22,7 @@ pub fn product(a: &Block, b: &Block) -> Block {
     [[left[0], right[0]], [left[1], right[1]]]
 }
 
+/// Rows become columns.
 pub fn transposed([[a, b], [c, d]]: Block) -> Block {
     [[a, c], [b, d]]
 }

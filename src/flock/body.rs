@@ -15,7 +15,12 @@ use crate::geometry::shape::Shape;
 #[derive(Clone, Debug, PartialEq)]
 pub enum Cut {
     /// A rectangle by count: `columns` sites in a row, `rows` rows, from site (0, 0).
-    Count { columns: u32, rows: u32 },
+    Count {
+        /// Sites in a row of the lattice.
+        columns: u32,
+        /// Rows of the lattice.
+        rows: u32,
+    },
     /// The sites inside a shape.
     Shape(Shape),
 }
@@ -23,22 +28,65 @@ pub enum Cut {
 /// Why no body can be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum BodyError {
+    /// No site of the lattice lies inside the shape.
     #[error(
         "the shape holds no lattice site: the lattice's spacing is {spacing}, the shape measures {width} by {height}"
     )]
-    Empty { spacing: f64, width: f64, height: f64 },
+    Empty {
+        /// The lattice's spacing \[length\].
+        spacing: f64,
+        /// Extent of the shape's bounds along x \[length\].
+        width: f64,
+        /// Extent of the shape's bounds along y \[length\].
+        height: f64,
+    },
+    /// The bounds hold more sites than a body may have.
     #[error("the body would have more than {limit} lattice sites in its bounds")]
-    TooLarge { limit: u64 },
+    TooLarge {
+        /// Most sites that the bounds may hold.
+        limit: u64,
+    },
+    /// Some particles cannot feel each other through any chain of neighbours.
     #[error(
         "the body falls into {parts} parts that are no neighbours of each other: particle {first} and particle {second} are not connected"
     )]
-    Disconnected { parts: usize, first: usize, second: usize },
+    Disconnected {
+        /// Number of connected parts.
+        parts: usize,
+        /// Id of a particle in one part.
+        first: usize,
+        /// Id of a particle in another part.
+        second: usize,
+    },
+    /// A particle of a cloud sees no other.
     #[error("particle {id} at ({}, {}) has no neighbour within {radius}", .place[0], .place[1])]
-    Alone { id: usize, place: [f64; 2], radius: f64 },
+    Alone {
+        /// Id of the particle.
+        id: usize,
+        /// Where it stands in the reference configuration \[length\].
+        place: [f64; 2],
+        /// Radius of its neighbourhood \[length\].
+        radius: f64,
+    },
+    /// The neighbourhoods of a cloud are too wide to be listed.
     #[error("within {radius} the particles have about {about} neighbours in all, at most {limit} are kept")]
-    TooManyNeighbours { radius: f64, about: u64, limit: u64 },
+    TooManyNeighbours {
+        /// Radius of the neighbourhoods \[length\].
+        radius: f64,
+        /// Neighbours of all particles together, estimated from a sample.
+        about: u64,
+        /// Most neighbours that are listed.
+        limit: u64,
+    },
+    /// The neighbourhoods of a lattice are too wide to be listed.
     #[error("the particles have about {about} neighbours in all, at most {limit} are kept")]
-    ManyNeighbours { about: u64, limit: u64 },
+    ManyNeighbours {
+        /// Neighbours of all particles together, an upper bound.
+        about: u64,
+        /// Most neighbours that are listed.
+        limit: u64,
+    },
+    /// The neighbourhood cannot be laid on the lattice.
     #[error(transparent)]
     Neighbourhood(#[from] NeighbourhoodError),
 }
@@ -48,6 +96,7 @@ pub enum BodyError {
 /// files, the order that they were given with.
 #[derive(Clone, Debug)]
 pub struct Body {
+    /// The lattice that the sites belong to; of particles given as points its spacing alone has a meaning.
     pub lattice: Lattice,
     /// Column and row of each particle, shape \[count\].
     pub sites: Vec<Site>,
@@ -55,6 +104,7 @@ pub struct Body {
     pub reference: Arc<Vectors>,
     /// Whether the particle belongs to the frame, shape \[count\].
     pub is_frame: Vec<bool>,
+    /// The shell around the body; none where no frame was asked for.
     pub frame: Option<Frame>,
     /// The user's ids of particles that were given as points; they lie on no lattice.
     pub numbering: Option<Arc<Numbering>>,
@@ -161,6 +211,7 @@ impl Body {
         (0..self.count()).map(|row| self.in_row(row))
     }
 
+    /// Number of particles, those of the frame included.
     pub fn count(&self) -> usize {
         self.sites.len()
     }

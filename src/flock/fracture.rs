@@ -52,6 +52,7 @@ pub enum Ghosts {
 /// A bond that broke.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Break {
+    /// Step at which it broke; 0 for a bond cut before the first.
     pub step: usize,
     /// Indices of the two particles, the lower first.
     pub pair: [u32; 2],
@@ -64,7 +65,9 @@ pub struct Break {
 /// Which bonds are broken, parallel to [`Neighbours::index`].
 #[derive(Clone, Debug)]
 pub struct Bonds {
+    /// When bonds break as the body moves; without one they are only cut.
     pub threshold: Option<Threshold>,
+    /// What stands in for neighbours that are lost.
     pub ghosts: Ghosts,
     broken: Vec<bool>,
     any_broken: bool,
@@ -84,6 +87,7 @@ pub(crate) enum StandIn {
 }
 
 impl Bonds {
+    /// All bonds of `neighbours`, unbroken.
     pub fn new(threshold: Option<Threshold>, ghosts: Ghosts, neighbours: &Neighbours) -> Self {
         let sees = |j: usize, k: u32| neighbours.of(j).contains(&k);
         let seen_by = |j: usize| neighbours.of(j).iter().all(|&k| sees(k as usize, j as u32));
@@ -97,10 +101,12 @@ impl Bonds {
         }
     }
 
+    /// Whether the pair at this place of [`Neighbours::index`] is broken.
     pub fn is_broken(&self, bond: usize) -> bool {
         self.broken[bond]
     }
 
+    /// Whether any bond is broken.
     pub fn any_broken(&self) -> bool {
         self.any_broken
     }

@@ -24,6 +24,7 @@ pub enum FrameRule {
 }
 
 impl FrameRule {
+    /// The name in scene files.
     pub fn name(self) -> &'static str {
         match self {
             FrameRule::Lagged => "lagged",
@@ -41,6 +42,7 @@ impl FrameRule {
 /// Frame points and the particles each serves, in compressed rows.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frame {
+    /// Which particles a frame point copies, and when.
     pub rule: FrameRule,
     /// Particle index of each frame point, ascending, shape \[points\].
     pub points: Vec<u32>,
@@ -72,10 +74,12 @@ impl Frame {
         frame
     }
 
+    /// Number of frame points.
     pub fn len(&self) -> usize {
         self.points.len()
     }
 
+    /// Whether there is no frame point.
     pub fn is_empty(&self) -> bool {
         self.points.is_empty()
     }

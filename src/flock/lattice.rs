@@ -13,30 +13,42 @@ pub type Site = [i32; 2];
 /// Which lattice, with its spacings \[length\] and angle \[rad\].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LatticeKind {
+    /// Bonds of one length at right angles.
     Square {
+        /// Bond length.
         spacing: f64,
     },
+    /// Bonds of two lengths at right angles.
     Rectangular {
+        /// Bond length along x, before the lattice is turned.
         a: f64,
+        /// Bond length along y, before the lattice is turned.
         b: f64,
     },
     /// Conventional cell `a` by `b` with a site at its centre.
     CentredRectangular {
+        /// Width of the cell along x, before the lattice is turned.
         a: f64,
+        /// Height of the cell along y, before the lattice is turned.
         b: f64,
     },
     /// Triangular lattice; one bond direction lies along x.
     Hexagonal {
+        /// Bond length.
         spacing: f64,
     },
     /// Edges `a` along x and `b` at `angle` \[rad\] from it.
     Oblique {
+        /// Length of the edge along x.
         a: f64,
+        /// Length of the other edge.
         b: f64,
+        /// Angle from the first edge to the other, counter-clockwise.
         angle: f64,
     },
     /// A hexagonal lattice with every third site missing; `spacing` is the bond length.
     Honeycomb {
+        /// Bond length.
         spacing: f64,
     },
 }
@@ -87,10 +99,12 @@ impl Lattice {
         Self { kind, origin, grid, e1: by(self.e1), e2: by(self.e2) }
     }
 
+    /// Kind and spacings, as the lattice was made or scaled.
     pub fn kind(&self) -> LatticeKind {
         self.kind
     }
 
+    /// The name in scene files and messages.
     pub fn name(&self) -> &'static str {
         match self.kind {
             LatticeKind::Square { .. } => "square",
@@ -102,6 +116,7 @@ impl Lattice {
         }
     }
 
+    /// Whether the lattice has a site at these integers: the parity rule.
     pub fn is_site(&self, [i, j]: Site) -> bool {
         match self.kind {
             LatticeKind::Square { .. } | LatticeKind::Rectangular { .. } | LatticeKind::Oblique { .. } => {
@@ -121,10 +136,12 @@ impl Lattice {
         }
     }
 
+    /// Number of sublattices: 2 on the honeycomb, else 1.
     pub fn sublattices(&self) -> usize {
         if matches!(self.kind, LatticeKind::Honeycomb { .. }) { 2 } else { 1 }
     }
 
+    /// Where a site is \[length, world frame\].
     pub fn position(&self, site: Site) -> [f64; 2] {
         let [x, y] = self.vector(site);
         [self.origin[0] + x, self.origin[1] + y]

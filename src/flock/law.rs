@@ -14,10 +14,13 @@ use super::vectors::Vectors;
 /// The arrays and index lists that a sweep runs over; it knows particles, not lattices.
 #[derive(Clone, Debug)]
 pub struct Flock {
+    /// The mean and the terms added to it.
     pub rule: Rule,
     /// Reference positions \[length\], shape \[count\].
     pub reference: Arc<Vectors>,
+    /// Which particle sees which, in summation order.
     pub neighbours: Neighbours,
+    /// How much each neighbour counts.
     pub weights: Weights,
     /// Loads on the particles of a material \[force\], shape \[count\].
     pub forces: Option<Vectors>,
@@ -124,6 +127,7 @@ impl MatrixWeights {
         [0, 1].map(|axis| compliance[axis][axis] == 0.0)
     }
 
+    /// How far a force moves the particle while its neighbours stay, `D^-1` \[length / force\].
     pub fn compliance(&self, particle: usize) -> Block {
         self.compliance[self.class[particle] as usize]
     }

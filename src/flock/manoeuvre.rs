@@ -8,8 +8,11 @@ use super::block::{Block, IDENTITY, apply};
 /// `x -> about + translate + matrix (x - about)` \[length, world frame\].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Affine {
+    /// The place that the matrix leaves where it is.
     pub about: [f64; 2],
+    /// Shift of every place \[length\].
     pub translate: [f64; 2],
+    /// Stretch, shear and turn \[1\].
     pub matrix: Block,
 }
 
@@ -17,6 +20,7 @@ impl Affine {
     /// Leaves everything where it is.
     pub const NONE: Affine = Affine { about: [0.0; 2], translate: [0.0; 2], matrix: IDENTITY };
 
+    /// Where a place is carried to \[length, world frame\].
     pub fn apply(&self, place: [f64; 2]) -> [f64; 2] {
         let about = self.about;
         let moved = apply(&self.matrix, [place[0] - about[0], place[1] - about[1]]);
@@ -27,16 +31,22 @@ impl Affine {
 /// Where a formation is: translation \[length\], turn \[rad\] applied after stretch and shear \[1\].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Posture {
+    /// Shift of the formation as a whole \[length\].
     pub translate: [f64; 2],
+    /// Angle, counter-clockwise \[rad\].
     pub rotate: f64,
+    /// Factors along x and y \[1\]; 1 changes nothing.
     pub stretch: [f64; 2],
+    /// Shift of x for every unit of y, and of y for every unit of x \[1\].
     pub shear: [f64; 2],
 }
 
 impl Posture {
+    /// The formation as it was laid out.
     pub const NOMINAL: Posture =
         Posture { translate: [0.0; 2], rotate: 0.0, stretch: [1.0; 2], shear: [0.0; 2] };
 
+    /// The map that carries the nominal posture about `about` \[length\] to this one.
     pub fn affine(&self, about: [f64; 2]) -> Affine {
         let (sin, cos) = self.rotate.sin_cos();
         let ([sx, sy], [hx, hy]) = (self.stretch, self.shear);
@@ -59,16 +69,22 @@ impl Posture {
 /// A part of a manoeuvre: `seconds` to get to a posture, `hold` to stay there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Leg {
+    /// Time to get there \[s\].
     pub seconds: f64,
+    /// Time to stay there \[s\].
     pub hold: f64,
+    /// Where the leg leads, counted from the formation as it was laid out.
     pub posture: Posture,
 }
 
 /// Legs one after another, from the nominal posture unless `from` says otherwise.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Manoeuvre {
+    /// The centre of turn, stretch and shear \[length, world frame\].
     pub about: [f64; 2],
+    /// Posture before the first leg.
     pub from: Posture,
+    /// Legs in the order in which they are flown.
     pub legs: Vec<Leg>,
 }
 
@@ -92,6 +108,7 @@ impl Manoeuvre {
         from
     }
 
+    /// The map of the formation's nominal places `time` seconds after the start.
     pub fn affine(&self, time: f64) -> Affine {
         self.posture(time).affine(self.about)
     }

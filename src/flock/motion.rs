@@ -5,28 +5,63 @@
 #[derive(Clone, Debug, PartialEq)]
 pub enum Motion {
     /// Constant velocity \[length per step\].
-    Velocity { per_step: [f64; 2] },
+    Velocity {
+        /// Displacement that each step adds.
+        per_step: [f64; 2],
+    },
     /// Displacements at given steps, ascending; before the first it runs from zero at step 0, after
     /// the last it holds.
-    Keyframes { frames: Vec<Keyframe>, interpolation: Interpolation },
+    Keyframes {
+        /// Keyframes by ascending step.
+        frames: Vec<Keyframe>,
+        /// How displacements between two keyframes are found.
+        interpolation: Interpolation,
+    },
     /// Rotation by `angle` \[rad\], stretch and shear about `about`, reached in even parts over `steps`.
-    Affine { about: [f64; 2], angle: f64, stretch: [f64; 2], shear: [f64; 2], steps: f64 },
+    Affine {
+        /// Centre of turn, stretch and shear.
+        about: [f64; 2],
+        /// Angle at the end, counter-clockwise.
+        angle: f64,
+        /// Factors along x and y at the end \[1\]; 1 changes nothing.
+        stretch: [f64; 2],
+        /// Shift of x for every unit of y, and of y for every unit of x, at the end \[1\]; before the turn.
+        shear: [f64; 2],
+        /// Steps after which the end is reached.
+        steps: f64,
+    },
     /// `amplitude * sin(2 pi (step / period + phase))`, less its value at step 0.
-    Sinusoid { amplitude: [f64; 2], period: f64, phase: f64 },
+    Sinusoid {
+        /// Greatest deflection along x and y.
+        amplitude: [f64; 2],
+        /// Steps of one oscillation.
+        period: f64,
+        /// Share of an oscillation by which the start is shifted \[1\].
+        phase: f64,
+    },
     /// A displacement for each leader, reached in even parts over `steps`; shape \[leaders\], in the
     /// order of the particles' indices.
-    Table { displacements: Vec<[f64; 2]>, steps: f64 },
+    Table {
+        /// Displacement of each leader at the end.
+        displacements: Vec<[f64; 2]>,
+        /// Steps after which the end is reached.
+        steps: f64,
+    },
 }
 
+/// A displacement at a given step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Keyframe {
+    /// Steps since the particle became a leader; parts of a step are allowed.
     pub step: f64,
+    /// From where the leader stood when it became one \[length\].
     pub displacement: [f64; 2],
 }
 
 /// How a motion goes from one keyframe to the next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Interpolation {
+    /// At constant velocity.
     Linear,
     /// Starts and ends each part at rest (the cubic `3s^2 - 2s^3`).
     Smooth,

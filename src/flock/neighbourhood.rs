@@ -11,9 +11,15 @@ use super::vectors::Vectors;
 pub enum Neighbourhood {
     /// The first `nc`, `nc` being the lattice's coordination number; `keep` reduces them, dropping
     /// from the end of the order of [`Lattice::offsets_within`].
-    First { keep: Option<usize> },
+    First {
+        /// How many are kept; all where there is none.
+        keep: Option<usize>,
+    },
     /// All sites within `radius` primitive cells each way: 8 for radius 1, 24 for radius 2.
-    Chebyshev { radius: i32 },
+    Chebyshev {
+        /// Primitive cells each way.
+        radius: i32,
+    },
     /// The first neighbours and theirs (the paper's second gradient).
     Second,
     /// The first neighbours and the sites behind them, twice as far in the same directions.
@@ -21,26 +27,63 @@ pub enum Neighbourhood {
     /// The sites at these offsets, in columns and rows.
     Offsets(Vec<Site>),
     /// The sites within this distance in the reference configuration \[length\].
-    Within { radius: f64 },
+    Within {
+        /// Greatest distance in the reference configuration \[length\].
+        radius: f64,
+    },
     /// The particles within this distance now \[length\]: the paper's liquid and gas.
-    Dynamic { radius: f64 },
+    Dynamic {
+        /// Greatest present distance \[length\].
+        radius: f64,
+    },
 }
 
 /// Why a neighbourhood cannot be laid on a lattice.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum NeighbourhoodError {
+    /// More neighbours are to be kept than there are.
     #[error("the {lattice} lattice has {coordination} first neighbours, {keep} cannot be kept")]
-    TooMany { lattice: &'static str, coordination: usize, keep: usize },
+    TooMany {
+        /// Name of the lattice.
+        lattice: &'static str,
+        /// First neighbours that it has.
+        coordination: usize,
+        /// Neighbours that were asked for.
+        keep: usize,
+    },
+    /// An offset that leads to no site of the lattice.
     #[error("offset [{}, {}] leads from a {lattice} site to a place that is no site", .offset[0], .offset[1])]
-    NoSite { lattice: &'static str, offset: Site },
+    NoSite {
+        /// Name of the lattice.
+        lattice: &'static str,
+        /// The offset, in columns and rows.
+        offset: Site,
+    },
+    /// A Chebyshev neighbourhood on a honeycomb.
     #[error("a honeycomb has no Chebyshev ring: its sites are no translations of each other")]
     RingOnHoneycomb,
+    /// A collinear neighbourhood on a lattice that does not go on straight behind its first neighbours.
     #[error("on a {lattice} lattice no site lies twice as far in the direction of a first neighbour")]
-    NothingBehind { lattice: &'static str },
+    NothingBehind {
+        /// Name of the lattice.
+        lattice: &'static str,
+    },
+    /// A radius that reaches no other site.
     #[error("no site lies within {radius} of another: the nearest is {spacing} away")]
-    TooSmall { radius: f64, spacing: f64 },
+    TooSmall {
+        /// The radius \[length\].
+        radius: f64,
+        /// Distance of the nearest site \[length\].
+        spacing: f64,
+    },
+    /// A radius that reaches too many sites.
     #[error("a particle would see about {about:.3e} others, at most {limit} are listed")]
-    TooLarge { about: f64, limit: u32 },
+    TooLarge {
+        /// Sites within it, estimated from the area of a cell.
+        about: f64,
+        /// Most sites that are listed.
+        limit: u32,
+    },
 }
 
 /// Neighbours of a particle above which nothing is listed: a radius of 600 spacings.
@@ -143,11 +186,14 @@ fn neighbours_of_neighbours(lattice: &Lattice, sublattice: usize) -> Vec<Site> {
 /// summation order. Shapes: `starts` \[count + 1\], `index` \[bonds\].
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Neighbours {
+    /// Where the bonds of each particle begin; the last entry is the number of bonds.
     pub starts: Vec<u32>,
+    /// The particle that each bond leads to.
     pub index: Vec<u32>,
 }
 
 impl Neighbours {
+    /// One list for each particle, in the order of the particles.
     pub fn from_lists(lists: impl IntoIterator<Item = impl IntoIterator<Item = u32>>) -> Self {
         let mut neighbours = Self { starts: vec![0], index: Vec::new() };
         for list in lists {
@@ -157,6 +203,7 @@ impl Neighbours {
         neighbours
     }
 
+    /// Number of particles that have a list, even an empty one.
     pub fn count(&self) -> usize {
         self.starts.len().saturating_sub(1)
     }
@@ -166,6 +213,7 @@ impl Neighbours {
         self.starts[particle] as usize..self.starts[particle + 1] as usize
     }
 
+    /// The particles that `particle` sees, in summation order.
     pub fn of(&self, particle: usize) -> &[u32] {
         &self.index[self.bonds(particle)]
     }

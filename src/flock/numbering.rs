@@ -52,6 +52,7 @@ impl Numbering {
         Self { ids, rows, by_id }
     }
 
+    /// The user's id of a particle.
     pub fn id(&self, particle: usize) -> u32 {
         self.ids[particle]
     }

@@ -18,7 +18,9 @@ pub trait Real:
     + Debug
     + 'static
 {
+    /// The nearest number of this precision.
     fn of(value: f64) -> Self;
+    /// The same number in double precision.
     fn wide(self) -> f64;
     /// The number bit by bit: 0.0 and -0.0 differ, and a NaN is itself.
     fn bits(self) -> u64;

@@ -7,19 +7,27 @@ use super::vectors::distance;
 /// Which particles; the frame is never picked.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Region {
+    /// The whole body.
     All,
     /// The particles within `depth` \[length\] of the body's outermost coordinate on that side.
     Edge {
+        /// Which side of the body's bounds.
         side: Side,
+        /// How far from that side into the body.
         depth: f64,
     },
     /// The particles in this box, its boundary included \[length\].
     Box {
+        /// Lowest coordinates.
         min: [f64; 2],
+        /// Highest coordinates.
         max: [f64; 2],
     },
+    /// The particles in this disc, its boundary included \[length\].
     Disc {
+        /// Centre of the disc.
         centre: [f64; 2],
+        /// Radius of the disc.
         radius: f64,
     },
     /// The particles with these ids.
@@ -31,9 +39,13 @@ pub enum Region {
 /// A side of a body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Side {
+    /// Lowest x.
     Left,
+    /// Highest x.
     Right,
+    /// Lowest y.
     Bottom,
+    /// Highest y.
     Top,
 }
 

@@ -16,8 +16,10 @@ pub enum Role {
 }
 
 impl Role {
+    /// Every role; files number them in this order.
     pub const ALL: [Role; 5] = [Role::Follower, Role::Leader, Role::Clamped, Role::Frame, Role::Ghost];
 
+    /// The name in scene files and reports.
     pub fn name(self) -> &'static str {
         match self {
             Role::Follower => "follower",

@@ -7,7 +7,9 @@
 /// time and the compiler can vectorise it.
 #[derive(Debug, Default, PartialEq)]
 pub struct Vectors<T = f64> {
+    /// First coordinates, shape \[count\].
     pub x: Vec<T>,
+    /// Second coordinates, shape \[count\].
     pub y: Vec<T>,
 }
 
@@ -17,27 +19,33 @@ impl<T: Copy + Default> Vectors<T> {
         Self { x: vec![T::default(); count], y: vec![T::default(); count] }
     }
 
+    /// Number of vectors.
     pub fn len(&self) -> usize {
         self.x.len()
     }
 
+    /// Whether there is no vector.
     pub fn is_empty(&self) -> bool {
         self.x.is_empty()
     }
 
+    /// Both coordinates of one vector.
     pub fn get(&self, index: usize) -> [T; 2] {
         [self.x[index], self.y[index]]
     }
 
+    /// Overwrites one vector.
     pub fn set(&mut self, index: usize, vector: [T; 2]) {
         [self.x[index], self.y[index]] = vector;
     }
 
+    /// Appends a vector.
     pub fn push(&mut self, [x, y]: [T; 2]) {
         self.x.push(x);
         self.y.push(y);
     }
 
+    /// The vectors in order.
     pub fn iter(&self) -> impl Iterator<Item = [T; 2]> + '_ {
         self.x.iter().zip(&self.y).map(|(&x, &y)| [x, y])
     }

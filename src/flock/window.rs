@@ -5,8 +5,11 @@ use super::lattice::Site;
 /// Sites `low` to `low + [columns, rows] - 1`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Window {
+    /// Lowest column and row.
     pub low: Site,
+    /// Number of columns.
     pub columns: i64,
+    /// Number of rows.
     pub rows: i64,
 }
 

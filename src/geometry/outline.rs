@@ -60,20 +60,49 @@ pub struct Outline {
 /// Why a shape has no outline that a body can be fitted to. Pieces and holes are counted from 1.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum OutlineError {
+    /// A loop that bounds no area, up to rounding.
     #[error("{} has no area", ring_name(*.ring))]
-    NoArea { ring: usize },
+    NoArea {
+        /// Number of the loop: 0 is the outer one, others are holes.
+        ring: usize,
+    },
+    /// Two pieces of one loop cross or touch elsewhere than where one ends and the next begins, or fold back on each
+    /// other.
     #[error(
         "{} crosses or touches itself near ({:.6}, {:.6})", ring_name(*.ring), .place[0], .place[1]
     )]
-    SelfCrossing { ring: usize, place: Point },
+    SelfCrossing {
+        /// Number of the loop: 0 is the outer one, others are holes.
+        ring: usize,
+        /// Where they meet \[length\].
+        place: Point,
+    },
+    /// Two loops cross or touch.
     #[error(
         "{} and {} cross or touch near ({:.6}, {:.6})", ring_name(.rings[0]), ring_name(.rings[1]), .place[0], .place[1]
     )]
-    Touching { rings: [usize; 2], place: Point },
+    Touching {
+        /// Numbers of the loops, the lower first: 0 is the outer one, others are holes.
+        rings: [usize; 2],
+        /// Where they meet \[length\].
+        place: Point,
+    },
+    /// A hole that begins outside the outer loop.
     #[error("hole {hole} does not lie inside the outer outline, but at ({:.6}, {:.6})", .place[0], .place[1])]
-    Outside { hole: usize, place: Point },
+    Outside {
+        /// Number of the hole, from 1.
+        hole: usize,
+        /// Where its first piece begins \[length\].
+        place: Point,
+    },
+    /// A hole within another hole.
     #[error("hole {inner} lies inside hole {outer}")]
-    Nested { inner: usize, outer: usize },
+    Nested {
+        /// Number of the hole that lies inside, from 1.
+        inner: usize,
+        /// Number of the hole around it, from 1.
+        outer: usize,
+    },
 }
 
 /// How messages name a loop.
@@ -278,6 +307,7 @@ impl Outline {
         numbered(&self.rings)
     }
 
+    /// The piece with this number of its loop and its own, both from 0.
     pub fn piece(&self, ring: usize, piece: usize) -> &Piece {
         &self.rings[ring][piece]
     }

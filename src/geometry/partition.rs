@@ -18,10 +18,20 @@ const NOTHING: f64 = 1e-9;
 /// Why regions divide no body. Regions are counted from 1.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PartitionError {
+    /// A region has no outline of its own that could divide anything.
     #[error("region {region}: {reason}")]
-    Outline { region: usize, reason: OutlineError },
+    Outline {
+        /// Number of the region, from 1.
+        region: usize,
+        /// What is wrong with its outline.
+        reason: OutlineError,
+    },
+    /// A region lies outside the body, or only along its outline.
     #[error("region {region} has no part of the body")]
-    Outside { region: usize },
+    Outside {
+        /// Number of the region, from 1.
+        region: usize,
+    },
 }
 
 /// The outline of a body, and the lines inside along which its regions meet.
@@ -99,10 +109,13 @@ impl Partition {
         ring < self.outline.rings().len()
     }
 
+    /// Whether a loop or line comes back to where it begins: every loop of the outline does, and a region's outline
+    /// that lies wholly inside the body.
     pub fn is_closed(&self, ring: usize) -> bool {
         self.closed[ring]
     }
 
+    /// The piece with these numbers in [`Partition::rings`].
     pub fn piece(&self, ring: usize, piece: usize) -> &Piece {
         &self.rings[ring][piece]
     }

@@ -23,9 +23,19 @@ pub enum Selection {
     /// The outer loop and those of all holes.
     All,
     /// The parts in a box, its boundary included \[length\].
-    Box { min: Point, max: Point },
+    Box {
+        /// Lowest coordinates.
+        min: Point,
+        /// Highest coordinates.
+        max: Point,
+    },
     /// The parts in a disc, its boundary included \[length\].
-    Disc { centre: Point, radius: f64 },
+    Disc {
+        /// Centre of the disc.
+        centre: Point,
+        /// Radius of the disc.
+        radius: f64,
+    },
     /// Pieces by number.
     Pieces {
         /// The loop: 0 is the outer one, then holes in their order.
@@ -37,7 +47,12 @@ pub enum Selection {
     },
     /// From the place of the outline nearest to one point to that nearest to the other, the shorter way
     /// \[length\].
-    Between { from: Point, to: Point },
+    Between {
+        /// One point; it need not lie on the outline.
+        from: Point,
+        /// The other point.
+        to: Point,
+    },
 }
 
 impl Portion {

@@ -7,26 +7,37 @@ use super::specimen::Specimen;
 /// [`Shape::contains`].
 #[derive(Clone, Debug, PartialEq)]
 pub enum Shape {
+    /// Sides along the axes.
     Rectangle {
+        /// Lower left corner.
         min: [f64; 2],
+        /// Upper right corner.
         max: [f64; 2],
     },
+    /// A full disc.
     Disc {
+        /// Coordinates of the middle \[length\].
         centre: [f64; 2],
+        /// Distance of the boundary from the middle \[length\].
         radius: f64,
     },
     /// Vertices in order, either way round; the last joins the first.
     Polygon {
+        /// Coordinates of the corners \[length\].
         vertices: Vec<[f64; 2]>,
     },
     /// Edges and arcs, each beginning where the one before ends, in a closed loop either way round.
     Path {
+        /// The first begins where the last ends.
         pieces: Vec<Piece>,
     },
+    /// A standard tensile specimen.
     Specimen(Specimen),
     /// The first shape without the others, whose boundaries stay with the body.
     WithHoles {
+        /// The shape that the others are taken out of.
         body: Box<Shape>,
+        /// Solid shapes that are taken out of it.
         holes: Vec<Shape>,
     },
 }

@@ -53,12 +53,14 @@ impl Specimen {
         (narrow + rise).min(wide)
     }
 
+    /// Whether `point` lies inside or within `tolerance` \[length\] of the boundary.
     pub fn contains(&self, point: [f64; 2], tolerance: f64) -> bool {
         let [across, along] = if self.lying { [point[1], point[0]] } else { point };
         let inside = along.clamp(0.0, self.overall);
         (along - inside).abs() <= tolerance.max(0.0) && across.abs() <= self.half_width(inside) + tolerance
     }
 
+    /// Lowest and highest coordinate on each axis \[length\].
     pub fn bounds(&self) -> ([f64; 2], [f64; 2]) {
         let half = self.grip_width / 2.0;
         if self.lying { ([0.0, -half], [self.overall, half]) } else { ([-half, 0.0], [half, self.overall]) }

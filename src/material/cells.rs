@@ -184,6 +184,7 @@ impl Cells {
         self.kind.push(kind);
     }
 
+    /// Number of cells.
     pub fn count(&self) -> usize {
         self.kind.len()
     }
@@ -198,6 +199,7 @@ impl Cells {
         &self.index[self.starts[cell] as usize..self.starts[cell + 1] as usize]
     }
 
+    /// Particles at the corners of each cell, counter-clockwise, in the order of the cells.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = &[u32]> + Clone {
         self.starts.windows(2).map(|ends| &self.index[ends[0] as usize..ends[1] as usize])
     }

@@ -26,11 +26,27 @@ pub enum Constants {
     /// Plane stress takes -1 < nu < 1, the range in which a two-dimensional sheet has positive
     /// energy; a sheet cut from a three-dimensional isotropic solid has nu < 1/2. Plane strain takes
     /// -1 < nu < 1/2: at 1/2 the material is incompressible.
-    Isotropic { young: f64, poisson: f64, plane: Plane },
+    Isotropic {
+        /// Young's modulus \[force / length^2\].
+        young: f64,
+        /// Poisson's ratio \[1\].
+        poisson: f64,
+        /// The assumption across the thickness.
+        plane: Plane,
+    },
     /// Plane stress: moduli along the fibres and across them and for shear \[force / length^2\],
     /// contraction across the fibres under tension along them \[1\], and the angle of the fibres from
     /// x \[rad\]. Positive energy needs `poisson_12^2 < young[0] / young[1]`.
-    Orthotropic { young: [f64; 2], poisson_12: f64, shear: f64, angle: f64 },
+    Orthotropic {
+        /// Moduli along the fibres and across them \[force / length^2\].
+        young: [f64; 2],
+        /// Contraction across the fibres under tension along them \[1\].
+        poisson_12: f64,
+        /// Shear modulus \[force / length^2\].
+        shear: f64,
+        /// Angle of the fibres from x, counter-clockwise \[rad\].
+        angle: f64,
+    },
 }
 
 /// Poisson's ratio in plane strain above which dilatations are averaged: see [`Elastic::averaged_dilatation`].
@@ -39,8 +55,15 @@ const LOCKS_ABOVE: f64 = 0.4;
 /// Why constants make no stable material.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ElasticError {
+    /// A modulus or a thickness that is not positive and finite.
     #[error("{name} must be positive and finite, but it is {value}")]
-    NotPositive { name: &'static str, value: f64 },
+    NotPositive {
+        /// What the messages call it.
+        name: &'static str,
+        /// What was given.
+        value: f64,
+    },
+    /// A Poisson's ratio with which an isotropic sheet is not stable.
     #[error(
         "Poisson's ratio in plane {} must lie between {low} and {high}, ends excluded, but it is {value}: {}",
         if *.plane == Plane::Stress { "stress" } else { "strain" },
@@ -48,13 +71,33 @@ pub enum ElasticError {
         else if *.plane == Plane::Stress { "at 1 and above, stretching in all directions has no finite, positive stiffness" }
         else { "at 1/2 the material is incompressible, and above it compression would give energy" }
     )]
-    Poisson { plane: Plane, value: f64, low: f64, high: f64 },
+    Poisson {
+        /// The assumption across the thickness.
+        plane: Plane,
+        /// What was given \[1\].
+        value: f64,
+        /// Lower bound, excluded \[1\].
+        low: f64,
+        /// Upper bound, excluded \[1\].
+        high: f64,
+    },
+    /// A Poisson's ratio with which an orthotropic sheet is not stable.
     #[error(
         "the orthotropic Poisson's ratio must be smaller in size than sqrt(E1/E2) = {bound}, but it is {value}: straining the sheet would give energy"
     )]
-    PoissonOrthotropic { value: f64, bound: f64 },
+    PoissonOrthotropic {
+        /// What was given \[1\].
+        value: f64,
+        /// The size that it must stay below \[1\].
+        bound: f64,
+    },
+    /// An angle of the fibres that is not finite.
     #[error("the angle of the fibres must be finite, but it is {value}")]
-    Angle { value: f64 },
+    Angle {
+        /// What was given \[rad\].
+        value: f64,
+    },
+    /// The entries of the stiffness over- or underflow.
     #[error("the stiffness of the sheet does not fit a double: the constants are too large or too small")]
     Range,
 }
@@ -85,6 +128,7 @@ impl Elastic {
         Ok(Self { constants, thickness, stiffness })
     }
 
+    /// The constants that the stiffness was made from.
     pub fn constants(&self) -> Constants {
         self.constants
     }

@@ -30,6 +30,7 @@ pub struct FreeEdge {
 /// The outline of a body, for [`crate::material::recovery`].
 #[derive(Clone, Debug, Default)]
 pub struct Edge {
+    /// Components of the traction that are known, at points along the outline.
     pub tractions: Vec<KnownTraction>,
     /// Which cell each of them acts on.
     pub cells: Vec<u32>,
@@ -38,6 +39,8 @@ pub struct Edge {
 }
 
 impl FreeEdge {
+    /// `loads` act on the outline of a sheet of this `thickness` \[length\]; `held` names the components of each
+    /// particle that a support or leader holds, shape \[count\].
     pub fn new(outline: Outline, (loads, thickness): (Vec<Load>, f64), held: Vec<[bool; 2]>) -> Self {
         Self { outline, loads, thickness, held, edge: OnceLock::new() }
     }

@@ -63,18 +63,42 @@ pub struct GradientWeights {
 /// Why a lattice has no second gradient of this length.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum GradientError {
+    /// The lattice has no sites straight behind the neighbours.
     #[error(transparent)]
     Neighbours(#[from] NeighbourhoodError),
+    /// A length that the lattice's own dispersion outweighs.
     #[error(
         "the length {length} is too short for this lattice: l^2 of long waves comes out as {found:.6}, so short waves would soften; it carries {shortest:.4} and more"
     )]
-    TooShort { length: f64, found: f64, shortest: f64 },
+    TooShort {
+        /// What was given \[length\].
+        length: f64,
+        /// Least gradient length squared of long waves with it \[length^2\].
+        found: f64,
+        /// Least length that the lattice carries \[length\].
+        shortest: f64,
+    },
+    /// A length too many times the distance of rows for the digits of a double.
     #[error("the length {length} is more than {LONGEST:.0} times the distance of rows, {rows}")]
-    TooLong { length: f64, rows: f64 },
+    TooLong {
+        /// What was given \[length\].
+        length: f64,
+        /// Greatest distance of two neighbouring rows of bonds \[length\].
+        rows: f64,
+    },
+    /// A length that is not positive and finite.
     #[error("the length must be positive and finite, but it is {length}")]
-    NotPositive { length: f64 },
+    NotPositive {
+        /// What was given \[length\].
+        length: f64,
+    },
+    /// A length with which some wave but a translation costs no energy.
     #[error("some wave costs nothing or gives energy with the length {length}")]
-    Unstable { length: f64 },
+    Unstable {
+        /// What was given \[length\].
+        length: f64,
+    },
+    /// The weights have no long-wave limit.
     #[error(transparent)]
     Wave(#[from] HomogeniseError),
 }

@@ -51,27 +51,47 @@ pub struct Crystal {
 /// Why weights have no effective material.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum HomogeniseError {
+    /// A neighbour does not see a particle back with the transposed weight.
     #[error(
         "the rule is not symmetric: a particle of sublattice {sublattice} sees a neighbour at [{}, {}] that does not see it back alike, so the long-wave limit drifts instead of being elastic",
         .vector[0], .vector[1]
     )]
-    NotSymmetric { sublattice: usize, vector: [f64; 2] },
+    NotSymmetric {
+        /// Sublattice of the particle that sees.
+        sublattice: usize,
+        /// From that particle to the neighbour \[length\].
+        vector: [f64; 2],
+    },
+    /// Far neighbours cancel near ones, so that long waves cost nothing.
     #[error(
         "long waves cost nothing: the weights of far neighbours cancel those of near ones, so there is no stiffness"
     )]
     NoStiffness,
+    /// Products of lengths and weights over- or underflow.
     #[error("lengths or weights are too large or too small: their products do not fit a double")]
     Range,
+    /// The two particles of a honeycomb's cell do not hold each other.
     #[error("the particles of a lattice cell do not hold each other: their difference costs nothing")]
     Loose,
+    /// A particle has no target: its weights do not sum to a positive definite matrix.
     #[error(
         "the weights of a particle of sublattice {sublattice} do not sum to a positive definite matrix, so it has no target"
     )]
-    Singular { sublattice: usize },
+    Singular {
+        /// Sublattice of the particle.
+        sublattice: usize,
+    },
+    /// Lists of weights do not fit the lists of neighbours.
     #[error(
         "{given} lists of weights were given for {needed} sublattices, or lists of other lengths than the neighbours'"
     )]
-    Weights { given: usize, needed: usize },
+    Weights {
+        /// Lists that were given.
+        given: usize,
+        /// Sublattices of the lattice.
+        needed: usize,
+    },
+    /// The material has no stiffness on the lattice's cell.
     #[error(transparent)]
     Shape(#[from] ShapeError),
 }
@@ -84,6 +104,7 @@ pub struct Effective {
     /// Lame's constants of the nearest isotropic stiffness \[force / length\], two-dimensional: the
     /// stiffness of an equal stretch is `lambda + mu`.
     pub lambda: f64,
+    /// The second of them, the stiffness against shear \[force / length\].
     pub mu: f64,
     /// Distance of the stiffness from the nearest isotropic one, relative \[1\].
     pub anisotropy: f64,
@@ -96,11 +117,13 @@ pub struct Effective {
 /// Gradient length squared `l^2` \[length^2\]: positive stiffens short waves.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GradientLength {
-    /// Of waves along x that move along x, and across it.
+    /// Of waves along x that move along x.
     pub longitudinal_x: f64,
+    /// Of waves along x that move across it.
     pub transverse_x: f64,
     /// Over all directions and both polarisations.
     pub least: f64,
+    /// Over all directions and both polarisations.
     pub greatest: f64,
 }
 

@@ -16,6 +16,7 @@ pub struct Traction {
 /// Everything that pushes on a body.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Loads {
+    /// Loads on sides of the boundary; several on one side add up.
     pub tractions: Vec<Traction>,
     /// Forces on particles \[force\]; several on one particle add up.
     pub forces: Vec<(u32, [f64; 2])>,
@@ -26,13 +27,26 @@ pub struct Loads {
 /// Why a load cannot be put on a body. Particles are named by their ids, which count from 1.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum LoadError {
+    /// A force acts on a particle that the body does not have, or that belongs to no cell.
     #[error("a force acts on particle {particle}, but {reason}")]
-    NoParticle { particle: usize, reason: &'static str },
+    NoParticle {
+        /// Id of the particle.
+        particle: usize,
+        /// What keeps the force from acting.
+        reason: &'static str,
+    },
+    /// A traction acts on what bounds no cell, or two.
     #[error(
         "a traction needs a side of the body's boundary, but particles {} and {} bound {}",
         .ends[0], .ends[1], if *.inside { "a side between two cells" } else { "no side of any cell" }
     )]
-    NotBoundary { ends: [usize; 2], inside: bool },
+    NotBoundary {
+        /// Ids of the particles at its ends.
+        ends: [usize; 2],
+        /// Whether two cells meet there.
+        inside: bool,
+    },
+    /// A force is not finite, or they add up beyond the range of a double.
     #[error("a load must be finite")]
     NotFinite,
 }

@@ -15,26 +15,52 @@ use crate::flock::vectors::Vectors;
 /// ids, which count from 1.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Mechanism {
+    /// A particle without a cell around it.
     #[error(
         "a mechanism: particle {particle} belongs to no cell, so nothing holds it to the body; fill or remove its surroundings"
     )]
-    NoCell { particle: usize },
+    NoCell {
+        /// Its id.
+        particle: usize,
+    },
+    /// Parts of the body hinge on a particle where nothing else pins them.
     #[error(
         "a mechanism: at particle {particle} cells meet at a corner only, and one side turns about it like a hinge"
     )]
-    Hinge { particle: usize },
+    Hinge {
+        /// Id of the particle that turns most.
+        particle: usize,
+    },
+    /// Two parts of the body are joined by no chain of cells.
     #[error("a mechanism: no chain of cells joins particle {first} to particle {second}")]
-    Apart { first: usize, second: usize },
+    Apart {
+        /// Id of a particle of one part.
+        first: usize,
+        /// Id of a particle of another part.
+        second: usize,
+    },
+    /// No particle of a part is held.
     #[error("a mechanism: no leader holds the part of the body to which particle {particle} belongs")]
-    Loose { particle: usize },
+    Loose {
+        /// Id of a particle of the part.
+        particle: usize,
+    },
+    /// A single particle of a part is held.
     #[error(
         "a mechanism: the part of the body to which particle {particle} belongs is held at one particle only and turns about it"
     )]
-    Turns { particle: usize },
+    Turns {
+        /// Id of a particle of the part.
+        particle: usize,
+    },
+    /// Single components of a part's particles are held, which leave it a motion.
     #[error(
         "a mechanism: the part of the body to which particle {particle} belongs can slide or turn along the components that are left free"
     )]
-    Slides { particle: usize },
+    Slides {
+        /// Id of a particle of the part.
+        particle: usize,
+    },
 }
 
 /// Linkages of more parts than this are not analysed: a hinge among them counts as a mechanism.

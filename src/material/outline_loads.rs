@@ -37,18 +37,24 @@ pub struct Profile {
 /// A load on parts of an outline.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OutlineLoad {
+    /// Where it acts.
     pub portions: Vec<Portion>,
+    /// What acts there, before the profile.
     pub push: Push,
+    /// How it varies along a line; the same everywhere where there is none.
     pub profile: Option<Profile>,
 }
 
 /// Something that pushes on a body.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Load {
+    /// On parts of the outline.
     Outline(OutlineLoad),
     /// The same force on each of these particles \[force\].
     Particles {
+        /// Indices of the particles.
         particles: Vec<u32>,
+        /// On each of them \[force, world frame\].
         force: [f64; 2],
     },
     /// On every cell alike \[force / length^2\]: weight per volume times the thickness of the sheet.
@@ -58,10 +64,16 @@ pub enum Load {
 /// Why a load cannot be put on a body. Particles are named by their ids, which count from 1.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum LoadError {
+    /// A force acts on a particle without a cell around it.
     #[error("a force acts on particle {particle}, but it belongs to no cell")]
-    NoCell { particle: usize },
+    NoCell {
+        /// Id of the particle.
+        particle: usize,
+    },
+    /// A load acts on the outline of a body that has none, or that has no cells.
     #[error("the cells have no boundary for a load to act on")]
     NoBoundary,
+    /// A force is not finite, or they add up beyond the range of a double.
     #[error("a load must be finite")]
     NotFinite,
 }
@@ -149,6 +161,7 @@ pub struct Loader<'a> {
 }
 
 impl<'a> Loader<'a> {
+    /// `outline` is that of the body's shape; only loads on it need one.
     pub fn new(cells: &'a Cells, body: &'a Body, outline: Option<&'a Outline>) -> Self {
         Self { cells, body, outline, sides: SideGrid::new(cells, &body.reference, body.lattice.spacing()) }
     }

@@ -8,6 +8,7 @@ type Point = [f64; 2];
 /// The particles around a place, and shares with which they stand for it: linear fields are met exactly.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Around {
+    /// Indices of the particles.
     pub particles: Vec<u32>,
     /// They add up to 1.
     pub shares: Vec<f64>,

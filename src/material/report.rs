@@ -22,6 +22,7 @@ const ROUNDING: f64 = 1e-9;
 /// The material of a rule on an infinite lattice.
 #[derive(Clone, Debug, Serialize)]
 pub struct MaterialReport {
+    /// The lattice that the rule lives on.
     pub lattice: LatticeFacts,
     /// The name of the rule.
     pub rule: String,
@@ -32,15 +33,20 @@ pub struct MaterialReport {
     /// `D = sum_j K_j` of each sublattice \[force / length\], or the sum of the weights \[1\] of a scalar
     /// rule.
     pub diagonal: Vec<Block>,
+    /// The continuum that the rule is for long waves.
     pub material: Material,
+    /// How waves differ from that continuum as they get shorter.
     pub gradient: Gradient,
+    /// Stability over all waves.
     pub waves: Waves,
     /// Further notes for the reader.
     pub notes: Vec<String>,
 }
 
+/// A lattice in numbers.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LatticeFacts {
+    /// Name of the lattice.
     pub kind: &'static str,
     /// Smallest distance between two sites \[length\].
     pub spacing: f64,
@@ -52,15 +58,30 @@ pub struct LatticeFacts {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum Asked {
+    /// A sheet alike in all directions.
     Isotropic {
+        /// Young's modulus \[force / length^2\].
         young: f64,
+        /// Poisson's ratio \[1\].
         poisson: f64,
         /// "stress" or "strain".
         plane: &'static str,
+        /// Thickness of the sheet \[length\].
         thickness: f64,
     },
     /// Moduli along and across the fibres, whose angle from x is in degrees.
-    Orthotropic { young: [f64; 2], poisson_12: f64, shear: f64, fibres: f64, thickness: f64 },
+    Orthotropic {
+        /// Moduli along the fibres and across them \[force / length^2\].
+        young: [f64; 2],
+        /// Contraction across the fibres under tension along them \[1\].
+        poisson_12: f64,
+        /// Shear modulus \[force / length^2\].
+        shear: f64,
+        /// Angle of the fibres from x \[degree\].
+        fibres: f64,
+        /// Thickness of the sheet \[length\].
+        thickness: f64,
+    },
 }
 
 /// A neighbour of an interior particle and its weight.
@@ -72,6 +93,7 @@ pub struct Weight {
     pub offset: [i32; 2],
     /// From the particle to the neighbour \[length\].
     pub vector: [f64; 2],
+    /// Length of that vector \[length\].
     pub distance: f64,
     /// Direction from x \[degree\].
     pub direction: f64,
@@ -89,7 +111,9 @@ pub struct Material {
     pub stiffness: [[f64; 3]; 3],
     /// Lame's constants of the nearest isotropic stiffness, two-dimensional \[force / length\].
     pub lambda: f64,
+    /// The second of them, the stiffness against shear \[force / length\].
     pub mu: f64,
+    /// Whether the stiffness is isotropic, to rounding.
     pub isotropic: bool,
     /// Relative distance from the nearest isotropic stiffness \[1\].
     pub anisotropy: f64,
@@ -101,6 +125,7 @@ pub struct Material {
     pub poisson_plane_strain: Option<f64>,
     /// Young's modulus \[force / length^2\], read as plane stress.
     pub young_plane_stress: f64,
+    /// The same read as plane strain; none where there is no such Poisson's ratio.
     pub young_plane_strain: Option<f64>,
     /// Engineering constants along x and y, or along and across the fibres where there are any; none
     /// where a strain costs nothing.
@@ -124,11 +149,15 @@ pub struct Engineering {
 /// it would in the plain continuum.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Gradient {
+    /// Of waves along x that move along x.
     pub longitudinal_x: f64,
+    /// Of waves along x that move across it.
     pub transverse_x: f64,
     /// Over all directions and both polarisations.
     pub least: f64,
+    /// Over all directions and both polarisations.
     pub greatest: f64,
+    /// What the sign does to short waves.
     pub effect: Effect,
 }
 
@@ -153,6 +182,7 @@ pub struct Waves {
     pub least: f64,
     /// The wave of that cost \[1/length\], and its length \[length\].
     pub worst: [f64; 2],
+    /// Length of that wave \[length\].
     pub worst_length: f64,
     /// Largest eigenvalue of `D^-1 S(k)` \[1\].
     pub largest: f64,

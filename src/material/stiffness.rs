@@ -23,12 +23,21 @@ use super::elastic::{Elastic, Voigt};
 /// Why a polygon is no cell.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ShapeError {
+    /// A polygon of one or two corners, or none.
     #[error("a cell needs at least 3 corners, but this one has {corners}")]
-    TooFew { corners: usize },
+    TooFew {
+        /// How many it has.
+        corners: usize,
+    },
+    /// A cell of no area, or with its area to the right.
     #[error("the cell has no area to its left: its corners coincide, lie on a line or run clockwise")]
     NoArea,
+    /// A quadrilateral that is not convex.
     #[error("the quadrilateral is not convex: it folds over at corner {corner}")]
-    Folded { corner: usize },
+    Folded {
+        /// Number of the corner where it folds over, from 0.
+        corner: usize,
+    },
 }
 
 /// Stiffness of a cell \[force / length\], shape \[2 corners, 2 corners\], symmetric to the bit: a

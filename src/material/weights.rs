@@ -49,29 +49,70 @@ pub struct Row {
 /// Why cells and neighbours make no material rule. Particles are named by their ids, which count from 1.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum WeightsError {
+    /// Two corners of a cell do not see each other.
     #[error(
         "{neighbours} neighbours cannot carry shear coupling: particles {particle} and {missing} share a cell but are no neighbours, so {}; ask for all particles that share a cell",
         if *.corners == 4 { "the cell's diagonal pairs are missing" } else { "the cell's stiffness is cut" }
     )]
-    MissingNeighbour { particle: usize, missing: usize, neighbours: usize, corners: usize },
+    MissingNeighbour {
+        /// Id of the particle that lacks a neighbour.
+        particle: usize,
+        /// Id of the neighbour that it lacks.
+        missing: usize,
+        /// Most neighbours that any particle has.
+        neighbours: usize,
+        /// Corners of their cell.
+        corners: usize,
+    },
+    /// Two particles that feel the same averaged dilatation do not see each other.
     #[error(
         "{neighbours} neighbours cannot carry a dilatation averaged over cells: particles {particle} and {missing} have cells that meet at a particle, but are no neighbours"
     )]
-    MissingMate { particle: usize, missing: usize, neighbours: usize },
+    MissingMate {
+        /// Id of the particle that lacks a neighbour.
+        particle: usize,
+        /// Id of the neighbour that it lacks.
+        missing: usize,
+        /// Most neighbours that any particle has.
+        neighbours: usize,
+    },
+    /// The cells do not hold the body together.
     #[error(transparent)]
     Mechanism(#[from] Mechanism),
+    /// A cell has no stiffness.
     #[error("cell {cell} (counted from 1): {reason}")]
-    Shape { cell: usize, reason: ShapeError },
+    Shape {
+        /// Number of the cell, from 1.
+        cell: usize,
+        /// What is wrong with its corners.
+        reason: ShapeError,
+    },
+    /// The cells around a particle give it no stiffness that can be inverted.
     #[error(
         "particle {particle} has a stiffness that is singular to the precision of a double: the cells around it are too slender or their stiffnesses too far apart"
     )]
-    Singular { particle: usize },
+    Singular {
+        /// Id of the particle.
+        particle: usize,
+    },
+    /// Stiffness factors do not fit the cells.
     #[error("{given} stiffness factors were given for {cells} cells")]
-    FactorCount { given: usize, cells: usize },
+    FactorCount {
+        /// Factors that were given.
+        given: usize,
+        /// Cells that there are.
+        cells: usize,
+    },
+    /// A stiffness factor that is not positive and finite.
     #[error(
         "the stiffness factor of cell {cell} (counted from 1) must be positive and finite, but it is {value}"
     )]
-    Factor { cell: usize, value: f64 },
+    Factor {
+        /// Number of the cell, from 1.
+        cell: usize,
+        /// What was given \[1\].
+        value: f64,
+    },
 }
 
 impl MaterialWeights {
@@ -128,6 +169,7 @@ impl MaterialWeights {
         Ok(Self { neighbours, class, rows, cells })
     }
 
+    /// Number of particles.
     pub fn count(&self) -> usize {
         self.class.len()
     }

@@ -26,34 +26,78 @@ pub use shared::Shared;
 /// Error writing or reading a recording.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordError {
+    /// A recording would replace a file that it may not.
     #[error("{} exists: remove it, or give the recording another name", .0.display())]
     Taken(PathBuf),
+    /// A recording would replace a file that is none.
     #[error(
         "{} is no MCAP file: --force replaces recordings only\n  help: move it away, or give the recording another name",
         .0.display()
     )]
     NotOurs(PathBuf),
+    /// Another program has put a file where the recording belongs while it was written.
     #[error("{} was taken meanwhile: the recording is complete and kept in {}", .path.display(), .part.display())]
-    Kept { part: PathBuf, path: PathBuf },
+    Kept {
+        /// Where the recording is.
+        part: PathBuf,
+        /// Where it belongs.
+        path: PathBuf,
+    },
+    /// A path that ends in no file name.
     #[error("{} does not name a file that could be made: give it a name that ends in .mcap", .0.display())]
     Unnamed(PathBuf),
+    /// What runs cannot be recorded.
     #[error("--record: {what} is not recorded\n  help: leave --record out, or use ROS 2")]
-    NotRecorded { what: &'static str },
+    NotRecorded {
+        /// What was to be recorded.
+        what: &'static str,
+    },
+    /// The system refuses a file.
     #[error("cannot {action} {}: {source}", .path.display())]
-    Io { action: &'static str, path: PathBuf, source: std::io::Error },
+    Io {
+        /// What was tried, as a verb.
+        action: &'static str,
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// A recording could not be written on.
     #[error("{} cannot be written: {source}", .path.display())]
-    Write { path: PathBuf, source: mcap::McapError },
+    Write {
+        /// The unfinished file.
+        path: PathBuf,
+        /// Why.
+        source: mcap::McapError,
+    },
+    /// What was to be read is no MCAP file, or is damaged beyond reading.
     #[error("{} is no MCAP file: {source}\n  help: give a file that --record or `ros2 bag record -s mcap` has written", .path.display())]
-    NoMcap { path: PathBuf, source: mcap::McapError },
+    NoMcap {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: mcap::McapError,
+    },
+    /// A recording that carries no swarm file.
     #[error(
         "{} does not say which swarm flew\n  help: name the swarm file with --swarm; only flockform's own recordings of a swarm carry it",
         .0.display()
     )]
     NoSwarm(PathBuf),
+    /// A recording that says too little to be replayed.
     #[error("{}: {what}\n  help: {help}", .path.display())]
-    Unusable { path: PathBuf, what: String, help: String },
+    Unusable {
+        /// The file.
+        path: PathBuf,
+        /// What is missing.
+        what: String,
+        /// What to do about it.
+        help: String,
+    },
+    /// The swarm of a recording, with the overrides, is none.
     #[error("{0}")]
     Scene(#[from] crate::scene::SceneError),
+    /// A topic or frame has no legal name.
     #[error("{0}")]
     Name(#[from] crate::ros::arguments::NameError),
 }

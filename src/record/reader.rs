@@ -17,9 +17,11 @@ use crate::ros::edge::wire::{Order, decode};
 /// A message as it stands in the file.
 #[derive(Clone, Debug)]
 pub struct Entry {
+    /// Name of the topic.
     pub topic: Arc<str>,
     /// `package/Name`.
     pub kind: Arc<str>,
+    /// The encoded message, its encapsulation header included.
     pub payload: Vec<u8>,
     /// When it was sent, or came \[s\].
     pub published: f64,
@@ -162,6 +164,7 @@ impl Reader {
         })
     }
 
+    /// The file that is read.
     pub fn path(&self) -> &Path {
         &self.path
     }

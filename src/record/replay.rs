@@ -25,13 +25,17 @@ use crate::swarm::control::Control;
 /// How a replay went.
 #[derive(Clone, Debug, Serialize, PartialEq)]
 pub struct Report {
+    /// The file that was replayed.
     pub recording: PathBuf,
+    /// Short name of the swarm.
     pub swarm: String,
     /// Periods replayed.
     pub ticks: u64,
+    /// Poses of the swarm's robots that were replayed.
     pub poses: u64,
     /// Differences beyond this count \[m\].
     pub tolerance: f64,
+    /// In the order of the swarm file.
     pub robots: Vec<RobotDifference>,
     /// The defect of the file's end, if it has one.
     pub damage: Option<String>,
@@ -40,6 +44,7 @@ pub struct Report {
 /// Of one robot; distances in \[m\], times as recorded in \[s\].
 #[derive(Clone, Debug, Default, Serialize, PartialEq)]
 pub struct RobotDifference {
+    /// Name of the robot.
     pub name: String,
     /// Targets recorded.
     pub recorded: u64,
@@ -47,7 +52,9 @@ pub struct RobotDifference {
     pub differ: u64,
     /// Targets that only the recording has, and that only the replay has.
     pub only_recorded: u64,
+    /// Targets that only the replay has.
     pub only_replayed: u64,
+    /// Largest distance of a recorded target from the replayed one.
     pub largest: f64,
     /// When the difference was largest.
     pub largest_at: Option<f64>,

@@ -10,6 +10,7 @@ use crate::ros::node::recorder::RecordSink;
 pub struct Shared(Arc<Mutex<Option<Recording>>>);
 
 impl Shared {
+    /// The one recording of all clones.
     pub fn new(recording: Recording) -> Self {
         Self(Arc::new(Mutex::new(Some(recording))))
     }

@@ -6,7 +6,9 @@ use super::{Scene, SceneError};
 /// A scene or a swarm in the binary.
 #[derive(Clone, Copy, Debug)]
 pub struct Bundled {
+    /// The name by which commands find it.
     pub name: &'static str,
+    /// The file as it was written.
     pub text: &'static str,
 }
 

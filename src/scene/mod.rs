@@ -48,32 +48,45 @@ pub struct Scene {
     pub raw: RawScene,
     /// Of a body of points a lattice that is as wide, which stands in for its spacing alone.
     pub lattice: Lattice,
+    /// Where the particles come from.
     pub body: BodySource,
     /// Whether the body keeps the outline of its shape.
     pub is_fitted: bool,
+    /// How frame points follow the body; none without a frame.
     pub frame: Option<FrameRule>,
+    /// Which others a particle sees.
     pub neighbourhood: Neighbourhood,
+    /// The mean of the neighbours' positions that is the target.
     pub mean: Mean,
+    /// Fixed weights of the neighbours, on top of the mean's own; all equal where there are none.
     pub weights: Option<Weights>,
     /// Whether particles with unbalanced neighbours are kept in place at rest.
     pub keeps_rest: bool,
+    /// What a pull along one axis does across it (Eq. 2).
     pub poisson: Option<PoissonTerm>,
+    /// The step beyond the target (Eq. 4).
     pub feedback: Option<Feedback>,
+    /// The order and the damping of the sweep.
     pub update: Update,
     /// The material of the body, if the scene gives one.
     pub material: Option<Elastic>,
     /// Parts of the body that are of another material; the later one counts where they overlap.
     pub inclusions: Vec<Inclusion>,
+    /// What pushes the body, in the order in which it is written.
     pub loads: Vec<Load>,
+    /// Roles in the order in which they are written; later entries win.
     pub roles: Vec<RoleEntry>,
+    /// When bonds break and what stands in for them; none where the scene does not say.
     pub fracture: Option<Fracture>,
     /// Ends of each cut \[length\].
     pub cuts: Vec<Segment>,
+    /// When the run ends.
     pub stop: Stop,
     /// How the equilibrium is found, where the scene is not stepped.
     pub equilibrium: Option<Equilibrium>,
     /// In which parts loads and motions come, where the scene says so.
     pub load_steps: Option<LoadSteps>,
+    /// What is kept of the run.
     pub record: Record,
     document: Document,
 }
@@ -139,7 +152,9 @@ pub enum BodySource {
 /// A part of the body that is of another material.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Inclusion {
+    /// Which part.
     pub shape: Shape,
+    /// What it is made of, with the body's plane and thickness.
     pub material: Elastic,
 }
 
@@ -149,20 +164,29 @@ pub enum Weights {
     /// One for each neighbour, in the neighbourhood's order.
     List(Vec<f64>),
     /// A power of the reference distance.
-    Distance { power: f64 },
+    Distance {
+        /// The power of the distance \[1\].
+        power: f64,
+    },
     /// Such that each particle's neighbours reproduce its place.
     Solved,
     /// A second gradient whose boundary layers have this decay length \[length\].
-    Gradient { length: f64 },
+    Gradient {
+        /// Decay length of a boundary layer along a row of bonds \[length\].
+        length: f64,
+    },
 }
 
 /// The Poisson term (Eq. 2) before the body's width is known.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PoissonTerm {
+    /// Response `K` \[1\]; negative draws the sides together when pulled.
     pub k: f64,
+    /// The axis whose displacement acts.
     pub axis: Axis,
     /// Coordinate of the central axis \[length\]; the middle of the body where `None`.
     pub centre: Option<f64>,
+    /// Exponent of the distance from the axis \[1\]: 1 is linear, 0 its sign alone.
     pub exponent: f64,
 }
 
@@ -170,29 +194,49 @@ pub struct PoissonTerm {
 #[derive(Clone, Debug, PartialEq)]
 pub enum Load {
     /// On the part of the outline in the region; stresses \[force / length^2\].
-    Outline { region: SceneRegion, push: Push, profile: Option<Profile> },
+    Outline {
+        /// Where the load acts.
+        region: SceneRegion,
+        /// What acts there.
+        push: Push,
+        /// How it varies along a line; the same everywhere where there is none.
+        profile: Option<Profile>,
+    },
     /// On each particle of the region \[force\].
-    Force { region: SceneRegion, force: [f64; 2] },
+    Force {
+        /// Which particles it pushes.
+        region: SceneRegion,
+        /// On each of them, along x and y.
+        force: [f64; 2],
+    },
     /// On all of the body \[force / length^3\].
-    Body { force: [f64; 2] },
+    Body {
+        /// Along x and y.
+        force: [f64; 2],
+    },
 }
 
 /// A role for the particles of a region.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RoleEntry {
+    /// Which particles take the role.
     pub region: SceneRegion,
+    /// What they become.
     pub role: Role,
     /// The one component that is held or led; both where `None`.
     pub axis: Option<Axis>,
     /// First step at which it holds.
     pub from: usize,
+    /// The condition that a particle must meet as well to take the role; none where all take it.
     pub when: Option<Condition>,
+    /// How leaders move; none for other roles.
     pub motion: Option<LeaderMotion>,
 }
 
 /// A region before the lattice's spacing has set what it leaves open.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SceneRegion {
+    /// A region that names all of its own bounds.
     Known(Region),
     /// The outermost particles on a side, half a spacing deep.
     Outermost(Side),
@@ -203,14 +247,18 @@ pub enum SceneRegion {
 /// How leaders move.
 #[derive(Clone, Debug, PartialEq)]
 pub enum LeaderMotion {
+    /// The same program for every leader.
     Program(Motion),
     /// Displacements read from a file, reached in even parts over `steps`.
     Table {
+        /// The rows of the file.
         rows: table::DisplacementTable,
+        /// Steps to get there.
         steps: usize,
     },
     /// To where finite elements have the particles, in even parts over `steps`.
     Reference {
+        /// Steps to get there.
         steps: usize,
     },
 }
@@ -218,13 +266,16 @@ pub enum LeaderMotion {
 /// When bonds break and what stands in for them; without a threshold none breaks by itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fracture {
+    /// How long a bond may become.
     pub threshold: Option<Threshold>,
+    /// What stands in for neighbours that are lost.
     pub ghosts: Ghosts,
 }
 
 /// When the run ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stop {
+    /// Steps after which the run ends at the latest.
     pub steps: usize,
     /// Largest one-step motion over spacing at which the body is in equilibrium.
     pub tolerance: Option<f64>,
@@ -235,6 +286,7 @@ pub struct Stop {
 /// How the equilibrium is found.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Equilibrium {
+    /// Solver, tolerance and precision.
     pub request: Request,
     /// Relative error of the followers' displacements that is asked for \[1\].
     pub accuracy: Option<f64>,
@@ -246,7 +298,12 @@ pub enum LoadSteps {
     /// Each part solved to equilibrium: parts of the whole, from 0 to 1, in their order \[1\].
     Solved(Vec<f64>),
     /// The loads grow over `ramp` steps of the sweep, or act from the first one on; a row is kept `every` so many.
-    Stepped { ramp: Option<usize>, every: usize },
+    Stepped {
+        /// Steps over which the loads grow; none where they act from the first one on.
+        ramp: Option<usize>,
+        /// Steps from one row of the response to the next.
+        every: usize,
+    },
 }
 
 /// The records of the run.
@@ -256,6 +313,8 @@ pub struct Record {
     pub probes: Vec<usize>,
     /// \[length\]
     pub places: Vec<[f64; 2]>,
+    /// Steps at which the configuration is drawn; the last one always is.
     pub figures: Vec<usize>,
+    /// Steps from one VTK file to the next; 0 writes none.
     pub vtk_every: usize,
 }

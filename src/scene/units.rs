@@ -5,9 +5,11 @@ use super::Scene;
 /// Units by name. A scene names that of length and may name that of stress; the others follow.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
 pub struct Units {
+    /// Of lengths and displacements.
     pub length: String,
     /// Of Young's modulus, tractions and stresses.
     pub stress: String,
+    /// Of loads and reactions.
     pub force: String,
     /// Of moments, energies and work.
     pub moment: String,
@@ -32,6 +34,7 @@ const FORCES: [(&str, &str, &str); 14] = [
 ];
 
 impl Units {
+    /// Of the numbers in a scene and in its results.
     pub fn of(scene: &Scene) -> Self {
         Self::new(scene.unit(), scene.raw.stress_unit.as_deref())
     }

@@ -26,7 +26,9 @@ use super::{Peer, ShmError, domain};
 /// How many can share a service: fixed by the process that creates it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Capacity {
+    /// Processes that may write.
     pub writers: usize,
+    /// Processes that may read.
     pub readers: usize,
     /// Slices that wait for a reader; of a full queue the oldest gives way.
     pub queue: usize,
@@ -309,6 +311,7 @@ impl<T: Payload> Writer<T> {
         self.factory.dynamic_config().number_of_subscribers()
     }
 
+    /// Name of the service.
     pub fn service(&self) -> &str {
         &self.service
     }
@@ -414,6 +417,7 @@ impl<T: Payload> Reader<T> {
         self.refused.get()
     }
 
+    /// Name of the service.
     pub fn service(&self) -> &str {
         &self.service
     }
@@ -427,6 +431,7 @@ pub const MOST_AT_ONCE: usize = 1024;
 pub struct Slice<T: Payload>(Sample<ipc::Service, [T], Header>);
 
 impl<T: Payload> Slice<T> {
+    /// Number, step and time that its sender gave it.
     pub fn header(&self) -> &Header {
         self.0.user_header()
     }

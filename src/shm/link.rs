@@ -9,8 +9,11 @@ use crate::swarm::control::scope::NodeScope;
 use crate::swarm::transport::{ControllerEnd, Heard, RobotsEnd, Target};
 use crate::swarm::watch::Pose;
 
+/// Leaf of the service that carries poses to the loop.
 pub const POSES: &str = "poses";
+/// Leaf of the service that carries the places of leaders moved from outside to the loop.
 pub const LEADERS: &str = "leaders";
+/// Leaf of the service that carries targets to the robots.
 pub const TARGETS: &str = "targets";
 
 /// The loop's end.

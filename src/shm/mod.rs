@@ -43,31 +43,75 @@ use crate::swarm::control::scope::NodeScopeError;
 /// Errors of shared memory.
 #[derive(Debug, thiserror::Error)]
 pub enum ShmError {
+    /// The swarm cannot be laid out or kept safe.
     #[error("{0}")]
     Swarm(#[from] SceneError),
+    /// A robot cannot be served alone.
     #[error("{0}")]
     NodeScope(#[from] NodeScopeError),
+    /// A domain is set to a name that is none.
     #[error(
         "{variable}={name:?} is no domain\n  help: give 1 to 32 letters, digits, `-` and `_`, or unset it for iceoryx2's own"
     )]
-    Domain { variable: &'static str, name: String },
+    Domain {
+        /// The environment variable that sets it.
+        variable: &'static str,
+        /// What it is set to.
+        name: String,
+    },
+    /// A swarm or body has a name that no service may bear.
     #[error(
         "{name:?} is no name of a service: {reason}\n  help: give 1 to 64 letters, digits, `-`, `_` and `.`"
     )]
-    Name { name: String, reason: &'static str },
+    Name {
+        /// The name.
+        name: String,
+        /// What is wrong with it.
+        reason: &'static str,
+    },
+    /// The process cannot take part in shared memory at all.
     #[error(
         "no place in shared memory: {reason}\n  help: is the folder of iceoryx2 (its root path, and /dev/shm) writable?"
     )]
-    Node { reason: String },
+    Node {
+        /// What iceoryx2 said.
+        reason: String,
+    },
+    /// A service carries another type, or another version of it.
     #[error(
         "{service} carries `{found}`, and this program speaks `{expected}`\n  help: use programs of one version, or keep them apart by {variable}",
         variable = domain::VARIABLE
     )]
-    Type { service: String, found: String, expected: String },
+    Type {
+        /// Name of the service.
+        service: String,
+        /// The type that it carries.
+        found: String,
+        /// The type that this program speaks.
+        expected: String,
+    },
+    /// A service cannot be opened or joined.
     #[error("{service}: {reason}\n  help: {help}")]
-    Service { service: String, reason: String, help: String },
+    Service {
+        /// Name of the service.
+        service: String,
+        /// What iceoryx2 said.
+        reason: String,
+        /// What to do about it.
+        help: String,
+    },
+    /// A slice could not be filled or sent.
     #[error("{service}: not sent: {reason}")]
-    Send { service: String, reason: String },
+    Send {
+        /// Name of the service.
+        service: String,
+        /// What iceoryx2 said.
+        reason: String,
+    },
+    /// The process cannot sleep until something arrives.
     #[error("cannot wait for what arrives: {reason}")]
-    Wait { reason: String },
+    Wait {
+        /// What iceoryx2 said.
+        reason: String,
+    },
 }

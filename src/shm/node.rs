@@ -18,8 +18,11 @@ use crate::swarm::pace::{Due, Pace, system_time};
 use crate::swarm::transport::{listen, serve};
 use crate::swarm::watch::Health;
 
+/// Leaf of the service that carries commands to the node.
 pub const COMMANDS: &str = "commands";
+/// Leaf of the service that carries the state of the formation.
 pub const STATE: &str = "state";
+/// Leaf of the service that carries the state of every member.
 pub const MEMBERS: &str = "members";
 
 /// Between two states \[s\].
@@ -71,6 +74,7 @@ impl FormationNode {
         })
     }
 
+    /// The loop as it stands.
     pub fn control(&self) -> &Control {
         &self.control
     }

@@ -56,6 +56,7 @@ payload! {
     Target as "FlockformTarget_v1" {
         /// Number of the robot in the swarm file's order, from 0.
         member: u32,
+        /// Padding to eight bytes: 0.
         reserved: u32,
         /// After the safety filter \[m, world frame\].
         position: [f64; 2],
@@ -67,6 +68,7 @@ payload! {
     Leader as "FlockformLeader_v1" {
         /// Number of the robot in the swarm file's order, from 0.
         member: u32,
+        /// Padding to eight bytes: 0.
         reserved: u32,
         /// \[m, world frame\]
         position: [f64; 2],
@@ -76,6 +78,7 @@ payload! {
     Command as "FlockformCommand_v1" {
         /// [`Command::EMERGENCY_STOP`] or [`Command::RESUME`].
         kind: u32,
+        /// Padding to eight bytes: 0.
         reserved: u32,
     }
 
@@ -83,6 +86,7 @@ payload! {
     Formation as "FlockformFormation_v1" {
         /// [`Formation::RUNNING`] to [`Formation::INACTIVE`], as in `flockform_msgs/FormationState`.
         mode: u32,
+        /// Number of members.
         members: u32,
         /// \[m\]
         formation_error: f64,
@@ -149,17 +153,23 @@ impl Default for Header {
 }
 
 impl Command {
+    /// Every robot is to hold its place until [`Command::RESUME`].
     pub const EMERGENCY_STOP: u32 = 1;
+    /// The formation is to go on.
     pub const RESUME: u32 = 2;
 
+    /// A command of this kind.
     pub fn new(kind: u32) -> Self {
         Self { kind, reserved: 0 }
     }
 }
 
 impl Formation {
+    /// Members get targets by the rule.
     pub const RUNNING: u32 = 0;
+    /// Every member holds its place.
     pub const EMERGENCY_STOPPED: u32 = 2;
+    /// No member gets a target.
     pub const INACTIVE: u32 = 3;
 }
 

@@ -9,6 +9,7 @@ use crate::engine::Engine;
 use crate::flock::role::Role;
 use crate::swarm::pace::system_time;
 
+/// Leaf of the service that carries the positions of a body.
 pub const POSITIONS: &str = "positions";
 
 /// Steps between two looks for readers that died.

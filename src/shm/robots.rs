@@ -40,6 +40,7 @@ impl SimulatedRobots {
         })
     }
 
+    /// The robots as they are.
     pub fn fleet(&self) -> &Fleet {
         &self.fleet
     }

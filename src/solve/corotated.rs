@@ -41,19 +41,29 @@ const OF_A_STEP: f64 = 1e-5;
 /// Why there is no corotated equilibrium to be had.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CorotatedError {
+    /// The rule has no operator.
     #[error(transparent)]
     NotLinear(#[from] NotLinear),
+    /// A system of Newton's method could not be solved in the unstrained body, or the solve was interrupted.
     #[error(transparent)]
     Solve(#[from] SolveError),
+    /// The rule has feedback.
     #[error("feedback is a term of the sweep, which the corotated equilibrium does not have")]
     Feedback,
+    /// Single precision was asked for.
     #[error("Newton's method on a corotated material computes in double precision only")]
     DoubleOnly,
+    /// Increments of the way got too small, or there were too many.
     #[error(
         "the rotations do not settle beyond {:.1} % of the way of leaders and loads ({solves} systems solved): the body snaps, buckles or is torn there",
         100.0 * part
     )]
-    Unsettled { part: f64, solves: usize },
+    Unsettled {
+        /// Share of the way of leaders and loads that was reached \[1\].
+        part: f64,
+        /// Systems that were solved.
+        solves: usize,
+    },
 }
 
 /// Whether a rule is what this file is about.

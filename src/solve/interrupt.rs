@@ -12,6 +12,7 @@ impl Interrupt {
         Self(Some(flag))
     }
 
+    /// Whether to end; never, where it has no flag.
     pub fn is_raised(self) -> bool {
         self.0.is_some_and(|flag| flag.load(Ordering::Relaxed))
     }

@@ -17,10 +17,16 @@ use crate::flock::vectors::Vectors;
 /// Why a rule has no operator.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum NotLinear {
+    /// The mean weighs neighbours by where they are, or turns with them.
     #[error("{rule} is not linear in the neighbours' positions")]
-    Rule { rule: String },
+    Rule {
+        /// Name of the mean.
+        rule: String,
+    },
+    /// A bond is broken.
     #[error("broken bonds make the rule depend on present positions")]
     Broken,
+    /// The rows make no operator.
     #[error(transparent)]
     Operator(#[from] OperatorError),
 }
@@ -28,7 +34,9 @@ pub enum NotLinear {
 /// A component of a particle that is held while the particle follows along the other.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HeldComponent {
+    /// Index of the particle.
     pub particle: usize,
+    /// The component that is held.
     pub axis: Axis,
     /// \[length\]
     pub displacement: f64,

@@ -1,10 +1,10 @@
 //! Spectra of sweeps over the rules, and the solvers for equilibrium.
 
-pub mod affine_weights;
-pub mod arnoldi;
+pub(crate) mod affine_weights;
+pub(crate) mod arnoldi;
 pub mod corotated;
 pub mod equilibrium;
-pub mod field;
+pub(crate) mod field;
 pub mod interrupt;
 pub mod linear;
 pub mod operator;

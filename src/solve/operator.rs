@@ -15,9 +15,9 @@ mod tests;
 
 use std::collections::HashMap;
 
-pub use columns::{Columns, Segment};
-pub use kernel::{RowCoefficients, Task, array, array_mut, pass};
-pub use matrix::{HELD, Matrix, leads_to_outlier};
+pub(crate) use columns::{Columns, Segment};
+pub(crate) use kernel::{RowCoefficients, Task, array, array_mut, pass};
+pub(crate) use matrix::{HELD, Matrix, leads_to_outlier};
 
 use crate::flock::block::{Block, transposed};
 use crate::flock::lattice::Site;
@@ -26,6 +26,7 @@ use crate::flock::lattice::Site;
 /// neighbours pull it along with \[force / length\].
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Row {
+    /// What holds the particle back by itself \[force / length\].
     pub diagonal: Block,
     /// Offsets in columns and rows of sites, none of them zero and none twice.
     pub entries: Vec<(Site, Block)>,
@@ -34,19 +35,49 @@ pub struct Row {
 /// Why rows make no operator. Particles are named by their ids, which count from 1.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum OperatorError {
+    /// Sites, classes and roles are not as many.
     #[error("{sites} sites, {classes} classes and {follows} roles do not describe one body")]
-    Shapes { sites: usize, classes: usize, follows: usize },
+    Shapes {
+        /// Sites that were given.
+        sites: usize,
+        /// Row classes that were given.
+        classes: usize,
+        /// Roles that were given.
+        follows: usize,
+    },
+    /// The sites do not ascend column by column, or one is given twice.
     #[error("the sites must ascend column by column, but that of particle {particle} does not")]
-    Order { particle: usize },
+    Order {
+        /// Id of the first particle out of order.
+        particle: usize,
+    },
+    /// A follower's row class names no row.
     #[error("particle {particle} has row class {class}, but there are {rows}")]
-    NoClass { particle: usize, class: u32, rows: usize },
+    NoClass {
+        /// Id of the particle.
+        particle: usize,
+        /// Its row class, from 0.
+        class: u32,
+        /// Rows that were given.
+        rows: usize,
+    },
+    /// A follower's row leads to a site without a particle.
     #[error(
         "the row of particle {particle} reaches {} columns and {} rows away, where no particle is",
         .offset[0], .offset[1]
     )]
-    NoNeighbour { particle: usize, offset: Site },
+    NoNeighbour {
+        /// Id of the particle.
+        particle: usize,
+        /// Columns and rows from it to that site.
+        offset: Site,
+    },
+    /// A follower's row has an entry that is not finite.
     #[error("the row of particle {particle} is not finite")]
-    NotFinite { particle: usize },
+    NotFinite {
+        /// Id of the particle.
+        particle: usize,
+    },
 }
 
 /// Rows for all particles of a body that follow.
@@ -149,14 +180,17 @@ impl Operator {
         self.held_axes.get(particle).copied().unwrap_or_default()
     }
 
+    /// Number of particles.
     pub fn count(&self) -> usize {
         self.class.len()
     }
 
+    /// Number of particles that follow.
     pub fn followers(&self) -> usize {
         self.follows.iter().filter(|&&follows| follows).count()
     }
 
+    /// Whether each particle follows, shape \[count\].
     pub fn follows(&self) -> &[bool] {
         &self.follows
     }

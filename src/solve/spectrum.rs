@@ -27,12 +27,15 @@ pub struct SpectralRadius {
 /// The ends of a spectrum on the real axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ends {
-    /// Least and greatest real part of an eigenvalue \[1\].
+    /// Least real part of an eigenvalue \[1\].
     pub lowest: f64,
+    /// Greatest real part of an eigenvalue \[1\].
     pub highest: f64,
     /// Whether both are real to rounding; then, of a sweep that is symmetric in some scalar product, all are.
     pub are_real: bool,
+    /// Sweeps made to find them.
     pub iterations: usize,
+    /// Whether both are known to 1e-10 of themselves.
     pub converged: bool,
 }
 

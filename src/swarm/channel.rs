@@ -33,33 +33,41 @@ pub struct ChannelParams {
 pub enum Lie {
     /// So far from where it is \[m\].
     Offset {
+        /// Along x and y.
         by: [f64; 2],
     },
     /// The place at which it began to lie.
     Frozen,
     /// Always this place \[m, world frame\].
     Claimed {
+        /// Where it claims to be.
         position: [f64; 2],
     },
     /// To and fro about where it is, `amplitude` \[m\] each way, in so many periods.
     Oscillating {
+        /// Greatest deflection along x and y.
         amplitude: [f64; 2],
+        /// Periods of one swing.
         periods: u32,
     },
     /// Anywhere within `radius` \[m\] of where it is.
     Random {
+        /// Greatest distance from the true place.
         radius: f64,
     },
+    /// Coordinates that are no numbers.
     NotANumber,
 }
 
 /// The kind of sender that a robot is.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Sender {
+    /// Sends its pose as it is.
     #[default]
     Honest,
     /// Sends nothing; poses already on their way still arrive.
     Dead,
+    /// Sends a pose that is none of its own.
     Lying(Lie),
 }
 
@@ -112,6 +120,7 @@ impl Channel {
         self.sender = sender;
     }
 
+    /// The kind that the robot is at present.
     pub fn sender(&self) -> Sender {
         self.sender
     }

@@ -24,7 +24,10 @@ pub enum Due {
     /// Sleep this long \[s\].
     In(f64),
     /// Do the tick; so many before it were missed and are left out.
-    Now { missed: u64 },
+    Now {
+        /// Ticks that are left out.
+        missed: u64,
+    },
 }
 
 impl Deadlines {

@@ -13,19 +13,20 @@
 //! * `torn`: particles that have lost bonds.
 
 mod gathers;
-pub mod kernel;
-pub mod rows;
+pub(crate) mod kernel;
+pub(crate) mod rows;
 mod schedule;
-pub mod terms;
+pub(crate) mod terms;
 #[cfg(test)]
 mod tests;
-pub mod torn;
+pub(crate) mod torn;
 
 use std::ops::Range;
 
 use rayon::prelude::*;
 
-pub use schedule::{Activity, LaggedFrame, Led, MOST_STEPS, Steps};
+pub use schedule::{Activity, Led, MOST_STEPS};
+use schedule::{LaggedFrame, Steps};
 
 use crate::flock::frame::Frame;
 use crate::flock::law::{Flock, Weights};
@@ -48,6 +49,7 @@ pub enum Order {
 /// How targets become positions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Update {
+    /// Which places of the neighbours a particle sees.
     pub order: Order,
     /// `x <- x + damping (target - x)` \[1\]; 1 takes the target itself.
     pub damping: f64,

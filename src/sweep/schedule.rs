@@ -49,6 +49,7 @@ pub struct Led<'a> {
 }
 
 impl Led<'_> {
+    /// Nothing is led.
     pub const NONE: Led<'static> = Led { particles: &[], place: &|_, _| [f64::NAN; 2] };
 }
 

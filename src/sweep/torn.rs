@@ -97,6 +97,7 @@ impl DamagedRows {
     }
 
     /// How many particles.
+    #[cfg(test)]
     pub fn len(&self) -> usize {
         let in_runs = |band: &Band| band.runs.iter().map(|run| run.particles.len()).sum::<usize>();
         self.bands.iter().map(|band| in_runs(band) + band.members.len()).sum()

@@ -22,6 +22,7 @@ const CORNERS: [Site; 4] = [[0, 0], [1, 0], [1, 1], [0, 1]];
 /// A plate of unit cells.
 #[derive(Clone, Debug)]
 pub struct Plate {
+    /// Cells along x and along y.
     pub cells: [i32; 2],
     /// Whether it has round holes.
     pub holes: bool,
@@ -30,6 +31,7 @@ pub struct Plate {
 /// Everything that an operator is made of.
 #[derive(Clone, Debug)]
 pub struct Parts {
+    /// Sites of the particles, column by column from the bottom.
     pub sites: Vec<Site>,
     class: Vec<u32>,
     rows: Vec<Row>,

@@ -42,8 +42,10 @@ pub struct Options {
 /// Why nothing could be measured.
 #[derive(Debug, thiserror::Error)]
 pub enum EquilibriumError {
+    /// The rows of a body make no operator.
     #[error(transparent)]
     Operator(#[from] OperatorError),
+    /// A system was not solved.
     #[error(transparent)]
     Solve(#[from] SolveError),
 }
@@ -53,14 +55,18 @@ pub enum EquilibriumError {
 pub struct Report {
     /// Whether this was the quick run, whose times mean little.
     pub quick: bool,
+    /// Threads that multigrid runs on; the factorisation runs on one.
     pub threads: usize,
+    /// Every body.
     pub cases: Vec<Case>,
 }
 
 /// One body.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Case {
+    /// Cells along each side, and whether there are holes.
     pub body: String,
+    /// Number of particles, the held ones included.
     pub particles: usize,
     /// Iterations of multigrid to a relative residual of 1e-8.
     pub iterations: usize,
@@ -68,6 +74,7 @@ pub struct Case {
     pub direct_seconds: f64,
     /// Relative residual that the factorisation left \[1\].
     pub direct_residual: f64,
+    /// One entry for each error that is aimed at.
     pub to_error: Vec<ToError>,
     /// Highest resident memory during the multigrid solve above that before, the body's own arrays
     /// included: positions 16, sites 8, neighbour lists 36, classes 4 \[B\]. Absent where the system does
@@ -80,6 +87,7 @@ pub struct Case {
 pub struct ToError {
     /// Relative L2 difference from the direct solution \[1\].
     pub error: f64,
+    /// Iterations of multigrid to that error.
     pub iterations: usize,
     /// From classes of rows to the first iteration, median \[s\].
     pub set_up_seconds: f64,

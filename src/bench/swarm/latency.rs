@@ -11,6 +11,7 @@ use serde::Serialize;
 /// The cases that could be measured.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Report {
+    /// One entry for each formation and way to serve it.
     pub cases: Vec<Case>,
     /// Why there are no cases, or not all.
     pub skipped: Option<String>,
@@ -19,6 +20,7 @@ pub struct Report {
 /// One formation and one way to serve it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Case {
+    /// Robots of the formation.
     pub robots: usize,
     /// Period of the node's steady loop \[s\], which a pose has to wait for; none where the node ticks over and
     /// over, 50 us apart: transport and tick alone.

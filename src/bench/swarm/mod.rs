@@ -55,8 +55,11 @@ const QUICK: Effort = Effort {
 pub struct Report {
     /// Whether this was the quick run, whose times mean little.
     pub quick: bool,
+    /// Neighbour query and rule, by number of robots.
     pub cases: Vec<rule::Case>,
+    /// Whole ticks of the loop, by number of robots.
     pub ticks: Vec<tick::Case>,
+    /// The way over the network.
     pub latency: latency::Report,
 }
 

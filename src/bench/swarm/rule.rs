@@ -45,14 +45,17 @@ const SETS: usize = 8;
 /// One swarm; medians over the repetitions.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Case {
+    /// Robots of the swarm.
     pub robots: usize,
     /// Neighbours of a robot, on average \[1\].
     pub neighbours: f64,
     /// Neighbour query and rule of all robots \[s\].
     pub rule_seconds_per_tick: f64,
+    /// Robots that one thread serves in a millisecond \[1/ms\].
     pub rule_robots_per_millisecond: f64,
     /// The same with the safety filter \[s\].
     pub safe_seconds_per_tick: f64,
+    /// Robots that one thread serves in a millisecond with the safety filter \[1/ms\].
     pub safe_robots_per_millisecond: f64,
 }
 

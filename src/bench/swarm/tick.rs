@@ -13,11 +13,13 @@ use crate::swarm::watch::Pose;
 /// One formation; the median over the repetitions.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Case {
+    /// Robots of the formation.
     pub robots: usize,
     /// How often the rule is applied in a tick, at most.
     pub sweeps: usize,
     /// All poses received, and the tick \[s\].
     pub seconds_per_tick: f64,
+    /// Robots that one thread serves in a millisecond \[1/ms\].
     pub robots_per_millisecond: f64,
 }
 

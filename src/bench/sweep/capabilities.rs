@@ -18,6 +18,7 @@ use crate::sweep::terms::Terms;
 /// A step of the engine beside the bare loops over the same body.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Capability {
+    /// The capability, in words.
     pub name: &'static str,
     /// Median over the repetitions \[s\].
     pub seconds_per_step: f64,

@@ -62,6 +62,7 @@ pub struct Report {
     pub quick: bool,
     /// One entry for each number of threads: the median over the whole run.
     pub triad: Vec<Bandwidth>,
+    /// Every body with every way to sweep it, on every number of threads.
     pub cases: Vec<Case>,
     /// The cost of a step of the engine over the bare loops, and that of each capability where it is named.
     pub capabilities: Vec<Capability>,
@@ -70,10 +71,13 @@ pub struct Report {
 /// One body, one way to sweep it, some number of threads.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Case {
+    /// The body and the way to sweep it, in words.
     pub subject: &'static str,
+    /// `f64` or `f32`.
     pub precision: &'static str,
     /// Particles along each side of the body.
     pub side: usize,
+    /// Threads that share the sweep.
     pub threads: usize,
     /// Steps taken together.
     pub steps_together: usize,
@@ -83,6 +87,7 @@ pub struct Case {
     pub bonds_watched: usize,
     /// Median over the repetitions \[s\].
     pub seconds_per_step: f64,
+    /// Followers over the time of a step \[1/s\].
     pub updates_per_second: f64,
     /// Bytes that an update moves when no cache holds the body.
     pub bytes_per_update: f64,

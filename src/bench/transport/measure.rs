@@ -9,13 +9,17 @@ use serde::Serialize;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Work {
+    /// A message that is ready is handed over.
     HandOff,
+    /// Every pose is written and read as well.
     FilledAndRead,
 }
 
 impl Work {
+    /// Every kind of work.
     pub const ALL: [Self; 2] = [Self::HandOff, Self::FilledAndRead];
 
+    /// A heading for tables.
     pub fn words(self) -> &'static str {
         match self {
             Self::HandOff => "Hand-off of a message that is ready",
@@ -73,14 +77,19 @@ pub struct Samples {
 /// One way, size and kind of work.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Case {
+    /// Name of the way.
     pub transport: &'static str,
+    /// The work that is timed.
     pub work: Work,
+    /// Poses in a message.
     pub poses: usize,
     /// Round trips measured.
     pub samples: usize,
     /// Messages that had not been answered after two seconds.
     pub lost: usize,
+    /// From the sending of a message to the receipt of its answer.
     pub round_trip: Quantiles,
+    /// From the sending of a message to its receipt.
     pub one_way: Quantiles,
     /// Of the whole process \[s\]; none for a hand-off, and where the system does not say (Linux does).
     pub cpu_seconds_per_message: Option<f64>,
@@ -89,9 +98,13 @@ pub struct Case {
 /// Times that so large a share does not exceed \[s\]; none without samples.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Quantiles {
+    /// Half of them take no longer.
     pub p50_seconds: Option<f64>,
+    /// Nine tenths of them take no longer.
     pub p90_seconds: Option<f64>,
+    /// 99 % of them take no longer.
     pub p99_seconds: Option<f64>,
+    /// 99.9 % of them take no longer.
     pub p999_seconds: Option<f64>,
 }
 
@@ -115,7 +128,7 @@ impl Samples {
         Quantiles::of(pairs.filter_map(|(a, b)| Some((*a)? / (*b)?)).collect()).p50_seconds
     }
 
-    pub fn case(self, transport: &'static str, work: Work, poses: usize) -> Case {
+    pub(crate) fn case(self, transport: &'static str, work: Work, poses: usize) -> Case {
         let messages = self.messages.max(1) as f64;
         Case {
             transport,

@@ -60,7 +60,9 @@ const DDS_TURNS: usize = 3;
 pub struct Report {
     /// Whether this was the quick run, whose times mean little.
     pub quick: bool,
+    /// Size of a pose in shared memory \[byte\].
     pub bytes_per_pose: usize,
+    /// Every way with every number of poses and kind of work.
     pub cases: Vec<Case>,
     /// Our transport's median round trip over that of iceoryx2 as it comes: the median over the turns.
     pub ours_over_raw: Vec<Ratio>,
@@ -71,8 +73,11 @@ pub struct Report {
 /// Two ways of one run.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Ratio {
+    /// The work that is timed.
     pub work: Work,
+    /// Poses in a message.
     pub poses: usize,
+    /// Round trip of the first way over that of the second, the median over the turns \[1\].
     pub ratio: f64,
 }
 

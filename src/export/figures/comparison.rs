@@ -23,6 +23,7 @@ const UNDEFORMED: &str = "#a8adb4";
 /// Two displacements of one body. Arrays follow the particles, shape \[particles\].
 #[derive(Clone, Copy, Debug)]
 pub struct Pair<'a> {
+    /// What stands above the figure.
     pub title: &'a str,
     /// Name of the unit of length.
     pub unit: &'a str,
@@ -30,12 +31,15 @@ pub struct Pair<'a> {
     pub stress_unit: &'a str,
     /// Distance of neighbours \[length\].
     pub spacing: f64,
+    /// Cells between the particles.
     pub cells: &'a Cells,
+    /// Role of each particle.
     pub roles: &'a [Role],
     /// Places of the particles at rest \[length\].
     pub reference: &'a Vectors,
     /// Displacements \[length\].
     pub rule: &'a Vectors,
+    /// True displacements \[length\].
     pub truth: &'a Vectors,
 }
 

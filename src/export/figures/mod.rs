@@ -7,14 +7,14 @@
 
 mod axes;
 mod bands;
-pub mod chart;
+pub(crate) mod chart;
 mod colour;
 mod comparison;
 mod configuration;
 mod energy;
 mod faces;
 #[cfg(feature = "swarm")]
-pub mod flight_map;
+pub(crate) mod flight_map;
 mod heading;
 mod history;
 mod page;
@@ -46,9 +46,11 @@ pub use von_mises::von_mises;
 /// The body that a figure shows.
 #[derive(Clone, Copy, Debug)]
 pub struct Subject<'a> {
+    /// What stands above the figure.
     pub title: &'a str,
     /// Name of the unit of length.
     pub unit: &'a str,
+    /// The particles at rest.
     pub body: &'a Body,
     /// The bonds of the body; `None` where neighbours are found anew at every step.
     pub neighbours: Option<&'a Neighbours>,
@@ -59,6 +61,7 @@ pub struct Subject<'a> {
 }
 
 impl<'a> Subject<'a> {
+    /// The body of a running or ended engine.
     pub fn of(scene: &'a Scene, engine: &'a Engine) -> Self {
         Self {
             title: &scene.raw.title,
@@ -87,8 +90,11 @@ pub(super) fn render(svg: &str, width: u32) -> Result<Vec<u8>, String> {
 pub enum Formats {
     /// No figures at all.
     None,
+    /// PNG alone.
     Png,
+    /// SVG alone.
     Svg,
+    /// Both.
     #[default]
     All,
 }

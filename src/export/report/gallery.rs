@@ -22,8 +22,11 @@ const LONGEST: usize = 180;
 pub struct Exhibit {
     /// `scenes` or `swarms`.
     pub kind: &'static str,
+    /// Short name of the scene or swarm.
     pub name: String,
+    /// Its title, as the file gives it.
     pub title: String,
+    /// The first sentence of its notes.
     pub sentence: String,
 }
 

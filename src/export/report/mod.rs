@@ -11,14 +11,14 @@
 
 #[cfg(feature = "fem")]
 pub mod comparison;
-pub mod encode;
+pub(crate) mod encode;
 #[cfg(feature = "swarm")]
 pub mod flight;
-pub mod frames;
+pub(crate) mod frames;
 pub mod gallery;
 pub mod page;
-pub mod plot;
-pub mod quantized_channel;
+pub(crate) mod plot;
+pub(crate) mod quantized_channel;
 pub mod run;
 pub mod stability;
 #[cfg(feature = "fem")]
@@ -27,7 +27,6 @@ pub mod view;
 
 #[cfg(feature = "swarm")]
 pub use flight::FlightRecorder;
-pub use page::{Page, Table};
 pub use run::{AnimationState, RunRecorder};
 
 use encode::EncodedFrames;

@@ -40,7 +40,7 @@ const SCRIPTS: [&str; 14] = [
 
 /// Everything that a report shows, from the top.
 #[derive(Debug, Default)]
-pub struct Page {
+pub(crate) struct Page {
     pub title: String,
     /// The command and the name of what it was given.
     pub command: String,
@@ -61,7 +61,7 @@ pub struct Page {
 }
 
 #[derive(Debug, Default)]
-pub struct Table {
+pub(crate) struct Table {
     pub caption: String,
     pub head: Vec<String>,
     pub rows: Vec<Vec<String>>,
@@ -72,14 +72,14 @@ impl Page {
     ///
     /// # Errors
     /// The file cannot be written.
-    pub fn write(&self, folder: &OutputFolder) -> Result<PathBuf, ExportError> {
+    pub(crate) fn write(&self, folder: &OutputFolder) -> Result<PathBuf, ExportError> {
         let path = folder.path(FILE);
         write_file(&path, self.html())?;
         Ok(path)
     }
 
     /// The whole file.
-    pub fn html(&self) -> String {
+    pub(crate) fn html(&self) -> String {
         let stages: Vec<_> = self.stages.iter().map(|stage| &stage.animation).collect();
         let data = in_script(&json!({ "stages": stages, "plots": self.plots }));
         let mut arrays = String::new();

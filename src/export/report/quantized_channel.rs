@@ -51,10 +51,6 @@ impl QuantizedChannel {
         track
     }
 
-    pub fn count(&self) -> usize {
-        self.low.len()
-    }
-
     /// Writes the codes, shape \[count\].
     pub fn read(&self, codes: &mut Vec<u32>) {
         codes.clear();

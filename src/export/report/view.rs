@@ -11,7 +11,7 @@ use crate::material::cells::Cells;
 
 /// The data of the scripts.
 #[derive(Clone, Debug, Default, Serialize)]
-pub struct Animation {
+pub(crate) struct Animation {
     /// Said above the canvas where several stand beside each other.
     pub name: String,
     /// `particle` or `robot`.
@@ -53,19 +53,19 @@ pub struct Animation {
 }
 
 #[derive(Clone, Debug, Default, Serialize)]
-pub struct Clock {
+pub(crate) struct Clock {
     pub quantity: &'static str,
     pub unit: &'static str,
 }
 
 #[derive(Clone, Debug, Serialize)]
-pub struct ChannelName {
+pub(crate) struct ChannelName {
     pub name: &'static str,
     pub bits: u32,
 }
 
 #[derive(Clone, Debug, Serialize)]
-pub struct Quantity {
+pub(crate) struct Quantity {
     /// As in the table that the program writes.
     pub key: String,
     pub label: String,
@@ -73,14 +73,14 @@ pub struct Quantity {
 }
 
 impl Quantity {
-    pub fn new(key: &str, label: &str, unit: impl Into<String>) -> Self {
+    pub(crate) fn new(key: &str, label: &str, unit: impl Into<String>) -> Self {
         Self { key: key.into(), label: label.into(), unit: unit.into() }
     }
 }
 
 /// Plane stress or strain.
 #[derive(Clone, Debug, Serialize)]
-pub struct Stress {
+pub(crate) struct Stress {
     /// Strain (xx, yy, engineering xy) to stress \[force / length^2\], shape \[3, 3\].
     pub stiffness: [[f64; 3]; 3],
     /// Share of xx + yy that acts across the plane \[1\].
@@ -90,7 +90,7 @@ pub struct Stress {
 }
 
 #[derive(Clone, Debug, Serialize)]
-pub struct Outline {
+pub(crate) struct Outline {
     /// `obstacle` or `fence`.
     pub kind: &'static str,
     /// \[length\]
@@ -100,18 +100,18 @@ pub struct Outline {
 /// An animation with its arrays, each compressed text with a name.
 #[derive(Debug)]
 pub struct View {
-    pub animation: Animation,
-    pub arrays: Vec<(String, String)>,
+    pub(crate) animation: Animation,
+    pub(crate) arrays: Vec<(String, String)>,
 }
 
 impl View {
-    pub fn new(animation: Animation) -> Self {
+    pub(crate) fn new(animation: Animation) -> Self {
         let role_names = Role::ALL.map(Role::name).to_vec();
         Self { animation: Animation { group: GROUP, role_names, ..animation }, arrays: Vec::new() }
     }
 
     /// The frames, and the clock's value at each of them.
-    pub fn set_frames(&mut self, frames: &Frames, encoded: EncodedFrames, times: Vec<f64>) {
+    pub(crate) fn set_frames(&mut self, frames: &Frames, encoded: EncodedFrames, times: Vec<f64>) {
         let tracks = || frames.kept().iter().flat_map(|frame| &frame.tracks);
         let name = |channel: &Channel| ChannelName { name: channel.name, bits: channel.bits };
         let animation = &mut self.animation;
@@ -128,31 +128,31 @@ impl View {
     }
 
     /// Places that displacements start from \[length\].
-    pub fn set_reference(&mut self, reference: &Vectors) {
+    pub(crate) fn set_reference(&mut self, reference: &Vectors) {
         self.put("X", doubles(reference.x.iter().copied()));
         self.put("Y", doubles(reference.y.iter().copied()));
     }
 
     /// Ids, where they are not the numbers from 1 on.
-    pub fn set_ids(&mut self, ids: impl Iterator<Item = u32>) {
+    pub(crate) fn set_ids(&mut self, ids: impl Iterator<Item = u32>) {
         self.put("ids", integers(ids, 1));
     }
 
     /// Roles at first, and `[step, particle, role]` of every change.
-    pub fn set_roles(&mut self, first: &[Role], changes: &[[u32; 3]]) {
+    pub(crate) fn set_roles(&mut self, first: &[Role], changes: &[[u32; 3]]) {
         self.put("roles", integers(first.iter().map(|&role| number(role)), 1));
         self.put("role-changes", integers(changes.iter().flatten().copied(), 3));
     }
 
     /// Pairs of neighbours; `sees` gives for each whether both ends see the other (0) or only the first (1), `broken`
     /// is one more than the step at which it broke, 0 for never.
-    pub fn set_bonds(&mut self, pairs: &[[u32; 2]], sees: &[u32], broken: &[u32]) {
+    pub(crate) fn set_bonds(&mut self, pairs: &[[u32; 2]], sees: &[u32], broken: &[u32]) {
         self.put("bonds", integers(pairs.iter().flatten().copied(), 2));
         self.put("bond-sees", integers(sees.iter().copied(), 1));
         self.put("bond-broken", integers(broken.iter().copied(), 1));
     }
 
-    pub fn set_cells(&mut self, cells: &Cells) {
+    pub(crate) fn set_cells(&mut self, cells: &Cells) {
         // The page draws polygons of as many corners each: those with fewer repeat their last.
         let most = cells.most_corners();
         let filled = |cell: &[u32]| (0..most).map(|k| cell[k.min(cell.len() - 1)]).collect::<Vec<_>>();
@@ -161,7 +161,7 @@ impl View {
     }
 
     /// A column known to the last bit at the end; NaN where there is nothing.
-    pub fn add_exact(&mut self, quantity: Quantity, values: impl Iterator<Item = f64>) {
+    pub(crate) fn add_exact(&mut self, quantity: Quantity, values: impl Iterator<Item = f64>) {
         self.put(&format!("exact-{}", quantity.key), doubles(values));
         self.animation.exact.push(quantity);
     }
@@ -171,11 +171,11 @@ impl View {
     }
 
     /// \[byte\]
-    pub fn size(&self) -> usize {
+    pub(crate) fn size(&self) -> usize {
         self.arrays.iter().map(|(_, text)| text.len()).sum()
     }
 }
 
-pub fn number(role: Role) -> u32 {
+pub(crate) fn number(role: Role) -> u32 {
     Role::ALL.iter().position(|&one| one == role).unwrap_or_default() as u32
 }

@@ -16,6 +16,7 @@ use crate::flock::block::{Block, plus};
 /// A cell of a patch that a particle feels.
 #[derive(Clone, Copy, Debug)]
 pub struct PatchCell<'a> {
+    /// Stiffness and shape of the cell.
     pub element: &'a Element,
     /// `w`, the area with which it counts \[length^2\].
     pub share: f64,

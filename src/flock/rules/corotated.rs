@@ -98,6 +98,7 @@ impl Turn {
         product(&product(&forth, block), &transposed(forth))
     }
 
+    /// A vector in the turned axes: `R vector`.
     pub fn forth(self, [x, y]: [f64; 2]) -> [f64; 2] {
         [self.cos * x - self.sin * y, self.sin * x + self.cos * y]
     }
@@ -114,6 +115,7 @@ impl Turn {
 /// The force on one corner of a cell, and its derivatives.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CellRow {
+    /// The cell's own rotation, and the trace of its stretch.
     pub turn: Turn,
     /// Force of the cell on the corner \[force, world frame\].
     pub force: [f64; 2],
@@ -122,6 +124,7 @@ pub struct CellRow {
 }
 
 impl Element {
+    /// Number of corners.
     pub fn corners(&self) -> usize {
         self.gradients.len()
     }
@@ -217,6 +220,7 @@ impl Element {
 /// A cell around a particle.
 #[derive(Clone, Copy, Debug)]
 pub struct CellAround<'a> {
+    /// Stiffness and shape of the cell.
     pub element: &'a Element,
     /// Factor on its stiffness \[1\].
     pub factor: f64,

@@ -64,6 +64,7 @@ pub struct ParticleState {
     pub reference: [f64; 2],
     /// Added to the mean \[length\]: see [`Rule::rest_offset`]. Zero for the literal formulas.
     pub rest: [f64; 2],
+    /// The push on the particle; none where nothing pushes.
     pub load: Option<Load>,
 }
 
@@ -73,17 +74,33 @@ pub enum Mean {
     /// The centre of gravity (Eq. 1), weighted by the neighbours' fixed weights.
     Barycentre,
     /// Weighted by this power of the present distance (Eq. 3; the paper's power is 1).
-    Distance { power: f64 },
+    Distance {
+        /// Exponent of the distance \[1\]; negative where near neighbours count more.
+        power: f64,
+    },
     /// The power mean of each coordinate; exponent 0 is the geometric mean.
-    Power { exponent: f64, origin: Origin },
+    Power {
+        /// Exponent of the power mean \[1\].
+        exponent: f64,
+        /// From where coordinates are measured.
+        origin: Origin,
+    },
     /// The median of each coordinate, which outliers do not move.
     Median,
     /// The mean of the places at `spacing` \[length\] from each neighbour, towards the particle,
     /// weighted by this power of the present distance.
-    Spaced { spacing: f64, power: f64 },
+    Spaced {
+        /// Distance that each neighbour proposes \[length\].
+        spacing: f64,
+        /// Exponent of the present distance \[1\].
+        power: f64,
+    },
     /// Weighted by the neighbours' matrices, which sum to the identity: a rule that is a material. Corotated it looks at
     /// the cells between them instead: see [`Rule::target_by_cells`].
-    Material { rotation: Rotation },
+    Material {
+        /// Whether cells turn.
+        rotation: Rotation,
+    },
 }
 
 impl Mean {
@@ -112,8 +129,11 @@ impl fmt::Display for Mean {
 /// A composed rule; what a scene does not name is `None` and not evaluated.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rule {
+    /// The mean of the neighbours' positions.
     pub mean: Mean,
+    /// Eq. 2: what a pull along one axis does across it.
     pub poisson: Option<Poisson>,
+    /// Eq. 4: the step beyond the target.
     pub feedback: Option<Feedback>,
 }
 

@@ -11,7 +11,9 @@ use super::ParticleState;
 /// A coordinate axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Axis {
+    /// The first coordinate.
     X,
+    /// The second coordinate.
     Y,
 }
 

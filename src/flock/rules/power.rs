@@ -13,7 +13,10 @@ use super::Neighbour;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Origin {
     /// `margin` \[length\] below the lowest neighbour, on each axis: translation-invariant.
-    Moving { margin: f64 },
+    Moving {
+        /// Distance below the lowest neighbour, greater than 0.
+        margin: f64,
+    },
     /// The axes' own zero: the literal formula. A particle with a neighbour at a coordinate that
     /// is not positive has no mean and stays.
     World,

@@ -52,23 +52,51 @@ const STAYS: f64 = 1e-11;
 /// Why a lattice cannot be fitted to an outline.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FitError {
+    /// The shape is narrower than the spacing of the lattice.
     #[error(
         "the shape is {width:.6} wide near ({:.6}, {:.6}), less than the spacing of the lattice, which is {spacing:.6}",
         .place[0], .place[1]
     )]
-    Narrow { width: f64, spacing: f64, place: [f64; 2] },
+    Narrow {
+        /// Distance of the opposite side of the outline \[length\].
+        width: f64,
+        /// Spacing of the lattice \[length\].
+        spacing: f64,
+        /// Where on the outline \[length\].
+        place: [f64; 2],
+    },
+    /// The outline turns more often within a cell than cells can follow.
     #[error(
         "near ({:.6}, {:.6}) the outline has details that cells of the lattice, {spacing:.6} apart, cannot follow",
         .place[0], .place[1]
     )]
-    Detail { spacing: f64, place: [f64; 2] },
+    Detail {
+        /// Spacing of the lattice \[length\].
+        spacing: f64,
+        /// Near the detail \[length\].
+        place: [f64; 2],
+    },
+    /// A hole is smaller than the spacing of the lattice.
     #[error(
         "hole {hole} is {width:.6} across, less than the spacing of the lattice, which is {spacing:.6}; it is near ({:.6}, {:.6})",
         .place[0], .place[1]
     )]
-    SmallHole { hole: usize, width: f64, spacing: f64, place: [f64; 2] },
+    SmallHole {
+        /// Number of the hole, from 1.
+        hole: usize,
+        /// Greater side of its bounds \[length\].
+        width: f64,
+        /// Spacing of the lattice \[length\].
+        spacing: f64,
+        /// Where its first piece begins \[length\].
+        place: [f64; 2],
+    },
+    /// The bounds of the shape hold more sites than a body may have.
     #[error("the shape has more than {limit} lattice sites in its bounds")]
-    TooLarge { limit: u64 },
+    TooLarge {
+        /// Most sites that they may hold.
+        limit: u64,
+    },
 }
 
 /// A body with its outline and its cells.

@@ -9,6 +9,7 @@ use super::RawMaterial;
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum RawLattice {
+    /// Bonds of one length at right angles.
     Square {
         /// Distance between neighbours [length].
         #[schemars(extend("exclusiveMinimum" = 0))]
@@ -17,6 +18,7 @@ pub enum RawLattice {
         #[serde(default)]
         orientation: f64,
     },
+    /// Bonds of two lengths at right angles.
     Rectangular {
         /// Edge of the cell along x [length].
         #[schemars(extend("exclusiveMinimum" = 0))]
@@ -49,6 +51,7 @@ pub enum RawLattice {
         #[serde(default)]
         orientation: f64,
     },
+    /// Bonds of two lengths at any angle.
     Oblique {
         /// Edge of the cell along x [length].
         #[schemars(extend("exclusiveMinimum" = 0))]
@@ -78,6 +81,7 @@ pub enum RawLattice {
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawBody {
+    /// The outline of the body, or its particles one by one.
     pub shape: RawShape,
     /// Shapes taken out of the body; particles on their rims stay.
     #[serde(default)]
@@ -99,6 +103,7 @@ pub struct RawBody {
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawInclusion {
+    /// The place of the part; what of it lies outside the body does not count.
     pub shape: RawShape,
     /// Of the body's plane, stress or strain, and as thick.
     pub material: RawMaterial,
@@ -142,6 +147,7 @@ pub enum RawShape {
         #[schemars(range(min = 1, max = 65535))]
         rows: u32,
     },
+    /// A rectangle with its sides along the axes.
     Rectangle {
         /// Lower left corner [length].
         #[serde(default)]
@@ -149,6 +155,7 @@ pub enum RawShape {
         /// Upper right corner [length].
         max: [f64; 2],
     },
+    /// A full disc.
     Disc {
         /// Centre [length].
         #[serde(default)]
@@ -157,6 +164,7 @@ pub enum RawShape {
         #[schemars(extend("exclusiveMinimum" = 0))]
         radius: f64,
     },
+    /// A polygon, convex or not.
     Polygon {
         /// Corners in order, either way round; the last joins the first [length].
         #[schemars(length(min = 3))]
@@ -166,6 +174,7 @@ pub enum RawShape {
     Path {
         /// Where the first one begins [length].
         from: [f64; 2],
+        /// Edges and arcs, each beginning where the one before ends.
         #[schemars(length(min = 1))]
         steps: Vec<RawStep>,
     },

@@ -16,6 +16,7 @@ pub enum RawMaterial {
         young: f64,
         /// Poisson's ratio: between -1 and 1 in plane stress, between -1 and 1/2 in plane strain [1].
         poisson: f64,
+        /// The assumption across the thickness; plane stress unless given.
         #[serde(default)]
         plane: RawPlane,
         /// Thickness [length].
@@ -56,6 +57,7 @@ pub enum RawPlane {
 pub enum RawLoad {
     /// On the part of the outline that lies in the region, along fixed directions.
     Traction {
+        /// The place where the load acts.
         region: RawRegion,
         /// Along x and y [force / length^2].
         traction: [f64; 2],
@@ -65,6 +67,7 @@ pub enum RawLoad {
     },
     /// On the part of the outline that lies in the region, along its normal.
     Pressure {
+        /// The place where the load acts.
         region: RawRegion,
         /// Positive pushes into the body [force / length^2].
         pressure: f64,
@@ -74,6 +77,7 @@ pub enum RawLoad {
     },
     /// On each particle of the region.
     Force {
+        /// The particles that are pushed.
         region: RawRegion,
         /// Along x and y [force].
         force: [f64; 2],
@@ -102,6 +106,7 @@ pub struct RawProfile {
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawEquilibrium {
+    /// The method; chosen by size, shape and rule unless given.
     #[serde(default)]
     pub solver: RawSolver,
     /// How near to elasticity the followers should come: the relative error of their displacements, as
@@ -113,6 +118,7 @@ pub struct RawEquilibrium {
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
     pub tolerance: Option<f64>,
+    /// Iterations after which the solver stops short of its tolerance [1].
     #[serde(default = "super::defaults::iterations")]
     #[schemars(range(min = 1))]
     pub most_iterations: usize,
@@ -144,6 +150,7 @@ pub enum RawSolver {
     GaussSeidel,
     /// Sweeps whose damping varies so as to use the whole spectrum.
     Chebyshev,
+    /// Sweeps that remember the direction of the last one; their number grows with the body.
     ConjugateGradients,
     /// Conjugate gradients with a multigrid cycle before each step.
     Multigrid,

@@ -41,6 +41,7 @@ pub struct RawScene {
     /// The lattice from which the body is cut; a body of points has none.
     #[serde(default)]
     pub lattice: Option<RawLattice>,
+    /// The body that is cut from the lattice, or given as points.
     pub body: RawBody,
     /// The shell around the body that gives edge particles their full neighbourhood.
     #[serde(default)]
@@ -49,12 +50,16 @@ pub struct RawScene {
     /// lattice.
     #[serde(default)]
     pub neighbours: Option<RawNeighbours>,
+    /// How a follower's position comes from its neighbours'; the centre of gravity unless given.
     #[serde(default)]
     pub rule: RawRule,
+    /// The material of the body; the rule `material` and loads need it.
     #[serde(default)]
     pub material: Option<RawMaterial>,
+    /// Everything that pushes the body, from the first step on unless `load_steps` says otherwise.
     #[serde(default)]
     pub loads: Vec<RawLoad>,
+    /// How targets become positions.
     #[serde(default)]
     pub update: RawUpdate,
     /// Roles of the particles, and from when; later entries win. Particles that no entry names are followers.
@@ -66,12 +71,16 @@ pub struct RawScene {
     /// Cuts made before the first step: every bond that crosses one is broken.
     #[serde(default)]
     pub cuts: Vec<RawCut>,
+    /// When the run ends.
     #[serde(default)]
     pub stop: RawStop,
+    /// Finds where the followers come to rest, instead of stepping there.
     #[serde(default)]
     pub equilibrium: Option<RawEquilibrium>,
+    /// Puts loads on part by part and keeps what the body does meanwhile.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub load_steps: Option<RawLoadSteps>,
+    /// The records of the run.
     #[serde(default)]
     pub record: RawRecord,
 }
@@ -103,6 +112,7 @@ pub struct RawFracture {
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 1))]
     pub stretch: Option<f64>,
+    /// The substitute for a lost neighbour; a point at the original lattice offset unless given.
     #[serde(default)]
     pub ghosts: RawGhosts,
 }

@@ -10,7 +10,9 @@ use crate::flock::motion::Interpolation;
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawRoles {
+    /// The particles that take the role.
     pub region: RawRegion,
+    /// The behaviour of these particles.
     pub role: RawRole,
     /// The one component that is held or led, for rollers and planes of symmetry; the particle follows along the
     /// other. Both unless given. For the rule `material` with small rotations.
@@ -49,6 +51,7 @@ pub enum RawRegion {
     All {},
     /// The outermost particles on a side.
     Edge {
+        /// The side on which the particles are outermost.
         side: RawSide,
         /// How far in from the outermost coordinate [length]; half a spacing unless given.
         #[serde(default)]
@@ -62,6 +65,7 @@ pub enum RawRegion {
         /// Upper right corner [length].
         max: [f64; 2],
     },
+    /// The particles in a disc.
     Disc {
         /// Centre [length].
         centre: [f64; 2],
@@ -101,9 +105,13 @@ pub enum RawRegion {
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum RawSide {
+    /// Lowest x.
     Left,
+    /// Highest x.
     Right,
+    /// Lowest y.
     Bottom,
+    /// Highest y.
     Top,
 }
 
@@ -111,6 +119,7 @@ pub enum RawSide {
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawWhen {
+    /// The quantity that is compared with the bounds.
     pub quantity: RawQuantity,
     /// Holds above this value [unit of the quantity].
     #[serde(default)]
@@ -147,8 +156,10 @@ pub enum RawMotion {
     },
     /// Displacements at given steps; the last one is held.
     Keyframes {
+        /// Places by ascending step.
         #[schemars(length(min = 1))]
         frames: Vec<RawKeyframe>,
+        /// How the motion goes from one keyframe to the next; straight unless given.
         #[serde(default)]
         interpolation: RawInterpolation,
     },
@@ -219,6 +230,7 @@ pub struct RawKeyframe {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum RawInterpolation {
+    /// At constant velocity.
     #[default]
     Linear,
     /// At rest at each keyframe.

@@ -85,6 +85,7 @@ pub enum RawMean {
     },
     /// The geometric mean of each coordinate.
     Geometric {
+        /// The origin of the coordinates; moves with the neighbours unless given.
         #[serde(default)]
         origin: RawOrigin,
     },
@@ -92,6 +93,7 @@ pub enum RawMean {
     Power {
         /// Exponent: 1 is the barycentre, 2 the quadratic mean, -1 the harmonic mean [1].
         exponent: f64,
+        /// The origin of the coordinates; moves with the neighbours unless given.
         #[serde(default)]
         origin: RawOrigin,
     },
@@ -109,6 +111,7 @@ pub enum RawMean {
     },
     /// Weighted by 2x2 matrices that make the body the scene's `[material]`. Free edges need no frame.
     Material {
+        /// Which turns of the body cost nothing; small ones unless given.
         #[serde(default)]
         rotation: RawRotation,
     },
@@ -183,8 +186,10 @@ pub enum RawRest {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum RawAxis {
+    /// The x axis.
     #[default]
     X,
+    /// The y axis.
     Y,
 }
 
@@ -233,6 +238,7 @@ pub enum RawFeedbackReference {
 #[derive(Clone, Debug, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawUpdate {
+    /// The order of updates within one step; all at once unless given.
     #[serde(default)]
     pub order: RawOrder,
     /// Part of the way to the target that is gone in one step [1]. Unless given, 1; for the rule

@@ -23,9 +23,13 @@ pub use validate::schema;
 pub struct Swarm {
     /// Short name: the bundled swarm's, or the file's without its ending.
     pub name: String,
+    /// The swarm as written, overrides and defaults included.
     pub raw: RawSwarm,
+    /// Where the robots' places come from.
     pub shape: Shape,
+    /// Leaders in the order in which they are written.
     pub leaders: Vec<Leaders>,
+    /// Motions of all leaders together, in the order in which they are written.
     pub manoeuvres: Vec<NamedManoeuvre>,
     document: Document,
 }
@@ -33,9 +37,11 @@ pub struct Swarm {
 /// A motion of all leaders together.
 #[derive(Clone, Debug)]
 pub struct NamedManoeuvre {
+    /// The name by which a leader's program or a service calls it.
     pub name: String,
     /// The point that is turned about \[m\]; the middle of the formation's places where `None`.
     pub about: Option<[f64; 2]>,
+    /// Legs in the order in which they are flown.
     pub legs: Vec<Leg>,
 }
 
@@ -66,13 +72,18 @@ pub struct Recording {
 /// Robots that lead.
 #[derive(Clone, Debug)]
 pub struct Leaders {
+    /// Which robots.
     pub who: Who,
+    /// How they move.
     pub program: Program,
 }
 
+/// Robots by name or by place.
 #[derive(Clone, Debug)]
 pub enum Who {
+    /// Robots with these names.
     Names(Vec<String>),
+    /// Robots whose places in the formation lie in a region of the lattice.
     Region(SceneRegion),
 }
 

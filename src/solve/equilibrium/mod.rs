@@ -45,15 +45,22 @@ pub const SINGLE_FLOOR: f64 = 1e-5;
 /// The solvers there are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Solver {
+    /// The synchronous sweep, damped: see [`jacobi`].
     Jacobi,
+    /// The sequential sweep, by colours: see [`gauss_seidel`].
     GaussSeidel,
+    /// Synchronous sweeps of varied damping: see [`chebyshev`].
     Chebyshev,
+    /// Sweeps with memory: see [`conjugate_gradients`].
     ConjugateGradients,
+    /// Conjugate gradients on coarser and coarser grids: see [`multigrid`].
     Multigrid,
+    /// A sparse factorisation: see [`direct`].
     Direct,
 }
 
 impl Solver {
+    /// Every solver.
     pub const ALL: [Solver; 6] = [
         Solver::Jacobi,
         Solver::GaussSeidel,
@@ -63,6 +70,7 @@ impl Solver {
         Solver::Direct,
     ];
 
+    /// The name in scene files and messages.
     pub fn name(self) -> &'static str {
         match self {
             Solver::Jacobi => "jacobi",
@@ -102,12 +110,14 @@ pub enum Choice {
     /// By size, symmetry and tolerance: see [`choose`].
     #[default]
     Auto,
+    /// The one that is named.
     This(Solver),
 }
 
 /// The precision of all vectors of a solve.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Precision {
+    /// Double precision wherever it decides the result.
     #[default]
     F64,
     /// The whole solve in single precision: down to [`SINGLE_FLOOR`], and on slender bodies an error in
@@ -118,10 +128,13 @@ pub enum Precision {
 /// How equilibrium is asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Request {
+    /// Which solver to take.
     pub solver: Choice,
     /// Largest residual force `|f - K u|` over that at the start, with all followers at zero, `|b|` \[1\].
     pub tolerance: f64,
+    /// Iterations after which the solve ends short of its tolerance.
     pub most_iterations: usize,
+    /// Precision of the vectors.
     pub precision: Precision,
     /// Ends the solve with [`SolveError::Interrupted`].
     pub interrupt: Interrupt,
@@ -144,9 +157,11 @@ impl Default for Request {
 pub struct Solved {
     /// Displacements \[length\], those of the held particles included, shape \[count\].
     pub displacement: Vectors,
+    /// The solver that was taken.
     pub solver: Solver,
     /// Why this solver.
     pub why: String,
+    /// Iterations made.
     pub iterations: usize,
     /// Relative residual before the first iteration, which is 1, and after each.
     pub residuals: Vec<f64>,

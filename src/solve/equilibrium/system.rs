@@ -10,6 +10,7 @@ use std::sync::OnceLock;
 /// A body's operator, the forces on it and where its held particles are.
 #[derive(Clone, Debug)]
 pub struct System {
+    /// `K` over all particles, with the rows of the followers.
     pub operator: Operator,
     /// Force on each particle \[force\]; those on held ones change nothing. Shape \[count\].
     pub forces: Vectors,
@@ -19,6 +20,7 @@ pub struct System {
 }
 
 impl System {
+    /// `forces` \[force\] and `held` displacements \[length\] of shape \[count\] each.
     pub fn new(operator: Operator, forces: Vectors, held: Vectors) -> Self {
         Self { operator, forces, held, asymmetric_pair: OnceLock::new() }
     }

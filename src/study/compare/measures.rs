@@ -38,21 +38,26 @@ pub struct Comparison {
     pub strain_energy_truth: f64,
     /// Particles that follow and are in a cell: those compared.
     pub followers: usize,
+    /// Cells whose stress and energy are compared.
     pub cells: usize,
     /// Time to the rule's equilibrium and to the truth's \[s\]; zero where it was not measured.
     pub seconds_rule: f64,
+    /// Time to the truth's \[s\].
     pub seconds_truth: f64,
 }
 
 /// Two displacements of one body. Arrays follow the particles, shape \[particles\].
 #[derive(Clone, Copy, Debug)]
 pub struct Sides<'a> {
+    /// Cells between the particles.
     pub cells: &'a Cells,
+    /// What the cells are made of.
     pub elastic: &'a Elastic,
     /// Which turns of a cell are no strain.
     pub rotation: Rotation,
     /// Displacements \[length\].
     pub rule: &'a Vectors,
+    /// True displacements \[length\].
     pub truth: &'a Vectors,
     /// Particles free to depart from the truth: the followers that are in a cell.
     pub follows: &'a [bool],

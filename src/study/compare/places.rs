@@ -11,7 +11,9 @@ use crate::flock::vectors::Vectors;
 /// Displacement and stress at one place of the body, by the rule and by the truth.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct PlaceComparison {
+    /// Where the rule puts the place, and its stress.
     pub rule: AtPlace,
+    /// Where the truth puts the place, and its stress.
     pub truth: AtPlace,
 }
 

@@ -22,6 +22,7 @@ const OUTSIDE: f64 = 1e-3;
 
 /// A shape with what holds it and what pulls it.
 pub struct Setting<'a> {
+    /// The outline of the shape.
     pub outline: &'a Outline,
     /// The outline with the edges of inclusions, and what these are made of, where there are any.
     pub inclusions: Option<(&'a Partition, &'a [Elastic])>,
@@ -29,9 +30,11 @@ pub struct Setting<'a> {
     pub reference: &'a Vectors,
     /// Distance of neighbouring particles \[length\].
     pub spacing: f64,
+    /// What the shape is made of, but for its inclusions.
     pub elastic: &'a Elastic,
     /// Whether the body may turn far.
     pub rotation: Rotation,
+    /// What holds it and where to; where supports overlap the later one holds.
     pub supports: Vec<Support<'a>>,
     /// On the outline, over the thickness of the sheet. A force on a particle acts at a point: there, and only there, the
     /// truth grows with the logarithm of the refinement.
@@ -51,14 +54,25 @@ pub struct Reference {
 /// Error computing the truth.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ReferenceError {
+    /// A part of the body is free to move as a whole.
     #[error(
         "the finite elements have no equilibrium: the part of the body around ({:.6}, {:.6}) is not held and free to {motion}", .place[0], .place[1]
     )]
-    Mechanism { place: Point, motion: &'static str },
+    Mechanism {
+        /// A place of that part \[length\].
+        place: Point,
+        /// How it can move, in words.
+        motion: &'static str,
+    },
+    /// The stiffness cannot be inverted in double precision.
     #[error(
         "the finite elements have no equilibrium: the body is soft beyond what a double resolves, most of all near ({:.6}, {:.6})", .place[0], .place[1]
     )]
-    Singular { place: Point },
+    Singular {
+        /// Where the body is softest \[length\].
+        place: Point,
+    },
+    /// Any other reason of the finite elements.
     #[error("the truth cannot be computed: {0}")]
     Fem(FemError),
 }

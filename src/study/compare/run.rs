@@ -25,8 +25,11 @@ use crate::scene::{LeaderMotion, Scene, SceneError};
 /// The truth of a scene's body in its material, under its loads, clamps and leaders.
 #[derive(Clone, Debug)]
 pub struct SceneTruth {
+    /// True displacements, at the particles and everywhere else.
     pub truth: Reference,
+    /// The body whose particles are asked for.
     pub layout: Layout,
+    /// The material of the scene.
     pub elastic: Elastic,
     /// Time to the solution.
     pub time: Duration,
@@ -35,15 +38,20 @@ pub struct SceneTruth {
 /// The results of a comparison. Arrays follow the particles or the cells of the body.
 #[derive(Debug)]
 pub struct Compared {
+    /// How far rule and truth are apart.
     pub comparison: Comparison,
+    /// How the rule's run ended.
     pub outcome: Outcome,
+    /// What the rule is compared with.
     pub truth: SceneTruth,
+    /// Cells over which stress and energy are taken.
     pub cells: Cells,
     /// Displacements by the rule \[length\], shape \[particles\]; the true ones are the truth's.
     pub rule: Vectors,
     /// At the centres of the cells, the corners displaced by the rule and in truth
     /// \[force / length^2\], shape \[cells\].
     pub von_mises_rule: Vec<f64>,
+    /// The same of the true displacements.
     pub von_mises_truth: Vec<f64>,
     /// At the scene's `record.places`.
     pub places: Vec<PlaceComparison>,

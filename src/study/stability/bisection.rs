@@ -43,12 +43,14 @@ pub struct Growth {
     pub value: f64,
     /// Factor by which the followers' displacements grew per step over the last part of the run \[1\].
     pub per_step: f64,
+    /// Steps of the run.
     pub steps: usize,
     /// Whether the factor had come to rest: one mode was left.
     pub settled: bool,
 }
 
 impl Growth {
+    /// Whether the disturbance was larger after a step than before.
     pub fn grows(&self) -> bool {
         self.per_step > 1.0
     }

@@ -14,7 +14,9 @@ use crate::scene::SceneError;
 /// A threshold from both sides.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Threshold {
+    /// What is varied.
     pub parameter: Parameter,
+    /// Which end of the stable range it is.
     pub side: Side,
     /// From the spectrum; none where the body grows at no value of the parameter, or at every one.
     pub predicted: Option<Predicted>,
@@ -40,43 +42,56 @@ impl Threshold {
 /// Spectrum and runs over the whole range of a parameter.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Sweep {
+    /// What is varied.
     pub parameter: Parameter,
     /// The scene's own value.
     pub present: f64,
+    /// Spectral radii at evenly spaced values over the whole range.
     pub spectrum: Vec<Radius>,
+    /// Runs at evenly spaced values over the whole range.
     pub runs: Vec<Growth>,
 }
 
 /// The results of spectrum and runs for a linear rule.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Linear {
+    /// Particles of the body, those of the frame included.
     pub particles: usize,
+    /// Particles that follow.
     pub followers: usize,
     /// Spectral radius of the scene's sweep as it is, and the sweeps it took to find it.
     pub radius: f64,
+    /// Sweeps that it took to find the radius.
     pub iterations: usize,
+    /// Whether the radius is known to its tolerance.
     pub converged: bool,
     /// Least and greatest eigenvalue of the sweep without feedback and damping, where they are real \[1\].
     pub ends: Option<[f64; 2]>,
+    /// Thresholds at both ends of the range of each parameter.
     pub thresholds: Vec<Threshold>,
+    /// The whole range of each parameter.
     pub sweeps: Vec<Sweep>,
 }
 
 /// Everything.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Study {
+    /// Short name of the scene.
     pub name: String,
+    /// Title of the scene.
     pub title: String,
     /// `None` where the rule is not linear or the body not held.
     pub linear: Option<Linear>,
     /// The reason why there are no thresholds.
     pub refused: Option<String>,
+    /// Every extreme with its outcome; empty where they were left out.
     pub extremes: Vec<Case>,
 }
 
 /// How far the study goes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Options {
+    /// How long runs may become, and how many there are.
     pub effort: Effort,
     /// Leaves the extremes out.
     pub no_extremes: bool,
@@ -189,6 +204,7 @@ fn sweep(
 }
 
 impl Side {
+    /// The name in reports.
     pub fn name(self) -> &'static str {
         match self {
             Side::Lower => "lower",

@@ -17,12 +17,15 @@ use crate::sweep::Order;
 pub enum Parameter {
     /// The feedback factor `fd` of Eq. 4.
     Feedback,
+    /// The damping of the update.
     Damping,
 }
 
 impl Parameter {
+    /// Every parameter.
     pub const ALL: [Parameter; 2] = [Parameter::Feedback, Parameter::Damping];
 
+    /// The name in reports.
     pub fn name(self) -> &'static str {
         match self {
             Parameter::Feedback => "feedback factor",
@@ -74,18 +77,22 @@ impl Subject {
         }
     }
 
+    /// What `MT` of Eq. 4 is, for feedback that is added as well.
     pub fn feedback_reference(&self) -> FeedbackReference {
         self.plan.setup.flock.rule.feedback.map_or(FeedbackReference::Initial, |f| f.reference)
     }
 
+    /// The order of updates within a step.
     pub fn order(&self) -> Order {
         self.plan.setup.update.order
     }
 
+    /// Number of particles, those of the frame included.
     pub fn particles(&self) -> usize {
         self.plan.count()
     }
 
+    /// Number of particles that follow.
     pub fn followers(&self) -> usize {
         self.plan.setup.roles.iter().filter(|&&role| role == Role::Follower).count()
     }

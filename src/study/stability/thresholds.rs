@@ -17,13 +17,16 @@ use crate::sweep::Order;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Side {
+    /// Where the range begins.
     Lower,
+    /// Where the range ends.
     Upper,
 }
 
 /// A value of a parameter beyond which the body grows.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Predicted {
+    /// The value of the parameter.
     pub value: f64,
     /// By formula, where the sweep has no memory and a real spectrum.
     pub closed_form: Option<f64>,
@@ -34,7 +37,9 @@ pub struct Predicted {
 /// A point of the curve that the radius makes over a parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Radius {
+    /// The value of the parameter.
     pub value: f64,
+    /// Spectral radius of the sweep with it \[1\].
     pub radius: f64,
 }
 

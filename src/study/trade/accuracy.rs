@@ -31,6 +31,7 @@ const OF_TRUTH: f64 = 0.05;
 /// A scene in the setting that was chosen.
 #[derive(Debug)]
 pub struct Chosen {
+    /// The scene, refined and with its solver set.
     pub scene: Scene,
     /// The choice in words.
     pub words: String,

@@ -11,7 +11,9 @@ use crate::solve::equilibrium::Solver;
 pub struct Grid {
     /// Spacings tried, as parts of the scene's \[1\].
     pub spacings: Vec<f64>,
+    /// Tolerances that every solver but a factorisation is tried with \[1\].
     pub tolerances: Vec<f64>,
+    /// Solvers that are tried.
     pub solvers: Vec<Solver>,
     /// Larger bodies are left out.
     pub max_particles: usize,
@@ -54,12 +56,15 @@ impl Grid {
 pub enum RuleChoice {
     /// Eq. 1, with the scene's neighbours or the first ones.
     Paper,
+    /// The matrix weights of the scene's material.
     Material,
 }
 
 impl RuleChoice {
+    /// Every rule.
     pub const ALL: [RuleChoice; 2] = [RuleChoice::Paper, RuleChoice::Material];
 
+    /// The name in reports.
     pub fn name(self) -> &'static str {
         match self {
             RuleChoice::Paper => "paper",
@@ -71,10 +76,13 @@ impl RuleChoice {
 /// One way to run the scene.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Setting {
+    /// The rule that moves the followers.
     pub rule: RuleChoice,
     /// Distance of nearest particles over the scene's \[1\].
     pub spacing: f64,
+    /// Name of the solver; empty where the scene was refused before one was tried.
     pub solver: &'static str,
+    /// Relative residual that was asked for \[1\]; a factorisation does not look at it.
     pub tolerance: f64,
     /// Bits of a number: 32 or 64.
     pub bits: u32,

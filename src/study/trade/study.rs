@@ -19,11 +19,13 @@ use crate::study::compare::run::{SceneTruth, plan_led_by, truth_of};
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "outcome", rename_all = "kebab-case")]
 pub enum Outcome {
+    /// The solver reached its tolerance.
     Settled,
     /// The solver ended short of its tolerance.
     Unsettled,
     /// The scene is not to be had in this setting.
     Refused {
+        /// The message that refused it.
         reason: String,
     },
 }
@@ -31,14 +33,18 @@ pub enum Outcome {
 /// A setting with what it costs and how far it is from the truth.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Point {
+    /// What was tried.
     #[serde(flatten)]
     pub setting: Setting,
+    /// Number of particles; 0 where the body was refused.
     pub particles: usize,
     /// Relative L2 error of the followers' displacements \[1\].
     pub error: Option<f64>,
     /// From the scene to the followers at rest, median of the repeats \[s\].
     pub seconds: Option<f64>,
+    /// Iterations of the solver.
     pub iterations: Option<usize>,
+    /// What came of it.
     #[serde(flatten)]
     pub outcome: Outcome,
 }
@@ -46,14 +52,19 @@ pub struct Point {
 /// All settings of a scene.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Study {
+    /// Short name of the scene.
     pub name: String,
+    /// Title of the scene.
     pub title: String,
     /// Nodes of the truth that errors are measured against, and the time it took \[s\].
     pub truth_nodes: usize,
+    /// Time that the truth took \[s\].
     pub truth_seconds: f64,
     /// Relative L2 error that the truth states of its own displacement \[1\]; `None` where it cannot.
     pub truth_stated_error: Option<f64>,
+    /// Runs of each setting, of which the median time counts.
     pub repeats: usize,
+    /// Every setting with its outcome.
     pub points: Vec<Point>,
 }
 

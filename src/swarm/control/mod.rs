@@ -22,6 +22,7 @@ use crate::scene::swarm::Swarm;
 /// The mode of the loop.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Mode {
+    /// Members get targets by the rule.
     #[default]
     Running,
     /// Every member holds the place it had when the stop came, until the stop is lifted.
@@ -160,18 +161,22 @@ impl Control {
         members.iter().for_each(|&member| self.serves[member] = true);
     }
 
+    /// Members, their places, leaders and the rule.
     pub fn formation(&self) -> &Formation {
         &self.formation
     }
 
+    /// The poses accepted from every member.
     pub fn watch(&self) -> &Watch {
         &self.watch
     }
 
+    /// Time from one tick to the next \[s\].
     pub fn period(&self) -> f64 {
         self.period
     }
 
+    /// What the loop does with targets.
     pub fn mode(&self) -> Mode {
         self.mode
     }
@@ -262,6 +267,7 @@ impl Control {
         }
     }
 
+    /// The part of the state that outlasts the process, for [`Control::restore`].
     pub fn kept(&self) -> KeptControl {
         KeptControl {
             is_stopped: self.mode == Mode::EmergencyStopped,
@@ -281,6 +287,7 @@ impl Control {
         }
     }
 
+    /// The limits that the filter enforces.
     pub fn limits(&self) -> &Limits {
         self.filter.limits()
     }
@@ -447,10 +454,12 @@ impl Control {
         self.watch.pose(member).map(|pose| pose.yaw)
     }
 
+    /// The member's velocity between its last two poses \[m/s\].
     pub fn velocity(&self, member: usize) -> [f64; 2] {
         self.velocity.get(member)
     }
 
+    /// How young the member's pose is.
     pub fn health(&self, member: usize) -> Health {
         self.watch.health(member)
     }

@@ -6,17 +6,33 @@ use crate::scene::swarm::Swarm;
 /// The members that a loop serves, and those whose poses it receives. By number, ascending.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct NodeScope {
+    /// Members whose targets the loop sends.
     pub mine: Vec<usize>,
+    /// Members whose poses the loop receives.
     pub heard: Vec<usize>,
 }
 
 /// The reason for which a robot cannot be served alone.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum NodeScopeError {
+    /// No robot is called so.
     #[error("--member {name}: there is no such robot\n  help: they are called `{first}` to `{last}`")]
-    Member { name: String, first: String, last: String },
+    Member {
+        /// The name that was given.
+        name: String,
+        /// Name of the first robot.
+        first: String,
+        /// Name of the last robot.
+        last: String,
+    },
+    /// The robot's target depends on more than its neighbours.
     #[error("--member {name}: {why}\n  help: run one node for all, without --member")]
-    NotAlone { name: String, why: &'static str },
+    NotAlone {
+        /// Name of the robot.
+        name: String,
+        /// What it depends on.
+        why: &'static str,
+    },
 }
 
 impl NodeScope {

@@ -8,7 +8,9 @@ use crate::swarm::watch::Health;
 /// The state of the formation.
 #[derive(Clone, Debug)]
 pub struct FormationState {
+    /// Ticks since the loop began.
     pub tick: u64,
+    /// What the loop does with targets.
     pub mode: Mode,
     /// \[m\]; absent where the rule has no single place of rest.
     pub formation_error: Option<f64>,
@@ -18,14 +20,18 @@ pub struct FormationState {
     pub pe1_sum: f64,
     /// Principal strain largest in size \[1\].
     pub strain_max: f64,
+    /// By number, shape \[members\].
     pub members: Vec<MemberState>,
 }
 
 /// The state of one member. Positions in \[m, world frame\].
 #[derive(Clone, Copy, Debug)]
 pub struct MemberState {
+    /// Whether it leads at present.
     pub leads: bool,
+    /// How young its pose is.
     pub health: Health,
+    /// Last known place; absent until a pose was believed.
     pub position: Option<[f64; 2]>,
     /// After the safety filter.
     pub target: Option<[f64; 2]>,
@@ -55,6 +61,7 @@ impl MemberState {
 }
 
 impl FormationState {
+    /// The state after the loop's last tick.
     pub fn of(control: &Control) -> Self {
         let formation = control.formation();
         let measures = control.measures();

@@ -49,6 +49,7 @@ impl Fleet {
         })
     }
 
+    /// True states of the robots, shape \[members\].
     pub fn robots(&self) -> &[Robot] {
         &self.robots
     }
@@ -59,6 +60,7 @@ impl Fleet {
         self.period = period;
     }
 
+    /// The model by which every robot moves.
     pub fn model(&self) -> &Model {
         &self.model
     }

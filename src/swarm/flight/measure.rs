@@ -30,6 +30,7 @@ pub struct Sample {
 /// A flight as it went.
 #[derive(Clone, Debug)]
 pub struct Record {
+    /// Measures of every period.
     pub samples: Vec<Sample>,
     /// Times of `tracks` \[s\].
     pub times: Vec<f64>,
@@ -48,6 +49,7 @@ pub struct Record {
 }
 
 impl Record {
+    /// A record of the start alone.
     pub fn new(swarm: &Swarm, flight: &Flight) -> Self {
         let count = flight.fleet().robots().len();
         Self {

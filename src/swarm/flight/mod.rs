@@ -53,14 +53,17 @@ impl Flight {
         })
     }
 
+    /// The loop that flies the robots.
     pub fn control(&self) -> &Control {
         &self.control
     }
 
+    /// The same, to be stopped, restored or given other limits.
     pub fn control_mut(&mut self) -> &mut Control {
         &mut self.control
     }
 
+    /// The robots as they are, with their channels and faults.
     pub fn fleet(&self) -> &Fleet {
         &self.fleet
     }

@@ -13,6 +13,7 @@ pub struct Moment {
     pub time: f64,
     /// Between the two robots, or of the one \[m, world frame\].
     pub x: f64,
+    /// Second coordinate of that place \[m, world frame\].
     pub y: f64,
 }
 

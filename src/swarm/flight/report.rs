@@ -10,14 +10,19 @@ use crate::scene::swarm::Swarm;
 /// Distances in \[m\], times in \[s\].
 #[derive(Clone, Debug, Serialize)]
 pub struct FlightReport {
+    /// Short name of the swarm.
     pub name: String,
+    /// Its title, as the file gives it.
     pub title: String,
+    /// Number of members.
     pub robots: usize,
+    /// Members that lead at the end.
     pub leaders: usize,
     /// Name of the robots' model.
     pub model: &'static str,
     /// Time flown.
     pub seconds: f64,
+    /// Periods flown.
     pub periods: u64,
     /// Largest, and at the end; absent where the leaders' motion is not affine.
     pub affine_error: Option<[f64; 2]>,
@@ -26,11 +31,13 @@ pub struct FlightReport {
     /// Time after which the formation stayed within `settled_within` of its shape, counted from the end of the
     /// leaders' programs; absent where it never was.
     pub settling_time: Option<f64>,
+    /// Distance from its shape up to which the formation counts as settled.
     pub settled_within: f64,
     /// Smallest ever; absent for a single robot without obstacles.
     pub clearance: Option<f64>,
     /// The robots that came that close, when and where.
     pub closest: Option<Moment>,
+    /// Largest distance from the continuum run of the same scene; absent where there is none.
     pub continuum_error: Option<f64>,
     /// Largest sum of PE1, and at the end \[m^2\].
     pub pe1: [f64; 2],
@@ -40,22 +47,32 @@ pub struct FlightReport {
     pub way: [f64; 2],
     /// Most robots that were lost at one time.
     pub most_lost: usize,
+    /// Every declared bound, and whether it held.
     pub bounds: Vec<Verdict>,
+    /// In the order of the members.
     pub per_robot: Vec<RobotReport>,
 }
 
 /// The results of one robot.
 #[derive(Clone, Debug, Serialize)]
 pub struct RobotReport {
+    /// Name of the robot.
     pub name: String,
+    /// Name of its role at the end.
     pub role: &'static str,
     /// At the end \[m\].
     pub x: f64,
+    /// At the end \[m\].
     pub y: f64,
+    /// Length of its way.
     pub way: f64,
+    /// Smallest free space around it ever; absent for a single robot without obstacles.
     pub clearance: Option<f64>,
+    /// Poses that were believed.
     pub accepted: u64,
+    /// Poses that were rejected, for whatever reason.
     pub rejected: u64,
+    /// Name of its pose's state at the end.
     pub health: &'static str,
 }
 
@@ -64,9 +81,11 @@ pub struct RobotReport {
 pub struct Verdict {
     /// Key of the bound.
     pub bound: &'static str,
+    /// The bound as the file gives it.
     pub declared: f64,
     /// Absent where there was nothing to measure, which is no success.
     pub found: Option<f64>,
+    /// Whether what was found keeps the bound.
     pub holds: bool,
     /// The robots that decided it, when and where; absent where there was nothing to measure.
     pub worst: Option<Moment>,
@@ -85,6 +104,7 @@ impl Verdict {
 }
 
 impl FlightReport {
+    /// The results of a flight that has ended.
     pub fn new(swarm: &Swarm, flight: &Flight, record: &Record) -> Self {
         let formation = flight.control().formation();
         let samples = &record.samples;

@@ -9,9 +9,20 @@ use crate::flock::vectors::Vectors;
 /// A leader's motion, as in [`Lead`]; the motion itself stays in the swarm file.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 pub enum KeptLead {
+    /// From outside: the place last given \[m\].
     External([f64; 2]),
-    Motion { since: f64 },
-    Manoeuvre { manoeuvre: KeptManoeuvre, since: f64 },
+    /// By the leader's own program.
+    Motion {
+        /// Time from which on \[s\].
+        since: f64,
+    },
+    /// With the other leaders.
+    Manoeuvre {
+        /// What they fly.
+        manoeuvre: KeptManoeuvre,
+        /// Time from which on \[s\].
+        since: f64,
+    },
 }
 
 /// A [`Manoeuvre`] as it is written down: seconds, hold and posture of each leg; a posture is translation, turn,

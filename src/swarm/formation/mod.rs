@@ -28,11 +28,13 @@ use settling::Settling;
 /// Members are named by their number, from 0; positions in \[m\], world frame.
 #[derive(Clone, Debug)]
 pub struct Formation {
+    /// Names of the members, shape \[members\].
     pub names: Vec<String>,
     /// \[m\], shape \[members\].
     pub radii: Vec<f64>,
     /// Nominal places \[m\], shape \[members\].
     pub places: Vectors,
+    /// Manoeuvres that can be flown, as the file gives them.
     pub manoeuvres: Vec<NamedManoeuvre>,
     leads: Vec<Option<Lead>>,
     course: TargetSource,
@@ -62,11 +64,16 @@ pub enum Lead {
     External([f64; 2]),
     /// From the time `since` on \[s\].
     Motion {
+        /// Displacements from the nominal place \[m\].
         motion: Motion,
+        /// Time at which it begins.
         since: f64,
     },
+    /// With the other leaders, from the time `since` on \[s\].
     Manoeuvre {
+        /// Postures of the formation as a whole.
         manoeuvre: Manoeuvre,
+        /// Time at which it begins.
         since: f64,
     },
 }
@@ -83,6 +90,7 @@ pub struct Seen<'a> {
 }
 
 impl Formation {
+    /// Number of members.
     pub fn count(&self) -> usize {
         self.names.len()
     }
@@ -92,6 +100,7 @@ impl Formation {
         self.spacing
     }
 
+    /// The member of this name.
     pub fn number(&self, name: &str) -> Option<usize> {
         self.names.iter().position(|known| known == name)
     }
@@ -101,6 +110,7 @@ impl Formation {
         self.places.middle()
     }
 
+    /// Whether a member leads at present.
     pub fn leads(&self, member: usize) -> bool {
         match &self.course {
             TargetSource::Rule { engine, particles } => engine.roles()[particles[member]] != Role::Follower,
@@ -336,6 +346,7 @@ impl Formation {
         Some(rest)
     }
 
+    /// Part of the way to its target that a follower goes in a sweep \[1\].
     pub fn damping(&self) -> f64 {
         self.engine().map_or(1.0, |engine| engine.update().damping)
     }

@@ -13,16 +13,38 @@ use crate::flock::neighbourhood::Neighbours;
 /// The reason for which so many liars are not tolerated. The texts describe the member without naming it.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Unsupported {
+    /// A follower has too few neighbours, whoever they are.
     #[error(
         "has {neighbours} neighbours, and {needed} are needed to tolerate F = {f} liars (on a lattice 8 each \
          tolerate 1, 24 tolerate 3)"
     )]
-    TooFewNeighbours { member: usize, neighbours: usize, needed: usize, f: usize },
+    TooFewNeighbours {
+        /// Number of the follower.
+        member: usize,
+        /// Neighbours that it has.
+        neighbours: usize,
+        /// Neighbours that it needs.
+        needed: usize,
+        /// Liars to be tolerated.
+        f: usize,
+    },
+    /// A follower has enough neighbours, but too few of them are sure to be reached from the leaders.
     #[error(
         "has {neighbours} neighbours of which only {reached} are sure to receive the leaders' values, and \
          {needed} are needed to tolerate F = {f} liars (on a lattice 8 each tolerate 1, 24 tolerate 3)"
     )]
-    NotReached { member: usize, neighbours: usize, reached: usize, needed: usize, f: usize },
+    NotReached {
+        /// Number of the follower.
+        member: usize,
+        /// Neighbours that it has.
+        neighbours: usize,
+        /// Those of them that are sure.
+        reached: usize,
+        /// Sure neighbours that it needs.
+        needed: usize,
+        /// Liars to be tolerated.
+        f: usize,
+    },
 }
 
 impl Unsupported {

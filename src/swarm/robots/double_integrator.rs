@@ -2,6 +2,7 @@
 
 use super::Robot;
 
+/// The limits of a double integrator.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DoubleIntegrator {
     /// Highest speed \[m/s\], default 1.

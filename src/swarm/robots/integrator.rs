@@ -2,6 +2,7 @@
 
 use super::Robot;
 
+/// The limit of a single integrator.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Integrator {
     /// Highest speed \[m/s\], default 1.

@@ -42,6 +42,7 @@ pub enum Model {
 }
 
 impl Model {
+    /// The name in swarm files.
     pub fn name(&self) -> &'static str {
         match self {
             Model::Ideal => "ideal",

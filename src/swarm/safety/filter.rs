@@ -29,6 +29,7 @@ impl Flags {
     /// The member stays without a target: its pose is not known, or the wanted target is not finite.
     pub const HELD: u32 = 64;
 
+    /// Whether this flag is set.
     pub fn has(self, flag: u32) -> bool {
         self.0 & flag != 0
     }
@@ -113,6 +114,7 @@ impl Filter {
         })
     }
 
+    /// The limits that are enforced.
     pub fn limits(&self) -> &Limits {
         &self.limits
     }

@@ -52,25 +52,70 @@ impl Default for Limits {
 /// Error building a filter.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SafetyError {
+    /// A limit is out of its range.
     #[error("limit `{name}` = {value}: give a number {range}, or leave it out for {default}")]
-    Limit { name: &'static str, value: f64, range: &'static str, default: &'static str },
+    Limit {
+        /// Which limit.
+        name: &'static str,
+        /// What was given, in the limit's unit.
+        value: f64,
+        /// The range, in words.
+        range: &'static str,
+        /// What holds where it is left out, in words.
+        default: &'static str,
+    },
+    /// A member's radius is negative or not finite.
     #[error("radius of member {member} = {radius} m: give a number from 0 up")]
-    Radius { member: usize, radius: f64 },
+    Radius {
+        /// Number of the member.
+        member: usize,
+        /// What was given \[m\].
+        radius: f64,
+    },
+    /// A polygon of one or two corners, or none.
     #[error("{place} has {count} corners: give at least 3")]
-    Corners { place: Place, count: usize },
+    Corners {
+        /// The shape.
+        place: Place,
+        /// Corners that it has.
+        count: usize,
+    },
+    /// A shape has a number that is not finite, or too large to compute with.
     #[error("{place} has a number that is not finite or beyond 1e100 m: give finite coordinates in metres")]
-    NotFinite { place: Place },
+    NotFinite {
+        /// The shape.
+        place: Place,
+    },
+    /// A polygon's corners lie on one line, to rounding.
     #[error("{place} has no area: give corners that do not lie on one line")]
-    NoArea { place: Place },
+    NoArea {
+        /// The shape.
+        place: Place,
+    },
+    /// Two edges of a polygon cross or touch that are no neighbours.
     #[error("{place}: edges {first} and {second} (from 0) cross: give corners in order around the shape")]
-    Crossing { place: Place, first: usize, second: usize },
+    Crossing {
+        /// The shape.
+        place: Place,
+        /// Number of one edge, from 0.
+        first: usize,
+        /// Number of the other edge, from 0.
+        second: usize,
+    },
+    /// A disc has no size.
     #[error("{place} has radius {radius} m: give a positive number")]
-    Disc { place: Place, radius: f64 },
+    Disc {
+        /// The shape.
+        place: Place,
+        /// What was given \[m\].
+        radius: f64,
+    },
 }
 
 /// The shape that an error is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Place {
+    /// The polygon that all members stay inside.
     Geofence,
     /// By its index in the list of obstacles.
     Obstacle(usize),

@@ -22,8 +22,11 @@ use crate::geometry::shape::segments_cross;
 pub enum Obstacle {
     /// Corners in order, either way round, convex or not; the last joins the first.
     Polygon(Vec<[f64; 2]>),
+    /// A full disc.
     Disc {
+        /// Coordinates of the middle.
         centre: [f64; 2],
+        /// Distance of the rim from the middle.
         radius: f64,
     },
 }
@@ -86,6 +89,7 @@ impl Obstacles {
         Ok(built)
     }
 
+    /// Whether there is nothing to keep away from.
     pub fn is_empty(&self) -> bool {
         self.pieces.is_empty()
     }

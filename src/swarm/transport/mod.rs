@@ -28,6 +28,7 @@ pub enum Heard {
 /// A member's next target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Target {
+    /// Number of the member.
     pub member: usize,
     /// \[m, world frame\]
     pub position: [f64; 2],
@@ -37,6 +38,7 @@ pub struct Target {
 
 /// The loop's end.
 pub trait ControllerEnd {
+    /// Why a target was not sent.
     type Error: std::error::Error;
 
     /// Passes to `hear` all that arrived since the last call, without waiting; `now` \[s\] stamps messages without one.
@@ -54,6 +56,7 @@ pub trait ControllerEnd {
 
 /// The robots' end.
 pub trait RobotsEnd {
+    /// Why a pose was not sent.
     type Error: std::error::Error;
 
     /// Sends poses of members, without waiting.

@@ -31,6 +31,7 @@ pub struct Pose {
 pub enum Health {
     /// No pose accepted yet, or the clock has been set back.
     Waiting,
+    /// Young enough to count as the present pose.
     Fresh,
     /// The last pose still stands in for the present one.
     Held,
@@ -41,6 +42,7 @@ pub enum Health {
 }
 
 impl Health {
+    /// The name in reports.
     pub fn name(self) -> &'static str {
         match self {
             Health::Waiting => "waiting",
@@ -77,12 +79,14 @@ struct Member {
 }
 
 impl Watch {
+    /// All members waiting.
     pub fn new(members: usize, limits: WatchLimits) -> Self {
         let member =
             Member { health: Health::Waiting, accepted: None, candidate: None, counts: Counts::default() };
         Self { limits, members: vec![member; members], clock: None }
     }
 
+    /// The conditions that poses have to meet.
     pub fn limits(&self) -> &WatchLimits {
         &self.limits
     }
@@ -141,6 +145,7 @@ impl Watch {
         self.members[member].age(now)
     }
 
+    /// How many of a member's poses were believed, and why the others were not.
     pub fn counts(&self, member: usize) -> &Counts {
         &self.members[member].counts
     }

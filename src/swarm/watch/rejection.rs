@@ -3,52 +3,102 @@
 /// The reason for rejecting a pose. It does not name the member, which the receiver knows.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum Rejection {
+    /// A coordinate, the heading, the stamp or the time of arrival is not finite.
     #[error("the {what} of a pose is not finite: its sender has lost itself, or sends uninitialised fields")]
-    NotFinite { what: &'static str },
+    NotFinite {
+        /// Which of them.
+        what: &'static str,
+    },
+    /// The receiver found that it is in another frame.
     #[error("a pose is in another frame: publish it in the swarm's, or name that one in the swarm file")]
     WrongFrame,
+    /// It is farther from the formation's middle than any pose may be.
     #[error(
         "a pose lies {distance:.3} m from the centre, at most {range:.3} m is allowed: check its frame and \
          units, or raise the range"
     )]
-    OutOfRange { distance: f64, range: f64 },
+    OutOfRange {
+        /// Its distance from there \[m\].
+        distance: f64,
+        /// Greatest distance that is allowed \[m\].
+        range: f64,
+    },
+    /// Its stamp is ahead of the clock.
     #[error(
         "a pose is stamped {ahead:.3} s ahead of the clock, at most {skew:.3} s is allowed: synchronise the \
          clocks"
     )]
-    FromTheFuture { ahead: f64, skew: f64 },
+    FromTheFuture {
+        /// By how much \[s\].
+        ahead: f64,
+        /// How much is allowed \[s\].
+        skew: f64,
+    },
+    /// It was measured too long ago.
     #[error(
         "a pose is {age:.3} s old on arrival, at most {age_limit:.3} s is allowed: synchronise the clocks, \
          or look for what delays it"
     )]
-    TooOld { age: f64, age_limit: f64 },
+    TooOld {
+        /// How long ago \[s\].
+        age: f64,
+        /// Greatest age that is allowed \[s\].
+        age_limit: f64,
+    },
     /// Ordinary on an unreliable network: counted, worth no warning.
     #[error("a pose is stamped {behind:.3} s before the newest one, or is that one again")]
-    NotNewer { behind: f64 },
+    NotNewer {
+        /// How much older than the newest one it is \[s\]; 0 for a copy.
+        behind: f64,
+    },
+    /// It implies a speed that no robot has.
     #[error(
         "a pose lies {distance:.3} m from the last one, at most {allowed:.3} m is allowed in the time between: \
          {seen} of the {recover} in a row that would make it believed"
     )]
-    Jump { distance: f64, allowed: f64, seen: u32, recover: u32 },
+    Jump {
+        /// Distance from the last pose believed \[m\].
+        distance: f64,
+        /// Greatest distance in the time between \[m\].
+        allowed: f64,
+        /// Poses that agree with it so far, itself included.
+        seen: u32,
+        /// Poses that have to agree for it to be believed.
+        recover: u32,
+    },
     /// A good pose of a member that was stopped.
     #[error("a pose of a stopped member: {seen} of the {recover} good ones in a row that it needs to go on")]
-    Recovering { seen: u32, recover: u32 },
+    Recovering {
+        /// Good poses so far, itself included.
+        seen: u32,
+        /// Good poses that the member needs.
+        recover: u32,
+    },
 }
 
 /// Counts of a member's accepted and rejected poses since the beginning.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
+    /// Poses that were believed.
     pub accepted: u64,
     /// Gaps between accepted stamps, in periods: what was lost or came too late. Zero where
     /// [`super::WatchLimits::period`] is not known.
     pub lost: u64,
+    /// Rejections as [`Rejection::NotFinite`].
     pub not_finite: u64,
+    /// Rejections as [`Rejection::WrongFrame`].
     pub wrong_frame: u64,
+    /// Rejections as [`Rejection::OutOfRange`].
     pub out_of_range: u64,
+    /// Rejections as [`Rejection::FromTheFuture`].
     pub from_the_future: u64,
+    /// Rejections as [`Rejection::TooOld`].
     pub too_old: u64,
+    /// Rejections as [`Rejection::NotNewer`].
     pub not_newer: u64,
+    /// Rejections as [`Rejection::Jump`].
     pub jumps: u64,
+    /// Rejections as [`Rejection::Recovering`].
     pub recovering: u64,
 }
 

@@ -16,6 +16,7 @@ pub struct RawFlight {
     /// Same seed, same flight.
     #[serde(default)]
     pub seed: u64,
+    /// The model of every robot; at its target after a period unless given.
     #[serde(default)]
     pub model: RawModel,
     /// Standard deviation of each coordinate of a pose [m]. Robots keep three of it farther away from everything, each.
@@ -41,8 +42,10 @@ pub struct RawFlight {
     /// Initial places of robots that do not start at their places in the formation.
     #[serde(default)]
     pub start: Vec<RawStart>,
+    /// Faults of single robots.
     #[serde(default)]
     pub faults: Vec<RawFault>,
+    /// Bounds on the results.
     #[serde(default)]
     pub bounds: RawBounds,
     /// Every so many periods the robots' places are kept for tables and figures [period].
@@ -93,6 +96,7 @@ pub enum RawModel {
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawStart {
+    /// Name of the robot.
     pub robot: String,
     /// [m]
     pub place: [f64; 2],
@@ -102,6 +106,7 @@ pub struct RawStart {
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawFault {
+    /// Name of the robot.
     pub robot: String,
     /// From this time on [s].
     #[schemars(range(min = 0))]
@@ -110,6 +115,7 @@ pub struct RawFault {
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub until: Option<f64>,
+    /// The kind of the fault.
     pub what: RawFaultKind,
 }
 

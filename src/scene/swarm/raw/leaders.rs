@@ -16,6 +16,7 @@ pub struct RawLeaders {
     /// By their place in the formation; on a lattice only.
     #[serde(default)]
     pub region: Option<RawRegion>,
+    /// The motion of these leaders.
     pub program: RawProgram,
 }
 
@@ -28,8 +29,10 @@ pub enum RawProgram {
     External {},
     /// Along displacements from its place in the formation.
     Path {
+        /// Places by ascending time.
         #[schemars(length(min = 1))]
         points: Vec<RawWaypoint>,
+        /// How the motion goes from one place to the next; straight unless given.
         #[serde(default)]
         interpolation: RawInterpolation,
     },
@@ -43,7 +46,10 @@ pub enum RawProgram {
         scale: f64,
     },
     /// With the other leaders, by one of the `manoeuvres`.
-    Manoeuvre { name: String },
+    Manoeuvre {
+        /// Name of the manoeuvre.
+        name: String,
+    },
 }
 
 /// A leader's place at a time.
@@ -62,11 +68,13 @@ pub struct RawWaypoint {
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawManoeuvre {
+    /// The name by which a leader's program or the service `set_formation` calls it.
     pub name: String,
     /// The point about which the formation is turned, stretched and sheared [m]; the middle of its places
     /// unless given.
     #[serde(default)]
     pub about: Option<[f64; 2]>,
+    /// Legs in the order in which they are flown.
     #[schemars(length(min = 1))]
     pub legs: Vec<RawLeg>,
 }

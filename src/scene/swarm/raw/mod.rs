@@ -43,10 +43,13 @@ pub struct RawSwarm {
     #[serde(default = "defaults::radius")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub radius: f64,
+    /// A continuum scene as the formation.
     #[serde(default)]
     pub scene: Option<RawBridge>,
+    /// The lattice from which the body is cut.
     #[serde(default)]
     pub lattice: Option<RawLattice>,
+    /// The body whose particles are the robots.
     #[serde(default)]
     pub body: Option<RawBody>,
     /// Virtual points around a body that give robots at its edge their full neighbourhood.
@@ -58,8 +61,10 @@ pub struct RawSwarm {
     /// Neighbours of robots that are given one by one; the six nearest unless given.
     #[serde(default)]
     pub links: Option<RawLinks>,
+    /// How a follower's target comes from its neighbours' positions.
     #[serde(default)]
     pub rule: RawRule,
+    /// The material of the body; the rule `material` needs it.
     #[serde(default)]
     pub material: Option<RawMaterial>,
     /// Leaders and their motions. Robots that no entry names follow.
@@ -68,19 +73,25 @@ pub struct RawSwarm {
     /// Motions of all leaders together, by name.
     #[serde(default)]
     pub manoeuvres: Vec<RawManoeuvre>,
+    /// Solid things that robots keep away from.
     #[serde(default)]
     pub obstacles: Vec<RawObstacle>,
+    /// Bounds on the published targets.
     #[serde(default)]
     pub limits: RawLimits,
+    /// Conditions on poses.
     #[serde(default)]
     pub poses: RawPoses,
     /// Trims neighbours that stray: tolerance of robots that lie.
     #[serde(default)]
     pub resilience: Option<RawResilience>,
+    /// The control loop.
     #[serde(default)]
     pub control: RawControl,
+    /// The simulation of `flockform swarm` and `flockform robots`.
     #[serde(default)]
     pub flight: RawFlight,
+    /// Topics and messages of the node.
     #[serde(default)]
     pub node: RawNode,
 }

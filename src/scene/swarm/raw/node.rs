@@ -12,6 +12,7 @@ pub struct RawNode {
     /// Frame of every pose (REP 105).
     #[serde(default = "defaults::frame_id")]
     pub frame_id: String,
+    /// The message type of poses.
     #[serde(default)]
     pub pose_type: RawPoseType,
     /// Topic of each robot's pose.
@@ -23,6 +24,7 @@ pub struct RawNode {
     /// Publishes velocities towards the targets too.
     #[serde(default)]
     pub velocity: Option<RawVelocityType>,
+    /// Topic of each robot's velocity.
     #[serde(default = "defaults::velocity_topic")]
     pub velocity_topic: String,
     /// A `std_msgs/Empty` on this topic stops every robot, as the service `~/emergency_stop` does. A topic reaches the node that
@@ -77,10 +79,12 @@ impl RawCommands {
         }
     }
 
+    /// Whether an emergency stop is accepted.
     pub fn may_stop(self) -> bool {
         self != Self::None
     }
 
+    /// Whether everything is accepted.
     pub fn may_do_all(self) -> bool {
         self == Self::All
     }

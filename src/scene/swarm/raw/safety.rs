@@ -32,11 +32,13 @@ pub struct RawLimits {
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum RawObstacle {
+    /// A polygon, convex or not.
     Polygon {
         /// Corners in order, either way round; the last joins the first [m].
         #[schemars(length(min = 3))]
         vertices: Vec<[f64; 2]>,
     },
+    /// A full disc.
     Disc {
         /// [m]
         centre: [f64; 2],

@@ -26,11 +26,28 @@ use crate::scene::{LeaderMotion, Scene, SceneError};
 #[serde(tag = "outcome", rename_all = "kebab-case")]
 pub enum Outcome {
     /// The answer is known, and this one is off by `error`, no more than `within` \[1\].
-    Right { error: f64, within: f64, check: String },
+    Right {
+        /// By how much, relative to what `check` names.
+        error: f64,
+        /// Greatest error that counts as right.
+        within: f64,
+        /// What the answer was held against, in words.
+        check: String,
+    },
     /// The program said that it could not, and why.
-    Refused { message: String },
+    Refused {
+        /// The first problem that it named.
+        message: String,
+    },
     /// It said nothing, and was off.
-    Wrong { error: Option<f64>, within: f64, check: String },
+    Wrong {
+        /// By how much, relative to what `check` names; none where the answer is not a number.
+        error: Option<f64>,
+        /// Greatest error that counts as right.
+        within: f64,
+        /// What the answer was held against, in words.
+        check: String,
+    },
 }
 
 impl Outcome {
@@ -70,9 +87,11 @@ impl fmt::Display for Outcome {
 /// One extreme.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Case {
+    /// What is extreme, in words.
     pub name: String,
     /// The body of the case.
     pub body: String,
+    /// What came of it.
     #[serde(flatten)]
     pub outcome: Outcome,
 }
