@@ -92,15 +92,15 @@ pub enum CheckpointError {
     /// The system refuses to read the checkpoint.
     #[error("{} cannot be read: {source}", .path.display())]
     Unreadable {
-        /// The file.
+        /// Path of the checkpoint.
         path: PathBuf,
-        /// Why.
+        /// What the system said.
         source: std::io::Error,
     },
     /// The file does not begin as a checkpoint does.
     #[error("{} is no checkpoint of flockform\n  help: give the folder of a run; remove the file to start again", .path.display())]
     NotOne {
-        /// The file.
+        /// Path of the checkpoint.
         path: PathBuf,
     },
     /// The file ends before its payload does.
@@ -109,7 +109,7 @@ pub enum CheckpointError {
         .path.display()
     )]
     Truncated {
-        /// The file.
+        /// Path of the checkpoint.
         path: PathBuf,
         /// Its size \[byte\].
         found: u64,
@@ -122,7 +122,7 @@ pub enum CheckpointError {
         .path.display()
     )]
     Corrupted {
-        /// The file.
+        /// Path of the checkpoint.
         path: PathBuf,
         /// What is wrong with it.
         what: String,
@@ -133,7 +133,7 @@ pub enum CheckpointError {
         .path.display()
     )]
     Version {
-        /// The file.
+        /// Path of the checkpoint.
         path: PathBuf,
         /// What wrote it.
         found: String,

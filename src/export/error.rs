@@ -53,7 +53,7 @@ pub enum ExportError {
         action: &'static str,
         /// The file or the folder.
         path: PathBuf,
-        /// Why.
+        /// What the system said.
         source: io::Error,
     },
     /// A figure's SVG cannot be drawn as PNG.

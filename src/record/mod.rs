@@ -57,9 +57,9 @@ pub enum RecordError {
     Io {
         /// What was tried, as a verb.
         action: &'static str,
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Why.
+        /// What the system said.
         source: std::io::Error,
     },
     /// A recording could not be written on.
@@ -67,15 +67,15 @@ pub enum RecordError {
     Write {
         /// The unfinished file.
         path: PathBuf,
-        /// Why.
+        /// What the MCAP library said.
         source: mcap::McapError,
     },
     /// What was to be read is no MCAP file, or is damaged beyond reading.
     #[error("{} is no MCAP file: {source}\n  help: give a file that --record or `ros2 bag record -s mcap` has written", .path.display())]
     NoMcap {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Why.
+        /// What the MCAP library said.
         source: mcap::McapError,
     },
     /// A recording that carries no swarm file.
@@ -87,7 +87,7 @@ pub enum RecordError {
     /// A recording that says too little to be replayed.
     #[error("{}: {what}\n  help: {help}", .path.display())]
     Unusable {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
         /// What is missing.
         what: String,

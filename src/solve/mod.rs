@@ -1,6 +1,6 @@
 //! Spectra of sweeps over the rules, and the solvers for equilibrium.
 
-pub(crate) mod affine_weights;
+pub mod affine_weights;
 pub(crate) mod arnoldi;
 pub mod corotated;
 pub mod equilibrium;

@@ -7,7 +7,7 @@
 //! it (Gauss-Seidel).
 
 //!
-//! * [`rows`]: a rule compiled for a body, as runs and gathers with coefficients.
+//! * `rows`: a rule compiled for a body, as runs and gathers with coefficients.
 //! * `kernel`, `gathers`: the loops over rows; `terms`: what is made of a mean while it is in the registers.
 //! * `schedule`: which bands take which step when, on which thread.
 //! * `torn`: particles that have lost bonds.

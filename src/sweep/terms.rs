@@ -162,6 +162,7 @@ impl Compiled {
 }
 
 impl<T: Real> Terms<'_, T> {
+    #[cfg(any(test, feature = "bench"))]
     pub const NONE: Self = Self { poisson: None, feedback: None, damping: None };
 
     pub fn is_empty(&self) -> bool {

@@ -9,10 +9,12 @@ mod parameters;
 
 use flockform::ros::arguments::{RosArgumentError, RosArguments};
 
+/// The arguments of a line, which quotes nothing.
 pub fn words(line: &str) -> Vec<String> {
     line.split_whitespace().map(String::from).collect()
 }
 
+/// Other arguments and the ROS arguments, under an empty environment.
 pub fn parse(arguments: &[String]) -> Result<(Vec<String>, RosArguments), RosArgumentError> {
     RosArguments::parse(arguments.iter().cloned(), &|_| None)
 }
@@ -22,6 +24,7 @@ pub fn ros(line: &str) -> RosArguments {
     parse(&words(&format!("--ros-args {line}"))).unwrap_or_else(|error| panic!("{line}: {error}")).1
 }
 
+/// The message that refuses `--ros-args LINE`.
 pub fn refusal(line: &str) -> String {
     match parse(&words(&format!("--ros-args {line}"))) {
         Ok(_) => panic!("{line} is accepted"),

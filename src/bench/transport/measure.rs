@@ -87,9 +87,9 @@ pub struct Case {
     pub samples: usize,
     /// Messages that had not been answered after two seconds.
     pub lost: usize,
-    /// From the sending of a message to the receipt of its answer.
+    /// From a message to its answer \[s\]; filling and reading count where they are timed.
     pub round_trip: Quantiles,
-    /// From the sending of a message to its receipt.
+    /// From a message to its receipt \[s\]; filling and reading count where they are timed.
     pub one_way: Quantiles,
     /// Of the whole process \[s\]; none for a hand-off, and where the system does not say (Linux does).
     pub cpu_seconds_per_message: Option<f64>,

@@ -20,13 +20,13 @@ pub enum Axis {
 /// Eq. 2 with its parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Poisson {
-    /// `K` \[1\]: response per unit of displacement along `pull`; negative draws the sides together.
+    /// `K` \[1\]: response per unit of displacement along `axis`; negative draws the sides together.
     pub k: f64,
     /// The axis whose displacement acts (the paper's x).
     pub axis: Axis,
-    /// Coordinate of the central axis across `pull` \[length\].
+    /// Coordinate of the central axis, across `axis` \[length\].
     pub centre: f64,
-    /// Half width of the body across `pull` \[length\], greater than 0.
+    /// Half width of the body across `axis` \[length\], greater than 0.
     pub half_width: f64,
     /// Exponent of the distance function: 1 linear, 0 its sign alone.
     pub exponent: f64,
@@ -43,7 +43,7 @@ impl Poisson {
         if s == 0.0 { 0.0 } else { s.signum() * s.abs().powf(self.exponent) }
     }
 
-    /// Adds the term to a target whose coordinate along `pull` is the new one already.
+    /// Adds the term to a target whose coordinate along `axis` is the new one already.
     pub fn add(&self, own: &ParticleState, target: &mut [f64; 2]) {
         let (along, across) = match self.axis {
             Axis::X => (0, 1),

@@ -4,16 +4,16 @@
 //! bounded queues. Everything it holds is polled; a peer that is slow, gone or wrong cannot hold it up, and a
 //! middleware that does ends the process ([`pulse`](super::edge::pulse)).
 
-pub mod diagnostics;
+pub(crate) mod diagnostics;
 mod drive;
 mod kept;
 pub mod leaders;
 mod link;
-pub mod markers;
-pub mod pose;
+pub(crate) mod markers;
+pub(crate) mod pose;
 pub mod recorder;
 mod settings;
-pub mod state;
+pub(crate) mod state;
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};

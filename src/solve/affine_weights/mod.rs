@@ -35,25 +35,53 @@ pub struct Solved {
 /// Why a shape has no weights. Members are named by index; the texts are about them and do not name them.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum WeightsError {
+    /// A follower without neighbours.
     #[error("follows and has no neighbours")]
-    NoNeighbours { member: usize },
+    NoNeighbours {
+        /// Index of the follower.
+        member: usize,
+    },
+    /// A follower whose place, or that of a neighbour, is not finite.
     #[error("has a place, or a neighbour with one, that is not finite")]
-    NotFinite { member: usize },
+    NotFinite {
+        /// Index of the follower.
+        member: usize,
+    },
+    /// A follower that lies off the point or line on which all its neighbours stand.
     #[error(
         "cannot be placed by its {neighbours} neighbours: they stand in one point or on one line, {off:.3e} of \
          their spread away from it"
     )]
-    Unreachable { member: usize, neighbours: usize, off: f64 },
+    Unreachable {
+        /// Index of the follower.
+        member: usize,
+        /// Number of its neighbours.
+        neighbours: usize,
+        /// How far off it lies, over the spread of its neighbours \[1\].
+        off: f64,
+    },
+    /// A follower whose weights are so large that errors of its neighbours' places would drown its own.
     #[error(
         "has neighbours that stand nearly on one line: its weights would multiply errors of their places by \
          {factor:.3e}, at most {most} is allowed"
     )]
-    Amplifies { member: usize, factor: f64, most: f64 },
+    Amplifies {
+        /// Index of the follower.
+        member: usize,
+        /// Sum of its weights' moduli \[1\].
+        factor: f64,
+        /// Greatest sum that is allowed \[1\].
+        most: f64,
+    },
+    /// The weights let some error of the followers' places stay or grow.
     #[error(
         "the formation does not come to rest: the slowest error is multiplied by {radius:.6} in every period, and \
          less than 1 is needed: those at the corners, whose weights are negative, have to lead"
     )]
-    DoesNotSettle { radius: f64 },
+    DoesNotSettle {
+        /// Factor of the slowest error in every period \[1\].
+        radius: f64,
+    },
 }
 
 impl WeightsError {

@@ -39,10 +39,10 @@ pub enum SolveError {
         /// Least tolerance that single precision is asked for \[1\].
         floor: f64,
     },
-    /// Single precision was asked of a solver that has none.
+    /// Single precision was asked of a solver that computes in double precision only.
     #[error("{solver} computes in double precision only")]
     DoubleOnly {
-        /// The solver.
+        /// Which one was to be used.
         solver: Solver,
     },
     /// Every particle is held.
@@ -65,7 +65,7 @@ pub enum SolveError {
         "{solver} needs neighbours that feel each other alike, but particles {first} and {second} do not; gauss-seidel, jacobi and direct do not ask for it"
     )]
     NotSymmetric {
-        /// The solver.
+        /// Which one was to be used.
         solver: Solver,
         /// Id of a particle that is felt by the second otherwise than it feels it.
         first: usize,
@@ -85,7 +85,7 @@ pub enum SolveError {
     /// The residual grew to 1e12 times the first, or ceased to be a number.
     #[error("{solver} diverged: the residual had grown to {residual:e} after {iterations} iterations")]
     Diverged {
-        /// The solver.
+        /// Which one was to be used.
         solver: Solver,
         /// Iterations made.
         iterations: usize,

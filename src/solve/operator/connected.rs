@@ -9,7 +9,7 @@ const SWEEPS: usize = 8;
 impl Operator {
     /// The first follower, counted from 0, that no chain of neighbours connects to a held particle;
     /// `matrix` is what [`Matrix::of_followers`] made of this operator.
-    pub fn adrift(&self, matrix: &Matrix) -> Option<usize> {
+    pub(crate) fn adrift(&self, matrix: &Matrix) -> Option<usize> {
         // Rows that owe something to held particles were made after all others.
         let beside_held = |&class: &u32| class != HELD && class as usize >= self.rows.len();
         let mut reached: Vec<bool> = matrix.class.iter().map(beside_held).collect();

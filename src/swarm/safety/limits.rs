@@ -75,7 +75,7 @@ pub enum SafetyError {
     /// A polygon of one or two corners, or none.
     #[error("{place} has {count} corners: give at least 3")]
     Corners {
-        /// The shape.
+        /// Which shape.
         place: Place,
         /// Corners that it has.
         count: usize,
@@ -83,19 +83,19 @@ pub enum SafetyError {
     /// A shape has a number that is not finite, or too large to compute with.
     #[error("{place} has a number that is not finite or beyond 1e100 m: give finite coordinates in metres")]
     NotFinite {
-        /// The shape.
+        /// Which shape.
         place: Place,
     },
     /// A polygon's corners lie on one line, to rounding.
     #[error("{place} has no area: give corners that do not lie on one line")]
     NoArea {
-        /// The shape.
+        /// Which shape.
         place: Place,
     },
     /// Two edges of a polygon cross or touch that are no neighbours.
     #[error("{place}: edges {first} and {second} (from 0) cross: give corners in order around the shape")]
     Crossing {
-        /// The shape.
+        /// Which shape.
         place: Place,
         /// Number of one edge, from 0.
         first: usize,
@@ -105,7 +105,7 @@ pub enum SafetyError {
     /// A disc has no size.
     #[error("{place} has radius {radius} m: give a positive number")]
     Disc {
-        /// The shape.
+        /// Which shape.
         place: Place,
         /// What was given \[m\].
         radius: f64,
