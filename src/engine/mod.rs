@@ -1,9 +1,10 @@
 //! The engine: a body is moved, one step after the other.
 //!
-//! A [`setup::Setup`] becomes an [`Engine`]: in each step roles change and leaders move (`leaders`), bonds break, loads grow ([`load`])
-//! and the rule is swept; where nothing in between depends on how the body stands, several steps are taken at once ([`several`]).
-//! An [`observer::Observer`] looks at it on its way. [`forces`] are those within a body that is a material, and what holds it;
-//! [`path`] sums up the work done between equilibria. [`state`] takes an engine out on its way and puts it back, for checkpoints.
+//! A [`setup::Setup`] becomes an [`Engine`]: in each step roles change and leaders move (`leaders`), bonds break, loads
+//! grow ([`load`]) and the rule is swept; where nothing in between depends on how the body stands, several steps are
+//! taken at once ([`several`]). An [`observer::Observer`] looks at it on its way. [`forces`] are those within a body
+//! that is a material, and what holds it; [`path`] sums up the work done between equilibria. [`state`] takes an engine
+//! out on its way and puts it back, for checkpoints.
 
 pub mod forces;
 mod leaders;

@@ -1,10 +1,11 @@
 //! `report.html`: the results of a run, a flight, a comparison or a study as one page that opens by double
 //! click, without network or server.
 //!
-//! A page shows bodies in motion ([`view::View`]), charts (`plot`) and tables. The frames of an animation are kept while
-//! the run goes on (`frames`), at an interval that doubles when there are too many, as displacements in whole multiples
-//! of a power of two (`quantized_channel`), and written as differences, deflated (`encode`). The page computes PE1,
-//! strain and stress from displacements; the values at the end are written to the last bit, as in `final.csv`.
+//! A page shows bodies in motion ([`view::View`]), charts (`plot`) and tables. The frames of an animation are kept
+//! while the run goes on (`frames`), at an interval that doubles when there are too many, as displacements in whole
+//! multiples of a power of two (`quantized_channel`), and written as differences, deflated (`encode`). The page
+//! computes PE1, strain and stress from displacements; the values at the end are written to the last bit, as in
+//! `final.csv`.
 //!
 //! [`RunRecorder`] watches a run, `FlightRecorder` a flight.
 

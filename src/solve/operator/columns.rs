@@ -84,10 +84,6 @@ impl Columns {
         self.step
     }
 
-    pub fn segments(&self) -> &[Segment] {
-        &self.segments
-    }
-
     /// Segments of a column, from the bottom; none where there is no such column.
     pub fn of(&self, column: i32) -> &[Segment] {
         if column == OUTLIERS {

@@ -136,12 +136,6 @@ impl Matrix {
         entries.fold([0, 0], |far, (o, _)| [far[0].max(o[0].abs()), far[1].max(o[1].abs())])
     }
 
-    /// Bytes on the heap.
-    pub fn bytes(&self) -> usize {
-        let entries: usize = self.rows.iter().map(|row| row.entries.len() * 40 + 56).sum();
-        self.class.len() * 4 + self.runs.len() * 16 + self.distances.len() * 4 + entries
-    }
-
     fn find_runs(&mut self) {
         // Where the distances last used with each class lie: most columns are like the one before.
         let mut last = vec![None; self.rows.len()];
