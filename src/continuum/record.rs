@@ -13,7 +13,7 @@ use crate::material::elastic::Elastic;
 /// A whole configuration at one step; arrays of shape \[count\].
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Snapshot {
-    /// Steps taken so far.
+    /// Steps or increments taken so far.
     pub step: usize,
     /// Present positions \[length, world frame\].
     #[serde(with = "serde_impls::points")]

@@ -143,7 +143,7 @@ impl Engine {
         engine
     }
 
-    /// Steps taken so far.
+    /// Steps taken so far; of a body that was put to rest, the step or increment that it rests at.
     pub fn step(&self) -> usize {
         self.step
     }
