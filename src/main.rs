@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 fn main() -> ExitCode {
     let done = cli::arguments().and_then(|(arguments, ros)| {
-        cli::start_log(arguments.verbose, &ros);
+        cli::log::start(&arguments, &ros);
         cli::watch_interrupts();
         cli::dispatch(arguments.command, &ros)
     });

@@ -5,6 +5,7 @@ mod compare;
 mod gallery;
 mod install;
 mod interrupt;
+pub mod log;
 mod material;
 mod node;
 mod output;
@@ -18,8 +19,6 @@ mod supervise;
 mod swarm;
 mod trade;
 
-use std::fmt::{self, Debug};
-use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -27,7 +26,7 @@ use clap::error::{ContextKind, ContextValue};
 use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 use flockform::continuum::report::PlanReport;
-use flockform::ros::arguments::{RosArgumentError, RosArguments, Severity};
+use flockform::ros::arguments::{RosArgumentError, RosArguments};
 use flockform::ros::edge::escaped;
 use flockform::ros::node::NodeError;
 use flockform::scene::{self, Bundled, Scene, SceneError, bundled};
@@ -35,8 +34,6 @@ use flockform::shm::ShmError;
 use flockform::study::compare::run::plan;
 use flockform::{bench, export};
 use node::Transport;
-use tracing::field::Field;
-use tracing_subscriber::fmt::format;
 
 /// Exit code of a run that started and failed: diverged or interrupted.
 pub const FAILED: u8 = 1;
@@ -356,38 +353,6 @@ fn renamed(error: &clap::Error) -> Option<(&'static str, &'static str)> {
     let kinds = [ContextKind::InvalidSubcommand, ContextKind::InvalidArg];
     let wrong = kinds.into_iter().find_map(|kind| error.get(kind))?;
     RENAMED.into_iter().find(|(then, _)| matches!(wrong, ContextValue::String(word) if word == then))
-}
-
-/// Logs go to standard error; `RUST_LOG` wins over `--log-level`, and that over `-v`.
-pub fn start_log(verbose: u8, ros: &RosArguments) {
-    let level = match ros.logging.level_of("flockform") {
-        _ if !ros.logging.stdout => "off",
-        None | Some(Severity::Unset) => {
-            ["warn", "flockform=info", "flockform=debug", "trace"][usize::from(verbose.min(3))]
-        }
-        Some(Severity::Debug) => "flockform=debug",
-        Some(Severity::Info) => "flockform=info",
-        Some(Severity::Warn) => "flockform=warn",
-        Some(Severity::Error | Severity::Fatal) => "flockform=error",
-    };
-    // The middleware reports every peer that comes and goes as a warning.
-    let level = match level {
-        "off" => level.to_owned(),
-        _ => format!("{level},rustdds=error,ros2_client=error"),
-    };
-    let filter = tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| level.into());
-    let colours = std::io::stderr().is_terminal();
-    let log = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr);
-    log.with_ansi(colours).fmt_fields(format::debug_fn(field)).without_time().init();
-}
-
-/// A field of a log line, on its line whatever is in it: much of it comes from files and from the network.
-fn field(line: &mut format::Writer<'_>, field: &Field, value: &dyn Debug) -> fmt::Result {
-    if field.name() != "message" {
-        write!(line, " {field}=")?;
-    }
-    // Longer than any line of our own.
-    write!(line, "{}", escaped(&format!("{value:?}"), 2000))
 }
 
 /// From now on an interrupt ends the program within a second.

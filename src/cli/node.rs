@@ -37,7 +37,7 @@ pub struct NodeArguments {
     pub transport: Transport,
     /// Run as the node of this robot: receive only its pose and its neighbours', and send only its target
     #[arg(long, value_name = "NAME")]
-    member: Option<String>,
+    pub member: Option<String>,
     #[command(flatten)]
     record: RecordArguments,
 }

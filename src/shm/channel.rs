@@ -73,7 +73,7 @@ pub fn service_name(space: &str, leaf: &str) -> Result<String, ShmError> {
     if !(1..=64).contains(&space.len()) {
         return Err(refused("its length"));
     }
-    let is_allowed = |c: char| c.is_alphanumeric() || matches!(c, '-' | '_' | '.');
+    let is_allowed = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_' | '.');
     if !space.chars().all(is_allowed) {
         return Err(refused("a character in it"));
     }

@@ -36,3 +36,36 @@ fn a_frame_id_forges_no_line_and_fills_no_disk() {
     let length: usize = lines.iter().map(String::len).sum();
     assert!(length < 5_000, "{length} bytes");
 }
+
+#[test]
+fn a_node_logs_as_ros_2_nodes_do() {
+    let renamed = ["--ros-args", "-r", "__node:=keeper", "-r", "__ns:=/fleet"];
+    let start = |words: &[&str], format: Option<&str>| {
+        let mut command = command(domain(), &[&["node", "square"], &renamed[..], words].concat());
+        command.env_remove("RUST_LOG").env_remove("RCUTILS_CONSOLE_OUTPUT_FORMAT");
+        Running::start(command.envs(format.map(|format| ("RCUTILS_CONSOLE_OUTPUT_FORMAT", format))))
+    };
+    let first = |words: &[&str], format: Option<&str>| {
+        let mut node = start(words, format);
+        let lines = node.lines();
+        let line = until("a line", || lines.try_recv().ok());
+        assert_eq!(node.terminate(), Some(0));
+        line
+    };
+    let line = first(&[], None);
+    let (head, text) = line.split_once("]: ").expect("a head and a text");
+    let (severity, rest) = head.split_once("] [").expect("a severity");
+    let (time, logger) = rest.split_once("] [").expect("a time");
+    assert_eq!((severity, logger), ("[INFO", "fleet.keeper"));
+    let digits = |text: &str| text.bytes().all(|byte| byte.is_ascii_digit());
+    assert!(time.split_once('.').is_some_and(|(s, ns)| digits(s) && digits(ns) && ns.len() == 9), "{line}");
+    assert!(text.contains("25 robots at 20.0 Hz"), "{line}");
+    let line = first(&[], Some("{name}|{severity}|{message}|{nothing}"));
+    assert!(line.starts_with("fleet.keeper|INFO|") && line.ends_with("|{nothing}"), "{line}");
+    // Quieter by name, as the node is called now.
+    let mut quiet = start(&["--log-level", "fleet.keeper:=error"], None);
+    let lines = quiet.lines();
+    std::thread::sleep(Duration::from_secs(2));
+    assert_eq!(quiet.terminate(), Some(0));
+    assert_eq!(lines.iter().collect::<Vec<_>>(), Vec::<String>::new());
+}

@@ -1,15 +1,19 @@
 //! Loopback without multicast: the trap of many robots on one computer.
 
-/// Says what to do if this computer's loopback device carries no multicast, once per process.
+/// Says what to do if nothing of this computer that may be used carries multicast, once per process.
 ///
 /// Participants then find each other only by asking the first few ports of the domain, so of more than
-/// about a dozen participants some stay unseen, without any error.
-pub fn warn_without_multicast() {
+/// about a dozen participants some stay unseen, without any error. Over a network device they find each other as they
+/// find those of other computers.
+pub fn warn_without_multicast(loopback_only: bool) {
     static ONCE: std::sync::Once = std::sync::Once::new();
     ONCE.call_once(|| {
-        if carries_multicast(std::fs::read_to_string("/sys/class/net/lo/flags").ok().as_deref())
-            == Some(false)
-        {
+        let devices = std::fs::read_dir("/sys/class/net").into_iter().flatten().flatten();
+        let usable = devices.filter(|device| !loopback_only || device.file_name() == "lo");
+        let flags: Vec<String> =
+            usable.filter_map(|device| std::fs::read_to_string(device.path().join("flags")).ok()).collect();
+        let known: Vec<bool> = flags.iter().filter_map(|flags| carries_multicast(flags)).collect();
+        if !known.is_empty() && !known.contains(&true) {
             tracing::warn!(
                 "the loopback device carries no multicast: at most 12 processes per ROS_DOMAIN_ID find each \
                  other on this computer. Remedy: ip link set lo multicast on && ip route add 239.0.0.0/8 dev \
@@ -19,12 +23,12 @@ pub fn warn_without_multicast() {
     });
 }
 
-/// Whether device flags as Linux prints them (`0x1009`) hold the multicast bit; `None` where it cannot be
-/// known.
-pub fn carries_multicast(flags: Option<&str>) -> Option<bool> {
-    const MULTICAST: u32 = 0x1000;
-    let digits = flags?.trim().strip_prefix("0x")?;
-    Some(u32::from_str_radix(digits, 16).ok()? & MULTICAST != 0)
+/// Whether a device with these flags, as Linux prints them (`0x1009`), is up and carries multicast; `None` where it
+/// cannot be known.
+fn carries_multicast(flags: &str) -> Option<bool> {
+    const UP_AND_MULTICAST: u32 = 0x1001;
+    let digits = flags.trim().strip_prefix("0x")?;
+    Some(u32::from_str_radix(digits, 16).ok()? & UP_AND_MULTICAST == UP_AND_MULTICAST)
 }
 
 #[cfg(test)]
@@ -32,10 +36,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_multicast_bit_is_read_from_device_flags() {
-        assert_eq!(carries_multicast(Some("0x9\n")), Some(false));
-        assert_eq!(carries_multicast(Some("0x1009\n")), Some(true));
-        assert_eq!(carries_multicast(Some("nonsense")), None);
-        assert_eq!(carries_multicast(None), None);
+    fn a_device_that_is_up_and_has_the_multicast_bit_carries_it() {
+        assert_eq!(carries_multicast("0x9\n"), Some(false));
+        assert_eq!(carries_multicast("0x1009\n"), Some(true));
+        assert_eq!(carries_multicast("0x1002\n"), Some(false), "down");
+        assert_eq!(carries_multicast("0x1003\n"), Some(true), "an ordinary network device");
+        assert_eq!(carries_multicast("nonsense"), None);
     }
 }

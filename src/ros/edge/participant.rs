@@ -69,7 +69,7 @@ impl Edge {
         if domain > 232 {
             return Err(EdgeError::Domain { domain });
         }
-        super::loopback::warn_without_multicast();
+        super::loopback::warn_without_multicast(options.loopback_only);
         let mut builder = DomainParticipantBuilder::new(domain);
         if options.loopback_only {
             builder = builder.with_only_networks([IpAddr::from([127, 0, 0, 1])]);

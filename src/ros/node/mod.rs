@@ -58,7 +58,7 @@ pub enum NodeError {
     Edge(#[from] EdgeError),
     #[error("{0}")]
     Name(#[from] NameError),
-    #[error("parameter {0}")]
+    #[error("{0}")]
     Parameter(#[from] Refusal),
     #[error("{0}")]
     NodeScope(#[from] NodeScopeError),

@@ -74,14 +74,17 @@ impl Store {
 
     fn admit(&self, name: &str, value: Option<Value>) -> Result<Value, Refusal> {
         let declaration = self.declared.get(name).ok_or_else(|| Refusal::Undeclared { name: said(name) })?;
-        if declaration.read_only {
-            return Err(Refusal::ReadOnly { name: name.into() });
+        let value = value.ok_or_else(|| Refusal::Unset { name: name.into() });
+        if !declaration.read_only {
+            return declaration.admit(value?);
         }
-        declaration.admit(value.ok_or_else(|| Refusal::Unset { name: name.into() })?)
+        // What it has already may be written again: `ros2 param load` does so with what `ros2 param dump` wrote.
+        let same = value.and_then(|value| declaration.admit(value)).ok();
+        same.filter(|same| *same == declaration.value).ok_or_else(|| Refusal::ReadOnly { name: name.into() })
     }
 
     fn apply(&mut self, name: &str, value: Value) {
-        if let Some(declaration) = self.declared.get_mut(name) {
+        if let Some(declaration) = self.declared.get_mut(name).filter(|declaration| !declaration.read_only) {
             declaration.value = value.clone();
             self.changes.push(Change { name: name.into(), value });
         }
@@ -186,6 +189,10 @@ mod tests {
     fn read_only_undeclared_unset_and_vetoed_are_refused_with_the_reason() {
         let mut store = store();
         assert!(matches!(set(&mut store, "use_sim_time", true), Err(Refusal::ReadOnly { .. })));
+        assert!(matches!(set(&mut store, "use_sim_time", 1.0), Err(Refusal::ReadOnly { .. })));
+        assert!(matches!(store.set("use_sim_time", None), Err(Refusal::ReadOnly { .. })));
+        assert_eq!(set(&mut store, "use_sim_time", false), Ok(()), "what it is already");
+        assert_eq!(store.take_changes(), []);
         assert!(matches!(set(&mut store, "speed", 1.0), Err(Refusal::Undeclared { .. })));
         assert!(matches!(store.set("rate", None), Err(Refusal::Unset { .. })));
         let vetoed = set(&mut store, "frame", "").expect_err("vetoed");

@@ -1,0 +1,170 @@
+//! The program's log, on standard error: that of a ROS 2 node as ROS 2 nodes write it (`rcutils`), any other short.
+
+use std::fmt::{self, Debug};
+use std::io::IsTerminal;
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use flockform::ros::arguments::{RosArguments, Severity};
+use flockform::ros::edge::escaped;
+use flockform::ros::node;
+use tracing::field::Field;
+use tracing::{Event, Level, Metadata, Subscriber};
+use tracing_subscriber::EnvFilter;
+use tracing_subscriber::fmt::format::{self, Writer};
+use tracing_subscriber::fmt::{FmtContext, FormatEvent, FormatFields};
+use tracing_subscriber::registry::LookupSpan;
+
+use super::node::Transport;
+use super::{Arguments, Command};
+
+/// Format of a node's lines unless `RCUTILS_CONSOLE_OUTPUT_FORMAT` says otherwise.
+const NODE_FORMAT: &str = "[{severity}] [{time}] [{name}]: {message}";
+
+/// Longer than any line of our own.
+const MOST_CHARACTERS: usize = 2000;
+
+/// Starts the log. `RUST_LOG` wins over `--log-level`, and that over `-v`. A node says what it does (INFO) unless told
+/// otherwise, any other command speaks up from WARN on.
+pub fn start(arguments: &Arguments, ros: &RosArguments) {
+    let logger = logger(&arguments.command, ros);
+    let verbosity = arguments.verbose + u8::from(logger.is_some());
+    let level = match ros.logging.level_of(logger.as_deref().unwrap_or(node::NAME)) {
+        _ if !ros.logging.stdout => "off",
+        None | Some(Severity::Unset) => {
+            ["warn", "flockform=info", "flockform=debug", "trace"][usize::from(verbosity.min(3))]
+        }
+        Some(Severity::Debug) => "flockform=debug",
+        Some(Severity::Info) => "flockform=info",
+        Some(Severity::Warn) => "flockform=warn",
+        Some(Severity::Error | Severity::Fatal) => "flockform=error",
+    };
+    // The middleware reports every peer that comes and goes as a warning.
+    let level = match level {
+        "off" => level.to_owned(),
+        _ => format!("{level},rustdds=error,ros2_client=error"),
+    };
+    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| level.into());
+    let log = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr);
+    let log = log.with_ansi(std::io::stderr().is_terminal()).fmt_fields(format::debug_fn(field));
+    match logger {
+        None => log.without_time().init(),
+        Some(name) => {
+            let asked = std::env::var("RCUTILS_CONSOLE_OUTPUT_FORMAT").ok();
+            let format = asked.filter(|format| !format.is_empty()).unwrap_or_else(|| NODE_FORMAT.into());
+            log.event_format(NodeLines { name, format }).init();
+        }
+    }
+}
+
+/// Name of the logger of the node that a command is, with dots as `rcl` has them; none of other commands.
+fn logger(command: &Command, ros: &RosArguments) -> Option<String> {
+    let (name, namespace) = match command {
+        Command::Node(node) if node.transport == Transport::Ros2 => {
+            (node::NAME, node.member.as_ref().map_or("/".into(), |member| format!("/{member}")))
+        }
+        Command::Robots(robots) if robots.transport == Transport::Ros2 => ("robots", "/".into()),
+        _ => return None,
+    };
+    let names = ros.names(name, &namespace).ok()?;
+    Some(names.fully_qualified().trim_start_matches('/').replace('/', "."))
+}
+
+/// A field of a log line, on its line whatever is in it: much of it comes from files and from the network.
+fn field(line: &mut Writer<'_>, field: &Field, value: &dyn Debug) -> fmt::Result {
+    if field.name() != "message" {
+        write!(line, " {field}=")?;
+    }
+    write!(line, "{}", escaped(&format!("{value:?}"), MOST_CHARACTERS))
+}
+
+/// The lines of a ROS 2 node.
+struct NodeLines {
+    /// Name of the logger.
+    name: String,
+    /// With the placeholders of `RCUTILS_CONSOLE_OUTPUT_FORMAT`.
+    format: String,
+}
+
+impl<S, N> FormatEvent<S, N> for NodeLines
+where
+    S: Subscriber + for<'a> LookupSpan<'a>,
+    N: for<'a> FormatFields<'a> + 'static,
+{
+    fn format_event(
+        &self,
+        context: &FmtContext<'_, S, N>,
+        mut writer: Writer<'_>,
+        event: &Event<'_>,
+    ) -> fmt::Result {
+        let mut message = String::new();
+        context.format_fields(Writer::new(&mut message), event)?;
+        let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+        let line =
+            filled(&self.format, &|placeholder| self.value(placeholder, event.metadata(), since, &message));
+        writeln!(writer, "{line}")
+    }
+}
+
+impl NodeLines {
+    fn value(
+        &self,
+        placeholder: &str,
+        of: &Metadata<'_>,
+        since: std::time::Duration,
+        message: &str,
+    ) -> Option<String> {
+        Some(match placeholder {
+            "severity" => severity(*of.level()).to_owned(),
+            "name" => self.name.clone(),
+            "message" => message.to_owned(),
+            "time" => format!("{}.{:09}", since.as_secs(), since.subsec_nanos()),
+            "time_as_nanoseconds" => since.as_nanos().to_string(),
+            "file_name" => of.file().unwrap_or_default().to_owned(),
+            "line_number" => of.line().unwrap_or_default().to_string(),
+            "function_name" => of.module_path().unwrap_or_default().to_owned(),
+            _ => return None,
+        })
+    }
+}
+
+fn severity(level: Level) -> &'static str {
+    match level {
+        Level::ERROR => "ERROR",
+        Level::WARN => "WARN",
+        Level::INFO => "INFO",
+        Level::DEBUG | Level::TRACE => "DEBUG",
+    }
+}
+
+/// A format with its placeholders filled in; those that are none stay as they are written.
+fn filled(format: &str, value: &dyn Fn(&str) -> Option<String>) -> String {
+    let mut line = String::new();
+    let mut rest = format;
+    while let Some((before, after)) = rest.split_once('{') {
+        line += before;
+        match after.split_once('}').and_then(|(name, after)| Some((value(name)?, after))) {
+            Some((value, after)) => {
+                line += &value;
+                rest = after;
+            }
+            None => {
+                line.push('{');
+                rest = after;
+            }
+        }
+    }
+    line + rest
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn placeholders_are_filled_in_and_others_stay() {
+        let value = |name: &str| (name == "name").then(|| "a.b{severity}".to_owned());
+        assert_eq!(filled("[{name}] {other} {", &value), "[a.b{severity}] {other} {");
+        assert_eq!(filled("{{name}}", &value), "{a.b{severity}}");
+        assert_eq!(filled("no placeholder", &value), "no placeholder");
+    }
+}
