@@ -28,7 +28,7 @@ use crate::scene::{Scene, SceneError};
 /// ```
 ///
 /// Everything is checked when it is laid out, in the words of the program: an error names the key of the
-/// [scene format](crate::guide::scenes) and the remedy. What has no method of its own is a key of that format: [`Builder::set`].
+/// scene format (guide `scenes`) and the remedy. What has no method of its own is a key of that format: [`Builder::set`].
 #[derive(Clone, Debug)]
 pub struct Builder {
     /// Keys of the scene format with their values in TOML.

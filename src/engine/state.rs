@@ -1,8 +1,7 @@
 //! An engine on its way, taken out and put back to the bit.
 //!
 //! The contents of a plan (the body, its neighbours, weights, loads, the leaders' motions) are no part of the
-//! state: they are planned again, and [`digest`](crate::continuum::digest::digest) shows
-//! whether they came out the same.
+//! state: they are planned again, and the digest of the plan shows whether they came out the same.
 
 use serde::{Deserialize, Serialize};
 
@@ -96,7 +95,7 @@ impl EngineState {
     ///
     /// # Errors
     /// A state of another body. A plan with as many of everything is taken for the right one: hold its
-    /// [`digest`](crate::continuum::digest::digest) against that of the plan that was run.
+    /// its digest against that of the plan that was run.
     pub fn engine(self, setup: Setup) -> Result<Engine, WrongState> {
         let mut engine = Engine::new(setup);
         self.require_fits(&engine)?;

@@ -1,4 +1,4 @@
-//! Real peers: Cyclone DDS from PyPI, as other processes on loopback.
+//! Real peers: Cyclone DDS from PyPI and Fast DDS from Debian, as other processes on loopback.
 //!
 //! They need Python 3.10 or newer with that package, and nothing of ROS 2:
 //!
@@ -6,6 +6,8 @@
 //! python3 -m venv venv && venv/bin/pip install cyclonedds
 //! FLOCKFORM_PYTHON=venv/bin/python cargo test --test interop -- --ignored --test-threads=1
 //! ```
+//!
+//! `ghosts.rs` needs g++ and Debian's `libfastrtps-dev`.
 //!
 //! `edge.rs` puts the edge alone against `peer.py`; the others put `flockform node`, as it is installed, between
 //! robots (`robots.py`) and somebody who watches it and calls its services (`watch.py`). Cyclone DDS speaks here
@@ -15,6 +17,7 @@
 mod edge;
 mod faults;
 mod flight;
+mod ghosts;
 mod load;
 mod own_network;
 #[path = "../common/running.rs"]

@@ -16,6 +16,7 @@
 
 pub mod clock;
 mod door;
+mod farewell;
 mod graph;
 pub mod lifecycle;
 pub mod loopback;

@@ -13,11 +13,11 @@ use ros2_client::dds::rustdds::{
     QosPolicyBuilder, RTPSEntity, Subscriber as DdsSubscriber, Topic, TopicKind,
 };
 
-use super::graph::{Graph, Watcher};
+use super::graph::{Graph, Watcher, prefix};
 use super::outbox::{Outbox, Outlet};
 use super::pulse::{self, Pulse};
 use super::wire::{Payload, Verbatim};
-use super::{EdgeError, Message, Publisher, Quality, Service, ServiceType, Subscription, names};
+use super::{EdgeError, Message, Publisher, Quality, Service, ServiceType, Subscription, farewell, names};
 
 /// Where to take part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -56,6 +56,7 @@ pub(super) struct Shared {
     subscriber: DdsSubscriber,
     participant: Option<DomainParticipant>,
     guid: GUID,
+    options: Options,
     pub graph: Arc<Graph>,
 }
 
@@ -87,7 +88,7 @@ impl Edge {
                 tracing::warn!("packets are not filtered before the middleware reads them: {error}")
             }
         }
-        let shared = Shared::join(participant).map_err(|error| refused(error.to_string()))?;
+        let shared = Shared::join(participant, options).map_err(|error| refused(error.to_string()))?;
         Ok(Self { shared: Arc::new(shared) })
     }
 
@@ -118,7 +119,7 @@ impl Edge {
 }
 
 impl Shared {
-    fn join(participant: DomainParticipant) -> Result<Self, Box<dyn std::error::Error>> {
+    fn join(participant: DomainParticipant, options: Options) -> Result<Self, Box<dyn std::error::Error>> {
         let plain = QosPolicyBuilder::new().build();
         let publisher = participant.create_publisher(&plain)?;
         let subscriber = participant.create_subscriber(&plain)?;
@@ -142,6 +143,7 @@ impl Shared {
             subscriber,
             participant: Some(participant),
             guid,
+            options,
             graph,
         })
     }
@@ -149,6 +151,11 @@ impl Shared {
     /// GUID of the participant.
     pub fn guid(&self) -> GUID {
         self.guid
+    }
+
+    /// Says that the participant has left; it may announce itself no more.
+    pub fn say_farewell(&self) {
+        farewell::say(prefix(self.guid), self.options.domain, self.options.loopback_only);
     }
 
     fn topic(&self, name: &str, kind: &str, policies: &QosPolicies) -> Result<Topic, EdgeError> {
@@ -203,6 +210,8 @@ impl Drop for Shared {
         if left.is_err() || finished.recv_timeout(LEAVING).is_err() {
             tracing::warn!("the DDS participant did not leave within {} s", LEAVING.as_secs());
         }
+        // It announces itself no more.
+        self.say_farewell();
     }
 }
 
