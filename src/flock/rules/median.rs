@@ -1,6 +1,9 @@
 //! The median of each coordinate. Not in the paper: a mean that a few outliers among the neighbours do not move, such as a robot
 //! whose poses are wrong or a particle that was torn away.
 //!
+//! A leader that moves away alone is an outlier too: a body on a lattice, whose particles have one neighbour in the direction of a pull, is
+//! not led by this rule. It is for many neighbours, as in swarms.
+//!
 //! With weights it is the value with half of the weight on either side; where a whole interval has that, its middle.
 
 use super::Neighbour;

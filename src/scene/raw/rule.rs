@@ -97,7 +97,8 @@ pub enum RawMean {
         #[serde(default)]
         origin: RawOrigin,
     },
-    /// The median of each coordinate: outliers among the neighbours do not move it (ours).
+    /// The median of each coordinate: outliers among the neighbours do not move it, and one leader among followers is an
+    /// outlier too (ours).
     Median,
     /// The mean of the places at a distance from each neighbour: cohesion with separation (ours).
     Spaced {
