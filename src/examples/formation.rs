@@ -16,7 +16,8 @@ fn main() -> Result<(), SceneError> {
     let members = control.formation().count();
     // Robots that do what they are told, at once.
     let mut places: Vec<[f64; 2]> = (0..members).map(|member| control.wanted(member)).collect();
-    for period in 0..200 {
+    // The corners are led by the manoeuvre of the swarm file: three legs, each followed by a hold.
+    for period in 0..900 {
         let now = f64::from(period) * control.period();
         for (member, &position) in places.iter().enumerate() {
             let pose = Pose { position, yaw: 0.0, stamp: now, frame_is_right: true };
@@ -28,8 +29,12 @@ fn main() -> Result<(), SceneError> {
         for (member, place) in places.iter_mut().enumerate() {
             *place = control.target(member).unwrap_or(*place);
         }
+        if period % 100 == 99 {
+            let error = control.formation_error().unwrap_or_default();
+            println!(
+                "{now:5.2} s: the last of {members} robots has {error:.3} m to go to its place in the formation"
+            );
+        }
     }
-    let error = control.formation_error().unwrap_or_default();
-    println!("{members} robots after 200 periods: {error:.3} m from the places of the formation");
     Ok(())
 }
