@@ -127,7 +127,7 @@ fn the_measured_factor_is_the_spectral_radius() {
 #[test]
 fn a_nonlinear_rule_has_no_threshold_but_its_extremes() {
     for (change, reason) in [
-        ("rule.mean={kind=\"distance\"}", "present distance"),
+        ("rule.mean={kind=\"distance\"}", "weighted by distance"),
         ("rule.mean={kind=\"geometric\"}", "geometric mean"),
         ("rule.mean={kind=\"spaced\",spacing=1.0}", "separation"),
         ("fracture={stretch=1.5}", "bonds that break"),
