@@ -23,8 +23,8 @@ const NODE_FORMAT: &str = "[{severity}] [{time}] [{name}]: {message}";
 /// Longer than any line of our own.
 const MOST_CHARACTERS: usize = 2000;
 
-/// Starts the log. `RUST_LOG` wins over `--log-level`, and that over `-v`. A node says what it does (INFO) unless told
-/// otherwise, any other command speaks up from WARN on.
+/// Starts the log. `RUST_LOG` wins over `--log-level`, and that over `-v`. By default a node logs from INFO on,
+/// any other command from WARN on.
 pub fn start(arguments: &Arguments, ros: &RosArguments) {
     let logger = logger(&arguments.command, ros);
     let verbosity = arguments.verbose + u8::from(logger.is_some());

@@ -12,7 +12,7 @@ use crate::scene::{Scene, SceneError};
 
 /// A body, what holds and leads it, and its rule.
 ///
-/// Unless told otherwise the neighbours are the first ones, the rule is the barycentre (Eq. 1) with the rest offset, and a run
+/// By default the neighbours are the first ones, the rule is the barycentre (Eq. 1) with the rest offset, and a run
 /// ends when nothing moves by more than a millionth of the spacing in a step, at the latest after 10,000 steps.
 ///
 /// ```

@@ -14,7 +14,7 @@ fn main() -> Result<(), SceneError> {
     let swarm = bundled_swarm("square").expect("a bundled swarm").load_swarm(&[])?;
     let mut control = Control::new(&swarm)?;
     let members = control.formation().count();
-    // Robots that do what they are told, at once.
+    // Ideal robots: each is at its target one period later.
     let mut places: Vec<[f64; 2]> = (0..members).map(|member| control.wanted(member)).collect();
     // The corners are led by the manoeuvre of the swarm file: three legs, each followed by a hold.
     for period in 0..900 {

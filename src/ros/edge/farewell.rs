@@ -12,7 +12,7 @@ use socket2::SockRef;
 /// Where participants listen for others (RTPS 2.3, section 9.6.1).
 const MULTICAST: Ipv4Addr = Ipv4Addr::new(239, 255, 0, 1);
 
-/// Participants of this computer that are told one by one: RustDDS takes as many ports.
+/// Participants of this computer that get a packet each: RustDDS takes as many ports.
 const PARTICIPANTS: u16 = 120;
 
 /// Says that the participant of this prefix has left. What is not sent is not missed: leases run out.

@@ -13,7 +13,7 @@ use crate::flock::neighbourhood::Neighbours;
 /// The reason for which so many liars are not tolerated. The texts describe the member without naming it.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Unsupported {
-    /// A follower has too few neighbours, whoever they are.
+    /// A follower has too few neighbours.
     #[error(
         "has {neighbours} neighbours, and {needed} are needed to tolerate F = {f} liars (on a lattice 8 each \
          tolerate 1, 24 tolerate 3)"
