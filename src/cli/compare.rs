@@ -49,11 +49,9 @@ pub fn compare(arguments: &CompareArguments) -> Result<ExitCode, Refusal> {
 
     let report = ComparisonReport::new(&scene, &compared);
     write_comparison(&folder, &scene, &compared, &report)?;
-    if !arguments.study.report.no_report {
-        report::comparison::write(&folder, &scene, &compared, &report)?;
-    }
     arguments.study.finish(
         folder,
+        |folder| report::comparison::write(folder, &scene, &compared, &report),
         || format!("{:#}\n", serde_json::json!(report)),
         || chosen + &words(&scene, &compared),
     )?;

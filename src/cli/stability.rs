@@ -40,9 +40,11 @@ pub fn stability(arguments: &StabilityArguments) -> Result<ExitCode, Refusal> {
     stages.finish();
     let study = study?;
     write_stability(&folder, &study)?;
-    if !arguments.study.report.no_report {
-        report::stability::write(&folder, &study)?;
-    }
-    arguments.study.finish(folder, || json(&study).unwrap_or_default(), || study.to_string())?;
+    arguments.study.finish(
+        folder,
+        |folder| report::stability::write(folder, &study),
+        || json(&study).unwrap_or_default(),
+        || study.to_string(),
+    )?;
     Ok(if study.holds() { ExitCode::SUCCESS } else { ExitCode::from(FAILED) })
 }

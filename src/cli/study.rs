@@ -1,7 +1,9 @@
 //! What the studies of a scene have in common: their arguments, and how they end.
 
 use clap::Args;
-use flockform::export::OutputFolder;
+use std::path::PathBuf;
+
+use flockform::export::{ExportError, OutputFolder};
 
 use super::output::{OutputArguments, ReportArguments};
 use super::{Refusal, SceneArguments, interrupt, print, say};
@@ -20,13 +22,17 @@ pub struct StudyArguments {
 }
 
 impl StudyArguments {
-    /// Gives the folder its name, and prints JSON or a table.
+    /// Writes the report, gives the folder its name, and prints JSON or a table.
     pub fn finish(
         &self,
         folder: OutputFolder,
+        report: impl FnOnce(&OutputFolder) -> Result<PathBuf, ExportError>,
         json: impl FnOnce() -> String,
         table: impl FnOnce() -> String,
     ) -> Result<(), Refusal> {
+        if !self.report.no_report {
+            report(&folder)?;
+        }
         let kept = interrupt::commit(folder)?;
         if self.json {
             print(&json());

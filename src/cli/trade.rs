@@ -43,9 +43,11 @@ pub fn trade(arguments: &TradeArguments) -> Result<ExitCode, Refusal> {
     stages.finish();
     let study = study?;
     write_trade(&folder, &study)?;
-    if !arguments.study.report.no_report {
-        report::trade::write(&folder, &study)?;
-    }
-    arguments.study.finish(folder, || format!("{:#}\n", serde_json::json!(study)), || study.to_string())?;
+    arguments.study.finish(
+        folder,
+        |folder| report::trade::write(folder, &study),
+        || format!("{:#}\n", serde_json::json!(study)),
+        || study.to_string(),
+    )?;
     Ok(ExitCode::SUCCESS)
 }

@@ -9,6 +9,8 @@ use std::net::{Ipv4Addr, UdpSocket};
 
 use socket2::SockRef;
 
+use super::packet::{Content, data, discovery_port};
+
 /// Where participants listen for others (RTPS 2.3, section 9.6.1).
 const MULTICAST: Ipv4Addr = Ipv4Addr::new(239, 255, 0, 1);
 
@@ -18,11 +20,11 @@ const PARTICIPANTS: u16 = 120;
 /// Says that the participant of this prefix has left. What is not sent is not missed: leases run out.
 pub fn say(prefix: [u8; 12], domain: u16, loopback_only: bool) {
     let packet = packet(prefix);
-    let Some(port) = 250_u16.checked_mul(domain).and_then(|first| first.checked_add(7400)) else { return };
+    let Some(common) = discovery_port(domain, None) else { return };
     let send = || -> io::Result<()> {
         let socket = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0))?;
         for participant in 0..PARTICIPANTS {
-            if let Some(port) = port.checked_add(10 + 2 * participant) {
+            if let Some(port) = discovery_port(domain, Some(participant)) {
                 let _ = socket.send_to(&packet, (Ipv4Addr::LOCALHOST, port));
             }
         }
@@ -32,7 +34,7 @@ pub fn say(prefix: [u8; 12], domain: u16, loopback_only: bool) {
                 continue;
             }
             SockRef::from(&socket).set_multicast_if_v4(&device)?;
-            let _ = socket.send_to(&packet, (MULTICAST, port));
+            let _ = socket.send_to(&packet, (MULTICAST, common));
         }
         Ok(())
     };
@@ -41,40 +43,19 @@ pub fn say(prefix: [u8; 12], domain: u16, loopback_only: bool) {
     }
 }
 
-/// An RTPS message of one DATA submessage without payload: the participant is disposed and unregistered (RTPS 2.3, sections
-/// 9.4.5.3, 9.6.3.8 and 9.6.3.9).
+/// The participant is disposed and unregistered (RTPS 2.3, sections 9.6.3.8 and 9.6.3.9).
 fn packet(prefix: [u8; 12]) -> Vec<u8> {
     const PARTICIPANT: [u8; 4] = [0, 0, 1, 0xc1];
     const ANNOUNCER: [u8; 4] = [0, 1, 0, 0xc2];
     const ANNOUNCEMENTS: [u8; 4] = [0, 1, 0, 0xc7];
-    let mut packet = Vec::from(*b"RTPS\x02\x03\x01\x12");
-    packet.extend(prefix);
-    // DATA, little endian, with inline QoS 16 bytes on; its length.
-    packet.extend([0x15, 0x03, 52, 0, 0, 0, 16, 0]);
-    packet.extend(ANNOUNCEMENTS);
-    packet.extend(ANNOUNCER);
-    // Later than any announcement.
-    packet.extend(0_i32.to_le_bytes());
-    packet.extend(i32::MAX.to_le_bytes());
     // PID_KEY_HASH: of a participant its GUID.
-    packet.extend([0x70, 0, 16, 0]);
-    packet.extend(prefix);
-    packet.extend(PARTICIPANT);
+    let mut parameters = vec![0x70, 0, 16, 0];
+    parameters.extend(prefix);
+    parameters.extend(PARTICIPANT);
     // PID_STATUS_INFO, and the end of the list.
-    packet.extend([0x71, 0, 4, 0, 0, 0, 0, 3]);
-    packet.extend([1, 0, 0, 0]);
-    packet
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_length_of_the_submessage_is_that_of_what_follows_it() {
-        let packet = packet([7; 12]);
-        let length = u16::from_le_bytes([packet[22], packet[23]]);
-        assert_eq!(usize::from(length), packet.len() - 24);
-        assert_eq!(packet.len() % 4, 0);
-    }
+    parameters.extend([0x71, 0, 4, 0, 0, 0, 0, 3]);
+    parameters.extend([1, 0, 0, 0]);
+    // Later than any announcement.
+    let number = i32::MAX as u32;
+    data(prefix, [ANNOUNCER, ANNOUNCEMENTS], number, &Content::InlineQos(&parameters))
 }

@@ -30,6 +30,12 @@ pub(super) fn prefix(guid: GUID) -> [u8; 12] {
     std::array::from_fn(|i| bytes[i])
 }
 
+/// Which end of its participant this is.
+pub(super) fn entity(guid: GUID) -> [u8; 4] {
+    let bytes = guid.to_bytes();
+    std::array::from_fn(|i| bytes[12 + i])
+}
+
 #[derive(Default)]
 pub(super) struct Graph {
     state: Mutex<State>,

@@ -23,6 +23,7 @@ pub mod loopback;
 pub mod message;
 pub mod names;
 mod outbox;
+mod packet;
 pub mod parameters;
 pub mod participant;
 pub mod pulse;

@@ -12,8 +12,10 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use ros2_client::dds::rustdds::{DomainParticipant, GUID, RTPSEntity};
+use ros2_client::dds::rustdds::{DomainParticipant, RTPSEntity};
 
+use super::graph::{entity, prefix};
+use super::packet::{Content, data, discovery_port};
 use super::participant::{Reader, Shared, Writer};
 use super::topic::{Taken, next};
 use super::{EdgeError, Quality};
@@ -91,39 +93,36 @@ impl Pulse {
 struct Loop {
     socket: UdpSocket,
     to: SocketAddr,
-    packet: Vec<u8>,
     reader: Reader,
     // Never written through: its name stands in the packets.
-    _writer: Writer,
+    writer: Writer,
 }
-
-/// Where in a packet the sequence number's low word stands, and the value, which is the same.
-const NUMBERS: [usize; 2] = [40, 48];
 
 impl Loop {
     fn open(shared: &Shared, participant: &DomainParticipant) -> Result<Self, EdgeError> {
-        let prefix = super::graph::prefix(participant.guid());
-        let name = prefix.iter().fold("flockform_loop".to_owned(), |name, byte| format!("{name}_{byte:02x}"));
+        let name = prefix(participant.guid())
+            .iter()
+            .fold("flockform_loop".to_owned(), |name, byte| format!("{name}_{byte:02x}"));
         // In this order: RustDDS announces the process's own writers to a new reader, and not the other way round.
         let writer = shared.writer(&name, "flockform::Loop_", Quality::BEST_EFFORT)?;
         let reader = shared.reader(&name, "flockform::Loop_", Quality::BEST_EFFORT)?;
         let refused =
             |error: std::io::Error| EdgeError::Endpoint { topic: name.clone(), reason: error.to_string() };
         let socket = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0)).map_err(refused)?;
-        // RTPS 2.3, section 9.6.1: the port of a participant's discovery.
-        let port =
-            7410 + 250 * u32::from(participant.domain_id()) + 2 * u32::from(participant.participant_id());
-        let port = u16::try_from(port).map_err(|error| refused(std::io::Error::other(error)))?;
-        let packet = packet(reader.guid(), writer.guid());
-        Ok(Self { socket, to: (Ipv4Addr::LOCALHOST, port).into(), packet, reader, _writer: writer })
+        let participant_id = participant.participant_id();
+        let port = discovery_port(participant.domain_id(), Some(participant_id));
+        let port = port.ok_or_else(|| refused(std::io::Error::other("no port is left for this domain")))?;
+        Ok(Self { socket, to: (Ipv4Addr::LOCALHOST, port).into(), reader, writer })
     }
 
     fn send(&mut self, number: u32) {
-        for at in NUMBERS {
-            self.packet[at..at + 4].copy_from_slice(&number.to_le_bytes());
-        }
+        let (reader, writer) = (self.reader.guid(), self.writer.guid());
+        let mut payload = [0, 1, 0, 0, 0, 0, 0, 0];
+        payload[4..].copy_from_slice(&number.to_le_bytes());
+        let ends = [entity(writer), entity(reader)];
+        let packet = data(prefix(writer), ends, number, &Content::Payload(&payload));
         // One that is not sent does not come back.
-        let _ = self.socket.send_to(&self.packet, self.to);
+        let _ = self.socket.send_to(&packet, self.to);
     }
 
     /// The newest that came back.
@@ -141,20 +140,6 @@ impl Loop {
         }
         newest
     }
-}
-
-/// An RTPS message of one DATA submessage (RTPS 2.3, sections 9.4.4 and 9.4.5.3), little endian, numbers still 0.
-fn packet(reader: GUID, writer: GUID) -> Vec<u8> {
-    let (reader, writer) = (reader.to_bytes(), writer.to_bytes());
-    let mut packet = Vec::from(*b"RTPS\x02\x03\x01\x12");
-    packet.extend(&writer[..12]);
-    // DATA with a payload, length, no flags, inline QoS would begin 16 bytes on.
-    packet.extend([0x15, 0x05, 28, 0, 0, 0, 16, 0]);
-    packet.extend(&reader[12..]);
-    packet.extend(&writer[12..]);
-    packet.extend([0; 8]);
-    packet.extend([0, 1, 0, 0, 0, 0, 0, 0]);
-    packet
 }
 
 /// Starts the thread that watches; it ends the process with [`MIDDLEWARE_GONE`].
