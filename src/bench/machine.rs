@@ -20,6 +20,13 @@ const COUNTED_BYTES: f64 = 24.0;
 /// Bytes an element that the memory bus carries: write-allocate included.
 const MOVED_BYTES: f64 = 32.0;
 
+/// The processor's name, where the system says.
+pub(super) fn processor() -> Option<String> {
+    let all = std::fs::read_to_string("/proc/cpuinfo").ok()?;
+    let line = all.lines().find(|line| line.starts_with("model name"))?;
+    Some(line.split_once(':')?.1.trim().to_owned())
+}
+
 /// Memory bandwidth of the triad on some number of threads.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Bandwidth {

@@ -92,6 +92,7 @@ fn run_here(arguments: &RunArguments) -> Result<ExitCode, Refusal> {
     };
     let setup = start.elapsed();
     tracing::info!("planned {} particles of `{}` in {setup:.1?}", plan.count(), scene.name);
+    tracing::info!("{}", flockform::sweep::chosen_here());
 
     let mut recorder = Recorder::new(&scene, &plan, &folder, left.as_ref())?;
     recorder.reports = !arguments.report.no_report;

@@ -15,6 +15,17 @@ pub const MEMORY: bool = false;
 /// For [`in_lanes`]: two of the widest vectors at a time, for loops that multiply. Measured: up to twice as fast.
 pub const ARITHMETIC: bool = true;
 
+/// The vectors that [`in_lanes`] takes on this processor, in words.
+pub fn vectors() -> &'static str {
+    #[cfg(target_arch = "x86_64")]
+    if is_x86_feature_detected!("avx512f") {
+        return "AVX2, and AVX-512 for loops that multiply";
+    } else if is_x86_feature_detected!("avx2") {
+        return "AVX2";
+    }
+    "of 16 bytes"
+}
+
 /// Runs a loop over numbers of so many bytes.
 pub fn in_lanes<const BYTES: usize, const LOAD: bool>(work: impl InLanes) {
     #[cfg(target_arch = "x86_64")]

@@ -7,13 +7,16 @@
 use std::ops::Range;
 
 use super::kernel::Component;
-use super::rows::{Coefficients, IN_CACHE};
+use super::rows::Coefficients;
 use super::terms::Terms;
 use crate::flock::real::Real;
 
 /// Prefetch distances in particles and in lists, for bodies larger than the caches: the processor cannot predict the
 /// addresses that the lists name. Measured on a million particles: 1.4 times as fast.
 const AHEAD: [usize; 2] = [64, 256];
+
+/// Particles beyond which a body is read so.
+const PREFETCHED_BEYOND: usize = 1 << 18;
 
 /// The lists of all bands, one group after the other.
 #[derive(Clone, Debug, Default)]
@@ -136,7 +139,7 @@ impl<T: Real> Alike<'_, T> {
         components: &mut [Component<'_, T>; P],
         rest: impl Fn(usize) -> [T; P],
     ) {
-        let is_large = components.iter().any(|component| component.present.len() > IN_CACHE);
+        let is_large = components.iter().any(|component| component.present.len() > PREFETCHED_BEYOND);
         // Where particle number 0 would stand: what a component says would be read again after every store.
         let present = components.each_ref().map(|c| c.present.as_ptr().wrapping_sub(c.seen_from));
         let next = components.each_mut().map(|c| c.next.as_mut_ptr().wrapping_sub(c.begin));

@@ -9,9 +9,10 @@
 //!
 //! * `rows`: a rule compiled for a body, as runs and gathers with coefficients.
 //! * `kernel`, `gathers`: the loops over rows; `terms`: what is made of a mean while it is in the registers.
-//! * `schedule`: which bands take which step when, on which thread.
+//! * `schedule`: which bands take which step when, on which thread; `caches`: how large a band is on this computer.
 //! * `torn`: particles that have lost bonds.
 
+pub(crate) mod caches;
 mod gathers;
 pub(crate) mod kernel;
 pub(crate) mod rows;
@@ -29,9 +30,11 @@ pub use schedule::{Activity, Led, MOST_STEPS};
 use schedule::{LaggedFrame, Steps};
 
 use crate::flock::frame::Frame;
+use crate::flock::lanes::vectors;
 use crate::flock::law::{Flock, Weights};
 use crate::flock::role::Role;
 use crate::flock::vectors::Vectors;
+use caches::Caches;
 use kernel::Component;
 use rows::Rows;
 use terms::Compiled;
@@ -69,6 +72,11 @@ const ASIDE_IN_PARALLEL: usize = 1 << 11;
 
 /// Particles of a column that are swept before it is the next one's turn.
 const TILE: usize = 64;
+
+/// What sweeps were chosen to be on this computer, in words: vectors, and how bodies are cut.
+pub fn chosen_here() -> String {
+    format!("vectors: {}; {}", vectors(), Caches::here())
+}
 
 /// The followers of a body, made ready to be swept.
 #[derive(Clone, Debug)]

@@ -16,6 +16,7 @@ mod tests;
 
 use std::ops::Range;
 
+use super::caches::Caches;
 use super::gathers::Gathers;
 use super::kernel::{self, Component, MOST_KEPT, Tables};
 use super::terms::Terms;
@@ -40,10 +41,6 @@ const MOST_LOOKED_THROUGH: usize = 4096;
 /// Most particles in a band, and how far particles may see for bands to be made: beyond that they are of
 /// this size and bound nothing.
 const LARGEST_BAND: usize = 1 << 17;
-
-/// Most particles of a body that counts as within the caches: 8 MiB in four arrays. Its columns are swept one
-/// after the other, and gaps between them swept over; and it is swept step by step, which streams best.
-pub(super) const IN_CACHE: usize = 1 << 18;
 
 /// Longest gap between two runs that is swept over rather than stopped at, and most particles in the gaps of
 /// one run.
@@ -83,6 +80,8 @@ pub struct Rows {
     kept: Vec<u32>,
     /// Whether no particle sees beyond the next band.
     is_local: bool,
+    is_in_cache: bool,
+    band_size: usize,
     followers: usize,
     /// How many times as far from the reference a mean takes a particle as any was that it sees, at most \[1\].
     gain: f64,
@@ -167,8 +166,11 @@ impl Rows {
         let reach = reach(neighbours, follows);
         self.is_local = reach <= LARGEST_BAND / 3;
         let smallest = (follows.len() / FEW_BANDS).clamp(SMALLEST_BAND[0], SMALLEST_BAND[1]);
-        // Three columns of a lattice, which are swept abreast; cut where a run ends anyway.
-        let size = if self.is_local { (reach * 5 / 2).max(smallest) } else { LARGEST_BAND };
+        let caches = Caches::here();
+        self.is_in_cache = follows.len() <= caches.whole_body;
+        self.band_size = if self.is_local { band_size(reach, caches).max(smallest) } else { LARGEST_BAND };
+        let size = self.band_size;
+        let is_in_cache = self.is_in_cache;
         let is_alike = |j: usize, k: usize| {
             follows[k]
                 && is_translate(neighbours, j, k)
@@ -191,9 +193,8 @@ impl Rows {
             let weighs = follows[j] && weighs(neighbours, j, source);
             if weighs && len >= SHORTEST_RUN {
                 let rests = rest.is_some_and(|rest| (j..j + len).any(|j| rest.get(j) != [0.0; 2]));
-                let bridge = follows.len() <= IN_CACHE;
                 let coefficients = self.coefficients_of(neighbours, j, source);
-                self.push_run(neighbours, (j, len, rests), coefficients, bridge.then_some(&listed));
+                self.push_run(neighbours, (j, len, rests), coefficients, is_in_cache.then_some(&listed));
             } else if follows[j] {
                 listed.extend(j as u32..(j + len) as u32);
             }
@@ -302,7 +303,17 @@ impl Rows {
 
     /// Whether the caches hold the whole body.
     pub fn is_in_cache(&self) -> bool {
-        self.bands.last().is_none_or(|end| end.particle as usize <= IN_CACHE)
+        self.is_in_cache
+    }
+
+    /// Fewest particles in a band, but for the last.
+    pub fn band_size(&self) -> usize {
+        self.band_size
+    }
+
+    /// Whether the second cache holds the bands that take several steps together.
+    pub fn front_stays(&self) -> bool {
+        self.is_in_cache || Caches::here().band.is_some_and(|most| self.band_size <= most)
     }
 
     /// The particles of some bands.
@@ -369,6 +380,17 @@ impl Rows {
             self.distances.len() - size
         });
         (at as u32, size as u32)
+    }
+}
+
+/// Particles of a band of a body whose particles see so far: three columns of a lattice, which are swept abreast, or
+/// fewer if more do not stay in the second cache; cut where a run ends anyway.
+fn band_size(reach: usize, caches: Caches) -> usize {
+    let three = reach * 5 / 2;
+    match caches.band {
+        Some(most) if reach <= most => three.min((most * 2 / 3 / reach.max(1)).max(1) * reach),
+        // In a front that no cache holds, columns abreast serve each other.
+        _ => three,
     }
 }
 

@@ -29,12 +29,13 @@ use super::terms::Terms;
 use crate::flock::frame::Frame;
 use crate::flock::real::Real;
 
-/// Most steps taken together: more gain nothing, their front no longer fits the second cache. Measured on
-/// 4096 squared: 4 steps are 1.75 times, 8 steps 2.1, 16 steps 2.2 and 32 steps 2.2 times as fast as one at a time.
+/// Most steps taken together: more gain nothing. Measured on 4096 squared: 4 steps are 1.75 times, 8 steps 2.1, 16 steps 2.2
+/// and 32 steps 2.2 times as fast as one at a time on an EPYC, 1.6, 1.9, 2.3 and 1.8 times on a Xeon.
 pub const MOST_STEPS: usize = 16;
 
-/// Particles of a column swept before it is the next one's turn, if several steps are taken together, or one.
-const TILES: [usize; 2] = [512, 64];
+/// Particles of a column swept before it is the next one's turn: if several steps are taken together, while the second
+/// cache holds their bands or not, or one.
+const TILES: [usize; 3] = [1 << 40, 512, 64];
 
 /// Bands swept in one go where each step is taken by itself: enough for what is asked of each band not to count.
 const MOST_BANDS: usize = 8;
@@ -65,6 +66,8 @@ pub struct LaggedFrame<'a, T> {
 pub struct Activity {
     /// For each coordinate and band; empty where nothing is known.
     changed: [Vec<bool>; 2],
+    /// The size of those bands \[particles\]: another computer may cut others.
+    band_size: usize,
     /// Coordinates computed, and those that sweeps of the whole body would have computed.
     computed: u64,
     due: u64,
@@ -111,6 +114,10 @@ impl<T: Real> Steps<'_, T> {
     /// `even`, which holds the present positions; the other holds those one step before. Returns for each step whether
     /// any particle moved farther in it than `farther` along an axis.
     pub fn take(&self, activity: &mut Activity, even: [&mut [T]; 2], odd: [&mut [T]; 2]) -> Vec<bool> {
+        if activity.band_size != self.rows.band_size() {
+            activity.forget();
+            activity.band_size = self.rows.band_size();
+        }
         let ([changed_x, changed_y], [even_x, even_y], [odd_x, odd_y]) = (&mut activity.changed, even, odd);
         let threads = if even_x.len() < PARALLEL_FROM { 1 } else { self.threads };
         let seen = if self.rows.share_in_runs() < 0.5 || self.rows.couples(&self.terms) {
@@ -341,7 +348,7 @@ impl<T: Real, const P: usize> Wavefront<'_, T, P> {
         let Self { steps, axes, stretch, rows } = self;
         let (compiled, levels) = (steps.rows, steps.count + 1);
         let origin = compiled.particles(stretch.clone()).start;
-        let tile = TILES[usize::from(steps.count == 1)];
+        let tile = TILES[if steps.count == 1 { 2 } else { usize::from(!compiled.front_stays()) }];
         let (present, next, flags) = rows.at(level);
         let mut axis = axes.iter().zip(present);
         let mut components = next.each_mut().map(|next| {

@@ -14,7 +14,8 @@ mod table;
 use rayon::{ThreadPoolBuildError, ThreadPoolBuilder};
 use serde::Serialize;
 
-use super::machine::{Bandwidth, median, time_triad};
+use super::machine::{Bandwidth, median, processor, time_triad};
+use crate::sweep::chosen_here;
 use bodies::Subject;
 pub use capabilities::{Capability, measure as measure_capabilities};
 
@@ -60,6 +61,10 @@ const QUICK: Effort =
 pub struct Report {
     /// Whether this was the quick run, whose times mean little.
     pub quick: bool,
+    /// The processor's name, where the system says.
+    pub processor: Option<String>,
+    /// The vectors and bands that were chosen for it.
+    pub chosen: String,
     /// One entry for each number of threads: the median over the whole run.
     pub triad: Vec<Bandwidth>,
     /// Every body with every way to sweep it, on every number of threads.
@@ -102,8 +107,14 @@ pub struct Case {
 /// If the system refuses to start the threads.
 pub fn run(options: &Options) -> Result<Report, ThreadPoolBuildError> {
     let effort = if options.quick { &QUICK } else { &FULL };
-    let mut report =
-        Report { quick: options.quick, triad: Vec::new(), cases: Vec::new(), capabilities: Vec::new() };
+    let mut report = Report {
+        quick: options.quick,
+        processor: processor(),
+        chosen: chosen_here(),
+        triad: Vec::new(),
+        cases: Vec::new(),
+        capabilities: Vec::new(),
+    };
     let mut triad = Triad::new(effort.triad);
     let pools: Vec<_> = THREADS
         .iter()

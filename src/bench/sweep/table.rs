@@ -9,6 +9,7 @@ const GIGA: f64 = 1e-9;
 
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "{}; {}", self.processor.as_deref().unwrap_or("a processor without name"), self.chosen)?;
         for triad in &self.triad {
             let Bandwidth { threads, counted_bytes_per_second, moved_bytes_per_second } = triad;
             let (counted, moved) = (GIGA * counted_bytes_per_second, GIGA * moved_bytes_per_second);
