@@ -37,6 +37,7 @@ use crate::scene::swarm::Swarm;
 use crate::swarm::control::Control;
 use crate::swarm::control::scope::{NodeScope, NodeScopeError};
 use crate::swarm::pace::{Pace, system_time};
+use crate::swarm::transport::complaints::Complaints;
 use crate::swarm::transport::{ControllerEnd, listen, target_of, targets};
 use diagnostics::Statistics;
 use drive::Drive;
@@ -96,6 +97,7 @@ pub struct FormationNode {
     markers: Option<Publisher<MarkerArray>>,
     diagnostics: Publisher<DiagnosticArray>,
     statistics: Statistics,
+    complaints: Complaints,
     frame_id: String,
     swarm: Swarm,
     names: Names,
@@ -161,6 +163,7 @@ impl FormationNode {
                 .transpose()?,
             diagnostics: node.publisher(&names.topic("/diagnostics")?, Quality::reliable(5))?,
             statistics: Statistics::default(),
+            complaints: Complaints::default(),
             frame_id: raw.frame_id.clone(),
             swarm: swarm.clone(),
             was_active: false,
@@ -255,7 +258,7 @@ impl FormationNode {
         self.answer(stamp);
         // Without a clock poses have no age, and none can be accepted.
         let Some(now) = self.clock.now() else { return };
-        listen(&mut self.control, &mut self.link, now);
+        listen(&mut self.control, &mut self.link, &mut self.complaints, now);
         drop(inside);
         self.record_event(now, LoopEvent::TICK, "", &[now]);
         self.control.tick(now);
