@@ -1,13 +1,16 @@
 //! Every way in and out of the formation's node: types of poses, leaders moved by topic, velocities, simulated time.
 
+use std::collections::BTreeSet;
 use std::time::Duration;
 
 use flockform::flock::vectors::distance;
 use flockform::ros::edge::Quality;
 use flockform::ros::edge::services::lifecycle_msgs;
+use flockform::ros::messages::diagnostic_msgs::DiagnosticArray;
 use flockform::ros::messages::geometry_msgs::{Pose, PoseStamped, Twist, TwistStamped};
 use flockform::ros::messages::rosgraph_msgs::Clock;
 use flockform::ros::messages::std_msgs::Header;
+use flockform::ros::messages::tf2_msgs::TFMessage;
 use flockform::ros::messages::{builtin_interfaces, geometry_msgs};
 use flockform::ros::node::FormationNode;
 use flockform::ros::robots::RobotNodes;
@@ -15,7 +18,8 @@ use flockform::swarm::watch::Health;
 use ros2_client::ServiceMapping;
 
 use super::formation::{PATIENT, Swarming, arguments, square};
-use super::support::{call, client, peers, until};
+use super::support::{PATIENCE, call, client, peers, until};
+use crate::waits::within;
 
 /// A flight short enough for a test.
 const SHORT: [&str; 2] =
@@ -33,12 +37,14 @@ fn away(swarm: &Swarming, to: impl Fn([f64; 2]) -> [f64; 2]) -> f64 {
     (0..formation.count()).map(apart).fold(0.0, f64::max)
 }
 
+fn is_flown(swarm: &Swarming) -> bool {
+    let formation = swarm.node.control().formation();
+    let map = formation.affine(formation.programs_end()).expect("a manoeuvre");
+    away(swarm, |place| map.apply(place)) < 0.01
+}
+
 fn until_flown(swarm: &mut Swarming, what: &str) {
-    swarm.fly_until(what, |swarm| {
-        let formation = swarm.node.control().formation();
-        let map = formation.affine(formation.programs_end()).expect("a manoeuvre");
-        away(swarm, |place| map.apply(place)) < 0.01
-    });
+    swarm.fly_until(what, is_flown);
 }
 
 #[test]
@@ -220,5 +226,41 @@ fn a_pose_without_a_stamp_is_as_old_as_its_arrival_by_whatever_clock() {
             node.tick();
             (node.control().health(6) == Health::Fresh).then_some(())
         });
+    }
+}
+
+#[test]
+fn two_fleets_of_one_file_fly_beside_each_other_each_in_its_namespace() {
+    let peers = peers();
+    let hearer = peers.theirs.node("/", "tower").expect("a node");
+    let reports =
+        hearer.subscription::<DiagnosticArray>("/diagnostics", Quality::reliable(50)).expect("hears");
+    let frames = hearer.subscription::<TFMessage>("/tf", Quality::reliable(100)).expect("hears");
+    let open = |namespace: &str, leg: &str| {
+        let legs = format!("manoeuvres[0].legs=[{{ seconds = 0.5, {leg} }}]");
+        let swarm = square(&[&PATIENT[..], &["limits.speed=4.0", &legs]].concat());
+        let arguments = arguments(&["-r", &format!("__ns:={namespace}")]);
+        let robots = RobotNodes::open(&swarm, &arguments).expect("robots");
+        let node = FormationNode::open(&swarm, &arguments, None).expect("a node");
+        Swarming { node, robots }
+    };
+    // Either would be led astray by what the other's node sends.
+    let mut fleets = [open("/left", "translate = [-1.0, 0.5]"), open("/right", "translate = [1.0, -0.5]")];
+    let (mut nodes, mut carried) = (BTreeSet::new(), BTreeSet::new());
+    within(3 * PATIENCE, "both are where they were led", || {
+        fleets.iter_mut().for_each(Swarming::tick);
+        while let Some((report, _)) = reports.take() {
+            nodes.extend(report.status.into_iter().map(|status| status.name));
+        }
+        while let Some((message, _)) = frames.take() {
+            carried.extend(message.transforms.into_iter().map(|frame| frame.child_frame_id));
+        }
+        let all_told = nodes.len() == 2 && carried.len() == 50;
+        (all_told && fleets.iter().all(is_flown)).then_some(())
+    });
+    let both = |leaf: &str| [format!("/left/{leaf}"), format!("/right/{leaf}")];
+    assert_eq!(Vec::from_iter(nodes), both("flockform: formation"));
+    for frame in ["left/robot_7/base_link", "right/robot_7/base_link"] {
+        assert!(carried.contains(frame), "{carried:?}");
     }
 }

@@ -50,12 +50,12 @@ impl Clock {
         Self { simulated: None }
     }
 
-    /// The simulator's time (`use_sim_time`), from `/clock`.
+    /// The simulator's time (`use_sim_time`), from `/clock` or what the node's rules make of it.
     ///
     /// # Errors
     /// As [`Node::subscription`].
     pub fn simulated(node: &Node) -> Result<Self, EdgeError> {
-        let subscription = node.subscription("/clock", Quality::BEST_EFFORT)?;
+        let subscription = node.subscription(&node.topic("/clock")?, Quality::BEST_EFFORT)?;
         Ok(Self { simulated: Some(Simulated { subscription, reading: Reading::default() }) })
     }
 

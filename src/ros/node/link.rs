@@ -44,7 +44,7 @@ impl Link {
         let formation = control.formation();
         let mut leaders = Vec::new();
         for m in formation.moved().filter(|m| part.mine.contains(m)) {
-            leaders.push((m, node.subscription(&topic("/{name}/leader_pose", m)?, Quality::BEST_EFFORT)?));
+            leaders.push((m, node.subscription(&topic(&raw.leader_topic, m)?, Quality::BEST_EFFORT)?));
         }
         let mut targets: Vec<_> = (0..formation.count()).map(|_| None).collect();
         for &m in &part.mine {

@@ -117,10 +117,9 @@ impl FormationNode {
     pub fn open(swarm: &Swarm, arguments: &RosArguments, member: Option<&str>) -> Result<Self, NodeError> {
         let mut control = Control::new(swarm)?;
         let part = NodeScope::take(swarm, &mut control, member)?;
-        let namespace = member.map_or("/".into(), |name| format!("/{name}"));
-        let names = arguments.names(NAME, &namespace)?;
+        let names = names(arguments, member)?;
         let edge = Edge::open(options(arguments))?;
-        let node = edge.node(names.namespace(), names.node_name())?;
+        let node = edge.named_node(&names)?;
 
         let (mut settings, store) = settings::declare(&control, arguments, &names.fully_qualified())?;
         check_commands(swarm, settings.autostart)?;
@@ -129,7 +128,9 @@ impl FormationNode {
         let clock = if settings.use_sim_time { Clock::simulated(&node)? } else { Clock::system() };
         let raw = &swarm.raw.node;
         let topic = |pattern: &str, m: usize| {
-            names.topic(&pattern.replace("{name}", &control.formation().names[m])).map_err(NodeError::from)
+            names
+                .fleet_topic(&pattern.replace("{name}", &control.formation().names[m]))
+                .map_err(NodeError::from)
         };
         let link = Link::open(&node, raw, &control, &part, clock.is_simulated(), &topic)?;
         let mut drives = Vec::new();
@@ -148,7 +149,7 @@ impl FormationNode {
             stop_requests: raw
                 .commands
                 .may_stop()
-                .then(|| names.topic(&raw.emergency_stop_topic).map_err(NodeError::from))
+                .then(|| names.fleet_topic(&raw.emergency_stop_topic).map_err(NodeError::from))
                 .transpose()?
                 .map(|topic| node.subscription(&topic, Quality::reliable(1)))
                 .transpose()?,
@@ -241,9 +242,9 @@ impl FormationNode {
         &self.control
     }
 
-    /// Namespace of the node and its topics.
-    pub fn namespace(&self) -> &str {
-        self.names.namespace()
+    /// Namespace of the fleet and its topics.
+    pub fn fleet(&self) -> &str {
+        self.names.fleet()
     }
 
     /// One period: what arrived, the targets, what is published.
@@ -381,6 +382,12 @@ impl FormationNode {
         }
     }
 
+    fn diagnosis(&mut self, now: f64) -> DiagnosticArray {
+        let (header, refused, troubles) = (self.header(now), self.link.refused(), self.troubles());
+        let names = [self.node.name(), &self.swarm.name];
+        self.statistics.message(&self.control, names, header, refused, &troubles)
+    }
+
     /// Publishes state and markers at `state_rate`, diagnostics at 1 Hz.
     fn report(&mut self, now: f64) {
         if self.statistics.is_due(diagnostics::STATE, now, self.settings.state_rate) {
@@ -399,10 +406,7 @@ impl FormationNode {
             }
         }
         if self.statistics.is_due(diagnostics::DIAGNOSTICS, now, 1.0) {
-            let (header, refused) = (self.header(now), self.link.refused());
-            let troubles = self.troubles();
-            let message =
-                self.statistics.message(&self.control, &self.swarm.name, header, refused, &troubles);
+            let message = self.diagnosis(now);
             copy(&mut self.link.recorder, &self.diagnostics, &message, now);
             self.statistics.sent(self.diagnostics.publish(&message));
         }
@@ -443,6 +447,18 @@ fn act(control: &mut Control, goal: Goal) -> Outcome {
         Goal::Configure => {}
     }
     Outcome::Success
+}
+
+/// The names of a formation's node: `__ns` gives the fleet's namespace, below which the node of one member has its own.
+///
+/// # Errors
+/// A name that ROS 2 does not allow.
+pub fn names(arguments: &RosArguments, member: Option<&str>) -> Result<Names, NameError> {
+    let names = arguments.names(NAME, "/")?;
+    match member {
+        Some(member) => names.of_robot(member),
+        None => Ok(names),
+    }
 }
 
 /// Where to take part, as the environment says.
