@@ -6,7 +6,7 @@ use std::time::Duration;
 use flockform::flock::vectors::distance;
 use flockform::ros::edge::Quality;
 use flockform::ros::edge::services::lifecycle_msgs;
-use flockform::ros::messages::diagnostic_msgs::DiagnosticArray;
+use flockform::ros::messages::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
 use flockform::ros::messages::geometry_msgs::{Pose, PoseStamped, Twist, TwistStamped};
 use flockform::ros::messages::rosgraph_msgs::Clock;
 use flockform::ros::messages::std_msgs::Header;
@@ -227,6 +227,34 @@ fn a_pose_without_a_stamp_is_as_old_as_its_arrival_by_whatever_clock() {
             (node.control().health(6) == Health::Fresh).then_some(())
         });
     }
+}
+
+#[test]
+fn a_node_without_the_clock_that_it_is_to_go_by_says_so_until_one_comes() {
+    let peers = peers();
+    let keeper = peers.theirs.node("/", "time_keeper").expect("a node");
+    let reports =
+        keeper.subscription::<DiagnosticArray>("/diagnostics", Quality::reliable(5)).expect("hears");
+    let clock = keeper.publisher::<Clock>("/elsewhere/clock", Quality::BEST_EFFORT).expect("out");
+    let remapped = [&SIMULATED[..], &["-r", "/clock:=/elsewhere/clock"]].concat();
+    let mut node = FormationNode::open(&square(&PATIENT), &arguments(&remapped), None).expect("a node");
+    let mut status = |tick: &mut dyn FnMut()| {
+        tick();
+        std::thread::sleep(Duration::from_millis(5));
+        node.tick();
+        reports.take_last().and_then(|(report, _)| report.status.into_iter().next())
+    };
+    let misses = |status: &DiagnosticStatus| status.message.contains("no time has come on /elsewhere/clock");
+    let status_without =
+        until("a word about the clock", || status(&mut || {}).filter(|status| misses(status)));
+    assert_eq!(status_without.level, DiagnosticStatus::ERROR);
+    let mut time = 100.0;
+    let mut tell = || {
+        time += 0.02;
+        let message = Clock { clock: builtin_interfaces::Time::from_seconds(time) };
+        clock.publish(&message).expect("sent");
+    };
+    until("no word about the clock", || status(&mut tell).filter(|status| !misses(status)));
 }
 
 #[test]

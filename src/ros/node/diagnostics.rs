@@ -57,7 +57,7 @@ impl Statistics {
     }
 
     /// The report of a node and its swarm, by name, and a new beginning for the times in it; `refused` messages were none
-    /// of their type, `troubles` are those of the network.
+    /// of their type, `troubles` are those of the network and the clock.
     pub fn message(
         &mut self,
         control: &Control,

@@ -98,6 +98,8 @@ pub struct FormationNode {
     diagnostics: Publisher<DiagnosticArray>,
     statistics: Statistics,
     complaints: Complaints,
+    /// Whether the absence of a clock was reported.
+    has_missed_clock: bool,
     frame_id: String,
     swarm: Swarm,
     names: Names,
@@ -165,6 +167,7 @@ impl FormationNode {
             diagnostics: node.publisher(&names.topic("/diagnostics")?, Quality::reliable(5))?,
             statistics: Statistics::default(),
             complaints: Complaints::default(),
+            has_missed_clock: false,
             frame_id: raw.frame_id.clone(),
             swarm: swarm.clone(),
             was_active: false,
@@ -258,7 +261,7 @@ impl FormationNode {
         let stamp = self.clock.now().unwrap_or_else(system_time);
         self.answer(stamp);
         // Without a clock poses have no age, and none can be accepted.
-        let Some(now) = self.clock.now() else { return };
+        let Some(now) = self.clock.now() else { return self.wait_for_clock(stamp) };
         listen(&mut self.control, &mut self.link, &mut self.complaints, now);
         drop(inside);
         self.record_event(now, LoopEvent::TICK, "", &[now]);
@@ -266,6 +269,24 @@ impl FormationNode {
         self.publish(now);
         self.statistics.tick(begun.elapsed().as_secs_f64());
         self.report(now);
+    }
+
+    /// A period without a clock; `stamp` \[s\] is the computer's time.
+    fn wait_for_clock(&mut self, stamp: f64) {
+        let Some(trouble) = self.no_clock() else { return };
+        if !std::mem::replace(&mut self.has_missed_clock, true) {
+            tracing::warn!("{trouble}");
+        }
+        // Not recorded: the time of a recording is the loop's, which has not begun.
+        if self.statistics.is_due(diagnostics::DIAGNOSTICS, stamp, 1.0) {
+            let message = self.diagnosis(stamp);
+            self.statistics.sent(self.diagnostics.publish(&message));
+        }
+    }
+
+    fn no_clock(&self) -> Option<String> {
+        let topic = self.clock.silent()?;
+        Some(format!("use_sim_time is true and no time has come on {topic}: no robot moves until one does"))
     }
 
     fn apply(&mut self, changes: &[Change], now: f64) {
@@ -341,15 +362,16 @@ impl FormationNode {
         }
     }
 
-    /// Problems of the network around the node.
+    /// Problems of the network around the node, and of its clock.
     fn troubles(&self) -> Vec<String> {
         let twins = self.node.twins();
         let twin = |of: &str| format!("{twins} other node{of} the name {}", self.node.name());
-        match twins {
-            0 => Vec::new(),
-            1 => vec![twin(" has")],
-            _ => vec![twin("s have")],
-        }
+        let twin = match twins {
+            0 => None,
+            1 => Some(twin(" has")),
+            _ => Some(twin("s have")),
+        };
+        twin.into_iter().chain(self.no_clock()).collect()
     }
 
     fn record_event(&mut self, now: f64, kind: u8, text: &str, values: &[f64]) {
