@@ -30,6 +30,11 @@ def generate_launch_description():
             description="Parameter file of the node",
         ),
         DeclareLaunchArgument(
+            "namespace",
+            default_value="/",
+            description="Namespace of the fleet: of its nodes and topics",
+        ),
+        DeclareLaunchArgument(
             "use_sim_time",
             default_value="false",
             description="The robots publish /clock, and the node takes the time from it",
@@ -38,6 +43,7 @@ def generate_launch_description():
         Node(
             package="flockform",
             executable="flockform",
+            namespace=LaunchConfiguration("namespace"),
             arguments=["robots", swarm],
             parameters=[{"publish_clock": use_sim_time}],
             output="screen",
@@ -47,6 +53,7 @@ def generate_launch_description():
         Node(
             package="flockform",
             executable="flockform",
+            namespace=LaunchConfiguration("namespace"),
             arguments=["node", swarm],
             parameters=[LaunchConfiguration("parameters"), {"use_sim_time": use_sim_time}],
             output="screen",

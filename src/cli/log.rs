@@ -58,14 +58,12 @@ pub fn start(arguments: &Arguments, ros: &RosArguments) {
 
 /// Name of the logger of the node that a command is, with dots as `rcl` has them; none of other commands.
 fn logger(command: &Command, ros: &RosArguments) -> Option<String> {
-    let (name, namespace) = match command {
-        Command::Node(node) if node.transport == Transport::Ros2 => {
-            (node::NAME, node.member.as_ref().map_or("/".into(), |member| format!("/{member}")))
-        }
-        Command::Robots(robots) if robots.transport == Transport::Ros2 => ("robots", "/".into()),
+    let names = match command {
+        Command::Node(node) if node.transport == Transport::Ros2 => node::names(ros, node.member.as_deref()),
+        Command::Robots(robots) if robots.transport == Transport::Ros2 => ros.names("robots", "/"),
         _ => return None,
     };
-    let names = ros.names(name, &namespace).ok()?;
+    let names = names.ok()?;
     Some(names.fully_qualified().trim_start_matches('/').replace('/', "."))
 }
 

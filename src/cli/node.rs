@@ -76,7 +76,7 @@ pub fn node(arguments: &NodeArguments, ros: &RosArguments) -> Result<ExitCode, R
     match life {
         Some(mut life) => {
             let mut node = FormationNode::open(&swarm, ros, name)?;
-            let (member, namespace) = (arguments.member.clone(), Some(node.namespace().to_owned()));
+            let (member, namespace) = (arguments.member.clone(), Some(node.fleet().to_owned()));
             let about = About { member, namespace, ..arguments.swarm.about("node", &swarm) };
             let recording = arguments.record.open(&about, false, life.number())?;
             if let Some(recording) = &recording {

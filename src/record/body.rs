@@ -201,7 +201,7 @@ fn diagnostics(engine: &Engine, name: &str, header: Header, residual: f64) -> Di
     ];
     let status = DiagnosticStatus {
         level: DiagnosticStatus::OK,
-        name: "flockform: run".into(),
+        name: format!("/{NAME}: run"),
         message: "stepping".into(),
         hardware_id: name.to_owned(),
         values,

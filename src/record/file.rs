@@ -36,7 +36,7 @@ pub struct About {
     pub folder: Option<PathBuf>,
     /// The robot that the loop was alone for.
     pub member: Option<String>,
-    /// Namespace of the node.
+    /// Namespace of the node's fleet.
     pub namespace: Option<String>,
 }
 

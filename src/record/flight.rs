@@ -22,6 +22,8 @@ const DIAGNOSTICS: f64 = 1.0;
 /// Writes down a flight, period by period.
 pub struct FlightMessages {
     recorder: MessageRecorder,
+    /// Fully qualified name of the node.
+    node: String,
     swarm: Swarm,
     topics: Topics,
     heard: Vec<(usize, Pose)>,
@@ -51,7 +53,7 @@ impl FlightMessages {
         };
         let of_robots = |pattern: &str| -> Result<Vec<String>, NameError> {
             let all = control.formation().names.iter();
-            all.map(|name| names.topic(&pattern.replace("{name}", name))).collect()
+            all.map(|name| names.fleet_topic(&pattern.replace("{name}", name))).collect()
         };
         Ok(Self {
             recorder: MessageRecorder::new(&names, &raw.frame_id, sink)?,
@@ -62,6 +64,7 @@ impl FlightMessages {
                 markers: names.topic("~/markers")?,
                 diagnostics: names.topic("/diagnostics")?,
             },
+            node: names.fully_qualified(),
             swarm: swarm.clone(),
             heard: Vec::new(),
             statistics: Statistics::default(),
@@ -102,7 +105,7 @@ impl FlightMessages {
             }
         }
         if self.statistics.is_due(diagnostics::DIAGNOSTICS, now, DIAGNOSTICS) {
-            let message = self.statistics.message(control, &self.swarm.name, header(), 0, &[]);
+            let message = self.statistics.message(control, [&self.node, &self.swarm.name], header(), 0, &[]);
             self.recorder.take(&self.topics.diagnostics, &message, [now; 2]);
         }
     }

@@ -12,13 +12,14 @@ use serde::Serialize;
 use super::topics::{Heard, stamped, topics};
 use super::{Entry, Reader, RecordError};
 use crate::flock::vectors::distance;
+use crate::ros::arguments::Names;
 use crate::ros::messages::builtin_interfaces::Time;
 use crate::ros::messages::flockform_msgs::{LoopEvent, SetFormationRequest};
 use crate::ros::messages::geometry_msgs::{self, PoseArray, PoseStamped};
 use crate::ros::messages::std_msgs::Header;
 use crate::ros::node::leaders::set_formation;
-use crate::ros::node::pose;
 use crate::ros::node::recorder::{parameters, set_parameter};
+use crate::ros::node::{NAME, pose};
 use crate::scene::swarm::Swarm;
 use crate::swarm::control::Control;
 
@@ -178,8 +179,12 @@ impl Replay {
         }
         control.listen_to(&heard_of);
         control.set_active(false);
-        let namespace = described.metadata.get("namespace").map_or("/", String::as_str);
-        let (topics, has_events) = topics(reader, swarm, &control, namespace)?;
+        let fleet = described.metadata.get("namespace").map_or("/", String::as_str);
+        let mut names = Names::new(NAME, fleet, &[])?;
+        if let Some(member) = described.metadata.get("member") {
+            names = names.of_robot(member)?;
+        }
+        let (topics, has_events) = topics(reader, swarm, &control, &names)?;
         let robot = |name: &String| RobotDifference { name: name.clone(), ..RobotDifference::default() };
         Ok(Self {
             as_recorded: parameters(&before).to_vec(),

@@ -7,7 +7,6 @@ use crate::ros::arguments::Names;
 use crate::ros::messages::geometry_msgs::{self, PoseStamped, PoseWithCovarianceStamped};
 use crate::ros::messages::nav_msgs::Odometry;
 use crate::ros::messages::std_msgs::Header;
-use crate::ros::node::NAME;
 use crate::ros::node::recorder::EVENTS;
 use crate::scene::swarm::Swarm;
 use crate::scene::swarm::raw::{RawNode, RawPoseType};
@@ -39,9 +38,8 @@ pub(super) fn topics(
     reader: &Reader,
     swarm: &Swarm,
     control: &Control,
-    namespace: &str,
+    names: &Names,
 ) -> Result<(BTreeMap<String, Heard>, bool), RecordError> {
-    let names = Names::new(NAME, namespace, &[])?;
     let raw = &swarm.raw.node;
     let leaf = EVENTS.trim_start_matches('~');
     let mut topics = BTreeMap::new();
@@ -52,14 +50,14 @@ pub(super) fn topics(
     })?;
     let has_events = !topics.is_empty();
     if raw.pose_type == RawPoseType::PoseArray {
-        topics.insert(names.topic(&raw.pose_topic)?, Heard::Poses);
+        topics.insert(names.fleet_topic(&raw.pose_topic)?, Heard::Poses);
     }
     let default = RawNode::default().pose_topic;
     for (m, name) in control.formation().names.iter().enumerate() {
-        let of = |pattern: &str| names.topic(&pattern.replace("{name}", name));
+        let of = |pattern: &str| names.fleet_topic(&pattern.replace("{name}", name));
         let pattern = if raw.pose_type == RawPoseType::PoseArray { &default } else { &raw.pose_topic };
         topics.insert(of(pattern)?, Heard::Pose(m));
-        topics.insert(of("/{name}/leader_pose")?, Heard::Leader(m));
+        topics.insert(of(&raw.leader_topic)?, Heard::Leader(m));
         topics.insert(of(&raw.target_topic)?, Heard::Target(m));
     }
     Ok((topics, has_events))

@@ -22,7 +22,7 @@ use super::messages::std_msgs::Header;
 use super::messages::tf2_msgs::TFMessage;
 use super::node::{NodeError, options};
 use crate::scene::swarm::Swarm;
-use crate::scene::swarm::raw::RawPoseType;
+use crate::scene::swarm::raw::{RawNode, RawPoseType};
 use crate::swarm::control::Control;
 use crate::swarm::flight::Fleet;
 use crate::swarm::formation::Formation;
@@ -52,7 +52,8 @@ pub struct KeptRobots {
 
 /// The robots' end over ROS 2: a node for each.
 pub struct Link {
-    names: Vec<String>,
+    /// The frame that each robot carries.
+    frames: Vec<String>,
     targets: Vec<Subscription<PoseStamped>>,
     poses: Poses,
     clock: Option<Publisher<Clock>>,
@@ -80,8 +81,8 @@ impl Link {
         let mut nodes = Vec::new();
         let mut topics = Vec::new();
         for name in &formation.names {
-            let names = arguments.names("robot", &format!("/{name}"))?;
-            nodes.push(edge.node(names.namespace(), names.node_name())?);
+            let names = arguments.names("robot", "/")?.of_robot(name)?;
+            nodes.push(edge.named_node(&names)?);
             topics.push(names);
         }
         let of = |pattern: &str, m: usize| topic(&topics[m], pattern, &formation.names[m]);
@@ -108,10 +109,12 @@ impl Link {
                 Poses::Array(Box::new(topic), vec![nowhere; formation.count()])
             }
         };
-        let clock =
-            is_set("publish_clock").then(|| first.publisher("/clock", Quality::BEST_EFFORT)).transpose()?;
-        let names = formation.names.clone();
-        Ok(Self { names, targets, poses, clock, frame_id: raw.frame_id.clone(), was_sent: false, nodes })
+        let clock = is_set("publish_clock")
+            .then(|| first.publisher(&first.topic("/clock")?, Quality::BEST_EFFORT))
+            .transpose()?;
+        let (fleet, frame_id) = (topics[0].fleet(), raw.frame_id.clone());
+        let frames = formation.names.iter().map(|name| frame_of(raw, fleet, name)).collect();
+        Ok(Self { frames, targets, poses, clock, frame_id, was_sent: false, nodes })
     }
 }
 
@@ -124,7 +127,7 @@ impl RobotNodes {
         let fleet = Fleet::new(swarm, formation)?;
         let link = Link::open(swarm, formation, arguments)?;
         Ok(Self {
-            frames: link.nodes[0].publisher("/tf", Quality::reliable(100))?,
+            frames: link.nodes[0].publisher(&link.nodes[0].topic("/tf")?, Quality::reliable(100))?,
             pace: Pace::new(1.0 / control.period()),
             goals: vec![None; formation.count()],
             pulse: None,
@@ -197,15 +200,15 @@ impl RobotNodes {
     fn say_frames(&self) -> Result<(), EdgeError> {
         let Self { link, fleet, .. } = self;
         let now = if link.clock.is_some() { fleet.time() } else { system_time() };
-        let frame = |(name, robot): (&String, &crate::swarm::robots::Robot)| TransformStamped {
+        let frame = |(carried, robot): (&String, &crate::swarm::robots::Robot)| TransformStamped {
             header: Header { stamp: Time::from_seconds(now), frame_id: link.frame_id.clone() },
-            child_frame_id: frame_of(name),
+            child_frame_id: carried.clone(),
             transform: Transform {
                 translation: Vector3 { x: robot.position[0], y: robot.position[1], z: 0.0 },
                 rotation: Quaternion::from_yaw(robot.yaw),
             },
         };
-        let transforms = link.names.iter().zip(fleet.robots()).map(frame).collect();
+        let transforms = link.frames.iter().zip(fleet.robots()).map(frame).collect();
         self.frames.publish(&TFMessage { transforms })
     }
 }
@@ -245,7 +248,7 @@ impl RobotsEnd for Link {
                     let pose_only = PoseWithCovariance { pose: planar(pose), ..Default::default() };
                     all[*m].publish(&Odometry {
                         header: header(pose),
-                        child_frame_id: frame_of(&self.names[*m]),
+                        child_frame_id: self.frames[*m].clone(),
                         pose: pose_only,
                         ..Odometry::default()
                     })?;
@@ -260,13 +263,15 @@ impl RobotsEnd for Link {
     }
 }
 
-/// Frame that a robot carries (REP 105).
-fn frame_of(name: &str) -> String {
-    format!("{name}/base_link")
+/// Frame that a robot of a fleet carries (REP 105).
+fn frame_of(raw: &RawNode, fleet: &str, name: &str) -> String {
+    let below_fleet = || format!("{fleet}/").trim_start_matches('/').to_owned();
+    let prefix = raw.frame_prefix.clone().unwrap_or_else(below_fleet);
+    format!("{prefix}{name}/base_link")
 }
 
 fn topic(names: &Names, pattern: &str, name: &str) -> Result<String, NodeError> {
-    Ok(names.topic(&pattern.replace("{name}", name))?)
+    Ok(names.fleet_topic(&pattern.replace("{name}", name))?)
 }
 
 fn each<M: super::edge::Message>(

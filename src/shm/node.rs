@@ -15,6 +15,7 @@ use crate::swarm::control::scope::NodeScope;
 use crate::swarm::control::state::{FormationState, MemberState};
 use crate::swarm::control::{Control, Mode};
 use crate::swarm::pace::{Due, Pace, system_time};
+use crate::swarm::transport::complaints::Complaints;
 use crate::swarm::transport::{listen, serve};
 use crate::swarm::watch::Health;
 
@@ -41,6 +42,7 @@ pub struct FormationNode {
     orders: RawCommands,
     state: Writer<Formation>,
     members: Writer<Member>,
+    complaints: Complaints,
     missed: u64,
     unsent: u64,
     elapsed: f64,
@@ -65,6 +67,7 @@ impl FormationNode {
             commands: Reader::open(&peer, space, COMMANDS, capacity)?,
             state: Writer::open(&peer, space, STATE, capacity, 1)?,
             members: Writer::open(&peer, space, MEMBERS, capacity, control.formation().count())?,
+            complaints: Complaints::default(),
             missed: 0,
             unsent: 0,
             elapsed: 0.0,
@@ -89,7 +92,7 @@ impl FormationNode {
         wait::keep(&bells, stop, &mut |arrived| {
             if arrived {
                 self.obey();
-                listen(&mut self.control, &mut self.end, system_time());
+                listen(&mut self.control, &mut self.end, &mut self.complaints, system_time());
             }
             loop {
                 match self.pace.due() {
@@ -108,7 +111,7 @@ impl FormationNode {
         let begun = Instant::now();
         let now = system_time();
         self.obey();
-        let sent = serve(&mut self.control, &self.part, &mut self.end, now);
+        let sent = serve(&mut self.control, &self.part, &mut self.end, &mut self.complaints, now);
         self.note(sent);
         self.elapsed = begun.elapsed().as_secs_f64();
         if self.every(STATE_PERIOD) {

@@ -73,6 +73,32 @@ fn topics_and_services_are_expanded_and_remapped_by_the_first_rule_that_matches(
 }
 
 #[test]
+fn topics_of_a_fleet_are_in_its_namespace_for_the_node_of_one_robot_too() {
+    let fleet = "-r __ns:=/fleet";
+    for (rules, robot, name, topic) in [
+        ("", None, "robot_3/pose", "/robot_3/pose"),
+        ("", Some("robot_7"), "robot_3/pose", "/robot_3/pose"),
+        ("", Some("robot_7"), "~/stop", "/robot_7/node/stop"),
+        (fleet, None, "robot_3/pose", "/fleet/robot_3/pose"),
+        (fleet, None, "/robot_3/pose", "/robot_3/pose"),
+        (fleet, None, "{ns}/pose", "/fleet/pose"),
+        (fleet, Some("robot_7"), "robot_3/pose", "/fleet/robot_3/pose"),
+        (fleet, Some("robot_7"), "{node}/pose", "/fleet/node/pose"),
+        (fleet, Some("robot_7"), "/robot_3/pose", "/robot_3/pose"),
+        (fleet, Some("robot_7"), "~/stop", "/fleet/robot_7/node/stop"),
+        ("-r __ns:=/fleet -r robot_3/pose:=mocap", None, "robot_3/pose", "/fleet/mocap"),
+        ("-r __ns:=/fleet -r /fleet/robot_3/pose:=/mocap", Some("robot_7"), "robot_3/pose", "/mocap"),
+        ("-r __ns:=/fleet -r pose:=here", Some("robot_7"), "robot_7/pose", "/fleet/robot_7/here"),
+    ] {
+        let names = ros(rules).names("node", "/").expect(rules);
+        let names = robot.map_or(Ok(names.clone()), |robot| names.of_robot(robot)).expect(rules);
+        assert_eq!(names.fleet_topic(name).expect(name), topic, "{name} by {rules} for {robot:?}");
+    }
+    let error = ros("").names("node", "/").expect("valid").of_robot("7").expect_err("a digit").to_string();
+    assert!(error.contains("namespace `/7`: `7` begins with a digit"), "{error}");
+}
+
+#[test]
 fn names_that_ros_does_not_allow_are_refused_with_place_and_remedy() {
     let names = ros("").names("node", "/ns").expect("valid");
     for (name, reason) in [

@@ -114,7 +114,7 @@ fn simulated_robots_fly_the_manoeuvre_that_the_node_leads() {
     assert!(state.members.iter().all(|member| member.health == MemberState::FRESH));
     assert!(state.clearance > 0.3 - 1e-9, "{}", state.clearance);
     assert_eq!(markers.markers.iter().filter(|marker| marker.ns == "members").count(), 25);
-    assert_eq!(report.status[0].name, "flockform: formation");
+    assert_eq!(report.status[0].name, "/flockform: formation");
 }
 
 #[test]

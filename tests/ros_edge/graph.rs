@@ -18,7 +18,7 @@ fn nodes_of_one_participant_are_announced_each_with_what_it_owns() {
     let one = peers.ours.node("/swarm", "one").expect("a node");
     let two = one.another_node("/swarm", "two").expect("a node");
     assert_eq!(two.name(), "/swarm/two");
-    assert_eq!(two.private("get_state"), "/swarm/two/get_state");
+    assert_eq!(two.private("get_state").as_deref(), Ok("/swarm/two/get_state"));
     let _out = one.publisher::<PoseStamped>("/announced", Quality::BEST_EFFORT).expect("out");
     let _in = two.subscription::<PoseStamped>("/announced", Quality::BEST_EFFORT).expect("in");
     let _service = two.service::<std_srvs::Trigger>("/swarm/two/stop").expect("a service");

@@ -1,13 +1,16 @@
 //! Every way in and out of the formation's node: types of poses, leaders moved by topic, velocities, simulated time.
 
+use std::collections::BTreeSet;
 use std::time::Duration;
 
 use flockform::flock::vectors::distance;
 use flockform::ros::edge::Quality;
 use flockform::ros::edge::services::lifecycle_msgs;
+use flockform::ros::messages::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
 use flockform::ros::messages::geometry_msgs::{Pose, PoseStamped, Twist, TwistStamped};
 use flockform::ros::messages::rosgraph_msgs::Clock;
 use flockform::ros::messages::std_msgs::Header;
+use flockform::ros::messages::tf2_msgs::TFMessage;
 use flockform::ros::messages::{builtin_interfaces, geometry_msgs};
 use flockform::ros::node::FormationNode;
 use flockform::ros::robots::RobotNodes;
@@ -15,7 +18,8 @@ use flockform::swarm::watch::Health;
 use ros2_client::ServiceMapping;
 
 use super::formation::{PATIENT, Swarming, arguments, square};
-use super::support::{call, client, peers, until};
+use super::support::{PATIENCE, call, client, peers, until};
+use crate::waits::within;
 
 /// A flight short enough for a test.
 const SHORT: [&str; 2] =
@@ -33,12 +37,14 @@ fn away(swarm: &Swarming, to: impl Fn([f64; 2]) -> [f64; 2]) -> f64 {
     (0..formation.count()).map(apart).fold(0.0, f64::max)
 }
 
+fn is_flown(swarm: &Swarming) -> bool {
+    let formation = swarm.node.control().formation();
+    let map = formation.affine(formation.programs_end()).expect("a manoeuvre");
+    away(swarm, |place| map.apply(place)) < 0.01
+}
+
 fn until_flown(swarm: &mut Swarming, what: &str) {
-    swarm.fly_until(what, |swarm| {
-        let formation = swarm.node.control().formation();
-        let map = formation.affine(formation.programs_end()).expect("a manoeuvre");
-        away(swarm, |place| map.apply(place)) < 0.01
-    });
+    swarm.fly_until(what, is_flown);
 }
 
 #[test]
@@ -221,4 +227,71 @@ fn a_pose_without_a_stamp_is_as_old_as_its_arrival_by_whatever_clock() {
             (node.control().health(6) == Health::Fresh).then_some(())
         });
     }
+}
+
+#[test]
+fn a_node_without_the_clock_that_it_is_to_go_by_says_so_until_one_comes() {
+    let peers = peers();
+    let keeper = peers.theirs.node("/", "time_keeper").expect("a node");
+    let reports =
+        keeper.subscription::<DiagnosticArray>("/diagnostics", Quality::reliable(5)).expect("hears");
+    let clock = keeper.publisher::<Clock>("/elsewhere/clock", Quality::BEST_EFFORT).expect("out");
+    let remapped = [&SIMULATED[..], &["-r", "/clock:=/elsewhere/clock"]].concat();
+    let mut node = FormationNode::open(&square(&PATIENT), &arguments(&remapped), None).expect("a node");
+    let mut status = |tick: &mut dyn FnMut()| {
+        tick();
+        std::thread::sleep(Duration::from_millis(5));
+        node.tick();
+        reports.take_last().and_then(|(report, _)| report.status.into_iter().next())
+    };
+    let misses = |status: &DiagnosticStatus| status.message.contains("no time has come on /elsewhere/clock");
+    let status_without =
+        until("a word about the clock", || status(&mut || {}).filter(|status| misses(status)));
+    assert_eq!(status_without.level, DiagnosticStatus::ERROR);
+    let mut time = 100.0;
+    let mut tell = || {
+        time += 0.02;
+        let message = Clock { clock: builtin_interfaces::Time::from_seconds(time) };
+        clock.publish(&message).expect("sent");
+    };
+    until("no word about the clock", || status(&mut tell).filter(|status| !misses(status)));
+}
+
+#[test]
+fn two_fleets_of_one_file_fly_beside_each_other_each_in_its_namespace() {
+    let peers = peers();
+    let hearer = peers.theirs.node("/", "tower").expect("a node");
+    let reports =
+        hearer.subscription::<DiagnosticArray>("/diagnostics", Quality::reliable(50)).expect("hears");
+    let frames = hearer.subscription::<TFMessage>("/tf", Quality::reliable(100)).expect("hears");
+    let open = |namespace: &str, leg: &str| {
+        let legs = format!("manoeuvres[0].legs=[{{ seconds = 0.5, {leg} }}]");
+        let swarm = square(&[&PATIENT[..], &["limits.speed=4.0", &legs]].concat());
+        let arguments = arguments(&["-r", &format!("__ns:={namespace}")]);
+        let robots = RobotNodes::open(&swarm, &arguments).expect("robots");
+        let node = FormationNode::open(&swarm, &arguments, None).expect("a node");
+        Swarming { node, robots }
+    };
+    // Either would be led astray by what the other's node sends.
+    let mut fleets = [open("/left", "translate = [-1.0, 0.5]"), open("/right", "translate = [1.0, -0.5]")];
+    let (mut nodes, mut carried) = (BTreeSet::new(), BTreeSet::new());
+    let mut hear = |fleets: &mut [Swarming]| {
+        fleets.iter_mut().for_each(Swarming::tick);
+        while let Some((report, _)) = reports.take() {
+            nodes.extend(report.status.into_iter().map(|status| status.name));
+        }
+        while let Some((message, _)) = frames.take() {
+            carried.extend(message.transforms.into_iter().map(|frame| frame.child_frame_id));
+        }
+        // The last words of other tests' nodes may come too.
+        ["/left/flockform: formation", "/right/flockform: formation"].iter().all(|&name| nodes.contains(name))
+            && ["left/robot_7/base_link", "right/robot_7/base_link"]
+                .iter()
+                .all(|&name| carried.contains(name))
+    };
+    within(3 * PATIENCE, "both are where they were led", || {
+        hear(&mut fleets);
+        fleets.iter().all(is_flown).then_some(())
+    });
+    until("both have names and frames of their own", || hear(&mut fleets).then_some(()));
 }

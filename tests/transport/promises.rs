@@ -3,6 +3,7 @@
 use std::time::{Duration, Instant};
 
 use flockform::swarm::control::Control;
+use flockform::swarm::transport::complaints::Complaints;
 use flockform::swarm::transport::{ControllerEnd, RobotsEnd, serve};
 use flockform::swarm::watch::Health;
 
@@ -170,6 +171,7 @@ pub fn a_pose_that_is_not_finite_moves_nobody(
 ) {
     let (mut controller, mut robots) = (transport.controller(), transport.robots());
     meet(&mut controller, &mut robots, 1);
+    let mut complaints = Complaints::default();
     let now = flockform::swarm::pace::system_time();
     let mut k = 0.0;
     until("everybody is heard", || {
@@ -179,7 +181,7 @@ pub fn a_pose_that_is_not_finite_moves_nobody(
             .collect();
         robots.say(now, &all).expect("said");
         a_moment();
-        serve(control, part, &mut controller, now + k).expect("sent");
+        serve(control, part, &mut controller, &mut complaints, now + k).expect("sent");
         (0..3).all(|m| control.health(m) == Health::Fresh).then_some(())
     });
     let before = control.watch().counts(1).rejected();
@@ -188,7 +190,7 @@ pub fn a_pose_that_is_not_finite_moves_nobody(
         let bad = flockform::swarm::watch::Pose { position: [f64::NAN, f64::INFINITY], ..pose(0.0, now + k) };
         robots.say(now, &[(1, bad)]).expect("said");
         a_moment();
-        serve(control, part, &mut controller, now + k).expect("sent");
+        serve(control, part, &mut controller, &mut complaints, now + k).expect("sent");
         (control.watch().counts(1).rejected() > before + 2).then_some(())
     });
     assert_eq!(control.position(1), Some([1.0, 0.0]), "the last good one stands");

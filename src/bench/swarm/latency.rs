@@ -183,11 +183,11 @@ mod over_dds {
                 Edge::open(Options { domain, loopback_only: true }).map_err(|error| error.to_string())?;
             let node = edge.node("/", "bench_robots").map_err(|error| error.to_string())?;
             let raw = &swarm.raw.node;
-            let topic = |pattern: &str, name: &str| pattern.replace("{name}", name);
+            let topic = |pattern: &str, name: &str| node.topic(&pattern.replace("{name}", name));
             let names = &formation.names;
-            let pose = |name: &String| node.publisher(&topic(&raw.pose_topic, name), Quality::BEST_EFFORT);
+            let pose = |name: &String| node.publisher(&topic(&raw.pose_topic, name)?, Quality::BEST_EFFORT);
             let target =
-                |name: &String| node.subscription(&topic(&raw.target_topic, name), Quality::reliable(1));
+                |name: &String| node.subscription(&topic(&raw.target_topic, name)?, Quality::reliable(1));
             Ok(Self {
                 places: formation.places.clone(),
                 poses: names.iter().map(pose).collect::<Result<_, _>>().map_err(|error| error.to_string())?,

@@ -32,6 +32,8 @@ const SLASHES: &str = "write tokens with one `/` between them and none at the en
 pub struct Names {
     node: String,
     namespace: String,
+    /// Namespace that the node shares with its fleet: its own, or the one above it.
+    fleet: String,
     rules: Vec<RemapRule>,
 }
 
@@ -49,7 +51,18 @@ impl Names {
         let namespace = if given.starts_with('/') { given.to_string() } else { format!("/{given}") };
         check_node_name(&node)?;
         check_namespace(&namespace)?;
-        Ok(Self { node, namespace, rules: rules.to_vec() })
+        Ok(Self { node, fleet: namespace.clone(), namespace, rules: rules.to_vec() })
+    }
+
+    /// The same for a node of one robot: it moves into the robot's namespace, below the fleet's, which is its namespace
+    /// so far.
+    ///
+    /// # Errors
+    /// A name that no namespace can have.
+    pub fn of_robot(self, robot: &str) -> Result<Self, NameError> {
+        let namespace = join(&self.fleet, robot);
+        check_namespace(&namespace)?;
+        Ok(Self { namespace, ..self })
     }
 
     /// The node's name, without its namespace.
@@ -60,6 +73,11 @@ impl Names {
     /// The node's namespace: `/`, or `/a/b`.
     pub fn namespace(&self) -> &str {
         &self.namespace
+    }
+
+    /// The namespace of the node's fleet: `/`, or `/a`.
+    pub fn fleet(&self) -> &str {
+        &self.fleet
     }
 
     /// Namespace and name: `/a/b/node`.
@@ -75,6 +93,15 @@ impl Names {
     /// A name that ROS 2 does not allow, as written or after remapping.
     pub fn topic(&self, name: &str) -> Result<String, NameError> {
         self.resolve("topic name", name, Scope::Topics)
+    }
+
+    /// As [`Names::topic`], where a relative `name` is relative to the fleet's namespace.
+    ///
+    /// # Errors
+    /// A name that ROS 2 does not allow, as written or after remapping.
+    pub fn fleet_topic(&self, name: &str) -> Result<String, NameError> {
+        let name = self.substitute("topic name", name)?;
+        if name.starts_with(['/', '~']) { self.topic(&name) } else { self.topic(&join(&self.fleet, &name)) }
     }
 
     /// As [`Names::topic`] for a service.

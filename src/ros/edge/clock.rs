@@ -1,5 +1,7 @@
 //! The clock: the computer's time, or the simulator's from `/clock`.
 
+use std::time::{Duration, Instant};
+
 use super::services::rosgraph_msgs;
 use super::{EdgeError, Node, Quality, Subscription};
 use crate::swarm::pace::system_time;
@@ -9,7 +11,12 @@ pub struct Clock {
     simulated: Option<Simulated>,
 }
 
+/// Silence of a simulator that is worth a word.
+const PATIENCE: Duration = Duration::from_secs(3);
+
 struct Simulated {
+    /// Time of the computer at which the subscription was made.
+    since: Instant,
     subscription: Subscription<rosgraph_msgs::Clock>,
     reading: Reading,
 }
@@ -50,19 +57,20 @@ impl Clock {
         Self { simulated: None }
     }
 
-    /// The simulator's time (`use_sim_time`), from `/clock`.
+    /// The simulator's time (`use_sim_time`), from `/clock` or what the node's rules make of it.
     ///
     /// # Errors
     /// As [`Node::subscription`].
     pub fn simulated(node: &Node) -> Result<Self, EdgeError> {
-        let subscription = node.subscription("/clock", Quality::BEST_EFFORT)?;
-        Ok(Self { simulated: Some(Simulated { subscription, reading: Reading::default() }) })
+        let subscription = node.subscription(&node.topic("/clock")?, Quality::BEST_EFFORT)?;
+        let reading = Reading::default();
+        Ok(Self { simulated: Some(Simulated { since: Instant::now(), subscription, reading }) })
     }
 
     /// Hears what came since the last tick. Returns how far time went back \[s\], if it did: everything
     /// stamped before then is from another run.
     pub fn poll(&mut self) -> Option<f64> {
-        let Simulated { subscription, reading } = self.simulated.as_mut()?;
+        let Simulated { subscription, reading, .. } = self.simulated.as_mut()?;
         while let Some((message, _)) = subscription.take() {
             reading.hear(message.clock.seconds());
         }
@@ -75,6 +83,13 @@ impl Clock {
             Some(simulated) => simulated.reading.now(),
             None => Some(system_time()),
         }
+    }
+
+    /// The simulator's topic, if nothing has come on it for some seconds since the beginning.
+    pub fn silent(&self) -> Option<&str> {
+        let Simulated { since, subscription, reading } = self.simulated.as_ref()?;
+        let silent = reading.now().is_none() && since.elapsed() > PATIENCE;
+        silent.then(|| subscription.topic())
     }
 
     /// Whether time comes from `/clock`.

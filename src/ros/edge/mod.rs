@@ -34,6 +34,8 @@ pub mod services;
 pub mod topic;
 pub mod wire;
 
+use super::arguments::NameError;
+
 pub use message::{Message, ServiceType};
 pub use participant::{Edge, Node, Options};
 pub use quality::Quality;
@@ -56,6 +58,8 @@ pub enum EdgeError {
     Participant { domain: u16, reason: String },
     #[error("{name:?} is no {kind} name: {reason}")]
     Name { kind: &'static str, name: String, reason: &'static str },
+    #[error("{0}")]
+    Resolution(#[from] NameError),
     #[error("no endpoint on {topic}: {reason}")]
     Endpoint { topic: String, reason: String },
     #[error("not sent on {topic}: {reason}")]

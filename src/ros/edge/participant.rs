@@ -18,6 +18,7 @@ use super::outbox::{Outbox, Outlet};
 use super::pulse::{self, Pulse};
 use super::wire::{Payload, Verbatim};
 use super::{EdgeError, Message, Publisher, Quality, Service, ServiceType, Subscription, farewell, names};
+use crate::ros::arguments::Names;
 
 /// Where to take part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -113,8 +114,19 @@ impl Edge {
         let reserved =
             |_| EdgeError::Name { kind: "node", name: qualified.clone(), reason: "not a node name" };
         let parsed = NodeName::new(namespace, name).map_err(reserved)?;
+        let names = Names::new(name, namespace, &[])?;
         self.shared.graph.add_node(parsed);
-        Ok(Node { shared: self.shared.clone(), name: qualified })
+        Ok(Node { shared: self.shared.clone(), name: qualified, names })
+    }
+
+    /// A node of these names, whose rules its topics and services follow.
+    ///
+    /// # Errors
+    /// As [`Edge::node`].
+    pub fn named_node(&self, names: &Names) -> Result<Node, EdgeError> {
+        let mut node = self.node(names.namespace(), names.node_name())?;
+        node.names = names.clone();
+        Ok(node)
     }
 }
 
@@ -219,6 +231,7 @@ impl Drop for Shared {
 pub struct Node {
     shared: Arc<Shared>,
     name: String,
+    names: Names,
 }
 
 impl Node {
@@ -240,9 +253,20 @@ impl Node {
         self.shared.graph.twins(&self.name)
     }
 
-    /// Fully qualified name of a private name: `~/leaf`.
-    pub fn private(&self, leaf: &str) -> String {
-        format!("{}/{leaf}", self.name)
+    /// Fully qualified name of a topic, by the node's rules: see [`Names::topic`].
+    ///
+    /// # Errors
+    /// A name that ROS 2 does not allow.
+    pub fn topic(&self, name: &str) -> Result<String, EdgeError> {
+        Ok(self.names.topic(name)?)
+    }
+
+    /// Fully qualified name of a service of the node, `~/leaf`, by its rules.
+    ///
+    /// # Errors
+    /// A name that ROS 2 does not allow.
+    pub fn private(&self, leaf: &str) -> Result<String, EdgeError> {
+        Ok(self.names.service(&format!("~/{leaf}"))?)
     }
 
     /// Another node of the same participant: see [`Edge::node`]. The two do not hear each other for certain:

@@ -56,12 +56,12 @@ impl Statistics {
         due
     }
 
-    /// The report, and a new beginning for the times in it; `refused` messages were none of their type, `troubles` are
-    /// those of the network.
+    /// The report of a node and its swarm, by name, and a new beginning for the times in it; `refused` messages were none
+    /// of their type, `troubles` are those of the network and the clock.
     pub fn message(
         &mut self,
         control: &Control,
-        name: &str,
+        [node, swarm]: [&str; 2],
         header: Header,
         refused: u64,
         troubles: &[String],
@@ -104,9 +104,9 @@ impl Statistics {
         (self.ticks, self.since, self.longest, self.reported_missed) = (0, Some(now), 0.0, self.missed);
         let status = DiagnosticStatus {
             level,
-            name: "flockform: formation".into(),
+            name: format!("{node}: formation"),
             message,
-            hardware_id: name.to_owned(),
+            hardware_id: swarm.to_owned(),
             values,
         };
         DiagnosticArray { header, status: vec![status] }

@@ -10,6 +10,8 @@ use crate::ros::messages::std_msgs::Header;
 use crate::scene::swarm::raw::RawNode;
 use crate::swarm::control::Control;
 use crate::swarm::control::scope::NodeScope;
+use crate::swarm::pace::system_time;
+use crate::swarm::transport::complaints::Complaints;
 use crate::swarm::transport::{ControllerEnd, Heard, Target};
 
 /// Topics of the members.
@@ -22,6 +24,8 @@ pub struct Link {
     simulated_time: bool,
     /// Places of leaders in another frame.
     misframed: u64,
+    /// Of leaders' places; those of poses are the loop's.
+    complaints: Complaints,
     /// Gets a copy of what goes through.
     pub recorder: Option<MessageRecorder>,
 }
@@ -40,7 +44,7 @@ impl Link {
         let formation = control.formation();
         let mut leaders = Vec::new();
         for m in formation.moved().filter(|m| part.mine.contains(m)) {
-            leaders.push((m, node.subscription(&topic("/{name}/leader_pose", m)?, Quality::BEST_EFFORT)?));
+            leaders.push((m, node.subscription(&topic(&raw.leader_topic, m)?, Quality::BEST_EFFORT)?));
         }
         let mut targets: Vec<_> = (0..formation.count()).map(|_| None).collect();
         for &m in &part.mine {
@@ -54,6 +58,7 @@ impl Link {
             frame_id: raw.frame_id.clone(),
             simulated_time,
             misframed: 0,
+            complaints: Complaints::default(),
             recorder: None,
         })
     }
@@ -75,14 +80,13 @@ impl ControllerEnd for Link {
                 let place = message.pose.position;
                 hear(Heard::Leader(*member, [place.x, place.y]));
             } else {
-                if self.misframed == 0 {
-                    tracing::warn!(
-                        "{}: frame `{}` is not `{}`, which the swarm file names (only the first is reported)",
-                        topic.topic(),
-                        said(&message.header.frame_id),
-                        self.frame_id
-                    );
-                }
+                let text = format_args!(
+                    "{}: frame `{}` is not `{}`, which the swarm file names",
+                    topic.topic(),
+                    said(&message.header.frame_id),
+                    self.frame_id
+                );
+                self.complaints.warn("wrong frame", *member, system_time(), &text);
                 self.misframed += 1;
             }
         }

@@ -37,6 +37,7 @@ use crate::scene::swarm::Swarm;
 use crate::swarm::control::Control;
 use crate::swarm::control::scope::{NodeScope, NodeScopeError};
 use crate::swarm::pace::{Pace, system_time};
+use crate::swarm::transport::complaints::Complaints;
 use crate::swarm::transport::{ControllerEnd, listen, target_of, targets};
 use diagnostics::Statistics;
 use drive::Drive;
@@ -96,6 +97,9 @@ pub struct FormationNode {
     markers: Option<Publisher<MarkerArray>>,
     diagnostics: Publisher<DiagnosticArray>,
     statistics: Statistics,
+    complaints: Complaints,
+    /// Whether the absence of a clock was reported.
+    has_missed_clock: bool,
     frame_id: String,
     swarm: Swarm,
     names: Names,
@@ -115,10 +119,9 @@ impl FormationNode {
     pub fn open(swarm: &Swarm, arguments: &RosArguments, member: Option<&str>) -> Result<Self, NodeError> {
         let mut control = Control::new(swarm)?;
         let part = NodeScope::take(swarm, &mut control, member)?;
-        let namespace = member.map_or("/".into(), |name| format!("/{name}"));
-        let names = arguments.names(NAME, &namespace)?;
+        let names = names(arguments, member)?;
         let edge = Edge::open(options(arguments))?;
-        let node = edge.node(names.namespace(), names.node_name())?;
+        let node = edge.named_node(&names)?;
 
         let (mut settings, store) = settings::declare(&control, arguments, &names.fully_qualified())?;
         check_commands(swarm, settings.autostart)?;
@@ -127,7 +130,9 @@ impl FormationNode {
         let clock = if settings.use_sim_time { Clock::simulated(&node)? } else { Clock::system() };
         let raw = &swarm.raw.node;
         let topic = |pattern: &str, m: usize| {
-            names.topic(&pattern.replace("{name}", &control.formation().names[m])).map_err(NodeError::from)
+            names
+                .fleet_topic(&pattern.replace("{name}", &control.formation().names[m]))
+                .map_err(NodeError::from)
         };
         let link = Link::open(&node, raw, &control, &part, clock.is_simulated(), &topic)?;
         let mut drives = Vec::new();
@@ -146,7 +151,7 @@ impl FormationNode {
             stop_requests: raw
                 .commands
                 .may_stop()
-                .then(|| names.topic(&raw.emergency_stop_topic).map_err(NodeError::from))
+                .then(|| names.fleet_topic(&raw.emergency_stop_topic).map_err(NodeError::from))
                 .transpose()?
                 .map(|topic| node.subscription(&topic, Quality::reliable(1)))
                 .transpose()?,
@@ -161,6 +166,8 @@ impl FormationNode {
                 .transpose()?,
             diagnostics: node.publisher(&names.topic("/diagnostics")?, Quality::reliable(5))?,
             statistics: Statistics::default(),
+            complaints: Complaints::default(),
+            has_missed_clock: false,
             frame_id: raw.frame_id.clone(),
             swarm: swarm.clone(),
             was_active: false,
@@ -238,9 +245,9 @@ impl FormationNode {
         &self.control
     }
 
-    /// Namespace of the node and its topics.
-    pub fn namespace(&self) -> &str {
-        self.names.namespace()
+    /// Namespace of the fleet and its topics.
+    pub fn fleet(&self) -> &str {
+        self.names.fleet()
     }
 
     /// One period: what arrived, the targets, what is published.
@@ -254,14 +261,32 @@ impl FormationNode {
         let stamp = self.clock.now().unwrap_or_else(system_time);
         self.answer(stamp);
         // Without a clock poses have no age, and none can be accepted.
-        let Some(now) = self.clock.now() else { return };
-        listen(&mut self.control, &mut self.link, now);
+        let Some(now) = self.clock.now() else { return self.wait_for_clock(stamp) };
+        listen(&mut self.control, &mut self.link, &mut self.complaints, now);
         drop(inside);
         self.record_event(now, LoopEvent::TICK, "", &[now]);
         self.control.tick(now);
         self.publish(now);
         self.statistics.tick(begun.elapsed().as_secs_f64());
         self.report(now);
+    }
+
+    /// A period without a clock; `stamp` \[s\] is the computer's time.
+    fn wait_for_clock(&mut self, stamp: f64) {
+        let Some(trouble) = self.no_clock() else { return };
+        if !std::mem::replace(&mut self.has_missed_clock, true) {
+            tracing::warn!("{trouble}");
+        }
+        // Not recorded: the time of a recording is the loop's, which has not begun.
+        if self.statistics.is_due(diagnostics::DIAGNOSTICS, stamp, 1.0) {
+            let message = self.diagnosis(stamp);
+            self.statistics.sent(self.diagnostics.publish(&message));
+        }
+    }
+
+    fn no_clock(&self) -> Option<String> {
+        let topic = self.clock.silent()?;
+        Some(format!("use_sim_time is true and no time has come on {topic}: no robot moves until one does"))
     }
 
     fn apply(&mut self, changes: &[Change], now: f64) {
@@ -337,15 +362,16 @@ impl FormationNode {
         }
     }
 
-    /// Problems of the network around the node.
+    /// Problems of the network around the node, and of its clock.
     fn troubles(&self) -> Vec<String> {
         let twins = self.node.twins();
         let twin = |of: &str| format!("{twins} other node{of} the name {}", self.node.name());
-        match twins {
-            0 => Vec::new(),
-            1 => vec![twin(" has")],
-            _ => vec![twin("s have")],
-        }
+        let twin = match twins {
+            0 => None,
+            1 => Some(twin(" has")),
+            _ => Some(twin("s have")),
+        };
+        twin.into_iter().chain(self.no_clock()).collect()
     }
 
     fn record_event(&mut self, now: f64, kind: u8, text: &str, values: &[f64]) {
@@ -378,6 +404,12 @@ impl FormationNode {
         }
     }
 
+    fn diagnosis(&mut self, now: f64) -> DiagnosticArray {
+        let (header, refused, troubles) = (self.header(now), self.link.refused(), self.troubles());
+        let names = [self.node.name(), &self.swarm.name];
+        self.statistics.message(&self.control, names, header, refused, &troubles)
+    }
+
     /// Publishes state and markers at `state_rate`, diagnostics at 1 Hz.
     fn report(&mut self, now: f64) {
         if self.statistics.is_due(diagnostics::STATE, now, self.settings.state_rate) {
@@ -396,10 +428,7 @@ impl FormationNode {
             }
         }
         if self.statistics.is_due(diagnostics::DIAGNOSTICS, now, 1.0) {
-            let (header, refused) = (self.header(now), self.link.refused());
-            let troubles = self.troubles();
-            let message =
-                self.statistics.message(&self.control, &self.swarm.name, header, refused, &troubles);
+            let message = self.diagnosis(now);
             copy(&mut self.link.recorder, &self.diagnostics, &message, now);
             self.statistics.sent(self.diagnostics.publish(&message));
         }
@@ -440,6 +469,18 @@ fn act(control: &mut Control, goal: Goal) -> Outcome {
         Goal::Configure => {}
     }
     Outcome::Success
+}
+
+/// The names of a formation's node: `__ns` gives the fleet's namespace, below which the node of one member has its own.
+///
+/// # Errors
+/// A name that ROS 2 does not allow.
+pub fn names(arguments: &RosArguments, member: Option<&str>) -> Result<Names, NameError> {
+    let names = arguments.names(NAME, "/")?;
+    match member {
+        Some(member) => names.of_robot(member),
+        None => Ok(names),
+    }
 }
 
 /// Where to take part, as the environment says.

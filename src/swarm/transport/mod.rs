@@ -9,11 +9,15 @@
 //! * An end that comes late, goes away, comes back or is killed does not disturb the others.
 //! * A payload that is no pose of a member is left out and counted.
 
+pub mod complaints;
 pub mod in_process;
+
+use complaints::Complaints;
 
 use super::control::Control;
 use super::control::scope::NodeScope;
 use super::flight::Fleet;
+use super::pace::system_time;
 use super::watch::Pose;
 
 /// A message that reaches the loop.
@@ -69,16 +73,28 @@ pub trait RobotsEnd {
     fn targets(&mut self, go: &mut dyn FnMut(usize, [f64; 2]));
 }
 
-/// The first half of a period: receives all messages that arrived.
-pub fn listen<E: ControllerEnd>(control: &mut Control, end: &mut E, now: f64) {
+/// The first half of a period: receives all messages that arrived, and warns of those that are dropped.
+pub fn listen<E: ControllerEnd>(control: &mut Control, end: &mut E, complaints: &mut Complaints, now: f64) {
     end.hear(now, &mut |heard| match heard {
         Heard::Pose(member, pose) => {
-            if let Err(rejection) = control.receive(member, pose, now) {
-                tracing::debug!("{}: {rejection}", control.formation().names[member]);
+            let Err(rejection) = control.receive(member, pose, now) else { return };
+            let name = &control.formation().names[member];
+            match rejection.cause() {
+                Some(cause) => {
+                    complaints.warn(cause, member, system_time(), &format_args!("{name}: {rejection}"))
+                }
+                None => tracing::debug!("{name}: {rejection}"),
             }
         }
         Heard::Leader(member, place) => {
-            control.tell(member, place);
+            if !control.tell(member, place) {
+                let name = &control.formation().names[member];
+                let text = format_args!(
+                    "{name}: a place to lead it to is not finite, farther from the centre than `poses.range` \
+                     allows, or for a robot without an external program"
+                );
+                complaints.warn("leader's place", member, system_time(), &text);
+            }
         }
     });
 }
@@ -91,9 +107,10 @@ pub fn serve<E: ControllerEnd>(
     control: &mut Control,
     part: &NodeScope,
     end: &mut E,
+    complaints: &mut Complaints,
     now: f64,
 ) -> Result<(), E::Error> {
-    listen(control, end, now);
+    listen(control, end, complaints, now);
     control.tick(now);
     end.send(now, &targets(control, part))
 }

@@ -76,6 +76,21 @@ pub enum Rejection {
     },
 }
 
+impl Rejection {
+    /// A short name of the cause; none for poses that are dropped in ordinary operation.
+    pub fn cause(&self) -> Option<&'static str> {
+        match self {
+            Rejection::NotFinite { .. } => Some("not finite"),
+            Rejection::WrongFrame => Some("wrong frame"),
+            Rejection::OutOfRange { .. } => Some("out of range"),
+            Rejection::FromTheFuture { .. } => Some("from the future"),
+            Rejection::TooOld { .. } => Some("too old"),
+            Rejection::Jump { .. } => Some("jump"),
+            Rejection::NotNewer { .. } | Rejection::Recovering { .. } => None,
+        }
+    }
+}
+
 /// Counts of a member's accepted and rejected poses since the beginning.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {

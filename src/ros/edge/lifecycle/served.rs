@@ -24,12 +24,12 @@ impl Lifecycle {
     pub fn new(node: &Node) -> Result<Self, EdgeError> {
         Ok(Self {
             machine: Machine::default(),
-            change: node.service(&node.private("change_state"))?,
-            state: node.service(&node.private("get_state"))?,
-            states: node.service(&node.private("get_available_states"))?,
-            transitions: node.service(&node.private("get_available_transitions"))?,
-            graph: node.service(&node.private("get_transition_graph"))?,
-            events: node.publisher(&node.private("transition_event"), Quality::reliable(10))?,
+            change: node.service(&node.private("change_state")?)?,
+            state: node.service(&node.private("get_state")?)?,
+            states: node.service(&node.private("get_available_states")?)?,
+            transitions: node.service(&node.private("get_available_transitions")?)?,
+            graph: node.service(&node.private("get_transition_graph")?)?,
+            events: node.publisher(&node.topic("~/transition_event")?, Quality::reliable(10))?,
         })
     }
 

@@ -29,13 +29,13 @@ impl Parameters {
         Ok(Self {
             store,
             node: node.name().into(),
-            get: node.service(&node.private("get_parameters"))?,
-            types: node.service(&node.private("get_parameter_types"))?,
-            describe: node.service(&node.private("describe_parameters"))?,
-            list: node.service(&node.private("list_parameters"))?,
-            set: node.service(&node.private("set_parameters"))?,
-            set_atomically: node.service(&node.private("set_parameters_atomically"))?,
-            events: node.publisher("/parameter_events", Quality::reliable(1000))?,
+            get: node.service(&node.private("get_parameters")?)?,
+            types: node.service(&node.private("get_parameter_types")?)?,
+            describe: node.service(&node.private("describe_parameters")?)?,
+            list: node.service(&node.private("list_parameters")?)?,
+            set: node.service(&node.private("set_parameters")?)?,
+            set_atomically: node.service(&node.private("set_parameters_atomically")?)?,
+            events: node.publisher(&node.topic("/parameter_events")?, Quality::reliable(1000))?,
             announced: false,
         })
     }

@@ -24,7 +24,7 @@ pub struct RawLeaders {
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum RawProgram {
-    /// Moved from outside: by topic (`leader_pose`) or by the service `set_formation`; holds its place until
+    /// Moved from outside: by topic (`node.leader_topic`) or by the service `set_formation`; holds its place until
     /// then.
     External {},
     /// Along displacements from its place in the formation.

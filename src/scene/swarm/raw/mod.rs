@@ -215,16 +215,19 @@ pub(super) mod defaults {
         "map".into()
     }
     pub fn pose_topic() -> String {
-        "/{name}/pose".into()
+        "{name}/pose".into()
     }
     pub fn target_topic() -> String {
-        "/{name}/target_pose".into()
+        "{name}/target_pose".into()
+    }
+    pub fn leader_topic() -> String {
+        "{name}/leader_pose".into()
     }
     pub fn emergency_stop_topic() -> String {
         "~/emergency_stop_request".into()
     }
     pub fn velocity_topic() -> String {
-        "/{name}/cmd_vel".into()
+        "{name}/cmd_vel".into()
     }
     pub fn settling() -> f64 {
         0.01

@@ -5,13 +5,18 @@ use serde::{Deserialize, Serialize};
 
 use super::defaults;
 
-/// Topics and messages of the node. `{name}` in a topic stands for the robot's name.
+/// Topics and messages of the node. `{name}` in a topic stands for the robot's name; a topic without a slash before it is
+/// below the fleet's namespace, which `--ros-args -r __ns:=/NAMESPACE` gives.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawNode {
     /// Frame of every pose (REP 105).
     #[serde(default = "defaults::frame_id")]
     pub frame_id: String,
+    /// Written before the frames that simulated robots carry, `{name}/base_link`; the fleet's namespace and a slash unless
+    /// given, and nothing in the root.
+    #[serde(default)]
+    pub frame_prefix: Option<String>,
     /// The message type of poses.
     #[serde(default)]
     pub pose_type: RawPoseType,
@@ -21,6 +26,9 @@ pub struct RawNode {
     /// Topic of each robot's target, a `geometry_msgs/PoseStamped`.
     #[serde(default = "defaults::target_topic")]
     pub target_topic: String,
+    /// Topic of the next place of each leader with an `external` program, a `geometry_msgs/PoseStamped`.
+    #[serde(default = "defaults::leader_topic")]
+    pub leader_topic: String,
     /// Publishes velocities towards the targets too.
     #[serde(default)]
     pub velocity: Option<RawVelocityType>,
@@ -43,9 +51,11 @@ impl Default for RawNode {
     fn default() -> Self {
         Self {
             frame_id: defaults::frame_id(),
+            frame_prefix: None,
             pose_type: RawPoseType::default(),
             pose_topic: defaults::pose_topic(),
             target_topic: defaults::target_topic(),
+            leader_topic: defaults::leader_topic(),
             velocity: None,
             velocity_topic: defaults::velocity_topic(),
             emergency_stop_topic: defaults::emergency_stop_topic(),
