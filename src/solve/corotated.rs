@@ -82,7 +82,7 @@ const DIRECT_UP_TO: usize = 200_000;
 pub fn choose(followers: usize, request: &Request) -> Result<(Solver, String), CorotatedError> {
     let (solver, why) = match request.solver {
         Choice::This(solver) => (solver, "asked for".into()),
-        Choice::Auto if cfg!(feature = "fem") && followers <= DIRECT_UP_TO => {
+        Choice::Auto if followers <= DIRECT_UP_TO => {
             (Solver::Direct, format!("{followers} followers are few enough to factorise"))
         }
         Choice::Auto => (

@@ -10,7 +10,7 @@
 //! * [`conjugate_gradients`]: the best that sweeps with memory can do without knowing the body's shape.
 //! * [`multigrid`]: conjugate gradients that let the whole body move and turn as well, on coarser and
 //!   coarser grids: the number of iterations does not grow with the body.
-//! * [`direct`]: a sparse factorisation (feature `fem`).
+//! * [`direct`]: a sparse factorisation.
 //!
 //! All of them reach the same equilibrium; [`solve`] says how it went, and [`choose`] which of them
 //! [`Choice::Auto`] is.
