@@ -5,6 +5,7 @@ pub mod problem;
 mod schema_check;
 mod schema_rule;
 
+use std::io::ErrorKind;
 use std::thread::ScopedJoinHandle;
 
 use serde::de::DeserializeOwned;
@@ -84,6 +85,7 @@ impl Document {
             match parser.spawn_scoped(scope, parse).map(ScopedJoinHandle::join) {
                 Ok(Ok(outcome)) => outcome,
                 Ok(Err(panic)) => std::panic::resume_unwind(panic),
+                Err(error) if error.kind() == ErrorKind::Unsupported => parse(),
                 Err(error) => Err(unread_problem(file, &error).into()),
             }
         })

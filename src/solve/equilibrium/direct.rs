@@ -1,8 +1,6 @@
 //! The direct solve: sparse Cholesky where the operator is symmetric, sparse LU elsewhere, both from the
 //! library faer.
 
-use std::time::Instant;
-
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::LltError;
 use faer::prelude::Solve;
@@ -16,9 +14,10 @@ use super::system::{Prepared, System};
 use super::{Found, SolveError, Solver, steps};
 use crate::flock::vectors::Vectors;
 use crate::solve::operator::{HELD, Matrix};
+use crate::solve::stopwatch::Stopwatch;
 
 pub(super) fn solve(prepared: &mut Prepared, system: &System) -> Result<Found, SolveError> {
-    let begin = Instant::now();
+    let begin = Stopwatch::start();
     let symmetric = system.asymmetric_pair().is_none();
     let sparse = Sparse::new(&prepared.matrix, symmetric);
     let mut unknowns = sparse.unknowns(&prepared.right);

@@ -29,13 +29,14 @@ mod rounding;
 mod steps;
 mod system;
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 pub use choice::choose;
 pub use error::SolveError;
 pub use system::System;
 
 use super::interrupt::Interrupt;
+use super::stopwatch::Stopwatch;
 use crate::flock::vectors::Vectors;
 use system::Prepared;
 
@@ -194,7 +195,7 @@ struct Found {
 
 /// Finds the equilibrium of a system.
 pub fn solve(system: &System, request: &Request) -> Result<Solved, SolveError> {
-    let begin = Instant::now();
+    let begin = Stopwatch::start();
     let allowed = request.tolerance > 0.0 && request.tolerance < 1.0;
     if !allowed {
         return Err(SolveError::Tolerance { tolerance: request.tolerance });
