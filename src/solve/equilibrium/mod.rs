@@ -166,7 +166,7 @@ pub struct Solved {
     pub iterations: usize,
     /// Relative residual before the first iteration, which is 1, and after each.
     pub residuals: Vec<f64>,
-    /// The phases of the solve and how long each took.
+    /// The phases of the solve and how long each took: zero where there is no clock, as in a browser.
     pub phases: Vec<(&'static str, Duration)>,
     /// Whether the tolerance was reached.
     pub converged: bool,
