@@ -25,6 +25,10 @@
 //! * `record` (feature `record`): recordings of flights and runs for Foxglove and `ros2 bag`, and their replay.
 //! * `bench` (feature `bench`): how fast sweeps and solvers are, beside what the machine and others can do.
 //!
+//! Features add rooms and never choose: what a room computes is the same whatever is built beside it.
+//! Without any, the crate builds for a browser too (`wasm32-unknown-unknown`): on one thread, with bundled scenes or
+//! scenes from text, and with every measured time zero, as there is no clock.
+//!
 //! A body in a few lines; [`Builder`] has more:
 //!
 //! ```

@@ -1,5 +1,7 @@
 //! What a run leaves behind: the folder, the tables, the frames and the figures.
 
+#![cfg(feature = "export")]
+
 use std::fs;
 use std::ops::ControlFlow;
 use std::path::Path;

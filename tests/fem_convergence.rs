@@ -1,5 +1,7 @@
 //! The finite elements against closed-form elasticity: errors, and the rates at which they fall.
 
+#![cfg(feature = "fem")]
+
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 
 use flockform::fem::{Axis, CellKind, Material, Mesh, Plane, Problem, Solution, solve};

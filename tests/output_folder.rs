@@ -1,5 +1,7 @@
 //! Whose files an output folder holds, and what becomes of them: `--force` removes what flockform wrote and nothing else.
 
+#![cfg(feature = "export")]
+
 use std::fs;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};

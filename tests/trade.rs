@@ -1,5 +1,7 @@
 //! What accuracy costs, and what is taken for an accuracy.
 
+#![cfg(feature = "fem")]
+
 use std::ops::ControlFlow;
 
 use flockform::fem::Effort;

@@ -9,9 +9,8 @@
 //! * `swarm` (feature `swarm`): robots served per millisecond: neighbour query, rule, safety filter, the whole tick;
 //!   with feature `ros` the time from a pose to its target over loopback.
 //! * `transport` (feature `shm`): what carrying poses costs: shared memory, sockets, DDS.
-//! * `equilibrium` (feature `fem`): seconds to equilibrium, beside a factorisation of the same system.
+//! * [`equilibrium`]: seconds to equilibrium, beside a factorisation of the same system.
 
-#[cfg(feature = "fem")]
 pub mod equilibrium;
 pub mod machine;
 #[cfg(feature = "swarm")]

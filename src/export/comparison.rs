@@ -16,6 +16,9 @@ use crate::study::compare::measures::Comparison;
 use crate::study::compare::places::PlaceComparison;
 use crate::study::compare::run::Compared;
 
+/// The file of a comparison, in place of a summary.
+const FILE: &str = "compare.json";
+
 /// The contents of `compare.json`; lengths in the scene's unit, infinities as `null`.
 #[derive(Clone, Debug, Serialize)]
 pub struct ComparisonReport {
@@ -151,7 +154,7 @@ pub fn write_comparison(
     let stresses = figures::von_mises(&pair, &compared.von_mises_rule, &compared.von_mises_truth);
     written.extend(figures::write(&figures::overlay(&pair), folder, "overlay")?);
     written.extend(figures::write(&stresses, folder, "von_mises")?);
-    let path = folder.path(summary::COMPARISON);
+    let path = folder.path(FILE);
     let mut text = serde_json::to_string_pretty(report).map_err(ExportError::io("write", &path))?;
     text.push('\n');
     write_file(&path, text)?;

@@ -14,6 +14,9 @@ use super::{OutputFolder, summary};
 use crate::scene::swarm::Swarm;
 use crate::swarm::flight::{FlightReport, Record, Sample, Verdict};
 
+/// The file of a flight, in place of a summary.
+const FILE: &str = "flight.json";
+
 #[derive(Serialize)]
 struct Report<'a> {
     program: &'static str,
@@ -55,7 +58,7 @@ pub fn write_flight(
     written.extend(figures::write(&flight_map::flight(swarm, record, report), folder, "flight")?);
     let errors = draw_below_each_other(&charts(record, report));
     written.extend(figures::write(&errors, folder, "errors")?);
-    let path = folder.path(summary::FLIGHT);
+    let path = folder.path(FILE);
     let (program, version) = (summary::PROGRAM, env!("CARGO_PKG_VERSION"));
     let whole = Report { program, version, holds: report.holds(), report, swarm: &swarm.raw };
     let text = serde_json::to_string_pretty(&whole).map_err(ExportError::io("write", &path))? + "\n";

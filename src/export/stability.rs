@@ -13,6 +13,9 @@ use super::{OutputFolder, summary};
 use crate::study::stability::bisection::Growth;
 use crate::study::stability::study::{Linear, Study, Sweep, Threshold};
 
+/// The file of a stability study, in place of a summary.
+const FILE: &str = "stability.json";
+
 #[derive(Serialize)]
 struct Report<'a> {
     program: &'static str,
@@ -44,7 +47,7 @@ pub fn write_stability(folder: &OutputFolder, study: &Study) -> Result<Vec<PathB
         written.push(write(folder, "growth.csv", rows(linear).into_iter())?);
         written.extend(figures::write(&figure(study, linear), folder, "growth")?);
     }
-    let path = folder.path(summary::STABILITY);
+    let path = folder.path(FILE);
     let text = json(study).map_err(ExportError::io("write", &path))?;
     write_file(&path, text)?;
     written.push(path);

@@ -23,19 +23,6 @@ use crate::solve::equilibrium::Solved;
 
 pub(super) const PROGRAM: &str = env!("CARGO_PKG_NAME");
 const FILE: &str = "summary.json";
-/// The file of a comparison, in place of a summary.
-pub(super) const COMPARISON: &str = "compare.json";
-/// The file of a trade study, in place of a summary.
-pub(super) const TRADE: &str = "trade.json";
-/// The file of a stability study, in place of a summary.
-pub(super) const STABILITY: &str = "stability.json";
-/// The file of a benchmark of transports, in place of a summary.
-pub(super) const TRANSPORT: &str = "transport.json";
-/// The file of a flight, in place of a summary.
-pub(super) const FLIGHT: &str = "flight.json";
-
-/// The file of a gallery, in place of a summary.
-pub(super) const GALLERY: &str = "gallery.json";
 
 /// Part of the forces on a body that may be left on a follower of one at rest \[1\].
 const AT_REST: f64 = 1e-6;

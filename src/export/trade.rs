@@ -13,6 +13,9 @@ use super::{OutputFolder, summary};
 use crate::solve::equilibrium::Solver;
 use crate::study::trade::{Outcome, Point, RuleChoice, Study};
 
+/// The file of a trade study, in place of a summary.
+const FILE: &str = "trade.json";
+
 #[derive(Serialize)]
 struct Report<'a> {
     program: &'static str,
@@ -46,7 +49,7 @@ pub fn write_trade(folder: &OutputFolder, study: &Study) -> Result<Vec<PathBuf>,
     let rows = study.points.iter().map(|point| row(point, front.contains(&point)));
     let mut written = vec![write(folder, "trade.csv", rows)?];
     written.extend(figures::write(&figure(study), folder, "trade")?);
-    let path = folder.path(summary::TRADE);
+    let path = folder.path(FILE);
     let report = Report { program: summary::PROGRAM, version: env!("CARGO_PKG_VERSION"), study };
     let mut text = serde_json::to_string_pretty(&report).map_err(ExportError::io("write", &path))?;
     text.push('\n');

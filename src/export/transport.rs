@@ -13,6 +13,9 @@ use super::{OutputFolder, summary};
 use crate::bench::transport::Report;
 use crate::bench::transport::measure::{Case, Work};
 
+/// The file of a benchmark of transports, in place of a summary.
+const FILE: &str = "transport.json";
+
 #[derive(Serialize)]
 struct Whole<'a> {
     program: &'static str,
@@ -46,7 +49,7 @@ struct Row {
 pub fn write_transport(folder: &OutputFolder, report: &Report) -> Result<Vec<PathBuf>, ExportError> {
     let mut written = vec![write(folder, "transport.csv", report.cases.iter().map(row))?];
     written.extend(figures::write(&figure(report), folder, "transport")?);
-    let path = folder.path(summary::TRANSPORT);
+    let path = folder.path(FILE);
     let whole = Whole { program: summary::PROGRAM, version: env!("CARGO_PKG_VERSION"), report };
     let mut text = serde_json::to_string_pretty(&whole).map_err(ExportError::io("write", &path))?;
     text.push('\n');

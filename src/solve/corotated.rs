@@ -8,7 +8,7 @@
 //! Leaders go their way and loads grow in increments, halved where Newton's method does not settle or a cell turns too far
 //! at once: that keeps to the equilibrium that the unstrained body grows into.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use rayon::prelude::*;
 
@@ -17,6 +17,7 @@ use super::equilibrium::{
 };
 use super::linear::{NotLinear, outlier_places};
 use super::operator::{Operator, OperatorError, Row};
+use super::stopwatch::Stopwatch;
 use crate::flock::block::{Block, apply, plus};
 use crate::flock::body::Body;
 use crate::flock::law::{Flock, MatrixWeights, Weights};
@@ -82,7 +83,7 @@ const DIRECT_UP_TO: usize = 200_000;
 pub fn choose(followers: usize, request: &Request) -> Result<(Solver, String), CorotatedError> {
     let (solver, why) = match request.solver {
         Choice::This(solver) => (solver, "asked for".into()),
-        Choice::Auto if cfg!(feature = "fem") && followers <= DIRECT_UP_TO => {
+        Choice::Auto if followers <= DIRECT_UP_TO => {
             (Solver::Direct, format!("{followers} followers are few enough to factorise"))
         }
         Choice::Auto => (
@@ -394,7 +395,7 @@ impl Newton<'_> {
         (locals, left): (&[Option<Local>], Vectors),
         led: Vectors,
     ) -> Result<(), CorotatedError> {
-        let begin = Instant::now();
+        let begin = Stopwatch::start();
         let operator = self.rule.tangent(locals).map_err(NotLinear::Operator)?;
         let system = System::new(operator, left, led);
         let assembled = begin.elapsed();

@@ -9,3 +9,4 @@ pub mod interrupt;
 pub mod linear;
 pub mod operator;
 pub mod spectrum;
+pub(crate) mod stopwatch;

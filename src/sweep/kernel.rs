@@ -181,6 +181,9 @@ impl<T: Real, const P: usize> Work<'_, '_, T, P> {
     }
 }
 
+/// A tile that no body reaches the end of, of a size that 32 bits hold too.
+const WHOLE: usize = 1 << (usize::BITS - 2);
+
 struct Loops<'a, 'b, M, T, const P: usize>(Work<'a, 'b, T, P>, PhantomData<M>);
 
 impl<M: Mean, T: Real, const P: usize> InLanes for Loops<'_, '_, M, T, P> {
@@ -189,7 +192,7 @@ impl<M: Mean, T: Real, const P: usize> InLanes for Loops<'_, '_, M, T, P> {
         let Work { runs, tables, tile, components, after } = self.0;
         for abreast in runs.chunks(ABREAST) {
             // Runs with gaps are those of small bodies, which a tile gains nothing.
-            let tile = if abreast.iter().any(|run| run.gaps > 0) { 1 << 40 } else { tile };
+            let tile = if abreast.iter().any(|run| run.gaps > 0) { WHOLE } else { tile };
             let (mut corner, mut more) = (0, true);
             while more {
                 more = false;

@@ -11,6 +11,8 @@
 //! `tour.mjs` does what a reader does and says what there was to see; here is what should have been.
 //! `FLOCKFORM_CHROMIUM` names another browser than `/usr/bin/chromium`.
 
+#![cfg(feature = "cli")]
+
 use std::path::{Path, PathBuf};
 use std::process::Command;
 

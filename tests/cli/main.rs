@@ -1,5 +1,7 @@
 //! The program as a person meets it: what it prints, what it writes, and how it refuses.
 
+#![cfg(feature = "cli")]
+
 mod checkpoint;
 mod compare;
 mod documents;

@@ -1,5 +1,7 @@
 //! Rule and truth on the same body.
 
+#![cfg(feature = "fem")]
+
 mod beam;
 mod measured;
 #[cfg(feature = "export")]

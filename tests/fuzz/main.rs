@@ -3,6 +3,8 @@
 //! Good files are damaged at random, by proptest, for `FLOCKFORM_FUZZ_SECONDS` each (one, unless given). A panic fails
 //! and is shrunk; so does a file that makes its reader take more memory or time than it is worth.
 
+#![cfg(all(feature = "export", feature = "record"))]
+
 mod checkpoints;
 mod recordings;
 mod texts;

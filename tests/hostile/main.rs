@@ -3,6 +3,8 @@
 //! `cargo test --test hostile` runs what takes seconds; the others take a minute or so each:
 //! `cargo test --test hostile -- --ignored --test-threads=1`.
 
+#![cfg(feature = "cli")]
+
 mod commands;
 mod disk;
 mod environment;

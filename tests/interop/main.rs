@@ -14,6 +14,8 @@
 //! as rmw_cyclonedds_cpp does: requests carry its 16 byte header. Its Python package cannot put a request's
 //! identity beside the payload, so the enhanced mapping is tested in `ros_edge`, with ros2-client.
 
+#![cfg(feature = "cli")]
+
 mod edge;
 mod faults;
 mod flight;

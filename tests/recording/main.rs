@@ -7,6 +7,8 @@
 //! FLOCKFORM_PYTHON=venv/bin/python cargo test --test recording -- --ignored
 //! ```
 
+#![cfg(feature = "cli")]
+
 mod program;
 mod read_back;
 mod replays;

@@ -1,6 +1,8 @@
 //! `--ros-args` and the environment, held against the rules of the ROS 2 design articles "ROS Command
 //! Line Arguments" and "Remapping Names", and against what `rcl` implements of them.
 
+#![cfg(feature = "ros")]
+
 mod any_input;
 mod environment;
 mod grammar;

@@ -3,6 +3,8 @@
 //! The tests share the participants and take turns: DDS discovery is slow on a busy computer, and each
 //! participant costs sockets and threads. Every wait is bounded.
 
+#![cfg(feature = "ros")]
+
 mod commands;
 mod formation;
 mod graph;

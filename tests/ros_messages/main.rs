@@ -1,6 +1,8 @@
 //! The message structs against their definitions: names, order and types of the fields, constants,
 //! and the bytes on the wire.
 
+#![cfg(feature = "ros")]
+
 mod definition;
 mod package;
 mod payloads;

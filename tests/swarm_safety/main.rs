@@ -1,5 +1,7 @@
 //! The safety filter on whole scenes: nobody comes nearer than declared, and who can arrive does.
 
+#![cfg(feature = "swarm")]
+
 mod random_flights;
 
 use flockform::flock::vectors::{Vectors, distance};

@@ -3,6 +3,8 @@
 //! [`promises`] are written once against the two ends of a transport; each transport's file calls them and adds what
 //! it alone can break. Processes that are killed are this test program, started again with a task ([`child`]).
 
+#![cfg(feature = "cli")]
+
 mod child;
 mod in_process;
 mod killed;

@@ -11,6 +11,9 @@ use super::super::figures;
 use super::super::{OutputFolder, summary};
 use super::page::{FILE, STYLE, escaped, filled};
 
+/// The file of a gallery, in place of a summary.
+const LIST: &str = "gallery.json";
+
 const PAGE: &str = include_str!("web/gallery.html");
 /// Width of a picture \[pixel\].
 const WIDTH: u32 = 540;
@@ -76,7 +79,7 @@ pub fn write_gallery(folder: &OutputFolder, exhibits: &[Exhibit]) -> Result<Vec<
     let page = filled(PAGE, &[("program", program), ("style", STYLE.into()), ("sections", sections)]);
     let index = folder.path("index.html");
     write_file(&index, page)?;
-    let path = folder.path(summary::GALLERY);
+    let path = folder.path(LIST);
     let list = List { program: summary::PROGRAM, version: env!("CARGO_PKG_VERSION"), exhibits };
     let text = serde_json::to_string_pretty(&list).map_err(ExportError::io("write", &path))? + "\n";
     write_file(&path, text)?;

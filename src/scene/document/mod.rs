@@ -5,6 +5,7 @@ pub mod problem;
 mod schema_check;
 mod schema_rule;
 
+use std::io::ErrorKind;
 use std::thread::ScopedJoinHandle;
 
 use serde::de::DeserializeOwned;
@@ -20,6 +21,9 @@ pub(crate) const MAX_DEPTH: usize = 64;
 
 /// Room for the parser to build, and drop, what it does not itself keep from nesting deeply: up to eighty
 /// inline tables, each under a dotted key of up to eighty steps.
+///
+/// Where there are no threads, as in a browser, the parser has the stack of its caller. Optimised, the deepest such
+/// document takes about half of the 1 MiB usual there; a build that needs more for it ends in a trap.
 const PARSER_STACK_BYTES: usize = 64 << 20;
 
 /// Values longer than this are abbreviated in messages.
@@ -84,6 +88,8 @@ impl Document {
             match parser.spawn_scoped(scope, parse).map(ScopedJoinHandle::join) {
                 Ok(Ok(outcome)) => outcome,
                 Ok(Err(panic)) => std::panic::resume_unwind(panic),
+                // No threads on this platform at all.
+                Err(error) if error.kind() == ErrorKind::Unsupported => parse(),
                 Err(error) => Err(unread_problem(file, &error).into()),
             }
         })

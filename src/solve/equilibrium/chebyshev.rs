@@ -5,13 +5,12 @@
 //! (Lanczos); where the residual shrinks more slowly than the bounds promise, the bound was too high and is
 //! lowered, and the iteration begins anew from where it is.
 
-use std::time::Instant;
-
 use super::history::History;
 use super::lanczos::Bounds;
 use super::system::Prepared;
 use super::{Found, Request, SolveError, Solver, lanczos, steps};
 use crate::flock::vectors::Vectors;
+use crate::solve::stopwatch::Stopwatch;
 
 /// Lanczos steps for the bounds.
 const ESTIMATE: usize = 60;
@@ -20,7 +19,7 @@ const ESTIMATE: usize = 60;
 const SAFETY: f64 = 1.02;
 
 pub(super) fn solve(prepared: &mut Prepared, request: &Request) -> Result<Found, SolveError> {
-    let begin = Instant::now();
+    let begin = Stopwatch::start();
     let Prepared { matrix, stencils, right, size, .. } = prepared;
     let Bounds { low, high } = lanczos::both(matrix, stencils, ESTIMATE);
     if low <= 0.0 {

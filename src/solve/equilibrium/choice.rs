@@ -17,14 +17,13 @@ pub fn choose(system: &System, request: &Request) -> (Solver, String) {
         return (solver, "asked for".into());
     }
     let followers = system.operator.followers();
-    let has_direct = cfg!(feature = "fem");
     if system.asymmetric_pair().is_some() {
         return choose_unsymmetric(followers, "neighbours do not feel each other alike");
     }
     if request.precision == Precision::F32 {
         return (Solver::Multigrid, "in single precision only iterations are offered".into());
     }
-    if has_direct && followers <= DIRECT_UP_TO {
+    if followers <= DIRECT_UP_TO {
         let why = format!("{followers} followers are factorised before an iteration has begun");
         return (Solver::Direct, why);
     }
@@ -33,7 +32,7 @@ pub fn choose(system: &System, request: &Request) -> (Solver, String) {
 
 /// The solver for so many followers whose operator has no symmetry, for the reason given.
 fn choose_unsymmetric(followers: usize, because: &str) -> (Solver, String) {
-    if cfg!(feature = "fem") && followers <= UNSYMMETRIC_UP_TO {
+    if followers <= UNSYMMETRIC_UP_TO {
         (Solver::Direct, format!("{because}, and {followers} followers are few enough to factorise"))
     } else {
         (Solver::GaussSeidel, format!("{because}, which rules out the faster iterations"))

@@ -4,8 +4,6 @@
 //! itself the solver takes `D^-1` for a preconditioner: the rule's own step is the direction that it makes
 //! conjugate to those before. With [`super::multigrid`] the number of iterations stops growing.
 
-use std::time::Instant;
-
 use super::history::History;
 use super::steps::for_groups;
 use super::system::Prepared;
@@ -13,6 +11,7 @@ use super::{Found, Precision, Request, SolveError, Solver, steps};
 use crate::flock::vectors::Vectors;
 use crate::solve::field::{Real, VectorsRef, dot};
 use crate::solve::operator::{Matrix, RowCoefficients};
+use crate::solve::stopwatch::Stopwatch;
 
 /// An approximation of `K^-1`, symmetric and positive.
 pub(super) trait Preconditioner<T: Real> {
@@ -75,7 +74,7 @@ pub(super) fn iterate<T: Real, P: Preconditioner<T>>(
     request: &Request,
     solver: Solver,
 ) -> Result<Found, SolveError> {
-    let begin = Instant::now();
+    let begin = Stopwatch::start();
     let matrix = &prepared.matrix;
     let mut r = right;
     let zeros = || Vectors::<T>::zeros(r.len());

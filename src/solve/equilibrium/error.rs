@@ -92,9 +92,6 @@ pub enum SolveError {
         /// Residual after them, relative to the first \[1\].
         residual: f64,
     },
-    /// The direct solver was asked of a build without it.
-    #[error("this build has no direct solver: build with the feature `fem`, or take multigrid")]
-    NoDirect,
     /// The direct solver's factorisation broke down.
     #[error("the factorisation of {unknowns} unknowns failed: {reason}")]
     Factorisation {

@@ -4,16 +4,15 @@
 //! colours follow from column and row alone: the result depends neither on the numbering nor on threads.
 //! For a positive operator it always converges (A. M. Ostrowski 1954), whatever the largest eigenvalue.
 
-use std::time::Instant;
-
 use super::history::History;
 use super::system::Prepared;
 use super::{Found, Request, SolveError, Solver, steps};
 use crate::flock::vectors::Vectors;
 use crate::solve::operator::{Matrix, RowCoefficients};
+use crate::solve::stopwatch::Stopwatch;
 
 pub(super) fn solve(prepared: &mut Prepared, request: &Request) -> Result<Found, SolveError> {
-    let begin = Instant::now();
+    let begin = Stopwatch::start();
     let Prepared { matrix, stencils, right, size, .. } = prepared;
     let colours = colours(matrix);
     let mut u = Vectors::zeros(matrix.count());

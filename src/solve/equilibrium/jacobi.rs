@@ -4,14 +4,13 @@
 //! shrinks by `1 - w` times the smallest eigenvalue at each step. Where neighbours feel each other alike
 //! the largest eigenvalue is estimated (Lanczos); elsewhere the norm of the rows bounds it.
 
-use std::time::Instant;
-
 use super::history::History;
 use super::system::Prepared;
 use super::{Found, Request, SolveError, Solver, lanczos, steps};
 use crate::flock::block::{inverse, product};
 use crate::flock::vectors::Vectors;
 use crate::solve::operator::Matrix;
+use crate::solve::stopwatch::Stopwatch;
 
 /// Share of the largest damping that converges; below 1 since the eigenvalue is estimated from within,
 /// and the largest mode would not shrink at 1.
@@ -21,7 +20,7 @@ const SHARE: f64 = 0.96;
 const ESTIMATE: usize = 20;
 
 pub(super) fn solve(prepared: &mut Prepared, request: &Request) -> Result<Found, SolveError> {
-    let begin = Instant::now();
+    let begin = Stopwatch::start();
     let Prepared { matrix, stencils, right, size, symmetric, .. } = prepared;
     let bound = largest_row(matrix);
     let largest = if *symmetric { lanczos::largest(matrix, stencils, ESTIMATE).min(bound) } else { bound };

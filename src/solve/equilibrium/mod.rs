@@ -10,7 +10,7 @@
 //! * [`conjugate_gradients`]: the best that sweeps with memory can do without knowing the body's shape.
 //! * [`multigrid`]: conjugate gradients that let the whole body move and turn as well, on coarser and
 //!   coarser grids: the number of iterations does not grow with the body.
-//! * [`direct`]: a sparse factorisation (feature `fem`).
+//! * [`direct`]: a sparse factorisation.
 //!
 //! All of them reach the same equilibrium; [`solve`] says how it went, and [`choose`] which of them
 //! [`Choice::Auto`] is.
@@ -29,13 +29,14 @@ mod rounding;
 mod steps;
 mod system;
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 pub use choice::choose;
 pub use error::SolveError;
 pub use system::System;
 
 use super::interrupt::Interrupt;
+use super::stopwatch::Stopwatch;
 use crate::flock::vectors::Vectors;
 use system::Prepared;
 
@@ -165,7 +166,7 @@ pub struct Solved {
     pub iterations: usize,
     /// Relative residual before the first iteration, which is 1, and after each.
     pub residuals: Vec<f64>,
-    /// The phases of the solve and how long each took.
+    /// The phases of the solve and how long each took: zero where there is no clock, as in a browser.
     pub phases: Vec<(&'static str, Duration)>,
     /// Whether the tolerance was reached.
     pub converged: bool,
@@ -194,7 +195,7 @@ struct Found {
 
 /// Finds the equilibrium of a system.
 pub fn solve(system: &System, request: &Request) -> Result<Solved, SolveError> {
-    let begin = Instant::now();
+    let begin = Stopwatch::start();
     let allowed = request.tolerance > 0.0 && request.tolerance < 1.0;
     if !allowed {
         return Err(SolveError::Tolerance { tolerance: request.tolerance });

@@ -1,7 +1,7 @@
 //! Rule and truth of a scene.
 
 use std::ops::ControlFlow;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use super::measures::{Comparison, Sides, von_mises};
 use super::places::{PlaceComparison, compare_places};
@@ -21,6 +21,7 @@ use crate::flock::vectors::Vectors;
 use crate::material::cells::Cells;
 use crate::material::elastic::Elastic;
 use crate::scene::{LeaderMotion, Scene, SceneError};
+use crate::solve::stopwatch::Stopwatch;
 
 /// The truth of a scene's body in its material, under its loads, clamps and leaders.
 #[derive(Clone, Debug)]
@@ -64,7 +65,7 @@ pub struct Compared {
 /// Names the key of the scene for which there is no truth: no material, a body without an outline, a body that nothing
 /// holds, a leader outside the shape.
 pub fn truth_of(scene: &Scene, effort: &Effort) -> Result<SceneTruth, SceneError> {
-    let start = Instant::now();
+    let start = Stopwatch::start();
     let layout = Layout::new(scene)?;
     let Some(elastic) = scene.material else { return Err(without_material(scene)) };
     let Some(outline) = &layout.outline else {
@@ -120,7 +121,7 @@ pub fn compare(
 ) -> Result<Compared, SceneError> {
     require_comparable(scene)?;
     let truth = truth_of(scene, effort)?;
-    let start = Instant::now();
+    let start = Stopwatch::start();
     let plan = plan_led_by(scene, &truth.truth)?;
     let cells = plan.setup.cells.clone().unwrap_or_else(|| Cells::of_body(&plan.setup.body));
     let outcome = run_to_equilibrium(scene, plan, watch)?;

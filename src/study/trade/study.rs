@@ -1,7 +1,6 @@
 //! Runs the settings and holds them against the truth.
 
 use std::fmt;
-use std::time::Instant;
 
 use serde::Serialize;
 
@@ -11,6 +10,7 @@ use crate::continuum::run::Outcome as RunOutcome;
 use crate::flock::role::Role;
 use crate::flock::vectors::{Vectors, distance};
 use crate::scene::{Scene, SceneError};
+use crate::solve::stopwatch::Stopwatch;
 use crate::study::compare::reference::Effort;
 use crate::study::compare::reference::Reference;
 use crate::study::compare::run::{SceneTruth, plan_led_by, truth_of};
@@ -146,7 +146,7 @@ fn measure(scene: &Scene, truth: &Reference, setting: Setting, particles: usize,
     let mut seconds = Vec::new();
     let mut last = None;
     for _ in 0..repeats.max(1) {
-        let start = Instant::now();
+        let start = Stopwatch::start();
         let settled = plan_led_by(scene, truth).and_then(|plan| match &scene.equilibrium {
             Some(asked) => solve_equilibrium(scene, &asked.request, plan),
             None => Err(scene.refuse("equilibrium", "no solver is set", "set one")),

@@ -20,8 +20,6 @@ mod envelope;
 mod tests;
 mod transfer;
 
-use std::time::Instant;
-
 use self::envelope::Envelope;
 use self::transfer::{OutlierShares, Transfer};
 use super::conjugate_gradients::{Preconditioner, iterate, iterate_single, single_scale};
@@ -31,6 +29,7 @@ use super::{Found, Precision, Request, SolveError, Solver, lanczos, steps};
 use crate::flock::vectors::Vectors;
 use crate::solve::field::{Real, dot};
 use crate::solve::operator::{Matrix, RowCoefficients};
+use crate::solve::stopwatch::Stopwatch;
 
 /// Nodes of the coarsest level: fewer are not worth another level.
 const COARSEST: usize = 640;
@@ -48,7 +47,7 @@ const SAFETY: f64 = 1.04;
 const SMOOTHED: f64 = 5.0;
 
 pub(super) fn solve(prepared: &mut Prepared, request: &Request) -> Result<Found, SolveError> {
-    let begin = Instant::now();
+    let begin = Stopwatch::start();
     let right = std::mem::take(&mut prepared.right);
     let mut cycle = Cycle::new(&prepared.matrix, prepared.grid)?;
     let set_up = begin.elapsed();
