@@ -7,7 +7,7 @@
 
 use std::collections::{HashMap, HashSet};
 
-use super::near::Buckets;
+use super::near::NearPieces;
 use super::sites::{NearSite, Sites, State};
 use super::{FitError, ROUNDING, Scale, is_kept_corner, order};
 use crate::flock::lattice::{Lattice, Site};
@@ -126,12 +126,12 @@ pub fn ways(face: &[u32]) -> impl Iterator<Item = [u32; 2]> + '_ {
 /// # Errors
 /// A place where the outline has finer details than cells can follow.
 pub fn cut(
-    (lattice, outline, buckets): (&Lattice, &Partition, &Buckets),
+    (lattice, outline, near): (&Lattice, &Partition, &NearPieces),
     scale: &Scale,
     sites: &Sites,
 ) -> Result<Faces, FitError> {
     let mut cutter = Cutter::new(lattice, outline, scale, sites);
-    cutter.cross_sides(buckets);
+    cutter.cross_sides(near);
     cutter.add_corners()?;
     cutter.chain()?;
     cutter.faces()
@@ -262,14 +262,14 @@ impl<'a> Cutter<'a> {
     }
 
     /// Nodes where the outline crosses the sides of cells.
-    fn cross_sides(&mut self, buckets: &Buckets) {
+    fn cross_sides(&mut self, near: &NearPieces) {
         let mut keys: Vec<SideKey> = self.beside.keys().copied().collect();
         keys.sort_unstable();
         for key in keys {
             let ends = key.map(|site| self.nodes[self.node_of(site) as usize]);
             let [a, b] = ends.map(|node| node.point);
             let mut found: Vec<(f64, Place)> = Vec::new();
-            for [ring, piece] in buckets.around(a, b, 0.0) {
+            for [ring, piece] in near.around(a, b) {
                 let crossings = meetings(a, b, self.outline.piece(ring, piece)).into_iter();
                 found.extend(crossings.map(|[s, t]| (s, Place { ring, piece, t })));
             }
