@@ -5,6 +5,7 @@
 //! by itself; nodes on its sides are shared with its neighbours, and the parts fit together by construction. Lines inside,
 //! along which regions of the body meet, cut in the same way, and both parts stay.
 
+use std::cell::OnceCell;
 use std::collections::{HashMap, HashSet};
 
 use super::near::NearPieces;
@@ -12,6 +13,7 @@ use super::sites::{NearSite, Sites, State};
 use super::{FitError, ROUNDING, Scale, is_kept_corner, order};
 use crate::flock::lattice::{Lattice, Site};
 use crate::flock::vectors::distance;
+use crate::geometry::locate::Finder;
 use crate::geometry::meeting::meetings;
 use crate::geometry::outline::Place;
 use crate::geometry::partition::Partition;
@@ -172,6 +174,8 @@ struct Cutter<'a> {
     corners: HashMap<[usize; 2], u32>,
     /// Sides along lines inside, either way.
     interfaces: HashSet<[u32; 2]>,
+    /// For the few parts of cells of which nothing else says whether they are inside.
+    finder: OnceCell<Finder<'a>>,
 }
 
 impl<'a> Cutter<'a> {
@@ -189,6 +193,7 @@ impl<'a> Cutter<'a> {
             cuts: HashMap::new(),
             corners: HashMap::new(),
             interfaces: HashSet::new(),
+            finder: OnceCell::new(),
         };
         cutter.lattice_nodes();
         cutter.collect_candidates();
@@ -604,7 +609,8 @@ impl<'a> Cutter<'a> {
             let p = self.nodes[node as usize].point;
             [x + p[0], y + p[1]]
         });
-        Ok(self.outline.outline().contains(sum.map(|v| v / part.len() as f64)))
+        let finder = self.finder.get_or_init(|| Finder::new(self.outline.outline()));
+        Ok(finder.contains(sum.map(|v| v / part.len() as f64)))
     }
 }
 
