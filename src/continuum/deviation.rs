@@ -2,7 +2,8 @@
 
 use super::plan::Plan;
 use crate::flock::vectors::distance;
-use crate::geometry::outline::Outline;
+use crate::geometry::locate::Finder;
+use crate::geometry::outline::{Outline, Piece};
 use crate::material::cells::Cells;
 use crate::material::stiffness::area;
 
@@ -38,10 +39,11 @@ fn farthest(plan: &Plan, cells: &Cells, outline: &Outline) -> f64 {
     let sides = cells.boundary_sides(&cells.incidence(reference.len()));
     let pieces = outline.pieces().count();
     let stride = (sides.len().saturating_mul(3 * pieces) / MOST_DISTANCES).max(1);
+    let finder = Finder::new(outline);
     let off = |side: &[u32; 2]| {
         let [a, b] = side.map(|i| reference.get(i as usize));
         let middle = [0, 1].map(|k| 0.5 * (a[k] + b[k]));
-        [a, middle].into_iter().map(|p| outline.nearest(p).1).fold(0.0, f64::max)
+        [a, middle].into_iter().map(|p| finder.nearest(p).1).fold(0.0, f64::max)
     };
     sides.iter().step_by(stride).map(off).fold(0.0, f64::max)
 }
@@ -49,23 +51,27 @@ fn farthest(plan: &Plan, cells: &Cells, outline: &Outline) -> f64 {
 /// The pieces of an outline as a scene names them, a line each, at most so many.
 pub fn pieces(outline: &Outline, most: usize) -> Vec<String> {
     let point = |[x, y]: [f64; 2]| format!("({x:.6}, {y:.6})").replace(".000000", "");
-    let mut lines: Vec<(usize, usize, String)> = outline
-        .pieces()
-        .map(|(ring, _, piece)| {
-            let hole = if ring == 0 { String::new() } else { format!("hole {ring}, ") };
-            let ends = format!("from {} to {}", point(piece.from), point(piece.to));
-            let what = match &piece.arc {
-                None => format!("edge {ends}"),
-                Some(arc) if distance(piece.from, piece.to) == 0.0 => {
-                    format!("circle about {}, radius {:.6}", point(arc.centre), arc.radius)
-                }
-                Some(arc) => format!("arc about {}, radius {:.6}, {ends}", point(arc.centre), arc.radius),
-            };
-            (ring, piece.number, format!("{hole}{}: {what}", piece.number + 1))
-        })
-        .collect();
+    let line = |(ring, piece): (usize, &Piece)| {
+        let hole = if ring == 0 { String::new() } else { format!("hole {ring}, ") };
+        let ends = format!("from {} to {}", point(piece.from), point(piece.to));
+        let what = match &piece.arc {
+            None => format!("edge {ends}"),
+            Some(arc) if distance(piece.from, piece.to) == 0.0 => {
+                format!("circle about {}, radius {:.6}", point(arc.centre), arc.radius)
+            }
+            Some(arc) => format!("arc about {}, radius {:.6}, {ends}", point(arc.centre), arc.radius),
+        };
+        (ring, piece.number, format!("{hole}{}: {what}", piece.number + 1))
+    };
+    let mut pieces: Vec<(usize, &Piece)> = outline.pieces().map(|(ring, _, piece)| (ring, piece)).collect();
+    pieces.sort_by_key(|(ring, piece)| (*ring, piece.number));
+    let left_out = pieces.len().saturating_sub(most);
+    // The parts of a piece that is divided have one number: all of them are needed to say which lines come first.
+    let last = pieces.get(most).map(|(ring, piece)| (*ring, piece.number));
+    let first =
+        pieces.iter().take_while(|(ring, piece)| last.is_none_or(|last| (*ring, piece.number) <= last));
+    let mut lines: Vec<(usize, usize, String)> = first.copied().map(line).collect();
     lines.sort();
-    let left_out = lines.len().saturating_sub(most);
     let mut lines: Vec<String> = lines.into_iter().take(most).map(|(.., line)| line).collect();
     if left_out > 0 {
         lines.push(format!("and {left_out} more"));

@@ -1,6 +1,6 @@
 //! From a scene to its body: particles, their neighbours, the cells between them, and their roles.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 
 use crate::engine::setup::RoleChange;
 use crate::flock::body::{Body, BodyError, Cut};
@@ -11,6 +11,7 @@ use crate::flock::region::{Region, Side};
 use crate::flock::role::Role;
 use crate::flock::rules::{Axis, Mean};
 use crate::flock::vectors::{Vectors, distance};
+use crate::geometry::locate::Finder;
 use crate::geometry::outline::{Outline, OutlineError, Place};
 use crate::geometry::partition::{Partition, PartitionError};
 use crate::geometry::portion::{Portion, Selection};
@@ -281,7 +282,8 @@ impl Layout {
             Some(known) => (0..self.body.count()).filter_map(|i| Some((i, known.places[i]?))).collect(),
             None => {
                 let boundary = Region::Boundary.pick(&self.body, &self.neighbours).into_iter();
-                boundary.map(|i| (i, outline.nearest(self.body.reference.get(i)).0)).collect()
+                let finder = Finder::new(outline);
+                boundary.map(|i| (i, finder.nearest(self.body.reference.get(i)).0)).collect()
             }
         };
         let is_on = |place: &Place| {
@@ -518,8 +520,8 @@ fn check_pieces(scene: &Scene, key: &str, region: &SceneRegion, outline: &Outlin
         };
         return Err(scene.refuse(&format!("{key}.hole"), message, "count body.holes from 1"));
     }
-    let has = |number: usize| rings[*ring].iter().any(|piece| piece.number == number);
-    match pieces.iter().position(|&number| !has(number)) {
+    let known: HashSet<usize> = rings[*ring].iter().map(|piece| piece.number).collect();
+    match pieces.iter().position(|number| !known.contains(number)) {
         None => Ok(()),
         Some(k) => {
             let most = rings[*ring].iter().map(|piece| piece.number + 1).max().unwrap_or(0);

@@ -11,8 +11,10 @@ use crate::flock::fracture::Threshold;
 use crate::flock::law::Weights;
 use crate::flock::role::Role;
 use crate::flock::rules::{FeedbackReference, Mean};
+use crate::flock::strain::Strain;
 use crate::material::outline_loads::Resultant;
 use crate::material::stiffness::area;
+use crate::material::stress::StressState;
 use crate::scene::{LoadSteps, Scene, SceneError, Weights as SceneWeights};
 use crate::sweep::{Order, Sweep};
 
@@ -203,7 +205,7 @@ fn facts(
         )
     });
     let outline = outline_facts(scene, plan, deviation);
-    let last = [("memory", format!("about {}", readable_bytes(memory(plan)))), ("stops", stop)];
+    let last = [("memory", format!("about {}", readable_bytes(memory(scene, plan)))), ("stops", stop)];
     let facts = first.into_iter().chain(swept.into_iter().flatten()).chain(moving).chain(last);
     Ok(facts.map(|(name, value)| (name.to_owned(), value)).chain(outline).collect())
 }
@@ -290,11 +292,34 @@ fn neighbour_entries(plan: &Plan) -> usize {
     }
 }
 
-/// Bytes that the run holds: positions (twice), reference, roles, sites, neighbour lists and what
+/// Bytes that the run holds when it writes its results, at its largest: what it steps, and [`results`].
+fn memory(scene: &Scene, plan: &Plan) -> usize {
+    stepped(plan) + results(scene, plan)
+}
+
+/// Bytes of configurations kept for figures, and of the last one in numbers.
+fn results(scene: &Scene, plan: &Plan) -> usize {
+    let is_solved_at_once = scene.equilibrium.is_some() && scene.load_steps.is_none();
+    let before = |figure: &&usize| !is_solved_at_once && **figure < plan.stop.steps;
+    // The last one is kept for its figure, and once more for the numbers.
+    let snapshots = scene.record.figures.iter().filter(before).count() + 2;
+    let stress = scene.material.map_or(0, |_| size_of::<Option<StressState>>());
+    plan.count() * (snapshots * SNAPSHOT + size_of::<Option<Strain>>() + stress)
+}
+
+/// Bytes of a particle in a [`Snapshot`](super::record::Snapshot): position, role and energies.
+const SNAPSHOT: usize = 16 + 1 + 2 * 8;
+
+/// Bytes that the steps take: positions (twice), reference, roles, sites, neighbour lists and what
 /// the scene adds to them.
-fn memory(plan: &Plan) -> usize {
+fn stepped(plan: &Plan) -> usize {
     let (count, bonds) = (plan.count(), neighbour_entries(plan));
     let present = |is: bool, bytes: usize| if is { bytes } else { 0 };
+    let cells = plan
+        .setup
+        .cells
+        .as_ref()
+        .map_or(0, |cells| 4 * (cells.starts.len() + cells.index.len() + cells.count()));
     count * (3 * 16 + 3 + 8 + 4)
         + bonds * 4
         + match &plan.setup.flock.weights {
@@ -305,6 +330,8 @@ fn memory(plan: &Plan) -> usize {
                 4 * count + 32 * weights.blocks.len() + cells
             }
         }
+        + cells
+        + 16 * count * plan.setup.loads.len()
         + present(plan.setup.flock.forces.is_some(), 16 * count)
         + present(plan.setup.flock.rest.is_some(), 16 * count)
         + present(plan.setup.flock.bonds.is_some(), bonds)

@@ -144,8 +144,10 @@ pub fn write_all(
     let strains: Vec<_> = (0..engine.body().count()).into_par_iter().map(|i| engine.strain(i)).collect();
     let largest_strain = strains.iter().flatten().map(Strain::largest).reduce(f64::max);
     let stresses = results.scene.material.as_ref().and_then(|elastic| Stresses::at_present(engine, elastic));
-    let stresses = stresses.as_ref().map(|stresses| &stresses.particles[..]);
-    let mut written = vec![csv::write_final(folder, engine.body(), &last, &strains, stresses)?];
+    let of_particles = stresses.as_ref().map(|stresses| &stresses.particles[..]);
+    let mut written = vec![csv::write_final(folder, engine.body(), &last, &strains, of_particles)?];
+    // Figures take memory of their own.
+    drop((strains, stresses));
     if !results.probes.is_empty() {
         written.push(csv::write_probes(folder, engine.body(), results.probes)?);
     }

@@ -8,6 +8,7 @@ use super::neighbourhood::{Neighbourhood, NeighbourhoodError, Neighbours};
 use super::numbering::Numbering;
 use super::vectors::Vectors;
 use super::window::Window;
+use crate::geometry::locate::Locator;
 use crate::geometry::outline::Place;
 use crate::geometry::shape::Shape;
 
@@ -297,19 +298,21 @@ impl SiteMap {
         }
         let mut map = Self { window, cells: vec![NOTHING; window.count() as usize] };
         let tolerance = 1e-9 * lattice.spacing();
+        let is_in: Box<dyn Fn(Site) -> bool> = match cut {
+            Cut::Count { columns, rows } => {
+                let steps = columns_per_site(lattice);
+                let within = |value: i32, most: u32| value >= 0 && i64::from(value) < i64::from(most);
+                Box::new(move |site| within(site[0], steps * columns) && within(site[1], *rows))
+            }
+            Cut::Shape(shape) => {
+                let locator = Locator::new(shape);
+                Box::new(move |site| locator.contains(lattice.position(site), tolerance))
+            }
+        };
         let mut found = false;
         for cell in 0..map.cells.len() {
             let site = map.window.site(cell);
-            let inside = lattice.is_site(site)
-                && match cut {
-                    Cut::Count { columns, rows } => {
-                        let steps = columns_per_site(lattice);
-                        let within = |value: i32, most: u32| value >= 0 && i64::from(value) < i64::from(most);
-                        within(site[0], steps * columns) && within(site[1], *rows)
-                    }
-                    Cut::Shape(shape) => shape.contains(lattice.position(site), tolerance),
-                };
-            if inside {
+            if lattice.is_site(site) && is_in(site) {
                 map.cells[cell] = BODY;
                 found = true;
             }

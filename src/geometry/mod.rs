@@ -2,6 +2,8 @@
 //!
 //! Lengths are in the unit of the shape's description, in the world frame; angles in radians, counter-clockwise.
 
+pub mod box_tree;
+pub mod locate;
 pub mod meeting;
 pub mod outline;
 pub mod partition;

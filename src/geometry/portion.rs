@@ -1,5 +1,6 @@
 //! Parts of an outline: what a load acts on and what a support holds.
 
+use std::collections::HashSet;
 use std::f64::consts::TAU;
 
 use super::outline::{Arc, Outline, Piece, Place};
@@ -99,7 +100,8 @@ impl Outline {
                 within(&|piece| within_disc(piece, *centre, radius + grain))
             }
             Selection::Pieces { ring, pieces, angles } => {
-                let is_asked = |number: usize| pieces.is_empty() || pieces.contains(&number);
+                let asked: HashSet<usize> = pieces.iter().copied().collect();
+                let is_asked = |number: usize| asked.is_empty() || asked.contains(&number);
                 let stretches = |piece: &Piece| match (angles, &piece.arc) {
                     (None, _) => vec![[0.0, 1.0]],
                     (Some(_), None) => Vec::new(),

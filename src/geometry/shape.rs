@@ -52,8 +52,8 @@ impl Shape {
             Shape::Disc { centre, radius } => {
                 (point[0] - centre[0]).hypot(point[1] - centre[1]) <= radius + tolerance
             }
-            Shape::Polygon { vertices } => polygon_contains(vertices, point, tolerance),
-            Shape::Path { pieces } => path_contains(pieces, point, tolerance),
+            Shape::Polygon { vertices } => polygon_contains(vertices, 0..vertices.len(), point, tolerance),
+            Shape::Path { pieces } => path_contains(pieces.iter(), point, tolerance),
             Shape::Specimen(specimen) => specimen.contains(point, tolerance),
             Shape::WithHoles { body, holes } => {
                 body.contains(point, tolerance) && !holes.iter().any(|hole| hole.contains(point, -tolerance))
@@ -97,11 +97,18 @@ impl Shape {
 /// The two ends of a straight line \[length\].
 pub type Segment = ([f64; 2], [f64; 2]);
 
-/// Even-odd test; a negative tolerance shrinks the polygon.
-fn polygon_contains(vertices: &[[f64; 2]], [x, y]: [f64; 2], tolerance: f64) -> bool {
+/// Even-odd test; a negative tolerance shrinks the polygon. Edges are numbered as the vertices at which they begin; only
+/// those near the point or to the right of it count.
+pub(super) fn polygon_contains(
+    vertices: &[[f64; 2]],
+    edges: impl Iterator<Item = usize>,
+    [x, y]: [f64; 2],
+    tolerance: f64,
+) -> bool {
     let mut inside = false;
     let mut nearest = f64::INFINITY;
-    for (k, &[ax, ay]) in vertices.iter().enumerate() {
+    for k in edges {
+        let [ax, ay] = vertices[k];
         let [bx, by] = vertices[(k + 1) % vertices.len()];
         if (ay > y) != (by > y) && x < ax + (y - ay) / (by - ay) * (bx - ax) {
             inside = !inside;
@@ -112,13 +119,17 @@ fn polygon_contains(vertices: &[[f64; 2]], [x, y]: [f64; 2], tolerance: f64) -> 
 }
 
 /// As [`polygon_contains`], with arcs as they are.
-fn path_contains(pieces: &[Piece], [x, y]: [f64; 2], tolerance: f64) -> bool {
-    let inside = is_inside(pieces.iter(), [x, y]);
+pub(super) fn path_contains<'a>(
+    pieces: impl Iterator<Item = &'a Piece> + Clone,
+    [x, y]: [f64; 2],
+    tolerance: f64,
+) -> bool {
+    let inside = is_inside(pieces.clone(), [x, y]);
     let away = |piece: &Piece| {
         let [px, py] = piece.point(piece.nearest([x, y]));
         (px - x).hypot(py - y)
     };
-    let nearest = pieces.iter().map(away).fold(f64::INFINITY, f64::min);
+    let nearest = pieces.map(away).fold(f64::INFINITY, f64::min);
     if tolerance >= 0.0 { inside || nearest <= tolerance } else { inside && nearest > -tolerance }
 }
 

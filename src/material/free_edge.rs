@@ -3,6 +3,7 @@
 use std::sync::OnceLock;
 
 use crate::flock::body::Body;
+use crate::geometry::locate::Finder;
 use crate::geometry::outline::{Outline, Place};
 use crate::material::cells::Cells;
 use crate::material::outline_loads::{Load, OutlineLoad};
@@ -66,9 +67,10 @@ impl FreeEdge {
         let loads: Option<Vec<Option<OutlineLoad>>> = self.loads.iter().map(outlined).collect();
         let loads: Vec<OutlineLoad> = loads.filter(|_| fits)?.into_iter().flatten().collect();
         let mut edge = Edge::default();
+        let finder = Finder::new(outline);
         for [a, b] in sides {
             let [from, to] = [a, b].map(|i| body.reference.get(i as usize));
-            let (place, _) = outline.nearest([0, 1].map(|k| 0.5 * (from[k] + to[k])));
+            let (place, _) = finder.nearest([0, 1].map(|k| 0.5 * (from[k] + to[k])));
             let piece = outline.piece(place.ring, place.piece);
             let (point, normal) = (piece.point(place.t), piece.normal(place.t));
             let acting = loads.iter().filter(|load| acts_at(load, &place)).map(|load| load.at(point, normal));

@@ -5,13 +5,15 @@
 //! by itself; nodes on its sides are shared with its neighbours, and the parts fit together by construction. Lines inside,
 //! along which regions of the body meet, cut in the same way, and both parts stay.
 
+use std::cell::OnceCell;
 use std::collections::{HashMap, HashSet};
 
-use super::near::Buckets;
+use super::near::NearPieces;
 use super::sites::{NearSite, Sites, State};
 use super::{FitError, ROUNDING, Scale, is_kept_corner, order};
 use crate::flock::lattice::{Lattice, Site};
 use crate::flock::vectors::distance;
+use crate::geometry::locate::Finder;
 use crate::geometry::meeting::meetings;
 use crate::geometry::outline::Place;
 use crate::geometry::partition::Partition;
@@ -126,12 +128,12 @@ pub fn ways(face: &[u32]) -> impl Iterator<Item = [u32; 2]> + '_ {
 /// # Errors
 /// A place where the outline has finer details than cells can follow.
 pub fn cut(
-    (lattice, outline, buckets): (&Lattice, &Partition, &Buckets),
+    (lattice, outline, near): (&Lattice, &Partition, &NearPieces),
     scale: &Scale,
     sites: &Sites,
 ) -> Result<Faces, FitError> {
     let mut cutter = Cutter::new(lattice, outline, scale, sites);
-    cutter.cross_sides(buckets);
+    cutter.cross_sides(near);
     cutter.add_corners()?;
     cutter.chain()?;
     cutter.faces()
@@ -172,6 +174,8 @@ struct Cutter<'a> {
     corners: HashMap<[usize; 2], u32>,
     /// Sides along lines inside, either way.
     interfaces: HashSet<[u32; 2]>,
+    /// For the few parts of cells of which nothing else says whether they are inside.
+    finder: OnceCell<Finder<'a>>,
 }
 
 impl<'a> Cutter<'a> {
@@ -189,6 +193,7 @@ impl<'a> Cutter<'a> {
             cuts: HashMap::new(),
             corners: HashMap::new(),
             interfaces: HashSet::new(),
+            finder: OnceCell::new(),
         };
         cutter.lattice_nodes();
         cutter.collect_candidates();
@@ -262,14 +267,14 @@ impl<'a> Cutter<'a> {
     }
 
     /// Nodes where the outline crosses the sides of cells.
-    fn cross_sides(&mut self, buckets: &Buckets) {
+    fn cross_sides(&mut self, near: &NearPieces) {
         let mut keys: Vec<SideKey> = self.beside.keys().copied().collect();
         keys.sort_unstable();
         for key in keys {
             let ends = key.map(|site| self.nodes[self.node_of(site) as usize]);
             let [a, b] = ends.map(|node| node.point);
             let mut found: Vec<(f64, Place)> = Vec::new();
-            for [ring, piece] in buckets.around(a, b, 0.0) {
+            for [ring, piece] in near.around(a, b) {
                 let crossings = meetings(a, b, self.outline.piece(ring, piece)).into_iter();
                 found.extend(crossings.map(|[s, t]| (s, Place { ring, piece, t })));
             }
@@ -604,7 +609,8 @@ impl<'a> Cutter<'a> {
             let p = self.nodes[node as usize].point;
             [x + p[0], y + p[1]]
         });
-        Ok(self.outline.outline().contains(sum.map(|v| v / part.len() as f64)))
+        let finder = self.finder.get_or_init(|| Finder::new(self.outline.outline()));
+        Ok(finder.contains(sum.map(|v| v / part.len() as f64)))
     }
 }
 

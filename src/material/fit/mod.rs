@@ -25,7 +25,7 @@ mod tidy;
 use std::sync::Arc;
 
 use self::cut::{Faces, Node};
-use self::near::Buckets;
+use self::near::NearPieces;
 use self::sites::Sites;
 use super::cells::{Cells, templates};
 use super::stiffness::area;
@@ -187,10 +187,10 @@ pub fn fit(lattice: &Lattice, outline: &Outline) -> Result<Fitted, FitError> {
 /// As [`fit`].
 pub fn fit_regions(lattice: &Lattice, outline: &Partition) -> Result<Fitted, FitError> {
     let scale = Scale::of(lattice);
-    let buckets = Buckets::new(outline, scale.diameter);
-    narrow::require_wide(outline, &buckets, scale.spacing)?;
+    let near = NearPieces::new(outline, scale.diameter);
+    narrow::require_wide(outline, &near, scale.spacing)?;
     let sites = Sites::find(lattice, outline, &scale)?;
-    let mut faces = cut::cut((lattice, outline, &buckets), &scale, &sites)?;
+    let mut faces = cut::cut((lattice, outline, &near), &scale, &sites)?;
     tidy::tidy(&mut faces, &scale);
     Ok(Assembly { lattice, outline, scale: &scale, sites: &sites, faces: &faces }.body())
 }

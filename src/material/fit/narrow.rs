@@ -1,6 +1,6 @@
 //! Whether a shape is everywhere as wide as the lattice is fine.
 
-use super::near::Buckets;
+use super::near::NearPieces;
 use super::{FitError, ROUNDING};
 use crate::flock::vectors::distance;
 use crate::geometry::meeting::meetings;
@@ -11,7 +11,7 @@ use crate::geometry::partition::Partition;
 ///
 /// # Errors
 /// A hole smaller than the spacing; the first place where the opposite side is nearer than that.
-pub fn require_wide(outline: &Partition, buckets: &Buckets, spacing: f64) -> Result<(), FitError> {
+pub fn require_wide(outline: &Partition, near: &NearPieces, spacing: f64) -> Result<(), FitError> {
     for hole in 1..outline.outline().rings().len() {
         let pieces = &outline.rings()[hole];
         let across = |k: usize| {
@@ -33,7 +33,7 @@ pub fn require_wide(outline: &Partition, buckets: &Buckets, spacing: f64) -> Res
         for t in (0..count).map(|k| (k as f64 + 0.5) / count as f64) {
             let (place, normal) = (piece.point(t), piece.normal(t));
             for across in sides.iter().map(|side| [0, 1].map(|k| place[k] + side * spacing * normal[k])) {
-                for [other_ring, other] in buckets.around(place, across, 0.0) {
+                for [other_ring, other] in near.around(place, across) {
                     let is_same = [other_ring, other] == [ring, number];
                     let other = outline.piece(other_ring, other);
                     if if is_same { piece.arc.is_none() } else { is_beside(other) } {

@@ -1,17 +1,22 @@
-//! Which pieces of an outline and of the lines inside are near: a grid of buckets.
+//! Which pieces of an outline and of the lines inside are near.
 
-use std::collections::HashMap;
-
+use crate::geometry::box_tree::BoxTree;
+use crate::geometry::locate::tree_of;
 use crate::geometry::outline::Piece;
 use crate::geometry::partition::Partition;
 
-/// Pieces by the buckets that they pass.
+/// The part of a cell's diameter by which boxes are widened: lines that are parallel but for rounding meet where a ten
+/// thousandth of their distance is lost.
+const MARGIN: f64 = 1e-3;
+
+/// Pieces sorted by where they are.
 #[derive(Debug)]
-pub struct Buckets {
-    /// Side of a bucket \[length\].
-    side: f64,
-    origin: [f64; 2],
-    pieces: HashMap<[i32; 2], Vec<[usize; 2]>>,
+pub struct NearPieces {
+    tree: BoxTree,
+    /// Loop and number of each piece of the tree, ascending.
+    numbers: Vec<[usize; 2]>,
+    /// \[length\]
+    margin: f64,
 }
 
 /// Parts of a piece, each about as long as `length`: lowest and highest coordinates \[length\].
@@ -27,37 +32,22 @@ pub fn stretches(piece: &Piece, length: f64) -> impl Iterator<Item = ([f64; 2], 
     })
 }
 
-impl Buckets {
-    /// Buckets of this side \[length\].
-    pub fn new(outline: &Partition, side: f64) -> Self {
-        let mut buckets = Self { side, origin: outline.outline().bounds().0, pieces: HashMap::new() };
-        for (ring, number, piece) in outline.pieces() {
-            for (low, high) in stretches(piece, side) {
-                let [from, to] = [low, high].map(|p| buckets.bucket(p));
-                for bucket in (from[0]..=to[0]).flat_map(|i| (from[1]..=to[1]).map(move |j| [i, j])) {
-                    let known = buckets.pieces.entry(bucket).or_default();
-                    if known.last() != Some(&[ring, number]) {
-                        known.push([ring, number]);
-                    }
-                }
-            }
+impl NearPieces {
+    /// Pieces among cells of this diameter \[length\].
+    pub fn new(outline: &Partition, diameter: f64) -> Self {
+        Self {
+            tree: tree_of(outline.pieces().map(|(.., piece)| piece)),
+            numbers: outline.pieces().map(|(ring, number, _)| [ring, number]).collect(),
+            margin: MARGIN * diameter,
         }
-        buckets
-    }
-
-    fn bucket(&self, p: [f64; 2]) -> [i32; 2] {
-        [0, 1].map(|k| ((p[k] - self.origin[k]) / self.side).floor() as i32)
     }
 
     /// Numbers of loop and piece of all pieces that may pass the box between two points, ascending.
-    pub fn around(&self, a: [f64; 2], b: [f64; 2], margin: f64) -> Vec<[usize; 2]> {
-        let from = self.bucket([0, 1].map(|k| a[k].min(b[k]) - margin));
-        let to = self.bucket([0, 1].map(|k| a[k].max(b[k]) + margin));
-        let all = (from[0]..=to[0]).flat_map(|i| (from[1]..=to[1]).map(move |j| [i, j]));
-        let mut found: Vec<_> =
-            all.filter_map(|bucket| self.pieces.get(&bucket)).flatten().copied().collect();
+    pub fn around(&self, a: [f64; 2], b: [f64; 2]) -> impl Iterator<Item = [usize; 2]> + '_ {
+        let low = [0, 1].map(|k| a[k].min(b[k]) - self.margin);
+        let high = [0, 1].map(|k| a[k].max(b[k]) + self.margin);
+        let mut found: Vec<usize> = self.tree.overlapping(low, high).collect();
         found.sort_unstable();
-        found.dedup();
-        found
+        found.into_iter().map(|k| self.numbers[k])
     }
 }
