@@ -31,7 +31,7 @@ impl Caches {
     }
 
     /// With a second cache of so many bytes a core, or unknown. Measured on a Xeon with 2 MiB: a front of half of it is best,
-    /// one of three quarters still 1.5 times as fast as what does not fit.
+    /// one of three quarters still 1.4 times as fast as what does not fit.
     fn of(second: Option<usize>) -> Self {
         match second.filter(|&bytes| bytes >= LARGE) {
             Some(bytes) => {

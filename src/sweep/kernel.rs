@@ -182,7 +182,7 @@ impl<T: Real, const P: usize> Work<'_, '_, T, P> {
 }
 
 /// A tile that no body reaches the end of, of a size that 32 bits hold too.
-const WHOLE: usize = 1 << (usize::BITS - 2);
+pub(super) const WHOLE: usize = 1 << (usize::BITS - 2);
 
 struct Loops<'a, 'b, M, T, const P: usize>(Work<'a, 'b, T, P>, PhantomData<M>);
 

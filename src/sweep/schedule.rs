@@ -23,7 +23,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::PARALLEL_FROM;
-use super::kernel::Component;
+use super::kernel::{self, Component};
 use super::rows::Rows;
 use super::terms::Terms;
 use crate::flock::frame::Frame;
@@ -35,7 +35,7 @@ pub const MOST_STEPS: usize = 16;
 
 /// Particles of a column swept before it is the next one's turn: if several steps are taken together, while the second
 /// cache holds their bands or not, or one.
-const TILES: [usize; 3] = [1 << 40, 512, 64];
+const TILES: [usize; 3] = [kernel::WHOLE, 512, 64];
 
 /// Bands swept in one go where each step is taken by itself: enough for what is asked of each band not to count.
 const MOST_BANDS: usize = 8;
