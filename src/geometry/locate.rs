@@ -178,8 +178,8 @@ mod tests {
             for shape in shapes(seed) {
                 let locator = Locator::new(&shape);
                 let mut next = chance(seed + 100);
+                let mut verdicts = [0; 2];
                 for tolerance in [0.0, 1e-9, 0.3, -1e-9, -0.3] {
-                    let mut verdicts = [0; 2];
                     // Half of the points lie on the raster, on which vertices and edges of tangles do.
                     for k in 0..200 {
                         let p = [0, 1].map(|_| 16.0 * next() - 3.0);
@@ -192,11 +192,8 @@ mod tests {
                         );
                         verdicts[usize::from(expected)] += 1;
                     }
-                    assert!(
-                        verdicts.iter().all(|&count| count > 5),
-                        "points inside and outside: {verdicts:?}"
-                    );
                 }
+                assert!(verdicts.iter().all(|&count| count > 20), "points inside and outside: {verdicts:?}");
             }
         }
     }
