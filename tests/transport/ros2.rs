@@ -76,7 +76,7 @@ impl Transport for Ros2 {
         let edge = Edge::open(Options { domain: domain(), loopback_only: true }).expect("sockets");
         let node = edge.node("/", "flockform").expect("a node");
         let names = &control.formation().names;
-        let topic = |pattern: &str, m: usize| Ok(format!("/{}", pattern.replace("{name}", &names[m])));
+        let topic = |pattern: &str, m: usize| Ok(node.topic(&pattern.replace("{name}", &names[m]))?);
         let link = Controller::open(&node, &self.swarm.raw.node, &control, &part, false, &topic);
         Served { link: link.expect("an end"), _node: node }
     }
