@@ -1,8 +1,8 @@
 //! What the studies of a scene have in common: their arguments, and how they end.
 
-use clap::Args;
 use std::path::PathBuf;
 
+use clap::Args;
 use flockform::export::{ExportError, OutputFolder};
 
 use super::output::{OutputArguments, ReportArguments};

@@ -141,11 +141,11 @@ impl Node {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
     /// Numbers from 0 to 1 that look drawn by chance.
-    fn chance(seed: u64) -> impl FnMut() -> f64 {
+    pub fn chance(seed: u64) -> impl FnMut() -> f64 {
         let mut state = seed;
         move || {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);

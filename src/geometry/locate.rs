@@ -127,16 +127,8 @@ fn right_of(tree: &BoxTree, [x, y]: Point, tolerance: f64) -> impl Iterator<Item
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::box_tree::tests::chance;
     use std::f64::consts::TAU;
-
-    /// Numbers from 0 to 1 that look drawn by chance.
-    fn chance(seed: u64) -> impl FnMut() -> f64 {
-        let mut state = seed;
-        move || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (state >> 40) as f64 / (1u64 << 24) as f64
-        }
-    }
 
     /// A polygon that need not be simple, its vertices on a raster: edges cross, touch, overlap and have no length.
     fn tangle(count: usize, seed: u64) -> Vec<Point> {

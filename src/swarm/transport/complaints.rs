@@ -15,7 +15,7 @@ pub struct Complaints {
 #[derive(Clone, Copy, Debug)]
 struct Dropped {
     /// Time of the last line \[s\].
-    told: f64,
+    warned: f64,
     /// Messages since that line.
     since: u64,
 }
@@ -34,15 +34,15 @@ impl Complaints {
     /// Counts a message; returns how many were dropped since the last line, this one included, if another line is due.
     fn count(&mut self, cause: &'static str, robot: usize, now: f64) -> Option<u64> {
         let Some(dropped) = self.dropped.get_mut(&(cause, robot)) else {
-            self.dropped.insert((cause, robot), Dropped { told: now, since: 0 });
+            self.dropped.insert((cause, robot), Dropped { warned: now, since: 0 });
             return Some(1);
         };
         dropped.since += 1;
         // A clock that was set back must not silence the warnings.
-        if (0.0..INTERVAL).contains(&(now - dropped.told)) {
+        if (0.0..INTERVAL).contains(&(now - dropped.warned)) {
             return None;
         }
-        dropped.told = now;
+        dropped.warned = now;
         Some(std::mem::take(&mut dropped.since))
     }
 }
