@@ -136,7 +136,9 @@ fn outputs_that_a_killed_program_had_put_aside_come_back() {
     let parent = tempfile::tempdir().expect("a folder");
     let out = former(parent.path());
     fs::rename(&out, parent.path().join(".out.replaced")).expect("renamed");
-    drop(OutputFolder::create(&out, false).expect("the place is free"));
+    // Once they are back, the place is theirs.
+    let error = OutputFolder::create(&out, false).expect_err("not empty");
+    assert!(matches!(error, ExportError::NotEmpty(_)), "{error}");
     assert_eq!(names_in(parent.path()), ["out"]);
     assert!(out.join("summary.json").is_file());
 }
@@ -179,4 +181,25 @@ fn nothing_is_written_through_a_link() {
     folder.commit().expect("committed");
     assert_eq!(fs::read_to_string(&victim).expect("there"), "mine");
     assert!(fs::symlink_metadata(out.join("final.csv")).expect("there").is_file());
+}
+
+#[test]
+fn of_many_that_want_one_name_each_gets_a_place_of_its_own() {
+    let parent = tempfile::tempdir().expect("a folder");
+    let place = |n: usize| parent.path().join(format!("out-{n}"));
+    // As a command does without --out: the first name that is free. Short work, so that names are filled meanwhile.
+    let work = || {
+        for _ in 0..100 {
+            let made = (0..).find_map(|n| match OutputFolder::create(&place(n), false) {
+                Err(ExportError::NotEmpty(_) | ExportError::Busy(_)) => None,
+                made => Some(made.expect("refused for no other reason")),
+            });
+            let folder = made.expect("endless");
+            fill(&folder, "summary.json");
+            folder.commit().expect("nobody else took the place");
+        }
+    };
+    std::thread::scope(|scope| (0..4).for_each(|_| drop(scope.spawn(work))));
+    assert!((0..400).all(|n| place(n).join("summary.json").is_file()), "{:?}", names_in(parent.path()));
+    assert_eq!(names_in(parent.path()).len(), 400);
 }

@@ -50,17 +50,19 @@ impl OutputFolder {
     /// fill are refused too.
     pub fn create(out: &Path, force: bool) -> Result<Self, ExportError> {
         let out = in_full(out)?;
-        standing(&out, force)?;
-        make_way(&unfinished(&out), force)?;
+        require_free(&out, force)?;
         let above = out.ancestors().skip(1).take_while(|folder| !folder.exists());
         let made: Vec<PathBuf> = above.map(Path::to_owned).collect();
         if let Some(parent) = made.first() {
             fs::create_dir_all(parent).map_err(ExportError::io("create", parent))?;
         }
         let (partial, lock) = claim(&out)?;
-        put_back(&out)?;
         let files = Arc::new(Written::open(&partial).map_err(ExportError::io("create", &partial))?);
-        Ok(Self { out, partial, files, force, made, is_kept: false, _lock: lock })
+        let folder = Self { out, partial, files, force, made, is_kept: false, _lock: lock };
+        put_back(&folder.out)?;
+        // Asked again under the lock: what held the name until now may have filled the place.
+        require_free(&folder.out, force)?;
+        Ok(folder)
     }
 
     /// The folder that a run to `out` has left unfinished; `force` as in [`OutputFolder::create`].
@@ -195,6 +197,12 @@ fn in_full(out: &Path) -> Result<PathBuf, ExportError> {
     found.map_err(ExportError::io("find", out))
 }
 
+/// Refuses a place that is not free for new outputs.
+fn require_free(out: &Path, force: bool) -> Result<(), ExportError> {
+    standing(out, force)?;
+    make_way(&unfinished(out), force)
+}
+
 /// Discards a run that was killed, where that is asked for.
 fn make_way(unfinished: &Path, force: bool) -> Result<(), ExportError> {
     if !unfinished.join(checkpoint::FILE).exists() {
@@ -255,15 +263,30 @@ fn claim(out: &Path) -> Result<(PathBuf, Option<File>), ExportError> {
         };
         match lock(&path) {
             Locked::Busy => return Err(ExportError::Busy(path)),
-            // It was taken for one that a killed program left, before it was locked.
             Locked::Gone => {}
-            Locked::Free(lock) if is_new && path.exists() => return Ok((path, lock)),
+            // Another folder was opened: one that was moved to its place, or removed, before it was locked.
+            Locked::Free(lock) if !is_at(lock.as_ref(), &path) => {}
+            Locked::Free(lock) if is_new => return Ok((path, lock)),
             // A killed program's remains are removed, unless their origin is unclear or other files are among them.
             Locked::Free(Some(_lock)) if discard(&path).is_ok() => {}
             Locked::Free(_) => attempt += 1,
         }
     }
     Err(ExportError::Busy(beside(out, "partial", 0)))
+}
+
+/// Whether a path leads to the folder that was opened at it; where none could be opened, whether to any.
+fn is_at(folder: Option<&File>, path: &Path) -> bool {
+    match folder {
+        #[cfg(unix)]
+        Some(folder) => {
+            use std::os::unix::fs::MetadataExt;
+            let identity = |found: fs::Metadata| (found.dev(), found.ino());
+            let at_path = fs::metadata(path).map(identity).ok();
+            at_path.is_some() && at_path == folder.metadata().map(identity).ok()
+        }
+        _ => path.exists(),
+    }
 }
 
 /// A killed program may not even have begun its list.
