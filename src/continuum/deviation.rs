@@ -3,7 +3,8 @@
 use super::plan::Plan;
 use crate::flock::vectors::distance;
 use crate::geometry::locate::Finder;
-use crate::geometry::outline::{Outline, Piece};
+use crate::geometry::outline::Outline;
+use crate::geometry::piece::Piece;
 use crate::material::cells::Cells;
 use crate::material::stiffness::area;
 

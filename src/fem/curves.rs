@@ -1,7 +1,8 @@
 //! The curves that a mesh has to follow: the pieces of an outline and lines inside the body, cut where they meet
 //! and where something begins or ends.
 
-use crate::geometry::outline::{Outline, Piece, Place};
+use crate::geometry::outline::{Outline, Place};
+use crate::geometry::piece::Piece;
 
 type Point = [f64; 2];
 

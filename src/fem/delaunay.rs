@@ -358,7 +358,7 @@ impl Mesher<'_> {
 /// Whether two curves with a common end turn less than 60 degrees from one to the other there.
 fn is_sharp(curves: &Curves, p: usize, q: usize) -> bool {
     let [a, b] = [p, q].map(|k| &curves.curves[k].piece);
-    let leaving = |piece: &crate::geometry::outline::Piece| {
+    let leaving = |piece: &crate::geometry::piece::Piece| {
         [(piece.from, piece.tangent(0.0)), (piece.to, piece.tangent(1.0).map(|v| -v))]
     };
     let mut sharp = false;

@@ -13,7 +13,8 @@ use super::delaunay::{Stretch, triangulate};
 use super::element::CellKind;
 use super::error::FemError;
 use super::mesh::{Mesh, Side};
-use crate::geometry::outline::{Outline, Piece, Place};
+use crate::geometry::outline::{Outline, Place};
+use crate::geometry::piece::Piece;
 
 type Point = [f64; 2];
 

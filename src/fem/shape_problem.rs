@@ -9,7 +9,8 @@ use super::outline_mesh::OutlineMesh;
 use super::problem::{Fixed, PointForce, Problem, Traction};
 use super::strain::Strain;
 use super::{Axis, Mesh};
-use crate::geometry::outline::{Outline, Piece, Place};
+use crate::geometry::outline::{Outline, Place};
+use crate::geometry::piece::Piece;
 use crate::geometry::portion::Portion;
 
 type Point = [f64; 2];

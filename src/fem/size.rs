@@ -123,7 +123,7 @@ impl<'c> Sizes<'c> {
     /// Halves a stretch until it is as short as the cells there; leaves with the number of cells in each.
     fn measure(
         &self,
-        piece: &crate::geometry::outline::Piece,
+        piece: &crate::geometry::piece::Piece,
         t: [f64; 2],
         depth: u32,
         leaves: &mut Vec<([f64; 2], f64)>,

@@ -1,7 +1,8 @@
 //! Shapes and outlines that are asked about many points: their pieces are sorted once, and each point looks at few of them.
 
 use super::box_tree::BoxTree;
-use super::outline::{Outline, Piece, Place, distance, is_inside};
+use super::outline::{Outline, Place};
+use super::piece::{Piece, distance, is_inside};
 use super::shape::{Shape, path_contains, polygon_contains};
 
 type Point = [f64; 2];

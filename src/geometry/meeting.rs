@@ -1,6 +1,6 @@
 //! Where edges and arcs meet.
 
-use super::outline::{Piece, distance};
+use super::piece::{Piece, distance};
 
 /// Where the segment from `a` to `b` meets a piece: shares of the way along either, from 0 to 1.
 pub fn meetings(a: [f64; 2], b: [f64; 2], piece: &Piece) -> Vec<[f64; 2]> {

@@ -3,10 +3,12 @@
 //! Lengths are in the unit of the shape's description, in the world frame; angles in radians, counter-clockwise.
 
 pub mod box_tree;
+mod crossings;
 pub mod locate;
 pub mod meeting;
 pub mod outline;
 pub mod partition;
+pub mod piece;
 pub mod portion;
 pub mod shape;
 pub mod specimen;

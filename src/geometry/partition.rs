@@ -7,7 +7,8 @@
 use std::collections::{HashMap, HashSet};
 
 use super::meeting::{crossings, on};
-use super::outline::{Outline, OutlineError, Piece, Place, distance, numbered};
+use super::outline::{Outline, OutlineError, Place};
+use super::piece::{Piece, distance, numbered};
 use super::shape::Shape;
 
 type Point = [f64; 2];

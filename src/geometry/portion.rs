@@ -3,7 +3,8 @@
 use std::collections::HashSet;
 use std::f64::consts::TAU;
 
-use super::outline::{Arc, Outline, Piece, Place};
+use super::outline::{Outline, Place};
+use super::piece::{Arc, Piece};
 
 type Point = [f64; 2];
 

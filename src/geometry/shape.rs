@@ -1,6 +1,6 @@
 //! Regions of the plane from which a body is cut (the paper's samples and ASTM specimens).
 
-use super::outline::{Piece, is_inside};
+use super::piece::{Piece, is_inside};
 use super::specimen::Specimen;
 
 /// A solid region \[length, world frame\]; its boundary belongs to it, within the tolerance given to

@@ -3,6 +3,10 @@
 //! Both are a straight gauge section between two wider grips, joined by circular fillets.
 //! Lengths are the standards' own, in millimetres, times `scale`.
 
+use std::f64::consts::TAU;
+
+use super::piece::{Arc, Piece, Point, reversed};
+
 /// A dog-bone whose axis runs along y, centred on x = 0, from y = 0 at the lower grip.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Specimen {
@@ -65,6 +69,65 @@ impl Specimen {
         let half = self.grip_width / 2.0;
         if self.lying { ([0.0, -half], [self.overall, half]) } else { ([-half, 0.0], [half, self.overall]) }
     }
+}
+
+/// Right side up, left side down: gauge, fillets and grips of a specimen.
+pub(super) fn profile(specimen: &Specimen) -> Vec<Piece> {
+    let Specimen { overall, grip_width, gauge_width, gauge_length, fillet, lying } = *specimen;
+    let (wide, narrow) = (grip_width / 2.0, gauge_width / 2.0);
+    let (low, high) = ((overall - gauge_length) / 2.0, (overall + gauge_length) / 2.0);
+    // Where the fillet has risen to the grip: an angle from the axis of symmetry of its circle.
+    let rise = wide - narrow;
+    let angle = if rise < fillet { (1.0 - rise / fillet).acos() } else { TAU / 4.0 };
+    let run = fillet * angle.sin();
+    let middle = narrow + fillet;
+    let mut right = vec![
+        Piece::edge([wide, 0.0], [wide, low - run]),
+        Piece::arc([middle, low], fillet, TAU / 2.0 + angle, -angle),
+        Piece::edge([narrow, low], [narrow, high]),
+        Piece::arc([middle, high], fillet, TAU / 2.0, -angle),
+        Piece::edge([wide, high + run], [wide, overall]),
+    ];
+    // The fillets run out tangentially into the gauge; arcs end exactly where edges begin.
+    right[1].from = right[0].to;
+    right[1].to = right[2].from;
+    right[3].from = right[2].to;
+    right[3].to = right[4].from;
+    (right[2].begins_at_corner, right[3].begins_at_corner) = (false, false);
+    let mirrored = |piece: &Piece| {
+        let flip = |[x, y]: Point| [-x, y];
+        let arc = piece.arc.map(|arc| Arc {
+            centre: flip(arc.centre),
+            start: TAU / 2.0 - arc.start,
+            sweep: -arc.sweep,
+            ..arc
+        });
+        Piece { from: flip(piece.from), to: flip(piece.to), arc, ..*piece }
+    };
+    let left: Vec<Piece> = right.iter().map(mirrored).collect();
+    let mut ring = right;
+    ring.push(Piece::edge([wide, overall], [-wide, overall]));
+    // Down the left side: each piece begins at a corner if the one after it did on the way up.
+    ring.extend(left.iter().enumerate().rev().map(|(k, piece)| {
+        let begins_at_corner = left.get(k + 1).is_none_or(|next| next.begins_at_corner);
+        Piece { begins_at_corner, ..piece.reversed() }
+    }));
+    ring.push(Piece::edge([-wide, 0.0], [wide, 0.0]));
+    ring.iter_mut().enumerate().for_each(|(number, piece)| piece.number = number);
+    if !lying {
+        return ring;
+    }
+    let swap = |[x, y]: Point| [y, x];
+    let swapped = |piece: &Piece| {
+        let arc = piece.arc.map(|arc| Arc {
+            centre: swap(arc.centre),
+            start: TAU / 4.0 - arc.start,
+            sweep: -arc.sweep,
+            ..arc
+        });
+        Piece { from: swap(piece.from), to: swap(piece.to), arc, ..*piece }
+    };
+    reversed(&ring.iter().map(swapped).collect::<Vec<_>>())
 }
 
 #[cfg(test)]

@@ -4,8 +4,8 @@ use super::near::NearPieces;
 use super::{FitError, ROUNDING};
 use crate::flock::vectors::distance;
 use crate::geometry::meeting::meetings;
-use crate::geometry::outline::Piece;
 use crate::geometry::partition::Partition;
+use crate::geometry::piece::Piece;
 
 /// Looks across the shape, and across its regions, from places half a spacing apart along the outline and the lines inside.
 ///

@@ -2,8 +2,8 @@
 
 use crate::geometry::box_tree::BoxTree;
 use crate::geometry::locate::tree_of;
-use crate::geometry::outline::Piece;
 use crate::geometry::partition::Partition;
+use crate::geometry::piece::Piece;
 
 /// The part of a cell's diameter by which boxes are widened: lines that are parallel but for rounding meet where a ten
 /// thousandth of their distance is lost.

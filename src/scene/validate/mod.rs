@@ -20,7 +20,7 @@ use crate::flock::frame::FrameRule;
 use crate::flock::lattice::{Lattice, LatticeKind};
 use crate::flock::neighbourhood::Neighbourhood;
 use crate::flock::rules::{Axis, Feedback, FeedbackReference, Mean, Origin};
-use crate::geometry::outline::Piece;
+use crate::geometry::piece::Piece;
 use crate::geometry::shape::{Segment, Shape};
 use crate::geometry::specimen::Specimen;
 use crate::material::elastic::Elastic;
