@@ -74,7 +74,7 @@ fn sweep(
     for &(particle, run) in colour {
         let (i, run) = (particle as usize, &matrix.runs()[run as usize]);
         let [mut x, mut y] = f.get(i);
-        for ([xx, xy, yx, yy], &distance) in stencils.blocks(run.class).iter().zip(matrix.distances(run)) {
+        for ([xx, yx, xy, yy], &distance) in stencils.blocks(run.class).iter().zip(matrix.distances(run)) {
             let [ux, uy] = u.get(i.wrapping_add_signed(distance as isize));
             x -= xx * ux + xy * uy;
             y -= yx * ux + yy * uy;

@@ -7,7 +7,7 @@
 
 use super::Row;
 use super::matrix::{Matrix, Run};
-use crate::flock::block::{Block, inverse};
+use crate::flock::block::{Block, inverse, transposed};
 use crate::flock::lanes::{InLanes, MEMORY, in_lanes};
 use crate::solve::field::{Real, VectorsRef};
 
@@ -22,9 +22,9 @@ const NARROW: usize = 8;
 pub struct RowCoefficients<T> {
     /// Where the blocks of each class begin, shape \[classes + 1\].
     starts: Vec<u32>,
-    /// By class: `D`, then `-K` of each entry.
+    /// By class: `D`, then `-K` of each entry, each by columns.
     blocks: Vec<[T; 4]>,
-    /// `D^-1` by class.
+    /// `D^-1` by class, by rows.
     inverse: Vec<[T; 4]>,
 }
 
@@ -32,19 +32,18 @@ impl<T: Real> RowCoefficients<T> {
     /// Rows multiplied by `scale`. A `D` without inverse is given zero: what it belongs to stays put.
     pub fn new(rows: &[Row], scale: f64) -> Self {
         let mut stencils = Self { starts: vec![0], blocks: Vec::new(), inverse: Vec::new() };
-        let cast = |block: &Block, factor: f64| {
-            [block[0][0], block[0][1], block[1][0], block[1][1]].map(|value| T::of(value * factor))
-        };
+        let cast = |[[xx, xy], [yx, yy]]: Block, factor: f64| [xx, xy, yx, yy].map(|v| T::of(v * factor));
         for row in rows {
-            stencils.blocks.push(cast(&row.diagonal, scale));
-            stencils.blocks.extend(row.entries.iter().map(|(_, block)| cast(block, -scale)));
+            stencils.blocks.push(cast(transposed(row.diagonal), scale));
+            let others = row.entries.iter().map(|(_, block)| cast(transposed(*block), -scale));
+            stencils.blocks.extend(others);
             stencils.starts.push(stencils.blocks.len() as u32);
-            stencils.inverse.push(cast(&inverse(&row.diagonal).unwrap_or_default(), 1.0 / scale));
+            stencils.inverse.push(cast(inverse(&row.diagonal).unwrap_or_default(), 1.0 / scale));
         }
         stencils
     }
 
-    /// `D` and `-K` of each entry of a class, by rows.
+    /// `D` and `-K` of each entry of a class, by columns.
     pub fn blocks(&self, class: u32) -> &[[T; 4]] {
         &self.blocks[self.starts[class as usize] as usize..self.starts[class as usize + 1] as usize]
     }
@@ -121,7 +120,7 @@ fn over_runs_portable<T: Real>(
             at += NARROW;
         }
         while at < end {
-            lanes::<T, 1>(blocks, distances, inverse, at, u, task);
+            single(blocks, distances, inverse, at, u, task);
             at += 1;
         }
     }
@@ -137,7 +136,7 @@ fn lanes<T: Real, const W: usize>(
     task: &mut impl Task<T>,
 ) {
     let (mut x, mut y) = ([T::default(); W], [T::default(); W]);
-    for ([xx, xy, yx, yy], &distance) in blocks.iter().zip(distances) {
+    for ([xx, yx, xy, yy], &distance) in blocks.iter().zip(distances) {
         let from = at.wrapping_add_signed(distance as isize);
         let (ux, uy) = (array::<T, W>(u.x, from), array::<T, W>(u.y, from));
         for k in 0..W {
@@ -146,6 +145,27 @@ fn lanes<T: Real, const W: usize>(
         }
     }
     task.take(at, inverse, &x, &y);
+}
+
+/// One particle of `lanes`, as those along an outline are: the products of a block side by side.
+#[inline(always)]
+fn single<T: Real>(
+    blocks: &[[T; 4]],
+    distances: &[i32],
+    inverse: &[T; 4],
+    at: usize,
+    u: VectorsRef<'_, T>,
+    task: &mut impl Task<T>,
+) {
+    let mut sum = [T::default(); 2];
+    for (block, &distance) in blocks.iter().zip(distances) {
+        let from = at.wrapping_add_signed(distance as isize);
+        let (ux, uy) = (u.x[from], u.y[from]);
+        let products = [block[0] * ux, block[1] * ux, block[2] * uy, block[3] * uy];
+        sum[0] += products[0] + products[2];
+        sum[1] += products[1] + products[3];
+    }
+    task.take(at, inverse, &[sum[0]], &[sum[1]]);
 }
 
 /// The `W` values from number `at` on.

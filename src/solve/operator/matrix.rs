@@ -24,6 +24,8 @@ pub struct Run {
     pub class: u32,
     /// Where the index distances begin: zero for the particle itself, then its neighbours'.
     pub distances: u32,
+    /// Number of them.
+    pub terms: u32,
 }
 
 /// A square matrix over the followers. Vectors are as long as the body, zero at particles that are held.
@@ -125,8 +127,7 @@ impl Matrix {
     /// Index distances to a run's particles themselves (zero) and to their neighbours, in the order of
     /// the row's entries.
     pub fn distances(&self, run: &Run) -> &[i32] {
-        let entries = self.rows[run.class as usize].entries.len();
-        &self.distances[run.distances as usize..][..entries + 1]
+        &self.distances[run.distances as usize..][..run.terms as usize]
     }
 
     /// Most columns and rows that an entry between two sites of the lattice reaches.
@@ -162,7 +163,8 @@ impl Matrix {
                     self.distances.len() - found.len()
                 });
                 last[class as usize] = Some(at);
-                self.runs.push(Run { start, len: len as u32, class, distances: at as u32 });
+                let (distances, terms) = (at as u32, found.len() as u32);
+                self.runs.push(Run { start, len: len as u32, class, distances, terms });
                 done += len as u32;
             }
         }

@@ -6,8 +6,9 @@
 use std::collections::HashMap;
 use std::ops::Range;
 
+use super::sums::Sums;
 use super::transfer::{Transfer, parents_of_place};
-use crate::flock::block::{Block, plus};
+use crate::flock::block::Block;
 use crate::flock::body::Body;
 use crate::flock::lattice::Site;
 use crate::solve::operator::{Columns, HELD, Matrix, Row, leads_to_outlier};
@@ -74,33 +75,6 @@ pub fn coarsen(fine: &Matrix, transfer: Transfer) -> Matrix {
     Matrix::compile(columns, nodes.into_iter().map(|(_, class)| class).collect(), rows)
 }
 
-/// Blocks by site, added up. They are few, so that looking through them all is faster than any map.
-#[derive(Default)]
-struct Sums(Vec<(Site, Block)>);
-
-impl Sums {
-    fn add(&mut self, site: Site, share: f64, block: &Block) {
-        let block = block.map(|row| row.map(|value| share * value));
-        match self.0.iter_mut().find(|(known, _)| *known == site) {
-            Some((_, sum)) => *sum = plus(sum, &block),
-            None => self.0.push((site, block)),
-        }
-    }
-
-    /// The row that has been added up by offsets; ordered, so that it does not depend on how it was summed.
-    fn row(&mut self) -> Row {
-        self.0.sort_unstable_by_key(|(offset, _)| *offset);
-        let mut row = Row::default();
-        for (offset, block) in self.0.drain(..).filter(|(_, block)| *block != Block::default()) {
-            match offset {
-                [0, 0] => row.diagonal = block,
-                _ => row.entries.push((offset, block.map(|row| row.map(|v| -v)))),
-            }
-        }
-        row
-    }
-}
-
 /// Nodes near particles that stand at no site, whose rows are summed one by one.
 struct Singles<'a> {
     fine: &'a Matrix,
@@ -112,6 +86,8 @@ struct Singles<'a> {
     halves: Vec<(Site, Block)>,
     /// Where that of each particle lies, shape \[count\].
     half: Vec<Range<u32>>,
+    /// The one that is being summed.
+    sums: Sums,
 }
 
 impl<'a> Singles<'a> {
@@ -147,7 +123,7 @@ impl<'a> Singles<'a> {
                 nodes.push((of_node[0].0, begin..shares.len()));
             }
         }
-        Self { fine, transfer, nodes, shares, halves: Vec::new(), half }
+        Self { fine, transfer, nodes, shares, halves: Vec::new(), half, sums: Sums::default() }
     }
 
     /// The row of `P' K P` at a node.
@@ -172,15 +148,7 @@ impl<'a> Singles<'a> {
     /// Adds a particle's row of `K P` by offsets from a node that has a share in it.
     fn add_half(&mut self, node: Site, site: Site, (i, share): (usize, f64), sums: &mut Sums) {
         if self.half[i].is_empty() {
-            let mut half = Sums(Vec::new());
-            let row = &self.fine.rows[self.fine.class[i] as usize];
-            self.add_parents(site, 1.0, &row.diagonal, &mut half);
-            for (offset, block) in &row.entries {
-                self.add_parents([site[0] + offset[0], site[1] + offset[1]], -1.0, block, &mut half);
-            }
-            let begin = self.halves.len();
-            self.halves.append(&mut half.0);
-            self.half[i] = begin as u32..self.halves.len() as u32;
+            self.find_half(node, site, i);
         }
         let Range { start, end } = self.half[i];
         for (other, block) in &self.halves[start as usize..end as usize] {
@@ -188,8 +156,23 @@ impl<'a> Singles<'a> {
         }
     }
 
-    /// Adds a block by the nodes that have a share in the particle at a site.
-    fn add_parents(&self, site: Site, sign: f64, block: &Block, sums: &mut Sums) {
+    /// Computes a particle's row of `K P`, summed by offsets from a node close to it.
+    fn find_half(&mut self, near: Site, site: Site, i: usize) {
+        let mut half = std::mem::take(&mut self.sums);
+        let row = &self.fine.rows[self.fine.class[i] as usize];
+        self.add_parents(near, site, (1.0, &row.diagonal), &mut half);
+        for (offset, block) in &row.entries {
+            self.add_parents(near, [site[0] + offset[0], site[1] + offset[1]], (-1.0, block), &mut half);
+        }
+        let begin = self.halves.len();
+        let absolute = |(offset, block): (Site, Block)| ([offset[0] + near[0], offset[1] + near[1]], block);
+        self.halves.extend(half.drain().map(absolute));
+        self.half[i] = begin as u32..self.halves.len() as u32;
+        self.sums = half;
+    }
+
+    /// Adds a block by the nodes that have a share in the particle at a site, as offsets from one of them.
+    fn add_parents(&self, near: Site, site: Site, (sign, block): (f64, &Block), sums: &mut Sums) {
         let place = if site[0] == Body::ALONG_OUTLINE {
             self.fine.outliers.places[(site[1] / self.fine.columns.step()) as usize]
         } else {
@@ -197,7 +180,7 @@ impl<'a> Singles<'a> {
         };
         for (node, share) in parents_of_place(place, self.transfer.steps) {
             if share > 0.0 {
-                sums.add(node, sign * share, block);
+                sums.add([node[0] - near[0], node[1] - near[1]], sign * share, block);
             }
         }
     }

@@ -16,6 +16,7 @@
 
 mod coarsen;
 mod envelope;
+mod sums;
 #[cfg(test)]
 mod tests;
 mod transfer;
