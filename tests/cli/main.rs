@@ -6,17 +6,23 @@ mod checkpoint;
 mod compare;
 mod documents;
 mod faults;
+#[path = "../common/folders.rs"]
+mod folders;
 mod install;
 mod interrupt;
+#[path = "../common/json.rs"]
+mod json;
 mod material;
 mod measured;
 mod points;
+#[path = "../common/program.rs"]
 mod program;
 mod report;
 mod run;
 #[path = "../common/signals.rs"]
 mod signals;
 mod stability;
+mod support;
 mod swarm;
 #[path = "../common/waits.rs"]
 mod waits;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use crate::program::*;
+use crate::support::*;
 
 /// A bar of 4 x 2 m that is pulled to the right; without contraction, so that the clamped end does not disturb.
 const BAR: &str = r#"
@@ -69,8 +69,7 @@ fn bundled(scene: &str, sets: &[&str]) -> (tempfile::TempDir, String) {
 }
 
 fn summary(folder: &Path) -> Value {
-    let text = std::fs::read_to_string(folder.join("o/summary.json")).expect("written");
-    serde_json::from_str(&text).expect("valid JSON")
+    json_in(&folder.join("o/summary.json"))
 }
 
 fn number(value: &Value) -> f64 {

@@ -1,5 +1,6 @@
 //! Displacements of second order on every lattice in any direction: a ring under pressure, a plate with a hole, a bent beam.
 
+use crate::folders::temporary;
 use crate::support::{KINDS, error, lattice, scene, scene_in, solved, table};
 
 const ORIENTATIONS: [f64; 12] = [0.0, 7.5, 15.0, 22.5, 30.0, 37.5, 45.0, 52.5, 60.0, 67.5, 75.0, 82.5];
@@ -86,7 +87,7 @@ steps = [
                     - 2.0 * c * (3.0 * t).sin()),
         ]
     };
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = temporary();
     for kind in KINDS {
         let (order, errors) = order(|h, orientation| {
             let lattice = lattice(kind, h, orientation);
@@ -119,7 +120,7 @@ loads = [{ kind = "traction", region = { kind = "edge", side = "right" }, tracti
         let curvature = 10.0 / 1000.0;
         [curvature * x * y, -0.5 * curvature * (x * x + 0.3 * y * y)]
     };
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = temporary();
     for kind in KINDS {
         let (order, errors) = order(|h, orientation| {
             let lattice = lattice(kind, h, orientation);

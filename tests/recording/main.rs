@@ -9,8 +9,12 @@
 
 #![cfg(feature = "cli")]
 
+#[path = "../common/folders.rs"]
+mod folders;
+#[path = "../common/program.rs"]
 mod program;
 mod read_back;
 mod replays;
 #[path = "../common/signals.rs"]
 mod signals;
+mod support;

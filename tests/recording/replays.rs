@@ -1,12 +1,12 @@
 //! A recorded flight flies again as it flew.
 
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 use std::time::{Duration, Instant};
 
 use flockform::record::replay::replay_file;
 use flockform::record::{Reader, RecordError};
 
-use crate::program::*;
+use crate::support::*;
 
 fn record(swarm: &[&str], folder: &std::path::Path) {
     let arguments = [&["swarm"], swarm, &["-q", "--out", "o", "--record", "flight.mcap"]].concat();
@@ -89,11 +89,7 @@ fn force_replaces_recordings_and_nothing_else() {
     let short = ["--set", "flight.duration=0.5", "--set", "flight.bounds={}", "-q", "--no-report"];
     let fly = |out: &str, more: &[&str]| {
         let all = [&["swarm", "square", "--out", out, "--record", "flight.mcap"][..], &short, more].concat();
-        Command::new(env!("CARGO_BIN_EXE_flockform"))
-            .args(all)
-            .current_dir(folder.path())
-            .output()
-            .expect("the program starts")
+        flockform(&all, folder.path())
     };
     let file = folder.path().join("flight.mcap");
     std::fs::write(&file, "years of work").expect("writable");
@@ -140,8 +136,8 @@ fn a_live_node_s_recording_replays_to_the_bit_with_the_parameters_it_was_given()
     let folder = temporary();
     let domain = (101 + std::process::id() % 101).to_string();
     let start = |arguments: &[&str]| {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_flockform"));
-        command.args(arguments).current_dir(folder.path()).env("ROS_DOMAIN_ID", &domain);
+        let mut command = command(arguments, folder.path());
+        command.env("ROS_DOMAIN_ID", &domain);
         command.env("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST").stdout(Stdio::null()).stderr(Stdio::null());
         command.spawn().expect("the program starts")
     };
