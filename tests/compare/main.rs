@@ -3,10 +3,17 @@
 #![cfg(feature = "fem")]
 
 mod beam;
+#[cfg(feature = "export")]
+#[path = "../common/folders.rs"]
+mod folders;
 mod measured;
 #[cfg(feature = "export")]
 mod outputs;
+#[path = "../common/reference.rs"]
+mod reference;
 mod refusals;
+#[path = "../common/scenes.rs"]
+mod scenes;
 mod support;
 mod table;
 mod truth;

@@ -8,8 +8,9 @@ use flockform::flock::lattice::{Lattice, LatticeKind};
 use flockform::flock::vectors::Vectors;
 use flockform::material::cells::{Cells, neighbourhood, without_loose_sites};
 use flockform::material::elastic::{Constants, Elastic, Plane};
-use flockform::scene::bundled;
 use flockform::study::compare::run::{Compared, compare};
+
+use crate::scenes::load;
 
 pub const KINDS: [LatticeKind; 6] = [
     LatticeKind::Square { spacing: 1.0 },
@@ -49,8 +50,7 @@ pub fn largest_difference(a: &Vectors, b: &Vectors) -> f64 {
 
 /// What the rule of a bundled scene makes of its body, with changes.
 pub fn compared(name: &str, overrides: &[&str]) -> Compared {
-    let overrides: Vec<String> = overrides.iter().map(|&text| text.into()).collect();
-    let scene = bundled(name).expect("bundled").load(&overrides).unwrap_or_else(|e| panic!("{e}"));
+    let scene = load(name, overrides);
     compare(&scene, &Effort::default(), &mut |_, _| ControlFlow::Continue(()))
         .unwrap_or_else(|e| panic!("{e}"))
 }

@@ -3,17 +3,12 @@
 use std::ops::ControlFlow;
 
 use flockform::fem::Effort;
-use flockform::scene::{Scene, bundled};
 use flockform::study::compare::measures::Comparison;
 use flockform::study::compare::run::{SceneTruth, compare, truth_of};
 use flockform::study::compare::split::ErrorParts;
 
+use crate::scenes::load;
 use crate::support::*;
-
-fn load(name: &str, overrides: &[&str]) -> Scene {
-    let overrides: Vec<String> = overrides.iter().map(|&text| text.into()).collect();
-    bundled(name).expect("bundled").load(&overrides).unwrap_or_else(|e| panic!("{e}"))
-}
 
 fn truth(name: &str, overrides: &[&str]) -> SceneTruth {
     truth_of(&load(name, overrides), &Effort::default()).unwrap_or_else(|e| panic!("{e}"))

@@ -4,5 +4,7 @@ mod beam;
 mod cantilever;
 mod locking;
 mod patch;
+#[path = "../common/reference.rs"]
+mod reference;
 mod refusals;
 mod support;
