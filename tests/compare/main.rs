@@ -12,6 +12,8 @@ mod outputs;
 #[path = "../common/reference.rs"]
 mod reference;
 mod refusals;
+#[path = "../common/samples.rs"]
+mod samples;
 #[path = "../common/scenes.rs"]
 mod scenes;
 mod support;

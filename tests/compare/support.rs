@@ -10,24 +10,11 @@ use flockform::material::cells::{Cells, neighbourhood, without_loose_sites};
 use flockform::material::elastic::{Constants, Elastic, Plane};
 use flockform::study::compare::run::{Compared, compare};
 
+pub use crate::samples::{KINDS, fibres};
 use crate::scenes::load;
-
-pub const KINDS: [LatticeKind; 6] = [
-    LatticeKind::Square { spacing: 1.0 },
-    LatticeKind::Rectangular { a: 1.0, b: 1.5 },
-    LatticeKind::CentredRectangular { a: 1.0, b: 1.4 },
-    LatticeKind::Hexagonal { spacing: 1.0 },
-    LatticeKind::Oblique { a: 1.0, b: 1.2, angle: 1.2 },
-    LatticeKind::Honeycomb { spacing: 1.0 },
-];
 
 pub fn sheet(young: f64, poisson: f64, plane: Plane) -> Elastic {
     Elastic::new(Constants::Isotropic { young, poisson, plane }, 0.5).expect("admissible")
-}
-
-pub fn fibres() -> Elastic {
-    let constants = Constants::Orthotropic { young: [9.0, 1.0], poisson_12: 0.4, shear: 0.6, angle: 0.5 };
-    Elastic::new(constants, 0.7).expect("admissible")
 }
 
 /// A body without particles that are in no cell.

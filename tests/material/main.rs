@@ -7,4 +7,6 @@ mod patch;
 #[path = "../common/reference.rs"]
 mod reference;
 mod refusals;
+#[path = "../common/samples.rs"]
+mod samples;
 mod support;

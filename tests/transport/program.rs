@@ -83,11 +83,6 @@ fn start(domain: &str, subcommand: &str) -> Running {
     Running(command.spawn().expect("it starts"))
 }
 
-fn kill(mut process: Running) {
-    process.0.kill().expect("it lives");
-    process.0.wait().expect("a child");
-}
-
 fn next(reader: &Reader<Member>, what: &str, is: impl Fn(&Slice<Member>) -> bool) {
     until(what, || reader.take_last().filter(&is).map(|_| ()));
 }
@@ -108,11 +103,12 @@ fn node_and_robots_are_processes_that_may_be_killed_and_come_back() {
     });
     next(&members, "the formation moves", |slice| slice.iter().all(|one| one.displacement[0].abs() > 0.1));
 
-    kill(node);
+    // SIGKILL.
+    drop(node);
     let mut node = start(&name, "node");
     next(&members, "a new node hears everybody", all_fresh);
 
-    kill(robots);
+    drop(robots);
     next(&members, "robots that are gone are held", |slice| slice.iter().all(|one| one.health != 1));
     let mut robots = start(&name, "robots");
     next(&members, "new robots are heard", all_fresh);
