@@ -66,6 +66,7 @@ fn the_released_sample_grows_where_its_spectrum_says_whatever_its_frame_remember
 fn roots_of_the_radius_are_the_formulas_where_the_sweep_has_no_memory() {
     for frame in ["frame=none", "frame=lagged"] {
         let linear = linear("tension", &[frame, NO_PROBES]);
+        assert!(!linear.thresholds.is_empty(), "{frame}");
         for one in &linear.thresholds {
             let predicted = one.predicted.as_ref().expect("predicted");
             assert_eq!(predicted.closed_form.is_some(), frame == "frame=none", "{one:?}");

@@ -6,6 +6,9 @@ mod beam;
 #[cfg(feature = "export")]
 #[path = "../common/folders.rs"]
 mod folders;
+#[cfg(feature = "export")]
+#[path = "../common/json.rs"]
+mod json;
 mod measured;
 #[cfg(feature = "export")]
 mod outputs;

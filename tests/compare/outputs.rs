@@ -8,6 +8,7 @@ use flockform::study::compare::run::Compared;
 use resvg::usvg::roxmltree::{Document, Node};
 
 use crate::folders::temporary;
+use crate::json::json_in;
 use crate::scenes::load;
 use crate::support::*;
 
@@ -48,7 +49,7 @@ fn a_comparison_leaves_its_report_its_tables_and_two_figures() {
             "von_mises.svg"
         ]
     );
-    let report: serde_json::Value = serde_json::from_str(&text(&out, "compare.json")).expect("JSON");
+    let report = json_in(&out.join("compare.json"));
     assert_eq!(report["displacement_rel_l2"], found.comparison.displacement_rel_l2);
     assert!(report["truth"]["stated_error"].as_f64().is_some_and(|error| error < 1e-4));
     assert_eq!(report["rule"]["stop_reason"], "equilibrium");

@@ -11,6 +11,8 @@
 
 #[path = "../common/folders.rs"]
 mod folders;
+#[path = "../common/json.rs"]
+mod json;
 #[path = "../common/program.rs"]
 mod program;
 mod read_back;

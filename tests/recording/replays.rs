@@ -42,11 +42,11 @@ fn a_changed_rule_is_told_robot_by_robot() {
     let slower = ["replay", "flight.mcap", "--set", "limits.speed=0.1"];
     let said = says(1, &slower, folder.path());
     assert!(said.contains("NOT within") && said.contains("robot_13"), "{said}");
-    let json = says(1, &[&slower[..], &["--json"]].concat(), folder.path());
-    let report: serde_json::Value = serde_json::from_str(&json).expect("JSON");
+    let said = says(1, &[&slower[..], &["--json"]].concat(), folder.path());
+    let report = json(&said);
     let robots = report["robots"].as_array().expect("robots");
     let changed = robots.iter().filter(|robot| robot["differ"].as_u64() > Some(0)).count();
-    assert!(changed > 0 && robots.iter().all(|robot| robot["only_recorded"] == 0), "{json}");
+    assert!(changed > 0 && robots.iter().all(|robot| robot["only_recorded"] == 0), "{said}");
     // A wide enough tolerance forgives it.
     says(0, &[&slower[..], &["--tolerance", "100"]].concat(), folder.path());
 }

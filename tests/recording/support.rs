@@ -3,6 +3,7 @@
 use std::path::Path;
 
 pub use crate::folders::temporary;
+pub use crate::json::json;
 pub use crate::program::{command, flockform};
 pub use crate::signals::signal;
 
