@@ -52,8 +52,13 @@ pub fn gallery(arguments: &GalleryArguments) -> Result<ExitCode, Refusal> {
 fn exhibits(names: &[String]) -> Result<Vec<Exhibit>, Refusal> {
     let all = || bundled::SCENES.iter().chain(bundled::SWARMS);
     if let Some(name) = names.iter().find(|name| !all().any(|one| one.name == **name)) {
-        let nearest = bundled::most_similar(name, all().map(|one| one.name)).unwrap_or_default();
-        return Err(Refusal::NotBundled { what: "scene", name: name.clone(), nearest });
+        let likeness = |other: &str| strsim::jaro_winkler(other, name);
+        let nearest = all().map(|one| one.name).max_by(|a, b| likeness(a).total_cmp(&likeness(b)));
+        return Err(Refusal::NotBundled {
+            what: "scene",
+            name: name.clone(),
+            nearest: nearest.unwrap_or_default(),
+        });
     }
     let is_asked = |one: &&Bundled| names.is_empty() || names.iter().any(|name| name == one.name);
     let scene = |one: &Bundled| -> Result<Exhibit, SceneError> {

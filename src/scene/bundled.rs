@@ -81,12 +81,6 @@ pub fn bundled(name: &str) -> Option<Bundled> {
     SCENES.iter().copied().find(|scene| scene.name == name)
 }
 
-/// The name most like a word, which is taken for a misspelling of it.
-pub fn most_similar<'a>(word: &str, names: impl Iterator<Item = &'a str>) -> Option<&'a str> {
-    let likeness = |name: &str| strsim::jaro_winkler(name, word);
-    names.max_by(|a, b| likeness(a).total_cmp(&likeness(b)))
-}
-
 impl Bundled {
     /// Reads the swarm; `overrides` are `KEY.PATH=VALUE` texts applied on top.
     ///

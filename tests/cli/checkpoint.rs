@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
-use crate::support::*;
+use crate::program::*;
 
 /// Fracture, with probes, figures and frames: everything that a run keeps.
 const RUN: [&str; 8] =

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::support::*;
+use crate::program::*;
 
 fn compare(folder: &Path, more: &[&str]) -> String {
     let arguments = [&["compare", "beam", "--truth-error", "0.01"], more].concat();

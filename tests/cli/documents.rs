@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use crate::support::*;
+use crate::program::*;
 
 /// Commands with a command of their own after them.
 const NESTED: [&str; 1] = ["bench"];

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use crate::support::*;
+use crate::program::*;
 
 #[test]
 fn runs_that_begin_at_once_get_a_folder_each() {

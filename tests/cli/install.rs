@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use crate::support::{flockform, temporary, text};
+use crate::program::{flockform, temporary, text};
 
 const CHECKOUT: &str = env!("CARGO_MANIFEST_DIR");
 

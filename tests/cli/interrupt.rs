@@ -4,7 +4,7 @@ use std::path::Path;
 use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
-use crate::support::*;
+use crate::program::*;
 
 /// Longest time from the signal to the end. The program promises one second; a machine that has other things to do
 /// takes longer to let it.

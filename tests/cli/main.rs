@@ -3,6 +3,8 @@
 #![cfg(feature = "cli")]
 
 mod checkpoint;
+#[path = "../common/command.rs"]
+mod command;
 mod compare;
 mod documents;
 mod faults;
@@ -15,14 +17,12 @@ mod json;
 mod material;
 mod measured;
 mod points;
-#[path = "../common/program.rs"]
 mod program;
 mod report;
 mod run;
 #[path = "../common/signals.rs"]
 mod signals;
 mod stability;
-mod support;
 mod swarm;
 #[path = "../common/waits.rs"]
 mod waits;

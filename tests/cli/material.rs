@@ -8,7 +8,7 @@ use flockform::material::elastic::{Constants, Elastic, Plane};
 use flockform::material::report::MaterialReport;
 use serde_json::Value;
 
-use crate::support::*;
+use crate::program::*;
 
 fn material(arguments: &[&str]) -> Output {
     flockform(&[&["material"], arguments].concat(), Path::new("."))

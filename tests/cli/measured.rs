@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use crate::support::*;
+use crate::program::*;
 
 /// A bar of 4 x 2 m that is pulled to the right; without contraction, so that the clamped end does not disturb.
 const BAR: &str = r#"

@@ -8,7 +8,7 @@ use flockform::record::Reader;
 use flockform::ros::messages::flockform_msgs::FormationState;
 use flockform::ros::messages::geometry_msgs::PoseArray;
 
-use crate::support::*;
+use crate::program::*;
 
 type Row = (usize, [f64; 2]);
 

@@ -2,7 +2,7 @@
 
 use std::fs::read_to_string;
 
-use crate::support::*;
+use crate::program::*;
 
 /// The data of a page.
 fn data(html: &str) -> serde_json::Value {

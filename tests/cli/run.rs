@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use crate::support::*;
+use crate::program::*;
 
 /// Runs and expects a refusal: exit code 2, these words, nothing on disk.
 fn refused(arguments: &[&str], words: &[&str]) {

@@ -1,6 +1,6 @@
 //! `flockform stability` as a person meets it.
 
-use crate::support::*;
+use crate::program::*;
 
 const QUICK: [&str; 4] = ["stability", "tension", "--quick", "--no-extremes"];
 

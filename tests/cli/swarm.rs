@@ -3,7 +3,7 @@
 use std::fs::{read_dir, read_to_string};
 use std::process::Output;
 
-use crate::support::*;
+use crate::program::*;
 
 fn refused(output: &Output, words: &[&str], expected: &str) {
     let said = text(&output.stderr);

@@ -9,14 +9,14 @@
 
 #![cfg(feature = "cli")]
 
+#[path = "../common/command.rs"]
+mod command;
 #[path = "../common/folders.rs"]
 mod folders;
 #[path = "../common/json.rs"]
 mod json;
-#[path = "../common/program.rs"]
 mod program;
 mod read_back;
 mod replays;
 #[path = "../common/signals.rs"]
 mod signals;
-mod support;

@@ -11,7 +11,7 @@ use flockform::ros::messages::geometry_msgs::{PoseArray, PoseStamped, PoseWithCo
 use flockform::ros::messages::nav_msgs::Odometry;
 use flockform::ros::messages::visualization_msgs::MarkerArray;
 
-use crate::support::*;
+use crate::program::*;
 
 /// A message of any type that recordings have.
 fn as_json(entry: &Entry) -> serde_json::Value {

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use flockform::record::replay::replay_file;
 use flockform::record::{Reader, RecordError};
 
-use crate::support::*;
+use crate::program::*;
 
 fn record(swarm: &[&str], folder: &std::path::Path) {
     let arguments = [&["swarm"], swarm, &["-q", "--out", "o", "--record", "flight.mcap"]].concat();

@@ -377,8 +377,8 @@ fn renamed<'a>(word: &str, candidates: &[&'a str]) -> Option<&'a str> {
     candidates.iter().copied().find(|candidate| *candidate == now)
 }
 
-/// The candidate that `word` most probably misspells or abbreviates, if any is near enough: a suggestion that is a mere
-/// guess would mislead here, other than among the names of [`most_similar`](crate::scene::bundled::most_similar).
+/// The candidate that `word` most probably misspells or abbreviates, if any is near enough: a mere guess would mislead
+/// more than none.
 fn nearest<'a>(word: &str, candidates: &[&'a str]) -> Option<&'a str> {
     if word.len() > LONGEST_MISSPELLING {
         return None;

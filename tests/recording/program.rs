@@ -1,10 +1,10 @@
-//! What all of these need: the program, a place to run it in, and signals.
+//! The program itself, and a place to run it in.
 
 use std::path::Path;
 
+pub use crate::command::{command, flockform};
 pub use crate::folders::temporary;
 pub use crate::json::json;
-pub use crate::program::{command, flockform};
 pub use crate::signals::signal;
 
 /// Runs and expects this exit code; what was said.
