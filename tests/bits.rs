@@ -1,5 +1,6 @@
 //! The same bits over threads, kernels and blockings, and those that are written down here.
 
+use flockform::continuum::digest::fnv1a;
 use flockform::flock::body::{Body, Cut};
 use flockform::flock::frame::{Frame, FrameRule};
 use flockform::flock::lattice::{Lattice, LatticeKind};
@@ -110,10 +111,10 @@ impl Pulled {
     }
 }
 
-/// FNV-1a over the bits of all coordinates.
+/// A hash of the bits of all coordinates.
 fn hash(points: &Vectors) -> u64 {
     let bytes = points.x.iter().chain(&points.y).flat_map(|value| value.to_bits().to_le_bytes());
-    bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
+    fnv1a(&bytes.collect::<Vec<u8>>())
 }
 
 fn assert_golden(body: &Pulled, golden: u64) {

@@ -6,23 +6,21 @@ use flockform::continuum::equilibrium::run_to_equilibrium;
 use flockform::continuum::plan::Plan;
 use flockform::continuum::run::{Outcome, StopReason};
 use flockform::flock::vectors::distance;
-use flockform::scene::{Scene, bundled};
+use flockform::scene::Scene;
 use flockform::solve::equilibrium::Precision;
 
-fn load(name: &str, overrides: &[&str]) -> Scene {
-    let overrides: Vec<String> = overrides.iter().map(|o| (*o).to_owned()).collect();
-    bundled(name).expect("bundled").load(&overrides).unwrap_or_else(|error| panic!("{error}"))
-}
+use scenes::{load, planned, try_load};
+
+#[path = "common/scenes.rs"]
+mod scenes;
 
 fn ended(scene: &Scene) -> Outcome {
-    let plan = Plan::new(scene).unwrap_or_else(|error| panic!("{error}"));
-    run_to_equilibrium(scene, plan, &mut |_, _| ControlFlow::Continue(()))
+    run_to_equilibrium(scene, planned(scene), &mut |_, _| ControlFlow::Continue(()))
         .unwrap_or_else(|error| panic!("{error}"))
 }
 
 fn refusal(name: &str, overrides: &[&str]) -> String {
-    let overrides: Vec<String> = overrides.iter().map(|o| (*o).to_owned()).collect();
-    let end = bundled(name).expect("bundled").load(&overrides).and_then(|scene| {
+    let end = try_load(name, overrides).and_then(|scene| {
         let plan = Plan::new(&scene)?;
         run_to_equilibrium(&scene, plan, &mut |_, _| ControlFlow::Continue(()))
     });

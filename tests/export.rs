@@ -8,16 +8,28 @@ use std::path::Path;
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
-use flockform::continuum::plan::Plan;
 use flockform::continuum::record::{ProbeSeries, Snapshot};
 use flockform::continuum::run::{Outcome, run};
 use flockform::export::{
     Drawing, ExportError, OutputFolder, Results, Timings, VtkSeries, figures, write_all,
 };
 use flockform::flock::role::Role;
-use flockform::scene::{Scene, bundled};
+use flockform::scene::Scene;
 use resvg::tiny_skia::Pixmap;
 use resvg::usvg::roxmltree::{Document, Node};
+
+use folders::{names_in, temporary};
+use json::json;
+use scenes::{load, planned};
+
+#[path = "common/folders.rs"]
+mod folders;
+
+#[path = "common/json.rs"]
+mod json;
+
+#[path = "common/scenes.rs"]
+mod scenes;
 
 /// A finished run with what was kept of it.
 struct Run {
@@ -29,9 +41,8 @@ struct Run {
 
 impl Run {
     fn of(name: &str, overrides: &[&str]) -> Self {
-        let overrides: Vec<String> = overrides.iter().map(|&text| text.into()).collect();
-        let scene = bundled(name).expect("bundled").load(&overrides).unwrap_or_else(|e| panic!("{e}"));
-        let plan = Plan::new(&scene).unwrap_or_else(|e| panic!("{e}"));
+        let scene = load(name, overrides);
+        let plan = planned(&scene);
         let mut probes: Vec<_> = plan.probes.iter().map(|&p| ProbeSeries::new(p)).collect();
         let mut snapshots = Vec::new();
         let outcome = run(plan, &mut |engine, _| {
@@ -65,15 +76,6 @@ impl Run {
     }
 }
 
-fn names_in(folder: &Path) -> Vec<String> {
-    let mut names: Vec<String> = fs::read_dir(folder)
-        .expect("readable")
-        .map(|entry| entry.expect("readable").file_name().to_string_lossy().into_owned())
-        .collect();
-    names.sort();
-    names
-}
-
 /// The list of what flockform wrote.
 const LIST: &str = "flockform-files.txt";
 
@@ -83,7 +85,7 @@ fn fill(folder: &OutputFolder, file: &str) {
 
 #[test]
 fn outputs_stand_in_their_place_only_when_committed() {
-    let parent = tempfile::tempdir().expect("a folder");
+    let parent = temporary();
     let out = parent.path().join("runs/out");
     let folder = OutputFolder::create(&out, false).expect("created");
     fill(&folder, "summary.json");
@@ -95,7 +97,7 @@ fn outputs_stand_in_their_place_only_when_committed() {
 
 #[test]
 fn outputs_that_are_not_committed_leave_nothing_behind() {
-    let parent = tempfile::tempdir().expect("a folder");
+    let parent = temporary();
     let folder = OutputFolder::create(&parent.path().join("out"), false).expect("created");
     fill(&folder, "final.csv");
     let hidden = names_in(parent.path());
@@ -111,7 +113,7 @@ fn outputs_that_are_not_committed_leave_nothing_behind() {
 
 #[test]
 fn a_folder_that_is_not_empty_is_refused_and_the_refusal_names_the_remedy() {
-    let parent = tempfile::tempdir().expect("a folder");
+    let parent = temporary();
     let out = parent.path().join("out");
     fs::create_dir(&out).expect("created");
     OutputFolder::create(&out, false).expect("an empty folder is welcome").commit().expect("committed");
@@ -127,7 +129,7 @@ fn a_folder_that_is_not_empty_is_refused_and_the_refusal_names_the_remedy() {
 
 #[test]
 fn with_force_former_outputs_stay_until_the_new_ones_take_their_place() {
-    let parent = tempfile::tempdir().expect("a folder");
+    let parent = temporary();
     let out = parent.path().join("out");
     let former = OutputFolder::create(&out, false).expect("created");
     fill(&former, "summary.json");
@@ -143,7 +145,7 @@ fn with_force_former_outputs_stay_until_the_new_ones_take_their_place() {
 
 #[test]
 fn outputs_are_kept_where_somebody_took_their_place_meanwhile() {
-    let parent = tempfile::tempdir().expect("a folder");
+    let parent = temporary();
     let out = parent.path().join("out");
     let folder = OutputFolder::create(&out, false).expect("created");
     fill(&folder, "summary.json");
@@ -159,7 +161,7 @@ fn outputs_are_kept_where_somebody_took_their_place_meanwhile() {
 
 #[test]
 fn a_place_that_cannot_be_a_folder_is_refused_with_its_path() {
-    let parent = tempfile::tempdir().expect("a folder");
+    let parent = temporary();
     let file = parent.path().join("file");
     fs::write(&file, "mine").expect("writable");
     let refusal = |path: &Path| OutputFolder::create(path, true).expect_err("refused");
@@ -173,7 +175,7 @@ fn a_place_that_cannot_be_a_folder_is_refused_with_its_path() {
 
 #[test]
 fn the_tables_of_the_tension_test_use_the_papers_numbering_and_read_back_exactly() {
-    let parent = tempfile::tempdir().expect("a folder");
+    let parent = temporary();
     let out = parent.path().join("out");
     let run = Run::of("tension", &["stop.steps=25", "record.figures=[]"]);
     run.write_to(&out).expect("written");
@@ -211,12 +213,12 @@ fn the_tables_of_the_tension_test_use_the_papers_numbering_and_read_back_exactly
 
 #[test]
 fn the_summary_tells_how_the_run_went() {
-    let parent = tempfile::tempdir().expect("a folder");
+    let parent = temporary();
     let out = parent.path().join("out");
     let run = Run::of("fracture", &["stop.steps=60", "record.figures=[]"]);
     run.write_to(&out).expect("written");
     let text = fs::read_to_string(out.join("summary.json")).expect("readable");
-    let summary: serde_json::Value = serde_json::from_str(&text).expect("valid JSON");
+    let summary = json(&text);
     assert_eq!(summary["program"], "flockform");
     assert_eq!(summary["version"], env!("CARGO_PKG_VERSION"));
     assert_eq!((&summary["name"], &summary["stop_reason"]), (&"fracture".into(), &"steps".into()));
@@ -244,14 +246,14 @@ fn the_summary_tells_how_the_run_went() {
 
 #[test]
 fn a_run_without_a_step_has_no_residual_but_a_valid_summary() {
-    let parent = tempfile::tempdir().expect("a folder");
+    let parent = temporary();
     let out = parent.path().join("out");
     let mut never_started = Run::of("tension", &["stop.steps=1", "record.figures=[]"]);
-    let plan = Plan::new(&never_started.scene).expect("plans");
+    let plan = planned(&never_started.scene);
     never_started.outcome = run(plan, &mut |_, _| ControlFlow::Break(()));
     never_started.write_to(&out).expect("written");
     let text = fs::read_to_string(out.join("summary.json")).expect("readable");
-    let summary: serde_json::Value = serde_json::from_str(&text).expect("valid JSON");
+    let summary = json(&text);
     assert_eq!((&summary["residual"], &summary["stop_reason"]), (&().into(), &"interrupted".into()));
 }
 
@@ -266,7 +268,7 @@ fn array<const SIZE: usize>(frame: Node<'_, '_>, name: &str) -> Vec<[u8; SIZE]> 
 
 #[test]
 fn a_frame_holds_every_particle_and_every_bond_with_its_state() {
-    let parent = tempfile::tempdir().expect("a folder");
+    let parent = temporary();
     let run = Run::of("notched-plate", &["stop.steps=30", "record.figures=[]"]);
     let engine = &run.outcome.engine;
     let folder = OutputFolder::create(&parent.path().join("out"), false).expect("created");
@@ -326,7 +328,7 @@ fn last_frame(run: &Run, parent: &Path) -> String {
 
 #[test]
 fn a_frame_of_a_material_has_its_cells_filled_with_stress() {
-    let parent = tempfile::tempdir().expect("a folder");
+    let parent = temporary();
     let run = Run::of("beam-loaded", &["lattice={kind=\"hexagonal\",spacing=1.0}"]);
     let text = last_frame(&run, parent.path());
     let document = Document::parse(&text).expect("well-formed");
@@ -349,7 +351,7 @@ fn a_frame_of_a_material_has_its_cells_filled_with_stress() {
 
 #[test]
 fn a_frame_of_the_paper_s_rule_with_a_material_has_particles_bonds_and_cells() {
-    let parent = tempfile::tempdir().expect("a folder");
+    let parent = temporary();
     let run = Run::of("grips", &["stop.steps=1", "rule={}"]);
     let text = last_frame(&run, parent.path());
     let document = Document::parse(&text).expect("well-formed");
@@ -486,7 +488,7 @@ fn probes_are_drawn_as_one_line_each_in_the_panels_where_something_happens() {
 
 #[test]
 fn the_png_is_the_svg_at_full_width_with_its_text() {
-    let parent = tempfile::tempdir().expect("a folder");
+    let parent = temporary();
     let run = Run::of("tension", &["stop.steps=1", "record.figures=[1]"]);
     let svg = figures::configuration(&run.subject(), &run.snapshots[0]);
     let folder = OutputFolder::create(&parent.path().join("out"), false).expect("created");

@@ -2,11 +2,14 @@
 
 use std::ops::ControlFlow;
 
-use flockform::continuum::plan::Plan;
 use flockform::continuum::record::ProbeSeries;
 use flockform::continuum::run::run;
 use flockform::engine::Engine;
-use flockform::scene::bundled;
+
+use scenes::{load, planned};
+
+#[path = "common/scenes.rs"]
+mod scenes;
 
 /// What the oracle says of one frame rule.
 struct Oracle {
@@ -46,8 +49,7 @@ fn displacement(engine: &Engine, column: i32, row: i32) -> f64 {
 #[test]
 fn the_tension_test_gives_the_oracle_s_numbers_with_both_frames() {
     for oracle in ORACLES {
-        let plan =
-            Plan::new(&bundled(oracle.scene).expect("bundled").load(&[]).expect("valid")).expect("plans");
+        let plan = planned(&load(oracle.scene, &[]));
         let mut centre = ProbeSeries::new(66);
         let (mut edge_row, mut centre_row, mut peak_column) = (0.0, 0.0, 0);
         let outcome = run(plan, &mut |engine, _| {

@@ -6,11 +6,18 @@ use std::fs;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
-use flockform::continuum::plan::Plan;
 use flockform::continuum::record::{ProbeSeries, Snapshot};
 use flockform::continuum::run::run;
 use flockform::export::{Drawing, ExportError, OutputFolder, Results, Timings, VtkSeries, write_all};
-use flockform::scene::bundled;
+
+use folders::{names_in, temporary};
+use scenes::{load, planned};
+
+#[path = "common/folders.rs"]
+mod folders;
+
+#[path = "common/scenes.rs"]
+mod scenes;
 
 /// The list of what flockform wrote.
 const LIST: &str = "flockform-files.txt";
@@ -19,14 +26,7 @@ fn fill(folder: &OutputFolder, file: &str) {
     fs::write(folder.path(file), "{}").expect("writable");
 }
 
-fn names_in(folder: &Path) -> Vec<String> {
-    let name = |entry: fs::DirEntry| entry.file_name().to_string_lossy().into_owned();
-    let mut names: Vec<String> = fs::read_dir(folder).expect("readable").flatten().map(name).collect();
-    names.sort();
-    names
-}
-
-/// Everything below a folder, links not followed.
+/// Everything below a folder, folders included, links not followed.
 fn files(folder: &Path) -> Vec<PathBuf> {
     let of = |entry: fs::DirEntry| {
         let below =
@@ -77,7 +77,7 @@ fn force_removes_what_the_list_names_and_refuses_where_there_is_more() {
         }),
     ];
     for (named, put) in adversaries {
-        let parent = tempfile::tempdir().expect("a folder");
+        let parent = temporary();
         let out = former(parent.path());
         // Made in time, and too late for the first look.
         let early = OutputFolder::create(&out, true).expect("all is ours");
@@ -95,7 +95,7 @@ fn force_removes_what_the_list_names_and_refuses_where_there_is_more() {
 
 #[test]
 fn a_list_that_somebody_wrote_reaches_nothing_outside() {
-    let parent = tempfile::tempdir().expect("a folder");
+    let parent = temporary();
     let out = former(parent.path());
     fs::write(parent.path().join("important.txt"), "mine").expect("writable");
     let lines =
@@ -109,7 +109,7 @@ fn a_list_that_somebody_wrote_reaches_nothing_outside() {
 
 #[test]
 fn a_killed_program_s_folder_is_removed_by_the_next_one_and_a_running_one_s_is_not() {
-    let parent = tempfile::tempdir().expect("a folder");
+    let parent = temporary();
     let out = parent.path().join("out");
     let first = OutputFolder::create(&out, false).expect("created");
     fill(&first, "final.csv");
@@ -133,7 +133,7 @@ fn a_killed_program_s_folder_is_removed_by_the_next_one_and_a_running_one_s_is_n
 
 #[test]
 fn outputs_that_a_killed_program_had_put_aside_come_back() {
-    let parent = tempfile::tempdir().expect("a folder");
+    let parent = temporary();
     let out = former(parent.path());
     fs::rename(&out, parent.path().join(".out.replaced")).expect("renamed");
     // Once they are back, the place is theirs.
@@ -146,7 +146,7 @@ fn outputs_that_a_killed_program_had_put_aside_come_back() {
 #[cfg(unix)]
 #[test]
 fn nothing_is_written_through_a_link() {
-    let parent = tempfile::tempdir().expect("a folder");
+    let parent = temporary();
     let out = parent.path().join("out");
     let victim = parent.path().join("victim");
     fs::write(&victim, "mine").expect("writable");
@@ -158,10 +158,10 @@ fn nothing_is_written_through_a_link() {
         let _ = fs::remove_file(open.join(name));
         std::os::unix::fs::symlink(&victim, open.join(name)).expect("linked");
     }
-    let scene = bundled("tension").expect("bundled").load(&["stop.steps=25".to_owned()]).expect("valid");
+    let scene = load("tension", &["stop.steps=25"]);
     let mut probes = [ProbeSeries::new(66)];
     let mut snapshots = Vec::new();
-    let outcome = run(Plan::new(&scene).expect("fits"), &mut |engine, _| {
+    let outcome = run(planned(&scene), &mut |engine, _| {
         probes[0].record(engine);
         if engine.step() == 25 {
             snapshots.push(Snapshot::of(engine));
@@ -185,7 +185,7 @@ fn nothing_is_written_through_a_link() {
 
 #[test]
 fn of_many_that_want_one_name_each_gets_a_place_of_its_own() {
-    let parent = tempfile::tempdir().expect("a folder");
+    let parent = temporary();
     let place = |n: usize| parent.path().join(format!("out-{n}"));
     // As a command does without --out: the first name that is free. Short work, so that names are filled meanwhile.
     let work = || {

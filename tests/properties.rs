@@ -13,9 +13,14 @@ use flockform::flock::rules::{
 use flockform::flock::vectors::Vectors;
 use flockform::material::elastic::{Constants, Elastic};
 use flockform::material::stiffness::{mean_gradients, triangle};
+use flockform::scene::Scene;
 use flockform::scene::bundled::SCENES;
-use flockform::scene::{Scene, bundled};
 use proptest::prelude::*;
+
+use scenes::{load, planned};
+
+#[path = "common/scenes.rs"]
+mod scenes;
 
 const LATTICES: [&str; 6] = [
     "lattice-square",
@@ -48,9 +53,7 @@ const MOVE_ONLY: [&str; 3] = [
 const NEITHER: &str = r#"rule={mean={kind="power",exponent=2.0,origin="world"},rest="literal"}"#;
 
 fn plan(name: &str, overrides: &[&str]) -> Plan {
-    let overrides: Vec<String> = overrides.iter().map(|&text| text.to_owned()).collect();
-    let scene = bundled(name).expect("bundled").load(&overrides).unwrap_or_else(|error| panic!("{error}"));
-    Plan::new(&scene).unwrap_or_else(|error| panic!("{error}"))
+    planned(&load(name, overrides))
 }
 
 /// A body off its outline's symmetry, pulled obliquely at one side.

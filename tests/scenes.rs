@@ -12,21 +12,27 @@ use flockform::flock::vectors::distance;
 use flockform::scene::swarm::Swarm;
 use flockform::scene::{Scene, bundled};
 
-fn scene(name: &str, overrides: &[&str]) -> Scene {
-    let overrides: Vec<String> = overrides.iter().map(|&text| text.to_owned()).collect();
-    bundled(name).expect("bundled").load(&overrides).unwrap_or_else(|error| panic!("{error}"))
-}
+use folders::temporary;
+use scenes::{load, planned};
+
+#[path = "common/folders.rs"]
+mod folders;
+#[path = "common/scenes.rs"]
+mod scenes;
 
 fn outcome(name: &str, overrides: &[&str]) -> Outcome {
     watched(name, overrides, |_| {})
 }
 
 fn watched(name: &str, overrides: &[&str], mut watch: impl FnMut(&Engine)) -> Outcome {
-    let plan = Plan::new(&scene(name, overrides)).unwrap_or_else(|error| panic!("{error}"));
-    run(plan, &mut |engine, _| {
+    let mut looks = 0;
+    let outcome = run(planned(&load(name, overrides)), &mut |engine, _| {
         watch(engine);
+        looks += 1;
         ControlFlow::Continue(())
-    })
+    });
+    assert!(looks >= outcome.engine.step().max(1), "every step is looked at: {looks}");
+    outcome
 }
 
 fn displacement(engine: &Engine, id: usize) -> [f64; 2] {
@@ -85,15 +91,14 @@ fn a_new_motion_starts_from_where_the_leader_stands() {
 
 #[test]
 fn a_displacement_file_leads_its_particles() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = temporary();
     let rows: String = (0..10).map(|row| format!("9,{row},0.5,{}\n", 0.1 * f64::from(row))).collect();
     std::fs::write(folder.path().join("led.csv"), format!("x,y,ux,uy\n{rows}")).expect("written");
     let csv = r#"roles[1].motion={kind="csv",file="led.csv",scale=2.0,steps=4}"#;
     let text = bundled("tension").expect("bundled").text;
     let scene =
         Scene::parse("csv", "csv.toml", text, &[csv.into(), "stop.steps=8".into()], Some(folder.path()));
-    let plan =
-        Plan::new(&scene.unwrap_or_else(|error| panic!("{error}"))).unwrap_or_else(|error| panic!("{error}"));
+    let plan = planned(&scene.unwrap_or_else(|error| panic!("{error}")));
     let mut half = [0.0; 2];
     let outcome = run(plan, &mut |engine, _| {
         if engine.step() == 2 {
@@ -228,16 +233,13 @@ fn a_broken_pair_never_influences_each_other_again() {
 
 #[test]
 fn pseudo_energies_are_those_of_the_formulas() {
-    watched("tension", &["stop.steps=5"], |engine| {
-        if engine.step() == 1 {
-            // Particle 127's left neighbour has not moved; the frame point right of it lags too.
-            assert!(
-                (engine.pe1(126) - (0.6 * 0.6 + 0.6 * 0.6) - expected_above_and_below(engine)).abs() < 1e-12
-            );
-            assert!((engine.pe2(126) - 0.6).abs() < 1e-12);
-            assert_eq!(engine.pe2(13), 0.0);
-        }
-    });
+    let outcome = outcome("tension", &["stop.steps=1"]);
+    let engine = &outcome.engine;
+    assert_eq!(engine.step(), 1);
+    // Particle 127's left neighbour has not moved; the frame point right of it lags too.
+    assert!((engine.pe1(126) - (0.6 * 0.6 + 0.6 * 0.6) - expected_above_and_below(engine)).abs() < 1e-12);
+    assert!((engine.pe2(126) - 0.6).abs() < 1e-12);
+    assert_eq!(engine.pe2(13), 0.0);
 }
 
 /// Share of particle 127's PE1 from the bonds to the leaders above and below, which move with it.
@@ -276,8 +278,8 @@ fn the_liquid_drop_stays_in_one_piece_and_rounds_itself() {
 
 #[test]
 fn a_plan_counts_what_it_says() {
-    let scene = scene("tension", &[]);
-    let report = PlanReport::new(&scene, &Plan::new(&scene).expect("plans")).expect("plans").to_string();
+    let scene = load("tension", &[]);
+    let report = PlanReport::new(&scene, &planned(&scene)).expect("plans").to_string();
     for words in
         ["144 (80 follower, 10 leader, 10 clamped, 44 frame)", "lagged frame of 44 points", "401 steps"]
     {
@@ -290,8 +292,7 @@ fn a_specimen_has_the_standard_s_outline_on_every_lattice() {
     for lattice in ["square", "hexagonal", "honeycomb"] {
         for shape in ["e8-sheet", "d638-type-i"] {
             let body = format!("body={{shape={{kind=\"{shape}\"}}}}");
-            let plan =
-                Plan::new(&scene(&format!("lattice-{lattice}"), &[&body])).unwrap_or_else(|e| panic!("{e}"));
+            let plan = planned(&load(&format!("lattice-{lattice}"), &[&body]));
             let width = |low: f64, high: f64| {
                 let reference = &plan.setup.body.reference;
                 let band = (0..plan.count()).filter(|&i| (low..high).contains(&reference.y[i]));
@@ -320,7 +321,7 @@ fn every_toml_block_of_readme_and_guides_is_a_scene_or_a_swarm() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let guides = std::fs::read_dir(root.join("src/guide")).expect("guides");
     let guides = guides.map(|entry| entry.expect("readable").path());
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = temporary();
     let cloud: String = (0..64).map(|k| format!("{},{}\n", k / 8, k % 8)).collect();
     std::fs::write(folder.path().join("cloud.csv"), format!("x,y\n{cloud}")).expect("written");
     let (mut scenes, mut swarms) = (0, 0);

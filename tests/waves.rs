@@ -7,16 +7,15 @@ use flockform::continuum::run::{StopReason, run};
 use flockform::engine::Engine;
 use flockform::flock::role::Role;
 use flockform::flock::rules::{Feedback, FeedbackReference, Rule};
-use flockform::scene::{Scene, bundled};
 use flockform::solve::spectrum::{SpectralRadius, spectral_radius};
 
-fn scene(name: &str, overrides: &[&str]) -> Scene {
-    let overrides: Vec<String> = overrides.iter().map(|&text| text.to_owned()).collect();
-    bundled(name).expect("bundled").load(&overrides).unwrap_or_else(|error| panic!("{error}"))
-}
+use scenes::{load, planned};
+
+#[path = "common/scenes.rs"]
+mod scenes;
 
 fn plan(name: &str, overrides: &[&str]) -> Plan {
-    Plan::new(&scene(name, overrides)).unwrap_or_else(|error| panic!("{error}"))
+    planned(&load(name, overrides))
 }
 
 /// Hops from each particle to the nearest leader, along neighbour relations; `None` where no chain

@@ -6,6 +6,7 @@ use std::path::{Component, Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
+use flockform::continuum::digest::fnv1a;
 use flockform::scene::bundled::SWARMS;
 
 use super::{Refusal, interrupt, print};
@@ -148,7 +149,7 @@ impl Manifest {
     }
 
     fn of(files: &[Installed]) -> Self {
-        Self(files.iter().map(|file| (checksum(&file.bytes), file.path.clone())).collect())
+        Self(files.iter().map(|file| (fnv1a(&file.bytes), file.path.clone())).collect())
     }
 
     fn into_file(self) -> Installed {
@@ -166,7 +167,7 @@ impl Manifest {
     }
 
     fn has(&self, path: &Path, bytes: &[u8]) -> bool {
-        let sum = checksum(bytes);
+        let sum = fnv1a(bytes);
         self.0.iter().any(|(installed, at)| *installed == sum && at == path)
     }
 
@@ -192,13 +193,6 @@ fn is_own_place(prefix: &Path, path: &Path) -> bool {
     is_plain
         && [SHARE, LIBRARY].into_iter().any(is_below)
         && parents.into_iter().all(|above| !prefix.join(above).is_symlink())
-}
-
-/// FNV-1a hash: distinguishes a changed file from an installed one, and is the same in every build.
-fn checksum(bytes: &[u8]) -> u64 {
-    bytes
-        .iter()
-        .fold(0xcbf2_9ce4_8422_2325, |sum, byte| (sum ^ u64::from(*byte)).wrapping_mul(0x100_0000_01b3))
 }
 
 /// A file written beside its place; removed again unless it is moved there.

@@ -1,14 +1,21 @@
-//! Whether two plans are the same.
+//! Whether two plans, or two files, are the same.
 
 use super::plan::Plan;
 use crate::engine::setup::Setup;
 use crate::flock::law::Weights;
 use crate::flock::vectors::Vectors;
 
-/// A fingerprint of everything in a plan that its run depends on, to distinguish plans: 64 bits,
-/// FNV-1a (G. Fowler, L. C. Noll, K.-P. Vo). Not secure against forgery.
+/// FNV-1a hash of bytes (G. Fowler, L. C. Noll, K.-P. Vo): 64 bits, the same in every build, not secure against
+/// forgery. The hashes of the standard library differ from version to version.
+pub fn fnv1a(bytes: &[u8]) -> u64 {
+    let mut hash = Fnv::default();
+    hash.bytes(bytes);
+    hash.0
+}
+
+/// A fingerprint of everything in a plan that its run depends on, to distinguish plans: an FNV-1a hash, see [`fnv1a`].
 pub fn digest(plan: &Plan) -> u64 {
-    let mut digest = Fnv(0xcbf2_9ce4_8422_2325);
+    let mut digest = Fnv::default();
     let Plan { setup, stop, probes, .. } = plan;
     let Setup { body, flock, update, present_radius, roles, changes, cuts, ramp, .. } = setup;
     digest.points(&body.reference);
@@ -46,6 +53,12 @@ pub fn digest(plan: &Plan) -> u64 {
 
 struct Fnv(u64);
 
+impl Default for Fnv {
+    fn default() -> Self {
+        Self(0xcbf2_9ce4_8422_2325)
+    }
+}
+
 impl Fnv {
     fn bytes(&mut self, bytes: &[u8]) {
         for &byte in bytes {
@@ -66,5 +79,18 @@ impl Fnv {
     fn points(&mut self, points: &Vectors) {
         self.numbers(&points.x);
         self.numbers(&points.y);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_hash_is_that_of_its_authors() {
+        // Test vectors of draft-eastlake-fnv.
+        assert_eq!(fnv1a(b""), 0xcbf2_9ce4_8422_2325);
+        assert_eq!(fnv1a(b"a"), 0xaf63_dc4c_8601_ec8c);
+        assert_eq!(fnv1a(b"foobar"), 0x8594_4171_f739_67e8);
     }
 }

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::disjoint_sets::DisjointSets;
 use super::frame::{Frame, FrameRule};
 use super::lattice::{Lattice, LatticeKind, Site};
 use super::neighbourhood::{Neighbourhood, NeighbourhoodError, Neighbours};
@@ -255,21 +256,12 @@ impl Body {
     /// Label of the connected part each particle belongs to, neighbour relations taken both ways and
     /// the frame left out, shape \[count\].
     pub fn components(&self, neighbours: &Neighbours) -> Vec<u32> {
-        let mut parent: Vec<u32> = (0..self.count() as u32).collect();
-        fn root(parent: &mut [u32], mut i: u32) -> u32 {
-            while parent[i as usize] != i {
-                parent[i as usize] = parent[parent[i as usize] as usize];
-                i = parent[i as usize];
-            }
-            i
-        }
+        let mut parts = DisjointSets::new(self.count());
         for i in 0..self.count() {
-            for &k in neighbours.of(i).iter().filter(|&&k| !self.is_frame[k as usize]) {
-                let (a, b) = (root(&mut parent, i as u32), root(&mut parent, k));
-                parent[a.max(b) as usize] = a.min(b);
-            }
+            let within = neighbours.of(i).iter().filter(|&&k| !self.is_frame[k as usize]);
+            within.for_each(|&k| parts.join(i as u32, k));
         }
-        (0..self.count() as u32).map(|i| root(&mut parent, i)).collect()
+        parts.labels()
     }
 }
 

@@ -9,6 +9,7 @@
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
 use super::cells::{Cells, Incidence};
+use crate::flock::disjoint_sets::DisjointSets;
 use crate::flock::vectors::Vectors;
 
 /// How a body, or what its leaders hold of it, can move without strain. Particles are named by their
@@ -162,15 +163,15 @@ fn free_motions(reference: &Vectors, held: &[[bool; 2]], members: &[usize]) -> u
 
 impl Linkage {
     fn of(cells: &Cells, incidence: &Incidence, particles: usize) -> Self {
-        let mut union = Union::new(cells.count());
+        let mut joined = DisjointSets::new(cells.count());
         for cell in 0..cells.count() {
             for side in cells.sides(cell) {
                 if let Some(other) = cells.across(incidence, side) {
-                    union.join(cell, other);
+                    joined.join(cell as u32, other as u32);
                 }
             }
         }
-        let (part, parts) = union.labels();
+        let (part, parts) = joined.numbered();
         let mut hinges = Vec::new();
         if parts > 1 {
             for i in 0..particles {
@@ -187,11 +188,11 @@ impl Linkage {
 
     /// Label of each part such that parts pinned to each other, however loosely, share it.
     fn groups(&self) -> Vec<usize> {
-        let mut union = Union::new(self.parts);
+        let mut pinned = DisjointSets::new(self.parts);
         for (_, parts) in &self.hinges {
-            parts.iter().for_each(|&part| union.join(parts[0], part));
+            parts.iter().for_each(|&part| pinned.join(parts[0] as u32, part as u32));
         }
-        union.labels().0
+        pinned.numbered().0
     }
 
     fn require_joined(&self, cells: &Cells) -> Result<(), Mechanism> {
@@ -255,45 +256,6 @@ impl Linkage {
             }
         }
         worst.1.map_or(Ok(()), |i| Err(Mechanism::Hinge { particle: i + 1 }))
-    }
-}
-
-/// Disjoint sets.
-struct Union {
-    parent: Vec<usize>,
-}
-
-impl Union {
-    fn new(count: usize) -> Self {
-        Self { parent: (0..count).collect() }
-    }
-
-    fn root(&mut self, mut i: usize) -> usize {
-        while self.parent[i] != i {
-            self.parent[i] = self.parent[self.parent[i]];
-            i = self.parent[i];
-        }
-        i
-    }
-
-    fn join(&mut self, a: usize, b: usize) {
-        let (a, b) = (self.root(a), self.root(b));
-        self.parent[a.max(b)] = a.min(b);
-    }
-
-    /// Number of its set for each member, counted in the order of first members, and how many sets.
-    fn labels(mut self) -> (Vec<usize>, usize) {
-        let (mut labels, mut sets) = (vec![0; self.parent.len()], 0);
-        for i in 0..labels.len() {
-            let root = self.root(i);
-            if root == i {
-                labels[i] = sets;
-                sets += 1;
-            } else {
-                labels[i] = labels[root];
-            }
-        }
-        (labels, sets)
     }
 }
 

@@ -1,7 +1,7 @@
 //! `flockform run --resume`: a killed run goes on as if nothing had been.
 
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
 use crate::program::*;
@@ -11,41 +11,27 @@ const RUN: [&str; 8] =
     ["run", "fracture", "--out", "o", "--set", "record.vtk_every=25", "--set", "record.figures=[50, 150]"];
 
 fn start(arguments: &[&str], folder: &Path) -> Child {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_flockform"));
-    command
-        .args(arguments)
-        .current_dir(folder)
-        .env_remove("RUST_LOG")
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped());
-    command.spawn().expect("the program starts")
+    let mut command = command(arguments, folder);
+    command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the program starts")
 }
 
 /// Every file below a folder, by its path in it; what a summary says of times left out.
 fn contents(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
-    let mut found = Vec::new();
-    let mut open = vec![folder.to_owned()];
-    while let Some(next) = open.pop() {
-        for entry in std::fs::read_dir(&next).expect("readable") {
-            let path = entry.expect("readable").path();
-            if path.is_dir() {
-                open.push(path);
-                continue;
-            }
-            let mut bytes = std::fs::read(&path).expect("readable");
-            if path.ends_with("summary.json") {
-                let mut summary: serde_json::Value = serde_json::from_slice(&bytes).expect("JSON");
-                summary["timings"] = serde_json::Value::Null;
-                bytes = summary.to_string().into_bytes();
-            }
-            if path.ends_with("report.html") {
-                let page = String::from_utf8(bytes).expect("text");
-                let page = without(&page, "<dt>Time</dt>", "</dd>");
-                bytes = without(&page, "&quot;timings&quot;: {", "}").into_bytes();
-            }
-            found.push((path.strip_prefix(folder).expect("below it").to_owned(), bytes));
+    let timeless = |path: PathBuf| {
+        let mut bytes = std::fs::read(&path).expect("readable");
+        if path.ends_with("summary.json") {
+            let mut summary = json(&text(&bytes));
+            summary["timings"] = serde_json::Value::Null;
+            bytes = summary.to_string().into_bytes();
         }
-    }
+        if path.ends_with("report.html") {
+            let page = String::from_utf8(bytes).expect("text");
+            let page = without(&page, "<dt>Time</dt>", "</dd>");
+            bytes = without(&page, "&quot;timings&quot;: {", "}").into_bytes();
+        }
+        (path.strip_prefix(folder).expect("below it").to_owned(), bytes)
+    };
+    let mut found: Vec<_> = files(folder).into_iter().map(timeless).collect();
     found.sort();
     found
 }

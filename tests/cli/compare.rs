@@ -38,8 +38,7 @@ fn places_that_a_scene_names_are_told_beside_the_truth_s() {
     let output = flockform(&["compare", "cook", "--out", "o", "--no-report"], folder.path());
     let said = text(&output.stdout);
     assert!(output.status.success() && said.contains("at (48, 52): rule, truth"), "{said}");
-    let file = std::fs::read_to_string(folder.path().join("o/compare.json")).expect("written");
-    let told = &serde_json::from_str::<serde_json::Value>(&file).expect("JSON")["places"][0];
+    let told = &json_in(&folder.path().join("o/compare.json"))["places"][0];
     for who in ["rule", "truth"] {
         let rise = told[who]["displacement"][1].as_f64().expect("a number");
         assert!((rise / 23.965 - 1.0).abs() < 0.003, "{told}");
@@ -58,20 +57,15 @@ fn an_accuracy_is_met_before_the_comparison() {
     let output = flockform(&arguments, folder.path());
     let said = text(&output.stdout);
     assert!(said.starts_with("accuracy 1 %: material rule at 0.5 of the written spacing"), "{said}");
-    let file = std::fs::read_to_string(folder.path().join("o/compare.json")).expect("written");
-    let error =
-        serde_json::from_str::<serde_json::Value>(&file).expect("JSON")["displacement_rel_l2"].as_f64();
+    let error = json_in(&folder.path().join("o/compare.json"))["displacement_rel_l2"].as_f64();
     assert!(error.is_some_and(|error| error < 0.01), "{error:?}");
 }
 
 #[test]
 fn json_is_the_file_and_quiet_is_quiet() {
     let folder = temporary();
-    let said = compare(folder.path(), &["--json", "--out", "here"]);
-    let file = std::fs::read_to_string(folder.path().join("here/compare.json")).expect("written");
-    let [said, file] =
-        [said, file].map(|text| serde_json::from_str::<serde_json::Value>(&text).expect("JSON"));
-    assert_eq!(said, file);
+    let said = json(&compare(folder.path(), &["--json", "--out", "here"]));
+    assert_eq!(said, json_in(&folder.path().join("here/compare.json")));
     assert!(said["von_mises_rel_l2"].as_f64().is_some_and(|error| error < 0.025), "{said}");
     assert_eq!(compare(folder.path(), &["--quiet", "--out", "here", "--force"]), "");
 }
@@ -88,15 +82,9 @@ fn what_cannot_be_compared_is_refused_with_exit_code_2_and_leaves_nothing() {
         let output = flockform(&arguments, folder.path());
         assert_eq!(output.status.code(), Some(2), "{arguments:?}");
         assert!(text(&output.stderr).contains(words), "{arguments:?}: {}", text(&output.stderr));
-        let left: Vec<_> = walk(folder.path());
+        let left = files(folder.path());
         assert!(left.is_empty(), "{arguments:?} left {left:?}");
     }
-}
-
-/// Files below a folder.
-fn walk(folder: &Path) -> Vec<std::path::PathBuf> {
-    let entries = std::fs::read_dir(folder).expect("readable").map(|entry| entry.expect("readable").path());
-    entries.flat_map(|path| if path.is_dir() { walk(&path) } else { vec![path] }).collect()
 }
 
 #[test]

@@ -128,3 +128,18 @@ fn the_readme_stays_short() {
     let (_, readme) = documents().pop().expect("the last one");
     assert!(readme.starts_with("# flockform") && readme.lines().count() <= 150, "{}", readme.lines().count());
 }
+
+#[test]
+fn every_file_that_names_the_version_names_this_one() {
+    let version = env!("CARGO_PKG_VERSION");
+    for (file, line) in [
+        ("package.xml", format!("  <version>{version}</version>")),
+        (".github/CITATION.cff", format!("version: {version}")),
+    ] {
+        let text =
+            std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join(file)).expect("readable");
+        assert!(text.lines().any(|one| one == line), "{file} lacks `{line}`");
+    }
+    let changes = include_str!("../../.github/CHANGELOG.md");
+    assert!(changes.contains(&format!("\n## {version}, ")), "CHANGELOG.md lacks {version}");
+}

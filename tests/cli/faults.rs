@@ -1,7 +1,6 @@
 //! What nobody asks for and somebody will meet: runs at once, values without bounds, files that write to the terminal.
 
 use std::path::Path;
-use std::process::Command;
 use std::time::{Duration, Instant};
 
 use crate::program::*;
@@ -10,9 +9,8 @@ use crate::program::*;
 fn runs_that_begin_at_once_get_a_folder_each() {
     let folder = temporary();
     let start = || {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_flockform"));
-        command.args(["run", "tension", "-q", "--no-report", "--figures", "none"]);
-        command.current_dir(folder.path()).spawn().expect("the program starts")
+        let run = ["run", "tension", "-q", "--no-report", "--figures", "none"];
+        command(&run, folder.path()).spawn().expect("the program starts")
     };
     let mut children: Vec<_> = (0..4).map(|_| start()).collect();
     for child in &mut children {
@@ -33,8 +31,7 @@ fn values_that_overflow_end_as_a_divergence() {
             flockform(&[&run[..], &["--set", "stop.divergence_ratio=1e300"]].concat(), folder.path());
         assert_eq!(output.status.code(), Some(1), "{pull}: {}", text(&output.stdout));
         assert!(text(&output.stdout).contains("diverged"), "{pull}: {}", text(&output.stdout));
-        let summary = std::fs::read_to_string(folder.path().join("o/summary.json")).expect("written");
-        let summary: serde_json::Value = serde_json::from_str(&summary).expect("JSON");
+        let summary = json_in(&folder.path().join("o/summary.json"));
         assert_eq!(summary["stop_reason"], "diverged", "{pull}");
         assert!(summary["energies"]["pe1"].is_number(), "{pull}: {}", summary["energies"]);
     }

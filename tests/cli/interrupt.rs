@@ -1,7 +1,7 @@
 //! Ctrl-C: whatever the program is doing, it ends within a second, and what it leaves is whole or not there.
 
 use std::path::Path;
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
 use crate::program::*;
@@ -16,27 +16,19 @@ fn patience() -> Duration {
 }
 
 fn start(arguments: &[&str], folder: &Path) -> Child {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_flockform"));
-    command.args(arguments).current_dir(folder).env_remove("RUST_LOG");
+    let mut command = command(arguments, folder);
     command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("the program starts")
 }
 
 /// Waits until the program is busy: it has made its hidden folder, and some time has gone by.
 fn wait_until_busy(child: &mut Child, folder: &Path, busy: Duration) {
     let begun = Instant::now();
-    while names(folder).is_empty() {
+    while names_in(folder).is_empty() {
         assert!(begun.elapsed() < Duration::from_secs(60), "it never began");
         assert!(child.try_wait().expect("a child").is_none(), "it ended by itself");
         std::thread::sleep(Duration::from_millis(5));
     }
     std::thread::sleep(busy);
-}
-
-fn names(folder: &Path) -> Vec<String> {
-    let name = |entry: std::fs::DirEntry| entry.file_name().to_string_lossy().into_owned();
-    let mut names: Vec<String> = std::fs::read_dir(folder).expect("readable").flatten().map(name).collect();
-    names.sort();
-    names
 }
 
 /// The exit code after an interrupt, and what is said; the end comes in time.
@@ -113,7 +105,7 @@ fn whatever_leaves_nothing_ends_at_once_and_leaves_nothing() {
         let (code, said) = ended(child, &format!("{job:?}"));
         assert_eq!(code, Some(1), "{job:?}: {said}");
         assert!(said.contains("interrupted"), "{job:?}: {said}");
-        assert!(names(folder.path()).is_empty(), "{job:?}: {:?}", files(folder.path()));
+        assert!(names_in(folder.path()).is_empty(), "{job:?}: {:?}", files(folder.path()));
     }
 }
 
@@ -137,7 +129,7 @@ fn a_large_run_of_slow_steps_keeps_its_checkpoint_and_goes_on_from_it() {
         assert_eq!(code, Some(1), "{said}");
         let is_kept = said.contains("--resume");
         let left: &[&str] = if is_kept { &["large.toml", "o.unfinished"] } else { &["large.toml"] };
-        assert_eq!(names(folder.path()), left, "{said}");
+        assert_eq!(names_in(folder.path()), left, "{said}");
         is_kept
     });
     assert!(kept, "a large run that is interrupted never keeps its checkpoint");
@@ -145,7 +137,7 @@ fn a_large_run_of_slow_steps_keeps_its_checkpoint_and_goes_on_from_it() {
     std::thread::sleep(Duration::from_secs(2));
     let (code, said) = ended(resumed, "the same run, resumed");
     assert_eq!(code, Some(1), "{said}");
-    assert_eq!(names(folder.path()), ["large.toml", "o.unfinished"]);
+    assert_eq!(names_in(folder.path()), ["large.toml", "o.unfinished"]);
 }
 
 #[test]
@@ -170,7 +162,7 @@ fn a_second_interrupt_ends_at_once() {
     signal("INT", child.id());
     let (code, said) = ended_after(child);
     assert_eq!(code, Some(1), "{said}");
-    let left = names(folder.path());
+    let left = names_in(folder.path());
     // Whichever came first: it was all written, or a part that can be resumed, or nothing.
     assert!(left.is_empty() || left == ["o"] || left == ["o.unfinished"], "{left:?}");
 }
@@ -194,7 +186,7 @@ fn a_program_whose_words_nobody_reads_ends_too() {
     drop(child.stderr.take());
     let (code, _) = ended(child, "a closed pipe");
     assert_eq!(code, Some(1));
-    assert!(names(folder.path()).is_empty());
+    assert!(names_in(folder.path()).is_empty());
 }
 
 #[test]
@@ -212,6 +204,6 @@ fn figures_are_not_worth_waiting_for() {
     }
     let (code, said) = ended(child, "figures");
     assert_eq!(code, Some(1), "{said}");
-    let left = names(folder.path());
+    let left = names_in(folder.path());
     assert!(left.is_empty() || folder.path().join("o/summary.json").is_file(), "{left:?}: {said}");
 }

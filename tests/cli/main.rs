@@ -3,11 +3,17 @@
 #![cfg(feature = "cli")]
 
 mod checkpoint;
+#[path = "../common/command.rs"]
+mod command;
 mod compare;
 mod documents;
 mod faults;
+#[path = "../common/folders.rs"]
+mod folders;
 mod install;
 mod interrupt;
+#[path = "../common/json.rs"]
+mod json;
 mod material;
 mod measured;
 mod points;

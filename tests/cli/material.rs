@@ -20,8 +20,8 @@ fn said(arguments: &[&str]) -> String {
     String::from_utf8(output.stdout).expect("text")
 }
 
-fn json(arguments: &[&str]) -> Value {
-    serde_json::from_str(&said(&[arguments, &["--json"]].concat())).expect("JSON")
+fn report_of(arguments: &[&str]) -> Value {
+    json(&said(&[arguments, &["--json"]].concat()))
 }
 
 fn refused(arguments: &[&str], words: &[&str]) {
@@ -53,7 +53,7 @@ fn poisson_and_young_are_recovered_on_every_lattice_by_the_command() {
     for lattice in LATTICES {
         for (nu, plane) in [("-0.9", "stress"), ("0", "strain"), ("0.33", "stress"), ("0.49", "strain")] {
             let constants = ["--young", "210e9", "--poisson", nu, "--plane", plane, "--thickness", "1e-3"];
-            let report = json(&[lattice, &constants].concat());
+            let report = report_of(&[lattice, &constants].concat());
             let found = &report["material"];
             let nu: f64 = nu.parse().expect("a number");
             let (poisson, young) = (format!("poisson_plane_{plane}"), format!("young_plane_{plane}"));
@@ -97,7 +97,7 @@ fn poisson_is_recovered_to_a_millionth_from_minus_nine_tenths_to_almost_a_half()
 #[test]
 fn eq_1_on_a_square_lattice_is_a_material_of_poisson_ratio_minus_one() {
     let arguments = ["--lattice", "square"];
-    let report = json(&arguments);
+    let report = report_of(&arguments);
     let found = &report["material"];
     assert!(close(&found["poisson_plane_stress"], -1.0, 1e-12), "{found}");
     assert!(close(&found["young_plane_stress"], 0.0, 1e-12), "{found}");
@@ -121,7 +121,8 @@ fn eq_1_on_a_square_lattice_is_a_material_of_poisson_ratio_minus_one() {
 #[test]
 fn hexagonal_weights_have_the_closed_form() {
     for nu in ["-0.9", "0", "0.3333333333333333", "0.45"] {
-        let report = json(&["--lattice", "hexagonal", "--spacing", "1", "--young", "3", "--poisson", nu]);
+        let report =
+            report_of(&["--lattice", "hexagonal", "--spacing", "1", "--young", "3", "--poisson", nu]);
         let nu: f64 = nu.parse().expect("a number");
         let r = (1.0 - 3.0 * nu) / (5.0 + nu);
         let weights = report["weights"].as_array().expect("weights");
@@ -140,7 +141,7 @@ fn hexagonal_weights_have_the_closed_form() {
 #[test]
 fn weights_of_a_particle_sum_to_the_identity() {
     for lattice in LATTICES {
-        let report = json(&[lattice, &["--young", "2", "--poisson", "0.3"]].concat());
+        let report = report_of(&[lattice, &["--young", "2", "--poisson", "0.3"]].concat());
         let weights = report["weights"].as_array().expect("weights");
         let sublattices = report["diagonal"].as_array().expect("one a sublattice").len();
         for s in 0..sublattices {
@@ -157,7 +158,7 @@ fn weights_of_a_particle_sum_to_the_identity() {
 fn an_orthotropic_sheet_comes_back_along_its_fibres() {
     for lattice in LATTICES {
         let fibres = ["--young", "9,1", "--poisson", "0.4", "--shear", "0.6", "--fiber-angle", "30"];
-        let report = json(&[lattice, &fibres].concat());
+        let report = report_of(&[lattice, &fibres].concat());
         let found = &report["material"]["engineering"];
         assert!(close(&found["angle"], 30.0, 1e-9) && close(&found["young"][0], 9.0, 1e-9), "{found}");
         assert!(close(&found["young"][1], 1.0, 1e-9) && close(&found["poisson_12"], 0.4, 1e-9), "{found}");
@@ -176,7 +177,7 @@ fn a_rule_that_no_symmetric_stress_has_says_so() {
 fn an_unstable_rule_says_so_and_offers_no_damping() {
     let weights = "1,1,1,1,-0.3,-0.3,-0.3,-0.3";
     let arguments = ["--lattice", "square", "--neighbours", "collinear", "--weights", weights];
-    let report = json(&arguments);
+    let report = report_of(&arguments);
     assert_eq!(report["waves"]["stable"], false);
     assert!(report["waves"]["damping_limit"].is_null());
     assert!(said(&arguments).contains("stable                      NO"));
@@ -185,14 +186,14 @@ fn an_unstable_rule_says_so_and_offers_no_damping() {
 #[test]
 fn neighbours_that_leave_particles_loose_are_unstable() {
     for arguments in [["--neighbours", "offsets:2,0;-2,0;0,2;0,-2"], ["--weights", "1,1,0,0"]] {
-        let report = json(&[&["--lattice", "square"][..], &arguments].concat());
+        let report = report_of(&[&["--lattice", "square"][..], &arguments].concat());
         assert_eq!(report["waves"]["stable"], false, "{arguments:?}");
     }
 }
 
 #[test]
 fn a_second_gradient_reports_a_positive_length_squared() {
-    let report = json(&["--lattice", "hexagonal", "--weights", "gradient:4"]);
+    let report = report_of(&["--lattice", "hexagonal", "--weights", "gradient:4"]);
     assert_eq!(report["gradient"]["effect"], "stiffens");
     // l^2 - h^2 / 6 to the order of the lattice, h^2 = 3/4.
     assert!(close(&report["gradient"]["least"], 16.0 - 0.125, 1e-2), "{}", report["gradient"]);
@@ -203,12 +204,12 @@ fn a_second_gradient_reports_a_positive_length_squared() {
 
 #[test]
 fn a_scene_is_asked_by_name_or_path_with_overrides() {
-    let report = json(&["second-gradient"]);
+    let report = report_of(&["second-gradient"]);
     assert_eq!(report["weights"].as_array().map(Vec::len), Some(12));
-    let report = json(&["gradient-layer", "--set", "rule.weights.length=5"]);
+    let report = report_of(&["gradient-layer", "--set", "rule.weights.length=5"]);
     assert!(close(&report["gradient"]["longitudinal_x"], 25.0 - 1.0 / 6.0, 1e-3));
     // Eq. 3 at rest: one along a bond, its derivative one more.
-    let report = json(&["tension", "--set", "rule.mean={kind=\"distance\"}"]);
+    let report = report_of(&["tension", "--set", "rule.mean={kind=\"distance\"}"]);
     assert!(close(&report["weights"][0]["weight"][0][0], 1.0 / 3.0, 1e-12));
     assert!(close(&report["weights"][0]["weight"][1][1], 1.0 / 6.0, 1e-12));
     assert!(report["waves"]["damping_limit"].is_null());

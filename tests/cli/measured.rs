@@ -69,8 +69,7 @@ fn bundled(scene: &str, sets: &[&str]) -> (tempfile::TempDir, String) {
 }
 
 fn summary(folder: &Path) -> Value {
-    let text = std::fs::read_to_string(folder.join("o/summary.json")).expect("written");
-    serde_json::from_str(&text).expect("valid JSON")
+    json_in(&folder.join("o/summary.json"))
 }
 
 fn number(value: &Value) -> f64 {

@@ -117,8 +117,7 @@ fn tables_and_frames_have_the_ids_and_the_order_of_the_file() {
             assert_eq!(number(&row[3 + k]), (place(a)[k] + place(b)[k]) / 2.0, "{a} {b}");
         }
     }
-    let summary = std::fs::read_to_string(out.join("summary.json")).expect("written");
-    let summary: serde_json::Value = serde_json::from_str(&summary).expect("JSON");
+    let summary = json_in(&out.join("summary.json"));
     let pair = [1, 2].map(|column| breaks[0][column].parse::<usize>().expect("an id"));
     assert_eq!(summary["broken_bonds"]["first"]["pair"], serde_json::json!(pair));
 
@@ -238,11 +237,8 @@ fn a_killed_run_of_points_goes_on_to_the_same_end_unless_its_file_was_sorted_mea
     let expected = names.map(whole);
     std::fs::remove_dir_all(folder.path().join("o")).expect("removed");
 
-    let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_flockform"))
-        .args(["run", "cloud.toml", "-q", "--out", "o", "--checkpoint-every", "5ms"])
-        .current_dir(folder.path())
-        .spawn()
-        .expect("starts");
+    let run = ["run", "cloud.toml", "-q", "--out", "o", "--checkpoint-every", "5ms"];
+    let mut child = command(&run, folder.path()).spawn().expect("starts");
     let patience = std::time::Instant::now();
     while !folder.path().join("o.unfinished").exists() {
         assert!(patience.elapsed().as_secs() < 60, "no checkpoint");

@@ -7,7 +7,7 @@ use crate::program::*;
 /// The data of a page.
 fn data(html: &str) -> serde_json::Value {
     let (_, rest) = html.split_once("id=\"data\">").expect("a page has data");
-    serde_json::from_str(rest.split_once("</script>").expect("closed").0).expect("JSON")
+    json(rest.split_once("</script>").expect("closed").0)
 }
 
 #[test]

@@ -1,7 +1,6 @@
 //! `flockform run`, `scenes`, `plan`, `schema`, `trade` and `bench`, and what they refuse.
 
 use std::path::Path;
-use std::process::Command;
 use std::time::{Duration, Instant};
 
 use crate::program::*;
@@ -32,10 +31,6 @@ fn run_in(folder: &Path, arguments: &[&str]) -> String {
     text(&output.stdout)
 }
 
-fn json(path: &Path) -> serde_json::Value {
-    serde_json::from_str(&std::fs::read_to_string(path).expect("written")).expect("valid JSON")
-}
-
 #[test]
 fn the_main_job_writes_the_figures_and_tables_of_the_paper() {
     let folder = temporary();
@@ -47,7 +42,7 @@ fn the_main_job_writes_the_figures_and_tables_of_the_paper() {
             assert!(out.join(format!("{figure}.{ending}")).is_file(), "{figure}.{ending}");
         }
     }
-    let summary = json(&out.join("summary.json"));
+    let summary = json_in(&out.join("summary.json"));
     assert_eq!(summary["stop_reason"], "steps");
     assert_eq!(summary["steps"], 401);
     assert_eq!(summary["counts"]["frame"], 44);
@@ -71,7 +66,7 @@ fn a_second_run_takes_a_new_folder_unless_one_is_named() {
     assert_eq!(again.status.code(), Some(2));
     assert!(text(&again.stderr).contains("--force"), "{}", text(&again.stderr));
     run_in(folder.path(), &["run", "tension", "--steps", "3", "--out", "out/tension", "--force"]);
-    assert_eq!(json(&folder.path().join("out/tension/summary.json"))["steps"], 3);
+    assert_eq!(json_in(&folder.path().join("out/tension/summary.json"))["steps"], 3);
 }
 
 #[test]
@@ -100,7 +95,7 @@ fn overrides_and_steps_reach_the_scene() {
     let sets =
         ["run", "tension", "--steps", "7", "--set", "roles[1].motion.per_step=[0.1, 0.2]", "--out", "o"];
     run_in(folder.path(), &sets);
-    let summary = json(&folder.path().join("o/summary.json"));
+    let summary = json_in(&folder.path().join("o/summary.json"));
     assert_eq!(summary["steps"], 7);
     assert_eq!(summary["scene"]["roles"][1]["motion"]["per_step"], serde_json::json!([0.1, 0.2]));
 }
@@ -120,7 +115,7 @@ fn the_fracture_scene_breaks_near_the_top_and_its_variants_elsewhere_or_faster()
     let folder = temporary();
     let broken = |scene: &str| {
         run_in(folder.path(), &["run", scene, "-q", "--out", scene]);
-        let summary = json(&folder.path().join(scene).join("summary.json"));
+        let summary = json_in(&folder.path().join(scene).join("summary.json"));
         let first = &summary["broken_bonds"]["first"];
         (first["along"].as_f64().expect("broke"), first["step"].as_u64().expect("broke"))
     };
@@ -147,7 +142,7 @@ fn a_run_that_diverges_fails_names_the_cause_and_keeps_the_last_good_state() {
     let said = text(&output.stdout);
     assert!(said.contains("diverged at step") && said.contains("particle"), "{said}");
     assert!(said.contains("feedback factor 1"), "{said}");
-    let summary = json(&folder.path().join("o/summary.json"));
+    let summary = json_in(&folder.path().join("o/summary.json"));
     assert_eq!(summary["stop_reason"], "diverged");
     let table = std::fs::read_to_string(folder.path().join("o/final.csv")).expect("written");
     assert!(!table.contains("NaN") && !table.contains("inf"));
@@ -156,8 +151,7 @@ fn a_run_that_diverges_fails_names_the_cause_and_keeps_the_last_good_state() {
 /// Starts a run that would go on for minutes.
 fn long_run(folder: &Path) -> std::process::Child {
     let arguments = ["run", "tension", "--out", "o", "--set", "stop.steps=100000000", "--set", "record={}"];
-    let mut command = Command::new(env!("CARGO_BIN_EXE_flockform"));
-    let child = command.args(arguments).current_dir(folder).stdout(std::process::Stdio::piped()).spawn();
+    let child = command(&arguments, folder).stdout(std::process::Stdio::piped()).spawn();
     let child = child.expect("the program starts");
     // The hidden folder shows that it has begun.
     let patience = Instant::now();
@@ -177,7 +171,7 @@ fn a_solved_scene_reports_its_solver_and_how_it_came_to_rest() {
     let said = run_in(folder.path(), &[&["run", "beam-loaded", "--out", "here"][..], &set].concat());
     assert!(said.contains("conjugate-gradients, asked for:") && said.contains("in equilibrium"), "{said}");
     let here = folder.path().join("here");
-    let summary = json(&here.join("summary.json"));
+    let summary = json_in(&here.join("summary.json"));
     let solved = &summary["equilibrium"];
     assert_eq!((&solved["solver"], &solved["converged"]), (&"conjugate-gradients".into(), &true.into()));
     assert!(solved["phases"]["solve"].as_f64().is_some_and(|s| s > 0.0), "{solved}");
@@ -188,7 +182,7 @@ fn a_solved_scene_reports_its_solver_and_how_it_came_to_rest() {
     let asked = "equilibrium={solver=\"jacobi\",most_iterations=3}";
     let output = flockform(&[&too_few[..], &[asked]].concat(), folder.path());
     assert_eq!(output.status.code(), Some(1), "{}", text(&output.stderr));
-    assert_eq!(json(&folder.path().join("there/summary.json"))["stop_reason"], "unsettled");
+    assert_eq!(json_in(&folder.path().join("there/summary.json"))["stop_reason"], "unsettled");
 }
 
 #[test]
@@ -200,7 +194,7 @@ fn a_trade_study_prints_what_is_cheapest_and_writes_every_setting() {
     }
     let here = folder.path().join("here");
     let table = std::fs::read_to_string(here.join("trade.csv")).expect("written");
-    let study = json(&here.join("trade.json"));
+    let study = json_in(&here.join("trade.json"));
     assert_eq!(table.lines().count() - 1, study["points"].as_array().expect("points").len());
     assert!(table.lines().any(|line| line.starts_with("material,0.5,") && line.contains(",multigrid,")));
     assert!(here.join("trade.png").is_file() && here.join("trade.svg").is_file());
@@ -224,7 +218,7 @@ fn an_interrupt_stops_at_the_next_step_and_writes_what_there_is() {
         let output = child.wait_with_output().expect("ends");
         assert_eq!(output.status.code(), Some(1), "{name}");
         assert!(text(&output.stdout).contains("interrupted"), "{}", text(&output.stdout));
-        assert_eq!(json(&folder.path().join("o/summary.json"))["stop_reason"], "interrupted");
+        assert_eq!(json_in(&folder.path().join("o/summary.json"))["stop_reason"], "interrupted");
     }
 }
 
@@ -408,8 +402,7 @@ fn a_plan_says_what_is_modelled_left_out_and_why() {
 
 #[test]
 fn the_schema_is_json_and_knows_every_top_level_key() {
-    let said = run_in(temporary().path(), &["schema"]);
-    let schema: serde_json::Value = serde_json::from_str(&said).expect("JSON");
+    let schema = json(&run_in(temporary().path(), &["schema"]));
     for key in
         ["lattice", "body", "frame", "neighbours", "rule", "update", "roles", "fracture", "stop", "record"]
     {
@@ -431,7 +424,7 @@ fn completions_and_help_have_what_they_promise() {
 #[test]
 fn the_bench_completes_and_its_json_is_valid() {
     let said = run_in(temporary().path(), &["bench", "sweep", "--quick", "--json"]);
-    let report: serde_json::Value = serde_json::from_str(&said).expect("JSON");
+    let report = json(&said);
     assert!(report.is_object(), "{said}");
 }
 
@@ -439,7 +432,7 @@ fn the_bench_completes_and_its_json_is_valid() {
 #[test]
 fn the_swarm_bench_says_in_json_what_a_tick_costs_and_how_long_a_target_takes() {
     let said = run_in(temporary().path(), &["bench", "swarm", "--quick", "--json"]);
-    let report: serde_json::Value = serde_json::from_str(&said).expect("JSON");
+    let report = json(&said);
     for (list, keys) in [
         ("cases", &["robots", "rule_robots_per_millisecond", "safe_robots_per_millisecond"][..]),
         ("ticks", &["robots", "sweeps", "seconds_per_tick", "robots_per_millisecond"]),

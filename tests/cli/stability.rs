@@ -29,7 +29,7 @@ fn json_is_the_file_and_quiet_is_quiet() {
     let output = flockform(&[&QUICK[..], &["--json", "--out", "here"]].concat(), folder.path());
     let said = text(&output.stdout);
     assert_eq!(said, std::fs::read_to_string(folder.path().join("here/stability.json")).expect("written"));
-    let study: serde_json::Value = serde_json::from_str(&said).expect("JSON");
+    let study = json(&said);
     assert_eq!(study["holds"], true);
     let upper = &study["linear"]["thresholds"][1];
     assert!((upper["predicted"]["value"].as_f64().expect("a number") - 0.006866).abs() < 1e-6, "{upper}");

@@ -23,8 +23,7 @@ fn a_swarm_is_flown_and_leaves_tables_and_figures() {
     {
         assert!(out.join(file).is_file(), "{file}");
     }
-    let report: serde_json::Value =
-        serde_json::from_str(&read_to_string(out.join("flight.json")).expect("written")).expect("JSON");
+    let report = json_in(&out.join("flight.json"));
     assert_eq!((report["holds"].as_bool(), report["robots"].as_u64()), (Some(true), Some(100)));
     assert_eq!(report["continuum_error"].as_f64(), Some(0.0));
     let samples = read_to_string(out.join("samples.csv")).expect("written");
@@ -86,6 +85,6 @@ fn swarms_are_listed_and_their_format_is_printed() {
     assert!(listed.status.success());
     assert!(text(&listed.stdout).lines().any(|line| line.starts_with("gap ") && line.contains("hundred")));
     let schema = flockform(&["schema", "--swarm"], folder.path());
-    let schema: serde_json::Value = serde_json::from_slice(&schema.stdout).expect("JSON");
+    let schema = json(&text(&schema.stdout));
     assert!(schema["properties"]["limits"].is_object() && schema["properties"]["flight"].is_object());
 }

@@ -1,44 +1,22 @@
 //! The truth against the reference files.
 
-use std::path::Path;
-
 use flockform::fem::Effort;
-use flockform::flock::body::Body;
 use flockform::flock::rules::Rotation;
-use flockform::flock::vectors::Vectors;
-use flockform::scene::bundled;
 use flockform::study::compare::measures::{Comparison, Sides};
 use flockform::study::compare::run::{SceneTruth, truth_of};
 
+use crate::reference::beam_displacements;
+use crate::scenes::load;
 use crate::support::*;
-
-/// Displacements of a reference file at the particles.
-fn reference(aspect: u32, body: &Body) -> Vectors {
-    // Beside the checkout, or above it where the checkout is a worktree in a folder of such.
-    let name = format!("shared/reference/beam_aspect{aspect}.csv");
-    let above = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().skip(1).map(|folder| folder.join(&name));
-    let path = above.clone().find(|path| path.exists()).or(above.clone().next()).expect("has a parent");
-    let text = std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
-    let rows: Vec<[f64; 4]> = text
-        .lines()
-        .skip(1)
-        .map(|line| {
-            let values: Vec<f64> = line.split(',').map(|v| v.parse().expect("a number")).collect();
-            values.try_into().expect("four columns")
-        })
-        .collect();
-    let at = |p: [f64; 2]| rows.iter().find(|r| (r[0] - p[0]).hypot(r[1] - p[1]) < 1e-9).expect("listed");
-    body.reference.iter().map(|p| [at(p)[2], at(p)[3]]).collect()
-}
 
 /// Distance of the truth from the reference, by the measures of a comparison.
 fn distance_from_reference(name: &str, aspect: u32) -> Comparison {
-    let scene = bundled(name).expect("bundled").load(&[]).unwrap_or_else(|e| panic!("{e}"));
+    let scene = load(name, &[]);
     let SceneTruth { truth, layout, elastic, time } =
         truth_of(&scene, &Effort::default()).unwrap_or_else(|e| panic!("{e}"));
     let (body, cells) = (&layout.body, layout.cells.as_ref().expect("has cells"));
     let follows: Vec<bool> = body.reference.x.iter().map(|&x| x > 10.5).collect();
-    let known = reference(aspect, body);
+    let known = beam_displacements(aspect, &body.reference);
     let sides = Sides {
         cells,
         elastic: &elastic,
@@ -60,7 +38,6 @@ fn distance_from_reference(name: &str, aspect: u32) -> Comparison {
 }
 
 #[test]
-#[ignore = "needs ../shared/reference"]
 fn the_truth_of_the_beam_is_that_of_the_reference() {
     for (name, aspect) in [("beam-loaded", 1), ("beam-5", 5), ("beam-10", 10)] {
         let found = distance_from_reference(name, aspect);

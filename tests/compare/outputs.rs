@@ -4,14 +4,16 @@ use std::path::Path;
 
 use flockform::export::comparison::{ComparisonReport, write_comparison};
 use flockform::export::{ExportError, OutputFolder};
-use flockform::scene::bundled;
 use flockform::study::compare::run::Compared;
 use resvg::usvg::roxmltree::{Document, Node};
 
+use crate::folders::temporary;
+use crate::json::json_in;
+use crate::scenes::load;
 use crate::support::*;
 
 fn write_to(out: &Path, name: &str, found: &Compared, force: bool) -> Result<(), ExportError> {
-    let scene = bundled(name).expect("bundled").load(&[]).unwrap_or_else(|e| panic!("{e}"));
+    let scene = load(name, &[]);
     let folder = OutputFolder::create(out, force)?;
     let written = write_comparison(&folder, &scene, found, &ComparisonReport::new(&scene, found))?;
     assert!(written.iter().all(|path| path.is_file()), "{written:?}");
@@ -28,7 +30,7 @@ fn of_class<'a>(svg: &'a Document<'a>, class: &'a str) -> impl Iterator<Item = N
 
 #[test]
 fn a_comparison_leaves_its_report_its_tables_and_two_figures() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = temporary();
     let (out, found) = (folder.path().join("out"), compared("beam-paper", &[]));
     write_to(&out, "beam-paper", &found, false).expect("written");
     let mut names: Vec<_> =
@@ -47,7 +49,7 @@ fn a_comparison_leaves_its_report_its_tables_and_two_figures() {
             "von_mises.svg"
         ]
     );
-    let report: serde_json::Value = serde_json::from_str(&text(&out, "compare.json")).expect("JSON");
+    let report = json_in(&out.join("compare.json"));
     assert_eq!(report["displacement_rel_l2"], found.comparison.displacement_rel_l2);
     assert!(report["truth"]["stated_error"].as_f64().is_some_and(|error| error < 1e-4));
     assert_eq!(report["rule"]["stop_reason"], "equilibrium");
@@ -65,7 +67,7 @@ fn a_comparison_leaves_its_report_its_tables_and_two_figures() {
 
 #[test]
 fn the_overlay_has_a_ring_for_every_true_particle_and_a_dot_for_every_particle_of_the_rule() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = temporary();
     let out = folder.path().join("out");
     write_to(&out, "beam-paper", &compared("beam-paper", &[]), false).expect("written");
     let overlay = text(&out, "overlay.svg");
@@ -78,7 +80,7 @@ fn the_overlay_has_a_ring_for_every_true_particle_and_a_dot_for_every_particle_o
 
 #[test]
 fn the_von_mises_figure_fills_every_cell_three_times_and_marks_stress_above_its_scale() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = temporary();
     for (name, exceeded) in [("beam", false), ("beam-hexagonal", false), ("beam-paper", true)] {
         let (out, found) = (folder.path().join(name), compared(name, &[]));
         write_to(&out, name, &found, false).expect("written");

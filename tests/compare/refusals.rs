@@ -3,13 +3,9 @@
 use std::ops::ControlFlow;
 
 use flockform::fem::Effort;
-use flockform::scene::{Scene, bundled};
 use flockform::study::compare::run::{compare, plan};
 
-fn load(name: &str, overrides: &[&str]) -> Scene {
-    let overrides: Vec<String> = overrides.iter().map(|&text| text.into()).collect();
-    bundled(name).expect("bundled").load(&overrides).unwrap_or_else(|e| panic!("{e}"))
-}
+use crate::scenes::load;
 
 fn refused(name: &str, overrides: &[&str], words: &[&str]) {
     let scene = load(name, overrides);

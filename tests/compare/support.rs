@@ -8,25 +8,13 @@ use flockform::flock::lattice::{Lattice, LatticeKind};
 use flockform::flock::vectors::Vectors;
 use flockform::material::cells::{Cells, neighbourhood, without_loose_sites};
 use flockform::material::elastic::{Constants, Elastic, Plane};
-use flockform::scene::bundled;
 use flockform::study::compare::run::{Compared, compare};
 
-pub const KINDS: [LatticeKind; 6] = [
-    LatticeKind::Square { spacing: 1.0 },
-    LatticeKind::Rectangular { a: 1.0, b: 1.5 },
-    LatticeKind::CentredRectangular { a: 1.0, b: 1.4 },
-    LatticeKind::Hexagonal { spacing: 1.0 },
-    LatticeKind::Oblique { a: 1.0, b: 1.2, angle: 1.2 },
-    LatticeKind::Honeycomb { spacing: 1.0 },
-];
+pub use crate::samples::{KINDS, fibres};
+use crate::scenes::load;
 
 pub fn sheet(young: f64, poisson: f64, plane: Plane) -> Elastic {
     Elastic::new(Constants::Isotropic { young, poisson, plane }, 0.5).expect("admissible")
-}
-
-pub fn fibres() -> Elastic {
-    let constants = Constants::Orthotropic { young: [9.0, 1.0], poisson_12: 0.4, shear: 0.6, angle: 0.5 };
-    Elastic::new(constants, 0.7).expect("admissible")
 }
 
 /// A body without particles that are in no cell.
@@ -49,8 +37,7 @@ pub fn largest_difference(a: &Vectors, b: &Vectors) -> f64 {
 
 /// What the rule of a bundled scene makes of its body, with changes.
 pub fn compared(name: &str, overrides: &[&str]) -> Compared {
-    let overrides: Vec<String> = overrides.iter().map(|&text| text.into()).collect();
-    let scene = bundled(name).expect("bundled").load(&overrides).unwrap_or_else(|e| panic!("{e}"));
+    let scene = load(name, overrides);
     compare(&scene, &Effort::default(), &mut |_, _| ControlFlow::Continue(()))
         .unwrap_or_else(|e| panic!("{e}"))
 }

@@ -3,6 +3,7 @@
 use flockform::continuum::mechanics::Stresses;
 use flockform::flock::vectors::distance;
 
+use crate::scenes::load;
 use crate::support::{KINDS, lattice, on_right_edge, scene, solved};
 
 const COOK: &str = r#"
@@ -78,12 +79,10 @@ loads = [{ kind = "traction", region = { kind = "edge", side = "right" }, tracti
 #[test]
 fn the_crown_of_a_hole_carries_its_published_stress() {
     // A quarter of a plate 40 x 40 with a hole of radius 4: 3.36 times the tension (as `flockform run plate-hole`).
-    let bundled = flockform::scene::bundled("plate-hole").expect("bundled");
     for kind in KINDS {
         for (h, bound) in [(0.5, 0.03), (0.25, 0.02)] {
             for orientation in [0.0, 20.0] {
-                let scene =
-                    bundled.load(&[lattice(kind, h, orientation)]).unwrap_or_else(|error| panic!("{error}"));
+                let scene = load("plate-hole", &[&lattice(kind, h, orientation)]);
                 let (plan, outcome) = solved(&scene);
                 let elastic = scene.material.as_ref().expect("a material");
                 let stresses = Stresses::at_present(&outcome.engine, elastic).expect("a material");

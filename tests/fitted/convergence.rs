@@ -1,5 +1,6 @@
 //! Displacements of second order on every lattice in any direction: a ring under pressure, a plate with a hole, a bent beam.
 
+use crate::folders::temporary;
 use crate::support::{KINDS, error, lattice, scene, scene_in, solved, table};
 
 /// Orientations \[degree\] spread over the half turn after which every lattice comes back.
@@ -95,7 +96,7 @@ steps = [
                     - 2.0 * c * (3.0 * t).sin()),
         ]
     };
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = temporary();
     for kind in KINDS {
         let (orders, errors) = orders(|h, orientation| {
             let lattice = lattice(kind, h, orientation);
@@ -129,7 +130,7 @@ loads = [{ kind = "traction", region = { kind = "edge", side = "right" }, tracti
         let curvature = 10.0 / 1000.0;
         [curvature * x * y, -0.5 * curvature * (x * x + 0.3 * y * y)]
     };
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = temporary();
     for kind in KINDS {
         let (orders, errors) = orders(|h, orientation| {
             let lattice = lattice(kind, h, orientation);

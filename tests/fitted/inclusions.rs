@@ -10,10 +10,10 @@ use flockform::material::elastic::{Constants, Elastic, Plane};
 use flockform::material::fit::{FitError, Fitted, LEAST_AREA, LEAST_SIDE, LEAST_WIDTH, fit_regions};
 use flockform::material::stiffness::area;
 use flockform::material::weights::MaterialWeights;
-use flockform::scene::Scene;
 use nalgebra::{Matrix2, Vector2};
 
 use crate::outlines::{KINDS, Noise};
+use crate::scenes::load;
 use crate::support::{KINDS as SCENE_KINDS, error, lattice, on_right_edge, scene, solved};
 
 fn isotropic(young: f64, poisson: f64, plane: Plane) -> Elastic {
@@ -248,12 +248,8 @@ fn inclusions_that_no_body_has_are_refused_by_name() {
 
 #[test]
 fn inclusions_hold_whatever_carries_the_material() {
-    let bundled = flockform::scene::bundled("inclusion").expect("bundled");
     let corner = |sets: &[&str]| {
-        let sets: Vec<String> = sets.iter().map(|set| (*set).to_owned()).collect();
-        let scene = Scene::parse("inclusion", "test.toml", bundled.text, &sets, None)
-            .unwrap_or_else(|error| panic!("{error}"));
-        let (plan, outcome) = solved(&scene);
+        let (plan, outcome) = solved(&load("inclusion", sets));
         on_right_edge(&plan, &outcome, 20.0, 20.0)[0]
     };
     let square = "lattice={ kind = \"square\", spacing = 1.0 }";

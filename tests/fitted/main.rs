@@ -2,8 +2,12 @@
 
 mod benchmarks;
 mod convergence;
+#[path = "../common/folders.rs"]
+mod folders;
 mod inclusions;
 mod iterations;
 mod outlines;
+#[path = "../common/scenes.rs"]
+mod scenes;
 mod speed;
 mod support;

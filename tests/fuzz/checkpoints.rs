@@ -5,24 +5,25 @@ use std::path::Path;
 use std::time::Duration;
 
 use flockform::continuum::digest::digest;
-use flockform::continuum::plan::Plan;
 use flockform::continuum::record::{ProbeSeries, Snapshot};
 use flockform::continuum::run::resume;
 use flockform::engine::Engine;
 use flockform::engine::observer::EachStep;
 use flockform::engine::state::EngineState;
 use flockform::export::checkpoint::{self, Checkpoint, RunRequest};
-use flockform::scene::{Scene, bundled};
+use flockform::scene::Scene;
 
 use super::*;
+use crate::folders::temporary;
+use crate::scenes::{load, planned};
 
 fn scene() -> Scene {
-    bundled("tension").expect("bundled").load(&["stop.steps=40".to_owned()]).expect("valid")
+    load("tension", &["stop.steps=40"])
 }
 
 fn good(folder: &Path) -> Vec<u8> {
     let scene = scene();
-    let plan = Plan::new(&scene).expect("fits");
+    let plan = planned(&scene);
     let sum = digest(&plan);
     let mut engine = Engine::new(plan.setup);
     let mut probe = ProbeSeries::new(66);
@@ -40,7 +41,7 @@ fn good(folder: &Path) -> Vec<u8> {
 
 #[test]
 fn a_damaged_checkpoint_is_gone_on_from_or_refused() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = temporary();
     let whole = good(folder.path());
     let path = folder.path().join(checkpoint::FILE);
     let (scene, before) = (scene(), peak());
@@ -53,7 +54,7 @@ fn a_damaged_checkpoint_is_gone_on_from_or_refused() {
         bytes.extend(payload);
         std::fs::write(&path, bytes).expect("writable");
         let Ok(Some(read)) = Checkpoint::read(folder.path()) else { return };
-        let plan = Plan::new(&scene).expect("fits");
+        let plan = planned(&scene);
         if read.require_of(folder.path(), &scene, digest(&plan)).is_err() {
             return;
         }

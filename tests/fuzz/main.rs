@@ -6,7 +6,13 @@
 #![cfg(all(feature = "export", feature = "record"))]
 
 mod checkpoints;
+#[path = "../common/folders.rs"]
+mod folders;
 mod recordings;
+#[path = "../common/scenes.rs"]
+mod scenes;
+#[path = "../common/swarms.rs"]
+mod swarms;
 mod texts;
 
 use std::time::{Duration, Instant};

@@ -15,10 +15,14 @@ use flockform::swarm::flight::{Flight, fly_heard};
 use proptest::prelude::*;
 
 use super::*;
+use crate::folders::temporary;
+use crate::swarms::load_swarm;
+
+/// Ten ticks of flight.
+const SHORT: [&str; 2] = ["flight.duration=0.5", "flight.bounds={}"];
 
 fn swarm() -> flockform::scene::swarm::Swarm {
-    let set = ["flight.duration=0.5".to_owned(), "flight.bounds={}".to_owned()];
-    bundled_swarm("square").expect("bundled").load_swarm(&set).expect("valid")
+    load_swarm("square", &SHORT)
 }
 
 /// What is said of the flight, as the program says it.
@@ -27,7 +31,7 @@ fn about() -> About {
         source: "swarm",
         name: "square".to_owned(),
         swarm: Some(bundled_swarm("square").expect("bundled").text.to_owned()),
-        set: vec!["flight.duration=0.5".to_owned(), "flight.bounds={}".to_owned()],
+        set: SHORT.map(str::to_owned).into(),
         ..About::default()
     }
 }
@@ -36,7 +40,7 @@ fn about() -> About {
 fn good() -> &'static [u8] {
     static GOOD: OnceLock<Vec<u8>> = OnceLock::new();
     GOOD.get_or_init(|| {
-        let folder = tempfile::tempdir().expect("a folder");
+        let folder = temporary();
         let path = folder.path().join("flight.mcap");
         let swarm = swarm();
         let flight = Flight::new(&swarm).expect("flies");
@@ -129,7 +133,7 @@ fn messages_with_anything_in_them_are_replayed_or_refused() {
     let reader = Reader::of_bytes(Path::new("good.mcap"), good().to_vec()).expect("readable");
     let mut entries: Vec<Entry> = Vec::new();
     reader.each(&mut |entry| entries.push(entry.clone())).expect("readable");
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = temporary();
     fuzz(&messages(), |messages| {
         let path = folder.path().join("messages.mcap");
         let mut recording = Recording::create(&path, &about(), true).expect("created");

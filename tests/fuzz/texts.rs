@@ -8,6 +8,7 @@ use flockform::swarm::control::Control;
 use proptest::prelude::*;
 
 use super::*;
+use crate::folders::temporary;
 
 /// One of these, damaged.
 fn one_of(all: &'static [Bundled]) -> impl Strategy<Value = (usize, Vec<Damage>)> {
@@ -16,7 +17,7 @@ fn one_of(all: &'static [Bundled]) -> impl Strategy<Value = (usize, Vec<Damage>)
 
 #[test]
 fn a_damaged_scene_is_read_or_refused_in_words() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = temporary();
     let path = folder.path().join("scene.toml");
     fuzz(&one_of(SCENES), |(which, damage)| {
         std::fs::write(&path, damaged(SCENES[which].text.as_bytes(), &damage)).expect("writable");
@@ -28,7 +29,7 @@ fn a_damaged_scene_is_read_or_refused_in_words() {
 
 #[test]
 fn a_damaged_swarm_is_set_up_or_refused() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = temporary();
     let path = folder.path().join("swarm.toml");
     fuzz(&one_of(SWARMS), |(which, damage)| {
         std::fs::write(&path, damaged(SWARMS[which].text.as_bytes(), &damage)).expect("writable");
@@ -42,7 +43,7 @@ const PARAMETERS: &str = include_str!("../../launch-configs/parameters/formation
 
 #[test]
 fn a_damaged_parameter_file_is_read_or_refused() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = temporary();
     let path = folder.path().join("parameters.yaml");
     fuzz(&damage(), |damage| {
         std::fs::write(&path, damaged(PARAMETERS.as_bytes(), &damage)).expect("writable");

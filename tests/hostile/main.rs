@@ -18,5 +18,7 @@ mod running;
 #[path = "../common/signals.rs"]
 mod signals;
 mod support;
+#[path = "../common/swarms.rs"]
+mod swarms;
 #[path = "../common/waits.rs"]
 mod waits;

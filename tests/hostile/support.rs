@@ -7,11 +7,11 @@ use std::sync::atomic::{AtomicU16, Ordering};
 use std::time::Duration;
 
 use flockform::ros::edge::{Edge, Options};
-use flockform::scene::bundled::bundled_swarm;
 use flockform::scene::swarm::Swarm;
 
 pub use crate::running::Running;
 pub use crate::signals::signal;
+use crate::swarms::load_swarm;
 use crate::waits::within;
 
 /// Another domain with every call, away from those of other runs.
@@ -26,8 +26,7 @@ pub fn edge(domain: u16) -> Edge {
 }
 
 pub fn square(overrides: &[&str]) -> Swarm {
-    let overrides: Vec<String> = overrides.iter().map(|&text| text.to_owned()).collect();
-    bundled_swarm("square").expect("bundled").load_swarm(&overrides).expect("valid")
+    load_swarm("square", overrides)
 }
 
 pub fn command(domain: u16, arguments: &[&str]) -> Command {

@@ -28,5 +28,7 @@ mod services;
 #[path = "../common/signals.rs"]
 mod signals;
 mod support;
+#[path = "../common/swarms.rs"]
+mod swarms;
 #[path = "../common/waits.rs"]
 mod waits;

@@ -8,12 +8,12 @@ use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
 use flockform::flock::vectors::distance;
-use flockform::scene::bundled::bundled_swarm;
 use flockform::scene::swarm::Swarm;
 use flockform::swarm::control::Control;
 use serde_json::{Value as Json, json};
 
 pub use crate::running::Running;
+use crate::swarms::load_swarm;
 
 /// Discovery on a computer whose loopback device carries no multicast takes up to ten seconds.
 pub const PATIENCE: Duration = Duration::from_secs(30);
@@ -131,11 +131,10 @@ impl Square {
     }
 
     pub fn of(name: &str, overrides: &[&[&str]]) -> Self {
-        let overrides: Vec<String> = overrides.concat().iter().map(|&text| text.to_owned()).collect();
-        let swarm = bundled_swarm(name).expect("bundled").load_swarm(&overrides).expect("valid");
+        let overrides = overrides.concat();
         let mut arguments = vec![name.to_owned()];
-        overrides.into_iter().for_each(|one| arguments.extend(["--set".to_owned(), one]));
-        Self { swarm, arguments }
+        overrides.iter().for_each(|&one| arguments.extend(["--set", one].map(str::to_owned)));
+        Self { swarm: load_swarm(name, &overrides), arguments }
     }
 
     pub fn control(&self) -> Control {

@@ -1,7 +1,5 @@
 //! The paper's beam against the truth in the reference files.
 
-use std::path::Path;
-
 use flockform::flock::body::{Body, Cut};
 use flockform::flock::cells_around::CellsAround;
 use flockform::flock::lattice::Lattice;
@@ -12,25 +10,14 @@ use flockform::material::elastic::Elastic;
 use flockform::material::loads::{Loads, Traction};
 use flockform::material::weights::{MaterialWeights, Row};
 
+use crate::reference::beam_displacements;
 use crate::support::*;
 
 /// Points and displacements of a reference file, and the body with the same particles in its numbering.
 fn beam(aspect: u32) -> (Body, Neighbours, Cells, Vectors) {
-    let path =
-        Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../shared/reference/beam_aspect{aspect}.csv"));
-    let text = std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
-    let rows: Vec<[f64; 4]> = text
-        .lines()
-        .skip(1)
-        .map(|line| {
-            let values: Vec<f64> = line.split(',').map(|v| v.parse().expect("a number")).collect();
-            values.try_into().expect("four columns")
-        })
-        .collect();
     let lattice = Lattice::new(KINDS[0], [10.0, 10.0], 0.0);
     let (body, neighbours, cells) = build(lattice, &Cut::Count { columns: 11 * aspect + 1, rows: 12 });
-    let at = |p: [f64; 2]| rows.iter().find(|r| (r[0] - p[0]).hypot(r[1] - p[1]) < 1e-9).expect("listed");
-    let truth = body.reference.iter().map(|p| [at(p)[2], at(p)[3]]).collect();
+    let truth = beam_displacements(aspect, &body.reference);
     (body, neighbours, cells, truth)
 }
 
@@ -57,7 +44,6 @@ fn beam_errors(aspect: u32) -> [f64; 2] {
 }
 
 #[test]
-#[ignore = "needs ../shared/reference"]
 fn the_beam_led_by_the_truth_matches_it() {
     for (aspect, displacement, von_mises) in [(1, 0.005, 0.025), (5, 0.01, 0.01), (10, 0.01, 0.01)] {
         let errors = beam_errors(aspect);
@@ -71,7 +57,6 @@ fn the_beam_led_by_the_truth_matches_it() {
 }
 
 #[test]
-#[ignore = "needs ../shared/reference"]
 fn the_beam_loaded_by_traction_matches_it() {
     let (body, neighbours, cells, truth) = beam(1);
     let elastic = sheet(1000.0, 0.33);
@@ -90,7 +75,6 @@ fn the_beam_loaded_by_traction_matches_it() {
 }
 
 #[test]
-#[ignore = "needs ../shared/reference"]
 fn the_barycentre_on_the_beam_has_the_errors_of_the_paper() {
     let (body, _, cells, truth) = beam(1);
     let first = Neighbourhood::First { keep: None };

@@ -4,5 +4,9 @@ mod beam;
 mod cantilever;
 mod locking;
 mod patch;
+#[path = "../common/reference.rs"]
+mod reference;
 mod refusals;
+#[path = "../common/samples.rs"]
+mod samples;
 mod support;

@@ -11,22 +11,10 @@ use flockform::material::cells::{Cells, neighbourhood, without_loose_sites};
 use flockform::material::elastic::{Constants, Elastic, Plane};
 use flockform::material::weights::MaterialWeights;
 
-pub const KINDS: [LatticeKind; 6] = [
-    LatticeKind::Square { spacing: 1.0 },
-    LatticeKind::Rectangular { a: 1.0, b: 1.5 },
-    LatticeKind::CentredRectangular { a: 1.0, b: 1.4 },
-    LatticeKind::Hexagonal { spacing: 1.0 },
-    LatticeKind::Oblique { a: 1.0, b: 1.2, angle: 1.2 },
-    LatticeKind::Honeycomb { spacing: 1.0 },
-];
+pub use crate::samples::{KINDS, fibres};
 
 pub fn sheet(young: f64, poisson: f64) -> Elastic {
     Elastic::new(Constants::Isotropic { young, poisson, plane: Plane::Stress }, 1.0).expect("admissible")
-}
-
-pub fn fibres() -> Elastic {
-    let constants = Constants::Orthotropic { young: [9.0, 1.0], poisson_12: 0.4, shear: 0.6, angle: 0.5 };
-    Elastic::new(constants, 0.7).expect("admissible")
 }
 
 pub fn build(lattice: Lattice, cut: &Cut) -> (Body, Neighbours, Cells) {

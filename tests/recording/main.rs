@@ -9,6 +9,12 @@
 
 #![cfg(feature = "cli")]
 
+#[path = "../common/command.rs"]
+mod command;
+#[path = "../common/folders.rs"]
+mod folders;
+#[path = "../common/json.rs"]
+mod json;
 mod program;
 mod read_back;
 mod replays;

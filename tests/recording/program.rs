@@ -1,14 +1,11 @@
-//! The program itself, run in a folder.
+//! The program itself, and a place to run it in.
 
 use std::path::Path;
-use std::process::{Command, Output};
 
+pub use crate::command::{command, flockform};
+pub use crate::folders::temporary;
+pub use crate::json::json;
 pub use crate::signals::signal;
-
-pub fn flockform(arguments: &[&str], folder: &Path) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_flockform"));
-    command.args(arguments).current_dir(folder).env_remove("RUST_LOG").output().expect("the program starts")
-}
 
 /// Runs and expects this exit code; what was said.
 pub fn says(code: i32, arguments: &[&str], folder: &Path) -> String {
@@ -16,8 +13,4 @@ pub fn says(code: i32, arguments: &[&str], folder: &Path) -> String {
     let said = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(code), "{arguments:?}: {said}");
     said.into_owned()
-}
-
-pub fn temporary() -> tempfile::TempDir {
-    tempfile::tempdir().expect("a temporary folder")
 }

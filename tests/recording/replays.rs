@@ -1,6 +1,6 @@
 //! A recorded flight flies again as it flew.
 
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 use std::time::{Duration, Instant};
 
 use flockform::record::replay::replay_file;
@@ -42,11 +42,11 @@ fn a_changed_rule_is_told_robot_by_robot() {
     let slower = ["replay", "flight.mcap", "--set", "limits.speed=0.1"];
     let said = says(1, &slower, folder.path());
     assert!(said.contains("NOT within") && said.contains("robot_13"), "{said}");
-    let json = says(1, &[&slower[..], &["--json"]].concat(), folder.path());
-    let report: serde_json::Value = serde_json::from_str(&json).expect("JSON");
+    let said = says(1, &[&slower[..], &["--json"]].concat(), folder.path());
+    let report = json(&said);
     let robots = report["robots"].as_array().expect("robots");
     let changed = robots.iter().filter(|robot| robot["differ"].as_u64() > Some(0)).count();
-    assert!(changed > 0 && robots.iter().all(|robot| robot["only_recorded"] == 0), "{json}");
+    assert!(changed > 0 && robots.iter().all(|robot| robot["only_recorded"] == 0), "{said}");
     // A wide enough tolerance forgives it.
     says(0, &[&slower[..], &["--tolerance", "100"]].concat(), folder.path());
 }
@@ -89,11 +89,7 @@ fn force_replaces_recordings_and_nothing_else() {
     let short = ["--set", "flight.duration=0.5", "--set", "flight.bounds={}", "-q", "--no-report"];
     let fly = |out: &str, more: &[&str]| {
         let all = [&["swarm", "square", "--out", out, "--record", "flight.mcap"][..], &short, more].concat();
-        Command::new(env!("CARGO_BIN_EXE_flockform"))
-            .args(all)
-            .current_dir(folder.path())
-            .output()
-            .expect("the program starts")
+        flockform(&all, folder.path())
     };
     let file = folder.path().join("flight.mcap");
     std::fs::write(&file, "years of work").expect("writable");
@@ -140,8 +136,8 @@ fn a_live_node_s_recording_replays_to_the_bit_with_the_parameters_it_was_given()
     let folder = temporary();
     let domain = (101 + std::process::id() % 101).to_string();
     let start = |arguments: &[&str]| {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_flockform"));
-        command.args(arguments).current_dir(folder.path()).env("ROS_DOMAIN_ID", &domain);
+        let mut command = command(arguments, folder.path());
+        command.env("ROS_DOMAIN_ID", &domain);
         command.env("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST").stdout(Stdio::null()).stderr(Stdio::null());
         command.spawn().expect("the program starts")
     };

@@ -14,13 +14,13 @@ use flockform::ros::messages::geometry_msgs::PoseStamped;
 use flockform::ros::messages::visualization_msgs::MarkerArray;
 use flockform::ros::node::FormationNode;
 use flockform::ros::robots::RobotNodes;
-use flockform::scene::bundled::bundled_swarm;
 use flockform::scene::swarm::Swarm;
 use flockform::swarm::control::Mode;
 use flockform::swarm::watch::Health;
 use ros2_client::ServiceMapping;
 
 use super::support::*;
+use crate::swarms::load_swarm;
 
 pub fn arguments(more: &[&str]) -> RosArguments {
     let domain = domain().to_string();
@@ -34,8 +34,7 @@ pub fn arguments(more: &[&str]) -> RosArguments {
 }
 
 pub fn square(overrides: &[&str]) -> Swarm {
-    let overrides: Vec<String> = overrides.iter().map(|&text| text.to_owned()).collect();
-    bundled_swarm("square").expect("bundled").load_swarm(&overrides).expect("valid")
+    load_swarm("square", overrides)
 }
 
 /// Both sides, and what a busy computer may do to them without anybody being taken for lost.

@@ -13,6 +13,8 @@ mod lifecycle;
 mod parameters;
 mod services;
 mod support;
+#[path = "../common/swarms.rs"]
+mod swarms;
 mod topics;
 #[path = "../common/waits.rs"]
 mod waits;

@@ -1,16 +1,16 @@
 //! A continuum scene as a formation.
 
-use flockform::continuum::plan::Plan;
 use flockform::continuum::record::ProbeSeries;
 use flockform::engine::Engine;
 use flockform::export::OutputFolder;
 use flockform::export::csv::write_probes;
 use flockform::flock::vectors::Vectors;
-use flockform::scene;
 use flockform::scene::swarm::Swarm;
 use flockform::swarm::flight::Flight;
 
 use super::support::*;
+use crate::folders::temporary;
+use crate::scenes::{load, planned};
 
 fn bits(points: &Vectors) -> Vec<[u64; 2]> {
     points.iter().map(|place| place.map(f64::to_bits)).collect()
@@ -30,8 +30,8 @@ fn ideal_robots_fly_the_bits_of_the_continuum_run() {
         let text = format!("title = \"{name}\"\nradius = 0.01\n[scene]\nname = \"{name}\"\n");
         let swarm = parse(&text).unwrap_or_else(|error| panic!("{error}"));
         let mut flight = Flight::new(&swarm).unwrap_or_else(|error| panic!("{error}"));
-        let scene = scene::bundled(name).expect("bundled").load(&[]).expect("valid");
-        let mut engine = Engine::new(Plan::new(&scene).expect("planned").setup);
+        let scene = load(name, &[]);
+        let mut engine = Engine::new(planned(&scene).setup);
         for _ in 0..60 {
             flight.step();
             engine.advance();
@@ -106,18 +106,15 @@ fn robots_inside_a_body_are_carried_along() {
 
 #[test]
 fn a_recorded_run_is_flown_step_by_step() {
-    let scene = scene::bundled("tension")
-        .expect("bundled")
-        .load(&["record.probes=[67, 68, 115]".into()])
-        .expect("valid");
-    let mut engine = Engine::new(Plan::new(&scene).expect("planned").setup);
+    let scene = load("tension", &["record.probes=[67, 68, 115]"]);
+    let mut engine = Engine::new(planned(&scene).setup);
     let mut probes: Vec<ProbeSeries> = [66, 67, 114].map(ProbeSeries::new).into();
     probes.iter_mut().for_each(|probe| probe.record(&engine));
     for _ in 0..30 {
         engine.advance();
         probes.iter_mut().for_each(|probe| probe.record(&engine));
     }
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = temporary();
     let output = OutputFolder::create(&folder.path().join("run"), false).expect("a folder");
     write_probes(&output, engine.body(), &probes).expect("written");
     let kept = output.commit().expect("kept");

@@ -6,6 +6,7 @@ use flockform::swarm::flight::Flight;
 use flockform::swarm::watch::{Health, Pose};
 
 use super::support::*;
+use crate::swarms::load_swarm;
 
 /// The square of the bundled file, flown with a fault from 2 s on; robot_13 is its middle.
 fn with_fault(what: &str, more: &[&str]) -> Flight {
@@ -14,7 +15,7 @@ fn with_fault(what: &str, more: &[&str]) -> Flight {
     let limits = "limits={ speed = 1.0 }";
     let mut overrides = vec!["control.sweeps=1", "flight.duration=40.0", limits, fault.as_str()];
     overrides.extend(more);
-    Flight::new(&bundled("square", &overrides)).unwrap_or_else(|error| panic!("{error}"))
+    Flight::new(&load_swarm("square", &overrides)).unwrap_or_else(|error| panic!("{error}"))
 }
 
 const MIDDLE: usize = 12;
@@ -66,7 +67,7 @@ fn a_member_that_comes_back_is_believed_again_and_the_formation_is_whole() {
     let fault =
         "flight.faults=[{ robot = \"robot_13\", at = 2.0, until = 6.0, what = { kind = \"silent\" } }]";
     let overrides = ["control.sweeps=1", "flight.duration=60.0", fault];
-    let (_, report) = flown(&bundled("square", &overrides));
+    let (_, report) = flown(&load_swarm("square", &overrides));
     assert_eq!(report.most_lost, 1);
     assert!(report.affine_error.expect("affine")[1] < 1e-3, "{:?}", report.affine_error);
 }
@@ -103,7 +104,7 @@ fn lost_late_and_doubled_poses_change_the_way_and_not_the_end() {
     for more in cases {
         let mut overrides = vec!["control.sweeps=1", "flight.duration=150.0", "flight.bounds={}"];
         overrides.extend(more);
-        let (_, report) = flown(&bundled("square", &overrides));
+        let (_, report) = flown(&load_swarm("square", &overrides));
         let [_, last] = report.affine_error.expect("affine");
         assert!(last < 0.02, "{more:?}: {last}");
     }
@@ -131,7 +132,7 @@ fn one_liar_is_trimmed_on_eight_neighbours_and_leads_them_astray_without() {
             overrides.push("resilience={ max_faulty_neighbours = 1 }");
         }
         let mut flight =
-            Flight::new(&bundled("square", &overrides)).unwrap_or_else(|error| panic!("{error}"));
+            Flight::new(&load_swarm("square", &overrides)).unwrap_or_else(|error| panic!("{error}"));
         fly(&mut flight, 600);
         let trimmed = (0..25).any(|m| flight.control().flags(m) & TRIMMED != 0);
         let formation = flight.control().formation();
@@ -151,7 +152,7 @@ fn one_liar_is_trimmed_on_eight_neighbours_and_leads_them_astray_without() {
 
 #[test]
 fn nobody_gets_a_target_before_it_is_heard() {
-    let mut control = Control::new(&bundled("square", &[])).expect("laid out");
+    let mut control = Control::new(&load_swarm("square", &[])).expect("laid out");
     control.tick(0.0);
     assert!((0..25).all(|m| control.target(m).is_none()));
     let pose = |stamp: f64| Pose { position: control_place(7), yaw: 0.0, stamp, frame_is_right: true };
@@ -163,12 +164,12 @@ fn nobody_gets_a_target_before_it_is_heard() {
 }
 
 fn control_place(m: usize) -> [f64; 2] {
-    Control::new(&bundled("square", &[])).expect("laid out").formation().places.get(m)
+    Control::new(&load_swarm("square", &[])).expect("laid out").formation().places.get(m)
 }
 
 #[test]
 fn the_programs_wait_until_every_leader_has_been_heard() {
-    let mut control = Control::new(&bundled("square", &[])).expect("laid out");
+    let mut control = Control::new(&load_swarm("square", &[])).expect("laid out");
     let places = control.formation().places.clone();
     let pose = |m: usize, stamp: f64| Pose { position: places.get(m), yaw: 0.0, stamp, frame_is_right: true };
     // robot_25 leads too, and comes last.

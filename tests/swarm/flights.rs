@@ -5,11 +5,13 @@ use flockform::scene::bundled::SWARMS;
 use flockform::swarm::flight::Flight;
 
 use super::support::*;
+use crate::folders::temporary;
+use crate::swarms::load_swarm;
 
 #[test]
 fn every_bundled_swarm_keeps_the_bounds_that_it_declares() {
     for swarm in SWARMS {
-        let swarm = bundled(swarm.name, &[]);
+        let swarm = load_swarm(swarm.name, &[]);
         let (_, report) = flown(&swarm);
         assert!(!report.bounds.is_empty(), "{} declares something", swarm.name);
         assert!(report.holds(), "{}: {:#?}", swarm.name, report.bounds);
@@ -19,7 +21,7 @@ fn every_bundled_swarm_keeps_the_bounds_that_it_declares() {
 #[test]
 fn an_affine_manoeuvre_is_followed_exactly_through_the_gap_at_every_moment() {
     for name in ["gap", "patch"] {
-        let (record, report) = flown(&bundled(name, &[]));
+        let (record, report) = flown(&load_swarm(name, &[]));
         let [largest, _] = report.affine_error.expect("an affine manoeuvre");
         assert!(largest <= 1e-9, "{name}: {largest:e}");
         // It did go: the formation's middle is where the manoeuvre ends.
@@ -33,7 +35,7 @@ fn an_affine_manoeuvre_is_followed_exactly_through_the_gap_at_every_moment() {
 #[test]
 fn without_solved_weights_the_edge_does_not_follow() {
     // The barycentre reproduces places in the interior alone: what the solved weights are for.
-    let plain = bundled("gap", &["rule={}", "flight.duration=8.0"]);
+    let plain = load_swarm("gap", &["rule={}", "flight.duration=8.0"]);
     let (_, report) = flown(&plain);
     assert!(report.affine_error.expect("affine")[0] > 0.1, "{:?}", report.affine_error);
     assert!(!report.holds());
@@ -50,13 +52,13 @@ fn a_frame_makes_up_for_the_missing_neighbours_of_a_formation_that_is_moved_as_a
         "flight.bounds={ final_error = 1e-6 }",
         "manoeuvres[0].legs=[{ seconds = 5.0, translate = [3.0, 1.0] }]",
     ];
-    let (_, report) = flown(&bundled("gap", &overrides));
+    let (_, report) = flown(&load_swarm("gap", &overrides));
     assert!(report.holds(), "{:?}", report.bounds);
 }
 
 #[test]
 fn a_hundred_robots_swap_places_across_a_circle_and_all_arrive() {
-    let swarm = bundled("antipodal", &["flight.bounds={ clearance = 0.1, final_error = 0.01 }"]);
+    let swarm = load_swarm("antipodal", &["flight.bounds={ clearance = 0.1, final_error = 0.01 }"]);
     let (_, report) = flown(&swarm);
     assert!(report.holds(), "{:?}", report.bounds);
 }
@@ -65,7 +67,7 @@ fn a_hundred_robots_swap_places_across_a_circle_and_all_arrive() {
 fn the_same_seed_gives_the_same_flight_and_another_does_not() {
     let noisy = ["flight.noise=0.01", "flight.loss=0.2", "flight.delay=2", "flight.duration=5.0"];
     let places = |seed: &str| {
-        let swarm = bundled("square", &[&noisy[..], &[seed]].concat());
+        let swarm = load_swarm("square", &[&noisy[..], &[seed]].concat());
         let (record, _) = flown(&swarm);
         record.tracks.last().expect("recorded").clone()
     };
@@ -84,7 +86,7 @@ fn every_model_of_a_robot_brings_the_formation_home() {
     for model in models {
         let overrides = ["limits.acceleration=4.0".to_owned(), format!("flight.model={model}")];
         let overrides: Vec<&str> = overrides.iter().map(String::as_str).collect();
-        let (_, report) = flown(&bundled("square", &overrides));
+        let (_, report) = flown(&load_swarm("square", &overrides));
         let [_, last] = report.affine_error.expect("affine");
         assert!(last < 0.01, "{model}: {last}");
         assert!(report.clearance.expect("others") >= 0.3 - 1e-9, "{model}: {:?}", report.clearance);
@@ -148,7 +150,7 @@ fn a_broken_bound_names_the_robots_the_time_and_the_place() {
     assert_eq!(json["bounds"][0]["worst"]["robots"][1], "right");
     assert_eq!(json["closest"]["time"], moment.time);
 
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = temporary();
     let out = flockform::export::OutputFolder::create(&folder.path().join("out"), false).expect("new");
     flockform::export::flight::write_flight(&out, &swarm, &record, &report).expect("written");
     let figure = std::fs::read_to_string(out.path("errors.svg")).expect("the figure");

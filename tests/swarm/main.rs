@@ -6,4 +6,10 @@ mod bridge;
 mod faults;
 mod files;
 mod flights;
+#[path = "../common/folders.rs"]
+mod folders;
+#[path = "../common/scenes.rs"]
+mod scenes;
 mod support;
+#[path = "../common/swarms.rs"]
+mod swarms;

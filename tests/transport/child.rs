@@ -1,7 +1,7 @@
 //! This test program as another process, with a task: to be killed in the midst of it.
 
 use std::io::{BufRead, BufReader};
-use std::process::{Child, Command, Stdio};
+use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use flockform::shm::channel::{Capacity, Reader};
@@ -11,6 +11,7 @@ use flockform::shm::{Domain, positions};
 use flockform::swarm::transport::RobotsEnd;
 
 use super::support::*;
+use crate::running::Running;
 
 const TASK: &str = "FLOCKFORM_TEST_TASK";
 const READY: &str = "ready";
@@ -19,7 +20,7 @@ const READY: &str = "ready";
 pub const NARROW: Capacity = Capacity { writers: 2, readers: 2, queue: 4, borrowed: 2, history: 1 };
 
 /// Another process, at its task until it is killed.
-pub struct Process(Child);
+pub struct Process(Running);
 
 impl Process {
     /// Waits until it says that it is at it.
@@ -33,24 +34,15 @@ impl Process {
             .stdout(Stdio::piped());
         let mut child = command.spawn().expect("it starts");
         let output = BufReader::new(child.stdout.take().expect("piped"));
-        let this = Self(child);
+        let this = Self(Running(child));
         let is_ready = output.lines().map_while(Result::ok).any(|line| line.ends_with(READY));
         assert!(is_ready, "{task} ended before it was at it");
         this
     }
 
-    /// SIGKILL.
-    pub fn kill(mut self) {
-        self.0.kill().expect("it lives");
-        self.0.wait().expect("a child");
-    }
-}
-
-impl Drop for Process {
-    fn drop(&mut self) {
-        // An error means that it has ended already.
-        let _ = self.0.kill();
-        let _ = self.0.wait();
+    /// SIGKILL, and the wait for its end.
+    pub fn kill(self) {
+        drop(self.0);
     }
 }
 

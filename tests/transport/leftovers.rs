@@ -5,6 +5,7 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use super::support::{domain_name, signal};
+use crate::folders::temporary;
 
 /// Files of a domain, wherever iceoryx2 keeps some.
 fn files(prefix: &str) -> Vec<PathBuf> {
@@ -44,7 +45,7 @@ fn publish(folder: &Path, user: Option<&str>, domain: Option<&str>) -> Command {
 
 #[test]
 fn a_clean_end_leaves_nothing_behind() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = temporary();
     let domain = domain_name();
     let output = publish(folder.path(), None, Some(&domain)).output().expect("the program starts");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
@@ -76,7 +77,7 @@ fn two_users_of_one_computer_both_run() {
         assert!(begun.elapsed() < Duration::from_secs(30), "it never began");
         std::thread::sleep(Duration::from_millis(20));
     }
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = temporary();
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;

@@ -6,6 +6,8 @@
 #![cfg(feature = "cli")]
 
 mod child;
+#[path = "../common/folders.rs"]
+mod folders;
 mod in_process;
 mod killed;
 mod leftovers;
@@ -14,9 +16,15 @@ mod program;
 mod promises;
 mod python;
 mod ros2;
+#[path = "../common/running.rs"]
+mod running;
+#[path = "../common/scenes.rs"]
+mod scenes;
 mod shm;
 #[path = "../common/signals.rs"]
 mod signals;
 mod support;
+#[path = "../common/swarms.rs"]
+mod swarms;
 #[path = "../common/waits.rs"]
 mod waits;

@@ -3,18 +3,17 @@
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-use flockform::continuum::plan::Plan;
 use flockform::engine::Engine;
 use flockform::scene::Scene;
-use flockform::scene::bundled::bundled;
 use flockform::shm::positions::{Positions, read};
 
 use super::child::Process;
 use super::support::*;
+use crate::folders::temporary;
+use crate::scenes::{load, planned};
 
 fn engine() -> Engine {
-    let scene = bundled("tension").expect("bundled").load(&[]).expect("valid");
-    Engine::new(Plan::new(&scene).expect("planned").setup)
+    Engine::new(planned(&load("tension", &[])).setup)
 }
 
 fn open(name: &str, engine: &Engine) -> Positions {
@@ -43,14 +42,14 @@ fn a_reader_sees_every_step_of_the_body_to_the_bit() {
 
 #[test]
 fn a_body_given_as_points_is_shown_by_its_ids_and_in_the_order_of_its_file() {
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = temporary();
     let rows = [(40, [2.0, 0.0]), (7, [0.0, 0.5]), (300, [1.0, 0.0]), (8, [0.0, 0.0])];
     let table = rows.map(|(id, [x, y])| format!("{id},{x},{y}\n")).concat();
     std::fs::write(folder.path().join("cloud.csv"), format!("id,x,y\n{table}")).expect("written");
     let text = "title = \"points\"\nneighbours = { kind = \"within\", radius = 1.2 }\n\
                 body = { shape = { kind = \"points\", file = \"cloud.csv\" } }\n";
     let scene = Scene::parse("points", "points.toml", text, &[], Some(folder.path())).expect("valid");
-    let engine = Engine::new(Plan::new(&scene).expect("planned").setup);
+    let engine = Engine::new(planned(&scene).setup);
     let name = domain_name();
     let peer = domain(&name).join("test").expect("shared memory");
     let mut shown = open(&name, &engine);
@@ -114,7 +113,7 @@ fn another_process_reads_a_run_of_the_program() {
     let name = domain_name();
     let peer = domain(&name).join("test").expect("shared memory");
     let reader = read(&peer, "specimen").expect("a reader");
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = temporary();
     let mut run = Command::new(env!("CARGO_BIN_EXE_flockform"))
         .args(["run", "tension", "--quiet", "--publish", "specimen", "--set", "stop.steps=100000000"])
         .arg("--out")
@@ -144,7 +143,7 @@ fn another_process_reads_a_run_of_the_program() {
 fn a_name_that_is_none_or_taken_is_refused_before_anything_is_written() {
     let name = domain_name();
     let _holds = open(&name, &engine());
-    let folder = tempfile::tempdir().expect("a folder");
+    let folder = temporary();
     for (given, word) in [("a/b", "no name of a service"), ("body", "at most 1")] {
         let out = folder.path().join("out");
         let output = Command::new(env!("CARGO_BIN_EXE_flockform"))

@@ -1,9 +1,8 @@
 //! `flockform node` and `flockform robots` over shared memory, and the same in one process.
 
-use std::process::{Child, Command, Stdio};
+use std::process::{Command, Stdio};
 
 use flockform::flock::vectors::distance;
-use flockform::scene::bundled::bundled_swarm;
 use flockform::scene::swarm::Swarm;
 use flockform::shm::channel::{Capacity, Reader, Slice, Writer};
 use flockform::shm::node::{COMMANDS, MEMBERS, STATE};
@@ -13,6 +12,8 @@ use flockform::swarm::flight::Flight;
 use flockform::swarm::watch::Health;
 
 use super::support::*;
+use crate::running::Running;
+use crate::swarms::load_swarm;
 
 /// Patience with a busy computer, and a short flight.
 const OVERRIDES: [&str; 6] = [
@@ -25,8 +26,7 @@ const OVERRIDES: [&str; 6] = [
 ];
 
 fn square() -> Swarm {
-    let overrides: Vec<String> = OVERRIDES.iter().map(|&text| text.to_owned()).collect();
-    bundled_swarm("square").expect("bundled").load_swarm(&overrides).expect("valid")
+    load_swarm("square", &OVERRIDES)
 }
 
 #[test]
@@ -57,9 +57,7 @@ fn the_loop_over_shared_memory_flies_what_the_simulated_flight_flies() {
 #[test]
 fn a_member_s_own_node_hears_its_neighbours_alone_and_moves_nobody_else() {
     let shm = domain(&domain_name());
-    let overrides: Vec<String> =
-        OVERRIDES.iter().chain(&["control.sweeps=1"]).map(|&text| text.to_owned()).collect();
-    let swarm = bundled_swarm("square").expect("bundled").load_swarm(&overrides).expect("valid");
+    let swarm = load_swarm("square", &[&OVERRIDES[..], &["control.sweeps=1"]].concat());
     let mut robots = SimulatedRobots::open(&swarm, &shm).expect("robots");
     let mut node = FormationNode::open(&swarm, &shm, Some("robot_7")).expect("a node");
     for _ in 0..20 {
@@ -74,37 +72,15 @@ fn a_member_s_own_node_hears_its_neighbours_alone_and_moves_nobody_else() {
     assert!(moved.into_iter().all(|m| m == 6));
 }
 
-/// A process of the program that ends with its test.
-struct Program(Child);
-
-impl Program {
-    fn start(domain: &str, subcommand: &str) -> Self {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_flockform"));
-        command.args([subcommand, "square", "--transport", "shm"]);
-        OVERRIDES.iter().for_each(|one| {
-            command.args(["--set", one]);
-        });
-        command.env(flockform::shm::domain::VARIABLE, domain).stdin(Stdio::null());
-        Self(command.spawn().expect("it starts"))
-    }
-
-    fn kill(&mut self) {
-        self.0.kill().expect("it lives");
-        self.0.wait().expect("a child");
-    }
-
-    fn terminate(mut self) -> Option<i32> {
-        signal("TERM", self.0.id());
-        until("it ends", || self.0.try_wait().expect("a child")).code()
-    }
-}
-
-impl Drop for Program {
-    fn drop(&mut self) {
-        // An error means that it has ended already.
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
+/// The program with the square in a domain of shared memory.
+fn start(domain: &str, subcommand: &str) -> Running {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_flockform"));
+    command.args([subcommand, "square", "--transport", "shm"]);
+    OVERRIDES.iter().for_each(|one| {
+        command.args(["--set", one]);
+    });
+    command.env(flockform::shm::domain::VARIABLE, domain).stdin(Stdio::null());
+    Running(command.spawn().expect("it starts"))
 }
 
 fn next(reader: &Reader<Member>, what: &str, is: impl Fn(&Slice<Member>) -> bool) {
@@ -119,23 +95,22 @@ fn node_and_robots_are_processes_that_may_be_killed_and_come_back() {
     let members = Reader::<Member>::open(&peer, "square", MEMBERS, capacity).expect("a reader");
     let state = Reader::<Formation>::open(&peer, "square", STATE, capacity).expect("a reader");
     let mut orders = Writer::<Order>::open(&peer, "square", COMMANDS, capacity, 1).expect("a writer");
-    let mut robots = Program::start(&name, "robots");
-    let mut node = Program::start(&name, "node");
+    let robots = start(&name, "robots");
+    let node = start(&name, "node");
     let all_fresh = |slice: &Slice<Member>| slice.len() == 25 && slice.iter().all(|one| one.health == 1);
     next(&members, "everybody is heard", |slice| {
         all_fresh(slice) && slice[6].name() == "robot_7" && slice[6].target[0].is_finite()
     });
     next(&members, "the formation moves", |slice| slice.iter().all(|one| one.displacement[0].abs() > 0.1));
 
-    node.kill();
+    // SIGKILL.
     drop(node);
-    let node = Program::start(&name, "node");
+    let mut node = start(&name, "node");
     next(&members, "a new node hears everybody", all_fresh);
 
-    robots.kill();
-    next(&members, "robots that are gone are held", |slice| slice.iter().all(|one| one.health != 1));
     drop(robots);
-    let robots = Program::start(&name, "robots");
+    next(&members, "robots that are gone are held", |slice| slice.iter().all(|one| one.health != 1));
+    let mut robots = start(&name, "robots");
     next(&members, "new robots are heard", all_fresh);
 
     until("the emergency stop", || {

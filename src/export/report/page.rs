@@ -145,6 +145,9 @@ fn in_script(value: &impl Serialize) -> String {
 }
 
 /// A module for a page that holds all of them: nothing to import, nothing to export.
+///
+/// By hand, as a page that is opened from a disk can import nothing: browsers load no modules from `file:`, and those that
+/// stand in a page have no name to be imported by. The tests hold the scripts to what this relies on.
 fn joined(module: &str) -> String {
     let is_import = |line: &&str| line.starts_with("import ");
     let own = |line: &str| line.strip_prefix("export ").unwrap_or(line).to_owned() + "\n";
@@ -217,6 +220,8 @@ fn drop_empty(value: &mut serde_json::Value) {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
+
     use super::*;
 
     #[test]
@@ -237,6 +242,29 @@ mod tests {
             assert!(!html.contains(word), "{word}");
         }
         assert!(!html.contains("{{"), "every place of the template is filled");
+    }
+
+    #[test]
+    fn the_scripts_may_stand_in_one_page() {
+        let (mut defined, mut imported) = (BTreeSet::new(), BTreeSet::new());
+        for line in SCRIPTS.into_iter().flat_map(str::lines) {
+            if line.starts_with("import") {
+                let names = line.strip_prefix("import { ").and_then(|line| line.split_once(" } from \"./"));
+                let (names, _) =
+                    names.filter(|(_, file)| file.ends_with(".js\";")).expect("one line, names alone");
+                imported.extend(names.split(", "));
+            }
+            let own = line.strip_prefix("export ").unwrap_or(line);
+            let own = own.strip_prefix("async ").unwrap_or(own);
+            if let Some((kind @ ("const" | "let" | "var" | "function" | "class"), rest)) = own.split_once(' ')
+            {
+                let name = rest.split([' ', '(', '=', ';', '{']).next().unwrap_or_default();
+                assert!(!name.is_empty() && defined.insert(name), "one name, one thing: {kind} {rest}");
+            } else {
+                assert_eq!(own, line, "only a definition is exported");
+            }
+        }
+        assert!(imported.len() > 10 && imported.is_subset(&defined), "{imported:?}");
     }
 
     #[test]

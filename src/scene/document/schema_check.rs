@@ -1,4 +1,7 @@
 //! One walk of a document against its schema, which finds everything wrong and says how to mend it.
+//!
+//! By hand, as validators of JSON walk values that do not know the line or override that they came from, and where no
+//! branch of a union fits they do not say which was meant.
 
 use serde_json::{Map, Number, Value};
 
@@ -374,7 +377,8 @@ fn renamed<'a>(word: &str, candidates: &[&'a str]) -> Option<&'a str> {
     candidates.iter().copied().find(|candidate| *candidate == now)
 }
 
-/// The candidate that `word` most probably misspells or abbreviates.
+/// The candidate that `word` most probably misspells or abbreviates, if any is near enough: a mere guess would mislead
+/// more than none.
 fn nearest<'a>(word: &str, candidates: &[&'a str]) -> Option<&'a str> {
     if word.len() > LONGEST_MISSPELLING {
         return None;

@@ -31,12 +31,12 @@ pub enum Mode {
     Inactive,
 }
 
-/// A neighbour's pose was not usable. This flag and the next two add to those of the filter.
-pub const NEIGHBOUR_LOST: u32 = 1 << 16;
+/// A neighbour's pose was not usable. This flag and the next two add to those of the filter ([`Flags`]).
+pub const NEIGHBOUR_LOST: u32 = 64;
 /// Straying neighbours were left out.
-pub const TRIMMED: u32 = 1 << 17;
+pub const TRIMMED: u32 = 128;
 /// A pose was rejected since the last tick.
-pub const POSE_REJECTED: u32 = 1 << 18;
+pub const POSE_REJECTED: u32 = 256;
 
 /// The part of a loop's state that outlasts its process.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]

@@ -9,7 +9,7 @@ use crate::flock::grid::CellGrid;
 use crate::flock::neighbourhood::Neighbours;
 use crate::flock::vectors::{Vectors, distance};
 
-/// The reasons for changing a target, as bits that may be combined.
+/// The reasons for changing a target, as bits that may be combined; those of the message `flockform_msgs/MemberState`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Flags(pub u32);
 
@@ -26,8 +26,9 @@ impl Flags {
     pub const OBSTRUCTED: u32 = 16;
     /// The member keeps to the right to get around what blocks it.
     pub const RESOLVING_DEADLOCK: u32 = 32;
-    /// The member stays without a target: its pose is not known, or the wanted target is not finite.
-    pub const HELD: u32 = 64;
+    /// The member stays without a target: its pose is not known, or the wanted target is not finite. No bit of the
+    /// message.
+    pub const HELD: u32 = 1 << 16;
 
     /// Whether this flag is set.
     pub fn has(self, flag: u32) -> bool {
