@@ -101,8 +101,8 @@ fn fifty_robots_at_a_hundred_hertz_in_one_array_lose_no_pose_and_no_target() {
 
 /// Both sides are `flockform`, in two processes; the peer looks on.
 ///
-/// The robots' process is not promised every deadline of a busy computer, and what it did not send in a period that it
-/// left out counts as lost where it was to be heard: then as fifty poses at once.
+/// The robots' process is not promised every deadline of a busy computer, and what it did not send in a period, or sent
+/// while the node was at work already, counts as lost where it was to be heard.
 #[test]
 #[ignore = "needs the cyclonedds package of PyPI: see the head of tests/interop/main.rs"]
 fn fifty_simulated_robots_in_another_process_fly_at_a_hundred_hertz() {
@@ -117,11 +117,11 @@ fn fifty_simulated_robots_in_another_process_fly_at_a_hundred_hertz() {
     let says = numbers(&watch);
     let lost = says("poses lost") - said("poses lost");
     println!("{rates:?} Hz, {lost} poses lost of about 50 000");
-    let missed = says("deadlines missed") - said("deadlines missed");
-    // A node that is late itself sees the two halves of a period's poses in two ticks, and counts each.
-    let is_explained =
-        if missed > 0.0 { lost < 0.1 * 50.0 * 100.0 * FLIGHT.as_secs_f64() } else { lost % 50.0 == 0.0 };
-    assert!(is_explained, "some of the robots' poses were lost: {lost}, with {missed} deadlines missed");
+    // That nothing is lost on the way is what the tests above count.
+    assert!(
+        lost < 0.1 * 50.0 * 100.0 * FLIGHT.as_secs_f64(),
+        "a tenth of the robots' poses were lost: {lost}"
+    );
     assert_eq!((says("messages refused"), says("messages not sent")), (0.0, 0.0));
     assert_eq!(says("poses rejected"), said("poses rejected"));
 }

@@ -16,6 +16,9 @@ use crate::solve::operator::{Columns, HELD, Matrix, Row, leads_to_outlier};
 /// How much coarser the first grid is than the lattice, in particles per node.
 const FIRST_RATIO: f64 = 4.0;
 
+/// Most columns, and rows, to a node.
+const MOST_STEPS: usize = 8;
+
 /// Columns and rows to a node of the first coarse grid: about four particles each, the nodes about as far
 /// apart both ways. `grid` are the vectors of one column and one row \[length\].
 pub fn first_steps(grid: [[f64; 2]; 2], particles_per_site: f64) -> [i32; 2] {
@@ -27,7 +30,8 @@ pub fn first_steps(grid: [[f64; 2]; 2], particles_per_site: f64) -> [i32; 2] {
         // A grid that is too coarse costs iterations, one that is too fine costs memory.
         ratio.ln().abs() + 1.5 * aspect.ln().abs()
     };
-    let all = (1..=8).flat_map(|i| (1..=8).map(move |j| [i, j])).filter(|&[i, j]| i * j > 1);
+    let most = MOST_STEPS as i32;
+    let all = (1..=most).flat_map(|i| (1..=most).map(move |j| [i, j])).filter(|&[i, j]| i * j > 1);
     all.min_by(|&a, &b| cost(a).total_cmp(&cost(b))).unwrap_or([2, 2])
 }
 
@@ -46,8 +50,9 @@ pub fn next_steps(spacing: [f64; 2]) -> [i32; 2] {
 
 /// The matrix of the coarse grid.
 pub fn coarsen(fine: &Matrix, transfer: Transfer) -> Matrix {
+    let parents = Parents::new(transfer.steps);
     let mut patterns = Patterns::new(transfer);
-    let mut singles = Singles::new(fine, transfer);
+    let mut singles = Singles::new(fine, parents);
     let mut nodes: Vec<(Site, u32)> = Vec::new();
     let across = transfer.steps[0];
     let columns = fine.columns.range();
@@ -63,7 +68,7 @@ pub fn coarsen(fine: &Matrix, transfer: Transfer) -> Matrix {
     let mut sums = Sums::default();
     let patterns = patterns.by_class;
     let mut rows: Vec<Row> =
-        patterns.iter().map(|pattern| galerkin(fine, transfer, pattern, &mut sums)).collect();
+        patterns.iter().map(|pattern| galerkin(fine, &parents, pattern, &mut sums)).collect();
     if !singles.nodes.is_empty() {
         for (node, outliers) in std::mem::take(&mut singles.nodes) {
             nodes.push((node, rows.len() as u32));
@@ -78,7 +83,9 @@ pub fn coarsen(fine: &Matrix, transfer: Transfer) -> Matrix {
 /// Nodes near particles that stand at no site, whose rows are summed one by one.
 struct Singles<'a> {
     fine: &'a Matrix,
-    transfer: Transfer,
+    parents: Parents,
+    /// Nodes with a share in each particle at no site, shape \[outliers\].
+    of_outliers: Vec<[(Site, f64); 4]>,
     /// Their sites, ascending, and where the particles at no site that have a share in each lie in `shares`.
     nodes: Vec<(Site, Range<usize>)>,
     shares: Vec<(usize, f64)>,
@@ -91,7 +98,9 @@ struct Singles<'a> {
 }
 
 impl<'a> Singles<'a> {
-    fn new(fine: &'a Matrix, transfer: Transfer) -> Self {
+    fn new(fine: &'a Matrix, parents: Parents) -> Self {
+        let of_outlier = |&place: &[f64; 2]| parents_of_place(place, parents.steps);
+        let of_outliers: Vec<_> = fine.outliers.places.iter().map(of_outlier).collect();
         let (mut nodes, mut shares, mut half) = (Vec::new(), Vec::new(), Vec::new());
         if !fine.outliers.places.is_empty() {
             half.resize(fine.count(), 0..0);
@@ -104,13 +113,12 @@ impl<'a> Singles<'a> {
                     let site = [column, segment.row + fine.columns.step() * k];
                     match i.checked_sub(fine.outliers.first) {
                         Some(outlier) => {
-                            let parents = parents_of_place(fine.outliers.places[outlier], transfer.steps);
-                            let parents = parents.into_iter().filter(|(_, share)| *share > 0.0);
-                            found.extend(parents.map(|(node, share)| (node, Some(i), share)));
+                            let nodes = of_outliers[outlier].into_iter().filter(|(_, share)| *share > 0.0);
+                            found.extend(nodes.map(|(node, share)| (node, Some(i), share)));
                         }
                         // Nodes with a share in a particle that feels one of these feel it through that.
                         None if leads[fine.class[i] as usize] => {
-                            found.extend(parents(site, transfer.steps).map(|node| (node, None, 0.0)));
+                            parents.each(site, 1.0, |node, _| found.push((node, None, 0.0)));
                         }
                         None => {}
                     }
@@ -123,18 +131,20 @@ impl<'a> Singles<'a> {
                 nodes.push((of_node[0].0, begin..shares.len()));
             }
         }
-        Self { fine, transfer, nodes, shares, halves: Vec::new(), half, sums: Sums::default() }
+        let (halves, sums) = (Vec::new(), Sums::default());
+        Self { fine, parents, of_outliers, nodes, shares, halves, half, sums }
     }
 
     /// The row of `P' K P` at a node.
     fn row(&mut self, node: Site, outliers: Range<usize>, sums: &mut Sums) -> Row {
-        let [across, along] = self.transfer.steps;
+        let [across, along] = self.parents.steps;
         let (first, step) = (self.fine.outliers.first, self.fine.columns.step());
         let near = |k: usize, step: i32| node[k] * step - step + 1..node[k] * step + step;
         for column in near(0, across) {
             for row in near(1, along) {
                 let Some((i, _)) = self.fine.columns.find([column, row]) else { continue };
-                let share = hat(column - node[0] * across, across) * hat(row - node[1] * along, along);
+                let hat = |axis: usize, at: i32| self.parents.hat(axis, at);
+                let share = hat(0, column - node[0] * across) * hat(1, row - node[1] * along);
                 self.add_half(node, [column, row], (i, share), sums);
             }
         }
@@ -173,15 +183,13 @@ impl<'a> Singles<'a> {
 
     /// Adds a block by the nodes that have a share in the particle at a site, as offsets from one of them.
     fn add_parents(&self, near: Site, site: Site, (sign, block): (f64, &Block), sums: &mut Sums) {
-        let place = if site[0] == Body::ALONG_OUTLINE {
-            self.fine.outliers.places[(site[1] / self.fine.columns.step()) as usize]
-        } else {
-            site.map(f64::from)
-        };
-        for (node, share) in parents_of_place(place, self.transfer.steps) {
-            if share > 0.0 {
-                sums.add([node[0] - near[0], node[1] - near[1]], sign * share, block);
-            }
+        let offset = |node: Site| [node[0] - near[0], node[1] - near[1]];
+        if site[0] != Body::ALONG_OUTLINE {
+            return self.parents.each(site, sign, |node, share| sums.add(offset(node), share, block));
+        }
+        let nodes = &self.of_outliers[(site[1] / self.fine.columns.step()) as usize];
+        for &(node, share) in nodes.iter().filter(|(_, share)| *share > 0.0) {
+            sums.add(offset(node), sign * share, block);
         }
     }
 }
@@ -259,35 +267,56 @@ impl Patterns {
 }
 
 /// The row of `P' K P` at a node with these surroundings.
-fn galerkin(fine: &Matrix, transfer: Transfer, pattern: &[u32], sums: &mut Sums) -> Row {
-    let [across, along] = transfer.steps;
+fn galerkin(fine: &Matrix, parents: &Parents, pattern: &[u32], sums: &mut Sums) -> Row {
+    let [across, along] = parents.steps;
     let reach = 2 * along - 1;
     for (k, &class) in pattern.iter().enumerate().filter(|(_, class)| **class != HELD) {
         let own = [k as i32 / reach - across + 1, k as i32 % reach - along + 1];
-        let share = hat(own[0], across) * hat(own[1], along);
+        let share = parents.hat(0, own[0]) * parents.hat(1, own[1]);
         let row = &fine.rows[class as usize];
         let entries = row.entries.iter().map(|(offset, block)| (*offset, block, -share));
         for (offset, block, share) in std::iter::once(([0, 0], &row.diagonal, share)).chain(entries) {
             let there = [own[0] + offset[0], own[1] + offset[1]];
-            for node in parents(there, transfer.steps) {
-                let at = [there[0] - node[0] * across, there[1] - node[1] * along];
-                sums.add(node, share * hat(at[0], across) * hat(at[1], along), block);
-            }
+            parents.each(there, share, |node, share| sums.add(node, share, block));
         }
     }
     sums.row()
 }
 
-/// Value at `at` of the piecewise linear function that is 1 at 0 and 0 from `step` on.
-fn hat(at: i32, step: i32) -> f64 {
-    1.0 - f64::from(at.abs()) / f64::from(step)
+/// The nodes that have a share in a site of the fine grid, by columns and by rows.
+#[derive(Clone, Copy)]
+struct Parents {
+    steps: [i32; 2],
+    /// Share of a node in what lies this many columns, and rows, away.
+    hats: [[f64; MOST_STEPS + 1]; 2],
 }
 
-/// The nodes that have a share in a place of the fine grid.
-fn parents([i, j]: Site, [across, along]: [i32; 2]) -> impl Iterator<Item = Site> {
-    let near = |at: i32, step: i32| {
+impl Parents {
+    fn new(steps: [i32; 2]) -> Self {
+        let hat = |step: i32, at: usize| (1.0 - at as f64 / f64::from(step)).max(0.0);
+        Self { steps, hats: steps.map(|step| std::array::from_fn(|at| hat(step, at))) }
+    }
+
+    /// Share of a node in what lies this far away along an axis.
+    fn hat(&self, axis: usize, at: i32) -> f64 {
+        self.hats[axis][at.unsigned_abs() as usize]
+    }
+
+    /// The one or two nodes around a column, or a row, with their shares; the second may have none.
+    fn along(&self, axis: usize, at: i32) -> [(i32, f64); 2] {
+        let step = self.steps[axis];
         let node = at.div_euclid(step);
-        node..=node + i32::from(at.rem_euclid(step) > 0)
-    };
-    near(i, across).flat_map(move |column| near(j, along).map(move |row| [column, row]))
+        let beyond = at - node * step;
+        [(node, self.hat(axis, beyond)), (node + 1, self.hat(axis, step - beyond))]
+    }
+
+    /// Hands out the nodes with a share in a site, each with `weight` times its share.
+    fn each(&self, site: Site, weight: f64, mut take: impl FnMut(Site, f64)) {
+        let rows = self.along(1, site[1]);
+        for (column, share) in self.along(0, site[0]).into_iter().filter(|(_, share)| *share > 0.0) {
+            for (row, other) in rows.into_iter().filter(|(_, share)| *share > 0.0) {
+                take([column, row], weight * share * other);
+            }
+        }
+    }
 }
