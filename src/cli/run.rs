@@ -29,15 +29,16 @@ use recorder::{Recorder, Records};
 use words::{closing_words, where_to_look};
 
 use super::checkpoint::{CheckpointArguments, Checkpointer, ResumedRun};
+use super::names::{FileName, SceneArguments};
 use super::output::{FigureArguments, OutputArguments, ReportArguments};
 use super::progress::{Drawn, Progress};
 use super::recording::{RecordArguments, close};
-use super::{FAILED, Refusal, SceneArguments, interrupt, say};
+use super::{FAILED, Refusal, interrupt, print, say};
 
 #[derive(Debug, Args)]
 pub struct RunArguments {
     /// Name of a bundled scene (see `flockform list scenes`) or path of a scene file; not with --resume
-    #[arg(required_unless_present = "resume")]
+    #[arg(required_unless_present = "resume", value_parser = FileName::SCENE, hide_possible_values = true)]
     scene: Option<String>,
     /// Override a key of the scene, validated like the file: `lattice.spacing=0.5`, `roles[1].from=30`
     #[arg(long = "set", value_name = "KEY.PATH=VALUE", requires = "scene")]
@@ -61,6 +62,9 @@ pub struct RunArguments {
     /// Show the positions after every step to other processes, as flockform/NAME/positions in shared memory
     #[arg(long, value_name = "NAME")]
     publish: Option<String>,
+    /// Print the summary as JSON, as in summary.json, instead of words
+    #[arg(long, conflicts_with = "quiet")]
+    json: bool,
 }
 
 /// Runs a scene and writes what comes of it.
@@ -163,13 +167,18 @@ fn run_here(arguments: &RunArguments) -> Result<ExitCode, Refusal> {
     if !is_interrupted {
         checkpoint::remove(&kept);
     }
-    if !arguments.output.quiet {
+    if arguments.json {
+        print(&format!("{:#}\n", serde_json::json!(summary)));
+    } else if !arguments.output.quiet {
         say(&words);
         say(&(closing_words(&scene, &outcome, &summary, elapsed) + &where_to_look(&kept) + &recorded));
     }
     if interrupt::is_raised() && !is_interrupted {
         eprintln!("interrupted: figures are missing, the rest is written");
         return Ok(ExitCode::from(FAILED));
+    }
+    if !is_interrupted {
+        arguments.report.show(&kept);
     }
     Ok(exit_code(&outcome))
 }

@@ -2,6 +2,7 @@
 
 #![cfg(feature = "cli")]
 
+mod beginnings;
 mod checkpoint;
 mod compare;
 mod documents;
