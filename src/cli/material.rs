@@ -123,7 +123,7 @@ pub struct WrongOption {
     help: String,
 }
 
-fn wrong(option: &'static str, message: impl Into<String>, help: impl Into<String>) -> WrongOption {
+pub fn wrong(option: &'static str, message: impl Into<String>, help: impl Into<String>) -> WrongOption {
     WrongOption { option, message: message.into(), help: help.into() }
 }
 

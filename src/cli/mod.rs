@@ -21,6 +21,7 @@ mod stability;
 mod study;
 mod supervise;
 mod swarm;
+mod sweep;
 mod trade;
 
 use std::path::PathBuf;
@@ -75,6 +76,16 @@ pub enum Command {
         after_help = "Example:\n  flockform trade grips --out /tmp/trade\n  flockform trade beam-loaded --max-particles 5000"
     )]
     Trade(trade::TradeArguments),
+    /// Runs a scene with many values of its keys, in parallel: one table, one figure
+    #[command(
+        after_help = "Examples:\n  flockform sweep tension --vary 'roles[1].motion.per_step=[[0.3, 0.0], [0.6, 0.0]]'\n  \
+                      flockform sweep tension --vary rule.feedback.factor=-0.2:0:5 --vary stop.steps=100:400:4 --outputs energies.pe1,probe.67.ux@60\n  \
+                      flockform sweep beam --vary material.poisson=0:0.45 --samples 40 --seed 1 --shard 1/4 --out part-1\n  \
+                      flockform sweep --resume part-1\n  \
+                      flockform sweep --merge part-1 part-2 part-3 part-4 --out all\n\n\
+                      Exit codes: 0 all runs ended, 1 interrupted or some refused, 2 bad input."
+    )]
+    Sweep(sweep::SweepArguments),
     /// Predicts and measures when a scene's body grows instead of coming to rest, and tests extreme input
     #[command(
         after_help = "Example:\n  flockform stability tension --out /tmp/stability\n  flockform stability beam --set update.damping=0.7 --no-extremes\n\n\
@@ -241,6 +252,12 @@ pub enum Refusal {
     #[error("{0}")]
     Record(#[from] flockform::record::RecordError),
     #[error("{0}")]
+    Design(#[from] flockform::study::design::DesignError),
+    #[error("{0}")]
+    Output(#[from] export::sweep::OutputError),
+    #[error("{0}")]
+    Sweep(#[from] export::sweep::SweepError),
+    #[error("{0}")]
     Checkpoint(#[from] export::checkpoint::CheckpointError),
     #[error(
         "there is no {what} file and no bundled {what} `{name}`\n  help: the nearest bundled {what} is `{nearest}`; `flockform list {what}s` lists them all"
@@ -347,6 +364,7 @@ pub fn dispatch(command: Command, ros: &RosArguments) -> Result<ExitCode, Refusa
         Command::Run(arguments) => return run::run(&arguments),
         Command::Compare(arguments) => return compare::compare(&arguments),
         Command::Trade(arguments) => return trade::trade(&arguments),
+        Command::Sweep(arguments) => return sweep::sweep(&arguments),
         Command::Stability(arguments) => return stability::stability(&arguments),
         Command::Swarm(arguments) => return swarm::swarm(&arguments),
         Command::Replay(arguments) => return replay::replay(&arguments),

@@ -172,3 +172,11 @@ pub fn bundled_file(name: &str) -> Result<(Kind, Bundled), Refusal> {
     let found = scene.or_else(|| bundled_swarm(name).map(|one| (Kind::Swarm, one)));
     found.ok_or_else(|| not_bundled(&Kind::ALL, name))
 }
+
+/// A scene's name as it is, or its path in full, for a command that is gone on with from another folder.
+pub fn in_full(scene: &str) -> String {
+    let place = Path::new(scene);
+    let is_path = bundled(scene).is_none() && place.exists();
+    let path = std::path::absolute(place).ok().filter(|_| is_path);
+    path.map_or_else(|| scene.to_owned(), |path| path.display().to_string())
+}

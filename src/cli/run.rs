@@ -5,7 +5,6 @@ mod recorder;
 mod words;
 
 use std::ops::ControlFlow;
-use std::path::Path;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
@@ -18,7 +17,7 @@ use flockform::export::report;
 use flockform::export::{Drawing, OutputFolder, Results, Timings, write_all};
 use flockform::record::About;
 use flockform::record::body::BodyMessages;
-use flockform::scene::{LoadSteps, Scene, bundled};
+use flockform::scene::{LoadSteps, Scene};
 use flockform::shm::Domain;
 use flockform::shm::positions::Positions;
 use flockform::solve::interrupt::Interrupt;
@@ -29,7 +28,7 @@ use recorder::{Recorder, Records};
 use words::{closing_words, where_to_look};
 
 use super::checkpoint::{CheckpointArguments, Checkpointer, ResumedRun};
-use super::names::{FileName, SceneArguments};
+use super::names::{FileName, SceneArguments, in_full};
 use super::output::{FigureArguments, OutputArguments, ReportArguments};
 use super::progress::{Drawn, Progress};
 use super::recording::{RecordArguments, close};
@@ -195,13 +194,9 @@ impl RunArguments {
             (None, Some(left)) => left.checkpoint.asked.clone(),
             (None, None) => unreachable!("a scene is required without --resume"),
             (Some(scene), _) => {
-                let place = Path::new(scene);
-                let in_full = std::path::absolute(place).ok().filter(|_| place.exists());
-                let is_path = bundled(scene).is_none();
-                let named = in_full.filter(|_| is_path).map(|path| path.display().to_string());
                 let steps = self.steps.map(|steps| format!("stop.steps={steps}"));
                 let set = self.set.iter().cloned().chain(steps).collect();
-                RunRequest { scene: named.unwrap_or_else(|| scene.clone()), set, force }
+                RunRequest { scene: in_full(scene), set, force }
             }
         }
     }

@@ -1,0 +1,503 @@
+//! Design of experiments: the runs of a parameter sweep, each a value for every varied key.
+//!
+//! A design is a function of what is asked for alone: grids count through the last key first, and what is drawn
+//! is drawn from a seed. So every process, thread and shard has the same runs under the same numbers.
+
+use std::fmt;
+use std::str::FromStr;
+
+use serde::{Deserialize, Serialize};
+
+/// Most runs of a design: their tables are kept in memory.
+const MOST_RUNS: usize = 1_000_000;
+
+/// Why there is no such design.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum DesignError {
+    /// A text that names no key or no values.
+    #[error(
+        "--vary {text}: {reason}\n  help: give KEY=FROM:TO:COUNT, KEY=FROM:TO:COUNT:log or KEY=[VALUE, ...]; with --samples KEY=FROM:TO"
+    )]
+    Vary {
+        /// What was given.
+        text: String,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// Two entries for one key.
+    #[error("--vary {0} is given twice\n  help: one list or range per key")]
+    Twice(String),
+    /// More runs than are kept.
+    #[error(
+        "the sweep has more than {MOST_RUNS} runs\n  help: vary fewer keys, take fewer values, or draw --samples"
+    )]
+    TooMany,
+    /// A text that is no shard.
+    #[error("--shard {0} is no part of a whole\n  help: give I/N with I from 1 to N, such as 1/4")]
+    Shard(String),
+}
+
+/// A value of a key, as an override has it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Level {
+    /// The value as it is written behind `KEY=`.
+    pub text: String,
+    /// The same as a number, where it is one.
+    pub number: Option<f64>,
+}
+
+impl Level {
+    fn written(text: &str) -> Self {
+        Self { text: text.to_owned(), number: text.parse().ok().filter(|number: &f64| number.is_finite()) }
+    }
+
+    /// The shortest text that reads back as the number; a whole one is written as an integer, which keys of both kinds
+    /// take.
+    fn of(number: f64) -> Self {
+        const EXACT: f64 = 9_007_199_254_740_992.0;
+        let is_whole = number.fract() == 0.0 && number.abs() < EXACT;
+        let text = if is_whole { format!("{}", number as i64) } else { format!("{number:?}") };
+        Self { text, number: Some(number) }
+    }
+}
+
+/// A key and the values that it takes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Factor {
+    /// Path of the key in the scene.
+    pub key: String,
+    /// Whether it is laid out, and drawn, by its logarithm.
+    pub is_log: bool,
+    values: Values,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+enum Values {
+    List(Vec<Level>),
+    /// From one end to the other; the number of values where it is given.
+    Range {
+        ends: [f64; 2],
+        count: Option<usize>,
+    },
+}
+
+impl FromStr for Factor {
+    type Err = DesignError;
+
+    /// Reads `KEY=a:b:n`, `KEY=a:b:n:log`, `KEY=a:b`, `KEY=a:b:log` or `KEY=[v1, v2, ...]`.
+    fn from_str(text: &str) -> Result<Self, DesignError> {
+        let refuse = |reason: &str| DesignError::Vary { text: text.to_owned(), reason: reason.to_owned() };
+        let (key, values) = text.split_once('=').ok_or_else(|| refuse("there is no `=`"))?;
+        let (key, values) = (key.trim().to_owned(), values.trim());
+        if key.is_empty() {
+            return Err(refuse("there is no key before the `=`"));
+        }
+        if let Some(list) = values.strip_prefix('[') {
+            let list = list.strip_suffix(']').ok_or_else(|| refuse("the list is not closed by `]`"))?;
+            let levels: Vec<Level> = elements(list).into_iter().map(Level::written).collect();
+            if levels.is_empty() || levels.iter().any(|level| level.text.is_empty()) {
+                return Err(refuse("a value of the list is missing"));
+            }
+            return Ok(Self { key, is_log: false, values: Values::List(levels) });
+        }
+        let (ends, count, is_log) = range(values).map_err(|reason| refuse(&reason))?;
+        Ok(Self { key, is_log, values: Values::Range { ends, count } })
+    }
+}
+
+/// Ends, number of values and scale of `a:b:n:log`, in which the last two may be missing.
+fn range(text: &str) -> Result<([f64; 2], Option<usize>, bool), String> {
+    let mut parts: Vec<&str> = text.split(':').map(str::trim).collect();
+    let is_log = parts.len() > 2 && parts.last() == Some(&"log");
+    if is_log {
+        parts.pop();
+    }
+    let number = |part: &str| {
+        let number: Option<f64> = part.parse().ok().filter(|number: &f64| number.is_finite());
+        number.ok_or_else(|| format!("`{part}` is no number"))
+    };
+    let (ends, count) = match parts[..] {
+        [from, to] => ([number(from)?, number(to)?], None),
+        [from, to, count] => {
+            let given: Option<usize> = count.parse().ok().filter(|&count| count > 0);
+            let count = given.ok_or_else(|| format!("`{count}` is no number of values"))?;
+            ([number(from)?, number(to)?], Some(count))
+        }
+        _ => return Err("it is neither a range nor a list".to_owned()),
+    };
+    if is_log && ends.iter().any(|&end| end <= 0.0) {
+        return Err("a logarithmic range has ends above 0".to_owned());
+    }
+    if count.is_some_and(|count| count > MOST_RUNS) {
+        return Err(format!("it has more than {MOST_RUNS} values"));
+    }
+    Ok((ends, count, is_log))
+}
+
+/// The elements of a list, split at commas outside of brackets and quotes.
+fn elements(list: &str) -> Vec<&str> {
+    let (mut depth, mut quote, mut start) = (0_i32, None, 0);
+    let mut found = Vec::new();
+    for (at, c) in list.char_indices() {
+        match (quote, c) {
+            (Some(open), c) if c == open => quote = None,
+            (Some(_), _) => {}
+            (None, '"' | '\'') => quote = Some(c),
+            (None, '[' | '{') => depth += 1,
+            (None, ']' | '}') => depth -= 1,
+            (None, ',') if depth == 0 => {
+                found.push(list[start..at].trim());
+                start = at + 1;
+            }
+            (None, _) => {}
+        }
+    }
+    found.push(list[start..].trim());
+    found
+}
+
+impl Factor {
+    /// The value at `part` of the way through the range, or of the list \[1\].
+    fn at(&self, part: f64) -> Level {
+        match &self.values {
+            Values::List(levels) => {
+                let n = (part * levels.len() as f64) as usize;
+                levels[n.min(levels.len() - 1)].clone()
+            }
+            Values::Range { ends, .. } => Level::of(between(*ends, part, self.is_log)),
+        }
+    }
+
+    /// All values of a grid.
+    fn levels(&self) -> Result<Vec<Level>, DesignError> {
+        match &self.values {
+            Values::List(levels) => Ok(levels.clone()),
+            Values::Range { ends, count: Some(count) } => {
+                let last = (count - 1).max(1) as f64;
+                Ok((0..*count).map(|n| Level::of(grid_point(*ends, n as f64, last, self.is_log))).collect())
+            }
+            Values::Range { .. } => {
+                let reason = "the number of values is missing, or --samples".to_owned();
+                Err(DesignError::Vary { text: self.to_string(), reason })
+            }
+        }
+    }
+
+    fn require_open(&self) -> Result<(), DesignError> {
+        match &self.values {
+            Values::Range { count: Some(count), .. } => {
+                let reason = format!("--samples says how many there are, and so does the {count}");
+                Err(DesignError::Vary { text: self.to_string(), reason })
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+impl fmt::Display for Factor {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match &self.values {
+            Values::List(levels) => {
+                let texts: Vec<&str> = levels.iter().map(|level| level.text.as_str()).collect();
+                write!(f, "{}=[{}]", self.key, texts.join(", "))
+            }
+            Values::Range { ends: [from, to], count } => {
+                let count = count.map_or(String::new(), |count| format!(":{count}"));
+                let scale = if self.is_log { ":log" } else { "" };
+                write!(f, "{}={from}:{to}{count}{scale}", self.key)
+            }
+        }
+    }
+}
+
+fn between([from, to]: [f64; 2], part: f64, is_log: bool) -> f64 {
+    match is_log {
+        true => (from.ln() + part * (to.ln() - from.ln())).exp(),
+        false => from + part * (to - from),
+    }
+}
+
+/// The `n`th of `last + 1` values; the ends are exact, and so are round steps (0.3 between 0.1 and 0.5).
+fn grid_point(ends @ [from, to]: [f64; 2], n: f64, last: f64, is_log: bool) -> f64 {
+    match n {
+        _ if n == 0.0 => from,
+        _ if n == last => to,
+        _ if is_log => between(ends, n / last, true),
+        _ => (from * (last - n) + to * n) / last,
+    }
+}
+
+/// How values are drawn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Sampling {
+    /// Each key's range, or list, is cut into as many equal parts as there are runs, and each part is drawn from once.
+    #[default]
+    LatinHypercube,
+    /// Independent and uniform.
+    Random,
+}
+
+/// Runs of a sweep, by number from 0.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Design {
+    /// The varied keys.
+    pub factors: Vec<Factor>,
+    /// A value for each key in its order, shape \[runs, keys\].
+    pub runs: Vec<Vec<Level>>,
+}
+
+impl Design {
+    /// Every combination of the keys' values; the last key changes from each run to the next.
+    ///
+    /// # Errors
+    /// A key that is given twice, a range without a number of values, or too many runs.
+    pub fn grid(factors: Vec<Factor>) -> Result<Self, DesignError> {
+        require_distinct(&factors)?;
+        let levels: Vec<Vec<Level>> = factors.iter().map(Factor::levels).collect::<Result<_, _>>()?;
+        let product = levels.iter().try_fold(1_usize, |count, levels| count.checked_mul(levels.len()));
+        let count = product.filter(|&count| count <= MOST_RUNS).ok_or(DesignError::TooMany)?;
+        let run = |number: usize| {
+            let mut rest = number;
+            let mut values: Vec<Level> = levels
+                .iter()
+                .rev()
+                .map(|levels| {
+                    let level = levels[rest % levels.len()].clone();
+                    rest /= levels.len();
+                    level
+                })
+                .collect();
+            values.reverse();
+            values
+        };
+        Ok(Self { runs: (0..count).map(run).collect(), factors })
+    }
+
+    /// So many runs with values drawn from the keys' ranges and lists; the same seed gives the same runs, and a
+    /// key's draws do not depend on the other keys.
+    ///
+    /// # Errors
+    /// A key that is given twice, a range with a number of values of its own, or too many runs.
+    pub fn sampled(
+        factors: Vec<Factor>,
+        samples: usize,
+        sampling: Sampling,
+        seed: u64,
+    ) -> Result<Self, DesignError> {
+        require_distinct(&factors)?;
+        factors.iter().try_for_each(Factor::require_open)?;
+        if samples > MOST_RUNS {
+            return Err(DesignError::TooMany);
+        }
+        let columns = factors.iter().enumerate().map(|(k, factor)| {
+            let mut draws = Draws::new(seed, k as u64);
+            let parts = match sampling {
+                Sampling::Random => (0..samples).map(|_| draws.part()).collect(),
+                Sampling::LatinHypercube => latin_column(samples, &mut draws),
+            };
+            parts.into_iter().map(|part| factor.at(part)).collect::<Vec<Level>>()
+        });
+        let columns: Vec<Vec<Level>> = columns.collect();
+        let run = |number: usize| columns.iter().map(|column| column[number].clone()).collect();
+        Ok(Self { runs: (0..samples).map(run).collect(), factors })
+    }
+
+    /// The overrides of a run.
+    pub fn overrides(&self, number: usize) -> Vec<String> {
+        let of = |(factor, level): (&Factor, &Level)| format!("{}={}", factor.key, level.text);
+        self.factors.iter().zip(&self.runs[number]).map(of).collect()
+    }
+}
+
+fn require_distinct(factors: &[Factor]) -> Result<(), DesignError> {
+    let twice =
+        factors.iter().enumerate().find(|(k, one)| factors[..*k].iter().any(|two| two.key == one.key));
+    twice.map_or(Ok(()), |(_, factor)| Err(DesignError::Twice(factor.key.clone())))
+}
+
+/// One draw from each of `count` equal parts, in a drawn order \[1\].
+fn latin_column(count: usize, draws: &mut Draws) -> Vec<f64> {
+    let mut order: Vec<usize> = (0..count).collect();
+    // Fisher and Yates.
+    for last in (1..count).rev() {
+        order.swap(last, draws.below(last + 1));
+    }
+    order.into_iter().map(|part| (part as f64 + draws.part()) / count as f64).collect()
+}
+
+/// Uniform draws by splitmix64 (Steele, Lea and Flood 2014): a few lines, the same on every machine.
+struct Draws(u64);
+
+impl Draws {
+    fn new(seed: u64, stream: u64) -> Self {
+        let mut draws = Self(seed);
+        let offset = draws.next();
+        Self(offset ^ Self(stream).next())
+    }
+
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    /// From 0 up to, and without, 1.
+    fn part(&mut self) -> f64 {
+        (self.next() >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    /// From 0 up to, and without, `count`.
+    fn below(&mut self, count: usize) -> usize {
+        ((u128::from(self.next()) * count as u128) >> 64) as usize
+    }
+}
+
+/// A part of a sweep's runs: every `of`th one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Shard {
+    /// From 1.
+    pub number: usize,
+    /// Number of parts.
+    pub of: usize,
+}
+
+impl Shard {
+    /// All runs.
+    pub const WHOLE: Self = Self { number: 1, of: 1 };
+
+    /// Whether the shard has this run.
+    pub fn has(self, run: usize) -> bool {
+        run % self.of == self.number - 1
+    }
+}
+
+impl FromStr for Shard {
+    type Err = DesignError;
+
+    fn from_str(text: &str) -> Result<Self, DesignError> {
+        let refuse = || DesignError::Shard(text.to_owned());
+        let (number, of) = text.split_once('/').ok_or_else(refuse)?;
+        let read = |part: &str| part.trim().parse::<usize>().map_err(|_| refuse());
+        let shard = Self { number: read(number)?, of: read(of)? };
+        if (1..=shard.of).contains(&shard.number) { Ok(shard) } else { Err(refuse()) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn factors(texts: &[&str]) -> Vec<Factor> {
+        texts.iter().map(|text| text.parse().unwrap_or_else(|error| panic!("{error}"))).collect()
+    }
+
+    fn column(design: &Design, key: usize) -> Vec<&str> {
+        design.runs.iter().map(|run| run[key].text.as_str()).collect()
+    }
+
+    #[test]
+    fn a_grid_has_every_combination_with_the_last_key_first() {
+        let grid = Design::grid(factors(&["a.b=0.1:0.5:3", "frame=[lagged, \"mirror\"]"])).unwrap();
+        assert_eq!(column(&grid, 0), ["0.1", "0.1", "0.3", "0.3", "0.5", "0.5"]);
+        assert_eq!(
+            column(&grid, 1),
+            ["lagged", "\"mirror\"", "lagged", "\"mirror\"", "lagged", "\"mirror\""]
+        );
+        assert_eq!(grid.overrides(3), ["a.b=0.3", "frame=\"mirror\""]);
+    }
+
+    #[test]
+    fn whole_numbers_are_written_as_integers_and_logarithmic_ranges_by_their_ratios() {
+        assert_eq!(
+            column(&Design::grid(factors(&["stop.steps=10:40:4"])).unwrap(), 0),
+            ["10", "20", "30", "40"]
+        );
+        let log = Design::grid(factors(&["k=1e-4:1:5:log"])).unwrap();
+        let values: Vec<f64> = log.runs.iter().map(|run| run[0].number.unwrap()).collect();
+        for (value, expected) in values.iter().zip([1e-4, 1e-3, 1e-2, 0.1, 1.0]) {
+            assert!((value / expected - 1.0).abs() < 1e-12, "{values:?}");
+        }
+        assert_eq!(column(&Design::grid(factors(&["k=2.5:9:1"])).unwrap(), 0), ["2.5"]);
+    }
+
+    #[test]
+    fn the_values_of_a_list_may_be_lists_and_tables() {
+        let grid = Design::grid(factors(&["v=[[0.1, 0], { kind = \"a,b\" }, x]"])).unwrap();
+        assert_eq!(column(&grid, 0), ["[0.1, 0]", "{ kind = \"a,b\" }", "x"]);
+    }
+
+    #[test]
+    fn a_latin_hypercube_has_one_run_in_each_part_of_each_key() {
+        let draw = |seed| {
+            Design::sampled(factors(&["a=0:10", "b=1:100:log"]), 50, Sampling::LatinHypercube, seed).unwrap()
+        };
+        let design = draw(7);
+        let parts = |key: usize, part: &dyn Fn(f64) -> f64| {
+            let mut found: Vec<usize> =
+                design.runs.iter().map(|run| (50.0 * part(run[key].number.unwrap())) as usize).collect();
+            found.sort_unstable();
+            found
+        };
+        let all: Vec<usize> = (0..50).collect();
+        assert_eq!(parts(0, &|value| value / 10.0), all);
+        assert_eq!(parts(1, &|value| value.log10() / 2.0), all);
+        assert_eq!(draw(7), design);
+        assert_ne!(draw(8), design);
+        // Ranks of the two keys are not those of each other: the correlation is far from 1.
+        let middle = |key: usize| move |run: &Vec<Level>| run[key].number.unwrap();
+        let (a, b): (Vec<f64>, Vec<f64>) =
+            design.runs.iter().map(|run| (middle(0)(run) - 5.0, middle(1)(run).log10() - 1.0)).unzip();
+        let dot = |x: &[f64], y: &[f64]| x.iter().zip(y).map(|(x, y)| x * y).sum::<f64>();
+        assert!(dot(&a, &b).abs() < 0.5 * (dot(&a, &a) * dot(&b, &b)).sqrt());
+    }
+
+    #[test]
+    fn a_keys_draws_do_not_depend_on_the_other_keys() {
+        let one = Design::sampled(factors(&["a=0:1"]), 9, Sampling::Random, 3).unwrap();
+        let two = Design::sampled(factors(&["a=0:1", "b=[x, y]"]), 9, Sampling::Random, 3).unwrap();
+        assert_eq!(column(&one, 0), column(&two, 0));
+        assert!(column(&two, 1).contains(&"x") && column(&two, 1).contains(&"y"));
+    }
+
+    #[test]
+    fn shards_part_the_runs() {
+        let shards: Vec<Shard> = ["1/3", "2/3", "3/3"].iter().map(|text| text.parse().unwrap()).collect();
+        for run in 0..10 {
+            assert_eq!(shards.iter().filter(|shard| shard.has(run)).count(), 1, "{run}");
+        }
+        for wrong in ["0/3", "4/3", "1", "1/0", "a/b", "-1/2"] {
+            assert!(wrong.parse::<Shard>().is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_variation_is_refused_with_its_text() {
+        for wrong in [
+            "a",
+            "=1:2:3",
+            "a=",
+            "a=1",
+            "a=1:2:0",
+            "a=1:x:3",
+            "a=1:2:3:4",
+            "a=[1,2",
+            "a=[1,,2]",
+            "a=[]",
+            "a=0:1:3:log",
+            "a=1:inf:3",
+            "a=1:2:9999999",
+        ] {
+            let error = wrong.parse::<Factor>().expect_err(wrong).to_string();
+            assert!(error.contains(&format!("--vary {wrong}: ")), "{error}");
+        }
+        let refused = |design: Result<Design, DesignError>| design.expect_err("refused").to_string();
+        assert!(refused(Design::grid(factors(&["a=1:2"]))).contains("number of values is missing"));
+        assert!(refused(Design::grid(factors(&["a=1:2:3", "a=[1]"]))).contains("twice"));
+        assert!(refused(Design::grid(factors(&["a=0:1:2000", "b=0:1:2000"]))).contains("more than"));
+        let counted = Design::sampled(factors(&["a=0:1:5"]), 3, Sampling::Random, 0);
+        assert!(refused(counted).contains("--samples"));
+    }
+}
