@@ -19,5 +19,6 @@ mod run;
 mod signals;
 mod stability;
 mod swarm;
+mod sweep;
 #[path = "../common/waits.rs"]
 mod waits;
