@@ -81,8 +81,7 @@ pub struct NewArguments {
 /// Writes a file to begin with, which is valid as it is; one that is there already stays.
 pub fn new(arguments: &NewArguments) -> Result<(), Refusal> {
     let NewArguments { kind, name, from } = arguments;
-    let bundled = bundled_file(from.as_deref().unwrap_or(first(*kind)))?;
-    let (found, file) = bundled;
+    let (found, file) = bundled_file(from.as_deref().unwrap_or(first(*kind)))?;
     if found != *kind {
         return Err(Refusal::OtherKind {
             name: file.name.to_owned(),

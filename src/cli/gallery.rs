@@ -53,7 +53,7 @@ pub fn gallery(arguments: &GalleryArguments) -> Result<ExitCode, Refusal> {
 fn exhibits(names: &[String]) -> Result<Vec<Exhibit>, Refusal> {
     let all = || bundled::SCENES.iter().chain(bundled::SWARMS);
     if let Some(name) = names.iter().find(|name| !all().any(|one| one.name == **name)) {
-        return Err(not_bundled(&[Kind::Scene, Kind::Swarm], name));
+        return Err(not_bundled(&Kind::ALL, name));
     }
     let is_asked = |one: &&Bundled| names.is_empty() || names.iter().any(|name| name == one.name);
     let scene = |one: &Bundled| -> Result<Exhibit, SceneError> {

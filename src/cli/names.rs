@@ -20,7 +20,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    const ALL: [Kind; 2] = [Kind::Scene, Kind::Swarm];
+    pub const ALL: [Kind; 2] = [Kind::Scene, Kind::Swarm];
 
     pub fn name(self) -> &'static str {
         match self {
@@ -88,12 +88,16 @@ impl Kind {
     /// # Errors
     /// A bundled file of the other kind, or neither file nor name.
     pub fn path(self, word: &str) -> Result<PathBuf, Refusal> {
-        let path = PathBuf::from(word);
-        if path.exists() || word.contains(['/', '\\', '.']) {
-            return Ok(path);
+        if is_path(word) {
+            return Ok(PathBuf::from(word));
         }
         Err(self.refuse_other(word).unwrap_or_else(|| not_bundled(&[self], word)))
     }
+}
+
+/// Whether a word is a path rather than a name: one that is there, or looks like one.
+pub fn is_path(word: &str) -> bool {
+    Path::new(word).exists() || word.contains(['/', '\\', '.'])
 }
 
 /// The error for a word that is no name of a bundled file of these kinds.

@@ -7,7 +7,7 @@ use flockform::study::compare::run::plan as plan_of;
 use flockform::swarm::plan::SwarmPlan;
 use serde_json::{Value, json};
 
-use super::names::{FileName, Kind, SceneArguments};
+use super::names::{FileName, Kind, SceneArguments, is_path, not_bundled};
 use super::swarm::SwarmFileArguments;
 use super::{Refusal, print, say};
 
@@ -33,6 +33,7 @@ pub fn plan(arguments: &PlanArguments) -> Result<(), Refusal> {
             let plan = SwarmPlan::new(&swarm)?;
             (plan.to_string(), json!(plan))
         }
+        None if !is_path(file) => return Err(not_bundled(&Kind::ALL, file)),
         Some(Kind::Scene) | None => {
             let scene = SceneArguments { scene: file.clone(), set: set.clone() }.load([])?;
             let plan = plan_of(&scene)?;

@@ -78,10 +78,12 @@ impl Begun {
     /// Says which of the two it is.
     pub fn require_of(&self, folder: &Path, scene: &Scene) -> Result<(), SweepError> {
         let now = Self::new(self.request.clone(), scene);
-        let what = match () {
-            () if self.version != now.version => format!("of version {} of the program", self.version),
-            () if self.scene_crc32 != now.scene_crc32 => format!("of another `{}`", self.request.scene),
-            () => return Ok(()),
+        let what = if self.version != now.version {
+            format!("of version {} of the program", self.version)
+        } else if self.scene_crc32 != now.scene_crc32 {
+            format!("of another `{}`", self.request.scene)
+        } else {
+            return Ok(());
         };
         Err(SweepError::Foreign { folder: folder.to_owned(), what })
     }

@@ -13,7 +13,7 @@ use std::path::PathBuf;
 
 pub(super) use journal::REQUEST;
 pub use journal::{Begun, Found, Journal, Row, SweepError, SweepRequest, read};
-pub use outputs::{Output, OutputError, Probed, Values};
+pub use outputs::{Output, OutputError, Probed, Quantity, Values};
 
 use super::OutputFolder;
 use super::error::ExportError;
