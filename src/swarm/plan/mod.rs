@@ -8,21 +8,19 @@
 //! * noise of the poses moves a follower by the root of the diagonal of `C = A C A' + A A' + B B'` times that noise;
 //! * behind leaders that move steadily a follower lags by the row of `(1 - A)^-1 (A + B) 1` times their way in a period.
 
-use std::fmt;
+mod period_map;
+mod words;
 
-use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
-use super::formation::{Formation, Seen};
-use crate::flock::vectors::{Vectors, distance};
+use super::formation::Formation;
+use crate::flock::vectors::distance;
 use crate::scene::SceneError;
 use crate::scene::swarm::raw::RawModel;
 use crate::scene::swarm::{Shape, Swarm};
 use crate::solve::spectrum::spectral_radius;
 use crate::swarm::flight::Flight;
-
-/// Most followers for the dense algebra of noise and lag: more would take seconds.
-const MOST_FOLLOWERS: usize = 150;
+use period_map::PeriodMap;
 
 /// Sweeps made to find the spectral radius.
 const MOST_SWEEPS: usize = 5000;
@@ -272,144 +270,6 @@ fn cautions(plan: &SwarmPlan) -> Vec<String> {
         ));
     }
     cautions
-}
-
-/// One period of the loop as a map of what is seen.
-struct PeriodMap {
-    /// Next places of the followers for the seen ones, shape \[2 followers, 2 followers\].
-    own: DMatrix<f64>,
-    /// The same for those of the leaders, shape \[2 followers, 2 leaders\].
-    led: DMatrix<f64>,
-}
-
-impl PeriodMap {
-    /// `None` where the rule is not linear, a scene leads or a frame remembers, and for too many followers.
-    fn of(formation: &Formation, sweeps: usize) -> Option<Self> {
-        let has_frame = formation.engine().is_none_or(|engine| engine.body().frame.is_some());
-        let (leaders, followers): (Vec<usize>, Vec<usize>) =
-            (0..formation.count()).partition(|&m| formation.leads(m));
-        let is_small = !followers.is_empty() && followers.len() <= MOST_FOLLOWERS;
-        formation.settled(&formation.places).filter(|_| formation.is_led_here() && !has_frame && is_small)?;
-        let mut formation = formation.clone();
-        let base = next(&mut formation, None, sweeps);
-        let mut columns = |members: &[usize]| {
-            let mut map = DMatrix::zeros(2 * followers.len(), 2 * members.len());
-            for (n, (&m, axis)) in members.iter().flat_map(|m| [(m, 0), (m, 1)]).enumerate() {
-                let moved = next(&mut formation, Some((m, axis)), sweeps);
-                for (k, &follower) in followers.iter().enumerate() {
-                    let (now, then) = (moved.get(follower), base.get(follower));
-                    (map[(2 * k, n)], map[(2 * k + 1, n)]) = (now[0] - then[0], now[1] - then[1]);
-                }
-            }
-            map
-        };
-        Some(Self { own: columns(&followers), led: columns(&leaders) })
-    }
-
-    /// `None` where noise adds up without bound.
-    fn noise_gain(&self) -> Option<f64> {
-        /// Doublings of the time over which noise is summed: more than 10^9 periods.
-        const DOUBLINGS: usize = 30;
-        let mut power = self.own.clone();
-        let mut covariance = &self.own * self.own.transpose() + &self.led * self.led.transpose();
-        for _ in 0..DOUBLINGS {
-            let added = &power * &covariance * power.transpose();
-            let is_summed = added.amax() <= 1e-12 * covariance.amax();
-            covariance += added;
-            if is_summed {
-                return Some(covariance.diagonal().max().max(0.0).sqrt());
-            }
-            power = &power * &power;
-        }
-        None
-    }
-
-    /// The largest lag of a follower behind leaders that move by 1 in a period \[period\].
-    fn lag(&self) -> Option<f64> {
-        let size = self.own.nrows();
-        let along = |axis: usize| {
-            let ones = |n: usize| DVector::from_fn(n, |k, _| if k % 2 == axis { 1.0 } else { 0.0 });
-            let seen = &self.own * ones(size) + &self.led * ones(self.led.ncols());
-            (DMatrix::identity(size, size) - &self.own).lu().solve(&seen).map(|lag| lag.amax())
-        };
-        Some(along(0)?.max(along(1)?)).filter(|lag| lag.is_finite())
-    }
-}
-
-/// The members' places after a period at whose start one of them is seen a metre off.
-fn next(formation: &mut Formation, off: Option<(usize, usize)>, sweeps: usize) -> Vectors {
-    let mut present = formation.places.clone();
-    if let Some((m, axis)) = off {
-        let mut place = present.get(m);
-        place[axis] += 1.0;
-        present.set(m, place);
-    }
-    let all = vec![true; formation.count()];
-    let mut targets = present.clone();
-    formation.advance(&Seen { present: &present, usable: &all, known: &all }, 0.0, sweeps, &mut targets);
-    targets
-}
-
-impl fmt::Display for SwarmPlan {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "{}: {}", self.name, self.title)?;
-        let mut line = |name: &str, value: String| writeln!(f, "  {name:<16}  {value}");
-        let Self { robots, leaders, model, spacing, sweeps, period_s, .. } = self;
-        line(
-            "robots",
-            format!("{robots} ({leaders} leaders), simulated as {model}, {:.1} s", self.flight_s),
-        )?;
-        let free =
-            self.free_space.map_or(String::new(), |free| format!(", {free:.4} m between the nearest rims"));
-        line("formation", format!("places {spacing:.4} m apart{free}, {:.2} neighbours", self.neighbours))?;
-        line("loop", format!("a target every {period_s} s, at most {sweeps} sweeps of the rule in each"))?;
-        let half_life = |half: Option<f64>| half.map_or("never".to_owned(), |half| format!("in {half:.3} s"));
-        match self.convergence {
-            Some(Convergence { factor, half_life_s }) => {
-                let halves = half_life(half_life_s);
-                line(
-                    "comes to rest",
-                    format!("a disturbance halves {halves}; {factor:.3e} is left a period"),
-                )?;
-                let delayed = half_life(self.delay.half_life_s);
-                let simulated = self.delay.simulated_s;
-                line("delay", format!("slows, never makes grow: with {simulated:.3} s it halves {delayed}"))?;
-            }
-            None => line("comes to rest", "not predicted: the rule is not linear, or a scene leads".into())?,
-        }
-        let DelayMargin { largest_s, largest_periods, .. } = self.delay;
-        line(
-            "delay margin",
-            format!("poses are used up to an age of {largest_s} s, {largest_periods} periods"),
-        )?;
-        if let Some(gain) = self.noise.gain {
-            line("noise", format!("a follower moves by up to {gain:.3} of the poses' standard deviation"))?;
-        }
-        let simulated = self.noise.simulated;
-        match self.noise.largest {
-            Some(largest) => line(
-                "noise margin",
-                format!(
-                    "{largest:.4} m until the clearance holds robots at their places; simulated {simulated} m"
-                ),
-            )?,
-            None => {
-                line("noise margin", format!("none set: robots are not kept apart; simulated {simulated} m"))?
-            }
-        }
-        let SpeedMargin { limit, lag_s, reachable, manoeuvres } = &self.speed;
-        line("speed limit", limit.map_or("none".into(), |limit| format!("{limit} m/s")))?;
-        if let Some(lag) = lag_s {
-            line("lag", format!("followers are up to {lag:.3} s behind steady leaders"))?;
-        }
-        if let Some(speed) = reachable {
-            line("reachable speed", format!("{speed:.4} m/s"))?;
-        }
-        for ManoeuvreSpeed { name, needed } in manoeuvres {
-            line("manoeuvre", format!("`{name}` moves a place at up to {needed:.3} m/s"))?;
-        }
-        self.cautions.iter().try_for_each(|caution| writeln!(f, "caution: {caution}"))
-    }
 }
 
 #[cfg(test)]
