@@ -131,7 +131,7 @@ pub enum Command {
         after_help = "Examples:\n  flockform new scene plate --from plate-hole && flockform run plate.toml\n  flockform new swarm patrol"
     )]
     New(bundle::NewArguments),
-    /// Shows what a scene makes the program model, or what a swarm can bear and reach, without running it
+    /// Shows what a scene makes the program model, or the margins and speeds of a swarm, without running it
     #[command(
         after_help = "Examples:\n  flockform plan fracture --set lattice.a=5.0\n  flockform plan square --set control.sweeps=1"
     )]

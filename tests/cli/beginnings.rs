@@ -124,7 +124,7 @@ fn the_plan_of_a_swarm_states_margins_and_speeds() {
     assert!(files(folder.path()).is_empty());
 }
 
-/// What bash completes a command line to; its last word may be empty.
+/// The words that bash offers at the end of a command line.
 fn completed(line: &[&str], folder: &Path) -> Vec<String> {
     let script = said(&["completions", "bash"], folder);
     std::fs::write(folder.join("completion"), script).expect("writable");

@@ -107,7 +107,7 @@ impl Runs<'_> {
         }
     }
 
-    /// What a run comes to, as `flockform run` makes it.
+    /// The end and the outputs of a run, as `flockform run` makes it.
     fn ended(&self, run: usize) -> Result<Ended, SceneError> {
         let start = Instant::now();
         let overrides = self.design.overrides(run);

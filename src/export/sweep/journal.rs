@@ -54,7 +54,7 @@ impl SweepRequest {
     }
 }
 
-/// A sweep that has begun: what was asked for, of which scene.
+/// A sweep that has begun: the request, and which scene it is of.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Begun {
     program: String,
@@ -104,11 +104,11 @@ fn crc32(scene: &Scene) -> u32 {
 pub struct Row {
     /// Its number in the design, from 0.
     pub run: usize,
-    /// Why it ended, by name; `refused` for one that could not begin.
+    /// The reason for its end, by name; `refused` for one that could not begin.
     pub stop_reason: String,
     /// The outputs as text, empty where there is none: numbers read back as the same.
     pub outputs: Vec<String>,
-    /// Why it was refused or diverged.
+    /// The cause of a refusal or a divergence.
     pub reason: String,
 }
 
@@ -131,7 +131,7 @@ pub enum SweepError {
     Unreadable {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The fault.
         source: io::Error,
     },
     /// Two sweeps that are not parts of one.
@@ -150,7 +150,7 @@ pub enum SweepError {
     Foreign {
         /// The folder.
         folder: PathBuf,
-        /// What they are of.
+        /// The origin of the runs, in words.
         what: String,
     },
 }
@@ -162,7 +162,7 @@ pub struct Found {
     pub folder: PathBuf,
     /// Where its results go.
     pub out: PathBuf,
-    /// What was asked for.
+    /// The request and its scene.
     pub begun: Begun,
     /// The runs that have ended, in that order.
     pub rows: Vec<Row>,

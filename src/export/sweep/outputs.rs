@@ -8,7 +8,7 @@ use super::super::Summary;
 use crate::engine::Engine;
 use crate::scene::Scene;
 
-/// Why a name is no output.
+/// Error in the name of an output.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum OutputError {
     /// A probe without a particle, or of something that particles do not have.
@@ -19,7 +19,7 @@ pub enum OutputError {
     /// The body has no such particle.
     #[error("--outputs {name}: the body has no particle {id}\n  help: final.csv of a run lists the ids")]
     Particle {
-        /// What was given.
+        /// The text given.
         name: String,
         /// The id in it.
         id: usize,
@@ -27,7 +27,7 @@ pub enum OutputError {
     /// The summary has no such key.
     #[error("--outputs {name}: summary.json has no such key\n  help: {} has {}", place(.at), .there.join(", "))]
     Unknown {
-        /// What was given.
+        /// The text given.
         name: String,
         /// The part of the path that is there.
         at: String,
@@ -37,7 +37,7 @@ pub enum OutputError {
     /// The key holds several values.
     #[error("--outputs {name} has several values\n  help: give one of them: {}", .there.join(", "))]
     Several {
-        /// What was given.
+        /// The text given.
         name: String,
         /// The keys below.
         there: Vec<String>,
@@ -59,14 +59,14 @@ pub enum Output {
         name: String,
         /// Of the particle, as in `final.csv`.
         id: usize,
-        /// What of the particle.
+        /// The quantity that is read.
         quantity: Quantity,
         /// After so many steps; at the end where there is none.
         step: Option<usize>,
     },
 }
 
-/// What a particle is asked for.
+/// The quantity read from a particle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
     /// Place along an axis, 0 or 1 \[length\].
@@ -158,7 +158,7 @@ impl Probed {
 pub struct Values<'a> {
     /// The engine at the end.
     pub engine: &'a Engine,
-    /// What the run came to.
+    /// The summary of the run.
     pub summary: &'a Summary,
     /// Readings on the way.
     pub probed: &'a Probed,

@@ -154,7 +154,7 @@ impl Factor {
     pub(super) fn require_open(&self) -> Result<(), DesignError> {
         match &self.values {
             Values::Range { count: Some(count), .. } => {
-                let reason = format!("--samples says how many there are, and so does the {count}");
+                let reason = format!("--samples gives the number of values: leave the {count} out");
                 Err(DesignError::Vary { text: self.to_string(), reason })
             }
             _ => Ok(()),

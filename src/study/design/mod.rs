@@ -16,7 +16,7 @@ pub use factor::{Factor, Level};
 /// Most runs of a design: their tables are kept in memory.
 const MOST_RUNS: usize = 1_000_000;
 
-/// Why there is no such design.
+/// Error in the description of a design.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum DesignError {
     /// A text that names no key or no values.
@@ -24,9 +24,9 @@ pub enum DesignError {
         "--vary {text}: {reason}\n  help: give KEY=FROM:TO:COUNT, KEY=FROM:TO:COUNT:log or KEY=[VALUE, ...]; with --samples KEY=FROM:TO"
     )]
     Vary {
-        /// What was given.
+        /// The text given.
         text: String,
-        /// What is wrong with it.
+        /// The fault.
         reason: String,
     },
     /// Two entries for one key.

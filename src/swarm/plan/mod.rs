@@ -108,11 +108,11 @@ pub struct SpeedMargin {
     /// Speed of the leaders up to which followers keep within `flight.bounds.affine_error` of their places, the speed
     /// limit at most \[m/s\]; absent without such a bound or a limit.
     pub reachable: Option<f64>,
-    /// What each manoeuvre asks of its fastest robot.
+    /// The demands of each manoeuvre.
     pub manoeuvres: Vec<ManoeuvreSpeed>,
 }
 
-/// What a manoeuvre asks of its fastest robot.
+/// The demands of a manoeuvre on its fastest robot.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ManoeuvreSpeed {
     /// Name of the manoeuvre.
