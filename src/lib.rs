@@ -16,7 +16,7 @@
 //! * [`material`]: rule weights from Young's modulus and Poisson's ratio, and what material a rule is.
 //! * [`engine`]: one step of a body after the other: leaders, roles, bonds, loads; used by continuum and swarm alike.
 //! * [`continuum`]: plans a scene, steps it or goes straight to rest, and hands what happens to an observer.
-//! * [`study`]: many runs of a scene: rule against finite elements, accuracy against cost, stability and its thresholds.
+//! * [`study`]: many runs of a scene: rule against finite elements, accuracy against cost, parameter sweeps, stability and its thresholds.
 //! * `export` (feature `export`): CSV, JSON, VTK and figures, one file per format.
 //! * `fem` (feature `fem`): finite elements, the reference for the rules; it imports no flock.
 //! * `swarm` (feature `swarm`): formations of robots: targets by the same rule, made safe; flights of simulated robots.

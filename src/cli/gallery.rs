@@ -10,13 +10,14 @@ use flockform::export::report::gallery::{Exhibit, write_gallery};
 use flockform::export::report::page;
 use flockform::scene::{Bundled, SceneError, bundled};
 
+use super::names::{FileName, Kind, not_bundled};
 use super::output::OutputArguments;
 use super::{FAILED, Refusal, interrupt, say};
 
 #[derive(Debug, Args)]
 pub struct GalleryArguments {
     /// Bundled scenes and swarms to run [default: all]
-    #[arg(value_name = "NAME")]
+    #[arg(value_name = "NAME", value_parser = FileName::ANY, hide_possible_values = true)]
     names: Vec<String>,
     #[command(flatten)]
     output: OutputArguments,
@@ -52,13 +53,7 @@ pub fn gallery(arguments: &GalleryArguments) -> Result<ExitCode, Refusal> {
 fn exhibits(names: &[String]) -> Result<Vec<Exhibit>, Refusal> {
     let all = || bundled::SCENES.iter().chain(bundled::SWARMS);
     if let Some(name) = names.iter().find(|name| !all().any(|one| one.name == **name)) {
-        let likeness = |other: &str| strsim::jaro_winkler(other, name);
-        let nearest = all().map(|one| one.name).max_by(|a, b| likeness(a).total_cmp(&likeness(b)));
-        return Err(Refusal::NotBundled {
-            what: "scene",
-            name: name.clone(),
-            nearest: nearest.unwrap_or_default(),
-        });
+        return Err(not_bundled(&Kind::ALL, name));
     }
     let is_asked = |one: &&Bundled| names.is_empty() || names.iter().any(|name| name == one.name);
     let scene = |one: &Bundled| -> Result<Exhibit, SceneError> {

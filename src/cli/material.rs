@@ -10,14 +10,19 @@ use flockform::material::gradient::{GradientWeights, layer_note};
 use flockform::material::homogenise::Crystal;
 use flockform::material::report::MaterialReport;
 
-use super::{Refusal, SceneArguments};
+use super::Refusal;
+use super::names::{FileName, SceneArguments};
 
 /// A question: a scene's rule, a rule given by its lattice and weights, or a material given by its
 /// constants.
 #[derive(Debug, Args)]
 pub struct MaterialArguments {
     /// Name of a bundled scene or path of a scene file whose rule to examine
-    #[arg(conflicts_with_all = ["lattice", "neighbours", "weights", "young"])]
+    #[arg(
+        value_parser = FileName::SCENE,
+        hide_possible_values = true,
+        conflicts_with_all = ["lattice", "neighbours", "weights", "young"]
+    )]
     scene: Option<String>,
     /// Override a key of the scene, as in `flockform run`
     #[arg(long = "set", value_name = "KEY.PATH=VALUE", requires = "scene")]
@@ -118,7 +123,7 @@ pub struct WrongOption {
     help: String,
 }
 
-fn wrong(option: &'static str, message: impl Into<String>, help: impl Into<String>) -> WrongOption {
+pub fn wrong(option: &'static str, message: impl Into<String>, help: impl Into<String>) -> WrongOption {
     WrongOption { option, message: message.into(), help: help.into() }
 }
 

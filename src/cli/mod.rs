@@ -1,14 +1,18 @@
 //! The command line: commands, options, and the function behind each.
 
+mod bundle;
 mod checkpoint;
 mod compare;
+mod completions;
 mod gallery;
 mod install;
 mod interrupt;
 pub mod log;
 mod material;
+mod names;
 mod node;
 mod output;
+mod plan;
 mod progress;
 mod recording;
 mod replay;
@@ -17,21 +21,20 @@ mod stability;
 mod study;
 mod supervise;
 mod swarm;
+mod sweep;
 mod trade;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::error::{ContextKind, ContextValue};
-use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
+use clap::{Parser, Subcommand};
 use clap_complete::Shell;
-use flockform::continuum::report::PlanReport;
 use flockform::ros::arguments::{RosArgumentError, RosArguments};
 use flockform::ros::edge::escaped;
 use flockform::ros::node::NodeError;
-use flockform::scene::{self, Bundled, Scene, SceneError, bundled};
+use flockform::scene::{self, SceneError};
 use flockform::shm::ShmError;
-use flockform::study::compare::run::plan;
 use flockform::{bench, export};
 use node::Transport;
 
@@ -73,6 +76,16 @@ pub enum Command {
         after_help = "Example:\n  flockform trade grips --out /tmp/trade\n  flockform trade beam-loaded --max-particles 5000"
     )]
     Trade(trade::TradeArguments),
+    /// Runs a scene with many values of its keys, in parallel: one table, one figure
+    #[command(
+        after_help = "Examples:\n  flockform sweep tension --vary 'roles[1].motion.per_step=[[0.3, 0.0], [0.6, 0.0]]'\n  \
+                      flockform sweep tension --vary rule.feedback.factor=-0.2:0:5 --vary stop.steps=100:400:4 --outputs energies.pe1,probe.67.ux@60\n  \
+                      flockform sweep beam --vary material.poisson=0:0.45 --samples 40 --seed 1 --shard 1/4 --out part-1\n  \
+                      flockform sweep --resume part-1\n  \
+                      flockform sweep --merge part-1 part-2 part-3 part-4 --out all\n\n\
+                      Exit codes: 0 all runs ended, 1 interrupted or some refused, 2 bad input."
+    )]
+    Sweep(sweep::SweepArguments),
     /// Predicts and measures when a scene's body grows instead of coming to rest, and tests extreme input
     #[command(
         after_help = "Example:\n  flockform stability tension --out /tmp/stability\n  flockform stability beam --set update.damping=0.7 --no-extremes\n\n\
@@ -108,14 +121,21 @@ pub enum Command {
     )]
     Gallery(gallery::GalleryArguments),
     /// Lists the bundled scenes or swarms, one a line
-    #[command(after_help = "Examples:\n  flockform list scenes\n  flockform list swarms")]
-    List {
-        /// Kind of file to list
-        what: Listed,
-    },
-    /// Shows what a scene makes the program model and what it leaves out, without running it
-    #[command(after_help = "Example:\n  flockform plan fracture --set lattice.a=5.0")]
-    Plan(SceneArguments),
+    #[command(after_help = "Examples:\n  flockform list scenes\n  flockform list swarms --json")]
+    List(bundle::ListArguments),
+    /// Prints the file of a bundled scene or swarm as it is
+    #[command(after_help = "Examples:\n  flockform show tension\n  flockform show square > my_swarm.toml")]
+    Show(bundle::ShowArguments),
+    /// Writes a scene or swarm file to begin with
+    #[command(
+        after_help = "Examples:\n  flockform new scene plate --from plate-hole && flockform run plate.toml\n  flockform new swarm patrol"
+    )]
+    New(bundle::NewArguments),
+    /// Shows what a scene makes the program model, or the margins and speeds of a swarm, without running it
+    #[command(
+        after_help = "Examples:\n  flockform plan fracture --set lattice.a=5.0\n  flockform plan square --set control.sweeps=1"
+    )]
+    Plan(plan::PlanArguments),
     /// Computes which material a rule is, or which weights a material takes
     #[command(
         after_help = "Examples:\n  flockform material --lattice square\n  flockform material --lattice hexagonal --neighbours second\n  \
@@ -147,13 +167,6 @@ pub enum Command {
     /// Measures how fast this machine runs the rules
     #[command(subcommand)]
     Bench(BenchCommand),
-}
-
-/// The kinds of file that `list` lists.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-pub enum Listed {
-    Scenes,
-    Swarms,
 }
 
 /// Commands and options that had another name once.
@@ -213,47 +226,6 @@ pub enum BenchCommand {
     },
 }
 
-/// A scene and the changes to it.
-#[derive(Debug, Args)]
-pub struct SceneArguments {
-    /// Name of a bundled scene (see `flockform list scenes`) or path of a scene file
-    pub scene: String,
-    /// Override a key of the scene, validated like the file: `lattice.spacing=0.5`, `roles[1].from=30`
-    #[arg(long = "set", value_name = "KEY.PATH=VALUE")]
-    pub set: Vec<String>,
-}
-
-impl SceneArguments {
-    fn load(&self, more: impl IntoIterator<Item = String>) -> Result<Scene, Refusal> {
-        let more: Vec<String> = more.into_iter().collect();
-        if bundled(&self.scene).is_none() {
-            scene_path("scene", &self.scene, bundled::SCENES)?;
-        }
-        Ok(self.load_scene(&more)?)
-    }
-
-    /// The scene with these overrides after the user's own.
-    fn load_scene(&self, more: &[String]) -> Result<Scene, SceneError> {
-        let overrides = [&self.set, more].concat();
-        match bundled(&self.scene) {
-            Some(bundled) => bundled.load(&overrides),
-            None => Scene::from_file(Path::new(&self.scene), &overrides),
-        }
-    }
-}
-
-/// A word as a path; one that is no file is taken for a misspelt name of a bundled file.
-fn scene_path(what: &'static str, word: &str, all: &[Bundled]) -> Result<PathBuf, Refusal> {
-    let path = PathBuf::from(word);
-    if path.exists() || word.contains(['/', '\\', '.']) {
-        return Ok(path);
-    }
-    let likeness = |name: &str| strsim::jaro_winkler(name, word);
-    let names = all.iter().map(|one| one.name);
-    let nearest = names.max_by(|a, b| likeness(a).total_cmp(&likeness(b))).unwrap_or_default();
-    Err(Refusal::NotBundled { what, name: word.to_owned(), nearest })
-}
-
 /// Reason why a command refused its input.
 #[derive(Debug, thiserror::Error)]
 pub enum Refusal {
@@ -280,11 +252,27 @@ pub enum Refusal {
     #[error("{0}")]
     Record(#[from] flockform::record::RecordError),
     #[error("{0}")]
+    Design(#[from] flockform::study::design::DesignError),
+    #[error("{0}")]
+    Output(#[from] export::sweep::OutputError),
+    #[error("{0}")]
+    Sweep(#[from] export::sweep::SweepError),
+    #[error("{0}")]
     Checkpoint(#[from] export::checkpoint::CheckpointError),
     #[error(
         "there is no {what} file and no bundled {what} `{name}`\n  help: the nearest bundled {what} is `{nearest}`; `flockform list {what}s` lists them all"
     )]
     NotBundled { what: &'static str, name: String, nearest: &'static str },
+    #[error("`{name}` is a {kind}\n  help: `flockform {command} {name}`")]
+    OtherKind { name: String, kind: &'static str, command: &'static str },
+    #[error(
+        "`{name}` cannot be the name of a {kind} file\n  help: give letters, digits, `-` and `_`, with a folder before them if need be"
+    )]
+    NewName { name: String, kind: &'static str },
+    #[error("{} is there already\n  help: give another name, or remove it first", .0.display())]
+    Exists(PathBuf),
+    #[error("cannot write {}: {source}", .path.display())]
+    NewFile { path: PathBuf, source: std::io::Error },
     #[error(
         "`{name}` left no report for the gallery: {reason}\n  help: run it alone to see why, or name the others"
     )]
@@ -376,31 +364,22 @@ pub fn dispatch(command: Command, ros: &RosArguments) -> Result<ExitCode, Refusa
         Command::Run(arguments) => return run::run(&arguments),
         Command::Compare(arguments) => return compare::compare(&arguments),
         Command::Trade(arguments) => return trade::trade(&arguments),
+        Command::Sweep(arguments) => return sweep::sweep(&arguments),
         Command::Stability(arguments) => return stability::stability(&arguments),
         Command::Swarm(arguments) => return swarm::swarm(&arguments),
         Command::Replay(arguments) => return replay::replay(&arguments),
         Command::Node(arguments) => return node::node(&arguments, ros),
         Command::Robots(arguments) => return node::robots(&arguments, ros),
-        Command::List { what: Listed::Scenes } => {
-            list(bundled::SCENES, |scene| Ok(scene.load(&[])?.raw.title))?
-        }
-        Command::List { what: Listed::Swarms } => {
-            list(bundled::SWARMS, |swarm| Ok(swarm.load_swarm(&[])?.raw.title))?;
-        }
+        Command::List(arguments) => bundle::list(&arguments)?,
+        Command::Show(arguments) => bundle::show(&arguments)?,
+        Command::New(arguments) => bundle::new(&arguments)?,
         Command::Gallery(arguments) => return gallery::gallery(&arguments),
         Command::Install(arguments) => return install::install(&arguments),
-        Command::Plan(arguments) => {
-            let scene = arguments.load([])?;
-            say(&PlanReport::new(&scene, &plan(&scene)?)?.to_string());
-        }
+        Command::Plan(arguments) => plan::plan(&arguments)?,
         Command::Material(arguments) => say(&material::answer(&arguments)?),
         Command::Schema { swarm: false } => print(&format!("{:#}\n", scene::validate::schema())),
         Command::Schema { swarm: true } => print(&format!("{:#}\n", scene::swarm::schema())),
-        Command::Completions { shell } => {
-            let mut script = Vec::new();
-            clap_complete::generate(shell, &mut Arguments::command(), "flockform", &mut script);
-            print(&String::from_utf8_lossy(&script));
-        }
+        Command::Completions { shell } => print(&completions::script(shell)),
         Command::Bench(BenchCommand::Sweep { json, quick }) => {
             let report = bench::sweep::run(&bench::sweep::Options { quick })?;
             print(&if json { format!("{}\n", serde_json::json!(report)) } else { report.to_string() });
@@ -426,14 +405,6 @@ pub fn dispatch(command: Command, ros: &RosArguments) -> Result<ExitCode, Refusa
         }
     }
     Ok(ExitCode::SUCCESS)
-}
-
-fn list(all: &[Bundled], title: impl Fn(&Bundled) -> Result<String, SceneError>) -> Result<(), SceneError> {
-    let width = all.iter().map(|one| one.name.len()).max().unwrap_or(0);
-    for one in all {
-        print(&format!("{:width$}  {}\n", one.name, title(one)?));
-    }
-    Ok(())
 }
 
 /// Prints words, some of which may come from files: no control character of theirs reaches the terminal.

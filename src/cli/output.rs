@@ -1,9 +1,11 @@
 //! Where a command's results go, and how much it says.
 
 use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
 
 use clap::{Args, ValueEnum};
 use flockform::export::figures::Formats;
+use flockform::export::report::page;
 use flockform::export::{ExportError, OutputFolder};
 
 use super::interrupt;
@@ -21,12 +23,46 @@ pub struct OutputArguments {
     pub force: bool,
 }
 
-/// Whether there shall be a report.html.
+/// Whether there shall be a report.html, and whether it is shown.
 #[derive(Debug, Args)]
 pub struct ReportArguments {
     /// Write no report.html, and keep no frames for it
     #[arg(long)]
     pub no_report: bool,
+    /// Open report.html at the end, with the program that this computer opens such files with
+    #[arg(long, conflicts_with = "no_report")]
+    open: bool,
+}
+
+impl ReportArguments {
+    /// Opens the report in a finished folder if that is asked for; a computer without an opener is no failure.
+    pub fn show(&self, folder: &Path) {
+        let report = folder.join(page::FILE);
+        if !self.open || !report.is_file() {
+            return;
+        }
+        if let Err(error) =
+            opener(&report).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn()
+        {
+            eprintln!("cannot open {}: {error}; open it by hand", report.display());
+        }
+    }
+}
+
+/// The command by which the platform opens a file, a page in the browser.
+fn opener(file: &Path) -> Command {
+    let mut command = match std::env::consts::OS {
+        "macos" => Command::new("open"),
+        "windows" => {
+            let mut command = Command::new("cmd");
+            // The first word in quotes would be a title.
+            command.args(["/C", "start", ""]);
+            command
+        }
+        _ => Command::new("xdg-open"),
+    };
+    command.arg(file);
+    command
 }
 
 /// Which figures there shall be.

@@ -5,7 +5,6 @@ mod recorder;
 mod words;
 
 use std::ops::ControlFlow;
-use std::path::Path;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
@@ -18,7 +17,7 @@ use flockform::export::report;
 use flockform::export::{Drawing, OutputFolder, Results, Timings, write_all};
 use flockform::record::About;
 use flockform::record::body::BodyMessages;
-use flockform::scene::{LoadSteps, Scene, bundled};
+use flockform::scene::{LoadSteps, Scene};
 use flockform::shm::Domain;
 use flockform::shm::positions::Positions;
 use flockform::solve::interrupt::Interrupt;
@@ -29,15 +28,16 @@ use recorder::{Recorder, Records};
 use words::{closing_words, where_to_look};
 
 use super::checkpoint::{CheckpointArguments, Checkpointer, ResumedRun};
+use super::names::{FileName, SceneArguments, in_full};
 use super::output::{FigureArguments, OutputArguments, ReportArguments};
 use super::progress::{Drawn, Progress};
 use super::recording::{RecordArguments, close};
-use super::{FAILED, Refusal, SceneArguments, interrupt, say};
+use super::{FAILED, Refusal, interrupt, print, say};
 
 #[derive(Debug, Args)]
 pub struct RunArguments {
     /// Name of a bundled scene (see `flockform list scenes`) or path of a scene file; not with --resume
-    #[arg(required_unless_present = "resume")]
+    #[arg(required_unless_present = "resume", value_parser = FileName::SCENE, hide_possible_values = true)]
     scene: Option<String>,
     /// Override a key of the scene, validated like the file: `lattice.spacing=0.5`, `roles[1].from=30`
     #[arg(long = "set", value_name = "KEY.PATH=VALUE", requires = "scene")]
@@ -61,6 +61,9 @@ pub struct RunArguments {
     /// Show the positions after every step to other processes, as flockform/NAME/positions in shared memory
     #[arg(long, value_name = "NAME")]
     publish: Option<String>,
+    /// Print the summary as JSON, as in summary.json, instead of words
+    #[arg(long, conflicts_with = "quiet")]
+    json: bool,
 }
 
 /// Runs a scene and writes what comes of it.
@@ -163,13 +166,18 @@ fn run_here(arguments: &RunArguments) -> Result<ExitCode, Refusal> {
     if !is_interrupted {
         checkpoint::remove(&kept);
     }
-    if !arguments.output.quiet {
+    if arguments.json {
+        print(&format!("{:#}\n", serde_json::json!(summary)));
+    } else if !arguments.output.quiet {
         say(&words);
         say(&(closing_words(&scene, &outcome, &summary, elapsed) + &where_to_look(&kept) + &recorded));
     }
     if interrupt::is_raised() && !is_interrupted {
         eprintln!("interrupted: figures are missing, the rest is written");
         return Ok(ExitCode::from(FAILED));
+    }
+    if !is_interrupted {
+        arguments.report.show(&kept);
     }
     Ok(exit_code(&outcome))
 }
@@ -186,13 +194,9 @@ impl RunArguments {
             (None, Some(left)) => left.checkpoint.asked.clone(),
             (None, None) => unreachable!("a scene is required without --resume"),
             (Some(scene), _) => {
-                let place = Path::new(scene);
-                let in_full = std::path::absolute(place).ok().filter(|_| place.exists());
-                let is_path = bundled(scene).is_none();
-                let named = in_full.filter(|_| is_path).map(|path| path.display().to_string());
                 let steps = self.steps.map(|steps| format!("stop.steps={steps}"));
                 let set = self.set.iter().cloned().chain(steps).collect();
-                RunRequest { scene: named.unwrap_or_else(|| scene.clone()), set, force }
+                RunRequest { scene: in_full(scene), set, force }
             }
         }
     }

@@ -5,8 +5,9 @@ use std::path::PathBuf;
 use clap::Args;
 use flockform::export::{ExportError, OutputFolder};
 
+use super::names::SceneArguments;
 use super::output::{OutputArguments, ReportArguments};
-use super::{Refusal, SceneArguments, interrupt, print, say};
+use super::{Refusal, interrupt, print, say};
 
 #[derive(Debug, Args)]
 pub struct StudyArguments {
@@ -39,6 +40,7 @@ impl StudyArguments {
         } else if !self.output.quiet {
             say(&format!("{}results in {}\n", table(), kept.display()));
         }
+        self.report.show(&kept);
         Ok(())
     }
 }

@@ -12,18 +12,20 @@ use flockform::export::flight::write_flight;
 use flockform::export::report::{self, FlightRecorder};
 use flockform::record::About;
 use flockform::record::flight::FlightMessages;
-use flockform::scene::bundled::{self, bundled_swarm};
+use flockform::scene::bundled::bundled_swarm;
 use flockform::scene::swarm::Swarm;
 use flockform::swarm::flight::{Flight, FlightReport, fly_heard};
 
+use super::names::{FileName, Kind};
 use super::output::{OutputArguments, ReportArguments};
 use super::recording::{RecordArguments, close};
-use super::{FAILED, Refusal, interrupt, print, say, scene_path};
+use super::{FAILED, Refusal, interrupt, print, say};
 
 /// A swarm and the changes to it.
 #[derive(Debug, Args)]
 pub struct SwarmFileArguments {
     /// Name of a bundled swarm (see `flockform list swarms`) or path of a swarm file
+    #[arg(value_parser = FileName::SWARM, hide_possible_values = true)]
     pub swarm: String,
     /// Override a key of the swarm, validated like the file: `limits.speed=0.5`, `leaders[0].program.kind=external`
     #[arg(long = "set", value_name = "KEY.PATH=VALUE")]
@@ -35,8 +37,9 @@ impl SwarmFileArguments {
         if let Some(bundled) = bundled_swarm(&self.swarm) {
             return Ok(bundled.load_swarm(&self.set)?);
         }
-        let path = scene_path("swarm", &self.swarm, bundled::SWARMS)?;
-        Ok(Swarm::from_file(Path::new(&path), &self.set)?)
+        let path = Kind::Swarm.path(&self.swarm)?;
+        Swarm::from_file(&path, &self.set)
+            .map_err(|error| Kind::Swarm.refuse_other(&self.swarm).unwrap_or(error.into()))
     }
 
     /// The description of the swarm for a recording.
@@ -115,6 +118,9 @@ pub fn swarm(arguments: &SwarmArguments) -> Result<ExitCode, Refusal> {
         say(&(words(&report, seconds, &kept) + &recorded));
     }
     let broken_off = interrupted.load(Ordering::Relaxed);
+    if !broken_off {
+        arguments.report.show(&kept);
+    }
     Ok(if report.holds() && !broken_off { ExitCode::SUCCESS } else { ExitCode::from(FAILED) })
 }
 

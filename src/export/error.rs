@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use super::manifest;
+use super::{manifest, sweep};
 
 /// Why outputs were not written.
 #[derive(Debug, thiserror::Error)]
@@ -36,8 +36,8 @@ pub enum ExportError {
     Unnamed(PathBuf),
     /// An unfinished run that would be discarded.
     #[error(
-        "{} holds a run that was not finished: continue it with `flockform run --resume {}`, discard it with --force, or give another --out",
-        .0.display(), .0.display()
+        "{} holds a {command} that was not finished: continue it with `flockform {command} --resume {}`, discard it with --force, or give another --out",
+        .0.display(), .0.display(), command = resumed_by(.0)
     )]
     Unfinished(PathBuf),
     /// Another program is writing the same outputs.
@@ -89,6 +89,11 @@ fn of_the_system(error: io::Error) -> io::Error {
         _ => None,
     });
     code.map_or(error, io::Error::from_raw_os_error)
+}
+
+/// The command that goes on with what an unfinished folder holds.
+fn resumed_by(unfinished: &Path) -> &'static str {
+    if unfinished.join(sweep::REQUEST).exists() { "sweep" } else { "run" }
 }
 
 fn list(paths: &[PathBuf]) -> String {

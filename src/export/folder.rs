@@ -15,9 +15,9 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::checkpoint;
 use super::error::ExportError;
 use super::manifest::{NotOurs, Ours, Written};
+use super::{checkpoint, sweep};
 
 /// A folder being filled. Dropped without [`OutputFolder::commit`] or [`OutputFolder::keep_unfinished`], it
 /// leaves nothing behind.
@@ -205,7 +205,7 @@ fn require_free(out: &Path, force: bool) -> Result<(), ExportError> {
 
 /// Discards a run that was killed, where that is asked for.
 fn make_way(unfinished: &Path, force: bool) -> Result<(), ExportError> {
-    if !unfinished.join(checkpoint::FILE).exists() {
+    if ![checkpoint::FILE, sweep::REQUEST].iter().any(|file| unfinished.join(file).exists()) {
         return Ok(());
     }
     if !force {

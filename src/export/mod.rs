@@ -19,7 +19,7 @@
 //! A page for people to look at is written beside them ([`report`]), and a gallery of such pages.
 //!
 //! A flight (`flight`, feature `swarm`), a comparison with the truth (`comparison`, feature `fem`) have folders of their own, and so has a study of
-//! what grows (`stability`).
+//! what grows (`stability`) and a parameter sweep ([`sweep`]).
 //!
 //! Frames are written while the run goes on, since a long run cannot keep them ([`VtkSeries`]); the
 //! rest comes at the end, by [`write_all`]:
@@ -67,6 +67,7 @@ pub(crate) mod manifest;
 pub mod report;
 pub mod stability;
 mod summary;
+pub mod sweep;
 #[cfg(feature = "fem")]
 pub mod trade;
 #[cfg(all(feature = "bench", feature = "shm"))]
@@ -83,6 +84,7 @@ use rayon::prelude::*;
 use crate::continuum::mechanics::Stresses;
 use crate::continuum::record::{LoadStep, ProbeSeries, Snapshot};
 use crate::continuum::run::Outcome;
+use crate::engine::Engine;
 use crate::flock::strain::Strain;
 use crate::flock::vectors::Vectors;
 use crate::scene::Scene;
@@ -141,8 +143,8 @@ pub fn write_all(
     let start = Instant::now();
     let engine = &results.outcome.engine;
     let last = Snapshot::of(engine);
-    let strains: Vec<_> = (0..engine.body().count()).into_par_iter().map(|i| engine.strain(i)).collect();
-    let largest_strain = strains.iter().flatten().map(Strain::largest).reduce(f64::max);
+    let strains = strains(engine);
+    let largest_strain = largest(&strains);
     let stresses = results.scene.material.as_ref().and_then(|elastic| Stresses::at_present(engine, elastic));
     let of_particles = stresses.as_ref().map(|stresses| &stresses.particles[..]);
     let mut written = vec![csv::write_final(folder, engine.body(), &last, &strains, of_particles)?];
@@ -168,6 +170,16 @@ pub fn write_all(
     let summary = Summary::new(results.scene, results.outcome, &last, largest_strain, timings);
     written.push(summary.write(folder)?);
     Ok((written, summary))
+}
+
+/// The strain of each particle's surroundings; `None` where it sees too few.
+fn strains(engine: &Engine) -> Vec<Option<Strain>> {
+    (0..engine.body().count()).into_par_iter().map(|i| engine.strain(i)).collect()
+}
+
+/// The strain largest in size.
+fn largest(strains: &[Option<Strain>]) -> Option<f64> {
+    strains.iter().flatten().map(Strain::largest).reduce(f64::max)
 }
 
 /// A figure still to be drawn, and its file without ending.

@@ -8,7 +8,7 @@ use std::time::Duration;
 use serde::Serialize;
 
 use super::error::{ExportError, write_file};
-use super::{OutputFolder, bonds};
+use super::{OutputFolder, bonds, largest, strains};
 use crate::continuum::mechanics::{Mechanics, Peak};
 use crate::continuum::places::{AtPlace, at_places};
 use crate::continuum::record::Snapshot;
@@ -178,6 +178,12 @@ pub struct Seconds {
 }
 
 impl Summary {
+    /// The summary of a run of which nothing else is written.
+    pub fn of_end(scene: &Scene, outcome: &Outcome, timings: Timings) -> Self {
+        let largest_strain = largest(&strains(&outcome.engine));
+        Self::new(scene, outcome, &Snapshot::of(&outcome.engine), largest_strain, timings)
+    }
+
     /// `last` is the configuration at the end.
     pub fn new(
         scene: &Scene,

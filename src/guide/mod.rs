@@ -2,7 +2,7 @@
 //!
 //! | guide | subject |
 //! |---|---|
-//! | [`scenes`] | the scene file: lattice, body, neighbours, rule, roles, motions; the bundled scenes |
+//! | [`scenes`] | the scene file: lattice, body, neighbours, rule, roles, motions; parameter sweeps; the bundled scenes |
 //! | [`materials`] | rules that are a material: loads, outlines, load steps, reactions and stresses |
 //! | [`accuracy`] | rules against finite elements, what an accuracy costs, when a body grows |
 //! | [`fracture`] | bonds that break, cuts, ghosts |

@@ -10,6 +10,7 @@ pub mod control;
 pub mod flight;
 pub mod formation;
 pub mod pace;
+pub mod plan;
 pub mod resilience;
 pub mod robots;
 pub mod safety;

@@ -2,6 +2,7 @@
 
 #![cfg(feature = "cli")]
 
+mod beginnings;
 mod checkpoint;
 #[path = "../common/command.rs"]
 mod command;
@@ -24,5 +25,6 @@ mod run;
 mod signals;
 mod stability;
 mod swarm;
+mod sweep;
 #[path = "../common/waits.rs"]
 mod waits;

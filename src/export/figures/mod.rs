@@ -22,6 +22,7 @@ mod png;
 mod raster;
 mod stress;
 mod svg;
+pub(crate) mod sweep;
 mod ticks;
 mod von_mises;
 

@@ -1,0 +1,186 @@
+//! Scene and swarm files, by the name of a bundled one or by path.
+
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
+
+use clap::builder::{PossibleValue, StringValueParser, TypedValueParser};
+use clap::{Args, ValueEnum};
+use flockform::scene::bundled::bundled_swarm;
+use flockform::scene::{self, Bundled, Scene, SceneError, bundled};
+
+use super::Refusal;
+
+/// The kinds of file that the program reads.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Kind {
+    /// A body
+    Scene,
+    /// A formation of robots
+    Swarm,
+}
+
+impl Kind {
+    pub const ALL: [Kind; 2] = [Kind::Scene, Kind::Swarm];
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Kind::Scene => "scene",
+            Kind::Swarm => "swarm",
+        }
+    }
+
+    /// The command that runs such a file.
+    pub fn command(self) -> &'static str {
+        match self {
+            Kind::Scene => "run",
+            Kind::Swarm => "swarm",
+        }
+    }
+
+    pub fn bundled(self) -> &'static [Bundled] {
+        match self {
+            Kind::Scene => bundled::SCENES,
+            Kind::Swarm => bundled::SWARMS,
+        }
+    }
+
+    fn other(self) -> Self {
+        match self {
+            Kind::Scene => Kind::Swarm,
+            Kind::Swarm => Kind::Scene,
+        }
+    }
+
+    /// Number of the keys that a file of this kind has at its top level.
+    fn keys_of(self, file: &toml::Table) -> usize {
+        let schema = match self {
+            Kind::Scene => scene::validate::schema(),
+            Kind::Swarm => scene::swarm::schema(),
+        };
+        file.keys().filter(|key| schema["properties"].get(key.as_str()).is_some()).count()
+    }
+
+    /// The kind of the bundled file of this name, or of the file at this path; by its keys, unless it has as many of
+    /// both kinds.
+    pub fn of(word: &str) -> Option<Self> {
+        let is_bundled = |kind: &Kind| kind.bundled().iter().any(|one| one.name == word);
+        if let Some(kind) = Kind::ALL.into_iter().find(is_bundled) {
+            return Some(kind);
+        }
+        let file: toml::Table = std::fs::read_to_string(word).ok()?.parse().ok()?;
+        let [scene, swarm] = Kind::ALL.map(|kind| kind.keys_of(&file));
+        match scene.cmp(&swarm) {
+            std::cmp::Ordering::Greater => Some(Kind::Scene),
+            std::cmp::Ordering::Less => Some(Kind::Swarm),
+            std::cmp::Ordering::Equal => None,
+        }
+    }
+
+    /// The error that names the kind of a file that is of the other one.
+    pub fn refuse_other(self, word: &str) -> Option<Refusal> {
+        let other = self.other();
+        let (kind, command) = (other.name(), other.command());
+        (Kind::of(word) == Some(other)).then(|| Refusal::OtherKind { name: word.to_owned(), kind, command })
+    }
+
+    /// A word as a path; one that is no file is taken for a misspelt name of a bundled file.
+    ///
+    /// # Errors
+    /// A bundled file of the other kind, or neither file nor name.
+    pub fn path(self, word: &str) -> Result<PathBuf, Refusal> {
+        if is_path(word) {
+            return Ok(PathBuf::from(word));
+        }
+        Err(self.refuse_other(word).unwrap_or_else(|| not_bundled(&[self], word)))
+    }
+}
+
+/// Whether a word is a path rather than a name: one that is there, or looks like one.
+pub fn is_path(word: &str) -> bool {
+    Path::new(word).exists() || word.contains(['/', '\\', '.'])
+}
+
+/// The error for a word that is no name of a bundled file of these kinds.
+pub fn not_bundled(kinds: &[Kind], word: &str) -> Refusal {
+    let all = kinds.iter().flat_map(|&kind| kind.bundled().iter().map(move |one| (kind, one.name)));
+    let likeness = |name: &str| strsim::jaro_winkler(name, word);
+    let nearest = all.max_by(|(_, a), (_, b)| likeness(a).total_cmp(&likeness(b)));
+    let (kind, nearest) = nearest.unwrap_or((Kind::Scene, ""));
+    Refusal::NotBundled { what: kind.name(), name: word.to_owned(), nearest }
+}
+
+/// A word on the command line that names a bundled file or is a path; shells complete the names.
+#[derive(Clone, Debug)]
+pub struct FileName(&'static [Kind]);
+
+impl FileName {
+    pub const SCENE: Self = Self(&[Kind::Scene]);
+    pub const SWARM: Self = Self(&[Kind::Swarm]);
+    pub const ANY: Self = Self(&Kind::ALL);
+}
+
+impl TypedValueParser for FileName {
+    type Value = String;
+
+    fn parse_ref(
+        &self,
+        command: &clap::Command,
+        argument: Option<&clap::Arg>,
+        value: &OsStr,
+    ) -> Result<String, clap::Error> {
+        StringValueParser::new().parse_ref(command, argument, value)
+    }
+
+    fn possible_values(&self) -> Option<Box<dyn Iterator<Item = PossibleValue> + '_>> {
+        let names = self.0.iter().flat_map(|kind| kind.bundled()).map(|one| one.name);
+        Some(Box::new(names.map(PossibleValue::new)))
+    }
+}
+
+/// A scene and the changes to it.
+#[derive(Debug, Args)]
+pub struct SceneArguments {
+    /// Name of a bundled scene (see `flockform list scenes`) or path of a scene file
+    #[arg(value_parser = FileName::SCENE, hide_possible_values = true)]
+    pub scene: String,
+    /// Override a key of the scene, validated like the file: `lattice.spacing=0.5`, `roles[1].from=30`
+    #[arg(long = "set", value_name = "KEY.PATH=VALUE")]
+    pub set: Vec<String>,
+}
+
+impl SceneArguments {
+    pub fn load(&self, more: impl IntoIterator<Item = String>) -> Result<Scene, Refusal> {
+        let more: Vec<String> = more.into_iter().collect();
+        if bundled(&self.scene).is_none() {
+            Kind::Scene.path(&self.scene)?;
+        }
+        self.load_scene(&more).map_err(|error| Kind::Scene.refuse_other(&self.scene).unwrap_or(error.into()))
+    }
+
+    /// The scene with these overrides after the user's own.
+    pub fn load_scene(&self, more: &[String]) -> Result<Scene, SceneError> {
+        let overrides = [&self.set, more].concat();
+        match bundled(&self.scene) {
+            Some(bundled) => bundled.load(&overrides),
+            None => Scene::from_file(Path::new(&self.scene), &overrides),
+        }
+    }
+}
+
+/// The text of a bundled file and its kind.
+///
+/// # Errors
+/// A name that no bundled file has.
+pub fn bundled_file(name: &str) -> Result<(Kind, Bundled), Refusal> {
+    let scene = bundled(name).map(|one| (Kind::Scene, one));
+    let found = scene.or_else(|| bundled_swarm(name).map(|one| (Kind::Swarm, one)));
+    found.ok_or_else(|| not_bundled(&Kind::ALL, name))
+}
+
+/// A scene's name as it is, or its path in full, for a command that is gone on with from another folder.
+pub fn in_full(scene: &str) -> String {
+    let place = Path::new(scene);
+    let is_path = bundled(scene).is_none() && place.exists();
+    let path = std::path::absolute(place).ok().filter(|_| is_path);
+    path.map_or_else(|| scene.to_owned(), |path| path.display().to_string())
+}

@@ -1,0 +1,65 @@
+//! `flockform plan`: a scene or a swarm before it runs.
+
+use clap::Args;
+use flockform::continuum::plan::Plan;
+use flockform::continuum::report::PlanReport;
+use flockform::study::compare::run::plan as plan_of;
+use flockform::swarm::plan::SwarmPlan;
+use serde_json::{Value, json};
+
+use super::names::{FileName, Kind, SceneArguments, is_path, not_bundled};
+use super::swarm::SwarmFileArguments;
+use super::{Refusal, print, say};
+
+#[derive(Debug, Args)]
+pub struct PlanArguments {
+    /// Name of a bundled scene or swarm (see `flockform list`) or path of a file of either kind
+    #[arg(value_parser = FileName::ANY, hide_possible_values = true)]
+    file: String,
+    /// Override a key of the file, validated like the file: `lattice.spacing=0.5`, `roles[1].from=30`
+    #[arg(long = "set", value_name = "KEY.PATH=VALUE")]
+    set: Vec<String>,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// Plans a scene or a swarm and prints the plan; a file of neither kind is refused as a scene.
+pub fn plan(arguments: &PlanArguments) -> Result<(), Refusal> {
+    let PlanArguments { file, set, json } = arguments;
+    let (words, value) = match Kind::of(file) {
+        Some(Kind::Swarm) => {
+            let swarm = SwarmFileArguments { swarm: file.clone(), set: set.clone() }.load()?;
+            let plan = SwarmPlan::new(&swarm)?;
+            (plan.to_string(), json!(plan))
+        }
+        None if !is_path(file) => return Err(not_bundled(&Kind::ALL, file)),
+        Some(Kind::Scene) | None => {
+            let scene = SceneArguments { scene: file.clone(), set: set.clone() }.load([])?;
+            let plan = plan_of(&scene)?;
+            let report = PlanReport::new(&scene, &plan)?;
+            (report.to_string(), scene_json(&scene.name, &plan, &report))
+        }
+    };
+    match json {
+        true => print(&format!("{value:#}\n")),
+        false => say(&words),
+    }
+    Ok(())
+}
+
+fn scene_json(name: &str, plan: &Plan, report: &PlanReport) -> Value {
+    let pairs = |pairs: &[(String, String)], [left, right]: [&str; 2]| -> Value {
+        pairs.iter().map(|(a, b)| json!({ left: a.trim_start(), right: b })).collect()
+    };
+    json!({
+        "name": name,
+        "title": report.title,
+        "particles": plan.count(),
+        "steps": plan.stop.steps,
+        "facts": pairs(&report.facts, ["name", "value"]),
+        "models": pairs(&report.modelled, ["effect", "key"]),
+        "leaves_out": pairs(&report.left_out, ["key", "reason"]),
+        "cautions": report.cautions,
+    })
+}

@@ -1,0 +1,292 @@
+//! `flockform sweep`: a scene with many values of its keys, one table and one figure.
+
+mod runs;
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Instant;
+
+use clap::{Args, ValueEnum};
+use flockform::export::sweep::{
+    Begun, Found, Journal, Output, Row, SweepError, SweepRequest, Table, read, write_sweep,
+};
+use flockform::export::{ExportError, OutputFolder};
+use flockform::scene::Scene;
+use flockform::study::design::{Design, Sampling, Shard};
+use runs::Runs;
+
+use super::material::wrong;
+use super::names::{FileName, SceneArguments, in_full};
+use super::output::{FigureArguments, OutputArguments};
+use super::{FAILED, Refusal, interrupt, print, say};
+
+#[derive(Debug, Args)]
+pub struct SweepArguments {
+    /// Name of a bundled scene (see `flockform list scenes`) or path of a scene file; not with --resume or --merge
+    #[arg(
+        required_unless_present_any = ["resume", "merge"],
+        value_parser = FileName::SCENE,
+        hide_possible_values = true
+    )]
+    scene: Option<String>,
+    /// Override a key of the scene in every run, validated like the file
+    #[arg(long = "set", value_name = "KEY.PATH=VALUE", requires = "scene")]
+    set: Vec<String>,
+    /// Vary a key: FROM:TO:COUNT (a grid; with :log by ratios), [VALUE, ...], or FROM:TO with --samples. Keys given
+    /// together make every combination
+    #[arg(long, value_name = "KEY.PATH=VALUES", requires = "scene", required_unless_present_any = ["resume", "merge"])]
+    vary: Vec<String>,
+    /// Draw so many runs from the ranges and lists instead of making every combination
+    #[arg(long, value_name = "N", requires = "scene", value_parser = clap::value_parser!(u32).range(1..))]
+    samples: Option<u32>,
+    /// How samples are drawn
+    #[arg(long, value_enum, default_value_t, requires = "samples")]
+    sampling: Sampled,
+    /// Seed of the samples: the same seed draws the same runs
+    #[arg(long, value_name = "S", default_value_t, requires = "samples")]
+    seed: u64,
+    /// Keys of summary.json, and probe.ID.QUANTITY@STEP with x, y, ux, uy, pe1 or pe2, separated by commas
+    /// [default: energy, strain, residual, steps; of a material strain energy and largest stress too]
+    #[arg(long, value_name = "KEY", value_delimiter = ',', requires = "scene")]
+    outputs: Vec<String>,
+    /// Output to draw [default: over one key those that vary, up to four; over more the first of them]
+    #[arg(long, value_name = "KEY")]
+    plot: Option<String>,
+    /// Make only every Nth run, from the Ith on: part I of N, to be merged with the others
+    #[arg(long, value_name = "I/N", requires = "scene")]
+    shard: Option<String>,
+    /// Threads to use [default: the machine's]; the table is the same for any number
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    threads: Option<u16>,
+    /// Go on with the killed or interrupted sweep to this --out
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["scene", "out", "force", "merge"])]
+    resume: Option<PathBuf>,
+    /// Put the shards in these folders together
+    #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with = "scene")]
+    merge: Vec<PathBuf>,
+    #[command(flatten)]
+    output: OutputArguments,
+    #[command(flatten)]
+    figures: FigureArguments,
+    /// Print the table as JSON
+    #[arg(long, conflicts_with = "quiet")]
+    json: bool,
+}
+
+/// How samples are drawn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+enum Sampled {
+    /// One from each of as many equal parts of every range as there are runs
+    #[default]
+    LatinHypercube,
+    /// Independent and uniform
+    Random,
+}
+
+impl SweepArguments {
+    fn request(&self) -> Result<SweepRequest, Refusal> {
+        let sampling = match self.sampling {
+            Sampled::LatinHypercube => Sampling::LatinHypercube,
+            Sampled::Random => Sampling::Random,
+        };
+        Ok(SweepRequest {
+            scene: in_full(self.scene.as_deref().unwrap_or_default()),
+            set: self.set.clone(),
+            vary: self.vary.clone(),
+            samples: self.samples.map(|count| (count as usize, sampling, self.seed)),
+            outputs: self.outputs.clone(),
+            shard: self.shard.as_deref().map_or(Ok(Shard::WHOLE), str::parse)?,
+            force: self.output.force,
+        })
+    }
+
+    fn require_plotted(&self, outputs: &[String]) -> Result<(), Refusal> {
+        match &self.plot {
+            Some(name) if !outputs.contains(name) => Err(wrong(
+                "--plot",
+                format!("`{name}` is no output of this sweep"),
+                format!("give one of {}, or add it to --outputs", outputs.join(", ")),
+            )
+            .into()),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// A sweep of a scene, laid out.
+struct Sweep {
+    begun: Begun,
+    /// Without the variations.
+    scene: Scene,
+    design: Design,
+    rows: BTreeMap<usize, Row>,
+}
+
+impl Sweep {
+    /// Lays out what is asked for; the usual outputs where none are named.
+    fn new(mut request: SweepRequest, rows: Vec<Row>) -> Result<Self, Refusal> {
+        let scene = scene_arguments(&request).load([])?;
+        if request.outputs.is_empty() {
+            request.outputs = Output::usual(&scene);
+        }
+        let design = request.design()?;
+        let rows = rows.into_iter().map(|row| (row.run, row)).collect();
+        Ok(Self { begun: Begun::new(request, &scene), scene, design, rows })
+    }
+
+    fn request(&self) -> &SweepRequest {
+        &self.begun.request
+    }
+
+    /// Runs of the shard that have not ended yet.
+    fn pending(&self) -> Vec<usize> {
+        let shard = self.request().shard;
+        (0..self.design.runs.len()).filter(|&run| shard.has(run) && !self.rows.contains_key(&run)).collect()
+    }
+
+    /// Name of the folder where none is given.
+    fn name(&self) -> String {
+        let Shard { number, of } = self.request().shard;
+        let shard = if of > 1 { format!("-{number}-of-{of}") } else { String::new() };
+        format!("{}-sweep{shard}", self.scene.name)
+    }
+
+    /// Writes the table, gives the folder its name, and prints JSON or words.
+    fn finish(
+        self,
+        arguments: &SweepArguments,
+        folder: OutputFolder,
+        start: Instant,
+    ) -> Result<ExitCode, Refusal> {
+        let table = Table {
+            title: &self.scene.raw.title,
+            design: &self.design,
+            is_grid: self.request().samples.is_none(),
+            outputs: &self.request().outputs,
+            rows: &self.rows,
+        };
+        write_sweep(&folder, &table, arguments.figures.formats(), arguments.plot.as_deref())?;
+        let json = arguments.json.then(|| table.json());
+        let kept = interrupt::commit(folder)?;
+        if let Some(json) = json {
+            print(&format!("{json:#}\n"));
+        } else if !arguments.output.quiet {
+            let seconds = start.elapsed().as_secs_f64();
+            let (name, ends) = (&self.scene.name, self.ends());
+            say(&format!("{name}: {ends}, {seconds:.2} s\nresults in {}\n", kept.display()));
+        }
+        let is_refused = self.rows.values().any(|row| row.stop_reason == runs::REFUSED);
+        Ok(if is_refused { ExitCode::from(FAILED) } else { ExitCode::SUCCESS })
+    }
+
+    /// `20 runs (18 steps, 2 diverged)`.
+    fn ends(&self) -> String {
+        let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
+        self.rows.values().for_each(|row| *counts.entry(&row.stop_reason).or_default() += 1);
+        let counts: Vec<String> =
+            counts.into_iter().map(|(reason, count)| format!("{count} {reason}")).collect();
+        format!("{} runs ({})", self.rows.len(), counts.join(", "))
+    }
+}
+
+fn scene_arguments(request: &SweepRequest) -> SceneArguments {
+    SceneArguments { scene: request.scene.clone(), set: request.set.clone() }
+}
+
+/// Makes the runs, goes on with them, or puts shards together.
+pub fn sweep(arguments: &SweepArguments) -> Result<ExitCode, Refusal> {
+    let start = Instant::now();
+    if !arguments.merge.is_empty() {
+        return merge(arguments, start);
+    }
+    let found = arguments.resume.as_deref().map(read).transpose()?;
+    let (request, rows) = match &found {
+        Some(found) => (found.begun.request.clone(), found.rows.clone()),
+        None => (arguments.request()?, Vec::new()),
+    };
+    let mut sweep = Sweep::new(request, rows)?;
+    found.as_ref().map_or(Ok(()), |found| found.begun.require_of(&found.folder, &sweep.scene))?;
+    arguments.require_plotted(&sweep.request().outputs)?;
+    let outputs: Vec<Output> =
+        sweep.request().outputs.iter().map(|name| name.parse()).collect::<Result<_, _>>()?;
+    let scene = scene_arguments(sweep.request());
+    let runs = Runs { scene: &scene, design: &sweep.design, outputs: &outputs };
+
+    let mut pending = sweep.pending();
+    // A misspelt key or output is found before a folder is made.
+    let first = if found.is_none() && !pending.is_empty() { runs.first(&pending)? } else { None };
+    let interrupted = interrupt::keeps();
+    let (folder, journal) = open(arguments, found.as_ref(), &sweep)?;
+    let words = format!("interrupted: `flockform sweep --resume {}` goes on", folder.folder().display());
+    interrupt::says(words.clone());
+    if let Some(first) = first {
+        journal.add(&first)?;
+        pending.retain(|&run| run != first.run);
+        sweep.rows.insert(first.run, first);
+    }
+    let threads = usize::from(arguments.threads.unwrap_or(0));
+    let made = runs.make(&pending, &journal, threads, arguments.output.quiet)?;
+    drop(journal);
+    if interrupted.load(std::sync::atomic::Ordering::Relaxed) {
+        eprintln!("{words}");
+        return Ok(ExitCode::from(FAILED));
+    }
+    sweep.rows.extend(made.into_iter().map(|row| (row.run, row)));
+    sweep.finish(arguments, folder, start)
+}
+
+/// The folder of a new sweep, or of one that is gone on with, and its journal.
+fn open(
+    arguments: &SweepArguments,
+    found: Option<&Found>,
+    sweep: &Sweep,
+) -> Result<(OutputFolder, Journal), ExportError> {
+    match found {
+        Some(found) if found.folder != found.out => {
+            let folder = OutputFolder::reopen(&found.out, found.begun.request.force)?;
+            let journal = Journal::resume(&folder, found)?;
+            Ok((folder, journal))
+        }
+        _ => {
+            let mut folder = match found {
+                Some(found) => super::output::create(&found.out, true)?,
+                None => arguments.output.folder(&sweep.name())?,
+            };
+            let rows: Vec<Row> = sweep.rows.values().cloned().collect();
+            let journal = Journal::begin(&mut folder, &sweep.begun, &rows)?;
+            Ok((folder, journal))
+        }
+    }
+}
+
+/// Puts the runs of several folders into one; what is missing can be made with `--resume`.
+fn merge(arguments: &SweepArguments, start: Instant) -> Result<ExitCode, Refusal> {
+    let parts: Vec<Found> = arguments.merge.iter().map(|dir| read(dir)).collect::<Result<_, _>>()?;
+    let Some((one, others)) = parts.split_first() else { return Ok(ExitCode::SUCCESS) };
+    let whole = one.begun.whole();
+    if let Some(other) = others.iter().find(|other| other.begun.whole() != whole) {
+        let (one, other) = (one.folder.clone(), other.folder.clone());
+        return Err(SweepError::Apart { one, other }.into());
+    }
+    let rows = parts.iter().flat_map(|part| part.rows.clone()).collect();
+    let mut request = whole.request;
+    request.force = arguments.output.force;
+    let sweep = Sweep::new(request, rows)?;
+    one.begun.require_of(&one.folder, &sweep.scene)?;
+    arguments.require_plotted(&sweep.request().outputs)?;
+    let (folder, journal) = open(arguments, None, &sweep)?;
+    drop(journal);
+    let missing = sweep.pending();
+    let out = folder.folder().with_extension("");
+    let code = sweep.finish(arguments, folder, start)?;
+    if missing.is_empty() {
+        return Ok(code);
+    }
+    let (count, first) = (missing.len(), missing[0]);
+    eprintln!(
+        "{count} runs are missing, the first is run {first}: `flockform sweep --resume {}` makes them",
+        out.display()
+    );
+    Ok(ExitCode::from(FAILED))
+}

@@ -1,0 +1,207 @@
+//! The runs of a sweep, made in parallel, each on a thread of its own.
+
+use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
+use std::time::Instant;
+
+use flockform::continuum::equilibrium::run_to_equilibrium_watched;
+use flockform::continuum::run::StopReason;
+use flockform::engine::Engine;
+use flockform::engine::observer::Observer;
+use flockform::export::sweep::{Journal, Output, OutputError, Probed, Row, Values};
+use flockform::export::{ExportError, Summary, Timings};
+use flockform::scene::SceneError;
+use flockform::solve::interrupt::Interrupt;
+use flockform::study::compare::run::plan;
+use flockform::study::design::Design;
+use flockform::study::trade::{Chosen, choose};
+
+use super::super::names::SceneArguments;
+use super::super::progress::Stages;
+use super::super::{Refusal, interrupt};
+
+/// How a run ended that could not begin.
+pub const REFUSED: &str = "refused";
+
+/// Updates of particles between two looks at the interrupt, at most: about a tenth of a second.
+const UPDATES_BETWEEN_LOOKS: usize = 1 << 23;
+
+/// The runs of a design.
+pub struct Runs<'a> {
+    pub scene: &'a SceneArguments,
+    pub design: &'a Design,
+    pub outputs: &'a [Output],
+}
+
+/// A run that has ended, and its outputs.
+struct Ended {
+    stop_reason: StopReason,
+    outputs: Vec<Result<String, OutputError>>,
+}
+
+impl Runs<'_> {
+    /// Makes the first of these runs before anything is written.
+    ///
+    /// # Errors
+    /// Keys that the scene refuses in the first run and in the last; outputs that a run does not have.
+    pub fn first(&self, pending: &[usize]) -> Result<Option<Row>, Refusal> {
+        let (run, last) = (pending[0], pending[pending.len() - 1]);
+        let ended = match self.ended(run) {
+            Err(error) if self.scene.load_scene(&self.design.overrides(last)).is_err() => {
+                return Err(error.into());
+            }
+            ended => ended,
+        };
+        if let Ok(Ended { stop_reason, outputs }) = &ended {
+            // What diverged may lack what the others have.
+            let is_sound = !matches!(stop_reason, StopReason::Diverged(_) | StopReason::Stuck(_));
+            if let Some(error) = outputs.iter().find_map(|output| output.as_ref().err()).filter(|_| is_sound)
+            {
+                return Err(error.clone().into());
+            }
+        }
+        Ok(self.row(run, ended))
+    }
+
+    /// Makes these runs and adds each to the journal as it ends; an interrupt leaves out those under way. `threads` is
+    /// 0 for as many as the machine has.
+    ///
+    /// # Errors
+    /// No threads, or a journal that cannot be written.
+    pub fn make(
+        &self,
+        pending: &[usize],
+        journal: &Journal,
+        threads: usize,
+        quiet: bool,
+    ) -> Result<Vec<Row>, Refusal> {
+        let machine = || std::thread::available_parallelism().map_or(1, usize::from);
+        let threads = if threads == 0 { machine() } else { threads };
+        let workers = threads.min(pending.len());
+        // Where there are fewer runs than cores, each gets several.
+        let pool = || rayon::ThreadPoolBuilder::new().num_threads((threads / workers).max(1)).build();
+        let pools: Vec<_> = (0..workers)
+            .map(|_| pool())
+            .collect::<Result<_, _>>()
+            .map_err(|error| Refusal::Threads { threads, error })?;
+        let work = Work {
+            runs: self,
+            pending,
+            journal,
+            next: AtomicUsize::new(0),
+            made: Mutex::default(),
+            failure: Mutex::default(),
+            stages: Mutex::new(Stages::new(quiet)),
+        };
+        std::thread::scope(|scope| {
+            for pool in &pools {
+                scope.spawn(|| pool.install(|| while work.one().is_continue() {}));
+            }
+        });
+        let Work { made, failure, stages, .. } = work;
+        stages.into_inner().unwrap_or_else(PoisonError::into_inner).finish();
+        match failure.into_inner().unwrap_or_else(PoisonError::into_inner) {
+            Some(error) => Err(error.into()),
+            None => Ok(made.into_inner().unwrap_or_else(PoisonError::into_inner)),
+        }
+    }
+
+    /// The end and the outputs of a run, as `flockform run` makes it.
+    fn ended(&self, run: usize) -> Result<Ended, SceneError> {
+        let start = Instant::now();
+        let overrides = self.design.overrides(run);
+        let load = |more: &[String]| self.scene.load_scene(&[&overrides, more].concat());
+        let Chosen { mut scene, .. } = choose(load(&[])?, &load)?;
+        if let Some(equilibrium) = &mut scene.equilibrium {
+            equilibrium.request.interrupt = Interrupt::new(interrupt::flag());
+        }
+        let plan = plan(&scene)?;
+        let between = (UPDATES_BETWEEN_LOOKS / plan.count().max(1)).max(1);
+        let mut observer = Look { outputs: self.outputs, probed: Probed::default(), between };
+        let setup = start.elapsed();
+        let outcome = run_to_equilibrium_watched(&scene, plan, &mut observer)?;
+        let timings = Timings { setup, steps: start.elapsed() - setup, ..Timings::default() };
+        let summary = Summary::of_end(&scene, &outcome, timings);
+        let values = Values { engine: &outcome.engine, summary: &summary, probed: &observer.probed };
+        Ok(Ended { outputs: values.texts(self.outputs), stop_reason: outcome.reason })
+    }
+
+    /// The row of a run; none for one that was broken off.
+    fn row(&self, run: usize, ended: Result<Ended, SceneError>) -> Option<Row> {
+        let row = |stop_reason: &str, outputs: Vec<String>, reason: String| {
+            Some(Row { run, stop_reason: stop_reason.to_owned(), outputs, reason })
+        };
+        match ended {
+            Ok(Ended { stop_reason: StopReason::Interrupted, .. }) => None,
+            Ok(Ended { stop_reason, outputs }) => {
+                let reason = match &stop_reason {
+                    StopReason::Diverged(divergence) => divergence.to_string(),
+                    StopReason::Stuck(why) => why.clone(),
+                    _ => String::new(),
+                };
+                let outputs = outputs.into_iter().map(Result::unwrap_or_default).collect();
+                row(stop_reason.name(), outputs, reason)
+            }
+            // A solve that was broken off has an error as well.
+            Err(_) if interrupt::is_raised() => None,
+            Err(error) => {
+                let words = error.to_string();
+                let reason = words.lines().next().unwrap_or_default().to_owned();
+                row(REFUSED, vec![String::new(); self.outputs.len()], reason)
+            }
+        }
+    }
+}
+
+/// The runs under way.
+struct Work<'a> {
+    runs: &'a Runs<'a>,
+    pending: &'a [usize],
+    journal: &'a Journal,
+    /// Place in `pending` of the run to be begun next.
+    next: AtomicUsize,
+    made: Mutex<Vec<Row>>,
+    failure: Mutex<Option<ExportError>>,
+    stages: Mutex<Stages>,
+}
+
+impl Work<'_> {
+    /// Makes the next run; breaks off where there is none, or none that could be kept.
+    fn one(&self) -> ControlFlow<()> {
+        let has_failed = self.failure.lock().unwrap_or_else(PoisonError::into_inner).is_some();
+        let place = self.next.fetch_add(1, Ordering::Relaxed);
+        let (Some(&run), false) = (self.pending.get(place), has_failed || interrupt::is_raised()) else {
+            return ControlFlow::Break(());
+        };
+        let words = self.runs.design.overrides(run).join(", ");
+        let stage = format!("run {} of {}: {words}", place + 1, self.pending.len());
+        self.stages.lock().unwrap_or_else(PoisonError::into_inner).next(&stage);
+        let Some(row) = self.runs.row(run, self.runs.ended(run)) else { return ControlFlow::Break(()) };
+        if let Err(error) = self.journal.add(&row) {
+            *self.failure.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
+            return ControlFlow::Break(());
+        }
+        self.made.lock().unwrap_or_else(PoisonError::into_inner).push(row);
+        ControlFlow::Continue(())
+    }
+}
+
+/// Reads the particles that are asked for, and looks at the interrupt on the way.
+struct Look<'a> {
+    outputs: &'a [Output],
+    probed: Probed,
+    /// Most steps between two looks.
+    between: usize,
+}
+
+impl Observer for Look<'_> {
+    fn next(&mut self, step: usize) -> usize {
+        Probed::next(self.outputs, step).min(step + self.between)
+    }
+
+    fn see(&mut self, engine: &Engine, _residual: f64) -> ControlFlow<()> {
+        self.probed.see(self.outputs, engine);
+        if interrupt::is_raised() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    }
+}

@@ -1,0 +1,119 @@
+//! A parameter sweep's outputs: `sweep.csv`, a row for each run; `sweep.json`, what was asked for; `runs.jsonl`, the
+//! runs in the order in which they ended; the figure `sweep`.
+//!
+//! While a sweep goes on it stands in the open, as `NAME.unfinished`, and each run is in `runs.jsonl` before the next
+//! begins ([`Journal`]): a sweep that is killed loses the runs under way and no other. The table is written from the
+//! runs by their number, so that it does not depend on threads, shards and restarts.
+
+mod journal;
+mod outputs;
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+pub(super) use journal::REQUEST;
+pub use journal::{Begun, Found, Journal, Row, SweepError, SweepRequest, read};
+pub use outputs::{Output, OutputError, Probed, Quantity, Values};
+
+use super::OutputFolder;
+use super::error::ExportError;
+use super::figures::sweep::{Column, Swept, draw};
+use super::figures::{self, Formats};
+use super::manifest::create;
+use crate::study::design::{Design, Level};
+
+/// The runs of a sweep.
+#[derive(Clone, Copy, Debug)]
+pub struct Table<'a> {
+    /// Title of the scene.
+    pub title: &'a str,
+    /// Values of the varied keys.
+    pub design: &'a Design,
+    /// Whether the runs are a grid's.
+    pub is_grid: bool,
+    /// Names of the outputs.
+    pub outputs: &'a [String],
+    /// The runs that ended, by their number.
+    pub rows: &'a BTreeMap<usize, Row>,
+}
+
+impl Table<'_> {
+    /// Names of the columns: the run, the varied keys, the outputs, how it ended.
+    pub fn head(&self) -> Vec<&str> {
+        let keys = self.design.factors.iter().map(|factor| factor.key.as_str());
+        let outputs = self.outputs.iter().map(String::as_str);
+        ["run"].into_iter().chain(keys).chain(outputs).chain(["stop_reason", "reason"]).collect()
+    }
+
+    /// The cells of each run, in the order of their numbers.
+    pub fn cells(&self) -> impl Iterator<Item = Vec<String>> {
+        self.rows.values().map(|row| {
+            let values = self.design.runs[row.run].iter().map(|level| level.text.clone());
+            let ended = [row.stop_reason.clone(), row.reason.clone()];
+            [row.run.to_string()].into_iter().chain(values).chain(row.outputs.clone()).chain(ended).collect()
+        })
+    }
+
+    /// The table as JSON: an object for each run, numbers as numbers.
+    pub fn json(&self) -> serde_json::Value {
+        let head = self.head();
+        let cell = |text: String| match text.parse::<f64>() {
+            Ok(number) if number.is_finite() => serde_json::json!(number),
+            _ => text.into(),
+        };
+        let object = |cells: Vec<String>| -> serde_json::Value {
+            head.iter().map(|&name| name.to_owned()).zip(cells.into_iter().map(cell)).collect()
+        };
+        self.cells().map(object).collect()
+    }
+
+    /// The figure, of this output or of those that vary.
+    fn figure(&self, plotted: Option<&str>) -> Option<String> {
+        let key = |k: usize| {
+            let levels: Vec<&Level> = self.rows.keys().map(|&run| &self.design.runs[run][k]).collect();
+            Column::of_levels(&self.design.factors[k], &levels)
+        };
+        let output = |n: usize| {
+            let value = |row: &Row| row.outputs.get(n).and_then(|text| text.parse::<f64>().ok());
+            let values = self.rows.values().map(value).collect();
+            Column { name: self.outputs[n].clone(), is_log: false, values, categories: Vec::new() }
+        };
+        let all: Vec<Column> = (0..self.outputs.len()).map(output).filter(Column::has_numbers).collect();
+        let is_asked = |column: &&Column| match plotted {
+            Some(name) => column.name == name,
+            None => column.varies(),
+        };
+        let asked: Vec<Column> = all.iter().filter(is_asked).cloned().collect();
+        draw(&Swept {
+            title: self.title,
+            is_grid: self.is_grid,
+            keys: (0..self.design.factors.len()).map(key).collect(),
+            // Outputs that are the same everywhere are shown where there are no others.
+            outputs: if asked.is_empty() { all } else { asked },
+        })
+    }
+}
+
+/// Writes the table and the figure.
+///
+/// # Errors
+/// The first file that cannot be written.
+pub fn write_sweep(
+    folder: &OutputFolder,
+    table: &Table<'_>,
+    formats: Formats,
+    plotted: Option<&str>,
+) -> Result<Vec<PathBuf>, ExportError> {
+    let path = folder.path("sweep.csv");
+    let mut writer = csv::Writer::from_writer(create(&path).map_err(ExportError::io("write", &path))?);
+    writer.write_record(table.head()).map_err(ExportError::io("write", &path))?;
+    for cells in table.cells() {
+        writer.write_record(cells).map_err(ExportError::io("write", &path))?;
+    }
+    writer.flush().map_err(ExportError::io("write", &path))?;
+    let mut written = vec![path.clone()];
+    if let Some(figure) = table.figure(plotted).filter(|_| formats != Formats::None) {
+        written.extend(figures::write_as(&figure, folder, "sweep", formats)?);
+    }
+    Ok(written)
+}

@@ -1,0 +1,40 @@
+//! Draws from a seed, the same on every machine.
+
+/// One draw from each of `count` equal parts, in a drawn order \[1\].
+pub(super) fn latin_column(count: usize, draws: &mut Draws) -> Vec<f64> {
+    let mut order: Vec<usize> = (0..count).collect();
+    // Fisher and Yates.
+    for last in (1..count).rev() {
+        order.swap(last, draws.below(last + 1));
+    }
+    order.into_iter().map(|part| (part as f64 + draws.part()) / count as f64).collect()
+}
+
+/// Uniform draws by splitmix64 (Steele, Lea and Flood 2014): a few lines, the same on every machine.
+pub(super) struct Draws(u64);
+
+impl Draws {
+    pub(super) fn new(seed: u64, stream: u64) -> Self {
+        let mut draws = Self(seed);
+        let offset = draws.next();
+        Self(offset ^ Self(stream).next())
+    }
+
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    /// From 0 up to, and without, 1.
+    pub(super) fn part(&mut self) -> f64 {
+        (self.next() >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    /// From 0 up to, and without, `count`.
+    fn below(&mut self, count: usize) -> usize {
+        ((u128::from(self.next()) * count as u128) >> 64) as usize
+    }
+}

@@ -1,0 +1,196 @@
+//! A varied key: its range or list, as it is written and as values.
+
+use std::fmt;
+use std::str::FromStr;
+
+use super::{DesignError, MOST_RUNS};
+
+/// A value of a key, as an override has it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Level {
+    /// The value as it is written behind `KEY=`.
+    pub text: String,
+    /// The same as a number, where it is one.
+    pub number: Option<f64>,
+}
+
+impl Level {
+    fn written(text: &str) -> Self {
+        Self { text: text.to_owned(), number: text.parse().ok().filter(|number: &f64| number.is_finite()) }
+    }
+
+    /// The shortest text that reads back as the number; a whole one is written as an integer, which keys of both kinds
+    /// take.
+    fn of(number: f64) -> Self {
+        const EXACT: f64 = 9_007_199_254_740_992.0;
+        let is_whole = number.fract() == 0.0 && number.abs() < EXACT;
+        let text = if is_whole { format!("{}", number as i64) } else { format!("{number:?}") };
+        Self { text, number: Some(number) }
+    }
+}
+
+/// A key and the values that it takes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Factor {
+    /// Path of the key in the scene.
+    pub key: String,
+    /// Whether it is laid out, and drawn, by its logarithm.
+    pub is_log: bool,
+    values: Values,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+enum Values {
+    List(Vec<Level>),
+    /// From one end to the other; the number of values where it is given.
+    Range {
+        ends: [f64; 2],
+        count: Option<usize>,
+    },
+}
+
+impl FromStr for Factor {
+    type Err = DesignError;
+
+    /// Reads `KEY=a:b:n`, `KEY=a:b:n:log`, `KEY=a:b`, `KEY=a:b:log` or `KEY=[v1, v2, ...]`.
+    fn from_str(text: &str) -> Result<Self, DesignError> {
+        let refuse = |reason: &str| DesignError::Vary { text: text.to_owned(), reason: reason.to_owned() };
+        let (key, values) = text.split_once('=').ok_or_else(|| refuse("there is no `=`"))?;
+        let (key, values) = (key.trim().to_owned(), values.trim());
+        if key.is_empty() {
+            return Err(refuse("there is no key before the `=`"));
+        }
+        if let Some(list) = values.strip_prefix('[') {
+            let list = list.strip_suffix(']').ok_or_else(|| refuse("the list is not closed by `]`"))?;
+            let levels: Vec<Level> = elements(list).into_iter().map(Level::written).collect();
+            if levels.is_empty() || levels.iter().any(|level| level.text.is_empty()) {
+                return Err(refuse("a value of the list is missing"));
+            }
+            return Ok(Self { key, is_log: false, values: Values::List(levels) });
+        }
+        let (ends, count, is_log) = range(values).map_err(|reason| refuse(&reason))?;
+        Ok(Self { key, is_log, values: Values::Range { ends, count } })
+    }
+}
+
+/// Ends, number of values and scale of `a:b:n:log`, in which the last two may be missing.
+fn range(text: &str) -> Result<([f64; 2], Option<usize>, bool), String> {
+    let mut parts: Vec<&str> = text.split(':').map(str::trim).collect();
+    let is_log = parts.len() > 2 && parts.last() == Some(&"log");
+    if is_log {
+        parts.pop();
+    }
+    let number = |part: &str| {
+        let number: Option<f64> = part.parse().ok().filter(|number: &f64| number.is_finite());
+        number.ok_or_else(|| format!("`{part}` is no number"))
+    };
+    let (ends, count) = match parts[..] {
+        [from, to] => ([number(from)?, number(to)?], None),
+        [from, to, count] => {
+            let given: Option<usize> = count.parse().ok().filter(|&count| count > 0);
+            let count = given.ok_or_else(|| format!("`{count}` is no number of values"))?;
+            ([number(from)?, number(to)?], Some(count))
+        }
+        _ => return Err("it is neither a range nor a list".to_owned()),
+    };
+    if is_log && ends.iter().any(|&end| end <= 0.0) {
+        return Err("a logarithmic range has ends above 0".to_owned());
+    }
+    if count.is_some_and(|count| count > MOST_RUNS) {
+        return Err(format!("it has more than {MOST_RUNS} values"));
+    }
+    Ok((ends, count, is_log))
+}
+
+/// The elements of a list, split at commas outside of brackets and quotes.
+fn elements(list: &str) -> Vec<&str> {
+    let (mut depth, mut quote, mut start) = (0_i32, None, 0);
+    let mut found = Vec::new();
+    for (at, c) in list.char_indices() {
+        match (quote, c) {
+            (Some(open), c) if c == open => quote = None,
+            (Some(_), _) => {}
+            (None, '"' | '\'') => quote = Some(c),
+            (None, '[' | '{') => depth += 1,
+            (None, ']' | '}') => depth -= 1,
+            (None, ',') if depth == 0 => {
+                found.push(list[start..at].trim());
+                start = at + 1;
+            }
+            (None, _) => {}
+        }
+    }
+    found.push(list[start..].trim());
+    found
+}
+
+impl Factor {
+    /// The value at `part` of the way through the range, or of the list \[1\].
+    pub(super) fn at(&self, part: f64) -> Level {
+        match &self.values {
+            Values::List(levels) => {
+                let n = (part * levels.len() as f64) as usize;
+                levels[n.min(levels.len() - 1)].clone()
+            }
+            Values::Range { ends, .. } => Level::of(between(*ends, part, self.is_log)),
+        }
+    }
+
+    /// All values of a grid.
+    pub(super) fn levels(&self) -> Result<Vec<Level>, DesignError> {
+        match &self.values {
+            Values::List(levels) => Ok(levels.clone()),
+            Values::Range { ends, count: Some(count) } => {
+                let last = (count - 1).max(1) as f64;
+                Ok((0..*count).map(|n| Level::of(grid_point(*ends, n as f64, last, self.is_log))).collect())
+            }
+            Values::Range { .. } => {
+                let reason = "the number of values is missing, or --samples".to_owned();
+                Err(DesignError::Vary { text: self.to_string(), reason })
+            }
+        }
+    }
+
+    pub(super) fn require_open(&self) -> Result<(), DesignError> {
+        match &self.values {
+            Values::Range { count: Some(count), .. } => {
+                let reason = format!("--samples gives the number of values: leave the {count} out");
+                Err(DesignError::Vary { text: self.to_string(), reason })
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+impl fmt::Display for Factor {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match &self.values {
+            Values::List(levels) => {
+                let texts: Vec<&str> = levels.iter().map(|level| level.text.as_str()).collect();
+                write!(f, "{}=[{}]", self.key, texts.join(", "))
+            }
+            Values::Range { ends: [from, to], count } => {
+                let count = count.map_or(String::new(), |count| format!(":{count}"));
+                let scale = if self.is_log { ":log" } else { "" };
+                write!(f, "{}={from}:{to}{count}{scale}", self.key)
+            }
+        }
+    }
+}
+
+fn between([from, to]: [f64; 2], part: f64, is_log: bool) -> f64 {
+    match is_log {
+        true => (from.ln() + part * (to.ln() - from.ln())).exp(),
+        false => from + part * (to - from),
+    }
+}
+
+/// The `n`th of `last + 1` values; the ends are exact, and so are round steps (0.3 between 0.1 and 0.5).
+fn grid_point(ends @ [from, to]: [f64; 2], n: f64, last: f64, is_log: bool) -> f64 {
+    match n {
+        _ if n == 0.0 => from,
+        _ if n == last => to,
+        _ if is_log => between(ends, n / last, true),
+        _ => (from * (last - n) + to * n) / last,
+    }
+}

@@ -1,0 +1,279 @@
+//! Design of experiments: the runs of a parameter sweep, each a value for every varied key.
+//!
+//! A design is a function of what is asked for alone: grids count through the last key first, and what is drawn
+//! is drawn from a seed. So every process, thread and shard has the same runs under the same numbers.
+
+mod draws;
+mod factor;
+
+use std::str::FromStr;
+
+use serde::{Deserialize, Serialize};
+
+use draws::{Draws, latin_column};
+pub use factor::{Factor, Level};
+
+/// Most runs of a design: their tables are kept in memory.
+const MOST_RUNS: usize = 1_000_000;
+
+/// Error in the description of a design.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum DesignError {
+    /// A text that names no key or no values.
+    #[error(
+        "--vary {text}: {reason}\n  help: give KEY=FROM:TO:COUNT, KEY=FROM:TO:COUNT:log or KEY=[VALUE, ...]; with --samples KEY=FROM:TO"
+    )]
+    Vary {
+        /// The text given.
+        text: String,
+        /// The fault.
+        reason: String,
+    },
+    /// Two entries for one key.
+    #[error("--vary {0} is given twice\n  help: one list or range per key")]
+    Twice(String),
+    /// More runs than are kept.
+    #[error(
+        "the sweep has more than {MOST_RUNS} runs\n  help: vary fewer keys, take fewer values, or draw --samples"
+    )]
+    TooMany,
+    /// A text that is no shard.
+    #[error("--shard {0} is no part of a whole\n  help: give I/N with I from 1 to N, such as 1/4")]
+    Shard(String),
+}
+
+/// How values are drawn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Sampling {
+    /// Each key's range, or list, is cut into as many equal parts as there are runs, and each part is drawn from once.
+    #[default]
+    LatinHypercube,
+    /// Independent and uniform.
+    Random,
+}
+
+/// Runs of a sweep, by number from 0.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Design {
+    /// The varied keys.
+    pub factors: Vec<Factor>,
+    /// A value for each key in its order, shape \[runs, keys\].
+    pub runs: Vec<Vec<Level>>,
+}
+
+impl Design {
+    /// Every combination of the keys' values; the last key changes from each run to the next.
+    ///
+    /// # Errors
+    /// A key that is given twice, a range without a number of values, or too many runs.
+    pub fn grid(factors: Vec<Factor>) -> Result<Self, DesignError> {
+        require_distinct(&factors)?;
+        let levels: Vec<Vec<Level>> = factors.iter().map(Factor::levels).collect::<Result<_, _>>()?;
+        let product = levels.iter().try_fold(1_usize, |count, levels| count.checked_mul(levels.len()));
+        let count = product.filter(|&count| count <= MOST_RUNS).ok_or(DesignError::TooMany)?;
+        let run = |number: usize| {
+            let mut rest = number;
+            let mut values: Vec<Level> = levels
+                .iter()
+                .rev()
+                .map(|levels| {
+                    let level = levels[rest % levels.len()].clone();
+                    rest /= levels.len();
+                    level
+                })
+                .collect();
+            values.reverse();
+            values
+        };
+        Ok(Self { runs: (0..count).map(run).collect(), factors })
+    }
+
+    /// So many runs with values drawn from the keys' ranges and lists; the same seed gives the same runs, and a
+    /// key's draws do not depend on the other keys.
+    ///
+    /// # Errors
+    /// A key that is given twice, a range with a number of values of its own, or too many runs.
+    pub fn sampled(
+        factors: Vec<Factor>,
+        samples: usize,
+        sampling: Sampling,
+        seed: u64,
+    ) -> Result<Self, DesignError> {
+        require_distinct(&factors)?;
+        factors.iter().try_for_each(Factor::require_open)?;
+        if samples > MOST_RUNS {
+            return Err(DesignError::TooMany);
+        }
+        let columns = factors.iter().enumerate().map(|(k, factor)| {
+            let mut draws = Draws::new(seed, k as u64);
+            let parts = match sampling {
+                Sampling::Random => (0..samples).map(|_| draws.part()).collect(),
+                Sampling::LatinHypercube => latin_column(samples, &mut draws),
+            };
+            parts.into_iter().map(|part| factor.at(part)).collect::<Vec<Level>>()
+        });
+        let columns: Vec<Vec<Level>> = columns.collect();
+        let run = |number: usize| columns.iter().map(|column| column[number].clone()).collect();
+        Ok(Self { runs: (0..samples).map(run).collect(), factors })
+    }
+
+    /// The overrides of a run.
+    pub fn overrides(&self, number: usize) -> Vec<String> {
+        let of = |(factor, level): (&Factor, &Level)| format!("{}={}", factor.key, level.text);
+        self.factors.iter().zip(&self.runs[number]).map(of).collect()
+    }
+}
+
+fn require_distinct(factors: &[Factor]) -> Result<(), DesignError> {
+    let twice =
+        factors.iter().enumerate().find(|(k, one)| factors[..*k].iter().any(|two| two.key == one.key));
+    twice.map_or(Ok(()), |(_, factor)| Err(DesignError::Twice(factor.key.clone())))
+}
+
+/// A part of a sweep's runs: every `of`th one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Shard {
+    /// From 1.
+    pub number: usize,
+    /// Number of parts.
+    pub of: usize,
+}
+
+impl Shard {
+    /// All runs.
+    pub const WHOLE: Self = Self { number: 1, of: 1 };
+
+    /// Whether the shard has this run.
+    pub fn has(self, run: usize) -> bool {
+        run % self.of == self.number - 1
+    }
+}
+
+impl FromStr for Shard {
+    type Err = DesignError;
+
+    fn from_str(text: &str) -> Result<Self, DesignError> {
+        let refuse = || DesignError::Shard(text.to_owned());
+        let (number, of) = text.split_once('/').ok_or_else(refuse)?;
+        let read = |part: &str| part.trim().parse::<usize>().map_err(|_| refuse());
+        let shard = Self { number: read(number)?, of: read(of)? };
+        if (1..=shard.of).contains(&shard.number) { Ok(shard) } else { Err(refuse()) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn factors(texts: &[&str]) -> Vec<Factor> {
+        texts.iter().map(|text| text.parse().unwrap_or_else(|error| panic!("{error}"))).collect()
+    }
+
+    fn column(design: &Design, key: usize) -> Vec<&str> {
+        design.runs.iter().map(|run| run[key].text.as_str()).collect()
+    }
+
+    #[test]
+    fn a_grid_has_every_combination_with_the_last_key_first() {
+        let grid = Design::grid(factors(&["a.b=0.1:0.5:3", "frame=[lagged, \"mirror\"]"])).unwrap();
+        assert_eq!(column(&grid, 0), ["0.1", "0.1", "0.3", "0.3", "0.5", "0.5"]);
+        assert_eq!(
+            column(&grid, 1),
+            ["lagged", "\"mirror\"", "lagged", "\"mirror\"", "lagged", "\"mirror\""]
+        );
+        assert_eq!(grid.overrides(3), ["a.b=0.3", "frame=\"mirror\""]);
+    }
+
+    #[test]
+    fn whole_numbers_are_written_as_integers_and_logarithmic_ranges_by_their_ratios() {
+        assert_eq!(
+            column(&Design::grid(factors(&["stop.steps=10:40:4"])).unwrap(), 0),
+            ["10", "20", "30", "40"]
+        );
+        let log = Design::grid(factors(&["k=1e-4:1:5:log"])).unwrap();
+        let values: Vec<f64> = log.runs.iter().map(|run| run[0].number.unwrap()).collect();
+        for (value, expected) in values.iter().zip([1e-4, 1e-3, 1e-2, 0.1, 1.0]) {
+            assert!((value / expected - 1.0).abs() < 1e-12, "{values:?}");
+        }
+        assert_eq!(column(&Design::grid(factors(&["k=2.5:9:1"])).unwrap(), 0), ["2.5"]);
+    }
+
+    #[test]
+    fn the_values_of_a_list_may_be_lists_and_tables() {
+        let grid = Design::grid(factors(&["v=[[0.1, 0], { kind = \"a,b\" }, x]"])).unwrap();
+        assert_eq!(column(&grid, 0), ["[0.1, 0]", "{ kind = \"a,b\" }", "x"]);
+    }
+
+    #[test]
+    fn a_latin_hypercube_has_one_run_in_each_part_of_each_key() {
+        let draw = |seed| {
+            Design::sampled(factors(&["a=0:10", "b=1:100:log"]), 50, Sampling::LatinHypercube, seed).unwrap()
+        };
+        let design = draw(7);
+        let parts = |key: usize, part: &dyn Fn(f64) -> f64| {
+            let mut found: Vec<usize> =
+                design.runs.iter().map(|run| (50.0 * part(run[key].number.unwrap())) as usize).collect();
+            found.sort_unstable();
+            found
+        };
+        let all: Vec<usize> = (0..50).collect();
+        assert_eq!(parts(0, &|value| value / 10.0), all);
+        assert_eq!(parts(1, &|value| value.log10() / 2.0), all);
+        assert_eq!(draw(7), design);
+        assert_ne!(draw(8), design);
+        // Ranks of the two keys are not those of each other: the correlation is far from 1.
+        let middle = |key: usize| move |run: &Vec<Level>| run[key].number.unwrap();
+        let (a, b): (Vec<f64>, Vec<f64>) =
+            design.runs.iter().map(|run| (middle(0)(run) - 5.0, middle(1)(run).log10() - 1.0)).unzip();
+        let dot = |x: &[f64], y: &[f64]| x.iter().zip(y).map(|(x, y)| x * y).sum::<f64>();
+        assert!(dot(&a, &b).abs() < 0.5 * (dot(&a, &a) * dot(&b, &b)).sqrt());
+    }
+
+    #[test]
+    fn a_keys_draws_do_not_depend_on_the_other_keys() {
+        let one = Design::sampled(factors(&["a=0:1"]), 9, Sampling::Random, 3).unwrap();
+        let two = Design::sampled(factors(&["a=0:1", "b=[x, y]"]), 9, Sampling::Random, 3).unwrap();
+        assert_eq!(column(&one, 0), column(&two, 0));
+        assert!(column(&two, 1).contains(&"x") && column(&two, 1).contains(&"y"));
+    }
+
+    #[test]
+    fn shards_part_the_runs() {
+        let shards: Vec<Shard> = ["1/3", "2/3", "3/3"].iter().map(|text| text.parse().unwrap()).collect();
+        for run in 0..10 {
+            assert_eq!(shards.iter().filter(|shard| shard.has(run)).count(), 1, "{run}");
+        }
+        for wrong in ["0/3", "4/3", "1", "1/0", "a/b", "-1/2"] {
+            assert!(wrong.parse::<Shard>().is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_variation_is_refused_with_its_text() {
+        for wrong in [
+            "a",
+            "=1:2:3",
+            "a=",
+            "a=1",
+            "a=1:2:0",
+            "a=1:x:3",
+            "a=1:2:3:4",
+            "a=[1,2",
+            "a=[1,,2]",
+            "a=[]",
+            "a=0:1:3:log",
+            "a=1:inf:3",
+            "a=1:2:9999999",
+        ] {
+            let error = wrong.parse::<Factor>().expect_err(wrong).to_string();
+            assert!(error.contains(&format!("--vary {wrong}: ")), "{error}");
+        }
+        let refused = |design: Result<Design, DesignError>| design.expect_err("refused").to_string();
+        assert!(refused(Design::grid(factors(&["a=1:2"]))).contains("number of values is missing"));
+        assert!(refused(Design::grid(factors(&["a=1:2:3", "a=[1]"]))).contains("twice"));
+        assert!(refused(Design::grid(factors(&["a=0:1:2000", "b=0:1:2000"]))).contains("more than"));
+        let counted = Design::sampled(factors(&["a=0:1:5"]), 3, Sampling::Random, 0);
+        assert!(refused(counted).contains("--samples"));
+    }
+}

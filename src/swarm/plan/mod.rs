@@ -1,0 +1,330 @@
+//! The plan of a swarm: how fast its formation comes to rest, how far noise and delay may go, how fast it can be led.
+//!
+//! One period of the loop is a linear map of the places at which the members are seen, `x' = A x_F + B x_L + D l` with
+//! the leaders' seen places `x_L` and led places `l`. The map is taken from the loop itself, column by column. With it:
+//!
+//! * the formation forgets a disturbance by the spectral radius of `A` in a period; a delay of `d` periods makes that
+//!   its `d + 1`st root, which is below 1 as well: delay slows the formation and never makes it grow;
+//! * noise of the poses moves a follower by the root of the diagonal of `C = A C A' + A A' + B B'` times that noise;
+//! * behind leaders that move steadily a follower lags by the row of `(1 - A)^-1 (A + B) 1` times their way in a period.
+
+mod period_map;
+mod words;
+
+use serde::Serialize;
+
+use super::formation::Formation;
+use crate::flock::vectors::distance;
+use crate::scene::SceneError;
+use crate::scene::swarm::raw::RawModel;
+use crate::scene::swarm::{Shape, Swarm};
+use crate::solve::spectrum::spectral_radius;
+use crate::swarm::flight::Flight;
+use period_map::PeriodMap;
+
+/// Sweeps made to find the spectral radius.
+const MOST_SWEEPS: usize = 5000;
+
+/// Standard deviations of noise that each robot keeps farther away from everything.
+const DEVIATIONS_KEPT: f64 = 3.0;
+
+/// A swarm before it flies.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SwarmPlan {
+    /// Name of the swarm.
+    pub name: String,
+    /// Title of the swarm.
+    pub title: String,
+    /// Number of robots.
+    pub robots: usize,
+    /// Those of them that lead.
+    pub leaders: usize,
+    /// Neighbours of a follower, in the mean \[1\].
+    pub neighbours: f64,
+    /// Smallest distance between two places of the formation \[m\].
+    pub spacing: f64,
+    /// Free space between the two rims that are nearest at the places of the formation \[m\].
+    pub free_space: Option<f64>,
+    /// The model of the simulated robots.
+    pub model: &'static str,
+    /// Time between two targets \[s\].
+    pub period_s: f64,
+    /// Applications of the rule in a period, at most.
+    pub sweeps: usize,
+    /// The simulated flight's duration \[s\].
+    pub flight_s: f64,
+    /// How fast a disturbance dies out; absent where the rule is not linear or a scene leads.
+    pub convergence: Option<Convergence>,
+    /// Effects of noise.
+    pub noise: NoiseMargin,
+    /// Effects of delay.
+    pub delay: DelayMargin,
+    /// How fast the formation can be led.
+    pub speed: SpeedMargin,
+    /// Warnings before the flight.
+    pub cautions: Vec<String>,
+}
+
+/// How fast a disturbance dies out.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Convergence {
+    /// Largest part of a disturbance that is left after a period \[1\].
+    pub factor: f64,
+    /// Time in which the slowest part of a disturbance halves \[s\]; absent where it does not.
+    pub half_life_s: Option<f64>,
+}
+
+/// Effects of noise in the poses.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct NoiseMargin {
+    /// The noise that is simulated: standard deviation of a coordinate \[m\].
+    pub simulated: f64,
+    /// Standard deviation of the place of the follower that is moved most, over that of the poses \[1\].
+    pub gain: Option<f64>,
+    /// Noise at which the filter begins to hold robots at their places of the formation \[m\].
+    pub largest: Option<f64>,
+}
+
+/// Effects of delay of the poses.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct DelayMargin {
+    /// The delay that is simulated, the jitter included \[s\].
+    pub simulated_s: f64,
+    /// Age up to which poses are used \[s\].
+    pub largest_s: f64,
+    /// The same in whole periods.
+    pub largest_periods: usize,
+    /// Time in which the slowest part of a disturbance halves under the simulated delay \[s\].
+    pub half_life_s: Option<f64>,
+}
+
+/// How fast the formation can be led.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SpeedMargin {
+    /// The speed limit \[m/s\].
+    pub limit: Option<f64>,
+    /// The time by which the last follower is behind steadily moving leaders, in the formation \[s\].
+    pub lag_s: Option<f64>,
+    /// Speed of the leaders up to which followers keep within `flight.bounds.affine_error` of their places, the speed
+    /// limit at most \[m/s\]; absent without such a bound or a limit.
+    pub reachable: Option<f64>,
+    /// The demands of each manoeuvre.
+    pub manoeuvres: Vec<ManoeuvreSpeed>,
+}
+
+/// The demands of a manoeuvre on its fastest robot.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ManoeuvreSpeed {
+    /// Name of the manoeuvre.
+    pub name: String,
+    /// Largest speed of a place of the formation \[m/s\].
+    pub needed: f64,
+}
+
+impl SwarmPlan {
+    /// # Errors
+    /// Names the key of the swarm that cannot be laid out, kept safe or flown.
+    pub fn new(swarm: &Swarm) -> Result<Self, SceneError> {
+        let flight = Flight::new(swarm)?;
+        let formation = flight.control().formation();
+        let raw = &swarm.raw;
+        let period = raw.control.period;
+        let leaders = (0..formation.count()).filter(|&m| formation.leads(m)).count();
+        let convergence = convergence(formation, swarm);
+        let map = PeriodMap::of(formation, raw.control.sweeps);
+        let delay = f64::from(raw.flight.delay + raw.flight.jitter);
+        let mut plan = Self {
+            name: swarm.name.clone(),
+            title: raw.title.clone(),
+            robots: formation.count(),
+            leaders,
+            neighbours: neighbours(formation),
+            spacing: formation.spacing(),
+            free_space: free_space(formation),
+            model: model(&raw.flight.model),
+            period_s: period,
+            sweeps: raw.control.sweeps,
+            flight_s: flight.periods() as f64 * period,
+            noise: NoiseMargin {
+                simulated: raw.flight.noise,
+                gain: map.as_ref().and_then(PeriodMap::noise_gain),
+                largest: largest_noise(formation, raw.limits.clearance),
+            },
+            delay: DelayMargin {
+                simulated_s: delay * period,
+                largest_s: raw.poses.age_limit,
+                // Of an exact multiple all periods count, whatever rounding makes of it.
+                largest_periods: (raw.poses.age_limit / period * (1.0 + 1e-12)) as usize,
+                half_life_s: convergence.and_then(|one| Some(one.half_life_s? * (delay + 1.0))),
+            },
+            speed: speed(swarm, formation, map.as_ref()),
+            convergence,
+            cautions: Vec::new(),
+        };
+        plan.cautions = cautions(&plan);
+        Ok(plan)
+    }
+}
+
+fn model(model: &RawModel) -> &'static str {
+    match model {
+        RawModel::Ideal => "ideal",
+        RawModel::Integrator => "integrator",
+        RawModel::Unicycle { .. } => "unicycle",
+        RawModel::DoubleIntegrator => "double-integrator",
+    }
+}
+
+fn neighbours(formation: &Formation) -> f64 {
+    let followers = || (0..formation.count()).filter(|&m| !formation.leads(m));
+    let all: usize = followers().map(|m| formation.neighbours(m).count()).sum();
+    all as f64 / followers().count().max(1) as f64
+}
+
+/// Smallest free space between two rims at the places of the formation \[m\].
+fn free_space(formation: &Formation) -> Option<f64> {
+    let Formation { places, radii, .. } = formation;
+    let pairs = (0..formation.count()).flat_map(|i| (0..i).map(move |j| (i, j)));
+    pairs.map(|(i, j)| distance(places.get(i), places.get(j)) - radii[i] - radii[j]).reduce(f64::min)
+}
+
+/// Noise at which two robots at their places take up all of the space between them \[m\].
+fn largest_noise(formation: &Formation, clearance: Option<f64>) -> Option<f64> {
+    let free = free_space(formation)? - clearance?;
+    Some((free / (2.0 * DEVIATIONS_KEPT)).max(0.0))
+}
+
+fn convergence(formation: &Formation, swarm: &Swarm) -> Option<Convergence> {
+    // A scene changes the roles on its way; a body that carries robots along is not moved by them.
+    let is_rule = matches!(swarm.shape, Shape::Places(_) | Shape::Body(_));
+    let engine = formation.engine().filter(|_| is_rule)?;
+    let frame = engine.body().frame.as_ref();
+    let found = spectral_radius(engine.flock(), frame, engine.roles(), engine.update(), MOST_SWEEPS)?;
+    let factor = found.radius.powf(swarm.raw.control.sweeps as f64);
+    let halves = factor < 1.0;
+    let half_life_s = halves.then(|| swarm.raw.control.period * half_life(factor));
+    Some(Convergence { factor, half_life_s })
+}
+
+/// Periods in which what is left by this factor a period is a half; none is shorter than one.
+fn half_life(factor: f64) -> f64 {
+    (0.5_f64.ln() / factor.max(f64::MIN_POSITIVE).ln()).max(1.0)
+}
+
+fn speed(swarm: &Swarm, formation: &Formation, map: Option<&PeriodMap>) -> SpeedMargin {
+    let limit = swarm.raw.limits.speed;
+    let lag_s = map.and_then(PeriodMap::lag).map(|periods| periods * swarm.raw.control.period);
+    let by_lag = swarm.raw.flight.bounds.affine_error.zip(lag_s).map(|(error, lag)| error / lag);
+    let reachable = [limit, by_lag].into_iter().flatten().reduce(f64::min).filter(|speed| speed.is_finite());
+    let manoeuvres = swarm.manoeuvres.iter().filter_map(|one| needed(formation, &one.name)).collect();
+    SpeedMargin { limit, lag_s, reachable, manoeuvres }
+}
+
+/// The largest speed of a place in a manoeuvre.
+fn needed(formation: &Formation, name: &str) -> Option<ManoeuvreSpeed> {
+    /// Parts of a leg between which speeds are taken; even, so that the fastest instant of a leg, its middle, is one.
+    const PARTS: usize = 100;
+    let manoeuvre = formation.manoeuvre(name, 0.0)?;
+    let mut needed: f64 = 0.0;
+    let mut start = 0.0;
+    for leg in &manoeuvre.legs {
+        let part = leg.seconds / PARTS as f64;
+        for n in 0..PARTS {
+            // Centred on the middle of the leg for n = PARTS / 2.
+            let middle = start + n as f64 * part;
+            let [before, after] = [middle - 0.5 * part, middle + 0.5 * part].map(|t| manoeuvre.affine(t));
+            let moved =
+                formation.places.iter().map(|place| distance(before.apply(place), after.apply(place)));
+            needed = moved.map(|way| way / part).fold(needed, f64::max);
+        }
+        start += leg.seconds + leg.hold;
+    }
+    Some(ManoeuvreSpeed { name: name.to_owned(), needed })
+}
+
+fn cautions(plan: &SwarmPlan) -> Vec<String> {
+    let mut cautions = Vec::new();
+    if let Some(Convergence { factor, half_life_s: None }) = plan.convergence {
+        cautions
+            .push(format!("disturbances do not die out: {factor:.4} of the slowest is left after a period"));
+    }
+    if plan.noise.largest.is_some_and(|largest| plan.noise.simulated > largest) {
+        cautions.push(
+            "the noise takes up the space between robots at their places: the filter will hold some of them; \
+             lower flight.noise or limits.clearance, or space the robots out"
+                .into(),
+        );
+    }
+    if plan.delay.simulated_s > plan.delay.largest_s {
+        cautions.push(
+            "poses are older than poses.age_limit when they arrive: no robot will get a target; lower flight.delay or \
+             raise the limit"
+                .into(),
+        );
+    }
+    let limit = plan.speed.limit.unwrap_or(f64::INFINITY);
+    for ManoeuvreSpeed { name, needed } in plan.speed.manoeuvres.iter().filter(|one| one.needed > limit) {
+        cautions.push(format!(
+            "manoeuvre `{name}` moves a robot's place at up to {needed:.3} m/s, above limits.speed: robots will fall \
+             behind; give its legs more seconds"
+        ));
+    }
+    cautions
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::bundled::bundled_swarm;
+
+    fn plan(name: &str, set: &[&str]) -> SwarmPlan {
+        let set: Vec<String> = set.iter().map(|&one| one.to_owned()).collect();
+        let swarm = bundled_swarm(name).expect("bundled").load_swarm(&set).expect("loads");
+        SwarmPlan::new(&swarm).expect("laid out")
+    }
+
+    #[test]
+    fn a_row_between_two_leaders_has_the_gain_and_the_lag_that_are_computed_by_hand() {
+        // One follower in the middle of two leaders, whose place is theirs in the mean: A = 0, B = (1/2, 1/2).
+        let text = "title = \"three\"\nlinks = { kind = \"nearest\", count = 2 }\nleaders = [\
+                    { robots = [\"a\", \"c\"], program = { kind = \"external\" } }]\n\
+                    robots = [{ name = \"a\", place = [0.0, 0.0] }, { name = \"b\", place = [1.0, 0.0] }, \
+                    { name = \"c\", place = [2.0, 0.0] }]\nlimits = { clearance = 0.1 }\n";
+        let swarm = Swarm::parse("three", "three.toml", text, &[], None).unwrap_or_else(|e| panic!("{e}"));
+        let plan = SwarmPlan::new(&swarm).expect("laid out");
+        assert!((plan.noise.gain.expect("linear") - 0.5_f64.sqrt()).abs() < 1e-9, "{plan}");
+        // Places as they were seen a period ago.
+        assert!((plan.speed.lag_s.expect("linear") - plan.period_s).abs() < 1e-9, "{plan}");
+        // 1 m between places, two radii of 0.15 m and the clearance leave 0.6 m for twice three deviations.
+        assert!((plan.noise.largest.expect("kept apart") - 0.1).abs() < 1e-9, "{plan}");
+        assert_eq!((plan.robots, plan.leaders, plan.delay.largest_periods), (3, 2, 10));
+    }
+
+    #[test]
+    fn more_sweeps_shorten_the_lag_and_delay_lengthens_the_half_life() {
+        let (one, many) = (plan("square", &["control.sweeps=1"]), plan("square", &[]));
+        let lag = |plan: &SwarmPlan| plan.speed.lag_s.expect("linear");
+        assert!(lag(&many) < 0.1 * lag(&one), "{many}\n{one}");
+        let delayed = plan("square", &["control.sweeps=1", "flight.delay=3"]);
+        let half = |plan: &SwarmPlan| plan.delay.half_life_s.expect("comes to rest");
+        assert!((half(&delayed) / half(&one) - 4.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn what_the_file_cannot_hold_is_warned_of() {
+        let hurried = plan("square", &["limits.speed=0.1"]);
+        assert!(hurried.cautions.iter().any(|caution| caution.contains("`turn`")), "{hurried}");
+        let noisy = plan("square", &["flight.noise=0.5"]);
+        assert!(noisy.cautions.iter().any(|caution| caution.contains("flight.noise")), "{noisy}");
+        let late = plan("square", &["flight.delay=100"]);
+        assert!(late.cautions.iter().any(|caution| caution.contains("poses.age_limit")), "{late}");
+    }
+
+    #[test]
+    fn a_manoeuvre_needs_half_again_the_mean_speed_of_its_fastest_leg() {
+        // The legs go by 3s^2 - 2s^3, whose steepest slope is 1.5.
+        let straight = "manoeuvres=[{ name = \"turn\", legs = [{ seconds = 4.0, translate = [8.0, 0.0] }] }]";
+        let plan = plan("square", &[straight]);
+        assert!((plan.speed.manoeuvres[0].needed - 3.0).abs() < 1e-3, "{plan}");
+    }
+}

@@ -1,0 +1,67 @@
+//! The plan of a swarm as it is printed.
+
+use std::fmt;
+
+use super::{Convergence, DelayMargin, ManoeuvreSpeed, SpeedMargin, SwarmPlan};
+
+impl fmt::Display for SwarmPlan {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "{}: {}", self.name, self.title)?;
+        let mut line = |name: &str, value: String| writeln!(f, "  {name:<16}  {value}");
+        let Self { robots, leaders, model, spacing, sweeps, period_s, .. } = self;
+        line(
+            "robots",
+            format!("{robots} ({leaders} leaders), simulated as {model}, {:.1} s", self.flight_s),
+        )?;
+        let free =
+            self.free_space.map_or(String::new(), |free| format!(", {free:.4} m between the nearest rims"));
+        line("formation", format!("places {spacing:.4} m apart{free}, {:.2} neighbours", self.neighbours))?;
+        line("loop", format!("a target every {period_s} s, at most {sweeps} sweeps of the rule in each"))?;
+        let half_life = |half: Option<f64>| half.map_or("never".to_owned(), |half| format!("in {half:.3} s"));
+        match self.convergence {
+            Some(Convergence { factor, half_life_s }) => {
+                let halves = half_life(half_life_s);
+                line(
+                    "comes to rest",
+                    format!("a disturbance halves {halves}; {factor:.3e} is left a period"),
+                )?;
+                let delayed = half_life(self.delay.half_life_s);
+                let simulated = self.delay.simulated_s;
+                line("delay", format!("slows, never makes grow: with {simulated:.3} s it halves {delayed}"))?;
+            }
+            None => line("comes to rest", "not predicted: the rule is not linear, or a scene leads".into())?,
+        }
+        let DelayMargin { largest_s, largest_periods, .. } = self.delay;
+        line(
+            "delay margin",
+            format!("poses are used up to an age of {largest_s} s, {largest_periods} periods"),
+        )?;
+        if let Some(gain) = self.noise.gain {
+            line("noise", format!("a follower moves by up to {gain:.3} of the poses' standard deviation"))?;
+        }
+        let simulated = self.noise.simulated;
+        match self.noise.largest {
+            Some(largest) => line(
+                "noise margin",
+                format!(
+                    "{largest:.4} m until the clearance holds robots at their places; simulated {simulated} m"
+                ),
+            )?,
+            None => {
+                line("noise margin", format!("none set: robots are not kept apart; simulated {simulated} m"))?
+            }
+        }
+        let SpeedMargin { limit, lag_s, reachable, manoeuvres } = &self.speed;
+        line("speed limit", limit.map_or("none".into(), |limit| format!("{limit} m/s")))?;
+        if let Some(lag) = lag_s {
+            line("lag", format!("followers are up to {lag:.3} s behind steady leaders"))?;
+        }
+        if let Some(speed) = reachable {
+            line("reachable speed", format!("{speed:.4} m/s"))?;
+        }
+        for ManoeuvreSpeed { name, needed } in manoeuvres {
+            line("manoeuvre", format!("`{name}` moves a place at up to {needed:.3} m/s"))?;
+        }
+        self.cautions.iter().try_for_each(|caution| writeln!(f, "caution: {caution}"))
+    }
+}

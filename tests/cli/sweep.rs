@@ -1,0 +1,263 @@
+//! `flockform sweep`: the table and whatever must not change it.
+
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use crate::program::*;
+
+fn said(arguments: &[&str], folder: &Path) -> String {
+    let output = flockform(arguments, folder);
+    assert!(output.status.success(), "{arguments:?}: {}", text(&output.stderr));
+    text(&output.stdout)
+}
+
+fn refused(arguments: &[&str], words: &[&str]) {
+    let folder = temporary();
+    let output = flockform(arguments, folder.path());
+    let why = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {why}");
+    words.iter().for_each(|word| assert!(why.contains(word), "{arguments:?} does not say `{word}`: {why}"));
+    assert!(files(folder.path()).is_empty(), "{arguments:?}: {:?}", files(folder.path()));
+}
+
+fn read(path: impl AsRef<Path>) -> String {
+    std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.as_ref().display()))
+}
+
+/// The cells of a table, its head first.
+fn table(path: impl AsRef<Path>) -> Vec<Vec<String>> {
+    let mut reader = csv::ReaderBuilder::new().has_headers(false).from_path(path).expect("a table");
+    let cells = |row: csv::StringRecord| row.iter().map(str::to_owned).collect();
+    reader.records().map(|row| cells(row.expect("a row"))).collect()
+}
+
+const VARY: [&str; 4] = ["--vary", "update.damping=0.5:1:3", "--vary", "stop.steps=[20, 40]"];
+
+#[test]
+fn a_sweep_has_the_numbers_of_single_runs() {
+    let folder = temporary();
+    let outputs = "energies.pe1,steps,probe.67.ux@20,probe.67.x";
+    said(&[&["sweep", "tension", "--outputs", outputs, "--out", "o"], &VARY[..]].concat(), folder.path());
+    let rows = table(folder.path().join("o/sweep.csv"));
+    assert_eq!(
+        rows[0].join(","),
+        "run,update.damping,stop.steps,energies.pe1,steps,probe.67.ux@20,probe.67.x,stop_reason,reason"
+    );
+    assert_eq!(rows.len(), 7);
+    let varied: Vec<String> = rows[1..].iter().map(|row| row[1..3].join(" ")).collect();
+    assert_eq!(varied, ["0.5 20", "0.5 40", "0.75 20", "0.75 40", "1 20", "1 40"]);
+    let set = ["--set", "update.damping=0.75", "--set", "stop.steps=40"];
+    let run = ["run", "tension", "-q", "--figures", "none", "--no-report", "--out", "single"];
+    said(&[&run[..], &set].concat(), folder.path());
+    let (summary, single) = (read(folder.path().join("single/summary.json")), &rows[4]);
+    assert!(summary.contains(&format!("\"pe1\": {},", single[3])), "{single:?} {summary}");
+    assert_eq!((single[4].as_str(), single[7].as_str()), ("40", "steps"));
+    let probes = table(folder.path().join("single/probes.csv"));
+    let place = |step: &str| -> f64 {
+        let row = probes.iter().find(|row| row[0] == step && row[1] == "67").expect("probed");
+        row[2].parse().expect("a number")
+    };
+    let number = |text: &str| -> f64 { text.parse().expect("a number") };
+    assert!((number(&single[5]) - (place("20") - place("0"))).abs() < 1e-12, "{single:?}");
+    assert_eq!(number(&single[6]), place("40"));
+    assert!(folder.path().join("o/sweep.svg").is_file() && folder.path().join("o/sweep.png").is_file());
+}
+
+#[test]
+fn threads_and_shards_do_not_change_a_byte_of_the_table() {
+    let folder = temporary();
+    let sweep = |more: &[&str]| {
+        let common = ["sweep", "tension", "--figures", "none", "-q"];
+        said(&[&common[..], &VARY, more].concat(), folder.path())
+    };
+    sweep(&["--out", "one", "--threads", "1"]);
+    sweep(&["--out", "many", "--threads", "5"]);
+    let one = read(folder.path().join("one/sweep.csv"));
+    assert_eq!(read(folder.path().join("many/sweep.csv")), one);
+    for shard in ["1/3", "2/3", "3/3"] {
+        sweep(&["--shard", shard]);
+    }
+    let parts = ["tension-sweep-1-of-3", "tension-sweep-2-of-3", "tension-sweep-3-of-3"];
+    let parts = parts.map(|part| format!("out/{part}"));
+    assert_eq!(table(folder.path().join(&parts[1]).join("sweep.csv")).len(), 3, "a head and two of six");
+    // In any order.
+    said(&["sweep", "--merge", &parts[2], &parts[0], &parts[1], "--out", "all", "-q"], folder.path());
+    assert_eq!(read(folder.path().join("all/sweep.csv")), one);
+    // Without one it says so, and the rest can be made.
+    let output = flockform(&["sweep", "--merge", &parts[0], &parts[2], "--out", "two"], folder.path());
+    assert_eq!(output.status.code(), Some(1), "{}", text(&output.stderr));
+    assert!(
+        text(&output.stderr).contains("2 runs are missing, the first is run 1"),
+        "{}",
+        text(&output.stderr)
+    );
+    assert_eq!(table(folder.path().join("two/sweep.csv")).len(), 5);
+    said(&["sweep", "--resume", "two", "-q"], folder.path());
+    assert_eq!(read(folder.path().join("two/sweep.csv")), one);
+    sweep(&["--out", "other", "--set", "lattice.spacing=2.0"]);
+    let output = flockform(&["sweep", "--merge", "one", "other", "--out", "none"], folder.path());
+    assert_eq!(output.status.code(), Some(2));
+    assert!(text(&output.stderr).contains("not parts of one sweep"), "{}", text(&output.stderr));
+    assert!(!folder.path().join("none").exists());
+}
+
+#[test]
+fn samples_are_those_of_their_seed() {
+    let folder = temporary();
+    let draw = |seed: &str, sampling: &str, out: &str| {
+        let arguments =
+            ["sweep", "tension", "--vary", "update.damping=0.1:1", "--samples", "8", "--seed", seed];
+        let more = ["--sampling", sampling, "--set", "stop.steps=5", "--figures", "none", "-q", "--out", out];
+        said(&[&arguments[..], &more].concat(), folder.path());
+        read(folder.path().join(out).join("sweep.csv"))
+    };
+    let first = draw("1", "latin-hypercube", "a");
+    assert_eq!(draw("1", "latin-hypercube", "b"), first);
+    assert_ne!(draw("2", "latin-hypercube", "c"), first);
+    assert_ne!(draw("1", "random", "d"), first);
+    let mut parts: Vec<usize> = table(folder.path().join("a/sweep.csv"))[1..]
+        .iter()
+        .map(|row| (8.0 * (row[1].parse::<f64>().expect("a number") - 0.1) / 0.9) as usize)
+        .collect();
+    parts.sort_unstable();
+    assert_eq!(parts, [0, 1, 2, 3, 4, 5, 6, 7]);
+}
+
+#[test]
+fn runs_that_the_scene_refuses_are_rows_that_say_why() {
+    let folder = temporary();
+    let arguments = ["sweep", "tension", "--vary", "update.damping=[0.5, -1, 1]", "--set", "stop.steps=5"];
+    let output = flockform(&[&arguments[..], &["--out", "o", "--json"]].concat(), folder.path());
+    assert_eq!(output.status.code(), Some(1), "{}", text(&output.stderr));
+    let rows = table(folder.path().join("o/sweep.csv"));
+    let ended: Vec<&str> = rows[1..].iter().map(|row| row[row.len() - 2].as_str()).collect();
+    assert_eq!(ended, ["steps", "refused", "steps"]);
+    assert!(rows[2].last().is_some_and(|reason| reason.contains("update.damping")), "{rows:?}");
+    let json: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    assert_eq!(
+        (json[1]["update.damping"].as_f64(), json[1]["stop_reason"].as_str()),
+        (Some(-1.0), Some("refused"))
+    );
+}
+
+#[test]
+fn what_cannot_be_swept_is_refused_and_leaves_nothing() {
+    let sweep = |more: &[&str], words: &[&str]| {
+        refused(&[&["sweep", "tension", "--set", "stop.steps=2"], more].concat(), words);
+    };
+    let damping = ["--vary", "update.damping=0.5:1:2"];
+    sweep(&["--vary", "update.dampnig=0.5:1:2"], &["dampnig"]);
+    sweep(&["--vary", "update.damping"], &["--vary update.damping", "KEY=FROM:TO:COUNT"]);
+    sweep(&["--vary", "update.damping=0.5:1"], &["--samples"]);
+    sweep(&["--vary", "a=0:1:2000", "--vary", "b=0:1:2000"], &["more than 1000000 runs"]);
+    sweep(&[&damping[..], &damping].concat(), &["twice"]);
+    sweep(&[&damping[..], &["--outputs", "energies.pe9"]].concat(), &["energies.pe9", "pe1, pe2"]);
+    sweep(&[&damping[..], &["--outputs", "energies"]].concat(), &["energies.pe1"]);
+    sweep(&[&damping[..], &["--outputs", "probe.999999.x"]].concat(), &["no particle 999999"]);
+    sweep(&[&damping[..], &["--shard", "5/4"]].concat(), &["--shard 5/4"]);
+    sweep(&[&damping[..], &["--plot", "steps", "--outputs", "residual"]].concat(), &["--plot", "residual"]);
+    sweep(&["--vary", "update.damping=0.5:1:4", "--samples", "3"], &["--samples"]);
+    refused(&["sweep", "tension"], &["--vary"]);
+    refused(&["sweep", "square", "--vary", "a=0:1:2"], &["`square` is a swarm"]);
+    refused(&["sweep", "--resume", "nowhere"], &["nowhere.unfinished", "holds a sweep"]);
+}
+
+#[test]
+fn twenty_runs_of_tension_take_less_than_a_second() {
+    // Unoptimised, on a machine that has other work, several times as long.
+    let patience = Duration::from_secs(if cfg!(debug_assertions) { 8 } else { 1 });
+    let folder = temporary();
+    let took = (0..3).map(|n| {
+        let start = Instant::now();
+        let out = format!("o{n}");
+        said(&["sweep", "tension", "--vary", "update.damping=0.5:1:20", "-q", "--out", &out], folder.path());
+        start.elapsed()
+    });
+    let took = took.min().expect("three times");
+    assert!(took < patience, "{took:?}");
+}
+
+/// A sweep of some seconds.
+const LONG: [&str; 7] =
+    ["sweep", "tension", "--vary", "update.damping=0.5:1:40", "--set", "stop.steps=20000", "-q"];
+
+fn start(folder: &Path) -> Child {
+    Command::new(env!("CARGO_BIN_EXE_flockform"))
+        .args(LONG)
+        .args(["--out", "o", "--figures", "none"])
+        .current_dir(folder)
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the program starts")
+}
+
+/// Waits until some runs have ended, and not all.
+fn wait_for_rows(folder: &Path) {
+    let journal = folder.join("o.unfinished/runs.jsonl");
+    within(Duration::from_secs(120), "some runs have ended", || {
+        let rows = std::fs::read_to_string(&journal).unwrap_or_default();
+        (rows.lines().count() >= 3).then_some(())
+    });
+}
+
+/// The table of an uninterrupted sweep.
+fn undisturbed(folder: &Path) -> String {
+    said(&[&LONG[..], &["--out", "whole", "--figures", "none"]].concat(), folder);
+    read(folder.join("whole/sweep.csv"))
+}
+
+#[test]
+fn a_killed_sweep_goes_on_with_the_runs_that_had_not_ended() {
+    let folder = temporary();
+    let mut child = start(folder.path());
+    wait_for_rows(folder.path());
+    signal("KILL", child.id());
+    assert!(!child.wait().expect("a child").success(), "it was killed before its end");
+    let journal = folder.path().join("o.unfinished/runs.jsonl");
+    let kept = read(&journal);
+    // As a power cut might leave it.
+    std::fs::write(&journal, format!("{kept}{{\"run\":39,\"stop_re")).expect("writable");
+    let again =
+        flockform(&["sweep", "tension", "--vary", "update.damping=0.5:1:2", "--out", "o"], folder.path());
+    assert_eq!(again.status.code(), Some(2));
+    assert!(text(&again.stderr).contains("flockform sweep --resume"), "{}", text(&again.stderr));
+    said(&["sweep", "--resume", "o", "-q", "--figures", "none"], folder.path());
+    assert!(!folder.path().join("o.unfinished").exists());
+    let all = read(folder.path().join("o/runs.jsonl"));
+    assert!(all.starts_with(&kept), "the runs that had ended were not made again");
+    assert_eq!(all.lines().count(), 40);
+    assert_eq!(read(folder.path().join("o/sweep.csv")), undisturbed(folder.path()));
+}
+
+#[test]
+fn ctrl_c_ends_a_sweep_within_a_second_and_keeps_its_rows() {
+    let folder = temporary();
+    let child = start(folder.path());
+    wait_for_rows(folder.path());
+    let since = Instant::now();
+    signal("INT", child.id());
+    let output = child.wait_with_output().expect("a child");
+    assert!(since.elapsed() < Duration::from_millis(1500), "{:?}", since.elapsed());
+    let words = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{words}");
+    assert!(words.contains("interrupted: `flockform sweep --resume"), "{words}");
+    assert!(!folder.path().join("o").exists());
+    assert!(read(folder.path().join("o.unfinished/runs.jsonl")).lines().count() >= 3);
+    said(&["sweep", "--resume", "o.unfinished", "-q", "--figures", "none"], folder.path());
+    assert_eq!(read(folder.path().join("o/sweep.csv")), undisturbed(folder.path()));
+}
+
+#[test]
+fn runs_of_a_scene_that_has_changed_are_not_gone_on_with() {
+    let folder = temporary();
+    said(&["new", "scene", "mine"], folder.path());
+    let arguments = ["sweep", "mine.toml", "--vary", "update.damping=0.5:1:4", "--shard", "1/2", "-q"];
+    said(&[&arguments[..], &["--out", "o", "--figures", "none"]].concat(), folder.path());
+    let path = folder.path().join("mine.toml");
+    std::fs::write(&path, read(&path).replace("steps = 401", "steps = 40")).expect("writable");
+    let output = flockform(&["sweep", "--resume", "o"], folder.path());
+    assert_eq!(output.status.code(), Some(2));
+    assert!(text(&output.stderr).contains("are of another"), "{}", text(&output.stderr));
+    assert_eq!(table(folder.path().join("o/sweep.csv")).len(), 3);
+}
