@@ -4,8 +4,8 @@ use std::fmt::{self, Debug};
 use std::io::IsTerminal;
 use std::time::{SystemTime, UNIX_EPOCH};
 
+use flockform::messages::escaped;
 use flockform::ros::arguments::{RosArguments, Severity};
-use flockform::ros::edge::escaped;
 use flockform::ros::node;
 use tracing::field::Field;
 use tracing::{Event, Level, Metadata, Subscriber};

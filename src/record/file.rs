@@ -10,9 +10,9 @@ use mcap::records::{MessageHeader, Metadata};
 use mcap::{Attachment, WriteOptions, Writer};
 
 use super::RecordError;
-use crate::ros::messages::builtin_interfaces::Time;
-use crate::ros::messages::definitions;
-use crate::ros::node::recorder::RecordedMessage;
+use crate::messages::builtin_interfaces::Time;
+use crate::messages::definitions;
+use crate::messages::recorder::RecordedMessage;
 
 /// Name of the metadata record that says what was recorded.
 pub const METADATA: &str = "flockform";

@@ -99,7 +99,7 @@ pub enum RecordError {
     Scene(#[from] crate::scene::SceneError),
     /// A topic or frame has no legal name.
     #[error("{0}")]
-    Name(#[from] crate::ros::arguments::NameError),
+    Name(#[from] crate::messages::names::NameError),
 }
 
 impl RecordError {

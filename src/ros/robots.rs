@@ -11,16 +11,17 @@ use serde::{Deserialize, Serialize};
 use super::arguments::{Names, RosArguments, Value};
 use super::edge::pulse::Pulse;
 use super::edge::{Edge, EdgeError, Node, Publisher, Quality, Subscription};
-use super::messages::builtin_interfaces::Time;
-use super::messages::geometry_msgs::{
+use super::node::{NodeError, options};
+use crate::messages::Message;
+use crate::messages::builtin_interfaces::Time;
+use crate::messages::geometry_msgs::{
     self, PoseArray, PoseStamped, PoseWithCovariance, PoseWithCovarianceStamped, Quaternion, Transform,
     TransformStamped, Vector3,
 };
-use super::messages::nav_msgs::Odometry;
-use super::messages::rosgraph_msgs::Clock;
-use super::messages::std_msgs::Header;
-use super::messages::tf2_msgs::TFMessage;
-use super::node::{NodeError, options};
+use crate::messages::nav_msgs::Odometry;
+use crate::messages::rosgraph_msgs::Clock;
+use crate::messages::std_msgs::Header;
+use crate::messages::tf2_msgs::TFMessage;
 use crate::scene::swarm::Swarm;
 use crate::scene::swarm::raw::{RawNode, RawPoseType};
 use crate::swarm::control::Control;
@@ -274,7 +275,7 @@ fn topic(names: &Names, pattern: &str, name: &str) -> Result<String, NodeError> 
     Ok(names.fleet_topic(&pattern.replace("{name}", name))?)
 }
 
-fn each<M: super::edge::Message>(
+fn each<M: Message>(
     nodes: &[Node],
     topic: &dyn Fn(usize) -> Result<String, NodeError>,
 ) -> Result<Vec<Publisher<M>>, NodeError> {

@@ -3,13 +3,13 @@
 use std::path::Path;
 use std::sync::OnceLock;
 
+use flockform::messages::flockform_msgs::LoopEvent;
+use flockform::messages::geometry_msgs::{PoseArray, PoseStamped, PoseWithCovarianceStamped};
+use flockform::messages::nav_msgs::Odometry;
+use flockform::messages::recorder::RecordedMessage;
 use flockform::record::flight::FlightMessages;
 use flockform::record::replay::{recorded_swarm, replay};
 use flockform::record::{About, Entry, Reader, Recording, Shared};
-use flockform::ros::messages::flockform_msgs::LoopEvent;
-use flockform::ros::messages::geometry_msgs::{PoseArray, PoseStamped, PoseWithCovarianceStamped};
-use flockform::ros::messages::nav_msgs::Odometry;
-use flockform::ros::node::recorder::RecordedMessage;
 use flockform::scene::bundled::bundled_swarm;
 use flockform::swarm::flight::{Flight, fly_heard};
 use proptest::prelude::*;

@@ -2,9 +2,9 @@
 
 use std::time::{Duration, Instant};
 
+use flockform::messages::geometry_msgs::{Pose, PoseStamped};
+use flockform::messages::std_msgs::Header;
 use flockform::ros::edge::Quality;
-use flockform::ros::messages::geometry_msgs::{Pose, PoseStamped};
-use flockform::ros::messages::std_msgs::Header;
 
 use super::support::*;
 

@@ -4,12 +4,12 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use flockform::messages::diagnostic_msgs::DiagnosticArray;
+use flockform::messages::flockform_msgs::{FormationState, LoopEvent};
+use flockform::messages::geometry_msgs::{PoseArray, PoseStamped, PoseWithCovarianceStamped};
+use flockform::messages::nav_msgs::Odometry;
+use flockform::messages::visualization_msgs::MarkerArray;
 use flockform::record::{Entry, Reader};
-use flockform::ros::messages::diagnostic_msgs::DiagnosticArray;
-use flockform::ros::messages::flockform_msgs::{FormationState, LoopEvent};
-use flockform::ros::messages::geometry_msgs::{PoseArray, PoseStamped, PoseWithCovarianceStamped};
-use flockform::ros::messages::nav_msgs::Odometry;
-use flockform::ros::messages::visualization_msgs::MarkerArray;
 
 use crate::program::*;
 

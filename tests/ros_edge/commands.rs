@@ -1,12 +1,13 @@
 //! Who may command a node, and what nobody may.
 
+use flockform::messages::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
+use flockform::messages::flockform_msgs::SetFormationRequest;
+use flockform::messages::formation::leaders::set_formation;
+use flockform::messages::std_msgs::Empty;
+use flockform::messages::{lifecycle_msgs, rcl_interfaces, std_srvs};
 use flockform::ros::edge::Quality;
 use flockform::ros::edge::lifecycle::State;
 use flockform::ros::edge::parameters::Value;
-use flockform::ros::edge::services::{Empty, lifecycle_msgs, rcl_interfaces, std_srvs};
-use flockform::ros::messages::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
-use flockform::ros::messages::flockform_msgs::SetFormationRequest;
-use flockform::ros::node::leaders::set_formation;
 use flockform::swarm::control::{Control, Mode};
 use ros2_client::ServiceMapping;
 

@@ -5,13 +5,14 @@
 use std::time::Duration;
 
 use flockform::flock::vectors::distance;
+use flockform::messages::diagnostic_msgs::DiagnosticArray;
+use flockform::messages::flockform_msgs::{FormationState, MemberState};
+use flockform::messages::geometry_msgs::PoseStamped;
+use flockform::messages::std_msgs::Empty;
+use flockform::messages::std_srvs;
+use flockform::messages::visualization_msgs::MarkerArray;
 use flockform::ros::arguments::RosArguments;
 use flockform::ros::edge::Quality;
-use flockform::ros::edge::services::{Empty, std_srvs};
-use flockform::ros::messages::diagnostic_msgs::DiagnosticArray;
-use flockform::ros::messages::flockform_msgs::{FormationState, MemberState};
-use flockform::ros::messages::geometry_msgs::PoseStamped;
-use flockform::ros::messages::visualization_msgs::MarkerArray;
 use flockform::ros::node::FormationNode;
 use flockform::ros::robots::RobotNodes;
 use flockform::scene::bundled::bundled_swarm;

@@ -16,7 +16,7 @@ use ros2_client::{Gid, NodeName};
 
 use super::participant::Reader;
 use super::topic::{Taken, next};
-use super::wire::decode;
+use crate::messages::wire::decode;
 
 /// How often the watcher looks \[s\]. Nodes announced within one look go out as one sample.
 const LOOK: Duration = Duration::from_millis(20);

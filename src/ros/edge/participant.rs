@@ -15,10 +15,11 @@ use ros2_client::dds::rustdds::{
 
 use super::graph::{Graph, Watcher, prefix};
 use super::outbox::{Outbox, Outlet};
+use super::payload::{Payload, Verbatim};
 use super::pulse::{self, Pulse};
-use super::wire::{Payload, Verbatim};
-use super::{EdgeError, Message, Publisher, Quality, Service, ServiceType, Subscription, farewell, names};
-use crate::ros::arguments::Names;
+use super::{EdgeError, Publisher, Quality, Service, Subscription, farewell, names};
+use crate::messages::names::Names;
+use crate::messages::{Message, ServiceType};
 
 /// Where to take part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -6,10 +6,12 @@ use std::sync::Arc;
 
 use ros2_client::dds::rustdds::{Timestamp, WriteOptionsBuilder};
 
+use super::EdgeError;
 use super::outbox::Outlet;
 use super::participant::{Reader, Shared};
-use super::wire::{Payload, decode};
-use super::{EdgeError, Message, said};
+use super::payload::Payload;
+use crate::messages::wire::decode;
+use crate::messages::{Message, said};
 
 /// When a sample was sent and when it came.
 #[derive(Clone, Copy, Debug, PartialEq)]

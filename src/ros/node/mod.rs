@@ -4,16 +4,11 @@
 //! bounded queues. Everything it holds is polled; a peer that is slow, gone or wrong cannot hold it up, and a
 //! middleware that does ends the process ([`pulse`](super::edge::pulse)).
 
-pub(crate) mod diagnostics;
 mod drive;
 mod kept;
-pub mod leaders;
 mod link;
-pub(crate) mod markers;
-pub(crate) mod pose;
-pub mod recorder;
+mod pose;
 mod settings;
-pub(crate) mod state;
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -24,31 +19,30 @@ use super::edge::clock::Clock;
 use super::edge::lifecycle::{Goal, Lifecycle, Outcome, Transition};
 use super::edge::parameters::{Change, Parameters, Refusal};
 use super::edge::pulse::Pulse;
-use super::edge::services::std_srvs;
-use super::edge::{Edge, EdgeError, Node, Options, Publisher, Quality, Service, ServiceType, Subscription};
-use super::messages::builtin_interfaces::Time;
-use super::messages::diagnostic_msgs::DiagnosticArray;
-use super::messages::flockform_msgs::{FormationState, LoopEvent, SetFormationRequest, SetFormationResponse};
-use super::messages::geometry_msgs::PoseStamped;
-use super::messages::std_msgs::{Empty, Header};
-use super::messages::visualization_msgs::MarkerArray;
+use super::edge::{Edge, EdgeError, Node, Options, Publisher, Quality, Service, Subscription};
+use crate::messages::Message;
+use crate::messages::builtin_interfaces::Time;
+use crate::messages::diagnostic_msgs::DiagnosticArray;
+use crate::messages::flockform_msgs::{FormationState, LoopEvent, SetFormation, SetFormationResponse};
+pub use crate::messages::formation::NAME;
+use crate::messages::formation::diagnostics::{self, Statistics};
+use crate::messages::formation::leaders::{as_event, set_formation};
+use crate::messages::formation::{markers, state};
+use crate::messages::recorder::{self, MessageRecorder, RecordSink};
+use crate::messages::std_msgs::{Empty, Header};
+use crate::messages::std_srvs;
+use crate::messages::visualization_msgs::MarkerArray;
 use crate::scene::SceneError;
 use crate::scene::swarm::Swarm;
 use crate::swarm::control::Control;
 use crate::swarm::control::scope::{NodeScope, NodeScopeError};
 use crate::swarm::pace::{Pace, system_time};
 use crate::swarm::transport::complaints::Complaints;
-use crate::swarm::transport::{ControllerEnd, listen, target_of, targets};
-use diagnostics::Statistics;
+use crate::swarm::transport::{ControllerEnd, listen, targets};
 use drive::Drive;
 pub use kept::KeptNode;
-use leaders::{as_event, set_formation};
 pub use link::Link;
-use recorder::{MessageRecorder, RecordSink};
 use settings::Settings;
-
-/// Name of the node unless `__node` says otherwise.
-pub const NAME: &str = "flockform";
 
 /// Why there is no node.
 #[derive(Debug, thiserror::Error)]
@@ -63,16 +57,6 @@ pub enum NodeError {
     Parameter(#[from] Refusal),
     #[error("{0}")]
     NodeScope(#[from] NodeScopeError),
-}
-
-/// The service that moves the leaders.
-struct SetFormation;
-
-impl ServiceType for SetFormation {
-    const PACKAGE: &str = "flockform_msgs";
-    const NAME: &str = "SetFormation";
-    type Request = SetFormationRequest;
-    type Response = SetFormationResponse;
 }
 
 /// A formation's node.
@@ -342,7 +326,7 @@ impl FormationNode {
             }
             false => outcome(false, "there is no emergency stop to lift"),
         });
-        let mut set = |request: &SetFormationRequest| match locked {
+        let mut set = |request: &_| match locked {
             Some(reason) => Err(reason.to_owned()),
             None => set_formation(control, request),
         };
@@ -435,20 +419,10 @@ impl FormationNode {
     }
 }
 
-fn copy<M: super::edge::Message>(
-    recorder: &mut Option<MessageRecorder>,
-    topic: &Publisher<M>,
-    message: &M,
-    now: f64,
-) {
+fn copy<M: Message>(recorder: &mut Option<MessageRecorder>, topic: &Publisher<M>, message: &M, now: f64) {
     if let Some(recorder) = recorder {
         recorder.take(topic.topic(), message, [now; 2]);
     }
-}
-
-/// Where a member is sent, as a message.
-pub fn target(control: &Control, member: usize, header: Header) -> Option<PoseStamped> {
-    target_of(control, member).map(|target| link::message(&target, header))
 }
 
 /// Refuses a node that no peer could make active.

@@ -3,8 +3,8 @@
 use std::ops::RangeInclusive;
 
 use super::Value;
-use crate::ros::edge::said;
-use crate::ros::edge::services::rcl_interfaces::{FloatingPointRange, IntegerRange, ParameterDescriptor};
+use crate::messages::rcl_interfaces::{FloatingPointRange, IntegerRange, ParameterDescriptor};
+use crate::messages::said;
 
 /// A validator: `Err` with the reason refuses a value.
 pub type Check = Box<dyn Fn(&str, &Value) -> Result<(), String> + Send>;

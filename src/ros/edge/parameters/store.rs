@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use super::Value;
 use super::declaration::{Declaration, Refusal};
-use crate::ros::edge::said;
-use crate::ros::edge::services::rcl_interfaces::ParameterDescriptor;
+use crate::messages::rcl_interfaces::ParameterDescriptor;
+use crate::messages::said;
 
 /// A parameter that changed.
 #[derive(Clone, Debug, PartialEq)]
@@ -129,7 +129,7 @@ impl Store {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ros::edge::services::rcl_interfaces::FloatingPointRange;
+    use crate::messages::rcl_interfaces::FloatingPointRange;
 
     fn store() -> Store {
         let mut store = Store::default();

@@ -215,8 +215,11 @@ fn check_full_name(what: &'static str, name: &str) -> Result<(), NameError> {
     Ok(())
 }
 
-/// Checks one token of a name; the error describes the fault.
-pub(super) fn check_token(token: &str) -> Result<(), String> {
+/// Checks one token of a name.
+///
+/// # Errors
+/// A description of the fault.
+pub fn check_token(token: &str) -> Result<(), String> {
     let is_allowed = |letter: char| letter.is_ascii_alphanumeric() || letter == '_';
     if token.is_empty() {
         return Err("is empty".into());

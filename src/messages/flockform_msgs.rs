@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::ServiceType;
 use super::geometry_msgs::{Point, Vector3};
 use super::std_msgs::Header;
 
@@ -133,5 +134,12 @@ pub struct SetFormationResponse {
     pub message: String,
 }
 
-impl ros2_client::Message for SetFormationRequest {}
-impl ros2_client::Message for SetFormationResponse {}
+/// `srv/SetFormation`: moves the leaders.
+pub struct SetFormation;
+
+impl ServiceType for SetFormation {
+    const PACKAGE: &str = "flockform_msgs";
+    const NAME: &str = "SetFormation";
+    type Request = SetFormationRequest;
+    type Response = SetFormationResponse;
+}

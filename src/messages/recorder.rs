@@ -1,11 +1,11 @@
 //! Copies of the messages, commands and targets of a loop, for recordings.
 
-use crate::ros::arguments::{NameError, Names};
-use crate::ros::edge::Message;
-use crate::ros::edge::wire::encode;
-use crate::ros::messages::builtin_interfaces::Time;
-use crate::ros::messages::flockform_msgs::LoopEvent;
-use crate::ros::messages::std_msgs::Header;
+use crate::messages::Message;
+use crate::messages::builtin_interfaces::Time;
+use crate::messages::flockform_msgs::LoopEvent;
+use crate::messages::names::{NameError, Names};
+use crate::messages::std_msgs::Header;
+use crate::messages::wire::encode;
 use crate::swarm::control::Control;
 
 /// Topic of [`LoopEvent`]s, below the node's name.

@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::Time;
-use crate::ros::edge::{Message, ServiceType};
+use super::builtin_interfaces::Time;
+use super::{Message, ServiceType};
 
 /// `msg/ParameterValue`: the field that `kind` names counts.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
