@@ -6,7 +6,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use flockform::messages::escaped;
 use flockform::ros::arguments::{RosArguments, Severity};
-use flockform::ros::node;
+use flockform::ros::{node, robots};
 use tracing::field::Field;
 use tracing::{Event, Level, Metadata, Subscriber};
 use tracing_subscriber::EnvFilter;
@@ -60,7 +60,7 @@ pub fn start(arguments: &Arguments, ros: &RosArguments) {
 fn logger(command: &Command, ros: &RosArguments) -> Option<String> {
     let names = match command {
         Command::Node(node) if node.transport == Transport::Ros2 => node::names(ros, node.member.as_deref()),
-        Command::Robots(robots) if robots.transport == Transport::Ros2 => ros.names("robots", "/"),
+        Command::Robots(asked) if asked.transport == Transport::Ros2 => ros.names(robots::NAME, "/"),
         _ => return None,
     };
     let names = names.ok()?;

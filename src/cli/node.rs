@@ -7,7 +7,7 @@ use flockform::record::About;
 use flockform::ros::arguments::RosArguments;
 use flockform::ros::edge::pulse::MIDDLEWARE_GONE;
 use flockform::ros::node::{FormationNode, NodeError};
-use flockform::ros::robots::RobotNodes;
+use flockform::ros::robots::{Layout, RobotNodes};
 use flockform::scene::swarm::Swarm;
 use flockform::shm::{self, Domain, SimulatedRobots};
 use flockform::swarm::control::Control;
@@ -49,6 +49,9 @@ pub struct RobotsArguments {
     /// Middleware that carries poses and targets
     #[arg(long, value_enum, default_value_t)]
     pub transport: Transport,
+    /// Make each robot a ROS 2 node of its own, /ROBOT/robot, instead of one node for all
+    #[arg(long)]
+    node_per_robot: bool,
 }
 
 /// Exit code of a node or robots that ran.
@@ -116,7 +119,8 @@ pub fn robots(arguments: &RobotsArguments, ros: &RosArguments) -> Result<ExitCod
     let announce = |count| tracing::info!("`{}`: {count} simulated robots", swarm.name);
     match life {
         Some(mut life) => {
-            let mut robots = RobotNodes::open(&swarm, ros)?;
+            let layout = if arguments.node_per_robot { Layout::NodePerRobot } else { Layout::OneNode };
+            let mut robots = RobotNodes::open(&swarm, ros, layout)?;
             announce(robots.fleet().robots().len());
             if let Some(left) = life.left() {
                 robots.restore(&left);
@@ -126,6 +130,7 @@ pub fn robots(arguments: &RobotsArguments, ros: &RosArguments) -> Result<ExitCod
                 robots.run_while(interrupt::serves(), &mut |robots| life.tell(|| robots.kept())),
             ));
         }
+        None if arguments.node_per_robot => return Err(Refusal::NoNodes),
         None => {
             let mut robots = SimulatedRobots::open(&swarm, &Domain::from_environment()?)?;
             announce(robots.fleet().robots().len());

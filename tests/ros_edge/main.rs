@@ -11,6 +11,7 @@ mod graph;
 mod interfaces;
 mod lifecycle;
 mod parameters;
+mod robots;
 mod services;
 mod support;
 mod topics;

@@ -8,7 +8,7 @@ mod drive;
 mod kept;
 mod link;
 mod pose;
-mod settings;
+pub(super) mod settings;
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};

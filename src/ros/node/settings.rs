@@ -1,7 +1,7 @@
 //! The node's parameters: what of the swarm file can be changed while it flies.
 
 use super::NodeError;
-use crate::ros::arguments::{RosArguments, Value as Given};
+use crate::ros::arguments::{Parameter, RosArguments, Value as Given};
 use crate::ros::edge::parameters::{Change, Declaration, Store, Value};
 use crate::swarm::control::Control;
 use crate::swarm::pace::Pace;
@@ -46,17 +46,7 @@ pub fn declare(
             .describe("become active without waiting for a lifecycle manager"),
         Declaration::new("use_sim_time", false).read_only().describe("take the time from /clock"),
     ];
-    let given = arguments.parameters_for(node);
-    let mut store = Store::default();
-    let names: Vec<String> = declarations.iter().map(|one| one.name().to_owned()).collect();
-    for declaration in declarations {
-        let start =
-            given.iter().rev().find(|one| one.name == declaration.name()).map(|one| value(&one.value));
-        store.declare(declaration, start)?;
-    }
-    for one in given.iter().filter(|one| !names.contains(&one.name)) {
-        tracing::warn!("parameter `{}` is not one of this node's: {}", one.name, names.join(", "));
-    }
+    let store = store(declarations, &arguments.parameters_for(node))?;
     let number = |name: &str| store.get(name).and_then(Value::as_double).unwrap_or_default();
     let flag = |name: &str| store.get(name).and_then(Value::as_bool).unwrap_or_default();
     let settings = Settings {
@@ -66,6 +56,23 @@ pub fn declare(
         autostart: flag("autostart"),
     };
     Ok((settings, store))
+}
+
+/// Declares parameters with the values given for them; a name that is none of theirs is only warned of.
+pub(in crate::ros) fn store<const N: usize>(
+    declarations: [Declaration; N],
+    given: &[Parameter],
+) -> Result<Store, NodeError> {
+    let mut store = Store::default();
+    let names: Vec<String> = declarations.iter().map(|one| one.name().to_owned()).collect();
+    for declaration in declarations {
+        let start = given.iter().rev().find(|one| one.name == declaration.name());
+        store.declare(declaration, start.map(|one| value(&one.value)))?;
+    }
+    for one in given.iter().filter(|one| !names.contains(&one.name)) {
+        tracing::warn!("parameter `{}` is not one of this node's: {}", one.name, names.join(", "));
+    }
+    Ok(store)
 }
 
 /// A limit that can be tightened and not loosened: the swarm file's value is the upper bound for every caller.
