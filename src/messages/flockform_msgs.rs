@@ -91,7 +91,7 @@ impl FormationState {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct LoopEvent {
     pub header: Header,
-    /// [`LoopEvent::TICK`] to [`LoopEvent::PARAMETER`].
+    /// [`LoopEvent::TICK`] to [`LoopEvent::CONFIGURE`].
     pub kind: u8,
     pub text: String,
     pub values: Vec<f64>,
@@ -106,6 +106,7 @@ impl LoopEvent {
     pub const MANOEUVRE: u8 = 5;
     pub const POSTURE: u8 = 6;
     pub const PARAMETER: u8 = 7;
+    pub const CONFIGURE: u8 = 8;
 }
 
 super::messages!("flockform_msgs": MemberState, FormationState, LoopEvent);

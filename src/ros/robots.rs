@@ -298,7 +298,7 @@ fn declare(arguments: &RosArguments, names: &Names) -> Result<Store, NodeError> 
     let publish_clock = Declaration::new(PUBLISH_CLOCK, false)
         .read_only()
         .describe("publish the simulation's time on /clock, from 0 s on");
-    settings::store([publish_clock], &arguments.parameters_for(&names.fully_qualified()))
+    settings::store(vec![publish_clock], &arguments.parameters_for(&names.fully_qualified()))
 }
 
 /// The names of the nodes to which the robots belong: one for all, or one for each.

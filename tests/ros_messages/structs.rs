@@ -175,7 +175,7 @@ fn every_constant_has_the_value_of_its_definition() {
         ),
         (
             "flockform_msgs/LoopEvent",
-            constants![LoopEvent: TICK, ACTIVE, INACTIVE, EMERGENCY_STOP, RESUME, MANOEUVRE, POSTURE, PARAMETER],
+            constants![LoopEvent: TICK, ACTIVE, INACTIVE, EMERGENCY_STOP, RESUME, MANOEUVRE, POSTURE, PARAMETER, CONFIGURE],
         ),
     ];
     for (name, definition) in every_definition() {

@@ -86,6 +86,18 @@ impl Graph {
         self.add(node, writer, name, |owned| &mut owned.writers);
     }
 
+    /// Forgets a local endpoint that is gone.
+    pub fn remove_endpoint(&self, endpoint: GUID) {
+        let mut state = self.state();
+        state.names.remove(&endpoint);
+        state.matched.remove(&endpoint);
+        for owned in state.nodes.values_mut() {
+            owned.readers.retain(|reader| *reader != endpoint);
+            owned.writers.retain(|writer| *writer != endpoint);
+        }
+        state.nodes_changed = true;
+    }
+
     fn add(&self, node: &str, endpoint: GUID, name: &str, list: fn(&mut Owned) -> &mut Vec<GUID>) {
         let mut state = self.state();
         state.names.insert(endpoint, name.to_owned());

@@ -56,6 +56,12 @@ impl<M: Message> Publisher<M> {
     }
 }
 
+impl<M> Drop for Publisher<M> {
+    fn drop(&mut self) {
+        self.shared.graph.remove_endpoint(self.outlet.guid());
+    }
+}
+
 /// Receives messages of one type on one topic.
 pub struct Subscription<M> {
     topic: String,
@@ -127,6 +133,12 @@ impl<M: Message> Subscription<M> {
 
     pub fn topic(&self) -> &str {
         &self.topic
+    }
+}
+
+impl<M> Drop for Subscription<M> {
+    fn drop(&mut self) {
+        self.shared.graph.remove_endpoint(self.reader.guid());
     }
 }
 
