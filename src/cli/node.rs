@@ -86,6 +86,9 @@ pub fn node(arguments: &NodeArguments, ros: &RosArguments) -> Result<ExitCode, R
                 node.record(recording.sink()).map_err(NodeError::from)?;
             }
             announce(&swarm, node.control());
+            for line in node.reached_at() {
+                tracing::info!("{line}");
+            }
             if let Some(left) = life.left() {
                 node.restore(left);
             }
@@ -122,6 +125,7 @@ pub fn robots(arguments: &RobotsArguments, ros: &RosArguments) -> Result<ExitCod
             let layout = if arguments.node_per_robot { Layout::NodePerRobot } else { Layout::OneNode };
             let mut robots = RobotNodes::open(&swarm, ros, layout)?;
             announce(robots.fleet().robots().len());
+            tracing::info!("{}", robots.reached_at());
             if let Some(left) = life.left() {
                 robots.restore(&left);
             }

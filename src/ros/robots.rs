@@ -152,6 +152,14 @@ impl RobotNodes {
         })
     }
 
+    /// Where the robots can be reached, in words.
+    pub fn reached_at(&self) -> String {
+        let (first, others) = (&self.link.nodes[0], self.link.nodes.len() - 1);
+        let others = if others == 0 { String::new() } else { format!(" and {others} nodes like it") };
+        let targets = self.link.targets.first().map_or("", |topic| topic.topic());
+        format!("{}{others} on {}; targets from {targets}", first.name(), first.options())
+    }
+
     /// Flies until `stop` is set.
     pub fn run(&mut self, stop: &AtomicBool) {
         self.run_while(stop, &mut |_| true);

@@ -6,6 +6,8 @@
 #![cfg(feature = "ros")]
 
 mod commands;
+#[cfg(feature = "record")]
+mod configuration;
 mod formation;
 mod graph;
 mod interfaces;

@@ -1,5 +1,6 @@
 //! The participant of a process, and the nodes in it.
 
+use std::fmt;
 use std::net::IpAddr;
 use std::sync::Arc;
 use std::sync::mpsc::channel;
@@ -34,6 +35,13 @@ pub struct Options {
 impl Default for Options {
     fn default() -> Self {
         Self { domain: 0, loopback_only: false }
+    }
+}
+
+impl fmt::Display for Options {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let reach = if self.loopback_only { ", for peers on this computer alone" } else { "" };
+        write!(f, "ROS domain {}{reach}", self.domain)
     }
 }
 
@@ -239,6 +247,11 @@ impl Node {
     /// Fully qualified name, e.g. `/swarm/flockform`.
     pub fn name(&self) -> &str {
         &self.name
+    }
+
+    /// Where it takes part.
+    pub fn options(&self) -> Options {
+        self.shared.options
     }
 
     /// Has a watchdog end the process when the middleware is dead or deaf: see [`pulse`].

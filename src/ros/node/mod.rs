@@ -237,6 +237,11 @@ impl FormationNode {
         self.origin.names.fleet()
     }
 
+    /// Where the node can be reached, in words.
+    pub fn reached_at(&self) -> [String; 2] {
+        self.origin.reached_at()
+    }
+
     fn hears_any(&self) -> bool {
         self.origin.part.heard.iter().any(|&m| self.control.health(m).is_usable())
     }

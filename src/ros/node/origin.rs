@@ -58,6 +58,19 @@ impl Origin {
         Ok(())
     }
 
+    /// Where the node can be reached, in words: its name and domain, and the topics of its first robot.
+    pub fn reached_at(&self) -> [String; 2] {
+        let (raw, robots) = (&self.swarm.raw.node, &self.fresh.formation().names);
+        let first = self.part.mine.first().map_or("{name}", |&m| &robots[m]);
+        // Checked when the node was opened.
+        let topic = |pattern: &str| self.topic_of(pattern, first).unwrap_or_default();
+        let (poses, targets) = (topic(&raw.pose_topic), topic(&raw.target_topic));
+        [
+            format!("{} on {}", self.node.name(), self.node.options()),
+            format!("{first}: poses from {poses}, targets to {targets}, in the frame `{}`", raw.frame_id),
+        ]
+    }
+
     /// Header of what is published at `now` \[s\].
     pub fn header(&self, now: f64) -> Header {
         Header { stamp: Time::from_seconds(now), frame_id: self.swarm.raw.node.frame_id.clone() }
