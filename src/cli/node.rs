@@ -12,11 +12,11 @@ use flockform::scene::swarm::Swarm;
 use flockform::shm::{self, Domain, SimulatedRobots};
 use flockform::swarm::control::Control;
 
-use super::interrupt;
 use super::recording::{RecordArguments, close};
 use super::supervise::{Life, supervise};
 use super::swarm::SwarmFileArguments;
 use super::{Refusal, say};
+use super::{interrupt, log};
 
 /// Middleware between the node and the robots.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
@@ -84,6 +84,9 @@ pub fn node(arguments: &NodeArguments, ros: &RosArguments) -> Result<ExitCode, R
             let recording = arguments.record.open(&about, false, life.number())?;
             if let Some(recording) = &recording {
                 node.record(recording.sink()).map_err(NodeError::from)?;
+            }
+            if let Some(level) = log::level() {
+                node.serve_log_level(level).map_err(NodeError::from)?;
             }
             announce(&swarm, node.control());
             for line in node.reached_at() {

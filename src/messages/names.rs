@@ -85,6 +85,11 @@ impl Names {
         join(&self.namespace, &self.node)
     }
 
+    /// Name of the node's logger, with dots as `rcl` has them: `a.b.node`.
+    pub fn logger(&self) -> String {
+        self.fully_qualified().trim_start_matches('/').replace('/', ".")
+    }
+
     /// The fully qualified name of a topic: `name` expanded, then remapped by the first rule that
     /// matches. `name` is absolute (`/pose`), relative to the namespace (`pose`) or to the node
     /// (`~/pose`), and may contain `{node}` and `{ns}`.

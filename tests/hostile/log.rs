@@ -70,3 +70,28 @@ fn a_node_logs_as_ros_2_nodes_do() {
     assert_eq!(quiet.terminate(), Some(0));
     assert_eq!(lines.iter().collect::<Vec<_>>(), Vec::<String>::new());
 }
+
+#[test]
+fn a_node_says_where_it_can_be_reached() {
+    let domain = domain();
+    for (subcommand, expected) in [
+        (
+            "node",
+            &["/fleet/flockform on ROS domain ", "/fleet/robot_1/pose", "/fleet/robot_1/target_pose"][..],
+        ),
+        ("robots", &["/fleet/robots on ROS domain ", "/fleet/robot_1/target_pose"]),
+    ] {
+        let words = [subcommand, "square", "--ros-args", "-r", "__ns:=/fleet"];
+        let mut command = command(domain, &words);
+        command.env_remove("RUST_LOG");
+        let mut running = Running::start(&mut command);
+        let lines = running.lines();
+        let mut said = String::new();
+        until("where it is reached", || {
+            said.extend(lines.try_iter());
+            expected.iter().all(|one| said.contains(one)).then_some(())
+        });
+        assert!(said.contains(&format!("ROS domain {domain}")), "{said}");
+        assert_eq!(running.terminate(), Some(0));
+    }
+}

@@ -1,12 +1,16 @@
 //! Who may command a node, and what nobody may.
 
+use std::sync::{Arc, Mutex};
+
 use flockform::messages::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
 use flockform::messages::flockform_msgs::SetFormationRequest;
 use flockform::messages::formation::leaders::set_formation;
 use flockform::messages::std_msgs::Empty;
 use flockform::messages::{lifecycle_msgs, rcl_interfaces, std_srvs};
+use flockform::ros::arguments::Severity;
 use flockform::ros::edge::Quality;
 use flockform::ros::edge::lifecycle::State;
+use flockform::ros::edge::loggers::LogLevel;
 use flockform::ros::edge::parameters::Value;
 use flockform::swarm::control::{Control, Mode};
 use ros2_client::ServiceMapping;
@@ -134,4 +138,37 @@ fn a_second_node_of_the_same_name_is_noticed_and_reported() {
     });
     drop(twin);
     told(&mut swarm, &|status| !status.message.contains("name"));
+}
+
+#[test]
+fn the_log_s_level_is_read_and_set_by_the_node_s_name_where_commands_are_allowed() {
+    use rcl_interfaces::{GetLoggerLevels, LoggerLevel, Names, SetLoggerLevels, SetLoggerLevelsRequest};
+    let mut peers = peers();
+    let severity = Arc::new(Mutex::new(Severity::Unset));
+    for (overrides, may) in [(&[][..], true), (&["node.commands=\"stop-only\""], false)] {
+        *severity.lock().expect("whole") = Severity::Info;
+        let (read, written) = (Arc::clone(&severity), Arc::clone(&severity));
+        let level = LogLevel {
+            get: Box::new(move || *read.lock().expect("whole")),
+            set: Box::new(move |wanted| {
+                *written.lock().expect("whole") = wanted;
+                Ok(())
+            }),
+        };
+        let mut swarm = Swarming::open(&square(&[&PATIENT[..], overrides].concat()), &[]);
+        swarm.node.serve_log_level(level).expect("services");
+        let mapping = ServiceMapping::Enhanced;
+        let get = client::<GetLoggerLevels>(&mut peers, mapping, "/flockform/get_logger_levels");
+        let set = client::<SetLoggerLevels>(&mut peers, mapping, "/flockform/set_logger_levels");
+        let names = Names { names: vec!["flockform".into(), "else".into()] };
+        let levels = call::<GetLoggerLevels>(&get, &names, &mut || swarm.tick()).levels;
+        assert_eq!(levels.iter().map(|one| one.level).collect::<Vec<_>>(), [20, 0]);
+        let wanted = [("flockform", 10), ("flockform", 11), ("else", 10)];
+        let levels = wanted.map(|(name, level)| LoggerLevel { name: name.into(), level }).into();
+        let asked = SetLoggerLevelsRequest { levels };
+        let results = call::<SetLoggerLevels>(&set, &asked, &mut || swarm.tick()).results;
+        assert_eq!(results.iter().map(|one| one.successful).collect::<Vec<_>>(), [may, false, false]);
+        let expected = if may { Severity::Debug } else { Severity::Info };
+        assert_eq!(*severity.lock().expect("whole"), expected);
+    }
 }

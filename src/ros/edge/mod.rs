@@ -8,6 +8,7 @@
 //! * [`topic`]: publishers and subscriptions; [`quality`]: what they promise each other.
 //! * [`service`]: services that answer peers on Fast DDS and on Cyclone DDS alike.
 //! * [`parameters`], [`lifecycle`]: what ROS 2 expects of a node, as pure cores and their services.
+//! * [`loggers`]: the level of the log.
 //! * [`pulse`]: whether the middleware still lives.
 //! * [`clock`]: system time or the simulator's.
 //!
@@ -18,6 +19,7 @@ mod door;
 mod farewell;
 mod graph;
 pub mod lifecycle;
+pub mod loggers;
 pub mod loopback;
 pub mod names;
 mod outbox;

@@ -249,6 +249,11 @@ impl Node {
         &self.name
     }
 
+    /// Name of its logger.
+    pub fn logger(&self) -> String {
+        self.names.logger()
+    }
+
     /// Where it takes part.
     pub fn options(&self) -> Options {
         self.shared.options

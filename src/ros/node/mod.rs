@@ -20,6 +20,7 @@ use std::time::Instant;
 use super::arguments::{DiscoveryRange, NameError, Names, RosArguments};
 use super::edge::clock::Clock;
 use super::edge::lifecycle::{Lifecycle, Transition};
+use super::edge::loggers::{LogLevel, Loggers};
 use super::edge::parameters::{Change, Parameters, Refusal};
 use super::edge::pulse::Pulse;
 use super::edge::{Edge, EdgeError, Options, Publisher, Quality, Service, Subscription};
@@ -73,6 +74,8 @@ pub struct FormationNode {
     stop_requests: Option<Subscription<Empty>>,
     resume: Service<std_srvs::Trigger>,
     set_formation: Service<SetFormation>,
+    /// Of a log whose level can change.
+    loggers: Option<Loggers>,
     /// Of a configured node.
     endpoints: Option<Endpoints>,
     /// As `endpoints.is_some()`, for the parameters that only a node that is not configured can change.
@@ -127,6 +130,7 @@ impl FormationNode {
                 .transpose()?,
             resume: node.service(&service("resume")?)?,
             set_formation: node.service(&service("set_formation")?)?,
+            loggers: None,
             endpoints: None,
             is_configured,
             is_new: false,
@@ -181,6 +185,15 @@ impl FormationNode {
         recorder.parameters(self.time(), &self.control);
         *self.recorder() = Some(recorder);
         self.is_new = false;
+        Ok(())
+    }
+
+    /// Lets peers read and set the level of this log.
+    ///
+    /// # Errors
+    /// A service that the middleware refuses.
+    pub fn serve_log_level(&mut self, level: LogLevel) -> Result<(), EdgeError> {
+        self.loggers = Some(Loggers::new(&self.origin.node, level)?);
         Ok(())
     }
 
@@ -321,6 +334,9 @@ impl FormationNode {
             self.record_event(now, kind, "", &[]);
         }
         let locked = (!commands.may_do_all()).then_some(not_allowed.as_str());
+        if let Some(loggers) = &self.loggers {
+            loggers.serve(locked);
+        }
         let changes = self.parameters.poll(now, locked);
         self.apply(&changes, now);
         let mut events: Vec<(u8, String, Vec<f64>)> = Vec::new();
