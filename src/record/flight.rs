@@ -119,14 +119,18 @@ impl FlightMessages {
         let (recorder, topic, times) = (&mut self.recorder, &self.topics.poses[member], [now; 2]);
         match raw.pose_type {
             RawPoseType::PoseStamped | RawPoseType::PoseArray => {
-                recorder.take(topic, &PoseStamped { header, pose: planar }, times);
+                recorder.take_received(topic, &PoseStamped { header, pose: planar }, times);
             }
             RawPoseType::PoseWithCovarianceStamped => {
-                recorder.take(topic, &PoseWithCovarianceStamped { header, pose: uncertain() }, times);
+                recorder.take_received(
+                    topic,
+                    &PoseWithCovarianceStamped { header, pose: uncertain() },
+                    times,
+                );
             }
             RawPoseType::Odometry => {
                 let message = Odometry { header, pose: uncertain(), ..Odometry::default() };
-                recorder.take(topic, &message, times);
+                recorder.take_received(topic, &message, times);
             }
         }
     }

@@ -141,7 +141,15 @@ fn messages_with_anything_in_them_are_replayed_or_refused() {
             let (package, name) = kind(package, name);
             let (time, published) = (entry.published, entry.published);
             let topic = &*entry.topic;
-            recording.write(&RecordedMessage { topic, package, name, payload: &payload, time, published });
+            recording.write(&RecordedMessage {
+                topic,
+                package,
+                name,
+                payload: &payload,
+                reliable: true,
+                time,
+                published,
+            });
         }
         recording.finish().expect("written");
         read(std::fs::read(&path).expect("readable"));

@@ -78,6 +78,39 @@ fn a_flight_s_recording_has_the_topics_of_the_live_node() {
     assert!(!folder.path().join("f.mcap.part").exists());
 }
 
+/// With an index of it all: readers that seek, as rosbag2 does, need not repair the file.
+#[test]
+fn a_recording_tells_rosbag2_its_topics_and_their_quality_of_service() {
+    let folder = temporary();
+    let calm = ["--set", "flight.duration=2.0", "--set", "flight.bounds={}"];
+    says(
+        0,
+        &[&["swarm", "square", "-q", "--out", "o", "--record", "f.mcap"][..], &calm].concat(),
+        folder.path(),
+    );
+    let bytes = std::fs::read(folder.path().join("f.mcap")).expect("written");
+    let summary = mcap::Summary::read(&bytes).expect("an index").expect("one that is not empty");
+    let statistics = summary.stats.as_ref().expect("statistics");
+    let index = summary.metadata_indexes.iter().find(|one| one.name == "rosbag2").expect("a record");
+    let mcap::records::Metadata { metadata, .. } = mcap::read::metadata(&bytes, index).expect("readable");
+    let bag: serde_json::Value = serde_json::from_str(&metadata["serialized_metadata"]).expect("JSON");
+    assert_eq!(bag["message_count"], statistics.message_count);
+    assert_eq!(bag["starting_time"]["nanoseconds_since_epoch"], statistics.message_start_time);
+    assert_eq!(bag["relative_file_paths"][0], "f.mcap");
+    let topics = bag["topics_with_message_count"].as_array().expect("topics");
+    assert_eq!(topics.len(), summary.channels.len());
+    for (id, channel) in &summary.channels {
+        let find = |one: &&serde_json::Value| one["topic_metadata"]["name"] == channel.topic.as_str();
+        let topic = topics.iter().find(find).expect("every channel");
+        assert_eq!(topic["message_count"], statistics.channel_message_counts[id], "{}", channel.topic);
+        let text = &channel.metadata["offered_qos_profiles"];
+        let offered: serde_json::Value = serde_json::from_str(text).expect("JSON");
+        assert_eq!(offered, topic["topic_metadata"]["offered_qos_profiles"]);
+        let expected = if channel.topic.ends_with("/pose") { "best_effort" } else { "reliable" };
+        assert_eq!(offered[0]["reliability"], expected, "{}", channel.topic);
+    }
+}
+
 #[test]
 #[ignore = "needs Python with mcap, mcap-ros2-support and rosbags: see main.rs"]
 fn mcap_and_rosbags_decode_every_message_to_the_values_written() {

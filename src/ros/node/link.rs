@@ -76,7 +76,7 @@ impl ControllerEnd for Link {
         for (member, topic) in &self.leaders {
             let Some((message, _)) = topic.take_last() else { continue };
             if let Some(recorder) = &mut self.recorder {
-                recorder.take(topic.topic(), &message, [now; 2]);
+                recorder.take_received(topic.topic(), &message, [now; 2]);
             }
             if is_frame(&message.header.frame_id, &self.frame_id) {
                 let place = message.pose.position;

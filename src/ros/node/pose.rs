@@ -133,6 +133,6 @@ fn copy<M: crate::messages::Message>(
     now: Option<f64>,
 ) {
     if let Some((recorder, time)) = recorder {
-        recorder.take(topic, message, [*time, now.unwrap_or(stamps.received)]);
+        recorder.take_received(topic, message, [*time, now.unwrap_or(stamps.received)]);
     }
 }
