@@ -50,6 +50,7 @@ fn a_node_is_configured_with_names_that_were_set_while_it_was_not() {
     assert!(refused.contains("cleanup"), "{refused}");
     assert_eq!(set(&mut peers, &mut swarm, "target_topic", "{name}/target_pose"), Ok(()), "as it is");
 
+    swarm.fly_until("the leaders are under way", |swarm| swarm.node.control().program_time() > 0.1);
     let before = swarm.node.control().program_time();
     change(&mut peers, &mut swarm, &["deactivate", "cleanup"]);
     swarm.fly_until("the state's topic is closed", |_| states.matched() == 0);
