@@ -94,11 +94,12 @@ impl MessageRecorder {
 }
 
 /// Of a loop: names and values in SI units.
-pub fn parameters(control: &Control) -> [(&'static str, f64); 5] {
+pub fn parameters(control: &Control) -> [(&'static str, f64); 6] {
     let limits = control.limits();
     [
         ("period", control.period()),
         ("damping", control.damping()),
+        ("sweeps", control.sweeps() as f64),
         ("speed_limit", limits.speed),
         ("acceleration_limit", limits.acceleration),
         ("clearance", limits.clearance),
@@ -111,6 +112,7 @@ pub fn set_parameter(control: &mut Control, name: &str, value: f64) -> bool {
     match name {
         "period" if value > 0.0 => control.set_period(value),
         "damping" => control.set_damping(value),
+        "sweeps" if value >= 1.0 => control.set_sweeps(value as usize),
         "speed_limit" => limits.speed = value,
         "acceleration_limit" => limits.acceleration = value,
         "clearance" => limits.clearance = value,

@@ -71,8 +71,8 @@ fn a_flight_s_recording_has_the_topics_of_the_live_node() {
     let count = |topic: &str| topics.iter().find(|(one, _)| one == topic).map(|(_, count)| *count);
     let ticks = count("/robot_1/target_pose").expect("targets");
     assert_eq!(count("/robot_25/pose"), Some(ticks));
-    // Before the ticks come five parameters and the start.
-    assert_eq!(count("/flockform/events"), Some(ticks + 6));
+    // Before the ticks come six parameters and the start.
+    assert_eq!(count("/flockform/events"), Some(ticks + 7));
     assert!(count("/flockform/state").is_some() && count("/flockform/markers").is_some(), "{topics:?}");
     assert!(count("/diagnostics").is_some(), "{topics:?}");
     assert!(!folder.path().join("f.mcap.part").exists());

@@ -19,7 +19,11 @@ use super::formation::{PATIENT, Swarming, square};
 use super::support::*;
 
 fn set(peers: &mut Peers, swarm: &mut Swarming, name: &str, value: f64) -> Result<(), String> {
-    let parameter = rcl_interfaces::Parameter { name: name.into(), value: Value::Double(value).to_wire() };
+    set_value(peers, swarm, name, &Value::Double(value))
+}
+
+fn set_value(peers: &mut Peers, swarm: &mut Swarming, name: &str, value: &Value) -> Result<(), String> {
+    let parameter = rcl_interfaces::Parameter { name: name.into(), value: value.to_wire() };
     let request = rcl_interfaces::Settings { parameters: vec![parameter] };
     let service = "/flockform/set_parameters";
     let client = client::<rcl_interfaces::SetParameters>(peers, ServiceMapping::Enhanced, service);
@@ -48,6 +52,24 @@ fn limits_are_tightened_and_never_loosened() {
     assert_eq!((swarm.node.control().limits().speed, swarm.node.control().limits().clearance), (0.25, 0.4));
     // Back to the file's, and not beyond.
     assert_eq!(set(&mut peers, &mut swarm, "speed_limit", 1.0), Ok(()));
+}
+
+#[test]
+fn the_gains_of_the_rule_change_while_it_flies() {
+    let mut peers = peers();
+    let mut swarm = Swarming::open(&square(&PATIENT), &[]);
+    assert_eq!(set(&mut peers, &mut swarm, "damping", 0.5), Ok(()));
+    assert_eq!(set_value(&mut peers, &mut swarm, "sweeps", &Value::Integer(7)), Ok(()));
+    let refused = set_value(&mut peers, &mut swarm, "sweeps", &Value::Integer(0)).expect_err("none");
+    assert!(refused.contains("1 to 100000"), "{refused}");
+    let control = swarm.node.control();
+    assert_eq!((control.damping(), control.sweeps()), (0.5, 7));
+    // What another process would go on from.
+    let kept = swarm.node.kept();
+    drop(swarm);
+    let mut again = Swarming::open(&square(&PATIENT), &[]);
+    again.node.restore(kept);
+    assert_eq!((again.node.control().damping(), again.node.control().sweeps()), (0.5, 7));
 }
 
 #[test]

@@ -22,7 +22,10 @@ pub struct KeptNode {
 impl FormationNode {
     /// The state for [`FormationNode::restore`].
     pub fn kept(&self) -> KeptNode {
-        let number = |(name, value): (&str, &Value)| Some((name.to_owned(), value.as_double()?));
+        let number = |(name, value): (&str, &Value)| {
+            let whole = value.as_integer().map(|number| number as f64);
+            Some((name.to_owned(), value.as_double().or(whole)?))
+        };
         let text = |(name, value): (&str, &Value)| Some((name.to_owned(), value.as_str()?.to_owned()));
         KeptNode {
             state: self.lifecycle.state().label().to_owned(),
@@ -42,7 +45,11 @@ impl FormationNode {
             // Names change while the node is not configured.
             self.go_to(State::Unconfigured, now);
         }
-        kept.parameters.into_iter().for_each(|(name, value)| self.set(&name, Value::Double(value)));
+        for (name, value) in kept.parameters {
+            let is_whole = self.parameters.get(&name).and_then(Value::as_integer).is_some();
+            let value = if is_whole { Value::Integer(value as i64) } else { Value::Double(value) };
+            self.set(&name, value);
+        }
         kept.names.into_iter().for_each(|(name, value)| self.set(&name, Value::String(value)));
         let changes = self.parameters.poll(now, None);
         self.apply(&changes, now);

@@ -110,7 +110,7 @@ impl FormationNode {
         let node = edge.named_node(&names)?;
 
         let is_configured = Arc::default();
-        let (settings, store) = settings::declare(&control, arguments, &names, swarm, &is_configured)?;
+        let (settings, store) = settings::declare(&control, arguments, &names, swarm, &part, &is_configured)?;
         check_commands(swarm, settings.autostart)?;
         let clock = if settings.use_sim_time { Clock::simulated(&node)? } else { Clock::system() };
         let service = |leaf: &str| names.service(&format!("~/{leaf}")).map_err(NodeError::from);

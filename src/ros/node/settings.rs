@@ -10,6 +10,7 @@ use crate::ros::edge::parameters::{Change, Declaration, Store, Value};
 use crate::scene::swarm::Swarm;
 use crate::scene::swarm::raw::RawNode;
 use crate::swarm::control::Control;
+use crate::swarm::control::scope::NodeScope;
 use crate::swarm::pace::Pace;
 
 /// Values of the parameters that are read where they are used.
@@ -44,6 +45,7 @@ pub(super) fn declare(
     arguments: &RosArguments,
     names: &Names,
     swarm: &Swarm,
+    part: &NodeScope,
     is_configured: &Arc<AtomicBool>,
 ) -> Result<(Settings, Store), NodeError> {
     let limits = control.limits();
@@ -62,6 +64,9 @@ pub(super) fn declare(
         Declaration::new("damping", control.damping())
             .range(0.0..=2.0)
             .describe("part of the way to its target that a follower goes in a sweep [1]"),
+        Declaration::new("sweeps", control.sweeps() as i64)
+            .integer_range(1..=most_sweeps(control, part), 0)
+            .describe("applications of the rule in a period [1]"),
         Declaration::new("autostart", true)
             .read_only()
             .describe("become active without waiting for a lifecycle manager"),
@@ -125,6 +130,11 @@ pub(in crate::ros) fn store(declarations: Vec<Declaration>, given: &[Parameter])
     Ok(store)
 }
 
+/// As the swarm file allows; the node of one robot receives its neighbours' poses alone, which makes one sweep.
+fn most_sweeps(control: &Control, part: &NodeScope) -> i64 {
+    if part.mine.len() == control.formation().count() { 100_000 } else { 1 }
+}
+
 /// A limit that can be tightened and not loosened: the swarm file's value is the upper bound for every caller.
 fn at_most(name: &str, limit: f64) -> Declaration {
     if limit == f64::INFINITY {
@@ -151,7 +161,8 @@ impl Settings {
     }
 
     pub fn apply(&mut self, change: &Change, control: &mut Control, pace: &mut Pace) {
-        let Some(number) = change.value.as_double() else { return };
+        let whole = change.value.as_integer().map(|number| number as f64);
+        let Some(number) = change.value.as_double().or(whole) else { return };
         let limit = if number == NONE { f64::INFINITY } else { number };
         let mut limits = control.limits().clone();
         match change.name.as_str() {
@@ -162,6 +173,7 @@ impl Settings {
             }
             "state_rate" => self.state_rate = number,
             "damping" => control.set_damping(number),
+            "sweeps" => control.set_sweeps(number as usize),
             "speed_limit" => limits.speed = limit,
             "acceleration_limit" => limits.acceleration = limit,
             "clearance" => limits.clearance = number,
