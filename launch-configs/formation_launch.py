@@ -39,7 +39,7 @@ def generate_launch_description():
             default_value="false",
             description="The robots publish /clock, and the node takes the time from it",
         ),
-        # Without a name of their own: the process is many nodes, one for each robot.
+        # All simulated robots are one node.
         Node(
             package="flockform",
             executable="flockform",

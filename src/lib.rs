@@ -20,7 +20,8 @@
 //! * `export` (feature `export`): CSV, JSON, VTK and figures, one file per format.
 //! * `fem` (feature `fem`): finite elements, the reference for the rules; it imports no flock.
 //! * `swarm` (feature `swarm`): formations of robots: targets by the same rule, made safe; flights of simulated robots.
-//! * `ros` (feature `ros`): the same over ROS 2: arguments, messages, parameters, lifecycle, the node.
+//! * `messages` (feature `messages`): what robots and formations publish: structs, encoding, names of topics.
+//! * `ros` (feature `ros`): the same over ROS 2: arguments, parameters, lifecycle, the node.
 //! * `shm` (feature `shm`): the same over shared memory, without a copy; a running body published to other processes.
 //! * `record` (feature `record`): recordings of flights and runs for Foxglove and `ros2 bag`, and their replay.
 //! * `bench` (feature `bench`): how fast sweeps and solvers are, beside what the machine and others can do.
@@ -60,6 +61,12 @@ pub mod bench;
 pub mod export;
 #[cfg(feature = "fem")]
 pub mod fem;
+#[allow(
+    missing_docs,
+    reason = "fields are those of the published interface definitions, which say what they mean"
+)]
+#[cfg(feature = "messages")]
+pub mod messages;
 #[cfg(feature = "record")]
 pub mod record;
 #[cfg(feature = "ros")]

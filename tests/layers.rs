@@ -112,8 +112,20 @@ fn the_swarm_knows_nothing_of_middleware_and_outputs() {
 }
 
 #[test]
+fn messages_describe_the_swarm_and_know_nothing_of_the_network() {
+    assert_imports_only("messages", &["scene", "flock", "swarm"]);
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/messages");
+    for file in rust_files(&source) {
+        let text = std::fs::read_to_string(&file).expect("readable");
+        for word in ["std::net", "std::fs", "std::thread", "socket2", "DomainParticipant"] {
+            assert!(!text.contains(word), "{} uses {word}", file.display());
+        }
+    }
+}
+
+#[test]
 fn ros_is_an_edge_of_the_swarm() {
-    assert_imports_only("ros", &["scene", "continuum", "engine", "flock", "swarm"]);
+    assert_imports_only("ros", &["scene", "continuum", "engine", "flock", "messages", "swarm"]);
 }
 
 #[test]
@@ -122,8 +134,8 @@ fn shared_memory_is_an_edge_of_the_swarm_and_of_the_continuum() {
 }
 
 #[test]
-fn recordings_stand_on_the_edge_and_know_nothing_of_figures() {
-    assert_imports_only("record", &["scene", "continuum", "engine", "flock", "swarm", "ros"]);
+fn recordings_stand_on_the_messages_and_know_nothing_of_the_network_and_of_figures() {
+    assert_imports_only("record", &["scene", "continuum", "engine", "flock", "swarm", "messages"]);
 }
 
 /// Files of `src` that contain a word.

@@ -2,11 +2,13 @@
 
 use std::fmt::{self, Debug};
 use std::io::IsTerminal;
+use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::{SystemTime, UNIX_EPOCH};
 
+use flockform::messages::escaped;
 use flockform::ros::arguments::{RosArguments, Severity};
-use flockform::ros::edge::escaped;
-use flockform::ros::node;
+use flockform::ros::edge::loggers::LogLevel;
+use flockform::ros::{node, robots};
 use tracing::field::Field;
 use tracing::{Event, Level, Metadata, Subscriber};
 use tracing_subscriber::EnvFilter;
@@ -23,25 +25,38 @@ const NODE_FORMAT: &str = "[{severity}] [{time}] [{name}]: {message}";
 /// Longer than any line of our own.
 const MOST_CHARACTERS: usize = 2000;
 
+/// The log of a node while it runs.
+struct NodeLog {
+    severity: Mutex<Severity>,
+    filter: Box<dyn Fn(EnvFilter) -> Result<(), String> + Send + Sync>,
+}
+
+static NODE_LOG: OnceLock<NodeLog> = OnceLock::new();
+
+/// The level of a node's log; none where nothing is to be logged, or what is not a node.
+pub fn level() -> Option<LogLevel> {
+    let log = NODE_LOG.get()?;
+    let severity = || log.severity.lock().unwrap_or_else(PoisonError::into_inner);
+    Some(LogLevel {
+        get: Box::new(move || *severity()),
+        set: Box::new(move |wanted| {
+            (log.filter)(only_ours(filter_of(wanted, 1)).into())?;
+            *severity() = wanted;
+            Ok(())
+        }),
+    })
+}
+
 /// Starts the log. `RUST_LOG` wins over `--log-level`, and that over `-v`. By default a node logs from INFO on,
 /// any other command from WARN on.
 pub fn start(arguments: &Arguments, ros: &RosArguments) {
     let logger = logger(&arguments.command, ros);
     let verbosity = arguments.verbose + u8::from(logger.is_some());
-    let level = match ros.logging.level_of(logger.as_deref().unwrap_or(node::NAME)) {
-        _ if !ros.logging.stdout => "off",
-        None | Some(Severity::Unset) => {
-            ["warn", "flockform=info", "flockform=debug", "trace"][usize::from(verbosity.min(3))]
-        }
-        Some(Severity::Debug) => "flockform=debug",
-        Some(Severity::Info) => "flockform=info",
-        Some(Severity::Warn) => "flockform=warn",
-        Some(Severity::Error | Severity::Fatal) => "flockform=error",
-    };
-    // The middleware reports every peer that comes and goes as a warning.
-    let level = match level {
-        "off" => level.to_owned(),
-        _ => format!("{level},rustdds=error,ros2_client=error"),
+    let given = ros.logging.level_of(logger.as_deref().unwrap_or(node::NAME));
+    let level = if ros.logging.stdout {
+        only_ours(filter_of(given.unwrap_or(Severity::Unset), verbosity))
+    } else {
+        "off".to_owned()
     };
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| level.into());
     let log = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr);
@@ -51,20 +66,45 @@ pub fn start(arguments: &Arguments, ros: &RosArguments) {
         Some(name) => {
             let asked = std::env::var("RCUTILS_CONSOLE_OUTPUT_FORMAT").ok();
             let format = asked.filter(|format| !format.is_empty()).unwrap_or_else(|| NODE_FORMAT.into());
-            log.event_format(NodeLines { name, format }).init();
+            let log = log.event_format(NodeLines { name, format }).with_filter_reloading();
+            let handle = log.reload_handle();
+            let severity = Mutex::new(given.unwrap_or(Severity::Unset));
+            let filter = Box::new(move |filter| handle.reload(filter).map_err(|error| error.to_string()));
+            if ros.logging.stdout {
+                // Set once: a process starts one log.
+                let _ = NODE_LOG.set(NodeLog { severity, filter });
+            }
+            log.init();
         }
     }
+}
+
+/// The filter of a severity; of none, that of a verbosity.
+fn filter_of(severity: Severity, verbosity: u8) -> &'static str {
+    match severity {
+        Severity::Unset => {
+            ["warn", "flockform=info", "flockform=debug", "trace"][usize::from(verbosity.min(3))]
+        }
+        Severity::Debug => "flockform=debug",
+        Severity::Info => "flockform=info",
+        Severity::Warn => "flockform=warn",
+        Severity::Error | Severity::Fatal => "flockform=error",
+    }
+}
+
+/// Without the warnings of the middleware, which reports every peer that comes and goes.
+fn only_ours(level: &str) -> String {
+    format!("{level},rustdds=error,ros2_client=error")
 }
 
 /// Name of the logger of the node that a command is, with dots as `rcl` has them; none of other commands.
 fn logger(command: &Command, ros: &RosArguments) -> Option<String> {
     let names = match command {
         Command::Node(node) if node.transport == Transport::Ros2 => node::names(ros, node.member.as_deref()),
-        Command::Robots(robots) if robots.transport == Transport::Ros2 => ros.names("robots", "/"),
+        Command::Robots(asked) if asked.transport == Transport::Ros2 => ros.names(robots::NAME, "/"),
         _ => return None,
     };
-    let names = names.ok()?;
-    Some(names.fully_qualified().trim_start_matches('/').replace('/', "."))
+    Some(names.ok()?.logger())
 }
 
 /// A field of a log line, on its line whatever is in it: much of it comes from files and from the network.

@@ -30,8 +30,8 @@ use std::process::ExitCode;
 use clap::error::{ContextKind, ContextValue};
 use clap::{Parser, Subcommand};
 use clap_complete::Shell;
+use flockform::messages::escaped;
 use flockform::ros::arguments::{RosArgumentError, RosArguments};
-use flockform::ros::edge::escaped;
 use flockform::ros::node::NodeError;
 use flockform::scene::{self, SceneError};
 use flockform::shm::ShmError;
@@ -112,7 +112,7 @@ pub enum Command {
     Node(node::NodeArguments),
     /// Simulates the robots of a swarm file, over ROS 2 or shared memory
     #[command(
-        after_help = "Example:\n  flockform robots square --ros-args -p publish_clock:=true\n  flockform robots square --transport shm"
+        after_help = "Example:\n  flockform robots square --ros-args -p publish_clock:=true\n  flockform robots square --node-per-robot\n  flockform robots square --transport shm"
     )]
     Robots(node::RobotsArguments),
     /// Runs every bundled scene and swarm and builds a page that links to their reports
@@ -243,6 +243,10 @@ pub enum Refusal {
         "--ros-args: this command is no ROS 2 node\n  help: leave them out, or use `flockform node` or `flockform robots` without --transport shm"
     )]
     NoNode,
+    #[error(
+        "--node-per-robot: robots are no ROS 2 nodes over shared memory\n  help: leave it out, or leave out --transport shm"
+    )]
+    NoNodes,
     #[error(
         "`{then}` is called `{now}` now\n  help: `flockform --help` lists every command, and `--help` after one its options"
     )]

@@ -7,16 +7,16 @@ use flockform::record::About;
 use flockform::ros::arguments::RosArguments;
 use flockform::ros::edge::pulse::MIDDLEWARE_GONE;
 use flockform::ros::node::{FormationNode, NodeError};
-use flockform::ros::robots::RobotNodes;
+use flockform::ros::robots::{Layout, RobotNodes};
 use flockform::scene::swarm::Swarm;
 use flockform::shm::{self, Domain, SimulatedRobots};
 use flockform::swarm::control::Control;
 
-use super::interrupt;
 use super::recording::{RecordArguments, close};
 use super::supervise::{Life, supervise};
 use super::swarm::SwarmFileArguments;
 use super::{Refusal, say};
+use super::{interrupt, log};
 
 /// Middleware between the node and the robots.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
@@ -49,6 +49,9 @@ pub struct RobotsArguments {
     /// Middleware that carries poses and targets
     #[arg(long, value_enum, default_value_t)]
     pub transport: Transport,
+    /// Make each robot a ROS 2 node of its own, /ROBOT/robot, instead of one node for all
+    #[arg(long)]
+    node_per_robot: bool,
 }
 
 /// Exit code of a node or robots that ran.
@@ -82,7 +85,13 @@ pub fn node(arguments: &NodeArguments, ros: &RosArguments) -> Result<ExitCode, R
             if let Some(recording) = &recording {
                 node.record(recording.sink()).map_err(NodeError::from)?;
             }
+            if let Some(level) = log::level() {
+                node.serve_log_level(level).map_err(NodeError::from)?;
+            }
             announce(&swarm, node.control());
+            for line in node.reached_at() {
+                tracing::info!("{line}");
+            }
             if let Some(left) = life.left() {
                 node.restore(left);
             }
@@ -116,8 +125,10 @@ pub fn robots(arguments: &RobotsArguments, ros: &RosArguments) -> Result<ExitCod
     let announce = |count| tracing::info!("`{}`: {count} simulated robots", swarm.name);
     match life {
         Some(mut life) => {
-            let mut robots = RobotNodes::open(&swarm, ros)?;
+            let layout = if arguments.node_per_robot { Layout::NodePerRobot } else { Layout::OneNode };
+            let mut robots = RobotNodes::open(&swarm, ros, layout)?;
             announce(robots.fleet().robots().len());
+            tracing::info!("{}", robots.reached_at());
             if let Some(left) = life.left() {
                 robots.restore(&left);
             }
@@ -126,6 +137,7 @@ pub fn robots(arguments: &RobotsArguments, ros: &RosArguments) -> Result<ExitCod
                 robots.run_while(interrupt::serves(), &mut |robots| life.tell(|| robots.kept())),
             ));
         }
+        None if arguments.node_per_robot => return Err(Refusal::NoNodes),
         None => {
             let mut robots = SimulatedRobots::open(&swarm, &Domain::from_environment()?)?;
             announce(robots.fleet().robots().len());

@@ -7,15 +7,15 @@ use crate::engine::Engine;
 use crate::flock::role::Role;
 use crate::flock::strain::Strain;
 use crate::flock::vectors::distance;
-use crate::ros::arguments::Names;
-use crate::ros::messages::builtin_interfaces::Time;
-use crate::ros::messages::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus, KeyValue};
-use crate::ros::messages::flockform_msgs::{FormationState, MemberState};
-use crate::ros::messages::geometry_msgs::{Point, Pose, PoseArray, Vector3};
-use crate::ros::messages::std_msgs::{ColorRGBA, Header};
-use crate::ros::messages::visualization_msgs::{Marker, MarkerArray};
-use crate::ros::node::NAME;
-use crate::ros::node::recorder::{MessageRecorder, RecordSink};
+use crate::messages::builtin_interfaces::Time;
+use crate::messages::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus, KeyValue};
+use crate::messages::flockform_msgs::{FormationState, MemberState};
+use crate::messages::formation::NAME;
+use crate::messages::geometry_msgs::{Point, Pose, PoseArray, Vector3};
+use crate::messages::names::Names;
+use crate::messages::recorder::{MessageRecorder, RecordSink};
+use crate::messages::std_msgs::{ColorRGBA, Header};
+use crate::messages::visualization_msgs::{Marker, MarkerArray};
 use crate::scene::Scene;
 
 /// \[s\]

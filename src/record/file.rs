@@ -10,9 +10,10 @@ use mcap::records::{MessageHeader, Metadata};
 use mcap::{Attachment, WriteOptions, Writer};
 
 use super::RecordError;
-use crate::ros::messages::builtin_interfaces::Time;
-use crate::ros::messages::definitions;
-use crate::ros::node::recorder::RecordedMessage;
+use super::rosbag2::{self, Channel, Span};
+use crate::messages::builtin_interfaces::Time;
+use crate::messages::definitions;
+use crate::messages::recorder::RecordedMessage;
 
 /// Name of the metadata record that says what was recorded.
 pub const METADATA: &str = "flockform";
@@ -46,7 +47,8 @@ pub struct Recording {
     part: PathBuf,
     force: bool,
     writer: Writer<BufWriter<File>>,
-    channels: BTreeMap<String, (u16, u32)>,
+    channels: BTreeMap<String, Channel>,
+    span: Span,
     failure: Option<mcap::McapError>,
     messages: u64,
 }
@@ -71,8 +73,8 @@ impl Recording {
         let write = |source| RecordError::Write { path: part.clone(), source };
         let mut writer = options.create(BufWriter::new(file)).map_err(write)?;
         describe(&mut writer, about).map_err(write)?;
-        let (path, channels) = (path.to_owned(), BTreeMap::new());
-        Ok(Self { path, part, force, writer, channels, failure: None, messages: 0 })
+        let (path, channels, span) = (path.to_owned(), BTreeMap::new(), Span::default());
+        Ok(Self { path, part, force, writer, channels, span, failure: None, messages: 0 })
     }
 
     /// Adds a message. After one that cannot be written no other is tried: [`Recording::finish`] says why.
@@ -89,16 +91,18 @@ impl Recording {
     fn try_to_write(&mut self, taped: &RecordedMessage<'_>) -> Result<(), mcap::McapError> {
         if !self.channels.contains_key(taped.topic) {
             let channel = add_channel(&mut self.writer, taped)?;
-            self.channels.insert(taped.topic.to_owned(), (channel, 0));
+            self.channels.insert(taped.topic.to_owned(), channel);
         }
-        let Some((channel_id, sequence)) = self.channels.get_mut(taped.topic) else { return Ok(()) };
+        let Some(channel) = self.channels.get_mut(taped.topic) else { return Ok(()) };
         let header = MessageHeader {
-            channel_id: *channel_id,
-            sequence: *sequence,
+            channel_id: channel.id,
+            // From 0 again after the largest of 32 bits.
+            sequence: channel.messages as u32,
             log_time: nanoseconds(taped.time),
             publish_time: nanoseconds(taped.published),
         };
-        *sequence = sequence.wrapping_add(1);
+        channel.messages += 1;
+        self.span.add(header.log_time);
         self.messages += 1;
         self.writer.write_to_known_channel(&header, taped.payload)
     }
@@ -117,6 +121,9 @@ impl Recording {
         if let Some(failure) = self.failure.take() {
             return Err(write(failure));
         }
+        let name = self.path.file_name().unwrap_or_default().to_string_lossy();
+        let bag = rosbag2::metadata(&name, self.span, self.channels.iter());
+        self.writer.write_metadata(&bag).map_err(write)?;
         self.writer.finish().map_err(write)?;
         let file = self.writer.into_inner();
         let synced = file.into_inner().map_err(|error| error.into_error()).and_then(|file| file.sync_all());
@@ -167,11 +174,14 @@ fn nanoseconds(seconds: f64) -> u64 {
 fn add_channel(
     writer: &mut Writer<BufWriter<File>>,
     taped: &RecordedMessage<'_>,
-) -> Result<u16, mcap::McapError> {
-    let RecordedMessage { package, name, topic, .. } = taped;
+) -> Result<Channel, mcap::McapError> {
+    let RecordedMessage { package, name, topic, reliable, .. } = *taped;
     let definition = definitions::concatenated(&format!("{package}/{name}")).unwrap_or_default();
-    let schema = writer.add_schema(&format!("{package}/msg/{name}"), "ros2msg", definition.as_bytes())?;
-    writer.add_channel(schema, topic, "cdr", &BTreeMap::new())
+    let kind = format!("{package}/msg/{name}");
+    let schema = writer.add_schema(&kind, "ros2msg", definition.as_bytes())?;
+    let quality = (rosbag2::OFFERED_QOS.to_owned(), format!("{:#}", rosbag2::offered_qos(reliable)));
+    let id = writer.add_channel(schema, topic, "cdr", &[quality].into())?;
+    Ok(Channel { id, kind, reliable, messages: 0 })
 }
 
 fn describe(writer: &mut Writer<BufWriter<File>>, about: &About) -> Result<(), mcap::McapError> {

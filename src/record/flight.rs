@@ -1,15 +1,15 @@
 //! The messages that the node of a simulated flight would receive and send.
 
 use super::RecordError;
-use crate::ros::arguments::{NameError, Names};
-use crate::ros::messages::builtin_interfaces::Time;
-use crate::ros::messages::flockform_msgs::LoopEvent;
-use crate::ros::messages::geometry_msgs::{self, PoseStamped, PoseWithCovariance, PoseWithCovarianceStamped};
-use crate::ros::messages::nav_msgs::Odometry;
-use crate::ros::messages::std_msgs::Header;
-use crate::ros::node::diagnostics::{self, Statistics};
-use crate::ros::node::recorder::{MessageRecorder, RecordSink};
-use crate::ros::node::{NAME, markers, state, target};
+use crate::messages::builtin_interfaces::Time;
+use crate::messages::flockform_msgs::LoopEvent;
+use crate::messages::formation::diagnostics::{self, Statistics};
+use crate::messages::formation::{NAME, markers, state, target};
+use crate::messages::geometry_msgs::{self, PoseStamped, PoseWithCovariance, PoseWithCovarianceStamped};
+use crate::messages::names::{NameError, Names};
+use crate::messages::nav_msgs::Odometry;
+use crate::messages::recorder::{MessageRecorder, RecordSink};
+use crate::messages::std_msgs::Header;
 use crate::scene::swarm::Swarm;
 use crate::scene::swarm::raw::{RawNode, RawPoseType};
 use crate::swarm::control::Control;
@@ -90,7 +90,7 @@ impl FlightMessages {
         let header =
             || Header { stamp: Time::from_seconds(now), frame_id: self.swarm.raw.node.frame_id.clone() };
         for (member, topic) in self.topics.targets.iter().enumerate() {
-            if let Some(message) = target(control, member, header()) {
+            if let Some(message) = target::of_member(control, member, header()) {
                 self.recorder.take(topic, &message, [now; 2]);
             }
         }
@@ -119,14 +119,18 @@ impl FlightMessages {
         let (recorder, topic, times) = (&mut self.recorder, &self.topics.poses[member], [now; 2]);
         match raw.pose_type {
             RawPoseType::PoseStamped | RawPoseType::PoseArray => {
-                recorder.take(topic, &PoseStamped { header, pose: planar }, times);
+                recorder.take_received(topic, &PoseStamped { header, pose: planar }, times);
             }
             RawPoseType::PoseWithCovarianceStamped => {
-                recorder.take(topic, &PoseWithCovarianceStamped { header, pose: uncertain() }, times);
+                recorder.take_received(
+                    topic,
+                    &PoseWithCovarianceStamped { header, pose: uncertain() },
+                    times,
+                );
             }
             RawPoseType::Odometry => {
                 let message = Odometry { header, pose: uncertain(), ..Odometry::default() };
-                recorder.take(topic, &message, times);
+                recorder.take_received(topic, &message, times);
             }
         }
     }

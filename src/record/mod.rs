@@ -4,7 +4,8 @@
 //! schemas, profile `ros2`), whether a node took part in a network, robots were simulated ([`flight`])
 //! or a body was swept ([`body`]). One more topic, `~/events`, has the times of the loop's ticks and the commands it took; the
 //! swarm file is attached. [`replay`] needs nothing else to repeat the flight and to list where today's targets
-//! differ.
+//! differ. A metadata record `rosbag2` and the quality of service of each channel let `ros2 bag info` and `ros2 bag play` read the
+//! file as one of their own.
 //!
 //! * [`mod@file`]: the writer. The file has its name when it is whole; until then it is `NAME.part`.
 
@@ -14,6 +15,7 @@ pub mod flight;
 
 mod reader;
 pub mod replay;
+mod rosbag2;
 mod shared;
 mod topics;
 
@@ -99,7 +101,7 @@ pub enum RecordError {
     Scene(#[from] crate::scene::SceneError),
     /// A topic or frame has no legal name.
     #[error("{0}")]
-    Name(#[from] crate::ros::arguments::NameError),
+    Name(#[from] crate::messages::names::NameError),
 }
 
 impl RecordError {

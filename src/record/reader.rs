@@ -11,8 +11,8 @@ use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
 use super::RecordError;
 use super::file::{METADATA, SWARM};
-use crate::ros::edge::Message;
-use crate::ros::edge::wire::{Order, decode};
+use crate::messages::Message;
+use crate::messages::wire::{Order, decode};
 
 /// A message as it stands in the file.
 #[derive(Clone, Debug)]

@@ -12,16 +12,16 @@ use serde::Serialize;
 use super::topics::{Heard, stamped, topics};
 use super::{Entry, Reader, RecordError};
 use crate::flock::vectors::distance;
-use crate::ros::arguments::Names;
-use crate::ros::messages::builtin_interfaces::Time;
-use crate::ros::messages::flockform_msgs::{LoopEvent, SetFormationRequest};
-use crate::ros::messages::geometry_msgs::{self, PoseArray, PoseStamped};
-use crate::ros::messages::std_msgs::Header;
-use crate::ros::node::leaders::set_formation;
-use crate::ros::node::recorder::{parameters, set_parameter};
-use crate::ros::node::{NAME, pose};
+use crate::messages::builtin_interfaces::Time;
+use crate::messages::flockform_msgs::{LoopEvent, SetFormationRequest};
+use crate::messages::formation::leaders::set_formation;
+use crate::messages::formation::{NAME, pose};
+use crate::messages::geometry_msgs::{self, PoseArray, PoseStamped};
+use crate::messages::names::Names;
+use crate::messages::recorder::{parameters, set_parameter};
+use crate::messages::std_msgs::Header;
 use crate::scene::swarm::Swarm;
-use crate::swarm::control::Control;
+use crate::swarm::control::{Control, Mode};
 
 /// How a replay went.
 #[derive(Clone, Debug, Serialize, PartialEq)]
@@ -134,6 +134,8 @@ pub fn replay(reader: &Reader, swarm: &Swarm, tolerance: f64) -> Result<Report, 
 
 struct Replay {
     control: Control,
+    /// The loop before its first tick.
+    fresh: Control,
     /// The parameters that the file and the overrides of the recording gave.
     as_recorded: Vec<(&'static str, f64)>,
     topics: BTreeMap<String, Heard>,
@@ -194,6 +196,7 @@ impl Replay {
             active: !has_events,
             today: vec![None; count],
             recorded: vec![None; count],
+            fresh: control.clone(),
             control,
             topics,
             heard_of,
@@ -275,8 +278,20 @@ impl Replay {
                 self.move_leaders(&SetFormationRequest { name, translate, rotate, stretch, shear, duration });
             }
             (LoopEvent::PARAMETER, &[value]) => self.parameter(text, value),
+            (LoopEvent::CONFIGURE, _) => self.begin_anew(),
             _ => {}
         }
+    }
+
+    /// As the node does in its transition `configure`: an emergency stop outlasts it.
+    fn begin_anew(&mut self) {
+        let is_stopped = self.control.mode() == Mode::EmergencyStopped;
+        self.control.clone_from(&self.fresh);
+        if is_stopped {
+            self.control.emergency_stop();
+        }
+        // The parameters that follow are those of a start.
+        self.begun = false;
     }
 
     /// Settings given at the start give way to those changed since the flight; those changed during it

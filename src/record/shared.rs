@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::Recording;
-use crate::ros::node::recorder::RecordSink;
+use crate::messages::recorder::RecordSink;
 
 /// May be cloned: it is one recording all the same.
 #[derive(Clone)]

@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 
 use super::{Entry, Reader, RecordError};
-use crate::ros::arguments::Names;
-use crate::ros::messages::geometry_msgs::{self, PoseStamped, PoseWithCovarianceStamped};
-use crate::ros::messages::nav_msgs::Odometry;
-use crate::ros::messages::std_msgs::Header;
-use crate::ros::node::recorder::EVENTS;
+use crate::messages::geometry_msgs::{self, PoseStamped, PoseWithCovarianceStamped};
+use crate::messages::names::Names;
+use crate::messages::nav_msgs::Odometry;
+use crate::messages::recorder::EVENTS;
+use crate::messages::std_msgs::Header;
 use crate::scene::swarm::Swarm;
 use crate::scene::swarm::raw::{RawNode, RawPoseType};
 use crate::swarm::control::Control;

@@ -5,16 +5,8 @@
     reason = "not written out yet: flags, names and values are those of `rcl`, named as there"
 )]
 pub mod arguments;
-#[allow(
-    missing_docs,
-    reason = "not written out yet; its services are copies of the published interface definitions"
-)]
+#[allow(missing_docs, reason = "not written out yet")]
 pub mod edge;
-#[allow(
-    missing_docs,
-    reason = "fields are those of the published interface definitions, which say what they mean"
-)]
-pub mod messages;
 #[allow(missing_docs, reason = "not written out yet: the program and the recordings are its users")]
 pub mod node;
 #[allow(missing_docs, reason = "not written out yet: the program is its user")]

@@ -1,26 +1,28 @@
-//! `flockform robots`: the simulated robots of a swarm file as ROS 2 nodes in one process.
+//! `flockform robots`: the simulated robots of a swarm file over ROS 2, in one process.
 //!
-//! Each is a node of its own name: poses out, targets in, its frame on `/tf`. The noise, delay, loss
-//! and faults of the file are applied here, so the formation node receives what it would from real robots.
+//! Poses out, targets in, frames on `/tf`, of one node for all robots or of a node for each ([`Layout`]). The noise,
+//! delay, loss and faults of the file are applied here, so the formation node receives what it would from real robots.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use serde::{Deserialize, Serialize};
 
-use super::arguments::{Names, RosArguments, Value};
+use super::arguments::{Names, RosArguments};
+use super::edge::parameters::{Declaration, Parameters, Store, Value};
 use super::edge::pulse::Pulse;
 use super::edge::{Edge, EdgeError, Node, Publisher, Quality, Subscription};
-use super::messages::builtin_interfaces::Time;
-use super::messages::geometry_msgs::{
+use super::node::{NodeError, options, settings};
+use crate::messages::Message;
+use crate::messages::builtin_interfaces::Time;
+use crate::messages::geometry_msgs::{
     self, PoseArray, PoseStamped, PoseWithCovariance, PoseWithCovarianceStamped, Quaternion, Transform,
     TransformStamped, Vector3,
 };
-use super::messages::nav_msgs::Odometry;
-use super::messages::rosgraph_msgs::Clock;
-use super::messages::std_msgs::Header;
-use super::messages::tf2_msgs::TFMessage;
-use super::node::{NodeError, options};
+use crate::messages::nav_msgs::Odometry;
+use crate::messages::rosgraph_msgs::Clock;
+use crate::messages::std_msgs::Header;
+use crate::messages::tf2_msgs::TFMessage;
 use crate::scene::swarm::Swarm;
 use crate::scene::swarm::raw::{RawNode, RawPoseType};
 use crate::swarm::control::Control;
@@ -50,7 +52,20 @@ pub struct KeptRobots {
     period: u64,
 }
 
-/// The robots' end over ROS 2: a node for each.
+/// The nodes that the robots are to others. Topics are the same in both.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Layout {
+    /// One node, `robots`, with its parameters: tools that ask every node wait for none.
+    #[default]
+    OneNode,
+    /// A node `robot` in the namespace of each robot, as of real ones; they serve no parameters.
+    NodePerRobot,
+}
+
+/// Name of the node of all robots, unless `__node` says otherwise.
+pub const NAME: &str = "robots";
+
+/// The robots' end over ROS 2.
 pub struct Link {
     /// The frame that each robot carries.
     frames: Vec<String>,
@@ -60,6 +75,8 @@ pub struct Link {
     frame_id: String,
     /// Whether a target came since last asked.
     was_sent: bool,
+    /// Of the one node.
+    parameters: Option<Parameters>,
     // Dropped after all that was made from them.
     nodes: Vec<Node>,
 }
@@ -75,57 +92,56 @@ enum Poses {
 impl Link {
     /// # Errors
     /// An obstacle in the ROS arguments or the network.
-    pub fn open(swarm: &Swarm, formation: &Formation, arguments: &RosArguments) -> Result<Self, NodeError> {
-        let edge = Edge::open(options(arguments))?;
+    pub fn open(
+        swarm: &Swarm,
+        formation: &Formation,
+        arguments: &RosArguments,
+        layout: Layout,
+    ) -> Result<Self, NodeError> {
         let raw = &swarm.raw.node;
-        let mut nodes = Vec::new();
-        let mut topics = Vec::new();
-        for name in &formation.names {
-            let names = arguments.names("robot", "/")?.of_robot(name)?;
-            nodes.push(edge.named_node(&names)?);
-            topics.push(names);
-        }
-        let of = |pattern: &str, m: usize| topic(&topics[m], pattern, &formation.names[m]);
-        let mut targets = Vec::new();
-        for (m, node) in nodes.iter().enumerate() {
-            targets.push(node.subscription(&of(&raw.target_topic, m)?, Quality::reliable(1))?);
-        }
-        let world = arguments.names("robots", "/")?;
-        let first = &nodes[0];
-        let is_set = |name: &str| {
-            let given = arguments.parameters_for(&world.fully_qualified());
-            given.iter().any(|one| one.name == name && one.value == Value::Bool(true))
-        };
+        let world = arguments.names(NAME, "/")?;
+        let store = declare(arguments, &world)?;
+        let publishes_clock = store.get(PUBLISH_CLOCK).and_then(Value::as_bool).unwrap_or_default();
+        let edge = Edge::open(options(arguments))?;
+        let owners = owners(formation, arguments, layout)?;
+        let nodes: Vec<Node> = owners.iter().map(|names| edge.named_node(names)).collect::<Result<_, _>>()?;
+        // The one node is the owner of all.
+        let owner = |m: usize| m.min(nodes.len() - 1);
+        let of = |pattern: &str, m: usize| topic(&owners[owner(m)], pattern, &formation.names[m]);
+        let targets: Result<Vec<_>, NodeError> = (0..formation.count())
+            .map(|m| Ok(nodes[owner(m)].subscription(&of(&raw.target_topic, m)?, Quality::reliable(1))?))
+            .collect();
+        let pose = |m: usize| Ok((&nodes[owner(m)], of(&raw.pose_topic, m)?));
+        let (count, first) = (formation.count(), &nodes[0]);
         let poses = match raw.pose_type {
-            RawPoseType::PoseStamped => Poses::Stamped(each(&nodes, &|m| of(&raw.pose_topic, m))?),
-            RawPoseType::PoseWithCovarianceStamped => {
-                Poses::WithCovariance(each(&nodes, &|m| of(&raw.pose_topic, m))?)
-            }
-            RawPoseType::Odometry => Poses::Odometry(each(&nodes, &|m| of(&raw.pose_topic, m))?),
+            RawPoseType::PoseStamped => Poses::Stamped(each(count, &pose)?),
+            RawPoseType::PoseWithCovarianceStamped => Poses::WithCovariance(each(count, &pose)?),
+            RawPoseType::Odometry => Poses::Odometry(each(count, &pose)?),
             RawPoseType::PoseArray => {
                 let topic = first.publisher(&of(&raw.pose_topic, 0)?, Quality::BEST_EFFORT)?;
                 // Nowhere until it says where.
                 let nowhere = geometry_msgs::Pose::planar([f64::NAN; 2], f64::NAN);
-                Poses::Array(Box::new(topic), vec![nowhere; formation.count()])
+                Poses::Array(Box::new(topic), vec![nowhere; count])
             }
         };
-        let clock = is_set("publish_clock")
+        let clock = publishes_clock
             .then(|| first.publisher(&first.topic("/clock")?, Quality::BEST_EFFORT))
             .transpose()?;
-        let (fleet, frame_id) = (topics[0].fleet(), raw.frame_id.clone());
-        let frames = formation.names.iter().map(|name| frame_of(raw, fleet, name)).collect();
-        Ok(Self { frames, targets, poses, clock, frame_id, was_sent: false, nodes })
+        let parameters = (layout == Layout::OneNode).then(|| Parameters::new(first, store)).transpose()?;
+        let frames = formation.names.iter().map(|name| frame_of(raw, world.fleet(), name)).collect();
+        let (targets, frame_id) = (targets?, raw.frame_id.clone());
+        Ok(Self { frames, targets, poses, clock, frame_id, was_sent: false, parameters, nodes })
     }
 }
 
 impl RobotNodes {
     /// # Errors
     /// An obstacle in the swarm file, the ROS arguments or the network.
-    pub fn open(swarm: &Swarm, arguments: &RosArguments) -> Result<Self, NodeError> {
+    pub fn open(swarm: &Swarm, arguments: &RosArguments, layout: Layout) -> Result<Self, NodeError> {
         let control = Control::new(swarm)?;
         let formation = control.formation();
         let fleet = Fleet::new(swarm, formation)?;
-        let link = Link::open(swarm, formation, arguments)?;
+        let link = Link::open(swarm, formation, arguments, layout)?;
         Ok(Self {
             frames: link.nodes[0].publisher(&link.nodes[0].topic("/tf")?, Quality::reliable(100))?,
             pace: Pace::new(1.0 / control.period()),
@@ -134,6 +150,14 @@ impl RobotNodes {
             fleet,
             link,
         })
+    }
+
+    /// Where the robots can be reached, in words.
+    pub fn reached_at(&self) -> String {
+        let (first, others) = (&self.link.nodes[0], self.link.nodes.len() - 1);
+        let others = if others == 0 { String::new() } else { format!(" and {others} nodes like it") };
+        let targets = self.link.targets.first().map_or("", |topic| topic.topic());
+        format!("{}{others} on {}; targets from {targets}", first.name(), first.options())
     }
 
     /// Flies until `stop` is set.
@@ -191,6 +215,10 @@ impl RobotNodes {
         let now = |fleet: &Fleet| if own_time { fleet.time() } else { system_time() };
         let pulse = pulse.clone();
         let _inside = pulse.as_ref().map(|pulse| pulse.inside());
+        if let Some(parameters) = &mut link.parameters {
+            // All are read-only: nothing changes.
+            parameters.poll(now(fleet), None);
+        }
         let sent = fly(fleet, goals, link, now).and_then(|()| self.say_frames());
         if let Err(error) = sent {
             tracing::debug!("{error}");
@@ -270,14 +298,39 @@ fn frame_of(raw: &RawNode, fleet: &str, name: &str) -> String {
     format!("{prefix}{name}/base_link")
 }
 
+/// Name of the parameter by which the robots publish `/clock`.
+const PUBLISH_CLOCK: &str = "publish_clock";
+
+/// The parameters of the robots, with what the arguments give the node of this name.
+fn declare(arguments: &RosArguments, names: &Names) -> Result<Store, NodeError> {
+    let publish_clock = Declaration::new(PUBLISH_CLOCK, false)
+        .read_only()
+        .describe("publish the simulation's time on /clock, from 0 s on");
+    settings::store(vec![publish_clock], &arguments.parameters_for(&names.fully_qualified()))
+}
+
+/// The names of the nodes to which the robots belong: one for all, or one for each.
+fn owners(formation: &Formation, arguments: &RosArguments, layout: Layout) -> Result<Vec<Names>, NodeError> {
+    match layout {
+        Layout::OneNode => Ok(vec![arguments.names(NAME, "/")?]),
+        Layout::NodePerRobot => {
+            formation.names.iter().map(|robot| Ok(arguments.names("robot", "/")?.of_robot(robot)?)).collect()
+        }
+    }
+}
+
 fn topic(names: &Names, pattern: &str, name: &str) -> Result<String, NodeError> {
     Ok(names.fleet_topic(&pattern.replace("{name}", name))?)
 }
 
-fn each<M: super::edge::Message>(
-    nodes: &[Node],
-    topic: &dyn Fn(usize) -> Result<String, NodeError>,
+/// A publisher for each robot, on the node and the topic that are the robot's.
+fn each<'a, M: Message>(
+    count: usize,
+    pose: &dyn Fn(usize) -> Result<(&'a Node, String), NodeError>,
 ) -> Result<Vec<Publisher<M>>, NodeError> {
-    let open = |(m, node): (usize, &Node)| Ok(node.publisher(&topic(m)?, Quality::BEST_EFFORT)?);
-    nodes.iter().enumerate().map(open).collect()
+    let open = |m| {
+        let (node, topic) = pose(m)?;
+        Ok(node.publisher(&topic, Quality::BEST_EFFORT)?)
+    };
+    (0..count).map(open).collect()
 }

@@ -6,6 +6,15 @@ use std::time::{Duration, Instant};
 use crate::program::*;
 
 #[test]
+fn robots_over_shared_memory_are_no_nodes() {
+    let folder = temporary();
+    let output = flockform(&["robots", "square", "--transport", "shm", "--node-per-robot"], folder.path());
+    assert_eq!(output.status.code(), Some(2));
+    let said = text(&output.stderr);
+    assert!(said.contains("--node-per-robot") && said.contains("help: "), "{said}");
+}
+
+#[test]
 fn runs_that_begin_at_once_get_a_folder_each() {
     let folder = temporary();
     let start = || {

@@ -4,9 +4,9 @@ use std::path::Path;
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
+use flockform::messages::flockform_msgs::FormationState;
+use flockform::messages::geometry_msgs::PoseArray;
 use flockform::record::Reader;
-use flockform::ros::messages::flockform_msgs::FormationState;
-use flockform::ros::messages::geometry_msgs::PoseArray;
 
 use crate::program::*;
 

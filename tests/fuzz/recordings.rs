@@ -3,13 +3,13 @@
 use std::path::Path;
 use std::sync::OnceLock;
 
+use flockform::messages::flockform_msgs::LoopEvent;
+use flockform::messages::geometry_msgs::{PoseArray, PoseStamped, PoseWithCovarianceStamped};
+use flockform::messages::nav_msgs::Odometry;
+use flockform::messages::recorder::RecordedMessage;
 use flockform::record::flight::FlightMessages;
 use flockform::record::replay::{recorded_swarm, replay};
 use flockform::record::{About, Entry, Reader, Recording, Shared};
-use flockform::ros::messages::flockform_msgs::LoopEvent;
-use flockform::ros::messages::geometry_msgs::{PoseArray, PoseStamped, PoseWithCovarianceStamped};
-use flockform::ros::messages::nav_msgs::Odometry;
-use flockform::ros::node::recorder::RecordedMessage;
 use flockform::scene::bundled::bundled_swarm;
 use flockform::swarm::flight::{Flight, fly_heard};
 use proptest::prelude::*;
@@ -145,7 +145,15 @@ fn messages_with_anything_in_them_are_replayed_or_refused() {
             let (package, name) = kind(package, name);
             let (time, published) = (entry.published, entry.published);
             let topic = &*entry.topic;
-            recording.write(&RecordedMessage { topic, package, name, payload: &payload, time, published });
+            recording.write(&RecordedMessage {
+                topic,
+                package,
+                name,
+                payload: &payload,
+                reliable: true,
+                time,
+                published,
+            });
         }
         recording.finish().expect("written");
         read(std::fs::read(&path).expect("readable"));

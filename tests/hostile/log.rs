@@ -2,9 +2,9 @@
 
 use std::time::{Duration, Instant};
 
+use flockform::messages::geometry_msgs::{Pose, PoseStamped};
+use flockform::messages::std_msgs::Header;
 use flockform::ros::edge::Quality;
-use flockform::ros::messages::geometry_msgs::{Pose, PoseStamped};
-use flockform::ros::messages::std_msgs::Header;
 
 use super::support::*;
 
@@ -69,4 +69,29 @@ fn a_node_logs_as_ros_2_nodes_do() {
     std::thread::sleep(Duration::from_secs(2));
     assert_eq!(quiet.terminate(), Some(0));
     assert_eq!(lines.iter().collect::<Vec<_>>(), Vec::<String>::new());
+}
+
+#[test]
+fn a_node_says_where_it_can_be_reached() {
+    let domain = domain();
+    for (subcommand, expected) in [
+        (
+            "node",
+            &["/fleet/flockform on ROS domain ", "/fleet/robot_1/pose", "/fleet/robot_1/target_pose"][..],
+        ),
+        ("robots", &["/fleet/robots on ROS domain ", "/fleet/robot_1/target_pose"]),
+    ] {
+        let words = [subcommand, "square", "--ros-args", "-r", "__ns:=/fleet"];
+        let mut command = command(domain, &words);
+        command.env_remove("RUST_LOG");
+        let mut running = Running::start(&mut command);
+        let lines = running.lines();
+        let mut said = String::new();
+        until("where it is reached", || {
+            said.extend(lines.try_iter());
+            expected.iter().all(|one| said.contains(one)).then_some(())
+        });
+        assert!(said.contains(&format!("ROS domain {domain}")), "{said}");
+        assert_eq!(running.terminate(), Some(0));
+    }
 }

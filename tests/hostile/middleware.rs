@@ -4,10 +4,11 @@ use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant};
 
 use flockform::flock::vectors::distance;
-use flockform::ros::edge::services::{Empty, std_srvs};
+use flockform::messages::flockform_msgs::FormationState;
+use flockform::messages::geometry_msgs::{PoseStamped, Twist};
+use flockform::messages::std_msgs::Empty;
+use flockform::messages::std_srvs;
 use flockform::ros::edge::{Edge, Node, Quality, Subscription};
-use flockform::ros::messages::flockform_msgs::FormationState;
-use flockform::ros::messages::geometry_msgs::{PoseStamped, Twist};
 use flockform::swarm::control::Control;
 use ros2_client::ServiceMapping;
 

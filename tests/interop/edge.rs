@@ -4,10 +4,12 @@ use std::io::Read;
 use std::process::Child;
 use std::time::{Duration, Instant};
 
+use flockform::messages::Message;
+use flockform::messages::builtin_interfaces::Time;
+use flockform::messages::std_srvs;
 use flockform::ros::edge::lifecycle::{Lifecycle, Outcome};
 use flockform::ros::edge::parameters::{Declaration, Parameters, Store, Value};
-use flockform::ros::edge::services::{Time, std_srvs};
-use flockform::ros::edge::{Edge, Message, Node, Options, Quality};
+use flockform::ros::edge::{Edge, Node, Options, Quality};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value as Json, json};
 

@@ -1,6 +1,6 @@
 //! What goes wrong between robots and node, over the wire. Each row says what the node makes of it.
 
-use flockform::ros::messages::flockform_msgs::MemberState;
+use flockform::messages::flockform_msgs::MemberState;
 use serde_json::{Value as Json, json};
 
 use super::support::*;

@@ -1,7 +1,7 @@
 //! The whole node between robots that a peer flies and a peer that watches.
 
 use flockform::flock::vectors::distance;
-use flockform::ros::messages::flockform_msgs::{FormationState, MemberState};
+use flockform::messages::flockform_msgs::{FormationState, MemberState};
 use serde_json::json;
 
 use super::support::*;

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use flockform::ros::messages::flockform_msgs::FormationState;
+use flockform::messages::flockform_msgs::FormationState;
 use serde_json::{Value as Json, json};
 
 use super::support::*;

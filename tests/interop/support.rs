@@ -192,7 +192,7 @@ pub mod state {
     //! Entries of a line of `watch.py` that holds a formation's state.
 
     use super::Json;
-    use flockform::ros::messages::flockform_msgs::MemberState;
+    use flockform::messages::flockform_msgs::MemberState;
 
     /// The state in the line, if it is one.
     pub fn of(line: &Json) -> Option<&Json> {

@@ -4,12 +4,12 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use flockform::messages::diagnostic_msgs::DiagnosticArray;
+use flockform::messages::flockform_msgs::{FormationState, LoopEvent};
+use flockform::messages::geometry_msgs::{PoseArray, PoseStamped, PoseWithCovarianceStamped};
+use flockform::messages::nav_msgs::Odometry;
+use flockform::messages::visualization_msgs::MarkerArray;
 use flockform::record::{Entry, Reader};
-use flockform::ros::messages::diagnostic_msgs::DiagnosticArray;
-use flockform::ros::messages::flockform_msgs::{FormationState, LoopEvent};
-use flockform::ros::messages::geometry_msgs::{PoseArray, PoseStamped, PoseWithCovarianceStamped};
-use flockform::ros::messages::nav_msgs::Odometry;
-use flockform::ros::messages::visualization_msgs::MarkerArray;
 
 use crate::program::*;
 
@@ -71,11 +71,44 @@ fn a_flight_s_recording_has_the_topics_of_the_live_node() {
     let count = |topic: &str| topics.iter().find(|(one, _)| one == topic).map(|(_, count)| *count);
     let ticks = count("/robot_1/target_pose").expect("targets");
     assert_eq!(count("/robot_25/pose"), Some(ticks));
-    // Before the ticks come five parameters and the start.
-    assert_eq!(count("/flockform/events"), Some(ticks + 6));
+    // Before the ticks come six parameters and the start.
+    assert_eq!(count("/flockform/events"), Some(ticks + 7));
     assert!(count("/flockform/state").is_some() && count("/flockform/markers").is_some(), "{topics:?}");
     assert!(count("/diagnostics").is_some(), "{topics:?}");
     assert!(!folder.path().join("f.mcap.part").exists());
+}
+
+/// With an index of it all: readers that seek, as rosbag2 does, need not repair the file.
+#[test]
+fn a_recording_tells_rosbag2_its_topics_and_their_quality_of_service() {
+    let folder = temporary();
+    let calm = ["--set", "flight.duration=2.0", "--set", "flight.bounds={}"];
+    says(
+        0,
+        &[&["swarm", "square", "-q", "--out", "o", "--record", "f.mcap"][..], &calm].concat(),
+        folder.path(),
+    );
+    let bytes = std::fs::read(folder.path().join("f.mcap")).expect("written");
+    let summary = mcap::Summary::read(&bytes).expect("an index").expect("one that is not empty");
+    let statistics = summary.stats.as_ref().expect("statistics");
+    let index = summary.metadata_indexes.iter().find(|one| one.name == "rosbag2").expect("a record");
+    let mcap::records::Metadata { metadata, .. } = mcap::read::metadata(&bytes, index).expect("readable");
+    let bag: serde_json::Value = serde_json::from_str(&metadata["serialized_metadata"]).expect("JSON");
+    assert_eq!(bag["message_count"], statistics.message_count);
+    assert_eq!(bag["starting_time"]["nanoseconds_since_epoch"], statistics.message_start_time);
+    assert_eq!(bag["relative_file_paths"][0], "f.mcap");
+    let topics = bag["topics_with_message_count"].as_array().expect("topics");
+    assert_eq!(topics.len(), summary.channels.len());
+    for (id, channel) in &summary.channels {
+        let find = |one: &&serde_json::Value| one["topic_metadata"]["name"] == channel.topic.as_str();
+        let topic = topics.iter().find(find).expect("every channel");
+        assert_eq!(topic["message_count"], statistics.channel_message_counts[id], "{}", channel.topic);
+        let text = &channel.metadata["offered_qos_profiles"];
+        let offered: serde_json::Value = serde_json::from_str(text).expect("JSON");
+        assert_eq!(offered, topic["topic_metadata"]["offered_qos_profiles"]);
+        let expected = if channel.topic.ends_with("/pose") { "best_effort" } else { "reliable" };
+        assert_eq!(offered[0]["reliability"], expected, "{}", channel.topic);
+    }
 }
 
 #[test]

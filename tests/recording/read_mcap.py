@@ -15,6 +15,9 @@ from pathlib import Path
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
+from rosbags.interfaces import QosDurability, QosHistory, QosLiveliness, QosReliability, QosTime
+from rosbags.rosbag2.metadata import parse_qos
+from ruamel.yaml import YAML
 
 
 def single(value):
@@ -38,6 +41,33 @@ def same(expected, found, where):
         assert expected == found, f"{where}: {found}, expected {expected}"
 
 
+def hold_against_rosbag2(bag, summary, recording):
+    """What `ros2 bag info` and `ros2 bag play` take from the file, in the form of metadata version 9."""
+    statistics, channels = summary.statistics, summary.channels.values()
+    found = YAML(typ="safe").load(bag["serialized_metadata"])
+    assert (found["version"], found["storage_identifier"], found["ros_distro"]) == (9, "mcap", "jazzy"), found
+    assert found["message_count"] == statistics.message_count, found
+    assert found["starting_time"]["nanoseconds_since_epoch"] == statistics.message_start_time, found
+    assert found["duration"]["nanoseconds"] == statistics.message_end_time - statistics.message_start_time, found
+    assert found["relative_file_paths"] == [Path(recording).name] == [one["path"] for one in found["files"]], found
+    topics = {one["topic_metadata"]["name"]: one for one in found["topics_with_message_count"]}
+    assert len(topics) == len(channels), topics
+    for channel in channels:
+        one = topics[channel.topic]
+        assert one["topic_metadata"]["type"] == summary.schemas[channel.schema_id].name, one
+        assert one["message_count"] == statistics.channel_message_counts[channel.id], one
+        # As one text in the channel, and as a list in the record.
+        for profiles in (channel.metadata["offered_qos_profiles"], one["topic_metadata"]["offered_qos_profiles"]):
+            (profile,) = parse_qos(profiles)
+            is_pose = channel.topic.endswith("/pose")
+            expected = QosReliability.BEST_EFFORT if is_pose else QosReliability.RELIABLE
+            assert profile.reliability == expected, (channel.topic, profile)
+            assert profile.durability == QosDurability.VOLATILE, profile
+            assert profile.liveliness == QosLiveliness.AUTOMATIC, profile
+            assert profile.history == QosHistory.UNKNOWN and profile.depth == 0, profile
+            assert profile.deadline == profile.lifespan == QosTime(9223372036, 854775807), profile
+
+
 def main(recording, expected_path):
     expected = [json.loads(line) for line in Path(expected_path).read_text().splitlines()]
     with open(recording, "rb") as file:
@@ -55,6 +85,7 @@ def main(recording, expected_path):
         assert read == len(expected), read
         attachments = {one.name: one.data.decode() for one in reader.iter_attachments()}
         metadata = {one.name: one.metadata for one in reader.iter_metadata()}
+    hold_against_rosbag2(metadata["rosbag2"], summary, recording)
     assert metadata["flockform"]["source"] in ("swarm", "node", "run"), metadata
     if metadata["flockform"]["source"] != "run":
         assert "title" in attachments["swarm.toml"], attachments

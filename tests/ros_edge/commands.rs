@@ -1,12 +1,17 @@
 //! Who may command a node, and what nobody may.
 
+use std::sync::{Arc, Mutex};
+
+use flockform::messages::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
+use flockform::messages::flockform_msgs::SetFormationRequest;
+use flockform::messages::formation::leaders::set_formation;
+use flockform::messages::std_msgs::Empty;
+use flockform::messages::{lifecycle_msgs, rcl_interfaces, std_srvs};
+use flockform::ros::arguments::Severity;
 use flockform::ros::edge::Quality;
 use flockform::ros::edge::lifecycle::State;
+use flockform::ros::edge::loggers::LogLevel;
 use flockform::ros::edge::parameters::Value;
-use flockform::ros::edge::services::{Empty, lifecycle_msgs, rcl_interfaces, std_srvs};
-use flockform::ros::messages::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
-use flockform::ros::messages::flockform_msgs::SetFormationRequest;
-use flockform::ros::node::leaders::set_formation;
 use flockform::swarm::control::{Control, Mode};
 use ros2_client::ServiceMapping;
 
@@ -14,7 +19,11 @@ use super::formation::{PATIENT, Swarming, square};
 use super::support::*;
 
 fn set(peers: &mut Peers, swarm: &mut Swarming, name: &str, value: f64) -> Result<(), String> {
-    let parameter = rcl_interfaces::Parameter { name: name.into(), value: Value::Double(value).to_wire() };
+    set_value(peers, swarm, name, &Value::Double(value))
+}
+
+fn set_value(peers: &mut Peers, swarm: &mut Swarming, name: &str, value: &Value) -> Result<(), String> {
+    let parameter = rcl_interfaces::Parameter { name: name.into(), value: value.to_wire() };
     let request = rcl_interfaces::Settings { parameters: vec![parameter] };
     let service = "/flockform/set_parameters";
     let client = client::<rcl_interfaces::SetParameters>(peers, ServiceMapping::Enhanced, service);
@@ -43,6 +52,24 @@ fn limits_are_tightened_and_never_loosened() {
     assert_eq!((swarm.node.control().limits().speed, swarm.node.control().limits().clearance), (0.25, 0.4));
     // Back to the file's, and not beyond.
     assert_eq!(set(&mut peers, &mut swarm, "speed_limit", 1.0), Ok(()));
+}
+
+#[test]
+fn the_gains_of_the_rule_change_while_it_flies() {
+    let mut peers = peers();
+    let mut swarm = Swarming::open(&square(&PATIENT), &[]);
+    assert_eq!(set(&mut peers, &mut swarm, "damping", 0.5), Ok(()));
+    assert_eq!(set_value(&mut peers, &mut swarm, "sweeps", &Value::Integer(7)), Ok(()));
+    let refused = set_value(&mut peers, &mut swarm, "sweeps", &Value::Integer(0)).expect_err("none");
+    assert!(refused.contains("1 to 100000"), "{refused}");
+    let control = swarm.node.control();
+    assert_eq!((control.damping(), control.sweeps()), (0.5, 7));
+    // What another process would go on from.
+    let kept = swarm.node.kept();
+    drop(swarm);
+    let mut again = Swarming::open(&square(&PATIENT), &[]);
+    again.node.restore(kept);
+    assert_eq!((again.node.control().damping(), again.node.control().sweeps()), (0.5, 7));
 }
 
 #[test]
@@ -133,4 +160,37 @@ fn a_second_node_of_the_same_name_is_noticed_and_reported() {
     });
     drop(twin);
     told(&mut swarm, &|status| !status.message.contains("name"));
+}
+
+#[test]
+fn the_log_s_level_is_read_and_set_by_the_node_s_name_where_commands_are_allowed() {
+    use rcl_interfaces::{GetLoggerLevels, LoggerLevel, Names, SetLoggerLevels, SetLoggerLevelsRequest};
+    let mut peers = peers();
+    let severity = Arc::new(Mutex::new(Severity::Unset));
+    for (overrides, may) in [(&[][..], true), (&["node.commands=\"stop-only\""], false)] {
+        *severity.lock().expect("whole") = Severity::Info;
+        let (read, written) = (Arc::clone(&severity), Arc::clone(&severity));
+        let level = LogLevel {
+            get: Box::new(move || *read.lock().expect("whole")),
+            set: Box::new(move |wanted| {
+                *written.lock().expect("whole") = wanted;
+                Ok(())
+            }),
+        };
+        let mut swarm = Swarming::open(&square(&[&PATIENT[..], overrides].concat()), &[]);
+        swarm.node.serve_log_level(level).expect("services");
+        let mapping = ServiceMapping::Enhanced;
+        let get = client::<GetLoggerLevels>(&mut peers, mapping, "/flockform/get_logger_levels");
+        let set = client::<SetLoggerLevels>(&mut peers, mapping, "/flockform/set_logger_levels");
+        let names = Names { names: vec!["flockform".into(), "else".into()] };
+        let levels = call::<GetLoggerLevels>(&get, &names, &mut || swarm.tick()).levels;
+        assert_eq!(levels.iter().map(|one| one.level).collect::<Vec<_>>(), [20, 0]);
+        let wanted = [("flockform", 10), ("flockform", 11), ("else", 10)];
+        let levels = wanted.map(|(name, level)| LoggerLevel { name: name.into(), level }).into();
+        let asked = SetLoggerLevelsRequest { levels };
+        let results = call::<SetLoggerLevels>(&set, &asked, &mut || swarm.tick()).results;
+        assert_eq!(results.iter().map(|one| one.successful).collect::<Vec<_>>(), [may, false, false]);
+        let expected = if may { Severity::Debug } else { Severity::Info };
+        assert_eq!(*severity.lock().expect("whole"), expected);
+    }
 }

@@ -5,15 +5,16 @@
 use std::time::Duration;
 
 use flockform::flock::vectors::distance;
+use flockform::messages::diagnostic_msgs::DiagnosticArray;
+use flockform::messages::flockform_msgs::{FormationState, MemberState};
+use flockform::messages::geometry_msgs::PoseStamped;
+use flockform::messages::std_msgs::Empty;
+use flockform::messages::std_srvs;
+use flockform::messages::visualization_msgs::MarkerArray;
 use flockform::ros::arguments::RosArguments;
 use flockform::ros::edge::Quality;
-use flockform::ros::edge::services::{Empty, std_srvs};
-use flockform::ros::messages::diagnostic_msgs::DiagnosticArray;
-use flockform::ros::messages::flockform_msgs::{FormationState, MemberState};
-use flockform::ros::messages::geometry_msgs::PoseStamped;
-use flockform::ros::messages::visualization_msgs::MarkerArray;
 use flockform::ros::node::FormationNode;
-use flockform::ros::robots::RobotNodes;
+use flockform::ros::robots::{Layout, RobotNodes};
 use flockform::scene::swarm::Swarm;
 use flockform::swarm::control::Mode;
 use flockform::swarm::watch::Health;
@@ -49,7 +50,7 @@ pub const PATIENT: [&str; 4] =
 impl Swarming {
     pub fn open(swarm: &Swarm, more: &[&str]) -> Self {
         Self {
-            robots: RobotNodes::open(swarm, &arguments(&[])).expect("robots"),
+            robots: RobotNodes::open(swarm, &arguments(&[]), Layout::OneNode).expect("robots"),
             node: FormationNode::open(swarm, &arguments(more), None).expect("a node"),
         }
     }
@@ -185,7 +186,7 @@ fn a_member_s_own_node_hears_its_neighbours_alone_and_moves_nobody_else() {
     let mut overrides = vec!["control.sweeps=1"];
     overrides.extend(PATIENT);
     let swarm = square(&overrides);
-    let mut robots = RobotNodes::open(&swarm, &arguments(&[])).expect("robots");
+    let mut robots = RobotNodes::open(&swarm, &arguments(&[]), Layout::OneNode).expect("robots");
     let mut node = FormationNode::open(&swarm, &arguments(&[]), Some("robot_7")).expect("a node");
     // Column by column, five high: robot_7 is the second of the second column.
     let near = [0, 1, 2, 5, 6, 7, 10, 11, 12];

@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use flockform::ros::edge::services::std_srvs;
+use flockform::messages::std_srvs;
 use flockform::ros::edge::{Edge, EdgeError, Options, Quality};
 use ros2_client::builtin_topics::ros_discovery;
 use ros2_client::dds::rustdds::policy::{Durability, History};

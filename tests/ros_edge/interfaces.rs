@@ -4,16 +4,16 @@ use std::collections::BTreeSet;
 use std::time::Duration;
 
 use flockform::flock::vectors::distance;
+use flockform::messages::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
+use flockform::messages::geometry_msgs::{Pose, PoseStamped, Twist, TwistStamped};
+use flockform::messages::lifecycle_msgs;
+use flockform::messages::rosgraph_msgs::Clock;
+use flockform::messages::std_msgs::Header;
+use flockform::messages::tf2_msgs::TFMessage;
+use flockform::messages::{builtin_interfaces, geometry_msgs};
 use flockform::ros::edge::Quality;
-use flockform::ros::edge::services::lifecycle_msgs;
-use flockform::ros::messages::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
-use flockform::ros::messages::geometry_msgs::{Pose, PoseStamped, Twist, TwistStamped};
-use flockform::ros::messages::rosgraph_msgs::Clock;
-use flockform::ros::messages::std_msgs::Header;
-use flockform::ros::messages::tf2_msgs::TFMessage;
-use flockform::ros::messages::{builtin_interfaces, geometry_msgs};
 use flockform::ros::node::FormationNode;
-use flockform::ros::robots::RobotNodes;
+use flockform::ros::robots::{Layout, RobotNodes};
 use flockform::swarm::watch::Health;
 use ros2_client::ServiceMapping;
 
@@ -189,7 +189,9 @@ const SIMULATED: [&str; 2] = ["-p", "use_sim_time:=true"];
 fn a_swarm_flies_by_the_time_of_its_simulator_and_once_more_when_that_begins_anew() {
     let _peers = peers();
     let swarm = square(&with(&SHORT));
-    let robots = || RobotNodes::open(&swarm, &arguments(&["-p", "publish_clock:=true"])).expect("robots");
+    let robots = || {
+        RobotNodes::open(&swarm, &arguments(&["-p", "publish_clock:=true"]), Layout::OneNode).expect("robots")
+    };
     let node = FormationNode::open(&swarm, &arguments(&SIMULATED), None).expect("a node");
     let mut swarm = Swarming { robots: robots(), node };
     swarm.until_all_are_heard();
@@ -268,7 +270,7 @@ fn two_fleets_of_one_file_fly_beside_each_other_each_in_its_namespace() {
         let legs = format!("manoeuvres[0].legs=[{{ seconds = 0.5, {leg} }}]");
         let swarm = square(&[&PATIENT[..], &["limits.speed=4.0", &legs]].concat());
         let arguments = arguments(&["-r", &format!("__ns:={namespace}")]);
-        let robots = RobotNodes::open(&swarm, &arguments).expect("robots");
+        let robots = RobotNodes::open(&swarm, &arguments, Layout::OneNode).expect("robots");
         let node = FormationNode::open(&swarm, &arguments, None).expect("a node");
         Swarming { node, robots }
     };

@@ -1,8 +1,9 @@
 //! The lifecycle from outside.
 
+use flockform::messages::lifecycle_msgs;
+use flockform::messages::std_msgs::Empty;
 use flockform::ros::edge::Quality;
 use flockform::ros::edge::lifecycle::{Goal, Lifecycle, Outcome, State};
-use flockform::ros::edge::services::{Empty, lifecycle_msgs};
 use ros2_client::ServiceMapping;
 
 use super::support::*;

@@ -6,11 +6,14 @@
 #![cfg(feature = "ros")]
 
 mod commands;
+#[cfg(feature = "record")]
+mod configuration;
 mod formation;
 mod graph;
 mod interfaces;
 mod lifecycle;
 mod parameters;
+mod robots;
 mod services;
 mod support;
 #[path = "../common/swarms.rs"]

@@ -1,7 +1,8 @@
 //! Parameters from outside.
 
+use flockform::messages::builtin_interfaces::Time;
+use flockform::messages::rcl_interfaces;
 use flockform::ros::edge::parameters::{Change, Declaration, Parameters, Store, Value};
-use flockform::ros::edge::services::{Time, rcl_interfaces};
 use flockform::ros::edge::{Node, Quality};
 use ros2_client::ServiceMapping;
 

@@ -1,6 +1,6 @@
 //! Services.
 
-use flockform::ros::edge::services::std_srvs;
+use flockform::messages::std_srvs;
 
 use super::support::*;
 

@@ -3,8 +3,9 @@
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
-use flockform::ros::edge::services::Time;
-use flockform::ros::edge::{Edge, Message, Options, Publisher, ServiceType, Subscription};
+use flockform::messages::builtin_interfaces::Time;
+use flockform::messages::{Message, ServiceType};
+use flockform::ros::edge::{Edge, Options, Publisher, Subscription};
 use ros2_client::dds::rustdds::DomainParticipantBuilder;
 use ros2_client::qos::{History, WhenFull};
 use ros2_client::{

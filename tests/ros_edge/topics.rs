@@ -1,8 +1,10 @@
 //! Publishers, subscriptions and the clock.
 
+use flockform::messages::Message;
+use flockform::messages::builtin_interfaces::Time;
+use flockform::messages::rosgraph_msgs;
+use flockform::ros::edge::Quality;
 use flockform::ros::edge::clock::Clock;
-use flockform::ros::edge::services::{Time, rosgraph_msgs};
-use flockform::ros::edge::{Message, Quality};
 use serde::{Deserialize, Serialize};
 
 use super::support::*;

@@ -1,7 +1,7 @@
 //! The message structs against their definitions: names, order and types of the fields, constants,
 //! and the bytes on the wire.
 
-#![cfg(feature = "ros")]
+#![cfg(feature = "messages")]
 
 mod definition;
 mod package;

@@ -1,6 +1,6 @@
 //! Whatever arrives as a payload is read or refused.
 
-use flockform::ros::messages::geometry_msgs::PoseArray;
+use flockform::messages::geometry_msgs::PoseArray;
 use proptest::prelude::*;
 
 use crate::structs::{Filled, every_struct};

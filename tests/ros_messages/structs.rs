@@ -2,19 +2,19 @@
 
 use std::path::PathBuf;
 
-use flockform::ros::messages::builtin_interfaces::{Duration, Time};
-use flockform::ros::messages::definitions;
-use flockform::ros::messages::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus, KeyValue};
-use flockform::ros::messages::flockform_msgs::{
+use flockform::messages::builtin_interfaces::{Duration, Time};
+use flockform::messages::definitions;
+use flockform::messages::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus, KeyValue};
+use flockform::messages::flockform_msgs::{
     FormationState, LoopEvent, MemberState, SetFormationRequest, SetFormationResponse,
 };
-use flockform::ros::messages::geometry_msgs::*;
-use flockform::ros::messages::nav_msgs::Odometry;
-use flockform::ros::messages::rosgraph_msgs::Clock;
-use flockform::ros::messages::sensor_msgs::CompressedImage;
-use flockform::ros::messages::std_msgs::{ColorRGBA, Header};
-use flockform::ros::messages::tf2_msgs::TFMessage;
-use flockform::ros::messages::visualization_msgs::{Marker, MarkerArray, MeshFile, UVCoordinate};
+use flockform::messages::geometry_msgs::*;
+use flockform::messages::nav_msgs::Odometry;
+use flockform::messages::rosgraph_msgs::Clock;
+use flockform::messages::sensor_msgs::CompressedImage;
+use flockform::messages::std_msgs::{ColorRGBA, Header};
+use flockform::messages::tf2_msgs::TFMessage;
+use flockform::messages::visualization_msgs::{Marker, MarkerArray, MeshFile, UVCoordinate};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
@@ -48,7 +48,7 @@ where
 
 macro_rules! all {
     ($($message:ident),+ $(,)?) => {{
-        use flockform::ros::messages::Message;
+        use flockform::messages::Message;
         vec![$(filled::<$message>(format!("{}/{}", $message::PACKAGE, $message::NAME))),+]
     }};
 }
@@ -175,7 +175,7 @@ fn every_constant_has_the_value_of_its_definition() {
         ),
         (
             "flockform_msgs/LoopEvent",
-            constants![LoopEvent: TICK, ACTIVE, INACTIVE, EMERGENCY_STOP, RESUME, MANOEUVRE, POSTURE, PARAMETER],
+            constants![LoopEvent: TICK, ACTIVE, INACTIVE, EMERGENCY_STOP, RESUME, MANOEUVRE, POSTURE, PARAMETER, CONFIGURE],
         ),
     ];
     for (name, definition) in every_definition() {

@@ -5,7 +5,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use flockform::ros::arguments::RosArguments;
 use flockform::ros::edge::{Edge, Node, Options};
 use flockform::ros::node::Link as Controller;
-use flockform::ros::robots::Link as Robots;
+use flockform::ros::robots::{Layout, Link as Robots};
 use flockform::scene::swarm::Swarm;
 use flockform::swarm::control::scope::NodeScope;
 use flockform::swarm::transport::{ControllerEnd, Heard, Target};
@@ -90,7 +90,7 @@ impl Transport for Ros2 {
         };
         let arguments = RosArguments::parse(["flockform".to_owned()], &environment).expect("none").1;
         let (control, _) = control_of(&self.swarm);
-        Robots::open(&self.swarm, control.formation(), &arguments).expect("an end")
+        Robots::open(&self.swarm, control.formation(), &arguments, Layout::OneNode).expect("an end")
     }
 }
 

@@ -86,11 +86,11 @@ mod over_dds {
     use super::super::formation;
     use super::{Case, Report};
     use crate::flock::vectors::Vectors;
+    use crate::messages::builtin_interfaces::Time;
+    use crate::messages::geometry_msgs::{Pose, PoseStamped};
+    use crate::messages::std_msgs::Header;
     use crate::ros::arguments::{DiscoveryRange, Environment, RosArguments};
     use crate::ros::edge::{Edge, Node, Options, Publisher, Quality, Subscription};
-    use crate::ros::messages::builtin_interfaces::Time;
-    use crate::ros::messages::geometry_msgs::{Pose, PoseStamped};
-    use crate::ros::messages::std_msgs::Header;
     use crate::ros::node::FormationNode;
     use crate::scene::swarm::Swarm;
     use crate::swarm::control::Control;

@@ -4,9 +4,9 @@ use std::time::{Duration, Instant};
 
 use super::measure::{End, Ends, Samples, Work, exchange};
 use super::{DDS_TURNS, Effort, Report};
+use crate::messages::builtin_interfaces::Time;
+use crate::messages::geometry_msgs::{Pose, PoseArray};
 use crate::ros::edge::{Edge, Node, Options, Publisher, Quality, Subscription};
-use crate::ros::messages::builtin_interfaces::Time;
-use crate::ros::messages::geometry_msgs::{Pose, PoseArray};
 
 pub const NAME: &str = "DDS";
 

@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
-use super::names::check_token;
 use super::remap::split_node;
 use super::{RosArgumentError, Value};
+use crate::messages::names::check_token;
 
 /// Where a value was given.
 #[derive(Clone, Debug, PartialEq, Eq)]

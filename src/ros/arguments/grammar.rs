@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use super::assignment::{Assignment, Origin};
 use super::logging::Logging;
-use super::remap::RemapRule;
 use super::{RosArgumentError, RosArguments, assignment, parameter_file};
+use crate::messages::remap::RemapRule;
 
 /// Every flag that may follow `--ros-args`.
 pub const FLAGS: [&str; 17] = [

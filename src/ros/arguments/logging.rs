@@ -58,6 +58,26 @@ impl Logging {
 }
 
 impl Severity {
+    /// Every severity with its number in `rcl_interfaces/msg/LoggerLevel`.
+    const NUMBERS: [(Self, u32); 6] = [
+        (Self::Unset, 0),
+        (Self::Debug, 10),
+        (Self::Info, 20),
+        (Self::Warn, 30),
+        (Self::Error, 40),
+        (Self::Fatal, 50),
+    ];
+
+    /// The number in `rcl_interfaces/msg/LoggerLevel`.
+    pub fn number(self) -> u32 {
+        Self::NUMBERS.iter().find(|(severity, _)| *severity == self).map_or(0, |(_, number)| *number)
+    }
+
+    /// The severity of a number, if there is one.
+    pub fn of_number(number: u32) -> Option<Self> {
+        Self::NUMBERS.iter().find(|(_, one)| *one == number).map(|(severity, _)| *severity)
+    }
+
     fn parse(word: &str) -> Option<Self> {
         Some(match word.to_ascii_uppercase().as_str() {
             "UNSET" => Self::Unset,

@@ -24,20 +24,19 @@ pub mod environment;
 mod error;
 mod grammar;
 pub mod logging;
-pub mod names;
 mod parameter_file;
-pub mod remap;
+mod remap;
 pub mod value;
 mod yaml;
 
 use std::path::PathBuf;
 
+pub use crate::messages::names::{NameError, Names};
+pub use crate::messages::remap::RemapRule;
 pub use assignment::{Assignment, NodePattern, Origin, Parameter};
 pub use environment::{DiscoveryRange, Environment};
 pub use error::RosArgumentError;
 pub use logging::{Logging, Severity};
-pub use names::{NameError, Names};
-pub use remap::RemapRule;
 pub use value::Value;
 
 /// The ROS arguments of a process.

@@ -2,8 +2,8 @@
 
 use std::time::{Duration, Instant};
 
-use super::services::rosgraph_msgs;
 use super::{EdgeError, Node, Quality, Subscription};
+use crate::messages::rosgraph_msgs;
 use crate::swarm::pace::system_time;
 
 /// The node's clock.

@@ -16,7 +16,7 @@ use ros2_client::{Gid, NodeName};
 
 use super::participant::Reader;
 use super::topic::{Taken, next};
-use super::wire::decode;
+use crate::messages::wire::decode;
 
 /// How often the watcher looks \[s\]. Nodes announced within one look go out as one sample.
 const LOOK: Duration = Duration::from_millis(20);
@@ -84,6 +84,18 @@ impl Graph {
 
     pub fn add_writer(&self, node: &str, writer: GUID, name: &str) {
         self.add(node, writer, name, |owned| &mut owned.writers);
+    }
+
+    /// Forgets a local endpoint that is gone.
+    pub fn remove_endpoint(&self, endpoint: GUID) {
+        let mut state = self.state();
+        state.names.remove(&endpoint);
+        state.matched.remove(&endpoint);
+        for owned in state.nodes.values_mut() {
+            owned.readers.retain(|reader| *reader != endpoint);
+            owned.writers.retain(|writer| *writer != endpoint);
+        }
+        state.nodes_changed = true;
     }
 
     fn add(&self, node: &str, endpoint: GUID, name: &str, list: fn(&mut Owned) -> &mut Vec<GUID>) {

@@ -8,8 +8,8 @@
 //! * [`topic`]: publishers and subscriptions; [`quality`]: what they promise each other.
 //! * [`service`]: services that answer peers on Fast DDS and on Cyclone DDS alike.
 //! * [`parameters`], [`lifecycle`]: what ROS 2 expects of a node, as pure cores and their services.
+//! * [`loggers`]: the level of the log.
 //! * [`pulse`]: whether the middleware still lives.
-//! * [`said()`]: text from the network, fit to be shown.
 //! * [`clock`]: system time or the simulator's.
 //!
 //! Times are seconds since the Unix epoch as `f64`.
@@ -19,27 +19,23 @@ mod door;
 mod farewell;
 mod graph;
 pub mod lifecycle;
+pub mod loggers;
 pub mod loopback;
-pub mod message;
 pub mod names;
 mod outbox;
 mod packet;
 pub mod parameters;
 pub mod participant;
+mod payload;
 pub mod pulse;
 pub mod quality;
-mod said;
 pub mod service;
-pub mod services;
 pub mod topic;
-pub mod wire;
 
-use super::arguments::NameError;
+use crate::messages::names::NameError;
 
-pub use message::{Message, ServiceType};
 pub use participant::{Edge, Node, Options};
 pub use quality::Quality;
-pub use said::{escaped, said};
 pub use service::{RequestId, Service};
 pub use topic::{Publisher, Stamps, Subscription};
 

@@ -13,7 +13,7 @@ use ros2_client::dds::rustdds::{GUID, RTPSEntity, WriteOptions};
 
 use super::EdgeError;
 use super::participant::Writer;
-use super::wire::Payload;
+use super::payload::Payload;
 
 /// Messages that wait on any topic, however short its history \[1\]: a computer that is busy for some periods loses none.
 const LEAST: usize = 4;
@@ -136,7 +136,7 @@ impl Outbox {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ros::edge::wire::decode;
+    use crate::messages::wire::decode;
     use crate::ros::edge::{Edge, Options, Quality};
 
     #[test]

@@ -1,5 +1,6 @@
 //! The participant of a process, and the nodes in it.
 
+use std::fmt;
 use std::net::IpAddr;
 use std::sync::Arc;
 use std::sync::mpsc::channel;
@@ -15,10 +16,11 @@ use ros2_client::dds::rustdds::{
 
 use super::graph::{Graph, Watcher, prefix};
 use super::outbox::{Outbox, Outlet};
+use super::payload::{Payload, Verbatim};
 use super::pulse::{self, Pulse};
-use super::wire::{Payload, Verbatim};
-use super::{EdgeError, Message, Publisher, Quality, Service, ServiceType, Subscription, farewell, names};
-use crate::ros::arguments::Names;
+use super::{EdgeError, Publisher, Quality, Service, Subscription, farewell, names};
+use crate::messages::names::Names;
+use crate::messages::{Message, ServiceType};
 
 /// Where to take part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,6 +35,13 @@ pub struct Options {
 impl Default for Options {
     fn default() -> Self {
         Self { domain: 0, loopback_only: false }
+    }
+}
+
+impl fmt::Display for Options {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let reach = if self.loopback_only { ", for peers on this computer alone" } else { "" };
+        write!(f, "ROS domain {}{reach}", self.domain)
     }
 }
 
@@ -238,6 +247,16 @@ impl Node {
     /// Fully qualified name, e.g. `/swarm/flockform`.
     pub fn name(&self) -> &str {
         &self.name
+    }
+
+    /// Name of its logger.
+    pub fn logger(&self) -> String {
+        self.names.logger()
+    }
+
+    /// Where it takes part.
+    pub fn options(&self) -> Options {
+        self.shared.options
     }
 
     /// Has a watchdog end the process when the middleware is dead or deaf: see [`pulse`].

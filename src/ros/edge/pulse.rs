@@ -75,6 +75,11 @@ impl Pulse {
         }
     }
 
+    /// Records that the loop listens to no peer for now: its silence then means nothing.
+    pub fn listens_to_none(&self) {
+        *self.heard.lock().unwrap_or_else(PoisonError::into_inner) = None;
+    }
+
     pub fn inside(&self) -> Inside<'_> {
         let now = self.begun.elapsed().as_millis() as u64;
         self.inside_since.store(now.max(1), Ordering::Relaxed);

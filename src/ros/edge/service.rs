@@ -19,9 +19,11 @@ use ros2_client::dds::rustdds::{GUID, SequenceNumber, Timestamp, WriteOptionsBui
 use super::graph::prefix;
 use super::outbox::Outlet;
 use super::participant::{Reader, Shared};
+use super::payload::Payload;
 use super::topic::{Taken, next};
-use super::wire::{BadPayload, Order, Payload, decode, encode};
-use super::{EdgeError, Quality, ServiceType, said};
+use super::{EdgeError, Quality};
+use crate::messages::wire::{BadPayload, Order, decode, encode};
+use crate::messages::{ServiceType, said};
 
 /// Bytes before a request or reply of Cyclone DDS.
 const HEADER: usize = 16;

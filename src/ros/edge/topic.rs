@@ -6,10 +6,12 @@ use std::sync::Arc;
 
 use ros2_client::dds::rustdds::{Timestamp, WriteOptionsBuilder};
 
+use super::EdgeError;
 use super::outbox::Outlet;
 use super::participant::{Reader, Shared};
-use super::wire::{Payload, decode};
-use super::{EdgeError, Message, said};
+use super::payload::Payload;
+use crate::messages::wire::decode;
+use crate::messages::{Message, said};
 
 /// When a sample was sent and when it came.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -51,6 +53,12 @@ impl<M: Message> Publisher<M> {
 
     pub fn topic(&self) -> &str {
         &self.topic
+    }
+}
+
+impl<M> Drop for Publisher<M> {
+    fn drop(&mut self) {
+        self.shared.graph.remove_endpoint(self.outlet.guid());
     }
 }
 
@@ -125,6 +133,12 @@ impl<M: Message> Subscription<M> {
 
     pub fn topic(&self) -> &str {
         &self.topic
+    }
+}
+
+impl<M> Drop for Subscription<M> {
+    fn drop(&mut self) {
+        self.shared.graph.remove_endpoint(self.reader.guid());
     }
 }
 

@@ -1,8 +1,8 @@
 //! Velocities towards the targets, for robots that are driven so.
 
+use crate::messages::geometry_msgs::{Twist, TwistStamped, Vector3};
+use crate::messages::std_msgs::Header;
 use crate::ros::edge::{EdgeError, Node, Publisher, Quality};
-use crate::ros::messages::geometry_msgs::{Twist, TwistStamped, Vector3};
-use crate::ros::messages::std_msgs::Header;
 use crate::scene::swarm::raw::{RawModel, RawSwarm, RawVelocityType};
 use crate::swarm::control::Control;
 

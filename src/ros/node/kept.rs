@@ -6,7 +6,6 @@ use super::FormationNode;
 use crate::ros::edge::lifecycle::State;
 use crate::ros::edge::parameters::Value;
 use crate::swarm::control::KeptControl;
-use crate::swarm::pace::system_time;
 
 /// A node's state. Poses are not in it: they come again, and those of before would be too old.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
@@ -16,33 +15,59 @@ pub struct KeptNode {
     control: KeptControl,
     /// Parameters that are numbers.
     parameters: Vec<(String, f64)>,
+    /// Parameters that are names.
+    names: Vec<(String, String)>,
 }
 
 impl FormationNode {
+    /// The state for [`FormationNode::restore`].
     pub fn kept(&self) -> KeptNode {
-        let number = |(name, value): (&str, &Value)| Some((name.to_owned(), value.as_double()?));
+        let number = |(name, value): (&str, &Value)| {
+            let whole = value.as_integer().map(|number| number as f64);
+            Some((name.to_owned(), value.as_double().or(whole)?))
+        };
+        let text = |(name, value): (&str, &Value)| Some((name.to_owned(), value.as_str()?.to_owned()));
         KeptNode {
             state: self.lifecycle.state().label().to_owned(),
             control: self.control.kept(),
             parameters: self.parameters.iter().filter_map(number).collect(),
+            names: self.parameters.iter().filter_map(text).collect(),
         }
     }
 
     /// Goes on from what another process left.
     pub fn restore(&mut self, kept: KeptNode) {
-        for (name, value) in kept.parameters {
-            // The same file gave them; another's limits win over what does not keep them.
-            if let Err(error) = self.parameters.set(&name, value) {
-                tracing::warn!("not as it was before: {error}");
-            }
+        let now = self.time();
+        let is_named = |(name, value): &(String, String)| {
+            self.parameters.get(name).and_then(Value::as_str) == Some(value.as_str())
+        };
+        if !kept.names.iter().all(is_named) {
+            // Names change while the node is not configured.
+            self.go_to(State::Unconfigured, now);
         }
-        let now = self.clock.now().unwrap_or_else(system_time);
+        for (name, value) in kept.parameters {
+            let is_whole = self.parameters.get(&name).and_then(Value::as_integer).is_some();
+            let value = if is_whole { Value::Integer(value as i64) } else { Value::Double(value) };
+            self.set(&name, value);
+        }
+        kept.names.into_iter().for_each(|(name, value)| self.set(&name, Value::String(value)));
         let changes = self.parameters.poll(now, None);
         self.apply(&changes, now);
         if let Some(state) = State::ALL.into_iter().find(|state| state.label() == kept.state) {
-            let control = &mut self.control;
-            self.lifecycle.go_to(state, now, &mut |goal| super::act(control, goal));
+            self.go_to(state, now);
         }
         self.control.restore(kept.control);
+    }
+
+    fn set(&mut self, name: &str, value: Value) {
+        // The same file gave them; another's limits win over what does not keep them.
+        if let Err(error) = self.parameters.set(name, value) {
+            tracing::warn!("not as it was before: {error}");
+        }
+    }
+
+    fn go_to(&mut self, state: State, now: f64) {
+        let (lifecycle, mut transitions) = self.transitions(now);
+        lifecycle.go_to(state, now, &mut |goal| transitions.act(goal));
     }
 }

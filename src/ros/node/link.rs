@@ -1,12 +1,14 @@
 //! The loop's end over ROS 2: poses and places of leaders in, `PoseStamped` targets out.
 
-use super::pose::{PoseSource, is_frame};
-use super::recorder::MessageRecorder;
+use super::pose::PoseSource;
 use super::{NodeError, TopicOf};
-use crate::ros::edge::{EdgeError, Node, Publisher, Quality, Subscription, said};
-use crate::ros::messages::builtin_interfaces::Time;
-use crate::ros::messages::geometry_msgs::{Pose, PoseStamped};
-use crate::ros::messages::std_msgs::Header;
+use crate::messages::builtin_interfaces::Time;
+use crate::messages::formation::{pose::is_frame, target};
+use crate::messages::geometry_msgs::PoseStamped;
+use crate::messages::recorder::MessageRecorder;
+use crate::messages::said;
+use crate::messages::std_msgs::Header;
+use crate::ros::edge::{EdgeError, Node, Publisher, Quality, Subscription};
 use crate::scene::swarm::raw::RawNode;
 use crate::swarm::control::Control;
 use crate::swarm::control::scope::NodeScope;
@@ -74,7 +76,7 @@ impl ControllerEnd for Link {
         for (member, topic) in &self.leaders {
             let Some((message, _)) = topic.take_last() else { continue };
             if let Some(recorder) = &mut self.recorder {
-                recorder.take(topic.topic(), &message, [now; 2]);
+                recorder.take_received(topic.topic(), &message, [now; 2]);
             }
             if is_frame(&message.header.frame_id, &self.frame_id) {
                 let place = message.pose.position;
@@ -97,7 +99,7 @@ impl ControllerEnd for Link {
         let mut outcome = Ok(());
         for target in targets {
             let Some(topic) = &self.targets[target.member] else { continue };
-            let message = message(target, header.clone());
+            let message = target::message(target, header.clone());
             if let Some(recorder) = &mut self.recorder {
                 recorder.take(topic.topic(), &message, [now; 2]);
             }
@@ -112,9 +114,4 @@ impl ControllerEnd for Link {
             + self.poses.refused()
             + self.leaders.iter().map(|(_, topic)| topic.refused()).sum::<u64>()
     }
-}
-
-/// A target as a message.
-pub fn message(target: &Target, header: Header) -> PoseStamped {
-    PoseStamped { header, pose: Pose::planar(target.position, target.yaw) }
 }

@@ -4,16 +4,14 @@
 //! bounded queues. Everything it holds is polled; a peer that is slow, gone or wrong cannot hold it up, and a
 //! middleware that does ends the process ([`pulse`](super::edge::pulse)).
 
-pub(crate) mod diagnostics;
 mod drive;
+mod endpoints;
 mod kept;
-pub mod leaders;
 mod link;
-pub(crate) mod markers;
-pub(crate) mod pose;
-pub mod recorder;
-mod settings;
-pub(crate) mod state;
+mod origin;
+mod pose;
+pub(super) mod settings;
+mod transitions;
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -21,34 +19,32 @@ use std::time::Instant;
 
 use super::arguments::{DiscoveryRange, NameError, Names, RosArguments};
 use super::edge::clock::Clock;
-use super::edge::lifecycle::{Goal, Lifecycle, Outcome, Transition};
+use super::edge::lifecycle::{Lifecycle, Transition};
+use super::edge::loggers::{LogLevel, Loggers};
 use super::edge::parameters::{Change, Parameters, Refusal};
 use super::edge::pulse::Pulse;
-use super::edge::services::std_srvs;
-use super::edge::{Edge, EdgeError, Node, Options, Publisher, Quality, Service, ServiceType, Subscription};
-use super::messages::builtin_interfaces::Time;
-use super::messages::diagnostic_msgs::DiagnosticArray;
-use super::messages::flockform_msgs::{FormationState, LoopEvent, SetFormationRequest, SetFormationResponse};
-use super::messages::geometry_msgs::PoseStamped;
-use super::messages::std_msgs::{Empty, Header};
-use super::messages::visualization_msgs::MarkerArray;
+use super::edge::{Edge, EdgeError, Options, Publisher, Quality, Service, Subscription};
+use crate::messages::Message;
+use crate::messages::diagnostic_msgs::DiagnosticArray;
+use crate::messages::flockform_msgs::{LoopEvent, SetFormation, SetFormationResponse};
+pub use crate::messages::formation::NAME;
+use crate::messages::formation::diagnostics::{self, Statistics};
+use crate::messages::formation::leaders::{as_event, set_formation};
+use crate::messages::recorder::{self, MessageRecorder, RecordSink};
+use crate::messages::std_msgs::Empty;
+use crate::messages::std_srvs;
 use crate::scene::SceneError;
 use crate::scene::swarm::Swarm;
 use crate::swarm::control::Control;
 use crate::swarm::control::scope::{NodeScope, NodeScopeError};
 use crate::swarm::pace::{Pace, system_time};
 use crate::swarm::transport::complaints::Complaints;
-use crate::swarm::transport::{ControllerEnd, listen, target_of, targets};
-use diagnostics::Statistics;
-use drive::Drive;
+use crate::swarm::transport::{ControllerEnd, listen, targets};
+use endpoints::Endpoints;
 pub use kept::KeptNode;
-use leaders::{as_event, set_formation};
 pub use link::Link;
-use recorder::{MessageRecorder, RecordSink};
+use origin::Origin;
 use settings::Settings;
-
-/// Name of the node unless `__node` says otherwise.
-pub const NAME: &str = "flockform";
 
 /// Why there is no node.
 #[derive(Debug, thiserror::Error)]
@@ -65,16 +61,6 @@ pub enum NodeError {
     NodeScope(#[from] NodeScopeError),
 }
 
-/// The service that moves the leaders.
-struct SetFormation;
-
-impl ServiceType for SetFormation {
-    const PACKAGE: &str = "flockform_msgs";
-    const NAME: &str = "SetFormation";
-    type Request = SetFormationRequest;
-    type Response = SetFormationResponse;
-}
-
 /// A formation's node.
 pub struct FormationNode {
     clock: Clock,
@@ -88,27 +74,27 @@ pub struct FormationNode {
     stop_requests: Option<Subscription<Empty>>,
     resume: Service<std_srvs::Trigger>,
     set_formation: Service<SetFormation>,
-    part: NodeScope,
-    link: Link,
-    drives: Vec<(usize, Drive)>,
-    /// Whether the last velocities were those of an active node.
-    is_driving: bool,
-    state: Publisher<FormationState>,
-    markers: Option<Publisher<MarkerArray>>,
+    /// Of a log whose level can change.
+    loggers: Option<Loggers>,
+    /// Of a configured node.
+    endpoints: Option<Endpoints>,
+    /// As `endpoints.is_some()`, for the parameters that only a node that is not configured can change.
+    is_configured: Arc<AtomicBool>,
+    /// Whether the loop has begun anew since the last tick; it is recorded.
+    is_new: bool,
+    /// Gets a copy of what goes through; with the topics while there are any.
+    recorder: Option<MessageRecorder>,
     diagnostics: Publisher<DiagnosticArray>,
     statistics: Statistics,
     complaints: Complaints,
     /// Whether the absence of a clock was reported.
     has_missed_clock: bool,
-    frame_id: String,
-    swarm: Swarm,
-    names: Names,
     /// Whether the node was active at the last tick; a change is recorded.
     was_active: bool,
     /// Of the watchdog, where there is one.
     pulse: Option<Arc<Pulse>>,
     // Dropped after all that was made from it.
-    node: Node,
+    origin: Origin,
 }
 
 impl FormationNode {
@@ -123,28 +109,15 @@ impl FormationNode {
         let edge = Edge::open(options(arguments))?;
         let node = edge.named_node(&names)?;
 
-        let (mut settings, store) = settings::declare(&control, arguments, &names.fully_qualified())?;
+        let is_configured = Arc::default();
+        let (settings, store) = settings::declare(&control, arguments, &names, swarm, &part, &is_configured)?;
         check_commands(swarm, settings.autostart)?;
-        let mut pace = Pace::new(settings.rate);
-        settings.apply_all(&store, &mut control, &mut pace);
         let clock = if settings.use_sim_time { Clock::simulated(&node)? } else { Clock::system() };
-        let raw = &swarm.raw.node;
-        let topic = |pattern: &str, m: usize| {
-            names
-                .fleet_topic(&pattern.replace("{name}", &control.formation().names[m]))
-                .map_err(NodeError::from)
-        };
-        let link = Link::open(&node, raw, &control, &part, clock.is_simulated(), &topic)?;
-        let mut drives = Vec::new();
-        for (m, kind) in part.mine.iter().flat_map(|&m| Some((m, raw.velocity?))) {
-            drives.push((m, Drive::open(&node, &topic(&raw.velocity_topic, m)?, kind, &swarm.raw)?));
-        }
-        let private = |leaf: &str| names.topic(&format!("~/{leaf}")).map_err(NodeError::from);
         let service = |leaf: &str| names.service(&format!("~/{leaf}")).map_err(NodeError::from);
+        let raw = &swarm.raw.node;
+        control.set_active(false);
         let mut this = Self {
-            part,
-            link,
-            pace,
+            pace: Pace::new(settings.rate),
             parameters: Parameters::new(&node, store)?,
             lifecycle: Lifecycle::new(&node)?,
             stop: node.service(&service("emergency_stop")?)?,
@@ -157,36 +130,49 @@ impl FormationNode {
                 .transpose()?,
             resume: node.service(&service("resume")?)?,
             set_formation: node.service(&service("set_formation")?)?,
-            state: node.publisher(&private("state")?, Quality::reliable(5))?,
-            markers: raw
-                .markers
-                .then(|| private("markers"))
-                .transpose()?
-                .map(|topic| node.publisher(&topic, Quality::reliable(1)))
-                .transpose()?,
+            loggers: None,
+            endpoints: None,
+            is_configured,
+            is_new: false,
+            recorder: None,
             diagnostics: node.publisher(&names.topic("/diagnostics")?, Quality::reliable(5))?,
             statistics: Statistics::default(),
             complaints: Complaints::default(),
             has_missed_clock: false,
-            frame_id: raw.frame_id.clone(),
-            swarm: swarm.clone(),
             was_active: false,
-            is_driving: false,
             pulse: None,
-            names,
-            drives,
+            origin: Origin {
+                simulated_time: clock.is_simulated(),
+                swarm: swarm.clone(),
+                fresh: control.clone(),
+                names,
+                part,
+                node,
+            },
             clock,
             settings,
             control,
-            node,
         };
-        this.control.set_active(false);
+        this.settings.apply_all(this.parameters.iter(), &mut this.control, &mut this.pace);
+        this.origin.take_names(&this.parameters);
+        this.origin.check_topics()?;
         if this.settings.autostart {
-            let now = this.clock.now().unwrap_or_else(system_time);
-            let control = &mut this.control;
-            this.lifecycle.autostart(now, &mut |goal| act(control, goal));
+            this.start()?;
         }
         Ok(this)
+    }
+
+    /// Takes the node to active.
+    fn start(&mut self) -> Result<(), NodeError> {
+        let now = self.time();
+        let (lifecycle, mut transitions) = self.transitions(now);
+        lifecycle.autostart(now, &mut |goal| transitions.act(goal));
+        transitions.failure.map_or(Ok(()), Err)
+    }
+
+    /// By its clock, or by the computer's where it has none yet \[s\].
+    fn time(&self) -> f64 {
+        self.clock.now().unwrap_or_else(system_time)
     }
 
     /// Gives a copy of everything from now on to `sink`.
@@ -194,9 +180,20 @@ impl FormationNode {
     /// # Errors
     /// A name that no topic can have.
     pub fn record(&mut self, sink: RecordSink) -> Result<(), NameError> {
-        let mut recorder = MessageRecorder::new(&self.names, &self.frame_id, sink)?;
-        recorder.parameters(self.clock.now().unwrap_or_else(system_time), &self.control);
-        self.link.recorder = Some(recorder);
+        let origin = &self.origin;
+        let mut recorder = MessageRecorder::new(&origin.names, &origin.swarm.raw.node.frame_id, sink)?;
+        recorder.parameters(self.time(), &self.control);
+        *self.recorder() = Some(recorder);
+        self.is_new = false;
+        Ok(())
+    }
+
+    /// Lets peers read and set the level of this log.
+    ///
+    /// # Errors
+    /// A service that the middleware refuses.
+    pub fn serve_log_level(&mut self, level: LogLevel) -> Result<(), EdgeError> {
+        self.loggers = Some(Loggers::new(&self.origin.node, level)?);
         Ok(())
     }
 
@@ -205,7 +202,7 @@ impl FormationNode {
     /// # Errors
     /// A computer that gives no socket or thread.
     pub fn watch_middleware(&mut self) -> Result<(), EdgeError> {
-        self.pulse = Some(self.node.watch()?);
+        self.pulse = Some(self.origin.node.watch()?);
         Ok(())
     }
 
@@ -222,20 +219,23 @@ impl FormationNode {
             self.statistics.missed += missed;
             self.tick();
             if let Some(pulse) = &self.pulse {
-                pulse.hears(self.part.heard.iter().any(|&m| self.control.health(m).is_usable()));
+                match self.endpoints {
+                    Some(_) => pulse.hears(self.hears_any()),
+                    None => pulse.listens_to_none(),
+                }
             }
             if self.pulse.as_ref().is_some_and(|pulse| pulse.is_given_up()) {
                 self.control.set_active(false);
-                self.say(self.clock.now().unwrap_or_else(system_time), false);
+                self.say(self.time(), false);
                 return false;
             }
             if !look(self) {
                 break;
             }
         }
-        let now = self.clock.now().unwrap_or_else(system_time);
-        let control = &mut self.control;
-        self.lifecycle.shut_down(now, &mut |goal| act(control, goal));
+        let now = self.time();
+        let (lifecycle, mut transitions) = self.transitions(now);
+        lifecycle.shut_down(now, &mut |goal| transitions.act(goal));
         // Robots that are driven by velocities would go on for ever.
         self.publish(now);
         true
@@ -247,7 +247,24 @@ impl FormationNode {
 
     /// Namespace of the fleet and its topics.
     pub fn fleet(&self) -> &str {
-        self.names.fleet()
+        self.origin.names.fleet()
+    }
+
+    /// Where the node can be reached, in words.
+    pub fn reached_at(&self) -> [String; 2] {
+        self.origin.reached_at()
+    }
+
+    fn hears_any(&self) -> bool {
+        self.origin.part.heard.iter().any(|&m| self.control.health(m).is_usable())
+    }
+
+    /// Where the recorder is: with the topics of a configured node.
+    fn recorder(&mut self) -> &mut Option<MessageRecorder> {
+        match &mut self.endpoints {
+            Some(endpoints) => &mut endpoints.link.recorder,
+            None => &mut self.recorder,
+        }
     }
 
     /// One period: what arrived, the targets, what is published.
@@ -258,11 +275,13 @@ impl FormationNode {
         if let Some(jump) = self.clock.poll() {
             tracing::warn!("time went back by {jump} s: waiting for poses of the new time");
         }
-        let stamp = self.clock.now().unwrap_or_else(system_time);
+        let stamp = self.time();
         self.answer(stamp);
         // Without a clock poses have no age, and none can be accepted.
         let Some(now) = self.clock.now() else { return self.wait_for_clock(stamp) };
-        listen(&mut self.control, &mut self.link, &mut self.complaints, now);
+        if let Some(endpoints) = &mut self.endpoints {
+            listen(&mut self.control, &mut endpoints.link, &mut self.complaints, now);
+        }
         drop(inside);
         self.record_event(now, LoopEvent::TICK, "", &[now]);
         self.control.tick(now);
@@ -301,19 +320,23 @@ impl FormationNode {
     }
 
     fn answer(&mut self, now: f64) {
-        let commands = self.swarm.raw.node.commands;
+        let commands = self.origin.swarm.raw.node.commands;
         let not_allowed = format!("the swarm file has node.commands = \"{}\"", commands.name());
         let may_switch = |edge: &Transition| {
             commands.may_do_all() || (commands.may_stop() && ["deactivate", "shutdown"].contains(&edge.label))
         };
-        let control = &mut self.control;
-        self.lifecycle.poll(now, &may_switch, &mut |goal| act(control, goal));
+        let (lifecycle, mut transitions) = self.transitions(now);
+        lifecycle.poll(now, &may_switch, &mut |goal| transitions.act(goal));
+        self.record_beginning(now);
         if self.lifecycle.is_active() != self.was_active {
             self.was_active = self.lifecycle.is_active();
             let kind = if self.was_active { LoopEvent::ACTIVE } else { LoopEvent::INACTIVE };
             self.record_event(now, kind, "", &[]);
         }
         let locked = (!commands.may_do_all()).then_some(not_allowed.as_str());
+        if let Some(loggers) = &self.loggers {
+            loggers.serve(locked);
+        }
         let changes = self.parameters.poll(now, locked);
         self.apply(&changes, now);
         let mut events: Vec<(u8, String, Vec<f64>)> = Vec::new();
@@ -342,8 +365,10 @@ impl FormationNode {
             }
             false => outcome(false, "there is no emergency stop to lift"),
         });
-        let mut set = |request: &SetFormationRequest| match locked {
+        let is_configured = self.endpoints.is_some();
+        let mut set = |request: &_| match locked {
             Some(reason) => Err(reason.to_owned()),
+            None if !is_configured => Err("the node is not configured".to_owned()),
             None => set_formation(control, request),
         };
         self.set_formation.serve(|request| match set(&request) {
@@ -364,8 +389,9 @@ impl FormationNode {
 
     /// Problems of the network around the node, and of its clock.
     fn troubles(&self) -> Vec<String> {
-        let twins = self.node.twins();
-        let twin = |of: &str| format!("{twins} other node{of} the name {}", self.node.name());
+        let node = &self.origin.node;
+        let twins = node.twins();
+        let twin = |of: &str| format!("{twins} other node{of} the name {}", node.name());
         let twin = match twins {
             0 => None,
             1 => Some(twin(" has")),
@@ -375,80 +401,66 @@ impl FormationNode {
     }
 
     fn record_event(&mut self, now: f64, kind: u8, text: &str, values: &[f64]) {
-        if let Some(recorder) = &mut self.link.recorder {
+        if let Some(recorder) = self.recorder() {
             recorder.event(now, kind, text, values);
         }
     }
 
-    fn header(&self, now: f64) -> Header {
-        Header { stamp: Time::from_seconds(now), frame_id: self.frame_id.clone() }
+    /// A loop that has begun anew, with its parameters.
+    fn record_beginning(&mut self, now: f64) {
+        if !std::mem::take(&mut self.is_new) {
+            return;
+        }
+        self.record_event(now, LoopEvent::CONFIGURE, "", &[]);
+        for (name, value) in recorder::parameters(&self.control) {
+            self.record_event(now, LoopEvent::PARAMETER, name, &[value]);
+        }
     }
 
-    /// Targets and velocities while the node is active; when it ceases to be, one velocity of zero: from then on the robots are
-    /// driven by others.
+    /// Publishes targets and velocities.
     fn publish(&mut self, now: f64) {
         self.say(now, self.lifecycle.is_active());
     }
 
     fn say(&mut self, now: f64, active: bool) {
+        let Some(endpoints) = &mut self.endpoints else { return };
         if active {
-            self.statistics.sent(self.link.send(now, &targets(&self.control, &self.part)));
+            let sent = endpoints.link.send(now, &targets(&self.control, &self.origin.part));
+            self.statistics.sent(sent);
         }
-        if !active && !std::mem::take(&mut self.is_driving) {
-            return;
-        }
-        self.is_driving = active;
-        for (member, drive) in &self.drives {
-            let target = self.control.target(*member).filter(|_| active);
-            self.statistics.sent(drive.publish(&self.control, *member, target, self.header(now)));
-        }
+        endpoints.drive(&self.control, active, &self.origin.header(now), &mut self.statistics);
     }
 
     fn diagnosis(&mut self, now: f64) -> DiagnosticArray {
-        let (header, refused, troubles) = (self.header(now), self.link.refused(), self.troubles());
-        let names = [self.node.name(), &self.swarm.name];
-        self.statistics.message(&self.control, names, header, refused, &troubles)
+        let refused = self.endpoints.as_ref().map_or(0, |endpoints| endpoints.link.refused());
+        let troubles = self.troubles();
+        let names = [self.origin.node.name(), &self.origin.swarm.name];
+        self.statistics.message(&self.control, names, self.origin.header(now), refused, &troubles)
     }
 
     /// Publishes state and markers at `state_rate`, diagnostics at 1 Hz.
     fn report(&mut self, now: f64) {
-        if self.statistics.is_due(diagnostics::STATE, now, self.settings.state_rate) {
-            let state = state::message(
-                &self.control,
-                &self.swarm.name,
-                self.header(now),
-                self.statistics.last_tick(),
-            );
-            copy(&mut self.link.recorder, &self.state, &state, now);
-            self.statistics.sent(self.state.publish(&state));
-            if let Some(topic) = &self.markers {
-                let markers = markers::message(&self.control, &self.swarm.raw, &self.header(now));
-                copy(&mut self.link.recorder, topic, &markers, now);
-                self.statistics.sent(topic.publish(&markers));
-            }
+        if let Some(endpoints) = &mut self.endpoints
+            && self.statistics.is_due(diagnostics::STATE, now, self.settings.state_rate)
+        {
+            endpoints.report(&self.control, &self.origin, now, &mut self.statistics);
         }
         if self.statistics.is_due(diagnostics::DIAGNOSTICS, now, 1.0) {
             let message = self.diagnosis(now);
-            copy(&mut self.link.recorder, &self.diagnostics, &message, now);
+            let recorder = match &mut self.endpoints {
+                Some(endpoints) => &mut endpoints.link.recorder,
+                None => &mut self.recorder,
+            };
+            copy(recorder, &self.diagnostics, &message, now);
             self.statistics.sent(self.diagnostics.publish(&message));
         }
     }
 }
 
-fn copy<M: super::edge::Message>(
-    recorder: &mut Option<MessageRecorder>,
-    topic: &Publisher<M>,
-    message: &M,
-    now: f64,
-) {
+fn copy<M: Message>(recorder: &mut Option<MessageRecorder>, topic: &Publisher<M>, message: &M, now: f64) {
     if let Some(recorder) = recorder {
         recorder.take(topic.topic(), message, [now; 2]);
     }
-}
-
-/// Where a member is sent, as a message.
-pub fn target(control: &Control, member: usize, header: Header) -> Option<PoseStamped> {
-    target_of(control, member).map(|target| link::message(&target, header))
 }
 
 /// Refuses a node that no peer could make active.
@@ -459,16 +471,6 @@ fn check_commands(swarm: &Swarm, autostart: bool) -> Result<(), SceneError> {
     }
     let what = format!("\"{}\" lets no peer make the node active, and autostart is false", commands.name());
     Err(swarm.refuse("node.commands", what, "leave the parameter autostart true, or allow \"all\""))
-}
-
-/// Performs the action of a lifecycle transition.
-fn act(control: &mut Control, goal: Goal) -> Outcome {
-    match goal {
-        Goal::Activate => control.set_active(true),
-        Goal::Deactivate | Goal::CleanUp | Goal::ShutDown | Goal::Recover => control.set_active(false),
-        Goal::Configure => {}
-    }
-    Outcome::Success
 }
 
 /// The names of a formation's node: `__ns` gives the fleet's namespace, below which the node of one member has its own.

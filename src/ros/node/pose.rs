@@ -2,10 +2,11 @@
 
 use super::recorder::MessageRecorder;
 use super::{NodeError, TopicOf};
+use crate::messages::formation::pose::pose;
+use crate::messages::geometry_msgs::{self, PoseArray, PoseStamped, PoseWithCovarianceStamped};
+use crate::messages::nav_msgs::Odometry;
+use crate::messages::std_msgs::Header;
 use crate::ros::edge::{Node, Quality, Stamps, Subscription};
-use crate::ros::messages::geometry_msgs::{self, PoseArray, PoseStamped, PoseWithCovarianceStamped};
-use crate::ros::messages::nav_msgs::Odometry;
-use crate::ros::messages::std_msgs::Header;
 use crate::scene::swarm::raw::{RawNode, RawPoseType};
 use crate::swarm::watch::Pose;
 
@@ -97,7 +98,7 @@ impl PoseSource {
     }
 }
 
-fn each<M: crate::ros::edge::Message>(
+fn each<M: crate::messages::Message>(
     node: &Node,
     raw: &RawNode,
     heard: &[usize],
@@ -110,7 +111,7 @@ fn each<M: crate::ros::edge::Message>(
     heard.iter().map(open).collect()
 }
 
-fn drain<M: crate::ros::edge::Message>(
+fn drain<M: crate::messages::Message>(
     all: &[(usize, Subscription<M>)],
     pose: impl Fn(&M, Stamps) -> Pose,
     (recorder, now): (&mut Option<(&mut MessageRecorder, f64)>, Option<f64>),
@@ -124,7 +125,7 @@ fn drain<M: crate::ros::edge::Message>(
     }
 }
 
-fn copy<M: crate::ros::edge::Message>(
+fn copy<M: crate::messages::Message>(
     recorder: &mut Option<(&mut MessageRecorder, f64)>,
     topic: &str,
     message: &M,
@@ -132,22 +133,6 @@ fn copy<M: crate::ros::edge::Message>(
     now: Option<f64>,
 ) {
     if let Some((recorder, time)) = recorder {
-        recorder.take(topic, message, [*time, now.unwrap_or(stamps.received)]);
+        recorder.take_received(topic, message, [*time, now.unwrap_or(stamps.received)]);
     }
-}
-
-/// A pose with its stamp; one that bears none was measured when it arrived.
-pub fn pose(header: &Header, pose: &geometry_msgs::Pose, arrival: f64, frame_id: &str) -> Pose {
-    let stamped = header.stamp.seconds();
-    Pose {
-        position: [pose.position.x, pose.position.y],
-        yaw: pose.orientation.yaw().unwrap_or(f64::NAN),
-        stamp: if stamped == 0.0 { arrival } else { stamped },
-        frame_is_right: is_frame(&header.frame_id, frame_id),
-    }
-}
-
-/// Whether a header speaks of this frame; older tools write a slash before it.
-pub fn is_frame(said: &str, meant: &str) -> bool {
-    said.strip_prefix('/').unwrap_or(said) == meant
 }

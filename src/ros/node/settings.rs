@@ -1,9 +1,16 @@
 //! The node's parameters: what of the swarm file can be changed while it flies.
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use super::NodeError;
-use crate::ros::arguments::{RosArguments, Value as Given};
+use crate::messages::names::Names;
+use crate::ros::arguments::{Parameter, RosArguments, Value as Given};
 use crate::ros::edge::parameters::{Change, Declaration, Store, Value};
+use crate::scene::swarm::Swarm;
+use crate::scene::swarm::raw::RawNode;
 use crate::swarm::control::Control;
+use crate::swarm::control::scope::NodeScope;
 use crate::swarm::pace::Pace;
 
 /// Values of the parameters that are read where they are used.
@@ -20,14 +27,30 @@ pub struct Settings {
 /// No limit, as a parameter that cannot be infinite says it.
 const NONE: f64 = 0.0;
 
-/// Declares every parameter, with what the arguments give.
-pub fn declare(
+/// A name of the swarm file's `[node]`.
+type Field = fn(&mut RawNode) -> &mut String;
+
+/// Parameters that are names of the swarm file's `[node]`. They can be changed while the node is not configured.
+pub(super) const TOPICS: [(&str, Field); 5] = [
+    ("frame_id", |raw| &mut raw.frame_id),
+    ("pose_topic", |raw| &mut raw.pose_topic),
+    ("target_topic", |raw| &mut raw.target_topic),
+    ("leader_topic", |raw| &mut raw.leader_topic),
+    ("velocity_topic", |raw| &mut raw.velocity_topic),
+];
+
+/// Declares every parameter, with what the arguments give; names can be changed while the node is not configured.
+pub(super) fn declare(
     control: &Control,
     arguments: &RosArguments,
-    node: &str,
+    names: &Names,
+    swarm: &Swarm,
+    part: &NodeScope,
+    is_configured: &Arc<AtomicBool>,
 ) -> Result<(Settings, Store), NodeError> {
     let limits = control.limits();
-    let declarations = [
+    let mut raw = swarm.raw.node.clone();
+    let mut declarations = vec![
         Declaration::new("rate", 1.0 / control.period()).range(1.0..=500.0).describe("targets a second [Hz]"),
         Declaration::new("state_rate", 10.0)
             .range(0.1..=100.0)
@@ -41,22 +64,24 @@ pub fn declare(
         Declaration::new("damping", control.damping())
             .range(0.0..=2.0)
             .describe("part of the way to its target that a follower goes in a sweep [1]"),
+        Declaration::new("sweeps", control.sweeps() as i64)
+            .integer_range(1..=most_sweeps(control, part), 0)
+            .describe("applications of the rule in a period [1]"),
         Declaration::new("autostart", true)
             .read_only()
             .describe("become active without waiting for a lifecycle manager"),
         Declaration::new("use_sim_time", false).read_only().describe("take the time from /clock"),
     ];
-    let given = arguments.parameters_for(node);
-    let mut store = Store::default();
-    let names: Vec<String> = declarations.iter().map(|one| one.name().to_owned()).collect();
-    for declaration in declarations {
-        let start =
-            given.iter().rev().find(|one| one.name == declaration.name()).map(|one| value(&one.value));
-        store.declare(declaration, start)?;
-    }
-    for one in given.iter().filter(|one| !names.contains(&one.name)) {
-        tracing::warn!("parameter `{}` is not one of this node's: {}", one.name, names.join(", "));
-    }
+    let robot = control.formation().names[0].clone();
+    declarations.extend(TOPICS.map(|(name, field)| {
+        let declaration = while_unconfigured(name, field(&mut raw), is_configured);
+        if name == "frame_id" {
+            declaration.describe("frame of every pose (REP 105)")
+        } else {
+            topic(declaration, names.clone(), robot.clone())
+        }
+    }));
+    let store = store(declarations, &arguments.parameters_for(&names.fully_qualified()))?;
     let number = |name: &str| store.get(name).and_then(Value::as_double).unwrap_or_default();
     let flag = |name: &str| store.get(name).and_then(Value::as_bool).unwrap_or_default();
     let settings = Settings {
@@ -66,6 +91,48 @@ pub fn declare(
         autostart: flag("autostart"),
     };
     Ok((settings, store))
+}
+
+/// A name that only a node that is not configured can change.
+fn while_unconfigured(name: &str, value: &str, is_configured: &Arc<AtomicBool>) -> Declaration {
+    let is_configured = Arc::clone(is_configured);
+    let words = "changes while the node is not configured";
+    Declaration::new(name, value).checked(words, move |_, _| match is_configured.load(Ordering::Relaxed) {
+        true => {
+            Err("the node is configured: `deactivate` and `cleanup` come first, `configure` after".into())
+        }
+        false => Ok(()),
+    })
+}
+
+/// Of a topic of the robots, which is tried with one of them.
+fn topic(declaration: Declaration, names: Names, robot: String) -> Declaration {
+    declaration.describe("topic of each robot; {name} stands for the robot's name").checked(
+        "a topic's name",
+        move |_, value| {
+            let pattern = value.as_str().unwrap_or_default().replace("{name}", &robot);
+            names.fleet_topic(&pattern).map(|_| ()).map_err(|error| error.to_string())
+        },
+    )
+}
+
+/// Declares parameters with the values given for them; a name that is none of theirs is only warned of.
+pub(in crate::ros) fn store(declarations: Vec<Declaration>, given: &[Parameter]) -> Result<Store, NodeError> {
+    let mut store = Store::default();
+    let names: Vec<String> = declarations.iter().map(|one| one.name().to_owned()).collect();
+    for declaration in declarations {
+        let start = given.iter().rev().find(|one| one.name == declaration.name());
+        store.declare(declaration, start.map(|one| value(&one.value)))?;
+    }
+    for one in given.iter().filter(|one| !names.contains(&one.name)) {
+        tracing::warn!("parameter `{}` is not one of this node's: {}", one.name, names.join(", "));
+    }
+    Ok(store)
+}
+
+/// As the swarm file allows; the node of one robot receives its neighbours' poses alone, which makes one sweep.
+fn most_sweeps(control: &Control, part: &NodeScope) -> i64 {
+    if part.mine.len() == control.formation().count() { 100_000 } else { 1 }
 }
 
 /// A limit that can be tightened and not loosened: the swarm file's value is the upper bound for every caller.
@@ -82,14 +149,20 @@ fn at_most(name: &str, limit: f64) -> Declaration {
 
 impl Settings {
     /// Applies all that the arguments gave.
-    pub fn apply_all(&mut self, store: &Store, control: &mut Control, pace: &mut Pace) {
-        for (name, value) in store.iter() {
+    pub fn apply_all<'a>(
+        &mut self,
+        parameters: impl Iterator<Item = (&'a str, &'a Value)>,
+        control: &mut Control,
+        pace: &mut Pace,
+    ) {
+        for (name, value) in parameters {
             self.apply(&Change { name: name.to_owned(), value: value.clone() }, control, pace);
         }
     }
 
     pub fn apply(&mut self, change: &Change, control: &mut Control, pace: &mut Pace) {
-        let Some(number) = change.value.as_double() else { return };
+        let whole = change.value.as_integer().map(|number| number as f64);
+        let Some(number) = change.value.as_double().or(whole) else { return };
         let limit = if number == NONE { f64::INFINITY } else { number };
         let mut limits = control.limits().clone();
         match change.name.as_str() {
@@ -100,6 +173,7 @@ impl Settings {
             }
             "state_rate" => self.state_rate = number,
             "damping" => control.set_damping(number),
+            "sweeps" => control.set_sweeps(number as usize),
             "speed_limit" => limits.speed = limit,
             "acceleration_limit" => limits.acceleration = limit,
             "clearance" => limits.clearance = number,

@@ -303,6 +303,16 @@ impl Control {
         self.formation.set_damping(damping);
     }
 
+    /// Applications of the rule in a period \[1\].
+    pub fn sweeps(&self) -> usize {
+        self.sweeps
+    }
+
+    /// Sets the applications of the rule in a period \[1\].
+    pub fn set_sweeps(&mut self, sweeps: usize) {
+        self.sweeps = sweeps;
+    }
+
     /// One period, at `now` \[s\].
     pub fn tick(&mut self, now: f64) {
         self.ticks += 1;

@@ -1,7 +1,7 @@
 //! The machine behind its services.
 
 use super::machine::{Goal, Machine, Outcome, State, Transition};
-use crate::ros::edge::services::lifecycle_msgs as msgs;
+use crate::messages::lifecycle_msgs as msgs;
 use crate::ros::edge::{EdgeError, Node, Publisher, Quality, Service};
 
 /// A node's lifecycle and the services `~/change_state`, `~/get_state`, `~/get_available_states`,

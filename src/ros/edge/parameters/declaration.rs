@@ -3,8 +3,8 @@
 use std::ops::RangeInclusive;
 
 use super::Value;
-use crate::ros::edge::said;
-use crate::ros::edge::services::rcl_interfaces::{FloatingPointRange, IntegerRange, ParameterDescriptor};
+use crate::messages::rcl_interfaces::{FloatingPointRange, IntegerRange, ParameterDescriptor};
+use crate::messages::said;
 
 /// A validator: `Err` with the reason refuses a value.
 pub type Check = Box<dyn Fn(&str, &Value) -> Result<(), String> + Send>;
@@ -24,7 +24,7 @@ pub struct Declaration {
     constraints: String,
     range: Option<Range>,
     pub(super) read_only: bool,
-    check: Option<Check>,
+    checks: Vec<Check>,
 }
 
 impl Declaration {
@@ -37,7 +37,7 @@ impl Declaration {
             constraints: String::new(),
             range: None,
             read_only: false,
-            check: None,
+            checks: Vec::new(),
         }
     }
 
@@ -91,8 +91,9 @@ impl Declaration {
         constraints: &str,
         check: impl Fn(&str, &Value) -> Result<(), String> + Send + 'static,
     ) -> Self {
-        self.constraints = constraints.into();
-        self.check = Some(Box::new(check));
+        let before = if self.constraints.is_empty() { "" } else { "; " };
+        self.constraints += &format!("{before}{constraints}");
+        self.checks.push(Box::new(check));
         self
     }
 
@@ -134,7 +135,7 @@ impl Declaration {
             }
             _ => {}
         }
-        if let Some(check) = &self.check {
+        for check in &self.checks {
             check(&self.name, &value).map_err(|reason| Refusal::Vetoed { name: name(), reason })?;
         }
         Ok(value)

@@ -1,8 +1,9 @@
 //! The store behind its services.
 
 use super::{Change, Declaration, Refusal, Store, Value};
-use crate::ros::edge::services::{Time, rcl_interfaces as msgs};
-use crate::ros::edge::{EdgeError, Node, Publisher, Quality, Service, said};
+use crate::messages::builtin_interfaces::Time;
+use crate::messages::{rcl_interfaces as msgs, said};
+use crate::ros::edge::{EdgeError, Node, Publisher, Quality, Service};
 
 /// A node's parameters and the services `~/get_parameters`, `~/set_parameters`,
 /// `~/set_parameters_atomically`, `~/list_parameters`, `~/describe_parameters`, `~/get_parameter_types`, with

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use super::Value;
 use super::declaration::{Declaration, Refusal};
-use crate::ros::edge::said;
-use crate::ros::edge::services::rcl_interfaces::ParameterDescriptor;
+use crate::messages::rcl_interfaces::ParameterDescriptor;
+use crate::messages::said;
 
 /// A parameter that changed.
 #[derive(Clone, Debug, PartialEq)]
@@ -75,12 +75,14 @@ impl Store {
     fn admit(&self, name: &str, value: Option<Value>) -> Result<Value, Refusal> {
         let declaration = self.declared.get(name).ok_or_else(|| Refusal::Undeclared { name: said(name) })?;
         let value = value.ok_or_else(|| Refusal::Unset { name: name.into() });
-        if !declaration.read_only {
-            return declaration.admit(value?);
+        // What it has already may be written again, whatever the node's state: `ros2 param load` does so with what
+        // `ros2 param dump` wrote.
+        let value = value.map(|value| value.widened(&declaration.value));
+        match value {
+            Ok(value) if value == declaration.value => Ok(value),
+            _ if declaration.read_only => Err(Refusal::ReadOnly { name: name.into() }),
+            value => declaration.admit(value?),
         }
-        // What it has already may be written again: `ros2 param load` does so with what `ros2 param dump` wrote.
-        let same = value.and_then(|value| declaration.admit(value)).ok();
-        same.filter(|same| *same == declaration.value).ok_or_else(|| Refusal::ReadOnly { name: name.into() })
     }
 
     fn apply(&mut self, name: &str, value: Value) {
@@ -129,7 +131,7 @@ impl Store {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ros::edge::services::rcl_interfaces::FloatingPointRange;
+    use crate::messages::rcl_interfaces::FloatingPointRange;
 
     fn store() -> Store {
         let mut store = Store::default();

@@ -1,6 +1,6 @@
 //! Values of parameters.
 
-use crate::ros::edge::services::rcl_interfaces::ParameterValue;
+use crate::messages::rcl_interfaces::ParameterValue;
 
 /// A parameter's value.
 #[derive(Clone, Debug, PartialEq)]

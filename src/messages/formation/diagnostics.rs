@@ -1,8 +1,9 @@
 //! How the loop fares, for `/diagnostics`.
 
-use crate::ros::edge::EdgeError;
-use crate::ros::messages::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus, KeyValue};
-use crate::ros::messages::std_msgs::Header;
+use std::fmt::Display;
+
+use crate::messages::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus, KeyValue};
+use crate::messages::std_msgs::Header;
 use crate::swarm::control::{Control, Mode};
 
 /// Index of a publication with its own rate.
@@ -36,7 +37,8 @@ impl Statistics {
         self.last
     }
 
-    pub fn sent(&mut self, outcome: Result<(), EdgeError>) {
+    /// Counts a message that could not be sent.
+    pub fn sent<E: Display>(&mut self, outcome: Result<(), E>) {
         if let Err(error) = outcome {
             if self.unsent == 0 {
                 tracing::warn!("{error} (only the first is reported)");

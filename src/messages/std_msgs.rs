@@ -1,13 +1,28 @@
-//! Structs of the standard services: fields in the order of the `.srv` and `.msg` files.
-
-pub mod lifecycle_msgs;
-pub mod rcl_interfaces;
-pub mod std_srvs;
-
-pub use crate::ros::messages::builtin_interfaces::Time;
-pub use crate::ros::messages::rosgraph_msgs;
+//! `std_msgs`: the header that stamped messages begin with, colours, and a message that says nothing but that it was sent.
 
 use serde::{Deserialize, Deserializer, Serialize};
+
+use super::builtin_interfaces::Time;
+
+/// When, and in which frame.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Header {
+    pub stamp: Time,
+    /// Coordinate frame, without a leading slash.
+    pub frame_id: String,
+}
+
+/// A colour, each part from 0 to 1.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ColorRGBA {
+    pub r: f32,
+    pub g: f32,
+    pub b: f32,
+    /// Opacity.
+    pub a: f32,
+}
+
+super::messages!("std_msgs": Header, ColorRGBA, Empty);
 
 /// A struct without fields: one zero byte on the wire, which some peers leave out.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -28,7 +43,7 @@ impl<'de> Deserialize<'de> for Empty {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ros::edge::wire::{Order, decode, encode};
+    use crate::messages::wire::{Order, decode, encode};
 
     #[test]
     fn nothing_is_one_byte_out_and_any_bytes_in() {

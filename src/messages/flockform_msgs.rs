@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::ServiceType;
 use super::geometry_msgs::{Point, Vector3};
 use super::std_msgs::Header;
 
@@ -90,7 +91,7 @@ impl FormationState {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct LoopEvent {
     pub header: Header,
-    /// [`LoopEvent::TICK`] to [`LoopEvent::PARAMETER`].
+    /// [`LoopEvent::TICK`] to [`LoopEvent::CONFIGURE`].
     pub kind: u8,
     pub text: String,
     pub values: Vec<f64>,
@@ -105,6 +106,7 @@ impl LoopEvent {
     pub const MANOEUVRE: u8 = 5;
     pub const POSTURE: u8 = 6;
     pub const PARAMETER: u8 = 7;
+    pub const CONFIGURE: u8 = 8;
 }
 
 super::messages!("flockform_msgs": MemberState, FormationState, LoopEvent);
@@ -133,5 +135,12 @@ pub struct SetFormationResponse {
     pub message: String,
 }
 
-impl ros2_client::Message for SetFormationRequest {}
-impl ros2_client::Message for SetFormationResponse {}
+/// `srv/SetFormation`: moves the leaders.
+pub struct SetFormation;
+
+impl ServiceType for SetFormation {
+    const PACKAGE: &str = "flockform_msgs";
+    const NAME: &str = "SetFormation";
+    type Request = SetFormationRequest;
+    type Response = SetFormationResponse;
+}

@@ -1,11 +1,11 @@
 //! Copies of the messages, commands and targets of a loop, for recordings.
 
-use crate::ros::arguments::{NameError, Names};
-use crate::ros::edge::Message;
-use crate::ros::edge::wire::encode;
-use crate::ros::messages::builtin_interfaces::Time;
-use crate::ros::messages::flockform_msgs::LoopEvent;
-use crate::ros::messages::std_msgs::Header;
+use crate::messages::Message;
+use crate::messages::builtin_interfaces::Time;
+use crate::messages::flockform_msgs::LoopEvent;
+use crate::messages::names::{NameError, Names};
+use crate::messages::std_msgs::Header;
+use crate::messages::wire::encode;
 use crate::swarm::control::Control;
 
 /// Topic of [`LoopEvent`]s, below the node's name.
@@ -23,6 +23,8 @@ pub struct RecordedMessage<'a> {
     pub name: &'static str,
     /// CDR, with its encapsulation header.
     pub payload: &'a [u8],
+    /// Whether lost samples are sent again; of what others sent, whether the loop asks for it.
+    pub reliable: bool,
     /// By the loop's clock \[s\].
     pub time: f64,
     /// When it was sent, or came \[s\].
@@ -50,8 +52,18 @@ impl MessageRecorder {
         Ok(Self { sink, payload: Vec::new(), events, frame_id: frame_id.to_owned() })
     }
 
-    /// A message of the loop's time `time` \[s\], which was sent or came at `published` \[s\].
-    pub fn take<M: Message>(&mut self, topic: &str, message: &M, [time, published]: [f64; 2]) {
+    /// A message that the loop sends at its time `time` \[s\], which goes out at `published` \[s\].
+    pub fn take<M: Message>(&mut self, topic: &str, message: &M, times: [f64; 2]) {
+        self.copy(topic, message, times, true);
+    }
+
+    /// A pose or the place of a leader, taken at the loop's time `time` \[s\], which was sent or came at `published`
+    /// \[s\]: the newest counts, and a lost one is not sent again.
+    pub fn take_received<M: Message>(&mut self, topic: &str, message: &M, times: [f64; 2]) {
+        self.copy(topic, message, times, false);
+    }
+
+    fn copy<M: Message>(&mut self, topic: &str, message: &M, [time, published]: [f64; 2], reliable: bool) {
         self.payload.clear();
         self.payload.extend(ENCAPSULATION);
         let mut body = Vec::new();
@@ -60,10 +72,11 @@ impl MessageRecorder {
             return;
         }
         self.payload.extend(body);
-        let (package, name) = (M::PACKAGE, M::NAME);
-        (self.sink)(&RecordedMessage { topic, package, name, payload: &self.payload, time, published });
+        let (package, name, payload) = (M::PACKAGE, M::NAME, &self.payload[..]);
+        (self.sink)(&RecordedMessage { topic, package, name, payload, reliable, time, published });
     }
 
+    /// A command that the loop took, or another input of it.
     pub fn event(&mut self, time: f64, kind: u8, text: &str, values: &[f64]) {
         let header = Header { stamp: Time::from_seconds(time), frame_id: self.frame_id.clone() };
         let event = LoopEvent { header, kind, text: text.to_owned(), values: values.to_vec() };
@@ -81,11 +94,12 @@ impl MessageRecorder {
 }
 
 /// Of a loop: names and values in SI units.
-pub fn parameters(control: &Control) -> [(&'static str, f64); 5] {
+pub fn parameters(control: &Control) -> [(&'static str, f64); 6] {
     let limits = control.limits();
     [
         ("period", control.period()),
         ("damping", control.damping()),
+        ("sweeps", control.sweeps() as f64),
         ("speed_limit", limits.speed),
         ("acceleration_limit", limits.acceleration),
         ("clearance", limits.clearance),
@@ -98,6 +112,7 @@ pub fn set_parameter(control: &mut Control, name: &str, value: f64) -> bool {
     match name {
         "period" if value > 0.0 => control.set_period(value),
         "damping" => control.set_damping(value),
+        "sweeps" if value >= 1.0 => control.set_sweeps(value as usize),
         "speed_limit" => limits.speed = value,
         "acceleration_limit" => limits.acceleration = value,
         "clearance" => limits.clearance = value,

@@ -1,29 +1,46 @@
-//! The messages of the node's topics, one file per interface package.
+//! Messages: their structs, one file per interface package, their encoding, and the names of the topics they travel on.
 //!
 //! A message on the wire (CDR) has no field names: **the order of the fields of each struct is the
 //! format**. `tests/ros_messages` holds every struct here against its `.msg` text, and against a
 //! reference encoder byte for byte. Names, units and frames are those of the packages (REP 103: SI,
 //! right-handed; REP 105: frames).
+//!
+//! * [`wire`]: the encoding. [`interface`]: what a struct needs to be a message or a service.
+//! * [`names`], [`remap`]: names of nodes and topics, and what a user makes of them.
+//! * [`formation`]: what a formation's loop publishes and accepts; [`recorder`]: copies of it.
+//! * [`said()`]: text from the network, fit to be shown.
+//!
+//! Nothing here opens a socket or a file.
 
 pub mod builtin_interfaces;
 pub mod definitions;
 pub mod diagnostic_msgs;
 pub mod flockform_msgs;
+pub mod formation;
 pub mod geometry_msgs;
+pub mod interface;
+pub mod lifecycle_msgs;
+pub mod names;
 pub mod nav_msgs;
+pub mod rcl_interfaces;
+pub mod recorder;
+pub mod remap;
 pub mod rosgraph_msgs;
+mod said;
 pub mod sensor_msgs;
 pub mod std_msgs;
+pub mod std_srvs;
 pub mod tf2_msgs;
 pub mod visualization_msgs;
+pub mod wire;
 
-pub use crate::ros::edge::Message;
+pub use interface::{Message, ServiceType};
+pub use said::{escaped, said};
 
 /// Names the messages of one package after their structs.
 macro_rules! messages {
     ($package:literal: $($message:ident),+ $(,)?) => {$(
-        impl ros2_client::Message for $message {}
-        impl $crate::ros::edge::Message for $message {
+        impl $crate::messages::Message for $message {
             const PACKAGE: &'static str = $package;
             const NAME: &'static str = stringify!($message);
         }

@@ -1,8 +1,8 @@
 //! The formation's state as a message.
 
-use crate::ros::messages::flockform_msgs::{FormationState, MemberState};
-use crate::ros::messages::geometry_msgs::{Point, Vector3};
-use crate::ros::messages::std_msgs::Header;
+use crate::messages::flockform_msgs::{FormationState, MemberState};
+use crate::messages::geometry_msgs::{Point, Vector3};
+use crate::messages::std_msgs::Header;
 use crate::swarm::control::state::FormationState as State;
 use crate::swarm::control::{Control, Mode};
 use crate::swarm::watch::Health;

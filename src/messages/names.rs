@@ -85,6 +85,11 @@ impl Names {
         join(&self.namespace, &self.node)
     }
 
+    /// Name of the node's logger, with dots as `rcl` has them: `a.b.node`.
+    pub fn logger(&self) -> String {
+        self.fully_qualified().trim_start_matches('/').replace('/', ".")
+    }
+
     /// The fully qualified name of a topic: `name` expanded, then remapped by the first rule that
     /// matches. `name` is absolute (`/pose`), relative to the namespace (`pose`) or to the node
     /// (`~/pose`), and may contain `{node}` and `{ns}`.
@@ -215,8 +220,11 @@ fn check_full_name(what: &'static str, name: &str) -> Result<(), NameError> {
     Ok(())
 }
 
-/// Checks one token of a name; the error describes the fault.
-pub(super) fn check_token(token: &str) -> Result<(), String> {
+/// Checks one token of a name.
+///
+/// # Errors
+/// A description of the fault.
+pub fn check_token(token: &str) -> Result<(), String> {
     let is_allowed = |letter: char| letter.is_ascii_alphanumeric() || letter == '_';
     if token.is_empty() {
         return Err("is empty".into());

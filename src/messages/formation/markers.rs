@@ -1,10 +1,10 @@
 //! Markers for RViz and Foxglove: members by role, links by strain, targets, obstacles.
 
 use crate::flock::vectors::distance;
-use crate::ros::messages::builtin_interfaces::Duration;
-use crate::ros::messages::geometry_msgs::{Point, Pose, Vector3};
-use crate::ros::messages::std_msgs::{ColorRGBA, Header};
-use crate::ros::messages::visualization_msgs::{Marker, MarkerArray};
+use crate::messages::builtin_interfaces::Duration;
+use crate::messages::geometry_msgs::{Point, Pose, Vector3};
+use crate::messages::std_msgs::{ColorRGBA, Header};
+use crate::messages::visualization_msgs::{Marker, MarkerArray};
 use crate::scene::swarm::raw::{RawObstacle, RawSwarm};
 use crate::swarm::control::Control;
 

@@ -1,13 +1,8 @@
-//! Payloads as they arrive, and the CDR encoding.
+//! The CDR encoding, in which messages travel and are recorded.
 //!
-//! Endpoints hand over bytes, and decoding happens here: a service must look at a request before it knows
-//! how to read it, and any bytes at all must end in a value or an error.
-
-use std::convert::Infallible;
+//! Any bytes at all end in a value or an error.
 
 use ros2_client::dds::rustdds::RepresentationIdentifier;
-use ros2_client::dds::rustdds::bytes::Bytes;
-use ros2_client::dds::rustdds::no_key::{Decode, DefaultDecoder, DeserializerAdapter, SerializerAdapter};
 use ros2_client::dds::rustdds::serialization::{deserialize_from_cdr_with_rep_id, to_writer_with_rep_id};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -60,72 +55,10 @@ pub fn encode<T: Serialize>(value: &T, into: &mut Vec<u8>) -> Result<(), String>
     to_writer_with_rep_id(into, value, RepresentationIdentifier::CDR_LE).map_err(|error| error.to_string())
 }
 
-/// One sample's bytes.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Payload {
-    pub order: Order,
-    pub bytes: Vec<u8>,
-}
-
-impl Payload {
-    /// A value, ready to be sent.
-    pub fn of<T: Serialize>(value: &T) -> Result<Self, String> {
-        let mut bytes = Vec::with_capacity(2 * size_of::<T>());
-        encode(value, &mut bytes)?;
-        Ok(Self { order: Order::Little, bytes })
-    }
-}
-
-/// Lets RustDDS read and write [`Payload`]s.
-pub(super) struct Verbatim;
-
-impl DeserializerAdapter<Payload> for Verbatim {
-    type Error = Infallible;
-    type Decoded = Payload;
-
-    fn supported_encodings() -> &'static [RepresentationIdentifier] {
-        &[RepresentationIdentifier::CDR_LE, RepresentationIdentifier::CDR_BE]
-    }
-
-    fn transform_decoded(decoded: Payload) -> Payload {
-        decoded
-    }
-}
-
-impl DefaultDecoder<Payload> for Verbatim {
-    type Decoder = Copied;
-    const DECODER: Copied = Copied;
-}
-
-/// Copies the bytes out of RustDDS's cache.
-#[derive(Clone)]
-pub(super) struct Copied;
-
-impl Decode<'_, Payload> for Copied {
-    type Error = Infallible;
-
-    fn decode_bytes(self, bytes: &[u8], encoding: RepresentationIdentifier) -> Result<Payload, Infallible> {
-        let order = if encoding == RepresentationIdentifier::CDR_BE { Order::Big } else { Order::Little };
-        Ok(Payload { order, bytes: bytes.to_vec() })
-    }
-}
-
-impl SerializerAdapter<Payload> for Verbatim {
-    type Error = Infallible;
-
-    fn output_encoding() -> RepresentationIdentifier {
-        RepresentationIdentifier::CDR_LE
-    }
-
-    fn to_bytes(value: &Payload) -> Result<Bytes, Infallible> {
-        Ok(Bytes::copy_from_slice(&value.bytes))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ros::edge::services::{lifecycle_msgs, rcl_interfaces, rosgraph_msgs, std_srvs};
+    use crate::messages::{lifecycle_msgs, rcl_interfaces, rosgraph_msgs, std_srvs};
     use proptest::prelude::*;
 
     /// Decodes in both byte orders; what comes out must encode again.

@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::Empty;
-use crate::ros::edge::{Message, ServiceType};
+use super::std_msgs::Empty;
+use super::{Message, ServiceType};
 
 /// `msg/State`.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

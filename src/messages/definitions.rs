@@ -89,9 +89,9 @@ pub const STANDARD: &[(&str, &str)] = &[
 
 /// Of our own messages.
 pub const OWN: &[(&str, &str)] = &[
-    ("flockform_msgs/FormationState", include_str!("../../../msgs/flockform_msgs/msg/FormationState.msg")),
-    ("flockform_msgs/LoopEvent", include_str!("../../../msgs/flockform_msgs/msg/LoopEvent.msg")),
-    ("flockform_msgs/MemberState", include_str!("../../../msgs/flockform_msgs/msg/MemberState.msg")),
+    ("flockform_msgs/FormationState", include_str!("../../msgs/flockform_msgs/msg/FormationState.msg")),
+    ("flockform_msgs/LoopEvent", include_str!("../../msgs/flockform_msgs/msg/LoopEvent.msg")),
+    ("flockform_msgs/MemberState", include_str!("../../msgs/flockform_msgs/msg/MemberState.msg")),
 ];
 
 /// A message's definition followed by those of all messages that it contains, each after a line of equal signs

@@ -2,8 +2,8 @@
 
 use crate::flock::manoeuvre::{Leg, Manoeuvre, Posture};
 use crate::flock::vectors::distance;
-use crate::ros::edge::said;
-use crate::ros::messages::flockform_msgs::{LoopEvent, SetFormationRequest};
+use crate::messages::flockform_msgs::{LoopEvent, SetFormationRequest};
+use crate::messages::said;
 use crate::swarm::control::Control;
 
 /// A request that was granted, for a recorder.

@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::Empty;
-use crate::ros::edge::ServiceType;
+use super::ServiceType;
+use super::std_msgs::Empty;
 
 /// `std_srvs/srv/Trigger`.
 pub struct Trigger;

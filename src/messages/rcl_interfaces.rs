@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::Time;
-use crate::ros::edge::{Message, ServiceType};
+use super::builtin_interfaces::Time;
+use super::{Message, ServiceType};
 
 /// `msg/ParameterValue`: the field that `kind` names counts.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -199,4 +199,51 @@ impl ServiceType for SetParametersAtomically {
     const NAME: &str = "SetParametersAtomically";
     type Request = Settings;
     type Response = SetParametersAtomicallyResponse;
+}
+
+/// `msg/LoggerLevel`.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct LoggerLevel {
+    pub name: String,
+    /// 0 unknown, 10 debug, 20 info, 30 warn, 40 error, 50 fatal.
+    pub level: u32,
+}
+
+/// `srv/GetLoggerLevels`.
+pub struct GetLoggerLevels;
+
+/// Response of [`GetLoggerLevels`], one level per name.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct GetLoggerLevelsResponse {
+    pub levels: Vec<LoggerLevel>,
+}
+
+impl ServiceType for GetLoggerLevels {
+    const PACKAGE: &str = "rcl_interfaces";
+    const NAME: &str = "GetLoggerLevels";
+    type Request = Names;
+    type Response = GetLoggerLevelsResponse;
+}
+
+/// `srv/SetLoggerLevels`.
+pub struct SetLoggerLevels;
+
+/// Request of [`SetLoggerLevels`].
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SetLoggerLevelsRequest {
+    pub levels: Vec<LoggerLevel>,
+}
+
+/// Response of [`SetLoggerLevels`], one `msg/SetLoggerLevelsResult` per level: its fields are those of
+/// [`SetParametersResult`].
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SetLoggerLevelsResponse {
+    pub results: Vec<SetParametersResult>,
+}
+
+impl ServiceType for SetLoggerLevels {
+    const PACKAGE: &str = "rcl_interfaces";
+    const NAME: &str = "SetLoggerLevels";
+    type Request = SetLoggerLevelsRequest;
+    type Response = SetLoggerLevelsResponse;
 }

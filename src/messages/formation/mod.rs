@@ -1,0 +1,13 @@
+//! The messages of a formation's loop: made from its [`Control`](crate::swarm::control::Control), and applied to it.
+//!
+//! A live node and a recording of a simulated flight publish the same: both take it from here.
+
+pub mod diagnostics;
+pub mod leaders;
+pub mod markers;
+pub mod pose;
+pub mod state;
+pub mod target;
+
+/// Name of a formation's node unless `__node` says otherwise.
+pub const NAME: &str = "flockform";

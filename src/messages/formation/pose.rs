@@ -1,0 +1,21 @@
+//! Poses of messages as the loop takes them.
+
+use crate::messages::geometry_msgs;
+use crate::messages::std_msgs::Header;
+use crate::swarm::watch::Pose;
+
+/// A pose with its stamp; one that bears none was measured when it arrived.
+pub fn pose(header: &Header, pose: &geometry_msgs::Pose, arrival: f64, frame_id: &str) -> Pose {
+    let stamped = header.stamp.seconds();
+    Pose {
+        position: [pose.position.x, pose.position.y],
+        yaw: pose.orientation.yaw().unwrap_or(f64::NAN),
+        stamp: if stamped == 0.0 { arrival } else { stamped },
+        frame_is_right: is_frame(&header.frame_id, frame_id),
+    }
+}
+
+/// Whether a header speaks of this frame; older tools write a slash before it.
+pub fn is_frame(said: &str, meant: &str) -> bool {
+    said.strip_prefix('/').unwrap_or(said) == meant
+}

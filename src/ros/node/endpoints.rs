@@ -1,0 +1,72 @@
+//! The topics of a configured node: the lifecycle's `configure` opens them, `cleanup` closes them.
+
+use super::drive::Drive;
+use super::link::Link;
+use super::origin::Origin;
+use super::{NodeError, copy};
+use crate::messages::flockform_msgs::FormationState;
+use crate::messages::formation::diagnostics::Statistics;
+use crate::messages::formation::{markers, state};
+use crate::messages::std_msgs::Header;
+use crate::messages::visualization_msgs::MarkerArray;
+use crate::ros::edge::{Publisher, Quality};
+use crate::swarm::control::Control;
+
+/// Poses in; targets, velocities, state and markers out.
+pub(super) struct Endpoints {
+    pub link: Link,
+    drives: Vec<(usize, Drive)>,
+    /// Whether the last velocities were those of an active node.
+    is_driving: bool,
+    state: Publisher<FormationState>,
+    markers: Option<Publisher<MarkerArray>>,
+}
+
+impl Endpoints {
+    /// # Errors
+    /// A topic that has no legal name, or that the middleware refuses.
+    pub fn open(origin: &Origin, control: &Control) -> Result<Self, NodeError> {
+        let Origin { node, names, part, swarm, .. } = origin;
+        let raw = &swarm.raw.node;
+        let topic = |pattern: &str, m: usize| origin.topic_of(pattern, &control.formation().names[m]);
+        let link = Link::open(node, raw, control, part, origin.simulated_time, &topic)?;
+        let mut drives = Vec::new();
+        for (m, kind) in part.mine.iter().flat_map(|&m| Some((m, raw.velocity?))) {
+            drives.push((m, Drive::open(node, &topic(&raw.velocity_topic, m)?, kind, &swarm.raw)?));
+        }
+        let markers = raw.markers.then(|| names.topic("~/markers")).transpose()?;
+        Ok(Self {
+            link,
+            drives,
+            is_driving: false,
+            state: node.publisher(&names.topic("~/state")?, Quality::reliable(5))?,
+            markers: markers.map(|topic| node.publisher(&topic, Quality::reliable(1))).transpose()?,
+        })
+    }
+
+    /// Velocities towards the targets of an active node; of one that ceases to be, zero once: from then on the robots
+    /// are driven by others.
+    pub fn drive(&mut self, control: &Control, active: bool, header: &Header, statistics: &mut Statistics) {
+        if !active && !self.is_driving {
+            return;
+        }
+        self.is_driving = active;
+        for (member, drive) in &self.drives {
+            let target = control.target(*member).filter(|_| active);
+            statistics.sent(drive.publish(control, *member, target, header.clone()));
+        }
+    }
+
+    /// Publishes state and markers at `now` \[s\].
+    pub fn report(&mut self, control: &Control, origin: &Origin, now: f64, statistics: &mut Statistics) {
+        let swarm = &origin.swarm;
+        let state = state::message(control, &swarm.name, origin.header(now), statistics.last_tick());
+        copy(&mut self.link.recorder, &self.state, &state, now);
+        statistics.sent(self.state.publish(&state));
+        if let Some(topic) = &self.markers {
+            let markers = markers::message(control, &swarm.raw, &origin.header(now));
+            copy(&mut self.link.recorder, topic, &markers, now);
+            statistics.sent(topic.publish(&markers));
+        }
+    }
+}

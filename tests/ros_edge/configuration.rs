@@ -1,0 +1,106 @@
+//! What `configure` opens and `cleanup` closes.
+
+use flockform::messages::flockform_msgs::FormationState;
+use flockform::messages::geometry_msgs::PoseStamped;
+use flockform::messages::lifecycle_msgs::{ChangeState, ChangeStateRequest, Transition};
+use flockform::messages::rcl_interfaces::{Parameter, SetParameters, Settings};
+use flockform::record::replay::replay_file;
+use flockform::record::{About, Recording, Shared};
+use flockform::ros::edge::Quality;
+use flockform::ros::edge::parameters::Value;
+use flockform::swarm::control::Mode;
+use ros2_client::ServiceMapping;
+
+use super::formation::{PATIENT, Swarming, square};
+use super::support::*;
+
+const MAPPING: ServiceMapping = ServiceMapping::Enhanced;
+
+/// Asks for transitions, one after the other.
+fn change(peers: &mut Peers, swarm: &mut Swarming, labels: &[&str]) {
+    let client = client::<ChangeState>(peers, MAPPING, "/flockform/change_state");
+    for &label in labels {
+        let transition = Transition { id: 0, label: label.into() };
+        let answer = call::<ChangeState>(&client, &ChangeStateRequest { transition }, &mut || swarm.tick());
+        assert!(answer.success, "{label}");
+    }
+}
+
+fn set(peers: &mut Peers, swarm: &mut Swarming, name: &str, value: &str) -> Result<(), String> {
+    let value = Value::String(value.into()).to_wire();
+    let request = Settings { parameters: vec![Parameter { name: name.into(), value }] };
+    let client = client::<SetParameters>(peers, MAPPING, "/flockform/set_parameters");
+    let answer = call::<SetParameters>(&client, &request, &mut || swarm.tick());
+    let result = answer.results.into_iter().next().expect("one for each");
+    if result.successful { Ok(()) } else { Err(result.reason) }
+}
+
+#[test]
+fn a_node_is_configured_with_names_that_were_set_while_it_was_not() {
+    let mut peers = peers();
+    let mut swarm = Swarming::open(&square(&PATIENT), &[]);
+    let hearer = peers.theirs.node("/", "configurer").expect("a node");
+    let reliable = Quality::reliable(5);
+    let states = hearer.subscription::<FormationState>("/flockform/state", reliable).expect("hears");
+    let goals = hearer.subscription::<PoseStamped>("/robot_7/goal", reliable).expect("hears");
+    swarm.until_all_are_heard();
+    swarm.fly_until("a state", |_| states.take_last().is_some());
+
+    let refused = set(&mut peers, &mut swarm, "target_topic", "{name}/goal").expect_err("it flies");
+    assert!(refused.contains("cleanup"), "{refused}");
+    assert_eq!(set(&mut peers, &mut swarm, "target_topic", "{name}/target_pose"), Ok(()), "as it is");
+
+    swarm.fly_until("the leaders are under way", |swarm| swarm.node.control().program_time() > 0.1);
+    let before = swarm.node.control().program_time();
+    change(&mut peers, &mut swarm, &["deactivate", "cleanup"]);
+    swarm.fly_until("the state's topic is closed", |_| states.matched() == 0);
+    while states.take().is_some() {}
+    let refused = set(&mut peers, &mut swarm, "target_topic", "{name}/no goal").expect_err("no name");
+    assert!(refused.contains("` `"), "{refused}");
+    assert_eq!(set(&mut peers, &mut swarm, "target_topic", "{name}/goal"), Ok(()));
+    assert_eq!(goals.matched(), 0);
+
+    change(&mut peers, &mut swarm, &["configure"]);
+    assert!(swarm.node.control().program_time() < before, "the formation begins anew");
+    change(&mut peers, &mut swarm, &["activate"]);
+    swarm.fly_until("targets by their new name", |_| goals.take_last().is_some());
+    swarm.fly_until("a state again", |_| states.take_last().is_some());
+}
+
+#[test]
+fn an_emergency_stop_outlasts_cleanup_and_configure() {
+    let mut peers = peers();
+    let mut swarm = Swarming::open(&square(&PATIENT), &[]);
+    swarm.until_all_are_heard();
+    let stop =
+        client::<flockform::messages::std_srvs::Trigger>(&mut peers, MAPPING, "/flockform/emergency_stop");
+    let asked = flockform::messages::std_msgs::Empty;
+    let answer = call::<flockform::messages::std_srvs::Trigger>(&stop, &asked, &mut || swarm.tick());
+    assert!(answer.success);
+    change(&mut peers, &mut swarm, &["deactivate", "cleanup", "configure", "activate"]);
+    assert_eq!(swarm.node.control().mode(), Mode::EmergencyStopped);
+}
+
+#[test]
+fn a_recording_with_a_cleanup_in_it_replays_to_the_bit() {
+    let mut peers = peers();
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = folder.path().join("flight.mcap");
+    // Its leaders must move, or a loop that goes on would give the targets of one that begins anew.
+    let legs = "manoeuvres[0].legs=[{ seconds = 20.0, translate = [2.0, 0.5] }]";
+    let file = square(&[&PATIENT[..], &[legs]].concat());
+    let about = About { source: "node", ..About::default() };
+    let recording = Shared::new(Recording::create(&path, &about, false).expect("writable"));
+    let mut swarm = Swarming::open(&file, &[]);
+    swarm.node.record(recording.sink()).expect("named");
+    swarm.until_all_are_heard();
+    swarm.fly_until("the leaders are under way", |swarm| swarm.node.control().program_time() > 0.3);
+    change(&mut peers, &mut swarm, &["deactivate", "cleanup", "configure", "activate"]);
+    swarm.until_all_are_heard();
+    swarm.fly_until("the leaders are under way again", |swarm| swarm.node.control().program_time() > 0.3);
+    drop(swarm);
+    recording.take().expect("open").finish().expect("whole");
+    let report = replay_file(&path, Some(file), &[], 0.0).expect("readable");
+    assert!(report.holds(), "{:?}", report.robots);
+    assert!(report.robots.iter().all(|robot| robot.recorded > 30), "{:?}", report.robots);
+}
