@@ -80,7 +80,7 @@ impl Kind {
     pub fn refuse_other(self, word: &str) -> Option<Refusal> {
         let other = self.other();
         let (kind, command) = (other.name(), other.command());
-        (Kind::of(word) == Some(other)).then(|| Refusal::OtherKind { name: word.to_owned(), kind, command })
+        (Kind::of(word) == Some(other)).then(|| Refusal::OtherKind { name: from_here(word), kind, command })
     }
 
     /// A word as a path; one that is no file is taken for a misspelt name of a bundled file.
@@ -175,6 +175,13 @@ pub fn bundled_file(name: &str) -> Result<(Kind, Bundled), Refusal> {
     let scene = bundled(name).map(|one| (Kind::Scene, one));
     let found = scene.or_else(|| bundled_swarm(name).map(|one| (Kind::Swarm, one)));
     found.ok_or_else(|| not_bundled(&Kind::ALL, name))
+}
+
+/// A name as it is, or a path as seen from the working folder.
+fn from_here(word: &str) -> String {
+    let here = std::env::current_dir().ok();
+    let below = here.and_then(|here| Some(Path::new(word).strip_prefix(here).ok()?.display().to_string()));
+    below.unwrap_or_else(|| word.to_owned())
 }
 
 /// A scene's name as it is, or its path in full, for a command that is gone on with from another folder.
