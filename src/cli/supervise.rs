@@ -15,7 +15,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
-use flockform::ros::edge::pulse::MIDDLEWARE_GONE;
+use flockform::ros::edge::pulse::{MIDDLEWARE_GONE, bound_opening};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
@@ -31,8 +31,12 @@ const SILENCE: Duration = Duration::from_millis(1500);
 const LOOK: Duration = Duration::from_millis(10);
 /// How long a child that was asked to end may take \[s\].
 const LEAVING: Duration = Duration::from_secs(8);
-/// Children in a row that end without a word before we give up \[1\].
+/// How long a child may take until it speaks \[s\].
+const OPENING: Duration = Duration::from_secs(30);
+/// Children in a row that end without a word before we give up \[1\]: for a reason of their own, and as those do whose
+/// middleware strangers flood, one after the other while that lasts.
 const SPEECHLESS: u32 = 5;
+const ENDED: u32 = 300;
 /// Longest wait before the next child, after several short lives \[s\].
 const REST: Duration = Duration::from_secs(1);
 
@@ -67,7 +71,11 @@ fn lead() -> std::io::Result<ExitCode> {
             // Done, interrupted, or refused: another would do the same.
             Some(code @ 0..=2) => return Ok(ExitCode::from(code)),
             _ if stop.load(Ordering::Relaxed) => return Ok(ExitCode::SUCCESS),
-            _ if speechless == SPEECHLESS => break,
+            _ if speechless
+                >= if matches!(code, None | Some(MIDDLEWARE_GONE)) { ENDED } else { SPEECHLESS } =>
+            {
+                break;
+            }
             _ => {}
         }
         let why = code.map_or("was ended".to_owned(), |code| format!("ended with code {code}"));
@@ -83,7 +91,7 @@ fn lead() -> std::io::Result<ExitCode> {
         };
         std::thread::sleep(rest);
     }
-    tracing::error!("{SPEECHLESS} processes in a row ended before they had begun");
+    tracing::error!("one process after the other ended before it had begun");
     Ok(ExitCode::from(MIDDLEWARE_GONE))
 }
 
@@ -141,7 +149,8 @@ fn follow(
             let _ = socket.shutdown(std::net::Shutdown::Write);
             asked = Some(Instant::now());
         }
-        let is_silent = last.is_some() && asked.is_none() && heard.elapsed() > SILENCE;
+        let patience = if last.is_some() { SILENCE } else { OPENING };
+        let is_silent = asked.is_none() && heard.elapsed() > patience;
         if is_silent || asked.is_some_and(|asked| asked.elapsed() > LEAVING) {
             tracing::error!("the process does not answer and is ended");
             child.kill()?;
@@ -153,6 +162,7 @@ fn follow(
 impl Life {
     fn take_up(number: u32) -> std::io::Result<Self> {
         use std::os::fd::AsFd;
+        bound_opening();
         let socket = UnixStream::from(std::io::stdin().as_fd().try_clone_to_owned()?);
         Ok(Self { number, socket: Some(socket), unsent: Vec::new(), sent: None })
     }

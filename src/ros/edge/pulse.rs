@@ -29,6 +29,8 @@ const DEAF: Duration = Duration::from_millis(700);
 /// Growth of the process since opening at which it is given up, and at which the kernel refuses memory \[kB\].
 const GROWTH: u64 = 128 * 1024;
 const MOST_GROWTH: u64 = 2 * GROWTH;
+/// The same for a process that has not opened its topics yet, which takes some of it.
+const MOST_OPENING: u64 = 3 * GROWTH;
 /// How long all peers that were heard before may be silent at once \[s\].
 const LONELY: Duration = Duration::from_secs(2);
 /// How long the loop has to say its last word once the middleware is given up \[s\].
@@ -169,7 +171,7 @@ pub(super) fn start(shared: &Shared, participant: &DomainParticipant) -> Result<
 /// Watches until there is a reason to give up; with it how long the loop has for its last word.
 fn watch(way: &mut Loop, pulse: &Pulse) -> (String, Duration) {
     let most = memory("VmRSS:").unwrap_or(0) + GROWTH;
-    bound_memory();
+    bound_memory(MOST_GROWTH);
     let threads = threads_of_middleware();
     let (mut sent, mut last_look, mut silence) = (0_u32, Instant::now(), Duration::ZERO);
     let mut look = 0_u32;
@@ -205,13 +207,22 @@ fn watch(way: &mut Loop, pulse: &Pulse) -> (String, Duration) {
     }
 }
 
-/// Has the kernel refuse what goes far beyond the memory that there is now: a thread that fills it may not let us look
-/// in time. The process then ends at once.
-fn bound_memory() {
-    let Some(most) = memory("VmData:").map(|size| 1024 * (size + MOST_GROWTH)) else { return };
-    let limit = libc::rlimit { rlim_cur: most, rlim_max: most };
+/// Has the kernel refuse what no opening needs: strangers reach the middleware before its watchdog is there.
+pub fn bound_opening() {
+    bound_memory(MOST_OPENING);
+}
+
+/// Has the kernel refuse what goes far beyond the memory that there is now, by `growth` \[kB\]: a thread that fills it
+/// may not let us look in time. The process then ends at once.
+fn bound_memory(growth: u64) {
+    let Some(most) = memory("VmData:").map(|size| 1024 * (size + growth)) else { return };
+    let mut limit = libc::rlimit { rlim_cur: 0, rlim_max: 0 };
+    // SAFETY: the call writes a struct that lives as long as it takes.
+    let is_known = unsafe { libc::getrlimit(libc::RLIMIT_DATA, &raw mut limit) } == 0;
+    // The largest that may be asked for stays, as the second bound may lie above the first.
+    limit.rlim_cur = most.min(limit.rlim_max);
     // SAFETY: the call reads a struct that lives as long as it takes.
-    if unsafe { libc::setrlimit(libc::RLIMIT_DATA, &raw const limit) } != 0 {
+    if !is_known || unsafe { libc::setrlimit(libc::RLIMIT_DATA, &raw const limit) } != 0 {
         tracing::debug!("no bound on memory: {}", std::io::Error::last_os_error());
     }
 }
