@@ -1,8 +1,8 @@
 //! What `configure` opens and `cleanup` closes.
 
+use flockform::flock::vectors::distance;
 use flockform::messages::flockform_msgs::FormationState;
 use flockform::messages::geometry_msgs::PoseStamped;
-use flockform::messages::lifecycle_msgs::{ChangeState, ChangeStateRequest, Transition};
 use flockform::messages::rcl_interfaces::{Parameter, SetParameters, Settings};
 use flockform::record::replay::replay_file;
 use flockform::record::{About, Recording, Shared};
@@ -11,20 +11,11 @@ use flockform::ros::edge::parameters::Value;
 use flockform::swarm::control::Mode;
 use ros2_client::ServiceMapping;
 
-use super::formation::{PATIENT, Swarming, square};
+use super::formation::{PATIENT, Swarming, change, square};
+use super::interfaces::stamped;
 use super::support::*;
 
 const MAPPING: ServiceMapping = ServiceMapping::Enhanced;
-
-/// Asks for transitions, one after the other.
-fn change(peers: &mut Peers, swarm: &mut Swarming, labels: &[&str]) {
-    let client = client::<ChangeState>(peers, MAPPING, "/flockform/change_state");
-    for &label in labels {
-        let transition = Transition { id: 0, label: label.into() };
-        let answer = call::<ChangeState>(&client, &ChangeStateRequest { transition }, &mut || swarm.tick());
-        assert!(answer.success, "{label}");
-    }
-}
 
 fn set(peers: &mut Peers, swarm: &mut Swarming, name: &str, value: &str) -> Result<(), String> {
     let value = Value::String(value.into()).to_wire();
@@ -43,8 +34,10 @@ fn a_node_is_configured_with_names_that_were_set_while_it_was_not() {
     let reliable = Quality::reliable(5);
     let states = hearer.subscription::<FormationState>("/flockform/state", reliable).expect("hears");
     let goals = hearer.subscription::<PoseStamped>("/robot_7/goal", reliable).expect("hears");
+    let targets = hearer.subscription::<PoseStamped>("/robot_7/target_pose", reliable).expect("hears");
     swarm.until_all_are_heard();
     swarm.fly_until("a state", |_| states.take_last().is_some());
+    swarm.fly_until("targets by their first name", |_| targets.matched() == 1);
 
     let refused = set(&mut peers, &mut swarm, "target_topic", "{name}/goal").expect_err("it flies");
     assert!(refused.contains("cleanup"), "{refused}");
@@ -54,17 +47,43 @@ fn a_node_is_configured_with_names_that_were_set_while_it_was_not() {
     let before = swarm.node.control().program_time();
     change(&mut peers, &mut swarm, &["deactivate", "cleanup"]);
     swarm.fly_until("the state's topic is closed", |_| states.matched() == 0);
+    swarm.fly_until("the targets' topic is closed", |_| targets.matched() == 0);
     while states.take().is_some() {}
     let refused = set(&mut peers, &mut swarm, "target_topic", "{name}/no goal").expect_err("no name");
     assert!(refused.contains("` `"), "{refused}");
     assert_eq!(set(&mut peers, &mut swarm, "target_topic", "{name}/goal"), Ok(()));
-    assert_eq!(goals.matched(), 0);
 
     change(&mut peers, &mut swarm, &["configure"]);
     assert!(swarm.node.control().program_time() < before, "the formation begins anew");
     change(&mut peers, &mut swarm, &["activate"]);
     swarm.fly_until("targets by their new name", |_| goals.take_last().is_some());
     swarm.fly_until("a state again", |_| states.take_last().is_some());
+    assert_eq!(targets.matched(), 0, "the topic of the first name stays closed");
+}
+
+#[test]
+fn places_of_leaders_from_before_cleanup_are_forgotten() {
+    let mut peers = peers();
+    let external = "leaders[0].program={ kind = \"external\" }";
+    let mut swarm = Swarming::open(&square(&[&PATIENT[..], &[external]].concat()), &[]);
+    let guide = peers.theirs.node("/", "former_guide").expect("a node");
+    let (name, corner) = {
+        let formation = swarm.node.control().formation();
+        (formation.names[0].clone(), formation.places.get(0))
+    };
+    let topic = guide.publisher(&format!("/{name}/leader_pose"), Quality::BEST_EFFORT).expect("out");
+    let away = [corner[0] - 0.5, corner[1] - 0.5];
+    swarm.until_all_are_heard();
+    swarm.fly_until("the corner is led away", |swarm| {
+        topic.publish(&stamped(away, "map")).expect("sent");
+        distance(swarm.node.control().wanted(0), away) < 1e-6
+    });
+    // The rest of what is on its way arrives.
+    (0..20).for_each(|_| swarm.tick());
+    change(&mut peers, &mut swarm, &["deactivate", "cleanup", "configure", "activate"]);
+    swarm.until_all_are_heard();
+    (0..50).for_each(|_| swarm.tick());
+    assert!(distance(swarm.node.control().wanted(0), corner) < 1e-6);
 }
 
 #[test]
