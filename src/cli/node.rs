@@ -89,12 +89,10 @@ pub fn node(arguments: &NodeArguments, ros: &RosArguments) -> Result<ExitCode, R
                 node.serve_log_level(level).map_err(NodeError::from)?;
             }
             announce(&swarm, node.control());
-            for line in node.reached_at() {
-                tracing::info!("{line}");
-            }
             if let Some(left) = life.left() {
                 node.restore(left);
             }
+            tracing::info!("{}", node.reached_at());
             node.watch_middleware().map_err(NodeError::from)?;
             let well = node.run_while(interrupt::serves(), &mut |node| life.tell(|| node.kept()));
             say(&close(recording)?);

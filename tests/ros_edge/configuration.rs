@@ -1,6 +1,7 @@
 //! What `configure` opens and `cleanup` closes.
 
 use flockform::flock::vectors::distance;
+use flockform::messages::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
 use flockform::messages::flockform_msgs::FormationState;
 use flockform::messages::geometry_msgs::PoseStamped;
 use flockform::messages::rcl_interfaces::{Parameter, SetParameters, Settings};
@@ -8,10 +9,12 @@ use flockform::record::replay::replay_file;
 use flockform::record::{About, Recording, Shared};
 use flockform::ros::edge::Quality;
 use flockform::ros::edge::parameters::Value;
+use flockform::ros::node::FormationNode;
+use flockform::ros::robots::{Layout, RobotNodes};
 use flockform::swarm::control::Mode;
 use ros2_client::ServiceMapping;
 
-use super::formation::{PATIENT, Swarming, change, square};
+use super::formation::{PATIENT, Swarming, arguments, ask, change, square};
 use super::interfaces::stamped;
 use super::support::*;
 
@@ -122,4 +125,58 @@ fn a_recording_with_a_cleanup_in_it_replays_to_the_bit() {
     let report = replay_file(&path, Some(file), &[], 0.0).expect("readable");
     assert!(report.holds(), "{:?}", report.robots);
     assert!(report.robots.iter().all(|robot| robot.recorded > 30), "{:?}", report.robots);
+}
+
+/// Words of the refusal of a topic with two uses.
+fn refusal(overrides: &[&str], more: &[&str]) -> String {
+    let file = square(&[&PATIENT[..], overrides].concat());
+    let refused = FormationNode::open(&file, &arguments(more), None);
+    refused.err().expect("a topic has two uses").to_string()
+}
+
+#[test]
+fn a_topic_with_two_uses_is_refused() {
+    let mut peers = peers();
+    let shared = refusal(&[], &["-p", "target_topic:=target_pose"]);
+    assert!(
+        shared.contains("topic /target_pose has two uses: targets of robot_1 and targets of"),
+        "{shared}"
+    );
+    assert!(shared.contains("{name}"), "{shared}");
+    let external = "leaders[0].program={ kind = \"external\" }";
+    let fed_back = refusal(&[external], &["-p", "leader_topic:={name}/target_pose"]);
+    assert!(fed_back.contains("targets of") && fed_back.contains("places of"), "{fed_back}");
+    let velocities = refusal(&["node.velocity=\"twist\"", "node.velocity_topic=\"/cmd_vel\""], &[]);
+    assert!(velocities.contains("velocities of"), "{velocities}");
+    // Without leaders moved by topic and without velocities those topics are not used.
+    let unused = ["-p", "leader_topic:=/places", "-p", "velocity_topic:=/places"];
+    drop(Swarming::open(&square(&PATIENT), &unused));
+    for topic in ["node.target_topic=\"goal\"", "node.pose_topic=\"{name}/target_pose\""] {
+        let file = square(&[&PATIENT[..], &[topic]].concat());
+        let refused = RobotNodes::open(&file, &arguments(&[]), Layout::OneNode).err().expect("two uses");
+        assert!(refused.to_string().contains("has two uses"), "{refused}");
+    }
+
+    let mut swarm = Swarming::open(&square(&PATIENT), &["-p", "autostart:=false"]);
+    assert_eq!(set(&mut peers, &mut swarm, "target_topic", "target_pose"), Ok(()));
+    assert_eq!(ask(&mut peers, &mut swarm, &["configure"]), [false]);
+    assert_eq!(set(&mut peers, &mut swarm, "target_topic", "{name}/target_pose"), Ok(()));
+    change(&mut peers, &mut swarm, &["configure", "activate"]);
+    swarm.until_all_are_heard();
+}
+
+#[test]
+fn a_node_that_is_not_configured_reports_no_error() {
+    let peers = peers();
+    let hearer = peers.theirs.node("/", "idle_doctor").expect("a node");
+    let reports =
+        hearer.subscription::<DiagnosticArray>("/diagnostics", Quality::reliable(50)).expect("hears");
+    let mut swarm = Swarming::open(&square(&PATIENT), &["-r", "__node:=idle", "-p", "autostart:=false"]);
+    let status = until("a report", || {
+        swarm.tick();
+        let messages = std::iter::from_fn(|| reports.take());
+        // The last words of other tests' nodes may come too.
+        messages.flat_map(|(report, _)| report.status).find(|status| status.name == "/idle: formation")
+    });
+    assert_eq!((status.level, &*status.message), (DiagnosticStatus::OK, "not configured"));
 }

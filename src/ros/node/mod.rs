@@ -12,6 +12,7 @@ mod origin;
 mod pose;
 pub(super) mod settings;
 mod transitions;
+pub(super) mod uses;
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -59,6 +60,13 @@ pub enum NodeError {
     Parameter(#[from] Refusal),
     #[error("{0}")]
     NodeScope(#[from] NodeScopeError),
+    #[error(
+        "topic {topic} has two uses: {} and {}\n  help: give each use a name of its own, and write {{name}} in it for the \
+         robot's name: {{name}}/pose",
+        uses[0],
+        uses[1]
+    )]
+    SharedTopic { topic: String, uses: [String; 2] },
 }
 
 /// A formation's node.
@@ -251,7 +259,7 @@ impl FormationNode {
     }
 
     /// Where the node can be reached, in words.
-    pub fn reached_at(&self) -> [String; 2] {
+    pub fn reached_at(&self) -> String {
         self.origin.reached_at()
     }
 
@@ -325,8 +333,12 @@ impl FormationNode {
         let may_switch = |edge: &Transition| {
             commands.may_do_all() || (commands.may_stop() && ["deactivate", "shutdown"].contains(&edge.label))
         };
+        let pulse = self.pulse.clone();
         let (lifecycle, mut transitions) = self.transitions(now);
-        lifecycle.poll(now, &may_switch, &mut |goal| transitions.act(goal));
+        lifecycle.poll(now, &may_switch, &mut |goal| match &pulse {
+            Some(pulse) => pulse.untimed(|| transitions.act(goal)),
+            None => transitions.act(goal),
+        });
         self.record_beginning(now);
         if self.lifecycle.is_active() != self.was_active {
             self.was_active = self.lifecycle.is_active();
@@ -435,7 +447,8 @@ impl FormationNode {
         let refused = self.endpoints.as_ref().map_or(0, |endpoints| endpoints.link.refused());
         let troubles = self.troubles();
         let names = [self.origin.node.name(), &self.origin.swarm.name];
-        self.statistics.message(&self.control, names, self.origin.header(now), refused, &troubles)
+        let (header, is_configured) = (self.origin.header(now), self.endpoints.is_some());
+        self.statistics.message(&self.control, names, header, refused, is_configured, &troubles)
     }
 
     /// Publishes state and markers at `state_rate`, diagnostics at 1 Hz.
