@@ -80,7 +80,8 @@ pub fn node(arguments: &NodeArguments, ros: &RosArguments) -> Result<ExitCode, R
         Some(mut life) => {
             let mut node = FormationNode::open(&swarm, ros, name)?;
             let (member, namespace) = (arguments.member.clone(), Some(node.fleet().to_owned()));
-            let about = About { member, namespace, ..arguments.swarm.about("node", &swarm) };
+            let mut about = About { member, namespace, ..arguments.swarm.about("node", &swarm) };
+            about.set.extend(node.overrides(&swarm));
             let recording = arguments.record.open(&about, false, life.number())?;
             if let Some(recording) = &recording {
                 node.record(recording.sink()).map_err(NodeError::from)?;

@@ -180,3 +180,28 @@ fn a_node_that_is_not_configured_reports_no_error() {
     });
     assert_eq!((status.level, &*status.message), (DiagnosticStatus::OK, "not configured"));
 }
+
+#[test]
+fn a_recording_s_overrides_name_the_topics_that_the_parameters_gave() {
+    let mut peers = peers();
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = folder.path().join("flight.mcap");
+    let about = About { source: "node", ..About::default() };
+    let recording = Shared::new(Recording::create(&path, &about, false).expect("writable"));
+    let (file, given) = (square(&PATIENT), "node.pose_topic=\"{name}/mocap\"");
+    let renamed = square(&[&PATIENT[..], &[given]].concat());
+    let more = ["-p", "pose_topic:={name}/mocap"];
+    let mut swarm = Swarming {
+        robots: RobotNodes::open(&renamed, &arguments(&[]), Layout::OneNode).expect("robots"),
+        node: FormationNode::open(&file, &arguments(&more), None).expect("a node"),
+    };
+    assert_eq!(swarm.node.overrides(&file), [given]);
+    assert_eq!(swarm.node.overrides(&renamed), [""; 0]);
+    swarm.node.record(recording.sink()).expect("named");
+    swarm.until_all_are_heard();
+    change(&mut peers, &mut swarm, &["deactivate"]);
+    drop(swarm);
+    recording.take().expect("open").finish().expect("whole");
+    let report = replay_file(&path, Some(renamed), &[], 0.0).expect("readable");
+    assert!(report.poses > 25, "{}", report.poses);
+}

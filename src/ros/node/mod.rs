@@ -258,6 +258,11 @@ impl FormationNode {
         self.origin.names.fleet()
     }
 
+    /// Overrides by which the swarm file that the node was opened with has the names that its parameters give.
+    pub fn overrides(&self, swarm: &Swarm) -> Vec<String> {
+        self.origin.overrides(swarm)
+    }
+
     /// Where the node can be reached, in words.
     pub fn reached_at(&self) -> String {
         self.origin.reached_at()

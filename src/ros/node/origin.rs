@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::NodeError;
-use super::settings::TOPICS;
+use super::settings::{Field, TOPICS};
 use super::uses::Uses;
 use crate::messages::builtin_interfaces::Time;
 use crate::messages::names::Names;
@@ -45,6 +45,16 @@ impl Origin {
                 value.clone_into(field(raw));
             }
         }
+    }
+
+    /// Overrides by which this swarm file, that of the node, names the topics and the frame as the parameters do.
+    pub fn overrides(&self, file: &Swarm) -> Vec<String> {
+        let (mut theirs, mut ours) = (file.raw.node.clone(), self.swarm.raw.node.clone());
+        let changed = |(key, field): (&str, Field)| {
+            let value = field(&mut ours);
+            (field(&mut theirs) != value).then(|| format!("node.{key}={value:?}"))
+        };
+        TOPICS.into_iter().filter_map(changed).collect()
     }
 
     /// Refuses topics that `configure` could not open, and topics of the fleet with two uses.

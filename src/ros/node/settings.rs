@@ -28,7 +28,7 @@ pub struct Settings {
 const NONE: f64 = 0.0;
 
 /// A name of the swarm file's `[node]`.
-type Field = fn(&mut RawNode) -> &mut String;
+pub(super) type Field = fn(&mut RawNode) -> &mut String;
 
 /// Parameters that are names of the swarm file's `[node]`. They can be changed while the node is not configured.
 pub(super) const TOPICS: [(&str, Field); 5] = [
