@@ -249,6 +249,22 @@ mod tests {
     use crate::ros::edge::{Edge, Options};
 
     #[test]
+    fn time_of_untimed_work_is_not_counted() {
+        let (given_up, inside_since) = (AtomicBool::new(false), AtomicU64::new(0));
+        let pulse = Pulse { begun: Instant::now(), given_up, inside_since, heard: Mutex::default() };
+        let _inside = pulse.inside();
+        let work = Duration::from_millis(50);
+        pulse.untimed(|| {
+            std::thread::sleep(work);
+            assert_eq!(pulse.kept_for(), Duration::ZERO);
+        });
+        // In whole milliseconds.
+        assert!(pulse.kept_for() + work <= pulse.begun.elapsed() + Duration::from_millis(2));
+        std::thread::sleep(Duration::from_millis(5));
+        assert!(pulse.kept_for() > Duration::ZERO, "the loop is inside again");
+    }
+
+    #[test]
     fn a_sample_comes_back_and_one_that_was_not_sent_does_not() {
         let domain = 100 + (std::process::id() % 101) as u16;
         let edge = Edge::open(Options { domain, loopback_only: true }).expect("sockets");

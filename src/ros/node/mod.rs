@@ -6,6 +6,7 @@
 
 mod drive;
 mod endpoints;
+mod error;
 mod kept;
 mod link;
 mod origin;
@@ -22,7 +23,7 @@ use super::arguments::{DiscoveryRange, NameError, Names, RosArguments};
 use super::edge::clock::Clock;
 use super::edge::lifecycle::{Lifecycle, Transition};
 use super::edge::loggers::{LogLevel, Loggers};
-use super::edge::parameters::{Change, Parameters, Refusal};
+use super::edge::parameters::{Change, Parameters};
 use super::edge::pulse::Pulse;
 use super::edge::{Edge, EdgeError, Options, Publisher, Quality, Service, Subscription};
 use crate::messages::Message;
@@ -37,37 +38,16 @@ use crate::messages::std_srvs;
 use crate::scene::SceneError;
 use crate::scene::swarm::Swarm;
 use crate::swarm::control::Control;
-use crate::swarm::control::scope::{NodeScope, NodeScopeError};
+use crate::swarm::control::scope::NodeScope;
 use crate::swarm::pace::{Pace, system_time};
 use crate::swarm::transport::complaints::Complaints;
 use crate::swarm::transport::{ControllerEnd, listen, targets};
 use endpoints::Endpoints;
+pub use error::NodeError;
 pub use kept::KeptNode;
 pub use link::Link;
 use origin::Origin;
 use settings::Settings;
-
-/// Why there is no node.
-#[derive(Debug, thiserror::Error)]
-pub enum NodeError {
-    #[error("{0}")]
-    Swarm(#[from] SceneError),
-    #[error("{0}")]
-    Edge(#[from] EdgeError),
-    #[error("{0}")]
-    Name(#[from] NameError),
-    #[error("{0}")]
-    Parameter(#[from] Refusal),
-    #[error("{0}")]
-    NodeScope(#[from] NodeScopeError),
-    #[error(
-        "topic {topic} has two uses: {} and {}\n  help: give each use a name of its own, and write {{name}} in it for the \
-         robot's name: {{name}}/pose",
-        uses[0],
-        uses[1]
-    )]
-    SharedTopic { topic: String, uses: [String; 2] },
-}
 
 /// A formation's node.
 pub struct FormationNode {
