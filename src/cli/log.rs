@@ -28,7 +28,19 @@ const MOST_CHARACTERS: usize = 2000;
 /// The log of a node while it runs.
 struct NodeLog {
     severity: Mutex<Severity>,
+    /// Severity and filter at the start, to which level 0 returns.
+    first: (Severity, String),
     filter: Box<dyn Fn(EnvFilter) -> Result<(), String> + Send + Sync>,
+}
+
+impl NodeLog {
+    /// Severity and filter when this severity is asked for.
+    fn of(&self, wanted: Severity) -> (Severity, String) {
+        match wanted {
+            Severity::Unset => self.first.clone(),
+            _ => (wanted, only_ours(filter_of(wanted, 0))),
+        }
+    }
 }
 
 static NODE_LOG: OnceLock<NodeLog> = OnceLock::new();
@@ -40,15 +52,16 @@ pub fn level() -> Option<LogLevel> {
     Some(LogLevel {
         get: Box::new(move || *severity()),
         set: Box::new(move |wanted| {
-            (log.filter)(only_ours(filter_of(wanted, 1)).into())?;
+            let (wanted, filter) = log.of(wanted);
+            (log.filter)(filter.into())?;
             *severity() = wanted;
             Ok(())
         }),
     })
 }
 
-/// Starts the log. `RUST_LOG` wins over `--log-level`, and that over `-v`. By default a node logs from INFO on,
-/// any other command from WARN on.
+/// Starts the log. `RUST_LOG` wins over `--log-level`, and that over `-v`, until a level is set from outside
+/// ([`level`]). By default a node logs from INFO on, any other command from WARN on.
 pub fn start(arguments: &Arguments, ros: &RosArguments) {
     let logger = logger(&arguments.command, ros);
     let verbosity = arguments.verbose + u8::from(logger.is_some());
@@ -59,6 +72,7 @@ pub fn start(arguments: &Arguments, ros: &RosArguments) {
         "off".to_owned()
     };
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| level.into());
+    let first = (given.unwrap_or(Severity::Unset), filter.to_string());
     let log = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr);
     let log = log.with_ansi(std::io::stderr().is_terminal()).fmt_fields(format::debug_fn(field));
     match logger {
@@ -68,11 +82,11 @@ pub fn start(arguments: &Arguments, ros: &RosArguments) {
             let format = asked.filter(|format| !format.is_empty()).unwrap_or_else(|| NODE_FORMAT.into());
             let log = log.event_format(NodeLines { name, format }).with_filter_reloading();
             let handle = log.reload_handle();
-            let severity = Mutex::new(given.unwrap_or(Severity::Unset));
+            let severity = Mutex::new(first.0);
             let filter = Box::new(move |filter| handle.reload(filter).map_err(|error| error.to_string()));
             if ros.logging.stdout {
                 // Set once: a process starts one log.
-                let _ = NODE_LOG.set(NodeLog { severity, filter });
+                let _ = NODE_LOG.set(NodeLog { severity, first, filter });
             }
             log.init();
         }
@@ -197,6 +211,18 @@ fn filled(format: &str, value: &dyn Fn(&str) -> Option<String>) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_unset_level_returns_to_the_filter_of_the_start() {
+        let first = (Severity::Warn, "flockform=warn,rustdds=debug".to_owned());
+        let log =
+            NodeLog { severity: Mutex::new(first.0), first: first.clone(), filter: Box::new(|_| Ok(())) };
+        assert_eq!(log.of(Severity::Unset), first);
+        let debug = (Severity::Debug, "flockform=debug,rustdds=error,ros2_client=error".to_owned());
+        assert_eq!(log.of(Severity::Debug), debug);
+        let filter = EnvFilter::from(first.1.as_str()).to_string();
+        assert_eq!(EnvFilter::from(filter.as_str()).to_string(), filter, "its text is a filter again");
+    }
 
     #[test]
     fn placeholders_are_filled_in_and_others_stay() {

@@ -80,7 +80,8 @@ pub fn node(arguments: &NodeArguments, ros: &RosArguments) -> Result<ExitCode, R
         Some(mut life) => {
             let mut node = FormationNode::open(&swarm, ros, name)?;
             let (member, namespace) = (arguments.member.clone(), Some(node.fleet().to_owned()));
-            let about = About { member, namespace, ..arguments.swarm.about("node", &swarm) };
+            let mut about = About { member, namespace, ..arguments.swarm.about("node", &swarm) };
+            about.set.extend(node.overrides(&swarm));
             let recording = arguments.record.open(&about, false, life.number())?;
             if let Some(recording) = &recording {
                 node.record(recording.sink()).map_err(NodeError::from)?;
@@ -89,12 +90,10 @@ pub fn node(arguments: &NodeArguments, ros: &RosArguments) -> Result<ExitCode, R
                 node.serve_log_level(level).map_err(NodeError::from)?;
             }
             announce(&swarm, node.control());
-            for line in node.reached_at() {
-                tracing::info!("{line}");
-            }
             if let Some(left) = life.left() {
                 node.restore(left);
             }
+            tracing::info!("{}", node.reached_at());
             node.watch_middleware().map_err(NodeError::from)?;
             let well = node.run_while(interrupt::serves(), &mut |node| life.tell(|| node.kept()));
             say(&close(recording)?);

@@ -105,7 +105,8 @@ impl FlightMessages {
             }
         }
         if self.statistics.is_due(diagnostics::DIAGNOSTICS, now, DIAGNOSTICS) {
-            let message = self.statistics.message(control, [&self.node, &self.swarm.name], header(), 0, &[]);
+            let names = [self.node.as_str(), &self.swarm.name];
+            let message = self.statistics.message(control, names, header(), 0, true, &[]);
             self.recorder.take(&self.topics.diagnostics, &message, [now; 2]);
         }
     }

@@ -287,6 +287,7 @@ impl Replay {
     fn begin_anew(&mut self) {
         let is_stopped = self.control.mode() == Mode::EmergencyStopped;
         self.control.clone_from(&self.fresh);
+        self.control.set_active(self.active);
         if is_stopped {
             self.control.emergency_stop();
         }

@@ -12,7 +12,8 @@ use super::arguments::{Names, RosArguments};
 use super::edge::parameters::{Declaration, Parameters, Store, Value};
 use super::edge::pulse::Pulse;
 use super::edge::{Edge, EdgeError, Node, Publisher, Quality, Subscription};
-use super::node::{NodeError, options, settings};
+use super::node::uses::Uses;
+use super::node::{NodeError, TopicOf, options, settings};
 use crate::messages::Message;
 use crate::messages::builtin_interfaces::Time;
 use crate::messages::geometry_msgs::{
@@ -52,7 +53,8 @@ pub struct KeptRobots {
     period: u64,
 }
 
-/// The nodes that the robots are to others. Topics are the same in both.
+/// The nodes that the robots are to others. Topics are the same in both, unless their names are relative to the node
+/// (`~/pose`).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Layout {
     /// One node, `robots`, with its parameters: tools that ask every node wait for none.
@@ -108,6 +110,7 @@ impl Link {
         // The one node is the owner of all.
         let owner = |m: usize| m.min(nodes.len() - 1);
         let of = |pattern: &str, m: usize| topic(&owners[owner(m)], pattern, &formation.names[m]);
+        check_topics(raw, formation, &of)?;
         let targets: Result<Vec<_>, NodeError> = (0..formation.count())
             .map(|m| Ok(nodes[owner(m)].subscription(&of(&raw.target_topic, m)?, Quality::reliable(1))?))
             .collect();
@@ -321,6 +324,18 @@ fn owners(formation: &Formation, arguments: &RosArguments, layout: Layout) -> Re
 
 fn topic(names: &Names, pattern: &str, name: &str) -> Result<String, NodeError> {
     Ok(names.fleet_topic(&pattern.replace("{name}", name))?)
+}
+
+/// Refuses topics of the robots with two uses.
+fn check_topics(raw: &RawNode, formation: &Formation, topic: TopicOf<'_>) -> Result<(), NodeError> {
+    let mut uses = Uses::default();
+    for (m, robot) in formation.names.iter().enumerate() {
+        uses.add(topic(&raw.target_topic, m)?, "targets", robot)?;
+        if m == 0 || raw.pose_type != RawPoseType::PoseArray {
+            uses.add(topic(&raw.pose_topic, m)?, "poses", robot)?;
+        }
+    }
+    Ok(())
 }
 
 /// A publisher for each robot, on the node and the topic that are the robot's.

@@ -60,8 +60,10 @@ fn the_gains_of_the_rule_change_while_it_flies() {
     let mut swarm = Swarming::open(&square(&PATIENT), &[]);
     assert_eq!(set(&mut peers, &mut swarm, "damping", 0.5), Ok(()));
     assert_eq!(set_value(&mut peers, &mut swarm, "sweeps", &Value::Integer(7)), Ok(()));
+    let many = set_value(&mut peers, &mut swarm, "sweeps", &Value::Integer(1001)).expect_err("too many");
+    assert!(many.contains("1 to 1000"), "{many}");
     let refused = set_value(&mut peers, &mut swarm, "sweeps", &Value::Integer(0)).expect_err("none");
-    assert!(refused.contains("1 to 100000"), "{refused}");
+    assert!(refused.contains("1 to 1000"), "{refused}");
     let control = swarm.node.control();
     assert_eq!((control.damping(), control.sweeps()), (0.5, 7));
     // What another process would go on from.
@@ -192,5 +194,10 @@ fn the_log_s_level_is_read_and_set_by_the_node_s_name_where_commands_are_allowed
         assert_eq!(results.iter().map(|one| one.successful).collect::<Vec<_>>(), [may, false, false]);
         let expected = if may { Severity::Debug } else { Severity::Info };
         assert_eq!(*severity.lock().expect("whole"), expected);
+        let levels = vec![LoggerLevel { name: "flockform".into(), level: 40 }; 17];
+        let results = call::<SetLoggerLevels>(&set, &SetLoggerLevelsRequest { levels }, &mut || swarm.tick());
+        assert_eq!(results.results.len(), 17);
+        assert!(results.results.iter().all(|one| !one.successful));
+        assert_eq!(*severity.lock().expect("whole"), expected, "too many in one request");
     }
 }

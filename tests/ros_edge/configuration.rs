@@ -1,30 +1,24 @@
 //! What `configure` opens and `cleanup` closes.
 
+use flockform::flock::vectors::distance;
+use flockform::messages::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
 use flockform::messages::flockform_msgs::FormationState;
 use flockform::messages::geometry_msgs::PoseStamped;
-use flockform::messages::lifecycle_msgs::{ChangeState, ChangeStateRequest, Transition};
 use flockform::messages::rcl_interfaces::{Parameter, SetParameters, Settings};
 use flockform::record::replay::replay_file;
 use flockform::record::{About, Recording, Shared};
 use flockform::ros::edge::Quality;
 use flockform::ros::edge::parameters::Value;
+use flockform::ros::node::FormationNode;
+use flockform::ros::robots::{Layout, RobotNodes};
 use flockform::swarm::control::Mode;
 use ros2_client::ServiceMapping;
 
-use super::formation::{PATIENT, Swarming, square};
+use super::formation::{PATIENT, Swarming, arguments, ask, change, square};
+use super::interfaces::stamped;
 use super::support::*;
 
 const MAPPING: ServiceMapping = ServiceMapping::Enhanced;
-
-/// Asks for transitions, one after the other.
-fn change(peers: &mut Peers, swarm: &mut Swarming, labels: &[&str]) {
-    let client = client::<ChangeState>(peers, MAPPING, "/flockform/change_state");
-    for &label in labels {
-        let transition = Transition { id: 0, label: label.into() };
-        let answer = call::<ChangeState>(&client, &ChangeStateRequest { transition }, &mut || swarm.tick());
-        assert!(answer.success, "{label}");
-    }
-}
 
 fn set(peers: &mut Peers, swarm: &mut Swarming, name: &str, value: &str) -> Result<(), String> {
     let value = Value::String(value.into()).to_wire();
@@ -43,8 +37,10 @@ fn a_node_is_configured_with_names_that_were_set_while_it_was_not() {
     let reliable = Quality::reliable(5);
     let states = hearer.subscription::<FormationState>("/flockform/state", reliable).expect("hears");
     let goals = hearer.subscription::<PoseStamped>("/robot_7/goal", reliable).expect("hears");
+    let targets = hearer.subscription::<PoseStamped>("/robot_7/target_pose", reliable).expect("hears");
     swarm.until_all_are_heard();
     swarm.fly_until("a state", |_| states.take_last().is_some());
+    swarm.fly_until("targets by their first name", |_| targets.matched() == 1);
 
     let refused = set(&mut peers, &mut swarm, "target_topic", "{name}/goal").expect_err("it flies");
     assert!(refused.contains("cleanup"), "{refused}");
@@ -54,17 +50,43 @@ fn a_node_is_configured_with_names_that_were_set_while_it_was_not() {
     let before = swarm.node.control().program_time();
     change(&mut peers, &mut swarm, &["deactivate", "cleanup"]);
     swarm.fly_until("the state's topic is closed", |_| states.matched() == 0);
+    swarm.fly_until("the targets' topic is closed", |_| targets.matched() == 0);
     while states.take().is_some() {}
     let refused = set(&mut peers, &mut swarm, "target_topic", "{name}/no goal").expect_err("no name");
     assert!(refused.contains("` `"), "{refused}");
     assert_eq!(set(&mut peers, &mut swarm, "target_topic", "{name}/goal"), Ok(()));
-    assert_eq!(goals.matched(), 0);
 
     change(&mut peers, &mut swarm, &["configure"]);
     assert!(swarm.node.control().program_time() < before, "the formation begins anew");
     change(&mut peers, &mut swarm, &["activate"]);
     swarm.fly_until("targets by their new name", |_| goals.take_last().is_some());
     swarm.fly_until("a state again", |_| states.take_last().is_some());
+    assert_eq!(targets.matched(), 0, "the topic of the first name stays closed");
+}
+
+#[test]
+fn places_of_leaders_from_before_cleanup_are_forgotten() {
+    let mut peers = peers();
+    let external = "leaders[0].program={ kind = \"external\" }";
+    let mut swarm = Swarming::open(&square(&[&PATIENT[..], &[external]].concat()), &[]);
+    let guide = peers.theirs.node("/", "former_guide").expect("a node");
+    let (name, corner) = {
+        let formation = swarm.node.control().formation();
+        (formation.names[0].clone(), formation.places.get(0))
+    };
+    let topic = guide.publisher(&format!("/{name}/leader_pose"), Quality::BEST_EFFORT).expect("out");
+    let away = [corner[0] - 0.5, corner[1] - 0.5];
+    swarm.until_all_are_heard();
+    swarm.fly_until("the corner is led away", |swarm| {
+        topic.publish(&stamped(away, "map")).expect("sent");
+        distance(swarm.node.control().wanted(0), away) < 1e-6
+    });
+    // The rest of what is on its way arrives.
+    (0..20).for_each(|_| swarm.tick());
+    change(&mut peers, &mut swarm, &["deactivate", "cleanup", "configure", "activate"]);
+    swarm.until_all_are_heard();
+    (0..50).for_each(|_| swarm.tick());
+    assert!(distance(swarm.node.control().wanted(0), corner) < 1e-6);
 }
 
 #[test]
@@ -103,4 +125,83 @@ fn a_recording_with_a_cleanup_in_it_replays_to_the_bit() {
     let report = replay_file(&path, Some(file), &[], 0.0).expect("readable");
     assert!(report.holds(), "{:?}", report.robots);
     assert!(report.robots.iter().all(|robot| robot.recorded > 30), "{:?}", report.robots);
+}
+
+/// Words of the refusal of a topic with two uses.
+fn refusal(overrides: &[&str], more: &[&str]) -> String {
+    let file = square(&[&PATIENT[..], overrides].concat());
+    let refused = FormationNode::open(&file, &arguments(more), None);
+    refused.err().expect("a topic has two uses").to_string()
+}
+
+#[test]
+fn a_topic_with_two_uses_is_refused() {
+    let mut peers = peers();
+    let shared = refusal(&[], &["-p", "target_topic:=target_pose"]);
+    assert!(
+        shared.contains("topic /target_pose has two uses: targets of robot_1 and targets of"),
+        "{shared}"
+    );
+    assert!(shared.contains("{name}"), "{shared}");
+    let external = "leaders[0].program={ kind = \"external\" }";
+    let fed_back = refusal(&[external], &["-p", "leader_topic:={name}/target_pose"]);
+    assert!(fed_back.contains("targets of") && fed_back.contains("places of"), "{fed_back}");
+    let velocities = refusal(&["node.velocity=\"twist\"", "node.velocity_topic=\"/cmd_vel\""], &[]);
+    assert!(velocities.contains("velocities of"), "{velocities}");
+    // Without leaders moved by topic and without velocities those topics are not used.
+    let unused = ["-p", "leader_topic:=/places", "-p", "velocity_topic:=/places"];
+    drop(Swarming::open(&square(&PATIENT), &unused));
+    for topic in ["node.target_topic=\"goal\"", "node.pose_topic=\"{name}/target_pose\""] {
+        let file = square(&[&PATIENT[..], &[topic]].concat());
+        let refused = RobotNodes::open(&file, &arguments(&[]), Layout::OneNode).err().expect("two uses");
+        assert!(refused.to_string().contains("has two uses"), "{refused}");
+    }
+
+    let mut swarm = Swarming::open(&square(&PATIENT), &["-p", "autostart:=false"]);
+    assert_eq!(set(&mut peers, &mut swarm, "target_topic", "target_pose"), Ok(()));
+    assert_eq!(ask(&mut peers, &mut swarm, &["configure"]), [false]);
+    assert_eq!(set(&mut peers, &mut swarm, "target_topic", "{name}/target_pose"), Ok(()));
+    change(&mut peers, &mut swarm, &["configure", "activate"]);
+    swarm.until_all_are_heard();
+}
+
+#[test]
+fn a_node_that_is_not_configured_reports_no_error() {
+    let peers = peers();
+    let hearer = peers.theirs.node("/", "idle_doctor").expect("a node");
+    let reports =
+        hearer.subscription::<DiagnosticArray>("/diagnostics", Quality::reliable(50)).expect("hears");
+    let mut swarm = Swarming::open(&square(&PATIENT), &["-r", "__node:=idle", "-p", "autostart:=false"]);
+    let status = until("a report", || {
+        swarm.tick();
+        let messages = std::iter::from_fn(|| reports.take());
+        // The last words of other tests' nodes may come too.
+        messages.flat_map(|(report, _)| report.status).find(|status| status.name == "/idle: formation")
+    });
+    assert_eq!((status.level, &*status.message), (DiagnosticStatus::OK, "not configured"));
+}
+
+#[test]
+fn a_recording_s_overrides_name_the_topics_that_the_parameters_gave() {
+    let mut peers = peers();
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = folder.path().join("flight.mcap");
+    let about = About { source: "node", ..About::default() };
+    let recording = Shared::new(Recording::create(&path, &about, false).expect("writable"));
+    let (file, given) = (square(&PATIENT), "node.pose_topic=\"{name}/mocap\"");
+    let renamed = square(&[&PATIENT[..], &[given]].concat());
+    let more = ["-p", "pose_topic:={name}/mocap"];
+    let mut swarm = Swarming {
+        robots: RobotNodes::open(&renamed, &arguments(&[]), Layout::OneNode).expect("robots"),
+        node: FormationNode::open(&file, &arguments(&more), None).expect("a node"),
+    };
+    assert_eq!(swarm.node.overrides(&file), [given]);
+    assert_eq!(swarm.node.overrides(&renamed), [""; 0]);
+    swarm.node.record(recording.sink()).expect("named");
+    swarm.until_all_are_heard();
+    change(&mut peers, &mut swarm, &["deactivate"]);
+    drop(swarm);
+    recording.take().expect("open").finish().expect("whole");
+    let report = replay_file(&path, Some(renamed), &[], 0.0).expect("readable");
+    assert!(report.poses > 25, "{}", report.poses);
 }

@@ -8,6 +8,7 @@ use flockform::flock::vectors::distance;
 use flockform::messages::diagnostic_msgs::DiagnosticArray;
 use flockform::messages::flockform_msgs::{FormationState, MemberState};
 use flockform::messages::geometry_msgs::PoseStamped;
+use flockform::messages::lifecycle_msgs::{ChangeState, ChangeStateRequest, Transition};
 use flockform::messages::std_msgs::Empty;
 use flockform::messages::std_srvs;
 use flockform::messages::visualization_msgs::MarkerArray;
@@ -75,6 +76,24 @@ impl Swarming {
             (0..control.formation().count()).all(|m| control.health(m) == Health::Fresh)
         });
     }
+}
+
+/// Asks for transitions, one after the other; says which were made.
+pub fn ask(peers: &mut Peers, swarm: &mut Swarming, labels: &[&str]) -> Vec<bool> {
+    let client = client::<ChangeState>(peers, ServiceMapping::Enhanced, "/flockform/change_state");
+    let mut ask = |id: u8, label: &str| {
+        let transition = Transition { id, label: label.into() };
+        call::<ChangeState>(&client, &ChangeStateRequest { transition }, &mut || swarm.tick()).success
+    };
+    // Once this is answered no reply is lost: a request sent again after one that was carried out would be refused.
+    assert!(!ask(99, "none"), "there is no such transition");
+    labels.iter().map(|label| ask(0, label)).collect()
+}
+
+/// Has the node make transitions, one after the other.
+pub fn change(peers: &mut Peers, swarm: &mut Swarming, labels: &[&str]) {
+    let made = ask(peers, swarm, labels);
+    assert!(made.iter().all(|&made| made), "{labels:?}: {made:?}");
 }
 
 #[test]

@@ -6,7 +6,6 @@ use std::time::Duration;
 use flockform::flock::vectors::distance;
 use flockform::messages::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
 use flockform::messages::geometry_msgs::{Pose, PoseStamped, Twist, TwistStamped};
-use flockform::messages::lifecycle_msgs;
 use flockform::messages::rosgraph_msgs::Clock;
 use flockform::messages::std_msgs::Header;
 use flockform::messages::tf2_msgs::TFMessage;
@@ -15,10 +14,9 @@ use flockform::ros::edge::Quality;
 use flockform::ros::node::FormationNode;
 use flockform::ros::robots::{Layout, RobotNodes};
 use flockform::swarm::watch::Health;
-use ros2_client::ServiceMapping;
 
-use super::formation::{PATIENT, Swarming, arguments, square};
-use super::support::{PATIENCE, call, client, peers, until};
+use super::formation::{PATIENT, Swarming, arguments, change, square};
+use super::support::{PATIENCE, peers, until};
 use crate::waits::within;
 
 /// A flight short enough for a test.
@@ -67,7 +65,7 @@ fn poses_come_in_every_type_of_message() {
     }
 }
 
-fn stamped(place: [f64; 2], frame_id: &str) -> PoseStamped {
+pub fn stamped(place: [f64; 2], frame_id: &str) -> PoseStamped {
     let header = Header { stamp: builtin_interfaces::Time::default(), frame_id: frame_id.into() };
     PoseStamped { header, pose: Pose::planar(place, 0.0) }
 }
@@ -139,17 +137,7 @@ fn velocities_are_left_to_others_while_the_node_is_not_active() {
         swarm.tick();
         plain.take()
     });
-    let client = client::<lifecycle_msgs::ChangeState>(
-        &mut peers,
-        ServiceMapping::Enhanced,
-        "/flockform/change_state",
-    );
-    let change = |swarm: &mut Swarming, label: &str| {
-        let transition = lifecycle_msgs::Transition { id: 0, label: label.into() };
-        let request = lifecycle_msgs::ChangeStateRequest { transition };
-        call::<lifecycle_msgs::ChangeState>(&client, &request, &mut || swarm.tick()).success
-    };
-    assert!(change(&mut swarm, "deactivate"));
+    change(&mut peers, &mut swarm, &["deactivate"]);
     // What was on its way arrives; the last of it is the zero.
     let mut last = None;
     for _ in 0..20 {
@@ -161,7 +149,7 @@ fn velocities_are_left_to_others_while_the_node_is_not_active() {
         swarm.tick();
         assert!(plain.take().is_none(), "a velocity of a node that is not active");
     }
-    assert!(change(&mut swarm, "activate"));
+    change(&mut peers, &mut swarm, &["activate"]);
     until("velocities again", || {
         swarm.tick();
         plain.take()

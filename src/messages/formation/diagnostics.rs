@@ -59,13 +59,14 @@ impl Statistics {
     }
 
     /// The report of a node and its swarm, by name, and a new beginning for the times in it; `refused` messages were none
-    /// of their type, `troubles` are those of the network and the clock.
+    /// of their type, `troubles` are those of the network and the clock. A node that is not configured receives no poses.
     pub fn message(
         &mut self,
         control: &Control,
         [node, swarm]: [&str; 2],
         header: Header,
         refused: u64,
+        is_configured: bool,
         troubles: &[String],
     ) -> DiagnosticArray {
         let formation = control.formation();
@@ -83,6 +84,7 @@ impl Statistics {
         let (level, message) = match (control.mode(), lost.len(), missed) {
             (Mode::EmergencyStopped, ..) => (DiagnosticStatus::ERROR, "emergency stop".to_owned()),
             _ if !troubles.is_empty() => (DiagnosticStatus::ERROR, troubles.join("; ")),
+            _ if !is_configured => (DiagnosticStatus::OK, "not configured".into()),
             (_, all, _) if all == formation.count() => (DiagnosticStatus::ERROR, "no robot is heard".into()),
             (_, 1.., _) => {
                 (DiagnosticStatus::WARN, format!("{} of {} robots lost", lost.len(), formation.count()))

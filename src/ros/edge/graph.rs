@@ -21,6 +21,9 @@ use crate::messages::wire::decode;
 /// How often the watcher looks \[s\]. Nodes announced within one look go out as one sample.
 const LOOK: Duration = Duration::from_millis(20);
 
+/// Looks from one sweep to the next \[1\]. Between them every endpoint that was being made gets its name.
+const SWEEP: u32 = 250;
+
 /// Announcements taken in one look \[1\].
 const MOST_AT_ONCE: usize = 64;
 
@@ -50,6 +53,8 @@ struct State {
     /// Node's fully qualified name to what it owns.
     nodes: BTreeMap<String, Owned>,
     nodes_changed: bool,
+    /// Matched local endpoints without a name when last swept: new, not of a node, or gone.
+    nameless: BTreeSet<GUID>,
     /// Other participants' nodes that bear names of ours.
     twins: BTreeMap<[u8; 12], Vec<String>>,
 }
@@ -178,6 +183,15 @@ impl Graph {
         }
     }
 
+    /// Forgets the matches of local endpoints that had no name at the last sweep either: a match that is read after its
+    /// endpoint was removed would stay for ever.
+    fn sweep(&self) {
+        let mut state = self.state();
+        let State { matched, names, nameless, .. } = &mut *state;
+        matched.retain(|endpoint, _| names.contains_key(endpoint) || !nameless.contains(endpoint));
+        *nameless = matched.keys().filter(|endpoint| !names.contains_key(endpoint)).copied().collect();
+    }
+
     /// Our nodes as `ros_discovery_info` wants them, if they changed since last asked.
     fn news(&self, participant: GUID, own_writer: GUID) -> Option<ParticipantEntitiesInfo> {
         let mut state = self.state();
@@ -237,7 +251,12 @@ fn watch(
     stopped: &Receiver<()>,
 ) {
     use ros2_client::dds::rustdds::RTPSEntity;
+    let mut look = 0_u32;
     while stopped.recv_timeout(LOOK) == Err(RecvTimeoutError::Timeout) {
+        look = look.wrapping_add(1);
+        if look.is_multiple_of(SWEEP) {
+            graph.sweep();
+        }
         // As many as RustDDS keeps for us.
         for event in std::iter::from_fn(|| listener.try_recv_status()).take(2048) {
             graph.note(event);
@@ -258,5 +277,24 @@ fn watch(
         {
             tracing::warn!("our nodes could not be announced: {error:?}");
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_match_without_a_name_is_forgotten_at_the_second_sweep() {
+        let graph = Graph::default();
+        let [named, gone] = [1, 2].map(|k| GUID::from_bytes([k; 16]));
+        for local in [named, gone] {
+            graph.state().matched.entry(local).or_default().insert(GUID::from_bytes([9; 16]));
+        }
+        graph.sweep();
+        assert_eq!(graph.matched(named), 1, "it may get its name yet");
+        graph.add_reader("/node", named, "/pose");
+        graph.sweep();
+        assert_eq!([graph.matched(named), graph.matched(gone)], [1, 0]);
     }
 }

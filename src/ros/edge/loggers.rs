@@ -15,6 +15,9 @@ pub struct LogLevel {
     pub set: Box<dyn Fn(Severity) -> Result<(), String> + Send>,
 }
 
+/// Levels taken of one request \[1\]: each sets the filter of the log anew, and a node has one logger.
+const MOST_LEVELS: usize = 16;
+
 /// A node's logger behind its services.
 pub struct Loggers {
     /// Name of the logger: the node's, with dots.
@@ -43,8 +46,13 @@ impl Loggers {
         self.get.serve(|request| GetLoggerLevelsResponse {
             levels: request.names.into_iter().map(|name| self.level_of(name)).collect(),
         });
-        self.set.serve(|request| SetLoggerLevelsResponse {
-            results: request.levels.iter().map(|wanted| result(self.set_level(wanted, locked))).collect(),
+        self.set.serve(|request| {
+            let count = request.levels.len();
+            let many =
+                (count > MOST_LEVELS).then(|| format!("{count} levels: at most {MOST_LEVELS} a request"));
+            let refused = locked.or(many.as_deref());
+            let results = request.levels.iter().map(|wanted| result(self.set_level(wanted, refused)));
+            SetLoggerLevelsResponse { results: results.collect() }
         });
     }
 
@@ -54,8 +62,8 @@ impl Loggers {
         LoggerLevel { name, level }
     }
 
-    fn set_level(&self, wanted: &LoggerLevel, locked: Option<&str>) -> Result<(), String> {
-        if let Some(reason) = locked {
+    fn set_level(&self, wanted: &LoggerLevel, refused: Option<&str>) -> Result<(), String> {
+        if let Some(reason) = refused {
             return Err(reason.to_owned());
         }
         if wanted.name != self.logger {

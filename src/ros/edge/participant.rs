@@ -18,6 +18,7 @@ use super::graph::{Graph, Watcher, prefix};
 use super::outbox::{Outbox, Outlet};
 use super::payload::{Payload, Verbatim};
 use super::pulse::{self, Pulse};
+use super::topic::forget_earlier;
 use super::{EdgeError, Publisher, Quality, Service, Subscription, farewell, names};
 use crate::messages::names::Names;
 use crate::messages::{Message, ServiceType};
@@ -319,6 +320,9 @@ impl Node {
         names::check("topic", topic)?;
         let kind = names::dds_message(M::PACKAGE, M::NAME);
         let reader = self.shared.reader(&names::dds_topic(topic), &kind, quality)?;
+        if !quality.transient_local {
+            forget_earlier(&reader);
+        }
         self.shared.graph.add_reader(&self.name, reader.guid(), topic);
         Ok(Subscription::new(topic.to_owned(), reader, self.shared.clone()))
     }

@@ -155,6 +155,16 @@ pub(super) enum Taken {
     Sample(Sample),
 }
 
+/// Skips the samples that an earlier reader of the participant left on the topic. RustDDS keeps one cache a topic, and
+/// a new reader starts at its beginning; a volatile subscription gets nothing from before it was made.
+pub(super) fn forget_earlier(reader: &Reader) {
+    for _ in 0..MOST_AT_ONCE {
+        if matches!(next(reader), Taken::Nothing) {
+            return;
+        }
+    }
+}
+
 /// Takes the next sample out of a reader.
 pub(super) fn next(reader: &Reader) -> Taken {
     reader.drain_read_notifications();

@@ -51,7 +51,8 @@ impl FormationNode {
             self.set(&name, value);
         }
         kept.names.into_iter().for_each(|(name, value)| self.set(&name, Value::String(value)));
-        let changes = self.parameters.poll(now, None);
+        // Requests wait for the first tick, which knows what peers may do.
+        let changes = self.parameters.changes(now);
         self.apply(&changes, now);
         if let Some(state) = State::ALL.into_iter().find(|state| state.label() == kept.state) {
             self.go_to(state, now);

@@ -6,12 +6,14 @@
 
 mod drive;
 mod endpoints;
+mod error;
 mod kept;
 mod link;
 mod origin;
 mod pose;
 pub(super) mod settings;
 mod transitions;
+pub(super) mod uses;
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -21,7 +23,7 @@ use super::arguments::{DiscoveryRange, NameError, Names, RosArguments};
 use super::edge::clock::Clock;
 use super::edge::lifecycle::{Lifecycle, Transition};
 use super::edge::loggers::{LogLevel, Loggers};
-use super::edge::parameters::{Change, Parameters, Refusal};
+use super::edge::parameters::{Change, Parameters};
 use super::edge::pulse::Pulse;
 use super::edge::{Edge, EdgeError, Options, Publisher, Quality, Service, Subscription};
 use crate::messages::Message;
@@ -36,30 +38,16 @@ use crate::messages::std_srvs;
 use crate::scene::SceneError;
 use crate::scene::swarm::Swarm;
 use crate::swarm::control::Control;
-use crate::swarm::control::scope::{NodeScope, NodeScopeError};
+use crate::swarm::control::scope::NodeScope;
 use crate::swarm::pace::{Pace, system_time};
 use crate::swarm::transport::complaints::Complaints;
 use crate::swarm::transport::{ControllerEnd, listen, targets};
 use endpoints::Endpoints;
+pub use error::NodeError;
 pub use kept::KeptNode;
 pub use link::Link;
 use origin::Origin;
 use settings::Settings;
-
-/// Why there is no node.
-#[derive(Debug, thiserror::Error)]
-pub enum NodeError {
-    #[error("{0}")]
-    Swarm(#[from] SceneError),
-    #[error("{0}")]
-    Edge(#[from] EdgeError),
-    #[error("{0}")]
-    Name(#[from] NameError),
-    #[error("{0}")]
-    Parameter(#[from] Refusal),
-    #[error("{0}")]
-    NodeScope(#[from] NodeScopeError),
-}
 
 /// A formation's node.
 pub struct FormationNode {
@@ -250,8 +238,13 @@ impl FormationNode {
         self.origin.names.fleet()
     }
 
+    /// Overrides by which the swarm file that the node was opened with has the names that its parameters give.
+    pub fn overrides(&self, swarm: &Swarm) -> Vec<String> {
+        self.origin.overrides(swarm)
+    }
+
     /// Where the node can be reached, in words.
-    pub fn reached_at(&self) -> [String; 2] {
+    pub fn reached_at(&self) -> String {
         self.origin.reached_at()
     }
 
@@ -325,8 +318,12 @@ impl FormationNode {
         let may_switch = |edge: &Transition| {
             commands.may_do_all() || (commands.may_stop() && ["deactivate", "shutdown"].contains(&edge.label))
         };
+        let pulse = self.pulse.clone();
         let (lifecycle, mut transitions) = self.transitions(now);
-        lifecycle.poll(now, &may_switch, &mut |goal| transitions.act(goal));
+        lifecycle.poll(now, &may_switch, &mut |goal| match &pulse {
+            Some(pulse) => pulse.untimed(|| transitions.act(goal)),
+            None => transitions.act(goal),
+        });
         self.record_beginning(now);
         if self.lifecycle.is_active() != self.was_active {
             self.was_active = self.lifecycle.is_active();
@@ -435,7 +432,8 @@ impl FormationNode {
         let refused = self.endpoints.as_ref().map_or(0, |endpoints| endpoints.link.refused());
         let troubles = self.troubles();
         let names = [self.origin.node.name(), &self.origin.swarm.name];
-        self.statistics.message(&self.control, names, self.origin.header(now), refused, &troubles)
+        let (header, is_configured) = (self.origin.header(now), self.endpoints.is_some());
+        self.statistics.message(&self.control, names, header, refused, is_configured, &troubles)
     }
 
     /// Publishes state and markers at `state_rate`, diagnostics at 1 Hz.

@@ -1,14 +1,17 @@
 //! The part of a node that stays while its formation is opened and closed.
 
+use std::collections::BTreeSet;
+
 use super::NodeError;
-use super::settings::TOPICS;
+use super::settings::{Field, TOPICS};
+use super::uses::Uses;
 use crate::messages::builtin_interfaces::Time;
 use crate::messages::names::Names;
 use crate::messages::std_msgs::Header;
 use crate::ros::edge::Node;
 use crate::ros::edge::parameters::{Parameters, Value};
 use crate::scene::swarm::Swarm;
-use crate::scene::swarm::raw::RawNode;
+use crate::scene::swarm::raw::RawPoseType;
 use crate::swarm::control::Control;
 use crate::swarm::control::scope::NodeScope;
 
@@ -44,31 +47,57 @@ impl Origin {
         }
     }
 
-    /// Refuses topics that a later `configure` could not open.
+    /// Overrides by which this swarm file, that of the node, names the topics and the frame as the parameters do.
+    pub fn overrides(&self, file: &Swarm) -> Vec<String> {
+        let (mut theirs, mut ours) = (file.raw.node.clone(), self.swarm.raw.node.clone());
+        let changed = |(key, field): (&str, Field)| {
+            let value = field(&mut ours);
+            (field(&mut theirs) != value).then(|| format!("node.{key}={value:?}"))
+        };
+        TOPICS.into_iter().filter_map(changed).collect()
+    }
+
+    /// Refuses topics that `configure` could not open, and topics of the fleet with two uses.
     ///
     /// # Errors
-    /// The first name that ROS 2 does not allow.
+    /// The first name that ROS 2 does not allow, or that is used twice.
     pub fn check_topics(&self) -> Result<(), NodeError> {
-        let RawNode { pose_topic, target_topic, leader_topic, velocity_topic, .. } = &self.swarm.raw.node;
-        for robot in &self.fresh.formation().names {
-            for pattern in [pose_topic, target_topic, leader_topic, velocity_topic] {
-                self.topic_of(pattern, robot)?;
+        let (raw, part, formation) = (&self.swarm.raw.node, &self.part, self.fresh.formation());
+        let is_array = raw.pose_type == RawPoseType::PoseArray;
+        let moved: BTreeSet<usize> = formation.moved().collect();
+        let patterns: [(&str, &str, &[usize], &dyn Fn(usize) -> bool); 4] = [
+            ("poses", &raw.pose_topic, &part.heard, &|m| m == 0 || !is_array),
+            ("targets", &raw.target_topic, &part.mine, &|_| true),
+            ("places", &raw.leader_topic, &part.mine, &|m| moved.contains(&m)),
+            ("velocities", &raw.velocity_topic, &part.mine, &|_| raw.velocity.is_some()),
+        ];
+        let mut uses = Uses::default();
+        for (purpose, pattern, own, is_used) in patterns {
+            // Topics below the node are its own alone: other robots' nodes have others.
+            let is_private = pattern.starts_with('~');
+            for (m, robot) in formation.names.iter().enumerate() {
+                let topic = self.topic_of(pattern, robot)?;
+                if is_used(m) && (!is_private || own.contains(&m)) {
+                    uses.add(topic, purpose, robot)?;
+                }
             }
         }
         Ok(())
     }
 
-    /// Where the node can be reached, in words: its name and domain, and the topics of its first robot.
-    pub fn reached_at(&self) -> [String; 2] {
+    /// Where the node can be reached, in words: its name and domain.
+    pub fn reached_at(&self) -> String {
+        format!("{} on {}", self.node.name(), self.node.options())
+    }
+
+    /// Where its first robot is reached, in words.
+    pub fn robots_reached_at(&self) -> String {
         let (raw, robots) = (&self.swarm.raw.node, &self.fresh.formation().names);
         let first = self.part.mine.first().map_or("{name}", |&m| &robots[m]);
-        // Checked when the node was opened.
+        // Checked before the topics were opened.
         let topic = |pattern: &str| self.topic_of(pattern, first).unwrap_or_default();
         let (poses, targets) = (topic(&raw.pose_topic), topic(&raw.target_topic));
-        [
-            format!("{} on {}", self.node.name(), self.node.options()),
-            format!("{first}: poses from {poses}, targets to {targets}, in the frame `{}`", raw.frame_id),
-        ]
+        format!("{first}: poses from {poses}, targets to {targets}, in the frame `{}`", raw.frame_id)
     }
 
     /// Header of what is published at `now` \[s\].

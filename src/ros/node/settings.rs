@@ -28,7 +28,7 @@ pub struct Settings {
 const NONE: f64 = 0.0;
 
 /// A name of the swarm file's `[node]`.
-type Field = fn(&mut RawNode) -> &mut String;
+pub(super) type Field = fn(&mut RawNode) -> &mut String;
 
 /// Parameters that are names of the swarm file's `[node]`. They can be changed while the node is not configured.
 pub(super) const TOPICS: [(&str, Field); 5] = [
@@ -130,9 +130,9 @@ pub(in crate::ros) fn store(declarations: Vec<Declaration>, given: &[Parameter])
     Ok(store)
 }
 
-/// As the swarm file allows; the node of one robot receives its neighbours' poses alone, which makes one sweep.
+/// 1000, or what the swarm file has if that is more: more could keep the loop for longer than its period. The node of one robot receives its neighbours' poses alone, which makes one sweep.
 fn most_sweeps(control: &Control, part: &NodeScope) -> i64 {
-    if part.mine.len() == control.formation().count() { 100_000 } else { 1 }
+    if part.mine.len() == control.formation().count() { (control.sweeps() as i64).max(1000) } else { 1 }
 }
 
 /// A limit that can be tightened and not loosened: the swarm file's value is the upper bound for every caller.

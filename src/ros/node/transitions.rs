@@ -1,7 +1,7 @@
 //! The node's part in the transitions of its lifecycle.
 //!
 //! `configure` opens the formation: it takes the topics and the frame from the parameters, begins the loop anew and opens
-//! the topics of the robots. `cleanup` closes them and forgets the loop. What stays throughout are the services, the
+//! the topics of the robots. `cleanup` closes them; the loop keeps its state until the next `configure`. What stays throughout are the services, the
 //! parameters, `/diagnostics`, and the emergency stop, which outlasts every transition.
 
 use std::sync::Arc;
@@ -71,8 +71,10 @@ impl Transitions<'_> {
 
     fn configure(&mut self) -> Outcome {
         self.origin.take_names(self.parameters);
-        match Endpoints::open(self.origin, &self.origin.fresh) {
+        let open = || Endpoints::open(self.origin, &self.origin.fresh);
+        match self.origin.check_topics().and_then(|()| open()) {
             Ok(mut endpoints) => {
+                tracing::info!("{}", self.origin.robots_reached_at());
                 self.begin_anew();
                 endpoints.link.recorder = self.recorder.take();
                 *self.endpoints = Some(endpoints);

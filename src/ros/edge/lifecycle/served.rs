@@ -75,15 +75,16 @@ impl Lifecycle {
         }
     }
 
-    /// Answers what was asked since the last tick, doing with `act` what those transitions ask for that `may` be asked
-    /// from outside. `now` \[s\] stamps the events.
+    /// Answers the questions since the last tick and at most one request for a transition, so that every state lasts a
+    /// tick: `act` does what the transition asks for if it `may` be asked for from outside. `now` \[s\] stamps the
+    /// events.
     pub fn poll(
         &mut self,
         now: f64,
         may: &dyn Fn(&Transition) -> bool,
         act: &mut dyn FnMut(Goal) -> Outcome,
     ) {
-        while let Some((id, request)) = self.change.take() {
+        if let Some((id, request)) = self.change.take() {
             let asked = request.transition;
             let edge = self.machine.asked(asked.id, &asked.label).filter(may);
             let success = edge.is_some_and(|edge| self.run(edge, now, act));

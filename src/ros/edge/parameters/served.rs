@@ -85,6 +85,11 @@ impl Parameters {
             let set = set.and_then(|()| self.store.set_atomically(settings));
             msgs::SetParametersAtomicallyResponse { result: result(set) }
         });
+        self.changes(now)
+    }
+
+    /// The changes since the last call, which are announced; answers no request. `now` \[s\] stamps the event.
+    pub fn changes(&mut self, now: f64) -> Vec<Change> {
         let changes = self.store.take_changes();
         self.announce(&changes, now);
         changes
