@@ -11,7 +11,7 @@ use clap::{Args, ValueEnum};
 use flockform::export::sweep::{
     Begun, Found, Journal, Output, Row, SweepError, SweepRequest, Table, read, write_sweep,
 };
-use flockform::export::{ExportError, OutputFolder};
+use flockform::export::{ExportError, OutputFolder, unfinished};
 use flockform::scene::Scene;
 use flockform::study::design::{Design, Sampling, Shard};
 use runs::Runs;
@@ -132,7 +132,8 @@ impl Sweep {
         }
         let design = request.design()?;
         let rows = rows.into_iter().map(|row| (row.run, row)).collect();
-        Ok(Self { begun: Begun::new(request, &scene), scene, design, rows })
+        let plan_digest = runs::first_digest(&scene_arguments(&request), &design);
+        Ok(Self { begun: Begun::new(request, &scene, plan_digest), scene, design, rows })
     }
 
     fn request(&self) -> &SweepRequest {
@@ -202,11 +203,16 @@ pub fn sweep(arguments: &SweepArguments) -> Result<ExitCode, Refusal> {
     }
     let found = arguments.resume.as_deref().map(read).transpose()?;
     let (request, rows) = match &found {
-        Some(found) => (found.begun.request.clone(), found.rows.clone()),
+        Some(found) => {
+            let mut request = found.begun.request.clone();
+            // The place is taken by the runs that are gone on with, and will be when this is gone on with in turn.
+            request.force |= found.folder == found.out;
+            (request, found.rows.clone())
+        }
         None => (arguments.request()?, Vec::new()),
     };
     let mut sweep = Sweep::new(request, rows)?;
-    found.as_ref().map_or(Ok(()), |found| found.begun.require_of(&found.folder, &sweep.scene))?;
+    found.as_ref().map_or(Ok(()), |found| found.begun.require_same(&found.folder, &sweep.begun))?;
     arguments.require_plotted(&sweep.request().outputs)?;
     let outputs: Vec<Output> =
         sweep.request().outputs.iter().map(|name| name.parse()).collect::<Result<_, _>>()?;
@@ -250,7 +256,14 @@ fn open(
         }
         _ => {
             let mut folder = match found {
-                Some(found) => super::output::create(&found.out, true)?,
+                Some(found) => {
+                    // Nobody has asked for what else was begun in this place to be discarded.
+                    let begun = unfinished(&found.out);
+                    if begun.exists() {
+                        return Err(ExportError::Unfinished(begun));
+                    }
+                    super::output::create(&found.out, true)?
+                }
                 None => arguments.output.folder(&sweep.name())?,
             };
             let rows: Vec<Row> = sweep.rows.values().cloned().collect();
@@ -273,7 +286,7 @@ fn merge(arguments: &SweepArguments, start: Instant) -> Result<ExitCode, Refusal
     let mut request = whole.request;
     request.force = arguments.output.force;
     let sweep = Sweep::new(request, rows)?;
-    one.begun.require_of(&one.folder, &sweep.scene)?;
+    one.begun.require_same(&one.folder, &sweep.begun)?;
     arguments.require_plotted(&sweep.request().outputs)?;
     let (folder, journal) = open(arguments, None, &sweep)?;
     drop(journal);

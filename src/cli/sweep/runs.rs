@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
+use flockform::continuum::digest::digest;
 use flockform::continuum::equilibrium::run_to_equilibrium_watched;
 use flockform::continuum::run::StopReason;
 use flockform::engine::Engine;
@@ -26,6 +27,17 @@ pub const REFUSED: &str = "refused";
 
 /// Updates of particles between two looks at the interrupt, at most: about a tenth of a second.
 const UPDATES_BETWEEN_LOOKS: usize = 1 << 23;
+
+/// Runs in which one is looked for that can be laid out.
+const MOST_LAID_OUT: usize = 16;
+
+/// Digest of the plan of the first run that can be laid out: of two sweeps of one command line it distinguishes those
+/// whose point or motion files differ.
+pub fn first_digest(scene: &SceneArguments, design: &Design) -> Option<u64> {
+    let runs = 0..design.runs.len().min(MOST_LAID_OUT);
+    let laid_out = |run| plan(&scene.load_scene(&design.overrides(run)).ok()?).ok();
+    runs.into_iter().find_map(laid_out).map(|plan| digest(&plan))
+}
 
 /// The runs of a design.
 pub struct Runs<'a> {
