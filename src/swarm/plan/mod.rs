@@ -6,7 +6,10 @@
 //! * the formation forgets a disturbance by the spectral radius of `A` in a period; a delay of `d` periods makes that
 //!   its `d + 1`st root, which is below 1 as well: delay slows the formation and never makes it grow;
 //! * noise of the poses moves a follower by the root of the diagonal of `C = A C A' + A A' + B B'` times that noise;
-//! * behind leaders that move steadily a follower lags by the row of `(1 - A)^-1 (A + B) 1` times their way in a period.
+//! * behind leaders that move steadily a follower lags by the row of `(1 - A)^-1 (A + B) 1` times their way in a period,
+//!   `d + 1` times that under a delay of `d` periods.
+//!
+//! A loop that is not linear has no such map, and nothing of this is stated of it.
 
 mod period_map;
 mod words;
@@ -53,8 +56,10 @@ pub struct SwarmPlan {
     pub sweeps: usize,
     /// The simulated flight's duration \[s\].
     pub flight_s: f64,
-    /// How fast a disturbance dies out; absent where the rule is not linear or a scene leads.
+    /// How fast a disturbance dies out.
     pub convergence: Option<Convergence>,
+    /// The reason for which that is not predicted.
+    pub not_predicted: Option<&'static str>,
     /// Effects of noise.
     pub noise: NoiseMargin,
     /// Effects of delay.
@@ -103,7 +108,8 @@ pub struct DelayMargin {
 pub struct SpeedMargin {
     /// The speed limit \[m/s\].
     pub limit: Option<f64>,
-    /// The time by which the last follower is behind steadily moving leaders, in the formation \[s\].
+    /// The time by which the last follower is behind steadily moving leaders under the simulated delay, in the
+    /// formation \[s\].
     pub lag_s: Option<f64>,
     /// Speed of the leaders up to which followers keep within `flight.bounds.affine_error` of their places, the speed
     /// limit at most \[m/s\]; absent without such a bound or a limit.
@@ -130,9 +136,10 @@ impl SwarmPlan {
         let raw = &swarm.raw;
         let period = raw.control.period;
         let leaders = (0..formation.count()).filter(|&m| formation.leads(m)).count();
-        let convergence = convergence(formation, swarm);
-        let map = PeriodMap::of(formation, raw.control.sweeps);
-        let delay = f64::from(raw.flight.delay + raw.flight.jitter);
+        let not_linear = not_linear(formation, swarm);
+        let convergence = convergence(formation, swarm).filter(|_| not_linear.is_none());
+        let map = PeriodMap::of(formation, raw.control.sweeps).filter(|_| not_linear.is_none());
+        let delay = f64::from(raw.flight.delay) + f64::from(raw.flight.jitter);
         let mut plan = Self {
             name: swarm.name.clone(),
             title: raw.title.clone(),
@@ -157,11 +164,12 @@ impl SwarmPlan {
                 largest_periods: (raw.poses.age_limit / period * (1.0 + 1e-12)) as usize,
                 half_life_s: convergence.and_then(|one| Some(one.half_life_s? * (delay + 1.0))),
             },
-            speed: speed(swarm, formation, map.as_ref()),
+            speed: speed(swarm, formation, map.as_ref(), delay),
+            not_predicted: convergence.is_none().then(|| not_linear.unwrap_or("the rule is not linear")),
             convergence,
             cautions: Vec::new(),
         };
-        plan.cautions = cautions(&plan);
+        plan.cautions = cautions(&plan, f64::from(raw.flight.delay) * period);
         Ok(plan)
     }
 }
@@ -194,10 +202,24 @@ fn largest_noise(formation: &Formation, clearance: Option<f64>) -> Option<f64> {
     Some((free / (2.0 * DEVIATIONS_KEPT)).max(0.0))
 }
 
-fn convergence(formation: &Formation, swarm: &Swarm) -> Option<Convergence> {
+/// The reason for which a period is no linear map, as far as the file shows it.
+fn not_linear(formation: &Formation, swarm: &Swarm) -> Option<&'static str> {
     // A scene changes the roles on its way; a body that carries robots along is not moved by them.
     let is_rule = matches!(swarm.shape, Shape::Places(_) | Shape::Body(_));
-    let engine = formation.engine().filter(|_| is_rule)?;
+    match formation.engine().filter(|_| is_rule) {
+        None => Some("a scene leads"),
+        Some(engine) if engine.lasting_neighbours().is_none() => {
+            Some("neighbours are found anew in every period")
+        }
+        Some(_) => {
+            let resilience = swarm.raw.resilience.as_ref().filter(|one| one.max_faulty_neighbours > 0);
+            resilience.map(|_| "robots leave straying neighbours out")
+        }
+    }
+}
+
+fn convergence(formation: &Formation, swarm: &Swarm) -> Option<Convergence> {
+    let engine = formation.engine()?;
     let frame = engine.body().frame.as_ref();
     let found = spectral_radius(engine.flock(), frame, engine.roles(), engine.update(), MOST_SWEEPS)?;
     let factor = found.radius.powf(swarm.raw.control.sweeps as f64);
@@ -211,9 +233,10 @@ fn half_life(factor: f64) -> f64 {
     (0.5_f64.ln() / factor.max(f64::MIN_POSITIVE).ln()).max(1.0)
 }
 
-fn speed(swarm: &Swarm, formation: &Formation, map: Option<&PeriodMap>) -> SpeedMargin {
+fn speed(swarm: &Swarm, formation: &Formation, map: Option<&PeriodMap>, delay: f64) -> SpeedMargin {
     let limit = swarm.raw.limits.speed;
-    let lag_s = map.and_then(PeriodMap::lag).map(|periods| periods * swarm.raw.control.period);
+    let lag_s =
+        map.and_then(PeriodMap::lag).map(|periods| periods * (delay + 1.0) * swarm.raw.control.period);
     let by_lag = swarm.raw.flight.bounds.affine_error.zip(lag_s).map(|(error, lag)| error / lag);
     let reachable = [limit, by_lag].into_iter().flatten().reduce(f64::min).filter(|speed| speed.is_finite());
     let manoeuvres = swarm.manoeuvres.iter().filter_map(|one| needed(formation, &one.name)).collect();
@@ -242,7 +265,8 @@ fn needed(formation: &Formation, name: &str) -> Option<ManoeuvreSpeed> {
     Some(ManoeuvreSpeed { name: name.to_owned(), needed })
 }
 
-fn cautions(plan: &SwarmPlan) -> Vec<String> {
+/// `delay_s` is the simulated delay without its jitter.
+fn cautions(plan: &SwarmPlan, delay_s: f64) -> Vec<String> {
     let mut cautions = Vec::new();
     if let Some(Convergence { factor, half_life_s: None }) = plan.convergence {
         cautions
@@ -255,10 +279,16 @@ fn cautions(plan: &SwarmPlan) -> Vec<String> {
                 .into(),
         );
     }
-    if plan.delay.simulated_s > plan.delay.largest_s {
+    if delay_s > plan.delay.largest_s {
         cautions.push(
             "poses are older than poses.age_limit when they arrive: no robot will get a target; lower flight.delay or \
              raise the limit"
+                .into(),
+        );
+    } else if plan.delay.simulated_s > plan.delay.largest_s {
+        cautions.push(
+            "jitter makes some poses older than poses.age_limit: robots will be lost for periods at a time; lower \
+             flight.jitter or raise the limit"
                 .into(),
         );
     }
@@ -317,7 +347,67 @@ mod tests {
         let noisy = plan("square", &["flight.noise=0.5"]);
         assert!(noisy.cautions.iter().any(|caution| caution.contains("flight.noise")), "{noisy}");
         let late = plan("square", &["flight.delay=100"]);
-        assert!(late.cautions.iter().any(|caution| caution.contains("poses.age_limit")), "{late}");
+        assert!(late.cautions.iter().any(|caution| caution.contains("no robot will get a target")), "{late}");
+        let jittery = plan("square", &["flight.jitter=100"]);
+        assert!(jittery.cautions.iter().any(|caution| caution.contains("lost for periods")), "{jittery}");
+        assert!(!jittery.to_string().contains("no robot will get a target"), "{jittery}");
+    }
+
+    /// The formation of `liar` in which everyone believes everyone and nobody lies, led at 1 m/s.
+    fn steadily_led(delay: u32) -> Swarm {
+        let text = bundled_swarm("liar").expect("bundled").text;
+        let text = text.replace("[resilience]\nmax_faulty_neighbours = 1\n", "");
+        let path =
+            "leaders[0].program={ kind = \"path\", points = [{ at = 40.0, displacement = [40.0, 0.0] }] }";
+        let delay = format!("flight.delay={delay}");
+        let set = [path, "flight.faults=[]", &delay].map(str::to_owned);
+        Swarm::parse("led", "led.toml", &text, &set, None).unwrap_or_else(|error| panic!("{error}"))
+    }
+
+    #[test]
+    fn a_steadily_led_formation_lags_as_its_plan_says_under_delay_too() {
+        for delay in [0, 3] {
+            let swarm = steadily_led(delay);
+            let lag = SwarmPlan::new(&swarm).expect("laid out").speed.lag_s.expect("linear");
+            let mut flight = Flight::new(&swarm).expect("flies");
+            let periods = (30.0 / swarm.raw.control.period) as usize;
+            (0..periods).for_each(|_| flight.step());
+            let (formation, places) = (flight.control().formation(), flight.fleet().places());
+            let ways = (0..formation.count()).map(|m| places.get(m)[0] - formation.places.get(m)[0]);
+            let (least, most) =
+                ways.fold((f64::INFINITY, 0.0_f64), |(least, most), way| (least.min(way), most.max(way)));
+            // At 1 m/s the way by which the last is behind, in metres, is the time in seconds.
+            assert!(((most - least) / lag - 1.0).abs() < 1e-3, "delay {delay}: {} {lag}", most - least);
+        }
+    }
+
+    #[test]
+    fn nothing_is_predicted_of_a_loop_that_is_not_linear_and_the_plan_says_why() {
+        let reason = |plan: &SwarmPlan| {
+            let numbers = (plan.convergence, plan.noise.gain, plan.speed.lag_s, plan.delay.half_life_s);
+            assert_eq!(numbers, (None, None, None, None), "{plan}");
+            plan.not_predicted.expect("a reason")
+        };
+        let liar = plan("liar", &[]);
+        assert!(reason(&liar).contains("straying"), "{liar}");
+        assert!(liar.to_string().contains("straying"), "{liar}");
+        let present = "title = \"two\"\nlinks = { kind = \"present\", radius = 3.0 }\nleaders = [\
+                       { robots = [\"a\"], program = { kind = \"external\" } }]\n\
+                       robots = [{ name = \"a\", place = [0.0, 0.0] }, { name = \"b\", place = [1.0, 0.0] }]\n";
+        let swarm = Swarm::parse("two", "two.toml", present, &[], None).unwrap_or_else(|e| panic!("{e}"));
+        assert!(reason(&SwarmPlan::new(&swarm).expect("laid out")).contains("anew"));
+        let led = SwarmPlan::new(&steadily_led(0)).expect("laid out");
+        assert_eq!((led.convergence.is_some(), led.not_predicted), (true, None));
+    }
+
+    #[test]
+    fn numbers_that_are_next_to_nothing_are_said_in_words() {
+        let mut plan = plan("square", &[]);
+        plan.convergence = Some(Convergence { factor: 7.9e-31, half_life_s: Some(0.1) });
+        plan.noise.gain = Some(1e-9);
+        let words = plan.to_string();
+        assert!(words.contains("less than 0.001 is left") && words.contains("do not hear"), "{words}");
+        assert!(!words.contains("e-31") && !words.contains("0.000 of"), "{words}");
     }
 
     #[test]
