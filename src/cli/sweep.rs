@@ -57,7 +57,7 @@ pub struct SweepArguments {
     #[arg(long, value_name = "I/N", requires = "scene")]
     shard: Option<String>,
     /// Threads to use [default: the machine's]; the table is the same for any number
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
     /// Go on with the killed or interrupted sweep to this --out
     #[arg(long, value_name = "DIR", conflicts_with_all = ["scene", "out", "force", "merge"])]
@@ -197,6 +197,12 @@ fn scene_arguments(request: &SweepRequest) -> SceneArguments {
 
 /// Makes the runs, goes on with them, or puts shards together.
 pub fn sweep(arguments: &SweepArguments) -> Result<ExitCode, Refusal> {
+    let threads = usize::from(arguments.threads.unwrap_or(0));
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    pool.map_err(|error| Refusal::threads(threads, error))?.install(|| sweep_here(arguments))
+}
+
+fn sweep_here(arguments: &SweepArguments) -> Result<ExitCode, Refusal> {
     let start = Instant::now();
     if !arguments.merge.is_empty() {
         return merge(arguments, start);
@@ -221,15 +227,15 @@ pub fn sweep(arguments: &SweepArguments) -> Result<ExitCode, Refusal> {
 
     let mut pending = sweep.pending();
     // A misspelt key or output is found before a folder is made.
-    let first = if found.is_none() && !pending.is_empty() { runs.first(&pending)? } else { None };
+    let first = if found.is_none() && !pending.is_empty() { runs.first(&pending)? } else { Vec::new() };
     let interrupted = interrupt::keeps();
     let (folder, journal) = open(arguments, found.as_ref(), &sweep)?;
     let words = format!("interrupted: `flockform sweep --resume {}` goes on", folder.folder().display());
     interrupt::says(words.clone());
-    if let Some(first) = first {
-        journal.add(&first)?;
-        pending.retain(|&run| run != first.run);
-        sweep.rows.insert(first.run, first);
+    for row in first {
+        journal.add(&row)?;
+        pending.retain(|&run| run != row.run);
+        sweep.rows.insert(row.run, row);
     }
     let threads = usize::from(arguments.threads.unwrap_or(0));
     let made = runs.make(&pending, &journal, threads, arguments.output.quiet)?;

@@ -166,6 +166,10 @@ fn what_cannot_be_swept_is_refused_and_leaves_nothing() {
     sweep(&[&damping[..], &["--outputs", "energies.pe9"]].concat(), &["energies.pe9", "pe1, pe2"]);
     sweep(&[&damping[..], &["--outputs", "energies"]].concat(), &["energies.pe1"]);
     sweep(&[&damping[..], &["--outputs", "probe.999999.x"]].concat(), &["no particle 999999"]);
+    // The first run is refused, the last shows what there is.
+    let refused_first = ["--vary", "update.damping=[-1, 0.5]"];
+    sweep(&[&refused_first[..], &["--outputs", "energies.pe9"]].concat(), &["energies.pe9", "pe1, pe2"]);
+    sweep(&[&damping[..], &["--threads", "2000"]].concat(), &["--threads", "1024"]);
     sweep(&[&damping[..], &["--shard", "5/4"]].concat(), &["--shard 5/4"]);
     sweep(&[&damping[..], &["--plot", "steps", "--outputs", "residual"]].concat(), &["--plot", "residual"]);
     sweep(&["--vary", "update.damping=0.5:1:4", "--samples", "3"], &["--samples"]);
