@@ -83,8 +83,7 @@ impl Runs<'_> {
         if !shows_all && last != run {
             ended.push((last, self.ended(last)));
         }
-        let sound = ended.iter().filter_map(|(_, ended)| ended.as_ref().ok());
-        match sound.filter_map(Ended::misspelt).next() {
+        match ended.iter().filter_map(|(_, ended)| ended.as_ref().ok()).find_map(Ended::misspelt) {
             Some(error) => Err(error.clone().into()),
             None => Ok(ended.into_iter().filter_map(|(run, ended)| self.row(run, ended)).collect()),
         }
