@@ -291,10 +291,15 @@ pub enum Refusal {
     #[error("{0}")]
     BenchEquilibrium(#[from] bench::equilibrium::EquilibriumError),
     #[error("--threads {threads}: {error}\n  help: give a number from 1 to the machine's cores")]
-    Threads { threads: usize, error: rayon::ThreadPoolBuildError },
+    Threads { threads: usize, error: std::io::Error },
 }
 
 impl Refusal {
+    /// Threads that the system does not give.
+    fn threads(threads: usize, error: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> Self {
+        Refusal::Threads { threads, error: std::io::Error::other(error) }
+    }
+
     /// Whether the work was begun, and the machine failed it: a full disk above all.
     fn is_failure(&self) -> bool {
         use export::ExportError;

@@ -61,12 +61,13 @@ impl Kind {
     }
 
     /// The kind of the bundled file of this name, or of the file at this path; by its keys, unless it has as many of
-    /// both kinds.
+    /// both kinds. A pipe, which can be read only once, has none.
     pub fn of(word: &str) -> Option<Self> {
         let is_bundled = |kind: &Kind| kind.bundled().iter().any(|one| one.name == word);
         if let Some(kind) = Kind::ALL.into_iter().find(is_bundled) {
             return Some(kind);
         }
+        std::fs::metadata(word).ok().filter(std::fs::Metadata::is_file)?;
         let file: toml::Table = std::fs::read_to_string(word).ok()?.parse().ok()?;
         let [scene, swarm] = Kind::ALL.map(|kind| kind.keys_of(&file));
         match scene.cmp(&swarm) {

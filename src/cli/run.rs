@@ -70,7 +70,7 @@ pub struct RunArguments {
 pub fn run(arguments: &RunArguments) -> Result<ExitCode, Refusal> {
     let threads = usize::from(arguments.threads.unwrap_or(0));
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-    pool.map_err(|error| Refusal::Threads { threads, error })?.install(|| run_here(arguments))
+    pool.map_err(|error| Refusal::threads(threads, error))?.install(|| run_here(arguments))
 }
 
 fn run_here(arguments: &RunArguments) -> Result<ExitCode, Refusal> {

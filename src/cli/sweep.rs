@@ -11,7 +11,7 @@ use clap::{Args, ValueEnum};
 use flockform::export::sweep::{
     Begun, Found, Journal, Output, Row, SweepError, SweepRequest, Table, read, write_sweep,
 };
-use flockform::export::{ExportError, OutputFolder};
+use flockform::export::{ExportError, OutputFolder, unfinished};
 use flockform::scene::Scene;
 use flockform::study::design::{Design, Sampling, Shard};
 use runs::Runs;
@@ -57,7 +57,7 @@ pub struct SweepArguments {
     #[arg(long, value_name = "I/N", requires = "scene")]
     shard: Option<String>,
     /// Threads to use [default: the machine's]; the table is the same for any number
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
     /// Go on with the killed or interrupted sweep to this --out
     #[arg(long, value_name = "DIR", conflicts_with_all = ["scene", "out", "force", "merge"])]
@@ -132,7 +132,8 @@ impl Sweep {
         }
         let design = request.design()?;
         let rows = rows.into_iter().map(|row| (row.run, row)).collect();
-        Ok(Self { begun: Begun::new(request, &scene), scene, design, rows })
+        let plan_digest = runs::first_digest(&scene_arguments(&request), &design);
+        Ok(Self { begun: Begun::new(request, &scene, plan_digest), scene, design, rows })
     }
 
     fn request(&self) -> &SweepRequest {
@@ -196,17 +197,28 @@ fn scene_arguments(request: &SweepRequest) -> SceneArguments {
 
 /// Makes the runs, goes on with them, or puts shards together.
 pub fn sweep(arguments: &SweepArguments) -> Result<ExitCode, Refusal> {
+    let threads = usize::from(arguments.threads.unwrap_or(0));
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    pool.map_err(|error| Refusal::threads(threads, error))?.install(|| sweep_here(arguments))
+}
+
+fn sweep_here(arguments: &SweepArguments) -> Result<ExitCode, Refusal> {
     let start = Instant::now();
     if !arguments.merge.is_empty() {
         return merge(arguments, start);
     }
     let found = arguments.resume.as_deref().map(read).transpose()?;
     let (request, rows) = match &found {
-        Some(found) => (found.begun.request.clone(), found.rows.clone()),
+        Some(found) => {
+            let mut request = found.begun.request.clone();
+            // The place is taken by the runs that are gone on with, and will be when this is gone on with in turn.
+            request.force |= found.folder == found.out;
+            (request, found.rows.clone())
+        }
         None => (arguments.request()?, Vec::new()),
     };
     let mut sweep = Sweep::new(request, rows)?;
-    found.as_ref().map_or(Ok(()), |found| found.begun.require_of(&found.folder, &sweep.scene))?;
+    found.as_ref().map_or(Ok(()), |found| found.begun.require_same(&found.folder, &sweep.begun))?;
     arguments.require_plotted(&sweep.request().outputs)?;
     let outputs: Vec<Output> =
         sweep.request().outputs.iter().map(|name| name.parse()).collect::<Result<_, _>>()?;
@@ -215,15 +227,15 @@ pub fn sweep(arguments: &SweepArguments) -> Result<ExitCode, Refusal> {
 
     let mut pending = sweep.pending();
     // A misspelt key or output is found before a folder is made.
-    let first = if found.is_none() && !pending.is_empty() { runs.first(&pending)? } else { None };
+    let first = if found.is_none() && !pending.is_empty() { runs.first(&pending)? } else { Vec::new() };
     let interrupted = interrupt::keeps();
     let (folder, journal) = open(arguments, found.as_ref(), &sweep)?;
     let words = format!("interrupted: `flockform sweep --resume {}` goes on", folder.folder().display());
     interrupt::says(words.clone());
-    if let Some(first) = first {
-        journal.add(&first)?;
-        pending.retain(|&run| run != first.run);
-        sweep.rows.insert(first.run, first);
+    for row in first {
+        journal.add(&row)?;
+        pending.retain(|&run| run != row.run);
+        sweep.rows.insert(row.run, row);
     }
     let threads = usize::from(arguments.threads.unwrap_or(0));
     let made = runs.make(&pending, &journal, threads, arguments.output.quiet)?;
@@ -250,7 +262,14 @@ fn open(
         }
         _ => {
             let mut folder = match found {
-                Some(found) => super::output::create(&found.out, true)?,
+                Some(found) => {
+                    // Nobody has asked for what else was begun in this place to be discarded.
+                    let begun = unfinished(&found.out);
+                    if begun.exists() {
+                        return Err(ExportError::Unfinished(begun));
+                    }
+                    super::output::create(&found.out, true)?
+                }
                 None => arguments.output.folder(&sweep.name())?,
             };
             let rows: Vec<Row> = sweep.rows.values().cloned().collect();
@@ -273,7 +292,7 @@ fn merge(arguments: &SweepArguments, start: Instant) -> Result<ExitCode, Refusal
     let mut request = whole.request;
     request.force = arguments.output.force;
     let sweep = Sweep::new(request, rows)?;
-    one.begun.require_of(&one.folder, &sweep.scene)?;
+    one.begun.require_same(&one.folder, &sweep.begun)?;
     arguments.require_plotted(&sweep.request().outputs)?;
     let (folder, journal) = open(arguments, None, &sweep)?;
     drop(journal);

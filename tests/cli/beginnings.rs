@@ -105,6 +105,24 @@ fn list_plan_and_run_have_json() {
     assert_eq!(summary, serde_json::from_slice::<serde_json::Value>(&file).expect("JSON"));
 }
 
+#[cfg(unix)]
+#[test]
+fn a_scene_from_a_pipe_is_planned() {
+    let folder = temporary();
+    let scene = said(&["show", "tension"], folder.path());
+    let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_flockform"))
+        .args(["plan", "/dev/stdin"])
+        .stdin(std::process::Stdio::piped())
+        .stdout(std::process::Stdio::piped())
+        .spawn()
+        .expect("the program starts");
+    let mut pipe = child.stdin.take().expect("a pipe");
+    std::io::Write::write_all(&mut pipe, scene.as_bytes()).expect("it is read");
+    drop(pipe);
+    let output = child.wait_with_output().expect("a child");
+    assert!(output.status.success() && text(&output.stdout).contains("144"), "{}", text(&output.stdout));
+}
+
 #[test]
 fn the_plan_of_a_swarm_states_margins_and_speeds() {
     let folder = temporary();

@@ -95,6 +95,17 @@ fn threads_and_shards_do_not_change_a_byte_of_the_table() {
     assert_eq!(table(folder.path().join("two/sweep.csv")).len(), 5);
     said(&["sweep", "--resume", "two", "-q"], folder.path());
     assert_eq!(read(folder.path().join("two/sweep.csv")), one);
+    // As if that had been killed before its last run: it goes on into the place of the merged runs.
+    let (two, unfinished) = (folder.path().join("two"), folder.path().join("two.unfinished"));
+    std::fs::create_dir(&unfinished).expect("writable");
+    for file in files(&two) {
+        std::fs::copy(&file, unfinished.join(file.file_name().expect("a name"))).expect("writable");
+    }
+    let rows = read(two.join("runs.jsonl"));
+    let kept: Vec<&str> = rows.split_inclusive('\n').take(5).collect();
+    std::fs::write(unfinished.join("runs.jsonl"), kept.concat()).expect("writable");
+    said(&["sweep", "--resume", "two", "-q"], folder.path());
+    assert_eq!(read(two.join("sweep.csv")), one);
     sweep(&["--out", "other", "--set", "lattice.spacing=2.0"]);
     let output = flockform(&["sweep", "--merge", "one", "other", "--out", "none"], folder.path());
     assert_eq!(output.status.code(), Some(2));
@@ -155,6 +166,10 @@ fn what_cannot_be_swept_is_refused_and_leaves_nothing() {
     sweep(&[&damping[..], &["--outputs", "energies.pe9"]].concat(), &["energies.pe9", "pe1, pe2"]);
     sweep(&[&damping[..], &["--outputs", "energies"]].concat(), &["energies.pe1"]);
     sweep(&[&damping[..], &["--outputs", "probe.999999.x"]].concat(), &["no particle 999999"]);
+    // The first run is refused, the last shows what there is.
+    let refused_first = ["--vary", "update.damping=[-1, 0.5]"];
+    sweep(&[&refused_first[..], &["--outputs", "energies.pe9"]].concat(), &["energies.pe9", "pe1, pe2"]);
+    sweep(&[&damping[..], &["--threads", "2000"]].concat(), &["--threads", "1024"]);
     sweep(&[&damping[..], &["--shard", "5/4"]].concat(), &["--shard 5/4"]);
     sweep(&[&damping[..], &["--plot", "steps", "--outputs", "residual"]].concat(), &["--plot", "residual"]);
     sweep(&["--vary", "update.damping=0.5:1:4", "--samples", "3"], &["--samples"]);
@@ -164,9 +179,9 @@ fn what_cannot_be_swept_is_refused_and_leaves_nothing() {
 }
 
 #[test]
-fn twenty_runs_of_tension_take_less_than_a_second() {
-    // Unoptimised, on a machine that has other work, several times as long.
-    let patience = Duration::from_secs(if cfg!(debug_assertions) { 8 } else { 1 });
+fn twenty_runs_of_tension_take_a_moment() {
+    // About a tenth of a second each, unoptimised; a sweep that waits for something is far off.
+    let patience = Duration::from_secs(20);
     let folder = temporary();
     let took = (0..3).map(|n| {
         let start = Instant::now();
@@ -178,14 +193,14 @@ fn twenty_runs_of_tension_take_less_than_a_second() {
     assert!(took < patience, "{took:?}");
 }
 
-/// A sweep of some seconds.
+/// A sweep that is not over when its first rows are seen, however fast the machine.
 const LONG: [&str; 7] =
-    ["sweep", "tension", "--vary", "update.damping=0.5:1:40", "--set", "stop.steps=20000", "-q"];
+    ["sweep", "tension", "--vary", "update.damping=0.5:1:40", "--set", "stop.steps=100000", "-q"];
 
 fn start(folder: &Path) -> Child {
     Command::new(env!("CARGO_BIN_EXE_flockform"))
         .args(LONG)
-        .args(["--out", "o", "--figures", "none"])
+        .args(["--out", "o", "--figures", "none", "--threads", "1"])
         .current_dir(folder)
         .stderr(Stdio::piped())
         .spawn()
@@ -231,14 +246,14 @@ fn a_killed_sweep_goes_on_with_the_runs_that_had_not_ended() {
 }
 
 #[test]
-fn ctrl_c_ends_a_sweep_within_a_second_and_keeps_its_rows() {
+fn ctrl_c_ends_a_sweep_soon_and_keeps_its_rows() {
     let folder = temporary();
     let child = start(folder.path());
     wait_for_rows(folder.path());
     let since = Instant::now();
     signal("INT", child.id());
     let output = child.wait_with_output().expect("a child");
-    assert!(since.elapsed() < Duration::from_millis(1500), "{:?}", since.elapsed());
+    assert!(since.elapsed() < Duration::from_secs(5), "{:?}", since.elapsed());
     let words = text(&output.stderr);
     assert_eq!(output.status.code(), Some(1), "{words}");
     assert!(words.contains("interrupted: `flockform sweep --resume"), "{words}");
@@ -260,4 +275,109 @@ fn runs_of_a_scene_that_has_changed_are_not_gone_on_with() {
     assert_eq!(output.status.code(), Some(2));
     assert!(text(&output.stderr).contains("are of another"), "{}", text(&output.stderr));
     assert_eq!(table(folder.path().join("o/sweep.csv")).len(), 3);
+}
+
+/// A scene whose body is in a file beside it.
+const POINTS: &str = r#"
+title = "Four by three"
+neighbours = { kind = "within", radius = 1.2 }
+stop = { steps = 5 }
+body = { shape = { kind = "points", file = "points.csv" } }
+
+[[roles]]
+region = { kind = "edge", side = "left", depth = 0.5 }
+role = "clamped"
+
+[[roles]]
+region = { kind = "edge", side = "right", depth = 0.5 }
+role = "leader"
+motion = { kind = "velocity", per_step = [0.05, 0.0] }
+"#;
+
+fn points(last_x: f64) -> String {
+    let places = (0..12).map(|n| (if n == 11 { last_x } else { f64::from(n / 3) }, f64::from(n % 3)));
+    std::iter::once("x,y\n".to_owned()).chain(places.map(|(x, y)| format!("{x:?},{y:?}\n"))).collect()
+}
+
+#[test]
+fn runs_of_a_body_whose_points_have_changed_are_not_put_together() {
+    let folder = temporary();
+    let place = folder.path().join("points.csv");
+    std::fs::write(folder.path().join("mine.toml"), POINTS).expect("writable");
+    let shard = |part: &str, out: &str| {
+        let arguments = ["sweep", "mine.toml", "--vary", "update.damping=0.5:1:4", "--figures", "none", "-q"];
+        said(&[&arguments[..], &["--shard", part, "--out", out]].concat(), folder.path());
+    };
+    std::fs::write(&place, points(3.0)).expect("writable");
+    shard("1/2", "a");
+    shard("2/2", "b");
+    said(&["sweep", "--merge", "a", "b", "--out", "both", "--figures", "none", "-q"], folder.path());
+    std::fs::write(&place, points(3.1)).expect("writable");
+    shard("2/2", "c");
+    let merged = flockform(&["sweep", "--merge", "a", "c", "--out", "none"], folder.path());
+    assert_eq!(merged.status.code(), Some(2));
+    assert!(text(&merged.stderr).contains("not parts of one sweep"), "{}", text(&merged.stderr));
+    let resumed = flockform(&["sweep", "--resume", "a"], folder.path());
+    assert_eq!(resumed.status.code(), Some(2));
+    assert!(text(&resumed.stderr).contains("of another body"), "{}", text(&resumed.stderr));
+}
+
+/// A finished sweep of two runs in `o`.
+fn finished(folder: &Path) {
+    let arguments = ["sweep", "tension", "--vary", "update.damping=0.5:1:2", "--set", "stop.steps=2", "-q"];
+    said(&[&arguments[..], &["--out", "o", "--figures", "none"]].concat(), folder);
+}
+
+fn not_resumed(folder: &Path, words: &[&str]) {
+    let output = flockform(&["sweep", "--resume", "o"], folder);
+    let why = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{why}");
+    words.iter().for_each(|word| assert!(why.contains(word), "no `{word}` in {why}"));
+}
+
+#[test]
+fn files_of_a_sweep_that_cannot_be_trusted_are_named() {
+    let folder = temporary();
+    finished(folder.path());
+    let [rows, request] = ["runs.jsonl", "sweep.json"].map(|name| folder.path().join("o").join(name));
+    let (good_rows, good_request) = (read(&rows), read(&request));
+    std::fs::write(&rows, format!("damaged\n{good_rows}")).expect("writable");
+    not_resumed(folder.path(), &["runs.jsonl", "line 1"]);
+    std::fs::write(&rows, &good_rows).expect("writable");
+    let written: serde_json::Value = serde_json::from_str(&good_request).expect("JSON");
+    let with = |key: &str, value: serde_json::Value| {
+        let mut changed = written.clone();
+        changed["request"][key] = value;
+        std::fs::write(&request, changed.to_string()).expect("writable");
+    };
+    with("shard", serde_json::json!({ "number": 1, "of": 0 }));
+    not_resumed(folder.path(), &["sweep.json", "--shard 1/0"]);
+    with("vary", serde_json::json!(["update.damping"]));
+    not_resumed(folder.path(), &["sweep.json", "there is no `=`"]);
+    with("outputs", serde_json::json!([]));
+    not_resumed(folder.path(), &["not those of its sweep.json"]);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_resumed_sweep_neither_follows_links_nor_discards_what_else_was_begun() {
+    let folder = temporary();
+    finished(folder.path());
+    let (rows, other) = (folder.path().join("o/runs.jsonl"), folder.path().join("other"));
+    std::fs::rename(&rows, &other).expect("movable");
+    let kept = read(&other);
+    std::os::unix::fs::symlink(&other, &rows).expect("linked");
+    // In the open, as a kill leaves it.
+    std::fs::rename(folder.path().join("o"), folder.path().join("o.unfinished")).expect("movable");
+    not_resumed(folder.path(), &["runs.jsonl", "no regular file"]);
+    assert_eq!(read(&other), kept);
+    std::fs::remove_file(folder.path().join("o.unfinished/runs.jsonl")).expect("removable");
+    std::fs::rename(&other, folder.path().join("o.unfinished/runs.jsonl")).expect("movable");
+    std::fs::rename(folder.path().join("o.unfinished"), folder.path().join("real")).expect("movable");
+    std::os::unix::fs::symlink(folder.path().join("real"), folder.path().join("o")).expect("linked");
+    let begun = folder.path().join("real.unfinished/checkpoint");
+    std::fs::create_dir(folder.path().join("real.unfinished")).expect("writable");
+    std::fs::write(&begun, "a run").expect("writable");
+    not_resumed(folder.path(), &["real.unfinished", "not finished"]);
+    assert_eq!(read(&begun), "a run");
 }

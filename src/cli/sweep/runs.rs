@@ -3,8 +3,10 @@
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
+use std::thread::Builder;
 use std::time::Instant;
 
+use flockform::continuum::digest::digest;
 use flockform::continuum::equilibrium::run_to_equilibrium_watched;
 use flockform::continuum::run::StopReason;
 use flockform::engine::Engine;
@@ -27,6 +29,17 @@ pub const REFUSED: &str = "refused";
 /// Updates of particles between two looks at the interrupt, at most: about a tenth of a second.
 const UPDATES_BETWEEN_LOOKS: usize = 1 << 23;
 
+/// Runs in which one is looked for that can be laid out.
+const MOST_LAID_OUT: usize = 16;
+
+/// Digest of the plan of the first run that can be laid out: of two sweeps of one command line it distinguishes those
+/// whose point or motion files differ.
+pub fn first_digest(scene: &SceneArguments, design: &Design) -> Option<u64> {
+    let runs = 0..design.runs.len().min(MOST_LAID_OUT);
+    let laid_out = |run| plan(&scene.load_scene(&design.overrides(run)).ok()?).ok();
+    runs.into_iter().find_map(laid_out).map(|plan| digest(&plan))
+}
+
 /// The runs of a design.
 pub struct Runs<'a> {
     pub scene: &'a SceneArguments,
@@ -40,32 +53,44 @@ struct Ended {
     outputs: Vec<Result<String, OutputError>>,
 }
 
+impl Ended {
+    /// Whether it has all that such a run has: what diverged may lack some of it.
+    fn is_sound(&self) -> bool {
+        !matches!(self.stop_reason, StopReason::Diverged(_) | StopReason::Stuck(_))
+    }
+
+    /// The first output that such a run does not have.
+    fn misspelt(&self) -> Option<&OutputError> {
+        self.outputs.iter().find_map(|output| output.as_ref().err()).filter(|_| self.is_sound())
+    }
+}
+
 impl Runs<'_> {
-    /// Makes the first of these runs before anything is written.
+    /// Makes the first of these runs before anything is written; where it does not show what a run has, the last too.
     ///
     /// # Errors
     /// Keys that the scene refuses in the first run and in the last; outputs that a run does not have.
-    pub fn first(&self, pending: &[usize]) -> Result<Option<Row>, Refusal> {
+    pub fn first(&self, pending: &[usize]) -> Result<Vec<Row>, Refusal> {
         let (run, last) = (pending[0], pending[pending.len() - 1]);
-        let ended = match self.ended(run) {
+        let first = match self.ended(run) {
             Err(error) if self.scene.load_scene(&self.design.overrides(last)).is_err() => {
                 return Err(error.into());
             }
-            ended => ended,
+            first => first,
         };
-        if let Ok(Ended { stop_reason, outputs }) = &ended {
-            // What diverged may lack what the others have.
-            let is_sound = !matches!(stop_reason, StopReason::Diverged(_) | StopReason::Stuck(_));
-            if let Some(error) = outputs.iter().find_map(|output| output.as_ref().err()).filter(|_| is_sound)
-            {
-                return Err(error.clone().into());
-            }
+        let shows_all = first.as_ref().is_ok_and(Ended::is_sound) || interrupt::is_raised();
+        let mut ended = vec![(run, first)];
+        if !shows_all && last != run {
+            ended.push((last, self.ended(last)));
         }
-        Ok(self.row(run, ended))
+        match ended.iter().filter_map(|(_, ended)| ended.as_ref().ok()).find_map(Ended::misspelt) {
+            Some(error) => Err(error.clone().into()),
+            None => Ok(ended.into_iter().filter_map(|(run, ended)| self.row(run, ended)).collect()),
+        }
     }
 
-    /// Makes these runs and adds each to the journal as it ends; an interrupt leaves out those under way. `threads` is
-    /// 0 for as many as the machine has.
+    /// Makes these runs and adds each to the journal as it ends; an interrupt leaves out those under way. `threads`
+    /// is 0 for as many as the machine has.
     ///
     /// # Errors
     /// No threads, or a journal that cannot be written.
@@ -84,7 +109,7 @@ impl Runs<'_> {
         let pools: Vec<_> = (0..workers)
             .map(|_| pool())
             .collect::<Result<_, _>>()
-            .map_err(|error| Refusal::Threads { threads, error })?;
+            .map_err(|error: rayon::ThreadPoolBuildError| Refusal::threads(threads, error))?;
         let work = Work {
             runs: self,
             pending,
@@ -94,13 +119,18 @@ impl Runs<'_> {
             failure: Mutex::default(),
             stages: Mutex::new(Stages::new(quiet)),
         };
-        std::thread::scope(|scope| {
-            for pool in &pools {
-                scope.spawn(|| pool.install(|| while work.one().is_continue() {}));
-            }
+        let spawned = std::thread::scope(|scope| {
+            let work = &work;
+            let spawned = pools.iter().try_for_each(|pool| {
+                let runs = || pool.install(|| while work.one().is_continue() {});
+                Builder::new().spawn_scoped(scope, runs).map(drop)
+            });
+            // Without all of its threads it ends with the runs that are under way.
+            spawned.inspect_err(|_| work.next.store(pending.len(), Ordering::Relaxed))
         });
         let Work { made, failure, stages, .. } = work;
         stages.into_inner().unwrap_or_else(PoisonError::into_inner).finish();
+        spawned.map_err(|error| Refusal::threads(threads, error))?;
         match failure.into_inner().unwrap_or_else(PoisonError::into_inner) {
             Some(error) => Err(error.into()),
             None => Ok(made.into_inner().unwrap_or_else(PoisonError::into_inner)),

@@ -61,27 +61,31 @@ pub struct Begun {
     version: String,
     /// Of the scene without the variations, as text.
     scene_crc32: u32,
+    /// Digest of the plan of the first run that can be laid out, which depends on the files that the scene names.
+    plan_digest: Option<u64>,
     /// The command line.
     pub request: SweepRequest,
 }
 
 impl Begun {
-    /// A sweep of this scene, which is the one without the variations.
-    pub fn new(request: SweepRequest, scene: &Scene) -> Self {
+    /// A sweep of this scene, which is the one without the variations; `plan_digest` is of the first run that can be
+    /// laid out.
+    pub fn new(request: SweepRequest, scene: &Scene, plan_digest: Option<u64>) -> Self {
         let (program, version) = (summary::PROGRAM.to_owned(), env!("CARGO_PKG_VERSION").to_owned());
-        Self { program, version, scene_crc32: crc32(scene), request }
+        Self { program, version, scene_crc32: crc32(scene), plan_digest, request }
     }
 
-    /// Refuses to add runs of another scene or of another program.
+    /// Refuses to add the runs of `now` where they are of another scene or of another program.
     ///
     /// # Errors
     /// Says which of the two it is.
-    pub fn require_of(&self, folder: &Path, scene: &Scene) -> Result<(), SweepError> {
-        let now = Self::new(self.request.clone(), scene);
+    pub fn require_same(&self, folder: &Path, now: &Self) -> Result<(), SweepError> {
         let what = if self.version != now.version {
             format!("of version {} of the program", self.version)
         } else if self.scene_crc32 != now.scene_crc32 {
             format!("of another `{}`", self.request.scene)
+        } else if self.plan_digest != now.plan_digest {
+            format!("of another body: a file that `{}` names has changed", self.request.scene)
         } else {
             return Ok(());
         };
@@ -177,37 +181,57 @@ pub struct Found {
 pub fn read(dir: &Path) -> Result<Found, SweepError> {
     let stem = dir.file_stem().filter(|_| dir.extension().is_some_and(|ending| ending == "unfinished"));
     let out = stem.map_or_else(|| dir.to_owned(), |stem| dir.with_file_name(stem));
+    // What a link leads to is what is replaced: an unfinished sweep stands beside that.
+    let out = if out.is_symlink() { fs::canonicalize(&out).unwrap_or(out) } else { out };
     let candidates = [unfinished(&out), out.clone()];
-    let Some(folder) = candidates.into_iter().find(|folder| folder.join(REQUEST).is_file()) else {
+    let holds = |folder: &PathBuf| fs::symlink_metadata(folder.join(REQUEST)).is_ok();
+    let Some(folder) = candidates.into_iter().find(holds) else {
         return Err(SweepError::Nothing { unfinished: unfinished(&out), out });
     };
-    let unreadable = |path: PathBuf| move |source: io::Error| SweepError::Unreadable { path, source };
-    let path = folder.join(REQUEST);
-    let text = fs::read_to_string(&path).map_err(unreadable(path.clone()))?;
-    let begun: Begun = serde_json::from_str(&text).map_err(|error| unreadable(path.clone())(error.into()))?;
-    let path = folder.join(RUNS);
-    let text = fs::read(&path).map_err(unreadable(path.clone()))?;
-    let (rows, whole) = whole_rows(&text);
+    let begun: Begun = parsed(&folder.join(REQUEST), |text| Ok(serde_json::from_slice(text)?))?;
+    let (rows, whole) = parsed(&folder.join(RUNS), whole_rows)?;
+    let design = begun.request.design().map_err(|error| SweepError::Unreadable {
+        path: folder.join(REQUEST),
+        source: io::Error::other(error),
+    })?;
     // A row of a run that the design does not have would be of another request.
-    let count =
-        begun.request.design().map_err(|error| unreadable(path.clone())(io::Error::other(error)))?.runs.len();
-    if rows.iter().any(|row| row.run >= count || row.outputs.len() != begun.request.outputs.len()) {
+    let (runs, outputs) = (design.runs.len(), begun.request.outputs.len());
+    if outputs == 0 || rows.iter().any(|row| row.run >= runs || row.outputs.len() != outputs) {
         return Err(SweepError::Foreign { folder, what: "not those of its sweep.json".to_owned() });
     }
     Ok(Found { folder, out, begun, rows, whole })
 }
 
-/// The rows up to the first that is not whole, and how many bytes they take.
-fn whole_rows(text: &[u8]) -> (Vec<Row>, u64) {
+/// What a file of a sweep says.
+fn parsed<T>(path: &Path, parse: impl FnOnce(&[u8]) -> io::Result<T>) -> Result<T, SweepError> {
+    let read = || parse(&require_regular(path).and_then(|()| fs::read(path))?);
+    read().map_err(|source| SweepError::Unreadable { path: path.to_owned(), source })
+}
+
+/// Refuses a link, which may lead to a file that is not flockform's, and a pipe, which may never end.
+fn require_regular(path: &Path) -> io::Result<()> {
+    match fs::symlink_metadata(path)?.is_file() {
+        true => Ok(()),
+        false => Err(io::Error::other("it is no regular file")),
+    }
+}
+
+/// The rows without the last line where a kill cut that, and how many bytes they take.
+///
+/// # Errors
+/// Names a damaged line before the last, which no kill leaves behind.
+fn whole_rows(text: &[u8]) -> io::Result<(Vec<Row>, u64)> {
     let (mut rows, mut whole) = (Vec::new(), 0);
-    for line in text.split_inclusive(|&byte| byte == b'\n') {
+    for (n, line) in text.split_inclusive(|&byte| byte == b'\n').enumerate() {
+        let next = whole + line.len();
         match serde_json::from_slice(line) {
             Ok(row) if line.ends_with(b"\n") => rows.push(row),
-            _ => break,
+            _ if next == text.len() => break,
+            _ => return Err(io::Error::other(format!("line {} is damaged", n + 1))),
         }
-        whole += line.len() as u64;
+        whole = next;
     }
-    (rows, whole)
+    Ok((rows, whole as u64))
 }
 
 /// The list of a sweep's runs, to which any thread adds.
@@ -250,6 +274,7 @@ impl Journal {
 
     fn open(folder: &OutputFolder) -> Result<Self, ExportError> {
         let path = folder.path(RUNS);
+        require_regular(&path).map_err(ExportError::io("write", &path))?;
         let file = OpenOptions::new().append(true).open(&path).map_err(ExportError::io("write", &path))?;
         Ok(Self { path, file: Mutex::new(file) })
     }
@@ -261,7 +286,14 @@ impl Journal {
     pub fn add(&self, row: &Row) -> Result<(), ExportError> {
         let line = line(row).map_err(ExportError::io("write", &self.path))?;
         let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
-        file.write_all(line.as_bytes()).map_err(ExportError::io("write", &self.path))
+        let add = |file: &mut File| {
+            let before = file.metadata()?.len();
+            // A part of a row would damage the journal for the rows that other threads still add.
+            file.write_all(line.as_bytes()).inspect_err(|_| {
+                let _ = file.set_len(before);
+            })
+        };
+        add(&mut file).map_err(ExportError::io("write", &self.path))
     }
 }
 
@@ -273,24 +305,28 @@ fn line(row: &Row) -> Result<String, serde_json::Error> {
 mod tests {
     use super::*;
 
+    fn row(run: usize) -> Row {
+        let outputs = vec!["0.1".into(), String::new()];
+        Row { run, stop_reason: "steps".into(), outputs, reason: "a\nline".into() }
+    }
+
     #[test]
     fn rows_are_read_up_to_the_one_that_a_kill_cut() {
-        let row = |run: usize| Row {
-            run,
-            stop_reason: "steps".into(),
-            outputs: vec!["0.1".into(), String::new()],
-            reason: "a\nline".into(),
-        };
         let lines: Vec<String> = (0..3).map(|run| line(&row(run)).unwrap()).collect();
         let all = lines.concat();
-        assert_eq!(whole_rows(all.as_bytes()), ((0..3).map(row).collect(), all.len() as u64));
+        let read = |text: &str| whole_rows(text.as_bytes()).unwrap();
+        assert_eq!(read(&all), ((0..3).map(row).collect(), all.len() as u64));
         let two = lines[..2].concat();
         for cut in two.len()..all.len() {
-            assert_eq!(
-                whole_rows(&all.as_bytes()[..cut]),
-                ((0..2).map(row).collect(), two.len() as u64),
-                "{cut}"
-            );
+            assert_eq!(read(&all[..cut]), ((0..2).map(row).collect(), two.len() as u64), "{cut}");
         }
+    }
+
+    #[test]
+    fn a_damaged_row_with_others_behind_it_is_named() {
+        let line = |run| line(&row(run)).unwrap();
+        let text = format!("{}{}\n{}", line(0), &line(1)[..9], line(2));
+        let error = whole_rows(text.as_bytes()).expect_err("damaged").to_string();
+        assert!(error.contains("line 2"), "{error}");
     }
 }

@@ -57,12 +57,8 @@ impl Table<'_> {
     /// The table as JSON: an object for each run, numbers as numbers.
     pub fn json(&self) -> serde_json::Value {
         let head = self.head();
-        let cell = |text: String| match text.parse::<f64>() {
-            Ok(number) if number.is_finite() => serde_json::json!(number),
-            _ => text.into(),
-        };
         let object = |cells: Vec<String>| -> serde_json::Value {
-            head.iter().map(|&name| name.to_owned()).zip(cells.into_iter().map(cell)).collect()
+            head.iter().map(|&name| name.to_owned()).zip(cells.iter().map(|text| cell(text))).collect()
         };
         self.cells().map(object).collect()
     }
@@ -94,6 +90,13 @@ impl Table<'_> {
     }
 }
 
+/// A cell as JSON: a number where it is one, an integer to its last digit.
+fn cell(text: &str) -> serde_json::Value {
+    let integer = || text.parse::<i64>().map(Into::into).or_else(|_| text.parse::<u64>().map(Into::into));
+    let number = || text.parse::<f64>().ok().filter(|number| number.is_finite()).map(Into::into);
+    integer().ok().or_else(number).unwrap_or_else(|| text.into())
+}
+
 /// Writes the table and the figure.
 ///
 /// # Errors
@@ -116,4 +119,20 @@ pub fn write_sweep(
         written.extend(figures::write_as(&figure, folder, "sweep", formats)?);
     }
     Ok(written)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cells_keep_their_numbers_in_json() {
+        let json = |text: &str| cell(text).to_string();
+        for number in ["40", "-3", "9007199254740993", "18446744073709551615", "0.1", "-1e-300"] {
+            assert_eq!(json(number), number);
+        }
+        for word in ["", "inf", "NaN", "lagged", "[0.1, 0]"] {
+            assert_eq!(json(word), format!("\"{word}\""));
+        }
+    }
 }

@@ -15,9 +15,9 @@ pub(super) struct Draws(u64);
 
 impl Draws {
     pub(super) fn new(seed: u64, stream: u64) -> Self {
-        let mut draws = Self(seed);
-        let offset = draws.next();
-        Self(offset ^ Self(stream).next())
+        // Mixed one after the other: by a symmetric mixture, stream 1 of seed 0 would be stream 0 of seed 1.
+        let of_seed = Self(seed).next();
+        Self(Self(of_seed ^ stream).next())
     }
 
     fn next(&mut self) -> u64 {
@@ -36,5 +36,19 @@ impl Draws {
     /// From 0 up to, and without, `count`.
     fn below(&mut self, count: usize) -> usize {
         ((u128::from(self.next()) * count as u128) >> 64) as usize
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn seeds_and_streams_are_not_interchangeable() {
+        let pairs = (0..4).flat_map(|seed| (0..4).map(move |stream| (seed, stream)));
+        let mut first: Vec<u64> = pairs.map(|(seed, stream)| Draws::new(seed, stream).next()).collect();
+        first.sort_unstable();
+        first.dedup();
+        assert_eq!(first.len(), 16);
     }
 }

@@ -136,14 +136,22 @@ impl Factor {
         }
     }
 
-    /// All values of a grid.
-    pub(super) fn levels(&self) -> Result<Vec<Level>, DesignError> {
+    /// All values of a grid, of which there are as many as [`Factor::count`] says.
+    pub(super) fn levels(&self, count: usize) -> Vec<Level> {
         match &self.values {
-            Values::List(levels) => Ok(levels.clone()),
-            Values::Range { ends, count: Some(count) } => {
-                let last = (count - 1).max(1) as f64;
-                Ok((0..*count).map(|n| Level::of(grid_point(*ends, n as f64, last, self.is_log))).collect())
+            Values::List(levels) => levels.clone(),
+            Values::Range { ends, .. } => {
+                let last = count.saturating_sub(1).max(1) as f64;
+                (0..count).map(|n| Level::of(grid_point(*ends, n as f64, last, self.is_log))).collect()
             }
+        }
+    }
+
+    /// Number of values in a grid.
+    pub(super) fn count(&self) -> Result<usize, DesignError> {
+        match &self.values {
+            Values::List(levels) => Ok(levels.len()),
+            Values::Range { count: Some(count), .. } => Ok(*count),
             Values::Range { .. } => {
                 let reason = "the number of values is missing, or --samples".to_owned();
                 Err(DesignError::Vary { text: self.to_string(), reason })

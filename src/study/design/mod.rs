@@ -16,6 +16,9 @@ pub use factor::{Factor, Level};
 /// Most runs of a design: their tables are kept in memory.
 const MOST_RUNS: usize = 1_000_000;
 
+/// Most values of a design, of all its runs together.
+const MOST_VALUES: usize = 8 * MOST_RUNS;
+
 /// Error in the description of a design.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum DesignError {
@@ -34,7 +37,7 @@ pub enum DesignError {
     Twice(String),
     /// More runs than are kept.
     #[error(
-        "the sweep has more than {MOST_RUNS} runs\n  help: vary fewer keys, take fewer values, or draw --samples"
+        "the sweep has more than {MOST_RUNS} runs, or {MOST_VALUES} values in all of them\n  help: vary fewer keys, take fewer values, or draw --samples"
     )]
     TooMany,
     /// A text that is no shard.
@@ -69,9 +72,12 @@ impl Design {
     /// A key that is given twice, a range without a number of values, or too many runs.
     pub fn grid(factors: Vec<Factor>) -> Result<Self, DesignError> {
         require_distinct(&factors)?;
-        let levels: Vec<Vec<Level>> = factors.iter().map(Factor::levels).collect::<Result<_, _>>()?;
-        let product = levels.iter().try_fold(1_usize, |count, levels| count.checked_mul(levels.len()));
-        let count = product.filter(|&count| count <= MOST_RUNS).ok_or(DesignError::TooMany)?;
+        // Counted before anything is laid out: what is too much for the memory is refused, not tried.
+        let counts: Vec<usize> = factors.iter().map(Factor::count).collect::<Result<_, _>>()?;
+        let product = counts.iter().try_fold(1_usize, |product, &count| product.checked_mul(count));
+        let count = product.filter(|&runs| fits(runs, factors.len())).ok_or(DesignError::TooMany)?;
+        let levels: Vec<Vec<Level>> =
+            factors.iter().zip(counts).map(|(one, count)| one.levels(count)).collect();
         let run = |number: usize| {
             let mut rest = number;
             let mut values: Vec<Level> = levels
@@ -90,7 +96,7 @@ impl Design {
     }
 
     /// So many runs with values drawn from the keys' ranges and lists; the same seed gives the same runs, and a
-    /// key's draws do not depend on the other keys.
+    /// key's draws depend on its position among the keys and not on what the others are.
     ///
     /// # Errors
     /// A key that is given twice, a range with a number of values of its own, or too many runs.
@@ -102,7 +108,7 @@ impl Design {
     ) -> Result<Self, DesignError> {
         require_distinct(&factors)?;
         factors.iter().try_for_each(Factor::require_open)?;
-        if samples > MOST_RUNS {
+        if !fits(samples, factors.len()) {
             return Err(DesignError::TooMany);
         }
         let columns = factors.iter().enumerate().map(|(k, factor)| {
@@ -125,6 +131,11 @@ impl Design {
     }
 }
 
+/// Whether so many runs of so many keys can be kept.
+fn fits(runs: usize, keys: usize) -> bool {
+    runs <= MOST_RUNS && runs.saturating_mul(keys) <= MOST_VALUES
+}
+
 fn require_distinct(factors: &[Factor]) -> Result<(), DesignError> {
     let twice =
         factors.iter().enumerate().find(|(k, one)| factors[..*k].iter().any(|two| two.key == one.key));
@@ -133,6 +144,7 @@ fn require_distinct(factors: &[Factor]) -> Result<(), DesignError> {
 
 /// A part of a sweep's runs: every `of`th one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "WrittenShard")]
 pub struct Shard {
     /// From 1.
     pub number: usize,
@@ -143,6 +155,10 @@ pub struct Shard {
 impl Shard {
     /// All runs.
     pub const WHOLE: Self = Self { number: 1, of: 1 };
+
+    fn new(number: usize, of: usize) -> Option<Self> {
+        (1..=of).contains(&number).then_some(Self { number, of })
+    }
 
     /// Whether the shard has this run.
     pub fn has(self, run: usize) -> bool {
@@ -157,8 +173,22 @@ impl FromStr for Shard {
         let refuse = || DesignError::Shard(text.to_owned());
         let (number, of) = text.split_once('/').ok_or_else(refuse)?;
         let read = |part: &str| part.trim().parse::<usize>().map_err(|_| refuse());
-        let shard = Self { number: read(number)?, of: read(of)? };
-        if (1..=shard.of).contains(&shard.number) { Ok(shard) } else { Err(refuse()) }
+        Self::new(read(number)?, read(of)?).ok_or_else(refuse)
+    }
+}
+
+/// A shard as a file has it.
+#[derive(Deserialize)]
+struct WrittenShard {
+    number: usize,
+    of: usize,
+}
+
+impl TryFrom<WrittenShard> for Shard {
+    type Error = DesignError;
+
+    fn try_from(WrittenShard { number, of }: WrittenShard) -> Result<Self, DesignError> {
+        Self::new(number, of).ok_or_else(|| DesignError::Shard(format!("{number}/{of}")))
     }
 }
 
@@ -247,6 +277,9 @@ mod tests {
         for wrong in ["0/3", "4/3", "1", "1/0", "a/b", "-1/2"] {
             assert!(wrong.parse::<Shard>().is_err(), "{wrong}");
         }
+        let read = |text: &str| serde_json::from_str::<Shard>(text);
+        assert_eq!(read("{\"number\":2,\"of\":3}").expect("a part"), shards[1]);
+        assert!(read("{\"number\":1,\"of\":0}").is_err() && read("{\"number\":0,\"of\":2}").is_err());
     }
 
     #[test]
@@ -273,6 +306,12 @@ mod tests {
         assert!(refused(Design::grid(factors(&["a=1:2"]))).contains("number of values is missing"));
         assert!(refused(Design::grid(factors(&["a=1:2:3", "a=[1]"]))).contains("twice"));
         assert!(refused(Design::grid(factors(&["a=0:1:2000", "b=0:1:2000"]))).contains("more than"));
+        // A thousand values of each of nine keys would not fit into memory before they are counted.
+        let many = |count: &str| -> Vec<Factor> {
+            (0..9).map(|k| format!("k{k}=0:1{count}").parse().expect("a factor")).collect()
+        };
+        assert!(refused(Design::grid(many(":1000"))).contains("more than"));
+        assert!(refused(Design::sampled(many(""), MOST_RUNS, Sampling::Random, 0)).contains("more than"));
         let counted = Design::sampled(factors(&["a=0:1:5"]), 3, Sampling::Random, 0);
         assert!(refused(counted).contains("--samples"));
     }

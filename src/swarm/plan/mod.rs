@@ -6,9 +6,14 @@
 //! * the formation forgets a disturbance by the spectral radius of `A` in a period; a delay of `d` periods makes that
 //!   its `d + 1`st root, which is below 1 as well: delay slows the formation and never makes it grow;
 //! * noise of the poses moves a follower by the root of the diagonal of `C = A C A' + A A' + B B'` times that noise;
-//! * behind leaders that move steadily a follower lags by the row of `(1 - A)^-1 (A + B) 1` times their way in a period.
+//! * behind leaders that move steadily a follower lags by the row of `(1 - A)^-1 (A + B) 1` times their way in a period,
+//!   `d + 1` times that under a delay of `d` periods.
+//!
+//! A loop that is not linear has no such map, and nothing of this is stated of it.
 
 mod period_map;
+#[cfg(test)]
+mod tests;
 mod words;
 
 use serde::Serialize;
@@ -53,8 +58,10 @@ pub struct SwarmPlan {
     pub sweeps: usize,
     /// The simulated flight's duration \[s\].
     pub flight_s: f64,
-    /// How fast a disturbance dies out; absent where the rule is not linear or a scene leads.
+    /// How fast a disturbance dies out.
     pub convergence: Option<Convergence>,
+    /// The reason for which that is not predicted.
+    pub not_predicted: Option<&'static str>,
     /// Effects of noise.
     pub noise: NoiseMargin,
     /// Effects of delay.
@@ -103,7 +110,8 @@ pub struct DelayMargin {
 pub struct SpeedMargin {
     /// The speed limit \[m/s\].
     pub limit: Option<f64>,
-    /// The time by which the last follower is behind steadily moving leaders, in the formation \[s\].
+    /// The time by which the last follower is behind steadily moving leaders under the simulated delay, in the
+    /// formation \[s\].
     pub lag_s: Option<f64>,
     /// Speed of the leaders up to which followers keep within `flight.bounds.affine_error` of their places, the speed
     /// limit at most \[m/s\]; absent without such a bound or a limit.
@@ -130,9 +138,10 @@ impl SwarmPlan {
         let raw = &swarm.raw;
         let period = raw.control.period;
         let leaders = (0..formation.count()).filter(|&m| formation.leads(m)).count();
-        let convergence = convergence(formation, swarm);
-        let map = PeriodMap::of(formation, raw.control.sweeps);
-        let delay = f64::from(raw.flight.delay + raw.flight.jitter);
+        let not_linear = not_linear(formation, swarm);
+        let convergence = convergence(formation, swarm).filter(|_| not_linear.is_none());
+        let map = PeriodMap::of(formation, raw.control.sweeps).filter(|_| not_linear.is_none());
+        let delay = f64::from(raw.flight.delay) + f64::from(raw.flight.jitter);
         let mut plan = Self {
             name: swarm.name.clone(),
             title: raw.title.clone(),
@@ -157,11 +166,12 @@ impl SwarmPlan {
                 largest_periods: (raw.poses.age_limit / period * (1.0 + 1e-12)) as usize,
                 half_life_s: convergence.and_then(|one| Some(one.half_life_s? * (delay + 1.0))),
             },
-            speed: speed(swarm, formation, map.as_ref()),
+            speed: speed(swarm, formation, map.as_ref(), delay),
+            not_predicted: convergence.is_none().then(|| not_linear.unwrap_or("the rule is not linear")),
             convergence,
             cautions: Vec::new(),
         };
-        plan.cautions = cautions(&plan);
+        plan.cautions = cautions(&plan, f64::from(raw.flight.delay) * period);
         Ok(plan)
     }
 }
@@ -194,10 +204,24 @@ fn largest_noise(formation: &Formation, clearance: Option<f64>) -> Option<f64> {
     Some((free / (2.0 * DEVIATIONS_KEPT)).max(0.0))
 }
 
-fn convergence(formation: &Formation, swarm: &Swarm) -> Option<Convergence> {
+/// The reason for which a period is no linear map, as far as the file shows it.
+fn not_linear(formation: &Formation, swarm: &Swarm) -> Option<&'static str> {
     // A scene changes the roles on its way; a body that carries robots along is not moved by them.
     let is_rule = matches!(swarm.shape, Shape::Places(_) | Shape::Body(_));
-    let engine = formation.engine().filter(|_| is_rule)?;
+    match formation.engine().filter(|_| is_rule) {
+        None => Some("a scene leads"),
+        Some(engine) if engine.lasting_neighbours().is_none() => {
+            Some("neighbours are found anew in every period")
+        }
+        Some(_) => {
+            let resilience = swarm.raw.resilience.as_ref().filter(|one| one.max_faulty_neighbours > 0);
+            resilience.map(|_| "robots leave straying neighbours out")
+        }
+    }
+}
+
+fn convergence(formation: &Formation, swarm: &Swarm) -> Option<Convergence> {
+    let engine = formation.engine()?;
     let frame = engine.body().frame.as_ref();
     let found = spectral_radius(engine.flock(), frame, engine.roles(), engine.update(), MOST_SWEEPS)?;
     let factor = found.radius.powf(swarm.raw.control.sweeps as f64);
@@ -211,9 +235,10 @@ fn half_life(factor: f64) -> f64 {
     (0.5_f64.ln() / factor.max(f64::MIN_POSITIVE).ln()).max(1.0)
 }
 
-fn speed(swarm: &Swarm, formation: &Formation, map: Option<&PeriodMap>) -> SpeedMargin {
+fn speed(swarm: &Swarm, formation: &Formation, map: Option<&PeriodMap>, delay: f64) -> SpeedMargin {
     let limit = swarm.raw.limits.speed;
-    let lag_s = map.and_then(PeriodMap::lag).map(|periods| periods * swarm.raw.control.period);
+    let lag_s =
+        map.and_then(PeriodMap::lag).map(|periods| periods * (delay + 1.0) * swarm.raw.control.period);
     let by_lag = swarm.raw.flight.bounds.affine_error.zip(lag_s).map(|(error, lag)| error / lag);
     let reachable = [limit, by_lag].into_iter().flatten().reduce(f64::min).filter(|speed| speed.is_finite());
     let manoeuvres = swarm.manoeuvres.iter().filter_map(|one| needed(formation, &one.name)).collect();
@@ -242,7 +267,8 @@ fn needed(formation: &Formation, name: &str) -> Option<ManoeuvreSpeed> {
     Some(ManoeuvreSpeed { name: name.to_owned(), needed })
 }
 
-fn cautions(plan: &SwarmPlan) -> Vec<String> {
+/// `delay_s` is the simulated delay without its jitter.
+fn cautions(plan: &SwarmPlan, delay_s: f64) -> Vec<String> {
     let mut cautions = Vec::new();
     if let Some(Convergence { factor, half_life_s: None }) = plan.convergence {
         cautions
@@ -255,10 +281,16 @@ fn cautions(plan: &SwarmPlan) -> Vec<String> {
                 .into(),
         );
     }
-    if plan.delay.simulated_s > plan.delay.largest_s {
+    if delay_s > plan.delay.largest_s {
         cautions.push(
             "poses are older than poses.age_limit when they arrive: no robot will get a target; lower flight.delay or \
              raise the limit"
+                .into(),
+        );
+    } else if plan.delay.simulated_s > plan.delay.largest_s {
+        cautions.push(
+            "jitter makes some poses older than poses.age_limit: robots will be lost for periods at a time; lower \
+             flight.jitter or raise the limit"
                 .into(),
         );
     }
@@ -270,61 +302,4 @@ fn cautions(plan: &SwarmPlan) -> Vec<String> {
         ));
     }
     cautions
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::scene::bundled::bundled_swarm;
-
-    fn plan(name: &str, set: &[&str]) -> SwarmPlan {
-        let set: Vec<String> = set.iter().map(|&one| one.to_owned()).collect();
-        let swarm = bundled_swarm(name).expect("bundled").load_swarm(&set).expect("loads");
-        SwarmPlan::new(&swarm).expect("laid out")
-    }
-
-    #[test]
-    fn a_row_between_two_leaders_has_the_gain_and_the_lag_that_are_computed_by_hand() {
-        // One follower in the middle of two leaders, whose place is theirs in the mean: A = 0, B = (1/2, 1/2).
-        let text = "title = \"three\"\nlinks = { kind = \"nearest\", count = 2 }\nleaders = [\
-                    { robots = [\"a\", \"c\"], program = { kind = \"external\" } }]\n\
-                    robots = [{ name = \"a\", place = [0.0, 0.0] }, { name = \"b\", place = [1.0, 0.0] }, \
-                    { name = \"c\", place = [2.0, 0.0] }]\nlimits = { clearance = 0.1 }\n";
-        let swarm = Swarm::parse("three", "three.toml", text, &[], None).unwrap_or_else(|e| panic!("{e}"));
-        let plan = SwarmPlan::new(&swarm).expect("laid out");
-        assert!((plan.noise.gain.expect("linear") - 0.5_f64.sqrt()).abs() < 1e-9, "{plan}");
-        // Places as they were seen a period ago.
-        assert!((plan.speed.lag_s.expect("linear") - plan.period_s).abs() < 1e-9, "{plan}");
-        // 1 m between places, two radii of 0.15 m and the clearance leave 0.6 m for twice three deviations.
-        assert!((plan.noise.largest.expect("kept apart") - 0.1).abs() < 1e-9, "{plan}");
-        assert_eq!((plan.robots, plan.leaders, plan.delay.largest_periods), (3, 2, 10));
-    }
-
-    #[test]
-    fn more_sweeps_shorten_the_lag_and_delay_lengthens_the_half_life() {
-        let (one, many) = (plan("square", &["control.sweeps=1"]), plan("square", &[]));
-        let lag = |plan: &SwarmPlan| plan.speed.lag_s.expect("linear");
-        assert!(lag(&many) < 0.1 * lag(&one), "{many}\n{one}");
-        let delayed = plan("square", &["control.sweeps=1", "flight.delay=3"]);
-        let half = |plan: &SwarmPlan| plan.delay.half_life_s.expect("comes to rest");
-        assert!((half(&delayed) / half(&one) - 4.0).abs() < 1e-9);
-    }
-
-    #[test]
-    fn what_the_file_cannot_hold_is_warned_of() {
-        let hurried = plan("square", &["limits.speed=0.1"]);
-        assert!(hurried.cautions.iter().any(|caution| caution.contains("`turn`")), "{hurried}");
-        let noisy = plan("square", &["flight.noise=0.5"]);
-        assert!(noisy.cautions.iter().any(|caution| caution.contains("flight.noise")), "{noisy}");
-        let late = plan("square", &["flight.delay=100"]);
-        assert!(late.cautions.iter().any(|caution| caution.contains("poses.age_limit")), "{late}");
-    }
-
-    #[test]
-    fn a_manoeuvre_needs_half_again_the_mean_speed_of_its_fastest_leg() {
-        // The legs go by 3s^2 - 2s^3, whose steepest slope is 1.5.
-        let straight = "manoeuvres=[{ name = \"turn\", legs = [{ seconds = 4.0, translate = [8.0, 0.0] }] }]";
-        let plan = plan("square", &[straight]);
-        assert!((plan.speed.manoeuvres[0].needed - 3.0).abs() < 1e-3, "{plan}");
-    }
 }

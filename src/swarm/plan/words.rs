@@ -4,6 +4,17 @@ use std::fmt;
 
 use super::{Convergence, DelayMargin, ManoeuvreSpeed, SpeedMargin, SwarmPlan};
 
+/// What is less reads as nothing to three places.
+const NOTHING: f64 = 0.001;
+
+fn half_life(half: Option<f64>) -> String {
+    match half {
+        None => "never".to_owned(),
+        Some(half) if half < NOTHING => "at once".to_owned(),
+        Some(half) => format!("in {half:.3} s"),
+    }
+}
+
 impl fmt::Display for SwarmPlan {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "{}: {}", self.name, self.title)?;
@@ -17,27 +28,35 @@ impl fmt::Display for SwarmPlan {
             self.free_space.map_or(String::new(), |free| format!(", {free:.4} m between the nearest rims"));
         line("formation", format!("places {spacing:.4} m apart{free}, {:.2} neighbours", self.neighbours))?;
         line("loop", format!("a target every {period_s} s, at most {sweeps} sweeps of the rule in each"))?;
-        let half_life = |half: Option<f64>| half.map_or("never".to_owned(), |half| format!("in {half:.3} s"));
         match self.convergence {
             Some(Convergence { factor, half_life_s }) => {
                 let halves = half_life(half_life_s);
+                let left =
+                    if factor < NOTHING { format!("less than {NOTHING}") } else { format!("{factor:.3}") };
                 line(
                     "comes to rest",
-                    format!("a disturbance halves {halves}; {factor:.3e} is left a period"),
+                    format!("a disturbance halves {halves}; {left} is left after a period"),
                 )?;
                 let delayed = half_life(self.delay.half_life_s);
                 let simulated = self.delay.simulated_s;
                 line("delay", format!("slows, never makes grow: with {simulated:.3} s it halves {delayed}"))?;
             }
-            None => line("comes to rest", "not predicted: the rule is not linear, or a scene leads".into())?,
+            None => {
+                line("comes to rest", format!("not predicted: {}", self.not_predicted.unwrap_or_default()))?
+            }
         }
         let DelayMargin { largest_s, largest_periods, .. } = self.delay;
         line(
             "delay margin",
             format!("poses are used up to an age of {largest_s} s, {largest_periods} periods"),
         )?;
-        if let Some(gain) = self.noise.gain {
-            line("noise", format!("a follower moves by up to {gain:.3} of the poses' standard deviation"))?;
+        match self.noise.gain {
+            None => {}
+            Some(gain) if gain < NOTHING => line("noise", "followers do not hear that of the poses".into())?,
+            Some(gain) => line(
+                "noise",
+                format!("a follower moves by up to {gain:.3} of the poses' standard deviation"),
+            )?,
         }
         let simulated = self.noise.simulated;
         match self.noise.largest {

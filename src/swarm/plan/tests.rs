@@ -1,0 +1,114 @@
+//! Plans against what is computed by hand, and against flights.
+
+use super::*;
+use crate::scene::bundled::bundled_swarm;
+
+fn plan(name: &str, set: &[&str]) -> SwarmPlan {
+    let set: Vec<String> = set.iter().map(|&one| one.to_owned()).collect();
+    let swarm = bundled_swarm(name).expect("bundled").load_swarm(&set).expect("loads");
+    SwarmPlan::new(&swarm).expect("laid out")
+}
+
+#[test]
+fn a_row_between_two_leaders_has_the_gain_and_the_lag_that_are_computed_by_hand() {
+    // One follower in the middle of two leaders, whose place is theirs in the mean: A = 0, B = (1/2, 1/2).
+    let text = "title = \"three\"\nlinks = { kind = \"nearest\", count = 2 }\nleaders = [\
+                { robots = [\"a\", \"c\"], program = { kind = \"external\" } }]\n\
+                robots = [{ name = \"a\", place = [0.0, 0.0] }, { name = \"b\", place = [1.0, 0.0] }, \
+                { name = \"c\", place = [2.0, 0.0] }]\nlimits = { clearance = 0.1 }\n";
+    let swarm = Swarm::parse("three", "three.toml", text, &[], None).unwrap_or_else(|e| panic!("{e}"));
+    let plan = SwarmPlan::new(&swarm).expect("laid out");
+    assert!((plan.noise.gain.expect("linear") - 0.5_f64.sqrt()).abs() < 1e-9, "{plan}");
+    // Places as they were seen a period ago.
+    assert!((plan.speed.lag_s.expect("linear") - plan.period_s).abs() < 1e-9, "{plan}");
+    // 1 m between places, two radii of 0.15 m and the clearance leave 0.6 m for twice three deviations.
+    assert!((plan.noise.largest.expect("kept apart") - 0.1).abs() < 1e-9, "{plan}");
+    assert_eq!((plan.robots, plan.leaders, plan.delay.largest_periods), (3, 2, 10));
+}
+
+#[test]
+fn more_sweeps_shorten_the_lag_and_delay_lengthens_the_half_life() {
+    let (one, many) = (plan("square", &["control.sweeps=1"]), plan("square", &[]));
+    let lag = |plan: &SwarmPlan| plan.speed.lag_s.expect("linear");
+    assert!(lag(&many) < 0.1 * lag(&one), "{many}\n{one}");
+    let delayed = plan("square", &["control.sweeps=1", "flight.delay=3"]);
+    let half = |plan: &SwarmPlan| plan.delay.half_life_s.expect("comes to rest");
+    assert!((half(&delayed) / half(&one) - 4.0).abs() < 1e-9);
+}
+
+#[test]
+fn what_the_file_cannot_hold_is_warned_of() {
+    let hurried = plan("square", &["limits.speed=0.1"]);
+    assert!(hurried.cautions.iter().any(|caution| caution.contains("`turn`")), "{hurried}");
+    let noisy = plan("square", &["flight.noise=0.5"]);
+    assert!(noisy.cautions.iter().any(|caution| caution.contains("flight.noise")), "{noisy}");
+    let late = plan("square", &["flight.delay=100"]);
+    assert!(late.cautions.iter().any(|caution| caution.contains("no robot will get a target")), "{late}");
+    let jittery = plan("square", &["flight.jitter=100"]);
+    assert!(jittery.cautions.iter().any(|caution| caution.contains("lost for periods")), "{jittery}");
+    assert!(!jittery.to_string().contains("no robot will get a target"), "{jittery}");
+}
+
+/// The formation of `liar` in which everyone believes everyone and nobody lies, led at 1 m/s.
+fn steadily_led(delay: u32) -> Swarm {
+    let text = bundled_swarm("liar").expect("bundled").text;
+    let text = text.replace("[resilience]\nmax_faulty_neighbours = 1\n", "");
+    let path = "leaders[0].program={ kind = \"path\", points = [{ at = 40.0, displacement = [40.0, 0.0] }] }";
+    let delay = format!("flight.delay={delay}");
+    let set = [path, "flight.faults=[]", &delay].map(str::to_owned);
+    Swarm::parse("led", "led.toml", &text, &set, None).unwrap_or_else(|error| panic!("{error}"))
+}
+
+#[test]
+fn a_steadily_led_formation_lags_as_its_plan_says_under_delay_too() {
+    for delay in [0, 3] {
+        let swarm = steadily_led(delay);
+        let lag = SwarmPlan::new(&swarm).expect("laid out").speed.lag_s.expect("linear");
+        let mut flight = Flight::new(&swarm).expect("flies");
+        let periods = (30.0 / swarm.raw.control.period) as usize;
+        (0..periods).for_each(|_| flight.step());
+        let (formation, places) = (flight.control().formation(), flight.fleet().places());
+        let ways = (0..formation.count()).map(|m| places.get(m)[0] - formation.places.get(m)[0]);
+        let (least, most) =
+            ways.fold((f64::INFINITY, 0.0_f64), |(least, most), way| (least.min(way), most.max(way)));
+        // At 1 m/s the way by which the last is behind, in metres, is the time in seconds.
+        assert!(((most - least) / lag - 1.0).abs() < 1e-3, "delay {delay}: {} {lag}", most - least);
+    }
+}
+
+#[test]
+fn nothing_is_predicted_of_a_loop_that_is_not_linear_and_the_plan_says_why() {
+    let reason = |plan: &SwarmPlan| {
+        let numbers = (plan.convergence, plan.noise.gain, plan.speed.lag_s, plan.delay.half_life_s);
+        assert_eq!(numbers, (None, None, None, None), "{plan}");
+        plan.not_predicted.expect("a reason")
+    };
+    let liar = plan("liar", &[]);
+    assert!(reason(&liar).contains("straying"), "{liar}");
+    assert!(liar.to_string().contains("straying"), "{liar}");
+    let present = "title = \"two\"\nlinks = { kind = \"present\", radius = 3.0 }\nleaders = [\
+                   { robots = [\"a\"], program = { kind = \"external\" } }]\n\
+                   robots = [{ name = \"a\", place = [0.0, 0.0] }, { name = \"b\", place = [1.0, 0.0] }]\n";
+    let swarm = Swarm::parse("two", "two.toml", present, &[], None).unwrap_or_else(|e| panic!("{e}"));
+    assert!(reason(&SwarmPlan::new(&swarm).expect("laid out")).contains("anew"));
+    let led = SwarmPlan::new(&steadily_led(0)).expect("laid out");
+    assert_eq!((led.convergence.is_some(), led.not_predicted), (true, None));
+}
+
+#[test]
+fn numbers_that_are_next_to_nothing_are_said_in_words() {
+    let mut plan = plan("square", &[]);
+    plan.convergence = Some(Convergence { factor: 7.9e-31, half_life_s: Some(0.1) });
+    plan.noise.gain = Some(1e-9);
+    let words = plan.to_string();
+    assert!(words.contains("less than 0.001 is left") && words.contains("do not hear"), "{words}");
+    assert!(!words.contains("e-31") && !words.contains("0.000 of"), "{words}");
+}
+
+#[test]
+fn a_manoeuvre_needs_half_again_the_mean_speed_of_its_fastest_leg() {
+    // The legs go by 3s^2 - 2s^3, whose steepest slope is 1.5.
+    let straight = "manoeuvres=[{ name = \"turn\", legs = [{ seconds = 4.0, translate = [8.0, 0.0] }] }]";
+    let plan = plan("square", &[straight]);
+    assert!((plan.speed.manoeuvres[0].needed - 3.0).abs() < 1e-3, "{plan}");
+}
