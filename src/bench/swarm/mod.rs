@@ -187,10 +187,4 @@ mod tests {
         assert!(report.ticks.iter().all(|case| case.seconds_per_tick > 0.0));
         assert!(report.to_string().contains("100"));
     }
-
-    #[test]
-    #[ignore = "prints the full measurement: cargo test --release --lib bench::swarm -- --ignored --nocapture"]
-    fn the_full_measurement() {
-        println!("{}", run(&Options { quick: false }));
-    }
 }
