@@ -144,7 +144,7 @@ fn a_topic_with_two_uses_is_refused() {
     );
     assert!(shared.contains("{name}"), "{shared}");
     let external = "leaders[0].program={ kind = \"external\" }";
-    let fed_back = refusal(&[external], &["-p", "leader_topic:={name}/target_pose"]);
+    let fed_back = refusal(&[external], &["-p", "leader_topic:='{name}/target_pose'"]);
     assert!(fed_back.contains("targets of") && fed_back.contains("places of"), "{fed_back}");
     let velocities = refusal(&["node.velocity=\"twist\"", "node.velocity_topic=\"/cmd_vel\""], &[]);
     assert!(velocities.contains("velocities of"), "{velocities}");
@@ -190,7 +190,7 @@ fn a_recording_s_overrides_name_the_topics_that_the_parameters_gave() {
     let recording = Shared::new(Recording::create(&path, &about, false).expect("writable"));
     let (file, given) = (square(&PATIENT), "node.pose_topic=\"{name}/mocap\"");
     let renamed = square(&[&PATIENT[..], &[given]].concat());
-    let more = ["-p", "pose_topic:={name}/mocap"];
+    let more = ["-p", "pose_topic:='{name}/mocap'"];
     let mut swarm = Swarming {
         robots: RobotNodes::open(&renamed, &arguments(&[]), Layout::OneNode).expect("robots"),
         node: FormationNode::open(&file, &arguments(&more), None).expect("a node"),
