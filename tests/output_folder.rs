@@ -196,7 +196,7 @@ fn of_many_that_want_one_name_each_gets_a_place_of_its_own() {
             });
             let folder = made.expect("endless");
             fill(&folder, "summary.json");
-            folder.commit().expect("nobody else took the place");
+            folder.commit().expect("no other took the place");
         }
     };
     std::thread::scope(|scope| (0..4).for_each(|_| drop(scope.spawn(work))));

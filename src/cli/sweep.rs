@@ -263,7 +263,7 @@ fn open(
         _ => {
             let mut folder = match found {
                 Some(found) => {
-                    // Nobody has asked for what else was begun in this place to be discarded.
+                    // What else was begun in this place is not discarded unasked.
                     let begun = unfinished(&found.out);
                     if begun.exists() {
                         return Err(ExportError::Unfinished(begun));

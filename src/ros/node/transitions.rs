@@ -1,8 +1,8 @@
 //! The node's part in the transitions of its lifecycle.
 //!
 //! `configure` opens the formation: it takes the topics and the frame from the parameters, begins the loop anew and opens
-//! the topics of the robots. `cleanup` closes them; the loop keeps its state until the next `configure`. What stays throughout are the services, the
-//! parameters, `/diagnostics`, and the emergency stop, which outlasts every transition.
+//! the topics of the robots. `cleanup` closes them; the loop keeps its state until the next `configure`. What stays
+//! throughout are the services, the parameters, `/diagnostics`, and the emergency stop, which outlasts every transition.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};

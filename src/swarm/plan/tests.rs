@@ -49,7 +49,7 @@ fn what_the_file_cannot_hold_is_warned_of() {
     assert!(!jittery.to_string().contains("no robot will get a target"), "{jittery}");
 }
 
-/// The formation of `liar` in which everyone believes everyone and nobody lies, led at 1 m/s.
+/// The formation of `liar` in which every robot believes every other and none lies, led at 1 m/s.
 fn steadily_led(delay: u32) -> Swarm {
     let text = bundled_swarm("liar").expect("bundled").text;
     let text = text.replace("[resilience]\nmax_faulty_neighbours = 1\n", "");
