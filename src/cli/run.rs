@@ -6,6 +6,7 @@ mod words;
 
 use std::ops::ControlFlow;
 use std::process::ExitCode;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use clap::Args;
@@ -150,9 +151,14 @@ fn run_here(arguments: &RunArguments) -> Result<ExitCode, Refusal> {
     let (snapshots, probes, load_steps) = (&snapshots[..], &probes[..], &load_steps[..]);
     let results = Results { scene: &scene, outcome: &outcome, snapshots, probes, load_steps, timings };
     let drawn = Drawn::new(arguments.output.quiet);
+    let is_cut_short = AtomicBool::new(false);
     let show = |done: usize, of: usize| {
         drawn.show(done, of);
-        if interrupt::is_raised() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        if interrupt::is_raised() {
+            is_cut_short.store(done < of, Ordering::Relaxed);
+            return ControlFlow::Break(());
+        }
+        ControlFlow::Continue(())
     };
     let drawing = Drawing { formats: arguments.figures.formats(), progress: &show };
     let (_, summary) = write_all(&folder, &results, drawing)?;
@@ -172,7 +178,7 @@ fn run_here(arguments: &RunArguments) -> Result<ExitCode, Refusal> {
         say(&words);
         say(&(closing_words(&scene, &outcome, &summary, elapsed) + &where_to_look(&kept) + &recorded));
     }
-    if interrupt::is_raised() && !is_interrupted {
+    if is_cut_short.into_inner() && !is_interrupted {
         eprintln!("interrupted: figures are missing, the rest is written");
         return Ok(ExitCode::from(FAILED));
     }
