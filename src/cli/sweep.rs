@@ -237,8 +237,7 @@ fn sweep_here(arguments: &SweepArguments) -> Result<ExitCode, Refusal> {
         pending.retain(|&run| run != row.run);
         sweep.rows.insert(row.run, row);
     }
-    let threads = usize::from(arguments.threads.unwrap_or(0));
-    let made = runs.make(&pending, &journal, threads, arguments.output.quiet)?;
+    let made = runs.make(&pending, &journal, arguments.output.quiet)?;
     drop(journal);
     if interrupted.load(std::sync::atomic::Ordering::Relaxed) {
         eprintln!("{words}");

@@ -28,6 +28,7 @@ pub mod real;
 pub mod region;
 pub mod role;
 pub mod rules;
+pub(crate) mod splitmix;
 pub mod strain;
 pub mod vectors;
 pub mod window;

@@ -13,7 +13,7 @@ use std::sync::Arc;
 use super::document::Document;
 use super::document::problem::{Place, Problem, SceneError};
 use super::raw::*;
-use super::{BodySource, Fracture, PoissonTerm, Record, Scene, Stop, Weights};
+use super::{BodySource, Fracture, PoissonTerm, Record, Scene, Stop, Weights, text};
 use crate::flock::body::Cut;
 use crate::flock::fracture::{Ghosts, Threshold};
 use crate::flock::frame::FrameRule;
@@ -68,7 +68,7 @@ impl File {
     pub(super) fn read(path: &Path, help: &str) -> Result<Self, SceneError> {
         let file = path.display().to_string();
         let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        match std::fs::read_to_string(path) {
+        match text::read(path) {
             Ok(text) => Ok(Self { name, file, text }),
             Err(error) => Err(SceneError::from(Problem {
                 place: Place::File { file },
