@@ -11,7 +11,7 @@ const KEY: &str = "scene.recording";
 
 pub fn read(file: &str, folder: Option<&Path>, refuse: Refuse<'_>) -> Result<Recording, SceneError> {
     let place = folder.unwrap_or(Path::new("")).join(file);
-    let text = text::read(place).map_err(|error| {
+    let text = text::read(&place).map_err(|error| {
         refuse(KEY, format!("cannot be read: {error}"), "give a path relative to the swarm file")
     })?;
     parse(&text)
