@@ -12,7 +12,6 @@ pub mod body;
 pub mod cells_around;
 pub mod cloud;
 pub mod condition;
-pub(crate) mod disjoint_sets;
 pub mod fracture;
 pub mod frame;
 pub mod grid;
