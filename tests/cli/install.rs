@@ -74,7 +74,7 @@ fn the_views_show_topics_that_the_node_has() {
     let panels = layout["configById"].as_object().expect("panels");
     let topics = |text: &str| -> BTreeSet<String> {
         let quoted = |c: char| !(c.is_ascii_alphanumeric() || "/_".contains(c));
-        text.split(quoted).filter(|word| word.starts_with("/flockform")).map(str::to_owned).collect()
+        text.split(quoted).filter(|word| word.starts_with("/flockform/")).map(str::to_owned).collect()
     };
     assert_eq!(topics(&rviz), ["/flockform/markers".to_owned()].into());
     assert_eq!(topics(&foxglove), ["/flockform/markers", "/flockform/state"].map(str::to_owned).into());
