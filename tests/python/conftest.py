@@ -49,6 +49,8 @@ def held_sheet():
     return {
         "lattice": {"kind": "square", "spacing": 1.0},
         "body": {"shape": {"kind": "grid", "columns": 12, "rows": 12}},
-        "roles": [{"region": {"kind": "edge", "side": side}, "role": "clamped"} for side in ("left", "right")],
+        "roles": [
+            {"region": {"kind": "edge", "side": side}, "role": "clamped"} for side in ("left", "right")
+        ],
         "stop": {"steps": 1000, "tolerance": 1e-6},
     }

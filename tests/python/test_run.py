@@ -109,7 +109,11 @@ def test_a_scene_that_cannot_be_is_refused_with_file_line_key_and_remedy(tmp_pat
         (lambda: flockform.run("tension", set={"stop.steps": None}), TypeError, "stop.steps: a NoneType"),
         (lambda: flockform.run("tension", set={"stop.steps": 10**30}), flockform.SceneError, "stop.steps"),
         (lambda: flockform.run("tension", set={"stop.stepz": 3}), flockform.SceneError, "stop.stepz"),
-        (lambda: flockform.run("tension", set={"lattice.spacing": float("nan")}), flockform.SceneError, "spacing"),
+        (
+            lambda: flockform.run("tension", set={"lattice.spacing": float("nan")}),
+            flockform.SceneError,
+            "spacing",
+        ),
         (lambda: flockform.run("tension", set={"title": 'a"\n\\b'}, every=0), ValueError, "every = 0"),
         (lambda: flockform.run("tension", every=-1), ValueError, "every = -1"),
         (lambda: flockform.compare("beam", truth_error=2.0), ValueError, "truth_error = 2"),
@@ -150,5 +154,7 @@ def test_more_frames_than_memory_holds_are_refused():
         "try: flockform.run('tension', set={'stop.steps': 100_000_000}, every=1)\n"
         "except MemoryError as error: print(error)\n"
     )
-    end = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=120)
+    end = subprocess.run(
+        [sys.executable, "-c", script], check=False, capture_output=True, text=True, timeout=120
+    )
     assert "raise `every`" in end.stdout, end

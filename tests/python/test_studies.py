@@ -79,7 +79,10 @@ def test_stubs_describe_what_is_there():
     for thing in flockform.__all__:
         if isinstance(getattr(flockform, thing), type):
             own = {one for one in vars(getattr(flockform, thing)) if not one.startswith("_")}
-            assert own == {name.split(".")[1] for name in names if name.startswith(f"{thing}.")
-                           and not name.split(".")[1].startswith("__")}, thing
+            assert own == {
+                name.split(".")[1]
+                for name in names
+                if name.startswith(f"{thing}.") and not name.split(".")[1].startswith("__")
+            }, thing
         elif callable(getattr(flockform, thing)):
             assert thing in names

@@ -15,8 +15,13 @@ LONG = {
     "stepping": lambda: flockform.run("tension", set={"stop.steps": 2_000_000_000}),
     "a body": lambda: flockform.Body("tension").advance(2_000_000_000),
     "a solver": lambda: flockform.run(
-        "beam", set={"lattice.spacing": 0.02, "equilibrium.solver": "jacobi", "roles[1].motion.kind": "velocity",
-                     "roles[1].motion.per_step": [0.0, 1.0]}
+        "beam",
+        set={
+            "lattice.spacing": 0.02,
+            "equilibrium.solver": "jacobi",
+            "roles[1].motion.kind": "velocity",
+            "roles[1].motion.per_step": [0.0, 1.0],
+        },
     ),
     "finite elements": lambda: flockform.compare("beam", truth_error=1e-9),
     "a study": lambda: flockform.stability("tension", extremes=True),
