@@ -68,7 +68,10 @@ pub(super) fn indices(name: &str, given: &Bound<'_, PyAny>, count: usize) -> PyR
     let array = as_array(name, given, "iu", "indices, which are integers", "int64")?;
     let array: PyReadonlyArrayDyn<'_, i64> = array.extract()?;
     if array.shape().len() > 1 {
-        return Err(wrong_shape(name, array.shape(), &[array.shape()[0]]));
+        let found = tuple(array.shape());
+        return Err(PyValueError::new_err(format!(
+            "{name} has shape {found}: give an integer or a list of them"
+        )));
     }
     let within = |&index: &i64| {
         let found = usize::try_from(index).ok().filter(|&index| index < count);
