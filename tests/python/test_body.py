@@ -89,9 +89,9 @@ def test_measures_of_a_body_have_a_row_for_each_particle():
 
 
 def test_bonds_break():
-    body = flockform.run("fracture").body
+    body = flockform.run("fracture", set={"stop.steps": 95}).body
     broken = body.broken_bonds()
-    assert broken.shape[1] == 2 and len(broken) > 50 and (broken[:, 0] < broken[:, 1]).all()
+    assert broken.shape[1] == 2 and len(broken) > 20 and (broken[:, 0] < broken[:, 1]).all()
 
 
 def test_a_copy_goes_its_own_way(held_sheet):

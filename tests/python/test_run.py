@@ -155,13 +155,21 @@ def test_more_frames_than_memory_holds_are_refused():
     import subprocess
     import sys
 
-    script = (
-        "import resource, flockform\n"
-        "flockform.run('tension')\n"
-        "resource.setrlimit(resource.RLIMIT_AS, (1 << 31, 1 << 31))\n"
-        "try: flockform.run('tension', set={'stop.steps': 100_000_000}, every=1)\n"
-        "except MemoryError as error: print(error)\n"
-    )
+    script = """
+import resource, flockform
+sheet = {
+    "lattice": {"kind": "square", "spacing": 1.0},
+    "body": {"shape": {"kind": "grid", "columns": 400, "rows": 400}},
+    "roles": [{"region": {"kind": "edge", "side": "left"}, "role": "clamped"}],
+    "stop": {"steps": 10_000_000},
+}
+flockform.run("tension")
+resource.setrlimit(resource.RLIMIT_AS, (1 << 31, 1 << 31))
+try:
+    flockform.run(sheet, every=1)
+except MemoryError as error:
+    print(error)
+"""
     end = subprocess.run(
         [sys.executable, "-c", script], check=False, capture_output=True, text=True, timeout=120
     )
