@@ -70,7 +70,9 @@ pub(super) fn beside<T: Send + 'static>(
         let seen = py.check_signals().and_then(|()| callback.map_or(Ok(()), |one| progress.call(one)));
         if let Err(error) = seen {
             flag.store(true, Ordering::Relaxed);
-            let _ = wait(py, &receive, GRACE);
+            if matches!(wait(py, &receive, GRACE), Err(RecvTimeoutError::Timeout)) {
+                retire_pool();
+            }
             return Err(error);
         }
     }
@@ -125,4 +127,9 @@ pub(super) fn pool() -> PyResult<Arc<ThreadPool>> {
         std::mem::forget(foreign);
     }
     Ok(pool)
+}
+
+/// Leaves the threads to the work that did not end: what comes next gets others and does not wait for them.
+fn retire_pool() {
+    drop(POOL.lock().unwrap_or_else(PoisonError::into_inner).take());
 }
