@@ -51,6 +51,8 @@ def stubs():
     text = (Path(flockform.__file__).parent / "_core.pyi").read_text()
     for node in ast.parse(text).body:
         if isinstance(node, ast.ClassDef):
+            if node.name.startswith("_"):
+                continue
             yield node.name, node
             for inner in node.body:
                 if isinstance(inner, ast.FunctionDef):
