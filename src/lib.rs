@@ -25,6 +25,7 @@
 //! * `shm` (feature `shm`): the same over shared memory, without a copy; a running body published to other processes.
 //! * `record` (feature `record`): recordings of flights and runs for Foxglove and `ros2 bag`, and their replay.
 //! * `bench` (feature `bench`): how fast sweeps and solvers are, beside what the machine and others can do.
+//! * `python` (feature `python`): the Python package; `pip install ./src/python` builds it (guide [`python`](guide::python)).
 //!
 //! Features add rooms and never choose: what a room computes is the same whatever is built beside it.
 //! Without any, the crate builds for a browser too (`wasm32-unknown-unknown`): on one thread, with bundled scenes or
@@ -67,6 +68,8 @@ pub mod fem;
 )]
 #[cfg(feature = "messages")]
 pub mod messages;
+#[cfg(feature = "python")]
+mod python;
 #[cfg(feature = "record")]
 pub mod record;
 #[cfg(feature = "ros")]

@@ -138,6 +138,24 @@ fn recordings_stand_on_the_messages_and_know_nothing_of_the_network_and_of_figur
     assert_imports_only("record", &["scene", "continuum", "engine", "flock", "swarm", "messages"]);
 }
 
+#[test]
+fn python_stands_above_the_rooms_that_compute_and_below_no_other() {
+    let below = [
+        "geometry",
+        "flock",
+        "sweep",
+        "solve",
+        "material",
+        "fem",
+        "scene",
+        "engine",
+        "continuum",
+        "study",
+        "swarm",
+    ];
+    assert_imports_only("python", &below);
+}
+
 /// Files of `src` that contain a word.
 fn files_with(word: &str) -> Vec<String> {
     let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");

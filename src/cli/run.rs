@@ -12,6 +12,7 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use flockform::continuum::digest::digest;
 use flockform::continuum::equilibrium::run_to_equilibrium_watched;
+use flockform::continuum::looks::Looks;
 use flockform::continuum::run::{Outcome, StopReason, resume};
 use flockform::export::checkpoint::{self, Checkpoint, RunRequest};
 use flockform::export::report;
@@ -24,7 +25,7 @@ use flockform::shm::positions::Positions;
 use flockform::solve::interrupt::Interrupt;
 use flockform::study::compare::run::plan;
 use flockform::study::trade::{Chosen, choose};
-use observer::{Looks, RunObserver};
+use observer::RunObserver;
 use recorder::{Recorder, Records};
 use words::{closing_words, where_to_look};
 

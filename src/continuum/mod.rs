@@ -12,6 +12,7 @@ pub mod deviation;
 pub mod digest;
 pub mod equilibrium;
 pub mod layout;
+pub mod looks;
 pub mod mechanics;
 pub mod places;
 pub mod plan;

@@ -229,8 +229,8 @@ impl StepBatch {
     }
 }
 
-/// The divergence of a body that was put where its energies overflow.
-pub(super) fn overflow(engine: &Engine) -> Option<Divergence> {
+/// The divergence of a body that was put where its energies overflow; `None` for any other.
+pub fn overflow(engine: &Engine) -> Option<Divergence> {
     divergence(engine, &engine.movement(), FARTHEST / engine.body().lattice.spacing())
 }
 

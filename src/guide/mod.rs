@@ -10,6 +10,7 @@
 //! | [`ros2`] | the ROS 2 node: topics, services, parameters, launch files |
 //! | [`security`] | command permissions, failures of robots, peers and the middleware |
 //! | [`shared_memory`] | the same loop between processes of one computer |
+//! | [`python`] | the Python package: runs, bodies, studies, swarms, errors and threads |
 //! | [`performance`] | how fast bodies step and settle, and how to measure it |
 //! | [`files`] | output files of a run, the report, checkpoints, exit codes |
 //! | [`theory`] | the paper's terms and equations, what they imply, where the paper leaves a choice |
@@ -40,6 +41,9 @@ pub mod security {}
 
 #[doc = include_str!("shared_memory.md")]
 pub mod shared_memory {}
+
+#[doc = include_str!("python.md")]
+pub mod python {}
 
 #[doc = include_str!("performance.md")]
 pub mod performance {}

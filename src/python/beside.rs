@@ -1,0 +1,135 @@
+//! Computes beside the interpreter: other Python threads go on, and Ctrl-C ends the wait.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+use pyo3::exceptions::PyRuntimeError;
+use pyo3::prelude::*;
+use rayon::ThreadPool;
+
+/// Time between two looks for a signal.
+const BETWEEN_LOOKS: Duration = Duration::from_millis(50);
+/// How long work may take to notice that it is to end; what does not notice goes on unseen, and its result is dropped.
+const GRACE: Duration = Duration::from_millis(500);
+
+/// Seen by the work and by the thread that waits for it.
+pub(super) struct Progress {
+    /// Raised for the work to end.
+    pub(super) flag: &'static AtomicBool,
+    step: AtomicUsize,
+    residual: AtomicU64,
+}
+
+impl Progress {
+    /// Reports the step that the work has come to; whether to end.
+    pub(super) fn step(&self, step: usize, residual: f64) -> bool {
+        self.step.store(step, Ordering::Relaxed);
+        self.residual.store(residual.to_bits(), Ordering::Relaxed);
+        self.flag.load(Ordering::Relaxed)
+    }
+
+    fn call(&self, callback: &Bound<'_, PyAny>) -> PyResult<()> {
+        let residual = f64::from_bits(self.residual.load(Ordering::Relaxed));
+        callback.call1((self.step.load(Ordering::Relaxed), residual)).map(drop)
+    }
+}
+
+/// Does `work` in a thread of its own and waits for it, with the interpreter free. `callback`, if there is one, is called
+/// in the waiting thread with the step and the residual, several times a second.
+///
+/// # Errors
+/// What a signal raises (`KeyboardInterrupt`), what `callback` raises, and work that panicked.
+pub(super) fn beside<T: Send + 'static>(
+    py: Python<'_>,
+    callback: Option<&Bound<'_, PyAny>>,
+    work: impl FnOnce(&Progress) -> T + Send + 'static,
+) -> PyResult<T> {
+    let pool = pool()?;
+    let flag = taken_flag();
+    let progress = Arc::new(Progress { flag, step: AtomicUsize::new(0), residual: AtomicU64::new(0) });
+    let (send, receive) = sync_channel(1);
+    let receive = Mutex::new(receive);
+    let shown = Arc::clone(&progress);
+    let job = move || {
+        let result = catch_unwind(AssertUnwindSafe(|| pool.install(|| work(&shown))));
+        give_back(flag);
+        // Nobody waits for what was interrupted.
+        let _ = send.send(result);
+    };
+    std::thread::Builder::new().name("flockform".into()).spawn(job)?;
+    loop {
+        let result = wait(py, &receive, BETWEEN_LOOKS);
+        match result {
+            Ok(result) => return result.map_err(|panic| panicked(&*panic)),
+            Err(RecvTimeoutError::Disconnected) => return Err(panicked(&"its thread ended")),
+            Err(RecvTimeoutError::Timeout) => {}
+        }
+        let seen = py.check_signals().and_then(|()| callback.map_or(Ok(()), |one| progress.call(one)));
+        if let Err(error) = seen {
+            flag.store(true, Ordering::Relaxed);
+            if matches!(wait(py, &receive, GRACE), Err(RecvTimeoutError::Timeout)) {
+                retire_pool();
+            }
+            return Err(error);
+        }
+    }
+}
+
+/// Waits with the interpreter free.
+fn wait<T: Send>(
+    py: Python<'_>,
+    receive: &Mutex<Receiver<T>>,
+    time: Duration,
+) -> Result<T, RecvTimeoutError> {
+    py.detach(|| receive.lock().unwrap_or_else(PoisonError::into_inner).recv_timeout(time))
+}
+
+fn panicked(panic: &dyn std::any::Any) -> PyErr {
+    let words = panic.downcast_ref::<&str>().map(|words| (*words).to_owned());
+    let words = words.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_default();
+    PyRuntimeError::new_err(format!("flockform has a fault, please report it: {words}"))
+}
+
+/// Flags not in use: solvers keep theirs for as long as a program lives, so they are used again.
+static FLAGS: Mutex<Vec<&'static AtomicBool>> = Mutex::new(Vec::new());
+
+fn taken_flag() -> &'static AtomicBool {
+    let free = FLAGS.lock().unwrap_or_else(PoisonError::into_inner).pop();
+    free.unwrap_or_else(|| Box::leak(Box::new(AtomicBool::new(false))))
+}
+
+/// By the work itself once it is done, so that no other work sees the flag of one that still has to end.
+fn give_back(flag: &'static AtomicBool) {
+    flag.store(false, Ordering::Relaxed);
+    FLAGS.lock().unwrap_or_else(PoisonError::into_inner).push(flag);
+}
+
+/// The threads that compute, and the process that they are in.
+static POOL: Mutex<Option<(u32, Arc<ThreadPool>)>> = Mutex::new(None);
+
+/// The threads of this process: a child that was forked, as `multiprocessing` does it, has none of its parent's and gets
+/// its own. `RAYON_NUM_THREADS` says how many; without it there are as many as processors.
+pub(super) fn pool() -> PyResult<Arc<ThreadPool>> {
+    let mut kept = POOL.lock().unwrap_or_else(PoisonError::into_inner);
+    let here = std::process::id();
+    if let Some((process, pool)) = &*kept
+        && *process == here
+    {
+        return Ok(Arc::clone(pool));
+    }
+    let built = rayon::ThreadPoolBuilder::new().build();
+    let pool = Arc::new(built.map_err(|error| PyRuntimeError::new_err(error.to_string()))?);
+    // The parent's threads are not here to be ended.
+    if let Some(foreign) = kept.replace((here, Arc::clone(&pool))) {
+        std::mem::forget(foreign);
+    }
+    Ok(pool)
+}
+
+/// Leaves the threads to the work that did not end: what comes next gets others and does not wait for them.
+fn retire_pool() {
+    drop(POOL.lock().unwrap_or_else(PoisonError::into_inner).take());
+}

@@ -1,0 +1,106 @@
+"""Interrupts, other threads, forked processes."""
+
+import multiprocessing
+import signal
+import threading
+import time
+
+import numpy as np
+import pytest
+
+import flockform
+
+# Each takes minutes if nothing ends it.
+LONG = {
+    "stepping": lambda: flockform.run("tension", set={"stop.steps": 2_000_000_000}),
+    "a body": lambda: flockform.Body("tension").advance(2_000_000_000),
+    "a solver": lambda: flockform.run(
+        "beam",
+        set={
+            "lattice.spacing": 0.02,
+            "equilibrium.solver": "jacobi",
+            "roles[1].motion.kind": "velocity",
+            "roles[1].motion.per_step": [0.0, 1.0],
+        },
+    ),
+    "finite elements": lambda: flockform.compare("beam", truth_error=1e-9),
+    "a study": lambda: flockform.stability("tension", extremes=True),
+}
+
+
+@pytest.mark.parametrize("what", LONG)
+def test_an_interrupt_ends_it_within_a_second(what):
+    begun = time.monotonic()
+    raised = []
+
+    def handler(*_):
+        raised.append(time.monotonic())
+        raise KeyboardInterrupt
+
+    former = signal.signal(signal.SIGALRM, handler)
+    signal.setitimer(signal.ITIMER_REAL, 0.5)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            LONG[what]()
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, former)
+    ended = time.monotonic()
+    assert raised and raised[0] >= begun
+    # A second, and another for a machine that has other things to do.
+    assert ended - raised[0] < 2.0
+    # The next one is not ended by what ended this one.
+    assert flockform.run("tension", set={"stop.steps": 3}).reason == "steps"
+
+
+def test_other_threads_go_on_while_a_run_computes():
+    ticks = []
+    over = threading.Event()
+
+    def tick():
+        while not over.wait(0.005):
+            ticks.append(time.monotonic())
+
+    thread = threading.Thread(target=tick)
+    thread.start()
+    before = len(ticks)
+    begun = time.monotonic()
+    flockform.Body("tension").advance(200_000)
+    took = time.monotonic() - begun
+    over.set()
+    thread.join()
+    assert len(ticks) - before > 0.1 * took / 0.005
+
+
+def test_runs_in_several_threads_do_not_disturb_each_other():
+    alone = flockform.run("tension").positions
+    ends = [None] * 6
+
+    def go(k):
+        ends[k] = flockform.run("tension").positions
+
+    threads = [threading.Thread(target=go, args=(k,)) for k in range(len(ends))]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert all(np.array_equal(end, alone) for end in ends)
+
+
+def _end_of(scene):
+    return flockform.run(scene).positions[-1]
+
+
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+def test_a_forked_process_computes_with_threads_of_its_own():
+    # Large enough for several threads: those of the parent do not exist in the child.
+    scene = {
+        "lattice": {"kind": "square", "spacing": 1.0},
+        "body": {"shape": {"kind": "grid", "columns": 400, "rows": 400}},
+        "roles": [{"region": {"kind": "edge", "side": "left"}, "role": "clamped"}],
+        "stop": {"steps": 3},
+    }
+    here = _end_of(scene)
+    with multiprocessing.get_context("fork").Pool(1) as pool:
+        there = pool.apply_async(_end_of, (scene,)).get(timeout=60)
+    assert np.array_equal(here, there)
