@@ -5,6 +5,7 @@ use std::thread;
 
 use flockform::continuum::plan::Plan;
 use flockform::continuum::run::{Outcome, SharedError, require_shareable, run_shared, run_watched};
+use flockform::continuum::shares::{Exchanged, Shares};
 use flockform::engine::Engine;
 use flockform::engine::observer::Observer;
 use flockform::engine::shared::NotShared;
@@ -249,4 +250,21 @@ fn what_ranks_cannot_share_is_refused_by_name() {
     let refused = require_shareable(&solved).expect_err("solved").to_string();
     assert!(refused.contains("equilibrium") && refused.contains("no solver yet"), "{refused}");
     assert!(require_shareable(&load("fracture", &[])).is_ok());
+}
+
+#[test]
+fn a_plan_foretells_who_moves_what_and_what_is_exchanged() {
+    let body = ["body.shape.columns=220", "body.shape.rows=40", "record.probes=[]", "frame=\"none\""];
+    let scene = load("tension", &body);
+    let shares = Shares::new(&scene, &planned(&scene), 4).expect("can be shared");
+    assert_eq!((shares.particles.len(), shares.particles.iter().sum::<usize>()), (4, 220 * 40));
+    let most = shares.particles.iter().max().copied().unwrap_or_default();
+    assert!(most < 220 * 40 / 3, "{:?}", shares.particles);
+    let Exchanged::Halos { steps, bytes } = shares.exchanged else { panic!("{:?}", shares.exchanged) };
+    // A neighbour is at most 40 places away: so many on both sides for each step, or the bands that hold them.
+    assert!(steps > 1 && bytes >= 16 * 2 * 40 * steps && bytes < 16 * 8 * 40 * steps, "{steps} {bytes}");
+    let torn = load("fracture", &[]);
+    let shares = Shares::new(&torn, &planned(&torn), 3).expect("can be shared");
+    assert!(matches!(shares.exchanged, Exchanged::Everything { .. }), "{:?}", shares.exchanged);
+    assert!(Shares::new(&load("beam-loaded", &[]), &planned(&load("beam-loaded", &[])), 2).is_err());
 }

@@ -35,6 +35,10 @@ pub enum RanksError {
     OtherBody { rank: usize },
     #[error("{refusal}\n  (on rank {rank})")]
     OnRank { rank: usize, refusal: Box<Refusal> },
+    #[error(
+        "--ranks: ranks share the run of a scene; a swarm is parted by `flockform node --member`\n  help: leave it out"
+    )]
+    Swarm,
     /// Another rank says why.
     #[error("another rank refuses")]
     SaidElsewhere,

@@ -18,4 +18,5 @@ pub mod plan;
 pub mod record;
 pub mod report;
 pub mod run;
+pub mod shares;
 mod weights;

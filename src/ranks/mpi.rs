@@ -89,19 +89,21 @@ impl Exchange for Processes {
         let world = SimpleCommunicator::world();
         let mut received: Vec<Vec<u64>> = from.iter().map(|&(_, words)| vec![0; words]).collect();
         mpi::request::scope(|scope| {
+            let (mut receiving, mut sending) = (Vec::new(), Vec::new());
             // What is awaited is announced first: then nothing has to be copied on its way.
-            let receive = |(&(rank, _), words)| {
+            for (&(rank, _), words) in from.iter().zip(&mut received) {
                 let source = world.process_at_rank(counted(rank));
-                source.immediate_receive_into::<_, [u64]>(scope, words)
-            };
-            let places = received.iter_mut().map(|words| &mut words[..]);
-            let receiving: Vec<_> = from.iter().zip(places).map(receive).collect();
-            let send = |(rank, words): &'_ (usize, Vec<u64>)| {
-                world.process_at_rank(counted(*rank)).immediate_send(scope, &words[..])
-            };
-            let sending: Vec<_> = messages.iter().map(send).collect();
-            receiving.into_iter().for_each(|one| drop(one.wait()));
-            sending.into_iter().for_each(|one| drop(one.wait()));
+                receiving.push(source.immediate_receive_into(scope, &mut words[..]));
+            }
+            for (rank, words) in messages {
+                sending.push(world.process_at_rank(counted(*rank)).immediate_send(scope, &words[..]));
+            }
+            receiving.into_iter().for_each(|one| {
+                one.wait();
+            });
+            sending.into_iter().for_each(|one| {
+                one.wait();
+            });
         });
         received
     }

@@ -107,6 +107,12 @@ impl Domain {
         halo
     }
 
+    /// How many particles each rank receives before so many steps, shape \[ranks\].
+    pub fn halo_sizes(&self, rows: &Rows, steps: usize) -> Vec<usize> {
+        let counts = self.counts().into_iter().enumerate();
+        counts.map(|(rank, own)| self.needed(rank, rows, steps).len().saturating_sub(own)).collect()
+    }
+
     /// The particles that a rank needs in order to take so many steps, its own among them; none if it owns none.
     fn needed(&self, rank: usize, rows: &Rows, steps: usize) -> Range<usize> {
         let cuts = self.bands.as_deref().unwrap_or_default();

@@ -159,6 +159,14 @@ impl Sweep {
         }
     }
 
+    /// How many particles each rank receives before so many steps, shape \[ranks\]; nothing where the body is not shared.
+    pub fn halo_sizes(&self, steps: usize) -> Vec<usize> {
+        match (&self.domain, &self.rows) {
+            (Some(domain), Some(rows)) => domain.halo_sizes(rows, steps),
+            _ => Vec::new(),
+        }
+    }
+
     /// Most steps that are worth taking together.
     pub fn steps_together(&self) -> usize {
         self.domain.as_ref().map_or(MOST_STEPS, Domain::steps_together)
