@@ -149,9 +149,9 @@ const LONG: [&str; 12] = [
     "--figures",
     "none",
     "--steps",
-    "20000",
+    "3000",
     "--checkpoint-every",
-    "200steps",
+    "100steps",
     "--quiet",
 ];
 

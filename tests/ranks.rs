@@ -268,3 +268,21 @@ fn a_plan_foretells_who_moves_what_and_what_is_exchanged() {
     assert!(matches!(shares.exchanged, Exchanged::Everything { .. }), "{:?}", shares.exchanged);
     assert!(Shares::new(&load("beam-loaded", &[]), &planned(&load("beam-loaded", &[])), 2).is_err());
 }
+
+/// Large enough for the threads of a rank to cut its part once more.
+#[test]
+fn threads_within_ranks_change_no_bit() {
+    let body = ["body.shape.columns=300", "body.shape.rows=250", "record.probes=[]", "record.figures=[]"];
+    let sets: Vec<&str> = body.into_iter().chain(["frame=\"none\"", "stop.steps=24"]).collect();
+    let scene = load("tension", &sets);
+    let (plan, expected) = (planned(&scene), alone(&scene, 4));
+    let ends = on_ranks(2, |team| {
+        let threads = rayon::ThreadPoolBuilder::new().num_threads(4).build().expect("threads");
+        threads.install(|| {
+            let mut looks = Looks::every(4);
+            let outcome = run_shared(plan.clone(), None, &team, &mut looks).expect("can be shared");
+            End::of(&outcome, looks.seen)
+        })
+    });
+    assert!(ends.iter().all(|end| *end == expected));
+}

@@ -15,7 +15,7 @@ use crate::flock::vectors::Vectors;
 use crate::ranks::Team;
 use crate::sweep::Order;
 use crate::sweep::caches::Caches;
-use crate::sweep::domain::Share;
+use crate::sweep::domain::{Domain, Share};
 
 /// A sweep that ranks cannot share.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -51,14 +51,11 @@ impl Engine {
         if self.is_whole {
             return;
         }
-        let (owned, counts) = (domain.owned(), domain.counts());
-        for points in [&mut self.present, &mut self.previous] {
-            gather_points(team, &owned, &counts, points);
-        }
+        let of_ranks =
+            gather_points(team, domain, [&mut self.present, &mut self.previous], self.activity.take_counts());
         self.is_whole = true;
-        let counts = team.each(self.activity.take_counts());
         if team.is_first() {
-            counts.into_iter().for_each(|of_rank| self.activity.add_counts(of_rank));
+            of_ranks.into_iter().for_each(|counts| self.activity.add_counts(counts));
         }
     }
 
@@ -67,7 +64,7 @@ impl Engine {
     pub(super) fn step_shared(&mut self) {
         self.sweep.step(&self.flock, None, &self.present, &mut self.previous);
         if let (Some((team, _)), Some(domain)) = (&self.team, self.sweep.domain()) {
-            gather_points(team, &domain.owned(), &domain.counts(), &mut self.previous);
+            gather_points(team, domain, [&mut self.previous], [0; 2]);
         }
         if let Some(frame) = &self.body.frame {
             frame.follow(&self.flock.reference, &self.present, &mut self.previous);
@@ -106,12 +103,29 @@ fn agreed_caches(team: &Team) -> Caches {
     Caches { whole_body: whole_body as usize, band: (has_band == 1).then_some(band as usize) }
 }
 
-fn gather_points(team: &Team, owned: &Range<usize>, counts: &[usize], points: &mut Vectors) {
-    for of in [&mut points.x, &mut points.y] {
-        let own: Vec<u64> = of[owned.clone()].iter().map(|value| value.to_bits()).collect();
-        let all = team.gather(&own, counts);
-        of.iter_mut().zip(all).for_each(|(value, bits)| *value = f64::from_bits(bits));
+/// Makes all ranks' particles known, and two words of each rank, in one exchange: it takes long to begin one.
+fn gather_points<const N: usize>(
+    team: &Team,
+    domain: &Domain,
+    mut points: [&mut Vectors; N],
+    more: [u64; 2],
+) -> Vec<[u64; 2]> {
+    let owned = domain.owned();
+    let own: Vec<u64> = points.iter().flat_map(|points| words(points, &owned)).chain(more).collect();
+    let counts: Vec<usize> = domain.counts().into_iter().map(|count| 2 * N * count + more.len()).collect();
+    let all = team.gather(&own, &counts);
+    let (mut rest, mut mores) = (&all[..], Vec::with_capacity(counts.len()));
+    for rank in 0..counts.len() {
+        let of = domain.of(rank);
+        for points in &mut points {
+            let (words, after) = rest.split_at(2 * of.len());
+            put(points, &of, words);
+            rest = after;
+        }
+        mores.push([rest[0], rest[1]]);
+        rest = &rest[more.len()..];
     }
+    mores
 }
 
 /// Coordinates as words: x, then y.
