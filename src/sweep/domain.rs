@@ -149,6 +149,11 @@ fn cuts(costs: impl Iterator<Item = usize> + Clone, parts: usize) -> Vec<usize> 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::flock::body::{Body, Cut};
+    use crate::flock::lattice::{Lattice, LatticeKind};
+    use crate::flock::law::{Flock, Weights};
+    use crate::flock::neighbourhood::Neighbourhood;
+    use crate::flock::rules::Rule;
 
     #[test]
     fn parts_cost_about_the_same_and_leave_nothing_out() {
@@ -162,6 +167,35 @@ mod tests {
             assert!(cuts.is_sorted());
         }
         assert_eq!(cuts(std::iter::empty(), 3), [0, 0, 0, 0]);
+    }
+
+    #[test]
+    fn what_a_rank_receives_is_what_the_others_send_it_and_all_that_it_needs() {
+        let lattice = Lattice::new(LatticeKind::Square { spacing: 1.0 }, [0.0; 2], 0.0);
+        let cut = Cut::Count { columns: 60, rows: 7 };
+        let (body, neighbours) =
+            Body::build(lattice, &cut, &Neighbourhood::First { keep: None }, None).expect("fits");
+        let flock = Flock::new(Rule::BARYCENTRE, body.reference, neighbours, Weights::Equal);
+        let count = flock.reference.len();
+        // The last ranks have nothing to do, and many steps reach over several ranks.
+        for ranks in [2, 5, 40] {
+            let share = |rank| Share { rank, ranks, ..Share::whole() };
+            let rows = Rows::compile(&flock, &vec![true; count], share(0)).expect("a barycentre");
+            let domains: Vec<Domain> = (0..ranks).map(|rank| Domain::of_rows(&rows, share(rank))).collect();
+            for steps in [1, 3, 16] {
+                let halos: Vec<Halo> = domains.iter().map(|domain| domain.halo(&rows, steps)).collect();
+                for (rank, domain) in domains.iter().enumerate() {
+                    let sent = |from: usize| halos[from].sends.iter().filter(|(to, _)| *to == rank);
+                    let sent: Vec<_> = (0..ranks)
+                        .flat_map(|from| sent(from).map(move |(_, of)| (from, of.clone())))
+                        .collect();
+                    assert_eq!(halos[rank].receives, sent, "rank {rank} of {ranks}, {steps} steps");
+                    let received: usize = sent.iter().map(|(_, of)| of.len()).sum();
+                    assert_eq!(received, domain.halo_sizes(&rows, steps)[rank]);
+                    assert_eq!(received == 0, domain.owned().is_empty(), "rank {rank} of {ranks}");
+                }
+            }
+        }
     }
 
     #[test]
