@@ -367,9 +367,11 @@ pub fn refuse(refusal: &Refusal) -> ExitCode {
         eprintln!("{}", interrupt::NOTHING_KEPT);
         return ExitCode::from(FAILED);
     }
-    if !matches!(refusal, Refusal::Ranks(ranks::RanksError::SaidElsewhere)) {
-        eprintln!("error: {}", on_terminal(&refusal.to_string()));
+    if matches!(refusal, Refusal::Ranks(ranks::RanksError::SaidElsewhere)) {
+        // A launcher ends all ranks when one of them fails: the one that speaks fails, and gets to speak.
+        return ExitCode::SUCCESS;
     }
+    eprintln!("error: {}", on_terminal(&refusal.to_string()));
     ExitCode::from(if refusal.is_failure() { FAILED } else { BAD_INPUT })
 }
 

@@ -124,9 +124,9 @@ fn help_to_run(arguments: &RunArguments, team: &Team) -> Result<ExitCode, Refusa
     let mut observer = Interrupted(interrupt::serves());
     begin.begin(prepared.digest)?;
     let from = prepared.left.map(|left| left.checkpoint).map(|from| (from.engine, from.residual));
-    let outcome = run_shared(prepared.plan, from, team, &mut observer);
-    // The first rank says what is wrong, as all have the same.
-    Ok(exit_code(&outcome.map_err(|_| ranks::RanksError::SaidElsewhere)?))
+    // The first rank says how it ended, in its exit code too: all have the same.
+    run_shared(prepared.plan, from, team, &mut observer).map_err(|_| ranks::RanksError::SaidElsewhere)?;
+    Ok(ExitCode::SUCCESS)
 }
 
 fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, Refusal> {

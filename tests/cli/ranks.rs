@@ -35,7 +35,8 @@ fn one_of_several_ranks_refuses_to_make_the_whole_run_and_names_the_feature() {
 #[test]
 fn the_first_rank_speaks_for_all() {
     let (output, left) = as_rank("3", "4", LAUNCHERS[0], &RUN);
-    assert_eq!(output.status.code(), Some(2));
+    // The launcher would end the first one, before it has spoken, if this one failed.
+    assert_eq!(output.status.code(), Some(0));
     assert!(output.stderr.is_empty() && output.stdout.is_empty() && left.is_empty());
 }
 
