@@ -165,8 +165,8 @@ fn long_alone() -> tempfile::TempDir {
 /// The long run on ranks, once it has kept a checkpoint.
 fn begun(ranks: usize, folder: &Path) -> Child {
     let run = mpirun(ranks, &LONG, folder).spawn().expect("mpirun is installed");
-    let checkpoint = || names_in(&folder.join("o.unfinished")).iter().any(|name| name.contains("checkpoint"));
-    within(PATIENCE, "a checkpoint", || checkpoint().then_some(()));
+    let checkpoint = folder.join("o.unfinished/checkpoint");
+    within(PATIENCE, "a checkpoint", || checkpoint.exists().then_some(()));
     run
 }
 
@@ -200,6 +200,7 @@ fn a_killed_rank_ends_the_run_within_seconds_and_it_goes_on_with_any_number_of_r
         signal("KILL", ranks[victim]);
         let status = within(PATIENCE, "mpirun ends", || run.try_wait().expect("a child"));
         assert!(!status.success() && start.elapsed() < Duration::from_secs(10), "{status} {start:?}");
+        assert!(folder.path().join("o.unfinished/checkpoint").exists(), "the last checkpoint stays");
         let resume = ["run", "--resume", "o", "--no-report", "--figures", "none", "--quiet"];
         let output = match victim {
             0 => flockform(&resume, folder.path()),
