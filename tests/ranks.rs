@@ -11,7 +11,7 @@ use flockform::engine::observer::Observer;
 use flockform::engine::shared::NotShared;
 use flockform::engine::state::EngineState;
 use flockform::flock::vectors::Vectors;
-use flockform::ranks::{Team, in_process};
+use flockform::ranks::{Exchange, Team, in_process};
 use flockform::scene::Scene;
 
 use scenes::{load, planned};
@@ -285,4 +285,46 @@ fn threads_within_ranks_change_no_bit() {
         })
     });
     assert!(ends.iter().all(|end| *end == expected));
+}
+
+/// Receives halos with an error in one coordinate.
+struct Noisy(Team);
+
+impl Exchange for Noisy {
+    fn rank(&self) -> usize {
+        self.0.rank()
+    }
+
+    fn count(&self) -> usize {
+        self.0.count()
+    }
+
+    fn swap(&mut self, messages: &[(usize, Vec<u64>)], from: &[(usize, usize)]) -> Vec<Vec<u64>> {
+        let mut received = self.0.swap(messages, from);
+        received.iter_mut().filter_map(|words| words.last_mut()).for_each(|word| *word ^= 1 << 20);
+        received
+    }
+
+    fn gather(&mut self, own: &[u64], counts: &[usize]) -> Vec<u64> {
+        self.0.gather(own, counts)
+    }
+}
+
+/// That the others can fail: ranks depend on every bit of what they receive.
+#[test]
+fn an_error_in_a_halo_is_seen_in_the_bits() {
+    let body = ["body.shape.columns=60", "body.shape.rows=20", "record.probes=[]", "frame=\"none\""];
+    let sets: Vec<&str> = body.into_iter().chain(["record.figures=[]", "stop.steps=80"]).collect();
+    let scene = load("tension", &sets);
+    let (plan, expected) = (planned(&scene), alone(&scene, 1 << 20));
+    let ends = |is_noisy: bool| {
+        on_ranks(2, |team| {
+            let team = if is_noisy { Team::new(Noisy(team)) } else { team };
+            let mut looks = Looks::every(1 << 20);
+            let outcome = run_shared(plan.clone(), None, &team, &mut looks).expect("can be shared");
+            End::of(&outcome, looks.seen)
+        })
+    };
+    assert!(ends(false).iter().all(|end| *end == expected));
+    assert!(ends(true).iter().all(|end| *end != expected));
 }
