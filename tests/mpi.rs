@@ -37,7 +37,6 @@ fn mpirun(ranks: usize, arguments: &[&str], folder: &Path) -> Command {
         ("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1"),
         ("OMPI_MCA_rmaps_base_oversubscribe", "1"),
         ("OMPI_MCA_mpi_yield_when_idle", "1"),
-        ("OMPI_MCA_odls_base_sigkill_timeout", "20"),
     ] {
         command.env(name, value);
     }
@@ -162,9 +161,10 @@ fn long_alone() -> tempfile::TempDir {
     folder
 }
 
-/// The long run on ranks, once it has kept a checkpoint.
-fn begun(ranks: usize, folder: &Path) -> Child {
-    let run = mpirun(ranks, &LONG, folder).spawn().expect("mpirun is installed");
+/// The long run on ranks, once it has kept a checkpoint; so many seconds after it was asked to end it is killed.
+fn begun(ranks: usize, patience: &str, folder: &Path) -> Child {
+    let mut run = mpirun(ranks, &LONG, folder);
+    let run = run.env("OMPI_MCA_odls_base_sigkill_timeout", patience).spawn().expect("mpirun is installed");
     let checkpoint = folder.join("o.unfinished/checkpoint");
     within(PATIENCE, "a checkpoint", || checkpoint.exists().then_some(()));
     run
@@ -193,7 +193,7 @@ fn a_killed_rank_ends_the_run_within_seconds_and_it_goes_on_with_any_number_of_r
     let expected = long_alone();
     for victim in 0..3 {
         let folder = temporary();
-        let mut run = begun(3, folder.path());
+        let mut run = begun(3, "1", folder.path());
         let ranks = ranks_of(&run);
         assert_eq!(ranks.len(), 3, "{ranks:?}");
         let start = Instant::now();
@@ -216,7 +216,7 @@ fn a_killed_rank_ends_the_run_within_seconds_and_it_goes_on_with_any_number_of_r
 fn an_interrupt_ends_all_ranks_at_one_step_from_which_the_run_goes_on() {
     let expected = long_alone();
     let folder = temporary();
-    let mut run = begun(3, folder.path());
+    let mut run = begun(3, "50", folder.path());
     let start = Instant::now();
     signal("INT", run.id());
     let status = within(PATIENCE, "mpirun ends", || run.try_wait().expect("a child"));
