@@ -86,13 +86,26 @@ fn scene_knows_nothing_of_hosts_and_outputs() {
 }
 
 #[test]
+fn ranks_know_nothing_of_what_they_exchange() {
+    assert_imports_only("ranks", &[]);
+}
+
+#[test]
+fn mpi_is_called_in_one_place() {
+    assert_eq!(files_with("use mpi::"), ["ranks/mpi.rs"]);
+}
+
+#[test]
 fn the_engine_knows_no_scene() {
-    assert_imports_only("engine", &["geometry", "flock", "material", "sweep"]);
+    assert_imports_only("engine", &["geometry", "flock", "material", "sweep", "ranks"]);
 }
 
 #[test]
 fn continuum_knows_nothing_of_outputs() {
-    assert_imports_only("continuum", &["geometry", "flock", "solve", "scene", "material", "sweep", "engine"]);
+    assert_imports_only(
+        "continuum",
+        &["geometry", "flock", "solve", "scene", "material", "sweep", "engine", "ranks"],
+    );
 }
 
 #[test]

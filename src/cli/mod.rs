@@ -14,6 +14,7 @@ mod node;
 mod output;
 mod plan;
 mod progress;
+mod ranks;
 mod recording;
 mod replay;
 mod run;
@@ -290,6 +291,8 @@ pub enum Refusal {
     #[cfg(feature = "fem")]
     #[error("{0}")]
     BenchEquilibrium(#[from] bench::equilibrium::EquilibriumError),
+    #[error("{0}")]
+    Ranks(#[from] ranks::RanksError),
     #[error("--threads {threads}: {error}\n  help: give a number from 1 to the machine's cores")]
     Threads { threads: usize, error: std::io::Error },
 }
@@ -364,11 +367,31 @@ pub fn refuse(refusal: &Refusal) -> ExitCode {
         eprintln!("{}", interrupt::NOTHING_KEPT);
         return ExitCode::from(FAILED);
     }
+    if matches!(refusal, Refusal::Ranks(ranks::RanksError::SaidElsewhere)) {
+        // A launcher ends all ranks when one of them fails: the one that speaks fails, and gets to speak.
+        return ExitCode::SUCCESS;
+    }
     eprintln!("error: {}", on_terminal(&refusal.to_string()));
     ExitCode::from(if refusal.is_failure() { FAILED } else { BAD_INPUT })
 }
 
+/// The name of a command whose results several ranks would write over each other.
+fn runs_alone(command: &Command) -> Option<&'static str> {
+    match command {
+        Command::Compare(_) => Some("compare"),
+        Command::Trade(_) => Some("trade"),
+        Command::Sweep(sweep) if !sweep.is_shard() => Some("sweep"),
+        Command::Stability(_) => Some("stability"),
+        Command::Swarm(_) => Some("swarm"),
+        Command::Gallery(_) => Some("gallery"),
+        _ => None,
+    }
+}
+
 pub fn dispatch(command: Command, ros: &RosArguments) -> Result<ExitCode, Refusal> {
+    if let Some(name) = runs_alone(&command) {
+        ranks::require_alone(name)?;
+    }
     match command {
         Command::Run(arguments) => return run::run(&arguments),
         Command::Compare(arguments) => return compare::compare(&arguments),

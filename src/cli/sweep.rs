@@ -85,6 +85,11 @@ enum Sampled {
 }
 
 impl SweepArguments {
+    /// Whether it is one of several that share the runs, each with a folder of its own.
+    pub fn is_shard(&self) -> bool {
+        self.shard.is_some()
+    }
+
     fn request(&self) -> Result<SweepRequest, Refusal> {
         let sampling = match self.sampling {
             Sampled::LatinHypercube => Sampling::LatinHypercube,

@@ -19,4 +19,5 @@ pub mod plan;
 pub mod record;
 pub mod report;
 pub mod run;
+pub mod shares;
 mod weights;

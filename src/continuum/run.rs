@@ -7,11 +7,13 @@ use crate::engine::Engine;
 use crate::engine::movement::{Movement, farthest, first_lost};
 use crate::engine::observer::{EachStep, Observer};
 use crate::engine::several::Reach;
+use crate::engine::shared::{Agreed, NotShared};
 use crate::engine::state::{EngineState, WrongState};
 use crate::flock::law::Weights;
 use crate::flock::rules::{FeedbackReference, Mean};
 use crate::flock::vectors::{Vectors, distance};
-use crate::scene::Stop;
+use crate::ranks::Team;
+use crate::scene::{Scene, SceneError, Stop};
 use crate::solve::equilibrium::Solved;
 use crate::sweep::Order;
 
@@ -112,6 +114,59 @@ pub fn resume(
     Ok(run_loop(state.engine(plan.setup)?, (residual, false), &bounds, observer))
 }
 
+/// Runs a plan, or goes on with it from a state and the residual that was seen with it, shared with the other ranks, which
+/// all must have the same plan. The results are those of a run alone, to the bit, on every rank. The first rank's `observer`
+/// names the steps that are looked at; at these every rank's sees the whole body, and any of them can break the run off.
+///
+/// # Errors
+/// A sweep that cannot be shared, or a state of another body.
+pub fn run_shared(
+    plan: Plan,
+    from: Option<(EngineState, f64)>,
+    team: &Team,
+    observer: &mut dyn Observer,
+) -> Result<Outcome, SharedError> {
+    let mut observer = Agreed { team, own: observer };
+    let bounds = Bounds::of(&plan);
+    let (mut engine, residual) = match from {
+        Some((state, residual)) => (state.engine(plan.setup)?, Some(residual)),
+        None => (Engine::new(plan.setup), None),
+    };
+    engine.join(team.clone())?;
+    let begin = match residual {
+        Some(residual) => (residual, false),
+        None => (f64::INFINITY, observer.see(&engine, f64::INFINITY).is_break()),
+    };
+    Ok(run_loop(engine, begin, &bounds, &mut observer))
+}
+
+/// Whether ranks can share the run of a scene.
+///
+/// # Errors
+/// Names the key that keeps them from it.
+pub fn require_shareable(scene: &Scene) -> Result<(), SceneError> {
+    let help = "run it on one rank, with as many threads as the machine has cores";
+    if scene.equilibrium.is_some() {
+        let help = format!("{help}, or leave [equilibrium] out to step there");
+        return Err(scene.refuse("equilibrium", "ranks share sweeps, and no solver yet", &help));
+    }
+    if scene.update.order == Order::Sequential {
+        return Err(scene.refuse("update.order", NotShared.to_string(), help));
+    }
+    Ok(())
+}
+
+/// The reason why a run cannot be shared.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum SharedError {
+    /// The sweep.
+    #[error("{0}")]
+    Sweep(#[from] NotShared),
+    /// The state that it was to go on from.
+    #[error("{0}")]
+    State(#[from] WrongState),
+}
+
 /// Displacement beyond which sums of squares, which energies are, overflow \[length\].
 const FARTHEST: f64 = 1e153;
 
@@ -158,6 +213,9 @@ fn run_loop(
         let most = look - engine.step();
         batch.advance(&mut engine, most);
         let movement = engine.movement();
+        if !(movement.is_finite && movement.largest_displacement <= *divergence_ratio) {
+            engine.gather();
+        }
         if let Some(divergence) = divergence(&engine, &movement, *divergence_ratio) {
             engine.undo_step();
             break StopReason::Diverged(divergence);
@@ -165,9 +223,11 @@ fn run_loop(
         batch.displacement = movement.largest_displacement;
         residual = movement.largest_move;
         if engine.step() == look || settled(residual, &engine) {
+            engine.gather();
             interrupted = observer.see(&engine, residual).is_break();
         }
     };
+    engine.gather();
     Outcome { engine, reason, residual, solved: None }
 }
 

@@ -2,7 +2,8 @@
 //!
 //! A [`setup::Setup`] becomes an [`Engine`]: in each step roles change and leaders move (`leaders`), bonds break, loads
 //! grow ([`load`]) and the rule is swept; where nothing in between depends on how the body stands, several steps are
-//! taken at once ([`several`]). An [`observer::Observer`] looks at it on its way. [`forces`] are those within a body
+//! taken at once ([`several`]). An [`observer::Observer`] looks at it on its way. Several ranks can share a body
+//! ([`shared`]). [`forces`] are those within a body
 //! that is a material, and what holds it; [`path`] sums up the work done between equilibria. [`state`] takes an engine
 //! out on its way and puts it back, for checkpoints.
 
@@ -15,6 +16,7 @@ pub mod path;
 pub(crate) mod serde_impls;
 pub mod setup;
 pub mod several;
+pub mod shared;
 pub mod state;
 
 use std::sync::Arc;
@@ -31,6 +33,8 @@ use crate::flock::strain::{Strain, strain};
 use crate::flock::vectors::Vectors;
 use crate::material::cells::Cells;
 use crate::material::free_edge::{Edge, FreeEdge};
+use crate::ranks::Team;
+use crate::sweep::domain::Share;
 use crate::sweep::{Activity, Order, Sweep, Update};
 use leaders::Led;
 use load::Load;
@@ -73,6 +77,10 @@ pub struct Engine {
     settled: Option<Vectors>,
     /// Of a body that is put to rest part by part.
     path: Option<Path>,
+    /// Those who share the body.
+    team: Option<(Team, Share)>,
+    /// Whether the positions of all particles are known here; of a shared body, otherwise, those of its own.
+    is_whole: bool,
 }
 
 /// Buffers of a neighbourhood that is found anew at every step.
@@ -127,6 +135,8 @@ impl Engine {
             load: Load::new(ramp, loads),
             settled: None,
             path: None,
+            team: None,
+            is_whole: true,
         };
         engine.follow_ramp();
         // The plan has given the roles that hold from the start; their motions begin here.
@@ -237,6 +247,7 @@ impl Engine {
             self.advance_by(1, None);
             return;
         }
+        self.gather();
         self.step += 1;
         self.settled = None;
         self.follow_ramp();
@@ -248,10 +259,18 @@ impl Engine {
         }
         self.move_leaders();
         self.move_components();
-        self.sweep.step(&self.flock, self.body.frame.as_ref(), &self.present, &mut self.previous);
+        match self.team {
+            None => {
+                self.sweep.step(&self.flock, self.body.frame.as_ref(), &self.present, &mut self.previous);
+            }
+            Some(_) => self.step_shared(),
+        }
         std::mem::swap(&mut self.present, &mut self.previous);
         self.activity.forget();
-        self.activity.count_whole(self.sweep.followers());
+        // The counts of all ranks are added up.
+        if self.team.as_ref().is_none_or(|(team, _)| team.is_first()) {
+            self.activity.count_whole(self.sweep.followers());
+        }
     }
 
     /// Puts particles where they have been seen \[length\], in place of where the last step sent them; frame
@@ -309,7 +328,7 @@ impl Engine {
         self.path.as_ref()
     }
 
-    /// Takes the last step back: positions as before it. Bonds that broke in it stay broken.
+    /// Takes the last step back: positions as before it. A shared body must have been [gathered](Engine::gather). Bonds that broke in it stay broken.
     pub fn undo_step(&mut self) {
         self.return_to(self.step - 1, &self.previous.clone(), self.activity.clone());
     }
@@ -325,7 +344,14 @@ impl Engine {
 
     /// Looks over the last step.
     pub fn movement(&self) -> Movement {
-        Movement::of(&self.present, &self.previous, &self.body.reference, self.body.lattice.spacing())
+        let (all, spacing) =
+            ([&self.present, &self.previous, &self.body.reference], self.body.lattice.spacing());
+        match (&self.team, self.sweep.domain()) {
+            (Some((team, _)), Some(domain)) => {
+                Movement::among(domain.owned(), all, spacing, |own| team.largest(own))
+            }
+            _ => Movement::among(0..self.present.len(), all, spacing, |own| own),
+        }
     }
 
     fn after_role_change(&mut self) {
@@ -343,10 +369,13 @@ impl Engine {
 
     fn compile_sweep(&mut self) {
         self.activity.forget();
+        let share = self.team.as_ref().map_or_else(Share::whole, |(_, share)| *share);
         self.sweep = if self.present_neighbours.is_some() {
-            Sweep::uncompiled(self.update, &self.flock, &self.roles)
+            let mut sweep = Sweep::uncompiled(self.update, &self.flock, &self.roles);
+            sweep.share_with(share);
+            sweep
         } else {
-            Sweep::compile(self.update, &self.flock, &self.roles)
+            Sweep::compile_share(self.update, &self.flock, &self.roles, share)
         };
         self.takes_several = self.sweep.takes_several(self.body.frame.as_ref());
     }

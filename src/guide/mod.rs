@@ -12,6 +12,7 @@
 //! | [`shared_memory`] | the same loop between processes of one computer |
 //! | [`python`] | the Python package: runs, bodies, studies, swarms, errors and threads |
 //! | [`performance`] | how fast bodies step and settle, and how to measure it |
+//! | [`ranks`] | runs shared by several processes over MPI: starting, what is exchanged, what is refused, faults |
 //! | [`files`] | output files of a run, the report, checkpoints, exit codes |
 //! | [`theory`] | the paper's terms and equations, what they imply, where the paper leaves a choice |
 //!
@@ -47,6 +48,9 @@ pub mod python {}
 
 #[doc = include_str!("performance.md")]
 pub mod performance {}
+
+#[doc = include_str!("ranks.md")]
+pub mod ranks {}
 
 #[doc = include_str!("files.md")]
 pub mod files {}
