@@ -290,7 +290,8 @@ pub enum Refusal {
     )]
     Exhibit { name: String, reason: String },
     #[error(
-        "no page can be served{}: {source}\n  help: give another --port, or none", port_words(*.port)
+        "no page can be served{}: {source}\n  help: give another --port, or none",
+        .port.map_or_else(String::new, |port| format!(" at port {port}"))
     )]
     Live { port: Option<u16>, source: std::io::Error },
     #[error("{} is no folder to save in\n  help: make it, or give another as --out", .0.display())]
@@ -306,10 +307,6 @@ pub enum Refusal {
     BenchEquilibrium(#[from] bench::equilibrium::EquilibriumError),
     #[error("--threads {threads}: {error}\n  help: give a number from 1 to the machine's cores")]
     Threads { threads: usize, error: std::io::Error },
-}
-
-fn port_words(port: Option<u16>) -> String {
-    port.map_or_else(String::new, |port| format!(" at port {port}"))
 }
 
 impl Refusal {

@@ -131,6 +131,7 @@ impl Bounds {
     }
 
     /// The divergence that the last step was, if it was one.
+    #[cfg(feature = "live")]
     pub(crate) fn divergence(&self, engine: &Engine) -> Option<Divergence> {
         divergence(engine, &engine.movement(), self.divergence_ratio)
     }

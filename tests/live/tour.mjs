@@ -37,7 +37,9 @@ async function open(context) {
 }
 
 const clock = (page) => page.evaluate(() => window.report.bodies[0].animation.times[0]);
-const later = (page, than) => page.waitForFunction((t) => window.report.bodies[0].animation.times[0] > t, than);
+// By the clock: a page in the background is not refreshed.
+const later = (page, than) =>
+  page.waitForFunction((t) => window.report.bodies[0].animation.times[0] > t, than, { polling: 20 });
 const place = (page, i) => page.evaluate((k) => [window.report.bodies[0].dx[k], window.report.bodies[0].dy[k]], i);
 
 async function shoot(page, name) {
@@ -139,9 +141,6 @@ const context = await chromium.launchPersistentContext(profile, options);
 try {
   const other = await open(context);
   const page = await open(context);
-  // In the background nothing is drawn.
-  const second = await context.browser()?.newContext?.();
-  await second?.close();
   await page.bringToFront();
   await page.click("#play");
   await later(page, 0);

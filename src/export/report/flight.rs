@@ -100,6 +100,7 @@ impl FlightRecorder {
     }
 
     /// Robots as they are, in a single frame; displacements are from `start` \[m\].
+    #[cfg(feature = "live")]
     pub(crate) fn still(swarm: &Swarm, flight: &Flight, start: &Vectors) -> View {
         let recorder = Self::since(flight, start.clone());
         let stage = recorder.begun(swarm, flight.control().formation().names.clone());

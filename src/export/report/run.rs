@@ -177,6 +177,7 @@ impl RunRecorder {
     }
 
     /// A body as it is, in a single frame.
+    #[cfg(feature = "live")]
     pub(crate) fn still(scene: &Scene, engine: &Engine) -> View {
         let mut recorder = Self::new(engine);
         recorder.finish(engine, false);

@@ -8,6 +8,10 @@ import { bodies, data, element, shown, state } from "./shown.js";
 
 // Time between two looks at the range of a quantity, which changes as the body moves, in ms.
 const RANGE_EVERY = 250;
+// Keys worth a try that a file may leave out.
+const SUGGESTED = ["update.damping=0.8", "rule.feedback.factor=-0.05", "fracture.stretch=1.5", "frame=immediate"];
+// Time after which a frame is drawn though the browser does not ask for it, in ms.
+const HIDDEN_EVERY = 300;
 
 const session = { socket: null, status: { alarmed: [], faults: [] }, frame: null, isAsked: false, rangeAt: 0 };
 const measured = { drawn: 0, since: 0, rate: 0, transfer: 0, drawing: 0 };
@@ -112,13 +116,17 @@ function receive(buffer) {
     element("layer-cracks").closest("label").hidden = !body.brokenBonds();
   } else if (kind === "frame") {
     session.frame = buffer;
-    if (session.isAsked) return;
+    // A frame that a later one replaces before it is drawn counts as drawn: the session waits for each.
+    if (session.isAsked) return ask({ do: "drawn", ms: 0 });
     session.isAsked = true;
     requestAnimationFrame(drawLatest);
+    // A page in the background is not refreshed.
+    setTimeout(drawLatest, HIDDEN_EVERY);
   }
 }
 
 function drawLatest() {
+  if (!session.isAsked) return;
   session.isAsked = false;
   const begun = performance.now();
   const frame = bodies[0].frames.take(session.frame);
@@ -170,8 +178,10 @@ function showNumbers() {
     return label;
   });
   element("live-numbers").replaceChildren(...inputs);
+  const known = data.live.keys.map(([key, value]) => `${key}=${value}`);
+  const offered = data.live.swarm ? known : [...known, ...SUGGESTED.filter((text) => !known.some((one) => one.startsWith(text.split("=")[0])))];
   element("live-keys").replaceChildren(
-    ...data.live.keys.map(([key, value]) => Object.assign(document.createElement("option"), { value: `${key}=${value}` })),
+    ...offered.map((value) => Object.assign(document.createElement("option"), { value })),
   );
 }
 
