@@ -16,6 +16,10 @@ use crate::export::report::live_page;
 
 /// Time from one state that is shown to the next, at least.
 const SHOWN_EVERY: Duration = Duration::from_micros(16_000);
+/// Time that requests are waited for: at least while the body moves, as at a slow speed nothing is due for long, and
+/// while it stands still.
+const LEAST_WAIT: Duration = Duration::from_millis(2);
+const IDLE: Duration = Duration::from_millis(50);
 /// Steps that are behind are caught up with for so long, and then forgotten.
 const BUSY: Duration = Duration::from_millis(14);
 /// Saved files of one name.
@@ -101,10 +105,11 @@ impl Conductor {
         self.show();
         let mut shown = Instant::now();
         let mut before = Instant::now();
+        let mut is_news = false;
         while !stop.load(Ordering::Relaxed) {
-            let wait =
-                if self.is_playing { SHOWN_EVERY.saturating_sub(shown.elapsed()) } else { SHOWN_EVERY * 3 };
-            let mut is_news = match requests.recv_timeout(wait) {
+            let due = SHOWN_EVERY.saturating_sub(shown.elapsed()).max(LEAST_WAIT);
+            let wait = if self.is_playing { due } else { IDLE };
+            is_news |= match requests.recv_timeout(wait) {
                 Ok(request) => self.take(request),
                 Err(RecvTimeoutError::Timeout) => false,
                 Err(RecvTimeoutError::Disconnected) => break,
@@ -119,7 +124,7 @@ impl Conductor {
             self.pace.look();
             if is_news && (shown.elapsed() >= SHOWN_EVERY || !self.is_playing) {
                 self.show();
-                shown = Instant::now();
+                (shown, is_news) = (Instant::now(), false);
             }
         }
         self.board.close();
@@ -206,13 +211,10 @@ impl Conductor {
     }
 
     fn save(&self, viewer: Viewer) {
-        let said = match self.session.saved().and_then(|text| Ok((self.write(&text)?, text))) {
-            Ok((path, text)) => {
+        let said = match self.session.saved().and_then(|text| self.write(&text)) {
+            Ok(path) => {
                 let command = format!("flockform {} {}", self.session.runner(), path.display());
-                json!({
-                    "event": "saved", "path": path, "command": command, "text": text,
-                    "left_out": self.session.left_out(),
-                })
+                json!({ "event": "saved", "path": path, "command": command })
             }
             Err(words) => json!({ "event": "refused", "words": words }),
         };

@@ -98,14 +98,6 @@ impl Session {
         }
     }
 
-    /// What a saved file leaves out; empty where nothing.
-    pub fn left_out(&self) -> &'static str {
-        match self {
-            Session::Body(_) => "",
-            Session::Swarm(swarm) => swarm.left_out(),
-        }
-    }
-
     /// The state of every particle; of the channels those that are wanted.
     pub fn frame(&self, wanted: &[bool]) -> Frame {
         match self {

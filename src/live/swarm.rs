@@ -227,11 +227,6 @@ impl Swarm {
         toml::to_string(&raw).map_err(|error| error.to_string())
     }
 
-    /// What the file leaves out: a scene with steps of its own flies as many as it has.
-    pub fn left_out(&self) -> &'static str {
-        ""
-    }
-
     /// The page's view of the robots as they are.
     pub fn view(&self) -> View {
         FlightRecorder::still(&self.now.file, &self.now.flight, self.start())

@@ -24,6 +24,8 @@ const FLAGS = [
 
 const seen = { errors: [], requests: [], faults: [] };
 
+const mark = (what) => process.env.FLOCKFORM_MARKS && console.error(Math.round(performance.now()), what);
+
 async function open(context) {
   const page = await context.newPage();
   page.setDefaultTimeout(60_000);
@@ -151,11 +153,15 @@ try {
     seen.measured = measured;
     await shoot(page, `${asked.name}-frames`);
   }
+  mark("playing");
   if (asked.drag !== undefined) await drag(page, other);
+  mark("dragged");
   if (asked.cut) {
     await cut(page);
+    mark("cut");
     await shoot(page, `${asked.name}-cut`);
     await undo(page);
+    mark("undone");
     await page.click("#play");
     await cut(page);
     await later(page, (await clock(page)) + 20);

@@ -77,7 +77,7 @@ function connect() {
 function hear(event) {
   if (event.event === "refused") say(event.words);
   else if (event.event === "saved") {
-    say(`Saved as ${event.path}. ${event.left_out} Replay: ${event.command}`);
+    say(`Saved as ${event.path}. Replay: ${event.command}`);
     document.body.dataset.saved = event.path;
   } else if (event.event === "status") takeStatus(event);
 }
