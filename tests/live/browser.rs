@@ -39,7 +39,7 @@ fn assert_shown(seen: &Value, displacements: impl Iterator<Item = [f64; 2]>) {
     for (i, u) in displacements.enumerate() {
         for (axis, along) in u.into_iter().enumerate() {
             let shown = seen["places"][axis][i].as_f64().expect("a number");
-            assert_eq!(shown, f64::from(along as f32), "particle {i}");
+            assert_eq!((shown as f32).to_bits(), (along as f32).to_bits(), "particle {i}");
         }
     }
 }
