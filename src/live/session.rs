@@ -98,11 +98,11 @@ impl Session {
         }
     }
 
-    /// The state of every particle; of the channels those that are wanted.
+    /// The state of every particle, of a body with those channels alone that are wanted.
     pub fn frame(&self, wanted: &[bool]) -> Frame {
         match self {
             Session::Body(body) => body.frame(wanted),
-            Session::Swarm(swarm) => swarm.frame(wanted),
+            Session::Swarm(swarm) => swarm.frame(),
         }
     }
 

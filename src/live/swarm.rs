@@ -237,8 +237,8 @@ impl Swarm {
         &self.now.flight.control().formation().places
     }
 
-    /// The state of every robot; of the channels those that are wanted.
-    pub fn frame(&self, wanted: &[bool]) -> Frame {
+    /// The state of every robot, with all channels.
+    pub fn frame(&self) -> Frame {
         let (control, places, start) =
             (self.now.flight.control(), self.now.flight.fleet().places(), self.start());
         let moved = |now: &[f64], then: &[f64]| now.iter().zip(then).map(|(n, t)| (n - t) as f32).collect();
@@ -253,8 +253,7 @@ impl Swarm {
             _ => measures.strain[m].map_or(f64::NAN, |strain| strain.largest()),
         };
         let channel = |name: &str| (0..places.len()).map(|m| of(name, m) as f32).collect();
-        let channels = CHANNELS.into_iter().zip(wanted);
-        let channels = channels.map(|(name, wanted)| wanted.then(|| channel(name))).collect();
+        let channels = CHANNELS.into_iter().map(|name| Some(channel(name))).collect();
         Frame { clock: self.now.flight.fleet().time(), places: places_moved, channels }
     }
 
