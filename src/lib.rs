@@ -25,6 +25,7 @@
 //! * `ros` (feature `ros`): the same over ROS 2: arguments, parameters, lifecycle, the node.
 //! * `shm` (feature `shm`): the same over shared memory, without a copy; a running body published to other processes.
 //! * `record` (feature `record`): recordings of flights and runs for Foxglove and `ros2 bag`, and their replay.
+//! * `live` (feature `live`): a body or a swarm under the reader's hands: a session, and the page that shows it.
 //! * `bench` (feature `bench`): how fast sweeps and solvers are, beside what the machine and others can do.
 //! * `python` (feature `python`): the Python package; `pip install ./src/python` builds it (guide [`python`](guide::python)).
 //!
@@ -64,6 +65,8 @@ pub mod bench;
 pub mod export;
 #[cfg(feature = "fem")]
 pub mod fem;
+#[cfg(feature = "live")]
+pub mod live;
 #[allow(
     missing_docs,
     reason = "fields are those of the published interface definitions, which say what they mean"

@@ -169,6 +169,21 @@ fn python_stands_above_the_rooms_that_compute_and_below_no_other() {
     assert_imports_only("python", &below);
 }
 
+#[test]
+fn live_sessions_show_bodies_and_swarms_and_know_nothing_of_middleware() {
+    assert_imports_only("live", &["scene", "continuum", "engine", "flock", "swarm", "export", "study"]);
+}
+
+#[test]
+fn live_sessions_answer_this_computer_alone() {
+    let opens = ["TcpListener::bind", "UdpSocket::bind"].map(|word| files_with(word).into_iter());
+    let own: Vec<String> = opens.into_iter().flatten().filter(|file| file.starts_with("live/")).collect();
+    assert_eq!(own, ["live/server.rs"]);
+    let server = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/live/server.rs");
+    let text = std::fs::read_to_string(server).expect("readable");
+    assert!(text.contains("TcpListener::bind((Ipv4Addr::LOCALHOST,"));
+}
+
 /// Files of `src` that contain a word.
 fn files_with(word: &str) -> Vec<String> {
     let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");

@@ -7,6 +7,7 @@ mod completions;
 mod gallery;
 mod install;
 mod interrupt;
+mod live;
 pub mod log;
 mod material;
 mod names;
@@ -99,6 +100,13 @@ pub enum Command {
                       Exit codes: 0 flown and every declared bound held, 1 a bound broken or interrupted, 2 bad input."
     )]
     Swarm(swarm::SwarmArguments),
+    /// Shows a body or a swarm in a browser on this computer, to be led by hand, cut and changed while it runs
+    #[command(
+        after_help = "Examples:\n  flockform live tension --open\n  flockform live gap --port 8080\n\n\
+                      Drag leaders, clamps or any particle; cut bonds; change keys; save what was done as a file that \
+                      `flockform run` or `flockform swarm` replays to the bit."
+    )]
+    Live(live::LiveArguments),
     /// Replays a recorded flight and lists where today's targets differ from the recorded ones
     #[command(
         after_help = "Examples:\n  flockform swarm gap --record gap.mcap\n  flockform replay gap.mcap\n  flockform replay gap.mcap --set limits.speed=0.5 --tolerance 0.01\n\n\
@@ -282,6 +290,13 @@ pub enum Refusal {
         "`{name}` left no report for the gallery: {reason}\n  help: run it alone to see why, or name the others"
     )]
     Exhibit { name: String, reason: String },
+    #[error(
+        "no page can be served{}: {source}\n  help: give another --port, or none",
+        .port.map_or_else(String::new, |port| format!(" at port {port}"))
+    )]
+    Live { port: Option<u16>, source: std::io::Error },
+    #[error("{} is no folder to save in\n  help: make it, or give another as --out", .0.display())]
+    LiveFolder(PathBuf),
     #[error("{0}")]
     Option(#[from] material::WrongOption),
     #[error("{0}")]
@@ -399,6 +414,7 @@ pub fn dispatch(command: Command, ros: &RosArguments) -> Result<ExitCode, Refusa
         Command::Sweep(arguments) => return sweep::sweep(&arguments),
         Command::Stability(arguments) => return stability::stability(&arguments),
         Command::Swarm(arguments) => return swarm::swarm(&arguments),
+        Command::Live(arguments) => return live::live(&arguments),
         Command::Replay(arguments) => return replay::replay(&arguments),
         Command::Node(arguments) => return node::node(&arguments, ros),
         Command::Robots(arguments) => return node::robots(&arguments, ros),

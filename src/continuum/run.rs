@@ -171,17 +171,24 @@ pub enum SharedError {
 const FARTHEST: f64 = 1e153;
 
 /// The conditions that end a run.
-struct Bounds {
+#[derive(Clone, Debug)]
+pub(crate) struct Bounds {
     stop: Stop,
     /// Largest displacement over the spacing, as the movement is.
     divergence_ratio: f64,
 }
 
 impl Bounds {
-    fn of(plan: &Plan) -> Self {
+    pub(crate) fn of(plan: &Plan) -> Self {
         let allowed = f64::min(plan.stop.divergence_ratio * plan.diagonal, FARTHEST);
         let divergence_ratio = allowed / plan.setup.body.lattice.spacing();
         Self { stop: plan.stop, divergence_ratio }
+    }
+
+    /// The divergence that the last step was, if it was one.
+    #[cfg(feature = "live")]
+    pub(crate) fn divergence(&self, engine: &Engine) -> Option<Divergence> {
+        divergence(engine, &engine.movement(), self.divergence_ratio)
     }
 }
 

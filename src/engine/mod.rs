@@ -7,6 +7,7 @@
 //! that is a material, and what holds it; [`path`] sums up the work done between equilibria. [`state`] takes an engine
 //! out on its way and puts it back, for checkpoints.
 
+mod actions;
 pub mod forces;
 mod leaders;
 pub mod load;
@@ -40,7 +41,7 @@ use leaders::Led;
 use load::Load;
 use movement::Movement;
 use path::Path;
-use setup::{RoleChange, Setup};
+use setup::{Action, RoleChange, Setup};
 
 /// A body on its way; positions in \[length, world frame\], shape \[count\].
 #[derive(Clone, Debug)]
@@ -53,6 +54,8 @@ pub struct Engine {
     takes_several: bool,
     roles: Vec<Role>,
     changes: Vec<RoleChange>,
+    /// By ascending step.
+    actions: Vec<Action>,
     /// By particle.
     leaders: Vec<Led>,
     /// The particles of `leaders`.
@@ -102,6 +105,7 @@ impl Engine {
             roles,
             changes,
             cuts,
+            actions,
             cells,
             loads,
             ramp,
@@ -122,6 +126,7 @@ impl Engine {
             update,
             roles,
             changes,
+            actions,
             leaders: Vec::new(),
             led: Vec::new(),
             led_components: Vec::new(),
@@ -250,6 +255,7 @@ impl Engine {
         self.gather();
         self.step += 1;
         self.settled = None;
+        self.act();
         self.follow_ramp();
         self.take_roles();
         self.break_bonds();
@@ -337,6 +343,7 @@ impl Engine {
     pub fn is_scheduled(&self) -> bool {
         let waits = |change: &RoleChange| change.when.is_none() && change.from > self.step.max(1);
         self.changes.iter().any(waits)
+            || self.next_action().is_some()
             || self.load.is_growing(self.step)
             || self.leaders.iter().any(|led| self.goes_on(led))
             || self.moves_components()
@@ -385,6 +392,11 @@ impl Engine {
         let known = self.breaks.len();
         let places = (&*self.body.reference, &self.present);
         bonds.break_stretched(self.step, &self.flock.neighbours, places, &self.roles, &mut self.breaks);
+        self.set_torn_aside(known);
+    }
+
+    /// Sweeps the ends of the bonds that have broken since `known` of them were as those of a torn body.
+    fn set_torn_aside(&mut self, known: usize) {
         if self.breaks.len() > known {
             tracing::debug!("step {}: {} bonds break", self.step, self.breaks.len() - known);
             self.takes_several = false;

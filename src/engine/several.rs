@@ -19,6 +19,7 @@ impl Engine {
             return 0;
         }
         let to_come = self.changes.iter().map(|change| change.from).filter(|&from| from > self.step.max(1));
+        let to_come = to_come.chain(self.next_action());
         let until = to_come.min().map_or(usize::MAX, |from| from - 1 - self.step);
         most.min(until).min(self.sweep.steps_together())
     }

@@ -98,10 +98,11 @@ impl EngineState {
     /// its digest against that of the plan that was run.
     pub fn engine(self, setup: Setup) -> Result<Engine, WrongState> {
         let mut engine = Engine::new(setup);
+        engine.step = self.step;
+        engine.conduct_until_now();
         self.require_fits(&engine)?;
         let led =
             |Leading { particle, change, which, since, base }| Led { particle, change, which, since, base };
-        engine.step = self.step;
         engine.follow_ramp();
         engine.present = self.present;
         engine.previous = self.previous;

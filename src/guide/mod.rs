@@ -7,6 +7,7 @@
 //! | [`accuracy`] | rules against finite elements, what an accuracy costs, when a body grows |
 //! | [`fracture`] | bonds that break, cuts, ghosts |
 //! | [`swarms`] | formations of robots: the swarm file, simulated flights, faults, recordings |
+//! | [`live`] | bodies and swarms in a browser, dragged, cut and changed by hand, and saved |
 //! | [`ros2`] | the ROS 2 node: topics, services, parameters, launch files |
 //! | [`security`] | command permissions, failures of robots, peers and the middleware |
 //! | [`shared_memory`] | the same loop between processes of one computer |
@@ -33,6 +34,9 @@ pub mod fracture {}
 
 #[doc = include_str!("swarms.md")]
 pub mod swarms {}
+
+#[doc = include_str!("live.md")]
+pub mod live {}
 
 #[doc = include_str!("ros2.md")]
 pub mod ros2 {}

@@ -113,6 +113,16 @@ impl Channel {
         }
     }
 
+    /// Sends as these say from the next pose on.
+    pub fn set_params(&mut self, params: ChannelParams) {
+        self.params = params;
+    }
+
+    /// The parameters by which it sends.
+    pub fn params(&self) -> ChannelParams {
+        self.params
+    }
+
     /// From the next pose on.
     pub fn set_sender(&mut self, sender: Sender) {
         if sender != self.sender {

@@ -1,6 +1,7 @@
 //! From the scene as written to the scene as meant: degrees to radians, choices to rules, and the
 //! checks that concern several keys at once.
 
+pub(super) mod actions;
 mod equilibrium;
 mod load_steps;
 mod material;
@@ -45,6 +46,20 @@ impl Scene {
         let document = Document::parse(file, text, overrides)?;
         let raw = document.read(&schema())?;
         validate(name, raw, document, folder)
+    }
+}
+
+impl Scene {
+    /// The scene without what puts its body to rest at once: a body to be stepped. Files are looked up in `folder`.
+    ///
+    /// # Errors
+    /// Names a key that needs what was left out.
+    pub fn stepped(&self, folder: Option<&Path>) -> Result<Self, SceneError> {
+        let mut raw = self.raw.clone();
+        if raw.equilibrium.take().is_some() {
+            raw.load_steps = None;
+        }
+        validate(&self.name, raw, self.document.clone(), folder)
     }
 }
 
@@ -153,6 +168,7 @@ pub(super) fn validate(
         roles,
         fracture: fracture(&raw.fracture, refuse)?,
         cuts: cuts(&raw.cuts, refuse)?,
+        actions: actions::actions(&raw, (name, &document, folder), refuse)?,
         stop: Stop {
             steps: raw.stop.steps,
             tolerance: raw.stop.tolerance,

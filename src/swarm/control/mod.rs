@@ -237,6 +237,12 @@ impl Control {
         distance(place, watch.centre) <= watch.range && self.formation.tell(member, place)
     }
 
+    /// As [`Control::tell`], for any leader, whose own program ends with this.
+    pub fn take_over(&mut self, member: usize, place: [f64; 2]) -> bool {
+        let watch = self.watch.limits();
+        distance(place, watch.centre) <= watch.range && self.formation.take_over(member, place)
+    }
+
     /// Moves all leaders by a manoeuvre from the next tick on.
     pub fn begin(&mut self, manoeuvre: &Manoeuvre) {
         let now = self.program_time();
