@@ -35,6 +35,9 @@ pub struct Swarm {
     before: Vec<State>,
 }
 
+/// Each leader that is held and where it was taken \[m\], and where the hand has them.
+type Hand = (Vec<(usize, [f64; 2])>, [f64; 2]);
+
 /// What [`Command::Undo`] returns to.
 #[derive(Clone)]
 struct State {
@@ -46,8 +49,8 @@ struct State {
     faults: Vec<RawFault>,
     /// Noise, delay and loss now.
     channel: (f64, u32, f64),
-    /// What viewers hold: each leader and where it was taken \[m\], and where the hand has them.
-    hands: BTreeMap<Viewer, (Vec<(usize, [f64; 2])>, [f64; 2])>,
+    /// What viewers hold.
+    hands: BTreeMap<Viewer, Hand>,
     alarms: Vec<Alarm>,
     layout: u64,
 }
