@@ -9,6 +9,12 @@ use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
 use command::{flockform, text};
+use flockform::Engine;
+use flockform::continuum::digest::digest;
+use flockform::continuum::plan::Plan;
+use flockform::engine::state::EngineState;
+use flockform::export::checkpoint::{Checkpoint, RunRequest};
+use flockform::scene::bundled;
 use folders::{files, names_in, temporary};
 use signals::signal;
 use waits::within;
@@ -24,12 +30,13 @@ mod signals;
 #[path = "common/waits.rs"]
 mod waits;
 
+const PROGRAM: &str = env!("CARGO_BIN_EXE_flockform");
 const PATIENCE: Duration = Duration::from_secs(60);
 
 /// The program on so many ranks, more than there may be cores, as whoever runs the tests.
 fn mpirun(ranks: usize, arguments: &[&str], folder: &Path) -> Command {
     let mut command = Command::new("mpirun");
-    command.args(["-n", &ranks.to_string(), env!("CARGO_BIN_EXE_flockform")]).args(arguments);
+    command.args(["-n", &ranks.to_string(), PROGRAM]).args(arguments);
     command.current_dir(folder).env_remove("RUST_LOG");
     // Open MPI's; MPICH asks for none of it.
     for (name, value) in [
@@ -138,6 +145,45 @@ fn what_is_wrong_is_said_once_and_nothing_is_left() {
     }
 }
 
+/// Leaves what a run that was killed after so many steps leaves, and returns the words that go on with it.
+fn killed(folder: &Path, out: &'static str, steps: usize) -> [&'static str; 3] {
+    let scene = bundled("tension").expect("bundled").load(&[]).expect("valid");
+    let plan = Plan::new(&scene).expect("fits");
+    let sum = digest(&plan);
+    let mut engine = Engine::new(plan.setup);
+    (0..steps).for_each(|_| engine.advance());
+    let asked = RunRequest { scene: "tension".into(), set: Vec::new(), force: false };
+    let state = (EngineState::of(&engine), f64::INFINITY);
+    let left = Checkpoint::new((&asked, &scene, sum), state, (&[], &[], &[], None), Duration::ZERO);
+    let folder = folder.join(out);
+    std::fs::create_dir(&folder).expect("a folder");
+    left.write(&folder).expect("written");
+    ["run", "--resume", out]
+}
+
+#[test]
+#[ignore = "needs mpirun"]
+fn ranks_that_are_to_make_different_runs_are_refused() {
+    let folder = temporary();
+    let resumed = [killed(folder.path(), "p", 10), killed(folder.path(), "q", 20)];
+    let before = names_in(folder.path());
+    let set = |words: &'static str| ["run", "tension", "--set", words];
+    for [first, second] in [
+        // A frame is no part of the planned body.
+        [&set("frame=mirror")[..], &set("frame=immediate")],
+        [&set("lattice.spacing=0.5"), &set("lattice.spacing=0.25")],
+        [&resumed[0], &resumed[1]],
+        [&["run", "tension"], &resumed[0]],
+    ] {
+        let both = [first, &[":", "-n", "1", PROGRAM], second].concat();
+        let output = on_ranks(1, &both, folder.path());
+        let said = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{both:?}: {said}");
+        assert!(said.contains("rank 1 is to make another run than rank 0"), "{both:?}: {said}");
+        assert_eq!(names_in(folder.path()), before, "{both:?}");
+    }
+}
+
 /// A run that is looked at after each of its steps, which take a while on ranks, with checkpoints.
 const LONG: [&str; 12] = [
     "run",
@@ -179,7 +225,7 @@ fn ranks_of(mpirun: &Child) -> Vec<u32> {
     };
     let is_rank = |&process: &u32| {
         let file = std::fs::read_link(format!("/proc/{process}/exe")).unwrap_or_default();
-        file == Path::new(env!("CARGO_BIN_EXE_flockform"))
+        file == Path::new(PROGRAM)
     };
     // MPICH has a process of its own in between.
     let first = children(mpirun.id());

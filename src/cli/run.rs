@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use clap::Args;
-use flockform::continuum::digest::digest;
+use flockform::continuum::digest::{digest, fnv1a};
 use flockform::continuum::equilibrium::run_to_equilibrium_watched;
 use flockform::continuum::looks::Looks;
 use flockform::continuum::plan::Plan;
@@ -112,6 +112,14 @@ impl Prepared {
         left.as_ref().map_or(Ok(()), |left| left.require_of(&scene, digest))?;
         Ok(Self { left, asked, scene, words, plan, digest })
     }
+
+    /// A fingerprint of what all ranks must have in common: plan, scene, and the state to go on from.
+    fn common(&self) -> u64 {
+        let scene = serde_json::to_vec(&self.scene.raw).expect("a scene was read from text");
+        let state = self.left.iter().flat_map(|left| left.checkpoint.fingerprint().to_le_bytes());
+        let all: Vec<u8> = self.digest.to_le_bytes().into_iter().chain(scene).chain(state).collect();
+        fnv1a(&all)
+    }
 }
 
 /// The part of a rank that neither prints nor writes.
@@ -121,9 +129,10 @@ fn help_to_run(arguments: &RunArguments, team: &Team) -> Result<ExitCode, Refusa
         Ok(prepared) => prepared,
         Err(refusal) => return Err(begin.refused(refusal)),
     };
-    begin.agree(prepared.digest)?;
+    let common = prepared.common();
+    begin.agree(common)?;
     let mut observer = Interrupted(interrupt::serves());
-    begin.begin(prepared.digest)?;
+    begin.begin(common)?;
     let from = prepared.left.map(|left| left.checkpoint).map(|from| (from.engine, from.residual));
     // The first rank says how it ended, in its exit code too: all have the same.
     run_shared(prepared.plan, from, team, &mut observer).map_err(|_| ranks::RanksError::SaidElsewhere)?;
@@ -133,8 +142,10 @@ fn help_to_run(arguments: &RunArguments, team: &Team) -> Result<ExitCode, Refusa
 fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, Refusal> {
     let start = Instant::now();
     let mut begin = Start::new(team);
-    let Prepared { left, asked, scene, words, plan, digest } = Prepared::new(arguments, team)?;
-    begin.agree(digest)?;
+    let prepared = Prepared::new(arguments, team)?;
+    let common = team.map_or(0, |_| prepared.common());
+    let Prepared { left, asked, scene, words, plan, digest } = prepared;
+    begin.agree(common)?;
     let shown = arguments.publish.as_ref();
     let open = |name: &String| Positions::open(&Domain::from_environment()?, name, plan.count());
     let shown = shown.map(open).transpose()?;
@@ -165,7 +176,7 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
         looks,
         interrupted,
     };
-    begin.begin(digest)?;
+    begin.begin(common)?;
     let from = left.map(|left| left.checkpoint).map(|Checkpoint { engine, residual, .. }| (engine, residual));
     let outcome = match (team, from) {
         (Some(team), from) => run_shared(plan, from, team, &mut observer)
