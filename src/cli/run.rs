@@ -76,7 +76,8 @@ pub fn run(arguments: &RunArguments) -> Result<ExitCode, Refusal> {
     let team = ranks::team()?;
     let threads = usize::from(arguments.threads.unwrap_or(0));
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-    let pool = pool.map_err(|error| Refusal::threads(threads, error))?;
+    // The others wait already: a rank without threads has to tell them.
+    let pool = pool.map_err(|error| Start::new(team.as_ref()).refused(Refusal::threads(threads, error)))?;
     pool.install(|| match team.as_ref() {
         Some(team) if !team.is_first() => help_to_run(arguments, team),
         team => run_here(arguments, team),
