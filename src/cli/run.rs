@@ -100,11 +100,12 @@ impl Prepared {
         let left = arguments.checkpoints.left()?;
         let asked = arguments.asked(left.as_ref());
         let words_of = SceneArguments { scene: asked.scene.clone(), set: asked.set.clone() };
-        let Chosen { mut scene, words } =
-            choose(words_of.load([])?, &|more: &[String]| words_of.load_scene(more))?;
+        let scene = words_of.load([])?;
+        // Before a choice, which solves the scene several times.
         if team.is_some() {
             require_shareable(&scene)?;
         }
+        let Chosen { mut scene, words } = choose(scene, &|more: &[String]| words_of.load_scene(more))?;
         if let Some(equilibrium) = &mut scene.equilibrium {
             equilibrium.request.interrupt = Interrupt::new(interrupt::flag());
         }
