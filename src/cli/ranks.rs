@@ -1,6 +1,9 @@
 //! Ranks: whether this program is one of several that a launcher has started, and how they begin a run together.
 
+use std::fs::File;
+use std::io::Read;
 use std::ops::ControlFlow;
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use flockform::continuum::digest::fnv1a;
@@ -157,9 +160,27 @@ fn first_wrong(all: &[Words]) -> Option<(usize, RanksError)> {
 
 /// A fingerprint of this program's file; of its version where the file cannot be read.
 fn program_hash() -> u64 {
-    let file = std::env::current_exe().and_then(std::fs::read);
-    file.map_or_else(|_| fnv1a(env!("CARGO_PKG_VERSION").as_bytes()), |bytes| fnv1a(&bytes))
+    static HASH: OnceLock<u64> = OnceLock::new();
+    let file = || hash_of(File::open(std::env::current_exe()?)?);
+    *HASH.get_or_init(|| file().unwrap_or_else(|_| fnv1a(env!("CARGO_PKG_VERSION").as_bytes())))
 }
+
+/// Hashes what is too large to be held by every rank: piece by piece, each after the hash of those before it.
+fn hash_of(mut file: impl Read) -> std::io::Result<u64> {
+    let mut hash = 0u64;
+    let mut piece = Vec::new();
+    loop {
+        piece.clear();
+        piece.extend(hash.to_le_bytes());
+        if file.by_ref().take(PIECE).read_to_end(&mut piece)? == 0 {
+            return Ok(hash);
+        }
+        hash = fnv1a(&piece);
+    }
+}
+
+/// Bytes of a file that are held at once.
+const PIECE: u64 = 1 << 16;
 
 /// The observer on all ranks but the first: an interrupt that reaches any of them ends the run on all, at the same step.
 pub struct Interrupted(pub &'static AtomicBool);
@@ -188,5 +209,19 @@ mod tests {
         assert!(rank == 1 && words.contains("rank 1 has another program"), "{words}");
         assert_eq!(wrong(&[[1, 2, 3], [1, 9, 3], [0, 0, 0]]).map(|(rank, _)| rank), Some(2));
         assert_eq!(wrong(&[[0, 0, 0], [1, 9, 3]]).map(|(rank, _)| rank), Some(0));
+    }
+
+    #[test]
+    fn every_piece_of_a_file_counts() {
+        let hash = |bytes: &[u8]| hash_of(bytes).expect("readable");
+        let mut bytes = vec![7; 3 * 65536 + 5];
+        let whole = hash(&bytes);
+        assert_eq!(whole, hash(&bytes));
+        assert_ne!(whole, hash(&bytes[..3 * 65536]));
+        for place in [0, 65536, 3 * 65536 + 4] {
+            bytes[place] = 8;
+            assert_ne!(whole, hash(&bytes), "{place}");
+            bytes[place] = 7;
+        }
     }
 }
