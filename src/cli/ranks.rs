@@ -1,6 +1,9 @@
 //! Ranks: whether this program is one of several that a launcher has started, and how they begin a run together.
 
+use std::fs::File;
+use std::io::Read;
 use std::ops::ControlFlow;
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use flockform::continuum::digest::fnv1a;
@@ -30,9 +33,9 @@ pub enum RanksError {
     )]
     OtherProgram { rank: usize },
     #[error(
-        "rank {rank} has planned another body than rank 0\n  help: give every machine the same scene file and options"
+        "rank {rank} is to make another run than rank 0\n  help: give every rank the same scene, files and options, and the same checkpoint to resume from"
     )]
-    OtherBody { rank: usize },
+    OtherRun { rank: usize },
     #[error("{refusal}\n  (on rank {rank})")]
     OnRank { rank: usize, refusal: Box<Refusal> },
     #[error(
@@ -85,7 +88,7 @@ pub struct Start<'a> {
     is_over: bool,
 }
 
-/// What ranks say to each other before they begin: whether they are ready, their program and their body.
+/// What ranks say to each other before they begin: whether they are ready, their program and their run.
 type Words = [u64; 3];
 
 impl<'a> Start<'a> {
@@ -93,10 +96,10 @@ impl<'a> Start<'a> {
         Self { team, is_over: team.is_none() }
     }
 
-    /// Waits until all ranks have come this far, with the same body.
-    pub fn agree(&mut self, digest: u64) -> Result<(), RanksError> {
+    /// Waits until all ranks have come this far, with the same run: `common` is the fingerprint of it.
+    pub fn agree(&mut self, common: u64) -> Result<(), RanksError> {
         let Some(team) = self.team else { return Ok(()) };
-        let all = team.each([1, program_hash(), digest]);
+        let all = team.each([1, program_hash(), common]);
         let wrong = first_wrong(&all);
         self.is_over = wrong.is_some();
         match wrong {
@@ -108,8 +111,8 @@ impl<'a> Start<'a> {
     }
 
     /// The same, as the last thing before the run.
-    pub fn begin(mut self, digest: u64) -> Result<(), RanksError> {
-        let agreed = self.agree(digest);
+    pub fn begin(mut self, common: u64) -> Result<(), RanksError> {
+        let agreed = self.agree(common);
         self.is_over = true;
         agreed
     }
@@ -140,11 +143,11 @@ impl Drop for Start<'_> {
 
 /// The first rank that is not ready for the same run as the first one.
 fn first_wrong(all: &[Words]) -> Option<(usize, RanksError)> {
-    let [_, program, digest] = *all.first()?;
+    let [_, program, common] = *all.first()?;
     let wrong = |(rank, words): (usize, &Words)| match *words {
         [0, ..] => Some((rank, RanksError::SaidElsewhere)),
         [_, other, _] if other != program => Some((rank, RanksError::OtherProgram { rank })),
-        [_, _, other] if other != digest => Some((rank, RanksError::OtherBody { rank })),
+        [_, _, other] if other != common => Some((rank, RanksError::OtherRun { rank })),
         _ => None,
     };
     // A refusal comes before a comparison with words that are none.
@@ -157,9 +160,27 @@ fn first_wrong(all: &[Words]) -> Option<(usize, RanksError)> {
 
 /// A fingerprint of this program's file; of its version where the file cannot be read.
 fn program_hash() -> u64 {
-    let file = std::env::current_exe().and_then(std::fs::read);
-    file.map_or_else(|_| fnv1a(env!("CARGO_PKG_VERSION").as_bytes()), |bytes| fnv1a(&bytes))
+    static HASH: OnceLock<u64> = OnceLock::new();
+    let file = || hash_of(File::open(std::env::current_exe()?)?);
+    *HASH.get_or_init(|| file().unwrap_or_else(|_| fnv1a(env!("CARGO_PKG_VERSION").as_bytes())))
 }
+
+/// Hashes what is too large to be held by every rank: piece by piece, each after the hash of those before it.
+fn hash_of(mut file: impl Read) -> std::io::Result<u64> {
+    let mut hash = 0u64;
+    let mut piece = Vec::new();
+    loop {
+        piece.clear();
+        piece.extend(hash.to_le_bytes());
+        if file.by_ref().take(PIECE).read_to_end(&mut piece)? == 0 {
+            return Ok(hash);
+        }
+        hash = fnv1a(&piece);
+    }
+}
+
+/// Bytes of a file that are held at once.
+const PIECE: u64 = 1 << 16;
 
 /// The observer on all ranks but the first: an interrupt that reaches any of them ends the run on all, at the same step.
 pub struct Interrupted(pub &'static AtomicBool);
@@ -182,11 +203,25 @@ mod tests {
     fn the_first_rank_that_differs_is_named() {
         let wrong = |all: &[Words]| first_wrong(all).map(|(rank, error)| (rank, error.to_string()));
         assert_eq!(wrong(&[[1, 2, 3], [1, 2, 3]]), None);
-        let (rank, words) = wrong(&[[1, 2, 3], [1, 2, 3], [1, 2, 4]]).expect("another body");
-        assert!(rank == 2 && words.contains("rank 2 has planned another body"), "{words}");
+        let (rank, words) = wrong(&[[1, 2, 3], [1, 2, 3], [1, 2, 4]]).expect("another run");
+        assert!(rank == 2 && words.contains("rank 2 is to make another run"), "{words}");
         let (rank, words) = wrong(&[[1, 2, 3], [1, 9, 4], [1, 2, 4]]).expect("another program");
         assert!(rank == 1 && words.contains("rank 1 has another program"), "{words}");
         assert_eq!(wrong(&[[1, 2, 3], [1, 9, 3], [0, 0, 0]]).map(|(rank, _)| rank), Some(2));
         assert_eq!(wrong(&[[0, 0, 0], [1, 9, 3]]).map(|(rank, _)| rank), Some(0));
+    }
+
+    #[test]
+    fn every_piece_of_a_file_counts() {
+        let hash = |bytes: &[u8]| hash_of(bytes).expect("readable");
+        let mut bytes = vec![7; 3 * 65536 + 5];
+        let whole = hash(&bytes);
+        assert_eq!(whole, hash(&bytes));
+        assert_ne!(whole, hash(&bytes[..3 * 65536]));
+        for place in [0, 65536, 3 * 65536 + 4] {
+            bytes[place] = 8;
+            assert_ne!(whole, hash(&bytes), "{place}");
+            bytes[place] = 7;
+        }
     }
 }

@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use clap::Args;
-use flockform::continuum::digest::digest;
+use flockform::continuum::digest::{digest, fnv1a};
 use flockform::continuum::equilibrium::run_to_equilibrium_watched;
 use flockform::continuum::looks::Looks;
 use flockform::continuum::plan::Plan;
@@ -76,7 +76,8 @@ pub fn run(arguments: &RunArguments) -> Result<ExitCode, Refusal> {
     let team = ranks::team()?;
     let threads = usize::from(arguments.threads.unwrap_or(0));
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-    let pool = pool.map_err(|error| Refusal::threads(threads, error))?;
+    // The others wait already: a rank without threads has to tell them.
+    let pool = pool.map_err(|error| Start::new(team.as_ref()).refused(Refusal::threads(threads, error)))?;
     pool.install(|| match team.as_ref() {
         Some(team) if !team.is_first() => help_to_run(arguments, team),
         team => run_here(arguments, team),
@@ -99,11 +100,12 @@ impl Prepared {
         let left = arguments.checkpoints.left()?;
         let asked = arguments.asked(left.as_ref());
         let words_of = SceneArguments { scene: asked.scene.clone(), set: asked.set.clone() };
-        let Chosen { mut scene, words } =
-            choose(words_of.load([])?, &|more: &[String]| words_of.load_scene(more))?;
+        let scene = words_of.load([])?;
+        // Before a choice, which solves the scene several times.
         if team.is_some() {
             require_shareable(&scene)?;
         }
+        let Chosen { mut scene, words } = choose(scene, &|more: &[String]| words_of.load_scene(more))?;
         if let Some(equilibrium) = &mut scene.equilibrium {
             equilibrium.request.interrupt = Interrupt::new(interrupt::flag());
         }
@@ -111,6 +113,14 @@ impl Prepared {
         let digest = digest(&plan);
         left.as_ref().map_or(Ok(()), |left| left.require_of(&scene, digest))?;
         Ok(Self { left, asked, scene, words, plan, digest })
+    }
+
+    /// A fingerprint of what all ranks must have in common: plan, scene, and the state to go on from.
+    fn common(&self) -> u64 {
+        let scene = serde_json::to_vec(&self.scene.raw).expect("a scene was read from text");
+        let state = self.left.iter().flat_map(|left| left.checkpoint.fingerprint().to_le_bytes());
+        let all: Vec<u8> = self.digest.to_le_bytes().into_iter().chain(scene).chain(state).collect();
+        fnv1a(&all)
     }
 }
 
@@ -121,9 +131,10 @@ fn help_to_run(arguments: &RunArguments, team: &Team) -> Result<ExitCode, Refusa
         Ok(prepared) => prepared,
         Err(refusal) => return Err(begin.refused(refusal)),
     };
-    begin.agree(prepared.digest)?;
+    let common = prepared.common();
+    begin.agree(common)?;
     let mut observer = Interrupted(interrupt::serves());
-    begin.begin(prepared.digest)?;
+    begin.begin(common)?;
     let from = prepared.left.map(|left| left.checkpoint).map(|from| (from.engine, from.residual));
     // The first rank says how it ended, in its exit code too: all have the same.
     run_shared(prepared.plan, from, team, &mut observer).map_err(|_| ranks::RanksError::SaidElsewhere)?;
@@ -133,8 +144,10 @@ fn help_to_run(arguments: &RunArguments, team: &Team) -> Result<ExitCode, Refusa
 fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, Refusal> {
     let start = Instant::now();
     let mut begin = Start::new(team);
-    let Prepared { left, asked, scene, words, plan, digest } = Prepared::new(arguments, team)?;
-    begin.agree(digest)?;
+    let prepared = Prepared::new(arguments, team)?;
+    let common = team.map_or(0, |_| prepared.common());
+    let Prepared { left, asked, scene, words, plan, digest } = prepared;
+    begin.agree(common)?;
     let shown = arguments.publish.as_ref();
     let open = |name: &String| Positions::open(&Domain::from_environment()?, name, plan.count());
     let shown = shown.map(open).transpose()?;
@@ -165,7 +178,7 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
         looks,
         interrupted,
     };
-    begin.begin(digest)?;
+    begin.begin(common)?;
     let from = left.map(|left| left.checkpoint).map(|Checkpoint { engine, residual, .. }| (engine, residual));
     let outcome = match (team, from) {
         (Some(team), from) => run_shared(plan, from, team, &mut observer)
