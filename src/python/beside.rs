@@ -8,7 +8,8 @@ use std::time::Duration;
 
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
-use rayon::ThreadPool;
+
+use super::threads::Threads;
 
 /// Time between two looks for a signal.
 const BETWEEN_LOOKS: Duration = Duration::from_millis(50);
@@ -47,14 +48,15 @@ pub(super) fn beside<T: Send + 'static>(
     callback: Option<&Bound<'_, PyAny>>,
     work: impl FnOnce(&Progress) -> T + Send + 'static,
 ) -> PyResult<T> {
-    let pool = pool()?;
+    let threads = Threads::taken()?;
     let flag = taken_flag();
     let progress = Arc::new(Progress { flag, step: AtomicUsize::new(0), residual: AtomicU64::new(0) });
     let (send, receive) = sync_channel(1);
     let receive = Mutex::new(receive);
     let shown = Arc::clone(&progress);
     let job = move || {
-        let result = catch_unwind(AssertUnwindSafe(|| pool.install(|| work(&shown))));
+        let result = catch_unwind(AssertUnwindSafe(|| threads.install(|| work(&shown))));
+        drop(threads);
         give_back(flag);
         // Nobody waits for what was interrupted.
         let _ = send.send(result);
@@ -70,9 +72,7 @@ pub(super) fn beside<T: Send + 'static>(
         let seen = py.check_signals().and_then(|()| callback.map_or(Ok(()), |one| progress.call(one)));
         if let Err(error) = seen {
             flag.store(true, Ordering::Relaxed);
-            if matches!(wait(py, &receive, GRACE), Err(RecvTimeoutError::Timeout)) {
-                retire_pool();
-            }
+            let _ = wait(py, &receive, GRACE);
             return Err(error);
         }
     }
@@ -105,31 +105,4 @@ fn taken_flag() -> &'static AtomicBool {
 fn give_back(flag: &'static AtomicBool) {
     flag.store(false, Ordering::Relaxed);
     FLAGS.lock().unwrap_or_else(PoisonError::into_inner).push(flag);
-}
-
-/// The threads that compute, and the process that they are in.
-static POOL: Mutex<Option<(u32, Arc<ThreadPool>)>> = Mutex::new(None);
-
-/// The threads of this process: a child that was forked, as `multiprocessing` does it, has none of its parent's and gets
-/// its own. `RAYON_NUM_THREADS` says how many; without it there are as many as processors.
-pub(super) fn pool() -> PyResult<Arc<ThreadPool>> {
-    let mut kept = POOL.lock().unwrap_or_else(PoisonError::into_inner);
-    let here = std::process::id();
-    if let Some((process, pool)) = &*kept
-        && *process == here
-    {
-        return Ok(Arc::clone(pool));
-    }
-    let built = rayon::ThreadPoolBuilder::new().build();
-    let pool = Arc::new(built.map_err(|error| PyRuntimeError::new_err(error.to_string()))?);
-    // The parent's threads are not here to be ended.
-    if let Some(foreign) = kept.replace((here, Arc::clone(&pool))) {
-        std::mem::forget(foreign);
-    }
-    Ok(pool)
-}
-
-/// Leaves the threads to the work that did not end: what comes next gets others and does not wait for them.
-fn retire_pool() {
-    drop(POOL.lock().unwrap_or_else(PoisonError::into_inner).take());
 }

@@ -9,10 +9,11 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use super::arrays::{indices, moved, pairs, places, rows};
-use super::beside::{beside, pool};
+use super::beside::beside;
 use super::errors::{as_dict, diverged};
 use super::run::{interrupt_by, positive, words};
 use super::source::Source;
+use super::threads::{Threads, here};
 use crate::continuum::equilibrium::{run_to_equilibrium, solve_equilibrium};
 use crate::continuum::mechanics::{Mechanics, Stresses};
 use crate::continuum::run::{Outcome, StopReason, overflow};
@@ -166,9 +167,9 @@ impl Body {
     #[pyo3(signature = (steps=1))]
     fn advance(&mut self, py: Python<'_>, steps: i64) -> PyResult<()> {
         let end = self.engine.step().saturating_add(positive("steps", steps)?);
-        let pool = pool()?;
+        let threads = Threads::taken()?;
         while self.engine.step() < end {
-            py.detach(|| pool.install(|| self.go(end)));
+            py.detach(|| threads.install(|| self.go(end)));
             if let Some(divergence) = overflow(&self.engine) {
                 return Err(diverged(&divergence));
             }
@@ -316,8 +317,7 @@ impl Body {
     /// particles (count, 3), particle_von_mises (count,). NaN across a broken bond, and for a particle in no cell.
     fn stress<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let elastic = self.elastic()?;
-        let pool = pool()?;
-        let found = py.detach(|| pool.install(|| Stresses::at_present(&self.engine, elastic)));
+        let found = here(py, || Stresses::at_present(&self.engine, elastic))?;
         let (Some(stresses), Some(cells)) = (found, self.engine.cells()) else {
             return Err(self.without_stiffness().into());
         };
