@@ -20,11 +20,34 @@ const GRACE: Duration = Duration::from_millis(500);
 pub(super) struct Progress {
     /// Raised for the work to end.
     pub(super) flag: &'static AtomicBool,
+    /// Whether the flag is another's by now.
+    is_over: Mutex<bool>,
     step: AtomicUsize,
     residual: AtomicU64,
 }
 
 impl Progress {
+    fn new() -> Self {
+        let (flag, is_over) = (taken_flag(), Mutex::new(false));
+        Self { flag, is_over, step: AtomicUsize::new(0), residual: AtomicU64::new(0) }
+    }
+
+    /// Tells the work to end, unless it has.
+    fn end(&self) {
+        let is_over = self.is_over.lock().unwrap_or_else(PoisonError::into_inner);
+        if !*is_over {
+            self.flag.store(true, Ordering::Relaxed);
+        }
+    }
+
+    /// Gives the flag back. The work itself does it once it is done, so that no other work sees the flag of one that still
+    /// has to end.
+    fn give_back(&self) {
+        *self.is_over.lock().unwrap_or_else(PoisonError::into_inner) = true;
+        self.flag.store(false, Ordering::Relaxed);
+        FLAGS.lock().unwrap_or_else(PoisonError::into_inner).push(self.flag);
+    }
+
     /// Reports the step that the work has come to; whether to end.
     pub(super) fn step(&self, step: usize, residual: f64) -> bool {
         self.step.store(step, Ordering::Relaxed);
@@ -49,15 +72,14 @@ pub(super) fn beside<T: Send + 'static>(
     work: impl FnOnce(&Progress) -> T + Send + 'static,
 ) -> PyResult<T> {
     let threads = Threads::taken()?;
-    let flag = taken_flag();
-    let progress = Arc::new(Progress { flag, step: AtomicUsize::new(0), residual: AtomicU64::new(0) });
+    let progress = Arc::new(Progress::new());
     let (send, receive) = sync_channel(1);
     let receive = Mutex::new(receive);
     let shown = Arc::clone(&progress);
     let job = move || {
         let result = catch_unwind(AssertUnwindSafe(|| threads.install(|| work(&shown))));
         drop(threads);
-        give_back(flag);
+        shown.give_back();
         // Nobody waits for what was interrupted.
         let _ = send.send(result);
     };
@@ -71,7 +93,7 @@ pub(super) fn beside<T: Send + 'static>(
         }
         let seen = py.check_signals().and_then(|()| callback.map_or(Ok(()), |one| progress.call(one)));
         if let Err(error) = seen {
-            flag.store(true, Ordering::Relaxed);
+            progress.end();
             let _ = wait(py, &receive, GRACE);
             return Err(error);
         }
@@ -99,10 +121,4 @@ static FLAGS: Mutex<Vec<&'static AtomicBool>> = Mutex::new(Vec::new());
 fn taken_flag() -> &'static AtomicBool {
     let free = FLAGS.lock().unwrap_or_else(PoisonError::into_inner).pop();
     free.unwrap_or_else(|| Box::leak(Box::new(AtomicBool::new(false))))
-}
-
-/// By the work itself once it is done, so that no other work sees the flag of one that still has to end.
-fn give_back(flag: &'static AtomicBool) {
-    flag.store(false, Ordering::Relaxed);
-    FLAGS.lock().unwrap_or_else(PoisonError::into_inner).push(flag);
 }
