@@ -1,6 +1,6 @@
 //! Computes beside the interpreter: other Python threads go on, and Ctrl-C ends the wait.
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -53,6 +53,13 @@ impl Progress {
         self.step.store(step, Ordering::Relaxed);
         self.residual.store(residual.to_bits(), Ordering::Relaxed);
         self.flag.load(Ordering::Relaxed)
+    }
+
+    /// Ends work that looks at no flag of its own, once it is to end; [`beside`] catches it.
+    pub(super) fn leave_if_raised(&self) {
+        if self.flag.load(Ordering::Relaxed) {
+            resume_unwind(Box::new("nobody waits any more"));
+        }
     }
 
     fn call(&self, callback: &Bound<'_, PyAny>) -> PyResult<()> {
