@@ -157,8 +157,8 @@ impl Body {
 
     /// Largest motion of a particle in the last step, over the spacing [1].
     #[getter]
-    fn residual(&self) -> f64 {
-        self.engine.movement().largest_move
+    fn residual(&self, py: Python<'_>) -> PyResult<f64> {
+        Ok(here(py, || self.engine.movement())?.largest_move)
     }
 
     /// Steps the body, one step unless told otherwise.
@@ -170,7 +170,7 @@ impl Body {
         let threads = Threads::taken()?;
         while self.engine.step() < end {
             py.detach(|| threads.install(|| self.go(end)));
-            if let Some(divergence) = overflow(&self.engine) {
+            if let Some(divergence) = py.detach(|| threads.install(|| overflow(&self.engine))) {
                 return Err(diverged(&divergence));
             }
             py.check_signals()?;
@@ -337,13 +337,14 @@ impl Body {
     /// role, particles, centre [length], displacement [length], force [force], moment and moment_about_origin
     /// [force length].
     fn reactions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let forces = Forces::of(&self.engine).ok_or_else(|| self.without_stiffness())?;
-        as_dict(py, &forces.reactions(&self.engine))
+        let found = here(py, || Forces::of(&self.engine).map(|forces| forces.reactions(&self.engine)))?;
+        as_dict(py, &found.ok_or_else(|| self.without_stiffness())?)
     }
 
     /// Reactions, loads, strain energy, work and the largest stress, with the keys of `summary.json`.
     fn mechanics<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let found = Mechanics::of(&self.engine, self.elastic()?);
+        let elastic = self.elastic()?;
+        let found = here(py, || Mechanics::of(&self.engine, elastic))?;
         as_dict(py, &found.ok_or_else(|| self.without_stiffness())?)
     }
 

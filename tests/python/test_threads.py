@@ -91,6 +91,10 @@ def _end_of(scene):
     return flockform.run(scene).positions[-1]
 
 
+def _force_of(scene):
+    return flockform.Body(scene).reactions()[0]["force"]
+
+
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")
 def test_a_forked_process_computes_with_threads_of_its_own():
     # Large enough for several threads: those of the parent do not exist in the child.
@@ -102,5 +106,21 @@ def test_a_forked_process_computes_with_threads_of_its_own():
     }
     here = _end_of(scene)
     with multiprocessing.get_context("fork").Pool(1) as pool:
-        there = pool.apply_async(_end_of, (scene,)).get(timeout=60)
+        there = pool.apply_async(_end_of, (scene,)).get(timeout=300)
     assert np.array_equal(here, there)
+
+
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+def test_a_forked_process_reads_forces_with_threads_of_its_own():
+    scene = {
+        "lattice": {"kind": "square", "spacing": 1.0},
+        "body": {"shape": {"kind": "grid", "columns": 60, "rows": 60}},
+        "material": {"kind": "isotropic", "young": 1.0, "poisson": 0.3},
+        "rule": {"mean": {"kind": "material"}},
+        "roles": [{"region": {"kind": "edge", "side": "left"}, "role": "clamped"}],
+        "stop": {"steps": 1},
+    }
+    here = _force_of(scene)
+    with multiprocessing.get_context("fork").Pool(1) as pool:
+        there = pool.apply_async(_force_of, (scene,)).get(timeout=300)
+    assert here == there
