@@ -16,7 +16,7 @@ use super::source::Source;
 use super::threads::{Threads, here};
 use crate::continuum::equilibrium::{run_to_equilibrium, solve_equilibrium};
 use crate::continuum::mechanics::{Mechanics, Stresses};
-use crate::continuum::run::{Outcome, StopReason, overflow};
+use crate::continuum::run::{Divergence, Outcome, StopReason, overflow};
 use crate::engine::Engine;
 use crate::engine::forces::Forces;
 use crate::flock::role::Role;
@@ -51,8 +51,8 @@ impl Body {
         self.engine.body().count()
     }
 
-    /// Steps until `end`, or for as long as Python may have to wait.
-    fn go(&mut self, end: usize) {
+    /// Steps until `end`, until the body diverges, or for as long as Python may have to wait.
+    fn go(&mut self, end: usize) -> Option<Divergence> {
         let begun = Instant::now();
         while self.engine.step() < end && begun.elapsed() < BETWEEN_LOOKS {
             if self.led.is_empty() {
@@ -64,7 +64,13 @@ impl Body {
                 self.lead_on();
                 self.engine.advance();
             }
+            // After every batch, so that the step of it does not depend on the clock.
+            let divergence = overflow(&self.engine);
+            if divergence.is_some() {
+                return divergence;
+            }
         }
+        None
     }
 
     /// Leads by hand in the next step.
@@ -163,14 +169,14 @@ impl Body {
 
     /// Steps the body, one step unless told otherwise.
     ///
-    /// Raises DivergedError once a particle has no finite place any more.
+    /// Raises DivergedError once a particle has no finite place any more, or one so far that energies overflow. The body is
+    /// lost then: what is to be kept is copied before.
     #[pyo3(signature = (steps=1))]
     fn advance(&mut self, py: Python<'_>, steps: i64) -> PyResult<()> {
         let end = self.engine.step().saturating_add(positive("steps", steps)?);
         let threads = Threads::taken()?;
         while self.engine.step() < end {
-            py.detach(|| threads.install(|| self.go(end)));
-            if let Some(divergence) = py.detach(|| threads.install(|| overflow(&self.engine))) {
+            if let Some(divergence) = py.detach(|| threads.install(|| self.go(end))) {
                 return Err(diverged(&divergence));
             }
             py.check_signals()?;

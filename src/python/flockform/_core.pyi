@@ -138,7 +138,8 @@ class Body:
     def advance(self, steps: int = 1) -> None:
         """Steps the body, one step unless told otherwise.
 
-        Raises DivergedError once a particle has no finite place any more.
+        Raises DivergedError once a particle has no finite place any more, or one so far that energies overflow. The body is
+        lost then: what is to be kept is copied before.
         """
 
     def lead(self, particles: ArrayLike, places: ArrayLike) -> None:
