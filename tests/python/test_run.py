@@ -132,6 +132,8 @@ def test_what_cannot_be_is_refused_by_name(call, error, words):
     with pytest.raises(error) as caught:
         call()
     assert words in str(caught.value)
+    if error is flockform.SceneError:
+        assert caught.value.problems and all(problem["message"] for problem in caught.value.problems)
 
 
 def test_values_nested_without_end_are_refused():
