@@ -217,10 +217,11 @@ impl Run {
 
 #[pymethods]
 impl Run {
-    fn __repr__(&self, py: Python<'_>) -> String {
-        let count = self.body.borrow(py).count();
+    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
+        // Another thread may be stepping it.
+        let count = self.body.try_borrow(py)?.count();
         let words = if self.words == self.reason { "" } else { &self.words };
         let gap = if words.is_empty() { "" } else { ": " };
-        format!("<flockform.Run of {}, {count} particles, {}{gap}{words}>", self.name, self.reason)
+        Ok(format!("<flockform.Run of {}, {count} particles, {}{gap}{words}>", self.name, self.reason))
     }
 }

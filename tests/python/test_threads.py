@@ -72,6 +72,21 @@ def test_other_threads_go_on_while_a_run_computes():
     assert len(ticks) - before > 0.1 * took / 0.005
 
 
+def test_a_run_whose_body_another_thread_steps_is_printed_or_says_so():
+    run = flockform.run("tension", set={"stop.steps": 1})
+    thread = threading.Thread(target=run.body.advance, args=(200_000,))
+    thread.start()
+    refusals = 0
+    while thread.is_alive():
+        try:
+            assert "144 particles" in repr(run)
+        except RuntimeError:
+            refusals += 1
+        time.sleep(0.001)
+    thread.join()
+    assert refusals > 0 and "144 particles" in repr(run)
+
+
 def test_runs_in_several_threads_do_not_disturb_each_other():
     alone = flockform.run("tension").positions
     ends = [None] * 6
