@@ -27,7 +27,8 @@ use crate::study::trade::{Chosen, choose};
 /// every: steps from one frame to the next; without it the end alone is kept.
 /// progress: called as progress(step, residual) several times a second.
 ///
-/// Raises SceneError for a scene that cannot be, MemoryError for more frames than fit.
+/// Raises SceneError for a scene that cannot be, and MemoryError for more frames than fit where
+/// the address space is limited (ulimit -v).
 #[pyfunction]
 #[pyo3(signature = (scene, *, set=None, every=None, progress=None))]
 pub(super) fn run(

@@ -137,6 +137,11 @@ fn quoted(key: &str) -> String {
     if is_bare { key.to_owned() } else { format!("\"{key}\"") }
 }
 
+/// A text as TOML writes it, which has the escapes of JSON and one more: that of DEL.
+fn text(words: String) -> String {
+    serde_json::Value::from(words).to_string().replace('\u{7f}', "\\u007F")
+}
+
 /// A value as TOML writes it; arrays and numbers of numpy are lists and numbers.
 fn toml(key: &str, value: &Bound<'_, PyAny>, depth: usize) -> PyResult<String> {
     if depth > MAX_DEPTH {
@@ -152,14 +157,13 @@ fn toml(key: &str, value: &Bound<'_, PyAny>, depth: usize) -> PyResult<String> {
         return Ok(format!("{:?}", value.extract::<f64>()?).to_lowercase());
     }
     if value.is_instance_of::<PyString>() {
-        // The escapes of JSON are those of TOML.
-        return Ok(serde_json::Value::from(value.extract::<String>()?).to_string());
+        return Ok(text(value.extract::<String>()?));
     }
     if let Ok(table) = value.cast::<PyDict>() {
         let entries = table.iter().map(|(name, value)| {
             let name: String =
                 name.extract().map_err(|_| PyTypeError::new_err(format!("{key}: keys are texts")))?;
-            Ok(format!("{}={}", serde_json::Value::from(name), toml(key, &value, depth + 1)?))
+            Ok(format!("{}={}", text(name), toml(key, &value, depth + 1)?))
         });
         return Ok(format!("{{{}}}", entries.collect::<PyResult<Vec<_>>>()?.join(",")));
     }

@@ -73,7 +73,7 @@ def test_keys_are_set_by_a_dict_or_by_texts(held_sheet):
 
 
 def test_texts_keep_their_quotes_and_lines():
-    title = 'a "title"\n\\ of \u00e4ll k\x01inds'
+    title = 'a "title"\n\\ of \u00e4ll k\x01in\x7fds'
     assert flockform.run("tension", set={"title": title, "stop.steps": 1}).reason == "steps"
     with pytest.raises(flockform.SceneError) as caught:
         flockform.run("tension", set={"unit": 3, "title": title})

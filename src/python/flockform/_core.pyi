@@ -65,7 +65,8 @@ def run(
     every: steps from one frame to the next; without it the end alone is kept.
     progress: called as progress(step, residual) several times a second.
 
-    Raises SceneError for a scene that cannot be, MemoryError for more frames than fit.
+    Raises SceneError for a scene that cannot be, and MemoryError for more frames than fit where
+    the address space is limited (ulimit -v).
     """
 
 class Run:
