@@ -29,7 +29,8 @@ pub(super) struct Progress {
 impl Progress {
     fn new() -> Self {
         let (flag, is_over) = (taken_flag(), Mutex::new(false));
-        Self { flag, is_over, step: AtomicUsize::new(0), residual: AtomicU64::new(0) }
+        let residual = AtomicU64::new(f64::INFINITY.to_bits());
+        Self { flag, is_over, step: AtomicUsize::new(0), residual }
     }
 
     /// Tells the work to end, unless it has.

@@ -25,7 +25,8 @@ use crate::study::trade::{Chosen, choose};
 /// scene: name of a bundled scene, path of a scene file, or a scene as a dict.
 /// set: keys to change, a dict such as {"stop.steps": 50} or texts KEY.PATH=VALUE.
 /// every: steps from one frame to the next; without it the end alone is kept.
-/// progress: called as progress(step, residual) several times a second.
+/// progress: called as progress(step, residual) several times a second; the residual is infinite before the first
+/// report. A scene that is solved reports its end alone.
 ///
 /// Raises SceneError for a scene that cannot be, and MemoryError for more frames than fit where
 /// the address space is limited (ulimit -v).

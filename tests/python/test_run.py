@@ -91,6 +91,7 @@ def test_progress_is_called_and_its_exception_ends_the_run():
     with pytest.raises(LookupError, match="enough"):
         flockform.run("tension", set={"stop.steps": 50_000_000}, progress=progress)
     assert len(seen) == 3 and seen[0][0] <= seen[1][0] <= seen[2][0]
+    assert all(residual > 0.0 for step, residual in seen if step == 0)
 
 
 def test_a_scene_that_cannot_be_is_refused_with_file_line_key_and_remedy(tmp_path):
