@@ -171,8 +171,10 @@ sheet = {
     "roles": [{"region": {"kind": "edge", "side": "left"}, "role": "clamped"}],
     "stop": {"steps": 10_000_000},
 }
-flockform.run("tension")
-resource.setrlimit(resource.RLIMIT_AS, (1 << 31, 1 << 31))
+flockform.run(sheet, set={"stop.steps": 1})
+with open("/proc/self/statm") as sizes:
+    most = int(sizes.read().split()[0]) * resource.getpagesize() + (256 << 20)
+resource.setrlimit(resource.RLIMIT_AS, (most, most))
 try:
     flockform.run(sheet, every=1)
 except MemoryError as error:
