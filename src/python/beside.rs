@@ -1,6 +1,6 @@
 //! Computes beside the interpreter: other Python threads go on, and Ctrl-C ends the wait.
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -8,7 +8,8 @@ use std::time::Duration;
 
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
-use rayon::ThreadPool;
+
+use super::threads::Threads;
 
 /// Time between two looks for a signal.
 const BETWEEN_LOOKS: Duration = Duration::from_millis(50);
@@ -19,16 +20,47 @@ const GRACE: Duration = Duration::from_millis(500);
 pub(super) struct Progress {
     /// Raised for the work to end.
     pub(super) flag: &'static AtomicBool,
+    /// Whether the flag is another's by now.
+    is_over: Mutex<bool>,
     step: AtomicUsize,
     residual: AtomicU64,
 }
 
 impl Progress {
+    fn new() -> Self {
+        let (flag, is_over) = (taken_flag(), Mutex::new(false));
+        let residual = AtomicU64::new(f64::INFINITY.to_bits());
+        Self { flag, is_over, step: AtomicUsize::new(0), residual }
+    }
+
+    /// Tells the work to end, unless it has.
+    fn end(&self) {
+        let is_over = self.is_over.lock().unwrap_or_else(PoisonError::into_inner);
+        if !*is_over {
+            self.flag.store(true, Ordering::Relaxed);
+        }
+    }
+
+    /// Gives the flag back. The work itself does it once it is done, so that no other work sees the flag of one that still
+    /// has to end.
+    fn give_back(&self) {
+        *self.is_over.lock().unwrap_or_else(PoisonError::into_inner) = true;
+        self.flag.store(false, Ordering::Relaxed);
+        FLAGS.lock().unwrap_or_else(PoisonError::into_inner).push(self.flag);
+    }
+
     /// Reports the step that the work has come to; whether to end.
     pub(super) fn step(&self, step: usize, residual: f64) -> bool {
         self.step.store(step, Ordering::Relaxed);
         self.residual.store(residual.to_bits(), Ordering::Relaxed);
         self.flag.load(Ordering::Relaxed)
+    }
+
+    /// Ends work that looks at no flag of its own, once it is to end; [`beside`] catches it.
+    pub(super) fn leave_if_raised(&self) {
+        if self.flag.load(Ordering::Relaxed) {
+            resume_unwind(Box::new("nobody waits any more"));
+        }
     }
 
     fn call(&self, callback: &Bound<'_, PyAny>) -> PyResult<()> {
@@ -47,15 +79,15 @@ pub(super) fn beside<T: Send + 'static>(
     callback: Option<&Bound<'_, PyAny>>,
     work: impl FnOnce(&Progress) -> T + Send + 'static,
 ) -> PyResult<T> {
-    let pool = pool()?;
-    let flag = taken_flag();
-    let progress = Arc::new(Progress { flag, step: AtomicUsize::new(0), residual: AtomicU64::new(0) });
+    let threads = Threads::taken()?;
+    let progress = Arc::new(Progress::new());
     let (send, receive) = sync_channel(1);
     let receive = Mutex::new(receive);
     let shown = Arc::clone(&progress);
     let job = move || {
-        let result = catch_unwind(AssertUnwindSafe(|| pool.install(|| work(&shown))));
-        give_back(flag);
+        let result = catch_unwind(AssertUnwindSafe(|| threads.install(|| work(&shown))));
+        drop(threads);
+        shown.give_back();
         // Nobody waits for what was interrupted.
         let _ = send.send(result);
     };
@@ -69,10 +101,8 @@ pub(super) fn beside<T: Send + 'static>(
         }
         let seen = py.check_signals().and_then(|()| callback.map_or(Ok(()), |one| progress.call(one)));
         if let Err(error) = seen {
-            flag.store(true, Ordering::Relaxed);
-            if matches!(wait(py, &receive, GRACE), Err(RecvTimeoutError::Timeout)) {
-                retire_pool();
-            }
+            progress.end();
+            let _ = wait(py, &receive, GRACE);
             return Err(error);
         }
     }
@@ -99,37 +129,4 @@ static FLAGS: Mutex<Vec<&'static AtomicBool>> = Mutex::new(Vec::new());
 fn taken_flag() -> &'static AtomicBool {
     let free = FLAGS.lock().unwrap_or_else(PoisonError::into_inner).pop();
     free.unwrap_or_else(|| Box::leak(Box::new(AtomicBool::new(false))))
-}
-
-/// By the work itself once it is done, so that no other work sees the flag of one that still has to end.
-fn give_back(flag: &'static AtomicBool) {
-    flag.store(false, Ordering::Relaxed);
-    FLAGS.lock().unwrap_or_else(PoisonError::into_inner).push(flag);
-}
-
-/// The threads that compute, and the process that they are in.
-static POOL: Mutex<Option<(u32, Arc<ThreadPool>)>> = Mutex::new(None);
-
-/// The threads of this process: a child that was forked, as `multiprocessing` does it, has none of its parent's and gets
-/// its own. `RAYON_NUM_THREADS` says how many; without it there are as many as processors.
-pub(super) fn pool() -> PyResult<Arc<ThreadPool>> {
-    let mut kept = POOL.lock().unwrap_or_else(PoisonError::into_inner);
-    let here = std::process::id();
-    if let Some((process, pool)) = &*kept
-        && *process == here
-    {
-        return Ok(Arc::clone(pool));
-    }
-    let built = rayon::ThreadPoolBuilder::new().build();
-    let pool = Arc::new(built.map_err(|error| PyRuntimeError::new_err(error.to_string()))?);
-    // The parent's threads are not here to be ended.
-    if let Some(foreign) = kept.replace((here, Arc::clone(&pool))) {
-        std::mem::forget(foreign);
-    }
-    Ok(pool)
-}
-
-/// Leaves the threads to the work that did not end: what comes next gets others and does not wait for them.
-fn retire_pool() {
-    drop(POOL.lock().unwrap_or_else(PoisonError::into_inner).take());
 }

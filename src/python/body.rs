@@ -9,13 +9,14 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use super::arrays::{indices, moved, pairs, places, rows};
-use super::beside::{beside, pool};
+use super::beside::beside;
 use super::errors::{as_dict, diverged};
 use super::run::{interrupt_by, positive, words};
 use super::source::Source;
+use super::threads::{Threads, here};
 use crate::continuum::equilibrium::{run_to_equilibrium, solve_equilibrium};
 use crate::continuum::mechanics::{Mechanics, Stresses};
-use crate::continuum::run::{Outcome, StopReason, overflow};
+use crate::continuum::run::{Divergence, Outcome, StopReason, overflow};
 use crate::engine::Engine;
 use crate::engine::forces::Forces;
 use crate::flock::role::Role;
@@ -50,8 +51,8 @@ impl Body {
         self.engine.body().count()
     }
 
-    /// Steps until `end`, or for as long as Python may have to wait.
-    fn go(&mut self, end: usize) {
+    /// Steps until `end`, until the body diverges, or for as long as Python may have to wait.
+    fn go(&mut self, end: usize) -> Option<Divergence> {
         let begun = Instant::now();
         while self.engine.step() < end && begun.elapsed() < BETWEEN_LOOKS {
             if self.led.is_empty() {
@@ -63,7 +64,13 @@ impl Body {
                 self.lead_on();
                 self.engine.advance();
             }
+            // After every batch, so that the step of it does not depend on the clock.
+            let divergence = overflow(&self.engine);
+            if divergence.is_some() {
+                return divergence;
+            }
         }
+        None
     }
 
     /// Leads by hand in the next step.
@@ -156,20 +163,20 @@ impl Body {
 
     /// Largest motion of a particle in the last step, over the spacing [1].
     #[getter]
-    fn residual(&self) -> f64 {
-        self.engine.movement().largest_move
+    fn residual(&self, py: Python<'_>) -> PyResult<f64> {
+        Ok(here(py, || self.engine.movement())?.largest_move)
     }
 
     /// Steps the body, one step unless told otherwise.
     ///
-    /// Raises DivergedError once a particle has no finite place any more.
+    /// Raises DivergedError once a particle has no finite place any more, or one so far that energies overflow. The body is
+    /// lost then: what is to be kept is copied before.
     #[pyo3(signature = (steps=1))]
     fn advance(&mut self, py: Python<'_>, steps: i64) -> PyResult<()> {
         let end = self.engine.step().saturating_add(positive("steps", steps)?);
-        let pool = pool()?;
+        let threads = Threads::taken()?;
         while self.engine.step() < end {
-            py.detach(|| pool.install(|| self.go(end)));
-            if let Some(divergence) = overflow(&self.engine) {
+            if let Some(divergence) = py.detach(|| threads.install(|| self.go(end))) {
                 return Err(diverged(&divergence));
             }
             py.check_signals()?;
@@ -316,8 +323,7 @@ impl Body {
     /// particles (count, 3), particle_von_mises (count,). NaN across a broken bond, and for a particle in no cell.
     fn stress<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let elastic = self.elastic()?;
-        let pool = pool()?;
-        let found = py.detach(|| pool.install(|| Stresses::at_present(&self.engine, elastic)));
+        let found = here(py, || Stresses::at_present(&self.engine, elastic))?;
         let (Some(stresses), Some(cells)) = (found, self.engine.cells()) else {
             return Err(self.without_stiffness().into());
         };
@@ -337,13 +343,14 @@ impl Body {
     /// role, particles, centre [length], displacement [length], force [force], moment and moment_about_origin
     /// [force length].
     fn reactions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let forces = Forces::of(&self.engine).ok_or_else(|| self.without_stiffness())?;
-        as_dict(py, &forces.reactions(&self.engine))
+        let found = here(py, || Forces::of(&self.engine).map(|forces| forces.reactions(&self.engine)))?;
+        as_dict(py, &found.ok_or_else(|| self.without_stiffness())?)
     }
 
     /// Reactions, loads, strain energy, work and the largest stress, with the keys of `summary.json`.
     fn mechanics<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let found = Mechanics::of(&self.engine, self.elastic()?);
+        let elastic = self.elastic()?;
+        let found = here(py, || Mechanics::of(&self.engine, elastic))?;
         as_dict(py, &found.ok_or_else(|| self.without_stiffness())?)
     }
 

@@ -2,7 +2,8 @@
 //!
 //! Built by maturin from `src/python/pyproject.toml` (`pip install ./src/python`); `flockform/` is what Python imports, this
 //! module its `flockform._core`. [`source`] turns arguments into scenes, [`arrays`] numpy memory into vectors and back,
-//! [`beside`] computes in another thread while the interpreter waits for results and for Ctrl-C. Nothing is computed here.
+//! [`beside`] computes in another thread while the interpreter waits for results and for Ctrl-C, and [`threads`] has the
+//! threads that it computes with. Nothing is computed here.
 
 mod arrays;
 mod beside;
@@ -12,6 +13,7 @@ mod run;
 mod source;
 mod studies;
 mod swarm;
+mod threads;
 
 use pyo3::pymodule;
 

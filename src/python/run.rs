@@ -25,9 +25,11 @@ use crate::study::trade::{Chosen, choose};
 /// scene: name of a bundled scene, path of a scene file, or a scene as a dict.
 /// set: keys to change, a dict such as {"stop.steps": 50} or texts KEY.PATH=VALUE.
 /// every: steps from one frame to the next; without it the end alone is kept.
-/// progress: called as progress(step, residual) several times a second.
+/// progress: called as progress(step, residual) several times a second; the residual is infinite before the first
+/// report. A scene that is solved reports its end alone.
 ///
-/// Raises SceneError for a scene that cannot be, MemoryError for more frames than fit.
+/// Raises SceneError for a scene that cannot be, and MemoryError for more frames than fit where
+/// the address space is limited (ulimit -v).
 #[pyfunction]
 #[pyo3(signature = (scene, *, set=None, every=None, progress=None))]
 pub(super) fn run(
@@ -217,10 +219,11 @@ impl Run {
 
 #[pymethods]
 impl Run {
-    fn __repr__(&self, py: Python<'_>) -> String {
-        let count = self.body.borrow(py).count();
+    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
+        // Another thread may be stepping it.
+        let count = self.body.try_borrow(py)?.count();
         let words = if self.words == self.reason { "" } else { &self.words };
         let gap = if words.is_empty() { "" } else { ": " };
-        format!("<flockform.Run of {}, {count} particles, {}{gap}{words}>", self.name, self.reason)
+        Ok(format!("<flockform.Run of {}, {count} particles, {}{gap}{words}>", self.name, self.reason))
     }
 }

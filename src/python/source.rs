@@ -9,11 +9,12 @@ use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyMapping, PyString, P
 use crate::scene::bundled::{SCENES, SWARMS, bundled_swarm};
 use crate::scene::document::MAX_DEPTH;
 use crate::scene::swarm::Swarm;
-use crate::scene::{Bundled, Scene, SceneError, bundled};
+use crate::scene::{Bundled, Place, Problem, Scene, SceneError, bundled};
 
 /// What stands in the text of a file that is given as a dict.
 const UNTITLED: &str = "title = \"Given in Python\"";
 const DICT: &str = "the dict";
+const CALL: &str = "the call";
 
 /// Where a file comes from, and the overrides on top of it.
 #[derive(Clone, Debug)]
@@ -96,11 +97,17 @@ fn not_bundled(kind: &str, all: &[Bundled], word: &str) -> PyErr {
     let likeness = |one: &&Bundled| strsim::jaro_winkler(one.name, word);
     let nearest = all.iter().max_by(|a, b| likeness(a).total_cmp(&likeness(b))).map_or("", |one| one.name);
     let list = kind.to_uppercase() + "S";
-    let message = format!(
-        "`{word}` is no bundled {kind} and no file; the nearest name is `{nearest}`\n  help: flockform.{list} lists \
-         the names; a path ends in .toml"
-    );
-    super::errors::SceneError::new_err(message)
+    let mut error = SceneError::default();
+    error.push(Problem {
+        place: Place::File { file: CALL.to_owned() },
+        key: kind.to_owned(),
+        found: Some(word.to_owned()),
+        message: format!(
+            "there is no bundled {kind} and no file of this name; the nearest name is `{nearest}`"
+        ),
+        help: Some(format!("flockform.{list} lists the names; a path ends in .toml")),
+    });
+    error.into()
 }
 
 /// The overrides of a `set` argument: a dict of key paths and values, or texts as on the command line.
@@ -130,6 +137,11 @@ fn quoted(key: &str) -> String {
     if is_bare { key.to_owned() } else { format!("\"{key}\"") }
 }
 
+/// A text as TOML writes it, which has the escapes of JSON and one more: that of DEL.
+fn text(words: String) -> String {
+    serde_json::Value::from(words).to_string().replace('\u{7f}', "\\u007F")
+}
+
 /// A value as TOML writes it; arrays and numbers of numpy are lists and numbers.
 fn toml(key: &str, value: &Bound<'_, PyAny>, depth: usize) -> PyResult<String> {
     if depth > MAX_DEPTH {
@@ -145,14 +157,13 @@ fn toml(key: &str, value: &Bound<'_, PyAny>, depth: usize) -> PyResult<String> {
         return Ok(format!("{:?}", value.extract::<f64>()?).to_lowercase());
     }
     if value.is_instance_of::<PyString>() {
-        // The escapes of JSON are those of TOML.
-        return Ok(serde_json::Value::from(value.extract::<String>()?).to_string());
+        return Ok(text(value.extract::<String>()?));
     }
     if let Ok(table) = value.cast::<PyDict>() {
         let entries = table.iter().map(|(name, value)| {
             let name: String =
                 name.extract().map_err(|_| PyTypeError::new_err(format!("{key}: keys are texts")))?;
-            Ok(format!("{}={}", serde_json::Value::from(name), toml(key, &value, depth + 1)?))
+            Ok(format!("{}={}", text(name), toml(key, &value, depth + 1)?))
         });
         return Ok(format!("{{{}}}", entries.collect::<PyResult<Vec<_>>>()?.join(",")));
     }

@@ -52,9 +52,13 @@ pub(super) fn stability<'py>(
     let source = Source::scene(scene, set)?;
     let effort = if quick { bisection::Effort::quick() } else { bisection::Effort::default() };
     let options = Options { effort, no_extremes: !extremes };
-    let study: Study = beside(py, None, move |_| {
+    let study: Study = beside(py, None, move |progress| {
         plan(&source.load(&[])?)?;
-        run(&|more: &[String]| source.load(more), options, &mut |_| {})
+        let load = |more: &[String]| {
+            progress.leave_if_raised();
+            source.load(more)
+        };
+        run(&load, options, &mut |_| progress.leave_if_raised())
     })??;
     let report = as_dict(py, &study)?;
     report.set_item("holds", study.holds())?;

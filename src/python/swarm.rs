@@ -8,6 +8,7 @@ use pyo3::types::PyDict;
 use super::arrays::{column, indices, mask, moved, numbers, pairs, places, rows, table};
 use super::beside::beside;
 use super::source::Source;
+use super::threads::here;
 use crate::scene::SceneError;
 use crate::swarm::control::{Control, Mode};
 use crate::swarm::watch::Pose;
@@ -156,7 +157,7 @@ impl Swarm {
                 self.rejected.push((robot, rejection.to_string()));
             }
         }
-        py.detach(|| self.control.tick(now));
+        here(py, || self.control.tick(now))?;
         self.now = now + self.control.period();
         rows(py, (0..count).map(|robot| self.control.target(robot).unwrap_or([f64::NAN; 2])))
     }

@@ -63,9 +63,11 @@ def run(
     scene: name of a bundled scene, path of a scene file, or a scene as a dict.
     set: keys to change, a dict such as {"stop.steps": 50} or texts KEY.PATH=VALUE.
     every: steps from one frame to the next; without it the end alone is kept.
-    progress: called as progress(step, residual) several times a second.
+    progress: called as progress(step, residual) several times a second; the residual is infinite before the first
+    report. A scene that is solved reports its end alone.
 
-    Raises SceneError for a scene that cannot be, MemoryError for more frames than fit.
+    Raises SceneError for a scene that cannot be, and MemoryError for more frames than fit where
+    the address space is limited (ulimit -v).
     """
 
 class Run:
@@ -138,7 +140,8 @@ class Body:
     def advance(self, steps: int = 1) -> None:
         """Steps the body, one step unless told otherwise.
 
-        Raises DivergedError once a particle has no finite place any more.
+        Raises DivergedError once a particle has no finite place any more, or one so far that energies overflow. The body is
+        lost then: what is to be kept is copied before.
         """
 
     def lead(self, particles: ArrayLike, places: ArrayLike) -> None:
