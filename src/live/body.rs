@@ -239,10 +239,14 @@ impl Body {
     /// The scene that replays what was done, as TOML.
     ///
     /// # Errors
-    /// A scene that cannot be written.
+    /// A scene that cannot be written, or that no run would take.
     pub fn saved(&self) -> Result<String, String> {
         let raw = self.now.replay();
-        toml::to_string(&raw).map_err(|error| error.to_string())
+        let text = toml::to_string(&raw).map_err(|error| error.to_string())?;
+        match Scene::parse("saved", "saved.toml", &text, &[], self.folder.as_deref()) {
+            Ok(_) => Ok(text),
+            Err(error) => Err(format!("no run would take this file yet: {error}")),
+        }
     }
 
     /// The page's view of the body as it is.
