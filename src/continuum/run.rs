@@ -278,7 +278,13 @@ impl StepBatch {
         // That is along each axis; along both at once, within the diagonal.
         if count < 2 || reach * std::f64::consts::SQRT_2 * (1.0 + 1e-9) > self.bound {
             self.single_steps = self.single_steps.saturating_sub(1);
-            return engine.advance();
+            let acts = engine.acts_next();
+            engine.advance();
+            // Another rule takes particles another distance.
+            if acts && self.reach.is_some() {
+                self.reach = engine.reach_of_a_step();
+            }
+            return;
         }
         let Some(tolerance) = self.tolerance else {
             engine.advance_by(count, None);

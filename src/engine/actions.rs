@@ -34,6 +34,11 @@ impl Engine {
         self.actions.iter().map(|action| action.at).filter(|&at| at > self.step).min()
     }
 
+    /// Whether an action is planned for the next step.
+    pub fn acts_next(&self) -> bool {
+        self.next_action() == Some(self.step + 1)
+    }
+
     /// Performs an action between two steps, which holds from step `at` on, the next one.
     pub fn perform(&mut self, what: &ActionKind, at: usize) {
         match what {

@@ -15,6 +15,7 @@ use crate::export::report::RunRecorder;
 use crate::export::report::view::View;
 use crate::flock::motion::{Interpolation, Keyframe, Motion};
 use crate::flock::role::Role;
+use crate::flock::rules::Mean;
 use crate::scene::raw::*;
 use crate::scene::{self, Scene, SceneError, is_changeable};
 
@@ -191,6 +192,9 @@ impl Body {
         if self.now.engine.lasting_neighbours().is_none() {
             return Err("neighbours that are found anew at every step cannot be cut".into());
         }
+        if matches!(self.now.engine.flock().rule.mean, Mean::Material { .. }) {
+            return Err("a material is in cells, not in bonds that could be cut".into());
+        }
         self.now.require_room()?;
         self.keep();
         let at = self.now.engine.step() + 1;
@@ -211,6 +215,9 @@ impl Body {
         let changed: Vec<String> = self.now.changed_keys().chain([text.to_owned()]).collect();
         let all = [&self.now.set[..], &changed].concat();
         let scene = (self.load)(&all)?.stepped(self.folder.as_deref())?;
+        if matches!(scene.mean, Mean::Material { .. }) && self.now.is_cut() {
+            return Err("a material is in cells, and bonds of this body were cut: reset it first".into());
+        }
         let Ok(conduct) = plan(&scene)?.conduct_of(&self.now.setup) else {
             // Another body: from the start, then.
             return self.restart([&self.now.set[..], &[text.to_owned()]].concat());
@@ -232,10 +239,14 @@ impl Body {
     /// The scene that replays what was done, as TOML.
     ///
     /// # Errors
-    /// A scene that cannot be written.
+    /// A scene that cannot be written, or that no run would take.
     pub fn saved(&self) -> Result<String, String> {
         let raw = self.now.replay();
-        toml::to_string(&raw).map_err(|error| error.to_string())
+        let text = toml::to_string(&raw).map_err(|error| error.to_string())?;
+        match Scene::parse("saved", "saved.toml", &text, &[], self.folder.as_deref()) {
+            Ok(_) => Ok(text),
+            Err(error) => Err(format!("no run would take this file yet: {error}")),
+        }
     }
 
     /// The page's view of the body as it is.
@@ -298,6 +309,10 @@ impl State {
 
     fn is_untouched(&self) -> bool {
         self.engine.step() == 0 && self.actions.is_empty() && self.hands.is_empty()
+    }
+
+    fn is_cut(&self) -> bool {
+        self.actions.iter().any(|action| matches!(action.what, RawActionKind::Cut { .. }))
     }
 
     /// The particles that one is held with, or itself.

@@ -65,6 +65,15 @@ pub fn actions(
     raw.actions.iter().enumerate().map(action).collect()
 }
 
+/// Whether bonds are cut on the way.
+pub fn cuts(raw: &RawScene) -> bool {
+    raw.actions.iter().any(is_cut)
+}
+
+fn is_cut(action: &RawAction) -> bool {
+    matches!(action.what, RawActionKind::Cut { .. })
+}
+
 fn require_changeable(key: &str, text: &str, refuse: Refuse<'_>) -> Result<(), SceneError> {
     if is_changeable(text) {
         return Ok(());
@@ -79,7 +88,7 @@ pub fn is_changeable(text: &str) -> bool {
     CHANGEABLE.contains(&table)
 }
 
-/// The scene with these keys changed from the start, without its actions.
+/// The scene with these keys changed from the start. Of its actions it has the cuts, with which not every rule goes.
 fn changed(
     name: &str,
     document: &Document,
@@ -88,6 +97,6 @@ fn changed(
 ) -> Result<crate::scene::Scene, SceneError> {
     let document = document.with(set)?;
     let mut raw: RawScene = document.read(&super::schema())?;
-    raw.actions.clear();
+    raw.actions.retain(is_cut);
     validate(name, raw, document, folder)
 }

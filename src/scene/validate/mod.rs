@@ -353,6 +353,7 @@ fn check_present_neighbours(raw: &RawScene, refuse: Refuse<'_>) -> Result<(), Sc
         ("frame", raw.frame != RawFrame::None, "a frame"),
         ("fracture", raw.fracture.is_some(), "fracture"),
         ("cuts", !raw.cuts.is_empty(), "cuts"),
+        ("actions", actions::cuts(raw), "cuts"),
         ("rule.weights", raw.rule.weights.is_some(), "fixed weights"),
     ];
     match clash.into_iter().find(|(_, used, _)| *used) {
