@@ -222,7 +222,9 @@ impl Swarm {
     /// A swarm that cannot be written.
     pub fn saved(&self) -> Result<String, String> {
         let mut raw = self.now.file.raw.clone();
-        raw.flight.commands.extend(self.now.commands.iter().cloned());
+        // Before a period the hand acted first: the file's own commands are performed when it begins.
+        let own = std::mem::replace(&mut raw.flight.commands, self.now.commands.clone());
+        raw.flight.commands.extend(own);
         raw.flight.commands.sort_by_key(|command| command.after);
         raw.flight.faults.clone_from(&self.now.faults);
         let flown = self.now.flight.fleet().period().max(1) as f64;
