@@ -102,7 +102,6 @@ impl Conductor {
 
     /// Goes on until `stop` is raised or nobody can ask for anything any more.
     pub fn run(mut self, requests: &Receiver<Request>, stop: &AtomicBool) {
-        self.show();
         let mut shown = Instant::now();
         let mut before = Instant::now();
         let mut is_news = false;
@@ -241,7 +240,8 @@ impl Conductor {
         Err(format!("{} has {MOST_FILES} such files: remove some", self.folder.display()))
     }
 
-    fn show(&mut self) {
+    /// Publishes the state, with a page where there is none of this layout.
+    pub(super) fn show(&mut self) {
         let begun = Instant::now();
         let layout = self.session.layout();
         if self.layout != Some(layout) {

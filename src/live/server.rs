@@ -68,7 +68,9 @@ impl Server {
         self.listener.set_nonblocking(true)?;
         let board = Arc::new(Board::default());
         let (requests, asked) = sync_channel(MOST_REQUESTS);
-        let conductor = Conductor::new(session, Arc::clone(&board), folder);
+        let mut conductor = Conductor::new(session, Arc::clone(&board), folder);
+        // Nobody is let in before there is a page.
+        conductor.show();
         let shared = Arc::new(Shared {
             token: self.token,
             port: self.port,
