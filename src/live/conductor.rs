@@ -59,6 +59,15 @@ pub struct Conductor {
     sets: Vec<String>,
 }
 
+/// Sends every viewer away when it is dropped, by a panic too.
+struct Closed(Arc<Board>);
+
+impl Drop for Closed {
+    fn drop(&mut self) {
+        self.0.close();
+    }
+}
+
 /// Counts steps and frames in stretches of time.
 struct Pace {
     since: Instant,
@@ -102,6 +111,7 @@ impl Conductor {
 
     /// Goes on until `stop` is raised or nobody can ask for anything any more.
     pub fn run(mut self, requests: &Receiver<Request>, stop: &AtomicBool) {
+        let _closed = Closed(Arc::clone(&self.board));
         let mut shown = Instant::now();
         let mut before = Instant::now();
         let mut is_news = false;
@@ -126,7 +136,6 @@ impl Conductor {
                 (shown, is_news) = (Instant::now(), false);
             }
         }
-        self.board.close();
     }
 
     /// Takes the steps that are due after so many seconds; whether there were any.

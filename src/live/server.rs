@@ -82,7 +82,7 @@ impl Server {
         std::thread::scope(|scope| {
             let run = move || conductor.run(&asked, stop);
             std::thread::Builder::new().name("live session".into()).spawn_scoped(scope, run)?;
-            while !stop.load(Ordering::Relaxed) {
+            while !stop.load(Ordering::Relaxed) && !shared.board.is_closed() {
                 match self.listener.accept() {
                     Ok((stream, _)) => admit(stream, &shared),
                     Err(_) => std::thread::sleep(LOOK),

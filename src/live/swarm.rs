@@ -20,7 +20,7 @@ pub const CHANNELS: [&str; 4] = ["clearance", "age", "pe1", "strain"];
 
 /// Keys of the flight that may change while robots fly.
 const CHANNEL_KEYS: [&str; 3] = ["flight.noise", "flight.delay", "flight.loss"];
-/// Most commands that are kept.
+/// Most commands and faults that are kept.
 const MOST_COMMANDS: usize = 100_000;
 /// States that can be returned to.
 const MOST_UNDONE: usize = 40;
@@ -188,6 +188,7 @@ impl Swarm {
             "flight.delay" => delay = raw.delay,
             _ => loss = raw.loss,
         }
+        self.now.require_room()?;
         self.keep();
         let command = FlightCommand::Channel { noise, delay, loss };
         if !self.now.flight.perform(&command) {
@@ -202,6 +203,7 @@ impl Swarm {
     fn fault(&mut self, robot: usize, what: Option<Fault>) -> Result<(), Refused> {
         let names = &self.now.flight.control().formation().names;
         let name = names.get(robot).ok_or("there is no such robot")?.clone();
+        self.now.require_room()?;
         self.keep();
         let now = self.now.flight.fleet().time();
         self.now.end_fault(&name, now);
@@ -342,7 +344,8 @@ impl State {
     }
 
     fn require_room(&self) -> Result<(), Refused> {
-        let is_full = self.commands.len() + self.flight.control().formation().count() > MOST_COMMANDS;
+        let kept = self.commands.len() + self.faults.len();
+        let is_full = kept + self.flight.control().formation().count() > MOST_COMMANDS;
         if is_full { Err("too much was done to be kept: save it, and reset".into()) } else { Ok(()) }
     }
 }
