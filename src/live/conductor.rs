@@ -269,17 +269,18 @@ impl Conductor {
             roles: roles(&self.session.roles()),
             broken: Arc::new(self.session.broken()),
             lineage: self.lineage,
-            status: self.status().to_string().into(),
+            status: self.status(frame.clock).to_string().into(),
         };
         self.pace.frames += 1;
         self.board.publish(published);
         self.frame_time += 0.1 * (1e3 * begun.elapsed().as_secs_f64() - self.frame_time);
     }
 
-    fn status(&self) -> Value {
+    fn status(&self, clock: f64) -> Value {
         let (alarms, alarmed) = self.session.alarms();
         json!({
             "event": "status",
+            "clock": clock,
             "playing": self.is_playing,
             "speed": self.speed,
             "layout": self.layout,
