@@ -56,7 +56,6 @@ pub struct Conductor {
     layout: Option<u64>,
     /// Why it goes on no further.
     stopped: Option<String>,
-    sets: Vec<String>,
 }
 
 /// Sends every viewer away when it is dropped, by a panic too.
@@ -105,7 +104,6 @@ impl Conductor {
             lineage: 0,
             layout: None,
             stopped: None,
-            sets: Vec::new(),
         }
     }
 
@@ -205,16 +203,9 @@ impl Conductor {
             return;
         }
         self.stopped = None;
-        match command {
-            Command::Undo {} | Command::Reset {} => {
-                self.is_playing = false;
-                self.lineage += 1;
-            }
-            Command::Set { key, value } => {
-                self.sets.retain(|text| text.split('=').next() != Some(key));
-                self.sets.push(format!("{key}={value}"));
-            }
-            _ => {}
+        if matches!(command, Command::Undo {} | Command::Reset {}) {
+            self.is_playing = false;
+            self.lineage += 1;
         }
     }
 
@@ -289,7 +280,7 @@ impl Conductor {
             "alarms": alarms,
             "alarmed": alarmed,
             "faults": self.session.faults(),
-            "sets": self.sets,
+            "sets": self.session.sets(),
             "viewers": self.board.viewers(),
             "rates": self.pace.rates,
         })

@@ -18,7 +18,7 @@ use crate::swarm::flight::{Alarm, Flight, FlightCommand};
 /// Quantities that come with every frame: a swarm is small.
 pub const CHANNELS: [&str; 4] = ["clearance", "age", "pe1", "strain"];
 
-/// Keys of the flight that may change while robots fly.
+/// Keys of the flight that may change while robots fly: noise, delay and loss.
 const CHANNEL_KEYS: [&str; 3] = ["flight.noise", "flight.delay", "flight.loss"];
 /// Most commands and faults that are kept.
 const MOST_COMMANDS: usize = 100_000;
@@ -86,6 +86,14 @@ impl Swarm {
     /// States that can be returned to.
     pub fn undoable(&self) -> usize {
         self.before.len()
+    }
+
+    /// Keys that were changed and hold now, `KEY=VALUE`, in their order.
+    pub fn sets(&self) -> Vec<String> {
+        let (noise, delay, loss) = self.now.channel;
+        let values = [noise.to_string(), delay.to_string(), loss.to_string()];
+        let channel = CHANNEL_KEYS.iter().zip(values).map(|(key, value)| format!("{key}={value}"));
+        self.now.set.iter().cloned().chain(channel).collect()
     }
 
     /// Flies a period.
