@@ -25,8 +25,8 @@ pub struct LiveArguments {
     /// Override a key, validated like the file: `lattice.spacing=0.5`
     #[arg(long = "set", value_name = "KEY.PATH=VALUE")]
     set: Vec<String>,
-    /// Port on this computer [default: a free one]
-    #[arg(long, value_name = "PORT", value_parser = clap::value_parser!(u16).range(1..))]
+    /// Port on this computer, from 1024: those below are the system's [default: a free one]
+    #[arg(long, value_name = "PORT", value_parser = clap::value_parser!(u16).range(1024..))]
     port: Option<u16>,
     /// Open the page, with the program that this computer opens such files with
     #[arg(long)]

@@ -102,6 +102,11 @@ impl Body {
         self.before.len()
     }
 
+    /// Keys that were changed and hold now, `KEY=VALUE`, in their order.
+    pub fn sets(&self) -> Vec<String> {
+        self.now.set.iter().cloned().chain(self.now.changed_keys()).collect()
+    }
+
     /// Takes a step.
     ///
     /// # Errors

@@ -56,7 +56,15 @@ pub struct Conductor {
     layout: Option<u64>,
     /// Why it goes on no further.
     stopped: Option<String>,
-    sets: Vec<String>,
+}
+
+/// Sends every viewer away when it is dropped, by a panic too.
+struct Closed(Arc<Board>);
+
+impl Drop for Closed {
+    fn drop(&mut self) {
+        self.0.close();
+    }
 }
 
 /// Counts steps and frames in stretches of time.
@@ -96,13 +104,12 @@ impl Conductor {
             lineage: 0,
             layout: None,
             stopped: None,
-            sets: Vec::new(),
         }
     }
 
     /// Goes on until `stop` is raised or nobody can ask for anything any more.
     pub fn run(mut self, requests: &Receiver<Request>, stop: &AtomicBool) {
-        self.show();
+        let _closed = Closed(Arc::clone(&self.board));
         let mut shown = Instant::now();
         let mut before = Instant::now();
         let mut is_news = false;
@@ -127,7 +134,6 @@ impl Conductor {
                 (shown, is_news) = (Instant::now(), false);
             }
         }
-        self.board.close();
     }
 
     /// Takes the steps that are due after so many seconds; whether there were any.
@@ -197,16 +203,9 @@ impl Conductor {
             return;
         }
         self.stopped = None;
-        match command {
-            Command::Undo {} | Command::Reset {} => {
-                self.is_playing = false;
-                self.lineage += 1;
-            }
-            Command::Set { key, value } => {
-                self.sets.retain(|text| text.split('=').next() != Some(key));
-                self.sets.push(format!("{key}={value}"));
-            }
-            _ => {}
+        if matches!(command, Command::Undo {} | Command::Reset {}) {
+            self.is_playing = false;
+            self.lineage += 1;
         }
     }
 
@@ -241,7 +240,8 @@ impl Conductor {
         Err(format!("{} has {MOST_FILES} such files: remove some", self.folder.display()))
     }
 
-    fn show(&mut self) {
+    /// Publishes the state, with a page where there is none of this layout.
+    pub(super) fn show(&mut self) {
         let begun = Instant::now();
         let layout = self.session.layout();
         if self.layout != Some(layout) {
@@ -260,17 +260,18 @@ impl Conductor {
             roles: roles(&self.session.roles()),
             broken: Arc::new(self.session.broken()),
             lineage: self.lineage,
-            status: self.status().to_string().into(),
+            status: self.status(frame.clock).to_string().into(),
         };
         self.pace.frames += 1;
         self.board.publish(published);
         self.frame_time += 0.1 * (1e3 * begun.elapsed().as_secs_f64() - self.frame_time);
     }
 
-    fn status(&self) -> Value {
+    fn status(&self, clock: f64) -> Value {
         let (alarms, alarmed) = self.session.alarms();
         json!({
             "event": "status",
+            "clock": clock,
             "playing": self.is_playing,
             "speed": self.speed,
             "layout": self.layout,
@@ -279,7 +280,7 @@ impl Conductor {
             "alarms": alarms,
             "alarmed": alarmed,
             "faults": self.session.faults(),
-            "sets": self.sets,
+            "sets": self.session.sets(),
             "viewers": self.board.viewers(),
             "rates": self.pace.rates,
         })

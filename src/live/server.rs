@@ -68,7 +68,9 @@ impl Server {
         self.listener.set_nonblocking(true)?;
         let board = Arc::new(Board::default());
         let (requests, asked) = sync_channel(MOST_REQUESTS);
-        let conductor = Conductor::new(session, Arc::clone(&board), folder);
+        let mut conductor = Conductor::new(session, Arc::clone(&board), folder);
+        // Nobody is let in before there is a page.
+        conductor.show();
         let shared = Arc::new(Shared {
             token: self.token,
             port: self.port,
@@ -80,7 +82,7 @@ impl Server {
         std::thread::scope(|scope| {
             let run = move || conductor.run(&asked, stop);
             std::thread::Builder::new().name("live session".into()).spawn_scoped(scope, run)?;
-            while !stop.load(Ordering::Relaxed) {
+            while !stop.load(Ordering::Relaxed) && !shared.board.is_closed() {
                 match self.listener.accept() {
                     Ok((stream, _)) => admit(stream, &shared),
                     Err(_) => std::thread::sleep(LOOK),

@@ -154,6 +154,14 @@ impl Session {
         }
     }
 
+    /// Keys that were changed and hold now, `KEY=VALUE`, in their order.
+    pub fn sets(&self) -> Vec<String> {
+        match self {
+            Session::Body(body) => body.sets(),
+            Session::Swarm(swarm) => swarm.sets(),
+        }
+    }
+
     /// Steps or periods in a second at the usual speed \[1/s\].
     pub fn rate(&self) -> f64 {
         /// As fast as screens are drawn.

@@ -103,9 +103,12 @@ impl Board {
         self.inner().viewers.len()
     }
 
-    /// Notes which quantity a viewer looks at.
+    /// Notes which quantity a viewer looks at, unless it has gone.
     pub fn want(&self, viewer: Viewer, quantity: String) {
-        self.inner().wanted.insert(viewer, quantity);
+        let mut inner = self.inner();
+        if inner.viewers.contains_key(&viewer) {
+            inner.wanted.insert(viewer, quantity);
+        }
     }
 
     /// Whether a viewer looks at this quantity.
@@ -126,7 +129,14 @@ impl Board {
 
     /// Wakes viewers that may be ready for more.
     pub fn wake(&self) {
+        // One that has looked and does not wait yet would miss it.
+        let _held = self.inner();
         self.changed.notify_all();
+    }
+
+    /// Whether the session is over.
+    pub fn is_closed(&self) -> bool {
+        self.inner().is_closed
     }
 
     /// Sends every viewer away.

@@ -18,9 +18,9 @@ use crate::swarm::flight::{Alarm, Flight, FlightCommand};
 /// Quantities that come with every frame: a swarm is small.
 pub const CHANNELS: [&str; 4] = ["clearance", "age", "pe1", "strain"];
 
-/// Keys of the flight that may change while robots fly.
+/// Keys of the flight that may change while robots fly: noise, delay and loss.
 const CHANNEL_KEYS: [&str; 3] = ["flight.noise", "flight.delay", "flight.loss"];
-/// Most commands that are kept.
+/// Most commands and faults that are kept.
 const MOST_COMMANDS: usize = 100_000;
 /// States that can be returned to.
 const MOST_UNDONE: usize = 40;
@@ -86,6 +86,14 @@ impl Swarm {
     /// States that can be returned to.
     pub fn undoable(&self) -> usize {
         self.before.len()
+    }
+
+    /// Keys that were changed and hold now, `KEY=VALUE`, in their order.
+    pub fn sets(&self) -> Vec<String> {
+        let (noise, delay, loss) = self.now.channel;
+        let values = [noise.to_string(), delay.to_string(), loss.to_string()];
+        let channel = CHANNEL_KEYS.iter().zip(values).map(|(key, value)| format!("{key}={value}"));
+        self.now.set.iter().cloned().chain(channel).collect()
     }
 
     /// Flies a period.
@@ -188,6 +196,7 @@ impl Swarm {
             "flight.delay" => delay = raw.delay,
             _ => loss = raw.loss,
         }
+        self.now.require_room()?;
         self.keep();
         let command = FlightCommand::Channel { noise, delay, loss };
         if !self.now.flight.perform(&command) {
@@ -202,6 +211,7 @@ impl Swarm {
     fn fault(&mut self, robot: usize, what: Option<Fault>) -> Result<(), Refused> {
         let names = &self.now.flight.control().formation().names;
         let name = names.get(robot).ok_or("there is no such robot")?.clone();
+        self.now.require_room()?;
         self.keep();
         let now = self.now.flight.fleet().time();
         self.now.end_fault(&name, now);
@@ -222,7 +232,9 @@ impl Swarm {
     /// A swarm that cannot be written.
     pub fn saved(&self) -> Result<String, String> {
         let mut raw = self.now.file.raw.clone();
-        raw.flight.commands.extend(self.now.commands.iter().cloned());
+        // Before a period the hand acted first: the file's own commands are performed when it begins.
+        let own = std::mem::replace(&mut raw.flight.commands, self.now.commands.clone());
+        raw.flight.commands.extend(own);
         raw.flight.commands.sort_by_key(|command| command.after);
         raw.flight.faults.clone_from(&self.now.faults);
         let flown = self.now.flight.fleet().period().max(1) as f64;
@@ -340,7 +352,8 @@ impl State {
     }
 
     fn require_room(&self) -> Result<(), Refused> {
-        let is_full = self.commands.len() + self.flight.control().formation().count() > MOST_COMMANDS;
+        let kept = self.commands.len() + self.faults.len();
+        let is_full = kept + self.flight.control().formation().count() > MOST_COMMANDS;
         if is_full { Err("too much was done to be kept: save it, and reset".into()) } else { Ok(()) }
     }
 }

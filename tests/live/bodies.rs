@@ -126,6 +126,10 @@ fn an_undone_deed_leaves_nothing_behind() {
     drag(&mut body, 66, [1.0, 0.0], 5);
     ask(&mut body, r#"{"do":"undo"}"#);
     assert_eq!(body.engine().step(), 40);
+    ask(&mut body, r#"{"do":"set","key":"update.damping","value":"0.7"}"#);
+    assert_eq!(body.sets(), ["update.damping=0.7"]);
+    ask(&mut body, r#"{"do":"undo"}"#);
+    assert!(body.sets().is_empty());
     ask(&mut body, r#"{"do":"undo"}"#);
     assert_eq!((body.engine().step(), body.engine().breaks().len()), (30, 0));
     assert!(*body.engine().present() == before);

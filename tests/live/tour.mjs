@@ -42,6 +42,15 @@ const clock = (page) => page.evaluate(() => window.report.bodies[0].animation.ti
 // By the clock: a page in the background is not refreshed.
 const later = (page, than) =>
   page.waitForFunction((t) => window.report.bodies[0].animation.times[0] > t, than, { polling: 20 });
+// Once the session stands still and its last state is drawn.
+const settled = (page) =>
+  page.waitForFunction(() => {
+    const { status } = window.report.live.session;
+    return !status.playing && window.report.bodies[0].animation.times[0] === status.clock;
+  }, undefined, { polling: 20 });
+// Once the dragged particle is higher than this: a hand that still holds it keeps it there.
+const lifted = (page, above) =>
+  page.waitForFunction(([k, y]) => window.report.bodies[0].dy[k] > y, [asked.drag, above], { polling: 20 });
 const place = (page, i) => page.evaluate((k) => [window.report.bodies[0].dx[k], window.report.bodies[0].dy[k]], i);
 
 async function shoot(page, name) {
@@ -67,13 +76,11 @@ async function drag(page, other) {
     await page.mouse.move(x + 4 * k, y - 3 * k);
     await later(page, await clock(page));
   }
+  await lifted(page, before[1] + 0.11);
+  await lifted(other, before[1] + 0.06);
+  seen.dragged = { before, after: await place(page, asked.drag), there: await place(other, asked.drag) };
   await shoot(page, `${asked.name}-drag`);
   await page.mouse.up();
-  await later(page, await clock(page));
-  const after = await place(page, asked.drag);
-  await later(other, await clock(page));
-  const there = await place(other, asked.drag);
-  seen.dragged = { before, after, there };
 }
 
 async function cut(page) {
@@ -90,9 +97,10 @@ async function cut(page) {
 }
 
 async function undo(page) {
-  const before = await clock(page);
+  const before = await page.evaluate(() => window.report.live.session.status.clock);
   await page.click("#live-undo");
   await page.waitForFunction(() => window.report.bodies[0].brokenBonds() === 0);
+  await settled(page);
   seen.undone = [before, await clock(page)];
 }
 
@@ -107,12 +115,16 @@ async function set(page) {
 }
 
 async function fault(page) {
+  // A robot that flies is gone from where it was seen.
+  await page.click("#play");
+  await settled(page);
   await page.locator(".canvas").scrollIntoViewIfNeeded();
   const [x, y] = await onScreen(page, asked.fault);
   await page.mouse.click(x, y);
   await page.selectOption("#live-fault", "dead");
   await page.waitForFunction(() => window.report.live.session.status.faults.length > 0);
   seen.hurt = await page.evaluate(() => window.report.live.session.status.faults);
+  await page.click("#play");
   await page.fill("#live-key", "flight.noise=0.02");
   await page.press("#live-key", "Enter");
   await later(page, (await clock(page)) + 0.5);
@@ -121,10 +133,11 @@ async function fault(page) {
 
 async function pause(page) {
   await page.click("#play");
-  await page.waitForFunction(() => !window.report.player.playing);
+  await settled(page);
   const before = await clock(page);
   await page.click("#forth");
   await later(page, before);
+  await settled(page);
   seen.stepped = (await clock(page)) - before;
 }
 
@@ -149,6 +162,7 @@ try {
   if (asked.frames) {
     await page.selectOption("#quantity", asked.quantity ?? "role");
     await page.waitForTimeout(asked.frames);
+    await page.waitForFunction(() => window.report.live.measured.rate > 0);
     const measured = await page.evaluate(() => ({ ...window.report.live.measured, rates: window.report.live.session.status.rates }));
     seen.measured = measured;
     await shoot(page, `${asked.name}-frames`);

@@ -97,10 +97,14 @@ function takeStatus(status) {
   element("live-alarms").replaceChildren(
     ...status.alarms.map((text) => Object.assign(document.createElement("li"), { textContent: text })),
   );
+  const values = new Map(data.live.keys.map(([key, value]) => [key, String(value)]));
   for (const text of status.sets) {
     const at = text.indexOf("=");
-    const input = document.querySelector(`#live-numbers input[data-key="${CSS.escape(text.slice(0, at))}"]`);
-    if (input && input !== document.activeElement) input.value = text.slice(at + 1);
+    values.set(text.slice(0, at), text.slice(at + 1));
+  }
+  for (const input of document.querySelectorAll("#live-numbers input")) {
+    const value = values.get(input.dataset.key);
+    if (input !== document.activeElement && input.value !== value) input.value = value;
   }
 }
 
