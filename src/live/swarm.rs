@@ -175,6 +175,10 @@ impl Swarm {
         }
         self.now.require_room()?;
         let targets: Vec<_> = held.iter().map(|&(m, [x, y])| (m, [x + by[0], y + by[1]])).collect();
+        // All of them or none: a formation that is led by a part of its leaders is torn.
+        if !targets.iter().all(|&(_, to)| self.now.flight.control().is_believed(to)) {
+            return Err("poses there would not be believed: they are beyond `poses.range`".into());
+        }
         for (member, to) in targets {
             self.now.lead(member, to)?;
         }
