@@ -1,7 +1,7 @@
 //! A body that several ranks share.
 //!
 //! Every rank has the whole plan (roles, neighbours, weights, leaders) and moves the particles of its
-//! [`Domain`](crate::sweep::domain::Domain). Between steps whose course is known ahead the ranks exchange halos, for as many steps
+//! [`Domain`]. Between steps whose course is known ahead the ranks exchange halos, for as many steps
 //! together as pay. Everything that looks at the whole body is preceded by [`Engine::gather`], after which every
 //! rank knows all positions and finds the same: bonds that break, neighbours found anew, roles taken on a
 //! condition, frames that look after the sweep, observers. So what a body does hangs on no rank, and its bits on no number
