@@ -38,7 +38,7 @@ mod waits;
 const PROGRAM: &str = env!("CARGO_BIN_EXE_flockform");
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// The program on so many ranks, more than there may be cores, as whoever runs the tests.
+/// The program on so many ranks, more than there may be cores, as the user that runs the tests.
 fn mpirun(ranks: usize, arguments: &[&str], folder: &Path) -> Command {
     let mut command = Command::new("mpirun");
     command.args(["-n", &ranks.to_string(), PROGRAM]).args(arguments);

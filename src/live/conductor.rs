@@ -107,7 +107,7 @@ impl Conductor {
         }
     }
 
-    /// Goes on until `stop` is raised or nobody can ask for anything any more.
+    /// Goes on until `stop` is raised or no viewer can ask for anything any more.
     pub fn run(mut self, requests: &Receiver<Request>, stop: &AtomicBool) {
         let _closed = Closed(Arc::clone(&self.board));
         let mut shown = Instant::now();

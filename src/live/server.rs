@@ -69,7 +69,7 @@ impl Server {
         let board = Arc::new(Board::default());
         let (requests, asked) = sync_channel(MOST_REQUESTS);
         let mut conductor = Conductor::new(session, Arc::clone(&board), folder);
-        // Nobody is let in before there is a page.
+        // No viewer is let in before there is a page.
         conductor.show();
         let shared = Arc::new(Shared {
             token: self.token,

@@ -88,7 +88,7 @@ pub(super) fn beside<T: Send + 'static>(
         let result = catch_unwind(AssertUnwindSafe(|| threads.install(|| work(&shown))));
         drop(threads);
         shown.give_back();
-        // Nobody waits for what was interrupted.
+        // What was interrupted has no caller any more.
         let _ = send.send(result);
     };
     std::thread::Builder::new().name("flockform".into()).spawn(job)?;

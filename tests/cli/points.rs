@@ -238,7 +238,7 @@ fn a_killed_run_of_points_goes_on_to_the_same_end_unless_its_file_was_sorted_mea
 
     let run = ["run", "cloud.toml", "-q", "--out", "o", "--checkpoint-every", "5ms"];
     let unfinished = folder.path().join("o.unfinished");
-    // On a machine that lets nobody look for a while the run is over before it is killed: another try.
+    // On a busy machine the run may be over before it is seen and killed: another try.
     for _ in 0..20 {
         std::fs::remove_dir_all(folder.path().join("o")).expect("removed");
         let mut child = command(&run, folder.path()).spawn().expect("starts");
