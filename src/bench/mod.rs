@@ -9,10 +9,13 @@
 //! * `swarm` (feature `swarm`): robots served per millisecond: neighbour query, rule, safety filter, the whole tick;
 //!   with feature `ros` the time from a pose to its target over loopback.
 //! * `transport` (feature `shm`): what carrying poses costs: shared memory, sockets, DDS.
+//! * [`scale`]: the same body and the same part of a body on more and more ranks, and what a model makes of thousands.
 //! * [`equilibrium`]: seconds to equilibrium, beside a factorisation of the same system.
 
 pub mod equilibrium;
+mod grid;
 pub mod machine;
+pub mod scale;
 #[cfg(feature = "swarm")]
 pub mod swarm;
 pub mod sweep;

@@ -1,5 +1,6 @@
 //! The command line: commands, options, and the function behind each.
 
+mod bench;
 mod bundle;
 mod checkpoint;
 mod compare;
@@ -32,12 +33,12 @@ use std::process::ExitCode;
 use clap::error::{ContextKind, ContextValue};
 use clap::{Parser, Subcommand};
 use clap_complete::Shell;
+use flockform::export;
 use flockform::messages::escaped;
 use flockform::ros::arguments::{RosArgumentError, RosArguments};
 use flockform::ros::node::NodeError;
 use flockform::scene::{self, SceneError};
 use flockform::shm::ShmError;
-use flockform::{bench, export};
 use node::Transport;
 
 /// Exit code of a run that started and failed: diverged or interrupted.
@@ -175,7 +176,7 @@ pub enum Command {
     },
     /// Measures how fast this machine runs the rules
     #[command(subcommand)]
-    Bench(BenchCommand),
+    Bench(bench::BenchCommand),
 }
 
 /// Commands and options that had another name once.
@@ -185,55 +186,6 @@ const RENAMED: [(&str, &str); 4] = [
     ("--fibres", "--fiber-angle"),
     ("--most-particles", "--max-particles"),
 ];
-
-#[derive(Debug, Subcommand)]
-pub enum BenchCommand {
-    /// Particle updates per second, beside the machine's memory bandwidth
-    #[command(after_help = "Example:\n  flockform bench sweep --json > sweep.json")]
-    Sweep {
-        /// Print JSON instead of a table
-        #[arg(long)]
-        json: bool,
-        /// Small sizes and few repetitions: a trial run, whose figures mean nothing
-        #[arg(long)]
-        quick: bool,
-    },
-    /// Robots per millisecond for neighbour query, rule, safety filter and whole tick; pose to target over loopback
-    #[cfg(feature = "swarm")]
-    #[command(after_help = "Example:\n  flockform bench swarm --json > swarm.json")]
-    Swarm {
-        /// Print JSON instead of a table
-        #[arg(long)]
-        json: bool,
-        /// Small swarms and few repetitions: a trial run, whose figures mean nothing
-        #[arg(long)]
-        quick: bool,
-    },
-    /// Latency and CPU of carrying poses: in process, iceoryx2, ours over it, Unix socket, DDS over loopback
-    #[command(after_help = "Example:\n  flockform bench transport --out /tmp/transport")]
-    Transport {
-        /// Print JSON instead of a table
-        #[arg(long)]
-        json: bool,
-        /// Small messages and few of them: a trial run, whose figures mean nothing
-        #[arg(long)]
-        quick: bool,
-        /// Also write the table and a figure to this folder; must be empty or new
-        #[arg(long, value_name = "DIR")]
-        out: Option<PathBuf>,
-    },
-    /// Seconds to equilibrium by multigrid, beside a factorisation of the same system
-    #[cfg(feature = "fem")]
-    #[command(after_help = "Example:\n  flockform bench equilibrium --json > equilibrium.json")]
-    Equilibrium {
-        /// Print JSON instead of a table
-        #[arg(long)]
-        json: bool,
-        /// Small bodies and few repetitions: a trial run, whose figures mean nothing
-        #[arg(long)]
-        quick: bool,
-    },
-}
 
 /// Reason why a command refused its input.
 #[derive(Debug, thiserror::Error)]
@@ -305,7 +257,7 @@ pub enum Refusal {
     Bench(#[from] rayon::ThreadPoolBuildError),
     #[cfg(feature = "fem")]
     #[error("{0}")]
-    BenchEquilibrium(#[from] bench::equilibrium::EquilibriumError),
+    BenchEquilibrium(#[from] flockform::bench::equilibrium::EquilibriumError),
     #[error("{0}")]
     Ranks(#[from] ranks::RanksError),
     #[error("--threads {threads}: {error}\n  help: give a number from 1 to the machine's cores")]
@@ -428,29 +380,7 @@ pub fn dispatch(command: Command, ros: &RosArguments) -> Result<ExitCode, Refusa
         Command::Schema { swarm: false } => print(&format!("{:#}\n", scene::validate::schema())),
         Command::Schema { swarm: true } => print(&format!("{:#}\n", scene::swarm::schema())),
         Command::Completions { shell } => print(&completions::script(shell)),
-        Command::Bench(BenchCommand::Sweep { json, quick }) => {
-            let report = bench::sweep::run(&bench::sweep::Options { quick })?;
-            print(&if json { format!("{}\n", serde_json::json!(report)) } else { report.to_string() });
-        }
-        #[cfg(feature = "swarm")]
-        Command::Bench(BenchCommand::Swarm { json, quick }) => {
-            let report = bench::swarm::run(&bench::swarm::Options { quick });
-            print(&if json { format!("{}\n", serde_json::json!(report)) } else { report.to_string() });
-        }
-        Command::Bench(BenchCommand::Transport { json, quick, out }) => {
-            let folder = out.map(|out| output::create(&out, false)).transpose()?;
-            let report = bench::transport::run(&bench::transport::Options { quick });
-            print(&if json { format!("{}\n", serde_json::json!(report)) } else { report.to_string() });
-            if let Some(folder) = folder {
-                export::transport::write_transport(&folder, &report)?;
-                interrupt::commit(folder)?;
-            }
-        }
-        #[cfg(feature = "fem")]
-        Command::Bench(BenchCommand::Equilibrium { json, quick }) => {
-            let report = bench::equilibrium::run(&bench::equilibrium::Options { quick })?;
-            print(&if json { format!("{}\n", serde_json::json!(report)) } else { report.to_string() });
-        }
+        Command::Bench(command) => bench::bench(command)?,
     }
     Ok(ExitCode::SUCCESS)
 }

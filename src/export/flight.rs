@@ -6,11 +6,12 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
+use super::OutputFolder;
 use super::csv::write;
-use super::error::{ExportError, write_file};
+use super::error::ExportError;
 use super::figures::chart::{Axis, Chart, Series, Style, draw_below_each_other};
 use super::figures::{self, SERIES, flight_map};
-use super::{OutputFolder, summary};
+use super::summary::write_signed;
 use crate::scene::swarm::Swarm;
 use crate::swarm::flight::{FlightReport, Record, Sample, Verdict};
 
@@ -19,8 +20,6 @@ const FILE: &str = "flight.json";
 
 #[derive(Serialize)]
 struct Report<'a> {
-    program: &'static str,
-    version: &'static str,
     /// Whether every declared bound held.
     holds: bool,
     #[serde(flatten)]
@@ -58,12 +57,8 @@ pub fn write_flight(
     written.extend(figures::write(&flight_map::flight(swarm, record, report), folder, "flight")?);
     let errors = draw_below_each_other(&charts(record, report));
     written.extend(figures::write(&errors, folder, "errors")?);
-    let path = folder.path(FILE);
-    let (program, version) = (summary::PROGRAM, env!("CARGO_PKG_VERSION"));
-    let whole = Report { program, version, holds: report.holds(), report, swarm: &swarm.raw };
-    let text = serde_json::to_string_pretty(&whole).map_err(ExportError::io("write", &path))? + "\n";
-    write_file(&path, text)?;
-    written.push(path);
+    let whole = Report { holds: report.holds(), report, swarm: &swarm.raw };
+    written.push(write_signed(folder, FILE, &whole)?);
     Ok(written)
 }
 

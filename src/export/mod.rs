@@ -65,6 +65,8 @@ mod folder;
 pub mod load;
 pub(crate) mod manifest;
 pub mod report;
+#[cfg(feature = "bench")]
+pub mod scale;
 pub mod stability;
 mod summary;
 pub mod sweep;

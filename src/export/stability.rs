@@ -5,11 +5,12 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
+use super::OutputFolder;
 use super::csv::write;
-use super::error::{ExportError, write_file};
+use super::error::ExportError;
 use super::figures::chart::{Axis, Chart, Landmark, Series, Style, draw_below_each_other};
 use super::figures::{self, SERIES};
-use super::{OutputFolder, summary};
+use super::summary::{signed, write_signed};
 use crate::study::stability::bisection::Growth;
 use crate::study::stability::study::{Linear, Study, Sweep, Threshold};
 
@@ -18,8 +19,6 @@ const FILE: &str = "stability.json";
 
 #[derive(Serialize)]
 struct Report<'a> {
-    program: &'static str,
-    version: &'static str,
     /// Whether predictions and runs agree and no extreme is wrong.
     holds: bool,
     #[serde(flatten)]
@@ -47,10 +46,7 @@ pub fn write_stability(folder: &OutputFolder, study: &Study) -> Result<Vec<PathB
         written.push(write(folder, "growth.csv", rows(linear).into_iter())?);
         written.extend(figures::write(&figure(study, linear), folder, "growth")?);
     }
-    let path = folder.path(FILE);
-    let text = json(study).map_err(ExportError::io("write", &path))?;
-    write_file(&path, text)?;
-    written.push(path);
+    written.push(write_signed(folder, FILE, &Report::of(study))?);
     Ok(written)
 }
 
@@ -59,9 +55,13 @@ pub fn write_stability(folder: &OutputFolder, study: &Study) -> Result<Vec<PathB
 /// # Errors
 /// None that a study could cause.
 pub fn json(study: &Study) -> serde_json::Result<String> {
-    let (program, version) = (summary::PROGRAM, env!("CARGO_PKG_VERSION"));
-    let report = Report { program, version, holds: study.holds(), study };
-    Ok(serde_json::to_string_pretty(&report)? + "\n")
+    signed(&Report::of(study))
+}
+
+impl<'a> Report<'a> {
+    fn of(study: &'a Study) -> Self {
+        Self { holds: study.holds(), study }
+    }
 }
 
 fn rows(linear: &Linear) -> Vec<Row> {

@@ -22,6 +22,32 @@ use crate::scene::units::Units;
 use crate::solve::equilibrium::Solved;
 
 pub(super) const PROGRAM: &str = env!("CARGO_PKG_NAME");
+
+/// A report that says which program made it.
+#[derive(Serialize)]
+struct Signed<'a, T> {
+    program: &'static str,
+    version: &'static str,
+    #[serde(flatten)]
+    report: &'a T,
+}
+
+/// The JSON of a report, the program's name and version before it.
+pub(super) fn signed<T: Serialize>(report: &T) -> serde_json::Result<String> {
+    let report = Signed { program: PROGRAM, version: env!("CARGO_PKG_VERSION"), report };
+    Ok(serde_json::to_string_pretty(&report)? + "\n")
+}
+
+/// Writes a report in place of a summary.
+pub(super) fn write_signed<T: Serialize>(
+    folder: &OutputFolder,
+    file: &str,
+    report: &T,
+) -> Result<PathBuf, ExportError> {
+    let path = folder.path(file);
+    write_file(&path, signed(report).map_err(ExportError::io("write", &path))?)?;
+    Ok(path)
+}
 const FILE: &str = "summary.json";
 
 /// Part of the forces on a body that may be left on a follower of one at rest \[1\].

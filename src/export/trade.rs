@@ -5,24 +5,17 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
+use super::OutputFolder;
 use super::csv::write;
-use super::error::{ExportError, write_file};
+use super::error::ExportError;
 use super::figures::chart::{Axis, Chart, Landmark, Series, Style, draw};
 use super::figures::{self, INK, SERIES};
-use super::{OutputFolder, summary};
+use super::summary::write_signed;
 use crate::solve::equilibrium::Solver;
 use crate::study::trade::{Outcome, Point, RuleChoice, Study};
 
 /// The file of a trade study, in place of a summary.
 const FILE: &str = "trade.json";
-
-#[derive(Serialize)]
-struct Report<'a> {
-    program: &'static str,
-    version: &'static str,
-    #[serde(flatten)]
-    study: &'a Study,
-}
 
 #[derive(Serialize)]
 struct Row<'a> {
@@ -49,12 +42,7 @@ pub fn write_trade(folder: &OutputFolder, study: &Study) -> Result<Vec<PathBuf>,
     let rows = study.points.iter().map(|point| row(point, front.contains(&point)));
     let mut written = vec![write(folder, "trade.csv", rows)?];
     written.extend(figures::write(&figure(study), folder, "trade")?);
-    let path = folder.path(FILE);
-    let report = Report { program: summary::PROGRAM, version: env!("CARGO_PKG_VERSION"), study };
-    let mut text = serde_json::to_string_pretty(&report).map_err(ExportError::io("write", &path))?;
-    text.push('\n');
-    write_file(&path, text)?;
-    written.push(path);
+    written.push(write_signed(folder, FILE, study)?);
     Ok(written)
 }
 

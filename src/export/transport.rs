@@ -5,24 +5,17 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
+use super::OutputFolder;
 use super::csv::write;
-use super::error::{ExportError, write_file};
+use super::error::ExportError;
 use super::figures::chart::{Axis, Chart, Series, Style, draw_below_each_other};
 use super::figures::{self, SERIES};
-use super::{OutputFolder, summary};
+use super::summary::write_signed;
 use crate::bench::transport::Report;
 use crate::bench::transport::measure::{Case, Work};
 
 /// The file of a benchmark of transports, in place of a summary.
 const FILE: &str = "transport.json";
-
-#[derive(Serialize)]
-struct Whole<'a> {
-    program: &'static str,
-    version: &'static str,
-    #[serde(flatten)]
-    report: &'a Report,
-}
 
 #[derive(Serialize)]
 struct Row {
@@ -49,12 +42,7 @@ struct Row {
 pub fn write_transport(folder: &OutputFolder, report: &Report) -> Result<Vec<PathBuf>, ExportError> {
     let mut written = vec![write(folder, "transport.csv", report.cases.iter().map(row))?];
     written.extend(figures::write(&figure(report), folder, "transport")?);
-    let path = folder.path(FILE);
-    let whole = Whole { program: summary::PROGRAM, version: env!("CARGO_PKG_VERSION"), report };
-    let mut text = serde_json::to_string_pretty(&whole).map_err(ExportError::io("write", &path))?;
-    text.push('\n');
-    write_file(&path, text)?;
-    written.push(path);
+    written.push(write_signed(folder, FILE, report)?);
     Ok(written)
 }
 

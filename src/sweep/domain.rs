@@ -91,7 +91,7 @@ impl Domain {
     pub fn steps_together(&self) -> usize {
         let sizes = self.bands.iter().flat_map(|cuts| cuts.windows(2)).map(|ends| ends[1] - ends[0]);
         let least = sizes.filter(|&bands| bands > 0).min().unwrap_or(0);
-        (least / BANDS_A_STEP).clamp(1, MOST_STEPS)
+        steps_of(least)
     }
 
     /// What is exchanged before so many steps are taken together.
@@ -122,6 +122,11 @@ impl Domain {
         }
         rows.particles(from.saturating_sub(steps)..(to + steps).min(rows.band_count()))
     }
+}
+
+/// How many steps a rank of so many bands takes together.
+pub fn steps_of(bands: usize) -> usize {
+    (bands / BANDS_A_STEP).clamp(1, MOST_STEPS)
 }
 
 /// What both stretches have in common, if anything.

@@ -4,13 +4,13 @@ use std::time::Instant;
 
 use serde::Serialize;
 
+use super::super::grid::{plan, stirred};
 use super::super::machine::median;
 use crate::continuum::plan::Plan;
 use crate::continuum::record::{ProbeSeries, Snapshot};
 use crate::engine::Engine;
 use crate::flock::role::Role;
 use crate::flock::vectors::Vectors;
-use crate::scene;
 use crate::sweep::domain::Share;
 use crate::sweep::kernel::Component;
 use crate::sweep::rows::Rows;
@@ -58,12 +58,12 @@ const NAMED: [(&str, &[&str], Recorded); 14] = [
 
 /// Times steps of a square body of so many particles along each side, with each capability.
 pub fn measure(side: usize, repetitions: usize, seconds: f64) -> Vec<Capability> {
-    let mut bare = Bare::new(&plan(side, &[]));
+    let mut bare = Bare::new(&plan([side; 2], &[]));
     let steps = bare.steps_in(seconds);
     NAMED
         .iter()
         .map(|&(name, keys, recorded)| {
-            let mut engine = Engine::new(plan(side, keys).setup);
+            let mut engine = Engine::new(plan([side; 2], keys).setup);
             let mut time = || time(&mut engine, steps, recorded);
             time();
             let (mut times, mut ratios): (Vec<f64>, Vec<f64>) = (0..repetitions)
@@ -73,22 +73,6 @@ pub fn measure(side: usize, repetitions: usize, seconds: f64) -> Vec<Capability>
             Capability { name, seconds_per_step: median(&mut times), over_bare_loops: median(&mut ratios) }
         })
         .collect()
-}
-
-/// A square body held all around and stirred, so that every particle moves in every step.
-fn plan(side: usize, keys: &[&str]) -> Plan {
-    let body = format!("body.shape={{kind=\"grid\",columns={side},rows={side}}}");
-    let held = "roles=[{region={kind=\"boundary\"},role=\"clamped\"}]";
-    let mut overrides: Vec<String> =
-        vec!["frame=\"none\"".into(), body, held.into(), "record.probes=[]".into()];
-    overrides.extend(keys.iter().map(|&key| key.to_owned()));
-    let scene = scene::bundled("tension").expect("bundled").load(&overrides);
-    let plan = scene.and_then(|scene| Plan::new(&scene));
-    plan.unwrap_or_else(|error| panic!("the benchmark's own scene is refused: {error}"))
-}
-
-fn stirred(reference: &Vectors) -> impl Iterator<Item = [f64; 2]> + '_ {
-    reference.iter().map(|[x, y]| [x + 0.01 * (0.1 * y).sin(), y + 0.01 * (0.1 * x).sin()])
 }
 
 fn time(engine: &mut Engine, steps: usize, recorded: Recorded) -> f64 {

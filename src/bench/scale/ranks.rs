@@ -1,0 +1,185 @@
+//! Ranks that are timed, and what they say to each other, counted.
+
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Instant;
+
+use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
+
+use super::super::grid::stirred;
+use super::super::machine::median;
+use super::model::Link;
+use crate::continuum::plan::Plan;
+use crate::engine::Engine;
+use crate::ranks::{Exchange, Team, in_process};
+use crate::sweep::MOST_STEPS;
+
+/// Words of the messages by which a link is measured: next to nothing, and a mebibyte.
+const MESSAGES: [usize; 2] = [1, 1 << 17];
+
+/// What other ranks had to send to one, and how long it waited for it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Tally {
+    pub messages: u64,
+    pub bytes: u64,
+    pub seconds: f64,
+}
+
+/// A rank whose messages are counted.
+struct Counted {
+    team: Team,
+    tally: Arc<Mutex<Tally>>,
+}
+
+impl Exchange for Counted {
+    fn rank(&self) -> usize {
+        self.team.rank()
+    }
+
+    fn count(&self) -> usize {
+        self.team.count()
+    }
+
+    fn swap(&mut self, messages: &[(usize, Vec<u64>)], from: &[(usize, usize)]) -> Vec<Vec<u64>> {
+        let begin = Instant::now();
+        let received = self.team.swap(messages, from);
+        let mut tally = self.tally.lock().unwrap_or_else(PoisonError::into_inner);
+        tally.seconds += begin.elapsed().as_secs_f64();
+        tally.messages += from.len() as u64;
+        tally.bytes += from.iter().map(|(_, words)| 8 * *words as u64).sum::<u64>();
+        received
+    }
+
+    fn gather(&mut self, own: &[u64], counts: &[usize]) -> Vec<u64> {
+        self.team.gather(own, counts)
+    }
+}
+
+/// Steps on one rank and on all, taken in turn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Times {
+    /// Medians \[s\].
+    pub alone: f64,
+    pub shared: f64,
+    /// Share of the time that the rank that waited longest was in exchanges \[1\].
+    pub in_exchange: f64,
+}
+
+/// Does `work` on so many ranks, each a thread with one thread to sweep with; the first one's result.
+pub fn on_threads<T: Send>(
+    count: usize,
+    work: impl Fn(&Team) -> T + Sync,
+) -> Result<T, ThreadPoolBuildError> {
+    let pools = (0..count).map(|_| single()).collect::<Result<Vec<_>, _>>()?;
+    Ok(std::thread::scope(|scope| {
+        let work = &work;
+        let ranks = pools.into_iter().zip(in_process(count));
+        let ranks: Vec<_> =
+            ranks.map(|(pool, team)| scope.spawn(move || pool.install(|| work(&team)))).collect();
+        let mut results = ranks.into_iter().map(|rank| rank.join().expect("no rank panics"));
+        let first = results.next().expect("at least one rank");
+        results.for_each(drop);
+        first
+    }))
+}
+
+/// One thread for a rank to sweep with.
+pub fn single() -> Result<ThreadPool, ThreadPoolBuildError> {
+    ThreadPoolBuilder::new().num_threads(1).build()
+}
+
+/// Times a body on one rank and another one, or the same, on all of them.
+pub fn time(team: &Team, [alone, shared]: [&Plan; 2], (repetitions, seconds): (usize, f64)) -> Times {
+    let tally = Arc::new(Mutex::new(Tally::default()));
+    let mut whole = team.is_first().then(|| engine(alone, None));
+    let mut parts = engine(shared, Some(Counted { team: team.clone(), tally: Arc::clone(&tally) }));
+    let steps = whole.as_mut().map_or(0, |whole| {
+        step(whole, MOST_STEPS);
+        let one = timed(whole, MOST_STEPS);
+        ((seconds / one).clamp(1.0, 1e5) as u64).next_multiple_of(MOST_STEPS as u64)
+    });
+    let [steps] = team.of_first([steps]);
+    step(&mut parts, MOST_STEPS);
+    let (mut of_one, mut of_all, mut waited) = (Vec::new(), Vec::new(), Vec::new());
+    for _ in 0..repetitions {
+        of_one.extend(whole.as_mut().map(|whole| timed(whole, steps as usize)));
+        *tally.lock().unwrap_or_else(PoisonError::into_inner) = Tally::default();
+        team.any(false);
+        let begin = Instant::now();
+        step(&mut parts, steps as usize);
+        let own = tally.lock().unwrap_or_else(PoisonError::into_inner).seconds;
+        let [longest] = team.largest([own]);
+        let all = begin.elapsed().as_secs_f64();
+        of_all.push(all / steps as f64);
+        waited.push(longest / all);
+    }
+    Times { alone: median(&mut of_one), shared: median(&mut of_all), in_exchange: median(&mut waited) }
+}
+
+/// What the rank that gets most messages is sent in so many steps, and the followers that the busiest one has.
+pub fn count(team: &Team, plan: &Plan, steps: usize) -> (Tally, u64) {
+    let tally = Arc::new(Mutex::new(Tally::default()));
+    let mut engine = engine(plan, Some(Counted { team: team.clone(), tally: Arc::clone(&tally) }));
+    // The first steps begin where everybody knows everything.
+    step(&mut engine, MOST_STEPS);
+    let counted = |engine: &Engine| engine.activity().clone().take_counts()[0];
+    let before = counted(&engine);
+    *tally.lock().unwrap_or_else(PoisonError::into_inner) = Tally::default();
+    step(&mut engine, steps);
+    let Tally { messages, bytes, .. } = *tally.lock().unwrap_or_else(PoisonError::into_inner);
+    let updates = (counted(&engine) - before) / 2;
+    let all = team.each([messages, bytes, updates]);
+    let most = |k: usize| all.iter().map(|of| of[k]).max().unwrap_or_default();
+    (Tally { messages: most(0), bytes: most(1), seconds: 0.0 }, most(2))
+}
+
+/// What messages between the first two ranks cost.
+pub fn link(team: &Team, rounds: usize) -> Link {
+    let other = [1, 0].get(team.rank()).copied();
+    let [latency, long] = MESSAGES.map(|words| {
+        let Some(other) = other else { return 0.0 };
+        let mut times: Vec<f64> = (0..rounds).map(|_| swapped(team, other, words)).collect();
+        median(&mut times)
+    });
+    let [latency, long] = team.of_first([latency, long].map(f64::to_bits)).map(f64::from_bits);
+    let bytes = 8.0 * (MESSAGES[1] - MESSAGES[0]) as f64;
+    Link { latency_seconds: latency, bytes_per_second: bytes / (long - latency).max(1e-9) }
+}
+
+/// Seconds that two ranks take to swap so many words.
+fn swapped(team: &Team, other: usize, words: usize) -> f64 {
+    let message = [(other, vec![7; words])];
+    let begin = Instant::now();
+    let received = team.swap(&message, &[(other, words)]);
+    std::hint::black_box(received);
+    begin.elapsed().as_secs_f64()
+}
+
+fn engine(plan: &Plan, rank: Option<Counted>) -> Engine {
+    let mut engine = Engine::new(plan.setup.clone());
+    let reference = engine.body().reference.clone();
+    engine.observe(stirred(&reference).enumerate());
+    if let Some(rank) = rank {
+        engine.join(Team::new(rank)).expect("a synchronous sweep");
+    }
+    engine
+}
+
+/// Takes steps, as many together as pay.
+fn step(engine: &mut Engine, steps: usize) {
+    let mut to_go = steps;
+    while to_go > 0 {
+        let together = engine.steps_at_once(to_go);
+        if together == 0 {
+            engine.advance();
+        } else {
+            engine.advance_by(together, None);
+        }
+        to_go -= together.max(1);
+    }
+}
+
+fn timed(engine: &mut Engine, steps: usize) -> f64 {
+    let begin = Instant::now();
+    step(engine, steps);
+    begin.elapsed().as_secs_f64() / steps as f64
+}

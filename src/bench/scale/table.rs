@@ -1,0 +1,112 @@
+//! The report in words.
+
+use std::fmt;
+
+use super::model::Link;
+use super::{Case, Report};
+
+impl fmt::Display for Report {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let processor = self.processor.as_deref().unwrap_or("a processor without name");
+        writeln!(f, "{processor}, {} cores; ranks are {} with one thread each", self.cores, self.ranks_are)?;
+        let Link { latency_seconds, bytes_per_second } = self.model.link;
+        writeln!(
+            f,
+            "an update takes {:.3} ns, a message {:.1} us and a second for {:.1} GB",
+            1e9 * self.model.update_seconds,
+            1e6 * latency_seconds,
+            1e-9 * bytes_per_second
+        )?;
+        cases(f, "strong: the same body", &self.strong)?;
+        cases(f, "weak: as much for each rank", &self.weak)?;
+        self.counts(f)?;
+        self.foretold(f)?;
+        if self.strong.iter().any(|case| case.ranks > self.cores) && self.ranks_are == "threads" {
+            writeln!(f, "\nThere were more ranks than cores: they waited for each other in turns.")?;
+        }
+        if self.quick {
+            writeln!(f, "\nA quick run: it shows that the benchmark works, its times mean little.")?;
+        }
+        Ok(())
+    }
+}
+
+fn cases(f: &mut fmt::Formatter<'_>, title: &str, cases: &[Case]) -> fmt::Result {
+    writeln!(
+        f,
+        "\n{title:<28} {:>14} {:>12} {:>12} {:>10} {:>12} {:>12}",
+        "body", "one rank", "a step", "efficiency", "in exchange", "foretold"
+    )?;
+    for case in cases {
+        writeln!(
+            f,
+            "{:<28} {:>14} {:>12} {:>12} {:>8.0} % {:>10.0} % {:>12}",
+            format!("{} ranks", case.ranks),
+            format!("{} x {}", case.body[0], case.body[1]),
+            milliseconds(case.alone_seconds_per_step),
+            milliseconds(case.seconds_per_step),
+            100.0 * case.efficiency,
+            100.0 * case.share_in_exchange,
+            milliseconds(case.foretold_seconds_per_step),
+        )?;
+    }
+    Ok(())
+}
+
+fn milliseconds(seconds: f64) -> String {
+    format!("{:.4} ms", 1e3 * seconds)
+}
+
+impl Report {
+    fn counts(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            f,
+            "\n{:<28} {:>14} {:>22} {:>22} {:>24}",
+            "counted a step (foretold)", "body", "messages", "bytes", "updates"
+        )?;
+        for case in &self.counted {
+            let beside = |counted: f64, foretold: f64| format!("{counted:.3} ({foretold:.3})");
+            let (counted, foretold) = (&case.counted, &case.foretold);
+            writeln!(
+                f,
+                "{:<28} {:>14} {:>22} {:>22} {:>24}",
+                format!("{} ranks", case.ranks),
+                format!("{} x {}", case.body[0], case.body[1]),
+                beside(counted.messages, foretold.messages),
+                beside(counted.bytes, foretold.bytes),
+                beside(counted.updates, foretold.updates),
+            )?;
+        }
+        Ok(())
+    }
+
+    fn foretold(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [[columns, rows], [each, high]] = [self.foretold_body, self.foretold_part];
+        let Link { latency_seconds, bytes_per_second } = Link::NETWORK;
+        writeln!(
+            f,
+            "\nforetold efficiency of {columns} x {rows} (strong) and of {each} x {high} for each rank (weak), with messages as \
+             they were\nmeasured here, and with those of a network that is assumed: {:.0} us and {:.0} GB/s",
+            1e6 * latency_seconds,
+            1e-9 * bytes_per_second
+        )?;
+        writeln!(
+            f,
+            "{:<28} {:>14} {:>12} {:>16} {:>16}",
+            "", "strong, here", "weak, here", "strong, network", "weak, network"
+        )?;
+        for one in &self.foretold {
+            let percent = |share: f64| format!("{:.1} %", 100.0 * share);
+            writeln!(
+                f,
+                "{:<28} {:>14} {:>12} {:>16} {:>16}",
+                format!("{} ranks", one.ranks),
+                percent(one.strong_efficiency),
+                percent(one.weak_efficiency),
+                percent(one.strong_efficiency_on_network),
+                percent(one.weak_efficiency_on_network),
+            )?;
+        }
+        Ok(())
+    }
+}
