@@ -395,11 +395,22 @@ fn runs_alone(command: &Command) -> Option<&'static str> {
     match command {
         Command::Compare(_) => Some("compare"),
         Command::Trade(_) => Some("trade"),
-        Command::Sweep(sweep) if !sweep.is_shard() => Some("sweep"),
+        Command::Sweep(sweep) => (!sweep.is_shard()).then_some("sweep"),
         Command::Stability(_) => Some("stability"),
         Command::Swarm(_) => Some("swarm"),
         Command::Gallery(_) => Some("gallery"),
-        _ => None,
+        Command::New(_) => Some("new"),
+        Command::Install(_) => Some("install"),
+        Command::Bench(_) => Some("bench"),
+        // They share a run.
+        Command::Run(_) => None,
+        // Each is a node of its own.
+        Command::Node(_) | Command::Robots(_) => None,
+        // They write nothing.
+        Command::List(_) | Command::Show(_) | Command::Plan(_) | Command::Material(_) => None,
+        Command::Schema { .. } | Command::Completions { .. } => None,
+        Command::Live(_) => Some("live"),
+        Command::Replay(_) => Some("replay"),
     }
 }
 
