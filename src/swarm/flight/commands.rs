@@ -4,7 +4,7 @@ use super::{Flight, faults};
 use crate::scene::SceneError;
 use crate::scene::swarm::Swarm;
 use crate::scene::swarm::raw::RawCommandKind;
-use crate::swarm::formation::Formation;
+use crate::swarm::control::Control;
 use crate::swarm::safety::Limits;
 
 /// Something that is done between two periods.
@@ -55,8 +55,10 @@ impl Flight {
 /// The commands of a swarm file.
 ///
 /// # Errors
-/// Names a robot that no program leads, and a period that comes before the one of the command above.
-pub fn of(swarm: &Swarm, formation: &Formation) -> Result<Vec<(u64, FlightCommand)>, SceneError> {
+/// Names a robot that no program leads, a place where no pose would be believed, and a period that comes before the one
+/// of the command above.
+pub fn of(swarm: &Swarm, control: &Control) -> Result<Vec<(u64, FlightCommand)>, SceneError> {
+    let formation = control.formation();
     let commands = &swarm.raw.flight.commands;
     if let Some(k) = commands.windows(2).position(|pair| pair[0].after > pair[1].after) {
         let message = "comes before the command above it";
@@ -83,5 +85,16 @@ pub fn of(swarm: &Swarm, formation: &Formation) -> Result<Vec<(u64, FlightComman
         };
         Ok((raw.after, what))
     };
+                if !control.is_believed(*to) {
+                    let range = swarm.raw.poses.range;
+                    let message =
+                        format!("lies more than poses.range = {range} m from the formation's middle");
+                    let key = format!("flight.commands[{k}].what.to");
+                    return Err(swarm.refuse(
+                        &key,
+                        message,
+                        "no pose is believed there: lead to a nearer place, or raise poses.range",
+                    ));
+                }
     commands.iter().enumerate().map(command).collect()
 }
