@@ -10,9 +10,10 @@ use crate::continuum::plan::Plan;
 use crate::continuum::run::Bounds;
 use crate::engine::Engine;
 use crate::engine::forces::held;
-use crate::engine::setup::{ActionKind, RoleChange, Setup};
+use crate::engine::setup::{RoleChange, Setup};
 use crate::export::report::RunRecorder;
 use crate::export::report::view::View;
+use crate::flock::action::{Action, ActionKind};
 use crate::flock::motion::{Interpolation, Keyframe, Motion};
 use crate::flock::role::Role;
 use crate::flock::rules::Mean;
@@ -209,9 +210,8 @@ impl Body {
     }
 
     fn set(&mut self, text: &str) -> Result<(), Refused> {
-        let sets = |action: &scene::Action| matches!(action.what, scene::ActionKind::Set(_));
         // A file that changes keys on its way would change them back.
-        if !is_changeable(text) || self.now.scene.actions.iter().any(sets) || self.now.is_untouched() {
+        if !is_changeable(text) || !self.now.scene.actions.iter().all(Action::is_cut) || self.now.is_untouched() {
             let mut set = self.now.set.clone();
             set.push(text.to_owned());
             return self.restart(set);
@@ -229,7 +229,7 @@ impl Body {
         };
         self.keep();
         let at = self.now.engine.step() + 1;
-        self.now.engine.perform(&ActionKind::Conduct(Arc::new(conduct)), at);
+        self.now.engine.perform(&ActionKind::Follow(Arc::new(conduct)), at);
         self.now.keep_key(at, text);
         Ok(())
     }
