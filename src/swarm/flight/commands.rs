@@ -1,4 +1,4 @@
-//! What is done from outside while robots fly: leaders sent to places, poses made worse.
+//! What is done from outside while robots fly: leaders sent to places, obstacles moved, poses made worse.
 
 use super::{Flight, faults};
 use crate::scene::SceneError;
@@ -17,6 +17,13 @@ pub enum FlightCommand {
         /// Where it goes.
         to: [f64; 2],
     },
+    /// Moves an obstacle at once.
+    MoveObstacle {
+        /// Its number.
+        obstacle: usize,
+        /// From its place in the file \[m\].
+        by: [f64; 2],
+    },
     /// Sends poses with this noise \[m\], delay \[period\] and loss \[1\].
     Channel {
         /// Standard deviation of each coordinate.
@@ -30,10 +37,11 @@ pub enum FlightCommand {
 
 impl Flight {
     /// Performs a command before the next period; false where it concerns a robot that no program leads, or a place
-    /// where no pose would be believed.
+    /// where no pose would be believed or an obstacle would be none.
     pub fn perform(&mut self, command: &FlightCommand) -> bool {
         match *command {
             FlightCommand::Lead { member, to } => self.control.take_over(member, to),
+            FlightCommand::MoveObstacle { obstacle, by } => self.control.move_obstacle(obstacle, by).is_ok(),
             FlightCommand::Channel { noise, delay, loss } => {
                 self.fleet.set_channels(noise, delay, loss);
                 let limits = Limits { deviation: noise, ..self.control.limits().clone() };
@@ -77,14 +85,6 @@ pub fn of(swarm: &Swarm, control: &Control) -> Result<Vec<(u64, FlightCommand)>,
                     let message = format!("no program of this swarm leads `{robot}`");
                     return Err(swarm.refuse(&key, message, "name a robot of [[leaders]]"));
                 }
-                FlightCommand::Lead { member, to: *to }
-            }
-            RawCommandKind::Channel { noise, delay, loss } => {
-                FlightCommand::Channel { noise: *noise, delay: *delay, loss: *loss }
-            }
-        };
-        Ok((raw.after, what))
-    };
                 if !control.is_believed(*to) {
                     let range = swarm.raw.poses.range;
                     let message =
@@ -96,5 +96,30 @@ pub fn of(swarm: &Swarm, control: &Control) -> Result<Vec<(u64, FlightCommand)>,
                         "no pose is believed there: lead to a nearer place, or raise poses.range",
                     ));
                 }
+                FlightCommand::Lead { member, to: *to }
+            }
+            RawCommandKind::MoveObstacle { obstacle, by } => {
+                let key = format!("flight.commands[{k}].what");
+                let count = swarm.raw.obstacles.len();
+                if *obstacle >= count {
+                    let message =
+                        format!("there is no such obstacle: the swarm has {count}, numbered from 0");
+                    return Err(swarm.refuse(
+                        &format!("{key}.obstacle"),
+                        message,
+                        "name one of [[obstacles]]",
+                    ));
+                }
+                control.filter().obstacles().with_moved(*obstacle, *by).map_err(|error| {
+                    swarm.refuse(&format!("{key}.by"), error.to_string(), "move it less far")
+                })?;
+                FlightCommand::MoveObstacle { obstacle: *obstacle, by: *by }
+            }
+            RawCommandKind::Channel { noise, delay, loss } => {
+                FlightCommand::Channel { noise: *noise, delay: *delay, loss: *loss }
+            }
+        };
+        Ok((raw.after, what))
+    };
     commands.iter().enumerate().map(command).collect()
 }
