@@ -146,6 +146,7 @@ fn what_is_wrong_is_said_once_and_nothing_is_left() {
         (vec!["run", "tension", "--set", "update.order=sequential"], "cannot be shared by ranks"),
         (vec!["run", "beam-loaded"], "no solver yet"),
         (vec!["compare", "beam"], "`compare` runs on one"),
+        (vec!["live", "tension"], "`live` runs on one"),
         (vec!["run", "tension", "--out", "/proc/none"], "/proc/none"),
     ] {
         let folder = temporary();

@@ -2,19 +2,17 @@
 
 use std::fs::OpenOptions;
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
 use flockform::live::body::Body;
 use flockform::live::server::Server;
 use flockform::live::session::Session;
-use flockform::live::swarm::Swarm as LiveSwarm;
-use flockform::scene::bundled::bundled_swarm;
-use flockform::scene::swarm::Swarm;
-use flockform::scene::{Scene, bundled};
+use flockform::live::swarm::Swarm;
 
-use super::names::{FileName, Kind, is_path, not_bundled};
+use super::names::{FileName, Kind, SceneArguments, folder_of};
+use super::swarm::SwarmFileArguments;
 use super::{Refusal, interrupt, output, print};
 
 #[derive(Debug, Args)]
@@ -56,40 +54,21 @@ pub fn live(arguments: &LiveArguments) -> Result<ExitCode, Refusal> {
 
 impl LiveArguments {
     fn session(&self) -> Result<Session, Refusal> {
-        let is_bundled = bundled(&self.file).is_some() || bundled_swarm(&self.file).is_some();
-        if !is_bundled && !is_path(&self.file) {
-            return Err(not_bundled(&Kind::ALL, &self.file));
-        }
-        let (file, set) = (self.file.clone(), self.set.clone());
-        if Kind::of(&self.file) == Some(Kind::Swarm) {
-            let load = move |more: &[String]| {
-                let all = [&set[..], more].concat();
-                match bundled_swarm(&file) {
-                    Some(bundled) => bundled.load_swarm(&all),
-                    None => Swarm::from_file(Path::new(&file), &all),
-                }
-            };
-            return Ok(Session::Swarm(Box::new(LiveSwarm::new(Box::new(load))?)));
-        }
-        let load = move |more: &[String]| {
-            let all = [&set[..], more].concat();
-            match bundled(&file) {
-                Some(bundled) => bundled.load(&all),
-                None => Scene::from_file(Path::new(&file), &all),
+        let (file, set, folder) = (self.file.clone(), self.set.clone(), folder_of(&self.file));
+        Ok(match Kind::of_either(&file)? {
+            Kind::Scene => {
+                let scene = SceneArguments { scene: file, set }.load([])?;
+                Session::Body(Box::new(Body::new(scene, folder)?))
             }
-        };
-        Ok(Session::Body(Box::new(Body::new(Box::new(load), self.beside())?)))
-    }
-
-    /// The folder of the file, in which the files that it names are looked up; none of a bundled one.
-    fn beside(&self) -> Option<PathBuf> {
-        let is_bundled = bundled(&self.file).is_some() || bundled_swarm(&self.file).is_some();
-        let folder = Path::new(&self.file).parent().map(Path::to_owned);
-        folder.filter(|_| !is_bundled)
+            Kind::Swarm => {
+                let swarm = SwarmFileArguments { swarm: file, set }.load()?;
+                Session::Swarm(Box::new(Swarm::new(swarm, folder)?))
+            }
+        })
     }
 
     fn saved_in(&self) -> Result<PathBuf, Refusal> {
-        let folder = self.out.clone().or_else(|| self.beside()).unwrap_or_default();
+        let folder = self.out.clone().or_else(|| folder_of(&self.file)).unwrap_or_default();
         let folder = if folder.as_os_str().is_empty() { PathBuf::from(".") } else { folder };
         if folder.is_dir() { Ok(folder) } else { Err(Refusal::LiveFolder(folder)) }
     }

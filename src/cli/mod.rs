@@ -225,9 +225,10 @@ pub enum Refusal {
     #[error("{0}")]
     Checkpoint(#[from] export::checkpoint::CheckpointError),
     #[error(
-        "there is no {what} file and no bundled {what} `{name}`\n  help: the nearest bundled {what} is `{nearest}`; `flockform list {what}s` lists them all"
+        "there is no {kinds} file and no bundled {kinds} `{name}`\n  help: the nearest bundled {kind} is `{nearest}`; {} lists them all",
+        .kinds.lists()
     )]
-    NotBundled { what: &'static str, name: String, nearest: &'static str },
+    NotBundled { kinds: names::Kinds, name: String, kind: &'static str, nearest: &'static str },
     #[error("`{name}` is a {kind}\n  help: `flockform {command} {name}`")]
     OtherKind { name: String, kind: &'static str, command: &'static str },
     #[error(
@@ -342,16 +343,28 @@ pub fn refuse(refusal: &Refusal) -> ExitCode {
     ExitCode::from(if refusal.is_failure() { FAILED } else { BAD_INPUT })
 }
 
-/// The name of a command whose results several ranks would write over each other.
+/// The name of a command that several ranks may not share: they would write their results over each other, or each the
+/// same. A command that is added has to be placed here.
 fn runs_alone(command: &Command) -> Option<&'static str> {
     match command {
         Command::Compare(_) => Some("compare"),
         Command::Trade(_) => Some("trade"),
-        Command::Sweep(sweep) if !sweep.is_shard() => Some("sweep"),
+        Command::Sweep(sweep) => (!sweep.is_shard()).then_some("sweep"),
         Command::Stability(_) => Some("stability"),
         Command::Swarm(_) => Some("swarm"),
+        Command::Live(_) => Some("live"),
+        Command::Replay(_) => Some("replay"),
         Command::Gallery(_) => Some("gallery"),
-        _ => None,
+        Command::New(_) => Some("new"),
+        Command::Install(_) => Some("install"),
+        Command::Bench(_) => Some("bench"),
+        // They share a run.
+        Command::Run(_) => None,
+        // Each is a node of its own.
+        Command::Node(_) | Command::Robots(_) => None,
+        // They write nothing.
+        Command::List(_) | Command::Show(_) | Command::Plan(_) | Command::Material(_) => None,
+        Command::Schema { .. } | Command::Completions { .. } => None,
     }
 }
 

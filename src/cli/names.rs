@@ -77,6 +77,17 @@ impl Kind {
         }
     }
 
+    /// The kind of what a command takes of either kind; a file of neither is taken for a scene.
+    ///
+    /// # Errors
+    /// A word that is neither a path nor a bundled name.
+    pub fn of_either(word: &str) -> Result<Self, Refusal> {
+        match Kind::of(word) {
+            None if !is_path(word) => Err(not_bundled(&Kind::ALL, word)),
+            kind => Ok(kind.unwrap_or(Kind::Scene)),
+        }
+    }
+
     /// The error that names the kind of a file that is of the other one.
     pub fn refuse_other(self, word: &str) -> Option<Refusal> {
         let other = self.other();
@@ -97,8 +108,14 @@ impl Kind {
 }
 
 /// Whether a word is a path rather than a name: one that is there, or looks like one.
-pub fn is_path(word: &str) -> bool {
+fn is_path(word: &str) -> bool {
     Path::new(word).exists() || word.contains(['/', '\\', '.'])
+}
+
+/// The folder of a file, in which the files that it names are looked up; none of a bundled one.
+pub fn folder_of(word: &str) -> Option<PathBuf> {
+    let is_bundled = bundled(word).is_some() || bundled_swarm(word).is_some();
+    Path::new(word).parent().filter(|_| !is_bundled).map(Path::to_owned)
 }
 
 /// The error for a word that is no name of a bundled file of these kinds.
@@ -107,7 +124,27 @@ pub fn not_bundled(kinds: &[Kind], word: &str) -> Refusal {
     let likeness = |name: &str| strsim::jaro_winkler(name, word);
     let nearest = all.max_by(|(_, a), (_, b)| likeness(a).total_cmp(&likeness(b)));
     let (kind, nearest) = nearest.unwrap_or((Kind::Scene, ""));
-    Refusal::NotBundled { what: kind.name(), name: word.to_owned(), nearest }
+    Refusal::NotBundled { kinds: Kinds(kinds.to_vec()), name: word.to_owned(), kind: kind.name(), nearest }
+}
+
+/// Kinds in words: `scene or swarm`.
+#[derive(Clone, Debug)]
+pub struct Kinds(Vec<Kind>);
+
+impl Kinds {
+    /// The commands that list the bundled files of these kinds.
+    pub fn lists(&self) -> String {
+        let lists: Vec<String> =
+            self.0.iter().map(|kind| format!("`flockform list {}s`", kind.name())).collect();
+        lists.join(" and ")
+    }
+}
+
+impl std::fmt::Display for Kinds {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let names: Vec<&str> = self.0.iter().map(|kind| kind.name()).collect();
+        f.write_str(&names.join(" or "))
+    }
 }
 
 /// A word on the command line that names a bundled file or is a path; shells complete the names.

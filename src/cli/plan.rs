@@ -8,7 +8,7 @@ use flockform::study::compare::run::plan as plan_of;
 use flockform::swarm::plan::SwarmPlan;
 use serde_json::{Value, json};
 
-use super::names::{FileName, Kind, SceneArguments, is_path, not_bundled};
+use super::names::{FileName, Kind, SceneArguments};
 use super::ranks::RanksError;
 use super::swarm::SwarmFileArguments;
 use super::{Refusal, print, say};
@@ -32,15 +32,14 @@ pub struct PlanArguments {
 /// Plans a scene or a swarm and prints the plan; a file of neither kind is refused as a scene.
 pub fn plan(arguments: &PlanArguments) -> Result<(), Refusal> {
     let PlanArguments { file, set, ranks, json } = arguments;
-    let (words, value) = match Kind::of(file) {
-        Some(Kind::Swarm) if ranks.is_some() => return Err(RanksError::Swarm.into()),
-        Some(Kind::Swarm) => {
+    let (words, value) = match Kind::of_either(file)? {
+        Kind::Swarm if ranks.is_some() => return Err(RanksError::Swarm.into()),
+        Kind::Swarm => {
             let swarm = SwarmFileArguments { swarm: file.clone(), set: set.clone() }.load()?;
             let plan = SwarmPlan::new(&swarm)?;
             (plan.to_string(), json!(plan))
         }
-        None if !is_path(file) => return Err(not_bundled(&Kind::ALL, file)),
-        Some(Kind::Scene) | None => {
+        Kind::Scene => {
             let scene = SceneArguments { scene: file.clone(), set: set.clone() }.load([])?;
             let plan = plan_of(&scene)?;
             let mut report = PlanReport::new(&scene, &plan)?;

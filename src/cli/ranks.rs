@@ -88,31 +88,82 @@ pub struct Start<'a> {
     is_over: bool,
 }
 
-/// What ranks say to each other before they begin: whether they are ready, their program and their run.
-type Words = [u64; 3];
+/// What a rank says to the others before they begin.
+#[derive(Clone, Copy)]
+enum Word {
+    Ready { program: u64, run: u64 },
+    Refused,
+}
+
+impl Word {
+    fn numbers(self) -> [u64; 3] {
+        match self {
+            Word::Ready { program, run } => [1, program, run],
+            Word::Refused => [0; 3],
+        }
+    }
+
+    fn of([is_ready, program, run]: [u64; 3]) -> Self {
+        if is_ready == 1 { Word::Ready { program, run } } else { Word::Refused }
+    }
+}
+
+/// What all ranks make of what they have said; the same on each.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Verdict {
+    Begin,
+    /// The first one that refuses; it says why.
+    Refused(usize),
+    /// The first one that differs from the first rank.
+    OtherProgram(usize),
+    OtherRun(usize),
+}
+
+impl Verdict {
+    fn of(all: &[Word]) -> Self {
+        // A refusal comes before a comparison: the one that refuses has no run.
+        if let Some(rank) = all.iter().position(|word| matches!(word, Word::Refused)) {
+            return Verdict::Refused(rank);
+        }
+        let [_, program, run] = all.first().map_or([0; 3], |first| first.numbers());
+        let wrong = |(rank, word): (usize, &Word)| match word.numbers() {
+            [_, other, _] if other != program => Some(Verdict::OtherProgram(rank)),
+            [_, _, other] if other != run => Some(Verdict::OtherRun(rank)),
+            _ => None,
+        };
+        all.iter().enumerate().find_map(wrong).unwrap_or(Verdict::Begin)
+    }
+}
 
 impl<'a> Start<'a> {
     pub fn new(team: Option<&'a Team>) -> Self {
         Self { team, is_over: team.is_none() }
     }
 
-    /// Waits until all ranks have come this far, with the same run: `common` is the fingerprint of it.
-    pub fn agree(&mut self, common: u64) -> Result<(), RanksError> {
+    /// Says a word to the others and hears theirs; anything but a beginning ends all.
+    fn exchange(&mut self, team: &Team, own: Word) -> Verdict {
+        let all: Vec<Word> = team.each(own.numbers()).into_iter().map(Word::of).collect();
+        let verdict = Verdict::of(&all);
+        self.is_over = verdict != Verdict::Begin;
+        verdict
+    }
+
+    /// Waits until all ranks have come this far, with the same run: `run` is the fingerprint of it.
+    pub fn agree(&mut self, run: u64) -> Result<(), RanksError> {
         let Some(team) = self.team else { return Ok(()) };
-        let all = team.each([1, program_hash(), common]);
-        let wrong = first_wrong(&all);
-        self.is_over = wrong.is_some();
-        match wrong {
-            None => Ok(()),
-            // Ranks that refuse say so themselves, and the first one says what only a comparison shows.
-            Some((rank, error)) if all[rank][0] == 1 && team.is_first() => Err(error),
-            Some(_) => Err(RanksError::SaidElsewhere),
-        }
+        let error = match self.exchange(team, Word::Ready { program: program_hash(), run }) {
+            Verdict::Begin => return Ok(()),
+            Verdict::Refused(_) => return Err(RanksError::SaidElsewhere),
+            Verdict::OtherProgram(rank) => RanksError::OtherProgram { rank },
+            Verdict::OtherRun(rank) => RanksError::OtherRun { rank },
+        };
+        // The first one says what only a comparison shows.
+        Err(if team.is_first() { error } else { RanksError::SaidElsewhere })
     }
 
     /// The same, as the last thing before the run.
-    pub fn begin(mut self, common: u64) -> Result<(), RanksError> {
-        let agreed = self.agree(common);
+    pub fn begin(mut self, run: u64) -> Result<(), RanksError> {
+        let agreed = self.agree(run);
         self.is_over = true;
         agreed
     }
@@ -120,42 +171,21 @@ impl<'a> Start<'a> {
     /// Ends the others, and returns what is to be said here.
     pub fn refused(mut self, refusal: Refusal) -> Refusal {
         let Some(team) = self.team else { return refusal };
-        self.is_over = true;
-        let first = team.each::<3>([0; 3]).iter().position(|words| words[0] == 0);
-        let error = if first != Some(team.rank()) {
-            RanksError::SaidElsewhere
-        } else if team.is_first() {
-            return refusal;
-        } else {
-            RanksError::OnRank { rank: team.rank(), refusal: Box::new(refusal) }
-        };
-        error.into()
+        let rank = team.rank();
+        match self.exchange(team, Word::Refused) {
+            Verdict::Refused(first) if first != rank => RanksError::SaidElsewhere.into(),
+            _ if team.is_first() => refusal,
+            _ => RanksError::OnRank { rank, refusal: Box::new(refusal) }.into(),
+        }
     }
 }
 
 impl Drop for Start<'_> {
     fn drop(&mut self) {
         if let Some(team) = self.team.filter(|_| !self.is_over && !std::thread::panicking()) {
-            let _ = team.each::<3>([0; 3]);
+            self.exchange(team, Word::Refused);
         }
     }
-}
-
-/// The first rank that is not ready for the same run as the first one.
-fn first_wrong(all: &[Words]) -> Option<(usize, RanksError)> {
-    let [_, program, common] = *all.first()?;
-    let wrong = |(rank, words): (usize, &Words)| match *words {
-        [0, ..] => Some((rank, RanksError::SaidElsewhere)),
-        [_, other, _] if other != program => Some((rank, RanksError::OtherProgram { rank })),
-        [_, _, other] if other != common => Some((rank, RanksError::OtherRun { rank })),
-        _ => None,
-    };
-    // A refusal comes before a comparison with words that are none.
-    let refused = all.iter().position(|words| words[0] == 0);
-    refused.map_or_else(
-        || all.iter().enumerate().find_map(wrong),
-        |rank| Some((rank, RanksError::SaidElsewhere)),
-    )
 }
 
 /// A fingerprint of this program's file; of its version where the file cannot be read.
@@ -200,15 +230,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_first_rank_that_differs_is_named() {
-        let wrong = |all: &[Words]| first_wrong(all).map(|(rank, error)| (rank, error.to_string()));
-        assert_eq!(wrong(&[[1, 2, 3], [1, 2, 3]]), None);
-        let (rank, words) = wrong(&[[1, 2, 3], [1, 2, 3], [1, 2, 4]]).expect("another run");
-        assert!(rank == 2 && words.contains("rank 2 is to make another run"), "{words}");
-        let (rank, words) = wrong(&[[1, 2, 3], [1, 9, 4], [1, 2, 4]]).expect("another program");
-        assert!(rank == 1 && words.contains("rank 1 has another program"), "{words}");
-        assert_eq!(wrong(&[[1, 2, 3], [1, 9, 3], [0, 0, 0]]).map(|(rank, _)| rank), Some(2));
-        assert_eq!(wrong(&[[0, 0, 0], [1, 9, 3]]).map(|(rank, _)| rank), Some(0));
+    fn the_first_rank_that_refuses_or_differs_is_named() {
+        let verdict =
+            |all: &[[u64; 3]]| Verdict::of(&all.iter().map(|&word| Word::of(word)).collect::<Vec<_>>());
+        assert_eq!(verdict(&[[1, 2, 3], [1, 2, 3]]), Verdict::Begin);
+        assert_eq!(verdict(&[[1, 2, 3], [1, 2, 3], [1, 2, 4]]), Verdict::OtherRun(2));
+        assert_eq!(verdict(&[[1, 2, 3], [1, 9, 4], [1, 2, 4]]), Verdict::OtherProgram(1));
+        assert_eq!(verdict(&[[1, 2, 3], [1, 9, 3], [0, 0, 0]]), Verdict::Refused(2));
+        assert_eq!(verdict(&[[0, 0, 0], [1, 9, 3]]), Verdict::Refused(0));
     }
 
     #[test]

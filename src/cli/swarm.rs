@@ -16,7 +16,7 @@ use flockform::scene::bundled::bundled_swarm;
 use flockform::scene::swarm::Swarm;
 use flockform::swarm::flight::{Flight, FlightReport, fly_heard};
 
-use super::names::{FileName, Kind};
+use super::names::{FileName, Kind, folder_of};
 use super::output::{OutputArguments, ReportArguments};
 use super::recording::{RecordArguments, close};
 use super::{FAILED, Refusal, interrupt, print, say};
@@ -48,7 +48,7 @@ impl SwarmFileArguments {
         let bundled = bundled_swarm(&self.swarm);
         let text =
             bundled.map_or_else(|| std::fs::read_to_string(path).ok(), |one| Some(one.text.to_owned()));
-        let folder = path.parent().filter(|_| bundled.is_none());
+        let folder = folder_of(&self.swarm);
         About {
             source,
             name: swarm.name.clone(),

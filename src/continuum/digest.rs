@@ -1,7 +1,8 @@
 //! Whether two plans, or two files, are the same.
 
 use super::plan::Plan;
-use crate::engine::setup::{ActionKind, Conduct, Setup};
+use crate::engine::setup::{Conduct, Setup};
+use crate::flock::action::ActionKind;
 use crate::flock::law::Weights;
 use crate::flock::vectors::Vectors;
 
@@ -41,7 +42,7 @@ pub fn digest(plan: &Plan) -> u64 {
         match &action.what {
             ActionKind::Cut(cut) => digest.text(&format!("{cut:?}")),
             // Two bodies with other keys differ in what these make of the rule.
-            ActionKind::Conduct(conduct) => {
+            ActionKind::Follow(conduct) => {
                 let Conduct { rule, fracture, update, forces, rest, .. } = &**conduct;
                 digest.text(&format!("{rule:?} {fracture:?} {update:?}"));
                 digest.weights(&conduct.weights);

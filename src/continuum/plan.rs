@@ -6,7 +6,8 @@ use std::sync::Arc;
 use super::damping::along_outline;
 use super::layout::{Layout, Truth, held_components, no_particle};
 use super::{places, weights};
-use crate::engine::setup::{Action, ActionKind, Conduct, RoleChange, Setup};
+use crate::engine::setup::{Conduct, RoleChange, Setup};
+use crate::flock::action::{Action, ActionKind};
 use crate::flock::body::{Body, MOST_ENTRIES};
 use crate::flock::fracture::{Bonds, Ghosts};
 use crate::flock::law::{Flock, MatrixWeights, Weights};
@@ -18,7 +19,7 @@ use crate::geometry::outline::Outline;
 use crate::material::free_edge::FreeEdge;
 use crate::material::mechanism::require_held;
 use crate::material::outline_loads::{Load, Resultant, sum};
-use crate::scene::{self, LoadSteps, Scene, SceneError, Stop};
+use crate::scene::{LoadSteps, Scene, SceneError, Stop};
 use crate::solve::linear::HeldComponent;
 use crate::sweep::{Order, Update};
 
@@ -64,31 +65,22 @@ impl Plan {
     fn lay_out(scene: &Scene, truth: Option<Truth<'_>>) -> Result<Self, SceneError> {
         let layout = Layout::new(scene)?;
         let changes = layout.role_changes(scene, truth)?;
-        let acting = if layout.cells.is_some() { layout.loads(scene)? } else { Vec::new() };
-        let loads = layout.forces_by_load(scene, &acting)?;
-        let reference = &layout.body.reference;
-        let resultants = loads.iter().map(|f| Resultant::of(reference.iter().zip(f.iter()))).collect();
-        let forces = sum(&loads);
-        let leads = held_axes(&layout.body, &changes);
-        require_carried(scene, &layout, &leads, forces.as_ref())?;
-        let free_edge = free_edge(scene, &layout, &acting, &leads).map(Arc::new);
+        let following = Following::new(scene, &layout, &changes)?;
+        let probes = probes(scene, &layout.body)?;
+        places::around(scene, layout.cells.as_ref(), &layout.body.reference)?;
+        require_listable(scene, &layout.body)?;
+        let actions = actions(scene, &layout, &changes)?;
         let Layout { body, neighbours, cells, outline, .. } = layout;
-        let follows = ever_follow(&body, &changes);
-        let mut weights = weights::of_body(scene, &body, &neighbours, cells.as_ref(), &follows)?;
-        if let Weights::Matrix(weights) = &mut weights {
-            hold_components(weights, &held_components(&changes, &body, 0.0));
-        }
-        let update = update(scene, &body, &neighbours, &weights);
+        let Following { weights, forces, update, loads, free_edge } = following;
+        let resultants = loads.iter().map(|f| Resultant::of(body.reference.iter().zip(f.iter()))).collect();
         let flock = flock(scene, &body, neighbours, weights, forces);
-        let probes = probes(scene, &body)?;
-        places::around(scene, cells.as_ref(), &body.reference)?;
-        require_listable(scene, &body)?;
         let roles = body.is_frame.iter().map(|&f| if f { Role::Frame } else { Role::Follower }).collect();
         let (low, high) = body.bounds();
         // A body of one particle has no extent; its spacing stands in.
         let diagonal = distance(low, high).max(body.lattice.spacing());
         let mut setup = Setup {
             changes,
+            actions,
             cells,
             loads,
             free_edge,
@@ -104,7 +96,6 @@ impl Plan {
         };
         make_cuts(&mut setup, scene);
         take_first_roles(&mut setup);
-        setup.actions = actions(scene, &setup, truth)?;
         Ok(Self { setup, stop: scene.stop, diagonal, probes, outline, resultants })
     }
 
@@ -115,11 +106,7 @@ impl Plan {
     pub fn conduct_of(self, setup: &Setup) -> Result<Conduct, &'static str> {
         let (Flock { neighbours, reference, .. }, then) = (&self.setup.flock, &setup.flock);
         let is_same = *reference == then.reference && *neighbours == then.neighbours;
-        if is_same {
-            Ok(Conduct::of(self.setup))
-        } else {
-            Err("the body would have other particles or neighbours")
-        }
+        if is_same { Ok(Conduct::of(self.setup)) } else { Err(OTHER_BODY) }
     }
 
     /// Number of particles, those of the frame included.
@@ -128,24 +115,86 @@ impl Plan {
     }
 }
 
-fn actions(scene: &Scene, setup: &Setup, truth: Option<Truth<'_>>) -> Result<Vec<Action>, SceneError> {
-    let action = |(k, action): (usize, &scene::Action)| {
+/// How the particles of a body laid out follow.
+struct Following {
+    weights: Weights,
+    /// Sum of the loads \[force\], shape \[count\].
+    forces: Option<Vectors>,
+    update: Update,
+    loads: Vec<Vectors>,
+    free_edge: Option<Arc<FreeEdge>>,
+}
+
+impl Following {
+    fn new(scene: &Scene, layout: &Layout, changes: &[RoleChange]) -> Result<Self, SceneError> {
+        let Layout { body, neighbours, cells, .. } = layout;
+        let acting = if cells.is_some() { layout.loads(scene)? } else { Vec::new() };
+        let loads = layout.forces_by_load(scene, &acting)?;
+        let forces = sum(&loads);
+        let leads = held_axes(body, changes);
+        require_carried(scene, layout, &leads, forces.as_ref())?;
+        let free_edge = free_edge(scene, layout, &acting, &leads).map(Arc::new);
+        let follows = ever_follow(body, changes);
+        let mut weights = weights::of_body(scene, body, neighbours, cells.as_ref(), &follows)?;
+        if let Weights::Matrix(weights) = &mut weights {
+            hold_components(weights, &held_components(changes, body, 0.0));
+        }
+        let update = update(scene, body, neighbours, &weights);
+        Ok(Self { weights, forces, update, loads, free_edge })
+    }
+
+    /// The same as something that a body under way changes to.
+    fn conduct(self, scene: &Scene, layout: &Layout) -> Conduct {
+        let Self { weights, forces, update, loads, free_edge } = self;
+        let flock = flock(scene, &layout.body, layout.neighbours.clone(), weights, forces);
+        Conduct::new(flock, update, layout.cells.clone(), loads, free_edge)
+    }
+}
+
+type Actions = Vec<Action<Arc<Conduct>>>;
+
+fn actions(scene: &Scene, layout: &Layout, changes: &[RoleChange]) -> Result<Actions, SceneError> {
+    let action = |(k, action): (usize, &Action<Box<Scene>>)| {
         let what = match &action.what {
-            scene::ActionKind::Cut(cut) => ActionKind::Cut(*cut),
-            scene::ActionKind::Set(changed) => {
+            ActionKind::Cut(cut) => ActionKind::Cut(*cut),
+            ActionKind::Follow(changed) => {
                 let refuse = |message: String| {
                     let help = "give these keys from the start instead";
                     scene.refuse(&format!("actions[{k}].what.keys"), message, help)
                 };
-                let changed = Plan::lay_out(changed, truth).map_err(|error| refuse(error.to_string()))?;
-                let conduct = changed.conduct_of(setup).map_err(|why| refuse(why.into()))?;
-                ActionKind::Conduct(Arc::new(conduct))
+                let other = other_layout(scene, changed, layout).map_err(refuse)?;
+                let layout = other.as_ref().unwrap_or(layout);
+                let following = Following::new(changed, layout, changes);
+                let following = following.map_err(|error| refuse(error.to_string()))?;
+                ActionKind::Follow(Arc::new(following.conduct(changed, layout)))
             }
         };
         Ok(Action { at: action.at, what })
     };
     scene.actions.iter().enumerate().map(action).collect()
 }
+
+/// The layout of a scene with other keys, where these concern cells and neighbours: the same particles and neighbours.
+///
+/// # Errors
+/// A sentence that says why it cannot be.
+fn other_layout(scene: &Scene, changed: &Scene, layout: &Layout) -> Result<Option<Layout>, String> {
+    let is_material = |scene: &Scene| matches!(scene.mean, Mean::Material { .. });
+    let is_alike = scene.material == changed.material
+        && scene.inclusions == changed.inclusions
+        && scene.neighbourhood == changed.neighbourhood
+        && is_material(scene) == is_material(changed)
+        && scene.is_fitted == changed.is_fitted;
+    if is_alike {
+        return Ok(None);
+    }
+    let other = Layout::new(changed).map_err(|error| error.to_string())?;
+    let is_same = other.body.reference == layout.body.reference && other.neighbours == layout.neighbours;
+    if is_same { Ok(Some(other)) } else { Err(OTHER_BODY.into()) }
+}
+
+/// Why keys do not change on the way.
+const OTHER_BODY: &str = "the body would have other particles or neighbours";
 
 fn make_cuts(setup: &mut Setup, scene: &Scene) {
     if let Some(bonds) = &mut setup.flock.bonds {
@@ -293,7 +342,7 @@ fn flock(
     });
     let needs_bonds = scene.fracture.is_some()
         || !scene.cuts.is_empty()
-        || scene.actions.iter().any(|action| matches!(action.what, scene::ActionKind::Cut(_)))
+        || scene.actions.iter().any(Action::is_cut)
         || scene.roles.iter().any(|entry| entry.role == Role::Ghost);
     let bonds = needs_bonds.then(|| {
         let (threshold, ghosts) =

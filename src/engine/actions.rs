@@ -3,17 +3,35 @@
 //! Those of a plan are performed as their steps begin. A session performs and steers them from outside between two
 //! steps; planned for the step that comes next, they give the same bits.
 
+use std::sync::Arc;
+
 use super::Engine;
 use super::load::Load;
-use super::setup::{Action, ActionKind, Conduct, RoleChange, Setup};
+use super::setup::{Conduct, RoleChange, Setup};
+use crate::flock::action::{Action, ActionKind};
 use crate::flock::fracture::Bonds;
 use crate::flock::law::Flock;
 use crate::flock::motion::Motion;
+use crate::flock::vectors::Vectors;
+use crate::material::cells::Cells;
+use crate::material::free_edge::FreeEdge;
+use crate::sweep::Update;
 
 impl Conduct {
     /// That of a body before its first step.
     pub fn of(setup: Setup) -> Self {
         let Setup { flock, update, cells, loads, free_edge, .. } = setup;
+        Self::new(flock, update, cells, loads, free_edge)
+    }
+
+    /// That of particles that follow as `flock` does, and what acts on them.
+    pub fn new(
+        flock: Flock,
+        update: Update,
+        cells: Option<Cells>,
+        loads: Vec<Vectors>,
+        free_edge: Option<Arc<FreeEdge>>,
+    ) -> Self {
         let Flock { rule, weights, forces, rest, bonds, .. } = flock;
         let fracture = bonds.map(|bonds| (bonds.threshold, bonds.ghosts));
         Self { rule, weights, forces, rest, fracture, update, cells, loads, free_edge }
@@ -40,9 +58,9 @@ impl Engine {
     }
 
     /// Performs an action between two steps, which holds from step `at` on, the next one.
-    pub fn perform(&mut self, what: &ActionKind, at: usize) {
+    pub fn perform(&mut self, what: &ActionKind<Arc<Conduct>>, at: usize) {
         match what {
-            ActionKind::Conduct(conduct) => self.conduct(conduct),
+            ActionKind::Follow(conduct) => self.conduct(conduct),
             ActionKind::Cut(cut) => {
                 let flock = &mut self.flock;
                 let bonds = flock.bonds.get_or_insert_with(|| Bonds::uncut(&flock.neighbours));
@@ -77,8 +95,9 @@ impl Engine {
 
     /// Follows by what the plan has for this step: part of putting a state back.
     pub(super) fn conduct_until_now(&mut self) {
-        let last = |action: &&Action| action.at <= self.step && matches!(action.what, ActionKind::Conduct(_));
-        if let Some(Action { what: ActionKind::Conduct(conduct), .. }) =
+        let last =
+            |action: &&Action<_>| action.at <= self.step && matches!(action.what, ActionKind::Follow(_));
+        if let Some(Action { what: ActionKind::Follow(conduct), .. }) =
             self.actions.iter().rfind(last).cloned()
         {
             self.conduct(&conduct);

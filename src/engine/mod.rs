@@ -22,6 +22,7 @@ pub mod state;
 
 use std::sync::Arc;
 
+use crate::flock::action::Action;
 use crate::flock::body::Body;
 use crate::flock::fracture::Break;
 use crate::flock::grid::CellGrid;
@@ -41,7 +42,7 @@ use leaders::Led;
 use load::Load;
 use movement::Movement;
 use path::Path;
-use setup::{Action, RoleChange, Setup};
+use setup::{Conduct, RoleChange, Setup};
 
 /// A body on its way; positions in \[length, world frame\], shape \[count\].
 #[derive(Clone, Debug)]
@@ -55,7 +56,7 @@ pub struct Engine {
     roles: Vec<Role>,
     changes: Vec<RoleChange>,
     /// By ascending step.
-    actions: Vec<Action>,
+    actions: Vec<Action<Arc<Conduct>>>,
     /// By particle.
     leaders: Vec<Led>,
     /// The particles of `leaders`.

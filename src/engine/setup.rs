@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use crate::flock::action::Action;
 use crate::flock::body::Body;
 use crate::flock::condition::Condition;
 use crate::flock::fracture::{Break, Ghosts, Threshold};
@@ -10,7 +11,6 @@ use crate::flock::motion::Motion;
 use crate::flock::role::Role;
 use crate::flock::rules::{Axis, Rule};
 use crate::flock::vectors::Vectors;
-use crate::geometry::shape::Segment;
 use crate::material::cells::Cells;
 use crate::material::free_edge::FreeEdge;
 use crate::sweep::Update;
@@ -33,7 +33,7 @@ pub struct Setup {
     /// Bonds cut before the first step.
     pub cuts: Vec<Break>,
     /// What is done to the body while it is stepped, by ascending step.
-    pub actions: Vec<Action>,
+    pub actions: Vec<Action<Arc<Conduct>>>,
     /// Between the particles, where the body has a material.
     pub cells: Option<Cells>,
     /// Forces of each load on the particles \[force\], shape \[loads\]\[count\]; their sum is the flock's.
@@ -59,24 +59,6 @@ pub struct RoleChange {
     pub when: Option<Condition>,
     /// How leaders move; none for those led by a truth that is not known yet.
     pub motion: Option<Motion>,
-}
-
-/// Something that is done to the body at the beginning of a step.
-#[derive(Clone, Debug)]
-pub struct Action {
-    /// First step at which it holds.
-    pub at: usize,
-    /// What is done.
-    pub what: ActionKind,
-}
-
-/// Kinds of actions.
-#[derive(Clone, Debug)]
-pub enum ActionKind {
-    /// The particles follow by this from now on.
-    Conduct(Arc<Conduct>),
-    /// Every bond breaks that crosses this line where the body stands \[length\].
-    Cut(Segment),
 }
 
 /// How particles follow: the part of a setup that may change while a body is stepped.

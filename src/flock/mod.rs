@@ -7,6 +7,7 @@
 //! Source: R. dell'Erba, "Flocking rules governing swarm robot as tool to describe continuum
 //! deformation", 2021, doi 10.1007/978-3-030-53755-5_14 ("the paper" throughout).
 
+pub mod action;
 pub mod block;
 pub mod body;
 pub mod cells_around;

@@ -2,6 +2,8 @@
 
 use serde::Deserialize;
 
+use crate::scene::raw::RawSide;
+
 /// Longest request of a viewer \[byte\].
 pub const MOST_BYTES: usize = 4096;
 
@@ -34,9 +36,19 @@ pub enum Command {
         #[serde(default)]
         alone: bool,
     },
+    /// Takes hold of an obstacle, by its number from 0.
+    GrabObstacle {
+        /// Number of the obstacle.
+        obstacle: usize,
+    },
     /// Moves what is held, from where it was taken \[length\].
     Drag {
         /// Along x and y.
+        by: [f64; 2],
+    },
+    /// Brings the leaders that are held closer together or farther apart, about their middle as they were taken.
+    Squeeze {
+        /// Factors along x and y \[1\], from 0.1 to 10.
         by: [f64; 2],
     },
     /// Lets go.
@@ -47,6 +59,13 @@ pub enum Command {
         from: [f64; 2],
         /// The other end.
         to: [f64; 2],
+    },
+    /// Loads a side of the body, in place of the load that a hand gave it before.
+    Load {
+        /// The side.
+        side: RawSide,
+        /// How far the side would go, were the body held at the opposite one and kept from contracting \[length\].
+        by: [f64; 2],
     },
     /// Changes a key as `--set` does.
     Set {
@@ -106,6 +125,7 @@ impl Command {
             Command::Set { key, value } => is_text(key) && is_text(value) && !key.contains('='),
             Command::Ask { quantity } => is_text(quantity),
             Command::Drawn { ms } => (0.0..=1e6).contains(ms),
+            Command::Squeeze { by } => by.iter().all(|factor| (0.1..=10.0).contains(factor)),
             Command::Cut { from, to } => from != to,
             _ => true,
         };
@@ -132,6 +152,7 @@ mod tests {
             r#"{"do":"play","more":1}"#,
             r#"{"do":"speed","value":0}"#,
             r#"{"do":"cut","from":[0,0],"to":[0,0]}"#,
+            r#"{"do":"squeeze","by":[1,0]}"#,
             "{\"do\":\"set\",\"key\":\"a\\n\",\"value\":\"1\"}",
         ];
         for text in wrong {

@@ -280,6 +280,7 @@ impl Conductor {
             "alarms": alarms,
             "alarmed": alarmed,
             "faults": self.session.faults(),
+            "obstacles": self.session.obstacles(),
             "sets": self.session.sets(),
             "viewers": self.board.viewers(),
             "rates": self.pace.rates,

@@ -180,6 +180,14 @@ impl Session {
         }
     }
 
+    /// How far each obstacle is from its place in the file \[length\].
+    pub fn obstacles(&self) -> Vec<[f64; 2]> {
+        match self {
+            Session::Body(_) => Vec::new(),
+            Session::Swarm(swarm) => swarm.obstacles(),
+        }
+    }
+
     /// Robots with a fault, and its kind.
     pub fn faults(&self) -> Vec<(usize, &'static str)> {
         match self {

@@ -1,10 +1,12 @@
-//! A swarm under the reader's hands: leaders sent to places, robots that fail, poses that are lost; and the file that
+//! A swarm under the reader's hands: leaders sent to places, obstacles moved, robots that fail, poses that are lost; and the file that
 //! flies it again.
 
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::command::{Command, Fault};
+use super::history::{self, History, Source};
 use super::session::{Frame, Refused, Viewer};
 use crate::export::report::FlightRecorder;
 use crate::export::report::view::View;
@@ -22,26 +24,31 @@ pub const CHANNELS: [&str; 4] = ["clearance", "age", "pe1", "strain"];
 const CHANNEL_KEYS: [&str; 3] = ["flight.noise", "flight.delay", "flight.loss"];
 /// Most commands and faults that are kept.
 const MOST_COMMANDS: usize = 100_000;
-/// States that can be returned to.
-const MOST_UNDONE: usize = 40;
-
-/// Reads the swarm with these overrides after those that the session began with.
-pub type Load = Box<dyn Fn(&[String]) -> Result<File, SceneError> + Send>;
 
 /// Robots under way, and everything that was done to them.
 pub struct Swarm {
-    load: Load,
-    now: State,
-    before: Vec<State>,
+    history: History<State>,
 }
 
-/// Each leader that is held and where it was taken \[m\], and where the hand has them.
-type Hand = (Vec<(usize, [f64; 2])>, [f64; 2]);
+/// What a viewer holds.
+#[derive(Clone)]
+struct Hand {
+    held: Held,
+    /// Where the hand has it, from where it was taken \[m\].
+    by: [f64; 2],
+}
 
-/// What [`Command::Undo`] returns to.
+/// What can be held, and where it was taken \[m\].
+#[derive(Clone)]
+enum Held {
+    Leaders(Vec<(usize, [f64; 2])>),
+    /// From its place in the file.
+    Obstacle(usize, [f64; 2]),
+}
+
+/// A swarm and everything that was done to it.
 #[derive(Clone)]
 struct State {
-    set: Vec<String>,
     file: Arc<File>,
     flight: Flight,
     /// What was done, as the format of swarm files says it.
@@ -52,53 +59,53 @@ struct State {
     /// What viewers hold.
     hands: BTreeMap<Viewer, Hand>,
     alarms: Vec<Alarm>,
-    layout: u64,
 }
 
 impl Swarm {
+    /// A swarm whose file looks up other files in `folder`.
+    ///
     /// # Errors
     /// Names the key of a swarm that cannot be flown.
-    pub fn new(load: Load) -> Result<Self, SceneError> {
-        let now = State::begin(&load, Vec::new(), 0)?;
-        Ok(Self { load, now, before: Vec::new() })
+    pub fn new(swarm: File, folder: Option<PathBuf>) -> Result<Self, SceneError> {
+        Ok(Self { history: History::new(swarm, folder)? })
     }
 
     /// The robots as they are.
     pub fn flight(&self) -> &Flight {
-        &self.now.flight
+        &self.history.now.flight
     }
 
     /// The swarm that it began with.
     pub fn swarm(&self) -> &File {
-        &self.now.file
+        &self.history.now.file
     }
 
     /// Time of a period \[s\].
     pub fn period(&self) -> f64 {
-        self.now.flight.control().period()
+        self.history.now.flight.control().period()
     }
 
     /// Changes whenever the robots are other ones.
     pub fn layout(&self) -> u64 {
-        self.now.layout
+        self.history.layout()
     }
 
     /// States that can be returned to.
     pub fn undoable(&self) -> usize {
-        self.before.len()
+        self.history.undoable()
     }
 
     /// Keys that were changed and hold now, `KEY=VALUE`, in their order.
     pub fn sets(&self) -> Vec<String> {
-        let (noise, delay, loss) = self.now.channel;
+        let (noise, delay, loss) = self.history.now.channel;
         let values = [noise.to_string(), delay.to_string(), loss.to_string()];
         let channel = CHANNEL_KEYS.iter().zip(values).map(|(key, value)| format!("{key}={value}"));
-        self.now.set.iter().cloned().chain(channel).collect()
+        self.history.set().iter().cloned().chain(channel).collect()
     }
 
     /// Flies a period.
     pub fn advance(&mut self) {
-        let State { file, flight, alarms, .. } = &mut self.now;
+        let State { file, flight, alarms, .. } = &mut self.history.now;
         let before = flight.fleet().places();
         flight.step();
         *alarms = Alarm::now(file, flight, &before);
@@ -111,7 +118,9 @@ impl Swarm {
     pub fn perform(&mut self, viewer: Viewer, command: &Command) -> Result<(), Refused> {
         match command {
             Command::Grab { particle, alone } => self.grab(viewer, *particle, *alone),
+            Command::GrabObstacle { obstacle } => self.grab_obstacle(viewer, *obstacle),
             Command::Drag { by } => self.drag(viewer, *by),
+            Command::Squeeze { by } => self.squeeze(viewer, *by),
             Command::Release {} => {
                 self.release(viewer);
                 Ok(())
@@ -119,112 +128,105 @@ impl Swarm {
             Command::Set { key, value } if CHANNEL_KEYS.contains(&key.trim()) => {
                 self.channel(key.trim(), value)
             }
-            Command::Set { key, value } => {
-                self.restart([&self.now.set[..], &[format!("{key}={value}")]].concat())
-            }
+            Command::Set { key, value } => self.history.restart(&[format!("{key}={value}")]),
             Command::Fault { robot, what } => self.fault(*robot, *what),
-            Command::Reset {} => self.restart(self.now.set.clone()),
-            Command::Undo {} => {
-                let layout = self.now.layout;
-                self.now = self.before.pop().ok_or("nothing was done yet")?;
-                if self.now.layout != layout {
-                    self.now.layout = layout + 1;
-                }
-                Ok(())
-            }
-            _ => Err("a swarm cannot do this".into()),
+            other => self.history.perform(other),
         }
-    }
-
-    fn keep(&mut self) {
-        if self.before.len() >= MOST_UNDONE {
-            self.before.remove(0);
-        }
-        let hands = BTreeMap::new();
-        self.before.push(State { hands, ..self.now.clone() });
-    }
-
-    fn restart(&mut self, set: Vec<String>) -> Result<(), Refused> {
-        let state = State::begin(&self.load, set, self.now.layout + 1)?;
-        self.keep();
-        self.now = state;
-        Ok(())
     }
 
     fn grab(&mut self, viewer: Viewer, robot: usize, alone: bool) -> Result<(), Refused> {
-        let formation = self.now.flight.control().formation();
+        let formation = self.history.now.flight.control().formation();
         if robot >= formation.count() {
             return Err("there is no such robot".into());
         }
         if !formation.is_led(robot) {
             return Err(format!("`{}` does not lead: drag a leader", formation.names[robot]).into());
         }
-        self.now.require_room()?;
-        let places = self.now.flight.fleet().places();
+        self.history.now.require_room()?;
+        let places = self.history.now.flight.fleet().places();
         let held = |m: &usize| if alone { *m == robot } else { formation.is_led(*m) };
         let held = (0..formation.count()).filter(held).map(|m| (m, places.get(m))).collect();
-        self.keep();
-        self.now.hands.insert(viewer, (held, [0.0; 2]));
+        self.take(viewer, Held::Leaders(held));
         Ok(())
     }
 
+    fn grab_obstacle(&mut self, viewer: Viewer, obstacle: usize) -> Result<(), Refused> {
+        let by = self.obstacles().get(obstacle).copied().ok_or("there is no such obstacle")?;
+        self.history.now.require_room()?;
+        self.take(viewer, Held::Obstacle(obstacle, by));
+        Ok(())
+    }
+
+    fn take(&mut self, viewer: Viewer, held: Held) {
+        self.history.keep();
+        self.history.now.hands.insert(viewer, Hand { held, by: [0.0; 2] });
+    }
+
     fn drag(&mut self, viewer: Viewer, by: [f64; 2]) -> Result<(), Refused> {
-        let (held, last) = self.now.hands.get(&viewer).cloned().ok_or("nothing is held")?;
+        let now = &mut self.history.now;
+        let Hand { held, by: last } = now.hands.get(&viewer).cloned().ok_or("nothing is held")?;
         if by == last {
             return Ok(());
         }
-        self.now.require_room()?;
-        let targets: Vec<_> = held.iter().map(|&(m, [x, y])| (m, [x + by[0], y + by[1]])).collect();
-        // All of them or none: a formation that is led by a part of its leaders is torn.
-        if !targets.iter().all(|&(_, to)| self.now.flight.control().is_believed(to)) {
-            return Err("poses there would not be believed: they are beyond `poses.range`".into());
+        now.require_room()?;
+        match &held {
+            Held::Leaders(leaders) => now.lead_all(leaders, |[x, y]| [x + by[0], y + by[1]])?,
+            Held::Obstacle(obstacle, [x, y]) => now.move_obstacle(*obstacle, [x + by[0], y + by[1]])?,
         }
-        for (member, to) in targets {
-            self.now.lead(member, to)?;
-        }
-        self.now.hands.insert(viewer, (held, by));
+        now.hands.insert(viewer, Hand { held, by });
         Ok(())
+    }
+
+    fn squeeze(&mut self, viewer: Viewer, by: [f64; 2]) -> Result<(), Refused> {
+        let now = &mut self.history.now;
+        let Some(Hand { held: Held::Leaders(leaders), .. }) = now.hands.get(&viewer).cloned() else {
+            return Err("no leaders are held".into());
+        };
+        now.require_room()?;
+        let share = 1.0 / leaders.len() as f64;
+        let middle = [0, 1].map(|k| leaders.iter().map(|(_, place)| place[k] * share).sum::<f64>());
+        now.lead_all(&leaders, |place| [0, 1].map(|k| middle[k] + by[k] * (place[k] - middle[k])))
     }
 
     /// Lets go of what a viewer holds: it stays where it was led to.
     pub fn release(&mut self, viewer: Viewer) {
-        self.now.hands.remove(&viewer);
+        self.history.now.hands.remove(&viewer);
     }
 
     fn channel(&mut self, key: &str, value: &str) -> Result<(), Refused> {
-        let set = [&self.now.set[..], &[format!("{key}={value}")]].concat();
-        let raw = (self.load)(&set)?.raw.flight;
-        let (mut noise, mut delay, mut loss) = self.now.channel;
+        let set = [self.history.set(), &[format!("{key}={value}")]].concat();
+        let Source { file, folder } = &self.history.source;
+        let raw = file.with(&set, folder.as_deref())?.raw.flight;
+        let (mut noise, mut delay, mut loss) = self.history.now.channel;
         match key {
             "flight.noise" => noise = raw.noise,
             "flight.delay" => delay = raw.delay,
             _ => loss = raw.loss,
         }
-        self.now.require_room()?;
-        self.keep();
-        let command = FlightCommand::Channel { noise, delay, loss };
-        if !self.now.flight.perform(&command) {
-            self.now = self.before.pop().ok_or("nothing was done yet")?;
+        self.history.now.require_room()?;
+        let mut flight = self.history.now.flight.clone();
+        if !flight.perform(&FlightCommand::Channel { noise, delay, loss }) {
             return Err("the safety filter refuses this noise".into());
         }
-        self.now.channel = (noise, delay, loss);
-        self.now.record(RawCommandKind::Channel { noise, delay, loss });
+        self.history.keep();
+        (self.history.now.flight, self.history.now.channel) = (flight, (noise, delay, loss));
+        self.history.now.record(RawCommandKind::Channel { noise, delay, loss });
         Ok(())
     }
 
     fn fault(&mut self, robot: usize, what: Option<Fault>) -> Result<(), Refused> {
-        let names = &self.now.flight.control().formation().names;
+        let names = &self.history.now.flight.control().formation().names;
         let name = names.get(robot).ok_or("there is no such robot")?.clone();
-        self.now.require_room()?;
-        self.keep();
-        let now = self.now.flight.fleet().time();
-        self.now.end_fault(&name, now);
-        let fleet = self.now.flight.fleet_mut();
+        self.history.now.require_room()?;
+        self.history.keep();
+        let now = self.history.now.flight.fleet().time();
+        self.history.now.end_fault(&name, now);
+        let fleet = self.history.now.flight.fleet_mut();
         match what.map(kind) {
             None => fleet.mend(robot),
             Some(kind) => {
                 fleet.break_down(robot, kind.clone());
-                self.now.faults.push(RawFault { robot: name, at: now, until: None, what: kind });
+                self.history.now.faults.push(RawFault { robot: name, at: now, until: None, what: kind });
             }
         }
         Ok(())
@@ -235,31 +237,31 @@ impl Swarm {
     /// # Errors
     /// A swarm that cannot be written.
     pub fn saved(&self) -> Result<String, String> {
-        let mut raw = self.now.file.raw.clone();
+        let mut raw = self.history.now.file.raw.clone();
         // Before a period the hand acted first: the file's own commands are performed when it begins.
-        let own = std::mem::replace(&mut raw.flight.commands, self.now.commands.clone());
+        let own = std::mem::replace(&mut raw.flight.commands, self.history.now.commands.clone());
         raw.flight.commands.extend(own);
         raw.flight.commands.sort_by_key(|command| command.after);
-        raw.flight.faults.clone_from(&self.now.faults);
-        let flown = self.now.flight.fleet().period().max(1) as f64;
+        raw.flight.faults.clone_from(&self.history.now.faults);
+        let flown = self.history.now.flight.fleet().period().max(1) as f64;
         raw.flight.duration = Some(flown * raw.control.period);
         toml::to_string(&raw).map_err(|error| error.to_string())
     }
 
     /// The page's view of the robots as they are.
     pub fn view(&self) -> View {
-        FlightRecorder::still(&self.now.file, &self.now.flight, self.start())
+        FlightRecorder::still(&self.history.now.file, &self.history.now.flight, self.start())
     }
 
     /// Where displacements are counted from \[m\].
     fn start(&self) -> &Vectors {
-        &self.now.flight.control().formation().places
+        &self.history.now.flight.control().formation().places
     }
 
     /// The state of every robot, with all channels.
     pub fn frame(&self) -> Frame {
         let (control, places, start) =
-            (self.now.flight.control(), self.now.flight.fleet().places(), self.start());
+            (self.history.now.flight.control(), self.history.now.flight.fleet().places(), self.start());
         let moved = |now: &[f64], then: &[f64]| now.iter().zip(then).map(|(n, t)| (n - t) as f32).collect();
         let places_moved = [moved(&places.x, &start.x), moved(&places.y, &start.y)];
         let mut clearance = Vec::new();
@@ -273,52 +275,90 @@ impl Swarm {
         };
         let channel = |name: &str| (0..places.len()).map(|m| of(name, m) as f32).collect();
         let channels = CHANNELS.into_iter().map(|name| Some(channel(name))).collect();
-        Frame { clock: self.now.flight.fleet().time(), places: places_moved, channels }
+        Frame { clock: self.history.now.flight.fleet().time(), places: places_moved, channels }
     }
 
     /// Roles by number.
     pub fn roles(&self) -> Vec<u8> {
-        let formation = self.now.flight.control().formation();
+        let formation = self.history.now.flight.control().formation();
         let role = |m: usize| if formation.leads(m) { Role::Leader } else { Role::Follower };
         crate::export::report::view::numbers(&(0..formation.count()).map(role).collect::<Vec<_>>())
     }
 
+    /// How far each obstacle is from its place in the file \[m\].
+    pub fn obstacles(&self) -> Vec<[f64; 2]> {
+        self.history.now.flight.control().filter().obstacles().moved().collect()
+    }
+
     /// Bounds that are broken, in words, and the robots that break them.
     pub fn alarms(&self) -> (Vec<String>, Vec<usize>) {
-        let names = &self.now.flight.control().formation().names;
+        let names = &self.history.now.flight.control().formation().names;
         let words = |alarm: &Alarm| {
             let robots: Vec<&str> = alarm.robots.iter().map(|&m| names[m].as_str()).collect();
             let Alarm { bound, declared, found, .. } = alarm;
             format!("{bound}: declared {declared} m, now {found:.3} m, by {}", robots.join(" and "))
         };
-        let robots = self.now.alarms.iter().flat_map(|alarm| alarm.robots.iter().copied());
-        (self.now.alarms.iter().map(words).collect(), robots.collect())
+        let robots = self.history.now.alarms.iter().flat_map(|alarm| alarm.robots.iter().copied());
+        (self.history.now.alarms.iter().map(words).collect(), robots.collect())
     }
 
     /// Robots with a fault now, and its kind.
     pub fn faults(&self) -> Vec<(usize, &'static str)> {
-        let fleet = self.now.flight.fleet();
+        let fleet = self.history.now.flight.fleet();
         let count = fleet.robots().len();
         (0..count).filter_map(|m| Some((m, fleet.fault_name(m)?))).collect()
     }
 }
 
-impl State {
-    fn begin(load: &Load, set: Vec<String>, layout: u64) -> Result<Self, SceneError> {
-        let file = load(&set)?;
+impl history::State for State {
+    const NAME: &'static str = "swarm";
+    type File = File;
+
+    fn begin(source: &Source<File>, set: &[String]) -> Result<Self, SceneError> {
+        let file = source.file.with(set, source.folder.as_deref())?;
         let flight = Flight::new(&file)?;
         let raw = &file.raw.flight;
         Ok(Self {
-            set,
             channel: (raw.noise, raw.delay, raw.loss),
             faults: raw.faults.clone(),
             commands: Vec::new(),
             hands: BTreeMap::new(),
             alarms: Vec::new(),
-            layout,
             flight,
             file: Arc::new(file),
         })
+    }
+
+    fn let_go_all(&mut self) {
+        self.hands.clear();
+    }
+
+    fn size(&self) -> usize {
+        self.flight.fleet().robots().len() + self.commands.len() + self.faults.len()
+    }
+}
+
+impl State {
+    /// Leads from where each leader was taken to where `to` has it.
+    fn lead_all(
+        &mut self,
+        leaders: &[(usize, [f64; 2])],
+        to: impl Fn([f64; 2]) -> [f64; 2],
+    ) -> Result<(), Refused> {
+        let targets: Vec<_> = leaders.iter().map(|&(m, place)| (m, to(place))).collect();
+        // All of them or none: a formation that is led by a part of its leaders is torn.
+        if !targets.iter().all(|&(_, to)| self.flight.control().is_believed(to)) {
+            return Err("poses there would not be believed: they are beyond `poses.range`".into());
+        }
+        targets.into_iter().try_for_each(|(member, to)| self.lead(member, to))
+    }
+
+    fn move_obstacle(&mut self, obstacle: usize, by: [f64; 2]) -> Result<(), Refused> {
+        if !self.flight.perform(&FlightCommand::MoveObstacle { obstacle, by }) {
+            return Err("an obstacle cannot be so far away".into());
+        }
+        self.record(RawCommandKind::MoveObstacle { obstacle, by });
+        Ok(())
     }
 
     fn lead(&mut self, member: usize, to: [f64; 2]) -> Result<(), Refused> {
@@ -330,11 +370,15 @@ impl State {
         Ok(())
     }
 
-    /// Keeps a command; of several for a robot before the same period the last.
+    /// Keeps a command; of several for a robot or an obstacle before the same period the last.
     fn record(&mut self, what: RawCommandKind) {
         let after = self.flight.fleet().period();
         let is_same = |one: &RawCommand| match (&one.what, &what) {
             (RawCommandKind::Lead { robot, .. }, RawCommandKind::Lead { robot: other, .. }) => robot == other,
+            (
+                RawCommandKind::MoveObstacle { obstacle, .. },
+                RawCommandKind::MoveObstacle { obstacle: other, .. },
+            ) => obstacle == other,
             (RawCommandKind::Channel { .. }, RawCommandKind::Channel { .. }) => true,
             _ => false,
         };

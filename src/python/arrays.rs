@@ -57,6 +57,20 @@ pub(super) fn places(name: &str, given: &Bound<'_, PyAny>, count: usize) -> PyRe
     Ok(table(name, given, count, 2)?.chunks_exact(2).map(|place| [place[0], place[1]]).collect())
 }
 
+/// A place for each of some particles, of all `count` unless they are given; one alone may be given without lists.
+pub(super) fn placed(
+    particles: Option<&Bound<'_, PyAny>>,
+    places: &Bound<'_, PyAny>,
+    count: usize,
+) -> PyResult<Vec<(usize, [f64; 2])>> {
+    let particles = match particles {
+        Some(given) => indices("particles", given, count)?,
+        None => (0..count).collect(),
+    };
+    let places = self::places("places", places, particles.len())?;
+    Ok(particles.into_iter().zip(places).collect())
+}
+
 /// One number for each of `count`.
 pub(super) fn column(name: &str, given: &Bound<'_, PyAny>, count: usize) -> PyResult<Vec<f64>> {
     let (numbers, shape) = numbers(name, given)?;

@@ -1,5 +1,6 @@
 //! Computes beside the interpreter: other Python threads go on, and Ctrl-C ends the wait.
 
+use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
@@ -10,6 +11,7 @@ use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 
 use super::threads::Threads;
+use crate::engine::Engine;
 
 /// Time between two looks for a signal.
 const BETWEEN_LOOKS: Duration = Duration::from_millis(50);
@@ -49,11 +51,11 @@ impl Progress {
         FLAGS.lock().unwrap_or_else(PoisonError::into_inner).push(self.flag);
     }
 
-    /// Reports the step that the work has come to; whether to end.
-    pub(super) fn step(&self, step: usize, residual: f64) -> bool {
-        self.step.store(step, Ordering::Relaxed);
+    /// Reports the step that the work has come to, and breaks it off once it is to end.
+    pub(super) fn see(&self, engine: &Engine, residual: f64) -> ControlFlow<()> {
+        self.step.store(engine.step(), Ordering::Relaxed);
         self.residual.store(residual.to_bits(), Ordering::Relaxed);
-        self.flag.load(Ordering::Relaxed)
+        if self.flag.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 
     /// Ends work that looks at no flag of its own, once it is to end; [`beside`] catches it.

@@ -8,7 +8,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use super::arrays::{indices, moved, pairs, places, rows};
+use super::arrays::{moved, pairs, placed, rows};
 use super::beside::beside;
 use super::errors::{as_dict, diverged};
 use super::run::{interrupt_by, positive, words};
@@ -188,10 +188,9 @@ impl Body {
     ///
     /// places [length], shape (2,) or (k, 2). A clamped particle stays there; a leader goes back to its own motion.
     fn lead(&mut self, particles: &Bound<'_, PyAny>, places: &Bound<'_, PyAny>) -> PyResult<()> {
-        let particles = indices("particles", particles, self.count())?;
-        let places = self::places("places", places, particles.len())?;
-        particles.iter().try_for_each(|&particle| self.require_led(particle))?;
-        particles.into_iter().zip(places).for_each(|(particle, place)| self.lead_to(particle, place));
+        let led = placed(Some(particles), places, self.count())?;
+        led.iter().try_for_each(|&(particle, _)| self.require_led(particle))?;
+        led.into_iter().for_each(|(particle, place)| self.lead_to(particle, place));
         Ok(())
     }
 
@@ -200,17 +199,11 @@ impl Body {
     /// places [length], shape (k, 2) for k particles, or (count, 2) for all of them.
     #[pyo3(signature = (places, particles=None))]
     fn observe(&mut self, places: &Bound<'_, PyAny>, particles: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
-        let particles = match particles {
-            Some(given) => indices("particles", given, self.count())?,
-            None => (0..self.count()).collect(),
-        };
-        let places = self::places("places", places, particles.len())?;
-        let held = |i: usize| matches!(self.engine.roles()[i], Role::Clamped | Role::Ghost);
-        let held: Vec<bool> = particles.iter().map(|&i| held(i)).collect();
-        self.engine.observe(particles.iter().copied().zip(places.iter().copied()));
-        let seen = particles.into_iter().zip(places).zip(held);
+        let mut seen = placed(particles, places, self.count())?;
+        self.engine.observe(seen.iter().copied());
         // What does not move by itself stays where it was seen.
-        seen.filter(|(_, held)| *held).for_each(|((particle, place), _)| self.lead_to(particle, place));
+        seen.retain(|&(i, _)| matches!(self.engine.roles()[i], Role::Clamped | Role::Ghost));
+        seen.into_iter().for_each(|(particle, place)| self.lead_to(particle, place));
         Ok(())
     }
 

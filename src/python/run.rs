@@ -18,7 +18,6 @@ use crate::engine::observer::Observer;
 use crate::scene::{Scene, SceneError};
 use crate::solve::interrupt::Interrupt;
 use crate::study::compare::run::plan;
-use crate::study::trade::{Chosen, choose};
 
 /// Runs a scene to its end, as `flockform run` does, and returns what came of it.
 ///
@@ -83,8 +82,7 @@ impl From<Failure> for PyErr {
 }
 
 fn run_source(source: &Source, every: Option<usize>, progress: &Progress) -> Result<Done, Failure> {
-    let Chosen { mut scene, .. } = choose(source.load(&[])?, &|more: &[String]| source.load(more))?;
-    interrupt_by(&mut scene, progress);
+    let scene = source.chosen(progress)?;
     let plan = plan(&scene)?;
     let looks = Looks::new(&plan, false);
     let mut watcher = Watcher { frames: Frames::default(), every, looks, progress };
@@ -146,8 +144,8 @@ impl Observer for Watcher<'_> {
         if self.every.is_some_and(|every| engine.step().is_multiple_of(every)) {
             self.frames.keep(engine);
         }
-        let is_over = self.progress.step(engine.step(), residual) || self.frames.is_full;
-        if is_over { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        let flow = self.progress.see(engine, residual);
+        if self.frames.is_full { ControlFlow::Break(()) } else { flow }
     }
 }
 

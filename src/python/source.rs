@@ -6,10 +6,13 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyMapping, PyString, PyTuple};
 
+use super::beside::Progress;
+use super::run::interrupt_by;
 use crate::scene::bundled::{SCENES, SWARMS, bundled_swarm};
 use crate::scene::document::MAX_DEPTH;
 use crate::scene::swarm::Swarm;
 use crate::scene::{Bundled, Place, Problem, Scene, SceneError, bundled};
+use crate::study::trade::{Chosen, choose};
 
 /// What stands in the text of a file that is given as a dict.
 const UNTITLED: &str = "title = \"Given in Python\"";
@@ -73,6 +76,14 @@ impl Source {
                 Scene::parse("python", DICT, UNTITLED, &[keys, &set[..]].concat(), Some(Path::new(".")))
             }
         }
+    }
+
+    /// Reads the scene to be run, by the rule and the solver that were chosen for it where it asks for an accuracy. Its
+    /// solver ends when the wait for it does.
+    pub(super) fn chosen(&self, progress: &Progress) -> Result<Scene, SceneError> {
+        let Chosen { mut scene, .. } = choose(self.load(&[])?, &|more: &[String]| self.load(more))?;
+        interrupt_by(&mut scene, progress);
+        Ok(scene)
     }
 
     /// Reads the swarm.

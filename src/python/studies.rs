@@ -1,7 +1,5 @@
 //! `flockform.material`, `flockform.stability` and `flockform.compare`.
 
-use std::ops::ControlFlow;
-
 use numpy::PyArrayDyn;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -10,7 +8,7 @@ use super::arrays::{moved, pairs};
 use super::beside::beside;
 use super::body::Body;
 use super::errors::as_dict;
-use super::run::{interrupt_by, words};
+use super::run::words;
 use super::source::Source;
 use crate::continuum::bulk_response;
 use crate::fem::Effort;
@@ -19,7 +17,6 @@ use crate::study::compare::run::{Compared, compare as compare_scene};
 use crate::study::stability::bisection;
 use crate::study::stability::extremes::plan;
 use crate::study::stability::study::{Options, Study, run};
-use crate::study::trade::{Chosen, choose};
 
 /// What material a scene's rule is, in a body without edges: a dict with the keys of `flockform material --json`.
 ///
@@ -81,14 +78,9 @@ pub(super) fn compare(
     let source = Source::scene(scene, set)?;
     let effort = Effort { target: part_of_one(truth_error)?, ..Effort::default() };
     let (scene, compared) = beside(py, progress, move |progress| {
-        let Chosen { mut scene, .. } = choose(source.load(&[])?, &|more: &[String]| source.load(more))?;
-        interrupt_by(&mut scene, progress);
-        let compared = compare_scene(&scene, &effort, &mut |engine, residual| match progress
-            .step(engine.step(), residual)
-        {
-            true => ControlFlow::Break(()),
-            false => ControlFlow::Continue(()),
-        })?;
+        let scene = source.chosen(progress)?;
+        let compared =
+            compare_scene(&scene, &effort, &mut |engine, residual| progress.see(engine, residual))?;
         Ok::<_, SceneError>((scene, compared))
     })??;
     Comparison::new(py, scene, compared)

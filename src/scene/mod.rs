@@ -17,6 +17,7 @@ pub mod validate;
 
 use std::sync::Arc;
 
+use crate::flock::action::Action;
 use crate::flock::body::Cut;
 use crate::flock::cloud::Cloud;
 use crate::flock::condition::Condition;
@@ -82,8 +83,9 @@ pub struct Scene {
     pub fracture: Option<Fracture>,
     /// Ends of each cut \[length\].
     pub cuts: Vec<Segment>,
-    /// Everything that is done to the body while it is stepped, by ascending step.
-    pub actions: Vec<Action>,
+    /// Everything that is done to the body while it is stepped, by ascending step; where particles follow otherwise, as
+    /// those of a scene that differs in nothing else.
+    pub actions: Vec<Action<Box<Scene>>>,
     /// When the run ends.
     pub stop: Stop,
     /// How the equilibrium is found, where the scene is not stepped.
@@ -265,24 +267,6 @@ pub enum LeaderMotion {
         /// Steps to get there.
         steps: usize,
     },
-}
-
-/// Something that is done to the body at the beginning of a step.
-#[derive(Clone, Debug)]
-pub struct Action {
-    /// First step at which it holds.
-    pub at: usize,
-    /// What is done.
-    pub what: ActionKind,
-}
-
-/// Kinds of actions.
-#[derive(Clone, Debug)]
-pub enum ActionKind {
-    /// The particles follow as those of this scene do, which differs in nothing else.
-    Set(Box<Scene>),
-    /// Every bond breaks that crosses this line where the body stands then \[length\].
-    Cut(Segment),
 }
 
 /// When bonds break and what stands in for them; without a threshold none breaks by itself.

@@ -237,6 +237,9 @@ fn a_missing_scene_is_refused_with_the_nearest_name() {
     refused(&["run", "tensoin"], &["no bundled scene `tensoin`", "`tension`", "flockform list scenes"]);
     refused(&["run", "scenes/nowhere.toml"], &["scenes/nowhere.toml", "cannot be read"]);
     refused(&["plan", "fractur"], &["`fracture`"]);
+    let both =
+        ["no scene or swarm file", "bundled swarm is `square`", "list scenes` and `flockform list swarms`"];
+    refused(&["live", "sqare"], &both);
 }
 
 #[test]

@@ -7,12 +7,15 @@ use flockform::continuum::plan::Plan;
 use flockform::engine::Engine;
 use flockform::live::body::Body;
 use flockform::live::command::Command;
+use flockform::scene::raw::RawSide;
 use flockform::scene::{Scene, bundled};
 
-fn begun(name: &'static str, set: &'static [&'static str]) -> Body {
+use super::folders::temporary;
+
+fn begun(name: &str, set: &[&str]) -> Body {
     let set: Vec<String> = set.iter().map(|&text| text.to_owned()).collect();
-    let load = move |more: &[String]| bundled(name).expect("bundled").load(&[&set[..], more].concat());
-    Body::new(Box::new(load), None).unwrap_or_else(|error| panic!("{error}"))
+    let scene = bundled(name).expect("bundled").load(&set).unwrap_or_else(|error| panic!("{error}"));
+    Body::new(scene, None).unwrap_or_else(|error| panic!("{error}"))
 }
 
 fn ask(body: &mut Body, text: &str) {
@@ -175,4 +178,55 @@ fn hands_that_hold_nothing_or_the_frame_are_refused() {
     ask(&mut body, r#"{"do":"drag","by":[1e300,-1e300]}"#);
     step(&mut body, 5);
     assert!(body.engine().present().iter().all(|[x, y]| x.abs() < 1e4 && y.abs() < 1e4));
+}
+
+#[test]
+fn a_file_that_is_edited_meanwhile_changes_nothing() {
+    let folder = temporary();
+    let path = folder.path().join("mine.toml");
+    let text = bundled("tension").expect("bundled").text;
+    std::fs::write(&path, text).expect("writable");
+    let scene = Scene::from_file(&path, &[]).unwrap_or_else(|error| panic!("{error}"));
+    let mut body = Body::new(scene, path.parent().map(Into::into)).unwrap_or_else(|error| panic!("{error}"));
+    step(&mut body, 5);
+    std::fs::write(&path, text.replace("spacing = 1.0", "spacing = 2.0").replace("[lattice]", "[latice]"))
+        .expect("writable");
+    ask(&mut body, r#"{"do":"set","key":"update.damping","value":"0.8"}"#);
+    assert_eq!(body.engine().step(), 5);
+    ask(&mut body, r#"{"do":"reset"}"#);
+    step(&mut body, 3);
+    assert_replays(&body);
+}
+
+#[test]
+fn hands_that_take_and_take_are_refused_before_they_fill_the_memory() {
+    let mut body = begun("tension", &["body.shape={ kind = \"grid\", columns = 3, rows = 4000 }"]);
+    let clamped = (0..body.engine().body().count()).find(|&i| body.engine().roles()[i].name() == "clamped");
+    let grab = Command::Grab { particle: clamped.expect("held"), alone: false };
+    let refused = (0..1000).find_map(|_| body.perform(0, &grab).err());
+    assert!(refused.expect("refused in the end").0.contains("too much"));
+    ask(&mut body, r#"{"do":"undo"}"#);
+}
+
+#[test]
+fn a_side_that_is_loaded_by_hand_goes_there_and_is_replayed_to_the_bit() {
+    let mut body = begun("beam-loaded", &["loads=[]"]);
+    step(&mut body, 5);
+    let corner = body.engine().body().count() - 1;
+    ask(&mut body, r#"{"do":"load","side":"right","by":[1.1,0.0]}"#);
+    step(&mut body, 400);
+    let [x, _] = body.engine().displacement(corner);
+    // It contracts, so it goes farther than it would without: by 1 / (1 - nu^2) in a long bar.
+    assert!((1.0..1.4).contains(&x), "{x}");
+    ask(&mut body, r#"{"do":"load","side":"top","by":[0.2,0.0]}"#);
+    step(&mut body, 3);
+    ask(&mut body, r#"{"do":"load","side":"right","by":[-1.1,0.0]}"#);
+    let sets = body.sets();
+    assert!(sets.last().expect("set").starts_with("loads[0].traction=[-"), "{sets:?}");
+    step(&mut body, 400);
+    assert!(body.engine().displacement(corner)[0] < -0.8, "{:?}", body.engine().displacement(corner));
+    assert_replays(&body);
+    let mut body = begun("tension", &[]);
+    let load = Command::Load { side: RawSide::Right, by: [1.0, 0.0] };
+    assert!(body.perform(0, &load).expect_err("refused").0.contains("only a material"));
 }

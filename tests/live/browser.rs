@@ -80,7 +80,7 @@ fn a_body_is_dragged_cut_undone_and_saved_while_another_viewer_looks_on() {
 #[ignore = "needs Chromium, Node, playwright-core and axe-core: see tests/browser/main.rs"]
 fn a_leader_is_dragged_and_a_robot_killed_and_the_flight_saved() {
     let folder = temporary();
-    let served = Served::swarm("square", folder.path());
+    let served = Served::swarm("square", &[], folder.path());
     let seen = tour(&served, &json!({ "name": "square", "drag": 0, "fault": 12 }));
     assert_eq!(seen["hurt"], json!([[12, "dead"]]));
     let saved = Path::new(seen["saved"].as_str().expect("a path")).to_owned();
@@ -92,6 +92,45 @@ fn a_leader_is_dragged_and_a_robot_killed_and_the_flight_saved() {
     let places = flight.control().formation().places.clone();
     let moved = flight.fleet().places();
     assert_shown(&seen, moved.iter().zip(places.iter()).map(|([x, y], [px, py])| [x - px, y - py]));
+}
+
+#[test]
+#[ignore = "needs Chromium, Node, playwright-core and axe-core: see tests/browser/main.rs"]
+fn an_obstacle_is_pushed_and_the_formation_squeezed_and_the_flight_saved() {
+    let folder = temporary();
+    let disc = "obstacles=[{ kind = \"disc\", centre = [-4.0, 3.0], radius = 1.0 }]".to_owned();
+    let served = Served::swarm(
+        "square",
+        &[disc, "leaders[0].program={ kind = \"external\" }".to_owned()],
+        folder.path(),
+    );
+    let pushed =
+        json!({ "name": "pushed", "push": { "at": [-4.0, 3.0], "by": [3.5, 0.0] }, "squeeze": true });
+    let seen = tour(&served, &pushed);
+    assert!(seen["pushed"][0].as_f64() > Some(3.3), "{}", seen["pushed"]);
+    assert!((4.0..5.6).contains(&seen["squeezed"].as_f64().expect("measured")), "{}", seen["squeezed"]);
+    let saved = Path::new(seen["saved"].as_str().expect("a path")).to_owned();
+    let swarm = Swarm::from_file(&saved, &[]).unwrap_or_else(|error| panic!("{error}"));
+    let mut flight = Flight::new(&swarm).unwrap_or_else(|error| panic!("{error}"));
+    (0..flight.periods()).for_each(|_| flight.step());
+    assert_eq!(seen["clock"], flight.fleet().time());
+    let places = flight.control().formation().places.clone();
+    let moved = flight.fleet().places();
+    assert_shown(&seen, moved.iter().zip(places.iter()).map(|([x, y], [px, py])| [x - px, y - py]));
+}
+
+#[test]
+#[ignore = "needs Chromium, Node, playwright-core and axe-core: see tests/browser/main.rs"]
+fn an_edge_is_loaded_by_hand_and_the_body_saved() {
+    let folder = temporary();
+    let served = Served::scene("beam-loaded", &["loads=[]".to_owned()], folder.path());
+    let seen = tour(&served, &json!({ "name": "loaded", "load": 137 }));
+    assert!(seen["loaded"][0].as_f64() > Some(0.3), "{}", seen["loaded"]);
+    let saved = Path::new(seen["saved"].as_str().expect("a path")).to_owned();
+    let scene = Scene::from_file(&saved, &[]).unwrap_or_else(|error| panic!("{error}"));
+    let plan = Plan::new(&scene).unwrap_or_else(|error| panic!("{error}"));
+    let engine = run(plan, &mut |_, _| ControlFlow::Continue(())).engine;
+    assert_shown(&seen, (0..engine.body().count()).map(|i| engine.displacement(i)));
 }
 
 #[test]

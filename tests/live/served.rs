@@ -19,16 +19,16 @@ pub struct Served {
 }
 
 impl Served {
-    pub fn scene(name: &'static str, set: &[String], folder: &Path) -> Self {
-        let set = set.to_vec();
-        let load = move |more: &[String]| bundled(name).expect("bundled").load(&[&set[..], more].concat());
-        let body = Body::new(Box::new(load), None).unwrap_or_else(|error| panic!("{error}"));
+    pub fn scene(name: &str, set: &[String], folder: &Path) -> Self {
+        let scene = bundled(name).expect("bundled").load(set).unwrap_or_else(|error| panic!("{error}"));
+        let body = Body::new(scene, None).unwrap_or_else(|error| panic!("{error}"));
         Self::session(Session::Body(Box::new(body)), folder)
     }
 
-    pub fn swarm(name: &'static str, folder: &Path) -> Self {
-        let load = move |more: &[String]| bundled_swarm(name).expect("bundled").load_swarm(more);
-        let swarm = Swarm::new(Box::new(load)).unwrap_or_else(|error| panic!("{error}"));
+    pub fn swarm(name: &str, set: &[String], folder: &Path) -> Self {
+        let swarm = bundled_swarm(name).expect("bundled").load_swarm(set);
+        let swarm = swarm.unwrap_or_else(|error| panic!("{error}"));
+        let swarm = Swarm::new(swarm, None).unwrap_or_else(|error| panic!("{error}"));
         Self::session(Session::Swarm(Box::new(swarm)), folder)
     }
 

@@ -6,15 +6,14 @@ use flockform::scene::bundled::bundled_swarm;
 use flockform::scene::swarm::Swarm;
 use flockform::swarm::flight::Flight;
 
-fn begun(name: &'static str) -> Live {
+fn begun(name: &str) -> Live {
     begun_with(name, &[])
 }
 
-fn begun_with(name: &'static str, set: &[String]) -> Live {
-    let set = set.to_vec();
-    let load =
-        move |more: &[String]| bundled_swarm(name).expect("bundled").load_swarm(&[&set[..], more].concat());
-    Live::new(Box::new(load)).unwrap_or_else(|error| panic!("{error}"))
+fn begun_with(name: &str, set: &[String]) -> Live {
+    let swarm = bundled_swarm(name).expect("bundled").load_swarm(set);
+    let swarm = swarm.unwrap_or_else(|error| panic!("{error}"));
+    Live::new(swarm, None).unwrap_or_else(|error| panic!("{error}"))
 }
 
 fn ask(swarm: &mut Live, text: &str) {
@@ -113,4 +112,93 @@ fn a_broken_bound_is_named_with_its_robots() {
     let (words, robots) = swarm.alarms();
     assert!(words[0].contains("clearance: declared 5 m, now") && words[0].contains("robot_"), "{words:?}");
     assert!(robots.len() >= 2, "{robots:?}");
+}
+
+#[test]
+fn a_lead_of_a_file_to_where_no_pose_is_believed_is_refused_with_its_key() {
+    let name = begun("square").flight().control().formation().names[0].clone();
+    let led = |x: f64| {
+        let lead = format!("{{ kind = \"lead\", robot = \"{name}\", to = [{x}, 0.0] }}");
+        let set =
+            [format!("flight.commands=[{{ after = 1, what = {lead} }}]"), "poses.range=20.0".to_owned()];
+        Flight::new(&bundled_swarm("square").expect("bundled").load_swarm(&set).expect("readable")).map(drop)
+    };
+    led(5.0).unwrap_or_else(|error| panic!("{error}"));
+    let words = led(1e3).expect_err("refused").to_string();
+    assert!(words.contains("flight.commands[0].what.to") && words.contains("poses.range = 20"), "{words}");
+}
+
+#[test]
+fn moved_obstacles_are_avoided_and_flown_again_to_the_bit() {
+    let obstacles = "obstacles=[{ kind = \"disc\", centre = [40.0, 0.0], radius = 0.5 }, \
+                     { kind = \"polygon\", vertices = [[-30.0, 0.0], [-29.0, 0.0], [-29.0, 1.0]] }]";
+    let mut swarm = begun_with("square", &[obstacles.to_owned()]);
+    fly(&mut swarm, 5);
+    let centre = swarm.flight().fleet().places().get(12);
+    ask(&mut swarm, r#"{"do":"grab-obstacle","obstacle":0}"#);
+    // Onto a robot, in steps; it gives way.
+    for k in 1..=20 {
+        let [x, y] = [centre[0] - 40.0, centre[1]].map(|way| way * f64::from(k) / 20.0);
+        ask(&mut swarm, &format!(r#"{{"do":"drag","by":[{x},{y}]}}"#));
+        fly(&mut swarm, 1);
+    }
+    ask(&mut swarm, r#"{"do":"release"}"#);
+    fly(&mut swarm, 20);
+    let [x, y] = swarm.flight().fleet().places().get(12);
+    // Its radius is 0.2, that of the obstacle 0.5.
+    assert!(f64::hypot(x - centre[0], y - centre[1]) > 0.7, "it gives way: {x}, {y}");
+    ask(&mut swarm, r#"{"do":"grab-obstacle","obstacle":1}"#);
+    ask(&mut swarm, r#"{"do":"drag","by":[27.5,1.0]}"#);
+    fly(&mut swarm, 15);
+    assert_eq!(swarm.obstacles()[1], [27.5, 1.0]);
+    assert_replays(&swarm);
+    ask(&mut swarm, r#"{"do":"undo"}"#);
+    assert_eq!(swarm.obstacles()[1], [0.0, 0.0]);
+    assert_replays(&swarm);
+}
+
+#[test]
+fn obstacles_that_are_none_or_go_too_far_are_refused_by_hand_and_in_a_file() {
+    let obstacle = "obstacles=[{ kind = \"polygon\", vertices = [[30.0, 0.0], [31.0, 0.0], [31.0, 1.0]] }]";
+    let mut swarm = begun_with("square", &[obstacle.to_owned()]);
+    let refused = |swarm: &mut Live, text: &str| {
+        swarm.perform(0, &Command::parse(text).expect("a request")).expect_err("refused").0
+    };
+    assert!(refused(&mut swarm, r#"{"do":"grab-obstacle","obstacle":1}"#).contains("no such obstacle"));
+    ask(&mut swarm, r#"{"do":"grab-obstacle","obstacle":0}"#);
+    // So far away its corners are one place.
+    assert!(refused(&mut swarm, r#"{"do":"drag","by":[1e60,0]}"#).contains("far away"));
+    assert_eq!(swarm.obstacles(), [[0.0, 0.0]]);
+    for (what, key) in
+        [("obstacle = 1, by = [1.0, 0.0]", "what.obstacle"), ("obstacle = 0, by = [1e60, 0.0]", "what.by")]
+    {
+        let command =
+            format!("flight.commands=[{{ after = 1, what = {{ kind = \"move-obstacle\", {what} }} }}]");
+        let file = bundled_swarm("square").expect("bundled").load_swarm(&[obstacle.to_owned(), command]);
+        let error = Flight::new(&file.expect("readable")).map(drop).expect_err("refused").to_string();
+        assert!(error.contains(&format!("flight.commands[0].{key}")), "{error}");
+    }
+}
+
+#[test]
+fn a_squeezed_formation_is_as_wide_as_its_leaders_and_flown_again_to_the_bit() {
+    let mut swarm = begun("square");
+    let wide = |swarm: &Live| {
+        let places = swarm.flight().fleet().places();
+        let largest = places.x.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        largest - places.x.iter().copied().fold(f64::INFINITY, f64::min)
+    };
+    let before = wide(&swarm);
+    let leader = leader(&swarm);
+    let refused = swarm.perform(0, &Command::Squeeze { by: [0.8; 2] }).expect_err("nothing is held").0;
+    assert!(refused.contains("no leaders are held"), "{refused}");
+    ask(&mut swarm, &format!(r#"{{"do":"grab","particle":{leader}}}"#));
+    for by in [0.9, 0.8, 0.7] {
+        ask(&mut swarm, &format!(r#"{{"do":"squeeze","by":[{by},{by}]}}"#));
+        fly(&mut swarm, 10);
+    }
+    ask(&mut swarm, r#"{"do":"release"}"#);
+    fly(&mut swarm, 60);
+    assert!((wide(&swarm) / before - 0.7).abs() < 0.01, "{} of {before}", wide(&swarm));
+    assert_replays(&swarm);
 }

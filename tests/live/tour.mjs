@@ -3,7 +3,8 @@
 //   node tour.mjs ADDRESS '{"drag": 66, "cut": [[4.5, 2], [4.6, 8]], "key": "rule.feedback.factor=-0.05"}'
 //
 // `drag` numbers the particle that is dragged, `cut` has the ends of a cut, `key` is a key to change, `fault` the robot that is
-// killed, `frames` for how many milliseconds the frames are counted. FLOCKFORM_NODE_MODULES is a folder with
+// killed, `push` says where an obstacle is taken and how far it goes, `squeeze` that the slider is moved, `load` has the particle
+// whose edge is loaded, `frames` for how many milliseconds the frames are counted. FLOCKFORM_NODE_MODULES is a folder with
 // playwright-core and axe-core, FLOCKFORM_PICTURES one for screenshots.
 
 import { createRequire } from "node:module";
@@ -131,6 +132,49 @@ async function fault(page) {
   seen.alarms = await page.$$eval("#live-alarms li", (items) => items.map((item) => item.textContent));
 }
 
+// The obstacle's corner is moved by the hand; the page shows where it went.
+async function push(page) {
+  const { by } = asked.push;
+  const from = await onScreen(page, asked.push.at);
+  const to = await onScreen(page, asked.push.at.map((along, k) => along + by[k]));
+  await page.mouse.move(...from);
+  await page.mouse.down();
+  for (let k = 1; k <= 10; k++) {
+    await page.mouse.move(...from.map((along, axis) => along + ((to[axis] - along) * k) / 10));
+    await later(page, await clock(page));
+  }
+  await page.waitForFunction((x) => window.report.live.session.status.obstacles[0][0] > x, 0.9 * by[0]);
+  await shoot(page, `${asked.name}-push`);
+  await page.mouse.up();
+  seen.pushed = await page.evaluate(() => window.report.live.session.status.obstacles[0]);
+}
+
+async function squeeze(page) {
+  await page.locator("#live-squeeze").fill("0.8");
+  await later(page, (await clock(page)) + 3);
+  await shoot(page, `${asked.name}-squeeze`);
+  seen.squeezed = await page.evaluate(() => {
+    const { X, dx } = window.report.bodies[0];
+    const places = [...X].map((x, i) => x + dx[i]);
+    return Math.max(...places) - Math.min(...places);
+  });
+}
+
+async function load(page) {
+  await page.check("input[name=tool][value=load]");
+  const [x, y] = await onScreen(page, asked.load);
+  await page.mouse.move(x, y);
+  await page.mouse.down();
+  await page.mouse.move(x + 20, y, { steps: 4 });
+  await page.mouse.move(x + 40, y, { steps: 4 });
+  await shoot(page, `${asked.name}-load`);
+  await page.mouse.up();
+  await page.waitForFunction(() => window.report.live.session.status.sets.some((text) => text.startsWith("loads")));
+  await later(page, (await clock(page)) + 200);
+  seen.loaded = await place(page, asked.load);
+  await page.check("input[name=tool][value=drag]");
+}
+
 async function pause(page) {
   await page.click("#play");
   await settled(page);
@@ -181,6 +225,9 @@ try {
     await later(page, (await clock(page)) + 20);
     await shoot(page, `${asked.name}-torn`);
   }
+  if (asked.push) await push(page);
+  if (asked.squeeze) await squeeze(page);
+  if (asked.load !== undefined) await load(page);
   if (asked.key) await set(page);
   if (asked.fault !== undefined) await fault(page);
   await shoot(page, `${asked.name}-end`);

@@ -8,7 +8,7 @@ use super::svg::{Path, Svg};
 use crate::flock::role::Role;
 use crate::flock::vectors::Vectors;
 use crate::scene::swarm::Swarm;
-use crate::scene::swarm::raw::RawObstacle;
+use crate::scene::swarm::raw::{RawCommandKind, RawObstacle};
 use crate::swarm::flight::{FlightReport, Record};
 
 const OBSTACLE: &str = "#6b7078";
@@ -26,12 +26,11 @@ pub fn flight(swarm: &Swarm, record: &Record, report: &FlightReport) -> String {
     };
     let leads = |m: usize| report.per_robot[m].role != Role::Follower.name();
     let count = first.len();
-    let shown: Vectors = record
-        .tracks
-        .iter()
-        .flat_map(|places| places.iter())
-        .chain(swarm.raw.obstacles.iter().flat_map(outline))
-        .collect();
+    let obstacles = (0..swarm.raw.obstacles.len()).flat_map(|k| {
+        let [first, last] = ends(swarm, k);
+        first.into_iter().chain(last)
+    });
+    let shown: Vectors = record.tracks.iter().flat_map(|places| places.iter()).chain(obstacles).collect();
     let axes = page::window(&shown, 0..shown.len(), 3.0 * swarm.raw.radius);
     let key = |name: &'static str, colour, mark| Key { name: name.into(), colour, mark };
     let mut legend = vec![
@@ -80,13 +79,36 @@ fn draw_obstacles(svg: &mut Svg, axes: &Axes, swarm: &Swarm) {
         path.polygon(corners.iter().map(|&corner| axes.place(corner)));
         path
     };
-    for obstacle in &swarm.raw.obstacles {
-        svg.path(&polygon(&outline(obstacle)), format_args!("class=\"obstacle\" fill=\"{OBSTACLE}\""));
+    for k in 0..swarm.raw.obstacles.len() {
+        let [first, last] = ends(swarm, k);
+        if first != last {
+            let stroke = format!("stroke=\"{START}\"");
+            svg.path(&polygon(&first), format_args!("class=\"start\" fill=\"none\" {stroke}"));
+        }
+        svg.path(&polygon(&last), format_args!("class=\"obstacle\" fill=\"{OBSTACLE}\""));
     }
     if let Some(fence) = &swarm.raw.limits.geofence {
         let stroke = format!("stroke=\"{OBSTACLE}\" stroke-dasharray=\"6 4\"");
         svg.path(&polygon(fence), format_args!("class=\"fence\" fill=\"none\" {stroke}"));
     }
+}
+
+/// Outlines of an obstacle where it begins and where it is moved to in the end.
+fn ends(swarm: &Swarm, obstacle: usize) -> [Vec<[f64; 2]>; 2] {
+    let first = outline(&swarm.raw.obstacles[obstacle]);
+    let [_, x, y] = moves(swarm, obstacle).last().unwrap_or_default();
+    let last = first.iter().map(|[px, py]| [px + x, py + y]).collect();
+    [first, last]
+}
+
+/// When an obstacle is moved \[s\], and how far from its place in the file along x and y \[m\].
+pub(in super::super) fn moves(swarm: &Swarm, obstacle: usize) -> impl Iterator<Item = [f64; 3]> + '_ {
+    swarm.raw.flight.commands.iter().filter_map(move |command| match command.what {
+        RawCommandKind::MoveObstacle { obstacle: one, by: [x, y] } if one == obstacle => {
+            Some([command.after as f64 * swarm.raw.control.period, x, y])
+        }
+        _ => None,
+    })
 }
 
 pub(in super::super) fn outline(obstacle: &RawObstacle) -> Vec<[f64; 2]> {

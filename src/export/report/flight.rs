@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::super::error::ExportError;
-use super::super::figures::flight_map::outline;
+use super::super::figures::flight_map::{moves, outline};
 use super::super::{OutputFolder, flight};
 use super::encoded;
 use super::frames::{Channel, Frames};
@@ -130,10 +130,13 @@ impl FlightRecorder {
 
 fn animation(swarm: &Swarm, names: Vec<String>) -> Animation {
     let own = |m: usize| swarm.raw.robots.get(m).and_then(|robot| robot.radius).unwrap_or(swarm.raw.radius);
-    let obstacles =
-        swarm.raw.obstacles.iter().map(|obstacle| Outline { kind: "obstacle", corners: outline(obstacle) });
-    let fence =
-        swarm.raw.limits.geofence.iter().map(|fence| Outline { kind: "fence", corners: fence.clone() });
+    let obstacles = swarm.raw.obstacles.iter().enumerate().map(|(k, obstacle)| Outline {
+        kind: "obstacle",
+        corners: outline(obstacle),
+        moves: moves(swarm, k).collect(),
+    });
+    let still = |fence: &Vec<[f64; 2]>| Outline { kind: "fence", corners: fence.clone(), moves: Vec::new() };
+    let fence = swarm.raw.limits.geofence.iter().map(still);
     Animation {
         noun: "robot",
         unit: "m".into(),

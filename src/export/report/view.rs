@@ -93,8 +93,10 @@ pub(crate) struct Stress {
 pub(crate) struct Outline {
     /// `obstacle` or `fence`.
     pub kind: &'static str,
-    /// \[length\]
+    /// Where it stands at first \[length\].
     pub corners: Vec<[f64; 2]>,
+    /// By ascending time, when it is moved and how far from there: time, x, y.
+    pub moves: Vec<[f64; 3]>,
 }
 
 /// An animation with its arrays, each compressed text with a name.

@@ -28,7 +28,8 @@ const fn colour(r: f32, g: f32, b: f32, a: f32) -> ColorRGBA {
 pub fn message(control: &Control, raw: &RawSwarm, header: &Header) -> MarkerArray {
     let mut markers = vec![links(control, header), targets(control, header)];
     markers.extend((0..control.formation().count()).filter_map(|m| member(control, m, header)));
-    markers.extend(raw.obstacles.iter().enumerate().map(|(k, one)| obstacle(one, k, header)));
+    let moved = raw.obstacles.iter().zip(control.filter().obstacles().moved());
+    markers.extend(moved.enumerate().map(|(k, (one, by))| obstacle(one, by, k, header)));
     markers.extend(raw.limits.geofence.as_ref().map(|fence| outline("fence", 0, fence, header)));
     MarkerArray { markers }
 }
@@ -100,15 +101,18 @@ fn targets(control: &Control, header: &Header) -> Marker {
     }
 }
 
-fn obstacle(obstacle: &RawObstacle, id: usize, header: &Header) -> Marker {
+fn obstacle(obstacle: &RawObstacle, by: [f64; 2], id: usize, header: &Header) -> Marker {
+    let moved = |&[x, y]: &[f64; 2]| [x + by[0], y + by[1]];
     match obstacle {
         RawObstacle::Disc { centre, radius } => Marker {
-            pose: Pose::planar(*centre, 0.0),
+            pose: Pose::planar(moved(centre), 0.0),
             scale: Vector3 { x: 2.0 * radius, y: 2.0 * radius, z: HEIGHT },
             color: OBSTACLE,
             ..marker(header, "obstacles", id, Marker::CYLINDER)
         },
-        RawObstacle::Polygon { vertices } => outline("obstacles", id, vertices, header),
+        RawObstacle::Polygon { vertices } => {
+            outline("obstacles", id, &vertices.iter().map(moved).collect::<Vec<_>>(), header)
+        }
     }
 }
 

@@ -38,7 +38,19 @@ impl Swarm {
         overrides: &[String],
         folder: Option<&Path>,
     ) -> Result<Self, SceneError> {
-        let document = Document::parse(file, text, overrides)?;
+        Self::build(name, Document::parse(file, text, overrides)?, folder)
+    }
+
+    /// The swarm with more keys set after those that it was read with, from the text that was read then. Files are
+    /// looked up in `folder`.
+    ///
+    /// # Errors
+    /// Keys that cannot be set so.
+    pub fn with(&self, set: &[String], folder: Option<&Path>) -> Result<Self, SceneError> {
+        Self::build(&self.name, self.document.with(set)?, folder)
+    }
+
+    fn build(name: &str, document: Document, folder: Option<&Path>) -> Result<Self, SceneError> {
         let raw: RawSwarm = document.read(&schema())?;
         let refuse: Refuse<'_> =
             &|key, message, help| SceneError::from(document.problem(key, message, Some(help.to_owned())));

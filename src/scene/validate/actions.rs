@@ -3,10 +3,11 @@
 use std::path::Path;
 
 use super::{Refuse, validate};
+use crate::flock::action::{Action, ActionKind};
+use crate::scene::Scene;
 use crate::scene::document::Document;
 use crate::scene::document::problem::SceneError;
 use crate::scene::raw::*;
-use crate::scene::{Action, ActionKind};
 
 /// Tables whose keys may change while the body is stepped: they leave particles, neighbours and roles as they are.
 pub const CHANGEABLE: [&str; 5] = ["rule", "update", "material", "loads", "fracture"];
@@ -22,7 +23,7 @@ pub fn actions(
     raw: &RawScene,
     (name, document, folder): (&str, &Document, Option<&Path>),
     refuse: Refuse<'_>,
-) -> Result<Vec<Action>, SceneError> {
+) -> Result<Vec<Action<Box<Scene>>>, SceneError> {
     if raw.actions.is_empty() {
         return Ok(Vec::new());
     }
@@ -57,7 +58,7 @@ pub fn actions(
                     let help = "each key is checked as on the command line, after those before it";
                     refuse(&format!("{key}.keys"), error.to_string(), help)
                 })?;
-                ActionKind::Set(Box::new(changed))
+                ActionKind::Follow(Box::new(changed))
             }
         };
         Ok(Action { at: action.at, what })
@@ -94,7 +95,7 @@ fn changed(
     document: &Document,
     set: &[String],
     folder: Option<&Path>,
-) -> Result<crate::scene::Scene, SceneError> {
+) -> Result<Scene, SceneError> {
     let document = document.with(set)?;
     let mut raw: RawScene = document.read(&super::schema())?;
     raw.actions.retain(is_cut);

@@ -50,6 +50,17 @@ impl Scene {
 }
 
 impl Scene {
+    /// The scene with more keys set after those that it was read with, from the text that was read then. Files are
+    /// looked up in `folder`.
+    ///
+    /// # Errors
+    /// Keys that cannot be set so.
+    pub fn with(&self, set: &[String], folder: Option<&Path>) -> Result<Self, SceneError> {
+        let document = self.document.with(set)?;
+        let raw = document.read(&schema())?;
+        validate(&self.name, raw, document, folder)
+    }
+
     /// The scene without what puts its body to rest at once: a body to be stepped. Files are looked up in `folder`.
     ///
     /// # Errors

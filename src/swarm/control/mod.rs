@@ -308,6 +308,19 @@ impl Control {
         self.filter.set_limits(limits)
     }
 
+    /// Moves an obstacle so far from its place in the file \[m\] from the next tick on.
+    ///
+    /// # Errors
+    /// A place where it would be none; it then stays.
+    ///
+    /// # Panics
+    /// If there is no such obstacle.
+    pub fn move_obstacle(&mut self, obstacle: usize, by: [f64; 2]) -> Result<(), SafetyError> {
+        let moved = self.filter.obstacles().with_moved(obstacle, by)?;
+        self.filter.set_obstacles(moved);
+        Ok(())
+    }
+
     /// Sets the part of the way to its target that a follower goes in a sweep \[1\].
     pub fn set_damping(&mut self, damping: f64) {
         self.formation.set_damping(damping);

@@ -1,10 +1,10 @@
-//! What is done from outside while robots fly: leaders sent to places, poses made worse.
+//! What is done from outside while robots fly: leaders sent to places, obstacles moved, poses made worse.
 
 use super::{Flight, faults};
 use crate::scene::SceneError;
 use crate::scene::swarm::Swarm;
 use crate::scene::swarm::raw::RawCommandKind;
-use crate::swarm::formation::Formation;
+use crate::swarm::control::Control;
 use crate::swarm::safety::Limits;
 
 /// Something that is done between two periods.
@@ -16,6 +16,13 @@ pub enum FlightCommand {
         member: usize,
         /// Where it goes.
         to: [f64; 2],
+    },
+    /// Moves an obstacle at once.
+    MoveObstacle {
+        /// Its number.
+        obstacle: usize,
+        /// From its place in the file \[m\].
+        by: [f64; 2],
     },
     /// Sends poses with this noise \[m\], delay \[period\] and loss \[1\].
     Channel {
@@ -30,10 +37,11 @@ pub enum FlightCommand {
 
 impl Flight {
     /// Performs a command before the next period; false where it concerns a robot that no program leads, or a place
-    /// where no pose would be believed.
+    /// where no pose would be believed or an obstacle would be none.
     pub fn perform(&mut self, command: &FlightCommand) -> bool {
         match *command {
             FlightCommand::Lead { member, to } => self.control.take_over(member, to),
+            FlightCommand::MoveObstacle { obstacle, by } => self.control.move_obstacle(obstacle, by).is_ok(),
             FlightCommand::Channel { noise, delay, loss } => {
                 self.fleet.set_channels(noise, delay, loss);
                 let limits = Limits { deviation: noise, ..self.control.limits().clone() };
@@ -55,8 +63,10 @@ impl Flight {
 /// The commands of a swarm file.
 ///
 /// # Errors
-/// Names a robot that no program leads, and a period that comes before the one of the command above.
-pub fn of(swarm: &Swarm, formation: &Formation) -> Result<Vec<(u64, FlightCommand)>, SceneError> {
+/// Names a robot that no program leads, a place where no pose would be believed, and a period that comes before the one
+/// of the command above.
+pub fn of(swarm: &Swarm, control: &Control) -> Result<Vec<(u64, FlightCommand)>, SceneError> {
+    let formation = control.formation();
     let commands = &swarm.raw.flight.commands;
     if let Some(k) = commands.windows(2).position(|pair| pair[0].after > pair[1].after) {
         let message = "comes before the command above it";
@@ -75,7 +85,35 @@ pub fn of(swarm: &Swarm, formation: &Formation) -> Result<Vec<(u64, FlightComman
                     let message = format!("no program of this swarm leads `{robot}`");
                     return Err(swarm.refuse(&key, message, "name a robot of [[leaders]]"));
                 }
+                if !control.is_believed(*to) {
+                    let range = swarm.raw.poses.range;
+                    let message =
+                        format!("lies more than poses.range = {range} m from the formation's middle");
+                    let key = format!("flight.commands[{k}].what.to");
+                    return Err(swarm.refuse(
+                        &key,
+                        message,
+                        "no pose is believed there: lead to a nearer place, or raise poses.range",
+                    ));
+                }
                 FlightCommand::Lead { member, to: *to }
+            }
+            RawCommandKind::MoveObstacle { obstacle, by } => {
+                let key = format!("flight.commands[{k}].what");
+                let count = swarm.raw.obstacles.len();
+                if *obstacle >= count {
+                    let message =
+                        format!("there is no such obstacle: the swarm has {count}, numbered from 0");
+                    return Err(swarm.refuse(
+                        &format!("{key}.obstacle"),
+                        message,
+                        "name one of [[obstacles]]",
+                    ));
+                }
+                control.filter().obstacles().with_moved(*obstacle, *by).map_err(|error| {
+                    swarm.refuse(&format!("{key}.by"), error.to_string(), "move it less far")
+                })?;
+                FlightCommand::MoveObstacle { obstacle: *obstacle, by: *by }
             }
             RawCommandKind::Channel { noise, delay, loss } => {
                 FlightCommand::Channel { noise: *noise, delay: *delay, loss: *loss }

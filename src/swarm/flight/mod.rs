@@ -57,7 +57,7 @@ impl Flight {
             fleet: Fleet::new(swarm, control.formation())?,
             periods: periods(swarm, &control),
             continuum: continuum(swarm)?,
-            commands: commands::of(swarm, control.formation())?,
+            commands: commands::of(swarm, &control)?,
             control,
         })
     }

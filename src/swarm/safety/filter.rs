@@ -131,6 +131,16 @@ impl Filter {
         Ok(())
     }
 
+    /// What members are kept away from.
+    pub fn obstacles(&self) -> &Obstacles {
+        &self.obstacles
+    }
+
+    /// Keeps members away from these from the next tick on.
+    pub fn set_obstacles(&mut self, obstacles: Obstacles) {
+        self.obstacles = obstacles;
+    }
+
     /// Safe targets \[m, world frame\] for the wanted ones over the next `period` \[s\], with the reasons for
     /// each change. The members are to go straight to their targets, at any pace; the speed is
     /// `|safe - present| / period` unless they brake ([`Limits::brakes`]).

@@ -31,9 +31,22 @@ pub enum Obstacle {
     },
 }
 
+impl Obstacle {
+    /// The same solid farther along \[m\].
+    fn moved(&self, [x, y]: [f64; 2]) -> Self {
+        let place = |[px, py]: [f64; 2]| [px + x, py + y];
+        match self {
+            Obstacle::Polygon(corners) => Obstacle::Polygon(corners.iter().copied().map(place).collect()),
+            Obstacle::Disc { centre, radius } => Obstacle::Disc { centre: place(*centre), radius: *radius },
+        }
+    }
+}
+
 /// Solids, indexed for queries by place.
 #[derive(Clone, Default)]
 pub struct Obstacles {
+    /// As they were given, and how far each has been moved since \[m\].
+    given: Vec<(Obstacle, [f64; 2])>,
     pieces: Vec<Piece>,
     outlines: Vec<Outline>,
     tree: Bvh,
@@ -69,16 +82,38 @@ impl Obstacles {
     /// A polygon of fewer than 3 corners, without area or with crossing edges, a disc without radius,
     /// a number that is not finite.
     pub fn new(obstacles: &[Obstacle]) -> Result<Self, SafetyError> {
+        Self::of(obstacles.iter().map(|obstacle| (obstacle.clone(), [0.0; 2])).collect())
+    }
+
+    fn of(given: Vec<(Obstacle, [f64; 2])>) -> Result<Self, SafetyError> {
         let mut built = Self::default();
-        for (index, obstacle) in obstacles.iter().enumerate() {
+        for (index, (obstacle, by)) in given.iter().enumerate() {
             let place = Place::Obstacle(index);
-            match obstacle {
-                Obstacle::Polygon(corners) => built.add_outline(corners, false, place)?,
-                Obstacle::Disc { centre, radius } => built.add_disc(*centre, *radius, place)?,
+            match obstacle.moved(*by) {
+                Obstacle::Polygon(corners) => built.add_outline(&corners, false, place)?,
+                Obstacle::Disc { centre, radius } => built.add_disc(centre, radius, place)?,
             }
         }
         built.grow_tree();
-        Ok(built)
+        Ok(Self { given, ..built })
+    }
+
+    /// The same with one of them so far from where it was given \[m\].
+    ///
+    /// # Errors
+    /// As [`Obstacles::new`]; a place so far away that a polygon has no area there is none.
+    ///
+    /// # Panics
+    /// If there is no such obstacle.
+    pub fn with_moved(&self, obstacle: usize, by: [f64; 2]) -> Result<Self, SafetyError> {
+        let mut given = self.given.clone();
+        given[obstacle].1 = by;
+        Self::of(given)
+    }
+
+    /// How far each has been moved from where it was given \[m\].
+    pub fn moved(&self) -> impl ExactSizeIterator<Item = [f64; 2]> + '_ {
+        self.given.iter().map(|(_, by)| *by)
     }
 
     /// All that lies outside a polygon.

@@ -58,7 +58,7 @@ export function listenToView(view) {
 export function listenToKeys() {
   document.addEventListener("keydown", (event) => {
     const own = event.target.closest("input, select, textarea, button, summary, pre");
-    const isRange = event.target.matches?.("input[type=range], input[type=checkbox]");
+    const isRange = event.target.matches?.("#time, input[type=checkbox]");
     if ((own && !isRange) || event.ctrlKey || event.metaKey || event.altKey) return;
     const shifts = { ArrowLeft: [60, 0], ArrowRight: [-60, 0], ArrowUp: [0, 60], ArrowDown: [0, -60] };
     const keys = {

@@ -94,6 +94,8 @@ function takeStatus(status) {
   element("speed").value = String(status.speed);
   element("live-undo").disabled = status.undo === 0;
   if (status.stopped) say(status.stopped);
+  // The page knows the present alone: where they are now is where they ever were.
+  status.obstacles.forEach((by, k) => (bodies[0].animation.outlines[k].moves = [[-Infinity, ...by]]));
   element("live-alarms").replaceChildren(
     ...status.alarms.map((text) => Object.assign(document.createElement("li"), { textContent: text })),
   );
@@ -189,6 +191,23 @@ function showNumbers() {
   );
 }
 
+// A slider that holds the leaders while it is moved, and goes back to the middle when it is let go.
+function listenToSqueeze(slider) {
+  let isHeld = false;
+  slider.addEventListener("input", () => {
+    const leader = bodies[0].firstRoles.indexOf(bodies[0].animation.role_names.indexOf("leader"));
+    if (leader < 0) return say("No program of this swarm leads a robot.");
+    if (!isHeld) ask({ do: "grab", particle: leader });
+    isHeld = true;
+    ask({ do: "squeeze", by: [slider.valueAsNumber, slider.valueAsNumber] });
+  });
+  slider.addEventListener("change", () => {
+    if (isHeld) ask({ do: "release" });
+    isHeld = false;
+    slider.value = "1";
+  });
+}
+
 function listenToSession() {
   element("live-reset").addEventListener("click", () => ask({ do: "reset" }));
   element("live-undo").addEventListener("click", () => ask({ do: "undo" }));
@@ -201,6 +220,7 @@ function listenToSession() {
     else say("Give KEY=VALUE, as --set takes it.");
   });
   element("quantity").addEventListener("change", askForQuantity);
+  listenToSqueeze(element("live-squeeze"));
   element("live-fault").addEventListener("change", () => {
     const robot = shown.views[0].kept;
     if (robot < 0) return say("Click a robot first.");
@@ -220,7 +240,7 @@ function startLive() {
   element("layer-ways").closest("label").hidden = true;
   element("layer-ways").checked = state.layers.ways = false;
   element("layer-cracks").closest("label").hidden = true;
-  element("tool-cut").hidden = data.live.swarm;
+  element("tool-cut").hidden = element("tool-load").hidden = data.live.swarm;
   element("live-robot").hidden = !data.live.swarm;
   showNumbers();
   listenToSession();

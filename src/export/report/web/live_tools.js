@@ -19,19 +19,23 @@ export function toolName() {
 export function takeTool(view, at, event, ask) {
   const tool = toolName();
   if (tool === "cut") return knife(view, at, ask);
-  const particle = tool === "drag" ? view.nearest(...at) : -1;
-  if (particle < 0) return null;
-  return hand(view, at, particle, event.shiftKey, ask);
+  const particle = tool === "look" ? -1 : view.nearest(...at);
+  if (tool === "load") return particle < 0 ? null : pull(view, at, sideOf(view.body, particle), ask);
+  if (tool !== "drag") return null;
+  if (particle >= 0) return hand(view, at, { do: "grab", particle, alone: event.shiftKey }, state.factor || 1, ask);
+  const obstacle = view.obstacleAt(...at);
+  return obstacle < 0 ? null : hand(view, at, { do: "grab-obstacle", obstacle }, 1, ask);
 }
 
-function hand(view, at, particle, alone, ask) {
+// What is shown enlarged by a factor goes less far than the pointer.
+function hand(view, at, grab, factor, ask) {
   const from = placeAt(view, at);
   let isHeld = false;
   const move = (to) => {
     const place = placeAt(view, to);
-    if (!isHeld) ask({ do: "grab", particle, alone });
+    if (!isHeld) ask(grab);
     isHeld = true;
-    ask({ do: "drag", by: [0, 1].map((k) => (place[k] - from[k]) / (state.factor || 1)) });
+    ask({ do: "drag", by: [0, 1].map((k) => (place[k] - from[k]) / factor) });
   };
   const end = () => {
     if (isHeld) ask({ do: "release" });
@@ -49,6 +53,28 @@ function knife(view, at, ask) {
     if (far < 4) return false;
     if (state.factor !== 1) shown.say("displacements are enlarged: set Enlarged to 1 to cut where bonds are");
     else ask({ do: "cut", from, to: placeAt(view, to) });
+    return true;
+  };
+  return { move, end };
+}
+
+// The side of the body that a particle is nearest to, as the body was at first.
+function sideOf({ X, Y }, particle) {
+  const ends = (values) => values.reduce(([low, high], value) => [Math.min(low, value), Math.max(high, value)], [Infinity, -Infinity]);
+  const [[left, right], [bottom, top]] = [ends(X), ends(Y)];
+  const away = { left: X[particle] - left, right: right - X[particle], bottom: Y[particle] - bottom, top: top - Y[particle] };
+  return Object.entries(away).reduce((nearest, one) => (one[1] < nearest[1] ? one : nearest))[0];
+}
+
+function pull(view, at, side, ask) {
+  const from = placeAt(view, at);
+  const move = (to) => drawKnife(view, at, to);
+  const end = (to) => {
+    view.drawOver();
+    const place = placeAt(view, to);
+    if (Math.hypot(to[0] - at[0], to[1] - at[1]) < 4) return false;
+    shown.say(`The ${side} side is loaded: drag it again for another load, undo takes it away.`);
+    ask({ do: "load", side, by: [0, 1].map((k) => (place[k] - from[k]) / (state.factor || 1)) });
     return true;
   };
   return { move, end };

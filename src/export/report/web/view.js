@@ -67,7 +67,8 @@ export class View {
     }
     if (at >= 0) body.go(at);
     const own = body.animation.radii.length ? Math.max(...body.animation.radii) : 0.5 * body.animation.spacing;
-    for (const { kind, corners } of body.animation.outlines) if (kind === "obstacle") corners.forEach(([x, y]) => take(x, y));
+    for (const { corners, moves } of body.animation.outlines.filter(({ kind }) => kind === "obstacle"))
+      for (const [, x, y] of [[0, 0, 0], ...moves]) corners.forEach(([px, py]) => take(px + x, py + y));
     return { low: box.low.map((value) => value - own), high: box.high.map((value) => value + own) };
   }
 
@@ -143,10 +144,30 @@ export class View {
     return pen;
   }
 
+  // The corners of an outline where it stands at the frame that is shown.
+  corners({ corners, moves }) {
+    const now = this.body.animation.times[this.show.frame];
+    const [, x, y] = moves.findLast(([time]) => time <= now) ?? [0, 0, 0];
+    return x || y ? corners.map(([px, py]) => [px + x, py + y]) : corners;
+  }
+
+  // The obstacle under a point of the box, in CSS pixels, by its number; -1 if there is none.
+  obstacleAt(px, py) {
+    const pen = this.under.getContext("2d");
+    const covers = ({ kind, ...outline }) => {
+      if (kind !== "obstacle") return false;
+      const border = new Path2D();
+      this.corners(outline).forEach((corner) => border.lineTo(...this.place(corner)));
+      return pen.isPointInPath(border, px * this.ratio, py * this.ratio);
+    };
+    return this.body.animation.outlines.findIndex(covers);
+  }
+
   drawUnder() {
     // Drawn again only when something of it changed: a frame of an animation moves nothing here but the ways.
     const { camera, turned, factor, layers, frame } = this.show;
-    const seen = [camera, turned, factor, this.width, this.height, this.ratio, themeText("card")];
+    const outlines = this.body.animation.outlines.map((outline) => this.corners(outline));
+    const seen = [outlines, camera, turned, factor, this.width, this.height, this.ratio, themeText("card")];
     const key = JSON.stringify(layers.ways ? [...seen, frame] : seen);
     if (key === this.below) return;
     this.below = key;
@@ -154,9 +175,9 @@ export class View {
     pen.fillStyle = themeText("card");
     pen.fillRect(0, 0, this.width, this.height);
     this.drawGrid(pen);
-    for (const { kind, corners } of this.body.animation.outlines) {
+    for (const [k, { kind }] of this.body.animation.outlines.entries()) {
       pen.beginPath();
-      corners.forEach((corner) => pen.lineTo(...this.place(corner)));
+      outlines[k].forEach((corner) => pen.lineTo(...this.place(corner)));
       pen.closePath();
       if (kind === "fence") {
         pen.strokeStyle = themeText("obstacle");

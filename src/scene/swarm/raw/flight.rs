@@ -174,6 +174,13 @@ pub enum RawCommandKind {
         /// [m]
         to: [f64; 2],
     },
+    /// Moves an obstacle, at once.
+    MoveObstacle {
+        /// Number among `obstacles`, from 0.
+        obstacle: usize,
+        /// From its place in the file [m].
+        by: [f64; 2],
+    },
     /// Changes what becomes of poses on their way.
     Channel {
         /// As `flight.noise` [m].

@@ -1,0 +1,121 @@
+//! What can be undone: the state of a session now, and those before it.
+
+use std::path::PathBuf;
+
+use super::command::Command;
+use super::session::Refused;
+use crate::scene::SceneError;
+
+/// States that can be returned to.
+const MOST_KEPT: usize = 40;
+/// Size of all of them together, see [`State::size`].
+const MOST_SIZE: usize = 1 << 21;
+
+/// A file as it was read when the session began.
+pub(super) struct Source<F> {
+    pub(super) file: F,
+    /// Where files that it names are looked up.
+    pub(super) folder: Option<PathBuf>,
+}
+
+/// What a session is at a moment.
+pub(super) trait State: Clone {
+    /// The word for what the session shows.
+    const NAME: &'static str;
+    /// The file that it begins with.
+    type File;
+
+    /// The beginning, with these keys set after those of the file.
+    ///
+    /// # Errors
+    /// Names a key that cannot be set so.
+    fn begin(source: &Source<Self::File>, set: &[String]) -> Result<Self, SceneError>;
+
+    /// Lets go of everything that viewers hold.
+    fn let_go_all(&mut self);
+
+    /// About how many numbers it holds.
+    fn size(&self) -> usize;
+}
+
+/// The state of a session now, and those that can be returned to.
+pub(super) struct History<S: State> {
+    pub(super) source: Source<S::File>,
+    pub(super) now: S,
+    /// Keys that were set from the start of `now`.
+    set: Vec<String>,
+    /// Changes whenever `now` is laid out anew.
+    layout: u64,
+    /// The same of those before.
+    before: Vec<(S, Vec<String>, u64)>,
+}
+
+impl<S: State> History<S> {
+    /// # Errors
+    /// As [`State::begin`].
+    pub(super) fn new(file: S::File, folder: Option<PathBuf>) -> Result<Self, SceneError> {
+        let source = Source { file, folder };
+        let now = S::begin(&source, &[])?;
+        Ok(Self { source, now, set: Vec::new(), layout: 0, before: Vec::new() })
+    }
+
+    /// Keys that were set from the start, `KEY=VALUE`, in their order.
+    pub(super) fn set(&self) -> &[String] {
+        &self.set
+    }
+
+    /// Changes with every other layout.
+    pub(super) fn layout(&self) -> u64 {
+        self.layout
+    }
+
+    /// States that can be returned to.
+    pub(super) fn undoable(&self) -> usize {
+        self.before.len()
+    }
+
+    /// Does what is the same in every session.
+    ///
+    /// # Errors
+    /// Why it cannot be done; nothing has changed then.
+    pub(super) fn perform(&mut self, command: &Command) -> Result<(), Refused> {
+        match command {
+            Command::Undo {} => self.undo(),
+            Command::Reset {} => self.restart(&[]),
+            _ => Err(format!("a {} cannot do this", S::NAME).into()),
+        }
+    }
+
+    /// Keeps the state, to be returned to. Hands do not come back.
+    pub(super) fn keep(&mut self) {
+        let mut state = self.now.clone();
+        state.let_go_all();
+        let size =
+            |states: &[(S, Vec<String>, u64)]| states.iter().map(|(one, ..)| one.size()).sum::<usize>();
+        let room = MOST_SIZE.saturating_sub(state.size());
+        while self.before.len() >= MOST_KEPT || (!self.before.is_empty() && size(&self.before) > room) {
+            self.before.remove(0);
+        }
+        self.before.push((state, self.set.clone(), self.layout));
+    }
+
+    fn undo(&mut self) -> Result<(), Refused> {
+        let (now, set, layout) = self.before.pop().ok_or("nothing was done yet")?;
+        // A layout that was left counts as a new one.
+        let layout = if layout == self.layout { layout } else { self.layout + 1 };
+        (self.now, self.set, self.layout) = (now, set, layout);
+        Ok(())
+    }
+
+    /// Begins anew, with more keys set.
+    ///
+    /// # Errors
+    /// As [`State::begin`]; nothing has changed then.
+    pub(super) fn restart(&mut self, more: &[String]) -> Result<(), Refused> {
+        let set = [&self.set[..], more].concat();
+        let state = S::begin(&self.source, &set)?;
+        self.keep();
+        (self.now, self.set, self.layout) = (state, set, self.layout + 1);
+        Ok(())
+    }
+}
