@@ -357,9 +357,9 @@ fn runs_alone(command: &Command) -> Option<&'static str> {
         Command::Gallery(_) => Some("gallery"),
         Command::New(_) => Some("new"),
         Command::Install(_) => Some("install"),
+        // They share what they do.
+        Command::Run(_) | Command::Bench(bench::BenchCommand::Scale { .. }) => None,
         Command::Bench(_) => Some("bench"),
-        // They share a run.
-        Command::Run(_) => None,
         // Each is a node of its own.
         Command::Node(_) | Command::Robots(_) => None,
         // They write nothing.
