@@ -59,6 +59,7 @@ pub mod comparison;
 pub mod csv;
 mod error;
 pub mod figures;
+pub mod film;
 #[cfg(feature = "swarm")]
 pub mod flight;
 mod folder;

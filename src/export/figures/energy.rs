@@ -31,7 +31,7 @@ pub fn pe1(subject: &Subject<'_>, snapshot: &Snapshot) -> String {
     let bands = Bands::around(low, high, (NOISE_IN_SPACINGS * spacing).powi(2));
     let axes = page::window(&snapshot.positions, drawn.iter().copied(), spacing);
     let note = format!("first pseudo-energy, {}", page::note(subject, snapshot));
-    let mut heading = Heading { title: subject.title.into(), note, legend: Vec::new() };
+    let mut heading = Heading { title: subject.title.into(), note, ..Heading::default() };
     let is_raster = drawn.len() > MOST_DOTS;
     if is_raster {
         heading.note += &format!("; {} particles drawn as squares of their largest value", drawn.len());
