@@ -7,6 +7,7 @@ use clap::{Args, ValueEnum};
 use flockform::export::film::{Film, FilmColour, FilmError, FilmFile, FilmFormat, Finished};
 
 use super::interrupt;
+use super::output::OutputArguments;
 use super::progress::Drawn;
 
 #[derive(Debug, Args)]
@@ -59,25 +60,20 @@ impl FilmArguments {
     /// The film, if one is asked for; its file stands beside its place until it is made, and an interrupt removes it.
     pub fn open(
         &self,
-        force: bool,
+        output: &OutputArguments,
         default: FilmColour,
         require: impl FnOnce(FilmColour) -> Result<(), FilmError>,
     ) -> Result<Option<AskedFilm>, FilmError> {
         let Some(path) = &self.film else { return Ok(None) };
         let colour = self.film_colour.map_or(default, FilmColour::from);
         require(colour)?;
-        let file = FilmFile::create(path, force)?;
+        let file = FilmFile::create(path, output.out(), output.force)?;
         interrupt::removes([file.part().to_owned()]);
         Ok(Some(AskedFilm { file, colour }))
     }
 }
 
 impl AskedFilm {
-    /// Refuses a place in the folder of the results.
-    pub fn require_outside(&self, folder: &Path) -> Result<(), FilmError> {
-        self.file.require_outside(folder)
-    }
-
     /// Makes the film once the results stand in `kept`; `None` if an interrupt ended it.
     pub fn make(self, film: &Film<'_>, kept: &Path, quiet: bool) -> Result<Option<Finished>, FilmError> {
         interrupt::removes([self.file.part().to_owned()]);

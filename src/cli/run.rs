@@ -156,12 +156,11 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
     let open = |name: &String| Positions::open(&Domain::from_environment()?, name, plan.count());
     let shown = shown.map(open).transpose()?;
     let required = |colour| film::run::require_colour(&scene, colour);
-    let film = arguments.film.open(arguments.output.force, FilmColour::Displacement, required)?;
+    let film = arguments.film.open(&arguments.output, FilmColour::Displacement, required)?;
     let mut folder = match &left {
         Some(left) => left.open()?,
         None => arguments.output.folder(&scene.name)?,
     };
-    film.as_ref().map_or(Ok(()), |film| film.require_outside(folder.place()))?;
     let setup = start.elapsed();
     tracing::info!("planned {} particles of `{}` in {setup:.1?}", plan.count(), scene.name);
     tracing::info!("{}", flockform::sweep::chosen_here());

@@ -83,11 +83,10 @@ pub struct SwarmArguments {
 pub fn swarm(arguments: &SwarmArguments) -> Result<ExitCode, Refusal> {
     let swarm = arguments.swarm.load()?;
     let flight = Flight::new(&swarm)?;
-    let film = arguments.film.open(arguments.output.force, FilmColour::Role, film::flight::require_colour)?;
+    let film = arguments.film.open(&arguments.output, FilmColour::Role, film::flight::require_colour)?;
     let reports = !arguments.report.no_report;
     let mut recorder = (reports || film.is_some()).then(|| FlightRecorder::new(&flight));
     let folder = arguments.output.folder(&swarm.name)?;
-    film.as_ref().map_or(Ok(()), |film| film.require_outside(folder.place()))?;
     let recording =
         arguments.record.open(&arguments.swarm.about("swarm", &swarm), arguments.output.force, 1)?;
     let messages = recording

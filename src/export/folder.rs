@@ -101,11 +101,6 @@ impl OutputFolder {
         std::iter::once(&self.partial).chain(&self.made).map(PathBuf::as_path)
     }
 
-    /// The place that it will take.
-    pub fn place(&self) -> &Path {
-        &self.out
-    }
-
     /// The folder in which everything stands until [`OutputFolder::commit`].
     pub fn folder(&self) -> &Path {
         &self.partial

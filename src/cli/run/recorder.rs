@@ -113,8 +113,9 @@ impl<'a> Recorder<'a> {
         let vtk = (record.vtk_every > 0).then(|| next(record.vtk_every));
         let load = load_every(self.scene).map(next);
         // The report has yet to say what it wants: the next one.
-        let animation =
-            self.keeps_frames().then(|| self.animation.as_ref().map_or(step + 1, |animation| animation.next(step)));
+        let animation = self
+            .keeps_frames()
+            .then(|| self.animation.as_ref().map_or(step + 1, |animation| animation.next(step)));
         [figure, vtk, load, animation].into_iter().flatten().min().unwrap_or(usize::MAX)
     }
 

@@ -5,6 +5,7 @@ use std::collections::HashSet;
 use super::axes::Axes;
 use super::bands::{Bands, Field};
 use super::colour;
+use super::energy::draw_contours;
 use super::heading::{Heading, Key, Mark};
 use super::page;
 use super::raster::Raster;
@@ -18,6 +19,30 @@ use crate::flock::vectors::distance;
 /// Bodies of more particles, or bonds, are drawn without bonds, which would be a grey sheet.
 const MOST_PARTICLES_WITH_BONDS: usize = 20_000;
 const MOST_BONDS: usize = 60_000;
+
+/// Dots of more particles than this are too small for their colours: their body is drawn as a surface.
+const MOST_COLOURED_DOTS: usize = 2_000;
+
+/// How particles are drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Style {
+    Dots,
+    /// Filled contours of a field.
+    Surface,
+    /// Squares, each for several particles.
+    Raster,
+}
+
+impl Style {
+    fn of(subject: &Subject<'_>, is_field: bool) -> Self {
+        match subject.body.count() {
+            count if count > MOST_DOTS => Self::Raster,
+            // Where neighbours are found anew at every step there are no faces to fill.
+            count if count > MOST_COLOURED_DOTS && is_field && subject.neighbours.is_some() => Self::Surface,
+            _ => Self::Dots,
+        }
+    }
+}
 
 /// Later ones are drawn over earlier ones: the few must not drown in the many.
 const PAINTING_ORDER: [Role; 5] = [Role::Frame, Role::Follower, Role::Ghost, Role::Clamped, Role::Leader];
@@ -77,12 +102,15 @@ impl Setting {
     }
 
     fn heading(&self, subject: &Subject<'_>, mut note: String, is_field: bool) -> Heading {
-        let count = subject.body.count();
-        let is_raster = count > MOST_DOTS;
-        if is_raster {
-            note += &format!("; {count} particles drawn as squares");
+        let style = Style::of(subject, is_field);
+        if style == Style::Raster {
+            note += &format!("; {} particles drawn as squares", subject.body.count());
         }
-        let legend = self.legend(is_raster, is_field);
+        // Surfaces and squares have the colours of the field alone.
+        let legend = match style {
+            Style::Surface | Style::Raster if is_field => Vec::new(),
+            _ => self.legend(style == Style::Raster, is_field),
+        };
         Heading { title: subject.title.into(), note, legend, least: self.heading }
     }
 
@@ -93,13 +121,13 @@ impl Setting {
             (colour::BROKEN_BOND, Mark::DashedLine)
         };
         let broken = Key { name: "broken bond".into(), colour, mark };
-        // A field has its colours for the body, and a raster of it shows no roles.
-        let is_listed = |role: &Role| !is_field || (!is_raster && *role != Role::Follower);
+        // A field has its colours for the body.
+        let is_listed = |role: &Role| !is_field || *role != Role::Follower;
         let mark = |role: Role| if is_field && role.is_body() { Mark::Ring } else { Mark::Dot };
         let roles = self.roles.iter().rev().copied().filter(is_listed);
         roles
             .map(|role| Key { name: role.name().into(), colour: colour::of_role(role), mark: mark(role) })
-            .chain((self.has_broken_bonds && !(is_raster && is_field)).then_some(broken))
+            .chain(self.has_broken_bonds.then_some(broken))
             .collect()
     }
 }
@@ -113,15 +141,20 @@ pub fn configuration_in(
     note: String,
     field: Option<&Field<'_>>,
 ) -> String {
-    let (count, spacing) = (snapshot.positions.len(), subject.body.lattice.spacing());
-    let is_raster = count > MOST_DOTS;
+    let spacing = subject.body.lattice.spacing();
+    let style = Style::of(subject, field.is_some());
     let heading = setting.heading(subject, note, field.is_some());
     let axes = page::around(setting.bounds, spacing);
     let beside = beside(field.map(|field| field.bands));
     page::with_body(&heading, axes, subject.unit, beside, |svg, axes| {
-        match field {
-            None if is_raster => draw_raster(svg, axes, snapshot, spacing),
-            Some(field) if is_raster => draw_field_raster(svg, axes, snapshot, field, spacing),
+        match (style, field) {
+            (Style::Raster, None) => draw_raster(svg, axes, snapshot, spacing),
+            (Style::Raster, Some(field)) => draw_field_raster(svg, axes, snapshot, field, spacing),
+            (Style::Surface, Some(field)) => {
+                let is_shown = |i: usize| snapshot.roles[i].is_body() && field.values[i].is_finite();
+                let is_drawn: Vec<bool> = (0..field.values.len()).map(is_shown).collect();
+                draw_contours(svg, axes, subject, (snapshot, field.values), &is_drawn, field.bands);
+            }
             _ => {
                 draw_bonds(svg, axes, subject, snapshot);
                 draw_dots(svg, axes, snapshot, spacing, field);

@@ -22,7 +22,7 @@ pub enum FilmError {
     NoFolder(PathBuf),
     /// A place inside the folder of results, which appears only at the end.
     #[error(
-        "the film would stand in {}, which is made for the results alone\n  help: give --film a place outside it",
+        "the film would stand in {}, which is for the results alone\n  help: give --film a place outside it",
         .0.display()
     )]
     InResults(PathBuf),

@@ -47,7 +47,8 @@ pub fn film<'a>(
             FilmColour::Role | FilmColour::Pe2 | FilmColour::VonMises => return None,
         })
     };
-    let finite = |frame: &usize| values(*frame).unwrap_or_default().into_iter().filter(|value| value.is_finite());
+    let finite =
+        |frame: &usize| values(*frame).unwrap_or_default().into_iter().filter(|value| value.is_finite());
     let range = frames.iter().flat_map(finite);
     let range = range.fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], v| [f64::min(l, v), f64::max(h, v)]);
     let scale = scale(colour, range);

@@ -59,14 +59,19 @@ pub struct FilmFile {
 }
 
 impl FilmFile {
-    /// A file that can be written, beside its place, as `.NAME.partial`.
+    /// A file that can be written, beside its place, as `.NAME.partial`; `results` is the folder of the results, as
+    /// far as one was asked for.
     ///
     /// # Errors
-    /// An ending that names no film; a file in the place, without `force` or not a film; no folder, or none that can
+    /// An ending that names no film; a place inside the results; a file in the place, without `force` or not a film; no folder, or none that can
     /// be written to; a video without `ffmpeg`; another program that makes the same film.
-    pub fn create(path: &Path, force: bool) -> Result<Self, FilmError> {
+    pub fn create(path: &Path, results: Option<&Path>, force: bool) -> Result<Self, FilmError> {
         let format = FilmFormat::of(path)?;
-        let path = std::path::absolute(path).map_err(FilmError::io("find", path))?;
+        let in_full = |path: &Path| std::path::absolute(path).map_err(FilmError::io("find", path));
+        let path = in_full(path)?;
+        if let Some(results) = results.map(in_full).transpose()?.filter(|results| path.starts_with(results)) {
+            return Err(FilmError::InResults(results));
+        }
         require_free(&path, format, force)?;
         if let Some(folder) = path.parent().filter(|folder| !folder.is_dir()) {
             return Err(FilmError::NoFolder(folder.to_owned()));
@@ -79,7 +84,10 @@ impl FilmFile {
         name.push(path.file_name().unwrap_or_default());
         name.push(".partial");
         let part = path.with_file_name(name);
-        // What a killed program left there is overwritten.
+        // What a killed program left there is overwritten, but no folder and no link.
+        if part.symlink_metadata().is_ok_and(|found| !found.is_file()) {
+            return Err(FilmError::Taken(part));
+        }
         let lock = File::options().write(true).create(true).truncate(false).open(&part);
         let lock = lock.map_err(FilmError::io("create", &part))?;
         if let Err(TryLockError::WouldBlock) = lock.try_lock() {
@@ -91,15 +99,6 @@ impl FilmFile {
     /// The file under its temporary name.
     pub fn part(&self) -> &Path {
         &self.part
-    }
-
-    /// Refuses a place inside a folder of results.
-    ///
-    /// # Errors
-    /// A folder in which the file stands.
-    pub fn require_outside(&self, folder: &Path) -> Result<(), FilmError> {
-        let folder = std::path::absolute(folder).map_err(FilmError::io("find", folder))?;
-        if self.path.starts_with(&folder) { Err(FilmError::InResults(folder)) } else { Ok(()) }
     }
 
     /// Pixels for a \[px\] of a figure: a video is shown larger than a GIF.
@@ -116,7 +115,9 @@ impl FilmFile {
     ) -> Result<Box<dyn Encoder>, FilmError> {
         match self.codec {
             None => Ok(Box::new(GifEncoder::create(&self.part, count, paint)?)),
-            Some(codec) => Ok(Box::new(VideoEncoder::start(self.format, codec, &self.part, time, paint(0)?.size)?)),
+            Some(codec) => {
+                Ok(Box::new(VideoEncoder::start(self.format, codec, &self.part, time, paint(0)?.size)?))
+            }
         }
     }
 
@@ -128,7 +129,8 @@ impl FilmFile {
     pub(super) fn finish(self) -> Result<PathBuf, FilmError> {
         // Asked again: another program may have written there meanwhile.
         require_free(&self.path, self.format, self.force)?;
-        fs::rename(&self.part, &self.path).map_err(FilmError::io("rename the finished film to", &self.path))?;
+        fs::rename(&self.part, &self.path)
+            .map_err(FilmError::io("rename the finished film to", &self.path))?;
         Ok(self.path.clone())
     }
 }
@@ -143,8 +145,12 @@ impl Drop for FilmFile {
 /// Refuses a place that is taken, but for a film of this kind that may be replaced.
 fn require_free(path: &Path, format: FilmFormat, force: bool) -> Result<(), FilmError> {
     let Ok(found) = path.symlink_metadata() else { return Ok(()) };
-    if !force || !found.is_file() {
+    if !force {
         return Err(FilmError::Taken(path.to_owned()));
+    }
+    // A link is not followed: what it leads to was not named.
+    if !found.is_file() {
+        return Err(FilmError::NotAFilm(path.to_owned()));
     }
     let mut begin = Vec::new();
     let read = File::open(path).and_then(|file| file.take(16).read_to_end(&mut begin));

@@ -153,9 +153,11 @@ impl Shown<'_> {
 
     fn stress(&self, frame: usize) -> Vec<f64> {
         let displacement = self.displacement(frame);
-        let found = self.scene.material.as_ref().and_then(|elastic| {
-            Stresses::of(self.engine, elastic, &displacement, &self.broken(frame))
-        });
+        let found = self
+            .scene
+            .material
+            .as_ref()
+            .and_then(|elastic| Stresses::of(self.engine, elastic, &displacement, &self.broken(frame)));
         let none = || vec![f64::NAN; displacement.len()];
         let size = |found: Stresses| {
             let of = |one: &Option<_>| one.as_ref().map_or(f64::NAN, von_mises);

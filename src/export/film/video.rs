@@ -21,9 +21,10 @@ fn codecs(format: FilmFormat) -> &'static [(&'static str, &'static [&'static str
             ("libopenh264", &["-b:v", "4M"]),
             ("mpeg4", &["-q:v", "3"]),
         ],
-        FilmFormat::WebM => {
-            &[("libvpx-vp9", &["-crf", "24", "-b:v", "0", "-row-mt", "1"]), ("libvpx", &["-crf", "10", "-b:v", "4M"])]
-        }
+        FilmFormat::WebM => &[
+            ("libvpx-vp9", &["-crf", "24", "-b:v", "0", "-row-mt", "1"]),
+            ("libvpx", &["-crf", "10", "-b:v", "4M"]),
+        ],
     }
 }
 
@@ -68,7 +69,8 @@ impl VideoEncoder {
             // The index first, so that a web page can play it while it loads.
             _ => ("mp4", &["-movflags", "+faststart"]),
         };
-        let options = codecs(format).iter().find(|(name, _)| *name == codec).map_or(&[][..], |(_, options)| options);
+        let options =
+            codecs(format).iter().find(|(name, _)| *name == codec).map_or(&[][..], |(_, options)| options);
         let mut command = Command::new(FFMPEG);
         command.args(["-hide_banner", "-loglevel", "error", "-nostdin", "-y"]);
         command.args(["-f", "rawvideo", "-pix_fmt", "rgba", "-video_size", &format!("{width}x{height}")]);

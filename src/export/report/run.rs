@@ -197,7 +197,9 @@ impl RunRecorder {
 
     pub(in crate::export) fn roles_at(&self, step: usize) -> Vec<Role> {
         let mut roles = self.first_roles.clone();
-        for &[_, particle, role] in self.changes.iter().filter(|[at, ..]| self.is_solved || *at as usize <= step) {
+        for &[_, particle, role] in
+            self.changes.iter().filter(|[at, ..]| self.is_solved || *at as usize <= step)
+        {
             roles[particle as usize] = Role::ALL[role as usize];
         }
         roles
