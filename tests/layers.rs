@@ -211,3 +211,10 @@ fn unsafe_code_stands_where_it_was_measured_to_pay_or_where_the_system_is_called
     ];
     assert_eq!(files_with("unsafe {"), known);
 }
+
+#[test]
+fn films_are_drawn_by_the_figures() {
+    let own = |word: &str| files_with(word).into_iter().any(|file| file.starts_with("export/film/"));
+    assert!(!own("Svg") && !own("<svg"), "a film has no drawing of its own");
+    assert!(own("figures::"));
+}

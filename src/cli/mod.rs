@@ -5,6 +5,7 @@ mod bundle;
 mod checkpoint;
 mod compare;
 mod completions;
+mod film;
 mod gallery;
 mod install;
 mod interrupt;
@@ -215,6 +216,8 @@ pub enum Refusal {
     #[error("{0}")]
     Export(#[from] export::ExportError),
     #[error("{0}")]
+    Film(#[from] export::film::FilmError),
+    #[error("{0}")]
     Record(#[from] flockform::record::RecordError),
     #[error("{0}")]
     Design(#[from] flockform::study::design::DesignError),
@@ -274,6 +277,7 @@ impl Refusal {
     /// Whether the work was begun, and the machine failed it: a full disk above all.
     fn is_failure(&self) -> bool {
         use export::ExportError;
+        use export::film::FilmError;
         use flockform::record::RecordError;
         let is_full = |error: &std::io::Error| {
             use std::io::ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull};
@@ -281,9 +285,11 @@ impl Refusal {
         };
         match self {
             Refusal::Export(ExportError::Io { source, .. })
+            | Refusal::Film(FilmError::Io { source, .. })
             | Refusal::Record(RecordError::Io { source, .. }) => is_full(source),
             Refusal::Export(ExportError::NotMoved { .. }) | Refusal::Record(RecordError::Kept { .. }) => true,
             Refusal::Record(RecordError::Write { .. }) => true,
+            Refusal::Film(FilmError::Encoder { .. } | FilmError::Frame { .. }) => true,
             _ => false,
         }
     }

@@ -9,22 +9,23 @@ use indicatif::{ProgressBar, ProgressStyle};
 /// Time between two plain lines, so that a log of a long run stays short.
 const BETWEEN_LINES: Duration = Duration::from_secs(5);
 
-/// How many figures are drawn: a bar on a terminal; in a pipe a line where it takes long.
+/// How many figures or frames are drawn: a bar on a terminal; in a pipe a line where it takes long.
 pub enum Drawn {
     Silent,
     Bar(ProgressBar),
-    Lines { last: Mutex<Instant> },
+    Lines { what: &'static str, last: Mutex<Instant> },
 }
 
 impl Drawn {
-    pub fn new(quiet: bool) -> Self {
+    /// `what` in the singular.
+    pub fn new(quiet: bool, what: &'static str) -> Self {
         if quiet {
             return Drawn::Silent;
         }
         if !std::io::stderr().is_terminal() {
-            return Drawn::Lines { last: Mutex::new(Instant::now()) };
+            return Drawn::Lines { what, last: Mutex::new(Instant::now()) };
         }
-        let style = ProgressStyle::with_template("{bar:32} drawing figure {pos}/{len}");
+        let style = ProgressStyle::with_template(&format!("{{bar:32}} drawing {what} {{pos}}/{{len}}"));
         let bar = ProgressBar::new(0);
         bar.set_style(style.expect("the template is fixed and right"));
         Drawn::Bar(bar)
@@ -38,11 +39,11 @@ impl Drawn {
                 bar.set_length(of as u64);
                 bar.set_position(done as u64);
             }
-            Drawn::Lines { last } => {
+            Drawn::Lines { what, last } => {
                 if let Ok(mut last) = last.lock()
                     && last.elapsed() >= BETWEEN_LINES
                 {
-                    eprintln!("drawing: {done} of {of} figures");
+                    eprintln!("drawing: {done} of {of} {what}s");
                     *last = Instant::now();
                 }
             }

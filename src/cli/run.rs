@@ -16,6 +16,7 @@ use flockform::continuum::looks::Looks;
 use flockform::continuum::plan::Plan;
 use flockform::continuum::run::{Outcome, SharedError, StopReason, require_shareable, resume, run_shared};
 use flockform::export::checkpoint::{self, Checkpoint, RunRequest};
+use flockform::export::film::{self, FilmColour};
 use flockform::export::report;
 use flockform::export::{Drawing, OutputFolder, Results, Timings, write_all};
 use flockform::ranks::Team;
@@ -32,6 +33,7 @@ use recorder::{Recorder, Records};
 use words::{closing_words, where_to_look};
 
 use super::checkpoint::{CheckpointArguments, Checkpointer, ResumedRun};
+use super::film::{FilmArguments, words as film_words};
 use super::names::{FileName, SceneArguments, in_full};
 use super::output::{FigureArguments, OutputArguments, ReportArguments};
 use super::progress::{Drawn, Progress};
@@ -53,6 +55,8 @@ pub struct RunArguments {
     report: ReportArguments,
     #[command(flatten)]
     figures: FigureArguments,
+    #[command(flatten)]
+    film: FilmArguments,
     #[command(flatten)]
     checkpoints: CheckpointArguments,
     #[command(flatten)]
@@ -151,6 +155,8 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
     let shown = arguments.publish.as_ref();
     let open = |name: &String| Positions::open(&Domain::from_environment()?, name, plan.count());
     let shown = shown.map(open).transpose()?;
+    let required = |colour| film::run::require_colour(&scene, colour);
+    let film = arguments.film.open(&arguments.output, FilmColour::Displacement, required)?;
     let mut folder = match &left {
         Some(left) => left.open()?,
         None => arguments.output.folder(&scene.name)?,
@@ -160,7 +166,7 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
     tracing::info!("{}", flockform::sweep::chosen_here());
 
     let mut recorder = Recorder::new(&scene, &plan, &folder, left.as_ref())?;
-    recorder.reports = !arguments.report.no_report;
+    (recorder.reports, recorder.films) = (!arguments.report.no_report, film.is_some());
     let about = About { source: "run", name: scene.name.clone(), ..About::default() };
     let recording = arguments.record.open(&about, arguments.output.force, 1)?;
     let messages = recording.as_ref().map(|one| BodyMessages::new(&scene, one.sink())).transpose()?;
@@ -211,11 +217,11 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
     }
     let on_the_way = recorder.writing;
     let records = recorder.finish(&outcome)?;
-    let Records { snapshots, probes, load_steps, stage, writing } = records;
+    let Records { snapshots, probes, load_steps, stage, animation, writing } = records;
     let timings = Timings { setup, steps: elapsed.saturating_sub(on_the_way), output: writing };
     let (snapshots, probes, load_steps) = (&snapshots[..], &probes[..], &load_steps[..]);
     let results = Results { scene: &scene, outcome: &outcome, snapshots, probes, load_steps, timings };
-    let drawn = Drawn::new(arguments.output.quiet);
+    let drawn = Drawn::new(arguments.output.quiet, "figure");
     let is_cut_short = AtomicBool::new(false);
     let show = |done: usize, of: usize| {
         drawn.show(done, of);
@@ -237,11 +243,22 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
     if !is_interrupted {
         checkpoint::remove(&kept);
     }
+    let film = film.filter(|_| !is_interrupted).zip(animation);
+    let is_asked = film.is_some();
+    let made = film.map_or(Ok(None), |(film, animation)| {
+        let drawn = film::run::film(&scene, &outcome, &animation, film.colour);
+        film.make(&drawn, &kept, arguments.output.quiet)
+    })?;
     if arguments.json {
         print(&format!("{:#}\n", serde_json::json!(summary)));
     } else if !arguments.output.quiet {
         say(&words);
         say(&(closing_words(&scene, &outcome, &summary, elapsed) + &where_to_look(&kept) + &recorded));
+        say(&made.as_ref().map_or_else(String::new, film_words));
+    }
+    if is_asked && made.is_none() {
+        eprintln!("interrupted: there is no film, the rest is written");
+        return Ok(ExitCode::from(FAILED));
     }
     if is_cut_short.into_inner() && !is_interrupted {
         eprintln!("interrupted: figures are missing, the rest is written");

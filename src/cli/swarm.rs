@@ -8,6 +8,7 @@ use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 use clap::Args;
+use flockform::export::film::{self, FilmColour};
 use flockform::export::flight::write_flight;
 use flockform::export::report::{self, FlightRecorder};
 use flockform::record::About;
@@ -16,6 +17,7 @@ use flockform::scene::bundled::bundled_swarm;
 use flockform::scene::swarm::Swarm;
 use flockform::swarm::flight::{Flight, FlightReport, fly_heard};
 
+use super::film::{FilmArguments, words as film_words};
 use super::names::{FileName, Kind, folder_of};
 use super::output::{OutputArguments, ReportArguments};
 use super::recording::{RecordArguments, close};
@@ -69,6 +71,8 @@ pub struct SwarmArguments {
     #[command(flatten)]
     report: ReportArguments,
     #[command(flatten)]
+    film: FilmArguments,
+    #[command(flatten)]
     record: RecordArguments,
     /// Print the report as JSON, as in flight.json
     #[arg(long, conflicts_with = "quiet")]
@@ -79,7 +83,9 @@ pub struct SwarmArguments {
 pub fn swarm(arguments: &SwarmArguments) -> Result<ExitCode, Refusal> {
     let swarm = arguments.swarm.load()?;
     let flight = Flight::new(&swarm)?;
-    let mut recorder = (!arguments.report.no_report).then(|| FlightRecorder::new(&flight));
+    let film = arguments.film.open(&arguments.output, FilmColour::Role, film::flight::require_colour)?;
+    let reports = !arguments.report.no_report;
+    let mut recorder = (reports || film.is_some()).then(|| FlightRecorder::new(&flight));
     let folder = arguments.output.folder(&swarm.name)?;
     let recording =
         arguments.record.open(&arguments.swarm.about("swarm", &swarm), arguments.output.force, 1)?;
@@ -104,20 +110,32 @@ pub fn swarm(arguments: &SwarmArguments) -> Result<ExitCode, Refusal> {
         if interrupted.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     })?;
     let seconds = start.elapsed().as_secs_f64();
-    let _saving = interrupt::saving();
+    let saving = interrupt::saving();
     write_flight(&folder, &swarm, &record, &report)?;
-    if let Some(recorder) = recorder {
+    if let Some(recorder) = recorder.as_mut().filter(|_| reports) {
         let stage = recorder.stage(&swarm, &report);
         report::flight::write(&folder, &swarm, &record, &report, stage)?;
     }
     let kept = interrupt::commit(folder)?;
     let recorded = close(recording)?;
+    drop(saving);
+    let broken_off = interrupted.load(Ordering::Relaxed);
+    let film = film.filter(|_| !broken_off).zip(recorder);
+    let is_asked = film.is_some();
+    let made = film.map_or(Ok(None), |(film, recorder)| {
+        let drawn = film::flight::film(&swarm, &record, &report, &recorder, film.colour);
+        film.make(&drawn, &kept, arguments.output.quiet)
+    })?;
     if arguments.json {
         print(&format!("{:#}\n", serde_json::json!(report)));
     } else if !arguments.output.quiet {
         say(&(words(&report, seconds, &kept) + &recorded));
+        say(&made.as_ref().map_or_else(String::new, film_words));
     }
-    let broken_off = interrupted.load(Ordering::Relaxed);
+    let broken_off = broken_off || is_asked && made.is_none();
+    if is_asked && made.is_none() {
+        eprintln!("interrupted: there is no film, the rest is written");
+    }
     if !broken_off {
         arguments.report.show(&kept);
     }

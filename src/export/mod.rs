@@ -16,7 +16,8 @@
 //! | `checkpoint` | in an unfinished or interrupted run: all it takes to go on |
 //! | `configuration_*`, `pe1_*`, `von_mises_*`, `probes` | figures, as SVG and as the PNG rendered from it |
 //!
-//! A page for people to look at is written beside them ([`report`]), and a gallery of such pages.
+//! A page for people to look at is written beside them ([`report`]), and a gallery of such pages; a film ([`film`]) stands
+//! where it is asked for.
 //!
 //! A flight (`flight`, feature `swarm`), a comparison with the truth (`comparison`, feature `fem`) have folders of their own, and so has a study of
 //! what grows (`stability`) and a parameter sweep ([`sweep`]).
@@ -59,6 +60,7 @@ pub mod comparison;
 pub mod csv;
 mod error;
 pub mod figures;
+pub mod film;
 #[cfg(feature = "swarm")]
 pub mod flight;
 mod folder;

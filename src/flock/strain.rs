@@ -28,7 +28,17 @@ impl Strain {
 
 /// Of one particle over its live neighbours; `None` where these lie on a line, or are fewer than two.
 pub fn strain(flock: &Flock, particle: usize, present: &Vectors) -> Option<Strain> {
-    let pairs = flock.live_neighbours(particle).map(|k| (flock.reference.get(k), present.get(k)));
+    strain_among(flock, particle, flock.live_neighbours(particle), present)
+}
+
+/// The same over these neighbours, as those that were bonded at an earlier step.
+pub fn strain_among(
+    flock: &Flock,
+    particle: usize,
+    neighbours: impl Iterator<Item = usize>,
+    present: &Vectors,
+) -> Option<Strain> {
+    let pairs = neighbours.map(|k| (flock.reference.get(k), present.get(k)));
     of_pairs((flock.reference.get(particle), present.get(particle)), pairs)
 }
 

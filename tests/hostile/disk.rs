@@ -42,6 +42,17 @@ fn a_full_disk_is_a_failure_that_every_message_names_and_leaves_nothing_half_wri
 
 #[test]
 #[ignore = "mounts a small disk, which takes user namespaces"]
+fn a_film_that_a_full_disk_has_no_room_for_is_not_there_and_the_results_are() {
+    let script = "\"$flockform\" run tension -q --no-report --figures none --out o --film t.gif; \
+                  echo \"code $?\"; test -s o/summary.json && echo kept; ls -A";
+    let said = on_a_small_disk("200k", script);
+    for word in ["No space left", "t.gif", "code 1", "kept\no\n"] {
+        assert!(said.contains(word), "{word}: {said}");
+    }
+}
+
+#[test]
+#[ignore = "mounts a small disk, which takes user namespaces"]
 fn a_checkpoint_outlives_a_full_disk_and_the_run_goes_on_when_there_is_room() {
     let script = "\"$flockform\" run tension -q --out o --checkpoint-every 20steps --set record.vtk_every=1; \
                   echo \"code $?\"; test -s o.unfinished/checkpoint && echo kept; \

@@ -20,8 +20,11 @@ pub struct Recorder<'a> {
     probes: Vec<ProbeSeries>,
     load_steps: Vec<LoadStep>,
     frames: Option<VtkSeries>,
-    /// Whether there shall be a `report.html`, and what it shows.
+    /// Whether there shall be a `report.html`.
     pub reports: bool,
+    /// Whether there shall be a film.
+    pub films: bool,
+    /// What they show.
     pub animation: Option<RunRecorder>,
     /// The state that an earlier run saved for it.
     animation_state: Option<AnimationState<'static>>,
@@ -34,7 +37,9 @@ pub struct Records {
     pub snapshots: Vec<Snapshot>,
     pub probes: Vec<ProbeSeries>,
     pub load_steps: Vec<LoadStep>,
+    /// The view of the report.
     pub stage: Option<View>,
+    pub animation: Option<RunRecorder>,
     pub writing: Duration,
 }
 
@@ -63,6 +68,7 @@ impl<'a> Recorder<'a> {
             load_steps: left.map_or_else(Vec::new, |left| left.checkpoint.load_steps.to_vec()),
             frames,
             reports: true,
+            films: false,
             animation: None,
             animation_state: left.and_then(|left| left.checkpoint.animation.clone()),
             failure: None,
@@ -92,7 +98,7 @@ impl<'a> Recorder<'a> {
         if self.frames.is_some() && engine.step().is_multiple_of(self.scene.record.vtk_every) {
             self.write_frame(engine);
         }
-        if self.reports {
+        if self.keeps_frames() {
             let start = Instant::now();
             RunRecorder::open(&mut self.animation, &mut self.animation_state, engine).watch(engine);
             self.writing += start.elapsed();
@@ -107,9 +113,14 @@ impl<'a> Recorder<'a> {
         let vtk = (record.vtk_every > 0).then(|| next(record.vtk_every));
         let load = load_every(self.scene).map(next);
         // The report has yet to say what it wants: the next one.
-        let animation =
-            self.reports.then(|| self.animation.as_ref().map_or(step + 1, |animation| animation.next(step)));
+        let animation = self
+            .keeps_frames()
+            .then(|| self.animation.as_ref().map_or(step + 1, |animation| animation.next(step)));
         [figure, vtk, load, animation].into_iter().flatten().min().unwrap_or(usize::MAX)
+    }
+
+    fn keeps_frames(&self) -> bool {
+        self.reports || self.films
     }
 
     fn measure(&mut self, engine: &Engine) {
@@ -145,18 +156,22 @@ impl<'a> Recorder<'a> {
         if let Some(failure) = self.failure {
             return Err(failure);
         }
-        if let Some(frames) = self.frames {
+        if let Some(frames) = self.frames.take() {
             frames.finish()?;
         }
         let start = Instant::now();
-        if self.reports {
+        if self.keeps_frames() {
             // A run that is gone on with from its last step has seen none.
             RunRecorder::open(&mut self.animation, &mut self.animation_state, engine);
         }
-        let stage = self.animation.map(|animation| animation.stage(self.scene, outcome));
+        if let Some(animation) = &mut self.animation {
+            animation.close(self.scene, outcome);
+        }
+        let animation = self.animation.as_mut().filter(|_| self.reports);
+        let stage = animation.map(|animation| animation.stage(self.scene, outcome));
         let writing = self.writing + start.elapsed();
-        let Self { snapshots, probes, load_steps, .. } = self;
-        Ok(Records { snapshots, probes, load_steps, stage, writing })
+        let Self { snapshots, probes, load_steps, animation, .. } = self;
+        Ok(Records { snapshots, probes, load_steps, stage, animation, writing })
     }
 }
 

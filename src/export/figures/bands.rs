@@ -1,5 +1,6 @@
 //! The bands of a filled contour plot: their levels, colours and outlines.
 
+use super::axes::Axes;
 use super::colour::viridis;
 use super::svg::{Anchor, INK, Svg, text_width};
 use super::ticks::Ticks;
@@ -77,6 +78,37 @@ impl Bands {
     fn widest_label(&self) -> f64 {
         let width = |&value: &f64| text_width(&self.levels.label(value), LABEL_TEXT);
         self.levels.values.iter().map(width).fold(0.0, f64::max)
+    }
+}
+
+/// Values of particles or robots, and their colours.
+#[derive(Clone, Copy, Debug)]
+pub struct Field<'a> {
+    pub quantity: &'a str,
+    pub unit: &'a str,
+    pub bands: &'a Bands,
+    /// Shape \[count\]; NaN where there is none.
+    pub values: &'a [f64],
+}
+
+/// Colour of what has no value.
+const NO_VALUE: &str = "#c9ccd1";
+
+impl Field<'_> {
+    /// The band of a particle; after the last one where it has no value.
+    pub fn band(&self, particle: usize) -> usize {
+        let value = self.values[particle];
+        if value.is_finite() { self.bands.of(value) } else { self.bands.count() }
+    }
+
+    pub fn colour(&self, band: usize) -> String {
+        if band < self.bands.count() { self.bands.colour(band) } else { NO_VALUE.into() }
+    }
+
+    /// Draws the colour bar beside a plot.
+    pub fn draw_bar(&self, svg: &mut Svg, axes: &Axes) {
+        let top_right = [axes.corner[0] + axes.size[0], axes.corner[1]];
+        self.bands.draw_bar(svg, top_right, axes.size[1], self.quantity, self.unit);
     }
 }
 

@@ -94,7 +94,7 @@ fn heading(chart: &Chart<'_>) -> Heading {
         mark: mark(series.style),
     };
     let legend = chart.series.iter().filter(|series| !series.name.is_empty()).map(key).collect();
-    Heading { title: chart.title.clone(), note: chart.note.clone(), legend }
+    Heading { title: chart.title.clone(), note: chart.note.clone(), legend, ..Heading::default() }
 }
 
 fn draw_on(svg: &mut Svg, chart: &Chart<'_>) {

@@ -54,7 +54,8 @@ pub fn overlay(pair: &Pair<'_>) -> String {
         note = "outlines by the rule and in truth".to_owned();
     }
     note += &scale_note(factor);
-    let heading = Heading { title: pair.title.into(), note, legend: legend(pair, is_dotted) };
+    let heading =
+        Heading { title: pair.title.into(), note, legend: legend(pair, is_dotted), ..Heading::default() };
     page::with_body(&heading, axes, pair.unit, 20.0, |svg, axes| {
         let dashes = "stroke-dasharray=\"5 3\"";
         draw_outline(svg, axes, pair, pair.reference, &format!("stroke=\"{UNDEFORMED}\" {dashes}"));

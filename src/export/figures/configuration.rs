@@ -3,7 +3,9 @@
 use std::collections::HashSet;
 
 use super::axes::Axes;
+use super::bands::{Bands, Field};
 use super::colour;
+use super::energy::draw_contours;
 use super::heading::{Heading, Key, Mark};
 use super::page;
 use super::raster::Raster;
@@ -18,46 +20,155 @@ use crate::flock::vectors::distance;
 const MOST_PARTICLES_WITH_BONDS: usize = 20_000;
 const MOST_BONDS: usize = 60_000;
 
+/// Dots of more particles than this are too small for their colours: their body is drawn as a surface.
+const MOST_COLOURED_DOTS: usize = 2_000;
+
+/// How particles are drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Style {
+    Dots,
+    /// Filled contours of a field.
+    Surface,
+    /// Squares, each for several particles.
+    Raster,
+}
+
+impl Style {
+    fn of(subject: &Subject<'_>, is_field: bool) -> Self {
+        match subject.body.count() {
+            count if count > MOST_DOTS => Self::Raster,
+            // Where neighbours are found anew at every step there are no faces to fill.
+            count if count > MOST_COLOURED_DOTS && is_field && subject.neighbours.is_some() => Self::Surface,
+            _ => Self::Dots,
+        }
+    }
+}
+
 /// Later ones are drawn over earlier ones: the few must not drown in the many.
 const PAINTING_ORDER: [Role; 5] = [Role::Frame, Role::Follower, Role::Ghost, Role::Clamped, Role::Leader];
 
 /// Particles as dots in the colours of their roles, live bonds grey, broken ones dashed red.
 pub fn configuration(subject: &Subject<'_>, snapshot: &Snapshot) -> String {
-    let count = snapshot.positions.len();
-    let spacing = subject.body.lattice.spacing();
-    let axes = page::window(&snapshot.positions, 0..count, spacing);
-    let is_raster = count > MOST_DOTS;
-    let mut heading = Heading {
-        title: subject.title.into(),
-        note: page::note(subject, snapshot),
-        legend: legend(snapshot, is_raster),
-    };
-    if is_raster {
-        heading.note += &format!("; {count} particles drawn as squares");
+    let mut setting = Setting::default();
+    setting.include(snapshot, None);
+    configuration_in(&setting, subject, snapshot, page::note(subject, snapshot), None)
+}
+
+/// The parts that all configurations of a film share, so that nothing moves but the body.
+#[derive(Clone, Debug, Default)]
+pub struct Setting {
+    bounds: Option<[[f64; 2]; 2]>,
+    /// Lowest and highest value of the field; none of frame and ghosts, which are no matter.
+    range: Option<[f64; 2]>,
+    roles: Vec<Role>,
+    has_broken_bonds: bool,
+    /// Height of the heading, at least \[px\].
+    heading: f64,
+}
+
+impl Setting {
+    /// Makes room for this configuration, and for these values of its particles, shape \[count\].
+    pub fn include(&mut self, snapshot: &Snapshot, values: Option<&[f64]>) {
+        let within = page::bounds(&snapshot.positions, 0..snapshot.positions.len());
+        self.bounds = match (self.bounds, within) {
+            (Some(all), Some(more)) => Some([
+                [0, 1].map(|k| f64::min(all[0][k], more[0][k])),
+                [0, 1].map(|k| f64::max(all[1][k], more[1][k])),
+            ]),
+            (all, more) => all.or(more),
+        };
+        let is_present = |role: &Role| self.roles.contains(role) || snapshot.roles.contains(role);
+        self.roles = PAINTING_ORDER.into_iter().filter(is_present).collect();
+        self.has_broken_bonds |= !snapshot.broken.is_empty();
+        let of_bodies = snapshot.roles.iter().zip(values.into_iter().flatten());
+        let shown = of_bodies.filter(|(role, value)| role.is_body() && value.is_finite());
+        self.range = shown.fold(self.range, |range, (_, &value)| {
+            let [low, high] = range.unwrap_or([value; 2]);
+            Some([low.min(value), high.max(value)])
+        });
     }
-    page::with_body(&heading, axes, subject.unit, 20.0, |svg, axes| {
-        if is_raster {
-            draw_raster(svg, axes, snapshot, spacing);
+
+    /// Bands for all values; those that differ by no more than `noise` have one colour.
+    pub fn bands(&self, noise: f64) -> Bands {
+        let [low, high] = self.range.unwrap_or([0.0; 2]);
+        Bands::around(low, high, noise)
+    }
+
+    /// Makes room for this note above the plot.
+    pub fn reserve(&mut self, subject: &Subject<'_>, note: String, bands: Option<&Bands>) {
+        let axes = page::around(self.bounds, subject.body.lattice.spacing());
+        let width = page::width_of(&axes, beside(bands));
+        self.heading = self.heading(subject, note, bands.is_some()).height(width);
+    }
+
+    fn heading(&self, subject: &Subject<'_>, mut note: String, is_field: bool) -> Heading {
+        let style = Style::of(subject, is_field);
+        if style == Style::Raster {
+            note += &format!("; {} particles drawn as squares", subject.body.count());
+        }
+        // Surfaces and squares have the colours of the field alone.
+        let legend = match style {
+            Style::Surface | Style::Raster if is_field => Vec::new(),
+            _ => self.legend(style == Style::Raster, is_field),
+        };
+        Heading { title: subject.title.into(), note, legend, least: self.heading }
+    }
+
+    fn legend(&self, is_raster: bool, is_field: bool) -> Vec<Key> {
+        let (colour, mark) = if is_raster {
+            (colour::BROKEN_BOND_SQUARE, Mark::Dot)
         } else {
-            draw_bonds(svg, axes, subject, snapshot);
-            draw_dots(svg, axes, snapshot, spacing);
+            (colour::BROKEN_BOND, Mark::DashedLine)
+        };
+        let broken = Key { name: "broken bond".into(), colour, mark };
+        // A field has its colours for the body.
+        let is_listed = |role: &Role| !is_field || *role != Role::Follower;
+        let mark = |role: Role| if is_field && role.is_body() { Mark::Ring } else { Mark::Dot };
+        let roles = self.roles.iter().rev().copied().filter(is_listed);
+        roles
+            .map(|role| Key { name: role.name().into(), colour: colour::of_role(role), mark: mark(role) })
+            .chain(self.has_broken_bonds.then_some(broken))
+            .collect()
+    }
+}
+
+/// A configuration in a setting under this note; with a field, the particles of the body are dots in its colours,
+/// leaders and clamped ones with a rim.
+pub fn configuration_in(
+    setting: &Setting,
+    subject: &Subject<'_>,
+    snapshot: &Snapshot,
+    note: String,
+    field: Option<&Field<'_>>,
+) -> String {
+    let spacing = subject.body.lattice.spacing();
+    let style = Style::of(subject, field.is_some());
+    let heading = setting.heading(subject, note, field.is_some());
+    let axes = page::around(setting.bounds, spacing);
+    let beside = beside(field.map(|field| field.bands));
+    page::with_body(&heading, axes, subject.unit, beside, |svg, axes| {
+        match (style, field) {
+            (Style::Raster, None) => draw_raster(svg, axes, snapshot, spacing),
+            (Style::Raster, Some(field)) => draw_field_raster(svg, axes, snapshot, field, spacing),
+            (Style::Surface, Some(field)) => {
+                let is_shown = |i: usize| snapshot.roles[i].is_body() && field.values[i].is_finite();
+                let is_drawn: Vec<bool> = (0..field.values.len()).map(is_shown).collect();
+                draw_contours(svg, axes, subject, (snapshot, field.values), &is_drawn, field.bands);
+            }
+            _ => {
+                draw_bonds(svg, axes, subject, snapshot);
+                draw_dots(svg, axes, snapshot, spacing, field);
+            }
+        }
+        if let Some(field) = field {
+            field.draw_bar(svg, axes);
         }
     })
 }
 
-fn legend(snapshot: &Snapshot, is_raster: bool) -> Vec<Key> {
-    let (colour, mark) = if is_raster {
-        (colour::BROKEN_BOND_SQUARE, Mark::Dot)
-    } else {
-        (colour::BROKEN_BOND, Mark::DashedLine)
-    };
-    let broken = Key { name: "broken bond".into(), colour, mark };
-    let is_present = |role: &Role| snapshot.roles.contains(role);
-    let roles = PAINTING_ORDER.into_iter().rev().filter(is_present);
-    roles
-        .map(|role| Key { name: role.name().into(), colour: colour::of_role(role), mark: Mark::Dot })
-        .chain((!snapshot.broken.is_empty()).then_some(broken))
-        .collect()
+/// Room for the colour bar, if there is one \[px\].
+fn beside(bands: Option<&Bands>) -> f64 {
+    bands.map_or(20.0, Bands::bar_room)
 }
 
 fn draw_bonds(svg: &mut Svg, axes: &Axes, subject: &Subject<'_>, snapshot: &Snapshot) {
@@ -111,17 +222,40 @@ fn broken_bond(
     vec![[a, towards(a, b)], [b, towards(b, a)]]
 }
 
-fn draw_dots(svg: &mut Svg, axes: &Axes, snapshot: &Snapshot, spacing: f64) {
+fn draw_dots(svg: &mut Svg, axes: &Axes, snapshot: &Snapshot, spacing: f64, field: Option<&Field<'_>>) {
     let radius = dot_radius(axes, spacing);
-    for role in PAINTING_ORDER {
-        let attributes = format!("class=\"{}\" fill=\"{}\"", role.name(), colour::of_role(role));
-        svg.group(attributes, |svg| {
-            for (place, _) in snapshot.positions.iter().zip(&snapshot.roles).filter(|(_, r)| **r == role) {
-                if place.iter().all(|value| value.is_finite()) {
-                    svg.circle(axes.place(place), radius);
-                }
+    let dots = |svg: &mut Svg, chosen: &dyn Fn(usize) -> bool| {
+        for (_, place) in snapshot.positions.iter().enumerate().filter(|(i, _)| chosen(*i)) {
+            if place.iter().all(|value| value.is_finite()) {
+                svg.circle(axes.place(place), radius);
             }
-        });
+        }
+    };
+    for role in PAINTING_ORDER {
+        let is_it = |i: usize| snapshot.roles[i] == role;
+        let Some(field) = field.filter(|_| role.is_body()) else {
+            let attributes = format!("class=\"{}\" fill=\"{}\"", role.name(), colour::of_role(role));
+            svg.group(attributes, |svg| dots(svg, &is_it));
+            continue;
+        };
+        let rim = match role {
+            Role::Follower => String::new(),
+            _ => format!(" stroke=\"{}\" stroke-width=\"{:.2}\"", colour::of_role(role), 0.35 * radius),
+        };
+        for band in 0..=field.bands.count() {
+            let attributes = format!("class=\"{}\" fill=\"{}\"{rim}", role.name(), field.colour(band));
+            svg.group(attributes, |svg| dots(svg, &|i| is_it(i) && field.band(i) == band));
+        }
+    }
+}
+
+fn draw_field_raster(svg: &mut Svg, axes: &Axes, snapshot: &Snapshot, field: &Field<'_>, spacing: f64) {
+    let mut raster = Raster::over(axes, spacing);
+    for (i, place) in snapshot.positions.iter().enumerate().filter(|(i, _)| snapshot.roles[*i].is_body()) {
+        raster.drop(axes.place(place), field.values[i]);
+    }
+    for (band, path) in raster.paths(field.bands.count(), |value| field.bands.of(value)).iter().enumerate() {
+        svg.path(path, format_args!("fill=\"{}\" shape-rendering=\"crispEdges\"", field.bands.colour(band)));
     }
 }
 

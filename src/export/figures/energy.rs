@@ -31,7 +31,7 @@ pub fn pe1(subject: &Subject<'_>, snapshot: &Snapshot) -> String {
     let bands = Bands::around(low, high, (NOISE_IN_SPACINGS * spacing).powi(2));
     let axes = page::window(&snapshot.positions, drawn.iter().copied(), spacing);
     let note = format!("first pseudo-energy, {}", page::note(subject, snapshot));
-    let mut heading = Heading { title: subject.title.into(), note, legend: Vec::new() };
+    let mut heading = Heading { title: subject.title.into(), note, ..Heading::default() };
     let is_raster = drawn.len() > MOST_DOTS;
     if is_raster {
         heading.note += &format!("; {} particles drawn as squares of their largest value", drawn.len());
@@ -40,23 +40,24 @@ pub fn pe1(subject: &Subject<'_>, snapshot: &Snapshot) -> String {
         if is_raster {
             draw_raster(svg, axes, snapshot, &drawn, &bands, spacing);
         } else {
-            draw_contours(svg, axes, subject, snapshot, &is_drawn, &bands);
+            draw_contours(svg, axes, subject, (snapshot, &snapshot.pe1), &is_drawn, &bands);
         }
         let top_right = [axes.corner[0] + axes.size[0], axes.corner[1]];
         bands.draw_bar(svg, top_right, axes.size[1], "PE1", &format!("{}²", subject.unit));
     })
 }
 
-fn draw_contours(
+/// Filled contours of these values of the particles that are drawn, shape \[count\] each.
+pub(super) fn draw_contours(
     svg: &mut Svg,
     axes: &Axes,
     subject: &Subject<'_>,
-    snapshot: &Snapshot,
+    (snapshot, values): (&Snapshot, &[f64]),
     is_drawn: &[bool],
     bands: &Bands,
 ) {
     let mut is_alone = is_drawn.to_vec();
-    let sample = |&i: &u32| (axes.place(snapshot.positions.get(i as usize)), snapshot.pe1[i as usize]);
+    let sample = |&i: &u32| (axes.place(snapshot.positions.get(i as usize)), values[i as usize]);
     let mut patches: Vec<Vec<Sample>> = Vec::new();
     // Where neighbours are found anew at every step the faces of the lattice mean nothing.
     let faces = match (subject.cells, subject.neighbours) {
@@ -76,7 +77,7 @@ fn draw_contours(
     }
     let radius = dot_radius(axes, subject.body.lattice.spacing());
     for i in (0..is_alone.len()).filter(|&i| is_alone[i]) {
-        let attributes = format!("fill=\"{}\"", bands.colour(bands.of(snapshot.pe1[i])));
+        let attributes = format!("fill=\"{}\"", bands.colour(bands.of(values[i])));
         svg.group(attributes, |svg| svg.circle(axes.place(snapshot.positions.get(i)), radius));
     }
 }

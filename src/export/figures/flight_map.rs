@@ -1,6 +1,7 @@
 //! A flight on a map: the robots' ways, where they began and where they ended, what stood in the way.
 
 use super::axes::Axes;
+use super::bands::Field;
 use super::colour;
 use super::heading::{Heading, Key, Mark};
 use super::page;
@@ -20,67 +21,141 @@ const MOST_WAYS: usize = 400;
 /// Corners of the polygon that stands for a disc.
 const ROUND: usize = 48;
 
+/// The whole flight.
 pub fn flight(swarm: &Swarm, record: &Record, report: &FlightReport) -> String {
-    let (Some(first), Some(last)) = (record.tracks.first(), record.tracks.last()) else {
-        return String::new();
-    };
-    let leads = |m: usize| report.per_robot[m].role != Role::Follower.name();
-    let count = first.len();
-    let obstacles = (0..swarm.raw.obstacles.len()).flat_map(|k| {
-        let [first, last] = ends(swarm, k);
-        first.into_iter().chain(last)
-    });
-    let shown: Vectors = record.tracks.iter().flat_map(|places| places.iter()).chain(obstacles).collect();
-    let axes = page::window(&shown, 0..shown.len(), 3.0 * swarm.raw.radius);
-    let key = |name: &'static str, colour, mark| Key { name: name.into(), colour, mark };
-    let mut legend = vec![
-        key("leader", colour::of_role(Role::Leader), Mark::Dot),
-        key("follower", colour::of_role(Role::Follower), Mark::Dot),
-        key("start", START, Mark::Ring),
-    ];
-    if !swarm.raw.obstacles.is_empty() {
-        legend.push(key("obstacle", OBSTACLE, Mark::Dot));
-    }
+    let Some(last) = record.tracks.last() else { return String::new() };
     let note = format!("{} robots, {:.1} s", report.robots, report.seconds);
-    let heading = Heading { title: report.title.clone(), note, legend };
-    page::with_body(&heading, axes, "m", 20.0, |svg, axes| {
-        let radius = (swarm.raw.radius * axes.scale()).clamp(1.2, 12.0);
-        draw_obstacles(svg, axes, swarm);
-        if count <= MOST_WAYS {
-            for (led, colour) in [(false, WAY), (true, LED_WAY)] {
-                let mut ways = Path::default();
-                for m in (0..count).filter(|&m| leads(m) == led) {
-                    let way: Vec<[f64; 2]> =
-                        record.tracks.iter().map(|places| axes.place(places.get(m))).collect();
-                    ways.polyline(simplified(&way));
-                }
-                svg.path(
-                    &ways,
-                    format_args!("class=\"way\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"0.9\""),
-                );
-            }
-        }
-        svg.group(format_args!("class=\"start\" fill=\"none\" stroke=\"{START}\""), |svg| {
-            first.iter().for_each(|place| svg.circle(axes.place(place), radius));
+    let moment = Moment { flown: record.tracks.len(), places: last, note, field: None };
+    Map::new(swarm, record, report).draw(&moment)
+}
+
+/// The map of a flight, which shows all of it at any of its times.
+pub struct Map<'a> {
+    swarm: &'a Swarm,
+    record: &'a Record,
+    report: &'a FlightReport,
+    axes: Axes,
+}
+
+/// A time of a flight.
+pub struct Moment<'a> {
+    /// How many of the recorded places lie before it.
+    pub flown: usize,
+    /// Of the robots \[m\].
+    pub places: &'a Vectors,
+    /// What stands under the title.
+    pub note: String,
+    /// Colours of the robots; those of their roles where there is none.
+    pub field: Option<Field<'a>>,
+}
+
+impl<'a> Map<'a> {
+    pub fn new(swarm: &'a Swarm, record: &'a Record, report: &'a FlightReport) -> Self {
+        let obstacles = (0..swarm.raw.obstacles.len()).flat_map(|k| {
+            let [first, last] = outlines(swarm, k, f64::INFINITY);
+            first.into_iter().chain(last)
         });
+        let shown: Vectors = record.tracks.iter().flat_map(|places| places.iter()).chain(obstacles).collect();
+        let axes = page::window(&shown, 0..shown.len(), 3.0 * swarm.raw.radius);
+        Self { swarm, record, report, axes }
+    }
+
+    /// When a moment is \[s\].
+    fn time_of(&self, moment: &Moment<'_>) -> f64 {
+        let last = moment.flown.checked_sub(1).and_then(|before| self.record.times.get(before));
+        last.copied().unwrap_or(0.0)
+    }
+
+    fn leads(&self, robot: usize) -> bool {
+        self.report.per_robot[robot].role != Role::Follower.name()
+    }
+
+    pub fn draw(&self, moment: &Moment<'_>) -> String {
+        let legend = self.legend(moment.field.is_some());
+        let (title, note) = (self.report.title.clone(), moment.note.clone());
+        let heading = Heading { title, note, legend, ..Heading::default() };
+        let beside = moment.field.map_or(20.0, |field| field.bands.bar_room());
+        page::with_body(&heading, self.axes.clone(), "m", beside, |svg, axes| {
+            let radius = (self.swarm.raw.radius * axes.scale()).clamp(1.2, 12.0);
+            draw_obstacles(svg, axes, self.swarm, self.time_of(moment));
+            self.draw_ways(svg, axes, moment);
+            svg.group(format_args!("class=\"start\" fill=\"none\" stroke=\"{START}\""), |svg| {
+                let first = self.record.tracks.first().into_iter().flat_map(|places| places.iter());
+                first.for_each(|place| svg.circle(axes.place(place), radius));
+            });
+            self.draw_robots(svg, axes, moment, radius);
+            if let Some(field) = &moment.field {
+                field.draw_bar(svg, axes);
+            }
+        })
+    }
+
+    fn legend(&self, is_field: bool) -> Vec<Key> {
+        let key = |name: &'static str, colour, mark| Key { name: name.into(), colour, mark };
+        let [leader, follower] = [Role::Leader, Role::Follower].map(colour::of_role);
+        let mut legend = vec![
+            key("leader", leader, if is_field { Mark::Ring } else { Mark::Dot }),
+            key("follower", follower, Mark::Dot),
+            key("start", START, Mark::Ring),
+        ];
+        if is_field {
+            legend.remove(1);
+        }
+        if !self.swarm.raw.obstacles.is_empty() {
+            legend.push(key("obstacle", OBSTACLE, Mark::Dot));
+        }
+        legend
+    }
+
+    fn draw_ways(&self, svg: &mut Svg, axes: &Axes, moment: &Moment<'_>) {
+        let count = moment.places.len();
+        if count > MOST_WAYS {
+            return;
+        }
+        for (led, colour) in [(false, WAY), (true, LED_WAY)] {
+            let mut ways = Path::default();
+            for m in (0..count).filter(|&m| self.leads(m) == led) {
+                let flown = self.record.tracks.iter().take(moment.flown).chain([moment.places]);
+                let way: Vec<[f64; 2]> = flown.map(|places| axes.place(places.get(m))).collect();
+                ways.polyline(simplified(&way));
+            }
+            svg.path(
+                &ways,
+                format_args!("class=\"way\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"0.9\""),
+            );
+        }
+    }
+
+    fn draw_robots(&self, svg: &mut Svg, axes: &Axes, moment: &Moment<'_>, radius: f64) {
         for (led, role) in [(false, Role::Follower), (true, Role::Leader)] {
-            svg.group(format_args!("class=\"{}\" fill=\"{}\"", role.name(), colour::of_role(role)), |svg| {
-                for m in (0..count).filter(|&m| leads(m) == led) {
-                    svg.circle(axes.place(last.get(m)), radius);
+            let own = colour::of_role(role);
+            svg.group(format_args!("class=\"{}\" fill=\"{own}\"", role.name()), |svg| {
+                for m in (0..moment.places.len()).filter(|&m| self.leads(m) == led) {
+                    let at = axes.place(moment.places.get(m));
+                    match &moment.field {
+                        None => svg.circle(at, radius),
+                        Some(field) => {
+                            let rim = if led { own } else { "none" };
+                            let width = 0.35 * radius;
+                            let rim = format!("stroke=\"{rim}\" stroke-width=\"{width:.2}\"");
+                            let colour = field.colour(field.band(m));
+                            svg.group(format_args!("fill=\"{colour}\" {rim}"), |svg| svg.circle(at, radius));
+                        }
+                    }
                 }
             });
         }
-    })
+    }
 }
 
-fn draw_obstacles(svg: &mut Svg, axes: &Axes, swarm: &Swarm) {
+fn draw_obstacles(svg: &mut Svg, axes: &Axes, swarm: &Swarm, now: f64) {
     let polygon = |corners: &[[f64; 2]]| {
         let mut path = Path::default();
         path.polygon(corners.iter().map(|&corner| axes.place(corner)));
         path
     };
     for k in 0..swarm.raw.obstacles.len() {
-        let [first, last] = ends(swarm, k);
+        let [first, last] = outlines(swarm, k, now);
         if first != last {
             let stroke = format!("stroke=\"{START}\"");
             svg.path(&polygon(&first), format_args!("class=\"start\" fill=\"none\" {stroke}"));
@@ -93,10 +168,10 @@ fn draw_obstacles(svg: &mut Svg, axes: &Axes, swarm: &Swarm) {
     }
 }
 
-/// Outlines of an obstacle where it begins and where it is moved to in the end.
-fn ends(swarm: &Swarm, obstacle: usize) -> [Vec<[f64; 2]>; 2] {
+/// Outlines of an obstacle where it begins and where it has been moved to by then \[s\].
+fn outlines(swarm: &Swarm, obstacle: usize, now: f64) -> [Vec<[f64; 2]>; 2] {
     let first = outline(&swarm.raw.obstacles[obstacle]);
-    let [_, x, y] = moves(swarm, obstacle).last().unwrap_or_default();
+    let [_, x, y] = moves(swarm, obstacle).take_while(|[at, ..]| *at <= now).last().unwrap_or_default();
     let last = first.iter().map(|[px, py]| [px + x, py + y]).collect();
     [first, last]
 }

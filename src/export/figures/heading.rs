@@ -31,12 +31,14 @@ pub struct Heading {
     pub title: String,
     pub note: String,
     pub legend: Vec<Key>,
+    /// Least height \[px\]: the sheets of a film are alike, however long their notes are.
+    pub least: f64,
 }
 
 impl Heading {
     /// Height on a sheet of this width, the space to the plot included \[px\].
     pub fn height(&self, width: f64) -> f64 {
-        self.draw(&mut Svg::new(width, 1.0), width)
+        self.draw(&mut Svg::new(width, 1.0), width).max(self.least)
     }
 
     /// Draws at the top of a sheet of this width; returns where the plot may begin \[px\].

@@ -34,7 +34,7 @@ pub fn probes(subject: &Subject<'_>, probes: &[ProbeSeries]) -> String {
     } else {
         "probed particles, by id".into()
     };
-    let heading = Heading { title: subject.title.into(), note, legend: Vec::new() };
+    let heading = Heading { title: subject.title.into(), note, ..Heading::default() };
     let ids: Vec<String> = shown.iter().map(|probe| subject.body.id(probe.particle).to_string()).collect();
     let panels = panels(subject, shown);
     let last = shown.iter().map(|probe| probe.positions.len()).max().unwrap_or(0).saturating_sub(1);

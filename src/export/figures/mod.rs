@@ -6,19 +6,19 @@
 //! written directly: a figure here is circles, lines and paths, and what matters is where they go.
 
 mod axes;
-mod bands;
+pub(super) mod bands;
 pub(crate) mod chart;
 mod colour;
 mod comparison;
-mod configuration;
+pub(super) mod configuration;
 mod energy;
 mod faces;
 #[cfg(feature = "swarm")]
 pub(crate) mod flight_map;
-mod heading;
+pub(super) mod heading;
 mod history;
-mod page;
-mod png;
+pub(super) mod page;
+pub(super) mod png;
 mod raster;
 mod stress;
 mod svg;

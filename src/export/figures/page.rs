@@ -22,7 +22,7 @@ pub fn with_body(
 ) -> String {
     let left = axes.left_of_plot();
     let needed = left + axes.size[0] + beside;
-    let width = needed.max(NARROWEST);
+    let width = width_of(&axes, beside);
     let top = heading.height(width);
     axes.corner = [left + (width - needed) / 2.0, top];
     let mut svg = Svg::new(width, top + axes.size[1] + Axes::BELOW);
@@ -32,22 +32,42 @@ pub fn with_body(
     svg.finish()
 }
 
+/// Width of the sheet of a body's plot with `beside` px of room to its right \[px\].
+pub fn width_of(axes: &Axes, beside: f64) -> f64 {
+    (axes.left_of_plot() + axes.size[0] + beside).max(NARROWEST)
+}
+
 /// The window that shows every particle that is drawn.
 pub fn window(positions: &Vectors, drawn: impl Iterator<Item = usize>, spacing: f64) -> Axes {
+    around(bounds(positions, drawn), spacing)
+}
+
+/// Lowest and highest place of those drawn, as far as they are anywhere.
+pub fn bounds(positions: &Vectors, drawn: impl Iterator<Item = usize>) -> Option<[[f64; 2]; 2]> {
     let finite = |&i: &usize| positions.get(i).iter().all(|value| value.is_finite());
-    let (low, high) = positions.bounds(drawn.filter(finite)).unwrap_or(([0.0; 2], [1.0; 2]));
+    positions.bounds(drawn.filter(finite)).map(|(low, high)| [low, high])
+}
+
+/// The window that shows what lies within these bounds.
+pub fn around(bounds: Option<[[f64; 2]; 2]>, spacing: f64) -> Axes {
+    let [low, high] = bounds.unwrap_or([[0.0; 2], [1.0; 2]]);
     let longest = (high[0] - low[0]).max(high[1] - low[1]);
     Axes::equal(low, high, (0.02 * longest).max(0.6 * spacing))
 }
 
 /// `step 20`, and how many bonds are broken.
 pub fn note(subject: &Subject<'_>, snapshot: &Snapshot) -> String {
-    let broken = match snapshot.broken.len() {
+    note_at(&format!("{} {}", subject.counts, snapshot.step), snapshot.broken.len())
+}
+
+/// The time in words, and how many bonds are broken.
+pub fn note_at(clock: &str, broken: usize) -> String {
+    let broken = match broken {
         0 => String::new(),
         1 => ", 1 broken bond".into(),
         count => format!(", {count} broken bonds"),
     };
-    format!("{} {}{broken}", subject.counts, snapshot.step)
+    format!("{clock}{broken}")
 }
 
 /// The part of a long line that a sheet can show: the ends and extremes within each half pixel.

@@ -1,20 +1,59 @@
-//! An SVG becomes a PNG, with the font that the program carries.
+//! An SVG becomes pixels, or a PNG, with the font that the program carries.
 
 use std::sync::Arc;
 
-use resvg::tiny_skia::{Pixmap, Transform};
+use resvg::tiny_skia::{Color, Pixmap, Transform};
 use resvg::usvg::{Options, Tree, fontdb};
 
 /// Renders at `width` pixels; the height follows from the drawing's shape. The error is a reason.
 pub fn render(svg: &str, width: u32) -> Result<Vec<u8>, String> {
+    let tree = Tree::from_str(svg, &options()).map_err(|error| error.to_string())?;
+    let zoom = width as f32 / tree.size().width();
+    let height = (tree.size().height() * zoom).round() as u32;
+    let mut pixmap = blank([width, height])?;
+    resvg::render(&tree, Transform::from_scale(zoom, zoom), &mut pixmap.as_mut());
+    pixmap.encode_png().map_err(|error| error.to_string())
+}
+
+fn options() -> Options<'static> {
     let mut options = Options { font_family: "DejaVu Sans".into(), ..Options::default() };
     let font = fontdb::Source::Binary(Arc::new(dejavu::sans::regular()));
     options.fontdb_mut().load_font_source(font);
-    let tree = Tree::from_str(svg, &options).map_err(|error| error.to_string())?;
-    let zoom = width as f32 / tree.size().width();
-    let height = (tree.size().height() * zoom).round() as u32;
-    let mut pixmap =
-        Pixmap::new(width, height).ok_or_else(|| format!("no image of {width} x {height} pixels"))?;
-    resvg::render(&tree, Transform::from_scale(zoom, zoom), &mut pixmap.as_mut());
-    pixmap.encode_png().map_err(|error| error.to_string())
+    options
+}
+
+fn blank([width, height]: [u32; 2]) -> Result<Pixmap, String> {
+    Pixmap::new(width, height).ok_or_else(|| format!("no image of {width} x {height} pixels"))
+}
+
+/// Renders many sheets, with the font read once.
+pub struct Painter {
+    options: Options<'static>,
+    /// Pixels for a \[px\] of the sheet.
+    zoom: f32,
+}
+
+/// An opaque picture of an even number of pixels each way, as videos ask for.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Picture {
+    pub size: [u32; 2],
+    /// Red, green, blue and 255 of each pixel, row by row.
+    pub rgba: Vec<u8>,
+}
+
+impl Painter {
+    pub fn new(zoom: f32) -> Self {
+        Self { options: options(), zoom }
+    }
+
+    /// The error is a reason.
+    pub fn paint(&self, svg: &str) -> Result<Picture, String> {
+        let tree = Tree::from_str(svg, &self.options).map_err(|error| error.to_string())?;
+        let even = |length: f32| 2 * (0.5 * self.zoom * length).ceil() as u32;
+        let size = [even(tree.size().width()), even(tree.size().height())];
+        let mut pixmap = blank(size)?;
+        pixmap.fill(Color::WHITE);
+        resvg::render(&tree, Transform::from_scale(self.zoom, self.zoom), &mut pixmap.as_mut());
+        Ok(Picture { size, rgba: pixmap.take() })
+    }
 }

@@ -51,7 +51,7 @@ pub fn stress(
     if is_raster {
         note += &format!("; {} cells drawn as squares of their largest value", shown.len());
     }
-    let heading = Heading { title: subject.title.into(), note, legend: Vec::new() };
+    let heading = Heading { title: subject.title.into(), note, ..Heading::default() };
     page::with_body(&heading, axes, subject.unit, bands.bar_room(), |svg, axes| {
         if is_raster {
             draw_raster(svg, axes, &places, &shown, &bands, subject.body.lattice.spacing());

@@ -103,7 +103,7 @@ impl Swept<'_> {
     fn heading(&self, output: &Column) -> Heading {
         let words: Vec<String> = self.keys.iter().filter_map(Column::words).collect();
         let note = [vec![format!("{}, {} runs", output.name, self.runs())], words].concat().join("; ");
-        Heading { title: self.title.to_owned(), note, legend: Vec::new() }
+        Heading { title: self.title.to_owned(), note, ..Heading::default() }
     }
 }
 

@@ -52,7 +52,7 @@ pub fn von_mises(pair: &Pair<'_>, rule: &[f64], truth: &[f64]) -> String {
     let heading = Heading {
         title: pair.title.into(),
         note: format!("von Mises stress at the centres of the cells{}", scale_note(factor)),
-        legend: Vec::new(),
+        ..Heading::default()
     };
     Sheet { axes, is_row, scales, heading }.draw(pair, &panels)
 }

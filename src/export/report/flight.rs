@@ -6,7 +6,7 @@ use super::super::error::ExportError;
 use super::super::figures::flight_map::{moves, outline};
 use super::super::{OutputFolder, flight};
 use super::encoded;
-use super::frames::{Channel, Frames};
+use super::frames::{Channel, Frame, Frames};
 use super::page::{Page, Table, number, scene_text};
 use super::plot::Plot;
 use super::view::{Animation, Clock, Outline, Quantity, View};
@@ -86,8 +86,22 @@ impl FlightRecorder {
         if is_last { self.frames.keep_last(period, &values) } else { self.frames.keep(period, &values) }
     }
 
+    pub(in crate::export) fn frames(&self) -> &[Frame] {
+        self.frames.kept()
+    }
+
+    /// Time of a frame \[s\].
+    pub(in crate::export) fn time(&self, frame: usize) -> f64 {
+        self.frames.kept()[frame].step as f64 * self.period
+    }
+
+    /// Places from which displacements are counted \[m\].
+    pub(in crate::export) fn start(&self) -> &Vectors {
+        &self.start
+    }
+
     /// The animation of the flight.
-    pub fn stage(self, swarm: &Swarm, report: &FlightReport) -> View {
+    pub fn stage(&mut self, swarm: &Swarm, report: &FlightReport) -> View {
         let names = report.per_robot.iter().map(|robot| robot.name.clone()).collect();
         let mut stage = self.begun(swarm, names);
         let robots = || report.per_robot.iter();
@@ -102,7 +116,7 @@ impl FlightRecorder {
     /// Robots as they are, in a single frame; displacements are from `start` \[m\].
     #[cfg(feature = "live")]
     pub(crate) fn still(swarm: &Swarm, flight: &Flight, start: &Vectors) -> View {
-        let recorder = Self::since(flight, start.clone());
+        let mut recorder = Self::since(flight, start.clone());
         let stage = recorder.begun(swarm, flight.control().formation().names.clone());
         recorder.finished(stage)
     }
@@ -120,7 +134,7 @@ impl FlightRecorder {
         stage
     }
 
-    fn finished(mut self, mut stage: View) -> View {
+    fn finished(&mut self, mut stage: View) -> View {
         let encoded = encoded(&mut self.frames, stage.size());
         let times = self.frames.kept().iter().map(|frame| frame.step as f64 * self.period).collect();
         stage.set_frames(&self.frames, encoded, times);

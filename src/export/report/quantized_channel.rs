@@ -60,6 +60,15 @@ impl QuantizedChannel {
         }
     }
 
+    /// The values, each within half a quantum; NaN where there is none.
+    pub fn values(&self) -> Vec<f64> {
+        let mut codes = Vec::new();
+        self.read(&mut codes);
+        let (quantum, nothing) = (f64::from(self.exponent).exp2(), none(self.bits));
+        let value = |code: u32| (self.base + i64::from(code)) as f64 * quantum;
+        codes.into_iter().map(|code| if code == nothing { f64::NAN } else { value(code) }).collect()
+    }
+
     /// Bytes of a code in memory and in the file.
     pub fn bytes(bits: u32) -> usize {
         bits.div_ceil(8) as usize
@@ -100,7 +109,7 @@ mod tests {
     }
 
     fn value(track: &QuantizedChannel, particle: usize) -> f64 {
-        (track.base + i64::from(code(track, particle))) as f64 * f64::from(track.exponent).exp2()
+        track.values()[particle]
     }
 
     #[test]
@@ -127,6 +136,8 @@ mod tests {
         let track = QuantizedChannel::of(&[1.0, f64::NAN, f64::INFINITY, 2.0], 12, None);
         assert_eq!([code(&track, 1), code(&track, 2)], [none(12); 2]);
         assert!(code(&track, 3) < none(12));
+        let is_there: Vec<bool> = track.values().iter().map(|value| value.is_finite()).collect();
+        assert_eq!(is_there, [true, false, false, true]);
     }
 
     #[test]

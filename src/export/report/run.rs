@@ -63,6 +63,7 @@ pub struct RunRecorder {
     /// Step, particle and role.
     changes: Vec<[u32; 3]>,
     values: Vec<Vec<f64>>,
+    is_solved: bool,
 }
 
 impl RunRecorder {
@@ -79,7 +80,7 @@ impl RunRecorder {
         let roles = engine.roles().to_vec();
         let values = vec![Vec::new(); channels.len()];
         let frames = Frames::new(count, channels);
-        Self { frames, first_roles: roles.clone(), roles, changes: Vec::new(), values }
+        Self { frames, first_roles: roles.clone(), roles, changes: Vec::new(), values, is_solved: false }
     }
 
     /// The recorder, made if there is none yet; it goes on from the state of an earlier one.
@@ -168,12 +169,40 @@ impl RunRecorder {
         self.roles.copy_from_slice(engine.roles());
     }
 
-    /// The animation of the run.
-    pub fn stage(mut self, scene: &Scene, outcome: &Outcome) -> View {
-        let engine = &outcome.engine;
-        let is_solved = is_solved_at_once(scene, outcome);
-        self.finish(engine, is_solved);
+    /// Takes the frames of the end, after which there are no others.
+    pub fn close(&mut self, scene: &Scene, outcome: &Outcome) {
+        self.is_solved = is_solved_at_once(scene, outcome);
+        self.finish(&outcome.engine, self.is_solved);
+    }
+
+    /// The animation of a run that is closed; of frames that are too many for a page half are let go.
+    pub fn stage(&mut self, scene: &Scene, outcome: &Outcome) -> View {
+        let (engine, is_solved) = (&outcome.engine, self.is_solved);
         self.view(scene, engine, is_solved, engine.body().count() <= MOST_EXACT)
+    }
+
+    pub(in crate::export) fn frames(&self) -> &[Frame] {
+        self.frames.kept()
+    }
+
+    /// Whether the frames are parts of the way to a rest that was solved for.
+    pub(in crate::export) fn is_solved(&self) -> bool {
+        self.is_solved
+    }
+
+    /// The part of the load at a frame, if frames are parts of it.
+    pub(in crate::export) fn part_of_load(&self, frame: usize) -> Option<f64> {
+        self.is_solved.then_some(frame as f64 / LOAD_FRAMES as f64)
+    }
+
+    pub(in crate::export) fn roles_at(&self, step: usize) -> Vec<Role> {
+        let mut roles = self.first_roles.clone();
+        for &[_, particle, role] in
+            self.changes.iter().filter(|[at, ..]| self.is_solved || *at as usize <= step)
+        {
+            roles[particle as usize] = Role::ALL[role as usize];
+        }
+        roles
     }
 
     /// A body as it is, in a single frame.
@@ -184,7 +213,7 @@ impl RunRecorder {
         recorder.view(scene, engine, false, false)
     }
 
-    fn view(mut self, scene: &Scene, engine: &Engine, is_solved: bool, is_exact: bool) -> View {
+    fn view(&mut self, scene: &Scene, engine: &Engine, is_solved: bool, is_exact: bool) -> View {
         let mut stage = View::new(animation(scene, engine, is_solved));
         stage.set_reference(&engine.body().reference);
         stage.set_roles(&self.first_roles, &self.changes);

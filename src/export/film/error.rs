@@ -1,0 +1,88 @@
+//! Errors of making films.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// Why there is no film.
+#[derive(Debug, thiserror::Error)]
+pub enum FilmError {
+    /// An ending that names no format.
+    #[error(
+        "{} does not say what film it is to be\n  help: end the name with .gif, .mp4 or .webm", .0.display()
+    )]
+    Ending(PathBuf),
+    /// A file that stands where the film belongs.
+    #[error("{} exists: give --force to replace it, or --film another name", .0.display())]
+    Taken(PathBuf),
+    /// A file that would be replaced, but is no film.
+    #[error("{} is no film of this kind: --force leaves it alone; give --film another name", .0.display())]
+    NotAFilm(PathBuf),
+    /// A folder that does not exist.
+    #[error("there is no folder {} for the film\n  help: make it, or give --film another place", .0.display())]
+    NoFolder(PathBuf),
+    /// A place inside the folder of results, which appears only at the end.
+    #[error(
+        "the film would stand in {}, which is for the results alone\n  help: give --film a place outside it",
+        .0.display()
+    )]
+    InResults(PathBuf),
+    /// Another program makes the same film.
+    #[error("{} is being made by another flockform that still runs: give --film another name", .0.display())]
+    Busy(PathBuf),
+    /// No program that makes videos.
+    #[error(
+        "{} takes the program `ffmpeg`: {reason}\n  help: install ffmpeg, or end the name of the film with .gif",
+        .path.display()
+    )]
+    NoEncoder {
+        /// The film.
+        path: PathBuf,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// A quantity that the subject does not have.
+    #[error("--film-colour {colour}: {reason}\n  help: {} can be shown: {choices}", .of)]
+    Colour {
+        /// The quantity asked for.
+        colour: &'static str,
+        /// Why it cannot be shown.
+        reason: &'static str,
+        /// Of what others can be shown.
+        of: &'static str,
+        /// The others.
+        choices: &'static str,
+    },
+    /// A frame that cannot be drawn.
+    #[error("frame {frame} of the film cannot be drawn: {reason}")]
+    Frame {
+        /// Its number, from 0.
+        frame: usize,
+        /// What the renderer said.
+        reason: String,
+    },
+    /// The program that makes videos failed.
+    #[error("ffmpeg made no film of {}: {said}", .path.display())]
+    Encoder {
+        /// The film.
+        path: PathBuf,
+        /// What the program said.
+        said: String,
+    },
+    /// The system refuses the file.
+    #[error("cannot {action} {}: {source}", .path.display())]
+    Io {
+        /// What was tried, as a verb.
+        action: &'static str,
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+}
+
+impl FilmError {
+    /// For `map_err`: what was tried, and on which path.
+    pub(super) fn io(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Self {
+        move |source| Self::Io { action, path: path.to_owned(), source }
+    }
+}

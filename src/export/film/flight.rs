@@ -1,0 +1,83 @@
+//! The film of a flight: its map at one time after another, with the ways flown so far.
+
+use super::{Film, FilmColour, FilmError, Scale, chosen};
+use crate::export::figures::bands::Bands;
+use crate::export::figures::flight_map::{Map, Moment};
+use crate::export::report::FlightRecorder;
+use crate::flock::vectors::Vectors;
+use crate::scene::swarm::Swarm;
+use crate::swarm::flight::{FlightReport, Record};
+
+/// Differences below this are rounding \[m\], \[1\]; of squares its square.
+const NOISE: f64 = 1e-9;
+
+/// Refuses a colour that robots do not have.
+///
+/// # Errors
+/// Stress and moves, which bodies have.
+pub fn require_colour(colour: FilmColour) -> Result<(), FilmError> {
+    let colour = match colour {
+        FilmColour::VonMises => "von-mises",
+        FilmColour::Pe2 => "pe2",
+        _ => return Ok(()),
+    };
+    let choices = "role, displacement, pe1, strain, clearance";
+    Err(FilmError::Colour { colour, reason: "robots have none", of: "of a swarm", choices })
+}
+
+/// The film of a flight whose recorder has seen all of it.
+pub fn film<'a>(
+    swarm: &'a Swarm,
+    record: &'a Record,
+    report: &'a FlightReport,
+    recorder: &'a FlightRecorder,
+    colour: FilmColour,
+) -> Film<'a> {
+    let frames = chosen(recorder.frames().len());
+    let values = move |frame: usize| -> Option<Vec<f64>> {
+        let tracks = &recorder.frames()[frame].tracks;
+        Some(match colour {
+            FilmColour::Displacement => {
+                let both = tracks[0].values().into_iter().zip(tracks[1].values());
+                both.map(|(x, y)| x.hypot(y)).collect()
+            }
+            FilmColour::Clearance => tracks[2].values(),
+            FilmColour::Pe1 => tracks[4].values(),
+            FilmColour::Strain => tracks[5].values(),
+            FilmColour::Role | FilmColour::Pe2 | FilmColour::VonMises => return None,
+        })
+    };
+    let finite =
+        |frame: &usize| values(*frame).unwrap_or_default().into_iter().filter(|value| value.is_finite());
+    let range = frames.iter().flat_map(finite);
+    let range = range.fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], v| [f64::min(l, v), f64::max(h, v)]);
+    let scale = scale(colour, range);
+    let places = move |frame: usize| -> Vectors {
+        let tracks = &recorder.frames()[frame].tracks;
+        let moved = tracks[0].values().into_iter().zip(tracks[1].values());
+        recorder.start().iter().zip(moved).map(|([x, y], (dx, dy))| [x + dx, y + dy]).collect()
+    };
+    let map = Map::new(swarm, record, report);
+    let count = frames.len();
+    let draw = move |n: usize| {
+        let (frame, values) = (frames[n], values(frames[n]));
+        let field = scale.as_ref().zip(values.as_deref()).map(|(scale, values)| scale.field(values));
+        let time = recorder.time(frame);
+        // The periods are whole, times are sums of them.
+        let flown = record.times.partition_point(|&at| at <= time + 1e-9 * time.abs());
+        let note = format!("{} robots, {time:.1} s", report.robots);
+        map.draw(&Moment { flown, places: &places(frame), note, field })
+    };
+    Film { count, draw: Box::new(draw) }
+}
+
+fn scale(colour: FilmColour, [low, high]: [f64; 2]) -> Option<Scale<'static>> {
+    let (quantity, unit, noise) = match colour {
+        FilmColour::Displacement => ("displacement", "m", NOISE),
+        FilmColour::Clearance => ("clearance", "m", NOISE),
+        FilmColour::Pe1 => ("PE1", "m²", NOISE * NOISE),
+        FilmColour::Strain => ("largest strain", "", NOISE),
+        FilmColour::Role | FilmColour::Pe2 | FilmColour::VonMises => return None,
+    };
+    Some(Scale { quantity, unit: unit.into(), bands: Bands::around(low, high, noise) })
+}

@@ -1,0 +1,185 @@
+//! The film of a run: its configurations, coloured by a quantity.
+
+use std::collections::HashSet;
+
+use rayon::prelude::*;
+
+use super::{Film, FilmColour, FilmError, Scale, chosen};
+use crate::continuum::mechanics::Stresses;
+use crate::continuum::record::Snapshot;
+use crate::continuum::run::Outcome;
+use crate::engine::Engine;
+use crate::export::figures::configuration::{Setting, configuration_in};
+use crate::export::figures::{Subject, page};
+use crate::export::report::RunRecorder;
+use crate::flock::pseudo_energy::pe1_among;
+use crate::flock::strain::strain_among;
+use crate::flock::vectors::Vectors;
+use crate::scene::Scene;
+use crate::scene::units::Units;
+
+/// Differences below this part of the spacing, or of one, are rounding.
+const NOISE: f64 = 1e-9;
+
+/// Refuses a colour that a scene's particles do not have.
+///
+/// # Errors
+/// Stress without a material, moves of a body that is solved for, and what robots alone have.
+pub fn require_colour(scene: &Scene, colour: FilmColour) -> Result<(), FilmError> {
+    let is_solved_at_once = scene.equilibrium.is_some() && scene.load_steps.is_none();
+    let (colour, reason) = match colour {
+        FilmColour::VonMises if scene.material.is_none() => ("von-mises", "the scene has no material"),
+        FilmColour::Pe2 if is_solved_at_once => ("pe2", "a body that is solved for at once makes no moves"),
+        FilmColour::Clearance => ("clearance", "particles keep no clearance, robots do"),
+        _ => return Ok(()),
+    };
+    let choices = "role, displacement, pe1, strain; pe2 of what is stepped, von-mises of a material";
+    Err(FilmError::Colour { colour, reason, of: "of a body", choices })
+}
+
+/// The film of a run whose recorder is finished.
+pub fn film<'a>(
+    scene: &'a Scene,
+    outcome: &'a Outcome,
+    recorder: &'a RunRecorder,
+    colour: FilmColour,
+) -> Film<'a> {
+    let frames = chosen(recorder.frames().len());
+    let shown = Shown { scene, engine: &outcome.engine, recorder, colour };
+    let mut setting = Setting::default();
+    let subject = Subject::of(scene, &outcome.engine);
+    for &frame in &frames {
+        let (snapshot, values) = (shown.snapshot(frame), shown.values(frame));
+        setting.include(&snapshot, values.as_deref());
+    }
+    let scale = shown.scale(&setting);
+    for &frame in &frames {
+        setting.reserve(&subject, shown.note(&subject, frame), scale.as_ref().map(|scale| &scale.bands));
+    }
+    let count = frames.len();
+    let draw = move |n: usize| {
+        let frame = frames[n];
+        let (snapshot, values) = (shown.snapshot(frame), shown.values(frame));
+        let field = scale.as_ref().zip(values.as_deref()).map(|(scale, values)| scale.field(values));
+        let note = shown.note(&subject, frame);
+        configuration_in(&setting, &subject, &snapshot, note, field.as_ref())
+    };
+    Film { count, draw: Box::new(draw) }
+}
+
+/// What the frames are taken from.
+struct Shown<'a> {
+    scene: &'a Scene,
+    engine: &'a Engine,
+    recorder: &'a RunRecorder,
+    colour: FilmColour,
+}
+
+impl Shown<'_> {
+    fn displacement(&self, frame: usize) -> Vectors {
+        let tracks = &self.recorder.frames()[frame].tracks;
+        Vectors { x: tracks[0].values(), y: tracks[1].values() }
+    }
+
+    /// The configuration, without the energies, which the figure does not show.
+    fn snapshot(&self, frame: usize) -> Snapshot {
+        let step = self.recorder.frames()[frame].step;
+        let rest = self.engine.body().reference.iter();
+        let place = |(then, by): ([f64; 2], [f64; 2])| [then[0] + by[0], then[1] + by[1]];
+        Snapshot {
+            step,
+            positions: rest.zip(self.displacement(frame).iter()).map(place).collect(),
+            roles: self.recorder.roles_at(step),
+            pe1: Vec::new(),
+            pe2: Vec::new(),
+            broken: self.broken(frame),
+        }
+    }
+
+    fn broken(&self, frame: usize) -> Vec<[u32; 2]> {
+        let step = self.recorder.frames()[frame].step;
+        // Bonds of a body at rest were broken before its load.
+        let is_broken = |at: usize| self.recorder.is_solved() || at <= step;
+        self.engine.breaks().iter().filter(|one| is_broken(one.step)).map(|one| one.pair).collect()
+    }
+
+    fn note(&self, subject: &Subject<'_>, frame: usize) -> String {
+        let step = self.recorder.frames()[frame].step;
+        let clock = match self.recorder.part_of_load(step) {
+            Some(part) => format!("{:.0} % of the load", 100.0 * part),
+            None => format!("{} {step}", subject.counts),
+        };
+        page::note_at(&clock, self.broken(frame).len())
+    }
+
+    /// Shape \[count\]; none where roles are shown.
+    fn values(&self, frame: usize) -> Option<Vec<f64>> {
+        let tracks = &self.recorder.frames()[frame].tracks;
+        // Of neighbours that are found anew the recorder has kept what the engine saw.
+        let is_kept = tracks.len() > 4;
+        Some(match self.colour {
+            FilmColour::Role | FilmColour::Clearance => return None,
+            FilmColour::Displacement => self.displacement(frame).iter().map(|[x, y]| x.hypot(y)).collect(),
+            FilmColour::Pe2 => tracks[2].values(),
+            FilmColour::Pe1 if is_kept => tracks[3].values(),
+            FilmColour::Strain if is_kept => tracks[4].values(),
+            FilmColour::Pe1 => self.by_neighbours(frame, |i, neighbours, places| {
+                pe1_among(self.engine.flock(), i, neighbours, places)
+            }),
+            FilmColour::Strain => self.by_neighbours(frame, |i, neighbours, places| {
+                let strain = strain_among(self.engine.flock(), i, neighbours, places);
+                strain.map_or(f64::NAN, |strain| strain.largest())
+            }),
+            FilmColour::VonMises => self.stress(frame),
+        })
+    }
+
+    /// A number of every particle from those that are bonded to it at the frame.
+    fn by_neighbours(
+        &self,
+        frame: usize,
+        of: impl Fn(usize, &mut dyn Iterator<Item = usize>, &Vectors) -> f64 + Sync,
+    ) -> Vec<f64> {
+        let snapshot = self.snapshot(frame);
+        let broken: HashSet<[u32; 2]> = snapshot.broken.iter().copied().collect();
+        let neighbours = &self.engine.flock().neighbours;
+        let one = |i: usize| {
+            let is_live = |&k: &u32| !broken.contains(&[k.min(i as u32), k.max(i as u32)]);
+            let live = neighbours.of(i).iter().copied().filter(is_live);
+            of(i, &mut live.map(|k| k as usize), &snapshot.positions)
+        };
+        (0..snapshot.positions.len()).into_par_iter().map(one).collect()
+    }
+
+    fn stress(&self, frame: usize) -> Vec<f64> {
+        let displacement = self.displacement(frame);
+        let found = self
+            .scene
+            .material
+            .as_ref()
+            .and_then(|elastic| Stresses::of(self.engine, elastic, &displacement, &self.broken(frame)));
+        let none = || vec![f64::NAN; displacement.len()];
+        let size = |found: Stresses| {
+            let of = |one: &Option<_>| one.as_ref().map_or(f64::NAN, von_mises);
+            found.particles.iter().map(of).collect()
+        };
+        found.map_or_else(none, size)
+    }
+
+    fn scale(&self, setting: &Setting) -> Option<Scale<'static>> {
+        let (unit, spacing) = (self.scene.unit(), self.engine.body().lattice.spacing());
+        let (quantity, unit, noise) = match self.colour {
+            FilmColour::Role | FilmColour::Clearance => return None,
+            FilmColour::Displacement => ("displacement", unit.to_owned(), NOISE * spacing),
+            FilmColour::Pe1 => ("PE1", format!("{unit}²"), (NOISE * spacing).powi(2)),
+            FilmColour::Pe2 => ("PE2", unit.to_owned(), NOISE * spacing),
+            FilmColour::Strain => ("largest strain", String::new(), NOISE),
+            FilmColour::VonMises => ("von Mises stress", Units::of(self.scene).stress, 0.0),
+        };
+        Some(Scale { quantity, unit, bands: setting.bands(noise) })
+    }
+}
+
+fn von_mises(stress: &crate::material::stress::StressState) -> f64 {
+    stress.von_mises
+}
