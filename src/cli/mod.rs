@@ -12,6 +12,7 @@ mod interrupt;
 mod live;
 pub mod log;
 mod material;
+mod memory;
 mod names;
 mod node;
 mod output;

@@ -5,10 +5,11 @@ use std::path::{Path, PathBuf};
 
 use clap::builder::{PossibleValue, StringValueParser, TypedValueParser};
 use clap::{Args, ValueEnum};
+use flockform::continuum::memory::at_least;
 use flockform::scene::bundled::bundled_swarm;
 use flockform::scene::{self, Bundled, Scene, SceneError, bundled};
 
-use super::Refusal;
+use super::{Refusal, memory};
 
 /// The kinds of file that the program reads.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -192,7 +193,10 @@ impl SceneArguments {
         if bundled(&self.scene).is_none() {
             Kind::Scene.path(&self.scene)?;
         }
-        self.load_scene(&more).map_err(|error| Kind::Scene.refuse_other(&self.scene).unwrap_or(error.into()))
+        let refuse = |error: SceneError| Kind::Scene.refuse_other(&self.scene).unwrap_or(error.into());
+        let scene = self.load_scene(&more).map_err(refuse)?;
+        memory::require(&scene, at_least(&scene))?;
+        Ok(scene)
     }
 
     /// The scene with these overrides after the user's own.

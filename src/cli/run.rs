@@ -13,6 +13,7 @@ use clap::Args;
 use flockform::continuum::digest::{digest, fnv1a};
 use flockform::continuum::equilibrium::run_to_equilibrium_watched;
 use flockform::continuum::looks::Looks;
+use flockform::continuum::memory::foretold;
 use flockform::continuum::plan::Plan;
 use flockform::continuum::run::{Outcome, SharedError, StopReason, require_shareable, resume, run_shared};
 use flockform::export::checkpoint::{self, Checkpoint, RunRequest};
@@ -39,7 +40,7 @@ use super::output::{FigureArguments, OutputArguments, ReportArguments};
 use super::progress::{Drawn, Progress};
 use super::ranks::{self, Interrupted, Start};
 use super::recording::{RecordArguments, close};
-use super::{FAILED, Refusal, interrupt, print, say};
+use super::{FAILED, Refusal, interrupt, memory, print, say};
 
 #[derive(Debug, Args)]
 pub struct RunArguments {
@@ -114,6 +115,7 @@ impl Prepared {
             equilibrium.request.interrupt = Interrupt::new(interrupt::flag());
         }
         let plan = plan(&scene)?;
+        memory::require(&scene, foretold(&scene, &plan) as f64)?;
         let digest = digest(&plan);
         left.as_ref().map_or(Ok(()), |left| left.require_of(&scene, digest))?;
         Ok(Self { left, asked, scene, words, plan, digest })

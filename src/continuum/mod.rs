@@ -14,6 +14,7 @@ pub mod equilibrium;
 pub mod layout;
 pub mod looks;
 pub mod mechanics;
+pub mod memory;
 pub mod places;
 pub mod plan;
 pub mod record;

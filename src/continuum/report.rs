@@ -6,6 +6,7 @@ use super::active_share::active_share;
 use super::bulk_response;
 use super::deviation::{Deviation, pieces};
 use super::equilibrium::select_solver;
+use super::memory::{foretold, neighbour_entries, readable_bytes};
 use super::plan::Plan;
 use crate::flock::fracture::Threshold;
 use crate::flock::law::Weights;
@@ -13,7 +14,6 @@ use crate::flock::role::Role;
 use crate::flock::rules::{FeedbackReference, Mean};
 use crate::material::outline_loads::Resultant;
 use crate::material::stiffness::area;
-use crate::material::stress::StressState;
 use crate::scene::{LoadSteps, Scene, SceneError, Weights as SceneWeights};
 use crate::sweep::{Order, Sweep};
 
@@ -204,7 +204,7 @@ fn facts(
         )
     });
     let outline = outline_facts(scene, plan, deviation);
-    let last = [("memory", format!("about {}", readable_bytes(memory(scene, plan)))), ("stops", stop)];
+    let last = [("memory", format!("about {}", readable_bytes(foretold(scene, plan)))), ("stops", stop)];
     let facts = first.into_iter().chain(swept.into_iter().flatten()).chain(moving).chain(last);
     Ok(facts.map(|(name, value)| (name.to_owned(), value)).chain(outline).collect())
 }
@@ -277,72 +277,6 @@ fn cautions(scene: &Scene, plan: &Plan, deviation: Option<&Deviation>) -> Vec<St
         cautions.push("no particle leads: the body relaxes by itself".into());
     }
     cautions
-}
-
-/// Entries of the neighbour lists; where they are found anew at every step, about as many as the
-/// radius holds at the reference density.
-fn neighbour_entries(plan: &Plan) -> usize {
-    match plan.setup.present_radius {
-        None => plan.setup.flock.neighbours.index.len(),
-        Some(radius) => {
-            let within = std::f64::consts::PI * radius * radius / plan.setup.body.lattice.cell_area();
-            (plan.count() as f64 * within.min(plan.count() as f64)) as usize
-        }
-    }
-}
-
-/// Bytes that the run holds when it writes its results, at its largest: what it steps, and [`results`].
-fn memory(scene: &Scene, plan: &Plan) -> usize {
-    stepped(plan) + results(scene, plan)
-}
-
-/// Bytes of configurations kept for figures, and of the last one in numbers.
-fn results(scene: &Scene, plan: &Plan) -> usize {
-    let is_solved_at_once = scene.equilibrium.is_some() && scene.load_steps.is_none();
-    let before = |figure: &&usize| !is_solved_at_once && **figure < plan.stop.steps;
-    // The last one is kept for its figure and for the numbers.
-    let snapshots = scene.record.figures.iter().filter(before).count() + 1;
-    let stress = scene.material.map_or(0, |_| size_of::<Option<StressState>>());
-    plan.count() * (snapshots * SNAPSHOT + stress)
-}
-
-/// Bytes of a particle in a [`Snapshot`](super::record::Snapshot): position, role and energies.
-const SNAPSHOT: usize = 16 + 1 + 2 * 8;
-
-/// Bytes that the steps take: positions (twice), reference, roles, sites, neighbour lists and what
-/// the scene adds to them.
-fn stepped(plan: &Plan) -> usize {
-    let (count, bonds) = (plan.count(), neighbour_entries(plan));
-    let present = |is: bool, bytes: usize| if is { bytes } else { 0 };
-    let cells = plan
-        .setup
-        .cells
-        .as_ref()
-        .map_or(0, |cells| 4 * (cells.starts.len() + cells.index.len() + cells.count()));
-    count * (3 * 16 + 3 + 8 + 4)
-        + bonds * 4
-        + match &plan.setup.flock.weights {
-            Weights::Equal => 0,
-            Weights::Scalar(weights) => 8 * weights.len(),
-            Weights::Matrix(weights) => {
-                let cells = weights.cells.as_ref().map_or(0, |cells| cells.bytes());
-                4 * count + 32 * weights.blocks.len() + cells
-            }
-        }
-        + cells
-        + 16 * count * plan.setup.loads.len()
-        + present(plan.setup.flock.forces.is_some(), 16 * count)
-        + present(plan.setup.flock.rest.is_some(), 16 * count)
-        + present(plan.setup.flock.bonds.is_some(), bonds)
-        + present(plan.setup.present_radius.is_some(), 8 * count)
-}
-
-fn readable_bytes(bytes: usize) -> String {
-    match bytes as f64 {
-        b if b < 1024.0 * 1024.0 => format!("{:.0} KiB", (b / 1024.0).ceil()),
-        b if b < 1024.0 * 1024.0 * 1024.0 => format!("{:.1} MiB", b / 1024.0 / 1024.0),
-        b => format!("{:.2} GiB", b / 1024.0 / 1024.0 / 1024.0),
-    }
 }
 
 impl fmt::Display for PlanReport {

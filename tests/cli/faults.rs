@@ -1,6 +1,7 @@
 //! What nobody asks for and somebody will meet: runs at once, values without bounds, files that write to the terminal.
 
 use std::path::Path;
+use std::process::Command;
 use std::time::{Duration, Instant};
 
 use crate::program::*;
@@ -28,6 +29,30 @@ fn runs_that_begin_at_once_get_a_folder_each() {
     for name in ["tension", "tension-2", "tension-3", "tension-4"] {
         assert!(folder.path().join("out").join(name).join("summary.json").is_file(), "{name}");
     }
+}
+
+#[test]
+fn a_body_beyond_the_memory_that_is_there_is_refused_with_both_numbers() {
+    let folder = temporary();
+    let limited = |columns: &str, words: &str| {
+        let program = command(&[], folder.path()).get_program().to_string_lossy().into_owned();
+        let body = format!("body.shape={{kind=\"grid\",columns={columns},rows={columns}}}");
+        let run = format!("ulimit -v 3000000; exec '{program}' {words} tension --set '{body}'");
+        Command::new("sh").args(["-c", &run]).current_dir(folder.path()).output().expect("sh starts")
+    };
+    // 63 bytes a particle are 6.3 and 3.1 GB; that is known before any of it is asked for.
+    for columns in ["10000", "7000"] {
+        for words in ["run --out o", "plan"] {
+            let output = limited(columns, words);
+            let said = text(&output.stderr);
+            assert_eq!(output.status.code(), Some(2), "{columns}: {said}");
+            assert!(said.contains("GiB of memory or more") && said.contains("`ulimit -v`"), "{said}");
+            assert!(said.contains("help: "), "{said}");
+        }
+    }
+    assert!(names_in(folder.path()).is_empty());
+    let small = limited("20", "plan");
+    assert!(small.status.success(), "{}", text(&small.stderr));
 }
 
 #[test]

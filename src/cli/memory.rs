@@ -1,0 +1,127 @@
+//! The memory that is there, and bodies that are too large for it.
+
+use std::fs::read_to_string;
+use std::path::Path;
+
+use flockform::continuum::memory::readable_bytes;
+use flockform::scene::{Scene, SceneError};
+
+/// Memory that this process may still take, and what bounds it.
+#[derive(Clone, Debug, PartialEq)]
+struct Room {
+    bytes: u64,
+    bound: &'static str,
+}
+
+/// Refuses a scene whose run takes more bytes than there are, so that no kernel has to end it on the way.
+///
+/// # Errors
+/// Says how much is taken, and how much is there.
+pub fn require(scene: &Scene, bytes: f64) -> Result<(), SceneError> {
+    match room() {
+        Some(room) if bytes > room.bytes as f64 => {
+            let [asked, there] = [bytes as usize, room.bytes as usize].map(readable_bytes);
+            let message = format!(
+                "a run of it takes {asked} of memory or more, and {there} are there ({})",
+                room.bound
+            );
+            Err(scene.refuse(
+                "body",
+                message,
+                "use a larger `lattice.spacing`, a smaller body, or fewer `record.figures`",
+            ))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// The least of the machine's, the control groups' and the process's own; `None` where the system says nothing.
+fn room() -> Option<Room> {
+    let machine = read_to_string("/proc/meminfo").ok().and_then(|text| field(&text, "MemAvailable:"));
+    let machine = machine.map(|kilobytes| Room { bytes: 1024 * kilobytes, bound: "the machine's" });
+    let groups = read_to_string("/proc/self/cgroup").ok().and_then(|text| of_groups(&text));
+    let own = read_to_string("/proc/self/limits").ok().and_then(|text| field(&text, "Max address space"));
+    let taken =
+        read_to_string("/proc/self/status").ok().and_then(|text| field(&text, "VmSize:")).unwrap_or(0);
+    let own = own.map(|limit| Room { bytes: limit.saturating_sub(1024 * taken), bound: "`ulimit -v`" });
+    [machine, groups, own].into_iter().flatten().min_by_key(|room| room.bytes)
+}
+
+/// The number behind a word of a text, if there is one.
+fn field(text: &str, name: &str) -> Option<u64> {
+    let line = text.lines().find_map(|line| line.strip_prefix(name))?;
+    line.split_whitespace().next()?.parse().ok()
+}
+
+/// The least room in the control groups that a process is in, as `/proc/self/cgroup` names them.
+fn of_groups(text: &str) -> Option<Room> {
+    let rooms = text.lines().filter_map(|line| {
+        let [_, controllers, path] = <[&str; 3]>::try_from(line.splitn(3, ':').collect::<Vec<_>>()).ok()?;
+        match controllers {
+            "" => least_room("/sys/fs/cgroup", path, ["memory.max", "memory.current"]),
+            "memory" => {
+                least_room("/sys/fs/cgroup/memory", path, ["memory.limit_in_bytes", "memory.usage_in_bytes"])
+            }
+            _ => None,
+        }
+    });
+    rooms.min().map(|bytes| Room { bytes, bound: "its control group's" })
+}
+
+/// The least room in a group and those around it; within a container its own group is the outermost one that it sees.
+fn least_room(mount: &str, path: &str, [limit, usage]: [&str; 2]) -> Option<u64> {
+    let groups = Path::new(path.trim_start_matches('/')).ancestors();
+    let room = |group: &Path| {
+        let group = Path::new(mount).join(group);
+        let read = |file: &str| read_to_string(group.join(file)).ok();
+        let number = |file: &str| read(file)?.trim().parse::<u64>().ok();
+        // Files that are kept because there was room for them make way.
+        let gives_way = read("memory.stat").and_then(|text| field(&text, "inactive_file ")).unwrap_or(0);
+        Some(number(limit)?.saturating_sub(number(usage)?.saturating_sub(gives_way)))
+    };
+    groups.filter_map(room).min()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_read_behind_their_words() {
+        let text = "MemTotal:       24576 kB\nMemAvailable:   1000 kB\nMax address space         unlimited  unlimited  bytes\n";
+        assert_eq!(field(text, "MemAvailable:"), Some(1000));
+        assert_eq!(field(text, "Max address space"), None);
+        assert_eq!(field(text, "VmSize:"), None);
+        assert_eq!(
+            field("Max address space    4096000000  unlimited bytes", "Max address space"),
+            Some(4_096_000_000)
+        );
+    }
+
+    #[test]
+    fn the_tightest_of_nested_groups_counts_and_files_in_it_give_way() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let write = |group: &str, file: &str, text: &str| {
+            let group = folder.path().join(group);
+            std::fs::create_dir_all(&group).expect("a folder");
+            std::fs::write(group.join(file), text).expect("written");
+        };
+        write("a/b", "memory.max", "max\n");
+        write("a/b", "memory.current", "700\n");
+        write("a", "memory.max", "5000\n");
+        write("a", "memory.current", "3000\n");
+        write("a", "memory.stat", "anon 1000\ninactive_file 500\n");
+        let mount = folder.path().to_str().expect("plain");
+        let files = ["memory.max", "memory.current"];
+        assert_eq!(least_room(mount, "/a/b", files), Some(2500));
+        write("a/b", "memory.max", "1000\n");
+        assert_eq!(least_room(mount, "/a/b", files), Some(300));
+        assert_eq!(least_room(mount, "/elsewhere", files), None);
+    }
+
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn this_machine_has_some() {
+        assert!(room().is_some_and(|room| room.bytes > 1 << 20));
+    }
+}
