@@ -229,7 +229,7 @@ pub enum Refusal {
     #[error("{0}")]
     Checkpoint(#[from] export::checkpoint::CheckpointError),
     #[error(
-        "there is no {kinds} file and no bundled {kinds} `{name}`\n  help: the nearest bundled {kind} is `{nearest}`; {} lists them all",
+        "there is no {kinds} file and no bundled {kinds} `{name}`\n  help: the nearest bundled {kind} is `{nearest}`; see {} for all of them",
         .kinds.lists()
     )]
     NotBundled { kinds: names::Kinds, name: String, kind: &'static str, nearest: &'static str },
