@@ -378,8 +378,10 @@ fn a_configuration_shows_every_particle_in_the_colour_of_its_role() {
     let svg = figures::configuration(&run.subject(), &run.snapshots[0]);
     let figure = Document::parse(&svg).expect("well-formed");
     for (role, count) in [("leader", 10), ("clamped", 10), ("follower", 80), ("frame", 44), ("ghost", 0)] {
-        let circles = |node: Node<'_, '_>| node.children().filter(|n| n.has_tag_name("circle")).count();
-        assert_eq!(groups(&figure, role).map(circles).sum::<usize>(), count, "{role}");
+        // Those that do not follow are told by their shape too, without their colour.
+        let shape = if ["leader", "clamped"].contains(&role) { "path" } else { "circle" };
+        let marks = |node: Node<'_, '_>| node.children().filter(|n| n.has_tag_name(shape)).count();
+        assert_eq!(groups(&figure, role).map(marks).sum::<usize>(), count, "{role}");
     }
     let texts: Vec<&str> =
         figure.descendants().filter(|n| n.has_tag_name("text")).filter_map(|n| n.text()).collect();

@@ -67,25 +67,28 @@ impl Picture {
         self.pixels[y as usize * self.width + x as usize]
     }
 
+    /// Darker than a bond: a line of the frame may be shared by two pixels.
     fn is_ink(&self, x: usize, y: usize) -> bool {
-        self.pixels[y * self.width + x].iter().all(|&channel| channel < 0x70)
+        self.pixels[y * self.width + x].iter().all(|&channel| channel < 0xa8)
     }
 
-    /// Left, top, right and bottom of the frame around the plot: the long dark lines.
+    /// Left, top, right and bottom of the frame around the plot: the long dark lines. Beside it is that of the bar.
     fn plot(&self) -> [f64; 4] {
-        let is_line = |count: usize, of: usize| 2 * count > of;
-        let rows: Vec<usize> = (0..self.height)
-            .filter(|&y| is_line((0..self.width).filter(|&x| self.is_ink(x, y)).count(), self.width))
-            .collect();
-        let columns: Vec<usize> = (0..self.width * 9 / 10)
-            .filter(|&x| is_line((0..self.height).filter(|&y| self.is_ink(x, y)).count(), self.height))
-            .collect();
-        let ends = |lines: &[usize]| {
-            [lines.first(), lines.last()].map(|line| *line.expect("the plot has a frame") as f64 + 0.5)
-        };
-        let ([left, right], [top, bottom]) = (ends(&columns), ends(&rows));
-        [left, top, right, bottom]
+        let is_row = |y: &usize| 2 * (0..self.width).filter(|&x| self.is_ink(x, *y)).count() > self.width;
+        let is_column =
+            |x: &usize| 2 * (0..self.height).filter(|&y| self.is_ink(*x, y)).count() > self.height;
+        let rows = lines((0..self.height).filter(is_row));
+        let columns = lines((0..self.width).filter(is_column));
+        assert!(rows.len() == 2 && columns.len() >= 2, "{rows:?} {columns:?}");
+        [columns[0], rows[0], columns[1], rows[1]]
     }
+}
+
+/// Middles of runs of pixels.
+fn lines(pixels: impl Iterator<Item = usize>) -> Vec<f64> {
+    let pixels: Vec<usize> = pixels.collect();
+    let runs = pixels.chunk_by(|a, b| a + 1 == *b);
+    runs.map(|run| 0.5 * (run[0] + run[run.len() - 1] + 1) as f64).collect()
 }
 
 /// The frames of a GIF, and the time of each \[s/100\].

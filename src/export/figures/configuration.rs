@@ -6,7 +6,7 @@ use super::axes::Axes;
 use super::bands::{Bands, Field};
 use super::colour;
 use super::energy::draw_contours;
-use super::heading::{Heading, Key, Mark};
+use super::heading::{Heading, Key, Mark, draw_mark};
 use super::page;
 use super::raster::Raster;
 use super::svg::{Path, Svg};
@@ -47,7 +47,16 @@ impl Style {
 /// Later ones are drawn over earlier ones: the few must not drown in the many.
 const PAINTING_ORDER: [Role; 5] = [Role::Frame, Role::Follower, Role::Ghost, Role::Clamped, Role::Leader];
 
-/// Particles as dots in the colours of their roles, live bonds grey, broken ones dashed red.
+/// The shape of a role, by which the reds are told apart without their colour.
+fn mark_of(role: Role) -> Mark {
+    match role {
+        Role::Leader => Mark::Diamond,
+        Role::Clamped => Mark::Square,
+        Role::Follower | Role::Frame | Role::Ghost => Mark::Dot,
+    }
+}
+
+/// Particles as dots in the colours of their roles, leaders as diamonds, clamped ones as squares, live bonds grey, broken ones dashed red.
 pub fn configuration(subject: &Subject<'_>, snapshot: &Snapshot) -> String {
     let mut setting = Setting::default();
     setting.include(snapshot, None);
@@ -123,7 +132,7 @@ impl Setting {
         let broken = Key { name: "broken bond".into(), colour, mark };
         // A field has its colours for the body.
         let is_listed = |role: &Role| !is_field || *role != Role::Follower;
-        let mark = |role: Role| if is_field && role.is_body() { Mark::Ring } else { Mark::Dot };
+        let mark = |role: Role| if is_raster { Mark::Dot } else { mark_of(role) };
         let roles = self.roles.iter().rev().copied().filter(is_listed);
         roles
             .map(|role| Key { name: role.name().into(), colour: colour::of_role(role), mark: mark(role) })
@@ -224,10 +233,10 @@ fn broken_bond(
 
 fn draw_dots(svg: &mut Svg, axes: &Axes, snapshot: &Snapshot, spacing: f64, field: Option<&Field<'_>>) {
     let radius = dot_radius(axes, spacing);
-    let dots = |svg: &mut Svg, chosen: &dyn Fn(usize) -> bool| {
+    let dots = |svg: &mut Svg, mark: Mark, chosen: &dyn Fn(usize) -> bool| {
         for (_, place) in snapshot.positions.iter().enumerate().filter(|(i, _)| chosen(*i)) {
             if place.iter().all(|value| value.is_finite()) {
-                svg.circle(axes.place(place), radius);
+                draw_mark(svg, mark, axes.place(place), radius);
             }
         }
     };
@@ -235,7 +244,7 @@ fn draw_dots(svg: &mut Svg, axes: &Axes, snapshot: &Snapshot, spacing: f64, fiel
         let is_it = |i: usize| snapshot.roles[i] == role;
         let Some(field) = field.filter(|_| role.is_body()) else {
             let attributes = format!("class=\"{}\" fill=\"{}\"", role.name(), colour::of_role(role));
-            svg.group(attributes, |svg| dots(svg, &is_it));
+            svg.group(attributes, |svg| dots(svg, mark_of(role), &is_it));
             continue;
         };
         let rim = match role {
@@ -244,7 +253,7 @@ fn draw_dots(svg: &mut Svg, axes: &Axes, snapshot: &Snapshot, spacing: f64, fiel
         };
         for band in 0..=field.bands.count() {
             let attributes = format!("class=\"{}\" fill=\"{}\"{rim}", role.name(), field.colour(band));
-            svg.group(attributes, |svg| dots(svg, &|i| is_it(i) && field.band(i) == band));
+            svg.group(attributes, |svg| dots(svg, mark_of(role), &|i| is_it(i) && field.band(i) == band));
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use super::svg::{Anchor, INK, Svg, text_width};
+use super::svg::{Anchor, INK, Path, Svg, text_width};
 
 const TITLE_TEXT: f64 = 16.0;
 const NOTE_TEXT: f64 = 13.0;
@@ -21,6 +21,8 @@ pub struct Key {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mark {
     Dot,
+    Square,
+    Diamond,
     Ring,
     Line,
     DashedLine,
@@ -73,6 +75,10 @@ fn draw_key(svg: &mut Svg, key: &Key, [x, y]: [f64; 2]) {
                 svg.rect([x + 3.0, y - 5.0], [10.0, 10.0], "rx=\"5\"");
             });
         }
+        Mark::Square | Mark::Diamond => {
+            let attributes = format!("fill=\"{}\" class=\"key\"", key.colour);
+            svg.group(attributes, |svg| draw_mark(svg, key.mark, [x + 8.0, y], 5.0));
+        }
         Mark::Ring => {
             let attributes = format!("fill=\"none\" stroke=\"{}\" stroke-width=\"1.5\"", key.colour);
             svg.group(attributes, |svg| svg.rect([x + 3.0, y - 5.0], [10.0, 10.0], "rx=\"5\""));
@@ -84,6 +90,20 @@ fn draw_key(svg: &mut Svg, key: &Key, [x, y]: [f64; 2]) {
         }
     }
     svg.text([x + 21.0, y], Anchor::Start, KEY_TEXT, INK, &key.name);
+}
+
+/// Draws a mark about as large as a dot of this radius; anything but a square and a diamond as that dot \[px\].
+pub fn draw_mark(svg: &mut Svg, mark: Mark, [x, y]: [f64; 2], radius: f64) {
+    let mut polygon = |corners: [[f64; 2]; 4], half: f64| {
+        let mut path = Path::default();
+        path.polygon(corners.map(|[right, down]| [x + half * right, y + half * down]));
+        svg.path(&path, "");
+    };
+    match mark {
+        Mark::Square => polygon([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]], 0.9 * radius),
+        Mark::Diamond => polygon([[0.0, -1.0], [1.0, 0.0], [0.0, 1.0], [-1.0, 0.0]], 1.25 * radius),
+        _ => svg.circle([x, y], radius),
+    }
 }
 
 /// Breaks a text between words so that no line is wider than `room` \[px\].
