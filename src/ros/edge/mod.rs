@@ -29,6 +29,8 @@ pub mod participant;
 mod payload;
 pub mod pulse;
 pub mod quality;
+#[cfg(feature = "security")]
+mod queue;
 pub mod service;
 pub mod topic;
 
@@ -52,12 +54,23 @@ pub enum EdgeError {
          domain? try another ROS_DOMAIN_ID"
     )]
     Participant { domain: u16, reason: String },
+    #[error(
+        "the enclave {place} does not admit to domain {domain}: {reason}\n  help: see whether its permissions and \
+         governance name this domain, are valid today and signed by the key of permissions_ca.cert.pem, and whether \
+         they allow ros_discovery_info"
+    )]
+    Enclave { domain: u16, place: String, reason: String },
     #[error("{name:?} is no {kind} name: {reason}")]
     Name { kind: &'static str, name: String, reason: &'static str },
     #[error("{0}")]
     Resolution(#[from] NameError),
     #[error("no endpoint on {topic}: {reason}")]
     Endpoint { topic: String, reason: String },
+    #[error(
+        "the permissions of this process do not allow {topic}\n  help: allow it in the enclave's permissions.xml, below \
+         publish where it is written and below subscribe where it is read, and sign that anew"
+    )]
+    Forbidden { topic: String },
     #[error("not sent on {topic}: {reason}")]
     Send { topic: String, reason: String },
 }

@@ -6,6 +6,7 @@
 //!
 //! The sample is a packet of our own, from a writer of ours to a reader of ours, sent to our own port: it passes the
 //! socket, the receiver and the cache like any other, and needs no multicast, which a loopback device may not have.
+//! A secured participant takes no such packet; there it is watched whether it empties its socket (`queue`).
 
 use std::net::{Ipv4Addr, SocketAddr, UdpSocket};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -17,6 +18,8 @@ use ros2_client::dds::rustdds::{DomainParticipant, RTPSEntity};
 use super::graph::{entity, prefix};
 use super::packet::{Content, data, discovery_port};
 use super::participant::{Reader, Shared, Writer};
+#[cfg(feature = "security")]
+use super::queue::Queue;
 use super::topic::{Taken, next};
 use super::{EdgeError, Quality};
 
@@ -109,6 +112,41 @@ impl Pulse {
     }
 }
 
+/// What shows that the middleware listens.
+enum Proof {
+    Sample(Loop),
+    /// Of a secured participant, which takes no sample that it has not authenticated.
+    #[cfg(feature = "security")]
+    Queue(Queue),
+}
+
+impl Proof {
+    fn open(shared: &Shared, participant: &DomainParticipant) -> Result<Self, EdgeError> {
+        #[cfg(feature = "security")]
+        if shared.is_secured {
+            return Queue::open(participant).map(Self::Queue);
+        }
+        Loop::open(shared, participant).map(Self::Sample)
+    }
+
+    fn send(&mut self, number: u32) {
+        match self {
+            Self::Sample(way) => way.send(number),
+            #[cfg(feature = "security")]
+            Self::Queue(queue) => queue.send(),
+        }
+    }
+
+    /// Whether something that was sent has been taken since this was last asked.
+    fn is_taken(&mut self) -> bool {
+        match self {
+            Self::Sample(way) => way.hear().is_some(),
+            #[cfg(feature = "security")]
+            Self::Queue(queue) => queue.is_taken(),
+        }
+    }
+}
+
 /// The sample and its way.
 struct Loop {
     socket: UdpSocket,
@@ -164,13 +202,13 @@ impl Loop {
 
 /// Starts the thread that watches; it ends the process with [`MIDDLEWARE_GONE`].
 pub(super) fn start(shared: &Shared, participant: &DomainParticipant) -> Result<Arc<Pulse>, EdgeError> {
-    let mut way = Loop::open(shared, participant)?;
+    let mut proof = Proof::open(shared, participant)?;
     let (given_up, inside_since) = (AtomicBool::new(false), AtomicU64::new(0));
     let heard = Mutex::default();
     let pulse = Arc::new(Pulse { begun: Instant::now(), given_up, inside_since, heard });
     let seen = pulse.clone();
     let watch = move || {
-        let (reason, last_word) = watch(&mut way, &seen);
+        let (reason, last_word) = watch(&mut proof, &seen);
         seen.given_up.store(true, Ordering::Relaxed);
         tracing::error!("the middleware is given up: {reason}");
         std::thread::sleep(last_word);
@@ -182,7 +220,7 @@ pub(super) fn start(shared: &Shared, participant: &DomainParticipant) -> Result<
 }
 
 /// Watches until there is a reason to give up; with it how long the loop has for its last word.
-fn watch(way: &mut Loop, pulse: &Pulse) -> (String, Duration) {
+fn watch(proof: &mut Proof, pulse: &Pulse) -> (String, Duration) {
     let most = memory("VmRSS:").unwrap_or(0) + GROWTH;
     bound_memory(MOST_GROWTH);
     let threads = threads_of_middleware();
@@ -203,9 +241,9 @@ fn watch(way: &mut Loop, pulse: &Pulse) -> (String, Duration) {
                 return ("one of its threads has ended".into(), LAST_WORD);
             }
             sent = sent.wrapping_add(1);
-            way.send(sent);
+            proof.send(sent);
         }
-        if way.hear().is_some() {
+        if proof.is_taken() {
             silence = Duration::ZERO;
         }
         if silence > DEAF {

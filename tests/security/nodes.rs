@@ -1,0 +1,212 @@
+//! Node and robots in processes of their own, each with the keys of its enclave, and what others can do to them.
+
+use std::io::Read;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use flockform::messages::flockform_msgs::FormationState;
+use flockform::messages::geometry_msgs::PoseStamped;
+use flockform::messages::std_msgs::Empty;
+use flockform::ros::arguments::RosArguments;
+use flockform::ros::edge::{Edge, Node, Quality, Subscription};
+use flockform::ros::node::FormationNode;
+use flockform::ros::robots::{Layout, RobotNodes};
+
+use super::exchange::{domain, plain, secured};
+use super::keystore::*;
+use super::running::Running;
+use super::stranger::{Stranger, hidden, port};
+use super::swarms::load_swarm;
+use super::waits::within;
+
+const PATIENCE: Duration = Duration::from_secs(60);
+/// Which part a process has that a test starts from its own program.
+const PART: &str = "FLOCKFORM_TEST_PART";
+
+#[test]
+#[ignore = "is the process that the others start"]
+fn a_process_of_its_own() {
+    static STOP: AtomicBool = AtomicBool::new(false);
+    let Ok(part) = std::env::var(PART) else { return };
+    std::thread::spawn(|| {
+        // The end of its input is that of the test.
+        let _ = std::io::stdin().read_to_end(&mut Vec::new());
+        STOP.store(true, Ordering::Relaxed);
+    });
+    let swarm = load_swarm("square", &[]);
+    let (_, arguments) = RosArguments::parse([], &|name| std::env::var(name).ok()).expect("a sound enclave");
+    assert!(arguments.security.enclave.is_some());
+    // The watchdogs end the process where the middleware seems dead, with a code of theirs.
+    if part == "node" {
+        let mut node = FormationNode::open(&swarm, &arguments, None).expect("admitted");
+        node.watch_middleware().expect("a watchdog");
+        node.run(&STOP);
+    } else {
+        let mut robots = RobotNodes::open(&swarm, &arguments, Layout::OneNode).expect("admitted");
+        robots.watch_middleware().expect("a watchdog");
+        robots.run(&STOP);
+    }
+    std::process::exit(0);
+}
+
+fn start(part: &str, domain: u16, keystore: &Keystore) -> Running {
+    let mut command = Command::new(std::env::current_exe().expect("a program"));
+    command
+        .args(["--exact", "nodes::a_process_of_its_own", "--ignored", "--nocapture"])
+        .env(PART, part)
+        .env("ROS_DOMAIN_ID", domain.to_string())
+        .env("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+        .env("ROS_SECURITY_ENABLE", "true")
+        .env("ROS_SECURITY_STRATEGY", "Enforce")
+        .env("ROS_SECURITY_KEYSTORE", &keystore.folder)
+        .env("ROS_SECURITY_ENCLAVE_OVERRIDE", format!("/{part}"))
+        .stdin(Stdio::piped());
+    Running(command.spawn().expect("the test's own program starts"))
+}
+
+/// Memory in use of a process \[kB\].
+fn resident(running: &Running) -> u32 {
+    let status = std::fs::read_to_string(format!("/proc/{}/status", running.0.id())).unwrap_or_default();
+    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"));
+    line.and_then(|line| line.split_whitespace().next()?.parse().ok()).unwrap_or(0)
+}
+
+/// Takes part in the network and counts what of a flight it hears.
+struct Watcher {
+    pose: Subscription<PoseStamped>,
+    target: Subscription<PoseStamped>,
+    state: Subscription<FormationState>,
+    poses: u32,
+    targets: u32,
+    mode: Option<u8>,
+    node: Node,
+}
+
+impl Watcher {
+    fn of(edge: &Edge) -> Self {
+        let node = edge.node("/", "watcher").expect("a node");
+        Self {
+            pose: node.subscription("/robot_1/pose", Quality::BEST_EFFORT).expect("may subscribe"),
+            target: node.subscription("/robot_1/target_pose", Quality::reliable(1)).expect("may subscribe"),
+            state: node.subscription("/flockform/state", Quality::reliable(5)).expect("may subscribe"),
+            poses: 0,
+            targets: 0,
+            mode: None,
+            node,
+        }
+    }
+
+    fn look(&mut self) {
+        self.poses += std::iter::from_fn(|| self.pose.take()).take(100).count() as u32;
+        self.targets += std::iter::from_fn(|| self.target.take()).take(100).count() as u32;
+        if let Some((state, _)) = self.state.take_last() {
+            self.mode = Some(state.mode);
+        }
+    }
+
+    /// Poses and targets that it hears in this time.
+    fn during(&mut self, time: Duration, mut each: impl FnMut()) -> [u32; 2] {
+        let (since, before) = (Instant::now(), [self.poses, self.targets]);
+        while since.elapsed() < time {
+            self.look();
+            each();
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        [self.poses - before[0], self.targets - before[1]]
+    }
+}
+
+/// Robots and node, flying, and one who may watch and command.
+struct Flight {
+    domain: u16,
+    watcher: Watcher,
+    processes: [Running; 2],
+    _edge: Edge,
+}
+
+impl Flight {
+    fn begin(folder: &Path, governance: Governance) -> Self {
+        let domain = domain();
+        let keystore = Keystore::make(folder, domain, governance);
+        for part in ["robots", "node", "watcher"] {
+            keystore.enclave(part, &EVERYTHING, &EVERYTHING);
+        }
+        let edge = secured(domain, &keystore.folder.join("enclaves/watcher"));
+        let mut watcher = Watcher::of(&edge);
+        let since = Instant::now();
+        let processes = ["robots", "node"].map(|part| start(part, domain, &keystore));
+        within(PATIENCE, "poses and targets", || {
+            watcher.look();
+            (watcher.poses > 20 && watcher.targets > 20 && watcher.mode.is_some()).then_some(())
+        });
+        println!("in flight after {:?}", since.elapsed());
+        Self { domain, watcher, processes, _edge: edge }
+    }
+
+    fn is_whole(&mut self) {
+        for process in &mut self.processes {
+            assert_eq!(process.0.try_wait().expect("a child"), None, "a process has ended");
+        }
+    }
+}
+
+#[test]
+#[ignore = "needs the command openssl"]
+fn a_secured_flight_is_read_and_commanded_by_those_with_keys_alone() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut flight = Flight::begin(folder.path(), GOVERNANCE);
+    let bare = plain(flight.domain);
+    let mut stranger = Watcher::of(&bare);
+    let stop = |watcher: &Watcher| {
+        let topic = "/flockform/emergency_stop_request";
+        watcher.node.publisher::<Empty>(topic, Quality::reliable(1)).expect("a publisher")
+    };
+    let theirs = stop(&stranger);
+    let heard = flight.watcher.during(Duration::from_secs(5), || {
+        stranger.look();
+        theirs.publish(&Empty).expect("sent");
+    });
+    println!("{heard:?} poses and targets in 5 s");
+    assert!(heard.iter().all(|&count| count > 50), "{heard:?}");
+    assert_eq!([stranger.poses, stranger.targets], [0, 0]);
+    assert_eq!(stranger.mode, None);
+    assert_ne!(flight.watcher.mode, Some(FormationState::EMERGENCY_STOPPED));
+    let ours = stop(&flight.watcher);
+    within(PATIENCE, "the stop", || {
+        ours.publish(&Empty).expect("sent");
+        flight.watcher.look();
+        (flight.watcher.mode == Some(FormationState::EMERGENCY_STOPPED)).then_some(())
+    });
+    flight.is_whole();
+}
+
+#[test]
+#[ignore = "needs the command openssl"]
+fn promises_in_the_name_of_a_secured_peer_are_not_believed() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut flight = Flight::begin(folder.path(), GOVERNANCE);
+    let mut stranger = Stranger::come(flight.domain);
+    within(PATIENCE, "names", || {
+        stranger.listen();
+        flight.watcher.look();
+        (stranger.prefixes.len() >= 3).then_some(())
+    });
+    let before = [0, 1].map(|k| resident(&flight.processes[k]));
+    let heard = flight.watcher.during(Duration::from_secs(10), || {
+        for prefix in stranger.prefixes.clone() {
+            let packet = stranger.promise(prefix);
+            for participant in 0..4 {
+                stranger.send(&packet, port(flight.domain, participant));
+                // The socket filter does not see it.
+                stranger.send(&hidden(&packet), port(flight.domain, participant));
+            }
+        }
+    });
+    let after = [0, 1].map(|k| resident(&flight.processes[k]));
+    println!("{heard:?} poses and targets in 10 s; {before:?} kB before, {after:?} kB after");
+    assert!(heard.iter().all(|&count| count > 100), "{heard:?}");
+    assert!((0..2).all(|k| after[k] < before[k] + 32 * 1024), "{before:?} {after:?}");
+    flight.is_whole();
+}
