@@ -165,3 +165,10 @@ fn unsafe_code_stands_where_it_was_measured_to_pay_or_where_the_system_is_called
     ];
     assert_eq!(files_with("unsafe {"), known);
 }
+
+#[test]
+fn keys_and_certificates_are_looked_into_in_one_place() {
+    assert_eq!(files_with("openssl::"), ["ros/arguments/enclave.rs"]);
+    let gated = files_with("feature = \"security\"");
+    assert!(gated.iter().all(|file| file.starts_with("ros/")), "{gated:?}");
+}
