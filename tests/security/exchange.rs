@@ -52,6 +52,7 @@ impl Peer {
     }
 
     fn turn(&mut self) {
+        std::thread::sleep(Duration::from_millis(5));
         let mut pose = PoseStamped { pose: Pose::planar([1.0, 2.0], 0.5), ..PoseStamped::default() };
         pose.header.frame_id = self.name.into();
         self.out.publish(&pose).expect("sent");

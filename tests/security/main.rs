@@ -3,7 +3,7 @@
 //!
 //! ```text
 //! apt-get install libssl-dev pkg-config openssl g++ libfastrtps-dev
-//! cargo test --features security --test security -- --ignored --test-threads=1
+//! cargo test --no-default-features --features ros,security --test security -- --ignored --test-threads=1
 //! ```
 
 #![cfg(feature = "security")]
@@ -13,10 +13,13 @@ mod exchange;
 mod keystore;
 mod nodes;
 #[path = "../common/running.rs"]
+#[expect(dead_code, reason = "the processes here end by the end of their input")]
 mod running;
 #[path = "../common/signals.rs"]
+#[expect(dead_code, reason = "no process here gets one")]
 mod signals;
 #[path = "../common/stranger.rs"]
+#[expect(dead_code, reason = "all strangers' names are good here")]
 mod stranger;
 #[path = "../common/swarms.rs"]
 mod swarms;
