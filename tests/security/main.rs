@@ -16,7 +16,6 @@ mod nodes;
 #[expect(dead_code, reason = "the processes here end by the end of their input")]
 mod running;
 #[path = "../common/signals.rs"]
-#[expect(dead_code, reason = "no process here gets one")]
 mod signals;
 #[path = "../common/stranger.rs"]
 #[expect(dead_code, reason = "all strangers' names are good here")]
