@@ -14,6 +14,7 @@
 //! * [`sweep`]: the rule compiled for a body, and its steps: the one room with vectors and the schedule of threads.
 //! * [`solve`]: spectra of sweeps, and the solvers for equilibrium.
 //! * [`material`]: rule weights from Young's modulus and Poisson's ratio, and what material a rule is.
+//! * [`ranks`]: processes that share a body: who they are, and how numbers get from one to another (over MPI with feature `mpi`).
 //! * [`engine`]: one step of a body after the other: leaders, roles, bonds, loads; used by continuum and swarm alike.
 //! * [`continuum`]: plans a scene, steps it or goes straight to rest, and hands what happens to an observer.
 //! * [`study`]: many runs of a scene: rule against finite elements, accuracy against cost, parameter sweeps, stability and its thresholds.
@@ -25,7 +26,9 @@
 //!   with keys of an enclave (SROS2).
 //! * `shm` (feature `shm`): the same over shared memory, without a copy; a running body published to other processes.
 //! * `record` (feature `record`): recordings of flights and runs for Foxglove and `ros2 bag`, and their replay.
+//! * `live` (feature `live`): a body or a swarm under the reader's hands: a session, and the page that shows it.
 //! * `bench` (feature `bench`): how fast sweeps and solvers are, beside what the machine and others can do.
+//! * `python` (feature `python`): the Python package; `pip install ./src/python` builds it (guide [`python`](guide::python)).
 //!
 //! Features add rooms and never choose: what a room computes is the same whatever is built beside it.
 //! Without any, the crate builds for a browser too (`wasm32-unknown-unknown`): on one thread, with bundled scenes or
@@ -51,6 +54,7 @@ pub mod flock;
 pub mod geometry;
 pub mod guide;
 pub mod material;
+pub mod ranks;
 pub mod scene;
 pub mod solve;
 pub mod study;
@@ -62,12 +66,16 @@ pub mod bench;
 pub mod export;
 #[cfg(feature = "fem")]
 pub mod fem;
+#[cfg(feature = "live")]
+pub mod live;
 #[allow(
     missing_docs,
     reason = "fields are those of the published interface definitions, which say what they mean"
 )]
 #[cfg(feature = "messages")]
 pub mod messages;
+#[cfg(feature = "python")]
+mod python;
 #[cfg(feature = "record")]
 pub mod record;
 #[cfg(feature = "ros")]

@@ -86,13 +86,26 @@ fn scene_knows_nothing_of_hosts_and_outputs() {
 }
 
 #[test]
+fn ranks_know_nothing_of_what_they_exchange() {
+    assert_imports_only("ranks", &[]);
+}
+
+#[test]
+fn mpi_is_called_in_one_place() {
+    assert_eq!(files_with("use mpi::"), ["ranks/mpi.rs"]);
+}
+
+#[test]
 fn the_engine_knows_no_scene() {
-    assert_imports_only("engine", &["geometry", "flock", "material", "sweep"]);
+    assert_imports_only("engine", &["geometry", "flock", "material", "sweep", "ranks"]);
 }
 
 #[test]
 fn continuum_knows_nothing_of_outputs() {
-    assert_imports_only("continuum", &["geometry", "flock", "solve", "scene", "material", "sweep", "engine"]);
+    assert_imports_only(
+        "continuum",
+        &["geometry", "flock", "solve", "scene", "material", "sweep", "engine", "ranks"],
+    );
 }
 
 #[test]
@@ -136,6 +149,39 @@ fn shared_memory_is_an_edge_of_the_swarm_and_of_the_continuum() {
 #[test]
 fn recordings_stand_on_the_messages_and_know_nothing_of_the_network_and_of_figures() {
     assert_imports_only("record", &["scene", "continuum", "engine", "flock", "swarm", "messages"]);
+}
+
+#[test]
+fn python_stands_above_the_rooms_that_compute_and_below_no_other() {
+    let below = [
+        "geometry",
+        "flock",
+        "sweep",
+        "solve",
+        "material",
+        "fem",
+        "scene",
+        "engine",
+        "continuum",
+        "study",
+        "swarm",
+    ];
+    assert_imports_only("python", &below);
+}
+
+#[test]
+fn live_sessions_show_bodies_and_swarms_and_know_nothing_of_middleware() {
+    assert_imports_only("live", &["scene", "continuum", "engine", "flock", "swarm", "export", "study"]);
+}
+
+#[test]
+fn live_sessions_answer_this_computer_alone() {
+    let opens = ["TcpListener::bind", "UdpSocket::bind"].map(|word| files_with(word).into_iter());
+    let own: Vec<String> = opens.into_iter().flatten().filter(|file| file.starts_with("live/")).collect();
+    assert_eq!(own, ["live/server.rs"]);
+    let server = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/live/server.rs");
+    let text = std::fs::read_to_string(server).expect("readable");
+    assert!(text.contains("TcpListener::bind((Ipv4Addr::LOCALHOST,"));
 }
 
 /// Files of `src` that contain a word.

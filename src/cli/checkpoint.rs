@@ -174,17 +174,23 @@ impl<'a> Checkpointer<'a> {
             })
     }
 
-    /// Keeps the run as it is now, to be gone on with if it is killed. One that cannot be written does not end
-    /// the run.
-    pub fn keep(&mut self, folder: &mut OutputFolder, engine: (&Engine, f64), mut kept: Recorded<'_>) {
+    /// Keeps the run as it is now, to be gone on with if it is killed, and returns whether it is kept. One that cannot be
+    /// written does not end the run.
+    pub fn keep(
+        &mut self,
+        folder: &mut OutputFolder,
+        engine: (&Engine, f64),
+        mut kept: Recorded<'_>,
+    ) -> bool {
         (self.last_step, self.last) = (engine.0.step(), Instant::now());
         if let Err(error) = self.try_to_keep(folder, engine, &mut kept) {
             tracing::warn!("no checkpoint at step {}: {error}", self.last_step);
-            return;
+            return false;
         }
         let took = self.last.elapsed();
         tracing::debug!("checkpoint of step {} in {took:.1?}", self.last_step);
         self.last = Instant::now();
+        true
     }
 
     fn try_to_keep(

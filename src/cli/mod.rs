@@ -7,6 +7,7 @@ mod completions;
 mod gallery;
 mod install;
 mod interrupt;
+mod live;
 pub mod log;
 mod material;
 mod names;
@@ -14,6 +15,7 @@ mod node;
 mod output;
 mod plan;
 mod progress;
+mod ranks;
 mod recording;
 mod replay;
 mod run;
@@ -98,6 +100,13 @@ pub enum Command {
                       Exit codes: 0 flown and every declared bound held, 1 a bound broken or interrupted, 2 bad input."
     )]
     Swarm(swarm::SwarmArguments),
+    /// Shows a body or a swarm in a browser on this computer, to be led by hand, cut and changed while it runs
+    #[command(
+        after_help = "Examples:\n  flockform live tension --open\n  flockform live gap --port 8080\n\n\
+                      Drag leaders, clamps or any particle; cut bonds; change keys; save what was done as a file that \
+                      `flockform run` or `flockform swarm` replays to the bit."
+    )]
+    Live(live::LiveArguments),
     /// Replays a recorded flight and lists where today's targets differ from the recorded ones
     #[command(
         after_help = "Examples:\n  flockform swarm gap --record gap.mcap\n  flockform replay gap.mcap\n  flockform replay gap.mcap --set limits.speed=0.5 --tolerance 0.01\n\n\
@@ -281,6 +290,13 @@ pub enum Refusal {
         "`{name}` left no report for the gallery: {reason}\n  help: run it alone to see why, or name the others"
     )]
     Exhibit { name: String, reason: String },
+    #[error(
+        "no page can be served{}: {source}\n  help: give another --port, or none",
+        .port.map_or_else(String::new, |port| format!(" at port {port}"))
+    )]
+    Live { port: Option<u16>, source: std::io::Error },
+    #[error("{} is no folder to save in\n  help: make it, or give another as --out", .0.display())]
+    LiveFolder(PathBuf),
     #[error("{0}")]
     Option(#[from] material::WrongOption),
     #[error("{0}")]
@@ -290,6 +306,8 @@ pub enum Refusal {
     #[cfg(feature = "fem")]
     #[error("{0}")]
     BenchEquilibrium(#[from] bench::equilibrium::EquilibriumError),
+    #[error("{0}")]
+    Ranks(#[from] ranks::RanksError),
     #[error("--threads {threads}: {error}\n  help: give a number from 1 to the machine's cores")]
     Threads { threads: usize, error: std::io::Error },
 }
@@ -364,11 +382,31 @@ pub fn refuse(refusal: &Refusal) -> ExitCode {
         eprintln!("{}", interrupt::NOTHING_KEPT);
         return ExitCode::from(FAILED);
     }
+    if matches!(refusal, Refusal::Ranks(ranks::RanksError::SaidElsewhere)) {
+        // A launcher ends all ranks when one of them fails: the one that speaks fails, and gets to speak.
+        return ExitCode::SUCCESS;
+    }
     eprintln!("error: {}", on_terminal(&refusal.to_string()));
     ExitCode::from(if refusal.is_failure() { FAILED } else { BAD_INPUT })
 }
 
+/// The name of a command whose results several ranks would write over each other.
+fn runs_alone(command: &Command) -> Option<&'static str> {
+    match command {
+        Command::Compare(_) => Some("compare"),
+        Command::Trade(_) => Some("trade"),
+        Command::Sweep(sweep) if !sweep.is_shard() => Some("sweep"),
+        Command::Stability(_) => Some("stability"),
+        Command::Swarm(_) => Some("swarm"),
+        Command::Gallery(_) => Some("gallery"),
+        _ => None,
+    }
+}
+
 pub fn dispatch(command: Command, ros: &RosArguments) -> Result<ExitCode, Refusal> {
+    if let Some(name) = runs_alone(&command) {
+        ranks::require_alone(name)?;
+    }
     match command {
         Command::Run(arguments) => return run::run(&arguments),
         Command::Compare(arguments) => return compare::compare(&arguments),
@@ -376,6 +414,7 @@ pub fn dispatch(command: Command, ros: &RosArguments) -> Result<ExitCode, Refusa
         Command::Sweep(arguments) => return sweep::sweep(&arguments),
         Command::Stability(arguments) => return stability::stability(&arguments),
         Command::Swarm(arguments) => return swarm::swarm(&arguments),
+        Command::Live(arguments) => return live::live(&arguments),
         Command::Replay(arguments) => return replay::replay(&arguments),
         Command::Node(arguments) => return node::node(&arguments, ros),
         Command::Robots(arguments) => return node::robots(&arguments, ros),

@@ -41,12 +41,15 @@ impl ReportArguments {
         if !self.open || !report.is_file() {
             return;
         }
-        if let Err(error) =
-            opener(&report).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn()
-        {
+        if let Err(error) = open(&report) {
             eprintln!("cannot open {}: {error}; open it by hand", report.display());
         }
     }
+}
+
+/// Opens a file with the program that this computer opens such files with.
+pub fn open(file: &Path) -> std::io::Result<()> {
+    opener(file).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn().map(drop)
 }
 
 /// The command by which the platform opens a file, a page in the browser.

@@ -3,11 +3,13 @@
 use clap::Args;
 use flockform::continuum::plan::Plan;
 use flockform::continuum::report::PlanReport;
+use flockform::continuum::shares::Shares;
 use flockform::study::compare::run::plan as plan_of;
 use flockform::swarm::plan::SwarmPlan;
 use serde_json::{Value, json};
 
 use super::names::{FileName, Kind, SceneArguments, is_path, not_bundled};
+use super::ranks::RanksError;
 use super::swarm::SwarmFileArguments;
 use super::{Refusal, print, say};
 
@@ -19,6 +21,9 @@ pub struct PlanArguments {
     /// Override a key of the file, validated like the file: `lattice.spacing=0.5`, `roles[1].from=30`
     #[arg(long = "set", value_name = "KEY.PATH=VALUE")]
     set: Vec<String>,
+    /// Also say how so many ranks would share the run of a scene (see the guide to ranks)
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    ranks: Option<u16>,
     /// Print JSON
     #[arg(long)]
     json: bool,
@@ -26,8 +31,9 @@ pub struct PlanArguments {
 
 /// Plans a scene or a swarm and prints the plan; a file of neither kind is refused as a scene.
 pub fn plan(arguments: &PlanArguments) -> Result<(), Refusal> {
-    let PlanArguments { file, set, json } = arguments;
+    let PlanArguments { file, set, ranks, json } = arguments;
     let (words, value) = match Kind::of(file) {
+        Some(Kind::Swarm) if ranks.is_some() => return Err(RanksError::Swarm.into()),
         Some(Kind::Swarm) => {
             let swarm = SwarmFileArguments { swarm: file.clone(), set: set.clone() }.load()?;
             let plan = SwarmPlan::new(&swarm)?;
@@ -37,7 +43,10 @@ pub fn plan(arguments: &PlanArguments) -> Result<(), Refusal> {
         Some(Kind::Scene) | None => {
             let scene = SceneArguments { scene: file.clone(), set: set.clone() }.load([])?;
             let plan = plan_of(&scene)?;
-            let report = PlanReport::new(&scene, &plan)?;
+            let mut report = PlanReport::new(&scene, &plan)?;
+            if let Some(ranks) = ranks {
+                report.facts.extend(Shares::new(&scene, &plan, usize::from(*ranks))?.facts());
+            }
             (report.to_string(), scene_json(&scene.name, &plan, &report))
         }
     };

@@ -10,12 +10,15 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use clap::Args;
-use flockform::continuum::digest::digest;
+use flockform::continuum::digest::{digest, fnv1a};
 use flockform::continuum::equilibrium::run_to_equilibrium_watched;
-use flockform::continuum::run::{Outcome, StopReason, resume};
+use flockform::continuum::looks::Looks;
+use flockform::continuum::plan::Plan;
+use flockform::continuum::run::{Outcome, SharedError, StopReason, require_shareable, resume, run_shared};
 use flockform::export::checkpoint::{self, Checkpoint, RunRequest};
 use flockform::export::report;
 use flockform::export::{Drawing, OutputFolder, Results, Timings, write_all};
+use flockform::ranks::Team;
 use flockform::record::About;
 use flockform::record::body::BodyMessages;
 use flockform::scene::{LoadSteps, Scene};
@@ -24,7 +27,7 @@ use flockform::shm::positions::Positions;
 use flockform::solve::interrupt::Interrupt;
 use flockform::study::compare::run::plan;
 use flockform::study::trade::{Chosen, choose};
-use observer::{Looks, RunObserver};
+use observer::RunObserver;
 use recorder::{Recorder, Records};
 use words::{closing_words, where_to_look};
 
@@ -32,6 +35,7 @@ use super::checkpoint::{CheckpointArguments, Checkpointer, ResumedRun};
 use super::names::{FileName, SceneArguments, in_full};
 use super::output::{FigureArguments, OutputArguments, ReportArguments};
 use super::progress::{Drawn, Progress};
+use super::ranks::{self, Interrupted, Start};
 use super::recording::{RecordArguments, close};
 use super::{FAILED, Refusal, interrupt, print, say};
 
@@ -67,29 +71,86 @@ pub struct RunArguments {
     json: bool,
 }
 
-/// Runs a scene and writes what comes of it.
+/// Runs a scene and writes what comes of it; one rank of several does its part of it, and the first one writes.
 pub fn run(arguments: &RunArguments) -> Result<ExitCode, Refusal> {
+    let team = ranks::team()?;
     let threads = usize::from(arguments.threads.unwrap_or(0));
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-    pool.map_err(|error| Refusal::threads(threads, error))?.install(|| run_here(arguments))
+    // The others wait already: a rank without threads has to tell them.
+    let pool = pool.map_err(|error| Start::new(team.as_ref()).refused(Refusal::threads(threads, error)))?;
+    pool.install(|| match team.as_ref() {
+        Some(team) if !team.is_first() => help_to_run(arguments, team),
+        team => run_here(arguments, team),
+    })
 }
 
-fn run_here(arguments: &RunArguments) -> Result<ExitCode, Refusal> {
-    let start = Instant::now();
-    let left = arguments.checkpoints.left()?;
-    let asked = arguments.asked(left.as_ref());
-    let words_of = SceneArguments { scene: asked.scene.clone(), set: asked.set.clone() };
-    let Chosen { mut scene, words } =
-        choose(words_of.load([])?, &|more: &[String]| words_of.load_scene(more))?;
-    if let Some(equilibrium) = &mut scene.equilibrium {
-        equilibrium.request.interrupt = Interrupt::new(interrupt::flag());
+/// A run that is about to begin.
+struct Prepared {
+    left: Option<ResumedRun>,
+    asked: RunRequest,
+    scene: Scene,
+    /// What was chosen for it.
+    words: String,
+    plan: Plan,
+    digest: u64,
+}
+
+impl Prepared {
+    fn new(arguments: &RunArguments, team: Option<&Team>) -> Result<Self, Refusal> {
+        let left = arguments.checkpoints.left()?;
+        let asked = arguments.asked(left.as_ref());
+        let words_of = SceneArguments { scene: asked.scene.clone(), set: asked.set.clone() };
+        let scene = words_of.load([])?;
+        // Before a choice, which solves the scene several times.
+        if team.is_some() {
+            require_shareable(&scene)?;
+        }
+        let Chosen { mut scene, words } = choose(scene, &|more: &[String]| words_of.load_scene(more))?;
+        if let Some(equilibrium) = &mut scene.equilibrium {
+            equilibrium.request.interrupt = Interrupt::new(interrupt::flag());
+        }
+        let plan = plan(&scene)?;
+        let digest = digest(&plan);
+        left.as_ref().map_or(Ok(()), |left| left.require_of(&scene, digest))?;
+        Ok(Self { left, asked, scene, words, plan, digest })
     }
-    let plan = plan(&scene)?;
+
+    /// A fingerprint of what all ranks must have in common: plan, scene, and the state to go on from.
+    fn common(&self) -> u64 {
+        let scene = serde_json::to_vec(&self.scene.raw).expect("a scene was read from text");
+        let state = self.left.iter().flat_map(|left| left.checkpoint.fingerprint().to_le_bytes());
+        let all: Vec<u8> = self.digest.to_le_bytes().into_iter().chain(scene).chain(state).collect();
+        fnv1a(&all)
+    }
+}
+
+/// The part of a rank that neither prints nor writes.
+fn help_to_run(arguments: &RunArguments, team: &Team) -> Result<ExitCode, Refusal> {
+    let mut begin = Start::new(Some(team));
+    let prepared = match Prepared::new(arguments, Some(team)) {
+        Ok(prepared) => prepared,
+        Err(refusal) => return Err(begin.refused(refusal)),
+    };
+    let common = prepared.common();
+    begin.agree(common)?;
+    let mut observer = Interrupted(interrupt::serves());
+    begin.begin(common)?;
+    let from = prepared.left.map(|left| left.checkpoint).map(|from| (from.engine, from.residual));
+    // The first rank says how it ended, in its exit code too: all have the same.
+    run_shared(prepared.plan, from, team, &mut observer).map_err(|_| ranks::RanksError::SaidElsewhere)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, Refusal> {
+    let start = Instant::now();
+    let mut begin = Start::new(team);
+    let prepared = Prepared::new(arguments, team)?;
+    let common = team.map_or(0, |_| prepared.common());
+    let Prepared { left, asked, scene, words, plan, digest } = prepared;
+    begin.agree(common)?;
     let shown = arguments.publish.as_ref();
     let open = |name: &String| Positions::open(&Domain::from_environment()?, name, plan.count());
     let shown = shown.map(open).transpose()?;
-    let digest = digest(&plan);
-    left.as_ref().map_or(Ok(()), |left| left.require_of(&scene, digest))?;
     let mut folder = match &left {
         Some(left) => left.open()?,
         None => arguments.output.folder(&scene.name)?,
@@ -117,9 +178,13 @@ fn run_here(arguments: &RunArguments) -> Result<ExitCode, Refusal> {
         looks,
         interrupted,
     };
-    let outcome = match left.map(|left| left.checkpoint) {
-        None => run_to_equilibrium_watched(&scene, plan, &mut observer)?,
-        Some(Checkpoint { engine, residual, .. }) => resume(plan, engine, residual, &mut observer)
+    begin.begin(common)?;
+    let from = left.map(|left| left.checkpoint).map(|Checkpoint { engine, residual, .. }| (engine, residual));
+    let outcome = match (team, from) {
+        (Some(team), from) => run_shared(plan, from, team, &mut observer)
+            .map_err(|error: SharedError| ResumedRun::foreign(observer.folder, &error))?,
+        (None, None) => run_to_equilibrium_watched(&scene, plan, &mut observer)?,
+        (None, Some((engine, residual))) => resume(plan, engine, residual, &mut observer)
             .map_err(|error| ResumedRun::foreign(observer.folder, &error))?,
     };
     let RunObserver { mut recorder, messages, progress, checkpointer, .. } = observer;

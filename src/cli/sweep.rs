@@ -85,6 +85,11 @@ enum Sampled {
 }
 
 impl SweepArguments {
+    /// Whether it is one of several that share the runs, each with a folder of its own.
+    pub fn is_shard(&self) -> bool {
+        self.shard.is_some()
+    }
+
     fn request(&self) -> Result<SweepRequest, Refusal> {
         let sampling = match self.sampling {
             Sampled::LatinHypercube => Sampling::LatinHypercube,
@@ -237,8 +242,7 @@ fn sweep_here(arguments: &SweepArguments) -> Result<ExitCode, Refusal> {
         pending.retain(|&run| run != row.run);
         sweep.rows.insert(row.run, row);
     }
-    let threads = usize::from(arguments.threads.unwrap_or(0));
-    let made = runs.make(&pending, &journal, threads, arguments.output.quiet)?;
+    let made = runs.make(&pending, &journal, arguments.output.quiet)?;
     drop(journal);
     if interrupted.load(std::sync::atomic::Ordering::Relaxed) {
         eprintln!("{words}");

@@ -1,7 +1,7 @@
 //! Whether two plans, or two files, are the same.
 
 use super::plan::Plan;
-use crate::engine::setup::Setup;
+use crate::engine::setup::{ActionKind, Conduct, Setup};
 use crate::flock::law::Weights;
 use crate::flock::vectors::Vectors;
 
@@ -17,20 +17,13 @@ pub fn fnv1a(bytes: &[u8]) -> u64 {
 pub fn digest(plan: &Plan) -> u64 {
     let mut digest = Fnv::default();
     let Plan { setup, stop, probes, .. } = plan;
-    let Setup { body, flock, update, present_radius, roles, changes, cuts, ramp, .. } = setup;
+    let Setup { body, flock, update, present_radius, roles, changes, cuts, actions, ramp, .. } = setup;
     digest.points(&body.reference);
     digest.text(&format!("{update:?} {present_radius:?} {stop:?} {:?} {cuts:?}", flock.rule));
     roles.iter().for_each(|role| digest.text(role.name()));
     flock.neighbours.starts.iter().for_each(|start| digest.bytes(&start.to_le_bytes()));
     flock.neighbours.index.iter().for_each(|index| digest.bytes(&index.to_le_bytes()));
-    match &flock.weights {
-        Weights::Equal => {}
-        Weights::Scalar(weights) => digest.numbers(weights),
-        Weights::Matrix(weights) => {
-            weights.class.iter().for_each(|class| digest.bytes(&class.to_le_bytes()));
-            weights.blocks.iter().flatten().for_each(|row| digest.numbers(row));
-        }
-    }
+    digest.weights(&flock.weights);
     flock.forces.iter().chain(&flock.rest).for_each(|points| digest.points(points));
     if let Some(ramp) = ramp {
         digest.text(&format!("ramp {ramp}"));
@@ -42,6 +35,19 @@ pub fn digest(plan: &Plan) -> u64 {
         let what = format!("{:?} {} {:?} {:?}", change.role, change.from, change.when, change.motion);
         digest.text(&what);
         change.particles.iter().for_each(|&particle| digest.bytes(&(particle as u64).to_le_bytes()));
+    }
+    for action in actions {
+        digest.text(&format!("action {}", action.at));
+        match &action.what {
+            ActionKind::Cut(cut) => digest.text(&format!("{cut:?}")),
+            // Two bodies with other keys differ in what these make of the rule.
+            ActionKind::Conduct(conduct) => {
+                let Conduct { rule, fracture, update, forces, rest, .. } = &**conduct;
+                digest.text(&format!("{rule:?} {fracture:?} {update:?}"));
+                digest.weights(&conduct.weights);
+                forces.iter().chain(rest).for_each(|points| digest.points(points));
+            }
+        }
     }
     probes.iter().for_each(|&probe| digest.bytes(&(probe as u64).to_le_bytes()));
     if body.numbering.is_some() {
@@ -60,6 +66,17 @@ impl Default for Fnv {
 }
 
 impl Fnv {
+    fn weights(&mut self, weights: &Weights) {
+        match weights {
+            Weights::Equal => {}
+            Weights::Scalar(weights) => self.numbers(weights),
+            Weights::Matrix(weights) => {
+                weights.class.iter().for_each(|class| self.bytes(&class.to_le_bytes()));
+                weights.blocks.iter().flatten().for_each(|row| self.numbers(row));
+            }
+        }
+    }
+
     fn bytes(&mut self, bytes: &[u8]) {
         for &byte in bytes {
             self.0 = (self.0 ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3);

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::damping::along_outline;
 use super::layout::{Layout, Truth, held_components, no_particle};
 use super::{places, weights};
-use crate::engine::setup::{RoleChange, Setup};
+use crate::engine::setup::{Action, ActionKind, Conduct, RoleChange, Setup};
 use crate::flock::body::{Body, MOST_ENTRIES};
 use crate::flock::fracture::{Bonds, Ghosts};
 use crate::flock::law::{Flock, MatrixWeights, Weights};
@@ -18,7 +18,7 @@ use crate::geometry::outline::Outline;
 use crate::material::free_edge::FreeEdge;
 use crate::material::mechanism::require_held;
 use crate::material::outline_loads::{Load, Resultant, sum};
-use crate::scene::{LoadSteps, Scene, SceneError, Stop};
+use crate::scene::{self, LoadSteps, Scene, SceneError, Stop};
 use crate::solve::linear::HeldComponent;
 use crate::sweep::{Order, Update};
 
@@ -104,13 +104,47 @@ impl Plan {
         };
         make_cuts(&mut setup, scene);
         take_first_roles(&mut setup);
+        setup.actions = actions(scene, &setup, truth)?;
         Ok(Self { setup, stop: scene.stop, diagonal, probes, outline, resultants })
+    }
+
+    /// How the particles follow by this plan, if they are those of `setup` and see the same neighbours.
+    ///
+    /// # Errors
+    /// A sentence that says why not.
+    pub fn conduct_of(self, setup: &Setup) -> Result<Conduct, &'static str> {
+        let (Flock { neighbours, reference, .. }, then) = (&self.setup.flock, &setup.flock);
+        let is_same = *reference == then.reference && *neighbours == then.neighbours;
+        if is_same {
+            Ok(Conduct::of(self.setup))
+        } else {
+            Err("the body would have other particles or neighbours")
+        }
     }
 
     /// Number of particles, those of the frame included.
     pub fn count(&self) -> usize {
         self.setup.body.count()
     }
+}
+
+fn actions(scene: &Scene, setup: &Setup, truth: Option<Truth<'_>>) -> Result<Vec<Action>, SceneError> {
+    let action = |(k, action): (usize, &scene::Action)| {
+        let what = match &action.what {
+            scene::ActionKind::Cut(cut) => ActionKind::Cut(*cut),
+            scene::ActionKind::Set(changed) => {
+                let refuse = |message: String| {
+                    let help = "give these keys from the start instead";
+                    scene.refuse(&format!("actions[{k}].what.keys"), message, help)
+                };
+                let changed = Plan::lay_out(changed, truth).map_err(|error| refuse(error.to_string()))?;
+                let conduct = changed.conduct_of(setup).map_err(|why| refuse(why.into()))?;
+                ActionKind::Conduct(Arc::new(conduct))
+            }
+        };
+        Ok(Action { at: action.at, what })
+    };
+    scene.actions.iter().enumerate().map(action).collect()
 }
 
 fn make_cuts(setup: &mut Setup, scene: &Scene) {
@@ -259,6 +293,7 @@ fn flock(
     });
     let needs_bonds = scene.fracture.is_some()
         || !scene.cuts.is_empty()
+        || scene.actions.iter().any(|action| matches!(action.what, scene::ActionKind::Cut(_)))
         || scene.roles.iter().any(|entry| entry.role == Role::Ghost);
     let bonds = needs_bonds.then(|| {
         let (threshold, ghosts) =

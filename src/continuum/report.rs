@@ -11,7 +11,6 @@ use crate::flock::fracture::Threshold;
 use crate::flock::law::Weights;
 use crate::flock::role::Role;
 use crate::flock::rules::{FeedbackReference, Mean};
-use crate::flock::strain::Strain;
 use crate::material::outline_loads::Resultant;
 use crate::material::stiffness::area;
 use crate::material::stress::StressState;
@@ -301,10 +300,10 @@ fn memory(scene: &Scene, plan: &Plan) -> usize {
 fn results(scene: &Scene, plan: &Plan) -> usize {
     let is_solved_at_once = scene.equilibrium.is_some() && scene.load_steps.is_none();
     let before = |figure: &&usize| !is_solved_at_once && **figure < plan.stop.steps;
-    // The last one is kept for its figure, and once more for the numbers.
-    let snapshots = scene.record.figures.iter().filter(before).count() + 2;
+    // The last one is kept for its figure and for the numbers.
+    let snapshots = scene.record.figures.iter().filter(before).count() + 1;
     let stress = scene.material.map_or(0, |_| size_of::<Option<StressState>>());
-    plan.count() * (snapshots * SNAPSHOT + size_of::<Option<Strain>>() + stress)
+    plan.count() * (snapshots * SNAPSHOT + stress)
 }
 
 /// Bytes of a particle in a [`Snapshot`](super::record::Snapshot): position, role and energies.

@@ -7,11 +7,13 @@ use crate::engine::Engine;
 use crate::engine::movement::{Movement, farthest, first_lost};
 use crate::engine::observer::{EachStep, Observer};
 use crate::engine::several::Reach;
+use crate::engine::shared::{Agreed, NotShared};
 use crate::engine::state::{EngineState, WrongState};
 use crate::flock::law::Weights;
 use crate::flock::rules::{FeedbackReference, Mean};
 use crate::flock::vectors::{Vectors, distance};
-use crate::scene::Stop;
+use crate::ranks::Team;
+use crate::scene::{Scene, SceneError, Stop};
 use crate::solve::equilibrium::Solved;
 use crate::sweep::Order;
 
@@ -112,21 +114,81 @@ pub fn resume(
     Ok(run_loop(state.engine(plan.setup)?, (residual, false), &bounds, observer))
 }
 
+/// Runs a plan, or goes on with it from a state and the residual that was seen with it, shared with the other ranks, which
+/// all must have the same plan. The results are those of a run alone, to the bit, on every rank. The first rank's `observer`
+/// names the steps that are looked at; at these every rank's sees the whole body, and any of them can break the run off.
+///
+/// # Errors
+/// A sweep that cannot be shared, or a state of another body.
+pub fn run_shared(
+    plan: Plan,
+    from: Option<(EngineState, f64)>,
+    team: &Team,
+    observer: &mut dyn Observer,
+) -> Result<Outcome, SharedError> {
+    let mut observer = Agreed { team, own: observer };
+    let bounds = Bounds::of(&plan);
+    let (mut engine, residual) = match from {
+        Some((state, residual)) => (state.engine(plan.setup)?, Some(residual)),
+        None => (Engine::new(plan.setup), None),
+    };
+    engine.join(team.clone())?;
+    let begin = match residual {
+        Some(residual) => (residual, false),
+        None => (f64::INFINITY, observer.see(&engine, f64::INFINITY).is_break()),
+    };
+    Ok(run_loop(engine, begin, &bounds, &mut observer))
+}
+
+/// Whether ranks can share the run of a scene.
+///
+/// # Errors
+/// Names the key that keeps them from it.
+pub fn require_shareable(scene: &Scene) -> Result<(), SceneError> {
+    let help = "run it on one rank, with as many threads as the machine has cores";
+    if scene.equilibrium.is_some() {
+        let help = format!("{help}, or leave [equilibrium] out to step there");
+        return Err(scene.refuse("equilibrium", "ranks share sweeps, and no solver yet", &help));
+    }
+    if scene.update.order == Order::Sequential {
+        return Err(scene.refuse("update.order", NotShared.to_string(), help));
+    }
+    Ok(())
+}
+
+/// The reason why a run cannot be shared.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum SharedError {
+    /// The sweep.
+    #[error("{0}")]
+    Sweep(#[from] NotShared),
+    /// The state that it was to go on from.
+    #[error("{0}")]
+    State(#[from] WrongState),
+}
+
 /// Displacement beyond which sums of squares, which energies are, overflow \[length\].
 const FARTHEST: f64 = 1e153;
 
 /// The conditions that end a run.
-struct Bounds {
+#[derive(Clone, Debug)]
+pub(crate) struct Bounds {
     stop: Stop,
     /// Largest displacement over the spacing, as the movement is.
     divergence_ratio: f64,
 }
 
 impl Bounds {
-    fn of(plan: &Plan) -> Self {
+    pub(crate) fn of(plan: &Plan) -> Self {
         let allowed = f64::min(plan.stop.divergence_ratio * plan.diagonal, FARTHEST);
         let divergence_ratio = allowed / plan.setup.body.lattice.spacing();
         Self { stop: plan.stop, divergence_ratio }
+    }
+
+    /// The divergence that the last step was, if it was one.
+    #[cfg(feature = "live")]
+    pub(crate) fn divergence(&self, engine: &Engine) -> Option<Divergence> {
+        divergence(engine, &engine.movement(), self.divergence_ratio)
     }
 }
 
@@ -158,6 +220,9 @@ fn run_loop(
         let most = look - engine.step();
         batch.advance(&mut engine, most);
         let movement = engine.movement();
+        if !(movement.is_finite && movement.largest_displacement <= *divergence_ratio) {
+            engine.gather();
+        }
         if let Some(divergence) = divergence(&engine, &movement, *divergence_ratio) {
             engine.undo_step();
             break StopReason::Diverged(divergence);
@@ -165,9 +230,11 @@ fn run_loop(
         batch.displacement = movement.largest_displacement;
         residual = movement.largest_move;
         if engine.step() == look || settled(residual, &engine) {
+            engine.gather();
             interrupted = observer.see(&engine, residual).is_break();
         }
     };
+    engine.gather();
     Outcome { engine, reason, residual, solved: None }
 }
 
@@ -211,7 +278,13 @@ impl StepBatch {
         // That is along each axis; along both at once, within the diagonal.
         if count < 2 || reach * std::f64::consts::SQRT_2 * (1.0 + 1e-9) > self.bound {
             self.single_steps = self.single_steps.saturating_sub(1);
-            return engine.advance();
+            let acts = engine.acts_next();
+            engine.advance();
+            // Another rule takes particles another distance.
+            if acts && self.reach.is_some() {
+                self.reach = engine.reach_of_a_step();
+            }
+            return;
         }
         let Some(tolerance) = self.tolerance else {
             engine.advance_by(count, None);
@@ -229,8 +302,8 @@ impl StepBatch {
     }
 }
 
-/// The divergence of a body that was put where its energies overflow.
-pub(super) fn overflow(engine: &Engine) -> Option<Divergence> {
+/// The divergence of a body that was put where its energies overflow; `None` for any other.
+pub fn overflow(engine: &Engine) -> Option<Divergence> {
     divergence(engine, &engine.movement(), FARTHEST / engine.body().lattice.spacing())
 }
 

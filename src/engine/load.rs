@@ -20,6 +20,10 @@ impl Load {
         Self { ramp, factor: 1.0, each, whole: None }
     }
 
+    pub fn ramp(&self) -> Option<usize> {
+        self.ramp
+    }
+
     /// Whether more of the loads is to come after this step.
     pub fn is_growing(&self, step: usize) -> bool {
         self.ramp.is_some_and(|ramp| step < ramp)

@@ -2,10 +2,12 @@
 //!
 //! A [`setup::Setup`] becomes an [`Engine`]: in each step roles change and leaders move (`leaders`), bonds break, loads
 //! grow ([`load`]) and the rule is swept; where nothing in between depends on how the body stands, several steps are
-//! taken at once ([`several`]). An [`observer::Observer`] looks at it on its way. [`forces`] are those within a body
+//! taken at once ([`several`]). An [`observer::Observer`] looks at it on its way. Several ranks can share a body
+//! ([`shared`]). [`forces`] are those within a body
 //! that is a material, and what holds it; [`path`] sums up the work done between equilibria. [`state`] takes an engine
 //! out on its way and puts it back, for checkpoints.
 
+mod actions;
 pub mod forces;
 mod leaders;
 pub mod load;
@@ -15,6 +17,7 @@ pub mod path;
 pub(crate) mod serde_impls;
 pub mod setup;
 pub mod several;
+pub mod shared;
 pub mod state;
 
 use std::sync::Arc;
@@ -31,12 +34,14 @@ use crate::flock::strain::{Strain, strain};
 use crate::flock::vectors::Vectors;
 use crate::material::cells::Cells;
 use crate::material::free_edge::{Edge, FreeEdge};
+use crate::ranks::Team;
+use crate::sweep::domain::Share;
 use crate::sweep::{Activity, Order, Sweep, Update};
 use leaders::Led;
 use load::Load;
 use movement::Movement;
 use path::Path;
-use setup::{RoleChange, Setup};
+use setup::{Action, RoleChange, Setup};
 
 /// A body on its way; positions in \[length, world frame\], shape \[count\].
 #[derive(Clone, Debug)]
@@ -49,6 +54,8 @@ pub struct Engine {
     takes_several: bool,
     roles: Vec<Role>,
     changes: Vec<RoleChange>,
+    /// By ascending step.
+    actions: Vec<Action>,
     /// By particle.
     leaders: Vec<Led>,
     /// The particles of `leaders`.
@@ -73,6 +80,10 @@ pub struct Engine {
     settled: Option<Vectors>,
     /// Of a body that is put to rest part by part.
     path: Option<Path>,
+    /// Those who share the body.
+    team: Option<(Team, Share)>,
+    /// Whether the positions of all particles are known here; of a shared body, otherwise, those of its own.
+    is_whole: bool,
 }
 
 /// Buffers of a neighbourhood that is found anew at every step.
@@ -94,6 +105,7 @@ impl Engine {
             roles,
             changes,
             cuts,
+            actions,
             cells,
             loads,
             ramp,
@@ -114,6 +126,7 @@ impl Engine {
             update,
             roles,
             changes,
+            actions,
             leaders: Vec::new(),
             led: Vec::new(),
             led_components: Vec::new(),
@@ -127,6 +140,8 @@ impl Engine {
             load: Load::new(ramp, loads),
             settled: None,
             path: None,
+            team: None,
+            is_whole: true,
         };
         engine.follow_ramp();
         // The plan has given the roles that hold from the start; their motions begin here.
@@ -237,8 +252,10 @@ impl Engine {
             self.advance_by(1, None);
             return;
         }
+        self.gather();
         self.step += 1;
         self.settled = None;
+        self.act();
         self.follow_ramp();
         self.take_roles();
         self.break_bonds();
@@ -248,10 +265,18 @@ impl Engine {
         }
         self.move_leaders();
         self.move_components();
-        self.sweep.step(&self.flock, self.body.frame.as_ref(), &self.present, &mut self.previous);
+        match self.team {
+            None => {
+                self.sweep.step(&self.flock, self.body.frame.as_ref(), &self.present, &mut self.previous);
+            }
+            Some(_) => self.step_shared(),
+        }
         std::mem::swap(&mut self.present, &mut self.previous);
         self.activity.forget();
-        self.activity.count_whole(self.sweep.followers());
+        // The counts of all ranks are added up.
+        if self.team.as_ref().is_none_or(|(team, _)| team.is_first()) {
+            self.activity.count_whole(self.sweep.followers());
+        }
     }
 
     /// Puts particles where they have been seen \[length\], in place of where the last step sent them; frame
@@ -309,7 +334,7 @@ impl Engine {
         self.path.as_ref()
     }
 
-    /// Takes the last step back: positions as before it. Bonds that broke in it stay broken.
+    /// Takes the last step back: positions as before it. A shared body must have been [gathered](Engine::gather). Bonds that broke in it stay broken.
     pub fn undo_step(&mut self) {
         self.return_to(self.step - 1, &self.previous.clone(), self.activity.clone());
     }
@@ -318,6 +343,7 @@ impl Engine {
     pub fn is_scheduled(&self) -> bool {
         let waits = |change: &RoleChange| change.when.is_none() && change.from > self.step.max(1);
         self.changes.iter().any(waits)
+            || self.next_action().is_some()
             || self.load.is_growing(self.step)
             || self.leaders.iter().any(|led| self.goes_on(led))
             || self.moves_components()
@@ -325,7 +351,14 @@ impl Engine {
 
     /// Looks over the last step.
     pub fn movement(&self) -> Movement {
-        Movement::of(&self.present, &self.previous, &self.body.reference, self.body.lattice.spacing())
+        let (all, spacing) =
+            ([&self.present, &self.previous, &self.body.reference], self.body.lattice.spacing());
+        match (&self.team, self.sweep.domain()) {
+            (Some((team, _)), Some(domain)) => {
+                Movement::among(domain.owned(), all, spacing, |own| team.largest(own))
+            }
+            _ => Movement::among(0..self.present.len(), all, spacing, |own| own),
+        }
     }
 
     fn after_role_change(&mut self) {
@@ -343,10 +376,13 @@ impl Engine {
 
     fn compile_sweep(&mut self) {
         self.activity.forget();
+        let share = self.team.as_ref().map_or_else(Share::whole, |(_, share)| *share);
         self.sweep = if self.present_neighbours.is_some() {
-            Sweep::uncompiled(self.update, &self.flock, &self.roles)
+            let mut sweep = Sweep::uncompiled(self.update, &self.flock, &self.roles);
+            sweep.share_with(share);
+            sweep
         } else {
-            Sweep::compile(self.update, &self.flock, &self.roles)
+            Sweep::compile_share(self.update, &self.flock, &self.roles, share)
         };
         self.takes_several = self.sweep.takes_several(self.body.frame.as_ref());
     }
@@ -356,6 +392,11 @@ impl Engine {
         let known = self.breaks.len();
         let places = (&*self.body.reference, &self.present);
         bonds.break_stretched(self.step, &self.flock.neighbours, places, &self.roles, &mut self.breaks);
+        self.set_torn_aside(known);
+    }
+
+    /// Sweeps the ends of the bonds that have broken since `known` of them were as those of a torn body.
+    fn set_torn_aside(&mut self, known: usize) {
         if self.breaks.len() > known {
             tracing::debug!("step {}: {} bonds break", self.step, self.breaks.len() - known);
             self.takes_several = false;

@@ -1,5 +1,7 @@
 //! How far a body moved in a step, and how far it is from where it began.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use crate::flock::vectors::{Vectors, distance};
@@ -24,35 +26,49 @@ const LANES: usize = 8;
 impl Movement {
     /// Looks over a step from `previous` to `present`.
     pub fn of(present: &Vectors, previous: &Vectors, reference: &Vectors, spacing: f64) -> Self {
-        let pieces = present.len().div_ceil(PIECE);
-        let all = [present, previous, reference];
-        let one = |piece: usize| Squares::of(all, piece * PIECE, spacing.recip());
+        Self::among(0..present.len(), [present, previous, reference], spacing, |own| own)
+    }
+
+    /// Looks over a step, from the second to the first, of a part of a body; `largest` finds the largest of the numbers of
+    /// all parts.
+    pub fn among(
+        part: Range<usize>,
+        all: [&Vectors; 3],
+        spacing: f64,
+        largest: impl Fn([f64; 3]) -> [f64; 3],
+    ) -> Self {
+        let pieces = part.len().div_ceil(PIECE);
+        let one = |piece: usize| {
+            let begin = part.start + piece * PIECE;
+            Squares::of(all, begin..(begin + PIECE).min(part.end), spacing.recip())
+        };
         let squares = if pieces > 4 {
             (0..pieces).into_par_iter().map(one).reduce(Squares::default, Squares::or)
         } else {
             (0..pieces).map(one).fold(Squares::default(), Squares::or)
         };
-        if squares.poison == 0.0 {
+        let is_poisoned = f64::from(u8::from(squares.poison != 0.0));
+        let [moved, displaced, is_poisoned] = largest([squares.moved, squares.displaced, is_poisoned]);
+        if is_poisoned == 0.0 {
             return Self {
-                largest_move: squares.moved.sqrt(),
-                largest_displacement: squares.displaced.sqrt(),
+                largest_move: moved.sqrt(),
+                largest_displacement: displaced.sqrt(),
                 is_finite: true,
             };
         }
-        Self::exactly(all, spacing)
+        let [largest_move, largest_displacement, is_lost] = largest(exactly(part, all, spacing));
+        Self { largest_move, largest_displacement, is_finite: is_lost == 0.0 }
     }
+}
 
-    /// For positions that are lost or so far away that a square overflows.
-    fn exactly([present, previous, reference]: [&Vectors; 3], spacing: f64) -> Self {
-        let largest = |from: &Vectors| {
-            (0..present.len()).map(|i| distance(present.get(i), from.get(i)) / spacing).fold(0.0, f64::max)
-        };
-        Self {
-            largest_move: largest(previous),
-            largest_displacement: largest(reference),
-            is_finite: first_lost(present).is_none(),
-        }
-    }
+/// Largest motion and displacement over the spacing, and 1 where a position is not finite, for positions that are lost or so
+/// far away that a square overflows.
+fn exactly(part: Range<usize>, [present, previous, reference]: [&Vectors; 3], spacing: f64) -> [f64; 3] {
+    let largest = |from: &Vectors| {
+        part.clone().map(|i| distance(present.get(i), from.get(i)) / spacing).fold(0.0, f64::max)
+    };
+    let is_lost = part.clone().any(|i| !present.get(i).iter().all(|place| place.is_finite()));
+    [largest(previous), largest(reference), f64::from(u8::from(is_lost))]
 }
 
 /// Index of the first particle whose position is not finite.
@@ -85,8 +101,7 @@ impl Squares {
         }
     }
 
-    fn of([present, previous, reference]: [&Vectors; 3], begin: usize, scale: f64) -> Self {
-        let piece = begin..(begin + PIECE).min(present.len());
+    fn of([present, previous, reference]: [&Vectors; 3], piece: Range<usize>, scale: f64) -> Self {
         let [x, y] = [&present.x[piece.clone()], &present.y[piece.clone()]];
         let [px, py] = [&previous.x[piece.clone()], &previous.y[piece.clone()]];
         let [rx, ry] = [&reference.x[piece.clone()], &reference.y[piece]];

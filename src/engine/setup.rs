@@ -4,12 +4,13 @@ use std::sync::Arc;
 
 use crate::flock::body::Body;
 use crate::flock::condition::Condition;
-use crate::flock::fracture::Break;
-use crate::flock::law::Flock;
+use crate::flock::fracture::{Break, Ghosts, Threshold};
+use crate::flock::law::{Flock, Weights};
 use crate::flock::motion::Motion;
 use crate::flock::role::Role;
-use crate::flock::rules::Axis;
+use crate::flock::rules::{Axis, Rule};
 use crate::flock::vectors::Vectors;
+use crate::geometry::shape::Segment;
 use crate::material::cells::Cells;
 use crate::material::free_edge::FreeEdge;
 use crate::sweep::Update;
@@ -31,6 +32,8 @@ pub struct Setup {
     pub changes: Vec<RoleChange>,
     /// Bonds cut before the first step.
     pub cuts: Vec<Break>,
+    /// What is done to the body while it is stepped, by ascending step.
+    pub actions: Vec<Action>,
     /// Between the particles, where the body has a material.
     pub cells: Option<Cells>,
     /// Forces of each load on the particles \[force\], shape \[loads\]\[count\]; their sum is the flock's.
@@ -58,6 +61,47 @@ pub struct RoleChange {
     pub motion: Option<Motion>,
 }
 
+/// Something that is done to the body at the beginning of a step.
+#[derive(Clone, Debug)]
+pub struct Action {
+    /// First step at which it holds.
+    pub at: usize,
+    /// What is done.
+    pub what: ActionKind,
+}
+
+/// Kinds of actions.
+#[derive(Clone, Debug)]
+pub enum ActionKind {
+    /// The particles follow by this from now on.
+    Conduct(Arc<Conduct>),
+    /// Every bond breaks that crosses this line where the body stands \[length\].
+    Cut(Segment),
+}
+
+/// How particles follow: the part of a setup that may change while a body is stepped.
+#[derive(Clone, Debug)]
+pub struct Conduct {
+    /// The mean and the terms added to it.
+    pub rule: Rule,
+    /// How much each neighbour counts.
+    pub weights: Weights,
+    /// Sum of the loads on each particle \[force\], shape \[count\].
+    pub forces: Option<Vectors>,
+    /// Rest offsets \[length\], shape \[count\].
+    pub rest: Option<Vectors>,
+    /// When bonds break, and what stands in for them.
+    pub fracture: Option<(Option<Threshold>, Ghosts)>,
+    /// The order and the damping of the sweep.
+    pub update: Update,
+    /// Between the particles, where the body has a material.
+    pub cells: Option<Cells>,
+    /// Forces of each load on the particles \[force\], shape \[loads\]\[count\].
+    pub loads: Vec<Vectors>,
+    /// Of a body fitted to its outline whose rule is a material.
+    pub free_edge: Option<Arc<FreeEdge>>,
+}
+
 impl Setup {
     /// Particles that see each other through `flock`; those that do not follow are led from outside.
     pub fn new(body: Body, flock: Flock, roles: Vec<Role>, update: Update) -> Self {
@@ -69,6 +113,7 @@ impl Setup {
             roles,
             changes: Vec::new(),
             cuts: Vec::new(),
+            actions: Vec::new(),
             cells: None,
             loads: Vec::new(),
             ramp: None,

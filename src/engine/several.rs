@@ -5,7 +5,7 @@ use super::leaders::Led as Leader;
 use crate::engine::setup::RoleChange;
 use crate::flock::law::Flock;
 use crate::flock::vectors::{Vectors, distance};
-use crate::sweep::{Activity, Led, MOST_STEPS};
+use crate::sweep::{Activity, Led};
 
 impl Engine {
     /// How many steps, at most `most`, can be taken by [`Engine::advance_by`] from here; 0 where the next one
@@ -19,13 +19,15 @@ impl Engine {
             return 0;
         }
         let to_come = self.changes.iter().map(|change| change.from).filter(|&from| from > self.step.max(1));
+        let to_come = to_come.chain(self.next_action());
         let until = to_come.min().map_or(usize::MAX, |from| from - 1 - self.step);
-        most.min(until).min(MOST_STEPS)
+        most.min(until).min(self.sweep.steps_together())
     }
 
     /// Takes so many steps, as many as [`Engine::steps_at_once`] allows; the bits are those of single ones.
     /// Returns for each whether a particle is known to have moved farther in it than `farther` \[length\].
     pub fn advance_by(&mut self, count: usize, farther: Option<f64>) -> Vec<bool> {
+        self.receive_halo(count);
         let (leaders, changes, step) = (&self.leaders, &self.changes, self.step);
         let place = |which: usize, level: usize| {
             leaders[which].place(changes, step + level).expect("leaders have a motion")
@@ -36,7 +38,7 @@ impl Engine {
         let moved = self.sweep.steps(&self.flock, frame, places, (count, led, farther), &mut self.activity);
         self.step += count;
         self.settled = None;
-        moved
+        if farther.is_some() { self.on_any_rank(moved) } else { moved }
     }
 
     /// Puts the body back to where it stood at an earlier step, with the same roles, as if it had not gone on.
@@ -45,6 +47,7 @@ impl Engine {
         self.settled = None;
         self.follow_ramp();
         self.present.clone_from(places);
+        self.is_whole = self.team.is_none();
         self.activity = activity;
         self.activity.forget();
     }

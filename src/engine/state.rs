@@ -95,13 +95,14 @@ impl EngineState {
     ///
     /// # Errors
     /// A state of another body. A plan with as many of everything is taken for the right one: hold its
-    /// its digest against that of the plan that was run.
+    /// digest against that of the plan that was run.
     pub fn engine(self, setup: Setup) -> Result<Engine, WrongState> {
         let mut engine = Engine::new(setup);
+        engine.step = self.step;
+        engine.conduct_until_now();
         self.require_fits(&engine)?;
         let led =
             |Leading { particle, change, which, since, base }| Led { particle, change, which, since, base };
-        engine.step = self.step;
         engine.follow_ramp();
         engine.present = self.present;
         engine.previous = self.previous;
@@ -134,14 +135,15 @@ impl EngineState {
         };
         for led in &self.leaders {
             require_below("role changes", led.change, engine.changes.len())?;
-            require_below(
-                "particles of a role change",
-                led.which,
-                engine.changes[led.change].particles.len(),
-            )?;
-            require_below("led particles", led.particle, count)?;
+            let change = &engine.changes[led.change];
+            require("leaders without a motion", usize::from(change.motion.is_none()), 0)?;
+            require_below("particles of a role change", led.which, change.particles.len())?;
+            require("as the number of a led particle", led.particle, change.particles[led.which])?;
             require_below("steps of a leader", led.since, self.step.saturating_add(1))?;
         }
+        // Found by bisection.
+        let disordered = self.leaders.windows(2).filter(|pair| pair[0].particle >= pair[1].particle);
+        require("leaders out of order", disordered.count(), 0)?;
         for (particle, _) in &self.guided {
             require_below("guided particles", *particle, count)?;
         }

@@ -22,6 +22,7 @@ use serde_json::Value;
 use super::error::ExportError;
 use super::manifest::create;
 use super::report::AnimationState;
+use crate::continuum::digest::fnv1a;
 use crate::continuum::record::{LoadStep, ProbeSeries, Snapshot};
 use crate::engine::state::EngineState;
 use crate::scene::Scene;
@@ -206,6 +207,12 @@ impl<'a> Checkpoint<'a> {
         Ok(bytes)
     }
 
+    /// A fingerprint of the state that a run goes on from, to distinguish checkpoints: see [`fnv1a`].
+    pub fn fingerprint(&self) -> u64 {
+        let state = postcard::to_stdvec(&(&self.engine, self.residual));
+        fnv1a(&state.expect("a checkpoint can be written"))
+    }
+
     /// Refuses to go on with another scene, or with files of it that have changed.
     ///
     /// # Errors
@@ -379,6 +386,10 @@ mod tests {
         assert_eq!(read.engine, state);
         assert_eq!(read.residual, f64::INFINITY);
         assert_eq!(read.stepping, Duration::from_millis(1500));
+        let mut other = read.clone();
+        assert_eq!(other.fingerprint(), read.fingerprint());
+        other.residual = 1.0;
+        assert_ne!(other.fingerprint(), read.fingerprint());
         assert_eq!((read.snapshots.len(), read.probes[0].pe1.len()), (1, 25));
         assert_eq!(read.snapshots[0].step, 25);
         let left: Vec<_> = fs::read_dir(folder.path()).expect("readable").flatten().collect();

@@ -13,9 +13,9 @@ use super::OutputFolder;
 use super::error::ExportError;
 use super::manifest::create;
 use crate::continuum::record::{ProbeSeries, Snapshot};
+use crate::engine::Engine;
 use crate::flock::body::Body;
 use crate::flock::fracture::Break;
-use crate::flock::strain::Strain;
 use crate::material::stress::StressState;
 
 #[derive(Serialize)]
@@ -82,17 +82,18 @@ struct ResidualRow {
 /// Mises stress of that mean. Such a mean lies below a peak at a free edge or a notch.
 pub fn write_final(
     folder: &OutputFolder,
-    body: &Body,
+    engine: &Engine,
     last: &Snapshot,
-    strains: &[Option<Strain>],
     stresses: Option<&[Option<StressState>]>,
 ) -> Result<PathBuf, ExportError> {
+    let body = engine.body();
     let stress = |i: usize, k: usize| stresses.map(|all| all[i].map(|stress| stress.components[k]));
     let of_lattice = |i: usize| body.numbering.is_none() && body.sites[i][0] != Body::ALONG_OUTLINE;
     let at_sites = (0..body.count()).filter(|&i| of_lattice(i)).map(|i| body.sites[i]);
     let lowest = |axis: usize| at_sites.clone().map(|site| i64::from(site[axis])).min().unwrap_or(0);
     let (first_column, first_row) = (lowest(0), lowest(1));
-    let rows = body.rows().map(|i| FinalRow {
+    // Strains are found as they are written: all of them at once would take as much memory as the body.
+    let rows = body.rows().map(|i| (i, engine.strain(i))).map(|(i, strain)| FinalRow {
         id: body.id(i),
         column: of_lattice(i).then(|| i64::from(body.sites[i][0]) - first_column + 1),
         row: of_lattice(i).then(|| i64::from(body.sites[i][1]) - first_row + 1),
@@ -103,10 +104,10 @@ pub fn write_final(
         y: last.positions.y[i],
         pe1: last.pe1[i],
         pe2: last.pe2[i],
-        strain_xx: strains[i].map(|strain| strain.components[0]),
-        strain_yy: strains[i].map(|strain| strain.components[1]),
-        strain_xy: strains[i].map(|strain| strain.components[2]),
-        rotation: strains[i].map(|strain| strain.rotation),
+        strain_xx: strain.map(|strain| strain.components[0]),
+        strain_yy: strain.map(|strain| strain.components[1]),
+        strain_xy: strain.map(|strain| strain.components[2]),
+        rotation: strain.map(|strain| strain.rotation),
         stress_xx: stress(i, 0),
         stress_yy: stress(i, 1),
         stress_xy: stress(i, 2),

@@ -74,6 +74,7 @@ pub mod trade;
 pub mod transport;
 mod vtk;
 
+use std::borrow::Cow;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -85,7 +86,6 @@ use crate::continuum::mechanics::Stresses;
 use crate::continuum::record::{LoadStep, ProbeSeries, Snapshot};
 use crate::continuum::run::Outcome;
 use crate::engine::Engine;
-use crate::flock::strain::Strain;
 use crate::flock::vectors::Vectors;
 use crate::scene::Scene;
 use crate::scene::units::Units;
@@ -142,14 +142,14 @@ pub fn write_all(
 ) -> Result<(Vec<PathBuf>, Summary), ExportError> {
     let start = Instant::now();
     let engine = &results.outcome.engine;
-    let last = Snapshot::of(engine);
-    let strains = strains(engine);
-    let largest_strain = largest(&strains);
+    // The last configuration is drawn as a rule, and kept only once.
+    let drawn = results.snapshots.last().filter(|last| last.step == engine.step());
+    let last = drawn.map_or_else(|| Cow::Owned(Snapshot::of(engine)), Cow::Borrowed);
     let stresses = results.scene.material.as_ref().and_then(|elastic| Stresses::at_present(engine, elastic));
     let of_particles = stresses.as_ref().map(|stresses| &stresses.particles[..]);
-    let mut written = vec![csv::write_final(folder, engine.body(), &last, &strains, of_particles)?];
+    let mut written = vec![csv::write_final(folder, engine, &last, of_particles)?];
     // Figures take memory of their own.
-    drop((strains, stresses));
+    drop(stresses);
     if !results.probes.is_empty() {
         written.push(csv::write_probes(folder, engine.body(), results.probes)?);
     }
@@ -167,19 +167,15 @@ pub fn write_all(
     }
     let mut timings = results.timings;
     timings.output += start.elapsed();
-    let summary = Summary::new(results.scene, results.outcome, &last, largest_strain, timings);
+    let summary = Summary::new(results.scene, results.outcome, &last, timings);
     written.push(summary.write(folder)?);
     Ok((written, summary))
 }
 
-/// The strain of each particle's surroundings; `None` where it sees too few.
-fn strains(engine: &Engine) -> Vec<Option<Strain>> {
-    (0..engine.body().count()).into_par_iter().map(|i| engine.strain(i)).collect()
-}
-
-/// The strain largest in size.
-fn largest(strains: &[Option<Strain>]) -> Option<f64> {
-    strains.iter().flatten().map(Strain::largest).reduce(f64::max)
+/// The strain of any particle's surroundings that is largest in size; `None` where no particle sees enough.
+fn largest_strain(engine: &Engine) -> Option<f64> {
+    let of = |i: usize| engine.strain(i).map(|strain| strain.largest());
+    (0..engine.body().count()).into_par_iter().filter_map(of).reduce_with(f64::max)
 }
 
 /// A figure still to be drawn, and its file without ending.

@@ -8,7 +8,7 @@ use std::time::Duration;
 use serde::Serialize;
 
 use super::error::{ExportError, write_file};
-use super::{OutputFolder, bonds, largest, strains};
+use super::{OutputFolder, bonds, largest_strain};
 use crate::continuum::mechanics::{Mechanics, Peak};
 use crate::continuum::places::{AtPlace, at_places};
 use crate::continuum::record::Snapshot;
@@ -180,20 +180,14 @@ pub struct Seconds {
 impl Summary {
     /// The summary of a run of which nothing else is written.
     pub fn of_end(scene: &Scene, outcome: &Outcome, timings: Timings) -> Self {
-        let largest_strain = largest(&strains(&outcome.engine));
-        Self::new(scene, outcome, &Snapshot::of(&outcome.engine), largest_strain, timings)
+        Self::new(scene, outcome, &Snapshot::of(&outcome.engine), timings)
     }
 
     /// `last` is the configuration at the end.
-    pub fn new(
-        scene: &Scene,
-        outcome: &Outcome,
-        last: &Snapshot,
-        largest_strain: Option<f64>,
-        timings: Timings,
-    ) -> Self {
+    pub fn new(scene: &Scene, outcome: &Outcome, last: &Snapshot, timings: Timings) -> Self {
         let [pe1, pe2] = last.energies();
         let engine = &outcome.engine;
+        let largest_strain = largest_strain(engine);
         let mechanics = scene.material.as_ref().and_then(|elastic| Mechanics::of(engine, elastic));
         Self {
             program: PROGRAM,

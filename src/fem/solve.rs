@@ -17,6 +17,7 @@ use super::newton::solve_turning;
 use super::problem::Problem;
 use super::solution::Solution;
 use super::strain::Strain;
+use crate::geometry::disjoint_sets::DisjointSets;
 
 /// Below this ratio of the softest motion's stiffness to the stiffness of the single components, at most
 /// two digits of the answer would be left: the matrix counts as singular.
@@ -67,12 +68,12 @@ fn check_rigid_motion(mesh: &Mesh, prescribed: &[Option<f64>]) -> Result<(), Fem
     for (c, _) in prescribed.iter().enumerate().filter(|(_, p)| p.is_some()) {
         let (node, lever) = (c / 2, 2 * (c % 2));
         let at = if lever == 0 { mesh.y()[node] } else { mesh.x()[node] };
-        let range = &mut held[part[node]][lever..lever + 2];
+        let range = &mut held[part[node] as usize][lever..lever + 2];
         (range[0], range[1]) = (range[0].min(at), range[1].max(at));
     }
     let size = |v: &[f64]| v.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
     let slack = 1e-12 * size(mesh.x()).max(size(mesh.y()));
-    for node in (0..mesh.node_count()).filter(|&n| part[n] == n) {
+    for node in (0..mesh.node_count()).filter(|&n| part[n] as usize == n) {
         let [y_low, y_high, x_low, x_high] = held[node];
         let motion = if y_low > y_high {
             "translate along x"
@@ -88,24 +89,14 @@ fn check_rigid_motion(mesh: &Mesh, prescribed: &[Option<f64>]) -> Result<(), Fem
     Ok(())
 }
 
-/// For each node the lowest-numbered node of its part (union by lowest root, with path halving).
-fn parts(mesh: &Mesh) -> Vec<usize> {
-    fn root(parent: &mut [usize], mut i: usize) -> usize {
-        while parent[i] != i {
-            parent[i] = parent[parent[i]];
-            i = parent[i];
-        }
-        i
-    }
-    let mut parent: Vec<usize> = (0..mesh.node_count()).collect();
+/// For each node the lowest-numbered node of its part.
+fn parts(mesh: &Mesh) -> Vec<u32> {
+    let mut parts = DisjointSets::new(mesh.node_count());
     for cell in 0..mesh.cell_count() {
         let nodes = mesh.cell(cell);
-        for &node in &nodes[1..] {
-            let (a, b) = (root(&mut parent, nodes[0] as usize), root(&mut parent, node as usize));
-            parent[a.max(b)] = a.min(b);
-        }
+        nodes[1..].iter().for_each(|&node| parts.join(nodes[0], node));
     }
-    (0..parent.len()).map(|i| root(&mut parent, i)).collect()
+    parts.labels()
 }
 
 /// The factor L of the permuted matrix.

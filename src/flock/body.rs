@@ -2,13 +2,13 @@
 
 use std::sync::Arc;
 
-use super::disjoint_sets::DisjointSets;
 use super::frame::{Frame, FrameRule};
 use super::lattice::{Lattice, LatticeKind, Site};
 use super::neighbourhood::{Neighbourhood, NeighbourhoodError, Neighbours};
 use super::numbering::Numbering;
 use super::vectors::Vectors;
 use super::window::Window;
+use crate::geometry::disjoint_sets::DisjointSets;
 use crate::geometry::locate::Locator;
 use crate::geometry::outline::Place;
 use crate::geometry::shape::Shape;

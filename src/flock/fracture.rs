@@ -101,6 +101,11 @@ impl Bonds {
         }
     }
 
+    /// All bonds of `neighbours`, of which none breaks by itself.
+    pub fn uncut(neighbours: &Neighbours) -> Self {
+        Self::new(None, Ghosts::Lattice, neighbours)
+    }
+
     /// Whether the pair at this place of [`Neighbours::index`] is broken.
     pub fn is_broken(&self, bond: usize) -> bool {
         self.broken[bond]
@@ -162,6 +167,24 @@ impl Bonds {
     ) {
         self.break_where(0, neighbours, (reference, reference), breaks, |j, k| {
             segments_cross(reference.get(j), reference.get(k), from, to)
+        });
+    }
+
+    /// Breaks, at this step, every bond that crosses the cut from `from` to `to` \[length\] where its ends are at present.
+    /// Bonds to the frame hold: it is no matter.
+    pub fn cut_present(
+        &mut self,
+        step: usize,
+        (from, to): Segment,
+        neighbours: &Neighbours,
+        (reference, present): (&Vectors, &Vectors),
+        roles: &[Role],
+        breaks: &mut Vec<Break>,
+    ) {
+        self.break_where(step, neighbours, (reference, present), breaks, |j, k| {
+            roles[j].is_body()
+                && roles[k].is_body()
+                && segments_cross(present.get(j), present.get(k), from, to)
         });
     }
 

@@ -4,6 +4,7 @@
 
 pub mod box_tree;
 mod crossings;
+pub(crate) mod disjoint_sets;
 pub mod locate;
 pub mod meeting;
 pub mod outline;

@@ -7,10 +7,13 @@
 //! | [`accuracy`] | rules against finite elements, what an accuracy costs, when a body grows |
 //! | [`fracture`] | bonds that break, cuts, ghosts |
 //! | [`swarms`] | formations of robots: the swarm file, simulated flights, faults, recordings |
+//! | [`live`] | bodies and swarms in a browser, dragged, cut and changed by hand, and saved |
 //! | [`ros2`] | the ROS 2 node: topics, services, parameters, launch files |
 //! | [`security`] | command permissions, failures of robots, peers and the middleware |
 //! | [`shared_memory`] | the same loop between processes of one computer |
+//! | [`python`] | the Python package: runs, bodies, studies, swarms, errors and threads |
 //! | [`performance`] | how fast bodies step and settle, and how to measure it |
+//! | [`ranks`] | runs shared by several processes over MPI: starting, what is exchanged, what is refused, faults |
 //! | [`files`] | output files of a run, the report, checkpoints, exit codes |
 //! | [`theory`] | the paper's terms and equations, what they imply, where the paper leaves a choice |
 //!
@@ -32,6 +35,9 @@ pub mod fracture {}
 #[doc = include_str!("swarms.md")]
 pub mod swarms {}
 
+#[doc = include_str!("live.md")]
+pub mod live {}
+
 #[doc = include_str!("ros2.md")]
 pub mod ros2 {}
 
@@ -41,8 +47,14 @@ pub mod security {}
 #[doc = include_str!("shared_memory.md")]
 pub mod shared_memory {}
 
+#[doc = include_str!("python.md")]
+pub mod python {}
+
 #[doc = include_str!("performance.md")]
 pub mod performance {}
+
+#[doc = include_str!("ranks.md")]
+pub mod ranks {}
 
 #[doc = include_str!("files.md")]
 pub mod files {}

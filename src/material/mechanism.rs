@@ -9,8 +9,8 @@
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
 use super::cells::{Cells, Incidence};
-use crate::flock::disjoint_sets::DisjointSets;
 use crate::flock::vectors::Vectors;
+use crate::geometry::disjoint_sets::DisjointSets;
 
 /// How a body, or what its leaders hold of it, can move without strain. Particles are named by their
 /// ids, which count from 1.

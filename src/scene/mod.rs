@@ -11,6 +11,7 @@ pub mod points;
 pub mod raw;
 pub mod swarm;
 pub mod table;
+pub(crate) mod text;
 pub mod units;
 pub mod validate;
 
@@ -38,6 +39,7 @@ pub use bundled::{Bundled, bundled};
 pub use document::Document;
 pub use document::problem::{Place, Problem, SceneError};
 use raw::RawScene;
+pub use validate::actions::{MOST_ACTIONS, is_changeable};
 
 /// A continuum scene, ready to be planned.
 #[derive(Clone, Debug)]
@@ -80,6 +82,8 @@ pub struct Scene {
     pub fracture: Option<Fracture>,
     /// Ends of each cut \[length\].
     pub cuts: Vec<Segment>,
+    /// Everything that is done to the body while it is stepped, by ascending step.
+    pub actions: Vec<Action>,
     /// When the run ends.
     pub stop: Stop,
     /// How the equilibrium is found, where the scene is not stepped.
@@ -261,6 +265,24 @@ pub enum LeaderMotion {
         /// Steps to get there.
         steps: usize,
     },
+}
+
+/// Something that is done to the body at the beginning of a step.
+#[derive(Clone, Debug)]
+pub struct Action {
+    /// First step at which it holds.
+    pub at: usize,
+    /// What is done.
+    pub what: ActionKind,
+}
+
+/// Kinds of actions.
+#[derive(Clone, Debug)]
+pub enum ActionKind {
+    /// The particles follow as those of this scene do, which differs in nothing else.
+    Set(Box<Scene>),
+    /// Every bond breaks that crosses this line where the body stands then \[length\].
+    Cut(Segment),
 }
 
 /// When bonds break and what stands in for them; without a threshold none breaks by itself.

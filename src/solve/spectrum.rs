@@ -9,6 +9,7 @@ use crate::flock::frame::Frame;
 use crate::flock::law::Flock;
 use crate::flock::role::Role;
 use crate::flock::rules::{Mean, Rotation};
+use crate::flock::splitmix;
 use crate::flock::vectors::Vectors;
 use crate::sweep::{Sweep, Update};
 
@@ -146,8 +147,6 @@ impl<'a> LinearSweep<'a> {
 
 /// A number between -1 and 1 for each index, the same on every machine (splitmix64).
 pub fn scatter(index: u64) -> f64 {
-    let mut z = index.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    let drawn = splitmix::mixed(index.wrapping_add(1).wrapping_mul(splitmix::STEP));
+    (drawn >> 11) as f64 / (1u64 << 52) as f64 - 1.0
 }

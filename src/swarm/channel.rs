@@ -7,6 +7,7 @@ use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
 
 use super::watch::Pose;
+use crate::flock::splitmix;
 
 /// Parameters of a channel. The default one delivers every pose at once and unchanged.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -112,6 +113,16 @@ impl Channel {
         }
     }
 
+    /// Sends as these say from the next pose on.
+    pub fn set_params(&mut self, params: ChannelParams) {
+        self.params = params;
+    }
+
+    /// The parameters by which it sends.
+    pub fn params(&self) -> ChannelParams {
+        self.params
+    }
+
     /// From the next pose on.
     pub fn set_sender(&mut self, sender: Sender) {
         if sender != self.sender {
@@ -204,12 +215,9 @@ fn stream(seed: u64, member: u64, cause: u64) -> Pcg64Mcg {
     Pcg64Mcg::new(u128::from(base) << 64 | u128::from(mixed(base)))
 }
 
-/// splitmix64: neighbouring seeds give streams that have nothing in common.
+/// Neighbouring seeds give streams that have nothing in common.
 fn mixed(seed: u64) -> u64 {
-    let mut z = seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
+    splitmix::mixed(seed.wrapping_add(splitmix::STEP))
 }
 
 #[cfg(test)]

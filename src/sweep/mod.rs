@@ -10,9 +10,10 @@
 //! * `rows`: a rule compiled for a body, as runs and gathers with coefficients.
 //! * `kernel`, `gathers`: the loops over rows; `terms`: what is made of a mean while it is in the registers.
 //! * `schedule`: which bands take which step when, on which thread; `caches`: how large a band is on this computer.
-//! * `torn`: particles that have lost bonds.
+//! * `domain`: the part of a body that a rank moves; `torn`: particles that have lost bonds.
 
-pub(crate) mod caches;
+pub mod caches;
+pub mod domain;
 mod gathers;
 pub(crate) mod kernel;
 pub(crate) mod rows;
@@ -35,6 +36,7 @@ use crate::flock::law::{Flock, Weights};
 use crate::flock::role::Role;
 use crate::flock::vectors::Vectors;
 use caches::Caches;
+use domain::{Domain, Halo, Share};
 use kernel::Component;
 use rows::Rows;
 use terms::Compiled;
@@ -91,16 +93,24 @@ pub struct Sweep {
     torn: DamagedRows,
     /// The same where it is not, ascending: they are swept one by one.
     aside: Vec<u32>,
+    /// The part of the body that is swept here, where it is shared.
+    domain: Option<Domain>,
 }
 
 impl Sweep {
     /// Compiles the rows, anew whenever roles or neighbours change; particles that lose a bond are
     /// [set aside](Sweep::set_aside).
     pub fn compile(update: Update, flock: &Flock, roles: &[Role]) -> Self {
+        Self::compile_share(update, flock, roles, Share::whole())
+    }
+
+    /// The same for one of the ranks that share the body.
+    pub fn compile_share(update: Update, flock: &Flock, roles: &[Role], share: Share) -> Self {
         let mut sweep = Self::uncompiled(update, flock, roles);
         if update.order == Order::Synchronous {
-            sweep.rows = Rows::compile(flock, &sweep.follows);
+            sweep.rows = Rows::compile(flock, &sweep.follows, share);
         }
+        sweep.share_with(share);
         let neighbours = &flock.neighbours;
         if let Some(rows) = sweep.rows.as_ref().filter(|_| sweep.is_plain(flock)) {
             sweep.torn = DamagedRows::new((0..rows.band_count()).map(|band| rows.particles(band..band + 1)));
@@ -123,7 +133,53 @@ impl Sweep {
             terms: Compiled::new(update, flock),
             torn: DamagedRows::default(),
             aside: Vec::new(),
+            domain: None,
         }
+    }
+
+    /// Leaves to the other ranks what is theirs; to be called before anything is swept. A sequential sweep cannot be
+    /// shared: each particle waits for the one before it.
+    pub fn share_with(&mut self, share: Share) {
+        self.domain = (share.ranks > 1).then(|| match &self.rows {
+            Some(rows) => Domain::of_rows(rows, share),
+            None => Domain::of_particles(&self.follows, share),
+        });
+    }
+
+    /// The part of the body that is swept here, where it is shared.
+    pub fn domain(&self) -> Option<&Domain> {
+        self.domain.as_ref()
+    }
+
+    /// What ranks exchange before they take so many steps together; nothing where the body is not shared.
+    pub fn halo(&self, steps: usize) -> Halo {
+        match (&self.domain, &self.rows) {
+            (Some(domain), Some(rows)) => domain.halo(rows, steps),
+            _ => Halo::default(),
+        }
+    }
+
+    /// How many particles each rank receives before so many steps, shape \[ranks\]; nothing where the body is not shared.
+    pub fn halo_sizes(&self, steps: usize) -> Vec<usize> {
+        match (&self.domain, &self.rows) {
+            (Some(domain), Some(rows)) => domain.halo_sizes(rows, steps),
+            _ => Vec::new(),
+        }
+    }
+
+    /// Most steps that are worth taking together.
+    pub fn steps_together(&self) -> usize {
+        self.domain.as_ref().map_or(MOST_STEPS, Domain::steps_together)
+    }
+
+    /// The particles that are swept here.
+    fn owned(&self) -> Range<usize> {
+        self.domain.as_ref().map_or(0..self.follows.len(), Domain::owned)
+    }
+
+    /// The bands that are swept here.
+    fn bands(&self, rows: &Rows) -> Range<usize> {
+        self.domain.as_ref().map_or(0..rows.band_count(), Domain::bands)
     }
 
     /// Whether targets are nothing but means of neighbours that count the same.
@@ -150,16 +206,21 @@ impl Sweep {
 
     /// Writes the followers' next positions, then the frame's. Leaders must stand in `next` already;
     /// what neither follows nor is frame keeps what stands there. The sequential sweep starts from
-    /// what `next` holds, so it must hold the present positions.
+    /// what `next` holds, so it must hold the present positions. Of a shared body only this rank's
+    /// followers move.
     pub fn step(&self, flock: &Flock, frame: Option<&Frame>, present: &Vectors, next: &mut Vectors) {
+        let owned = self.owned();
         if let Some(rows) = &self.rows {
             self.sweep_whole(rows, flock, present, next);
             self.step_aside(flock, present, next);
         } else if self.update.order == Order::Synchronous {
             for_chunks(next, |chunk, x, y| {
                 let begin = chunk * chunk_size(present.len());
-                for i in (0..x.len()).filter(|i| self.follows[begin + i]) {
-                    [x[i], y[i]] = self.moved(begin + i, flock, present);
+                let chunk = begin..begin + x.len();
+                for j in owned.start.max(chunk.start)..owned.end.min(chunk.end) {
+                    if self.follows[j] {
+                        [x[j - begin], y[j - begin]] = self.moved(j, flock, present);
+                    }
                 }
             });
         } else {
@@ -175,11 +236,14 @@ impl Sweep {
     /// Moves the particles that the rows do not fit any more; the values that the rows left there are overwritten.
     fn step_aside(&self, flock: &Flock, present: &Vectors, next: &mut Vectors) {
         let moved = |&j: &u32| (j, self.moved(j as usize, flock, present));
-        if self.aside.len() >= ASIDE_IN_PARALLEL && rayon::current_num_threads() > 1 {
-            let moved: Vec<(u32, [f64; 2])> = self.aside.par_iter().map(moved).collect();
+        let owned = self.owned();
+        let before = |end: usize| self.aside.partition_point(|&j| (j as usize) < end);
+        let aside = &self.aside[before(owned.start)..before(owned.end)];
+        if aside.len() >= ASIDE_IN_PARALLEL && rayon::current_num_threads() > 1 {
+            let moved: Vec<(u32, [f64; 2])> = aside.par_iter().map(moved).collect();
             moved.into_iter().for_each(|(j, place)| next.set(j as usize, place));
         } else {
-            self.aside.iter().map(moved).for_each(|(j, place)| next.set(j as usize, place));
+            aside.iter().map(moved).for_each(|(j, place)| next.set(j as usize, place));
         }
     }
 
@@ -201,7 +265,8 @@ impl Sweep {
         let reference = [&flock.reference.x[..], &flock.reference.y[..]];
         let frame = frame.map(|frame| LaggedFrame { frame, reference });
         let terms = self.terms.of(flock);
-        let steps = Steps { rows, terms, rest, force, frame, led, count, farther, threads };
+        let owned = self.bands(rows);
+        let steps = Steps { rows, owned, terms, rest, force, frame, led, count, farther, threads };
         let even = [&mut present.x[..], &mut present.y[..]];
         let farther = steps.take(activity, even, [&mut next.x[..], &mut next.y[..]]);
         if count % 2 == 1 {
@@ -220,8 +285,10 @@ impl Sweep {
     pub fn takes_several(&self, frame: Option<&Frame>) -> bool {
         let keeps_up =
             |frame: &Frame, rows: &Rows| frame.rule.looks_before_the_sweep() && rows.are_near(frame.reach());
+        let is_parted = |rows: &Rows| self.domain.is_none() || rows.is_local();
         self.torn.is_empty()
             && self.aside.is_empty()
+            && self.rows.as_ref().is_some_and(is_parted)
             && self.rows.as_ref().is_some_and(|rows| frame.is_none_or(|frame| keeps_up(frame, rows)))
     }
 
@@ -233,14 +300,14 @@ impl Sweep {
 
     /// One step of all rows, in pieces of whole bands.
     fn sweep_whole(&self, rows: &Rows, flock: &Flock, present: &Vectors, next: &mut Vectors) {
-        let bands = rows.band_count();
-        let size = if is_parallel(present.len()) { chunk_size(present.len()) } else { usize::MAX };
+        let (bands, owned) = (self.bands(rows), self.owned());
+        let size = if is_parallel(owned.len()) { chunk_size(owned.len()) } else { usize::MAX };
         let mut pieces = Vec::new();
-        let (mut x, mut y) = (&mut next.x[..], &mut next.y[..]);
-        let mut first = 0;
-        for band in 0..bands {
+        let (mut x, mut y) = (&mut next.x[owned.clone()], &mut next.y[owned]);
+        let mut first = bands.start;
+        for band in bands.clone() {
             let particles = rows.particles(first..band + 1);
-            if particles.len() >= size || band + 1 == bands {
+            if particles.len() >= size || band + 1 == bands.end {
                 let (head_x, tail_x) = x.split_at_mut(particles.len());
                 let (head_y, tail_y) = y.split_at_mut(particles.len());
                 pieces.push((first..band + 1, particles.start, head_x, head_y));

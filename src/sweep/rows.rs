@@ -17,6 +17,7 @@ mod tests;
 use std::ops::Range;
 
 use super::caches::Caches;
+use super::domain::Share;
 use super::gathers::Gathers;
 use super::kernel::{self, Component, MOST_KEPT, Tables};
 use super::terms::Terms;
@@ -34,6 +35,9 @@ const SMALLEST_BAND: [usize; 2] = [1 << 10, 1 << 11];
 
 /// Bands that a body has before they become larger.
 const FEW_BANDS: usize = 1 << 7;
+
+/// Bands that each rank has before they become larger, where a body is shared: below that they are as small as is allowed.
+const FEW_BANDS_A_RANK: usize = 1 << 6;
 
 /// Most distances and coefficients that are looked through for a row that is known already.
 const MOST_LOOKED_THROUGH: usize = 4096;
@@ -125,7 +129,7 @@ enum Source<'a> {
 
 impl Rows {
     /// Compiles the rule for the particles that follow; `None` where its mean is not affine in the positions.
-    pub fn compile(flock: &Flock, follows: &[bool]) -> Option<Self> {
+    pub fn compile(flock: &Flock, follows: &[bool], share: Share) -> Option<Self> {
         let neighbours = &flock.neighbours;
         let mut starts: Vec<u32> = Vec::new();
         let (source, coefficients, gain) = match (flock.rule.mean, &flock.weights) {
@@ -153,20 +157,19 @@ impl Rows {
             _ => return None,
         };
         let rows = Self { coefficients, gain, ..Self::default() };
-        Some(rows.compiled(neighbours, follows, source, flock.rest.as_ref()))
+        Some(rows.compiled(neighbours, follows, (source, flock.rest.as_ref()), share))
     }
 
     fn compiled(
         mut self,
         neighbours: &Neighbours,
         follows: &[bool],
-        source: Source<'_>,
-        rest: Option<&Vectors>,
+        (source, rest): (Source<'_>, Option<&Vectors>),
+        share: Share,
     ) -> Self {
         let reach = reach(neighbours, follows);
         self.is_local = reach <= LARGEST_BAND / 3;
-        let smallest = (follows.len() / FEW_BANDS).clamp(SMALLEST_BAND[0], SMALLEST_BAND[1]);
-        let caches = Caches::here();
+        let (caches, smallest) = (share.caches, smallest_band(follows.len(), share.ranks));
         self.is_in_cache = follows.len() <= caches.whole_body;
         self.band_size = if self.is_local { band_size(reach, caches).max(smallest) } else { LARGEST_BAND };
         let size = self.band_size;
@@ -392,6 +395,12 @@ fn band_size(reach: usize, caches: Caches) -> usize {
         // In a front that no cache holds, columns abreast serve each other.
         _ => three,
     }
+}
+
+/// Fewest particles in a band of a body of so many, shared by so many ranks.
+fn smallest_band(particles: usize, ranks: usize) -> usize {
+    let alone = (particles / FEW_BANDS).clamp(SMALLEST_BAND[0], SMALLEST_BAND[1]);
+    if ranks == 1 { alone } else { alone.min(particles / (ranks * FEW_BANDS_A_RANK)).max(1) }
 }
 
 /// Index distance to the farthest neighbour of any follower.

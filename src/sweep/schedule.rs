@@ -84,17 +84,30 @@ impl Activity {
         if self.due == 0 { 1.0 } else { self.computed as f64 / self.due as f64 }
     }
 
+    /// Takes the counts out, to be added up with those of other ranks: computed and due.
+    pub fn take_counts(&mut self) -> [u64; 2] {
+        [std::mem::take(&mut self.computed), std::mem::take(&mut self.due)]
+    }
+
+    /// Adds counts of other steps, or of other parts of the body.
+    pub fn add_counts(&mut self, [computed, due]: [u64; 2]) {
+        self.computed = self.computed.saturating_add(computed);
+        self.due = self.due.saturating_add(due);
+    }
+
     /// Counts steps of a whole body of so many followers.
     pub fn count_whole(&mut self, followers: usize) {
-        self.computed = self.computed.saturating_add(2 * followers as u64);
-        self.due = self.due.saturating_add(2 * followers as u64);
+        self.add_counts([2 * followers as u64; 2]);
     }
 }
 
 /// Several steps to be taken, and their input.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 pub struct Steps<'a, T> {
     pub rows: &'a Rows,
+    /// The bands that are to be moved; all but where the body is shared. Those around them are moved as long as they are
+    /// needed.
+    pub owned: Range<usize>,
     pub terms: Terms<'a, T>,
     pub rest: Option<[&'a [T]; 2]>,
     /// Loads, where the rows are of a material.
@@ -132,7 +145,8 @@ impl<T: Real> Steps<'_, T> {
             x.add(y);
             x
         };
-        let due = 2 * (self.rows.all_followers() * self.count) as u64;
+        let followers: usize = self.owned.clone().map(|band| self.rows.followers(band)).sum();
+        let due = 2 * (followers * self.count) as u64;
         activity.due = activity.due.saturating_add(due);
         activity.computed = activity.computed.saturating_add(seen.computed);
         seen.farther[..self.count].to_vec()
@@ -152,16 +166,21 @@ impl<T: Real> Steps<'_, T> {
             flags.iter_mut().step_by(levels).zip(&**changed).for_each(|(flag, changed)| *flag |= changed);
         }
         let mut seen = Seen::default();
+        if self.owned.is_empty() {
+            return seen;
+        }
         let mut rows = Stretch { even, odd, flags: &mut flags };
-        let cuts = self.cuts(bands, threads);
+        let all = self.due(0);
+        let cuts = self.cuts(all.clone(), threads);
         if cuts.len() == 2 {
             Wavefront { steps: self, axes, stretch: 0..bands, rows: rows.lend() }
-                .run(|_| 0..bands, &mut seen);
+                .run(|level| self.due(level), &mut seen);
         } else {
             let segments: Vec<Range<usize>> = cuts.windows(2).map(|ends| ends[0]..ends[1]).collect();
             let shrinking = |segment: &Range<usize>, level: usize| {
-                let from = if segment.start == 0 { 0 } else { segment.start + level };
-                from..if segment.end == bands { bands } else { segment.end - level }
+                let due = self.due(level);
+                let from = if segment.start == all.start { due.start } else { segment.start + level };
+                from..if segment.end == all.end { due.end } else { segment.end - level }
             };
             self.take_fronts(axes, rows.lend(), &segments, shrinking, &mut seen);
             let inner = &cuts[1..cuts.len() - 1];
@@ -174,17 +193,27 @@ impl<T: Real> Steps<'_, T> {
         }
         for changed in changed {
             let last = flags.iter().skip(self.count).step_by(levels);
-            last.zip(changed).for_each(|(flag, changed)| *changed = *flag);
+            // Those of others move on without being seen.
+            let last = last.enumerate().map(|(band, flag)| *flag || !self.owned.contains(&band));
+            last.zip(changed).for_each(|(flag, changed)| *changed = flag);
         }
         seen
     }
 
-    /// Where the body is cut for the threads, its ends included.
-    fn cuts(&self, bands: usize, threads: usize) -> Vec<usize> {
+    /// The bands that take step number `level`, so that those owned can take the last one; number 0 is what the first
+    /// step needs.
+    fn due(&self, level: usize) -> Range<usize> {
+        let still_needed = self.count - level;
+        let end = (self.owned.end + still_needed).min(self.rows.band_count());
+        self.owned.start.saturating_sub(still_needed)..end
+    }
+
+    /// Where these bands are cut for the threads, their ends included.
+    fn cuts(&self, bands: Range<usize>, threads: usize) -> Vec<usize> {
         // A segment must outlast the steps, and a wedge fit in.
-        let most = if self.rows.is_local() { bands / (3 * (self.count + 1)) } else { 1 };
+        let most = if self.rows.is_local() { bands.len() / (3 * (self.count + 1)) } else { 1 };
         let segments = threads.clamp(1, most.max(1));
-        (0..=segments).map(|k| k * bands / segments).collect()
+        (0..=segments).map(|k| bands.start + k * bands.len() / segments).collect()
     }
 
     /// Takes the steps in disjoint stretches of bands at once; `range` says which bands of a stretch take a step.
@@ -372,7 +401,9 @@ impl<T: Real, const P: usize> Wavefront<'_, T, P> {
                 changed = changed || differ(before, after);
                 *farther = *farther || steps.farther.is_some_and(|limit| is_farther(before, after, limit));
             }
-            seen.computed += (P * compiled.followers(band)) as u64;
+            if steps.owned.contains(&band) {
+                seen.computed += (P * compiled.followers(band)) as u64;
+            }
             flags[(band - stretch.start) * levels + level] = changed;
         }
     }

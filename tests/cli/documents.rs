@@ -42,7 +42,7 @@ fn documents() -> Vec<(String, String)> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let guides = files(&root.join("src/guide")).into_iter().filter(|path| path.extension().unwrap() == "md");
     let paths: Vec<_> = guides.chain([root.join("README.md")]).collect();
-    assert_eq!(paths.len(), 12, "{paths:?}");
+    assert_eq!(paths.len(), 15, "{paths:?}");
     let read = |path: &std::path::PathBuf| std::fs::read_to_string(path).expect("readable");
     paths.iter().map(|path| (path.display().to_string(), read(path))).collect()
 }

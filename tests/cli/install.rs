@@ -44,8 +44,12 @@ fn the_package_lies_where_ros_looks_for_it() {
     let share = prefix.join("share/flockform");
     let checkout = Path::new(CHECKOUT);
     assert_eq!(read(share.join("package.xml")), read(checkout.join("package.xml")));
-    let folders =
-        [("msgs", "msgs"), ("parameters", "launch-configs/parameters"), ("swarms", "launch-configs/swarms")];
+    let folders = [
+        ("msgs", "msgs"),
+        ("parameters", "launch-configs/parameters"),
+        ("swarms", "launch-configs/swarms"),
+        ("views", "launch-configs/views"),
+    ];
     for (there, here) in folders {
         let here = checkout.join(here);
         assert_eq!(files(&share.join(there)), files(&here));
@@ -59,6 +63,33 @@ fn the_package_lies_where_ros_looks_for_it() {
         .collect();
     assert_eq!(files(&share.join("launch")), launch);
     assert!(files(&prefix).iter().all(|file| !file.contains("partial")), "{:?}", files(&prefix));
+}
+
+#[test]
+fn the_views_show_topics_that_the_node_has() {
+    let views = Path::new(CHECKOUT).join("launch-configs/views");
+    let read = |name: &str| std::fs::read_to_string(views.join(name)).expect("readable");
+    let (rviz, foxglove) = (read("formation.rviz"), read("formation.foxglove.json"));
+    let layout: serde_json::Value = serde_json::from_str(&foxglove).expect("JSON");
+    let panels = layout["configById"].as_object().expect("panels");
+    let topics = |text: &str| -> BTreeSet<String> {
+        let quoted = |c: char| !(c.is_ascii_alphanumeric() || "/_".contains(c));
+        text.split(quoted).filter(|word| word.starts_with("/flockform/")).map(str::to_owned).collect()
+    };
+    assert_eq!(topics(&rviz), ["/flockform/markers".to_owned()].into());
+    assert_eq!(topics(&foxglove), ["/flockform/markers", "/flockform/state"].map(str::to_owned).into());
+    let state =
+        std::fs::read_to_string(Path::new(CHECKOUT).join("msgs/flockform_msgs/msg/FormationState.msg"));
+    let state = state.expect("readable");
+    let fields: Vec<&str> = state.lines().filter_map(|line| line.split_whitespace().nth(1)).collect();
+    let plotted: Vec<&str> =
+        foxglove.split("/flockform/state.").skip(1).filter_map(|rest| rest.split('"').next()).collect();
+    assert_eq!(plotted.len(), 3);
+    assert!(plotted.iter().all(|field| fields.contains(field)), "{plotted:?} of {fields:?}");
+    // Every panel of the layout has its settings.
+    let tree = layout["layout"].to_string();
+    let shown: BTreeSet<&str> = tree.split('"').filter(|word| word.contains('!')).collect();
+    assert_eq!(shown, panels.keys().map(String::as_str).collect());
 }
 
 #[test]

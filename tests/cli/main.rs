@@ -19,6 +19,8 @@ mod material;
 mod measured;
 mod points;
 mod program;
+#[cfg(not(feature = "mpi"))]
+mod ranks;
 mod report;
 mod run;
 #[path = "../common/signals.rs"]

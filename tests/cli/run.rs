@@ -271,6 +271,19 @@ fn wrong_choices_are_refused_with_the_choices() {
 }
 
 #[test]
+fn cuts_on_the_way_are_refused_where_cuts_from_the_start_are() {
+    let cut = "{at=2,what={kind=\"cut\",from=[6.5,-5.0],to=[6.5,20.0]}}";
+    let alone = format!("actions=[{cut}]");
+    refused_with("drop", &[&alone], &["actions", "cannot go with neighbours that are found anew"]);
+    refused_with("beam-loaded", &[&alone], &["actions", "not in bonds that could be cut"]);
+    let material = "material={kind=\"isotropic\",young=1000.0,poisson=0.33}";
+    let then = "{at=3,what={kind=\"set\",keys=[\"rule.mean={kind=\\\"material\\\"}\"]}}";
+    let both = format!("actions=[{cut},{then}]");
+    let overrides = ["frame=none", "neighbours={kind=\"chebyshev\",radius=1}", material, &both];
+    refused_with("tension", &overrides, &["actions[1].what.keys", "not in bonds that could be cut"]);
+}
+
+#[test]
 fn a_body_that_cannot_be_is_refused_with_the_remedy() {
     refused_with(
         "tension",

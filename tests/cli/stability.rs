@@ -54,6 +54,17 @@ fn what_cannot_be_asked_is_refused_with_exit_code_2_and_leaves_nothing() {
 }
 
 #[test]
+fn a_rule_that_changes_on_the_way_has_no_one_threshold() {
+    let folder = temporary();
+    let damped = "actions=[{at=2,what={kind=\"set\",keys=[\"update.damping=0.5\"]}}]";
+    let output = flockform(&[&QUICK[..], &["--set", damped, "--json"]].concat(), folder.path());
+    let study = json(&text(&output.stdout));
+    assert!(study["linear"].is_null(), "{study}");
+    let refused = study["refused"].as_str().expect("says why");
+    assert!(refused.contains("actions") && refused.contains("no one threshold"), "{refused}");
+}
+
+#[test]
 fn a_rule_without_a_spectrum_says_so_and_runs_its_extremes() {
     let folder = temporary();
     let arguments = ["stability", "tension", "--set", "rule.mean={kind=\"distance\"}"];

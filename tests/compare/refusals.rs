@@ -24,6 +24,8 @@ fn scenes_without_a_material_or_without_one_state_of_rest_are_refused() {
     refused("fracture", &[isotropic], &["fracture", "bonds that break have no part in it"]);
     let cut = "cuts=[{ from = [5.5, 4.0], to = [5.5, 6.0] }]";
     refused("shear", &[isotropic, cut], &["cuts", "a whole body"]);
+    let damped = "actions=[{at=2,what={kind=\"set\",keys=[\"update.damping=0.5\"]}}]";
+    refused("shear", &[isotropic, damped], &["actions", "changed on its way"]);
 }
 
 #[test]

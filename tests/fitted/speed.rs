@@ -8,7 +8,7 @@ use flockform::solve::equilibrium::{Choice, Request, Solver, System, solve};
 
 use crate::support::{lattice, scene};
 
-const ROUNDS: usize = 7;
+const ROUNDS: usize = 25;
 
 /// Most that a fitted body may take, in times of the same shape in whole cells along the axes of its lattice.
 const MOST: f64 = 1.5;
@@ -46,13 +46,13 @@ fn once(system: &System) -> ([f64; 2], usize) {
     (times.map(|time| time.as_secs_f64() * 1e9 / system.operator.count() as f64), solved.iterations)
 }
 
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
+/// What other programs on the machine cost is never negative.
+fn least(values: impl Iterator<Item = f64>) -> f64 {
+    values.fold(f64::INFINITY, f64::min)
 }
 
 #[test]
-#[ignore = "times, for an optimised build and a quiet machine; not reached yet: 1.7 to 2.1"]
+#[ignore = "times, for an optimised build and a quiet machine; not reached yet: 1.6 to 2.3"]
 fn fitted_bodies_are_solved_in_at_most_half_as_much_time_more_than_whole_cells() {
     let plate = |sides: [f64; 2]| format!("shape = {{ kind = \"rectangle\", max = {sides:?} }}");
     let sieve = |n: usize, radius: f64| format!("{}\nholes = [{}]", plate([40.0; 2]), holes(n, radius));
@@ -68,8 +68,8 @@ fn fitted_bodies_are_solved_in_at_most_half_as_much_time_more_than_whole_cells()
             let (fitted, share) = system(kind, h, 17.0, &body);
             let (whole, _) = system(kind, h, 0.0, &format!("outline = \"lattice\"\n{body}"));
             let rounds: Vec<_> = (0..ROUNDS).map(|_| [once(&whole), once(&fitted)]).collect();
-            let of = |which: usize, phase: usize| median(rounds.iter().map(|r| r[which].0[phase]).collect());
-            let ratio = median(rounds.iter().map(|[whole, fitted]| fitted.0[1] / whole.0[1]).collect());
+            let of = |which: usize, phase: usize| least(rounds.iter().map(|r| r[which].0[phase]));
+            let ratio = of(1, 1) / of(0, 1);
             worst = worst.max(ratio);
             println!(
                 "{kind}, {name}: {} particles, {:.1} % on the outline; ns a particle: whole cells {:.0} + {:.0} in {}, \

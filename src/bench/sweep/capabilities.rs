@@ -11,6 +11,7 @@ use crate::engine::Engine;
 use crate::flock::role::Role;
 use crate::flock::vectors::Vectors;
 use crate::scene;
+use crate::sweep::domain::Share;
 use crate::sweep::kernel::Component;
 use crate::sweep::rows::Rows;
 use crate::sweep::terms::Terms;
@@ -120,7 +121,7 @@ impl Bare {
         let follows: Vec<bool> = plan.setup.roles.iter().map(|&role| role == Role::Follower).collect();
         let present: Vectors = stirred(&plan.setup.body.reference).collect();
         Self {
-            rows: Rows::compile(&plan.setup.flock, &follows).expect("a barycentre"),
+            rows: Rows::compile(&plan.setup.flock, &follows, Share::whole()).expect("a barycentre"),
             next: present.clone(),
             present,
         }

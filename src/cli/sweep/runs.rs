@@ -89,20 +89,12 @@ impl Runs<'_> {
         }
     }
 
-    /// Makes these runs and adds each to the journal as it ends; an interrupt leaves out those under way. `threads`
-    /// is 0 for as many as the machine has.
+    /// Makes these runs and adds each to the journal as it ends; an interrupt leaves out those under way.
     ///
     /// # Errors
     /// No threads, or a journal that cannot be written.
-    pub fn make(
-        &self,
-        pending: &[usize],
-        journal: &Journal,
-        threads: usize,
-        quiet: bool,
-    ) -> Result<Vec<Row>, Refusal> {
-        let machine = || std::thread::available_parallelism().map_or(1, usize::from);
-        let threads = if threads == 0 { machine() } else { threads };
+    pub fn make(&self, pending: &[usize], journal: &Journal, quiet: bool) -> Result<Vec<Row>, Refusal> {
+        let threads = rayon::current_num_threads();
         let workers = threads.min(pending.len());
         // Where there are fewer runs than cores, each gets several.
         let pool = || rayon::ThreadPoolBuilder::new().num_threads((threads / workers).max(1)).build();

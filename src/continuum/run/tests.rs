@@ -59,6 +59,38 @@ fn a_run_taken_up_again_at_any_step_ends_with_the_same_bits() {
     continues_to_the_same_end("tension", &free, &[0, 1, 7, 20, 21, 45]);
 }
 
+/// Looks at every so many steps.
+struct Every(usize);
+
+impl Observer for Every {
+    fn next(&mut self, step: usize) -> usize {
+        step + self.0
+    }
+
+    fn see(&mut self, _: &Engine, _: f64) -> ControlFlow<()> {
+        ControlFlow::Continue(())
+    }
+}
+
+#[test]
+fn a_rule_that_is_changed_on_the_way_diverges_at_the_same_step_however_often_it_is_looked_at() {
+    let changed = [
+        "frame=none",
+        "body.shape={kind=\"grid\",columns=40,rows=40}",
+        "roles=[{region={kind=\"edge\",side=\"left\"},role=\"clamped\"},\
+         {region={kind=\"edge\",side=\"right\"},role=\"leader\",motion={kind=\"velocity\",per_step=[0.6,0.0]}}]",
+        "record={}",
+        "stop.steps=400",
+        "actions=[{at=100,what={kind=\"set\",keys=[\"update.damping=1.5\"]}}]",
+    ];
+    let scene = scene("tension", &changed);
+    let [each, some, all] = [1, 7, 400].map(|many| bits(&run_watched(plan(&scene), &mut Every(many))));
+    assert!(each.2.starts_with("Diverged"), "{}", each.2);
+    assert_eq!(each.2, some.2);
+    assert_eq!(each.2, all.2);
+    assert!(each == some && each == all);
+}
+
 #[test]
 fn a_load_that_grows_goes_on_growing() {
     let growing = [

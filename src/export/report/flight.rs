@@ -34,6 +34,11 @@ pub struct FlightRecorder {
 impl FlightRecorder {
     /// From the flight before its first period.
     pub fn new(flight: &Flight) -> Self {
+        Self::since(flight, flight.fleet().places())
+    }
+
+    /// As [`FlightRecorder::new`], with displacements from these places \[m\].
+    fn since(flight: &Flight, start: Vectors) -> Self {
         let channel = |name, bits| Channel { name, bits };
         let mut channels = vec![channel("dx", BITS), channel("dy", BITS)];
         channels.extend(["clearance", "age", "pe1", "strain"].map(|name| channel(name, BITS)));
@@ -47,7 +52,7 @@ impl FlightRecorder {
         links.dedup();
         let mut recorder = Self {
             frames: Frames::new(count, channels),
-            start: flight.fleet().places(),
+            start,
             links,
             leads: (0..count).map(|m| formation.leads(m)).collect(),
             period: flight.control().period(),
@@ -82,8 +87,29 @@ impl FlightRecorder {
     }
 
     /// The animation of the flight.
-    pub fn stage(mut self, swarm: &Swarm, report: &FlightReport) -> View {
-        let mut stage = View::new(animation(swarm, report));
+    pub fn stage(self, swarm: &Swarm, report: &FlightReport) -> View {
+        let names = report.per_robot.iter().map(|robot| robot.name.clone()).collect();
+        let mut stage = self.begun(swarm, names);
+        let robots = || report.per_robot.iter();
+        stage.add_exact(Quantity::new("x", "x", "m"), robots().map(|robot| robot.x));
+        stage.add_exact(Quantity::new("y", "y", "m"), robots().map(|robot| robot.y));
+        stage.add_exact(Quantity::new("way", "way", "m"), robots().map(|robot| robot.way));
+        let least = robots().map(|robot| robot.clearance.unwrap_or(f64::NAN));
+        stage.add_exact(Quantity::new("clearance", "least clearance", "m"), least);
+        self.finished(stage)
+    }
+
+    /// Robots as they are, in a single frame; displacements are from `start` \[m\].
+    #[cfg(feature = "live")]
+    pub(crate) fn still(swarm: &Swarm, flight: &Flight, start: &Vectors) -> View {
+        let recorder = Self::since(flight, start.clone());
+        let stage = recorder.begun(swarm, flight.control().formation().names.clone());
+        recorder.finished(stage)
+    }
+
+    /// The view without its frames.
+    fn begun(&self, swarm: &Swarm, names: Vec<String>) -> View {
+        let mut stage = View::new(animation(swarm, names));
         stage.set_reference(&self.start);
         let role = |&leads: &bool| if leads { Role::Leader } else { Role::Follower };
         stage.set_roles(&self.leads.iter().map(role).collect::<Vec<_>>(), &[]);
@@ -91,12 +117,10 @@ impl FlightRecorder {
             let none = vec![0; self.links.len()];
             stage.set_bonds(&self.links, &none, &none);
         }
-        let robots = || report.per_robot.iter();
-        stage.add_exact(Quantity::new("x", "x", "m"), robots().map(|robot| robot.x));
-        stage.add_exact(Quantity::new("y", "y", "m"), robots().map(|robot| robot.y));
-        stage.add_exact(Quantity::new("way", "way", "m"), robots().map(|robot| robot.way));
-        let least = robots().map(|robot| robot.clearance.unwrap_or(f64::NAN));
-        stage.add_exact(Quantity::new("clearance", "least clearance", "m"), least);
+        stage
+    }
+
+    fn finished(mut self, mut stage: View) -> View {
         let encoded = encoded(&mut self.frames, stage.size());
         let times = self.frames.kept().iter().map(|frame| frame.step as f64 * self.period).collect();
         stage.set_frames(&self.frames, encoded, times);
@@ -104,7 +128,7 @@ impl FlightRecorder {
     }
 }
 
-fn animation(swarm: &Swarm, report: &FlightReport) -> Animation {
+fn animation(swarm: &Swarm, names: Vec<String>) -> Animation {
     let own = |m: usize| swarm.raw.robots.get(m).and_then(|robot| robot.radius).unwrap_or(swarm.raw.radius);
     let obstacles =
         swarm.raw.obstacles.iter().map(|obstacle| Outline { kind: "obstacle", corners: outline(obstacle) });
@@ -114,9 +138,9 @@ fn animation(swarm: &Swarm, report: &FlightReport) -> Animation {
         noun: "robot",
         unit: "m".into(),
         clock: Clock { quantity: "time", unit: "s" },
-        names: report.per_robot.iter().map(|robot| robot.name.clone()).collect(),
         spacing: 2.0 * swarm.raw.radius,
-        radii: (0..report.robots).map(own).collect(),
+        radii: (0..names.len()).map(own).collect(),
+        names,
         quantities: vec![
             Quantity::new("clearance", "clearance", "m"),
             Quantity::new("age", "age of the pose", "s"),
@@ -163,6 +187,7 @@ pub fn write(
         facts: facts(report),
         tables: tables(report),
         texts: texts(swarm),
+        live: None,
     };
     page.write(folder)
 }

@@ -44,3 +44,10 @@ fn encoded(frames: &mut Frames, others: usize) -> EncodedFrames {
     }
     encoded
 }
+
+/// A page that a session feeds.
+#[cfg(feature = "live")]
+pub(crate) fn live_page(command: String, title: String, view: view::View, live: serde_json::Value) -> String {
+    let page = page::Page { title, command, stages: vec![view], live: Some(live), ..page::Page::default() };
+    page.html()
+}

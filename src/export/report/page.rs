@@ -38,6 +38,11 @@ const SCRIPTS: [&str; 14] = [
     include_str!("web/page.js"),
 ];
 
+/// Those of a page whose data come from a session, after the others.
+const LIVE_SCRIPTS: [&str; 3] =
+    [include_str!("web/live_frames.js"), include_str!("web/live_tools.js"), include_str!("web/live.js")];
+const LIVE_TOOLS: &str = include_str!("web/live.html");
+
 /// Everything that a report shows, from the top.
 #[derive(Debug, Default)]
 pub(crate) struct Page {
@@ -58,6 +63,8 @@ pub(crate) struct Page {
     pub tables: Vec<Table>,
     /// Long texts under their titles, folded.
     pub texts: Vec<(String, String)>,
+    /// The session that feeds the page, for a page that is no report.
+    pub live: Option<serde_json::Value>,
 }
 
 #[derive(Debug, Default)]
@@ -81,7 +88,7 @@ impl Page {
     /// The whole file.
     pub(crate) fn html(&self) -> String {
         let stages: Vec<_> = self.stages.iter().map(|stage| &stage.animation).collect();
-        let data = in_script(&json!({ "stages": stages, "plots": self.plots }));
+        let data = in_script(&json!({ "stages": stages, "plots": self.plots, "live": self.live }));
         let mut arrays = String::new();
         for (number, stage) in self.stages.iter().enumerate() {
             for (name, text) in &stage.arrays {
@@ -89,11 +96,13 @@ impl Page {
                     writeln!(arrays, "<script type=\"text/plain\" id=\"s{number}-{name}\">{text}</script>");
             }
         }
-        let script: String = SCRIPTS.into_iter().map(joined).collect();
+        let live = if self.live.is_some() { &LIVE_SCRIPTS[..] } else { &[] };
+        let script: String = SCRIPTS.iter().chain(live).map(|module| joined(module)).collect();
         let parts = [
             ("title", escaped(&self.title)),
             ("command", escaped(&self.command)),
             ("verdict", self.verdict_html()),
+            ("live", if self.live.is_some() { LIVE_TOOLS.into() } else { String::new() }),
             ("note", escaped(&self.note)),
             ("facts", self.facts_html()),
             ("tables", self.tables.iter().map(table_html).collect()),
@@ -247,7 +256,7 @@ mod tests {
     #[test]
     fn the_scripts_may_stand_in_one_page() {
         let (mut defined, mut imported) = (BTreeSet::new(), BTreeSet::new());
-        for line in SCRIPTS.into_iter().flat_map(str::lines) {
+        for line in SCRIPTS.into_iter().chain(LIVE_SCRIPTS).flat_map(str::lines) {
             if line.starts_with("import") {
                 let names = line.strip_prefix("import { ").and_then(|line| line.split_once(" } from \"./"));
                 let (names, _) =

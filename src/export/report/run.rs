@@ -173,6 +173,18 @@ impl RunRecorder {
         let engine = &outcome.engine;
         let is_solved = is_solved_at_once(scene, outcome);
         self.finish(engine, is_solved);
+        self.view(scene, engine, is_solved, engine.body().count() <= MOST_EXACT)
+    }
+
+    /// A body as it is, in a single frame.
+    #[cfg(feature = "live")]
+    pub(crate) fn still(scene: &Scene, engine: &Engine) -> View {
+        let mut recorder = Self::new(engine);
+        recorder.finish(engine, false);
+        recorder.view(scene, engine, false, false)
+    }
+
+    fn view(mut self, scene: &Scene, engine: &Engine, is_solved: bool, is_exact: bool) -> View {
         let mut stage = View::new(animation(scene, engine, is_solved));
         stage.set_reference(&engine.body().reference);
         stage.set_roles(&self.first_roles, &self.changes);
@@ -188,7 +200,7 @@ impl RunRecorder {
                 stage.set_cells(&cells);
             }
         }
-        if engine.body().count() <= MOST_EXACT {
+        if is_exact {
             add_exact(&mut stage, scene, engine);
         }
         let encoded = encoded(&mut self.frames, stage.size());
@@ -324,6 +336,7 @@ pub fn write(
         facts: facts(scene, outcome, summary),
         tables: Vec::new(),
         texts: texts(scene, summary),
+        live: None,
     };
     page.write(folder)
 }

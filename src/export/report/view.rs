@@ -176,6 +176,12 @@ impl View {
     }
 }
 
+/// Roles by number, shape \[count\].
+#[cfg(feature = "live")]
+pub(crate) fn numbers(roles: &[Role]) -> Vec<u8> {
+    roles.iter().map(|&role| number(role) as u8).collect()
+}
+
 pub(crate) fn number(role: Role) -> u32 {
     Role::ALL.iter().position(|&one| one == role).unwrap_or_default() as u32
 }

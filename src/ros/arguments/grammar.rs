@@ -7,6 +7,7 @@ use super::logging::Logging;
 use super::security::fault_of_name;
 use super::{RosArgumentError, RosArguments, assignment, parameter_file};
 use crate::messages::remap::RemapRule;
+use crate::scene::text;
 
 /// Every flag that may follow `--ros-args`.
 pub const FLAGS: [&str; 17] = [
@@ -86,8 +87,8 @@ impl RosArguments {
     }
 
     fn read_parameters(&mut self, path: PathBuf) -> Result<(), RosArgumentError> {
-        let text = std::fs::read_to_string(&path)
-            .map_err(|error| RosArgumentError::ReadFile { path: path.clone(), error })?;
+        let text =
+            text::read(&path).map_err(|error| RosArgumentError::ReadFile { path: path.clone(), error })?;
         let read = parameter_file::parse(&text).map_err(|error| error.in_file(&path))?;
         self.assignments.extend(read.into_iter().map(|entry| {
             let origin = Origin::File { path: path.clone(), line: entry.line };

@@ -62,28 +62,26 @@ impl Origin {
     /// # Errors
     /// The first name that ROS 2 does not allow, or that is used twice.
     pub fn check_topics(&self) -> Result<(), NodeError> {
+        type IsUsed<'a> = &'a dyn Fn(usize) -> bool;
         let (raw, part, formation) = (&self.swarm.raw.node, &self.part, self.fresh.formation());
         let is_array = raw.pose_type == RawPoseType::PoseArray;
         let moved: BTreeSet<usize> = formation.moved().collect();
-        let patterns = [
-            ("poses", &raw.pose_topic, &part.heard),
-            ("targets", &raw.target_topic, &part.mine),
-            ("places", &raw.leader_topic, &part.mine),
-            ("velocities", &raw.velocity_topic, &part.mine),
+        let is_posed = |m: usize| m == 0 || !is_array;
+        let is_moved = |m: usize| moved.contains(&m);
+        let has_velocity = |_: usize| raw.velocity.is_some();
+        let patterns: [(_, _, _, IsUsed<'_>); 4] = [
+            ("poses", &raw.pose_topic, &part.heard, &is_posed),
+            ("targets", &raw.target_topic, &part.mine, &|_| true),
+            ("places", &raw.leader_topic, &part.mine, &is_moved),
+            ("velocities", &raw.velocity_topic, &part.mine, &has_velocity),
         ];
-        let is_used = |purpose: &str, m: usize| match purpose {
-            "poses" => m == 0 || !is_array,
-            "places" => moved.contains(&m),
-            "velocities" => raw.velocity.is_some(),
-            _ => true,
-        };
         let mut uses = Uses::default();
-        for (purpose, pattern, own) in patterns {
+        for (purpose, pattern, own, is_used) in patterns {
             // Topics below the node are its own alone: other robots' nodes have others.
             let is_private = pattern.starts_with('~');
             for (m, robot) in formation.names.iter().enumerate() {
                 let topic = self.topic_of(pattern, robot)?;
-                if is_used(purpose, m) && (!is_private || own.contains(&m)) {
+                if is_used(m) && (!is_private || own.contains(&m)) {
                     uses.add(topic, purpose, robot)?;
                 }
             }

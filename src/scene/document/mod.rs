@@ -109,6 +109,23 @@ impl Document {
         refused.into_result(Document { file: file.to_owned(), overrides: overrides.to_vec(), root })
     }
 
+    /// The document with more overrides after its own.
+    ///
+    /// # Errors
+    /// Every override that is malformed or cannot be placed.
+    pub(crate) fn with(&self, more: &[String]) -> Result<Document, SceneError> {
+        let mut document = self.clone();
+        let mut refused = SceneError::default();
+        for text in more {
+            let origin = Origin::Override(document.overrides.len());
+            document.overrides.push(text.clone());
+            if let Err(problem) = overrides::apply(&mut document.root, text, origin) {
+                refused.push(*problem);
+            }
+        }
+        refused.into_result(document)
+    }
+
     /// The document as a value that fits `schema`, which is a JSON Schema as schemars derives it.
     ///
     /// # Errors

@@ -7,6 +7,7 @@
 // Units stand in brackets as they are: the schema prints these comments, which escapes would spoil.
 #![allow(rustdoc::broken_intra_doc_links)]
 
+mod actions;
 mod body;
 mod load_steps;
 mod material;
@@ -16,6 +17,7 @@ mod rule;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+pub use actions::*;
 pub use body::*;
 pub use load_steps::*;
 pub use material::*;
@@ -71,6 +73,9 @@ pub struct RawScene {
     /// Cuts made before the first step: every bond that crosses one is broken.
     #[serde(default)]
     pub cuts: Vec<RawCut>,
+    /// Everything that is done to the body while it is stepped, by ascending step; roles say when particles are led.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub actions: Vec<RawAction>,
     /// When the run ends.
     #[serde(default)]
     pub stop: RawStop,

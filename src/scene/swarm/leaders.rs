@@ -6,6 +6,7 @@ use super::raw::*;
 use super::{Leaders, Program, Shape, Who};
 use crate::flock::motion::{Interpolation, Keyframe, Motion};
 use crate::scene::document::problem::SceneError;
+use crate::scene::text;
 use crate::scene::validate::{Refuse, roles};
 
 pub fn leaders(
@@ -64,7 +65,7 @@ fn program(
         RawProgram::File { path, scale } => {
             let key = format!("{key}.program.path");
             let place = folder.unwrap_or(Path::new("")).join(path);
-            let text = std::fs::read_to_string(&place).map_err(|error| {
+            let text = text::read(&place).map_err(|error| {
                 refuse(&key, format!("cannot be read: {error}"), "give a path relative to the swarm file")
             })?;
             track(&text, *scale).map_err(|message| {

@@ -4,13 +4,14 @@ use std::path::Path;
 
 use super::Recording;
 use crate::scene::document::problem::SceneError;
+use crate::scene::text;
 use crate::scene::validate::Refuse;
 
 const KEY: &str = "scene.recording";
 
 pub fn read(file: &str, folder: Option<&Path>, refuse: Refuse<'_>) -> Result<Recording, SceneError> {
     let place = folder.unwrap_or(Path::new("")).join(file);
-    let text = std::fs::read_to_string(place).map_err(|error| {
+    let text = text::read(&place).map_err(|error| {
         refuse(KEY, format!("cannot be read: {error}"), "give a path relative to the swarm file")
     })?;
     parse(&text)

@@ -110,6 +110,7 @@ fn body_scene(raw: &RawSwarm, lattice: &RawLattice, body: &RawBody) -> RawScene 
         roles: Vec::new(),
         fracture: None,
         cuts: Vec::new(),
+        actions: Vec::new(),
         stop: RawStop::default(),
         equilibrium: None,
         load_steps: None,

@@ -139,6 +139,9 @@ pub fn damping(raw: &RawScene, lattice: &Lattice, body: Option<&Elastic>, inclus
     raw.update.damping.unwrap_or_else(of_waves)
 }
 
+/// Why a material has no cuts.
+const UNCUT: &str = "a material is in cells, not in bonds that could be cut";
+
 /// A material lives in cells: it has no bonds to break, no need of a frame, and weights of its own.
 pub fn check_rule(raw: &RawScene, refuse: Refuse<'_>) -> Result<(), SceneError> {
     if !is_material(raw) {
@@ -169,9 +172,8 @@ pub fn check_rule(raw: &RawScene, refuse: Refuse<'_>) -> Result<(), SceneError> 
         ("fracture", raw.fracture.is_some(), "a material is in cells, not in bonds that could break", {
             "leave this out, or use a rule without material"
         }),
-        ("cuts", !raw.cuts.is_empty(), "a material is in cells, not in bonds that could be cut", {
-            "cut the body's shape instead (body.holes, a polygon)"
-        }),
+        ("cuts", !raw.cuts.is_empty(), UNCUT, "cut the body's shape instead (body.holes, a polygon)"),
+        ("actions", super::actions::cuts(raw), UNCUT, "leave cuts out, or use a rule without material"),
         ("roles", ghosts, "ghosts leave the body by breaking bonds, and a material is in cells", {
             "use other roles, or a rule without material"
         }),

@@ -1,6 +1,7 @@
 //! From the scene as written to the scene as meant: degrees to radians, choices to rules, and the
 //! checks that concern several keys at once.
 
+pub(super) mod actions;
 mod equilibrium;
 mod load_steps;
 mod material;
@@ -13,7 +14,7 @@ use std::sync::Arc;
 use super::document::Document;
 use super::document::problem::{Place, Problem, SceneError};
 use super::raw::*;
-use super::{BodySource, Fracture, PoissonTerm, Record, Scene, Stop, Weights};
+use super::{BodySource, Fracture, PoissonTerm, Record, Scene, Stop, Weights, text};
 use crate::flock::body::Cut;
 use crate::flock::fracture::{Ghosts, Threshold};
 use crate::flock::frame::FrameRule;
@@ -48,6 +49,20 @@ impl Scene {
     }
 }
 
+impl Scene {
+    /// The scene without what puts its body to rest at once: a body to be stepped. Files are looked up in `folder`.
+    ///
+    /// # Errors
+    /// Names a key that needs what was left out.
+    pub fn stepped(&self, folder: Option<&Path>) -> Result<Self, SceneError> {
+        let mut raw = self.raw.clone();
+        if raw.equilibrium.take().is_some() {
+            raw.load_steps = None;
+        }
+        validate(&self.name, raw, self.document.clone(), folder)
+    }
+}
+
 /// The JSON Schema of a scene file.
 pub fn schema() -> serde_json::Value {
     schemars::schema_for!(RawScene).into()
@@ -68,7 +83,7 @@ impl File {
     pub(super) fn read(path: &Path, help: &str) -> Result<Self, SceneError> {
         let file = path.display().to_string();
         let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        match std::fs::read_to_string(path) {
+        match text::read(path) {
             Ok(text) => Ok(Self { name, file, text }),
             Err(error) => Err(SceneError::from(Problem {
                 place: Place::File { file },
@@ -153,6 +168,7 @@ pub(super) fn validate(
         roles,
         fracture: fracture(&raw.fracture, refuse)?,
         cuts: cuts(&raw.cuts, refuse)?,
+        actions: actions::actions(&raw, (name, &document, folder), refuse)?,
         stop: Stop {
             steps: raw.stop.steps,
             tolerance: raw.stop.tolerance,
@@ -337,6 +353,7 @@ fn check_present_neighbours(raw: &RawScene, refuse: Refuse<'_>) -> Result<(), Sc
         ("frame", raw.frame != RawFrame::None, "a frame"),
         ("fracture", raw.fracture.is_some(), "fracture"),
         ("cuts", !raw.cuts.is_empty(), "cuts"),
+        ("actions", actions::cuts(raw), "cuts"),
         ("rule.weights", raw.rule.weights.is_some(), "fixed weights"),
     ];
     match clash.into_iter().find(|(_, used, _)| *used) {

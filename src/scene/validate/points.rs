@@ -8,6 +8,7 @@ use crate::flock::cloud::Cloud;
 use crate::scene::document::problem::SceneError;
 use crate::scene::points::PointTable;
 use crate::scene::raw::*;
+use crate::scene::text;
 
 /// The points of the body, where it is given by them.
 pub fn cloud(raw: &RawScene, folder: Option<&Path>, refuse: Refuse<'_>) -> Result<Option<Cloud>, SceneError> {
@@ -15,7 +16,7 @@ pub fn cloud(raw: &RawScene, folder: Option<&Path>, refuse: Refuse<'_>) -> Resul
     refuse_what_needs_a_lattice(raw, refuse)?;
     let radius = radius(raw, refuse)?;
     let (key, path) = ("body.shape.file", folder.unwrap_or(Path::new("")).join(file));
-    let text = std::fs::read_to_string(&path).map_err(|error| {
+    let text = text::read(&path).map_err(|error| {
         let message = format!("cannot read {}: {error}", path.display());
         refuse(key, message, "the path is relative to the scene file")
     })?;

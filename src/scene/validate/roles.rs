@@ -12,6 +12,7 @@ use crate::geometry::portion::Selection;
 use crate::scene::document::problem::SceneError;
 use crate::scene::raw::*;
 use crate::scene::table::DisplacementTable;
+use crate::scene::text;
 use crate::scene::{LeaderMotion, RoleEntry, SceneRegion};
 
 pub fn role_entry(
@@ -154,7 +155,7 @@ fn leader_motion(
             let key = format!("{key}.motion.file");
             let path = folder.unwrap_or(Path::new("")).join(file);
             let help = "the path is relative to the scene file";
-            let text = std::fs::read_to_string(&path)
+            let text = text::read(&path)
                 .map_err(|error| refuse(&key, format!("cannot read {}: {error}", path.display()), help))?;
             let rows = DisplacementTable::parse(&text, *scale).map_err(|error| {
                 refuse(&key, format!("{}: {error}", path.display()), "mend the file, or name another")

@@ -75,11 +75,12 @@ impl Matrix {
         let mut class = vec![HELD; operator.count()];
         let mut rows = operator.rows.clone();
         let mut known = HashMap::new();
+        let mut firsts = Vec::new();
         for stretch in operator.stretches() {
             let Stretch { start, len, class: full, .. } = stretch;
             let entries = &operator.rows[full as usize].entries;
-            let firsts: Vec<usize> =
-                entries.iter().map(|(offset, _)| operator.index_of(stretch.site, *offset)).collect();
+            firsts.clear();
+            firsts.extend(entries.iter().map(|(offset, _)| operator.index_of(stretch.site, *offset)));
             let is_whole = |i: usize| operator.follows[i] && operator.held_axes(i) == [false; 2];
             let own = (start..start + len).all(is_whole);
             let free = own && firsts.iter().all(|&j| (j..j + len).all(is_whole));

@@ -164,6 +164,10 @@ fn require_comparable(scene: &Scene) -> Result<(), SceneError> {
     if scene.material.is_none() {
         return Err(without_material(scene));
     }
+    if !scene.actions.is_empty() {
+        let message = "the truth knows one body, and this one is changed on its way";
+        return Err(scene.refuse("actions", message, "leave this out to compare"));
+    }
     let later = scene.roles.iter().position(|entry| entry.from > 1 || entry.when.is_some());
     if let Some(k) = later {
         let key = if scene.roles[k].when.is_some() { "when" } else { "from" };

@@ -1,5 +1,7 @@
 //! Draws from a seed, the same on every machine.
 
+use crate::flock::splitmix;
+
 /// One draw from each of `count` equal parts, in a drawn order \[1\].
 pub(super) fn latin_column(count: usize, draws: &mut Draws) -> Vec<f64> {
     let mut order: Vec<usize> = (0..count).collect();
@@ -10,7 +12,7 @@ pub(super) fn latin_column(count: usize, draws: &mut Draws) -> Vec<f64> {
     order.into_iter().map(|part| (part as f64 + draws.part()) / count as f64).collect()
 }
 
-/// Uniform draws by splitmix64 (Steele, Lea and Flood 2014): a few lines, the same on every machine.
+/// Uniform draws by splitmix64.
 pub(super) struct Draws(u64);
 
 impl Draws {
@@ -21,11 +23,8 @@ impl Draws {
     }
 
     fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
+        self.0 = self.0.wrapping_add(splitmix::STEP);
+        splitmix::mixed(self.0)
     }
 
     /// From 0 up to, and without, 1.

@@ -48,7 +48,7 @@ impl Subject {
     /// The body with the roles that hold at the end of the scene, its leaders held.
     ///
     /// # Errors
-    /// Names what makes the rule nonlinear, and a follower that no leader holds.
+    /// Names what makes the rule nonlinear, what changes it on the way, and a follower that no leader holds.
     pub fn of(scene: &Scene) -> Result<Self, SceneError> {
         // The places that the truth gives its leaders do not matter: they are held at rest.
         let mut plan = Plan::with_truth(scene, &|places| vec![[0.0; 2]; places.len()])?;
@@ -180,6 +180,10 @@ impl Subject {
 }
 
 fn require_linear(scene: &Scene, plan: &Plan) -> Result<(), SceneError> {
+    if !scene.actions.is_empty() {
+        let message = "a body that is changed on its way has no one sweep, and so no one threshold";
+        return Err(scene.refuse("actions", message, "leave actions out, and set their keys from the start"));
+    }
     let (key, reason) = match scene.mean {
         mean if !mean.is_affine() => ("rule.mean", &*format!("targets by the {mean}")),
         _ if plan.setup.present_radius.is_some() => ("neighbours", "neighbours found anew at every step"),

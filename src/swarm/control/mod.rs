@@ -233,8 +233,18 @@ impl Control {
     /// Gives a leader that is moved from outside its next place \[m\]; false if it is not one, or the place lies
     /// where no pose would be believed.
     pub fn tell(&mut self, member: usize, place: [f64; 2]) -> bool {
+        self.is_believed(place) && self.formation.tell(member, place)
+    }
+
+    /// As [`Control::tell`], for any leader, whose own program ends with this.
+    pub fn take_over(&mut self, member: usize, place: [f64; 2]) -> bool {
+        self.is_believed(place) && self.formation.take_over(member, place)
+    }
+
+    /// Whether a pose at a place \[m\] would be believed.
+    pub fn is_believed(&self, place: [f64; 2]) -> bool {
         let watch = self.watch.limits();
-        distance(place, watch.centre) <= watch.range && self.formation.tell(member, place)
+        distance(place, watch.centre) <= watch.range
     }
 
     /// Moves all leaders by a manoeuvre from the next tick on.

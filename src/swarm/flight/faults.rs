@@ -17,6 +17,32 @@ pub struct Fault {
 }
 
 impl Fault {
+    /// A fault that lasts.
+    pub fn from_now(member: usize, now: f64, kind: RawFaultKind) -> Self {
+        Self { member, from: now, until: f64::INFINITY, kind }
+    }
+
+    /// Ends it, if it has begun.
+    pub fn end(&mut self, now: f64) {
+        if self.holds(now) {
+            self.until = now;
+        }
+    }
+
+    /// Its kind.
+    pub fn name(&self) -> &'static str {
+        match self.kind {
+            RawFaultKind::Silent => "silent",
+            RawFaultKind::Dead => "dead",
+            RawFaultKind::Stuck => "stuck",
+            RawFaultKind::Offset { .. } => "offset",
+            RawFaultKind::Frozen => "frozen",
+            RawFaultKind::Random { .. } => "random",
+            RawFaultKind::NotANumber => "not-a-number",
+            RawFaultKind::WrongFrame => "wrong-frame",
+        }
+    }
+
     pub fn holds(&self, now: f64) -> bool {
         (self.from..self.until).contains(&now)
     }

@@ -4,13 +4,14 @@ use super::faults::{self, Fault};
 use crate::flock::vectors::Vectors;
 use crate::scene::SceneError;
 use crate::scene::swarm::Swarm;
-use crate::scene::swarm::raw::{RawModel, RawSwarm};
+use crate::scene::swarm::raw::{RawFaultKind, RawModel, RawSwarm};
 use crate::swarm::channel::{Channel, ChannelParams};
 use crate::swarm::formation::Formation;
 use crate::swarm::robots::{DoubleIntegrator, Integrator, Model, Robot, Unicycle};
 use crate::swarm::watch::Pose;
 
 /// Robots by number, and the periods they have flown.
+#[derive(Clone)]
 pub struct Fleet {
     robots: Vec<Robot>,
     channels: Vec<Channel>,
@@ -88,6 +89,30 @@ impl Fleet {
     /// Whether the robot moves at all now.
     fn is_able(&self, member: usize) -> bool {
         !self.fault(member).is_some_and(Fault::stands)
+    }
+
+    /// The kind of a robot's present fault, as its file calls it.
+    pub fn fault_name(&self, member: usize) -> Option<&'static str> {
+        self.fault(member).map(Fault::name)
+    }
+
+    /// Gives a robot a fault from now on, of which it has this one alone.
+    pub fn break_down(&mut self, member: usize, kind: RawFaultKind) {
+        self.mend(member);
+        self.faults.push(Fault::from_now(member, self.time(), kind));
+    }
+
+    /// Ends the present faults of a robot.
+    pub fn mend(&mut self, member: usize) {
+        let now = self.time();
+        self.faults.iter_mut().filter(|fault| fault.member == member).for_each(|fault| fault.end(now));
+    }
+
+    /// Sends poses with this noise \[m\], delay \[period\] and loss \[1\] from now on.
+    pub(super) fn set_channels(&mut self, noise: f64, delay: u32, loss: f64) {
+        for channel in &mut self.channels {
+            channel.set_params(ChannelParams { noise, delay, loss, ..channel.params() });
+        }
     }
 
     /// Every robot sends its pose, stamped with `stamp` \[s\]; `hear` receives the poses that the channels deliver now.

@@ -3,6 +3,8 @@
 //! In a period every robot sends its pose, the channels deliver, the control ticks, and every robot goes towards
 //! its target. A real swarm's period is the same, so a simulated flight tests the tick that flies real robots.
 
+mod alarms;
+mod commands;
 mod faults;
 mod fleet;
 mod measure;
@@ -19,12 +21,15 @@ use crate::engine::Engine;
 use crate::flock::vectors::distance;
 use crate::scene::SceneError;
 use crate::scene::swarm::{Shape, Swarm};
+pub use alarms::Alarm;
+pub use commands::FlightCommand;
 pub use fleet::Fleet;
 pub use measure::{Record, Sample};
 pub use moment::Moment;
 pub use report::{FlightReport, RobotReport, Verdict};
 
 /// The continuum run of the scene that is flown.
+#[derive(Clone)]
 struct Twin {
     engine: Engine,
     /// Particle of each member.
@@ -32,12 +37,15 @@ struct Twin {
 }
 
 /// Robots under way. Members by number, as everywhere in this room.
+#[derive(Clone)]
 pub struct Flight {
     control: Control,
     fleet: Fleet,
     periods: u64,
     /// The same scene as a continuum, stepped beside the flight.
     continuum: Option<Twin>,
+    /// By ascending period.
+    commands: Vec<(u64, FlightCommand)>,
 }
 
 impl Flight {
@@ -49,6 +57,7 @@ impl Flight {
             fleet: Fleet::new(swarm, control.formation())?,
             periods: periods(swarm, &control),
             continuum: continuum(swarm)?,
+            commands: commands::of(swarm, control.formation())?,
             control,
         })
     }
@@ -68,6 +77,11 @@ impl Flight {
         &self.fleet
     }
 
+    /// The same, to be given faults.
+    pub fn fleet_mut(&mut self) -> &mut Fleet {
+        &mut self.fleet
+    }
+
     /// The number of periods of the flight.
     pub fn periods(&self) -> u64 {
         self.periods
@@ -81,6 +95,7 @@ impl Flight {
     /// Flies one period; `hear` receives the poses that the control receives.
     pub fn step_heard(&mut self, hear: &mut dyn FnMut(usize, Pose)) {
         let now = self.fleet.time();
+        self.perform_due();
         let control = &mut self.control;
         self.fleet.say(now, &mut |member, pose| {
             hear(member, pose);

@@ -178,6 +178,21 @@ impl Formation {
         }
     }
 
+    /// Sends a leader to a place \[m\], from now on moved from outside; false for a member that no program of the swarm
+    /// leads.
+    pub fn take_over(&mut self, member: usize, place: [f64; 2]) -> bool {
+        let is_led = self.leads[member].is_some();
+        if is_led {
+            self.leads[member] = Some(Lead::External(place));
+        }
+        is_led
+    }
+
+    /// Whether a program of the swarm leads a member.
+    pub fn is_led(&self, member: usize) -> bool {
+        self.leads[member].is_some()
+    }
+
     /// Moves all leaders by a manoeuvre from `now` \[s\] on.
     pub fn begin(&mut self, manoeuvre: &Manoeuvre, now: f64) {
         for lead in self.leads.iter_mut().flatten() {

@@ -59,7 +59,7 @@ fn compare(flock: &Flock, held: impl Fn(usize) -> bool, what: &str) -> f64 {
     const MARK: f64 = 12345.0;
     let count = flock.reference.len();
     let follows: Vec<bool> = (0..count).map(|j| !held(j)).collect();
-    let rows = Rows::compile(flock, &follows).expect("a barycentre");
+    let rows = Rows::compile(flock, &follows, Share::whole()).expect("a barycentre");
     let present = rough(count, 1);
     let mut next = Vectors { x: vec![MARK; count], y: vec![MARK; count] };
     sweep(&rows, flock, &present, &mut next);
@@ -146,7 +146,7 @@ fn a_mean_of_negative_zeros_and_a_particle_without_neighbours_give_the_bits_of_t
         Weights::Equal,
     );
     let all_rest = Flock { rest: Some(Vectors { x: vec![1.0; 22], y: vec![1.0; 22] }), ..flock.clone() };
-    let rows = Rows::compile(&all_rest, &[true; 22]).expect("a barycentre");
+    let rows = Rows::compile(&all_rest, &[true; 22], Share::whole()).expect("a barycentre");
     assert!(rows.share_in_runs() > 0.9);
     let negative = || vec![-0.0; 22];
     let present = Vectors { x: negative(), y: negative() };

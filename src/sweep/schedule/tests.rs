@@ -80,7 +80,8 @@ impl Case {
             let (rows, terms) = (sweep.rows.as_ref().expect("affine"), sweep.terms.of(&self.flock));
             let force = self.flock.forces.as_ref().map(|force| [&force.x[..], &force.y[..]]);
             let frame = None;
-            let steps = Steps { rows, terms, rest, force, frame, led, count, farther: None, threads };
+            let owned = 0..rows.band_count();
+            let steps = Steps { rows, owned, terms, rest, force, frame, led, count, farther: None, threads };
             let even = [&mut present.x[..], &mut present.y[..]];
             let odd = [&mut next.x[..], &mut next.y[..]];
             pool.install(|| steps.take(&mut activity, even, odd));
@@ -120,8 +121,9 @@ fn threads_beyond_one_a_coordinate_cut_the_body_in_segments() {
     let segments = |threads| {
         let (led, count, farther) = (Led::NONE, 16, None);
         let (terms, rest, force, frame) = (Terms::NONE, None, None, None);
-        let steps = Steps::<f64> { rows, terms, rest, force, frame, led, count, farther, threads };
-        steps.cuts(rows.band_count(), threads.div_ceil(2)).len() - 1
+        let owned = 0..rows.band_count();
+        let steps = Steps::<f64> { rows, owned, terms, rest, force, frame, led, count, farther, threads };
+        steps.cuts(0..rows.band_count(), threads.div_ceil(2)).len() - 1
     };
     assert_eq!([1, 2, 4, 8].map(segments), [1, 1, 2, 4]);
 }

@@ -29,11 +29,16 @@ export class Body {
     for (const { key } of this.animation.exact) this.exact.set(key, await doubles(named(`exact-${key}`)));
   }
 
-  // Bonds in the order in which they break, those that never do last: the living ones are the end of the list.
   async openBonds(named) {
-    const pairs = await integers(named("bonds"), 2);
-    const sees = await integers(named("bond-sees"), 1);
-    const broken = await integers(named("bond-broken"), 1);
+    this.pairs = await integers(named("bonds"), 2);
+    this.sees = await integers(named("bond-sees"), 1);
+    this.broken = await integers(named("bond-broken"), 1);
+    this.orderBonds();
+  }
+
+  // Bonds in the order in which they break, those that never do last: the living ones are the end of the list.
+  orderBonds() {
+    const { pairs, sees, broken } = this;
     const breakOf = (bond) => (broken[bond] === 0 ? Infinity : broken[bond] - 1);
     const order = Array.from(broken.keys());
     if (broken.some((step) => step > 0)) order.sort((a, b) => breakOf(a) - breakOf(b) || a - b);
@@ -47,10 +52,16 @@ export class Body {
     });
   }
 
-  // Triangles in the order in which they are torn: a cell lasts as long as the bonds between its corners.
   async openCells(named) {
     const { corners } = this.animation;
-    const index = corners ? await integers(named("cells"), corners) : new Uint32Array(0);
+    this.cells = corners ? await integers(named("cells"), corners) : new Uint32Array(0);
+    this.orderCells();
+  }
+
+  // Triangles in the order in which they are torn: a cell lasts as long as the bonds between its corners.
+  orderCells() {
+    const { corners } = this.animation;
+    const index = this.cells;
     const count = corners ? index.length / corners : 0;
     const dead = new Map();
     for (let n = 0; n < this.breaks.length && this.breaks[n] < Infinity; n++) {

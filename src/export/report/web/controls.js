@@ -13,6 +13,8 @@ export function listenToView(view) {
   const { box } = view;
   let from = null;
   let moved = 0;
+  // What a live page has the pointer do instead of moving the view.
+  let tool = null;
   const local = (event) => {
     const bounds = box.getBoundingClientRect();
     return [event.clientX - bounds.left, event.clientY - bounds.top];
@@ -20,6 +22,7 @@ export function listenToView(view) {
   box.addEventListener("pointerdown", (event) => {
     from = [event.clientX, event.clientY];
     moved = 0;
+    tool = shown.tool?.(view, local(event), event) ?? null;
     box.setPointerCapture(event.pointerId);
     box.classList.add("dragged");
   });
@@ -30,15 +33,18 @@ export function listenToView(view) {
     moved += Math.abs(by[0]) + Math.abs(by[1]);
     from = [event.clientX, event.clientY];
     tip(null);
-    move(...by);
+    if (tool) tool.move(local(event));
+    else move(...by);
   });
-  const end = () => {
+  const end = (event) => {
+    if (from && tool) tool.end(local(event));
+    tool = null;
     from = null;
     box.classList.remove("dragged");
   };
   box.addEventListener("pointerup", (event) => {
     if (from && moved < 4 && shown.player.ready) keep(view, view.nearest(...local(event)));
-    end();
+    end(event);
   });
   box.addEventListener("pointercancel", end);
   box.addEventListener("pointerleave", () => shown.player.ready && showTip(view, -1, null));

@@ -36,7 +36,8 @@ export function drawNow() {
 function drawClock() {
   const { quantity, unit } = bodies[0].animation.clock;
   const [now, end] = [shown.player.times[shown.player.frame], shown.player.times.at(-1)];
-  const text = `${quantity} ${words(now)} of ${words(end)}${unit ? ` ${unit}` : ""}`;
+  const whole = shown.player.isLive ? "" : ` of ${words(end)}`;
+  const text = `${quantity} ${words(now)}${whole}${unit ? ` ${unit}` : ""}`;
   element("now").textContent = text;
   element("time").value = String(shown.player.frame);
   element("time").setAttribute("aria-valuetext", text);
@@ -95,7 +96,7 @@ async function start() {
   document.body.dataset.ready = "true";
 }
 
-start().catch((error) => {
+export const started = start().catch((error) => {
   element("loading").textContent = `This page cannot show its animation: ${error.message}.`;
   console.error(error);
 });

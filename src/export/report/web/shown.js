@@ -17,6 +17,7 @@ export const state = {
   ranges: new Map(),
 };
 
+// A live page adds what takes the pointer (`tool`), what is drawn on top (`over`) and where words are said (`say`).
 export const shown = { views: [], charts: [], player: null, isPrinting: false };
 
 // For the browser's console: `report.bodies[0].numbers(66)`.

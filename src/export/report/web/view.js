@@ -3,6 +3,7 @@
 import { Painter } from "./painter.js";
 import { PlainPainter } from "./painter2d.js";
 import { themeColour, themeText, ticks, words } from "./colour.js";
+import { shown } from "./shown.js";
 
 // Ways of more particles would cover each other.
 const MOST_WAYS = 400;
@@ -246,11 +247,12 @@ export class View {
   }
 
   drawOver() {
-    const isEmpty = this.kept < 0 && this.marked < 0 && !(this.show.layers.cracks && this.body.brokenBonds());
+    const isEmpty = this.kept < 0 && this.marked < 0 && !shown.over && !(this.show.layers.cracks && this.body.brokenBonds());
     if (isEmpty && this.isClear && this.over.width === this.clearWidth) return;
     [this.isClear, this.clearWidth] = [isEmpty, this.over.width];
     const pen = this.pen(this.over);
     if (this.show.layers.cracks) this.drawCracks(pen);
+    shown.over?.(this);
     for (const [particle, width] of [[this.kept, 3], [this.marked, 2]]) {
       if (particle < 0) continue;
       const [x, y] = this.at(particle);

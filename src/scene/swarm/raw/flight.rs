@@ -45,6 +45,10 @@ pub struct RawFlight {
     /// Faults of single robots.
     #[serde(default)]
     pub faults: Vec<RawFault>,
+    /// What is done from outside on the way, by ascending period.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schemars(length(max = 200000))]
+    pub commands: Vec<RawCommand>,
     /// Bounds on the results.
     #[serde(default)]
     pub bounds: RawBounds,
@@ -67,6 +71,7 @@ impl Default for RawFlight {
             duplicates: 0.0,
             start: Vec::new(),
             faults: Vec::new(),
+            commands: Vec::new(),
             bounds: RawBounds::default(),
             record_every: 1,
         }
@@ -146,6 +151,41 @@ pub enum RawFaultKind {
     NotANumber,
     /// Sends poses in another frame.
     WrongFrame,
+}
+
+/// Something that is done from outside before a period.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawCommand {
+    /// Periods flown before [period].
+    pub after: u64,
+    /// What is done.
+    pub what: RawCommandKind,
+}
+
+/// Kinds of commands.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum RawCommandKind {
+    /// Sends a leader to a place, whatever its program is.
+    Lead {
+        /// Name of the robot.
+        robot: String,
+        /// [m]
+        to: [f64; 2],
+    },
+    /// Changes what becomes of poses on their way.
+    Channel {
+        /// As `flight.noise` [m].
+        #[schemars(range(min = 0))]
+        noise: f64,
+        /// As `flight.delay` [period].
+        #[schemars(range(max = 1000))]
+        delay: u32,
+        /// As `flight.loss` [1].
+        #[schemars(range(min = 0, max = 1))]
+        loss: f64,
+    },
 }
 
 /// Bounds on the results; a flight that breaks one of these ends with exit code 1. Errors are those of the robots

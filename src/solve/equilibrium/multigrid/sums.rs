@@ -1,6 +1,6 @@
 //! Blocks added up by where they lead: the rows of `P' K P` while they come into being.
 
-use crate::flock::block::{Block, plus};
+use crate::flock::block::Block;
 use crate::flock::lattice::Site;
 use crate::solve::operator::Row;
 
@@ -12,24 +12,22 @@ pub struct Sums {
     radius: i32,
     /// By offset, column by column; zero where nothing was added.
     window: Vec<Block>,
-    is_used: Vec<bool>,
-    /// Places in the window that are used, in the order of their first addition.
-    used: Vec<u32>,
+    /// Places in the window that something was added to, by bits.
+    used: Vec<u64>,
 }
 
 impl Default for Sums {
     fn default() -> Self {
-        let size = (2 * RADIUS as usize + 1).pow(2);
-        Self {
-            radius: RADIUS,
-            window: vec![Block::default(); size],
-            is_used: vec![false; size],
-            used: Vec::new(),
-        }
+        Self::of_radius(RADIUS)
     }
 }
 
 impl Sums {
+    fn of_radius(radius: i32) -> Self {
+        let size = (2 * radius as usize + 1).pow(2);
+        Self { radius, window: vec![Block::default(); size], used: vec![0; size.div_ceil(64)] }
+    }
+
     /// Adds a share of a block at an offset.
     pub fn add(&mut self, offset: Site, share: f64, block: &Block) {
         let far = offset[0].abs().max(offset[1].abs());
@@ -37,29 +35,34 @@ impl Sums {
             self.widen(far);
         }
         let at = ((offset[0] + self.radius) * self.width() + offset[1] + self.radius) as usize;
-        let block = block.map(|row| row.map(|value| share * value));
-        if std::mem::replace(&mut self.is_used[at], true) {
-            self.window[at] = plus(&self.window[at], &block);
-        } else {
-            self.used.push(at as u32);
-            self.window[at] = block;
-        }
+        self.used[at / 64] |= 1 << (at % 64);
+        let sum = self.window[at].as_flattened_mut();
+        sum.iter_mut().zip(block.as_flattened()).for_each(|(sum, value)| *sum += share * value);
     }
 
     /// Takes out what has been added up, ordered by offset, so that it does not depend on how it was summed.
     pub fn drain(&mut self) -> impl Iterator<Item = (Site, Block)> + '_ {
         let (width, radius) = (self.width(), self.radius);
-        let Self { window, is_used, used, .. } = self;
-        used.sort_unstable();
-        used.drain(..).map(move |at| {
-            is_used[at as usize] = false;
-            ([at as i32 / width - radius, at as i32 % width - radius], window[at as usize])
+        let Self { window, used, .. } = self;
+        let places = used.iter_mut().enumerate().flat_map(|(word, bits)| {
+            std::iter::from_fn(move || {
+                let bit = bits.trailing_zeros();
+                (bit < 64).then(|| {
+                    *bits &= *bits - 1;
+                    word * 64 + bit as usize
+                })
+            })
+        });
+        places.map(move |at| {
+            let block = std::mem::take(&mut window[at]);
+            ([at as i32 / width - radius, at as i32 % width - radius], block)
         })
     }
 
     /// The row that has been added up.
     pub fn row(&mut self) -> Row {
-        let mut row = Row::default();
+        let blocks = self.used.iter().map(|word| word.count_ones() as usize).sum();
+        let mut row = Row { entries: Vec::with_capacity(blocks), ..Row::default() };
         for (offset, block) in self.drain().filter(|(_, block)| *block != Block::default()) {
             match offset {
                 [0, 0] => row.diagonal = block,
@@ -74,11 +77,8 @@ impl Sums {
     }
 
     fn widen(&mut self, radius: i32) {
-        let known: Vec<(Site, Block)> = self.drain().collect();
-        self.radius = radius;
-        let size = (self.width() as usize).pow(2);
-        (self.window, self.is_used) = (vec![Block::default(); size], vec![false; size]);
-        known.into_iter().for_each(|(offset, block)| self.add(offset, 1.0, &block));
+        let mut narrow = std::mem::replace(self, Self::of_radius(radius));
+        narrow.drain().for_each(|(offset, block)| self.add(offset, 1.0, &block));
     }
 }
 

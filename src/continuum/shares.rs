@@ -1,0 +1,85 @@
+//! How ranks would share a run, before any of them is started.
+
+use super::plan::Plan;
+use super::run::require_shareable;
+use crate::engine::setup::Setup;
+use crate::engine::several::looks_at_every_step;
+use crate::scene::{Scene, SceneError};
+use crate::sweep::Sweep;
+use crate::sweep::domain::Share;
+
+/// Bytes of a position.
+const PLACE: usize = 16;
+
+/// What is exchanged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Exchanged {
+    /// Halos, before so many steps are taken together; bytes that the rank with the largest receives.
+    Halos {
+        /// Steps taken together at most.
+        steps: usize,
+        /// Bytes received.
+        bytes: usize,
+    },
+    /// All positions after each step; bytes that each rank receives.
+    Everything {
+        /// Bytes received, less those that a rank has itself.
+        bytes: usize,
+    },
+}
+
+/// The parts of a body that ranks share.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Shares {
+    /// Particles of each rank, shape \[ranks\].
+    pub particles: Vec<usize>,
+    /// Between the ranks.
+    pub exchanged: Exchanged,
+}
+
+impl Shares {
+    /// The shares of so many ranks.
+    ///
+    /// # Errors
+    /// Names the key of a scene that ranks cannot share.
+    pub fn new(scene: &Scene, plan: &Plan, ranks: usize) -> Result<Self, SceneError> {
+        require_shareable(scene)?;
+        let Setup { body, flock, changes, update, roles, present_radius, .. } = &plan.setup;
+        let share = Share { ranks, ..Share::whole() };
+        let sweep = Sweep::compile_share(*update, flock, roles, share);
+        let particles = sweep.domain().map_or_else(|| vec![plan.count()], |domain| domain.counts());
+        let looks = looks_at_every_step(present_radius.is_some(), flock, changes);
+        let exchanged = if looks || !sweep.takes_several(body.frame.as_ref()) {
+            let least = particles.iter().min().copied().unwrap_or_default();
+            Exchanged::Everything { bytes: PLACE * (plan.count() - least) }
+        } else {
+            let steps = sweep.steps_together();
+            let largest = sweep.halo_sizes(steps).into_iter().max().unwrap_or_default();
+            Exchanged::Halos { steps, bytes: PLACE * largest }
+        };
+        Ok(Self { particles, exchanged })
+    }
+
+    /// For the plan: names and values.
+    pub fn facts(&self) -> Vec<(String, String)> {
+        let (least, most) = (self.particles.iter().min(), self.particles.iter().max());
+        let (least, most) = (least.copied().unwrap_or_default(), most.copied().unwrap_or_default());
+        let ranks = self.particles.len();
+        let idle = self.particles.iter().filter(|&&count| count == 0).count();
+        let idle = if idle == 0 { String::new() } else { format!("; {idle} have nothing to do") };
+        let exchanged = match self.exchanged {
+            Exchanged::Halos { steps, bytes } => {
+                format!("halos of at most {bytes} bytes before every {steps} steps that nothing looks at")
+            }
+            Exchanged::Everything { bytes } => {
+                format!("all positions after each step, {bytes} bytes to each rank")
+            }
+        };
+        let facts = [
+            ("ranks", format!("{ranks}, which move {least} to {most} particles each{idle}")),
+            ("exchanged", exchanged),
+            ("memory of each rank", "as much as one alone: each holds the whole body".to_owned()),
+        ];
+        facts.map(|(name, value)| (name.to_owned(), value)).into()
+    }
+}

@@ -1,0 +1,98 @@
+//! Actions on a body while it is stepped: bonds are cut, particles follow by other rules, a hand leads some of them.
+//!
+//! Those of a plan are performed as their steps begin. A session performs and steers them from outside between two
+//! steps; planned for the step that comes next, they give the same bits.
+
+use super::Engine;
+use super::load::Load;
+use super::setup::{Action, ActionKind, Conduct, RoleChange, Setup};
+use crate::flock::fracture::Bonds;
+use crate::flock::law::Flock;
+use crate::flock::motion::Motion;
+
+impl Conduct {
+    /// That of a body before its first step.
+    pub fn of(setup: Setup) -> Self {
+        let Setup { flock, update, cells, loads, free_edge, .. } = setup;
+        let Flock { rule, weights, forces, rest, bonds, .. } = flock;
+        let fracture = bonds.map(|bonds| (bonds.threshold, bonds.ghosts));
+        Self { rule, weights, forces, rest, fracture, update, cells, loads, free_edge }
+    }
+}
+
+impl Engine {
+    /// Performs what is planned for this step.
+    pub(super) fn act(&mut self) {
+        let due = self.actions.iter().filter(|action| action.at == self.step);
+        for what in due.map(|action| action.what.clone()).collect::<Vec<_>>() {
+            self.perform(&what, self.step);
+        }
+    }
+
+    /// Whether an action is planned for a step after this one, and the first such step.
+    pub(super) fn next_action(&self) -> Option<usize> {
+        self.actions.iter().map(|action| action.at).filter(|&at| at > self.step).min()
+    }
+
+    /// Whether an action is planned for the next step.
+    pub fn acts_next(&self) -> bool {
+        self.next_action() == Some(self.step + 1)
+    }
+
+    /// Performs an action between two steps, which holds from step `at` on, the next one.
+    pub fn perform(&mut self, what: &ActionKind, at: usize) {
+        match what {
+            ActionKind::Conduct(conduct) => self.conduct(conduct),
+            ActionKind::Cut(cut) => {
+                let flock = &mut self.flock;
+                let bonds = flock.bonds.get_or_insert_with(|| Bonds::uncut(&flock.neighbours));
+                let known = self.breaks.len();
+                let places = (&*self.body.reference, &self.present);
+                bonds.cut_present(at, *cut, &flock.neighbours, places, &self.roles, &mut self.breaks);
+                self.set_torn_aside(known);
+            }
+        }
+    }
+
+    fn conduct(&mut self, conduct: &Conduct) {
+        let Conduct { rule, weights, forces, rest, fracture, update, cells, loads, free_edge } =
+            conduct.clone();
+        let flock = &mut self.flock;
+        (flock.rule, flock.weights, flock.forces, flock.rest) = (rule, weights, forces, rest);
+        match (&mut flock.bonds, fracture) {
+            (Some(bonds), Some((threshold, ghosts))) => (bonds.threshold, bonds.ghosts) = (threshold, ghosts),
+            (Some(bonds), None) => bonds.threshold = None,
+            (None, Some((threshold, ghosts))) => {
+                flock.bonds = Some(Bonds::new(threshold, ghosts, &flock.neighbours));
+            }
+            (None, None) => {}
+        }
+        (self.update, self.cells, self.free_edge) = (update, cells, free_edge);
+        let factor = self.load_factor();
+        self.load = Load::new(self.load.ramp(), loads);
+        self.set_load_factor(factor);
+        self.settled = None;
+        self.compile_sweep();
+    }
+
+    /// Follows by what the plan has for this step: part of putting a state back.
+    pub(super) fn conduct_until_now(&mut self) {
+        let last = |action: &&Action| action.at <= self.step && matches!(action.what, ActionKind::Conduct(_));
+        if let Some(Action { what: ActionKind::Conduct(conduct), .. }) =
+            self.actions.iter().rfind(last).cloned()
+        {
+            self.conduct(&conduct);
+        }
+    }
+
+    /// Adds a role that particles take at a step to come, and returns its number among the changes.
+    pub fn add_role_change(&mut self, change: RoleChange) -> usize {
+        self.changes.push(change);
+        self.changes.len() - 1
+    }
+
+    /// Gives the leaders of a change another motion, which says the same of the steps so far.
+    pub fn steer(&mut self, change: usize, motion: Motion) {
+        self.changes[change].motion = Some(motion);
+    }
+}

@@ -1,0 +1,231 @@
+// A page that a session feeds: the socket, the clock, the controls of the session.
+
+import { words } from "./colour.js";
+import { breakBonds, kindOf, LiveFrames } from "./live_frames.js";
+import { drawAlarms, takeTool } from "./live_tools.js";
+import { drawNow, started } from "./page.js";
+import { bodies, data, element, shown, state } from "./shown.js";
+
+// Time between two looks at the range of a quantity, which changes as the body moves, in ms.
+const RANGE_EVERY = 250;
+// Keys worth a try that a file may leave out.
+const SUGGESTED = ["update.damping=0.8", "rule.feedback.factor=-0.05", "fracture.stretch=1.5", "frame=immediate"];
+// Time after which a frame is drawn though the browser does not ask for it, in ms.
+const HIDDEN_EVERY = 300;
+
+const session = { socket: null, status: { alarmed: [], faults: [] }, frame: null, isAsked: false, rangeAt: 0 };
+const measured = { drawn: 0, since: 0, rate: 0, transfer: 0, drawing: 0 };
+
+function ask(command) {
+  if (session.socket?.readyState === WebSocket.OPEN) session.socket.send(JSON.stringify(command));
+}
+
+// The clock of a session, in the place of a film's: it knows the present alone.
+class LivePlayer {
+  constructor() {
+    Object.assign(this, { times: bodies[0].animation.times, frame: 0, ready: 1, playing: false, isLive: true, tempo: 1 });
+  }
+
+  get last() {
+    return 0;
+  }
+
+  get speed() {
+    return this.tempo;
+  }
+
+  set speed(value) {
+    this.tempo = value;
+    ask({ do: "speed", value });
+  }
+
+  toggle() {
+    ask({ do: this.playing ? "pause" : "play" });
+  }
+
+  pause() {}
+
+  // One on is a step; the only other place is the one before the last deed.
+  go(frame) {
+    if (frame > 0) ask({ do: "step" });
+    else if (frame < 0) ask({ do: "undo" });
+  }
+
+  seek() {}
+}
+
+function say(text) {
+  element("live-words").textContent = text;
+}
+
+function connect() {
+  const token = new URLSearchParams(location.search).get("token") ?? "";
+  const socket = new WebSocket(`ws://${location.host}/socket?token=${encodeURIComponent(token)}`);
+  socket.binaryType = "arraybuffer";
+  socket.onmessage = ({ data: message }) => (typeof message === "string" ? hear(JSON.parse(message)) : receive(message));
+  socket.onopen = () => {
+    document.body.dataset.live = "open";
+    askForQuantity();
+  };
+  socket.onclose = () => {
+    document.body.dataset.live = "closed";
+    say("The session is over, or has no room for another viewer.");
+  };
+  session.socket = socket;
+}
+
+function hear(event) {
+  if (event.event === "refused") say(event.words);
+  else if (event.event === "saved") {
+    say(`Saved as ${event.path}. Replay: ${event.command}`);
+    document.body.dataset.saved = event.path;
+  } else if (event.event === "status") takeStatus(event);
+}
+
+function takeStatus(status) {
+  // Another body: another page.
+  if (status.layout !== data.live.layout) return location.reload();
+  session.status = status;
+  shown.player.tempo = status.speed;
+  if (shown.player.playing !== status.playing) {
+    shown.player.playing = status.playing;
+    shown.player.changed?.();
+  }
+  element("speed").value = String(status.speed);
+  element("live-undo").disabled = status.undo === 0;
+  if (status.stopped) say(status.stopped);
+  element("live-alarms").replaceChildren(
+    ...status.alarms.map((text) => Object.assign(document.createElement("li"), { textContent: text })),
+  );
+  const values = new Map(data.live.keys.map(([key, value]) => [key, String(value)]));
+  for (const text of status.sets) {
+    const at = text.indexOf("=");
+    values.set(text.slice(0, at), text.slice(at + 1));
+  }
+  for (const input of document.querySelectorAll("#live-numbers input")) {
+    const value = values.get(input.dataset.key);
+    if (input !== document.activeElement && input.value !== value) input.value = value;
+  }
+}
+
+function receive(buffer) {
+  const [body] = bodies;
+  const kind = kindOf(buffer);
+  if (kind === "roles") {
+    body.firstRoles = new Uint8Array(buffer, 8);
+    body.roleChanges = [];
+  } else if (kind === "broken") {
+    breakBonds(body, buffer);
+    shown.views.forEach((view) => view.painter.setMesh(body));
+    element("layer-cracks").closest("label").hidden = !body.brokenBonds();
+  } else if (kind === "frame") {
+    session.frame = buffer;
+    // A frame that a later one replaces before it is drawn counts as drawn: the session waits for each.
+    if (session.isAsked) return ask({ do: "drawn", ms: 0 });
+    session.isAsked = true;
+    requestAnimationFrame(drawLatest);
+    // A page in the background is not refreshed.
+    setTimeout(drawLatest, HIDDEN_EVERY);
+  }
+}
+
+function drawLatest() {
+  if (!session.isAsked) return;
+  session.isAsked = false;
+  const begun = performance.now();
+  const frame = bodies[0].frames.take(session.frame);
+  if (!frame) return location.reload();
+  const [body] = bodies;
+  body.animation.times[0] = frame.clock;
+  body.at = -1;
+  if (begun - session.rangeAt > RANGE_EVERY) {
+    state.ranges.clear();
+    session.rangeAt = begun;
+  }
+  drawNow();
+  const drawing = performance.now() - begun;
+  ask({ do: "drawn", ms: Math.min(drawing, 1e6) });
+  measure(frame, performance.timeOrigin + begun - frame.sent, drawing);
+}
+
+// Means over some frames; said twice a second.
+function measure(frame, transfer, drawing) {
+  measured.transfer += 0.1 * (transfer - measured.transfer);
+  measured.drawing += 0.1 * (drawing - measured.drawing);
+  measured.drawn += 1;
+  const now = performance.now();
+  if (now - measured.since < 500) return;
+  measured.rate = (1000 * measured.drawn) / (now - measured.since);
+  Object.assign(measured, { drawn: 0, since: now, step: frame.stepTime, encoding: frame.frameTime });
+  const [steps] = session.status.rates ?? [0];
+  element("loading").textContent =
+    `${words(measured.rate, 3)} frames/s, ${words(steps, 3)} steps/s; a step takes ${words(frame.stepTime, 2)} ms, a frame ` +
+    `${words(frame.frameTime, 2)} ms to make, ${words(measured.transfer, 2)} ms to come, ${words(measured.drawing, 2)} ms to draw.`;
+}
+
+function askForQuantity() {
+  ask({ do: "ask", quantity: state.quantity });
+}
+
+function set(key, value) {
+  say("");
+  ask({ do: "set", key: key.trim(), value: String(value).trim() });
+}
+
+function showNumbers() {
+  const inputs = data.live.keys.map(([key, value]) => {
+    const label = document.createElement("label");
+    const input = Object.assign(document.createElement("input"), { type: "number", step: "any", value });
+    input.dataset.key = key;
+    input.addEventListener("change", () => set(key, input.value));
+    label.append(`${key} `, input);
+    return label;
+  });
+  element("live-numbers").replaceChildren(...inputs);
+  const known = data.live.keys.map(([key, value]) => `${key}=${value}`);
+  const offered = data.live.swarm ? known : [...known, ...SUGGESTED.filter((text) => !known.some((one) => one.startsWith(text.split("=")[0])))];
+  element("live-keys").replaceChildren(
+    ...offered.map((value) => Object.assign(document.createElement("option"), { value })),
+  );
+}
+
+function listenToSession() {
+  element("live-reset").addEventListener("click", () => ask({ do: "reset" }));
+  element("live-undo").addEventListener("click", () => ask({ do: "undo" }));
+  element("live-save").addEventListener("click", () => ask({ do: "save" }));
+  element("live-set").addEventListener("submit", (event) => {
+    event.preventDefault();
+    const text = element("live-key").value;
+    const at = text.indexOf("=");
+    if (at > 0) set(text.slice(0, at), text.slice(at + 1));
+    else say("Give KEY=VALUE, as --set takes it.");
+  });
+  element("quantity").addEventListener("change", askForQuantity);
+  element("live-fault").addEventListener("change", () => {
+    const robot = shown.views[0].kept;
+    if (robot < 0) return say("Click a robot first.");
+    ask({ do: "fault", robot, what: element("live-fault").value || null });
+  });
+}
+
+function startLive() {
+  const [body] = bodies;
+  const { changed } = shown.player;
+  body.frames = new LiveFrames(data.live.channels, body.count);
+  shown.player = Object.assign(new LivePlayer(), { changed });
+  shown.say = say;
+  shown.tool = (view, at, event) => takeTool(view, at, event, ask);
+  shown.over = (view) => drawAlarms(view, session.status);
+  document.body.classList.add("is-live");
+  element("layer-ways").closest("label").hidden = true;
+  element("layer-ways").checked = state.layers.ways = false;
+  element("layer-cracks").closest("label").hidden = true;
+  element("tool-cut").hidden = data.live.swarm;
+  element("live-robot").hidden = !data.live.swarm;
+  showNumbers();
+  listenToSession();
+  window.report.live = { session, measured, ask };
+  connect();
+}
+
+if (data.live) started.then(startLive);

@@ -1,0 +1,142 @@
+//! Requests of viewers, as JSON.
+
+use serde::Deserialize;
+
+/// Longest request of a viewer \[byte\].
+pub const MOST_BYTES: usize = 4096;
+
+/// Something that a viewer asks for.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(tag = "do", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Command {
+    /// Goes on.
+    Play {},
+    /// Stands still.
+    Pause {},
+    /// Takes one step, and stands still.
+    Step {},
+    /// Begins anew; what was done is kept for [`Command::Undo`] alone.
+    Reset {},
+    /// Returns to the moment before the last thing that was done.
+    Undo {},
+    /// Writes the file that replays what was done.
+    Save {},
+    /// Steps at this multiple of the usual speed \[1\].
+    Speed {
+        /// From 0.01 to 1000.
+        value: f64,
+    },
+    /// Takes hold of a particle or robot, by its number from 0, with all that are held as it is.
+    Grab {
+        /// Number of the particle.
+        particle: usize,
+        /// Whether to take this one alone.
+        #[serde(default)]
+        alone: bool,
+    },
+    /// Moves what is held, from where it was taken \[length\].
+    Drag {
+        /// Along x and y.
+        by: [f64; 2],
+    },
+    /// Lets go.
+    Release {},
+    /// Breaks the bonds that cross a line as the body stands \[length\].
+    Cut {
+        /// One end.
+        from: [f64; 2],
+        /// The other end.
+        to: [f64; 2],
+    },
+    /// Changes a key as `--set` does.
+    Set {
+        /// Such as `rule.feedback.factor`.
+        key: String,
+        /// In TOML.
+        value: String,
+    },
+    /// Gives a robot a fault, or takes it away.
+    Fault {
+        /// Number of the robot, from 0.
+        robot: usize,
+        /// The kind of fault; none makes it sound.
+        what: Option<Fault>,
+    },
+    /// Needs the values of this quantity with every frame.
+    Ask {
+        /// Key of a quantity.
+        quantity: String,
+    },
+    /// Has drawn a frame.
+    Drawn {
+        /// Time that drawing took \[ms\].
+        ms: f64,
+    },
+}
+
+/// Faults that a viewer can give a robot.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Fault {
+    /// Stands still and sends no poses.
+    Dead,
+    /// Moves on but sends no poses.
+    Silent,
+    /// Stands still and sends its poses.
+    Stuck,
+}
+
+impl Command {
+    /// Reads a request.
+    ///
+    /// # Errors
+    /// A sentence for its sender.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        if text.len() > MOST_BYTES {
+            return Err(format!("a request is at most {MOST_BYTES} bytes long"));
+        }
+        let command: Self = serde_json::from_str(text).map_err(|error| format!("no request: {error}"))?;
+        command.check().map(|()| command)
+    }
+
+    fn check(&self) -> Result<(), String> {
+        let is_text = |text: &str| text.len() <= 200 && !text.contains(char::is_control);
+        let holds = match self {
+            Command::Speed { value } => (0.01..=1000.0).contains(value),
+            Command::Set { key, value } => is_text(key) && is_text(value) && !key.contains('='),
+            Command::Ask { quantity } => is_text(quantity),
+            Command::Drawn { ms } => (0.0..=1e6).contains(ms),
+            Command::Cut { from, to } => from != to,
+            _ => true,
+        };
+        if holds { Ok(()) } else { Err(format!("out of range: {self:?}")) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn requests_are_read_and_others_refused() {
+        let grab = Command::parse(r#"{"do":"grab","particle":3}"#);
+        assert_eq!(grab, Ok(Command::Grab { particle: 3, alone: false }));
+        let wrong = [
+            "",
+            "[]",
+            r#"{"do":"format"}"#,
+            r#"{"do":"grab","particle":-1}"#,
+            r#"{"do":"grab","particle":1e3}"#,
+            r#"{"do":"drag","by":[1e999,0]}"#,
+            r#"{"do":"drag","by":[null,0]}"#,
+            r#"{"do":"play","more":1}"#,
+            r#"{"do":"speed","value":0}"#,
+            r#"{"do":"cut","from":[0,0],"to":[0,0]}"#,
+            "{\"do\":\"set\",\"key\":\"a\\n\",\"value\":\"1\"}",
+        ];
+        for text in wrong {
+            assert!(Command::parse(text).is_err(), "{text}");
+        }
+        assert!(Command::parse(&format!(r#"{{"do":"ask","quantity":"{}"}}"#, "x".repeat(5000))).is_err());
+    }
+}

@@ -1,0 +1,375 @@
+//! Runs a session: steps at the speed asked for, what viewers ask in between, and the latest state for all of them.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError};
+use std::time::{Duration, Instant, SystemTime};
+
+use serde_json::{Value, json};
+use tungstenite::Bytes;
+
+use super::command::Command;
+use super::session::{Frame, Session, Viewer};
+use super::state::{Board, Published};
+use crate::export::report::live_page;
+
+/// Time from one state that is shown to the next, at least.
+const SHOWN_EVERY: Duration = Duration::from_micros(16_000);
+/// Time that requests are waited for: at least while the body moves, as at a slow speed nothing is due for long, and
+/// while it stands still.
+const LEAST_WAIT: Duration = Duration::from_millis(2);
+const IDLE: Duration = Duration::from_millis(50);
+/// Steps that are behind are caught up with for so long, and then forgotten.
+const BUSY: Duration = Duration::from_millis(14);
+/// Saved files of one name.
+const MOST_FILES: usize = 1000;
+
+/// Something for the session.
+#[derive(Debug)]
+pub enum Request {
+    /// A viewer asks for something.
+    Command(Viewer, Command),
+    /// A viewer has come.
+    Come,
+    /// A viewer has gone.
+    Gone(Viewer),
+}
+
+/// A session and how it goes on.
+pub struct Conductor {
+    session: Session,
+    board: Arc<Board>,
+    /// Folder of saved files.
+    folder: PathBuf,
+    is_playing: bool,
+    speed: f64,
+    /// Parts of a step that are due.
+    due: f64,
+    /// Mean time of a step, and of encoding a frame \[ms\].
+    step_time: f64,
+    frame_time: f64,
+    /// Steps a second in the last while.
+    pace: Pace,
+    number: u64,
+    lineage: u64,
+    layout: Option<u64>,
+    /// Why it goes on no further.
+    stopped: Option<String>,
+}
+
+/// Sends every viewer away when it is dropped, by a panic too.
+struct Closed(Arc<Board>);
+
+impl Drop for Closed {
+    fn drop(&mut self) {
+        self.0.close();
+    }
+}
+
+/// Counts steps and frames in stretches of time.
+struct Pace {
+    since: Instant,
+    steps: u32,
+    frames: u32,
+    /// \[1/s\]
+    rates: [f64; 2],
+}
+
+impl Pace {
+    fn look(&mut self) {
+        let seconds = self.since.elapsed().as_secs_f64();
+        if seconds > 0.5 {
+            self.rates = [f64::from(self.steps) / seconds, f64::from(self.frames) / seconds];
+            (self.since, self.steps, self.frames) = (Instant::now(), 0, 0);
+        }
+    }
+}
+
+impl Conductor {
+    /// A session that stands still, whose files are saved in `folder`.
+    pub fn new(session: Session, board: Arc<Board>, folder: PathBuf) -> Self {
+        let pace = Pace { since: Instant::now(), steps: 0, frames: 0, rates: [0.0; 2] };
+        Self {
+            session,
+            board,
+            folder,
+            is_playing: false,
+            speed: 1.0,
+            due: 0.0,
+            step_time: 0.0,
+            frame_time: 0.0,
+            pace,
+            number: 0,
+            lineage: 0,
+            layout: None,
+            stopped: None,
+        }
+    }
+
+    /// Goes on until `stop` is raised or no viewer can ask for anything any more.
+    pub fn run(mut self, requests: &Receiver<Request>, stop: &AtomicBool) {
+        let _closed = Closed(Arc::clone(&self.board));
+        let mut shown = Instant::now();
+        let mut before = Instant::now();
+        let mut is_news = false;
+        while !stop.load(Ordering::Relaxed) {
+            let due = SHOWN_EVERY.saturating_sub(shown.elapsed()).max(LEAST_WAIT);
+            let wait = if self.is_playing { due } else { IDLE };
+            is_news |= match requests.recv_timeout(wait) {
+                Ok(request) => self.take(request),
+                Err(RecvTimeoutError::Timeout) => false,
+                Err(RecvTimeoutError::Disconnected) => break,
+            };
+            // A flood of requests does not keep the body from moving.
+            for request in requests.try_iter().take(256) {
+                is_news |= self.take(request);
+            }
+            let now = Instant::now();
+            is_news |= self.play(now.duration_since(before).as_secs_f64());
+            before = now;
+            self.pace.look();
+            if is_news && (shown.elapsed() >= SHOWN_EVERY || !self.is_playing) {
+                self.show();
+                (shown, is_news) = (Instant::now(), false);
+            }
+        }
+    }
+
+    /// Takes the steps that are due after so many seconds; whether there were any.
+    fn play(&mut self, seconds: f64) -> bool {
+        if !self.is_playing {
+            self.due = 0.0;
+            return false;
+        }
+        self.due += seconds * self.session.rate() * self.speed;
+        let begun = Instant::now();
+        let mut taken = 0;
+        while self.due >= 1.0 && self.is_playing && begun.elapsed() < BUSY {
+            self.step();
+            self.due -= 1.0;
+            taken += 1;
+        }
+        self.due = self.due.min(1.0);
+        taken > 0
+    }
+
+    fn step(&mut self) {
+        let begun = Instant::now();
+        match self.session.advance() {
+            Ok(()) => self.stopped = None,
+            Err(why) => {
+                self.is_playing = false;
+                self.stopped = Some(why);
+            }
+        }
+        self.pace.steps += 1;
+        self.step_time += 0.1 * (1e3 * begun.elapsed().as_secs_f64() - self.step_time);
+    }
+
+    /// Does what is asked; whether there is something to show.
+    fn take(&mut self, request: Request) -> bool {
+        match request {
+            Request::Come => true,
+            Request::Gone(viewer) => {
+                self.session.release(viewer);
+                true
+            }
+            Request::Command(viewer, command) => self.perform(viewer, &command),
+        }
+    }
+
+    fn perform(&mut self, viewer: Viewer, command: &Command) -> bool {
+        match command {
+            Command::Play {} => self.is_playing = true,
+            Command::Pause {} => self.is_playing = false,
+            Command::Step {} => {
+                self.is_playing = false;
+                self.step();
+            }
+            Command::Speed { value } => self.speed = *value,
+            Command::Save {} => self.save(viewer),
+            Command::Ask { quantity } => self.board.want(viewer, quantity.clone()),
+            Command::Drawn { .. } => return false,
+            other => self.act(viewer, other),
+        }
+        true
+    }
+
+    /// Does something with the session, or says why not.
+    fn act(&mut self, viewer: Viewer, command: &Command) {
+        if let Err(refused) = self.session.perform(viewer, command) {
+            self.board.tell(viewer, &json!({ "event": "refused", "words": refused.0 }));
+            return;
+        }
+        self.stopped = None;
+        if matches!(command, Command::Undo {} | Command::Reset {}) {
+            self.is_playing = false;
+            self.lineage += 1;
+        }
+    }
+
+    fn save(&self, viewer: Viewer) {
+        let said = match self.session.saved().and_then(|text| self.write(&text)) {
+            Ok(path) => {
+                let command = format!("flockform {} {}", self.session.runner(), path.display());
+                json!({ "event": "saved", "path": path, "command": command })
+            }
+            Err(words) => json!({ "event": "refused", "words": words }),
+        };
+        self.board.tell(viewer, &said);
+    }
+
+    /// Writes a file of a name that is not taken.
+    fn write(&self, text: &str) -> Result<PathBuf, String> {
+        let (name, _) = self.session.title();
+        let heading = format!("# Recorded by `flockform live`, from `{name}`.\n");
+        let name = name.strip_suffix("_live").unwrap_or(name);
+        let names = (1..=MOST_FILES).map(|n| match n {
+            1 => format!("{name}_live.toml"),
+            n => format!("{name}_live_{n}.toml"),
+        });
+        for name in names {
+            let path = self.folder.join(name);
+            match write_new(&path, &(heading.clone() + text)) {
+                Ok(()) => return Ok(path),
+                Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => {}
+                Err(error) => return Err(format!("cannot write {}: {error}", path.display())),
+            }
+        }
+        Err(format!("{} has {MOST_FILES} such files: remove some", self.folder.display()))
+    }
+
+    /// Publishes the state, with a page where there is none of this layout.
+    pub(super) fn show(&mut self) {
+        let begun = Instant::now();
+        let layout = self.session.layout();
+        if self.layout != Some(layout) {
+            self.layout = Some(layout);
+            self.lineage += 1;
+            self.board.set_page(self.page());
+        }
+        let channels = self.session.channels();
+        let wanted: Vec<bool> = channels.iter().map(|name| self.board.is_wanted(name)).collect();
+        let frame = self.session.frame(&wanted);
+        self.number += 1;
+        let published = Published {
+            number: self.number,
+            frame: encoded(&frame, self.step_time, self.frame_time),
+            layout,
+            roles: roles(&self.session.roles()),
+            broken: Arc::new(self.session.broken()),
+            lineage: self.lineage,
+            status: self.status(frame.clock).to_string().into(),
+        };
+        self.pace.frames += 1;
+        self.board.publish(published);
+        self.frame_time += 0.1 * (1e3 * begun.elapsed().as_secs_f64() - self.frame_time);
+    }
+
+    fn status(&self, clock: f64) -> Value {
+        let (alarms, alarmed) = self.session.alarms();
+        json!({
+            "event": "status",
+            "clock": clock,
+            "playing": self.is_playing,
+            "speed": self.speed,
+            "layout": self.layout,
+            "undo": self.session.undoable(),
+            "stopped": self.stopped,
+            "alarms": alarms,
+            "alarmed": alarmed,
+            "faults": self.session.faults(),
+            "sets": self.session.sets(),
+            "viewers": self.board.viewers(),
+            "rates": self.pace.rates,
+        })
+    }
+
+    fn page(&self) -> String {
+        let (name, title) = self.session.title();
+        let live = json!({
+            "channels": self.session.channels(),
+            "layout": self.session.layout(),
+            "keys": numbers(&self.session.raw()),
+            "swarm": matches!(self.session, Session::Swarm(_)),
+        });
+        live_page(format!("flockform live {name}"), title.to_owned(), self.session.view(), live)
+    }
+}
+
+/// Writes a file that is not there yet; nothing of it stays if it cannot be written whole.
+fn write_new(path: &Path, text: &str) -> std::io::Result<()> {
+    use std::io::Write;
+    let mut file = std::fs::File::create_new(path)?;
+    file.write_all(text.as_bytes()).inspect_err(|_| {
+        let _ = std::fs::remove_file(path);
+    })
+}
+
+/// Kinds of binary messages, which begin with it.
+const FRAME: u32 = 1;
+const ROLES: u32 = 2;
+const BROKEN: u32 = 3;
+
+/// A frame: kind, count, the channels that follow as bits, nothing; the clock, when it was sent \[ms since 1970\], times
+/// of a step and of a frame \[ms\] as doubles; then every quantity.
+fn encoded(frame: &Frame, step_time: f64, frame_time: f64) -> Bytes {
+    let Frame { clock, places: [dx, dy], channels } = frame;
+    let mut bytes = Vec::with_capacity(48 + 4 * dx.len() * (2 + channels.len()));
+    let bit = |(k, channel): (usize, &Option<Vec<f32>>)| u32::from(channel.is_some()) << k;
+    let present: u32 = channels.iter().enumerate().map(bit).sum();
+    for word in [FRAME, dx.len() as u32, present, 0] {
+        bytes.extend(word.to_le_bytes());
+    }
+    let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+    for value in [*clock, 1e3 * since.as_secs_f64(), step_time, frame_time] {
+        bytes.extend(value.to_le_bytes());
+    }
+    for values in [dx, dy].into_iter().chain(channels.iter().flatten()) {
+        values.iter().for_each(|value| bytes.extend(value.to_le_bytes()));
+    }
+    bytes.into()
+}
+
+fn roles(roles: &[u8]) -> Bytes {
+    let mut bytes = Vec::with_capacity(8 + roles.len());
+    bytes.extend(ROLES.to_le_bytes());
+    bytes.extend((roles.len() as u32).to_le_bytes());
+    bytes.extend(roles);
+    bytes.into()
+}
+
+/// Broken bonds as the page unpacks them: those after the `known` first ones, or all of them anew.
+pub(super) fn broken(pairs: &[[u32; 2]], is_anew: bool) -> Bytes {
+    let mut bytes = Vec::with_capacity(8 + 8 * pairs.len());
+    bytes.extend(BROKEN.to_le_bytes());
+    bytes.extend(u32::from(is_anew).to_le_bytes());
+    pairs.iter().flatten().for_each(|end| bytes.extend(end.to_le_bytes()));
+    bytes.into()
+}
+
+/// The numbers of a file that a page offers to change, by key.
+fn numbers(raw: &Value) -> Vec<(String, Value)> {
+    const TABLES: [&str; 7] = ["rule", "update", "material", "fracture", "lattice", "limits", "flight"];
+    const MOST: usize = 24;
+    let mut found = Vec::new();
+    for table in TABLES {
+        collect(table, &raw[table], &mut found);
+    }
+    found.retain(|(key, _)| {
+        !["flight.seed", "flight.record_every", "flight.duration"].contains(&key.as_str())
+    });
+    found.truncate(MOST);
+    found
+}
+
+fn collect(key: &str, value: &Value, found: &mut Vec<(String, Value)>) {
+    match value {
+        Value::Number(_) => found.push((key.to_owned(), value.clone())),
+        Value::Object(table) => {
+            table.iter().for_each(|(name, value)| collect(&format!("{key}.{name}"), value, found));
+        }
+        _ => {}
+    }
+}

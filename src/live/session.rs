@@ -1,0 +1,223 @@
+//! What viewers share: a body or a swarm, and what they have done with it.
+
+use super::body::Body;
+use super::command::Command;
+use super::swarm::Swarm;
+use crate::export::report::view::View;
+use crate::scene::SceneError;
+
+/// A viewer, by the number of its connection.
+pub type Viewer = u64;
+
+/// Pairs of particles whose bond is broken, in the order in which they broke.
+pub type Broken = Vec<[u32; 2]>;
+
+/// The state of every particle or robot at a moment.
+#[derive(Clone, Debug)]
+pub struct Frame {
+    /// Step, or seconds.
+    pub clock: f64,
+    /// Displacements along x and y \[length\], shape \[2\]\[count\].
+    pub places: [Vec<f32>; 2],
+    /// Other quantities, those alone that a viewer looks at, shape \[channels\]\[count\].
+    pub channels: Vec<Option<Vec<f32>>>,
+}
+
+/// Why something was not done.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Refused(pub String);
+
+impl From<&str> for Refused {
+    fn from(words: &str) -> Self {
+        Self(words.to_owned())
+    }
+}
+
+impl From<String> for Refused {
+    fn from(words: String) -> Self {
+        Self(words)
+    }
+}
+
+impl From<SceneError> for Refused {
+    fn from(error: SceneError) -> Self {
+        Self(error.to_string())
+    }
+}
+
+/// A body or a swarm under the hands of viewers.
+pub enum Session {
+    /// Particles that are stepped.
+    Body(Box<Body>),
+    /// Robots that fly.
+    Swarm(Box<Swarm>),
+}
+
+impl Session {
+    /// Takes a step, or flies a period.
+    ///
+    /// # Errors
+    /// Why it goes on no further.
+    pub fn advance(&mut self) -> Result<(), String> {
+        match self {
+            Session::Body(body) => body.advance(),
+            Session::Swarm(swarm) => {
+                swarm.advance();
+                Ok(())
+            }
+        }
+    }
+
+    /// Does what a viewer asks.
+    ///
+    /// # Errors
+    /// Why it cannot be done; nothing has changed then.
+    pub fn perform(&mut self, viewer: Viewer, command: &Command) -> Result<(), Refused> {
+        match self {
+            Session::Body(body) => body.perform(viewer, command),
+            Session::Swarm(swarm) => swarm.perform(viewer, command),
+        }
+    }
+
+    /// Lets go of what a viewer that is gone held.
+    pub fn release(&mut self, viewer: Viewer) {
+        match self {
+            Session::Body(body) => body.release(viewer),
+            Session::Swarm(swarm) => swarm.release(viewer),
+        }
+    }
+
+    /// The file that replays what was done, as TOML.
+    ///
+    /// # Errors
+    /// Why it cannot be written.
+    pub fn saved(&self) -> Result<String, String> {
+        match self {
+            Session::Body(body) => body.saved(),
+            Session::Swarm(swarm) => swarm.saved(),
+        }
+    }
+
+    /// The state of every particle, of a body with those channels alone that are wanted.
+    pub fn frame(&self, wanted: &[bool]) -> Frame {
+        match self {
+            Session::Body(body) => body.frame(wanted),
+            Session::Swarm(swarm) => swarm.frame(),
+        }
+    }
+
+    /// Quantities that the page cannot compute from displacements.
+    pub fn channels(&self) -> Vec<&'static str> {
+        match self {
+            Session::Body(body) => body.channels(),
+            Session::Swarm(_) => super::swarm::CHANNELS.to_vec(),
+        }
+    }
+
+    /// Roles by number, shape \[count\].
+    pub fn roles(&self) -> Vec<u8> {
+        match self {
+            Session::Body(body) => crate::export::report::view::numbers(body.engine().roles()),
+            Session::Swarm(swarm) => swarm.roles(),
+        }
+    }
+
+    /// Bonds that are broken now.
+    pub fn broken(&self) -> Broken {
+        match self {
+            Session::Body(body) => body.broken(),
+            Session::Swarm(_) => Broken::new(),
+        }
+    }
+
+    /// How many bonds are broken now.
+    pub fn broken_count(&self) -> usize {
+        match self {
+            Session::Body(body) => body.engine().breaks().len(),
+            Session::Swarm(_) => 0,
+        }
+    }
+
+    /// Changes whenever a page has to be built anew.
+    pub fn layout(&self) -> u64 {
+        match self {
+            Session::Body(body) => body.layout(),
+            Session::Swarm(swarm) => swarm.layout(),
+        }
+    }
+
+    /// Things that can be undone.
+    pub fn undoable(&self) -> usize {
+        match self {
+            Session::Body(body) => body.undoable(),
+            Session::Swarm(swarm) => swarm.undoable(),
+        }
+    }
+
+    /// Keys that were changed and hold now, `KEY=VALUE`, in their order.
+    pub fn sets(&self) -> Vec<String> {
+        match self {
+            Session::Body(body) => body.sets(),
+            Session::Swarm(swarm) => swarm.sets(),
+        }
+    }
+
+    /// Steps or periods in a second at the usual speed \[1/s\].
+    pub fn rate(&self) -> f64 {
+        /// As fast as screens are drawn.
+        const STEPS: f64 = 60.0;
+        match self {
+            Session::Body(_) => STEPS,
+            Session::Swarm(swarm) => 1.0 / swarm.period(),
+        }
+    }
+
+    /// Sentences on what is wrong now, and the robots that they concern.
+    pub fn alarms(&self) -> (Vec<String>, Vec<usize>) {
+        match self {
+            Session::Body(_) => (Vec::new(), Vec::new()),
+            Session::Swarm(swarm) => swarm.alarms(),
+        }
+    }
+
+    /// Robots with a fault, and its kind.
+    pub fn faults(&self) -> Vec<(usize, &'static str)> {
+        match self {
+            Session::Body(_) => Vec::new(),
+            Session::Swarm(swarm) => swarm.faults(),
+        }
+    }
+
+    /// The page's view of what there is now.
+    pub fn view(&self) -> View {
+        match self {
+            Session::Body(body) => body.view(),
+            Session::Swarm(swarm) => swarm.view(),
+        }
+    }
+
+    /// Short name and title of the file.
+    pub fn title(&self) -> (&str, &str) {
+        match self {
+            Session::Body(body) => (&body.scene().name, &body.scene().raw.title),
+            Session::Swarm(swarm) => (&swarm.swarm().name, &swarm.swarm().raw.title),
+        }
+    }
+
+    /// The command that runs a saved file.
+    pub fn runner(&self) -> &'static str {
+        match self {
+            Session::Body(_) => "run",
+            Session::Swarm(_) => "swarm",
+        }
+    }
+
+    /// The file as it was read, defaults and overrides included.
+    pub fn raw(&self) -> serde_json::Value {
+        match self {
+            Session::Body(body) => serde_json::to_value(&body.scene().raw),
+            Session::Swarm(swarm) => serde_json::to_value(&swarm.swarm().raw),
+        }
+        .unwrap_or_default()
+    }
+}

@@ -1,0 +1,119 @@
+//! Ranks: processes that share one body, each of which moves its own particles.
+//!
+//! A [`Team`] is what a rank knows of the others: how many they are, which one it is, and how numbers get from one
+//! to another. They travel over MPI (`mpi`, with the feature of that name) or between threads of one process
+//! ([`in_process`]), which the tests run on and which needs no MPI. What a rank owns is decided where bodies are
+//! swept; what is exchanged, and when, by the engine. [`launcher`] finds out whether a program was started as one of
+//! several.
+//!
+//! Everything travels as bits, and what several ranks have computed is put together in the order of the ranks: results
+//! do not depend on which rank was faster.
+
+pub mod launcher;
+#[cfg(feature = "mpi")]
+pub mod mpi;
+mod threads;
+
+use std::fmt;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+pub use threads::in_process;
+
+/// How numbers get from rank to rank. All ranks call the same methods in the same order.
+///
+/// A rank that is lost ends the others: neither method returns without what it waits for.
+pub trait Exchange: Send {
+    /// The number of this rank, from 0.
+    fn rank(&self) -> usize;
+
+    /// How many ranks there are.
+    fn count(&self) -> usize;
+
+    /// Sends each message to its rank and receives as many words as are asked for from each of `from`, in their order:
+    /// (rank, words). A rank is named at most once in each, and never this one.
+    fn swap(&mut self, messages: &[(usize, Vec<u64>)], from: &[(usize, usize)]) -> Vec<Vec<u64>>;
+
+    /// The words of all ranks, one after the other; `counts` says how many each has, shape \[ranks\].
+    fn gather(&mut self, own: &[u64], counts: &[usize]) -> Vec<u64>;
+}
+
+/// A rank's connection to the others; copies are the same rank's.
+#[derive(Clone)]
+pub struct Team {
+    rank: usize,
+    count: usize,
+    exchange: Arc<Mutex<dyn Exchange>>,
+}
+
+impl fmt::Debug for Team {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "rank {} of {}", self.rank, self.count)
+    }
+}
+
+impl Team {
+    /// The team that an exchange connects this rank with.
+    pub fn new(exchange: impl Exchange + 'static) -> Self {
+        let (rank, count) = (exchange.rank(), exchange.count());
+        Self { rank, count, exchange: Arc::new(Mutex::new(exchange)) }
+    }
+
+    /// The number of this rank, from 0.
+    pub fn rank(&self) -> usize {
+        self.rank
+    }
+
+    /// How many ranks there are.
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
+    /// Whether this is the rank that prints and writes.
+    pub fn is_first(&self) -> bool {
+        self.rank == 0
+    }
+
+    /// See [`Exchange::swap`].
+    pub fn swap(&self, messages: &[(usize, Vec<u64>)], from: &[(usize, usize)]) -> Vec<Vec<u64>> {
+        self.exchange().swap(messages, from)
+    }
+
+    /// See [`Exchange::gather`].
+    pub fn gather(&self, own: &[u64], counts: &[usize]) -> Vec<u64> {
+        self.exchange().gather(own, counts)
+    }
+
+    /// As many words of each rank, shape \[ranks\]\[N\].
+    pub fn each<const N: usize>(&self, own: [u64; N]) -> Vec<[u64; N]> {
+        let all = self.gather(&own, &vec![N; self.count]);
+        let of = |words: &[u64]| std::array::from_fn(|k| words[k]);
+        all.chunks_exact(N).map(of).collect()
+    }
+
+    /// The first rank's words, on all ranks.
+    pub fn of_first<const N: usize>(&self, own: [u64; N]) -> [u64; N] {
+        self.each(own).first().copied().unwrap_or(own)
+    }
+
+    /// Whether it is so on any rank.
+    pub fn any(&self, own: bool) -> bool {
+        self.each([u64::from(own)]).contains(&[1])
+    }
+
+    /// The largest of each of the numbers, none of which is NaN.
+    pub fn largest<const N: usize>(&self, own: [f64; N]) -> [f64; N] {
+        let all = self.each(own.map(f64::to_bits));
+        let largest = |k: usize| all.iter().map(|of| f64::from_bits(of[k])).fold(own[k], f64::max);
+        std::array::from_fn(largest)
+    }
+
+    /// The first rank whose words differ from the first rank's.
+    pub fn first_unlike<const N: usize>(&self, own: [u64; N]) -> Option<usize> {
+        let all = self.each(own);
+        all.iter().position(|one| Some(one) != all.first())
+    }
+
+    fn exchange(&self) -> MutexGuard<'_, dyn Exchange + 'static> {
+        self.exchange.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}

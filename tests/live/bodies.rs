@@ -1,0 +1,178 @@
+//! A body led by hand, cut and changed, and the scene that replays it.
+
+use std::ops::ControlFlow;
+
+use flockform::continuum::equilibrium::run_to_equilibrium;
+use flockform::continuum::plan::Plan;
+use flockform::engine::Engine;
+use flockform::live::body::Body;
+use flockform::live::command::Command;
+use flockform::scene::{Scene, bundled};
+
+fn begun(name: &'static str, set: &'static [&'static str]) -> Body {
+    let set: Vec<String> = set.iter().map(|&text| text.to_owned()).collect();
+    let load = move |more: &[String]| bundled(name).expect("bundled").load(&[&set[..], more].concat());
+    Body::new(Box::new(load), None).unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn ask(body: &mut Body, text: &str) {
+    let command = Command::parse(text).unwrap_or_else(|error| panic!("{text}: {error}"));
+    body.perform(0, &command).unwrap_or_else(|refused| panic!("{text}: {}", refused.0));
+}
+
+fn step(body: &mut Body, count: usize) {
+    (0..count).for_each(|_| body.advance().expect("goes on"));
+}
+
+/// The end of the run of a saved scene.
+fn replayed(text: &str) -> Engine {
+    let scene = Scene::parse("saved", "saved.toml", text, &[], None)
+        .unwrap_or_else(|error| panic!("{error}\n{text}"));
+    let plan = Plan::new(&scene).unwrap_or_else(|error| panic!("{error}"));
+    let outcome = run_to_equilibrium(&scene, plan, &mut |_, _| ControlFlow::Continue(()));
+    outcome.unwrap_or_else(|error| panic!("{error}")).engine
+}
+
+/// That a saved scene ends where the body is, bit by bit.
+fn assert_replays(body: &Body) {
+    let text = body.saved().expect("can be written");
+    let (now, then) = (body.engine(), replayed(&text));
+    assert_eq!(now.step(), then.step());
+    let bits = |engine: &Engine| -> Vec<[u64; 2]> {
+        engine.present().iter().map(|[x, y]| [x.to_bits(), y.to_bits()]).collect()
+    };
+    assert_eq!(now.roles(), then.roles());
+    assert_eq!(now.breaks(), then.breaks());
+    assert!(bits(now) == bits(&then), "the same positions to the last bit");
+}
+
+fn drag(body: &mut Body, particle: usize, by: [f64; 2], steps: usize) {
+    ask(body, &format!(r#"{{"do":"grab","particle":{particle}}}"#));
+    for k in 1..=steps {
+        let [x, y] = by.map(|along| along * k as f64 / steps as f64);
+        ask(body, &format!(r#"{{"do":"drag","by":[{x},{y}]}}"#));
+        step(body, 1);
+    }
+    ask(body, r#"{"do":"release"}"#);
+}
+
+#[test]
+fn a_dragged_leader_and_a_dragged_follower_are_replayed_to_the_bit() {
+    let mut body = begun("tension", &[]);
+    step(&mut body, 10);
+    // A leader of the tenth body column, with all that are led as it is.
+    let leader = (0..144).find(|&i| body.engine().roles()[i].name() == "leader").expect("led");
+    drag(&mut body, leader, [1.0 / 3.0, 0.7], 17);
+    step(&mut body, 9);
+    drag(&mut body, 66, [-0.4, 1.1], 12);
+    step(&mut body, 20);
+    assert!(
+        body.engine().displacement(66)[1] > 0.05,
+        "it has been moved: {:?}",
+        body.engine().displacement(66)
+    );
+    assert_replays(&body);
+}
+
+#[test]
+fn a_drag_from_the_very_beginning_and_one_under_way_are_replayed() {
+    let mut body = begun("tension", &[]);
+    drag(&mut body, 66, [0.3, 0.2], 5);
+    ask(&mut body, r#"{"do":"grab","particle":70,"alone":true}"#);
+    ask(&mut body, r#"{"do":"drag","by":[0.25,0.5]}"#);
+    step(&mut body, 3);
+    assert_replays(&body);
+}
+
+#[test]
+fn cuts_and_changed_keys_are_replayed_to_the_bit() {
+    let mut body = begun("tension", &[]);
+    step(&mut body, 25);
+    ask(&mut body, r#"{"do":"cut","from":[4.5,2.0],"to":[4.6,8.0]}"#);
+    assert!(body.engine().breaks().len() > 3, "{}", body.engine().breaks().len());
+    step(&mut body, 15);
+    ask(&mut body, r#"{"do":"set","key":"rule.feedback.factor","value":"-0.05"}"#);
+    ask(&mut body, r#"{"do":"set","key":"update.damping","value":"0.8"}"#);
+    step(&mut body, 15);
+    ask(&mut body, r#"{"do":"cut","from":[7.5,9.0],"to":[7.5,20.0]}"#);
+    step(&mut body, 5);
+    assert_replays(&body);
+}
+
+#[test]
+fn a_material_and_a_body_that_breaks_are_replayed_to_the_bit() {
+    let mut body = begun("beam-loaded", &[]);
+    step(&mut body, 30);
+    let free = body.engine().body().count() - 1;
+    drag(&mut body, free, [0.1, 0.3], 8);
+    ask(&mut body, r#"{"do":"set","key":"material.young","value":"2000.0"}"#);
+    step(&mut body, 30);
+    assert_replays(&body);
+
+    let mut body = begun("fracture", &[]);
+    step(&mut body, 40);
+    ask(&mut body, r#"{"do":"set","key":"fracture.distance","value":"1.9"}"#);
+    step(&mut body, 60);
+    assert_replays(&body);
+}
+
+#[test]
+fn an_undone_deed_leaves_nothing_behind() {
+    let mut body = begun("tension", &[]);
+    step(&mut body, 30);
+    let before = body.engine().present().clone();
+    ask(&mut body, r#"{"do":"cut","from":[4.5,2.0],"to":[4.6,8.0]}"#);
+    step(&mut body, 10);
+    drag(&mut body, 66, [1.0, 0.0], 5);
+    ask(&mut body, r#"{"do":"undo"}"#);
+    assert_eq!(body.engine().step(), 40);
+    ask(&mut body, r#"{"do":"set","key":"update.damping","value":"0.7"}"#);
+    assert_eq!(body.sets(), ["update.damping=0.7"]);
+    ask(&mut body, r#"{"do":"undo"}"#);
+    assert!(body.sets().is_empty());
+    ask(&mut body, r#"{"do":"undo"}"#);
+    assert_eq!((body.engine().step(), body.engine().breaks().len()), (30, 0));
+    assert!(*body.engine().present() == before);
+    step(&mut body, 10);
+    assert_replays(&body);
+    assert!(body.perform(0, &Command::Undo {}).is_err(), "nothing else was done");
+}
+
+#[test]
+fn keys_that_change_the_body_begin_anew_and_wrong_ones_change_nothing() {
+    let mut body = begun("tension", &[]);
+    step(&mut body, 5);
+    let layout = body.layout();
+    for (key, value) in [
+        ("update.damping", "-1.0"),
+        ("update.damping", "nan"),
+        ("rule.feedbak.factor", "1.0"),
+        ("lattice.spacing", "0.0"),
+        ("rule", "3"),
+        ("", "1"),
+        ("roles[99].from", "2"),
+    ] {
+        let command = Command::Set { key: key.into(), value: value.into() };
+        let refused = body.perform(0, &command).expect_err(key);
+        assert!(!refused.0.is_empty() && body.engine().step() == 5 && body.layout() == layout, "{key}");
+    }
+    ask(&mut body, r#"{"do":"set","key":"lattice.spacing","value":"0.5"}"#);
+    assert!(body.engine().step() == 0 && body.layout() != layout);
+    step(&mut body, 12);
+    assert_replays(&body);
+    ask(&mut body, r#"{"do":"undo"}"#);
+    assert!(body.engine().step() == 5 && body.layout() != layout, "the page has to be built anew once more");
+}
+
+#[test]
+fn hands_that_hold_nothing_or_the_frame_are_refused() {
+    let mut body = begun("tension", &[]);
+    let refused = |body: &mut Body, command: Command| body.perform(0, &command).expect_err("refused").0;
+    assert!(refused(&mut body, Command::Grab { particle: 0, alone: false }).contains("frame"));
+    assert!(refused(&mut body, Command::Grab { particle: 144, alone: false }).contains("no such particle"));
+    assert!(refused(&mut body, Command::Drag { by: [1.0, 0.0] }).contains("nothing is held"));
+    ask(&mut body, r#"{"do":"grab","particle":66}"#);
+    ask(&mut body, r#"{"do":"drag","by":[1e300,-1e300]}"#);
+    step(&mut body, 5);
+    assert!(body.engine().present().iter().all(|[x, y]| x.abs() < 1e4 && y.abs() < 1e4));
+}

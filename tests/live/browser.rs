@@ -1,0 +1,113 @@
+//! The live page in headless Chromium.
+
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::process::Command;
+
+use flockform::continuum::plan::Plan;
+use flockform::continuum::run::run;
+use flockform::scene::Scene;
+use flockform::scene::swarm::Swarm;
+use flockform::swarm::flight::Flight;
+use serde_json::{Value, json};
+
+use super::folders::temporary;
+use super::served::Served;
+
+fn tour(served: &Served, asked: &Value) -> Value {
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/live/tour.mjs");
+    let output = Command::new("node").arg(script).arg(&served.address).arg(asked.to_string()).output();
+    let output = output.expect("node starts");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{said}");
+    let seen: Value =
+        serde_json::from_slice(&output.stdout).unwrap_or_else(|error| panic!("{error}: {said}"));
+    println!("{}", seen["words"]);
+    println!("{}", seen["measured"]);
+    assert_eq!(seen["errors"], json!([]), "the console has no errors");
+    let (host, _) = served.parts();
+    let is_own = |url: &Value| {
+        let url = url.as_str().unwrap_or_default();
+        url.starts_with(&format!("http://{host}/")) || url.starts_with("data:")
+    };
+    assert!(seen["requests"].as_array().expect("listed").iter().all(is_own), "{}", seen["requests"]);
+    seen
+}
+
+/// That the page showed at the end what a replay of the saved file ends with, as single floats.
+fn assert_shown(seen: &Value, displacements: impl Iterator<Item = [f64; 2]>) {
+    for (i, u) in displacements.enumerate() {
+        for (axis, along) in u.into_iter().enumerate() {
+            let shown = seen["places"][axis][i].as_f64().expect("a number");
+            assert_eq!((shown as f32).to_bits(), (along as f32).to_bits(), "particle {i}");
+        }
+    }
+}
+
+#[test]
+#[ignore = "needs Chromium, Node, playwright-core and axe-core: see tests/browser/main.rs"]
+fn a_body_is_dragged_cut_undone_and_saved_while_another_viewer_looks_on() {
+    let folder = temporary();
+    let served = Served::scene("tension", &[], folder.path());
+    let asked = json!({
+        "name": "tension", "drag": 66, "cut": [[4.5, 2.0], [4.6, 8.0]], "key": "rule.feedback.factor=-0.05",
+    });
+    let seen = tour(&served, &asked);
+    let place =
+        |when: &str| -> Vec<f64> { serde_json::from_value(seen["dragged"][when].clone()).expect("two") };
+    assert!(place("after")[1] - place("before")[1] > 0.1, "{}", seen["dragged"]);
+    assert!(place("there")[1] - place("before")[1] > 0.05, "the other viewer sees it: {}", seen["dragged"]);
+    assert!(seen["broken"].as_u64() > Some(3), "{}", seen["broken"]);
+    let undone: Vec<f64> = serde_json::from_value(seen["undone"].clone()).expect("two");
+    assert!(undone[1] <= undone[0], "{undone:?}");
+    assert!(
+        seen["refused"].as_str().is_some_and(|words| words.contains("update.damping")),
+        "{}",
+        seen["refused"]
+    );
+    assert_eq!(seen["stepped"], 1.0);
+    let saved = Path::new(seen["saved"].as_str().expect("a path")).to_owned();
+    assert_eq!(saved, folder.path().join("tension_live.toml"));
+    let scene = Scene::from_file(&saved, &[]).unwrap_or_else(|error| panic!("{error}"));
+    let plan = Plan::new(&scene).unwrap_or_else(|error| panic!("{error}"));
+    let engine = run(plan, &mut |_, _| ControlFlow::Continue(())).engine;
+    assert_eq!(seen["clock"], engine.step() as f64);
+    assert!(!engine.breaks().is_empty());
+    assert_shown(&seen, (0..engine.body().count()).map(|i| engine.displacement(i)));
+}
+
+#[test]
+#[ignore = "needs Chromium, Node, playwright-core and axe-core: see tests/browser/main.rs"]
+fn a_leader_is_dragged_and_a_robot_killed_and_the_flight_saved() {
+    let folder = temporary();
+    let served = Served::swarm("square", folder.path());
+    let seen = tour(&served, &json!({ "name": "square", "drag": 0, "fault": 12 }));
+    assert_eq!(seen["hurt"], json!([[12, "dead"]]));
+    let saved = Path::new(seen["saved"].as_str().expect("a path")).to_owned();
+    let swarm = Swarm::from_file(&saved, &[]).unwrap_or_else(|error| panic!("{error}"));
+    assert!(swarm.raw.flight.commands.iter().filter(|one| one.after > 0).count() > 3);
+    let mut flight = Flight::new(&swarm).unwrap_or_else(|error| panic!("{error}"));
+    (0..flight.periods()).for_each(|_| flight.step());
+    assert_eq!(seen["clock"], flight.fleet().time());
+    let places = flight.control().formation().places.clone();
+    let moved = flight.fleet().places();
+    assert_shown(&seen, moved.iter().zip(places.iter()).map(|([x, y], [px, py])| [x - px, y - py]));
+}
+
+#[test]
+#[ignore = "needs Chromium, Node, playwright-core and axe-core, and prints frames a second: see tests/browser/main.rs"]
+fn frames_a_second_of_ten_thousand_and_a_hundred_thousand_particles_are_measured() {
+    for (name, rows) in [("10^4", 100), ("10^5", 316)] {
+        let folder = temporary();
+        let set = [
+            format!("body.shape={{ kind = \"grid\", columns = {rows}, rows = {rows} }}"),
+            "record={}".to_owned(),
+        ];
+        let served = Served::scene("shear", &set, folder.path());
+        println!("{name} particles:");
+        for quantity in ["role", "pe1"] {
+            let seen = tour(&served, &json!({ "name": name, "frames": 6000, "quantity": quantity }));
+            assert!(seen["measured"]["rate"].as_f64() > Some(0.0), "{}", seen["measured"]);
+        }
+    }
+}

@@ -1,0 +1,59 @@
+//! A session served in this process, for the tests of viewers.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+
+use flockform::live::body::Body;
+use flockform::live::server::Server;
+use flockform::live::session::Session;
+use flockform::live::swarm::Swarm;
+use flockform::scene::bundled::{bundled, bundled_swarm};
+
+/// A server that ends with the value.
+pub struct Served {
+    pub address: String,
+    stop: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Served {
+    pub fn scene(name: &'static str, set: &[String], folder: &Path) -> Self {
+        let set = set.to_vec();
+        let load = move |more: &[String]| bundled(name).expect("bundled").load(&[&set[..], more].concat());
+        let body = Body::new(Box::new(load), None).unwrap_or_else(|error| panic!("{error}"));
+        Self::session(Session::Body(Box::new(body)), folder)
+    }
+
+    pub fn swarm(name: &'static str, folder: &Path) -> Self {
+        let load = move |more: &[String]| bundled_swarm(name).expect("bundled").load_swarm(more);
+        let swarm = Swarm::new(Box::new(load)).unwrap_or_else(|error| panic!("{error}"));
+        Self::session(Session::Swarm(Box::new(swarm)), folder)
+    }
+
+    fn session(session: Session, folder: &Path) -> Self {
+        let server = Server::open(None).expect("a free port");
+        let (address, folder) = (server.address(), folder.to_owned());
+        let stop = Arc::new(AtomicBool::new(false));
+        let stopped = Arc::clone(&stop);
+        let serve = move || server.serve(session, folder, &stopped).expect("serves");
+        Self { address, stop, thread: Some(std::thread::spawn(serve)) }
+    }
+
+    /// Host with port, and token.
+    pub fn parts(&self) -> (String, String) {
+        let rest = self.address.strip_prefix("http://").expect("an address");
+        let (host, token) = rest.split_once("/?token=").expect("with a token");
+        (host.to_owned(), token.to_owned())
+    }
+}
+
+impl Drop for Served {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}

@@ -1,0 +1,195 @@
+// Does in a live page what a hand does, and says as JSON what there was to see.
+//
+//   node tour.mjs ADDRESS '{"drag": 66, "cut": [[4.5, 2], [4.6, 8]], "key": "rule.feedback.factor=-0.05"}'
+//
+// `drag` numbers the particle that is dragged, `cut` has the ends of a cut, `key` is a key to change, `fault` the robot that is
+// killed, `frames` for how many milliseconds the frames are counted. FLOCKFORM_NODE_MODULES is a folder with
+// playwright-core and axe-core, FLOCKFORM_PICTURES one for screenshots.
+
+import { createRequire } from "node:module";
+import { mkdtempSync, readFileSync, rmSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join, resolve } from "node:path";
+
+const modules = join(resolve(process.env.FLOCKFORM_NODE_MODULES ?? "node_modules"), "/");
+const { chromium } = createRequire(modules)("playwright-core");
+const axe = readFileSync(join(modules, "axe-core/axe.min.js"), "utf8");
+const [address, asked] = [process.argv[2], JSON.parse(process.argv[3] ?? "{}")];
+const pictures = process.env.FLOCKFORM_PICTURES;
+
+const FLAGS = [
+  "--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking",
+  "--disable-component-update", "--disable-sync", "--enable-unsafe-swiftshader",
+];
+
+const seen = { errors: [], requests: [], faults: [] };
+
+const mark = (what) => process.env.FLOCKFORM_MARKS && console.error(Math.round(performance.now()), what);
+
+async function open(context) {
+  const page = await context.newPage();
+  page.setDefaultTimeout(60_000);
+  page.on("console", (message) => message.type() === "error" && seen.errors.push(message.text()));
+  page.on("pageerror", (error) => seen.errors.push(error.message));
+  page.on("request", (request) => seen.requests.push(request.url()));
+  await page.goto(address);
+  await page.waitForSelector("body[data-live=open]");
+  await page.waitForFunction(() => window.report.live.session.frame);
+  return page;
+}
+
+const clock = (page) => page.evaluate(() => window.report.bodies[0].animation.times[0]);
+// By the clock: a page in the background is not refreshed.
+const later = (page, than) =>
+  page.waitForFunction((t) => window.report.bodies[0].animation.times[0] > t, than, { polling: 20 });
+// Once the session stands still and its last state is drawn.
+const settled = (page) =>
+  page.waitForFunction(() => {
+    const { status } = window.report.live.session;
+    return !status.playing && window.report.bodies[0].animation.times[0] === status.clock;
+  }, undefined, { polling: 20 });
+// Once the dragged particle is higher than this: a hand that still holds it keeps it there.
+const lifted = (page, above) =>
+  page.waitForFunction(([k, y]) => window.report.bodies[0].dy[k] > y, [asked.drag, above], { polling: 20 });
+const place = (page, i) => page.evaluate((k) => [window.report.bodies[0].dx[k], window.report.bodies[0].dy[k]], i);
+
+async function shoot(page, name) {
+  if (pictures) await page.screenshot({ path: join(pictures, `${name}.png`), fullPage: true });
+}
+
+// Where a place of the body, or a particle, is on the screen.
+const onScreen = (page, what) =>
+  page.evaluate((at) => {
+    const [view] = window.report.views;
+    const box = view.box.getBoundingClientRect();
+    const [x, y] = typeof at === "number" ? view.at(at) : view.place(at);
+    return [box.left + x, box.top + y];
+  }, what);
+
+async function drag(page, other) {
+  await page.locator(".canvas").scrollIntoViewIfNeeded();
+  const before = await place(page, asked.drag);
+  const [x, y] = await onScreen(page, asked.drag);
+  await page.mouse.move(x, y);
+  await page.mouse.down();
+  for (let k = 1; k <= 12; k++) {
+    await page.mouse.move(x + 4 * k, y - 3 * k);
+    await later(page, await clock(page));
+  }
+  await lifted(page, before[1] + 0.11);
+  await lifted(other, before[1] + 0.06);
+  seen.dragged = { before, after: await place(page, asked.drag), there: await place(other, asked.drag) };
+  await shoot(page, `${asked.name}-drag`);
+  await page.mouse.up();
+}
+
+async function cut(page) {
+  await page.check("input[name=tool][value=cut]");
+  const [from, to] = [await onScreen(page, asked.cut[0]), await onScreen(page, asked.cut[1])];
+  await page.mouse.move(...from);
+  await page.mouse.down();
+  await page.mouse.move((from[0] + to[0]) / 2, (from[1] + to[1]) / 2, { steps: 4 });
+  await page.mouse.move(...to, { steps: 4 });
+  await page.mouse.up();
+  await page.waitForFunction(() => window.report.bodies[0].brokenBonds() > 0);
+  seen.broken = await page.evaluate(() => window.report.bodies[0].brokenBonds());
+  await page.check("input[name=tool][value=drag]");
+}
+
+async function undo(page) {
+  const before = await page.evaluate(() => window.report.live.session.status.clock);
+  await page.click("#live-undo");
+  await page.waitForFunction(() => window.report.bodies[0].brokenBonds() === 0);
+  await settled(page);
+  seen.undone = [before, await clock(page)];
+}
+
+async function set(page) {
+  await page.fill("#live-key", "update.damping=-1");
+  await page.press("#live-key", "Enter");
+  await page.waitForFunction(() => document.getElementById("live-words").textContent.includes("update.damping"));
+  seen.refused = await page.textContent("#live-words");
+  await page.fill("#live-key", asked.key);
+  await page.press("#live-key", "Enter");
+  await page.waitForFunction((key) => window.report.live.session.status.sets.includes(key), asked.key);
+}
+
+async function fault(page) {
+  // A robot that flies is gone from where it was seen.
+  await page.click("#play");
+  await settled(page);
+  await page.locator(".canvas").scrollIntoViewIfNeeded();
+  const [x, y] = await onScreen(page, asked.fault);
+  await page.mouse.click(x, y);
+  await page.selectOption("#live-fault", "dead");
+  await page.waitForFunction(() => window.report.live.session.status.faults.length > 0);
+  seen.hurt = await page.evaluate(() => window.report.live.session.status.faults);
+  await page.click("#play");
+  await page.fill("#live-key", "flight.noise=0.02");
+  await page.press("#live-key", "Enter");
+  await later(page, (await clock(page)) + 0.5);
+  seen.alarms = await page.$$eval("#live-alarms li", (items) => items.map((item) => item.textContent));
+}
+
+async function pause(page) {
+  await page.click("#play");
+  await settled(page);
+  const before = await clock(page);
+  await page.click("#forth");
+  await later(page, before);
+  await settled(page);
+  seen.stepped = (await clock(page)) - before;
+}
+
+async function save(page) {
+  await page.click("#live-save");
+  await page.waitForSelector("body[data-saved]");
+  seen.saved = await page.evaluate(() => document.body.dataset.saved);
+  seen.clock = await clock(page);
+  seen.places = await page.evaluate(() => [[...window.report.bodies[0].dx], [...window.report.bodies[0].dy]]);
+}
+
+const profile = mkdtempSync(join(tmpdir(), "flockform-live-"));
+const executablePath = process.env.FLOCKFORM_CHROMIUM ?? "/usr/bin/chromium";
+const options = { executablePath, args: FLAGS, headless: true, viewport: { width: 1280, height: 1000 } };
+const context = await chromium.launchPersistentContext(profile, options);
+try {
+  const other = await open(context);
+  const page = await open(context);
+  await page.bringToFront();
+  await page.click("#play");
+  await later(page, 0);
+  if (asked.frames) {
+    await page.selectOption("#quantity", asked.quantity ?? "role");
+    await page.waitForTimeout(asked.frames);
+    await page.waitForFunction(() => window.report.live.measured.rate > 0);
+    const measured = await page.evaluate(() => ({ ...window.report.live.measured, rates: window.report.live.session.status.rates }));
+    seen.measured = measured;
+    await shoot(page, `${asked.name}-frames`);
+  }
+  mark("playing");
+  if (asked.drag !== undefined) await drag(page, other);
+  mark("dragged");
+  if (asked.cut) {
+    await cut(page);
+    mark("cut");
+    await shoot(page, `${asked.name}-cut`);
+    await undo(page);
+    mark("undone");
+    await page.click("#play");
+    await cut(page);
+    await later(page, (await clock(page)) + 20);
+    await shoot(page, `${asked.name}-torn`);
+  }
+  if (asked.key) await set(page);
+  if (asked.fault !== undefined) await fault(page);
+  await shoot(page, `${asked.name}-end`);
+  await pause(page);
+  await save(page);
+  await page.addScriptTag({ content: axe }).catch(() => {});
+  seen.words = await page.textContent("#loading");
+  console.log(JSON.stringify(seen));
+} finally {
+  await context.close();
+  rmSync(profile, { recursive: true, force: true });
+}

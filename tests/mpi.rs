@@ -1,0 +1,290 @@
+//! The program under `mpirun`: the files of a run are those of a run alone, whatever happens on the way.
+//!
+//! Needs `mpirun` of the MPI that the program is built with, and a build with the feature `mpi`.
+
+#![cfg(all(feature = "cli", feature = "mpi"))]
+
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
+use std::sync::mpsc;
+use std::time::{Duration, Instant};
+
+use command::{flockform, text};
+use flockform::Engine;
+use flockform::continuum::digest::digest;
+use flockform::continuum::plan::Plan;
+use flockform::engine::state::EngineState;
+use flockform::export::checkpoint::{Checkpoint, RunRequest};
+use flockform::scene::bundled;
+use folders::{files, names_in, temporary};
+use running::Running;
+use signals::signal;
+use waits::within;
+
+#[path = "common/command.rs"]
+mod command;
+#[path = "common/folders.rs"]
+mod folders;
+#[path = "common/json.rs"]
+mod json;
+#[path = "common/running.rs"]
+#[allow(dead_code, reason = "a launcher is not asked to end")]
+mod running;
+#[path = "common/signals.rs"]
+mod signals;
+#[path = "common/waits.rs"]
+mod waits;
+
+const PROGRAM: &str = env!("CARGO_BIN_EXE_flockform");
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// The program on so many ranks, more than there may be cores, as the user that runs the tests.
+fn mpirun(ranks: usize, arguments: &[&str], folder: &Path) -> Command {
+    let mut command = Command::new("mpirun");
+    command.args(["-n", &ranks.to_string(), PROGRAM]).args(arguments);
+    command.current_dir(folder).env_remove("RUST_LOG");
+    // Open MPI's; MPICH asks for none of it.
+    for (name, value) in [
+        ("OMPI_ALLOW_RUN_AS_ROOT", "1"),
+        ("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1"),
+        ("OMPI_MCA_rmaps_base_oversubscribe", "1"),
+        ("OMPI_MCA_mpi_yield_when_idle", "1"),
+    ] {
+        command.env(name, value);
+    }
+    command.stdout(Stdio::piped()).stderr(Stdio::piped());
+    command
+}
+
+/// Waits for the program on ranks, which may be waiting for each other.
+fn on_ranks(ranks: usize, arguments: &[&str], folder: &Path) -> Output {
+    let run = mpirun(ranks, arguments, folder).spawn().expect("mpirun is installed");
+    let (process, (done, output)) = (run.id(), mpsc::channel());
+    std::thread::spawn(move || done.send(run.wait_with_output()));
+    match output.recv_timeout(2 * PATIENCE) {
+        Ok(output) => output.expect("readable"),
+        Err(_) => {
+            signal("TERM", process);
+            panic!("{arguments:?} on {ranks} ranks: not within {:?}", 2 * PATIENCE);
+        }
+    }
+}
+
+/// The files of a run, by their path in its folder; of the summary, what does not depend on the clock or on how the work
+/// was shared. The report embeds the summary.
+fn contents(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
+    let read = |path: PathBuf| {
+        let mut bytes = std::fs::read(&path).expect("readable");
+        if path.ends_with("summary.json") {
+            let mut summary = json::json(&text(&bytes));
+            summary["timings"] = serde_json::Value::Null;
+            summary["share_swept"] = serde_json::Value::Null;
+            bytes = summary.to_string().into_bytes();
+        }
+        (path.strip_prefix(folder).expect("below it").to_owned(), bytes)
+    };
+    let mut found: Vec<_> =
+        files(folder).into_iter().filter(|path| !path.ends_with("report.html")).map(read).collect();
+    found.sort();
+    found
+}
+
+fn assert_same(found: &Path, expected: &Path, what: &str) {
+    let (found, expected) = (contents(found), contents(expected));
+    let names = |all: &[(PathBuf, Vec<u8>)]| all.iter().map(|(path, _)| path.clone()).collect::<Vec<_>>();
+    assert_eq!(names(&found), names(&expected), "{what}");
+    for ((path, bytes), (_, of_one)) in found.iter().zip(&expected) {
+        assert!(bytes == of_one, "{what}: {} differs", path.display());
+    }
+}
+
+fn assert_ends_well(output: &Output, what: &str) {
+    assert!(output.status.success(), "{what}: {}", text(&output.stderr));
+}
+
+#[test]
+#[ignore = "needs mpirun"]
+fn a_run_on_ranks_writes_the_files_of_a_run_alone() {
+    let folder = temporary();
+    let scenes: [(&str, &[&str]); 6] = [
+        ("tension", &["--set", "record.vtk_every=20"]),
+        ("tension-immediate", &[]),
+        ("feedback-oscillate", &[]),
+        ("fracture", &["--steps", "80"]),
+        ("lattice-honeycomb", &[]),
+        ("shear", &["--steps", "60"]),
+    ];
+    for (name, more) in scenes {
+        let alone = folder.path().join(format!("{name}-alone"));
+        let arguments = |out: &Path| {
+            let out = out.display().to_string();
+            let fixed = ["run", name, "--figures", "none", "--out"].map(str::to_owned);
+            fixed.into_iter().chain([out]).chain(more.iter().map(|&one| one.to_owned())).collect::<Vec<_>>()
+        };
+        let words = arguments(&alone);
+        let words: Vec<&str> = words.iter().map(String::as_str).collect();
+        assert_ends_well(&flockform(&words, folder.path()), name);
+        for ranks in [2, 4] {
+            let shared = folder.path().join(format!("{name}-{ranks}"));
+            let words = arguments(&shared);
+            let words: Vec<&str> = words.iter().map(String::as_str).collect();
+            let output = on_ranks(ranks, &words, folder.path());
+            assert_ends_well(&output, name);
+            assert_same(&shared, &alone, &format!("{name} on {ranks} ranks"));
+            let said = text(&output.stdout);
+            assert_eq!(said.matches("results in").count(), 1, "only one rank speaks: {said}");
+        }
+    }
+}
+
+#[test]
+#[ignore = "needs mpirun"]
+fn what_is_wrong_is_said_once_and_nothing_is_left() {
+    for (arguments, words) in [
+        (vec!["run", "tensio"], "no bundled scene"),
+        (vec!["run", "tension", "--set", "rule.mean.kind=x"], "rule.mean"),
+        (vec!["run", "tension", "--set", "update.order=sequential"], "cannot be shared by ranks"),
+        (vec!["run", "beam-loaded"], "no solver yet"),
+        (vec!["compare", "beam"], "`compare` runs on one"),
+        (vec!["run", "tension", "--out", "/proc/none"], "/proc/none"),
+    ] {
+        let folder = temporary();
+        let start = Instant::now();
+        let output = on_ranks(4, &arguments, folder.path());
+        let said = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {said}");
+        assert_eq!(said.matches("error: ").count(), 1, "{arguments:?}: {said}");
+        assert!(said.contains(words), "{arguments:?}: {said}");
+        assert!(names_in(folder.path()).is_empty(), "{arguments:?}");
+        assert!(start.elapsed() < PATIENCE, "{arguments:?}");
+    }
+}
+
+/// Leaves what a run that was killed after so many steps leaves, and returns the words that go on with it.
+fn killed(folder: &Path, out: &'static str, steps: usize) -> [&'static str; 3] {
+    let scene = bundled("tension").expect("bundled").load(&[]).expect("valid");
+    let plan = Plan::new(&scene).expect("fits");
+    let sum = digest(&plan);
+    let mut engine = Engine::new(plan.setup);
+    (0..steps).for_each(|_| engine.advance());
+    let asked = RunRequest { scene: "tension".into(), set: Vec::new(), force: false };
+    let state = (EngineState::of(&engine), f64::INFINITY);
+    let left = Checkpoint::new((&asked, &scene, sum), state, (&[], &[], &[], None), Duration::ZERO);
+    let folder = folder.join(out);
+    std::fs::create_dir(&folder).expect("a folder");
+    left.write(&folder).expect("written");
+    ["run", "--resume", out]
+}
+
+#[test]
+#[ignore = "needs mpirun"]
+fn ranks_that_are_to_make_different_runs_are_refused() {
+    let folder = temporary();
+    let resumed = [killed(folder.path(), "p", 10), killed(folder.path(), "q", 20)];
+    let before = names_in(folder.path());
+    let set = |words: &'static str| ["run", "tension", "--set", words];
+    for [first, second] in [
+        // A frame is no part of the planned body.
+        [&set("frame=mirror")[..], &set("frame=immediate")],
+        [&set("lattice.spacing=0.5"), &set("lattice.spacing=0.25")],
+        [&resumed[0], &resumed[1]],
+        [&["run", "tension"], &resumed[0]],
+    ] {
+        let both = [first, &[":", "-n", "1", PROGRAM], second].concat();
+        let output = on_ranks(1, &both, folder.path());
+        let said = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{both:?}: {said}");
+        assert!(said.contains("rank 1 is to make another run than rank 0"), "{both:?}: {said}");
+        assert_eq!(names_in(folder.path()), before, "{both:?}");
+    }
+}
+
+/// A run that is looked at after each of its steps, which take a while on ranks, with checkpoints.
+const LONG: [&str; 12] = [
+    "run",
+    "tension",
+    "--out",
+    "o",
+    "--no-report",
+    "--figures",
+    "none",
+    "--steps",
+    "1500",
+    "--checkpoint-every",
+    "100steps",
+    "--quiet",
+];
+
+/// The long run alone, in a folder of its own.
+fn long_alone() -> tempfile::TempDir {
+    let folder = temporary();
+    assert_ends_well(&flockform(&LONG, folder.path()), "alone");
+    folder
+}
+
+/// The long run on ranks that has kept a checkpoint, and the process ids of the ranks; so that it does not end before
+/// it is told to, one rank is frozen, for which the others wait.
+fn begun(ranks: usize, frozen: usize, folder: &Path) -> (Running, Vec<u32>) {
+    let run = Running(mpirun(ranks, &LONG, folder).spawn().expect("mpirun is installed"));
+    let found = || Some(ranks_of(&run.0)).filter(|found| found.len() == ranks);
+    let processes = within(PATIENCE, "all ranks", found);
+    let checkpoint = folder.join("o.unfinished/checkpoint");
+    within(PATIENCE, "a checkpoint", || checkpoint.exists().then_some(()));
+    signal("STOP", processes[frozen]);
+    (run, processes)
+}
+
+/// Process ids of the ranks.
+fn ranks_of(mpirun: &Child) -> Vec<u32> {
+    let children = |parent: u32| -> Vec<u32> {
+        let output = Command::new("ps").args(["--ppid", &parent.to_string(), "-o", "pid="]).output();
+        let output = text(&output.expect("ps runs").stdout);
+        output.split_whitespace().filter_map(|word| word.parse().ok()).collect()
+    };
+    let is_rank = |&process: &u32| {
+        let file = std::fs::read_link(format!("/proc/{process}/exe")).unwrap_or_default();
+        file == Path::new(PROGRAM)
+    };
+    // MPICH has a process of its own in between.
+    let first = children(mpirun.id());
+    let second: Vec<u32> = first.iter().flat_map(|&process| children(process)).collect();
+    first.into_iter().chain(second).filter(is_rank).collect()
+}
+
+#[test]
+#[ignore = "needs mpirun"]
+fn a_killed_rank_ends_the_run_which_goes_on_with_any_number_of_ranks() {
+    let expected = long_alone();
+    for victim in 0..3 {
+        let folder = temporary();
+        let (mut run, ranks) = begun(3, (victim + 1) % 3, folder.path());
+        signal("KILL", ranks[victim]);
+        let status = within(PATIENCE, "mpirun ends", || run.0.try_wait().expect("a child"));
+        assert!(!status.success(), "{status}");
+        assert!(folder.path().join("o.unfinished/checkpoint").exists(), "the last checkpoint stays");
+        let resume = ["run", "--resume", "o", "--no-report", "--figures", "none", "--quiet"];
+        let output = match victim {
+            0 => flockform(&resume, folder.path()),
+            _ => on_ranks(victim + 1, &resume, folder.path()),
+        };
+        assert_ends_well(&output, "resumed");
+        assert_same(&folder.path().join("o"), &expected.path().join("o"), &format!("rank {victim} killed"));
+    }
+}
+
+#[test]
+#[ignore = "needs mpirun"]
+fn an_interrupt_of_one_rank_ends_all_at_one_step_from_which_the_run_goes_on() {
+    let expected = long_alone();
+    let folder = temporary();
+    let (mut run, ranks) = begun(3, 1, folder.path());
+    // It is not told by the launcher, which would kill what takes longer than it likes.
+    signal("TERM", ranks[1]);
+    signal("CONT", ranks[1]);
+    let status = within(PATIENCE, "mpirun ends", || run.0.try_wait().expect("a child"));
+    assert!(!status.success(), "{status}");
+    assert!(folder.path().join("o/summary.json").exists(), "the first rank writes what there is");
+    let resume = ["run", "--resume", "o", "--no-report", "--figures", "none", "--quiet"];
+    assert_ends_well(&on_ranks(2, &resume, folder.path()), "resumed");
+    assert_same(&folder.path().join("o"), &expected.path().join("o"), "interrupted");
+}

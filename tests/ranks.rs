@@ -1,0 +1,330 @@
+//! A body that ranks share ends with the bits that it has alone, for any number of ranks.
+
+use std::ops::ControlFlow;
+use std::thread;
+
+use flockform::continuum::plan::Plan;
+use flockform::continuum::run::{Outcome, SharedError, require_shareable, run_shared, run_watched};
+use flockform::continuum::shares::{Exchanged, Shares};
+use flockform::engine::Engine;
+use flockform::engine::observer::Observer;
+use flockform::engine::shared::NotShared;
+use flockform::engine::state::EngineState;
+use flockform::flock::vectors::Vectors;
+use flockform::ranks::{Exchange, Team, in_process};
+use flockform::scene::Scene;
+
+use scenes::{load, planned};
+
+#[path = "common/scenes.rs"]
+mod scenes;
+
+/// Everything that a run leaves, to the bit.
+#[derive(Clone, Debug, PartialEq)]
+struct End {
+    step: usize,
+    reason: String,
+    places: Vec<u64>,
+    residual: u64,
+    breaks: String,
+    roles: String,
+    /// Steps that were looked at, and a hash of all places at each.
+    seen: Vec<(usize, u64)>,
+}
+
+impl End {
+    fn of(outcome: &Outcome, seen: Vec<(usize, u64)>) -> Self {
+        let engine = &outcome.engine;
+        let energies = (0..engine.body().count()).flat_map(|i| [engine.pe1(i), engine.pe2(i)]);
+        let places = bits(engine.present()).chain(bits(engine.previous()));
+        Self {
+            step: engine.step(),
+            reason: format!("{:?}", outcome.reason),
+            places: places.chain(energies.map(f64::to_bits)).collect(),
+            residual: outcome.residual.to_bits(),
+            breaks: format!("{:?}", engine.breaks()),
+            roles: format!("{:?}", engine.roles()),
+            seen,
+        }
+    }
+}
+
+fn bits(points: &Vectors) -> impl Iterator<Item = u64> + '_ {
+    points.x.iter().chain(&points.y).map(|value| value.to_bits())
+}
+
+/// Looks every so many steps, and keeps the state at one of them.
+struct Looks {
+    every: usize,
+    keep_at: Option<usize>,
+    seen: Vec<(usize, u64)>,
+    kept: Option<(EngineState, f64)>,
+}
+
+impl Looks {
+    fn every(every: usize) -> Self {
+        Self { every, keep_at: None, seen: Vec::new(), kept: None }
+    }
+}
+
+impl Observer for Looks {
+    fn next(&mut self, step: usize) -> usize {
+        (step / self.every + 1) * self.every
+    }
+
+    fn see(&mut self, engine: &Engine, residual: f64) -> ControlFlow<()> {
+        let hash = bits(engine.present()).fold(0, |hash: u64, bits| hash.rotate_left(7) ^ bits);
+        self.seen.push((engine.step(), hash));
+        if self.keep_at == Some(engine.step()) {
+            self.kept = Some((EngineState::of(engine), residual));
+            return ControlFlow::Break(());
+        }
+        ControlFlow::Continue(())
+    }
+}
+
+/// The results of `work` on each of so many ranks, in order.
+fn on_ranks<T: Send>(count: usize, work: impl Fn(Team) -> T + Sync) -> Vec<T> {
+    thread::scope(|scope| {
+        let ranks: Vec<_> = in_process(count).into_iter().map(|team| scope.spawn(|| work(team))).collect();
+        ranks.into_iter().map(|rank| rank.join().expect("no rank panics")).collect()
+    })
+}
+
+fn alone(scene: &Scene, every: usize) -> End {
+    let mut looks = Looks::every(every);
+    let outcome = run_watched(planned(scene), &mut looks);
+    End::of(&outcome, looks.seen)
+}
+
+fn shared(plan: &Plan, every: usize, ranks: usize) -> Vec<End> {
+    on_ranks(ranks, |team| {
+        // Only the first rank's looks count.
+        let mut looks = Looks::every(if team.is_first() { every } else { 1 });
+        let outcome = run_shared(plan.clone(), None, &team, &mut looks).expect("can be shared");
+        End::of(&outcome, looks.seen)
+    })
+}
+
+fn assert_same(name: &str, sets: &[&str], every: usize) {
+    let scene = load(name, sets);
+    let (plan, expected) = (planned(&scene), alone(&scene, every));
+    assert!(expected.step > 5, "{name}: something happens");
+    for ranks in 1..=7 {
+        for (rank, end) in shared(&plan, every, ranks).into_iter().enumerate() {
+            let what = format!("{name} {sets:?}, rank {rank} of {ranks}");
+            assert_eq!((end.step, &end.reason), (expected.step, &expected.reason), "{what}");
+            assert_eq!(end.seen, expected.seen, "{what}");
+            assert!(end == expected, "{what}");
+        }
+    }
+}
+
+#[test]
+fn sweeps_of_a_barycentre_with_leaders_that_let_go_have_the_same_bits_on_any_number_of_ranks() {
+    assert_same("tension", &["stop.steps=60", "frame=\"none\"", "record.probes=[]"], 25);
+    assert_same("tension", &["stop.steps=60"], 7);
+}
+
+#[test]
+fn frames_that_look_after_the_sweep_feedback_and_the_poisson_term_too() {
+    assert_same("tension-immediate", &["stop.steps=45"], 20);
+    assert_same("feedback-oscillate", &["stop.steps=45"], 20);
+    assert_same("poisson-term", &["stop.steps=45"], 20);
+}
+
+#[test]
+fn means_without_rows_and_weights_of_distance_too() {
+    assert_same("power-mean", &["stop.steps=30"], 10);
+    assert_same("distance-weights", &["stop.steps=30"], 10);
+}
+
+#[test]
+fn materials_and_neighbours_found_anew_too() {
+    assert_same("shear", &["stop.steps=40"], 15);
+    assert_same("notched-plate", &["stop.steps=40"], 15);
+    assert_same("drop", &["stop.steps=12"], 5);
+}
+
+#[test]
+fn cracks_run_the_same_way_on_any_number_of_ranks() {
+    assert_same("fracture", &["stop.steps=60"], 20);
+    assert_same("fracture-hexagonal", &["stop.steps=60"], 20);
+}
+
+#[test]
+fn every_lattice_settles_at_the_same_step() {
+    for lattice in ["square", "rectangular", "centred-rectangular", "hexagonal", "oblique", "honeycomb"] {
+        assert_same(&format!("lattice-{lattice}"), &[], 1 << 20);
+    }
+}
+
+#[test]
+fn a_divergence_is_seen_at_the_same_step_and_taken_back() {
+    let scene = load("feedback-grow", &["stop.divergence_ratio=1.01"]);
+    let expected = alone(&scene, 1 << 20);
+    assert!(expected.reason.starts_with("Diverged"), "{}", expected.reason);
+    for ranks in [2, 5] {
+        assert!(shared(&planned(&scene), 1 << 20, ranks).iter().all(|end| *end == expected), "{ranks} ranks");
+    }
+}
+
+/// Large enough for several steps together: halos of several bands, over several bands of each rank.
+#[test]
+fn many_steps_together_with_halos_of_many_bands_have_the_same_bits() {
+    let body = [
+        "body.shape.columns=220",
+        "body.shape.rows=40",
+        "record.probes=[]",
+        "record.figures=[]",
+        "stop.steps=150",
+    ];
+    for frame in ["frame=\"none\"", "frame=\"lagged\""] {
+        let sets: Vec<&str> = body.into_iter().chain([frame]).collect();
+        let scene = load("tension", &sets);
+        let expected = alone(&scene, 64);
+        for ranks in [2, 3, 5] {
+            let ends = shared(&planned(&scene), 64, ranks);
+            assert!(ends.iter().all(|end| *end == expected), "{frame}, {ranks} ranks");
+        }
+    }
+}
+
+#[test]
+fn a_run_goes_on_with_another_number_of_ranks() {
+    for (name, at) in [("tension", 23), ("fracture", 40)] {
+        let scene = load(name, &["stop.steps=60"]);
+        let (plan, expected) = (planned(&scene), alone(&scene, 1));
+        let kept = on_ranks(3, |team| {
+            let mut looks = Looks { keep_at: Some(at).filter(|_| team.is_first()), ..Looks::every(1) };
+            let outcome = run_shared(plan.clone(), None, &team, &mut looks).expect("can be shared");
+            assert_eq!((outcome.engine.step(), outcome.reason.name()), (at, "interrupted"));
+            looks.kept
+        });
+        let from = kept.into_iter().flatten().next().expect("came that far");
+        for ranks in [1, 2, 4] {
+            let ends = on_ranks(ranks, |team| {
+                let mut looks = Looks::every(1);
+                let outcome = run_shared(plan.clone(), Some(from.clone()), &team, &mut looks);
+                End::of(&outcome.expect("can be shared"), Vec::new())
+            });
+            let expected = End { seen: Vec::new(), ..expected.clone() };
+            assert!(ends.iter().all(|end| *end == expected), "{name} on {ranks} ranks");
+        }
+    }
+}
+
+#[test]
+fn any_rank_can_break_the_run_off_and_all_end_at_the_same_step() {
+    struct Impatient(bool);
+    impl Observer for Impatient {
+        fn next(&mut self, step: usize) -> usize {
+            step + 4
+        }
+
+        fn see(&mut self, engine: &Engine, _: f64) -> ControlFlow<()> {
+            if self.0 && engine.step() >= 10 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        }
+    }
+    let plan = planned(&load("tension", &[]));
+    let ends = on_ranks(4, |team| {
+        let outcome = run_shared(plan.clone(), None, &team, &mut Impatient(team.rank() == 2));
+        let outcome = outcome.expect("can be shared");
+        (outcome.engine.step(), outcome.reason.name())
+    });
+    assert_eq!(ends, [(12, "interrupted"); 4]);
+}
+
+#[test]
+fn what_ranks_cannot_share_is_refused_by_name() {
+    let sequential = load("tension", &["update.order=sequential"]);
+    let refused = require_shareable(&sequential).expect_err("sequential").to_string();
+    assert!(
+        refused.contains("update.order") && refused.contains("one particle after the other"),
+        "{refused}"
+    );
+    let plan = planned(&sequential);
+    let refusals = on_ranks(2, |team| run_shared(plan.clone(), None, &team, &mut Looks::every(1)).err());
+    assert!(refusals.iter().all(|one| *one == Some(SharedError::Sweep(NotShared))), "{refusals:?}");
+    let solved = load("beam-loaded", &[]);
+    let refused = require_shareable(&solved).expect_err("solved").to_string();
+    assert!(refused.contains("equilibrium") && refused.contains("no solver yet"), "{refused}");
+    assert!(require_shareable(&load("fracture", &[])).is_ok());
+}
+
+#[test]
+fn a_plan_foretells_who_moves_what_and_what_is_exchanged() {
+    let body = ["body.shape.columns=220", "body.shape.rows=40", "record.probes=[]", "frame=\"none\""];
+    let scene = load("tension", &body);
+    let shares = Shares::new(&scene, &planned(&scene), 4).expect("can be shared");
+    assert_eq!((shares.particles.len(), shares.particles.iter().sum::<usize>()), (4, 220 * 40));
+    let most = shares.particles.iter().max().copied().unwrap_or_default();
+    assert!(most < 220 * 40 / 3, "{:?}", shares.particles);
+    let Exchanged::Halos { steps, bytes } = shares.exchanged else { panic!("{:?}", shares.exchanged) };
+    // A neighbour is at most 40 places away: so many on both sides for each step, or the bands that hold them.
+    assert!(steps > 1 && bytes >= 16 * 2 * 40 * steps && bytes < 16 * 8 * 40 * steps, "{steps} {bytes}");
+    let torn = load("fracture", &[]);
+    let shares = Shares::new(&torn, &planned(&torn), 3).expect("can be shared");
+    assert!(matches!(shares.exchanged, Exchanged::Everything { .. }), "{:?}", shares.exchanged);
+    assert!(Shares::new(&load("beam-loaded", &[]), &planned(&load("beam-loaded", &[])), 2).is_err());
+}
+
+/// Large enough for the threads of a rank to cut its part once more.
+#[test]
+fn threads_within_ranks_change_no_bit() {
+    let body = ["body.shape.columns=300", "body.shape.rows=250", "record.probes=[]", "record.figures=[]"];
+    let sets: Vec<&str> = body.into_iter().chain(["frame=\"none\"", "stop.steps=24"]).collect();
+    let scene = load("tension", &sets);
+    let (plan, expected) = (planned(&scene), alone(&scene, 4));
+    let ends = on_ranks(2, |team| {
+        let threads = rayon::ThreadPoolBuilder::new().num_threads(4).build().expect("threads");
+        threads.install(|| {
+            let mut looks = Looks::every(4);
+            let outcome = run_shared(plan.clone(), None, &team, &mut looks).expect("can be shared");
+            End::of(&outcome, looks.seen)
+        })
+    });
+    assert!(ends.iter().all(|end| *end == expected));
+}
+
+/// Receives halos with an error in one coordinate.
+struct Noisy(Team);
+
+impl Exchange for Noisy {
+    fn rank(&self) -> usize {
+        self.0.rank()
+    }
+
+    fn count(&self) -> usize {
+        self.0.count()
+    }
+
+    fn swap(&mut self, messages: &[(usize, Vec<u64>)], from: &[(usize, usize)]) -> Vec<Vec<u64>> {
+        let mut received = self.0.swap(messages, from);
+        received.iter_mut().filter_map(|words| words.last_mut()).for_each(|word| *word ^= 1 << 20);
+        received
+    }
+
+    fn gather(&mut self, own: &[u64], counts: &[usize]) -> Vec<u64> {
+        self.0.gather(own, counts)
+    }
+}
+
+/// That the others can fail: ranks depend on every bit of what they receive.
+#[test]
+fn an_error_in_a_halo_is_seen_in_the_bits() {
+    let body = ["body.shape.columns=60", "body.shape.rows=20", "record.probes=[]", "frame=\"none\""];
+    let sets: Vec<&str> = body.into_iter().chain(["record.figures=[]", "stop.steps=80"]).collect();
+    let scene = load("tension", &sets);
+    let (plan, expected) = (planned(&scene), alone(&scene, 1 << 20));
+    let ends = |is_noisy: bool| {
+        on_ranks(2, |team| {
+            let team = if is_noisy { Team::new(Noisy(team)) } else { team };
+            let mut looks = Looks::every(1 << 20);
+            let outcome = run_shared(plan.clone(), None, &team, &mut looks).expect("can be shared");
+            End::of(&outcome, looks.seen)
+        })
+    };
+    assert!(ends(false).iter().all(|end| *end == expected));
+    assert!(ends(true).iter().all(|end| *end != expected));
+}
