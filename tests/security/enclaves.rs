@@ -127,6 +127,41 @@ fn each_fault_ends_an_enforced_process_by_name_and_is_a_warning_to_another() {
 
 #[test]
 #[ignore = "needs the command openssl"]
+fn what_a_governance_leaves_open_is_a_warning_where_security_is_enforced_too() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let keystore = Keystore::make(folder.path(), 0, GOVERNANCE);
+    let enclave = keystore.enclave("one", &EVERYTHING, &EVERYTHING);
+    let cases: [(Governance, &[&str]); 6] = [
+        (GOVERNANCE, &[]),
+        (Governance { metadata: "SIGN", ..GOVERNANCE }, &["sent readable"]),
+        (Governance { metadata: "NONE", ..GOVERNANCE }, &["sent readable"]),
+        (Governance { metadata: "NONE", rtps: "ENCRYPT", ..GOVERNANCE }, &[]),
+        (Governance { admits_all: true, ..GOVERNANCE }, &["allow_unauthenticated_participants is true"]),
+        (
+            Governance { reads_permissions: false, ..GOVERNANCE },
+            &[
+                "enable_join_access_control is",
+                "enable_read_access_control is",
+                "enable_write_access_control is",
+            ],
+        ),
+    ];
+    for (governance, words) in cases {
+        keystore.govern(governance);
+        for strategy in ["Enforce", "Permissive"] {
+            let Security { enclave: used, warnings } =
+                settled(folder.path(), strategy, "/one", &[]).expect("usable");
+            assert_eq!(used.as_ref(), Some(&enclave));
+            assert_eq!(warnings.len(), words.len(), "{warnings:?}");
+            for (warning, words) in warnings.iter().zip(words) {
+                assert!(warning.contains("governance.p7s: ") && warning.contains(words), "{warning}");
+            }
+        }
+    }
+}
+
+#[test]
+#[ignore = "needs the command openssl"]
 fn the_enclave_is_the_root_or_the_argument_s_or_the_override_s() {
     let folder = tempfile::tempdir().expect("a folder");
     let keystore = Keystore::make(folder.path(), 0, GOVERNANCE);

@@ -19,7 +19,8 @@ const PATIENCE: Duration = Duration::from_secs(30);
 /// Another domain with every call, away from those of other runs.
 pub fn domain() -> u16 {
     static NEXT: AtomicU16 = AtomicU16::new(0);
-    101 + (std::process::id() % 4) as u16 * 32 + NEXT.fetch_add(1, Ordering::Relaxed) % 32
+    // The ports of these lie below those that the system hands out.
+    2 + (std::process::id() % 4) as u16 * 24 + NEXT.fetch_add(1, Ordering::Relaxed) % 24
 }
 
 fn options(domain: u16) -> Options {
@@ -52,22 +53,28 @@ impl Peer {
     }
 
     fn turn(&mut self) {
-        std::thread::sleep(Duration::from_millis(5));
         let mut pose = PoseStamped { pose: Pose::planar([1.0, 2.0], 0.5), ..PoseStamped::default() };
         pose.header.frame_id = self.name.into();
-        self.out.publish(&pose).expect("sent");
+        // One that a full queue refuses is followed by others.
+        let _ = self.out.publish(&pose);
         while let Some((pose, _)) = self.poses.take() {
             assert_eq!(pose.pose.position.y, 2.0);
             self.heard.push(pose.header.frame_id);
         }
     }
 
+    /// How often it has heard the peer of this name.
+    fn count(&self, name: &str) -> usize {
+        self.heard.iter().filter(|one| *one == name).count()
+    }
+
     fn has_heard(&self, name: &str) -> bool {
-        self.heard.iter().any(|one| one == name)
+        self.count(name) > 0
     }
 }
 
 fn all<const N: usize>(peers: [&mut Peer; N]) {
+    std::thread::sleep(Duration::from_millis(20));
     peers.into_iter().for_each(Peer::turn);
 }
 
@@ -75,7 +82,6 @@ fn during(time: Duration, mut each: impl FnMut()) {
     let since = Instant::now();
     while since.elapsed() < time {
         each();
-        std::thread::sleep(Duration::from_millis(20));
     }
 }
 
@@ -92,21 +98,16 @@ fn peers_of_one_keystore_exchange_and_nobody_else_reads_or_is_heard() {
     let bare = plain(domain);
     let (mut one, mut two) = (Peer::of(&one, "one"), Peer::of(&two, "two"));
     let (mut outsider, mut bare) = (Peer::of(&outsider, "outsider"), Peer::of(&bare, "bare"));
-    let since = Instant::now();
-    within(PATIENCE, "each hears the other", || {
+    within(PATIENCE, "fifty each way", || {
         all([&mut one, &mut two, &mut outsider, &mut bare]);
-        (one.has_heard("two") && two.has_heard("one")).then_some(())
+        (one.count("two") > 50 && two.count("one") > 50).then_some(())
     });
-    println!("heard after {:?}", since.elapsed());
-    during(Duration::from_secs(4), || all([&mut one, &mut two, &mut outsider, &mut bare]));
     for peer in [&one, &two] {
         assert!(!peer.has_heard("bare") && !peer.has_heard("outsider"), "{}: {:?}", peer.name, peer.heard);
     }
     for peer in [&outsider, &bare] {
         assert!(!peer.has_heard("one") && !peer.has_heard("two"), "{}: {:?}", peer.name, peer.heard);
     }
-    println!("{} and {} heard", one.heard.len(), two.heard.len());
-    assert!(two.heard.len() > 20);
 }
 
 #[test]
@@ -123,7 +124,9 @@ fn a_peer_publishes_and_subscribes_to_what_its_permissions_allow_and_nothing_els
     let poses = listener.subscription::<PoseStamped>("/pose", Quality::reliable(10)).expect("allowed");
     let out = speaker.publisher::<PoseStamped>("/pose", Quality::reliable(10)).expect("allowed");
     within(PATIENCE, "a pose", || {
-        out.publish(&PoseStamped::default()).expect("sent");
+        // One that a full queue refuses is followed by others.
+        let _ = out.publish(&PoseStamped::default());
+        std::thread::sleep(Duration::from_millis(20));
         poses.take()
     });
     let refusals = [
@@ -134,29 +137,38 @@ fn a_peer_publishes_and_subscribes_to_what_its_permissions_allow_and_nothing_els
     ];
     for refusal in refusals {
         let said = refusal.expect("not allowed").to_string();
-        assert!(said.contains("rt/") && said.contains("permissions"), "{said}");
+        assert!(
+            said.contains("rt/") && said.contains("permissions") && said.contains("Not allowed to"),
+            "{said}"
+        );
     }
 }
 
 #[test]
 #[ignore = "needs the command openssl"]
-fn permissions_that_a_peer_wrote_itself_are_worth_nothing() {
+fn peers_look_at_the_permissions_of_each_other() {
     let folder = tempfile::tempdir().expect("a folder");
     let domain = domain();
-    let keystore = Keystore::make(&folder.path().join("ours"), domain, GOVERNANCE);
-    let forged = Keystore::make(&folder.path().join("forged"), domain, GOVERNANCE);
-    let honest = keystore.enclave("honest", &EVERYTHING, &EVERYTHING);
-    let insider = keystore.enclave("insider", &["ros_discovery_info"], &["ros_discovery_info"]);
-    let more = forged.enclave("insider", &EVERYTHING, &EVERYTHING);
-    // Its identity is genuine, and what it may do it says itself.
-    for file in ["permissions_ca.cert.pem", "governance.p7s", "permissions.p7s"] {
-        std::fs::remove_file(insider.join(file)).expect("removed");
-        std::fs::copy(more.join(file), insider.join(file)).expect("copied");
-    }
-    let (honest, insider) = (secured(domain, &honest), secured(domain, &insider));
-    let (mut honest, mut insider) = (Peer::of(&honest, "honest"), Peer::of(&insider, "insider"));
-    during(Duration::from_secs(6), || all([&mut honest, &mut insider]));
-    assert!(!honest.has_heard("insider") && !insider.has_heard("honest"));
+    let keystore = Keystore::make(folder.path(), domain, GOVERNANCE);
+    let [honest, witness, insider] =
+        ["honest", "witness", "insider"].map(|name| keystore.enclave(name, &EVERYTHING, &EVERYTHING));
+    // It is opened while it may do everything, and meets those who come when it no longer may.
+    let begun = Instant::now();
+    let end = Duration::from_secs(20);
+    let few = ["ros_discovery_info"];
+    keystore.permit_until("insider", end, [&few, &few]);
+    let insider = secured(domain, &insider);
+    let mut insider = Peer::of(&insider, "insider");
+    assert!(begun.elapsed() < end, "this computer is too slow for this test");
+    std::thread::sleep((end + Duration::from_secs(2)).saturating_sub(begun.elapsed()));
+    let (honest, witness) = (secured(domain, &honest), secured(domain, &witness));
+    let (mut honest, mut witness) = (Peer::of(&honest, "honest"), Peer::of(&witness, "witness"));
+    within(PATIENCE, "fifty each way", || {
+        all([&mut honest, &mut witness, &mut insider]);
+        (honest.count("witness") > 50 && witness.count("honest") > 50).then_some(())
+    });
+    assert!(!honest.has_heard("insider") && !witness.has_heard("insider"));
+    assert!(!insider.has_heard("honest") && !insider.has_heard("witness"));
 }
 
 /// A participant of Fast DDS, compiled here; what it has heard comes line by line.
@@ -194,14 +206,14 @@ fn fast_dds_with_keys_of_the_same_keystore_exchanges_and_with_others_does_not() 
         let enclave = others.enclave("fast", &EVERYTHING, &EVERYTHING);
         let (_running, lines) = fast_dds(folder.path(), domain, &enclave);
         within(PATIENCE, "it is ready", || lines.try_iter().find(|line| line == "ready"));
-        during(Duration::from_secs(4), || ours.turn());
+        during(Duration::from_secs(4), || all([&mut ours]));
         assert!(!has_heard(&lines) && !ours.has_heard("fast"));
     }
     let enclave = keystore.enclave("fast", &EVERYTHING, &EVERYTHING);
     let (_running, lines) = fast_dds(folder.path(), domain, &enclave);
     let mut is_heard = false;
     within(PATIENCE, "each hears the other", || {
-        ours.turn();
+        all([&mut ours]);
         is_heard |= has_heard(&lines);
         (is_heard && ours.has_heard("fast")).then_some(())
     });

@@ -3,9 +3,16 @@
 use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 /// The governance that `ros2 security` writes, but for the payloads: encrypting them as well loses samples.
-pub const GOVERNANCE: Governance = Governance { rtps: "SIGN", metadata: "ENCRYPT", data: "NONE" };
+pub const GOVERNANCE: Governance = Governance {
+    rtps: "SIGN",
+    metadata: "ENCRYPT",
+    data: "NONE",
+    admits_all: false,
+    reads_permissions: true,
+};
 
 /// What protects a domain.
 #[derive(Clone, Copy)]
@@ -13,6 +20,9 @@ pub struct Governance {
     pub rtps: &'static str,
     pub metadata: &'static str,
     pub data: &'static str,
+    /// Whether those without keys are let in.
+    pub admits_all: bool,
+    pub reads_permissions: bool,
 }
 
 /// All that nodes need.
@@ -79,19 +89,21 @@ impl Keystore {
                  -days 30 -subj {subject} -out {own}/cert.pem"
             ),
         );
-        self.sign(&format!("{own}/permissions"), &self.permissions(name, publish, subscribe));
+        let grant = self.grant(name, ["2020-01-01T00:00:00", "2049-01-01T00:00:00"], publish, subscribe);
+        self.sign(&format!("{own}/permissions"), &permissions(&grant));
         folder
     }
 
-    fn governance(&self, Governance { rtps, metadata, data }: Governance) -> String {
+    fn governance(&self, governance: Governance) -> String {
+        let Governance { rtps, metadata, data, admits_all, reads_permissions } = governance;
         format!(
             r#"<?xml version="1.0" encoding="UTF-8"?>
 <dds xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance" xsi:noNamespaceSchemaLocation="http://www.omg.org/spec/DDS-SECURITY/20170901/omg_shared_ca_governance.xsd">
   <domain_access_rules>
     <domain_rule>
       <domains><id>{}</id></domains>
-      <allow_unauthenticated_participants>false</allow_unauthenticated_participants>
-      <enable_join_access_control>true</enable_join_access_control>
+      <allow_unauthenticated_participants>{admits_all}</allow_unauthenticated_participants>
+      <enable_join_access_control>{reads_permissions}</enable_join_access_control>
       <discovery_protection_kind>ENCRYPT</discovery_protection_kind>
       <liveliness_protection_kind>ENCRYPT</liveliness_protection_kind>
       <rtps_protection_kind>{rtps}</rtps_protection_kind>
@@ -100,8 +112,8 @@ impl Keystore {
           <topic_expression>*</topic_expression>
           <enable_discovery_protection>true</enable_discovery_protection>
           <enable_liveliness_protection>true</enable_liveliness_protection>
-          <enable_read_access_control>true</enable_read_access_control>
-          <enable_write_access_control>true</enable_write_access_control>
+          <enable_read_access_control>{reads_permissions}</enable_read_access_control>
+          <enable_write_access_control>{reads_permissions}</enable_write_access_control>
           <metadata_protection_kind>{metadata}</metadata_protection_kind>
           <!-- <data_protection_kind>ENCRYPT</data_protection_kind> -->
           <data_protection_kind>{data}</data_protection_kind>
@@ -115,17 +127,31 @@ impl Keystore {
         )
     }
 
-    fn permissions(&self, name: &str, publish: &[&str], subscribe: &[&str]) -> String {
+    /// Permits an enclave everything for this long, and then what it may publish and subscribe to in these lists.
+    pub fn permit_until(&self, name: &str, end: Duration, [publish, subscribe]: [&[&str]; 2]) {
+        let now = SystemTime::now().duration_since(UNIX_EPOCH).expect("a clock after 1970").as_secs();
+        let date = |seconds: u64| {
+            let mut command = Command::new("date");
+            let command = command.args(["-u", "-d", &format!("@{seconds}"), "+%Y-%m-%dT%H:%M:%S"]);
+            let said = command.output().expect("the command date").stdout;
+            String::from_utf8(said).expect("text").trim().to_owned()
+        };
+        let end = date(now + end.as_secs());
+        let grants = [
+            self.grant(name, ["2020-01-01T00:00:00", &end], &EVERYTHING, &EVERYTHING),
+            self.grant(name, [&end, "2049-01-01T00:00:00"], publish, subscribe),
+        ];
+        self.sign(&format!("enclaves/{name}/permissions"), &permissions(&grants.concat()));
+    }
+
+    fn grant(&self, name: &str, [begin, end]: [&str; 2], publish: &[&str], subscribe: &[&str]) -> String {
         let topics = |names: &[&str]| -> String {
             names.iter().map(|name| format!("<topic>{name}</topic>")).collect()
         };
         format!(
-            r#"<?xml version="1.0" encoding="UTF-8"?>
-<dds xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance" xsi:noNamespaceSchemaLocation="http://www.omg.org/spec/DDS-SECURITY/20170901/omg_shared_ca_permissions.xsd">
-  <permissions>
-    <grant name="/{name}">
+            r#"    <grant name="/{name}">
       <subject_name>CN=/{name}</subject_name>
-      <validity><not_before>2020-01-01T00:00:00</not_before><not_after>2049-01-01T00:00:00</not_after></validity>
+      <validity><not_before>{begin}</not_before><not_after>{end}</not_after></validity>
       <allow_rule>
         <domains><id>{}</id></domains>
         <publish><topics>{}</topics></publish>
@@ -133,12 +159,22 @@ impl Keystore {
       </allow_rule>
       <default>DENY</default>
     </grant>
-  </permissions>
-</dds>
 "#,
             self.domain,
             topics(publish),
             topics(subscribe)
         )
     }
+}
+
+/// The document of these grants.
+fn permissions(grants: &str) -> String {
+    format!(
+        r#"<?xml version="1.0" encoding="UTF-8"?>
+<dds xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance" xsi:noNamespaceSchemaLocation="http://www.omg.org/spec/DDS-SECURITY/20170901/omg_shared_ca_permissions.xsd">
+  <permissions>
+{grants}  </permissions>
+</dds>
+"#
+    )
 }

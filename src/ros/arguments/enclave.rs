@@ -13,12 +13,15 @@ use openssl::nid::Nid;
 use openssl::pkey::{HasPublic, PKey, PKeyRef, Private};
 use openssl::x509::X509;
 
-use super::security::{Fault, ROOT, fault_of_name};
+use super::security::{Fault, Gravity, ROOT, fault_of_name};
 
 const CERTIFICATE: &str = "cert.pem";
 const KEY: &str = "key.pem";
 const GOVERNANCE: &str = "governance.p7s";
 const REVOCATIONS: &str = "crl.pem";
+/// Elements of the governance.
+const DATA: &str = "data_protection_kind";
+const METADATA: &str = "metadata_protection_kind";
 /// Largest file that is read \[B\]; those of a keystore have some kilobytes.
 const LARGEST: u64 = 1 << 20;
 /// What the middleware signs with: RSA is refused by it, other curves are unknown to it.
@@ -59,16 +62,19 @@ pub fn faults(folder: &Path) -> Vec<Fault> {
     }));
     found(key.map(drop));
     found(read(folder, "permissions.p7s").map(drop));
-    found(governance(folder));
     found(revocations(folder));
+    match governance(folder) {
+        Ok(rules) => faults.extend(weaknesses(folder, &rules).chain(lossy(folder, &rules))),
+        Err(fault) => faults.push(fault),
+    }
     // Stable: within each kind they stay in the order of the files.
-    faults.sort_by_key(|fault| fault.is_bearable);
+    faults.sort_by_key(|fault| fault.gravity);
     faults
 }
 
 /// A fault that leaves no keys to use.
 fn fault(place: impl ToString, reason: impl ToString, help: &'static str) -> Fault {
-    Fault { place: place.to_string(), reason: reason.to_string(), help, is_bearable: false }
+    Fault { place: place.to_string(), reason: reason.to_string(), help, gravity: Gravity::Unusable }
 }
 
 fn read(folder: &Path, name: &str) -> Result<Vec<u8>, Fault> {
@@ -129,28 +135,64 @@ fn matches(folder: &Path, certificate: &X509, key: &PKey<Private>) -> Result<(),
     Err(fault(folder.join(KEY).display(), "is not the key of cert.pem", help))
 }
 
-/// The middleware loses samples whose payload is protected by itself.
-fn governance(folder: &Path) -> Result<(), Fault> {
-    let text = String::from_utf8_lossy(&read(folder, GOVERNANCE)?).into_owned();
-    let place = folder.join(GOVERNANCE);
-    let kinds = values(&without_comments(&text), "data_protection_kind");
-    if kinds.is_empty() {
+/// The rules of the governance, without comments.
+fn governance(folder: &Path) -> Result<String, Fault> {
+    let rules = without_comments(&String::from_utf8_lossy(&read(folder, GOVERNANCE)?));
+    if values(&rules, DATA).is_empty() {
         let help = "sign it so that its XML stays readable: `openssl smime -sign -text`";
+        let place = folder.join(GOVERNANCE);
         return Err(fault(place.display(), "holds no data_protection_kind in the clear", help));
     }
-    match kinds.into_iter().find(|kind| kind != "NONE") {
-        None => Ok(()),
-        Some(kind) => Err(Fault {
-            reason: format!(
-                "data_protection_kind is {kind}, under which RustDDS loses each sample whose length is no \
-                 multiple of four, and everything reliable after it"
-            ),
-            place: place.display().to_string(),
-            help: "set data_protection_kind to NONE and leave metadata_protection_kind ENCRYPT, which encrypts \
-                   the data too, and sign it anew",
-            is_bearable: true,
-        }),
+    Ok(rules)
+}
+
+/// The middleware loses samples whose payload is protected by itself.
+fn lossy(folder: &Path, rules: &str) -> Option<Fault> {
+    let kind = values(rules, DATA).into_iter().find(|kind| kind != "NONE")?;
+    Some(Fault {
+        reason: format!(
+            "data_protection_kind is {kind}, under which RustDDS loses each sample whose length is no \
+             multiple of four, and everything reliable after it"
+        ),
+        place: folder.join(GOVERNANCE).display().to_string(),
+        help: "set data_protection_kind to NONE and leave metadata_protection_kind ENCRYPT, which encrypts \
+               the data too, and sign it anew",
+        gravity: Gravity::Dishonoured,
+    })
+}
+
+/// What the rules leave open, each once; whichever domains and topics they are for.
+fn weaknesses(folder: &Path, rules: &str) -> impl Iterator<Item = Fault> {
+    let is_encrypted = |kind: &String| kind.starts_with("ENCRYPT");
+    let is_wrapped = values(rules, "rtps_protection_kind").iter().all(is_encrypted);
+    let is_open = |rule: &str| {
+        values(rule, DATA).iter().any(|kind| kind == "NONE")
+            && !values(rule, METADATA).iter().all(is_encrypted)
+    };
+    let mut reasons = Vec::new();
+    if !is_wrapped && rules.split("<topic_rule").skip(1).any(is_open) {
+        let reason = "metadata_protection_kind is not ENCRYPT and data_protection_kind is NONE for some topics: their \
+                      samples are sent readable by all";
+        reasons.push(reason.to_owned());
     }
+    let is_true = |value: &String| ["true", "1"].contains(&value.as_str());
+    if values(rules, "allow_unauthenticated_participants").iter().any(is_true) {
+        reasons.push("allow_unauthenticated_participants is true: peers without keys are let in".to_owned());
+    }
+    for switch in ["enable_join_access_control", "enable_read_access_control", "enable_write_access_control"]
+    {
+        if !values(rules, switch).iter().all(is_true) {
+            reasons.push(format!("{switch} is false for some: their permissions are not looked at"));
+        }
+    }
+    let place = folder.join(GOVERNANCE).display().to_string();
+    let help = "protect it as `ros2 security create_keystore` does, and sign it anew";
+    reasons.into_iter().map(move |reason| Fault {
+        place: place.clone(),
+        reason,
+        help,
+        gravity: Gravity::Weak,
+    })
 }
 
 /// The middleware reads no list of revoked certificates.
@@ -164,7 +206,7 @@ fn revocations(folder: &Path) -> Result<(), Fault> {
         place: path.display().to_string(),
         reason: "certificates that it revokes would be taken: RustDDS reads no revocation list".into(),
         help: "make a keystore with another CA for those who stay, and remove crl.pem",
-        is_bearable: true,
+        gravity: Gravity::Dishonoured,
     })
 }
 

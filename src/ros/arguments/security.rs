@@ -45,8 +45,19 @@ pub(super) struct Fault {
     pub place: String,
     pub reason: String,
     pub help: &'static str,
-    /// Whether the keys are usable in spite of it.
-    pub is_bearable: bool,
+    pub gravity: Gravity,
+}
+
+/// How much a fault matters; the gravest first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Gravity {
+    /// It leaves no keys to use.
+    Unusable,
+    /// The keys are usable, but not as their files ask.
+    #[cfg_attr(not(feature = "security"), expect(dead_code, reason = "of the files of an enclave"))]
+    Dishonoured,
+    /// The files are honoured, and protect less than they might.
+    Weak,
 }
 
 impl fmt::Display for Fault {
@@ -83,12 +94,13 @@ impl SecurityRequest {
             return Ok(Security { enclave: None, warnings });
         }
         let (folder, faults) = self.keys(argument);
+        let refused = faults.iter().find(|fault| fault.gravity < Gravity::Weak);
         if self.is_enforced()
-            && let Some(Fault { place, reason, help, .. }) = faults.first().cloned()
+            && let Some(Fault { place, reason, help, .. }) = refused.cloned()
         {
             return Err(RosArgumentError::Security { place, reason, help });
         }
-        let enclave = folder.filter(|_| faults.iter().all(|fault| fault.is_bearable));
+        let enclave = folder.filter(|_| faults.iter().all(|fault| fault.gravity > Gravity::Unusable));
         let mut warnings: Vec<String> = faults.iter().map(Fault::to_string).collect();
         match &enclave {
             None => warnings = vec![in_the_clear(warnings.join("; "))],
@@ -116,7 +128,7 @@ impl SecurityRequest {
             place: "ROS_SECURITY_ENABLE=true".into(),
             reason: "this program was built without the feature `security` and speaks unsecured DDS".into(),
             help: "build it with `--features security`, or set ROS_SECURITY_ENABLE=false for this process",
-            is_bearable: false,
+            gravity: Gravity::Unusable,
         };
         (None, vec![fault])
     }

@@ -55,7 +55,7 @@ pub fn guard(before: &BTreeMap<String, i32>, loopback_only: bool) -> io::Result<
 ///
 /// # Errors
 /// A port that no socket of this process has.
-#[cfg(feature = "security")]
+#[cfg(any(test, feature = "security"))]
 pub fn listener(on: u16) -> io::Result<UdpSocket> {
     let mut all = sockets()?.into_values().map(borrowed);
     let found = all.find(|socket| port(*socket) == Some(on)).ok_or(io::ErrorKind::NotFound)?;

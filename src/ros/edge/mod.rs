@@ -29,9 +29,11 @@ pub mod participant;
 mod payload;
 pub mod pulse;
 pub mod quality;
-#[cfg(feature = "security")]
+#[cfg(any(test, feature = "security"))]
+#[cfg_attr(not(feature = "security"), allow(dead_code, reason = "its test alone is built"))]
 mod queue;
 pub mod service;
+mod threads;
 pub mod topic;
 
 use crate::messages::names::NameError;
@@ -67,10 +69,10 @@ pub enum EdgeError {
     #[error("no endpoint on {topic}: {reason}")]
     Endpoint { topic: String, reason: String },
     #[error(
-        "the permissions of this process do not allow {topic}\n  help: allow it in the enclave's permissions.xml, below \
-         publish where it is written and below subscribe where it is read, and sign that anew"
+        "the permissions of this process do not allow {topic}: {reason}\n  help: allow it in the enclave's \
+         permissions.xml, below publish where it is written and below subscribe where it is read, and sign that anew"
     )]
-    Forbidden { topic: String },
+    Forbidden { topic: String, reason: String },
     #[error("not sent on {topic}: {reason}")]
     Send { topic: String, reason: String },
 }

@@ -95,7 +95,10 @@ impl Edge {
         let domain = options.domain;
         let refused = |reason: String| {
             let place = enclave.display().to_string();
-            EdgeError::Enclave { domain, place, reason }
+            match is_forbidden(&reason) {
+                true => EdgeError::Enclave { domain, place, reason },
+                false => EdgeError::Participant { domain, reason },
+            }
         };
         let files = Files::with_ros_default_names(enclave, String::new());
         let builder = DomainParticipantBuilder::new(domain).builtin_security(files);
@@ -235,10 +238,15 @@ impl Shared {
 /// An endpoint that RustDDS refused, with its reason.
 fn refused(topic: &str, reason: &str) -> EdgeError {
     let (topic, reason) = (topic.to_owned(), reason.to_owned());
-    match reason.contains("Not allowed by security") {
-        true => EdgeError::Forbidden { topic },
+    match is_forbidden(&reason) {
+        true => EdgeError::Forbidden { topic, reason },
         false => EdgeError::Endpoint { topic, reason },
     }
+}
+
+/// Whether keys, permissions or governance are the reason of an error of RustDDS, which has one kind of error for that.
+fn is_forbidden(reason: &str) -> bool {
+    reason.contains("Not allowed by security")
 }
 
 /// RustDDS hands new endpoints to a thread of its own through a channel of bounded length, and refuses those that it
