@@ -22,7 +22,8 @@
 //! * `fem` (feature `fem`): finite elements, the reference for the rules; it imports no flock.
 //! * `swarm` (feature `swarm`): formations of robots: targets by the same rule, made safe; flights of simulated robots.
 //! * `messages` (feature `messages`): what robots and formations publish: structs, encoding, names of topics.
-//! * `ros` (feature `ros`): the same over ROS 2: arguments, parameters, lifecycle, the node.
+//! * `ros` (feature `ros`): the same over ROS 2: arguments, parameters, lifecycle, the node. With the feature `security`
+//!   with keys of an enclave (SROS2).
 //! * `shm` (feature `shm`): the same over shared memory, without a copy; a running body published to other processes.
 //! * `record` (feature `record`): recordings of flights and runs for Foxglove and `ros2 bag`, and their replay.
 //! * `live` (feature `live`): a body or a swarm under the reader's hands: a session, and the page that shows it.

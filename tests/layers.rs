@@ -218,3 +218,10 @@ fn films_are_drawn_by_the_figures() {
     assert!(!own("Svg") && !own("<svg"), "a film has no drawing of its own");
     assert!(own("figures::"));
 }
+
+#[test]
+fn keys_and_certificates_are_looked_into_in_one_place() {
+    assert_eq!(files_with("openssl::"), ["ros/arguments/enclave.rs"]);
+    let gated = files_with("feature = \"security\"");
+    assert!(gated.iter().all(|file| file.starts_with("ros/")), "{gated:?}");
+}

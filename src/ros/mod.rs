@@ -7,6 +7,7 @@
 pub mod arguments;
 #[allow(missing_docs, reason = "not written out yet")]
 pub mod edge;
+mod network;
 #[allow(missing_docs, reason = "not written out yet: the program and the recordings are its users")]
 pub mod node;
 #[allow(missing_docs, reason = "not written out yet: the program is its user")]

@@ -11,9 +11,10 @@ use serde::{Deserialize, Serialize};
 use super::arguments::{Names, RosArguments};
 use super::edge::parameters::{Declaration, Parameters, Store, Value};
 use super::edge::pulse::Pulse;
-use super::edge::{Edge, EdgeError, Node, Publisher, Quality, Subscription};
+use super::edge::{EdgeError, Node, Publisher, Quality, Subscription};
+use super::network;
 use super::node::uses::Uses;
-use super::node::{NodeError, TopicOf, options, settings};
+use super::node::{NodeError, TopicOf, settings};
 use crate::messages::Message;
 use crate::messages::builtin_interfaces::Time;
 use crate::messages::geometry_msgs::{
@@ -104,7 +105,7 @@ impl Link {
         let world = arguments.names(NAME, "/")?;
         let store = declare(arguments, &world)?;
         let publishes_clock = store.get(PUBLISH_CLOCK).and_then(Value::as_bool).unwrap_or_default();
-        let edge = Edge::open(options(arguments))?;
+        let edge = network::join(arguments)?;
         let owners = owners(formation, arguments, layout)?;
         let nodes: Vec<Node> = owners.iter().map(|names| edge.named_node(names)).collect::<Result<_, _>>()?;
         // The one node is the owner of all.

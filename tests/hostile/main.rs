@@ -17,6 +17,8 @@ mod peers;
 mod running;
 #[path = "../common/signals.rs"]
 mod signals;
+#[path = "../common/stranger.rs"]
+mod stranger;
 mod support;
 #[path = "../common/swarms.rs"]
 mod swarms;

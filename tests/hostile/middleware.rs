@@ -224,11 +224,6 @@ impl Scene {
 
 const FLOOD: Duration = Duration::from_secs(30);
 
-/// A promise behind so many empty submessages that the socket filter does not look at it.
-fn hidden(packet: &[u8]) -> Vec<u8> {
-    [&packet[..20], &[1, 1, 0, 0].repeat(32), &packet[20..]].concat()
-}
-
 fn promises(stranger: &mut Stranger) -> Vec<Vec<u8>> {
     let all = stranger.prefixes.clone();
     all.into_iter().map(|prefix| stranger.promise(prefix)).collect()

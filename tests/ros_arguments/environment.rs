@@ -1,6 +1,6 @@
 //! What the environment says.
 
-use flockform::ros::arguments::{DiscoveryRange, Environment, RosArgumentError, RosArguments};
+use flockform::ros::arguments::{DiscoveryRange, Environment, RosArgumentError, RosArguments, Security};
 
 /// The environment in which exactly these variables are set.
 fn environment(set: &[(&str, &str)]) -> Result<Environment, RosArgumentError> {
@@ -49,10 +49,45 @@ fn what_cannot_be_honoured_is_refused_with_a_remedy() {
     }
 }
 
+/// How a process takes part in which these variables are set, with this `--enclave`.
+fn security(set: &[(&str, &str)], enclave: &str) -> Result<Security, RosArgumentError> {
+    let look_up = |name: &str| set.iter().find(|(key, _)| *key == name).map(|(_, value)| value.to_string());
+    let arguments = ["--ros-args", "-e", enclave].map(String::from);
+    RosArguments::parse(arguments, &look_up).map(|(_, ros)| ros.security)
+}
+
+const ENABLED: (&str, &str) = ("ROS_SECURITY_ENABLE", "true");
+const ENFORCED: (&str, &str) = ("ROS_SECURITY_STRATEGY", "Enforce");
+
 #[test]
-fn enforced_security_is_refused_rather_than_ignored() {
-    let enabled = ("ROS_SECURITY_ENABLE", "true");
-    assert!(environment(&[enabled, ("ROS_SECURITY_STRATEGY", "Enforce")]).is_err());
-    assert!(environment(&[enabled, ("ROS_SECURITY_STRATEGY", "Permissive")]).is_ok());
-    assert!(environment(&[("ROS_SECURITY_STRATEGY", "Enforce")]).is_ok());
+fn what_asks_for_security_and_gets_none_is_a_warning() {
+    for variables in [&[][..], &[("ROS_SECURITY_ENABLE", "false")], &[("ROS_SECURITY_KEYSTORE", "/keys")]] {
+        assert_eq!(security(variables, "/").expect("nothing is enforced"), Security::default());
+    }
+    let one = [("ROS_SECURITY_ENCLAVE_OVERRIDE", "/talker")];
+    for (variables, enclave, words) in [
+        (&[("ROS_SECURITY_ENABLE", "True")][..], "/", "ROS_SECURITY_ENABLE=True"),
+        (&[ENFORCED], "/", "ROS_SECURITY_STRATEGY=Enforce"),
+        (&one, "/", "ROS_SECURITY_ENCLAVE_OVERRIDE=/talker"),
+        (&[], "/talker", "--enclave /talker"),
+        (&[ENABLED], "/", "in the clear"),
+        (&[ENABLED, ("ROS_SECURITY_STRATEGY", "Permissive")], "/", "in the clear"),
+        (&[ENABLED, ("ROS_SECURITY_STRATEGY", "enforce")], "/", "in the clear"),
+    ] {
+        let Security { enclave, warnings } = security(variables, enclave).expect(words);
+        assert_eq!(enclave, None);
+        assert!(warnings.len() == 1 && warnings[0].contains(words), "{words}: {warnings:?}");
+        assert!(warnings[0].contains("everything is sent and taken in the clear"), "{warnings:?}");
+    }
+}
+
+#[test]
+fn enforced_security_that_cannot_be_had_is_refused_rather_than_ignored() {
+    let missing = if cfg!(feature = "security") { "ROS_SECURITY_KEYSTORE" } else { "feature `security`" };
+    let error = security(&[ENABLED, ENFORCED], "/").expect_err("no keystore").to_string();
+    assert!(error.contains(missing) && error.contains("help: "), "{error}");
+    let keystore = ("ROS_SECURITY_KEYSTORE", "/nowhere");
+    let error = security(&[ENABLED, ENFORCED, keystore], "/talker").expect_err("no enclave").to_string();
+    let missing = if cfg!(feature = "security") { "/nowhere/enclaves/talker" } else { missing };
+    assert!(error.contains(missing), "{error}");
 }

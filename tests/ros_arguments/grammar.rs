@@ -99,10 +99,19 @@ fn logging_is_read_and_the_last_word_counts() {
 }
 
 #[test]
+fn an_enclave_has_a_name_like_a_namespace_and_the_last_counts() {
+    assert_eq!(ros("-e /").enclave.as_deref(), Some("/"));
+    assert_eq!(ros("-e /one --enclave /fleet/robot_7").enclave.as_deref(), Some("/fleet/robot_7"));
+    for name in ["talker", "/../etc", "/a//b", "/a/", "//", "/a b", "/7", "/a/./b", "./a"] {
+        let arguments = ["--ros-args", "-e", name].map(String::from);
+        let message = crate::parse(&arguments).expect_err(name).to_string();
+        assert!(message.contains(name) && message.contains("help: name it as"), "{message}");
+    }
+}
+
+#[test]
 fn what_this_node_does_not_have_is_refused_and_not_ignored() {
     for line in [
-        "-e /talker",
-        "--enclave talker",
         "--log-config-file log.config",
         "--log-file-name run",
         "--enable-rosout-logs",

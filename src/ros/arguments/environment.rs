@@ -1,6 +1,7 @@
 //! The environment variables that ROS 2 nodes read.
 
 use super::RosArgumentError;
+use super::security::SecurityRequest;
 use super::value::integer;
 
 /// Largest domain whose ports fit below 65536 (RTPS 2.3, section 9.6.1: 7400 + 250 domain).
@@ -29,6 +30,8 @@ pub struct Environment {
     /// The middleware of the nodes around (`RMW_IMPLEMENTATION`), as typed: it decides how services
     /// are called.
     pub middleware: Option<String>,
+    /// What is asked of DDS security.
+    pub security: SecurityRequest,
 }
 
 impl Environment {
@@ -36,10 +39,9 @@ impl Environment {
     ///
     /// # Errors
     /// A domain that is no whole number from 0 to 232, an unknown discovery range, and what this node cannot do:
-    /// discovery that is off, peers by address, enforced security.
+    /// discovery that is off, peers by address.
     pub fn read(look_up: &dyn Fn(&str) -> Option<String>) -> Result<Self, RosArgumentError> {
         let variable = |name: &str| look_up(name).filter(|value| !value.is_empty());
-        refuse_enforced_security(&variable)?;
         let domain = variable("ROS_DOMAIN_ID").map_or(Ok(0), read_domain)?;
         let localhost_only = variable("ROS_LOCALHOST_ONLY").is_some_and(|value| value.starts_with('1'));
         let discovery = match variable("ROS_AUTOMATIC_DISCOVERY_RANGE") {
@@ -57,7 +59,12 @@ impl Environment {
                 help: "unset it for this process and let multicast reach the peers, or run it beside them",
             });
         }
-        Ok(Self { domain, discovery, middleware: variable("RMW_IMPLEMENTATION") })
+        Ok(Self {
+            domain,
+            discovery,
+            middleware: variable("RMW_IMPLEMENTATION"),
+            security: SecurityRequest::read(&variable),
+        })
     }
 }
 
@@ -93,18 +100,4 @@ fn read_range(value: String) -> Result<DiscoveryRange, RosArgumentError> {
             });
         }
     })
-}
-
-/// Refuses enforced security: this node communicates unencrypted.
-fn refuse_enforced_security(variable: &dyn Fn(&str) -> Option<String>) -> Result<(), RosArgumentError> {
-    let is = |name: &str, value: &str| variable(name).is_some_and(|set| set == value);
-    if is("ROS_SECURITY_ENABLE", "true") && is("ROS_SECURITY_STRATEGY", "Enforce") {
-        return Err(RosArgumentError::Environment {
-            variable: "ROS_SECURITY_STRATEGY",
-            value: "Enforce".into(),
-            reason: "this node speaks unsecured DDS",
-            help: "set ROS_SECURITY_STRATEGY=Permissive or ROS_SECURITY_ENABLE=false for this process",
-        });
-    }
-    Ok(())
 }

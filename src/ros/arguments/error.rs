@@ -24,6 +24,8 @@ pub enum RosArgumentError {
     ParameterFile { path: PathBuf, line: usize, reason: String, help: &'static str },
     #[error("environment variable {variable}={value}: {reason}\n  help: {help}")]
     Environment { variable: &'static str, value: String, reason: &'static str, help: &'static str },
+    #[error("DDS security: {place}: {reason}\n  help: {help}")]
+    Security { place: String, reason: String, help: &'static str },
 }
 
 fn nearest_flag(nearest: &Option<&'static str>) -> String {

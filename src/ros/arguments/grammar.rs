@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use super::assignment::{Assignment, Origin};
 use super::logging::Logging;
+use super::security::fault_of_name;
 use super::{RosArgumentError, RosArguments, assignment, parameter_file};
 use crate::messages::remap::RemapRule;
 use crate::scene::text;
@@ -70,18 +71,7 @@ impl RosArguments {
                 return Err(no_log_library(&flag, value("the path of a configuration file")?));
             }
             "--log-file-name" => return Err(no_log_library(&flag, value("a file name prefix")?)),
-            "-e" | "--enclave" => match value("a security enclave /PATH")?.as_str() {
-                // The default enclave of every node.
-                "/" => {}
-                enclave => {
-                    return Err(RosArgumentError::Rule {
-                        flag: flag.clone(),
-                        rule: enclave.into(),
-                        reason: "this node speaks unsecured DDS and has no keys of an enclave".into(),
-                        help: "leave it out, and keep untrusted computers off the network",
-                    });
-                }
-            },
+            "-e" | "--enclave" => self.enclave = Some(enclave(&flag, value("a security enclave /PATH")?)?),
             switch if switch_of(&mut self.logging, switch) => {}
             "--enable-rosout-logs" | "--enable-external-lib-logs" => {
                 return Err(RosArgumentError::Rule {
@@ -107,6 +97,12 @@ impl RosArguments {
         self.parameter_files.push(path);
         Ok(())
     }
+}
+
+fn enclave(flag: &str, name: String) -> Result<String, RosArgumentError> {
+    let Some(reason) = fault_of_name(&name) else { return Ok(name) };
+    let help = "name it as in `ros2 security create_enclave`: /fleet/robot_7";
+    Err(RosArgumentError::Rule { flag: flag.into(), rule: name, reason: reason.into(), help })
 }
 
 /// Sets the switch that `flag` names; false where it names none.

@@ -20,12 +20,15 @@
 //! ```
 
 mod assignment;
+#[cfg(feature = "security")]
+mod enclave;
 pub mod environment;
 mod error;
 mod grammar;
 pub mod logging;
 mod parameter_file;
 mod remap;
+mod security;
 pub mod value;
 mod yaml;
 
@@ -37,6 +40,7 @@ pub use assignment::{Assignment, NodePattern, Origin, Parameter};
 pub use environment::{DiscoveryRange, Environment};
 pub use error::RosArgumentError;
 pub use logging::{Logging, Severity};
+pub use security::{Security, SecurityRequest};
 pub use value::Value;
 
 /// The ROS arguments of a process.
@@ -53,6 +57,10 @@ pub struct RosArguments {
     pub logging: Logging,
     /// The environment variables.
     pub environment: Environment,
+    /// The enclave that `--enclave` names, begun with a slash.
+    pub enclave: Option<String>,
+    /// How to take part, as enclave and environment say.
+    pub security: Security,
 }
 
 impl RosArguments {
@@ -61,14 +69,16 @@ impl RosArguments {
     ///
     /// # Errors
     /// An unknown flag, a flag without its value, a rule that does not parse, a parameter file that
-    /// cannot be read or understood, an environment variable out of its range.
+    /// cannot be read or understood, an environment variable out of its range, security that is enforced and
+    /// cannot be had.
     pub fn parse(
         arguments: impl IntoIterator<Item = String>,
         environment: &dyn Fn(&str) -> Option<String>,
     ) -> Result<(Vec<String>, Self), RosArgumentError> {
         let environment = Environment::read(environment)?;
         let (rest, parsed) = grammar::parse(arguments)?;
-        Ok((rest, Self { environment, ..parsed }))
+        let security = environment.security.settle(parsed.enclave.as_deref())?;
+        Ok((rest, Self { environment, security, ..parsed }))
     }
 
     /// The names of a node that calls itself `node` in `namespace`, with these rules applied.

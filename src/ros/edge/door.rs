@@ -9,6 +9,8 @@
 
 use std::collections::BTreeMap;
 use std::io;
+#[cfg(any(test, feature = "security"))]
+use std::net::UdpSocket;
 use std::os::fd::BorrowedFd;
 
 use socket2::{SockFilter, SockRef, Type};
@@ -40,19 +42,38 @@ pub fn guard(before: &BTreeMap<String, i32>, loopback_only: bool) -> io::Result<
     let program = program(loopback_only);
     let mut guarded = 0;
     for (_, number) in sockets()?.into_iter().filter(|(name, _)| !before.contains_key(name)) {
-        // SAFETY: the number was an open socket of this process a moment ago. One that was closed since, or handed out
-        // anew, makes the calls below fail or names another socket, whose kind is looked at first.
-        let descriptor = unsafe { BorrowedFd::borrow_raw(number) };
-        let socket = SockRef::from(&descriptor);
-        let is_bound = socket
-            .local_addr()
-            .is_ok_and(|address| address.as_socket_ipv4().is_some_and(|at| at.port() != 0));
-        if is_bound && socket.r#type().is_ok_and(|kind| kind == Type::DGRAM) {
-            socket.attach_filter(&program)?;
+        let socket = borrowed(number);
+        if port(socket).is_some() {
+            SockRef::from(&socket).attach_filter(&program)?;
             guarded += 1;
         }
     }
     Ok(guarded)
+}
+
+/// The UDP socket of this process on a port, as another descriptor of it.
+///
+/// # Errors
+/// A port that no socket of this process has.
+#[cfg(any(test, feature = "security"))]
+pub fn listener(on: u16) -> io::Result<UdpSocket> {
+    let mut all = sockets()?.into_values().map(borrowed);
+    let found = all.find(|socket| port(*socket) == Some(on)).ok_or(io::ErrorKind::NotFound)?;
+    Ok(UdpSocket::from(found.try_clone_to_owned()?))
+}
+
+fn borrowed(number: i32) -> BorrowedFd<'static> {
+    // SAFETY: the number was an open socket of this process a moment ago. One that was closed since, or handed out
+    // anew, makes calls fail or names another socket, whose kind is looked at first.
+    unsafe { BorrowedFd::borrow_raw(number) }
+}
+
+/// The port of a UDP socket over IPv4 that has one.
+fn port(socket: BorrowedFd<'_>) -> Option<u16> {
+    let socket = SockRef::from(&socket);
+    let port = socket.local_addr().ok()?.as_socket_ipv4()?.port();
+    let is_udp = socket.r#type().is_ok_and(|kind| kind == Type::DGRAM);
+    (is_udp && port != 0).then_some(port)
 }
 
 /// Where a conditional jump goes.
@@ -280,7 +301,6 @@ fn slot() -> Vec<Line> {
 
 #[cfg(test)]
 mod tests {
-    use std::net::UdpSocket;
     use std::time::Duration;
 
     use super::*;

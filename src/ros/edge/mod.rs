@@ -29,7 +29,11 @@ pub mod participant;
 mod payload;
 pub mod pulse;
 pub mod quality;
+#[cfg(any(test, feature = "security"))]
+#[cfg_attr(not(feature = "security"), allow(dead_code, reason = "its test alone is built"))]
+mod queue;
 pub mod service;
+mod threads;
 pub mod topic;
 
 use crate::messages::names::NameError;
@@ -52,12 +56,23 @@ pub enum EdgeError {
          domain? try another ROS_DOMAIN_ID"
     )]
     Participant { domain: u16, reason: String },
+    #[error(
+        "the enclave {place} does not admit to domain {domain}: {reason}\n  help: see whether its permissions and \
+         governance name this domain, are valid today and signed by the key of permissions_ca.cert.pem, and whether \
+         they allow ros_discovery_info"
+    )]
+    Enclave { domain: u16, place: String, reason: String },
     #[error("{name:?} is no {kind} name: {reason}")]
     Name { kind: &'static str, name: String, reason: &'static str },
     #[error("{0}")]
     Resolution(#[from] NameError),
     #[error("no endpoint on {topic}: {reason}")]
     Endpoint { topic: String, reason: String },
+    #[error(
+        "the permissions of this process do not allow {topic}: {reason}\n  help: allow it in the enclave's \
+         permissions.xml, below publish where it is written and below subscribe where it is read, and sign that anew"
+    )]
+    Forbidden { topic: String, reason: String },
     #[error("not sent on {topic}: {reason}")]
     Send { topic: String, reason: String },
 }

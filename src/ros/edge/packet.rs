@@ -15,8 +15,7 @@ pub fn data(prefix: [u8; 12], [writer, reader]: [[u8; 4]; 2], number: u32, conte
         Content::Payload(content) => (0x05, *content),
         Content::InlineQos(content) => (0x03, *content),
     };
-    let mut packet = Vec::from(*b"RTPS\x02\x03\x01\x12");
-    packet.extend(prefix);
+    let mut packet = head(prefix);
     packet.extend([0x15, flags]);
     packet.extend((20 + content.len() as u16).to_le_bytes());
     // No more flags; inline QoS or payload begin 16 bytes on.
@@ -27,6 +26,16 @@ pub fn data(prefix: [u8; 12], [writer, reader]: [[u8; 4]; 2], number: u32, conte
     packet.extend(number.to_le_bytes());
     packet.extend(content);
     packet
+}
+
+/// An RTPS message of one PAD submessage, which means nothing, with a number in it (RTPS 2.3, section 8.3.7.11).
+#[cfg(any(test, feature = "security"))]
+pub fn numbered(prefix: [u8; 12], number: u32) -> Vec<u8> {
+    [&head(prefix)[..], &[0x01, 0x01, 4, 0], &number.to_le_bytes()].concat()
+}
+
+fn head(prefix: [u8; 12]) -> Vec<u8> {
+    [&b"RTPS\x02\x03\x01\x12"[..], &prefix].concat()
 }
 
 /// The port at which all participants of a domain hear of each other by multicast, or, of one participant, by unicast

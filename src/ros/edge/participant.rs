@@ -68,25 +68,57 @@ pub(super) struct Shared {
     participant: Option<DomainParticipant>,
     guid: GUID,
     options: Options,
+    /// Whether peers and their samples are authenticated; those of our own making are then not.
+    #[cfg(feature = "security")]
+    pub is_secured: bool,
     pub graph: Arc<Graph>,
 }
 
 impl Edge {
-    /// Joins a domain.
+    /// Joins a domain, in the clear.
     ///
     /// # Errors
     /// A domain out of range, or a computer that gives no sockets.
     pub fn open(options: Options) -> Result<Self, EdgeError> {
+        let refused = |reason: String| EdgeError::Participant { domain: options.domain, reason };
+        let shared = Self::join(options, DomainParticipantBuilder::new(options.domain), &refused)?;
+        Ok(Self { shared: Arc::new(shared) })
+    }
+
+    /// Joins a domain with the keys of an enclave, as those who may.
+    ///
+    /// # Errors
+    /// As [`Edge::open`], and keys, permissions or a governance that do not admit it to the domain.
+    #[cfg(feature = "security")]
+    pub fn open_in_enclave(options: Options, enclave: &std::path::Path) -> Result<Self, EdgeError> {
+        use ros2_client::dds::rustdds::DomainParticipantSecurityConfigFiles as Files;
         let domain = options.domain;
-        if domain > 232 {
-            return Err(EdgeError::Domain { domain });
+        let refused = |reason: String| {
+            let place = enclave.display().to_string();
+            match is_forbidden(&reason) {
+                true => EdgeError::Enclave { domain, place, reason },
+                false => EdgeError::Participant { domain, reason },
+            }
+        };
+        let files = Files::with_ros_default_names(enclave, String::new());
+        let builder = DomainParticipantBuilder::new(domain).builtin_security(files);
+        let mut shared = Self::join(options, builder, &refused)?;
+        shared.is_secured = true;
+        Ok(Self { shared: Arc::new(shared) })
+    }
+
+    fn join(
+        options: Options,
+        mut builder: DomainParticipantBuilder,
+        refused: &dyn Fn(String) -> EdgeError,
+    ) -> Result<Shared, EdgeError> {
+        if options.domain > 232 {
+            return Err(EdgeError::Domain { domain: options.domain });
         }
         super::loopback::warn_without_multicast(options.loopback_only);
-        let mut builder = DomainParticipantBuilder::new(domain);
         if options.loopback_only {
             builder = builder.with_only_networks([IpAddr::from([127, 0, 0, 1])]);
         }
-        let refused = |reason: String| EdgeError::Participant { domain, reason };
         let before = super::door::sockets().unwrap_or_default();
         let participant = builder.build().map_err(|error| refused(error.to_string()))?;
         match super::door::guard(&before, options.loopback_only) {
@@ -99,8 +131,7 @@ impl Edge {
                 tracing::warn!("packets are not filtered before the middleware reads them: {error}")
             }
         }
-        let shared = Shared::join(participant, options).map_err(|error| refused(error.to_string()))?;
-        Ok(Self { shared: Arc::new(shared) })
+        Shared::join(participant, options).map_err(|error| refused(error.to_string()))
     }
 
     pub(super) fn with_participant<T>(
@@ -166,6 +197,8 @@ impl Shared {
             participant: Some(participant),
             guid,
             options,
+            #[cfg(feature = "security")]
+            is_secured: false,
             graph,
         })
     }
@@ -181,26 +214,39 @@ impl Shared {
     }
 
     fn topic(&self, name: &str, kind: &str, policies: &QosPolicies) -> Result<Topic, EdgeError> {
-        let refused = |reason: String| EdgeError::Endpoint { topic: name.to_owned(), reason };
-        let participant = self.participant.as_ref().ok_or_else(|| refused("the edge is closed".into()))?;
+        let participant = self.participant.as_ref().ok_or_else(|| refused(name, "the edge is closed"))?;
         participant
             .create_topic(name.to_owned(), kind.to_owned(), policies, TopicKind::NoKey)
-            .map_err(|error| refused(error.to_string()))
+            .map_err(|error| refused(name, &error.to_string()))
     }
 
     pub fn reader(&self, topic: &str, kind: &str, quality: Quality) -> Result<Reader, EdgeError> {
         let policies = quality.policies();
         let dds = self.topic(topic, kind, &policies)?;
         patiently(|| self.subscriber.create_simple_datareader_no_key(&dds, Some(policies.clone())))
-            .map_err(|error| EdgeError::Endpoint { topic: topic.to_owned(), reason: error.to_string() })
+            .map_err(|error| refused(topic, &error.to_string()))
     }
 
     pub fn writer(&self, topic: &str, kind: &str, quality: Quality) -> Result<Writer, EdgeError> {
         let policies = quality.policies();
         let dds = self.topic(topic, kind, &policies)?;
         patiently(|| self.publisher.create_datawriter_no_key(&dds, Some(policies.clone())))
-            .map_err(|error| EdgeError::Endpoint { topic: topic.to_owned(), reason: error.to_string() })
+            .map_err(|error| refused(topic, &error.to_string()))
     }
+}
+
+/// An endpoint that RustDDS refused, with its reason.
+fn refused(topic: &str, reason: &str) -> EdgeError {
+    let (topic, reason) = (topic.to_owned(), reason.to_owned());
+    match is_forbidden(&reason) {
+        true => EdgeError::Forbidden { topic, reason },
+        false => EdgeError::Endpoint { topic, reason },
+    }
+}
+
+/// Whether keys, permissions or governance are the reason of an error of RustDDS, which has one kind of error for that.
+fn is_forbidden(reason: &str) -> bool {
+    reason.contains("Not allowed by security")
 }
 
 /// RustDDS hands new endpoints to a thread of its own through a channel of bounded length, and refuses those that it

@@ -6,6 +6,8 @@
 //!
 //! The sample is a packet of our own, from a writer of ours to a reader of ours, sent to our own port: it passes the
 //! socket, the receiver and the cache like any other, and needs no multicast, which a loopback device may not have.
+//! A secured participant takes no such packet; there it is watched whether it empties its socket (`queue`), which takes
+//! it longer.
 
 use std::net::{Ipv4Addr, SocketAddr, UdpSocket};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -17,24 +19,63 @@ use ros2_client::dds::rustdds::{DomainParticipant, RTPSEntity};
 use super::graph::{entity, prefix};
 use super::packet::{Content, data, discovery_port};
 use super::participant::{Reader, Shared, Writer};
+#[cfg(feature = "security")]
+use super::queue::Queue;
 use super::topic::{Taken, next};
-use super::{EdgeError, Quality};
+use super::{EdgeError, Quality, threads};
 
 /// How often memory and threads are looked at \[s\]. A flood of promises fills 1 GB/s.
 const LOOK: Duration = Duration::from_millis(10);
 /// Looks between two samples \[1\].
 const BEAT: u32 = 10;
-/// How long no sample may come back, and how long the loop may be kept by the middleware \[s\].
-const DEAF: Duration = Duration::from_millis(700);
 /// Growth of the process since opening at which it is given up, and at which the kernel refuses memory \[kB\].
 const GROWTH: u64 = 128 * 1024;
 const MOST_GROWTH: u64 = 2 * GROWTH;
 /// The same for a process that has not opened its topics yet, which takes some of it.
 const MOST_OPENING: u64 = 3 * GROWTH;
-/// How long all peers that were heard before may be silent at once \[s\].
-const LONELY: Duration = Duration::from_secs(2);
 /// How long the loop has to say its last word once the middleware is given up \[s\].
 const LAST_WORD: Duration = Duration::from_millis(100);
+
+/// How long the middleware may keep silent.
+#[derive(Clone, Copy)]
+struct Patience {
+    /// How long no sample may come back, and how long the loop may be kept by the middleware \[s\].
+    deaf: Duration,
+    /// How long all peers that were heard before may be silent at once \[s\].
+    lonely: Duration,
+    /// How much of its threads' waiting for a processor, at most, is not counted as silence \[s\].
+    starved: Duration,
+}
+
+const IN_THE_CLEAR: Patience =
+    Patience { deaf: Duration::from_millis(700), lonely: Duration::from_secs(2), starved: Duration::ZERO };
+/// With keys RustDDS is silent for longer (`.github/upstream.md`, 9). Its threads share one lock, at which the second to
+/// come sleeps 0.1 s, again and again while keys of all endpoints are exchanged with each peer that appears: measured
+/// was 0.9 s undisturbed (unoptimised). It decrypts all that has arrived before it looks at its socket again: up to 14 s
+/// on a computer with more to do than processors. To end the process then makes all its peers exchange keys once more,
+/// which keeps them silent in turn.
+#[cfg(feature = "security")]
+const WITH_KEYS: Patience = Patience {
+    deaf: Duration::from_secs(3),
+    lonely: Duration::from_secs(8),
+    starved: Duration::from_secs(9),
+};
+
+impl Patience {
+    fn of(shared: &Shared) -> Self {
+        #[cfg(feature = "security")]
+        if shared.is_secured {
+            return WITH_KEYS;
+        }
+        let _ = shared;
+        IN_THE_CLEAR
+    }
+
+    /// How much of a silence is not counted in which the threads have waited so long for a processor \[s\].
+    fn forgiven(&self, waited: Duration) -> Duration {
+        waited.min(self.starved)
+    }
+}
 
 /// Exit code of a process whose middleware was given up: a new one will do (EX_SOFTWARE of sysexits.h).
 pub const MIDDLEWARE_GONE: u8 = 70;
@@ -42,11 +83,14 @@ pub const MIDDLEWARE_GONE: u8 = 70;
 /// The state shared by the loop and its watchdog.
 pub struct Pulse {
     begun: Instant,
+    patience: Patience,
     given_up: AtomicBool,
     /// When the loop went into the middleware \[ms since `begun`\]; 0 while it is out.
     inside_since: AtomicU64,
-    /// When the loop last heard a peer.
-    heard: Mutex<Option<Instant>>,
+    /// How long the threads of the middleware had waited for a processor when last looked at \[ms\].
+    waited: AtomicU64,
+    /// When the loop last heard a peer, and how long the threads had waited by then.
+    heard: Mutex<Option<(Instant, Duration)>>,
 }
 
 /// While it lives the loop is in the hands of the middleware.
@@ -59,6 +103,26 @@ impl Drop for Inside<'_> {
 }
 
 impl Pulse {
+    fn new(patience: Patience) -> Self {
+        let (given_up, [inside_since, waited]) = (AtomicBool::new(false), [0, 0].map(AtomicU64::new));
+        Self { begun: Instant::now(), patience, given_up, inside_since, waited, heard: Mutex::default() }
+    }
+
+    fn look_at_waits(&self) -> Duration {
+        self.waited.store(threads::waited().as_millis() as u64, Ordering::Relaxed);
+        self.waited()
+    }
+
+    fn waited(&self) -> Duration {
+        Duration::from_millis(self.waited.load(Ordering::Relaxed))
+    }
+
+    /// Whether it has been silent for too long since it was heard.
+    fn is_lonely(&self, (at, waited): (Instant, Duration)) -> bool {
+        let forgiven = self.patience.forgiven(self.waited().saturating_sub(waited));
+        at.elapsed() > self.patience.lonely + forgiven
+    }
+
     /// Whether the process is about to end.
     pub fn is_given_up(&self) -> bool {
         self.given_up.load(Ordering::Relaxed)
@@ -69,8 +133,8 @@ impl Pulse {
     pub fn hears(&self, any_peer: bool) {
         let mut heard = self.heard.lock().unwrap_or_else(PoisonError::into_inner);
         if any_peer {
-            *heard = Some(Instant::now());
-        } else if heard.is_some_and(|heard| heard.elapsed() > LONELY)
+            *heard = Some((Instant::now(), self.waited()));
+        } else if heard.is_some_and(|heard| self.is_lonely(heard))
             && !self.given_up.swap(true, Ordering::Relaxed)
         {
             tracing::error!("the middleware is given up: all peers that were heard before are silent");
@@ -105,6 +169,41 @@ impl Pulse {
         match self.inside_since.load(Ordering::Relaxed) {
             0 => Duration::ZERO,
             since => self.begun.elapsed().saturating_sub(Duration::from_millis(since)),
+        }
+    }
+}
+
+/// What shows that the middleware listens.
+enum Proof {
+    Sample(Loop),
+    /// Of a secured participant, which takes no sample that it has not authenticated.
+    #[cfg(feature = "security")]
+    Queue(Queue),
+}
+
+impl Proof {
+    fn open(shared: &Shared, participant: &DomainParticipant) -> Result<Self, EdgeError> {
+        #[cfg(feature = "security")]
+        if shared.is_secured {
+            return Queue::open(participant).map(Self::Queue);
+        }
+        Loop::open(shared, participant).map(Self::Sample)
+    }
+
+    fn send(&mut self, number: u32) {
+        match self {
+            Self::Sample(way) => way.send(number),
+            #[cfg(feature = "security")]
+            Self::Queue(queue) => queue.send(number),
+        }
+    }
+
+    /// Whether something that was sent has been taken since this was last asked.
+    fn is_taken(&mut self) -> bool {
+        match self {
+            Self::Sample(way) => way.hear().is_some(),
+            #[cfg(feature = "security")]
+            Self::Queue(queue) => queue.is_taken(),
         }
     }
 }
@@ -164,13 +263,11 @@ impl Loop {
 
 /// Starts the thread that watches; it ends the process with [`MIDDLEWARE_GONE`].
 pub(super) fn start(shared: &Shared, participant: &DomainParticipant) -> Result<Arc<Pulse>, EdgeError> {
-    let mut way = Loop::open(shared, participant)?;
-    let (given_up, inside_since) = (AtomicBool::new(false), AtomicU64::new(0));
-    let heard = Mutex::default();
-    let pulse = Arc::new(Pulse { begun: Instant::now(), given_up, inside_since, heard });
+    let mut proof = Proof::open(shared, participant)?;
+    let pulse = Arc::new(Pulse::new(Patience::of(shared)));
     let seen = pulse.clone();
     let watch = move || {
-        let (reason, last_word) = watch(&mut way, &seen);
+        let (reason, last_word) = watch(&mut proof, &seen);
         seen.given_up.store(true, Ordering::Relaxed);
         tracing::error!("the middleware is given up: {reason}");
         std::thread::sleep(last_word);
@@ -182,12 +279,12 @@ pub(super) fn start(shared: &Shared, participant: &DomainParticipant) -> Result<
 }
 
 /// Watches until there is a reason to give up; with it how long the loop has for its last word.
-fn watch(way: &mut Loop, pulse: &Pulse) -> (String, Duration) {
+fn watch(proof: &mut Proof, pulse: &Pulse) -> (String, Duration) {
     let most = memory("VmRSS:").unwrap_or(0) + GROWTH;
     bound_memory(MOST_GROWTH);
-    let threads = threads_of_middleware();
+    let (patience, threads) = (pulse.patience, threads::count());
     let (mut sent, mut last_look, mut silence) = (0_u32, Instant::now(), Duration::ZERO);
-    let mut look = 0_u32;
+    let (mut look, mut waited) = (0_u32, pulse.look_at_waits());
     loop {
         look = look.wrapping_add(1);
         std::thread::sleep(LOOK);
@@ -199,23 +296,26 @@ fn watch(way: &mut Loop, pulse: &Pulse) -> (String, Duration) {
             return (format!("the process has grown to {} MB", size / 1024), Duration::ZERO);
         }
         if look.is_multiple_of(BEAT) {
-            if threads_of_middleware() < threads {
+            if threads::count() < threads {
                 return ("one of its threads has ended".into(), LAST_WORD);
             }
+            pulse.look_at_waits();
             sent = sent.wrapping_add(1);
-            way.send(sent);
+            proof.send(sent);
         }
-        if way.hear().is_some() {
-            silence = Duration::ZERO;
+        if proof.is_taken() {
+            (silence, waited) = (Duration::ZERO, pulse.waited());
         }
-        if silence > DEAF {
+        let kept = pulse.kept_for();
+        let limit = patience.deaf + patience.forgiven(pulse.waited().saturating_sub(waited));
+        if silence > limit {
             return (
                 format!("it has heard nothing for {:.1} s, not even us", silence.as_secs_f64()),
                 LAST_WORD,
             );
         }
-        if pulse.kept_for() > DEAF {
-            return (format!("it has kept the loop for {:.1} s", pulse.kept_for().as_secs_f64()), LAST_WORD);
+        if kept > limit {
+            return (format!("it has kept the loop for {:.1} s", kept.as_secs_f64()), LAST_WORD);
         }
     }
 }
@@ -247,22 +347,30 @@ fn memory(key: &str) -> Option<u64> {
     line.split_whitespace().next()?.parse().ok()
 }
 
-/// Threads that RustDDS has in this process \[1\]; 0 where the system does not say.
-fn threads_of_middleware() -> usize {
-    let Ok(threads) = std::fs::read_dir("/proc/self/task") else { return 0 };
-    let name = |thread: std::fs::DirEntry| std::fs::read_to_string(thread.path().join("comm")).ok();
-    threads.flatten().filter_map(name).filter(|name| name.starts_with("RustDDS")).count()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::ros::edge::{Edge, Options};
 
     #[test]
+    fn silence_of_a_middleware_without_a_processor_is_forgiven_for_a_while_and_in_the_clear_never() {
+        let (moment, hour) = (Duration::from_millis(1), Duration::from_secs(3600));
+        let is_lonely = |starved, waited: Duration| {
+            let pulse = Pulse::new(Patience { deaf: hour, lonely: moment, starved });
+            pulse.hears(true);
+            pulse.waited.store(waited.as_millis() as u64, Ordering::Relaxed);
+            std::thread::sleep(5 * moment);
+            pulse.hears(false);
+            pulse.is_given_up()
+        };
+        assert!(!is_lonely(hour, hour));
+        assert!(is_lonely(hour, Duration::ZERO) && is_lonely(moment, hour));
+        assert!(is_lonely(IN_THE_CLEAR.starved, hour));
+    }
+
+    #[test]
     fn time_of_untimed_work_is_not_counted() {
-        let (given_up, inside_since) = (AtomicBool::new(false), AtomicU64::new(0));
-        let pulse = Pulse { begun: Instant::now(), given_up, inside_since, heard: Mutex::default() };
+        let pulse = Pulse::new(IN_THE_CLEAR);
         let _inside = pulse.inside();
         let work = Duration::from_millis(50);
         pulse.untimed(|| {
@@ -299,6 +407,6 @@ mod tests {
         }
         std::thread::sleep(Duration::from_millis(50));
         assert_eq!(way.hear(), None);
-        assert!(threads_of_middleware() >= 2 && memory("VmRSS:").is_some_and(|size| size > 1000));
+        assert!(threads::count() >= 2 && memory("VmRSS:").is_some_and(|size| size > 1000));
     }
 }

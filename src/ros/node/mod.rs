@@ -19,13 +19,14 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-use super::arguments::{DiscoveryRange, NameError, Names, RosArguments};
+use super::arguments::{NameError, Names, RosArguments};
 use super::edge::clock::Clock;
 use super::edge::lifecycle::{Lifecycle, Transition};
 use super::edge::loggers::{LogLevel, Loggers};
 use super::edge::parameters::{Change, Parameters};
 use super::edge::pulse::Pulse;
-use super::edge::{Edge, EdgeError, Options, Publisher, Quality, Service, Subscription};
+use super::edge::{EdgeError, Publisher, Quality, Service, Subscription};
+use super::network;
 use crate::messages::Message;
 use crate::messages::diagnostic_msgs::DiagnosticArray;
 use crate::messages::flockform_msgs::{LoopEvent, SetFormation, SetFormationResponse};
@@ -94,7 +95,7 @@ impl FormationNode {
         let mut control = Control::new(swarm)?;
         let part = NodeScope::take(swarm, &mut control, member)?;
         let names = names(arguments, member)?;
-        let edge = Edge::open(options(arguments))?;
+        let edge = network::join(arguments)?;
         let node = edge.named_node(&names)?;
 
         let is_configured = Arc::default();
@@ -481,12 +482,6 @@ pub fn names(arguments: &RosArguments, member: Option<&str>) -> Result<Names, Na
         Some(member) => names.of_robot(member),
         None => Ok(names),
     }
-}
-
-/// Where to take part, as the environment says.
-pub fn options(arguments: &RosArguments) -> Options {
-    let environment = &arguments.environment;
-    Options { domain: environment.domain, loopback_only: environment.discovery == DiscoveryRange::Localhost }
 }
 
 /// Names of topics under the rules given to a node.
