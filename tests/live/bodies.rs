@@ -200,7 +200,7 @@ fn a_file_that_is_edited_meanwhile_changes_nothing() {
 
 #[test]
 fn hands_that_take_and_take_are_refused_before_they_fill_the_memory() {
-    let mut body = begun("tension", &["body.shape={ kind = \"grid\", columns = 3, rows = 4000 }"]);
+    let mut body = begun("tension", &["body.shape={ kind = \"grid\", columns = 2, rows = 30000 }"]);
     let clamped = (0..body.engine().body().count()).find(|&i| body.engine().roles()[i].name() == "clamped");
     let grab = Command::Grab { particle: clamped.expect("held"), alone: false };
     let refused = (0..1000).find_map(|_| body.perform(0, &grab).err());
