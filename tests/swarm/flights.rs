@@ -155,7 +155,7 @@ fn a_broken_bound_names_the_robots_the_time_and_the_place() {
     flockform::export::flight::write_flight(&out, &swarm, &record, &report).expect("written");
     let figure = std::fs::read_to_string(out.path("errors.svg")).expect("the figure");
     assert!(figure.contains("declared clearance"), "the bound has a line in the chart");
-    let recorder = flockform::export::report::FlightRecorder::new(&Flight::new(&swarm).expect("flies"));
+    let mut recorder = flockform::export::report::FlightRecorder::new(&Flight::new(&swarm).expect("flies"));
     let stage = recorder.stage(&swarm, &report);
     let page =
         flockform::export::report::flight::write(&out, &swarm, &record, &report, stage).expect("written");
