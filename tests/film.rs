@@ -162,7 +162,7 @@ fn each_frame_shows_the_particles_in_their_places_and_in_the_colours_of_their_di
     let on_sheet =
         |[x, y]: [f64; 2]| [left + scale * (x - low[0] + margin), bottom - scale * (y - low[1] + margin)];
     // The bar beside the plot has bands of 0.1 from nothing to the leaders' displacement.
-    let of_bar = |value: f64| last.at([right + 26.0, bottom - (bottom - top) * (value / PULLED).min(0.999)]);
+    let of_bar = |value: f64| last.at([right + 26.0, bottom - (bottom - top) * (value / PULLED).min(0.98)]);
     assert_eq!([of_bar(0.05), of_bar(PULLED)], [[0x44, 0x01, 0x54], [0xfd, 0xe7, 0x25]]);
     let mut checked = 0;
     for particle in particles.iter().filter(|one| one.role != "frame") {
@@ -339,6 +339,9 @@ fn ffmpeg_makes_videos_of_as_many_frames() {
             .expect("ffprobe is there");
         let found = text(&probe.stdout);
         let numbers: Vec<usize> = found.trim().split(',').map(|n| n.parse().expect("a number")).collect();
-        assert!(numbers[2] > STEPS && numbers[0] % 2 == 0 && numbers[1] % 2 == 0, "{found}");
+        assert!(
+            numbers[2] > STEPS && numbers[0].is_multiple_of(2) && numbers[1].is_multiple_of(2),
+            "{found}"
+        );
     }
 }

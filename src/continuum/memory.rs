@@ -1,13 +1,13 @@
 //! The memory that a run takes, before it does.
 
 use super::plan::Plan;
-use crate::flock::body::Cut;
+use crate::flock::body::{Cut, MOST_SITES};
 use crate::flock::law::Weights;
 use crate::geometry::outline::Outline;
 use crate::material::stress::StressState;
 use crate::scene::{BodySource, Scene};
 
-/// Fewest bytes that a run of a scene takes, known before anything is laid out.
+/// Fewest bytes that a run of a scene takes, known before anything is laid out; 0 where its layout is refused anyway.
 pub fn at_least(scene: &Scene) -> f64 {
     let BodySource::Cut(cut) = &scene.body else { return 0.0 };
     let particles = match cut {
@@ -16,7 +16,7 @@ pub fn at_least(scene: &Scene) -> f64 {
             Outline::of_shape(shape).map_or(0.0, |outline| outline.area() / scene.lattice.cell_area())
         }
     };
-    particles * EACH as f64
+    if particles > MOST_SITES as f64 { 0.0 } else { particles * EACH as f64 }
 }
 
 /// Bytes that the run holds when it writes its results, at its largest: what it steps, and the configurations that are

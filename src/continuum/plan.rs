@@ -88,8 +88,9 @@ impl Plan {
                 Neighbourhood::Dynamic { radius } => Some(radius),
                 _ => None,
             },
+            // Matched to the end: of `ramp` alone rustc 1.95 makes a ramp of whatever lies where there is none.
             ramp: match scene.load_steps {
-                Some(LoadSteps::Stepped { ramp, .. }) => ramp,
+                Some(LoadSteps::Stepped { ramp: Some(ramp), .. }) => Some(ramp),
                 _ => None,
             },
             ..Setup::new(body, flock, roles, update)

@@ -126,7 +126,7 @@ pub struct OutlineParticles {
 }
 
 /// More lattice sites than this are refused before memory is asked for.
-const MOST_SITES: u64 = 1 << 28;
+pub const MOST_SITES: u64 = 1 << 28;
 
 /// More neighbour entries than this are refused before memory is asked for: 4 GiB.
 pub const MOST_ENTRIES: u64 = 1 << 30;

@@ -106,11 +106,11 @@ pub fn time(team: &Team, [alone, shared]: [&Plan; 2], (repetitions, seconds): (u
         team.any(false);
         let begin = Instant::now();
         step(&mut parts, steps as usize);
-        let own = tally.lock().unwrap_or_else(PoisonError::into_inner).seconds;
+        let own =
+            tally.lock().unwrap_or_else(PoisonError::into_inner).seconds / begin.elapsed().as_secs_f64();
         let [longest] = team.largest([own]);
-        let all = begin.elapsed().as_secs_f64();
-        of_all.push(all / steps as f64);
-        waited.push(longest / all);
+        of_all.push(begin.elapsed().as_secs_f64() / steps as f64);
+        waited.push(longest);
     }
     Times { alone: median(&mut of_one), shared: median(&mut of_all), in_exchange: median(&mut waited) }
 }

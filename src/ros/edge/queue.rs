@@ -110,6 +110,7 @@ mod tests {
         take();
         assert!(queue.is_taken(), "the first is another");
         (0..2).for_each(|_| take());
+        assert!(!queue.is_taken(), "nothing was sent since");
 
         let stranger = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0)).expect("a port");
         stranger.send_to(&[0; 30], (Ipv4Addr::LOCALHOST, port)).expect("sent");
