@@ -67,12 +67,19 @@ const onScreen = (page, what) =>
     return [box.left + x, box.top + y];
   }, what);
 
+// By script: a hand holds the pointer, and what is pressed by it is let go elsewhere.
+const play = (page) => page.evaluate(() => document.getElementById("play").click());
+
 async function drag(page, other) {
+  // A particle that moves is gone from where it was seen.
+  await play(page);
+  await settled(page);
   await page.locator(".canvas").scrollIntoViewIfNeeded();
   const before = await place(page, asked.drag);
   const [x, y] = await onScreen(page, asked.drag);
   await page.mouse.move(x, y);
   await page.mouse.down();
+  await play(page);
   for (let k = 1; k <= 12; k++) {
     await page.mouse.move(x + 4 * k, y - 3 * k);
     await later(page, await clock(page));
@@ -116,8 +123,7 @@ async function set(page) {
 }
 
 async function fault(page) {
-  // A robot that flies is gone from where it was seen.
-  await page.click("#play");
+  await play(page);
   await settled(page);
   await page.locator(".canvas").scrollIntoViewIfNeeded();
   const [x, y] = await onScreen(page, asked.fault);
@@ -125,7 +131,7 @@ async function fault(page) {
   await page.selectOption("#live-fault", "dead");
   await page.waitForFunction(() => window.report.live.session.status.faults.length > 0);
   seen.hurt = await page.evaluate(() => window.report.live.session.status.faults);
-  await page.click("#play");
+  await play(page);
   await page.fill("#live-key", "flight.noise=0.02");
   await page.press("#live-key", "Enter");
   await later(page, (await clock(page)) + 0.5);
