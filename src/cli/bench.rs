@@ -46,7 +46,7 @@ pub enum BenchCommand {
         #[arg(long, value_name = "DIR")]
         out: Option<PathBuf>,
     },
-    /// Efficiency on more and more ranks, measured, counted, and foretold for thousands
+    /// Efficiency on more and more ranks, measured, counted, and predicted for thousands
     #[command(
         after_help = "Examples:\n  flockform bench scale --out /tmp/scale\n  mpirun -n 4 flockform bench scale    (built with the feature mpi)"
     )]

@@ -3,7 +3,8 @@
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
-use clap::{Args, ValueEnum};
+use clap::Args;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use flockform::export::film::{Film, FilmColour, FilmError, FilmFile, FilmFormat, Finished};
 
 use super::interrupt;
@@ -16,33 +17,14 @@ pub struct FilmArguments {
     #[arg(long, value_name = "FILE", value_parser = film_path)]
     film: Option<PathBuf>,
     /// Quantity that colours the film's particles or robots [default: displacement of a body, role in a swarm]
-    #[arg(long, value_name = "QUANTITY", value_enum, requires = "film")]
-    film_colour: Option<Colour>,
+    #[arg(long, value_name = "QUANTITY", value_parser = film_colour(), requires = "film")]
+    film_colour: Option<FilmColour>,
 }
 
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum Colour {
-    Role,
-    Displacement,
-    Pe1,
-    Pe2,
-    Strain,
-    VonMises,
-    Clearance,
-}
-
-impl From<Colour> for FilmColour {
-    fn from(colour: Colour) -> Self {
-        match colour {
-            Colour::Role => Self::Role,
-            Colour::Displacement => Self::Displacement,
-            Colour::Pe1 => Self::Pe1,
-            Colour::Pe2 => Self::Pe2,
-            Colour::Strain => Self::Strain,
-            Colour::VonMises => Self::VonMises,
-            Colour::Clearance => Self::Clearance,
-        }
-    }
+fn film_colour() -> impl TypedValueParser<Value = FilmColour> {
+    let named = |name: String| FilmColour::ALL.into_iter().find(|colour| colour.name() == name);
+    PossibleValuesParser::new(FilmColour::ALL.map(FilmColour::name))
+        .try_map(move |name| named(name).ok_or("no quantity has this name"))
 }
 
 fn film_path(text: &str) -> Result<PathBuf, FilmError> {
@@ -65,7 +47,7 @@ impl FilmArguments {
         require: impl FnOnce(FilmColour) -> Result<(), FilmError>,
     ) -> Result<Option<AskedFilm>, FilmError> {
         let Some(path) = &self.film else { return Ok(None) };
-        let colour = self.film_colour.map_or(default, FilmColour::from);
+        let colour = self.film_colour.unwrap_or(default);
         require(colour)?;
         let file = FilmFile::create(path, output.out(), output.force)?;
         interrupt::removes([file.part().to_owned()]);

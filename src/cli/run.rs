@@ -13,7 +13,7 @@ use clap::Args;
 use flockform::continuum::digest::{digest, fnv1a};
 use flockform::continuum::equilibrium::run_to_equilibrium_watched;
 use flockform::continuum::looks::Looks;
-use flockform::continuum::memory::foretold;
+use flockform::continuum::memory::predicted;
 use flockform::continuum::plan::Plan;
 use flockform::continuum::run::{Outcome, SharedError, StopReason, require_shareable, resume, run_shared};
 use flockform::export::checkpoint::{self, Checkpoint, RunRequest};
@@ -115,7 +115,7 @@ impl Prepared {
             equilibrium.request.interrupt = Interrupt::new(interrupt::flag());
         }
         let plan = plan(&scene)?;
-        memory::require(&scene, foretold(&scene, &plan) as f64)?;
+        memory::require(&scene, predicted(&scene, &plan) as f64)?;
         let digest = digest(&plan);
         left.as_ref().map_or(Ok(()), |left| left.require_of(&scene, digest))?;
         Ok(Self { left, asked, scene, words, plan, digest })

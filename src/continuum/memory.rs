@@ -21,7 +21,7 @@ pub fn at_least(scene: &Scene) -> f64 {
 
 /// Bytes that the run holds when it writes its results, at its largest: what it steps, and the configurations that are
 /// kept; figures and the report come on top of it.
-pub fn foretold(scene: &Scene, plan: &Plan) -> usize {
+pub fn predicted(scene: &Scene, plan: &Plan) -> usize {
     stepped(plan) + results(scene, plan)
 }
 

@@ -1,5 +1,5 @@
 //! The outputs of a benchmark of ranks: `scale.json` with everything, `scale.csv` with what was measured, and the figure
-//! `scale`, efficiency against ranks, measured and foretold.
+//! `scale`, efficiency against ranks, measured and predicted.
 
 use std::path::PathBuf;
 
@@ -12,7 +12,7 @@ use super::figures::chart::{Axis, Chart, Series, Style, draw_below_each_other};
 use super::figures::{self, SERIES};
 use super::summary::write_signed;
 use crate::bench::scale::model::Link;
-use crate::bench::scale::{Case, Foretold, Report};
+use crate::bench::scale::{Case, Predicted, Report};
 
 /// The file of a benchmark of ranks, in place of a summary.
 const FILE: &str = "scale.json";
@@ -27,7 +27,7 @@ struct Row {
     alone_seconds_per_step: f64,
     efficiency: f64,
     share_in_exchange: f64,
-    foretold_seconds_per_step: f64,
+    predicted_seconds_per_step: f64,
 }
 
 /// Writes everything; times in \[s\].
@@ -53,42 +53,42 @@ fn row(scaling: &'static str, case: Case) -> Row {
         alone_seconds_per_step: case.alone_seconds_per_step,
         efficiency: case.efficiency,
         share_in_exchange: case.share_in_exchange,
-        foretold_seconds_per_step: case.foretold_seconds_per_step,
+        predicted_seconds_per_step: case.predicted_seconds_per_step,
     }
 }
 
 /// Efficiency against ranks: one chart for the same body, and one for as much of a body each.
 pub fn figure(report: &Report) -> String {
-    let [[columns, rows], [each, high]] = [report.foretold_body, report.foretold_part];
+    let [[columns, rows], [each, high]] = [report.predicted_body, report.predicted_part];
     let strong = chart(
         report,
-        ("The same body on more ranks", format!("foretold: {columns} x {rows} particles")),
+        ("The same body on more ranks", format!("predicted: {columns} x {rows} particles")),
         (&report.strong, [|one| one.strong_efficiency, |one| one.strong_efficiency_on_network]),
     );
     let weak = chart(
         report,
-        ("As much of a body for each rank", format!("foretold: {each} x {high} particles each")),
+        ("As much of a body for each rank", format!("predicted: {each} x {high} particles each")),
         (&report.weak, [|one| one.weak_efficiency, |one| one.weak_efficiency_on_network]),
     );
     draw_below_each_other(&[strong, weak])
 }
 
-type Efficiency = fn(&Foretold) -> f64;
+type Efficiency = fn(&Predicted) -> f64;
 
 fn chart(
     report: &Report,
     (title, body): (&str, String),
-    (cases, foretold): (&[Case], [Efficiency; 2]),
+    (cases, predicted): (&[Case], [Efficiency; 2]),
 ) -> Chart<'static> {
     let measured = cases.iter().map(|case| [case.ranks as f64, case.efficiency]).collect();
     let Link { latency_seconds, bytes_per_second } = Link::NETWORK;
     let network = format!(
-        "foretold, a network assumed to take {:.0} us a message and carry {:.0} GB/s",
+        "predicted, a network assumed to take {:.0} us a message and carry {:.0} GB/s",
         1e6 * latency_seconds,
         1e-9 * bytes_per_second
     );
     let line = |name: String, n: usize, of: Efficiency| {
-        let points = report.foretold.iter().map(|one| [one.ranks as f64, of(one)]).collect();
+        let points = report.predicted.iter().map(|one| [one.ranks as f64, of(one)]).collect();
         Series { name, colour: SERIES[n], style: Style::Line, points }
     };
     let what = format!("measured here, ranks are {}", report.ranks_are);
@@ -100,8 +100,8 @@ fn chart(
             Axis { quantity: "efficiency", unit: "", is_log: false },
         ],
         series: vec![
-            line("foretold, messages as measured here".into(), 1, foretold[0]),
-            line(network, 2, foretold[1]),
+            line("predicted, messages as measured here".into(), 1, predicted[0]),
+            line(network, 2, predicted[1]),
             Series { name: what, colour: SERIES[0], style: Style::Beads, points: measured },
         ],
         landmarks: Vec::new(),

@@ -1,9 +1,9 @@
-//! How a body scales over ranks: measured on those of this computer, counted on 64, foretold for 4,096.
+//! How a body scales over ranks: measured on those of this computer, counted on 64, predicted for 4,096.
 //!
 //! * **strong**: the same body on more ranks. **weak**: as many columns for each rank. Both take turns with one rank alone,
 //!   and every rank has one thread. Without a launcher ranks are threads of this process; under `mpirun` they are processes.
 //! * **counted**: messages, bytes and updates of small bodies on up to 64 ranks, beside those of the [`model`].
-//! * **foretold**: the model with the cost of an update and of a message as they were measured here, and with the messages of
+//! * **predicted**: the model with the cost of an update and of a message as they were measured here, and with the messages of
 //!   a network that is assumed.
 
 pub mod model;
@@ -52,15 +52,15 @@ const COUNTED: [usize; 7] = [1, 2, 4, 8, 16, 32, 64];
 /// Columns of each of these ranks, rows, and steps that are counted.
 const SMALL: ([usize; 2], usize) = ([48, 8], 64);
 
-/// Ranks for which efficiencies are foretold, the body that they share, and that of each.
-const FORETOLD: [usize; 6] = [1, 4, 16, 64, 512, 4096];
+/// Ranks for which efficiencies are predicted, the body that they share, and that of each.
+const PREDICTED: [usize; 6] = [1, 4, 16, 64, 512, 4096];
 const LARGE: [usize; 2] = [16_384, 16_384];
 const LARGE_EACH: [usize; 2] = [1024, 4096];
 
 /// Columns of a band of a body this large: see `sweep::rows`.
 const BAND: usize = 3;
 
-/// Everything that was measured, counted and foretold.
+/// Everything that was measured, counted and predicted.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Report {
     /// Whether this was the quick run, whose times mean little.
@@ -79,12 +79,12 @@ pub struct Report {
     pub weak: Vec<Case>,
     /// Counts of small bodies, beside the model's.
     pub counted: Vec<Counted>,
-    /// The body of `strong_efficiency` in what is foretold: columns, rows.
-    pub foretold_body: [usize; 2],
+    /// The body of `strong_efficiency` in what is predicted: columns, rows.
+    pub predicted_body: [usize; 2],
     /// The part of a rank in `weak_efficiency`: columns, rows.
-    pub foretold_part: [usize; 2],
+    pub predicted_part: [usize; 2],
     /// Efficiencies by the model.
-    pub foretold: Vec<Foretold>,
+    pub predicted: Vec<Predicted>,
 }
 
 /// A body on some ranks.
@@ -103,7 +103,7 @@ pub struct Case {
     /// Share of the time that the rank that waited longest was in exchanges, waiting for slower ones included \[1\].
     pub share_in_exchange: f64,
     /// The model's \[s\].
-    pub foretold_seconds_per_step: f64,
+    pub predicted_seconds_per_step: f64,
 }
 
 /// Counts of the rank that has most, per step.
@@ -116,7 +116,7 @@ pub struct Counted {
     /// Messages, bytes and updates that were counted.
     pub counted: Counts,
     /// The same by the model.
-    pub foretold: Counts,
+    pub predicted: Counts,
 }
 
 /// Of one rank, per step.
@@ -130,9 +130,9 @@ pub struct Counts {
     pub updates: f64,
 }
 
-/// Efficiencies that nobody has measured.
+/// Efficiencies that were not measured.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Foretold {
+pub struct Predicted {
     /// How many ranks.
     pub ranks: usize,
     /// With the messages that were measured here \[1\].
@@ -165,10 +165,10 @@ pub fn run(options: &Options, team: Option<&Team>) -> Result<Report, ThreadPoolB
     }
     let model = Model { update_seconds: update_seconds(&weak), link };
     for case in strong.iter_mut().chain(&mut weak) {
-        case.foretold_seconds_per_step = model.seconds(&grid(case.body).load(case.ranks));
+        case.predicted_seconds_per_step = model.seconds(&grid(case.body).load(case.ranks));
     }
     let counted = COUNTED.map(counted).into_iter().collect::<Result<_, _>>()?;
-    let foretold = FORETOLD.map(|ranks| Foretold::new(ranks, &model)).into();
+    let predicted = PREDICTED.map(|ranks| Predicted::new(ranks, &model)).into();
     Ok(Report {
         quick: options.quick,
         processor: processor(),
@@ -178,9 +178,9 @@ pub fn run(options: &Options, team: Option<&Team>) -> Result<Report, ThreadPoolB
         strong,
         weak,
         counted,
-        foretold_body: LARGE,
-        foretold_part: LARGE_EACH,
-        foretold,
+        predicted_body: LARGE,
+        predicted_part: LARGE_EACH,
+        predicted,
     })
 }
 
@@ -197,7 +197,7 @@ fn update_seconds(weak: &[Case]) -> f64 {
     super::machine::median(&mut weak.iter().map(of).collect::<Vec<f64>>())
 }
 
-/// A case; what is foretold comes later.
+/// A case; its prediction comes later.
 fn measured(
     effort: &Effort,
     [alone, shared]: [[usize; 2]; 2],
@@ -218,7 +218,7 @@ fn measured(
         alone_seconds_per_step: times.alone,
         efficiency: times_as_large * times.alone / (ranks as f64 * times.shared),
         share_in_exchange: times.in_exchange,
-        foretold_seconds_per_step: f64::NAN,
+        predicted_seconds_per_step: f64::NAN,
     })
 }
 
@@ -232,11 +232,11 @@ fn counted(ranks: usize) -> Result<Counted, ThreadPoolBuildError> {
     let each = |count: u64| count as f64 / steps as f64;
     let counted = Counts { messages: each(messages), bytes: each(bytes), updates: each(updates) };
     let load = grid(body).load(ranks);
-    let foretold = Counts { messages: load.messages, bytes: load.bytes, updates: load.updates };
-    Ok(Counted { ranks, body, counted, foretold })
+    let predicted = Counts { messages: load.messages, bytes: load.bytes, updates: load.updates };
+    Ok(Counted { ranks, body, counted, predicted })
 }
 
-impl Foretold {
+impl Predicted {
     fn new(ranks: usize, here: &Model) -> Self {
         let network = Model { link: Link::NETWORK, ..*here };
         let (body, part) = (grid(LARGE), grid(LARGE_EACH));
@@ -257,28 +257,28 @@ mod tests {
     #[test]
     fn what_is_exchanged_is_what_the_model_says_up_to_64_ranks() {
         for ranks in COUNTED {
-            let Counted { counted, foretold, .. } = super::counted(ranks).expect("threads");
-            assert_eq!(counted.messages, foretold.messages, "{ranks} ranks");
-            assert_eq!(counted.bytes, foretold.bytes, "{ranks} ranks");
+            let Counted { counted, predicted, .. } = super::counted(ranks).expect("threads");
+            assert_eq!(counted.messages, predicted.messages, "{ranks} ranks");
+            assert_eq!(counted.bytes, predicted.bytes, "{ranks} ranks");
             // The model gives each rank whole bands; ends of the body have held columns.
-            let off = counted.updates / foretold.updates;
-            assert!((0.93..=1.0).contains(&off), "{ranks} ranks: {counted:?}, {foretold:?}");
+            let off = counted.updates / predicted.updates;
+            assert!((0.93..=1.0).contains(&off), "{ranks} ranks: {counted:?}, {predicted:?}");
         }
     }
 
     #[test]
-    fn a_quick_run_measures_all_and_says_what_is_foretold() {
+    fn a_quick_run_measures_all_and_says_what_is_predicted() {
         let report = run(&Options { quick: true, ranks: Some(3) }, None).expect("threads");
         let ranks: Vec<usize> = report.strong.iter().map(|case| case.ranks).collect();
         assert_eq!(ranks, [2, 3]);
         for case in report.strong.iter().chain(&report.weak) {
             assert!(case.seconds_per_step > 0.0 && case.efficiency > 0.0, "{case:?}");
-            assert!(case.foretold_seconds_per_step > 0.0 && case.share_in_exchange < 1.0, "{case:?}");
+            assert!(case.predicted_seconds_per_step > 0.0 && case.share_in_exchange < 1.0, "{case:?}");
         }
         assert!(report.model.link.latency_seconds > 0.0 && report.model.link.bytes_per_second > 1e6);
-        assert_eq!(report.foretold[0].strong_efficiency, 1.0);
+        assert_eq!(report.predicted[0].strong_efficiency, 1.0);
         let json = serde_json::to_value(&report).expect("plain numbers");
-        assert!(json["counted"][6]["foretold"]["bytes"].as_f64() > Some(0.0));
+        assert!(json["counted"][6]["predicted"]["bytes"].as_f64() > Some(0.0));
         let words = report.to_string();
         assert!(words.contains("4096") && words.contains("assumed") && words.contains("threads"), "{words}");
     }

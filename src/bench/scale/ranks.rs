@@ -1,6 +1,6 @@
 //! Ranks that are timed, and what they say to each other, counted.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
@@ -24,6 +24,10 @@ pub struct Tally {
     pub seconds: f64,
 }
 
+fn held(tally: &Mutex<Tally>) -> MutexGuard<'_, Tally> {
+    tally.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
 /// A rank whose messages are counted.
 struct Counted {
     team: Team,
@@ -42,7 +46,7 @@ impl Exchange for Counted {
     fn swap(&mut self, messages: &[(usize, Vec<u64>)], from: &[(usize, usize)]) -> Vec<Vec<u64>> {
         let begin = Instant::now();
         let received = self.team.swap(messages, from);
-        let mut tally = self.tally.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut tally = held(&self.tally);
         tally.seconds += begin.elapsed().as_secs_f64();
         tally.messages += from.len() as u64;
         tally.bytes += from.iter().map(|(_, words)| 8 * *words as u64).sum::<u64>();
@@ -102,12 +106,11 @@ pub fn time(team: &Team, [alone, shared]: [&Plan; 2], (repetitions, seconds): (u
     let (mut of_one, mut of_all, mut waited) = (Vec::new(), Vec::new(), Vec::new());
     for _ in 0..repetitions {
         of_one.extend(whole.as_mut().map(|whole| timed(whole, steps as usize)));
-        *tally.lock().unwrap_or_else(PoisonError::into_inner) = Tally::default();
+        *held(&tally) = Tally::default();
         team.any(false);
         let begin = Instant::now();
         step(&mut parts, steps as usize);
-        let own =
-            tally.lock().unwrap_or_else(PoisonError::into_inner).seconds / begin.elapsed().as_secs_f64();
+        let own = held(&tally).seconds / begin.elapsed().as_secs_f64();
         let [longest] = team.largest([own]);
         of_all.push(begin.elapsed().as_secs_f64() / steps as f64);
         waited.push(longest);
@@ -123,9 +126,9 @@ pub fn count(team: &Team, plan: &Plan, steps: usize) -> (Tally, u64) {
     step(&mut engine, MOST_STEPS);
     let counted = |engine: &Engine| engine.activity().clone().take_counts()[0];
     let before = counted(&engine);
-    *tally.lock().unwrap_or_else(PoisonError::into_inner) = Tally::default();
+    *held(&tally) = Tally::default();
     step(&mut engine, steps);
-    let Tally { messages, bytes, .. } = *tally.lock().unwrap_or_else(PoisonError::into_inner);
+    let Tally { messages, bytes, .. } = *held(&tally);
     let updates = (counted(&engine) - before) / 2;
     let all = team.each([messages, bytes, updates]);
     let most = |k: usize| all.iter().map(|of| of[k]).max().unwrap_or_default();

@@ -20,7 +20,7 @@ impl fmt::Display for Report {
         cases(f, "strong: the same body", &self.strong)?;
         cases(f, "weak: as much for each rank", &self.weak)?;
         self.counts(f)?;
-        self.foretold(f)?;
+        self.predicted(f)?;
         if self.strong.iter().any(|case| case.ranks > self.cores) && self.ranks_are == "threads" {
             writeln!(f, "\nThere were more ranks than cores: they waited for each other in turns.")?;
         }
@@ -35,7 +35,7 @@ fn cases(f: &mut fmt::Formatter<'_>, title: &str, cases: &[Case]) -> fmt::Result
     writeln!(
         f,
         "\n{title:<28} {:>14} {:>12} {:>12} {:>10} {:>12} {:>12}",
-        "body", "one rank", "a step", "efficiency", "in exchange", "foretold"
+        "body", "one rank", "a step", "efficiency", "in exchange", "predicted"
     )?;
     for case in cases {
         writeln!(
@@ -47,7 +47,7 @@ fn cases(f: &mut fmt::Formatter<'_>, title: &str, cases: &[Case]) -> fmt::Result
             milliseconds(case.seconds_per_step),
             100.0 * case.efficiency,
             100.0 * case.share_in_exchange,
-            milliseconds(case.foretold_seconds_per_step),
+            milliseconds(case.predicted_seconds_per_step),
         )?;
     }
     Ok(())
@@ -62,30 +62,30 @@ impl Report {
         writeln!(
             f,
             "\n{:<28} {:>14} {:>22} {:>22} {:>24}",
-            "counted a step (foretold)", "body", "messages", "bytes", "updates"
+            "counted a step (predicted)", "body", "messages", "bytes", "updates"
         )?;
         for case in &self.counted {
-            let beside = |counted: f64, foretold: f64| format!("{counted:.3} ({foretold:.3})");
-            let (counted, foretold) = (&case.counted, &case.foretold);
+            let beside = |counted: f64, predicted: f64| format!("{counted:.3} ({predicted:.3})");
+            let (counted, predicted) = (&case.counted, &case.predicted);
             writeln!(
                 f,
                 "{:<28} {:>14} {:>22} {:>22} {:>24}",
                 format!("{} ranks", case.ranks),
                 format!("{} x {}", case.body[0], case.body[1]),
-                beside(counted.messages, foretold.messages),
-                beside(counted.bytes, foretold.bytes),
-                beside(counted.updates, foretold.updates),
+                beside(counted.messages, predicted.messages),
+                beside(counted.bytes, predicted.bytes),
+                beside(counted.updates, predicted.updates),
             )?;
         }
         Ok(())
     }
 
-    fn foretold(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let [[columns, rows], [each, high]] = [self.foretold_body, self.foretold_part];
+    fn predicted(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [[columns, rows], [each, high]] = [self.predicted_body, self.predicted_part];
         let Link { latency_seconds, bytes_per_second } = Link::NETWORK;
         writeln!(
             f,
-            "\nforetold efficiency of {columns} x {rows} (strong) and of {each} x {high} for each rank (weak), with messages as \
+            "\npredicted efficiency of {columns} x {rows} (strong) and of {each} x {high} for each rank (weak), with messages as \
              they were\nmeasured here, and with those of a network that is assumed: {:.0} us and {:.0} GB/s",
             1e6 * latency_seconds,
             1e-9 * bytes_per_second
@@ -95,7 +95,7 @@ impl Report {
             "{:<28} {:>14} {:>12} {:>16} {:>16}",
             "", "strong, here", "weak, here", "strong, network", "weak, network"
         )?;
-        for one in &self.foretold {
+        for one in &self.predicted {
             let percent = |share: f64| format!("{:.1} %", 100.0 * share);
             writeln!(
                 f,

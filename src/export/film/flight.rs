@@ -16,12 +16,10 @@ const NOISE: f64 = 1e-9;
 /// # Errors
 /// Stress and moves, which bodies have.
 pub fn require_colour(colour: FilmColour) -> Result<(), FilmError> {
-    let colour = match colour {
-        FilmColour::VonMises => "von-mises",
-        FilmColour::Pe2 => "pe2",
-        _ => return Ok(()),
-    };
-    let choices = "role, displacement, pe1, strain, clearance";
+    if !matches!(colour, FilmColour::VonMises | FilmColour::Pe2) {
+        return Ok(());
+    }
+    let (colour, choices) = (colour.name(), "role, displacement, pe1, strain, clearance");
     Err(FilmError::Colour { colour, reason: "robots have none", of: "of a swarm", choices })
 }
 

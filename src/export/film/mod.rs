@@ -53,6 +53,25 @@ pub enum FilmColour {
     Clearance,
 }
 
+impl FilmColour {
+    /// All of them.
+    pub const ALL: [Self; 7] =
+        [Self::Role, Self::Displacement, Self::Pe1, Self::Pe2, Self::Strain, Self::VonMises, Self::Clearance];
+
+    /// The name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Role => "role",
+            Self::Displacement => "displacement",
+            Self::Pe1 => "pe1",
+            Self::Pe2 => "pe2",
+            Self::Strain => "strain",
+            Self::VonMises => "von-mises",
+            Self::Clearance => "clearance",
+        }
+    }
+}
+
 /// Values of a film's particles or robots on a scale for all its frames.
 struct Scale<'a> {
     quantity: &'a str,

@@ -27,12 +27,13 @@ const NOISE: f64 = 1e-9;
 /// Stress without a material, moves of a body that is solved for, and what robots alone have.
 pub fn require_colour(scene: &Scene, colour: FilmColour) -> Result<(), FilmError> {
     let is_solved_at_once = scene.equilibrium.is_some() && scene.load_steps.is_none();
-    let (colour, reason) = match colour {
-        FilmColour::VonMises if scene.material.is_none() => ("von-mises", "the scene has no material"),
-        FilmColour::Pe2 if is_solved_at_once => ("pe2", "a body that is solved for at once makes no moves"),
-        FilmColour::Clearance => ("clearance", "particles keep no clearance, robots do"),
+    let reason = match colour {
+        FilmColour::VonMises if scene.material.is_none() => "the scene has no material",
+        FilmColour::Pe2 if is_solved_at_once => "a body that is solved for at once makes no moves",
+        FilmColour::Clearance => "particles keep no clearance, robots do",
         _ => return Ok(()),
     };
+    let colour = colour.name();
     let choices = "role, displacement, pe1, strain; pe2 of what is stepped, von-mises of a material";
     Err(FilmError::Colour { colour, reason, of: "of a body", choices })
 }
