@@ -1,18 +1,24 @@
-//! The program's log, on standard error: that of a ROS 2 node as ROS 2 nodes write it (`rcutils`), any other short.
+//! The program's log, on standard error: that of a ROS 2 node as ROS 2 nodes write it (`rcutils`), any other short. A node's
+//! lines are for `/rosout` too.
 
 use std::fmt::{self, Debug};
 use std::io::IsTerminal;
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::{SystemTime, UNIX_EPOCH};
 
+use flockform::messages::builtin_interfaces::Time;
 use flockform::messages::escaped;
+use flockform::messages::rcl_interfaces::Log;
 use flockform::ros::arguments::{RosArguments, Severity};
 use flockform::ros::edge::loggers::LogLevel;
+use flockform::ros::edge::rosout::MOST_WAITING;
 use flockform::ros::{node, robots};
 use tracing::field::Field;
 use tracing::{Event, Level, Metadata, Subscriber};
 use tracing_subscriber::EnvFilter;
 use tracing_subscriber::fmt::format::{self, Writer};
+use tracing_subscriber::fmt::writer::BoxMakeWriter;
 use tracing_subscriber::fmt::{FmtContext, FormatEvent, FormatFields};
 use tracing_subscriber::registry::LookupSpan;
 
@@ -44,6 +50,13 @@ impl NodeLog {
 }
 
 static NODE_LOG: OnceLock<NodeLog> = OnceLock::new();
+/// The end of a node's lines at which they are taken.
+static LINES: Mutex<Option<Receiver<Log>>> = Mutex::new(None);
+
+/// The lines of a node's log, for its topic; none where they are not asked for, or taken already.
+pub fn lines() -> Option<Receiver<Log>> {
+    LINES.lock().unwrap_or_else(PoisonError::into_inner).take()
+}
 
 /// The level of a node's log; none where nothing is to be logged, or what is not a node.
 pub fn level() -> Option<LogLevel> {
@@ -66,25 +79,34 @@ pub fn start(arguments: &Arguments, ros: &RosArguments) {
     let logger = logger(&arguments.command, ros);
     let verbosity = arguments.verbose + u8::from(logger.is_some());
     let given = ros.logging.level_of(logger.as_deref().unwrap_or(node::NAME));
-    let level = if ros.logging.stdout {
+    let is_console = ros.logging.stdout;
+    let is_topic = logger.is_some() && ros.logging.rosout;
+    let level = if is_console || is_topic {
         only_ours(filter_of(given.unwrap_or(Severity::Unset), verbosity))
     } else {
         "off".to_owned()
     };
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| level.into());
     let first = (given.unwrap_or(Severity::Unset), filter.to_string());
-    let log = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr);
+    let writer =
+        if is_console { BoxMakeWriter::new(std::io::stderr) } else { BoxMakeWriter::new(std::io::sink) };
+    let log = tracing_subscriber::fmt().with_env_filter(filter).with_writer(writer);
     let log = log.with_ansi(std::io::stderr().is_terminal()).fmt_fields(format::debug_fn(field));
     match logger {
         None => log.without_time().init(),
         Some(name) => {
             let asked = std::env::var("RCUTILS_CONSOLE_OUTPUT_FORMAT").ok();
             let format = asked.filter(|format| !format.is_empty()).unwrap_or_else(|| NODE_FORMAT.into());
-            let log = log.event_format(NodeLines { name, format }).with_filter_reloading();
+            let lines = is_topic.then(|| {
+                let (sender, lines) = sync_channel(MOST_WAITING);
+                *LINES.lock().unwrap_or_else(PoisonError::into_inner) = Some(lines);
+                sender
+            });
+            let log = log.event_format(NodeLines { name, format, lines }).with_filter_reloading();
             let handle = log.reload_handle();
             let severity = Mutex::new(first.0);
             let filter = Box::new(move |filter| handle.reload(filter).map_err(|error| error.to_string()));
-            if ros.logging.stdout {
+            if is_console || is_topic {
                 // Set once: a process starts one log.
                 let _ = NODE_LOG.set(NodeLog { severity, first, filter });
             }
@@ -135,6 +157,8 @@ struct NodeLines {
     name: String,
     /// With the placeholders of `RCUTILS_CONSOLE_OUTPUT_FORMAT`.
     format: String,
+    /// To `/rosout`, if they go there.
+    lines: Option<SyncSender<Log>>,
 }
 
 impl<S, N> FormatEvent<S, N> for NodeLines
@@ -153,11 +177,30 @@ where
         let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
         let line =
             filled(&self.format, &|placeholder| self.value(placeholder, event.metadata(), since, &message));
+        if let Some(lines) = &self.lines {
+            // Where they are not taken the latest are lost: a log never waits.
+            let _ = lines.try_send(self.record(event.metadata(), since, message));
+        }
         writeln!(writer, "{line}")
     }
 }
 
 impl NodeLines {
+    fn record(&self, of: &Metadata<'_>, since: std::time::Duration, message: String) -> Log {
+        Log {
+            stamp: Time {
+                sec: i32::try_from(since.as_secs()).unwrap_or(i32::MAX),
+                nanosec: since.subsec_nanos(),
+            },
+            level: severity(*of.level()).number() as u8,
+            name: self.name.clone(),
+            msg: message,
+            file: of.file().unwrap_or_default().to_owned(),
+            function: of.module_path().unwrap_or_default().to_owned(),
+            line: of.line().unwrap_or_default(),
+        }
+    }
+
     fn value(
         &self,
         placeholder: &str,
@@ -166,7 +209,7 @@ impl NodeLines {
         message: &str,
     ) -> Option<String> {
         Some(match placeholder {
-            "severity" => severity(*of.level()).to_owned(),
+            "severity" => severity(*of.level()).name().to_owned(),
             "name" => self.name.clone(),
             "message" => message.to_owned(),
             "time" => format!("{}.{:09}", since.as_secs(), since.subsec_nanos()),
@@ -179,12 +222,12 @@ impl NodeLines {
     }
 }
 
-fn severity(level: Level) -> &'static str {
+fn severity(level: Level) -> Severity {
     match level {
-        Level::ERROR => "ERROR",
-        Level::WARN => "WARN",
-        Level::INFO => "INFO",
-        Level::DEBUG | Level::TRACE => "DEBUG",
+        Level::ERROR => Severity::Error,
+        Level::WARN => Severity::Warn,
+        Level::INFO => Severity::Info,
+        Level::DEBUG | Level::TRACE => Severity::Debug,
     }
 }
 

@@ -61,16 +61,16 @@ fn ended(well: bool) -> ExitCode {
 
 /// In the process that does the work its life, which shared memory needs none of; in the one that outlives it the
 /// code to end with.
-fn life(transport: Transport) -> Result<Result<Option<Life>, ExitCode>, Refusal> {
+fn life(transport: Transport, ros: &RosArguments) -> Result<Result<Option<Life>, ExitCode>, Refusal> {
     match transport {
         Transport::Shm => Ok(Ok(None)),
-        Transport::Ros2 => Ok(supervise().map_err(Refusal::Supervise)?.map(Some)),
+        Transport::Ros2 => Ok(supervise(&ros.security).map_err(Refusal::Supervise)?.map(Some)),
     }
 }
 
 /// Keeps a formation until it is interrupted.
 pub fn node(arguments: &NodeArguments, ros: &RosArguments) -> Result<ExitCode, Refusal> {
-    let life = match life(arguments.transport)? {
+    let life = match life(arguments.transport, ros)? {
         Ok(life) => life,
         Err(code) => return Ok(code),
     };
@@ -88,6 +88,9 @@ pub fn node(arguments: &NodeArguments, ros: &RosArguments) -> Result<ExitCode, R
             }
             if let Some(level) = log::level() {
                 node.serve_log_level(level).map_err(NodeError::from)?;
+            }
+            if let Some(lines) = log::lines() {
+                node.publish_log(lines).map_err(NodeError::from)?;
             }
             announce(&swarm, node.control());
             if let Some(left) = life.left() {
@@ -116,7 +119,7 @@ fn announce(swarm: &Swarm, control: &Control) {
 
 /// Flies simulated robots until they are interrupted.
 pub fn robots(arguments: &RobotsArguments, ros: &RosArguments) -> Result<ExitCode, Refusal> {
-    let life = match life(arguments.transport)? {
+    let life = match life(arguments.transport, ros)? {
         Ok(life) => life,
         Err(code) => return Ok(code),
     };
@@ -126,6 +129,9 @@ pub fn robots(arguments: &RobotsArguments, ros: &RosArguments) -> Result<ExitCod
         Some(mut life) => {
             let layout = if arguments.node_per_robot { Layout::NodePerRobot } else { Layout::OneNode };
             let mut robots = RobotNodes::open(&swarm, ros, layout)?;
+            if let Some(lines) = log::lines() {
+                robots.publish_log(lines).map_err(NodeError::from)?;
+            }
             announce(robots.fleet().robots().len());
             tracing::info!("{}", robots.reached_at());
             if let Some(left) = life.left() {

@@ -15,7 +15,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
-use flockform::ros::edge::pulse::{MIDDLEWARE_GONE, bound_opening};
+use flockform::ros::arguments::Security;
+use flockform::ros::edge::pulse::{MIDDLEWARE_GONE, bound_opening, longest_silence};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
@@ -25,8 +26,8 @@ use super::interrupt;
 const LIFE: &str = "FLOCKFORM_LIFE";
 /// How often a child sends its state \[s\].
 const SEND_PERIOD: Duration = Duration::from_millis(100);
-/// How long a child that has spoken may be silent \[s\].
-const SILENCE: Duration = Duration::from_millis(1500);
+/// How much longer than its own watchdog allows a child that has spoken may be silent \[s\].
+const BEYOND_ITS_WATCHDOG: Duration = Duration::from_millis(800);
 /// How often the child is looked at \[s\].
 const LOOK: Duration = Duration::from_millis(10);
 /// How long a child that was asked to end may take \[s\].
@@ -51,20 +52,20 @@ pub struct Life {
 
 /// Runs this program again as a child, and another whenever one ends for no reason of its own; returns in the child,
 /// and in this process with the code of the last.
-pub fn supervise() -> std::io::Result<Result<Life, ExitCode>> {
+pub fn supervise(security: &Security) -> std::io::Result<Result<Life, ExitCode>> {
     match std::env::var(LIFE).ok().and_then(|number| number.parse().ok()) {
         Some(number) => Ok(Ok(Life::take_up(number)?)),
-        None => lead().map(Err),
+        None => lead(longest_silence(security) + BEYOND_ITS_WATCHDOG).map(Err),
     }
 }
 
-fn lead() -> std::io::Result<ExitCode> {
+fn lead(silence: Duration) -> std::io::Result<ExitCode> {
     let stop = interrupt::serves();
     let (mut state, mut speechless, mut rest) = (b"null\n".to_vec(), 0, Duration::ZERO);
     for number in 1_u32.. {
         let begun = Instant::now();
         let (mut child, lines) = start(number, &state)?;
-        let (code, last) = follow(&mut child, lines, stop)?;
+        let (code, last) = follow(&mut child, lines, silence, stop)?;
         speechless = if last.is_some() { 0 } else { speechless + 1 };
         state = last.unwrap_or(state);
         match code {
@@ -119,10 +120,11 @@ fn start(number: u32, state: &[u8]) -> std::io::Result<(Child, Lines)> {
 
 type Lines = (UnixStream, Receiver<Vec<u8>>);
 
-/// Waits for the end of a child: its exit code, if it gave one, and the last state it sent.
+/// Waits for the end of a child, or ends one that is silent for longer than that: its exit code, if it gave one, and the last state it sent.
 fn follow(
     child: &mut Child,
     (socket, lines): Lines,
+    silence: Duration,
     stop: &AtomicBool,
 ) -> std::io::Result<(Option<u8>, Option<Vec<u8>>)> {
     let (mut last, mut heard, mut asked): (Option<Vec<u8>>, Instant, Option<Instant>) =
@@ -149,7 +151,7 @@ fn follow(
             let _ = socket.shutdown(std::net::Shutdown::Write);
             asked = Some(Instant::now());
         }
-        let patience = if last.is_some() { SILENCE } else { OPENING };
+        let patience = if last.is_some() { silence } else { OPENING };
         let is_silent = asked.is_none() && heard.elapsed() > patience;
         if is_silent || asked.is_some_and(|asked| asked.elapsed() > LEAVING) {
             tracing::error!("the process does not answer and is ended");

@@ -43,6 +43,21 @@ pub const STANDARD: &[(&str, &str)] = &[
          KeyValue[] values",
     ),
     ("diagnostic_msgs/DiagnosticArray", "std_msgs/Header header\nDiagnosticStatus[] status"),
+    (
+        "rcl_interfaces/Log",
+        "byte DEBUG=10
+         byte INFO=20
+         byte WARN=30
+         byte ERROR=40
+         byte FATAL=50
+         builtin_interfaces/Time stamp
+         uint8 level
+         string name
+         string msg
+         string file
+         string function
+         uint32 line",
+    ),
     ("visualization_msgs/UVCoordinate", "float32 u\nfloat32 v"),
     ("visualization_msgs/MeshFile", "string filename\nuint8[] data"),
     (

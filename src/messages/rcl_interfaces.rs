@@ -1,4 +1,4 @@
-//! Package `rcl_interfaces`: parameters.
+//! Package `rcl_interfaces`: parameters, and lines of logs.
 
 use serde::{Deserialize, Serialize};
 
@@ -81,6 +81,25 @@ pub struct ParameterEvent {
 impl Message for ParameterEvent {
     const PACKAGE: &str = "rcl_interfaces";
     const NAME: &str = "ParameterEvent";
+}
+
+/// `msg/Log`: a line of a node's log.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Log {
+    pub stamp: Time,
+    /// Severity by number, 10 (debug) to 50 (fatal).
+    pub level: u8,
+    /// Name of the logger.
+    pub name: String,
+    pub msg: String,
+    pub file: String,
+    pub function: String,
+    pub line: u32,
+}
+
+impl Message for Log {
+    const PACKAGE: &str = "rcl_interfaces";
+    const NAME: &str = "Log";
 }
 
 /// Request of [`GetParameters`], [`GetParameterTypes`] and [`DescribeParameters`].

@@ -22,6 +22,7 @@ use crate::messages::recorder::{parameters, set_parameter};
 use crate::messages::std_msgs::Header;
 use crate::scene::swarm::Swarm;
 use crate::swarm::control::{Control, Mode};
+use crate::swarm::flight::{FlightCommand, commands};
 
 /// How a replay went.
 #[derive(Clone, Debug, Serialize, PartialEq)]
@@ -146,6 +147,8 @@ struct Replay {
     has_events: bool,
     /// Whether the robots were: their time begins at 0, which says of a real one that it has none.
     is_simulated: bool,
+    /// What the file of a simulated flight had done from outside, by ascending period.
+    commands: Vec<(u64, FlightCommand)>,
     active: bool,
     begun: bool,
     /// Poses since the last tick: member, header, pose, arrival \[s\].
@@ -187,6 +190,8 @@ impl Replay {
             names = names.of_robot(member)?;
         }
         let (topics, has_events) = topics(reader, swarm, &control, &names)?;
+        let is_simulated = described.metadata.get("source").is_some_and(|source| source == "swarm");
+        let commands = if is_simulated { commands::of(swarm, &control)? } else { Vec::new() };
         let robot = |name: &String| RobotDifference { name: name.clone(), ..RobotDifference::default() };
         Ok(Self {
             as_recorded: parameters(&before).to_vec(),
@@ -202,7 +207,8 @@ impl Replay {
             heard_of,
             tolerance,
             has_events,
-            is_simulated: described.metadata.get("source").is_some_and(|source| source == "swarm"),
+            is_simulated,
+            commands,
             begun: false,
             waiting: Vec::new(),
             exact: BTreeMap::new(),
@@ -322,6 +328,10 @@ impl Replay {
             self.control.set_active(false);
         } else if !self.has_events {
             self.control.set_active(true);
+        }
+        for command in commands::due(&self.commands, self.ticks) {
+            // What was refused is refused again.
+            command.perform(&mut self.control);
         }
         (self.now, self.ticks) = (now, self.ticks + 1);
         self.exact.insert(Time::from_seconds(now), now);

@@ -5,12 +5,14 @@
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::Receiver;
 
 use serde::{Deserialize, Serialize};
 
 use super::arguments::{Names, RosArguments};
 use super::edge::parameters::{Declaration, Parameters, Store, Value};
 use super::edge::pulse::Pulse;
+use super::edge::rosout::Rosout;
 use super::edge::{EdgeError, Node, Publisher, Quality, Subscription};
 use super::network;
 use super::node::uses::Uses;
@@ -22,6 +24,7 @@ use crate::messages::geometry_msgs::{
     TransformStamped, Vector3,
 };
 use crate::messages::nav_msgs::Odometry;
+use crate::messages::rcl_interfaces::Log;
 use crate::messages::rosgraph_msgs::Clock;
 use crate::messages::std_msgs::Header;
 use crate::messages::tf2_msgs::TFMessage;
@@ -42,6 +45,7 @@ pub struct RobotNodes {
     goals: Vec<Option<[f64; 2]>>,
     link: Link,
     frames: Publisher<TFMessage>,
+    rosout: Option<Rosout>,
     /// Of the watchdog, where there is one.
     pulse: Option<Arc<Pulse>>,
 }
@@ -150,6 +154,7 @@ impl RobotNodes {
             frames: link.nodes[0].publisher(&link.nodes[0].topic("/tf")?, Quality::reliable(100))?,
             pace: Pace::new(1.0 / control.period()),
             goals: vec![None; formation.count()],
+            rosout: None,
             pulse: None,
             fleet,
             link,
@@ -187,6 +192,15 @@ impl RobotNodes {
         true
     }
 
+    /// Publishes these lines of the log, in the name of the first node.
+    ///
+    /// # Errors
+    /// A topic that the middleware refuses.
+    pub fn publish_log(&mut self, lines: Receiver<Log>) -> Result<(), EdgeError> {
+        self.rosout = Some(Rosout::new(&self.link.nodes[0], lines)?);
+        Ok(())
+    }
+
     /// As [`FormationNode::watch_middleware`](super::node::FormationNode::watch_middleware).
     ///
     /// # Errors
@@ -213,7 +227,7 @@ impl RobotNodes {
 
     /// One period: targets in, poses out.
     pub fn tick(&mut self) {
-        let Self { fleet, goals, link, pulse, .. } = self;
+        let Self { fleet, goals, link, pulse, rosout, .. } = self;
         // The publisher of the simulated time starts it.
         let own_time = link.clock.is_some();
         let now = |fleet: &Fleet| if own_time { fleet.time() } else { system_time() };
@@ -223,6 +237,7 @@ impl RobotNodes {
             // All are read-only: nothing changes.
             parameters.poll(now(fleet), None);
         }
+        rosout.iter().for_each(Rosout::publish);
         let sent = fly(fleet, goals, link, now).and_then(|()| self.say_frames());
         if let Err(error) = sent {
             tracing::debug!("{error}");

@@ -10,7 +10,7 @@ fn what_cannot_be_honoured_ends_with_code_2_and_a_remedy() {
         (&[("ROS_SECURITY_ENABLE", "true"), ("ROS_SECURITY_STRATEGY", "Enforce")], &[], "help: "),
         (&[], &["--ros-args", "-e", "talker"], "name it as in"),
         (&[], &["--ros-args", "--log-config-file", "log.yaml"], "leave it out"),
-        (&[], &["--ros-args", "--enable-rosout-logs"], "leave it out"),
+        (&[], &["--ros-args", "--enable-external-lib-logs"], "leave it out"),
     ];
     for subcommand in ["node", "robots"] {
         for (variables, words, remedy) in cases {

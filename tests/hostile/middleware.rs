@@ -229,6 +229,31 @@ fn promises(stranger: &mut Stranger) -> Vec<Vec<u8>> {
     all.into_iter().map(|prefix| stranger.promise(prefix)).collect()
 }
 
+/// Packets of discovery and promises with some bytes of each changed.
+fn changed(stranger: &mut Stranger, next: &mut impl FnMut(usize) -> usize) -> Vec<Vec<u8>> {
+    let mut all = promises(stranger);
+    all.extend(stranger.packets.iter().cloned());
+    for packet in &mut all {
+        for _ in 0..=next(4) {
+            // The magic word stays, or nobody would look at the rest.
+            let at = 4 + next(packet.len() - 4);
+            packet[at] = next(256) as u8;
+        }
+    }
+    all
+}
+
+/// The same numbers below a bound in every run (xorshift64).
+fn chance() -> impl FnMut(usize) -> usize {
+    let mut random = 0x2545_f491_4f6c_dd1d_u64;
+    move |below| {
+        random ^= random << 13;
+        random ^= random >> 7;
+        random ^= random << 17;
+        (random >> 11) as usize % below
+    }
+}
+
 #[test]
 #[ignore = "takes a minute: thirty seconds of a flood"]
 fn a_flood_of_impossible_promises_costs_nothing() {
@@ -268,25 +293,8 @@ fn robots_under_the_same_flood_go_on_where_they_were() {
 fn changed_packets_of_discovery_cost_some_seconds_of_hold_at_most() {
     let mut scene = Scene::open(&LONG);
     let lines = scene.node.lines();
-    let mut random = 0x2545_f491_4f6c_dd1d_u64;
-    let mut next = move |below: usize| {
-        random ^= random << 13;
-        random ^= random >> 7;
-        random ^= random << 17;
-        (random >> 11) as usize % below
-    };
-    let largest = scene.flood(NODE, |stranger| {
-        let mut all = promises(stranger);
-        all.extend(stranger.packets.iter().cloned());
-        for packet in &mut all {
-            for _ in 0..=next(4) {
-                // The magic word stays, or nobody would look at the rest.
-                let at = 4 + next(packet.len() - 4);
-                packet[at] = next(256) as u8;
-            }
-        }
-        all
-    });
+    let mut next = chance();
+    let largest = scene.flood(NODE, |stranger| changed(stranger, &mut next));
     scene.is_well(largest, &lines);
     assert_eq!(scene.node.terminate(), Some(0));
 }
@@ -307,6 +315,71 @@ fn a_process_that_is_killed_or_stands_still_is_followed_by_one_that_goes_on() {
     }
     assert!(scene.judge.mean() > scene.begun_at, "the program began anew");
     assert_eq!(scene.node.terminate(), Some(0));
+}
+
+/// Takes seconds from `FLOCKFORM_ATTACK_SECONDS`.
+#[test]
+#[ignore = "takes a minute; half an hour with FLOCKFORM_ATTACK_SECONDS=1800"]
+fn all_attacks_at_once_on_node_and_robots_make_nothing_unsafe() {
+    const PHASE: Duration = Duration::from_secs(3);
+    let seconds = std::env::var("FLOCKFORM_ATTACK_SECONDS").ok().and_then(|text| text.parse().ok());
+    let length = Duration::from_secs(seconds.unwrap_or(30));
+    // There and back for as long as it takes.
+    let away = "{ seconds = 10.0, hold = 1.0, translate = [5.0, 2.0], rotate = 90.0 }, { seconds = 10.0, hold = 1.0 }, ";
+    let legs = format!("manoeuvres[0].legs=[{}]", away.repeat(length.as_secs() as usize / 20 + 2));
+    let mut scene = Scene::open(&[legs.leak()]);
+    let [node_lines, robot_lines] = [scene.node.lines(), scene.robots.lines()];
+    let (mut next, mut attacks, mut largest, mut longest) = (chance(), [0_u32; 5], [0; 2], 0.0_f64);
+    let since = Instant::now();
+    while since.elapsed() < length {
+        // Any of them, all of them, or none, in which case the swarm flies on.
+        let [promised, masked, mutated] = [0; 3].map(|_| next(2) == 1);
+        let signals = [("KILL", next(6) == 0), ("STOP", next(6) == 0)];
+        for (count, is_on) in attacks.iter_mut().zip([promised, masked, mutated, signals[0].1, signals[1].1])
+        {
+            *count += u32::from(is_on);
+        }
+        let Scene { domain, stranger, judge, robots, node, .. } = &mut scene;
+        for (name, _) in signals.iter().filter(|(_, is_sent)| *is_sent) {
+            let victim = if next(2) == 0 { &*node } else { &*robots };
+            victim.worker().into_iter().for_each(|worker| signal(name, worker));
+        }
+        judge.during(PHASE, || {
+            stranger.listen();
+            // Of those that were: each life has a name of its own.
+            let old = stranger.prefixes.len().saturating_sub(6);
+            stranger.prefixes.drain(..old);
+            let mut packets = Vec::new();
+            if promised || masked {
+                let all = promises(stranger);
+                packets.extend(all.iter().filter(|_| masked).map(|one| hidden(one)));
+                packets.extend(all.into_iter().filter(|_| promised));
+            }
+            if mutated {
+                packets.extend(changed(stranger, &mut next));
+            }
+            for (packet, to) in packets.iter().flat_map(|packet| [ROBOTS, NODE].map(|to| (packet, to))) {
+                stranger.send(packet, port(*domain, to));
+            }
+            for (largest, victim) in largest.iter_mut().zip([&*node, &*robots]) {
+                *largest = victim.worker().map_or(0, resident).max(*largest);
+            }
+        });
+        longest = longest.max(std::mem::take(&mut judge.silence));
+    }
+    let back = scene.judge.until_all_are_sent();
+    let lives = [&node_lines, &robot_lines]
+        .map(|lines| lines.try_iter().filter(|line| line.contains("goes on")).count());
+    println!(
+        "{} s: {attacks:?} phases of promises, hidden ones, changed packets, kills and stops; lives of node and robots \
+         {lives:?}, {largest:?} kB; longest without targets {longest:.1} s, robots then went {:.3} m; back after {back:.1} s",
+        length.as_secs(),
+        scene.judge.coast,
+    );
+    assert!(largest.iter().all(|&size| size < 512 * 1024), "{largest:?} kB");
+    assert!(scene.judge.coast <= 0.15, "{} m", scene.judge.coast);
+    assert!(back < 10.0, "{back} s");
+    assert_eq!([scene.node.terminate(), scene.robots.terminate()], [Some(0), Some(0)]);
 }
 
 #[test]

@@ -136,6 +136,28 @@ fn the_lifecycle_switches_targets_off_and_on() {
 
 #[test]
 #[ignore = "needs the cyclonedds package of PyPI: see the head of tests/interop/main.rs"]
+fn the_lines_of_the_log_come_by_topic_even_to_a_late_joiner() {
+    let (square, domain) = (Square::new(&[&PATIENT]), domain());
+    let _node = square.start(domain, "node", &[]);
+    let _robots = square.robots(domain);
+    let early = watch(domain);
+    early.until("everybody is heard", |line| state::all_fresh(state::of(line)?).then_some(()));
+    let line = watch(domain).until("the first lines", |line| {
+        line.get("log")
+            .filter(|log| log["message"].as_str().is_some_and(|text| text.contains("25 robots")))
+            .cloned()
+    });
+    assert_eq!((&line["level"], &line["name"]), (&json!(20), &json!("flockform")));
+    assert!(line["file"].as_str().is_some_and(|file| file.ends_with(".rs")), "{line}");
+    // Of a node that leaves it out no line comes.
+    let quiet = square.start(domain, "node", &["--ros-args", "-r", "__node:=quiet", "--disable-rosout-logs"]);
+    early.skip();
+    early.during(Duration::from_secs(2), |line| assert_ne!(line["log"]["name"], json!("quiet"), "{line}"));
+    drop(quiet);
+}
+
+#[test]
+#[ignore = "needs the cyclonedds package of PyPI: see the head of tests/interop/main.rs"]
 fn an_emergency_stop_holds_everybody_whatever_else_is_asked_until_it_is_lifted() {
     let slow = ["manoeuvres[0].legs=[{ seconds = 100.0, translate = [50.0, 0.0] }]", "limits.speed=2.0"];
     let mut asked = Asked::open(&slow);

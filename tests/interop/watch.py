@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Somebody who looks at a formation's node and calls its services, on Cyclone DDS.
 
-Usage: watch.py DOMAIN NODE, the node's fully qualified name. Prints {"state": ...} and {"diagnostics": ...} as they
+Usage: watch.py DOMAIN NODE, the node's fully qualified name. Prints {"state": ...}, {"diagnostics": ...} and {"log": ...} as they
 come and {"reply": ...} for every command {"call": SERVICE, "with": BODY} on the standard input; SERVICES says what
 bodies mean.
 """
@@ -39,6 +39,7 @@ SERVICES = {
 def watch(participant, node):
     states = DataReader(participant, Topic(participant, f"rt{node}/state", FormationState), qos=RELIABLE)
     reports = DataReader(participant, Topic(participant, "rt/diagnostics", DiagnosticArray), qos=RELIABLE)
+    logs = DataReader(participant, Topic(participant, "rt/rosout", Log), qos=LATCHED)
     clients, orders = {}, commands()
     tell(ready=True)
     while True:
@@ -50,6 +51,9 @@ def watch(participant, node):
                 status = report.status[0]
                 values = {one.key: one.value for one in status.values}
                 tell(diagnostics={"level": status.level, "message": status.message, **values})
+        for log in logs.take(N=10):
+            if log.sample_info.valid_data:
+                tell(log={"level": log.level, "name": log.name, "message": log.msg, "file": log.file})
         while not orders.empty():
             order = orders.get()
             name = order["call"]

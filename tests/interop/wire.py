@@ -163,6 +163,17 @@ class ParameterValue(IdlStruct, typename="rcl_interfaces::msg::dds_::ParameterVa
 
 
 @dataclass
+class Log(IdlStruct, typename="rcl_interfaces::msg::dds_::Log_"):
+    stamp: Time
+    level: uint8
+    name: str
+    msg: str
+    file: str
+    function: str
+    line: uint32
+
+
+@dataclass
 class Parameter(IdlStruct, typename="rcl_interfaces::msg::dds_::Parameter_"):
     name: str
     value: ParameterValue

@@ -93,7 +93,8 @@ fn logging_is_read_and_the_last_word_counts() {
     assert_eq!(logging.level, Some(Severity::Warn));
     assert_eq!(logging.level_of("a.b"), Some(Severity::Fatal));
     assert_eq!(logging.level_of("other"), Some(Severity::Warn));
-    assert!(logging.stdout);
+    assert!(logging.stdout && !logging.rosout);
+    assert!(ros("--disable-rosout-logs --enable-rosout-logs").logging.rosout && ros("").logging.rosout);
     assert!(!ros("--disable-stdout-logs -e /").logging.stdout);
     assert_eq!(ros("").logging.level, None);
 }
@@ -111,12 +112,7 @@ fn an_enclave_has_a_name_like_a_namespace_and_the_last_counts() {
 
 #[test]
 fn what_this_node_does_not_have_is_refused_and_not_ignored() {
-    for line in [
-        "--log-config-file log.config",
-        "--log-file-name run",
-        "--enable-rosout-logs",
-        "--enable-external-lib-logs",
-    ] {
+    for line in ["--log-config-file log.config", "--log-file-name run", "--enable-external-lib-logs"] {
         let message = refusal(line);
         assert!(message.contains(line) && message.contains("leave it out"), "{line}: {message}");
     }

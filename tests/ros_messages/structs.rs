@@ -10,6 +10,7 @@ use flockform::messages::flockform_msgs::{
 };
 use flockform::messages::geometry_msgs::*;
 use flockform::messages::nav_msgs::Odometry;
+use flockform::messages::rcl_interfaces::Log;
 use flockform::messages::rosgraph_msgs::Clock;
 use flockform::messages::sensor_msgs::CompressedImage;
 use flockform::messages::std_msgs::{ColorRGBA, Header};
@@ -80,6 +81,7 @@ pub fn every_struct() -> Vec<Filled> {
         KeyValue,
         DiagnosticStatus,
         DiagnosticArray,
+        Log,
         UVCoordinate,
         MeshFile,
         Marker,

@@ -73,14 +73,7 @@ impl RosArguments {
             "--log-file-name" => return Err(no_log_library(&flag, value("a file name prefix")?)),
             "-e" | "--enclave" => self.enclave = Some(enclave(&flag, value("a security enclave /PATH")?)?),
             switch if switch_of(&mut self.logging, switch) => {}
-            "--enable-rosout-logs" | "--enable-external-lib-logs" => {
-                return Err(RosArgumentError::Rule {
-                    flag: flag.clone(),
-                    rule: String::new(),
-                    reason: "this node logs to the console alone".into(),
-                    help: "leave it out, and keep the console's output",
-                });
-            }
+            "--enable-external-lib-logs" => return Err(no_log_library(&flag, String::new())),
             _ => return Err(unknown(flag)),
         }
         Ok(())
@@ -114,15 +107,16 @@ fn switch_of(logging: &mut Logging, flag: &str) -> bool {
     };
     match name {
         "stdout-logs" => logging.stdout = on,
+        "rosout-logs" => logging.rosout = on,
         // There are none.
-        "rosout-logs" | "external-lib-logs" => return !on,
+        "external-lib-logs" => return !on,
         _ => return false,
     }
     true
 }
 
 fn no_log_library(flag: &str, rule: String) -> RosArgumentError {
-    let reason = "this node logs to the console alone".into();
+    let reason = "this node logs to the console and to /rosout alone".into();
     RosArgumentError::Rule {
         flag: flag.into(),
         rule,

@@ -23,11 +23,13 @@ pub struct Logging {
     pub loggers: Vec<(String, Severity)>,
     /// Logs go to the console \[default: true\].
     pub stdout: bool,
+    /// Logs go to the topic `/rosout` \[default: true\].
+    pub rosout: bool,
 }
 
 impl Default for Logging {
     fn default() -> Self {
-        Self { level: None, loggers: Vec::new(), stdout: true }
+        Self { level: None, loggers: Vec::new(), stdout: true, rosout: true }
     }
 }
 
@@ -58,35 +60,31 @@ impl Logging {
 }
 
 impl Severity {
-    /// Every severity with its number in `rcl_interfaces/msg/LoggerLevel`.
-    const NUMBERS: [(Self, u32); 6] = [
-        (Self::Unset, 0),
-        (Self::Debug, 10),
-        (Self::Info, 20),
-        (Self::Warn, 30),
-        (Self::Error, 40),
-        (Self::Fatal, 50),
-    ];
+    const ALL: [Self; 6] = [Self::Unset, Self::Debug, Self::Info, Self::Warn, Self::Error, Self::Fatal];
 
-    /// The number in `rcl_interfaces/msg/LoggerLevel`.
+    /// The number in `rcl_interfaces/msg/LoggerLevel` and `rcl_interfaces/msg/Log`.
     pub fn number(self) -> u32 {
-        Self::NUMBERS.iter().find(|(severity, _)| *severity == self).map_or(0, |(_, number)| *number)
+        10 * self as u32
     }
 
     /// The severity of a number, if there is one.
     pub fn of_number(number: u32) -> Option<Self> {
-        Self::NUMBERS.iter().find(|(_, one)| *one == number).map(|(severity, _)| *severity)
+        Self::ALL.into_iter().find(|severity| severity.number() == number)
+    }
+
+    /// As in lines of a log.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Unset => "UNSET",
+            Self::Debug => "DEBUG",
+            Self::Info => "INFO",
+            Self::Warn => "WARN",
+            Self::Error => "ERROR",
+            Self::Fatal => "FATAL",
+        }
     }
 
     fn parse(word: &str) -> Option<Self> {
-        Some(match word.to_ascii_uppercase().as_str() {
-            "UNSET" => Self::Unset,
-            "DEBUG" => Self::Debug,
-            "INFO" => Self::Info,
-            "WARN" => Self::Warn,
-            "ERROR" => Self::Error,
-            "FATAL" => Self::Fatal,
-            _ => return None,
-        })
+        Self::ALL.into_iter().find(|severity| severity.name().eq_ignore_ascii_case(word))
     }
 }

@@ -8,7 +8,7 @@
 //! * [`topic`]: publishers and subscriptions; [`quality`]: what they promise each other.
 //! * [`service`]: services that answer peers on Fast DDS and on Cyclone DDS alike.
 //! * [`parameters`], [`lifecycle`]: what ROS 2 expects of a node, as pure cores and their services.
-//! * [`loggers`]: the level of the log.
+//! * [`loggers`]: the level of the log; [`rosout`]: its lines.
 //! * [`pulse`]: whether the middleware still lives.
 //! * [`clock`]: system time or the simulator's.
 //!
@@ -32,6 +32,7 @@ pub mod quality;
 #[cfg(any(test, feature = "security"))]
 #[cfg_attr(not(feature = "security"), allow(dead_code, reason = "its test alone is built"))]
 mod queue;
+pub mod rosout;
 pub mod service;
 mod threads;
 pub mod topic;

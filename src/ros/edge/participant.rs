@@ -69,7 +69,6 @@ pub(super) struct Shared {
     guid: GUID,
     options: Options,
     /// Whether peers and their samples are authenticated; those of our own making are then not.
-    #[cfg(feature = "security")]
     pub is_secured: bool,
     pub graph: Arc<Graph>,
 }
@@ -197,7 +196,6 @@ impl Shared {
             participant: Some(participant),
             guid,
             options,
-            #[cfg(feature = "security")]
             is_secured: false,
             graph,
         })

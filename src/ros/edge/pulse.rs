@@ -23,6 +23,7 @@ use super::participant::{Reader, Shared, Writer};
 use super::queue::Queue;
 use super::topic::{Taken, next};
 use super::{EdgeError, Quality, threads};
+use crate::ros::arguments::Security;
 
 /// How often memory and threads are looked at \[s\]. A flood of promises fills 1 GB/s.
 const LOOK: Duration = Duration::from_millis(10);
@@ -54,7 +55,6 @@ const IN_THE_CLEAR: Patience =
 /// was 0.9 s undisturbed (unoptimised). It decrypts all that has arrived before it looks at its socket again: up to 14 s
 /// on a computer with more to do than processors. To end the process then makes all its peers exchange keys once more,
 /// which keeps them silent in turn.
-#[cfg(feature = "security")]
 const WITH_KEYS: Patience = Patience {
     deaf: Duration::from_secs(3),
     lonely: Duration::from_secs(8),
@@ -62,19 +62,24 @@ const WITH_KEYS: Patience = Patience {
 };
 
 impl Patience {
-    fn of(shared: &Shared) -> Self {
-        #[cfg(feature = "security")]
-        if shared.is_secured {
-            return WITH_KEYS;
-        }
-        let _ = shared;
-        IN_THE_CLEAR
+    fn of(is_secured: bool) -> Self {
+        if is_secured { WITH_KEYS } else { IN_THE_CLEAR }
+    }
+
+    /// The longest that the loop may be kept by the middleware before the process ends itself \[s\].
+    fn longest(&self) -> Duration {
+        self.deaf + self.starved
     }
 
     /// How much of a silence is not counted in which the threads have waited so long for a processor \[s\].
     fn forgiven(&self, waited: Duration) -> Duration {
         waited.min(self.starved)
     }
+}
+
+/// How long the middleware may keep the loop of a process, with keys or in the clear, before its watchdog ends it \[s\].
+pub fn longest_silence(security: &Security) -> Duration {
+    Patience::of(security.enclave.is_some()).longest()
 }
 
 /// Exit code of a process whose middleware was given up: a new one will do (EX_SOFTWARE of sysexits.h).
@@ -264,7 +269,7 @@ impl Loop {
 /// Starts the thread that watches; it ends the process with [`MIDDLEWARE_GONE`].
 pub(super) fn start(shared: &Shared, participant: &DomainParticipant) -> Result<Arc<Pulse>, EdgeError> {
     let mut proof = Proof::open(shared, participant)?;
-    let pulse = Arc::new(Pulse::new(Patience::of(shared)));
+    let pulse = Arc::new(Pulse::new(Patience::of(shared.is_secured)));
     let seen = pulse.clone();
     let watch = move || {
         let (reason, last_word) = watch(&mut proof, &seen);

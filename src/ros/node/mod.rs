@@ -17,6 +17,7 @@ pub(super) mod uses;
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::Receiver;
 use std::time::Instant;
 
 use super::arguments::{NameError, Names, RosArguments};
@@ -25,6 +26,7 @@ use super::edge::lifecycle::{Lifecycle, Transition};
 use super::edge::loggers::{LogLevel, Loggers};
 use super::edge::parameters::{Change, Parameters};
 use super::edge::pulse::Pulse;
+use super::edge::rosout::Rosout;
 use super::edge::{EdgeError, Publisher, Quality, Service, Subscription};
 use super::network;
 use crate::messages::Message;
@@ -33,6 +35,7 @@ use crate::messages::flockform_msgs::{LoopEvent, SetFormation, SetFormationRespo
 pub use crate::messages::formation::NAME;
 use crate::messages::formation::diagnostics::{self, Statistics};
 use crate::messages::formation::leaders::{as_event, set_formation};
+use crate::messages::rcl_interfaces::Log;
 use crate::messages::recorder::{self, MessageRecorder, RecordSink};
 use crate::messages::std_msgs::Empty;
 use crate::messages::std_srvs;
@@ -65,6 +68,7 @@ pub struct FormationNode {
     set_formation: Service<SetFormation>,
     /// Of a log whose level can change.
     loggers: Option<Loggers>,
+    rosout: Option<Rosout>,
     /// Of a configured node.
     endpoints: Option<Endpoints>,
     /// As `endpoints.is_some()`, for the parameters that only a node that is not configured can change.
@@ -120,6 +124,7 @@ impl FormationNode {
             resume: node.service(&service("resume")?)?,
             set_formation: node.service(&service("set_formation")?)?,
             loggers: None,
+            rosout: None,
             endpoints: None,
             is_configured,
             is_new: false,
@@ -186,6 +191,15 @@ impl FormationNode {
         Ok(())
     }
 
+    /// Publishes these lines of the log.
+    ///
+    /// # Errors
+    /// A topic that the middleware refuses.
+    pub fn publish_log(&mut self, lines: Receiver<Log>) -> Result<(), EdgeError> {
+        self.rosout = Some(Rosout::new(&self.origin.node, lines)?);
+        Ok(())
+    }
+
     /// Has a watchdog end this process when the middleware is dead or deaf: for programs that are started again.
     ///
     /// # Errors
@@ -227,6 +241,7 @@ impl FormationNode {
         lifecycle.shut_down(now, &mut |goal| transitions.act(goal));
         // Robots that are driven by velocities would go on for ever.
         self.publish(now);
+        self.rosout.iter().for_each(Rosout::publish);
         true
     }
 
@@ -271,6 +286,7 @@ impl FormationNode {
         }
         let stamp = self.time();
         self.answer(stamp);
+        self.rosout.iter().for_each(Rosout::publish);
         // Without a clock poses have no age, and none can be accepted.
         let Some(now) = self.clock.now() else { return self.wait_for_clock(stamp) };
         if let Some(endpoints) = &mut self.endpoints {

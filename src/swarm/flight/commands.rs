@@ -35,29 +35,41 @@ pub enum FlightCommand {
     },
 }
 
-impl Flight {
-    /// Performs a command before the next period; false where it concerns a robot that no program leads, or a place
+impl FlightCommand {
+    /// Performs on the loop its part of the command; false where it concerns a robot that no program leads, or a place
     /// where no pose would be believed or an obstacle would be none.
-    pub fn perform(&mut self, command: &FlightCommand) -> bool {
-        match *command {
-            FlightCommand::Lead { member, to } => self.control.take_over(member, to),
-            FlightCommand::MoveObstacle { obstacle, by } => self.control.move_obstacle(obstacle, by).is_ok(),
-            FlightCommand::Channel { noise, delay, loss } => {
-                self.fleet.set_channels(noise, delay, loss);
-                let limits = Limits { deviation: noise, ..self.control.limits().clone() };
-                self.control.set_limits(limits).is_ok()
+    pub fn perform(&self, control: &mut Control) -> bool {
+        match *self {
+            Self::Lead { member, to } => control.take_over(member, to),
+            Self::MoveObstacle { obstacle, by } => control.move_obstacle(obstacle, by).is_ok(),
+            Self::Channel { noise, .. } => {
+                let limits = Limits { deviation: noise, ..control.limits().clone() };
+                control.set_limits(limits).is_ok()
             }
         }
+    }
+}
+
+impl Flight {
+    /// Performs a command before the next period; false as [`FlightCommand::perform`].
+    pub fn perform(&mut self, command: &FlightCommand) -> bool {
+        if let FlightCommand::Channel { noise, delay, loss } = *command {
+            self.fleet.set_channels(noise, delay, loss);
+        }
+        command.perform(&mut self.control)
     }
 
     /// Performs what the file has for this period.
     pub(super) fn perform_due(&mut self) {
-        let period = self.fleet.period();
-        let due = self.commands.iter().filter(|(after, _)| *after == period);
-        for (_, command) in due.cloned().collect::<Vec<_>>() {
+        for command in due(&self.commands, self.fleet.period()).cloned().collect::<Vec<_>>() {
             self.perform(&command);
         }
     }
+}
+
+/// Those of the commands that are for the time after so many periods.
+pub fn due(commands: &[(u64, FlightCommand)], periods: u64) -> impl Iterator<Item = &FlightCommand> {
+    commands.iter().filter(move |(after, _)| *after == periods).map(|(_, command)| command)
 }
 
 /// The commands of a swarm file.

@@ -4,7 +4,7 @@
 //! its target. A real swarm's period is the same, so a simulated flight tests the tick that flies real robots.
 
 mod alarms;
-mod commands;
+pub(crate) mod commands;
 mod faults;
 mod fleet;
 mod measure;
