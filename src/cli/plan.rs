@@ -1,9 +1,11 @@
 //! `flockform plan`: a scene or a swarm before it runs.
 
 use clap::Args;
+use flockform::continuum::memory::readable_bytes;
 use flockform::continuum::plan::Plan;
 use flockform::continuum::report::PlanReport;
 use flockform::continuum::shares::Shares;
+use flockform::export::report::run::most_bytes;
 use flockform::study::compare::run::plan as plan_of;
 use flockform::swarm::plan::SwarmPlan;
 use serde_json::{Value, json};
@@ -43,6 +45,8 @@ pub fn plan(arguments: &PlanArguments) -> Result<(), Refusal> {
             let scene = SceneArguments { scene: file.clone(), set: set.clone() }.load([])?;
             let plan = plan_of(&scene)?;
             let mut report = PlanReport::new(&scene, &plan)?;
+            let page = format!("up to {} more; none with --no-report", readable_bytes(most_bytes(&plan)));
+            report.facts.push(("memory of report.html".into(), page));
             if let Some(ranks) = ranks {
                 report.facts.extend(Shares::new(&scene, &plan, usize::from(*ranks))?.facts());
             }

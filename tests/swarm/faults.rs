@@ -150,6 +150,39 @@ fn one_liar_is_trimmed_on_eight_neighbours_and_leads_them_astray_without() {
     assert!(without > 0.2, "{without}");
 }
 
+/// Between any two of the others the filter asks for their poses alone: a third one may hold them, and not push them.
+#[test]
+fn robots_that_say_where_they_are_keep_clear_of_each_other_whatever_one_says() {
+    let lies = [
+        // On top of a neighbour, between two of them, far away, anywhere, and where it was once.
+        "{ kind = \"offset\", by = [1.5, 0.0] }",
+        "{ kind = \"offset\", by = [0.75, 0.75] }",
+        "{ kind = \"offset\", by = [-40.0, 3.0] }",
+        "{ kind = \"random\", within = 3.0 }",
+        "{ kind = \"frozen\" }",
+    ];
+    let models = [
+        "flight.model={ kind = \"ideal\" }",
+        "flight.model={ kind = \"integrator\" }",
+        "flight.model={ kind = \"double-integrator\" }",
+    ];
+    for (lie, model) in lies.into_iter().flat_map(|lie| models.map(|model| (lie, model))) {
+        let limits = "limits={ speed = 1.0, clearance = 0.3 }";
+        // Believed at once, at any speed: the worst for those around.
+        let mut flight = with_fault(lie, &[limits, model, "poses.recover=1", "poses.jump_speed=1e6"]);
+        let mut nearest = f64::INFINITY;
+        for _ in 0..800 {
+            flight.step();
+            let (places, radii) = (flight.fleet().places(), &flight.control().formation().radii);
+            let honest = || (0..25).filter(|&m| m != MIDDLE);
+            for (a, b) in honest().flat_map(|a| honest().take_while(move |&b| b < a).map(move |b| (a, b))) {
+                nearest = nearest.min(distance(places.get(a), places.get(b)) - radii[a] - radii[b]);
+            }
+        }
+        assert!(nearest >= 0.3 - 1e-9, "{lie} {model}: {nearest} m");
+    }
+}
+
 #[test]
 fn nobody_gets_a_target_before_it_is_heard() {
     let mut control = Control::new(&load_swarm("square", &[])).expect("laid out");

@@ -47,6 +47,12 @@ impl Frames {
         Self { channels, count, kept: Vec::new(), interval: 1, most }
     }
 
+    /// Bytes of the frames of so many steps \[byte\].
+    pub fn bytes(&self, steps: usize) -> usize {
+        let bytes: usize = self.channels.iter().map(|channel| QuantizedChannel::bytes(channel.bits)).sum();
+        self.most.min(steps.saturating_add(1)) * bytes * self.count
+    }
+
     /// Whether the frame of this step is to be kept.
     pub fn wants(&self, step: usize) -> bool {
         step.is_multiple_of(self.interval)

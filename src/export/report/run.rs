@@ -17,6 +17,7 @@ use super::page::{Page, number, scene_text};
 use super::plot::{self, Plot, PlotAxis, PlotSeries};
 use super::view::{self, Animation, Clock, Quantity, Stress, View};
 use crate::continuum::mechanics::Stresses;
+use crate::continuum::plan::Plan;
 use crate::continuum::record::Snapshot;
 use crate::continuum::run::{Outcome, StopReason};
 use crate::engine::Engine;
@@ -54,6 +55,28 @@ pub struct AnimationState<'a> {
     changes: Vec<[u32; 3]>,
 }
 
+/// What frames hold of each particle.
+fn channels(count: usize, are_neighbours_lasting: bool) -> Vec<Channel> {
+    let [bits, others] = if count <= MOST_FINE { [FINE_BITS; 2] } else { [COARSE_BITS, COLOUR_BITS] };
+    let channel = |name, bits| Channel { name, bits };
+    let mut channels = vec![channel("dx", bits), channel("dy", bits), channel("pe2", others)];
+    // Neighbours that are found anew at every step are known to the engine alone.
+    if !are_neighbours_lasting {
+        channels.extend(["pe1", "strain"].map(|name| channel(name, others)));
+    }
+    channels
+}
+
+/// Bytes that the report takes of a run beside it, at most: frames while it goes on, then what they are packed in.
+pub fn most_bytes(plan: &Plan) -> usize {
+    /// Bytes of a particle as pages are written: bonds and cells as lists and as text, differences of frames. The most
+    /// that was measured (`tension`, 300 to 1200 squared) was 280.
+    const PACKING: usize = 300;
+    let count = plan.count();
+    let frames = Frames::new(count, channels(count, plan.setup.present_radius.is_none()));
+    frames.bytes(plan.stop.steps) + count * PACKING
+}
+
 /// Keeps the frames of a run while it goes on.
 #[derive(Debug)]
 pub struct RunRecorder {
@@ -70,13 +93,7 @@ impl RunRecorder {
     /// From the engine before its first step.
     fn new(engine: &Engine) -> Self {
         let count = engine.body().count();
-        let [bits, others] = if count <= MOST_FINE { [FINE_BITS; 2] } else { [COARSE_BITS, COLOUR_BITS] };
-        let channel = |name, bits| Channel { name, bits };
-        let mut channels = vec![channel("dx", bits), channel("dy", bits), channel("pe2", others)];
-        // Neighbours that are found anew at every step are known to the engine alone.
-        if engine.lasting_neighbours().is_none() {
-            channels.extend(["pe1", "strain"].map(|name| channel(name, others)));
-        }
+        let channels = channels(count, engine.lasting_neighbours().is_some());
         let roles = engine.roles().to_vec();
         let values = vec![Vec::new(); channels.len()];
         let frames = Frames::new(count, channels);
