@@ -100,7 +100,8 @@ fn a_body_turned_by_a_right_angle_is_not_strained_by_the_corotated_rule() {
         )
     };
     let roles = format!("roles=[{},{}]", turned("left"), turned("right"));
-    for lattice in LATTICES {
+    // Cells of four, three and six corners.
+    for lattice in ["square", "hexagonal", "honeycomb"] {
         let name = format!("lattice-{lattice}");
         for how in ["stop.tolerance=1e-14", "equilibrium={tolerance=1e-13}"] {
             let overrides = [MATERIAL, COROTATED, CELLS, &roles, how, "stop.steps=100000"];

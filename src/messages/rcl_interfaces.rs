@@ -87,7 +87,7 @@ impl Message for ParameterEvent {
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Log {
     pub stamp: Time,
-    /// Severity by number, 10 (debug) to 50 (fatal).
+    /// One of the constants.
     pub level: u8,
     /// Name of the logger.
     pub name: String,
@@ -95,6 +95,14 @@ pub struct Log {
     pub file: String,
     pub function: String,
     pub line: u32,
+}
+
+impl Log {
+    pub const DEBUG: u8 = 10;
+    pub const INFO: u8 = 20;
+    pub const WARN: u8 = 30;
+    pub const ERROR: u8 = 40;
+    pub const FATAL: u8 = 50;
 }
 
 impl Message for Log {

@@ -158,6 +158,7 @@ fn every_constant_has_the_value_of_its_definition() {
         };
     }
     let expected = [
+        ("rcl_interfaces/Log", constants![Log: DEBUG, INFO, WARN, ERROR, FATAL]),
         ("diagnostic_msgs/DiagnosticStatus", constants![DiagnosticStatus: OK, WARN, ERROR, STALE]),
         (
             "visualization_msgs/Marker",

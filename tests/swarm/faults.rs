@@ -167,7 +167,7 @@ fn robots_that_say_where_they_are_keep_clear_of_each_other_whatever_one_says() {
         "flight.model={ kind = \"double-integrator\" }",
     ];
     for (lie, model) in lies.into_iter().flat_map(|lie| models.map(|model| (lie, model))) {
-        let limits = "limits={ speed = 1.0, clearance = 0.3 }";
+        let limits = "limits={ speed = 1.0, acceleration = 2.0, clearance = 0.3 }";
         // Believed at once, at any speed: the worst for those around.
         let mut flight = with_fault(lie, &[limits, model, "poses.recover=1", "poses.jump_speed=1e6"]);
         let mut nearest = f64::INFINITY;
