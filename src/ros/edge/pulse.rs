@@ -180,7 +180,7 @@ impl Pulse {
 
 /// What shows that the middleware listens.
 enum Proof {
-    Sample(Loop),
+    Sample(Box<Loop>),
     /// Of a secured participant, which takes no sample that it has not authenticated.
     #[cfg(feature = "security")]
     Queue(Queue),
@@ -192,7 +192,7 @@ impl Proof {
         if shared.is_secured {
             return Queue::open(participant).map(Self::Queue);
         }
-        Loop::open(shared, participant).map(Self::Sample)
+        Loop::open(shared, participant).map(Box::new).map(Self::Sample)
     }
 
     fn send(&mut self, number: u32) {
