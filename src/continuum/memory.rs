@@ -20,7 +20,7 @@ pub fn at_least(scene: &Scene) -> f64 {
 }
 
 /// Bytes that the run holds when it writes its results, at its largest: what it steps, and the configurations that are
-/// kept. The report takes more of it (`export::report::run::most_bytes`), and each figure some 10 MB while it is drawn.
+/// kept. The report takes more of it (`export::report::run::most_bytes`), and each figure some 20 MB while it is drawn.
 pub fn predicted(scene: &Scene, plan: &Plan) -> usize {
     stepped(plan) + results(scene, plan)
 }

@@ -238,12 +238,21 @@ fn norm(vector: &[f64]) -> f64 {
 mod tests {
     use super::*;
 
+    fn product(matrix: &DMatrix<f64>) -> impl FnMut(&[f64], &mut [f64]) {
+        move |from, to| to.copy_from_slice((matrix * DVector::from_column_slice(from)).as_slice())
+    }
+
+    fn start(size: usize) -> Vec<f64> {
+        (0..size).map(|k| 1.0 + (0.7391 * k as f64).sin()).collect()
+    }
+
     fn of_matrix(matrix: &DMatrix<f64>, wanted: Wanted) -> Found {
-        let mut apply = |from: &[f64], to: &mut [f64]| {
-            to.copy_from_slice((matrix * DVector::from_column_slice(from)).as_slice());
-        };
-        let start = (0..matrix.nrows()).map(|k| 1.0 + (0.7391 * k as f64).sin()).collect();
-        eigenvalues(&mut apply, start, (wanted, Accuracy::Full), 20_000)
+        eigenvalues(&mut product(matrix), start(matrix.nrows()), (wanted, Accuracy::Full), 20_000)
+    }
+
+    /// Half the sum of the neighbours in a row.
+    fn chain_of(size: usize) -> DMatrix<f64> {
+        DMatrix::from_fn(size, size, |i, j| if i.abs_diff(j) == 1 { 0.5 } else { 0.0 })
     }
 
     #[test]
@@ -266,13 +275,8 @@ mod tests {
 
     #[test]
     fn a_chain_longer_than_the_vectors_kept_is_found_after_starting_over() {
-        let size = 120;
-        let chain = DMatrix::from_fn(size, size, |i, j| if i.abs_diff(j) == 1 { 0.5 } else { 0.0 });
-        let mut apply = |from: &[f64], to: &mut [f64]| {
-            to.copy_from_slice((&chain * DVector::from_column_slice(from)).as_slice());
-        };
-        let start = (0..size).map(|k| 1.0 + (0.7391 * k as f64).sin()).collect();
-        let found = eigenvalues_keeping(40, &mut apply, start, (Wanted::Ends, Accuracy::Full), 20_000);
+        let (size, wanted) = (120, (Wanted::Ends, Accuracy::Full));
+        let found = eigenvalues_keeping(40, &mut product(&chain_of(size)), start(size), wanted, 20_000);
         assert!(found.applications > 2 * 40, "{found:?}");
         let expected = (std::f64::consts::PI / (size as f64 + 1.0)).cos();
         assert!(found.converged, "{found:?}");
@@ -282,12 +286,8 @@ mod tests {
 
     #[test]
     fn what_is_not_settled_is_not_called_settled() {
-        let chain = DMatrix::from_fn(400, 400, |i, j| if i.abs_diff(j) == 1 { 0.5 } else { 0.0 });
-        let mut apply = |from: &[f64], to: &mut [f64]| {
-            to.copy_from_slice((&chain * DVector::from_column_slice(from)).as_slice());
-        };
-        let start = (0..400).map(|k| 1.0 + (0.7391 * f64::from(k)).sin()).collect();
-        assert!(!eigenvalues(&mut apply, start, (Wanted::Modulus, Accuracy::Full), 20).converged);
+        let wanted = (Wanted::Modulus, Accuracy::Full);
+        assert!(!eigenvalues(&mut product(&chain_of(400)), start(400), wanted, 20).converged);
     }
 
     #[test]

@@ -10,6 +10,8 @@ use flockform::messages::std_msgs::Empty;
 use flockform::messages::std_srvs;
 use flockform::ros::edge::{Edge, Node, Quality, Subscription};
 use flockform::swarm::control::Control;
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64Mcg;
 use ros2_client::ServiceMapping;
 
 use super::peers;
@@ -230,28 +232,17 @@ fn promises(stranger: &mut Stranger) -> Vec<Vec<u8>> {
 }
 
 /// Packets of discovery and promises with some bytes of each changed.
-fn changed(stranger: &mut Stranger, next: &mut impl FnMut(usize) -> usize) -> Vec<Vec<u8>> {
+fn changed(stranger: &mut Stranger, random: &mut Pcg64Mcg) -> Vec<Vec<u8>> {
     let mut all = promises(stranger);
     all.extend(stranger.packets.iter().cloned());
     for packet in &mut all {
-        for _ in 0..=next(4) {
+        for _ in 0..=random.random_range(0..4) {
             // The magic word stays, or nobody would look at the rest.
-            let at = 4 + next(packet.len() - 4);
-            packet[at] = next(256) as u8;
+            let at = random.random_range(4..packet.len());
+            packet[at] = random.random();
         }
     }
     all
-}
-
-/// The same numbers below a bound in every run (xorshift64).
-fn chance() -> impl FnMut(usize) -> usize {
-    let mut random = 0x2545_f491_4f6c_dd1d_u64;
-    move |below| {
-        random ^= random << 13;
-        random ^= random >> 7;
-        random ^= random << 17;
-        (random >> 11) as usize % below
-    }
 }
 
 #[test]
@@ -293,8 +284,8 @@ fn robots_under_the_same_flood_go_on_where_they_were() {
 fn changed_packets_of_discovery_cost_some_seconds_of_hold_at_most() {
     let mut scene = Scene::open(&LONG);
     let lines = scene.node.lines();
-    let mut next = chance();
-    let largest = scene.flood(NODE, |stranger| changed(stranger, &mut next));
+    let mut random = Pcg64Mcg::seed_from_u64(1);
+    let largest = scene.flood(NODE, |stranger| changed(stranger, &mut random));
     scene.is_well(largest, &lines);
     assert_eq!(scene.node.terminate(), Some(0));
 }
@@ -329,19 +320,20 @@ fn all_attacks_at_once_on_node_and_robots_make_nothing_unsafe() {
     let legs = format!("manoeuvres[0].legs=[{}]", away.repeat(length.as_secs() as usize / 20 + 2));
     let mut scene = Scene::open(&[legs.leak()]);
     let [node_lines, robot_lines] = [scene.node.lines(), scene.robots.lines()];
-    let (mut next, mut attacks, mut largest, mut longest) = (chance(), [0_u32; 5], [0; 2], 0.0_f64);
+    let mut random = Pcg64Mcg::seed_from_u64(2);
+    let (mut attacks, mut largest, mut longest) = ([0_u32; 5], [0; 2], 0.0_f64);
     let since = Instant::now();
     while since.elapsed() < length {
         // Any of them, all of them, or none, in which case the swarm flies on.
-        let [promised, masked, mutated] = [0; 3].map(|_| next(2) == 1);
-        let signals = [("KILL", next(6) == 0), ("STOP", next(6) == 0)];
+        let [promised, masked, mutated] = [0.5; 3].map(|part| random.random_bool(part));
+        let signals = ["KILL", "STOP"].map(|name| (name, random.random_bool(1.0 / 6.0)));
         for (count, is_on) in attacks.iter_mut().zip([promised, masked, mutated, signals[0].1, signals[1].1])
         {
             *count += u32::from(is_on);
         }
         let Scene { domain, stranger, judge, robots, node, .. } = &mut scene;
         for (name, _) in signals.iter().filter(|(_, is_sent)| *is_sent) {
-            let victim = if next(2) == 0 { &*node } else { &*robots };
+            let victim = if random.random() { &*node } else { &*robots };
             victim.worker().into_iter().for_each(|worker| signal(name, worker));
         }
         judge.during(PHASE, || {
@@ -356,7 +348,7 @@ fn all_attacks_at_once_on_node_and_robots_make_nothing_unsafe() {
                 packets.extend(all.into_iter().filter(|_| promised));
             }
             if mutated {
-                packets.extend(changed(stranger, &mut next));
+                packets.extend(changed(stranger, &mut random));
             }
             for (packet, to) in packets.iter().flat_map(|packet| [ROBOTS, NODE].map(|to| (packet, to))) {
                 stranger.send(packet, port(*domain, to));

@@ -39,18 +39,21 @@ pub struct Frames {
     most: usize,
 }
 
+/// Bytes of a frame \[byte\].
+fn bytes_of(channels: &[Channel], count: usize) -> usize {
+    count * channels.iter().map(|channel| QuantizedChannel::bytes(channel.bits)).sum::<usize>()
+}
+
 impl Frames {
     /// For `count` particles.
     pub fn new(count: usize, channels: Vec<Channel>) -> Self {
-        let bytes: usize = channels.iter().map(|channel| QuantizedChannel::bytes(channel.bits)).sum();
-        let most = (MOST_BYTES / (bytes * count).max(1)).clamp(4, MOST_FRAMES);
+        let most = (MOST_BYTES / bytes_of(&channels, count).max(1)).clamp(4, MOST_FRAMES);
         Self { channels, count, kept: Vec::new(), interval: 1, most }
     }
 
     /// Bytes of the frames of so many steps \[byte\].
     pub fn bytes(&self, steps: usize) -> usize {
-        let bytes: usize = self.channels.iter().map(|channel| QuantizedChannel::bytes(channel.bits)).sum();
-        self.most.min(steps.saturating_add(1)) * bytes * self.count
+        self.most.min(steps.saturating_add(1)) * bytes_of(&self.channels, self.count)
     }
 
     /// Whether the frame of this step is to be kept.
