@@ -58,7 +58,7 @@ struct Looks {
     every: usize,
     keep_at: Option<usize>,
     seen: Vec<(usize, u64)>,
-    kept: Option<(EngineState, f64)>,
+    kept: Option<(EngineState<'static>, f64)>,
 }
 
 impl Looks {
@@ -76,7 +76,7 @@ impl Observer for Looks {
         let hash = bits(engine.present()).fold(0, |hash: u64, bits| hash.rotate_left(7) ^ bits);
         self.seen.push((engine.step(), hash));
         if self.keep_at == Some(engine.step()) {
-            self.kept = Some((EngineState::of(engine), residual));
+            self.kept = Some((EngineState::of(engine).into_owned(), residual));
             return ControlFlow::Break(());
         }
         ControlFlow::Continue(())

@@ -169,6 +169,7 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
 
     let mut recorder = Recorder::new(&scene, &plan, &folder, left.as_ref())?;
     (recorder.reports, recorder.films) = (!arguments.report.no_report, film.is_some());
+    recorder.draws = arguments.figures.formats() != Formats::None;
     let about = About { source: "run", name: scene.name.clone(), ..About::default() };
     let recording = arguments.record.open(&about, arguments.output.force, 1)?;
     let messages = recording.as_ref().map(|one| BodyMessages::new(&scene, one.sink())).transpose()?;

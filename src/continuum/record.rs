@@ -42,14 +42,6 @@ impl Snapshot {
             broken: engine.breaks().iter().map(|b| b.pair).collect(),
         }
     }
-
-    /// Sums of PE1 \[length^2\] and PE2 \[length\] over the body, in order of index.
-    pub fn energies(&self) -> [f64; 2] {
-        let sum = |values: &[f64]| {
-            values.iter().zip(&self.roles).filter(|(_, role)| role.is_body()).map(|(value, _)| value).sum()
-        };
-        [sum(&self.pe1), sum(&self.pe2)]
-    }
 }
 
 /// The history of one particle: entry `t` is step `t`, the start included.

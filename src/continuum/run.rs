@@ -106,7 +106,7 @@ pub fn run_watched(plan: Plan, observer: &mut dyn Observer) -> Outcome {
 /// A state of another body.
 pub fn resume(
     plan: Plan,
-    state: EngineState,
+    state: EngineState<'_>,
     residual: f64,
     observer: &mut dyn Observer,
 ) -> Result<Outcome, WrongState> {
@@ -122,7 +122,7 @@ pub fn resume(
 /// A sweep that cannot be shared, or a state of another body.
 pub fn run_shared(
     plan: Plan,
-    from: Option<(EngineState, f64)>,
+    from: Option<(EngineState<'_>, f64)>,
     team: &Team,
     observer: &mut dyn Observer,
 ) -> Result<Outcome, SharedError> {

@@ -242,6 +242,12 @@ impl Engine {
         pe2(particle, &self.present, &self.previous)
     }
 
+    /// Sums of PE1 \[length^2\] and PE2 \[length\] over the body, in order of index.
+    pub fn energies(&self) -> [f64; 2] {
+        let body = || (0..self.roles.len()).filter(|&i| self.roles[i].is_body());
+        [body().map(|i| self.pe1(i)).sum(), body().map(|i| self.pe2(i)).sum()]
+    }
+
     /// Strain of one particle's surroundings; `None` for a particle that sees too few.
     pub fn strain(&self, particle: usize) -> Option<Strain> {
         strain(&self.flock, particle, &self.present)

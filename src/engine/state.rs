@@ -3,6 +3,8 @@
 //! The contents of a plan (the body, its neighbours, weights, loads, the leaders' motions) are no part of the
 //! state: they are planned again, and the digest of the plan shows whether they came out the same.
 
+use std::borrow::Cow;
+
 use serde::{Deserialize, Serialize};
 
 use super::Engine;
@@ -14,21 +16,21 @@ use crate::flock::role::Role;
 use crate::flock::vectors::Vectors;
 use crate::sweep::Activity;
 
-/// Everything that steps have changed.
+/// Everything that steps have changed; of a living engine it is borrowed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct EngineState {
+pub struct EngineState<'a> {
     step: usize,
     /// Positions now and before the last step \[length\], shape \[count\].
     #[serde(with = "serde_impls::points")]
-    present: Vectors,
+    present: Cow<'a, Vectors>,
     #[serde(with = "serde_impls::points")]
-    previous: Vectors,
+    previous: Cow<'a, Vectors>,
     #[serde(with = "serde_impls::roles")]
-    roles: Vec<Role>,
+    roles: Cow<'a, [Role]>,
     leaders: Vec<Leading>,
-    guided: Vec<(usize, [f64; 2])>,
+    guided: Cow<'a, [(usize, [f64; 2])]>,
     #[serde(with = "serde_impls::breaks")]
-    breaks: Vec<Break>,
+    breaks: Cow<'a, [Break]>,
     /// Where something moved in the last step, and what was swept so far.
     activity: Activity,
     /// Whether each bond is broken, eight to a byte; absent where none can break.
@@ -57,9 +59,9 @@ pub struct WrongState {
     pub planned: usize,
 }
 
-impl EngineState {
+impl<'a> EngineState<'a> {
     /// The state of an engine between two steps.
-    pub fn of(engine: &Engine) -> Self {
+    pub fn of(engine: &'a Engine) -> Self {
         let leading = |&Led { particle, change, which, since, base }: &Led| Leading {
             particle,
             change,
@@ -75,14 +77,30 @@ impl EngineState {
         let bytes = flock.neighbours.index.len().div_ceil(8);
         Self {
             step: engine.step,
-            present: engine.present.clone(),
-            previous: engine.previous.clone(),
-            roles: engine.roles.clone(),
+            present: Cow::Borrowed(&engine.present),
+            previous: Cow::Borrowed(&engine.previous),
+            roles: Cow::Borrowed(&engine.roles),
             leaders: engine.leaders.iter().map(leading).collect(),
-            guided: engine.guided.clone(),
-            breaks: engine.breaks.clone(),
+            guided: Cow::Borrowed(&engine.guided),
+            breaks: Cow::Borrowed(&engine.breaks),
             activity: engine.activity.clone(),
             broken: flock.bonds.as_ref().map(|bonds| (0..bytes).map(|byte| packed(byte, bonds)).collect()),
+        }
+    }
+
+    /// The state for later, when the engine has gone on.
+    pub fn into_owned(self) -> EngineState<'static> {
+        let Self { step, present, previous, roles, leaders, guided, breaks, activity, broken } = self;
+        EngineState {
+            step,
+            present: Cow::Owned(present.into_owned()),
+            previous: Cow::Owned(previous.into_owned()),
+            roles: Cow::Owned(roles.into_owned()),
+            leaders,
+            guided: Cow::Owned(guided.into_owned()),
+            breaks: Cow::Owned(breaks.into_owned()),
+            activity,
+            broken,
         }
     }
 
@@ -104,13 +122,13 @@ impl EngineState {
         let led =
             |Leading { particle, change, which, since, base }| Led { particle, change, which, since, base };
         engine.follow_ramp();
-        engine.present = self.present;
-        engine.previous = self.previous;
-        engine.roles = self.roles;
+        engine.present = self.present.into_owned();
+        engine.previous = self.previous.into_owned();
+        engine.roles = self.roles.into_owned();
         engine.leaders = self.leaders.into_iter().map(led).collect();
         engine.led = engine.leaders.iter().map(|led| led.particle).collect();
-        engine.guided = self.guided;
-        engine.breaks = self.breaks;
+        engine.guided = self.guided.into_owned();
+        engine.breaks = self.breaks.into_owned();
         if let (Some(bonds), Some(broken)) = (&mut engine.flock.bonds, &self.broken) {
             bonds.set_broken(|bond| broken[bond / 8] >> (bond % 8) & 1 == 1);
         }
@@ -144,7 +162,7 @@ impl EngineState {
         // Found by bisection.
         let disordered = self.leaders.windows(2).filter(|pair| pair[0].particle >= pair[1].particle);
         require("leaders out of order", disordered.count(), 0)?;
-        for (particle, _) in &self.guided {
+        for (particle, _) in self.guided.iter() {
             require_below("guided particles", *particle, count)?;
         }
         for particle in self.breaks.iter().flat_map(|one| one.pair) {

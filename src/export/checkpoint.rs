@@ -12,7 +12,7 @@
 
 use std::borrow::Cow;
 use std::fs::{self, File};
-use std::io::{ErrorKind, Write};
+use std::io::{self, BufWriter, ErrorKind, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -47,7 +47,7 @@ pub struct Checkpoint<'a> {
     /// [`crate::continuum::digest::digest`] of the plan.
     digest: u64,
     /// The engine's state after the last step.
-    pub engine: EngineState,
+    pub engine: EngineState<'a>,
     /// Largest one-step motion over the spacing, at the last step; infinite before the first.
     pub residual: f64,
     /// Configurations that are to be drawn at the end.
@@ -158,7 +158,7 @@ impl<'a> Checkpoint<'a> {
     /// A checkpoint of a run with a plan of this `digest`.
     pub fn new(
         (asked, scene, digest): (&RunRequest, &Scene, u64),
-        (engine, residual): (EngineState, f64),
+        (engine, residual): (EngineState<'a>, f64),
         (snapshots, probes, load_steps, animation): Recorded<'a>,
         stepping: Duration,
     ) -> Self {
@@ -180,11 +180,8 @@ impl<'a> Checkpoint<'a> {
     /// Takes the place of the former checkpoint in the folder when it is whole on the disk.
     pub fn write(&self, folder: &Path) -> Result<(), ExportError> {
         let (part, path) = (folder.join(PART), folder.join(FILE));
-        let bytes = self.bytes().map_err(ExportError::io("write", &path))?;
         let write = || {
-            let mut file = create(&part)?;
-            file.write_all(&bytes)?;
-            file.sync_all()?;
+            self.write_to(create(&part)?)?.sync_all()?;
             fs::rename(&part, &path)?;
             sync_folder(folder)
         };
@@ -195,16 +192,28 @@ impl<'a> Checkpoint<'a> {
         })
     }
 
-    fn bytes(&self) -> std::io::Result<Vec<u8>> {
-        let blank = vec![0; HEADER];
-        let mut bytes = postcard::to_extend(self, blank).map_err(std::io::Error::other)?;
-        let length = (bytes.len() - HEADER) as u64;
-        let sum = crc32fast::hash(&bytes[HEADER..]);
-        bytes[..8].copy_from_slice(&MAGIC);
-        bytes[8..12].copy_from_slice(&VERSION.to_le_bytes());
-        bytes[12..20].copy_from_slice(&length.to_le_bytes());
-        bytes[20..24].copy_from_slice(&sum.to_le_bytes());
-        Ok(bytes)
+    /// As it is written, so that it is never in memory beside the run; the header comes last, over its place.
+    fn write_to(&self, mut file: File) -> io::Result<File> {
+        file.write_all(&[0; HEADER])?;
+        let payload = Payload { file, sum: crc32fast::Hasher::new(), length: 0, failure: None };
+        let mut buffered = BufWriter::with_capacity(1 << 20, payload);
+        let written = postcard::to_io(self, &mut buffered).map(|_| ());
+        let flushed = buffered.flush();
+        // What is left in the buffer after a failure is of no use.
+        let Payload { mut file, sum, length, failure } = buffered.into_parts().0;
+        if let Some(failure) = failure {
+            return Err(failure);
+        }
+        written.map_err(io::Error::other).and(flushed)?;
+        let header = [
+            &MAGIC[..],
+            &VERSION.to_le_bytes(),
+            &length.to_le_bytes(),
+            &sum.finalize().to_le_bytes(),
+        ];
+        file.rewind()?;
+        file.write_all(&header.concat())?;
+        Ok(file)
     }
 
     /// A fingerprint of the state that a run goes on from, to distinguish checkpoints: see [`fnv1a`].
@@ -290,6 +299,32 @@ impl Checkpoint<'static> {
     }
 }
 
+/// What comes behind the header, on its way to the disk.
+struct Payload {
+    file: File,
+    sum: crc32fast::Hasher,
+    length: u64,
+    /// What the system said: postcard has one error for all that can happen to a writer.
+    failure: Option<io::Error>,
+}
+
+impl Write for Payload {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        if let Err(failure) = self.file.write_all(bytes) {
+            let kind = failure.kind();
+            self.failure = Some(failure);
+            return Err(kind.into());
+        }
+        self.sum.update(bytes);
+        self.length += bytes.len() as u64;
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
 /// Removes the checkpoint files of a folder.
 pub fn remove(folder: &Path) {
     for name in [PART, FILE] {
@@ -354,7 +389,7 @@ mod tests {
         bundled("tension").expect("bundled").load(&sets).expect("valid")
     }
 
-    fn written(folder: &Path) -> (EngineState, Vec<u8>) {
+    fn written(folder: &Path) -> (EngineState<'static>, Vec<u8>) {
         let scene = scene(&[]);
         let plan = Plan::new(&scene).expect("fits");
         let sum = digest(&plan);
@@ -374,7 +409,7 @@ mod tests {
             Duration::from_millis(1500),
         );
         checkpoint.write(folder).expect("written");
-        (state, fs::read(folder.join(FILE)).expect("there"))
+        (state.into_owned(), fs::read(folder.join(FILE)).expect("there"))
     }
 
     #[test]

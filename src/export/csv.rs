@@ -12,7 +12,7 @@ use serde::Serialize;
 use super::OutputFolder;
 use super::error::ExportError;
 use super::manifest::create;
-use crate::continuum::record::{ProbeSeries, Snapshot};
+use crate::continuum::record::ProbeSeries;
 use crate::engine::Engine;
 use crate::flock::body::Body;
 use crate::flock::fracture::Break;
@@ -83,7 +83,6 @@ struct ResidualRow {
 pub fn write_final(
     folder: &OutputFolder,
     engine: &Engine,
-    last: &Snapshot,
     stresses: Option<&[Option<StressState>]>,
 ) -> Result<PathBuf, ExportError> {
     let body = engine.body();
@@ -92,18 +91,18 @@ pub fn write_final(
     let at_sites = (0..body.count()).filter(|&i| of_lattice(i)).map(|i| body.sites[i]);
     let lowest = |axis: usize| at_sites.clone().map(|site| i64::from(site[axis])).min().unwrap_or(0);
     let (first_column, first_row) = (lowest(0), lowest(1));
-    // Strains are found as they are written: all of them at once would take as much memory as the body.
+    // Energies and strains are found as they are written: all of them at once would take as much memory as the body.
     let rows = body.rows().map(|i| (i, engine.strain(i))).map(|(i, strain)| FinalRow {
         id: body.id(i),
         column: of_lattice(i).then(|| i64::from(body.sites[i][0]) - first_column + 1),
         row: of_lattice(i).then(|| i64::from(body.sites[i][1]) - first_row + 1),
-        role: last.roles[i].name(),
+        role: engine.roles()[i].name(),
         reference_x: body.reference.x[i],
         reference_y: body.reference.y[i],
-        x: last.positions.x[i],
-        y: last.positions.y[i],
-        pe1: last.pe1[i],
-        pe2: last.pe2[i],
+        x: engine.present().x[i],
+        y: engine.present().y[i],
+        pe1: engine.pe1(i),
+        pe2: engine.pe2(i),
         strain_xx: strain.map(|strain| strain.components[0]),
         strain_yy: strain.map(|strain| strain.components[1]),
         strain_xy: strain.map(|strain| strain.components[2]),

@@ -78,7 +78,6 @@ pub mod trade;
 pub mod transport;
 mod vtk;
 
-use std::borrow::Cow;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -146,12 +145,9 @@ pub fn write_all(
 ) -> Result<(Vec<PathBuf>, Summary), ExportError> {
     let start = Instant::now();
     let engine = &results.outcome.engine;
-    // The last configuration is drawn as a rule, and kept only once.
-    let drawn = results.snapshots.last().filter(|last| last.step == engine.step());
-    let last = drawn.map_or_else(|| Cow::Owned(Snapshot::of(engine)), Cow::Borrowed);
     let stresses = results.scene.material.as_ref().and_then(|elastic| Stresses::at_present(engine, elastic));
     let of_particles = stresses.as_ref().map(|stresses| &stresses.particles[..]);
-    let mut written = vec![csv::write_final(folder, engine, &last, of_particles)?];
+    let mut written = vec![csv::write_final(folder, engine, of_particles)?];
     // Figures take memory of their own.
     drop(stresses);
     if !results.probes.is_empty() {
@@ -171,7 +167,7 @@ pub fn write_all(
     }
     let mut timings = results.timings;
     timings.output += start.elapsed();
-    let summary = Summary::new(results.scene, results.outcome, &last, timings);
+    let summary = Summary::new(results.scene, results.outcome, timings);
     written.push(summary.write(folder)?);
     Ok((written, summary))
 }

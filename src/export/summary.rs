@@ -11,7 +11,6 @@ use super::error::{ExportError, write_file};
 use super::{OutputFolder, bonds, largest_strain};
 use crate::continuum::mechanics::{Mechanics, Peak};
 use crate::continuum::places::{AtPlace, at_places};
-use crate::continuum::record::Snapshot;
 use crate::continuum::run::{Outcome, StopReason};
 use crate::engine::Engine;
 use crate::engine::forces::Reaction;
@@ -204,15 +203,10 @@ pub struct Seconds {
 }
 
 impl Summary {
-    /// The summary of a run of which nothing else is written.
-    pub fn of_end(scene: &Scene, outcome: &Outcome, timings: Timings) -> Self {
-        Self::new(scene, outcome, &Snapshot::of(&outcome.engine), timings)
-    }
-
-    /// `last` is the configuration at the end.
-    pub fn new(scene: &Scene, outcome: &Outcome, last: &Snapshot, timings: Timings) -> Self {
-        let [pe1, pe2] = last.energies();
+    /// The summary of a run that took this long.
+    pub fn new(scene: &Scene, outcome: &Outcome, timings: Timings) -> Self {
         let engine = &outcome.engine;
+        let [pe1, pe2] = engine.energies();
         let largest_strain = largest_strain(engine);
         let mechanics = scene.material.as_ref().and_then(|elastic| Mechanics::of(engine, elastic));
         Self {

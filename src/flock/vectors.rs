@@ -1,5 +1,7 @@
 //! Positions as parallel arrays: the one layout every sweep, recorder and transport reads.
 
+use std::borrow::Cow;
+
 /// One vector in the plane for each particle, shape \[count\] each: positions and displacements
 /// \[length unit of the scene, world frame\], forces, residuals.
 ///
@@ -11,6 +13,12 @@ pub struct Vectors<T = f64> {
     pub x: Vec<T>,
     /// Second coordinates, shape \[count\].
     pub y: Vec<T>,
+}
+
+impl From<Vectors> for Cow<'_, Vectors> {
+    fn from(vectors: Vectors) -> Self {
+        Cow::Owned(vectors)
+    }
 }
 
 impl<T: Copy + Default> Vectors<T> {

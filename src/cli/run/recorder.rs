@@ -24,6 +24,8 @@ pub struct Recorder<'a> {
     pub reports: bool,
     /// Whether there shall be a film.
     pub films: bool,
+    /// Whether there shall be figures.
+    pub draws: bool,
     /// What they show.
     pub animation: Option<RunRecorder>,
     /// The state that an earlier run saved for it.
@@ -69,6 +71,7 @@ impl<'a> Recorder<'a> {
             frames,
             reports: true,
             films: false,
+            draws: true,
             animation: None,
             animation_state: left.and_then(|left| left.checkpoint.animation.clone()),
             failure: None,
@@ -140,11 +143,11 @@ impl<'a> Recorder<'a> {
         self.failure.is_some()
     }
 
-    /// The last configuration is always drawn, and for ParaView always written.
+    /// The last configuration is drawn wherever any is, and for ParaView always written.
     pub fn finish(mut self, outcome: &Outcome) -> Result<Records, ExportError> {
         let engine = &outcome.engine;
         let step = engine.step();
-        if self.snapshots.last().is_none_or(|last| last.step != step) {
+        if self.draws && self.snapshots.last().is_none_or(|last| last.step != step) {
             self.snapshots.push(Snapshot::of(engine));
         }
         if load_every(self.scene).is_some() && self.load_steps.last().is_none_or(|last| last.step != step) {

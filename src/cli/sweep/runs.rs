@@ -144,7 +144,7 @@ impl Runs<'_> {
         let setup = start.elapsed();
         let outcome = run_to_equilibrium_watched(&scene, plan, &mut observer)?;
         let timings = Timings { setup, steps: start.elapsed() - setup, ..Timings::default() };
-        let summary = Summary::of_end(&scene, &outcome, timings);
+        let summary = Summary::new(&scene, &outcome, timings);
         let values = Values { engine: &outcome.engine, summary: &summary, probed: &observer.probed };
         Ok(Ended { outputs: values.texts(self.outputs), stop_reason: outcome.reason })
     }

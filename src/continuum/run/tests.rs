@@ -16,7 +16,7 @@ fn plan(scene: &Scene) -> Plan {
 }
 
 /// The state, and what depends on the neighbours: PE1 and the residual, then how the run ended.
-fn bits(outcome: &Outcome) -> (EngineState, Vec<u64>, String) {
+fn bits(outcome: &Outcome) -> (EngineState<'_>, Vec<u64>, String) {
     let engine = &outcome.engine;
     let pe1 = (0..engine.body().count()).map(|i| engine.pe1(i));
     let numbers = pe1.chain([outcome.residual]).map(f64::to_bits).collect();
@@ -31,7 +31,7 @@ fn continues_to_the_same_end(name: &str, sets: &[&str], at: &[usize]) {
         let mut kept = None;
         let _ = run(plan(&scene), &mut |engine, residual| {
             if engine.step() == step {
-                kept = Some((EngineState::of(engine), residual));
+                kept = Some((EngineState::of(engine).into_owned(), residual));
                 return ControlFlow::Break(());
             }
             ControlFlow::Continue(())
@@ -130,8 +130,8 @@ fn a_run_that_had_come_to_rest_takes_no_further_step() {
 
 #[test]
 fn a_state_of_another_body_is_refused() {
-    let state = EngineState::of(&Engine::new(plan(&scene("tension", &[])).setup));
-    let error = state.engine(plan(&scene("fracture", &[])).setup).expect_err("another body");
+    let engine = Engine::new(plan(&scene("tension", &[])).setup);
+    let error = EngineState::of(&engine).engine(plan(&scene("fracture", &[])).setup).expect_err("another body");
     assert!(error.to_string().contains("144 particles"), "{error}");
 }
 

@@ -18,7 +18,6 @@ use super::plot::{self, Plot, PlotAxis, PlotSeries};
 use super::view::{self, Animation, Clock, Quantity, Stress, View};
 use crate::continuum::mechanics::Stresses;
 use crate::continuum::plan::Plan;
-use crate::continuum::record::Snapshot;
 use crate::continuum::run::{Outcome, StopReason};
 use crate::engine::Engine;
 use crate::engine::serde_impls;
@@ -326,17 +325,17 @@ fn set_bonds(stage: &mut View, engine: &Engine, is_solved: bool) {
 
 /// The columns of `final.csv`.
 fn add_exact(stage: &mut View, scene: &Scene, engine: &Engine) {
-    let last = Snapshot::of(engine);
     let strains: Vec<Option<Strain>> =
         (0..engine.body().count()).into_par_iter().map(|i| engine.strain(i)).collect();
     let unit = scene.unit();
     let mut add = |key: &str, label: &str, unit: &str, values: &mut dyn Iterator<Item = f64>| {
         stage.add_exact(Quantity::new(key, label, unit), values);
     };
-    add("x", "x", unit, &mut last.positions.x.iter().copied());
-    add("y", "y", unit, &mut last.positions.y.iter().copied());
-    add("pe1", "PE1", &format!("{unit}²"), &mut last.pe1.iter().copied());
-    add("pe2", "PE2", unit, &mut last.pe2.iter().copied());
+    let all = || 0..engine.body().count();
+    add("x", "x", unit, &mut engine.present().x.iter().copied());
+    add("y", "y", unit, &mut engine.present().y.iter().copied());
+    add("pe1", "PE1", &format!("{unit}²"), &mut all().map(|i| engine.pe1(i)));
+    add("pe2", "PE2", unit, &mut all().map(|i| engine.pe2(i)));
     for (k, name) in ["xx", "yy", "xy"].into_iter().enumerate() {
         let component = |strain: &Option<Strain>| strain.map_or(f64::NAN, |strain| strain.components[k]);
         add(&format!("strain_{name}"), &format!("strain {name}"), "", &mut strains.iter().map(component));
