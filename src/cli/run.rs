@@ -17,6 +17,7 @@ use flockform::continuum::memory::predicted;
 use flockform::continuum::plan::Plan;
 use flockform::continuum::run::{Outcome, SharedError, StopReason, require_shareable, resume, run_shared};
 use flockform::export::checkpoint::{self, Checkpoint, RunRequest};
+use flockform::export::figures::Formats;
 use flockform::export::film::{self, FilmColour};
 use flockform::export::report;
 use flockform::export::{Drawing, OutputFolder, Results, Timings, write_all};

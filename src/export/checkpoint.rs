@@ -205,12 +205,8 @@ impl<'a> Checkpoint<'a> {
             return Err(failure);
         }
         written.map_err(io::Error::other).and(flushed)?;
-        let header = [
-            &MAGIC[..],
-            &VERSION.to_le_bytes(),
-            &length.to_le_bytes(),
-            &sum.finalize().to_le_bytes(),
-        ];
+        let header =
+            [&MAGIC[..], &VERSION.to_le_bytes(), &length.to_le_bytes(), &sum.finalize().to_le_bytes()];
         file.rewind()?;
         file.write_all(&header.concat())?;
         Ok(file)

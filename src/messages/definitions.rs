@@ -129,16 +129,16 @@ pub fn concatenated(name: &str) -> Option<String> {
     Some(text)
 }
 
-fn definition(name: &str) -> Option<&'static str> {
+pub(super) fn definition(name: &str) -> Option<&'static str> {
     STANDARD.iter().chain(OWN).find(|(one, _)| *one == name).map(|(_, text)| *text)
 }
 
-fn trimmed(text: &str) -> String {
+pub(super) fn trimmed(text: &str) -> String {
     text.trim_end().lines().map(|line| format!("{}\n", line.trim())).collect()
 }
 
 /// The messages that are fields of a message; types without a package are of its own.
-fn contained(name: &str) -> Vec<String> {
+pub(super) fn contained(name: &str) -> Vec<String> {
     let own = name.split('/').next().unwrap_or_default();
     let kind = |line: &str| {
         let kind = line.split('#').next()?.split_whitespace().next()?;

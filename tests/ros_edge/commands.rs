@@ -6,6 +6,7 @@ use flockform::messages::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
 use flockform::messages::flockform_msgs::SetFormationRequest;
 use flockform::messages::formation::leaders::set_formation;
 use flockform::messages::std_msgs::Empty;
+use flockform::messages::type_description_interfaces::{GetTypeDescription, GetTypeDescriptionRequest};
 use flockform::messages::{lifecycle_msgs, rcl_interfaces, std_srvs};
 use flockform::ros::arguments::Severity;
 use flockform::ros::edge::Quality;
@@ -162,6 +163,24 @@ fn a_second_node_of_the_same_name_is_noticed_and_reported() {
     });
     drop(twin);
     told(&mut swarm, &|status| !status.message.contains("name"));
+}
+
+#[test]
+fn a_peer_without_our_files_is_told_what_our_messages_are_made_of() {
+    let mut peers = peers();
+    let mut swarm = Swarming::open(&square(&PATIENT), &[]);
+    let name = "/flockform/get_type_description";
+    let ask = client::<GetTypeDescription>(&mut peers, ServiceMapping::Enhanced, name);
+    let type_name = "flockform_msgs/msg/FormationState".to_owned();
+    let asked = GetTypeDescriptionRequest { type_name, include_type_sources: true, ..Default::default() };
+    let answer = call::<GetTypeDescription>(&ask, &asked, &mut || swarm.tick());
+    assert!(answer.successful, "{}", answer.failure_reason);
+    assert!(answer.type_sources[0].raw_file_contents.contains("MemberState[] members"));
+    let fields = &answer.type_description.type_description.fields;
+    assert!(fields.iter().any(|field| field.kind.nested_type_name == "flockform_msgs/msg/MemberState"));
+    let asked = GetTypeDescriptionRequest { type_hash: "RIHS01_ff".into(), ..asked };
+    let refused = call::<GetTypeDescription>(&ask, &asked, &mut || swarm.tick());
+    assert!(!refused.successful && refused.failure_reason.contains("RIHS01_"), "{refused:?}");
 }
 
 #[test]

@@ -1,4 +1,5 @@
-"""Encodes messages with rosbags (PyPI): JSON lines {"type": "package/Name", "value": ...} in, hexadecimal CDR out.
+"""Encodes messages with rosbags (PyPI): JSON lines {"type": "package/Name", "value": ...} in, hexadecimal CDR out; for lines
+without a value the hash of the type.
 
 Usage: reference_cdr.py PATH_OF_FLOCKFORM_MSGS
 """
@@ -50,6 +51,9 @@ def main():
         asked = json.loads(line)
         package, name = asked["type"].split("/")
         kind = f"{package}/msg/{name}"
+        if "value" not in asked:
+            print(store.hash_rihs01(kind))
+            continue
         print(bytes(store.serialize_cdr(message(store, kind, asked["value"]), kind)).hex())
 
 

@@ -36,7 +36,7 @@ pub struct Filled {
     pub decodes: fn(&[u8]) -> bool,
 }
 
-fn filled<T>(name: String) -> Filled
+pub fn filled<T>(name: String) -> Filled
 where
     T: Serialize + DeserializeOwned + PartialEq + std::fmt::Debug,
 {

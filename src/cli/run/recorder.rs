@@ -41,6 +41,7 @@ pub struct Records {
     pub load_steps: Vec<LoadStep>,
     /// The view of the report.
     pub stage: Option<View>,
+    /// For a film.
     pub animation: Option<RunRecorder>,
     pub writing: Duration,
 }
@@ -173,7 +174,8 @@ impl<'a> Recorder<'a> {
         let animation = self.animation.as_mut().filter(|_| self.reports);
         let stage = animation.map(|animation| animation.stage(self.scene, outcome));
         let writing = self.writing + start.elapsed();
-        let Self { snapshots, probes, load_steps, animation, .. } = self;
+        let Self { snapshots, probes, load_steps, animation, films, .. } = self;
+        let animation = animation.filter(|_| films);
         Ok(Records { snapshots, probes, load_steps, stage, animation, writing })
     }
 }

@@ -16,11 +16,11 @@ fn plan(scene: &Scene) -> Plan {
 }
 
 /// The state, and what depends on the neighbours: PE1 and the residual, then how the run ended.
-fn bits(outcome: &Outcome) -> (EngineState<'_>, Vec<u64>, String) {
+fn bits(outcome: &Outcome) -> (EngineState<'static>, Vec<u64>, String) {
     let engine = &outcome.engine;
     let pe1 = (0..engine.body().count()).map(|i| engine.pe1(i));
     let numbers = pe1.chain([outcome.residual]).map(f64::to_bits).collect();
-    (EngineState::of(engine), numbers, format!("{:?}", outcome.reason))
+    (EngineState::of(engine).into_owned(), numbers, format!("{:?}", outcome.reason))
 }
 
 /// Runs whole, and again broken off at every one of `at`, through bytes.
@@ -131,7 +131,8 @@ fn a_run_that_had_come_to_rest_takes_no_further_step() {
 #[test]
 fn a_state_of_another_body_is_refused() {
     let engine = Engine::new(plan(&scene("tension", &[])).setup);
-    let error = EngineState::of(&engine).engine(plan(&scene("fracture", &[])).setup).expect_err("another body");
+    let error =
+        EngineState::of(&engine).engine(plan(&scene("fracture", &[])).setup).expect_err("another body");
     assert!(error.to_string().contains("144 particles"), "{error}");
 }
 

@@ -67,7 +67,7 @@ fn encode_group(group: &[Frame]) -> (Vec<u8>, String) {
             modes.push(mode as u8);
             deltas.clear();
             deltas.extend(differences(track, &codes[k], past, mode));
-            packer.put_planes(&deltas, QuantizedChannel::bytes(track.bits));
+            packer.put_planes(deltas.iter().copied(), QuantizedChannel::bytes(track.bits));
         }
     }
     (modes, packer.finish())
@@ -129,23 +129,23 @@ fn zigzag(difference: u32, bits: u32) -> u32 {
 }
 
 /// Whole numbers as text: each written as the difference from the one `stride` before.
-pub fn integers(values: impl Iterator<Item = u32>, stride: usize) -> String {
-    let values: Vec<u32> = values.collect();
-    let before = |i: usize| if i < stride { 0 } else { values[i - stride] };
-    let signed = |i: usize| values[i].wrapping_sub(before(i)) as i32;
-    let differences: Vec<u32> =
-        (0..values.len()).map(|i| ((signed(i) << 1) ^ (signed(i) >> 31)) as u32).collect();
+/// They are gone through once for each byte and never kept, since those of a body take more memory than the body.
+pub fn integers(values: impl Iterator<Item = u32> + Clone, stride: usize) -> String {
+    let mut before = vec![0; stride];
+    let differences = values.enumerate().map(move |(i, value)| {
+        let signed = value.wrapping_sub(std::mem::replace(&mut before[i % stride], value)) as i32;
+        ((signed << 1) ^ (signed >> 31)) as u32
+    });
     let mut packer = Packer::new();
-    packer.put_planes(&differences, 4);
+    packer.put_planes(differences, 4);
     packer.finish()
 }
 
 /// Numbers as text, to the last bit.
-pub fn doubles(values: impl Iterator<Item = f64>) -> String {
-    let values: Vec<[u8; 8]> = values.map(f64::to_le_bytes).collect();
+pub fn doubles(values: &[f64]) -> String {
     let mut packer = Packer::new();
-    for plane in 0..8 {
-        packer.put(&values.iter().map(|bytes| bytes[plane]).collect::<Vec<u8>>());
+    for byte in 0..8 {
+        packer.put(values.iter().map(|value| value.to_le_bytes()[byte]));
     }
     packer.finish()
 }
@@ -153,29 +153,38 @@ pub fn doubles(values: impl Iterator<Item = f64>) -> String {
 /// Level of deflate: mostly zeros compress as well at a lower one, in half the time.
 const LEVEL: u32 = 4;
 
+/// Bytes that are deflated at once.
+const PIECE: usize = 1 << 16;
+
 /// Deflate into memory, then base64.
 struct Packer {
     encoder: ZlibEncoder<Vec<u8>>,
-    plane: Vec<u8>,
+    piece: Vec<u8>,
 }
 
 impl Packer {
     fn new() -> Self {
-        Self { encoder: ZlibEncoder::new(Vec::new(), Compression::new(LEVEL)), plane: Vec::new() }
+        Self {
+            encoder: ZlibEncoder::new(Vec::new(), Compression::new(LEVEL)),
+            piece: Vec::with_capacity(PIECE),
+        }
     }
 
-    fn put(&mut self, bytes: &[u8]) {
-        self.encoder.write_all(bytes).expect("memory takes everything");
+    fn put(&mut self, mut bytes: impl Iterator<Item = u8>) {
+        loop {
+            self.piece.clear();
+            self.piece.extend(bytes.by_ref().take(PIECE));
+            if self.piece.is_empty() {
+                return;
+            }
+            self.encoder.write_all(&self.piece).expect("memory takes everything");
+        }
     }
 
     /// The lowest bytes of all numbers, then the next ones.
-    fn put_planes(&mut self, numbers: &[u32], bytes: usize) {
+    fn put_planes(&mut self, numbers: impl Iterator<Item = u32> + Clone, bytes: usize) {
         for byte in 0..bytes {
-            let mut plane = std::mem::take(&mut self.plane);
-            plane.clear();
-            plane.extend(numbers.iter().map(|number| (number >> (8 * byte)) as u8));
-            self.put(&plane);
-            self.plane = plane;
+            self.put(numbers.clone().map(|number| (number >> (8 * byte)) as u8));
         }
     }
 

@@ -128,8 +128,8 @@ impl FlightRecorder {
         let role = |&leads: &bool| if leads { Role::Leader } else { Role::Follower };
         stage.set_roles(&self.leads.iter().map(role).collect::<Vec<_>>(), &[]);
         if !self.links.is_empty() {
-            let none = vec![0; self.links.len()];
-            stage.set_bonds(&self.links, &none, &none);
+            let none = self.links.iter().map(|_| 0);
+            stage.set_bonds(&self.links, none.clone(), none);
         }
         stage
     }

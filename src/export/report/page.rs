@@ -4,14 +4,15 @@
 //! charts are data that the scripts draw. The scripts are modules of their own, in `web/`; a page holds them one after
 //! another, without their imports, so no two may give a name of the top level to different things.
 
-use std::fmt::Write as _;
+use std::io::{self, Write};
 use std::path::PathBuf;
 
 use serde::Serialize;
 use serde_json::json;
 
 use super::super::OutputFolder;
-use super::super::error::{ExportError, write_file};
+use super::super::error::ExportError;
+use super::super::manifest::create_buffered;
 use super::plot::Plot;
 use super::view::View;
 
@@ -81,24 +82,40 @@ impl Page {
     /// The file cannot be written.
     pub(crate) fn write(&self, folder: &OutputFolder) -> Result<PathBuf, ExportError> {
         let path = folder.path(FILE);
-        write_file(&path, self.html())?;
+        let write = || self.write_to(&mut create_buffered(&path)?);
+        write().map_err(ExportError::io("write", &path))?;
         Ok(path)
     }
 
     /// The whole file.
+    #[cfg(any(test, feature = "live"))]
     pub(crate) fn html(&self) -> String {
-        let stages: Vec<_> = self.stages.iter().map(|stage| &stage.animation).collect();
-        let data = in_script(&json!({ "stages": stages, "plots": self.plots, "live": self.live }));
-        let mut arrays = String::new();
+        let mut bytes = Vec::new();
+        self.write_to(&mut bytes).expect("memory takes everything");
+        String::from_utf8(bytes).expect("all of it is text")
+    }
+
+    /// The arrays go from where they are, since those of a large body are most of the page.
+    fn write_to(&self, out: &mut impl Write) -> io::Result<()> {
+        let (before, after) = PAGE.split_once("{{arrays}}").expect("the template has a place for them");
+        let parts = self.parts();
+        out.write_all(filled(before, &parts).as_bytes())?;
         for (number, stage) in self.stages.iter().enumerate() {
             for (name, text) in &stage.arrays {
-                let _ =
-                    writeln!(arrays, "<script type=\"text/plain\" id=\"s{number}-{name}\">{text}</script>");
+                writeln!(out, "<script type=\"text/plain\" id=\"s{number}-{name}\">{text}</script>")?;
             }
         }
+        out.write_all(filled(after, &parts).as_bytes())?;
+        out.flush()
+    }
+
+    /// Texts for the template, by name.
+    fn parts(&self) -> [(&'static str, String); 14] {
+        let stages: Vec<_> = self.stages.iter().map(|stage| &stage.animation).collect();
+        let data = in_script(&json!({ "stages": stages, "plots": self.plots, "live": self.live }));
         let live = if self.live.is_some() { &LIVE_SCRIPTS[..] } else { &[] };
         let script: String = SCRIPTS.iter().chain(live).map(|module| joined(module)).collect();
-        let parts = [
+        [
             ("title", escaped(&self.title)),
             ("command", escaped(&self.command)),
             ("verdict", self.verdict_html()),
@@ -111,11 +128,9 @@ impl Page {
             ("stages", if self.stages.is_empty() { "hidden".into() } else { String::new() }),
             ("plots", if self.plots.is_empty() { "hidden".into() } else { String::new() }),
             ("style", STYLE.into()),
-            ("arrays", arrays),
             ("data", data),
             ("script", script),
-        ];
-        filled(PAGE, &parts)
+        ]
     }
 
     fn verdict_html(&self) -> String {

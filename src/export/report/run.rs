@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::super::bonds::listed_once;
+use super::super::bonds::pairs;
 use super::super::error::ExportError;
 use super::super::figures::SERIES;
 use super::super::load;
@@ -152,6 +152,8 @@ impl RunRecorder {
             let values: Vec<&[f64]> = self.values.iter().map(Vec::as_slice).collect();
             self.frames.keep_last(engine.step(), &values);
         }
+        // Nothing is taken any more, and the page is yet to be packed.
+        self.values.iter_mut().for_each(|values| *values = Vec::new());
     }
 
     /// Values of every channel, displacements times `part`.
@@ -311,16 +313,14 @@ fn set_bonds(stage: &mut View, engine: &Engine, is_solved: bool) {
     let mut breaks: Vec<([u32; 2], u32)> =
         engine.breaks().iter().map(|one| (one.pair, one.step as u32 + 1)).collect();
     breaks.sort_unstable();
-    let (mut pairs, mut sees, mut broken) = (Vec::new(), Vec::new(), Vec::new());
-    for (_, [a, b]) in listed_once(neighbours) {
-        let pair = [a.min(b), a.max(b)];
-        let found = breaks.binary_search_by_key(&pair, |one| one.0);
-        pairs.push([a, b]);
-        sees.push(u32::from(!neighbours.of(b as usize).contains(&a)));
+    let all: Vec<[u32; 2]> = pairs(neighbours).collect();
+    let sees = all.iter().map(|&[a, b]| u32::from(!neighbours.of(b as usize).contains(&a)));
+    let broken = all.iter().map(|&[a, b]| {
+        let found = breaks.binary_search_by_key(&[a.min(b), a.max(b)], |one| one.0);
         // Bonds that are broken at rest were broken before the load.
-        broken.push(found.map_or(0, |n| if is_solved { 1 } else { breaks[n].1 }));
-    }
-    stage.set_bonds(&pairs, &sees, &broken);
+        found.map_or(0, |n| if is_solved { 1 } else { breaks[n].1 })
+    });
+    stage.set_bonds(&all, sees, broken);
 }
 
 /// The columns of `final.csv`.

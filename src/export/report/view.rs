@@ -131,12 +131,12 @@ impl View {
 
     /// Places that displacements start from \[length\].
     pub(crate) fn set_reference(&mut self, reference: &Vectors) {
-        self.put("X", doubles(reference.x.iter().copied()));
-        self.put("Y", doubles(reference.y.iter().copied()));
+        self.put("X", doubles(&reference.x));
+        self.put("Y", doubles(&reference.y));
     }
 
     /// Ids, where they are not the numbers from 1 on.
-    pub(crate) fn set_ids(&mut self, ids: impl Iterator<Item = u32>) {
+    pub(crate) fn set_ids(&mut self, ids: impl Iterator<Item = u32> + Clone) {
         self.put("ids", integers(ids, 1));
     }
 
@@ -148,23 +148,28 @@ impl View {
 
     /// Pairs of neighbours; `sees` gives for each whether both ends see the other (0) or only the first (1), `broken`
     /// is one more than the step at which it broke, 0 for never.
-    pub(crate) fn set_bonds(&mut self, pairs: &[[u32; 2]], sees: &[u32], broken: &[u32]) {
+    pub(crate) fn set_bonds(
+        &mut self,
+        pairs: &[[u32; 2]],
+        sees: impl Iterator<Item = u32> + Clone,
+        broken: impl Iterator<Item = u32> + Clone,
+    ) {
         self.put("bonds", integers(pairs.iter().flatten().copied(), 2));
-        self.put("bond-sees", integers(sees.iter().copied(), 1));
-        self.put("bond-broken", integers(broken.iter().copied(), 1));
+        self.put("bond-sees", integers(sees, 1));
+        self.put("bond-broken", integers(broken, 1));
     }
 
-    pub(crate) fn set_cells(&mut self, cells: &Cells) {
+    pub(crate) fn set_cells<'a>(&mut self, cells: &'a Cells) {
         // The page draws polygons of as many corners each: those with fewer repeat their last.
         let most = cells.most_corners();
-        let filled = |cell: &[u32]| (0..most).map(|k| cell[k.min(cell.len() - 1)]).collect::<Vec<_>>();
+        let filled = |cell: &'a [u32]| (0..most).map(move |k| cell[k.min(cell.len() - 1)]);
         self.animation.corners = most;
         self.put("cells", integers(cells.iter().flat_map(filled), most));
     }
 
     /// A column known to the last bit at the end; NaN where there is nothing.
     pub(crate) fn add_exact(&mut self, quantity: Quantity, values: impl Iterator<Item = f64>) {
-        self.put(&format!("exact-{}", quantity.key), doubles(values));
+        self.put(&format!("exact-{}", quantity.key), doubles(&values.collect::<Vec<f64>>()));
         self.animation.exact.push(quantity);
     }
 

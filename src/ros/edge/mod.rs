@@ -8,13 +8,14 @@
 //! * [`topic`]: publishers and subscriptions; [`quality`]: what they promise each other.
 //! * [`service`]: services that answer peers on Fast DDS and on Cyclone DDS alike.
 //! * [`parameters`], [`lifecycle`]: what ROS 2 expects of a node, as pure cores and their services.
-//! * [`loggers`]: the level of the log; [`rosout`]: its lines.
+//! * [`loggers`]: the level of the log; [`rosout`]: its lines; [`descriptions`]: what messages are made of.
 //! * [`pulse`]: whether the middleware still lives.
 //! * [`clock`]: system time or the simulator's.
 //!
 //! Times are seconds since the Unix epoch as `f64`.
 
 pub mod clock;
+pub mod descriptions;
 mod door;
 mod farewell;
 mod graph;

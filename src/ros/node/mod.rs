@@ -22,6 +22,7 @@ use std::time::Instant;
 
 use super::arguments::{NameError, Names, RosArguments};
 use super::edge::clock::Clock;
+use super::edge::descriptions::TypeDescriptions;
 use super::edge::lifecycle::{Lifecycle, Transition};
 use super::edge::loggers::{LogLevel, Loggers};
 use super::edge::parameters::{Change, Parameters};
@@ -67,6 +68,7 @@ pub struct FormationNode {
     resume: Service<std_srvs::Trigger>,
     set_formation: Service<SetFormation>,
     /// Of a log whose level can change.
+    descriptions: TypeDescriptions,
     loggers: Option<Loggers>,
     rosout: Option<Rosout>,
     /// Of a configured node.
@@ -123,6 +125,7 @@ impl FormationNode {
                 .transpose()?,
             resume: node.service(&service("resume")?)?,
             set_formation: node.service(&service("set_formation")?)?,
+            descriptions: TypeDescriptions::new(&node)?,
             loggers: None,
             rosout: None,
             endpoints: None,
@@ -351,6 +354,7 @@ impl FormationNode {
         if let Some(loggers) = &self.loggers {
             loggers.serve(locked);
         }
+        self.descriptions.serve();
         let changes = self.parameters.poll(now, locked);
         self.apply(&changes, now);
         let mut events: Vec<(u8, String, Vec<f64>)> = Vec::new();
