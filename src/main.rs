@@ -6,6 +6,7 @@ use std::process::ExitCode;
 
 fn main() -> ExitCode {
     let done = cli::arguments().and_then(|(arguments, ros)| {
+        cli::spare_memory(&arguments.command);
         cli::log::start(&arguments, &ros);
         cli::watch_interrupts();
         cli::dispatch(arguments.command, &ros)

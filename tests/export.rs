@@ -489,7 +489,7 @@ fn probes_are_drawn_as_one_line_each_in_the_panels_where_something_happens() {
 }
 
 #[test]
-fn the_png_is_the_svg_at_full_width_with_its_text() {
+fn the_png_is_the_svg_at_twice_its_size_with_its_text() {
     let parent = temporary();
     let run = Run::of("tension", &["stop.steps=1", "record.figures=[1]"]);
     let svg = figures::configuration(&run.subject(), &run.snapshots[0]);
@@ -501,12 +501,10 @@ fn the_png_is_the_svg_at_full_width_with_its_text() {
     let figure = Document::parse(&svg).expect("well-formed");
     let size =
         |name: &str| figure.root_element().attribute(name).expect("there").parse::<f64>().expect("a number");
-    assert_eq!(png.width(), figures::PNG_WIDTH);
-    assert_eq!(f64::from(png.height()), (1600.0 * size("height") / size("width")).round());
+    let zoom = f64::from(figures::PNG_ZOOM);
+    assert_eq!([png.width(), png.height()].map(f64::from), ["width", "height"].map(|name| zoom * size(name)));
     // The title's line holds ink: the font was found.
-    let zoom = 1600.0 / size("width");
-    let rows = (10.0 * zoom) as usize..(26.0 * zoom) as usize;
-    let dark =
-        png.pixels()[rows.start * 1600..rows.end * 1600].iter().filter(|pixel| pixel.red() < 90).count();
+    let [begin, end] = [10.0, 26.0].map(|row| (zoom * row) as usize * png.width() as usize);
+    let dark = png.pixels()[begin..end].iter().filter(|pixel| pixel.red() < 90).count();
     assert!(dark > 500, "{dark} dark pixels");
 }

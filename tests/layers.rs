@@ -203,6 +203,7 @@ fn the_width_of_vectors_is_chosen_in_one_place() {
 #[test]
 fn unsafe_code_stands_where_it_was_measured_to_pay_or_where_the_system_is_called() {
     let known = [
+        "cli/memory.rs",
         "flock/grid/candidates.rs",
         "flock/lanes.rs",
         "ros/edge/door.rs",

@@ -35,6 +35,20 @@ pub fn require(scene: &Scene, bytes: f64) -> Result<(), SceneError> {
     }
 }
 
+/// Has large arrays go back to the system when they are dropped. glibc keeps those that are smaller than one that was dropped
+/// before, and what it keeps lies in pieces: an equilibrium of 432,000 particles took 12 % more at its largest. What solves
+/// again and again is faster without.
+pub fn return_what_is_dropped() {
+    /// Bytes from which an array has pages of its own.
+    #[cfg(all(feature = "ros", target_env = "gnu"))]
+    const LARGE: libc::c_int = 1 << 17;
+    // SAFETY: the call sets a number of the allocator; no other thread runs yet.
+    #[cfg(all(feature = "ros", target_env = "gnu"))]
+    unsafe {
+        libc::mallopt(libc::M_MMAP_THRESHOLD, LARGE);
+    }
+}
+
 /// The least of the machine's, the control groups' and the process's own; `None` where the system says nothing.
 fn room() -> Option<Room> {
     let machine = read_to_string("/proc/meminfo").ok().and_then(|text| field(&text, "MemAvailable:"));

@@ -330,6 +330,13 @@ fn renamed(error: &clap::Error) -> Option<(&'static str, &'static str)> {
     RENAMED.into_iter().find(|(then, _)| matches!(wrong, ContextValue::String(word) if word == then))
 }
 
+/// Has a run take no more memory than it must: it is the one command whose size is that of its body.
+pub fn spare_memory(command: &Command) {
+    if matches!(command, Command::Run(_)) {
+        memory::return_what_is_dropped();
+    }
+}
+
 /// From now on an interrupt ends the program within a second.
 pub fn watch_interrupts() {
     interrupt::watch();

@@ -5,7 +5,7 @@ use flockform::continuum::memory::readable_bytes;
 use flockform::continuum::plan::Plan;
 use flockform::continuum::report::PlanReport;
 use flockform::continuum::shares::Shares;
-use flockform::export::report::run::most_bytes;
+use flockform::export::memory::{Outputs, predicted};
 use flockform::study::compare::run::plan as plan_of;
 use flockform::swarm::plan::SwarmPlan;
 use serde_json::{Value, json};
@@ -45,12 +45,14 @@ pub fn plan(arguments: &PlanArguments) -> Result<(), Refusal> {
             let scene = SceneArguments { scene: file.clone(), set: set.clone() }.load([])?;
             let plan = plan_of(&scene)?;
             let mut report = PlanReport::new(&scene, &plan)?;
-            let page = format!("up to {} more; none with --no-report", readable_bytes(most_bytes(&plan)));
-            report.facts.push(("memory of report.html".into(), page));
+            let memory = [Outputs::ALL, Outputs::TABLES].map(|outputs| predicted(&scene, &plan, outputs));
+            let [all, tables] = memory.map(readable_bytes);
+            let words = format!("about {all}; {tables} with --figures none --no-report");
+            report.facts.push(("memory".into(), words));
             if let Some(ranks) = ranks {
                 report.facts.extend(Shares::new(&scene, &plan, usize::from(*ranks))?.facts());
             }
-            (report.to_string(), scene_json(&scene.name, &plan, &report))
+            (report.to_string(), scene_json(&scene.name, &plan, &report, memory))
         }
     };
     match json {
@@ -60,7 +62,7 @@ pub fn plan(arguments: &PlanArguments) -> Result<(), Refusal> {
     Ok(())
 }
 
-fn scene_json(name: &str, plan: &Plan, report: &PlanReport) -> Value {
+fn scene_json(name: &str, plan: &Plan, report: &PlanReport, [all, tables]: [usize; 2]) -> Value {
     let pairs = |pairs: &[(String, String)], [left, right]: [&str; 2]| -> Value {
         pairs.iter().map(|(a, b)| json!({ left: a.trim_start(), right: b })).collect()
     };
@@ -69,6 +71,7 @@ fn scene_json(name: &str, plan: &Plan, report: &PlanReport) -> Value {
         "title": report.title,
         "particles": plan.count(),
         "steps": plan.stop.steps,
+        "memory_bytes": { "all": all, "tables": tables },
         "facts": pairs(&report.facts, ["name", "value"]),
         "models": pairs(&report.modelled, ["effect", "key"]),
         "leaves_out": pairs(&report.left_out, ["key", "reason"]),

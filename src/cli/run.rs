@@ -13,12 +13,12 @@ use clap::Args;
 use flockform::continuum::digest::{digest, fnv1a};
 use flockform::continuum::equilibrium::run_to_equilibrium_watched;
 use flockform::continuum::looks::Looks;
-use flockform::continuum::memory::predicted;
 use flockform::continuum::plan::Plan;
 use flockform::continuum::run::{Outcome, SharedError, StopReason, require_shareable, resume, run_shared};
 use flockform::export::checkpoint::{self, Checkpoint, RunRequest};
 use flockform::export::figures::Formats;
 use flockform::export::film::{self, FilmColour};
+use flockform::export::memory::{Outputs, predicted};
 use flockform::export::report;
 use flockform::export::{Drawing, OutputFolder, Results, Timings, write_all};
 use flockform::ranks::Team;
@@ -116,7 +116,8 @@ impl Prepared {
             equilibrium.request.interrupt = Interrupt::new(interrupt::flag());
         }
         let plan = plan(&scene)?;
-        memory::require(&scene, predicted(&scene, &plan) as f64)?;
+        let outputs = Outputs { figures: arguments.figures.formats(), report: !arguments.report.no_report };
+        memory::require(&scene, predicted(&scene, &plan, outputs) as f64)?;
         let digest = digest(&plan);
         left.as_ref().map_or(Ok(()), |left| left.require_of(&scene, digest))?;
         Ok(Self { left, asked, scene, words, plan, digest })

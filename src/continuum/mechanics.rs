@@ -1,6 +1,6 @@
 //! The readings of a testing machine on a body: reactions, load, strain energy, stress.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -129,7 +129,11 @@ impl Stresses {
 impl Mechanics {
     /// At the engine's present places; `None` without a material.
     pub fn of(engine: &Engine, elastic: &Elastic) -> Option<Self> {
-        let stresses = Stresses::at_present(engine, elastic)?;
+        Self::under(&Stresses::at_present(engine, elastic)?, engine, elastic)
+    }
+
+    /// Where the stresses at the engine's present places are known already.
+    pub fn under(stresses: &Stresses, engine: &Engine, elastic: &Elastic) -> Option<Self> {
         let cells = engine.cells()?;
         let forces = Forces::of(engine);
         let u = engine.displacements();
@@ -196,8 +200,11 @@ fn recovered(
     let spacing = lattice.spacing().max((lattice.cell_area() * lattice.sublattices() as f64).sqrt());
     let bucket = |p: [f64; 2]| p.map(|v| (v / (REACH * spacing)).floor() as i64);
     let mut cells_in: HashMap<[i64; 2], Vec<(u32, CellStress)>> = HashMap::new();
-    let centres = cells.centroids(&body.reference);
-    for (cell, centroid) in centres.iter().enumerate() {
+    let around = |[x, y]: [i64; 2]| (x - 1..=x + 1).flat_map(move |x| (y - 1..=y + 1).map(move |y| [x, y]));
+    let near_edge: HashSet<[i64; 2]> =
+        edge.particles.iter().flat_map(|&i| around(bucket(body.reference.get(i)))).collect();
+    let centres = cells.centroids(&body.reference).enumerate();
+    for (cell, centroid) in centres.filter(|&(_, centroid)| near_edge.contains(&bucket(centroid))) {
         let (area, stress) = (area(cells.shape(cell)), of_cells[cell].components);
         let region = cells.region_of(cell);
         cells_in.entry(bucket(centroid)).or_default().push((region, CellStress { centroid, area, stress }));
@@ -215,10 +222,8 @@ fn recovered(
     let fields: Vec<Fields> = std::iter::once(elastic).chain(&cells.inclusions).map(Fields::of).collect();
     let recover = |&i: &usize| {
         let point = body.reference.get(i);
-        let [x, y] = bucket(point);
-        let around = || (x - 1..=x + 1).flat_map(|x| (y - 1..=y + 1).map(move |y| [x, y]));
         let near = |p: [f64; 2]| distance(p, point) < REACH * spacing;
-        let around_here = around().filter_map(|b| cells_in.get(&b)).flatten();
+        let around_here = around(bucket(point)).filter_map(|b| cells_in.get(&b)).flatten();
         let (regions, cells_here): (Vec<u32>, Vec<CellStress>) =
             around_here.filter(|(_, cell)| near(cell.centroid)).copied().unzip();
         // Across an interface no one field goes on.
@@ -227,7 +232,7 @@ fn recovered(
             return None;
         }
         let elastic = cells.material_of_region(region, elastic);
-        let tractions: Vec<KnownTraction> = around()
+        let tractions: Vec<KnownTraction> = around(bucket(point))
             .filter_map(|b| tractions_in.get(&b))
             .flatten()
             .filter(|t| near(t.point))

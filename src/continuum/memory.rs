@@ -1,11 +1,16 @@
-//! The memory that a run takes, before it does.
+//! The memory that a run takes, before it does: what it steps, solves and measures. `export::memory` adds what its
+//! outputs take.
+//!
+//! Arrays of the plan are counted; what solvers and measurements take beside them was measured on square and hexagonal
+//! bodies of 100,000 to 1,200,000 particles, aligned and fitted, and is the same for each particle.
 
 use super::plan::Plan;
 use crate::flock::body::{Cut, MOST_SITES};
 use crate::flock::law::Weights;
-use crate::geometry::outline::Outline;
-use crate::material::stress::StressState;
+use crate::geometry::outline::{Outline, Place};
 use crate::scene::{BodySource, Scene};
+use crate::solve::corotated::is_corotated;
+use crate::solve::equilibrium::{Choice, Solver, UNSYMMETRIC_UP_TO};
 
 /// Fewest bytes that a run of a scene takes, known before anything is laid out; 0 where its layout is refused anyway.
 pub fn at_least(scene: &Scene) -> f64 {
@@ -19,31 +24,11 @@ pub fn at_least(scene: &Scene) -> f64 {
     if particles > MOST_SITES as f64 { 0.0 } else { particles * EACH as f64 }
 }
 
-/// Bytes that the run holds when it writes its results, at its largest: what it steps, and the configurations that are
-/// kept. The report takes more of it (`export::report::run::most_bytes`), and each figure some 20 MB while it is drawn.
-pub fn predicted(scene: &Scene, plan: &Plan) -> usize {
-    stepped(plan) + results(scene, plan)
-}
-
-/// Bytes of configurations kept for figures, and of the last one in numbers.
-fn results(scene: &Scene, plan: &Plan) -> usize {
-    let is_solved_at_once = scene.equilibrium.is_some() && scene.load_steps.is_none();
-    let before = |figure: &&usize| !is_solved_at_once && **figure < plan.stop.steps;
-    // The last one is kept for its figure and for the numbers.
-    let snapshots = scene.record.figures.iter().filter(before).count() + 1;
-    let stress = scene.material.map_or(0, |_| size_of::<Option<StressState>>());
-    plan.count() * (snapshots * SNAPSHOT + stress)
-}
-
-/// Bytes of a particle in a [`Snapshot`](super::record::Snapshot): position, role and energies.
-const SNAPSHOT: usize = 16 + 1 + 2 * 8;
-
 /// Bytes of each particle: positions (twice), reference, roles, sites, and where its neighbours begin.
 const EACH: usize = 3 * 16 + 3 + 8 + 4;
 
-/// Bytes that the steps take: positions (twice), reference, roles, sites, neighbour lists and what
-/// the scene adds to them.
-fn stepped(plan: &Plan) -> usize {
+/// Bytes of an engine: positions (twice), reference, roles, sites, neighbour lists and what the scene adds to them.
+pub fn stepped(plan: &Plan) -> usize {
     let (count, bonds) = (plan.count(), neighbour_entries(plan));
     let present = |is: bool, bytes: usize| if is { bytes } else { 0 };
     let cells = plan
@@ -63,10 +48,50 @@ fn stepped(plan: &Plan) -> usize {
         }
         + cells
         + 16 * count * plan.setup.loads.len()
+        + present(plan.setup.body.outline.is_some(), size_of::<Option<Place>>() * count)
+        + present(plan.setup.free_edge.is_some(), 2 * count)
         + present(plan.setup.flock.forces.is_some(), 16 * count)
         + present(plan.setup.flock.rest.is_some(), 16 * count)
-        + present(plan.setup.flock.bonds.is_some(), bonds)
+        // Whether each is broken, and a list of those that may still break.
+        + present(plan.setup.flock.bonds.is_some(), 4 * bonds)
         + present(plan.setup.present_radius.is_some(), 8 * count)
+}
+
+/// Bytes that finding the equilibrium takes beside the plan, less the positions that the engine has later; 0 for a scene
+/// that is stepped.
+pub fn solving(scene: &Scene, plan: &Plan) -> usize {
+    /// Vectors of conjugate gradients, and of all levels of multigrid.
+    const BY_ITERATION: f64 = 118.0;
+    /// The matrix of a body that turns, which differs from row to row, and its factor.
+    const COROTATED: f64 = 4_600.0;
+    /// Of a factor, by each doubling of the body from 2^11 particles on.
+    const FACTOR: f64 = 530.0;
+    let Some(asked) = &scene.equilibrium else { return 0 };
+    let count = plan.count() as f64;
+    let is_direct = match asked.request.solver {
+        Choice::This(solver) => solver == Solver::Direct,
+        Choice::Auto => plan.count() <= UNSYMMETRIC_UP_TO && is_one_sided(plan),
+    };
+    let each = match (is_corotated(&plan.setup.flock), is_direct) {
+        (true, _) => COROTATED,
+        (false, true) => FACTOR * (count.log2() - 11.0).max(1.0),
+        (false, false) => BY_ITERATION,
+    };
+    (each * count) as usize
+}
+
+/// Whether a particle sees another that does not see it; a material's never do.
+fn is_one_sided(plan: &Plan) -> bool {
+    let neighbours = &plan.setup.flock.neighbours;
+    let sees = |i: usize, j: usize| neighbours.of(j).contains(&(i as u32));
+    let all = |i: usize| neighbours.of(i).iter().all(|&j| sees(i, j as usize));
+    !matches!(plan.setup.flock.weights, Weights::Matrix(_)) && !(0..plan.count()).all(all)
+}
+
+/// Bytes of stresses and forces as they are measured, where the scene has a material.
+pub fn measured(plan: &Plan) -> usize {
+    let Some(cells) = &plan.setup.cells else { return 0 };
+    195 * plan.count() + 55 * cells.count()
 }
 
 /// Entries of the neighbour lists; where they are found anew at every step, about as many as the

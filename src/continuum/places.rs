@@ -43,11 +43,9 @@ pub fn around(scene: &Scene, cells: Option<&Cells>, reference: &Vectors) -> Resu
     scene.record.places.iter().enumerate().map(of).collect()
 }
 
-/// Displacement and stress at each place of `record.places` at present.
-pub fn at_places(scene: &Scene, engine: &Engine) -> Vec<AtPlace> {
-    let (Some(elastic), false) = (&scene.material, scene.record.places.is_empty()) else { return Vec::new() };
+/// Displacement and stress at each place of `record.places`, under the stresses at present.
+pub fn at_places(scene: &Scene, engine: &Engine, stresses: &Stresses) -> Vec<AtPlace> {
     let around = around(scene, engine.cells(), &engine.body().reference).unwrap_or_default();
-    let Some(stresses) = Stresses::at_present(engine, elastic) else { return Vec::new() };
     let at = |(&place, around): (&[f64; 2], Around)| {
         let displacement = around.mean(|i| Some(engine.displacement(i))).unwrap_or_default();
         let of = |StressState { components: [xx, yy, xy], von_mises, .. }| [xx, yy, xy, von_mises];

@@ -6,7 +6,7 @@ use super::active_share::active_share;
 use super::bulk_response;
 use super::deviation::{Deviation, pieces};
 use super::equilibrium::select_solver;
-use super::memory::{neighbour_entries, predicted, readable_bytes};
+use super::memory::neighbour_entries;
 use super::plan::Plan;
 use crate::flock::fracture::Threshold;
 use crate::flock::law::Weights;
@@ -204,7 +204,7 @@ fn facts(
         )
     });
     let outline = outline_facts(scene, plan, deviation);
-    let last = [("memory", format!("about {}", readable_bytes(predicted(scene, plan)))), ("stops", stop)];
+    let last = [("stops", stop)];
     let facts = first.into_iter().chain(swept.into_iter().flatten()).chain(moving).chain(last);
     Ok(facts.map(|(name, value)| (name.to_owned(), value)).chain(outline).collect())
 }

@@ -66,6 +66,7 @@ pub mod flight;
 mod folder;
 pub mod load;
 pub(crate) mod manifest;
+pub mod memory;
 pub mod report;
 #[cfg(feature = "bench")]
 pub mod scale;
@@ -145,7 +146,7 @@ pub fn write_all(
 ) -> Result<(Vec<PathBuf>, Summary), ExportError> {
     let start = Instant::now();
     let engine = &results.outcome.engine;
-    let stresses = results.scene.material.as_ref().and_then(|elastic| Stresses::at_present(engine, elastic));
+    let (measured, stresses) = Measured::of(results.scene, engine).unzip();
     let of_particles = stresses.as_ref().map(|stresses| &stresses.particles[..]);
     let mut written = vec![csv::write_final(folder, engine, of_particles)?];
     // Figures take memory of their own.
@@ -167,7 +168,7 @@ pub fn write_all(
     }
     let mut timings = results.timings;
     timings.output += start.elapsed();
-    let summary = Summary::new(results.scene, results.outcome, timings);
+    let summary = Summary::new(results.scene, results.outcome, measured, timings);
     written.push(summary.write(folder)?);
     Ok((written, summary))
 }

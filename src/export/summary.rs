@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use super::error::{ExportError, write_file};
 use super::{OutputFolder, bonds, largest_strain};
-use crate::continuum::mechanics::{Mechanics, Peak};
+use crate::continuum::mechanics::{Mechanics, Peak, Stresses};
 use crate::continuum::places::{AtPlace, at_places};
 use crate::continuum::run::{Outcome, StopReason};
 use crate::engine::Engine;
@@ -203,12 +203,11 @@ pub struct Seconds {
 }
 
 impl Summary {
-    /// The summary of a run that took this long.
-    pub fn new(scene: &Scene, outcome: &Outcome, timings: Timings) -> Self {
+    /// The summary of a run that took this long; `measured` is what there is to measure at its end.
+    pub fn new(scene: &Scene, outcome: &Outcome, measured: Option<Measured>, timings: Timings) -> Self {
         let engine = &outcome.engine;
         let [pe1, pe2] = engine.energies();
         let largest_strain = largest_strain(engine);
-        let mechanics = scene.material.as_ref().and_then(|elastic| Mechanics::of(engine, elastic));
         Self {
             program: PROGRAM,
             version: env!("CARGO_PKG_VERSION"),
@@ -225,12 +224,8 @@ impl Summary {
             share_swept: outcome.solved.is_none().then(|| outcome.engine.activity().share_computed()),
             equilibrium: outcome.solved.as_ref().map(Equilibrium::of),
             energies: Energies { pe1, pe2, largest_strain },
-            cautions: mechanics.as_ref().map_or_else(Vec::new, |mechanics| mechanics.cautions(engine)),
-            mechanics: mechanics.map(|mechanics| Measured {
-                units: Units::of(scene),
-                mechanics,
-                places: at_places(scene, engine),
-            }),
+            cautions: measured.as_ref().map_or_else(Vec::new, |measured| measured.mechanics.cautions(engine)),
+            mechanics: measured,
             broken_bonds: broken_bonds(&outcome.engine),
             timings: Seconds {
                 setup_s: timings.setup.as_secs_f64(),
@@ -248,6 +243,17 @@ impl Summary {
         text.push('\n');
         write_file(&path, text)?;
         Ok(path)
+    }
+}
+
+impl Measured {
+    /// At the engine's present places, and the stresses there; `None` without a material.
+    pub fn of(scene: &Scene, engine: &Engine) -> Option<(Self, Stresses)> {
+        let elastic = scene.material.as_ref()?;
+        let stresses = Stresses::at_present(engine, elastic)?;
+        let mechanics = Mechanics::under(&stresses, engine, elastic)?;
+        let places = at_places(scene, engine, &stresses);
+        Some((Self { units: Units::of(scene), mechanics, places }, stresses))
     }
 }
 

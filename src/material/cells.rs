@@ -162,7 +162,7 @@ impl Cells {
     /// Divides whole cells of a lattice into regions, by the middle of each \[length\].
     pub fn divide(&mut self, reference: &Vectors, regions: usize, region: impl Fn([f64; 2]) -> usize) {
         let kinds = self.shapes.len();
-        let centres = self.centroids(reference);
+        let centres: Vectors = self.centroids(reference).collect();
         for (kind, centre) in self.kind.iter_mut().zip(centres.iter()) {
             *kind += (region(centre) * kinds) as u32;
         }
@@ -338,13 +338,13 @@ impl Cells {
     }
 
     /// Centre of gravity of each cell \[length\], shape \[count\].
-    pub fn centroids(&self, reference: &Vectors) -> Vectors {
+    pub fn centroids<'a>(&'a self, reference: &'a Vectors) -> impl Iterator<Item = [f64; 2]> + 'a {
         let of_kind: Vec<[f64; 2]> = self.shapes.iter().map(|shape| centroid(shape)).collect();
-        let place = |(cell, &kind): (&[u32], &u32)| {
+        let place = move |(cell, &kind): (&[u32], &u32)| {
             let ([x, y], [dx, dy]) = (reference.get(cell[0] as usize), of_kind[kind as usize]);
             [x + dx, y + dy]
         };
-        self.iter().zip(&self.kind).map(place).collect()
+        self.iter().zip(&self.kind).map(place)
     }
 
     /// Centre of each cell, the mean of its corners \[length\], shape \[count\].

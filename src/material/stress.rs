@@ -79,8 +79,8 @@ pub fn at_particles(
         let within = |cell: usize| cells.region_of(cell) == region && counts(cell);
         let means = region_means(cells, (elastic, region), of_cells, particles, within);
         for (known, mean) in stresses.iter_mut().zip(means) {
-            let larger = |known: &StressState, mean: &StressState| mean.von_mises > known.von_mises;
-            if known.as_ref().is_none_or(|known| mean.as_ref().is_some_and(|mean| larger(known, mean))) {
+            let is_larger = |known: &StressState| mean.is_some_and(|mean| mean.von_mises > known.von_mises);
+            if known.as_ref().is_none_or(is_larger) {
                 *known = mean;
             }
         }
@@ -95,8 +95,8 @@ fn region_means(
     of_cells: &[StressState],
     particles: usize,
     counts: impl Fn(usize) -> bool,
-) -> Vec<Option<StressState>> {
-    let elastic = cells.material_of_region(region, elastic);
+) -> impl Iterator<Item = Option<StressState>> {
+    let elastic = *cells.material_of_region(region, elastic);
     let mut sums = vec![([0.0; 3], 0.0); particles];
     let areas: Vec<f64> = cells.shapes.iter().map(|shape| area(shape)).collect();
     for (cell, corners) in cells.iter().enumerate().filter(|&(cell, _)| counts(cell)) {
@@ -107,10 +107,10 @@ fn region_means(
             *whole += weight;
         }
     }
-    let mean = |(sum, whole): ([f64; 3], f64)| {
-        (whole > 0.0).then(|| StressState::of(sum.map(|component| component / whole), elastic))
+    let mean = move |(sum, whole): ([f64; 3], f64)| {
+        (whole > 0.0).then(|| StressState::of(sum.map(|component| component / whole), &elastic))
     };
-    sums.into_iter().map(mean).collect()
+    sums.into_iter().map(mean)
 }
 
 /// Strain energy of the cells \[force length\] under displacements \[length\] of their corners.

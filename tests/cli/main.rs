@@ -17,6 +17,8 @@ mod interrupt;
 mod json;
 mod material;
 mod measured;
+#[cfg(target_os = "linux")]
+mod memory;
 mod points;
 mod program;
 #[cfg(not(feature = "mpi"))]

@@ -93,7 +93,7 @@ impl<'a> Recorder<'a> {
 
     pub fn step(&mut self, engine: &Engine) {
         self.probes.iter_mut().for_each(|probe| probe.record(engine));
-        if self.scene.record.figures.contains(&engine.step()) {
+        if self.draws && self.scene.record.figures.contains(&engine.step()) {
             self.snapshots.push(Snapshot::of(engine));
         }
         if load_every(self.scene).is_some_and(|every| engine.step().is_multiple_of(every)) {

@@ -12,7 +12,7 @@ use flockform::continuum::run::StopReason;
 use flockform::engine::Engine;
 use flockform::engine::observer::Observer;
 use flockform::export::sweep::{Journal, Output, OutputError, Probed, Row, Values};
-use flockform::export::{ExportError, Summary, Timings};
+use flockform::export::{ExportError, Measured, Summary, Timings};
 use flockform::scene::SceneError;
 use flockform::solve::interrupt::Interrupt;
 use flockform::study::compare::run::plan;
@@ -144,7 +144,8 @@ impl Runs<'_> {
         let setup = start.elapsed();
         let outcome = run_to_equilibrium_watched(&scene, plan, &mut observer)?;
         let timings = Timings { setup, steps: start.elapsed() - setup, ..Timings::default() };
-        let summary = Summary::new(&scene, &outcome, timings);
+        let measured = Measured::of(&scene, &outcome.engine).map(|(measured, _)| measured);
+        let summary = Summary::new(&scene, &outcome, measured, timings);
         let values = Values { engine: &outcome.engine, summary: &summary, probed: &observer.probed };
         Ok(Ended { outputs: values.texts(self.outputs), stop_reason: outcome.reason })
     }

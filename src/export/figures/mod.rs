@@ -75,15 +75,15 @@ impl<'a> Subject<'a> {
     }
 }
 
-/// Width of every PNG \[pixel\].
-pub const PNG_WIDTH: u32 = 1600;
+/// Pixels of a PNG for a \[px\] of the sheet: text is as large in all of them, and no sheet takes more than some 20 MB.
+pub const PNG_ZOOM: f32 = 2.0;
 
 /// More particles than this are drawn as a raster: an SVG of a million circles opens nowhere.
 const MOST_DOTS: usize = 60_000;
 
 /// A figure as PNG, `width` pixels wide; the error is a reason.
-pub(super) fn render(svg: &str, width: u32) -> Result<Vec<u8>, String> {
-    png::render(svg, width)
+pub(super) fn render(svg: &str, width: f32) -> Result<Vec<u8>, String> {
+    png::render(svg, |sheet| width / sheet)
 }
 
 /// The files of a figure.
@@ -120,7 +120,7 @@ pub fn write_as(
     }
     if matches!(formats, Formats::Png | Formats::All) {
         let path = folder.path(format!("{name}.png"));
-        let png = png::render(svg, PNG_WIDTH)
+        let png = png::render(svg, |_| PNG_ZOOM)
             .map_err(|reason| ExportError::Figure { path: path.clone(), reason })?;
         write_file(&path, png)?;
         written.push(path);

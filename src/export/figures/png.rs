@@ -5,12 +5,12 @@ use std::sync::Arc;
 use resvg::tiny_skia::{Color, Pixmap, Transform};
 use resvg::usvg::{Options, Tree, fontdb};
 
-/// Renders at `width` pixels; the height follows from the drawing's shape. The error is a reason.
-pub fn render(svg: &str, width: u32) -> Result<Vec<u8>, String> {
+/// Renders with as many pixels for a \[px\] of the sheet as `zoom` says of its width. The error is a reason.
+pub fn render(svg: &str, zoom: impl FnOnce(f32) -> f32) -> Result<Vec<u8>, String> {
     let tree = Tree::from_str(svg, &options()).map_err(|error| error.to_string())?;
-    let zoom = width as f32 / tree.size().width();
-    let height = (tree.size().height() * zoom).round() as u32;
-    let mut pixmap = blank([width, height])?;
+    let zoom = zoom(tree.size().width());
+    let size = [tree.size().width(), tree.size().height()].map(|length| (zoom * length).round() as u32);
+    let mut pixmap = blank(size)?;
     resvg::render(&tree, Transform::from_scale(zoom, zoom), &mut pixmap.as_mut());
     pixmap.encode_png().map_err(|error| error.to_string())
 }

@@ -51,9 +51,18 @@ impl Frames {
         Self { channels, count, kept: Vec::new(), interval: 1, most }
     }
 
-    /// Bytes of the frames of so many steps \[byte\].
-    pub fn bytes(&self, steps: usize) -> usize {
-        self.most.min(steps.saturating_add(1)) * bytes_of(&self.channels, self.count)
+    /// Frames that are kept of so many steps at their most, and at the end.
+    pub fn of_steps(&self, steps: usize) -> [usize; 2] {
+        let mut interval = 1;
+        while steps / interval >= self.most {
+            interval *= 2;
+        }
+        [self.most.min(steps.saturating_add(1)), steps / interval + 1]
+    }
+
+    /// Bytes of one frame \[byte\].
+    pub fn bytes_of_one(&self) -> usize {
+        bytes_of(&self.channels, self.count)
     }
 
     /// Whether the frame of this step is to be kept.
@@ -141,6 +150,8 @@ mod tests {
             assert_eq!(*last, steps);
             assert!(even.iter().enumerate().all(|(k, &step)| step == k * frames.interval()), "{kept:?}");
             assert!(kept.len() > MOST_FRAMES / 2 || frames.interval() == 1, "{steps}: {}", kept.len());
+            let [most, at_end] = frames.of_steps(steps);
+            assert!(kept.len().abs_diff(at_end) <= 1 && most >= at_end, "{steps}: {most}, {at_end}");
         }
     }
 

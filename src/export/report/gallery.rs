@@ -16,7 +16,7 @@ const LIST: &str = "gallery.json";
 
 const PAGE: &str = include_str!("web/gallery.html");
 /// Width of a picture \[pixel\].
-const WIDTH: u32 = 540;
+const WIDTH: f32 = 540.0;
 /// Longest sentence \[character\].
 const LONGEST: usize = 180;
 

@@ -11,12 +11,14 @@ use super::super::error::ExportError;
 use super::super::figures::SERIES;
 use super::super::load;
 use super::super::{OutputFolder, Results, Summary};
+use super::encode::GROUP;
 use super::encoded;
 use super::frames::{Channel, Frame, Frames, MOST_FRAMES};
 use super::page::{Page, number, scene_text};
 use super::plot::{self, Plot, PlotAxis, PlotSeries};
 use super::view::{self, Animation, Clock, Quantity, Stress, View};
 use crate::continuum::mechanics::Stresses;
+use crate::continuum::memory::{measured, neighbour_entries};
 use crate::continuum::plan::Plan;
 use crate::continuum::run::{Outcome, StopReason};
 use crate::engine::Engine;
@@ -66,14 +68,45 @@ fn channels(count: usize, are_neighbours_lasting: bool) -> Vec<Channel> {
     channels
 }
 
-/// Bytes that the report takes of a run beside it, at most: frames while it goes on, then what they are packed in.
-pub fn most_bytes(plan: &Plan) -> usize {
-    /// Bytes of a particle as pages are written: bonds and cells as lists and as text, differences of frames. The most
-    /// that was measured (`tension`, 300 to 1200 squared) was 280.
-    const PACKING: usize = 300;
+/// Bytes of the report of a run.
+#[derive(Clone, Copy, Debug, Default)]
+pub(in crate::export) struct Packed {
+    /// Of what a frame is taken from, until the last one is.
+    pub values: usize,
+    /// Of the frames at their most, and at the end.
+    pub frames: [usize; 2],
+    /// Of what they are packed in, with bonds and cells.
+    pub packing: usize,
+    /// Of the text, until it is written.
+    pub text: usize,
+}
+
+/// What the report of a run takes, before it begins.
+pub(in crate::export) fn packed(plan: &Plan, is_solved_at_once: bool) -> Packed {
+    /// Bytes of a particle's place and neighbours as text: rows of a lattice are next to nothing.
+    const TEXT: usize = 6;
+    /// Bytes of its numbers at the end as text; where nothing has come yet, they are next to nothing too.
+    const EXACT: usize = 20;
+    const EXACT_WITH_STRESS: usize = 80;
     let count = plan.count();
     let frames = Frames::new(count, channels(count, plan.setup.present_radius.is_none()));
-    frames.bytes(plan.stop.steps) + count * PACKING
+    let steps = if is_solved_at_once { LOAD_FRAMES } else { plan.stop.steps };
+    let is_exact = count <= MOST_EXACT;
+    let exact = if is_exact { (size_of::<Option<Strain>>() + 8) * count + measured(plan) } else { 0 };
+    let text = match (is_exact, &plan.setup.cells) {
+        (false, _) => TEXT,
+        (true, None) => TEXT + EXACT,
+        (true, Some(_)) => TEXT + EXACT_WITH_STRESS,
+    };
+    let bonds = 8 * neighbour_entries(plan) / 2;
+    let kept = frames.of_steps(steps);
+    let at_once = rayon::current_num_threads().min(kept[1].div_ceil(GROUP));
+    Packed {
+        values: 8 * frames.channels.len() * count,
+        frames: kept.map(|kept| kept * frames.bytes_of_one()),
+        packing: exact.max(bonds).max((text + at_once * 4 * (2 * frames.channels.len() + 1)) * count),
+        text: text * count,
+    }
 }
 
 /// Keeps the frames of a run while it goes on.

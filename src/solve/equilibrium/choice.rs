@@ -9,7 +9,7 @@ use super::{Choice, Precision, Request, Solver, System};
 const DIRECT_UP_TO: usize = 1_000;
 
 /// Followers up to which a factorisation is still the best answer to an operator without symmetry.
-const UNSYMMETRIC_UP_TO: usize = 200_000;
+pub const UNSYMMETRIC_UP_TO: usize = 200_000;
 
 /// The solver that a request leads to, and why.
 pub fn choose(system: &System, request: &Request) -> (Solver, String) {

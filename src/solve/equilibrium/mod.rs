@@ -31,7 +31,7 @@ mod system;
 
 use std::time::Duration;
 
-pub use choice::choose;
+pub use choice::{UNSYMMETRIC_UP_TO, choose};
 pub use error::SolveError;
 pub use system::System;
 

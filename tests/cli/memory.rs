@@ -1,0 +1,65 @@
+//! The memory that `plan` foretells against that of the run.
+
+use std::process::{Child, Stdio};
+use std::time::Duration;
+
+use super::command::{command, flockform};
+use super::folders::temporary;
+
+/// The largest that a process has been, once it has ended \[byte\].
+fn peak(mut child: Child) -> f64 {
+    let status = format!("/proc/{}/status", child.id());
+    let mut most = 0.0_f64;
+    loop {
+        let text = std::fs::read_to_string(&status).unwrap_or_default();
+        let line = text.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+        let kibibytes = line.and_then(|line| line.split_whitespace().next()?.parse::<f64>().ok());
+        most = most.max(1024.0 * kibibytes.unwrap_or(0.0));
+        if let Some(status) = child.try_wait().expect("a child") {
+            assert!(status.success(), "{status}");
+            return most;
+        }
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
+/// Lines that are off by more than a tenth.
+fn off(scene: &str, sets: &[&str]) -> Vec<String> {
+    let sets: Vec<&str> = sets.iter().flat_map(|set| ["--set", set]).collect();
+    let folder = temporary();
+    let plan = flockform(&[&["plan", scene, "--json"], &sets[..]].concat(), folder.path());
+    let plan: serde_json::Value = serde_json::from_slice(&plan.stdout).expect("JSON");
+    assert!(plan["particles"].as_u64() > Some(90_000), "{}", plan["particles"]);
+    let mut off = Vec::new();
+    for (key, flags) in [("all", &[][..]), ("tables", &["--figures", "none", "--no-report"])] {
+        let run = ["run", scene, "--quiet", "--threads", "2", "--out", key];
+        let mut command = command(&[&run[..], flags, &sets].concat(), folder.path());
+        let child = command.stdout(Stdio::null()).spawn().expect("starts");
+        let (found, foretold) = (peak(child), plan["memory_bytes"][key].as_f64().expect("a number"));
+        let line = format!("{scene} {key}: {:.1} MB, foretold {:.1}", found / 1e6, foretold / 1e6);
+        println!("{line} ({:+.1} %)", 100.0 * (foretold / found - 1.0));
+        if (foretold / found - 1.0).abs() > 0.1 {
+            off.push(line);
+        }
+    }
+    off
+}
+
+#[test]
+fn plan_foretells_the_memory_of_a_run_within_a_tenth() {
+    let cases: [(&str, &[&str]); 8] = [
+        (
+            "tension",
+            &["body.shape.columns=400", "body.shape.rows=400", "stop.steps=60", "record.figures=[1,10,20]"],
+        ),
+        ("shear", &["body.shape.columns=500", "body.shape.rows=400", "stop.steps=10"]),
+        ("notched-plate", &["lattice.spacing=0.1", "stop.steps=20"]),
+        ("second-gradient", &["body.shape.columns=350", "body.shape.rows=350", "stop.steps=40"]),
+        ("fracture", &["lattice.a=1.2", "lattice.b=1.3", "fracture.distance=2", "stop.steps=20"]),
+        ("beam-loaded", &["lattice.spacing=0.03"]),
+        ("beam-hexagonal", &["lattice.spacing=0.03"]),
+        ("plate-hole", &["lattice.spacing=0.05"]),
+    ];
+    let off: Vec<String> = cases.iter().flat_map(|(scene, sets)| off(scene, sets)).collect();
+    assert!(off.is_empty(), "{off:#?}");
+}
