@@ -13,7 +13,7 @@ use crate::flock::role::Role;
 use crate::flock::vectors::{Vectors, distance};
 use crate::scene::{LoadSteps, Scene, SceneError};
 use crate::solve::corotated::{self, CorotatedError, Way};
-use crate::solve::equilibrium::{Request, SolveError, Solved, Solver, System, choose, solve};
+use crate::solve::equilibrium::{Choice, Request, SolveError, Solved, Solver, System, choose, solve};
 use crate::solve::linear::{HeldComponent, NotLinear, system};
 
 /// Runs a plan to its end as its scene asks: stepping, or straight to the equilibrium under the whole load. `see` sees each step of
@@ -168,7 +168,11 @@ fn refuse_corotated(scene: &Scene, error: &CorotatedError) -> SceneError {
 }
 
 fn refuse(scene: &Scene, error: &SolveError) -> SceneError {
-    let help = "choose another equilibrium.solver, or equilibrium.solver = \"auto\"";
+    let is_auto = matches!(&scene.equilibrium, Some(asked) if matches!(asked.request.solver, Choice::Auto));
+    let help = match is_auto {
+        true => "try equilibrium.solver = \"direct\", a larger lattice.spacing, or more supports",
+        false => "choose another equilibrium.solver, or equilibrium.solver = \"auto\"",
+    };
     scene.refuse("equilibrium", error.to_string(), help)
 }
 

@@ -31,7 +31,7 @@ async function open(context) {
   page.on("console", (message) => message.type() === "error" && seen.errors.push(message.text()));
   page.on("pageerror", (error) => seen.errors.push(error.message));
   page.on("request", (request) => seen.requests.push(request.url().slice(0, 60)));
-  const query = asked.painter === "2d" ? "?painter=2d" : "";
+  const query = asked.painter ? `?painter=${asked.painter}` : "";
   await page.goto(pathToFileURL(resolve(file)).href + query);
   await page.waitForSelector("body[data-ready=true]");
   return page;
@@ -46,6 +46,19 @@ const picture = async (page) => {
   await settled(page);
   return page.evaluate(() => window.report.views.map((view) => view.composed().toDataURL()).join());
 };
+
+// The view at the end of the film in few pixels, as numbers from 0 to 255.
+async function small(page) {
+  await page.click("#last");
+  await settled(page);
+  return page.evaluate(() => {
+    const canvas = Object.assign(document.createElement("canvas"), { width: 60, height: 30 });
+    const pen = canvas.getContext("2d");
+    pen.imageSmoothingQuality = "high";
+    pen.drawImage(window.report.views[0].composed(), 0, 0, 60, 30);
+    return [...pen.getImageData(0, 0, 60, 30).data];
+  });
+}
 
 // The numbers shown in an element, as written to the last digit.
 const numbersIn = (page, id) =>
@@ -159,6 +172,7 @@ try {
   seen.charts = await page.evaluate(() => document.querySelectorAll("#plots figure").length);
   if (seen.views) {
     seen.painter = await page.evaluate(() => window.report.views[0].painter.constructor.name);
+    if (asked.small) seen.small = await small(page);
     await play(page);
     await zoom(page);
     await find(page);

@@ -49,10 +49,20 @@ void main() {
   colour = vec4(own.rgb * own.a, own.a);
 }`;
 
+// Asked of a canvas of its own: one that has had a context takes no other.
+function isStandIn() {
+  const gl = document.createElement("canvas").getContext("webgl2");
+  const info = gl?.getExtension("WEBGL_debug_renderer_info");
+  const name = info ? gl.getParameter(info.UNMASKED_RENDERER_WEBGL) : "";
+  gl?.getExtension("WEBGL_lose_context")?.loseContext();
+  return /swiftshader|llvmpipe|software|basic render/i.test(name);
+}
+
 export class Painter {
-  // Null where the browser has no WebGL2. Smooth edges cost what a processor that stands in for a graphics card has not.
-  static on(canvas, antialias) {
-    const gl = canvas.getContext("webgl2", { antialias, premultipliedAlpha: true, preserveDrawingBuffer: true });
+  // Null where the browser has no WebGL2, or, unless asked for, a processor stands in for the graphics card.
+  static on(canvas, isAskedFor) {
+    if (!isAskedFor && isStandIn()) return null;
+    const gl = canvas.getContext("webgl2", { premultipliedAlpha: true, preserveDrawingBuffer: true });
     return gl && new Painter(canvas, gl);
   }
 

@@ -7,8 +7,6 @@ import { shown } from "./shown.js";
 
 // Ways of more particles would cover each other.
 const MOST_WAYS = 400;
-// Edges of more particles than this are too fine to be smoothed.
-const MOST_SMOOTH = 20000;
 // Largest distance of the pointer from a particle that it names, in pixels.
 const REACH = 14;
 
@@ -35,8 +33,9 @@ export class View {
     this.box.append(this.under, this.middle, this.over);
     figure.append(this.box);
     parent.append(figure);
-    const wanted = new URLSearchParams(location.search).get("painter") !== "2d";
-    this.painter = (wanted && Painter.on(this.middle, body.count <= MOST_SMOOTH)) || new PlainPainter(this.middle);
+    // Where neither is asked for, the one that is faster here.
+    const wanted = new URLSearchParams(location.search).get("painter");
+    this.painter = (wanted !== "2d" && Painter.on(this.middle, wanted === "webgl")) || new PlainPainter(this.middle);
     this.places = new Float32Array(2 * body.count);
     this.shades = new Float32Array(body.count);
     this.radii = new Float32Array(body.count);
@@ -112,7 +111,7 @@ export class View {
     const trianglesFrom = 3 * body.trianglesPerCell * body.tornCells();
     this.painter.draw({
       places, values: shades, radii,
-      palette: show.palette, isFlat: show.isFlat, layers: show.layers,
+      palette: show.palette, isFlat: show.isFlat, layers: show.layers, spacing: animation.spacing * scale,
       camera: { x: show.camera.x - origin[0], y: show.camera.y - origin[1], scale },
       bondsFrom, bondCount: body.bonds.length - bondsFrom,
       trianglesFrom, triangleCount: body.triangles.length - trianglesFrom,
