@@ -1,9 +1,16 @@
 //! Signals, as a user sends them.
 
+#![allow(dead_code, reason = "each test program uses the part that it needs")]
+
 use std::process::Command;
 
 /// Sends a signal by its name, such as `INT`.
 pub fn signal(name: &str, process: u32) {
-    let sent = Command::new("kill").args(["-s", name, &process.to_string()]).status().expect("kill runs");
-    assert!(sent.success(), "{name} cannot be sent to process {process}");
+    assert!(is_sent(name, process), "{name} cannot be sent to process {process}");
+}
+
+/// The same to a process that may have ended.
+pub fn is_sent(name: &str, process: u32) -> bool {
+    let sent = Command::new("kill").args(["-s", name, &process.to_string()]).status();
+    sent.expect("kill runs").success()
 }

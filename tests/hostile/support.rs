@@ -9,7 +9,7 @@ use flockform::ros::edge::{Edge, Options};
 use flockform::scene::swarm::Swarm;
 
 pub use crate::running::Running;
-pub use crate::signals::signal;
+pub use crate::signals::{is_sent, signal};
 pub use crate::stranger::{Stranger, hidden, port};
 use crate::swarms::load_swarm;
 use crate::waits::within;
