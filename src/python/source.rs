@@ -34,6 +34,9 @@ enum Origin {
     Keys(Vec<String>),
 }
 
+/// What bundled files are called, all of them, and the one of a name.
+type Shelf<'a> = (&'a str, &'a [Bundled], fn(&str) -> Option<Bundled>);
+
 impl Source {
     /// The scene that an argument names.
     pub(super) fn scene(given: &Bound<'_, PyAny>, set: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
@@ -48,7 +51,7 @@ impl Source {
     fn of(
         given: &Bound<'_, PyAny>,
         set: Option<&Bound<'_, PyAny>>,
-        (kind, all, find): (&str, &[Bundled], fn(&str) -> Option<Bundled>),
+        (kind, all, find): Shelf<'_>,
     ) -> PyResult<Self> {
         let set = set.map(overrides).transpose()?.unwrap_or_default();
         if let Ok(keys) = given.cast::<PyMapping>() {
