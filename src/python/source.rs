@@ -111,15 +111,25 @@ fn not_bundled(kind: &str, all: &[Bundled], word: &str) -> PyErr {
     let likeness = |one: &&Bundled| strsim::jaro_winkler(one.name, word);
     let nearest = all.iter().max_by(|a, b| likeness(a).total_cmp(&likeness(b))).map_or("", |one| one.name);
     let list = kind.to_uppercase() + "S";
+    let (message, help) = match kind {
+        "swarm" if bundled(word).is_some() => {
+            ("is a bundled scene, no swarm".to_owned(), "flockform.run and flockform.Body take it".to_owned())
+        }
+        "scene" if bundled_swarm(word).is_some() => {
+            ("is a bundled swarm, no scene".to_owned(), "flockform.Swarm takes it".to_owned())
+        }
+        _ => (
+            format!("there is no bundled {kind} and no file of this name; the nearest name is `{nearest}`"),
+            format!("flockform.{list} lists the names; a path ends in .toml"),
+        ),
+    };
     let mut error = SceneError::default();
     error.push(Problem {
         place: Place::File { file: CALL.to_owned() },
         key: kind.to_owned(),
         found: Some(word.to_owned()),
-        message: format!(
-            "there is no bundled {kind} and no file of this name; the nearest name is `{nearest}`"
-        ),
-        help: Some(format!("flockform.{list} lists the names; a path ends in .toml")),
+        message,
+        help: Some(help),
     });
     error.into()
 }

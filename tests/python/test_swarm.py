@@ -113,6 +113,8 @@ def test_bad_arrays_are_refused_by_name(arguments, error, words):
     assert words in str(caught.value)
 
 
-def test_a_scene_is_no_swarm():
-    with pytest.raises(flockform.SceneError, match="`tension` is no bundled swarm"):
+def test_a_scene_is_no_swarm_and_a_swarm_no_scene():
+    with pytest.raises(flockform.SceneError, match="tension: is a bundled scene, no swarm"):
         flockform.Swarm("tension")
+    with pytest.raises(flockform.SceneError, match="square: is a bundled swarm, no scene"):
+        flockform.Body("square")
