@@ -150,9 +150,10 @@ fn one_liar_is_trimmed_on_eight_neighbours_and_leads_them_astray_without() {
     assert!(without > 0.2, "{without}");
 }
 
-/// Between any two of the others the filter asks for their poses alone: a third one may hold them, and not push them.
+/// Between any two of the others, and of what stands still, the filter asks for their own poses alone: a third one may hold
+/// them, and not push them.
 #[test]
-fn robots_that_say_where_they_are_keep_clear_of_each_other_whatever_one_says() {
+fn robots_that_say_where_they_are_keep_every_bound_among_themselves_whatever_one_says() {
     let lies = [
         // On top of a neighbour, between two of them, far away, anywhere, and where it was once.
         "{ kind = \"offset\", by = [1.5, 0.0] }",
@@ -167,19 +168,32 @@ fn robots_that_say_where_they_are_keep_clear_of_each_other_whatever_one_says() {
         "flight.model={ kind = \"double-integrator\" }",
     ];
     for (lie, model) in lies.into_iter().flat_map(|lie| models.map(|model| (lie, model))) {
-        let limits = "limits={ speed = 1.0, acceleration = 2.0, clearance = 0.3 }";
+        // The way of the formation leads past a post and up to a fence.
+        let limits = "limits={ speed = 1.0, acceleration = 2.0, clearance = 0.3, geofence = [[-5, -6], [9.2, -6], [9.2, 8], [-5, 8]] }";
+        let post = "obstacles=[{ kind = \"disc\", centre = [4.5, 4.0], radius = 0.4 }]";
         // Believed at once, at any speed: the worst for those around.
-        let mut flight = with_fault(lie, &[limits, model, "poses.recover=1", "poses.jump_speed=1e6"]);
-        let mut nearest = f64::INFINITY;
+        let all = [limits, post, model, "poses.recover=1", "poses.jump_speed=1e6"];
+        let mut flight = with_fault(lie, &all);
+        let (mut nearest, mut to_post, mut east, mut fastest) =
+            (f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, 0.0_f64);
         for _ in 0..800 {
+            let before = flight.fleet().places().clone();
             flight.step();
             let (places, radii) = (flight.fleet().places(), &flight.control().formation().radii);
             let honest = || (0..25).filter(|&m| m != MIDDLE);
             for (a, b) in honest().flat_map(|a| honest().take_while(move |&b| b < a).map(move |b| (a, b))) {
                 nearest = nearest.min(distance(places.get(a), places.get(b)) - radii[a] - radii[b]);
             }
+            for m in honest() {
+                to_post = to_post.min(distance(places.get(m), [4.5, 4.0]) - 0.4 - radii[m]);
+                east = east.max(places.x[m]);
+                fastest = fastest.max(distance(places.get(m), before.get(m)) / 0.05);
+            }
         }
         assert!(nearest >= 0.3 - 1e-9, "{lie} {model}: {nearest} m");
+        assert!((0.3 - 1e-9..0.35).contains(&to_post), "{lie} {model}: {to_post} m from the post");
+        assert!((8.5..9.2 + 1e-9).contains(&east), "{lie} {model}: {east} m");
+        assert!(fastest <= 1.0 + 1e-9, "{lie} {model}: {fastest} m/s");
     }
 }
 
