@@ -3,7 +3,7 @@
 use std::process::{Child, Stdio};
 use std::time::Duration;
 
-use super::command::{command, flockform};
+use super::command::command;
 use super::folders::temporary;
 
 /// The largest that a process has been, once it has ended \[byte\].
@@ -27,14 +27,20 @@ fn peak(mut child: Child) -> f64 {
 fn off(scene: &str, sets: &[&str]) -> Vec<String> {
     let sets: Vec<&str> = sets.iter().flat_map(|set| ["--set", set]).collect();
     let folder = temporary();
-    let plan = flockform(&[&["plan", scene, "--json"], &sets[..]].concat(), folder.path());
+    // What is drawn at once depends on them.
+    let on_two_threads = |arguments: &[&str]| {
+        let mut command = command(arguments, folder.path());
+        command.env("RAYON_NUM_THREADS", "2");
+        command
+    };
+    let plan = on_two_threads(&[&["plan", scene, "--json"], &sets[..]].concat()).output();
+    let plan = plan.expect("the program starts");
     let plan: serde_json::Value = serde_json::from_slice(&plan.stdout).expect("JSON");
     assert!(plan["particles"].as_u64() > Some(90_000), "{}", plan["particles"]);
     let mut off = Vec::new();
     for (key, flags) in [("all", &[][..]), ("tables", &["--figures", "none", "--no-report"])] {
-        let run = ["run", scene, "--quiet", "--threads", "2", "--out", key];
-        let mut command = command(&[&run[..], flags, &sets].concat(), folder.path());
-        let child = command.stdout(Stdio::null()).spawn().expect("starts");
+        let run = [&["run", scene, "--quiet", "--out", key], flags, &sets].concat();
+        let child = on_two_threads(&run).stdout(Stdio::null()).spawn().expect("starts");
         let (found, foretold) = (peak(child), plan["memory_bytes"][key].as_f64().expect("a number"));
         let line = format!("{scene} {key}: {:.1} MB, foretold {:.1}", found / 1e6, foretold / 1e6);
         println!("{line} ({:+.1} %)", 100.0 * (foretold / found - 1.0));
