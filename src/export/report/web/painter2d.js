@@ -61,14 +61,19 @@ export class PlainPainter {
     const half = layers.surface ? 0.625 * spacing + 0.5 : Math.max(0.27 * spacing, 0.8);
     const [left, top] = [width / 2 - camera.x * camera.scale, height / 2 + camera.y * camera.scale];
     for (let i = 0; i < values.length; i++) {
-      const [x, y] = [left + places[2 * i] * camera.scale, top - places[2 * i + 1] * camera.scale];
+      const x = left + places[2 * i] * camera.scale;
+      const y = top - places[2 * i + 1] * camera.scale;
       // Also those that are nowhere.
       if (!(x > -half && x < width + half && y > -half && y < height + half)) continue;
       const value = values[i];
-      const shade = value < -0.5 ? SHADES : Math.round(Math.min(Math.max(value, 0), 1) * (SHADES - 1));
-      const [from, to] = [Math.max(Math.round(x - half), 0), Math.min(Math.round(x + half), width)];
+      const colour = colours[value < -0.5 ? SHADES : Math.round(Math.min(Math.max(value, 0), 1) * (SHADES - 1))];
+      const from = Math.max(Math.round(x - half), 0);
+      const to = Math.min(Math.round(x + half), width);
       const last = Math.min(Math.round(y + half), height);
-      for (let row = Math.max(Math.round(y - half), 0); row < last; row++) pixels.fill(colours[shade], row * width + from, row * width + to);
+      for (let row = Math.max(Math.round(y - half), 0); row < last; row++) {
+        // A call of fill costs more than a few pixels.
+        for (let at = row * width + from; at < row * width + to; at++) pixels[at] = colour;
+      }
     }
     pen.putImageData(this.image, 0, 0);
   }
