@@ -35,7 +35,7 @@ impl Outputs {
 
 /// Bytes that a run takes at its largest, the program included.
 pub fn predicted(scene: &Scene, plan: &Plan, outputs: Outputs) -> usize {
-    let is_solved_at_once = scene.equilibrium.is_some() && scene.load_steps.is_none();
+    let is_solved_at_once = scene.is_solved_at_once();
     let draws = outputs.figures != Formats::None;
     let before = |figure: &&usize| !is_solved_at_once && **figure < plan.stop.steps;
     let snapshots = if draws { scene.record.figures.iter().filter(before).count() } else { 0 };

@@ -1,6 +1,6 @@
 //! Package `type_description_interfaces`: what a type is made of, for peers that do not have its files.
 //!
-//! [`TypeDescription::of`] reads it from the definitions here; [`TypeDescription::hash`] is what ROS 2 tells types apart by
+//! [`TypeDescription::of`] reads it from the definitions here; [`TypeDescription::hash`] is what ROS 2 distinguishes types by
 //! (REP 2016, RIHS01).
 
 use std::fmt::Write as _;

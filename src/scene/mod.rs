@@ -134,6 +134,11 @@ impl Scene {
         }
     }
 
+    /// Whether its equilibrium is solved for without states in between.
+    pub fn is_solved_at_once(&self) -> bool {
+        self.equilibrium.is_some() && self.load_steps.is_none()
+    }
+
     /// The unit of length, for axes and tables.
     pub fn unit(&self) -> &str {
         &self.raw.unit

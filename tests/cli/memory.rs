@@ -1,4 +1,4 @@
-//! The memory that `plan` foretells against that of the run.
+//! The memory that `plan` predicts against that of the run.
 
 use std::process::{Child, Stdio};
 use std::time::Duration;
@@ -41,10 +41,10 @@ fn off(scene: &str, sets: &[&str]) -> Vec<String> {
     for (key, flags) in [("all", &[][..]), ("tables", &["--figures", "none", "--no-report"])] {
         let run = [&["run", scene, "--quiet", "--out", key], flags, &sets].concat();
         let child = on_two_threads(&run).stdout(Stdio::null()).spawn().expect("starts");
-        let (found, foretold) = (peak(child), plan["memory_bytes"][key].as_f64().expect("a number"));
-        let line = format!("{scene} {key}: {:.1} MB, foretold {:.1}", found / 1e6, foretold / 1e6);
-        println!("{line} ({:+.1} %)", 100.0 * (foretold / found - 1.0));
-        if (foretold / found - 1.0).abs() > 0.1 {
+        let (found, predicted) = (peak(child), plan["memory_bytes"][key].as_f64().expect("a number"));
+        let line = format!("{scene} {key}: {:.1} MB, predicted {:.1}", found / 1e6, predicted / 1e6);
+        println!("{line} ({:+.1} %)", 100.0 * (predicted / found - 1.0));
+        if (predicted / found - 1.0).abs() > 0.1 {
             off.push(line);
         }
     }
@@ -52,7 +52,7 @@ fn off(scene: &str, sets: &[&str]) -> Vec<String> {
 }
 
 #[test]
-fn plan_foretells_the_memory_of_a_run_within_a_tenth() {
+fn plan_predicts_the_memory_of_a_run_within_a_tenth() {
     let cases: [(&str, &[&str]); 8] = [
         (
             "tension",

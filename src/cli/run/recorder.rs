@@ -54,7 +54,7 @@ impl<'a> Recorder<'a> {
         left: Option<&ResumedRun>,
     ) -> Result<Self, ExportError> {
         // A body that is not stepped has no history.
-        let is_solved_at_once = scene.equilibrium.is_some() && scene.load_steps.is_none();
+        let is_solved_at_once = scene.is_solved_at_once();
         let probed: &[usize] = if is_solved_at_once { &[] } else { &plan.probes };
         let new_probes = || probed.iter().map(|&particle| ProbeSeries::new(particle)).collect();
         let every = scene.record.vtk_every;

@@ -26,10 +26,9 @@ const NOISE: f64 = 1e-9;
 /// # Errors
 /// Stress without a material, moves of a body that is solved for, and what robots alone have.
 pub fn require_colour(scene: &Scene, colour: FilmColour) -> Result<(), FilmError> {
-    let is_solved_at_once = scene.equilibrium.is_some() && scene.load_steps.is_none();
     let reason = match colour {
         FilmColour::VonMises if scene.material.is_none() => "the scene has no material",
-        FilmColour::Pe2 if is_solved_at_once => "a body that is solved for at once makes no moves",
+        FilmColour::Pe2 if scene.is_solved_at_once() => "a body that is solved for at once makes no moves",
         FilmColour::Clearance => "particles keep no clearance, robots do",
         _ => return Ok(()),
     };
