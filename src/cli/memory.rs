@@ -4,6 +4,8 @@ use std::fs::read_to_string;
 use std::path::Path;
 
 use flockform::continuum::memory::readable_bytes;
+use flockform::continuum::plan::Plan;
+use flockform::export::memory::Outputs;
 use flockform::scene::{Scene, SceneError};
 
 /// Memory that this process may still take, and what bounds it.
@@ -11,6 +13,16 @@ use flockform::scene::{Scene, SceneError};
 struct Room {
     bytes: u64,
     bound: &'static str,
+}
+
+/// Bytes that the run of a plan takes at its largest. What this process took until the plan was made, the run takes too.
+pub fn predicted(scene: &Scene, plan: &Plan, outputs: Outputs) -> usize {
+    /// Code of the program until then, where the system does not say.
+    const CODE: u64 = 16 << 10;
+    let status = read_to_string("/proc/self/status").unwrap_or_default();
+    let kibibytes = |name: &str, otherwise: u64| 1024 * field(&status, name).unwrap_or(otherwise) as usize;
+    let running = flockform::export::memory::predicted(scene, plan, outputs, kibibytes("RssFile:", CODE));
+    running.max(kibibytes("VmHWM:", 0))
 }
 
 /// Refuses a scene whose run takes more bytes than there are, so that no kernel has to end it on the way.
@@ -46,6 +58,15 @@ pub fn return_what_is_dropped() {
     #[cfg(all(feature = "ros", target_env = "gnu"))]
     unsafe {
         libc::mallopt(libc::M_MMAP_THRESHOLD, LARGE);
+    }
+}
+
+/// Gives back what small arrays that were dropped have left, as the frames of a small body.
+pub fn return_what_is_free() {
+    // SAFETY: the call asks nothing of its caller.
+    #[cfg(all(feature = "ros", target_env = "gnu"))]
+    unsafe {
+        libc::malloc_trim(0);
     }
 }
 

@@ -330,9 +330,9 @@ fn renamed(error: &clap::Error) -> Option<(&'static str, &'static str)> {
     RENAMED.into_iter().find(|(then, _)| matches!(wrong, ContextValue::String(word) if word == then))
 }
 
-/// Has a run take no more memory than it must: it is the one command whose size is that of its body.
+/// Has a run take no more memory than it must: it is the one command whose size is that of its body. `plan` says what a run takes.
 pub fn spare_memory(command: &Command) {
-    if matches!(command, Command::Run(_)) {
+    if matches!(command, Command::Run(_) | Command::Plan(_)) {
         memory::return_what_is_dropped();
     }
 }

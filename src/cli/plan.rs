@@ -5,11 +5,12 @@ use flockform::continuum::memory::readable_bytes;
 use flockform::continuum::plan::Plan;
 use flockform::continuum::report::PlanReport;
 use flockform::continuum::shares::Shares;
-use flockform::export::memory::{Outputs, predicted};
+use flockform::export::memory::Outputs;
 use flockform::study::compare::run::plan as plan_of;
 use flockform::swarm::plan::SwarmPlan;
 use serde_json::{Value, json};
 
+use super::memory::predicted;
 use super::names::{FileName, Kind, SceneArguments};
 use super::ranks::RanksError;
 use super::swarm::SwarmFileArguments;

@@ -18,7 +18,7 @@ use flockform::continuum::run::{Outcome, SharedError, StopReason, require_sharea
 use flockform::export::checkpoint::{self, Checkpoint, RunRequest};
 use flockform::export::figures::Formats;
 use flockform::export::film::{self, FilmColour};
-use flockform::export::memory::{Outputs, predicted};
+use flockform::export::memory::Outputs;
 use flockform::export::report;
 use flockform::export::{Drawing, OutputFolder, Results, Timings, write_all};
 use flockform::ranks::Team;
@@ -117,7 +117,7 @@ impl Prepared {
         }
         let plan = plan(&scene)?;
         let outputs = Outputs { figures: arguments.figures.formats(), report: !arguments.report.no_report };
-        memory::require(&scene, predicted(&scene, &plan, outputs) as f64)?;
+        memory::require(&scene, memory::predicted(&scene, &plan, outputs) as f64)?;
         let digest = digest(&plan);
         left.as_ref().map_or(Ok(()), |left| left.require_of(&scene, digest))?;
         Ok(Self { left, asked, scene, words, plan, digest })
@@ -222,6 +222,7 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
     }
     let on_the_way = recorder.writing;
     let records = recorder.finish(&outcome)?;
+    memory::return_what_is_free();
     let Records { snapshots, probes, load_steps, stage, animation, writing } = records;
     let timings = Timings { setup, steps: elapsed.saturating_sub(on_the_way), output: writing };
     let (snapshots, probes, load_steps) = (&snapshots[..], &probes[..], &load_steps[..]);

@@ -1,21 +1,19 @@
 //! The memory that a run takes at its largest, before it does, with its outputs ([`crate::continuum::memory`] has what the
-//! run itself takes). Films, recordings and ParaView files come on top, and the finite elements of a truth that leads. Within a
-//! tenth from 90,000 particles on (`tests/cli/memory.rs`); of smaller bodies pictures take most.
+//! run itself takes); within a tenth (`tests/cli/memory.rs`). Films, recordings and ParaView files come on top, and what was
+//! taken and given back before the plan was made, by the finite elements of a truth that leads or a setting that was chosen.
 
-use super::figures::Formats;
+use super::figures::axes::Axes;
+use super::figures::{Formats, MOST_DOTS, PNG_ZOOM, page};
 use super::report::run::{Packed, packed};
 use crate::continuum::memory::{measured, solving, stepped};
 use crate::continuum::plan::Plan;
 use crate::scene::Scene;
 
-/// Bytes of the program without a body.
-const PROGRAM: usize = 19 << 20;
+/// Bytes of what a program adds to its own once it runs a body: code that has not run yet, stacks, tables.
+const RUNNING: usize = 3 << 20;
 
 /// Bytes of a particle in a [`Snapshot`](crate::continuum::record::Snapshot): position, role and energies.
 const SNAPSHOT: usize = 16 + 1 + 2 * 8;
-
-/// Bytes of the picture that a figure is while it is drawn.
-const PICTURE: usize = 18 << 20;
 
 /// What a run shall write.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,8 +31,8 @@ impl Outputs {
     pub const ALL: Self = Self { figures: Formats::All, report: true };
 }
 
-/// Bytes that a run takes at its largest, the program included.
-pub fn predicted(scene: &Scene, plan: &Plan, outputs: Outputs) -> usize {
+/// Bytes that a run takes at its largest by a program whose own code takes so many until its plan is made.
+pub fn predicted(scene: &Scene, plan: &Plan, outputs: Outputs, program: usize) -> usize {
     let is_solved_at_once = scene.is_solved_at_once();
     let draws = outputs.figures != Formats::None;
     let before = |figure: &&usize| !is_solved_at_once && **figure < plan.stop.steps;
@@ -48,9 +46,36 @@ pub fn predicted(scene: &Scene, plan: &Plan, outputs: Outputs) -> usize {
     };
     let packing = last + values.max(packing) + frames[1];
     let tables = last + text + measured(plan);
-    let at_once = rayon::current_num_threads().min(3 * (scene.record.figures.len() + 1));
     // Of stresses a figure needs those of the cells.
-    let drawing = if draws { last + text + at_once * PICTURE + measured(plan) / 2 } else { 0 };
+    let drawing = if draws { last + text + pictures(scene, plan) + measured(plan) / 2 } else { 0 };
     let most = [stepping, packing, tables, drawing].into_iter().max().unwrap_or(0);
-    PROGRAM + stepped(plan) + snapshots + most
+    program + RUNNING + stepped(plan) + snapshots + most
+}
+
+/// Bytes of what figures are while they are drawn, as many at once as there are threads.
+fn pictures(scene: &Scene, plan: &Plan) -> usize {
+    /// What draws, with its fonts; those of one more at the same time.
+    const PAINTER: usize = 3 << 20;
+    const FONTS: usize = 1 << 20;
+    /// A particle as a shape.
+    const DOT: usize = 950;
+    /// Heading and axes beside a body, and the bar of its colours \[px\].
+    const ABOVE: f64 = 60.0;
+    const BAR: f64 = 100.0;
+    /// Height of a chart \[px\].
+    const CHART: f64 = 560.0;
+    let bytes = |[width, height]: [f64; 2]| 4 * (f64::from(PNG_ZOOM).powi(2) * width * height) as usize;
+    let body = &plan.setup.body;
+    // As it lies before it is deformed.
+    let axes = page::window(&body.reference, 0..plan.count(), body.lattice.spacing());
+    let sheet = bytes([page::width_of(&axes, BAR), ABOVE + axes.size[1] + Axes::BELOW]);
+    let moments = if scene.is_solved_at_once() { 1 } else { scene.record.figures.len() + 1 };
+    let of_each = if plan.setup.cells.is_some() { 3 } else { 2 };
+    let mut sheets = vec![sheet; of_each * moments];
+    let charts = [!plan.probes.is_empty(), scene.equilibrium.is_some(), scene.load_steps.is_some()];
+    sheets.extend(charts.into_iter().filter(|&is| is).map(|_| bytes([page::WIDTH, CHART])));
+    sheets.sort_unstable_by(|a, b| b.cmp(a));
+    let at_once = rayon::current_num_threads();
+    let dots = if plan.count() <= MOST_DOTS { DOT * plan.count() * at_once.min(moments) } else { 0 };
+    PAINTER + dots + sheets.iter().take(at_once).map(|one| one + FONTS).sum::<usize>()
 }

@@ -23,24 +23,22 @@ fn peak(mut child: Child) -> f64 {
     }
 }
 
-/// Lines that are off by more than a tenth.
-fn off(scene: &str, sets: &[&str]) -> Vec<String> {
+/// Lines that are off by more than a tenth, on so many threads: as many pictures are drawn at once.
+fn off(threads: &str, scene: &str, sets: &[&str]) -> Vec<String> {
     let sets: Vec<&str> = sets.iter().flat_map(|set| ["--set", set]).collect();
     let folder = temporary();
-    // What is drawn at once depends on them.
-    let on_two_threads = |arguments: &[&str]| {
+    let on_threads = |arguments: &[&str]| {
         let mut command = command(arguments, folder.path());
-        command.env("RAYON_NUM_THREADS", "2");
+        command.env("RAYON_NUM_THREADS", threads);
         command
     };
-    let plan = on_two_threads(&[&["plan", scene, "--json"], &sets[..]].concat()).output();
+    let plan = on_threads(&[&["plan", scene, "--json"], &sets[..]].concat()).output();
     let plan = plan.expect("the program starts");
     let plan: serde_json::Value = serde_json::from_slice(&plan.stdout).expect("JSON");
-    assert!(plan["particles"].as_u64() > Some(90_000), "{}", plan["particles"]);
     let mut off = Vec::new();
     for (key, flags) in [("all", &[][..]), ("tables", &["--figures", "none", "--no-report"])] {
         let run = [&["run", scene, "--quiet", "--out", key], flags, &sets].concat();
-        let child = on_two_threads(&run).stdout(Stdio::null()).spawn().expect("starts");
+        let child = on_threads(&run).stdout(Stdio::null()).spawn().expect("starts");
         let (found, predicted) = (peak(child), plan["memory_bytes"][key].as_f64().expect("a number"));
         let line = format!("{scene} {key}: {:.1} MB, predicted {:.1}", found / 1e6, predicted / 1e6);
         println!("{line} ({:+.1} %)", 100.0 * (predicted / found - 1.0));
@@ -66,6 +64,24 @@ fn plan_predicts_the_memory_of_a_run_within_a_tenth() {
         ("beam-hexagonal", &["lattice.spacing=0.03"]),
         ("plate-hole", &["lattice.spacing=0.05"]),
     ];
-    let off: Vec<String> = cases.iter().flat_map(|(scene, sets)| off(scene, sets)).collect();
+    let off: Vec<String> = cases.iter().flat_map(|(scene, sets)| off("2", scene, sets)).collect();
+    assert!(off.is_empty(), "{off:#?}");
+}
+
+/// Of small bodies pictures take most, and two threads need not paint their largest at the same moment; of a scene led by its
+/// truth the finite elements take most, before there is a plan.
+#[test]
+fn small_bodies_and_those_led_by_their_truth_take_what_plan_predicts() {
+    let cases: [(&str, &[&str]); 8] = [
+        ("tension", &[]),
+        ("tension", &["body.shape.columns=140", "body.shape.rows=140", "stop.steps=60"]),
+        ("shear", &["body.shape.columns=100", "body.shape.rows=100"]),
+        ("fracture-slow", &[]),
+        ("plate-hole", &["lattice.spacing=0.2"]),
+        ("l-bracket", &[]),
+        ("beam", &[]),
+        ("beam-paper-5", &[]),
+    ];
+    let off: Vec<String> = cases.iter().flat_map(|(scene, sets)| off("1", scene, sets)).collect();
     assert!(off.is_empty(), "{off:#?}");
 }

@@ -181,31 +181,30 @@ fn beside(bands: Option<&Bands>) -> f64 {
 }
 
 fn draw_bonds(svg: &mut Svg, axes: &Axes, subject: &Subject<'_>, snapshot: &Snapshot) {
-    let line = |path: &mut Path, ends: [[f64; 2]; 2]| {
-        let ends = ends.map(|end| axes.place(end));
-        if ends.iter().flatten().all(|value| value.is_finite()) {
-            path.polyline(ends);
-        }
-    };
     let broken: HashSet<[u32; 2]> = snapshot.broken.iter().copied().collect();
     let is_live = |[j, k]: [u32; 2]| !broken.contains(&[j.min(k), j.max(k)]);
     if let Some(neighbours) = subject.neighbours
         && snapshot.positions.len() <= MOST_PARTICLES_WITH_BONDS
         && neighbours.index.len() <= 2 * MOST_BONDS
     {
-        let mut live = Path::default();
-        for pair in bonds::pairs(neighbours).filter(|&pair| is_live(pair)) {
-            line(&mut live, pair.map(|i| snapshot.positions.get(i as usize)));
-        }
-        svg.path(&live, format_args!("fill=\"none\" stroke=\"{}\" stroke-width=\"0.8\"", colour::LIVE_BOND));
+        let live = bonds::pairs(neighbours).filter(|&pair| is_live(pair));
+        let ends = live.map(|pair| pair.map(|i| snapshot.positions.get(i as usize)));
+        draw_lines(svg, axes, ends, &format!("stroke=\"{}\" stroke-width=\"0.8\"", colour::LIVE_BOND));
     }
-    let mut lost = Path::default();
-    for &pair in &snapshot.broken {
-        broken_bond(axes, subject, snapshot, pair).into_iter().for_each(|ends| line(&mut lost, ends));
-    }
-    if !lost.is_empty() {
-        let stroke = format!("stroke=\"{}\" stroke-width=\"1.3\"", colour::BROKEN_BOND);
-        svg.path(&lost, format_args!("class=\"broken\" fill=\"none\" {stroke} stroke-dasharray=\"3 2\""));
+    let lost = snapshot.broken.iter().flat_map(|&pair| broken_bond(axes, subject, snapshot, pair));
+    let stroke = format!("stroke=\"{}\" stroke-width=\"1.3\" stroke-dasharray=\"3 2\"", colour::BROKEN_BOND);
+    draw_lines(svg, axes, lost, &format!("class=\"broken\" {stroke}"));
+}
+
+/// Draws lines between ends that are somewhere, a few in a path: what is made of one to fill it takes memory.
+fn draw_lines(svg: &mut Svg, axes: &Axes, lines: impl Iterator<Item = [[f64; 2]; 2]>, attributes: &str) {
+    const OF_A_PATH: usize = 500;
+    let lines = lines.map(|ends| ends.map(|end| axes.place(end)));
+    let mut lines = lines.filter(|ends| ends.iter().flatten().all(|value| value.is_finite())).peekable();
+    while lines.peek().is_some() {
+        let mut path = Path::default();
+        lines.by_ref().take(OF_A_PATH).for_each(|ends| path.polyline(ends));
+        svg.path(&path, format_args!("fill=\"none\" {attributes}"));
     }
 }
 

@@ -5,7 +5,7 @@
 //! rule makes of a body beside the truth. Axes of bodies are equal, and every axis carries its unit. SVG is
 //! written directly: a figure here is circles, lines and paths, and what matters is where they go.
 
-mod axes;
+pub(super) mod axes;
 pub(super) mod bands;
 pub(crate) mod chart;
 mod colour;
@@ -79,7 +79,7 @@ impl<'a> Subject<'a> {
 pub const PNG_ZOOM: f32 = 2.0;
 
 /// More particles than this are drawn as a raster: an SVG of a million circles opens nowhere.
-const MOST_DOTS: usize = 60_000;
+pub(super) const MOST_DOTS: usize = 60_000;
 
 /// A figure as PNG, `width` pixels wide; the error is a reason.
 pub(super) fn render(svg: &str, width: f32) -> Result<Vec<u8>, String> {

@@ -10,9 +10,19 @@ pub fn render(svg: &str, zoom: impl FnOnce(f32) -> f32) -> Result<Vec<u8>, Strin
     let tree = Tree::from_str(svg, &options()).map_err(|error| error.to_string())?;
     let zoom = zoom(tree.size().width());
     let size = [tree.size().width(), tree.size().height()].map(|length| (zoom * length).round() as u32);
-    let mut pixmap = blank(size)?;
-    resvg::render(&tree, Transform::from_scale(zoom, zoom), &mut pixmap.as_mut());
-    pixmap.encode_png().map_err(|error| error.to_string())
+    let Picture { rgba, .. } = picture(tree, zoom, size)?;
+    // tiny-skia would encode a copy, without what lies in it of its transparency; this has none.
+    encoded(size, &rgba).map_err(|error| error.to_string())
+}
+
+fn encoded([width, height]: [u32; 2], rgba: &[u8]) -> Result<Vec<u8>, png::EncodingError> {
+    let mut file = Vec::new();
+    let mut encoder = png::Encoder::new(&mut file, width, height);
+    encoder.set_color(png::ColorType::Rgba);
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(rgba)?;
+    writer.finish()?;
+    Ok(file)
 }
 
 fn options() -> Options<'static> {
@@ -22,8 +32,14 @@ fn options() -> Options<'static> {
     options
 }
 
-fn blank([width, height]: [u32; 2]) -> Result<Pixmap, String> {
-    Pixmap::new(width, height).ok_or_else(|| format!("no image of {width} x {height} pixels"))
+/// A sheet on white paper; the tree goes before anything is made of its picture.
+fn picture(tree: Tree, zoom: f32, size: [u32; 2]) -> Result<Picture, String> {
+    let [width, height] = size;
+    let pixmap = Pixmap::new(width, height);
+    let mut pixmap = pixmap.ok_or_else(|| format!("no image of {width} x {height} pixels"))?;
+    pixmap.fill(Color::WHITE);
+    resvg::render(&tree, Transform::from_scale(zoom, zoom), &mut pixmap.as_mut());
+    Ok(Picture { size, rgba: pixmap.take() })
 }
 
 /// Renders many sheets, with the font read once.
@@ -51,9 +67,6 @@ impl Painter {
         let tree = Tree::from_str(svg, &self.options).map_err(|error| error.to_string())?;
         let even = |length: f32| 2 * (0.5 * self.zoom * length).ceil() as u32;
         let size = [even(tree.size().width()), even(tree.size().height())];
-        let mut pixmap = blank(size)?;
-        pixmap.fill(Color::WHITE);
-        resvg::render(&tree, Transform::from_scale(self.zoom, self.zoom), &mut pixmap.as_mut());
-        Ok(Picture { size, rgba: pixmap.take() })
+        picture(tree, self.zoom, size)
     }
 }
