@@ -32,7 +32,7 @@ const SERVES: u8 = 2;
 pub const NOTHING_KEPT: &str = "interrupted: nothing is kept";
 
 /// How long work that keeps results may take to notice.
-const GRACE: Duration = Duration::from_millis(700);
+const GRACE: Duration = Duration::from_millis(500);
 /// How long another thread may go on writing into a folder that is being removed.
 const REMOVING: Duration = Duration::from_millis(150);
 
@@ -118,7 +118,11 @@ pub fn says(words: String) {
 pub fn commit(folder: OutputFolder) -> Result<PathBuf, ExportError> {
     let _saving = saving();
     let kept = folder.commit();
-    left().paths.clear();
+    let mut left = left();
+    left.paths.clear();
+    if let Ok(kept) = &kept {
+        left.words = Some(format!("interrupted: the results are in {}", kept.display()));
+    }
     kept
 }
 

@@ -153,6 +153,21 @@ fn increments_that_are_solved_before_an_interrupt_are_kept() {
 }
 
 #[test]
+fn a_flight_keeps_what_was_flown_and_says_so() {
+    let folder = temporary();
+    let mut child =
+        start(&["swarm", "square", "--out", "o", "--set", "flight.duration=100000"], folder.path());
+    // Long enough that its tables are still being written when the time to notice is over.
+    wait_until_busy(&mut child, folder.path(), Duration::from_secs(2));
+    signal("INT", child.id());
+    let output = child.wait_with_output().expect("ended");
+    assert_eq!(output.status.code(), Some(1));
+    let said = text(&output.stderr);
+    assert!(!said.contains("nothing is kept"), "{said}");
+    assert!(folder.path().join("o/flight.json").is_file(), "{:?}", files(folder.path()));
+}
+
+#[test]
 fn a_second_interrupt_ends_at_once() {
     let folder = temporary();
     let endless = ["--set", "stop.steps=100000000", "--set", "record={}"];
