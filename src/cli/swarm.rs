@@ -98,7 +98,7 @@ pub fn swarm(arguments: &SwarmArguments) -> Result<ExitCode, Refusal> {
     let start = Instant::now();
     let mut hear = |member, pose| {
         if let Some(messages) = &mut *messages.borrow_mut() {
-            messages.hear(member, pose);
+            messages.receive(member, pose);
         }
     };
     let (record, report) = fly_heard(&swarm, &mut hear, &mut |flight, _| {

@@ -46,7 +46,7 @@ pub fn of_body(
         Some(FixedWeights::Solved) => {
             let solved = affine_weights::solve(&body.reference, neighbours, follows).map_err(|error| {
                 let help = "use a wider neighbourhood or a frame, or let a leader have this place";
-                scene.refuse("rule.weights", error.told(|i| format!("particle {}", body.id(i))), help)
+                scene.refuse("rule.weights", error.described(|i| format!("particle {}", body.id(i))), help)
             })?;
             Ok(Weights::Scalar(solved.weights))
         }

@@ -200,7 +200,7 @@ impl Swarm {
     fn lead(&mut self, robot: &Bound<'_, PyAny>, place: &Bound<'_, PyAny>) -> PyResult<()> {
         let member = self.robot(robot)?;
         let place = places("place", place, 1)?[0];
-        if self.control.tell(member, place) {
+        if self.control.place_leader(member, place) {
             return Ok(());
         }
         let name = &self.names()[member];

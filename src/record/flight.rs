@@ -73,7 +73,7 @@ impl FlightMessages {
     }
 
     /// A pose that the channels have delivered.
-    pub fn hear(&mut self, member: usize, pose: Pose) {
+    pub fn receive(&mut self, member: usize, pose: Pose) {
         self.heard.push((member, pose));
     }
 

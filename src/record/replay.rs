@@ -244,7 +244,7 @@ impl Replay {
             Some(&Heard::Leader(member)) => {
                 let Some(PoseStamped { header, pose: place }) = entry.decode() else { return };
                 if pose::is_frame(&header.frame_id, &self.frame_id) {
-                    self.control.tell(member, [place.position.x, place.position.y]);
+                    self.control.place_leader(member, [place.position.x, place.position.y]);
                 }
             }
             Some(&Heard::Target(member)) => {

@@ -180,7 +180,7 @@ impl RobotNodes {
             self.pace.wait();
             self.tick();
             if let Some(pulse) = &self.pulse {
-                pulse.hears(std::mem::take(&mut self.link.was_sent));
+                pulse.note_peers(std::mem::take(&mut self.link.was_sent));
             }
             if self.pulse.as_ref().is_some_and(|pulse| pulse.is_given_up()) {
                 return false;
@@ -272,7 +272,7 @@ impl RobotsEnd for Link {
         }
     }
 
-    fn say(&mut self, now: f64, said: &[(usize, Pose)]) -> Result<(), EdgeError> {
+    fn send(&mut self, now: f64, said: &[(usize, Pose)]) -> Result<(), EdgeError> {
         let stamp = Time::from_seconds(now);
         if let Some(clock) = &self.clock {
             clock.publish(&Clock { clock: stamp })?;

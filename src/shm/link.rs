@@ -6,7 +6,7 @@ use super::wait::Bell;
 use super::{Capacity, Peer, Reader, ShmError, Writer};
 use crate::swarm::control::Control;
 use crate::swarm::control::scope::NodeScope;
-use crate::swarm::transport::{ControllerEnd, Heard, RobotsEnd, Target};
+use crate::swarm::transport::{ControllerEnd, Received, RobotsEnd, Target};
 use crate::swarm::watch::Pose;
 
 /// Leaf of the service that carries poses to the loop.
@@ -60,7 +60,7 @@ impl Controller {
 impl ControllerEnd for Controller {
     type Error = ShmError;
 
-    fn hear(&mut self, now: f64, hear: &mut dyn FnMut(Heard)) {
+    fn receive(&mut self, now: f64, take: &mut dyn FnMut(Received)) {
         self.poses.still();
         self.leaders.still();
         let count = self.hears.len();
@@ -70,7 +70,7 @@ impl ControllerEnd for Controller {
                 if member >= count {
                     self.refused += 1;
                 } else if self.hears[member] {
-                    hear(Heard::Pose(member, pose(wire, now)));
+                    take(Received::Pose(member, pose(wire, now)));
                 }
             }
         }
@@ -80,7 +80,7 @@ impl ControllerEnd for Controller {
                 if member >= count {
                     self.refused += 1;
                 } else if self.serves[member] {
-                    hear(Heard::Leader(member, leader.position));
+                    take(Received::Leader(member, leader.position));
                 }
             }
         }
@@ -133,7 +133,7 @@ impl Robots {
 impl RobotsEnd for Robots {
     type Error = ShmError;
 
-    fn say(&mut self, now: f64, poses: &[(usize, Pose)]) -> Result<(), ShmError> {
+    fn send(&mut self, now: f64, poses: &[(usize, Pose)]) -> Result<(), ShmError> {
         self.period += 1;
         // Delays and duplicates may make more poses than robots.
         for some in poses.chunks(self.count.max(1)) {

@@ -66,7 +66,7 @@ fn task() {
             println!("{READY}");
             while begun.elapsed() < PATIENCE {
                 let stamp = flockform::swarm::pace::system_time();
-                robots.say(stamp, &[(1, pose(1.0, stamp))]).expect("said");
+                robots.send(stamp, &[(1, pose(1.0, stamp))]).expect("said");
                 std::thread::sleep(Duration::from_millis(2));
             }
         }

@@ -79,7 +79,7 @@ fn in_process_a_pose_that_is_not_finite_moves_nobody() {
 #[test]
 fn in_process_a_pose_of_nobody_is_left_out_and_counted() {
     let (mut controller, mut robots) = join(3);
-    robots.say(1.0, &[(3, pose(0.0, 1.0)), (2, pose(5.0, 1.0))]).expect("said");
+    robots.send(1.0, &[(3, pose(0.0, 1.0)), (2, pose(5.0, 1.0))]).expect("said");
     assert_eq!(heard(&mut controller), [(2, pose(5.0, 1.0))]);
     assert_eq!(controller.refused(), 1);
 }

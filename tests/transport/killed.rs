@@ -67,7 +67,7 @@ fn robots_that_are_killed_are_forgotten_and_heard_again_when_they_come_back() {
         peer.clean_up();
         // What it had sent may still come, and nothing after it.
         heard(&mut controller);
-        others.say(1.0, &[(0, pose(1.0, 1.0))]).expect("said");
+        others.send(1.0, &[(0, pose(1.0, 1.0))]).expect("said");
         assert_eq!(heard(&mut controller), [(0, pose(1.0, 1.0))]);
     }
 }

@@ -20,7 +20,7 @@ pub fn poses_come_in_order_and_the_newest_comes(transport: &mut impl Transport) 
     let mut stamps = Vec::new();
     for k in 1..=200 {
         let stamp = 10.0 + f64::from(k);
-        robots.say(stamp, &[(0, pose(stamp, stamp)), (1, pose(-stamp, stamp))]).expect("said");
+        robots.send(stamp, &[(0, pose(stamp, stamp)), (1, pose(-stamp, stamp))]).expect("said");
         // At times several wait together.
         if k % 3 == 0 {
             a_moment();
@@ -65,20 +65,20 @@ pub fn who_comes_late_hears_what_is_said_from_then_on(transport: &mut impl Trans
     let mut robots = transport.robots();
     for k in 0..100 {
         robots
-            .say(1.0, &[(0, pose(f64::from(k), 1.0 + f64::from(k)))])
+            .send(1.0, &[(0, pose(f64::from(k), 1.0 + f64::from(k)))])
             .expect("nobody listens, and nobody waits");
     }
     let mut late = transport.controller();
     let begun = Instant::now();
     let (_, first) = until("a late loop hears", || {
         let stamp = 200.0 + begun.elapsed().as_secs_f64();
-        robots.say(stamp, &[(0, pose(7.0, stamp))]).expect("said");
+        robots.send(stamp, &[(0, pose(7.0, stamp))]).expect("said");
         heard(&mut late).into_iter().find(|(_, pose)| pose.stamp >= 200.0)
     });
     assert_eq!(first.position, [7.0, 2.0]);
     let mut later = transport.robots();
     until("late robots are heard", || {
-        later.say(300.0, &[(1, pose(8.0, 300.0))]).expect("said");
+        later.send(300.0, &[(1, pose(8.0, 300.0))]).expect("said");
         heard(&mut late).iter().any(|(m, pose)| *m == 1 && pose.stamp == 300.0).then_some(())
     });
 }
@@ -92,12 +92,12 @@ pub fn a_peer_that_goes_away_harms_nobody_else(transport: &mut impl Transport) {
     let mut stamp = 10.0;
     until("who stayed is heard", || {
         stamp += 1.0;
-        stays.say(stamp, &[(0, pose(1.0, stamp))]).expect("said");
+        stays.send(stamp, &[(0, pose(1.0, stamp))]).expect("said");
         heard(&mut controller).iter().any(|(m, pose)| *m == 0 && pose.stamp > 12.0).then_some(())
     });
     drop(controller);
     for _ in 0..100 {
-        stays.say(99.0, &[(0, pose(1.0, 99.0))]).expect("robots go on without a loop");
+        stays.send(99.0, &[(0, pose(1.0, 99.0))]).expect("robots go on without a loop");
     }
 }
 
@@ -121,7 +121,7 @@ pub fn a_thousand_robots_are_carried(transport: &mut impl Transport, served: &[u
     until("everybody is heard at once", || {
         stamp += 1.0;
         let all: Vec<_> = (0..count).map(|m| (m, pose(m as f64, stamp))).collect();
-        robots.say(stamp, &all).expect("said");
+        robots.send(stamp, &all).expect("said");
         std::thread::sleep(Duration::from_millis(20));
         let heard = heard(&mut controller);
         let mut whole = vec![false; count];
@@ -147,7 +147,7 @@ pub fn who_does_not_listen_holds_nobody_up(transport: &mut impl Transport) {
     let said = 5000;
     for k in 1..=said {
         let stamp = 10.0 + f64::from(k);
-        robots.say(stamp, &[(0, pose(1.0, stamp))]).expect("a queue that is full refuses nothing");
+        robots.send(stamp, &[(0, pose(1.0, stamp))]).expect("a queue that is full refuses nothing");
     }
     let mut waited = heard(&mut controller);
     if transport.newest_waits() {
@@ -157,7 +157,7 @@ pub fn who_does_not_listen_holds_nobody_up(transport: &mut impl Transport) {
     until("the newest of the flood", || {
         waited.extend(heard(&mut controller));
         // A network may lose the very last.
-        robots.say(1e5, &[(0, pose(1.0, 1e5))]).expect("said");
+        robots.send(1e5, &[(0, pose(1.0, 1e5))]).expect("said");
         waited.iter().any(|(_, pose)| pose.stamp >= 10.0 + f64::from(said)).then_some(())
     });
     let of_the_flood = waited.iter().filter(|(_, pose)| pose.stamp < 1e5).count();
@@ -179,7 +179,7 @@ pub fn a_pose_that_is_not_finite_moves_nobody(
         let all: Vec<_> = (0..3)
             .map(|m| (m, flockform::swarm::watch::Pose { position: [m as f64, 0.0], ..pose(0.0, now + k) }))
             .collect();
-        robots.say(now, &all).expect("said");
+        robots.send(now, &all).expect("said");
         a_moment();
         serve(control, part, &mut controller, &mut complaints, now + k).expect("sent");
         (0..3).all(|m| control.health(m) == Health::Fresh).then_some(())
@@ -188,7 +188,7 @@ pub fn a_pose_that_is_not_finite_moves_nobody(
     until("bad poses are turned away", || {
         k += 1e-3;
         let bad = flockform::swarm::watch::Pose { position: [f64::NAN, f64::INFINITY], ..pose(0.0, now + k) };
-        robots.say(now, &[(1, bad)]).expect("said");
+        robots.send(now, &[(1, bad)]).expect("said");
         a_moment();
         serve(control, part, &mut controller, &mut complaints, now + k).expect("sent");
         (control.watch().counts(1).rejected() > before + 2).then_some(())

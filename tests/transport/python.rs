@@ -43,7 +43,7 @@ fn python_reads_poses_and_moves_a_leader() {
         let poses: Vec<(usize, Pose)> = (0..3)
             .map(|m| (m, Pose { position: places[m], yaw: 0.0, stamp, frame_is_right: true }))
             .collect();
-        robots.say(stamp, &poses).expect("said");
+        robots.send(stamp, &poses).expect("said");
         node.tick();
         robots.targets(&mut |m, place| {
             if m == 0 {

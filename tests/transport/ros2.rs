@@ -8,7 +8,7 @@ use flockform::ros::node::Link as Controller;
 use flockform::ros::robots::{Layout, Link as Robots};
 use flockform::scene::swarm::Swarm;
 use flockform::swarm::control::scope::NodeScope;
-use flockform::swarm::transport::{ControllerEnd, Heard, Target};
+use flockform::swarm::transport::{ControllerEnd, Received, Target};
 
 use super::promises;
 use super::support::*;
@@ -22,8 +22,8 @@ pub struct Served {
 impl ControllerEnd for Served {
     type Error = <Controller as ControllerEnd>::Error;
 
-    fn hear(&mut self, now: f64, hear: &mut dyn FnMut(Heard)) {
-        self.link.hear(now, hear);
+    fn receive(&mut self, now: f64, take: &mut dyn FnMut(Received)) {
+        self.link.receive(now, hear);
     }
 
     fn send(&mut self, now: f64, targets: &[Target]) -> Result<(), Self::Error> {

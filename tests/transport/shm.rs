@@ -4,7 +4,7 @@ use flockform::shm::channel::{Capacity, Reader, Writer};
 use flockform::shm::link::{Controller, POSES, Robots};
 use flockform::shm::payload::{Leader, Pose as WirePose};
 use flockform::shm::{Domain, Peer, ShmError};
-use flockform::swarm::transport::{ControllerEnd, Heard, RobotsEnd};
+use flockform::swarm::transport::{ControllerEnd, Received, RobotsEnd};
 use iceoryx2::prelude::{ZeroCopySend, ipc};
 
 use super::promises;
@@ -94,7 +94,7 @@ fn a_pose_or_a_leader_of_nobody_is_left_out_and_counted() {
     let mut controller = shm.controller();
     let mut robots = shm.robots();
     meet(&mut controller, &mut robots, 0);
-    robots.say(1.0, &[(3, pose(0.0, 1.0)), (2, pose(5.0, 1.0))]).expect("said");
+    robots.send(1.0, &[(3, pose(0.0, 1.0)), (2, pose(5.0, 1.0))]).expect("said");
     assert_eq!(heard(&mut controller), [(2, pose(5.0, 1.0))]);
     let peer = shm.peer();
     let mut leaders = Writer::<Leader>::open(peer, "row", "leaders", &Capacity::SWARM, 2).expect("a writer");
@@ -102,8 +102,8 @@ fn a_pose_or_a_leader_of_nobody_is_left_out_and_counted() {
     let leader = |k: usize| Leader { member: all[k].0, reserved: 0, position: [all[k].1, 0.0] };
     leaders.send(1.0, 0, 2, leader).expect("sent");
     let mut told = Vec::new();
-    controller.hear(1.0, &mut |heard| told.push(heard));
-    assert_eq!(told, [Heard::Leader(0, [4.0, 0.0])]);
+    controller.receive(1.0, &mut |heard| told.push(heard));
+    assert_eq!(told, [Received::Leader(0, [4.0, 0.0])]);
     assert_eq!(controller.refused(), 2);
 }
 
@@ -155,9 +155,9 @@ fn swarms_and_domains_do_not_meet() {
     let mut robots = open(&peer, "row");
     let mut strangers = [open(&peer, "other"), open(&stranger, "row")];
     for one in &mut strangers {
-        one.say(1.0, &[(1, pose(9.0, 1.0))]).expect("said");
+        one.send(1.0, &[(1, pose(9.0, 1.0))]).expect("said");
     }
-    robots.say(1.0, &[(0, pose(1.0, 1.0))]).expect("said");
+    robots.send(1.0, &[(0, pose(1.0, 1.0))]).expect("said");
     assert_eq!(heard(&mut controller), [(0, pose(1.0, 1.0))]);
 }
 

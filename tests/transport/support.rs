@@ -7,7 +7,7 @@ use flockform::scene::swarm::Swarm;
 use flockform::shm::Domain;
 use flockform::swarm::control::Control;
 use flockform::swarm::control::scope::NodeScope;
-use flockform::swarm::transport::{ControllerEnd, Heard, RobotsEnd, Target};
+use flockform::swarm::transport::{ControllerEnd, Received, RobotsEnd, Target};
 use flockform::swarm::watch::Pose;
 
 pub use crate::signals::signal;
@@ -76,8 +76,8 @@ pub trait Transport {
 /// All poses that arrived since the last call.
 pub fn heard(end: &mut impl ControllerEnd) -> Vec<(usize, Pose)> {
     let mut poses = Vec::new();
-    end.hear(0.0, &mut |heard| {
-        if let Heard::Pose(member, pose) = heard {
+    end.receive(0.0, &mut |heard| {
+        if let Received::Pose(member, pose) = heard {
             poses.push((member, pose));
         }
     });
@@ -87,7 +87,7 @@ pub fn heard(end: &mut impl ControllerEnd) -> Vec<(usize, Pose)> {
 /// Says a pose of `member` until it is heard: over a network the first ones find nobody yet.
 pub fn meet<C: ControllerEnd, R: RobotsEnd>(controller: &mut C, robots: &mut R, member: usize) {
     until("the ends find each other, poses", || {
-        robots.say(1.0, &[(member, pose(0.0, 1.0))]).expect("said");
+        robots.send(1.0, &[(member, pose(0.0, 1.0))]).expect("said");
         heard(controller).iter().any(|(m, _)| *m == member).then_some(())
     });
     // And the way back.

@@ -30,7 +30,7 @@ pub struct Reading {
 
 impl Reading {
     /// Another time from the simulator \[s\].
-    pub fn hear(&mut self, time: f64) {
+    pub fn receive(&mut self, time: f64) {
         if let Some(before) = self.now
             && time < before
         {
@@ -72,7 +72,7 @@ impl Clock {
     pub fn poll(&mut self) -> Option<f64> {
         let Simulated { subscription, reading, .. } = self.simulated.as_mut()?;
         while let Some((message, _)) = subscription.take() {
-            reading.hear(message.clock.seconds());
+            reading.receive(message.clock.seconds());
         }
         reading.jump_back()
     }
@@ -107,7 +107,7 @@ mod tests {
         let mut reading = Reading::default();
         assert_eq!(reading.now(), None);
         for time in [10.0, 10.5, 2.0, 2.5] {
-            reading.hear(time);
+            reading.receive(time);
         }
         assert_eq!(reading.now(), Some(2.5));
         assert_eq!(reading.jump_back(), Some(8.5));

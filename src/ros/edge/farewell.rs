@@ -18,7 +18,7 @@ const MULTICAST: Ipv4Addr = Ipv4Addr::new(239, 255, 0, 1);
 const PARTICIPANTS: u16 = 120;
 
 /// Says that the participant of this prefix has left. What is not sent is not missed: leases run out.
-pub fn say(prefix: [u8; 12], domain: u16, loopback_only: bool) {
+pub fn send(prefix: [u8; 12], domain: u16, loopback_only: bool) {
     let packet = packet(prefix);
     let Some(common) = discovery_port(domain, None) else { return };
     let send = || -> io::Result<()> {

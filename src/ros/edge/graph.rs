@@ -131,7 +131,7 @@ impl Graph {
     }
 
     /// Takes the announcement of the nodes of another participant.
-    fn hear(&self, info: &ParticipantEntitiesInfo, own: GUID) {
+    fn receive(&self, info: &ParticipantEntitiesInfo, own: GUID) {
         let from: [u8; 12] = std::array::from_fn(|i| info.gid().to_bytes16()[i]);
         if from == prefix(own) {
             return;
@@ -269,7 +269,7 @@ fn watch(
             };
             // An unreadable announcement names no twin of ours.
             if let Ok(info) = decode::<ParticipantEntitiesInfo>(&payload.bytes, payload.order) {
-                graph.hear(&info, guid);
+                graph.receive(&info, guid);
             }
         }
         if let Some(news) = graph.news(guid, writer.guid())

@@ -208,7 +208,7 @@ impl Shared {
 
     /// Says that the participant has left; it may announce itself no more.
     pub fn say_farewell(&self) {
-        farewell::say(prefix(self.guid), self.options.domain, self.options.loopback_only);
+        farewell::send(prefix(self.guid), self.options.domain, self.options.loopback_only);
     }
 
     fn topic(&self, name: &str, kind: &str, policies: &QosPolicies) -> Result<Topic, EdgeError> {

@@ -135,7 +135,7 @@ impl Pulse {
 
     /// Records after each tick whether the loop hears any peer. Forged discovery can leave the middleware deaf to all
     /// its peers though otherwise sound; a new one finds them. A process that has never heard a peer waits for one.
-    pub fn hears(&self, any_peer: bool) {
+    pub fn note_peers(&self, any_peer: bool) {
         let mut heard = self.heard.lock().unwrap_or_else(PoisonError::into_inner);
         if any_peer {
             *heard = Some((Instant::now(), self.waited()));
@@ -206,7 +206,7 @@ impl Proof {
     /// Whether something that was sent has been taken since this was last asked.
     fn is_taken(&mut self) -> bool {
         match self {
-            Self::Sample(way) => way.hear().is_some(),
+            Self::Sample(way) => way.receive().is_some(),
             #[cfg(feature = "security")]
             Self::Queue(queue) => queue.is_taken(),
         }
@@ -250,7 +250,7 @@ impl Loop {
     }
 
     /// The newest that came back.
-    fn hear(&self) -> Option<u32> {
+    fn receive(&self) -> Option<u32> {
         let mut newest = None;
         for _ in 0..64 {
             match next(&self.reader) {
@@ -362,10 +362,10 @@ mod tests {
         let (moment, hour) = (Duration::from_millis(1), Duration::from_secs(3600));
         let is_lonely = |starved, waited: Duration| {
             let pulse = Pulse::new(Patience { deaf: hour, lonely: moment, starved });
-            pulse.hears(true);
+            pulse.note_peers(true);
             pulse.waited.store(waited.as_millis() as u64, Ordering::Relaxed);
             std::thread::sleep(5 * moment);
-            pulse.hears(false);
+            pulse.note_peers(false);
             pulse.is_given_up()
         };
         assert!(!is_lonely(hour, hour));
@@ -398,20 +398,20 @@ mod tests {
         let first = (1..500).find(|&number| {
             way.send(number);
             std::thread::sleep(Duration::from_millis(10));
-            way.hear() == Some(number)
+            way.receive() == Some(number)
         });
         let first = first.expect("none came back");
         assert!(since.elapsed() < Duration::from_secs(2), "the first that came back was {first}");
         for number in first + 1..first + 20 {
             way.send(number);
             let since = Instant::now();
-            while way.hear() != Some(number) {
+            while way.receive() != Some(number) {
                 assert!(since.elapsed() < Duration::from_secs(5), "sample {number} did not come back");
                 std::thread::sleep(Duration::from_millis(1));
             }
         }
         std::thread::sleep(Duration::from_millis(50));
-        assert_eq!(way.hear(), None);
+        assert_eq!(way.receive(), None);
         assert!(threads::count() >= 2 && memory("VmRSS:").is_some_and(|size| size > 1000));
     }
 }

@@ -14,7 +14,7 @@ use crate::swarm::control::Control;
 use crate::swarm::control::scope::NodeScope;
 use crate::swarm::pace::system_time;
 use crate::swarm::transport::complaints::Complaints;
-use crate::swarm::transport::{ControllerEnd, Heard, Target};
+use crate::swarm::transport::{ControllerEnd, Received, Target};
 
 /// Topics of the members.
 pub struct Link {
@@ -69,10 +69,10 @@ impl Link {
 impl ControllerEnd for Link {
     type Error = EdgeError;
 
-    fn hear(&mut self, now: f64, hear: &mut dyn FnMut(Heard)) {
+    fn receive(&mut self, now: f64, take: &mut dyn FnMut(Received)) {
         let simulated = self.simulated_time.then_some(now);
         let copies = self.recorder.as_mut().map(|recorder| (recorder, now));
-        self.poses.take(&self.frame_id, simulated, copies, &mut |m, pose| hear(Heard::Pose(m, pose)));
+        self.poses.take(&self.frame_id, simulated, copies, &mut |m, pose| take(Received::Pose(m, pose)));
         for (member, topic) in &self.leaders {
             let Some((message, _)) = topic.take_last() else { continue };
             if let Some(recorder) = &mut self.recorder {
@@ -80,7 +80,7 @@ impl ControllerEnd for Link {
             }
             if is_frame(&message.header.frame_id, &self.frame_id) {
                 let place = message.pose.position;
-                hear(Heard::Leader(*member, [place.x, place.y]));
+                take(Received::Leader(*member, [place.x, place.y]));
             } else {
                 let text = format_args!(
                     "{}: frame `{}` is not `{}`, which the swarm file names",

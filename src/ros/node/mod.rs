@@ -226,13 +226,13 @@ impl FormationNode {
             self.tick();
             if let Some(pulse) = &self.pulse {
                 match self.endpoints {
-                    Some(_) => pulse.hears(self.hears_any()),
+                    Some(_) => pulse.note_peers(self.hears_any()),
                     None => pulse.listens_to_none(),
                 }
             }
             if self.pulse.as_ref().is_some_and(|pulse| pulse.is_given_up()) {
                 self.control.set_active(false);
-                self.say(self.time(), false);
+                self.publish(self.time(), false);
                 return false;
             }
             if !look(self) {
@@ -243,7 +243,7 @@ impl FormationNode {
         let (lifecycle, mut transitions) = self.transitions(now);
         lifecycle.shut_down(now, &mut |goal| transitions.act(goal));
         // Robots that are driven by velocities would go on for ever.
-        self.publish(now);
+        self.publish(now, self.lifecycle.is_active());
         self.rosout.iter().for_each(Rosout::publish);
         true
     }
@@ -298,7 +298,7 @@ impl FormationNode {
         drop(inside);
         self.record_event(now, LoopEvent::TICK, "", &[now]);
         self.control.tick(now);
-        self.publish(now);
+        self.publish(now, self.lifecycle.is_active());
         self.statistics.tick(begun.elapsed().as_secs_f64());
         self.report(now);
     }
@@ -436,11 +436,7 @@ impl FormationNode {
     }
 
     /// Publishes targets and velocities.
-    fn publish(&mut self, now: f64) {
-        self.say(now, self.lifecycle.is_active());
-    }
-
-    fn say(&mut self, now: f64, active: bool) {
+    fn publish(&mut self, now: f64, active: bool) {
         let Some(endpoints) = &mut self.endpoints else { return };
         if active {
             let sent = endpoints.link.send(now, &targets(&self.control, &self.origin.part));

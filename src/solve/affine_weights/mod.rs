@@ -86,7 +86,7 @@ pub enum WeightsError {
 
 impl WeightsError {
     /// The error as a sentence whose subject is the member concerned.
-    pub fn told(&self, name: impl Fn(usize) -> String) -> String {
+    pub fn described(&self, name: impl Fn(usize) -> String) -> String {
         match self {
             Self::NoNeighbours { member }
             | Self::NotFinite { member }

@@ -232,8 +232,8 @@ impl Control {
 
     /// Gives a leader that is moved from outside its next place \[m\]; false if it is not one, or the place lies
     /// where no pose would be believed.
-    pub fn tell(&mut self, member: usize, place: [f64; 2]) -> bool {
-        self.is_believed(place) && self.formation.tell(member, place)
+    pub fn place_leader(&mut self, member: usize, place: [f64; 2]) -> bool {
+        self.is_believed(place) && self.formation.place_leader(member, place)
     }
 
     /// As [`Control::tell`], for any leader, whose own program ends with this.

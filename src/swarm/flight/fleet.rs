@@ -116,7 +116,7 @@ impl Fleet {
     }
 
     /// Every robot sends its pose, stamped with `stamp` \[s\]; `hear` receives the poses that the channels deliver now.
-    pub fn say(&mut self, stamp: f64, hear: &mut dyn FnMut(usize, Pose)) {
+    pub fn send(&mut self, stamp: f64, hear: &mut dyn FnMut(usize, Pose)) {
         for m in 0..self.robots.len() {
             let fault = self.fault(m);
             let sender = fault.map(Fault::sender).unwrap_or_default();

@@ -97,7 +97,7 @@ impl Flight {
         let now = self.fleet.time();
         self.perform_due();
         let control = &mut self.control;
-        self.fleet.say(now, &mut |member, pose| {
+        self.fleet.send(now, &mut |member, pose| {
             hear(member, pose);
             // The watch counts rejected poses.
             let _ = control.receive(member, pose, now);

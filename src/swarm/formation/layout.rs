@@ -61,7 +61,7 @@ fn of_places(swarm: &Swarm, rule: Rule) -> Result<Formation, SceneError> {
         Some(RawWeights::Solved {}) => {
             let solved = affine_weights::solve(&places, &neighbours, &follows).map_err(|error| {
                 let help = "give it more neighbours on all its sides, or make it a leader";
-                swarm.refuse("rule.weights", error.told(|i| format!("`{}`", names[i])), help)
+                swarm.refuse("rule.weights", error.described(|i| format!("`{}`", names[i])), help)
             })?;
             Weights::Scalar(solved.weights)
         }

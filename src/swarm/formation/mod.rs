@@ -168,7 +168,7 @@ impl Formation {
     }
 
     /// Gives a leader that is moved from outside a new place \[m\]; false for any other member.
-    pub fn tell(&mut self, member: usize, place: [f64; 2]) -> bool {
+    pub fn place_leader(&mut self, member: usize, place: [f64; 2]) -> bool {
         match &mut self.leads[member] {
             Some(Lead::External(moved)) => {
                 *moved = place;

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::convert::Infallible;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use super::{ControllerEnd, Heard, RobotsEnd, Target};
+use super::{ControllerEnd, Received, RobotsEnd, Target};
 use crate::swarm::watch::Pose;
 
 /// Most poses, and most targets, of one member that wait in a queue \[1\].
@@ -88,9 +88,9 @@ impl Robots {
 impl ControllerEnd for Controller {
     type Error = Infallible;
 
-    fn hear(&mut self, _now: f64, hear: &mut dyn FnMut(Heard)) {
-        self.0.poses.take(|member, pose| hear(Heard::Pose(member, pose)));
-        self.0.leaders.take(|member, place| hear(Heard::Leader(member, place)));
+    fn receive(&mut self, _now: f64, take: &mut dyn FnMut(Received)) {
+        self.0.poses.take(|member, pose| take(Received::Pose(member, pose)));
+        self.0.leaders.take(|member, place| take(Received::Leader(member, place)));
     }
 
     fn send(&mut self, _now: f64, targets: &[Target]) -> Result<(), Infallible> {
@@ -106,7 +106,7 @@ impl ControllerEnd for Controller {
 impl RobotsEnd for Robots {
     type Error = Infallible;
 
-    fn say(&mut self, _now: f64, poses: &[(usize, Pose)]) -> Result<(), Infallible> {
+    fn send(&mut self, _now: f64, poses: &[(usize, Pose)]) -> Result<(), Infallible> {
         let strangers = self.0.poses.push(poses.iter().copied());
         *self.0.refused.lock().unwrap_or_else(PoisonError::into_inner) += strangers;
         Ok(())

@@ -22,7 +22,7 @@ use super::watch::Pose;
 
 /// A message that reaches the loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Heard {
+pub enum Received {
     /// A member's pose.
     Pose(usize, Pose),
     /// The next place of a leader that is moved from outside \[m\].
@@ -45,8 +45,8 @@ pub trait ControllerEnd {
     /// Why a target was not sent.
     type Error: std::error::Error;
 
-    /// Passes to `hear` all that arrived since the last call, without waiting; `now` \[s\] stamps messages without one.
-    fn hear(&mut self, now: f64, hear: &mut dyn FnMut(Heard));
+    /// Passes to `take` all that arrived since the last call, without waiting; `now` \[s\] stamps messages without one.
+    fn receive(&mut self, now: f64, take: &mut dyn FnMut(Received));
 
     /// Sends the targets of a tick, without waiting.
     ///
@@ -67,7 +67,7 @@ pub trait RobotsEnd {
     ///
     /// # Errors
     /// The first that was not sent.
-    fn say(&mut self, now: f64, poses: &[(usize, Pose)]) -> Result<(), Self::Error>;
+    fn send(&mut self, now: f64, poses: &[(usize, Pose)]) -> Result<(), Self::Error>;
 
     /// Passes to `go` the targets that arrived since the last call \[m\]; of one member's the newest comes last.
     fn targets(&mut self, go: &mut dyn FnMut(usize, [f64; 2]));
@@ -75,8 +75,8 @@ pub trait RobotsEnd {
 
 /// The first half of a period: receives all messages that arrived, and warns of those that are dropped.
 pub fn listen<E: ControllerEnd>(control: &mut Control, end: &mut E, complaints: &mut Complaints, now: f64) {
-    end.hear(now, &mut |heard| match heard {
-        Heard::Pose(member, pose) => {
+    end.receive(now, &mut |heard| match heard {
+        Received::Pose(member, pose) => {
             let Err(rejection) = control.receive(member, pose, now) else { return };
             let name = &control.formation().names[member];
             match rejection.cause() {
@@ -86,8 +86,8 @@ pub fn listen<E: ControllerEnd>(control: &mut Control, end: &mut E, complaints: 
                 None => tracing::debug!("{name}: {rejection}"),
             }
         }
-        Heard::Leader(member, place) => {
-            if !control.tell(member, place) {
+        Received::Leader(member, place) => {
+            if !control.place_leader(member, place) {
                 let name = &control.formation().names[member];
                 let text = format_args!(
                     "{name}: a place to lead it to is not finite, farther from the centre than `poses.range` \
@@ -146,8 +146,8 @@ pub fn fly<E: RobotsEnd>(
     fleet.go(|member| goals[member]);
     let now = now(fleet);
     let mut said = Vec::new();
-    fleet.say(now, &mut |member, pose| said.push((member, pose)));
-    end.say(now, &said)
+    fleet.send(now, &mut |member, pose| said.push((member, pose)));
+    end.send(now, &said)
 }
 
 /// Takes a target for a robot's goal \[m\]; one that is not finite, or of no robot, changes nothing.
