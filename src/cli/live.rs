@@ -18,38 +18,64 @@ use super::{Refusal, interrupt, output, print};
 #[derive(Debug, Args)]
 pub struct LiveArguments {
     /// Name of a bundled scene or swarm, or path of a file
-    #[arg(value_parser = FileName::ANY, hide_possible_values = true)]
+    #[arg(value_parser = FileName::ANY, hide_possible_values = true, group = "page")]
     file: String,
     /// Override a key, validated like the file: `lattice.spacing=0.5`
     #[arg(long = "set", value_name = "KEY.PATH=VALUE")]
     set: Vec<String>,
-    /// Port on this computer, from 1024: those below are the system's [default: a free one]
-    #[arg(long, value_name = "PORT", value_parser = clap::value_parser!(u16).range(1024..))]
-    port: Option<u16>,
-    /// Open the page, with the program that this computer opens such files with
-    #[arg(long)]
-    open: bool,
+    #[command(flatten)]
+    page: PageArguments,
     /// Folder for what is saved [default: that of the file, or the working folder for a bundled one]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+}
+
+/// The page in a browser; the argument that asks for one is in the group `page`.
+#[derive(Debug, Args)]
+pub struct PageArguments {
+    /// Port on this computer, from 1024: those below are the system's [default: a free one]
+    #[arg(long, value_name = "PORT", value_parser = clap::value_parser!(u16).range(1024..), requires = "page")]
+    port: Option<u16>,
+    /// Open the page, with the program that this computer opens such files with
+    #[arg(long, requires = "page")]
+    open: bool,
 }
 
 /// Serves a session until it is interrupted.
 pub fn live(arguments: &LiveArguments) -> Result<ExitCode, Refusal> {
     let session = arguments.session()?;
     let folder = arguments.saved_in()?;
-    let refuse = |source| Refusal::Live { port: arguments.port, source };
-    let server = Server::open(arguments.port).map_err(refuse)?;
-    let address = server.address();
-    print(&format!("{address}\n"));
-    eprintln!("open this address in a browser on this computer; it ends with an interrupt (Ctrl-C)");
-    let door = arguments.open.then(|| open(&address)).flatten();
+    let server = arguments.page.server()?;
+    let door = arguments.page.announce(&server);
     let stop = interrupt::serves();
-    let served = server.serve(session, folder, stop).map_err(refuse);
+    let served = server.serve(session, folder, stop).map_err(|source| arguments.page.refuse(source));
+    close(door);
+    served.map(|()| ExitCode::SUCCESS)
+}
+
+impl PageArguments {
+    pub fn server(&self) -> Result<Server, Refusal> {
+        Server::open(self.port).map_err(|source| self.refuse(source))
+    }
+
+    fn refuse(&self, source: std::io::Error) -> Refusal {
+        Refusal::Live { port: self.port, source }
+    }
+
+    /// Prints the address, and opens it if that is asked for: for [`close`].
+    pub fn announce(&self, server: &Server) -> Option<PathBuf> {
+        let address = server.address();
+        print(&format!("{address}\n"));
+        eprintln!("open this address in a browser on this computer; it ends with an interrupt (Ctrl-C)");
+        self.open.then(|| open(&address)).flatten()
+    }
+}
+
+/// Removes the file by which the page was opened.
+pub fn close(door: Option<PathBuf>) {
     if let Some(door) = door {
         let _ = std::fs::remove_file(door);
     }
-    served.map(|()| ExitCode::SUCCESS)
 }
 
 impl LiveArguments {

@@ -118,7 +118,7 @@ pub enum Command {
     Replay(replay::ReplayArguments),
     /// Keeps a swarm in formation over ROS 2 or shared memory: poses in, safe targets out
     #[command(
-        after_help = "Example:\n  flockform node square --ros-args -r __ns:=/fleet -p speed_limit:=0.5\n  flockform node square --member robot_3\n  flockform node square --transport shm\n\n\
+        after_help = "Example:\n  flockform node square --ros-args -r __ns:=/fleet -p speed_limit:=0.5\n  flockform node square --member robot_3\n  flockform node square --live --open\n  flockform node square --transport shm\n\n\
                       Exit codes: 0 ended as asked, 2 bad input, 70 the middleware is gone and cannot be started again."
     )]
     Node(node::NodeArguments),
@@ -210,6 +210,10 @@ pub enum Refusal {
         "--node-per-robot: robots are no ROS 2 nodes over shared memory\n  help: leave it out, or leave out --transport shm"
     )]
     NoNodes,
+    #[error(
+        "--live: over shared memory a node serves no page\n  help: leave it out, or leave out --transport shm"
+    )]
+    NoPage,
     #[error(
         "`{then}` is called `{now}` now\n  help: `flockform --help` lists every command, and `--help` after one its options"
     )]

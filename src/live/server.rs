@@ -47,12 +47,24 @@ impl Server {
     /// # Errors
     /// A port that is taken, or a system without random numbers.
     pub fn open(port: Option<u16>) -> io::Result<Self> {
-        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port.unwrap_or(0)))?;
-        let port = listener.local_addr().map(|address: SocketAddr| address.port())?;
         let mut random = [0; 16];
         getrandom::fill(&mut random).map_err(io::Error::other)?;
-        let token = random.iter().map(|byte| format!("{byte:02x}")).collect();
+        Self::reopen(port.unwrap_or(0), random.iter().map(|byte| format!("{byte:02x}")).collect())
+    }
+
+    /// At the port of an earlier server and with its token, so that its pages find this one.
+    ///
+    /// # Errors
+    /// A port that is taken.
+    pub fn reopen(port: u16, token: String) -> io::Result<Self> {
+        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port))?;
+        let port = listener.local_addr().map(|address: SocketAddr| address.port())?;
         Ok(Self { listener, port, token })
+    }
+
+    /// The port and the token, for [`Server::reopen`].
+    pub fn place(&self) -> (u16, String) {
+        (self.port, self.token.clone())
     }
 
     /// The address to open in a browser, with its token.
@@ -160,7 +172,7 @@ impl Shared {
         } else if !is_from_here {
             Some("another page asks\n")
         } else if !is_same(asked.token.as_bytes(), self.token.as_bytes()) {
-            Some("the address lacks its token: open the one that `flockform live` prints\n")
+            Some("the address lacks its token: open the one that flockform prints\n")
         } else {
             None
         }
