@@ -183,3 +183,62 @@ impl Monitor {
         (0..count).filter(|&m| !health(m).is_usable()).map(|m| (m, health(m).name())).collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::bundled::bundled_swarm;
+
+    fn monitor() -> (Monitor, Feed, Control) {
+        let file = bundled_swarm("square").expect("bundled").load_swarm(&[]).expect("readable");
+        let control = Control::new(&file).expect("laid out");
+        let (monitor, feed) = Monitor::new(file, None).expect("laid out");
+        (monitor, feed, control)
+    }
+
+    #[test]
+    fn a_state_is_copied_when_a_viewer_waits_for_one_and_never_otherwise() {
+        let (mut monitor, feed, mut control) = monitor();
+        let mut tick = || {
+            control.tick(control.ticks() as f64 * 0.05);
+            feed.offer(&control);
+        };
+        (0..3).for_each(|_| tick());
+        assert!(!monitor.poll(false) && monitor.states.try_recv().is_err(), "nobody watches");
+        assert!(!monitor.poll(true), "wanted from now on");
+        (0..3).for_each(|_| tick());
+        assert!(monitor.poll(true) && monitor.control.ticks() == 4, "the first after that");
+        (0..3).for_each(|_| tick());
+        assert!(monitor.poll(true) && monitor.control.ticks() == 7);
+        // One that was still wanted when the last viewer left is not shown to the next.
+        tick();
+        assert!(!monitor.poll(false) && !monitor.poll(true));
+    }
+
+    #[test]
+    fn a_loop_does_not_wait_for_a_viewer_that_takes_nothing() {
+        let (mut monitor, feed, control) = monitor();
+        let (done, ends) = sync_channel(1);
+        monitor.poll(true);
+        std::thread::spawn(move || {
+            for _ in 0..100 {
+                feed.is_wanted.store(true, Ordering::Relaxed);
+                feed.offer(&control);
+            }
+            done.send(())
+        });
+        assert!(ends.recv_timeout(Duration::from_secs(60)).is_ok(), "the loop waits");
+        assert!(monitor.poll(true) && !monitor.poll(true), "one state is kept");
+    }
+
+    #[test]
+    fn a_silent_loop_is_reported() {
+        let (mut monitor, feed, control) = monitor();
+        monitor.poll(true);
+        monitor.asked = Instant::now().checked_sub(2 * SILENT_AFTER);
+        assert!(monitor.poll(true) && !monitor.poll(true), "said once");
+        assert!(monitor.alarms().0[0].contains("no state"));
+        feed.offer(&control);
+        assert!(monitor.poll(true) && monitor.alarms().0.is_empty());
+    }
+}
