@@ -2,18 +2,28 @@
 
 use std::fs::OpenOptions;
 use std::io::Write;
-use std::path::PathBuf;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
+use flockform::continuum::plan::Plan;
+use flockform::continuum::run::run;
 use flockform::live::body::Body;
 use flockform::live::server::Server;
 use flockform::live::session::Session;
 use flockform::live::swarm::Swarm;
+use flockform::record::body::BodyMessages;
+use flockform::record::{About, Shared};
+use flockform::scene::Scene;
+use flockform::scene::swarm::Swarm as SwarmFile;
+use flockform::swarm::control::Control;
+use flockform::swarm::flight::{Flight, Sample};
 
 use super::names::{FileName, Kind, SceneArguments, folder_of};
-use super::swarm::SwarmFileArguments;
-use super::{Refusal, interrupt, output, print};
+use super::recording::{self, RecordArguments};
+use super::swarm::{SwarmFileArguments, fly_recorded};
+use super::{Refusal, interrupt, output, print, say};
 
 #[derive(Debug, Args)]
 pub struct LiveArguments {
@@ -25,6 +35,8 @@ pub struct LiveArguments {
     set: Vec<String>,
     #[command(flatten)]
     page: PageArguments,
+    #[command(flatten)]
+    record: RecordArguments,
     /// Folder for what is saved [default: that of the file, or the working folder for a bundled one]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -45,12 +57,41 @@ pub struct PageArguments {
 pub fn live(arguments: &LiveArguments) -> Result<ExitCode, Refusal> {
     let session = arguments.session()?;
     let folder = arguments.saved_in()?;
+    let (about, from) = (arguments.about(&session), folder_of(&arguments.file));
     let server = arguments.page.server()?;
+    let recording = arguments.record.open(&about, false, 1)?;
     let door = arguments.page.announce(&server);
     let stop = interrupt::serves();
     let served = server.serve(session, folder, stop).map_err(|source| arguments.page.refuse(source));
     close(door);
-    served.map(|()| ExitCode::SUCCESS)
+    let session = served?;
+    if let Some(recording) = recording {
+        let recorded = record(&session, &recording, from.as_deref());
+        say(&recording::close(Some(recording))?);
+        recorded?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Records what was done: the messages of a run of the file that replays it. What was undone is not in it.
+fn record(session: &Session, recording: &Shared, folder: Option<&Path>) -> Result<(), Refusal> {
+    let text = session.saved().map_err(Refusal::LiveRecord)?;
+    let (name, _) = session.title();
+    if let Session::Body(_) = session {
+        let scene = Scene::parse(name, "the session", &text, &[], folder)?;
+        let mut messages = BodyMessages::new(&scene, recording.sink())?;
+        let outcome = run(Plan::new(&scene)?, &mut |engine, residual| {
+            messages.step(engine, residual);
+            ControlFlow::Continue(())
+        });
+        messages.finish(&outcome.engine, outcome.residual);
+    } else {
+        let swarm = SwarmFile::parse(name, "the session", &text, &[], folder)?;
+        recording.attach_swarm(&text);
+        let mut watch = |_: &Flight, _: &Sample| ControlFlow::Continue(());
+        fly_recorded(&swarm, &Control::new(&swarm)?, Some(recording), &mut watch)?;
+    }
+    Ok(())
 }
 
 impl PageArguments {
@@ -91,6 +132,12 @@ impl LiveArguments {
                 Session::Swarm(Box::new(Swarm::new(swarm, folder)?))
             }
         })
+    }
+
+    /// The description of the session for a recording; its swarm file is known at the end.
+    fn about(&self, session: &Session) -> About {
+        let folder = folder_of(&self.file).and_then(|folder| std::path::absolute(folder.join(".")).ok());
+        About { source: "live", name: session.title().0.to_owned(), folder, ..About::default() }
     }
 
     fn saved_in(&self) -> Result<PathBuf, Refusal> {

@@ -256,6 +256,8 @@ pub enum Refusal {
         .port.map_or_else(String::new, |port| format!(" at port {port}"))
     )]
     Live { port: Option<u16>, source: std::io::Error },
+    #[error("--record: nothing is recorded: {0}")]
+    LiveRecord(String),
     #[error("{} is no folder to save in\n  help: make it, or give another as --out", .0.display())]
     LiveFolder(PathBuf),
     #[error("{0}")]
@@ -292,6 +294,7 @@ impl Refusal {
             Refusal::Export(ExportError::Io { source, .. })
             | Refusal::Film(FilmError::Io { source, .. })
             | Refusal::Record(RecordError::Io { source, .. }) => is_full(source),
+            Refusal::LiveRecord(_) => true,
             Refusal::Export(ExportError::NotMoved { .. }) | Refusal::Record(RecordError::Kept { .. }) => true,
             Refusal::Record(RecordError::Write { .. }) => true,
             Refusal::Film(FilmError::Encoder { .. } | FilmError::Frame { .. }) => true,

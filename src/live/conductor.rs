@@ -108,8 +108,8 @@ impl Conductor {
         }
     }
 
-    /// Goes on until `stop` is raised or no viewer can ask for anything any more.
-    pub fn run(mut self, requests: &Receiver<Request>, stop: &AtomicBool) {
+    /// Goes on until `stop` is raised or no viewer can ask for anything any more, and returns the session.
+    pub fn run(mut self, requests: &Receiver<Request>, stop: &AtomicBool) -> Session {
         let _closed = Closed(Arc::clone(&self.board));
         let mut shown = Instant::now();
         let mut before = Instant::now();
@@ -139,6 +139,7 @@ impl Conductor {
                 (shown, is_news) = (Instant::now(), false);
             }
         }
+        self.session
     }
 
     /// Takes the steps that are due after so many seconds; whether there were any.

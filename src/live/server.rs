@@ -72,11 +72,11 @@ impl Server {
         format!("http://127.0.0.1:{}/?token={}", self.port, self.token)
     }
 
-    /// Serves a session until `stop` is raised; what viewers save is written in `folder`.
+    /// Serves a session until `stop` is raised, and returns it; what viewers save is written in `folder`.
     ///
     /// # Errors
-    /// A listener that is gone, or no threads.
-    pub fn serve(self, session: Session, folder: PathBuf, stop: &AtomicBool) -> io::Result<()> {
+    /// A listener that is gone, no threads, or a session that has panicked.
+    pub fn serve(self, session: Session, folder: PathBuf, stop: &AtomicBool) -> io::Result<Session> {
         self.listener.set_nonblocking(true)?;
         let board = Arc::new(Board::default());
         let (requests, asked) = sync_channel(MOST_REQUESTS);
@@ -93,14 +93,14 @@ impl Server {
         });
         std::thread::scope(|scope| {
             let run = move || conductor.run(&asked, stop);
-            std::thread::Builder::new().name("live session".into()).spawn_scoped(scope, run)?;
+            let run = std::thread::Builder::new().name("live session".into()).spawn_scoped(scope, run)?;
             while !stop.load(Ordering::Relaxed) && !shared.board.is_closed() {
                 match self.listener.accept() {
                     Ok((stream, _)) => admit(stream, &shared),
                     Err(_) => std::thread::sleep(LOOK),
                 }
             }
-            Ok(())
+            run.join().map_err(|_| io::Error::other("the session has panicked"))
         })
     }
 }

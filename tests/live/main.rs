@@ -12,6 +12,10 @@ mod folders;
 #[cfg(feature = "cli")]
 mod node;
 #[cfg(feature = "cli")]
+mod pages;
+#[cfg(feature = "cli")]
+mod recorded;
+#[cfg(feature = "cli")]
 #[path = "../common/running.rs"]
 mod running;
 mod served;

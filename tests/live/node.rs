@@ -2,16 +2,13 @@
 
 use std::io::Write;
 use std::net::TcpStream;
-use std::path::Path;
-use std::process::{Command, Stdio};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use serde_json::{Value, json};
-use tungstenite::client::ClientRequestBuilder;
-use tungstenite::{Message, WebSocket};
+use serde_json::json;
 
 use super::folders::temporary;
+use super::pages::{Viewer, address, start};
 use super::running::Running;
 use super::signals::signal;
 use super::strangers::{PATIENCE, answer, let_in, masked, socket_request, soon};
@@ -26,7 +23,7 @@ struct Flown {
     _robots: Running,
     host: String,
     token: String,
-    _folder: tempfile::TempDir,
+    _folders: [tempfile::TempDir; 2],
     _turn: MutexGuard<'static, ()>,
 }
 
@@ -34,14 +31,11 @@ impl Flown {
     fn begin(more: &[&str]) -> Self {
         let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
         let folder = temporary();
-        let printed = folder.path().join("address");
-        let _robots = start(&["robots", "square"], Stdio::null());
-        let out = std::fs::File::create(&printed).expect("a file");
-        let node = start(&[&["node", "square", "--live"], more].concat(), out.into());
-        let address = within(PATIENCE, "an address", || line(&printed));
-        let rest = address.strip_prefix("http://").expect("an address");
-        let (host, token) = rest.split_once("/?token=").expect("with a token");
-        Self { node, _robots, host: host.into(), token: token.into(), _folder: folder, _turn: turn }
+        let elsewhere = temporary();
+        let _robots = start(&["robots", "square"], elsewhere.path());
+        let node = start(&[&["node", "square", "--live"], more].concat(), folder.path());
+        let (host, token) = address(folder.path());
+        Self { node, _robots, host, token, _folders: [folder, elsewhere], _turn: turn }
     }
 
     fn port(&self) -> u16 {
@@ -59,82 +53,7 @@ impl Flown {
     }
 
     fn try_viewer(&self) -> Option<Viewer> {
-        let stream = TcpStream::connect(&self.host).ok()?;
-        stream.set_read_timeout(Some(PATIENCE)).ok()?;
-        let uri = format!("ws://{}/socket?token={}", self.host, self.token).parse().expect("an address");
-        let request = ClientRequestBuilder::new(uri).with_header("Origin", format!("http://{}", self.host));
-        let (socket, _) = tungstenite::client(request, stream).ok()?;
-        Some(Viewer { socket, frame: Vec::new() })
-    }
-}
-
-fn start(arguments: &[&str], out: Stdio) -> Running {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_flockform"));
-    command.args(arguments).env("ROS_DOMAIN_ID", (101 + std::process::id() % 101).to_string());
-    command.env("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST").env_remove("RUST_LOG");
-    command.stdin(Stdio::null()).stdout(out).stderr(Stdio::null());
-    Running(command.spawn().expect("the program starts"))
-}
-
-/// The first line of a file, once it is whole.
-fn line(path: &Path) -> Option<String> {
-    let text = std::fs::read_to_string(path).ok()?;
-    text.split_once('\n').map(|(line, _)| line.to_owned())
-}
-
-/// A page without a browser.
-struct Viewer {
-    socket: WebSocket<TcpStream>,
-    /// The last frame.
-    frame: Vec<u8>,
-}
-
-impl Viewer {
-    fn ask(&mut self, command: &Value) {
-        self.socket.send(Message::text(command.to_string())).expect("sent");
-    }
-
-    /// The first event that `holds`; frames before it are drawn.
-    fn until(&mut self, what: &str, mut holds: impl FnMut(&Value, &[u8]) -> bool) -> Value {
-        let since = Instant::now();
-        while since.elapsed() < PATIENCE {
-            match self.socket.read().unwrap_or_else(|error| panic!("{what}: {error}")) {
-                Message::Text(text) => {
-                    let event: Value = serde_json::from_str(&text).expect("JSON");
-                    if holds(&event, &self.frame) {
-                        return event;
-                    }
-                }
-                Message::Binary(bytes) if bytes[0] == 1 => {
-                    self.frame = bytes.to_vec();
-                    self.ask(&json!({ "do": "drawn", "ms": 1.0 }));
-                }
-                _ => {}
-            }
-        }
-        panic!("{what}: not within {PATIENCE:?}");
-    }
-
-    fn status(&mut self, what: &str, mut holds: impl FnMut(&Value) -> bool) -> Value {
-        self.until(what, |event, _| event["event"] == "status" && holds(event))
-    }
-
-    /// What came of a command: whether it was done, and the words.
-    fn done(&mut self, command: Value) -> (bool, String) {
-        self.ask(&command);
-        let answer =
-            self.until("an answer", |event, _| event["event"] == "done" || event["event"] == "refused");
-        (answer["event"] == "done", answer["words"].as_str().expect("words").to_owned())
-    }
-
-    fn mode(&mut self, mode: &str) {
-        self.status(mode, |status| status["node"]["mode"].as_str().is_some_and(|now| now.starts_with(mode)));
-    }
-
-    fn until_all_poses_are_received(&mut self) -> Value {
-        self.status("every pose is received", |status| {
-            status["faults"] == json!([]) && status["clock"] != 0.0
-        })
+        Viewer::enter(&self.host, &self.token)
     }
 }
 
