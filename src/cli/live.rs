@@ -134,10 +134,11 @@ impl LiveArguments {
         })
     }
 
-    /// The description of the session for a recording; its swarm file is known at the end.
+    /// The description of the session for a recording, as of the command that replays it; its swarm file is known at
+    /// the end.
     fn about(&self, session: &Session) -> About {
         let folder = folder_of(&self.file).and_then(|folder| std::path::absolute(folder.join(".")).ok());
-        About { source: "live", name: session.title().0.to_owned(), folder, ..About::default() }
+        About { source: session.runner(), name: session.title().0.to_owned(), folder, ..About::default() }
     }
 
     fn saved_in(&self) -> Result<PathBuf, Refusal> {

@@ -174,8 +174,9 @@ fn commands_of_the_program_around_a_node_are_those_of_peers() {
             assert!(may || answer.is_err_and(|words| words.contains(allowed)));
         }
         // A second transition in one period, and answers that nobody takes.
-        ["activate", "deactivate", "activate"]
-            .map(|label| send.send((8, NodeCommand::ChangeState(label))).expect("room"));
+        for label in ["activate", "deactivate", "activate"] {
+            send.send((8, NodeCommand::ChangeState(label))).expect("room");
+        }
         swarm.tick();
         let second = answered.try_iter().nth(1).expect("two have room").1;
         assert!(second.is_err_and(|words| words.contains("another transition") || words.contains(allowed)));
