@@ -204,7 +204,7 @@ mod tests {
             feed.offer(&control);
         };
         (0..3).for_each(|_| tick());
-        assert!(!monitor.poll(false) && monitor.states.try_recv().is_err(), "nobody watches");
+        assert!(!monitor.poll(false) && monitor.states.try_recv().is_err(), "without a viewer");
         assert!(!monitor.poll(true), "wanted from now on");
         (0..3).for_each(|_| tick());
         assert!(monitor.poll(true) && monitor.control.ticks() == 4, "the first after that");

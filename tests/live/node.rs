@@ -18,7 +18,7 @@ use super::waits::within;
 static TURN: Mutex<()> = Mutex::new(());
 
 /// A node with a page, and its simulated robots.
-struct Flown {
+pub struct Flown {
     node: Running,
     _robots: Running,
     host: String,
@@ -28,7 +28,7 @@ struct Flown {
 }
 
 impl Flown {
-    fn begin(more: &[&str]) -> Self {
+    pub fn begin(more: &[&str]) -> Self {
         let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
         let folder = temporary();
         let elsewhere = temporary();
@@ -36,6 +36,10 @@ impl Flown {
         let node = start(&[&["node", "square", "--live"], more].concat(), folder.path());
         let (host, token) = address(folder.path());
         Self { node, _robots, host, token, _folders: [folder, elsewhere], _turn: turn }
+    }
+
+    pub fn address(&self) -> String {
+        format!("http://{}/?token={}", self.host, self.token)
     }
 
     fn port(&self) -> u16 {
