@@ -196,39 +196,48 @@ mod tests {
         (monitor, feed, control)
     }
 
+    /// A loop that waits for a viewer would wait for ever.
+    fn within_a_minute(work: impl FnOnce() + Send + 'static) {
+        let (done, ended) = sync_channel(1);
+        std::thread::spawn(move || {
+            work();
+            done.send(())
+        });
+        assert!(ended.recv_timeout(Duration::from_secs(60)).is_ok(), "it failed, or does not end");
+    }
+
     #[test]
     fn a_state_is_copied_when_a_viewer_waits_for_one_and_never_otherwise() {
-        let (mut monitor, feed, mut control) = monitor();
-        let mut tick = || {
-            control.tick(control.ticks() as f64 * 0.05);
-            feed.offer(&control);
-        };
-        (0..3).for_each(|_| tick());
-        assert!(!monitor.poll(false) && monitor.states.try_recv().is_err(), "without a viewer");
-        assert!(!monitor.poll(true), "wanted from now on");
-        (0..3).for_each(|_| tick());
-        assert!(monitor.poll(true) && monitor.control.ticks() == 4, "the first after that");
-        (0..3).for_each(|_| tick());
-        assert!(monitor.poll(true) && monitor.control.ticks() == 7);
-        // One that was still wanted when the last viewer left is not shown to the next.
-        tick();
-        assert!(!monitor.poll(false) && !monitor.poll(true));
+        within_a_minute(|| {
+            let (mut monitor, feed, mut control) = monitor();
+            let mut tick = || {
+                control.tick(control.ticks() as f64 * 0.05);
+                feed.offer(&control);
+            };
+            (0..3).for_each(|_| tick());
+            assert!(!monitor.poll(false) && monitor.states.try_recv().is_err(), "without a viewer");
+            assert!(!monitor.poll(true), "wanted from now on");
+            (0..3).for_each(|_| tick());
+            assert!(monitor.poll(true) && monitor.control.ticks() == 4, "the first after that");
+            (0..3).for_each(|_| tick());
+            assert!(monitor.poll(true) && monitor.control.ticks() == 7);
+            // One that was still wanted when the last viewer left is not shown to the next.
+            tick();
+            assert!(!monitor.poll(false) && !monitor.poll(true));
+        });
     }
 
     #[test]
     fn a_loop_does_not_wait_for_a_viewer_that_takes_nothing() {
-        let (mut monitor, feed, control) = monitor();
-        let (done, ends) = sync_channel(1);
-        monitor.poll(true);
-        std::thread::spawn(move || {
+        within_a_minute(|| {
+            let (mut monitor, feed, control) = monitor();
+            monitor.poll(true);
             for _ in 0..100 {
                 feed.is_wanted.store(true, Ordering::Relaxed);
                 feed.offer(&control);
             }
-            done.send(())
+            assert!(monitor.poll(true) && !monitor.poll(true), "one state is kept");
         });
-        assert!(ends.recv_timeout(Duration::from_secs(60)).is_ok(), "the loop waits");
-        assert!(monitor.poll(true) && !monitor.poll(true), "one state is kept");
     }
 
     #[test]
