@@ -229,7 +229,12 @@ async function command(page) {
   await page.waitForFunction(() => window.report.live.session.status.alarms.length > 0);
   await shoot(page, `${asked.name}-moves`);
   seen.alarms = await page.$$eval("#live-alarms li", (items) => items.map((item) => item.textContent));
-  await page.waitForFunction((k) => window.report.bodies[0].dx[k] > 0.3 && window.report.bodies[0].dy[k] > 0.15, asked.node);
+  // The program that led them before would go on for longer.
+  await later(page, (await clock(page)) + 4);
+  const posture = () => page.evaluate(() => JSON.stringify({ ...window.report.live.session.status.node }));
+  const before = await posture();
+  await later(page, (await clock(page)) + 0.5);
+  seen.isThere = (await posture()) === before;
 }
 
 async function everything(page, other) {
