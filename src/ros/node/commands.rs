@@ -16,14 +16,17 @@ pub enum NodeCommand {
     Resume,
     /// `~/set_formation`.
     SetFormation(SetFormationRequest),
-    /// `~/change_state`, by the label of the transition; at most one is made in a period.
+    /// `~/change_state`, by the label of the transition; one is made in a period, after that of a peer.
     ChangeState(&'static str),
 }
 
 /// What came of a command: what was done, or the reason why not.
 pub type Answer = Result<String, String>;
 
-/// Commands of the program around the node. Its sender has a bound: all that wait are taken in a period.
+/// Commands of the program around the node that are taken in a period at most.
+pub(super) const MOST_AT_ONCE: usize = 8;
+
+/// Commands of the program around the node.
 pub struct CommandQueue {
     /// With a number that the answer bears again.
     pub commands: Receiver<(u64, NodeCommand)>,

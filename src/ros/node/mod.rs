@@ -48,7 +48,7 @@ use crate::swarm::pace::{Pace, system_time};
 use crate::swarm::transport::complaints::Complaints;
 use crate::swarm::transport::{ControllerEnd, listen, targets};
 pub use commands::{Answer, CommandQueue, NodeCommand};
-use commands::{Commanded, not_allowed};
+use commands::{Commanded, MOST_AT_ONCE, not_allowed};
 use endpoints::Endpoints;
 pub use error::NodeError;
 pub use kept::KeptNode;
@@ -348,7 +348,7 @@ impl FormationNode {
             allowed.may_do_all() || (allowed.may_stop() && ["deactivate", "shutdown"].contains(&edge.label))
         };
         let own: Vec<(u64, NodeCommand)> =
-            self.queue.iter().flat_map(|queue| queue.commands.try_iter()).collect();
+            self.queue.iter().flat_map(|queue| queue.commands.try_iter().take(MOST_AT_ONCE)).collect();
         let own_transition = own.iter().find_map(|(_, command)| match command {
             NodeCommand::ChangeState(label) => Some(*label),
             _ => None,
@@ -359,13 +359,10 @@ impl FormationNode {
             Some(pulse) => pulse.untimed(|| transitions.act(goal)),
             None => transitions.act(goal),
         };
-        let changed = match own_transition {
-            Some(label) => lifecycle.change(0, label, now, &may_switch, &mut act),
-            None => {
-                lifecycle.poll(now, &may_switch, &mut act);
-                false
-            }
-        };
+        lifecycle.poll(now, &may_switch, &mut act);
+        // After those of peers, which it cannot keep out.
+        let changed =
+            own_transition.is_some_and(|label| lifecycle.change(0, label, now, &may_switch, &mut act));
         self.record_beginning(now);
         if self.lifecycle.is_active() != self.was_active {
             self.was_active = self.lifecycle.is_active();
