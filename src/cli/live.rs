@@ -2,54 +2,121 @@
 
 use std::fs::OpenOptions;
 use std::io::Write;
-use std::path::PathBuf;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
+use flockform::continuum::plan::Plan;
+use flockform::continuum::run::run;
 use flockform::live::body::Body;
 use flockform::live::server::Server;
 use flockform::live::session::Session;
 use flockform::live::swarm::Swarm;
+use flockform::record::body::BodyMessages;
+use flockform::record::{About, Shared};
+use flockform::scene::Scene;
+use flockform::scene::swarm::Swarm as SwarmFile;
+use flockform::swarm::control::Control;
+use flockform::swarm::flight::{Flight, Sample};
 
 use super::names::{FileName, Kind, SceneArguments, folder_of};
-use super::swarm::SwarmFileArguments;
-use super::{Refusal, interrupt, output, print};
+use super::recording::{self, RecordArguments};
+use super::swarm::{SwarmFileArguments, fly_recorded};
+use super::{Refusal, interrupt, output, print, say};
 
 #[derive(Debug, Args)]
 pub struct LiveArguments {
     /// Name of a bundled scene or swarm, or path of a file
-    #[arg(value_parser = FileName::ANY, hide_possible_values = true)]
+    #[arg(value_parser = FileName::ANY, hide_possible_values = true, group = "page")]
     file: String,
     /// Override a key, validated like the file: `lattice.spacing=0.5`
     #[arg(long = "set", value_name = "KEY.PATH=VALUE")]
     set: Vec<String>,
-    /// Port on this computer, from 1024: those below are the system's [default: a free one]
-    #[arg(long, value_name = "PORT", value_parser = clap::value_parser!(u16).range(1024..))]
-    port: Option<u16>,
-    /// Open the page, with the program that this computer opens such files with
-    #[arg(long)]
-    open: bool,
+    #[command(flatten)]
+    page: PageArguments,
+    #[command(flatten)]
+    record: RecordArguments,
     /// Folder for what is saved [default: that of the file, or the working folder for a bundled one]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+}
+
+/// The page in a browser; the argument that asks for one is in the group `page`.
+#[derive(Debug, Args)]
+pub struct PageArguments {
+    /// Port on this computer, from 1024: those below are the system's [default: a free one]
+    #[arg(long, value_name = "PORT", value_parser = clap::value_parser!(u16).range(1024..), requires = "page")]
+    port: Option<u16>,
+    /// Open the page, with the program that this computer opens such files with
+    #[arg(long, requires = "page")]
+    open: bool,
 }
 
 /// Serves a session until it is interrupted.
 pub fn live(arguments: &LiveArguments) -> Result<ExitCode, Refusal> {
     let session = arguments.session()?;
     let folder = arguments.saved_in()?;
-    let refuse = |source| Refusal::Live { port: arguments.port, source };
-    let server = Server::open(arguments.port).map_err(refuse)?;
-    let address = server.address();
-    print(&format!("{address}\n"));
-    eprintln!("open this address in a browser on this computer; it ends with an interrupt (Ctrl-C)");
-    let door = arguments.open.then(|| open(&address)).flatten();
+    let (about, from) = (arguments.about(&session), folder_of(&arguments.file));
+    let server = arguments.page.server()?;
+    let recording = arguments.record.open(&about, false, 1)?;
+    let door = arguments.page.announce(&server);
     let stop = interrupt::serves();
-    let served = server.serve(session, folder, stop).map_err(refuse);
+    let served = server.serve(session, folder, stop).map_err(|source| arguments.page.refuse(source));
+    close(door);
+    let session = served?;
+    if let Some(recording) = recording {
+        let recorded = record(&session, &recording, from.as_deref());
+        say(&recording::close(Some(recording))?);
+        recorded?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Records what was done: the messages of a run of the file that replays it. What was undone is not in it.
+fn record(session: &Session, recording: &Shared, folder: Option<&Path>) -> Result<(), Refusal> {
+    let text = session.saved().map_err(Refusal::LiveRecord)?;
+    let (name, _) = session.title();
+    if let Session::Body(_) = session {
+        let scene = Scene::parse(name, "the session", &text, &[], folder)?;
+        let mut messages = BodyMessages::new(&scene, recording.sink())?;
+        let outcome = run(Plan::new(&scene)?, &mut |engine, residual| {
+            messages.step(engine, residual);
+            ControlFlow::Continue(())
+        });
+        messages.finish(&outcome.engine, outcome.residual);
+    } else {
+        let swarm = SwarmFile::parse(name, "the session", &text, &[], folder)?;
+        recording.attach_swarm(&text);
+        let mut watch = |_: &Flight, _: &Sample| ControlFlow::Continue(());
+        fly_recorded(&swarm, &Control::new(&swarm)?, Some(recording), &mut watch)?;
+    }
+    Ok(())
+}
+
+impl PageArguments {
+    pub fn server(&self) -> Result<Server, Refusal> {
+        Server::open(self.port).map_err(|source| self.refuse(source))
+    }
+
+    fn refuse(&self, source: std::io::Error) -> Refusal {
+        Refusal::Live { port: self.port, source }
+    }
+
+    /// Prints the address, and opens it if that is asked for: for [`close`].
+    pub fn announce(&self, server: &Server) -> Option<PathBuf> {
+        let address = server.address();
+        print(&format!("{address}\n"));
+        eprintln!("open this address in a browser on this computer; it ends with an interrupt (Ctrl-C)");
+        self.open.then(|| open(&address)).flatten()
+    }
+}
+
+/// Removes the file by which the page was opened.
+pub fn close(door: Option<PathBuf>) {
     if let Some(door) = door {
         let _ = std::fs::remove_file(door);
     }
-    served.map(|()| ExitCode::SUCCESS)
 }
 
 impl LiveArguments {
@@ -65,6 +132,13 @@ impl LiveArguments {
                 Session::Swarm(Box::new(Swarm::new(swarm, folder)?))
             }
         })
+    }
+
+    /// The description of the session for a recording, as of the command that replays it; its swarm file is known at
+    /// the end.
+    fn about(&self, session: &Session) -> About {
+        let folder = folder_of(&self.file).and_then(|folder| std::path::absolute(folder.join(".")).ok());
+        About { source: session.runner(), name: session.title().0.to_owned(), folder, ..About::default() }
     }
 
     fn saved_in(&self) -> Result<PathBuf, Refusal> {

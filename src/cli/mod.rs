@@ -118,7 +118,7 @@ pub enum Command {
     Replay(replay::ReplayArguments),
     /// Keeps a swarm in formation over ROS 2 or shared memory: poses in, safe targets out
     #[command(
-        after_help = "Example:\n  flockform node square --ros-args -r __ns:=/fleet -p speed_limit:=0.5\n  flockform node square --member robot_3\n  flockform node square --transport shm\n\n\
+        after_help = "Example:\n  flockform node square --ros-args -r __ns:=/fleet -p speed_limit:=0.5\n  flockform node square --member robot_3\n  flockform node square --live --open\n  flockform node square --transport shm\n\n\
                       Exit codes: 0 ended as asked, 2 bad input, 70 the middleware is gone and cannot be started again."
     )]
     Node(node::NodeArguments),
@@ -211,6 +211,10 @@ pub enum Refusal {
     )]
     NoNodes,
     #[error(
+        "--live: over shared memory a node serves no page\n  help: leave it out, or leave out --transport shm"
+    )]
+    NoPage,
+    #[error(
         "`{then}` is called `{now}` now\n  help: `flockform --help` lists every command, and `--help` after one its options"
     )]
     Renamed { then: &'static str, now: &'static str },
@@ -252,6 +256,8 @@ pub enum Refusal {
         .port.map_or_else(String::new, |port| format!(" at port {port}"))
     )]
     Live { port: Option<u16>, source: std::io::Error },
+    #[error("--record: nothing is recorded: {0}")]
+    LiveRecord(String),
     #[error("{} is no folder to save in\n  help: make it, or give another as --out", .0.display())]
     LiveFolder(PathBuf),
     #[error("{0}")]
@@ -288,6 +294,7 @@ impl Refusal {
             Refusal::Export(ExportError::Io { source, .. })
             | Refusal::Film(FilmError::Io { source, .. })
             | Refusal::Record(RecordError::Io { source, .. }) => is_full(source),
+            Refusal::LiveRecord(_) => true,
             Refusal::Export(ExportError::NotMoved { .. }) | Refusal::Record(RecordError::Kept { .. }) => true,
             Refusal::Record(RecordError::Write { .. }) => true,
             Refusal::Film(FilmError::Encoder { .. } | FilmError::Frame { .. }) => true,

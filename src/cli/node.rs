@@ -1,22 +1,34 @@
 //! `flockform node` and `flockform robots`: a swarm over ROS 2, or over shared memory.
 
+use std::path::PathBuf;
 use std::process::ExitCode;
+use std::sync::mpsc::sync_channel;
 
 use clap::{Args, ValueEnum};
+use flockform::live::command::Command;
+use flockform::live::monitor::{CommandLink, Feed, Monitor};
+use flockform::live::server::Server;
+use flockform::live::session::Session;
+use flockform::messages::flockform_msgs::SetFormationRequest;
 use flockform::record::About;
 use flockform::ros::arguments::RosArguments;
 use flockform::ros::edge::pulse::MIDDLEWARE_GONE;
-use flockform::ros::node::{FormationNode, NodeError};
+use flockform::ros::node::{CommandQueue, FormationNode, KeptNode, NodeCommand, NodeError};
 use flockform::ros::robots::{Layout, RobotNodes};
 use flockform::scene::swarm::Swarm;
 use flockform::shm::{self, Domain, SimulatedRobots};
 use flockform::swarm::control::Control;
+use serde::{Deserialize, Serialize};
 
+use super::live::{self, PageArguments};
 use super::recording::{RecordArguments, close};
 use super::supervise::{Life, supervise};
 use super::swarm::SwarmFileArguments;
 use super::{Refusal, say};
 use super::{interrupt, log};
+
+/// Commands of the page that wait for the loop, which takes all of them in a period.
+const MOST_COMMANDS: usize = 4;
 
 /// Middleware between the node and the robots.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
@@ -38,6 +50,14 @@ pub struct NodeArguments {
     /// Run as the node of this robot: receive only its pose and its neighbours', and send only its target
     #[arg(long, value_name = "NAME")]
     pub member: Option<String>,
+    /// Show the swarm in a browser on this computer while it flies; nothing can be changed from there
+    #[arg(long, group = "page")]
+    live: bool,
+    /// Let the page send commands as ROS 2 peers can, within `node.commands` of the swarm file: stop, resume, move
+    #[arg(long, requires = "live")]
+    allow_commands: bool,
+    #[command(flatten)]
+    page: PageArguments,
     #[command(flatten)]
     record: RecordArguments,
 }
@@ -78,6 +98,11 @@ pub fn node(arguments: &NodeArguments, ros: &RosArguments) -> Result<ExitCode, R
     let name = arguments.member.as_deref();
     match life {
         Some(mut life) => {
+            let left: Option<Left> = life.left();
+            let page = arguments
+                .live
+                .then(|| LivePage::open(arguments, life.number(), left.as_ref()))
+                .transpose()?;
             let mut node = FormationNode::open(&swarm, ros, name)?;
             let (member, namespace) = (arguments.member.clone(), Some(node.fleet().to_owned()));
             let mut about = About { member, namespace, ..arguments.swarm.about("node", &swarm) };
@@ -93,23 +118,133 @@ pub fn node(arguments: &NodeArguments, ros: &RosArguments) -> Result<ExitCode, R
                 node.publish_log(lines).map_err(NodeError::from)?;
             }
             announce(&swarm, node.control());
-            if let Some(left) = life.left() {
-                node.restore(left);
+            if let Some(left) = left {
+                node.restore(left.node);
             }
             tracing::info!("{}", node.reached_at());
+            let page = page
+                .flatten()
+                .map(|page| page.serve(&swarm, &mut node, arguments.allow_commands))
+                .transpose()?;
             node.watch_middleware().map_err(NodeError::from)?;
-            let well = node.run_while(interrupt::serves(), &mut |node| life.tell(|| node.kept()));
+            let well = node.run_while(interrupt::serves(), &mut |node| {
+                page.iter().for_each(|page| page.feed.offer(node.control()));
+                life.send(|| Left { node: node.kept(), page: page.as_ref().map(|page| page.place.clone()) })
+            });
+            live::close(page.and_then(|page| page.door));
             say(&close(recording)?);
             return Ok(ended(well));
         }
         None => {
             arguments.record.require_none("--transport shm")?;
+            if arguments.live {
+                return Err(Refusal::NoPage);
+            }
             let mut node = shm::FormationNode::open(&swarm, &Domain::from_environment()?, name)?;
             announce(&swarm, node.control());
             node.run(interrupt::serves())?;
         }
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// What a node's process leaves to the next.
+#[derive(Deserialize, Serialize)]
+struct Left {
+    node: KeptNode,
+    /// Port and token of the page.
+    page: Option<(u16, String)>,
+}
+
+/// A page that shows the flying swarm, in the process of the control loop. The next process serves the same address.
+struct LivePage {
+    server: Server,
+    door: Option<PathBuf>,
+}
+
+/// The loop's end of a page that is served.
+struct ServedPage {
+    feed: Feed,
+    place: (u16, String),
+    door: Option<PathBuf>,
+}
+
+impl LivePage {
+    /// The page of the process before this one goes on; a page that cannot be served ends no flight, but refuses to
+    /// begin one.
+    fn open(arguments: &NodeArguments, life: u32, left: Option<&Left>) -> Result<Option<Self>, Refusal> {
+        let again = left.and_then(|left| left.page.clone());
+        let server = match again.clone() {
+            Some((port, token)) => {
+                Server::reopen(port, token).map_err(|source| Refusal::Live { port: Some(port), source })
+            }
+            None => arguments.page.server(),
+        };
+        match server {
+            Ok(server) => {
+                let door = if again.is_none() { arguments.page.announce(&server) } else { None };
+                Ok(Some(Self { server, door }))
+            }
+            Err(refusal) if life == 1 => Err(refusal),
+            Err(refusal) => {
+                tracing::warn!("the swarm flies on without its page: {refusal}");
+                Ok(None)
+            }
+        }
+    }
+
+    /// Serves the page in threads of its own, which the loop does not wait for.
+    fn serve(
+        self,
+        swarm: &Swarm,
+        node: &mut FormationNode,
+        allow_commands: bool,
+    ) -> Result<ServedPage, Refusal> {
+        let Self { server, door } = self;
+        let link = allow_commands.then(|| {
+            let (send, commands) = sync_channel(MOST_COMMANDS);
+            let (answers, answered) = sync_channel(MOST_COMMANDS);
+            node.take_commands(CommandQueue { commands, answers });
+            let send = move |viewer, command: &Command| {
+                let command = node_command(command).ok_or("a node takes no such command")?;
+                send.try_send((viewer, command))
+                    .map_err(|_| "the node has not done the last commands yet: try again".into())
+            };
+            CommandLink { send: Box::new(send), answers: answered }
+        });
+        let (monitor, feed) = Monitor::new(swarm.clone(), link)?;
+        let (session, place) = (Session::Monitor(Box::new(monitor)), server.place());
+        let serve = move || {
+            if let Err(error) = server.serve(session, PathBuf::new(), interrupt::serves()) {
+                tracing::warn!("the page is no longer served: {error}");
+            }
+        };
+        if let Err(error) = std::thread::Builder::new().name("live page".into()).spawn(serve) {
+            tracing::warn!("the swarm flies without its page: {error}");
+        }
+        Ok(ServedPage { feed, place, door })
+    }
+}
+
+/// The node's own command for one of the page.
+fn node_command(command: &Command) -> Option<NodeCommand> {
+    Some(match command.clone() {
+        Command::EmergencyStop {} => NodeCommand::EmergencyStop,
+        Command::Resume {} => NodeCommand::Resume,
+        Command::Activate {} => NodeCommand::ChangeState("activate"),
+        Command::Deactivate {} => NodeCommand::ChangeState("deactivate"),
+        Command::SetFormation { name, translate, rotate, stretch, shear, duration } => {
+            NodeCommand::SetFormation(SetFormationRequest {
+                name,
+                translate,
+                rotate,
+                stretch,
+                shear,
+                duration,
+            })
+        }
+        _ => return None,
+    })
 }
 
 fn announce(swarm: &Swarm, control: &Control) {
@@ -139,7 +274,7 @@ pub fn robots(arguments: &RobotsArguments, ros: &RosArguments) -> Result<ExitCod
             }
             robots.watch_middleware().map_err(NodeError::from)?;
             return Ok(ended(
-                robots.run_while(interrupt::serves(), &mut |robots| life.tell(|| robots.kept())),
+                robots.run_while(interrupt::serves(), &mut |robots| life.send(|| robots.kept())),
             ));
         }
         None if arguments.node_per_robot => return Err(Refusal::NoNodes),

@@ -193,7 +193,7 @@ impl Life {
     }
 
     /// Sends the state if it is due. Returns false if the socket is closed: the process should end.
-    pub fn tell<T: Serialize>(&mut self, state: impl FnOnce() -> T) -> bool {
+    pub fn send<T: Serialize>(&mut self, state: impl FnOnce() -> T) -> bool {
         if self.sent.is_some_and(|sent| sent.elapsed() < SEND_PERIOD) {
             return true;
         }

@@ -11,11 +11,12 @@ use clap::Args;
 use flockform::export::film::{self, FilmColour};
 use flockform::export::flight::write_flight;
 use flockform::export::report::{self, FlightRecorder};
-use flockform::record::About;
 use flockform::record::flight::FlightMessages;
+use flockform::record::{About, Shared};
 use flockform::scene::bundled::bundled_swarm;
 use flockform::scene::swarm::Swarm;
-use flockform::swarm::flight::{Flight, FlightReport, fly_heard};
+use flockform::swarm::control::Control;
+use flockform::swarm::flight::{Flight, FlightReport, Record, Sample, fly_heard};
 
 use super::film::{FilmArguments, words as film_words};
 use super::names::{FileName, Kind, folder_of};
@@ -89,26 +90,13 @@ pub fn swarm(arguments: &SwarmArguments) -> Result<ExitCode, Refusal> {
     let folder = arguments.output.folder(&swarm.name)?;
     let recording =
         arguments.record.open(&arguments.swarm.about("swarm", &swarm), arguments.output.force, 1)?;
-    let messages = recording
-        .as_ref()
-        .map(|one| FlightMessages::new(&swarm, flight.control(), one.sink()))
-        .transpose()?;
-    let messages = RefCell::new(messages);
     let interrupted = interrupt::keeps();
     let start = Instant::now();
-    let mut hear = |member, pose| {
-        if let Some(messages) = &mut *messages.borrow_mut() {
-            messages.receive(member, pose);
-        }
-    };
-    let (record, report) = fly_heard(&swarm, &mut hear, &mut |flight, _| {
-        if let Some(messages) = &mut *messages.borrow_mut() {
-            // When the period began that has just been flown.
-            messages.tick(flight.control(), (flight.fleet().period() - 1) as f64 * swarm.raw.control.period);
-        }
+    let mut watch = |flight: &Flight, _: &Sample| {
         recorder.iter_mut().for_each(|recorder| recorder.watch(flight));
         if interrupted.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-    })?;
+    };
+    let (record, report) = fly_recorded(&swarm, flight.control(), recording.as_ref(), &mut watch)?;
     let seconds = start.elapsed().as_secs_f64();
     let saving = interrupt::saving();
     write_flight(&folder, &swarm, &record, &report)?;
@@ -140,6 +128,29 @@ pub fn swarm(arguments: &SwarmArguments) -> Result<ExitCode, Refusal> {
         arguments.report.show(&kept);
     }
     Ok(if report.holds() && !broken_off { ExitCode::SUCCESS } else { ExitCode::from(FAILED) })
+}
+
+/// Flies a swarm that this control is of, and records the messages of its loop.
+pub fn fly_recorded(
+    swarm: &Swarm,
+    control: &Control,
+    recording: Option<&Shared>,
+    watch: &mut dyn FnMut(&Flight, &Sample) -> ControlFlow<()>,
+) -> Result<(Record, FlightReport), Refusal> {
+    let messages = recording.map(|one| FlightMessages::new(swarm, control, one.sink())).transpose()?;
+    let messages = RefCell::new(messages);
+    let mut hear = |member, pose| {
+        if let Some(messages) = &mut *messages.borrow_mut() {
+            messages.receive(member, pose);
+        }
+    };
+    Ok(fly_heard(swarm, &mut hear, &mut |flight, sample| {
+        if let Some(messages) = &mut *messages.borrow_mut() {
+            // When the period began that has just been flown.
+            messages.tick(flight.control(), (flight.fleet().period() - 1) as f64 * swarm.raw.control.period);
+        }
+        watch(flight, sample)
+    })?)
 }
 
 fn words(report: &FlightReport, seconds: f64, kept: &Path) -> String {

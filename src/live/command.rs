@@ -81,6 +81,35 @@ pub enum Command {
         /// The kind of fault; none makes it sound.
         what: Option<Fault>,
     },
+    /// Has a node hold every robot, as its service `~/emergency_stop` does.
+    EmergencyStop {},
+    /// Ends an emergency stop, as `~/resume` does.
+    Resume {},
+    /// Has a node send targets, as the transition of its lifecycle does.
+    Activate {},
+    /// Has a node send no targets.
+    Deactivate {},
+    /// Moves the leaders, as `~/set_formation` does.
+    SetFormation {
+        /// A manoeuvre of the file; with a name the other values are not used.
+        #[serde(default)]
+        name: String,
+        /// Shift from the nominal places \[m\].
+        #[serde(default)]
+        translate: [f64; 2],
+        /// Counter-clockwise \[rad\].
+        #[serde(default)]
+        rotate: f64,
+        /// Factors along x and y \[1\].
+        #[serde(default = "unstretched")]
+        stretch: [f64; 2],
+        /// Shift of x for every unit of y, and of y for every unit of x \[1\].
+        #[serde(default)]
+        shear: [f64; 2],
+        /// Time until the formation is there \[s\].
+        #[serde(default)]
+        duration: f64,
+    },
     /// Needs the values of this quantity with every frame.
     Ask {
         /// Key of a quantity.
@@ -91,6 +120,10 @@ pub enum Command {
         /// Time that drawing took \[ms\].
         ms: f64,
     },
+}
+
+fn unstretched() -> [f64; 2] {
+    [1.0; 2]
 }
 
 /// Faults that a viewer can give a robot.
@@ -123,7 +156,7 @@ impl Command {
         let holds = match self {
             Command::Speed { value } => (0.01..=1000.0).contains(value),
             Command::Set { key, value } => is_text(key) && is_text(value) && !key.contains('='),
-            Command::Ask { quantity } => is_text(quantity),
+            Command::Ask { quantity: text } | Command::SetFormation { name: text, .. } => is_text(text),
             Command::Drawn { ms } => (0.0..=1e6).contains(ms),
             Command::Squeeze { by } => by.iter().all(|factor| (0.1..=10.0).contains(factor)),
             Command::Cut { from, to } => from != to,
@@ -141,6 +174,8 @@ mod tests {
     fn requests_are_read_and_others_refused() {
         let grab = Command::parse(r#"{"do":"grab","particle":3}"#);
         assert_eq!(grab, Ok(Command::Grab { particle: 3, alone: false }));
+        let moved = Command::parse(r#"{"do":"set-formation","translate":[1,0],"duration":2}"#);
+        assert!(matches!(moved, Ok(Command::SetFormation { stretch: [1.0, 1.0], duration: 2.0, .. })));
         let wrong = [
             "",
             "[]",
@@ -153,6 +188,8 @@ mod tests {
             r#"{"do":"speed","value":0}"#,
             r#"{"do":"cut","from":[0,0],"to":[0,0]}"#,
             r#"{"do":"squeeze","by":[1,0]}"#,
+            r#"{"do":"set-formation","translate":[1e999,0]}"#,
+            r#"{"do":"set-formation","name":"a\u0007"}"#,
             "{\"do\":\"set\",\"key\":\"a\\n\",\"value\":\"1\"}",
         ];
         for text in wrong {

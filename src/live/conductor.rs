@@ -10,6 +10,7 @@ use serde_json::{Value, json};
 use tungstenite::Bytes;
 
 use super::command::Command;
+use super::monitor::Monitor;
 use super::session::{Frame, Session, Viewer};
 use super::state::{Board, Published};
 use crate::export::report::live_page;
@@ -107,13 +108,17 @@ impl Conductor {
         }
     }
 
-    /// Goes on until `stop` is raised or no viewer can ask for anything any more.
-    pub fn run(mut self, requests: &Receiver<Request>, stop: &AtomicBool) {
+    /// Goes on until `stop` is raised or no viewer can ask for anything any more, and returns the session.
+    pub fn run(mut self, requests: &Receiver<Request>, stop: &AtomicBool) -> Session {
         let _closed = Closed(Arc::clone(&self.board));
         let mut shown = Instant::now();
         let mut before = Instant::now();
         let mut is_news = false;
         while !stop.load(Ordering::Relaxed) {
+            if let Session::Monitor(_) = self.session {
+                // It goes on by itself; the question is whether a viewer follows it.
+                self.is_playing = self.board.viewers() > 0;
+            }
             let due = SHOWN_EVERY.saturating_sub(shown.elapsed()).max(LEAST_WAIT);
             let wait = if self.is_playing { due } else { IDLE };
             is_news |= match requests.recv_timeout(wait) {
@@ -134,10 +139,19 @@ impl Conductor {
                 (shown, is_news) = (Instant::now(), false);
             }
         }
+        self.session
     }
 
     /// Takes the steps that are due after so many seconds; whether there were any.
     fn play(&mut self, seconds: f64) -> bool {
+        if let Session::Monitor(monitor) = &mut self.session {
+            for (viewer, answer) in monitor.answers() {
+                self.board.send(viewer, &answered(answer));
+            }
+            let is_new = monitor.poll(self.is_playing);
+            self.pace.steps += u32::from(is_new);
+            return is_new;
+        }
         if !self.is_playing {
             self.due = 0.0;
             return false;
@@ -180,7 +194,11 @@ impl Conductor {
     }
 
     fn perform(&mut self, viewer: Viewer, command: &Command) -> bool {
+        let is_stepped_elsewhere = matches!(self.session, Session::Monitor(_));
         match command {
+            Command::Ask { quantity } => self.board.want(viewer, quantity.clone()),
+            Command::Drawn { .. } => return false,
+            other if is_stepped_elsewhere => self.act(viewer, other),
             Command::Play {} => self.is_playing = true,
             Command::Pause {} => self.is_playing = false,
             Command::Step {} => {
@@ -189,8 +207,6 @@ impl Conductor {
             }
             Command::Speed { value } => self.speed = *value,
             Command::Save {} => self.save(viewer),
-            Command::Ask { quantity } => self.board.want(viewer, quantity.clone()),
-            Command::Drawn { .. } => return false,
             other => self.act(viewer, other),
         }
         true
@@ -199,7 +215,7 @@ impl Conductor {
     /// Does something with the session, or says why not.
     fn act(&mut self, viewer: Viewer, command: &Command) {
         if let Err(refused) = self.session.perform(viewer, command) {
-            self.board.tell(viewer, &json!({ "event": "refused", "words": refused.0 }));
+            self.board.send(viewer, &answered(Err(refused.0)));
             return;
         }
         self.stopped = None;
@@ -217,7 +233,7 @@ impl Conductor {
             }
             Err(words) => json!({ "event": "refused", "words": words }),
         };
-        self.board.tell(viewer, &said);
+        self.board.send(viewer, &said);
     }
 
     /// Writes a file of a name that is not taken.
@@ -284,18 +300,39 @@ impl Conductor {
             "sets": self.session.sets(),
             "viewers": self.board.viewers(),
             "rates": self.pace.rates,
+            "node": self.monitor().map(Monitor::status),
         })
     }
 
     fn page(&self) -> String {
         let (name, title) = self.session.title();
+        let node = self.monitor().map(
+            |monitor| json!({ "commands": monitor.takes_commands(), "manoeuvres": monitor.manoeuvres() }),
+        );
+        let command = match &node {
+            Some(_) => format!("flockform node {name} --live"),
+            None => format!("flockform live {name}"),
+        };
         let live = json!({
             "channels": self.session.channels(),
             "layout": self.session.layout(),
-            "keys": numbers(&self.session.raw()),
-            "swarm": matches!(self.session, Session::Swarm(_)),
+            "keys": if node.is_some() { Vec::new() } else { numbers(&self.session.raw()) },
+            "swarm": !matches!(self.session, Session::Body(_)),
+            "node": node,
         });
-        live_page(format!("flockform live {name}"), title.to_owned(), self.session.view(), live)
+        live_page(command, title.to_owned(), self.session.view(), live)
+    }
+
+    fn monitor(&self) -> Option<&Monitor> {
+        if let Session::Monitor(monitor) = &self.session { Some(monitor) } else { None }
+    }
+}
+
+/// What came of a command, for its viewer.
+fn answered(answer: Result<String, String>) -> Value {
+    match answer {
+        Ok(words) => json!({ "event": "done", "words": words }),
+        Err(words) => json!({ "event": "refused", "words": words }),
     }
 }
 

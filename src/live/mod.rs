@@ -5,12 +5,15 @@
 //! at the speed that is asked for and shows each viewer the latest state ([`state`]); [`server`] lets viewers in, who see
 //! the page of a report with live data.
 //!
+//! A [`monitor::Monitor`] in its place shows a swarm that another loop flies, as `flockform node --live` does.
+//!
 //! A viewer shows the token of the address; what it sends is bounded in size and number, and checked as the file is.
 
 pub mod body;
 pub mod command;
 pub mod conductor;
 mod history;
+pub mod monitor;
 mod request;
 pub mod server;
 pub mod session;

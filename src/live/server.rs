@@ -47,12 +47,24 @@ impl Server {
     /// # Errors
     /// A port that is taken, or a system without random numbers.
     pub fn open(port: Option<u16>) -> io::Result<Self> {
-        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port.unwrap_or(0)))?;
-        let port = listener.local_addr().map(|address: SocketAddr| address.port())?;
         let mut random = [0; 16];
         getrandom::fill(&mut random).map_err(io::Error::other)?;
-        let token = random.iter().map(|byte| format!("{byte:02x}")).collect();
+        Self::reopen(port.unwrap_or(0), random.iter().map(|byte| format!("{byte:02x}")).collect())
+    }
+
+    /// At the port of an earlier server and with its token, so that its pages find this one.
+    ///
+    /// # Errors
+    /// A port that is taken.
+    pub fn reopen(port: u16, token: String) -> io::Result<Self> {
+        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port))?;
+        let port = listener.local_addr().map(|address: SocketAddr| address.port())?;
         Ok(Self { listener, port, token })
+    }
+
+    /// The port and the token, for [`Server::reopen`].
+    pub fn place(&self) -> (u16, String) {
+        (self.port, self.token.clone())
     }
 
     /// The address to open in a browser, with its token.
@@ -60,11 +72,11 @@ impl Server {
         format!("http://127.0.0.1:{}/?token={}", self.port, self.token)
     }
 
-    /// Serves a session until `stop` is raised; what viewers save is written in `folder`.
+    /// Serves a session until `stop` is raised, and returns it; what viewers save is written in `folder`.
     ///
     /// # Errors
-    /// A listener that is gone, or no threads.
-    pub fn serve(self, session: Session, folder: PathBuf, stop: &AtomicBool) -> io::Result<()> {
+    /// A listener that is gone, no threads, or a session that has panicked.
+    pub fn serve(self, session: Session, folder: PathBuf, stop: &AtomicBool) -> io::Result<Session> {
         self.listener.set_nonblocking(true)?;
         let board = Arc::new(Board::default());
         let (requests, asked) = sync_channel(MOST_REQUESTS);
@@ -81,14 +93,14 @@ impl Server {
         });
         std::thread::scope(|scope| {
             let run = move || conductor.run(&asked, stop);
-            std::thread::Builder::new().name("live session".into()).spawn_scoped(scope, run)?;
+            let run = std::thread::Builder::new().name("live session".into()).spawn_scoped(scope, run)?;
             while !stop.load(Ordering::Relaxed) && !shared.board.is_closed() {
                 match self.listener.accept() {
                     Ok((stream, _)) => admit(stream, &shared),
                     Err(_) => std::thread::sleep(LOOK),
                 }
             }
-            Ok(())
+            run.join().map_err(|_| io::Error::other("the session has panicked"))
         })
     }
 }
@@ -160,7 +172,7 @@ impl Shared {
         } else if !is_from_here {
             Some("another page asks\n")
         } else if !is_same(asked.token.as_bytes(), self.token.as_bytes()) {
-            Some("the address lacks its token: open the one that `flockform live` prints\n")
+            Some("the address lacks its token: open the one that flockform prints\n")
         } else {
             None
         }

@@ -2,6 +2,7 @@
 
 use super::body::Body;
 use super::command::Command;
+use super::monitor::Monitor;
 use super::swarm::Swarm;
 use crate::export::report::view::View;
 use crate::scene::SceneError;
@@ -51,6 +52,8 @@ pub enum Session {
     Body(Box<Body>),
     /// Robots that fly.
     Swarm(Box<Swarm>),
+    /// Robots that another loop flies.
+    Monitor(Box<Monitor>),
 }
 
 impl Session {
@@ -65,6 +68,7 @@ impl Session {
                 swarm.advance();
                 Ok(())
             }
+            Session::Monitor(_) => Ok(()),
         }
     }
 
@@ -76,6 +80,7 @@ impl Session {
         match self {
             Session::Body(body) => body.perform(viewer, command),
             Session::Swarm(swarm) => swarm.perform(viewer, command),
+            Session::Monitor(monitor) => monitor.perform(viewer, command),
         }
     }
 
@@ -84,6 +89,7 @@ impl Session {
         match self {
             Session::Body(body) => body.release(viewer),
             Session::Swarm(swarm) => swarm.release(viewer),
+            Session::Monitor(_) => {}
         }
     }
 
@@ -95,6 +101,7 @@ impl Session {
         match self {
             Session::Body(body) => body.saved(),
             Session::Swarm(swarm) => swarm.saved(),
+            Session::Monitor(_) => Err("what a node flies is kept by --record".into()),
         }
     }
 
@@ -103,6 +110,7 @@ impl Session {
         match self {
             Session::Body(body) => body.frame(wanted),
             Session::Swarm(swarm) => swarm.frame(),
+            Session::Monitor(monitor) => monitor.frame(),
         }
     }
 
@@ -110,7 +118,7 @@ impl Session {
     pub fn channels(&self) -> Vec<&'static str> {
         match self {
             Session::Body(body) => body.channels(),
-            Session::Swarm(_) => super::swarm::CHANNELS.to_vec(),
+            Session::Swarm(_) | Session::Monitor(_) => super::swarm::CHANNELS.to_vec(),
         }
     }
 
@@ -119,6 +127,7 @@ impl Session {
         match self {
             Session::Body(body) => crate::export::report::view::numbers(body.engine().roles()),
             Session::Swarm(swarm) => swarm.roles(),
+            Session::Monitor(monitor) => monitor.roles(),
         }
     }
 
@@ -126,7 +135,7 @@ impl Session {
     pub fn broken(&self) -> Broken {
         match self {
             Session::Body(body) => body.broken(),
-            Session::Swarm(_) => Broken::new(),
+            Session::Swarm(_) | Session::Monitor(_) => Broken::new(),
         }
     }
 
@@ -134,7 +143,7 @@ impl Session {
     pub fn broken_count(&self) -> usize {
         match self {
             Session::Body(body) => body.engine().breaks().len(),
-            Session::Swarm(_) => 0,
+            Session::Swarm(_) | Session::Monitor(_) => 0,
         }
     }
 
@@ -143,6 +152,7 @@ impl Session {
         match self {
             Session::Body(body) => body.layout(),
             Session::Swarm(swarm) => swarm.layout(),
+            Session::Monitor(_) => 0,
         }
     }
 
@@ -151,6 +161,7 @@ impl Session {
         match self {
             Session::Body(body) => body.undoable(),
             Session::Swarm(swarm) => swarm.undoable(),
+            Session::Monitor(_) => 0,
         }
     }
 
@@ -159,6 +170,7 @@ impl Session {
         match self {
             Session::Body(body) => body.sets(),
             Session::Swarm(swarm) => swarm.sets(),
+            Session::Monitor(_) => Vec::new(),
         }
     }
 
@@ -169,6 +181,7 @@ impl Session {
         match self {
             Session::Body(_) => STEPS,
             Session::Swarm(swarm) => 1.0 / swarm.period(),
+            Session::Monitor(_) => 0.0,
         }
     }
 
@@ -177,6 +190,7 @@ impl Session {
         match self {
             Session::Body(_) => (Vec::new(), Vec::new()),
             Session::Swarm(swarm) => swarm.alarms(),
+            Session::Monitor(monitor) => monitor.alarms(),
         }
     }
 
@@ -185,6 +199,7 @@ impl Session {
         match self {
             Session::Body(_) => Vec::new(),
             Session::Swarm(swarm) => swarm.obstacles(),
+            Session::Monitor(monitor) => monitor.obstacles(),
         }
     }
 
@@ -193,6 +208,7 @@ impl Session {
         match self {
             Session::Body(_) => Vec::new(),
             Session::Swarm(swarm) => swarm.faults(),
+            Session::Monitor(monitor) => monitor.faults(),
         }
     }
 
@@ -201,6 +217,7 @@ impl Session {
         match self {
             Session::Body(body) => body.view(),
             Session::Swarm(swarm) => swarm.view(),
+            Session::Monitor(monitor) => monitor.view(),
         }
     }
 
@@ -209,6 +226,7 @@ impl Session {
         match self {
             Session::Body(body) => (&body.scene().name, &body.scene().raw.title),
             Session::Swarm(swarm) => (&swarm.swarm().name, &swarm.swarm().raw.title),
+            Session::Monitor(monitor) => (&monitor.swarm().name, &monitor.swarm().raw.title),
         }
     }
 
@@ -217,6 +235,7 @@ impl Session {
         match self {
             Session::Body(_) => "run",
             Session::Swarm(_) => "swarm",
+            Session::Monitor(_) => "node",
         }
     }
 
@@ -225,6 +244,7 @@ impl Session {
         match self {
             Session::Body(body) => serde_json::to_value(&body.scene().raw),
             Session::Swarm(swarm) => serde_json::to_value(&swarm.swarm().raw),
+            Session::Monitor(monitor) => serde_json::to_value(&monitor.swarm().raw),
         }
         .unwrap_or_default()
     }

@@ -117,7 +117,7 @@ impl Board {
     }
 
     /// Says something to a viewer.
-    pub fn tell(&self, viewer: Viewer, words: &serde_json::Value) {
+    pub fn send(&self, viewer: Viewer, words: &serde_json::Value) {
         if let Some(notices) = self.inner().viewers.get_mut(&viewer) {
             if notices.len() >= MOST_NOTICES {
                 notices.pop_front();

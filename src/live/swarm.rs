@@ -15,10 +15,11 @@ use crate::flock::vectors::Vectors;
 use crate::scene::SceneError;
 use crate::scene::swarm::Swarm as File;
 use crate::scene::swarm::raw::{RawCommand, RawCommandKind, RawFault, RawFaultKind};
+use crate::swarm::control::Control;
 use crate::swarm::flight::{Alarm, Flight, FlightCommand};
 
 /// Quantities that come with every frame: a swarm is small.
-pub const CHANNELS: [&str; 4] = ["clearance", "age", "pe1", "strain"];
+pub const CHANNELS: [&str; 6] = ["clearance", "age", "pe1", "strain", "target_dx", "target_dy"];
 
 /// Keys of the flight that may change while robots fly: noise, delay and loss.
 const CHANNEL_KEYS: [&str; 3] = ["flight.noise", "flight.delay", "flight.loss"];
@@ -250,39 +251,21 @@ impl Swarm {
 
     /// The page's view of the robots as they are.
     pub fn view(&self) -> View {
-        FlightRecorder::still(&self.history.now.file, &self.history.now.flight, self.start())
-    }
-
-    /// Where displacements are counted from \[m\].
-    fn start(&self) -> &Vectors {
-        &self.history.now.flight.control().formation().places
+        let State { file, flight, .. } = &self.history.now;
+        FlightRecorder::still(file, flight.control(), &flight.fleet().places())
     }
 
     /// The state of every robot, with all channels.
     pub fn frame(&self) -> Frame {
-        let (control, places, start) =
-            (self.history.now.flight.control(), self.history.now.flight.fleet().places(), self.start());
-        let moved = |now: &[f64], then: &[f64]| now.iter().zip(then).map(|(n, t)| (n - t) as f32).collect();
-        let places_moved = [moved(&places.x, &start.x), moved(&places.y, &start.y)];
-        let mut clearance = Vec::new();
+        let (control, fleet) = (self.flight().control(), self.flight().fleet());
+        let (places, mut clearance) = (fleet.places(), Vec::new());
         control.filter().clearance(&places, &mut clearance);
-        let measures = control.formation().measures(&places);
-        let of = |name: &str, m: usize| match name {
-            "clearance" => clearance[m],
-            "age" => control.age(m).unwrap_or(f64::NAN),
-            "pe1" => measures.pe1[m],
-            _ => measures.strain[m].map_or(f64::NAN, |strain| strain.largest()),
-        };
-        let channel = |name: &str| (0..places.len()).map(|m| of(name, m) as f32).collect();
-        let channels = CHANNELS.into_iter().map(|name| Some(channel(name))).collect();
-        Frame { clock: self.history.now.flight.fleet().time(), places: places_moved, channels }
+        frame(control, &places, &clearance, fleet.time())
     }
 
     /// Roles by number.
     pub fn roles(&self) -> Vec<u8> {
-        let formation = self.history.now.flight.control().formation();
-        let role = |m: usize| if formation.leads(m) { Role::Leader } else { Role::Follower };
-        crate::export::report::view::numbers(&(0..formation.count()).map(role).collect::<Vec<_>>())
+        roles(self.flight().control())
     }
 
     /// How far each obstacle is from its place in the file \[m\].
@@ -292,14 +275,7 @@ impl Swarm {
 
     /// Bounds that are broken, in words, and the robots that break them.
     pub fn alarms(&self) -> (Vec<String>, Vec<usize>) {
-        let names = &self.history.now.flight.control().formation().names;
-        let words = |alarm: &Alarm| {
-            let robots: Vec<&str> = alarm.robots.iter().map(|&m| names[m].as_str()).collect();
-            let Alarm { bound, declared, found, .. } = alarm;
-            format!("{bound}: declared {declared} m, now {found:.3} m, by {}", robots.join(" and "))
-        };
-        let robots = self.history.now.alarms.iter().flat_map(|alarm| alarm.robots.iter().copied());
-        (self.history.now.alarms.iter().map(words).collect(), robots.collect())
+        in_words(&self.history.now.alarms, &self.flight().control().formation().names)
     }
 
     /// Robots with a fault now, and its kind.
@@ -308,6 +284,48 @@ impl Swarm {
         let count = fleet.robots().len();
         (0..count).filter_map(|m| Some((m, fleet.fault_name(m)?))).collect()
     }
+}
+
+/// The state of every robot at these places \[m\], with all channels; displacements are from the nominal places.
+pub(super) fn frame(control: &Control, places: &Vectors, clearance: &[f64], clock: f64) -> Frame {
+    let start = &control.formation().places;
+    let measures = control.formation().measures(places);
+    let to_target = |m: usize, axis: usize| {
+        control.target(m).map_or(f64::NAN, |target| target[axis] - start.get(m)[axis])
+    };
+    let of = |name: &str, m: usize| match name {
+        "clearance" => clearance[m],
+        "age" => control.age(m).unwrap_or(f64::NAN),
+        "pe1" => measures.pe1[m],
+        "target_dx" => to_target(m, 0),
+        "target_dy" => to_target(m, 1),
+        _ => measures.strain[m].map_or(f64::NAN, |strain| strain.largest()),
+    };
+    let moved = |now: &[f64], then: &[f64]| now.iter().zip(then).map(|(n, t)| (n - t) as f32).collect();
+    let channel = |name: &str| (0..places.len()).map(|m| of(name, m) as f32).collect();
+    Frame {
+        clock,
+        places: [moved(&places.x, &start.x), moved(&places.y, &start.y)],
+        channels: CHANNELS.into_iter().map(|name| Some(channel(name))).collect(),
+    }
+}
+
+/// Roles by number.
+pub(super) fn roles(control: &Control) -> Vec<u8> {
+    let formation = control.formation();
+    let role = |m: usize| if formation.leads(m) { Role::Leader } else { Role::Follower };
+    crate::export::report::view::numbers(&(0..formation.count()).map(role).collect::<Vec<_>>())
+}
+
+/// Bounds that are broken, in words, and the robots that break them.
+pub(super) fn in_words(alarms: &[Alarm], names: &[String]) -> (Vec<String>, Vec<usize>) {
+    let words = |alarm: &Alarm| {
+        let robots: Vec<&str> = alarm.robots.iter().map(|&m| names[m].as_str()).collect();
+        let Alarm { bound, declared, found, .. } = alarm;
+        format!("{bound}: declared {declared} m, now {found:.3} m, by {}", robots.join(" and "))
+    };
+    let robots = alarms.iter().flat_map(|alarm| alarm.robots.iter().copied());
+    (alarms.iter().map(words).collect(), robots.collect())
 }
 
 impl history::State for State {

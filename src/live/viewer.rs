@@ -103,7 +103,7 @@ fn receive(
                     return;
                 }
             }
-            Err(words) => board.tell(viewer, &json!({ "event": "refused", "words": words })),
+            Err(words) => board.send(viewer, &json!({ "event": "refused", "words": words })),
         }
     }
 }

@@ -107,6 +107,11 @@ impl Recording {
         self.writer.write_to_known_channel(&header, taped.payload)
     }
 
+    /// Adds the text of the swarm file that was flown, where it was not known at the beginning.
+    pub fn attach_swarm(&mut self, text: &str) {
+        self.failure = self.failure.take().or_else(|| attach_swarm(&mut self.writer, text).err());
+    }
+
     /// Messages so far.
     pub fn messages(&self) -> u64 {
         self.messages
@@ -200,12 +205,15 @@ fn describe(writer: &mut Writer<BufWriter<File>>, about: &About) -> Result<(), m
         }
     }
     writer.write_metadata(&Metadata { name: METADATA.to_owned(), metadata })?;
-    let Some(swarm) = &about.swarm else { return Ok(()) };
+    about.swarm.as_ref().map_or(Ok(()), |swarm| attach_swarm(writer, swarm))
+}
+
+fn attach_swarm(writer: &mut Writer<BufWriter<File>>, text: &str) -> Result<(), mcap::McapError> {
     writer.attach(&Attachment {
         log_time: 0,
         create_time: 0,
         name: SWARM.to_owned(),
         media_type: "application/toml".to_owned(),
-        data: swarm.as_bytes().into(),
+        data: text.as_bytes().into(),
     })
 }

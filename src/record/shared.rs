@@ -26,6 +26,13 @@ impl Shared {
         })
     }
 
+    /// As [`Recording::attach_swarm`].
+    pub fn attach_swarm(&self, text: &str) {
+        if let Some(recording) = &mut *self.0.lock().unwrap_or_else(PoisonError::into_inner) {
+            recording.attach_swarm(text);
+        }
+    }
+
     /// Takes the recording back, to be closed; `None` the second time.
     pub fn take(&self) -> Option<Recording> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).take()

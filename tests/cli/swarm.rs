@@ -65,9 +65,12 @@ fn what_cannot_fly_is_refused_with_exit_code_2_and_nothing_is_left() {
 #[test]
 fn nodes_refuse_what_ros_cannot_mean() {
     let folder = temporary();
-    let cases: [(&[&str], &str); 6] = [
+    let cases: [(&[&str], &str); 9] = [
         (&["node", "square", "--ros-args", "--remapp", "a:=b"], "--remapp"),
         (&["node", "square", "--ros-args", "-r", "__ns:=no slash"], "no slash"),
+        (&["node", "square", "--port", "9000"], "--live"),
+        (&["node", "square", "--allow-commands"], "--live"),
+        (&["node", "square", "--live", "--transport", "shm"], "leave out --transport shm"),
         (&["node", "square", "--member", "robot_99"], "they are called `robot_1` to `robot_25`"),
         (&["node", "square", "--member", "robot_7"], "needs to see the whole formation"),
         (&["node", "square", "--ros-args", "-p", "speed_limit:=-2.0"], "speed_limit"),

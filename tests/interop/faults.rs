@@ -48,7 +48,7 @@ fn silent_robots_are_held_then_lost_and_only_who_depends_on_them_is_told() {
     let (watch, mut robots) = (watch(domain), square.robots(domain));
     watch.until("everybody is heard", |line| state::all_fresh(state::of(line)?).then_some(()));
     let lost = ["robot_7", "robot_19"];
-    robots.tell(json!({"robot_7": "silent", "robot_19": "silent"}));
+    robots.send(json!({"robot_7": "silent", "robot_19": "silent"}));
     let mut seen = Vec::new();
     let state = watch.until("both are stopped", |line| {
         let state = state::of(line)?;
@@ -76,7 +76,7 @@ fn silent_robots_are_held_then_lost_and_only_who_depends_on_them_is_told() {
             .all(|(name, count)| lost.contains(&name.as_str()) || *count > before[name] + 20)
             .then_some(())
     });
-    robots.tell(json!({"robot_7": null, "robot_19": null}));
+    robots.send(json!({"robot_7": null, "robot_19": null}));
     watch.until("everybody is heard again", |line| {
         let state = state::of(line)?;
         (state::all_fresh(state) && state::who(state, needs_somebody_lost).is_empty()).then_some(())
@@ -98,7 +98,7 @@ fn bad_poses_are_rejected_and_counted_and_never_make_a_target() {
     watch.until("everybody is heard", |line| state::all_fresh(state::of(line)?).then_some(()));
     let is_rejected = |member: &Json| state::has(member, MemberState::POSE_REJECTED);
     for what in ["nan", "infinity", "frame", "past", "future", "twice", "reversed"] {
-        robots.tell(json!({"robot_7": what}));
+        robots.send(json!({"robot_7": what}));
         let mut rejections = 0;
         watch.until(&format!("{what}: ten poses of robot_7 are rejected"), |line| {
             let state = state::of(line)?;
@@ -110,7 +110,7 @@ fn bad_poses_are_rejected_and_counted_and_never_make_a_target() {
             rejections += of.len();
             (rejections >= 10).then_some(())
         });
-        robots.tell(json!({"robot_7": null}));
+        robots.send(json!({"robot_7": null}));
         let mut clean = 0;
         watch.until(&format!("{what}: it is believed again"), |line| {
             let state = state::of(line)?;

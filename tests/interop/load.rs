@@ -75,7 +75,7 @@ fn fly(rate: f64, pose: &[&str], messages_a_period: f64) -> Result<(), String> {
     change_state(&mut watch, "deactivate");
     robots.during(Duration::from_secs(1), |_| ());
     let says = numbers(&watch);
-    robots.tell(json!({"stop": true}));
+    robots.send(json!({"stop": true}));
     let after = report(&robots);
 
     let ticks = ticks.map(|[first, last]| last - first).expect("the formation flew");
@@ -105,7 +105,7 @@ fn report(robots: &Peer) -> Json {
 }
 
 fn change_state(watch: &mut Peer, label: &str) {
-    watch.tell(json!({"call": "change_state", "with": label}));
+    watch.send(json!({"call": "change_state", "with": label}));
     let reply = watch.until(label, |line| line.get("reply").cloned());
     assert_eq!(reply["success"], json!(true), "{label}");
 }

@@ -27,7 +27,7 @@ impl Asked {
     }
 
     fn ask(&mut self, service: &str, body: Json) -> Json {
-        self.watch.tell(json!({"call": service, "with": body}));
+        self.watch.send(json!({"call": service, "with": body}));
         self.watch.until(service, |line| line.get("reply").cloned())
     }
 

@@ -77,7 +77,7 @@ impl Peer {
         Self { name: script, orders, lines, _running: Running(child) }
     }
 
-    pub fn tell(&mut self, order: Json) {
+    pub fn send(&mut self, order: Json) {
         writeln!(self.orders, "{order}").expect("it listens");
     }
 

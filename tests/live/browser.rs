@@ -14,9 +14,9 @@ use serde_json::{Value, json};
 use super::folders::temporary;
 use super::served::Served;
 
-fn tour(served: &Served, asked: &Value) -> Value {
+fn tour(address: &str, asked: &Value) -> Value {
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/live/tour.mjs");
-    let output = Command::new("node").arg(script).arg(&served.address).arg(asked.to_string()).output();
+    let output = Command::new("node").arg(script).arg(address).arg(asked.to_string()).output();
     let output = output.expect("node starts");
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{said}");
@@ -25,10 +25,10 @@ fn tour(served: &Served, asked: &Value) -> Value {
     println!("{}", seen["words"]);
     println!("{}", seen["measured"]);
     assert_eq!(seen["errors"], json!([]), "the console has no errors");
-    let (host, _) = served.parts();
+    let (origin, _) = address.split_once('?').expect("with a token");
     let is_own = |url: &Value| {
         let url = url.as_str().unwrap_or_default();
-        url.starts_with(&format!("http://{host}/")) || url.starts_with("data:")
+        url.starts_with(origin) || url.starts_with("data:")
     };
     assert!(seen["requests"].as_array().expect("listed").iter().all(is_own), "{}", seen["requests"]);
     seen
@@ -52,7 +52,7 @@ fn a_body_is_dragged_cut_undone_and_saved_while_another_viewer_looks_on() {
     let asked = json!({
         "name": "tension", "drag": 66, "cut": [[4.5, 2.0], [4.6, 8.0]], "key": "rule.feedback.factor=-0.05",
     });
-    let seen = tour(&served, &asked);
+    let seen = tour(&served.address, &asked);
     let place =
         |when: &str| -> Vec<f64> { serde_json::from_value(seen["dragged"][when].clone()).expect("two") };
     assert!(place("after")[1] - place("before")[1] > 0.1, "{}", seen["dragged"]);
@@ -81,7 +81,7 @@ fn a_body_is_dragged_cut_undone_and_saved_while_another_viewer_looks_on() {
 fn a_leader_is_dragged_and_a_robot_killed_and_the_flight_saved() {
     let folder = temporary();
     let served = Served::swarm("square", &[], folder.path());
-    let seen = tour(&served, &json!({ "name": "square", "drag": 0, "fault": 12 }));
+    let seen = tour(&served.address, &json!({ "name": "square", "drag": 0, "fault": 12 }));
     assert_eq!(seen["hurt"], json!([[12, "dead"]]));
     let saved = Path::new(seen["saved"].as_str().expect("a path")).to_owned();
     let swarm = Swarm::from_file(&saved, &[]).unwrap_or_else(|error| panic!("{error}"));
@@ -106,7 +106,7 @@ fn an_obstacle_is_pushed_and_the_formation_squeezed_and_the_flight_saved() {
     );
     let pushed =
         json!({ "name": "pushed", "push": { "at": [-4.0, 3.0], "by": [3.5, 0.0] }, "squeeze": true });
-    let seen = tour(&served, &pushed);
+    let seen = tour(&served.address, &pushed);
     assert!(seen["pushed"][0].as_f64() > Some(3.3), "{}", seen["pushed"]);
     assert!((4.0..5.6).contains(&seen["squeezed"].as_f64().expect("measured")), "{}", seen["squeezed"]);
     let saved = Path::new(seen["saved"].as_str().expect("a path")).to_owned();
@@ -124,13 +124,25 @@ fn an_obstacle_is_pushed_and_the_formation_squeezed_and_the_flight_saved() {
 fn an_edge_is_loaded_by_hand_and_the_body_saved() {
     let folder = temporary();
     let served = Served::scene("beam-loaded", &["loads=[]".to_owned()], folder.path());
-    let seen = tour(&served, &json!({ "name": "loaded", "load": 137 }));
+    let seen = tour(&served.address, &json!({ "name": "loaded", "load": 137 }));
     assert!(seen["loaded"][0].as_f64() > Some(0.3), "{}", seen["loaded"]);
     let saved = Path::new(seen["saved"].as_str().expect("a path")).to_owned();
     let scene = Scene::from_file(&saved, &[]).unwrap_or_else(|error| panic!("{error}"));
     let plan = Plan::new(&scene).unwrap_or_else(|error| panic!("{error}"));
     let engine = run(plan, &mut |_, _| ControlFlow::Continue(())).engine;
     assert_shown(&seen, (0..engine.body().count()).map(|i| engine.displacement(i)));
+}
+
+#[cfg(feature = "cli")]
+#[test]
+#[ignore = "needs Chromium, Node, playwright-core and axe-core: see tests/browser/main.rs"]
+fn a_flying_swarm_is_stopped_resumed_and_moved_from_its_node_s_page() {
+    let flown =
+        super::node::Flown::begin(&["--allow-commands", "--set", "flight.bounds.affine_error=0.0001"]);
+    let seen = tour(&flown.address(), &json!({ "name": "node", "node": 0 }));
+    let words = seen["alarms"][0].as_str().expect("a broken bound");
+    assert!(words.starts_with("affine_error: declared 0.0001 m"), "{words}");
+    assert_eq!(seen["isThere"], true);
 }
 
 #[test]
@@ -145,7 +157,7 @@ fn frames_a_second_of_ten_thousand_and_a_hundred_thousand_particles_are_measured
         let served = Served::scene("shear", &set, folder.path());
         println!("{name} particles:");
         for quantity in ["role", "pe1"] {
-            let seen = tour(&served, &json!({ "name": name, "frames": 6000, "quantity": quantity }));
+            let seen = tour(&served.address, &json!({ "name": name, "frames": 6000, "quantity": quantity }));
             assert!(seen["measured"]["rate"].as_f64() > Some(0.0), "{}", seen["measured"]);
         }
     }

@@ -37,7 +37,7 @@ impl Served {
         let (address, folder) = (server.address(), folder.to_owned());
         let stop = Arc::new(AtomicBool::new(false));
         let stopped = Arc::clone(&stop);
-        let serve = move || server.serve(session, folder, &stopped).expect("serves");
+        let serve = move || drop(server.serve(session, folder, &stopped).expect("serves"));
         Self { address, stop, thread: Some(std::thread::spawn(serve)) }
     }
 

@@ -8,9 +8,9 @@ use super::folders::temporary;
 use super::served::Served;
 
 /// Time for what a busy computer does in a moment.
-const PATIENCE: Duration = Duration::from_secs(60);
+pub const PATIENCE: Duration = Duration::from_secs(60);
 
-fn answer(host: &str, request: &str) -> String {
+pub fn answer(host: &str, request: &str) -> String {
     let mut stream = TcpStream::connect(host).expect("listens");
     stream.set_read_timeout(Some(PATIENCE)).expect("a socket");
     // One that is sent away need not take all of it.
@@ -20,7 +20,7 @@ fn answer(host: &str, request: &str) -> String {
     String::from_utf8_lossy(&bytes[..count]).into_owned()
 }
 
-fn socket_request(host: &str, token: &str, named: &str, origin: &str) -> String {
+pub fn socket_request(host: &str, token: &str, named: &str, origin: &str) -> String {
     let _ = host;
     format!(
         "GET /socket?token={token} HTTP/1.1\r\nHost: {named}\r\n{origin}Connection: Upgrade\r\nUpgrade: websocket\r\n\
@@ -101,7 +101,7 @@ fn floods_garbage_and_slow_readers_do_not_stop_the_session() {
 }
 
 /// Waits until something holds.
-fn soon(what: &str, holds: impl Fn() -> bool) {
+pub fn soon(what: &str, holds: impl Fn() -> bool) {
     let begun = Instant::now();
     while !holds() {
         assert!(begun.elapsed() < PATIENCE, "not in {PATIENCE:?}: {what}");
@@ -110,7 +110,7 @@ fn soon(what: &str, holds: impl Fn() -> bool) {
 }
 
 /// A socket that is let in, if need be once others have gone.
-fn let_in(host: &str, asks: &str) -> TcpStream {
+pub fn let_in(host: &str, asks: &str) -> TcpStream {
     let begun = Instant::now();
     loop {
         if let Ok(stream) = try_let_in(host, asks) {
@@ -131,7 +131,7 @@ fn try_let_in(host: &str, asks: &str) -> std::io::Result<TcpStream> {
 }
 
 /// A text frame of a client.
-fn masked(text: &[u8]) -> Vec<u8> {
+pub fn masked(text: &[u8]) -> Vec<u8> {
     let mut frame = vec![0x81];
     match text.len() {
         short @ ..126 => frame.push(0x80 | short as u8),

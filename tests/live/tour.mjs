@@ -4,7 +4,7 @@
 //
 // `drag` numbers the particle that is dragged, `cut` has the ends of a cut, `key` is a key to change, `fault` the robot that is
 // killed, `push` says where an obstacle is taken and how far it goes, `squeeze` that the slider is moved, `load` has the particle
-// whose edge is loaded, `frames` for how many milliseconds the frames are counted. FLOCKFORM_NODE_MODULES is a folder with
+// whose edge is loaded, `node` the leader of a node that is dragged, `frames` for how many milliseconds the frames are counted. FLOCKFORM_NODE_MODULES is a folder with
 // playwright-core and axe-core, FLOCKFORM_PICTURES one for screenshots.
 
 import { createRequire } from "node:module";
@@ -199,14 +199,45 @@ async function save(page) {
   seen.places = await page.evaluate(() => [[...window.report.bodies[0].dx], [...window.report.bodies[0].dy]]);
 }
 
-const profile = mkdtempSync(join(tmpdir(), "flockform-live-"));
-const executablePath = process.env.FLOCKFORM_CHROMIUM ?? "/usr/bin/chromium";
-const options = { executablePath, args: FLAGS, headless: true, viewport: { width: 1280, height: 1000 } };
-const context = await chromium.launchPersistentContext(profile, options);
-try {
-  const other = await open(context);
-  const page = await open(context);
-  await page.bringToFront();
+// The page of a node that takes commands: stopped, resumed, moved by a leader that is dragged.
+async function command(page) {
+  const mode = (name) => page.waitForFunction((n) => document.getElementById("node-mode").textContent.startsWith(n), name);
+  const said = (text) => page.waitForFunction((t) => document.getElementById("live-words").textContent.includes(t), text);
+  await page.waitForFunction(() => window.report.live.session.status.faults.length === 0);
+  await page.click("#node-stop");
+  await mode("emergency stop");
+  await shoot(page, `${asked.name}-stop`);
+  await page.click("#node-resume");
+  await mode("running");
+  await page.click("#node-switch");
+  await mode("inactive");
+  await page.click("#node-switch");
+  await mode("running");
+  await page.fill("#node-move [name=x]", "9");
+  await page.fill("#node-move [name=duration]", "0.1");
+  await page.click("#node-move button");
+  await said("duration of at least");
+  await page.fill("#node-move [name=duration]", "3");
+  await page.check("input[name=tool][value=drag]");
+  await page.locator(".canvas").scrollIntoViewIfNeeded();
+  const [x, y] = await onScreen(page, asked.node);
+  await page.mouse.move(x, y);
+  await page.mouse.down();
+  await page.mouse.move(x + 60, y - 30, { steps: 5 });
+  await page.mouse.up();
+  await said("under way for 3 s");
+  await page.waitForFunction(() => window.report.live.session.status.alarms.length > 0);
+  await shoot(page, `${asked.name}-moves`);
+  seen.alarms = await page.$$eval("#live-alarms li", (items) => items.map((item) => item.textContent));
+  // The program that led them before would go on for longer.
+  await later(page, (await clock(page)) + 4);
+  const posture = () => page.evaluate(() => JSON.stringify({ ...window.report.live.session.status.node }));
+  const before = await posture();
+  await later(page, (await clock(page)) + 0.5);
+  seen.isThere = (await posture()) === before;
+}
+
+async function everything(page, other) {
   await page.click("#play");
   await later(page, 0);
   if (asked.frames) {
@@ -239,6 +270,18 @@ try {
   await shoot(page, `${asked.name}-end`);
   await pause(page);
   await save(page);
+}
+
+const profile = mkdtempSync(join(tmpdir(), "flockform-live-"));
+const executablePath = process.env.FLOCKFORM_CHROMIUM ?? "/usr/bin/chromium";
+const options = { executablePath, args: FLAGS, headless: true, viewport: { width: 1280, height: 1000 } };
+const context = await chromium.launchPersistentContext(profile, options);
+try {
+  const other = await open(context);
+  const page = await open(context);
+  await page.bringToFront();
+  if (asked.node !== undefined) await command(page);
+  else await everything(page, other);
   await page.addScriptTag({ content: axe }).catch(() => {});
   seen.words = await page.textContent("#loading");
   console.log(JSON.stringify(seen));

@@ -1,5 +1,6 @@
 //! Who may command a node, and what nobody may.
 
+use std::sync::mpsc::sync_channel;
 use std::sync::{Arc, Mutex};
 
 use flockform::messages::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus};
@@ -13,6 +14,7 @@ use flockform::ros::edge::Quality;
 use flockform::ros::edge::lifecycle::State;
 use flockform::ros::edge::loggers::LogLevel;
 use flockform::ros::edge::parameters::Value;
+use flockform::ros::node::{CommandQueue, NodeCommand};
 use flockform::swarm::control::{Control, Mode};
 use ros2_client::ServiceMapping;
 
@@ -140,6 +142,46 @@ fn a_swarm_takes_the_commands_that_its_file_allows() {
         assert!(!change(&mut swarm, State::Inactive.label()), "no transition");
         assert_eq!(change(&mut swarm, "deactivate"), commands == "stop-only");
         assert!(!change(&mut swarm, "activate"));
+    }
+}
+
+#[test]
+fn commands_of_the_program_around_a_node_are_those_of_peers() {
+    let _peers = peers();
+    let permissions = [("none", [false; 4]), ("stop-only", [true, true, false, false]), ("all", [true; 4])];
+    for (allowed, may) in permissions {
+        let of = format!("node.commands={allowed}");
+        let overrides: Vec<&str> = PATIENT.into_iter().chain([of.as_str()]).collect();
+        let mut swarm = Swarming::open(&square(&overrides), &["-r", "__ns:=/own"]);
+        let (send, commands) = sync_channel(8);
+        let (answers, answered) = sync_channel(2);
+        swarm.node.take_commands(CommandQueue { commands, answers });
+        let asked = [
+            NodeCommand::ChangeState("deactivate"),
+            NodeCommand::EmergencyStop,
+            NodeCommand::Resume,
+            NodeCommand::SetFormation(SetFormationRequest {
+                translate: [1.0, 0.0],
+                duration: 5.0,
+                ..moved()
+            }),
+        ];
+        for (command, may) in asked.into_iter().zip(may) {
+            send.send((7, command.clone())).expect("there is room");
+            swarm.tick();
+            let (number, answer) = answered.try_recv().expect("answered in the same period");
+            assert_eq!((number, answer.is_ok()), (7, may), "{allowed}, {command:?}: {answer:?}");
+            assert!(may || answer.is_err_and(|words| words.contains(allowed)));
+        }
+        // A second transition in one period, and answers that nobody takes.
+        for label in ["activate", "deactivate", "activate"] {
+            send.send((8, NodeCommand::ChangeState(label))).expect("room");
+        }
+        swarm.tick();
+        let second = answered.try_iter().nth(1).expect("two have room").1;
+        assert!(second.is_err_and(|words| words.contains("another transition") || words.contains(allowed)));
+        let state = serde_json::to_value(swarm.node.kept()).expect("JSON")["state"].clone();
+        assert_eq!(state, if allowed == "stop-only" { "inactive" } else { "active" });
     }
 }
 

@@ -13,6 +13,7 @@ use super::view::{Animation, Clock, Outline, Quantity, View};
 use crate::flock::role::Role;
 use crate::flock::vectors::Vectors;
 use crate::scene::swarm::Swarm;
+use crate::swarm::control::Control;
 use crate::swarm::flight::{Flight, FlightReport, Record};
 
 /// Bits of every quantity.
@@ -34,15 +35,16 @@ pub struct FlightRecorder {
 impl FlightRecorder {
     /// From the flight before its first period.
     pub fn new(flight: &Flight) -> Self {
-        Self::since(flight, flight.fleet().places())
+        let places = flight.fleet().places();
+        Self::since(flight.control(), &places, places.clone())
     }
 
-    /// As [`FlightRecorder::new`], with displacements from these places \[m\].
-    fn since(flight: &Flight, start: Vectors) -> Self {
+    /// Robots at these places \[m\], with displacements from `start` \[m\].
+    fn since(control: &Control, places: &Vectors, start: Vectors) -> Self {
         let channel = |name, bits| Channel { name, bits };
         let mut channels = vec![channel("dx", BITS), channel("dy", BITS)];
         channels.extend(["clearance", "age", "pe1", "strain"].map(|name| channel(name, BITS)));
-        let formation = flight.control().formation();
+        let formation = control.formation();
         let count = formation.count();
         // Seen from both ends or from one, a line between two robots is one line.
         let mut links: Vec<[u32; 2]> = (0..count)
@@ -55,9 +57,9 @@ impl FlightRecorder {
             start,
             links,
             leads: (0..count).map(|m| formation.leads(m)).collect(),
-            period: flight.control().period(),
+            period: control.period(),
         };
-        recorder.keep(flight, false);
+        recorder.keep(control, places, 0, false);
         recorder
     }
 
@@ -65,24 +67,23 @@ impl FlightRecorder {
     pub fn watch(&mut self, flight: &Flight) {
         let (period, is_last) = (flight.fleet().period(), flight.fleet().period() == flight.periods());
         if is_last || self.frames.wants(period as usize) {
-            self.keep(flight, is_last);
+            self.keep(flight.control(), &flight.fleet().places(), period, is_last);
         }
     }
 
-    fn keep(&mut self, flight: &Flight, is_last: bool) {
-        let (control, places) = (flight.control(), flight.fleet().places());
+    fn keep(&mut self, control: &Control, places: &Vectors, period: u64, is_last: bool) {
         let count = places.len();
         let moved = |now: &[f64], then: &[f64]| now.iter().zip(then).map(|(n, t)| n - t).collect();
         let (dx, dy): (Vec<f64>, Vec<f64>) =
             (moved(&places.x, &self.start.x), moved(&places.y, &self.start.y));
         let mut clearance = Vec::new();
-        control.filter().clearance(&places, &mut clearance);
+        control.filter().clearance(places, &mut clearance);
         let age: Vec<f64> = (0..count).map(|m| control.age(m).unwrap_or(f64::NAN)).collect();
-        let measures = control.formation().measures(&places);
+        let measures = control.formation().measures(places);
         let strain: Vec<f64> =
             measures.strain.iter().map(|strain| strain.map_or(f64::NAN, |s| s.largest())).collect();
         let values = [&dx[..], &dy, &clearance, &age, &measures.pe1, &strain];
-        let period = flight.fleet().period() as usize;
+        let period = period as usize;
         if is_last { self.frames.keep_last(period, &values) } else { self.frames.keep(period, &values) }
     }
 
@@ -113,11 +114,12 @@ impl FlightRecorder {
         self.finished(stage)
     }
 
-    /// Robots as they are, in a single frame; displacements are from `start` \[m\].
+    /// Robots at these places \[m\], in a single frame; displacements are from their nominal places.
     #[cfg(feature = "live")]
-    pub(crate) fn still(swarm: &Swarm, flight: &Flight, start: &Vectors) -> View {
-        let mut recorder = Self::since(flight, start.clone());
-        let stage = recorder.begun(swarm, flight.control().formation().names.clone());
+    pub(crate) fn still(swarm: &Swarm, control: &Control, places: &Vectors) -> View {
+        let formation = control.formation();
+        let mut recorder = Self::since(control, places, formation.places.clone());
+        let stage = recorder.begun(swarm, formation.names.clone());
         recorder.finished(stage)
     }
 

@@ -4,6 +4,7 @@
 //! bounded queues. Everything it holds is polled; a peer that is slow, gone or wrong cannot hold it up, and a
 //! middleware that does ends the process ([`pulse`](super::edge::pulse)).
 
+mod commands;
 mod drive;
 mod endpoints;
 mod error;
@@ -35,7 +36,6 @@ use crate::messages::diagnostic_msgs::DiagnosticArray;
 use crate::messages::flockform_msgs::{LoopEvent, SetFormation, SetFormationResponse};
 pub use crate::messages::formation::NAME;
 use crate::messages::formation::diagnostics::{self, Statistics};
-use crate::messages::formation::leaders::{as_event, set_formation};
 use crate::messages::rcl_interfaces::Log;
 use crate::messages::recorder::{self, MessageRecorder, RecordSink};
 use crate::messages::std_msgs::Empty;
@@ -47,6 +47,8 @@ use crate::swarm::control::scope::NodeScope;
 use crate::swarm::pace::{Pace, system_time};
 use crate::swarm::transport::complaints::Complaints;
 use crate::swarm::transport::{ControllerEnd, listen, targets};
+pub use commands::{Answer, CommandQueue, NodeCommand};
+use commands::{Commanded, MOST_AT_ONCE, not_allowed};
 use endpoints::Endpoints;
 pub use error::NodeError;
 pub use kept::KeptNode;
@@ -67,6 +69,8 @@ pub struct FormationNode {
     stop_requests: Option<Subscription<Empty>>,
     resume: Service<std_srvs::Trigger>,
     set_formation: Service<SetFormation>,
+    /// Of the program around the node, where it has any.
+    queue: Option<CommandQueue>,
     /// Of a log whose level can change.
     descriptions: TypeDescriptions,
     loggers: Option<Loggers>,
@@ -125,6 +129,7 @@ impl FormationNode {
                 .transpose()?,
             resume: node.service(&service("resume")?)?,
             set_formation: node.service(&service("set_formation")?)?,
+            queue: None,
             descriptions: TypeDescriptions::new(&node)?,
             loggers: None,
             rosout: None,
@@ -201,6 +206,11 @@ impl FormationNode {
     pub fn publish_log(&mut self, lines: Receiver<Log>) -> Result<(), EdgeError> {
         self.rosout = Some(Rosout::new(&self.origin.node, lines)?);
         Ok(())
+    }
+
+    /// Takes commands of this queue from now on, as those of peers.
+    pub fn take_commands(&mut self, queue: CommandQueue) {
+        self.queue = Some(queue);
     }
 
     /// Has a watchdog end this process when the middleware is dead or deaf: for programs that are started again.
@@ -333,70 +343,71 @@ impl FormationNode {
     }
 
     fn answer(&mut self, now: f64) {
-        let commands = self.origin.swarm.raw.node.commands;
-        let not_allowed = format!("the swarm file has node.commands = \"{}\"", commands.name());
+        let allowed = self.origin.swarm.raw.node.commands;
         let may_switch = |edge: &Transition| {
-            commands.may_do_all() || (commands.may_stop() && ["deactivate", "shutdown"].contains(&edge.label))
+            allowed.may_do_all() || (allowed.may_stop() && ["deactivate", "shutdown"].contains(&edge.label))
         };
+        let own: Vec<(u64, NodeCommand)> =
+            self.queue.iter().flat_map(|queue| queue.commands.try_iter().take(MOST_AT_ONCE)).collect();
+        let own_transition = own.iter().find_map(|(_, command)| match command {
+            NodeCommand::ChangeState(label) => Some(*label),
+            _ => None,
+        });
         let pulse = self.pulse.clone();
         let (lifecycle, mut transitions) = self.transitions(now);
-        lifecycle.poll(now, &may_switch, &mut |goal| match &pulse {
+        let mut act = |goal| match &pulse {
             Some(pulse) => pulse.untimed(|| transitions.act(goal)),
             None => transitions.act(goal),
-        });
+        };
+        lifecycle.poll(now, &may_switch, &mut act);
+        // After those of peers, which it cannot keep out.
+        let changed =
+            own_transition.is_some_and(|label| lifecycle.change(0, label, now, &may_switch, &mut act));
         self.record_beginning(now);
         if self.lifecycle.is_active() != self.was_active {
             self.was_active = self.lifecycle.is_active();
             let kind = if self.was_active { LoopEvent::ACTIVE } else { LoopEvent::INACTIVE };
             self.record_event(now, kind, "", &[]);
         }
-        let locked = (!commands.may_do_all()).then_some(not_allowed.as_str());
+        let not_allowed = not_allowed(allowed);
+        let locked = (!allowed.may_do_all()).then_some(not_allowed.as_str());
         if let Some(loggers) = &self.loggers {
             loggers.serve(locked);
         }
         self.descriptions.serve();
         let changes = self.parameters.poll(now, locked);
         self.apply(&changes, now);
-        let mut events: Vec<(u8, String, Vec<f64>)> = Vec::new();
-        let outcome = |success, message: &str| std_srvs::Outcome { success, message: message.into() };
-        let control = &mut self.control;
-        let mut stop_all = || {
-            control.emergency_stop();
-            events.push((LoopEvent::EMERGENCY_STOP, String::new(), Vec::new()));
-        };
+        let is_configured = self.endpoints.is_some();
+        let mut commanded =
+            Commanded { control: &mut self.control, allowed, is_configured, events: Vec::new() };
         if self.stop_requests.as_ref().is_some_and(|requests| requests.take_last().is_some()) {
             tracing::warn!("emergency stop by topic");
-            stop_all();
+            let _ = commanded.perform(&NodeCommand::EmergencyStop);
         }
-        self.stop.serve(|_| {
-            if !commands.may_stop() {
-                return outcome(false, &not_allowed);
-            }
-            stop_all();
-            outcome(true, "every robot holds its place until ~/resume")
-        });
-        self.resume.serve(|_| match commands.may_do_all() && control.resume() {
-            _ if !commands.may_do_all() => outcome(false, &not_allowed),
-            true => {
-                events.push((LoopEvent::RESUME, String::new(), Vec::new()));
-                outcome(true, "the formation goes on")
-            }
-            false => outcome(false, "there is no emergency stop to lift"),
-        });
-        let is_configured = self.endpoints.is_some();
-        let mut set = |request: &_| match locked {
-            Some(reason) => Err(reason.to_owned()),
-            None if !is_configured => Err("the node is not configured".to_owned()),
-            None => set_formation(control, request),
+        let outcome = |answer: Answer| {
+            let (success, message) = (answer.is_ok(), answer.unwrap_or_else(|refused| refused));
+            std_srvs::Outcome { success, message }
         };
-        self.set_formation.serve(|request| match set(&request) {
-            Ok(message) => {
-                events.push(as_event(&request));
-                SetFormationResponse { success: true, message }
-            }
-            Err(message) => SetFormationResponse { success: false, message },
+        self.stop.serve(|_| outcome(commanded.perform(&NodeCommand::EmergencyStop)));
+        self.resume.serve(|_| outcome(commanded.perform(&NodeCommand::Resume)));
+        self.set_formation.serve(|request| {
+            let answer = outcome(commanded.perform(&NodeCommand::SetFormation(request)));
+            SetFormationResponse { success: answer.success, message: answer.message }
         });
-        for (kind, text, values) in events {
+        let mut transition = own_transition.map(|label| match (changed, locked) {
+            (true, _) => Ok(format!("{label}: done")),
+            (false, Some(reason)) => Err(reason.to_owned()),
+            (false, None) => {
+                Err(format!("{label}: not possible, the node is {}", self.lifecycle.state().label()))
+            }
+        });
+        for (number, command) in own {
+            let is_transition = matches!(command, NodeCommand::ChangeState(_));
+            let answer = is_transition.then(|| transition.take()).flatten();
+            let answer = answer.unwrap_or_else(|| commanded.perform(&command));
+            self.queue.iter().for_each(|queue| drop(queue.answers.try_send((number, answer.clone()))));
+        }
+        for (kind, text, values) in commanded.events {
             self.record_event(now, kind, &text, &values);
         }
         // A node that was switched off in an emergency stop stays off after it.

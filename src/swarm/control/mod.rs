@@ -509,12 +509,12 @@ impl Control {
 
     /// Strain and PE1 from the poses of the last tick; members never seen count at their nominal places.
     pub fn measures(&self) -> Measures {
-        self.formation.measures(&self.seen_places())
+        self.formation.measures(&self.last_places())
     }
 
     /// Each member's place of rest with the leaders as they are \[m\]; `None` where the rule is not linear.
     pub fn settled(&self) -> Option<Vectors> {
-        self.formation.settled(&self.seen_places())
+        self.formation.settled(&self.last_places())
     }
 
     /// Largest distance of a follower with a usable pose from where it comes to rest \[m\].
@@ -535,7 +535,8 @@ impl Control {
         &self.filter
     }
 
-    fn seen_places(&self) -> Vectors {
+    /// The members' last known places; those never known are nominal \[m\].
+    pub fn last_places(&self) -> Vectors {
         let mut places = self.formation.places.clone();
         for member in (0..places.len()).filter(|&member| self.known[member]) {
             places.set(member, self.present.get(member));

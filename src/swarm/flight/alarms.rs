@@ -1,10 +1,11 @@
-//! Declared bounds that are broken in the period just flown, and by which robots.
+//! Declared bounds that are broken now, and by which robots.
 
-use super::measure::Record;
+use super::Flight;
+use super::measure::{Record, closest, farthest};
 use super::moment::Extreme;
-use super::{Flight, Sample};
 use crate::flock::vectors::Vectors;
 use crate::scene::swarm::Swarm;
+use crate::swarm::control::Control;
 
 /// A declared bound that does not hold now.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,26 +24,55 @@ impl Alarm {
     /// The bounds that the period just flown breaks; `before` is where the robots were as it began.
     pub fn now(swarm: &Swarm, flight: &Flight, before: &Vectors) -> Vec<Self> {
         let mut record = Record::new(swarm, flight);
-        let Sample { affine_error, clearance, continuum_error, .. } = record.take(flight, before);
-        let bounds = &swarm.raw.flight.bounds;
+        let sample = record.take(flight, before);
         let [affine, _, continuum] = record.farthest.last().copied().unwrap_or_default();
-        let above = |bound, declared: Option<f64>, found: Option<f64>, by: Option<Extreme>| {
-            let (declared, found) = (declared?, found?);
-            (found > declared).then(|| Alarm { bound, declared, found, robots: robots(by) })
-        };
-        let too_close = bounds.clearance.filter(|&declared| clearance < declared).map(|declared| Alarm {
-            bound: "clearance",
-            declared,
-            found: clearance,
-            robots: robots(record.closest),
-        });
-        let alarms = [
-            above("affine_error", bounds.affine_error, affine_error, affine),
-            above("continuum_error", bounds.continuum_error, continuum_error, continuum),
-            too_close,
-        ];
-        alarms.into_iter().flatten().collect()
+        broken(swarm, affine, continuum, sample.clearance, record.closest)
     }
+
+    /// The bounds that robots break by their last poses. A robot without a usable pose breaks none, and no continuum
+    /// run goes beside such a swarm.
+    pub fn of_poses(swarm: &Swarm, control: &Control) -> Vec<Self> {
+        let (formation, time) = (control.formation(), control.program_time());
+        let present = control.last_places();
+        let is_usable = |m: usize| control.health(m).is_usable();
+        let affine = formation.affine(time);
+        let affine = affine
+            .and_then(|map| farthest(&present, time, &|m| map.apply(formation.places.get(m)), is_usable));
+        let mut around = Vec::new();
+        control.clearance(&mut around);
+        let of_usable =
+            around.iter().enumerate().map(|(m, &gap)| if is_usable(m) { gap } else { f64::INFINITY });
+        let around: Vec<f64> = of_usable.collect();
+        let clearance = around.iter().copied().fold(f64::INFINITY, f64::min);
+        let by = closest(&around, clearance, &present, time);
+        broken(swarm, affine, None, clearance, Some(by))
+    }
+}
+
+fn broken(
+    swarm: &Swarm,
+    affine: Option<Extreme>,
+    continuum: Option<Extreme>,
+    clearance: f64,
+    closest: Option<Extreme>,
+) -> Vec<Alarm> {
+    let bounds = &swarm.raw.flight.bounds;
+    let above = |bound, declared: Option<f64>, by: Option<Extreme>| {
+        let (declared, found) = (declared?, by?.value);
+        (found > declared).then(|| Alarm { bound, declared, found, robots: robots(by) })
+    };
+    let too_close = bounds.clearance.filter(|&declared| clearance < declared).map(|declared| Alarm {
+        bound: "clearance",
+        declared,
+        found: clearance,
+        robots: robots(closest),
+    });
+    let alarms = [
+        above("affine_error", bounds.affine_error, affine),
+        above("continuum_error", bounds.continuum_error, continuum),
+        too_close,
+    ];
+    alarms.into_iter().flatten().collect()
 }
 
 fn robots(by: Option<Extreme>) -> Vec<usize> {

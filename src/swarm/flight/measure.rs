@@ -83,14 +83,7 @@ impl Record {
             self.closest = Some(closest(&self.around, clearance, &present, time));
         }
         let farthest = |place: &dyn Fn(usize) -> [f64; 2], sound_only: bool| {
-            let apart = |member: usize| {
-                let here = present.get(member);
-                let (value, other) = (distance(place(member), here), None);
-                Extreme { value, member, other, time, place: here }
-            };
-            let counts = |&m: &usize| !sound_only || flight.fleet().is_sound(m);
-            let all = (0..formation.count()).filter(counts).map(apart);
-            all.max_by(|a, b| a.value.total_cmp(&b.value).then(b.member.cmp(&a.member)))
+            farthest(&present, time, place, |m| !sound_only || flight.fleet().is_sound(m))
         };
         let affine = formation.affine(control.program_time());
         let affine = affine.map(|map| farthest(&|m| map.apply(formation.places.get(m)), true));
@@ -120,8 +113,24 @@ impl Record {
     }
 }
 
+/// The robot farthest from its place, among those that count.
+pub(super) fn farthest(
+    present: &Vectors,
+    time: f64,
+    place: &dyn Fn(usize) -> [f64; 2],
+    counts: impl Fn(usize) -> bool,
+) -> Option<Extreme> {
+    let apart = |member: usize| {
+        let here = present.get(member);
+        let (value, other) = (distance(place(member), here), None);
+        Extreme { value, member, other, time, place: here }
+    };
+    let all = (0..present.len()).filter(|&m| counts(m)).map(apart);
+    all.max_by(|a, b| a.value.total_cmp(&b.value).then(b.member.cmp(&a.member)))
+}
+
 /// The robots that came that close.
-fn closest(around: &[f64], value: f64, present: &Vectors, time: f64) -> Extreme {
+pub(super) fn closest(around: &[f64], value: f64, present: &Vectors, time: f64) -> Extreme {
     let those = |&m: &usize| around[m] == value;
     let member = (0..around.len()).find(those).unwrap_or(0);
     let here = present.get(member);

@@ -10,6 +10,8 @@ mod layout;
 mod links;
 mod settling;
 
+use std::sync::Arc;
+
 use crate::engine::Engine;
 use crate::flock::manoeuvre::{Affine, Manoeuvre, Posture};
 use crate::flock::motion::Motion;
@@ -39,7 +41,8 @@ pub struct Formation {
     leads: Vec<Option<Lead>>,
     course: TargetSource,
     spacing: f64,
-    settling: Option<Settling>,
+    /// Shared by copies: it is large, and never changed.
+    settling: Option<Arc<Settling>>,
     /// Roles for which `settling` was computed.
     settled_roles: Vec<Role>,
     /// Whether a scene's own program leads.
@@ -395,7 +398,7 @@ impl Formation {
         let TargetSource::Rule { engine, .. } = &self.course else { return };
         if self.settled_roles != engine.roles() {
             self.settled_roles = engine.roles().to_vec();
-            self.settling = Settling::of(engine);
+            self.settling = Settling::of(engine).map(Arc::new);
         }
     }
 }

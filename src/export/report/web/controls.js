@@ -37,7 +37,7 @@ export function listenToView(view) {
     else move(...by);
   });
   const end = (event) => {
-    if (from && tool) tool.end(local(event));
+    if (from && tool) tool.end(local(event), event);
     tool = null;
     from = null;
     box.classList.remove("dragged");

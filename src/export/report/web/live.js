@@ -2,7 +2,7 @@
 
 import { words } from "./colour.js";
 import { breakBonds, kindOf, LiveFrames } from "./live_frames.js";
-import { drawAlarms, takeTool } from "./live_tools.js";
+import { drawAlarms, drawDashes, drawTargets, takeFormation, takeTool } from "./live_tools.js";
 import { drawNow, started } from "./page.js";
 import { bodies, data, element, shown, state } from "./shown.js";
 
@@ -10,6 +10,8 @@ import { bodies, data, element, shown, state } from "./shown.js";
 const RANGE_EVERY = 250;
 // Keys worth a try that a file may leave out.
 const SUGGESTED = ["update.damping=0.8", "rule.feedback.factor=-0.05", "fracture.stretch=1.5", "frame=immediate"];
+// Time after which a node's page tries to connect again, in ms.
+const AGAIN_AFTER = 1000;
 // Time after which a frame is drawn though the browser does not ask for it, in ms.
 const HIDDEN_EVERY = 300;
 
@@ -40,13 +42,14 @@ class LivePlayer {
   }
 
   toggle() {
-    ask({ do: this.playing ? "pause" : "play" });
+    if (!data.live.node) ask({ do: this.playing ? "pause" : "play" });
   }
 
   pause() {}
 
   // One on is a step; the only other place is the one before the last deed.
   go(frame) {
+    if (data.live.node) return;
     if (frame > 0) ask({ do: "step" });
     else if (frame < 0) ask({ do: "undo" });
   }
@@ -65,17 +68,22 @@ function connect() {
   socket.onmessage = ({ data: message }) => (typeof message === "string" ? hear(JSON.parse(message)) : receive(message));
   socket.onopen = () => {
     document.body.dataset.live = "open";
+    if (data.live.node) say("");
     askForQuantity();
   };
   socket.onclose = () => {
     document.body.dataset.live = "closed";
-    say("The session is over, or has no room for another viewer.");
+    // A node's next process serves the same address.
+    if (data.live.node) {
+      say("No connection to the node: what is shown is old. Trying again.");
+      setTimeout(connect, AGAIN_AFTER);
+    } else say("The session is over, or has no room for another viewer.");
   };
   session.socket = socket;
 }
 
 function hear(event) {
-  if (event.event === "refused") say(event.words);
+  if (event.event === "refused" || event.event === "done") say(event.words);
   else if (event.event === "saved") {
     say(`Saved as ${event.path}. Replay: ${event.command}`);
     document.body.dataset.saved = event.path;
@@ -94,6 +102,7 @@ function takeStatus(status) {
   element("speed").value = String(status.speed);
   element("live-undo").disabled = status.undo === 0;
   if (status.stopped) say(status.stopped);
+  if (status.node) takeNode(status.node);
   // The page knows the present alone: where they are now is where they ever were.
   status.obstacles.forEach((by, k) => (bodies[0].animation.outlines[k].moves = [[-Infinity, ...by]]));
   element("live-alarms").replaceChildren(
@@ -108,6 +117,54 @@ function takeStatus(status) {
     const value = values.get(input.dataset.key);
     if (input !== document.activeElement && input.value !== value) input.value = value;
   }
+}
+
+// What a node says of itself: empty fields of the form stand for the posture that the leaders have now.
+function takeNode(node) {
+  const inMode = (mode) => node.mode.startsWith(mode);
+  element("node-mode").textContent = node.mode;
+  element("node-mode").className = inMode("emergency") ? "bad" : "";
+  element("node-resume").disabled = !(element("node-stop").disabled = inMode("emergency"));
+  element("node-switch").textContent = inMode("inactive") ? "activate" : "deactivate";
+  const { elements } = element("node-move");
+  for (const [name, value] of Object.entries(postureFields(node))) elements[name].placeholder = words(value);
+}
+
+function postureFields({ translate: [x, y], rotate, stretch }) {
+  return { x, y, turn: (rotate * 180) / Math.PI, "stretch-x": stretch[0], "stretch-y": stretch[1] };
+}
+
+function moveFormation(by) {
+  const { node } = session.status;
+  const { elements } = element("node-move");
+  const now = postureFields(node);
+  const value = (name) => (elements[name].value === "" || by ? now[name] : elements[name].valueAsNumber);
+  const translate = ["x", "y"].map((name, k) => value(name) + (by?.[k] ?? 0));
+  const stretch = [value("stretch-x"), value("stretch-y")];
+  const rotate = (value("turn") * Math.PI) / 180;
+  ask({ do: "set-formation", translate, rotate, stretch, shear: node.shear, duration: elements.duration.valueAsNumber || 0 });
+}
+
+function listenToNode({ commands, manoeuvres }) {
+  document.body.classList.add("is-node");
+  element("live-node").hidden = false;
+  element("node-commands").hidden = element("live-tools").hidden = !commands;
+  document.querySelector("input[name=tool][value=look]").checked = true;
+  element("node-stop").addEventListener("click", () => ask({ do: "emergency-stop" }));
+  element("node-resume").addEventListener("click", () => ask({ do: "resume" }));
+  element("node-switch").addEventListener("click", ({ target }) => ask({ do: target.textContent }));
+  const onSubmit = (id, send) =>
+    element(id).addEventListener("submit", (event) => {
+      event.preventDefault();
+      send();
+    });
+  onSubmit("node-move", () => moveFormation());
+  onSubmit("node-manoeuvre", () => ask({ do: "set-formation", name: element("node-manoeuvre").elements.name.value }));
+  element("node-manoeuvre").hidden = manoeuvres.length === 0;
+  const options = manoeuvres.map((name) => Object.assign(document.createElement("option"), { value: name, textContent: name }));
+  element("node-manoeuvre").elements.name.replaceChildren(...options);
+  const mark = (from, to) => (session.pull = from && [from, to]);
+  shown.tool = (view, at) => takeFormation(view, at, mark, moveFormation);
 }
 
 function receive(buffer) {
@@ -160,8 +217,9 @@ function measure(frame, transfer, drawing) {
   measured.rate = (1000 * measured.drawn) / (now - measured.since);
   Object.assign(measured, { drawn: 0, since: now, step: frame.stepTime, encoding: frame.frameTime });
   const [steps] = session.status.rates ?? [0];
+  const engine = data.live.node ? "states/s;" : `steps/s; a step takes ${words(frame.stepTime, 2)} ms,`;
   element("loading").textContent =
-    `${words(measured.rate, 3)} frames/s, ${words(steps, 3)} steps/s; a step takes ${words(frame.stepTime, 2)} ms, a frame ` +
+    `${words(measured.rate, 3)} frames/s, ${words(steps, 3)} ${engine} a frame ` +
     `${words(frame.frameTime, 2)} ms to make, ${words(measured.transfer, 2)} ms to come, ${words(measured.drawing, 2)} ms to draw.`;
 }
 
@@ -235,15 +293,20 @@ function startLive() {
   shown.player = Object.assign(new LivePlayer(), { changed });
   shown.say = say;
   shown.tool = (view, at, event) => takeTool(view, at, event, ask);
-  shown.over = (view) => drawAlarms(view, session.status);
+  shown.over = (view) => {
+    drawTargets(view);
+    drawAlarms(view, session.status);
+    if (session.pull) drawDashes(view, ...session.pull);
+  };
   document.body.classList.add("is-live");
   element("layer-ways").closest("label").hidden = true;
   element("layer-ways").checked = state.layers.ways = false;
   element("layer-cracks").closest("label").hidden = true;
   element("tool-cut").hidden = element("tool-load").hidden = data.live.swarm;
-  element("live-robot").hidden = !data.live.swarm;
+  element("live-robot").hidden = !data.live.swarm || Boolean(data.live.node);
   showNumbers();
   listenToSession();
+  if (data.live.node) listenToNode(data.live.node);
   window.report.live = { session, measured, ask };
   connect();
 }

@@ -83,6 +83,11 @@ function pull(view, at, side, ask) {
 function drawKnife(view, from, to) {
   view.isClear = false;
   view.drawOver();
+  drawDashes(view, from, to);
+  view.isClear = false;
+}
+
+export function drawDashes(view, from, to) {
   const pen = view.over.getContext("2d");
   pen.beginPath();
   pen.moveTo(...from);
@@ -92,7 +97,47 @@ function drawKnife(view, from, to) {
   pen.setLineDash([5, 4]);
   pen.stroke();
   pen.setLineDash([]);
-  view.isClear = false;
+}
+
+// Drags a leader of a node: where it is let go, `send(by)` sends the formation, and not before. `mark(from, to)` marks the way.
+export function takeFormation(view, at, mark, send) {
+  const { firstRoles, animation } = view.body;
+  const particle = toolName() === "drag" ? view.nearest(...at) : -1;
+  if (particle < 0 || animation.role_names[firstRoles[particle]] !== "leader") return null;
+  const from = placeAt(view, at);
+  const move = (to) => mark(at, to);
+  const end = (to, event) => {
+    mark();
+    if (event.type !== "pointerup" || Math.hypot(to[0] - at[0], to[1] - at[1]) < 4) return false;
+    const place = placeAt(view, to);
+    send([0, 1].map((k) => (place[k] - from[k]) / (state.factor || 1)));
+    return true;
+  };
+  return { move, end };
+}
+
+// Lines from robots to their targets.
+export function drawTargets(view) {
+  const { body, show } = view;
+  const [tx, ty] = ["target_dx", "target_dy"].map((name) => body.frames.values.get(name));
+  if (!tx || !ty) return;
+  const pen = view.over.getContext("2d");
+  pen.lineWidth = 1;
+  pen.strokeStyle = themeText("ink");
+  pen.beginPath();
+  for (let i = 0; i < body.count; i++) {
+    if (!Number.isFinite(tx[i] + ty[i])) continue;
+    const [x, y] = view.at(i);
+    const [u, v] = view.place([body.X[i] + show.factor * tx[i], body.Y[i] + show.factor * ty[i]]);
+    if (Math.hypot(u - x, v - y) < 2) continue;
+    pen.moveTo(x, y);
+    pen.lineTo(u, v);
+    pen.moveTo(u - 3, v - 3);
+    pen.lineTo(u + 3, v + 3);
+    pen.moveTo(u - 3, v + 3);
+    pen.lineTo(u + 3, v - 3);
+  }
+  pen.stroke();
 }
 
 // Rings around robots that break a bound, and crosses on those that have a fault.

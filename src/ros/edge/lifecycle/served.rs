@@ -8,7 +8,7 @@ use crate::ros::edge::{EdgeError, Node, Publisher, Quality, Service};
 /// `~/get_available_transitions`, `~/get_transition_graph`, with the topic `~/transition_event`.
 pub struct Lifecycle {
     machine: Machine,
-    change: Service<msgs::ChangeState>,
+    changes: Service<msgs::ChangeState>,
     state: Service<msgs::GetState>,
     states: Service<msgs::GetAvailableStates>,
     transitions: Service<msgs::GetAvailableTransitions>,
@@ -24,7 +24,7 @@ impl Lifecycle {
     pub fn new(node: &Node) -> Result<Self, EdgeError> {
         Ok(Self {
             machine: Machine::default(),
-            change: node.service(&node.private("change_state")?)?,
+            changes: node.service(&node.private("change_state")?)?,
             state: node.service(&node.private("get_state")?)?,
             states: node.service(&node.private("get_available_states")?)?,
             transitions: node.service(&node.private("get_available_transitions")?)?,
@@ -84,15 +84,27 @@ impl Lifecycle {
         may: &dyn Fn(&Transition) -> bool,
         act: &mut dyn FnMut(Goal) -> Outcome,
     ) {
-        if let Some((id, request)) = self.change.take() {
+        if let Some((id, request)) = self.changes.take() {
             let asked = request.transition;
-            let edge = self.machine.asked(asked.id, &asked.label).filter(may);
-            let success = edge.is_some_and(|edge| self.run(edge, now, act));
-            if let Err(error) = self.change.reply(&id, &msgs::ChangeStateResponse { success }) {
+            let success = self.change(asked.id, &asked.label, now, may, act);
+            if let Err(error) = self.changes.reply(&id, &msgs::ChangeStateResponse { success }) {
                 tracing::warn!("{error}");
             }
         }
         self.answer_questions();
+    }
+
+    /// Makes a transition as a peer's request does, by its label where the id is 0; says whether what it asks for was done.
+    pub fn change(
+        &mut self,
+        id: u8,
+        label: &str,
+        now: f64,
+        may: &dyn Fn(&Transition) -> bool,
+        act: &mut dyn FnMut(Goal) -> Outcome,
+    ) -> bool {
+        let edge = self.machine.asked(id, label).filter(may);
+        edge.is_some_and(|edge| self.run(edge, now, act))
     }
 
     /// Follows an edge to the next primary state; says whether what it asks for was done.
