@@ -23,7 +23,7 @@ impl ControllerEnd for Served {
     type Error = <Controller as ControllerEnd>::Error;
 
     fn receive(&mut self, now: f64, take: &mut dyn FnMut(Received)) {
-        self.link.receive(now, hear);
+        self.link.receive(now, take);
     }
 
     fn send(&mut self, now: f64, targets: &[Target]) -> Result<(), Self::Error> {

@@ -236,7 +236,7 @@ impl Control {
         self.is_believed(place) && self.formation.place_leader(member, place)
     }
 
-    /// As [`Control::tell`], for any leader, whose own program ends with this.
+    /// As [`Control::place_leader`], for any leader, whose own program ends with this.
     pub fn take_over(&mut self, member: usize, place: [f64; 2]) -> bool {
         self.is_believed(place) && self.formation.take_over(member, place)
     }
