@@ -16,7 +16,6 @@ use flockform::continuum::looks::Looks;
 use flockform::continuum::plan::Plan;
 use flockform::continuum::run::{Outcome, SharedError, StopReason, require_shareable, resume, run_shared};
 use flockform::export::checkpoint::{self, Checkpoint, RunRequest};
-use flockform::export::figures::Formats;
 use flockform::export::film::{self, FilmColour};
 use flockform::export::memory::Outputs;
 use flockform::export::report;
@@ -116,8 +115,7 @@ impl Prepared {
             equilibrium.request.interrupt = Interrupt::new(interrupt::flag());
         }
         let plan = plan(&scene)?;
-        let outputs = Outputs { figures: arguments.figures.formats(), report: !arguments.report.no_report };
-        memory::require(&scene, memory::predicted(&scene, &plan, outputs) as f64)?;
+        memory::require(&scene, memory::predicted(&scene, &plan, arguments.outputs()) as f64)?;
         let digest = digest(&plan);
         left.as_ref().map_or(Ok(()), |left| left.require_of(&scene, digest))?;
         Ok(Self { left, asked, scene, words, plan, digest })
@@ -169,9 +167,8 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
     tracing::info!("planned {} particles of `{}` in {setup:.1?}", plan.count(), scene.name);
     tracing::info!("{}", flockform::sweep::chosen_here());
 
-    let mut recorder = Recorder::new(&scene, &plan, &folder, left.as_ref())?;
-    (recorder.reports, recorder.films) = (!arguments.report.no_report, film.is_some());
-    recorder.draws = arguments.figures.formats() != Formats::None;
+    let recorder =
+        Recorder::new(&scene, &plan, &folder, left.as_ref(), (arguments.outputs(), film.is_some()))?;
     let about = About { source: "run", name: scene.name.clone(), ..About::default() };
     let recording = arguments.record.open(&about, arguments.output.force, 1)?;
     let messages = recording.as_ref().map(|one| BodyMessages::new(&scene, one.sink())).transpose()?;
@@ -281,6 +278,10 @@ fn resume_words(folder: &OutputFolder) -> String {
 }
 
 impl RunArguments {
+    fn outputs(&self) -> Outputs {
+        Outputs { figures: self.figures.formats(), report: !self.report.no_report }
+    }
+
     /// The requested run, independent of the working folder.
     fn asked(&self, left: Option<&ResumedRun>) -> RunRequest {
         let force = self.output.force;

@@ -29,12 +29,17 @@ impl Outputs {
     pub const TABLES: Self = Self { figures: Formats::None, report: false };
     /// All that a run writes when nothing else is asked for.
     pub const ALL: Self = Self { figures: Formats::All, report: true };
+
+    /// Whether there shall be figures.
+    pub fn draws(self) -> bool {
+        self.figures != Formats::None
+    }
 }
 
 /// Bytes that a run takes at its largest by a program whose own code takes so many until its plan is made.
 pub fn predicted(scene: &Scene, plan: &Plan, outputs: Outputs, program: usize) -> usize {
     let is_solved_at_once = scene.is_solved_at_once();
-    let draws = outputs.figures != Formats::None;
+    let draws = outputs.draws();
     let before = |figure: &&usize| !is_solved_at_once && **figure < plan.stop.steps;
     let snapshots = if draws { scene.record.figures.iter().filter(before).count() } else { 0 };
     let [snapshots, last] = [snapshots, usize::from(draws)].map(|each| each * SNAPSHOT * plan.count());

@@ -143,6 +143,7 @@ fn a_flying_swarm_is_stopped_resumed_and_moved_from_its_node_s_page() {
     let words = seen["alarms"][0].as_str().expect("a broken bound");
     assert!(words.starts_with("affine_error: declared 0.0001 m"), "{words}");
     assert_eq!(seen["isThere"], true);
+    assert_eq!(seen["isInView"], true, "the view follows the swarm");
 }
 
 #[test]

@@ -235,6 +235,12 @@ async function command(page) {
   const before = await posture();
   await later(page, (await clock(page)) + 0.5);
   seen.isThere = (await posture()) === before;
+  seen.isInView = await page.evaluate(() => {
+    const { views: [view], state: { camera, factor, turned } } = window.report;
+    const { low, high } = view.bounds([0], factor, turned);
+    const room = [view.width, view.height].map((length) => length / camera.scale / 2);
+    return [camera.x, camera.y].every((middle, k) => low[k] > middle - room[k] && high[k] < middle + room[k]);
+  });
 }
 
 async function everything(page, other) {

@@ -6,6 +6,7 @@ use flockform::continuum::plan::Plan;
 use flockform::continuum::record::{LoadStep, ProbeSeries, Snapshot};
 use flockform::continuum::run::Outcome;
 use flockform::engine::Engine;
+use flockform::export::memory::Outputs;
 use flockform::export::report::view::View;
 use flockform::export::report::{AnimationState, RunRecorder};
 use flockform::export::{ExportError, OutputFolder, VtkSeries};
@@ -20,13 +21,10 @@ pub struct Recorder<'a> {
     probes: Vec<ProbeSeries>,
     load_steps: Vec<LoadStep>,
     frames: Option<VtkSeries>,
-    /// Whether there shall be a `report.html`.
-    pub reports: bool,
+    outputs: Outputs,
     /// Whether there shall be a film.
-    pub films: bool,
-    /// Whether there shall be figures.
-    pub draws: bool,
-    /// What they show.
+    films: bool,
+    /// What report and film show.
     pub animation: Option<RunRecorder>,
     /// The state that an earlier run saved for it.
     animation_state: Option<AnimationState<'static>>,
@@ -52,6 +50,7 @@ impl<'a> Recorder<'a> {
         plan: &Plan,
         folder: &OutputFolder,
         left: Option<&ResumedRun>,
+        (outputs, films): (Outputs, bool),
     ) -> Result<Self, ExportError> {
         // A body that is not stepped has no history.
         let is_solved_at_once = scene.is_solved_at_once();
@@ -70,9 +69,8 @@ impl<'a> Recorder<'a> {
             probes: left.map_or_else(new_probes, |left| left.checkpoint.probes.to_vec()),
             load_steps: left.map_or_else(Vec::new, |left| left.checkpoint.load_steps.to_vec()),
             frames,
-            reports: true,
-            films: false,
-            draws: true,
+            outputs,
+            films,
             animation: None,
             animation_state: left.and_then(|left| left.checkpoint.animation.clone()),
             failure: None,
@@ -93,7 +91,7 @@ impl<'a> Recorder<'a> {
 
     pub fn step(&mut self, engine: &Engine) {
         self.probes.iter_mut().for_each(|probe| probe.record(engine));
-        if self.draws && self.scene.record.figures.contains(&engine.step()) {
+        if self.outputs.draws() && self.scene.record.figures.contains(&engine.step()) {
             self.snapshots.push(Snapshot::of(engine));
         }
         if load_every(self.scene).is_some_and(|every| engine.step().is_multiple_of(every)) {
@@ -124,7 +122,7 @@ impl<'a> Recorder<'a> {
     }
 
     fn keeps_frames(&self) -> bool {
-        self.reports || self.films
+        self.outputs.report || self.films
     }
 
     fn measure(&mut self, engine: &Engine) {
@@ -148,7 +146,7 @@ impl<'a> Recorder<'a> {
     pub fn finish(mut self, outcome: &Outcome) -> Result<Records, ExportError> {
         let engine = &outcome.engine;
         let step = engine.step();
-        if self.draws && self.snapshots.last().is_none_or(|last| last.step != step) {
+        if self.outputs.draws() && self.snapshots.last().is_none_or(|last| last.step != step) {
             self.snapshots.push(Snapshot::of(engine));
         }
         if load_every(self.scene).is_some() && self.load_steps.last().is_none_or(|last| last.step != step) {
@@ -171,7 +169,7 @@ impl<'a> Recorder<'a> {
         if let Some(animation) = &mut self.animation {
             animation.close(self.scene, outcome);
         }
-        let animation = self.animation.as_mut().filter(|_| self.reports);
+        let animation = self.animation.as_mut().filter(|_| self.outputs.report);
         let stage = animation.map(|animation| animation.stage(self.scene, outcome));
         let writing = self.writing + start.elapsed();
         let Self { snapshots, probes, load_steps, animation, films, .. } = self;

@@ -20,6 +20,19 @@ export function fit() {
   state.isFitted = true;
 }
 
+// Keeps what moves on the page, unless the reader has moved the view or holds something in it.
+export function follow() {
+  const [view] = shown.views;
+  if (!state.isFitted || view.box.classList.contains("dragged")) return;
+  const { low, high } = view.bounds([state.frame], state.factor, state.turned);
+  const { x, y, scale } = state.camera;
+  const room = [view.width / scale, view.height / scale];
+  const isOut = [x, y].some((middle, k) => low[k] < middle - room[k] / 2 || high[k] > middle + room[k] / 2);
+  if (!isOut) return;
+  if (room.some((length, k) => high[k] - low[k] > 0.95 * length)) fit();
+  else state.camera = { x: (low[0] + high[0]) / 2, y: (low[1] + high[1]) / 2, scale };
+}
+
 export function zoom(by, view = shown.views[0], at = [view.width / 2, view.height / 2]) {
   const { camera } = state;
   const [ox, oy] = [at[0] - view.width / 2, view.height / 2 - at[1]];

@@ -1,12 +1,13 @@
 // A page that a session feeds: the socket, the clock, the controls of the session.
 
+import { follow } from "./camera.js";
 import { words } from "./colour.js";
 import { breakBonds, kindOf, LiveFrames } from "./live_frames.js";
 import { drawAlarms, drawDashes, drawTargets, takeFormation, takeTool } from "./live_tools.js";
 import { drawNow, started } from "./page.js";
 import { bodies, data, element, shown, state } from "./shown.js";
 
-// Time between two looks at the range of a quantity, which changes as the body moves, in ms.
+// Time between two looks at the range of a quantity and at the room in the view, which change as the body moves, in ms.
 const RANGE_EVERY = 250;
 // Keys worth a try that a file may leave out.
 const SUGGESTED = ["update.damping=0.8", "rule.feedback.factor=-0.05", "fracture.stretch=1.5", "frame=immediate"];
@@ -200,6 +201,7 @@ function drawLatest() {
   if (begun - session.rangeAt > RANGE_EVERY) {
     state.ranges.clear();
     session.rangeAt = begun;
+    follow();
   }
   drawNow();
   const drawing = performance.now() - begun;

@@ -49,13 +49,17 @@ void main() {
   colour = vec4(own.rgb * own.a, own.a);
 }`;
 
-// Asked of a canvas of its own: one that has had a context takes no other.
+// Asked once, of a canvas of its own: one that has had a context takes no other.
+let standsIn;
 function isStandIn() {
-  const gl = document.createElement("canvas").getContext("webgl2");
-  const info = gl?.getExtension("WEBGL_debug_renderer_info");
-  const name = info ? gl.getParameter(info.UNMASKED_RENDERER_WEBGL) : "";
-  gl?.getExtension("WEBGL_lose_context")?.loseContext();
-  return /swiftshader|llvmpipe|software|basic render/i.test(name);
+  if (standsIn === undefined) {
+    const gl = document.createElement("canvas").getContext("webgl2");
+    const info = gl?.getExtension("WEBGL_debug_renderer_info");
+    const name = info ? gl.getParameter(info.UNMASKED_RENDERER_WEBGL) : "";
+    gl?.getExtension("WEBGL_lose_context")?.loseContext();
+    standsIn = /swiftshader|llvmpipe|software|basic render/i.test(name);
+  }
+  return standsIn;
 }
 
 export class Painter {

@@ -7,6 +7,12 @@ import { SHADES } from "./colour.js";
 const STEPS = 64;
 // Particles nearer to each other, in device pixels, are squares of pixels: their cells, bonds and outlines could not be seen.
 const DENSE = 4;
+// Bodies of more particles are set pixel by pixel as long as cells are smaller than this, in device pixels: to fill a path takes
+// longer than its few pixels do.
+const MANY = 2000;
+const SMALL = 24;
+// Places farther from the canvas, in device pixels, are nowhere.
+const FAR = 1e5;
 
 export class PlainPainter {
   constructor(canvas) {
@@ -24,6 +30,7 @@ export class PlainPainter {
     const { camera, layers } = scene;
     pen.clearRect(0, 0, canvas.width, canvas.height);
     if (scene.spacing < DENSE && (layers.surface || layers.points)) return this.squares(scene);
+    if (scene.spacing < SMALL && scene.values.length > MANY) return this.pixels(scene);
     const [left, top] = [canvas.width / 2, canvas.height / 2];
     this.x = (i) => left + (scene.places[2 * i] - camera.x) * camera.scale;
     this.y = (i) => top - (scene.places[2 * i + 1] - camera.y) * camera.scale;
@@ -50,14 +57,19 @@ export class PlainPainter {
     }
   }
 
-  // A surface has no gaps where the body is stretched by a quarter.
-  squares({ places, values, palette, camera, spacing, layers }) {
+  // The image that pixels are set in, with nothing in it.
+  blank() {
     const { canvas, pen } = this;
     const { width, height } = canvas;
     if (this.image?.width !== width || this.image?.height !== height) this.image = pen.createImageData(width, height);
-    const pixels = new Uint32Array(this.image.data.buffer);
-    pixels.fill(0);
-    const colours = new Uint32Array(Uint8Array.from(palette).buffer);
+    return new Uint32Array(this.image.data.buffer).fill(0);
+  }
+
+  // A surface has no gaps where the body is stretched by a quarter.
+  squares({ places, values, palette, camera, spacing, layers }) {
+    const { width, height } = this.canvas;
+    const pixels = this.blank();
+    const colourOf = inPalette(palette);
     const half = layers.surface ? 0.625 * spacing + 0.5 : Math.max(0.27 * spacing, 0.8);
     const [left, top] = [width / 2 - camera.x * camera.scale, height / 2 + camera.y * camera.scale];
     for (let i = 0; i < values.length; i++) {
@@ -65,8 +77,7 @@ export class PlainPainter {
       const y = top - places[2 * i + 1] * camera.scale;
       // Also those that are nowhere.
       if (!(x > -half && x < width + half && y > -half && y < height + half)) continue;
-      const value = values[i];
-      const colour = colours[value < -0.5 ? SHADES : Math.round(Math.min(Math.max(value, 0), 1) * (SHADES - 1))];
+      const colour = colourOf(values[i]);
       const from = Math.max(Math.round(x - half), 0);
       const to = Math.min(Math.round(x + half), width);
       const last = Math.min(Math.round(y + half), height);
@@ -75,7 +86,57 @@ export class PlainPainter {
         for (let at = row * width + from; at < row * width + to; at++) pixels[at] = colour;
       }
     }
-    pen.putImageData(this.image, 0, 0);
+    this.pen.putImageData(this.image, 0, 0);
+  }
+
+  // Cells, bonds and dots as on paths, but for the soft edges of cells and bonds.
+  pixels(scene) {
+    const { places, camera, values, layers } = scene;
+    const [left, top] = [this.canvas.width / 2 - camera.x * camera.scale, this.canvas.height / 2 + camera.y * camera.scale];
+    const [x, y] = [new Float32Array(values.length), new Float32Array(values.length)];
+    for (let i = 0; i < values.length; i++) {
+      x[i] = left + places[2 * i] * camera.scale;
+      y[i] = top - places[2 * i + 1] * camera.scale;
+    }
+    const canvas = { pixels: this.blank(), width: this.canvas.width, height: this.canvas.height };
+    if (layers.surface) this.setTriangles(canvas, scene, x, y);
+    if (layers.bonds) this.setLines(canvas, scene, x, y);
+    if (layers.points) setDots(canvas, scene, x, y);
+    this.pen.putImageData(this.image, 0, 0);
+  }
+
+  setTriangles(canvas, { trianglesFrom, triangleCount, values, isFlat, palette }, x, y) {
+    const { triangles } = this;
+    const colourOf = inPalette(palette);
+    for (let n = trianglesFrom; n < trianglesFrom + triangleCount; n += 3) {
+      const a = triangles[n];
+      const b = triangles[n + 1];
+      const c = triangles[n + 2];
+      const isNone = values[a] < -0.5 || values[b] < -0.5 || values[c] < -0.5;
+      const value = isFlat ? values[c] : isNone ? -1 : (values[a] + values[b] + values[c]) / 3;
+      setTriangle(canvas, x[a], y[a], x[b], y[b], x[c], y[c], colourOf(value));
+    }
+  }
+
+  setLines({ pixels, width, height }, { bondsFrom, bondCount, bondColour, layers }, x, y) {
+    const { bonds } = this;
+    const colour = bondColour[0] | (bondColour[1] << 8) | (bondColour[2] << 16);
+    const cover = layers.surface ? 90 : 230;
+    for (let n = bondsFrom; n < bondsFrom + bondCount; n += 2) {
+      let column = x[bonds[n]];
+      let row = y[bonds[n]];
+      let right = x[bonds[n + 1]] - column;
+      let down = y[bonds[n + 1]] - row;
+      const steps = Math.ceil(Math.max(Math.abs(right), Math.abs(down)));
+      if (!(steps < FAR)) continue;
+      right /= steps;
+      down /= steps;
+      for (let k = 0; k < steps; k++, column += right, row += down) {
+        if (!(column >= 0 && column < width && row >= 0 && row < height)) continue;
+        const at = (row | 0) * width + (column | 0);
+        pixels[at] = mixed(pixels[at], colour, cover);
+      }
+    }
   }
 
   surface(scene) {
@@ -116,5 +177,61 @@ export class PlainPainter {
         pen.arc(x, y, radius, 0, 7);
       }
     });
+  }
+}
+
+// Of a value, as a pixel.
+function inPalette(palette) {
+  const colours = new Uint32Array(Uint8Array.from(palette).buffer);
+  return (value) => colours[value < -0.5 ? SHADES : Math.round(Math.min(Math.max(value, 0), 1) * (SHADES - 1))];
+}
+
+// A pixel of which so many parts of 256 are covered by a colour.
+function mixed(under, colour, cover) {
+  if (under === 0) return (colour & 0xffffff) | (cover << 24);
+  const rest = 256 - cover;
+  const redBlue = ((Math.imul(under & 0xff00ff, rest) + Math.imul(colour & 0xff00ff, cover)) >>> 8) & 0xff00ff;
+  const green = ((Math.imul(under & 0xff00, rest) + Math.imul(colour & 0xff00, cover)) >>> 8) & 0xff00;
+  return redBlue | green | (Math.max(under >>> 24, cover) << 24);
+}
+
+// The pixels whose middles lie in it: of triangles that share an edge each has its own.
+function setTriangle({ pixels, width, height }, ax, ay, bx, by, cx, cy, colour) {
+  const low = Math.min(ay, by, cy);
+  const high = Math.max(ay, by, cy);
+  if (!(Math.max(ax, bx, cx) - Math.min(ax, bx, cx) < FAR && high - low < FAR)) return;
+  const last = Math.min(Math.ceil(high - 0.5), height);
+  for (let row = Math.max(Math.ceil(low - 0.5), 0); row < last; row++) {
+    const at = row + 0.5;
+    // Two of its edges are cut.
+    const ab = ay > at === by > at ? NaN : ax + ((at - ay) / (by - ay)) * (bx - ax);
+    const bc = by > at === cy > at ? NaN : bx + ((at - by) / (cy - by)) * (cx - bx);
+    const ca = cy > at === ay > at ? NaN : cx + ((at - cy) / (ay - cy)) * (ax - cx);
+    const one = Number.isNaN(ab) ? bc : ab;
+    const other = Number.isNaN(ca) ? bc : ca;
+    const from = Math.max(Math.ceil(Math.min(one, other) - 0.5), 0);
+    const end = row * width + Math.min(Math.ceil(Math.max(one, other) - 0.5), width);
+    for (let pixel = row * width + from; pixel < end; pixel++) pixels[pixel] = colour;
+  }
+}
+
+// Within half a pixel of their rims they are covered in part.
+function setDots({ pixels, width, height }, { values, radii, palette }, x, y) {
+  const colourOf = inPalette(palette);
+  for (let i = 0; i < values.length; i++) {
+    const radius = Math.max(radii[i], 0.8);
+    const [inner, outer] = [(radius - 0.5) ** 2, (radius + 0.5) ** 2];
+    const left = Math.max(Math.floor(x[i] - radius - 0.5), 0);
+    const right = Math.min(Math.ceil(x[i] + radius + 0.5), width);
+    const bottom = Math.min(Math.ceil(y[i] + radius + 0.5), height);
+    const colour = colourOf(values[i]);
+    for (let row = Math.max(Math.floor(y[i] - radius - 0.5), 0); row < bottom; row++) {
+      const down = (row + 0.5 - y[i]) ** 2;
+      for (let column = left, at = row * width + left; column < right; column++, at++) {
+        const away = (column + 0.5 - x[i]) ** 2 + down;
+        if (away <= inner) pixels[at] = colour;
+        else if (away < outer) pixels[at] = mixed(pixels[at], colour, (256 * (outer - away)) / (outer - inner));
+      }
+    }
   }
 }
