@@ -61,7 +61,7 @@ pub fn return_what_is_dropped() {
     }
 }
 
-/// Gives back what small arrays that were dropped have left, as the frames of a small body.
+/// Gives back the memory of small arrays that were dropped, such as the frames of a small body.
 pub fn return_what_is_free() {
     // SAFETY: the call asks nothing of its caller.
     #[cfg(all(feature = "ros", target_env = "gnu"))]

@@ -41,8 +41,8 @@ pub fn predicted(scene: &Scene, plan: &Plan, outputs: Outputs, program: usize) -
     let is_solved_at_once = scene.is_solved_at_once();
     let draws = outputs.draws();
     let before = |figure: &&usize| !is_solved_at_once && **figure < plan.stop.steps;
-    let snapshots = if draws { scene.record.figures.iter().filter(before).count() } else { 0 };
-    let [snapshots, last] = [snapshots, usize::from(draws)].map(|each| each * SNAPSHOT * plan.count());
+    let drawn_before = if draws { scene.record.figures.iter().filter(before).count() } else { 0 };
+    let [snapshots, last] = [drawn_before, usize::from(draws)].map(|each| each * SNAPSHOT * plan.count());
     let Packed { values, frames, packing, text } =
         if outputs.report { packed(plan, is_solved_at_once) } else { Packed::default() };
     let stepping = match is_solved_at_once {
@@ -52,18 +52,23 @@ pub fn predicted(scene: &Scene, plan: &Plan, outputs: Outputs, program: usize) -
     let packing = last + values.max(packing) + frames[1];
     let tables = last + text + measured(plan);
     // Of stresses a figure needs those of the cells.
-    let drawing = if draws { last + text + pictures(scene, plan) + measured(plan) / 2 } else { 0 };
+    let drawing = match draws {
+        true => last + text + pictures(scene, plan, drawn_before + 1) + measured(plan) / 2,
+        false => 0,
+    };
     let most = [stepping, packing, tables, drawing].into_iter().max().unwrap_or(0);
     program + RUNNING + stepped(plan) + snapshots + most
 }
 
-/// Bytes of what figures are while they are drawn, as many at once as there are threads.
-fn pictures(scene: &Scene, plan: &Plan) -> usize {
+/// Bytes of what the figures of so many steps are while they are drawn, as many at once as there are threads.
+fn pictures(scene: &Scene, plan: &Plan, moments: usize) -> usize {
     /// What draws, with its fonts; those of one more at the same time.
     const PAINTER: usize = 3 << 20;
     const FONTS: usize = 1 << 20;
     /// A particle as a shape.
     const DOT: usize = 950;
+    /// The dashes of bonds that break.
+    const DASHES: usize = 2 << 20;
     /// Heading and axes beside a body, and the bar of its colours \[px\].
     const ABOVE: f64 = 60.0;
     const BAR: f64 = 100.0;
@@ -74,7 +79,6 @@ fn pictures(scene: &Scene, plan: &Plan) -> usize {
     // As it lies before it is deformed.
     let axes = page::window(&body.reference, 0..plan.count(), body.lattice.spacing());
     let sheet = bytes([page::width_of(&axes, BAR), ABOVE + axes.size[1] + Axes::BELOW]);
-    let moments = if scene.is_solved_at_once() { 1 } else { scene.record.figures.len() + 1 };
     let of_each = if plan.setup.cells.is_some() { 3 } else { 2 };
     let mut sheets = vec![sheet; of_each * moments];
     let charts = [!plan.probes.is_empty(), scene.equilibrium.is_some(), scene.load_steps.is_some()];
@@ -82,5 +86,6 @@ fn pictures(scene: &Scene, plan: &Plan) -> usize {
     sheets.sort_unstable_by(|a, b| b.cmp(a));
     let at_once = rayon::current_num_threads();
     let dots = if plan.count() <= MOST_DOTS { DOT * plan.count() * at_once.min(moments) } else { 0 };
-    PAINTER + dots + sheets.iter().take(at_once).map(|one| one + FONTS).sum::<usize>()
+    let dashes = if plan.setup.flock.bonds.is_some() { DASHES } else { 0 };
+    PAINTER + dots + dashes + sheets.iter().take(at_once).map(|one| one + FONTS).sum::<usize>()
 }

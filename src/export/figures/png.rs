@@ -11,7 +11,7 @@ pub fn render(svg: &str, zoom: impl FnOnce(f32) -> f32) -> Result<Vec<u8>, Strin
     let zoom = zoom(tree.size().width());
     let size = [tree.size().width(), tree.size().height()].map(|length| (zoom * length).round() as u32);
     let Picture { rgba, .. } = picture(tree, zoom, size)?;
-    // tiny-skia would encode a copy, without what lies in it of its transparency; this has none.
+    // tiny-skia's own encoder makes a copy to divide by transparency, which a sheet on white paper has not.
     encoded(size, &rgba).map_err(|error| error.to_string())
 }
 

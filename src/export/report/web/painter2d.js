@@ -43,8 +43,7 @@ export class PlainPainter {
   inShades(count, valueOf, { palette, isFlat }, trace) {
     const bins = new Map();
     for (let n = 0; n < count; n++) {
-      const value = valueOf(n);
-      const shade = value < -0.5 ? SHADES : Math.round(Math.min(Math.max(value, 0), 1) * (SHADES - 1));
+      const shade = shadeOf(valueOf(n));
       const bin = isFlat || shade === SHADES ? shade : Math.round((shade * (STEPS - 1)) / (SHADES - 1)) * 1000;
       if (!bins.has(bin)) bins.set(bin, { shade, items: [] });
       bins.get(bin).items.push(n);
@@ -105,16 +104,15 @@ export class PlainPainter {
     this.pen.putImageData(this.image, 0, 0);
   }
 
-  setTriangles(canvas, { trianglesFrom, triangleCount, values, isFlat, palette }, x, y) {
+  setTriangles(canvas, scene, x, y) {
     const { triangles } = this;
-    const colourOf = inPalette(palette);
+    const { trianglesFrom, triangleCount } = scene;
+    const colourOf = inPalette(scene.palette);
     for (let n = trianglesFrom; n < trianglesFrom + triangleCount; n += 3) {
       const a = triangles[n];
       const b = triangles[n + 1];
       const c = triangles[n + 2];
-      const isNone = values[a] < -0.5 || values[b] < -0.5 || values[c] < -0.5;
-      const value = isFlat ? values[c] : isNone ? -1 : (values[a] + values[b] + values[c]) / 3;
-      setTriangle(canvas, x[a], y[a], x[b], y[b], x[c], y[c], colourOf(value));
+      setTriangle(canvas, x[a], y[a], x[b], y[b], x[c], y[c], colourOf(ofTriangle(scene, a, b, c)));
     }
   }
 
@@ -143,11 +141,8 @@ export class PlainPainter {
     const { triangles, pen } = this;
     const from = scene.trianglesFrom / 3;
     const corner = (n, k) => triangles[3 * (from + n) + k];
-    const mean = (n) => {
-      const values = [0, 1, 2].map((k) => scene.values[corner(n, k)]);
-      return scene.isFlat ? values[2] : Math.min(...values) < -0.5 ? -1 : (values[0] + values[1] + values[2]) / 3;
-    };
-    this.inShades(scene.triangleCount / 3, mean, scene, (n) => {
+    const valueOf = (n) => ofTriangle(scene, corner(n, 0), corner(n, 1), corner(n, 2));
+    this.inShades(scene.triangleCount / 3, valueOf, scene, (n) => {
       pen.moveTo(this.x(corner(n, 0)), this.y(corner(n, 0)));
       pen.lineTo(this.x(corner(n, 1)), this.y(corner(n, 1)));
       pen.lineTo(this.x(corner(n, 2)), this.y(corner(n, 2)));
@@ -180,10 +175,21 @@ export class PlainPainter {
   }
 }
 
+function shadeOf(value) {
+  return value < -0.5 ? SHADES : Math.round(Math.min(Math.max(value, 0), 1) * (SHADES - 1));
+}
+
 // Of a value, as a pixel.
 function inPalette(palette) {
   const colours = new Uint32Array(Uint8Array.from(palette).buffer);
-  return (value) => colours[value < -0.5 ? SHADES : Math.round(Math.min(Math.max(value, 0), 1) * (SHADES - 1))];
+  return (value) => colours[shadeOf(value)];
+}
+
+// The value of a triangle with these corners.
+function ofTriangle({ values, isFlat }, a, b, c) {
+  if (isFlat) return values[c];
+  const isNone = values[a] < -0.5 || values[b] < -0.5 || values[c] < -0.5;
+  return isNone ? -1 : (values[a] + values[b] + values[c]) / 3;
 }
 
 // A pixel of which so many parts of 256 are covered by a colour.
