@@ -60,6 +60,7 @@ const SHARED: &[(&str, &str)] = embedded![
     "msgs/flockform_msgs/msg/FormationState.msg" from "msgs/flockform_msgs/msg/FormationState.msg",
     "msgs/flockform_msgs/msg/LoopEvent.msg" from "msgs/flockform_msgs/msg/LoopEvent.msg",
     "msgs/flockform_msgs/msg/MemberState.msg" from "msgs/flockform_msgs/msg/MemberState.msg",
+    "msgs/flockform_msgs/msg/Ranges.msg" from "msgs/flockform_msgs/msg/Ranges.msg",
     "msgs/flockform_msgs/srv/SetFormation.srv" from "msgs/flockform_msgs/srv/SetFormation.srv",
 ];
 

@@ -139,9 +139,9 @@ pub fn fly_recorded(
 ) -> Result<(Record, FlightReport), Refusal> {
     let messages = recording.map(|one| FlightMessages::new(swarm, control, one.sink())).transpose()?;
     let messages = RefCell::new(messages);
-    let mut hear = |member, pose| {
+    let mut hear = |received| {
         if let Some(messages) = &mut *messages.borrow_mut() {
-            messages.receive(member, pose);
+            messages.receive(received);
         }
     };
     Ok(fly_heard(swarm, &mut hear, &mut |flight, sample| {

@@ -107,6 +107,7 @@ pub const OWN: &[(&str, &str)] = &[
     ("flockform_msgs/FormationState", include_str!("../../msgs/flockform_msgs/msg/FormationState.msg")),
     ("flockform_msgs/LoopEvent", include_str!("../../msgs/flockform_msgs/msg/LoopEvent.msg")),
     ("flockform_msgs/MemberState", include_str!("../../msgs/flockform_msgs/msg/MemberState.msg")),
+    ("flockform_msgs/Ranges", include_str!("../../msgs/flockform_msgs/msg/Ranges.msg")),
 ];
 
 /// A message's definition followed by those of all messages that it contains, each after a line of equal signs

@@ -109,7 +109,17 @@ impl LoopEvent {
     pub const CONFIGURE: u8 = 8;
 }
 
-super::messages!("flockform_msgs": MemberState, FormationState, LoopEvent);
+/// Distances that a robot measured of others at the header's stamp.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Ranges {
+    pub header: Header,
+    /// Names of the others.
+    pub robots: Vec<String>,
+    /// \[m\], in the order of `robots`.
+    pub distances: Vec<f64>,
+}
+
+super::messages!("flockform_msgs": MemberState, FormationState, LoopEvent, Ranges);
 
 /// Request of the service `SetFormation`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -4,7 +4,7 @@ use super::RecordError;
 use crate::messages::builtin_interfaces::Time;
 use crate::messages::flockform_msgs::LoopEvent;
 use crate::messages::formation::diagnostics::{self, Statistics};
-use crate::messages::formation::{NAME, markers, state, target};
+use crate::messages::formation::{NAME, markers, ranges, state, target};
 use crate::messages::geometry_msgs::{self, PoseStamped, PoseWithCovariance, PoseWithCovarianceStamped};
 use crate::messages::names::{NameError, Names};
 use crate::messages::nav_msgs::Odometry;
@@ -13,7 +13,8 @@ use crate::messages::std_msgs::Header;
 use crate::scene::swarm::Swarm;
 use crate::scene::swarm::raw::{RawNode, RawPoseType};
 use crate::swarm::control::Control;
-use crate::swarm::watch::Pose;
+use crate::swarm::transport::Received;
+use crate::swarm::watch::{Pose, Range};
 
 /// States and markers a second, as of a node with default parameters \[Hz\].
 const STATES: f64 = 10.0;
@@ -27,6 +28,7 @@ pub struct FlightMessages {
     swarm: Swarm,
     topics: Topics,
     heard: Vec<(usize, Pose)>,
+    measured: Vec<Range>,
     statistics: Statistics,
     begun: bool,
 }
@@ -34,6 +36,7 @@ pub struct FlightMessages {
 /// Names of topics; of robots by number.
 struct Topics {
     poses: Vec<String>,
+    ranges: Vec<String>,
     targets: Vec<String>,
     state: String,
     markers: String,
@@ -59,6 +62,7 @@ impl FlightMessages {
             recorder: MessageRecorder::new(&names, &raw.frame_id, sink)?,
             topics: Topics {
                 poses: of_robots(&pattern)?,
+                ranges: of_robots(&raw.ranges_topic)?,
                 targets: of_robots(&raw.target_topic)?,
                 state: names.topic("~/state")?,
                 markers: names.topic("~/markers")?,
@@ -67,14 +71,19 @@ impl FlightMessages {
             node: names.fully_qualified(),
             swarm: swarm.clone(),
             heard: Vec::new(),
+            measured: Vec::new(),
             statistics: Statistics::default(),
             begun: false,
         })
     }
 
-    /// A pose that the channels have delivered.
-    pub fn receive(&mut self, member: usize, pose: Pose) {
-        self.heard.push((member, pose));
+    /// A pose or a range that the channels have delivered; leaders are moved by commands of the file.
+    pub fn receive(&mut self, received: Received) {
+        match received {
+            Received::Pose(member, pose) => self.heard.push((member, pose)),
+            Received::Range(range) => self.measured.push(range),
+            Received::Leader(..) => {}
+        }
     }
 
     /// A period that was computed at `now` \[s\].
@@ -82,6 +91,11 @@ impl FlightMessages {
         if !std::mem::replace(&mut self.begun, true) {
             self.recorder.parameters(now, control);
             self.recorder.event(now, LoopEvent::ACTIVE, "", &[]);
+        }
+        let measured = std::mem::take(&mut self.measured);
+        let names = &control.formation().names;
+        for (observer, message) in ranges::messages(&measured, names, &self.swarm.raw.node.frame_id) {
+            self.recorder.take_received(&self.topics.ranges[observer], &message, [now; 2]);
         }
         for (member, pose) in std::mem::take(&mut self.heard) {
             self.pose(member, &pose, now);

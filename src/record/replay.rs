@@ -13,9 +13,9 @@ use super::topics::{Heard, stamped, topics};
 use super::{Entry, Reader, RecordError};
 use crate::flock::vectors::distance;
 use crate::messages::builtin_interfaces::Time;
-use crate::messages::flockform_msgs::{LoopEvent, SetFormationRequest};
+use crate::messages::flockform_msgs::{LoopEvent, Ranges, SetFormationRequest};
 use crate::messages::formation::leaders::set_formation;
-use crate::messages::formation::{NAME, pose};
+use crate::messages::formation::{NAME, pose, ranges};
 use crate::messages::geometry_msgs::{self, PoseArray, PoseStamped};
 use crate::messages::names::Names;
 use crate::messages::recorder::{parameters, set_parameter};
@@ -23,6 +23,7 @@ use crate::messages::std_msgs::Header;
 use crate::scene::swarm::Swarm;
 use crate::swarm::control::{Control, Mode};
 use crate::swarm::flight::{FlightCommand, commands};
+use crate::swarm::watch::Range;
 
 /// How a replay went.
 #[derive(Clone, Debug, Serialize, PartialEq)]
@@ -153,6 +154,8 @@ struct Replay {
     begun: bool,
     /// Poses since the last tick: member, header, pose, arrival \[s\].
     waiting: Vec<(usize, Header, geometry_msgs::Pose, f64)>,
+    /// Ranges since the last tick: observer, message, arrival \[s\].
+    measured: Vec<(usize, Ranges, f64)>,
     /// Times of ticks by what a stamp makes of them: a simulation's times are finer than nanoseconds.
     exact: BTreeMap<Time, f64>,
     now: f64,
@@ -211,6 +214,7 @@ impl Replay {
             commands,
             begun: false,
             waiting: Vec::new(),
+            measured: Vec::new(),
             exact: BTreeMap::new(),
             now: 0.0,
             ticks: 0,
@@ -239,6 +243,11 @@ impl Replay {
                     if let Some(&pose) = poses.get(member) {
                         self.waiting.push((member, header.clone(), pose, entry.published));
                     }
+                }
+            }
+            Some(&Heard::Ranges(observer)) => {
+                if let Some(message) = entry.decode::<Ranges>() {
+                    self.measured.push((observer, message, entry.published));
                 }
             }
             Some(&Heard::Leader(member)) => {
@@ -321,6 +330,14 @@ impl Replay {
         }
     }
 
+    /// When the content of a message was measured \[s\].
+    fn stamp_of(&self, header: &Header, arrival: f64) -> f64 {
+        if !self.is_simulated && header.stamp == Time::default() {
+            return arrival;
+        }
+        self.exact.get(&header.stamp).copied().unwrap_or(header.stamp.seconds())
+    }
+
     fn tick(&mut self, now: f64) {
         self.compare();
         self.begun = true;
@@ -335,12 +352,17 @@ impl Replay {
         }
         (self.now, self.ticks) = (now, self.ticks + 1);
         self.exact.insert(Time::from_seconds(now), now);
+        for (observer, message, arrival) in std::mem::take(&mut self.measured) {
+            let stamp = self.stamp_of(&message.header, arrival);
+            let names = &self.control.formation().names;
+            let all: Vec<_> = ranges::ranges(&message, observer, names, arrival).collect();
+            for range in all.into_iter().filter(|range| self.heard_of.binary_search(&range.of).is_ok()) {
+                self.control.receive_range(Range { stamp, ..range }, now);
+            }
+        }
         for (member, header, one, arrival) in std::mem::take(&mut self.waiting) {
             let mut pose = pose::pose(&header, &one, arrival, &self.frame_id);
-            if self.is_simulated || header.stamp != Time::default() {
-                let exact = self.exact.get(&header.stamp).copied();
-                pose.stamp = exact.unwrap_or(header.stamp.seconds());
-            }
+            pose.stamp = self.stamp_of(&header, arrival);
             // Refused messages are refused again.
             let _ = self.control.receive(member, pose, now);
             self.poses += 1;

@@ -20,6 +20,8 @@ pub(super) enum Heard {
     /// Of all robots, in their order.
     Poses,
     Leader(usize),
+    /// That a robot measured.
+    Ranges(usize),
     Target(usize),
 }
 
@@ -58,6 +60,7 @@ pub(super) fn topics(
         let pattern = if raw.pose_type == RawPoseType::PoseArray { &default } else { &raw.pose_topic };
         topics.insert(of(pattern)?, Heard::Pose(m));
         topics.insert(of(&raw.leader_topic)?, Heard::Leader(m));
+        topics.insert(of(&raw.ranges_topic)?, Heard::Ranges(m));
         topics.insert(of(&raw.target_topic)?, Heard::Target(m));
     }
     Ok((topics, has_events))

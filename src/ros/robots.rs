@@ -19,6 +19,8 @@ use super::node::uses::Uses;
 use super::node::{NodeError, TopicOf, settings};
 use crate::messages::Message;
 use crate::messages::builtin_interfaces::Time;
+use crate::messages::flockform_msgs::Ranges;
+use crate::messages::formation::ranges;
 use crate::messages::geometry_msgs::{
     self, PoseArray, PoseStamped, PoseWithCovariance, PoseWithCovarianceStamped, Quaternion, Transform,
     TransformStamped, Vector3,
@@ -29,14 +31,14 @@ use crate::messages::rosgraph_msgs::Clock;
 use crate::messages::std_msgs::Header;
 use crate::messages::tf2_msgs::TFMessage;
 use crate::scene::swarm::Swarm;
-use crate::scene::swarm::raw::{RawNode, RawPoseType};
+use crate::scene::swarm::raw::{RawNode, RawPoseType, RawSwarm};
 use crate::swarm::control::Control;
 use crate::swarm::flight::Fleet;
 use crate::swarm::formation::Formation;
 use crate::swarm::pace::{Pace, system_time};
 use crate::swarm::robots::Robot;
 use crate::swarm::transport::{RobotsEnd, fly};
-use crate::swarm::watch::Pose;
+use crate::swarm::watch::{Pose, Range};
 
 /// The robots, and what they speak through.
 pub struct RobotNodes {
@@ -78,6 +80,9 @@ pub struct Link {
     frames: Vec<String>,
     targets: Vec<Subscription<PoseStamped>>,
     poses: Poses,
+    /// By robot; empty in a swarm without ranges.
+    ranges: Vec<Publisher<Ranges>>,
+    names: Vec<String>,
     clock: Option<Publisher<Clock>>,
     frame_id: String,
     /// Whether a target came since last asked.
@@ -115,7 +120,7 @@ impl Link {
         // The one node is the owner of all.
         let owner = |m: usize| m.min(nodes.len() - 1);
         let of = |pattern: &str, m: usize| topic(&owners[owner(m)], pattern, &formation.names[m]);
-        check_topics(raw, formation, &of)?;
+        check_topics(&swarm.raw, formation, &of)?;
         let targets: Result<Vec<_>, NodeError> = (0..formation.count())
             .map(|m| Ok(nodes[owner(m)].subscription(&of(&raw.target_topic, m)?, Quality::reliable(1))?))
             .collect();
@@ -132,13 +137,27 @@ impl Link {
                 Poses::Array(Box::new(topic), vec![nowhere; count])
             }
         };
+        let range = |m: usize| Ok((&nodes[owner(m)], of(&raw.ranges_topic, m)?));
+        let ranges = if swarm.raw.ranges.is_some() { each(count, &range)? } else { Vec::new() };
         let clock = publishes_clock
             .then(|| first.publisher(&first.topic("/clock")?, Quality::BEST_EFFORT))
             .transpose()?;
         let parameters = (layout == Layout::OneNode).then(|| Parameters::new(first, store)).transpose()?;
         let frames = formation.names.iter().map(|name| frame_of(raw, world.fleet(), name)).collect();
         let (targets, frame_id) = (targets?, raw.frame_id.clone());
-        Ok(Self { frames, targets, poses, clock, frame_id, was_sent: false, parameters, nodes })
+        let names = formation.names.clone();
+        Ok(Self {
+            frames,
+            targets,
+            poses,
+            ranges,
+            names,
+            clock,
+            frame_id,
+            was_sent: false,
+            parameters,
+            nodes,
+        })
     }
 }
 
@@ -272,6 +291,15 @@ impl RobotsEnd for Link {
         }
     }
 
+    fn send_ranges(&mut self, _now: f64, measured: &[Range]) -> Result<(), EdgeError> {
+        for (observer, message) in ranges::messages(measured, &self.names, &self.frame_id) {
+            if let Some(topic) = self.ranges.get(observer) {
+                topic.publish(&message)?;
+            }
+        }
+        Ok(())
+    }
+
     fn send(&mut self, now: f64, said: &[(usize, Pose)]) -> Result<(), EdgeError> {
         let stamp = Time::from_seconds(now);
         if let Some(clock) = &self.clock {
@@ -343,12 +371,16 @@ fn topic(names: &Names, pattern: &str, name: &str) -> Result<String, NodeError> 
 }
 
 /// Refuses topics of the robots with two uses.
-fn check_topics(raw: &RawNode, formation: &Formation, topic: TopicOf<'_>) -> Result<(), NodeError> {
+fn check_topics(raw: &RawSwarm, formation: &Formation, topic: TopicOf<'_>) -> Result<(), NodeError> {
+    let (has_ranges, raw) = (raw.ranges.is_some(), &raw.node);
     let mut uses = Uses::default();
     for (m, robot) in formation.names.iter().enumerate() {
         uses.add(topic(&raw.target_topic, m)?, "targets", robot)?;
         if m == 0 || raw.pose_type != RawPoseType::PoseArray {
             uses.add(topic(&raw.pose_topic, m)?, "poses", robot)?;
+        }
+        if has_ranges {
+            uses.add(topic(&raw.ranges_topic, m)?, "ranges", robot)?;
         }
     }
     Ok(())

@@ -1,16 +1,18 @@
 //! The ends of a [`transport`](crate::swarm::transport) over shared memory.
 
 use super::channel::MOST_AT_ONCE;
-use super::payload::{Leader, Pose as Wire, Target as WireTarget};
+use super::payload::{Leader, Pose as Wire, Range as WireRange, Target as WireTarget};
 use super::wait::Bell;
 use super::{Capacity, Peer, Reader, ShmError, Writer};
 use crate::swarm::control::Control;
 use crate::swarm::control::scope::NodeScope;
 use crate::swarm::transport::{ControllerEnd, Received, RobotsEnd, Target};
-use crate::swarm::watch::Pose;
+use crate::swarm::watch::{Pose, Range};
 
 /// Leaf of the service that carries poses to the loop.
 pub const POSES: &str = "poses";
+/// Leaf of the service that carries ranges to the loop, of swarms that have them.
+pub const RANGES: &str = "ranges";
 /// Leaf of the service that carries the places of leaders moved from outside to the loop.
 pub const LEADERS: &str = "leaders";
 /// Leaf of the service that carries targets to the robots.
@@ -19,6 +21,7 @@ pub const TARGETS: &str = "targets";
 /// The loop's end.
 pub struct Controller {
     poses: Reader<Wire>,
+    ranges: Option<Reader<WireRange>>,
     leaders: Reader<Leader>,
     targets: Writer<WireTarget>,
     /// Members whose poses and places are taken.
@@ -35,6 +38,7 @@ impl Controller {
     /// As [`Reader::open`] and [`Writer::open`].
     pub fn open(peer: &Peer, space: &str, control: &Control, part: &NodeScope) -> Result<Self, ShmError> {
         let count = control.formation().count();
+        let has_ranges = control.watch().limits().ranges.is_some();
         let among = |members: &[usize]| {
             let mut all = vec![false; count];
             members.iter().for_each(|&member| all[member] = true);
@@ -42,6 +46,7 @@ impl Controller {
         };
         Ok(Self {
             poses: Reader::open(peer, space, POSES, &Capacity::SWARM)?,
+            ranges: has_ranges.then(|| Reader::open(peer, space, RANGES, &Capacity::SWARM)).transpose()?,
             leaders: Reader::open(peer, space, LEADERS, &Capacity::SWARM)?,
             targets: Writer::open(peer, space, TARGETS, &Capacity::SWARM, part.mine.len())?,
             hears: among(&part.heard),
@@ -53,7 +58,8 @@ impl Controller {
 
     /// The bell that rings when poses or places of leaders arrive.
     pub fn bells(&self) -> Vec<Bell> {
-        vec![self.poses.bell(), self.leaders.bell()]
+        let ranges = self.ranges.iter().map(Reader::bell);
+        [self.poses.bell(), self.leaders.bell()].into_iter().chain(ranges).collect()
     }
 }
 
@@ -64,6 +70,20 @@ impl ControllerEnd for Controller {
         self.poses.still();
         self.leaders.still();
         let count = self.hears.len();
+        if let Some(ranges) = &self.ranges {
+            ranges.still();
+            for slice in std::iter::from_fn(|| ranges.take()).take(MOST_AT_ONCE) {
+                for wire in slice.iter() {
+                    let [observer, of] = [wire.observer, wire.of].map(|member| member as usize);
+                    if observer.max(of) >= count {
+                        self.refused += 1;
+                    } else if self.hears[observer] && self.hears[of] {
+                        let stamp = if wire.stamp == 0.0 { now } else { wire.stamp };
+                        take(Received::Range(Range { observer, of, distance: wire.distance, stamp }));
+                    }
+                }
+            }
+        }
         for slice in std::iter::from_fn(|| self.poses.take()).take(MOST_AT_ONCE) {
             for wire in slice.iter() {
                 let member = wire.member as usize;
@@ -98,13 +118,18 @@ impl ControllerEnd for Controller {
     }
 
     fn refused(&self) -> u64 {
-        self.refused + self.poses.refused() + self.leaders.refused()
+        let ranges = self.ranges.as_ref().map_or(0, Reader::refused);
+        self.refused + ranges + self.poses.refused() + self.leaders.refused()
     }
 }
+
+/// Ranges a robot in a slice; where robots measure more others, a period takes several slices.
+const OTHERS: usize = 32;
 
 /// The robots' end: of all of them, or of one.
 pub struct Robots {
     poses: Writer<Wire>,
+    ranges: Option<Writer<WireRange>>,
     targets: Reader<WireTarget>,
     count: usize,
     period: u64,
@@ -118,10 +143,21 @@ impl Robots {
     pub fn open(peer: &Peer, space: &str, count: usize) -> Result<Self, ShmError> {
         Ok(Self {
             poses: Writer::open(peer, space, POSES, &Capacity::SWARM, count)?,
+            ranges: None,
             targets: Reader::open(peer, space, TARGETS, &Capacity::SWARM)?,
             count,
             period: 0,
         })
+    }
+
+    /// The same, with rangefinders.
+    ///
+    /// # Errors
+    /// As [`Writer::open`].
+    pub fn with_ranges(mut self, peer: &Peer, space: &str) -> Result<Self, ShmError> {
+        let at_once = self.count * OTHERS;
+        self.ranges = Some(Writer::open(peer, space, RANGES, &Capacity::SWARM, at_once)?);
+        Ok(self)
     }
 
     /// The bell that rings when targets arrive.
@@ -138,6 +174,20 @@ impl RobotsEnd for Robots {
         // Delays and duplicates may make more poses than robots.
         for some in poses.chunks(self.count.max(1)) {
             self.poses.send(now, self.period, some.len(), |k| wire(&some[k]))?;
+        }
+        Ok(())
+    }
+
+    fn send_ranges(&mut self, now: f64, ranges: &[Range]) -> Result<(), ShmError> {
+        let Some(writer) = &mut self.ranges else {
+            let reason = "these robots were opened without ranges".to_owned();
+            return Err(ShmError::Send { service: RANGES.to_owned(), reason });
+        };
+        for some in ranges.chunks((self.count * OTHERS).max(1)) {
+            writer.send(now, self.period, some.len(), |k| {
+                let Range { observer, of, distance, stamp } = some[k];
+                WireRange { observer: observer as u32, of: of as u32, distance, stamp }
+            })?;
         }
         Ok(())
     }

@@ -52,6 +52,18 @@ payload! {
         stamp: f64,
     }
 
+    /// A distance that one robot measured of another.
+    Range as "FlockformRange_v1" {
+        /// Number of the robot that measured, in the swarm file's order, from 0.
+        observer: u32,
+        /// Number of the robot that was measured.
+        of: u32,
+        /// Centre to centre \[m\].
+        distance: f64,
+        /// When it was measured \[s since the Unix epoch\]; 0: when it arrives.
+        stamp: f64,
+    }
+
     /// The next target of a robot.
     Target as "FlockformTarget_v1" {
         /// Number of the robot in the swarm file's order, from 0.
@@ -200,6 +212,7 @@ mod tests {
         let sizes = [
             size_of::<Header>(),
             size_of::<Pose>(),
+            size_of::<Range>(),
             size_of::<Target>(),
             size_of::<Leader>(),
             size_of::<Command>(),
@@ -207,7 +220,7 @@ mod tests {
             size_of::<Member>(),
             size_of::<Particle>(),
         ];
-        assert_eq!(sizes, [24, 40, 32, 24, 8, 48, 208, 24]);
+        assert_eq!(sizes, [24, 40, 24, 32, 24, 8, 48, 208, 24]);
         assert_eq!((offset_of!(Pose, position), offset_of!(Pose, stamp)), (8, 32));
         assert_eq!((offset_of!(Member, position), offset_of!(Member, name)), (16, 144));
     }

@@ -31,11 +31,12 @@ impl SimulatedRobots {
         let control = Control::new(swarm)?;
         let formation = control.formation();
         let peer = domain.join("flockform_robots")?;
+        let end = Robots::open(&peer, &swarm.name, formation.count())?;
         Ok(Self {
             fleet: Fleet::new(swarm, formation)?,
             pace: Pace::new(1.0 / control.period()),
             goals: vec![None; formation.count()],
-            end: Robots::open(&peer, &swarm.name, formation.count())?,
+            end: if swarm.raw.ranges.is_some() { end.with_ranges(&peer, &swarm.name)? } else { end },
             peer,
         })
     }

@@ -209,8 +209,8 @@ impl Channel {
     }
 }
 
-/// A random stream for each seed, member and cause.
-fn stream(seed: u64, member: u64, cause: u64) -> Pcg64Mcg {
+/// A random stream for each seed, member and cause, 0 to 3.
+pub(super) fn stream(seed: u64, member: u64, cause: u64) -> Pcg64Mcg {
     let base = mixed(mixed(seed) ^ member.wrapping_mul(4).wrapping_add(cause));
     Pcg64Mcg::new(u128::from(base) << 64 | u128::from(mixed(base)))
 }

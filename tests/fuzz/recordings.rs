@@ -47,7 +47,7 @@ fn good() -> &'static [u8] {
         let recording = Shared::new(Recording::create(&path, &about(), false).expect("created"));
         let messages = FlightMessages::new(&swarm, flight.control(), recording.sink()).expect("named");
         let messages = std::cell::RefCell::new(messages);
-        let mut hear = |member, pose| messages.borrow_mut().receive(member, pose);
+        let mut hear = |received| messages.borrow_mut().receive(received);
         fly_heard(&swarm, &mut hear, &mut |flight, _| {
             let time = (flight.fleet().period() - 1) as f64 * swarm.raw.control.period;
             messages.borrow_mut().tick(flight.control(), time);

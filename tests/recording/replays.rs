@@ -20,10 +20,12 @@ fn a_recorded_flight_replays_to_the_bit_whatever_its_robots_suffer() {
         ["square", "--set", "flight.loss=0.3", "--set", "flight.noise=0.01", "--set", "flight.delay=2"];
     let driven = ["square", "--set", "node.pose_type=odometry"];
     let broken = ["square", "--set", faults];
+    let ranges = "ranges={ reach = 3.5, noise = 0.02, tolerance = 0.2 }";
+    let measured = ["square", "--set", faults, "--set", ranges, "--set", "flight.delay=1"];
     let commands = "flight.commands=[{after=10,what={kind=\"move-obstacle\",obstacle=0,by=[0.0,0.3]}},{after=20,what={kind=\"channel\",noise=0.02,delay=1,loss=0.1}},{after=30,what={kind=\"lead\",robot=\"robot_1\",to=[0.5,0.5]}}]";
     let commanded = ["gap", "--set", commands];
     let short = ["--set", "flight.duration=5.0", "--set", "flight.bounds={}"];
-    for swarm in [&suffering[..], &driven, &broken, &commanded, &["liar"]] {
+    for swarm in [&suffering[..], &driven, &broken, &measured, &commanded, &["liar"]] {
         let folder = temporary();
         record(&[swarm, &short].concat(), folder.path());
         let report = replay_file(&folder.path().join("flight.mcap"), None, &[], 0.0).expect("readable");

@@ -8,6 +8,7 @@ mod files;
 mod flights;
 #[path = "../common/folders.rs"]
 mod folders;
+mod ranges;
 #[path = "../common/scenes.rs"]
 mod scenes;
 mod support;

@@ -40,6 +40,11 @@ fn in_process_poses_come_in_order_and_the_newest_comes() {
 }
 
 #[test]
+fn in_process_ranges_come_as_they_were_measured() {
+    promises::ranges_come_as_they_were_measured(&mut InProcess::new(3));
+}
+
+#[test]
 fn in_process_targets_reach_their_robots_to_the_bit() {
     promises::targets_reach_their_robots_to_the_bit(&mut InProcess::new(3));
 }

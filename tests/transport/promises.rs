@@ -4,8 +4,8 @@ use std::time::{Duration, Instant};
 
 use flockform::swarm::control::Control;
 use flockform::swarm::transport::complaints::Complaints;
-use flockform::swarm::transport::{ControllerEnd, RobotsEnd, serve};
-use flockform::swarm::watch::Health;
+use flockform::swarm::transport::{ControllerEnd, Received, RobotsEnd, serve};
+use flockform::swarm::watch::{Health, Range};
 
 use super::support::*;
 
@@ -41,6 +41,29 @@ pub fn poses_come_in_order_and_the_newest_comes(transport: &mut impl Transport) 
         pose.position == [if *m == 0 { pose.stamp } else { -pose.stamp }, 2.0] && pose.yaw == 0.5
     };
     assert!(stamps.iter().all(right), "what is said is what is heard");
+}
+
+/// Of a swarm of three that measure each other.
+pub fn ranges_come_as_they_were_measured(transport: &mut impl Transport) {
+    let (mut controller, mut robots) = (transport.controller(), transport.robots());
+    meet(&mut controller, &mut robots, 0);
+    let range = |observer, of, distance| Range { observer, of, distance, stamp: 2.5 };
+    let sent = [range(0, 1, 0.1 + 0.2), range(0, 2, 1.0 / 3.0), range(2, 0, f64::NAN), range(2, 1, 1e-300)];
+    let bits = |range: &Range| (range.observer, range.of, range.distance.to_bits(), range.stamp.to_bits());
+    let mut found = Vec::new();
+    until("the ranges", || {
+        robots.send_ranges(2.5, &sent).expect("sent");
+        a_moment();
+        controller.receive(2.5, &mut |received| {
+            if let Received::Range(range) = received {
+                found.push(bits(&range));
+            }
+        });
+        sent.iter().all(|range| found.contains(&bits(range))).then_some(())
+    });
+    let all = sent.map(|range| bits(&range));
+    assert!(found.iter().all(|one| all.contains(one)), "{found:?}");
+    assert_eq!(controller.refused(), 0);
 }
 
 pub fn targets_reach_their_robots_to_the_bit(transport: &mut impl Transport) {

@@ -100,6 +100,11 @@ fn ros2_poses_come_in_order_and_the_newest_comes() {
 }
 
 #[test]
+fn ros2_ranges_come_as_they_were_measured() {
+    promises::ranges_come_as_they_were_measured(&mut Ros2::new(row(3, &MEASURED), vec![0, 1, 2]));
+}
+
+#[test]
 fn ros2_targets_reach_their_robots_to_the_bit() {
     promises::targets_reach_their_robots_to_the_bit(&mut Ros2::small());
 }

@@ -5,6 +5,7 @@ use flockform::shm::link::{Controller, POSES, Robots};
 use flockform::shm::payload::{Leader, Pose as WirePose};
 use flockform::shm::{Domain, Peer, ShmError};
 use flockform::swarm::transport::{ControllerEnd, Received, RobotsEnd};
+use flockform::swarm::watch::Range;
 use iceoryx2::prelude::{ZeroCopySend, ipc};
 
 use super::promises;
@@ -12,13 +13,14 @@ use super::support::*;
 
 struct Shm {
     count: usize,
+    more: &'static [&'static str],
     domain: Domain,
     peers: Vec<Peer>,
 }
 
 impl Shm {
     fn new(count: usize) -> Self {
-        Self { count, domain: domain(&domain_name()), peers: Vec::new() }
+        Self { count, more: &[], domain: domain(&domain_name()), peers: Vec::new() }
     }
 
     fn peer(&mut self) -> &Peer {
@@ -36,19 +38,41 @@ impl Transport for Shm {
     }
 
     fn controller(&mut self) -> Controller {
-        let (control, part) = control_of(&row(self.count, &[]));
+        let (control, part) = control_of(&row(self.count, self.more));
         Controller::open(self.peer(), "row", &control, &part).expect("an end")
     }
 
     fn robots(&mut self) -> Robots {
-        let count = self.count;
-        Robots::open(self.peer(), "row", count).expect("an end")
+        let (count, measures) = (self.count, !self.more.is_empty());
+        let peer = self.peer();
+        let robots = Robots::open(peer, "row", count).expect("an end");
+        if measures { robots.with_ranges(peer, "row").expect("an end") } else { robots }
     }
 }
 
 #[test]
 fn shm_poses_come_in_order_and_the_newest_comes() {
     promises::poses_come_in_order_and_the_newest_comes(&mut Shm::new(3));
+}
+
+#[test]
+fn shm_ranges_come_as_they_were_measured() {
+    promises::ranges_come_as_they_were_measured(&mut Shm { more: &MEASURED, ..Shm::new(3) });
+}
+
+#[test]
+fn ranges_by_or_of_nobody_are_left_out_and_counted() {
+    let mut shm = Shm { more: &MEASURED, ..Shm::new(3) };
+    let (mut controller, mut robots) = (shm.controller(), shm.robots());
+    meet(&mut controller, &mut robots, 0);
+    let range = |observer, of| Range { observer, of, distance: 1.0, stamp: 1.0 };
+    robots.send_ranges(1.0, &[range(3, 0), range(0, 7), range(0, 1)]).expect("sent");
+    let mut found = Vec::new();
+    controller.receive(1.0, &mut |received| found.push(received));
+    assert_eq!(found, [Received::Range(range(0, 1))]);
+    assert_eq!(controller.refused(), 2);
+    let unequipped = Robots::open(shm.peer(), "row", 3).expect("an end").send_ranges(1.0, &[range(0, 1)]);
+    assert!(unequipped.expect_err("no rangefinders").to_string().contains("ranges"));
 }
 
 #[test]

@@ -43,6 +43,9 @@ pub fn row(count: usize, more: &[&str]) -> Swarm {
     Swarm::parse("row", "a test's swarm", &text, &overrides, None).expect("valid")
 }
 
+/// Makes robots of a row measure each other.
+pub const MEASURED: [&str; 2] = ["limits.speed=1.0", "ranges={ reach = 5.0 }"];
+
 pub fn control_of(swarm: &Swarm) -> (Control, NodeScope) {
     let mut control = Control::new(swarm).expect("valid");
     let part = NodeScope::take(swarm, &mut control, None).expect("all");

@@ -6,6 +6,7 @@ pub mod diagnostics;
 pub mod leaders;
 pub mod markers;
 pub mod pose;
+pub mod ranges;
 pub mod state;
 pub mod target;
 

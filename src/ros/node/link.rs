@@ -3,7 +3,8 @@
 use super::pose::PoseSource;
 use super::{NodeError, TopicOf};
 use crate::messages::builtin_interfaces::Time;
-use crate::messages::formation::{pose::is_frame, target};
+use crate::messages::flockform_msgs::Ranges;
+use crate::messages::formation::{pose::is_frame, ranges, target};
 use crate::messages::geometry_msgs::PoseStamped;
 use crate::messages::recorder::MessageRecorder;
 use crate::messages::said;
@@ -19,6 +20,11 @@ use crate::swarm::transport::{ControllerEnd, Received, Target};
 /// Topics of the members.
 pub struct Link {
     poses: PoseSource,
+    /// By observer; empty in a swarm without ranges.
+    ranges: Vec<(usize, Subscription<Ranges>)>,
+    names: Vec<String>,
+    /// Members whose poses are received.
+    heard: Vec<usize>,
     leaders: Vec<(usize, Subscription<PoseStamped>)>,
     /// By member; none for those that others serve.
     targets: Vec<Option<Publisher<PoseStamped>>>,
@@ -52,9 +58,17 @@ impl Link {
         for &m in &part.mine {
             targets[m] = Some(node.publisher(&topic(&raw.target_topic, m)?, Quality::reliable(1))?);
         }
+        let mut ranges = Vec::new();
+        let has_ranges = control.watch().limits().ranges.is_some();
+        for &m in part.heard.iter().filter(|_| has_ranges) {
+            ranges.push((m, node.subscription(&topic(&raw.ranges_topic, m)?, Quality::BEST_EFFORT)?));
+        }
         let poses = PoseSource::open(node, raw, &part.heard, topic)?;
         Ok(Self {
             poses,
+            ranges,
+            names: formation.names.clone(),
+            heard: part.heard.clone(),
             leaders,
             targets,
             frame_id: raw.frame_id.clone(),
@@ -66,11 +80,27 @@ impl Link {
     }
 }
 
+impl Link {
+    fn receive_ranges(&mut self, now: f64, take: &mut dyn FnMut(Received)) {
+        for (observer, topic) in &self.ranges {
+            let Some((message, stamps)) = topic.take_last() else { continue };
+            let arrival = if self.simulated_time { now } else { stamps.received };
+            if let Some(recorder) = &mut self.recorder {
+                recorder.take_received(topic.topic(), &message, [now, arrival]);
+            }
+            ranges::ranges(&message, *observer, &self.names, arrival)
+                .filter(|range| self.heard.binary_search(&range.of).is_ok())
+                .for_each(|range| take(Received::Range(range)));
+        }
+    }
+}
+
 impl ControllerEnd for Link {
     type Error = EdgeError;
 
     fn receive(&mut self, now: f64, take: &mut dyn FnMut(Received)) {
         let simulated = self.simulated_time.then_some(now);
+        self.receive_ranges(now, take);
         let copies = self.recorder.as_mut().map(|recorder| (recorder, now));
         self.poses.take(&self.frame_id, simulated, copies, &mut |m, pose| take(Received::Pose(m, pose)));
         for (member, topic) in &self.leaders {
@@ -112,6 +142,7 @@ impl ControllerEnd for Link {
     fn refused(&self) -> u64 {
         self.misframed
             + self.poses.refused()
+            + self.ranges.iter().map(|(_, topic)| topic.refused()).sum::<u64>()
             + self.leaders.iter().map(|(_, topic)| topic.refused()).sum::<u64>()
     }
 }

@@ -31,11 +31,12 @@ const NONE: f64 = 0.0;
 pub(super) type Field = fn(&mut RawNode) -> &mut String;
 
 /// Parameters that are names of the swarm file's `[node]`. They can be changed while the node is not configured.
-pub(super) const TOPICS: [(&str, Field); 5] = [
+pub(super) const TOPICS: [(&str, Field); 6] = [
     ("frame_id", |raw| &mut raw.frame_id),
     ("pose_topic", |raw| &mut raw.pose_topic),
     ("target_topic", |raw| &mut raw.target_topic),
     ("leader_topic", |raw| &mut raw.leader_topic),
+    ("ranges_topic", |raw| &mut raw.ranges_topic),
     ("velocity_topic", |raw| &mut raw.velocity_topic),
 ];
 

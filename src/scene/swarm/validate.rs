@@ -246,6 +246,10 @@ fn check_safety(raw: &RawSwarm, refuse: Refuse<'_>) -> Result<(), SceneError> {
         let message = format!("a robot would be stopped before its pose is too old ({} s)", poses.age_limit);
         return Err(refuse("poses.stop_after", message, "give at least poses.age_limit"));
     }
+    if raw.ranges.is_some() && raw.limits.speed.or(poses.jump_speed).is_none() {
+        let message = "robots may move any way between a range and a pose, which then contradict nothing";
+        return Err(refuse("ranges", message.into(), "give limits.speed, or poses.jump_speed"));
+    }
     if poses.age_limit < raw.control.period {
         let message = format!("poses would be too old before the next period ({} s)", raw.control.period);
         return Err(refuse("poses.age_limit", message, "give several periods"));

@@ -13,7 +13,8 @@ use super::formation::{Formation, KeptLead, Measures, Seen};
 use super::resilience::trim;
 use super::robots::DoubleIntegrator;
 use super::safety::{self, Filter, Flags, Limits, SafetyError};
-use super::watch::{Gains, Health, Pose, Rejection, Track, Watch};
+use super::transport::Received;
+use super::watch::{Gains, Health, Pose, Range, Rejection, Track, Watch};
 use crate::flock::manoeuvre::Manoeuvre;
 use crate::flock::vectors::{Vectors, distance};
 use crate::scene::SceneError;
@@ -222,6 +223,24 @@ impl Control {
             track.correct(&pose, &dynamics, self.period, deviation);
         }
         verdict
+    }
+
+    /// What arrives at `now` \[s\], of whatever kind.
+    ///
+    /// # Errors
+    /// As [`Control::receive`].
+    pub fn take(&mut self, received: Received, now: f64) -> Result<(), Rejection> {
+        match received {
+            Received::Pose(member, pose) => return self.receive(member, pose, now),
+            Received::Range(range) => drop(self.receive_range(range, now)),
+            Received::Leader(member, place) => drop(self.place_leader(member, place)),
+        }
+        Ok(())
+    }
+
+    /// A range that arrives at `now` \[s\]; false if it is of no use. Counts where the swarm file has `[ranges]`.
+    pub fn receive_range(&mut self, range: Range, now: f64) -> bool {
+        self.watch.receive_range(range, now)
     }
 
     /// The model of members that take time to brake.

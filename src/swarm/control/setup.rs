@@ -5,7 +5,7 @@ use crate::scene::swarm::Swarm;
 use crate::scene::swarm::raw::{RawFlight, RawLimits, RawModel, RawObstacle};
 use crate::swarm::formation::Formation;
 use crate::swarm::safety::{Filter, Limits, Obstacle, Obstacles, Place, SafetyError};
-use crate::swarm::watch::WatchLimits;
+use crate::swarm::watch::{RangeLimits, WatchLimits};
 
 /// The number of faulty robots to be tolerated among a member's neighbours.
 ///
@@ -58,6 +58,11 @@ pub fn watch(swarm: &Swarm, formation: &Formation, speed: f64) -> WatchLimits {
         jump_speed: poses.jump_speed.unwrap_or(speed),
         recover: poses.recover as u32,
         period: Some(period),
+        ranges: swarm
+            .raw
+            .ranges
+            .as_ref()
+            .map(|ranges| RangeLimits { tolerance: ranges.tolerance, max_liars: ranges.max_liars }),
         ..WatchLimits::default()
     }
 }

@@ -1,13 +1,15 @@
 //! Simulated robots with their channels and faults; their targets come from outside.
 
 use super::faults::{self, Fault};
+use super::rangefinders::Rangefinders;
 use crate::flock::vectors::Vectors;
 use crate::scene::SceneError;
 use crate::scene::swarm::Swarm;
 use crate::scene::swarm::raw::{RawFaultKind, RawModel, RawSwarm};
-use crate::swarm::channel::{Channel, ChannelParams};
+use crate::swarm::channel::{Channel, ChannelParams, Sender};
 use crate::swarm::formation::Formation;
 use crate::swarm::robots::{DoubleIntegrator, Integrator, Model, Robot, Unicycle};
+use crate::swarm::transport::Received;
 use crate::swarm::watch::Pose;
 
 /// Robots by number, and the periods they have flown.
@@ -16,6 +18,7 @@ pub struct Fleet {
     robots: Vec<Robot>,
     channels: Vec<Channel>,
     faults: Vec<Fault>,
+    rangefinders: Option<Rangefinders>,
     model: Model,
     /// \[s\]
     dt: f64,
@@ -43,6 +46,10 @@ impl Fleet {
         Ok(Self {
             channels: (0..robots.len()).map(|m| Channel::new(params, raw.flight.seed, m)).collect(),
             faults: faults::of(swarm, formation)?,
+            rangefinders: raw
+                .ranges
+                .as_ref()
+                .map(|one| Rangefinders::new(one, raw.flight.seed, robots.len())),
             model: model(raw),
             dt: raw.control.period,
             period: 0,
@@ -115,8 +122,10 @@ impl Fleet {
         }
     }
 
-    /// Every robot sends its pose, stamped with `stamp` \[s\]; `hear` receives the poses that the channels deliver now.
-    pub fn send(&mut self, stamp: f64, hear: &mut dyn FnMut(usize, Pose)) {
+    /// Every robot sends the ranges that it measures, then its pose, stamped with `stamp` \[s\]; `hear` receives what
+    /// arrives now.
+    pub fn send(&mut self, stamp: f64, hear: &mut dyn FnMut(Received)) {
+        self.send_ranges(stamp, hear);
         for m in 0..self.robots.len() {
             let fault = self.fault(m);
             let sender = fault.map(Fault::sender).unwrap_or_default();
@@ -124,8 +133,19 @@ impl Fleet {
             let Robot { position, yaw, .. } = self.robots[m];
             self.channels[m].set_sender(sender);
             self.channels[m].send(self.period, Pose { position, yaw, stamp, frame_is_right });
-            self.channels[m].deliver(self.period).for_each(|pose| hear(m, pose));
+            self.channels[m].deliver(self.period).for_each(|pose| hear(Received::Pose(m, pose)));
         }
+    }
+
+    fn send_ranges(&mut self, stamp: f64, hear: &mut dyn FnMut(Received)) {
+        let Some(mut rangefinders) = self.rangefinders.take() else { return };
+        let sends = |m: usize| self.fault(m).map(Fault::sender) != Some(Sender::Dead);
+        if let Some(channel) = self.channels.first() {
+            let measured = (self.places(), stamp);
+            rangefinders
+                .measure(measured, &channel.params(), sends, &mut |range| hear(Received::Range(range)));
+        }
+        self.rangefinders = Some(rangefinders);
     }
 
     /// Every robot goes towards its target \[m\] for one period; those without one come to rest.

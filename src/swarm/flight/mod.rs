@@ -9,13 +9,14 @@ mod faults;
 mod fleet;
 mod measure;
 mod moment;
+mod rangefinders;
 mod report;
 
 use std::ops::ControlFlow;
 
 use super::control::Control;
 use super::robots::Robot;
-use super::watch::Pose;
+use super::transport::Received;
 use crate::continuum::plan::Plan;
 use crate::engine::Engine;
 use crate::flock::vectors::distance;
@@ -89,18 +90,18 @@ impl Flight {
 
     /// Flies one period.
     pub fn step(&mut self) {
-        self.step_heard(&mut |_, _| {});
+        self.step_heard(&mut |_| {});
     }
 
-    /// Flies one period; `hear` receives the poses that the control receives.
-    pub fn step_heard(&mut self, hear: &mut dyn FnMut(usize, Pose)) {
+    /// Flies one period; `hear` receives what the control receives.
+    pub fn step_heard(&mut self, hear: &mut dyn FnMut(Received)) {
         let now = self.fleet.time();
         self.perform_due();
         let control = &mut self.control;
-        self.fleet.send(now, &mut |member, pose| {
-            hear(member, pose);
+        self.fleet.send(now, &mut |received| {
+            hear(received);
             // The watch counts rejected poses.
-            let _ = control.receive(member, pose, now);
+            let _ = control.take(received, now);
         });
         self.control.tick(now);
         self.fleet.go(|member| self.control.target(member));
@@ -131,16 +132,16 @@ pub fn fly(
     swarm: &Swarm,
     watch: &mut dyn FnMut(&Flight, &Sample) -> ControlFlow<()>,
 ) -> Result<(Record, FlightReport), SceneError> {
-    fly_heard(swarm, &mut |_, _| {}, watch)
+    fly_heard(swarm, &mut |_| {}, watch)
 }
 
-/// As [`fly`]; `hear` receives the poses that the control receives, before `watch` is called for the period.
+/// As [`fly`]; `hear` receives what the control receives, before `watch` is called for the period.
 ///
 /// # Errors
 /// As [`Flight::new`].
 pub fn fly_heard(
     swarm: &Swarm,
-    hear: &mut dyn FnMut(usize, Pose),
+    hear: &mut dyn FnMut(Received),
     watch: &mut dyn FnMut(&Flight, &Sample) -> ControlFlow<()>,
 ) -> Result<(Record, FlightReport), SceneError> {
     let mut flight = Flight::new(swarm)?;

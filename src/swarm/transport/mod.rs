@@ -18,13 +18,15 @@ use super::control::Control;
 use super::control::scope::NodeScope;
 use super::flight::Fleet;
 use super::pace::system_time;
-use super::watch::Pose;
+use super::watch::{Pose, Range};
 
 /// A message that reaches the loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Received {
     /// A member's pose.
     Pose(usize, Pose),
+    /// A distance that one member measured of another.
+    Range(Range),
     /// The next place of a leader that is moved from outside \[m\].
     Leader(usize, [f64; 2]),
 }
@@ -69,6 +71,12 @@ pub trait RobotsEnd {
     /// The first that was not sent.
     fn send(&mut self, now: f64, poses: &[(usize, Pose)]) -> Result<(), Self::Error>;
 
+    /// Sends ranges that members measured, without waiting; those of one observer stand together.
+    ///
+    /// # Errors
+    /// The first that were not sent.
+    fn send_ranges(&mut self, now: f64, ranges: &[Range]) -> Result<(), Self::Error>;
+
     /// Passes to `go` the targets that arrived since the last call \[m\]; of one member's the newest comes last.
     fn targets(&mut self, go: &mut dyn FnMut(usize, [f64; 2]));
 }
@@ -76,6 +84,18 @@ pub trait RobotsEnd {
 /// The first half of a period: receives all messages that arrived, and warns of those that are dropped.
 pub fn listen<E: ControllerEnd>(control: &mut Control, end: &mut E, complaints: &mut Complaints, now: f64) {
     end.receive(now, &mut |heard| match heard {
+        Received::Range(range) => {
+            if !control.receive_range(range, now) {
+                let name = &control.formation().names[range.observer];
+                let text = format_args!(
+                    "{name}: a range of {:?} m, {:.3} s old, is of no use: it is not finite, negative, of the robot by \
+                     itself, from the future or older than `poses.age_limit`",
+                    range.distance,
+                    now - range.stamp
+                );
+                complaints.warn("range", range.observer, system_time(), &text);
+            }
+        }
         Received::Pose(member, pose) => {
             let Err(rejection) = control.receive(member, pose, now) else { return };
             let name = &control.formation().names[member];
@@ -145,9 +165,14 @@ pub fn fly<E: RobotsEnd>(
     end.targets(&mut |member, place| aim(goals, member, place));
     fleet.go(|member| goals[member]);
     let now = now(fleet);
-    let mut said = Vec::new();
-    fleet.send(now, &mut |member, pose| said.push((member, pose)));
-    end.send(now, &said)
+    let (mut poses, mut ranges) = (Vec::new(), Vec::new());
+    fleet.send(now, &mut |sent| match sent {
+        Received::Pose(member, pose) => poses.push((member, pose)),
+        Received::Range(range) => ranges.push(range),
+        Received::Leader(..) => {}
+    });
+    let measured = if ranges.is_empty() { Ok(()) } else { end.send_ranges(now, &ranges) };
+    end.send(now, &poses).and(measured)
 }
 
 /// Takes a target for a robot's goal \[m\]; one that is not finite, or of no robot, changes nothing.

@@ -1,6 +1,6 @@
 //! The conditions that a pose has to meet, and the meaning of its age.
 
-use super::{Health, Pose, Rejection};
+use super::{Health, Pose, RangeLimits, Rejection};
 use crate::flock::vectors::distance;
 
 /// The conditions that poses have to meet. Needs `0 < fresh <= age_limit <= stop_after`.
@@ -29,6 +29,8 @@ pub struct WatchLimits {
     pub recover: u32,
     /// Time between the stamps of a member \[s\], where it is known, to count what is lost; default none.
     pub period: Option<f64>,
+    /// Holds poses against ranges, where members measure each other; default none.
+    pub ranges: Option<RangeLimits>,
 }
 
 impl Default for WatchLimits {
@@ -44,6 +46,7 @@ impl Default for WatchLimits {
             jump_slack: 0.5,
             recover: 5,
             period: None,
+            ranges: None,
         }
     }
 }

@@ -6,10 +6,12 @@
 //! finite is ever returned.
 
 mod limits;
+mod ranges;
 mod rejection;
 mod track;
 
 pub use limits::WatchLimits;
+pub use ranges::{Range, RangeLimits};
 pub use rejection::{Counts, Rejection};
 pub use track::{Gains, Track};
 
@@ -64,6 +66,8 @@ impl Health {
 pub struct Watch {
     limits: WatchLimits,
     members: Vec<Member>,
+    /// The newest ranges of each member, by ascending observer.
+    ranges: Vec<Vec<Range>>,
     /// Latest time seen \[s\].
     clock: Option<f64>,
 }
@@ -83,7 +87,7 @@ impl Watch {
     pub fn new(members: usize, limits: WatchLimits) -> Self {
         let member =
             Member { health: Health::Waiting, accepted: None, candidate: None, counts: Counts::default() };
-        Self { limits, members: vec![member; members], clock: None }
+        Self { limits, members: vec![member; members], ranges: vec![Vec::new(); members], clock: None }
     }
 
     /// The conditions that poses have to meet.
@@ -102,8 +106,9 @@ impl Watch {
     /// Panics if there is no such member.
     pub fn receive(&mut self, member: usize, pose: Pose, now: f64) -> Result<(), Rejection> {
         self.follow_clock(now);
+        let sound = self.limits.admit(&pose, now).and_then(|()| self.weigh_by_ranges(member, &pose));
         let watched = &mut self.members[member];
-        let verdict = self.limits.admit(&pose, now).and_then(|()| watched.weigh(&pose, now, &self.limits));
+        let verdict = sound.and_then(|()| watched.weigh(&pose, now, &self.limits));
         match &verdict {
             Ok(()) => watched.accept(pose, now, &self.limits),
             Err(rejection) => watched.counts.count(rejection),
@@ -155,9 +160,8 @@ impl Watch {
     fn follow_clock(&mut self, now: f64) {
         let set_back = self.clock.is_some_and(|clock| now < clock - self.limits.skew);
         if set_back || !now.is_finite() {
-            for member in &mut self.members {
-                (member.health, member.accepted, member.candidate) = (Health::Waiting, None, None);
-            }
+            self.members.iter_mut().for_each(Member::forget);
+            self.ranges.iter_mut().for_each(Vec::clear);
             self.clock = None;
         }
         if now.is_finite() {
@@ -167,6 +171,11 @@ impl Watch {
 }
 
 impl Member {
+    /// Forgets every pose.
+    fn forget(&mut self) {
+        (self.health, self.accepted, self.candidate) = (Health::Waiting, None, None);
+    }
+
     fn age(&self, now: f64) -> Option<f64> {
         self.accepted.map(|pose| (now - pose.stamp).max(0.0))
     }

@@ -66,6 +66,19 @@ pub enum Rejection {
         /// Poses that have to agree for it to be believed.
         recover: u32,
     },
+    /// More members measured it elsewhere than may lie.
+    #[error(
+        "a pose is contradicted by the ranges of {against} of the {measured} robots that measured this one, at most \
+         {max_liars} may be wrong: look after its localisation"
+    )]
+    Contradicted {
+        /// Members whose ranges disagree with the pose.
+        against: usize,
+        /// Members that have measured.
+        measured: usize,
+        /// How many may disagree.
+        max_liars: usize,
+    },
     /// A good pose of a member that was stopped.
     #[error("a pose of a stopped member: {seen} of the {recover} good ones in a row that it needs to go on")]
     Recovering {
@@ -86,6 +99,7 @@ impl Rejection {
             Rejection::FromTheFuture { .. } => Some("from the future"),
             Rejection::TooOld { .. } => Some("too old"),
             Rejection::Jump { .. } => Some("jump"),
+            Rejection::Contradicted { .. } => Some("contradicted by ranges"),
             Rejection::NotNewer { .. } | Rejection::Recovering { .. } => None,
         }
     }
@@ -113,6 +127,8 @@ pub struct Counts {
     pub not_newer: u64,
     /// Rejections as [`Rejection::Jump`].
     pub jumps: u64,
+    /// Rejections as [`Rejection::Contradicted`].
+    pub contradicted: u64,
     /// Rejections as [`Rejection::Recovering`].
     pub recovering: u64,
 }
@@ -127,6 +143,7 @@ impl Counts {
             + self.too_old
             + self.not_newer
             + self.jumps
+            + self.contradicted
             + self.recovering
     }
 
@@ -139,6 +156,7 @@ impl Counts {
             Rejection::TooOld { .. } => &mut self.too_old,
             Rejection::NotNewer { .. } => &mut self.not_newer,
             Rejection::Jump { .. } => &mut self.jumps,
+            Rejection::Contradicted { .. } => &mut self.contradicted,
             Rejection::Recovering { .. } => &mut self.recovering,
         };
         *counter += 1;

@@ -82,6 +82,9 @@ pub struct RawSwarm {
     /// Conditions on poses.
     #[serde(default)]
     pub poses: RawPoses,
+    /// Ranges that robots measure of each other.
+    #[serde(default)]
+    pub ranges: Option<RawRanges>,
     /// Trims neighbours that stray: tolerance of robots that lie.
     #[serde(default)]
     pub resilience: Option<RawResilience>,
@@ -211,6 +214,12 @@ pub(super) mod defaults {
     pub fn recover() -> usize {
         5
     }
+    pub fn range_tolerance() -> f64 {
+        0.5
+    }
+    pub fn max_liars() -> usize {
+        1
+    }
     pub fn frame_id() -> String {
         "map".into()
     }
@@ -222,6 +231,9 @@ pub(super) mod defaults {
     }
     pub fn leader_topic() -> String {
         "{name}/leader_pose".into()
+    }
+    pub fn ranges_topic() -> String {
+        "{name}/ranges".into()
     }
     pub fn emergency_stop_topic() -> String {
         "~/emergency_stop_request".into()

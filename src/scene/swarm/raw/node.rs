@@ -29,6 +29,9 @@ pub struct RawNode {
     /// Topic of the next place of each leader with an `external` program, a `geometry_msgs/PoseStamped`.
     #[serde(default = "defaults::leader_topic")]
     pub leader_topic: String,
+    /// Topic of the ranges that each robot measures of others, a `flockform_msgs/Ranges`; needs `[ranges]`.
+    #[serde(default = "defaults::ranges_topic")]
+    pub ranges_topic: String,
     /// Publishes velocities towards the targets too.
     #[serde(default)]
     pub velocity: Option<RawVelocityType>,
@@ -56,6 +59,7 @@ impl Default for RawNode {
             pose_topic: defaults::pose_topic(),
             target_topic: defaults::target_topic(),
             leader_topic: defaults::leader_topic(),
+            ranges_topic: defaults::ranges_topic(),
             velocity: None,
             velocity_topic: defaults::velocity_topic(),
             emergency_stop_topic: defaults::emergency_stop_topic(),

@@ -93,6 +93,28 @@ impl Default for RawPoses {
     }
 }
 
+/// Distances that robots measure of each other, by radio or sight. A robot whose poses are contradicted by more others than
+/// may lie is not believed. Needs a speed limit, or `poses.jump_speed`: robots move between a range and a pose.
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RawRanges {
+    /// Simulated robots measure all that are no farther than this [m].
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub reach: f64,
+    /// Standard deviation of the ranges that simulated robots measure [m].
+    #[serde(default)]
+    #[schemars(range(min = 0))]
+    pub noise: f64,
+    /// Difference between a range and the poses of the two that is no contradiction, besides the ways that they go in the
+    /// meantime [m].
+    #[serde(default = "defaults::range_tolerance")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub tolerance: f64,
+    /// Most robots that lie, about their places or about ranges [1]: one more has to contradict a pose.
+    #[serde(default = "defaults::max_liars")]
+    pub max_liars: usize,
+}
+
 /// W-MSR: each robot leaves the neighbours out that stray farthest from its own displacement.
 #[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

@@ -1,0 +1,249 @@
+//! Ranges: distances that members measure of each other, against which poses are held.
+//!
+//! A range that disagrees with the poses of the two shows that one of three is wrong, and not which. A pose that more
+//! observers contradict than may lie is wrong whatever else is: at least one of them is honest and has measured. A lie
+//! passes only for observers from which the false place is as far as the true one, and these lie on one line, the
+//! perpendicular bisector of the two places. So every lie beyond the tolerance is found where more honest observers
+//! than may lie stand beside any such line.
+
+use super::{Pose, Rejection, Watch, WatchLimits};
+use crate::flock::vectors::distance;
+
+/// A distance that one member measured of another.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Range {
+    /// Number of the member that measured.
+    pub observer: usize,
+    /// Number of the member that was measured.
+    pub of: usize,
+    /// \[m\]
+    pub distance: f64,
+    /// Time of the measurement \[s\].
+    pub stamp: f64,
+}
+
+/// The conditions that poses have to meet where members measure each other.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RangeLimits {
+    /// Difference between a range and the distance of two poses of its time that is no contradiction \[m\].
+    pub tolerance: f64,
+    /// Most members that lie, about places or ranges \[1\]: a pose that more contradict is rejected.
+    pub max_liars: usize,
+}
+
+impl Watch {
+    /// Takes in a range that arrives at `now` \[s\]; of one pair's the newest counts. False for one that is of no use:
+    /// not finite, negative, of a member by itself, from the future, or too old to be compared.
+    ///
+    /// # Panics
+    /// If there is no such member.
+    pub fn receive_range(&mut self, range: Range, now: f64) -> bool {
+        self.follow_clock(now);
+        let Range { observer, of, distance, stamp } = range;
+        assert!(observer < self.members.len(), "no member {observer}");
+        let age = now - stamp;
+        let is_in_time = -self.limits.skew <= age && age <= self.limits.age_limit;
+        if observer == of || !is_in_time || !distance.is_finite() || distance < 0.0 {
+            return false;
+        }
+        let ranges = &mut self.ranges[of];
+        match ranges.binary_search_by_key(&observer, |known| known.observer) {
+            Ok(place) if ranges[place].stamp < stamp => ranges[place] = range,
+            Ok(_) => {}
+            Err(place) => ranges.insert(place, range),
+        }
+        true
+    }
+
+    /// Refuses a pose that too many contradict. A pose that was believed before anyone had measured is forgotten if it
+    /// is contradicted too: the member then waits as if it had never been heard.
+    pub(super) fn weigh_by_ranges(&mut self, member: usize, pose: &Pose) -> Result<(), Rejection> {
+        let verdict = self.contradicted(member, pose);
+        if verdict.is_err()
+            && let Some(accepted) = self.members[member].accepted
+            && self.contradicted(member, &accepted).is_err()
+        {
+            self.members[member].forget();
+        }
+        verdict
+    }
+
+    fn contradicted(&self, member: usize, pose: &Pose) -> Result<(), Rejection> {
+        let Some(RangeLimits { tolerance, max_liars }) = self.limits.ranges else { return Ok(()) };
+        let (mut measured, mut against) = (0, 0);
+        for range in &self.ranges[member] {
+            let Some(observer) = self.pose(range.observer) else { continue };
+            if (pose.stamp - range.stamp).abs() > self.limits.age_limit {
+                continue;
+            }
+            measured += 1;
+            let allowed = tolerance
+                + self.limits.way(pose.stamp - range.stamp)
+                + self.limits.way(observer.stamp - range.stamp);
+            if (distance(pose.position, observer.position) - range.distance).abs() > allowed {
+                against += 1;
+            }
+        }
+        if against > max_liars {
+            return Err(Rejection::Contradicted { against, measured, max_liars });
+        }
+        Ok(())
+    }
+}
+
+impl WatchLimits {
+    /// The longest way of a member in a time \[m\].
+    fn way(&self, time: f64) -> f64 {
+        // An infinite speed times no time is not a number.
+        if time == 0.0 { 0.0 } else { self.jump_speed * time.abs() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Health;
+    use super::*;
+
+    /// Four in the corners of a square of 4 m and one in its middle.
+    const PLACES: [[f64; 2]; 5] = [[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0], [2.0, 2.0]];
+
+    fn watch() -> Watch {
+        let ranges = Some(RangeLimits { tolerance: 0.2, max_liars: 1 });
+        Watch::new(5, WatchLimits { ranges, jump_speed: 1.0, recover: 1, ..WatchLimits::default() })
+    }
+
+    fn pose(position: [f64; 2], stamp: f64) -> Pose {
+        Pose { position, yaw: 0.0, stamp, frame_is_right: true }
+    }
+
+    /// Every member measures every other, `observed` at its place and all others at theirs; then all send their poses,
+    /// `claims` of member 4.
+    fn period(
+        watch: &mut Watch,
+        now: f64,
+        claims: [f64; 2],
+        measure: impl Fn(usize, usize) -> f64,
+    ) -> Vec<Result<(), Rejection>> {
+        for observer in 0..5 {
+            for of in (0..5).filter(|&of| of != observer) {
+                assert!(
+                    watch.receive_range(
+                        Range { observer, of, distance: measure(observer, of), stamp: now },
+                        now
+                    )
+                );
+            }
+        }
+        watch.look(now);
+        (0..5).map(|m| watch.receive(m, pose(if m == 4 { claims } else { PLACES[m] }, now), now)).collect()
+    }
+
+    fn true_distance(observer: usize, of: usize) -> f64 {
+        distance(PLACES[observer], PLACES[of])
+    }
+
+    #[test]
+    fn a_lie_is_rejected_and_honest_poses_never_are() {
+        let mut watch = watch();
+        for step in 0..40 {
+            // It drifts away at a quarter of the allowed speed.
+            let now = 0.1 * f64::from(step);
+            let drift = 0.25 * now;
+            let verdicts = period(&mut watch, now, [2.0 + drift, 2.0], true_distance);
+            assert!(verdicts[..4].iter().all(Result::is_ok), "{now}: {verdicts:?}");
+            // Seen from the corners, 45 degrees off, the drift shows by 0.7 of it.
+            match drift {
+                ..0.25 => assert_eq!(verdicts[4], Ok(()), "{now}"),
+                0.35.. => assert!(
+                    matches!(
+                        verdicts[4],
+                        Err(Rejection::Contradicted { against: 4, measured: 4, max_liars: 1 })
+                    ),
+                    "{now}: {:?}",
+                    verdicts[4]
+                ),
+                _ => {}
+            }
+        }
+        assert!(!watch.health(4).is_usable());
+        assert!(watch.last(4).is_some_and(|pose| pose.position[0] < 2.35), "the last believed stays");
+    }
+
+    #[test]
+    fn a_place_as_far_from_all_observers_on_a_line_is_not_found_and_one_beside_it_is_enough() {
+        let mut watch = watch();
+        // Mirrored at the line through members 0 and 2, on which the middle lies too.
+        let mirrored = |watch: &mut Watch, now: f64, also: &[usize]| {
+            let observers = [&[0, 2, 4][..], also].concat();
+            for &observer in &observers {
+                let range = Range { observer, of: 1, distance: true_distance(observer, 1), stamp: now };
+                assert!(watch.receive_range(range, now));
+            }
+            for m in [0, 2, 3, 4] {
+                watch.receive(m, pose(PLACES[m], now), now).expect("no one measures it");
+            }
+            watch.receive(1, pose([0.1, 3.9], now), now)
+        };
+        assert_eq!(mirrored(&mut watch, 0.0, &[]), Ok(()));
+        watch.limits.ranges = Some(RangeLimits { tolerance: 0.2, max_liars: 0 });
+        assert!(matches!(
+            mirrored(&mut watch, 0.1, &[3]),
+            Err(Rejection::Contradicted { against: 1, measured: 4, .. })
+        ));
+    }
+
+    #[test]
+    fn one_liar_accuses_nobody_and_two_are_beyond_what_is_promised() {
+        let mut watch = watch();
+        let lying = |liars: usize| {
+            move |observer: usize, of: usize| {
+                true_distance(observer, of) + if observer < liars { 3.0 } else { 0.0 }
+            }
+        };
+        for step in 0..20 {
+            let verdicts = period(&mut watch, 0.1 * f64::from(step), PLACES[4], lying(1));
+            assert!(verdicts.iter().all(Result::is_ok), "{verdicts:?}");
+        }
+        let verdicts = period(&mut watch, 2.0, PLACES[4], lying(2));
+        assert!(verdicts[4].is_err());
+    }
+
+    #[test]
+    fn a_place_believed_before_anyone_had_measured_is_forgotten() {
+        let mut watch = watch();
+        for m in 0..4 {
+            watch.receive(m, pose(PLACES[m], 0.0), 0.0).expect("a first pose");
+        }
+        watch.receive(4, pose([9.0, 9.0], 0.0), 0.0).expect("nobody has measured yet");
+        assert_eq!(watch.position(4), Some([9.0, 9.0]));
+        let verdicts = period(&mut watch, 0.1, [9.0, 9.0], true_distance);
+        assert!(verdicts[4].is_err() && verdicts[..4].iter().all(Result::is_ok));
+        assert_eq!((watch.health(4), watch.last(4)), (Health::Waiting, None));
+        assert_eq!(period(&mut watch, 0.2, PLACES[4], true_distance)[4], Ok(()), "the truth is believed");
+    }
+
+    #[test]
+    fn ranges_that_say_nothing_are_left_out() {
+        let mut watch = watch();
+        let range = Range { observer: 0, of: 1, distance: 4.0, stamp: 10.0 };
+        assert!(watch.receive_range(range, 10.0));
+        for wrong in [
+            Range { distance: f64::NAN, ..range },
+            Range { distance: -1.0, ..range },
+            Range { of: 0, ..range },
+            Range { stamp: f64::NAN, ..range },
+            Range { stamp: 11.0, ..range },
+            Range { stamp: 5.0, ..range },
+        ] {
+            assert!(!watch.receive_range(wrong, 10.0), "{wrong:?}");
+        }
+        assert!(
+            watch.receive_range(Range { distance: 99.0, stamp: 9.9, ..range }, 10.0),
+            "late, and no harm"
+        );
+        assert_eq!(watch.ranges[1], [range], "the newest counts");
+        // A clock that is set back makes them worthless.
+        watch.look(1.0);
+        assert!(watch.ranges[1].is_empty());
+    }
+}
