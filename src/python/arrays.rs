@@ -30,17 +30,28 @@ pub(super) fn rows<const N: usize>(
     moved(py, rows.flatten().collect(), &[count, N])
 }
 
-/// Finite real numbers of an argument called `name`, with their shape: any array or list of floats or integers that
+/// Real numbers of an argument called `name`, with their shape: any array or list of floats or integers that
 /// doubles hold.
-pub(super) fn numbers(name: &str, given: &Bound<'_, PyAny>) -> PyResult<(Vec<f64>, Vec<usize>)> {
+fn reals(name: &str, given: &Bound<'_, PyAny>) -> PyResult<(Vec<f64>, Vec<usize>)> {
     let array = as_array(name, given, "fiu", "real numbers, best as float64", "float64")?;
     let array: PyReadonlyArrayDyn<'_, f64> = array.extract()?;
-    let numbers = array.as_slice()?;
+    Ok((array.as_slice()?.to_vec(), array.shape().to_vec()))
+}
+
+/// As [`reals`], all of which have to be finite.
+pub(super) fn numbers(name: &str, given: &Bound<'_, PyAny>) -> PyResult<(Vec<f64>, Vec<usize>)> {
+    let (numbers, shape) = reals(name, given)?;
     if let Some(at) = numbers.iter().position(|number| !number.is_finite()) {
-        let place = index_of(at, array.shape());
+        let place = index_of(at, &shape);
         return Err(PyValueError::new_err(format!("{name}{place} is {}: give finite numbers", numbers[at])));
     }
-    Ok((numbers.to_vec(), array.shape().to_vec()))
+    Ok((numbers, shape))
+}
+
+/// A number for each pair of `count`, by rows; NaN where there is none.
+pub(super) fn square(name: &str, given: &Bound<'_, PyAny>, count: usize) -> PyResult<Vec<f64>> {
+    let (numbers, shape) = reals(name, given)?;
+    if shape == [count, count] { Ok(numbers) } else { Err(wrong_shape(name, &shape, &[count, count])) }
 }
 
 /// Rows of `width` numbers each, as many as `count` says.

@@ -5,13 +5,13 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use super::arrays::{column, indices, mask, moved, numbers, pairs, places, rows, table};
+use super::arrays::{column, indices, mask, moved, numbers, pairs, places, rows, square, table};
 use super::beside::beside;
 use super::source::Source;
 use super::threads::here;
 use crate::scene::SceneError;
 use crate::swarm::control::{Control, Mode};
-use crate::swarm::watch::Pose;
+use crate::swarm::watch::{Pose, Range};
 
 /// A formation whose poses come from Python and whose targets go there.
 ///
@@ -52,6 +52,22 @@ impl Swarm {
             }
             now => Ok(now.unwrap_or(self.now)),
         }
+    }
+
+    /// Takes in the distances that robots measured of each other at `now`.
+    fn hear_ranges(&mut self, given: &Bound<'_, PyAny>, now: f64) -> PyResult<()> {
+        let count = self.count();
+        let distances = square("ranges", given, count)?;
+        if self.control.watch().limits().ranges.is_none() {
+            let message =
+                format!("ranges: swarm `{}` has no [ranges], which says how they are weighed", self.name);
+            return Err(PyValueError::new_err(message));
+        }
+        for (pair, &distance) in distances.iter().enumerate().filter(|(_, distance)| !distance.is_nan()) {
+            let (observer, of) = (pair / count, pair % count);
+            self.control.receive_range(Range { observer, of, distance, stamp: now }, now);
+        }
+        Ok(())
     }
 
     fn robot(&self, given: &Bound<'_, PyAny>) -> PyResult<usize> {
@@ -132,10 +148,12 @@ impl Swarm {
     /// read, but must be finite.
     /// stamps: when the poses were measured [s], shape (count,); now unless given.
     /// now: time of the tick [s]; one period after the last one unless given.
+    /// ranges: how far robots measured others to be at the tick [m], shape (count, count), a row for each that measured;
+    /// NaN where none did. Only of a swarm with [ranges].
     ///
     /// Returns the targets [m], float64, shape (count, 2); NaN for a robot without a usable pose, which is to stay
     /// where it is.
-    #[pyo3(signature = (poses, *, heard=None, stamps=None, now=None))]
+    #[pyo3(signature = (poses, *, heard=None, stamps=None, now=None, ranges=None))]
     fn tick<'py>(
         &mut self,
         py: Python<'py>,
@@ -143,12 +161,16 @@ impl Swarm {
         heard: Option<&Bound<'py, PyAny>>,
         stamps: Option<&Bound<'py, PyAny>>,
         now: Option<f64>,
+        ranges: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let count = self.count();
         let poses = self.poses(poses)?;
         let heard = heard.map_or_else(|| Ok(vec![true; count]), |given| mask("heard", given, count))?;
         let now = self.time(now)?;
         let stamps = stamps.map_or_else(|| Ok(vec![now; count]), |given| column("stamps", given, count))?;
+        if let Some(given) = ranges {
+            self.hear_ranges(given, now)?;
+        }
         self.rejected.clear();
         for robot in (0..count).filter(|&robot| heard[robot]) {
             let [x, y, yaw] = poses[robot];

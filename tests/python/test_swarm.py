@@ -93,6 +93,25 @@ def test_a_copy_goes_its_own_way():
     assert np.array_equal(fly(swarm, 50, places), fly(twin, 50, places))
 
 
+def test_a_lie_about_a_place_is_found_by_the_ranges_of_others():
+    swarm = flockform.Swarm("square", set={"ranges": {"tolerance": 0.2}})
+    places = swarm.places()
+    ranges = np.linalg.norm(places[:, None] - places, axis=2)
+    ranges[ranges > 3.5] = np.nan
+    np.fill_diagonal(ranges, np.nan)
+    for _ in range(4):
+        swarm.tick(places, ranges=ranges)
+        assert not swarm.rejections()
+    said = places.copy()
+    said[12] += [0.4, 0.0]
+    # Half a metre is noise that the speed limit allows for: only the ranges tell.
+    swarm.tick(said)
+    assert not swarm.rejections()
+    swarm.tick(said, ranges=ranges)
+    assert list(swarm.rejections()) == ["robot_13"]
+    assert "range" in swarm.rejections()["robot_13"]
+
+
 @pytest.mark.parametrize(
     ("arguments", "error", "words"),
     [
@@ -104,6 +123,8 @@ def test_a_copy_goes_its_own_way():
         ({"heard": [True]}, ValueError, "heard has shape (1,): give (25,)"),
         ({"stamps": np.zeros(3)}, ValueError, "stamps has shape (3,): give (25,)"),
         ({"now": float("nan")}, ValueError, "now = NaN"),
+        ({"ranges": np.zeros(25)}, ValueError, "ranges has shape (25,): give (25, 25)"),
+        ({"ranges": np.zeros((25, 25))}, ValueError, "swarm `square` has no [ranges]"),
     ],
 )
 def test_bad_arrays_are_refused_by_name(arguments, error, words):

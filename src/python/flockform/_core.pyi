@@ -330,6 +330,7 @@ class Swarm:
         heard: ArrayLike | None = None,
         stamps: ArrayLike | None = None,
         now: float | None = None,
+        ranges: ArrayLike | None = None,
     ) -> NDArray[np.float64]:
         """One period: poses in, safe targets out.
 
@@ -338,6 +339,8 @@ class Swarm:
         read, but must be finite.
         stamps: when the poses were measured [s], shape (count,); now unless given.
         now: time of the tick [s]; one period after the last one unless given.
+        ranges: how far robots measured others to be at the tick [m], shape (count, count), a row for each that measured;
+        NaN where none did. Only of a swarm with [ranges].
 
         Returns the targets [m], float64, shape (count, 2); NaN for a robot without a usable pose, which is to stay
         where it is.

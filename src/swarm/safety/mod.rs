@@ -70,8 +70,9 @@
 //! A pose that is farther from the last one than the speed limit allows, and half a metre of noise, is not accepted
 //! before several agree ([`Watch`](super::watch::Watch)); until then the member's last accepted pose counts, by its
 //! age. Physics excludes no more: poses that drift slowly from the true place are accepted, and others may collide
-//! with the member where it truly is. No filter can do better with poses from the members themselves; it would take
-//! ranges measured by others, which no message here carries. A liar cannot bring two honest members
+//! with the member where it truly is. No filter can do better with poses from the members themselves; it takes
+//! ranges that others measure, against which the watch holds every pose
+//! ([`RangeLimits`](super::watch::RangeLimits)). A liar cannot bring two honest members
 //! near each other: their borders follow from their own poses alone.
 //!
 //! It is a filter, not a planner: it goes around what is convex and may wait or wander before what is not.

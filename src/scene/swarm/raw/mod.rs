@@ -214,6 +214,9 @@ pub(super) mod defaults {
     pub fn recover() -> usize {
         5
     }
+    pub fn reach() -> f64 {
+        10.0
+    }
     pub fn range_tolerance() -> f64 {
         0.5
     }

@@ -99,6 +99,7 @@ impl Default for RawPoses {
 #[serde(deny_unknown_fields)]
 pub struct RawRanges {
     /// Simulated robots measure all that are no farther than this [m].
+    #[serde(default = "defaults::reach")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub reach: f64,
     /// Standard deviation of the ranges that simulated robots measure [m].
