@@ -2,8 +2,8 @@
 //!
 //! Most commands have nothing to keep before they are done: the thread that hears of the signal removes what they
 //! have begun to write and ends the program, in the midst of a mesh or a factorisation too. A command that
-//! [`keeps`] results looks at the flag itself and saves them; if it has not begun to within [`GRACE`], it is ended all
-//! the same. A second signal ends any command at once.
+//! [`keeps`] results looks at the flag itself and saves them; if it has not begun to within [`GRACE`], or writes a large
+//! state at [`SAVED_BY`], it is ended all the same. A second signal ends any command at once.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -20,8 +20,10 @@ static RAISED: AtomicBool = AtomicBool::new(false);
 static ENDING: AtomicBool = AtomicBool::new(false);
 /// How the first signal is handled.
 static MODE: AtomicU8 = AtomicU8::new(ENDS);
-/// How many parts of the program ask for time to save results.
+/// How many parts of the program ask for time to save what is written in a moment.
 static SAVING: AtomicUsize = AtomicUsize::new(0);
+/// How many ask for what is left of the second to save what may take longer.
+static SAVING_IN_TIME: AtomicUsize = AtomicUsize::new(0);
 /// Paths removed at the end, and the message printed.
 static LEFT: Mutex<Left> = Mutex::new(Left { paths: Vec::new(), words: None });
 
@@ -33,6 +35,8 @@ pub const NOTHING_KEPT: &str = "interrupted: nothing is kept";
 
 /// How long work that keeps results may take to notice.
 const GRACE: Duration = Duration::from_millis(500);
+/// When the state of a large body has to be written; what is not is given up, and the checkpoint before it stays.
+const SAVED_BY: Duration = Duration::from_millis(750);
 /// How long another thread may go on writing into a folder that is being removed.
 const REMOVING: Duration = Duration::from_millis(150);
 
@@ -90,17 +94,29 @@ pub fn leave_to_the_end() {
     }
 }
 
-/// Time to save results; what takes long must be worth it.
-pub struct Saving(());
+/// Time to save results, for as long as this lives.
+pub struct Saving(&'static AtomicUsize);
 
+impl Saving {
+    fn counted_by(counter: &'static AtomicUsize) -> Self {
+        counter.fetch_add(1, Ordering::SeqCst);
+        Self(counter)
+    }
+}
+
+/// Time to save what is written in a moment.
 pub fn saving() -> Saving {
-    SAVING.fetch_add(1, Ordering::SeqCst);
-    Saving(())
+    Saving::counted_by(&SAVING)
+}
+
+/// Time to save what may take longer than is left of the second.
+pub fn saving_in_time() -> Saving {
+    Saving::counted_by(&SAVING_IN_TIME)
 }
 
 impl Drop for Saving {
     fn drop(&mut self) {
-        SAVING.fetch_sub(1, Ordering::SeqCst);
+        self.0.fetch_sub(1, Ordering::SeqCst);
     }
 }
 
@@ -112,6 +128,13 @@ pub fn removes(paths: impl IntoIterator<Item = PathBuf>) {
 /// Sets the message printed if the program is ended from here on.
 pub fn says(words: String) {
     left().words = Some(words);
+}
+
+/// Prints the message now; an end from here on is silent.
+pub fn says_at_once(words: &str) {
+    let mut left = left();
+    print(words);
+    left.words = Some(String::new());
 }
 
 /// Gives a finished folder its name, without an end in between.
@@ -127,8 +150,10 @@ pub fn commit(folder: OutputFolder) -> Result<PathBuf, ExportError> {
 }
 
 fn end_when_saved(grace: Duration) {
+    let raised = Instant::now();
     std::thread::sleep(grace);
-    while SAVING.load(Ordering::SeqCst) > 0 {
+    let saves = |counter: &AtomicUsize| counter.load(Ordering::SeqCst) > 0;
+    while saves(&SAVING) || (saves(&SAVING_IN_TIME) && raised.elapsed() < SAVED_BY) {
         std::thread::sleep(Duration::from_millis(5));
     }
     end();
@@ -143,9 +168,15 @@ fn end() -> ! {
             std::thread::sleep(Duration::from_millis(2));
         }
     }
-    // A closed stderr must not keep the program from ending: `eprintln` would panic.
-    let _ = writeln!(std::io::stderr(), "{}", left.words.as_deref().unwrap_or(NOTHING_KEPT));
+    print(left.words.as_deref().unwrap_or(NOTHING_KEPT));
     std::process::exit(FAILED.into())
+}
+
+fn print(words: &str) {
+    if !words.is_empty() {
+        // A closed stderr must not keep the program from ending: `eprintln` would panic.
+        let _ = writeln!(std::io::stderr(), "{words}");
+    }
 }
 
 /// A hidden folder is ours with all that is in it; any other must be empty.

@@ -207,10 +207,10 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
     let is_small = outcome.engine.body().count() <= QUICKLY_WRITTEN;
     let mut saving = (is_interrupted && is_small).then(interrupt::saving);
     if is_interrupted || elapsed > WORTH_KEEPING {
-        let _saving = interrupt::saving();
+        let _saving = if is_small { interrupt::saving() } else { interrupt::saving_in_time() };
         let is_left = checkpointer.leave(&mut folder, (&outcome.engine, outcome.residual), recorder.kept());
         if is_left && is_interrupted && !is_small {
-            eprintln!("{}", resume_words(&folder));
+            interrupt::says_at_once(&resume_words(&folder));
             return Ok(ExitCode::from(FAILED));
         }
         if is_left {

@@ -6,7 +6,7 @@ use flockform::messages::builtin_interfaces::{Duration, Time};
 use flockform::messages::definitions;
 use flockform::messages::diagnostic_msgs::{DiagnosticArray, DiagnosticStatus, KeyValue};
 use flockform::messages::flockform_msgs::{
-    FormationState, LoopEvent, MemberState, SetFormationRequest, SetFormationResponse,
+    FormationState, LoopEvent, MemberState, Ranges, SetFormationRequest, SetFormationResponse,
 };
 use flockform::messages::geometry_msgs::*;
 use flockform::messages::nav_msgs::Odometry;
@@ -89,6 +89,7 @@ pub fn every_struct() -> Vec<Filled> {
         MemberState,
         FormationState,
         LoopEvent,
+        Ranges,
     ];
     all.push(filled::<SetFormationRequest>("flockform_msgs/SetFormation_Request".into()));
     all.push(filled::<SetFormationResponse>("flockform_msgs/SetFormation_Response".into()));
