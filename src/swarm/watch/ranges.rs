@@ -211,8 +211,8 @@ mod tests {
     #[test]
     fn a_place_believed_before_anyone_had_measured_is_forgotten() {
         let mut watch = watch();
-        for m in 0..4 {
-            watch.receive(m, pose(PLACES[m], 0.0), 0.0).expect("a first pose");
+        for (m, &place) in PLACES[..4].iter().enumerate() {
+            watch.receive(m, pose(place, 0.0), 0.0).expect("a first pose");
         }
         watch.receive(4, pose([9.0, 9.0], 0.0), 0.0).expect("nobody has measured yet");
         assert_eq!(watch.position(4), Some([9.0, 9.0]));
