@@ -2,8 +2,9 @@
 //!
 //! The coefficients of the iteration are those of Lanczos' tridiagonal matrix, whose extreme eigenvalues
 //! approach those of the operator from within (G. H. Golub and C. F. Van Loan, *Matrix Computations*,
-//! section 10.2.5). On a large body the steps are taken on a few groups of its columns with all others
-//! held, which lowers the largest eigenvalue by next to nothing.
+//! section 10.2.5). On a large body the largest eigenvalue is looked for on a few groups of its columns with all
+//! others held. It belongs to a displacement of a few particles that the rows around them decide, so groups that
+//! hold every different row between them have it to next to nothing.
 
 use super::steps::{Apply, precondition_group};
 use crate::flock::vectors::Vectors;
@@ -20,11 +21,20 @@ pub struct Bounds {
     pub high: f64,
 }
 
-/// Groups of columns that a largest eigenvalue is looked for in: both ends and the middle.
+/// Groups of columns that a largest eigenvalue is looked for in: both ends, the middle, and those with a row that
+/// none before has, as at an outline, a hole or an inclusion.
 fn samples(matrix: &Matrix) -> Vec<usize> {
     let last = matrix.groups() - 1;
     let mut samples = vec![0, last / 2, last];
     samples.dedup();
+    let mut seen = vec![false; matrix.rows.len()];
+    let mut has_new = |group: usize| {
+        let rows = matrix.runs_of(group).iter().map(|run| run.class as usize);
+        rows.fold(false, |any, row| any | !std::mem::replace(&mut seen[row], true))
+    };
+    samples.iter().for_each(|&group| _ = has_new(group));
+    samples.extend((0..=last).filter(|&group| has_new(group)));
+    samples.sort_unstable();
     samples
 }
 
