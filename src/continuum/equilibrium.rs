@@ -169,9 +169,15 @@ fn refuse_corotated(scene: &Scene, error: &CorotatedError) -> SceneError {
 
 fn refuse(scene: &Scene, error: &SolveError) -> SceneError {
     let is_auto = matches!(&scene.equilibrium, Some(asked) if matches!(asked.request.solver, Choice::Auto));
-    let help = match is_auto {
-        true => "try equilibrium.solver = \"direct\", a larger lattice.spacing, or more supports",
-        false => "choose another equilibrium.solver, or equilibrium.solver = \"auto\"",
+    let help = match (error, is_auto) {
+        (SolveError::NotPositive { solver: Solver::Direct, .. }, _) => {
+            "add supports, or bring the stiffnesses closer together"
+        }
+        (SolveError::NotPositive { .. }, false) => {
+            "try equilibrium.solver = \"direct\": a factorisation finds out whether the body is stable"
+        }
+        (_, true) => "try equilibrium.solver = \"direct\", a larger lattice.spacing, or more supports",
+        (_, false) => "choose another equilibrium.solver, or equilibrium.solver = \"auto\"",
     };
     scene.refuse("equilibrium", error.to_string(), help)
 }

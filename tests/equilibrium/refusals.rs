@@ -91,6 +91,14 @@ fn a_body_that_gains_energy_by_moving_is_found_out() {
 }
 
 #[test]
+fn an_automatic_choice_asks_a_factorisation_before_it_calls_a_body_unstable() {
+    let unstable = chain(2000, |i| if i % 2 == 0 { [-0.9, 1.0] } else { [1.0, -0.9] });
+    assert_eq!(choose(&unstable, &Request::default()).0, Solver::Multigrid);
+    let error = solve(&unstable, &Request::default()).map(|solved| solved.iterations).expect_err("refused");
+    assert!(matches!(error, SolveError::NotPositive { solver: Solver::Direct, .. }), "{error}");
+}
+
+#[test]
 fn tolerances_and_precisions_that_cannot_be_had_are_refused() {
     let system = chain(10, |_| [1.0, 1.0]);
     for tolerance in [0.0, 1.0, -1.0, f64::NAN] {

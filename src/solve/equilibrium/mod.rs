@@ -38,6 +38,7 @@ pub use system::System;
 use super::interrupt::Interrupt;
 use super::stopwatch::Stopwatch;
 use crate::flock::vectors::Vectors;
+use choice::falls_back;
 use system::Prepared;
 
 /// Relative residual that no whole solve in single precision is asked to go below.
@@ -204,7 +205,19 @@ pub fn solve(system: &System, request: &Request) -> Result<Solved, SolveError> {
     check(system, request, solver)?;
     let mut prepared = Prepared::new(system)?;
     let prepared_in = begin.elapsed();
-    let found = by(solver, &mut prepared, system, request)?;
+    let (found, solver, why) = match by(solver, &mut prepared, system, request) {
+        Err(SolveError::NotPositive { .. }) if falls_back(system, request, solver) => {
+            // The iteration has used up the right-hand side.
+            prepared.right = prepared.scaled_right(system);
+            let found = by(Solver::Direct, &mut prepared, system, request)?;
+            (
+                found,
+                Solver::Direct,
+                format!("{solver} took the body for unstable, which a factorisation finds out"),
+            )
+        }
+        found => (found?, solver, why),
+    };
     let set_up = prepared_in + found.set_up;
     let mut residuals = found.residuals;
     if let Some(last) = residuals.last_mut().filter(|_| solver.updates_residual() && prepared.size > 0.0) {
