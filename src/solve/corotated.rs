@@ -7,6 +7,10 @@
 //!
 //! Leaders go their way and loads grow in increments, halved where Newton's method does not settle or a cell turns too far
 //! at once: that keeps to the equilibrium that the unstrained body grows into.
+//!
+//! A displacement known to the last digit of a double leaves a residual of `eps |K| |u|`. The bending of a beam needs so much
+//! less force than its stretching that this exceeds the load itself where the beam is some thousands of times as long as
+//! high, so Newton's method has settled where its residual is no more than that.
 
 use std::time::Duration;
 
@@ -32,7 +36,7 @@ const STALLED: usize = 2;
 const MOST_SOLVES: usize = 500;
 /// Least part of the way taken at once.
 const LEAST_STRIDE: f64 = 1.0 / 1024.0;
-/// Residual at which the next increment may begin.
+/// Residual at which the next increment may begin; where rounding leaves more, the part of the displacements that a step is.
 const ON_THE_WAY: f64 = 1e-3;
 /// Cosine of the largest turn of a cell in one increment: 60 degrees.
 const LEAST_COSINE: f64 = 0.5;
@@ -271,6 +275,22 @@ impl Corotated<'_> {
         Some((locals, left))
     }
 
+    /// The force that the last digits of the displacements stand for, `eps | |K| |u| + |f| |`: no displacement in doubles can
+    /// be asked to leave less.
+    fn rounding(&self, locals: &[Option<Local>], u: &Vectors, part: f64) -> f64 {
+        let size = |block: &Block, u: [f64; 2]| apply(&block.map(|row| row.map(f64::abs)), u.map(f64::abs));
+        let of_particle = |(i, local): (usize, &Option<Local>)| {
+            let (Some(local), free) = (local, self.free(i)) else { return [0.0; 2] };
+            let mut sum = self.load(i).map(|load| (part * load).abs());
+            add(&mut sum, size(&local.diagonal, u.get(i)));
+            for (&j, block) in self.flock.neighbours.of(i).iter().zip(&local.blocks) {
+                add(&mut sum, size(block, u.get(j as usize)));
+            }
+            [0, 1].map(|axis| if free[axis] { sum[axis] } else { 0.0 })
+        };
+        f64::EPSILON * norm(&locals.iter().enumerate().map(of_particle).collect())
+    }
+
     /// The force at the start, all followers at zero and all cells in the axes of the reference.
     fn size(&self) -> f64 {
         let mut u = Vectors::zeros(self.follows.len());
@@ -338,7 +358,10 @@ impl Newton<'_> {
                 // An error in the unstrained body is an error of the scene.
                 Err(error) if self.residuals.len() == 1 => return Err(error),
                 Err(error @ CorotatedError::Solve(SolveError::Interrupted)) => return Err(error),
-                Err(_) => stride = 0.5 * (part - done),
+                Err(error) => {
+                    tracing::debug!(part, %error, "an increment fails");
+                    stride = 0.5 * (part - done);
+                }
             }
             let solves = self.residuals.len() - 1;
             if done < 1.0 && (stride < LEAST_STRIDE || solves >= MOST_SOLVES) {
@@ -363,17 +386,28 @@ impl Newton<'_> {
         let Some((mut locals, mut left)) = rule.forces(&u, after) else { return Ok(None) };
         let turns: Vec<Option<Turn>> = locals.iter().map(|l| l.as_ref().map(|l| l.turn)).collect();
         let (mut best, mut stalled) = (f64::INFINITY, 0);
+        let (mut is_settled, mut is_rounding) = (false, false);
         for _ in 0..MOST_STEPS {
-            self.step(&mut u, (&locals, left), std::mem::replace(&mut led, Vectors::zeros(now.len())))?;
+            let led = std::mem::replace(&mut led, Vectors::zeros(now.len()));
+            match self.step(&mut u, (&locals, left), led) {
+                // There is nothing left that another step could find.
+                Err(CorotatedError::Solve(SolveError::NotPositive { .. })) if is_rounding => break,
+                stepped => stepped?,
+            }
             rule.hold(&mut u, &now);
             let Some(found) = rule.forces(&u, after) else { return Ok(None) };
             (locals, left) = found;
             let residual = norm(&left) / self.size;
             self.residuals.push(residual);
+            let rounding = rule.rounding(&locals, &u, after) / self.size;
+            tracing::debug!(after, residual, rounding, "a step of Newton's method");
             // Where rounding has the last word, further steps do not make it less.
             stalled = if residual > 0.5 * best { stalled + 1 } else { 0 };
             best = best.min(residual);
-            if residual <= goal || (residual <= ON_THE_WAY && stalled == STALLED) {
+            is_rounding = residual <= rounding && self.last_step <= ON_THE_WAY;
+            let is_enough = residual <= goal.max(ON_THE_WAY) || is_rounding;
+            is_settled |= is_enough;
+            if residual <= goal || (is_enough && stalled >= STALLED) {
                 break;
             }
             if residual.is_nan() || residual > 1e6 {
@@ -384,7 +418,7 @@ impl Newton<'_> {
             (Some(a), Some(b)) => a.cosine_to(b.turn) >= LEAST_COSINE,
             _ => true,
         };
-        let arrived = best <= goal.max(ON_THE_WAY) && turns.iter().zip(&locals).all(near);
+        let arrived = is_settled && turns.iter().zip(&locals).all(near);
         Ok(arrived.then_some(u))
     }
 

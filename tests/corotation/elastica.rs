@@ -64,3 +64,19 @@ fn a_cantilever_bends_like_the_elastica_on_squares_triangles_and_hexagons() {
         }
     }
 }
+
+#[test]
+fn a_beam_so_slender_that_rounding_leaves_more_than_a_thousandth_of_its_load_bends_like_a_shorter_one() {
+    let solved = |length: f64| {
+        let (young, a) = (12.0, 1e-4);
+        let load = a * young / 12.0 / (length * length);
+        let beam = Beam::new(KINDS[0](0.5), length, &sheet(young, 0.0), [0.0, load]);
+        let solved = beam.solved_by(Solver::Direct);
+        assert!(solved.is_at_rest(), "{:?}, known to {:?}", solved.residuals, solved.known_to);
+        let [_, w] = beam.of_the_end(&solved.displacement);
+        (w / length, solved.residuals.last().copied())
+    };
+    let ((short, _), (long, residual)) = (solved(400.0), solved(4000.0));
+    assert!(residual > Some(1e-3), "{residual:?}");
+    assert!((long / short - 1.0).abs() < 1e-4, "{long} {short}");
+}
