@@ -110,6 +110,12 @@ impl OutputArguments {
 
     /// The folder asked for, or the first of out/NAME, out/NAME-2, ... that is not taken.
     pub fn folder(&self, name: &str) -> Result<OutputFolder, ExportError> {
+        let mut folder = self.empty(name)?;
+        folder.set_command(command_line(std::env::args().skip(1)));
+        Ok(folder)
+    }
+
+    fn empty(&self, name: &str) -> Result<OutputFolder, ExportError> {
         if let Some(out) = &self.out {
             return create(out, self.force);
         }
@@ -123,5 +129,63 @@ impl OutputArguments {
             path.set_file_name(format!("{name}-{n}"));
         }
         unreachable!("endless")
+    }
+}
+
+/// Options that change nothing of a report, and whether a value follows.
+const WITHOUT_EFFECT: [(&str, bool); 12] = [
+    ("--out", true),
+    ("--force", false),
+    ("--quiet", false),
+    ("-q", false),
+    ("--verbose", false),
+    ("-v", false),
+    ("--open", false),
+    ("--json", false),
+    ("--figures", true),
+    ("--film", true),
+    ("--record", true),
+    ("--publish", true),
+];
+
+/// The command with these arguments as a shell takes it, without options that change nothing of its report.
+pub fn command_line(arguments: impl IntoIterator<Item = String>) -> String {
+    let mut words = vec!["flockform".to_owned()];
+    let mut arguments = arguments.into_iter();
+    while let Some(argument) = arguments.next() {
+        let name = argument.split_once('=').map_or(argument.as_str(), |(name, _)| name);
+        match WITHOUT_EFFECT.iter().find(|(known, _)| *known == name) {
+            None => words.push(quoted(&argument)),
+            Some((known, takes_value)) if *takes_value && *known == argument => drop(arguments.next()),
+            Some(_) => {}
+        }
+    }
+    words.join(" ")
+}
+
+/// A word that a POSIX shell reads as this text.
+fn quoted(text: &str) -> String {
+    let is_plain = |sign: char| sign.is_ascii_alphanumeric() || "-_./=:,+@%".contains(sign);
+    match !text.is_empty() && text.chars().all(is_plain) {
+        true => text.to_owned(),
+        false => format!("'{}'", text.replace('\'', r"'\''")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_command_line_can_be_typed_again() {
+        let of = |line: &[&str]| command_line(line.iter().map(|&word| word.to_owned()));
+        assert_eq!(
+            of(&["swarm", "square", "-q", "--out", "a b", "--set", "title=it's", "--force", "--out=c"]),
+            r"flockform swarm square --set 'title=it'\''s'"
+        );
+        assert_eq!(
+            of(&["compare", "my scene.toml", "--truth-error", "0.01", "--open"]),
+            "flockform compare 'my scene.toml' --truth-error 0.01"
+        );
     }
 }

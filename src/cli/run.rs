@@ -36,7 +36,7 @@ use words::{closing_words, where_to_look};
 use super::checkpoint::{CheckpointArguments, Checkpointer, ResumedRun};
 use super::film::{FilmArguments, words as film_words};
 use super::names::{FileName, SceneArguments, in_full};
-use super::output::{FigureArguments, OutputArguments, ReportArguments};
+use super::output::{FigureArguments, OutputArguments, ReportArguments, command_line};
 use super::progress::{Drawn, Progress};
 use super::ranks::{self, Interrupted, Start};
 use super::recording::{RecordArguments, close};
@@ -163,6 +163,8 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
         Some(left) => left.open()?,
         None => arguments.output.folder(&scene.name)?,
     };
+    // A run that was resumed is told by how it began.
+    folder.set_command(command_line(asked.arguments()));
     let setup = start.elapsed();
     tracing::info!("planned {} particles of `{}` in {setup:.1?}", plan.count(), scene.name);
     tracing::info!("{}", flockform::sweep::chosen_here());

@@ -76,6 +76,14 @@ pub struct RunRequest {
     pub force: bool,
 }
 
+impl RunRequest {
+    /// The arguments of `flockform` that run it anew.
+    pub fn arguments(&self) -> impl Iterator<Item = String> {
+        let set = self.set.iter().flat_map(|set| ["--set".to_owned(), set.clone()]);
+        ["run".to_owned(), self.scene.clone()].into_iter().chain(set)
+    }
+}
+
 /// Error resuming a run from a checkpoint.
 #[derive(Debug, thiserror::Error)]
 pub enum CheckpointError {

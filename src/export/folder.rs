@@ -27,6 +27,8 @@ pub struct OutputFolder {
     partial: PathBuf,
     files: Arc<Written>,
     force: bool,
+    /// The command that makes its content again, for the reader.
+    command: Option<String>,
     /// Folders above it that were made for it, the innermost first.
     made: Vec<PathBuf>,
     /// Whether what was written outlives this value.
@@ -58,7 +60,7 @@ impl OutputFolder {
         }
         let (partial, lock) = claim(&out)?;
         let files = Arc::new(Written::open(&partial).map_err(ExportError::io("create", &partial))?);
-        let folder = Self { out, partial, files, force, made, is_kept: false, _lock: lock };
+        let folder = Self { out, partial, files, force, command: None, made, is_kept: false, _lock: lock };
         put_back(&folder.out)?;
         // Asked again under the lock: what held the name until now may have filled the place.
         require_free(&folder.out, force)?;
@@ -74,7 +76,7 @@ impl OutputFolder {
         let partial = unfinished(&out);
         let Locked::Free(lock) = lock(&partial) else { return Err(ExportError::Busy(partial)) };
         let files = Arc::new(Written::open(&partial).map_err(ExportError::io("open", &partial))?);
-        Ok(Self { out, partial, files, force, made: Vec::new(), is_kept: true, _lock: lock })
+        Ok(Self { out, partial, files, force, command: None, made: Vec::new(), is_kept: true, _lock: lock })
     }
 
     /// Lets what is written outlive this program, in the open, as `NAME.unfinished`. Paths given before are
@@ -104,6 +106,16 @@ impl OutputFolder {
     /// The folder in which everything stands until [`OutputFolder::commit`].
     pub fn folder(&self) -> &Path {
         &self.partial
+    }
+
+    /// Sets the command that makes its content again, which reports show.
+    pub fn set_command(&mut self, command: String) {
+        self.command = Some(command);
+    }
+
+    /// The command that makes its content again, if it is known.
+    pub fn command(&self) -> Option<&str> {
+        self.command.as_deref()
     }
 
     /// The path of the output of this name, which `--force` may replace from now on.

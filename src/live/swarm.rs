@@ -8,7 +8,7 @@ use std::sync::Arc;
 use super::command::{Command, Fault};
 use super::history::{self, History, Source};
 use super::session::{Frame, Refused, Viewer};
-use crate::export::report::FlightRecorder;
+use crate::export::report::flight::{FlightRecorder, from_places};
 use crate::export::report::view::View;
 use crate::flock::role::Role;
 use crate::flock::vectors::Vectors;
@@ -19,7 +19,7 @@ use crate::swarm::control::Control;
 use crate::swarm::flight::{Alarm, Flight, FlightCommand};
 
 /// Quantities that come with every frame: a swarm is small.
-pub const CHANNELS: [&str; 6] = ["clearance", "age", "pe1", "strain", "target_dx", "target_dy"];
+pub const CHANNELS: [&str; 7] = ["clearance", "away", "age", "pe1", "strain", "target_dx", "target_dy"];
 
 /// Keys of the flight that may change while robots fly: noise, delay and loss.
 const CHANNEL_KEYS: [&str; 3] = ["flight.noise", "flight.delay", "flight.loss"];
@@ -290,11 +290,13 @@ impl Swarm {
 pub(super) fn frame(control: &Control, places: &Vectors, clearance: &[f64], clock: f64) -> Frame {
     let start = &control.formation().places;
     let measures = control.formation().measures(places);
+    let away = from_places(control, places);
     let to_target = |m: usize, axis: usize| {
         control.target(m).map_or(f64::NAN, |target| target[axis] - start.get(m)[axis])
     };
     let of = |name: &str, m: usize| match name {
         "clearance" => clearance[m],
+        "away" => away.as_ref().map_or(f64::NAN, |away| away[m]),
         "age" => control.age(m).unwrap_or(f64::NAN),
         "pe1" => measures.pe1[m],
         "target_dx" => to_target(m, 0),

@@ -71,6 +71,7 @@ fn assert_sound(seen: &Value) {
             .is_some_and(|u| u.starts_with("file:") || u.starts_with("data:") || u.starts_with("blob:"))
     };
     assert!(requests.iter().all(is_own), "{requests:?}");
+    assert_eq!(seen["cut"], json!([]), "all of it is seen on a phone");
 }
 
 /// What holds of every animation: it plays, stops, steps, scrubs to the end, zooms and looks different coloured by at least
@@ -89,6 +90,31 @@ fn assert_film_works(seen: &Value, colours: u64) {
     let pictures = &seen["pictures"];
     assert!(pictures["different"].as_u64() >= Some(colours), "{pictures}");
     assert_eq!(pictures["themes"], true);
+    // The wheel scrolls the page over a view that shows all, zooms with ctrl, and then by itself; a finger likewise.
+    let turned =
+        |scrolled: bool, touch: &str| json!({ "scrolled": scrolled, "zoomed": !scrolled, "touch": touch });
+    let wheel = [turned(true, "pan-x pan-y"), turned(false, "none"), turned(false, "none")]
+        .map(|one| one.to_string());
+    let seen_wheel = seen["wheel"].as_array().expect("listed").iter().map(Value::to_string);
+    assert_eq!(seen_wheel.collect::<Vec<_>>(), wheel);
+    // An address shows what was shown; what makes no sense in it is left alone.
+    let [last, changed, again] = [0, 1, 2].map(|k| &seen["address"][k]);
+    assert_eq!(changed, again);
+    assert_eq!((&changed["quantity"], &changed["layers"]["points"]), (last, &json!(false)));
+    assert_ne!(seen["nonsense"]["quantity"], *last);
+    assert_saved(seen);
+}
+
+/// What holds of saved pictures: they are as wide as the views, with title, clock and scale, in a drawing as letters.
+fn assert_saved(seen: &Value) {
+    let saved = &seen["saved"];
+    let views: u64 = saved["views"].as_array().expect("listed").iter().filter_map(Value::as_u64).sum();
+    let png = &saved["png"];
+    assert!(png["pixels"][0].as_u64() > Some(views) && png["size"].as_u64() > Some(5000), "{png}");
+    let texts = saved["svg"]["texts"].as_array().expect("listed");
+    for text in saved["shown"].as_array().expect("listed") {
+        assert!(texts.contains(text), "{text} in {texts:?}");
+    }
 }
 
 /// A number as the page has it.
@@ -174,7 +200,7 @@ fn a_swarms_report_shows_its_robots_where_robots_csv_has_them() {
         assert_same(shown, row, &["x", "y", "way", "clearance"]);
     }
     let offered = seen["pictures"]["names"].as_array().expect("listed");
-    for quantity in ["clearance", "age", "strain"] {
+    for quantity in ["clearance", "away", "speed", "acceleration", "age", "strain"] {
         assert!(offered.contains(&quantity.into()), "{offered:?}");
     }
     assert!(number(&seen["numbers"][0], "clearance") > 0.0, "found by its name");
@@ -184,10 +210,18 @@ fn a_swarms_report_shows_its_robots_where_robots_csv_has_them() {
 #[ignore = "needs Chromium, Node, playwright-core and axe-core: see tests/browser/main.rs"]
 fn a_comparison_shows_rule_and_truth_beside_each_other() {
     let report = Report::of(&["compare", "beam-paper", "--truth-error", "0.01"]);
-    let seen = report.tour(&json!({ "hover": [40] }));
+    let seen = report.tour(&json!({ "hover": [40], "compare": true }));
     assert_sound(&seen);
     assert_film_works(&seen, 4);
     assert_eq!(seen["views"], 2);
+    assert_eq!(seen["command"], "flockform compare beam-paper --truth-error 0.01");
+    let compared = &seen["compare"];
+    assert_eq!((&compared["clip"], &compared["isOver"]), (&json!("inset(0px 0px 0px 30%)"), &json!(true)));
+    let apart = &compared["apart"];
+    assert!(apart["wrong"] == 0 && apart["right"].as_u64() > Some(100), "{apart}");
+    let scale = compared["scale"].as_str().expect("text");
+    assert!(scale.contains("rule less truth") && scale.contains("from −"), "{scale}");
+    assert_eq!(compared["differs"], true);
     let row = &report.table("compare.csv")[40];
     for (shown, written) in [("ux", "ux_rule"), ("uy", "uy_rule")] {
         let written: f64 = row[written].parse().expect("a number");

@@ -143,6 +143,126 @@ async function colours(page) {
   await page.click("#theme");
 }
 
+// Wheels over the view as it begins, with ctrl, and after that: what became of the view and of the page.
+async function wheel(page) {
+  await page.focus(".canvas");
+  await page.keyboard.press("0");
+  // The middle of the window is in the view wherever the page stands after a little scrolling.
+  await page.setViewportSize({ width: 1000, height: 500 });
+  await page.locator(".canvas").first().scrollIntoViewIfNeeded();
+  await settled(page);
+  const box = await page.locator(".canvas").first().boundingBox();
+  await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
+  seen.wheel = [];
+  for (const isControlled of [false, true, false]) {
+    const before = await page.evaluate(() => [window.scrollY, window.report.state.camera.scale]);
+    if (isControlled) await page.keyboard.down("Control");
+    await page.mouse.wheel(0, isControlled ? -30 : 30);
+    if (isControlled) await page.keyboard.up("Control");
+    await page.waitForTimeout(300);
+    const after = await page.evaluate(() => [window.scrollY, window.report.state.camera.scale]);
+    const touch = await page.evaluate(() => getComputedStyle(document.querySelector(".canvas")).touchAction);
+    seen.wheel.push({ scrolled: after[0] !== before[0], zoomed: after[1] !== before[1], touch });
+  }
+  await page.setViewportSize({ width: 1280, height: 1000 });
+}
+
+const view = (page) =>
+  page.evaluate(() => {
+    const { frame, quantity, camera, compare, turned, layers } = window.report.state;
+    return { frame, quantity, compare, turned, layers, camera: Object.values(camera).map((value) => value.toPrecision(4)).join() };
+  });
+
+// What the address of a changed view shows in a page of its own.
+async function address(page, context) {
+  const last = await page.locator("#quantity option").last().getAttribute("value");
+  await page.selectOption("#quantity", last);
+  await page.evaluate(() => window.report.player.go(Math.round(0.4 * window.report.player.last)));
+  await page.click("#turn");
+  await page.uncheck("#layer-points");
+  await page.focus(".canvas");
+  await page.keyboard.press("+");
+  // The address follows once the view is at rest.
+  await page.waitForTimeout(800);
+  const other = await context.newPage();
+  await other.goto(page.url());
+  await other.waitForSelector("body[data-ready=true]");
+  await settled(other);
+  seen.address = [last, await view(page), await view(other)];
+  await other.goto(`${page.url().split("#")[0]}#at=NaN&colour=%3Cb%3E&view=1,2&compare=x&enlarged=-1`);
+  await other.reload();
+  await other.waitForSelector("body[data-ready=true]");
+  seen.nonsense = await view(other);
+  await other.close();
+}
+
+// The second body laid over the first, and the first less the second: pictures, and the values that are coloured.
+async function compare(page) {
+  const beside = await picture(page);
+  await page.selectOption("#compare", "slider");
+  await page.locator("#edge").fill("30");
+  await settled(page);
+  const [clip, boxes] = await page.evaluate(() => {
+    const all = [...document.querySelectorAll(".canvas")];
+    return [getComputedStyle(all[1]).clipPath, all.map((box) => JSON.stringify(box.getBoundingClientRect()))];
+  });
+  await page.selectOption("#compare", "difference");
+  await page.selectOption("#quantity", "von_mises");
+  await settled(page);
+  const apart = await page.evaluate(() => {
+    const [a, b] = window.report.bodies.map((body) => body.field("von_mises"));
+    const { shades } = window.report.views[0];
+    // By its colour: a half is nothing.
+    const signs = [...shades].map((shade, i) => (shade < 0 ? 0 : Math.sign(shade - 0.5) * Math.sign(a[i] - b[i])));
+    return { wrong: signs.filter((sign) => sign < 0).length, right: signs.filter((sign) => sign > 0).length };
+  });
+  const scale = await page.getAttribute("#scale", "aria-label");
+  seen.compare = { clip, isOver: boxes[0] === boxes[1], apart, scale, differs: beside !== (await picture(page)) };
+  await page.selectOption("#compare", "side");
+}
+
+// What the picture buttons save.
+async function saved(page) {
+  seen.saved = {};
+  for (const [button, kind] of [["picture", "png"], ["drawing", "svg"]]) {
+    const [download] = await Promise.all([page.waitForEvent("download"), page.click(`#${button}`)]);
+    const path = join(profile, `saved.${kind}`);
+    await download.saveAs(path);
+    const bytes = readFileSync(path);
+    const name = download.suggestedFilename();
+    seen.saved[kind] = { name, size: bytes.length };
+    if (kind === "png") seen.saved.png.pixels = [bytes.readUInt32BE(16), bytes.readUInt32BE(20)];
+    else seen.saved.svg.texts = await page.evaluate((text) => {
+      const drawing = new DOMParser().parseFromString(text, "image/svg+xml");
+      return [...drawing.querySelectorAll("parsererror, title, text")].map((one) => one.textContent);
+    }, bytes.toString());
+  }
+  seen.saved.shown = await page.evaluate(() => ["h1", "#now", "#scale > span"].map((of) => document.querySelector(of).textContent));
+  seen.saved.views = await page.evaluate(() => window.report.views.map((one) => one.middle.width));
+}
+
+// What is cut off or has to be scrolled to sideways on a phone.
+async function phone(page) {
+  await page.setViewportSize({ width: 390, height: 844 });
+  await settled(page);
+  await page.waitForTimeout(200);
+  seen.cut = await page.evaluate(() => {
+    const width = document.documentElement.clientWidth;
+    const cut = document.documentElement.scrollWidth > width ? [`the page is ${document.documentElement.scrollWidth} wide`] : [];
+    for (const one of document.querySelectorAll("body *:not(script):not(style)")) {
+      if (one.closest(".table, pre, [hidden]") || !one.getClientRects().length) continue;
+      const { left, right, width: own } = one.getBoundingClientRect();
+      if (own && (right > width + 0.5 || left < -0.5)) cut.push(`${one.tagName} ${one.id} ${one.textContent.slice(0, 40)}`);
+    }
+    for (const text of document.querySelectorAll(".plots svg text")) {
+      const [own, all] = [text.getBoundingClientRect(), text.ownerSVGElement.getBoundingClientRect()];
+      if (own.left < all.left - 0.5 || own.right > all.right + 0.5 || own.bottom > all.bottom + 0.5) cut.push(text.textContent);
+    }
+    return cut;
+  });
+  await page.setViewportSize({ width: 1280, height: 1000 });
+}
+
 async function points(page) {
   seen.points = [];
   for (const dot of await page.$$("#plots svg circle[stroke-width='1.5']")) {
@@ -178,7 +298,13 @@ try {
     await find(page);
     await hover(page);
     await colours(page);
+    await wheel(page);
+    if (asked.compare) await compare(page);
+    await saved(page);
+    await address(page, context);
   }
+  await phone(page);
+  seen.command = await page.textContent("#command");
   await points(page);
   seen.title = await page.title();
   for (const theme of ["light", "dark"]) {

@@ -11,7 +11,7 @@ use super::page::{Page, Table, number, scene_text};
 use super::plot::Plot;
 use super::view::{Animation, Clock, Outline, Quantity, View};
 use crate::flock::role::Role;
-use crate::flock::vectors::Vectors;
+use crate::flock::vectors::{Vectors, distance};
 use crate::scene::swarm::Swarm;
 use crate::swarm::control::Control;
 use crate::swarm::flight::{Flight, FlightReport, Record};
@@ -28,8 +28,32 @@ pub struct FlightRecorder {
     start: Vectors,
     links: Vec<[u32; 2]>,
     leads: Vec<bool>,
+    /// Whether it is known where each robot comes to rest.
+    has_places: bool,
+    /// Velocities after the last period \[m/s\], from which the next ones' accelerations follow.
+    velocities: Vec<[f64; 2]>,
     /// \[s\]
     period: f64,
+}
+
+/// The quantities that frames hold besides displacements: name, label, unit.
+const QUANTITIES: [(&str, &str, &str); 7] = [
+    ("clearance", "clearance", "m"),
+    ("away", "distance from place", "m"),
+    ("speed", "speed", "m/s"),
+    ("acceleration", "acceleration", "m/s²"),
+    ("age", "age of the pose", "s"),
+    ("pe1", "PE1", "m²"),
+    ("strain", "largest strain", ""),
+];
+/// Those of robots whose motion is known, and not their places alone.
+const OF_MOTION: [&str; 2] = ["speed", "acceleration"];
+
+/// Distance of every robot from where the rule comes to rest with the leaders as they are \[m\]; `None` where that is
+/// not known.
+pub(crate) fn from_places(control: &Control, places: &Vectors) -> Option<Vec<f64>> {
+    let rest = control.formation().settled(places)?;
+    Some(rest.iter().zip(places.iter()).map(|(rest, place)| distance(rest, place)).collect())
 }
 
 impl FlightRecorder {
@@ -41,9 +65,8 @@ impl FlightRecorder {
 
     /// Robots at these places \[m\], with displacements from `start` \[m\].
     fn since(control: &Control, places: &Vectors, start: Vectors) -> Self {
-        let channel = |name, bits| Channel { name, bits };
-        let mut channels = vec![channel("dx", BITS), channel("dy", BITS)];
-        channels.extend(["clearance", "age", "pe1", "strain"].map(|name| channel(name, BITS)));
+        let names = ["dx", "dy"].into_iter().chain(QUANTITIES.map(|(name, ..)| name));
+        let channels = names.map(|name| Channel { name, bits: BITS }).collect();
         let formation = control.formation();
         let count = formation.count();
         // Seen from both ends or from one, a line between two robots is one line.
@@ -57,32 +80,51 @@ impl FlightRecorder {
             start,
             links,
             leads: (0..count).map(|m| formation.leads(m)).collect(),
+            has_places: from_places(control, places).is_some(),
+            velocities: vec![[0.0; 2]; count],
             period: control.period(),
         };
-        recorder.keep(control, places, 0, false);
+        let at_rest = vec![0.0; count];
+        recorder.keep(control, places, [&at_rest, &at_rest], 0, false);
         recorder
     }
 
     /// Looks at a period just flown.
     pub fn watch(&mut self, flight: &Flight) {
-        let (period, is_last) = (flight.fleet().period(), flight.fleet().period() == flight.periods());
+        let (fleet, period) = (flight.fleet(), flight.fleet().period());
+        let velocities: Vec<[f64; 2]> = fleet.robots().iter().map(|robot| robot.velocity).collect();
+        let is_last = period == flight.periods();
         if is_last || self.frames.wants(period as usize) {
-            self.keep(flight.control(), &flight.fleet().places(), period, is_last);
+            let speed: Vec<f64> = velocities.iter().map(|[x, y]| x.hypot(*y)).collect();
+            let change = velocities.iter().zip(&self.velocities);
+            let acceleration: Vec<f64> =
+                change.map(|(&now, &before)| distance(now, before) / self.period).collect();
+            self.keep(flight.control(), &fleet.places(), [&speed, &acceleration], period, is_last);
         }
+        self.velocities = velocities;
     }
 
-    fn keep(&mut self, control: &Control, places: &Vectors, period: u64, is_last: bool) {
+    fn keep(
+        &mut self,
+        control: &Control,
+        places: &Vectors,
+        [speed, acceleration]: [&[f64]; 2],
+        period: u64,
+        is_last: bool,
+    ) {
         let count = places.len();
         let moved = |now: &[f64], then: &[f64]| now.iter().zip(then).map(|(n, t)| n - t).collect();
         let (dx, dy): (Vec<f64>, Vec<f64>) =
             (moved(&places.x, &self.start.x), moved(&places.y, &self.start.y));
         let mut clearance = Vec::new();
         control.filter().clearance(places, &mut clearance);
+        let away = from_places(control, places).unwrap_or_else(|| vec![f64::NAN; count]);
         let age: Vec<f64> = (0..count).map(|m| control.age(m).unwrap_or(f64::NAN)).collect();
         let measures = control.formation().measures(places);
         let strain: Vec<f64> =
             measures.strain.iter().map(|strain| strain.map_or(f64::NAN, |s| s.largest())).collect();
-        let values = [&dx[..], &dy, &clearance, &age, &measures.pe1, &strain];
+        // In the order of the channels.
+        let values = [&dx[..], &dy, &clearance, &away, speed, acceleration, &age, &measures.pe1, &strain];
         let period = period as usize;
         if is_last { self.frames.keep_last(period, &values) } else { self.frames.keep(period, &values) }
     }
@@ -104,7 +146,7 @@ impl FlightRecorder {
     /// The animation of the flight.
     pub fn stage(&mut self, swarm: &Swarm, report: &FlightReport) -> View {
         let names = report.per_robot.iter().map(|robot| robot.name.clone()).collect();
-        let mut stage = self.begun(swarm, names);
+        let mut stage = self.begun(swarm, names, true);
         let robots = || report.per_robot.iter();
         stage.add_exact(Quantity::new("x", "x", "m"), robots().map(|robot| robot.x));
         stage.add_exact(Quantity::new("y", "y", "m"), robots().map(|robot| robot.y));
@@ -119,13 +161,19 @@ impl FlightRecorder {
     pub(crate) fn still(swarm: &Swarm, control: &Control, places: &Vectors) -> View {
         let formation = control.formation();
         let mut recorder = Self::since(control, places, formation.places.clone());
-        let stage = recorder.begun(swarm, formation.names.clone());
+        let stage = recorder.begun(swarm, formation.names.clone(), false);
         recorder.finished(stage)
     }
 
-    /// The view without its frames.
-    fn begun(&self, swarm: &Swarm, names: Vec<String>) -> View {
-        let mut stage = View::new(animation(swarm, names));
+    /// The view without its frames, of robots that fly or that stand still.
+    fn begun(&self, swarm: &Swarm, names: Vec<String>, flies: bool) -> View {
+        let is_known = |name: &str| match name {
+            "away" => self.has_places,
+            _ => flies || !OF_MOTION.contains(&name),
+        };
+        let known = QUANTITIES.into_iter().filter(|(name, ..)| is_known(name));
+        let quantities = known.map(|(name, label, unit)| Quantity::new(name, label, unit)).collect();
+        let mut stage = View::new(Animation { quantities, ..animation(swarm, names) });
         stage.set_reference(&self.start);
         let role = |&leads: &bool| if leads { Role::Leader } else { Role::Follower };
         stage.set_roles(&self.leads.iter().map(role).collect::<Vec<_>>(), &[]);
@@ -160,12 +208,6 @@ fn animation(swarm: &Swarm, names: Vec<String>) -> Animation {
         spacing: 2.0 * swarm.raw.radius,
         radii: (0..names.len()).map(own).collect(),
         names,
-        quantities: vec![
-            Quantity::new("clearance", "clearance", "m"),
-            Quantity::new("age", "age of the pose", "s"),
-            Quantity::new("pe1", "PE1", "m²"),
-            Quantity::new("strain", "largest strain", ""),
-        ],
         outlines: obstacles.chain(fence).collect(),
         ..Animation::default()
     }

@@ -22,7 +22,7 @@ pub const FILE: &str = "report.html";
 const PAGE: &str = include_str!("web/page.html");
 pub(super) const STYLE: &str = include_str!("web/page.css");
 /// In the order in which they build on each other.
-const SCRIPTS: [&str; 14] = [
+const SCRIPTS: [&str; 18] = [
     include_str!("web/unpack.js"),
     include_str!("web/colour.js"),
     include_str!("web/body.js"),
@@ -34,8 +34,12 @@ const SCRIPTS: [&str; 14] = [
     include_str!("web/player.js"),
     include_str!("web/scale.js"),
     include_str!("web/camera.js"),
+    include_str!("web/compare.js"),
     include_str!("web/numbers.js"),
+    include_str!("web/svg_pen.js"),
+    include_str!("web/picture.js"),
     include_str!("web/controls.js"),
+    include_str!("web/address.js"),
     include_str!("web/page.js"),
 ];
 
@@ -48,7 +52,7 @@ const LIVE_TOOLS: &str = include_str!("web/live.html");
 #[derive(Debug, Default)]
 pub(crate) struct Page {
     pub title: String,
-    /// The command and the name of what it was given.
+    /// The command and the name of what it was given, unless the folder has the command itself.
     pub command: String,
     /// The outcome, and whether it is a success.
     pub verdict: Option<(bool, String)>,
@@ -82,7 +86,7 @@ impl Page {
     /// The file cannot be written.
     pub(crate) fn write(&self, folder: &OutputFolder) -> Result<PathBuf, ExportError> {
         let path = folder.path(FILE);
-        let write = || self.write_to(&mut create_buffered(&path)?);
+        let write = || self.write_to(&mut create_buffered(&path)?, folder.command());
         write().map_err(ExportError::io("write", &path))?;
         Ok(path)
     }
@@ -91,14 +95,14 @@ impl Page {
     #[cfg(any(test, feature = "live"))]
     pub(crate) fn html(&self) -> String {
         let mut bytes = Vec::new();
-        self.write_to(&mut bytes).expect("memory takes everything");
+        self.write_to(&mut bytes, None).expect("memory takes everything");
         String::from_utf8(bytes).expect("all of it is text")
     }
 
     /// The arrays go from where they are, since those of a large body are most of the page.
-    fn write_to(&self, out: &mut impl Write) -> io::Result<()> {
+    fn write_to(&self, out: &mut impl Write, command: Option<&str>) -> io::Result<()> {
         let (before, after) = PAGE.split_once("{{arrays}}").expect("the template has a place for them");
-        let parts = self.parts();
+        let parts = self.parts(command.unwrap_or(&self.command));
         out.write_all(filled(before, &parts).as_bytes())?;
         for (number, stage) in self.stages.iter().enumerate() {
             for (name, text) in &stage.arrays {
@@ -110,14 +114,14 @@ impl Page {
     }
 
     /// Texts for the template, by name.
-    fn parts(&self) -> [(&'static str, String); 14] {
+    fn parts(&self, command: &str) -> [(&'static str, String); 14] {
         let stages: Vec<_> = self.stages.iter().map(|stage| &stage.animation).collect();
         let data = in_script(&json!({ "stages": stages, "plots": self.plots, "live": self.live }));
         let live = if self.live.is_some() { &LIVE_SCRIPTS[..] } else { &[] };
         let script: String = SCRIPTS.iter().chain(live).map(|module| joined(module)).collect();
         [
             ("title", escaped(&self.title)),
-            ("command", escaped(&self.command)),
+            ("command", escaped(command)),
             ("verdict", self.verdict_html()),
             ("live", if self.live.is_some() { LIVE_TOOLS.into() } else { String::new() }),
             ("note", escaped(&self.note)),

@@ -5,7 +5,7 @@ import { sampled } from "./scale.js";
 import { bodies, element, shown, state } from "./shown.js";
 
 export function fit() {
-  const boxes = shown.views.map((view) => view.bounds(sampled(shown.player.ready, shown.player.last), state.factor, state.turned));
+  const boxes = shown.views.filter((one) => one.isSeen).map((view) => view.bounds(sampled(shown.player.ready, shown.player.last), state.factor, state.turned));
   const low = [0, 1].map((k) => Math.min(...boxes.map((box) => box.low[k])));
   const high = [0, 1].map((k) => Math.max(...boxes.map((box) => box.high[k])));
   const view = shown.views[0];

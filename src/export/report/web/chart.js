@@ -108,7 +108,8 @@ export class Chart {
     plot.landmarks.forEach(({ x: at, name }, row) => {
       svg("line", { x1: x(at), x2: x(at), y1: room.top, y2: room.top + size[1], stroke: "var(--soft)", "stroke-dasharray": "5 4" }, root);
       const end = x(at) > room.left + 0.6 * size[0];
-      svg("text", { x: x(at) + (end ? -5 : 5), y: room.top + 13 + 15 * row, "text-anchor": end ? "end" : "start", class: "faint" }, root).textContent = name;
+      const attributes = { x: x(at) + (end ? -5 : 5), y: room.top + 13 + 15 * row, "text-anchor": end ? "end" : "start", class: "faint name" };
+      svg("text", attributes, root).textContent = name;
     });
     for (const series of this.shown()) {
       const places = series.points.map((point) => [x(point[0]), y(point[1])]).filter((place) => place.every(Number.isFinite));
@@ -117,6 +118,12 @@ export class Chart {
     this.cursor = svg("line", { y1: room.top, y2: room.top + size[1], stroke: "var(--accent)", "stroke-width": 1.5, visibility: "hidden" }, root);
     this.ring = svg("circle", { r: 8, fill: "none", stroke: "var(--ink)", "stroke-width": 2, visibility: "hidden" }, root);
     this.holder.replaceChildren(root);
+    // On a narrow page a name may reach beyond the chart, which is known now that it has letters.
+    for (const name of root.querySelectorAll(".name")) {
+      const box = name.getBBox();
+      const by = Math.min(width - 2 - (box.x + box.width), 0) || Math.max(2 - box.x, 0);
+      name.setAttribute("x", Number(name.getAttribute("x")) + by);
+    }
     this.listen(root);
     if (this.now !== undefined) this.go(this.now);
   }

@@ -26,6 +26,13 @@ export function viridis(part) {
   return VIRIDIS[below].map((from, k) => Math.round(from + (place - below) * (VIRIDIS[below + 1][k] - from)));
 }
 
+// From blue over nearly white to red, as light at both ends.
+export function diverging(part) {
+  const ends = part < 0.5 ? [33, 102, 172] : [178, 24, 43];
+  const away = Math.min(Math.abs(2 * part - 1), 1);
+  return ends.map((end) => Math.round(240 + away * (end - 240)));
+}
+
 // A palette of SHADES colours, RGBA, and after them the colour of nothing.
 export function palette(colourOf) {
   const bytes = new Uint8Array(4 * (SHADES + 1));

@@ -3,6 +3,7 @@
 import { move, refit, turn, zoom } from "./camera.js";
 import { keep, showTip, tip } from "./numbers.js";
 import { draw, drawNow } from "./page.js";
+import { saveDrawing, savePicture } from "./picture.js";
 import { takePalette } from "./scale.js";
 import { bodies, element, shown, state } from "./shown.js";
 
@@ -11,7 +12,8 @@ const MOST_DOTS = 12000;
 
 export function listenToView(view) {
   const { box } = view;
-  let from = null;
+  // Where each finger, or the mouse, was last.
+  const pointers = new Map();
   let moved = 0;
   // What a live page has the pointer do instead of moving the view.
   let tool = null;
@@ -20,39 +22,53 @@ export function listenToView(view) {
     return [event.clientX - bounds.left, event.clientY - bounds.top];
   };
   box.addEventListener("pointerdown", (event) => {
-    from = [event.clientX, event.clientY];
-    moved = 0;
-    tool = shown.tool?.(view, local(event), event) ?? null;
+    if (!pointers.size) {
+      moved = 0;
+      tool = shown.tool?.(view, local(event), event) ?? null;
+    }
+    pointers.set(event.pointerId, local(event));
     box.setPointerCapture(event.pointerId);
     box.classList.add("dragged");
   });
   box.addEventListener("pointermove", (event) => {
     if (!shown.player.ready) return;
-    if (!from) return showTip(view, view.nearest(...local(event)), event);
-    const by = [event.clientX - from[0], event.clientY - from[1]];
+    const [now, before] = [local(event), pointers.get(event.pointerId)];
+    if (!before) return showTip(view, view.nearest(...now), event);
+    pointers.set(event.pointerId, now);
+    const by = [now[0] - before[0], now[1] - before[1]];
     moved += Math.abs(by[0]) + Math.abs(by[1]);
-    from = [event.clientX, event.clientY];
     tip(null);
-    if (tool) tool.move(local(event));
-    else move(...by);
+    if (tool) tool.move(now);
+    else if (pointers.size > 1) pinch(view, now, before, [...pointers].find(([id]) => id !== event.pointerId)[1]);
+    // One finger scrolls the page unless the view is zoomed.
+    else if (event.pointerType !== "touch" || !state.isFitted) move(...by);
   });
   const end = (event) => {
-    if (from && tool) tool.end(local(event), event);
+    if (tool && pointers.has(event.pointerId)) tool.end(local(event), event);
+    pointers.delete(event.pointerId);
+    if (pointers.size) return;
     tool = null;
-    from = null;
     box.classList.remove("dragged");
   };
   box.addEventListener("pointerup", (event) => {
-    if (from && moved < 4 && shown.player.ready) keep(view, view.nearest(...local(event)));
+    if (pointers.size === 1 && pointers.has(event.pointerId) && moved < 4 && shown.player.ready) keep(view, view.nearest(...local(event)));
     end(event);
   });
   box.addEventListener("pointercancel", end);
   box.addEventListener("pointerleave", () => shown.player.ready && showTip(view, -1, null));
   box.addEventListener("dblclick", refit);
   box.addEventListener("wheel", (event) => {
+    // Over a view that shows all there is the wheel scrolls the page.
+    if (state.isFitted && !event.ctrlKey && !event.metaKey && !shown.tool) return;
     event.preventDefault();
     zoom(Math.exp(-event.deltaY * (event.deltaMode ? 0.05 : 0.0016)), view, local(event));
   }, { passive: false });
+}
+
+// Zooms by what a finger moves away from another one that rests.
+function pinch(view, now, before, other) {
+  const away = ([x, y]) => Math.max(Math.hypot(x - other[0], y - other[1]), 1);
+  zoom(away(now) / away(before), view, [(now[0] + other[0]) / 2, (now[1] + other[1]) / 2]);
 }
 
 export function listenToKeys() {
@@ -103,6 +119,7 @@ export function listenToControls() {
   on("zoom-fit", "click", refit);
   on("turn", "click", () => turn(!state.turned));
   on("picture", "click", savePicture);
+  on("drawing", "click", saveDrawing);
   on("quantity", "change", () => choose(element("quantity").value));
   on("log", "change", () => {
     state.isLog = element("log").checked;
@@ -135,23 +152,6 @@ export function choose(quantity) {
   draw();
 }
 
-export function savePicture() {
-  const pictures = shown.views.map((view) => view.composed());
-  const gap = 12;
-  const canvas = document.createElement("canvas");
-  canvas.width = pictures.reduce((sum, one) => sum + one.width + gap, -gap);
-  canvas.height = Math.max(...pictures.map((one) => one.height));
-  let left = 0;
-  for (const one of pictures) {
-    canvas.getContext("2d").drawImage(one, left, 0);
-    left += one.width + gap;
-  }
-  const link = document.createElement("a");
-  link.href = canvas.toDataURL("image/png");
-  link.download = `${document.title} ${element("now").textContent}.png`;
-  link.click();
-}
-
 // Until layers are chosen, a field fills the body and roles are dots, as each is read best.
 export function layersFor(quantity) {
   if (state.hasChosenLayers) return;
@@ -181,6 +181,24 @@ export function nameControls() {
   element("find-name").textContent = animation.noun[0].toUpperCase() + animation.noun.slice(1);
   element("magnify-label").hidden = isSwarm;
   element("find-names").replaceChildren(...animation.names.map((name) => Object.assign(document.createElement("option"), { value: name })));
+}
+
+export function listenToCopy() {
+  const [button, command] = [element("copy"), element("command")];
+  const say = (word) => {
+    button.textContent = word;
+    setTimeout(() => (button.textContent = "copy"), 2000);
+  };
+  button.addEventListener("click", async () => {
+    try {
+      await navigator.clipboard.writeText(command.textContent);
+      say("copied");
+    } catch {
+      // Where a page may not, the reader can.
+      window.getSelection().selectAllChildren(command);
+      say("selected");
+    }
+  });
 }
 
 export function listenToTheme() {

@@ -1,9 +1,11 @@
 // Draws what is shown, and starts.
 
+import { listenToAddress, remember } from "./address.js";
 import { fit, isTall, refit, turn, wantedFactor } from "./camera.js";
 import { Chart } from "./chart.js";
 import { words } from "./colour.js";
-import { choose, listenToControls, listenToKeys, listenToTheme, listenToView, nameControls } from "./controls.js";
+import { listenToCompare } from "./compare.js";
+import { choose, listenToControls, listenToCopy, listenToKeys, listenToTheme, listenToView, nameControls } from "./controls.js";
 import { showKept, tip } from "./numbers.js";
 import { Player } from "./player.js";
 import { drawScale, quantities, shade } from "./scale.js";
@@ -26,10 +28,11 @@ export function draw() {
 export function drawNow() {
   if (!shown.views.length || !shown.player.ready) return;
   const show = { ...state, shade, isFlat: state.quantity === "role" };
-  shown.views.forEach((view) => view.draw(show));
+  shown.views.filter((view) => view.isSeen).forEach((view) => view.draw(show));
   drawScale();
   drawClock();
   showKept();
+  remember();
   document.body.dataset.drawn = String(Number(document.body.dataset.drawn ?? 0) + 1);
 }
 
@@ -65,6 +68,7 @@ async function startFilm() {
   });
   nameControls();
   listenToControls();
+  listenToCompare();
   listenToKeys();
   choose(bodies.length > 1 || animation.stress ? "von_mises" : "role");
   const before = bodies.slice(0, -1);
@@ -80,11 +84,13 @@ async function startFilm() {
   element("magnify").value = String(state.factor);
   if (animation.clock.unit === "%") shown.player.go(shown.player.last);
   fit();
+  listenToAddress();
   drawNow();
 }
 
 async function start() {
   listenToTheme();
+  listenToCopy();
   shown.charts = data.plots.map((plot) => new Chart(plot, element("plots"), { tip, seek: (time) => shown.player?.seek(time) }));
   if (bodies.length) await startFilm();
   document.querySelectorAll("[data-seek]").forEach((button) =>

@@ -1,6 +1,6 @@
 // The colouring of particles: quantities, their range over the animation, the colour bar.
 
-import { SHADES, palette, themeColour, themeText, ticks, viridis, words } from "./colour.js";
+import { SHADES, diverging, palette, themeColour, themeText, ticks, viridis, words } from "./colour.js";
 import { bodies, element, shown, state } from "./shown.js";
 import { isUnit } from "./view.js";
 
@@ -22,6 +22,24 @@ export function quantities() {
   ];
 }
 
+// Whether the first body less the second is shown. The error is of both, roles are no numbers.
+export function isDifference() {
+  return state.compare === "difference" && state.quantity !== "role" && state.quantity !== "error";
+}
+
+export function isLog() {
+  return state.isLog && !isDifference();
+}
+
+// A quantity of a body at its frame, or by how much it is above that of the other body there.
+function valuesOf(body, key) {
+  if (!isDifference()) return body.field(key);
+  const [, other] = bodies;
+  other.go(body.at);
+  const theirs = other.field(key);
+  return body.field(key).map((value, i) => value - theirs[i]);
+}
+
 export function sampled(ready, last) {
   const count = Math.min(LOOKED_AT, ready);
   const frames = new Set(Array.from({ length: count }, (_, k) => Math.round((k * (ready - 1)) / Math.max(count - 1, 1))));
@@ -31,16 +49,19 @@ export function sampled(ready, last) {
 
 // Lowest and highest value of the scale, and the largest of all.
 export function rangeOf(key) {
-  const known = state.ranges.get(key);
+  const name = isDifference() ? `${key} difference` : key;
+  const known = state.ranges.get(name);
   if (known && known.ready === shown.player.ready) return known;
   const values = [];
-  for (const body of bodies) {
+  for (const body of isDifference() ? bodies.slice(0, 1) : bodies) {
     const at = body.at;
     for (const frame of sampled(shown.player.ready, shown.player.last)) {
       body.go(frame);
-      const field = body.field(key);
+      const field = valuesOf(body, key);
       const every = Math.max(1, Math.floor(field.length / 4000));
-      for (let i = 0; i < field.length; i += every) if (Number.isFinite(field[i])) values.push(field[i]);
+      for (let i = 0; i < field.length; i += every) {
+        if (Number.isFinite(field[i])) values.push(isDifference() ? Math.abs(field[i]) : field[i]);
+      }
     }
     if (at >= 0) body.go(at);
   }
@@ -48,10 +69,12 @@ export function rangeOf(key) {
   const largest = values.at(-1) ?? 1;
   const most = values[Math.floor(MOST_OF_ALL * (values.length - 1))] ?? 1;
   let high = largest > 2 * most && most > 0 ? most : largest;
-  const low = Math.min(values[0] ?? 0, 0);
+  let low = Math.min(values[0] ?? 0, 0);
   if (!(high > low)) high = low + 1;
+  // Nothing stands in the middle.
+  if (isDifference()) low = -high;
   const range = { low, high, largest, ready: shown.player.ready };
-  state.ranges.set(key, range);
+  state.ranges.set(name, range);
   return range;
 }
 
@@ -63,8 +86,8 @@ export function shade(body, out) {
   }
   // The scale first: it looks at other frames.
   const { low, high } = rangeOf(state.quantity);
-  const field = body.field(state.quantity);
-  if (state.isLog) {
+  const field = valuesOf(body, state.quantity);
+  if (isLog()) {
     const top = Math.log10(high);
     for (let i = 0; i < out.length; i++) {
       const part = 1 + (Math.log10(Math.abs(field[i])) - top) / DECADES;
@@ -84,43 +107,68 @@ export function takePalette() {
   state.palette =
     state.quantity === "role"
       ? palette((k) => roles[k] ?? [0, 0, 0])
-      : palette((k) => viridis(k / (SHADES - 1)));
+      : palette((k) => (isDifference() ? diverging : viridis)(k / (SHADES - 1)));
+}
+
+// What the colours mean, as [name, colour] of the roles that there are.
+export function roleKeys() {
+  const { role_names: names } = bodies[0].animation;
+  const counts = names.map(() => 0);
+  for (const role of bodies[0].roles()) counts[role] += 1;
+  const there = names.map((name, role) => [name, counts[role]]).filter(([, count]) => count > 0);
+  return there.map(([name, count]) => [`${count} ${plural(name, count)}`, themeText(name)]);
+}
+
+// The key of the bonds that are broken by now; none where there are none.
+export function crackKeys() {
+  const broken = bodies[0].brokenBonds();
+  return broken ? [[`${broken} broken bonds`, themeText("crack")]] : [];
+}
+
+// The scale of the quantity that is shown: its name, its ends, its ticks as [part of the scale, text], and what is beyond it.
+export function scaleOf() {
+  const one = quantities().find(({ key }) => key === state.quantity);
+  const { low, high, largest } = rangeOf(state.quantity);
+  const [first, second] = bodies.map((body) => body.animation.name);
+  const label = isDifference() ? `${one.label}, ${first} less ${second}` : one.label;
+  const bottom = high / 10 ** DECADES;
+  const values = isLog() ? Array.from({ length: DECADES + 1 }, (_, k) => bottom * 10 ** k) : ticks(low, high, 5);
+  const part = (value) => (isLog() ? Math.log10(value / bottom) / DECADES : (value - low) / (high - low));
+  return {
+    name: isUnit(one.unit) ? `${label} [${one.unit}]` : label,
+    ends: [low, high],
+    ticks: values.map((value) => [part(value), words(value, 3)]),
+    more: largest > high ? `brightest up to ${words(largest, 3)}` : "",
+  };
+}
+
+// The colours of the scale in a row.
+export function ramp() {
+  const canvas = Object.assign(document.createElement("canvas"), { width: SHADES, height: 1 });
+  canvas.getContext("2d").putImageData(new ImageData(new Uint8ClampedArray(state.palette.subarray(0, 4 * SHADES)), SHADES, 1), 0, 0);
+  return canvas;
 }
 
 export function drawScale() {
   const scale = element("scale");
-  const one = quantities().find(({ key }) => key === state.quantity);
-  element("log-label").hidden = state.quantity === "role";
+  element("log-label").hidden = state.quantity === "role" || isDifference();
+  const cracks = crackKeys().map(([text, colour]) => key(colour, text));
   if (state.quantity === "role") {
-    const { role_names: names } = bodies[0].animation;
-    const counts = names.map(() => 0);
-    for (const role of bodies[0].roles()) counts[role] += 1;
-    const keys = names.map((name, role) => (counts[role] ? key(themeText(name), `${counts[role]} ${plural(name, counts[role])}`) : null));
-    if (bodies[0].brokenBonds()) keys.push(key(themeText("crack"), `${bodies[0].brokenBonds()} broken bonds`));
-    scale.replaceChildren(...keys.filter(Boolean));
+    scale.replaceChildren(...roleKeys().map(([text, colour]) => key(colour, text)), ...cracks);
     scale.setAttribute("aria-label", `Colours: ${scale.textContent}`);
     return;
   }
-  const { low, high, largest } = rangeOf(state.quantity);
-  const name = Object.assign(document.createElement("span"), { className: "name" });
-  name.textContent = isUnit(one.unit) ? `${one.label} [${one.unit}]` : one.label;
-  const ramp = Object.assign(document.createElement("div"), { className: "ramp" });
-  const canvas = Object.assign(document.createElement("canvas"), { width: SHADES, height: 1 });
-  canvas.getContext("2d").putImageData(new ImageData(new Uint8ClampedArray(state.palette.subarray(0, 4 * SHADES)), SHADES, 1), 0, 0);
-  ramp.append(canvas);
-  const bottom = high / 10 ** DECADES;
-  const values = state.isLog ? Array.from({ length: DECADES + 1 }, (_, k) => bottom * 10 ** k) : ticks(low, high, 5);
-  for (const value of values) {
-    const part = state.isLog ? Math.log10(value / bottom) / DECADES : (value - low) / (high - low);
-    const tick = Object.assign(document.createElement("span"), { className: "tick", textContent: words(value, 3) });
+  const { name, ends, ticks: marks, more } = scaleOf();
+  const bar = Object.assign(document.createElement("div"), { className: "ramp" });
+  bar.append(ramp());
+  for (const [part, text] of marks) {
+    const tick = Object.assign(document.createElement("span"), { className: "tick", textContent: text });
     tick.style.left = `${100 * part}%`;
-    ramp.append(tick);
+    bar.append(tick);
   }
-  const more = document.createElement("span");
-  if (largest > high) more.textContent = `brightest up to ${words(largest, 3)}`;
-  scale.replaceChildren(name, ramp, more);
-  if (bodies[0].brokenBonds()) scale.append(key(themeText("crack"), `${bodies[0].brokenBonds()} broken bonds`));
-  scale.setAttribute("aria-label", `Colours: ${name.textContent} from ${words(low, 3)} to ${words(high, 3)}`);
+  const span = (text, className = "") => Object.assign(document.createElement("span"), { textContent: text, className });
+  scale.replaceChildren(span(name, "name"), bar, span(more), ...cracks);
+  scale.setAttribute("aria-label", `Colours: ${name} from ${words(ends[0], 3)} to ${words(ends[1], 3)}`);
 }
 
 export function plural(name, count) {

@@ -10,6 +10,8 @@ export const state = {
   frame: 0,
   quantity: "role",
   isLog: false,
+  // Of two bodies: beside each other ("side"), the second laid over the first ("slider"), or what lies between them.
+  compare: "side",
   factor: 1,
   turned: false,
   camera: { x: 0, y: 0, scale: 1 },

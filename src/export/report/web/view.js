@@ -71,6 +71,11 @@ export class View {
     return { low: box.low.map((value) => value - own), high: box.high.map((value) => value + own) };
   }
 
+  // Whether it stands on the page.
+  get isSeen() {
+    return this.box.clientWidth > 0;
+  }
+
   resize() {
     const ratio = window.devicePixelRatio || 1;
     const [width, height] = [this.box.clientWidth, this.box.clientHeight];
@@ -90,6 +95,8 @@ export class View {
   // is a place as shown.
   draw(show) {
     this.show = show;
+    // A finger and the wheel scroll the page as long as there is nothing more to see here.
+    this.box.classList.toggle("zoomed", !show.isFitted || Boolean(shown.tool));
     this.resize();
     const { body, places, shades, radii, ratio } = this;
     body.go(show.frame);
@@ -170,7 +177,10 @@ export class View {
     const key = JSON.stringify(layers.ways ? [...seen, frame] : seen);
     if (key === this.below) return;
     this.below = key;
-    const pen = this.pen(this.under);
+    this.paintUnder(this.pen(this.under), outlines);
+  }
+
+  paintUnder(pen, outlines = this.body.animation.outlines.map((outline) => this.corners(outline))) {
     pen.fillStyle = themeText("card");
     pen.fillRect(0, 0, this.width, this.height);
     this.drawGrid(pen);
@@ -271,8 +281,12 @@ export class View {
     if (isEmpty && this.isClear && this.over.width === this.clearWidth) return;
     [this.isClear, this.clearWidth] = [isEmpty, this.over.width];
     const pen = this.pen(this.over);
-    if (this.show.layers.cracks) this.drawCracks(pen);
+    this.paintOver(pen);
     shown.over?.(this);
+  }
+
+  paintOver(pen) {
+    if (this.show.layers.cracks) this.drawCracks(pen);
     for (const [particle, width] of [[this.kept, 3], [this.marked, 2]]) {
       if (particle < 0) continue;
       const [x, y] = this.at(particle);
