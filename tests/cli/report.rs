@@ -31,7 +31,8 @@ fn every_command_with_an_outcome_leaves_a_report_unless_told_not_to() {
         let shown = data(&html);
         let counts = ["stages", "plots"].map(|key| shown[key].as_array().expect("listed").len());
         assert_eq!(counts, [stages, charts], "{words:?}");
-        assert!(html.contains(&format!("<code>flockform {} {}</code>", words[0], words[1])), "{words:?}");
+        let command = format!("<code id=\"command\">flockform {}</code>", words.join(" "));
+        assert!(html.contains(&command), "{words:?}");
         run(&["--no-report"]);
         assert!(!path.exists(), "{words:?}");
     }
