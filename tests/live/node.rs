@@ -86,10 +86,10 @@ fn a_flying_swarm_is_shown_on_this_computer_alone_and_can_only_be_read() {
     assert!(words.starts_with("clearance: declared 5 m, now") && words.contains("robot_"), "{words}");
     assert!(status["alarmed"].as_array().is_some_and(|robots| robots.len() >= 2), "{status}");
     let (_, quantities) = decoded(&viewer.frame);
-    // Displacements, clearance, age, PE1, strain, and targets.
-    assert_eq!((quantities.len(), quantities[0].len()), (8, 25));
+    // Displacements, clearance, distance from place, age, PE1, strain, and targets.
+    assert_eq!((quantities.len(), quantities[0].len()), (9, 25));
     let is_known = |k: &usize| quantities[*k].iter().all(|value| value.is_finite());
-    assert!([0, 1, 2, 3, 6, 7].iter().all(is_known), "{quantities:?}");
+    assert!([0, 1, 2, 3, 4, 7, 8].iter().all(is_known), "{quantities:?}");
     let asked = [
         json!({ "do": "emergency-stop" }),
         json!({ "do": "deactivate" }),
