@@ -8,7 +8,7 @@ use std::collections::{HashMap, HashSet};
 
 use super::meeting::{crossings, on};
 use super::outline::{Outline, OutlineError, Place};
-use super::piece::{Piece, distance, numbered};
+use super::piece::{Piece, distance};
 use super::shape::Shape;
 
 type Point = [f64; 2];
@@ -40,9 +40,9 @@ pub enum PartitionError {
 pub struct Partition {
     /// With a corner wherever a line ends on it.
     outline: Outline,
-    /// Loops of the outline, then lines.
-    rings: Vec<Vec<Piece>>,
-    /// Of each, whether it comes back to where it begins.
+    /// Pieces of the lines inside.
+    lines: Vec<Vec<Piece>>,
+    /// Of each line, whether it comes back to where it begins.
     closed: Vec<bool>,
     /// Ends of lines, as loop and piece that begins there, and the corner that each is.
     joined: HashMap<[usize; 2], [usize; 2]>,
@@ -54,11 +54,10 @@ pub struct Partition {
 impl Partition {
     /// A body of one region.
     pub fn whole(outline: &Outline) -> Self {
-        let rings = outline.rings().to_vec();
         Self {
             outline: outline.clone(),
-            closed: vec![true; rings.len()],
-            rings,
+            lines: Vec::new(),
+            closed: Vec::new(),
             joined: HashMap::new(),
             junctions: HashSet::new(),
             regions: Vec::new(),
@@ -91,18 +90,25 @@ impl Partition {
     }
 
     /// Loops of the outline, then lines; pieces of either.
-    pub fn rings(&self) -> &[Vec<Piece>] {
-        &self.rings
+    pub fn rings(&self) -> impl Iterator<Item = &[Piece]> {
+        self.outline.rings().iter().chain(&self.lines).map(Vec::as_slice)
+    }
+
+    /// Pieces of a loop or line.
+    pub fn ring(&self, ring: usize) -> &[Piece] {
+        let loops = self.outline.rings();
+        loops.get(ring).unwrap_or_else(|| &self.lines[ring - loops.len()])
     }
 
     /// Pieces of the outline and of lines, with the numbers of their loop or line and their own.
     pub fn pieces(&self) -> impl Iterator<Item = (usize, usize, &Piece)> {
-        numbered(&self.rings)
+        let numbered = |(r, ring): (usize, &'_ [Piece])| (0..ring.len()).map(move |p| (r, p));
+        self.rings().enumerate().flat_map(numbered).map(|(r, p)| (r, p, self.piece(r, p)))
     }
 
     /// Pieces of the lines inside.
     pub fn lines(&self) -> impl Iterator<Item = &Piece> {
-        self.rings[self.outline.rings().len()..].iter().flatten()
+        self.lines.iter().flatten()
     }
 
     /// Whether a loop bounds the body, and is no line inside.
@@ -113,12 +119,12 @@ impl Partition {
     /// Whether a loop or line comes back to where it begins: every loop of the outline does, and a region's outline
     /// that lies wholly inside the body.
     pub fn is_closed(&self, ring: usize) -> bool {
-        self.closed[ring]
+        self.is_bounding(ring) || self.closed[ring - self.outline.rings().len()]
     }
 
     /// The piece with these numbers in [`Partition::rings`].
     pub fn piece(&self, ring: usize, piece: usize) -> &Piece {
-        &self.rings[ring][piece]
+        &self.ring(ring)[piece]
     }
 
     /// \[length\]
@@ -133,7 +139,7 @@ impl Partition {
 
     /// The one name of a corner that belongs to several lines.
     pub fn named(&self, [ring, piece]: [usize; 2]) -> [usize; 2] {
-        let piece = if self.closed[ring] && piece == self.rings[ring].len() { 0 } else { piece };
+        let piece = if self.is_closed(ring) && piece == self.ring(ring).len() { 0 } else { piece };
         self.joined.get(&[ring, piece]).copied().unwrap_or([ring, piece])
     }
 
@@ -191,16 +197,16 @@ impl Partition {
             };
             let Some(first) = (0..parts.len()).find(|&k| begins(k)) else {
                 if kept[0] {
-                    self.rings.push(parts);
+                    self.lines.push(parts);
                     self.closed.push(true);
                 }
                 continue;
             };
             for k in (first..first + parts.len()).map(|k| k % parts.len()).filter(|&k| kept[k]) {
-                match self.rings.last_mut().filter(|_| !begins(k)) {
+                match self.lines.last_mut().filter(|_| !begins(k)) {
                     Some(line) => line.push(parts[k]),
                     None => {
-                        self.rings.push(vec![parts[k]]);
+                        self.lines.push(vec![parts[k]]);
                         self.closed.push(false);
                     }
                 }
@@ -220,24 +226,27 @@ impl Partition {
     /// Divides pieces that are there where something meets them.
     fn cut_known(&mut self, cuts: &HashMap<[usize; 2], Vec<f64>>) {
         let near = self.near();
-        for (r, ring) in self.rings.iter_mut().enumerate() {
+        let divided = |(r, ring): (usize, &[Piece])| {
             let parts = |(p, piece): (usize, &Piece)| match cuts.get(&[r, p]) {
                 None => vec![*piece],
                 Some(cuts) => cut(piece, &mut cuts.clone(), near),
             };
-            *ring = ring.iter().enumerate().flat_map(parts).collect();
-        }
-        let bounding = self.outline.rings().len();
-        self.outline = self.outline.with_rings(self.rings[..bounding].to_vec());
+            ring.iter().enumerate().flat_map(parts).collect()
+        };
+        let mut rings: Vec<Vec<Piece>> = self.rings().enumerate().map(divided).collect();
+        self.lines = rings.split_off(self.outline.rings().len());
+        self.outline = self.outline.with_rings(rings);
     }
 
     /// Names the ends of lines after the corners that they are.
     fn join(&mut self) {
         let near = self.near();
         let bounding = self.outline.rings().len();
-        for line in (bounding..self.rings.len()).filter(|&line| !self.closed[line]) {
-            let count = self.rings[line].len();
-            for (piece, end) in [(0, self.rings[line][0].from), (count, self.rings[line][count - 1].to)] {
+        let open: Vec<usize> =
+            (0..self.lines.len()).filter(|&k| !self.closed[k]).map(|k| bounding + k).collect();
+        for line in open {
+            let count = self.ring(line).len();
+            for (piece, end) in [(0, self.piece(line, 0).from), (count, self.piece(line, count - 1).to)] {
                 let corner = self.pieces().find(|(r, p, piece)| {
                     [*r, *p] != [line, 0] && *r <= line && distance(piece.from, end) <= near
                 });
@@ -327,7 +336,7 @@ mod tests {
         assert_eq!(found.outline().corners().count(), 4 + 4 + 1, "where lines end the outline has corners");
         assert!(found.outline().pieces().all(|(.., piece)| piece.number < 4), "pieces keep their numbers");
         assert_eq!([[0.5, 0.5], [2.0, 0.5], [2.0, 1.5], [2.0, 2.5]].map(|p| found.region(p)), [3, 1, 2, 0]);
-        for (ring, line) in found.rings().iter().enumerate().skip(1) {
+        for (ring, line) in found.rings().enumerate().skip(1) {
             for end in [[ring, 0], [ring, line.len()]] {
                 assert!(found.named(end) != end && found.is_junction(found.named(end)), "{end:?}");
             }

@@ -210,10 +210,10 @@ impl Operator {
     pub fn asymmetric_pair(&self) -> Option<[usize; 2]> {
         // The last class that each entry of each class was found to fit; a body has few pairs.
         let mut fits: Vec<Vec<u32>> = self.rows.iter().map(|row| vec![HELD; row.entries.len()]).collect();
-        self.stretches().find_map(|stretch| {
+        self.stretches(|stretch, firsts| {
             let class = stretch.class as usize;
-            for (e, &(offset, _)) in self.rows[class].entries.iter().enumerate() {
-                let (first, _) = self.columns.find(add(stretch.site, offset))?;
+            for (e, first) in firsts.iter().enumerate() {
+                let first = (*first)?;
                 for k in 0..stretch.len {
                     let other = first + k;
                     if !self.follows[other] || fits[class][e] == self.class[other] {
@@ -245,29 +245,38 @@ impl Operator {
         self.columns.find(add(site, offset)).map(|(index, _)| index).expect("checked when made")
     }
 
-    /// Followers of one class in a row, in segments whose neighbours are segments as well.
-    pub(super) fn stretches(&self) -> impl Iterator<Item = Stretch> + '_ {
-        self.columns.iter().flat_map(move |(column, segment)| {
-            let mut done = 0;
-            std::iter::from_fn(move || {
-                let begin = segment.start as usize;
-                while done < segment.len as usize && !self.follows[begin + done] {
-                    done += 1;
+    /// Hands out followers of one class in a row, in segments whose neighbours are segments as well, with the first
+    /// neighbour that each entry leads to, until there is an answer.
+    pub(super) fn stretches<R>(
+        &self,
+        mut take: impl FnMut(Stretch, &[Option<usize>]) -> Option<R>,
+    ) -> Option<R> {
+        let mut firsts = Vec::new();
+        for (column, segment) in self.columns.iter() {
+            let (mut start, end) = (segment.start as usize, (segment.start + segment.len) as usize);
+            while start < end {
+                if !self.follows[start] {
+                    start += 1;
+                    continue;
                 }
-                let start = begin + done;
-                let class = *self.class[..begin + segment.len as usize].get(start)?;
-                let site = [column, segment.row + self.columns.step() * done as i32];
-                let most = segment.len as usize - done;
-                let same =
-                    (0..most).take_while(|k| self.follows[start + k] && self.class[start + k] == class);
+                let class = self.class[start];
+                let steps = start as i32 - segment.start as i32;
+                let site = [column, segment.row + self.columns.step() * steps];
+                let same = (start..end).take_while(|&i| self.follows[i] && self.class[i] == class);
                 let mut len = same.count();
+                firsts.clear();
                 for (offset, _) in &self.rows[class as usize].entries {
-                    len = len.min(self.columns.find(add(site, *offset)).map_or(1, |(_, room)| room));
+                    let found = self.columns.find(add(site, *offset));
+                    len = len.min(found.map_or(1, |(_, room)| room));
+                    firsts.push(found.map(|(first, _)| first));
                 }
-                done += len;
-                Some(Stretch { site, start, len, class })
-            })
-        })
+                if let Some(answer) = take(Stretch { start, len, class }, &firsts) {
+                    return Some(answer);
+                }
+                start += len;
+            }
+        }
+        None
     }
 
     fn check_rows(&self) -> Result<(), OperatorError> {
@@ -276,25 +285,23 @@ impl Operator {
             blocks.flatten().flatten().all(|value| value.is_finite())
         };
         let finite: Vec<bool> = self.rows.iter().map(finite).collect();
-        for Stretch { site, start, class, .. } in self.stretches() {
+        let refused = self.stretches(|Stretch { start, class, .. }, firsts| {
+            let particle = start + 1;
             if !finite[class as usize] {
-                return Err(OperatorError::NotFinite { particle: start + 1 });
+                return Some(OperatorError::NotFinite { particle });
             }
-            for (offset, _) in &self.rows[class as usize].entries {
-                if self.columns.find(add(site, *offset)).is_none() {
-                    return Err(OperatorError::NoNeighbour { particle: start + 1, offset: *offset });
-                }
-            }
-        }
-        Ok(())
+            let lost = firsts.iter().position(Option::is_none)?;
+            let (offset, _) = self.rows[class as usize].entries[lost];
+            Some(OperatorError::NoNeighbour { particle, offset })
+        });
+        refused.map_or(Ok(()), Err)
     }
 }
 
-/// Followers `start..start + len`, the first at `site`, that have one class and each neighbour at one
+/// Followers `start..start + len` that have one class and each neighbour at one
 /// index distance.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Stretch {
-    pub site: Site,
     pub start: usize,
     pub len: usize,
     pub class: u32,

@@ -427,7 +427,7 @@ impl<'a> Cutter<'a> {
             }
         }
         chain.sort_by(|(a, x), (b, y)| order(a, b).then(x.cmp(y)));
-        for (ring, pieces) in self.outline.rings().iter().enumerate() {
+        for (ring, pieces) in self.outline.rings().enumerate() {
             let from = chain.partition_point(|(place, _)| place.ring < ring);
             let to = chain.partition_point(|(place, _)| place.ring <= ring);
             let mut nodes: Vec<u32> = chain[from..to].iter().map(|&(_, node)| node).collect();

@@ -164,7 +164,7 @@ fn is_kept_corner(outline: &Partition, scale: &Scale, corner: [usize; 2]) -> boo
         return true;
     }
     let [ring, piece] = corner;
-    let pieces = &outline.rings()[ring];
+    let pieces = outline.ring(ring);
     let (before, after) = (&pieces[(piece + pieces.len() - 1) % pieces.len()], &pieces[piece]);
     let (a, b) = (before.tangent(1.0), after.tangent(0.0));
     let turn = (a[0] * b[1] - a[1] * b[0]).atan2(a[0] * b[0] + a[1] * b[1]).abs();

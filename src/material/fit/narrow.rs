@@ -13,7 +13,7 @@ use crate::geometry::piece::Piece;
 /// A hole smaller than the spacing; the first place where the opposite side is nearer than that.
 pub fn require_wide(outline: &Partition, near: &NearPieces, spacing: f64) -> Result<(), FitError> {
     for hole in 1..outline.outline().rings().len() {
-        let pieces = &outline.rings()[hole];
+        let pieces = outline.ring(hole);
         let across = |k: usize| {
             let ends = pieces.iter().map(Piece::bounds).map(|(low, high)| [low[k], high[k]]);
             ends.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]).map_or(0.0, |[low, high]| high - low)

@@ -6,13 +6,13 @@ use super::{Choice, Precision, Request, Solver, System};
 /// a few milliseconds. Measured to a residual of 1e-10, direct and multigrid: 0.1 and 0.1 ms on 9 x 9
 /// particles, 4.3 and 0.9 ms on 33 x 33, 17 and 2.3 ms on 65 x 65; on plates with holes 8.5 and 9.1 ms with
 /// 3 221 particles, 65 and 42 ms with 17 601.
-const DIRECT_UP_TO: usize = 1_000;
+pub const DIRECT_UP_TO: usize = 1_000;
 
 /// Followers up to which a factorisation is still the best answer to an operator without symmetry.
 pub const UNSYMMETRIC_UP_TO: usize = 200_000;
 
 /// Followers up to which a factorisation is tried where an iteration fails. Measured with 347 000: 33 s and 3.7 GiB.
-const FACTORISED_UP_TO: usize = 400_000;
+pub const FACTORISED_UP_TO: usize = 400_000;
 
 /// The solver that a request leads to, and why.
 pub fn choose(system: &System, request: &Request) -> (Solver, String) {

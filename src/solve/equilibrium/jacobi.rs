@@ -7,9 +7,9 @@
 use super::history::History;
 use super::system::Prepared;
 use super::{Found, Request, SolveError, Solver, lanczos, steps};
-use crate::flock::block::{inverse, product};
+use crate::flock::block::{Block, inverse, product};
 use crate::flock::vectors::Vectors;
-use crate::solve::operator::Matrix;
+use crate::solve::operator::Row;
 use crate::solve::stopwatch::Stopwatch;
 
 /// Share of the largest damping that converges; below 1 since the eigenvalue is estimated from within,
@@ -22,7 +22,7 @@ const ESTIMATE: usize = 20;
 pub(super) fn solve(prepared: &mut Prepared, request: &Request) -> Result<Found, SolveError> {
     let begin = Stopwatch::start();
     let Prepared { matrix, stencils, right, size, symmetric, .. } = prepared;
-    let bound = largest_row(matrix);
+    let bound = matrix.rows.iter().map(row_sum).fold(1.0, f64::max);
     let largest = if *symmetric { lanczos::largest(matrix, stencils, ESTIMATE).min(bound) } else { bound };
     let weight = SHARE * 2.0 / largest;
     let mut u = Vectors::zeros(matrix.count());
@@ -37,17 +37,14 @@ pub(super) fn solve(prepared: &mut Prepared, request: &Request) -> Result<Found,
     Ok(Found { displacement: u, residuals: history.residuals, set_up })
 }
 
-/// The largest sum of the norms of a row of `D^-1 K`: no eigenvalue is larger in modulus.
-fn largest_row(matrix: &Matrix) -> f64 {
-    let norm = |block: &[[f64; 2]; 2]| block.iter().flatten().map(|v| v * v).sum::<f64>().sqrt();
-    let spectral = |block: &[[f64; 2]; 2]| {
+/// The sum of the norms of a row's blocks of `D^-1 K`: no eigenvalue is larger in modulus than the largest of all rows.
+pub(super) fn row_sum(row: &Row) -> f64 {
+    let norm = |block: &Block| block.iter().flatten().map(|v| v * v).sum::<f64>().sqrt();
+    let spectral = |block: &Block| {
         let [[a, b], [c, d]] = *block;
         let (square, determinant) = (norm(block).powi(2), a * d - b * c);
         ((square + (square * square - 4.0 * determinant * determinant).max(0.0).sqrt()) / 2.0).sqrt()
     };
-    let of_row = |row: &crate::solve::operator::Row| {
-        let inverse = inverse(&row.diagonal).unwrap_or_default();
-        1.0 + row.entries.iter().map(|(_, block)| spectral(&product(&inverse, block))).sum::<f64>()
-    };
-    matrix.rows.iter().map(of_row).fold(1.0, f64::max)
+    let inverse = inverse(&row.diagonal).unwrap_or_default();
+    1.0 + row.entries.iter().map(|(_, block)| spectral(&product(&inverse, block))).sum::<f64>()
 }

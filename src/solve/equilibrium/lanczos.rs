@@ -3,13 +3,14 @@
 //! The coefficients of the iteration are those of Lanczos' tridiagonal matrix, whose extreme eigenvalues
 //! approach those of the operator from within (G. H. Golub and C. F. Van Loan, *Matrix Computations*,
 //! section 10.2.5). On a large body the largest eigenvalue is looked for on a few groups of its columns with all
-//! others held. It belongs to a displacement of a few particles that the rows around them decide, so groups that
-//! hold every different row between them have it to next to nothing.
+//! others held. It belongs to a displacement of a few particles that the rows around them decide, so both ends, the
+//! middle and the groups whose rows could carry most have it to next to nothing.
 
+use super::jacobi::row_sum;
 use super::steps::{Apply, precondition_group};
 use crate::flock::vectors::Vectors;
 use crate::solve::field::{Real, VectorsMut, dot};
-use crate::solve::operator::{Matrix, RowCoefficients, pass};
+use crate::solve::operator::{Matrix, Row, RowCoefficients, pass};
 
 /// Share of the first residual's square below which the next one is rounding.
 const EXHAUSTED: f64 = 1e-24;
@@ -21,19 +22,29 @@ pub struct Bounds {
     pub high: f64,
 }
 
-/// Groups of columns that a largest eigenvalue is looked for in: both ends, the middle, and those with a row that
-/// none before has, as at an outline, a hole or an inclusion.
+/// Most groups looked at beside both ends and the middle: each costs as much as they do.
+const MOST_ODD: usize = 2;
+
+/// Groups of columns that a largest eigenvalue is looked for in: both ends, the middle, and of those with rows that
+/// none of these has, as at an outline, a hole or an inclusion, the few whose rows could carry most.
 fn samples(matrix: &Matrix) -> Vec<usize> {
     let last = matrix.groups() - 1;
     let mut samples = vec![0, last / 2, last];
     samples.dedup();
+    if samples.len() == matrix.groups() {
+        return samples;
+    }
+    let rows_of = |group: usize| matrix.runs_of(group).iter().map(|run| run.class as usize);
     let mut seen = vec![false; matrix.rows.len()];
-    let mut has_new = |group: usize| {
-        let rows = matrix.runs_of(group).iter().map(|run| run.class as usize);
-        rows.fold(false, |any, row| any | !std::mem::replace(&mut seen[row], true))
-    };
-    samples.iter().for_each(|&group| _ = has_new(group));
-    samples.extend((0..=last).filter(|&group| has_new(group)));
+    samples.iter().flat_map(|&group| rows_of(group)).for_each(|row| seen[row] = true);
+    let sum_of = |(row, seen): (&Row, &bool)| if *seen { 0.0 } else { row_sum(row) };
+    let sums: Vec<f64> = matrix.rows.iter().zip(&seen).map(sum_of).collect();
+    let odd_of =
+        |group: usize| rows_of(group).filter(|&row| !seen[row]).map(|row| sums[row]).reduce(f64::max);
+    let mut odd: Vec<(f64, usize)> =
+        (0..=last).filter_map(|group| odd_of(group).map(|sum| (sum, group))).collect();
+    odd.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+    samples.extend(odd.iter().take(MOST_ODD).map(|&(_, group)| group));
     samples.sort_unstable();
     samples
 }

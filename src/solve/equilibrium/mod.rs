@@ -31,7 +31,7 @@ mod system;
 
 use std::time::Duration;
 
-pub use choice::{UNSYMMETRIC_UP_TO, choose};
+pub use choice::{DIRECT_UP_TO, FACTORISED_UP_TO, UNSYMMETRIC_UP_TO, choose};
 pub use error::SolveError;
 pub use system::System;
 

@@ -80,26 +80,25 @@ impl System {
     fn right_side(&self, matrix: &Matrix) -> Vectors<f64> {
         let operator = &self.operator;
         let mut right = Vectors { x: self.forces.x.clone(), y: self.forces.y.clone() };
-        for stretch in operator.stretches() {
-            let range = stretch.start..stretch.start + stretch.len;
-            // Only rows that owe something to a held particle were given another class.
-            if matrix.class[range.clone()].iter().all(|&class| class == stretch.class) {
-                continue;
-            }
-            for (offset, block) in &operator.rows()[stretch.class as usize].entries {
-                let first = operator.index_of(stretch.site, *offset);
-                for (k, i) in range.clone().enumerate() {
-                    let Some(held) = self.held_part(first + k) else { continue };
+        for (column, segment) in matrix.columns.iter() {
+            for k in 0..segment.len as usize {
+                let i = segment.start as usize + k;
+                let class = operator.class[i];
+                // Only rows that owe something to a held particle were given another class.
+                if matrix.class[i] == class {
+                    continue;
+                }
+                let row = &operator.rows()[class as usize];
+                let site = [column, segment.row + matrix.columns.step() * k as i32];
+                for (offset, block) in &row.entries {
+                    let Some(held) = self.held_part(operator.index_of(site, *offset)) else { continue };
                     let [x, y] = apply(block, held);
                     right.x[i] += x;
                     right.y[i] += y;
                 }
-            }
-            for i in range {
                 let [x, y] = operator.held_axes(i);
                 let Some(held) = self.held_part(i).filter(|_| x || y) else { continue };
-                let diagonal = &operator.rows()[stretch.class as usize].diagonal;
-                let [fx, fy] = apply(diagonal, held);
+                let [fx, fy] = apply(&row.diagonal, held);
                 right.x[i] = if x { 0.0 } else { right.x[i] - fx };
                 right.y[i] = if y { 0.0 } else { right.y[i] - fy };
             }

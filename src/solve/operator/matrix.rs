@@ -75,18 +75,14 @@ impl Matrix {
         let mut class = vec![HELD; operator.count()];
         let mut rows = operator.rows.clone();
         let mut known = HashMap::new();
-        let mut firsts = Vec::new();
-        for stretch in operator.stretches() {
-            let Stretch { start, len, class: full, .. } = stretch;
-            let entries = &operator.rows[full as usize].entries;
-            firsts.clear();
-            firsts.extend(entries.iter().map(|(offset, _)| operator.index_of(stretch.site, *offset)));
+        operator.stretches(|Stretch { start, len, class: full, .. }, firsts| {
+            let firsts = || firsts.iter().map(|first| first.expect("checked when made"));
             let is_whole = |i: usize| operator.follows[i] && operator.held_axes(i) == [false; 2];
             let own = (start..start + len).all(is_whole);
-            let free = own && firsts.iter().all(|&j| (j..j + len).all(is_whole));
+            let free = own && firsts().all(|j| (j..j + len).all(is_whole));
             if free {
                 class[start..start + len].fill(full);
-                continue;
+                return None::<()>;
             }
             for k in 0..len {
                 // Which components of the particle itself and of its neighbours are unknowns.
@@ -94,16 +90,17 @@ impl Matrix {
                     let held = operator.held_axes(i);
                     if operator.follows[i] { held.map(|held| !held) } else { [false; 2] }
                 };
-                let ends = std::iter::once(start).chain(firsts.iter().copied());
+                let ends = std::iter::once(start).chain(firsts());
                 let free: Vec<[bool; 2]> = ends.map(|first| unknown(first + k)).collect();
-                let follows: Vec<bool> = firsts.iter().map(|&j| operator.follows[j + k]).collect();
+                let follows: Vec<bool> = firsts().map(|j| operator.follows[j + k]).collect();
                 class[start + k] =
                     *known.entry((full, free, follows)).or_insert_with_key(|(full, free, follows)| {
                         rows.push(without_held(&operator.rows[*full as usize], free, follows));
                         rows.len() as u32 - 1
                     });
             }
-        }
+            None
+        });
         let outliers = operator.outliers.clone();
         Self { outliers, ..Self::compile(columns, class, rows) }
     }

@@ -7,11 +7,11 @@ use std::collections::HashMap;
 use std::ops::Range;
 
 use super::sums::Sums;
-use super::transfer::{Transfer, parents_of_place};
+use super::transfer::{OutlierShares, Transfer, parents_of_place};
 use crate::flock::block::Block;
 use crate::flock::body::Body;
 use crate::flock::lattice::Site;
-use crate::solve::operator::{Columns, HELD, Matrix, Row, leads_to_outlier};
+use crate::solve::operator::{Columns, HELD, Matrix, Outliers, Row, leads_to_outlier};
 
 /// How much coarser the first grid is than the lattice, in particles per node.
 const FIRST_RATIO: f64 = 4.0;
@@ -48,97 +48,132 @@ pub fn next_steps(spacing: [f64; 2]) -> [i32; 2] {
     }
 }
 
-/// The matrix of the coarse grid.
-pub fn coarsen(fine: &Matrix, transfer: Transfer) -> Matrix {
+/// The matrix of the coarse grid, and the shares of particles at no site in its nodes.
+pub fn coarsen(fine: &Matrix, transfer: Transfer) -> (Matrix, OutlierShares) {
     let parents = Parents::new(transfer.steps);
-    let mut patterns = Patterns::new(transfer);
-    let mut singles = Singles::new(fine, parents);
+    let of_outliers = OutlierParents::new(fine, transfer.steps);
+    let mut patterns = Patterns::new(fine, transfer);
     let mut nodes: Vec<(Site, u32)> = Vec::new();
+    // Nodes whose rows are summed one by one, and the particles at no site that have a share in each.
+    let mut singles: Vec<(Site, &[Child])> = of_outliers
+        .children
+        .chunk_by(|a, b| a.node == b.node)
+        .map(|of_node| (of_node[0].node, of_node))
+        .collect();
+    let mut beside = Vec::new();
     let across = transfer.steps[0];
     let columns = fine.columns.range();
-    let mut left = singles.nodes.iter().peekable();
+    let mut left = singles.iter().peekable();
     for column in columns.start.div_euclid(across)..=(columns.end - 1).div_euclid(across) + 1 {
         // Nodes are asked about in their order.
-        let is_single = |row: i32| {
+        let has_outlier = |row: i32| {
             while left.next_if(|(node, _)| *node < [column, row]).is_some() {}
             left.peek().is_some_and(|(node, _)| *node == [column, row])
         };
-        patterns.column(fine, column, is_single, |row, number| nodes.push(([column, row], number)));
+        patterns.column(fine, column, has_outlier, |row, class| match class {
+            Some(class) => nodes.push(([column, row], class)),
+            None => beside.push(([column, row], &[][..])),
+        });
     }
+    singles.extend(beside);
     let mut sums = Sums::default();
-    let patterns = patterns.by_class;
     let mut rows: Vec<Row> =
         patterns.iter().map(|pattern| galerkin(fine, &parents, pattern, &mut sums)).collect();
-    if !singles.nodes.is_empty() {
-        for (node, outliers) in std::mem::take(&mut singles.nodes) {
-            nodes.push((node, rows.len() as u32));
-            rows.push(singles.row(node, outliers, &mut sums));
-        }
-        nodes.sort_unstable();
+    let mut halves = Halves::new(fine, &parents, &of_outliers);
+    for (node, of_node) in singles {
+        nodes.push((node, rows.len() as u32));
+        rows.push(halves.row(node, of_node, &mut sums));
     }
+    // Ascending lists one after the other, which a stable sort joins.
+    nodes.sort();
     let columns = Columns::new(nodes.iter().map(|&(site, _)| site), |_| true);
-    Matrix::compile(columns, nodes.into_iter().map(|(_, class)| class).collect(), rows)
+    let shares = of_outliers.shares(&nodes);
+    (Matrix::compile(columns, nodes.into_iter().map(|(_, class)| class).collect(), rows), shares)
 }
 
-/// Nodes near particles that stand at no site, whose rows are summed one by one.
-struct Singles<'a> {
+/// The nodes around the particles that stand at no site.
+struct OutlierParents {
+    /// Index of the first of these particles.
+    first: usize,
+    /// Nodes and shares of each; those that are held have a share in none. Shape \[outliers\].
+    nodes: Vec<[(Site, f64); 4]>,
+    /// The same by nodes, ascending.
+    children: Vec<Child>,
+}
+
+/// Share of a node in a particle that stands at no site.
+#[derive(Clone, Copy)]
+struct Child {
+    node: Site,
+    particle: usize,
+    share: f64,
+}
+
+impl OutlierParents {
+    fn new(fine: &Matrix, steps: [i32; 2]) -> Self {
+        let Outliers { first, ref places } = fine.outliers;
+        let follows = |k: usize| fine.class[first + k] != HELD;
+        let of_place = |(k, &place): (usize, &[f64; 2])| {
+            let nodes = parents_of_place(place, steps);
+            if follows(k) { nodes } else { nodes.map(|(node, _)| (node, 0.0)) }
+        };
+        let nodes: Vec<_> = places.iter().enumerate().map(of_place).collect();
+        let all = (first..).zip(&nodes).flat_map(|(particle, nodes)| {
+            nodes.iter().map(move |&(node, share)| Child { node, particle, share })
+        });
+        let mut children: Vec<Child> = all.filter(|child| child.share > 0.0).collect();
+        children.sort_unstable_by_key(|child| (child.node, child.particle));
+        Self { first, nodes, children }
+    }
+
+    /// The same by the numbers of the nodes, which ascend and hold every parent.
+    fn shares(&self, nodes: &[(Site, u32)]) -> OutlierShares {
+        let mut parents = vec![[(0, 0.0); 4]; self.nodes.len()];
+        let mut number = 0;
+        let children = self.children.iter().map(|&Child { node, particle, share }| {
+            while nodes[number].0 != node {
+                number += 1;
+            }
+            let of_particle: &mut [(u32, f32); 4] = &mut parents[particle - self.first];
+            let free = of_particle.iter_mut().find(|(_, share)| *share == 0.0);
+            *free.expect("four at most") = (number as u32, share as f32);
+            (number as u32, particle as u32, share as f32)
+        });
+        let children = children.collect();
+        OutlierShares { first: self.first, parents, children }
+    }
+}
+
+/// Rows of `K P`, each computed when it is first asked for: up to four nodes have a share in a particle.
+struct Halves<'a> {
     fine: &'a Matrix,
-    parents: Parents,
-    /// Nodes with a share in each particle at no site, shape \[outliers\].
-    of_outliers: Vec<[(Site, f64); 4]>,
-    /// Their sites, ascending, and where the particles at no site that have a share in each lie in `shares`.
-    nodes: Vec<(Site, Range<usize>)>,
-    shares: Vec<(usize, f64)>,
-    /// Rows of `K P` by nodes, each computed when it is first asked for: up to four nodes have a share in one.
-    halves: Vec<(Site, Block)>,
-    /// Where that of each particle lies, shape \[count\].
-    half: Vec<Range<u32>>,
+    parents: &'a Parents,
+    of_outliers: &'a OutlierParents,
+    /// Rows one after the other, by nodes.
+    all: Vec<(Site, Block)>,
+    /// Where that of each particle lies, shape \[count\]; empty where there are no particles at no site.
+    of_particle: Vec<Range<u32>>,
     /// The one that is being summed.
     sums: Sums,
 }
 
-impl<'a> Singles<'a> {
-    fn new(fine: &'a Matrix, parents: Parents) -> Self {
-        let of_outlier = |&place: &[f64; 2]| parents_of_place(place, parents.steps);
-        let of_outliers: Vec<_> = fine.outliers.places.iter().map(of_outlier).collect();
-        let (mut nodes, mut shares, mut half) = (Vec::new(), Vec::new(), Vec::new());
-        if !fine.outliers.places.is_empty() {
-            half.resize(fine.count(), 0..0);
-            let mut found: Vec<(Site, Option<usize>, f64)> = Vec::new();
-            let leads = |row: &Row| row.entries.iter().any(|(offset, _)| leads_to_outlier(*offset));
-            let leads: Vec<bool> = fine.rows.iter().map(leads).collect();
-            for (column, segment) in fine.columns.iter() {
-                for k in 0..segment.len as i32 {
-                    let i = segment.start as usize + k as usize;
-                    let site = [column, segment.row + fine.columns.step() * k];
-                    match i.checked_sub(fine.outliers.first) {
-                        Some(outlier) => {
-                            let nodes = of_outliers[outlier].into_iter().filter(|(_, share)| *share > 0.0);
-                            found.extend(nodes.map(|(node, share)| (node, Some(i), share)));
-                        }
-                        // Nodes with a share in a particle that feels one of these feel it through that.
-                        None if leads[fine.class[i] as usize] => {
-                            parents.each(site, 1.0, |node, _| found.push((node, None, 0.0)));
-                        }
-                        None => {}
-                    }
-                }
-            }
-            found.sort_unstable_by_key(|&(node, particle, _)| (node, particle));
-            for of_node in found.chunk_by(|a, b| a.0 == b.0) {
-                let begin = shares.len();
-                shares.extend(of_node.iter().filter_map(|&(_, particle, share)| Some((particle?, share))));
-                nodes.push((of_node[0].0, begin..shares.len()));
-            }
+impl<'a> Halves<'a> {
+    fn new(fine: &'a Matrix, parents: &'a Parents, of_outliers: &'a OutlierParents) -> Self {
+        let count = if of_outliers.nodes.is_empty() { 0 } else { fine.count() };
+        Self {
+            fine,
+            parents,
+            of_outliers,
+            all: Vec::new(),
+            of_particle: vec![0..0; count],
+            sums: Sums::default(),
         }
-        let (halves, sums) = (Vec::new(), Sums::default());
-        Self { fine, parents, of_outliers, nodes, shares, halves, half, sums }
     }
 
     /// The row of `P' K P` at a node.
-    fn row(&mut self, node: Site, outliers: Range<usize>, sums: &mut Sums) -> Row {
+    fn row(&mut self, node: Site, outliers: &[Child], sums: &mut Sums) -> Row {
         let [across, along] = self.parents.steps;
-        let (first, step) = (self.fine.outliers.first, self.fine.columns.step());
+        let (first, step) = (self.of_outliers.first, self.fine.columns.step());
         let near = |k: usize, step: i32| node[k] * step - step + 1..node[k] * step + step;
         for column in near(0, across) {
             for row in near(1, along) {
@@ -148,48 +183,48 @@ impl<'a> Singles<'a> {
                 self.add_half(node, [column, row], (i, share), sums);
             }
         }
-        for at in outliers {
-            let (i, share) = self.shares[at];
-            self.add_half(node, [Body::ALONG_OUTLINE, (i - first) as i32 * step], (i, share), sums);
+        for &Child { particle, share, .. } in outliers {
+            let site = [Body::ALONG_OUTLINE, (particle - first) as i32 * step];
+            self.add_half(node, site, (particle, share), sums);
         }
         sums.row()
     }
 
     /// Adds a particle's row of `K P` by offsets from a node that has a share in it.
     fn add_half(&mut self, node: Site, site: Site, (i, share): (usize, f64), sums: &mut Sums) {
-        if self.half[i].is_empty() {
-            self.find_half(node, site, i);
+        if self.of_particle[i].is_empty() {
+            self.find(node, site, i);
         }
-        let Range { start, end } = self.half[i];
-        for (other, block) in &self.halves[start as usize..end as usize] {
+        let Range { start, end } = self.of_particle[i];
+        for (other, block) in &self.all[start as usize..end as usize] {
             sums.add([other[0] - node[0], other[1] - node[1]], share, block);
         }
     }
 
     /// Computes a particle's row of `K P`, summed by offsets from a node close to it.
-    fn find_half(&mut self, near: Site, site: Site, i: usize) {
-        let mut half = std::mem::take(&mut self.sums);
+    fn find(&mut self, near: Site, site: Site, i: usize) {
         let row = &self.fine.rows[self.fine.class[i] as usize];
-        self.add_parents(near, site, (1.0, &row.diagonal), &mut half);
+        self.add_parents(near, site, (1.0, &row.diagonal));
         for (offset, block) in &row.entries {
-            self.add_parents(near, [site[0] + offset[0], site[1] + offset[1]], (-1.0, block), &mut half);
+            self.add_parents(near, [site[0] + offset[0], site[1] + offset[1]], (-1.0, block));
         }
-        let begin = self.halves.len();
+        let begin = self.all.len();
         let absolute = |(offset, block): (Site, Block)| ([offset[0] + near[0], offset[1] + near[1]], block);
-        self.halves.extend(half.drain().map(absolute));
-        self.half[i] = begin as u32..self.halves.len() as u32;
-        self.sums = half;
+        self.all.extend(self.sums.drain().map(absolute));
+        self.of_particle[i] = begin as u32..self.all.len() as u32;
     }
 
     /// Adds a block by the nodes that have a share in the particle at a site, as offsets from one of them.
-    fn add_parents(&self, near: Site, site: Site, (sign, block): (f64, &Block), sums: &mut Sums) {
-        let offset = |node: Site| [node[0] - near[0], node[1] - near[1]];
+    fn add_parents(&mut self, near: Site, site: Site, (sign, block): (f64, &Block)) {
+        let sums = &mut self.sums;
         if site[0] != Body::ALONG_OUTLINE {
-            return self.parents.each(site, sign, |node, share| sums.add(offset(node), share, block));
+            let steps = self.parents.steps;
+            let from_near = [0, 1].map(|axis| site[axis] - near[axis] * steps[axis]);
+            return self.parents.each(from_near, sign, |node, share| sums.add(node, share, block));
         }
-        let nodes = &self.of_outliers[(site[1] / self.fine.columns.step()) as usize];
+        let nodes = &self.of_outliers.nodes[(site[1] / self.fine.columns.step()) as usize];
         for &(node, share) in nodes.iter().filter(|(_, share)| *share > 0.0) {
-            sums.add(offset(node), sign * share, block);
+            sums.add([node[0] - near[0], node[1] - near[1]], sign * share, block);
         }
     }
 }
@@ -198,24 +233,46 @@ impl<'a> Singles<'a> {
 struct Patterns {
     transfer: Transfer,
     known: HashMap<Vec<u32>, u32>,
-    by_class: Vec<Vec<u32>>,
+    /// One after the other.
+    all: Vec<u32>,
     /// Classes of the fine columns within reach of a coarse one, row by row.
     around: Vec<Vec<u32>>,
+    /// Of each row of the fine matrix, whether it leads to a particle at no site; empty where there is none.
+    leads: Vec<bool>,
 }
 
 impl Patterns {
-    fn new(transfer: Transfer) -> Self {
+    fn new(fine: &Matrix, transfer: Transfer) -> Self {
         let width = 2 * transfer.steps[0] as usize - 1;
-        Self { transfer, known: HashMap::new(), by_class: Vec::new(), around: vec![Vec::new(); width] }
+        let leads = |row: &Row| row.entries.iter().any(|(offset, _)| leads_to_outlier(*offset));
+        let rows = if fine.outliers.places.is_empty() { &[] } else { &fine.rows[..] };
+        Self {
+            transfer,
+            known: HashMap::new(),
+            all: Vec::new(),
+            around: vec![Vec::new(); width],
+            leads: rows.iter().map(leads).collect(),
+        }
     }
 
-    /// Hands out the row and the class of each node of a coarse column.
+    /// Particles within reach of a node.
+    fn size(&self) -> usize {
+        self.around.len() * (2 * self.transfer.steps[1] as usize - 1)
+    }
+
+    /// The patterns by class.
+    fn iter(&self) -> impl Iterator<Item = &[u32]> {
+        self.all.chunks_exact(self.size())
+    }
+
+    /// Hands out the row and the class of each node of a coarse column; none of those that feel a particle at no site
+    /// through others. Nodes for which `has_outlier` holds are left out.
     fn column(
         &mut self,
         fine: &Matrix,
         number: i32,
-        mut is_single: impl FnMut(i32) -> bool,
-        mut node: impl FnMut(i32, u32),
+        mut has_outlier: impl FnMut(i32) -> bool,
+        mut node: impl FnMut(i32, Option<u32>),
     ) {
         let [across, along] = self.transfer.steps;
         let within = number * across - across + 1..number * across + across;
@@ -234,34 +291,40 @@ impl Patterns {
             }
         }
         let reach = 2 * along as usize - 1;
-        let (mut pattern, mut before) = (Vec::new(), HELD);
+        let size = self.size();
+        let (mut pattern, mut before) = (Vec::with_capacity(size), HELD);
         for row in first..=last {
-            if is_single(row) {
+            if has_outlier(row) {
                 before = HELD;
                 continue;
             }
             let at = ((row - first) * along) as usize;
             let alike = before != HELD && {
-                let known = self.by_class[before as usize].chunks_exact(reach);
+                let known = self.all[before as usize * size..].chunks_exact(reach);
                 self.around.iter().zip(known).all(|(rows, known)| &rows[at..at + reach] == known)
             };
             if !alike {
                 pattern.clear();
                 self.around.iter().for_each(|rows| pattern.extend(&rows[at..at + reach]));
+                before = HELD;
                 if pattern.iter().all(|&class| class == HELD) {
-                    before = HELD;
+                    continue;
+                }
+                if pattern.iter().any(|&class| self.leads.get(class as usize) == Some(&true)) {
+                    node(row, None);
                     continue;
                 }
                 before = match self.known.get(&pattern) {
                     Some(&class) => class,
                     None => {
-                        self.by_class.push(pattern.clone());
-                        self.known.insert(pattern.clone(), self.by_class.len() as u32 - 1);
-                        self.by_class.len() as u32 - 1
+                        let class = self.known.len() as u32;
+                        self.all.extend(&pattern);
+                        self.known.insert(pattern.clone(), class);
+                        class
                     }
                 };
             }
-            node(row, before);
+            node(row, Some(before));
         }
     }
 }
@@ -284,17 +347,31 @@ fn galerkin(fine: &Matrix, parents: &Parents, pattern: &[u32], sums: &mut Sums) 
 }
 
 /// The nodes that have a share in a site of the fine grid, by columns and by rows.
-#[derive(Clone, Copy)]
 struct Parents {
     steps: [i32; 2],
     /// Share of a node in what lies this many columns, and rows, away.
     hats: [[f64; MOST_STEPS + 1]; 2],
+    /// Nodes around columns, and rows, from `-NEAR` to `NEAR`: setting up a cut outline asks for little else.
+    near: [Vec<Beside>; 2],
+}
+
+/// Farthest from a node that sites are asked about often.
+const NEAR: i32 = 2 * MOST_STEPS as i32;
+
+/// The one or two nodes with a share in a column, or a row, and their shares.
+#[derive(Clone, Copy)]
+struct Beside {
+    nodes: [(i32, f64); 2],
+    count: usize,
 }
 
 impl Parents {
     fn new(steps: [i32; 2]) -> Self {
         let hat = |step: i32, at: usize| (1.0 - at as f64 / f64::from(step)).max(0.0);
-        Self { steps, hats: steps.map(|step| std::array::from_fn(|at| hat(step, at))) }
+        let hats = steps.map(|step| std::array::from_fn(|at| hat(step, at)));
+        let mut parents = Self { steps, hats, near: Default::default() };
+        parents.near = [0, 1].map(|axis| (-NEAR..=NEAR).map(|at| parents.find(axis, at)).collect());
+        parents
     }
 
     /// Share of a node in what lies this far away along an axis.
@@ -302,20 +379,25 @@ impl Parents {
         self.hats[axis][at.unsigned_abs() as usize]
     }
 
-    /// The one or two nodes around a column, or a row, with their shares; the second may have none.
-    fn along(&self, axis: usize, at: i32) -> [(i32, f64); 2] {
+    fn find(&self, axis: usize, at: i32) -> Beside {
         let step = self.steps[axis];
-        let node = at.div_euclid(step);
-        let beyond = at - node * step;
-        [(node, self.hat(axis, beyond)), (node + 1, self.hat(axis, step - beyond))]
+        let (node, beyond) = (at.div_euclid(step), at.rem_euclid(step));
+        let nodes = [(node, self.hat(axis, beyond)), (node + 1, self.hat(axis, step - beyond))];
+        Beside { nodes, count: if beyond == 0 { 1 } else { 2 } }
+    }
+
+    fn along(&self, axis: usize, at: i32) -> Beside {
+        let known = self.near[axis].get((at + NEAR) as usize);
+        known.copied().unwrap_or_else(|| self.find(axis, at))
     }
 
     /// Hands out the nodes with a share in a site, each with `weight` times its share.
+    #[inline]
     fn each(&self, site: Site, weight: f64, mut take: impl FnMut(Site, f64)) {
-        let rows = self.along(1, site[1]);
-        for (column, share) in self.along(0, site[0]).into_iter().filter(|(_, share)| *share > 0.0) {
-            for (row, other) in rows.into_iter().filter(|(_, share)| *share > 0.0) {
-                take([column, row], weight * share * other);
+        let (columns, rows) = (self.along(0, site[0]), self.along(1, site[1]));
+        for (column, share) in &columns.nodes[..columns.count] {
+            for (row, other) in &rows.nodes[..rows.count] {
+                take([*column, *row], weight * share * other);
             }
         }
     }

@@ -184,10 +184,9 @@ fn descend(here: &Smoothed<'_>, vectors: &mut LevelVectors, below: &mut [Level],
 
 impl Level {
     fn new(fine: &Matrix, transfer: Transfer, scale: f64) -> Self {
-        let matrix = coarsen::coarsen(fine, transfer);
+        let (matrix, outliers) = coarsen::coarsen(fine, transfer);
         let stencils = RowCoefficients::new(&matrix.rows, scale);
         let vectors = LevelVectors::new(matrix.count());
-        let outliers = OutlierShares::new(fine, &matrix, transfer);
         Self { transfer, outliers, matrix, stencils, weights: [0.0; 2], vectors }
     }
 }

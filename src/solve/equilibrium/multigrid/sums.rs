@@ -29,6 +29,7 @@ impl Sums {
     }
 
     /// Adds a share of a block at an offset.
+    #[inline]
     pub fn add(&mut self, offset: Site, share: f64, block: &Block) {
         let far = offset[0].abs().max(offset[1].abs());
         if far > self.radius {

@@ -38,7 +38,7 @@ fn product(a: &[f64], b: &[f64]) -> f64 {
 }
 
 /// Every way a lattice may be coarsened, and the matrices above and below.
-fn each_coarsening(test: impl Fn(LatticeKind, &Matrix, &Matrix, Transfer)) {
+fn each_coarsening(test: impl Fn(LatticeKind, &Matrix, &(Matrix, OutlierShares), Transfer)) {
     for kind in LatticeKind::SAMPLES {
         let regular = operator(kind, 11, 13, |i| i < 9 || i == 50);
         let operators = [with_outliers(&regular), regular];
@@ -51,12 +51,8 @@ fn each_coarsening(test: impl Fn(LatticeKind, &Matrix, &Matrix, Transfer)) {
                 let coarse = coarsen(&fine, transfer);
                 test(kind, &fine, &coarse, transfer);
                 // And again, from a grid without gaps.
-                test(
-                    kind,
-                    &coarse,
-                    &coarsen(&coarse, Transfer { steps: [2, 2] }),
-                    Transfer { steps: [2, 2] },
-                );
+                let transfer = Transfer { steps: [2, 2] };
+                test(kind, &coarse.0, &coarsen(&coarse.0, transfer), transfer);
             }
         }
     }
@@ -64,11 +60,11 @@ fn each_coarsening(test: impl Fn(LatticeKind, &Matrix, &Matrix, Transfer)) {
 
 #[test]
 fn the_coarse_operator_is_the_triple_product() {
-    each_coarsening(|kind, fine, coarse, transfer| {
+    each_coarsening(|kind, fine, (coarse, shares), transfer| {
         let k = dense(fine);
         let p = columns(coarse.count(), |unit| {
             let mut out = Vectors::zeros(fine.count());
-            transfer.prolong((fine, coarse), &OutlierShares::new(fine, coarse, transfer), unit, &mut out);
+            transfer.prolong((fine, coarse), shares, unit, &mut out);
             out
         });
         let coarse = dense(coarse);
@@ -85,15 +81,15 @@ fn the_coarse_operator_is_the_triple_product() {
 
 #[test]
 fn restriction_is_the_transpose_of_interpolation() {
-    each_coarsening(|kind, fine, coarse, transfer| {
+    each_coarsening(|kind, fine, (coarse, shares), transfer| {
         let p = columns(coarse.count(), |unit| {
             let mut out = Vectors::zeros(fine.count());
-            transfer.prolong((fine, coarse), &OutlierShares::new(fine, coarse, transfer), unit, &mut out);
+            transfer.prolong((fine, coarse), shares, unit, &mut out);
             out
         });
         let r = columns(fine.count(), |unit| {
             let mut out = Vectors::zeros(coarse.count());
-            transfer.restrict((fine, coarse), &OutlierShares::new(fine, coarse, transfer), unit, &mut out);
+            transfer.restrict((fine, coarse), shares, unit, &mut out);
             out
         });
         for (i, row) in r.iter().enumerate().filter(|(i, _)| fine.class[i % fine.count()] != HELD) {
@@ -106,7 +102,7 @@ fn restriction_is_the_transpose_of_interpolation() {
 
 #[test]
 fn the_coarse_space_contains_translations_rotations_and_uniform_strains() {
-    each_coarsening(|kind, fine, coarse, transfer| {
+    each_coarsening(|kind, fine, (coarse, shares), transfer| {
         let affine = |[i, j]: [f64; 2]| [0.5 - 0.3 * i + 0.7 * j, -0.25 + 0.2 * i + 0.1 * j];
         let mut nodes = Vectors::zeros(coarse.count());
         for (node, [i, j]) in coarse.columns.sites().enumerate() {
@@ -115,7 +111,7 @@ fn the_coarse_space_contains_translations_rotations_and_uniform_strains() {
             (nodes.x[node], nodes.y[node]) = (x as f32, y as f32);
         }
         let mut found = Vectors::zeros(fine.count());
-        transfer.prolong((fine, coarse), &OutlierShares::new(fine, coarse, transfer), &nodes, &mut found);
+        transfer.prolong((fine, coarse), shares, &nodes, &mut found);
         for site in fine.columns.sites() {
             let (i, _) = fine.columns.find(site).expect("a follower");
             let outlier = i.checked_sub(fine.outliers.first);
@@ -180,13 +176,12 @@ fn the_envelope_refuses_what_is_not_positive_and_leaves_out_what_is_nothing() {
     let strip = crate::solve::operator::Operator::from_rows(&sites, grid, follows, row).expect("rows");
     let fine = Matrix::of_followers(&strip);
     let transfer = Transfer { steps: [2, 2] };
-    let coarse = coarsen(&fine, transfer);
+    let (coarse, none) = coarsen(&fine, transfer);
     let mut factor = Envelope::new(&coarse, 1.0, false).expect("not negative");
     // The force of a displacement that the coarse grid can have, on the coarse grid.
     let mut nodes = Vectors::<f32>::zeros(coarse.count());
     nodes.x.iter_mut().enumerate().for_each(|(k, x)| *x = (k as f32 * 0.4).sin());
     let mut exact = Vectors::zeros(fine.count());
-    let none = OutlierShares::default();
     transfer.prolong((&fine, &coarse), &none, &nodes, &mut exact);
     let (mut f, mut coarse_f) = (Vectors::zeros(fine.count()), Vectors::zeros(coarse.count()));
     steps::apply(&fine, &RowCoefficients::<f32>::new(&fine.rows, 1.0), &exact, &mut f);
@@ -211,7 +206,7 @@ fn nodes_lie_about_as_far_apart_both_ways_and_stand_for_about_four_particles() {
         let fine = Matrix::of_followers(&operator(kind, 24, 24, |i| i == 0));
         let steps = first_steps(grid, particles_per_site(&fine));
         let mut spacing = [0, 1].map(|k| grid[k][0].hypot(grid[k][1]) * f64::from(steps[k]));
-        let ratio = fine.count() as f64 / coarsen(&fine, Transfer { steps }).count() as f64;
+        let ratio = fine.count() as f64 / coarsen(&fine, Transfer { steps }).0.count() as f64;
         println!("{kind:?} {steps:?} {spacing:?} {ratio}");
         assert!((1.9..5.0).contains(&ratio), "{kind:?} {steps:?}: {ratio}");
         for _ in 0..3 {

@@ -8,7 +8,7 @@ use crate::flock::lattice::Site;
 use crate::flock::vectors::Vectors;
 use crate::solve::equilibrium::steps::for_groups;
 use crate::solve::field::{VectorsMut, VectorsRef};
-use crate::solve::operator::{Columns, HELD, Matrix, Segment};
+use crate::solve::operator::{Columns, Matrix, Segment};
 
 /// Between the particles of one matrix and the nodes of the next.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -65,31 +65,14 @@ impl Column {
 #[derive(Clone, Debug, Default)]
 pub struct OutlierShares {
     /// Index of the first of them in the fine matrix.
-    first: usize,
-    /// Nodes and shares of each, shape \[outliers\].
-    parents: Vec<[(u32, f32); 4]>,
+    pub first: usize,
+    /// Nodes and shares of each, those of no share last, shape \[outliers\].
+    pub parents: Vec<[(u32, f32); 4]>,
     /// The same by nodes: node, particle, share; ascending.
-    children: Vec<(u32, u32, f32)>,
+    pub children: Vec<(u32, u32, f32)>,
 }
 
 impl OutlierShares {
-    pub fn new(fine: &Matrix, coarse: &Matrix, transfer: Transfer) -> Self {
-        let first = fine.outliers.first;
-        let mut shares = Self { first, ..Self::default() };
-        for (k, &place) in fine.outliers.places.iter().enumerate() {
-            let is_held = fine.class[first + k] == HELD;
-            let nodes = parents_of_place(place, transfer.steps).map(|(site, share)| {
-                let node = coarse.columns.find(site).filter(|_| !is_held && share > 0.0);
-                node.map_or((0, 0.0), |(node, _)| (node as u32, share as f32))
-            });
-            let used = nodes.iter().filter(|(_, share)| *share > 0.0);
-            shares.children.extend(used.map(|&(node, share)| (node, (first + k) as u32, share)));
-            shares.parents.push(nodes);
-        }
-        shares.children.sort_by_key(|&(node, particle, _)| (node, particle));
-        shares
-    }
-
     fn restrict(&self, from: &Vectors<f32>, to: &mut VectorsMut<'_, f32>) {
         let range = to.range();
         let begin = self.children.partition_point(|&(node, ..)| (node as usize) < range.start);
