@@ -3,8 +3,10 @@
 use std::ops::ControlFlow;
 
 use flockform::continuum::equilibrium::run_to_equilibrium;
+use flockform::continuum::memory::fallback;
 use flockform::continuum::plan::Plan;
 use flockform::continuum::run::{Outcome, StopReason};
+use flockform::export::Measured;
 use flockform::flock::vectors::distance;
 use flockform::scene::Scene;
 use flockform::solve::equilibrium::Precision;
@@ -309,4 +311,52 @@ fn tractions_and_weight_act_on_the_thickness_and_forces_on_the_whole_of_it() {
         let ratio = largest(&load, "0.5") / largest(&load, "2.0");
         assert!((ratio / thin_over_thick - 1.0).abs() < 1e-9, "{load}: {ratio}");
     }
+}
+
+/// A cantilever one cell high, loaded across at its end.
+fn slender(length: f64, solver: &str) -> Scene {
+    let text = format!(
+        "title = \"slender\"\nstop = {{ steps = 1 }}\n\
+         equilibrium = {{ solver = \"{solver}\", tolerance = 1e-12 }}\n\
+         rule = {{ mean = {{ kind = \"material\" }} }}\n\
+         lattice = {{ kind = \"square\", spacing = 1.0 }}\n\
+         material = {{ kind = \"isotropic\", young = 1000.0, poisson = 0.3 }}\n\
+         body = {{ shape = {{ kind = \"rectangle\", max = [{length:?}, 1.0] }} }}\n\
+         roles = [{{ region = {{ kind = \"edge\", side = \"left\" }}, role = \"clamped\" }}]\n\
+         loads = [{{ kind = \"traction\", region = {{ kind = \"edge\", side = \"right\" }}, traction = [0.0, 1e-6] }}]\n"
+    );
+    Scene::parse("slender", "slender.toml", &text, &[], None).unwrap_or_else(|error| panic!("{error}"))
+}
+
+#[test]
+fn a_body_solved_as_far_as_rounding_goes_is_not_said_to_move() {
+    let scene = slender(2000.0, "direct");
+    let outcome = ended(&scene);
+    assert_eq!(outcome.reason, StopReason::Equilibrium);
+    let solved = outcome.solved.as_ref().expect("solved");
+    assert!(!solved.converged && solved.known_to.is_some(), "{:?}", solved.residuals.last());
+    let (measured, _) = Measured::of(&scene, &outcome).expect("a material");
+    let words = measured.to_string();
+    assert!(words.contains("what tolerance and rounding leave: an unbalanced force of"), "{words}");
+    assert!(!words.contains("not at rest"), "{words}");
+    // The same body ended short of any equilibrium.
+    let mut short = outcome;
+    let solved = short.solved.as_mut().expect("solved");
+    solved.known_to = None;
+    let (measured, _) = Measured::of(&scene, &short).expect("a material");
+    assert!(measured.to_string().contains("not at rest"), "{measured}");
+}
+
+#[test]
+fn a_factorisation_is_foreseen_where_an_iteration_may_fall_back_on_it() {
+    let fallback = |length: f64, solver: &str| {
+        let scene = slender(length, solver);
+        fallback(&scene, &planned(&scene))
+    };
+    assert!(fallback(2000.0, "auto").is_some_and(|bytes| bytes > 1 << 20));
+    // Factorised before any iteration, or asked for by name.
+    assert_eq!(
+        [fallback(100.0, "auto"), fallback(2000.0, "direct"), fallback(2000.0, "multigrid")],
+        [None; 3]
+    );
 }

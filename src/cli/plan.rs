@@ -1,7 +1,7 @@
 //! `flockform plan`: a scene or a swarm before it runs.
 
 use clap::Args;
-use flockform::continuum::memory::readable_bytes;
+use flockform::continuum::memory::{fallback, readable_bytes};
 use flockform::continuum::plan::Plan;
 use flockform::continuum::report::PlanReport;
 use flockform::continuum::shares::Shares;
@@ -48,7 +48,11 @@ pub fn plan(arguments: &PlanArguments) -> Result<(), Refusal> {
             let mut report = PlanReport::new(&scene, &plan)?;
             let memory = [Outputs::ALL, Outputs::TABLES].map(|outputs| predicted(&scene, &plan, outputs));
             let [all, tables] = memory.map(readable_bytes);
-            let words = format!("about {all}; {tables} with --figures none --no-report");
+            let fallback = fallback(&scene, &plan).map_or_else(String::new, |bytes| {
+                let bytes = readable_bytes(bytes);
+                format!("; about {bytes} more if multigrid fails and a factorisation decides")
+            });
+            let words = format!("about {all}; {tables} with --figures none --no-report{fallback}");
             report.facts.push(("memory".into(), words));
             if let Some(ranks) = ranks {
                 report.facts.extend(Shares::new(&scene, &plan, usize::from(*ranks))?.facts());

@@ -7,10 +7,13 @@
 use super::plan::Plan;
 use crate::flock::body::{Cut, MOST_SITES};
 use crate::flock::law::Weights;
+use crate::flock::role::Role;
 use crate::geometry::outline::{Outline, Place};
 use crate::scene::{BodySource, Scene};
 use crate::solve::corotated::is_corotated;
-use crate::solve::equilibrium::{Choice, Solver, UNSYMMETRIC_UP_TO};
+use crate::solve::equilibrium::{
+    Choice, DIRECT_UP_TO, FACTORISED_UP_TO, Precision, Solver, UNSYMMETRIC_UP_TO,
+};
 
 /// Fewest bytes that a run of a scene takes, known before anything is laid out; 0 where its layout is refused anyway.
 pub fn at_least(scene: &Scene) -> f64 {
@@ -64,20 +67,38 @@ pub fn solving(scene: &Scene, plan: &Plan) -> usize {
     const BY_ITERATION: f64 = 118.0;
     /// The matrix of a body that turns, which differs from row to row, and its factor.
     const COROTATED: f64 = 4_600.0;
-    /// Of a factor, by each doubling of the body from 2^11 particles on.
-    const FACTOR: f64 = 530.0;
     let Some(asked) = &scene.equilibrium else { return 0 };
     let count = plan.count() as f64;
     let is_direct = match asked.request.solver {
         Choice::This(solver) => solver == Solver::Direct,
         Choice::Auto => plan.count() <= UNSYMMETRIC_UP_TO && is_one_sided(plan),
     };
-    let each = match (is_corotated(&plan.setup.flock), is_direct) {
-        (true, _) => COROTATED,
-        (false, true) => FACTOR * (count.log2() - 11.0).max(1.0),
-        (false, false) => BY_ITERATION,
-    };
-    (each * count) as usize
+    match (is_corotated(&plan.setup.flock), is_direct) {
+        (true, _) => (COROTATED * count) as usize,
+        (false, true) => factor(plan),
+        (false, false) => (BY_ITERATION * count) as usize,
+    }
+}
+
+/// Bytes of the factor that an automatic choice falls back on where its iteration takes the body for unstable; `None` where
+/// it does not iterate, or would not fall back. Few bodies need it: [`solving`] leaves it out.
+pub fn fallback(scene: &Scene, plan: &Plan) -> Option<usize> {
+    let request = &scene.equilibrium.as_ref()?.request;
+    let followers = plan.setup.roles.iter().filter(|&&role| role == Role::Follower).count();
+    let falls_back = request.solver == Choice::Auto
+        && request.precision == Precision::F64
+        && (DIRECT_UP_TO + 1..=FACTORISED_UP_TO).contains(&followers)
+        && !is_corotated(&plan.setup.flock)
+        && !is_one_sided(plan);
+    falls_back.then(|| factor(plan))
+}
+
+/// Bytes of a factor.
+fn factor(plan: &Plan) -> usize {
+    /// Of each particle, by each doubling of the body from 2^11 particles on.
+    const EACH: f64 = 530.0;
+    let count = plan.count() as f64;
+    (EACH * (count.log2() - 11.0).max(1.0) * count) as usize
 }
 
 /// Whether a particle sees another that does not see it; a material's never do.

@@ -146,7 +146,7 @@ pub fn write_all(
 ) -> Result<(Vec<PathBuf>, Summary), ExportError> {
     let start = Instant::now();
     let engine = &results.outcome.engine;
-    let (measured, stresses) = Measured::of(results.scene, engine).unzip();
+    let (measured, stresses) = Measured::of(results.scene, results.outcome).unzip();
     let of_particles = stresses.as_ref().map(|stresses| &stresses.particles[..]);
     let mut written = vec![csv::write_final(folder, engine, of_particles)?];
     // Figures take memory of their own.

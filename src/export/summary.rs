@@ -163,6 +163,9 @@ pub struct FirstBreak {
 pub struct Measured {
     /// Units of the numbers, by name.
     pub units: Units,
+    /// Whether a solver found an equilibrium: what then is unbalanced is what its tolerance and rounding leave.
+    #[serde(skip)]
+    pub is_settled: bool,
     /// The readings themselves.
     #[serde(flatten)]
     pub mechanics: Mechanics,
@@ -247,19 +250,21 @@ impl Summary {
 }
 
 impl Measured {
-    /// At the engine's present places, and the stresses there; `None` without a material.
-    pub fn of(scene: &Scene, engine: &Engine) -> Option<(Self, Stresses)> {
+    /// At the places where a run ended, and the stresses there; `None` without a material.
+    pub fn of(scene: &Scene, outcome: &Outcome) -> Option<(Self, Stresses)> {
+        let engine = &outcome.engine;
         let elastic = scene.material.as_ref()?;
         let stresses = Stresses::at_present(engine, elastic)?;
         let mechanics = Mechanics::under(&stresses, engine, elastic)?;
         let places = at_places(scene, engine, &stresses);
-        Some((Self { units: Units::of(scene), mechanics, places }, stresses))
+        let is_settled = outcome.solved.as_ref().is_some_and(Solved::is_at_rest);
+        Some((Self { units: Units::of(scene), is_settled, mechanics, places }, stresses))
     }
 }
 
 impl fmt::Display for Measured {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { units, mechanics, places } = self;
+        let Self { units, is_settled, mechanics, places } = self;
         let (force, moment, length) = (&units.force, &units.moment, &units.length);
         // Rounding of the larger component is no number of the smaller one.
         let shown = |value: f64, beside: f64| if value.abs() < 1e-9 * beside.abs() { 0.0 } else { value };
@@ -298,7 +303,8 @@ impl fmt::Display for Measured {
         let sizes = sizes.chain(mechanics.load.map(|load| load.force)).map(|[x, y]| x.hypot(y));
         let largest = sizes.fold(0.0, f64::max);
         if let Some(left) = mechanics.unbalanced.filter(|left| *left > AT_REST * largest) {
-            writeln!(f, "not at rest: an unbalanced force of {} {force} acts on a follower", short(left))?;
+            let why = if *is_settled { "what tolerance and rounding leave" } else { "not at rest" };
+            writeln!(f, "{why}: an unbalanced force of {} {force} acts on a follower", short(left))?;
         }
         if let Some(Peak { von_mises, cell, place, particles }) = &mechanics.largest_von_mises {
             let stress = &units.stress;

@@ -144,7 +144,7 @@ impl Runs<'_> {
         let setup = start.elapsed();
         let outcome = run_to_equilibrium_watched(&scene, plan, &mut observer)?;
         let timings = Timings { setup, steps: start.elapsed() - setup, ..Timings::default() };
-        let measured = Measured::of(&scene, &outcome.engine).map(|(measured, _)| measured);
+        let measured = Measured::of(&scene, &outcome).map(|(measured, _)| measured);
         let summary = Summary::new(&scene, &outcome, measured, timings);
         let values = Values { engine: &outcome.engine, summary: &summary, probed: &observer.probed };
         Ok(Ended { outputs: values.texts(self.outputs), stop_reason: outcome.reason })
