@@ -2,8 +2,8 @@
 
 use super::axes::Axes;
 use super::colour;
-use super::configuration::dot_radius;
-use super::heading::{Heading, Key, Mark};
+use super::configuration::{dot_radius, mark_of};
+use super::heading::{Heading, Key, Mark, draw_mark};
 use super::page;
 use super::svg::{Path, Svg};
 use crate::flock::role::Role;
@@ -140,7 +140,7 @@ fn legend(pair: &Pair<'_>, is_dotted: bool) -> Vec<Key> {
         return vec![key("truth", TRUTH, Mark::Line), key("rule", blue, Mark::Line), undeformed];
     }
     let led = [Role::Leader, Role::Clamped].into_iter().filter(|role| pair.roles.contains(role));
-    let led = led.map(|role| key(role.name(), colour::of_role(role), Mark::Dot));
+    let led = led.map(|role| key(role.name(), colour::of_role(role), mark_of(role)));
     let first = [key("truth", TRUTH, Mark::Ring), key("rule: follower", blue, Mark::Dot)];
     first.into_iter().chain(led).chain([undeformed]).collect()
 }
@@ -171,7 +171,7 @@ fn draw_particles(svg: &mut Svg, axes: &Axes, pair: &Pair<'_>, rule: &Vectors, t
     for role in [Role::Follower, Role::Clamped, Role::Leader] {
         svg.group(format_args!("class=\"{}\" fill=\"{}\"", role.name(), colour::of_role(role)), |svg| {
             for i in pair.drawn().filter(is_seen).filter(|&i| pair.roles[i] == role) {
-                svg.circle(axes.place(rule.get(i)), radius);
+                draw_mark(svg, mark_of(role), axes.place(rule.get(i)), radius);
             }
         });
     }

@@ -48,7 +48,7 @@ impl Style {
 const PAINTING_ORDER: [Role; 5] = [Role::Frame, Role::Follower, Role::Ghost, Role::Clamped, Role::Leader];
 
 /// The shape of a role, by which the reds are told apart without their colour.
-fn mark_of(role: Role) -> Mark {
+pub(super) fn mark_of(role: Role) -> Mark {
     match role {
         Role::Leader => Mark::Diamond,
         Role::Clamped => Mark::Square,
@@ -273,11 +273,11 @@ pub(super) fn dot_radius(axes: &Axes, spacing: f64) -> f64 {
 }
 
 /// Marks of a square of the raster; of several that fall into one square the last of these is shown. Ends of broken bonds
-/// (`None`) must not hide the few that are led.
+/// (`None`) must not hide the few that are led, nor the many the frame around them.
 const SQUARE_ORDER: [Option<Role>; 6] = [
-    Some(Role::Frame),
     Some(Role::Follower),
     Some(Role::Ghost),
+    Some(Role::Frame),
     None,
     Some(Role::Clamped),
     Some(Role::Leader),

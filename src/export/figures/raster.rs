@@ -1,5 +1,6 @@
 //! A coarse raster for bodies of very many particles: squares that keep the largest value in them.
 
+use super::PNG_ZOOM;
 use super::axes::Axes;
 use super::svg::Path;
 
@@ -13,11 +14,14 @@ pub struct Raster {
 }
 
 impl Raster {
-    /// Squares twice as wide as particles are apart, so that a deformed body keeps no holes.
+    /// Squares twice as wide as particles are apart, so that a deformed body keeps no holes. They begin and end with
+    /// pixels of the enlarged sheet: between others seams would show.
     pub fn over(axes: &Axes, spacing: f64) -> Self {
-        let side = (2.0 * spacing * axes.scale()).max(2.0);
-        let [columns, rows] = axes.size.map(|length| (length / side) as usize + 1);
-        Self { corner: axes.corner, side, columns, largest: vec![None; columns * rows] }
+        const PIXEL: f64 = 1.0 / PNG_ZOOM as f64;
+        let side = ((2.0 * spacing * axes.scale()).max(2.0) / PIXEL).ceil() * PIXEL;
+        let corner = axes.corner.map(|along| (along / PIXEL).floor() * PIXEL);
+        let [columns, rows] = axes.size.map(|length| (length / side) as usize + 2);
+        Self { corner, side, columns, largest: vec![None; columns * rows] }
     }
 
     /// Lets `value` fall onto the sheet at `place` \[px\].

@@ -25,6 +25,8 @@ const GAP: f64 = 22.0;
 const NAME: f64 = 26.0;
 const NAME_TEXT: f64 = 13.0;
 const TICK_TEXT: f64 = 12.0;
+/// From one line of a bar's name to the next \[px\].
+const LINE: f64 = 17.0;
 const BAR_WIDTH: f64 = 16.0;
 const BAR_GAP: f64 = 20.0;
 const BETWEEN_BARS: f64 = 26.0;
@@ -114,7 +116,7 @@ impl Scale {
 
     /// Room beside the panels \[px\].
     fn room(&self) -> f64 {
-        BAR_GAP + BAR_WIDTH + 8.0 + self.widest_label() + 34.0
+        BAR_GAP + BAR_WIDTH + 8.0 + self.widest_label() + 34.0 + LINE
     }
 
     fn draw(&self, svg: &mut Svg, [left, top]: [f64; 2], height: f64, unit: &str) {
@@ -142,7 +144,16 @@ impl Scale {
         }
         let name_x = text + self.widest_label() + 16.0;
         let name = self.ticks.axis_name(self.name, unit);
-        svg.upward_text([name_x, top + height / 2.0], NAME_TEXT, &name);
+        // What is longer than the bar would run into the next one: its unit has a line of its own.
+        let lines = match name.split_once(" [") {
+            Some((quantity, unit)) if text_width(&name, NAME_TEXT) > height => {
+                vec![quantity.to_owned(), format!("[{unit}")]
+            }
+            _ => vec![name],
+        };
+        for (n, line) in lines.iter().enumerate() {
+            svg.upward_text([name_x + n as f64 * LINE, top + height / 2.0], NAME_TEXT, line);
+        }
     }
 }
 
