@@ -41,9 +41,12 @@ impl Asked {
         after - before
     }
 
+    /// What the node says of itself after a change; one report may have been on its way.
     fn mode(&self) -> u64 {
         self.watch.skip();
-        self.watch.until("a state", |line| state::of(line)?["mode"].as_u64())
+        let mode = || self.watch.until("a state", |line| state::of(line)?["mode"].as_u64());
+        mode();
+        mode()
     }
 
     /// Waits until every robot stands where `posture` takes its place.

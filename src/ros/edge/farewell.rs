@@ -9,13 +9,7 @@ use std::net::{Ipv4Addr, UdpSocket};
 
 use socket2::SockRef;
 
-use super::packet::{Content, data, discovery_port};
-
-/// Where participants listen for others (RTPS 2.3, section 9.6.1).
-const MULTICAST: Ipv4Addr = Ipv4Addr::new(239, 255, 0, 1);
-
-/// Participants of this computer that get a packet each: RustDDS takes as many ports.
-const PARTICIPANTS: u16 = 120;
+use super::packet::{ANNOUNCER, Content, MULTICAST, PARTICIPANTS, data, discovery_port};
 
 /// Says that the participant of this prefix has left. What is not sent is not missed: leases run out.
 pub fn send(prefix: [u8; 12], domain: u16, loopback_only: bool) {
@@ -46,7 +40,6 @@ pub fn send(prefix: [u8; 12], domain: u16, loopback_only: bool) {
 /// The participant is disposed and unregistered (RTPS 2.3, sections 9.6.3.8 and 9.6.3.9).
 fn packet(prefix: [u8; 12]) -> Vec<u8> {
     const PARTICIPANT: [u8; 4] = [0, 0, 1, 0xc1];
-    const ANNOUNCER: [u8; 4] = [0, 1, 0, 0xc2];
     const ANNOUNCEMENTS: [u8; 4] = [0, 1, 0, 0xc7];
     // PID_KEY_HASH: of a participant its GUID.
     let mut parameters = vec![0x70, 0, 16, 0];

@@ -14,6 +14,7 @@ use ros2_client::dds::rustdds::{
 use ros2_client::entities_info::{NodeEntitiesInfo, ParticipantEntitiesInfo};
 use ros2_client::{Gid, NodeName};
 
+use super::nudge::Nudge;
 use super::participant::Reader;
 use super::topic::{Taken, next};
 use crate::messages::wire::decode;
@@ -222,12 +223,13 @@ impl Watcher {
         guid: GUID,
         writer: DataWriterCdr<ParticipantEntitiesInfo>,
         reader: Reader,
+        nudge: Option<Nudge>,
     ) -> std::io::Result<Self> {
         let (stop, stopped) = channel();
         let listener = participant.status_listener();
         let thread = std::thread::Builder::new()
             .name("ros graph".into())
-            .spawn(move || watch(&graph, &listener, guid, &writer, &reader, &stopped))?;
+            .spawn(move || watch(&graph, &listener, guid, &writer, &reader, nudge, &stopped))?;
         Ok(Self { stop: Some(stop), thread: Some(thread) })
     }
 }
@@ -242,12 +244,23 @@ impl Drop for Watcher {
     }
 }
 
+/// Our reader and the writer of another that have found each other.
+fn writer_matched(event: &DomainParticipantStatusEvent) -> Option<(GUID, GUID)> {
+    match event {
+        DomainParticipantStatusEvent::RemoteWriterMatched { local_reader, remote_writer } => {
+            Some((*local_reader, *remote_writer))
+        }
+        _ => None,
+    }
+}
+
 fn watch(
     graph: &Graph,
     listener: &DomainParticipantStatusListener,
     guid: GUID,
     writer: &DataWriterCdr<ParticipantEntitiesInfo>,
     reader: &Reader,
+    mut nudge: Option<Nudge>,
     stopped: &Receiver<()>,
 ) {
     use ros2_client::dds::rustdds::RTPSEntity;
@@ -257,8 +270,12 @@ fn watch(
         if look.is_multiple_of(SWEEP) {
             graph.sweep();
         }
+        nudge.iter_mut().for_each(Nudge::listen);
         // As many as RustDDS keeps for us.
         for event in std::iter::from_fn(|| listener.try_recv_status()).take(2048) {
+            if let (Some(nudge), Some((reader, writer))) = (&nudge, writer_matched(&event)) {
+                nudge.ask(reader, writer);
+            }
             graph.note(event);
         }
         for _ in 0..MOST_AT_ONCE {

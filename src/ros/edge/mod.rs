@@ -23,6 +23,7 @@ pub mod lifecycle;
 pub mod loggers;
 pub mod loopback;
 pub mod names;
+mod nudge;
 mod outbox;
 mod packet;
 pub mod parameters;

@@ -15,6 +15,7 @@ use ros2_client::dds::rustdds::{
 };
 
 use super::graph::{Graph, Watcher, prefix};
+use super::nudge::Nudge;
 use super::outbox::{Outbox, Outlet};
 use super::payload::{Payload, Verbatim};
 use super::pulse::{self, Pulse};
@@ -80,7 +81,7 @@ impl Edge {
     /// A domain out of range, or a computer that gives no sockets.
     pub fn open(options: Options) -> Result<Self, EdgeError> {
         let refused = |reason: String| EdgeError::Participant { domain: options.domain, reason };
-        let shared = Self::join(options, DomainParticipantBuilder::new(options.domain), &refused)?;
+        let shared = Self::join(options, DomainParticipantBuilder::new(options.domain), false, &refused)?;
         Ok(Self { shared: Arc::new(shared) })
     }
 
@@ -101,14 +102,14 @@ impl Edge {
         };
         let files = Files::with_ros_default_names(enclave, String::new());
         let builder = DomainParticipantBuilder::new(domain).builtin_security(files);
-        let mut shared = Self::join(options, builder, &refused)?;
-        shared.is_secured = true;
+        let shared = Self::join(options, builder, true, &refused)?;
         Ok(Self { shared: Arc::new(shared) })
     }
 
     fn join(
         options: Options,
         mut builder: DomainParticipantBuilder,
+        is_secured: bool,
         refused: &dyn Fn(String) -> EdgeError,
     ) -> Result<Shared, EdgeError> {
         if options.domain > 232 {
@@ -130,7 +131,7 @@ impl Edge {
                 tracing::warn!("packets are not filtered before the middleware reads them: {error}")
             }
         }
-        Shared::join(participant, options).map_err(|error| refused(error.to_string()))
+        Shared::join(participant, options, is_secured).map_err(|error| refused(error.to_string()))
     }
 
     pub(super) fn with_participant<T>(
@@ -171,7 +172,11 @@ impl Edge {
 }
 
 impl Shared {
-    fn join(participant: DomainParticipant, options: Options) -> Result<Self, Box<dyn std::error::Error>> {
+    fn join(
+        participant: DomainParticipant,
+        options: Options,
+        is_secured: bool,
+    ) -> Result<Self, Box<dyn std::error::Error>> {
         let plain = QosPolicyBuilder::new().build();
         let publisher = participant.create_publisher(&plain)?;
         let subscriber = participant.create_subscriber(&plain)?;
@@ -187,7 +192,13 @@ impl Shared {
         let reader = subscriber.create_simple_datareader_no_key(&announcements, Some(policies))?;
         let graph = Arc::new(Graph::default());
         let guid = participant.guid();
-        let watcher = Watcher::start(graph.clone(), &participant, guid, writer, reader)?;
+        // What is not authenticated is not taken there.
+        let nudge = (!is_secured).then(|| Nudge::open(guid, options.domain, options.loopback_only));
+        let nudge = nudge.transpose().unwrap_or_else(|error| {
+            tracing::debug!("the first calls of some clients may take 3 s: {error}");
+            None
+        });
+        let watcher = Watcher::start(graph.clone(), &participant, guid, writer, reader, nudge)?;
         Ok(Self {
             watcher: Some(watcher),
             outbox: Outbox::start()?,
@@ -196,7 +207,7 @@ impl Shared {
             participant: Some(participant),
             guid,
             options,
-            is_secured: false,
+            is_secured,
             graph,
         })
     }
