@@ -143,7 +143,7 @@ impl Body {
     }
 
     fn load(&mut self, side: RawSide, by: [f64; 2]) -> Result<(), Refused> {
-        let Source { file, folder } = &self.history.source;
+        let Source { file, folder } = &*self.history.source;
         let scene = file.with(&self.sets(), folder.as_deref())?;
         let key = load_key(&self.history.now, &scene, side, by)?;
         self.set(&key)
@@ -160,7 +160,7 @@ impl Body {
         self.history.now.require_room(0)?;
         let changed: Vec<String> = self.history.now.changed_keys().chain([text.to_owned()]).collect();
         let all = [self.history.set(), &changed].concat();
-        let Source { file, folder } = &self.history.source;
+        let Source { file, folder } = &*self.history.source;
         let scene = file.with(&all, folder.as_deref())?.stepped(folder.as_deref())?;
         if matches!(scene.mean, Mean::Material { .. }) && self.history.now.is_cut() {
             return Err("a material is in cells, and bonds of this body were cut: reset it first".into());

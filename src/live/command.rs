@@ -3,6 +3,7 @@
 use serde::Deserialize;
 
 use crate::scene::raw::RawSide;
+use crate::swarm::design::Edit;
 
 /// Longest request of a viewer \[byte\].
 pub const MOST_BYTES: usize = 4096;
@@ -80,6 +81,11 @@ pub enum Command {
         robot: usize,
         /// The kind of fault; none makes it sound.
         what: Option<Fault>,
+    },
+    /// Changes the formation; the flight begins anew.
+    Design {
+        /// The change.
+        edit: Edit,
     },
     /// Has a node hold every robot, as its service `~/emergency_stop` does.
     EmergencyStop {},
@@ -159,6 +165,7 @@ impl Command {
             Command::Ask { quantity: text } | Command::SetFormation { name: text, .. } => is_text(text),
             Command::Drawn { ms } => (0.0..=1e6).contains(ms),
             Command::Squeeze { by } => by.iter().all(|factor| (0.1..=10.0).contains(factor)),
+            Command::Design { edit: Edit::Rename { name, .. } } => is_text(name),
             Command::Cut { from, to } => from != to,
             _ => true,
         };
@@ -176,8 +183,14 @@ mod tests {
         assert_eq!(grab, Ok(Command::Grab { particle: 3, alone: false }));
         let moved = Command::parse(r#"{"do":"set-formation","translate":[1,0],"duration":2}"#);
         assert!(matches!(moved, Ok(Command::SetFormation { stretch: [1.0, 1.0], duration: 2.0, .. })));
+        let placed = Command::parse(r#"{"do":"design","edit":{"what":"place","at":[1,0],"leads":false}}"#);
+        assert!(matches!(placed, Ok(Command::Design { edit: Edit::Place { leads: false, .. } })));
         let wrong = [
             "",
+            r#"{"do":"design"}"#,
+            r#"{"do":"design","edit":{"what":"place","at":[1e999,0],"leads":false}}"#,
+            r#"{"do":"design","edit":{"what":"rename","robot":0,"name":"a\u0007"}}"#,
+            r#"{"do":"design","edit":{"what":"remove","robot":0,"more":1}}"#,
             "[]",
             r#"{"do":"format"}"#,
             r#"{"do":"grab","particle":-1}"#,

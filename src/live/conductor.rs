@@ -319,6 +319,7 @@ impl Conductor {
             "keys": if node.is_some() { Vec::new() } else { numbers(&self.session.raw()) },
             "swarm": !matches!(self.session, Session::Body(_)),
             "node": node,
+            "design": self.session.design(),
         });
         live_page(command, title.to_owned(), self.session.view(), live)
     }

@@ -1,6 +1,7 @@
 //! What can be undone: the state of a session now, and those before it.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use super::command::Command;
 use super::session::Refused;
@@ -11,7 +12,7 @@ const MOST_KEPT: usize = 40;
 /// Size of all of them together, see [`State::size`].
 const MOST_SIZE: usize = 1 << 21;
 
-/// A file as it was read when the session began.
+/// A file as it was read when the session began, or as a hand designed it.
 pub(super) struct Source<F> {
     pub(super) file: F,
     /// Where files that it names are looked up.
@@ -40,21 +41,28 @@ pub(super) trait State: Clone {
 
 /// The state of a session now, and those that can be returned to.
 pub(super) struct History<S: State> {
-    pub(super) source: Source<S::File>,
+    pub(super) source: Arc<Source<S::File>>,
     pub(super) now: S,
     /// Keys that were set from the start of `now`.
     set: Vec<String>,
     /// Changes whenever `now` is laid out anew.
     layout: u64,
-    /// The same of those before.
-    before: Vec<(S, Vec<String>, u64)>,
+    before: Vec<Before<S>>,
+}
+
+/// The same at a moment before.
+struct Before<S: State> {
+    source: Arc<Source<S::File>>,
+    state: S,
+    set: Vec<String>,
+    layout: u64,
 }
 
 impl<S: State> History<S> {
     /// # Errors
     /// As [`State::begin`].
     pub(super) fn new(file: S::File, folder: Option<PathBuf>) -> Result<Self, SceneError> {
-        let source = Source { file, folder };
+        let source = Arc::new(Source { file, folder });
         let now = S::begin(&source, &[])?;
         Ok(Self { source, now, set: Vec::new(), layout: 0, before: Vec::new() })
     }
@@ -90,20 +98,20 @@ impl<S: State> History<S> {
     pub(super) fn keep(&mut self) {
         let mut state = self.now.clone();
         state.let_go_all();
-        let size =
-            |states: &[(S, Vec<String>, u64)]| states.iter().map(|(one, ..)| one.size()).sum::<usize>();
+        let size = |before: &[Before<S>]| before.iter().map(|one| one.state.size()).sum::<usize>();
         let room = MOST_SIZE.saturating_sub(state.size());
         while self.before.len() >= MOST_KEPT || (!self.before.is_empty() && size(&self.before) > room) {
             self.before.remove(0);
         }
-        self.before.push((state, self.set.clone(), self.layout));
+        let source = Arc::clone(&self.source);
+        self.before.push(Before { source, state, set: self.set.clone(), layout: self.layout });
     }
 
     fn undo(&mut self) -> Result<(), Refused> {
-        let (now, set, layout) = self.before.pop().ok_or("nothing was done yet")?;
+        let Before { source, state, set, layout } = self.before.pop().ok_or("nothing was done yet")?;
         // A layout that was left counts as a new one.
         let layout = if layout == self.layout { layout } else { self.layout + 1 };
-        (self.now, self.set, self.layout) = (now, set, layout);
+        (self.source, self.now, self.set, self.layout) = (source, state, set, layout);
         Ok(())
     }
 
@@ -112,10 +120,22 @@ impl<S: State> History<S> {
     /// # Errors
     /// As [`State::begin`]; nothing has changed then.
     pub(super) fn restart(&mut self, more: &[String]) -> Result<(), Refused> {
-        let set = [&self.set[..], more].concat();
-        let state = S::begin(&self.source, &set)?;
+        self.begin(Arc::clone(&self.source), [&self.set[..], more].concat())
+    }
+
+    /// Begins anew with another file.
+    ///
+    /// # Errors
+    /// As [`State::begin`]; nothing has changed then.
+    pub(super) fn replace(&mut self, file: S::File) -> Result<(), Refused> {
+        let folder = self.source.folder.clone();
+        self.begin(Arc::new(Source { file, folder }), Vec::new())
+    }
+
+    fn begin(&mut self, source: Arc<Source<S::File>>, set: Vec<String>) -> Result<(), Refused> {
+        let state = S::begin(&source, &set)?;
         self.keep();
-        (self.now, self.set, self.layout) = (state, set, self.layout + 1);
+        (self.source, self.now, self.set, self.layout) = (source, state, set, self.layout + 1);
         Ok(())
     }
 }

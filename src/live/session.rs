@@ -212,6 +212,14 @@ impl Session {
         }
     }
 
+    /// What is said of a formation that can be designed.
+    pub fn design(&self) -> Option<Vec<String>> {
+        match self {
+            Session::Swarm(swarm) => swarm.exactness(),
+            Session::Body(_) | Session::Monitor(_) => None,
+        }
+    }
+
     /// The page's view of what there is now.
     pub fn view(&self) -> View {
         match self {

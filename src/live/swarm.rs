@@ -16,7 +16,9 @@ use crate::scene::SceneError;
 use crate::scene::swarm::Swarm as File;
 use crate::scene::swarm::raw::{RawCommand, RawCommandKind, RawFault, RawFaultKind};
 use crate::swarm::control::Control;
+use crate::swarm::design::{self, Edit};
 use crate::swarm::flight::{Alarm, Flight, FlightCommand};
+use crate::swarm::plan::Exactness;
 
 /// Quantities that come with every frame: a swarm is small.
 pub const CHANNELS: [&str; 7] = ["clearance", "away", "age", "pe1", "strain", "target_dx", "target_dy"];
@@ -131,8 +133,19 @@ impl Swarm {
             }
             Command::Set { key, value } => self.history.restart(&[format!("{key}={value}")]),
             Command::Fault { robot, what } => self.fault(*robot, *what),
+            Command::Design { edit } => self.design(edit),
             other => self.history.perform(other),
         }
+    }
+
+    /// The change is made in the file that was designed last, and what was flown since is left behind.
+    fn design(&mut self, edit: &Edit) -> Result<(), Refused> {
+        let State { file, flight, .. } = &self.history.now;
+        let mut raw = design::by_robots(file, flight.control().formation())?;
+        edit.perform(&mut raw)?;
+        let text = toml::to_string(&raw).map_err(|error| error.to_string())?;
+        let folder = self.history.source.folder.clone();
+        self.history.replace(File::parse(&file.name, "the design", &text, &[], folder.as_deref())?)
     }
 
     fn grab(&mut self, viewer: Viewer, robot: usize, alone: bool) -> Result<(), Refused> {
@@ -196,7 +209,7 @@ impl Swarm {
 
     fn channel(&mut self, key: &str, value: &str) -> Result<(), Refused> {
         let set = [self.history.set(), &[format!("{key}={value}")]].concat();
-        let Source { file, folder } = &self.history.source;
+        let Source { file, folder } = &*self.history.source;
         let raw = file.with(&set, folder.as_deref())?.raw.flight;
         let (mut noise, mut delay, mut loss) = self.history.now.channel;
         match key {
@@ -244,9 +257,21 @@ impl Swarm {
         raw.flight.commands.extend(own);
         raw.flight.commands.sort_by_key(|command| command.after);
         raw.flight.faults.clone_from(&self.history.now.faults);
-        let flown = self.history.now.flight.fleet().period().max(1) as f64;
-        raw.flight.duration = Some(flown * raw.control.period);
+        let flown = self.history.now.flight.fleet().period();
+        // What has not begun to fly is to fly as its file says.
+        if flown > 0 {
+            raw.flight.duration = Some(flown as f64 * raw.control.period);
+        }
         toml::to_string(&raw).map_err(|error| error.to_string())
+    }
+
+    /// How exactly followers keep to the leaders' motion, in words; `None` where the formation is that of a scene.
+    pub fn exactness(&self) -> Option<Vec<String>> {
+        let formation = self.flight().control().formation();
+        let exactness = Exactness::of(self.swarm(), formation).map(|exactness| exactness.in_words());
+        let unknown =
+            || vec!["what becomes of manoeuvres is not predicted: the rule is not linear".to_owned()];
+        formation.is_led_here().then(|| exactness.unwrap_or_else(unknown))
     }
 
     /// The page's view of the robots as they are.

@@ -4,9 +4,11 @@
 //! targets, by [`watch`] (which poses are believed), [`resilience`] (which neighbours are) and [`safety`] (what is
 //! safe). [`flight`] closes the loop with simulated [`robots`] behind [`channel`]s; over a [`transport`] it is
 //! closed at a steady [`pace`] with real ones: within a process, over shared memory (room `shm`), over ROS 2 (room `ros`).
+//! A [`design`] changes the robots of a formation one by one.
 
 pub mod channel;
 pub mod control;
+pub mod design;
 pub mod flight;
 pub mod formation;
 pub mod pace;

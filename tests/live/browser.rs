@@ -121,6 +121,27 @@ fn an_obstacle_is_pushed_and_the_formation_squeezed_and_the_flight_saved() {
 
 #[test]
 #[ignore = "needs Chromium, Node, playwright-core and axe-core: see tests/browser/main.rs"]
+fn a_formation_is_designed_and_the_file_is_the_design() {
+    let folder = temporary();
+    let served = Served::swarm("square", &["rule={}".to_owned()], folder.path());
+    let asked = json!({ "name": "designed", "design": { "at": [7.5, 3.0], "by": [0.0, 1.5], "other": 12 } });
+    let seen = tour(&served.address, &asked);
+    let words = seen["exact"].as_array().expect("words");
+    assert_eq!(words[0], "followers take part exactly in every shift of the leaders");
+    assert_eq!(seen["removed"], 25);
+    let saved = Path::new(seen["saved"].as_str().expect("a path")).to_owned();
+    let swarm = Swarm::from_file(&saved, &[]).unwrap_or_else(|error| panic!("{error}"));
+    let scout = swarm.raw.robots.iter().find(|robot| robot.name == "scout").expect("named");
+    assert!((scout.place[0] - 7.5).abs() < 0.05 && (scout.place[1] - 4.5).abs() < 0.05, "{:?}", scout.place);
+    assert!(scout.neighbours.contains(&"robot_13".to_owned()), "{:?}", scout.neighbours);
+    let led = |entry: &flockform::scene::swarm::raw::RawLeaders| entry.robots.contains(&"scout".to_owned());
+    assert!(!swarm.raw.leaders.iter().any(led), "placed to lead, and told to follow");
+    assert_eq!((swarm.raw.robots.len(), swarm.raw.flight.duration), (26, Some(45.0)));
+    Flight::new(&swarm).unwrap_or_else(|error| panic!("{error}"));
+}
+
+#[test]
+#[ignore = "needs Chromium, Node, playwright-core and axe-core: see tests/browser/main.rs"]
 fn an_edge_is_loaded_by_hand_and_the_body_saved() {
     let folder = temporary();
     let served = Served::scene("beam-loaded", &["loads=[]".to_owned()], folder.path());

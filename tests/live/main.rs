@@ -7,6 +7,7 @@
 
 mod bodies;
 mod browser;
+mod designs;
 #[path = "../common/folders.rs"]
 mod folders;
 #[cfg(feature = "cli")]

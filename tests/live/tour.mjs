@@ -4,7 +4,7 @@
 //
 // `drag` numbers the particle that is dragged, `cut` has the ends of a cut, `key` is a key to change, `fault` the robot that is
 // killed, `push` says where an obstacle is taken and how far it goes, `squeeze` that the slider is moved, `load` has the particle
-// whose edge is loaded, `node` the leader of a node that is dragged, `frames` for how many milliseconds the frames are counted. FLOCKFORM_NODE_MODULES is a folder with
+// whose edge is loaded, `design` says what a designer does, `node` the leader of a node that is dragged, `frames` for how many milliseconds the frames are counted. FLOCKFORM_NODE_MODULES is a folder with
 // playwright-core and axe-core, FLOCKFORM_PICTURES one for screenshots.
 
 import { createRequire } from "node:module";
@@ -199,6 +199,49 @@ async function save(page) {
   seen.places = await page.evaluate(() => [[...window.report.bodies[0].dx], [...window.report.bodies[0].dy]]);
 }
 
+// The page after the design that begins anew.
+async function redesigned(page, act) {
+  await page.evaluate(() => (window.isOld = true));
+  await act();
+  await page.waitForFunction(() => !window.isOld && window.report?.live?.session.frame);
+  await page.waitForSelector("body[data-live=open]");
+}
+
+// A robot is placed, dragged, linked, named and told to lead; another one is removed, and comes back.
+async function design(page) {
+  const { at, by, other } = asked.design;
+  // From a flight back to the formation.
+  await page.click("#play");
+  await later(page, 0.2);
+  await redesigned(page, () => page.check("input[name=tool][value=place]"));
+  await settled(page);
+  await page.check("#design-leads");
+  await page.locator(".canvas").scrollIntoViewIfNeeded();
+  const click = async (what) => page.mouse.click(...(await onScreen(page, what)));
+  const pull = async (from, to) => {
+    await page.mouse.move(...(await onScreen(page, from)));
+    await page.mouse.down();
+    await page.mouse.move(...(await onScreen(page, to)), { steps: 5 });
+    await page.mouse.up();
+  };
+  await redesigned(page, () => click(at));
+  const placed = await page.evaluate(() => window.report.bodies[0].count - 1);
+  await redesigned(page, () => pull(placed, at.map((along, k) => along + by[k])));
+  await page.check("input[name=tool][value=link]");
+  await redesigned(page, () => pull(placed, other));
+  await click(placed);
+  await page.fill("#design-name [name=name]", "scout");
+  await redesigned(page, () => page.click("#design-name button"));
+  await redesigned(page, () => page.click("#design-lead"));
+  await shoot(page, `${asked.name}-design`);
+  seen.exact = await page.$$eval("#design-exact li", (items) => items.map((item) => item.textContent));
+  await click(other);
+  await redesigned(page, () => page.click("#design-remove"));
+  seen.removed = await page.evaluate(() => window.report.bodies[0].count);
+  await redesigned(page, () => page.click("#live-undo"));
+  await save(page);
+}
+
 // The page of a node that takes commands: stopped, resumed, moved by a leader that is dragged.
 async function command(page) {
   const mode = (name) => page.waitForFunction((n) => document.getElementById("node-mode").textContent.startsWith(n), name);
@@ -287,6 +330,7 @@ try {
   const page = await open(context);
   await page.bringToFront();
   if (asked.node !== undefined) await command(page);
+  else if (asked.design) await design(page);
   else await everything(page, other);
   await page.addScriptTag({ content: axe }).catch(() => {});
   seen.words = await page.textContent("#loading");

@@ -44,8 +44,12 @@ const SCRIPTS: [&str; 18] = [
 ];
 
 /// Those of a page whose data come from a session, after the others.
-const LIVE_SCRIPTS: [&str; 3] =
-    [include_str!("web/live_frames.js"), include_str!("web/live_tools.js"), include_str!("web/live.js")];
+const LIVE_SCRIPTS: [&str; 4] = [
+    include_str!("web/live_frames.js"),
+    include_str!("web/live_tools.js"),
+    include_str!("web/live_design.js"),
+    include_str!("web/live.js"),
+];
 const LIVE_TOOLS: &str = include_str!("web/live.html");
 
 /// Everything that a report shows, from the top.

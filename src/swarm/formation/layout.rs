@@ -43,8 +43,8 @@ impl Formation {
 fn of_places(swarm: &Swarm, rule: Rule) -> Result<Formation, SceneError> {
     let places: Vectors = swarm.raw.robots.iter().map(|robot| robot.place).collect();
     let names: Vec<String> = swarm.raw.robots.iter().map(|robot| robot.name.clone()).collect();
-    let leads = leads(swarm, &names, &places, &|_, _| Ok(Vec::new()))?;
-    let follows: Vec<bool> = leads.iter().map(Option::is_none).collect();
+    let led = leads(swarm, &names, &places, &|_, _| Ok(Vec::new()))?;
+    let follows: Vec<bool> = led.iter().map(Option::is_none).collect();
     let neighbours = links::neighbours(swarm, &places)?;
     let present_radius = match swarm.raw.links {
         Some(RawLinks::Present { radius }) => Some(radius),
@@ -78,13 +78,14 @@ fn of_places(swarm: &Swarm, rule: Rule) -> Result<Formation, SceneError> {
     if swarm.raw.rule.rest == RawRest::Balanced && present_radius.is_none() {
         flock.keep_rest();
     }
-    let roles = leads.iter().map(|lead| if lead.is_some() { Role::Leader } else { Role::Follower }).collect();
+    let roles = led.iter().map(|lead| if lead.is_some() { Role::Leader } else { Role::Follower }).collect();
     let update = Update { damping: default_damping(rule), ..Update::default() };
     let setup = Setup { present_radius, ..Setup::new(body, flock, roles, update) };
     let radius = |k: usize| swarm.raw.robots[k].radius.unwrap_or(swarm.raw.radius);
     let mut formation = of_particles(swarm, setup, false);
     formation.radii = (0..formation.count()).map(radius).collect();
-    (formation.names, formation.leads) = (names, leads);
+    formation.names = names;
+    formation.let_lead(led);
     Ok(formation)
 }
 
@@ -101,12 +102,12 @@ fn of_body(swarm: &Swarm, scene: &Scene) -> Result<Formation, SceneError> {
     let members: Vec<usize> = layout.body.body_particles().collect();
     let names = numbered(swarm, members.len());
     let places: Vectors = members.iter().map(|&i| layout.body.reference.get(i)).collect();
-    let leads = leads(swarm, &names, &places, &|k, region| {
+    let members_led = leads(swarm, &names, &places, &|k, region| {
         let picked = layout.pick(scene, &format!("leaders[{k}]"), region)?;
         Ok(picked.into_iter().filter_map(|i| members.binary_search(&i).ok()).collect())
     })?;
     let ids: Vec<usize> =
-        (0..members.len()).filter(|&m| leads[m].is_some()).map(|m| members[m] + 1).collect();
+        (0..members.len()).filter(|&m| members_led[m].is_some()).map(|m| members[m] + 1).collect();
     let mut led = scene.clone();
     if !ids.is_empty() {
         let region = SceneRegion::Known(Region::Ids(ids));
@@ -120,7 +121,8 @@ fn of_body(swarm: &Swarm, scene: &Scene) -> Result<Formation, SceneError> {
         });
     }
     let mut formation = of_particles(swarm, Plan::new(&led)?.setup, false);
-    (formation.names, formation.leads) = (names, leads);
+    formation.names = names;
+    formation.let_lead(members_led);
     Ok(formation)
 }
 
@@ -177,6 +179,7 @@ fn formation(
     let mut formation = Formation {
         radii: vec![swarm.raw.radius; names.len()],
         leads: vec![None; names.len()],
+        entries: vec![None; names.len()],
         spacing: spacing_of(&places),
         manoeuvres: swarm.manoeuvres.clone(),
         settling: None,
@@ -197,13 +200,13 @@ fn numbered(swarm: &Swarm, count: usize) -> Vec<String> {
 /// Members in a region, for the entry of leaders of this number.
 type Pick<'a> = &'a dyn Fn(usize, &SceneRegion) -> Result<Vec<usize>, SceneError>;
 
-/// The motion of each member that leads; later entries win.
+/// The entry that each member which leads is led by, and its motion; later entries win.
 fn leads(
     swarm: &Swarm,
     names: &[String],
     places: &Vectors,
     pick: Pick<'_>,
-) -> Result<Vec<Option<Lead>>, SceneError> {
+) -> Result<Vec<Option<(usize, Lead)>>, SceneError> {
     let mut leads = vec![None; names.len()];
     for (k, entry) in swarm.leaders.iter().enumerate() {
         let members = match &entry.who {
@@ -224,7 +227,7 @@ fn leads(
                 .collect::<Result<_, _>>()?,
         };
         for m in members {
-            leads[m] = Some(lead(swarm, k, &entry.program, &names[m], m, places)?);
+            leads[m] = Some((k, lead(swarm, k, &entry.program, &names[m], m, places)?));
         }
     }
     Ok(leads)

@@ -39,6 +39,8 @@ pub struct Formation {
     /// Manoeuvres that can be flown, as the file gives them.
     pub manoeuvres: Vec<NamedManoeuvre>,
     leads: Vec<Option<Lead>>,
+    /// The entry of the file that leads each member.
+    entries: Vec<Option<usize>>,
     course: TargetSource,
     spacing: f64,
     /// Shared by copies: it is large, and never changed.
@@ -189,6 +191,17 @@ impl Formation {
             self.leads[member] = Some(Lead::External(place));
         }
         is_led
+    }
+
+    /// The entry of the file's `leaders` that leads a member.
+    pub fn entry(&self, member: usize) -> Option<usize> {
+        self.entries[member]
+    }
+
+    fn let_lead(&mut self, leads: Vec<Option<(usize, Lead)>>) {
+        let split =
+            |lead: Option<(usize, Lead)>| lead.map_or((None, None), |(k, lead)| (Some(k), Some(lead)));
+        (self.entries, self.leads) = leads.into_iter().map(split).unzip();
     }
 
     /// Whether a program of the swarm leads a member.

@@ -11,6 +11,7 @@
 //!
 //! A loop that is not linear has no such map, and nothing of this is stated of it.
 
+mod exactness;
 mod period_map;
 #[cfg(test)]
 mod tests;
@@ -25,6 +26,7 @@ use crate::scene::swarm::raw::RawModel;
 use crate::scene::swarm::{Shape, Swarm};
 use crate::solve::spectrum::spectral_radius;
 use crate::swarm::flight::Flight;
+pub use exactness::{Exactness, ManoeuvreError};
 use period_map::PeriodMap;
 
 /// Sweeps made to find the spectral radius.
@@ -68,6 +70,8 @@ pub struct SwarmPlan {
     pub delay: DelayMargin,
     /// How fast the formation can be led.
     pub speed: SpeedMargin,
+    /// How exactly followers keep to the leaders' motion; absent where no linear rule says.
+    pub exactness: Option<Exactness>,
     /// Warnings before the flight.
     pub cautions: Vec<String>,
 }
@@ -167,6 +171,7 @@ impl SwarmPlan {
                 half_life_s: convergence.and_then(|one| Some(one.half_life_s? * (delay + 1.0))),
             },
             speed: speed(swarm, formation, map.as_ref(), delay),
+            exactness: Exactness::of(swarm, formation),
             not_predicted: convergence.is_none().then(|| not_linear.unwrap_or("the rule is not linear")),
             convergence,
             cautions: Vec::new(),

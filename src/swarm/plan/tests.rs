@@ -112,3 +112,35 @@ fn a_manoeuvre_needs_half_again_the_mean_speed_of_its_fastest_leg() {
     let plan = plan("square", &[straight]);
     assert!((plan.speed.manoeuvres[0].needed - 3.0).abs() < 1e-3, "{plan}");
 }
+
+#[test]
+fn solved_weights_follow_every_affine_motion_and_equal_ones_shifts_alone() {
+    let exactness = |set: &[&str]| plan("square", set).exactness.expect("linear");
+    let solved = exactness(&[]);
+    assert_eq!(solved.exact, ["shift", "turn", "stretch", "shear"]);
+    assert_eq!(solved.manoeuvres, [ManoeuvreError { name: "turn".into(), largest: 0.0 }]);
+    let equal = exactness(&["rule={ rest = \"balanced\" }"]);
+    assert_eq!(equal.exact, ["shift"]);
+    // By the flight itself, which is slow and swept to rest in every period.
+    let slow = [
+        "rule={ rest = \"balanced\" }",
+        "limits={}",
+        "flight.model={ kind = \"ideal\" }",
+        "flight.bounds={}",
+    ];
+    let slow: Vec<String> =
+        slow.iter().map(|&one| one.to_owned()).chain(["control.sweeps=20000".into()]).collect();
+    let swarm = bundled_swarm("square").expect("bundled").load_swarm(&slow).expect("loads");
+    let mut flight = Flight::new(&swarm).expect("laid out");
+    let mut flown: f64 = 0.0;
+    while flight.fleet().time() < 30.0 {
+        flight.step();
+        let affine = flight.control().formation().affine(flight.fleet().time()).expect("a manoeuvre");
+        let formation = flight.control().formation();
+        let places = flight.fleet().places();
+        let apart = |m: usize| distance(places.get(m), affine.apply(formation.places.get(m)));
+        flown = (0..formation.count()).map(apart).fold(flown, f64::max);
+    }
+    let predicted = equal.manoeuvres[0].largest;
+    assert!(predicted > 0.1 && (flown / predicted - 1.0).abs() < 0.02, "{flown} beside {predicted}");
+}

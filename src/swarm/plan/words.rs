@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::{Convergence, DelayMargin, ManoeuvreSpeed, SpeedMargin, SwarmPlan};
+use super::{Convergence, DelayMargin, Exactness, ManoeuvreError, ManoeuvreSpeed, SpeedMargin, SwarmPlan};
 
 /// What is less reads as nothing to three places.
 const NOTHING: f64 = 0.001;
@@ -81,6 +81,26 @@ impl fmt::Display for SwarmPlan {
         for ManoeuvreSpeed { name, needed } in manoeuvres {
             line("manoeuvre", format!("`{name}` moves a place at up to {needed:.3} m/s"))?;
         }
+        for words in self.exactness.iter().flat_map(Exactness::in_words) {
+            line("exact", words)?;
+        }
         self.cautions.iter().try_for_each(|caution| writeln!(f, "caution: {caution}"))
+    }
+}
+
+impl Exactness {
+    /// What is followed exactly, and how far each manoeuvre is from that, a line each.
+    pub fn in_words(&self) -> Vec<String> {
+        let exact = match &self.exact[..] {
+            [] => "no motion of the leaders is followed exactly".to_owned(),
+            exact => format!("followers take part exactly in every {} of the leaders", exact.join(", ")),
+        };
+        let of_one = |ManoeuvreError { name, largest }: &ManoeuvreError| match largest {
+            0.0 => format!("manoeuvre `{name}`: every follower in its place"),
+            _ => format!(
+                "manoeuvre `{name}`: followers up to {largest:.3} m from their places, however slow it is"
+            ),
+        };
+        std::iter::once(exact).chain(self.manoeuvres.iter().map(of_one)).collect()
     }
 }

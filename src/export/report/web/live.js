@@ -3,6 +3,7 @@
 import { follow } from "./camera.js";
 import { words } from "./colour.js";
 import { breakBonds, kindOf, LiveFrames } from "./live_frames.js";
+import { isDesigning, keepHands, listenToDesign, showDesign, takeDesign, takeUpHands } from "./live_design.js";
 import { drawAlarms, drawDashes, drawTargets, takeFormation, takeTool } from "./live_tools.js";
 import { drawNow, started } from "./page.js";
 import { bodies, data, element, shown, state } from "./shown.js";
@@ -16,7 +17,7 @@ const AGAIN_AFTER = 1000;
 // Time after which a frame is drawn though the browser does not ask for it, in ms.
 const HIDDEN_EVERY = 300;
 
-const session = { socket: null, status: { alarmed: [], faults: [] }, frame: null, isAsked: false, rangeAt: 0 };
+const session = { socket: null, status: { alarmed: [], faults: [] }, frame: null, isAsked: false, rangeAt: 0, alarms: "", sets: null };
 const measured = { drawn: 0, since: 0, rate: 0, transfer: 0, drawing: 0 };
 
 function ask(command) {
@@ -84,6 +85,8 @@ function connect() {
 }
 
 function hear(event) {
+  // A number that was refused is still in its field.
+  if (event.event === "refused") session.sets = null;
   if (event.event === "refused" || event.event === "done") say(event.words);
   else if (event.event === "saved") {
     say(`Saved as ${event.path}. Replay: ${event.command}`);
@@ -91,9 +94,14 @@ function hear(event) {
   } else if (event.event === "status") takeStatus(event);
 }
 
+function loadAnew() {
+  keepHands();
+  location.reload();
+}
+
 function takeStatus(status) {
   // Another body: another page.
-  if (status.layout !== data.live.layout) return location.reload();
+  if (status.layout !== data.live.layout) return loadAnew();
   session.status = status;
   shown.player.tempo = status.speed;
   if (shown.player.playing !== status.playing) {
@@ -106,11 +114,23 @@ function takeStatus(status) {
   if (status.node) takeNode(status.node);
   // The page knows the present alone: where they are now is where they ever were.
   status.obstacles.forEach((by, k) => (bodies[0].animation.outlines[k].moves = [[-Infinity, ...by]]));
-  element("live-alarms").replaceChildren(
-    ...status.alarms.map((text) => Object.assign(document.createElement("li"), { textContent: text })),
-  );
+  const alarms = status.alarms.join("\n");
+  if (alarms !== session.alarms) {
+    session.alarms = alarms;
+    const line = (text) => Object.assign(document.createElement("li"), { textContent: text });
+    element("live-alarms").replaceChildren(...status.alarms.map(line));
+  }
+  const sets = status.sets.join("\n");
+  if (sets !== session.sets) {
+    session.sets = sets;
+    takeSets(status.sets);
+  }
+}
+
+// Numbers that were changed, here or by another viewer.
+function takeSets(sets) {
   const values = new Map(data.live.keys.map(([key, value]) => [key, String(value)]));
-  for (const text of status.sets) {
+  for (const text of sets) {
     const at = text.indexOf("=");
     values.set(text.slice(0, at), text.slice(at + 1));
   }
@@ -194,7 +214,7 @@ function drawLatest() {
   session.isAsked = false;
   const begun = performance.now();
   const frame = bodies[0].frames.take(session.frame);
-  if (!frame) return location.reload();
+  if (!frame) return loadAnew();
   const [body] = bodies;
   body.animation.times[0] = frame.clock;
   body.at = -1;
@@ -294,21 +314,27 @@ function startLive() {
   body.frames = new LiveFrames(data.live.channels, body.count);
   shown.player = Object.assign(new LivePlayer(), { changed });
   shown.say = say;
-  shown.tool = (view, at, event) => takeTool(view, at, event, ask);
-  shown.over = (view) => {
-    drawTargets(view);
-    drawAlarms(view, session.status);
-    if (session.pull) drawDashes(view, ...session.pull);
-  };
+  shown.tool = (view, at, event) => (isDesigning() ? takeDesign(view, at, ask) : takeTool(view, at, event, ask));
+  // Of a body nothing is drawn on top, and an empty canvas stays as it is.
+  if (data.live.swarm)
+    shown.over = (view) => {
+      showDesign();
+      drawTargets(view);
+      drawAlarms(view, session.status);
+      if (session.pull) drawDashes(view, ...session.pull);
+    };
   document.body.classList.add("is-live");
   element("layer-ways").closest("label").hidden = true;
   element("layer-ways").checked = state.layers.ways = false;
   element("layer-cracks").closest("label").hidden = true;
   element("tool-cut").hidden = element("tool-load").hidden = data.live.swarm;
+  element("tool-place").hidden = element("tool-link").hidden = !data.live.design;
   element("live-robot").hidden = !data.live.swarm || Boolean(data.live.node);
   showNumbers();
   listenToSession();
   if (data.live.node) listenToNode(data.live.node);
+  if (data.live.design) listenToDesign(ask, () => bodies[0].animation.times[0] === 0);
+  takeUpHands();
   window.report.live = { session, measured, ask };
   connect();
 }

@@ -4,7 +4,7 @@ import { bodies, shown, state } from "./shown.js";
 import { themeText } from "./colour.js";
 
 // The place under a point of the box, in the body's coordinates.
-function placeAt(view, [px, py]) {
+export function placeAt(view, [px, py]) {
   const { camera } = state;
   const x = camera.x + (px - view.width / 2) / camera.scale;
   const y = camera.y - (py - view.height / 2) / camera.scale;
@@ -46,7 +46,7 @@ function hand(view, at, grab, factor, ask) {
 
 function knife(view, at, ask) {
   const from = placeAt(view, at);
-  const move = (to) => drawKnife(view, at, to);
+  const move = (to) => drawLine(view, at, to);
   const end = (to) => {
     view.drawOver();
     const far = Math.hypot(to[0] - at[0], to[1] - at[1]);
@@ -68,7 +68,7 @@ function sideOf({ X, Y }, particle) {
 
 function pull(view, at, side, ask) {
   const from = placeAt(view, at);
-  const move = (to) => drawKnife(view, at, to);
+  const move = (to) => drawLine(view, at, to);
   const end = (to) => {
     view.drawOver();
     const place = placeAt(view, to);
@@ -80,7 +80,7 @@ function pull(view, at, side, ask) {
   return { move, end };
 }
 
-function drawKnife(view, from, to) {
+export function drawLine(view, from, to) {
   view.isClear = false;
   view.drawOver();
   drawDashes(view, from, to);

@@ -58,6 +58,7 @@ export function keep(view, particle) {
 export function showKept() {
   const box = element("kept");
   const kept = shown.views.filter((view) => view.kept >= 0);
+  if (box.hidden && !kept.length) return;
   box.hidden = !kept.length;
   box.replaceChildren(
     ...kept.flatMap((view) => {

@@ -149,11 +149,18 @@ export function ramp() {
   return canvas;
 }
 
+// What the scale shows; to lay the page out anew for the same takes longer than a frame may.
+let drawn = "";
+
 export function drawScale() {
   const scale = element("scale");
   element("log-label").hidden = state.quantity === "role" || isDifference();
+  const isRole = state.quantity === "role";
+  const shows = JSON.stringify([isRole ? roleKeys() : scaleOf(), crackKeys(), isDifference(), themeText("card")]);
+  if (shows === drawn) return;
+  drawn = shows;
   const cracks = crackKeys().map(([text, colour]) => key(colour, text));
-  if (state.quantity === "role") {
+  if (isRole) {
     scale.replaceChildren(...roleKeys().map(([text, colour]) => key(colour, text)), ...cracks);
     scale.setAttribute("aria-label", `Colours: ${scale.textContent}`);
     return;

@@ -1,0 +1,78 @@
+//! How exactly followers come to rest where their leaders' affine motion has their places.
+
+use serde::Serialize;
+
+use super::not_linear;
+use crate::flock::manoeuvre::{Affine, Posture};
+use crate::flock::vectors::{Vectors, distance};
+use crate::scene::swarm::Swarm;
+use crate::swarm::formation::Formation;
+
+/// Distance over the spacing of the formation that is rounding.
+const ROUNDING: f64 = 1e-9;
+
+/// How far followers come to rest from their places behind leaders that move as one.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Exactness {
+    /// The motions of the leaders that every follower takes part in exactly: `shift`, `turn`, `stretch`, `shear`.
+    pub exact: Vec<&'static str>,
+    /// What becomes of each manoeuvre.
+    pub manoeuvres: Vec<ManoeuvreError>,
+}
+
+/// How far followers are from their places in a manoeuvre that is flown slowly.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ManoeuvreError {
+    /// Name of the manoeuvre.
+    pub name: String,
+    /// Largest distance of a follower from its place \[m\]; 0 where it is rounding.
+    pub largest: f64,
+}
+
+impl Exactness {
+    /// `None` where the rule is not linear, no program of the swarm leads, or the followers are too many.
+    pub fn of(swarm: &Swarm, formation: &Formation) -> Option<Self> {
+        let about = formation.middle();
+        let is_led = formation.is_led_here() && (0..formation.count()).any(|m| formation.is_led(m));
+        (is_led && not_linear(formation, swarm).is_none())
+            .then(|| formation.settled(&formation.places))??;
+        let is_exact = |postures: &[Posture]| {
+            postures.iter().all(|posture| largest(formation, posture.affine(about)) == Some(0.0))
+        };
+        let nominal = Posture::NOMINAL;
+        // The answer of the rule to displacements is linear, so two members of each family stand for all of it.
+        let families = [
+            ("shift", [[1.0, 0.0], [0.0, 1.0]].map(|translate| Posture { translate, ..nominal })),
+            ("turn", [1.0, -2.0].map(|rotate| Posture { rotate, ..nominal })),
+            ("stretch", [[2.0, 1.0], [1.0, 2.0]].map(|stretch| Posture { stretch, ..nominal })),
+            ("shear", [[1.0, 0.0], [0.0, 1.0]].map(|shear| Posture { shear, ..nominal })),
+        ];
+        let exact = families.into_iter().filter(|(_, postures)| is_exact(postures)).map(|(name, _)| name);
+        let manoeuvres = formation.manoeuvres.iter().filter_map(|one| on_the_way(formation, &one.name));
+        Some(Self { exact: exact.collect(), manoeuvres: manoeuvres.collect() })
+    }
+}
+
+fn on_the_way(formation: &Formation, name: &str) -> Option<ManoeuvreError> {
+    /// Parts of a leg at whose ends the places are compared.
+    const PARTS: usize = 16;
+    let manoeuvre = formation.manoeuvre(name, 0.0)?;
+    let mut found: f64 = 0.0;
+    let mut start = 0.0;
+    for leg in &manoeuvre.legs {
+        for n in 0..=PARTS {
+            let time = start + leg.seconds * n as f64 / PARTS as f64;
+            found = found.max(largest(formation, manoeuvre.affine(time))?);
+        }
+        start += leg.seconds + leg.hold;
+    }
+    Some(ManoeuvreError { name: name.to_owned(), largest: found })
+}
+
+/// Largest distance of a follower at rest from where the leaders' motion has its place \[m\].
+fn largest(formation: &Formation, affine: Affine) -> Option<f64> {
+    let places: Vectors = formation.places.iter().map(|place| affine.apply(place)).collect();
+    let rest = formation.settled(&places)?;
+    let found = (0..places.len()).map(|m| distance(places.get(m), rest.get(m))).fold(0.0, f64::max);
+    Some(if found > ROUNDING * formation.spacing() { found } else { 0.0 })
+}
