@@ -37,9 +37,16 @@ fn off(threads: &str, scene: &str, sets: &[&str]) -> Vec<String> {
     let plan: serde_json::Value = serde_json::from_slice(&plan.stdout).expect("JSON");
     let mut off = Vec::new();
     for (key, flags) in [("all", &[][..]), ("tables", &["--figures", "none", "--no-report"])] {
-        let run = [&["run", scene, "--quiet", "--out", key], flags, &sets].concat();
-        let child = on_threads(&run).stdout(Stdio::null()).spawn().expect("starts");
-        let (found, predicted) = (peak(child), plan["memory_bytes"][key].as_f64().expect("a number"));
+        let run = [&["run", scene, "--quiet", "--force", "--out", key], flags, &sets].concat();
+        let predicted = plan["memory_bytes"][key].as_f64().expect("a number");
+        let mut found = 0.0_f64;
+        // On a busy computer the last of a short process is not seen: what is seen is never more than it took.
+        for _ in 0..3 {
+            if found < 0.95 * predicted {
+                let child = on_threads(&run).stdout(Stdio::null()).spawn().expect("starts");
+                found = found.max(peak(child));
+            }
+        }
         let line = format!("{scene} {key}: {:.1} MB, predicted {:.1}", found / 1e6, predicted / 1e6);
         println!("{line} ({:+.1} %)", 100.0 * (predicted / found - 1.0));
         if (predicted / found - 1.0).abs() > 0.1 {
