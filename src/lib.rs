@@ -14,7 +14,7 @@
 //! * [`sweep`]: the rule compiled for a body, and its steps: the one room with vectors and the schedule of threads.
 //! * [`solve`]: spectra of sweeps, and the solvers for equilibrium.
 //! * [`material`]: rule weights from Young's modulus and Poisson's ratio, and what material a rule is.
-//! * [`ranks`]: processes that share a body: who they are, and how numbers get from one to another (over MPI with feature `mpi`).
+//! * [`ranks`]: processes that share a body, and the messages between them (over MPI with feature `mpi`).
 //! * [`engine`]: one step of a body after the other: leaders, roles, bonds, loads; used by continuum and swarm alike.
 //! * [`continuum`]: plans a scene, steps it or goes straight to rest, and hands what happens to an observer.
 //! * [`study`]: many runs of a scene: rule against finite elements, accuracy against cost, parameter sweeps, stability and its thresholds.

@@ -148,7 +148,7 @@ pub fn node(arguments: &NodeArguments, ros: &RosArguments) -> Result<ExitCode, R
     Ok(ExitCode::SUCCESS)
 }
 
-/// What a node's process leaves to the next.
+/// State that a node's process leaves to the next.
 #[derive(Deserialize, Serialize)]
 struct Left {
     node: KeptNode,

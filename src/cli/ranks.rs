@@ -88,7 +88,7 @@ pub struct Start<'a> {
     is_over: bool,
 }
 
-/// What a rank says to the others before they begin.
+/// The message of a rank to the others before they begin.
 #[derive(Clone, Copy)]
 enum Word {
     Ready { program: u64, run: u64 },
@@ -108,7 +108,7 @@ impl Word {
     }
 }
 
-/// What all ranks make of what they have said; the same on each.
+/// The verdict on all messages; the same on each rank.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Verdict {
     Begin,

@@ -94,7 +94,7 @@ struct Prepared {
     left: Option<ResumedRun>,
     asked: RunRequest,
     scene: Scene,
-    /// What was chosen for it.
+    /// The choice that was made for it.
     words: String,
     plan: Plan,
     digest: u64,
@@ -163,7 +163,7 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
         Some(left) => left.open()?,
         None => arguments.output.folder(&scene.name)?,
     };
-    // A run that was resumed is told by how it began.
+    // A resumed run is described by how it began.
     folder.set_command(command_line(asked.arguments()));
     let setup = start.elapsed();
     tracing::info!("planned {} particles of `{}` in {setup:.1?}", plan.count(), scene.name);

@@ -1,4 +1,4 @@
-//! What the studies of a scene have in common: their arguments, and how they end.
+//! Common parts of the studies of a scene: their arguments, and how they end.
 
 use std::path::PathBuf;
 

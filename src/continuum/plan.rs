@@ -26,7 +26,7 @@ use crate::sweep::{Order, Update};
 /// A scene laid out; nothing of it refers to the scene file.
 #[derive(Clone, Debug)]
 pub struct Plan {
-    /// What the engine starts from.
+    /// The start of the engine.
     pub setup: Setup,
     /// When a run ends.
     pub stop: Stop,

@@ -55,9 +55,9 @@ pub struct Divergence {
     pub step: usize,
     /// Id of the particle.
     pub particle: usize,
-    /// What the particle did, to follow its id in a sentence.
+    /// The particle's fault, to follow its id in a sentence.
     pub what: String,
-    /// What most often leads to this with such a rule.
+    /// The usual cause with such a rule.
     pub likely_cause: String,
 }
 

@@ -11,7 +11,7 @@ use crate::sweep::domain::Share;
 /// Bytes of a position.
 const PLACE: usize = 16;
 
-/// What is exchanged.
+/// The data that are exchanged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Exchanged {
     /// Halos, before so many steps are taken together; bytes that the rank with the largest receives.

@@ -81,7 +81,7 @@ pub struct Engine {
     settled: Option<Vectors>,
     /// Of a body that is put to rest part by part.
     path: Option<Path>,
-    /// Those who share the body.
+    /// The ranks that share the body.
     team: Option<(Team, Share)>,
     /// Whether the positions of all particles are known here; of a shared body, otherwise, those of its own.
     is_whole: bool,

@@ -1,4 +1,4 @@
-//! What an engine starts from.
+//! The start of an engine: body, rule, roles and motions.
 
 use std::sync::Arc;
 
@@ -32,7 +32,7 @@ pub struct Setup {
     pub changes: Vec<RoleChange>,
     /// Bonds cut before the first step.
     pub cuts: Vec<Break>,
-    /// What is done to the body while it is stepped, by ascending step.
+    /// Actions on the body while it is stepped, by ascending step.
     pub actions: Vec<Action<Arc<Conduct>>>,
     /// Between the particles, where the body has a material.
     pub cells: Option<Cells>,
@@ -49,7 +49,7 @@ pub struct Setup {
 pub struct RoleChange {
     /// Indices of the particles.
     pub particles: Vec<usize>,
-    /// What they become.
+    /// Their new role.
     pub role: Role,
     /// The one component that is held or led while the particles follow along the other.
     pub axis: Option<Axis>,

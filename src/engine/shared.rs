@@ -142,7 +142,7 @@ fn put(points: &mut Vectors, of: &Range<usize>, words: &[u64]) {
 
 /// An observer on each rank: the first one says when they look, and any of them can break the run off.
 pub struct Agreed<'a> {
-    /// Those who look together.
+    /// The ranks that look together.
     pub team: &'a Team,
     /// Looks on this rank.
     pub own: &'a mut dyn Observer,

@@ -51,7 +51,7 @@ struct Leading {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the state has {found} {what}, the plan {planned}: it belongs to another body")]
 pub struct WrongState {
-    /// What is counted.
+    /// The quantity that is counted.
     pub what: &'static str,
     /// How many the state has.
     pub found: usize,

@@ -103,7 +103,7 @@ pub enum CheckpointError {
     Unreadable {
         /// Path of the checkpoint.
         path: PathBuf,
-        /// What the system said.
+        /// The error of the system.
         source: std::io::Error,
     },
     /// The file does not begin as a checkpoint does.
@@ -133,7 +133,7 @@ pub enum CheckpointError {
     Corrupted {
         /// Path of the checkpoint.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The fault in it.
         what: String,
     },
     /// Another version of the layout or of the program wrote the file.
@@ -144,9 +144,9 @@ pub enum CheckpointError {
     Version {
         /// Path of the checkpoint.
         path: PathBuf,
-        /// What wrote it.
+        /// The version that wrote it.
         found: String,
-        /// What reads it.
+        /// The version that reads it.
         known: String,
     },
     /// The checkpoint is of another scene, or files that the scene names have changed.
@@ -157,7 +157,7 @@ pub enum CheckpointError {
     Foreign {
         /// The file or its folder.
         path: PathBuf,
-        /// What differs.
+        /// The difference.
         what: String,
     },
 }
@@ -303,12 +303,12 @@ impl Checkpoint<'static> {
     }
 }
 
-/// What comes behind the header, on its way to the disk.
+/// The part behind the header, on its way to the disk.
 struct Payload {
     file: File,
     sum: crc32fast::Hasher,
     length: u64,
-    /// What the system said: postcard has one error for all that can happen to a writer.
+    /// The error of the system: postcard has one error for all faults of a writer.
     failure: Option<io::Error>,
 }
 

@@ -49,11 +49,11 @@ pub enum ExportError {
     /// The system refuses a file or a folder.
     #[error("cannot {action} {}: {source}", .path.display())]
     Io {
-        /// What was tried, as a verb.
+        /// The attempt, as a verb.
         action: &'static str,
         /// The file or the folder.
         path: PathBuf,
-        /// What the system said.
+        /// The error of the system.
         source: io::Error,
     },
     /// A figure's SVG cannot be drawn as PNG.
@@ -61,7 +61,7 @@ pub enum ExportError {
     Figure {
         /// The figure.
         path: PathBuf,
-        /// What the renderer said.
+        /// The error of the renderer.
         reason: String,
     },
     /// The outputs are whole but stand under their temporary name.

@@ -15,7 +15,7 @@ const RUNNING: usize = 3 << 20;
 /// Bytes of a particle in a [`Snapshot`](crate::continuum::record::Snapshot): position, role and energies.
 const SNAPSHOT: usize = 16 + 1 + 2 * 8;
 
-/// What a run shall write.
+/// Outputs that a run is to write.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Outputs {
     /// The files of each figure.
@@ -62,7 +62,7 @@ pub fn predicted(scene: &Scene, plan: &Plan, outputs: Outputs, program: usize) -
 
 /// Bytes of what the figures of so many steps are while they are drawn, as many at once as there are threads.
 fn pictures(scene: &Scene, plan: &Plan, moments: usize) -> usize {
-    /// What draws, with its fonts; those of one more at the same time.
+    /// Memory of the renderer with its fonts; that of one more at the same time.
     const PAINTER: usize = 3 << 20;
     const FONTS: usize = 1 << 20;
     /// A particle as a shape.

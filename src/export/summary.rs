@@ -134,7 +134,7 @@ pub struct Energies {
     pub largest_strain: Option<f64>,
 }
 
-/// What fracture has done to the body.
+/// The effect of fracture on the body.
 #[derive(Clone, Copy, Debug, Serialize, PartialEq)]
 pub struct BrokenBonds {
     /// Pairs of neighbours that are broken.

@@ -78,7 +78,7 @@ pub struct Support<'a> {
 pub struct PortionTraction<'a> {
     /// Where it acts.
     pub on: Vec<Portion>,
-    /// What acts there.
+    /// The load there.
     pub traction: TractionField<'a>,
 }
 
@@ -87,7 +87,7 @@ pub struct PortionTraction<'a> {
 pub struct ShapeProblem<'a> {
     /// The outline of the undeformed body \[m\].
     pub outline: &'a Outline,
-    /// What the body is made of, but for its inclusions.
+    /// Material of the body without its inclusions.
     pub material: Material,
     /// The measure of strain.
     pub strain: Strain,
@@ -95,9 +95,9 @@ pub struct ShapeProblem<'a> {
     pub inclusions: Vec<(&'a Outline, Material)>,
     /// Lines inside the body along which materials meet. They may not overlap.
     pub interfaces: Vec<Piece>,
-    /// What holds the body.
+    /// Supports of the body.
     pub supports: Vec<Support<'a>>,
-    /// What pulls its outline.
+    /// Loads on its outline.
     pub tractions: Vec<PortionTraction<'a>>,
     /// Forces \[N\] at points \[m\]. The displacement has no limit at the point itself.
     pub point_forces: Vec<(Point, Point)>,

@@ -7,7 +7,7 @@ use crate::geometry::shape::Segment;
 pub struct Action<T> {
     /// First step at which it holds.
     pub at: usize,
-    /// What is done.
+    /// The change.
     pub what: ActionKind<T>,
 }
 

@@ -3,7 +3,7 @@
 /// A condition on one particle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Condition {
-    /// What is tested.
+    /// The quantity that is tested.
     pub quantity: Quantity,
     /// Greatest value at which it does not hold; unbounded where there is none.
     pub above: Option<f64>,

@@ -67,7 +67,7 @@ pub struct Break {
 pub struct Bonds {
     /// When bonds break as the body moves; without one they are only cut.
     pub threshold: Option<Threshold>,
-    /// What stands in for neighbours that are lost.
+    /// The substitute for neighbours that are lost.
     pub ghosts: Ghosts,
     broken: Vec<bool>,
     any_broken: bool,

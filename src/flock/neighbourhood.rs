@@ -1,4 +1,4 @@
-//! Whose positions a particle sees (the paper's Choice 2).
+//! The neighbours whose positions a particle sees (the paper's Choice 2).
 
 use std::f64::consts::PI;
 

@@ -1,6 +1,6 @@
 //! splitmix64 (Steele, Lea and Flood 2014): a few lines, the same on every machine.
 
-/// What the state of a stream grows by from draw to draw.
+/// Increment of a stream's state from draw to draw.
 pub(crate) const STEP: u64 = 0x9e37_79b9_7f4a_7c15;
 
 /// The bits of a state spread over the whole number: neighbouring states give numbers that have nothing in common.

@@ -50,7 +50,7 @@ impl<'a> Locator<'a> {
         })
     }
 
-    /// What [`Shape::contains`] says of the shape.
+    /// As [`Shape::contains`] of the shape.
     pub fn contains(&self, point: Point, tolerance: f64) -> bool {
         match &self.0 {
             Located::Simple(shape) => shape.contains(point, tolerance),
@@ -87,7 +87,7 @@ impl<'a> Finder<'a> {
         }
     }
 
-    /// What [`Outline::nearest`] finds.
+    /// As [`Outline::nearest`].
     pub fn nearest(&self, p: Point) -> (Place, f64) {
         let piece = |k: usize| self.outline.piece(self.numbers[k][0], self.numbers[k][1]);
         let away = |k: usize| distance(piece(k).point(piece(k).nearest(p)), p);
@@ -101,7 +101,7 @@ impl<'a> Finder<'a> {
         }
     }
 
-    /// What [`Outline::contains`] says.
+    /// As [`Outline::contains`].
     pub fn contains(&self, p: Point) -> bool {
         let near = right_of(&self.tree, p, 0.0).map(|k| self.numbers[k]);
         is_inside(near.map(|[ring, piece]| self.outline.piece(ring, piece)), p)

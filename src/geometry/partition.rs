@@ -24,7 +24,7 @@ pub enum PartitionError {
     Outline {
         /// Number of the region, from 1.
         region: usize,
-        /// What is wrong with its outline.
+        /// The fault of its outline.
         reason: OutlineError,
     },
     /// A region lies outside the body, or only along its outline.

@@ -329,7 +329,7 @@ impl Conductor {
     }
 }
 
-/// What came of a command, for its viewer.
+/// The outcome of a command, for its viewer.
 fn answered(answer: Result<String, String>) -> Value {
     match answer {
         Ok(words) => json!({ "event": "done", "words": words }),

@@ -1,4 +1,4 @@
-//! What can be undone: the state of a session now, and those before it.
+//! The states that undo returns to: the state of a session now, and those before it.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -19,7 +19,7 @@ pub(super) struct Source<F> {
     pub(super) folder: Option<PathBuf>,
 }
 
-/// What a session is at a moment.
+/// The state of a session at a moment.
 pub(super) trait State: Clone {
     /// The word for what the session shows.
     const NAME: &'static str;

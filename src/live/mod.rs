@@ -2,8 +2,8 @@
 //!
 //! A [`session::Session`] steps a body ([`body`]) or flies a swarm ([`swarm`]), does what viewers ask ([`command`]) and
 //! keeps it (`history`), so that it can be undone, and saved as a file that replays it to the bit. [`conductor`] runs it
-//! at the speed that is asked for and shows each viewer the latest state ([`state`]); [`server`] lets viewers in, who see
-//! the page of a report with live data.
+//! at the speed that is asked for and shows each viewer the latest state ([`state`]); [`server`] lets viewers in and sends
+//! them the page of a report with live data.
 //!
 //! A [`monitor::Monitor`] in its place shows a swarm that another loop flies, as `flockform node --live` does.
 //!

@@ -98,7 +98,7 @@ impl Monitor {
         is_new || self.is_silent != was_silent
     }
 
-    /// What the loop has answered since the last call.
+    /// Answers of the loop since the last call.
     pub(super) fn answers(&self) -> impl Iterator<Item = (Viewer, Result<String, String>)> + '_ {
         self.commands.iter().flat_map(|link| link.answers.try_iter())
     }

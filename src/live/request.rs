@@ -10,7 +10,7 @@ const MOST_HEADERS: usize = 64;
 /// How long a browser may take to ask.
 const PATIENCE: Duration = Duration::from_secs(5);
 
-/// What a browser asks for.
+/// The request of a browser.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub(super) struct Asked {
     pub path: String,

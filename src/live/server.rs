@@ -31,7 +31,7 @@ pub struct Server {
     token: String,
 }
 
-/// What the threads of connections share.
+/// State that the threads of connections share.
 struct Shared {
     token: String,
     port: u16,

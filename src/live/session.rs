@@ -1,4 +1,4 @@
-//! What viewers share: a body or a swarm, and what they have done with it.
+//! The session that viewers share: a body or a swarm, and what they have done with it.
 
 use super::body::Body;
 use super::command::Command;
@@ -212,7 +212,7 @@ impl Session {
         }
     }
 
-    /// What is said of a formation that can be designed.
+    /// Remarks on a formation that can be designed.
     pub fn design(&self) -> Option<Vec<String>> {
         match self {
             Session::Swarm(swarm) => swarm.exactness(),

@@ -1,4 +1,4 @@
-//! What viewers are shown: the latest state alone, of which each viewer takes as much as it can draw.
+//! The state that viewers are shown: the latest alone, of which each viewer takes as much as it can draw.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};

@@ -33,7 +33,7 @@ pub struct Swarm {
     history: History<State>,
 }
 
-/// What a viewer holds.
+/// The thing that a viewer holds.
 #[derive(Clone)]
 struct Hand {
     held: Held,
@@ -41,7 +41,7 @@ struct Hand {
     by: [f64; 2],
 }
 
-/// What can be held, and where it was taken \[m\].
+/// A thing that can be held, and where it was taken \[m\].
 #[derive(Clone)]
 enum Held {
     Leaders(Vec<(usize, [f64; 2])>),
@@ -54,12 +54,12 @@ enum Held {
 struct State {
     file: Arc<File>,
     flight: Flight,
-    /// What was done, as the format of swarm files says it.
+    /// Past changes, in the format of swarm files.
     commands: Vec<RawCommand>,
     faults: Vec<RawFault>,
     /// Noise, delay and loss now.
     channel: (f64, u32, f64),
-    /// What viewers hold.
+    /// Things that viewers hold.
     hands: BTreeMap<Viewer, Hand>,
     alarms: Vec<Alarm>,
 }

@@ -108,7 +108,7 @@ fn receive(
     }
 }
 
-/// What a viewer has been sent.
+/// State that a viewer has been sent.
 #[derive(Default)]
 struct Sent {
     number: u64,

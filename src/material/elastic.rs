@@ -58,9 +58,9 @@ pub enum ElasticError {
     /// A modulus or a thickness that is not positive and finite.
     #[error("{name} must be positive and finite, but it is {value}")]
     NotPositive {
-        /// What the messages call it.
+        /// Its name in messages.
         name: &'static str,
-        /// What was given.
+        /// The given value.
         value: f64,
     },
     /// A Poisson's ratio with which an isotropic sheet is not stable.
@@ -74,7 +74,7 @@ pub enum ElasticError {
     Poisson {
         /// The assumption across the thickness.
         plane: Plane,
-        /// What was given \[1\].
+        /// The given value \[1\].
         value: f64,
         /// Lower bound, excluded \[1\].
         low: f64,
@@ -86,7 +86,7 @@ pub enum ElasticError {
         "the orthotropic Poisson's ratio must be smaller in size than sqrt(E1/E2) = {bound}, but it is {value}: straining the sheet would give energy"
     )]
     PoissonOrthotropic {
-        /// What was given \[1\].
+        /// The given value \[1\].
         value: f64,
         /// The size that it must stay below \[1\].
         bound: f64,
@@ -94,7 +94,7 @@ pub enum ElasticError {
     /// An angle of the fibres that is not finite.
     #[error("the angle of the fibres must be finite, but it is {value}")]
     Angle {
-        /// What was given \[rad\].
+        /// The given value \[rad\].
         value: f64,
     },
     /// The entries of the stiffness over- or underflow.

@@ -71,7 +71,7 @@ pub enum GradientError {
         "the length {length} is too short for this lattice: l^2 of long waves comes out as {found:.6}, so short waves would soften; it carries {shortest:.4} and more"
     )]
     TooShort {
-        /// What was given \[length\].
+        /// The given value \[length\].
         length: f64,
         /// Least gradient length squared of long waves with it \[length^2\].
         found: f64,
@@ -81,7 +81,7 @@ pub enum GradientError {
     /// A length too many times the distance of rows for the digits of a double.
     #[error("the length {length} is more than {LONGEST:.0} times the distance of rows, {rows}")]
     TooLong {
-        /// What was given \[length\].
+        /// The given value \[length\].
         length: f64,
         /// Greatest distance of two neighbouring rows of bonds \[length\].
         rows: f64,
@@ -89,13 +89,13 @@ pub enum GradientError {
     /// A length that is not positive and finite.
     #[error("the length must be positive and finite, but it is {length}")]
     NotPositive {
-        /// What was given \[length\].
+        /// The given value \[length\].
         length: f64,
     },
     /// A length with which some wave but a translation costs no energy.
     #[error("some wave costs nothing or gives energy with the length {length}")]
     Unstable {
-        /// What was given \[length\].
+        /// The given value \[length\].
         length: f64,
     },
     /// The weights have no long-wave limit.

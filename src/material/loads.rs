@@ -32,7 +32,7 @@ pub enum LoadError {
     NoParticle {
         /// Id of the particle.
         particle: usize,
-        /// What keeps the force from acting.
+        /// The obstacle to the force.
         reason: &'static str,
     },
     /// A traction acts on what bounds no cell, or two.

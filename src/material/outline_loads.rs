@@ -39,7 +39,7 @@ pub struct Profile {
 pub struct OutlineLoad {
     /// Where it acts.
     pub portions: Vec<Portion>,
-    /// What acts there, before the profile.
+    /// The load there, before the profile.
     pub push: Push,
     /// How it varies along a line; the same everywhere where there is none.
     pub profile: Option<Profile>,

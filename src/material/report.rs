@@ -157,7 +157,7 @@ pub struct Gradient {
     pub least: f64,
     /// Over all directions and both polarisations.
     pub greatest: f64,
-    /// What the sign does to short waves.
+    /// The effect of the sign on short waves.
     pub effect: Effect,
 }
 

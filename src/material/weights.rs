@@ -84,7 +84,7 @@ pub enum WeightsError {
     Shape {
         /// Number of the cell, from 1.
         cell: usize,
-        /// What is wrong with its corners.
+        /// The fault of its corners.
         reason: ShapeError,
     },
     /// The cells around a particle give it no stiffness that can be inverted.
@@ -110,7 +110,7 @@ pub enum WeightsError {
     Factor {
         /// Number of the cell, from 1.
         cell: usize,
-        /// What was given \[1\].
+        /// The given value \[1\].
         value: f64,
     },
 }

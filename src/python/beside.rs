@@ -61,7 +61,7 @@ impl Progress {
     /// Ends work that looks at no flag of its own, once it is to end; [`beside`] catches it.
     pub(super) fn leave_if_raised(&self) {
         if self.flag.load(Ordering::Relaxed) {
-            resume_unwind(Box::new("nobody waits any more"));
+            resume_unwind(Box::new("no caller waits any more"));
         }
     }
 

@@ -167,7 +167,7 @@ impl Body {
         Ok(here(py, || self.engine.movement())?.largest_move)
     }
 
-    /// Steps the body, one step unless told otherwise.
+    /// Steps the body, by one step unless `steps` is given.
     ///
     /// Raises DivergedError once a particle has no finite place any more, or one so far that energies overflow. The body is
     /// lost then: what is to be kept is copied before.

@@ -26,12 +26,12 @@ create_exception!(
 impl From<scene::SceneError> for PyErr {
     fn from(error: scene::SceneError) -> Self {
         let raised = SceneError::new_err(error.to_string());
-        let told = Python::attach(|py| {
+        let outcome = Python::attach(|py| {
             let problems = error.problems().iter().map(|problem| described(py, problem));
             let problems = problems.collect::<PyResult<Vec<_>>>()?;
             raised.value(py).setattr("problems", PyList::new(py, problems)?)
         });
-        told.err().unwrap_or(raised)
+        outcome.err().unwrap_or(raised)
     }
 }
 

@@ -14,7 +14,7 @@ use crate::scene::swarm::Swarm;
 use crate::scene::{Bundled, Place, Problem, Scene, SceneError, bundled};
 use crate::study::trade::{Chosen, choose};
 
-/// What stands in the text of a file that is given as a dict.
+/// TOML text of a file that is given as a dict.
 const UNTITLED: &str = "title = \"Given in Python\"";
 const DICT: &str = "the dict";
 const CALL: &str = "the call";
@@ -34,7 +34,7 @@ enum Origin {
     Keys(Vec<String>),
 }
 
-/// What bundled files are called, all of them, and the one of a name.
+/// The names of all bundled files, and the lookup of one.
 type Shelf<'a> = (&'a str, &'a [Bundled], fn(&str) -> Option<Bundled>);
 
 impl Source {

@@ -18,7 +18,7 @@ use crate::study::stability::bisection;
 use crate::study::stability::extremes::plan;
 use crate::study::stability::study::{Options, Study, run};
 
-/// What material a scene's rule is, in a body without edges: a dict with the keys of `flockform material --json`.
+/// The material that a scene's rule is in a body without edges: a dict with the keys of `flockform material --json`.
 ///
 /// scene and set as for run().
 #[pyfunction]

@@ -114,7 +114,7 @@ impl Swarm {
         self.control.period()
     }
 
-    /// What the loop does: "running" or "emergency-stopped".
+    /// The mode of the loop: "running" or "emergency-stopped".
     #[getter]
     fn mode(&self) -> &'static str {
         match self.control.mode() {

@@ -32,7 +32,7 @@ pub enum MpiError {
         said: usize,
         /// How many MPI knows.
         known: usize,
-        /// What MPI calls itself.
+        /// The name and version that MPI gives.
         library: String,
     },
 }

@@ -48,20 +48,20 @@ pub enum RecordError {
     /// A path that ends in no file name.
     #[error("{} does not name a file that could be made: give it a name that ends in .mcap", .0.display())]
     Unnamed(PathBuf),
-    /// What runs cannot be recorded.
+    /// A run that cannot be recorded.
     #[error("--record: {what} is not recorded\n  help: leave --record out, or use ROS 2")]
     NotRecorded {
-        /// What was to be recorded.
+        /// The subject of the recording.
         what: &'static str,
     },
     /// The system refuses a file.
     #[error("cannot {action} {}: {source}", .path.display())]
     Io {
-        /// What was tried, as a verb.
+        /// The attempt, as a verb.
         action: &'static str,
         /// Path of the file.
         path: PathBuf,
-        /// What the system said.
+        /// The error of the system.
         source: std::io::Error,
     },
     /// A recording could not be written on.
@@ -69,15 +69,15 @@ pub enum RecordError {
     Write {
         /// The unfinished file.
         path: PathBuf,
-        /// What the MCAP library said.
+        /// The error of the MCAP library.
         source: mcap::McapError,
     },
-    /// What was to be read is no MCAP file, or is damaged beyond reading.
+    /// The file is no MCAP file, or is damaged beyond reading.
     #[error("{} is no MCAP file: {source}\n  help: give a file that --record or `ros2 bag record -s mcap` has written", .path.display())]
     NoMcap {
         /// Path of the file.
         path: PathBuf,
-        /// What the MCAP library said.
+        /// The error of the MCAP library.
         source: mcap::McapError,
     },
     /// A recording that carries no swarm file.
@@ -91,9 +91,9 @@ pub enum RecordError {
     Unusable {
         /// Path of the file.
         path: PathBuf,
-        /// What is missing.
+        /// The missing part.
         what: String,
-        /// What to do about it.
+        /// The remedy.
         help: String,
     },
     /// The swarm of a recording, with the overrides, is none.

@@ -69,7 +69,7 @@ impl Reader {
     /// A recording that is in memory already; `path` is what it is called.
     ///
     /// # Errors
-    /// What is no MCAP file.
+    /// A file that is no MCAP file.
     pub fn of_bytes(path: &Path, bytes: Vec<u8>) -> Result<Self, RecordError> {
         let path = path.to_owned();
         if !bytes.starts_with(mcap::MAGIC) {

@@ -148,7 +148,7 @@ struct Replay {
     has_events: bool,
     /// Whether the robots were: their time begins at 0, which says of a real one that it has none.
     is_simulated: bool,
-    /// What the file of a simulated flight had done from outside, by ascending period.
+    /// Commands from outside in the file of a simulated flight, by ascending period.
     commands: Vec<(u64, FlightCommand)>,
     active: bool,
     begun: bool,

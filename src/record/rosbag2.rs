@@ -1,4 +1,4 @@
-//! What `ros2 bag` looks for in a file of the profile `ros2`: the quality of service of each channel, and one metadata record.
+//! Records that `ros2 bag` looks for in a file of the profile `ros2`: the quality of service of each channel, and one metadata record.
 //!
 //! Both are those of rosbag2's metadata version 9 (Jazzy). They are JSON, which is YAML too.
 

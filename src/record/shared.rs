@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use super::Recording;
 use crate::messages::recorder::RecordSink;
 
-/// May be cloned: it is one recording all the same.
+/// Clones share one recording.
 #[derive(Clone)]
 pub struct Shared(Arc<Mutex<Option<Recording>>>);
 

@@ -65,7 +65,7 @@ pub struct Scene {
     pub weights: Option<Weights>,
     /// Whether particles with unbalanced neighbours are kept in place at rest.
     pub keeps_rest: bool,
-    /// What a pull along one axis does across it (Eq. 2).
+    /// The effect of a pull along one axis across it (Eq. 2).
     pub poisson: Option<PoissonTerm>,
     /// The step beyond the target (Eq. 4).
     pub feedback: Option<Feedback>,
@@ -75,7 +75,7 @@ pub struct Scene {
     pub material: Option<Elastic>,
     /// Parts of the body that are of another material; the later one counts where they overlap.
     pub inclusions: Vec<Inclusion>,
-    /// What pushes the body, in the order in which it is written.
+    /// Loads on the body, in the order of the file.
     pub loads: Vec<Load>,
     /// Roles in the order in which they are written; later entries win.
     pub roles: Vec<RoleEntry>,
@@ -92,7 +92,7 @@ pub struct Scene {
     pub equilibrium: Option<Equilibrium>,
     /// In which parts loads and motions come, where the scene says so.
     pub load_steps: Option<LoadSteps>,
-    /// What is kept of the run.
+    /// The parts of the run that are recorded.
     pub record: Record,
     document: Document,
 }
@@ -165,7 +165,7 @@ pub enum BodySource {
 pub struct Inclusion {
     /// Which part.
     pub shape: Shape,
-    /// What it is made of, with the body's plane and thickness.
+    /// Its material, with the body's plane and thickness.
     pub material: Elastic,
 }
 
@@ -208,7 +208,7 @@ pub enum Load {
     Outline {
         /// Where the load acts.
         region: SceneRegion,
-        /// What acts there.
+        /// The load there.
         push: Push,
         /// How it varies along a line; the same everywhere where there is none.
         profile: Option<Profile>,
@@ -232,7 +232,7 @@ pub enum Load {
 pub struct RoleEntry {
     /// Which particles take the role.
     pub region: SceneRegion,
-    /// What they become.
+    /// Their new role.
     pub role: Role,
     /// The one component that is held or led; both where `None`.
     pub axis: Option<Axis>,
@@ -279,7 +279,7 @@ pub enum LeaderMotion {
 pub struct Fracture {
     /// How long a bond may become.
     pub threshold: Option<Threshold>,
-    /// What stands in for neighbours that are lost.
+    /// The substitute for neighbours that are lost.
     pub ghosts: Ghosts,
 }
 

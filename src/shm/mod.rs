@@ -56,7 +56,7 @@ pub enum ShmError {
     Domain {
         /// The environment variable that sets it.
         variable: &'static str,
-        /// What it is set to.
+        /// Its present value.
         name: String,
     },
     /// A swarm or body has a name that no service may bear.
@@ -66,7 +66,7 @@ pub enum ShmError {
     Name {
         /// The name.
         name: String,
-        /// What is wrong with it.
+        /// The fault in it.
         reason: &'static str,
     },
     /// The process cannot take part in shared memory at all.
@@ -74,7 +74,7 @@ pub enum ShmError {
         "no place in shared memory: {reason}\n  help: is the folder of iceoryx2 (its root path, and /dev/shm) writable?"
     )]
     Node {
-        /// What iceoryx2 said.
+        /// The error of iceoryx2.
         reason: String,
     },
     /// A service carries another type, or another version of it.
@@ -95,9 +95,9 @@ pub enum ShmError {
     Service {
         /// Name of the service.
         service: String,
-        /// What iceoryx2 said.
+        /// The error of iceoryx2.
         reason: String,
-        /// What to do about it.
+        /// The remedy.
         help: String,
     },
     /// A slice could not be filled or sent.
@@ -105,13 +105,13 @@ pub enum ShmError {
     Send {
         /// Name of the service.
         service: String,
-        /// What iceoryx2 said.
+        /// The error of iceoryx2.
         reason: String,
     },
     /// The process cannot sleep until something arrives.
     #[error("cannot wait for what arrives: {reason}")]
     Wait {
-        /// What iceoryx2 said.
+        /// The error of iceoryx2.
         reason: String,
     },
 }

@@ -27,7 +27,7 @@ impl Positions {
     /// As `flockform/NAME/positions`, of a body of so many particles.
     ///
     /// # Errors
-    /// A name that is none, one under which a body is published already, or too little memory.
+    /// An invalid name, a name in use, or insufficient memory.
     pub fn open(domain: &Domain, name: &str, particles: usize) -> Result<Self, ShmError> {
         let peer = domain.join("flockform_run")?;
         let writer = Writer::open(&peer, name, POSITIONS, &Capacity::BODY, particles)?;

@@ -26,7 +26,7 @@ use crate::flock::lattice::Site;
 /// neighbours pull it along with \[force / length\].
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Row {
-    /// What holds the particle back by itself \[force / length\].
+    /// Stiffness that holds the particle back by itself \[force / length\].
     pub diagonal: Block,
     /// Offsets in columns and rows of sites, none of them zero and none twice.
     pub entries: Vec<(Site, Block)>,

@@ -32,7 +32,7 @@ impl Share {
     }
 }
 
-/// Who owns which particles.
+/// Shares of the particles, by rank.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Domain {
     rank: usize,
@@ -42,7 +42,7 @@ pub struct Domain {
     particles: Vec<usize>,
 }
 
-/// What a rank sends and receives before steps: (rank, particles), at most one stretch for each rank.
+/// Particles that a rank sends and receives before steps: (rank, particles), at most one stretch for each rank.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Halo {
     /// Particles of this rank that others need.
@@ -94,7 +94,7 @@ impl Domain {
         steps_of(least)
     }
 
-    /// What is exchanged before so many steps are taken together.
+    /// The exchange before so many steps are taken together.
     pub fn halo(&self, rows: &Rows, steps: usize) -> Halo {
         let others = (0..self.counts().len()).filter(|&rank| rank != self.rank);
         let mut halo = Halo::default();
@@ -129,7 +129,7 @@ pub fn steps_of(bands: usize) -> usize {
     (bands / BANDS_A_STEP).clamp(1, MOST_STEPS)
 }
 
-/// What both stretches have in common, if anything.
+/// The intersection of both stretches, if any.
 fn meet(a: &Range<usize>, b: &Range<usize>) -> Option<Range<usize>> {
     let both = a.start.max(b.start)..a.end.min(b.end);
     (!both.is_empty()).then_some(both)

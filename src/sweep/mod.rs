@@ -75,7 +75,7 @@ const ASIDE_IN_PARALLEL: usize = 1 << 11;
 /// Particles of a column that are swept before it is the next one's turn.
 const TILE: usize = 64;
 
-/// What sweeps were chosen to be on this computer, in words: vectors, and how bodies are cut.
+/// The choices made for sweeps on this computer, in words: vectors, and how bodies are cut.
 pub fn chosen_here() -> String {
     format!("vectors: {}; {}", vectors(), Caches::here())
 }
@@ -151,7 +151,7 @@ impl Sweep {
         self.domain.as_ref()
     }
 
-    /// What ranks exchange before they take so many steps together; nothing where the body is not shared.
+    /// The exchange of ranks before they take so many steps together; empty where the body is not shared.
     pub fn halo(&self, steps: usize) -> Halo {
         match (&self.domain, &self.rows) {
             (Some(domain), Some(rows)) => domain.halo(rows, steps),

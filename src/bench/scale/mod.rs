@@ -71,7 +71,7 @@ pub struct Report {
     pub cores: usize,
     /// `threads` or `processes`.
     pub ranks_are: &'static str,
-    /// What the model was given.
+    /// Inputs of the model.
     pub model: Model,
     /// The same body on more ranks.
     pub strong: Vec<Case>,

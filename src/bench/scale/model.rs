@@ -7,12 +7,12 @@ use crate::sweep::domain::steps_of;
 /// Bytes of a position.
 const PLACE: f64 = 16.0;
 
-/// What messages between ranks cost.
+/// Cost of messages between ranks.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Link {
     /// Time of a message with next to nothing in it \[s\].
     pub latency_seconds: f64,
-    /// What a long message carries in a second \[B/s\].
+    /// Rate of a long message \[B/s\].
     pub bytes_per_second: f64,
 }
 
@@ -32,7 +32,7 @@ pub struct Grid {
     pub band: usize,
 }
 
-/// What a step asks of the rank that has most to do: its share of what happens once for several steps, on average.
+/// Work of the busiest rank in a step: its share of what happens once for several steps, on average.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Load {
     /// Steps taken together.

@@ -16,7 +16,7 @@ use crate::sweep::MOST_STEPS;
 /// Words of the messages by which a link is measured: next to nothing, and a mebibyte.
 const MESSAGES: [usize; 2] = [1, 1 << 17];
 
-/// What other ranks had to send to one, and how long it waited for it.
+/// Data that other ranks had to send to one, and how long it waited for them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Tally {
     pub messages: u64,
@@ -118,7 +118,7 @@ pub fn time(team: &Team, [alone, shared]: [&Plan; 2], (repetitions, seconds): (u
     Times { alone: median(&mut of_one), shared: median(&mut of_all), in_exchange: median(&mut waited) }
 }
 
-/// What the rank that gets most messages is sent in so many steps, and the followers that the busiest one has.
+/// Data that the rank with most messages receives in so many steps, and the followers of the busiest one.
 pub fn count(team: &Team, plan: &Plan, steps: usize) -> (Tally, u64) {
     let tally = Arc::new(Mutex::new(Tally::default()));
     let mut engine = engine(plan, Some(Counted { team: team.clone(), tally: Arc::clone(&tally) }));
@@ -135,7 +135,7 @@ pub fn count(team: &Team, plan: &Plan, steps: usize) -> (Tally, u64) {
     (Tally { messages: most(0), bytes: most(1), seconds: 0.0 }, most(2))
 }
 
-/// What messages between the first two ranks cost.
+/// Cost of messages between the first two ranks.
 pub fn link(team: &Team, rounds: usize) -> Link {
     let other = [1, 0].get(team.rank()).copied();
     let [latency, long] = MESSAGES.map(|words| {

@@ -24,7 +24,7 @@ pub struct Recorder<'a> {
     outputs: Outputs,
     /// Whether there shall be a film.
     films: bool,
-    /// What report and film show.
+    /// Values that report and film show.
     pub animation: Option<RunRecorder>,
     /// The state that an earlier run saved for it.
     animation_state: Option<AnimationState<'static>>,

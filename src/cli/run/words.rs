@@ -1,4 +1,4 @@
-//! What a run says at its end.
+//! The closing messages of a run.
 
 use std::path::Path;
 use std::time::Duration;

@@ -23,7 +23,7 @@ const UNDEFORMED: &str = "#a8adb4";
 /// Two displacements of one body. Arrays follow the particles, shape \[particles\].
 #[derive(Clone, Copy, Debug)]
 pub struct Pair<'a> {
-    /// What stands above the figure.
+    /// The heading of the figure.
     pub title: &'a str,
     /// Name of the unit of length.
     pub unit: &'a str,

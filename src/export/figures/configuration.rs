@@ -47,7 +47,7 @@ impl Style {
 /// Later ones are drawn over earlier ones: the few must not drown in the many.
 const PAINTING_ORDER: [Role; 5] = [Role::Frame, Role::Follower, Role::Ghost, Role::Clamped, Role::Leader];
 
-/// The shape of a role, by which the reds are told apart without their colour.
+/// The shape of a role, which distinguishes the reds without their colour.
 pub(super) fn mark_of(role: Role) -> Mark {
     match role {
         Role::Leader => Mark::Diamond,

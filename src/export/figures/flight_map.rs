@@ -43,7 +43,7 @@ pub struct Moment<'a> {
     pub flown: usize,
     /// Of the robots \[m\].
     pub places: &'a Vectors,
-    /// What stands under the title.
+    /// The subtitle.
     pub note: String,
     /// Colours of the robots; those of their roles where there is none.
     pub field: Option<Field<'a>>,

@@ -47,7 +47,7 @@ pub use von_mises::von_mises;
 /// The body that a figure shows.
 #[derive(Clone, Copy, Debug)]
 pub struct Subject<'a> {
-    /// What stands above the figure.
+    /// The heading of the figure.
     pub title: &'a str,
     /// Name of the unit of length.
     pub unit: &'a str,

@@ -37,7 +37,7 @@ pub enum FilmError {
     NoEncoder {
         /// The film.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The fault in it.
         reason: String,
     },
     /// A quantity that the subject does not have.
@@ -45,7 +45,7 @@ pub enum FilmError {
     Colour {
         /// The quantity asked for.
         colour: &'static str,
-        /// Why it cannot be shown.
+        /// Reason for the refusal.
         reason: &'static str,
         /// Of what others can be shown.
         of: &'static str,
@@ -57,7 +57,7 @@ pub enum FilmError {
     Frame {
         /// Its number, from 0.
         frame: usize,
-        /// What the renderer said.
+        /// The error of the renderer.
         reason: String,
     },
     /// The program that makes videos failed.
@@ -65,17 +65,17 @@ pub enum FilmError {
     Encoder {
         /// The film.
         path: PathBuf,
-        /// What the program said.
+        /// The error of the program.
         said: String,
     },
     /// The system refuses the file.
     #[error("cannot {action} {}: {source}", .path.display())]
     Io {
-        /// What was tried, as a verb.
+        /// The attempt, as a verb.
         action: &'static str,
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The error of the system.
         source: io::Error,
     },
 }

@@ -67,7 +67,7 @@ pub fn film<'a>(
     Film { count, draw: Box::new(draw) }
 }
 
-/// What the frames are taken from.
+/// Source of the frames.
 struct Shown<'a> {
     scene: &'a Scene,
     engine: &'a Engine,

@@ -52,7 +52,7 @@ pub fn write(
             })
             .into(),
         note: format!(
-            "{FRAMES} even parts of both displacements. Von Mises stresses are those at the centres of the cells, shared out to the corners; compare.csv and cells.csv have the numbers."
+            "{FRAMES} equal increments of both displacements. Von Mises stresses are those at the centres of the cells, shared out to the corners; compare.csv and cells.csv have the numbers."
         ),
         facts: facts(scene, report),
         tables: vec![measures(report)],

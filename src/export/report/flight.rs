@@ -264,7 +264,7 @@ fn note(animation: &Animation, report: &FlightReport) -> String {
     let shown = animation.times.len();
     let all = if shown as u64 > report.periods { "all".to_owned() } else { format!("{shown} of them are") };
     format!(
-        "{} periods flown, {all} shown. Lines join robots that hear each other at the start. At the last frame places, ways and \
+        "{} periods flown, {all} shown. Lines join neighbours at the start. At the last frame places, ways and \
          least clearances are those of robots.csv, to the last digit.",
         report.periods
     )

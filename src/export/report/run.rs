@@ -56,7 +56,7 @@ pub struct AnimationState<'a> {
     changes: Vec<[u32; 3]>,
 }
 
-/// What frames hold of each particle.
+/// Values that frames hold of each particle.
 fn channels(count: usize, are_neighbours_lasting: bool) -> Vec<Channel> {
     let [bits, others] = if count <= MOST_FINE { [FINE_BITS; 2] } else { [COARSE_BITS, COLOUR_BITS] };
     let channel = |name, bits| Channel { name, bits };
@@ -81,7 +81,7 @@ pub(in crate::export) struct Packed {
     pub text: usize,
 }
 
-/// What the report of a run takes, before it begins.
+/// Memory that the report of a run takes, before it begins.
 pub(in crate::export) fn packed(plan: &Plan, is_solved_at_once: bool) -> Packed {
     /// Bytes of a particle's place and neighbours as text: rows of a lattice are next to nothing.
     const TEXT: usize = 6;
@@ -438,7 +438,7 @@ fn note(animation: &Animation, outcome: &Outcome, is_solved: bool) -> String {
     let bits = animation.channels.first().map_or(0, |channel| channel.bits);
     let mut note = if is_solved {
         format!(
-            "Solved for its rest, not stepped: {frames} frames in even parts of the displacement, as under a load that grows evenly."
+            "Solved for its rest, not stepped: {frames} frames in equal increments of the displacement, as under a load that grows evenly."
         )
     } else {
         let (steps, counts) = (outcome.engine.step(), animation.clock.quantity);

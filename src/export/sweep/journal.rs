@@ -202,7 +202,7 @@ pub fn read(dir: &Path) -> Result<Found, SweepError> {
     Ok(Found { folder, out, begun, rows, whole })
 }
 
-/// What a file of a sweep says.
+/// Contents of a file of a sweep.
 fn parsed<T>(path: &Path, parse: impl FnOnce(&[u8]) -> io::Result<T>) -> Result<T, SweepError> {
     let read = || parse(&require_regular(path).and_then(|()| fs::read(path))?);
     read().map_err(|source| SweepError::Unreadable { path: path.to_owned(), source })

@@ -20,7 +20,7 @@ pub enum FeedbackReference {
 pub struct Feedback {
     /// Feedback factor `fd` \[1\].
     pub factor: f64,
-    /// What `MT` is.
+    /// The meaning of `MT`.
     pub reference: FeedbackReference,
 }
 

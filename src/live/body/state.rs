@@ -31,10 +31,10 @@ pub(super) struct State {
     pub(super) setup: Arc<Setup>,
     pub(super) bounds: Bounds,
     pub(super) engine: Engine,
-    /// What was done, as the scene format says it.
+    /// Past changes, in the scene format.
     hands: Vec<RawRoles>,
     pub(super) actions: Vec<RawAction>,
-    /// What viewers hold.
+    /// Things that viewers hold.
     pub(super) grabs: BTreeMap<Viewer, Grab>,
 }
 

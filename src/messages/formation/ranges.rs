@@ -58,7 +58,7 @@ mod tests {
 
     #[test]
     fn a_message_of_any_length_and_any_names_gives_at_most_a_range_a_robot() {
-        let stranger = ["b", "nobody", "c"].map(str::to_owned).to_vec();
+        let stranger = ["b", "stranger", "c"].map(str::to_owned).to_vec();
         let unstamped = Ranges { robots: stranger, distances: vec![1.0, 2.0], ..Ranges::default() };
         let of: Vec<_> = ranges(&unstamped, 0, &names(), 9.0).map(|r| (r.of, r.distance, r.stamp)).collect();
         assert_eq!(of, [(1, 1.0, 9.0)]);

@@ -138,7 +138,7 @@ class Body:
         """Largest motion of a particle in the last step, over the spacing [1]."""
 
     def advance(self, steps: int = 1) -> None:
-        """Steps the body, one step unless told otherwise.
+        """Steps the body, by one step unless `steps` is given.
 
         Raises DivergedError once a particle has no finite place any more, or one so far that energies overflow. The body is
         lost then: what is to be kept is copied before.

@@ -24,7 +24,7 @@ const DATA: &str = "data_protection_kind";
 const METADATA: &str = "metadata_protection_kind";
 /// Largest file that is read \[B\]; those of a keystore have some kilobytes.
 const LARGEST: u64 = 1 << 20;
-/// What the middleware signs with: RSA is refused by it, other curves are unknown to it.
+/// Keys that the middleware signs with: RSA is refused by it, other curves are unknown to it.
 const CURVE: Nid = Nid::X9_62_PRIME256V1;
 const CURVE_HELP: &str = "make the keystore with EC keys of the curve prime256v1, as `ros2 security` does";
 
@@ -48,7 +48,7 @@ pub fn folder(keystore: Option<&Path>, name: &str) -> Result<PathBuf, Fault> {
     }
 }
 
-/// What is wrong with the files of an enclave; the gravest first.
+/// Faults in the files of an enclave, the gravest first.
 pub fn faults(folder: &Path) -> Vec<Fault> {
     let mut faults = Vec::new();
     let mut found = |checked: Result<(), Fault>| faults.extend(checked.err());
@@ -161,7 +161,7 @@ fn lossy(folder: &Path, rules: &str) -> Option<Fault> {
     })
 }
 
-/// What the rules leave open, each once; whichever domains and topics they are for.
+/// Protections that the rules leave open, each once; whichever domains and topics they are for.
 fn weaknesses(folder: &Path, rules: &str) -> impl Iterator<Item = Fault> {
     let is_encrypted = |kind: &String| kind.starts_with("ENCRYPT");
     let is_wrapped = values(rules, "rtps_protection_kind").iter().all(is_encrypted);
@@ -205,7 +205,7 @@ fn revocations(folder: &Path) -> Result<(), Fault> {
     Err(Fault {
         place: path.display().to_string(),
         reason: "certificates that it revokes would be taken: RustDDS reads no revocation list".into(),
-        help: "make a keystore with another CA for those who stay, and remove crl.pem",
+        help: "make a keystore with another CA for the enclaves that stay, and remove crl.pem",
         gravity: Gravity::Dishonoured,
     })
 }

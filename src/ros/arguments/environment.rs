@@ -30,7 +30,7 @@ pub struct Environment {
     /// The middleware of the nodes around (`RMW_IMPLEMENTATION`), as typed: it decides how services
     /// are called.
     pub middleware: Option<String>,
-    /// What is asked of DDS security.
+    /// The request for DDS security.
     pub security: SecurityRequest,
 }
 

@@ -16,7 +16,7 @@ use super::enclave;
 /// The enclave of a process that names none.
 pub(super) const ROOT: &str = "/";
 
-/// What the environment asks of DDS security, as typed.
+/// The environment's request for DDS security, as typed.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct SecurityRequest {
     /// `ROS_SECURITY_ENABLE`: on if exactly `true`.
@@ -29,12 +29,12 @@ pub struct SecurityRequest {
     pub enclave: Option<String>,
 }
 
-/// How a process takes part; the default is in the clear, with nobody who asked for anything else.
+/// How a process takes part; the default is in the clear, with no request for anything else.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Security {
     /// The folder of the enclave whose keys are used; none in the clear, as always without the feature `security`.
     pub enclave: Option<PathBuf>,
-    /// What was asked for and is not given.
+    /// The request that is not met.
     pub warnings: Vec<String>,
 }
 
@@ -133,7 +133,7 @@ impl SecurityRequest {
         (None, vec![fault])
     }
 
-    /// What asks for security though it is not on.
+    /// Requests for security though it is not on.
     fn unheeded(&self, argument: Option<&str>) -> Option<String> {
         let asked = [
             self.enable

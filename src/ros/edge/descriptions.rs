@@ -1,4 +1,4 @@
-//! What a node's messages are made of, for peers without their files: `~/get_type_description`.
+//! Descriptions of a node's messages, for peers without their files: `~/get_type_description`.
 
 use super::{EdgeError, Node, Service};
 use crate::messages::said;

@@ -11,7 +11,7 @@ pub const PARTICIPANTS: u16 = 120;
 /// The end that announces a participant.
 pub const ANNOUNCER: [u8; 4] = [0, 1, 0, 0xc2];
 
-/// What follows the head of a DATA submessage.
+/// The part behind the head of a DATA submessage.
 pub enum Content<'a> {
     /// Serialised, encapsulation included.
     Payload(&'a [u8]),

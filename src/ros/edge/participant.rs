@@ -85,7 +85,7 @@ impl Edge {
         Ok(Self { shared: Arc::new(shared) })
     }
 
-    /// Joins a domain with the keys of an enclave, as those who may.
+    /// Joins a domain with the keys of an enclave.
     ///
     /// # Errors
     /// As [`Edge::open`], and keys, permissions or a governance that do not admit it to the domain.

@@ -178,7 +178,7 @@ impl Pulse {
     }
 }
 
-/// What shows that the middleware listens.
+/// Evidence that the middleware is receiving.
 enum Proof {
     Sample(Box<Loop>),
     /// Of a secured participant, which takes no sample that it has not authenticated.

@@ -14,7 +14,7 @@ use super::door;
 use super::graph::prefix;
 use super::packet::{discovery_port, numbered};
 
-/// Bytes of a packet by which it is told from the next \[B\].
+/// Bytes of a packet that distinguish it from the next \[B\].
 const HEAD: usize = 256;
 
 /// The queue and what was last seen of it.

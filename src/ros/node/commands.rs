@@ -20,7 +20,7 @@ pub enum NodeCommand {
     ChangeState(&'static str),
 }
 
-/// What came of a command: what was done, or the reason why not.
+/// The outcome of a command: what was done, or the reason why not.
 pub type Answer = Result<String, String>;
 
 /// Commands of the program around the node that are taken in a period at most.

@@ -18,7 +18,7 @@ use crate::ros::edge::parameters::Parameters;
 use crate::swarm::control::{Control, Mode};
 use crate::swarm::pace::Pace;
 
-/// What transitions change, beside the machine that asks for them.
+/// The state that transitions change, beside the machine that asks for them.
 pub(super) struct Transitions<'a> {
     origin: &'a mut Origin,
     control: &'a mut Control,

@@ -10,7 +10,7 @@ pub struct RawAction {
     /// First step at which it holds [step].
     #[schemars(range(min = 1))]
     pub at: usize,
-    /// What is done.
+    /// The change.
     pub what: RawActionKind,
 }
 

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::raw::*;
-use super::{Leaders, Program, Shape, Who};
+use super::{Leaders, Picked, Program, Shape};
 use crate::flock::motion::{Interpolation, Keyframe, Motion};
 use crate::scene::document::problem::SceneError;
 use crate::scene::text;
@@ -17,9 +17,9 @@ pub fn leaders(
 ) -> Result<Vec<Leaders>, SceneError> {
     let entry = |(k, entry): (usize, &RawLeaders)| {
         let key = format!("leaders[{k}]");
-        let who = match (&entry.robots[..], &entry.region) {
+        let picked = match (&entry.robots[..], &entry.region) {
             ([], Some(region)) if matches!(shape, Shape::Body(_)) => {
-                Who::Region(roles::region(&key, region, refuse)?)
+                Picked::Region(roles::region(&key, region, refuse)?)
             }
             ([], Some(_)) => {
                 let message =
@@ -30,13 +30,13 @@ pub fn leaders(
                 let help = "name the robots (robots = [\"r1\"]) or give a region";
                 return Err(refuse(&key, "this entry names no leader".into(), help));
             }
-            (names, None) => Who::Names(names.to_vec()),
+            (names, None) => Picked::Names(names.to_vec()),
             (_, Some(_)) => {
                 let message = "both names and a region are given".into();
                 return Err(refuse(&format!("{key}.region"), message, "keep one of them"));
             }
         };
-        Ok(Leaders { who, program: program(&key, &entry.program, raw, folder, refuse)? })
+        Ok(Leaders { robots: picked, program: program(&key, &entry.program, raw, folder, refuse)? })
     };
     raw.leaders.iter().enumerate().map(entry).collect()
 }

@@ -73,14 +73,14 @@ pub struct Recording {
 #[derive(Clone, Debug)]
 pub struct Leaders {
     /// Which robots.
-    pub who: Who,
+    pub robots: Picked,
     /// How they move.
     pub program: Program,
 }
 
 /// Robots by name or by place.
 #[derive(Clone, Debug)]
-pub enum Who {
+pub enum Picked {
     /// Robots with these names.
     Names(Vec<String>),
     /// Robots whose places in the formation lie in a region of the lattice.

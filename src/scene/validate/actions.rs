@@ -89,7 +89,7 @@ pub fn is_changeable(text: &str) -> bool {
     CHANGEABLE.contains(&table)
 }
 
-/// The scene with these keys changed from the start. Of its actions it has the cuts, with which not every rule goes.
+/// The scene with these keys changed from the start. Keeps only its cut actions, which some rules do not support.
 fn changed(
     name: &str,
     document: &Document,

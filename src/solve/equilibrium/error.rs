@@ -18,7 +18,7 @@ pub enum SolveError {
     /// A force, a held displacement or a result of the solve is not finite.
     #[error("the {what} of particle {particle} is not finite")]
     NotFinite {
-        /// What the messages call it.
+        /// Its name in messages.
         what: &'static str,
         /// Id of the particle.
         particle: usize,
@@ -26,7 +26,7 @@ pub enum SolveError {
     /// The tolerance does not lie between 0 and 1.
     #[error("the tolerance must lie between 0 and 1, but it is {tolerance}")]
     Tolerance {
-        /// What was asked for \[1\].
+        /// The value asked for \[1\].
         tolerance: f64,
     },
     /// The tolerance is finer than single precision.
@@ -34,7 +34,7 @@ pub enum SolveError {
         "single precision reaches a relative residual of {floor:e} at best, but {tolerance:e} is asked for"
     )]
     SinglePrecision {
-        /// What was asked for \[1\].
+        /// The value asked for \[1\].
         tolerance: f64,
         /// Least tolerance that single precision is asked for \[1\].
         floor: f64,
@@ -97,7 +97,7 @@ pub enum SolveError {
     Factorisation {
         /// Unknowns of the system.
         unknowns: usize,
-        /// What the library said.
+        /// The error of the library.
         reason: String,
     },
     /// The request's [`Interrupt`](crate::solve::interrupt::Interrupt) was raised.

@@ -51,7 +51,7 @@ pub struct Comparison {
 pub struct Sides<'a> {
     /// Cells between the particles.
     pub cells: &'a Cells,
-    /// What the cells are made of.
+    /// Material of the cells.
     pub elastic: &'a Elastic,
     /// Which turns of a cell are no strain.
     pub rotation: Rotation,

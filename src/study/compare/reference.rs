@@ -30,11 +30,11 @@ pub struct Setting<'a> {
     pub reference: &'a Vectors,
     /// Distance of neighbouring particles \[length\].
     pub spacing: f64,
-    /// What the shape is made of, but for its inclusions.
+    /// Material of the shape without its inclusions.
     pub elastic: &'a Elastic,
     /// Whether the body may turn far.
     pub rotation: Rotation,
-    /// What holds it and where to; where supports overlap the later one holds.
+    /// Its supports and where they hold it; where supports overlap the later one holds.
     pub supports: Vec<Support<'a>>,
     /// On the outline, over the thickness of the sheet. A force on a particle acts at a point: there, and only there, the
     /// truth grows with the logarithm of the refinement.

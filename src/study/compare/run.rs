@@ -44,7 +44,7 @@ pub struct Compared {
     pub comparison: Comparison,
     /// How the rule's run ended.
     pub outcome: Outcome,
-    /// What the rule is compared with.
+    /// The reference that the rule is compared with.
     pub truth: SceneTruth,
     /// Cells over which stress and energy are taken.
     pub cells: Cells,
@@ -161,7 +161,7 @@ pub fn plan_led_by(scene: &Scene, truth: &Reference) -> Result<Plan, SceneError>
     })
 }
 
-/// The truth knows one body and one state of rest.
+/// The reference covers one body in one equilibrium state.
 fn require_comparable(scene: &Scene) -> Result<(), SceneError> {
     if scene.material.is_none() {
         return Err(without_material(scene));

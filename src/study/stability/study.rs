@@ -14,7 +14,7 @@ use crate::scene::SceneError;
 /// A threshold from both sides.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Threshold {
-    /// What is varied.
+    /// The parameter that is varied.
     pub parameter: Parameter,
     /// Which end of the stable range it is.
     pub side: Side,
@@ -42,7 +42,7 @@ impl Threshold {
 /// Spectrum and runs over the whole range of a parameter.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Sweep {
-    /// What is varied.
+    /// The parameter that is varied.
     pub parameter: Parameter,
     /// The scene's own value.
     pub present: f64,

@@ -77,7 +77,7 @@ impl Subject {
         }
     }
 
-    /// What `MT` of Eq. 4 is, for feedback that is added as well.
+    /// The meaning of `MT` of Eq. 4, for feedback that is added as well.
     pub fn feedback_reference(&self) -> FeedbackReference {
         self.plan.setup.flock.rule.feedback.map_or(FeedbackReference::Initial, |f| f.reference)
     }

@@ -33,7 +33,7 @@ pub enum Outcome {
 /// A setting with what it costs and how far it is from the truth.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Point {
-    /// What was tried.
+    /// The setting that was tried.
     #[serde(flatten)]
     pub setting: Setting,
     /// Number of particles; 0 where the body was refused.
@@ -44,7 +44,7 @@ pub struct Point {
     pub seconds: Option<f64>,
     /// Iterations of the solver.
     pub iterations: Option<usize>,
-    /// What came of it.
+    /// The outcome.
     #[serde(flatten)]
     pub outcome: Outcome,
 }

@@ -177,7 +177,7 @@ impl Control {
         self.period
     }
 
-    /// What the loop does with targets.
+    /// The loop's way with targets.
     pub fn mode(&self) -> Mode {
         self.mode
     }
@@ -225,7 +225,7 @@ impl Control {
         verdict
     }
 
-    /// What arrives at `now` \[s\], of whatever kind.
+    /// All messages that arrive at `now` \[s\].
     ///
     /// # Errors
     /// As [`Control::receive`].

@@ -30,7 +30,7 @@ pub enum NodeScopeError {
     NotAlone {
         /// Name of the robot.
         name: String,
-        /// What it depends on.
+        /// The setting that it depends on.
         why: &'static str,
     },
 }

@@ -10,7 +10,7 @@ use crate::swarm::watch::Health;
 pub struct FormationState {
     /// Ticks since the loop began.
     pub tick: u64,
-    /// What the loop does with targets.
+    /// The loop's way with targets.
     pub mode: Mode,
     /// \[m\]; absent where the rule has no single place of rest.
     pub formation_error: Option<f64>,

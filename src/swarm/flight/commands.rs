@@ -1,4 +1,4 @@
-//! What is done from outside while robots fly: leaders sent to places, obstacles moved, poses made worse.
+//! Commands from outside while robots fly: leaders sent to places, obstacles moved, poses made worse.
 
 use super::{Flight, faults};
 use crate::scene::SceneError;

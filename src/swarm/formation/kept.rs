@@ -18,7 +18,7 @@ pub enum KeptLead {
     },
     /// With the other leaders.
     Manoeuvre {
-        /// What they fly.
+        /// The motion that they fly.
         manoeuvre: KeptManoeuvre,
         /// Time from which on \[s\].
         since: f64,

@@ -15,7 +15,7 @@ use crate::flock::vectors::{Vectors, distance};
 use crate::material::cells::Cells;
 use crate::scene::raw::{RawRest, RawWeights};
 use crate::scene::swarm::raw::RawLinks;
-use crate::scene::swarm::{Program, Recording, Shape, Swarm, Who};
+use crate::scene::swarm::{Picked, Program, Recording, Shape, Swarm};
 use crate::scene::{RoleEntry, Scene, SceneError, SceneRegion};
 use crate::solve::affine_weights;
 use crate::sweep::Update;
@@ -209,9 +209,9 @@ fn leads(
 ) -> Result<Vec<Option<(usize, Lead)>>, SceneError> {
     let mut leads = vec![None; names.len()];
     for (k, entry) in swarm.leaders.iter().enumerate() {
-        let members = match &entry.who {
-            Who::Region(region) => pick(k, region)?,
-            Who::Names(wanted) => wanted
+        let members = match &entry.robots {
+            Picked::Region(region) => pick(k, region)?,
+            Picked::Names(wanted) => wanted
                 .iter()
                 .enumerate()
                 .map(|(n, name)| {

@@ -16,7 +16,7 @@ const ROUNDING: f64 = 1e-9;
 pub struct Exactness {
     /// The motions of the leaders that every follower takes part in exactly: `shift`, `turn`, `stretch`, `shear`.
     pub exact: Vec<&'static str>,
-    /// What becomes of each manoeuvre.
+    /// The error of each manoeuvre.
     pub manoeuvres: Vec<ManoeuvreError>,
 }
 

@@ -101,7 +101,7 @@ fn numbers_that_are_next_to_nothing_are_said_in_words() {
     plan.convergence = Some(Convergence { factor: 7.9e-31, half_life_s: Some(0.1) });
     plan.noise.gain = Some(1e-9);
     let words = plan.to_string();
-    assert!(words.contains("less than 0.001 is left") && words.contains("do not hear"), "{words}");
+    assert!(words.contains("less than 0.001 is left") && words.contains("does not reach"), "{words}");
     assert!(!words.contains("e-31") && !words.contains("0.000 of"), "{words}");
 }
 

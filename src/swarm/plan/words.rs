@@ -4,7 +4,7 @@ use std::fmt;
 
 use super::{Convergence, DelayMargin, Exactness, ManoeuvreError, ManoeuvreSpeed, SpeedMargin, SwarmPlan};
 
-/// What is less reads as nothing to three places.
+/// Smaller values read as zero to three places.
 const NOTHING: f64 = 0.001;
 
 fn half_life(half: Option<f64>) -> String {
@@ -39,7 +39,12 @@ impl fmt::Display for SwarmPlan {
                 )?;
                 let delayed = half_life(self.delay.half_life_s);
                 let simulated = self.delay.simulated_s;
-                line("delay", format!("slows, never makes grow: with {simulated:.3} s it halves {delayed}"))?;
+                line(
+                    "delay",
+                    format!(
+                        "slows convergence, never destabilises: with {simulated:.3} s the error halves {delayed}"
+                    ),
+                )?;
             }
             None => {
                 line("comes to rest", format!("not predicted: {}", self.not_predicted.unwrap_or_default()))?
@@ -52,7 +57,9 @@ impl fmt::Display for SwarmPlan {
         )?;
         match self.noise.gain {
             None => {}
-            Some(gain) if gain < NOTHING => line("noise", "followers do not hear that of the poses".into())?,
+            Some(gain) if gain < NOTHING => {
+                line("noise", "the noise of poses does not reach the targets of followers".into())?
+            }
             Some(gain) => line(
                 "noise",
                 format!("a follower moves by up to {gain:.3} of the poses' standard deviation"),
@@ -89,7 +96,7 @@ impl fmt::Display for SwarmPlan {
 }
 
 impl Exactness {
-    /// What is followed exactly, and how far each manoeuvre is from that, a line each.
+    /// The motions that are followed exactly, and how far each manoeuvre is from that, a line each.
     pub fn in_words(&self) -> Vec<String> {
         let exact = match &self.exact[..] {
             [] => "no motion of the leaders is followed exactly".to_owned(),

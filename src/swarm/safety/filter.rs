@@ -131,7 +131,7 @@ impl Filter {
         Ok(())
     }
 
-    /// What members are kept away from.
+    /// Obstacles that members are kept away from.
     pub fn obstacles(&self) -> &Obstacles {
         &self.obstacles
     }

@@ -57,11 +57,11 @@ pub enum SafetyError {
     Limit {
         /// Which limit.
         name: &'static str,
-        /// What was given, in the limit's unit.
+        /// The given value, in the limit's unit.
         value: f64,
         /// The range, in words.
         range: &'static str,
-        /// What holds where it is left out, in words.
+        /// The default, in words.
         default: &'static str,
     },
     /// A member's radius is negative or not finite.
@@ -69,7 +69,7 @@ pub enum SafetyError {
     Radius {
         /// Number of the member.
         member: usize,
-        /// What was given \[m\].
+        /// The given value \[m\].
         radius: f64,
     },
     /// A polygon of one or two corners, or none.
@@ -107,7 +107,7 @@ pub enum SafetyError {
     Disc {
         /// Which shape.
         place: Place,
-        /// What was given \[m\].
+        /// The given value \[m\].
         radius: f64,
     },
 }

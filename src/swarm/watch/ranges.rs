@@ -214,7 +214,7 @@ mod tests {
         for (m, &place) in PLACES[..4].iter().enumerate() {
             watch.receive(m, pose(place, 0.0), 0.0).expect("a first pose");
         }
-        watch.receive(4, pose([9.0, 9.0], 0.0), 0.0).expect("nobody has measured yet");
+        watch.receive(4, pose([9.0, 9.0], 0.0), 0.0).expect("nothing was measured yet");
         assert_eq!(watch.position(4), Some([9.0, 9.0]));
         let verdicts = period(&mut watch, 0.1, [9.0, 9.0], true_distance);
         assert!(verdicts[4].is_err() && verdicts[..4].iter().all(Result::is_ok));

@@ -47,8 +47,8 @@ export function remember() {
   waiting = setTimeout(() => {
     const changed = Object.entries(present()).filter(([name, value]) => value !== plain[name]);
     // Layers go with the colour until they are chosen.
-    const told = changed.filter(([name]) => name !== "layers" || state.hasChosenLayers);
-    const hash = told.length ? `#${new URLSearchParams(told)}` : "";
+    const kept = changed.filter(([name]) => name !== "layers" || state.hasChosenLayers);
+    const hash = kept.length ? `#${new URLSearchParams(kept)}` : "";
     if (hash === location.hash) return;
     try {
       history.replaceState(null, "", hash || location.pathname + location.search);

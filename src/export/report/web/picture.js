@@ -12,7 +12,7 @@ const GAP = 12;
 const TITLE = 22;
 const LINE = 18;
 const BAR = { width: 300, height: 12 };
-// More dots and lines than this would make a file that nobody can open: they go in as the picture they are.
+// More dots and lines than this would make a file too large to open: they go in as the picture they are.
 const MOST_VECTORS = 20000;
 
 export function savePicture() {

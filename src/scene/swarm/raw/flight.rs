@@ -45,7 +45,7 @@ pub struct RawFlight {
     /// Faults of single robots.
     #[serde(default)]
     pub faults: Vec<RawFault>,
-    /// What is done from outside on the way, by ascending period.
+    /// Commands from outside on the way, by ascending period.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(max = 200000))]
     pub commands: Vec<RawCommand>,
@@ -159,7 +159,7 @@ pub enum RawFaultKind {
 pub struct RawCommand {
     /// Periods flown before [period].
     pub after: u64,
-    /// What is done.
+    /// The change.
     pub what: RawCommandKind,
 }
 

@@ -31,7 +31,7 @@ pub enum Outcome {
         error: f64,
         /// Greatest error that counts as right.
         within: f64,
-        /// What the answer was held against, in words.
+        /// The reference of the answer, in words.
         check: String,
     },
     /// The program said that it could not, and why.
@@ -45,7 +45,7 @@ pub enum Outcome {
         error: Option<f64>,
         /// Greatest error that counts as right.
         within: f64,
-        /// What the answer was held against, in words.
+        /// The reference of the answer, in words.
         check: String,
     },
 }
@@ -87,11 +87,11 @@ impl fmt::Display for Outcome {
 /// One extreme.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Case {
-    /// What is extreme, in words.
+    /// The extreme, in words.
     pub name: String,
     /// The body of the case.
     pub body: String,
-    /// What came of it.
+    /// The outcome.
     #[serde(flatten)]
     pub outcome: Outcome,
 }
