@@ -11,6 +11,7 @@ mod rejection;
 mod track;
 
 pub use limits::WatchLimits;
+use ranges::Measured;
 pub use ranges::{Range, RangeLimits};
 pub use rejection::{Counts, Rejection};
 pub use track::{Gains, Track};
@@ -66,8 +67,8 @@ impl Health {
 pub struct Watch {
     limits: WatchLimits,
     members: Vec<Member>,
-    /// The newest ranges of each member, by ascending observer.
-    ranges: Vec<Vec<Range>>,
+    /// The latest ranges of each member, by ascending observer.
+    ranges: Vec<Vec<Measured>>,
     /// Latest time seen \[s\].
     clock: Option<f64>,
 }

@@ -5,6 +5,9 @@
 //! passes only for observers from which the false place is as far as the true one, and these lie on one line, the
 //! perpendicular bisector of the two places. So every lie beyond the tolerance is found where more honest observers
 //! than may lie stand beside any such line.
+//!
+//! Ranges of the last while are kept, each with the place of its observer at the time: a pose is held against those of its
+//! own time, whatever time it claims, and gains nothing by a stamp of the past.
 
 use super::{Pose, Rejection, Watch, WatchLimits};
 use crate::flock::vectors::distance;
@@ -31,6 +34,39 @@ pub struct RangeLimits {
     pub max_liars: usize,
 }
 
+/// What one member has measured of another lately.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Measured {
+    observer: usize,
+    /// By ascending stamp, each with the observer's pose as it was known then.
+    kept: Vec<(Range, Option<Pose>)>,
+}
+
+/// Ranges of a pair that are kept, evenly spread over the time in which poses may be late.
+const MOST_KEPT: usize = 16;
+
+impl Measured {
+    /// Adds a range that is newer than all of them; those older than `age_limit` \[s\] go.
+    fn add(&mut self, range: Range, from: Option<Pose>, age_limit: f64) {
+        self.kept.retain(|(known, _)| range.stamp - known.stamp <= age_limit);
+        // The newest is always kept, those before it as far apart as there is room for.
+        if let [.., (before, _), (last, _)] = &self.kept[..]
+            && last.stamp - before.stamp < age_limit / MOST_KEPT as f64
+        {
+            self.kept.pop();
+        }
+        self.kept.push((range, from));
+    }
+
+    /// The one nearest in time to a stamp \[s\].
+    fn at(&self, stamp: f64) -> &(Range, Option<Pose>) {
+        let after = self.kept.partition_point(|(range, _)| range.stamp < stamp);
+        let near = self.kept[after.saturating_sub(1)..].iter().take(2);
+        let away = |(range, _): &(Range, Option<Pose>)| (range.stamp - stamp).abs();
+        near.min_by(|a, b| away(a).total_cmp(&away(b))).expect("one at least is kept")
+    }
+}
+
 impl Watch {
     /// Takes in a range that arrives at `now` \[s\]; of one pair's the newest counts. False for one that is of no use:
     /// not finite, negative, of a member by itself, from the future, or too old to be compared.
@@ -46,11 +82,14 @@ impl Watch {
         if observer == of || !is_in_time || !distance.is_finite() || distance < 0.0 {
             return false;
         }
+        let (from, age_limit) = (self.pose(observer), self.limits.age_limit);
         let ranges = &mut self.ranges[of];
         match ranges.binary_search_by_key(&observer, |known| known.observer) {
-            Ok(place) if ranges[place].stamp < stamp => ranges[place] = range,
+            Ok(place) if ranges[place].kept.last().is_none_or(|(last, _)| last.stamp < stamp) => {
+                ranges[place].add(range, from, age_limit);
+            }
             Ok(_) => {}
-            Err(place) => ranges.insert(place, range),
+            Err(place) => ranges.insert(place, Measured { observer, kept: vec![(range, from)] }),
         }
         true
     }
@@ -71,12 +110,16 @@ impl Watch {
     fn contradicted(&self, member: usize, pose: &Pose) -> Result<(), Rejection> {
         let Some(RangeLimits { tolerance, max_liars }) = self.limits.ranges else { return Ok(()) };
         let (mut measured, mut against) = (0, 0);
-        for range in &self.ranges[member] {
-            let Some(observer) = self.pose(range.observer) else { continue };
+        for one in &self.ranges[member] {
+            let Some(present) = self.pose(one.observer) else { continue };
+            let (range, then) = one.at(pose.stamp);
             if (pose.stamp - range.stamp).abs() > self.limits.age_limit {
                 continue;
             }
             measured += 1;
+            // The pose known at the time, or the present one: the nearer in time.
+            let away = |observer: &Pose| (observer.stamp - range.stamp).abs();
+            let observer = then.filter(|then| away(then) <= away(&present)).unwrap_or(present);
             let allowed = tolerance
                 + self.limits.way(pose.stamp - range.stamp)
                 + self.limits.way(observer.stamp - range.stamp);
@@ -223,6 +266,31 @@ mod tests {
     }
 
     #[test]
+    fn a_false_place_of_the_past_gains_nothing_by_its_stamp() {
+        let mut watch = watch();
+        let mut verdicts = Vec::new();
+        for step in 0..40 {
+            let now = 0.05 * f64::from(step);
+            for observer in 0..4 {
+                let range = Range { observer, of: 4, distance: true_distance(observer, 4), stamp: now };
+                assert!(watch.receive_range(range, now));
+            }
+            watch.look(now);
+            for (m, &place) in PLACES[..4].iter().enumerate() {
+                watch.receive(m, pose(place, now), now).expect("no one measures it");
+            }
+            // At the speed of 1 m/s that poses are allowed it may have come 0.9 m in the 0.9 s since.
+            verdicts.push(watch.receive(4, pose([2.7, 2.0], now - 0.9), now));
+        }
+        let late = verdicts[20..].iter();
+        assert!(
+            late.clone().all(|verdict| matches!(verdict, Err(Rejection::Contradicted { .. }))),
+            "{verdicts:?}"
+        );
+        assert!(watch.ranges[4].iter().all(|one| one.kept.len() <= MOST_KEPT + 2), "few are kept");
+    }
+
+    #[test]
     fn ranges_that_say_nothing_are_left_out() {
         let mut watch = watch();
         let range = Range { observer: 0, of: 1, distance: 4.0, stamp: 10.0 };
@@ -241,7 +309,8 @@ mod tests {
             watch.receive_range(Range { distance: 99.0, stamp: 9.9, ..range }, 10.0),
             "late, and no harm"
         );
-        assert_eq!(watch.ranges[1], [range], "the newest counts");
+        assert_eq!(watch.ranges[1].len(), 1);
+        assert_eq!(watch.ranges[1][0].kept, [(range, None)], "the newest counts");
         // A clock that is set back makes them worthless.
         watch.look(1.0);
         assert!(watch.ranges[1].is_empty());
