@@ -580,6 +580,7 @@ fn refuse_outline(scene: &Scene, error: &OutlineError) -> SceneError {
             let key = if *ring == 0 { "body.shape".into() } else { format!("body.holes[{}]", ring - 1) };
             (key, "give its corners in order, once around")
         }
+        OutlineError::TooDense { .. } => ("body.shape".into(), "or set body.outline = \"lattice\""),
     };
     scene.refuse(&key, error.to_string(), help)
 }

@@ -9,7 +9,7 @@ use super::numbering::Numbering;
 use super::vectors::Vectors;
 use super::window::Window;
 use crate::geometry::disjoint_sets::DisjointSets;
-use crate::geometry::locate::Locator;
+use crate::geometry::locate::RowLocator;
 use crate::geometry::outline::Place;
 use crate::geometry::shape::Shape;
 
@@ -281,6 +281,17 @@ struct SiteMap {
 }
 
 impl SiteMap {
+    /// Marks the sites of a row that are particles of the body.
+    fn mark_row(&mut self, row: i32, is_in: impl Fn(Site) -> bool) {
+        for column in self.window.low[0]..self.window.low[0] + self.window.columns as i32 {
+            if is_in([column, row])
+                && let Some(cell) = self.window.number([column, row])
+            {
+                self.cells[cell] = BODY;
+            }
+        }
+    }
+
     fn cut(lattice: &Lattice, cut: &Cut, margin: Site) -> Result<Self, BodyError> {
         let (low, high) = window(lattice, cut)?;
         let wider = |site: Site, by: i32| [site[0] + by * margin[0], site[1] + by * margin[1]];
@@ -290,26 +301,27 @@ impl SiteMap {
         }
         let mut map = Self { window, cells: vec![NOTHING; window.count() as usize] };
         let tolerance = 1e-9 * lattice.spacing();
-        let is_in: Box<dyn Fn(Site) -> bool> = match cut {
+        match cut {
             Cut::Count { columns, rows } => {
                 let steps = columns_per_site(lattice);
                 let within = |value: i32, most: u32| value >= 0 && i64::from(value) < i64::from(most);
-                Box::new(move |site| within(site[0], steps * columns) && within(site[1], *rows))
+                for row in low[1]..=high[1] {
+                    map.mark_row(row, |site| {
+                        lattice.is_site(site) && within(site[0], steps * columns) && within(site[1], *rows)
+                    });
+                }
             }
             Cut::Shape(shape) => {
-                let locator = Locator::new(shape);
-                Box::new(move |site| locator.contains(lattice.position(site), tolerance))
-            }
-        };
-        let mut found = false;
-        for cell in 0..map.cells.len() {
-            let site = map.window.site(cell);
-            if lattice.is_site(site) && is_in(site) {
-                map.cells[cell] = BODY;
-                found = true;
+                let locator = RowLocator::new(shape, lattice.vector([1, 0]));
+                for row in low[1]..=high[1] {
+                    let of_shape = locator.row(lattice.position([low[0], row]));
+                    map.mark_row(row, |site| {
+                        lattice.is_site(site) && of_shape.contains(lattice.position(site), tolerance)
+                    });
+                }
             }
         }
-        if found {
+        if map.cells.contains(&BODY) {
             return Ok(map);
         }
         let (low, high) = match cut {

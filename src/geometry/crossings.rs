@@ -15,6 +15,9 @@ struct Chord {
     high: Point,
 }
 
+/// Comparisons of two chords that are made at most: half a second.
+const MOST_PAIRS: usize = 50_000_000;
+
 /// Refuses loops of which two chords come nearer than `near` \[length\] and are not neighbours.
 pub(super) fn check(rings: &[Vec<Piece>], near: f64) -> Result<(), OutlineError> {
     let chords = chords(rings);
@@ -49,9 +52,13 @@ fn check_pairs<I: Iterator<Item = usize>>(
     let mut counts = vec![0; chords.iter().map(|chord| chord.ring + 1).max().unwrap_or(0)];
     chords.iter().for_each(|chord| counts[chord.ring] += 1);
     let mut ahead: Vec<usize> = Vec::new();
+    let mut compared = 0;
     for (k, a) in chords.iter().enumerate() {
         ahead.clear();
-        ahead.extend(around(a).filter(|&other| other > k));
+        ahead.extend(around(a).inspect(|_| compared += 1).filter(|&other| other > k));
+        if compared > MOST_PAIRS {
+            return Err(OutlineError::TooDense { count: chords.len() });
+        }
         ahead.sort_unstable();
         let ahead = ahead.iter().map(|&other| &chords[other]);
         let is_near = |b: &&Chord| {

@@ -3,7 +3,7 @@
 use super::box_tree::BoxTree;
 use super::outline::{Outline, Place};
 use super::piece::{Piece, distance, is_inside};
-use super::shape::{Shape, path_contains, polygon_contains};
+use super::shape::{Segment, Shape, crossing, path_contains, polygon_contains, segment_distance};
 
 type Point = [f64; 2];
 
@@ -17,7 +17,6 @@ enum Located<'a> {
     Simple(&'a Shape),
     Polygon {
         vertices: &'a [Point],
-        /// Of the edges, each numbered as the vertex at which it begins.
         tree: BoxTree,
     },
     Path {
@@ -34,13 +33,7 @@ impl<'a> Locator<'a> {
     /// Sorts the boundary of a shape.
     pub fn new(shape: &'a Shape) -> Self {
         Self(match shape {
-            Shape::Polygon { vertices } => {
-                let bounds = |k: usize| {
-                    let (a, b) = (vertices[k], vertices[(k + 1) % vertices.len()]);
-                    ([0, 1].map(|axis| a[axis].min(b[axis])), [0, 1].map(|axis| a[axis].max(b[axis])))
-                };
-                Located::Polygon { vertices, tree: BoxTree::new((0..vertices.len()).map(bounds)) }
-            }
+            Shape::Polygon { vertices } => Located::Polygon { vertices, tree: tree_of_edges(vertices) },
             Shape::Path { pieces } => Located::Path { pieces, tree: tree_of(pieces.iter()) },
             Shape::WithHoles { body, holes } => Located::WithHoles {
                 body: Box::new(Self::new(body)),
@@ -66,6 +59,134 @@ impl<'a> Locator<'a> {
             }
         }
     }
+}
+
+/// A shape to be asked about points in rows: where a row crosses the boundary is found once for all of its points.
+#[derive(Clone, Debug)]
+pub struct RowLocator<'a> {
+    located: RowLocated<'a>,
+    /// Cosine and sine of the rows' direction.
+    turn: Point,
+}
+
+#[derive(Clone, Debug)]
+enum RowLocated<'a> {
+    Polygon {
+        /// Along and across the rows.
+        vertices: Vec<Point>,
+        tree: BoxTree,
+    },
+    WithHoles {
+        body: Box<RowLocator<'a>>,
+        holes: Vec<RowLocator<'a>>,
+    },
+    /// Of few pieces, or of arcs.
+    Other(Locator<'a>),
+}
+
+impl<'a> RowLocator<'a> {
+    /// Sorts the boundary of a shape for rows in this direction, of any length but 0.
+    pub fn new(shape: &'a Shape, direction: Point) -> Self {
+        let length = direction[0].hypot(direction[1]);
+        let turn = direction.map(|along| along / length);
+        let located = match shape {
+            Shape::Polygon { vertices } => {
+                let vertices: Vec<Point> = vertices.iter().map(|&vertex| turned(turn, vertex)).collect();
+                let tree = tree_of_edges(&vertices);
+                RowLocated::Polygon { vertices, tree }
+            }
+            Shape::WithHoles { body, holes } => RowLocated::WithHoles {
+                body: Box::new(Self::new(body, direction)),
+                holes: holes.iter().map(|hole| Self::new(hole, direction)).collect(),
+            },
+            other => RowLocated::Other(Locator::new(other)),
+        };
+        Self { located, turn }
+    }
+
+    /// The row through a point.
+    pub fn row(&self, through: Point) -> Row<'_> {
+        let [_, across] = turned(self.turn, through);
+        let parts = match &self.located {
+            RowLocated::Polygon { vertices, tree } => {
+                let low = [f64::NEG_INFINITY, across];
+                let near = tree.overlapping(low, [f64::INFINITY, across]);
+                let mut crossings: Vec<f64> =
+                    near.filter_map(|k| crossing(edge(vertices, k), across)).collect();
+                crossings.sort_unstable_by(f64::total_cmp);
+                RowParts::Polygon { vertices, tree, crossings }
+            }
+            RowLocated::WithHoles { body, holes } => RowParts::WithHoles {
+                body: Box::new(body.row(through)),
+                holes: holes.iter().map(|hole| hole.row(through)).collect(),
+            },
+            RowLocated::Other(locator) => RowParts::Other(locator),
+        };
+        Row { parts, turn: self.turn }
+    }
+}
+
+/// A row of points, and where it crosses the boundary of a shape.
+pub struct Row<'r> {
+    parts: RowParts<'r>,
+    turn: Point,
+}
+
+enum RowParts<'r> {
+    Polygon {
+        vertices: &'r [Point],
+        tree: &'r BoxTree,
+        /// Along the row, ascending.
+        crossings: Vec<f64>,
+    },
+    WithHoles {
+        body: Box<Row<'r>>,
+        holes: Vec<Row<'r>>,
+    },
+    Other(&'r Locator<'r>),
+}
+
+impl Row<'_> {
+    /// As [`Shape::contains`], of a point of the row.
+    pub fn contains(&self, point: Point, tolerance: f64) -> bool {
+        match &self.parts {
+            RowParts::Polygon { vertices, tree, crossings } => {
+                let [along, across] = turned(self.turn, point);
+                let behind = crossings.len() - crossings.partition_point(|&crossing| crossing <= along);
+                // Twice the tolerance, as distances are rounded.
+                let near = 2.0 * tolerance.abs();
+                let beside = tree.overlapping([along - near, across - near], [along + near, across + near]);
+                let away = |k: usize| {
+                    let (a, b) = edge(vertices, k);
+                    segment_distance([along, across], a, b)
+                };
+                let nearest = beside.map(away).fold(f64::INFINITY, f64::min);
+                let inside = behind % 2 == 1;
+                if tolerance >= 0.0 { inside || nearest <= tolerance } else { inside && nearest > -tolerance }
+            }
+            RowParts::WithHoles { body, holes } => {
+                body.contains(point, tolerance) && !holes.iter().any(|hole| hole.contains(point, -tolerance))
+            }
+            RowParts::Other(locator) => locator.contains(point, tolerance),
+        }
+    }
+}
+
+/// Coordinates along and across rows.
+fn turned([cos, sin]: Point, [x, y]: Point) -> Point {
+    [cos * x + sin * y, cos * y - sin * x]
+}
+
+fn edge(vertices: &[Point], k: usize) -> Segment {
+    (vertices[k], vertices[(k + 1) % vertices.len()])
+}
+
+/// Of the edges of a polygon, each numbered as the vertex at which it begins.
+fn tree_of_edges(vertices: &[Point]) -> BoxTree {
+    BoxTree::new((0..vertices.len()).map(|k| {
+        let (a, b) = edge(vertices, k);
+        ([0, 1].map(|axis| a[axis].min(b[axis])), [0, 1].map(|axis| a[axis].max(b[axis])))
+    }))
 }
 
 /// An outline to be asked about many points.
@@ -183,6 +304,14 @@ mod tests {
                             expected,
                             "{seed} {tolerance} {p:?} {shape:?}"
                         );
+                        // A row in any direction goes through it; along x the answer is the same to the last bit.
+                        assert_eq!(
+                            RowLocator::new(&shape, [2.0, 0.0]).row(p).contains(p, tolerance),
+                            expected
+                        );
+                        let (sin, cos) = (0.1 * k as f64).sin_cos();
+                        let turned = RowLocator::new(&shape, [cos, sin]).row(p).contains(p, tolerance);
+                        assert!(turned == expected || k % 2 == 0, "{seed} {tolerance} {p:?} {shape:?}");
                         verdicts[usize::from(expected)] += 1;
                     }
                 }

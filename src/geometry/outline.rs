@@ -58,6 +58,14 @@ pub enum OutlineError {
         /// Where they meet \[length\].
         place: Point,
     },
+    /// So many pieces run side by side that to compare each with those beside it would take minutes.
+    #[error(
+        "too many of its {count} pieces run side by side to be checked for crossings: give fewer corners"
+    )]
+    TooDense {
+        /// Number of straight parts of all loops.
+        count: usize,
+    },
     /// A hole that begins outside the outer loop.
     #[error("hole {hole} does not lie inside the outer outline, but at ({:.6}, {:.6})", .place[0], .place[1])]
     Outside {

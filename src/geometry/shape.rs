@@ -97,6 +97,11 @@ impl Shape {
 /// The two ends of a straight line \[length\].
 pub type Segment = ([f64; 2], [f64; 2]);
 
+/// Where an edge crosses the line at this height; its lower end belongs to it, its upper one does not.
+pub fn crossing(([ax, ay], [bx, by]): Segment, y: f64) -> Option<f64> {
+    ((ay > y) != (by > y)).then(|| ax + (y - ay) / (by - ay) * (bx - ax))
+}
+
 /// Even-odd test; a negative tolerance shrinks the polygon. Edges are numbered as the vertices at which they begin; only
 /// those near the point or to the right of it count.
 pub(super) fn polygon_contains(
@@ -108,12 +113,9 @@ pub(super) fn polygon_contains(
     let mut inside = false;
     let mut nearest = f64::INFINITY;
     for k in edges {
-        let [ax, ay] = vertices[k];
-        let [bx, by] = vertices[(k + 1) % vertices.len()];
-        if (ay > y) != (by > y) && x < ax + (y - ay) / (by - ay) * (bx - ax) {
-            inside = !inside;
-        }
-        nearest = nearest.min(segment_distance([x, y], [ax, ay], [bx, by]));
+        let (a, b) = (vertices[k], vertices[(k + 1) % vertices.len()]);
+        inside ^= crossing((a, b), y).is_some_and(|crossing| x < crossing);
+        nearest = nearest.min(segment_distance([x, y], a, b));
     }
     if tolerance >= 0.0 { inside || nearest <= tolerance } else { inside && nearest > -tolerance }
 }

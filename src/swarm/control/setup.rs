@@ -101,6 +101,7 @@ pub fn filter(swarm: &Swarm, formation: &Formation) -> Result<Filter, SceneError
             | SafetyError::NotFinite { place }
             | SafetyError::NoArea { place }
             | SafetyError::Crossing { place, .. }
+            | SafetyError::TooDense { place, .. }
             | SafetyError::Disc { place, .. } => match place {
                 Place::Geofence => "limits.geofence".into(),
                 Place::Obstacle(k) => format!("obstacles[{k}]"),

@@ -102,6 +102,16 @@ pub enum SafetyError {
         /// Number of the other edge, from 0.
         second: usize,
     },
+    /// So many edges run side by side that to compare each with those beside it would take minutes.
+    #[error(
+        "{place}: too many of its {count} edges run side by side to be checked for crossings: give fewer corners"
+    )]
+    TooDense {
+        /// Which shape.
+        place: Place,
+        /// Number of edges.
+        count: usize,
+    },
     /// A disc has no size.
     #[error("{place} has radius {radius} m: give a positive number")]
     Disc {

@@ -15,7 +15,8 @@ use parry2d::shape::{Ball, Segment};
 
 use super::cell::{HalfPlane, nearest};
 use super::limits::{Place, SafetyError};
-use crate::geometry::shape::segments_cross;
+use crate::geometry::box_tree::BoxTree;
+use crate::geometry::shape::{crossing, segments_cross};
 
 /// A solid \[m, world frame\].
 #[derive(Clone, Debug, PartialEq)]
@@ -65,7 +66,6 @@ enum Piece {
 /// The border of one polygon.
 #[derive(Clone)]
 struct Outline {
-    corners: Vec<[f64; 2]>,
     low: [f64; 2],
     high: [f64; 2],
     /// The solid is all that lies outside: a fence.
@@ -73,6 +73,9 @@ struct Outline {
     /// Corners run anticlockwise.
     anticlockwise: bool,
 }
+
+/// Comparisons of two edges of a polygon that are made at most: half a second.
+const MOST_PAIRS: usize = 50_000_000;
 
 /// Largest coordinate accepted \[m\]: squares must not overflow.
 const LARGEST: f64 = 1e100;
@@ -145,7 +148,7 @@ impl Obstacles {
             }
         }
         let anticlockwise = twice_area > 0.0;
-        self.outlines.push(Outline { corners: corners.to_vec(), low, high, inverted, anticlockwise });
+        self.outlines.push(Outline { low, high, inverted, anticlockwise });
         self.within.push(false);
         Ok(())
     }
@@ -179,12 +182,11 @@ impl Obstacles {
             return;
         }
         let here = vector(place);
-        for (index, outline) in self.outlines.iter().enumerate() {
-            self.within[index] = outline.is_solid_at(place);
-            if self.within[index] {
-                planes.push(self.way_out(index, here, keep));
-            }
-        }
+        let mut within = std::mem::take(&mut self.within);
+        self.find_solids(place, &mut within);
+        let inside = (0..within.len()).filter(|&outline| within[outline]);
+        planes.extend(inside.map(|outline| self.way_out(outline, here, keep)));
+        self.within = within;
         let margin = Vector::splat((keep + reach).min(LARGEST));
         let near = Aabb::new(here - margin, here + margin);
         let way = (rest != place).then(|| Segment::new(here, vector(rest)));
@@ -208,6 +210,22 @@ impl Obstacles {
             let normal = self.towards(piece, from);
             let ahead = vector(normal).dot(from - here);
             planes.push(HalfPlane { normal, offset: distance - keep + ahead });
+        }
+    }
+
+    /// Finds for each outline whether the place lies in its solid; even-odd, by the edges to the right of it.
+    fn find_solids(&self, [x, y]: [f64; 2], within: &mut Vec<bool>) {
+        within.clear();
+        within.resize(self.outlines.len(), false);
+        let farthest = self.outlines.iter().fold(x, |far, outline| far.max(outline.high[0]));
+        for leaf in self.tree.intersect_aabb(&Aabb::new(vector([x, y]), vector([farthest, y]))) {
+            if let Piece::Edge { segment, outline } = &self.pieces[leaf as usize] {
+                let edge = (pair(segment.a), pair(segment.b));
+                within[*outline] ^= crossing(edge, y).is_some_and(|crossing| x < crossing);
+            }
+        }
+        for (within, outline) in within.iter_mut().zip(&self.outlines) {
+            *within = (*within && outline.is_boxed([x, y])) != outline.inverted;
         }
     }
 
@@ -248,15 +266,18 @@ impl Obstacles {
             |node: &parry2d::partitioning::BvhNode, _| node.aabb().distance_to_local_point(here, true),
             |leaf, _| Some(Distance(self.pieces[leaf as usize].distance(here))),
         );
-        let inside = self.outlines.iter().any(|outline| outline.is_solid_at(place));
+        let mut within = Vec::new();
+        self.find_solids(place, &mut within);
         let depth = |piece: &Piece| match piece {
-            Piece::Edge { segment, outline } if self.outlines[*outline].is_solid_at(place) => {
+            Piece::Edge { segment, outline } if within[*outline] => {
                 Some(segment.distance_to_local_point(here, true))
             }
             _ => None,
         };
         match border {
-            _ if inside => -self.pieces.iter().filter_map(depth).fold(f64::INFINITY, f64::min),
+            _ if within.contains(&true) => {
+                -self.pieces.iter().filter_map(depth).fold(f64::INFINITY, f64::min)
+            }
             Some((_, Distance(distance))) => distance,
             None => f64::INFINITY,
         }
@@ -351,19 +372,8 @@ impl Piece {
 }
 
 impl Outline {
-    /// Whether the place lies in the solid; even-odd.
-    fn is_solid_at(&self, [x, y]: [f64; 2]) -> bool {
-        let boxed = self.low[0] <= x && x <= self.high[0] && self.low[1] <= y && y <= self.high[1];
-        let mut inside = false;
-        if boxed {
-            for (k, &[ax, ay]) in self.corners.iter().enumerate() {
-                let [bx, by] = self.corners[(k + 1) % self.corners.len()];
-                if (ay > y) != (by > y) && x < ax + (y - ay) / (by - ay) * (bx - ax) {
-                    inside = !inside;
-                }
-            }
-        }
-        inside != self.inverted
+    fn is_boxed(&self, [x, y]: [f64; 2]) -> bool {
+        self.low[0] <= x && x <= self.high[0] && self.low[1] <= y && y <= self.high[1]
     }
 
     /// The edge's unit normal into the solid.
@@ -384,13 +394,24 @@ fn check_polygon(corners: &[[f64; 2]], place: Place) -> Result<f64, SafetyError>
         return Err(SafetyError::NotFinite { place });
     }
     let edge = |k: usize| (corners[k], corners[(k + 1) % count]);
+    let bounds = |k: usize| {
+        let (a, b) = edge(k);
+        ([0, 1].map(|axis| a[axis].min(b[axis])), [0, 1].map(|axis| a[axis].max(b[axis])))
+    };
+    let tree = BoxTree::new((0..count).map(bounds));
+    let mut compared = 0;
     for first in 0..count {
+        let (low, high) = bounds(first);
         // Neighbouring edges share a corner; they cannot cross, but they can lie on each other.
-        for second in first + 2..count {
+        let others = tree.overlapping(low, high).inspect(|_| compared += 1).filter(|&second| {
             let ((a, b), (c, d)) = (edge(first), edge(second));
-            if !(first == 0 && second == count - 1) && segments_cross(a, b, c, d) {
-                return Err(SafetyError::Crossing { place, first, second });
-            }
+            second >= first + 2 && !(first == 0 && second == count - 1) && segments_cross(a, b, c, d)
+        });
+        if let Some(second) = others.min() {
+            return Err(SafetyError::Crossing { place, first, second });
+        }
+        if compared > MOST_PAIRS {
+            return Err(SafetyError::TooDense { place, count });
         }
     }
     let [ox, oy] = corners[0];
