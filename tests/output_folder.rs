@@ -143,6 +143,16 @@ fn outputs_that_a_killed_program_had_put_aside_come_back() {
     assert!(out.join("summary.json").is_file());
 }
 
+#[test]
+fn a_folder_of_another_program_is_not_taken_for_former_outputs() {
+    let parent = temporary();
+    let (out, other) = (parent.path().join("out"), parent.path().join(".out.replaced"));
+    fs::create_dir(&other).expect("created");
+    fs::write(other.join("thesis.tex"), "years").expect("writable");
+    OutputFolder::create(&out, false).expect("the place is free").commit().expect("committed");
+    assert!(other.join("thesis.tex").is_file());
+}
+
 #[cfg(unix)]
 #[test]
 fn nothing_is_written_through_a_link() {

@@ -306,10 +306,11 @@ fn discard(partial: &Path) -> Result<(), ExportError> {
     fs::remove_dir(partial).or_else(|_| remove(partial))
 }
 
-/// A program that was killed while it replaced outputs has left them aside.
+/// A program that was killed while it replaced outputs has left them aside; a folder of that name that another program made is
+/// not touched.
 fn put_back(out: &Path) -> Result<(), ExportError> {
     let aside = beside(out, "replaced", 0);
-    match aside.exists() {
+    match Ours::in_folder(&aside).is_ok() {
         true if !out.exists() => rename(&aside, out),
         true => {
             if let Err(error) = remove(&aside) {
