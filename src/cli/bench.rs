@@ -81,16 +81,16 @@ pub enum BenchCommand {
 pub fn bench(command: BenchCommand) -> Result<(), Refusal> {
     match command {
         BenchCommand::Sweep { json, quick } => {
-            print_report(&bench::sweep::run(&bench::sweep::Options { quick })?, json);
+            print_report(&bench::sweep::run(&bench::sweep::Options { quick })?, json)?;
         }
         #[cfg(feature = "swarm")]
         BenchCommand::Swarm { json, quick } => {
-            print_report(&bench::swarm::run(&bench::swarm::Options { quick }), json);
+            print_report(&bench::swarm::run(&bench::swarm::Options { quick }), json)?;
         }
         BenchCommand::Transport { json, quick, out } => {
             let folder = out.map(|out| output::create(&out, false)).transpose()?;
             let report = bench::transport::run(&bench::transport::Options { quick });
-            print_report(&report, json);
+            print_report(&report, json)?;
             if let Some(folder) = folder {
                 export::transport::write_transport(&folder, &report)?;
                 interrupt::commit(folder)?;
@@ -101,14 +101,14 @@ pub fn bench(command: BenchCommand) -> Result<(), Refusal> {
         }
         #[cfg(feature = "fem")]
         BenchCommand::Equilibrium { json, quick } => {
-            print_report(&bench::equilibrium::run(&bench::equilibrium::Options { quick })?, json);
+            print_report(&bench::equilibrium::run(&bench::equilibrium::Options { quick })?, json)?;
         }
     }
     Ok(())
 }
 
-fn print_report(report: &(impl Serialize + std::fmt::Display), json: bool) {
-    print(&if json { format!("{}\n", serde_json::json!(report)) } else { report.to_string() });
+fn print_report(report: &(impl Serialize + std::fmt::Display), json: bool) -> Result<(), Refusal> {
+    print(&if json { format!("{}\n", serde_json::json!(report)) } else { report.to_string() })
 }
 
 /// Every rank measures, and the first one says what was found.
@@ -123,7 +123,7 @@ fn scale(options: bench::scale::Options, json: bool, out: Option<&Path>) -> Resu
     start.begin(u64::from(options.quick))?;
     let report = bench::scale::run(&options, team.as_ref())?;
     if is_first {
-        print_report(&report, json);
+        print_report(&report, json)?;
     }
     if let Some(folder) = folder {
         export::scale::write_scale(&folder, &report)?;

@@ -28,7 +28,7 @@ pub struct ListArguments {
 }
 
 /// Lists bundled files, one a line.
-pub fn list(arguments: &ListArguments) -> Result<(), SceneError> {
+pub fn list(arguments: &ListArguments) -> Result<(), Refusal> {
     let kind = match arguments.what {
         Listed::Scenes => Kind::Scene,
         Listed::Swarms => Kind::Swarm,
@@ -38,12 +38,11 @@ pub fn list(arguments: &ListArguments) -> Result<(), SceneError> {
     if arguments.json {
         let entry = |(one, title): (&Bundled, &String)| json!({ "name": one.name, "title": title });
         let entries: Vec<Value> = all.iter().zip(&titles).map(entry).collect();
-        print(&format!("{:#}\n", Value::from(entries)));
-        return Ok(());
+        return print(&format!("{:#}\n", Value::from(entries)));
     }
     let width = all.iter().map(|one| one.name.len()).max().unwrap_or(0);
-    all.iter().zip(titles).for_each(|(one, title)| print(&format!("{:width$}  {title}\n", one.name)));
-    Ok(())
+    let line = |(one, title): (&Bundled, &String)| format!("{:width$}  {title}\n", one.name);
+    print(&all.into_iter().zip(&titles).map(line).collect::<String>())
 }
 
 fn title(kind: Kind, one: &Bundled) -> Result<String, SceneError> {
@@ -63,8 +62,7 @@ pub struct ShowArguments {
 /// Prints a bundled file as it is.
 pub fn show(arguments: &ShowArguments) -> Result<(), Refusal> {
     let (_, file) = bundled_file(&arguments.name)?;
-    print(file.text);
-    Ok(())
+    print(file.text)
 }
 
 #[derive(Debug, Args)]
@@ -91,13 +89,7 @@ pub fn new(arguments: &NewArguments) -> Result<(), Refusal> {
     }
     let path = toml_path(*kind, name)?;
     write_new(&path, &(heading(*kind, &file, &path) + file.text))?;
-    say(&format!(
-        "{} begins as `{}`: edit it, then `{}`\n",
-        path.display(),
-        file.name,
-        command(*kind, &path)
-    ));
-    Ok(())
+    say(&format!("{} begins as `{}`: edit it, then `{}`\n", path.display(), file.name, command(*kind, &path)))
 }
 
 /// The bundled file that a new one of this kind begins as.

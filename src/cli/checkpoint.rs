@@ -13,6 +13,8 @@ use flockform::export::report::RunRecorder;
 use flockform::export::{ExportError, OutputFolder, VtkSeries, unfinished};
 use flockform::scene::Scene;
 
+use super::interrupt;
+
 #[derive(Debug, Args)]
 pub struct CheckpointArguments {
     /// Interval between checkpoints, from which a killed run can be resumed: 60s, 10min, 2h, 5000steps or
@@ -174,23 +176,17 @@ impl<'a> Checkpointer<'a> {
             })
     }
 
-    /// Keeps the run as it is now, to be gone on with if it is killed, and returns whether it is kept. One that cannot be
-    /// written does not end the run.
-    pub fn keep(
-        &mut self,
-        folder: &mut OutputFolder,
-        engine: (&Engine, f64),
-        mut kept: Recorded<'_>,
-    ) -> bool {
+    /// Keeps the run as it is now, to be gone on with if it is killed. One that cannot be written does not end the run.
+    pub fn keep(&mut self, folder: &mut OutputFolder, engine: (&Engine, f64), mut kept: Recorded<'_>) {
         (self.last_step, self.last) = (engine.0.step(), Instant::now());
         if let Err(error) = self.try_to_keep(folder, engine, &mut kept) {
+            interrupt::leave_to_the_end();
             tracing::warn!("no checkpoint at step {}: {error}", self.last_step);
-            return false;
+            return;
         }
         let took = self.last.elapsed();
         tracing::debug!("checkpoint of step {} in {took:.1?}", self.last_step);
         self.last = Instant::now();
-        true
     }
 
     fn try_to_keep(
@@ -202,19 +198,30 @@ impl<'a> Checkpointer<'a> {
         if let Some(frames) = &mut kept.frames {
             frames.sync()?;
         }
-        // Before the folder takes its name: that one is never without a checkpoint.
-        self.write(folder, engine, kept)?;
-        folder.keep_unfinished()
+        self.write_and_name(folder, engine, kept)
     }
 
-    /// Leaves a checkpoint of the last step, and says whether there is one.
-    pub fn leave(&self, folder: &mut OutputFolder, engine: (&Engine, f64), mut kept: Recorded<'_>) -> bool {
+    /// Before the folder takes its name: that one is never without a checkpoint.
+    fn write_and_name(
+        &self,
+        folder: &mut OutputFolder,
+        engine: (&Engine, f64),
+        kept: &Recorded<'_>,
+    ) -> Result<(), ExportError> {
+        self.write(folder, engine, kept)?;
+        interrupt::keep_unfinished(folder, resume_words)
+    }
+
+    /// Leaves a checkpoint of the last step, and says whether there is one. Frames are on their way to the disk then: to wait
+    /// for each would take longer than an interrupt may.
+    pub fn leave(&self, folder: &mut OutputFolder, engine: (&Engine, f64), kept: &Recorded<'_>) -> bool {
         let is_asked = self.every.iter().any(|interval| *interval != Interval::Never);
         if self.scene.equilibrium.is_some() || !is_asked {
             return false;
         }
-        let left = self.try_to_keep(folder, engine, &mut kept);
+        let left = self.write_and_name(folder, engine, kept);
         if let Err(error) = &left {
+            interrupt::leave_to_the_end();
             tracing::warn!("the run could not be resumed: {error}");
         }
         left.is_ok()
@@ -232,6 +239,11 @@ impl<'a> Checkpointer<'a> {
         let state = (EngineState::of(engine), residual);
         Checkpoint::new(of, state, recorded, self.stepping()).write(folder.folder())
     }
+}
+
+/// The message of a run that is left to be gone on with.
+pub fn resume_words(folder: &OutputFolder) -> String {
+    format!("interrupted: `flockform run --resume {}` goes on", folder.folder().display())
 }
 
 #[cfg(test)]

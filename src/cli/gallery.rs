@@ -44,7 +44,7 @@ pub fn gallery(arguments: &GalleryArguments) -> Result<ExitCode, Refusal> {
     write_gallery(&folder, &exhibits)?;
     let kept = interrupt::commit(folder)?;
     if !arguments.output.quiet {
-        say(&format!("open {}\n", kept.join("index.html").display()));
+        say(&format!("open {}\n", kept.join("index.html").display()))?;
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -35,6 +35,16 @@ pub enum InstallError {
     OwnProgram(io::Error),
 }
 
+impl InstallError {
+    /// The error of the system that kept a file from being written.
+    pub fn source_of_writing(&self) -> Option<&io::Error> {
+        match self {
+            InstallError::Write { error, .. } => Some(error),
+            InstallError::Foreign { .. } | InstallError::OwnProgram(_) => None,
+        }
+    }
+}
+
 fn list(paths: &[PathBuf]) -> String {
     paths.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(", ")
 }
@@ -111,7 +121,7 @@ pub fn install(arguments: &InstallArguments) -> Result<ExitCode, Refusal> {
         "Installed into {prefix}. Then, where ROS 2 is set up:\n  source '{prefix}/setup.bash'\n  \
          ros2 launch flockform formation_launch.xml\n",
         prefix = prefix.display()
-    ));
+    ))?;
     Ok(ExitCode::SUCCESS)
 }
 

@@ -2,8 +2,9 @@
 //!
 //! Most commands have nothing to keep before they are done: the thread that hears of the signal removes what they
 //! have begun to write and ends the program, in the midst of a mesh or a factorisation too. A command that
-//! [`keeps`] results looks at the flag itself and saves them; if it has not begun to within [`GRACE`], or writes a large
-//! state at [`SAVED_BY`], it is ended all the same. A second signal ends any command at once.
+//! [`keeps`] results looks at the flag itself and saves them; if it has not begun to within [`GRACE`], or is still saving at
+//! [`SAVED_BY`], it is ended all the same. A second signal ends any command at once. Nothing gets its final name once the
+//! end has begun.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -20,10 +21,8 @@ static RAISED: AtomicBool = AtomicBool::new(false);
 static ENDING: AtomicBool = AtomicBool::new(false);
 /// How the first signal is handled.
 static MODE: AtomicU8 = AtomicU8::new(ENDS);
-/// How many parts of the program ask for time to save what is written in a moment.
+/// How many parts of the program ask for what is left of the second to save something.
 static SAVING: AtomicUsize = AtomicUsize::new(0);
-/// How many ask for what is left of the second to save what may take longer.
-static SAVING_IN_TIME: AtomicUsize = AtomicUsize::new(0);
 /// Paths removed at the end, and the message printed.
 static LEFT: Mutex<Left> = Mutex::new(Left { paths: Vec::new(), words: None });
 
@@ -35,8 +34,10 @@ pub const NOTHING_KEPT: &str = "interrupted: nothing is kept";
 
 /// How long work that keeps results may take to notice.
 const GRACE: Duration = Duration::from_millis(500);
-/// When the state of a large body has to be written; what is not is given up, and the checkpoint before it stays.
+/// When results have to be saved; what is not is given up, and the checkpoint before it stays.
 const SAVED_BY: Duration = Duration::from_millis(750);
+/// How long the last words may take: a reader that has stopped keeps no program from ending.
+const PRINTING: Duration = Duration::from_millis(100);
 /// How long another thread may go on writing into a folder that is being removed.
 const REMOVING: Duration = Duration::from_millis(150);
 
@@ -94,29 +95,17 @@ pub fn leave_to_the_end() {
     }
 }
 
-/// Time to save results, for as long as this lives.
-pub struct Saving(&'static AtomicUsize);
+/// What is left of the second to save results, for as long as this lives.
+pub struct Saving(());
 
-impl Saving {
-    fn counted_by(counter: &'static AtomicUsize) -> Self {
-        counter.fetch_add(1, Ordering::SeqCst);
-        Self(counter)
-    }
-}
-
-/// Time to save what is written in a moment.
 pub fn saving() -> Saving {
-    Saving::counted_by(&SAVING)
-}
-
-/// Time to save what may take longer than is left of the second.
-pub fn saving_in_time() -> Saving {
-    Saving::counted_by(&SAVING_IN_TIME)
+    SAVING.fetch_add(1, Ordering::SeqCst);
+    Saving(())
 }
 
 impl Drop for Saving {
     fn drop(&mut self) {
-        self.0.fetch_sub(1, Ordering::SeqCst);
+        SAVING.fetch_sub(1, Ordering::SeqCst);
     }
 }
 
@@ -132,28 +121,44 @@ pub fn says(words: String) {
 
 /// Prints the message now; an end from here on is silent.
 pub fn says_at_once(words: &str) {
-    let mut left = left();
+    // Not under the lock, which the end needs: a reader that has stopped keeps this from returning.
+    left().words = Some(String::new());
     print(words);
-    left.words = Some(String::new());
 }
 
-/// Gives a finished folder its name, without an end in between.
-pub fn commit(folder: OutputFolder) -> Result<PathBuf, ExportError> {
-    let _saving = saving();
-    let kept = folder.commit();
+/// Gives something its name, and the end a message, without an end in between; does not return once the end has begun.
+fn rename<R, E>(work: impl FnOnce() -> Result<R, E>, words: impl FnOnce(&R) -> String) -> Result<R, E> {
     let mut left = left();
-    left.paths.clear();
-    if let Ok(kept) = &kept {
-        left.words = Some(format!("interrupted: the results are in {}", kept.display()));
+    if ENDING.load(Ordering::SeqCst) {
+        drop(left);
+        leave_to_the_end();
+        unreachable!("the program ends");
     }
-    kept
+    let done = work()?;
+    left.words = Some(words(&done));
+    Ok(done)
+}
+
+/// Gives a finished folder its name.
+pub fn commit(folder: OutputFolder) -> Result<PathBuf, ExportError> {
+    let kept =
+        rename(|| folder.commit(), |kept| format!("interrupted: the results are in {}", kept.display()))?;
+    left().paths.clear();
+    Ok(kept)
+}
+
+/// Lets a folder outlive the program, to be gone on with as `words` say.
+pub fn keep_unfinished(
+    folder: &mut OutputFolder,
+    words: impl FnOnce(&OutputFolder) -> String,
+) -> Result<(), ExportError> {
+    rename(|| folder.keep_unfinished().map(|()| folder), |folder| words(folder)).map(|_| ())
 }
 
 fn end_when_saved(grace: Duration) {
     let raised = Instant::now();
     std::thread::sleep(grace);
-    let saves = |counter: &AtomicUsize| counter.load(Ordering::SeqCst) > 0;
-    while saves(&SAVING) || (saves(&SAVING_IN_TIME) && raised.elapsed() < SAVED_BY) {
+    while SAVING.load(Ordering::SeqCst) > 0 && raised.elapsed() < SAVED_BY {
         std::thread::sleep(Duration::from_millis(5));
     }
     end();
@@ -168,7 +173,13 @@ fn end() -> ! {
             std::thread::sleep(Duration::from_millis(2));
         }
     }
-    print(left.words.as_deref().unwrap_or(NOTHING_KEPT));
+    let words = left.words.clone().unwrap_or_else(|| NOTHING_KEPT.to_owned());
+    let (done, printed) = std::sync::mpsc::channel();
+    std::thread::spawn(move || {
+        print(&words);
+        let _ = done.send(());
+    });
+    let _ = printed.recv_timeout(PRINTING);
     std::process::exit(FAILED.into())
 }
 

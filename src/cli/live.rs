@@ -60,14 +60,14 @@ pub fn live(arguments: &LiveArguments) -> Result<ExitCode, Refusal> {
     let (about, from) = (arguments.about(&session), folder_of(&arguments.file));
     let server = arguments.page.server()?;
     let recording = arguments.record.open(&about, false, 1)?;
-    let door = arguments.page.announce(&server);
+    let door = arguments.page.announce(&server)?;
     let stop = interrupt::serves();
     let served = server.serve(session, folder, stop).map_err(|source| arguments.page.refuse(source));
     close(door);
     let session = served?;
     if let Some(recording) = recording {
         let recorded = record(&session, &recording, from.as_deref());
-        say(&recording::close(Some(recording))?);
+        say(&recording::close(Some(recording))?)?;
         recorded?;
     }
     Ok(ExitCode::SUCCESS)
@@ -104,11 +104,14 @@ impl PageArguments {
     }
 
     /// Prints the address, and opens it if that is asked for: for [`close`].
-    pub fn announce(&self, server: &Server) -> Option<PathBuf> {
+    ///
+    /// # Errors
+    /// Standard output that takes no address: nothing else says it.
+    pub fn announce(&self, server: &Server) -> Result<Option<PathBuf>, Refusal> {
         let address = server.address();
-        print(&format!("{address}\n"));
+        print(&format!("{address}\n"))?;
         eprintln!("open this address in a browser on this computer; it ends with an interrupt (Ctrl-C)");
-        self.open.then(|| open(&address)).flatten()
+        Ok(self.open.then(|| open(&address)).flatten())
     }
 }
 

@@ -29,6 +29,7 @@ mod swarm;
 mod sweep;
 mod trade;
 
+use std::io::ErrorKind;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -245,6 +246,8 @@ pub enum Refusal {
     NewName { name: String, kind: &'static str },
     #[error("{} is there already\n  help: give another name, or remove it first", .0.display())]
     Exists(PathBuf),
+    #[error("cannot write to standard output: {0}")]
+    Print(std::io::Error),
     #[error("cannot write {}: {source}", .path.display())]
     NewFile { path: PathBuf, source: std::io::Error },
     #[error(
@@ -293,8 +296,10 @@ impl Refusal {
         match self {
             Refusal::Export(ExportError::Io { source, .. })
             | Refusal::Film(FilmError::Io { source, .. })
-            | Refusal::Record(RecordError::Io { source, .. }) => is_full(source),
-            Refusal::LiveRecord(_) => true,
+            | Refusal::Record(RecordError::Io { source, .. })
+            | Refusal::NewFile { source, .. } => is_full(source),
+            Refusal::Install(error) => error.source_of_writing().is_some_and(is_full),
+            Refusal::LiveRecord(_) | Refusal::Print(_) | Refusal::Exhibit { .. } => true,
             Refusal::Export(ExportError::NotMoved { .. }) | Refusal::Record(RecordError::Kept { .. }) => true,
             Refusal::Record(RecordError::Write { .. }) => true,
             Refusal::Film(FilmError::Encoder { .. } | FilmError::Frame { .. }) => true,
@@ -320,7 +325,11 @@ pub fn arguments() -> Result<(Arguments, RosArguments), Refusal> {
     };
     let arguments = Arguments::try_parse_from(rest).map_err(|error| match renamed(&error) {
         Some((then, now)) => Refusal::Renamed { then, now },
-        None => error.exit(),
+        None if error.use_stderr() => error.exit(),
+        None => match error.print() {
+            Err(lost) if lost.kind() != ErrorKind::BrokenPipe => Refusal::Print(lost),
+            _ => std::process::exit(error.exit_code()),
+        },
     })?;
     match arguments.command {
         Command::Node(node::NodeArguments { transport: Transport::Ros2, .. })
@@ -410,18 +419,18 @@ pub fn dispatch(command: Command, ros: &RosArguments) -> Result<ExitCode, Refusa
         Command::Gallery(arguments) => return gallery::gallery(&arguments),
         Command::Install(arguments) => return install::install(&arguments),
         Command::Plan(arguments) => plan::plan(&arguments)?,
-        Command::Material(arguments) => say(&material::answer(&arguments)?),
-        Command::Schema { swarm: false } => print(&format!("{:#}\n", scene::validate::schema())),
-        Command::Schema { swarm: true } => print(&format!("{:#}\n", scene::swarm::schema())),
-        Command::Completions { shell } => print(&completions::script(shell)),
+        Command::Material(arguments) => say(&material::answer(&arguments)?)?,
+        Command::Schema { swarm: false } => print(&format!("{:#}\n", scene::validate::schema()))?,
+        Command::Schema { swarm: true } => print(&format!("{:#}\n", scene::swarm::schema()))?,
+        Command::Completions { shell } => print(&completions::script(shell))?,
         Command::Bench(command) => bench::bench(command)?,
     }
     Ok(ExitCode::SUCCESS)
 }
 
 /// Prints words, some of which may come from files: no control character of theirs reaches the terminal.
-fn say(text: &str) {
-    print(&on_terminal(text));
+fn say(text: &str) -> Result<(), Refusal> {
+    print(&on_terminal(text))
 }
 
 /// A text whose lines stay, and whose other control characters are escaped.
@@ -435,7 +444,11 @@ fn on_terminal(text: &str) -> String {
 }
 
 /// Writes to standard output; a reader that has gone away (`| head`) is no error.
-fn print(text: &str) {
+fn print(text: &str) -> Result<(), Refusal> {
     use std::io::Write;
-    let _ = std::io::stdout().write_all(text.as_bytes());
+    let mut output = std::io::stdout();
+    match output.write_all(text.as_bytes()).and_then(|()| output.flush()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(Refusal::Print(error)),
+        _ => Ok(()),
+    }
 }

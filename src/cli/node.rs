@@ -132,7 +132,7 @@ pub fn node(arguments: &NodeArguments, ros: &RosArguments) -> Result<ExitCode, R
                 life.send(|| Left { node: node.kept(), page: page.as_ref().map(|page| page.place.clone()) })
             });
             live::close(page.and_then(|page| page.door));
-            say(&close(recording)?);
+            say(&close(recording)?)?;
             return Ok(ended(well));
         }
         None => {
@@ -182,7 +182,7 @@ impl LivePage {
         };
         match server {
             Ok(server) => {
-                let door = if again.is_none() { arguments.page.announce(&server) } else { None };
+                let door = if again.is_none() { arguments.page.announce(&server)? } else { None };
                 Ok(Some(Self { server, door }))
             }
             Err(refusal) if life == 1 => Err(refusal),

@@ -61,8 +61,8 @@ pub fn plan(arguments: &PlanArguments) -> Result<(), Refusal> {
         }
     };
     match json {
-        true => print(&format!("{value:#}\n")),
-        false => say(&words),
+        true => print(&format!("{value:#}\n"))?,
+        false => say(&words)?,
     }
     Ok(())
 }

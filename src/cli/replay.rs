@@ -42,9 +42,9 @@ pub fn replay(arguments: &ReplayArguments) -> Result<ExitCode, Refusal> {
     };
     let report = fly_again(&reader, &swarm, arguments.tolerance)?;
     if arguments.json {
-        print(&format!("{:#}\n", serde_json::json!(report)));
+        print(&format!("{:#}\n", serde_json::json!(report)))?;
     } else {
-        say(&words(&report));
+        say(&words(&report))?;
     }
     Ok(if report.holds() { ExitCode::SUCCESS } else { ExitCode::from(FAILED) })
 }

@@ -19,7 +19,7 @@ use flockform::export::checkpoint::{self, Checkpoint, RunRequest};
 use flockform::export::film::{self, FilmColour};
 use flockform::export::memory::Outputs;
 use flockform::export::report;
-use flockform::export::{Drawing, OutputFolder, Results, Timings, write_all};
+use flockform::export::{Drawing, Results, Timings, write_all};
 use flockform::ranks::Team;
 use flockform::record::About;
 use flockform::record::body::BodyMessages;
@@ -33,7 +33,7 @@ use observer::RunObserver;
 use recorder::{Recorder, Records};
 use words::{closing_words, where_to_look};
 
-use super::checkpoint::{CheckpointArguments, Checkpointer, ResumedRun};
+use super::checkpoint::{CheckpointArguments, Checkpointer, ResumedRun, resume_words};
 use super::film::{FilmArguments, words as film_words};
 use super::names::{FileName, SceneArguments, in_full};
 use super::output::{FigureArguments, OutputArguments, ReportArguments, command_line};
@@ -207,16 +207,13 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
     tracing::info!("{} steps in {elapsed:.1?}, writing", outcome.engine.step());
     let is_interrupted = outcome.reason == StopReason::Interrupted;
     let is_small = outcome.engine.body().count() <= QUICKLY_WRITTEN;
-    let mut saving = (is_interrupted && is_small).then(interrupt::saving);
+    let mut saving = is_interrupted.then(interrupt::saving);
     if is_interrupted || elapsed > WORTH_KEEPING {
-        let _saving = if is_small { interrupt::saving() } else { interrupt::saving_in_time() };
-        let is_left = checkpointer.leave(&mut folder, (&outcome.engine, outcome.residual), recorder.kept());
+        let _saving = interrupt::saving();
+        let is_left = checkpointer.leave(&mut folder, (&outcome.engine, outcome.residual), &recorder.kept());
         if is_left && is_interrupted && !is_small {
             interrupt::says_at_once(&resume_words(&folder));
             return Ok(ExitCode::from(FAILED));
-        }
-        if is_left {
-            interrupt::says(resume_words(&folder));
         }
     }
     let on_the_way = recorder.writing;
@@ -255,11 +252,11 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
         film.make(&drawn, &kept, arguments.output.quiet)
     })?;
     if arguments.json {
-        print(&format!("{:#}\n", serde_json::json!(summary)));
+        print(&format!("{:#}\n", serde_json::json!(summary)))?;
     } else if !arguments.output.quiet {
-        say(&words);
-        say(&(closing_words(&scene, &outcome, &summary, elapsed) + &where_to_look(&kept) + &recorded));
-        say(&made.as_ref().map_or_else(String::new, film_words));
+        say(&words)?;
+        say(&(closing_words(&scene, &outcome, &summary, elapsed) + &where_to_look(&kept) + &recorded))?;
+        say(&made.as_ref().map_or_else(String::new, film_words))?;
     }
     if is_asked && made.is_none() {
         eprintln!("interrupted: there is no film, the rest is written");
@@ -273,10 +270,6 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
         arguments.report.show(&kept);
     }
     Ok(exit_code(&outcome))
-}
-
-fn resume_words(folder: &OutputFolder) -> String {
-    format!("interrupted: `flockform run --resume {}` goes on", folder.folder().display())
 }
 
 impl RunArguments {

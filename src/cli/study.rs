@@ -36,9 +36,9 @@ impl StudyArguments {
         }
         let kept = interrupt::commit(folder)?;
         if self.json {
-            print(&json());
+            print(&json())?;
         } else if !self.output.quiet {
-            say(&format!("{}results in {}\n", table(), kept.display()));
+            say(&format!("{}results in {}\n", table(), kept.display()))?;
         }
         self.report.show(&kept);
         Ok(())

@@ -115,10 +115,10 @@ pub fn swarm(arguments: &SwarmArguments) -> Result<ExitCode, Refusal> {
         film.make(&drawn, &kept, arguments.output.quiet)
     })?;
     if arguments.json {
-        print(&format!("{:#}\n", serde_json::json!(report)));
+        print(&format!("{:#}\n", serde_json::json!(report)))?;
     } else if !arguments.output.quiet {
-        say(&(words(&report, seconds, &kept) + &recorded));
-        say(&made.as_ref().map_or_else(String::new, film_words));
+        say(&(words(&report, seconds, &kept) + &recorded))?;
+        say(&made.as_ref().map_or_else(String::new, film_words))?;
     }
     let broken_off = broken_off || is_asked && made.is_none();
     if is_asked && made.is_none() {

@@ -176,11 +176,11 @@ impl Sweep {
         let json = arguments.json.then(|| table.json());
         let kept = interrupt::commit(folder)?;
         if let Some(json) = json {
-            print(&format!("{json:#}\n"));
+            print(&format!("{json:#}\n"))?;
         } else if !arguments.output.quiet {
             let seconds = start.elapsed().as_secs_f64();
             let (name, ends) = (&self.scene.name, self.ends());
-            say(&format!("{name}: {ends}, {seconds:.2} s\nresults in {}\n", kept.display()));
+            say(&format!("{name}: {ends}, {seconds:.2} s\nresults in {}\n", kept.display()))?;
         }
         let is_refused = self.rows.values().any(|row| row.stop_reason == runs::REFUSED);
         Ok(if is_refused { ExitCode::from(FAILED) } else { ExitCode::SUCCESS })

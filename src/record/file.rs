@@ -83,7 +83,7 @@ impl Recording {
             return;
         }
         if let Err(error) = self.try_to_write(taped) {
-            tracing::warn!("the recording {} ends here: {error}", self.path.display());
+            tracing::warn!("the recording {} ends here: {}", self.path.display(), super::reason(&error));
             self.failure = Some(error);
         }
     }

@@ -65,7 +65,7 @@ pub enum RecordError {
         source: std::io::Error,
     },
     /// A recording could not be written on.
-    #[error("{} cannot be written: {source}", .path.display())]
+    #[error("{} cannot be written: {}", .path.display(), reason(source))]
     Write {
         /// The unfinished file.
         path: PathBuf,
@@ -102,6 +102,14 @@ pub enum RecordError {
     /// A topic or frame has no legal name.
     #[error("{0}")]
     Name(#[from] crate::messages::names::NameError),
+}
+
+/// The error of the MCAP library, with that of the system below it.
+fn reason(error: &mcap::McapError) -> String {
+    match std::error::Error::source(error) {
+        Some(source) => format!("{error}: {source}"),
+        None => error.to_string(),
+    }
 }
 
 impl RecordError {

@@ -15,6 +15,77 @@ fn robots_over_shared_memory_are_no_nodes() {
     assert!(said.contains("--node-per-robot") && said.contains("help: "), "{said}");
 }
 
+/// 100,000 corners in teeth as high as the body, upright or slanted, and around a swarm.
+#[test]
+fn outlines_of_a_hundred_thousand_corners_are_answered_at_once() {
+    let folder = temporary();
+    let teeth = |slant: f64, [width, height]: [f64; 2]| {
+        let count = 50_000;
+        let corner = |k: usize| {
+            let x = width * k as f64 / count as f64;
+            if k % 2 == 0 { [x, 0.0] } else { [x + slant * width, height] }
+        };
+        let corners: Vec<String> = (0..count)
+            .map(corner)
+            .chain([[width * (1.0 + slant), 2.0 * height], [slant * width, 2.0 * height]])
+            .map(|[x, y]| format!("[{x:?}, {y:?}]"))
+            .collect();
+        corners.join(", ")
+    };
+    let round: Vec<String> = (0..100_000)
+        .map(|k| (std::f64::consts::TAU * f64::from(k) / 1e5).sin_cos())
+        .map(|(sin, cos)| format!("[{:?}, {:?}]", 50.0 * cos, 50.0 * sin))
+        .collect();
+    let rule = "title = \"T\"\nstop = { steps = 1 }\nrule = { mean = { kind = \"barycentre\" } }\n\
+                neighbours = { kind = \"first\" }\n\
+                roles = [{ region = { kind = \"edge\", side = \"left\" }, role = \"clamped\" }]\n";
+    let body = |slant: f64, turned: f64| {
+        format!(
+            "{rule}lattice = {{ kind = \"square\", spacing = 1.0, orientation = {turned:?} }}\n\
+             body = {{ shape = {{ kind = \"polygon\", vertices = [{}] }} }}\n",
+            teeth(slant, [100.0, 50.0])
+        )
+    };
+    let fence = format!("limits.geofence=[{}]", round.join(", "));
+    let files = [("upright", body(0.0, 0.0)), ("turned", body(0.0, 30.0)), ("slanted", body(0.7, 0.0))];
+    for (name, text) in &files {
+        std::fs::write(folder.path().join(format!("{name}.toml")), text).expect("writable");
+    }
+    let swarm = flockform(&["show", "square"], folder.path());
+    let fenced = text(&swarm.stdout).replace("[limits]", &format!("[limits]\n{}", &fence["limits.".len()..]));
+    std::fs::write(folder.path().join("fenced.toml"), fenced).expect("writable");
+    let program = command(&[], folder.path()).get_program().to_string_lossy().into_owned();
+    for name in ["upright", "turned", "slanted", "fenced"] {
+        // Of processor time, whatever else the computer has to do.
+        let script = format!("ulimit -t 3; exec '{program}' plan {name}.toml");
+        let output = Command::new("sh").args(["-c", &script]).current_dir(folder.path()).output();
+        let output = output.expect("sh starts");
+        let said = text(&output.stderr);
+        assert!(output.status.code().is_some(), "{name}: it takes more than three seconds");
+        assert!(output.status.success() || said.contains("help: "), "{name}: {said}");
+        assert_eq!(name == "slanted", said.contains("side by side"), "{name}: {said}");
+    }
+}
+
+#[test]
+fn standard_output_that_takes_nothing_is_a_failure() {
+    let folder = temporary();
+    for words in
+        [&["plan", "tension"][..], &["schema"], &["list", "scenes"], &["show", "square"], &["--help"]]
+    {
+        let full = std::fs::File::options().write(true).open("/dev/full").expect("Linux");
+        let output = command(words, folder.path()).stdout(full).output().expect("starts");
+        let said = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{words:?}: {said}");
+        assert!(said.contains("No space left"), "{words:?}: {said}");
+        // A reader that has had enough is none.
+        let mut child =
+            command(words, folder.path()).stdout(std::process::Stdio::piped()).spawn().expect("starts");
+        drop(child.stdout.take());
+        assert!(child.wait().expect("ends").success(), "{words:?}");
+    }
+}
+
 #[test]
 fn runs_that_begin_at_once_get_a_folder_each() {
     let folder = temporary();

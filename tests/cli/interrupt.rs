@@ -1,7 +1,7 @@
 //! Ctrl-C: whatever the program is doing, it ends within a second, and what it leaves is whole or not there.
 
 use std::path::Path;
-use std::process::{Child, Stdio};
+use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use crate::program::*;
@@ -140,31 +140,122 @@ fn a_large_run_of_slow_steps_keeps_its_checkpoint_and_goes_on_from_it() {
     assert_eq!(names_in(folder.path()), ["large.toml", "o.unfinished"]);
 }
 
+/// Interrupts a job until its results come in time, which a computer that has other work may not let them: then nothing is
+/// kept, and it is tried again.
+fn kept(job: &[&str], busy: Duration, result: &str) -> tempfile::TempDir {
+    for _ in 0..8 {
+        let folder = temporary();
+        let mut child = start(&[job, &["--out", "o"]].concat(), folder.path());
+        wait_until_busy(&mut child, folder.path(), busy);
+        let (code, said) = ended(child, &format!("{job:?}"));
+        assert_eq!(code, Some(1), "{said}");
+        let is_kept = folder.path().join("o").join(result).is_file();
+        assert_ne!(is_kept, said.contains("nothing is kept"), "{said}: {:?}", files(folder.path()));
+        assert!(is_kept || names_in(folder.path()).is_empty(), "{said}: {:?}", files(folder.path()));
+        if is_kept {
+            return folder;
+        }
+    }
+    panic!("{job:?}: its results are never kept");
+}
+
 #[test]
 fn increments_that_are_solved_before_an_interrupt_are_kept() {
-    let folder = temporary();
-    let steps = "load_steps={increments=20000}";
-    let mut child = start(&["run", "beam-loaded", "--out", "o", "--set", steps], folder.path());
-    wait_until_busy(&mut child, folder.path(), Duration::from_secs(3));
-    let (code, said) = ended(child, "increments");
-    assert_eq!(code, Some(1), "{said}");
+    let job = ["run", "beam-loaded", "--set", "load_steps={increments=20000}"];
+    let folder = kept(&job, Duration::from_secs(3), "load.csv");
     let table = std::fs::read_to_string(folder.path().join("o/load.csv")).expect("kept");
     assert!(table.lines().count() > 2, "{table}");
 }
 
 #[test]
 fn a_flight_keeps_what_was_flown_and_says_so() {
-    let folder = temporary();
-    let mut child =
-        start(&["swarm", "square", "--out", "o", "--set", "flight.duration=100000"], folder.path());
-    // Long enough that its tables are still being written when the time to notice is over.
-    wait_until_busy(&mut child, folder.path(), Duration::from_secs(2));
-    signal("INT", child.id());
-    let output = child.wait_with_output().expect("ended");
-    assert_eq!(output.status.code(), Some(1));
-    let said = text(&output.stderr);
-    assert!(!said.contains("nothing is kept"), "{said}");
-    assert!(folder.path().join("o/flight.json").is_file(), "{:?}", files(folder.path()));
+    kept(&["swarm", "square", "--set", "flight.duration=100000"], Duration::from_millis(300), "flight.json");
+}
+
+/// Results grow with what was done: however many there are, the end comes in time, and a run can be gone on with or has left
+/// nothing.
+#[test]
+fn results_that_take_long_to_write_keep_no_program_from_ending() {
+    let endless = ["run", "tension", "--set", "stop.steps=100000000"];
+    let jobs: [(&[&str], u64); 3] = [
+        (&["--set", "record.vtk_every=1"], 4),
+        (&[], 8),
+        (&["swarm", "square", "--set", "flight.duration=100000"], 12),
+    ];
+    for (job, seconds) in jobs {
+        let job = if job.first() == Some(&"swarm") { job.to_vec() } else { [&endless, job].concat() };
+        let folder = temporary();
+        let mut child = start(&[&job[..], &["-q", "--out", "o"]].concat(), folder.path());
+        wait_until_busy(&mut child, folder.path(), Duration::from_secs(seconds));
+        let (code, said) = ended(child, &format!("{job:?}"));
+        assert_eq!(code, Some(1), "{said}");
+        let left = names_in(folder.path());
+        match said.contains("nothing is kept") {
+            true => assert!(left.is_empty(), "{left:?}"),
+            false => assert!(left == ["o"] || left == ["o.unfinished"], "{left:?}: {said}"),
+        }
+    }
+}
+
+/// A second signal comes while results are being saved: what then stands there is whole.
+#[test]
+fn a_second_interrupt_leaves_no_part_of_the_results() {
+    for pause in [20, 100, 300] {
+        let folder = temporary();
+        let frames = ["--set", "stop.steps=100000000", "--set", "record.vtk_every=1"];
+        let mut child =
+            start(&[&["run", "tension", "-q", "--out", "o"], &frames[..]].concat(), folder.path());
+        wait_until_busy(&mut child, folder.path(), Duration::from_secs(3));
+        signal("INT", child.id());
+        std::thread::sleep(Duration::from_millis(pause));
+        let is_sent = crate::signals::is_sent("INT", child.id());
+        let (code, said) = ended_after(child);
+        assert_eq!(code, Some(1), "{said}");
+        let (kept, unfinished) = (folder.path().join("o"), folder.path().join("o.unfinished"));
+        if kept.exists() {
+            let list = std::fs::read_to_string(kept.join("steps.pvd")).expect("a list of frames");
+            let frames = list.split("file=\"").skip(1).map(|part| part.split('"').next().expect("quoted"));
+            let missing: Vec<&str> = frames.filter(|frame| !kept.join(frame).is_file()).collect();
+            assert!(missing.is_empty(), "{said}: {} frames are missing", missing.len());
+            assert!(!said.contains("nothing is kept"), "{said}");
+        } else if unfinished.exists() {
+            assert!(unfinished.join("checkpoint").is_file(), "{said}: {:?}", names_in(&unfinished));
+        }
+        assert!(
+            kept.exists() || unfinished.exists() || said.contains("nothing is kept"),
+            "{is_sent}: {said}"
+        );
+        assert!(!said.contains("could not be resumed"), "{said}");
+    }
+}
+
+/// A pipe that is full, and that nothing empties.
+#[test]
+fn a_program_whose_words_are_never_taken_ends_too() {
+    for signals in [1, 2] {
+        let folder = temporary();
+        let script = format!(
+            "{{ head -c 70000 /dev/zero >&2 & sleep 0.3; exec '{}' stability tension -q --out o; }}",
+            command(&[], folder.path()).get_program().to_string_lossy()
+        );
+        let mut shell = Command::new("sh");
+        shell.args(["-c", &script]).current_dir(folder.path()).env_remove("RUST_LOG");
+        let mut child = shell.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("sh starts");
+        wait_until_busy(&mut child, folder.path(), Duration::from_millis(300));
+        let (since, patience) = (Instant::now(), patience());
+        for _ in 0..signals {
+            signal("INT", child.id());
+        }
+        while child.try_wait().expect("a child").is_none() {
+            if since.elapsed() > patience {
+                child.kill().expect("kills");
+                panic!("not within {patience:?}");
+            }
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        assert_eq!(child.wait().expect("ended").code(), Some(1));
+        assert!(names_in(folder.path()).is_empty());
+    }
 }
 
 #[test]

@@ -42,6 +42,22 @@ fn a_full_disk_is_a_failure_that_every_message_names_and_leaves_nothing_half_wri
 
 #[test]
 #[ignore = "mounts a small disk, which takes user namespaces"]
+fn whatever_a_full_disk_takes_nothing_of_is_a_failure() {
+    for command in [
+        "new scene other --from cook",
+        "install --prefix p",
+        "schema > s",
+        "plan tension > s",
+        "swarm square --no-report -q --out o --record r.mcap",
+    ] {
+        let script = format!("cat /dev/zero > fill 2> /dev/null; \"$flockform\" {command}; echo \"code $?\"");
+        let said = on_a_small_disk("64k", &script);
+        assert!(said.contains("code 1") && said.contains("No space left"), "{command}: {said}");
+    }
+}
+
+#[test]
+#[ignore = "mounts a small disk, which takes user namespaces"]
 fn a_film_that_a_full_disk_has_no_room_for_is_not_there_and_the_results_are() {
     let script = "\"$flockform\" run tension -q --no-report --figures none --out o --film t.gif; \
                   echo \"code $?\"; test -s o/summary.json && echo kept; ls -A";

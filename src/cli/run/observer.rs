@@ -11,9 +11,7 @@ use flockform::record::body::BodyMessages;
 use flockform::shm::positions::Positions;
 
 use super::recorder::Recorder;
-use super::resume_words;
 use crate::cli::checkpoint::Checkpointer;
-use crate::cli::interrupt;
 use crate::cli::progress::Progress;
 
 /// Records, publications, progress, checkpoints, and the interrupt that ends them.
@@ -43,12 +41,8 @@ impl Observer for RunObserver<'_, '_> {
             messages.step(engine, residual);
         }
         self.progress.step(engine.step(), residual);
-        if self.checkpointer.is_due(engine.step())
-            && !self.recorder.failed()
-            && self.checkpointer.keep(self.folder, (engine, residual), self.recorder.kept())
-        {
-            // A rank that waits for one that was killed is ended without getting to leave another one.
-            interrupt::says(resume_words(self.folder));
+        if self.checkpointer.is_due(engine.step()) && !self.recorder.failed() {
+            self.checkpointer.keep(self.folder, (engine, residual), self.recorder.kept());
         }
         let stop = self.recorder.failed() || self.interrupted.load(Ordering::Relaxed);
         if stop { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
