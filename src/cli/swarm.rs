@@ -9,7 +9,7 @@ use std::time::Instant;
 
 use clap::Args;
 use flockform::export::film::{self, FilmColour};
-use flockform::export::flight::write_flight;
+use flockform::export::flight::{write_flight, write_flight_tables};
 use flockform::export::report::{self, FlightRecorder};
 use flockform::record::flight::FlightMessages;
 use flockform::record::{About, Shared};
@@ -99,7 +99,9 @@ pub fn swarm(arguments: &SwarmArguments) -> Result<ExitCode, Refusal> {
     let (record, report) = fly_recorded(&swarm, flight.control(), recording.as_ref(), &mut watch)?;
     let seconds = start.elapsed().as_secs_f64();
     let saving = interrupt::saving();
-    write_flight(&folder, &swarm, &record, &report)?;
+    // Figures take longer than an interrupt may.
+    let write = if interrupt::is_raised() { write_flight_tables } else { write_flight };
+    write(&folder, &swarm, &record, &report)?;
     if let Some(recorder) = recorder.as_mut().filter(|_| reports) {
         let stage = recorder.stage(&swarm, &report);
         report::flight::write(&folder, &swarm, &record, &report, stage)?;

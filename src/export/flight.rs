@@ -45,21 +45,34 @@ pub fn write_flight(
     record: &Record,
     report: &FlightReport,
 ) -> Result<Vec<PathBuf>, ExportError> {
+    let mut written = write_flight_tables(folder, swarm, record, report)?;
+    written.extend(figures::write(&flight_map::flight(swarm, record, report), folder, "flight")?);
+    let errors = draw_below_each_other(&charts(record, report));
+    written.extend(figures::write(&errors, folder, "errors")?);
+    Ok(written)
+}
+
+/// Writes everything but the figures.
+///
+/// # Errors
+/// The first file that cannot be written.
+pub fn write_flight_tables(
+    folder: &OutputFolder,
+    swarm: &Swarm,
+    record: &Record,
+    report: &FlightReport,
+) -> Result<Vec<PathBuf>, ExportError> {
     let tracks = record.times.iter().zip(&record.tracks).flat_map(|(&time, places)| {
         let named = report.per_robot.iter().zip(places.iter());
         named.map(move |(robot, [x, y])| TrackRow { time, name: &robot.name, x, y })
     });
-    let mut written = vec![
+    let whole = Report { holds: report.holds(), report, swarm: &swarm.raw };
+    Ok(vec![
         write(folder, "samples.csv", record.samples.iter())?,
         write(folder, "robots.csv", report.per_robot.iter())?,
         write(folder, "tracks.csv", tracks)?,
-    ];
-    written.extend(figures::write(&flight_map::flight(swarm, record, report), folder, "flight")?);
-    let errors = draw_below_each_other(&charts(record, report));
-    written.extend(figures::write(&errors, folder, "errors")?);
-    let whole = Report { holds: report.holds(), report, swarm: &swarm.raw };
-    written.push(write_signed(folder, FILE, &whole)?);
-    Ok(written)
+        write_signed(folder, FILE, &whole)?,
+    ])
 }
 
 /// Of the lines of declared bounds.

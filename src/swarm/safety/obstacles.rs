@@ -74,8 +74,8 @@ struct Outline {
     anticlockwise: bool,
 }
 
-/// Comparisons of two edges of a polygon that are made at most: half a second.
-const MOST_PAIRS: usize = 50_000_000;
+/// Comparisons of two edges of a polygon that are made at most: a quarter of a second.
+const MOST_PAIRS: usize = 20_000_000;
 
 /// Largest coordinate accepted \[m\]: squares must not overflow.
 const LARGEST: f64 = 1e100;
