@@ -208,6 +208,7 @@ impl RobotNodes {
                 break;
             }
         }
+        self.pulse.iter().for_each(|pulse| pulse.leave());
         true
     }
 

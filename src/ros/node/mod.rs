@@ -249,6 +249,7 @@ impl FormationNode {
                 break;
             }
         }
+        self.pulse.iter().for_each(|pulse| pulse.leave());
         let now = self.time();
         let (lifecycle, mut transitions) = self.transitions(now);
         lifecycle.shut_down(now, &mut |goal| transitions.act(goal));
