@@ -33,5 +33,7 @@ mod signals;
 mod support;
 #[path = "../common/swarms.rs"]
 mod swarms;
+mod two_hosts;
 #[path = "../common/waits.rs"]
 mod waits;
+mod warnings;
