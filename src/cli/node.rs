@@ -267,6 +267,9 @@ pub fn robots(arguments: &RobotsArguments, ros: &RosArguments) -> Result<ExitCod
             let layout = if arguments.node_per_robot { Layout::NodePerRobot } else { Layout::OneNode };
             interrupt::serves();
             let mut robots = RobotNodes::open(&swarm, ros, layout)?;
+            if let Some(level) = log::level() {
+                robots.serve_log_level(level).map_err(NodeError::from)?;
+            }
             if let Some(lines) = log::lines() {
                 robots.publish_log(lines).map_err(NodeError::from)?;
             }

@@ -17,6 +17,7 @@
 #![cfg(feature = "cli")]
 
 mod edge;
+mod endpoints;
 mod fastdds;
 mod faults;
 mod first_calls;
