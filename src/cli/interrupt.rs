@@ -3,13 +3,14 @@
 //! Most commands have nothing to keep before they are done: the thread that hears of the signal removes what they
 //! have begun to write and ends the program, in the midst of a mesh or a factorisation too. A command that
 //! [`keeps`] results looks at the flag itself and saves them; if it has not begun to within [`GRACE`], or is still saving at
-//! [`SAVED_BY`], it is ended all the same. A second signal ends any command at once. Nothing gets its final name once the
-//! end has begun.
+//! [`SAVED_BY`], it is ended all the same. Nothing gets its final name once the end has begun. A second signal ends any
+//! command at once, but for one that [`serves`]: `ros2 launch` and `timeout` signal a group of processes and each of them,
+//! and a node has its leave to take. There the signals of [`ONE_SIGNAL`] are one.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU8, AtomicUsize, Ordering};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
 use flockform::export::{ExportError, OutputFolder};
@@ -19,6 +20,8 @@ use super::FAILED;
 static RAISED: AtomicBool = AtomicBool::new(false);
 /// Whether the program is being ended by the thread of the signal.
 static ENDING: AtomicBool = AtomicBool::new(false);
+/// When the first signal came.
+static FIRST: OnceLock<Instant> = OnceLock::new();
 /// How the first signal is handled.
 static MODE: AtomicU8 = AtomicU8::new(ENDS);
 /// How many parts of the program ask for what is left of the second to save something.
@@ -41,6 +44,9 @@ const PRINTING: Duration = Duration::from_millis(100);
 /// How long another thread may go on writing into a folder that is being removed.
 const REMOVING: Duration = Duration::from_millis(150);
 
+/// How long signals are one with the first to a command that serves.
+const ONE_SIGNAL: Duration = Duration::from_secs(1);
+
 struct Left {
     paths: Vec<PathBuf>,
     words: Option<String>,
@@ -53,7 +59,11 @@ fn left() -> MutexGuard<'static, Left> {
 /// Listens for signals, from now until the program ends.
 pub fn watch() {
     let heard = || {
+        let first = FIRST.get_or_init(Instant::now);
         if RAISED.swap(true, Ordering::SeqCst) {
+            if MODE.load(Ordering::SeqCst) == SERVES && first.elapsed() < ONE_SIGNAL {
+                return;
+            }
             end();
         }
         match MODE.load(Ordering::SeqCst) {

@@ -103,6 +103,8 @@ pub fn node(arguments: &NodeArguments, ros: &RosArguments) -> Result<ExitCode, R
                 .live
                 .then(|| LivePage::open(arguments, life.number(), left.as_ref()))
                 .transpose()?;
+            // Others know the node from now on: an end has a leave to take.
+            interrupt::serves();
             let mut node = FormationNode::open(&swarm, ros, name)?;
             let (member, namespace) = (arguments.member.clone(), Some(node.fleet().to_owned()));
             let mut about = About { member, namespace, ..arguments.swarm.about("node", &swarm) };
@@ -263,7 +265,11 @@ pub fn robots(arguments: &RobotsArguments, ros: &RosArguments) -> Result<ExitCod
     match life {
         Some(mut life) => {
             let layout = if arguments.node_per_robot { Layout::NodePerRobot } else { Layout::OneNode };
+            interrupt::serves();
             let mut robots = RobotNodes::open(&swarm, ros, layout)?;
+            if let Some(level) = log::level() {
+                robots.serve_log_level(level).map_err(NodeError::from)?;
+            }
             if let Some(lines) = log::lines() {
                 robots.publish_log(lines).map_err(NodeError::from)?;
             }

@@ -54,6 +54,10 @@ impl FlightMessages {
             RawPoseType::PoseArray => RawNode::default().pose_topic,
             _ => raw.pose_topic.clone(),
         };
+        let targets = match raw.has_target_array() {
+            true => RawNode::default().target_topic,
+            false => raw.target_topic.clone(),
+        };
         let of_robots = |pattern: &str| -> Result<Vec<String>, NameError> {
             let all = control.formation().names.iter();
             all.map(|name| names.fleet_topic(&pattern.replace("{name}", name))).collect()
@@ -63,7 +67,7 @@ impl FlightMessages {
             topics: Topics {
                 poses: of_robots(&pattern)?,
                 ranges: of_robots(&raw.ranges_topic)?,
-                targets: of_robots(&raw.target_topic)?,
+                targets: of_robots(&targets)?,
                 state: names.topic("~/state")?,
                 markers: names.topic("~/markers")?,
                 diagnostics: names.topic("/diagnostics")?,
@@ -113,10 +117,8 @@ impl FlightMessages {
         if self.statistics.is_due(diagnostics::STATE, now, STATES) {
             let message = state::message(control, &self.swarm.name, header(), 0.0);
             self.recorder.take(&self.topics.state, &message, [now; 2]);
-            if self.swarm.raw.node.markers {
-                let message = markers::message(control, &self.swarm.raw, &header());
-                self.recorder.take(&self.topics.markers, &message, [now; 2]);
-            }
+            let message = markers::message(control, &self.swarm.raw, &header());
+            self.recorder.take(&self.topics.markers, &message, [now; 2]);
         }
         if self.statistics.is_due(diagnostics::DIAGNOSTICS, now, DIAGNOSTICS) {
             let names = [self.node.as_str(), &self.swarm.name];

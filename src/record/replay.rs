@@ -224,6 +224,14 @@ impl Replay {
         })
     }
 
+    /// Ticks where the targets of a recording without the loop's events are the first of a period.
+    fn tick_of_targets(&mut self, header: &Header) {
+        if !self.has_events && self.stamp != Some(header.stamp) {
+            self.stamp = Some(header.stamp);
+            self.tick(header.stamp.seconds());
+        }
+    }
+
     fn see(&mut self, entry: &Entry) {
         match self.topics.get(&*entry.topic) {
             None => {}
@@ -258,11 +266,19 @@ impl Replay {
             }
             Some(&Heard::Target(member)) => {
                 let Some(PoseStamped { header, pose }) = entry.decode() else { return };
-                if !self.has_events && self.stamp != Some(header.stamp) {
-                    self.stamp = Some(header.stamp);
-                    self.tick(header.stamp.seconds());
-                }
+                self.tick_of_targets(&header);
                 self.recorded[member] = Some([pose.position.x, pose.position.y]);
+            }
+            Some(Heard::Targets) => {
+                let Some(PoseArray { header, poses }) = entry.decode() else { return };
+                self.tick_of_targets(&header);
+                for (recorded, pose) in self.recorded.iter_mut().zip(&poses) {
+                    let place = [pose.position.x, pose.position.y];
+                    // Of a robot that is sent nowhere it is no number.
+                    if place.iter().all(|x| x.is_finite()) {
+                        *recorded = Some(place);
+                    }
+                }
             }
         }
     }

@@ -5,6 +5,8 @@
 use mcap::records::Metadata;
 use serde_json::json;
 
+use crate::messages::type_description_interfaces::TypeDescription;
+
 /// Name of the metadata record.
 pub(super) const METADATA: &str = "rosbag2";
 /// Key of a channel's quality of service.
@@ -50,6 +52,12 @@ pub(super) fn offered_qos(reliable: bool) -> serde_json::Value {
     }])
 }
 
+/// The hash of a type `package/msg/Name`; empty, as in recordings of older distributions, where the type has no description here.
+fn hash(kind: &str) -> String {
+    let described = kind.split_once("/msg/").map(|(package, name)| format!("{package}/{name}"));
+    described.and_then(|name| TypeDescription::of(&name)).map_or_else(String::new, |known| known.hash())
+}
+
 /// The record of a whole recording in the file of this name.
 pub(super) fn metadata<'a>(
     file: &str,
@@ -67,8 +75,7 @@ pub(super) fn metadata<'a>(
                 "type": channel.kind,
                 "serialization_format": "cdr",
                 "offered_qos_profiles": offered_qos(channel.reliable),
-                // No hash: what is not known is left empty, as in recordings of older distributions.
-                "type_description_hash": "",
+                "type_description_hash": hash(&channel.kind),
             });
             json!({"topic_metadata": metadata, "message_count": channel.messages})
         })

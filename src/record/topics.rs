@@ -23,6 +23,8 @@ pub(super) enum Heard {
     /// That a robot measured.
     Ranges(usize),
     Target(usize),
+    /// Of all robots, in their order.
+    Targets,
 }
 
 /// A pose with its header, from any of the messages that carry one.
@@ -54,14 +56,19 @@ pub(super) fn topics(
     if raw.pose_type == RawPoseType::PoseArray {
         topics.insert(names.fleet_topic(&raw.pose_topic)?, Heard::Poses);
     }
-    let default = RawNode::default().pose_topic;
+    if raw.has_target_array() {
+        topics.insert(names.fleet_topic(&raw.target_topic)?, Heard::Targets);
+    }
+    let default = RawNode::default();
     for (m, name) in control.formation().names.iter().enumerate() {
         let of = |pattern: &str| names.fleet_topic(&pattern.replace("{name}", name));
-        let pattern = if raw.pose_type == RawPoseType::PoseArray { &default } else { &raw.pose_topic };
+        let pattern =
+            if raw.pose_type == RawPoseType::PoseArray { &default.pose_topic } else { &raw.pose_topic };
+        let target = if raw.has_target_array() { &default.target_topic } else { &raw.target_topic };
         topics.insert(of(pattern)?, Heard::Pose(m));
         topics.insert(of(&raw.leader_topic)?, Heard::Leader(m));
         topics.insert(of(&raw.ranges_topic)?, Heard::Ranges(m));
-        topics.insert(of(&raw.target_topic)?, Heard::Target(m));
+        topics.insert(of(target)?, Heard::Target(m));
     }
     Ok((topics, has_events))
 }

@@ -10,6 +10,8 @@ use std::sync::mpsc::Receiver;
 use serde::{Deserialize, Serialize};
 
 use super::arguments::{Names, RosArguments};
+use super::edge::descriptions::TypeDescriptions;
+use super::edge::loggers::{LogLevel, Loggers};
 use super::edge::parameters::{Declaration, Parameters, Store, Value};
 use super::edge::pulse::Pulse;
 use super::edge::rosout::Rosout;
@@ -31,7 +33,7 @@ use crate::messages::rosgraph_msgs::Clock;
 use crate::messages::std_msgs::Header;
 use crate::messages::tf2_msgs::TFMessage;
 use crate::scene::swarm::Swarm;
-use crate::scene::swarm::raw::{RawNode, RawPoseType, RawSwarm};
+use crate::scene::swarm::raw::{RawNode, RawPoseType, RawService, RawSwarm};
 use crate::swarm::control::Control;
 use crate::swarm::flight::Fleet;
 use crate::swarm::formation::Formation;
@@ -78,7 +80,7 @@ pub const NAME: &str = "robots";
 pub struct Link {
     /// The frame that each robot carries.
     frames: Vec<String>,
-    targets: Vec<Subscription<PoseStamped>>,
+    targets: Targets,
     poses: Poses,
     /// By robot; empty in a swarm without ranges.
     ranges: Vec<Publisher<Ranges>>,
@@ -87,11 +89,33 @@ pub struct Link {
     frame_id: String,
     /// Whether a target came since last asked.
     was_sent: bool,
-    /// Of the one node.
+    /// Of the one node, as what follows.
     parameters: Option<Parameters>,
+    descriptions: Option<TypeDescriptions>,
+    loggers: Option<Loggers>,
+    has_loggers: bool,
     // Dropped after all that was made from them.
     nodes: Vec<Node>,
 }
+
+enum Targets {
+    Stamped(Vec<Subscription<PoseStamped>>),
+    /// In the order of the robots.
+    Array(Box<Subscription<PoseArray>>),
+}
+
+impl Targets {
+    /// The first topic.
+    fn topic(&self) -> &str {
+        match self {
+            Self::Stamped(all) => all.first().map_or("", Subscription::topic),
+            Self::Array(topic) => topic.topic(),
+        }
+    }
+}
+
+/// Messages of an array taken in a period at most: each node of one robot sends its own.
+const MOST_AT_ONCE: usize = 1024;
 
 enum Poses {
     Stamped(Vec<Publisher<PoseStamped>>),
@@ -121,9 +145,17 @@ impl Link {
         let owner = |m: usize| m.min(nodes.len() - 1);
         let of = |pattern: &str, m: usize| topic(&owners[owner(m)], pattern, &formation.names[m]);
         check_topics(&swarm.raw, formation, &of)?;
-        let targets: Result<Vec<_>, NodeError> = (0..formation.count())
-            .map(|m| Ok(nodes[owner(m)].subscription(&of(&raw.target_topic, m)?, Quality::reliable(1))?))
-            .collect();
+        let target = |m: usize| -> Result<_, NodeError> {
+            Ok(nodes[owner(m)].subscription(&of(&raw.target_topic, m)?, Quality::reliable(1))?)
+        };
+        let targets = if raw.has_target_array() {
+            let topic = of(&raw.target_topic, 0)?;
+            // As many as there may be nodes.
+            let depth = u16::try_from(formation.count()).unwrap_or(u16::MAX);
+            Targets::Array(Box::new(nodes[0].subscription(&topic, Quality::reliable(depth))?))
+        } else {
+            Targets::Stamped((0..formation.count()).map(target).collect::<Result<_, _>>()?)
+        };
         let pose = |m: usize| Ok((&nodes[owner(m)], of(&raw.pose_topic, m)?));
         let (count, first) = (formation.count(), &nodes[0]);
         let poses = match raw.pose_type {
@@ -142,10 +174,13 @@ impl Link {
         let clock = publishes_clock
             .then(|| first.publisher(&first.topic("/clock")?, Quality::BEST_EFFORT))
             .transpose()?;
-        let parameters = (layout == Layout::OneNode).then(|| Parameters::new(first, store)).transpose()?;
+        let is_one = layout == Layout::OneNode;
+        let is_served = is_one && raw.serves(RawService::Parameters);
+        let parameters = is_one.then(|| Parameters::open(first, store, is_served)).transpose()?;
+        let describes = is_one && raw.serves(RawService::TypeDescription);
+        let descriptions = describes.then(|| TypeDescriptions::new(first)).transpose()?;
         let frames = formation.names.iter().map(|name| frame_of(raw, world.fleet(), name)).collect();
-        let (targets, frame_id) = (targets?, raw.frame_id.clone());
-        let names = formation.names.clone();
+        let (names, frame_id) = (formation.names.clone(), raw.frame_id.clone());
         Ok(Self {
             frames,
             targets,
@@ -156,6 +191,9 @@ impl Link {
             frame_id,
             was_sent: false,
             parameters,
+            descriptions,
+            loggers: None,
+            has_loggers: is_one && raw.serves(RawService::LoggerLevels),
             nodes,
         })
     }
@@ -184,7 +222,7 @@ impl RobotNodes {
     pub fn reached_at(&self) -> String {
         let (first, others) = (&self.link.nodes[0], self.link.nodes.len() - 1);
         let others = if others == 0 { String::new() } else { format!(" and {others} nodes like it") };
-        let targets = self.link.targets.first().map_or("", |topic| topic.topic());
+        let targets = self.link.targets.topic();
         format!("{}{others} on {}; targets from {targets}", first.name(), first.options())
     }
 
@@ -208,7 +246,19 @@ impl RobotNodes {
                 break;
             }
         }
+        self.pulse.iter().for_each(|pulse| pulse.leave());
         true
+    }
+
+    /// Lets peers read and set the level of this log, where the swarm file asks for that.
+    ///
+    /// # Errors
+    /// A service that the middleware refuses.
+    pub fn serve_log_level(&mut self, level: LogLevel) -> Result<(), EdgeError> {
+        if self.link.has_loggers {
+            self.link.loggers = Some(Loggers::new(&self.link.nodes[0], level)?);
+        }
+        Ok(())
     }
 
     /// Publishes these lines of the log, in the name of the first node.
@@ -256,6 +306,8 @@ impl RobotNodes {
             // All are read-only: nothing changes.
             parameters.poll(now(fleet), None);
         }
+        link.descriptions.iter().for_each(TypeDescriptions::serve);
+        link.loggers.iter().for_each(|loggers| loggers.serve(None));
         rosout.iter().for_each(Rosout::publish);
         let sent = fly(fleet, goals, link, now).and_then(|()| self.say_frames());
         if let Err(error) = sent {
@@ -283,10 +335,24 @@ impl RobotsEnd for Link {
     type Error = EdgeError;
 
     fn targets(&mut self, go: &mut dyn FnMut(usize, [f64; 2])) {
-        for (member, topic) in self.targets.iter().enumerate() {
-            if let Some((message, _)) = topic.take_last() {
-                self.was_sent = true;
-                go(member, [message.pose.position.x, message.pose.position.y]);
+        match &self.targets {
+            Targets::Stamped(all) => {
+                for (member, topic) in all.iter().enumerate() {
+                    if let Some((message, _)) = topic.take_last() {
+                        self.was_sent = true;
+                        go(member, [message.pose.position.x, message.pose.position.y]);
+                    }
+                }
+            }
+            Targets::Array(topic) => {
+                for (message, _) in std::iter::from_fn(|| topic.take()).take(MOST_AT_ONCE) {
+                    self.was_sent = true;
+                    let places = message.poses.iter().map(|pose| [pose.position.x, pose.position.y]);
+                    let known = places.enumerate().take(self.names.len());
+                    known
+                        .filter(|(_, place)| place.iter().all(|x| x.is_finite()))
+                        .for_each(|(m, place)| go(m, place));
+                }
             }
         }
     }
@@ -375,7 +441,9 @@ fn check_topics(raw: &RawSwarm, formation: &Formation, topic: TopicOf<'_>) -> Re
     let (has_ranges, raw) = (raw.ranges.is_some(), &raw.node);
     let mut uses = Uses::default();
     for (m, robot) in formation.names.iter().enumerate() {
-        uses.add(topic(&raw.target_topic, m)?, "targets", robot)?;
+        if m == 0 || !raw.has_target_array() {
+            uses.add(topic(&raw.target_topic, m)?, "targets", robot)?;
+        }
         if m == 0 || raw.pose_type != RawPoseType::PoseArray {
             uses.add(topic(&raw.pose_topic, m)?, "poses", robot)?;
         }

@@ -30,3 +30,9 @@ pub fn started(name: &str, arguments: &[String], folder: &Path) -> (Running, Rec
     std::thread::spawn(move || output.lines().map_while(Result::ok).try_for_each(|line| say.send(line)));
     (Running(child), lines)
 }
+
+/// The milliseconds that a call of `fastdds_client` took, and the length of its reply.
+pub fn called(line: &str) -> (f64, usize) {
+    let (took, length) = line.split_once(' ').expect("two numbers");
+    (took.parse().expect("milliseconds"), length.parse().expect("bytes"))
+}

@@ -1,8 +1,10 @@
-// A client on Fast DDS that calls `get_state` of a node again and again, as a client on rmw_fastrtps_cpp does, each time with
-// endpoints of its own: the call goes out as soon as they are matched. Prints the milliseconds that each call took.
+// A client on Fast DDS that calls a service of a node as a client on rmw_fastrtps_cpp does: `get_state` again and again, each
+// time with endpoints of its own, or any service with these requests (hexadecimal, with their encapsulation), all with the
+// same endpoints. A call goes out as soon as they are matched. Prints the milliseconds and the length of the reply of each.
 //
 // g++ -std=c++17 -o fastdds_client fastdds_client.cpp -lfastrtps -lfastcdr
 // fastdds_client DOMAIN CALLS
+// fastdds_client DOMAIN SERVICE TYPE REQUEST...
 
 #include <chrono>
 #include <cstdlib>
@@ -10,6 +12,7 @@
 #include <iostream>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include <fastdds/dds/domain/DomainParticipant.hpp>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
@@ -35,7 +38,7 @@ class Bytes : public TopicDataType {
 public:
     explicit Bytes(const char *name) {
         setName(name);
-        m_typeSize = 4096;
+        m_typeSize = 65536;
         m_isGetKeyDefined = false;
     }
     bool serialize(void *data, SerializedPayload_t *payload) override {
@@ -61,8 +64,65 @@ double since(Clock::time_point begun) {
     return std::chrono::duration<double, std::milli>(Clock::now() - begun).count();
 }
 
-int main(int, char **arguments) {
-    const int domain = std::atoi(arguments[1]), calls = std::atoi(arguments[2]);
+// The endpoints of a client.
+struct Client {
+    Publisher *publisher;
+    Subscriber *subscriber;
+    DataReader *reader;
+    DataWriter *writer;
+
+    Client(Publisher *publisher, Subscriber *subscriber, Topic *asked, Topic *answered)
+        : publisher(publisher), subscriber(subscriber) {
+        DataReaderQos reader_qos = DATAREADER_QOS_DEFAULT;
+        reader_qos.reliability().kind = RELIABLE_RELIABILITY_QOS;
+        DataWriterQos writer_qos = DATAWRITER_QOS_DEFAULT;
+        writer_qos.durability().kind = VOLATILE_DURABILITY_QOS;
+        reader = subscriber->create_datareader(answered, reader_qos);
+        writer = publisher->create_datawriter(asked, writer_qos);
+        auto begun = Clock::now();
+        PublicationMatchedStatus writers;
+        SubscriptionMatchedStatus readers;
+        do {
+            std::this_thread::sleep_for(std::chrono::microseconds(50));
+            writer->get_publication_matched_status(writers);
+            reader->get_subscription_matched_status(readers);
+        } while ((writers.current_count == 0 || readers.current_count == 0) && since(begun) < 20000);
+    }
+
+    ~Client() {
+        publisher->delete_datawriter(writer);
+        subscriber->delete_datareader(reader);
+    }
+
+    void call(std::string request) {
+        std::string reply;
+        WriteParams identity;
+        identity.related_sample_identity().writer_guid() = reader->guid();
+        auto begun = Clock::now();
+        writer->write(&request, identity);
+        SampleInfo info;
+        bool is_answered = false;
+        while (!is_answered && since(begun) < 8000) {
+            std::this_thread::sleep_for(std::chrono::microseconds(200));
+            is_answered = reader->take_next_sample(&reply, &info) == ReturnCode_t::RETCODE_OK && info.valid_data
+                && info.related_sample_identity.writer_guid() == reader->guid();
+        }
+        std::cout << (is_answered ? since(begun) : 1e9) << ' ' << reply.size() << std::endl;
+    }
+};
+
+std::string bytes_of(const std::string &hexadecimal) {
+    std::string bytes;
+    for (size_t at = 0; at + 1 < hexadecimal.size(); at += 2) {
+        bytes.push_back(static_cast<char>(std::stoi(hexadecimal.substr(at, 2), nullptr, 16)));
+    }
+    return bytes;
+}
+
+int main(int count, char **arguments) {
+    const int domain = std::atoi(arguments[1]);
+    const std::string service = count > 4 ? arguments[2] : "flockform/get_state";
+    const std::string type = count > 4 ? arguments[3] : "lifecycle_msgs::srv::dds_::GetState";
     DomainParticipantQos qos;
     // The participants of this computer, should its loopback device carry no multicast.
     for (int participant = 0; participant < 8; ++participant) {
@@ -72,43 +132,23 @@ int main(int, char **arguments) {
         qos.wire_protocol().builtin.initialPeersList.push_back(locator);
     }
     auto *participant = DomainParticipantFactory::get_instance()->create_participant(domain, qos);
-    TypeSupport requests(new Bytes("lifecycle_msgs::srv::dds_::GetState_Request_"));
-    TypeSupport replies(new Bytes("lifecycle_msgs::srv::dds_::GetState_Response_"));
+    TypeSupport requests(new Bytes((type + "_Request_").c_str()));
+    TypeSupport replies(new Bytes((type + "_Response_").c_str()));
     requests.register_type(participant);
     replies.register_type(participant);
-    auto *asked = participant->create_topic("rq/flockform/get_stateRequest", requests.get_type_name(), TOPIC_QOS_DEFAULT);
-    auto *answered = participant->create_topic("rr/flockform/get_stateReply", replies.get_type_name(), TOPIC_QOS_DEFAULT);
+    auto *asked = participant->create_topic("rq/" + service + "Request", requests.get_type_name(), TOPIC_QOS_DEFAULT);
+    auto *answered = participant->create_topic("rr/" + service + "Reply", replies.get_type_name(), TOPIC_QOS_DEFAULT);
     auto *publisher = participant->create_publisher(PUBLISHER_QOS_DEFAULT);
     auto *subscriber = participant->create_subscriber(SUBSCRIBER_QOS_DEFAULT);
-    DataReaderQos reader_qos = DATAREADER_QOS_DEFAULT;
-    reader_qos.reliability().kind = RELIABLE_RELIABILITY_QOS;
-    DataWriterQos writer_qos = DATAWRITER_QOS_DEFAULT;
-    writer_qos.durability().kind = VOLATILE_DURABILITY_QOS;
-    for (int call = 0; call < calls; ++call) {
-        auto *reader = subscriber->create_datareader(answered, reader_qos);
-        auto *writer = publisher->create_datawriter(asked, writer_qos);
-        auto begun = Clock::now();
-        PublicationMatchedStatus writers;
-        SubscriptionMatchedStatus readers;
-        do {
-            std::this_thread::sleep_for(std::chrono::microseconds(50));
-            writer->get_publication_matched_status(writers);
-            reader->get_subscription_matched_status(readers);
-        } while ((writers.current_count == 0 || readers.current_count == 0) && since(begun) < 20000);
-        std::string request("\0\1\0\0\0", 5), reply;
-        WriteParams identity;
-        identity.related_sample_identity().writer_guid() = reader->guid();
-        begun = Clock::now();
-        writer->write(&request, identity);
-        SampleInfo info;
-        bool is_answered = false;
-        while (!is_answered && since(begun) < 8000) {
-            std::this_thread::sleep_for(std::chrono::microseconds(200));
-            is_answered = reader->take_next_sample(&reply, &info) == ReturnCode_t::RETCODE_OK && info.valid_data;
+    if (count > 4) {
+        Client client(publisher, subscriber, asked, answered);
+        for (int request = 4; request < count; ++request) {
+            client.call(bytes_of(arguments[request]));
         }
-        std::cout << (is_answered ? since(begun) : 1e9) << std::endl;
-        publisher->delete_datawriter(writer);
-        subscriber->delete_datareader(reader);
+    } else {
+        for (int call = 0; call < std::atoi(arguments[2]); ++call) {
+            Client(publisher, subscriber, asked, answered).call(std::string("\0\1\0\0\0", 5));
+        }
     }
     std::_Exit(0);
 }

@@ -3,7 +3,7 @@
 use std::sync::mpsc::RecvTimeoutError;
 use std::time::Duration;
 
-use super::fastdds::started;
+use super::fastdds::{called, started};
 use super::support::*;
 
 const CALLS: usize = 300;
@@ -19,7 +19,7 @@ fn no_first_call_waits_for_a_heartbeat() {
     let mut took: Vec<f64> = Vec::new();
     while took.len() < CALLS {
         match lines.recv_timeout(Duration::from_secs(40)) {
-            Ok(line) => took.push(line.parse().expect("milliseconds")),
+            Ok(line) => took.push(called(&line).0),
             Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => {
                 panic!("the client fell silent after {} calls", took.len())
             }

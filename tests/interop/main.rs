@@ -7,7 +7,7 @@
 //! FLOCKFORM_PYTHON=venv/bin/python cargo test --test interop -- --ignored --test-threads=1
 //! ```
 //!
-//! `ghosts.rs` and `first_calls.rs` need g++ and Debian's `libfastrtps-dev`.
+//! `ghosts.rs`, `first_calls.rs` and `large_replies.rs` need g++ and Debian's `libfastrtps-dev`.
 //!
 //! `edge.rs` puts the edge alone against `peer.py`; the others put `flockform node`, as it is installed, between
 //! robots (`robots.py`) and somebody who watches it and calls its services (`watch.py`). Cyclone DDS speaks here
@@ -17,11 +17,13 @@
 #![cfg(feature = "cli")]
 
 mod edge;
+mod endpoints;
 mod fastdds;
 mod faults;
 mod first_calls;
 mod flight;
 mod ghosts;
+mod large_replies;
 mod load;
 mod own_network;
 #[path = "../common/running.rs"]
@@ -32,5 +34,7 @@ mod signals;
 mod support;
 #[path = "../common/swarms.rs"]
 mod swarms;
+mod two_hosts;
 #[path = "../common/waits.rs"]
 mod waits;
+mod warnings;

@@ -7,6 +7,7 @@ Usage: robots.py DOMAIN SPEC. SPEC is a JSON object:
   frame      frame_id of the poses
   pose_type  "pose-stamped" (default) or "pose-array"
   pose_topic of the array
+  target_topic of the array of targets, where they come in one
   batch      this process's robots by number, [first, end); all unless given
 Commands on the standard input, one JSON object a line, name to what is wrong with that robot from now on: "silent",
 "nan", "infinity", "frame", "past", "future", "twice", "reversed" or null for nothing; or {"stop": true}: no more
@@ -33,7 +34,12 @@ class Robots:
         def topic(name, leaf):
             return Topic(participant, f"rt/{name}/{leaf}", PoseStamped)
 
-        self.targets = {name: DataReader(participant, topic(name, "target_pose"), qos=DEEP) for name in names}
+        self.targets, self.target_array = {}, None
+        if "target_topic" in spec:
+            of_all = Topic(participant, f"rt{spec['target_topic']}", PoseArray)
+            self.target_array = DataReader(participant, of_all, qos=DEEP)
+        else:
+            self.targets = {name: DataReader(participant, topic(name, "target_pose"), qos=DEEP) for name in names}
         if spec.get("pose_type") == "pose-array":
             out = Topic(participant, f"rt{spec['pose_topic']}", PoseArray)
             self.array, self.poses = DataWriter(participant, out, qos=BEST_EFFORT), {}
@@ -44,14 +50,20 @@ class Robots:
     def hear(self):
         for name, reader in self.targets.items():
             for target in reader.take(N=100):
-                if not target.sample_info.valid_data:
-                    continue
-                place = [target.pose.position.x, target.pose.position.y]
-                self.received[name] += 1
-                if all(map(math.isfinite, place)):
-                    self.places[name] = place
-                else:
-                    self.not_finite += 1
+                if target.sample_info.valid_data:
+                    self.go(name, target.pose)
+        for message in self.target_array.take(N=100) if self.target_array else []:
+            if message.sample_info.valid_data:
+                for name, pose in zip(self.places, message.poses):
+                    self.go(name, pose)
+
+    def go(self, name, pose):
+        place = [pose.position.x, pose.position.y]
+        self.received[name] += 1
+        if all(map(math.isfinite, place)):
+            self.places[name] = place
+        else:
+            self.not_finite += 1
 
     def say(self, stamp):
         if self.stopped:
@@ -83,7 +95,7 @@ class Robots:
             received=self.received,  # targets, by robot
             sent=self.sent,  # messages with poses
             not_finite=self.not_finite,  # targets that are no place
-            heard=sorted(name for name, out in self.poses.items() if out.get_matched_subscriptions()),
+            heard=[] if self.array else sorted(name for name, out in self.poses.items() if out.get_matched_subscriptions()),
             sent_to=sorted(name for name, way in self.targets.items() if way.get_matched_publications()),
         )
 

@@ -62,7 +62,12 @@ pub struct Peer {
 
 impl Peer {
     pub fn start(script: &'static str, domain: u16, argument: &str) -> Self {
-        let mut child = python(script, &[&domain.to_string(), argument]).spawn().expect("python starts");
+        Self::of(script, python(script, &[&domain.to_string(), argument]))
+    }
+
+    /// The process of a script that this command starts.
+    pub fn of(script: &'static str, mut command: Command) -> Self {
+        let mut child = command.spawn().expect("python starts");
         let orders = child.stdin.take().expect("piped");
         let output = BufReader::new(child.stdout.take().expect("piped"));
         let (say, lines) = channel();
@@ -147,6 +152,14 @@ impl Square {
         all.extend(self.arguments.iter().map(String::as_str));
         all.extend(more);
         flockform(domain, &all)
+    }
+
+    /// `flockform SUBCOMMAND` of it, for peers on all hosts.
+    pub fn start_anywhere(&self, domain: u16, subcommand: &str) -> Running {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_flockform"));
+        command.arg(subcommand).args(&self.arguments).env("ROS_DOMAIN_ID", domain.to_string());
+        command.env_remove("ROS_AUTOMATIC_DISCOVERY_RANGE").stdin(Stdio::null());
+        Running(command.spawn().expect("the binary starts"))
     }
 
     /// What `robots.py` is told, with the robots where `place` puts each from its place.

@@ -108,6 +108,13 @@ fn a_recording_tells_rosbag2_its_topics_and_their_quality_of_service() {
         assert_eq!(offered, topic["topic_metadata"]["offered_qos_profiles"]);
         let expected = if channel.topic.ends_with("/pose") { "best_effort" } else { "reliable" };
         assert_eq!(offered[0]["reliability"], expected, "{}", channel.topic);
+        let hash = topic["topic_metadata"]["type_description_hash"].as_str().expect("text");
+        assert!(hash.starts_with("RIHS01_") && hash.len() == 71, "{}: {hash:?}", channel.topic);
+        if channel.topic.ends_with("/pose") {
+            // As Jazzy's geometry_msgs has it.
+            let known = "RIHS01_10f3786d7d40fd2b54367835614bff85d4ad3b5dab62bf8bca0cc232d73b4cd8";
+            assert_eq!(hash, known);
+        }
     }
 }
 

@@ -210,7 +210,8 @@ fn a_second_node_of_the_same_name_is_noticed_and_reported() {
 #[test]
 fn a_peer_without_our_files_is_told_what_our_messages_are_made_of() {
     let mut peers = peers();
-    let mut swarm = Swarming::open(&square(&PATIENT), &[]);
+    let asked_for = [&PATIENT[..], &["node.services=[\"type-description\"]"]].concat();
+    let mut swarm = Swarming::open(&square(&asked_for), &[]);
     let name = "/flockform/get_type_description";
     let ask = client::<GetTypeDescription>(&mut peers, ServiceMapping::Enhanced, name);
     let type_name = "flockform_msgs/msg/FormationState".to_owned();
@@ -240,7 +241,8 @@ fn the_log_s_level_is_read_and_set_by_the_node_s_name_where_commands_are_allowed
                 Ok(())
             }),
         };
-        let mut swarm = Swarming::open(&square(&[&PATIENT[..], overrides].concat()), &[]);
+        let asked_for = ["node.services=[\"logger-levels\"]"];
+        let mut swarm = Swarming::open(&square(&[&PATIENT[..], overrides, &asked_for].concat()), &[]);
         swarm.node.serve_log_level(level).expect("services");
         let mapping = ServiceMapping::Enhanced;
         let get = client::<GetLoggerLevels>(&mut peers, mapping, "/flockform/get_logger_levels");

@@ -102,6 +102,7 @@ fn simulated_robots_fly_the_manoeuvre_that_the_node_leads() {
     // Shorter and faster than the file's own, so that the test is.
     let mut overrides = vec![
         "manoeuvres[0].legs=[{ seconds = 1.0, translate = [2.0, 0.5], rotate = 30.0 }]",
+        "node.markers=true",
         "limits.speed=8.0",
     ];
     overrides.extend(PATIENT);

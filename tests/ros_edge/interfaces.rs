@@ -54,6 +54,7 @@ fn poses_come_in_every_type_of_message() {
         overrides.push(&kind_is);
         if kind == "pose-array" {
             overrides.push("node.pose_topic=\"/all/poses\"");
+            overrides.push("node.target_type=\"pose-array\"");
         }
         let mut swarm = Swarming::open(&square(&overrides), &[]);
         swarm.until_all_are_heard();

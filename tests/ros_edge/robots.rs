@@ -2,8 +2,13 @@
 
 use std::time::Duration;
 
-use flockform::messages::rcl_interfaces::{GetParameters, ListParameters, ListParametersRequest, Names};
+use flockform::messages::rcl_interfaces::{
+    GetLoggerLevels, GetParameters, ListParameters, ListParametersRequest, Names,
+};
+use flockform::messages::type_description_interfaces::{GetTypeDescription, GetTypeDescriptionRequest};
+use flockform::ros::arguments::Severity;
 use flockform::ros::edge::Node;
+use flockform::ros::edge::loggers::LogLevel;
 use flockform::ros::edge::parameters::Value;
 use flockform::ros::robots::{Layout, RobotNodes};
 use ros2_client::ServiceMapping;
@@ -47,4 +52,27 @@ fn the_node_of_all_robots_answers_for_its_parameters() {
     let get = client::<GetParameters>(&mut peers, mapping, "/robots/get_parameters");
     let got = call::<GetParameters>(&get, &Names { names: listed.names }, &mut tick);
     assert_eq!(got.values, [Value::Bool(true).to_wire()]);
+}
+
+#[test]
+fn the_node_of_all_robots_has_the_services_that_the_swarm_file_asks_for() {
+    let mut peers = peers();
+    let asked_for = ["node.services=[\"type-description\", \"logger-levels\"]"];
+    let swarm = square(&[&PATIENT[..], &asked_for].concat());
+    let mut robots = RobotNodes::open(&swarm, &arguments(&[]), Layout::OneNode).expect("robots");
+    let (get, set) = (Box::new(|| Severity::Warn), Box::new(|_| Err("as it is".to_owned())));
+    robots.serve_log_level(LogLevel { get, set }).expect("services");
+    let mut tick = || {
+        robots.tick();
+        std::thread::sleep(Duration::from_millis(5));
+    };
+    let mapping = ServiceMapping::Enhanced;
+    let get = client::<GetLoggerLevels>(&mut peers, mapping, "/robots/get_logger_levels");
+    let levels = call::<GetLoggerLevels>(&get, &Names { names: vec!["robots".into()] }, &mut tick).levels;
+    assert_eq!(levels[0].level, 30);
+    let ask = client::<GetTypeDescription>(&mut peers, mapping, "/robots/get_type_description");
+    let type_name = "geometry_msgs/msg/PoseStamped".to_owned();
+    let asked = GetTypeDescriptionRequest { type_name, ..Default::default() };
+    let answer = call::<GetTypeDescription>(&ask, &asked, &mut tick);
+    assert!(answer.successful, "{}", answer.failure_reason);
 }

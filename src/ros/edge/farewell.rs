@@ -1,18 +1,19 @@
 //! The leave of a participant, said so that Fast DDS takes it.
 //!
 //! RustDDS disposes its participant without the key hash that Fast DDS asks for, which then keeps it in its graph until the lease runs
-//! out, 50 s later (`.github/upstream.md`). The same is said here once more, with the hash: in a packet to those ports at which
-//! participants hear of others.
+//! out, 50 s later (`.github/upstream.md`). The same is sent here once more, with the hash: in a packet to those ports at which
+//! participants take announcements.
 
 use std::io;
-use std::net::{Ipv4Addr, UdpSocket};
+use std::net::{Ipv4Addr, SocketAddrV4, UdpSocket};
 
 use socket2::SockRef;
 
 use super::packet::{ANNOUNCER, Content, MULTICAST, PARTICIPANTS, data, discovery_port};
 
-/// Says that the participant of this prefix has left. What is not sent is not missed: leases run out.
-pub fn send(prefix: [u8; 12], domain: u16, loopback_only: bool) {
+/// Announces that the participant of this prefix has left: to all of this computer and, where multicast is not carried, to those
+/// that are known by their places. What does not arrive is made up for by the lease.
+pub fn send(prefix: [u8; 12], domain: u16, loopback_only: bool, places: &[SocketAddrV4]) {
     let packet = packet(prefix);
     let Some(common) = discovery_port(domain, None) else { return };
     let send = || -> io::Result<()> {
@@ -22,6 +23,7 @@ pub fn send(prefix: [u8; 12], domain: u16, loopback_only: bool) {
                 let _ = socket.send_to(&packet, (Ipv4Addr::LOCALHOST, port));
             }
         }
+        places.iter().for_each(|place| _ = socket.send_to(&packet, place));
         // By the device that the system takes for others, and by that for itself.
         for device in [Ipv4Addr::UNSPECIFIED, Ipv4Addr::LOCALHOST] {
             if loopback_only && !device.is_loopback() {

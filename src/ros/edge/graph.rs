@@ -14,9 +14,11 @@ use ros2_client::dds::rustdds::{
 use ros2_client::entities_info::{NodeEntitiesInfo, ParticipantEntitiesInfo};
 use ros2_client::{Gid, NodeName};
 
-use super::nudge::Nudge;
+use super::nudge;
 use super::participant::Reader;
+use super::places::Places;
 use super::topic::{Taken, next};
+use super::whole::WholeReplies;
 use crate::messages::wire::decode;
 
 /// How often the watcher looks \[s\]. Nodes announced within one look go out as one sample.
@@ -118,6 +120,13 @@ impl Graph {
         self.state().matched.get(&local).map_or(0, BTreeSet::len)
     }
 
+    /// Prefixes of the participants whose endpoints match a local one.
+    pub fn matched_participants(&self, local: GUID) -> Vec<[u8; 12]> {
+        let state = self.state();
+        let all: BTreeSet<_> = state.matched.get(&local).into_iter().flatten().copied().map(prefix).collect();
+        all.into_iter().collect()
+    }
+
     /// Whether some endpoint of that participant matches the local one.
     pub fn matches_participant(&self, local: GUID, participant: [u8; 12]) -> bool {
         self.state()
@@ -210,6 +219,13 @@ impl Graph {
     }
 }
 
+/// What is sent beside RustDDS, in the clear.
+#[derive(Clone)]
+pub(super) struct Beside {
+    pub places: Arc<Places>,
+    pub replies: Arc<WholeReplies>,
+}
+
 /// The thread that watches; it ends when dropped.
 pub(super) struct Watcher {
     stop: Option<Sender<()>>,
@@ -223,13 +239,13 @@ impl Watcher {
         guid: GUID,
         writer: DataWriterCdr<ParticipantEntitiesInfo>,
         reader: Reader,
-        nudge: Option<Nudge>,
+        beside: Option<Beside>,
     ) -> std::io::Result<Self> {
         let (stop, stopped) = channel();
         let listener = participant.status_listener();
         let thread = std::thread::Builder::new()
             .name("ros graph".into())
-            .spawn(move || watch(&graph, &listener, guid, &writer, &reader, nudge, &stopped))?;
+            .spawn(move || watch(&graph, &listener, guid, &writer, &reader, beside.as_ref(), &stopped))?;
         Ok(Self { stop: Some(stop), thread: Some(thread) })
     }
 }
@@ -260,7 +276,7 @@ fn watch(
     guid: GUID,
     writer: &DataWriterCdr<ParticipantEntitiesInfo>,
     reader: &Reader,
-    mut nudge: Option<Nudge>,
+    beside: Option<&Beside>,
     stopped: &Receiver<()>,
 ) {
     use ros2_client::dds::rustdds::RTPSEntity;
@@ -270,11 +286,14 @@ fn watch(
         if look.is_multiple_of(SWEEP) {
             graph.sweep();
         }
-        nudge.iter_mut().for_each(Nudge::listen);
+        if let Some(beside) = beside {
+            beside.places.listen();
+            beside.replies.repeat();
+        }
         // As many as RustDDS keeps for us.
         for event in std::iter::from_fn(|| listener.try_recv_status()).take(2048) {
-            if let (Some(nudge), Some((reader, writer))) = (&nudge, writer_matched(&event)) {
-                nudge.ask(reader, writer);
+            if let (Some(beside), Some((reader, writer))) = (beside, writer_matched(&event)) {
+                nudge::ask(&beside.places, reader, writer);
             }
             graph.note(event);
         }

@@ -29,6 +29,7 @@ mod packet;
 pub mod parameters;
 pub mod participant;
 mod payload;
+mod places;
 pub mod pulse;
 pub mod quality;
 #[cfg(any(test, feature = "security"))]
@@ -38,6 +39,7 @@ pub mod rosout;
 pub mod service;
 mod threads;
 pub mod topic;
+mod whole;
 
 use crate::messages::names::NameError;
 

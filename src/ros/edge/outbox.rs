@@ -14,6 +14,7 @@ use ros2_client::dds::rustdds::{GUID, RTPSEntity, WriteOptions};
 use super::EdgeError;
 use super::participant::Writer;
 use super::payload::Payload;
+use super::whole::{Reply, WholeReplies};
 
 /// Messages that wait on any topic, however short its history \[1\]: a computer that is busy for some periods loses none.
 const LEAST: usize = 4;
@@ -31,6 +32,8 @@ pub(super) struct Outlet {
     writer: Mutex<Writer>,
     most: usize,
     queue: Mutex<Queue>,
+    /// Of a service in the clear.
+    replies: Option<Arc<WholeReplies>>,
 }
 
 #[derive(Default)]
@@ -43,10 +46,10 @@ struct Queue {
 }
 
 impl Outlet {
-    pub fn new(topic: &str, writer: Writer, depth: u16) -> Arc<Self> {
+    pub fn new(topic: &str, writer: Writer, depth: u16, replies: Option<Arc<WholeReplies>>) -> Arc<Self> {
         let most = usize::from(depth).max(LEAST);
         let (topic, guid) = (topic.to_owned(), writer.guid());
-        Arc::new(Self { topic, guid, writer: Mutex::new(writer), most, queue: Mutex::default() })
+        Arc::new(Self { topic, guid, writer: Mutex::new(writer), most, queue: Mutex::default(), replies })
     }
 
     pub fn guid(&self) -> GUID {
@@ -64,8 +67,13 @@ impl Outlet {
         let Some((payload, options)) = queue.waiting.pop_front() else { return };
         drop(queue);
         let writer = self.writer.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Err(error) = writer.write_with_options(payload, options) {
-            self.queue().refused = Some(error.to_string());
+        let whole = self.replies.as_ref().and_then(|replies| Some((replies, Reply::of(&payload, &options)?)));
+        match (writer.write_with_options(payload, options), whole) {
+            (Ok(sample), Some((replies, reply))) => {
+                replies.send(self.guid, i64::from(sample.sequence_number), &reply);
+            }
+            (Ok(_), None) => {}
+            (Err(error), _) => self.queue().refused = Some(error.to_string()),
         }
     }
 }
@@ -144,7 +152,7 @@ mod tests {
         let domain = 100 + (std::process::id() % 101) as u16;
         let edge = Edge::open(Options { domain, loopback_only: true }).expect("sockets");
         let writer = edge.with_participant(|shared, _| shared.writer("rt/hangs", "T_", Quality::BEST_EFFORT));
-        let outlet = Outlet::new("/hangs", writer.expect("a writer"), 1);
+        let outlet = Outlet::new("/hangs", writer.expect("a writer"), 1, None);
         let hangs = outlet.writer.lock().expect("no thread panicked");
         let mut outbox = Outbox::start().expect("a thread");
         let post =

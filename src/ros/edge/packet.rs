@@ -17,15 +17,19 @@ pub enum Content<'a> {
     Payload(&'a [u8]),
     /// A list of parameters with its end, and no payload.
     InlineQos(&'a [u8]),
+    /// The one before the other.
+    Both { inline_qos: &'a [u8], payload: &'a [u8] },
 }
 
 /// An RTPS message of one DATA submessage, little endian, from a writer to a reader of the participant of this prefix
 /// (RTPS 2.3, sections 9.4.4 and 9.4.5.3).
 pub fn data(prefix: [u8; 12], [writer, reader]: [[u8; 4]; 2], number: u32, content: &Content<'_>) -> Vec<u8> {
     let (flags, content) = match content {
-        Content::Payload(content) => (0x05, *content),
-        Content::InlineQos(content) => (0x03, *content),
+        Content::Payload(content) => (0x05, [*content, &[]]),
+        Content::InlineQos(content) => (0x03, [*content, &[]]),
+        Content::Both { inline_qos, payload } => (0x07, [*inline_qos, *payload]),
     };
+    let content = content.concat();
     let mut packet = head(prefix);
     packet.extend([0x15, flags]);
     packet.extend((20 + content.len() as u16).to_le_bytes());
@@ -37,6 +41,17 @@ pub fn data(prefix: [u8; 12], [writer, reader]: [[u8; 4]; 2], number: u32, conte
     packet.extend(number.to_le_bytes());
     packet.extend(content);
     packet
+}
+
+/// Inline QoS of a reply: the request of this reader or writer and number that it answers, under the two identifiers by which
+/// DDS programs know it, as RustDDS writes them.
+pub fn related_to(guid: [u8; 16], number: i64) -> Vec<u8> {
+    const RELATED_SAMPLE_IDENTITY: [u16; 2] = [0x0083, 0x800f];
+    const END: [u8; 4] = [1, 0, 0, 0];
+    let number = number.cast_unsigned();
+    let halves = [(number >> 32) as u32, number as u32].map(u32::to_le_bytes).concat();
+    let one = |kind: u16| [&kind.to_le_bytes()[..], &[24, 0], &guid, &halves].concat();
+    [&RELATED_SAMPLE_IDENTITY.map(one).concat()[..], &END].concat()
 }
 
 /// An RTPS message of one PAD submessage, which means nothing, with a number in it (RTPS 2.3, section 8.3.7.11).
@@ -79,9 +94,18 @@ pub fn first_sample_wanted(own: [u8; 12], reader: [u8; 4], to: [u8; 12], writer:
     packet
 }
 
-/// The participant that a packet announces, and the places at which it takes samples; `None` of every other packet
-/// (RTPS 2.3, sections 9.4.5.3 and 9.6.2.2).
-pub fn announced_at(packet: &[u8]) -> Option<([u8; 12], Vec<SocketAddrV4>)> {
+/// A participant and the places at which it takes packets.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Announcement {
+    pub from: [u8; 12],
+    pub samples: Vec<SocketAddrV4>,
+    pub discovery: Vec<SocketAddrV4>,
+}
+
+/// The participant that a packet announces; `None` of every other packet (RTPS 2.3, sections 9.4.5.3 and 9.6.2.2).
+pub fn announced(packet: &[u8]) -> Option<Announcement> {
+    const METATRAFFIC_UNICAST_LOCATOR: u16 = 0x32;
+    const DEFAULT_UNICAST_LOCATOR: u16 = 0x31;
     const DATA: u8 = 0x15;
     const WITH_INLINE_QOS: u8 = 0x02;
     const WITH_PAYLOAD: u8 = 0x04;
@@ -98,7 +122,9 @@ pub fn announced_at(packet: &[u8]) -> Option<([u8; 12], Vec<SocketAddrV4>)> {
             if flags & WITH_INLINE_QOS != 0 {
                 while Parameter::take(&mut payload, flags & 1 == 1).is_some() {}
             }
-            return Some((from, default_places(payload)));
+            let [samples, discovery] =
+                [DEFAULT_UNICAST_LOCATOR, METATRAFFIC_UNICAST_LOCATOR].map(|kind| places(payload, kind));
+            return Some(Announcement { from, samples, discovery });
         }
         rest = next;
     }
@@ -129,9 +155,8 @@ impl<'a> Parameter<'a> {
     }
 }
 
-/// The places of UDP in a list of parameters.
-fn default_places(payload: &[u8]) -> Vec<SocketAddrV4> {
-    const DEFAULT_UNICAST_LOCATOR: u16 = 0x31;
+/// The places of UDP in a list of parameters of this kind.
+fn places(payload: &[u8], kind: u16) -> Vec<SocketAddrV4> {
     const UDP: u32 = 1;
     let is_little = payload.get(1) == Some(&3);
     let word = |bytes: &[u8]| {
@@ -145,7 +170,7 @@ fn default_places(payload: &[u8]) -> Vec<SocketAddrV4> {
     };
     let mut list = payload.get(4..).unwrap_or_default();
     let all = std::iter::from_fn(|| Parameter::take(&mut list, is_little));
-    all.filter(|one| one.kind == DEFAULT_UNICAST_LOCATOR).filter_map(|one| place(one.value)).collect()
+    all.filter(|one| one.kind == kind).filter_map(|one| place(one.value)).collect()
 }
 
 #[cfg(test)]
@@ -155,12 +180,14 @@ mod tests {
     /// An announcement with two places, and something that no place is between them, behind this inline QoS.
     fn announcement(inline_qos: &[u8]) -> Vec<u8> {
         let locator = |kind: u32, port: u32, address: [u8; 4]| {
-            let head = [&[0x31, 0, 24, 0][..], &kind.to_le_bytes(), &port.to_le_bytes()].concat();
+            let use_of = if port == 7410 { 0x32 } else { 0x31 };
+            let head = [&[use_of, 0, 24, 0][..], &kind.to_le_bytes(), &port.to_le_bytes()].concat();
             [&head[..], &[0; 12], &address].concat()
         };
         let payload = [
             &[0, 3, 0, 0][..],
             &locator(1, 7411, [10, 0, 0, 7]),
+            &locator(1, 7410, [10, 0, 0, 7]),
             &[0x15, 0, 4, 0, 2, 3, 0, 0],
             &locator(16, 7, [0; 4]),
             &locator(1, 7413, [127, 0, 0, 1]),
@@ -177,28 +204,33 @@ mod tests {
 
     #[test]
     fn an_announcement_says_where_its_participant_is() {
-        let places = ["10.0.0.7:7411", "127.0.0.1:7413"].map(|place| place.parse().expect("an address"));
+        let place = |place: &str| place.parse().expect("an address");
+        let expected = Announcement {
+            from: [0x0f; 12],
+            samples: vec![place("10.0.0.7:7411"), place("127.0.0.1:7413")],
+            discovery: vec![place("10.0.0.7:7410")],
+        };
         // As that of the second participant of a process on Fast DDS is.
         let inline_qos = [&[0x0f, 0x80, 24, 0][..], &[7; 24], &[1, 0, 0, 0]].concat();
         for inline_qos in [&[][..], &inline_qos] {
-            assert_eq!(announced_at(&announcement(inline_qos)), Some(([0x0f; 12], places.to_vec())));
+            assert_eq!(announced(&announcement(inline_qos)).as_ref(), Some(&expected));
         }
-        assert_eq!(announced_at(&numbered([1; 12], 7)), None);
+        assert_eq!(announced(&numbered([1; 12], 7)), None);
         let farewell = data([7; 12], [ANNOUNCER, [2; 4]], 9, &Content::InlineQos(&[5; 36]));
-        assert_eq!(announced_at(&farewell), None);
+        assert_eq!(announced(&farewell), None);
     }
 
     #[test]
     fn damaged_announcements_are_read_without_a_panic() {
         let whole = announcement(&[0x0f, 0x80, 4, 0, 7, 7, 7, 7, 1, 0, 0, 0]);
         for cut in 0..whole.len() {
-            let _ = announced_at(&whole[..cut]);
+            let _ = announced(&whole[..cut]);
         }
         for at in 0..whole.len() {
             for value in [0, 1, 3, 0x7f, 0x80, 0xff] {
                 let mut changed = whole.clone();
                 changed[at] = value;
-                let _ = announced_at(&changed);
+                let _ = announced(&changed);
             }
         }
     }
@@ -216,6 +248,20 @@ mod tests {
         let length = u16::from_le_bytes([packet[22], packet[23]]);
         assert_eq!(usize::from(length), packet.len() - 24);
         assert_eq!((packet.len() % 4, packet[40]), (0, 9));
+    }
+
+    #[test]
+    fn a_reply_names_its_request_twice_before_its_payload() {
+        let qos = related_to([7; 16], (3 << 32) | 9);
+        assert_eq!(qos.len(), 2 * 28 + 4);
+        assert_eq!(qos[..4], [0x83, 0, 24, 0]);
+        assert_eq!(qos[28..32], [0x0f, 0x80, 24, 0]);
+        assert_eq!((&qos[20..28], &qos[56..]), (&[3, 0, 0, 0, 9, 0, 0, 0][..], &[1, 0, 0, 0][..]));
+        let packet =
+            data([7; 12], [[1; 4], [2; 4]], 9, &Content::Both { inline_qos: &qos, payload: &[5; 8] });
+        let length = u16::from_le_bytes([packet[22], packet[23]]);
+        assert_eq!((usize::from(length), packet[21]), (packet.len() - 24, 0x07));
+        assert_eq!(packet[packet.len() - 12..], [1, 0, 0, 0, 5, 5, 5, 5, 5, 5, 5, 5]);
     }
 
     #[test]

@@ -14,12 +14,13 @@ use ros2_client::dds::rustdds::{
     QosPolicyBuilder, RTPSEntity, Subscriber as DdsSubscriber, Topic, TopicKind,
 };
 
-use super::graph::{Graph, Watcher, prefix};
-use super::nudge::Nudge;
+use super::graph::{Beside, Graph, Watcher, prefix};
 use super::outbox::{Outbox, Outlet};
 use super::payload::{Payload, Verbatim};
+use super::places::Places;
 use super::pulse::{self, Pulse};
 use super::topic::forget_earlier;
+use super::whole::WholeReplies;
 use super::{EdgeError, Publisher, Quality, Service, Subscription, farewell, names};
 use crate::messages::names::Names;
 use crate::messages::{Message, ServiceType};
@@ -72,6 +73,7 @@ pub(super) struct Shared {
     /// Whether peers and their samples are authenticated; those of our own making are then not.
     pub is_secured: bool,
     pub graph: Arc<Graph>,
+    beside: Option<Beside>,
 }
 
 impl Edge {
@@ -193,12 +195,18 @@ impl Shared {
         let graph = Arc::new(Graph::default());
         let guid = participant.guid();
         // What is not authenticated is not taken there.
-        let nudge = (!is_secured).then(|| Nudge::open(guid, options.domain, options.loopback_only));
-        let nudge = nudge.transpose().unwrap_or_else(|error| {
-            tracing::debug!("the first calls of some clients may take 3 s: {error}");
+        let places = (!is_secured).then(|| Places::open(guid, options.domain, options.loopback_only));
+        let places = places.transpose().unwrap_or_else(|error| {
+            tracing::warn!(
+                "first calls of clients on Fast DDS may take 3 s, and large replies not arrive: {error}"
+            );
             None
         });
-        let watcher = Watcher::start(graph.clone(), &participant, guid, writer, reader, nudge)?;
+        let beside = places.map(Arc::new).map(|places| Beside {
+            replies: Arc::new(WholeReplies::new(places.clone(), graph.clone())),
+            places,
+        });
+        let watcher = Watcher::start(graph.clone(), &participant, guid, writer, reader, beside.clone())?;
         Ok(Self {
             watcher: Some(watcher),
             outbox: Outbox::start()?,
@@ -209,6 +217,7 @@ impl Shared {
             options,
             is_secured,
             graph,
+            beside,
         })
     }
 
@@ -219,7 +228,8 @@ impl Shared {
 
     /// Says that the participant has left; it may announce itself no more.
     pub fn say_farewell(&self) {
-        farewell::send(prefix(self.guid), self.options.domain, self.options.loopback_only);
+        let places = self.beside.as_ref().map(|beside| beside.places.discovery()).unwrap_or_default();
+        farewell::send(prefix(self.guid), self.options.domain, self.options.loopback_only, &places);
     }
 
     fn topic(&self, name: &str, kind: &str, policies: &QosPolicies) -> Result<Topic, EdgeError> {
@@ -359,7 +369,7 @@ impl Node {
         let kind = names::dds_message(M::PACKAGE, M::NAME);
         let writer = self.shared.writer(&names::dds_topic(topic), &kind, quality)?;
         self.shared.graph.add_writer(&self.name, writer.guid(), topic);
-        let outlet = Outlet::new(topic, writer, quality.depth);
+        let outlet = Outlet::new(topic, writer, quality.depth, None);
         Ok(Publisher::new(topic.to_owned(), outlet, self.shared.clone()))
     }
 
@@ -395,7 +405,8 @@ impl Node {
         let reader = self.shared.reader(&requests, &request, Service::<S>::QUALITY)?;
         self.shared.graph.add_writer(&self.name, writer.guid(), name);
         self.shared.graph.add_reader(&self.name, reader.guid(), name);
-        let outlet = Outlet::new(name, writer, Service::<S>::QUALITY.depth);
+        let replies = self.shared.beside.as_ref().map(|beside| beside.replies.clone());
+        let outlet = Outlet::new(name, writer, Service::<S>::QUALITY.depth, replies);
         Ok(Service::new(name.to_owned(), reader, outlet, self.shared.clone()))
     }
 }

@@ -28,6 +28,16 @@ impl Payload {
     }
 }
 
+impl Payload {
+    /// As it stands in a packet: behind its encapsulation, and with bytes after it up to a multiple of four.
+    pub fn serialized(&self) -> Vec<u8> {
+        let order = u8::from(self.order == Order::Little);
+        let mut bytes = [&[0, order, 0, 0], &self.bytes[..]].concat();
+        bytes.resize(bytes.len().next_multiple_of(4), 0);
+        bytes
+    }
+}
+
 /// Lets RustDDS read and write [`Payload`]s.
 pub(super) struct Verbatim;
 

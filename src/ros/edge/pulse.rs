@@ -90,6 +90,8 @@ pub struct Pulse {
     begun: Instant,
     patience: Patience,
     given_up: AtomicBool,
+    /// Whether the process leaves the network, which ends threads of the middleware.
+    is_leaving: AtomicBool,
     /// When the loop went into the middleware \[ms since `begun`\]; 0 while it is out.
     inside_since: AtomicU64,
     /// How long the threads of the middleware had waited for a processor when last looked at \[ms\].
@@ -109,8 +111,10 @@ impl Drop for Inside<'_> {
 
 impl Pulse {
     fn new(patience: Patience) -> Self {
-        let (given_up, [inside_since, waited]) = (AtomicBool::new(false), [0, 0].map(AtomicU64::new));
-        Self { begun: Instant::now(), patience, given_up, inside_since, waited, heard: Mutex::default() }
+        let [given_up, is_leaving] = [false; 2].map(AtomicBool::new);
+        let [inside_since, waited] = [0; 2].map(AtomicU64::new);
+        let (begun, heard) = (Instant::now(), Mutex::default());
+        Self { begun, patience, given_up, is_leaving, inside_since, waited, heard }
     }
 
     fn look_at_waits(&self) -> Duration {
@@ -131,6 +135,11 @@ impl Pulse {
     /// Whether the process is about to end.
     pub fn is_given_up(&self) -> bool {
         self.given_up.load(Ordering::Relaxed)
+    }
+
+    /// Ends the watch: from now on threads of the middleware end because they are to.
+    pub fn leave(&self) {
+        self.is_leaving.store(true, Ordering::Relaxed);
     }
 
     /// Records after each tick whether the loop hears any peer. Forged discovery can leave the middleware deaf to all
@@ -272,7 +281,7 @@ pub(super) fn start(shared: &Shared, participant: &DomainParticipant) -> Result<
     let pulse = Arc::new(Pulse::new(Patience::of(shared.is_secured)));
     let seen = pulse.clone();
     let watch = move || {
-        let (reason, last_word) = watch(&mut proof, &seen);
+        let Some((reason, last_word)) = watch(&mut proof, &seen) else { return };
         seen.given_up.store(true, Ordering::Relaxed);
         tracing::error!("the middleware is given up: {reason}");
         std::thread::sleep(last_word);
@@ -283,8 +292,9 @@ pub(super) fn start(shared: &Shared, participant: &DomainParticipant) -> Result<
     Ok(pulse)
 }
 
-/// Watches until there is a reason to give up; with it how long the loop has for its last word.
-fn watch(proof: &mut Proof, pulse: &Pulse) -> (String, Duration) {
+/// Watches until there is a reason to give up, and returns it with the time that the loop has for its last word; `None` once the
+/// process leaves.
+fn watch(proof: &mut Proof, pulse: &Pulse) -> Option<(String, Duration)> {
     let most = memory("VmRSS:").unwrap_or(0) + GROWTH;
     bound_memory(MOST_GROWTH);
     let (patience, threads) = (pulse.patience, threads::count());
@@ -293,16 +303,19 @@ fn watch(proof: &mut Proof, pulse: &Pulse) -> (String, Duration) {
     loop {
         look = look.wrapping_add(1);
         std::thread::sleep(LOOK);
+        if pulse.is_leaving.load(Ordering::Relaxed) {
+            return None;
+        }
         // A suspended computer is not a deaf middleware: only time in which this thread ran counts.
         silence += last_look.elapsed().min(4 * LOOK);
         last_look = Instant::now();
         if let Some(size) = memory("VmRSS:").filter(|size| *size > most) {
             // It grows while we wait.
-            return (format!("the process has grown to {} MB", size / 1024), Duration::ZERO);
+            return Some((format!("the process has grown to {} MB", size / 1024), Duration::ZERO));
         }
         if look.is_multiple_of(BEAT) {
             if threads::count() < threads {
-                return ("one of its threads has ended".into(), LAST_WORD);
+                return Some(("one of its threads has ended".into(), LAST_WORD));
             }
             pulse.look_at_waits();
             sent = sent.wrapping_add(1);
@@ -314,13 +327,11 @@ fn watch(proof: &mut Proof, pulse: &Pulse) -> (String, Duration) {
         let kept = pulse.kept_for();
         let limit = patience.deaf + patience.forgiven(pulse.waited().saturating_sub(waited));
         if silence > limit {
-            return (
-                format!("it has heard nothing for {:.1} s, not even us", silence.as_secs_f64()),
-                LAST_WORD,
-            );
+            let reason = format!("it has heard nothing for {:.1} s, not even us", silence.as_secs_f64());
+            return Some((reason, LAST_WORD));
         }
         if kept > limit {
-            return (format!("it has kept the loop for {:.1} s", kept.as_secs_f64()), LAST_WORD);
+            return Some((format!("it has kept the loop for {:.1} s", kept.as_secs_f64()), LAST_WORD));
         }
     }
 }

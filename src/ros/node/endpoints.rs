@@ -20,6 +20,8 @@ pub(super) struct Endpoints {
     is_driving: bool,
     state: Publisher<FormationState>,
     markers: Option<Publisher<MarkerArray>>,
+    /// Of their topic, which a recording has in any case.
+    markers_name: String,
 }
 
 impl Endpoints {
@@ -34,13 +36,14 @@ impl Endpoints {
         for (m, kind) in part.mine.iter().flat_map(|&m| Some((m, raw.velocity?))) {
             drives.push((m, Drive::open(node, &topic(&raw.velocity_topic, m)?, kind, &swarm.raw)?));
         }
-        let markers = raw.markers.then(|| names.topic("~/markers")).transpose()?;
+        let markers_name = names.topic("~/markers")?;
         Ok(Self {
             link,
             drives,
             is_driving: false,
             state: node.publisher(&names.topic("~/state")?, Quality::reliable(5))?,
-            markers: markers.map(|topic| node.publisher(&topic, Quality::reliable(1))).transpose()?,
+            markers: raw.markers.then(|| node.publisher(&markers_name, Quality::reliable(1))).transpose()?,
+            markers_name,
         })
     }
 
@@ -63,9 +66,14 @@ impl Endpoints {
         let state = state::message(control, &swarm.name, origin.header(now), statistics.last_tick());
         copy(&mut self.link.recorder, &self.state, &state, now);
         statistics.sent(self.state.publish(&state));
+        if self.markers.is_none() && self.link.recorder.is_none() {
+            return;
+        }
+        let markers = markers::message(control, &swarm.raw, &origin.header(now));
+        if let Some(recorder) = &mut self.link.recorder {
+            recorder.take(&self.markers_name, &markers, [now; 2]);
+        }
         if let Some(topic) = &self.markers {
-            let markers = markers::message(control, &swarm.raw, &origin.header(now));
-            copy(&mut self.link.recorder, topic, &markers, now);
             statistics.sent(topic.publish(&markers));
         }
     }

@@ -1,11 +1,11 @@
 //! The loop's end over ROS 2: poses and places of leaders in, `PoseStamped` targets out.
 
 use super::pose::PoseSource;
-use super::{NodeError, TopicOf};
+use super::{NodeError, TopicOf, copy};
 use crate::messages::builtin_interfaces::Time;
 use crate::messages::flockform_msgs::Ranges;
 use crate::messages::formation::{pose::is_frame, ranges, target};
-use crate::messages::geometry_msgs::PoseStamped;
+use crate::messages::geometry_msgs::{Pose, PoseArray, PoseStamped};
 use crate::messages::recorder::MessageRecorder;
 use crate::messages::said;
 use crate::messages::std_msgs::Header;
@@ -26,8 +26,7 @@ pub struct Link {
     /// Members whose poses are received.
     heard: Vec<usize>,
     leaders: Vec<(usize, Subscription<PoseStamped>)>,
-    /// By member; none for those that others serve.
-    targets: Vec<Option<Publisher<PoseStamped>>>,
+    targets: TargetTopics,
     frame_id: String,
     simulated_time: bool,
     /// Places of leaders in another frame.
@@ -36,6 +35,33 @@ pub struct Link {
     complaints: Complaints,
     /// Gets a copy of what goes through.
     pub recorder: Option<MessageRecorder>,
+}
+
+enum TargetTopics {
+    /// By member; none for those that others serve.
+    Stamped(Vec<Option<Publisher<PoseStamped>>>),
+    /// One message for all.
+    Array(Box<Publisher<PoseArray>>),
+}
+
+impl TargetTopics {
+    fn open(
+        node: &Node,
+        raw: &RawNode,
+        count: usize,
+        mine: &[usize],
+        topic: TopicOf<'_>,
+    ) -> Result<Self, NodeError> {
+        if raw.has_target_array() {
+            let topic = topic(&raw.target_topic, 0)?;
+            return Ok(Self::Array(Box::new(node.publisher(&topic, Quality::reliable(1))?)));
+        }
+        let mut targets: Vec<_> = (0..count).map(|_| None).collect();
+        for &m in mine {
+            targets[m] = Some(node.publisher(&topic(&raw.target_topic, m)?, Quality::reliable(1))?);
+        }
+        Ok(Self::Stamped(targets))
+    }
 }
 
 impl Link {
@@ -54,10 +80,7 @@ impl Link {
         for m in formation.moved().filter(|m| part.mine.contains(m)) {
             leaders.push((m, node.subscription(&topic(&raw.leader_topic, m)?, Quality::BEST_EFFORT)?));
         }
-        let mut targets: Vec<_> = (0..formation.count()).map(|_| None).collect();
-        for &m in &part.mine {
-            targets[m] = Some(node.publisher(&topic(&raw.target_topic, m)?, Quality::reliable(1))?);
-        }
+        let targets = TargetTopics::open(node, raw, formation.count(), &part.mine, topic)?;
         let mut ranges = Vec::new();
         let has_ranges = control.watch().limits().ranges.is_some();
         for &m in part.heard.iter().filter(|_| has_ranges) {
@@ -126,17 +149,25 @@ impl ControllerEnd for Link {
 
     fn send(&mut self, now: f64, targets: &[Target]) -> Result<(), EdgeError> {
         let header = Header { stamp: Time::from_seconds(now), frame_id: self.frame_id.clone() };
-        let mut outcome = Ok(());
-        for target in targets {
-            let Some(topic) = &self.targets[target.member] else { continue };
-            let message = target::message(target, header.clone());
-            if let Some(recorder) = &mut self.recorder {
-                recorder.take(topic.topic(), &message, [now; 2]);
+        match &self.targets {
+            TargetTopics::Array(_) if targets.is_empty() => Ok(()),
+            TargetTopics::Array(topic) => {
+                let message = array(targets, self.names.len(), header);
+                copy(&mut self.recorder, topic, &message, now);
+                topic.publish(&message)
             }
-            // A failure for one member does not stop the others' targets.
-            outcome = outcome.and(topic.publish(&message));
+            TargetTopics::Stamped(topics) => {
+                let mut outcome = Ok(());
+                for target in targets {
+                    let Some(topic) = &topics[target.member] else { continue };
+                    let message = target::message(target, header.clone());
+                    copy(&mut self.recorder, topic, &message, now);
+                    // A failure for one member does not stop the others' targets.
+                    outcome = outcome.and(topic.publish(&message));
+                }
+                outcome
+            }
         }
-        outcome
     }
 
     fn refused(&self) -> u64 {
@@ -145,4 +176,13 @@ impl ControllerEnd for Link {
             + self.ranges.iter().map(|(_, topic)| topic.refused()).sum::<u64>()
             + self.leaders.iter().map(|(_, topic)| topic.refused()).sum::<u64>()
     }
+}
+
+/// The targets of `count` robots as one message; nowhere for robots without one.
+fn array(targets: &[Target], count: usize, header: Header) -> PoseArray {
+    let mut poses = vec![Pose::planar([f64::NAN; 2], f64::NAN); count];
+    for target in targets {
+        poses[target.member] = Pose::planar(target.position, target.yaw);
+    }
+    PoseArray { header, poses }
 }

@@ -42,6 +42,7 @@ use crate::messages::std_msgs::Empty;
 use crate::messages::std_srvs;
 use crate::scene::SceneError;
 use crate::scene::swarm::Swarm;
+use crate::scene::swarm::raw::RawService;
 use crate::swarm::control::Control;
 use crate::swarm::control::scope::NodeScope;
 use crate::swarm::pace::{Pace, system_time};
@@ -71,8 +72,8 @@ pub struct FormationNode {
     set_formation: Service<SetFormation>,
     /// Of the program around the node, where it has any.
     queue: Option<CommandQueue>,
+    descriptions: Option<TypeDescriptions>,
     /// Of a log whose level can change.
-    descriptions: TypeDescriptions,
     loggers: Option<Loggers>,
     rosout: Option<Rosout>,
     /// Of a configured node.
@@ -117,8 +118,11 @@ impl FormationNode {
         control.set_active(false);
         let mut this = Self {
             pace: Pace::new(settings.rate),
-            parameters: Parameters::new(&node, store)?,
-            lifecycle: Lifecycle::new(&node)?,
+            parameters: Parameters::open(&node, store, raw.serves(RawService::Parameters))?,
+            lifecycle: Lifecycle::open(
+                &node,
+                [RawService::Lifecycle, RawService::TransitionEvents].map(|kind| raw.serves(kind)),
+            )?,
             stop: node.service(&service("emergency_stop")?)?,
             stop_requests: raw
                 .commands
@@ -130,7 +134,10 @@ impl FormationNode {
             resume: node.service(&service("resume")?)?,
             set_formation: node.service(&service("set_formation")?)?,
             queue: None,
-            descriptions: TypeDescriptions::new(&node)?,
+            descriptions: raw
+                .serves(RawService::TypeDescription)
+                .then(|| TypeDescriptions::new(&node))
+                .transpose()?,
             loggers: None,
             rosout: None,
             endpoints: None,
@@ -190,12 +197,14 @@ impl FormationNode {
         Ok(())
     }
 
-    /// Lets peers read and set the level of this log.
+    /// Lets peers read and set the level of this log, where the swarm file asks for that.
     ///
     /// # Errors
     /// A service that the middleware refuses.
     pub fn serve_log_level(&mut self, level: LogLevel) -> Result<(), EdgeError> {
-        self.loggers = Some(Loggers::new(&self.origin.node, level)?);
+        if self.origin.swarm.raw.node.serves(RawService::LoggerLevels) {
+            self.loggers = Some(Loggers::new(&self.origin.node, level)?);
+        }
         Ok(())
     }
 
@@ -249,6 +258,7 @@ impl FormationNode {
                 break;
             }
         }
+        self.pulse.iter().for_each(|pulse| pulse.leave());
         let now = self.time();
         let (lifecycle, mut transitions) = self.transitions(now);
         lifecycle.shut_down(now, &mut |goal| transitions.act(goal));
@@ -374,7 +384,7 @@ impl FormationNode {
         if let Some(loggers) = &self.loggers {
             loggers.serve(locked);
         }
-        self.descriptions.serve();
+        self.descriptions.iter().for_each(TypeDescriptions::serve);
         let changes = self.parameters.poll(now, locked);
         self.apply(&changes, now);
         let is_configured = self.endpoints.is_some();
@@ -492,8 +502,18 @@ fn copy<M: Message>(recorder: &mut Option<MessageRecorder>, topic: &Publisher<M>
 /// Refuses a node that no peer could make active.
 fn check_commands(swarm: &Swarm, autostart: bool) -> Result<(), SceneError> {
     let commands = swarm.raw.node.commands;
-    if autostart || commands.may_do_all() {
+    let has_lifecycle = swarm.raw.node.serves(RawService::Lifecycle);
+    if autostart || (commands.may_do_all() && has_lifecycle) {
         return Ok(());
+    }
+    if commands.may_do_all() {
+        let what =
+            "without \"lifecycle\" no peer can make the node active, and autostart is false".to_owned();
+        return Err(swarm.refuse(
+            "node.services",
+            what,
+            "leave the parameter autostart true, or add \"lifecycle\"",
+        ));
     }
     let what = format!("\"{}\" lets no peer make the node active, and autostart is false", commands.name());
     Err(swarm.refuse("node.commands", what, "leave the parameter autostart true, or allow \"all\""))

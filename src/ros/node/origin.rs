@@ -67,12 +67,13 @@ impl Origin {
         let is_array = raw.pose_type == RawPoseType::PoseArray;
         let moved: BTreeSet<usize> = formation.moved().collect();
         let is_posed = |m: usize| m == 0 || !is_array;
+        let is_target = |m: usize| m == 0 || !raw.has_target_array();
         let is_moved = |m: usize| moved.contains(&m);
         let has_ranges = self.swarm.raw.ranges.is_some();
         let has_velocity = |_: usize| raw.velocity.is_some();
         let patterns: [(_, _, _, IsUsed<'_>); 5] = [
             ("poses", &raw.pose_topic, &part.heard, &is_posed),
-            ("targets", &raw.target_topic, &part.mine, &|_| true),
+            ("targets", &raw.target_topic, &part.mine, &is_target),
             ("places", &raw.leader_topic, &part.mine, &is_moved),
             ("ranges", &raw.ranges_topic, &part.heard, &|_| has_ranges),
             ("velocities", &raw.velocity_topic, &part.mine, &has_velocity),

@@ -51,7 +51,8 @@ impl Swarm {
     }
 
     fn build(name: &str, document: Document, folder: Option<&Path>) -> Result<Self, SceneError> {
-        let raw: RawSwarm = document.read(&schema())?;
+        let mut raw: RawSwarm = document.read(&schema())?;
+        raw.node.name_arrays();
         let refuse: Refuse<'_> =
             &|key, message, help| SceneError::from(document.problem(key, message, Some(help.to_owned())));
         check_robots(&raw, refuse)?;

@@ -80,14 +80,16 @@ struct Member {
     accepted: Option<Pose>,
     /// Newest pose of a run that is consistent in itself and not yet believed, and how many are in it.
     candidate: Option<(Pose, u32)>,
+    /// Shortest time between two stamps of late, which is the member's own period \[s\].
+    shortest: Option<f64>,
     counts: Counts,
 }
 
 impl Watch {
     /// All members waiting.
     pub fn new(members: usize, limits: WatchLimits) -> Self {
-        let member =
-            Member { health: Health::Waiting, accepted: None, candidate: None, counts: Counts::default() };
+        let (health, counts) = (Health::Waiting, Counts::default());
+        let member = Member { health, accepted: None, candidate: None, shortest: None, counts };
         Self { limits, members: vec![member; members], ranges: vec![Vec::new(); members], clock: None }
     }
 
@@ -219,8 +221,13 @@ impl Member {
 
     fn accept(&mut self, pose: Pose, now: f64, limits: &WatchLimits) {
         if let (Some(last), Some(period)) = (self.accepted, limits.period) {
+            /// Growth of the shortest gap with every pose: a member that sends less often from now on is taken for what it is.
+            const GROWTH: f64 = 1.002;
+            let gap = pose.stamp - last.stamp;
+            let own = self.shortest.map_or(gap, |shortest| shortest.min(gap));
             // The cast saturates: a period of zero or a NaN harms nothing but the count.
-            self.counts.lost += ((pose.stamp - last.stamp) / period - 1.0).round() as u64;
+            self.counts.lost += (gap / own.max(period) - 1.0).round() as u64;
+            self.shortest = Some(GROWTH * own);
         }
         self.counts.accepted += 1;
         self.accepted = Some(pose);

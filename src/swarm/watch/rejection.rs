@@ -110,7 +110,7 @@ impl Rejection {
 pub struct Counts {
     /// Poses that were believed.
     pub accepted: u64,
-    /// Gaps between accepted stamps, in periods: what was lost or came too late. Zero where
+    /// Gaps between accepted stamps, in periods of the member, or the loop's where that is longer: what was lost or came too late. Zero where
     /// [`super::WatchLimits::period`] is not known.
     pub lost: u64,
     /// Rejections as [`Rejection::NotFinite`].

@@ -86,7 +86,23 @@ fn the_newest_wins_whatever_the_order() {
         assert_eq!(watch.position(0), Some([if stamp == 1.0 { 0.0 } else { 0.2 }, 0.0]));
     }
     let counts = watch.counts(0);
-    assert_eq!((counts.accepted, counts.not_newer, counts.lost), (2, 2, 1));
+    assert_eq!((counts.accepted, counts.not_newer), (2, 2));
+}
+
+#[test]
+fn poses_of_a_member_that_is_slower_than_the_loop_are_not_lost() {
+    // The loop's period is 0.1 s; each row has gaps in periods and what of them is a loss.
+    let rows: [(&[u32], u64); 4] =
+        [(&[1, 1, 1, 3, 1], 2), (&[4, 4, 4, 4], 0), (&[2, 2, 4, 2, 4], 2), (&[2, 1, 2, 1], 1)];
+    for (gaps, lost) in rows {
+        let (mut watch, mut stamp) = (watch(), 1.0);
+        watch.receive(0, pose(0.0, stamp), stamp).expect("good");
+        for &gap in gaps {
+            stamp += 0.1 * f64::from(gap);
+            watch.receive(0, pose(0.0, stamp), stamp).expect("good");
+        }
+        assert_eq!(watch.counts(0).lost, lost, "{gaps:?}");
+    }
 }
 
 #[test]

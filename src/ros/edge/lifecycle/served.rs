@@ -8,12 +8,41 @@ use crate::ros::edge::{EdgeError, Node, Publisher, Quality, Service};
 /// `~/get_available_transitions`, `~/get_transition_graph`, with the topic `~/transition_event`.
 pub struct Lifecycle {
     machine: Machine,
+    /// None where peers have no part in it.
+    services: Option<Services>,
+    events: Option<Publisher<msgs::TransitionEvent>>,
+}
+
+struct Services {
     changes: Service<msgs::ChangeState>,
     state: Service<msgs::GetState>,
     states: Service<msgs::GetAvailableStates>,
     transitions: Service<msgs::GetAvailableTransitions>,
     graph: Service<msgs::GetAvailableTransitions>,
-    events: Publisher<msgs::TransitionEvent>,
+}
+
+impl Services {
+    fn new(node: &Node) -> Result<Self, EdgeError> {
+        Ok(Self {
+            changes: node.service(&node.private("change_state")?)?,
+            state: node.service(&node.private("get_state")?)?,
+            states: node.service(&node.private("get_available_states")?)?,
+            transitions: node.service(&node.private("get_available_transitions")?)?,
+            graph: node.service(&node.private("get_transition_graph")?)?,
+        })
+    }
+
+    fn answer_questions(&self, now: State) {
+        self.state.serve(|_| msgs::GetStateResponse { current_state: state(now) });
+        self.states
+            .serve(|_| msgs::GetAvailableStatesResponse { available_states: State::ALL.map(state).into() });
+        self.transitions.serve(|_| msgs::GetAvailableTransitionsResponse {
+            available_transitions: Transition::from(now).map(description).collect(),
+        });
+        self.graph.serve(|_| msgs::GetAvailableTransitionsResponse {
+            available_transitions: Transition::ALL.map(description).into(),
+        });
+    }
 }
 
 impl Lifecycle {
@@ -22,15 +51,18 @@ impl Lifecycle {
     /// # Errors
     /// As [`Node::service`].
     pub fn new(node: &Node) -> Result<Self, EdgeError> {
-        Ok(Self {
-            machine: Machine::default(),
-            changes: node.service(&node.private("change_state")?)?,
-            state: node.service(&node.private("get_state")?)?,
-            states: node.service(&node.private("get_available_states")?)?,
-            transitions: node.service(&node.private("get_available_transitions")?)?,
-            graph: node.service(&node.private("get_transition_graph")?)?,
-            events: node.publisher(&node.topic("~/transition_event")?, Quality::reliable(10))?,
-        })
+        Self::open(node, [true; 2])
+    }
+
+    /// An unconfigured node, with services and with events where that is asked for.
+    ///
+    /// # Errors
+    /// As [`Node::service`].
+    pub fn open(node: &Node, [is_served, has_events]: [bool; 2]) -> Result<Self, EdgeError> {
+        let services = is_served.then(|| Services::new(node)).transpose()?;
+        let events = has_events.then(|| node.topic("~/transition_event")).transpose()?;
+        let events = events.map(|topic| node.publisher(&topic, Quality::reliable(10))).transpose()?;
+        Ok(Self { machine: Machine::default(), services, events })
     }
 
     pub fn state(&self) -> State {
@@ -84,14 +116,17 @@ impl Lifecycle {
         may: &dyn Fn(&Transition) -> bool,
         act: &mut dyn FnMut(Goal) -> Outcome,
     ) {
-        if let Some((id, request)) = self.changes.take() {
+        if let Some((id, request)) = self.services.as_ref().and_then(|services| services.changes.take()) {
             let asked = request.transition;
             let success = self.change(asked.id, &asked.label, now, may, act);
-            if let Err(error) = self.changes.reply(&id, &msgs::ChangeStateResponse { success }) {
+            if let Some(services) = &self.services
+                && let Err(error) = services.changes.reply(&id, &msgs::ChangeStateResponse { success })
+            {
                 tracing::warn!("{error}");
             }
         }
-        self.answer_questions();
+        let state = self.state();
+        self.services.iter().for_each(|services| services.answer_questions(state));
     }
 
     /// Makes a transition as a peer's request does, by its label where the id is 0; says whether what it asks for was done.
@@ -122,24 +157,12 @@ impl Lifecycle {
         asked == Outcome::Success
     }
 
-    fn answer_questions(&self) {
-        let now = self.state();
-        self.state.serve(|_| msgs::GetStateResponse { current_state: state(now) });
-        self.states
-            .serve(|_| msgs::GetAvailableStatesResponse { available_states: State::ALL.map(state).into() });
-        self.transitions.serve(|_| msgs::GetAvailableTransitionsResponse {
-            available_transitions: Transition::from(now).map(description).collect(),
-        });
-        self.graph.serve(|_| msgs::GetAvailableTransitionsResponse {
-            available_transitions: Transition::ALL.map(description).into(),
-        });
-    }
-
     fn publish_event(&self, edge: Transition, now: f64) {
+        let Some(events) = &self.events else { return };
         let msgs::TransitionDescription { transition, start_state, goal_state } = description(edge);
         let timestamp = (now * 1e9) as u64;
         let event = msgs::TransitionEvent { timestamp, transition, start_state, goal_state };
-        if let Err(error) = self.events.publish(&event) {
+        if let Err(error) = events.publish(&event) {
             tracing::warn!("{error}");
         }
     }

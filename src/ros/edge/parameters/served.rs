@@ -11,6 +11,12 @@ use crate::ros::edge::{EdgeError, Node, Publisher, Quality, Service};
 pub struct Parameters {
     store: Store,
     node: String,
+    /// None where peers have no part in them.
+    services: Option<Services>,
+    announced: bool,
+}
+
+struct Services {
     get: Service<msgs::GetParameters>,
     types: Service<msgs::GetParameterTypes>,
     describe: Service<msgs::DescribeParameters>,
@@ -18,7 +24,59 @@ pub struct Parameters {
     set: Service<msgs::SetParameters>,
     set_atomically: Service<msgs::SetParametersAtomically>,
     events: Publisher<msgs::ParameterEvent>,
-    announced: bool,
+}
+
+impl Services {
+    fn new(node: &Node) -> Result<Self, EdgeError> {
+        Ok(Self {
+            get: node.service(&node.private("get_parameters")?)?,
+            types: node.service(&node.private("get_parameter_types")?)?,
+            describe: node.service(&node.private("describe_parameters")?)?,
+            list: node.service(&node.private("list_parameters")?)?,
+            set: node.service(&node.private("set_parameters")?)?,
+            set_atomically: node.service(&node.private("set_parameters_atomically")?)?,
+            events: node.publisher(&node.topic("/parameter_events")?, Quality::reliable(1000))?,
+        })
+    }
+
+    fn answer_questions(&self, store: &Store) {
+        let unset = msgs::ParameterValue::default;
+        self.get.serve(|request| msgs::GetParametersResponse {
+            values: each(&request, |name| store.get(name).map_or_else(unset, Value::to_wire)),
+        });
+        self.types.serve(|request| msgs::GetParameterTypesResponse {
+            types: each(&request, |name| store.get(name).map_or(0, Value::kind)),
+        });
+        self.describe.serve(|request| msgs::DescribeParametersResponse {
+            descriptors: each(&request, |name| store.descriptor(name)),
+        });
+        self.list.serve(|request| {
+            let (names, prefixes) = store.list(&request.prefixes, request.depth);
+            msgs::ListParametersResponse { names, prefixes }
+        });
+    }
+
+    /// Takes new values from peers; with a reason in `locked`, none.
+    fn take_values(&self, store: &mut Store, locked: Option<&str>) {
+        let may = |name: &str| match locked {
+            Some(reason) => Err(Refusal::Vetoed { name: said(name), reason: reason.into() }),
+            None => Ok(()),
+        };
+        self.set.serve(|request| {
+            let set = |parameter: msgs::Parameter| {
+                let name = parameter.name;
+                result(may(&name).and_then(|()| store.set(&name, Value::from_wire(parameter.value))))
+            };
+            msgs::SetParametersResponse { results: request.parameters.into_iter().map(set).collect() }
+        });
+        self.set_atomically.serve(|request| {
+            let wanted = |parameter: msgs::Parameter| (parameter.name, Value::from_wire(parameter.value));
+            let settings: Vec<_> = request.parameters.into_iter().map(wanted).collect();
+            let set = may(settings.first().map_or("", |(name, _)| name));
+            let set = set.and_then(|()| store.set_atomically(settings));
+            msgs::SetParametersAtomicallyResponse { result: result(set) }
+        });
+    }
 }
 
 impl Parameters {
@@ -27,18 +85,16 @@ impl Parameters {
     /// # Errors
     /// As [`Node::service`].
     pub fn new(node: &Node, store: Store) -> Result<Self, EdgeError> {
-        Ok(Self {
-            store,
-            node: node.name().into(),
-            get: node.service(&node.private("get_parameters")?)?,
-            types: node.service(&node.private("get_parameter_types")?)?,
-            describe: node.service(&node.private("describe_parameters")?)?,
-            list: node.service(&node.private("list_parameters")?)?,
-            set: node.service(&node.private("set_parameters")?)?,
-            set_atomically: node.service(&node.private("set_parameters_atomically")?)?,
-            events: node.publisher(&node.topic("/parameter_events")?, Quality::reliable(1000))?,
-            announced: false,
-        })
+        Self::open(node, store, true)
+    }
+
+    /// Holds what the store declares, and serves it if `is_served`.
+    ///
+    /// # Errors
+    /// As [`Node::service`].
+    pub fn open(node: &Node, store: Store, is_served: bool) -> Result<Self, EdgeError> {
+        let services = is_served.then(|| Services::new(node)).transpose()?;
+        Ok(Self { store, node: node.name().into(), services, announced: false })
     }
 
     /// Declares one more: see [`Store::declare`].
@@ -66,25 +122,10 @@ impl Parameters {
     /// Answers the requests since the last tick and returns the changes. `now` \[s\] stamps the event. With a reason in
     /// `locked`, peers may set no parameter.
     pub fn poll(&mut self, now: f64, locked: Option<&str>) -> Vec<Change> {
-        self.answer_questions();
-        let may = |name: &str| match locked {
-            Some(reason) => Err(Refusal::Vetoed { name: said(name), reason: reason.into() }),
-            None => Ok(()),
-        };
-        self.set.serve(|request| {
-            let set = |parameter: msgs::Parameter| {
-                let name = parameter.name;
-                result(may(&name).and_then(|()| self.store.set(&name, Value::from_wire(parameter.value))))
-            };
-            msgs::SetParametersResponse { results: request.parameters.into_iter().map(set).collect() }
-        });
-        self.set_atomically.serve(|request| {
-            let wanted = |parameter: msgs::Parameter| (parameter.name, Value::from_wire(parameter.value));
-            let settings: Vec<_> = request.parameters.into_iter().map(wanted).collect();
-            let set = may(settings.first().map_or("", |(name, _)| name));
-            let set = set.and_then(|()| self.store.set_atomically(settings));
-            msgs::SetParametersAtomicallyResponse { result: result(set) }
-        });
+        if let Some(services) = &self.services {
+            services.answer_questions(&self.store);
+            services.take_values(&mut self.store, locked);
+        }
         self.changes(now)
     }
 
@@ -95,25 +136,8 @@ impl Parameters {
         changes
     }
 
-    fn answer_questions(&self) {
-        let store = &self.store;
-        let unset = msgs::ParameterValue::default;
-        self.get.serve(|request| msgs::GetParametersResponse {
-            values: each(&request, |name| store.get(name).map_or_else(unset, Value::to_wire)),
-        });
-        self.types.serve(|request| msgs::GetParameterTypesResponse {
-            types: each(&request, |name| store.get(name).map_or(0, Value::kind)),
-        });
-        self.describe.serve(|request| msgs::DescribeParametersResponse {
-            descriptors: each(&request, |name| store.descriptor(name)),
-        });
-        self.list.serve(|request| {
-            let (names, prefixes) = store.list(&request.prefixes, request.depth);
-            msgs::ListParametersResponse { names, prefixes }
-        });
-    }
-
     fn announce(&mut self, changes: &[Change], now: f64) {
+        let Some(services) = &self.services else { return };
         let parameter =
             |name: &str, value: &Value| msgs::Parameter { name: name.into(), value: value.to_wire() };
         let mut event = msgs::ParameterEvent {
@@ -129,7 +153,7 @@ impl Parameters {
         if event.new_parameters.is_empty() && event.changed_parameters.is_empty() {
             return;
         }
-        if let Err(error) = self.events.publish(&event) {
+        if let Err(error) = services.events.publish(&event) {
             tracing::warn!("{error}");
         }
     }

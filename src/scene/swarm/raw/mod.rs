@@ -199,9 +199,6 @@ pub(super) mod defaults {
     pub fn one() -> f64 {
         1.0
     }
-    pub fn yes() -> bool {
-        true
-    }
     pub fn age_limit() -> f64 {
         0.5
     }
@@ -231,6 +228,9 @@ pub(super) mod defaults {
     }
     pub fn target_topic() -> String {
         "{name}/target_pose".into()
+    }
+    pub fn services() -> Vec<super::RawService> {
+        vec![super::RawService::Parameters, super::RawService::Lifecycle]
     }
     pub fn leader_topic() -> String {
         "{name}/leader_pose".into()

@@ -20,10 +20,13 @@ pub struct RawNode {
     /// The message type of poses.
     #[serde(default)]
     pub pose_type: RawPoseType,
-    /// Topic of each robot's pose.
+    /// Topic of each robot's pose, or of the array of all.
     #[serde(default = "defaults::pose_topic")]
     pub pose_topic: String,
-    /// Topic of each robot's target, a `geometry_msgs/PoseStamped`.
+    /// The message type of targets.
+    #[serde(default)]
+    pub target_type: RawTargetType,
+    /// Topic of each robot's target, or of the array of all.
     #[serde(default = "defaults::target_topic")]
     pub target_topic: String,
     /// Topic of the next place of each leader with an `external` program, a `geometry_msgs/PoseStamped`.
@@ -42,9 +45,13 @@ pub struct RawNode {
     /// flies now, whatever a client's graph remembers of earlier ones.
     #[serde(default = "defaults::emergency_stop_topic")]
     pub emergency_stop_topic: String,
-    /// Publishes `visualization_msgs/MarkerArray` on `~/markers`.
-    #[serde(default = "defaults::yes")]
+    /// Publishes `visualization_msgs/MarkerArray` on `~/markers`; recordings have them in any case.
+    #[serde(default)]
     pub markers: bool,
+    /// Services of the node beside its commands, and of the node of simulated robots. Each costs every peer of the network endpoints
+    /// to discover.
+    #[serde(default = "defaults::services")]
+    pub services: Vec<RawService>,
     /// Commands that the node accepts from the network.
     #[serde(default)]
     pub commands: RawCommands,
@@ -57,16 +64,56 @@ impl Default for RawNode {
             frame_prefix: None,
             pose_type: RawPoseType::default(),
             pose_topic: defaults::pose_topic(),
+            target_type: RawTargetType::default(),
             target_topic: defaults::target_topic(),
             leader_topic: defaults::leader_topic(),
             ranges_topic: defaults::ranges_topic(),
             velocity: None,
             velocity_topic: defaults::velocity_topic(),
             emergency_stop_topic: defaults::emergency_stop_topic(),
-            markers: true,
+            markers: false,
+            services: defaults::services(),
             commands: RawCommands::default(),
         }
     }
+}
+
+impl RawNode {
+    /// Whether the node has these services.
+    pub fn serves(&self, service: RawService) -> bool {
+        self.services.contains(&service)
+    }
+
+    /// Whether all targets are one message.
+    pub fn has_target_array(&self) -> bool {
+        self.target_type == RawTargetType::PoseArray
+    }
+
+    /// Gives an array whose topic is not named in the file a name without a robot's in it.
+    pub(in crate::scene::swarm) fn name_arrays(&mut self) {
+        if self.pose_type == RawPoseType::PoseArray && self.pose_topic == defaults::pose_topic() {
+            self.pose_topic = "poses".into();
+        }
+        if self.has_target_array() && self.target_topic == defaults::target_topic() {
+            self.target_topic = "target_poses".into();
+        }
+    }
+}
+
+/// Services by kind.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum RawService {
+    /// `ros2 param`: six services and `/parameter_events`.
+    Parameters,
+    /// `ros2 lifecycle`: five services.
+    Lifecycle,
+    /// The topic `~/transition_event`.
+    TransitionEvents,
+    /// `~/get_logger_levels` and `~/set_logger_levels`.
+    LoggerLevels,
+    /// `~/get_type_description`.
+    TypeDescription,
 }
 
 /// Commands that are accepted while the node runs. The limits of the file hold in any case: commands can
@@ -115,7 +162,19 @@ pub enum RawPoseType {
     PoseWithCovarianceStamped,
     /// `nav_msgs/Odometry`.
     Odometry,
-    /// One `geometry_msgs/PoseArray` for all, in the order of the robots; `pose_topic` names it.
+    /// One `geometry_msgs/PoseArray` for all, in the order of the robots, on `pose_topic`, which then is `poses` unless given.
+    PoseArray,
+}
+
+/// Message that carries targets.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum RawTargetType {
+    /// `geometry_msgs/PoseStamped`.
+    #[default]
+    PoseStamped,
+    /// One `geometry_msgs/PoseArray` for all, in the order of the robots, on `target_topic`, which then is `target_poses` unless
+    /// given. Robots that are sent nowhere have places that are not numbers.
     PoseArray,
 }
 
