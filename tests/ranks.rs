@@ -14,7 +14,7 @@ use flockform::engine::shared::NotShared;
 use flockform::engine::state::EngineState;
 use flockform::flock::vectors::Vectors;
 use flockform::ranks::{Exchange, Team, in_process};
-use flockform::scene::Scene;
+use flockform::scene::{Scene, bundled};
 use flockform::solve::interrupt::Interrupt;
 
 use scenes::{load, planned};
@@ -110,12 +110,15 @@ fn shared(plan: &Plan, every: usize, ranks: usize) -> Vec<End> {
 }
 
 fn assert_same(name: &str, sets: &[&str], every: usize) {
-    let scene = load(name, sets);
-    let (plan, expected) = (planned(&scene), alone(&scene, every));
+    assert_scene_the_same(&load(name, sets), &format!("{name} {sets:?}"), every);
+}
+
+fn assert_scene_the_same(scene: &Scene, name: &str, every: usize) {
+    let (plan, expected) = (planned(scene), alone(scene, every));
     assert!(expected.step > 5, "{name}: something happens");
     for ranks in 1..=7 {
         for (rank, end) in shared(&plan, every, ranks).into_iter().enumerate() {
-            let what = format!("{name} {sets:?}, rank {rank} of {ranks}");
+            let what = format!("{name}, rank {rank} of {ranks}");
             assert_eq!((end.step, &end.reason), (expected.step, &expected.reason), "{what}");
             assert_eq!(end.seen, expected.seen, "{what}");
             assert!(end == expected, "{what}");
@@ -147,6 +150,87 @@ fn materials_and_neighbours_found_anew_too() {
     assert_same("shear", &["stop.steps=40"], 15);
     assert_same("notched-plate", &["stop.steps=40"], 15);
     assert_same("drop", &["stop.steps=12"], 5);
+}
+
+/// The bundled scene that is stepped where the file asks for its equilibrium.
+fn stepped(name: &str, sets: &[&str]) -> Scene {
+    let text = bundled(name).expect("bundled").text;
+    let text = text.replace("[equilibrium]\nsolver = \"auto\"\n", "");
+    assert!(!text.contains("[equilibrium]"));
+    let sets: Vec<String> = sets.iter().map(|&set| set.to_owned()).collect();
+    Scene::parse(name, name, &text, &sets, None).unwrap_or_else(|error| panic!("{name} {sets:?}: {error}"))
+}
+
+fn assert_steps_the_same(name: &str, sets: &[&str], every: usize) {
+    assert_scene_the_same(&stepped(name, sets), name, every);
+}
+
+/// Material, loads from the start and growing, thick outlines and other materials within; all by cells.
+#[test]
+fn loaded_materials_and_fitted_outlines_too() {
+    assert_steps_the_same("beam-loaded", &["stop.steps=60"], 25);
+    assert_steps_the_same("beam-loaded", &["stop.steps=60", "load_steps.ramp.steps=40"], 25);
+    assert_steps_the_same("l-bracket", &["stop.steps=40"], 15);
+    assert_steps_the_same("plate-hole", &["stop.steps=40"], 15);
+    assert_steps_the_same("ring", &["stop.steps=40", "load_steps={ramp={steps=30},every=7}"], 15);
+    assert_steps_the_same("inclusion", &["stop.steps=30"], 15);
+    assert_steps_the_same("elastica", &["stop.steps=30"], 15);
+    assert_steps_the_same("cook", &["stop.steps=30"], 15);
+}
+
+/// Large enough for several steps together.
+#[test]
+fn halos_of_a_loaded_material_and_of_a_fitted_outline_have_the_same_bits() {
+    let large = ["lattice.spacing=0.25", "body.shape.max=[60.0,25.0]", "stop.steps=70"];
+    assert_steps_the_same("beam-loaded", &large, 64);
+    assert_steps_the_same("plate-hole", &["lattice.spacing=0.2", "stop.steps=70"], 64);
+}
+
+#[test]
+fn roles_on_a_condition_and_what_is_done_on_the_way_too() {
+    let when = "roles[2]={region={kind=\"all\"},role=\"clamped\",when={quantity=\"displacement\",above=1.5}}";
+    assert_same("tension", &[when, "stop.steps=60"], 25);
+    let damped = "{at=9,what={kind=\"set\",keys=[\"update.damping=0.5\"]}}";
+    let cut = "{at=12,what={kind=\"cut\",from=[6.5,-5.0],to=[6.5,6.2]}}";
+    let actions = format!("actions=[{damped},{cut}]");
+    assert_same("tension", &["frame=none", "record.probes=[]", &actions, "stop.steps=40"], 7);
+    let heavier = "actions=[{at=9,what={kind=\"set\",keys=[\"loads[0].traction=[0.0,80.0]\"]}}]";
+    assert_steps_the_same("beam-loaded", &[heavier, "stop.steps=40"], 25);
+}
+
+/// Particles at no sites, torn until bonds break.
+#[test]
+fn bodies_of_points_too() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut cloud = "id,x,y\n".to_owned();
+    for i in 0..30 * 12 {
+        let (column, row) = (f64::from(i / 12), f64::from(i % 12));
+        let shift = 0.3 * (12.9898 * f64::from(i)).sin();
+        cloud.push_str(&format!("{},{:?},{:?}\n", 7 * i + 1, column + shift, row - shift));
+    }
+    std::fs::write(folder.path().join("cloud.csv"), cloud).expect("written");
+    let text = r#"
+title = "A torn cloud"
+neighbours = { kind = "within", radius = 1.7 }
+fracture = { stretch = 1.25 }
+body.shape = { kind = "points", file = "cloud.csv" }
+stop.steps = 80
+
+[[roles]]
+region = { kind = "edge", side = "left", depth = 0.8 }
+role = "clamped"
+
+[[roles]]
+region = { kind = "edge", side = "right", depth = 0.8 }
+role = "leader"
+motion = { kind = "velocity", per_step = [0.1, 0.0] }
+"#;
+    let of = |text: &str| {
+        let scene = Scene::parse("cloud", "cloud.toml", text, &[], Some(folder.path()));
+        scene.unwrap_or_else(|error| panic!("{error}"))
+    };
+    assert_scene_the_same(&of(text), "torn points", 25);
+    assert_scene_the_same(&of(&text.replace("fracture = { stretch = 1.25 }\n", "")), "points", 25);
 }
 
 #[test]
@@ -409,7 +493,10 @@ fn an_interrupt_of_one_rank_ends_the_solve_on_all() {
     let mut cases: Vec<_> =
         ["jacobi", "gauss-seidel", "chebyshev", "conjugate-gradients"].into_iter().map(of).collect();
     cases.push((LARGE_BEAM.iter().map(|&set| set.to_owned()).collect(), "beam-loaded"));
-    cases.push((vec!["lattice.spacing=0.25".to_owned(), "equilibrium.solver=multigrid".to_owned()], "elastica"));
+    cases.push((
+        vec!["lattice.spacing=0.25".to_owned(), "equilibrium.solver=multigrid".to_owned()],
+        "elastica",
+    ));
     for (sets, name) in cases {
         let sets: Vec<&str> = sets.iter().map(String::as_str).collect();
         let scene = load(name, &sets);
