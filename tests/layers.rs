@@ -66,8 +66,8 @@ fn sweep_imports_the_flock_alone() {
 }
 
 #[test]
-fn solve_stands_on_the_flock_and_its_sweeps() {
-    assert_imports_only("solve", &["geometry", "flock", "sweep"]);
+fn solve_stands_on_the_flock_its_sweeps_and_the_ranks_that_share_them() {
+    assert_imports_only("solve", &["geometry", "flock", "sweep", "ranks"]);
 }
 
 #[test]

@@ -1,9 +1,12 @@
 //! The program under `mpirun`: the files of a run are those of a run alone, whatever happens on the way.
 //!
-//! Needs `mpirun` of the MPI that the program is built with, and a build with the feature `mpi`.
+//! Needs the launcher of the MPI that the program is built with, and a build with the feature `mpi`. The launcher is `mpirun`, or
+//! what the variable `FLOCKFORM_MPIRUN` names.
 
 #![cfg(all(feature = "cli", feature = "mpi"))]
 
+use std::hash::{BuildHasher, RandomState};
+use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::sync::mpsc;
@@ -38,9 +41,13 @@ mod waits;
 const PROGRAM: &str = env!("CARGO_BIN_EXE_flockform");
 const PATIENCE: Duration = Duration::from_secs(60);
 
+fn launcher() -> String {
+    std::env::var("FLOCKFORM_MPIRUN").unwrap_or_else(|_| "mpirun".to_owned())
+}
+
 /// The program on so many ranks, more than there may be cores, as the user that runs the tests.
 fn mpirun(ranks: usize, arguments: &[&str], folder: &Path) -> Command {
-    let mut command = Command::new("mpirun");
+    let mut command = Command::new(launcher());
     command.args(["-n", &ranks.to_string(), PROGRAM]).args(arguments);
     command.current_dir(folder).env_remove("RUST_LOG");
     // Open MPI's; MPICH asks for none of it.
@@ -79,6 +86,9 @@ fn contents(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
             let mut summary = json::json(&text(&bytes));
             summary["timings"] = serde_json::Value::Null;
             summary["share_swept"] = serde_json::Value::Null;
+            if let Some(solver) = summary["equilibrium"].as_object_mut() {
+                solver.remove("phases");
+            }
             bytes = summary.to_string().into_bytes();
         }
         (path.strip_prefix(folder).expect("below it").to_owned(), bytes)
@@ -114,7 +124,26 @@ fn a_run_on_ranks_writes_the_files_of_a_run_alone() {
         ("lattice-honeycomb", &[]),
         ("shear", &["--steps", "60"]),
     ];
-    for (name, more) in scenes {
+    assert_alike_on_ranks(&folder, &scenes);
+}
+
+#[test]
+#[ignore = "needs mpirun"]
+fn equilibria_on_ranks_are_those_of_a_run_alone() {
+    let folder = temporary();
+    let large = ["lattice.spacing=0.1", "body.shape.max=[40.0,22.0]", "equilibrium.solver=multigrid"];
+    let large = large.map(|set| ["--set", set]);
+    let scenes: [(&str, &[&str]); 3] = [
+        // Five groups of columns, which two ranks share.
+        ("beam-loaded", large.as_flattened()),
+        ("plate-hole", &["--set", "equilibrium.solver=conjugate-gradients"]),
+        ("elastica", &["--set", "lattice.spacing=0.25", "--set", "load_steps.increments=3"]),
+    ];
+    assert_alike_on_ranks(&folder, &scenes);
+}
+
+fn assert_alike_on_ranks(folder: &tempfile::TempDir, scenes: &[(&str, &[&str])]) {
+    for &(name, more) in scenes {
         let alone = folder.path().join(format!("{name}-alone"));
         let arguments = |out: &Path| {
             let out = out.display().to_string();
@@ -144,7 +173,19 @@ fn what_is_wrong_is_said_once_and_nothing_is_left() {
         (vec!["run", "tensio"], "no bundled scene"),
         (vec!["run", "tension", "--set", "rule.mean.kind=x"], "rule.mean"),
         (vec!["run", "tension", "--set", "update.order=sequential"], "cannot be shared by ranks"),
-        (vec!["run", "beam-loaded"], "no solver yet"),
+        (vec!["run", "beam-loaded", "--set", "equilibrium.tolerance=2"], "equilibrium.tolerance"),
+        // It is said after all have begun.
+        (
+            vec![
+                "run",
+                "lattice-square",
+                "--set",
+                "equilibrium={}",
+                "--set",
+                "rule.mean={kind=\"distance\"}",
+            ],
+            "no equilibrium can be solved for",
+        ),
         (vec!["compare", "beam"], "`compare` runs on one"),
         (vec!["live", "tension"], "`live` runs on one"),
         (vec!["run", "tension", "--out", "/proc/none"], "cannot create /proc/"),
@@ -200,39 +241,82 @@ fn ranks_that_are_to_make_different_runs_are_refused() {
     }
 }
 
-/// A run that is looked at after each of its steps, which take a while on ranks, with checkpoints.
-const LONG: [&str; 12] = [
-    "run",
-    "tension",
-    "--out",
-    "o",
-    "--no-report",
-    "--figures",
-    "none",
-    "--steps",
-    "1500",
-    "--checkpoint-every",
-    "100steps",
-    "--quiet",
-];
-
-/// The long run alone, in a folder of its own.
-fn long_alone() -> tempfile::TempDir {
+#[test]
+#[ignore = "needs mpirun"]
+fn ranks_with_different_programs_are_refused() {
     let folder = temporary();
-    assert_ends_well(&flockform(&LONG, folder.path()), "alone");
+    let other = folder.path().join("other");
+    let mut program = std::fs::read(PROGRAM).expect("readable");
+    // It still runs: what comes after its last section is not loaded.
+    program.push(0);
+    std::fs::write(&other, program).expect("written");
+    let permissions = std::fs::metadata(PROGRAM).expect("a file").permissions();
+    std::fs::set_permissions(&other, permissions).expect("permitted");
+    let other = other.display().to_string();
+    let both = ["run", "tension", ":", "-n", "1", &other, "run", "tension"];
+    let output = on_ranks(1, &both, folder.path());
+    let said = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert!(said.contains("rank 1 has another program than rank 0"), "{said}");
+    assert_eq!(names_in(folder.path()), ["other"]);
+}
+
+/// A run that is looked at after each of its steps, which take a while on ranks, with checkpoints.
+#[rustfmt::skip]
+const fn long(steps: &'static str) -> [&'static str; 12] {
+    [
+        "run", "tension", "--out", "o", "--no-report", "--figures", "none", "--quiet",
+        "--checkpoint-every", "100steps", "--steps", steps,
+    ]
+}
+
+const LONG: [&str; 12] = long("1500");
+/// One that does not end before an interrupt reaches it.
+const LONGER: [&str; 12] = long("15000");
+
+/// A long run alone, in a folder of its own.
+fn alone(long: [&str; 12]) -> tempfile::TempDir {
+    let folder = temporary();
+    assert_ends_well(&flockform(&long, folder.path()), "alone");
     folder
 }
 
-/// The long run on ranks that has kept a checkpoint, and the process ids of the ranks; so that it does not end before
-/// it is told to, one rank is frozen, for which the others wait.
-fn begun(ranks: usize, frozen: usize, folder: &Path) -> (Running, Vec<u32>) {
-    let run = Running(mpirun(ranks, &LONG, folder).spawn().expect("mpirun is installed"));
+/// A long run on ranks, and their process ids.
+fn started(ranks: usize, long: [&str; 12], folder: &Path) -> (Running, Vec<u32>) {
+    let run = Running(mpirun(ranks, &long, folder).spawn().expect("mpirun is installed"));
     let found = || Some(ranks_of(&run.0)).filter(|found| found.len() == ranks);
     let processes = within(PATIENCE, "all ranks", found);
-    let checkpoint = folder.join("o.unfinished/checkpoint");
-    within(PATIENCE, "a checkpoint", || checkpoint.exists().then_some(()));
+    (run, processes)
+}
+
+/// The same once it has kept a checkpoint; so that it does not end before it is asked to, one rank is frozen, for which the
+/// others wait.
+fn begun(ranks: usize, frozen: usize, folder: &Path) -> (Running, Vec<u32>) {
+    let (run, processes) = started(ranks, LONG, folder);
+    wait_for_checkpoint(folder);
     signal("STOP", processes[frozen]);
     (run, processes)
+}
+
+fn wait_for_checkpoint(folder: &Path) {
+    let checkpoint = folder.join("o.unfinished/checkpoint");
+    within(PATIENCE, "a checkpoint", || checkpoint.exists().then_some(()));
+}
+
+/// Waits until the launcher has ended; whether it ended well, and its words.
+fn ended(run: &mut Running) -> (bool, String) {
+    let status = within(PATIENCE, "mpirun ends", || run.0.try_wait().expect("a child"));
+    let mut said = String::new();
+    run.0.stderr.take().expect("piped").read_to_string(&mut said).expect("text");
+    (status.success(), said)
+}
+
+/// Resumes a long run and compares it with the one that was never disturbed.
+fn assert_resumes(ranks: usize, folder: &Path, expected: &Path, what: &str) {
+    let resume = ["run", "--resume", "o", "--no-report", "--figures", "none", "--quiet"];
+    let output = if ranks == 1 { flockform(&resume, folder) } else { on_ranks(ranks, &resume, folder) };
+    assert_ends_well(&output, what);
+    assert_same(&folder.join("o"), &expected.join("o"), what);
 }
 
 /// Process ids of the ranks.
@@ -255,37 +339,86 @@ fn ranks_of(mpirun: &Child) -> Vec<u32> {
 #[test]
 #[ignore = "needs mpirun"]
 fn a_killed_rank_ends_the_run_which_goes_on_with_any_number_of_ranks() {
-    let expected = long_alone();
+    let expected = alone(LONG);
     for victim in 0..3 {
         let folder = temporary();
         let (mut run, ranks) = begun(3, (victim + 1) % 3, folder.path());
         signal("KILL", ranks[victim]);
-        let status = within(PATIENCE, "mpirun ends", || run.0.try_wait().expect("a child"));
-        assert!(!status.success(), "{status}");
+        let killed = Instant::now();
+        let (is_well, said) = ended(&mut run);
+        assert!(!is_well, "{said}");
+        assert!(killed.elapsed() < PATIENCE / 4, "{:?}", killed.elapsed());
+        // Open MPI names the rank, MPICH its process.
+        let names = [format!("rank {victim} with PID"), format!("PID {}", ranks[victim])];
+        assert!(names.iter().any(|name| said.contains(name)), "{names:?}: {said}");
         assert!(folder.path().join("o.unfinished/checkpoint").exists(), "the last checkpoint stays");
-        let resume = ["run", "--resume", "o", "--no-report", "--figures", "none", "--quiet"];
-        let output = match victim {
-            0 => flockform(&resume, folder.path()),
-            _ => on_ranks(victim + 1, &resume, folder.path()),
-        };
-        assert_ends_well(&output, "resumed");
-        assert_same(&folder.path().join("o"), &expected.path().join("o"), &format!("rank {victim} killed"));
+        let what = format!("rank {victim} killed");
+        assert_resumes(victim + 1, folder.path(), expected.path(), &what);
     }
 }
 
 #[test]
 #[ignore = "needs mpirun"]
+fn a_rank_killed_at_any_moment_costs_no_more_than_the_last_checkpoint() {
+    let expected = alone(LONG);
+    let undisturbed = {
+        let folder = temporary();
+        let (mut run, _) = started(3, LONG, folder.path());
+        let begin = Instant::now();
+        assert!(ended(&mut run).0);
+        begin.elapsed()
+    };
+    // Of a resumed run, one that had ended, and one without a checkpoint yet.
+    let mut counts = [0; 3];
+    for n in 0..20 {
+        let folder = temporary();
+        let random = RandomState::new().hash_one(n);
+        let (victim, after) =
+            (random as usize % 3, undisturbed.mul_f64((random >> 32) as f64 / 2f64.powi(32)));
+        let what = format!("rank {victim} killed after {after:?} of {undisturbed:?}");
+        let (mut run, ranks) = started(3, LONG, folder.path());
+        std::thread::sleep(after);
+        signals::is_sent("KILL", ranks[victim]);
+        let (_, said) = ended(&mut run);
+        let [done, left] =
+            ["o/summary.json", "o.unfinished/checkpoint"].map(|of| folder.path().join(of).exists());
+        match (done, left) {
+            (true, _) => assert_same(&folder.path().join("o"), &expected.path().join("o"), &what),
+            (false, true) => assert_resumes(1 + n % 3, folder.path(), expected.path(), &what),
+            (false, false) => assert!(!folder.path().join("o").exists(), "{what}: {said}"),
+        }
+        counts[if done { 1 } else { usize::from(!left) * 2 }] += 1;
+    }
+    println!("resumed, ended before, killed before the first checkpoint: {counts:?}");
+    assert!(counts[0] > 0, "{counts:?}");
+}
+
+#[test]
+#[ignore = "needs mpirun"]
+fn an_interrupt_of_the_launcher_ends_the_run_which_goes_on_to_the_same_bits() {
+    let expected = alone(LONGER);
+    let folder = temporary();
+    let (mut run, _) = started(3, LONGER, folder.path());
+    wait_for_checkpoint(folder.path());
+    signal("INT", run.0.id());
+    let interrupted = Instant::now();
+    let (is_well, said) = ended(&mut run);
+    assert!(!is_well, "{said}");
+    assert!(interrupted.elapsed() < PATIENCE / 4, "{:?}", interrupted.elapsed());
+    assert_resumes(2, folder.path(), expected.path(), "interrupted");
+}
+
+#[test]
+#[ignore = "needs mpirun"]
 fn an_interrupt_of_one_rank_ends_all_at_one_step_from_which_the_run_goes_on() {
-    let expected = long_alone();
+    let expected = alone(LONG);
     let folder = temporary();
     let (mut run, ranks) = begun(3, 1, folder.path());
     // It is not told by the launcher, which would kill what takes longer than it likes.
     signal("TERM", ranks[1]);
     signal("CONT", ranks[1]);
-    let status = within(PATIENCE, "mpirun ends", || run.0.try_wait().expect("a child"));
-    assert!(!status.success(), "{status}");
+    let (is_well, said) = ended(&mut run);
+    assert!(!is_well, "{said}");
     assert!(folder.path().join("o/summary.json").exists(), "the first rank writes what there is");
-    let resume = ["run", "--resume", "o", "--no-report", "--figures", "none", "--quiet"];
-    assert_ends_well(&on_ranks(2, &resume, folder.path()), "resumed");
-    assert_same(&folder.path().join("o"), &expected.path().join("o"), "interrupted");
+    assert_resumes(2, folder.path(), expected.path(), "interrupted");
 }

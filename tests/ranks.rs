@@ -1,8 +1,10 @@
 //! A body that ranks share ends with the bits that it has alone, for any number of ranks.
 
 use std::ops::ControlFlow;
+use std::sync::atomic::AtomicBool;
 use std::thread;
 
+use flockform::continuum::equilibrium::{run_to_equilibrium_shared, run_to_equilibrium_watched};
 use flockform::continuum::plan::Plan;
 use flockform::continuum::run::{Outcome, SharedError, require_shareable, run_shared, run_watched};
 use flockform::continuum::shares::{Exchanged, Shares};
@@ -12,7 +14,8 @@ use flockform::engine::shared::NotShared;
 use flockform::engine::state::EngineState;
 use flockform::flock::vectors::Vectors;
 use flockform::ranks::{Exchange, Team, in_process};
-use flockform::scene::Scene;
+use flockform::scene::{Scene, bundled};
+use flockform::solve::interrupt::Interrupt;
 
 use scenes::{load, planned};
 
@@ -107,12 +110,15 @@ fn shared(plan: &Plan, every: usize, ranks: usize) -> Vec<End> {
 }
 
 fn assert_same(name: &str, sets: &[&str], every: usize) {
-    let scene = load(name, sets);
-    let (plan, expected) = (planned(&scene), alone(&scene, every));
+    assert_scene_the_same(&load(name, sets), &format!("{name} {sets:?}"), every);
+}
+
+fn assert_scene_the_same(scene: &Scene, name: &str, every: usize) {
+    let (plan, expected) = (planned(scene), alone(scene, every));
     assert!(expected.step > 5, "{name}: something happens");
     for ranks in 1..=7 {
         for (rank, end) in shared(&plan, every, ranks).into_iter().enumerate() {
-            let what = format!("{name} {sets:?}, rank {rank} of {ranks}");
+            let what = format!("{name}, rank {rank} of {ranks}");
             assert_eq!((end.step, &end.reason), (expected.step, &expected.reason), "{what}");
             assert_eq!(end.seen, expected.seen, "{what}");
             assert!(end == expected, "{what}");
@@ -144,6 +150,87 @@ fn materials_and_neighbours_found_anew_too() {
     assert_same("shear", &["stop.steps=40"], 15);
     assert_same("notched-plate", &["stop.steps=40"], 15);
     assert_same("drop", &["stop.steps=12"], 5);
+}
+
+/// The bundled scene that is stepped where the file asks for its equilibrium.
+fn stepped(name: &str, sets: &[&str]) -> Scene {
+    let text = bundled(name).expect("bundled").text;
+    let text = text.replace("[equilibrium]\nsolver = \"auto\"\n", "");
+    assert!(!text.contains("[equilibrium]"));
+    let sets: Vec<String> = sets.iter().map(|&set| set.to_owned()).collect();
+    Scene::parse(name, name, &text, &sets, None).unwrap_or_else(|error| panic!("{name} {sets:?}: {error}"))
+}
+
+fn assert_steps_the_same(name: &str, sets: &[&str], every: usize) {
+    assert_scene_the_same(&stepped(name, sets), name, every);
+}
+
+/// Material, loads from the start and growing, thick outlines and other materials within; all by cells.
+#[test]
+fn loaded_materials_and_fitted_outlines_too() {
+    assert_steps_the_same("beam-loaded", &["stop.steps=60"], 25);
+    assert_steps_the_same("beam-loaded", &["stop.steps=60", "load_steps.ramp.steps=40"], 25);
+    assert_steps_the_same("l-bracket", &["stop.steps=40"], 15);
+    assert_steps_the_same("plate-hole", &["stop.steps=40"], 15);
+    assert_steps_the_same("ring", &["stop.steps=40", "load_steps={ramp={steps=30},every=7}"], 15);
+    assert_steps_the_same("inclusion", &["stop.steps=30"], 15);
+    assert_steps_the_same("elastica", &["stop.steps=30"], 15);
+    assert_steps_the_same("cook", &["stop.steps=30"], 15);
+}
+
+/// Large enough for several steps together.
+#[test]
+fn halos_of_a_loaded_material_and_of_a_fitted_outline_have_the_same_bits() {
+    let large = ["lattice.spacing=0.25", "body.shape.max=[60.0,25.0]", "stop.steps=70"];
+    assert_steps_the_same("beam-loaded", &large, 64);
+    assert_steps_the_same("plate-hole", &["lattice.spacing=0.2", "stop.steps=70"], 64);
+}
+
+#[test]
+fn roles_on_a_condition_and_what_is_done_on_the_way_too() {
+    let when = "roles[2]={region={kind=\"all\"},role=\"clamped\",when={quantity=\"displacement\",above=1.5}}";
+    assert_same("tension", &[when, "stop.steps=60"], 25);
+    let damped = "{at=9,what={kind=\"set\",keys=[\"update.damping=0.5\"]}}";
+    let cut = "{at=12,what={kind=\"cut\",from=[6.5,-5.0],to=[6.5,6.2]}}";
+    let actions = format!("actions=[{damped},{cut}]");
+    assert_same("tension", &["frame=none", "record.probes=[]", &actions, "stop.steps=40"], 7);
+    let heavier = "actions=[{at=9,what={kind=\"set\",keys=[\"loads[0].traction=[0.0,80.0]\"]}}]";
+    assert_steps_the_same("beam-loaded", &[heavier, "stop.steps=40"], 25);
+}
+
+/// Particles at no sites, torn until bonds break.
+#[test]
+fn bodies_of_points_too() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut cloud = "id,x,y\n".to_owned();
+    for i in 0..30 * 12 {
+        let (column, row) = (f64::from(i / 12), f64::from(i % 12));
+        let shift = 0.3 * (12.9898 * f64::from(i)).sin();
+        cloud.push_str(&format!("{},{:?},{:?}\n", 7 * i + 1, column + shift, row - shift));
+    }
+    std::fs::write(folder.path().join("cloud.csv"), cloud).expect("written");
+    let text = r#"
+title = "A torn cloud"
+neighbours = { kind = "within", radius = 1.7 }
+fracture = { stretch = 1.25 }
+body.shape = { kind = "points", file = "cloud.csv" }
+stop.steps = 80
+
+[[roles]]
+region = { kind = "edge", side = "left", depth = 0.8 }
+role = "clamped"
+
+[[roles]]
+region = { kind = "edge", side = "right", depth = 0.8 }
+role = "leader"
+motion = { kind = "velocity", per_step = [0.1, 0.0] }
+"#;
+    let of = |text: &str| {
+        let scene = Scene::parse("cloud", "cloud.toml", text, &[], Some(folder.path()));
+        scene.unwrap_or_else(|error| panic!("{error}"))
+    };
+    assert_scene_the_same(&of(text), "torn points", 25);
+    assert_scene_the_same(&of(&text.replace("fracture = { stretch = 1.25 }\n", "")), "points", 25);
 }
 
 #[test]
@@ -246,10 +333,9 @@ fn what_ranks_cannot_share_is_refused_by_name() {
     let plan = planned(&sequential);
     let refusals = on_ranks(2, |team| run_shared(plan.clone(), None, &team, &mut Looks::every(1)).err());
     assert!(refusals.iter().all(|one| *one == Some(SharedError::Sweep(NotShared))), "{refusals:?}");
-    let solved = load("beam-loaded", &[]);
-    let refused = require_shareable(&solved).expect_err("solved").to_string();
-    assert!(refused.contains("equilibrium") && refused.contains("no solver yet"), "{refused}");
     assert!(require_shareable(&load("fracture", &[])).is_ok());
+    // A solved body is not swept.
+    assert!(require_shareable(&load("beam-loaded", &["update.order=sequential"])).is_ok());
 }
 
 #[test]
@@ -266,7 +352,167 @@ fn a_plan_foretells_who_moves_what_and_what_is_exchanged() {
     let torn = load("fracture", &[]);
     let shares = Shares::new(&torn, &planned(&torn), 3).expect("can be shared");
     assert!(matches!(shares.exchanged, Exchanged::Everything { .. }), "{:?}", shares.exchanged);
-    assert!(Shares::new(&load("beam-loaded", &[]), &planned(&load("beam-loaded", &[])), 2).is_err());
+}
+
+#[test]
+fn a_plan_foretells_which_solvers_ranks_share() {
+    let exchanged = |name: &str, sets: &[&str]| {
+        let scene = load(name, sets);
+        let shares = Shares::new(&scene, &planned(&scene), 3).expect("can be shared");
+        (shares.particles.clone(), shares.exchanged)
+    };
+    let (particles, of_direct) = exchanged("beam-loaded", &["equilibrium.solver=direct"]);
+    assert_eq!(of_direct, Exchanged::Interrupts);
+    assert!(particles[0] > 0 && particles == [particles[0]; 3], "{particles:?}");
+    assert_eq!(exchanged("elastica", &[]).1, Exchanged::Interrupts);
+    let (particles, of_multigrid) = exchanged("beam-loaded", LARGE_BEAM);
+    let Exchanged::Iterations { bytes } = of_multigrid else { panic!("{of_multigrid:?}") };
+    // A column on either side.
+    let column = 16 * 2 * 121;
+    assert_eq!(bytes, column);
+    let [least, most] = [particles.iter().min(), particles.iter().max()].map(|of| of.copied().unwrap_or(0));
+    assert!(least > 0 && most - least <= 2 * 8192, "{particles:?}");
+    let (particles, _) = exchanged("beam-loaded", &["equilibrium.solver=multigrid"]);
+    assert_eq!(particles[1..], [0, 0], "too small for more than one");
+}
+
+/// What a solved run leaves, to the bit: the end, the residual after each iteration, the displacements, and the rest in words.
+#[derive(Clone, Debug, PartialEq)]
+struct Rest {
+    end: End,
+    residuals: Vec<u64>,
+    displacement: Vec<u64>,
+    words: String,
+}
+
+impl Rest {
+    fn of(outcome: &Outcome, seen: Vec<(usize, u64)>) -> Self {
+        let solved = outcome.solved.as_ref().expect("solved");
+        Self {
+            end: End::of(outcome, seen),
+            residuals: solved.residuals.iter().map(|residual| residual.to_bits()).collect(),
+            displacement: bits(&solved.displacement).collect(),
+            words: format!("{} {} {:?}", solved.solver, solved.converged, solved.known_to),
+        }
+    }
+}
+
+fn solved_alone(scene: &Scene, plan: &Plan) -> Rest {
+    let mut looks = Looks::every(1);
+    let outcome = run_to_equilibrium_watched(scene, plan.clone(), &mut looks).expect("an equilibrium");
+    Rest::of(&outcome, looks.seen)
+}
+
+/// The same shared, or why it failed.
+fn solved_on(scene: &Scene, plan: &Plan, team: &Team) -> Result<Rest, SharedError> {
+    let mut looks = Looks::every(1);
+    let outcome = run_to_equilibrium_shared(scene, plan.clone(), None, team, &mut looks)?;
+    Ok(Rest::of(&outcome, looks.seen))
+}
+
+fn assert_rests_the_same(name: &str, sets: &[&str], solver: &str, ranks: &[usize]) {
+    let scene = load(name, sets);
+    let plan = planned(&scene);
+    let expected = solved_alone(&scene, &plan);
+    assert!(expected.words.starts_with(solver), "{name} {sets:?}: {}", expected.words);
+    assert!(expected.residuals.len() > 1, "{name} {sets:?}");
+    for &count in ranks {
+        let found = on_ranks(count, |team| solved_on(&scene, &plan, &team).expect("an equilibrium"));
+        for (rank, rest) in found.into_iter().enumerate() {
+            let what = format!("{name} {sets:?}, rank {rank} of {count}");
+            assert_eq!(rest.residuals.len(), expected.residuals.len(), "iterations: {what}");
+            assert!(rest.residuals == expected.residuals, "residuals: {what}");
+            assert!(rest.displacement == expected.displacement, "displacement: {what}");
+            assert!(rest == expected, "{what}");
+        }
+    }
+}
+
+/// A beam of 1201 x 121 particles: 17 groups of columns, enough for eight ranks.
+const LARGE_BEAM: &[&str] =
+    &["lattice.spacing=0.1", "body.shape.max=[130.0,22.0]", "equilibrium.solver=multigrid"];
+
+#[test]
+fn every_solver_finds_the_same_equilibrium_on_any_number_of_ranks() {
+    let solver = |name: &str| format!("equilibrium.solver={name}");
+    for name in ["direct", "jacobi", "gauss-seidel", "chebyshev", "conjugate-gradients", "multigrid"] {
+        assert_rests_the_same("beam-loaded", &[&solver(name)], name, &[1, 2, 3]);
+    }
+}
+
+#[test]
+fn multigrid_that_ranks_share_has_the_same_bits() {
+    assert_rests_the_same("beam-loaded", LARGE_BEAM, "multigrid", &[2, 3, 4, 5, 6, 7]);
+    let single = [LARGE_BEAM, &["equilibrium.precision=f32", "equilibrium.tolerance=1e-5"]].concat();
+    assert_rests_the_same("beam-loaded", &single, "multigrid", &[4]);
+}
+
+#[test]
+fn conjugate_gradients_that_ranks_share_have_the_same_bits() {
+    let sets = [&LARGE_BEAM[..2], &["equilibrium.solver=conjugate-gradients", "equilibrium.tolerance=0.05"]]
+        .concat();
+    assert_rests_the_same("beam-loaded", &sets, "conjugate-gradients", &[2, 7]);
+}
+
+#[test]
+fn bodies_fitted_to_their_outline_and_every_lattice_too() {
+    let fine = ["lattice.spacing=0.08", "equilibrium.solver=multigrid"];
+    assert_rests_the_same("plate-hole", &fine, "multigrid", &[2, 3]);
+    let fine = ["lattice.spacing=0.035", "equilibrium.solver=multigrid"];
+    assert_rests_the_same("ring", &fine, "multigrid", &[2, 3]);
+}
+
+#[test]
+fn equilibria_on_the_way_and_rotations_too() {
+    assert_rests_the_same("beam-loaded", &["load_steps={increments=3}"], "direct", &[2, 3]);
+    assert_rests_the_same(
+        "elastica",
+        &["lattice.spacing=0.25", "load_steps={increments=3}"],
+        "direct",
+        &[2, 3],
+    );
+}
+
+/// Large enough for the threads of a rank to share its groups.
+#[test]
+fn threads_within_ranks_change_no_bit_of_an_equilibrium() {
+    let scene = load("beam-loaded", LARGE_BEAM);
+    let plan = planned(&scene);
+    let expected = solved_alone(&scene, &plan);
+    let found = on_ranks(2, |team| {
+        let threads = rayon::ThreadPoolBuilder::new().num_threads(3).build().expect("threads");
+        threads.install(|| solved_on(&scene, &plan, &team).expect("an equilibrium"))
+    });
+    assert!(found.iter().all(|rest| *rest == expected));
+}
+
+#[test]
+fn an_interrupt_of_one_rank_ends_the_solve_on_all() {
+    static RAISED: AtomicBool = AtomicBool::new(true);
+    let of = |solver: &str| (vec![format!("equilibrium.solver={solver}")], "beam-loaded");
+    let mut cases: Vec<_> =
+        ["jacobi", "gauss-seidel", "chebyshev", "conjugate-gradients"].into_iter().map(of).collect();
+    cases.push((LARGE_BEAM.iter().map(|&set| set.to_owned()).collect(), "beam-loaded"));
+    cases.push((
+        vec!["lattice.spacing=0.25".to_owned(), "equilibrium.solver=multigrid".to_owned()],
+        "elastica",
+    ));
+    for (sets, name) in cases {
+        let sets: Vec<&str> = sets.iter().map(String::as_str).collect();
+        let scene = load(name, &sets);
+        let plan = planned(&scene);
+        let found = on_ranks(3, |team| {
+            let mut scene = scene.clone();
+            let asked = scene.equilibrium.as_mut().expect("asked for");
+            if team.rank() == 1 {
+                asked.request.interrupt = Interrupt::new(&RAISED);
+            }
+            solved_on(&scene, &plan, &team).err().map(|error| error.to_string())
+        });
+        let is_interrupted =
+            |error: &Option<String>| error.as_ref().is_some_and(|error| error.contains("interrupted"));
+        assert!(found.iter().all(is_interrupted), "{name} {sets:?}: {found:?}");
+    }
 }
 
 /// Large enough for the threads of a rank to cut its part once more.
@@ -327,4 +573,14 @@ fn an_error_in_a_halo_is_seen_in_the_bits() {
     };
     assert!(ends(false).iter().all(|end| *end == expected));
     assert!(ends(true).iter().all(|end| *end != expected));
+}
+
+#[test]
+fn an_error_in_a_halo_of_a_solver_is_seen_in_the_bits() {
+    let scene = load("beam-loaded", LARGE_BEAM);
+    let plan = planned(&scene);
+    let expected = solved_alone(&scene, &plan);
+    let found = on_ranks(2, |team| solved_on(&scene, &plan, &Team::new(Noisy(team))));
+    // It may find no equilibrium at all.
+    assert!(found.into_iter().all(|rest| rest.map_or(true, |rest| rest != expected)));
 }

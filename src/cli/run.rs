@@ -11,10 +11,10 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use flockform::continuum::digest::{digest, fnv1a};
-use flockform::continuum::equilibrium::run_to_equilibrium_watched;
+use flockform::continuum::equilibrium::{run_to_equilibrium_shared, run_to_equilibrium_watched};
 use flockform::continuum::looks::Looks;
 use flockform::continuum::plan::Plan;
-use flockform::continuum::run::{Outcome, SharedError, StopReason, require_shareable, resume, run_shared};
+use flockform::continuum::run::{Outcome, SharedError, StopReason, require_shareable, resume};
 use flockform::export::checkpoint::{self, Checkpoint, RunRequest};
 use flockform::export::film::{self, FilmColour};
 use flockform::export::memory::Outputs;
@@ -143,7 +143,8 @@ fn help_to_run(arguments: &RunArguments, team: &Team) -> Result<ExitCode, Refusa
     begin.begin(common)?;
     let from = prepared.left.map(|left| left.checkpoint).map(|from| (from.engine, from.residual));
     // The first rank says how it ended, in its exit code too: all have the same.
-    run_shared(prepared.plan, from, team, &mut observer).map_err(|_| ranks::RanksError::SaidElsewhere)?;
+    run_to_equilibrium_shared(&prepared.scene, prepared.plan, from, team, &mut observer)
+        .map_err(|_| ranks::RanksError::SaidElsewhere)?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -191,8 +192,12 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
     begin.begin(common)?;
     let from = left.map(|left| left.checkpoint).map(|Checkpoint { engine, residual, .. }| (engine, residual));
     let outcome = match (team, from) {
-        (Some(team), from) => run_shared(plan, from, team, &mut observer)
-            .map_err(|error: SharedError| ResumedRun::foreign(observer.folder, &error))?,
+        (Some(team), from) => run_to_equilibrium_shared(&scene, plan, from, team, &mut observer).map_err(
+            |error| match error {
+                SharedError::Scene(error) => Refusal::from(error),
+                error => ResumedRun::foreign(observer.folder, &error).into(),
+            },
+        )?,
         (None, None) => run_to_equilibrium_watched(&scene, plan, &mut observer)?,
         (None, Some((engine, residual))) => resume(plan, engine, residual, &mut observer)
             .map_err(|error| ResumedRun::foreign(observer.folder, &error))?,

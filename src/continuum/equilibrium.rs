@@ -6,14 +6,17 @@ use std::ops::ControlFlow;
 
 use super::layout::{held, held_components};
 use super::plan::Plan;
-use super::run::{Outcome, StopReason, overflow, run_watched};
+use super::run::{Outcome, SharedError, StopReason, overflow, run_shared, run_watched};
 use crate::engine::Engine;
 use crate::engine::observer::{EachStep, Observer};
+use crate::engine::shared::Agreed;
+use crate::engine::state::EngineState;
 use crate::flock::role::Role;
 use crate::flock::vectors::{Vectors, distance};
+use crate::ranks::Team;
 use crate::scene::{LoadSteps, Scene, SceneError};
 use crate::solve::corotated::{self, CorotatedError, Way};
-use crate::solve::equilibrium::{Choice, Request, SolveError, Solved, Solver, System, choose, solve};
+use crate::solve::equilibrium::{Choice, Request, SolveError, Solved, Solver, System, choose, solve_shared};
 use crate::solve::linear::{HeldComponent, NotLinear, system};
 
 /// Runs a plan to its end as its scene asks: stepping, or straight to the equilibrium under the whole load. `see` sees each step of
@@ -26,7 +29,7 @@ pub fn run_to_equilibrium(
     plan: Plan,
     see: &mut dyn FnMut(&Engine, f64) -> ControlFlow<()>,
 ) -> Result<Outcome, SceneError> {
-    come_to_whole_load(scene, plan, &mut EachStep(see))
+    come_to_whole_load(scene, plan, None, &mut EachStep(see))
 }
 
 /// The same, seen at those steps alone that the observer names. Where the scene's `[load_steps]` asks for equilibria on the
@@ -39,17 +42,51 @@ pub fn run_to_equilibrium_watched(
     plan: Plan,
     observer: &mut dyn Observer,
 ) -> Result<Outcome, SceneError> {
+    come_to_rest(scene, plan, None, observer)
+}
+
+/// Runs a plan to its end as its scene asks, shared with the other ranks, which all must have the same scene and plan; goes on
+/// from a state of a stepped run and the residual that was seen with it. The results are those of a run alone, to the bit, on
+/// every rank, and the observers are as [`run_shared`] has them.
+///
+/// # Errors
+/// As [`run_to_equilibrium`] and [`run_shared`].
+pub fn run_to_equilibrium_shared(
+    scene: &Scene,
+    plan: Plan,
+    from: Option<(EngineState<'_>, f64)>,
+    team: &Team,
+    observer: &mut dyn Observer,
+) -> Result<Outcome, SharedError> {
+    if scene.equilibrium.is_none() || from.is_some() {
+        return run_shared(plan, from, team, observer);
+    }
+    Ok(come_to_rest(scene, plan, Some(team), &mut Agreed { team, own: observer })?)
+}
+
+fn come_to_rest(
+    scene: &Scene,
+    plan: Plan,
+    team: Option<&Team>,
+    observer: &mut dyn Observer,
+) -> Result<Outcome, SceneError> {
     match (&scene.equilibrium, &scene.load_steps) {
         (Some(asked), Some(LoadSteps::Solved(parts))) => {
-            increments::settle_each(scene, &asked.request, plan, parts, observer)
+            increments::settle_each((scene, &asked.request, team), plan, parts, observer)
         }
-        _ => come_to_whole_load(scene, plan, observer),
+        _ => come_to_whole_load(scene, plan, team, observer),
     }
 }
 
-fn come_to_whole_load(scene: &Scene, plan: Plan, observer: &mut dyn Observer) -> Result<Outcome, SceneError> {
+fn come_to_whole_load(
+    scene: &Scene,
+    plan: Plan,
+    team: Option<&Team>,
+    observer: &mut dyn Observer,
+) -> Result<Outcome, SceneError> {
     let Some(asked) = &scene.equilibrium else { return Ok(run_watched(plan, observer)) };
-    let outcome = solve_equilibrium(scene, &asked.request, plan)?;
+    let solved = solve_plan(scene, &asked.request, &plan, team)?;
+    let outcome = outcome(plan, solved);
     // There is nothing left to break off.
     let _ = observer.see(&outcome.engine, outcome.residual);
     Ok(outcome)
@@ -60,24 +97,37 @@ fn come_to_whole_load(scene: &Scene, plan: Plan, observer: &mut dyn Observer) ->
 /// # Errors
 /// Names what in the scene has no equilibrium, or none that the solver asked for can find.
 pub fn solve_equilibrium(scene: &Scene, request: &Request, plan: Plan) -> Result<Outcome, SceneError> {
-    let solved = if corotated::is_corotated(&plan.setup.flock) {
-        let steps = steps_of_the_way(&plan) as f64;
-        let held = |part: f64| way_after(&plan, part * steps);
-        let axes = held_axes(&plan);
-        corotated::solve(
-            &plan.setup.flock,
-            &plan.setup.body,
-            follows(&plan),
-            axes,
-            &Way::whole(&held),
-            request,
-        )
-        .map_err(|error| refuse_corotated(scene, &error))?
-    } else {
-        let system = of_plan(scene, &plan)?;
-        solve(&system, request).map_err(|error| refuse(scene, &error))?
-    };
+    let solved = solve_plan(scene, request, &plan, None)?;
     Ok(outcome(plan, solved))
+}
+
+fn solve_plan(
+    scene: &Scene,
+    request: &Request,
+    plan: &Plan,
+    team: Option<&Team>,
+) -> Result<Solved, SceneError> {
+    if !corotated::is_corotated(&plan.setup.flock) {
+        let system = of_plan(scene, plan)?;
+        return solve_shared(&system, request, team).map_err(|error| refuse(scene, &error));
+    }
+    let steps = steps_of_the_way(plan) as f64;
+    let held = |part: f64| way_after(plan, part * steps);
+    solve_corotated(plan, &Way::whole(&held), request, team).map_err(|error| refuse_corotated(scene, &error))
+}
+
+/// Every rank solves the whole body, and all end alike.
+fn solve_corotated(
+    plan: &Plan,
+    way: &Way<'_>,
+    request: &Request,
+    team: Option<&Team>,
+) -> Result<Solved, CorotatedError> {
+    const INTERRUPTED: CorotatedError = CorotatedError::Solve(SolveError::Interrupted);
+    let (flock, body) = (&plan.setup.flock, &plan.setup.body);
+    let solved = corotated::solve(flock, body, follows(plan), held_axes(plan), way, request);
+    let is_interrupted = solved.as_ref().is_err_and(|error| *error == INTERRUPTED);
+    if team.is_some_and(|team| team.any(is_interrupted)) { Err(INTERRUPTED) } else { solved }
 }
 
 /// The solver that would be taken, and why.

@@ -146,11 +146,8 @@ pub fn run_shared(
 /// Names the key that keeps them from it.
 pub fn require_shareable(scene: &Scene) -> Result<(), SceneError> {
     let help = "run it on one rank, with as many threads as the machine has cores";
-    if scene.equilibrium.is_some() {
-        let help = format!("{help}, or leave [equilibrium] out to step there");
-        return Err(scene.refuse("equilibrium", "ranks share sweeps, and no solver yet", &help));
-    }
-    if scene.update.order == Order::Sequential {
+    // A solved body is not swept.
+    if scene.equilibrium.is_none() && scene.update.order == Order::Sequential {
         return Err(scene.refuse("update.order", NotShared.to_string(), help));
     }
     Ok(())
@@ -165,6 +162,9 @@ pub enum SharedError {
     /// The state that it was to go on from.
     #[error("{0}")]
     State(#[from] WrongState),
+    /// The equilibrium that the scene asks for.
+    #[error("{0}")]
+    Scene(#[from] SceneError),
 }
 
 /// Displacement beyond which sums of squares, which energies are, overflow \[length\].

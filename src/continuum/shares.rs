@@ -1,10 +1,13 @@
 //! How ranks would share a run, before any of them is started.
 
+use super::equilibrium::of_plan;
 use super::plan::Plan;
 use super::run::require_shareable;
 use crate::engine::setup::Setup;
 use crate::engine::several::looks_at_every_step;
 use crate::scene::{Scene, SceneError};
+use crate::solve::corotated::is_corotated;
+use crate::solve::equilibrium::{Request, SolverShares, choose, shared_by};
 use crate::sweep::Sweep;
 use crate::sweep::domain::Share;
 
@@ -26,6 +29,14 @@ pub enum Exchanged {
         /// Bytes received, less those that a rank has itself.
         bytes: usize,
     },
+    /// Halos in each iteration of a solver, before each pass over the particles and the coarser grids; bytes that the rank
+    /// with the largest receives before it applies the operator.
+    Iterations {
+        /// Bytes received.
+        bytes: usize,
+    },
+    /// Nothing but whether to end: each rank solves for the whole body.
+    Interrupts,
 }
 
 /// The parts of a body that ranks share.
@@ -44,6 +55,9 @@ impl Shares {
     /// Names the key of a scene that ranks cannot share.
     pub fn new(scene: &Scene, plan: &Plan, ranks: usize) -> Result<Self, SceneError> {
         require_shareable(scene)?;
+        if let Some(asked) = &scene.equilibrium {
+            return Self::of_solver(scene, &asked.request, plan, ranks);
+        }
         let Setup { body, flock, changes, update, roles, present_radius, .. } = &plan.setup;
         let share = Share { ranks, ..Share::whole() };
         let sweep = Sweep::compile_share(*update, flock, roles, share);
@@ -60,6 +74,19 @@ impl Shares {
         Ok(Self { particles, exchanged })
     }
 
+    fn of_solver(scene: &Scene, request: &Request, plan: &Plan, ranks: usize) -> Result<Self, SceneError> {
+        let all = Self { particles: vec![plan.count(); ranks], exchanged: Exchanged::Interrupts };
+        if is_corotated(&plan.setup.flock) {
+            return Ok(all);
+        }
+        let system = of_plan(scene, plan)?;
+        let (solver, _) = choose(&system, request);
+        Ok(shared_by(&system, solver, ranks).map_or(all, |SolverShares { particles, received }| Self {
+            particles,
+            exchanged: Exchanged::Iterations { bytes: PLACE * received },
+        }))
+    }
+
     /// For the plan: names and values.
     pub fn facts(&self) -> Vec<(String, String)> {
         let (least, most) = (self.particles.iter().min(), self.particles.iter().max());
@@ -67,6 +94,15 @@ impl Shares {
         let ranks = self.particles.len();
         let idle = self.particles.iter().filter(|&&count| count == 0).count();
         let idle = if idle == 0 { String::new() } else { format!("; {idle} have nothing to do") };
+        let moved = match self.exchanged {
+            Exchanged::Iterations { .. } => {
+                format!("{ranks}, which iterate on {least} to {most} particles each{idle}; each sets all up")
+            }
+            Exchanged::Interrupts => {
+                format!("{ranks}, each of which solves for all {most}: no faster than one")
+            }
+            _ => format!("{ranks}, which move {least} to {most} particles each{idle}"),
+        };
         let exchanged = match self.exchanged {
             Exchanged::Halos { steps, bytes } => {
                 format!("halos of at most {bytes} bytes before every {steps} steps that nothing looks at")
@@ -74,9 +110,15 @@ impl Shares {
             Exchanged::Everything { bytes } => {
                 format!("all positions after each step, {bytes} bytes to each rank")
             }
+            Exchanged::Iterations { bytes } => {
+                format!(
+                    "halos of at most {bytes} bytes in each iteration, smaller ones for the coarser grids, and sums"
+                )
+            }
+            Exchanged::Interrupts => "nothing but whether to end".to_owned(),
         };
         let facts = [
-            ("ranks", format!("{ranks}, which move {least} to {most} particles each{idle}")),
+            ("ranks", moved),
             ("exchanged", exchanged),
             ("memory of each rank", "as much as one alone: each holds the whole body".to_owned()),
         ];

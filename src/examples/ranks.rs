@@ -1,11 +1,12 @@
 //! Ranks of MPI that share a body: `mpirun -n 4 target/debug/examples/ranks tension` prints the same hash of all
-//! positions as the example does when it is started alone.
+//! positions as the example does when it is started alone. A scene may ask for its equilibrium: `beam-loaded`.
 
 use std::ops::ControlFlow;
 
 use flockform::Plan;
 use flockform::continuum::digest::fnv1a;
-use flockform::continuum::run::{require_shareable, run, run_shared};
+use flockform::continuum::equilibrium::{run_to_equilibrium, run_to_equilibrium_shared};
+use flockform::continuum::run::require_shareable;
 use flockform::engine::observer::EachStep;
 use flockform::ranks::launcher::place_here;
 use flockform::ranks::mpi::join;
@@ -21,8 +22,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let team = place_here().map(join).transpose()?;
     let mut see = |_: &flockform::Engine, _: f64| ControlFlow::Continue(());
     let outcome = match &team {
-        None => run(plan, &mut see),
-        Some(team) => run_shared(plan, None, team, &mut EachStep(&mut see))?,
+        None => run_to_equilibrium(&scene, plan, &mut see)?,
+        Some(team) => run_to_equilibrium_shared(&scene, plan, None, team, &mut EachStep(&mut see))?,
     };
     if team.as_ref().is_none_or(|team| team.is_first()) {
         let present = outcome.engine.present();

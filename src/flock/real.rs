@@ -24,6 +24,8 @@ pub trait Real:
     fn wide(self) -> f64;
     /// The number bit by bit: 0.0 and -0.0 differ, and a NaN is itself.
     fn bits(self) -> u64;
+    /// The number with these bits.
+    fn of_bits(bits: u64) -> Self;
 }
 
 impl Real for f64 {
@@ -39,6 +41,10 @@ impl Real for f64 {
     fn bits(self) -> u64 {
         self.to_bits()
     }
+    #[inline(always)]
+    fn of_bits(bits: u64) -> Self {
+        f64::from_bits(bits)
+    }
 }
 
 impl Real for f32 {
@@ -53,5 +59,9 @@ impl Real for f32 {
     #[inline(always)]
     fn bits(self) -> u64 {
         u64::from(self.to_bits())
+    }
+    #[inline(always)]
+    fn of_bits(bits: u64) -> Self {
+        f32::from_bits(bits as u32)
     }
 }

@@ -8,5 +8,6 @@ pub(crate) mod field;
 pub mod interrupt;
 pub mod linear;
 pub mod operator;
+pub(crate) mod part;
 pub mod spectrum;
 pub(crate) mod stopwatch;

@@ -2,14 +2,15 @@
 
 use super::{Observer, Outcome, Plan, StopReason, overflow, steps_of_the_way};
 use super::{
-    farthest_from_target, follows, held_axes, of_plan_after, reason, refuse, refuse_corotated, way_after,
+    farthest_from_target, of_plan_after, reason, refuse, refuse_corotated, solve_corotated, way_after,
 };
 use crate::engine::Engine;
 use crate::engine::load::scaled;
 use crate::flock::vectors::Vectors;
+use crate::ranks::Team;
 use crate::scene::{Scene, SceneError};
 use crate::solve::corotated::{self, CorotatedError, Way};
-use crate::solve::equilibrium::{Request, SolveError, Solved, solve};
+use crate::solve::equilibrium::{Request, SolveError, Solved, solve_shared};
 
 /// Why a part of the way cannot be gone.
 enum Failure {
@@ -25,8 +26,7 @@ enum Failure {
 /// # Errors
 /// As [`super::solve_equilibrium`]: what is wrong with the scene and not with the size of the load.
 pub(super) fn settle_each(
-    scene: &Scene,
-    request: &Request,
+    (scene, request, team): (&Scene, &Request, Option<&Team>),
     mut plan: Plan,
     parts: &[f64],
     observer: &mut dyn Observer,
@@ -45,7 +45,7 @@ pub(super) fn settle_each(
             break;
         }
         let start = outcome.solved.as_ref().map(|solved| (&solved.displacement, last));
-        let solved = match settle_at(scene, request, (&mut plan, whole.as_ref()), start, part) {
+        let solved = match settle_at((scene, request, team), (&mut plan, whole.as_ref()), start, part) {
             Ok(solved) => solved,
             Err(Failure::Refused(error)) => return Err(error),
             Err(Failure::Interrupted) => {
@@ -74,8 +74,7 @@ pub(super) fn settle_each(
 
 /// The equilibrium under this part of loads and motions.
 fn settle_at(
-    scene: &Scene,
-    request: &Request,
+    (scene, request, team): (&Scene, &Request, Option<&Team>),
     (plan, whole): (&mut Plan, Option<&Vectors>),
     start: Option<(&Vectors, f64)>,
     part: f64,
@@ -84,14 +83,13 @@ fn settle_at(
     if !corotated::is_corotated(&plan.setup.flock) {
         plan.setup.flock.forces = whole.map(|whole| scaled(whole, part));
         let system = of_plan_after(scene, plan, part * steps).map_err(Failure::Refused)?;
-        return solve(&system, request).map_err(|error| match error {
+        return solve_shared(&system, request, team).map_err(|error| match error {
             SolveError::Interrupted => Failure::Interrupted,
             error => Failure::Refused(refuse(scene, &error)),
         });
     }
     let way = Way { held: &|part| way_after(plan, part * steps), start, end: part };
-    let axes = held_axes(plan);
-    let solved = corotated::solve(&plan.setup.flock, &plan.setup.body, follows(plan), axes, &way, request);
+    let solved = solve_corotated(plan, &way, request, team);
     solved.map_err(|error| match error {
         CorotatedError::Solve(SolveError::Interrupted) => Failure::Interrupted,
         CorotatedError::Unsettled { .. } if start.is_some() => Failure::Lost(error.to_string()),

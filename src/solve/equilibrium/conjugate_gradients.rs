@@ -5,11 +5,11 @@
 //! conjugate to those before. With [`super::multigrid`] the number of iterations stops growing.
 
 use super::history::History;
-use super::steps::for_groups;
+use super::steps::{for_groups, for_own_groups};
 use super::system::Prepared;
 use super::{Found, Precision, Request, SolveError, Solver, steps};
 use crate::flock::vectors::Vectors;
-use crate::solve::field::{Real, VectorsRef, dot};
+use crate::solve::field::{Real, VectorsMut, VectorsRef, dot};
 use crate::solve::operator::{Matrix, RowCoefficients};
 use crate::solve::stopwatch::Stopwatch;
 
@@ -65,7 +65,7 @@ pub(super) fn iterate_single<P: Preconditioner<f32>>(
     Ok(Found { displacement, ..found })
 }
 
-/// Conjugate gradients from zero. `right` becomes the residual.
+/// Conjugate gradients from zero. `right` becomes the residual. Ranks share the matrix, and all have the result.
 pub(super) fn iterate<T: Real, P: Preconditioner<T>>(
     prepared: &Prepared,
     stencils: &RowCoefficients<T>,
@@ -92,15 +92,19 @@ pub(super) fn iterate<T: Real, P: Preconditioner<T>>(
             return Err(SolveError::NotPositive { solver, iteration });
         }
         turn(matrix, (size, z), rz / rz_before, &mut p);
+        matrix.receive(&mut p);
         let pq = steps::apply(matrix, stencils, &p, &mut q);
         let positive = pq > 0.0;
         if !positive {
             return Err(SolveError::NotPositive { solver, iteration });
         }
-        size = advance(matrix, rz / pq, (&p, &q), (&mut x, &mut r)).sqrt();
+        let squares = advance(matrix, rz / pq, (&p, &q), (&mut x, &mut r));
+        let (square, is_interrupted) = matrix.sum_and_any(&squares, request.interrupt.is_raised());
+        size = square.sqrt();
         rz_before = rz;
-        history.push(solver, size / at_start)?;
+        history.push_agreed(solver, size / at_start, is_interrupted)?;
     }
+    matrix.gather(&mut x);
     let wide = |values: Vec<T>| values.into_iter().map(Real::wide).collect();
     Ok(Found { displacement: Vectors { x: wide(x.x), y: wide(x.y) }, residuals: history.residuals, set_up })
 }
@@ -108,7 +112,7 @@ pub(super) fn iterate<T: Real, P: Preconditioner<T>>(
 /// `p = size z + ratio p`.
 fn turn<T: Real, Z: Real>(matrix: &Matrix, (size, z): (f64, &Vectors<Z>), ratio: f64, p: &mut Vectors<T>) {
     let (size, ratio) = (T::of(size), T::of(ratio));
-    for_groups(p.parts(&matrix.bounds), |_, p| {
+    for_own_groups(matrix, matrix.own_parts(p), |_, p| {
         let z = z.view().range(p.range());
         let turn = |p: &mut [T], z: &[Z]| {
             p.iter_mut().zip(z).for_each(|(p, z)| *p = size * T::of(z.wide()) + ratio * *p);
@@ -118,16 +122,16 @@ fn turn<T: Real, Z: Real>(matrix: &Matrix, (size, z): (f64, &Vectors<Z>), ratio:
     });
 }
 
-/// `x += step p` and `r -= step q`; returns the square of `r`.
+/// `x += step p` and `r -= step q`; returns the square of `r` over each group of this rank.
 fn advance<T: Real>(
     matrix: &Matrix,
     step: f64,
     (p, q): (&Vectors<T>, &Vectors<T>),
     (x, r): (&mut Vectors<T>, &mut Vectors<T>),
-) -> f64 {
+) -> Vec<f64> {
     let step = T::of(step);
-    let groups = x.parts(&matrix.bounds).into_iter().zip(r.parts(&matrix.bounds)).collect();
-    let sums = for_groups(groups, |_, (x, r)| {
+    let groups = matrix.own_parts(x).into_iter().zip(matrix.own_parts(r)).collect();
+    for_groups(groups, |_, (x, r): (VectorsMut<'_, T>, VectorsMut<'_, T>)| {
         let (p, q) = (p.view().range(x.range()), q.view().range(x.range()));
         let advance = |x: &mut [T], p: &[T]| x.iter_mut().zip(p).for_each(|(x, &p)| *x += step * p);
         let retreat = |r: &mut [T], q: &[T]| r.iter_mut().zip(q).for_each(|(r, &q)| *r = *r - step * q);
@@ -137,8 +141,7 @@ fn advance<T: Real>(
         retreat(r.y, q.y);
         let r = VectorsRef { x: &*r.x, y: &*r.y };
         dot(r, r)
-    });
-    sums.iter().sum()
+    })
 }
 
 /// `D^-1` of the rows.
@@ -153,12 +156,12 @@ impl<T: Real> Preconditioner<T> for BlockJacobi<'_, T> {
 
     fn precondition(&mut self, r: &Vectors<T>, size: f64) -> (&Vectors<T>, f64) {
         let (matrix, stencils) = (self.matrix, self.stencils);
-        let sums = for_groups(self.z.parts(&matrix.bounds), |group, z| {
+        let sums = for_own_groups(matrix, matrix.own_parts(&mut self.z), |group, z| {
             let range = z.range();
-            let part = crate::solve::field::VectorsMut { begin: z.begin, x: &mut *z.x, y: &mut *z.y };
+            let part = VectorsMut { begin: z.begin, x: &mut *z.x, y: &mut *z.y };
             steps::precondition_group(matrix, stencils, (0.0, 1.0 / size), r.view(), group, part);
             dot(VectorsRef { x: &*z.x, y: &*z.y }, r.view().range(range))
         });
-        (&self.z, sums.iter().sum())
+        (&self.z, matrix.sum(&sums))
     }
 }

@@ -32,12 +32,22 @@ impl History {
     /// Takes the residual of another iteration; refuses one that has grown beyond all use, and to go on when
     /// interrupted.
     pub fn push(&mut self, solver: Solver, residual: f64) -> Result<(), SolveError> {
+        self.push_agreed(solver, residual, self.interrupt.is_raised())
+    }
+
+    /// The same where the ranks have agreed on whether one of them is interrupted.
+    pub fn push_agreed(
+        &mut self,
+        solver: Solver,
+        residual: f64,
+        is_interrupted: bool,
+    ) -> Result<(), SolveError> {
         self.residuals.push(residual);
         let iterations = self.iterations();
         if residual < self.residuals[self.best] {
             self.best = iterations;
         }
-        if self.interrupt.is_raised() {
+        if is_interrupted {
             return Err(SolveError::Interrupted);
         }
         let bounded = residual < 1e12;

@@ -26,9 +26,10 @@ pub mod jacobi;
 mod lanczos;
 pub mod multigrid;
 mod rounding;
-mod steps;
+pub(super) mod steps;
 mod system;
 
+use std::sync::Arc;
 use std::time::Duration;
 
 pub use choice::{DIRECT_UP_TO, FACTORISED_UP_TO, UNSYMMETRIC_UP_TO, choose};
@@ -36,8 +37,11 @@ pub use error::SolveError;
 pub use system::System;
 
 use super::interrupt::Interrupt;
+use super::operator::Matrix;
+use super::part::{Cuts, Halo, Part, read_by_rows};
 use super::stopwatch::Stopwatch;
 use crate::flock::vectors::Vectors;
+use crate::ranks::Team;
 use choice::falls_back;
 use system::Prepared;
 
@@ -91,6 +95,11 @@ impl Solver {
 
     /// Whether it carries its residual along instead of computing it anew, so that the two part in the end.
     fn updates_residual(self) -> bool {
+        matches!(self, Solver::ConjugateGradients | Solver::Multigrid)
+    }
+
+    /// Whether ranks share its iterations; with another solver each of them solves the whole system.
+    pub fn is_shared(self) -> bool {
         matches!(self, Solver::ConjugateGradients | Solver::Multigrid)
     }
 
@@ -196,6 +205,12 @@ struct Found {
 
 /// Finds the equilibrium of a system.
 pub fn solve(system: &System, request: &Request) -> Result<Solved, SolveError> {
+    solve_shared(system, request, None)
+}
+
+/// The same shared with the other ranks of a team, which all have the same system: the same bits on every one of them, and an
+/// interrupt of any ends all alike.
+pub fn solve_shared(system: &System, request: &Request, team: Option<&Team>) -> Result<Solved, SolveError> {
     let begin = Stopwatch::start();
     let allowed = request.tolerance > 0.0 && request.tolerance < 1.0;
     if !allowed {
@@ -203,7 +218,7 @@ pub fn solve(system: &System, request: &Request) -> Result<Solved, SolveError> {
     }
     let (solver, why) = choose(system, request);
     check(system, request, solver)?;
-    let mut prepared = Prepared::new(system)?;
+    let mut prepared = Prepared::new(system, team.cloned())?;
     let prepared_in = begin.elapsed();
     let (found, solver, why) = match by(solver, &mut prepared, system, request) {
         Err(SolveError::NotPositive { .. }) if falls_back(system, request, solver) => {
@@ -246,7 +261,46 @@ pub fn solve(system: &System, request: &Request) -> Result<Solved, SolveError> {
     })
 }
 
+/// How ranks share the iterations of a solver.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SolverShares {
+    /// Particles of each rank, shape \[ranks\].
+    pub particles: Vec<usize>,
+    /// The most that a rank receives of others before it applies the operator, in particles.
+    pub received: usize,
+}
+
+/// How so many ranks would share a solve; `None` where each would solve the whole system.
+pub fn shared_by(system: &System, solver: Solver, ranks: usize) -> Option<SolverShares> {
+    if !solver.is_shared() {
+        return None;
+    }
+    let matrix = Matrix::of_followers(&system.operator);
+    let cuts = Cuts::new(&matrix, ranks);
+    let received =
+        |rank: usize| Halo::new(rank, &cuts, |rank| read_by_rows(&matrix, cuts.groups_of(rank))).received();
+    let particles = (0..ranks).map(|rank| cuts.particles_of(rank).len()).collect();
+    Some(SolverShares { particles, received: (0..ranks).map(received).max().unwrap_or_default() })
+}
+
+/// The result of a solver, which is the same on all ranks.
 fn by(
+    solver: Solver,
+    prepared: &mut Prepared,
+    system: &System,
+    request: &Request,
+) -> Result<Found, SolveError> {
+    let part = |team: &Team| Arc::new(Part::new(team, &prepared.matrix));
+    prepared.matrix.part = prepared.team.as_ref().filter(|_| solver.is_shared()).map(part);
+    let found = by_one(solver, prepared, system, request);
+    prepared.matrix.part = None;
+    // Where each rank solves the whole system, one that is interrupted would leave the others waiting for it later on.
+    let is_interrupted = found.as_ref().is_err_and(|error| *error == SolveError::Interrupted);
+    let any = |team: &Team| team.any(is_interrupted);
+    if prepared.team.as_ref().is_some_and(any) { Err(SolveError::Interrupted) } else { found }
+}
+
+fn by_one(
     solver: Solver,
     prepared: &mut Prepared,
     system: &System,

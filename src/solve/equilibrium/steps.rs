@@ -1,6 +1,7 @@
 //! The passes over a body that solvers are made of. Each is done group by group, in parallel where there
 //! is more than one; sums are taken over each group and then over the groups in their order, so that any
-//! number of threads gives the same bits.
+//! number of threads gives the same bits, and any number of ranks. A rank passes over its own groups; what its rows read
+//! of others it must have received.
 
 use rayon::prelude::*;
 
@@ -15,6 +16,16 @@ pub fn for_groups<P: Send, R: Send>(groups: Vec<P>, work: impl Fn(usize, P) -> R
     } else {
         groups.into_iter().enumerate().map(|(group, part)| work(group, part)).collect()
     }
+}
+
+/// The same on every group of a matrix that this rank owns; `parts` are theirs.
+pub fn for_own_groups<P: Send, R: Send>(
+    matrix: &Matrix,
+    parts: Vec<P>,
+    work: impl Fn(usize, P) -> R + Sync,
+) -> Vec<R> {
+    let first = matrix.own_groups().start;
+    for_groups(parts, |group, part| work(first + group, part))
 }
 
 /// `K u`, written to `out`.
@@ -86,29 +97,38 @@ pub fn apply<T: Real>(
     u: &Vectors<T>,
     out: &mut Vectors<T>,
 ) -> f64 {
-    let sums = for_groups(out.parts(&matrix.bounds), |group, out| {
+    let sums = for_own_groups(matrix, matrix.own_parts(out), |group, out| {
         let range = out.range();
         let mut task = Apply { out };
         pass(matrix, stencils, group, u.view(), &mut task);
         dot(VectorsRef { x: task.out.x, y: task.out.y }, u.view().range(range))
     });
-    sums.iter().sum()
+    matrix.sum(&sums)
 }
 
 /// `out = f - K u`; returns its square.
 pub fn residual<T: Real>(
     matrix: &Matrix,
     stencils: &RowCoefficients<T>,
-    (u, f): (&Vectors<T>, &Vectors<T>),
+    of: (&Vectors<T>, &Vectors<T>),
     out: &mut Vectors<T>,
 ) -> f64 {
-    let sums = for_groups(out.parts(&matrix.bounds), |group, out| {
+    matrix.sum(&residual_of_groups(matrix, stencils, of, out))
+}
+
+/// The same; returns the squares of the groups of this rank, for which it need not wait for others.
+pub fn residual_of_groups<T: Real>(
+    matrix: &Matrix,
+    stencils: &RowCoefficients<T>,
+    (u, f): (&Vectors<T>, &Vectors<T>),
+    out: &mut Vectors<T>,
+) -> Vec<f64> {
+    for_own_groups(matrix, matrix.own_parts(out), |group, out| {
         let mut task = Residual { f: f.view(), out };
         pass(matrix, stencils, group, u.view(), &mut task);
         let out = VectorsRef { x: &*task.out.x, y: &*task.out.y };
         dot(out, out)
-    });
-    sums.iter().sum()
+    })
 }
 
 /// `out = u + weight D^-1 (f - K u)`.
@@ -119,7 +139,7 @@ pub fn smooth<T: Real>(
     (u, f): (&Vectors<T>, &Vectors<T>),
     out: &mut Vectors<T>,
 ) {
-    for_groups(out.parts(&matrix.bounds), |group, out| {
+    for_own_groups(matrix, matrix.own_parts(out), |group, out| {
         let mut task = Smooth { weight: T::of(weight), f: f.view(), u: u.view(), out };
         pass(matrix, stencils, group, u.view(), &mut task);
     });
@@ -133,7 +153,7 @@ pub fn precondition<T: Real>(
     f: &Vectors<T>,
     out: &mut Vectors<T>,
 ) {
-    for_groups(out.parts(&matrix.bounds), |group, out| {
+    for_own_groups(matrix, matrix.own_parts(out), |group, out| {
         precondition_group(matrix, stencils, (keep, weight), f.view(), group, out);
     });
 }
@@ -163,7 +183,7 @@ pub fn precondition_group<T: Real>(
 
 /// `u += step`.
 pub fn advance<T: Real>(matrix: &Matrix, step: &Vectors<T>, u: &mut Vectors<T>) {
-    for_groups(u.parts(&matrix.bounds), |_, u| {
+    for_own_groups(matrix, matrix.own_parts(u), |_, u| {
         let step = step.view().range(u.range());
         u.x.iter_mut().zip(step.x).for_each(|(u, &step)| *u += step);
         u.y.iter_mut().zip(step.y).for_each(|(u, &step)| *u += step);

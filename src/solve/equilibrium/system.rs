@@ -3,6 +3,7 @@
 use super::{SolveError, steps};
 use crate::flock::block::{apply, inverse};
 use crate::flock::vectors::Vectors;
+use crate::ranks::Team;
 use crate::solve::field::dot;
 use crate::solve::operator::{HELD, Matrix, Operator, RowCoefficients};
 use std::sync::OnceLock;
@@ -125,10 +126,12 @@ pub(super) struct Prepared {
     pub grid: [[f64; 2]; 2],
     /// Whether any two neighbours feel each other alike.
     pub symmetric: bool,
+    /// The ranks that solve it together.
+    pub team: Option<Team>,
 }
 
 impl Prepared {
-    pub fn new(system: &System) -> Result<Self, SolveError> {
+    pub fn new(system: &System, team: Option<Team>) -> Result<Self, SolveError> {
         let operator = &system.operator;
         if operator.followers() == 0 {
             return Err(SolveError::NothingFollows);
@@ -157,7 +160,7 @@ impl Prepared {
         let scales = [1.0 / stiffness, force];
         let length = power_of_two(operator.grid.as_flattened().iter().copied());
         let grid = operator.grid.map(|vector| vector.map(|v| v / length));
-        Ok(Self { matrix, stencils, right, size, scales, grid, symmetric })
+        Ok(Self { matrix, stencils, right, size, scales, grid, symmetric, team })
     }
 
     /// `|f - K u| / |f|` of these displacements, which is not what an iteration that never looks back takes

@@ -84,6 +84,13 @@ impl Columns {
         self.step
     }
 
+    /// Indices of the particles of these columns of the lattice, as far as there are any.
+    pub fn particles(&self, columns: std::ops::Range<i32>) -> std::ops::Range<usize> {
+        let last = self.begins.len() as i32 - 1;
+        let begin = |column: i32| self.begins[(column - self.first).clamp(0, last) as usize] as usize;
+        begin(columns.start)..begin(columns.end)
+    }
+
     /// Segments of a column, from the bottom; none where there is no such column.
     pub fn of(&self, column: i32) -> &[Segment] {
         if column == OUTLIERS {

@@ -2,12 +2,17 @@
 //! every level of multigrid is.
 
 use std::collections::HashMap;
+use std::ops::Range;
+use std::sync::Arc;
 
 use super::columns::Columns;
 use super::{Operator, Outliers, Row, Stretch, add};
 use crate::flock::block::Block;
 use crate::flock::body::Body;
 use crate::flock::lattice::Site;
+use crate::flock::vectors::Vectors;
+use crate::solve::field::{Real, VectorsMut};
+use crate::solve::part::Part;
 
 /// Class of particles that do not follow.
 pub const HELD: u32 = u32::MAX;
@@ -45,28 +50,43 @@ pub struct Matrix {
     /// First run of each group, shape \[groups + 1\].
     group_runs: Vec<usize>,
     pub outliers: Outliers,
+    /// The part of this rank while several iterate with it; what they compute outside it is not known here.
+    pub part: Option<Arc<Part>>,
 }
 
 impl Matrix {
     /// `columns` hold the particles that have a class, and the entries of every row lead to such.
     pub fn compile(columns: Columns, class: Vec<u32>, rows: Vec<Row>) -> Self {
-        let (bounds, group_columns) = columns.groups(GROUP, class.len());
         let mut matrix = Self {
             columns,
             class,
             rows,
             runs: Vec::new(),
             distances: Vec::new(),
-            bounds,
-            group_columns,
+            bounds: Vec::new(),
+            group_columns: Vec::new(),
             group_runs: Vec::new(),
             outliers: Outliers::default(),
+            part: None,
         };
         matrix.outliers.first = matrix.class.len();
         matrix.find_runs();
-        let first = |&bound: &usize| matrix.runs.partition_point(|run| (run.start as usize) < bound);
-        matrix.group_runs = matrix.bounds.iter().map(first).collect();
+        matrix.group(GROUP);
         matrix
+    }
+
+    /// Cuts the body into groups of at least so many particles.
+    fn group(&mut self, size: usize) {
+        (self.bounds, self.group_columns) = self.columns.groups(size, self.class.len());
+        let first = |&bound: &usize| self.runs.partition_point(|run| (run.start as usize) < bound);
+        self.group_runs = self.bounds.iter().map(first).collect();
+    }
+
+    /// The same in groups of another size.
+    #[cfg(test)]
+    pub fn regrouped(mut self, size: usize) -> Self {
+        self.group(size);
+        self
     }
 
     /// The rows of the operator without what they owe to held particles.
@@ -111,6 +131,41 @@ impl Matrix {
 
     pub fn groups(&self) -> usize {
         self.bounds.len() - 1
+    }
+
+    /// The groups that this rank computes.
+    pub fn own_groups(&self) -> Range<usize> {
+        self.part.as_ref().map_or(0..self.groups(), |part| part.groups())
+    }
+
+    /// The groups that this rank computes, of a vector that is written.
+    pub fn own_parts<'a, T: Real>(&self, v: &'a mut Vectors<T>) -> Vec<VectorsMut<'a, T>> {
+        let groups = self.own_groups();
+        v.parts(&self.bounds).into_iter().skip(groups.start).take(groups.len()).collect()
+    }
+
+    /// The sum over all groups, of which `own` are those of this rank.
+    pub fn sum(&self, own: &[f64]) -> f64 {
+        self.sum_and_any(own, false).0
+    }
+
+    /// The same, and whether any rank has the flag.
+    pub fn sum_and_any(&self, own: &[f64], flag: bool) -> (f64, bool) {
+        self.part.as_ref().map_or_else(|| (own.iter().sum(), flag), |part| part.sum(own, flag))
+    }
+
+    /// Makes known to this rank what the rows of its particles lead to.
+    pub fn receive<T: Real>(&self, v: &mut Vectors<T>) {
+        if let Some(part) = &self.part {
+            part.receive(v);
+        }
+    }
+
+    /// Makes the whole vector known to every rank.
+    pub fn gather<T: Real>(&self, v: &mut Vectors<T>) {
+        if let Some(part) = &self.part {
+            part.gather(v);
+        }
     }
 
     /// Runs of a group.

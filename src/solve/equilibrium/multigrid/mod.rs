@@ -10,6 +10,8 @@
 //!   J. J. Hu, R. S. Tuminaro, Journal of Computational Physics 188, 2003), bounded by an estimate of the
 //!   largest eigenvalue of each level.
 //! * The coarsest level is solved outright (`envelope`).
+//! * Ranks share each level by groups of its columns. Where these become few, the first rank does what is left of the
+//!   way down and back up, and the others wait for it: it would take less time than their exchanges.
 //!
 //! The cycle runs in single precision: it begins at zero and its result is only a direction, so what
 //! rounding does to it costs no digit of the equilibrium; the iteration around it runs in double precision.
@@ -21,15 +23,19 @@ mod sums;
 mod tests;
 mod transfer;
 
+use std::sync::Arc;
+
 use self::envelope::Envelope;
 use self::transfer::{OutlierShares, Transfer};
 use super::conjugate_gradients::{Preconditioner, iterate, iterate_single, single_scale};
-use super::steps::for_groups;
+use super::steps::{for_groups, for_own_groups};
 use super::system::Prepared;
 use super::{Found, Precision, Request, SolveError, Solver, lanczos, steps};
 use crate::flock::vectors::Vectors;
+use crate::ranks::Team;
 use crate::solve::field::{Real, dot};
 use crate::solve::operator::{Matrix, RowCoefficients};
+use crate::solve::part::{Halo, Part};
 use crate::solve::stopwatch::Stopwatch;
 
 /// Nodes of the coarsest level: fewer are not worth another level.
@@ -84,6 +90,29 @@ struct Level {
     stencils: RowCoefficients<f32>,
     weights: [f64; 2],
     vectors: LevelVectors,
+    /// Between ranks, where they share the levels.
+    transfers: Option<Transfers>,
+}
+
+/// What a rank receives to get from one level to the next and back.
+struct Transfers {
+    team: Team,
+    /// Of the finer level, for the restriction.
+    down: Halo,
+    /// Of the coarser level, for the interpolation.
+    up: Halo,
+}
+
+impl Transfers {
+    fn new([fine, coarse]: [(&Part, &Matrix); 2], transfer: Transfer, outliers: &OutlierShares) -> Self {
+        let (team, levels) = (fine.0.team.clone(), (fine.1, coarse.1));
+        let [fine, coarse] = [&fine.0.cuts, &coarse.0.cuts];
+        let read_down = |rank: usize| transfer.restricted_from(levels, outliers, &coarse.groups_of(rank));
+        let read_up = |rank: usize| transfer.prolonged_from(levels, outliers, &fine.groups_of(rank));
+        let rank = team.rank();
+        let (down, up) = (Halo::new(rank, fine, read_down), Halo::new(rank, coarse, read_up));
+        Self { team, down, up }
+    }
 }
 
 /// The vectors of a level.
@@ -167,27 +196,52 @@ fn descend(here: &Smoothed<'_>, vectors: &mut LevelVectors, below: &mut [Level],
     let Smoothed { matrix, stencils, weights } = *here;
     let LevelVectors { f, u, v } = vectors;
     let Some((next, further)) = below.split_first_mut() else {
-        coarsest.solve((&f.x, &f.y), (&mut v.x, &mut v.y));
+        solve_coarsest(matrix, coarsest, f, v);
         return;
     };
     steps::precondition(matrix, stencils, (0.0, weights[0]), f, u);
+    matrix.receive(u);
     steps::smooth(matrix, stencils, weights[1], (u, f), v);
-    steps::residual(matrix, stencils, (v, f), u);
+    matrix.receive(v);
+    steps::residual_of_groups(matrix, stencils, (v, f), u);
+    if let Some(Transfers { team, down, .. }) = &next.transfers {
+        down.receive(team, u);
+    }
     let levels = (matrix, &next.matrix);
     next.transfer.restrict(levels, &next.outliers, u, &mut next.vectors.f);
     let view = Smoothed { matrix: &next.matrix, stencils: &next.stencils, weights: next.weights };
     descend(&view, &mut next.vectors, further, coarsest);
+    if let Some(Transfers { team, up, .. }) = &next.transfers {
+        up.receive(team, &mut next.vectors.v);
+    }
     next.transfer.prolong(levels, &next.outliers, &next.vectors.v, v);
+    matrix.receive(v);
     steps::smooth(matrix, stencils, weights[1], (v, f), u);
+    matrix.receive(u);
     steps::smooth(matrix, stencils, weights[0], (u, f), v);
+}
+
+/// Each rank that owns some of the coarsest level solves it; hardly ever is it more than the first one.
+fn solve_coarsest(matrix: &Matrix, coarsest: &mut Envelope, f: &mut Vectors<f32>, v: &mut Vectors<f32>) {
+    if matrix.part.as_ref().is_some_and(|part| part.is_shared()) {
+        matrix.gather(f);
+    }
+    if !matrix.own_groups().is_empty() {
+        coarsest.solve((&f.x, &f.y), (&mut v.x, &mut v.y));
+    }
 }
 
 impl Level {
     fn new(fine: &Matrix, transfer: Transfer, scale: f64) -> Self {
-        let (matrix, outliers) = coarsen::coarsen(fine, transfer);
+        let (mut matrix, outliers) = coarsen::coarsen(fine, transfer);
+        let part = fine.part.as_ref().map(|part| Part::new(&part.team, &matrix));
+        let with_part = fine.part.as_deref().zip(part.as_ref());
+        let transfers = with_part
+            .map(|(above, here)| Transfers::new([(above, fine), (here, &matrix)], transfer, &outliers));
+        matrix.part = part.map(Arc::new);
         let stencils = RowCoefficients::new(&matrix.rows, scale);
         let vectors = LevelVectors::new(matrix.count());
-        Self { transfer, outliers, matrix, stencils, weights: [0.0; 2], vectors }
+        Self { transfer, outliers, matrix, stencils, weights: [0.0; 2], vectors, transfers }
     }
 }
 
@@ -204,7 +258,7 @@ impl<T: Real> Preconditioner<T> for Cycle<'_> {
     fn precondition(&mut self, r: &Vectors<T>, size: f64) -> (&Vectors<f32>, f64) {
         let f = &mut self.vectors.f;
         let scale = 1.0 / size;
-        for_groups(f.parts(&self.matrix.bounds), |_, f| {
+        for_own_groups(self.matrix, self.matrix.own_parts(f), |_, f| {
             let r = r.view().range(f.range());
             let cast = |f: &mut [f32], r: &[T]| {
                 f.iter_mut().zip(r).for_each(|(f, r)| *f = (r.wide() * scale) as f32);
@@ -214,10 +268,12 @@ impl<T: Real> Preconditioner<T> for Cycle<'_> {
         });
         self.run();
         let z = &self.vectors.v;
-        let groups = self.matrix.bounds.windows(2).map(|ends| ends[0]..ends[1]).collect();
+        let own = self.matrix.own_groups();
+        let groups =
+            self.matrix.bounds[own.start..=own.end].windows(2).map(|ends| ends[0]..ends[1]).collect();
         let sums = for_groups(groups, |_, range: std::ops::Range<usize>| {
             dot(z.view().range(range.clone()), r.view().range(range))
         });
-        (z, sums.iter().sum())
+        (z, self.matrix.sum(&sums))
     }
 }

@@ -4,9 +4,11 @@
 //! particle or not. Places are affine in column and row on every lattice, so displacements that are
 //! affine, rotations among them, are reproduced to rounding.
 
+use std::ops::Range;
+
 use crate::flock::lattice::Site;
 use crate::flock::vectors::Vectors;
-use crate::solve::equilibrium::steps::for_groups;
+use crate::solve::equilibrium::steps::for_own_groups;
 use crate::solve::field::{VectorsMut, VectorsRef};
 use crate::solve::operator::{Columns, Matrix, Segment};
 
@@ -84,6 +86,20 @@ impl OutlierShares {
         }
     }
 
+    /// The particles that have a share in one of these nodes.
+    fn restricted_from(&self, nodes: &Range<usize>) -> impl Iterator<Item = usize> {
+        let has = |(node, ..): &&(u32, u32, f32)| nodes.contains(&(*node as usize));
+        self.children.iter().filter(has).map(|&(_, particle, _)| particle as usize)
+    }
+
+    /// The nodes that these particles have a share in; the first one, with no share, beside them where they are fewer than
+    /// four.
+    fn prolonged_from(&self, particles: &Range<usize>) -> impl Iterator<Item = usize> {
+        let outliers = particles.start.max(self.first)..particles.end.max(self.first);
+        let parents = outliers.filter_map(|i| self.parents.get(i - self.first));
+        parents.flatten().map(|&(node, _)| node as usize)
+    }
+
     fn prolong(&self, from: &Vectors<f32>, to: &mut VectorsMut<'_, f32>) {
         let range = to.range();
         for i in range.start.max(self.first)..range.end {
@@ -125,7 +141,7 @@ impl Transfer {
         from: &Vectors<f32>,
         to: &mut Vectors<f32>,
     ) {
-        for_groups(to.parts(&coarse.bounds), |group, mut to| {
+        for_own_groups(coarse, coarse.own_parts(to), |group, mut to| {
             let mut column = Column::new();
             for number in coarse.group_columns[group]..coarse.group_columns[group + 1] {
                 self.gather(&fine.columns, (&coarse.columns, number), from.view(), &mut column);
@@ -135,6 +151,38 @@ impl Transfer {
             }
             outliers.restrict(from, &mut to);
         });
+    }
+
+    /// What [`Transfer::restrict`] to these groups of nodes reads of the fine particles.
+    pub fn restricted_from(
+        self,
+        (fine, coarse): (&Matrix, &Matrix),
+        outliers: &OutlierShares,
+        groups: &Range<usize>,
+    ) -> Vec<Range<usize>> {
+        let across = self.steps[0];
+        let [first, end] = [groups.start, groups.end].map(|group| coarse.group_columns[group]);
+        let columns = first * across - across + 1..(end - 1) * across + across;
+        let nodes = coarse.bounds[groups.start]..coarse.bounds[groups.end];
+        let one = |i: usize| i..i + 1;
+        let of_columns = Some(fine.columns.particles(columns)).filter(|_| first < end);
+        of_columns.into_iter().chain(outliers.restricted_from(&nodes).map(one)).collect()
+    }
+
+    /// What [`Transfer::prolong`] to these groups of particles reads of the coarse nodes.
+    pub fn prolonged_from(
+        self,
+        (fine, coarse): (&Matrix, &Matrix),
+        outliers: &OutlierShares,
+        groups: &Range<usize>,
+    ) -> Vec<Range<usize>> {
+        let across = self.steps[0];
+        let [first, end] = [groups.start, groups.end].map(|group| fine.group_columns[group]);
+        let columns = first.div_euclid(across)..(end - 1).div_euclid(across) + 2;
+        let particles = fine.bounds[groups.start]..fine.bounds[groups.end];
+        let one = |i: usize| i..i + 1;
+        let of_columns = Some(coarse.columns.particles(columns)).filter(|_| first < end);
+        of_columns.into_iter().chain(outliers.prolonged_from(&particles).map(one)).collect()
     }
 
     /// The fine columns that have a share in a coarse one, weighted and added up row by row.
@@ -189,7 +237,7 @@ impl Transfer {
         from: &Vectors<f32>,
         to: &mut Vectors<f32>,
     ) {
-        for_groups(to.parts(&fine.bounds), |group, mut to| {
+        for_own_groups(fine, fine.own_parts(to), |group, mut to| {
             let mut column = Column::new();
             for number in fine.group_columns[group]..fine.group_columns[group + 1] {
                 let Some([low, high]) = fine.columns.rows_of(number) else { continue };

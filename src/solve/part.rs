@@ -1,0 +1,380 @@
+//! The part of a matrix that one of several ranks computes, and what it receives from the others for it.
+//!
+//! A rank owns consecutive groups of columns. Every pass over the particles is made group by group, and every sum is
+//! added up over each group and then over the groups in their order, so ranks change no bit, as threads do not. All
+//! ranks have the whole matrix: each of them finds what all of them read, and nothing has to be negotiated.
+
+use std::ops::Range;
+
+use super::field::Real;
+use super::operator::Matrix;
+use crate::flock::vectors::Vectors;
+use crate::ranks::Team;
+
+/// Groups per rank below which a matrix is not shared: the exchanges would take longer than the passes.
+const FEWEST_GROUPS: usize = 2;
+
+/// The groups of a matrix that each rank owns.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Cuts {
+    /// First group of each rank, shape \[ranks + 1\].
+    groups: Vec<usize>,
+    /// First particle of each rank, shape \[ranks + 1\].
+    particles: Vec<usize>,
+}
+
+impl Cuts {
+    /// About as many particles for each rank; the first one owns all where there are few groups.
+    pub fn new(matrix: &Matrix, ranks: usize) -> Self {
+        let (bounds, groups) = (&matrix.bounds, matrix.groups());
+        let count = matrix.count();
+        let nearest = |particle: usize| {
+            let after = bounds.partition_point(|&bound| bound < particle);
+            let before = after.saturating_sub(1);
+            if particle - bounds[before] < bounds[after] - particle { before } else { after }
+        };
+        let first = |rank: usize| match rank {
+            0 => 0,
+            _ if rank == ranks || groups < FEWEST_GROUPS * ranks => groups,
+            _ => nearest(rank * count / ranks),
+        };
+        let groups: Vec<usize> = (0..=ranks).map(first).collect();
+        let particles = groups.iter().map(|&group| bounds[group]).collect();
+        Self { groups, particles }
+    }
+
+    /// How many ranks there are.
+    fn ranks(&self) -> usize {
+        self.groups.len() - 1
+    }
+
+    /// The groups of a rank.
+    pub fn groups_of(&self, rank: usize) -> Range<usize> {
+        self.groups[rank]..self.groups[rank + 1]
+    }
+
+    /// The particles of a rank.
+    pub fn particles_of(&self, rank: usize) -> Range<usize> {
+        self.particles[rank]..self.particles[rank + 1]
+    }
+
+    /// Whether more than one rank owns something.
+    fn is_shared(&self) -> bool {
+        self.groups.windows(2).filter(|ends| ends[0] < ends[1]).count() > 1
+    }
+}
+
+/// Particles that ranks send each other.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Halo {
+    /// To each rank that reads some of this one's.
+    sends: Vec<(usize, Vec<Range<usize>>)>,
+    /// From each rank that owns some of what this one reads.
+    receives: Vec<(usize, Vec<Range<usize>>)>,
+}
+
+impl Halo {
+    /// The halo of a rank; `read_by` are the particles that a rank reads, in any order and its own among them.
+    pub fn new(rank: usize, owned: &Cuts, read_by: impl Fn(usize) -> Vec<Range<usize>>) -> Self {
+        let mut halo = Self::default();
+        let read_here = joined(read_by(rank));
+        for other in (0..owned.ranks()).filter(|&other| other != rank) {
+            let received = within(&read_here, &owned.particles_of(other));
+            if !received.is_empty() {
+                halo.receives.push((other, received));
+            }
+            let sent = within(&joined(read_by(other)), &owned.particles_of(rank));
+            if !sent.is_empty() {
+                halo.sends.push((other, sent));
+            }
+        }
+        halo
+    }
+
+    /// Particles that are received.
+    pub fn received(&self) -> usize {
+        self.receives.iter().map(|(_, of)| count(of)).sum()
+    }
+
+    /// Exchanges the particles of a vector.
+    pub fn receive<T: Real>(&self, team: &Team, v: &mut Vectors<T>) {
+        if self.sends.is_empty() && self.receives.is_empty() {
+            return;
+        }
+        let sent: Vec<_> = self.sends.iter().map(|(rank, of)| (*rank, words(v, of))).collect();
+        let sizes: Vec<_> =
+            self.receives.iter().map(|(rank, of)| (*rank, words_per_particle::<T>() * count(of))).collect();
+        for ((_, of), words) in self.receives.iter().zip(team.swap(&sent, &sizes)) {
+            put(v, of, &words);
+        }
+    }
+}
+
+/// The part of a matrix that this rank computes.
+#[derive(Clone, Debug)]
+pub struct Part {
+    /// The ranks.
+    pub team: Team,
+    /// What each of them owns.
+    pub cuts: Cuts,
+    /// What the rows of this one's particles lead to.
+    halo: Halo,
+}
+
+impl Part {
+    /// The part of this rank.
+    pub fn new(team: &Team, matrix: &Matrix) -> Self {
+        let cuts = Cuts::new(matrix, team.count());
+        let halo = Halo::new(team.rank(), &cuts, |rank| read_by_rows(matrix, cuts.groups_of(rank)));
+        Self { team: team.clone(), cuts, halo }
+    }
+
+    /// The groups that this rank owns.
+    pub fn groups(&self) -> Range<usize> {
+        self.cuts.groups_of(self.team.rank())
+    }
+
+    /// Whether this rank is not the only one that owns groups.
+    pub fn is_shared(&self) -> bool {
+        self.cuts.is_shared()
+    }
+
+    /// The sum over all groups, of which this rank has its own, in their order; and whether any rank has the flag.
+    pub fn sum(&self, own: &[f64], flag: bool) -> (f64, bool) {
+        let words: Vec<u64> = own.iter().map(|sum| sum.to_bits()).chain([u64::from(flag)]).collect();
+        let counts: Vec<usize> =
+            (0..self.cuts.ranks()).map(|rank| self.cuts.groups_of(rank).len() + 1).collect();
+        let all = self.team.gather(&words, &counts);
+        let (mut rest, mut sums, mut any) = (&all[..], Vec::new(), false);
+        for count in counts {
+            let (of_rank, after) = rest.split_at(count);
+            let (flag, of_groups) = of_rank.split_last().expect("a flag at least");
+            sums.extend(of_groups.iter().map(|&bits| f64::from_bits(bits)));
+            any |= *flag == 1;
+            rest = after;
+        }
+        (sums.iter().sum(), any)
+    }
+
+    /// Makes known what the rows of this rank's particles lead to.
+    pub fn receive<T: Real>(&self, v: &mut Vectors<T>) {
+        self.halo.receive(&self.team, v);
+    }
+
+    /// Makes the whole vector known to every rank.
+    pub fn gather<T: Real>(&self, v: &mut Vectors<T>) {
+        let of = |rank: usize| [self.cuts.particles_of(rank)];
+        let ranks = 0..self.cuts.ranks();
+        let counts: Vec<usize> =
+            ranks.clone().map(|rank| words_per_particle::<T>() * count(&of(rank))).collect();
+        let all = self.team.gather(&words(v, &of(self.team.rank())), &counts);
+        let mut rest = &all[..];
+        for rank in ranks {
+            let (of_rank, after) = rest.split_at(counts[rank]);
+            if rank != self.team.rank() {
+                put(v, &of(rank), of_rank);
+            }
+            rest = after;
+        }
+    }
+}
+
+/// Particles outside a rank's groups that their rows lead to.
+pub fn read_by_rows(matrix: &Matrix, groups: Range<usize>) -> Vec<Range<usize>> {
+    let owned = matrix.bounds[groups.start]..matrix.bounds[groups.end];
+    let mut outside = Vec::new();
+    for run in groups.flat_map(|group| matrix.runs_of(group)) {
+        for &distance in matrix.distances(run) {
+            let start = (run.start as usize).wrapping_add_signed(distance as isize);
+            let end = start + run.len as usize;
+            if start < owned.start || end > owned.end {
+                outside.push(start..end);
+            }
+        }
+    }
+    outside
+}
+
+/// Ascending and apart from each other.
+fn joined(mut ranges: Vec<Range<usize>>) -> Vec<Range<usize>> {
+    ranges.sort_unstable_by_key(|range| range.start);
+    let mut joined: Vec<Range<usize>> = Vec::new();
+    for range in ranges.into_iter().filter(|range| !range.is_empty()) {
+        match joined.last_mut() {
+            Some(last) if range.start <= last.end => last.end = last.end.max(range.end),
+            _ => joined.push(range),
+        }
+    }
+    joined
+}
+
+/// What of the ranges lies in another one.
+fn within(ranges: &[Range<usize>], of: &Range<usize>) -> Vec<Range<usize>> {
+    let cut = ranges.iter().map(|range| range.start.max(of.start)..range.end.min(of.end));
+    cut.filter(|range| !range.is_empty()).collect()
+}
+
+fn count(of: &[Range<usize>]) -> usize {
+    of.iter().map(ExactSizeIterator::len).sum()
+}
+
+/// Both components of single precision go into one word.
+const fn words_per_particle<T>() -> usize {
+    if size_of::<T>() == size_of::<f32>() { 1 } else { 2 }
+}
+
+fn words<T: Real>(v: &Vectors<T>, of: &[Range<usize>]) -> Vec<u64> {
+    let mut words = Vec::with_capacity(words_per_particle::<T>() * count(of));
+    for range in of {
+        let (x, y) = (&v.x[range.clone()], &v.y[range.clone()]);
+        if words_per_particle::<T>() == 1 {
+            words.extend(x.iter().zip(y).map(|(x, y)| x.bits() | y.bits() << 32));
+        } else {
+            words.extend(x.iter().chain(y).map(|value| value.bits()));
+        }
+    }
+    words
+}
+
+fn put<T: Real>(v: &mut Vectors<T>, of: &[Range<usize>], words: &[u64]) {
+    let mut rest = words;
+    for range in of {
+        let (of_range, after) = rest.split_at(words_per_particle::<T>() * range.len());
+        let (x, y) = (&mut v.x[range.clone()], &mut v.y[range.clone()]);
+        if words_per_particle::<T>() == 1 {
+            for ((x, y), word) in x.iter_mut().zip(y).zip(of_range) {
+                (*x, *y) = (T::of_bits(word & u64::from(u32::MAX)), T::of_bits(word >> 32));
+            }
+        } else {
+            let (of_x, of_y) = of_range.split_at(range.len());
+            x.iter_mut().zip(of_x).for_each(|(x, &bits)| *x = T::of_bits(bits));
+            y.iter_mut().zip(of_y).for_each(|(y, &bits)| *y = T::of_bits(bits));
+        }
+        rest = after;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flock::lattice::LatticeKind;
+    use crate::ranks::in_process;
+    use crate::solve::operator::RowCoefficients;
+    use crate::solve::operator::samples::{operator, with_outliers};
+
+    /// Bodies on every lattice, each in groups of few particles; some have particles along an outline.
+    fn matrices() -> Vec<Matrix> {
+        let of_kind = |kind: LatticeKind| {
+            let regular = operator(kind, 24, 17, |i| i < 9 || i == 50);
+            [with_outliers(&regular), regular].map(|operator| Matrix::of_followers(&operator).regrouped(20))
+        };
+        LatticeKind::SAMPLES.into_iter().flat_map(of_kind).collect()
+    }
+
+    #[test]
+    fn ranks_own_all_groups_once_and_about_as_much_each() {
+        for matrix in matrices() {
+            for ranks in 1..=7 {
+                let cuts = Cuts::new(&matrix, ranks);
+                let owned: Vec<usize> = (0..ranks).flat_map(|rank| cuts.groups_of(rank)).collect();
+                assert_eq!(owned, (0..matrix.groups()).collect::<Vec<_>>());
+                assert_eq!(cuts.is_shared(), ranks > 1 && matrix.groups() >= 2 * ranks);
+                let largest = (0..ranks).map(|rank| cuts.particles_of(rank).len()).max();
+                // Groups are columns, of up to 35 particles more than is asked for.
+                let fair = matrix.count() / ranks + 2 * (20 + 35);
+                assert!(!cuts.is_shared() || largest <= Some(fair), "{largest:?} {fair}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_body_of_few_groups_stays_on_the_first_rank() {
+        let matrix = Matrix::of_followers(&operator(LatticeKind::SAMPLES[0], 24, 17, |i| i < 9));
+        let cuts = Cuts::new(&matrix, 3);
+        assert!(!cuts.is_shared());
+        assert_eq!([0, 1, 2].map(|rank| cuts.groups_of(rank).len()), [matrix.groups(), 0, 0]);
+    }
+
+    #[test]
+    fn everything_that_is_read_is_owned_or_received_and_sent_by_its_owner() {
+        for matrix in matrices() {
+            for ranks in 2..=5 {
+                let parts: Vec<Part> =
+                    in_process(ranks).iter().map(|team| Part::new(team, &matrix)).collect();
+                for (rank, part) in parts.iter().enumerate() {
+                    let mut known = vec![false; matrix.count()];
+                    known[part.cuts.particles_of(rank)].fill(true);
+                    for (other, of) in &part.halo.receives {
+                        of.iter().for_each(|range| known[range.clone()].fill(true));
+                        let sent = parts[*other].halo.sends.iter().find(|(to, _)| *to == rank);
+                        assert_eq!(sent.map(|(_, of)| of), Some(of));
+                    }
+                    for run in part.groups().flat_map(|group| matrix.runs_of(group)) {
+                        for &distance in matrix.distances(run) {
+                            let start = (run.start as usize).wrapping_add_signed(distance as isize);
+                            assert!(known[start..start + run.len as usize].iter().all(|&known| known));
+                        }
+                    }
+                }
+                let sends: usize = parts.iter().map(|part| part.halo.sends.len()).sum();
+                assert_eq!(sends, parts.iter().map(|part| part.halo.receives.len()).sum::<usize>());
+            }
+        }
+    }
+
+    /// The product with rows on ranks that know nothing but their own particles, and its sum, as bits.
+    fn product<T: Real>(matrix: &Matrix, team: Option<&Team>) -> (Vec<u64>, u64) {
+        let mut matrix = matrix.clone();
+        matrix.part = team.map(|team| std::sync::Arc::new(Part::new(team, &matrix)));
+        let own =
+            matrix.part.as_ref().map_or(0..matrix.count(), |part| part.cuts.particles_of(part.team.rank()));
+        let noise = |i: usize| (i as f64 * 0.618_033_988_749_895).fract() - 0.5;
+        let of = |i: usize, at: usize| T::of(if own.contains(&i) { noise(at) } else { f64::NAN });
+        let mut u = Vectors {
+            x: (0..matrix.count()).map(|i| of(i, 2 * i)).collect(),
+            y: (0..matrix.count()).map(|i| of(i, 2 * i + 1)).collect(),
+        };
+        let stencils = RowCoefficients::<T>::new(&matrix.rows, 0.7);
+        let mut out = Vectors::zeros(matrix.count());
+        matrix.receive(&mut u);
+        let sum = crate::solve::equilibrium::steps::apply(&matrix, &stencils, &u, &mut out);
+        matrix.gather(&mut out);
+        (out.x.iter().chain(&out.y).map(|value| value.bits()).collect(), sum.to_bits())
+    }
+
+    fn assert_products_agree<T: Real>() {
+        for matrix in matrices() {
+            let alone = product::<T>(&matrix, None);
+            for ranks in [1, 2, 3, 5, 40] {
+                std::thread::scope(|scope| {
+                    for team in in_process(ranks) {
+                        let (matrix, alone) = (&matrix, &alone);
+                        scope.spawn(move || assert!(product::<T>(matrix, Some(&team)) == *alone));
+                    }
+                });
+            }
+        }
+    }
+
+    #[test]
+    fn a_product_has_the_same_bits_on_any_number_of_ranks() {
+        assert_products_agree::<f64>();
+        assert_products_agree::<f32>();
+    }
+
+    #[test]
+    fn a_flag_of_any_rank_is_known_to_all() {
+        let matrix = &matrices()[0];
+        std::thread::scope(|scope| {
+            for team in in_process(3) {
+                scope.spawn(move || {
+                    let part = Part::new(&team, matrix);
+                    let own = vec![1.0; part.groups().len()];
+                    let flags = [Some(2), None].map(|raised| part.sum(&own, raised == Some(team.rank())));
+                    let all = matrix.groups() as f64;
+                    assert_eq!(flags, [(all, true), (all, false)]);
+                });
+            }
+        });
+    }
+}
