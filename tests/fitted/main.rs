@@ -7,6 +7,7 @@ mod folders;
 mod inclusions;
 mod iterations;
 mod outlines;
+mod rollers;
 #[path = "../common/scenes.rs"]
 mod scenes;
 mod speed;
