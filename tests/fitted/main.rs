@@ -6,6 +6,7 @@ mod convergence;
 mod folders;
 mod inclusions;
 mod iterations;
+mod locking;
 mod outlines;
 mod rollers;
 #[path = "../common/scenes.rs"]
