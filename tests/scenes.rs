@@ -277,6 +277,24 @@ fn the_liquid_drop_stays_in_one_piece_and_rounds_itself() {
 }
 
 #[test]
+fn feedback_that_overshoots_swings_a_particle_about_its_place() {
+    let mut moved = Vec::new();
+    watched("feedback-oscillate", &[], |engine| moved.push((engine.step(), displacement(engine, 67)[0])));
+    let drawn_out = moved.iter().filter(|(step, _)| *step <= 20);
+    assert!(drawn_out.clone().zip(drawn_out.skip(1)).all(|((_, a), (_, b))| b > a), "is drawn to the right");
+    let free: Vec<f64> = moved.iter().filter(|(step, _)| *step > 20).map(|(_, x)| *x).collect();
+    let swings: Vec<f64> = free.chunk_by(|a, b| a.signum() == b.signum()).map(|run| largest(run)).collect();
+    println!("{} swings: {swings:.3?}", swings.len());
+    assert!(swings.len() > 20, "{swings:?}");
+    // To either side, and out.
+    assert!(swings[0] > 1.0 && swings[swings.len() - 1] < 0.1 * swings[0], "{swings:?}");
+}
+
+fn largest(values: &[f64]) -> f64 {
+    values.iter().fold(0.0, |most, value| most.max(value.abs()))
+}
+
+#[test]
 fn a_plan_counts_what_it_says() {
     let scene = load("tension", &[]);
     let report = PlanReport::new(&scene, &planned(&scene)).expect("plans").to_string();

@@ -9,7 +9,7 @@ use flockform::scene::raw::RawLattice;
 use flockform::scene::{Scene, SceneError, bundled};
 use flockform::solve::equilibrium::{Precision, Solver};
 use flockform::study::compare::run::compare;
-use flockform::study::trade::{Grid, Outcome, RuleChoice, Study, choose, run};
+use flockform::study::trade::{Chosen, Grid, Outcome, RuleChoice, Study, choose, run};
 
 fn study(name: &str, grid: &Grid) -> Study {
     let scene = bundled(name).expect("bundled");
@@ -56,13 +56,17 @@ fn the_error_of_the_material_rule_falls_with_the_spacing_and_solvers_agree() {
     );
 }
 
-/// A bundled scene in the setting chosen for an accuracy.
-fn chosen(name: &str, overrides: &[&str], accuracy: &str) -> Result<Scene, SceneError> {
+/// A bundled scene in the setting chosen for an accuracy, and the error estimated for it.
+fn chosen_for(name: &str, overrides: &[&str], accuracy: &str) -> Result<Chosen, SceneError> {
     let scene = bundled(name).expect("bundled");
     let mut base: Vec<String> = overrides.iter().map(|o| (*o).to_owned()).collect();
     base.push(format!("equilibrium.accuracy={accuracy}"));
     let load = |more: &[String]| scene.load(&[&base, more].concat());
-    choose(load(&[])?, &load).map(|chosen| chosen.scene)
+    choose(load(&[])?, &load)
+}
+
+fn chosen(name: &str, overrides: &[&str], accuracy: &str) -> Result<Scene, SceneError> {
+    chosen_for(name, overrides, accuracy).map(|chosen| chosen.scene)
 }
 
 #[test]
@@ -92,10 +96,12 @@ const STIFF: &str = "material={ kind = \"isotropic\", young = 1000.0, poisson = 
 const WEIGHT: &str = "loads=[{ kind = \"body\", force = [0.0, -1.0] }]";
 
 #[test]
-fn what_is_delivered_is_at_most_what_was_asked() {
-    let cases: [(&str, &[&str], &str, f64); 22] = [
+fn what_is_delivered_is_at_most_what_was_asked_and_about_what_was_estimated() {
+    let cases: [(&str, &[&str], &str, f64); 24] = [
         ("beam-loaded", &[SLENDER, HALF], "5%", 0.05),
         ("beam-loaded", &[SLENDER, HALF], "2%", 0.02),
+        ("beam-loaded", &[SLENDER, HALF], "1%", 0.01),
+        ("beam-loaded", &[SLENDER, HALF], "0.1%", 0.001),
         ("beam-loaded", &[ODD, HALF], "5%", 0.05),
         ("beam-loaded", &[HEXAGONAL], "2%", 0.02),
         ("beam-loaded", &[HONEYCOMB_LATTICE], "3%", 0.03),
@@ -118,15 +124,22 @@ fn what_is_delivered_is_at_most_what_was_asked() {
         ("l-bracket", &["lattice={ kind = \"hexagonal\", spacing = 8.0 }"], "3%", 0.03),
     ];
     for (name, overrides, asked, bound) in cases {
-        let scene =
-            chosen(name, overrides, asked).unwrap_or_else(|error| panic!("{overrides:?} {asked}: {error}"));
+        let Chosen { scene, estimate, .. } = chosen_for(name, overrides, asked)
+            .unwrap_or_else(|error| panic!("{overrides:?} {asked}: {error}"));
         let effort = Effort { target: 1e-6, ..Effort::default() };
         let found = compare(&scene, &effort, &mut |_, _| ControlFlow::Continue(()));
         let found = found.unwrap_or_else(|error| panic!("{overrides:?}: {error}"));
         let (error, particles) = (found.comparison.displacement_rel_l2, found.rule.len());
         let request = scene.equilibrium.expect("solved for").request;
-        println!("{name} {overrides:?} {asked}: {error:.5}, {particles} particles, {request:?}");
+        let ratio = estimate.expect("was measured") / error;
+        println!(
+            "{name} {overrides:?} {asked}: {error:.5}, estimated {ratio:.3} times that, {particles} particles, {request:?}"
+        );
         assert!(error <= bound, "{name} {overrides:?} {asked}: {error}");
+        assert!(
+            (0.5..2.0).contains(&ratio),
+            "{name} {overrides:?} {asked}: {error}, estimated {ratio} times that"
+        );
         let solved = found.outcome.solved.as_ref().expect("solved");
         assert!(solved.converged, "{name} {overrides:?} {asked} ends short of its tolerance");
     }

@@ -110,7 +110,7 @@ impl Prepared {
         if team.is_some() {
             require_shareable(&scene)?;
         }
-        let Chosen { mut scene, words } = choose(scene, &|more: &[String]| words_of.load_scene(more))?;
+        let Chosen { mut scene, words, .. } = choose(scene, &|more: &[String]| words_of.load_scene(more))?;
         if let Some(equilibrium) = &mut scene.equilibrium {
             equilibrium.request.interrupt = Interrupt::new(interrupt::flag());
         }

@@ -97,3 +97,20 @@ fn the_von_mises_figure_fills_every_cell_three_times_and_marks_stress_above_its_
         }
     }
 }
+
+#[test]
+fn the_error_picture_has_a_scale_of_its_own() {
+    let folder = temporary();
+    let (out, found) = (folder.path().join("beam"), compared("beam", &[]));
+    write_to(&out, "beam", &found, false).expect("written");
+    let drawn = text(&out, "von_mises.svg");
+    let svg = Document::parse(&drawn).expect("XML");
+    // An error of some percent of the stress fills its scale from end to end: the last cells drawn are the third panel's largest.
+    let fills: Vec<_> = of_class(&svg, "cells").filter_map(|path| path.attribute("fill")).collect();
+    assert_eq!(fills.last(), Some(&"#fde725"), "{fills:?}");
+    // Of the two scales the larger is the first.
+    let apart = found.von_mises_rule.iter().zip(&found.von_mises_truth).map(|(a, b)| (a - b).abs());
+    let (most, error) =
+        (found.von_mises_truth.iter().copied().fold(0.0, f64::max), apart.fold(0.0, f64::max));
+    assert!(error < 0.2 * most, "{error} of {most}: the scales can be told apart");
+}

@@ -54,9 +54,10 @@ fn errors(kind: LatticeKind, a: f64) -> [f64; 2] {
 }
 
 #[test]
-fn a_cantilever_bends_like_the_elastica_on_squares_triangles_and_hexagons() {
-    for (kind, bounds) in [(KINDS[0], [0.005, 0.005]), (KINDS[3], [0.005, 0.01]), (KINDS[5], [0.005, 0.005])]
-    {
+fn a_cantilever_bends_like_the_elastica_on_every_lattice() {
+    for (number, kind) in KINDS.into_iter().enumerate() {
+        // Triangles are stiffer in bending than quadrilaterals and hexagons.
+        let bounds = if number == 3 { [0.005, 0.01] } else { [0.005, 0.005] };
         for a in [1.0, 5.0, 10.0] {
             let [w, u] = errors(kind(1.0 / 16.0), a);
             println!("{:?} a = {a}: w {:+.2} %, u {:+.2} %", kind(1.0), 100.0 * w, 100.0 * u);

@@ -1,6 +1,6 @@
 //! Published figures: Cook's membrane, and the rows of a table of bodies that whole cells get wrong.
 
-use flockform::continuum::mechanics::Stresses;
+use flockform::continuum::mechanics::{Mechanics, Stresses};
 use flockform::flock::vectors::distance;
 
 use crate::scenes::load;
@@ -92,6 +92,27 @@ fn the_crown_of_a_hole_carries_its_published_stress() {
                 let stress = stresses.particles[at.expect("a corner")].expect("in cells").components[0];
                 assert!((stress / 3.36 - 1.0).abs() < bound, "{kind}, {h}, {orientation} degrees: {stress}");
             }
+        }
+    }
+}
+
+#[test]
+fn the_largest_stress_of_a_plate_with_a_hole_does_not_grow_with_refinement() {
+    // On whole cells the corners of the staircase carry more the finer they are. Here the largest is the crown's.
+    for kind in KINDS {
+        for orientation in [0.0, 20.0] {
+            let largest = [1.0, 0.5, 0.25, 0.125].map(|h| {
+                let scene = load("plate-hole", &[&lattice(kind, h, orientation)]);
+                let (_, outcome) = solved(&scene);
+                let elastic = scene.material.as_ref().expect("a material");
+                let peak = Mechanics::of(&outcome.engine, elastic).and_then(|all| all.largest_von_mises);
+                let peak = peak.expect("is stressed");
+                assert!(distance(peak.place, [0.0, 4.0]) < 1.0, "{kind}, {h}, {orientation}: {peak:?}");
+                peak.von_mises / 3.36
+            });
+            println!("{kind} at {orientation}: {largest:.4?}");
+            assert!(largest.iter().all(|part| *part < 1.06), "{kind} at {orientation}: {largest:?}");
+            assert!((largest[3] - 1.0).abs() < 0.02, "{kind} at {orientation}: {largest:?}");
         }
     }
 }

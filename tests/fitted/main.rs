@@ -6,7 +6,9 @@ mod convergence;
 mod folders;
 mod inclusions;
 mod iterations;
+mod locking;
 mod outlines;
+mod rollers;
 #[path = "../common/scenes.rs"]
 mod scenes;
 mod speed;

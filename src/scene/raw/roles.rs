@@ -15,7 +15,7 @@ pub struct RawRoles {
     /// The behaviour of these particles.
     pub role: RawRole,
     /// The one component that is held or led, for rollers and planes of symmetry; the particle follows along the
-    /// other. Both unless given. For the rule `material` with small rotations.
+    /// other. Both unless given. For the rule `material`.
     #[serde(default)]
     pub axis: Option<RawAxis>,
     /// First step at which the role holds [step]; 0 and 1 both mean from the start.

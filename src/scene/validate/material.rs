@@ -244,13 +244,12 @@ pub fn is_fitted(raw: &RawScene, refuse: Refuse<'_>) -> Result<bool, SceneError>
     }
 }
 
-/// Single components are held in the small-rotation material alone: other rules have no force to leave free.
+/// Single components are held in a material alone: other rules have no force to leave free.
 pub fn check_axes(raw: &RawScene, refuse: Refuse<'_>) -> Result<(), SceneError> {
     let Some(k) = raw.roles.iter().position(|entry| entry.axis.is_some()) else { return Ok(()) };
     let key = format!("roles[{k}].axis");
-    let small = matches!(raw.rule.mean, Some(RawMean::Material { rotation: RawRotation::Small }));
-    if !small {
-        let message = "one component can be held in a material with small rotations only".into();
+    if !is_material(raw) {
+        let message = "one component can be held in a material only".into();
         return Err(refuse(&key, message, "use rule.mean = { kind = \"material\" }, or leave axis out"));
     }
     let entry = &raw.roles[k];

@@ -35,6 +35,9 @@ pub struct Chosen {
     pub scene: Scene,
     /// The choice in words.
     pub words: String,
+    /// The error that it was chosen for, relative L2 of the displacements, the truth's own included \[1\]; `None` where
+    /// nothing was measured.
+    pub estimate: Option<f64>,
 }
 
 /// Chooses the widest spacing, the written one at most, at which the scene's followers are as near to
@@ -45,11 +48,11 @@ pub struct Chosen {
 /// Names what keeps the scene from being refined or held against a truth, or how near it came.
 pub fn choose(scene: Scene, load: Load<'_>) -> Result<Chosen, SceneError> {
     let Some(accuracy) = scene.equilibrium.and_then(|asked| asked.accuracy) else {
-        return Ok(Chosen { scene, words: String::new() });
+        return Ok(Chosen { scene, words: String::new(), estimate: None });
     };
     if !matches!(scene.raw.rule.mean, Some(RawMean::Material { .. })) {
         let words = format!("accuracy {} %: the paper's rule at the written spacing\n", 100.0 * accuracy);
-        return Ok(Chosen { scene, words });
+        return Ok(Chosen { scene, words, estimate: None });
     }
     let mut nearest = f64::INFINITY;
     let mut particles = 0;
@@ -165,7 +168,7 @@ impl<'a> Body<'a> {
             };
             if solved.converged && solved.error <= accuracy {
                 let words = words(&solved, accuracy, self.part);
-                return Ok(Chosen { scene: solved.scene, words });
+                return Ok(Chosen { scene: solved.scene, words, estimate: Some(solved.error) });
             }
             last = match solved.converged {
                 true => format!("the last one tried leaves {:.2} %", 100.0 * solved.error),

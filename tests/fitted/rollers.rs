@@ -1,0 +1,101 @@
+//! Single components that are held in a body that turns: rollers and planes of symmetry under `corotated`.
+
+use flockform::continuum::mechanics::Mechanics;
+use flockform::continuum::plan::Plan;
+use flockform::continuum::run::Outcome;
+use flockform::flock::vectors::distance;
+use flockform::scene::Scene;
+
+use crate::scenes::load;
+use crate::support::{KINDS, lattice, solved};
+
+const COROTATED: &str = "rule.mean={ kind = \"material\", rotation = \"corotated\" }";
+
+fn measured(scene: &Scene, outcome: &Outcome) -> Mechanics {
+    let elastic = scene.material.as_ref().expect("a material");
+    Mechanics::of(&outcome.engine, elastic).expect("has cells")
+}
+
+fn largest(outcome: &Outcome) -> f64 {
+    (0..outcome.engine.roles().len())
+        .map(|i| distance(outcome.engine.displacement(i), [0.0; 2]))
+        .fold(0.0, f64::max)
+}
+
+#[test]
+fn a_ring_on_rollers_that_hardly_turns_is_that_of_small_rotations() {
+    for kind in KINDS {
+        let at = lattice(kind, 1.0, 20.0).replace(" = {", "={");
+        let light = "loads[0].pressure=1e-4";
+        let found = [&[&*at, light][..], &[&at, light, COROTATED]].map(|sets| {
+            let scene = load("ring", &[sets, &["equilibrium.tolerance=1e-11"]].concat());
+            let (_, outcome) = solved(&scene);
+            (measured(&scene, &outcome), outcome)
+        });
+        let [(small, at_small), (turning, at_turning)] = &found;
+        let apart = (0..at_small.engine.roles().len())
+            .map(|i| distance(at_small.engine.displacement(i), at_turning.engine.displacement(i)))
+            .fold(0.0, f64::max);
+        // Strains of 3e-7, whose squares are what the rotations differ by.
+        assert!(apart < 1e-5 * largest(at_small), "{kind}: {apart:e}");
+        for mechanics in [small, turning] {
+            // The pressure on a bore of radius 4 pushes each plane of symmetry away by 4 times as much, and nothing acts along it.
+            let [below, left] = [0, 1].map(|k| mechanics.reactions[k].force);
+            for (found, expected) in [(below, [0.0, -4e-4]), (left, [-4e-4, 0.0])] {
+                let off = distance(found, expected);
+                assert!(off < 1e-8 * 4e-4, "{kind}: {found:?}, off by {off:e}");
+            }
+        }
+    }
+}
+
+/// A beam of depth 1 on two supports 20 apart, loaded along its top, whole or its right half on a plane of symmetry.
+fn bent(half: bool) -> (Scene, Plan, Outcome) {
+    let from = if half { 0.0 } else { -10.0 };
+    let end = |x: f64| {
+        format!(
+            "{{ region = {{ kind = \"disc\", centre = [{x:?}, 0.0], radius = 1e-3 }}, role = \"clamped\", axis = \"y\" }}"
+        )
+    };
+    let middle = "{ region = { kind = \"box\", min = [-1e-3, -1.0], max = [1e-3, 2.0] }, role = \"clamped\", axis = \"x\" }";
+    let supports = if half { vec![end(10.0)] } else { vec![end(-10.0), end(10.0)] };
+    let parts = format!(
+        "body = {{ shape = {{ kind = \"rectangle\", min = [{from:?}, 0.0], max = [10.0, 1.0] }} }}\n\
+         material = {{ kind = \"isotropic\", young = 1000.0, poisson = 0.3 }}\n\
+         roles = [{middle}, {}]\n\
+         loads = [{{ kind = \"traction\", region = {{ kind = \"edge\", side = \"top\" }}, traction = [0.0, -0.2] }}]",
+        supports.join(", ")
+    );
+    let text = format!(
+        "title = \"bent\"\nstop = {{ steps = 1 }}\nequilibrium = {{ tolerance = 1e-12 }}\n\
+         rule = {{ mean = {{ kind = \"material\", rotation = \"corotated\" }} }}\n\
+         lattice = {{ kind = \"square\", spacing = 0.5 }}\n{parts}"
+    );
+    let scene = Scene::parse("bent", "bent.toml", &text, &[], None).unwrap_or_else(|error| panic!("{error}"));
+    let (plan, outcome) = solved(&scene);
+    (scene, plan, outcome)
+}
+
+#[test]
+fn half_of_a_beam_on_a_plane_of_symmetry_bends_as_far_as_the_whole() {
+    let (scene, plan, outcome) = bent(true);
+    let mechanics = measured(&scene, &outcome);
+    assert!(mechanics.largest_turn > 0.2, "turns far: {}", mechanics.largest_turn);
+    // What the supports return sums up to the load, component by component.
+    let [symmetry, support] = [0, 1].map(|k| mechanics.reactions[k].force);
+    let load = mechanics.load.expect("is loaded").force;
+    assert!(symmetry[0].abs() < 1e-8 * 2.0 && symmetry[1] == 0.0, "{symmetry:?}");
+    assert!(support[0] == 0.0 && (support[1] + load[1]).abs() < 1e-8 * 2.0, "{support:?} {load:?}");
+    let moments = mechanics.reactions.iter().map(|reaction| reaction.moment_about_origin).sum::<f64>();
+    let all = moments + mechanics.load.expect("is loaded").moment_about_origin;
+    assert!(all.abs() < 1e-8 * 20.0, "{all:e} turns the body");
+
+    let (_, whole_plan, whole) = bent(false);
+    let reference = &whole_plan.setup.body.reference;
+    for (i, p) in plan.setup.body.reference.iter().enumerate() {
+        let twin =
+            (0..whole_plan.count()).find(|&j| distance(reference.get(j), p) < 1e-9).expect("has a twin");
+        let apart = distance(outcome.engine.displacement(i), whole.engine.displacement(twin));
+        assert!(apart < 1e-7, "{p:?}: {apart:e} apart");
+    }
+}
