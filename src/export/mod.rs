@@ -68,6 +68,7 @@ pub mod load;
 pub(crate) mod manifest;
 pub mod memory;
 pub mod report;
+pub mod shell;
 #[cfg(feature = "bench")]
 pub mod scale;
 pub mod stability;
