@@ -208,7 +208,10 @@ fn what_cannot_become_a_film_is_refused_before_the_run() {
         (&["--film", "nowhere/sheet.gif"], "no folder"),
         (&["--film", "o/sheet.gif"], "results alone"),
         (&["--film", "sheet.gif", "--film-colour", "von-mises"], "no material"),
-        (&["--film", "sheet.gif", "--film-colour", "clearance"], "robots do"),
+        (
+            &["--film", "sheet.gif", "--film-colour", "clearance"],
+            "possible values: role, displacement, pe1, pe2, strain, von-mises",
+        ),
         (&["--film-colour", "pe1"], "--film"),
     ];
     for (more, word) in refusals {
@@ -219,7 +222,21 @@ fn what_cannot_become_a_film_is_refused_before_the_run() {
         assert_eq!(names_in(folder.path()), ["notes.gif", "sheet.toml"], "{more:?}");
     }
     let output = flockform(&["swarm", "square", "--film", "a.gif", "--film-colour", "pe2"], folder.path());
-    assert_eq!(output.status.code(), Some(2), "{}", text(&output.stderr));
+    let said = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert!(said.contains("possible values: role, displacement, pe1, strain, clearance"), "{said}");
+}
+
+#[test]
+fn a_film_of_a_tall_body_is_no_higher_than_a_screen() {
+    let folder = temporary();
+    let shape = "body.shape={ kind = \"grid\", columns = 4, rows = 60 }";
+    let output =
+        filmed(folder.path(), &["--film", "sheet.gif", "--set", shape, "--steps", "2", "--no-report"]);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let film = decoded(&folder.path().join("sheet.gif"));
+    let (width, height) = (film[0].0.width, film[0].0.height);
+    assert!(height < 720 && width > 400, "{width} x {height}");
 }
 
 #[test]

@@ -11,19 +11,32 @@ use super::interrupt;
 use super::output::OutputArguments;
 use super::progress::Drawn;
 
+/// A film of a body.
 #[derive(Debug, Args)]
-pub struct FilmArguments {
+pub struct BodyFilmArguments {
     /// Make a film of it as FILE.gif, FILE.mp4 or FILE.webm; the last two take the program ffmpeg
     #[arg(long, value_name = "FILE", value_parser = film_path)]
     film: Option<PathBuf>,
-    /// Quantity that colours the film's particles or robots [default: displacement of a body, role in a swarm]
-    #[arg(long, value_name = "QUANTITY", value_parser = film_colour(), requires = "film")]
+    /// Quantity that colours the film's particles [default: displacement]
+    #[arg(long, value_name = "QUANTITY", value_parser = one_of(FilmColour::OF_BODIES), requires = "film")]
     film_colour: Option<FilmColour>,
 }
 
-fn film_colour() -> impl TypedValueParser<Value = FilmColour> {
-    let named = |name: String| FilmColour::ALL.into_iter().find(|colour| colour.name() == name);
-    PossibleValuesParser::new(FilmColour::ALL.map(FilmColour::name))
+/// A film of a swarm.
+#[derive(Debug, Args)]
+pub struct SwarmFilmArguments {
+    /// Make a film of it as FILE.gif, FILE.mp4 or FILE.webm; the last two take the program ffmpeg
+    #[arg(long, value_name = "FILE", value_parser = film_path)]
+    film: Option<PathBuf>,
+    /// Quantity that colours the film's robots [default: role]
+    #[arg(long, value_name = "QUANTITY", value_parser = one_of(FilmColour::OF_SWARMS), requires = "film")]
+    film_colour: Option<FilmColour>,
+}
+
+/// Reads the name of one of these colours.
+fn one_of<const N: usize>(colours: [FilmColour; N]) -> impl TypedValueParser<Value = FilmColour> {
+    let named = move |name: String| colours.into_iter().find(|colour| colour.name() == name);
+    PossibleValuesParser::new(colours.map(FilmColour::name))
         .try_map(move |name| named(name).ok_or("no quantity has this name"))
 }
 
@@ -38,24 +51,35 @@ pub struct AskedFilm {
     pub colour: FilmColour,
 }
 
-impl FilmArguments {
-    /// The film, if one is asked for; its file stands beside its place until it is made, and an interrupt removes it.
+impl BodyFilmArguments {
+    /// The film, if one is asked for, in a colour that the body has.
     pub fn open(
         &self,
         output: &OutputArguments,
-        default: FilmColour,
         require: impl FnOnce(FilmColour) -> Result<(), FilmError>,
     ) -> Result<Option<AskedFilm>, FilmError> {
-        let Some(path) = &self.film else { return Ok(None) };
-        let colour = self.film_colour.unwrap_or(default);
-        require(colour)?;
-        let file = FilmFile::create(path, output.out(), output.force)?;
-        interrupt::removes([file.part().to_owned()]);
-        Ok(Some(AskedFilm { file, colour }))
+        let colour = self.film_colour.unwrap_or(FilmColour::Displacement);
+        let open = |path: &PathBuf| require(colour).and_then(|()| AskedFilm::open(path, output, colour));
+        self.film.as_ref().map(open).transpose()
+    }
+}
+
+impl SwarmFilmArguments {
+    /// The film, if one is asked for.
+    pub fn open(&self, output: &OutputArguments) -> Result<Option<AskedFilm>, FilmError> {
+        let colour = self.film_colour.unwrap_or(FilmColour::Role);
+        self.film.as_ref().map(|path| AskedFilm::open(path, output, colour)).transpose()
     }
 }
 
 impl AskedFilm {
+    /// Its file stands beside its place until it is made, and an interrupt removes it.
+    fn open(path: &Path, output: &OutputArguments, colour: FilmColour) -> Result<Self, FilmError> {
+        let file = FilmFile::create(path, output.out(), output.force)?;
+        interrupt::removes([file.part().to_owned()]);
+        Ok(Self { file, colour })
+    }
+
     /// Makes the film once the results stand in `kept`; `None` if an interrupt ended it.
     pub fn make(self, film: &Film<'_>, kept: &Path, quiet: bool) -> Result<Option<Finished>, FilmError> {
         interrupt::removes([self.file.part().to_owned()]);

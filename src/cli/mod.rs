@@ -74,12 +74,12 @@ pub enum Command {
     Run(run::RunArguments),
     /// Compares a scene's rule with finite elements on the same body
     #[command(
-        after_help = "Example:\n  flockform compare beam --out /tmp/beam\n  flockform compare beam-paper --set neighbours.kind=second"
+        after_help = "Examples:\n  flockform compare beam --out /tmp/beam\n  flockform compare beam-paper --set neighbours.kind=second"
     )]
     Compare(compare::CompareArguments),
     /// Measures what accuracy costs: many rules, spacings and solvers of a scene against finite elements
     #[command(
-        after_help = "Example:\n  flockform trade grips --out /tmp/trade\n  flockform trade beam-loaded --max-particles 5000"
+        after_help = "Examples:\n  flockform trade grips --out /tmp/trade\n  flockform trade beam-loaded --max-particles 5000"
     )]
     Trade(trade::TradeArguments),
     /// Runs a scene with many values of its keys, in parallel: one table, one figure
@@ -94,13 +94,13 @@ pub enum Command {
     Sweep(sweep::SweepArguments),
     /// Predicts and measures when a scene's body grows instead of coming to rest, and tests extreme input
     #[command(
-        after_help = "Example:\n  flockform stability tension --out /tmp/stability\n  flockform stability beam --set update.damping=0.7 --no-extremes\n\n\
+        after_help = "Examples:\n  flockform stability tension --out /tmp/stability\n  flockform stability beam --set update.damping=0.7 --no-extremes\n\n\
                       Exit codes: 0 predictions and runs agree and no extreme is wrong, 1 otherwise, 2 bad input."
     )]
     Stability(stability::StabilityArguments),
     /// Flies a swarm of simulated robots, without middleware, and reports how it went
     #[command(
-        after_help = "Example:\n  flockform swarm gap --out /tmp/gap\n  flockform swarm antipodal --set limits.speed=0.5\n\n\
+        after_help = "Examples:\n  flockform swarm gap --out /tmp/gap\n  flockform swarm antipodal --set limits.speed=0.5\n\n\
                       Exit codes: 0 flown and every declared bound held, 1 a bound broken or interrupted, 2 bad input."
     )]
     Swarm(swarm::SwarmArguments),
@@ -119,18 +119,18 @@ pub enum Command {
     Replay(replay::ReplayArguments),
     /// Keeps a swarm in formation over ROS 2 or shared memory: poses in, safe targets out
     #[command(
-        after_help = "Example:\n  flockform node square --ros-args -r __ns:=/fleet -p speed_limit:=0.5\n  flockform node square --member robot_3\n  flockform node square --live --open\n  flockform node square --transport shm\n\n\
+        after_help = "Examples:\n  flockform node square --ros-args -r __ns:=/fleet -p speed_limit:=0.5\n  flockform node square --member robot_3\n  flockform node square --live --open\n  flockform node square --transport shm\n\n\
                       Exit codes: 0 ended as asked, 2 bad input, 70 the middleware is gone and cannot be started again."
     )]
     Node(node::NodeArguments),
     /// Simulates the robots of a swarm file, over ROS 2 or shared memory
     #[command(
-        after_help = "Example:\n  flockform robots square --ros-args -p publish_clock:=true\n  flockform robots square --node-per-robot\n  flockform robots square --transport shm"
+        after_help = "Examples:\n  flockform robots square --ros-args -p publish_clock:=true\n  flockform robots square --node-per-robot\n  flockform robots square --transport shm"
     )]
     Robots(node::RobotsArguments),
     /// Runs every bundled scene and swarm and builds a page that links to their reports
     #[command(
-        after_help = "Example:\n  flockform gallery --out /tmp/gallery\n  flockform gallery tension gap"
+        after_help = "Examples:\n  flockform gallery --out /tmp/gallery\n  flockform gallery tension gap"
     )]
     Gallery(gallery::GalleryArguments),
     /// Lists the bundled scenes or swarms, one a line
@@ -163,7 +163,7 @@ pub enum Command {
     )]
     Install(install::InstallArguments),
     /// Prints the JSON Schema of a scene file
-    #[command(after_help = "Example:\n  flockform schema > scene.schema.json\n  flockform schema --swarm")]
+    #[command(after_help = "Examples:\n  flockform schema > scene.schema.json\n  flockform schema --swarm")]
     Schema {
         /// Print that of a swarm file instead
         #[arg(long)]

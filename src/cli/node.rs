@@ -21,6 +21,7 @@ use flockform::swarm::control::Control;
 use serde::{Deserialize, Serialize};
 
 use super::live::{self, PageArguments};
+use super::output::command_line;
 use super::recording::{RecordArguments, close};
 use super::supervise::{Life, supervise};
 use super::swarm::SwarmFileArguments;
@@ -216,8 +217,9 @@ impl LivePage {
         });
         let (monitor, feed) = Monitor::new(swarm.clone(), link)?;
         let (session, place) = (Session::Monitor(Box::new(monitor)), server.place());
+        let command = command_line(std::env::args().skip(1));
         let serve = move || {
-            if let Err(error) = server.serve(session, PathBuf::new(), interrupt::serves()) {
+            if let Err(error) = server.serve(session, command, PathBuf::new(), interrupt::serves()) {
                 tracing::warn!("the page is no longer served: {error}");
             }
         };

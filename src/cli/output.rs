@@ -6,6 +6,7 @@ use std::process::{Command, Stdio};
 use clap::{Args, ValueEnum};
 use flockform::export::figures::Formats;
 use flockform::export::report::page;
+use flockform::export::shell::quoted;
 use flockform::export::{ExportError, OutputFolder};
 
 use super::interrupt;
@@ -161,15 +162,6 @@ pub fn command_line(arguments: impl IntoIterator<Item = String>) -> String {
         }
     }
     words.join(" ")
-}
-
-/// A word that a POSIX shell reads as this text.
-fn quoted(text: &str) -> String {
-    let is_plain = |sign: char| sign.is_ascii_alphanumeric() || "-_./=:,+@%".contains(sign);
-    match !text.is_empty() && text.chars().all(is_plain) {
-        true => text.to_owned(),
-        false => format!("'{}'", text.replace('\'', r"'\''")),
-    }
 }
 
 #[cfg(test)]

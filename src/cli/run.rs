@@ -16,7 +16,7 @@ use flockform::continuum::looks::Looks;
 use flockform::continuum::plan::Plan;
 use flockform::continuum::run::{Outcome, SharedError, StopReason, require_shareable, resume};
 use flockform::export::checkpoint::{self, Checkpoint, RunRequest};
-use flockform::export::film::{self, FilmColour};
+use flockform::export::film;
 use flockform::export::memory::Outputs;
 use flockform::export::report;
 use flockform::export::{Drawing, Results, Timings, write_all};
@@ -34,7 +34,7 @@ use recorder::{Recorder, Records};
 use words::{closing_words, where_to_look};
 
 use super::checkpoint::{CheckpointArguments, Checkpointer, ResumedRun, resume_words};
-use super::film::{FilmArguments, words as film_words};
+use super::film::{BodyFilmArguments, words as film_words};
 use super::names::{FileName, SceneArguments, in_full};
 use super::output::{FigureArguments, OutputArguments, ReportArguments, command_line};
 use super::progress::{Drawn, Progress};
@@ -57,7 +57,7 @@ pub struct RunArguments {
     #[command(flatten)]
     figures: FigureArguments,
     #[command(flatten)]
-    film: FilmArguments,
+    film: BodyFilmArguments,
     #[command(flatten)]
     checkpoints: CheckpointArguments,
     #[command(flatten)]
@@ -159,7 +159,7 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
     let open = |name: &String| Positions::open(&Domain::from_environment()?, name, plan.count());
     let shown = shown.map(open).transpose()?;
     let required = |colour| film::run::require_colour(&scene, colour);
-    let film = arguments.film.open(&arguments.output, FilmColour::Displacement, required)?;
+    let film = arguments.film.open(&arguments.output, required)?;
     let mut folder = match &left {
         Some(left) => left.open()?,
         None => arguments.output.folder(&scene.name)?,

@@ -8,7 +8,7 @@ use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 use clap::Args;
-use flockform::export::film::{self, FilmColour};
+use flockform::export::film;
 use flockform::export::flight::{write_flight, write_flight_tables};
 use flockform::export::report::{self, FlightRecorder};
 use flockform::record::flight::FlightMessages;
@@ -18,7 +18,7 @@ use flockform::scene::swarm::Swarm;
 use flockform::swarm::control::Control;
 use flockform::swarm::flight::{Flight, FlightReport, Record, Sample, fly_heard};
 
-use super::film::{FilmArguments, words as film_words};
+use super::film::{SwarmFilmArguments, words as film_words};
 use super::names::{FileName, Kind, folder_of};
 use super::output::{OutputArguments, ReportArguments};
 use super::recording::{RecordArguments, close};
@@ -72,7 +72,7 @@ pub struct SwarmArguments {
     #[command(flatten)]
     report: ReportArguments,
     #[command(flatten)]
-    film: FilmArguments,
+    film: SwarmFilmArguments,
     #[command(flatten)]
     record: RecordArguments,
     /// Print the report as JSON, as in flight.json
@@ -84,7 +84,7 @@ pub struct SwarmArguments {
 pub fn swarm(arguments: &SwarmArguments) -> Result<ExitCode, Refusal> {
     let swarm = arguments.swarm.load()?;
     let flight = Flight::new(&swarm)?;
-    let film = arguments.film.open(&arguments.output, FilmColour::Role, film::flight::require_colour)?;
+    let film = arguments.film.open(&arguments.output)?;
     let reports = !arguments.report.no_report;
     let mut recorder = (reports || film.is_some()).then(|| FlightRecorder::new(&flight));
     let folder = arguments.output.folder(&swarm.name)?;

@@ -186,13 +186,33 @@ impl Sweep {
         Ok(if is_refused { ExitCode::from(FAILED) } else { ExitCode::SUCCESS })
     }
 
-    /// `20 runs (18 steps, 2 diverged)`.
+    /// `20 runs, all ended at stop.steps`, or `20 runs: 18 ended at stop.steps, 2 diverged`.
     fn ends(&self) -> String {
         let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
         self.rows.values().for_each(|row| *counts.entry(&row.stop_reason).or_default() += 1);
-        let counts: Vec<String> =
-            counts.into_iter().map(|(reason, count)| format!("{count} {reason}")).collect();
-        format!("{} runs ({})", self.rows.len(), counts.join(", "))
+        let runs = match self.rows.len() {
+            1 => "1 run".to_owned(),
+            count => format!("{count} runs"),
+        };
+        let counts: Vec<(&str, usize)> = counts.into_iter().collect();
+        if let [(reason, count)] = counts[..] {
+            let all = if count == 1 { "" } else { "all " };
+            return format!("{runs}, {all}{}", in_words(reason));
+        }
+        let parts: Vec<String> =
+            counts.iter().map(|(reason, count)| format!("{count} {}", in_words(reason))).collect();
+        format!("{runs}: {}", parts.join(", "))
+    }
+}
+
+/// How a run ended, after its subject.
+fn in_words(reason: &str) -> &str {
+    match reason {
+        "steps" => "ended at stop.steps",
+        "equilibrium" => "came to equilibrium",
+        "unsettled" => "did not come to rest",
+        "stuck" => "got stuck",
+        other => other,
     }
 }
 

@@ -70,6 +70,7 @@ pub mod memory;
 pub mod report;
 #[cfg(feature = "bench")]
 pub mod scale;
+pub mod shell;
 pub mod stability;
 mod summary;
 pub mod sweep;
@@ -221,7 +222,8 @@ fn figures_of<'a>(results: &'a Results<'_>, subject: &'a Subject<'_>, units: &'a
                 let places = snapshot.positions.iter().zip(subject.body.reference.iter());
                 let displacement: Vectors = places.map(moved).collect();
                 let found = Stresses::of(&outcome.engine, elastic, &displacement, &snapshot.broken);
-                let stresses = found.map_or_else(Vec::new, |found| found.cells);
+                let none = || Stresses { cells: Vec::new(), particles: Vec::new(), recovered: Vec::new() };
+                let stresses = found.unwrap_or_else(none);
                 figures::stress(subject, snapshot, cells, &stresses, &units.stress)
             };
             figures.push((name("von_mises"), Box::new(draw)));

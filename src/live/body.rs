@@ -6,6 +6,8 @@ mod state;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use serde_json::{Value, json};
+
 use super::command::Command;
 use super::history::{History, Source};
 use super::session::{Broken, Frame, Refused, Viewer};
@@ -60,6 +62,33 @@ impl Body {
     /// Keys that were changed and hold now, `KEY=VALUE`, in their order.
     pub fn sets(&self) -> Vec<String> {
         self.history.set().iter().cloned().chain(self.history.now.changed_keys()).collect()
+    }
+
+    /// Numbers that act though the scene leaves them out, by key: damping, feedback, and the toughness of a body that can
+    /// break.
+    pub fn defaults(&self) -> Vec<(String, Value)> {
+        let engine = &self.history.now.engine;
+        let mut defaults = vec![("update.damping".to_owned(), json!(engine.update().damping))];
+        if !matches!(engine.flock().rule.mean, Mean::Material { .. }) {
+            defaults.push(("rule.feedback.factor".into(), json!(0.0)));
+        }
+        if self.can_break() {
+            defaults.push(("fracture.stretch".into(), Value::Null));
+        }
+        defaults
+    }
+
+    /// Whether bonds could break past a stretch, and none has been set.
+    fn can_break(&self) -> bool {
+        let engine = &self.history.now.engine;
+        let is_whole = engine.flock().bonds.as_ref().is_none_or(|bonds| bonds.threshold.is_none());
+        let has_bonds = !matches!(engine.flock().rule.mean, Mean::Material { .. });
+        engine.lasting_neighbours().is_some() && has_bonds && is_whole
+    }
+
+    /// Whether a side can be loaded by hand: stress takes a material.
+    pub fn takes_loads(&self) -> bool {
+        self.scene().material.is_some()
     }
 
     /// Takes a step.

@@ -14,6 +14,7 @@ use super::monitor::Monitor;
 use super::session::{Frame, Session, Viewer};
 use super::state::{Board, Published};
 use crate::export::report::live_page;
+use crate::export::shell::quoted;
 
 /// Time from one state that is shown to the next, at least.
 const SHOWN_EVERY: Duration = Duration::from_micros(16_000);
@@ -41,6 +42,8 @@ pub enum Request {
 pub struct Conductor {
     session: Session,
     board: Arc<Board>,
+    /// The command that began the session.
+    command: String,
     /// Folder of saved files.
     folder: PathBuf,
     is_playing: bool,
@@ -88,12 +91,13 @@ impl Pace {
 }
 
 impl Conductor {
-    /// A session that stands still, whose files are saved in `folder`.
-    pub fn new(session: Session, board: Arc<Board>, folder: PathBuf) -> Self {
+    /// A session that stands still, begun by `command`, whose files are saved in `folder`.
+    pub fn new(session: Session, board: Arc<Board>, command: String, folder: PathBuf) -> Self {
         let pace = Pace { since: Instant::now(), steps: 0, frames: 0, rates: [0.0; 2] };
         Self {
             session,
             board,
+            command,
             folder,
             is_playing: false,
             speed: 1.0,
@@ -298,6 +302,8 @@ impl Conductor {
             "faults": self.session.faults(),
             "obstacles": self.session.obstacles(),
             "sets": self.session.sets(),
+            "command": self.command(),
+            "loads": self.session.takes_loads(),
             "viewers": self.board.viewers(),
             "rates": self.pace.rates,
             "node": self.monitor().map(Monitor::status),
@@ -305,23 +311,37 @@ impl Conductor {
     }
 
     fn page(&self) -> String {
-        let (name, title) = self.session.title();
+        let (_, title) = self.session.title();
         let node = self.monitor().map(
             |monitor| json!({ "commands": monitor.takes_commands(), "manoeuvres": monitor.manoeuvres() }),
         );
-        let command = match &node {
-            Some(_) => format!("flockform node {name} --live"),
-            None => format!("flockform live {name}"),
-        };
         let live = json!({
             "channels": self.session.channels(),
             "layout": self.session.layout(),
-            "keys": if node.is_some() { Vec::new() } else { numbers(&self.session.raw()) },
+            "keys": if node.is_some() { Vec::new() } else { self.keys() },
             "swarm": !matches!(self.session, Session::Body(_)),
             "node": node,
             "design": self.session.design(),
         });
-        live_page(command, title.to_owned(), self.session.view(), live)
+        live_page(self.command(), title.to_owned(), self.session.view(), live)
+    }
+
+    /// The command that begins with everything as it is set now.
+    fn command(&self) -> String {
+        let sets = self.session.sets();
+        let key = |set: &str| set.split('=').next().unwrap_or_default().to_owned();
+        // Of several changes of a key the last holds.
+        let holds = |(n, set): &(usize, &String)| !sets[n + 1..].iter().any(|later| key(later) == key(set));
+        let held = sets.iter().enumerate().filter(holds);
+        held.fold(self.command.clone(), |command, (_, set)| format!("{command} --set {}", quoted(set)))
+    }
+
+    /// Numbers that a page offers to change, by key.
+    fn keys(&self) -> Vec<(String, Value)> {
+        let written = numbers(&self.session.raw());
+        let is_new = |(key, _): &(String, Value)| !written.iter().any(|(known, _)| known == key);
+        let defaults: Vec<_> = self.session.defaults().into_iter().filter(is_new).collect();
+        written.into_iter().chain(defaults).collect()
     }
 
     fn monitor(&self) -> Option<&Monitor> {

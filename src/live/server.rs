@@ -72,15 +72,22 @@ impl Server {
         format!("http://127.0.0.1:{}/?token={}", self.port, self.token)
     }
 
-    /// Serves a session until `stop` is raised, and returns it; what viewers save is written in `folder`.
+    /// Serves a session until `stop` is raised, and returns it; what viewers save is written in `folder`. `command` is
+    /// that which began the session, as its page shows it.
     ///
     /// # Errors
     /// A listener that is gone, no threads, or a session that has panicked.
-    pub fn serve(self, session: Session, folder: PathBuf, stop: &AtomicBool) -> io::Result<Session> {
+    pub fn serve(
+        self,
+        session: Session,
+        command: String,
+        folder: PathBuf,
+        stop: &AtomicBool,
+    ) -> io::Result<Session> {
         self.listener.set_nonblocking(true)?;
         let board = Arc::new(Board::default());
         let (requests, asked) = sync_channel(MOST_REQUESTS);
-        let mut conductor = Conductor::new(session, Arc::clone(&board), folder);
+        let mut conductor = Conductor::new(session, Arc::clone(&board), command, folder);
         // No viewer is let in before there is a page.
         conductor.show();
         let shared = Arc::new(Shared {

@@ -5,7 +5,7 @@ use super::command::Command;
 use super::monitor::Monitor;
 use super::swarm::Swarm;
 use crate::export::report::view::View;
-use crate::scene::SceneError;
+use crate::scene::{Place, Problem, SceneError};
 
 /// A viewer, by the number of its connection.
 pub type Viewer = u64;
@@ -41,8 +41,16 @@ impl From<String> for Refused {
 }
 
 impl From<SceneError> for Refused {
+    /// A viewer that sets a key has not typed `--set`.
     fn from(error: SceneError) -> Self {
-        Self(error.to_string())
+        let words = |problem: &Problem| {
+            let text = problem.to_string();
+            let is_set = matches!(problem.place, Place::Override { .. });
+            let place = format!("{}: ", problem.place);
+            text.strip_prefix(&place).filter(|_| is_set).map_or_else(|| text.clone(), str::to_owned)
+        };
+        let lines: Vec<String> = error.problems().iter().map(words).collect();
+        Self(lines.join("\n"))
     }
 }
 
@@ -171,6 +179,22 @@ impl Session {
             Session::Body(body) => body.sets(),
             Session::Swarm(swarm) => swarm.sets(),
             Session::Monitor(_) => Vec::new(),
+        }
+    }
+
+    /// Numbers that act though the file leaves them out, by key.
+    pub fn defaults(&self) -> Vec<(String, serde_json::Value)> {
+        match self {
+            Session::Body(body) => body.defaults(),
+            Session::Swarm(_) | Session::Monitor(_) => Vec::new(),
+        }
+    }
+
+    /// Whether a side can be loaded by hand.
+    pub fn takes_loads(&self) -> bool {
+        match self {
+            Session::Body(body) => body.takes_loads(),
+            Session::Swarm(_) | Session::Monitor(_) => false,
         }
     }
 

@@ -102,7 +102,10 @@ impl Swarm {
     pub fn sets(&self) -> Vec<String> {
         let (noise, delay, loss) = self.history.now.channel;
         let values = [noise.to_string(), delay.to_string(), loss.to_string()];
-        let channel = CHANNEL_KEYS.iter().zip(values).map(|(key, value)| format!("{key}={value}"));
+        let raw = &self.history.now.file.raw.flight;
+        let is_changed = [noise != raw.noise, delay != raw.delay, loss != raw.loss];
+        let channel = CHANNEL_KEYS.iter().zip(values).zip(is_changed).filter(|(_, is_changed)| *is_changed);
+        let channel = channel.map(|((key, value), _)| format!("{key}={value}"));
         self.history.set().iter().cloned().chain(channel).collect()
     }
 

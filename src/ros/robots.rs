@@ -125,6 +125,19 @@ enum Poses {
     Array(Box<Publisher<PoseArray>>, Vec<geometry_msgs::Pose>),
 }
 
+impl Poses {
+    /// The topic of the first robot.
+    fn first_topic(&self) -> &str {
+        let first = match self {
+            Poses::Stamped(all) => all.first().map(Publisher::topic),
+            Poses::WithCovariance(all) => all.first().map(Publisher::topic),
+            Poses::Odometry(all) => all.first().map(Publisher::topic),
+            Poses::Array(topic, _) => Some(topic.topic()),
+        };
+        first.unwrap_or_default()
+    }
+}
+
 impl Link {
     /// # Errors
     /// An obstacle in the ROS arguments or the network.
@@ -223,7 +236,8 @@ impl RobotNodes {
         let (first, others) = (&self.link.nodes[0], self.link.nodes.len() - 1);
         let others = if others == 0 { String::new() } else { format!(" and {others} nodes like it") };
         let targets = self.link.targets.topic();
-        format!("{}{others} on {}; targets from {targets}", first.name(), first.options())
+        let poses = self.link.poses.first_topic();
+        format!("{}{others} on {}; poses to {poses}, targets from {targets}", first.name(), first.options())
     }
 
     /// Flies until `stop` is set.

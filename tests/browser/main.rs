@@ -103,6 +103,29 @@ fn assert_film_works(seen: &Value, colours: u64) {
     assert_eq!((&changed["quantity"], &changed["layers"]["points"]), (last, &json!(false)));
     assert_ne!(seen["nonsense"]["quantity"], *last);
     assert_saved(seen);
+    assert_marked(seen);
+}
+
+/// What holds of marks: a role has one shape, in the view and in its legend, and a broken bond is dashed.
+fn assert_marked(seen: &Value) {
+    // Whether the corner of a square and the tip of a diamond are covered.
+    for (role, covered) in seen["shapes"].as_object().expect("by role") {
+        let expected = match role.as_str() {
+            "leader" => [false, true],
+            "clamped" => [true, false],
+            _ => [false, false],
+        };
+        assert_eq!(*covered, json!(expected), "{role}");
+    }
+    for sign in seen["signs"].as_array().expect("listed") {
+        let expected = match sign[0].as_str().expect("a name") {
+            "leader" | "leaders" => "diamond",
+            "clamped" => "square",
+            "broken bond" | "broken bonds" => "crack",
+            _ => "dot",
+        };
+        assert_eq!(sign[1], expected, "{sign}");
+    }
 }
 
 /// What holds of saved pictures: they are as wide as the views, with title, clock and scale, in a drawing as letters.
@@ -179,6 +202,18 @@ fn a_torn_body_shows_its_strain_and_its_broken_bonds() {
     assert_same(&seen["hovered"][0], row, &["x", "y", "pe1", "strain_xx"]);
     let part = |name: &str| row[name].parse::<f64>().expect("a number");
     let (xx, yy, xy) = (part("strain_xx"), part("strain_yy"), part("strain_xy"));
+    let names = |of: &str| {
+        seen[of].as_array().expect("listed").iter().filter_map(|one| one[0].as_str()).collect::<Vec<_>>()
+    };
+    assert!(
+        names("signs").contains(&"broken bonds") && names("signs").contains(&"clamped"),
+        "{:?}",
+        names("signs")
+    );
+    assert!(seen["saved"]["svg"]["dashed"].as_u64() >= Some(1), "{}", seen["saved"]["svg"]);
+    // Buttons stand at that corner of the page, and not in a picture.
+    let texts = seen["saved"]["svg"]["texts"].as_array().expect("listed");
+    assert!(texts.contains(&json!("1000")), "{texts:?}");
     let largest = ((xx + yy) / 2.0).abs() + ((xx - yy) / 2.0).hypot(xy);
     let shown = number(&seen["hovered"][0], "strain");
     assert!(
@@ -217,6 +252,8 @@ fn a_comparison_shows_rule_and_truth_beside_each_other() {
     assert_eq!(seen["command"], "flockform compare beam-paper --truth-error 0.01");
     let compared = &seen["compare"];
     assert_eq!((&compared["clip"], &compared["isOver"]), (&json!("inset(0px 0px 0px 30%)"), &json!(true)));
+    assert_eq!(compared["line"], json!(["\"\"", "2px", 30]));
+    assert_eq!(seen["seams"], json!([0, 0]));
     let apart = &compared["apart"];
     assert!(apart["wrong"] == 0 && apart["right"].as_u64() > Some(100), "{apart}");
     let scale = compared["scale"].as_str().expect("text");
@@ -227,6 +264,28 @@ fn a_comparison_shows_rule_and_truth_beside_each_other() {
         let written: f64 = row[written].parse().expect("a number");
         assert_eq!(number(&seen["hovered"][0], shown).to_bits(), written.to_bits());
     }
+}
+
+#[test]
+#[ignore = "needs Chromium, Node, playwright-core and axe-core: see tests/browser/main.rs"]
+fn the_stress_of_a_report_reaches_what_the_program_prints() {
+    let report = Report::of(&["run", "plate-hole"]);
+    let seen = report.tour(&json!({}));
+    assert_sound(&seen);
+    let largest = report
+        .table("final.csv")
+        .iter()
+        .map(|row| row["von_mises"].parse().unwrap_or(0.0))
+        .fold(0.0, f64::max);
+    let shown = number(&seen["scale"], "end");
+    assert!(largest > 3.3 && (shown - largest).abs() < 1e-9 * largest, "{shown} of {largest}");
+    assert_eq!(seen["seams"], json!([0]));
+}
+
+#[test]
+#[ignore = "needs Chromium, Node, playwright-core and axe-core: see tests/browser/main.rs"]
+fn a_swarms_table_is_read_on_a_phone() {
+    assert_sound(&Report::of(&["swarm", "gap"]).tour(&json!({})));
 }
 
 #[test]

@@ -198,13 +198,17 @@ async function address(page, context) {
 
 // The second body laid over the first, and the first less the second: pictures, and the values that are coloured.
 async function compare(page) {
+  await page.selectOption("#quantity", "von_mises");
   const beside = await picture(page);
+  seen.seams = await seams(page);
   await page.selectOption("#compare", "slider");
   await page.locator("#edge").fill("30");
   await settled(page);
-  const [clip, boxes] = await page.evaluate(() => {
+  const [clip, boxes, line] = await page.evaluate(() => {
     const all = [...document.querySelectorAll(".canvas")];
-    return [getComputedStyle(all[1]).clipPath, all.map((box) => JSON.stringify(box.getBoundingClientRect()))];
+    const { content, left, width } = getComputedStyle(all[1], "::after");
+    const line = [content, width, Math.round((100 * parseFloat(left)) / all[1].clientWidth)];
+    return [getComputedStyle(all[1]).clipPath, all.map((box) => JSON.stringify(box.getBoundingClientRect())), line];
   });
   await page.selectOption("#compare", "difference");
   await page.selectOption("#quantity", "von_mises");
@@ -217,13 +221,82 @@ async function compare(page) {
     return { wrong: signs.filter((sign) => sign < 0).length, right: signs.filter((sign) => sign > 0).length };
   });
   const scale = await page.getAttribute("#scale", "aria-label");
-  seen.compare = { clip, isOver: boxes[0] === boxes[1], apart, scale, differs: beside !== (await picture(page)) };
+  seen.compare = { clip, line, isOver: boxes[0] === boxes[1], apart, scale, differs: beside !== (await picture(page)) };
   await page.selectOption("#compare", "side");
+}
+
+// The shape in which a particle of each role is drawn: whether the corner of a square and the tip of a diamond are covered.
+async function shapes(page) {
+  await page.click("#last");
+  await page.selectOption("#quantity", "role");
+  seen.shapes = await page.evaluate(async () => {
+    const { views: [view], state } = window.report;
+    const { body } = view;
+    const layer = (name) => document.getElementById(`layer-${name}`);
+    for (const name of ["bonds", "surface", "cracks", "ways"]) layer(name).checked = state.layers[name] = false;
+    layer("points").checked = true;
+    const found = {};
+    for (const [role, name] of body.animation.role_names.entries()) {
+      // Some of a comparison's have no place.
+      const particle = [...body.roles()].findIndex((one, i) => one === role && Number.isFinite(body.dx[i]));
+      if (particle < 0) continue;
+      const [x, y] = view.shown([body.X[particle] + state.factor * body.dx[particle], body.Y[particle] + state.factor * body.dy[particle]]);
+      state.camera = { x, y, scale: 60 / body.animation.spacing };
+      state.isFitted = false;
+      layer("points").dispatchEvent(new Event("change"));
+      await new Promise((go) => requestAnimationFrame(() => requestAnimationFrame(go)));
+      const picture = Object.assign(document.createElement("canvas"), { width: view.middle.width, height: view.middle.height });
+      const pen = picture.getContext("2d");
+      pen.drawImage(view.middle, 0, 0);
+      const [px, py] = view.at(particle);
+      const r = view.radii[particle];
+      const covered = (right, down) => pen.getImageData(px * view.ratio + right * r, py * view.ratio + down * r, 1, 1).data[3] > 128;
+      found[name] = [covered(0.78, 0.78), covered(1.1, 0)];
+    }
+    return found;
+  });
+  seen.signs = await page.$$eval("#scale .key", (keys) => keys.map((one) => [one.textContent.split(" ").slice(1).join(" "), one.firstChild.className]));
+  await page.focus(".canvas");
+  await page.keyboard.press("0");
+}
+
+// Pixels of a filled body through which paper is seen though the body is all around them.
+const seams = (page) =>
+  page.evaluate(() =>
+    window.report.views.map(({ middle: canvas }) => {
+      const { width, height } = canvas;
+      const copy = Object.assign(document.createElement("canvas"), { width, height }).getContext("2d");
+      copy.drawImage(canvas, 0, 0);
+      const { data } = copy.getImageData(0, 0, width, height);
+      const cover = (x, y) => data[4 * (y * width + x) + 3];
+      let count = 0;
+      for (let y = 4; y < height - 4; y++) {
+        for (let x = 4; x < width - 4; x++) {
+          const isSoft = cover(x, y) > 0 && cover(x, y) < 250;
+          if (isSoft && [[4, 0], [-4, 0], [0, 4], [0, -4]].every(([u, v]) => cover(x + u, y + v) > 250)) count++;
+        }
+      }
+      return count;
+    }),
+  );
+
+// The end of the scale of the stress, and how whole the body is that it fills.
+async function stress(page) {
+  await settled(page);
+  const ends = await page.evaluate(() => {
+    const range = window.report.state.ranges.get("von_mises");
+    return { end: String(range.high), largest: String(range.largest) };
+  });
+  seen.scale = ends;
+  seen.seams = await seams(page);
 }
 
 // What the picture buttons save.
 async function saved(page) {
   seen.saved = {};
+  await page.focus(".canvas");
+  await page.keyboard.press("0");
+  await settled(page);
   for (const [button, kind] of [["picture", "png"], ["drawing", "svg"]]) {
     const [download] = await Promise.all([page.waitForEvent("download"), page.click(`#${button}`)]);
     const path = join(profile, `saved.${kind}`);
@@ -236,6 +309,7 @@ async function saved(page) {
       const drawing = new DOMParser().parseFromString(text, "image/svg+xml");
       return [...drawing.querySelectorAll("parsererror, title, text")].map((one) => one.textContent);
     }, bytes.toString());
+    if (kind === "svg") seen.saved.svg.dashed = bytes.toString().split('stroke-dasharray="3 2"').length - 1;
   }
   seen.saved.shown = await page.evaluate(() => ["h1", "#now", "#scale > span"].map((of) => document.querySelector(of).textContent));
   seen.saved.views = await page.evaluate(() => window.report.views.map((one) => one.middle.width));
@@ -250,10 +324,12 @@ async function phone(page) {
     const width = document.documentElement.clientWidth;
     const cut = document.documentElement.scrollWidth > width ? [`the page is ${document.documentElement.scrollWidth} wide`] : [];
     for (const one of document.querySelectorAll("body *:not(script):not(style)")) {
-      if (one.closest(".table, pre, [hidden]") || !one.getClientRects().length) continue;
+      if (one.closest("pre, [hidden]") || !one.getClientRects().length) continue;
       const { left, right, width: own } = one.getBoundingClientRect();
       if (own && (right > width + 0.5 || left < -0.5)) cut.push(`${one.tagName} ${one.id} ${one.textContent.slice(0, 40)}`);
     }
+    for (const one of document.querySelectorAll(".table, th, td, .facts dd"))
+      if (one.scrollWidth > one.clientWidth + 1) cut.push(`${one.tagName} is ${one.scrollWidth} wide: ${one.textContent.slice(0, 40)}`);
     for (const text of document.querySelectorAll(".plots svg text")) {
       const [own, all] = [text.getBoundingClientRect(), text.ownerSVGElement.getBoundingClientRect()];
       if (own.left < all.left - 0.5 || own.right > all.right + 0.5 || own.bottom > all.bottom + 0.5) cut.push(text.textContent);
@@ -292,6 +368,7 @@ try {
   seen.charts = await page.evaluate(() => document.querySelectorAll("#plots figure").length);
   if (seen.views) {
     seen.painter = await page.evaluate(() => window.report.views[0].painter.constructor.name);
+    if ((await page.inputValue("#quantity")) === "von_mises") await stress(page);
     if (asked.small) seen.small = await small(page);
     await play(page);
     await zoom(page);
@@ -300,6 +377,7 @@ try {
     await colours(page);
     await wheel(page);
     if (asked.compare) await compare(page);
+    await shapes(page);
     await saved(page);
     await address(page, context);
   }

@@ -135,6 +135,11 @@ fn the_plan_of_a_swarm_states_margins_and_speeds() {
     assert_eq!(plan["speed"]["limit"], 0.7);
     // 1.5 m between places less two radii of 0.2 m and 0.3 m of clearance, in six standard deviations.
     assert!((plan["noise"]["largest"].as_f64().expect("kept apart") - 0.8 / 6.0).abs() < 1e-9, "{plan}");
+    // Followers that are in their places at once set no speed, and ideal robots none either.
+    assert_eq!(plan["speed"]["reachable"], 0.7);
+    let ideal = said(&["plan", "gap"], folder.path());
+    assert!(ideal.contains("  reachable speed   not limited: ideal robots"), "{ideal}");
+    assert!(json(&["plan", "gap", "--json"], folder.path())["speed"]["reachable"].is_null(), "{ideal}");
     for name in ["gap", "patch", "antipodal", "liar", "bridge"] {
         assert!(said(&["plan", name], folder.path()).contains("robots"), "{name}");
     }

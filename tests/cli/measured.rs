@@ -357,6 +357,20 @@ fn a_body_that_finds_no_rest_under_more_load_keeps_what_it_had() {
 }
 
 #[test]
+fn the_stress_figure_reaches_the_largest_stress_that_is_printed() {
+    let folder = temporary();
+    let output = flockform(&["run", "plate-hole", "--figures", "svg", "--out", "o"], folder.path());
+    let said = text(&output.stdout);
+    assert!(said.contains("largest von Mises stress 3.3357"), "{said}");
+    let picture = std::fs::read_to_string(folder.path().join("o/von_mises_0001.svg")).expect("drawn");
+    let labels = picture.split("</text>").filter_map(|part| part.rsplit('>').next()?.parse::<f64>().ok());
+    // Labels of the axes are whole numbers.
+    let bar = labels.filter(|value| value.fract() != 0.0 && *value < 10.0).fold(0.0, f64::max);
+    assert!(bar >= 3.3 && picture.contains("class=\"band\""), "contours up to {bar}");
+    assert!(picture.contains("solved for equilibrium") && !picture.contains("step 1"), "{picture:.600}");
+}
+
+#[test]
 fn figures_are_drawn_as_the_files_asked_for_and_the_report_is_named() {
     let drawn = |formats: &str| {
         let (folder, said) = run(&[BAR, PULL, SOLVED], &["--figures", formats], 0);
@@ -375,6 +389,8 @@ fn figures_are_drawn_as_the_files_asked_for_and_the_report_is_named() {
     // A strain of 1e-7 is drawn so that it is seen, and the heading says so.
     let picture = std::fs::read_to_string(folder.path().join("o/von_mises_1000.svg")).expect("drawn");
     assert!(picture.contains("displacements enlarged") && picture.contains("von Mises stress"), "{picture}");
+    // No step leads to an equilibrium.
+    assert!(picture.contains("solved for equilibrium") && !picture.contains("step 1000"), "{picture}");
     let folder = temporary();
     let output = flockform(&["run", "tension", "--steps", "2", "--figures", "none"], folder.path());
     let said = text(&output.stdout);

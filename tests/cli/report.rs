@@ -63,6 +63,9 @@ fn a_body_that_is_solved_for_is_shown_on_its_way_under_the_load() {
     let quantities = film["quantities"].as_array().expect("listed").iter();
     let keys: Vec<&str> = quantities.filter_map(|one| one["key"].as_str()).collect();
     assert_eq!(keys, ["pe1", "von_mises", "strain"]);
+    // What is measured is one fact of several lines.
+    assert_eq!(html.matches("<dt>Mechanics</dt>").count(), 1);
+    assert!(html.contains("class=\"wide\"><dt>Mechanics</dt><dd>reactions, force"), "with its lines");
 }
 
 #[test]

@@ -435,6 +435,16 @@ fn completions_and_help_have_what_they_promise() {
     for command in ["run", "list", "plan", "schema", "completions", "material"] {
         assert!(run_in(folder.path(), &[command, "--help"]).contains("Example"), "{command}");
     }
+    for command in
+        ["run", "compare", "trade", "sweep", "stability", "swarm", "live", "replay", "node", "robots"]
+            .into_iter()
+            .chain(["gallery", "list", "show", "new", "plan", "material", "install", "schema", "completions"])
+    {
+        let help = run_in(folder.path(), &[command, "--help"]);
+        let (_, examples) = help.split_once("\nExample").expect("there are some");
+        let count = examples.split("\n\n").next().map_or(0, |lines| lines.matches("\n  flockform ").count());
+        assert_eq!(examples.starts_with("s:"), count > 1, "{command}: {count} in {help}");
+    }
 }
 
 #[test]

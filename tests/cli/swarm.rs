@@ -33,6 +33,22 @@ fn a_swarm_is_flown_and_leaves_tables_and_figures() {
 }
 
 #[test]
+fn leaders_are_diamonds_on_the_map_and_in_its_legend() {
+    let folder = temporary();
+    let output = flockform(&["swarm", "square", "--out", "out", "--no-report"], folder.path());
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let map = read_to_string(folder.path().join("out/flight.svg")).expect("drawn");
+    let group = |role: &str| {
+        let (_, rest) = map.split_once(&format!("<g class=\"{role}\"")).expect("drawn");
+        rest.split_once("</g>").expect("closed").0.to_owned()
+    };
+    let marks = |role: &str| (group(role).matches("<path").count(), group(role).matches("<circle").count());
+    assert_eq!([marks("leader"), marks("follower")], [(4, 0), (0, 21)]);
+    let keys: Vec<&str> = map.split("class=\"key\"").skip(1).collect();
+    assert!(keys[0].trim_start_matches('>').trim_start().starts_with("<path"), "{}", keys[0]);
+}
+
+#[test]
 fn a_broken_bound_ends_with_exit_code_1_and_all_is_written() {
     let folder = temporary();
     let set = "flight.bounds={ final_error = 1e-30, clearance = 5.0 }";

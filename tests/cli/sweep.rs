@@ -179,6 +179,19 @@ fn what_cannot_be_swept_is_refused_and_leaves_nothing() {
 }
 
 #[test]
+fn the_last_line_says_how_the_runs_ended() {
+    let folder = temporary();
+    let of = |more: &[&str]| {
+        let sweep = ["sweep", "tension", "--vary", "update.damping=[0.5, 0.8]", "--figures", "none"];
+        said(&[&sweep[..], more].concat(), folder.path())
+    };
+    let words = of(&["--set", "stop.steps=3"]);
+    assert!(words.contains("tension: 2 runs, all ended at stop.steps, "), "{words}");
+    let words = of(&["--set", "stop.steps=100000", "--set", "stop.tolerance=1e-3"]);
+    assert!(words.contains("tension: 2 runs, all came to equilibrium, "), "{words}");
+}
+
+#[test]
 fn twenty_runs_of_tension_take_a_moment() {
     // About a tenth of a second each, unoptimised; a sweep that waits for something is far off.
     let patience = Duration::from_secs(20);

@@ -65,6 +65,18 @@ fn a_body_is_dragged_cut_undone_and_saved_while_another_viewer_looks_on() {
         "{}",
         seen["refused"]
     );
+    assert!(seen["refused"].as_str().is_some_and(|words| !words.starts_with("--set")), "{}", seen["refused"]);
+    assert_eq!(seen["alert"], json!(["alert", "note bad", "rgb(179, 38, 30)"]));
+    for key in ["update.damping", "rule.feedback.factor", "fracture.stretch"] {
+        assert!(seen["offered"][key].is_string(), "{key} in {}", seen["offered"]);
+    }
+    assert_eq!([&seen["offered"]["update.damping"], &seen["offered"]["fracture.stretch"]], ["1", ""]);
+    assert_eq!(seen["boxes"]["rule.feedback.factor"], "-0.05");
+    assert_eq!(seen["command"], "flockform live tension --set rule.feedback.factor=-0.05");
+    let hints = seen["hints"].as_object().expect("by tool");
+    assert_eq!(hints.keys().collect::<Vec<_>>(), ["drag", "cut", "look"], "there is no material to load");
+    assert!(hints["cut"].as_str().is_some_and(|words| words.contains("cut")), "{hints:?}");
+    assert_eq!(hints["look"], "Drag to move the view");
     assert_eq!(seen["stepped"], 1.0);
     let saved = Path::new(seen["saved"].as_str().expect("a path")).to_owned();
     assert_eq!(saved, folder.path().join("tension_live.toml"));
@@ -147,6 +159,7 @@ fn an_edge_is_loaded_by_hand_and_the_body_saved() {
     let served = Served::scene("beam-loaded", &["loads=[]".to_owned()], folder.path());
     let seen = tour(&served.address, &json!({ "name": "loaded", "load": 137 }));
     assert!(seen["loaded"][0].as_f64() > Some(0.3), "{}", seen["loaded"]);
+    assert_eq!(seen["hints"]["load"], "Drag a side of the body to load it");
     let saved = Path::new(seen["saved"].as_str().expect("a path")).to_owned();
     let scene = Scene::from_file(&saved, &[]).unwrap_or_else(|error| panic!("{error}"));
     let plan = Plan::new(&scene).unwrap_or_else(|error| panic!("{error}"));
@@ -165,6 +178,7 @@ fn a_flying_swarm_is_stopped_resumed_and_moved_from_its_node_s_page() {
     assert!(words.starts_with("affine_error: declared 0.0001 m"), "{words}");
     assert_eq!(seen["isThere"], true);
     assert_eq!(seen["isInView"], true, "the view follows the swarm");
+    assert!(seen["beyond"].as_f64() < Some(0.5), "half a robot is never out of the view: {}", seen["beyond"]);
 }
 
 #[test]

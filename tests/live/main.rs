@@ -7,6 +7,8 @@
 
 mod bodies;
 mod browser;
+#[cfg(feature = "cli")]
+mod commands;
 mod designs;
 #[path = "../common/folders.rs"]
 mod folders;

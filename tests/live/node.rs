@@ -72,6 +72,8 @@ fn decoded(frame: &[u8]) -> (f64, Vec<Vec<f32>>) {
 #[test]
 fn a_flying_swarm_is_shown_on_this_computer_alone_and_can_only_be_read() {
     let flown = Flown::begin(&["--set", "flight.bounds.clearance=5.0"]);
+    let begun = flown.viewer().status("its command", |_| true)["command"].clone();
+    assert_eq!(begun, "flockform node square --live --set flight.bounds.clearance=5.0");
     assert!(flown.host.starts_with("127.0.0.1:"));
     // An address of this computer that is not 127.0.0.1, as those of its networks are.
     assert!(TcpStream::connect(("127.0.0.2", flown.port())).is_err());

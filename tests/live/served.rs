@@ -35,9 +35,10 @@ impl Served {
     fn session(session: Session, folder: &Path) -> Self {
         let server = Server::open(None).expect("a free port");
         let (address, folder) = (server.address(), folder.to_owned());
+        let command = format!("flockform live {}", session.title().0);
         let stop = Arc::new(AtomicBool::new(false));
         let stopped = Arc::clone(&stop);
-        let serve = move || drop(server.serve(session, folder, &stopped).expect("serves"));
+        let serve = move || drop(server.serve(session, command, folder, &stopped).expect("serves"));
         Self { address, stop, thread: Some(std::thread::spawn(serve)) }
     }
 

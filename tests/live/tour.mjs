@@ -117,9 +117,30 @@ async function set(page) {
   await page.press("#live-key", "Enter");
   await page.waitForFunction(() => document.getElementById("live-words").textContent.includes("update.damping"));
   seen.refused = await page.textContent("#live-words");
+  seen.alert = await page.evaluate(() => {
+    const words = document.getElementById("live-words");
+    return [words.getAttribute("role"), words.className, getComputedStyle(words).color];
+  });
   await page.fill("#live-key", asked.key);
   await page.press("#live-key", "Enter");
   await page.waitForFunction((key) => window.report.live.session.status.sets.includes(key), asked.key);
+  seen.boxes = await boxes(page);
+  seen.command = await page.textContent("#command");
+}
+
+// Numbers that can be changed, by key.
+const boxes = (page) =>
+  page.$$eval("#live-numbers input", (inputs) => Object.fromEntries(inputs.map((input) => [input.dataset.key, input.value])));
+
+// Tools that are offered, and what the page says of each.
+async function tools(page) {
+  seen.hints = {};
+  for (const tool of await page.$$("input[name=tool]")) {
+    if (!(await tool.isVisible())) continue;
+    await tool.check();
+    seen.hints[await tool.getAttribute("value")] = await page.textContent("#hint");
+  }
+  await page.check("input[name=tool][value=drag]");
 }
 
 async function fault(page) {
@@ -242,6 +263,23 @@ async function design(page) {
   await save(page);
 }
 
+// Notes frame by frame how far robots are beyond the edge of the view, in their diameters.
+const watchEdges = (page) =>
+  page.evaluate(() => {
+    window.beyond = 0;
+    const look = () => {
+      const { views: [view], state: { camera, factor, turned } } = window.report;
+      const { low, high } = view.bounds([0], factor, turned);
+      const room = [view.width, view.height].map((length) => length / camera.scale / 2);
+      const own = 2 * Math.max(...view.body.animation.radii);
+      [camera.x, camera.y].forEach((middle, k) => {
+        window.beyond = Math.max(window.beyond, (middle - room[k] - low[k]) / own, (high[k] - middle - room[k]) / own);
+      });
+      requestAnimationFrame(look);
+    };
+    requestAnimationFrame(look);
+  });
+
 // The page of a node that takes commands: stopped, resumed, moved by a leader that is dragged.
 async function command(page) {
   const mode = (name) => page.waitForFunction((n) => document.getElementById("node-mode").textContent.startsWith(n), name);
@@ -269,6 +307,7 @@ async function command(page) {
   await page.mouse.move(x + 60, y - 30, { steps: 5 });
   await page.mouse.up();
   await said("under way for 3 s");
+  await watchEdges(page);
   await page.waitForFunction(() => window.report.live.session.status.alarms.length > 0);
   await shoot(page, `${asked.name}-moves`);
   seen.alarms = await page.$$eval("#live-alarms li", (items) => items.map((item) => item.textContent));
@@ -278,6 +317,7 @@ async function command(page) {
   const before = await posture();
   await later(page, (await clock(page)) + 0.5);
   seen.isThere = (await posture()) === before;
+  seen.beyond = await page.evaluate(() => window.beyond);
   seen.isInView = await page.evaluate(() => {
     const { views: [view], state: { camera, factor, turned } } = window.report;
     const { low, high } = view.bounds([0], factor, turned);
@@ -287,6 +327,8 @@ async function command(page) {
 }
 
 async function everything(page, other) {
+  seen.offered = await boxes(page);
+  await tools(page);
   await page.click("#play");
   await later(page, 0);
   if (asked.frames) {

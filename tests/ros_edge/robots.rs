@@ -25,6 +25,11 @@ fn robots_are_one_node_or_a_node_each() {
         probes.map(|(namespace, name)| peers.theirs.node(namespace, name).expect("a node")).into();
     for (layout, announced) in [(Layout::OneNode, [1, 0, 0]), (Layout::NodePerRobot, [0, 1, 1])] {
         let mut robots = RobotNodes::open(&square(&PATIENT), &arguments(&[]), layout).expect("robots");
+        let words = robots.reached_at();
+        assert!(
+            words.contains("poses to /robot_1/pose") && words.contains("targets from /robot_1/"),
+            "{words}"
+        );
         let what = format!("the nodes of {layout:?}");
         until(&what, || {
             robots.tick();

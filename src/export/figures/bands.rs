@@ -22,10 +22,18 @@ pub struct Bands {
 impl Bands {
     /// Bands for values from `low` to `high`; one band if they differ by no more than `noise`.
     pub fn around(low: f64, high: f64, noise: f64) -> Self {
-        const MOST: f64 = 14.0;
+        Self::of_most(14.0, low, high, noise)
+    }
+
+    /// Narrower ones, for a field with a peak far above the rest.
+    pub fn fine(low: f64, high: f64, noise: f64) -> Self {
+        Self::of_most(20.0, low, high, noise)
+    }
+
+    fn of_most(most: f64, low: f64, high: f64, noise: f64) -> Self {
         let value = if high.abs() <= noise || !high.is_finite() { 0.0 } else { high };
         let varies = high - low > noise.max(1e-9 * high.abs());
-        Self { levels: if varies { Ticks::around(low, high, MOST) } else { Ticks::single(value) } }
+        Self { levels: if varies { Ticks::around(low, high, most) } else { Ticks::single(value) } }
     }
 
     pub fn count(&self) -> usize {

@@ -73,9 +73,22 @@ pub struct Setting {
     has_broken_bonds: bool,
     /// Height of the heading, at least \[px\].
     heading: f64,
+    is_film: bool,
 }
 
 impl Setting {
+    /// For the configurations of a film.
+    pub fn of_film() -> Self {
+        Self { is_film: true, ..Self::default() }
+    }
+
+    fn axes(&self, spacing: f64) -> Axes {
+        match self.is_film {
+            true => page::around_in_film(self.bounds, spacing),
+            false => page::around(self.bounds, spacing),
+        }
+    }
+
     /// Makes room for this configuration, and for these values of its particles, shape \[count\].
     pub fn include(&mut self, snapshot: &Snapshot, values: Option<&[f64]>) {
         let within = page::bounds(&snapshot.positions, 0..snapshot.positions.len());
@@ -105,7 +118,7 @@ impl Setting {
 
     /// Makes room for this note above the plot.
     pub fn reserve(&mut self, subject: &Subject<'_>, note: String, bands: Option<&Bands>) {
-        let axes = page::around(self.bounds, subject.body.lattice.spacing());
+        let axes = self.axes(subject.body.lattice.spacing());
         let width = page::width_of(&axes, beside(bands));
         self.heading = self.heading(subject, note, bands.is_some()).height(width);
     }
@@ -153,7 +166,7 @@ pub fn configuration_in(
     let spacing = subject.body.lattice.spacing();
     let style = Style::of(subject, field.is_some());
     let heading = setting.heading(subject, note, field.is_some());
-    let axes = page::around(setting.bounds, spacing);
+    let axes = setting.axes(spacing);
     let beside = beside(field.map(|field| field.bands));
     page::with_body(&heading, axes, subject.unit, beside, |svg, axes| {
         match (style, field) {

@@ -70,15 +70,20 @@ pub(super) fn draw_contours(
         face.iter().for_each(|&corner| is_alone[corner as usize] = false);
         patches.push(face.iter().map(sample).collect());
     }
-    // Every band is laid over all of what is at least as high, so that no seam shows between bands.
-    for band in 0..bands.count() {
-        let path = superlevel(&patches, (band > 0).then(|| bands.level(band)));
-        svg.path(&path, format_args!("class=\"band\" fill=\"{}\"", bands.colour(band)));
-    }
+    draw_bands(svg, &patches, bands);
     let radius = dot_radius(axes, subject.body.lattice.spacing());
     for i in (0..is_alone.len()).filter(|&i| is_alone[i]) {
         let attributes = format!("fill=\"{}\"", bands.colour(bands.of(values[i])));
         svg.group(attributes, |svg| svg.circle(axes.place(snapshot.positions.get(i)), radius));
+    }
+}
+
+/// Filled contours over patches, each with the field at its corners.
+pub(super) fn draw_bands(svg: &mut Svg, patches: &[Vec<Sample>], bands: &Bands) {
+    // Every band is laid over all of what is at least as high, so that no seam shows between bands.
+    for band in 0..bands.count() {
+        let path = superlevel(patches, (band > 0).then(|| bands.level(band)));
+        svg.path(&path, format_args!("class=\"band\" fill=\"{}\"", bands.colour(band)));
     }
 }
 

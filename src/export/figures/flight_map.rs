@@ -3,7 +3,8 @@
 use super::axes::Axes;
 use super::bands::Field;
 use super::colour;
-use super::heading::{Heading, Key, Mark};
+use super::configuration::mark_of;
+use super::heading::{Heading, Key, Mark, draw_mark};
 use super::page;
 use super::svg::{Path, Svg};
 use crate::flock::role::Role;
@@ -51,12 +52,27 @@ pub struct Moment<'a> {
 
 impl<'a> Map<'a> {
     pub fn new(swarm: &'a Swarm, record: &'a Record, report: &'a FlightReport) -> Self {
+        Self::within(swarm, record, report, page::around)
+    }
+
+    /// The map of a film.
+    pub fn of_film(swarm: &'a Swarm, record: &'a Record, report: &'a FlightReport) -> Self {
+        Self::within(swarm, record, report, page::around_in_film)
+    }
+
+    /// In the window that `around` makes of the bounds of everything.
+    fn within(
+        swarm: &'a Swarm,
+        record: &'a Record,
+        report: &'a FlightReport,
+        around: impl FnOnce(Option<[[f64; 2]; 2]>, f64) -> Axes,
+    ) -> Self {
         let obstacles = (0..swarm.raw.obstacles.len()).flat_map(|k| {
             let [first, last] = outlines(swarm, k, f64::INFINITY);
             first.into_iter().chain(last)
         });
         let shown: Vectors = record.tracks.iter().flat_map(|places| places.iter()).chain(obstacles).collect();
-        let axes = page::window(&shown, 0..shown.len(), 3.0 * swarm.raw.radius);
+        let axes = around(page::bounds(&shown, 0..shown.len()), 3.0 * swarm.raw.radius);
         Self { swarm, record, report, axes }
     }
 
@@ -94,7 +110,7 @@ impl<'a> Map<'a> {
         let key = |name: &'static str, colour, mark| Key { name: name.into(), colour, mark };
         let [leader, follower] = [Role::Leader, Role::Follower].map(colour::of_role);
         let mut legend = vec![
-            key("leader", leader, if is_field { Mark::Ring } else { Mark::Dot }),
+            key("leader", leader, mark_of(Role::Leader)),
             key("follower", follower, Mark::Dot),
             key("start", START, Mark::Ring),
         ];
@@ -128,18 +144,19 @@ impl<'a> Map<'a> {
 
     fn draw_robots(&self, svg: &mut Svg, axes: &Axes, moment: &Moment<'_>, radius: f64) {
         for (led, role) in [(false, Role::Follower), (true, Role::Leader)] {
-            let own = colour::of_role(role);
+            let (own, mark) = (colour::of_role(role), mark_of(role));
             svg.group(format_args!("class=\"{}\" fill=\"{own}\"", role.name()), |svg| {
                 for m in (0..moment.places.len()).filter(|&m| self.leads(m) == led) {
                     let at = axes.place(moment.places.get(m));
                     match &moment.field {
-                        None => svg.circle(at, radius),
+                        None => draw_mark(svg, mark, at, radius),
                         Some(field) => {
                             let rim = if led { own } else { "none" };
                             let width = 0.35 * radius;
                             let rim = format!("stroke=\"{rim}\" stroke-width=\"{width:.2}\"");
                             let colour = field.colour(field.band(m));
-                            svg.group(format_args!("fill=\"{colour}\" {rim}"), |svg| svg.circle(at, radius));
+                            let attributes = format!("fill=\"{colour}\" {rim}");
+                            svg.group(attributes, |svg| draw_mark(svg, mark, at, radius));
                         }
                     }
                 }

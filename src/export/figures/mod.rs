@@ -59,6 +59,8 @@ pub struct Subject<'a> {
     pub cells: Option<&'a Cells>,
     /// The unit of the run's clock: `step` or `increment`.
     pub counts: &'static str,
+    /// Whether the body was solved for its equilibrium: no steps lead there.
+    pub is_solved_at_once: bool,
 }
 
 impl<'a> Subject<'a> {
@@ -71,6 +73,7 @@ impl<'a> Subject<'a> {
             neighbours: engine.lasting_neighbours(),
             cells: engine.cells(),
             counts: scene.counts(),
+            is_solved_at_once: scene.is_solved_at_once(),
         }
     }
 }

@@ -50,14 +50,34 @@ pub fn bounds(positions: &Vectors, drawn: impl Iterator<Item = usize>) -> Option
 
 /// The window that shows what lies within these bounds.
 pub fn around(bounds: Option<[[f64; 2]; 2]>, spacing: f64) -> Axes {
+    let ([low, high], margin) = margins(bounds, spacing);
+    Axes::equal(low, high, margin)
+}
+
+/// The same in a film, which is shown whole: a sheet that is higher than a screen would be made small, and its letters
+/// with it.
+pub fn around_in_film(bounds: Option<[[f64; 2]; 2]>, spacing: f64) -> Axes {
+    /// Room for the plot \[px\].
+    const ROOM: [f64; 2] = [680.0, 560.0];
+    let ([low, high], margin) = margins(bounds, spacing);
+    Axes::fitted(low, high, margin, ROOM)
+}
+
+/// The bounds, of nothing those of a unit, and the room around them.
+fn margins(bounds: Option<[[f64; 2]; 2]>, spacing: f64) -> ([[f64; 2]; 2], f64) {
     let [low, high] = bounds.unwrap_or([[0.0; 2], [1.0; 2]]);
     let longest = (high[0] - low[0]).max(high[1] - low[1]);
-    Axes::equal(low, high, (0.02 * longest).max(0.6 * spacing))
+    ([low, high], (0.02 * longest).max(0.6 * spacing))
 }
 
 /// `step 20`, and how many bonds are broken.
 pub fn note(subject: &Subject<'_>, snapshot: &Snapshot) -> String {
-    note_at(&format!("{} {}", subject.counts, snapshot.step), snapshot.broken.len())
+    // The step of an equilibrium says no more than which leaders hold there.
+    let clock = match subject.is_solved_at_once {
+        true => "solved for equilibrium".to_owned(),
+        false => format!("{} {}", subject.counts, snapshot.step),
+    };
+    note_at(&clock, snapshot.broken.len())
 }
 
 /// The time in words, and how many bonds are broken.

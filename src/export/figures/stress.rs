@@ -1,13 +1,15 @@
-//! The von Mises stress of a body, cell by cell, where its cells are.
+//! The von Mises stress of a body: cell by cell, or as contours where it is known along the edges.
 
 use super::Subject;
 use super::axes::Axes;
-use super::bands::Bands;
+use super::bands::{Bands, Sample};
 use super::comparison::{enlargement, scale_note};
+use super::energy::draw_bands;
 use super::heading::Heading;
 use super::page;
 use super::raster::Raster;
 use super::svg::{Path, Svg};
+use crate::continuum::mechanics::Stresses;
 use crate::continuum::record::Snapshot;
 use crate::flock::vectors::Vectors;
 use crate::material::cells::Cells;
@@ -20,11 +22,12 @@ const NOISE: f64 = 1e-9;
 
 /// Every whole cell in the colour of its von Mises stress, in its place or, where displacements could not be seen or
 /// the body would be lost beside them, in the place of a displacement so many times as large, which the heading says.
+/// Along a fitted outline stress is known at the particles: there contours reach the peak at the edge, which no cell has.
 pub fn stress(
     subject: &Subject<'_>,
     snapshot: &Snapshot,
     cells: &Cells,
-    stresses: &[StressState],
+    stresses: &Stresses,
     unit: &str,
 ) -> String {
     let reference = &subject.body.reference;
@@ -37,16 +40,19 @@ pub fn stress(
     let places: Vectors = reference.iter().zip(displacement.iter()).map(place).collect();
     let shown: Vec<(&[u32], f64)> = cells
         .iter()
-        .zip(stresses.iter().map(|stress| stress.von_mises))
+        .zip(stresses.cells.iter().map(|stress| stress.von_mises))
         .filter(|(cell, value)| {
             value.is_finite() && cell.iter().all(|&i| places.get(i as usize).iter().all(|v| v.is_finite()))
         })
         .collect();
-    let range = shown.iter().fold([f64::INFINITY, 0.0], |[low, high], (_, v)| [low.min(*v), v.max(high)]);
-    let bands = Bands::around(range[0].min(range[1]), range[1], NOISE * range[1]);
+    let corners = at_corners(cells, stresses).filter(|_| shown.len() <= MOST_CELLS);
+    let values = shown.iter().map(|(_, value)| *value).chain(corners.iter().flatten().copied().flatten());
+    let range = values.fold([f64::INFINITY, 0.0], |[low, high], v| [f64::min(low, v), f64::max(v, high)]);
+    let bands = Bands::fine(range[0].min(range[1]), range[1], NOISE * range[1]);
     let axes = page::window(&places, drawn(), subject.body.lattice.spacing());
+    let place = if corners.is_some() { "" } else { " in the cells" };
     let mut note =
-        format!("von Mises stress in the cells, {}{}", page::note(subject, snapshot), scale_note(factor));
+        format!("von Mises stress{place}, {}{}", page::note(subject, snapshot), scale_note(factor));
     let is_raster = shown.len() > MOST_CELLS;
     if is_raster {
         note += &format!("; {} cells drawn as squares of their largest value", shown.len());
@@ -55,12 +61,40 @@ pub fn stress(
     page::with_body(&heading, axes, subject.unit, bands.bar_room(), |svg, axes| {
         if is_raster {
             draw_raster(svg, axes, &places, &shown, &bands, subject.body.lattice.spacing());
+        } else if let Some(values) = &corners {
+            draw_bands(svg, &patches(axes, &places, &shown, values), &bands);
         } else {
             draw_cells(svg, axes, &places, &shown, &bands);
         }
         let top_right = [axes.corner[0] + axes.size[0], axes.corner[1]];
         bands.draw_bar(svg, top_right, axes.size[1], "von Mises stress", unit);
     })
+}
+
+/// The stress at every particle, where it is recovered along the edges and one material makes it continuous; shape
+/// \[count\].
+fn at_corners(cells: &Cells, stresses: &Stresses) -> Option<Vec<Option<f64>>> {
+    let is_known = !stresses.recovered.is_empty() && cells.inclusions.is_empty();
+    let of = |stress: &Option<_>| stress.as_ref().map(von_mises).filter(|value| value.is_finite());
+    is_known.then(|| stresses.particles.iter().map(of).collect())
+}
+
+fn von_mises(stress: &StressState) -> f64 {
+    stress.von_mises
+}
+
+/// The cells with the stress at their corners.
+fn patches(
+    axes: &Axes,
+    places: &Vectors,
+    shown: &[(&[u32], f64)],
+    values: &[Option<f64>],
+) -> Vec<Vec<Sample>> {
+    let patch = |(cell, own): &(&[u32], f64)| {
+        let sample = |&i: &u32| (axes.place(places.get(i as usize)), values[i as usize].unwrap_or(*own));
+        cell.iter().map(sample).collect()
+    };
+    shown.iter().map(patch).collect()
 }
 
 fn draw_cells(svg: &mut Svg, axes: &Axes, places: &Vectors, shown: &[(&[u32], f64)], bands: &Bands) {

@@ -6,7 +6,7 @@ use super::chart::{Axis, Chart, Series, Style, draw_below_each_other};
 use super::colour::{SERIES, viridis};
 use super::heading::Heading;
 use super::page;
-use super::svg::{Anchor, INK, Path, Svg};
+use super::svg::{Anchor, INK, Path, Svg, text_width};
 use super::ticks::Ticks;
 use crate::study::design::{Factor, Level};
 
@@ -256,7 +256,12 @@ fn parallel(swept: &Swept<'_>, output: &Column) -> String {
         for &value in &ticks.values {
             let at = [x(k), y(column, value)];
             svg.group(format_args!("stroke=\"{INK}\""), |svg| svg.line([at[0] - 4.0, at[1]], at));
-            svg.text([at[0] - 7.0, at[1]], Anchor::End, TEXT, INK, &ticks.label(value));
+            // Lines end under the label, which would not be read on them.
+            let label = ticks.label(value);
+            let (width, height) = (text_width(&label, TEXT) + 4.0, TEXT + 2.0);
+            let corner = [at[0] - 9.0 - text_width(&label, TEXT), at[1] - 0.5 * height];
+            svg.rect(corner, [width, height], "fill=\"#ffffff\" class=\"paper\"");
+            svg.text([at[0] - 7.0, at[1]], Anchor::End, TEXT, INK, &label);
         }
         // Long names in two rows do not meet.
         let below = top + HEIGHT + if k % 2 == 0 { 16.0 } else { 34.0 };
@@ -310,6 +315,10 @@ mod tests {
         let svg = draw(&swept(keys, &[1.0, 2.0, 3.0])).expect("drawn");
         assert_eq!(svg.matches("<path").count(), 3);
         assert!(svg.contains("frame: 1 lagged, 2 mirror") && !svg.contains("NaN"), "{svg}");
+        // Under every number is paper that ends the lines.
+        let labels = svg.matches("text-anchor=\"end\"").count();
+        assert!(labels > 8 && svg.matches("class=\"paper\"").count() == labels, "{svg}");
+        assert!(svg.rfind("<path") < svg.find("class=\"paper\""), "over the lines");
     }
 
     #[test]

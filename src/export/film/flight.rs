@@ -1,6 +1,6 @@
 //! The film of a flight: its map at one time after another, with the ways flown so far.
 
-use super::{Film, FilmColour, FilmError, Scale, chosen};
+use super::{Film, FilmColour, Scale, chosen};
 use crate::export::figures::bands::Bands;
 use crate::export::figures::flight_map::{Map, Moment};
 use crate::export::report::FlightRecorder;
@@ -10,18 +10,6 @@ use crate::swarm::flight::{FlightReport, Record};
 
 /// Differences below this are rounding \[m\], \[1\]; of squares its square.
 const NOISE: f64 = 1e-9;
-
-/// Refuses a colour that robots do not have.
-///
-/// # Errors
-/// Stress and moves, which bodies have.
-pub fn require_colour(colour: FilmColour) -> Result<(), FilmError> {
-    if !matches!(colour, FilmColour::VonMises | FilmColour::Pe2) {
-        return Ok(());
-    }
-    let (colour, choices) = (colour.name(), "role, displacement, pe1, strain, clearance");
-    Err(FilmError::Colour { colour, reason: "robots have none", of: "of a swarm", choices })
-}
 
 /// The film of a flight whose recorder has seen all of it.
 pub fn film<'a>(
@@ -55,7 +43,7 @@ pub fn film<'a>(
         let moved = tracks[0].values().into_iter().zip(tracks[1].values());
         recorder.start().iter().zip(moved).map(|([x, y], (dx, dy))| [x + dx, y + dy]).collect()
     };
-    let map = Map::new(swarm, record, report);
+    let map = Map::of_film(swarm, record, report);
     let count = frames.len();
     let draw = move |n: usize| {
         let (frame, values) = (frames[n], values(frames[n]));

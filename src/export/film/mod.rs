@@ -54,9 +54,13 @@ pub enum FilmColour {
 }
 
 impl FilmColour {
-    /// All of them.
-    pub const ALL: [Self; 7] =
-        [Self::Role, Self::Displacement, Self::Pe1, Self::Pe2, Self::Strain, Self::VonMises, Self::Clearance];
+    /// Those of particles.
+    pub const OF_BODIES: [Self; 6] =
+        [Self::Role, Self::Displacement, Self::Pe1, Self::Pe2, Self::Strain, Self::VonMises];
+
+    /// Those of robots.
+    pub const OF_SWARMS: [Self; 5] =
+        [Self::Role, Self::Displacement, Self::Pe1, Self::Strain, Self::Clearance];
 
     /// The name on the command line.
     pub fn name(self) -> &'static str {

@@ -46,7 +46,7 @@ pub fn film<'a>(
 ) -> Film<'a> {
     let frames = chosen(recorder.frames().len());
     let shown = Shown { scene, engine: &outcome.engine, recorder, colour };
-    let mut setting = Setting::default();
+    let mut setting = Setting::of_film();
     let subject = Subject::of(scene, &outcome.engine);
     for &frame in &frames {
         let (snapshot, values) = (shown.snapshot(frame), shown.values(frame));

@@ -22,9 +22,10 @@ pub const FILE: &str = "report.html";
 const PAGE: &str = include_str!("web/page.html");
 pub(super) const STYLE: &str = include_str!("web/page.css");
 /// In the order in which they build on each other.
-const SCRIPTS: [&str; 18] = [
+const SCRIPTS: [&str; 19] = [
     include_str!("web/unpack.js"),
     include_str!("web/colour.js"),
+    include_str!("web/marks.js"),
     include_str!("web/body.js"),
     include_str!("web/shown.js"),
     include_str!("web/painter.js"),
@@ -155,7 +156,8 @@ impl Page {
 
     fn facts_html(&self) -> String {
         let fact = |(name, value): &(String, String)| {
-            format!("<div><dt>{}</dt><dd>{}</dd></div>", escaped(name), escaped(value))
+            let class = if value.contains('\n') { " class=\"wide\"" } else { "" };
+            format!("<div{class}><dt>{}</dt><dd>{}</dd></div>", escaped(name), escaped(value))
         };
         self.facts.iter().map(fact).collect()
     }
@@ -204,14 +206,22 @@ pub(super) fn escaped(text: &str) -> String {
 }
 
 fn table_html(table: &Table) -> String {
-    let cells = |tag: &str, cells: &[String]| -> String {
-        cells.iter().map(|cell| format!("<{tag}>{}</{}>", escaped(cell), &tag[..2])).collect()
+    let heads: String =
+        table.head.iter().map(|name| format!("<th scope=\"col\">{}</th>", escaped(name))).collect();
+    // On a narrow screen every cell stands in a line of its own, behind the name of its column.
+    let cell = |(name, text): (&String, &String)| {
+        let class = if text.parse::<f64>().is_ok() { " class=\"number\"" } else { "" };
+        format!("<td data-name=\"{}\"{class}>{}</td>", escaped(name), escaped(text))
     };
-    let rows: String = table.rows.iter().map(|row| format!("<tr>{}</tr>\n", cells("td", row))).collect();
+    let row = |row: &Vec<String>| -> String {
+        let cells: String = table.head.iter().zip(row).map(cell).collect();
+        format!("<tr>{cells}</tr>\n")
+    };
+    let rows: String = table.rows.iter().map(row).collect();
     format!(
         "<div class=\"card table\" tabindex=\"0\"><table><caption>{}</caption><thead><tr>{}</tr></thead><tbody>{rows}</tbody></table></div>",
         escaped(&table.caption),
-        cells("th scope=\"col\"", &table.head),
+        heads,
     )
 }
 

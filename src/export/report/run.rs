@@ -513,9 +513,9 @@ fn facts(scene: &Scene, outcome: &Outcome, summary: &Summary) -> Vec<(String, St
     }
     if let Some(measured) = &summary.mechanics {
         // As the program prints it at its end.
-        for line in measured.to_string().lines() {
-            fact("Mechanics", line.trim().to_owned());
-        }
+        let lines: Vec<String> =
+            measured.to_string().lines().map(|line| line.trim_end().to_owned()).collect();
+        fact("Mechanics", lines.join("\n"));
     }
     for caution in &summary.cautions {
         fact("Caution", caution.clone());

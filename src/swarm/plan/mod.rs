@@ -32,6 +32,9 @@ use period_map::PeriodMap;
 /// Sweeps made to find the spectral radius.
 const MOST_SWEEPS: usize = 5000;
 
+/// A lag below this sets no speed: what it allows is far above that of any robot \[s\].
+const LEAST_LAG: f64 = 1e-3;
+
 /// Standard deviations of noise that each robot keeps farther away from everything.
 const DEVIATIONS_KEPT: f64 = 3.0;
 
@@ -118,7 +121,8 @@ pub struct SpeedMargin {
     /// formation \[s\].
     pub lag_s: Option<f64>,
     /// Speed of the leaders up to which followers keep within `flight.bounds.affine_error` of their places, the speed
-    /// limit at most \[m/s\]; absent without such a bound or a limit.
+    /// limit at most \[m/s\]; absent without such a bound or a limit, and where followers lag by nothing that could be
+    /// measured.
     pub reachable: Option<f64>,
     /// The demands of each manoeuvre.
     pub manoeuvres: Vec<ManoeuvreSpeed>,
@@ -244,7 +248,8 @@ fn speed(swarm: &Swarm, formation: &Formation, map: Option<&PeriodMap>, delay: f
     let limit = swarm.raw.limits.speed;
     let lag_s =
         map.and_then(PeriodMap::lag).map(|periods| periods * (delay + 1.0) * swarm.raw.control.period);
-    let by_lag = swarm.raw.flight.bounds.affine_error.zip(lag_s).map(|(error, lag)| error / lag);
+    let felt = lag_s.filter(|lag| *lag >= LEAST_LAG);
+    let by_lag = swarm.raw.flight.bounds.affine_error.zip(felt).map(|(error, lag)| error / lag);
     let reachable = [limit, by_lag].into_iter().flatten().reduce(f64::min).filter(|speed| speed.is_finite());
     let manoeuvres = swarm.manoeuvres.iter().filter_map(|one| needed(formation, &one.name)).collect();
     SpeedMargin { limit, lag_s, reachable, manoeuvres }

@@ -82,8 +82,13 @@ impl fmt::Display for SwarmPlan {
         if let Some(lag) = lag_s {
             line("lag", format!("followers are up to {lag:.3} s behind steady leaders"))?;
         }
-        if let Some(speed) = reachable {
-            line("reachable speed", format!("{speed:.4} m/s"))?;
+        match (reachable, lag_s) {
+            (Some(speed), _) => line("reachable speed", format!("{speed:.4} m/s"))?,
+            (None, Some(lag)) if *lag < NOTHING => line(
+                "reachable speed",
+                format!("not limited: {model} robots, with the rule, keep up at any"),
+            )?,
+            (None, _) => {}
         }
         for ManoeuvreSpeed { name, needed } in manoeuvres {
             line("manoeuvre", format!("`{name}` moves a place at up to {needed:.3} m/s"))?;

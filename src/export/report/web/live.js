@@ -4,7 +4,7 @@ import { follow } from "./camera.js";
 import { words } from "./colour.js";
 import { breakBonds, kindOf, LiveFrames } from "./live_frames.js";
 import { isDesigning, keepHands, listenToDesign, showDesign, takeDesign, takeUpHands } from "./live_design.js";
-import { drawAlarms, drawDashes, drawTargets, takeFormation, takeTool } from "./live_tools.js";
+import { drawAlarms, drawDashes, drawTargets, takeFormation, takeTool, toolName } from "./live_tools.js";
 import { drawNow, started } from "./page.js";
 import { bodies, data, element, shown, state } from "./shown.js";
 
@@ -59,8 +59,14 @@ class LivePlayer {
   seek() {}
 }
 
-function say(text) {
-  element("live-words").textContent = text;
+// A refusal looks like one, and is read out at once.
+function say(text, isRefusal = false) {
+  const words = element("live-words");
+  // What a session goes on saying is read out once.
+  if (words.textContent === text) return;
+  words.className = isRefusal ? "note bad" : "note";
+  words.setAttribute("role", isRefusal ? "alert" : "status");
+  words.textContent = text;
 }
 
 function connect() {
@@ -77,9 +83,9 @@ function connect() {
     document.body.dataset.live = "closed";
     // A node's next process serves the same address.
     if (data.live.node) {
-      say("No connection to the node: what is shown is old. Trying again.");
+      say("No connection to the node: what is shown is old. Trying again.", true);
       setTimeout(connect, AGAIN_AFTER);
-    } else say("The session is over, or has no room for another viewer.");
+    } else say("The session is over, or has no room for another viewer.", true);
   };
   session.socket = socket;
 }
@@ -87,7 +93,7 @@ function connect() {
 function hear(event) {
   // A number that was refused is still in its field.
   if (event.event === "refused") session.sets = null;
-  if (event.event === "refused" || event.event === "done") say(event.words);
+  if (event.event === "refused" || event.event === "done") say(event.words, event.event === "refused");
   else if (event.event === "saved") {
     say(`Saved as ${event.path}. Replay: ${event.command}`);
     document.body.dataset.saved = event.path;
@@ -110,7 +116,9 @@ function takeStatus(status) {
   }
   element("speed").value = String(status.speed);
   element("live-undo").disabled = status.undo === 0;
-  if (status.stopped) say(status.stopped);
+  if (status.stopped) say(status.stopped, true);
+  if (element("command").textContent !== status.command) element("command").textContent = status.command;
+  if (element("tool-load").hidden === status.loads) offerLoads(status.loads);
   if (status.node) takeNode(status.node);
   // The page knows the present alone: where they are now is where they ever were.
   status.obstacles.forEach((by, k) => (bodies[0].animation.outlines[k].moves = [[-Infinity, ...by]]));
@@ -129,15 +137,55 @@ function takeStatus(status) {
 
 // Numbers that were changed, here or by another viewer.
 function takeSets(sets) {
-  const values = new Map(data.live.keys.map(([key, value]) => [key, String(value)]));
+  const values = new Map(data.live.keys.map(([key, value]) => [key, value === null ? "" : String(value)]));
   for (const text of sets) {
     const at = text.indexOf("=");
-    values.set(text.slice(0, at), text.slice(at + 1));
+    values.set(text.slice(0, at).trim(), text.slice(at + 1).trim());
   }
-  for (const input of document.querySelectorAll("#live-numbers input")) {
-    const value = values.get(input.dataset.key);
-    if (input !== document.activeElement && input.value !== value) input.value = value;
+  for (const [key, value] of values) {
+    const isNumber = value !== "" && Number.isFinite(Number(value));
+    const input = numberOf(key) ?? (isNumber ? addNumber(key, value) : null);
+    if (input && input !== document.activeElement && input.value !== value) input.value = value;
   }
+  // What was undone and is no number of the file is none to change.
+  for (const input of document.querySelectorAll("#live-numbers input")) if (!values.has(input.dataset.key)) input.parentElement.remove();
+}
+
+function numberOf(key) {
+  return [...document.querySelectorAll("#live-numbers input")].find((input) => input.dataset.key === key);
+}
+
+// A box for a number; an empty one stands for none.
+function addNumber(key, value) {
+  const label = document.createElement("label");
+  const input = Object.assign(document.createElement("input"), { type: "number", step: "any", value: value ?? "", placeholder: "none" });
+  input.dataset.key = key;
+  input.addEventListener("change", () => input.value !== "" && set(key, input.value));
+  label.append(`${key} `, input);
+  element("live-numbers").append(label);
+  return input;
+}
+
+// A body without a material has no stress that a load could be in balance with.
+function offerLoads(isOffered) {
+  element("tool-load").hidden = !isOffered;
+  if (isOffered || toolName() !== "load") return;
+  document.querySelector("input[name=tool][value=drag]").checked = true;
+  showHint();
+}
+
+// What dragging does, by the tool.
+function showHint() {
+  const dragged = data.live.swarm ? "a leader or an obstacle to move it" : "a particle to lead it";
+  const hints = {
+    drag: `Drag ${dragged}, elsewhere to move the view`,
+    cut: "Drag across bonds to cut them",
+    load: "Drag a side of the body to load it",
+    place: "Click for another robot, drag one to another place",
+    link: "Drag from robot to robot to link them, or to part them",
+    look: "Drag to move the view",
+  };
+  element("hint").textContent = hints[toolName()];
 }
 
 // What a node says of itself: empty fields of the form stand for the posture that the leaders have now.
@@ -221,8 +269,10 @@ function drawLatest() {
   if (begun - session.rangeAt > RANGE_EVERY) {
     state.ranges.clear();
     session.rangeAt = begun;
-    follow();
+    if (!data.live.swarm) follow();
   }
+  // Few robots move fast: one would be half out before the next look.
+  if (data.live.swarm) follow();
   drawNow();
   const drawing = performance.now() - begun;
   ask({ do: "drawn", ms: Math.min(drawing, 1e6) });
@@ -255,16 +305,8 @@ function set(key, value) {
 }
 
 function showNumbers() {
-  const inputs = data.live.keys.map(([key, value]) => {
-    const label = document.createElement("label");
-    const input = Object.assign(document.createElement("input"), { type: "number", step: "any", value });
-    input.dataset.key = key;
-    input.addEventListener("change", () => set(key, input.value));
-    label.append(`${key} `, input);
-    return label;
-  });
-  element("live-numbers").replaceChildren(...inputs);
-  const known = data.live.keys.map(([key, value]) => `${key}=${value}`);
+  data.live.keys.forEach(([key, value]) => addNumber(key, value));
+  const known = data.live.keys.filter(([, value]) => value !== null).map(([key, value]) => `${key}=${value}`);
   const offered = data.live.swarm ? known : [...known, ...SUGGESTED.filter((text) => !known.some((one) => one.startsWith(text.split("=")[0])))];
   element("live-keys").replaceChildren(
     ...offered.map((value) => Object.assign(document.createElement("option"), { value })),
@@ -276,7 +318,7 @@ function listenToSqueeze(slider) {
   let isHeld = false;
   slider.addEventListener("input", () => {
     const leader = bodies[0].firstRoles.indexOf(bodies[0].animation.role_names.indexOf("leader"));
-    if (leader < 0) return say("No program of this swarm leads a robot.");
+    if (leader < 0) return say("No program of this swarm leads a robot.", true);
     if (!isHeld) ask({ do: "grab", particle: leader });
     isHeld = true;
     ask({ do: "squeeze", by: [slider.valueAsNumber, slider.valueAsNumber] });
@@ -297,13 +339,13 @@ function listenToSession() {
     const text = element("live-key").value;
     const at = text.indexOf("=");
     if (at > 0) set(text.slice(0, at), text.slice(at + 1));
-    else say("Give KEY=VALUE, as --set takes it.");
+    else say("Give KEY=VALUE, as --set takes it.", true);
   });
   element("quantity").addEventListener("change", askForQuantity);
   listenToSqueeze(element("live-squeeze"));
   element("live-fault").addEventListener("change", () => {
     const robot = shown.views[0].kept;
-    if (robot < 0) return say("Click a robot first.");
+    if (robot < 0) return say("Click a robot first.", true);
     ask({ do: "fault", robot, what: element("live-fault").value || null });
   });
 }
@@ -327,14 +369,17 @@ function startLive() {
   element("layer-ways").closest("label").hidden = true;
   element("layer-ways").checked = state.layers.ways = false;
   element("layer-cracks").closest("label").hidden = true;
-  element("tool-cut").hidden = element("tool-load").hidden = data.live.swarm;
+  element("tool-cut").hidden = data.live.swarm;
+  element("tool-load").hidden = true;
   element("tool-place").hidden = element("tool-link").hidden = !data.live.design;
   element("live-robot").hidden = !data.live.swarm || Boolean(data.live.node);
   showNumbers();
+  document.querySelectorAll("input[name=tool]").forEach((tool) => tool.addEventListener("change", showHint));
   listenToSession();
   if (data.live.node) listenToNode(data.live.node);
   if (data.live.design) listenToDesign(ask, () => bodies[0].animation.times[0] === 0);
   takeUpHands();
+  showHint();
   window.report.live = { session, measured, ask };
   connect();
 }

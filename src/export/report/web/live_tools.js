@@ -51,7 +51,7 @@ function knife(view, at, ask) {
     view.drawOver();
     const far = Math.hypot(to[0] - at[0], to[1] - at[1]);
     if (far < 4) return false;
-    if (state.factor !== 1) shown.say("displacements are enlarged: set Enlarged to 1 to cut where bonds are");
+    if (state.factor !== 1) shown.say("Displacements are enlarged: set Enlarged to 1 to cut where bonds are.", true);
     else ask({ do: "cut", from, to: placeAt(view, to) });
     return true;
   };

@@ -15,26 +15,36 @@ const VERTEX = `${COMMON}
 layout(location = 0) in vec2 place;
 layout(location = 1) in float value;
 layout(location = 2) in float radius;
+layout(location = 3) in float mark;
 uniform vec4 camera;
 out float smoothValue;
 flat out float flatValue;
 flat out float size;
+flat out int kind;
 void main() {
   smoothValue = flatValue = value;
   size = max(radius * 2.0, 1.6);
-  gl_PointSize = size + 1.0;
+  kind = int(mark + 0.5);
+  gl_PointSize = size * (kind == 2 ? 1.25 : 1.0) + 1.0;
   gl_Position = vec4((place - camera.xy) * camera.zw, 0.0, 1.0);
 }`;
 
 const POINT = `${COMMON}
 flat in float flatValue;
 flat in float size;
+flat in int kind;
 out vec4 colour;
+// As beyondMark has it.
+float beyond(vec2 away) {
+  if (kind == 1) return max(away.x, away.y) - 0.45 * size;
+  if (kind == 2) return (away.x + away.y - 0.625 * size) * 0.7071;
+  return length(away) - 0.5 * size;
+}
 void main() {
-  float away = length(gl_PointCoord - 0.5) * (size + 1.0);
-  float cover = clamp(0.5 * size + 0.5 - away, 0.0, 1.0);
+  float beyondRim = beyond(abs(gl_PointCoord - 0.5) * (size * (kind == 2 ? 1.25 : 1.0) + 1.0));
+  float cover = clamp(0.5 - beyondRim, 0.0, 1.0);
   if (cover <= 0.0) discard;
-  float rim = size > 9.0 ? clamp(away - 0.5 * size + 1.6, 0.0, 1.0) * 0.35 : 0.0;
+  float rim = size > 9.0 ? clamp(beyondRim + 1.6, 0.0, 1.0) * 0.35 : 0.0;
   colour = vec4(shade(flatValue).rgb * (1.0 - rim), 1.0) * cover;
 }`;
 
@@ -75,12 +85,13 @@ export class Painter {
     this.gl = gl;
     this.points = this.program(VERTEX, POINT);
     this.fill = this.program(VERTEX, FILL);
-    this.buffers = [0, 1, 2].map(() => gl.createBuffer());
+    this.buffers = [0, 1, 2, 3].map(() => gl.createBuffer());
     this.index = { bonds: gl.createBuffer(), triangles: gl.createBuffer() };
-    [2, 1, 1].forEach((size, location) => {
+    [2, 1, 1, 1].forEach((size, location) => {
       gl.bindBuffer(gl.ARRAY_BUFFER, this.buffers[location]);
       gl.enableVertexAttribArray(location);
-      gl.vertexAttribPointer(location, size, gl.FLOAT, false, 0, 0);
+      // Marks are bytes.
+      gl.vertexAttribPointer(location, size, location === 3 ? gl.UNSIGNED_BYTE : gl.FLOAT, false, 0, 0);
     });
     this.texture = gl.createTexture();
     gl.bindTexture(gl.TEXTURE_2D, this.texture);
@@ -111,13 +122,14 @@ export class Painter {
     }
   }
 
-  // `places` are pairs about the origin of the camera, `values` from 0 to 1 or -1 for nothing, `radii` in device pixels.
-  draw({ places, values, radii, palette, camera, layers, isFlat, bondsFrom, trianglesFrom, bondCount, triangleCount, bondColour }) {
+  // `places` are pairs about the origin of the camera, `values` from 0 to 1 or -1 for nothing, `radii` in device pixels,
+  // `marks` the numbers of the shapes.
+  draw({ places, values, radii, marks, palette, camera, layers, isFlat, bondsFrom, trianglesFrom, bondCount, triangleCount, bondColour }) {
     const { gl, canvas } = this;
     gl.viewport(0, 0, canvas.width, canvas.height);
     gl.clearColor(0, 0, 0, 0);
     gl.clear(gl.COLOR_BUFFER_BIT);
-    [places, values, radii].forEach((data, location) => {
+    [places, values, radii, marks].forEach((data, location) => {
       gl.bindBuffer(gl.ARRAY_BUFFER, this.buffers[location]);
       gl.bufferData(gl.ARRAY_BUFFER, data, gl.DYNAMIC_DRAW);
     });

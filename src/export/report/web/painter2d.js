@@ -2,6 +2,7 @@
 // card: that is faster here.
 
 import { SHADES } from "./colour.js";
+import { beyondMark, traceMark } from "./marks.js";
 
 // Shades that are distinguished: each is one path.
 const STEPS = 64;
@@ -11,6 +12,8 @@ const DENSE = 4;
 // longer than its few pixels do.
 const MANY = 2000;
 const SMALL = 24;
+// Width of the line around each triangle, in device pixels: both edges of two neighbours are soft, and paper shows between.
+const SEAM = 1.5;
 // Places farther from the canvas, in device pixels, are nowhere.
 const FAR = 1e5;
 
@@ -39,8 +42,9 @@ export class PlainPainter {
     if (layers.points) this.dots(scene);
   }
 
-  // Calls `trace` for the items of each shade in turn, and fills.
-  inShades(count, valueOf, { palette, isFlat }, trace) {
+  // Calls `trace` for the items of each shade in turn, and fills; with `seam`, the width of a line in the same colour that
+  // covers the seams between them.
+  inShades(count, valueOf, { palette, isFlat }, trace, seam = 0) {
     const bins = new Map();
     for (let n = 0; n < count; n++) {
       const shade = shadeOf(valueOf(n));
@@ -53,6 +57,9 @@ export class PlainPainter {
       items.forEach(trace);
       this.pen.fillStyle = `rgb(${palette.slice(4 * shade, 4 * shade + 3).join(" ")})`;
       this.pen.fill();
+      if (!seam) continue;
+      Object.assign(this.pen, { strokeStyle: this.pen.fillStyle, lineWidth: seam, lineJoin: "round" });
+      this.pen.stroke();
     }
   }
 
@@ -146,7 +153,8 @@ export class PlainPainter {
       pen.moveTo(this.x(corner(n, 0)), this.y(corner(n, 0)));
       pen.lineTo(this.x(corner(n, 1)), this.y(corner(n, 1)));
       pen.lineTo(this.x(corner(n, 2)), this.y(corner(n, 2)));
-    });
+      pen.closePath();
+    }, SEAM);
   }
 
   lines({ bondsFrom, bondCount, bondColour, layers }) {
@@ -167,10 +175,7 @@ export class PlainPainter {
       const [x, y, radius] = [this.x(i), this.y(i), Math.max(scene.radii[i], 0.8)];
       if (radius < 1.5) {
         pen.rect(x - radius, y - radius, 2 * radius, 2 * radius);
-      } else {
-        pen.moveTo(x + radius, y);
-        pen.arc(x, y, radius, 0, 7);
-      }
+      } else traceMark(pen, scene.marks[i], x, y, radius);
     });
   }
 }
@@ -222,9 +227,15 @@ function setTriangle({ pixels, width, height }, ax, ay, bx, by, cx, cy, colour) 
 }
 
 // Within half a pixel of their rims they are covered in part.
-function setDots({ pixels, width, height }, { values, radii, palette }, x, y) {
+function setDots(canvas, scene, x, y) {
+  const { pixels, width, height } = canvas;
+  const { values, radii, palette, marks } = scene;
   const colourOf = inPalette(palette);
   for (let i = 0; i < values.length; i++) {
+    if (marks[i]) {
+      setMark(canvas, marks[i], x[i], y[i], Math.max(radii[i], 0.8), colourOf(values[i]));
+      continue;
+    }
     const radius = Math.max(radii[i], 0.8);
     const [inner, outer] = [(radius - 0.5) ** 2, (radius + 0.5) ** 2];
     const left = Math.max(Math.floor(x[i] - radius - 0.5), 0);
@@ -238,6 +249,22 @@ function setDots({ pixels, width, height }, { values, radii, palette }, x, y) {
         if (away <= inner) pixels[at] = colour;
         else if (away < outer) pixels[at] = mixed(pixels[at], colour, (256 * (outer - away)) / (outer - inner));
       }
+    }
+  }
+}
+
+// A mark that is no dot, likewise.
+function setMark({ pixels, width, height }, mark, x, y, radius, colour) {
+  const reach = 1.25 * radius + 1;
+  const left = Math.max(Math.floor(x - reach), 0);
+  const right = Math.min(Math.ceil(x + reach), width);
+  const bottom = Math.min(Math.ceil(y + reach), height);
+  for (let row = Math.max(Math.floor(y - reach), 0); row < bottom; row++) {
+    for (let column = left; column < right; column++) {
+      const cover = 0.5 - beyondMark(mark, column + 0.5 - x, row + 0.5 - y, radius);
+      const at = row * width + column;
+      if (cover >= 1) pixels[at] = colour;
+      else if (cover > 0) pixels[at] = mixed(pixels[at], colour, 256 * cover);
     }
   }
 }

@@ -2,6 +2,8 @@
 // dots are vectors.
 
 import { themeText } from "./colour.js";
+import { traceMark } from "./marks.js";
+import { CRACK_DASH } from "./view.js";
 import { SvgPen } from "./svg_pen.js";
 import { crackKeys, ramp, roleKeys, scaleOf } from "./scale.js";
 import { element, shown, state } from "./shown.js";
@@ -71,6 +73,11 @@ function sheetOf() {
       pen.strokeStyle = themeText("line");
       pen.lineWidth = 1;
       pen.strokeRect(left + edge, top, view.width - edge, view.height);
+      if (over) {
+        // As on the page, the second body begins behind a line.
+        pen.fillStyle = themeText("ink");
+        pen.fillRect(left + edge, top, 2, view.height);
+      }
       if (state.compare !== "slider") left += view.width + GAP;
     });
     paintScale(pen, top + views[0].height + GAP);
@@ -94,13 +101,14 @@ function sheetOf() {
     paintKeys(pen, keys, x + long + 20, y);
   }
 
-  // Texts in a row, each behind a dot of its colour; what has no room is left out.
+  // Texts in a row, each behind a mark of its colour; what has no room is left out.
   function paintKeys(pen, keys, from, y) {
     let x = from;
-    for (const [text, colour] of keys) {
+    for (const [text, colour, mark] of keys) {
       const long = pen.measureText(text).width + (colour ? 18 : 0);
       if (x + long > width - MARGIN) return;
-      if (colour) dot(pen, x + 6, y + 7, 5, colour);
+      if (mark === "crack") dashes(pen, x, y + 7, 13, colour);
+      else if (colour) sign(pen, mark, x + 6, y + 7, 5, colour);
       write(pen, text, x + (colour ? 16 : 0), y + 11);
       x += long + 18;
     }
@@ -144,15 +152,25 @@ function paintBody(pen, view) {
     if (!(x > -50 && y > -50 && x < view.width + 50 && y < view.height + 50)) continue;
     const shade = shades[i] < 0 ? palette.length / 4 - 1 : Math.round(shades[i] * (palette.length / 4 - 2));
     const [r, g, b] = palette.subarray(4 * shade, 4 * shade + 3);
-    dot(pen, x, y, radii[i] / ratio, `rgb(${r}, ${g}, ${b})`);
+    sign(pen, view.marks[i], x, y, radii[i] / ratio, `rgb(${r}, ${g}, ${b})`);
   }
 }
 
-function dot(pen, x, y, radius, colour) {
+function sign(pen, mark, x, y, radius, colour) {
   pen.fillStyle = colour;
   pen.beginPath();
-  pen.arc(x, y, radius, 0, 2 * Math.PI);
+  traceMark(pen, mark, x, y, radius);
   pen.fill();
+}
+
+function dashes(pen, x, y, long, colour) {
+  Object.assign(pen, { strokeStyle: colour, lineWidth: 2 });
+  pen.setLineDash(CRACK_DASH);
+  pen.beginPath();
+  pen.moveTo(x, y);
+  pen.lineTo(x + long, y);
+  pen.stroke();
+  pen.setLineDash([]);
 }
 
 function write(pen, text, x, y, colour = "ink") {

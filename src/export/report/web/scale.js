@@ -2,12 +2,15 @@
 
 import { SHADES, diverging, palette, themeColour, themeText, ticks, viridis, words } from "./colour.js";
 import { bodies, element, shown, state } from "./shown.js";
+import { markOf } from "./marks.js";
 import { isUnit } from "./view.js";
 
 // Frames looked at for the window and for the scale of a quantity.
 const LOOKED_AT = 24;
-// The scale ends at this part of all values if the rest is far above it.
+// The scale ends at this part of all values if the largest is so many times above it; stress has peaks that matter.
 const MOST_OF_ALL = 0.995;
+const FAR_ABOVE = { von_mises: 6 };
+const FAR_ABOVE_OTHERS = 2;
 // Decades of a logarithmic scale.
 const DECADES = 4;
 
@@ -53,22 +56,26 @@ export function rangeOf(key) {
   const known = state.ranges.get(name);
   if (known && known.ready === shown.player.ready) return known;
   const values = [];
+  let peak = -Infinity;
   for (const body of isDifference() ? bodies.slice(0, 1) : bodies) {
     const at = body.at;
     for (const frame of sampled(shown.player.ready, shown.player.last)) {
       body.go(frame);
       const field = valuesOf(body, key);
       const every = Math.max(1, Math.floor(field.length / 4000));
-      for (let i = 0; i < field.length; i += every) {
-        if (Number.isFinite(field[i])) values.push(isDifference() ? Math.abs(field[i]) : field[i]);
+      for (let i = 0; i < field.length; i++) {
+        const value = isDifference() ? Math.abs(field[i]) : field[i];
+        if (!Number.isFinite(value)) continue;
+        if (i % every === 0) values.push(value);
+        if (value > peak) peak = value;
       }
     }
     if (at >= 0) body.go(at);
   }
   values.sort((a, b) => a - b);
-  const largest = values.at(-1) ?? 1;
+  const largest = values.length ? peak : 1;
   const most = values[Math.floor(MOST_OF_ALL * (values.length - 1))] ?? 1;
-  let high = largest > 2 * most && most > 0 ? most : largest;
+  let high = largest > (FAR_ABOVE[key] ?? FAR_ABOVE_OTHERS) * most && most > 0 ? most : largest;
   let low = Math.min(values[0] ?? 0, 0);
   if (!(high > low)) high = low + 1;
   // Nothing stands in the middle.
@@ -110,19 +117,19 @@ export function takePalette() {
       : palette((k) => (isDifference() ? diverging : viridis)(k / (SHADES - 1)));
 }
 
-// What the colours mean, as [name, colour] of the roles that there are.
+// What the colours mean, as [name, colour, mark] of the roles that there are.
 export function roleKeys() {
   const { role_names: names } = bodies[0].animation;
   const counts = names.map(() => 0);
   for (const role of bodies[0].roles()) counts[role] += 1;
   const there = names.map((name, role) => [name, counts[role]]).filter(([, count]) => count > 0);
-  return there.map(([name, count]) => [`${count} ${plural(name, count)}`, themeText(name)]);
+  return there.map(([name, count]) => [`${count} ${plural(name, count)}`, themeText(name), markOf(name)]);
 }
 
 // The key of the bonds that are broken by now; none where there are none.
 export function crackKeys() {
   const broken = bodies[0].brokenBonds();
-  return broken ? [[`${broken} broken bonds`, themeText("crack")]] : [];
+  return broken ? [[`${broken} broken bond${broken === 1 ? "" : "s"}`, themeText("crack"), "crack"]] : [];
 }
 
 // The scale of the quantity that is shown: its name, its ends, its ticks as [part of the scale, text], and what is beyond it.
@@ -159,9 +166,9 @@ export function drawScale() {
   const shows = JSON.stringify([isRole ? roleKeys() : scaleOf(), crackKeys(), isDifference(), themeText("card")]);
   if (shows === drawn) return;
   drawn = shows;
-  const cracks = crackKeys().map(([text, colour]) => key(colour, text));
+  const cracks = crackKeys().map(key);
   if (isRole) {
-    scale.replaceChildren(...roleKeys().map(([text, colour]) => key(colour, text)), ...cracks);
+    scale.replaceChildren(...roleKeys().map(key), ...cracks);
     scale.setAttribute("aria-label", `Colours: ${scale.textContent}`);
     return;
   }
@@ -182,10 +189,10 @@ export function plural(name, count) {
   return name === "follower" || name === "leader" || name === "ghost" ? (count === 1 ? name : `${name}s`) : name;
 }
 
-export function key(colour, text) {
+export function key([text, colour, mark]) {
   const span = Object.assign(document.createElement("span"), { className: "key" });
-  const dot = document.createElement("i");
-  dot.style.background = colour;
-  span.append(dot, text);
+  const sign = Object.assign(document.createElement("i"), { className: mark });
+  sign.style.setProperty("--own", colour);
+  span.append(sign, text);
   return span;
 }

@@ -2,6 +2,7 @@
 
 import { Painter } from "./painter.js";
 import { PlainPainter } from "./painter2d.js";
+import { marksOf } from "./marks.js";
 import { themeColour, themeText, ticks, words } from "./colour.js";
 import { shown } from "./shown.js";
 
@@ -9,6 +10,9 @@ import { shown } from "./shown.js";
 const MOST_WAYS = 400;
 // Largest distance of the pointer from a particle that it names, in pixels.
 const REACH = 14;
+
+// Of broken bonds, in pixels.
+export const CRACK_DASH = [3, 2];
 
 // Scenes without a unit call it so.
 export function isUnit(unit) {
@@ -39,6 +43,8 @@ export class View {
     this.places = new Float32Array(2 * body.count);
     this.shades = new Float32Array(body.count);
     this.radii = new Float32Array(body.count);
+    this.marks = new Uint8Array(body.count);
+    this.markOfRole = marksOf(body.animation.role_names);
   }
 
   // After the body is open.
@@ -114,10 +120,11 @@ export class View {
     const scale = show.camera.scale * ratio;
     if (animation.radii.length) for (let i = 0; i < body.count; i++) radii[i] = Math.max(animation.radii[i] * scale, 1.5 * ratio);
     else radii.fill(Math.min(Math.max((show.layers.surface ? 0.13 : 0.27) * animation.spacing * scale, 0.7), 9 * ratio));
+    if (show.layers.points) body.roles().forEach((role, i) => (this.marks[i] = this.markOfRole[role]));
     const bondsFrom = 2 * body.brokenBonds();
     const trianglesFrom = 3 * body.trianglesPerCell * body.tornCells();
     this.painter.draw({
-      places, values: shades, radii,
+      places, values: shades, radii, marks: this.marks,
       palette: show.palette, isFlat: show.isFlat, layers: show.layers, spacing: animation.spacing * scale,
       camera: { x: show.camera.x - origin[0], y: show.camera.y - origin[1], scale },
       bondsFrom, bondCount: body.bonds.length - bondsFrom,
@@ -229,8 +236,10 @@ export class View {
     const [h, v] = this.show.turned ? ["y", "x"] : ["x", "y"];
     const { unit } = this.body.animation;
     const named = (name) => (isUnit(unit) ? `${name} [${unit}]` : name);
-    const inside = across.filter((x) => this.pixel([x, 0])[0] > 50 && this.pixel([x, 0])[0] < this.width - 190);
-    inside.forEach((x) => pen.fillText(words(x), this.pixel([x, 0])[0] + 3, this.height - 5));
+    for (const x of across) {
+      const from = this.pixel([x, 0])[0] + 3;
+      if (from > 53 && from + pen.measureText(words(x)).width < this.width - 2) pen.fillText(words(x), from, this.height - 5);
+    }
     const between = up.filter((y) => this.pixel([0, y])[1] > 34 && this.pixel([0, y])[1] < this.height - 16);
     between.forEach((y) => pen.fillText(words(this.show.turned ? -y : y), 5, this.pixel([0, y])[1] - 3));
     pen.fillText(named(h), this.width - pen.measureText(named(h)).width - 6, 14);
@@ -298,13 +307,14 @@ export class View {
     }
   }
 
-  // Both flanks of every broken bond: half a bond from each of its ends, across it.
+  // Both flanks of every broken bond: half a bond from each of its ends, across it; dashed, as in the figures.
   drawCracks(pen) {
     const { body, show } = this;
     const broken = body.brokenBonds();
     if (!broken) return;
     pen.strokeStyle = themeText("crack");
     pen.lineWidth = Math.min(Math.max(0.09 * body.animation.spacing * show.camera.scale, 1), 2.5);
+    pen.setLineDash(CRACK_DASH);
     pen.beginPath();
     for (let n = 0; n < broken; n++) {
       const [a, b] = [body.bonds[2 * n], body.bonds[2 * n + 1]];
@@ -318,6 +328,7 @@ export class View {
       }
     }
     pen.stroke();
+    pen.setLineDash([]);
   }
 
   // The particle nearest to a point of the box, in CSS pixels; -1 if none is near.
