@@ -14,7 +14,7 @@
 //! | `report.html` | the run as a page ([`report`]) |
 //! | `flockform-files.txt` | the files that flockform wrote, which alone `--force` replaces |
 //! | `checkpoint` | in an unfinished or interrupted run: all it takes to go on |
-//! | `configuration_*`, `pe1_*`, `von_mises_*`, `probes` | figures, as SVG and as the PNG rendered from it |
+//! | `configuration_*`, `pe1_*`, `von_mises_*`, `stress_*`, `probes` | figures, as SVG and as the PNG rendered from it |
 //!
 //! A page for people to look at is written beside them ([`report`]), and a gallery of such pages; a film ([`film`]) stands
 //! where it is asked for.
@@ -216,15 +216,18 @@ fn figures_of<'a>(results: &'a Results<'_>, subject: &'a Subject<'_>, units: &'a
         figures.push((name("configuration"), Box::new(move || figures::configuration(subject, snapshot))));
         figures.push((name("pe1"), Box::new(move || figures::pe1(subject, snapshot))));
         if let (Some(cells), Some(elastic)) = (outcome.engine.cells(), &scene.material) {
-            let draw = move || {
+            // Each figure has stresses of its own while it is drawn, and none before or after.
+            let stresses = move || {
                 let moved = |(now, then): ([f64; 2], [f64; 2])| [now[0] - then[0], now[1] - then[1]];
                 let places = snapshot.positions.iter().zip(subject.body.reference.iter());
                 let displacement: Vectors = places.map(moved).collect();
-                let found = Stresses::of(&outcome.engine, elastic, &displacement, &snapshot.broken);
-                let stresses = found.map_or_else(Vec::new, |found| found.cells);
-                figures::stress(subject, snapshot, cells, &stresses, &units.stress)
+                Stresses::in_cells(&outcome.engine, elastic, &displacement, &snapshot.broken)
             };
-            figures.push((name("von_mises"), Box::new(draw)));
+            let unit = units.stress.as_str();
+            let von_mises = move || figures::stress(subject, snapshot, cells, &stresses(), unit);
+            let components = move || figures::components(subject, snapshot, cells, &stresses(), unit);
+            figures.push((name("von_mises"), Box::new(von_mises)));
+            figures.push((name("stress"), Box::new(components)));
         }
     }
     if !probes.is_empty() {

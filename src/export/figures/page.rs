@@ -50,9 +50,20 @@ pub fn bounds(positions: &Vectors, drawn: impl Iterator<Item = usize>) -> Option
 
 /// The window that shows what lies within these bounds.
 pub fn around(bounds: Option<[[f64; 2]; 2]>, spacing: f64) -> Axes {
+    let ([low, high], margin) = with_margin(bounds, spacing);
+    Axes::equal(low, high, margin)
+}
+
+/// The same in a room of this size \[px\].
+pub fn within(bounds: Option<[[f64; 2]; 2]>, spacing: f64, room: [f64; 2]) -> Axes {
+    let ([low, high], margin) = with_margin(bounds, spacing);
+    Axes::fitted(low, high, margin, room)
+}
+
+fn with_margin(bounds: Option<[[f64; 2]; 2]>, spacing: f64) -> ([[f64; 2]; 2], f64) {
     let [low, high] = bounds.unwrap_or([[0.0; 2], [1.0; 2]]);
     let longest = (high[0] - low[0]).max(high[1] - low[1]);
-    Axes::equal(low, high, (0.02 * longest).max(0.6 * spacing))
+    ([low, high], (0.02 * longest).max(0.6 * spacing))
 }
 
 /// `step 20`, and how many bonds are broken.
