@@ -244,10 +244,7 @@ impl Layout {
         match region {
             SceneRegion::Outline(selection) => outline.portions(selection, grain),
             SceneRegion::Outermost(side) => match band(*side, 0.0) {
-                // Across the ends of a flat side the depth of rounding reaches around its corners.
-                flat if flat.iter().any(|portion| portion.length(outline) > 1e-6 * spacing) => {
-                    flat.into_iter().filter(|portion| portion.length(outline) > 1e-6 * spacing).collect()
-                }
+                flat if !flat.is_empty() => flat,
                 _ => band(*side, outermost_depth(*side, &self.body)),
             },
             SceneRegion::Known(region) => match region {
