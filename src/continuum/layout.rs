@@ -16,7 +16,7 @@ use crate::geometry::outline::{Outline, OutlineError, Place};
 use crate::geometry::partition::{Partition, PartitionError};
 use crate::geometry::portion::{Portion, Selection};
 use crate::material::cells::{Cells, neighbourhood, neighbourhood_of, without_loose_sites};
-use crate::material::fit::{FitError, Fitted, fit_regions};
+use crate::material::fit::{FitError, Fitted, Part, fit_regions};
 use crate::material::outline_loads::{self, Loader, OutlineLoad, Push};
 use crate::scene::{BodySource, LeaderMotion, Load, RoleEntry, Scene, SceneError, SceneRegion};
 use crate::solve::linear::HeldComponent;
@@ -244,10 +244,7 @@ impl Layout {
         match region {
             SceneRegion::Outline(selection) => outline.portions(selection, grain),
             SceneRegion::Outermost(side) => match band(*side, 0.0) {
-                // Across the ends of a flat side the depth of rounding reaches around its corners.
-                flat if flat.iter().any(|portion| portion.length(outline) > 1e-6 * spacing) => {
-                    flat.into_iter().filter(|portion| portion.length(outline) > 1e-6 * spacing).collect()
-                }
+                flat if !flat.is_empty() => flat,
                 _ => band(*side, outermost_depth(*side, &self.body)),
             },
             SceneRegion::Known(region) => match region {
@@ -539,14 +536,31 @@ fn fitted(scene: &Scene) -> Result<Option<(Fitted, Partition)>, SceneError> {
     let (true, BodySource::Cut(Cut::Shape(shape))) = (scene.is_fitted, &scene.body) else { return Ok(None) };
     let outline = Outline::of_shape(shape).map_err(|error| refuse_outline(scene, &error))?;
     let partition = divided(scene, &outline)?;
-    let fitted = fit_regions(&scene.lattice, &partition).map_err(|error| {
-        let help = match error {
-            FitError::TooLarge { .. } => "use a wider spacing or a smaller shape",
-            _ => "use a smaller spacing, leave the detail out, or set body.outline = \"lattice\"",
-        };
-        scene.refuse("body.shape", error.to_string(), help)
-    })?;
+    let fitted = fit_regions(&scene.lattice, &partition).map_err(|error| refuse_fit(scene, &error))?;
     Ok(Some((fitted, partition)))
+}
+
+/// Names the part of the body that is too narrow, or too large, for the lattice.
+fn refuse_fit(scene: &Scene, error: &FitError) -> SceneError {
+    let help = match error {
+        FitError::TooLarge { .. } => "use a wider spacing or a smaller shape",
+        _ => "use a smaller spacing, leave the detail out, or set body.outline = \"lattice\"",
+    };
+    let key = match error {
+        FitError::SmallHole { hole, .. } => format!("body.holes[{}]", hole - 1),
+        FitError::Narrow { part, .. } => part_key(*part),
+        FitError::Detail { .. } | FitError::TooLarge { .. } => "body.shape".into(),
+    };
+    scene.refuse(&key, error.to_string(), help)
+}
+
+/// The key of what bounds the body: its shape, one of its holes, one of its inclusions.
+fn part_key(part: Part) -> String {
+    match part {
+        Part::Outer => "body.shape".into(),
+        Part::Hole(hole) => format!("body.holes[{}]", hole - 1),
+        Part::Region(region) => format!("body.inclusions[{}].shape", region - 1),
+    }
 }
 
 /// The outline with the edges of the scene's inclusions.
@@ -576,7 +590,7 @@ fn refuse_outline(scene: &Scene, error: &OutlineError) -> SceneError {
             format!("body.holes[{}]", hole - 1),
             "keep holes inside and apart, draw a notch as part of a polygon, or set body.outline = \"lattice\"",
         ),
-        OutlineError::SelfCrossing { ring, .. } | OutlineError::NoArea { ring } => {
+        OutlineError::SelfCrossing { ring, .. } | OutlineError::NoArea { ring, .. } => {
             let key = if *ring == 0 { "body.shape".into() } else { format!("body.holes[{}]", ring - 1) };
             (key, "give its corners in order, once around")
         }

@@ -81,11 +81,8 @@ impl Stresses {
         broken: &[[u32; 2]],
     ) -> Option<Self> {
         let cells = engine.cells()?;
-        let mut of_cells = stress::of_cells(cells, elastic, displacement, rotation(engine));
         let torn = torn(cells, displacement.len(), broken);
-        for (stress, _) in of_cells.iter_mut().zip(&torn).filter(|(_, torn)| **torn) {
-            *stress = StressState { strain: [f64::NAN; 3], components: [f64::NAN; 3], von_mises: f64::NAN };
-        }
+        let of_cells = of_whole_cells(engine, (cells, &torn), elastic, displacement);
         let mut particles =
             stress::at_particles(cells, elastic, &of_cells, displacement.len(), |cell| !torn[cell]);
         let recovered = match broken {
@@ -97,6 +94,20 @@ impl Stresses {
         }
         let recovered = recovered.into_iter().map(|(i, _)| i).collect();
         Some(Self { cells: of_cells, particles, recovered })
+    }
+
+    /// Those of the cells alone, under the same; empty without cells.
+    pub fn in_cells(
+        engine: &Engine,
+        elastic: &Elastic,
+        displacement: &Vectors,
+        broken: &[[u32; 2]],
+    ) -> Vec<StressState> {
+        let of = |cells| {
+            let torn = torn(cells, displacement.len(), broken);
+            of_whole_cells(engine, (cells, &torn), elastic, displacement)
+        };
+        engine.cells().map_or_else(Vec::new, of)
     }
 
     /// At the engine's present places.
@@ -124,6 +135,20 @@ impl Stresses {
         let particles = corners.iter().map(|&i| engine.body().id(i as usize)).collect();
         Some(Peak { von_mises, cell: Some(cell + 1), place: places.middle(), particles })
     }
+}
+
+/// The stress of each cell, NaN in those that are torn.
+fn of_whole_cells(
+    engine: &Engine,
+    (cells, torn): (&Cells, &[bool]),
+    elastic: &Elastic,
+    displacement: &Vectors,
+) -> Vec<StressState> {
+    let mut of_cells = stress::of_cells(cells, elastic, displacement, rotation(engine));
+    for (stress, _) in of_cells.iter_mut().zip(torn).filter(|(_, torn)| **torn) {
+        *stress = StressState { strain: [f64::NAN; 3], components: [f64::NAN; 3], von_mises: f64::NAN };
+    }
+    of_cells
 }
 
 impl Mechanics {

@@ -3,10 +3,12 @@
 //! taken and given back before the plan was made, by the finite elements of a truth that leads or a setting that was chosen.
 
 use super::figures::axes::Axes;
-use super::figures::{Formats, MOST_DOTS, PNG_ZOOM, page};
+use super::figures::{Formats, MOST_DOTS, PNG_ZOOM, components, page, panels};
 use super::report::run::{Packed, packed};
 use crate::continuum::memory::{measured, solving, stepped};
 use crate::continuum::plan::Plan;
+use crate::material::cells::Cells;
+use crate::material::stress::StressState;
 use crate::scene::Scene;
 
 /// Bytes of what a program adds to its own once it runs a body: code that has not run yet, stacks, tables.
@@ -51,9 +53,11 @@ pub fn predicted(scene: &Scene, plan: &Plan, outputs: Outputs, program: usize) -
     };
     let packing = last + values.max(packing) + frames[1];
     let tables = last + text + measured(plan);
-    // Of stresses a figure needs those of the cells.
+    // Of stresses a figure needs those of the cells, and there are two that do.
+    let cells = plan.setup.cells.as_ref().map_or(0, Cells::count);
+    let stresses = rayon::current_num_threads().min(2) * size_of::<StressState>() * cells;
     let drawing = match draws {
-        true => last + text + pictures(scene, plan, drawn_before + 1) + measured(plan) / 2,
+        true => last + text + pictures(scene, plan, drawn_before + 1) + stresses,
         false => 0,
     };
     let most = [stepping, packing, tables, drawing].into_iter().max().unwrap_or(0);
@@ -79,8 +83,13 @@ fn pictures(scene: &Scene, plan: &Plan, moments: usize) -> usize {
     // As it lies before it is deformed.
     let axes = page::window(&body.reference, 0..plan.count(), body.lattice.spacing());
     let sheet = bytes([page::width_of(&axes, BAR), ABOVE + axes.size[1] + Axes::BELOW]);
-    let of_each = if plan.setup.cells.is_some() { 3 } else { 2 };
+    let has_cells = plan.setup.cells.is_some();
+    let of_each = if has_cells { 3 } else { 2 };
     let mut sheets = vec![sheet; of_each * moments];
+    if has_cells {
+        let (axes, is_row) = components::window(&body.reference, 0..plan.count(), body.lattice.spacing());
+        sheets.extend(vec![bytes(panels::sheet_size(&axes, is_row, [BAR, ABOVE])); moments]);
+    }
     let charts = [!plan.probes.is_empty(), scene.equilibrium.is_some(), scene.load_steps.is_some()];
     sheets.extend(charts.into_iter().filter(|&is| is).map(|_| bytes([page::WIDTH, CHART])));
     sheets.sort_unstable_by(|a, b| b.cmp(a));

@@ -14,7 +14,7 @@
 //! | `report.html` | the run as a page ([`report`]) |
 //! | `flockform-files.txt` | the files that flockform wrote, which alone `--force` replaces |
 //! | `checkpoint` | in an unfinished or interrupted run: all it takes to go on |
-//! | `configuration_*`, `pe1_*`, `von_mises_*`, `probes` | figures, as SVG and as the PNG rendered from it |
+//! | `configuration_*`, `pe1_*`, `von_mises_*`, `stress_*`, `probes` | figures, as SVG and as the PNG rendered from it |
 //!
 //! A page for people to look at is written beside them ([`report`]), and a gallery of such pages; a film ([`film`]) stands
 //! where it is asked for.
@@ -217,16 +217,24 @@ fn figures_of<'a>(results: &'a Results<'_>, subject: &'a Subject<'_>, units: &'a
         figures.push((name("configuration"), Box::new(move || figures::configuration(subject, snapshot))));
         figures.push((name("pe1"), Box::new(move || figures::pe1(subject, snapshot))));
         if let (Some(cells), Some(elastic)) = (outcome.engine.cells(), &scene.material) {
-            let draw = move || {
+            // Each figure has stresses of its own while it is drawn, and none before or after.
+            let displacement = move || -> Vectors {
                 let moved = |(now, then): ([f64; 2], [f64; 2])| [now[0] - then[0], now[1] - then[1]];
-                let places = snapshot.positions.iter().zip(subject.body.reference.iter());
-                let displacement: Vectors = places.map(moved).collect();
-                let found = Stresses::of(&outcome.engine, elastic, &displacement, &snapshot.broken);
-                let none = || Stresses { cells: Vec::new(), particles: Vec::new(), recovered: Vec::new() };
-                let stresses = found.unwrap_or_else(none);
-                figures::stress(subject, snapshot, cells, &stresses, &units.stress)
+                snapshot.positions.iter().zip(subject.body.reference.iter()).map(moved).collect()
             };
-            figures.push((name("von_mises"), Box::new(draw)));
+            let unit = units.stress.as_str();
+            let von_mises = move || {
+                let found = Stresses::of(&outcome.engine, elastic, &displacement(), &snapshot.broken);
+                let none = || Stresses { cells: Vec::new(), particles: Vec::new(), recovered: Vec::new() };
+                figures::stress(subject, snapshot, cells, &found.unwrap_or_else(none), unit)
+            };
+            let components = move || {
+                let stresses =
+                    Stresses::in_cells(&outcome.engine, elastic, &displacement(), &snapshot.broken);
+                figures::components(subject, snapshot, cells, &stresses, unit)
+            };
+            figures.push((name("von_mises"), Box::new(von_mises)));
+            figures.push((name("stress"), Box::new(components)));
         }
     }
     if !probes.is_empty() {

@@ -143,6 +143,13 @@ impl Partition {
         self.joined.get(&[ring, piece]).copied().unwrap_or([ring, piece])
     }
 
+    /// The region whose outline a line inside is part of, counted from 1: of several that share it the first.
+    pub fn region_along(&self, line: usize) -> usize {
+        let p = self.piece(line, 0).point(0.5);
+        let is_along = |region: &Outline| region.nearest(p).1 <= 1e3 * self.near();
+        self.regions.iter().position(is_along).map_or(0, |k| k + 1)
+    }
+
     /// Whether a line ends at a corner.
     pub fn is_junction(&self, corner: [usize; 2]) -> bool {
         self.junctions.contains(&corner)

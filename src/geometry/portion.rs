@@ -76,7 +76,8 @@ impl Portion {
 
 impl Outline {
     /// The portions of the outline that are selected, in the order of its pieces; what is no longer than `grain`
-    /// \[length\] is left out, and the edges of boxes and discs are widened by it.
+    /// \[length\] is left out. Of boxes and discs, a piece that leaves one by no more than `grain` lies in it, one that reaches
+    /// in no deeper does not, and any other is cut at the edge itself.
     pub fn portions(&self, selection: &Selection, grain: f64) -> Vec<Portion> {
         let within = |inside: &dyn Fn(&Piece) -> Vec<[f64; 2]>| {
             let of_piece = |(ring, number, piece): (usize, usize, &Piece)| {
@@ -89,16 +90,16 @@ impl Outline {
             Selection::All => within(&|_| vec![[0.0, 1.0]]),
             Selection::Box { min, max } => within(&|piece| {
                 let sides = [
-                    ([1.0, 0.0], max[0] + grain),
-                    ([-1.0, 0.0], grain - min[0]),
-                    ([0.0, 1.0], max[1] + grain),
-                    ([0.0, -1.0], grain - min[1]),
+                    ([1.0, 0.0], max[0]),
+                    ([-1.0, 0.0], -min[0]),
+                    ([0.0, 1.0], max[1]),
+                    ([0.0, -1.0], -min[1]),
                 ];
-                let sides = sides.map(|(normal, offset)| below(piece, normal, offset));
-                sides.into_iter().fold(vec![[0.0, 1.0]], |kept, side| common(&kept, &side))
+                let within = |(normal, offset)| cut_at(grain, |grown| below(piece, normal, offset + grown));
+                sides.map(within).into_iter().fold(vec![[0.0, 1.0]], |kept, side| common(&kept, &side))
             }),
             Selection::Disc { centre, radius } => {
-                within(&|piece| within_disc(piece, *centre, radius + grain))
+                within(&|piece| cut_at(grain, |grown| within_disc(piece, *centre, (radius + grown).max(0.0))))
             }
             Selection::Pieces { ring, pieces, angles } => {
                 let asked: HashSet<usize> = pieces.iter().copied().collect();
@@ -144,6 +145,19 @@ impl Outline {
         }
         run.push(Portion { ring, piece, t: [0.0, b.t] });
         run
+    }
+}
+
+/// The stretches of a piece on one side of an edge, which `inside` names for that edge moved outwards by a length. A piece
+/// along the edge, which rounding may put on either side of it, is taken whole, and one that touches it not at all; any
+/// other is cut at the edge itself: a cut as far off as the grain would be off by much more where it meets the edge at a
+/// small angle.
+fn cut_at(grain: f64, inside: impl Fn(f64) -> Vec<[f64; 2]>) -> Vec<[f64; 2]> {
+    let widened = inside(grain);
+    match widened == [[0.0, 1.0]] {
+        true => widened,
+        false if inside(-grain).is_empty() => Vec::new(),
+        false => inside(0.0),
     }
 }
 
@@ -248,14 +262,21 @@ mod tests {
         let all = 12.0 + TAU * 0.5;
         assert!((length(&outline, &Selection::All) - all).abs() < 1e-12);
         let right = Selection::Box { min: [4.0, 0.5], max: [4.0, 2.0] };
-        assert!((length(&outline, &right) - 1.5).abs() < 1e-8);
+        assert!((length(&outline, &right) - 1.5).abs() < 1e-12);
         let half = Selection::Box { min: [2.0, 0.25], max: [3.0, 1.75] };
-        assert!((length(&outline, &half) - TAU * 0.25).abs() < 1e-8, "half of the hole");
+        assert!((length(&outline, &half) - TAU * 0.25).abs() < 1e-12, "half of the hole");
         let disc = Selection::Disc { centre: [0.0, 0.0], radius: 1.0 };
-        assert!((length(&outline, &disc) - 2.0).abs() < 1e-8);
+        assert!((length(&outline, &disc) - 2.0).abs() < 1e-12);
         // A circle through the centre of the hole's circle, of the same radius, has a third of it inside.
         let lens = Selection::Disc { centre: [2.5, 1.0], radius: 0.5 };
-        assert!((length(&outline, &lens) - TAU * 0.5 / 3.0).abs() < 1e-7);
+        assert!((length(&outline, &lens) - TAU * 0.5 / 3.0).abs() < 1e-12);
+        // An edge that only touches the hole takes in none of it or all of it, though rounding moves the edge.
+        for off in [-1e-12, 0.0, 1e-12] {
+            let beside = Selection::Box { min: [1.0, 1.5 + off], max: [3.0, 1.9] };
+            assert_eq!(outline.portions(&beside, 1e-9), []);
+            let around = Selection::Box { min: [1.0, 0.1], max: [3.0, 1.5 + off] };
+            assert!((length(&outline, &around) - TAU * 0.5).abs() < 1e-12);
+        }
     }
 
     #[test]

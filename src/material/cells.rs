@@ -322,7 +322,7 @@ impl Cells {
         let outer = (0..polygons.len()).max_by(|&a, &b| size(&polygons[a]).total_cmp(&size(&polygons[b])));
         polygons.swap(0, outer.unwrap_or(0));
         if polygons.is_empty() {
-            return Err(OutlineError::NoArea { ring: 0 });
+            return Err(OutlineError::NoArea { ring: 0, place: [0.0; 2] });
         }
         Outline::of_polygons(&polygons)
     }

@@ -361,7 +361,9 @@ mod tests {
                 let found = add(part, Push::Traction([1.0, 0.0]), None);
                 // Both the edge and the hole lie in the box.
                 let hole = 2.0 * (1.5f64 / 1.7).asin() * 2.0 * 1.7;
-                assert!((found.force[0] - length / 2.0 - hole).abs() < 1e-7, "{label}: {found:?}");
+                assert!((found.force[0] - length / 2.0 - hole).abs() < 1e-11, "{label}: {found:?}");
+                let heights = (5.5f64.powi(2) - 2.5f64.powi(2)) / 2.0 * length / 6.0;
+                assert!((found.moment + heights + 4.0 * hole).abs() < 1e-10, "{label}: {found:?}");
                 // A pressure in a hole has no resultant; one that grows with y pushes as it lifts a swimmer.
                 let rim = || Selection::Pieces { ring: 1, pieces: vec![], angles: None };
                 let found = add(rim(), Push::Pressure(5.0), None);

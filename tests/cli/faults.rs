@@ -179,3 +179,49 @@ fn a_radius_beyond_everything_is_refused_at_once() {
         assert!(begun.elapsed() < Duration::from_secs(20), "{sets:?}: {:?}", begun.elapsed());
     }
 }
+
+#[test]
+fn shapes_that_no_lattice_follows_are_refused_by_name_and_place() {
+    let plate = "shape = { kind = \"rectangle\", max = [20.0, 10.0] }";
+    let disc = |centre: [f64; 2], radius: f64| {
+        format!("{{ kind = \"disc\", centre = {centre:?}, radius = {radius:?} }}")
+    };
+    let holes = |discs: &[String]| format!("body={{ {plate}, holes = [{}] }}", discs.join(", "));
+    let polygon =
+        |vertices: &str| format!("body={{ shape = {{ kind = \"polygon\", vertices = [{vertices}] }} }}");
+    let cases = [
+        (
+            polygon("[0.0, 0.0], [20.0, 10.0], [20.0, 0.0], [0.0, 10.0]"),
+            "body.shape",
+            "crosses or touches itself near (10.000000, 5.000000)",
+        ),
+        (
+            polygon("[0.0, 0.0], [20.0, 0.0], [8.0, 0.0]"),
+            "body.shape",
+            "has no area near (0.000000, 0.000000)",
+        ),
+        // Narrow, a bridge between two holes, one between a hole and the edge, a hole that no cell leaves room for.
+        (
+            "body.shape={ kind = \"rectangle\", max = [20.0, 0.7] }".to_owned(),
+            "body.shape",
+            "0.700000 wide near (0.2",
+        ),
+        (holes(&[disc([7.0, 5.0], 2.0), disc([11.5, 5.0], 2.0)]), "body.holes[1]", "wide near (8.9"),
+        (holes(&[disc([7.0, 5.0], 1.0), disc([14.0, 2.4], 2.0)]), "body.holes[1]", "wide near (12."),
+        (
+            holes(&[disc([7.0, 5.0], 2.0), disc([14.0, 5.0], 0.3)]),
+            "body.holes[1]",
+            "hole 2 is 0.600000 across",
+        ),
+    ];
+    for (body, key, words) in cases {
+        let folder = temporary();
+        let sets = ["--set", &body, "--set", "lattice.spacing=1.0", "--set", "record.places=[]"];
+        let output = flockform(&[&["run", "bar", "--out", "o"][..], &sets].concat(), folder.path());
+        let said = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{body}: {said}");
+        for part in [key, words, "help: "] {
+            assert!(said.contains(part), "{body} does not say `{part}`:\n{said}");
+        }
+    }
+}

@@ -381,7 +381,7 @@ fn figures_are_drawn_as_the_files_asked_for_and_the_report_is_named() {
         };
         (count("svg"), count("png"), folder)
     };
-    for (formats, svg, png) in [("none", 0, 0), ("svg", 4, 0), ("png", 0, 4), ("all", 4, 4)] {
+    for (formats, svg, png) in [("none", 0, 0), ("svg", 5, 0), ("png", 0, 5), ("all", 5, 5)] {
         let (found_svg, found_png, _folder) = drawn(formats);
         assert_eq!((found_svg, found_png), (svg, png), "{formats}");
     }
@@ -391,6 +391,13 @@ fn figures_are_drawn_as_the_files_asked_for_and_the_report_is_named() {
     assert!(picture.contains("displacements enlarged") && picture.contains("von Mises stress"), "{picture}");
     // No step leads to an equilibrium.
     assert!(picture.contains("solved for equilibrium") && !picture.contains("step 1000"), "{picture}");
+    // Three panels, and one scale from as much pressure as there is tension: the bar's tension is its end, and red.
+    let picture = std::fs::read_to_string(folder.path().join("o/stress_1000.svg")).expect("drawn");
+    for words in
+        [">xx<", ">yy<", ">xy<", "stress [Pa]", "fill=\"#b40426\" stroke", ">\u{2212}40000<", ">40000<"]
+    {
+        assert!(picture.contains(words), "no `{words}` in {picture}");
+    }
     let folder = temporary();
     let output = flockform(&["run", "tension", "--steps", "2", "--figures", "none"], folder.path());
     let said = text(&output.stdout);

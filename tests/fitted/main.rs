@@ -1,6 +1,7 @@
 //! Bodies that keep their outline: what they promise, against closed forms, published figures and exact resultants.
 
 mod benchmarks;
+mod bundled;
 mod convergence;
 #[path = "../common/folders.rs"]
 mod folders;

@@ -39,13 +39,37 @@ const VIRIDIS: [[u8; 3]; 11] = [
     [0xfd, 0xe7, 0x25],
 ];
 
+/// The diverging colour map of K. Moreland (Advances in Visual Computing, LNCS 5876, 2009) at every eighth.
+const BLUE_TO_RED: [[u8; 3]; 9] = [
+    [59, 76, 192],
+    [98, 130, 234],
+    [141, 176, 254],
+    [184, 208, 249],
+    [221, 221, 221],
+    [245, 196, 173],
+    [244, 154, 123],
+    [222, 96, 77],
+    [180, 4, 38],
+];
+
 /// Viridis, perceptually uniform, at `fraction` of its way from dark to bright.
 pub fn viridis(fraction: f64) -> String {
-    let place = fraction.clamp(0.0, 1.0) * 10.0;
-    let below = (place as usize).min(9);
+    along(&VIRIDIS, fraction)
+}
+
+/// From blue over grey, at half of the way, to red.
+pub fn blue_to_red(fraction: f64) -> String {
+    along(&BLUE_TO_RED, fraction)
+}
+
+/// The colour at `fraction` of the way along a map.
+fn along(map: &[[u8; 3]], fraction: f64) -> String {
+    let last = map.len() - 1;
+    let place = fraction.clamp(0.0, 1.0) * last as f64;
+    let below = (place as usize).min(last - 1);
     let part = place - below as f64;
     let mix = |channel: usize| {
-        let [from, to] = [VIRIDIS[below], VIRIDIS[below + 1]].map(|colour| f64::from(colour[channel]));
+        let [from, to] = [map[below], map[below + 1]].map(|colour| f64::from(colour[channel]));
         (from + part * (to - from)).round() as u8
     };
     format!("#{:02x}{:02x}{:02x}", mix(0), mix(1), mix(2))
@@ -59,5 +83,6 @@ mod tests {
     fn viridis_runs_from_dark_violet_to_yellow() {
         assert_eq!([viridis(0.0), viridis(0.5), viridis(1.0)], ["#440154", "#21918c", "#fde725"]);
         assert_eq!(viridis(0.05), "#461365");
+        assert_eq!([0.0, 0.5, 1.0].map(blue_to_red), ["#3b4cc0", "#dddddd", "#b40426"]);
     }
 }

@@ -1,7 +1,8 @@
 //! Figures: each is drawn once, as SVG, and its PNG is rendered from that very SVG.
 //!
 //! [`configuration()`]: the body at a step, in the paper's colours. [`pe1`]: filled contours of the first
-//! pseudo-energy over it. [`stress()`]: the von Mises stress of its cells. [`probes`]: the history of a few particles. [`overlay`] and [`von_mises()`]: what a
+//! pseudo-energy over it. [`stress()`] and [`components()`]: the von Mises stress of its cells, and
+//! the components of their stress. [`probes`]: the history of a few particles. [`overlay`] and [`von_mises()`]: what a
 //! rule makes of a body beside the truth. Axes of bodies are equal, and every axis carries its unit. SVG is
 //! written directly: a figure here is circles, lines and paths, and what matters is where they go.
 
@@ -10,6 +11,7 @@ pub(super) mod bands;
 pub(crate) mod chart;
 mod colour;
 mod comparison;
+pub(super) mod components;
 pub(super) mod configuration;
 mod energy;
 mod faces;
@@ -18,6 +20,7 @@ pub(crate) mod flight_map;
 pub(super) mod heading;
 mod history;
 pub(super) mod page;
+pub(super) mod panels;
 pub(super) mod png;
 mod raster;
 mod stress;
@@ -37,6 +40,7 @@ use crate::material::cells::Cells;
 use crate::scene::Scene;
 pub use colour::SERIES;
 pub use comparison::{Pair, overlay};
+pub use components::components;
 pub use configuration::configuration;
 pub use energy::pe1;
 pub use history::probes;

@@ -50,8 +50,14 @@ pub fn bounds(positions: &Vectors, drawn: impl Iterator<Item = usize>) -> Option
 
 /// The window that shows what lies within these bounds.
 pub fn around(bounds: Option<[[f64; 2]; 2]>, spacing: f64) -> Axes {
-    let ([low, high], margin) = margins(bounds, spacing);
+    let ([low, high], margin) = with_margin(bounds, spacing);
     Axes::equal(low, high, margin)
+}
+
+/// The same in a room of this size \[px\].
+pub fn within(bounds: Option<[[f64; 2]; 2]>, spacing: f64, room: [f64; 2]) -> Axes {
+    let ([low, high], margin) = with_margin(bounds, spacing);
+    Axes::fitted(low, high, margin, room)
 }
 
 /// The same in a film, which is shown whole: a sheet that is higher than a screen would be made small, and its letters
@@ -59,12 +65,11 @@ pub fn around(bounds: Option<[[f64; 2]; 2]>, spacing: f64) -> Axes {
 pub fn around_in_film(bounds: Option<[[f64; 2]; 2]>, spacing: f64) -> Axes {
     /// Room for the plot \[px\].
     const ROOM: [f64; 2] = [680.0, 560.0];
-    let ([low, high], margin) = margins(bounds, spacing);
-    Axes::fitted(low, high, margin, ROOM)
+    within(bounds, spacing, ROOM)
 }
 
 /// The bounds, of nothing those of a unit, and the room around them.
-fn margins(bounds: Option<[[f64; 2]; 2]>, spacing: f64) -> ([[f64; 2]; 2], f64) {
+fn with_margin(bounds: Option<[[f64; 2]; 2]>, spacing: f64) -> ([[f64; 2]; 2], f64) {
     let [low, high] = bounds.unwrap_or([[0.0; 2], [1.0; 2]]);
     let longest = (high[0] - low[0]).max(high[1] - low[1]);
     ([low, high], (0.02 * longest).max(0.6 * spacing))

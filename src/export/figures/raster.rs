@@ -26,13 +26,22 @@ impl Raster {
 
     /// Lets `value` fall onto the sheet at `place` \[px\].
     pub fn drop(&mut self, place: [f64; 2], value: f64) {
+        self.drop_greater(place, value, |value| value);
+    }
+
+    /// The same where values have either sign: that which is larger in size stays.
+    pub fn drop_largest_in_size(&mut self, place: [f64; 2], value: f64) {
+        self.drop_greater(place, value, f64::abs);
+    }
+
+    fn drop_greater(&mut self, place: [f64; 2], value: f64, size: fn(f64) -> f64) {
         let [column, row] = [0, 1].map(|k| (place[k] - self.corner[k]) / self.side);
         if column >= 0.0
             && row >= 0.0
             && (column as usize) < self.columns
             && let Some(square) = self.largest.get_mut(row as usize * self.columns + column as usize)
         {
-            *square = Some(square.map_or(value, |largest| largest.max(value)));
+            *square = Some(square.filter(|&largest| size(largest) >= size(value)).unwrap_or(value));
         }
     }
 

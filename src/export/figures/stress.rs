@@ -30,14 +30,7 @@ pub fn stress(
     stresses: &Stresses,
     unit: &str,
 ) -> String {
-    let reference = &subject.body.reference;
-    let drawn = || (0..snapshot.roles.len()).filter(|&i| snapshot.roles[i].is_body());
-    let moved = |(now, then): ([f64; 2], [f64; 2])| [now[0] - then[0], now[1] - then[1]];
-    let displacement: Vectors = snapshot.positions.iter().zip(reference.iter()).map(moved).collect();
-    // Large displacements are drawn as they are: a bent body is to look as bent as it is.
-    let factor = enlargement(reference, &displacement, drawn).max(1.0);
-    let place = |(then, by): ([f64; 2], [f64; 2])| [then[0] + factor * by[0], then[1] + factor * by[1]];
-    let places: Vectors = reference.iter().zip(displacement.iter()).map(place).collect();
+    let (places, factor) = enlarged(subject, snapshot);
     let shown: Vec<(&[u32], f64)> = cells
         .iter()
         .zip(stresses.cells.iter().map(|stress| stress.von_mises))
@@ -49,7 +42,7 @@ pub fn stress(
     let values = shown.iter().map(|(_, value)| *value).chain(corners.iter().flatten().copied().flatten());
     let range = values.fold([f64::INFINITY, 0.0], |[low, high], v| [f64::min(low, v), f64::max(v, high)]);
     let bands = Bands::fine(range[0].min(range[1]), range[1], NOISE * range[1]);
-    let axes = page::window(&places, drawn(), subject.body.lattice.spacing());
+    let axes = page::window(&places, drawn(snapshot), subject.body.lattice.spacing());
     let place = if corners.is_some() { "" } else { " in the cells" };
     let mut note =
         format!("von Mises stress{place}, {}{}", page::note(subject, snapshot), scale_note(factor));
@@ -95,6 +88,22 @@ fn patches(
         cell.iter().map(sample).collect()
     };
     shown.iter().map(patch).collect()
+}
+
+/// The particles that are matter.
+pub(super) fn drawn(snapshot: &Snapshot) -> impl Iterator<Item = usize> {
+    (0..snapshot.roles.len()).filter(|&i| snapshot.roles[i].is_body())
+}
+
+/// Where particles are drawn, and the factor by which their displacements are enlarged for that.
+pub(super) fn enlarged(subject: &Subject<'_>, snapshot: &Snapshot) -> (Vectors, f64) {
+    let reference = &subject.body.reference;
+    let moved = |(now, then): ([f64; 2], [f64; 2])| [now[0] - then[0], now[1] - then[1]];
+    let displacement: Vectors = snapshot.positions.iter().zip(reference.iter()).map(moved).collect();
+    // Large displacements are drawn as they are: a bent body is to look as bent as it is.
+    let factor = enlargement(reference, &displacement, || drawn(snapshot)).max(1.0);
+    let place = |(then, by): ([f64; 2], [f64; 2])| [then[0] + factor * by[0], then[1] + factor * by[1]];
+    (reference.iter().zip(displacement.iter()).map(place).collect(), factor)
 }
 
 fn draw_cells(svg: &mut Svg, axes: &Axes, places: &Vectors, shown: &[(&[u32], f64)], bands: &Bands) {

@@ -64,6 +64,8 @@ pub enum FitError {
         spacing: f64,
         /// Where on the outline \[length\].
         place: [f64; 2],
+        /// What bounds the body there, and could lie elsewhere.
+        part: Part,
     },
     /// The outline turns more often within a cell than cells can follow.
     #[error(
@@ -97,6 +99,28 @@ pub enum FitError {
         /// Most sites that they may hold.
         limit: u64,
     },
+}
+
+/// A part of what bounds a body and its regions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Part {
+    /// The outer outline.
+    Outer,
+    /// A hole by its number, from 1.
+    Hole(usize),
+    /// The edge of a region by its number, from 1.
+    Region(usize),
+}
+
+impl Part {
+    /// The part that a loop or a line is.
+    fn of(outline: &Partition, ring: usize) -> Self {
+        match (outline.is_bounding(ring), ring) {
+            (false, line) => Self::Region(outline.region_along(line)),
+            (true, 0) => Self::Outer,
+            (true, hole) => Self::Hole(hole),
+        }
+    }
 }
 
 /// A body with its outline and its cells.

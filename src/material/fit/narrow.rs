@@ -1,7 +1,7 @@
 //! Whether a shape is everywhere as wide as the lattice is fine.
 
 use super::near::NearPieces;
-use super::{FitError, ROUNDING};
+use super::{FitError, Part, ROUNDING};
 use crate::flock::vectors::distance;
 use crate::geometry::meeting::meetings;
 use crate::geometry::partition::Partition;
@@ -42,7 +42,8 @@ pub fn require_wide(outline: &Partition, near: &NearPieces, spacing: f64) -> Res
                     let opposite = meetings(place, across, other).into_iter().map(|[s, _]| s);
                     let opposite = opposite.filter(|s| *s > 1e-6 && *s < 1.0 - 1e-6);
                     if let Some(share) = opposite.reduce(f64::min) {
-                        return Err(FitError::Narrow { width: share * spacing, spacing, place });
+                        let part = Part::of(outline, ring).max(Part::of(outline, other_ring));
+                        return Err(FitError::Narrow { width: share * spacing, spacing, place, part });
                     }
                 }
             }

@@ -1,0 +1,63 @@
+//! The components of the stress of a body's cells, where the cells are.
+
+use super::Subject;
+use super::axes::Axes;
+use super::comparison::scale_note;
+use super::heading::Heading;
+use super::page;
+use super::panels::{MOST_CELLS, Panel, Scale, Sheet, arranged};
+use super::stress::{drawn, enlarged};
+use crate::continuum::record::Snapshot;
+use crate::flock::vectors::Vectors;
+use crate::material::cells::Cells;
+use crate::material::stress::StressState;
+
+const NAMES: [&str; 3] = ["xx", "yy", "xy"];
+/// Stress below this part of the largest is rounding.
+const NOISE: f64 = 1e-9;
+
+/// Every whole cell three times, in the colours of its stresses xx, yy and xy on one scale: red is tension, blue pressure.
+/// Cells are in their places, or in those of displacements enlarged as the heading says.
+pub fn components(
+    subject: &Subject<'_>,
+    snapshot: &Snapshot,
+    cells: &Cells,
+    stresses: &[StressState],
+    unit: &str,
+) -> String {
+    let (places, factor) = enlarged(subject, snapshot);
+    let spacing = subject.body.lattice.spacing();
+    let (axes, is_row) = window(&places, drawn(snapshot), spacing);
+    let finite = || stresses.iter().flat_map(|stress| stress.components).filter(|s| s.is_finite());
+    let largest = finite().fold(0.0, |largest: f64, s| largest.max(s.abs()));
+    let of = |k: usize| -> Vec<f64> {
+        let value = |stress: &StressState| stress.components[k];
+        // Rounding has no sign worth a colour.
+        stresses.iter().map(value).map(|s| if s.abs() < NOISE * largest { 0.0 } else { s }).collect()
+    };
+    let by_component = [0, 1, 2].map(of);
+    let panels =
+        [0, 1, 2].map(|k| Panel { name: NAMES[k], stress: &by_component[k], places: &places, scale: 0 });
+    let mut note = format!(
+        "stresses xx, yy and xy in the cells, {}{}",
+        page::note(subject, snapshot),
+        scale_note(factor)
+    );
+    if cells.count() > MOST_CELLS {
+        note += &format!("; {} cells drawn as squares of their largest value", cells.count());
+    }
+    let heading = Heading { title: subject.title.into(), note, ..Heading::default() };
+    let scales = vec![Scale::around_zero("stress", largest, 10.0)];
+    Sheet { axes, is_row, scales, heading, cells, unit: subject.unit, stress_unit: unit, spacing }
+        .draw(&panels)
+}
+
+/// The plot of each component, and whether the three stand in a row.
+pub(in crate::export) fn window(
+    places: &Vectors,
+    drawn: impl Iterator<Item = usize>,
+    spacing: f64,
+) -> (Axes, bool) {
+    let bounds = page::bounds(places, drawn);
+    arranged(|room| page::within(bounds, spacing, room))
+}
