@@ -283,7 +283,7 @@ fn feedback_that_overshoots_swings_a_particle_about_its_place() {
     let drawn_out = moved.iter().filter(|(step, _)| *step <= 20);
     assert!(drawn_out.clone().zip(drawn_out.skip(1)).all(|((_, a), (_, b))| b > a), "is drawn to the right");
     let free: Vec<f64> = moved.iter().filter(|(step, _)| *step > 20).map(|(_, x)| *x).collect();
-    let swings: Vec<f64> = free.chunk_by(|a, b| a.signum() == b.signum()).map(|run| largest(run)).collect();
+    let swings: Vec<f64> = free.chunk_by(|a, b| a.signum() == b.signum()).map(largest).collect();
     println!("{} swings: {swings:.3?}", swings.len());
     assert!(swings.len() > 20, "{swings:?}");
     // To either side, and out.
