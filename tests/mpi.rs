@@ -303,10 +303,11 @@ fn wait_for_checkpoint(folder: &Path) {
     within(PATIENCE, "a checkpoint", || checkpoint.exists().then_some(()));
 }
 
-/// Waits until the launcher has ended; whether it ended well, and its words.
+/// Waits until the launcher has ended; whether it ended well, and its words: MPICH's says on its output what went wrong.
 fn ended(run: &mut Running) -> (bool, String) {
     let status = within(PATIENCE, "mpirun ends", || run.0.try_wait().expect("a child"));
     let mut said = String::new();
+    run.0.stdout.take().expect("piped").read_to_string(&mut said).expect("text");
     run.0.stderr.take().expect("piped").read_to_string(&mut said).expect("text");
     (status.success(), said)
 }
@@ -348,9 +349,9 @@ fn a_killed_rank_ends_the_run_which_goes_on_with_any_number_of_ranks() {
         let (is_well, said) = ended(&mut run);
         assert!(!is_well, "{said}");
         assert!(killed.elapsed() < PATIENCE / 4, "{:?}", killed.elapsed());
-        // Open MPI names the rank, MPICH its process.
-        let names = [format!("rank {victim} with PID"), format!("PID {}", ranks[victim])];
-        assert!(names.iter().any(|name| said.contains(name)), "{names:?}: {said}");
+        // Open MPI names the rank. MPICH names a process, which may be one that it has ended because of the other.
+        let by_process = ranks.iter().any(|process| said.contains(&format!("PID {process} RUNNING")));
+        assert!(by_process || said.contains(&format!("rank {victim} with PID")), "rank {victim}: {said}");
         assert!(folder.path().join("o.unfinished/checkpoint").exists(), "the last checkpoint stays");
         let what = format!("rank {victim} killed");
         assert_resumes(victim + 1, folder.path(), expected.path(), &what);
@@ -363,7 +364,7 @@ fn a_rank_killed_at_any_moment_costs_no_more_than_the_last_checkpoint() {
     let expected = alone(LONG);
     let undisturbed = {
         let folder = temporary();
-        let (mut run, _) = started(3, LONG, folder.path());
+        let (mut run, _) = started(2, LONG, folder.path());
         let begin = Instant::now();
         assert!(ended(&mut run).0);
         begin.elapsed()
@@ -374,9 +375,9 @@ fn a_rank_killed_at_any_moment_costs_no_more_than_the_last_checkpoint() {
         let folder = temporary();
         let random = RandomState::new().hash_one(n);
         let (victim, after) =
-            (random as usize % 3, undisturbed.mul_f64((random >> 32) as f64 / 2f64.powi(32)));
+            (random as usize % 2, undisturbed.mul_f64((random >> 32) as f64 / 2f64.powi(32)));
         let what = format!("rank {victim} killed after {after:?} of {undisturbed:?}");
-        let (mut run, ranks) = started(3, LONG, folder.path());
+        let (mut run, ranks) = started(2, LONG, folder.path());
         std::thread::sleep(after);
         signals::is_sent("KILL", ranks[victim]);
         let (_, said) = ended(&mut run);
@@ -384,7 +385,7 @@ fn a_rank_killed_at_any_moment_costs_no_more_than_the_last_checkpoint() {
             ["o/summary.json", "o.unfinished/checkpoint"].map(|of| folder.path().join(of).exists());
         match (done, left) {
             (true, _) => assert_same(&folder.path().join("o"), &expected.path().join("o"), &what),
-            (false, true) => assert_resumes(1 + n % 3, folder.path(), expected.path(), &what),
+            (false, true) => assert_resumes(1 + n % 2, folder.path(), expected.path(), &what),
             (false, false) => assert!(!folder.path().join("o").exists(), "{what}: {said}"),
         }
         counts[if done { 1 } else { usize::from(!left) * 2 }] += 1;

@@ -358,8 +358,11 @@ fn a_plan_foretells_who_moves_what_and_what_is_exchanged() {
 fn a_plan_foretells_which_solvers_ranks_share() {
     let exchanged = |name: &str, sets: &[&str]| {
         let scene = load(name, sets);
-        let shares = Shares::new(&scene, &planned(&scene), 3).expect("can be shared");
-        (shares.particles.clone(), shares.exchanged)
+        let plan = planned(&scene);
+        let shares = Shares::new(&scene, &plan, 3).expect("can be shared");
+        // Positions, forces, and what solves for them.
+        assert!(shares.bytes > 150 * plan.count(), "{}", shares.bytes);
+        (shares.particles, shares.exchanged)
     };
     let (particles, of_direct) = exchanged("beam-loaded", &["equilibrium.solver=direct"]);
     assert_eq!(of_direct, Exchanged::Interrupts);

@@ -55,6 +55,11 @@ fn place() -> Option<Place> {
     place_here().filter(|place| place.count > 1)
 }
 
+/// Ranks on this machine beside this one, as far as the launcher says.
+pub fn others_here() -> usize {
+    place().map_or(0, |place| place.here - 1)
+}
+
 /// One rank speaks for all of those that refuse the same.
 fn said_once(place: Place, error: RanksError) -> RanksError {
     if place.rank == 0 { error } else { RanksError::SaidElsewhere }

@@ -15,6 +15,7 @@ use flockform::continuum::equilibrium::{run_to_equilibrium_shared, run_to_equili
 use flockform::continuum::looks::Looks;
 use flockform::continuum::plan::Plan;
 use flockform::continuum::run::{Outcome, SharedError, StopReason, require_shareable, resume};
+use flockform::continuum::shares::bytes_each;
 use flockform::export::checkpoint::{self, Checkpoint, RunRequest};
 use flockform::export::film;
 use flockform::export::memory::Outputs;
@@ -115,7 +116,10 @@ impl Prepared {
             equilibrium.request.interrupt = Interrupt::new(interrupt::flag());
         }
         let plan = plan(&scene)?;
-        memory::require(&scene, memory::predicted(&scene, &plan, arguments.outputs()) as f64)?;
+        // The ranks of a machine share its memory, and each holds the whole body.
+        let of_others = ranks::others_here() * bytes_each(&scene, &plan);
+        let bytes = memory::predicted(&scene, &plan, arguments.outputs()) + of_others;
+        memory::require(&scene, bytes as f64)?;
         let digest = digest(&plan);
         left.as_ref().map_or(Ok(()), |left| left.require_of(&scene, digest))?;
         Ok(Self { left, asked, scene, words, plan, digest })

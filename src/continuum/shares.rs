@@ -1,6 +1,7 @@
 //! How ranks would share a run, before any of them is started.
 
 use super::equilibrium::of_plan;
+use super::memory::{readable_bytes, solving, stepped};
 use super::plan::Plan;
 use super::run::require_shareable;
 use crate::engine::setup::Setup;
@@ -13,6 +14,11 @@ use crate::sweep::domain::Share;
 
 /// Bytes of a position.
 const PLACE: usize = 16;
+
+/// Bytes that every rank takes, whatever it shows or writes: the body, and what steps or solves it.
+pub fn bytes_each(scene: &Scene, plan: &Plan) -> usize {
+    stepped(plan) + solving(scene, plan)
+}
 
 /// The data that are exchanged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,6 +52,8 @@ pub struct Shares {
     pub particles: Vec<usize>,
     /// Between the ranks.
     pub exchanged: Exchanged,
+    /// Bytes that each rank takes for the body and what steps or solves it; the first one takes more for the results.
+    pub bytes: usize,
 }
 
 impl Shares {
@@ -71,11 +79,12 @@ impl Shares {
             let largest = sweep.halo_sizes(steps).into_iter().max().unwrap_or_default();
             Exchanged::Halos { steps, bytes: PLACE * largest }
         };
-        Ok(Self { particles, exchanged })
+        Ok(Self { particles, exchanged, bytes: bytes_each(scene, plan) })
     }
 
     fn of_solver(scene: &Scene, request: &Request, plan: &Plan, ranks: usize) -> Result<Self, SceneError> {
-        let all = Self { particles: vec![plan.count(); ranks], exchanged: Exchanged::Interrupts };
+        let bytes = bytes_each(scene, plan);
+        let all = Self { particles: vec![plan.count(); ranks], exchanged: Exchanged::Interrupts, bytes };
         if is_corotated(&plan.setup.flock) {
             return Ok(all);
         }
@@ -84,6 +93,7 @@ impl Shares {
         Ok(shared_by(&system, solver, ranks).map_or(all, |SolverShares { particles, received }| Self {
             particles,
             exchanged: Exchanged::Iterations { bytes: PLACE * received },
+            bytes,
         }))
     }
 
@@ -117,11 +127,8 @@ impl Shares {
             }
             Exchanged::Interrupts => "nothing but whether to end".to_owned(),
         };
-        let facts = [
-            ("ranks", moved),
-            ("exchanged", exchanged),
-            ("memory of each rank", "as much as one alone: each holds the whole body".to_owned()),
-        ];
+        let memory = format!("{} beside the results: each holds the whole body", readable_bytes(self.bytes));
+        let facts = [("ranks", moved), ("exchanged", exchanged), ("memory of each rank", memory)];
         facts.map(|(name, value)| (name.to_owned(), value)).into()
     }
 }

@@ -9,24 +9,28 @@ pub struct Place {
     pub count: usize,
     /// The variable of the environment that says how many.
     pub variable: &'static str,
+    /// Ranks on this machine, this one among them; 1 where the launcher does not say.
+    pub here: usize,
 }
 
-/// Variables that a launcher gives to each rank: how many there are, and which one it is. The launcher nearest to the program
+/// Variables that a launcher gives to each rank: how many there are, which one it is, and how many there are on its machine,
+/// which Slurm gives as a list. The launcher nearest to the program
 /// comes first: within a Slurm job, `mpirun` has a number of its own. Slurm's `SLURM_NTASKS` is not among them: it describes a
 /// job, and a batch script that runs once has it too.
-const VARIABLES: [[&str; 2]; 4] = [
-    ["OMPI_COMM_WORLD_SIZE", "OMPI_COMM_WORLD_RANK"],
-    ["MV2_COMM_WORLD_SIZE", "MV2_COMM_WORLD_RANK"],
-    ["PMI_SIZE", "PMI_RANK"],
-    ["SLURM_STEP_NUM_TASKS", "SLURM_PROCID"],
+const VARIABLES: [[&str; 3]; 4] = [
+    ["OMPI_COMM_WORLD_SIZE", "OMPI_COMM_WORLD_RANK", "OMPI_COMM_WORLD_LOCAL_SIZE"],
+    ["MV2_COMM_WORLD_SIZE", "MV2_COMM_WORLD_RANK", "MV2_COMM_WORLD_LOCAL_SIZE"],
+    ["PMI_SIZE", "PMI_RANK", "MPI_LOCALNRANKS"],
+    ["SLURM_STEP_NUM_TASKS", "SLURM_PROCID", "SLURM_STEP_TASKS_PER_NODE"],
 ];
 
 /// This program's place, where a launcher has given it one; `variable` looks a variable of the environment up.
 pub fn place(variable: &dyn Fn(&str) -> Option<String>) -> Option<Place> {
     let number = |name: &str| variable(name)?.trim().parse::<usize>().ok();
-    VARIABLES.iter().find_map(|&[size, own]| {
+    VARIABLES.iter().find_map(|&[size, own, local]| {
         let (count, rank) = (number(size)?, number(own)?);
-        (rank < count).then_some(Place { rank, count, variable: size })
+        let here = number(local).map_or(1, |here| here.clamp(1, count.max(1)));
+        (rank < count).then_some(Place { rank, count, variable: size, here })
     })
 }
 
@@ -69,6 +73,20 @@ mod tests {
             ("OMPI_COMM_WORLD_RANK", "0"),
         ];
         assert_eq!(among(&within_slurm), Some((0, 1)));
+    }
+
+    #[test]
+    fn ranks_on_one_machine_are_counted_where_the_launcher_says_so() {
+        let here = |local: &[(&str, &str)]| {
+            let variables = [&[("PMI_SIZE", "8"), ("PMI_RANK", "7")], local].concat();
+            let of =
+                |name: &str| variables.iter().find(|(known, _)| *known == name).map(|(_, v)| (*v).to_owned());
+            place(&of).map(|place| place.here)
+        };
+        assert_eq!(here(&[("MPI_LOCALNRANKS", "4")]), Some(4));
+        for unclear in [&[][..], &[("MPI_LOCALNRANKS", "2(x3),1")], &[("OMPI_COMM_WORLD_LOCAL_SIZE", "4")]] {
+            assert_eq!(here(unclear), Some(1));
+        }
     }
 
     #[test]

@@ -91,11 +91,6 @@ impl Halo {
         halo
     }
 
-    /// Particles that are received.
-    pub fn received(&self) -> usize {
-        self.receives.iter().map(|(_, of)| count(of)).sum()
-    }
-
     /// Exchanges the particles of a vector.
     pub fn receive<T: Real>(&self, team: &Team, v: &mut Vectors<T>) {
         if self.sends.is_empty() && self.receives.is_empty() {
@@ -163,24 +158,24 @@ impl Part {
 
     /// Makes the whole vector known to every rank.
     pub fn gather<T: Real>(&self, v: &mut Vectors<T>) {
-        let of = |rank: usize| [self.cuts.particles_of(rank)];
-        let ranks = 0..self.cuts.ranks();
-        let counts: Vec<usize> =
-            ranks.clone().map(|rank| words_per_particle::<T>() * count(&of(rank))).collect();
-        let all = self.team.gather(&words(v, &of(self.team.rank())), &counts);
-        let mut rest = &all[..];
-        for rank in ranks {
-            let (of_rank, after) = rest.split_at(counts[rank]);
-            if rank != self.team.rank() {
-                put(v, &of(rank), of_rank);
-            }
-            rest = after;
-        }
+        let (own, all) = (self.team.rank(), 0..self.cuts.ranks());
+        let others = all.filter(|&rank| rank != own);
+        let of = |rank: usize| (rank, vec![self.cuts.particles_of(rank)]);
+        let is_any = |(_, of): &(usize, Vec<Range<usize>>)| count(of) > 0;
+        let receives = others.clone().map(of).filter(is_any).collect();
+        let sends = others.map(|rank| (rank, of(own).1)).filter(is_any).collect();
+        Halo { sends, receives }.receive(&self.team, v);
     }
 }
 
+/// How many particles of others a rank receives before it applies the rows of its own.
+pub fn received_by(matrix: &Matrix, cuts: &Cuts, rank: usize) -> usize {
+    let (own, read) = (cuts.particles_of(rank), joined(read_by_rows(matrix, cuts.groups_of(rank))));
+    [0..own.start, own.end..matrix.count()].iter().map(|others| count(&within(&read, others))).sum()
+}
+
 /// Particles outside a rank's groups that their rows lead to.
-pub fn read_by_rows(matrix: &Matrix, groups: Range<usize>) -> Vec<Range<usize>> {
+fn read_by_rows(matrix: &Matrix, groups: Range<usize>) -> Vec<Range<usize>> {
     let owned = matrix.bounds[groups.start]..matrix.bounds[groups.end];
     let mut outside = Vec::new();
     for run in groups.flat_map(|group| matrix.runs_of(group)) {
@@ -309,6 +304,8 @@ mod tests {
                         let sent = parts[*other].halo.sends.iter().find(|(to, _)| *to == rank);
                         assert_eq!(sent.map(|(_, of)| of), Some(of));
                     }
+                    let received: usize = part.halo.receives.iter().map(|(_, of)| count(of)).sum();
+                    assert_eq!(received_by(&matrix, &part.cuts, rank), received);
                     for run in part.groups().flat_map(|group| matrix.runs_of(group)) {
                         for &distance in matrix.distances(run) {
                             let start = (run.start as usize).wrapping_add_signed(distance as isize);

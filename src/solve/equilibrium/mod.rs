@@ -38,7 +38,7 @@ pub use system::System;
 
 use super::interrupt::Interrupt;
 use super::operator::Matrix;
-use super::part::{Cuts, Halo, Part, read_by_rows};
+use super::part::{Cuts, Part, received_by};
 use super::stopwatch::Stopwatch;
 use crate::flock::vectors::Vectors;
 use crate::ranks::Team;
@@ -277,8 +277,7 @@ pub fn shared_by(system: &System, solver: Solver, ranks: usize) -> Option<Solver
     }
     let matrix = Matrix::of_followers(&system.operator);
     let cuts = Cuts::new(&matrix, ranks);
-    let received =
-        |rank: usize| Halo::new(rank, &cuts, |rank| read_by_rows(&matrix, cuts.groups_of(rank))).received();
+    let received = |rank: usize| received_by(&matrix, &cuts, rank);
     let particles = (0..ranks).map(|rank| cuts.particles_of(rank).len()).collect();
     Some(SolverShares { particles, received: (0..ranks).map(received).max().unwrap_or_default() })
 }
