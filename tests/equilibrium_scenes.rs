@@ -6,6 +6,7 @@ use flockform::continuum::equilibrium::run_to_equilibrium;
 use flockform::continuum::memory::fallback;
 use flockform::continuum::plan::Plan;
 use flockform::continuum::run::{Outcome, StopReason};
+#[cfg(feature = "export")]
 use flockform::export::Measured;
 use flockform::flock::vectors::distance;
 use flockform::scene::Scene;
@@ -328,6 +329,7 @@ fn slender(length: f64, solver: &str) -> Scene {
     Scene::parse("slender", "slender.toml", &text, &[], None).unwrap_or_else(|error| panic!("{error}"))
 }
 
+#[cfg(feature = "export")]
 #[test]
 fn a_body_solved_as_far_as_rounding_goes_is_not_said_to_move() {
     let scene = slender(2000.0, "direct");
