@@ -314,7 +314,7 @@ impl SiteMap {
             Cut::Shape(shape) => {
                 let locator = RowLocator::new(shape, lattice.vector([1, 0]));
                 for row in low[1]..=high[1] {
-                    let of_shape = locator.row(lattice.position([low[0], row]));
+                    let of_shape = locator.row(lattice.position([low[0], row]), tolerance);
                     map.mark_row(row, |site| {
                         lattice.is_site(site) && of_shape.contains(lattice.position(site), tolerance)
                     });

@@ -15,8 +15,8 @@ struct Chord {
     high: Point,
 }
 
-/// Comparisons of two chords that are made at most: a quarter of a second.
-const MOST_PAIRS: usize = 20_000_000;
+/// Comparisons of two chords that are made at most: some tenths of a second.
+const MOST_PAIRS: usize = 10_000_000;
 
 /// Refuses loops of which two chords come nearer than `near` \[length\] and are not neighbours.
 pub(super) fn check(rings: &[Vec<Piece>], near: f64) -> Result<(), OutlineError> {
@@ -92,9 +92,9 @@ fn meeting(a: [Point; 2], b: [Point; 2], near: f64) -> Option<Point> {
     let is_beside = |[from, to]: [Point; 2], other: [Point; 2]| {
         let along = minus(to, from);
         // Twice as far as what is too near: sums are rounded.
-        let reach = 2.0 * near * along[0].hypot(along[1]);
+        let reach = 4.0 * near * near * (along[0] * along[0] + along[1] * along[1]);
         let [one, two] = other.map(|p| cross(along, minus(p, from)));
-        one.min(two) > reach || one.max(two) < -reach
+        one * two > 0.0 && (one * one).min(two * two) > reach
     };
     if is_beside(a, b) || is_beside(b, a) {
         return None;

@@ -75,6 +75,8 @@ enum RowLocated<'a> {
         /// Along and across the rows.
         vertices: Vec<Point>,
         tree: BoxTree,
+        /// Rounding of the coordinates.
+        slack: f64,
     },
     WithHoles {
         body: Box<RowLocator<'a>>,
@@ -93,7 +95,8 @@ impl<'a> RowLocator<'a> {
             Shape::Polygon { vertices } => {
                 let vertices: Vec<Point> = vertices.iter().map(|&vertex| turned(turn, vertex)).collect();
                 let tree = tree_of_edges(&vertices);
-                RowLocated::Polygon { vertices, tree }
+                let largest = vertices.iter().flatten().fold(0.0, |most: f64, along| most.max(along.abs()));
+                RowLocated::Polygon { vertices, tree, slack: 1e-12 * largest }
             }
             Shape::WithHoles { body, holes } => RowLocated::WithHoles {
                 body: Box::new(Self::new(body, direction)),
@@ -104,21 +107,29 @@ impl<'a> RowLocator<'a> {
         Self { located, turn }
     }
 
-    /// The row through a point.
-    pub fn row(&self, through: Point) -> Row<'_> {
+    /// The row through a point, for tolerances up to this one or its opposite.
+    pub fn row(&self, through: Point, tolerance: f64) -> Row<'_> {
         let [_, across] = turned(self.turn, through);
         let parts = match &self.located {
-            RowLocated::Polygon { vertices, tree } => {
-                let low = [f64::NEG_INFINITY, across];
-                let near = tree.overlapping(low, [f64::INFINITY, across]);
-                let mut crossings: Vec<f64> =
-                    near.filter_map(|k| crossing(edge(vertices, k), across)).collect();
+            RowLocated::Polygon { vertices, tree, slack } => {
+                let near = tolerance.abs() + slack;
+                let (low, high) = (across - near, across + near);
+                let mut crossings = Vec::new();
+                let mut stretches = Vec::new();
+                for k in tree.overlapping([f64::NEG_INFINITY, low], [f64::INFINITY, high]) {
+                    let ends = edge(vertices, k);
+                    crossings.extend(crossing(ends, across));
+                    let [from, to] = between(ends, low, high);
+                    stretches.push(Stretch { from: from - near, to: to + near, edge: k as u32 });
+                }
                 crossings.sort_unstable_by(f64::total_cmp);
-                RowParts::Polygon { vertices, tree, crossings }
+                stretches.sort_unstable_by(|a, b| a.from.total_cmp(&b.from));
+                let longest = stretches.iter().map(|one| one.to - one.from).fold(0.0, f64::max);
+                RowParts::Polygon { vertices, crossings, stretches, longest }
             }
             RowLocated::WithHoles { body, holes } => RowParts::WithHoles {
-                body: Box::new(body.row(through)),
-                holes: holes.iter().map(|hole| hole.row(through)).collect(),
+                body: Box::new(body.row(through, tolerance)),
+                holes: holes.iter().map(|hole| hole.row(through, tolerance)).collect(),
             },
             RowLocated::Other(locator) => RowParts::Other(locator),
         };
@@ -135,9 +146,11 @@ pub struct Row<'r> {
 enum RowParts<'r> {
     Polygon {
         vertices: &'r [Point],
-        tree: &'r BoxTree,
         /// Along the row, ascending.
         crossings: Vec<f64>,
+        /// By ascending beginnings.
+        stretches: Vec<Stretch>,
+        longest: f64,
     },
     WithHoles {
         body: Box<Row<'r>>,
@@ -146,21 +159,27 @@ enum RowParts<'r> {
     Other(&'r Locator<'r>),
 }
 
+/// Where on a row an edge may be within the tolerance.
+struct Stretch {
+    from: f64,
+    to: f64,
+    edge: u32,
+}
+
 impl Row<'_> {
     /// As [`Shape::contains`], of a point of the row.
     pub fn contains(&self, point: Point, tolerance: f64) -> bool {
         match &self.parts {
-            RowParts::Polygon { vertices, tree, crossings } => {
+            RowParts::Polygon { vertices, crossings, stretches, longest } => {
                 let [along, across] = turned(self.turn, point);
                 let behind = crossings.len() - crossings.partition_point(|&crossing| crossing <= along);
-                // Twice the tolerance, as distances are rounded.
-                let near = 2.0 * tolerance.abs();
-                let beside = tree.overlapping([along - near, across - near], [along + near, across + near]);
-                let away = |k: usize| {
-                    let (a, b) = edge(vertices, k);
+                let first = stretches.partition_point(|one| one.from < along - longest);
+                let beside = stretches[first..].iter().take_while(|one| one.from <= along);
+                let away = |one: &Stretch| {
+                    let (a, b) = edge(vertices, one.edge as usize);
                     segment_distance([along, across], a, b)
                 };
-                let nearest = beside.map(away).fold(f64::INFINITY, f64::min);
+                let nearest = beside.filter(|one| along <= one.to).map(away).fold(f64::INFINITY, f64::min);
                 let inside = behind % 2 == 1;
                 if tolerance >= 0.0 { inside || nearest <= tolerance } else { inside && nearest > -tolerance }
             }
@@ -175,6 +194,15 @@ impl Row<'_> {
 /// Coordinates along and across rows.
 fn turned([cos, sin]: Point, [x, y]: Point) -> Point {
     [cos * x + sin * y, cos * y - sin * x]
+}
+
+/// How far the part of an edge between two heights reaches to the left and to the right.
+fn between((a, b): Segment, low: f64, high: f64) -> [f64; 2] {
+    let rise = b[1] - a[1];
+    // One that is level lies wholly between them, or it would not be asked about.
+    let at = |height: f64| a[0] + ((height - a[1]) / rise).clamp(0.0, 1.0) * (b[0] - a[0]);
+    let ends = if rise == 0.0 { [a[0], b[0]] } else { [at(low), at(high)] };
+    [ends[0].min(ends[1]), ends[0].max(ends[1])]
 }
 
 fn edge(vertices: &[Point], k: usize) -> Segment {
@@ -306,11 +334,12 @@ mod tests {
                         );
                         // A row in any direction goes through it; along x the answer is the same to the last bit.
                         assert_eq!(
-                            RowLocator::new(&shape, [2.0, 0.0]).row(p).contains(p, tolerance),
+                            RowLocator::new(&shape, [2.0, 0.0]).row(p, tolerance).contains(p, tolerance),
                             expected
                         );
                         let (sin, cos) = (0.1 * k as f64).sin_cos();
-                        let turned = RowLocator::new(&shape, [cos, sin]).row(p).contains(p, tolerance);
+                        let turned =
+                            RowLocator::new(&shape, [cos, sin]).row(p, tolerance).contains(p, tolerance);
                         assert!(turned == expected || k % 2 == 1, "{seed} {tolerance} {p:?} {shape:?}");
                         verdicts[usize::from(expected)] += 1;
                     }
