@@ -42,7 +42,7 @@ pub fn list(arguments: &ListArguments) -> Result<(), Refusal> {
     }
     let width = all.iter().map(|one| one.name.len()).max().unwrap_or(0);
     let line = |(one, title): (&Bundled, &String)| format!("{:width$}  {title}\n", one.name);
-    print(&all.into_iter().zip(&titles).map(line).collect::<String>())
+    print(&all.iter().zip(&titles).map(line).collect::<String>())
 }
 
 fn title(kind: Kind, one: &Bundled) -> Result<String, SceneError> {

@@ -23,7 +23,7 @@ fn outlines_of_a_hundred_thousand_corners_are_answered_at_once() {
         let count = 50_000;
         let corner = |k: usize| {
             let x = width * k as f64 / count as f64;
-            if k % 2 == 0 { [x, 0.0] } else { [x + slant * width, height] }
+            if k.is_multiple_of(2) { [x, 0.0] } else { [x + slant * width, height] }
         };
         let corners: Vec<String> = (0..count)
             .map(corner)
