@@ -3,63 +3,9 @@
 use super::box_tree::BoxTree;
 use super::outline::{Outline, Place};
 use super::piece::{Piece, distance, is_inside};
-use super::shape::{Segment, Shape, crossing, path_contains, polygon_contains, segment_distance};
+use super::shape::{Segment, Shape, crossing, path_contains, segment_distance};
 
 type Point = [f64; 2];
-
-/// A shape to be asked about many points: of its boundary, what is near a point is known without a look at the rest.
-#[derive(Clone, Debug)]
-pub struct Locator<'a>(Located<'a>);
-
-#[derive(Clone, Debug)]
-enum Located<'a> {
-    /// One of few pieces.
-    Simple(&'a Shape),
-    Polygon {
-        vertices: &'a [Point],
-        tree: BoxTree,
-    },
-    Path {
-        pieces: &'a [Piece],
-        tree: BoxTree,
-    },
-    WithHoles {
-        body: Box<Locator<'a>>,
-        holes: Vec<Locator<'a>>,
-    },
-}
-
-impl<'a> Locator<'a> {
-    /// Sorts the boundary of a shape.
-    pub fn new(shape: &'a Shape) -> Self {
-        Self(match shape {
-            Shape::Polygon { vertices } => Located::Polygon { vertices, tree: tree_of_edges(vertices) },
-            Shape::Path { pieces } => Located::Path { pieces, tree: tree_of(pieces.iter()) },
-            Shape::WithHoles { body, holes } => Located::WithHoles {
-                body: Box::new(Self::new(body)),
-                holes: holes.iter().map(Self::new).collect(),
-            },
-            simple => Located::Simple(simple),
-        })
-    }
-
-    /// As [`Shape::contains`] of the shape.
-    pub fn contains(&self, point: Point, tolerance: f64) -> bool {
-        match &self.0 {
-            Located::Simple(shape) => shape.contains(point, tolerance),
-            Located::Polygon { vertices, tree } => {
-                polygon_contains(vertices, right_of(tree, point, tolerance), point, tolerance)
-            }
-            Located::Path { pieces, tree } => {
-                let near = right_of(tree, point, tolerance).map(|k| &pieces[k]);
-                path_contains(near, point, tolerance)
-            }
-            Located::WithHoles { body, holes } => {
-                body.contains(point, tolerance) && !holes.iter().any(|hole| hole.contains(point, -tolerance))
-            }
-        }
-    }
-}
 
 /// A shape to be asked about points in rows: where a row crosses the boundary is found once for all of its points.
 #[derive(Clone, Debug)]
@@ -82,8 +28,12 @@ enum RowLocated<'a> {
         body: Box<RowLocator<'a>>,
         holes: Vec<RowLocator<'a>>,
     },
-    /// Of few pieces, or of arcs.
-    Other(Locator<'a>),
+    Path {
+        pieces: &'a [Piece],
+        tree: BoxTree,
+    },
+    /// Of few pieces.
+    Simple(&'a Shape),
 }
 
 impl<'a> RowLocator<'a> {
@@ -102,7 +52,8 @@ impl<'a> RowLocator<'a> {
                 body: Box::new(Self::new(body, direction)),
                 holes: holes.iter().map(|hole| Self::new(hole, direction)).collect(),
             },
-            other => RowLocated::Other(Locator::new(other)),
+            Shape::Path { pieces } => RowLocated::Path { pieces, tree: tree_of(pieces.iter()) },
+            simple => RowLocated::Simple(simple),
         };
         Self { located, turn }
     }
@@ -131,7 +82,8 @@ impl<'a> RowLocator<'a> {
                 body: Box::new(body.row(through, tolerance)),
                 holes: holes.iter().map(|hole| hole.row(through, tolerance)).collect(),
             },
-            RowLocated::Other(locator) => RowParts::Other(locator),
+            RowLocated::Path { pieces, tree } => RowParts::Path { pieces, tree },
+            RowLocated::Simple(shape) => RowParts::Simple(shape),
         };
         Row { parts, turn: self.turn }
     }
@@ -156,7 +108,11 @@ enum RowParts<'r> {
         body: Box<Row<'r>>,
         holes: Vec<Row<'r>>,
     },
-    Other(&'r Locator<'r>),
+    Path {
+        pieces: &'r [Piece],
+        tree: &'r BoxTree,
+    },
+    Simple(&'r Shape),
 }
 
 /// Where on a row an edge may be within the tolerance.
@@ -186,7 +142,11 @@ impl Row<'_> {
             RowParts::WithHoles { body, holes } => {
                 body.contains(point, tolerance) && !holes.iter().any(|hole| hole.contains(point, -tolerance))
             }
-            RowParts::Other(locator) => locator.contains(point, tolerance),
+            RowParts::Path { pieces, tree } => {
+                let near = right_of(tree, point, tolerance).map(|k| &pieces[k]);
+                path_contains(near, point, tolerance)
+            }
+            RowParts::Simple(shape) => shape.contains(point, tolerance),
         }
     }
 }
@@ -318,7 +278,7 @@ mod tests {
     fn few_pieces_say_of_a_point_what_all_say() {
         for seed in 0..20 {
             for shape in shapes(seed) {
-                let locator = Locator::new(&shape);
+                let locator = RowLocator::new(&shape, [2.0, 0.0]);
                 let mut next = chance(seed + 100);
                 let mut verdicts = [0; 2];
                 for tolerance in [0.0, 1e-9, 0.3, -1e-9, -0.3] {
@@ -327,15 +287,11 @@ mod tests {
                         let p = [0, 1].map(|_| 16.0 * next() - 3.0);
                         let p = if k % 2 == 0 { p } else { p.map(f64::round) };
                         let expected = shape.contains(p, tolerance);
-                        assert_eq!(
-                            locator.contains(p, tolerance),
-                            expected,
-                            "{seed} {tolerance} {p:?} {shape:?}"
-                        );
                         // A row in any direction goes through it; along x the answer is the same to the last bit.
                         assert_eq!(
-                            RowLocator::new(&shape, [2.0, 0.0]).row(p, tolerance).contains(p, tolerance),
-                            expected
+                            locator.row(p, tolerance).contains(p, tolerance),
+                            expected,
+                            "{seed} {tolerance} {p:?} {shape:?}"
                         );
                         let (sin, cos) = (0.1 * k as f64).sin_cos();
                         let turned =
