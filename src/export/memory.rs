@@ -17,6 +17,9 @@ const RUNNING: usize = 3 << 20;
 /// Bytes of a particle in a [`Snapshot`](crate::continuum::record::Snapshot): position, role and energies.
 const SNAPSHOT: usize = 16 + 1 + 2 * 8;
 
+/// Bytes of what a figure shows of a cell: three components, or the von Mises stress and where the corners stand.
+const SHOWN: usize = 3 * 8;
+
 /// Outputs that a run is to write.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Outputs {
@@ -53,9 +56,9 @@ pub fn predicted(scene: &Scene, plan: &Plan, outputs: Outputs, program: usize) -
     };
     let packing = last + values.max(packing) + frames[1];
     let tables = last + text + measured(plan);
-    // Of stresses a figure needs those of the cells, and there are two that do.
+    // Of stresses a figure needs those of the cells, and what it shows of them; there are two that do.
     let cells = plan.setup.cells.as_ref().map_or(0, Cells::count);
-    let stresses = rayon::current_num_threads().min(2) * size_of::<StressState>() * cells;
+    let stresses = rayon::current_num_threads().min(2) * (size_of::<StressState>() + SHOWN) * cells;
     let drawing = match draws {
         true => last + text + pictures(scene, plan, drawn_before + 1) + stresses,
         false => 0,
