@@ -252,7 +252,7 @@ fn free_edge(scene: &Scene, layout: &Layout, loads: &[Load], held: &[[bool; 2]])
 fn held_axes(body: &Body, changes: &[RoleChange]) -> Vec<[bool; 2]> {
     let mut leads = vec![[false; 2]; body.count()];
     for change in changes.iter().filter(|change| change.from <= 1 && change.when.is_none()) {
-        let is_led = matches!(change.role, Role::Leader | Role::Clamped);
+        let is_led = change.role.is_led();
         for &i in &change.particles {
             match change.axis {
                 None => leads[i] = [is_led; 2],

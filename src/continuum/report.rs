@@ -272,7 +272,7 @@ fn cautions(scene: &Scene, plan: &Plan, deviation: Option<&Deviation>) -> Vec<St
         );
     }
     cautions.extend(bulk_response::cautions(scene));
-    let led = |role: &Role| matches!(role, Role::Leader | Role::Clamped);
+    let led = |role: &Role| role.is_led();
     if !plan.setup.roles.iter().any(led) && scene.roles.iter().all(|entry| !led(&entry.role)) {
         cautions.push("no particle leads: the body relaxes by itself".into());
     }

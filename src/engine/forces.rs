@@ -207,7 +207,7 @@ pub fn held(engine: &Engine) -> Vec<Vec<Held>> {
         for &i in particles.iter().filter(|&&i| roles[i] == present) {
             match axis {
                 Some(axis) => holder[i][*axis as usize] = Some(k),
-                None if matches!(role, Role::Leader | Role::Clamped) => holder[i] = [Some(k); 2],
+                None if role.is_led() => holder[i] = [Some(k); 2],
                 None => holder[i] = [None; 2],
             }
         }

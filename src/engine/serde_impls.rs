@@ -27,8 +27,7 @@ pub(crate) mod roles {
     use crate::flock::role::Role;
 
     pub fn serialize<S: Serializer>(roles: &[Role], to: S) -> Result<S::Ok, S::Error> {
-        let number = |role: &Role| Role::ALL.iter().position(|one| one == role).unwrap_or(0) as u8;
-        to.collect_seq(roles.iter().map(number))
+        to.collect_seq(roles.iter().map(|role| role.number()))
     }
 
     pub fn deserialize<'de, D: Deserializer<'de>, T: From<Vec<Role>>>(from: D) -> Result<T, D::Error> {

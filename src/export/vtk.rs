@@ -140,16 +140,6 @@ fn file_name(step: usize) -> String {
     format!("step_{step:06}.vtu")
 }
 
-fn role_number(role: Role) -> u8 {
-    match role {
-        Role::Follower => 0,
-        Role::Leader => 1,
-        Role::Clamped => 2,
-        Role::Frame => 3,
-        Role::Ghost => 4,
-    }
-}
-
 fn write_frame(path: &Path, engine: &Engine, material: Option<&Elastic>) -> io::Result<()> {
     let mut out = create_buffered(path)?;
     let grid = Grid::of(engine);
@@ -158,7 +148,7 @@ fn write_frame(path: &Path, engine: &Engine, material: Option<&Elastic>) -> io::
     writeln!(out, "<?xml version=\"1.0\"?>")?;
     let attributes = "type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\"";
     writeln!(out, "<VTKFile {attributes} header_type=\"UInt64\">")?;
-    let roles = Role::ALL.map(|role| format!("{} {}", role_number(role), role.name())).join(", ");
+    let roles = Role::ALL.map(|role| format!("{} {}", role.number(), role.name())).join(", ");
     writeln!(out, "<!-- step {}; role: {roles} -->", engine.step())?;
     writeln!(out, "<UnstructuredGrid>")?;
     writeln!(out, "<Piece NumberOfPoints=\"{points}\" NumberOfCells=\"{}\">", grid.count())?;
@@ -177,7 +167,7 @@ fn write_point_data(out: &mut impl Write, engine: &Engine, stresses: Option<&Str
     let (points, body) = (engine.present().len(), engine.body());
     writeln!(out, "<PointData Scalars=\"pe1\" Vectors=\"displacement\">")?;
     integers(out, "id", points, body.rows().map(|i| body.id(i) as i64))?;
-    let roles = body.rows().map(|i| role_number(engine.roles()[i]));
+    let roles = body.rows().map(|i| engine.roles()[i].number());
     bytes(out, "role", points, roles)?;
     let moved = body.rows().map(|i| (engine.present().get(i), body.reference.get(i)));
     let displacement = moved.flat_map(|(now, initial)| [now[0] - initial[0], now[1] - initial[1], 0.0]);

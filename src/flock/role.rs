@@ -30,6 +30,16 @@ impl Role {
         }
     }
 
+    /// Its place in [`Role::ALL`], which stands for it in files and messages.
+    pub const fn number(self) -> u8 {
+        self as u8
+    }
+
+    /// Whether the particle goes where it is led or held rather than where the rule has it.
+    pub fn is_led(self) -> bool {
+        matches!(self, Role::Leader | Role::Clamped)
+    }
+
     /// Whether the particle is matter: part of the body rather than scaffolding around it.
     pub fn is_body(self) -> bool {
         matches!(self, Role::Follower | Role::Leader | Role::Clamped)

@@ -115,7 +115,8 @@ impl Conductor {
     /// Goes on until `stop` is raised or no viewer can ask for anything any more, and returns the session.
     pub fn run(mut self, requests: &Receiver<Request>, stop: &AtomicBool) -> Session {
         let _closed = Closed(Arc::clone(&self.board));
-        let mut shown = Instant::now();
+        // Kept on a grid of times: what a frame is late by would otherwise come on top of each.
+        let mut next = Instant::now();
         let mut before = Instant::now();
         let mut is_news = false;
         while !stop.load(Ordering::Relaxed) {
@@ -123,7 +124,7 @@ impl Conductor {
                 // It goes on by itself; the question is whether a viewer follows it.
                 self.is_playing = self.board.viewers() > 0;
             }
-            let due = SHOWN_EVERY.saturating_sub(shown.elapsed()).max(LEAST_WAIT);
+            let due = next.saturating_duration_since(Instant::now()).max(LEAST_WAIT);
             let wait = if self.is_playing { due } else { IDLE };
             is_news |= match requests.recv_timeout(wait) {
                 Ok(request) => self.take(request),
@@ -138,9 +139,9 @@ impl Conductor {
             is_news |= self.play(now.duration_since(before).as_secs_f64());
             before = now;
             self.pace.look();
-            if is_news && (shown.elapsed() >= SHOWN_EVERY || !self.is_playing) {
+            if is_news && (now >= next || !self.is_playing) {
                 self.show();
-                (shown, is_news) = (Instant::now(), false);
+                (next, is_news) = ((next + SHOWN_EVERY).max(now), false);
             }
         }
         self.session

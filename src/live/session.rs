@@ -133,7 +133,7 @@ impl Session {
     /// Roles by number, shape \[count\].
     pub fn roles(&self) -> Vec<u8> {
         match self {
-            Session::Body(body) => crate::export::report::view::numbers(body.engine().roles()),
+            Session::Body(body) => body.engine().roles().iter().map(|role| role.number()).collect(),
             Session::Swarm(swarm) => swarm.roles(),
             Session::Monitor(monitor) => monitor.roles(),
         }

@@ -344,7 +344,7 @@ pub(super) fn frame(control: &Control, places: &Vectors, clearance: &[f64], cloc
 pub(super) fn roles(control: &Control) -> Vec<u8> {
     let formation = control.formation();
     let role = |m: usize| if formation.leads(m) { Role::Leader } else { Role::Follower };
-    crate::export::report::view::numbers(&(0..formation.count()).map(role).collect::<Vec<_>>())
+    (0..formation.count()).map(|m| role(m).number()).collect()
 }
 
 /// Bounds that are broken, in words, and the robots that break them.

@@ -92,7 +92,7 @@ impl Body {
 
     fn require_led(&self, particle: usize) -> PyResult<()> {
         let role = self.engine.roles()[particle];
-        if matches!(role, Role::Leader | Role::Clamped) {
+        if role.is_led() {
             return Ok(());
         }
         let id = self.engine.body().id(particle);
@@ -266,8 +266,7 @@ impl Body {
 
     /// Roles of the particles as numbers of flockform.ROLES, uint8, shape (count,).
     fn roles<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<u8>>> {
-        let number = |role: &Role| Role::ALL.iter().position(|one| one == role).unwrap_or_default() as u8;
-        moved(py, self.engine.roles().iter().map(number).collect(), &[self.count()])
+        moved(py, self.engine.roles().iter().map(|role| role.number()).collect(), &[self.count()])
     }
 
     /// Indices of the particles of a role, int64, shape (k,).

@@ -6,7 +6,6 @@
 use super::payload::Particle;
 use super::{Capacity, Domain, Peer, Reader, ShmError, Writer};
 use crate::engine::Engine;
-use crate::flock::role::Role;
 use crate::swarm::pace::system_time;
 
 /// Leaf of the service that carries the positions of a body.
@@ -47,7 +46,11 @@ impl Positions {
         let (present, roles, body) = (engine.present(), engine.roles(), engine.body());
         let particle = |row: usize| {
             let i = body.in_row(row);
-            Particle { id: body.id(i) as u32, role: code(roles[i]), position: [present.x[i], present.y[i]] }
+            Particle {
+                id: body.id(i) as u32,
+                role: roles[i].number().into(),
+                position: [present.x[i], present.y[i]],
+            }
         };
         if let Err(error) = self.writer.send(system_time(), step as u64, present.len(), particle) {
             if self.unsent == 0 {
@@ -60,16 +63,6 @@ impl Positions {
     /// Steps that could not be shown \[1\].
     pub fn unsent(&self) -> u64 {
         self.unsent
-    }
-}
-
-fn code(role: Role) -> u32 {
-    match role {
-        Role::Follower => 0,
-        Role::Leader => 1,
-        Role::Clamped => 2,
-        Role::Frame => 3,
-        Role::Ghost => 4,
     }
 }
 

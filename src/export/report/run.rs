@@ -16,7 +16,7 @@ use super::encoded;
 use super::frames::{Channel, Frame, Frames, MOST_FRAMES};
 use super::page::{Page, number, scene_text};
 use super::plot::{self, Plot, PlotAxis, PlotSeries};
-use super::view::{self, Animation, Clock, Quantity, Stress, View};
+use super::view::{Animation, Clock, Quantity, Stress, View};
 use crate::continuum::mechanics::Stresses;
 use crate::continuum::memory::{measured, neighbour_entries};
 use crate::continuum::plan::Plan;
@@ -215,7 +215,7 @@ impl RunRecorder {
         let both = self.roles.iter().zip(engine.roles()).enumerate();
         let step = engine.step() as u32;
         self.changes.extend(
-            both.filter(|(_, (was, is))| was != is).map(|(i, (_, &is))| [step, i as u32, view::number(is)]),
+            both.filter(|(_, (was, is))| was != is).map(|(i, (_, &is))| [step, i as u32, is.number().into()]),
         );
         self.roles.copy_from_slice(engine.roles());
     }

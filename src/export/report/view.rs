@@ -142,7 +142,7 @@ impl View {
 
     /// Roles at first, and `[step, particle, role]` of every change.
     pub(crate) fn set_roles(&mut self, first: &[Role], changes: &[[u32; 3]]) {
-        self.put("roles", integers(first.iter().map(|&role| number(role)), 1));
+        self.put("roles", integers(first.iter().map(|&role| role.number().into()), 1));
         self.put("role-changes", integers(changes.iter().flatten().copied(), 3));
     }
 
@@ -181,14 +181,4 @@ impl View {
     pub(crate) fn size(&self) -> usize {
         self.arrays.iter().map(|(_, text)| text.len()).sum()
     }
-}
-
-/// Roles by number, shape \[count\].
-#[cfg(feature = "live")]
-pub(crate) fn numbers(roles: &[Role]) -> Vec<u8> {
-    roles.iter().map(|&role| number(role) as u8).collect()
-}
-
-pub(crate) fn number(role: Role) -> u32 {
-    Role::ALL.iter().position(|&one| one == role).unwrap_or_default() as u32
 }

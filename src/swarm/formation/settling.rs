@@ -32,7 +32,7 @@ impl Settling {
     pub fn of(engine: &Engine) -> Option<Self> {
         let roles = engine.roles();
         let follows: Vec<bool> = roles.iter().map(|&role| role == Role::Follower).collect();
-        let leads = |&i: &usize| matches!(roles[i], Role::Leader | Role::Clamped);
+        let leads = |&i: &usize| roles[i].is_led();
         let leaders: Vec<usize> = (0..roles.len()).filter(leads).collect();
         let followers: Vec<usize> = (0..roles.len()).filter(|&i| follows[i]).collect();
         if followers.is_empty() || followers.len() > MOST_FOLLOWERS {
