@@ -4,8 +4,8 @@
 //
 // `drag` numbers the particle that is dragged, `cut` has the ends of a cut, `key` is a key to change, `fault` the robot that is
 // killed, `push` says where an obstacle is taken and how far it goes, `squeeze` that the slider is moved, `load` has the particle
-// whose edge is loaded, `design` says what a designer does, `node` the leader of a node that is dragged, `frames` for how many milliseconds the frames are counted. FLOCKFORM_NODE_MODULES is a folder with
-// playwright-core and axe-core, FLOCKFORM_PICTURES one for screenshots.
+// whose edge is loaded, `design` says what a designer does, `node` the leader of a node that is dragged. FLOCKFORM_NODE_MODULES
+// is a folder with playwright-core and axe-core, FLOCKFORM_PICTURES one for screenshots.
 
 import { createRequire } from "node:module";
 import { mkdtempSync, readFileSync, rmSync } from "node:fs";
@@ -331,14 +331,6 @@ async function everything(page, other) {
   await tools(page);
   await page.click("#play");
   await later(page, 0);
-  if (asked.frames) {
-    await page.selectOption("#quantity", asked.quantity ?? "role");
-    await page.waitForTimeout(asked.frames);
-    await page.waitForFunction(() => window.report.live.measured.rate > 0);
-    const measured = await page.evaluate(() => ({ ...window.report.live.measured, rates: window.report.live.session.status.rates }));
-    seen.measured = measured;
-    await shoot(page, `${asked.name}-frames`);
-  }
   mark("playing");
   if (asked.drag !== undefined) await drag(page, other);
   mark("dragged");
