@@ -100,7 +100,8 @@ pub fn swarm(arguments: &SwarmArguments) -> Result<ExitCode, Refusal> {
     let seconds = start.elapsed().as_secs_f64();
     let saving = interrupt::saving();
     // Figures take longer than an interrupt may.
-    let write = if interrupt::is_raised() { write_flight_tables } else { write_flight };
+    let is_drawn = !interrupt::is_raised();
+    let write = if is_drawn { write_flight } else { write_flight_tables };
     write(&folder, &swarm, &record, &report)?;
     if let Some(recorder) = recorder.as_mut().filter(|_| reports) {
         let stage = recorder.stage(&swarm, &report);
@@ -110,8 +111,8 @@ pub fn swarm(arguments: &SwarmArguments) -> Result<ExitCode, Refusal> {
     let recorded = close(recording)?;
     drop(saving);
     let broken_off = interrupted.load(Ordering::Relaxed);
-    let film = film.filter(|_| !broken_off).zip(recorder);
     let is_asked = film.is_some();
+    let film = film.filter(|_| !broken_off).zip(recorder);
     let made = film.map_or(Ok(None), |(film, recorder)| {
         let drawn = film::flight::film(&swarm, &record, &report, &recorder, film.colour);
         film.make(&drawn, &kept, arguments.output.quiet)
@@ -123,9 +124,13 @@ pub fn swarm(arguments: &SwarmArguments) -> Result<ExitCode, Refusal> {
         say(&made.as_ref().map_or_else(String::new, film_words))?;
     }
     let broken_off = broken_off || is_asked && made.is_none();
-    if is_asked && made.is_none() {
-        eprintln!("interrupted: there is no film, the rest is written");
-    }
+    let missing = match (is_drawn, is_asked && made.is_none()) {
+        (true, false) => None,
+        (true, true) => Some("there is no film"),
+        (false, false) => Some("there are no figures"),
+        (false, true) => Some("there are neither figures nor a film"),
+    };
+    missing.iter().for_each(|missing| eprintln!("interrupted: {missing}, the rest is written"));
     if !broken_off {
         arguments.report.show(&kept);
     }

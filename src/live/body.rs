@@ -81,9 +81,13 @@ impl Body {
     /// Whether bonds could break past a stretch, and none has been set.
     fn can_break(&self) -> bool {
         let engine = &self.history.now.engine;
-        let is_whole = engine.flock().bonds.as_ref().is_none_or(|bonds| bonds.threshold.is_none());
-        let has_bonds = !matches!(engine.flock().rule.mean, Mean::Material { .. });
-        engine.lasting_neighbours().is_some() && has_bonds && is_whole
+        engine.flock().bonds.as_ref().is_none_or(|bonds| bonds.threshold.is_none()) && self.takes_cuts()
+    }
+
+    /// Whether it has bonds that can be cut.
+    pub fn takes_cuts(&self) -> bool {
+        let engine = &self.history.now.engine;
+        engine.lasting_neighbours().is_some() && !matches!(engine.flock().rule.mean, Mean::Material { .. })
     }
 
     /// Whether a side can be loaded by hand: stress takes a material.

@@ -304,7 +304,7 @@ impl Conductor {
             "obstacles": self.session.obstacles(),
             "sets": self.session.sets(),
             "command": self.command(),
-            "loads": self.session.takes_loads(),
+            "tools": self.session.tools(),
             "viewers": self.board.viewers(),
             "rates": self.pace.rates,
             "node": self.monitor().map(Monitor::status),

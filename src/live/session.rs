@@ -190,12 +190,11 @@ impl Session {
         }
     }
 
-    /// Whether a side can be loaded by hand.
-    pub fn takes_loads(&self) -> bool {
-        match self {
-            Session::Body(body) => body.takes_loads(),
-            Session::Swarm(_) | Session::Monitor(_) => false,
-        }
+    /// What a hand can do to a body of this kind, by the tools' names.
+    pub fn tools(&self) -> Vec<&'static str> {
+        let Session::Body(body) = self else { return Vec::new() };
+        let tools = [("cut", body.takes_cuts()), ("load", body.takes_loads())];
+        tools.into_iter().filter(|(_, is)| *is).map(|(name, _)| name).collect()
     }
 
     /// Steps or periods in a second at the usual speed \[1/s\].

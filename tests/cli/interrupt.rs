@@ -142,7 +142,7 @@ fn a_large_run_of_slow_steps_keeps_its_checkpoint_and_goes_on_from_it() {
 
 /// Interrupts a job until its results come in time, which a computer that has other work may not let them: then nothing is
 /// kept, and it is tried again.
-fn kept(job: &[&str], busy: Duration, result: &str) -> tempfile::TempDir {
+fn kept(job: &[&str], busy: Duration, result: &str) -> (tempfile::TempDir, String) {
     for _ in 0..8 {
         let folder = temporary();
         let mut child = start(&[job, &["--out", "o"]].concat(), folder.path());
@@ -153,7 +153,7 @@ fn kept(job: &[&str], busy: Duration, result: &str) -> tempfile::TempDir {
         assert_ne!(is_kept, said.contains("nothing is kept"), "{said}: {:?}", files(folder.path()));
         assert!(is_kept || names_in(folder.path()).is_empty(), "{said}: {:?}", files(folder.path()));
         if is_kept {
-            return folder;
+            return (folder, said);
         }
     }
     panic!("{job:?}: its results are never kept");
@@ -162,14 +162,20 @@ fn kept(job: &[&str], busy: Duration, result: &str) -> tempfile::TempDir {
 #[test]
 fn increments_that_are_solved_before_an_interrupt_are_kept() {
     let job = ["run", "beam-loaded", "--set", "load_steps={increments=20000}"];
-    let folder = kept(&job, Duration::from_secs(3), "load.csv");
+    let (folder, _) = kept(&job, Duration::from_secs(3), "load.csv");
     let table = std::fs::read_to_string(folder.path().join("o/load.csv")).expect("kept");
     assert!(table.lines().count() > 2, "{table}");
 }
 
 #[test]
 fn a_flight_keeps_what_was_flown_and_says_so() {
-    kept(&["swarm", "square", "--set", "flight.duration=100000"], Duration::from_millis(300), "flight.json");
+    let job = ["swarm", "square", "--set", "flight.duration=100000"];
+    for (film, missing) in
+        [(&[][..], "there are no figures"), (&["--film", "f.gif"], "neither figures nor a film")]
+    {
+        let (_, said) = kept(&[&job, film].concat(), Duration::from_millis(300), "flight.json");
+        assert!(said.contains(missing), "{said}");
+    }
 }
 
 /// Results grow with what was done: however many there are, the end comes in time, and a run can be gone on with or has left

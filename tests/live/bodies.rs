@@ -7,6 +7,7 @@ use flockform::continuum::plan::Plan;
 use flockform::engine::Engine;
 use flockform::live::body::Body;
 use flockform::live::command::Command;
+use flockform::live::session::Session;
 use flockform::scene::raw::RawSide;
 use flockform::scene::{Scene, bundled};
 
@@ -229,4 +230,14 @@ fn a_side_that_is_loaded_by_hand_goes_there_and_is_replayed_to_the_bit() {
     let mut body = begun("tension", &[]);
     let load = Command::Load { side: RawSide::Right, by: [1.0, 0.0] };
     assert!(body.perform(0, &load).expect_err("refused").0.contains("only a material"));
+}
+
+#[test]
+fn tools_are_those_that_the_body_takes() {
+    let cut = Command::Cut { from: [0.5, -100.0], to: [0.6, 100.0] };
+    for (name, tools) in [("tension", &["cut"][..]), ("beam-loaded", &["load"]), ("drop", &[])] {
+        let session = Session::Body(Box::new(begun(name, &[])));
+        assert_eq!(session.tools(), tools, "{name}");
+        assert_eq!(begun(name, &[]).perform(0, &cut).is_ok(), tools.contains(&"cut"), "{name}");
+    }
 }

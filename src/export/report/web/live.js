@@ -118,7 +118,7 @@ function takeStatus(status) {
   element("live-undo").disabled = status.undo === 0;
   if (status.stopped) say(status.stopped, true);
   if (element("command").textContent !== status.command) element("command").textContent = status.command;
-  if (element("tool-load").hidden === status.loads) offerLoads(status.loads);
+  ["cut", "load"].forEach((tool) => offer(tool, status.tools.includes(tool)));
   if (status.node) takeNode(status.node);
   // The page knows the present alone: where they are now is where they ever were.
   status.obstacles.forEach((by, k) => (bodies[0].animation.outlines[k].moves = [[-Infinity, ...by]]));
@@ -166,10 +166,10 @@ function addNumber(key, value) {
   return input;
 }
 
-// A body without a material has no stress that a load could be in balance with.
-function offerLoads(isOffered) {
-  element("tool-load").hidden = !isOffered;
-  if (isOffered || toolName() !== "load") return;
+// A body without a material has no stress that a load could be in balance with, one of cells no bonds to cut.
+function offer(tool, isOffered) {
+  element(`tool-${tool}`).hidden = !isOffered;
+  if (isOffered || toolName() !== tool) return;
   document.querySelector("input[name=tool][value=drag]").checked = true;
   showHint();
 }
@@ -369,8 +369,7 @@ function startLive() {
   element("layer-ways").closest("label").hidden = true;
   element("layer-ways").checked = state.layers.ways = false;
   element("layer-cracks").closest("label").hidden = true;
-  element("tool-cut").hidden = data.live.swarm;
-  element("tool-load").hidden = true;
+  element("tool-cut").hidden = element("tool-load").hidden = true;
   element("tool-place").hidden = element("tool-link").hidden = !data.live.design;
   element("live-robot").hidden = !data.live.swarm || Boolean(data.live.node);
   showNumbers();
