@@ -16,7 +16,7 @@ mod tests;
 use std::collections::HashMap;
 
 pub(crate) use columns::{Columns, Segment};
-pub(crate) use kernel::{RowCoefficients, Task, array, array_mut, pass};
+pub(crate) use kernel::{RowCoefficients, Task, array, array_mut, pass, product};
 pub(crate) use matrix::{HELD, Matrix, leads_to_outlier};
 
 use crate::flock::block::{Block, transposed};

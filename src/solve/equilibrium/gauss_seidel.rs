@@ -8,7 +8,7 @@ use super::history::History;
 use super::system::Prepared;
 use super::{Found, Request, SolveError, Solver, steps};
 use crate::flock::vectors::Vectors;
-use crate::solve::operator::{Matrix, RowCoefficients};
+use crate::solve::operator::{Matrix, RowCoefficients, product};
 use crate::solve::stopwatch::Stopwatch;
 
 pub(super) fn solve(prepared: &mut Prepared, request: &Request) -> Result<Found, SolveError> {
@@ -73,12 +73,9 @@ fn sweep(
 ) {
     for &(particle, run) in colour {
         let (i, run) = (particle as usize, &matrix.runs()[run as usize]);
-        let [mut x, mut y] = f.get(i);
-        for ([xx, yx, xy, yy], &distance) in stencils.blocks(run.class).iter().zip(matrix.distances(run)) {
-            let [ux, uy] = u.get(i.wrapping_add_signed(distance as isize));
-            x -= xx * ux + xy * uy;
-            y -= yx * ux + yy * uy;
-        }
+        let [load, felt] =
+            [f.get(i), product(stencils.blocks(run.class), matrix.distances(run), i, u.view())];
+        let [x, y] = [load[0] - felt[0], load[1] - felt[1]];
         let [xx, xy, yx, yy] = stencils.inverse(run.class);
         u.x[i] += xx * x + xy * y;
         u.y[i] += yx * x + yy * y;

@@ -153,7 +153,7 @@ fn lanes<T: Real, const W: usize>(
     task.take(at, inverse, &x, &y);
 }
 
-/// One particle, as those along an outline are: the products of a block side by side, and each summed by itself.
+/// One particle, as those along an outline are.
 #[inline(always)]
 fn single<T: Real>(
     blocks: &[[T; 4]],
@@ -163,6 +163,13 @@ fn single<T: Real>(
     u: VectorsRef<'_, T>,
     task: &mut impl Task<T>,
 ) {
+    let [x, y] = product(blocks, distances, at, u);
+    task.take(at, inverse, &[x], &[y]);
+}
+
+/// `K u` of one particle: the products of a block side by side, and each summed by itself.
+#[inline(always)]
+pub fn product<T: Real>(blocks: &[[T; 4]], distances: &[i32], at: usize, u: VectorsRef<'_, T>) -> [T; 2] {
     let mut sums = [T::default(); 4];
     for (block, &distance) in blocks.iter().zip(distances) {
         let from = at.wrapping_add_signed(distance as isize);
@@ -172,7 +179,7 @@ fn single<T: Real>(
             sums[k] += block[k] * factors[k];
         }
     }
-    task.take(at, inverse, &[sums[0] + sums[2]], &[sums[1] + sums[3]]);
+    [sums[0] + sums[2], sums[1] + sums[3]]
 }
 
 /// The `W` values from number `at` on.
