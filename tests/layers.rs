@@ -201,6 +201,30 @@ fn the_width_of_vectors_is_chosen_in_one_place() {
 }
 
 #[test]
+fn loops_are_written_in_vectors_where_rows_are_applied_and_bonds_are_watched() {
+    let known = ["flock/fracture/watch.rs", "solve/operator/kernel.rs", "sweep/kernel.rs", "sweep/torn.rs"];
+    assert_eq!(files_with("in_lanes::<"), known);
+}
+
+#[test]
+fn threads_share_a_body_in_the_schedule_and_where_a_solver_or_a_report_goes_over_all_of_it() {
+    let known = [
+        "engine/forces.rs",
+        "engine/movement.rs",
+        "solve/corotated.rs",
+        "solve/equilibrium/steps.rs",
+        "sweep/mod.rs",
+        "sweep/schedule.rs",
+        "sweep/schedule/tests.rs",
+        "sweep/tests.rs",
+    ];
+    let rooms = ["flock/", "sweep/", "engine/", "solve/"];
+    let mut found = files_with("rayon::");
+    found.retain(|file| rooms.iter().any(|room| file.starts_with(room)));
+    assert_eq!(found, known);
+}
+
+#[test]
 fn unsafe_code_stands_where_it_was_measured_to_pay_or_where_the_system_is_called() {
     let known = [
         "cli/memory.rs",
