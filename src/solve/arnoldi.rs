@@ -5,7 +5,8 @@
 //! leaves approach those of `A` at the rim first. Power iteration keeps the last of these vectors only: it
 //! takes the number of steps that separates the two largest moduli, and where they are those of a pair
 //! (`+-lambda`, a two-cycle; or complex) it never settles. Here pairs are eigenvalues like any other, and
-//! the residual of each says how far it is to be believed.
+//! the residual of each says how far it is to be believed: faer's `partial_eigen` says how many have converged, and
+//! knows the largest in size alone, which is why this is written here.
 
 use nalgebra::{Complex, DMatrix, DVector, Schur};
 

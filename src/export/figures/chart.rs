@@ -1,5 +1,5 @@
 //! Curves and points over two axes, each linear or logarithmic: what a solver, a trade or a threshold
-//! looks like.
+//! looks like. Drawn here and not by a crate of charts: axes, ticks, fonts and colours are those of the figures of bodies.
 
 use super::axes::Axes;
 use super::heading::{Heading, Key, Mark};
@@ -301,6 +301,12 @@ mod tests {
 
     #[test]
     fn a_chart_of_nothing_is_drawn_all_the_same() {
-        assert!(draw(&chart(Vec::new())).contains("</svg>"));
+        let svg = draw(&chart(Vec::new()));
+        assert!(svg.ends_with("</svg>\n") || svg.ends_with("</svg>"), "{svg}");
+        assert!(
+            svg.contains(">time [s]<") && svg.contains(">error [s]<"),
+            "its axes have their names: {svg}"
+        );
+        assert!(!svg.contains("NaN") && !svg.contains("inf") && !svg.contains("<circle"), "{svg}");
     }
 }
