@@ -1,8 +1,11 @@
 //! Flights of the bundled swarms, and what they promise.
 
+use std::ops::ControlFlow;
+
 use flockform::flock::vectors::{Vectors, distance};
 use flockform::scene::bundled::SWARMS;
-use flockform::swarm::flight::Flight;
+use flockform::swarm::flight::{Flight, fly};
+use flockform::swarm::plan::SwarmPlan;
 
 use super::support::*;
 use crate::folders::temporary;
@@ -90,6 +93,65 @@ fn every_model_of_a_robot_brings_the_formation_home() {
         let [_, last] = report.affine_error.expect("affine");
         assert!(last < 0.01, "{model}: {last}");
         assert!(report.clearance.expect("others") >= 0.3 - 1e-9, "{model}: {:?}", report.clearance);
+    }
+}
+
+/// Two robots in a row, the first led over 10 m in 20 s.
+const ROW: &str = "title = \"row\"\nradius = 0.2\nlinks = { kind = \"nearest\", count = 1 }\n\
+    robots = [{ name = \"a\", place = [0.0, 0.0] }, { name = \"b\", place = [-1.5, 0.0] }]\n\
+    limits = { speed = 1.0, acceleration = 1.0, clearance = 0.2 }\n[[leaders]]\nrobots = [\"a\"]\n\
+    program = { kind = \"path\", points = [{ at = 20.0, displacement = [10.0, 0.0] }] }\n[flight]\nduration = 30.0\n";
+
+/// Two late or noisy poses give no velocity: a limit of acceleration that took it from them held all robots in place.
+#[test]
+fn robots_whose_acceleration_is_limited_arrive_however_late_or_noisy_their_poses_are() {
+    let models = ["ideal\"", "integrator\"", "unicycle\", turn_rate = 90.0"];
+    for fault in ["delay = 1", "noise = 0.005", "jitter = 1", "loss = 0.3"] {
+        for model in models {
+            let text = format!("{ROW}{fault}\nmodel = {{ kind = \"{model} }}\n");
+            let swarm = parse(&text).unwrap_or_else(|error| panic!("{text}: {error}"));
+            let period = swarm.raw.control.period;
+            let mut targets: Vec<f64> = Vec::new();
+            let (record, report) = fly(&swarm, &mut |flight, _| {
+                targets.extend(flight.control().target(0).map(|[x, _]| x));
+                ControlFlow::Continue(())
+            })
+            .expect("flies");
+            let end = record.tracks.last().expect("recorded").get(0);
+            assert!(distance(end, [10.0, 0.0]) < 0.05, "{fault}, {model}: {end:?}");
+            assert!(report.way[1] < 11.0, "{fault}, {model}: to and fro, {:?}", report.way);
+            if fault.starts_with("delay") {
+                let change = |three: &[f64]| ((three[2] - three[1]) - (three[1] - three[0])).abs();
+                let most = targets.windows(3).map(change).fold(0.0, f64::max) / (period * period);
+                assert!(most < 1.0 + 1e-6, "{fault}, {model}: targets that change by {most} m/s^2");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_flight_whose_leader_or_whose_poses_never_arrive_has_no_final_error_that_holds() {
+    let bound = "[flight.bounds]\nfinal_error = 0.05\n";
+    // Too fast to follow; poses that are all lost, or too old when they come.
+    for (fault, found) in [("delay = 8", true), ("loss = 1.0", false), ("delay = 30", false)] {
+        let swarm = parse(&format!("{ROW}{fault}\n{bound}")).unwrap_or_else(|error| panic!("{error}"));
+        let (_, report) = flown(&swarm);
+        let [verdict] = &report.bounds[..] else { panic!("{:?}", report.bounds) };
+        assert!(!verdict.holds, "{fault}: {verdict:?}");
+        assert_eq!(verdict.found.is_some(), found, "{fault}: {verdict:?}");
+    }
+}
+
+#[test]
+fn robots_with_late_poses_go_at_the_speed_that_the_plan_says() {
+    for delay in [1, 4] {
+        let swarm = parse(&format!("{ROW}delay = {delay}\n")).unwrap_or_else(|error| panic!("{error}"));
+        let reachable = SwarmPlan::new(&swarm).expect("laid out").speed.reachable.expect("a limit");
+        assert!((reachable - 1.0 / (1.0 + f64::from(delay))).abs() < 1e-12, "{reachable}");
+        let (_, report) = flown(&swarm);
+        // The leader's program goes at 0.5 m/s.
+        let way = if reachable < 0.5 { 30.0 * reachable } else { 10.0 };
+        assert!((report.way[1] / way - 1.0).abs() < 0.03, "{delay} late: {:?}, {way}", report.way);
     }
 }
 

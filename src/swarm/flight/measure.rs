@@ -13,7 +13,8 @@ pub struct Sample {
     pub time: f64,
     /// Largest distance of a robot, leaders included, from its place under the leaders' affine motion.
     pub affine_error: Option<f64>,
-    /// Largest distance of a follower from where the rule comes to rest behind the leaders as they are.
+    /// Largest distance of a robot from its place: of a follower from where the rule comes to rest behind the leaders as
+    /// they are, of a leader from where it is led to.
     pub formation_error: Option<f64>,
     /// Smallest free space between two rims, or a rim and an obstacle, during the period.
     pub clearance: f64,
@@ -87,7 +88,11 @@ impl Record {
         };
         let affine = formation.affine(control.program_time());
         let affine = affine.map(|map| farthest(&|m| map.apply(formation.places.get(m)), true));
-        let rest = formation.settled(&present).map(|rest| farthest(&|m| rest.get(m), true));
+        let led_to = |m: usize| Some(control.wanted(m)).filter(|place| place.iter().all(|x| x.is_finite()));
+        let rest = formation.settled(&present).map(|rest| {
+            let place = |m: usize| led_to(m).filter(|_| formation.leads(m)).unwrap_or_else(|| rest.get(m));
+            farthest(&place, true)
+        });
         let continuum = flight.continuum_places().map(|place| farthest(&place, false));
         let error = |extreme: Option<Option<Extreme>>| extreme.map(|one| one.map_or(0.0, |one| one.value));
         let measures = formation.measures(&present);

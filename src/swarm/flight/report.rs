@@ -135,7 +135,9 @@ impl FlightReport {
             bounds: Vec::new(),
             per_robot: (0..formation.count()).map(|m| robot(flight, record, m)).collect(),
         };
-        report.bounds = verdicts(swarm, &report, record, &formation.names);
+        let is_lost = |m: usize| flight.fleet().is_sound(m) && !flight.control().health(m).is_usable();
+        let any_lost = (0..formation.count()).any(is_lost);
+        report.bounds = verdicts(swarm, &report, record, &formation.names, any_lost);
         report
     }
 
@@ -180,7 +182,13 @@ fn settling_time(samples: &[Sample], programs_end: f64, within: f64) -> Option<f
     samples.get(settled).map(|sample| (sample.time - programs_end).max(0.0))
 }
 
-fn verdicts(swarm: &Swarm, report: &FlightReport, record: &Record, names: &[String]) -> Vec<Verdict> {
+fn verdicts(
+    swarm: &Swarm,
+    report: &FlightReport,
+    record: &Record,
+    names: &[String],
+    any_lost: bool,
+) -> Vec<Verdict> {
     let bounds = &swarm.raw.flight.bounds;
     // Rounding alone may take this much of a clearance that the filter keeps exactly.
     const ROUNDING: f64 = 1e-9;
@@ -196,7 +204,8 @@ fn verdicts(swarm: &Swarm, report: &FlightReport, record: &Record, names: &[Stri
     };
     let [affine, rest, continuum] = [0, 1, 2];
     let shape = if report.affine_error.is_some() { affine } else { rest };
-    let last = report.affine_error.or(report.formation_error).map(|[_, last]| last);
+    // A robot that is lost to the end has not flown to its place, wherever that is by now.
+    let last = report.affine_error.or(report.formation_error).map(|[_, last]| last).filter(|_| !any_lost);
     let farthest = |which: usize| record.farthest.iter().filter_map(move |all| all[which]);
     let largest = |which| farthest(which).max_by(|a, b| a.value.total_cmp(&b.value));
     // The robot that kept the formation from being settled.

@@ -120,8 +120,8 @@ pub struct SpeedMargin {
     /// The time by which the last follower is behind steadily moving leaders under the simulated delay, in the
     /// formation \[s\].
     pub lag_s: Option<f64>,
-    /// Speed of the leaders up to which followers keep within `flight.bounds.affine_error` of their places, the speed
-    /// limit at most \[m/s\]; absent without such a bound or a limit, and where followers lag by nothing that could be
+    /// Speed of the leaders up to which followers keep within `flight.bounds.affine_error` of their places \[m/s\], at most
+    /// the speed limit, which robots that do not brake share with the periods that their poses are late by; absent without such a bound or a limit, and where followers lag by nothing that could be
     /// measured.
     pub reachable: Option<f64>,
     /// The demands of each manoeuvre.
@@ -245,12 +245,15 @@ fn half_life(factor: f64) -> f64 {
 }
 
 fn speed(swarm: &Swarm, formation: &Formation, map: Option<&PeriodMap>, delay: f64) -> SpeedMargin {
+    // A target lies no farther from a late pose than the limit allows in a period; those that brake have places of now.
+    let brakes = matches!(swarm.raw.flight.model, RawModel::DoubleIntegrator);
     let limit = swarm.raw.limits.speed;
+    let kept = limit.map(|limit| if brakes { limit } else { limit / (delay + 1.0) });
     let lag_s =
         map.and_then(PeriodMap::lag).map(|periods| periods * (delay + 1.0) * swarm.raw.control.period);
     let felt = lag_s.filter(|lag| *lag >= LEAST_LAG);
     let by_lag = swarm.raw.flight.bounds.affine_error.zip(felt).map(|(error, lag)| error / lag);
-    let reachable = [limit, by_lag].into_iter().flatten().reduce(f64::min).filter(|speed| speed.is_finite());
+    let reachable = [kept, by_lag].into_iter().flatten().reduce(f64::min).filter(|speed| speed.is_finite());
     let manoeuvres = swarm.manoeuvres.iter().filter_map(|one| needed(formation, &one.name)).collect();
     SpeedMargin { limit, lag_s, reachable, manoeuvres }
 }

@@ -62,8 +62,9 @@ pub struct Filter {
     pub(super) obstacles: Obstacles,
     pub(super) fence: Obstacles,
     pub(super) detours: Vec<Detour>,
-    /// Targets of the last tick \[m\]; not finite before the first.
-    sent: Vectors,
+    /// Targets of the last tick and of the one before \[m\]; not finite before there were any.
+    pub(super) sent: Vectors,
+    pub(super) sent_before: Vectors,
     pub(super) crowd: Crowd,
     pub(super) cell: Cell,
 }
@@ -106,6 +107,7 @@ impl Filter {
             largest_radius: radii.iter().copied().fold(0.0, f64::max),
             detours: vec![Detour::default(); radii.len()],
             sent: vec![[f64::NAN; 2]; radii.len()].into_iter().collect(),
+            sent_before: vec![[f64::NAN; 2]; radii.len()].into_iter().collect(),
             limits,
             radii,
             obstacles,
@@ -164,6 +166,7 @@ impl Filter {
             let (target, changed) = self.target(seen, wanted.get(member), period, member);
             let target = self.within_speed(seen, target, period, member);
             if seen.known[member] {
+                self.sent_before.set(member, self.sent.get(member));
                 self.sent.set(member, target);
             }
             safe.set(member, target);
@@ -176,13 +179,18 @@ impl Filter {
     /// place has, which is convex, so the end of the shorter way does too.
     fn within_speed(&self, seen: &Seen, target: [f64; 2], period: f64, member: usize) -> [f64; 2] {
         let last = self.sent.get(member);
-        let is_late = seen.ages[member] > (1.0 - TOUCHING) * period || self.limits.deviation > 0.0;
-        if !self.limits.arrives || !is_late || !seen.known[member] || !last.iter().all(|x| x.is_finite()) {
+        let is_elsewhere = seen.known[member] && self.is_inexact(seen, period, member);
+        if !self.limits.arrives || !is_elsewhere || !last.iter().all(|x| x.is_finite()) {
             return target;
         }
         let way = [target[0] - last[0], target[1] - last[1]];
         let step = shortened(way, self.limits.speed * period);
         if step == way { target } else { [last[0] + step[0], last[1] + step[1]] }
+    }
+
+    /// Whether a member's pose does not say where it is: late, or noisy.
+    pub(super) fn is_inexact(&self, seen: &Seen, period: f64, member: usize) -> bool {
+        seen.ages[member] > (1.0 - TOUCHING) * period || self.limits.deviation > 0.0
     }
 
     /// Sorts the members for the queries to come.

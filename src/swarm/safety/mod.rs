@@ -57,7 +57,8 @@
 //!
 //! Members without that flag go no faster than lets them brake before every border of their cell, as it stands.
 //! Where a border comes too fast the cell is kept and the acceleration exceeded, with
-//! [`Flags::ACCELERATION_LIMITED`] set.
+//! [`Flags::ACCELERATION_LIMITED`] set. A late pose is of a place that its member has left, and two noisy ones give no
+//! velocity: such a member is taken to go from target to target, whose changes are then what the limit bounds.
 //!
 //! # Noise
 //! With [`Limits::deviation`] everything is kept three deviations of each member farther away, and the ways on which

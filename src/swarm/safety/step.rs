@@ -18,6 +18,15 @@ struct MotionRequest {
     reach: f64,
 }
 
+/// A member's motion as far as it is known.
+#[derive(Clone, Copy)]
+struct Motion {
+    /// Its place, relative to that of its pose \[m\].
+    from: [f64; 2],
+    /// \[m/s\]
+    velocity: [f64; 2],
+}
+
 /// The origins of a cell's planes, by their index: first members, then obstacles, then the fence.
 #[derive(Clone, Copy)]
 struct Origins {
@@ -46,26 +55,24 @@ impl Filter {
             self.detours[member].reset();
             return (here, Flags(Flags::HELD));
         }
-        let mut request = self.request(seen, way, period, member);
+        let brakes = !self.crowd.rest.is_empty();
+        let motion = self.motion(seen, period, member);
+        let mut request = self.request(motion, way, period);
         let origins = self.enclose(seen, &mut request, member);
         let open = request.open(request.reach);
         let mut flags = self.why(open, origins);
-        let velocity = self.velocity(seen, member);
-        let brakes = !self.crowd.rest.is_empty();
-        if velocity.is_some() && !brakes {
-            self.leave_room_to_brake(&mut request, period, &mut flags);
+        if let Some(Motion { from, .. }) = motion.filter(|_| !brakes) {
+            self.leave_room_to_brake(&mut request, from, period, &mut flags);
         }
-        let hindered = flags != Flags::default() || velocity.is_some();
+        let hindered = flags != Flags::default() || motion.is_some();
         let goal = if !hindered && self.detours[member].is_fresh() {
             open
         } else {
             self.around(&request, member, &mut flags)
         };
-        let step = match velocity {
-            Some(velocity) if brakes => self.brakable(velocity, goal, period, &mut flags),
-            Some(velocity) => {
-                shortened(self.steered(velocity, goal, period, &request, &mut flags), request.step)
-            }
+        let step = match motion {
+            Some(Motion { velocity, .. }) if brakes => self.brakable(velocity, goal, period, &mut flags),
+            Some(motion) => shortened(self.steered(motion, goal, period, &request, &mut flags), request.step),
             None => shortened(goal, request.step),
         };
         let step = self.cast(here, step, origins, member);
@@ -77,22 +84,38 @@ impl Filter {
         (target, flags)
     }
 
-    fn request(&self, seen: &Seen, way: [f64; 2], period: f64, member: usize) -> MotionRequest {
+    fn request(&self, motion: Option<Motion>, way: [f64; 2], period: f64) -> MotionRequest {
         let (step, distance) = (self.limits.speed * period, length(way));
-        match self.velocity(seen, member) {
+        match motion {
             None => MotionRequest { way, distance, step, reach: distance.min(step) },
-            Some(velocity) => {
-                let most = self.limits.acceleration;
+            Some(Motion { from, velocity }) => {
+                let (most, ahead) = (self.limits.acceleration, length(from));
                 let top = (length(velocity) + most * period).min(self.limits.speed);
                 let reach = if self.crowd.rest.is_empty() {
-                    top * period + top * top / (2.0 * most)
+                    ahead + top * period + top * top / (2.0 * most)
                 } else {
                     // To the end of the longest step, and of the braking after it.
                     0.5 * period * length(velocity) + self.braking().covered([top, 0.0], period)[0]
                 };
-                MotionRequest { way, distance, step: step.min(top * period), reach }
+                MotionRequest { way, distance, step: step.min(ahead + top * period), reach }
             }
         }
+    }
+
+    /// Where the member is taken to be and how it moves, where a limit asks for it. A late pose is of a place that the
+    /// member has left, and two noisy ones give no velocity: it is then taken to go from target to target. Those that
+    /// brake have estimates of both.
+    fn motion(&self, seen: &Seen, period: f64, member: usize) -> Option<Motion> {
+        let velocity = self.velocity(seen, member)?;
+        let here = seen.present.get(member);
+        let [last, before] = [&self.sent, &self.sent_before].map(|sent| sent.get(member));
+        let is_known = last.iter().chain(&before).all(|x| x.is_finite());
+        if self.brakes(seen) || !is_known || !self.is_inexact(seen, period, member) {
+            return Some(Motion { from: [0.0; 2], velocity });
+        }
+        let velocity = [0, 1].map(|k| (last[k] - before[k]) / period);
+        let from = [last[0] - here[0], last[1] - here[1]];
+        Some(Motion { from, velocity: shortened(velocity, self.limits.speed) })
     }
 
     /// The member's velocity, where there is one and a limit that asks for it.
@@ -196,14 +219,25 @@ impl Filter {
     }
 
     /// Brings the cell's borders and the end of the way as near as the member can go in a period and brake
-    /// in time after it, `v T + v^2 / (2 a)` being the room: a member that kept to this at the last tick can do
-    /// so at this one, as long as the borders stay.
-    fn leave_room_to_brake(&mut self, request: &mut MotionRequest, period: f64, flags: &mut Flags) {
+    /// in time after it, `v T + v^2 / (2 a)` being the room from where it is: a member that kept to this at the last tick
+    /// can do so at this one, as long as the borders stay.
+    fn leave_room_to_brake(
+        &mut self,
+        request: &mut MotionRequest,
+        from: [f64; 2],
+        period: f64,
+        flags: &mut Flags,
+    ) {
         let most = self.limits.acceleration;
         let step = |room: f64| period * most * ((period * period + 2.0 * room / most).sqrt() - period);
-        let brakable = step(length(self.cell.nearest(request.way, request.reach)));
+        let end = self.cell.nearest(request.way, request.reach);
+        let brakable = length(from) + step(length([end[0] - from[0], end[1] - from[1]]));
         for plane in self.cell.planes.iter_mut().filter(|plane| plane.offset > 0.0) {
-            plane.offset = step(plane.offset);
+            let gone = dot(plane.normal, from);
+            // At the border or beyond it as it is, there is nothing to bring nearer.
+            if plane.offset > gone {
+                plane.offset = (gone + step(plane.offset - gone)).max(0.0);
+            }
         }
         if brakable < request.step.min(request.distance) {
             flags.0 |= Flags::ACCELERATION_LIMITED;
@@ -215,19 +249,19 @@ impl Filter {
     /// comes first where it leaves none.
     fn steered(
         &self,
-        velocity: [f64; 2],
+        Motion { from, velocity }: Motion,
         goal: [f64; 2],
         period: f64,
         request: &MotionRequest,
         flags: &mut Flags,
     ) -> [f64; 2] {
-        let change = [goal[0] / period - velocity[0], goal[1] / period - velocity[1]];
+        let change = [0, 1].map(|k| (goal[k] - from[k]) / period - velocity[k]);
         let held = shortened(change, self.limits.acceleration * period);
         if held == change {
             return goal;
         }
         flags.0 |= Flags::ACCELERATION_LIMITED;
-        let next = [(velocity[0] + held[0]) * period, (velocity[1] + held[1]) * period];
+        let next = [0, 1].map(|k| from[k] + (velocity[k] + held[k]) * period);
         self.cell.nearest(next, request.step)
     }
 
