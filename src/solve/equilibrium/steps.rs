@@ -170,14 +170,20 @@ pub fn precondition_group<T: Real>(
     let (keep, weight) = (T::of(keep), T::of(weight));
     for run in matrix.runs_of(group) {
         let [xx, xy, yx, yy] = stencils.inverse(run.class).map(|entry| entry * weight);
-        let range = run.start as usize..(run.start + run.len) as usize;
-        let f = f.range(range.clone());
-        let here = range.start - out.begin..range.end - out.begin;
-        let (x, y) = (&mut out.x[here.clone()], &mut out.y[here]);
-        for (((x, y), &fx), &fy) in x.iter_mut().zip(y).zip(f.x).zip(f.y) {
+        let step = |x: &mut T, y: &mut T, fx: T, fy: T| {
             *x = keep * *x + (xx * fx + xy * fy);
             *y = keep * *y + (yx * fx + yy * fy);
+        };
+        let range = run.start as usize..(run.start + run.len) as usize;
+        let begin = range.start - out.begin;
+        // Along an outline there are as many runs as particles, and slices of one would take longer than the step.
+        if run.len == 1 {
+            step(&mut out.x[begin], &mut out.y[begin], f.x[range.start], f.y[range.start]);
+            continue;
         }
+        let here = begin..begin + range.len();
+        let (f, x, y) = (f.range(range), &mut out.x[here.clone()], &mut out.y[here]);
+        x.iter_mut().zip(y).zip(f.x).zip(f.y).for_each(|(((x, y), &fx), &fy)| step(x, y, fx, fy));
     }
 }
 

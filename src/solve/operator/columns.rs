@@ -142,7 +142,9 @@ impl Columns {
         let segments = self.of(column);
         let after = segments.partition_point(|segment| segment.row <= row);
         let segment = segments[..after].last()?;
-        let (steps, odd) = ((row - segment.row) / self.step, (row - segment.row) % self.step);
+        let away = row - segment.row;
+        // Setting up asks for every neighbour of every cut cell, and a division takes as long as all the rest.
+        let (steps, odd) = if self.step == 1 { (away, 0) } else { (away / self.step, away % self.step) };
         (odd == 0 && steps < segment.len as i32)
             .then(|| ((segment.start as i32 + steps) as usize, (segment.len as i32 - steps) as usize))
     }

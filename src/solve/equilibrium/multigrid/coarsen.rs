@@ -220,12 +220,16 @@ impl<'a> Halves<'a> {
         if site[0] != Body::ALONG_OUTLINE {
             let steps = self.parents.steps;
             let from_near = [0, 1].map(|axis| site[axis] - near[axis] * steps[axis]);
-            return self.parents.each(from_near, sign, |node, share| sums.add(node, share, block));
+            let (node, shares) = self.parents.around(from_near, sign);
+            return sums.add_around(node, shares, block);
         }
         let nodes = &self.of_outliers.nodes[(site[1] / self.fine.columns.step()) as usize];
-        for &(node, share) in nodes.iter().filter(|(_, share)| *share > 0.0) {
-            sums.add([node[0] - near[0], node[1] - near[1]], sign * share, block);
-        }
+        let first = nodes[0].0;
+        sums.add_around(
+            [first[0] - near[0], first[1] - near[1]],
+            nodes.map(|(_, share)| sign * share),
+            block,
+        );
     }
 }
 
@@ -340,7 +344,8 @@ fn galerkin(fine: &Matrix, parents: &Parents, pattern: &[u32], sums: &mut Sums) 
         let entries = row.entries.iter().map(|(offset, block)| (*offset, block, -share));
         for (offset, block, share) in std::iter::once(([0, 0], &row.diagonal, share)).chain(entries) {
             let there = [own[0] + offset[0], own[1] + offset[1]];
-            parents.each(there, share, |node, share| sums.add(node, share, block));
+            let (node, shares) = parents.around(there, share);
+            sums.add_around(node, shares, block);
         }
     }
     sums.row()
@@ -358,11 +363,11 @@ struct Parents {
 /// Farthest from a node that sites are asked about often.
 const NEAR: i32 = 2 * MOST_STEPS as i32;
 
-/// The one or two nodes with a share in a column, or a row, and their shares.
+/// The node at a column, or a row, or before it, and the shares of that one and of the next.
 #[derive(Clone, Copy)]
 struct Beside {
-    nodes: [(i32, f64); 2],
-    count: usize,
+    node: i32,
+    shares: [f64; 2],
 }
 
 impl Parents {
@@ -382,8 +387,7 @@ impl Parents {
     fn find(&self, axis: usize, at: i32) -> Beside {
         let step = self.steps[axis];
         let (node, beyond) = (at.div_euclid(step), at.rem_euclid(step));
-        let nodes = [(node, self.hat(axis, beyond)), (node + 1, self.hat(axis, step - beyond))];
-        Beside { nodes, count: if beyond == 0 { 1 } else { 2 } }
+        Beside { node, shares: [self.hat(axis, beyond), self.hat(axis, step - beyond)] }
     }
 
     fn along(&self, axis: usize, at: i32) -> Beside {
@@ -391,14 +395,13 @@ impl Parents {
         known.copied().unwrap_or_else(|| self.find(axis, at))
     }
 
-    /// Hands out the nodes with a share in a site, each with `weight` times its share.
-    #[inline]
-    fn each(&self, site: Site, weight: f64, mut take: impl FnMut(Site, f64)) {
+    /// The node at a site or before it both ways, and `weight` times the shares of this one, of the next along the column, of
+    /// that in the next column and of the one beyond both.
+    #[inline(always)]
+    fn around(&self, site: Site, weight: f64) -> (Site, [f64; 4]) {
         let (columns, rows) = (self.along(0, site[0]), self.along(1, site[1]));
-        for (column, share) in &columns.nodes[..columns.count] {
-            for (row, other) in &rows.nodes[..rows.count] {
-                take([*column, *row], weight * share * other);
-            }
-        }
+        let [near, far] = columns.shares.map(|share| weight * share);
+        let [below, above] = rows.shares;
+        ([columns.node, rows.node], [near * below, near * above, far * below, far * above])
     }
 }

@@ -4,16 +4,14 @@ use crate::flock::block::Block;
 use crate::flock::lattice::Site;
 use crate::solve::operator::Row;
 
-/// Columns and rows around a node that a fresh window holds; rows of a regular lattice need no more.
-const RADIUS: i32 = 3;
+/// Columns and rows around a node that a fresh window holds; most rows need no more.
+const RADIUS: i32 = 2;
 
 /// Blocks by offset. A window of all offsets that occur: looking one up is what setting up a cut outline does most.
 pub struct Sums {
     radius: i32,
     /// By offset, column by column; zero where nothing was added.
     window: Vec<Block>,
-    /// Places in the window that something was added to, by bits.
-    used: Vec<u64>,
 }
 
 impl Default for Sums {
@@ -24,47 +22,44 @@ impl Default for Sums {
 
 impl Sums {
     fn of_radius(radius: i32) -> Self {
-        let size = (2 * radius as usize + 1).pow(2);
-        Self { radius, window: vec![Block::default(); size], used: vec![0; size.div_ceil(64)] }
+        Self { radius, window: vec![Block::default(); (2 * radius as usize + 1).pow(2)] }
     }
 
     /// Adds a share of a block at an offset.
     #[inline]
     pub fn add(&mut self, offset: Site, share: f64, block: &Block) {
-        let far = offset[0].abs().max(offset[1].abs());
-        if far > self.radius {
-            self.widen(far);
-        }
-        let at = ((offset[0] + self.radius) * self.width() + offset[1] + self.radius) as usize;
-        self.used[at / 64] |= 1 << (at % 64);
-        let sum = self.window[at].as_flattened_mut();
-        sum.iter_mut().zip(block.as_flattened()).for_each(|(sum, value)| *sum += share * value);
+        let at = self.at(offset, offset[0].abs().max(offset[1].abs()));
+        add(&mut self.window[at], share, block);
     }
 
-    /// Takes out what has been added up, ordered by offset, so that it does not depend on how it was summed.
+    /// Adds shares of a block at an offset, one row on, one column on and one of both on.
+    #[inline(always)]
+    pub fn add_around(&mut self, offset: Site, shares: [f64; 4], block: &Block) {
+        let far = |at: i32| (-at).max(at + 1);
+        let at = self.at(offset, far(offset[0]).max(far(offset[1])));
+        let width = self.width() as usize;
+        let (column, next) = self.window[at..at + width + 2].split_at_mut(width);
+        add(&mut column[0], shares[0], block);
+        add(&mut column[1], shares[1], block);
+        add(&mut next[0], shares[2], block);
+        add(&mut next[1], shares[3], block);
+    }
+
+    /// Takes out what has been added up and is not zero, ordered by offset, so that it does not depend on how it was summed.
     pub fn drain(&mut self) -> impl Iterator<Item = (Site, Block)> + '_ {
-        let (width, radius) = (self.width(), self.radius);
-        let Self { window, used, .. } = self;
-        let places = used.iter_mut().enumerate().flat_map(|(word, bits)| {
-            std::iter::from_fn(move || {
-                let bit = bits.trailing_zeros();
-                (bit < 64).then(|| {
-                    *bits &= *bits - 1;
-                    word * 64 + bit as usize
-                })
-            })
-        });
-        places.map(move |at| {
-            let block = std::mem::take(&mut window[at]);
-            ([at as i32 / width - radius, at as i32 % width - radius], block)
+        let (width, radius) = (self.width() as usize, self.radius);
+        let columns = (-radius..).zip(self.window.chunks_exact_mut(width));
+        columns.flat_map(move |(column, blocks)| {
+            let added = (-radius..).zip(blocks).filter(|(_, block)| !is_zero(block));
+            added.map(move |(row, block)| ([column, row], std::mem::take(block)))
         })
     }
 
     /// The row that has been added up.
     pub fn row(&mut self) -> Row {
-        let blocks = self.used.iter().map(|word| word.count_ones() as usize).sum();
+        let blocks = self.window.iter().map(|block| usize::from(!is_zero(block))).sum();
         let mut row = Row { entries: Vec::with_capacity(blocks), ..Row::default() };
-        for (offset, block) in self.drain().filter(|(_, block)| *block != Block::default()) {
+        for (offset, block) in self.drain() {
             match offset {
                 [0, 0] => row.diagonal = block,
                 _ => row.entries.push((offset, block.map(|row| row.map(|v| -v)))),
@@ -73,14 +68,37 @@ impl Sums {
         row
     }
 
+    /// Where an offset lies in the window, which reaches `far` at least.
+    #[inline]
+    fn at(&mut self, offset: Site, far: i32) -> usize {
+        if far > self.radius {
+            self.widen(far);
+        }
+        ((offset[0] + self.radius) * self.width() + offset[1] + self.radius) as usize
+    }
+
     fn width(&self) -> i32 {
         2 * self.radius + 1
     }
 
+    #[cold]
     fn widen(&mut self, radius: i32) {
         let mut narrow = std::mem::replace(self, Self::of_radius(radius));
         narrow.drain().for_each(|(offset, block)| self.add(offset, 1.0, &block));
     }
+}
+
+#[inline(always)]
+fn add(sum: &mut Block, share: f64, block: &Block) {
+    sum.as_flattened_mut()
+        .iter_mut()
+        .zip(block.as_flattened())
+        .for_each(|(sum, value)| *sum += share * value);
+}
+
+/// Looks at all four entries, which is faster than to leave at the first.
+fn is_zero(block: &Block) -> bool {
+    block.as_flattened().iter().fold(true, |zero, value| zero & (*value == 0.0))
 }
 
 #[cfg(test)]
