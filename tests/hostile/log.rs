@@ -105,6 +105,15 @@ fn programs_whose_log_nothing_reads_fly_on_and_end_when_asked() {
         println!("ended after {:?}", since.elapsed());
         assert!(since.elapsed() < LEAVING, "{:?}", since.elapsed());
     }
+    for subcommand in ["robots", "node"] {
+        let mut command = command(domain, &["-vv", subcommand, "square", "--transport", "shm"]);
+        command.env("FLOCKFORM_SHM_DOMAIN", format!("log{}", std::process::id()));
+        let mut running = Running::start(command.stderr(pipe.try_clone().expect("another end")));
+        std::thread::sleep(Duration::from_secs(2));
+        let since = Instant::now();
+        assert_eq!(running.terminate(), Some(0));
+        assert!(since.elapsed() < LEAVING, "{:?}", since.elapsed());
+    }
 }
 
 #[test]
