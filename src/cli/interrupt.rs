@@ -3,9 +3,9 @@
 //! Most commands have nothing to keep before they are done: the thread that hears of the signal removes what they
 //! have begun to write and ends the program, in the midst of a mesh or a factorisation too. A command that
 //! [`keeps`] results looks at the flag itself and saves them; if it has not begun to within [`GRACE`], or is still saving at
-//! [`SAVED_BY`], it is ended all the same. Nothing gets its final name once the end has begun. A second signal ends any
-//! command at once, but for one that [`serves`]: `ros2 launch` and `timeout` signal a group of processes and each of them,
-//! and a node has its leave to take. There the signals of [`ONE_SIGNAL`] are one.
+//! [`SAVED_BY`], earlier where there is much memory to free, it is ended all the same. Nothing gets its final name once the
+//! end has begun. A second signal ends any command at once, but for one that [`serves`]: `ros2 launch` and `timeout` signal
+//! a group of processes and each of them, and a node has its leave to take. There the signals of [`ONE_SIGNAL`] are one.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -37,8 +37,10 @@ pub const NOTHING_KEPT: &str = "interrupted: nothing is kept";
 
 /// How long work that keeps results may take to notice.
 const GRACE: Duration = Duration::from_millis(500);
-/// When results have to be saved; what is not is given up, and the checkpoint before it stays.
+/// When results have to be saved by a small program; what is not is given up, and the checkpoint before it stays.
 const SAVED_BY: Duration = Duration::from_millis(750);
+/// How long the system takes at the end of a program to free a GiB of its memory, with the disk's cache of what is removed.
+const FREEING: Duration = Duration::from_millis(250);
 /// How long the last words may take: a reader that has stopped keeps no program from ending.
 const PRINTING: Duration = Duration::from_millis(100);
 /// How long another thread may go on writing into a folder that is being removed.
@@ -167,11 +169,17 @@ pub fn keep_unfinished(
 
 fn end_when_saved(grace: Duration) {
     let raised = Instant::now();
-    std::thread::sleep(grace);
-    while SAVING.load(Ordering::SeqCst) > 0 && raised.elapsed() < SAVED_BY {
+    let saved_by = saved_by(super::memory::resident());
+    std::thread::sleep(grace.min(saved_by));
+    while SAVING.load(Ordering::SeqCst) > 0 && raised.elapsed() < saved_by {
         std::thread::sleep(Duration::from_millis(5));
     }
     end();
+}
+
+/// When a program of this size \[B\] has to be done: its memory is freed within the second too.
+fn saved_by(resident: u64) -> Duration {
+    SAVED_BY.saturating_sub(FREEING.mul_f64(resident as f64 / f64::from(1 << 30)))
 }
 
 fn end() -> ! {
@@ -212,5 +220,19 @@ fn remove(path: &Path) -> std::io::Result<()> {
             let _ = std::fs::remove_dir(path);
             Ok(())
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_more_memory_there_is_to_free_the_earlier_the_end() {
+        assert_eq!(saved_by(0), SAVED_BY);
+        assert_eq!(saved_by(1 << 30), SAVED_BY - FREEING);
+        assert_eq!(saved_by(1 << 40), Duration::ZERO);
+        let resident = crate::cli::memory::resident();
+        assert!((1 << 20..1 << 34).contains(&resident), "{resident}");
     }
 }

@@ -22,6 +22,7 @@ use tracing_subscriber::fmt::writer::BoxMakeWriter;
 use tracing_subscriber::fmt::{FmtContext, FormatEvent, FormatFields};
 use tracing_subscriber::registry::LookupSpan;
 
+use super::log_writer::LogWriter;
 use super::node::Transport;
 use super::{Arguments, Command};
 
@@ -88,8 +89,14 @@ pub fn start(arguments: &Arguments, ros: &RosArguments) {
     };
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| level.into());
     let first = (given.unwrap_or(Severity::Unset), filter.to_string());
-    let writer =
-        if is_console { BoxMakeWriter::new(std::io::stderr) } else { BoxMakeWriter::new(std::io::sink) };
+    // A control loop must not wait for a reader; any other command may.
+    let is_loop = matches!(arguments.command, Command::Node(_) | Command::Robots(_));
+    let thread = (is_console && is_loop).then(|| LogWriter::start(std::io::stderr()));
+    let writer = match thread {
+        Some(Ok(writer)) => BoxMakeWriter::new(move || writer.clone()),
+        _ if is_console => BoxMakeWriter::new(std::io::stderr),
+        _ => BoxMakeWriter::new(std::io::sink),
+    };
     let log = tracing_subscriber::fmt().with_env_filter(filter).with_writer(writer);
     let log = log.with_ansi(std::io::stderr().is_terminal()).fmt_fields(format::debug_fn(field));
     match logger {

@@ -70,6 +70,12 @@ pub fn return_what_is_free() {
     }
 }
 
+/// Memory of this process that is in use \[B\]; 0 where the system does not say.
+pub fn resident() -> u64 {
+    let status = read_to_string("/proc/self/status").unwrap_or_default();
+    1024 * field(&status, "VmRSS:").unwrap_or(0)
+}
+
 /// The least of the machine's, the control groups' and the process's own; `None` where the system says nothing.
 fn room() -> Option<Room> {
     let machine = read_to_string("/proc/meminfo").ok().and_then(|text| field(&text, "MemAvailable:"));

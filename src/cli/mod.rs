@@ -11,6 +11,7 @@ mod install;
 mod interrupt;
 mod live;
 pub mod log;
+mod log_writer;
 mod material;
 mod memory;
 mod names;

@@ -15,7 +15,7 @@ pub fn join(arguments: &RosArguments) -> Result<Edge, EdgeError> {
     let environment = &arguments.environment;
     let loopback_only = environment.discovery == DiscoveryRange::Localhost;
     let options = Options { domain: environment.domain, loopback_only };
-    for warning in &arguments.security.warnings {
+    for warning in environment.warnings.iter().chain(&arguments.security.warnings) {
         tracing::warn!("{}", escaped(warning, LONGEST));
     }
     #[cfg(feature = "security")]

@@ -1,5 +1,6 @@
 //! Text from the network in the log: short, on its line, and not again and again.
 
+use std::io::Write;
 use std::time::{Duration, Instant};
 
 use flockform::messages::geometry_msgs::{Pose, PoseStamped};
@@ -7,6 +8,11 @@ use flockform::messages::std_msgs::Header;
 use flockform::ros::edge::Quality;
 
 use super::support::*;
+
+/// Bytes that a pipe holds \[1\].
+const PIPE: usize = 65_536;
+/// A second is promised; a machine with other work takes longer.
+const LEAVING: Duration = Duration::from_secs(3);
 
 #[test]
 fn a_frame_id_forges_no_line_and_fills_no_disk() {
@@ -69,6 +75,45 @@ fn a_node_logs_as_ros_2_nodes_do() {
     std::thread::sleep(Duration::from_secs(2));
     assert_eq!(quiet.terminate(), Some(0));
     assert_eq!(lines.iter().collect::<Vec<_>>(), Vec::<String>::new());
+}
+
+#[test]
+fn programs_whose_log_nothing_reads_fly_on_and_end_when_asked() {
+    let domain = domain();
+    // Full from the beginning: not a line of theirs finds place.
+    let (_reader, mut pipe) = std::io::pipe().expect("a pipe");
+    pipe.write_all(&[b'.'; PIPE]).expect("as much as a pipe holds");
+    let start = |subcommand: &str| {
+        let mut command = command(domain, &["-vv", subcommand, "square"]);
+        command.env("RUST_LOG", "trace").stderr(pipe.try_clone().expect("another end"));
+        Running::start(&mut command)
+    };
+    let (robots, node) = (start("robots"), start("node"));
+    let edge = edge(domain);
+    let listener = edge.node("/", "listener").expect("a node");
+    let targets = listener.subscription::<PoseStamped>("/robot_1/target_pose", Quality::reliable(1));
+    let targets = targets.expect("may subscribe");
+    let mut count = 0;
+    until("five seconds of targets", || {
+        count += std::iter::from_fn(|| targets.take()).take(100).count();
+        std::thread::sleep(Duration::from_millis(5));
+        (count > 100).then_some(())
+    });
+    for mut running in [node, robots] {
+        let since = Instant::now();
+        assert_eq!(running.terminate(), Some(0));
+        println!("ended after {:?}", since.elapsed());
+        assert!(since.elapsed() < LEAVING, "{:?}", since.elapsed());
+    }
+    for subcommand in ["robots", "node"] {
+        let mut command = command(domain, &["-vv", subcommand, "square", "--transport", "shm"]);
+        command.env("FLOCKFORM_SHM_DOMAIN", format!("log{}", std::process::id()));
+        let mut running = Running::start(command.stderr(pipe.try_clone().expect("another end")));
+        std::thread::sleep(Duration::from_secs(2));
+        let since = Instant::now();
+        assert_eq!(running.terminate(), Some(0));
+        assert!(since.elapsed() < LEAVING, "{:?}", since.elapsed());
+    }
 }
 
 #[test]

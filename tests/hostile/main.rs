@@ -8,6 +8,7 @@
 mod commands;
 mod disk;
 mod environment;
+mod liar;
 mod log;
 mod middleware;
 #[path = "../ros_edge/support.rs"]

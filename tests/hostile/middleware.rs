@@ -18,7 +18,7 @@ use super::peers;
 use super::support::*;
 
 /// Robots that fly slowly for minutes.
-const LONG: [&str; 1] = ["manoeuvres[0].legs=[{ seconds = 300.0, translate = [60.0, 0.0] }]"];
+pub const LONG: [&str; 1] = ["manoeuvres[0].legs=[{ seconds = 300.0, translate = [60.0, 0.0] }]"];
 
 fn arguments(subcommand: &'static str, overrides: &[&'static str]) -> Vec<&'static str> {
     let mut all = vec![subcommand, "square"];
@@ -27,8 +27,10 @@ fn arguments(subcommand: &'static str, overrides: &[&'static str]) -> Vec<&'stat
 }
 
 /// Who sees all poses and targets, and judges them.
-struct Judge {
+pub struct Judge {
     control: Control,
+    /// A robot whose poses are others' too.
+    pub liar: Option<usize>,
     poses: Vec<Subscription<PoseStamped>>,
     targets: Vec<Subscription<PoseStamped>>,
     state: Subscription<FormationState>,
@@ -65,6 +67,7 @@ impl Judge {
             silence: 0.0,
             held: vec![None; count],
             coast: 0.0,
+            liar: None,
             control,
             _node: node,
         }
@@ -73,7 +76,10 @@ impl Judge {
     fn look(&mut self) {
         let limits = self.control.limits().clone();
         let period = self.control.period();
-        for m in 0..self.poses.len() {
+        if let Some(liar) = self.liar {
+            (self.places[liar], self.sent[liar]) = (None, Instant::now());
+        }
+        for m in (0..self.poses.len()).filter(|&m| self.liar != Some(m)) {
             while let Some((pose, _)) = self.poses[m].take() {
                 let (stamp, at) = (pose.header.stamp.seconds(), [pose.pose.position.x, pose.pose.position.y]);
                 if let Some((before, from)) = self.places[m] {
@@ -117,7 +123,7 @@ impl Judge {
         }
     }
 
-    fn during(&mut self, time: Duration, mut each: impl FnMut()) {
+    pub fn during(&mut self, time: Duration, mut each: impl FnMut()) {
         let since = Instant::now();
         while since.elapsed() < time {
             self.look();
@@ -127,7 +133,7 @@ impl Judge {
     }
 
     /// How long it takes until everybody is sent somewhere anew [s].
-    fn until_all_are_sent(&mut self) -> f64 {
+    pub fn until_all_are_sent(&mut self) -> f64 {
         let since = Instant::now();
         while since.elapsed() < PATIENCE {
             self.look();
@@ -140,21 +146,21 @@ impl Judge {
     }
 
     /// Where the leaders' program has them: the mean place of all targets.
-    fn mean(&self) -> f64 {
+    pub fn mean(&self) -> f64 {
         let all: Vec<f64> = self.places.iter().flatten().map(|(_, at)| at[0]).collect();
         all.iter().sum::<f64>() / all.len() as f64
     }
 }
 
 /// Judge, robots and node, flying.
-struct Scene {
+pub struct Scene {
     domain: u16,
     stranger: Stranger,
-    judge: Judge,
-    robots: Running,
-    node: Running,
-    begun_at: f64,
-    _edge: Edge,
+    pub judge: Judge,
+    pub robots: Running,
+    pub node: Running,
+    pub begun_at: f64,
+    pub edge: Edge,
 }
 
 /// Numbers of the participants, in the order in which they come.
@@ -162,7 +168,7 @@ const ROBOTS: u16 = 1;
 const NODE: u16 = 2;
 
 impl Scene {
-    fn open(overrides: &[&'static str]) -> Self {
+    pub fn open(overrides: &[&'static str]) -> Self {
         let domain = domain();
         let stranger = Stranger::come(domain);
         let edge = edge(domain);
@@ -183,7 +189,7 @@ impl Scene {
         judge.during(Duration::from_secs(3), || ());
         let begun_at = judge.mean();
         (judge.silence, judge.coast) = (0.0, 0.0);
-        let mut scene = Self { domain, stranger, judge, robots, node, begun_at, _edge: edge };
+        let mut scene = Self { domain, stranger, judge, robots, node, begun_at, edge };
         scene.stranger.listen();
         let known = scene.stranger.prefixes.len();
         assert!(known >= 2, "{known} participants are known");

@@ -43,9 +43,29 @@ fn what_cannot_be_honoured_is_refused_with_a_remedy() {
     for (variable, value, remedy) in [
         ("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF", "LOCALHOST"),
         ("ROS_STATIC_PEERS", "10.0.0.7;robot", "unset it"),
+        ("ROS_DISCOVERY_SERVER", ";10.0.0.7:11811", "for its peers"),
+        ("RMW_IMPLEMENTATION", "rmw_zenoh_cpp", "rmw_cyclonedds_cpp"),
+        ("RMW_IMPLEMENTATION", "rmw_iceoryx_cpp", "rmw_fastrtps_cpp"),
     ] {
         let error = environment(&[(variable, value)]).expect_err(value).to_string();
         assert!(error.contains(&format!("{variable}={value}")) && error.contains(remedy), "{error}");
+    }
+}
+
+#[test]
+fn settings_of_another_middleware_are_a_warning() {
+    for (variable, middleware) in [
+        ("CYCLONEDDS_URI", "Cyclone DDS"),
+        ("FASTRTPS_DEFAULT_PROFILES_FILE", "Fast DDS"),
+        ("FASTDDS_DEFAULT_PROFILES_FILE", "Fast DDS"),
+        ("FASTDDS_BUILTIN_TRANSPORTS", "Fast DDS"),
+        ("NDDS_QOS_PROFILES", "Connext"),
+        ("NDDS_DISCOVERY_PEERS", "Connext"),
+    ] {
+        let warnings = environment(&[(variable, "file:///profile.xml")]).expect("no fault").warnings;
+        let is_named = |warning: &String| warning.contains(variable) && warning.contains(middleware);
+        assert!(warnings.len() == 1 && warnings.iter().all(is_named), "{variable}: {warnings:?}");
+        assert_eq!(environment(&[(variable, "")]).expect("as if unset"), Environment::default());
     }
 }
 

@@ -150,6 +150,62 @@ fn one_liar_is_trimmed_on_eight_neighbours_and_leads_them_astray_without() {
     assert!(without > 0.2, "{without}");
 }
 
+/// The worst of a flight for all robots but the middle.
+struct Worst {
+    /// Between two hulls \[m\].
+    apart: f64,
+    /// From the post \[m\].
+    to_post: f64,
+    /// Farthest towards the fence \[m\].
+    east: f64,
+    /// \[m/s\]
+    speed: f64,
+}
+
+const MODELS: [&str; 3] = [
+    "flight.model={ kind = \"ideal\" }",
+    "flight.model={ kind = \"integrator\" }",
+    "flight.model={ kind = \"double-integrator\" }",
+];
+
+/// Flies past a post and up to a fence, with a fault of the middle, whose poses are believed at once, at any speed: the
+/// worst for those around it. `lie` is called before each period.
+fn worst_of_the_others(fault: &str, model: &str, mut lie: impl FnMut(&mut Flight, u32)) -> Worst {
+    let limits = "limits={ speed = 1.0, acceleration = 2.0, clearance = 0.3, geofence = [[-2, -3], [11, -3], [11, 11], [-2, 11]] }";
+    let post = "obstacles=[{ kind = \"disc\", centre = [8.5, 3.0], radius = 0.4 }]";
+    let mut flight = with_fault(fault, &[limits, post, model, "poses.recover=1", "poses.jump_speed=1e6"]);
+    let mut worst =
+        Worst { apart: f64::INFINITY, to_post: f64::INFINITY, east: f64::NEG_INFINITY, speed: 0.0 };
+    for period in 0..800 {
+        let before = flight.fleet().places().clone();
+        lie(&mut flight, period);
+        flight.step();
+        let (places, radii) = (flight.fleet().places(), &flight.control().formation().radii);
+        let others = || (0..25).filter(|&m| m != MIDDLE);
+        for (a, b) in others().flat_map(|a| others().take_while(move |&b| b < a).map(move |b| (a, b))) {
+            worst.apart = worst.apart.min(distance(places.get(a), places.get(b)) - radii[a] - radii[b]);
+        }
+        for m in others() {
+            worst.to_post = worst.to_post.min(distance(places.get(m), [8.5, 3.0]) - 0.4 - radii[m]);
+            worst.east = worst.east.max(places.x[m]);
+            worst.speed = worst.speed.max(distance(places.get(m), before.get(m)) / 0.05);
+        }
+    }
+    worst
+}
+
+impl Worst {
+    /// Every bound holds; whether the post and the fence were reached.
+    fn within_bounds(&self, what: &str) -> [bool; 2] {
+        let Self { apart, to_post, east, speed } = *self;
+        assert!(apart >= 0.3 - 1e-9, "{what}: {apart} m");
+        assert!(to_post >= 0.3 - 1e-9, "{what}: {to_post} m from the post");
+        assert!(east <= 11.0 - 0.2 + 1e-9, "{what}: {east} m");
+        assert!(speed <= 1.0 + 1e-9, "{what}: {speed} m/s");
+        [to_post < 0.31, east > 10.7]
+    }
+}
+
 /// Between any two of the others, and of what stands still, the filter asks for their own poses alone: a third one may hold
 /// them, and not push them.
 #[test]
@@ -162,44 +218,63 @@ fn robots_that_say_where_they_are_keep_every_bound_among_themselves_whatever_one
         "{ kind = \"random\", within = 3.0 }",
         "{ kind = \"frozen\" }",
     ];
-    let models = [
-        "flight.model={ kind = \"ideal\" }",
-        "flight.model={ kind = \"integrator\" }",
-        "flight.model={ kind = \"double-integrator\" }",
-    ];
     let mut were_reached = [0; 2];
-    for (lie, model) in lies.into_iter().flat_map(|lie| models.map(|model| (lie, model))) {
-        // The way of the formation leads past a post and up to a fence.
-        let limits = "limits={ speed = 1.0, acceleration = 2.0, clearance = 0.3, geofence = [[-2, -3], [11, -3], [11, 11], [-2, 11]] }";
-        let post = "obstacles=[{ kind = \"disc\", centre = [8.5, 3.0], radius = 0.4 }]";
-        // Believed at once, at any speed: the worst for those around.
-        let all = [limits, post, model, "poses.recover=1", "poses.jump_speed=1e6"];
-        let mut flight = with_fault(lie, &all);
-        let (mut nearest, mut to_post, mut east, mut fastest) =
-            (f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, 0.0_f64);
-        for _ in 0..800 {
-            let before = flight.fleet().places().clone();
-            flight.step();
-            let (places, radii) = (flight.fleet().places(), &flight.control().formation().radii);
-            let honest = || (0..25).filter(|&m| m != MIDDLE);
-            for (a, b) in honest().flat_map(|a| honest().take_while(move |&b| b < a).map(move |b| (a, b))) {
-                nearest = nearest.min(distance(places.get(a), places.get(b)) - radii[a] - radii[b]);
-            }
-            for m in honest() {
-                to_post = to_post.min(distance(places.get(m), [8.5, 3.0]) - 0.4 - radii[m]);
-                east = east.max(places.x[m]);
-                fastest = fastest.max(distance(places.get(m), before.get(m)) / 0.05);
-            }
-        }
-        assert!(nearest >= 0.3 - 1e-9, "{lie} {model}: {nearest} m");
-        assert!(to_post >= 0.3 - 1e-9, "{lie} {model}: {to_post} m from the post");
-        assert!(east <= 11.0 - 0.2 + 1e-9, "{lie} {model}: {east} m");
-        were_reached[0] += usize::from(to_post < 0.31);
-        were_reached[1] += usize::from(east > 10.7);
-        assert!(fastest <= 1.0 + 1e-9, "{lie} {model}: {fastest} m/s");
+    for (lie, model) in lies.into_iter().flat_map(|lie| MODELS.map(|model| (lie, model))) {
+        let worst = worst_of_the_others(lie, model, |_, _| {});
+        let reached = worst.within_bounds(&format!("{lie} {model}"));
+        were_reached
+            .iter_mut()
+            .zip(reached)
+            .for_each(|(flights, is_reached)| *flights += i32::from(is_reached));
     }
     // Post and fence are in the way.
     assert!(were_reached.iter().all(|&flights| flights > 5), "{were_reached:?}");
+}
+
+/// Ages and velocities are taken from stamps, which a liar can choose as it can its place.
+#[test]
+fn a_liar_that_forges_its_stamps_too_brings_no_two_others_near_each_other() {
+    type Stamps = fn(f64, u32) -> [f64; 2];
+    // Two poses a period: as far ahead and back as is admitted, to and fro, and no time apart.
+    let stamps: [(&str, Stamps); 4] = [
+        ("ahead", |now, _| [now + 0.098, now + 0.099]),
+        ("back", |now, _| [now - 0.49, now - 0.48]),
+        (
+            "to and fro",
+            |now, period| if period % 20 < 10 { [now - 0.4, now - 0.39] } else { [now, now + 0.09] },
+        ),
+        ("at once", |now, _| [now, now + 1e-12]),
+    ];
+    // Beside its true place: none, on top of a neighbour and back, round it faster than anything flies, and far away.
+    type Lie = fn(u32) -> [[f64; 2]; 2];
+    let lies: [(&str, Lie); 4] = [
+        ("its own place", |_| [[0.0; 2]; 2]),
+        ("two neighbours", |_| [[1.5, 0.0], [0.0, 1.5]]),
+        ("round it", |period| {
+            let (sin, cos) = f64::from(period).sin_cos();
+            [[1.2 * cos, 1.2 * sin], [-1.2 * cos, -1.2 * sin]]
+        }),
+        ("far away", |_| [[-40.0, 3.0], [0.2, 0.0]]),
+    ];
+    let mut were_believed = 0;
+    for (k, (stamps, lie)) in stamps.iter().flat_map(|stamps| lies.map(|lie| (stamps, lie))).enumerate() {
+        let model = MODELS[k % MODELS.len()];
+        let what = format!("{} stamps, {}, {model}", stamps.0, lie.0);
+        let worst = worst_of_the_others("{ kind = \"silent\" }", model, |flight, period| {
+            let (now, place) = (flight.fleet().time(), flight.fleet().places().get(MIDDLE));
+            if now < 2.0 {
+                return;
+            }
+            for (by, stamp) in lie.1(period).into_iter().zip(stamps.1(now, period)) {
+                let position = [0, 1].map(|axis| place[axis] + by[axis]);
+                let pose = Pose { position, yaw: 0.0, stamp, frame_is_right: true };
+                were_believed += u32::from(flight.control_mut().receive(MIDDLE, pose, now).is_ok());
+            }
+        });
+        worst.within_bounds(&what);
+    }
+    // Of 24,320: those dated behind the last one are not.
+    assert!(were_believed > 20_000, "{were_believed}");
 }
 
 #[test]

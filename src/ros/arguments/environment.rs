@@ -19,6 +19,25 @@ pub enum DiscoveryRange {
     SystemDefault,
 }
 
+/// Middleware that nodes on DDS exchange with: their wire format is RTPS.
+const ON_DDS: [&str; 5] = [
+    "rmw_fastrtps_cpp",
+    "rmw_fastrtps_dynamic_cpp",
+    "rmw_cyclonedds_cpp",
+    "rmw_connextdds",
+    "rmw_gurumdds_cpp",
+];
+
+/// Settings of one middleware alone. Nodes on others, this one included, do not read them.
+const OF_OTHERS: [(&str, &str); 6] = [
+    ("CYCLONEDDS_URI", "Cyclone DDS"),
+    ("FASTRTPS_DEFAULT_PROFILES_FILE", "Fast DDS"),
+    ("FASTDDS_DEFAULT_PROFILES_FILE", "Fast DDS"),
+    ("FASTDDS_BUILTIN_TRANSPORTS", "Fast DDS"),
+    ("NDDS_QOS_PROFILES", "Connext"),
+    ("NDDS_DISCOVERY_PEERS", "Connext"),
+];
+
 /// The environment variables of ROS 2; `Default` is an empty environment.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Environment {
@@ -27,9 +46,10 @@ pub struct Environment {
     /// How far to discover (`ROS_LOCALHOST_ONLY` before `ROS_AUTOMATIC_DISCOVERY_RANGE`)
     /// \[default: subnet\].
     pub discovery: DiscoveryRange,
-    /// The middleware of the nodes around (`RMW_IMPLEMENTATION`), as typed: it decides how services
-    /// are called.
+    /// The middleware of the nodes around (`RMW_IMPLEMENTATION`), one on DDS.
     pub middleware: Option<String>,
+    /// Variables that are set and have no effect here, in words.
+    pub warnings: Vec<String>,
     /// The request for DDS security.
     pub security: SecurityRequest,
 }
@@ -39,7 +59,7 @@ impl Environment {
     ///
     /// # Errors
     /// A domain that is no whole number from 0 to 232, an unknown discovery range, and what this node cannot do:
-    /// discovery that is off, peers by address.
+    /// discovery that is off, peers by address or from a server, a middleware that is not DDS.
     pub fn read(look_up: &dyn Fn(&str) -> Option<String>) -> Result<Self, RosArgumentError> {
         let variable = |name: &str| look_up(name).filter(|value| !value.is_empty());
         let domain = variable("ROS_DOMAIN_ID").map_or(Ok(0), read_domain)?;
@@ -49,23 +69,57 @@ impl Environment {
             Some(range) => read_range(range)?,
             None => DiscoveryRange::default(),
         };
-        if let Some(value) =
-            variable("ROS_STATIC_PEERS").filter(|peers| peers.split(';').any(|p| !p.is_empty()))
-        {
-            return Err(RosArgumentError::Environment {
-                variable: "ROS_STATIC_PEERS",
-                value,
-                reason: "this node finds peers by multicast and on this computer, not by address",
-                help: "unset it for this process and let multicast reach the peers, or run it beside them",
-            });
+        if let Some(refusal) = unreachable_peers(&variable) {
+            return Err(refusal);
         }
         Ok(Self {
             domain,
             discovery,
-            middleware: variable("RMW_IMPLEMENTATION"),
+            middleware: variable("RMW_IMPLEMENTATION").map(read_middleware).transpose()?,
+            warnings: OF_OTHERS.iter().filter(|(name, _)| variable(name).is_some()).map(of_others).collect(),
             security: SecurityRequest::read(&variable),
         })
     }
+}
+
+/// Peers that are found in ways that this node does not have.
+fn unreachable_peers(variable: &dyn Fn(&str) -> Option<String>) -> Option<RosArgumentError> {
+    let names_any = |peers: &String| peers.split(';').any(|peer| !peer.is_empty());
+    let refusal =
+        |variable, value, reason, help| RosArgumentError::Environment { variable, value, reason, help };
+    let peers = variable("ROS_STATIC_PEERS").filter(names_any).map(|value| {
+        refusal(
+            "ROS_STATIC_PEERS",
+            value,
+            "this node finds peers by multicast and on this computer, not by address",
+            "unset it for this process and let multicast reach the peers, or run it beside them",
+        )
+    });
+    peers.or_else(|| {
+        let value = variable("ROS_DISCOVERY_SERVER").filter(names_any)?;
+        Some(refusal(
+            "ROS_DISCOVERY_SERVER",
+            value,
+            "this node finds peers by multicast, not from a server of Fast DDS, and peers that ask one do not find it",
+            "unset it for this process and for its peers",
+        ))
+    })
+}
+
+fn read_middleware(value: String) -> Result<String, RosArgumentError> {
+    if ON_DDS.contains(&value.as_str()) {
+        return Ok(value);
+    }
+    Err(RosArgumentError::Environment {
+        variable: "RMW_IMPLEMENTATION",
+        value,
+        reason: "this node speaks DDS, and nodes on a middleware that is not known to do so do not hear it",
+        help: "run its peers on rmw_fastrtps_cpp or rmw_cyclonedds_cpp; if they are on DDS, unset it for this process",
+    })
+}
+
+fn of_others((name, middleware): &(&str, &str)) -> String {
+    format!("{name} has no effect on this node: it is for nodes on {middleware}")
 }
 
 fn read_domain(value: String) -> Result<u16, RosArgumentError> {

@@ -6,6 +6,9 @@
 //! process may put on its own sockets: Linux, Documentation/networking/filter.rst). The filter is not complete: of a
 //! packet's submessages only the first [`SLOTS`] are checked, and carefully forged numbers can still make RustDDS deaf
 //! to a peer. [`pulse`](super::pulse) handles the rest.
+//!
+//! A secured participant loses messages of the handshake by which peers prove who they are: they go to everybody, and of
+//! those that come at once RustDDS takes the last, which may be for another. Those for others are kept out too.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -17,6 +20,9 @@ use socket2::{SockFilter, SockRef, Type};
 
 /// Submessages looked at in a packet \[1\]: as many as the filters of older kernels have room for.
 const SLOTS: usize = 20;
+
+/// Submessages among which a message of the handshake is looked for: it comes alone, behind a time stamp at most \[1\].
+const HANDSHAKE_SLOTS: usize = 3;
 
 /// Sockets of this process, by the kernel's names for them.
 pub fn sockets() -> io::Result<BTreeMap<String, i32>> {
@@ -34,12 +40,17 @@ pub fn sockets() -> io::Result<BTreeMap<String, i32>> {
     Ok(found)
 }
 
-/// Filters what the UDP sockets hear that this process opened since it had those of `before`; says how many there are.
+/// Filters what the UDP sockets hear that this process opened since it had those of `before`; says how many there are. A
+/// secured participant, whose prefix is `secured`, hears no handshakes of others.
 ///
 /// # Errors
 /// A kernel that has no such filters.
-pub fn guard(before: &BTreeMap<String, i32>, loopback_only: bool) -> io::Result<usize> {
-    let program = program(loopback_only);
+pub fn guard(
+    before: &BTreeMap<String, i32>,
+    loopback_only: bool,
+    secured: Option<[u8; 12]>,
+) -> io::Result<usize> {
+    let program = program(loopback_only, secured);
     let mut guarded = 0;
     for (_, number) in sockets()?.into_iter().filter(|(name, _)| !before.contains_key(name)) {
         let socket = borrowed(number);
@@ -158,11 +169,17 @@ const PAD: u32 = 0x01;
 const HEARTBEAT: u32 = 0x07;
 const GAP: u32 = 0x08;
 const INFO_TIMESTAMP: u32 = 0x09;
+const DATA: u32 = 0x15;
 const DATA_FRAGMENT: u32 = 0x16;
+/// The writer of the handshake (DDS Security 1.1, table 7): its messages are not protected.
+const HANDSHAKE_WRITER: u32 = 0x0002_01c3;
+/// From the beginning of a DATA submessage without inline QoS to the participant that a message of the handshake is for:
+/// headers and encapsulation, and the identities of this message and of the one that it answers (7.4.3).
+const ADDRESSEE: u32 = 24 + 4 + 24 + 24;
 /// Largest sample in fragments, in units of 64 KiB \[1\].
 const LARGEST_SAMPLE: u32 = 64;
 
-fn program(loopback_only: bool) -> Vec<SockFilter> {
+fn program(loopback_only: bool, secured: Option<[u8; 12]>) -> Vec<SockFilter> {
     let mut program = Vec::new();
     if loopback_only {
         let is_loopback = [
@@ -182,14 +199,38 @@ fn program(loopback_only: bool) -> Vec<SockFilter> {
         Do(LD_IMM_X, FIRST),
     ];
     assemble(&is_rtps, &mut program);
-    let slot = slot();
-    (0..SLOTS).for_each(|_| assemble(&slot, &mut program));
+    let (first, other) = (slot(secured), slot(None));
+    // What the handshake takes is less than one slot.
+    let slots = SLOTS - usize::from(secured.is_some());
+    (0..slots).for_each(|n| assemble(if n < HANDSHAKE_SLOTS { &first } else { &other }, &mut program));
     program.push(SockFilter::new(RET, 0, 0, PASS));
     program
 }
 
+/// Drops a message of the handshake that is neither for the participant of this prefix nor for everybody; the kind of the
+/// submessage is in A.
+fn handshake(own: [u8; 12], skip: u8, dropped: u8, to_others: u8) -> [Line; 13] {
+    let word = |n: usize| u32::from_be_bytes([own[n], own[n + 1], own[n + 2], own[n + 3]]);
+    [
+        If(JEQ, DATA, Next, Label(skip)),
+        Do(LDX_B, 1),
+        // Inline QoS have no fixed length, and nobody is known to send any here.
+        If(JSET, 2, Label(skip), Next),
+        Do(LDX_W, 12),
+        If(JEQ, HANDSHAKE_WRITER, Next, Label(skip)),
+        Do(LDX_W, ADDRESSEE),
+        If(JEQ, word(0), Next, Label(to_others)),
+        Do(LDX_W, ADDRESSEE + 4),
+        If(JEQ, word(4), Next, Label(dropped)),
+        Do(LDX_W, ADDRESSEE + 8),
+        If(JEQ, word(8), Label(skip), Label(dropped)),
+        Is(to_others),
+        If(JEQ, 0, Label(skip), Label(dropped)),
+    ]
+}
+
 /// Checks the submessage that begins at X and goes on to the next. A read beyond the packet drops it.
-fn slot() -> Vec<Line> {
+fn slot(secured: Option<[u8; 12]>) -> Vec<Line> {
     const NUMBERS: u8 = 0;
     const LITTLE: u8 = 1;
     const COMPARE: u8 = 2;
@@ -204,7 +245,9 @@ fn slot() -> Vec<Line> {
     const PASSED: u8 = 11;
     const HERE: u8 = 12;
     const EMPTY: u8 = 13;
-    vec![
+    const OTHER: u8 = 14;
+    const TO_OTHERS: u8 = 15;
+    let mut lines = vec![
         Do(LD_LEN, 0),
         If(JGT_X, 0, Label(HERE), Label(PASSED)),
         Is(HERE),
@@ -213,7 +256,7 @@ fn slot() -> Vec<Line> {
         Do(ST, 0),
         If(JEQ, HEARTBEAT, Label(NUMBERS), Next),
         If(JEQ, DATA_FRAGMENT, Label(FRAGMENT), Next),
-        If(JEQ, GAP, Next, Label(SKIP)),
+        If(JEQ, GAP, Next, Label(OTHER)),
         // A gap that starts at the first sample is normal for a late joiner and costs nothing.
         Do(LDX_W, 12),
         If(JEQ, 0, Next, Label(NUMBERS)),
@@ -266,6 +309,10 @@ fn slot() -> Vec<Line> {
         Do(LDX_H, 32),
         Is(SIZE),
         If(JGT, LARGEST_SAMPLE - 1, Label(DROPPED), Label(SKIP)),
+        Is(OTHER),
+    ];
+    lines.extend(secured.into_iter().flat_map(|own| handshake(own, SKIP, DROPPED, TO_OTHERS)));
+    lines.extend([
         Is(SKIP),
         Do(LDX_MEM, 3),
         Do(LDX_B, 1),
@@ -296,7 +343,8 @@ fn slot() -> Vec<Line> {
         Do(ADD, 4),
         Do(ADD_X, 0),
         Do(TAX, 0),
-    ]
+    ]);
+    lines
 }
 
 #[cfg(test)]
@@ -331,20 +379,67 @@ mod tests {
         [b"RTPS\x02\x03\x01\x12 a stranger ".to_vec(), submessages.concat()].concat()
     }
 
-    #[test]
-    fn promises_that_no_memory_holds_stay_outside_and_everything_ordinary_comes_in() {
+    /// A socket behind a filter, and whether a packet comes in.
+    fn door(secured: Option<[u8; 12]>) -> (UdpSocket, impl Fn(&[u8]) -> bool) {
         let before = sockets().expect("a process");
         let inside = UdpSocket::bind("127.0.0.1:0").expect("a socket");
         inside.set_read_timeout(Some(Duration::from_millis(100))).expect("a socket");
         // Tests beside this one may have opened some too.
-        assert!(guard(&before, true).expect("Linux") >= 1);
+        assert!(guard(&before, true, secured).expect("Linux") >= 1);
         let outside = UdpSocket::bind("127.0.0.1:0").expect("a socket");
         let to = inside.local_addr().expect("bound");
-        let comes_in = |packet: &[u8]| {
+        let listener = inside.try_clone().expect("another descriptor");
+        let comes_in = move |packet: &[u8]| {
             outside.send_to(packet, to).expect("sent");
             let mut heard = [0; 65_536];
-            inside.recv(&mut heard).is_ok_and(|length| heard[..length] == *packet)
+            listener.recv(&mut heard).is_ok_and(|length| heard[..length] == *packet)
         };
+        (inside, comes_in)
+    }
+
+    #[test]
+    fn handshakes_of_others_stay_outside_of_a_secured_participant() {
+        const OURS: [u8; 12] = *b"us on 2 keys";
+        let message = |writer: u32, to: [u8; 12], little: bool| {
+            let mut bytes = submessage(0x15, &[0; 40], little);
+            bytes[12..16].copy_from_slice(&writer.to_be_bytes());
+            bytes[76..88].copy_from_slice(&to);
+            bytes
+        };
+        let time = submessage(9, &[1, 2], true);
+        let (_inside, comes_in) = door(Some(OURS));
+        for little in [true, false] {
+            let to = |to| message(HANDSHAKE_WRITER, to, little);
+            let inline_qos = {
+                let mut bytes = to([7; 12]);
+                bytes[1] |= 2;
+                bytes
+            };
+            for one in [to(OURS), to([0; 12]), inline_qos, message(0x0000_00c2, [7; 12], little)] {
+                assert!(comes_in(&packet(&[time.clone(), one.clone()])), "{little} {one:?}");
+                assert!(comes_in(&packet(&[one])), "{little}");
+            }
+            let strangers = [0, 4, 8].map(|from| {
+                let mut to = OURS;
+                to[from] += 1;
+                to
+            });
+            for stranger in strangers.into_iter().chain([[7; 12]]) {
+                let one = to(stranger);
+                assert!(!comes_in(&packet(&[time.clone(), one.clone()])), "{little} {stranger:?}");
+                assert!(!comes_in(&packet(std::slice::from_ref(&one))), "{little} {stranger:?}");
+            }
+        }
+        let heartbeats = [vec![time.clone(); 17], vec![numbers(7, 1, 1 << 62, true)]].concat();
+        assert!(!comes_in(&packet(&heartbeats)), "the other bounds hold too");
+        let (_inside, comes_in) = door(None);
+        assert!(comes_in(&packet(&[message(HANDSHAKE_WRITER, [7; 12], true)])));
+    }
+
+    #[test]
+    fn promises_that_no_memory_holds_stay_outside_and_everything_ordinary_comes_in() {
+        let (inside, comes_in) = door(None);
+        let to = inside.local_addr().expect("bound");
         let text = submessage(0x15, &[7; 40], true);
         let (pad, time) = (submessage(1, &[], true), submessage(9, &[], false));
         for little in [true, false] {

@@ -123,7 +123,8 @@ impl Edge {
         }
         let before = super::door::sockets().unwrap_or_default();
         let participant = builder.build().map_err(|error| refused(error.to_string()))?;
-        match super::door::guard(&before, options.loopback_only) {
+        let secured = is_secured.then(|| prefix(participant.guid()));
+        match super::door::guard(&before, options.loopback_only, secured) {
             Ok(_) => {}
             // Without the filter, packets that had to be excluded would enter.
             Err(error) if options.loopback_only => {
