@@ -32,7 +32,7 @@ const BEYOND_ITS_WATCHDOG: Duration = Duration::from_millis(800);
 const LOOK: Duration = Duration::from_millis(10);
 /// How long a child that was asked to end may take \[s\].
 const LEAVING: Duration = Duration::from_secs(8);
-/// How long a child may take until it speaks \[s\].
+/// How long a child that is not stopped may take until it speaks \[s\].
 const OPENING: Duration = Duration::from_secs(30);
 /// Children in a row that end without a word before we give up \[1\]: for a reason of their own, and as those do whose
 /// middleware strangers flood, one after the other while that lasts.
@@ -151,14 +151,21 @@ fn follow(
             let _ = socket.shutdown(std::net::Shutdown::Write);
             asked = Some(Instant::now());
         }
-        let patience = if last.is_some() { silence } else { OPENING };
-        let is_silent = asked.is_none() && heard.elapsed() > patience;
+        let is_late = || last.is_some() || heard.elapsed() > OPENING || is_stopped(child.id());
+        let is_silent = asked.is_none() && heard.elapsed() > silence && is_late();
         if is_silent || asked.is_some_and(|asked| asked.elapsed() > LEAVING) {
             tracing::error!("the process does not answer and is ended");
             child.kill()?;
         }
         std::thread::sleep(LOOK);
     }
+}
+
+/// Whether a process has been stopped (SIGSTOP), so that it will never speak; false where the system does not say.
+fn is_stopped(process: u32) -> bool {
+    let stat = std::fs::read_to_string(format!("/proc/{process}/stat")).unwrap_or_default();
+    // Behind its name, which may have anything in it.
+    stat.rsplit_once(") ").is_some_and(|(_, rest)| rest.starts_with('T'))
 }
 
 impl Life {

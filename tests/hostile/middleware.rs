@@ -310,6 +310,14 @@ fn a_process_that_is_killed_or_stands_still_is_followed_by_one_that_goes_on() {
         assert!(back < 5.0, "{signal_name}: {back} s");
         scene.judge.during(Duration::from_secs(2), || ());
     }
+    // One that stands still before it has said a word.
+    let worker = scene.node.worker().expect("a worker");
+    signal("KILL", worker);
+    let next = until("another process", || scene.node.worker().filter(|&process| process != worker));
+    signal("STOP", next);
+    let back = scene.judge.until_all_are_sent();
+    println!("STOP while it opens: back after {back:.2} s");
+    assert!(back < 5.0, "{back} s");
     assert!(scene.judge.mean() > scene.begun_at, "the program began anew");
     assert_eq!(scene.node.terminate(), Some(0));
 }
