@@ -150,7 +150,7 @@ fn what_is_doubtful_is_a_caution_before_the_flight() {
                 points = [{ at = 2.0, displacement = [9.0, 0.0] }] } }]";
     let squeezed = "manoeuvres=[{ name = \"turn\", legs = [{ seconds = 60.0, stretch = [0.2, 1.0] }] }]";
     let fence = "limits.geofence=[[-1.0, -1.0], [7.0, -1.0], [7.0, 7.0], [-1.0, 7.0]]";
-    let cases: [(&[&str], &str); 7] = [
+    let cases: [(&[&str], &str); 6] = [
         (&["flight.loss=1.0"], "every pose is lost"),
         (&[path], "the program of leaders[0] moves a robot at up to 4.500 m/s, above limits.speed"),
         (&[squeezed], "manoeuvre `turn` leaves -0.100 m between"),
@@ -160,7 +160,6 @@ fn what_is_doubtful_is_a_caution_before_the_flight() {
             "these robots start outside",
         ),
         (&["ranges={ reach = 1.0, max_liars = 1 }"], "no more than ranges.max_liars robots are within"),
-        (&["leaders=[]", "rule.weights.kind=equal", "flight.bounds={}"], "no robot leads"),
     ];
     for (more, expected) in cases {
         let cautions = square(more);
@@ -172,6 +171,11 @@ fn what_is_doubtful_is_a_caution_before_the_flight() {
                  leaders = [{ robots = [\"a\"], program = { kind = \"external\" } }]\n";
     let cautions = plan_of(&parse(apart).expect("valid"));
     assert!(cautions[0].starts_with("no leader reaches `c`, `d`:"), "{cautions:?}");
+    let (unled, _) = PAIR.split_once("[[leaders]]").expect("leaders last");
+    let cautions = plan_of(&parse(unled).expect("valid"));
+    assert!(cautions[0].starts_with("no robot leads"), "{cautions:?}");
+    let bounded = refusal(&format!("{apart}[flight.bounds]\nfinal_error = 0.1\n"));
+    assert!(bounded.contains("no leader reaches `c`, `d`"), "{bounded}");
 }
 
 fn plan_of(swarm: &Swarm) -> Vec<String> {

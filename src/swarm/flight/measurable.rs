@@ -16,7 +16,11 @@ pub fn require(swarm: &Swarm, flight: &Flight) -> Result<(), SceneError> {
     let has_shape = has_affine || !formation.is_led_here() || formation.settled(&formation.places).is_some();
     let has_solids = formation.count() > 1 || !swarm.raw.obstacles.is_empty();
     let no_affine = "the leaders' motion is not affine, so no robot has a place by it";
-    let no_shape = "the leaders' motion is not affine, and no place of rest behind them can be computed";
+    let unled = formation.unled();
+    let no_shape = match formation.named(|m| unled.contains(&m)) {
+        Some(names) => &format!("no leader reaches {names}"),
+        None => "the leaders' motion is not affine, and no place of rest behind them can be computed",
+    };
     let no_continuum = "the robots are not the particles of a scene that runs beside them";
     let no_solids = "there is one robot, and no obstacle";
     let one_manoeuvre = "let all leaders follow one manoeuvre, or bound final_error instead";

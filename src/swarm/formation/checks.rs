@@ -5,6 +5,39 @@ use crate::flock::vectors::distance;
 use crate::scene::SceneError;
 use crate::scene::swarm::Swarm;
 
+/// Robots that a message names.
+const MOST_NAMED: usize = 6;
+
+impl Formation {
+    /// Members that no leader reaches by links that last, ascending; none where a scene leads, or links do not last.
+    pub fn unled(&self) -> Vec<usize> {
+        let mut reached: Vec<bool> = (0..self.count()).map(|m| self.leads(m)).collect();
+        let is_judged = match self.engine().filter(|_| self.is_led_here()) {
+            None => false,
+            Some(engine) => engine.lasting_neighbours().is_some() || !reached.contains(&true),
+        };
+        let mut grows = is_judged;
+        while std::mem::take(&mut grows) {
+            for m in 0..self.count() {
+                if !reached[m] && self.neighbours(m).any(|other| reached[other]) {
+                    (reached[m], grows) = (true, true);
+                }
+            }
+        }
+        (0..self.count()).filter(|&m| is_judged && !reached[m]).collect()
+    }
+
+    /// Names of the members that are picked, the first few of them; none where none is.
+    pub fn named(&self, is_picked: impl Fn(usize) -> bool) -> Option<String> {
+        let picked: Vec<usize> = (0..self.count()).filter(|&m| is_picked(m)).collect();
+        let shown: Vec<String> =
+            picked.iter().take(MOST_NAMED).map(|&m| format!("`{}`", self.names[m])).collect();
+        let more = picked.len().saturating_sub(MOST_NAMED);
+        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+        (!picked.is_empty()).then(|| shown.join(", ") + &more)
+    }
+}
+
 /// Refuses places at which two robots would be closer than the swarm's own limit.
 pub fn require_apart(swarm: &Swarm, formation: &Formation) -> Result<(), SceneError> {
     let Some(clearance) = swarm.raw.limits.clearance else { return Ok(()) };

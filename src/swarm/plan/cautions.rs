@@ -9,9 +9,6 @@ use crate::scene::swarm::{Program, Swarm};
 use crate::swarm::flight::Flight;
 use crate::swarm::formation::Formation;
 
-/// Robots that a caution names.
-const MOST_NAMED: usize = 6;
-
 /// Parts of a leg or of a program between which a leader's way is looked at.
 const PARTS: usize = 40;
 
@@ -30,7 +27,9 @@ pub fn of(swarm: &Swarm, flight: &Flight) -> Vec<String> {
         unled(formation),
         unmeasured(raw, formation),
         outside(flight, "start", &|m| flight.fleet().robots()[m].position),
-        outside(flight, "have their places in the formation", &|m| formation.places.get(m)),
+        (!raw.flight.start.is_empty())
+            .then(|| outside(flight, "have their places in the formation", &|m| formation.places.get(m)))
+            .flatten(),
         led_outside(flight),
         in_solids(flight),
     ];
@@ -65,21 +64,11 @@ fn delay(raw: &RawSwarm) -> Option<String> {
 
 /// Robots that no leader reaches by links that last.
 fn unled(formation: &Formation) -> Option<String> {
-    let engine = formation.engine().filter(|_| formation.is_led_here())?;
-    let mut reached: Vec<bool> = (0..formation.count()).map(|m| formation.leads(m)).collect();
-    if !reached.contains(&true) {
+    let unled = formation.unled();
+    if unled.len() == formation.count() {
         return Some("no robot leads: the formation goes nowhere; add [[leaders]]".into());
     }
-    engine.lasting_neighbours()?;
-    let mut grows = true;
-    while std::mem::take(&mut grows) {
-        for m in 0..formation.count() {
-            if !reached[m] && formation.neighbours(m).any(|other| reached[other]) {
-                (reached[m], grows) = (true, true);
-            }
-        }
-    }
-    let names = named(formation, |m| !reached[m])?;
+    let names = formation.named(|m| unled.contains(&m))?;
     Some(format!(
         "no leader reaches {names}: these robots follow each other alone; link them to the others, or let one of them lead"
     ))
@@ -92,7 +81,7 @@ fn unmeasured(raw: &RawSwarm, formation: &Formation) -> Option<String> {
         let apart = |other: &usize| distance(formation.places.get(m), formation.places.get(*other));
         (0..formation.count()).filter(|other| *other != m && apart(other) <= ranges.reach).count()
     };
-    let names = named(formation, |m| near(m) <= ranges.max_liars)?;
+    let names = formation.named(|m| near(m) <= ranges.max_liars)?;
     Some(format!(
         "no more than ranges.max_liars robots are within ranges.reach of {names}: lies of these robots are never found; \
          lower the one or raise the other"
@@ -102,7 +91,7 @@ fn unmeasured(raw: &RawSwarm, formation: &Formation) -> Option<String> {
 /// Robots that the fence does not hold.
 fn outside(flight: &Flight, which: &str, place: &dyn Fn(usize) -> [f64; 2]) -> Option<String> {
     let (filter, formation) = (flight.control().filter(), flight.control().formation());
-    let names = named(formation, |m| !filter.is_fenced_in(place(m), formation.radii[m] - ROUNDING))?;
+    let names = formation.named(|m| !filter.is_fenced_in(place(m), formation.radii[m] - ROUNDING))?;
     Some(format!(
         "these robots {which} outside limits.geofence, in whole or in part: {names}; widen it, or move them"
     ))
@@ -116,7 +105,7 @@ fn led_outside(flight: &Flight) -> Option<String> {
         let is_in = |place| filter.is_fenced_in(place, formation.radii[m] - ROUNDING);
         (0..=4 * PARTS).filter_map(led).any(|place| !is_in(place))
     };
-    let names = named(formation, leaves)?;
+    let names = formation.named(leaves)?;
     Some(format!(
         "programs lead these robots out of limits.geofence: {names}; they will stop at the fence: widen it, or change their \
          programs"
@@ -127,7 +116,7 @@ fn led_outside(flight: &Flight) -> Option<String> {
 fn in_solids(flight: &Flight) -> Option<String> {
     let (obstacles, formation) = (flight.control().filter().obstacles(), flight.control().formation());
     let overlaps = |m: usize| obstacles.distance(formation.places.get(m)) < formation.radii[m] - ROUNDING;
-    let names = named(formation, overlaps)?;
+    let names = formation.named(overlaps)?;
     Some(format!("an obstacle stands at the places of {names} in the formation; move one of them"))
 }
 
@@ -212,14 +201,4 @@ fn narrowest(formation: &Formation, manoeuvre: &Manoeuvre) -> Option<(f64, usize
         start += leg.seconds + leg.hold;
     }
     least
-}
-
-/// Names of the members that are picked, the first few of them; none where none is.
-fn named(formation: &Formation, is_picked: impl Fn(usize) -> bool) -> Option<String> {
-    let picked: Vec<usize> = (0..formation.count()).filter(|&m| is_picked(m)).collect();
-    let shown: Vec<String> =
-        picked.iter().take(MOST_NAMED).map(|&m| format!("`{}`", formation.names[m])).collect();
-    let more = picked.len().saturating_sub(MOST_NAMED);
-    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
-    (!picked.is_empty()).then(|| shown.join(", ") + &more)
 }
