@@ -78,7 +78,8 @@ pub fn level() -> Option<LogLevel> {
 /// ([`level`]). By default a node logs from INFO on, any other command from WARN on.
 pub fn start(arguments: &Arguments, ros: &RosArguments) {
     let logger = logger(&arguments.command, ros);
-    let verbosity = arguments.verbose + u8::from(logger.is_some());
+    let is_node = matches!(arguments.command, Command::Node(_) | Command::Robots(_));
+    let verbosity = arguments.verbose + u8::from(is_node);
     let given = ros.logging.level_of(logger.as_deref().unwrap_or(node::NAME));
     let is_console = ros.logging.stdout;
     let is_topic = logger.is_some() && ros.logging.rosout;

@@ -120,7 +120,7 @@ pub enum Command {
     Replay(replay::ReplayArguments),
     /// Keeps a swarm in formation over ROS 2 or shared memory: poses in, safe targets out
     #[command(
-        after_help = "Examples:\n  flockform node square --ros-args -r __ns:=/fleet -p speed_limit:=0.5\n  flockform node square --member robot_3\n  flockform node square --live --open\n  flockform node square --transport shm\n\n\
+        after_help = "Examples:\n  flockform node square --ros-args -r __ns:=/fleet -p speed_limit:=0.5\n  flockform node square --member robot_3 --set control.sweeps=1\n  flockform node square --live --open\n  flockform node square --transport shm\n\n\
                       Exit codes: 0 ended as asked, 2 bad input, 70 the middleware is gone and cannot be started again."
     )]
     Node(node::NodeArguments),

@@ -16,8 +16,9 @@ use flockform::ros::edge::pulse::MIDDLEWARE_GONE;
 use flockform::ros::node::{CommandQueue, FormationNode, KeptNode, NodeCommand, NodeError};
 use flockform::ros::robots::{Layout, RobotNodes};
 use flockform::scene::swarm::Swarm;
-use flockform::shm::{self, Domain, SimulatedRobots};
+use flockform::shm::{self, Domain, ShmError, SimulatedRobots};
 use flockform::swarm::control::Control;
+use flockform::swarm::control::scope::NodeScopeError;
 use serde::{Deserialize, Serialize};
 
 use super::live::{self, PageArguments};
@@ -106,7 +107,7 @@ pub fn node(arguments: &NodeArguments, ros: &RosArguments) -> Result<ExitCode, R
                 .transpose()?;
             // Others know the node from now on: an end has a leave to take.
             interrupt::serves();
-            let mut node = FormationNode::open(&swarm, ros, name)?;
+            let mut node = FormationNode::open(&swarm, ros, name).map_err(|error| refused(&swarm, error))?;
             let (member, namespace) = (arguments.member.clone(), Some(node.fleet().to_owned()));
             let mut about = About { member, namespace, ..arguments.swarm.about("node", &swarm) };
             about.set.extend(node.overrides(&swarm));
@@ -143,12 +144,31 @@ pub fn node(arguments: &NodeArguments, ros: &RosArguments) -> Result<ExitCode, R
             if arguments.live {
                 return Err(Refusal::NoPage);
             }
-            let mut node = shm::FormationNode::open(&swarm, &Domain::from_environment()?, name)?;
+            let domain = Domain::from_environment()?;
+            let mut node =
+                shm::FormationNode::open(&swarm, &domain, name).map_err(|error| refused(&swarm, error))?;
             announce(&swarm, node.control());
             node.run(interrupt::serves())?;
         }
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// The refusal of a node that did not open: of one robot's among several sweeps with the key that has them.
+fn refused(swarm: &Swarm, error: impl Into<Refusal>) -> Refusal {
+    let refusal = error.into();
+    let (Refusal::Node(NodeError::NodeScope(NodeScopeError::NotAlone { name, .. }))
+    | Refusal::Shm(ShmError::NodeScope(NodeScopeError::NotAlone { name, .. }))) = &refusal
+    else {
+        return refusal;
+    };
+    let sweeps = swarm.raw.control.sweeps;
+    if sweeps == 1 {
+        return refusal;
+    }
+    let why = format!("--member {name}: with {sweeps} sweeps its target depends on the whole formation");
+    let help = "add --set control.sweeps=1, or run one node for all, without --member";
+    swarm.refuse("control.sweeps", why, help).into()
 }
 
 /// State that a node's process leaves to the next.

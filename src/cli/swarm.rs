@@ -17,12 +17,13 @@ use flockform::scene::bundled::bundled_swarm;
 use flockform::scene::swarm::Swarm;
 use flockform::swarm::control::Control;
 use flockform::swarm::flight::{Flight, FlightReport, Record, Sample, fly_heard};
+use flockform::swarm::plan::cautions;
 
 use super::film::{SwarmFilmArguments, words as film_words};
 use super::names::{FileName, Kind, folder_of};
 use super::output::{OutputArguments, ReportArguments};
 use super::recording::{RecordArguments, close};
-use super::{FAILED, Refusal, interrupt, print, say};
+use super::{FAILED, Refusal, interrupt, on_terminal, print, say};
 
 /// A swarm and the changes to it.
 #[derive(Debug, Args)]
@@ -84,6 +85,11 @@ pub struct SwarmArguments {
 pub fn swarm(arguments: &SwarmArguments) -> Result<ExitCode, Refusal> {
     let swarm = arguments.swarm.load()?;
     let flight = Flight::new(&swarm)?;
+    if !arguments.output.quiet {
+        cautions::of(&swarm, &flight)
+            .iter()
+            .for_each(|caution| eprintln!("caution: {}", on_terminal(caution)));
+    }
     let film = arguments.film.open(&arguments.output)?;
     let reports = !arguments.report.no_report;
     let mut recorder = (reports || film.is_some()).then(|| FlightRecorder::new(&flight));
@@ -161,12 +167,13 @@ pub fn fly_recorded(
 }
 
 fn words(report: &FlightReport, seconds: f64, kept: &Path) -> String {
+    let FlightReport { leaders, leaders_at_start, .. } = *report;
+    let at_end = if leaders == leaders_at_start { String::new() } else { format!(" ({leaders} at the end)") };
     let mut words = format!(
-        "{}: {} robots ({}), {} leaders, {:.2} s flown in {seconds:.2} s ({:.0} times real time)\n",
+        "{}: {} robots ({}), {leaders_at_start} leaders{at_end}, {:.2} s flown in {seconds:.2} s ({:.0} times real time)\n",
         report.name,
         report.robots,
         report.model,
-        report.leaders,
         report.seconds,
         report.seconds / seconds.max(1e-9)
     );

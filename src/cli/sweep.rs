@@ -262,7 +262,7 @@ fn sweep_here(arguments: &SweepArguments) -> Result<ExitCode, Refusal> {
         pending.retain(|&run| run != row.run);
         sweep.rows.insert(row.run, row);
     }
-    let made = runs.make(&pending, &journal, arguments.output.quiet)?;
+    let made = runs.make((sweep.rows.len(), &pending), &journal, arguments.output.quiet)?;
     drop(journal);
     if interrupted.load(std::sync::atomic::Ordering::Relaxed) {
         eprintln!("{words}");

@@ -492,7 +492,10 @@ fn check_ids(scene: &Scene, key: &str, region: &SceneRegion, body: &Body) -> Res
         };
         let help = match body.numbering {
             Some(_) => "ids are those of the body's file, or the numbers of its rows",
-            None => "`flockform plan` prints the numbering",
+            None => {
+                "particles count from 1, column by column from the bottom left, the frame's included; in a report a \
+                 particle that is pointed at shows its number"
+            }
         };
         return Err(scene.refuse(&format!("{key}.ids[{n}]"), message, help));
     }

@@ -1,7 +1,9 @@
 //! `flockform swarm`, `node` and `robots` as people call them.
 
-use std::fs::{read_dir, read_to_string};
+use std::fs::{read_dir, read_to_string, write};
 use std::process::Output;
+
+use flockform::swarm::control::scope::NodeScope;
 
 use crate::program::*;
 
@@ -48,6 +50,31 @@ fn leaders_are_diamonds_on_the_map_and_in_its_legend() {
     assert!(keys[0].trim_start_matches('>').trim_start().starts_with("<path"), "{}", keys[0]);
 }
 
+/// A fence far outside the window, and robots of two sizes.
+#[test]
+fn the_map_clips_the_fence_and_draws_every_robot_to_scale() {
+    const PAIR: &str = "title = \"t\"\n\
+        robots = [{ name = \"a\", place = [0.0, 0.0], radius = 1.2 }, { name = \"b\", place = [4.0, 0.0] },\n\
+        { name = \"c\", place = [2.0, 0.0], radius = 0.3 }]\n\
+        leaders = [{ robots = [\"a\", \"b\"], program = { kind = \"external\" } }]\n\
+        [limits]\ngeofence = [[-50.0, -50.0], [50.0, -50.0], [50.0, 50.0], [-50.0, 50.0]]\n\
+        [flight]\nduration = 1.0\n";
+    let folder = temporary();
+    write(folder.path().join("pair.toml"), PAIR).expect("written");
+    let output = flockform(&["swarm", "pair.toml", "--out", "out", "--no-report"], folder.path());
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let map = read_to_string(folder.path().join("out/flight.svg")).expect("drawn");
+    let (_, window) = map.split_once("<clipPath id=\"plot\">").expect("a window");
+    let (_, clipped) = window.split_once("<g clip-path=\"url(#plot)\">").expect("something is clipped");
+    assert!(clipped.trim_start().starts_with("<path class=\"fence\""), "{clipped}");
+    let (_, starts) = map.split_once("<g class=\"start\"").expect("drawn");
+    let (starts, _) = starts.split_once("</g>").expect("closed");
+    let radius = |circle: &str| circle.split('"').next().expect("a number").parse::<f64>().expect("a number");
+    let radii: Vec<f64> = starts.split(" r=\"").skip(1).map(radius).collect();
+    let [a, b, c] = radii[..] else { panic!("{radii:?}") };
+    assert!((a / c - 4.0).abs() < 0.02 && (a / b - 8.0).abs() < 0.02, "{radii:?}");
+}
+
 #[test]
 fn a_broken_bound_ends_with_exit_code_1_and_all_is_written() {
     let folder = temporary();
@@ -81,20 +108,76 @@ fn what_cannot_fly_is_refused_with_exit_code_2_and_nothing_is_left() {
 #[test]
 fn nodes_refuse_what_ros_cannot_mean() {
     let folder = temporary();
-    let cases: [(&[&str], &str); 9] = [
+    let cases: [(&[&str], &str); 10] = [
         (&["node", "square", "--ros-args", "--remapp", "a:=b"], "--remapp"),
         (&["node", "square", "--ros-args", "-r", "__ns:=no slash"], "no slash"),
         (&["node", "square", "--port", "9000"], "--live"),
         (&["node", "square", "--allow-commands"], "--live"),
         (&["node", "square", "--live", "--transport", "shm"], "leave out --transport shm"),
         (&["node", "square", "--member", "robot_99"], "they are called `robot_1` to `robot_25`"),
-        (&["node", "square", "--member", "robot_7"], "needs to see the whole formation"),
+        (&["node", "square", "--member", "robot_7"], "help: add --set control.sweeps=1"),
+        (
+            &["node", "square", "--member", "robot_7", "--transport", "shm"],
+            "control.sweeps = 200: --member robot_7",
+        ),
         (&["node", "square", "--ros-args", "-p", "speed_limit:=-2.0"], "speed_limit"),
         (&["run", "tension", "--ros-args", "-r", "a:=b"], "this command is no ROS 2 node"),
     ];
     for (words, expected) in cases {
         refused(&flockform(words, folder.path()), words, expected);
     }
+}
+
+/// Every call of `node` or `robots` for a single member in the guide and in the help.
+#[test]
+fn the_examples_of_single_members_can_be_flown_alone() {
+    let folder = temporary();
+    let help = flockform(&["node", "--help"], folder.path());
+    let guide = include_str!("../../src/guide/ros2.md");
+    let texts = [text(&help.stdout), guide.to_owned()];
+    let examples = texts.iter().flat_map(|text| text.lines()).filter_map(|line| {
+        let line = line.split('#').next().unwrap_or(line).trim();
+        (line.starts_with("flockform node") && line.contains("--member")).then_some(line)
+    });
+    let examples: Vec<&str> = examples.collect();
+    assert_eq!(examples.len(), 2, "{examples:?}");
+    for example in examples {
+        let words: Vec<&str> = example.split_whitespace().collect();
+        let value =
+            |option: &str| words.iter().position(|word| *word == option).map(|k| words[k + 1].to_owned());
+        let set: Vec<String> = value("--set").into_iter().collect();
+        let swarm = flockform::scene::bundled::bundled_swarm(words[2]).expect("bundled").load_swarm(&set);
+        let swarm = swarm.expect("valid");
+        let mut control = flockform::swarm::control::Control::new(&swarm).expect("laid out");
+        let scope = NodeScope::take(&swarm, &mut control, value("--member").as_deref());
+        assert_eq!(scope.map(|scope| scope.mine.len()), Ok(1), "{example}");
+    }
+}
+
+#[test]
+fn a_flight_that_is_in_doubt_says_so_on_standard_error_and_the_plan_too() {
+    let folder = temporary();
+    let set = ["--set", "flight.loss=1.0"];
+    let flown =
+        flockform(&[&["swarm", "square", "--out", "out", "--no-report"], &set[..]].concat(), folder.path());
+    assert!(text(&flown.stderr).contains("caution: every pose is lost"), "{}", text(&flown.stderr));
+    let planned = flockform(&[&["plan", "square"], &set[..]].concat(), folder.path());
+    assert!(text(&planned.stdout).contains("caution: every pose is lost"), "{}", text(&planned.stdout));
+}
+
+/// A scene changes the roles on its way.
+#[test]
+fn the_leaders_of_a_flight_are_those_of_its_plan() {
+    const TENSION: &str = "title = \"t\"\nscene = { name = \"tension\" }\n[flight]\nduration = 40.0\n";
+    let folder = temporary();
+    write(folder.path().join("tension.toml"), TENSION).expect("written");
+    let planned = flockform(&["plan", "tension.toml"], folder.path());
+    let planned = text(&planned.stdout);
+    let (before, _) = planned.split_once(" leaders)").expect("said");
+    let leaders = before.rsplit('(').next().expect("a number");
+    let flown = flockform(&["swarm", "tension.toml", "--out", "out", "--no-report"], folder.path());
+    let said = text(&flown.stdout);
+    assert!(said.contains(&format!("), {leaders} leaders")), "{leaders}: {said}");
 }
 
 #[test]

@@ -44,6 +44,33 @@ fn a_frame_id_forges_no_line_and_fills_no_disk() {
 }
 
 #[test]
+fn a_node_without_poses_says_so_once_and_a_wrong_frame_is_named() {
+    let domain = domain();
+    let mut node = Running::start(&mut command(domain, &["node", "square"]));
+    let lines = node.lines();
+    let mut all = Vec::new();
+    let mut line = |words: &str| {
+        until(words, || {
+            all.extend(lines.try_iter());
+            all.iter().find(|line| line.contains(words)).cloned()
+        })
+    };
+    let silent = line("no pose has come for 5 s");
+    assert!(silent.starts_with("[WARN]") && silent.contains("/robot_1/pose"), "{silent}");
+    let edge = edge(domain);
+    let stranger = edge.node("/", "stranger").expect("a node");
+    let topic = stranger.publisher::<PoseStamped>("/robot_1/pose", Quality::reliable(1)).expect("says");
+    until("the node listens", || (topic.matched() > 0).then_some(()));
+    let header = Header { frame_id: "odom".into(), ..Header::default() };
+    topic.publish(&PoseStamped { header, pose: Pose::planar([0.0, 0.0], 0.0) }).expect("sent");
+    let wrong = line("robot_1: a pose is in the frame `odom`, not in `");
+    assert!(wrong.contains("node.frame_id"), "{wrong}");
+    assert_eq!(node.terminate(), Some(0));
+    all.extend(lines.iter());
+    assert_eq!(all.iter().filter(|line| line.contains("no pose has come")).count(), 1, "{all:#?}");
+}
+
+#[test]
 fn a_node_logs_as_ros_2_nodes_do() {
     let renamed = ["--ros-args", "-r", "__node:=keeper", "-r", "__ns:=/fleet"];
     let start = |words: &[&str], format: Option<&str>| {

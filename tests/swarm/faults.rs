@@ -72,6 +72,19 @@ fn a_member_that_comes_back_is_believed_again_and_the_formation_is_whole() {
     assert!(report.affine_error.expect("affine")[1] < 1e-3, "{:?}", report.affine_error);
 }
 
+/// What has not arrived yet is not lost; what never arrives is.
+#[test]
+fn a_robot_is_lost_from_its_first_pose_on_or_if_none_comes() {
+    let lost = |more: &[&str]| {
+        let overrides = [&["control.sweeps=1", "flight.duration=5.0"], more].concat();
+        flown(&load_swarm("square", &overrides)).1.most_lost
+    };
+    let dead = "flight.faults=[{ robot = \"robot_13\", at = 0.0, what = { kind = \"dead\" } }]";
+    assert_eq!(lost(&["flight.delay=3", "flight.jitter=2"]), 0);
+    assert_eq!(lost(&["flight.delay=3", dead]), 1);
+    assert_eq!(lost(&["flight.loss=1.0"]), 25);
+}
+
 #[test]
 fn nonsense_poses_are_turned_away_and_leave_the_others_where_they_belong() {
     for what in ["{ kind = \"not-a-number\" }", "{ kind = \"wrong-frame\" }"] {

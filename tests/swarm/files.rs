@@ -1,10 +1,13 @@
 //! What a swarm file may not say, and what the program answers.
 
 use flockform::scene::SceneError;
+use flockform::scene::swarm::Swarm;
 use flockform::swarm::control::Control;
 use flockform::swarm::flight::Flight;
+use flockform::swarm::plan::cautions;
 
 use super::support::*;
+use crate::swarms::load_swarm;
 
 const PAIR: &str = "title = \"t\"\n[[robots]]\nname = \"a\"\nplace = [0.0, 0.0]\n[[robots]]\nname = \"b\"\nplace = [1.0, 0.0]\n\
                     [[robots]]\nname = \"c\"\nplace = [0.0, 1.0]\n[[leaders]]\nrobots = [\"a\", \"b\"]\nprogram = { kind = \"external\" }\n";
@@ -52,6 +55,39 @@ fn a_bad_swarm_file_is_refused_with_place_and_remedy() {
             with("[[flight.faults]]\nrobot = \"z\"\nat = 1.0\nwhat = { kind = \"silent\" }\n"),
             "flight.faults[0].robot = \"z\": there is no robot `z`",
         ),
+        (
+            with("[flight.bounds]\naffine_error = 0.1\n"),
+            "flight.bounds.affine_error = 0.1: can never be measured",
+        ),
+        (
+            with("[flight.bounds]\ncontinuum_error = 0.1\n"),
+            "flight.bounds.continuum_error = 0.1: can never be measured",
+        ),
+        (with("[poses]\nrange = 0.5\n"), "and poses farther than poses.range (0.5 m) are rejected"),
+        (with("[flight]\nduration = 1e15\n"), "periods; a flight has 1e7 at most"),
+        (with("[limits]\nspeed = 1.0\n[ranges]\nmax_liars = 2\n"), "there are 2 that could measure it"),
+        (
+            with("[[obstacles]]\nkind = \"disc\"\ncentre = [1.0, 0.1]\nradius = 0.3\n"),
+            "robots[1].place = [1.0, 0.0]: `b` starts at [1.0, 0.0]",
+        ),
+        (
+            with("[flight]\nstart = [{ robot = \"c\", place = [1.0, 0.1] }]\n[limits]\nclearance = 0.1\n"),
+            "`c` starts 0.100 m from `b`",
+        ),
+        (
+            with(
+                "[flight]\nstart = [{ robot = \"c\", place = [3.0, 0.1] }, { robot = \"c\", place = [4.0, 0.0] }]\n",
+            ),
+            "flight.start[1].robot = \"c\": `c` has a place to start at already",
+        ),
+        (
+            with("[[leaders]]\nrobots = [\"a\"]\nprogram = { kind = \"external\" }\n"),
+            "leaders[1].robots[0] = \"a\": `a` leads by leaders[0] already",
+        ),
+        (
+            with("[[robots]]\nname = \"d\"\nplace = [5.0, 5.0]\nneighbours = [\"a\", \"a\"]\n"),
+            "robots[3].neighbours[1] = \"a\": `d` has this neighbour already",
+        ),
         (with("[resilience]\nmax_faulty_neighbours = 1\n"), "`c` has 2 neighbours"),
     ];
     for (text, expected) in cases {
@@ -95,4 +131,54 @@ fn a_corner_without_enough_neighbours_for_its_place_is_named() {
                 [rule]\nweights = { kind = \"solved\" }\n";
     let report = refusal(text);
     assert!(report.contains("rule.weights") && report.contains("particle 1 "), "{report}");
+}
+
+#[test]
+fn robots_fly_without_bounds_that_only_a_simulation_measures() {
+    let swarm = parse(&format!("{PAIR}[flight.bounds]\naffine_error = 0.1\n")).expect("valid");
+    assert!(Control::new(&swarm).is_ok());
+    assert!(Flight::new(&swarm).is_err());
+}
+
+/// What may be meant, and is likely not.
+#[test]
+fn what_is_doubtful_is_a_caution_before_the_flight() {
+    let square = |more: &[&str]| plan_of(&load_swarm("square", more));
+    let quiet = square(&[]);
+    assert!(quiet.len() == 1 && quiet[0].contains("moves a robot's place at up to"), "{quiet:?}");
+    let path = "leaders=[{ robots = [\"robot_1\", \"robot_5\", \"robot_21\", \"robot_25\"], program = { kind = \"path\", \
+                points = [{ at = 2.0, displacement = [9.0, 0.0] }] } }]";
+    let squeezed = "manoeuvres=[{ name = \"turn\", legs = [{ seconds = 60.0, stretch = [0.2, 1.0] }] }]";
+    let fence = "limits.geofence=[[-1.0, -1.0], [7.0, -1.0], [7.0, 7.0], [-1.0, 7.0]]";
+    let cases: [(&[&str], &str); 6] = [
+        (&["flight.loss=1.0"], "every pose is lost"),
+        (&[path], "the program of leaders[0] moves a robot at up to 4.500 m/s, above limits.speed"),
+        (&[squeezed], "manoeuvre `turn` leaves -0.100 m between"),
+        (&[fence], "programs lead these robots out of limits.geofence: `robot_1`"),
+        (
+            &["flight.start=[{ robot = \"robot_7\", place = [-9.0, 0.0] }]", fence],
+            "these robots start outside",
+        ),
+        (&["ranges={ reach = 1.0, max_liars = 1 }"], "no more than ranges.max_liars robots are within"),
+    ];
+    for (more, expected) in cases {
+        let cautions = square(more);
+        assert!(cautions.iter().any(|caution| caution.contains(expected)), "{more:?}: {cautions:?}");
+    }
+    let apart = "title = \"t\"\nlinks = { kind = \"listed\" }\n\
+                 robots = [{ name = \"a\", place = [0.0, 0.0] }, { name = \"b\", place = [1.0, 0.0], neighbours = [\"a\"] },\n\
+                 { name = \"c\", place = [2.0, 0.0], neighbours = [\"d\"] }, { name = \"d\", place = [3.0, 0.0], neighbours = [\"c\"] }]\n\
+                 leaders = [{ robots = [\"a\"], program = { kind = \"external\" } }]\n";
+    let cautions = plan_of(&parse(apart).expect("valid"));
+    assert!(cautions[0].starts_with("no leader reaches `c`, `d`:"), "{cautions:?}");
+    let (unled, _) = PAIR.split_once("[[leaders]]").expect("leaders last");
+    let cautions = plan_of(&parse(unled).expect("valid"));
+    assert!(cautions[0].starts_with("no robot leads"), "{cautions:?}");
+    let bounded = refusal(&format!("{apart}[flight.bounds]\nfinal_error = 0.1\n"));
+    assert!(bounded.contains("no leader reaches `c`, `d`"), "{bounded}");
+}
+
+fn plan_of(swarm: &Swarm) -> Vec<String> {
+    let flight = Flight::new(swarm).unwrap_or_else(|error| panic!("{error}"));
+    cautions::of(swarm, &flight)
 }

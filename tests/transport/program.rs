@@ -1,5 +1,6 @@
 //! `flockform node` and `flockform robots` over shared memory, and the same in one process.
 
+use std::io::{BufRead, BufReader};
 use std::process::{Command, Stdio};
 
 use flockform::flock::vectors::distance;
@@ -74,12 +75,30 @@ fn a_member_s_own_node_hears_its_neighbours_alone_and_moves_nobody_else() {
 
 /// The program with the square in a domain of shared memory.
 fn start(domain: &str, subcommand: &str) -> Running {
+    start_with(domain, subcommand, Stdio::inherit())
+}
+
+#[test]
+fn both_say_what_they_serve_as_over_ros_2() {
+    let name = domain_name();
+    for (subcommand, expected) in [("robots", "25 simulated robots"), ("node", "25 robots at 100.0 Hz")] {
+        let mut running = start_with(&name, subcommand, Stdio::piped());
+        let mut lines = BufReader::new(running.0.stderr.take().expect("piped")).lines();
+        let line = lines.find(|line| line.as_ref().is_ok_and(|line| line.contains("`square`: ")));
+        let line = line.expect("a line").expect("text");
+        assert!(line.contains(expected), "{line}");
+        assert_eq!(running.terminate(), Some(0));
+    }
+}
+
+fn start_with(domain: &str, subcommand: &str, log: Stdio) -> Running {
     let mut command = Command::new(env!("CARGO_BIN_EXE_flockform"));
     command.args([subcommand, "square", "--transport", "shm"]);
     OVERRIDES.iter().for_each(|one| {
         command.args(["--set", one]);
     });
-    command.env(flockform::shm::domain::VARIABLE, domain).stdin(Stdio::null());
+    command.env(flockform::shm::domain::VARIABLE, domain).stdin(Stdio::null()).stderr(log);
+    command.env_remove("RUST_LOG");
     Running(command.spawn().expect("it starts"))
 }
 

@@ -89,11 +89,16 @@ impl Runs<'_> {
         }
     }
 
-    /// Makes these runs and adds each to the journal as it ends; an interrupt leaves out those under way.
+    /// Makes these runs after those that are done, and adds each to the journal as it ends; an interrupt leaves out those under way.
     ///
     /// # Errors
     /// No threads, or a journal that cannot be written.
-    pub fn make(&self, pending: &[usize], journal: &Journal, quiet: bool) -> Result<Vec<Row>, Refusal> {
+    pub fn make(
+        &self,
+        (done, pending): (usize, &[usize]),
+        journal: &Journal,
+        quiet: bool,
+    ) -> Result<Vec<Row>, Refusal> {
         let threads = rayon::current_num_threads();
         let workers = threads.min(pending.len());
         // Where there are fewer runs than cores, each gets several.
@@ -104,6 +109,7 @@ impl Runs<'_> {
             .map_err(|error: rayon::ThreadPoolBuildError| Refusal::threads(threads, error))?;
         let work = Work {
             runs: self,
+            done,
             pending,
             journal,
             next: AtomicUsize::new(0),
@@ -180,6 +186,8 @@ impl Runs<'_> {
 /// The runs under way.
 struct Work<'a> {
     runs: &'a Runs<'a>,
+    /// Runs made before these.
+    done: usize,
     pending: &'a [usize],
     journal: &'a Journal,
     /// Place in `pending` of the run to be begun next.
@@ -198,7 +206,7 @@ impl Work<'_> {
             return ControlFlow::Break(());
         };
         let words = self.runs.design.overrides(run).join(", ");
-        let stage = format!("run {} of {}: {words}", place + 1, self.pending.len());
+        let stage = format!("run {} of {}: {words}", self.done + place + 1, self.done + self.pending.len());
         self.stages.lock().unwrap_or_else(PoisonError::into_inner).next(&stage);
         let Some(row) = self.runs.row(run, self.runs.ended(run)) else { return ControlFlow::Break(()) };
         if let Err(error) = self.journal.add(&row) {

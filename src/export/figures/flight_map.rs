@@ -72,7 +72,8 @@ impl<'a> Map<'a> {
             first.into_iter().chain(last)
         });
         let shown: Vectors = record.tracks.iter().flat_map(|places| places.iter()).chain(obstacles).collect();
-        let axes = around(page::bounds(&shown, 0..shown.len()), 3.0 * swarm.raw.radius);
+        let own = swarm.raw.robots.iter().filter_map(|robot| robot.radius);
+        let axes = around(page::bounds(&shown, 0..shown.len()), 3.0 * own.fold(swarm.raw.radius, f64::max));
         Self { swarm, record, report, axes }
     }
 
@@ -92,14 +93,13 @@ impl<'a> Map<'a> {
         let heading = Heading { title, note, legend, ..Heading::default() };
         let beside = moment.field.map_or(20.0, |field| field.bands.bar_room());
         page::with_body(&heading, self.axes.clone(), "m", beside, |svg, axes| {
-            let radius = (self.swarm.raw.radius * axes.scale()).clamp(1.2, 12.0);
             draw_obstacles(svg, axes, self.swarm, self.time_of(moment));
             self.draw_ways(svg, axes, moment);
             svg.group(format_args!("class=\"start\" fill=\"none\" stroke=\"{START}\""), |svg| {
                 let first = self.record.tracks.first().into_iter().flat_map(|places| places.iter());
-                first.for_each(|place| svg.circle(axes.place(place), radius));
+                first.enumerate().for_each(|(m, place)| svg.circle(axes.place(place), self.radius(axes, m)));
             });
-            self.draw_robots(svg, axes, moment, radius);
+            self.draw_robots(svg, axes, moment);
             if let Some(field) = &moment.field {
                 field.draw_bar(svg, axes);
             }
@@ -142,12 +142,21 @@ impl<'a> Map<'a> {
         }
     }
 
-    fn draw_robots(&self, svg: &mut Svg, axes: &Axes, moment: &Moment<'_>, radius: f64) {
+    /// Radius of a robot's mark \[px\]: to scale, but never too small to be seen; where the file gives all robots one
+    /// radius, also never so large that the marks hide the ways.
+    fn radius(&self, axes: &Axes, robot: usize) -> f64 {
+        let raw = &self.swarm.raw;
+        let own = raw.robots.get(robot).and_then(|robot| robot.radius).unwrap_or(raw.radius);
+        let most = if raw.robots.iter().any(|robot| robot.radius.is_some()) { f64::INFINITY } else { 12.0 };
+        (own * axes.scale()).clamp(1.2, most)
+    }
+
+    fn draw_robots(&self, svg: &mut Svg, axes: &Axes, moment: &Moment<'_>) {
         for (led, role) in [(false, Role::Follower), (true, Role::Leader)] {
             let (own, mark) = (colour::of_role(role), mark_of(role));
             svg.group(format_args!("class=\"{}\" fill=\"{own}\"", role.name()), |svg| {
                 for m in (0..moment.places.len()).filter(|&m| self.leads(m) == led) {
-                    let at = axes.place(moment.places.get(m));
+                    let (at, radius) = (axes.place(moment.places.get(m)), self.radius(axes, m));
                     match &moment.field {
                         None => draw_mark(svg, mark, at, radius),
                         Some(field) => {
@@ -181,7 +190,9 @@ fn draw_obstacles(svg: &mut Svg, axes: &Axes, swarm: &Swarm, now: f64) {
     }
     if let Some(fence) = &swarm.raw.limits.geofence {
         let stroke = format!("stroke=\"{OBSTACLE}\" stroke-dasharray=\"6 4\"");
-        svg.path(&polygon(fence), format_args!("class=\"fence\" fill=\"none\" {stroke}"));
+        svg.clipped("plot", axes.corner, axes.size, |svg| {
+            svg.path(&polygon(fence), format_args!("class=\"fence\" fill=\"none\" {stroke}"));
+        });
     }
 }
 

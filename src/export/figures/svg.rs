@@ -41,9 +41,19 @@ impl Svg {
 
     /// Elements that share `attributes`.
     pub fn group(&mut self, attributes: impl Display, draw: impl FnOnce(&mut Self)) {
-        self.push(format_args!("<g {attributes}>"));
+        self.group_of("g", attributes, draw);
+    }
+
+    fn group_of(&mut self, element: &str, attributes: impl Display, draw: impl FnOnce(&mut Self)) {
+        self.push(format_args!("<{element} {attributes}>"));
         draw(self);
-        self.push("</g>");
+        self.push(format_args!("</{element}>"));
+    }
+
+    /// Elements of which only the part inside a rectangle shows. `name` is the rectangle's, one on a sheet.
+    pub fn clipped(&mut self, name: &str, corner: [f64; 2], size: [f64; 2], draw: impl FnOnce(&mut Self)) {
+        self.group_of("clipPath", format_args!("id=\"{name}\""), |svg| svg.rect(corner, size, ""));
+        self.group(format_args!("clip-path=\"url(#{name})\""), draw);
     }
 
     pub fn circle(&mut self, [x, y]: [f64; 2], radius: f64) {

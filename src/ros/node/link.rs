@@ -1,5 +1,7 @@
 //! The loop's end over ROS 2: poses and places of leaders in, `PoseStamped` targets out.
 
+use std::collections::BTreeMap;
+
 use super::pose::PoseSource;
 use super::{NodeError, TopicOf, copy};
 use crate::messages::builtin_interfaces::Time;
@@ -31,6 +33,8 @@ pub struct Link {
     simulated_time: bool,
     /// Places of leaders in another frame.
     misframed: u64,
+    /// By member, the frame of its last pose in another than the swarm's.
+    wrong_frames: BTreeMap<usize, String>,
     /// Of leaders' places; those of poses are the loop's.
     complaints: Complaints,
     /// Gets a copy of what goes through.
@@ -97,6 +101,7 @@ impl Link {
             frame_id: raw.frame_id.clone(),
             simulated_time,
             misframed: 0,
+            wrong_frames: BTreeMap::new(),
             complaints: Complaints::default(),
             recorder: None,
         })
@@ -125,7 +130,13 @@ impl ControllerEnd for Link {
         let simulated = self.simulated_time.then_some(now);
         self.receive_ranges(now, take);
         let copies = self.recorder.as_mut().map(|recorder| (recorder, now));
-        self.poses.take(&self.frame_id, simulated, copies, &mut |m, pose| take(Received::Pose(m, pose)));
+        let wrong_frames = &mut self.wrong_frames;
+        self.poses.take(&self.frame_id, simulated, copies, &mut |m, pose, frame| {
+            if !pose.frame_is_right {
+                wrong_frames.insert(m, said(frame).to_string());
+            }
+            take(Received::Pose(m, pose));
+        });
         for (member, topic) in &self.leaders {
             let Some((message, _)) = topic.take_last() else { continue };
             if let Some(recorder) = &mut self.recorder {
@@ -168,6 +179,10 @@ impl ControllerEnd for Link {
                 outcome
             }
         }
+    }
+
+    fn wrong_frame(&self, member: usize) -> Option<[&str; 2]> {
+        Some([self.wrong_frames.get(&member)?, &self.frame_id])
     }
 
     fn refused(&self) -> u64 {

@@ -314,6 +314,7 @@ impl FormationNode {
         let Some(now) = self.clock.now() else { return self.wait_for_clock(stamp) };
         if let Some(endpoints) = &mut self.endpoints {
             listen(&mut self.control, &mut endpoints.link, &mut self.complaints, now);
+            endpoints.warn_of_silence(&self.control, &self.origin);
         }
         drop(inside);
         self.record_event(now, LoopEvent::TICK, "", &[now]);

@@ -37,49 +37,34 @@ impl PoseSource {
     }
 
     /// Passes every pose that arrived since the last call to `hear`, and its message to `recorder` with the loop's
-    /// time. Under simulated time `now` \[s\] is given; it replaces the reception time, which DDS takes from the
+    /// time, and the frame that the message names. Under simulated time `now` \[s\] is given; it replaces the reception time, which DDS takes from the
     /// computer's clock.
     pub fn take(
         &self,
         frame_id: &str,
         now: Option<f64>,
         mut recorder: Option<(&mut MessageRecorder, f64)>,
-        hear: &mut dyn FnMut(usize, Pose),
+        hear: &mut dyn FnMut(usize, Pose, &str),
     ) {
         let pose = |header: &Header, one: &geometry_msgs::Pose, stamps: Stamps| {
             pose(header, one, now.unwrap_or(stamps.received), frame_id)
         };
         match self {
             Self::Stamped(all) => {
-                drain(
-                    all,
-                    |message, stamps| pose(&message.header, &message.pose, stamps),
-                    (&mut recorder, now),
-                    hear,
-                );
+                drain(all, |message| (&message.header, &message.pose), pose, (&mut recorder, now), hear);
             }
             Self::WithCovariance(all) => {
-                drain(
-                    all,
-                    |message, stamps| pose(&message.header, &message.pose.pose, stamps),
-                    (&mut recorder, now),
-                    hear,
-                );
+                drain(all, |message| (&message.header, &message.pose.pose), pose, (&mut recorder, now), hear);
             }
             Self::Odometry(all) => {
-                drain(
-                    all,
-                    |message, stamps| pose(&message.header, &message.pose.pose, stamps),
-                    (&mut recorder, now),
-                    hear,
-                );
+                drain(all, |message| (&message.header, &message.pose.pose), pose, (&mut recorder, now), hear);
             }
             Self::Array(topic, heard) => {
                 for (message, stamps) in std::iter::from_fn(|| topic.take()).take(MOST_AT_ONCE) {
                     copy(&mut recorder, topic.topic(), &message, stamps, now);
                     for &member in heard {
                         if let Some(one) = message.poses.get(member) {
-                            hear(member, pose(&message.header, one, stamps));
+                            hear(member, pose(&message.header, one, stamps), &message.header.frame_id);
                         }
                     }
                 }
@@ -113,14 +98,16 @@ fn each<M: crate::messages::Message>(
 
 fn drain<M: crate::messages::Message>(
     all: &[(usize, Subscription<M>)],
-    pose: impl Fn(&M, Stamps) -> Pose,
+    parts: impl Fn(&M) -> (&Header, &geometry_msgs::Pose),
+    pose: impl Fn(&Header, &geometry_msgs::Pose, Stamps) -> Pose,
     (recorder, now): (&mut Option<(&mut MessageRecorder, f64)>, Option<f64>),
-    hear: &mut dyn FnMut(usize, Pose),
+    hear: &mut dyn FnMut(usize, Pose, &str),
 ) {
     for (member, topic) in all {
         for (message, stamps) in std::iter::from_fn(|| topic.take()).take(MOST_AT_ONCE) {
             copy(recorder, topic.topic(), &message, stamps, now);
-            hear(*member, pose(&message, stamps));
+            let (header, one) = parts(&message);
+            hear(*member, pose(header, one, stamps), &header.frame_id);
         }
     }
 }

@@ -15,6 +15,7 @@ pub fn leaders(
     folder: Option<&Path>,
     refuse: Refuse<'_>,
 ) -> Result<Vec<Leaders>, SceneError> {
+    require_one_program(raw, refuse)?;
     let entry = |(k, entry): (usize, &RawLeaders)| {
         let key = format!("leaders[{k}]");
         let picked = match (&entry.robots[..], &entry.region) {
@@ -39,6 +40,22 @@ pub fn leaders(
         Ok(Leaders { robots: picked, program: program(&key, &entry.program, raw, folder, refuse)? })
     };
     raw.leaders.iter().enumerate().map(entry).collect()
+}
+
+/// Refuses robots that are named as leaders more than once.
+fn require_one_program(raw: &RawSwarm, refuse: Refuse<'_>) -> Result<(), SceneError> {
+    let all = raw.leaders.iter().enumerate();
+    let named: Vec<([usize; 2], &String)> = all
+        .flat_map(|(k, entry)| entry.robots.iter().enumerate().map(move |(n, name)| ([k, n], name)))
+        .collect();
+    for (place, &([k, n], name)) in named.iter().enumerate() {
+        if let Some(([before, _], _)) = named[..place].iter().find(|(_, other)| *other == name) {
+            let message = format!("`{name}` leads by leaders[{before}] already");
+            let help = "name each leader once, and give it one program";
+            return Err(refuse(&format!("leaders[{k}].robots[{n}]"), message, help));
+        }
+    }
+    Ok(())
 }
 
 fn program(

@@ -16,6 +16,9 @@ use crate::scene::raw::{
 use crate::scene::validate::{self as scene_checks, File, Refuse};
 use crate::scene::{Scene, bundled};
 
+/// Periods of a simulated flight: at a hundred a second more than a day.
+const MOST_PERIODS: f64 = 1e7;
+
 impl Swarm {
     /// Reads a swarm file from disk; `overrides` are `KEY.PATH=VALUE` texts applied on top.
     ///
@@ -232,6 +235,10 @@ fn check_robots(raw: &RawSwarm, refuse: Refuse<'_>) -> Result<(), SceneError> {
             let message = format!("`{}` and `{}` have the same place", other.name, robot.name);
             return Err(refuse(&format!("robots[{k}].place"), message, "give each a place of its own"));
         }
+        if let Some(n) = repeated(&robot.neighbours) {
+            let message = format!("`{}` has this neighbour already", robot.name);
+            return Err(refuse(&format!("robots[{k}].neighbours[{n}]"), message, "name each once"));
+        }
     }
     Ok(())
 }
@@ -270,6 +277,11 @@ fn check_safety(raw: &RawSwarm, refuse: Refuse<'_>) -> Result<(), SceneError> {
     Ok(())
 }
 
+/// The first of these that is the same as one before it.
+fn repeated<T: PartialEq>(all: &[T]) -> Option<usize> {
+    (1..all.len()).find(|&n| all[..n].contains(&all[n]))
+}
+
 fn area(corners: &[[f64; 2]]) -> f64 {
     let next = corners.iter().cycle().skip(1);
     corners.iter().zip(next).map(|(a, b)| 0.5 * (a[0] * b[1] - a[1] * b[0])).sum()
@@ -286,6 +298,16 @@ fn check_flight(raw: &RawSwarm, refuse: Refuse<'_>) -> Result<(), SceneError> {
     if let Some(key) = needs {
         let message = "this model of a robot needs a limit".into();
         return Err(refuse(key, message, "give it, or use flight.model = { kind = \"ideal\" }"));
+    }
+    let periods = raw.flight.duration.unwrap_or(0.0) / raw.control.period;
+    if periods > MOST_PERIODS {
+        let message = format!("is {periods:.3e} periods; a flight has {MOST_PERIODS:e} at most");
+        return Err(refuse("flight.duration", message, "give a shorter time, or a longer control.period"));
+    }
+    let starts: Vec<&String> = raw.flight.start.iter().map(|start| &start.robot).collect();
+    if let Some(n) = repeated(&starts) {
+        let message = format!("`{}` has a place to start at already", starts[n]);
+        return Err(refuse(&format!("flight.start[{n}].robot"), message, "give each robot one"));
     }
     for (k, fault) in raw.flight.faults.iter().enumerate() {
         if fault.until.is_some_and(|until| until <= fault.at) {

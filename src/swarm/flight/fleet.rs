@@ -115,6 +115,12 @@ impl Fleet {
         self.faults.iter_mut().filter(|fault| fault.member == member).for_each(|fault| fault.end(now));
     }
 
+    /// The longest that a pose is under way at present \[s\].
+    pub(super) fn longest_delay(&self) -> f64 {
+        let periods = |channel: &Channel| channel.params().delay + channel.params().jitter;
+        f64::from(self.channels.iter().map(periods).max().unwrap_or(0)) * self.dt
+    }
+
     /// Sends poses with this noise \[m\], delay \[period\] and loss \[1\] from now on.
     pub(super) fn set_channels(&mut self, noise: f64, delay: u32, loss: f64) {
         for channel in &mut self.channels {

@@ -24,7 +24,7 @@ pub struct Sample {
     pub pe1: f64,
     /// Largest strain of a member's surroundings \[1\].
     pub strain: f64,
-    /// Members whose pose is too old to be used.
+    /// Members whose pose is too old to be used, from each one's first pose on.
     pub lost: usize,
 }
 
@@ -45,6 +45,8 @@ pub struct Record {
     pub(super) closest: Option<Extreme>,
     /// The robot farthest from its place in each period: by the affine motion, by the rule, by the continuum.
     pub(super) farthest: Vec<[Option<Extreme>; 3]>,
+    /// Members that led at the start.
+    pub(super) leaders: usize,
     every: usize,
     around: Vec<f64>,
 }
@@ -53,6 +55,7 @@ impl Record {
     /// A record of the start alone.
     pub fn new(swarm: &Swarm, flight: &Flight) -> Self {
         let count = flight.fleet().robots().len();
+        let formation = flight.control().formation();
         Self {
             samples: Vec::new(),
             times: vec![0.0],
@@ -61,6 +64,7 @@ impl Record {
             clearances: vec![f64::INFINITY; count],
             closest: None,
             farthest: Vec::new(),
+            leaders: (0..count).filter(|&m| formation.leads(m)).count(),
             every: swarm.raw.flight.record_every,
             around: Vec::new(),
         }
@@ -104,7 +108,7 @@ impl Record {
             continuum_error: error(continuum),
             pe1: measures.pe1.iter().sum(),
             strain: measures.strain.iter().flatten().map(|s| s.largest()).fold(0.0, f64::max),
-            lost: (0..formation.count()).filter(|&m| !control.health(m).is_usable()).count(),
+            lost: (0..formation.count()).filter(|&m| flight.is_lost(m)).count(),
         };
         self.farthest.push([affine.flatten(), rest.flatten(), continuum.flatten()]);
         self.samples.push(sample);

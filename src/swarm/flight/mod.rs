@@ -4,9 +4,11 @@
 //! its target. A real swarm's period is the same, so a simulated flight tests the tick that flies real robots.
 
 mod alarms;
+mod beginning;
 pub(crate) mod commands;
 mod faults;
 mod fleet;
+mod measurable;
 mod measure;
 mod moment;
 mod rangefinders;
@@ -51,16 +53,20 @@ pub struct Flight {
 
 impl Flight {
     /// # Errors
-    /// Names the key of the swarm that cannot be laid out, kept safe or flown.
+    /// Names the key of the swarm that cannot be laid out, kept safe or flown, a robot that starts in something
+    /// solid, a bound that cannot be measured.
     pub fn new(swarm: &Swarm) -> Result<Self, SceneError> {
         let control = Control::new(swarm)?;
-        Ok(Self {
+        let flight = Self {
             fleet: Fleet::new(swarm, control.formation())?,
             periods: periods(swarm, &control),
             continuum: continuum(swarm)?,
             commands: commands::of(swarm, &control)?,
             control,
-        })
+        };
+        beginning::require_free(swarm, &flight)?;
+        measurable::require(swarm, &flight)?;
+        Ok(flight)
     }
 
     /// The loop that flies the robots.
@@ -108,6 +114,16 @@ impl Flight {
         if let Some(twin) = &mut self.continuum {
             twin.engine.advance();
         }
+    }
+
+    /// Whether a member's pose cannot be used. Before its first one has arrived a member is not lost, but late: until it
+    /// would be too old, counted from when the first may arrive.
+    pub(super) fn is_lost(&self, member: usize) -> bool {
+        let watch = self.control.watch();
+        let counts = watch.counts(member);
+        let has_sent = counts.accepted + counts.rejected() > 0;
+        let is_late = self.fleet.time() <= self.fleet.longest_delay() + watch.limits().age_limit;
+        !self.control.health(member).is_usable() && (has_sent || !is_late)
     }
 
     /// Largest distance of a robot from its particle in the continuum run of the same scene \[m\].

@@ -18,6 +18,8 @@ pub struct FlightReport {
     pub robots: usize,
     /// Members that lead at the end.
     pub leaders: usize,
+    /// Members that lead at the start: a scene may change the roles on its way.
+    pub leaders_at_start: usize,
     /// Name of the robots' model.
     pub model: &'static str,
     /// Time flown.
@@ -115,6 +117,7 @@ impl FlightReport {
             title: swarm.raw.title.clone(),
             robots: formation.count(),
             leaders,
+            leaders_at_start: record.leaders,
             model: flight.fleet().model().name(),
             seconds: flight.fleet().time(),
             periods: flight.fleet().period(),

@@ -1,6 +1,6 @@
 //! Builds a formation from a swarm file, with the checks that need the places.
 
-use super::{Formation, Lead, TargetSource, inside, links, spacing_of};
+use super::{Formation, Lead, TargetSource, checks, inside, links, spacing_of};
 use crate::continuum::layout::Layout;
 use crate::continuum::plan::Plan;
 use crate::engine::Engine;
@@ -32,7 +32,9 @@ impl Formation {
             Shape::Inside(scene) => inside_of(swarm, scene)?,
             Shape::Recorded(scene, recording) => recorded(swarm, scene, recording)?,
         };
-        require_apart(swarm, &formation)?;
+        checks::require_apart(swarm, &formation)?;
+        checks::require_in_range(swarm, &formation)?;
+        checks::require_witnesses(swarm, &formation)?;
         if matches!(swarm.raw.rule.weights, Some(RawWeights::Solved {})) {
             require_settling(swarm, &formation)?;
         }
@@ -289,27 +291,4 @@ fn require_settling(swarm: &Swarm, formation: &Formation) -> Result<(), SceneErr
         };
         swarm.refuse("rule.weights", error.to_string(), help)
     })
-}
-
-/// Refuses places at which two robots would be closer than the swarm's own limit.
-fn require_apart(swarm: &Swarm, formation: &Formation) -> Result<(), SceneError> {
-    let Some(clearance) = swarm.raw.limits.clearance else { return Ok(()) };
-    for i in 0..formation.count() {
-        for j in 0..i {
-            let needed = formation.radii[i] + formation.radii[j] + clearance;
-            let apart = distance(formation.places.get(i), formation.places.get(j));
-            if apart < needed {
-                let message = format!(
-                    "the places of `{}` and `{}` are {apart} m apart, and their radii and the clearance need {needed} m",
-                    formation.names[j], formation.names[i]
-                );
-                return Err(swarm.refuse(
-                    "limits.clearance",
-                    message,
-                    "widen the formation, or lower the clearance or the radius",
-                ));
-            }
-        }
-    }
-    Ok(())
 }

@@ -4,6 +4,7 @@
 //! are moved by the engine that moves bodies: a period of a swarm is a step of a continuum whose particles
 //! have been put where the robots were seen.
 
+mod checks;
 mod inside;
 mod kept;
 mod layout;
@@ -259,7 +260,7 @@ impl Formation {
     }
 
     /// The place of a leader at `time` by its program \[m\].
-    fn led_to(&self, member: usize, time: f64) -> Option<[f64; 2]> {
+    pub(in crate::swarm) fn led_to(&self, member: usize, time: f64) -> Option<[f64; 2]> {
         let place = self.places.get(member);
         Some(match self.leads[member].as_ref()? {
             Lead::External(moved) => *moved,

@@ -11,6 +11,7 @@
 //!
 //! A loop that is not linear has no such map, and nothing of this is stated of it.
 
+pub mod cautions;
 mod exactness;
 mod period_map;
 #[cfg(test)]
@@ -180,7 +181,7 @@ impl SwarmPlan {
             convergence,
             cautions: Vec::new(),
         };
-        plan.cautions = cautions(&plan, f64::from(raw.flight.delay) * period);
+        plan.cautions = lasting(&plan).into_iter().chain(cautions::of(swarm, &flight)).collect();
         Ok(plan)
     }
 }
@@ -280,39 +281,8 @@ fn needed(formation: &Formation, name: &str) -> Option<ManoeuvreSpeed> {
     Some(ManoeuvreSpeed { name: name.to_owned(), needed })
 }
 
-/// `delay_s` is the simulated delay without its jitter.
-fn cautions(plan: &SwarmPlan, delay_s: f64) -> Vec<String> {
-    let mut cautions = Vec::new();
-    if let Some(Convergence { factor, half_life_s: None }) = plan.convergence {
-        cautions
-            .push(format!("disturbances do not die out: {factor:.4} of the slowest is left after a period"));
-    }
-    if plan.noise.largest.is_some_and(|largest| plan.noise.simulated > largest) {
-        cautions.push(
-            "the noise takes up the space between robots at their places: the filter will hold some of them; \
-             lower flight.noise or limits.clearance, or space the robots out"
-                .into(),
-        );
-    }
-    if delay_s > plan.delay.largest_s {
-        cautions.push(
-            "poses are older than poses.age_limit when they arrive: no robot will get a target; lower flight.delay or \
-             raise the limit"
-                .into(),
-        );
-    } else if plan.delay.simulated_s > plan.delay.largest_s {
-        cautions.push(
-            "jitter makes some poses older than poses.age_limit: robots will be lost for periods at a time; lower \
-             flight.jitter or raise the limit"
-                .into(),
-        );
-    }
-    let limit = plan.speed.limit.unwrap_or(f64::INFINITY);
-    for ManoeuvreSpeed { name, needed } in plan.speed.manoeuvres.iter().filter(|one| one.needed > limit) {
-        cautions.push(format!(
-            "manoeuvre `{name}` moves a robot's place at up to {needed:.3} m/s, above limits.speed: robots will fall \
-             behind; give its legs more seconds"
-        ));
-    }
-    cautions
+/// A loop whose disturbances last.
+fn lasting(plan: &SwarmPlan) -> Option<String> {
+    let Some(Convergence { factor, half_life_s: None }) = plan.convergence else { return None };
+    Some(format!("disturbances do not die out: {factor:.4} of the slowest is left after a period"))
 }

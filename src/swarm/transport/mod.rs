@@ -18,7 +18,7 @@ use super::control::Control;
 use super::control::scope::NodeScope;
 use super::flight::Fleet;
 use super::pace::system_time;
-use super::watch::{Pose, Range};
+use super::watch::{Pose, Range, Rejection};
 
 /// A message that reaches the loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,6 +58,12 @@ pub trait ControllerEnd {
 
     /// Invalid payloads since the beginning \[1\].
     fn refused(&self) -> u64;
+
+    /// The frame of the last pose of a member that was in another than the swarm's, where messages name frames, and the
+    /// swarm's.
+    fn wrong_frame(&self, _member: usize) -> Option<[&str; 2]> {
+        None
+    }
 }
 
 /// The robots' end.
@@ -83,6 +89,7 @@ pub trait RobotsEnd {
 
 /// The first half of a period: receives all messages that arrived, and warns of those that are dropped.
 pub fn listen<E: ControllerEnd>(control: &mut Control, end: &mut E, complaints: &mut Complaints, now: f64) {
+    let mut misframed = Vec::new();
     end.receive(now, &mut |heard| match heard {
         Received::Range(range) => {
             if !control.receive_range(range, now) {
@@ -98,6 +105,10 @@ pub fn listen<E: ControllerEnd>(control: &mut Control, end: &mut E, complaints: 
         }
         Received::Pose(member, pose) => {
             let Err(rejection) = control.receive(member, pose, now) else { return };
+            if rejection == Rejection::WrongFrame {
+                misframed.push(member);
+                return;
+            }
             let name = &control.formation().names[member];
             match rejection.cause() {
                 Some(cause) => {
@@ -117,6 +128,17 @@ pub fn listen<E: ControllerEnd>(control: &mut Control, end: &mut E, complaints: 
             }
         }
     });
+    for member in misframed {
+        let name = &control.formation().names[member];
+        let text = match end.wrong_frame(member) {
+            None => format!("{name}: {}", Rejection::WrongFrame),
+            Some([theirs, ours]) => format!(
+                "{name}: a pose is in the frame `{theirs}`, not in `{ours}`: publish it in that one, or name the other as \
+                 `node.frame_id`"
+            ),
+        };
+        complaints.warn("wrong frame", member, system_time(), &text);
+    }
 }
 
 /// One period of the loop at `now` \[s\]: receives, ticks and sends the targets of the members that it serves.

@@ -212,7 +212,8 @@ pub struct RawBounds {
     #[serde(default)]
     #[schemars(range(min = 0))]
     pub clearance: Option<f64>,
-    /// Time after which the formation stays within `settled_within` of its shape [s].
+    /// Time after which the formation stays within `settled_within` of its shape, counted from the end of the
+    /// leaders' programs [s].
     #[serde(default)]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub settling_time: Option<f64>,

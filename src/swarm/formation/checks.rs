@@ -1,0 +1,104 @@
+//! Checks of a formation that has been laid out.
+
+use super::Formation;
+use crate::flock::vectors::distance;
+use crate::scene::SceneError;
+use crate::scene::swarm::Swarm;
+
+/// Robots that a message names.
+const MOST_NAMED: usize = 6;
+
+impl Formation {
+    /// Members that no leader reaches by links that last, ascending; none where a scene leads, or links do not last.
+    pub fn unled(&self) -> Vec<usize> {
+        let mut reached: Vec<bool> = (0..self.count()).map(|m| self.leads(m)).collect();
+        let is_judged = match self.engine().filter(|_| self.is_led_here()) {
+            None => false,
+            Some(engine) => engine.lasting_neighbours().is_some() || !reached.contains(&true),
+        };
+        let mut grows = is_judged;
+        while std::mem::take(&mut grows) {
+            for m in 0..self.count() {
+                if !reached[m] && self.neighbours(m).any(|other| reached[other]) {
+                    (reached[m], grows) = (true, true);
+                }
+            }
+        }
+        (0..self.count()).filter(|&m| is_judged && !reached[m]).collect()
+    }
+
+    /// Names of the members that are picked, the first few of them; none where none is.
+    pub fn named(&self, is_picked: impl Fn(usize) -> bool) -> Option<String> {
+        let picked: Vec<usize> = (0..self.count()).filter(|&m| is_picked(m)).collect();
+        let shown: Vec<String> =
+            picked.iter().take(MOST_NAMED).map(|&m| format!("`{}`", self.names[m])).collect();
+        let more = picked.len().saturating_sub(MOST_NAMED);
+        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+        (!picked.is_empty()).then(|| shown.join(", ") + &more)
+    }
+}
+
+/// Refuses places at which two robots would be closer than the swarm's own limit.
+pub fn require_apart(swarm: &Swarm, formation: &Formation) -> Result<(), SceneError> {
+    let Some(clearance) = swarm.raw.limits.clearance else { return Ok(()) };
+    for i in 0..formation.count() {
+        for j in 0..i {
+            let needed = formation.radii[i] + formation.radii[j] + clearance;
+            let apart = distance(formation.places.get(i), formation.places.get(j));
+            if apart < needed {
+                let [apart, needed] = [apart, needed].map(rounded);
+                let message = format!(
+                    "the places of `{}` and `{}` are {apart} m apart, and their radii and the clearance need {needed} m",
+                    formation.names[j], formation.names[i]
+                );
+                return Err(swarm.refuse(
+                    "limits.clearance",
+                    message,
+                    "widen the formation, or lower the clearance or the radius",
+                ));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// A length of which the digits of rounding errors are left out \[m\]: micrometres are kept.
+fn rounded(length: f64) -> f64 {
+    (length * 1e6).round() / 1e6
+}
+
+/// Refuses places where no pose would be believed.
+pub fn require_in_range(swarm: &Swarm, formation: &Formation) -> Result<(), SceneError> {
+    let (middle, range) = (formation.middle(), swarm.raw.poses.range);
+    let off = |m: usize| distance(formation.places.get(m), middle);
+    let farthest = (0..formation.count()).max_by(|&a, &b| off(a).total_cmp(&off(b)));
+    match farthest.filter(|&m| off(m) > range) {
+        None => Ok(()),
+        Some(m) => {
+            let key = match swarm.raw.robots.len() {
+                0 => "poses.range".into(),
+                _ => format!("robots[{m}].place"),
+            };
+            let message = format!(
+                "`{}` is {:.4e} m from the formation's middle, and poses farther than poses.range ({range} m) are rejected",
+                formation.names[m],
+                off(m)
+            );
+            Err(swarm.refuse(&key, message, "give places nearer to each other, or raise poses.range"))
+        }
+    }
+}
+
+/// Refuses more liars than could ever be outvoted by the robots that measure.
+pub fn require_witnesses(swarm: &Swarm, formation: &Formation) -> Result<(), SceneError> {
+    let Some(ranges) = &swarm.raw.ranges else { return Ok(()) };
+    let others = formation.count().saturating_sub(1);
+    if ranges.max_liars < others {
+        return Ok(());
+    }
+    let message = format!(
+        "a pose is contradicted by more robots than this, and there are {others} that could measure it: no lie would ever be \
+         found"
+    );
+    Err(swarm.refuse("ranges.max_liars", message, "lower it, or leave ranges out"))
+}

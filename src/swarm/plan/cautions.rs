@@ -1,0 +1,204 @@
+//! Warnings before a flight that follow from the file and the formation's places alone.
+
+use super::{ManoeuvreSpeed, largest_noise, needed};
+use crate::flock::manoeuvre::Manoeuvre;
+use crate::flock::motion::{Keyframe, Motion};
+use crate::flock::vectors::distance;
+use crate::scene::swarm::raw::RawSwarm;
+use crate::scene::swarm::{Program, Swarm};
+use crate::swarm::flight::Flight;
+use crate::swarm::formation::Formation;
+
+/// Parts of a leg or of a program between which a leader's way is looked at.
+const PARTS: usize = 40;
+
+/// Less than this is rounding \[m\] or \[m/s\].
+const ROUNDING: f64 = 1e-9;
+
+/// All of them.
+pub fn of(swarm: &Swarm, flight: &Flight) -> Vec<String> {
+    let formation = flight.control().formation();
+    let raw = &swarm.raw;
+    let one = [
+        noise(raw, formation),
+        delay(raw),
+        (raw.flight.loss >= 1.0)
+            .then(|| "every pose is lost: no robot will get a target; lower flight.loss".to_owned()),
+        unled(formation),
+        unmeasured(raw, formation),
+        outside(flight, "start", &|m| flight.fleet().robots()[m].position),
+        (!raw.flight.start.is_empty())
+            .then(|| outside(flight, "have their places in the formation", &|m| formation.places.get(m)))
+            .flatten(),
+        led_outside(flight),
+        in_solids(flight),
+    ];
+    let fast = fast_manoeuvres(raw, formation).chain(fast_paths(swarm));
+    one.into_iter().flatten().chain(fast).chain(narrow(raw, formation)).collect()
+}
+
+fn noise(raw: &RawSwarm, formation: &Formation) -> Option<String> {
+    largest_noise(formation, raw.limits.clearance).filter(|largest| raw.flight.noise > *largest).map(|_| {
+        "the noise takes up the space between robots at their places: the filter will hold some of them; \
+         lower flight.noise or limits.clearance, or space the robots out"
+            .into()
+    })
+}
+
+fn delay(raw: &RawSwarm) -> Option<String> {
+    let period = raw.control.period;
+    let (delay, jitter) = (f64::from(raw.flight.delay), f64::from(raw.flight.jitter));
+    if delay * period > raw.poses.age_limit {
+        return Some(
+            "poses are older than poses.age_limit when they arrive: no robot will get a target; lower flight.delay or \
+             raise the limit"
+                .into(),
+        );
+    }
+    ((delay + jitter) * period > raw.poses.age_limit).then(|| {
+        "jitter makes some poses older than poses.age_limit: robots will be lost for periods at a time; lower \
+         flight.jitter or raise the limit"
+            .into()
+    })
+}
+
+/// Robots that no leader reaches by links that last.
+fn unled(formation: &Formation) -> Option<String> {
+    let unled = formation.unled();
+    if unled.len() == formation.count() {
+        return Some("no robot leads: the formation goes nowhere; add [[leaders]]".into());
+    }
+    let names = formation.named(|m| unled.contains(&m))?;
+    Some(format!(
+        "no leader reaches {names}: these robots follow each other alone; link them to the others, or let one of them lead"
+    ))
+}
+
+/// Robots whose poses too few others measure to contradict them.
+fn unmeasured(raw: &RawSwarm, formation: &Formation) -> Option<String> {
+    let ranges = raw.ranges.as_ref()?;
+    let near = |m: usize| {
+        let apart = |other: &usize| distance(formation.places.get(m), formation.places.get(*other));
+        (0..formation.count()).filter(|other| *other != m && apart(other) <= ranges.reach).count()
+    };
+    let names = formation.named(|m| near(m) <= ranges.max_liars)?;
+    Some(format!(
+        "no more than ranges.max_liars robots are within ranges.reach of {names}: lies of these robots are never found; \
+         lower the one or raise the other"
+    ))
+}
+
+/// Robots that the fence does not hold.
+fn outside(flight: &Flight, which: &str, place: &dyn Fn(usize) -> [f64; 2]) -> Option<String> {
+    let (filter, formation) = (flight.control().filter(), flight.control().formation());
+    let names = formation.named(|m| !filter.is_fenced_in(place(m), formation.radii[m] - ROUNDING))?;
+    Some(format!(
+        "these robots {which} outside limits.geofence, in whole or in part: {names}; widen it, or move them"
+    ))
+}
+
+fn led_outside(flight: &Flight) -> Option<String> {
+    let (filter, formation) = (flight.control().filter(), flight.control().formation());
+    let end = Some(formation.programs_end()).filter(|end| end.is_finite())?;
+    let leaves = |m: usize| {
+        let led = |k: usize| formation.led_to(m, end * k as f64 / (4 * PARTS) as f64);
+        let is_in = |place| filter.is_fenced_in(place, formation.radii[m] - ROUNDING);
+        (0..=4 * PARTS).filter_map(led).any(|place| !is_in(place))
+    };
+    let names = formation.named(leaves)?;
+    Some(format!(
+        "programs lead these robots out of limits.geofence: {names}; they will stop at the fence: widen it, or change their \
+         programs"
+    ))
+}
+
+/// Robots whose places in the formation are taken by an obstacle, wherever they start.
+fn in_solids(flight: &Flight) -> Option<String> {
+    let (obstacles, formation) = (flight.control().filter().obstacles(), flight.control().formation());
+    let overlaps = |m: usize| obstacles.distance(formation.places.get(m)) < formation.radii[m] - ROUNDING;
+    let names = formation.named(overlaps)?;
+    Some(format!("an obstacle stands at the places of {names} in the formation; move one of them"))
+}
+
+fn fast_manoeuvres(raw: &RawSwarm, formation: &Formation) -> impl Iterator<Item = String> {
+    let limit = raw.limits.speed.unwrap_or(f64::INFINITY);
+    let all = raw.manoeuvres.iter().filter_map(|one| needed(formation, &one.name));
+    let fast = all.filter(move |one| one.needed > limit);
+    fast.map(|ManoeuvreSpeed { name, needed }| {
+        format!(
+            "manoeuvre `{name}` moves a robot's place at up to {needed:.3} m/s, above limits.speed: robots will fall \
+             behind; give its legs more seconds"
+        )
+    })
+}
+
+fn fast_paths(swarm: &Swarm) -> impl Iterator<Item = String> {
+    let limit = swarm.raw.limits.speed.unwrap_or(f64::INFINITY);
+    swarm.leaders.iter().enumerate().filter_map(move |(k, leaders)| {
+        let fastest = match &leaders.program {
+            Program::Motion(motion) => speed(motion),
+            Program::Individual(tracks) => tracks.iter().map(|(_, motion)| speed(motion)).fold(0.0, f64::max),
+            Program::External | Program::Manoeuvre(_) => 0.0,
+        };
+        (fastest > limit * (1.0 + ROUNDING)).then(|| {
+            format!(
+                "the program of leaders[{k}] moves a robot at up to {fastest:.3} m/s, above limits.speed: it will fall \
+                 behind; give its points more time"
+            )
+        })
+    })
+}
+
+/// Largest speed of a program by keyframes \[m/s\].
+fn speed(motion: &Motion) -> f64 {
+    let Motion::Keyframes { frames, .. } = motion else { return 0.0 };
+    let times: Vec<f64> =
+        std::iter::once(0.0).chain(frames.iter().map(|Keyframe { step, .. }| *step)).collect();
+    let segment = |pair: &[f64]| {
+        let part = (pair[1] - pair[0]) / PARTS as f64;
+        let place = |k: usize| motion.displacement(pair[0] + k as f64 * part, 0, [0.0; 2]);
+        let moved = |k: usize| if part > 0.0 { distance(place(k), place(k + 1)) / part } else { 0.0 };
+        (0..PARTS).map(moved).fold(0.0, f64::max)
+    };
+    times.windows(2).map(segment).fold(0.0, f64::max)
+}
+
+/// Manoeuvres that bring two places nearer than the robots may be.
+fn narrow(raw: &RawSwarm, formation: &Formation) -> impl Iterator<Item = String> {
+    let clearance = raw.limits.clearance;
+    raw.manoeuvres.iter().filter_map(move |one| {
+        let manoeuvre = formation.manoeuvre(&one.name, 0.0)?;
+        let (free, i, j) = narrowest(formation, &manoeuvre)?;
+        (free < clearance? - ROUNDING).then(|| {
+            let [first, second] = [i, j].map(|m| &formation.names[m]);
+            format!(
+                "manoeuvre `{}` leaves {free:.3} m between `{first}` and `{second}` at their places, less than \
+                 limits.clearance: robots will be held off them; stretch or shear it less",
+                one.name
+            )
+        })
+    })
+}
+
+/// Least free space between two robots at their places in a manoeuvre \[m\], and which two.
+fn narrowest(formation: &Formation, manoeuvre: &Manoeuvre) -> Option<(f64, usize, usize)> {
+    const INSTANTS: usize = 10;
+    let mut least: Option<(f64, usize, usize)> = None;
+    let mut start = 0.0;
+    for leg in &manoeuvre.legs {
+        for k in 1..=INSTANTS {
+            let map = manoeuvre.affine(start + leg.seconds * k as f64 / INSTANTS as f64);
+            let places: Vec<[f64; 2]> = formation.places.iter().map(|place| map.apply(place)).collect();
+            for i in 0..places.len() {
+                for j in 0..i {
+                    let free = distance(places[i], places[j]) - formation.radii[i] - formation.radii[j];
+                    if least.is_none_or(|(other, ..)| free < other) {
+                        least = Some((free, j, i));
+                    }
+                }
+            }
+        }
+        start += leg.seconds + leg.hold;
+    }
+    least
+}
