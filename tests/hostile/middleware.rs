@@ -315,6 +315,8 @@ fn a_process_that_is_killed_or_stands_still_is_followed_by_one_that_goes_on() {
     signal("KILL", worker);
     let next = until("another process", || scene.node.worker().filter(|&process| process != worker));
     signal("STOP", next);
+    // What was sent before is no sign of life.
+    scene.judge.during(Duration::from_millis(200), || ());
     let back = scene.judge.until_all_are_sent();
     println!("STOP while it opens: back after {back:.2} s");
     assert!(back < 5.0, "{back} s");
