@@ -154,7 +154,7 @@ impl fmt::Display for Comparison {
             ("displacement, largest error", largest),
             ("von Mises, relative L2", percent(self.von_mises_rel_l2)),
             ("energy norm of the error", part(self.energy_norm_rel)),
-            ("  at the cells' corners alone", percent(self.energy_rel)),
+            ("  at the cells' corners", percent(self.energy_rel)),
             ("strain energy, rule", energies),
             ("compared", format!("{} followers, {} cells", self.followers, self.cells)),
             ("time, rule", format!("{:.3} s", self.seconds_rule)),
