@@ -360,3 +360,70 @@ fn every_toml_block_of_readme_and_guides_is_a_scene_or_a_swarm() {
     }
     assert!(scenes >= 7 && swarms >= 2, "{scenes} scenes, {swarms} swarms");
 }
+
+/// A strip without ghosts, clamped on its left, under these further lines.
+fn without_ghosts(name: &str, more: &str) -> Scene {
+    let text = format!(
+        "title = \"A strip without ghosts\"\nlattice = {{ kind = \"hexagonal\", spacing = 1.0, orientation = 17 }}\n\
+         body = {{ shape = {{ kind = \"rectangle\", max = [12.0, 8.0] }} }}\nneighbours = {{ kind = \"first\" }}\n\
+         fracture = {{ stretch = 1.3, ghosts = \"none\" }}\n{more}"
+    );
+    Scene::parse(name, "strip.toml", &text, &[], None).unwrap_or_else(|error| panic!("{error}"))
+}
+
+const CLAMPED: &str =
+    "[[roles]]\nregion = { kind = \"edge\", side = \"left\", depth = 1.2 }\nrole = \"clamped\"\n";
+
+#[test]
+fn a_cut_body_at_rest_stays_where_it_is_without_ghosts() {
+    let cuts = [
+        // Into the body, and through it: nothing leads the loose half.
+        "cuts = [{ from = [4.0, 4.1], to = [20.0, 4.1] }]",
+        "cuts = [{ from = [6.2, -1.0], to = [6.2, 9.0] }]",
+        // By a scattered mean, one by one in order, and by weights: other ways to the same targets.
+        "cuts = [{ from = [4.0, 4.1], to = [20.0, 4.1] }]\nrule = { mean = { kind = \"distance\", power = -1.0 } }",
+        "cuts = [{ from = [4.0, 4.1], to = [20.0, 4.1] }]\nupdate = { order = \"sequential\" }",
+        "cuts = [{ from = [4.0, 4.1], to = [20.0, 4.1] }]\nrule = { poisson = { k = 0.03, axis = \"x\" } }",
+    ];
+    for cut in cuts {
+        let scene = without_ghosts("cut", &format!("{cut}\nstop = {{ steps = 300 }}\n{CLAMPED}"));
+        let outcome = run(planned(&scene), &mut |_, _| ControlFlow::Continue(()));
+        let engine = &outcome.engine;
+        assert!(engine.breaks().len() > 10, "{cut}: {} are cut", engine.breaks().len());
+        let moved = (1..=engine.body().count()).flat_map(|id| displacement(engine, id));
+        let farthest = moved.fold(0.0, |most: f64, d| most.max(d.abs()));
+        assert!(farthest < 1e-12, "{cut}: {farthest}");
+    }
+}
+
+#[test]
+fn a_strip_torn_in_two_without_ghosts_comes_to_rest_in_two_unstrained_pieces_whenever_it_is_resumed() {
+    use flockform::continuum::run::resume;
+    use flockform::engine::observer::EachStep;
+    use flockform::engine::state::EngineState;
+    let led = "[[roles]]\nregion = { kind = \"edge\", side = \"right\", depth = 1.2 }\nrole = \"leader\"\n\
+               motion = { kind = \"keyframes\", frames = [{ step = 200, displacement = [4.0, 1.0] }] }\n";
+    let scene = without_ghosts("torn", &format!("stop = {{ steps = 4000 }}\n{CLAMPED}{led}"));
+    let mut kept = None;
+    let outcome = run(planned(&scene), &mut |engine, residual| {
+        if engine.step() == 150 {
+            kept = Some((EngineState::of(engine).into_owned(), residual));
+        }
+        ControlFlow::Continue(())
+    });
+    let engine = &outcome.engine;
+    assert!(!engine.breaks().is_empty());
+    // Each goes with what holds it, as a rigid body; what broke off altogether stays undeformed too.
+    let pieces = (1..=engine.body().count()).filter(|&id| {
+        let [x, y] = displacement(engine, id);
+        x.hypot(y) < 1e-6 || (x - 4.0).hypot(y - 1.0) < 1e-6
+    });
+    let count = pieces.count();
+    assert!(count + 4 > engine.body().count(), "{count} of {}", engine.body().count());
+    let (state, residual) = kept.expect("came that far");
+    let mut see = |_: &Engine, _: f64| ControlFlow::Continue(());
+    let resumed = resume(planned(&scene), state, residual, &mut EachStep(&mut see)).expect("the same body");
+    let bits =
+        |engine: &Engine| -> Vec<[u64; 2]> { engine.present().iter().map(|p| p.map(f64::to_bits)).collect() };
+    assert!(bits(&resumed.engine) == bits(engine));
+}

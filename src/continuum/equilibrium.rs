@@ -13,6 +13,7 @@ use crate::engine::shared::Agreed;
 use crate::engine::state::EngineState;
 use crate::flock::role::Role;
 use crate::flock::vectors::{Vectors, distance};
+use crate::material::elastic::{Constants, Plane};
 use crate::ranks::Team;
 use crate::scene::{LoadSteps, Scene, SceneError};
 use crate::solve::corotated::{self, CorotatedError, Way};
@@ -192,7 +193,8 @@ pub fn of_plan(scene: &Scene, plan: &Plan) -> Result<System, SceneError> {
 fn of_plan_after(scene: &Scene, plan: &Plan, steps: f64) -> Result<System, SceneError> {
     let held = held_after(plan, steps);
     let components = held_components(&plan.setup.changes, &plan.setup.body, steps);
-    system(&plan.setup.flock, &plan.setup.body, follows(plan), held, &components).map_err(|error| {
+    let found = system(&plan.setup.flock, &plan.setup.body, follows(plan), held, &components);
+    let mut system = found.map_err(|error| {
         let (key, help) = match error {
             NotLinear::Rule { .. } => {
                 ("rule.mean", "leave [equilibrium] out: sweeps find where such a rule comes to rest")
@@ -201,6 +203,20 @@ fn of_plan_after(scene: &Scene, plan: &Plan, steps: f64) -> Result<System, Scene
             NotLinear::Operator(_) => ("rule", "give weights that are finite"),
         };
         scene.refuse(key, format!("no equilibrium can be solved for: {error}"), help)
+    })?;
+    system.is_nearly_incompressible = is_nearly_incompressible(scene);
+    Ok(system)
+}
+
+/// Poisson's ratio in plane strain above which iterations are many.
+const NEAR_A_HALF: f64 = 0.49;
+
+/// Whether the body's material, or that of one of its inclusions, hardly changes its volume.
+fn is_nearly_incompressible(scene: &Scene) -> bool {
+    let inclusions = scene.inclusions.iter().map(|part| &part.material);
+    scene.material.iter().chain(inclusions).any(|part| match part.constants() {
+        Constants::Isotropic { poisson, plane: Plane::Strain, .. } => poisson > NEAR_A_HALF,
+        _ => false,
     })
 }
 

@@ -1,21 +1,21 @@
 //! The readings of a testing machine on a body: reactions, load, strain energy, stress.
 
-use std::collections::{HashMap, HashSet};
-
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use super::edge_stress::{self, recovered};
 use crate::engine::Engine;
 use crate::engine::forces::{Forces, LoadResultant, Reaction};
 use crate::engine::path::{Path, Work};
 use crate::flock::rules::{Mean, Rotation};
-use crate::flock::vectors::{Vectors, distance};
+use crate::flock::vectors::Vectors;
 use crate::material::cells::Cells;
 use crate::material::elastic::Elastic;
-use crate::material::recovery::{CellStress, Fields, KnownTraction, REACH, stress_at};
-use crate::material::stiffness::area;
 use crate::material::stress::{self, StressState};
 
+/// Part of the strain energy by which the work done on the way may differ from it.
+const MISSED_WORK: f64 = 0.05;
+/// Strain of a body that has been unloaded again, but for rounding \[1\].
+const UNSTRAINED: f64 = 1e-9;
 /// Strain beyond which small rotations and strains are a caution \[1\].
 const SMALL_STRAIN: f64 = 0.1;
 /// Turn of a cell beyond which they are \[rad\]: 10 degrees, whose cosine is off by 1.5 %.
@@ -86,7 +86,7 @@ impl Stresses {
         let mut particles =
             stress::at_particles(cells, elastic, &of_cells, displacement.len(), |cell| !torn[cell]);
         let recovered = match broken {
-            [] => recovered(engine, elastic, &of_cells, displacement),
+            [] => recovered(engine, elastic, &of_cells, (displacement, rotation(engine))),
             _ => Vec::new(),
         };
         for &(i, stress) in &recovered {
@@ -183,18 +183,37 @@ impl Mechanics {
 
     /// Warnings about the result.
     pub fn cautions(&self, engine: &Engine) -> Vec<String> {
-        let is_small = matches!(engine.flock().rule.mean, Mean::Material { rotation: Rotation::Small });
-        let is_beyond = self.largest_strain > SMALL_STRAIN || self.largest_turn > SMALL_TURN;
-        if !(is_small && is_beyond) {
-            return Vec::new();
+        let mut cautions = Vec::new();
+        let is_material = matches!(engine.flock().rule.mean, Mean::Material { .. });
+        let is_small = is_material && rotation(engine) == Rotation::Small;
+        if is_small && (self.largest_strain > SMALL_STRAIN || self.largest_turn > SMALL_TURN) {
+            cautions.push(format!(
+                "strains of up to {:.0} % and turns of up to {:.0} degrees under rotation = \"small\", which is right \
+                 for small ones (10 %, 10 degrees): displacements and forces are proportional to the load, as they are \
+                 no more in a body that is bent so far; rotation = \"corotated\" follows the turns",
+                100.0 * self.largest_strain,
+                self.largest_turn.to_degrees()
+            ));
         }
-        vec![format!(
-            "strains of up to {:.0} % and turns of up to {:.0} degrees under rotation = \"small\", which is right for \
-             small ones (10 %, 10 degrees): displacements and forces are proportional to the load, as they are no more \
-             in a body that is bent so far; rotation = \"corotated\" follows the turns",
-            100.0 * self.largest_strain,
-            self.largest_turn.to_degrees()
-        )]
+        cautions.extend(self.missed_work());
+        if let Some(cells) = engine.cells().filter(|_| is_material) {
+            cautions.extend(edge_stress::cautions(engine.free_edge(), engine.body(), cells));
+        }
+        cautions
+    }
+
+    /// The trapezoid rule misses work where forces are not linear between two equilibria.
+    fn missed_work(&self) -> Option<String> {
+        let done = self.work_done.map(|work| work.loads + work.supports)?;
+        let missed = (done - self.strain_energy).abs() / self.strain_energy;
+        let is_loaded = self.largest_strain > UNSTRAINED;
+        (is_loaded && missed > MISSED_WORK && missed.is_finite()).then(|| {
+            format!(
+                "the work done on the way, summed up by the trapezoid rule from one equilibrium to the next, differs by \
+                 {:.0} % from the strain energy, which holds: use more load_steps.increments",
+                100.0 * missed
+            )
+        })
     }
 }
 
@@ -207,66 +226,6 @@ fn strain_energy(engine: &Engine, elastic: &Elastic, forces: Option<&Forces>, u:
     }
     let of_cells = engine.cells().map(|cells| stress::strain_energy(cells, elastic, u, rotation(engine)));
     of_cells.and_then(Result::ok).unwrap_or(f64::NAN)
-}
-
-/// Stress of the particles along a fitted outline, from the cells near them and the tractions that are known there.
-/// Of a body that turns all of them are taken in axes that turn with it, in which a stress is in equilibrium but for terms of
-/// the size of the strain.
-fn recovered(
-    engine: &Engine,
-    elastic: &Elastic,
-    of_cells: &[StressState],
-    displacement: &Vectors,
-) -> Vec<(usize, StressState)> {
-    let (Some(edge), Some(cells)) = (engine.free_edge(), engine.cells()) else { return Vec::new() };
-    let (body, factor) = (engine.body(), engine.load_factor());
-    let lattice = &body.lattice;
-    // The sites of a honeycomb are nearer to each other than its cells are wide.
-    let spacing = lattice.spacing().max((lattice.cell_area() * lattice.sublattices() as f64).sqrt());
-    let bucket = |p: [f64; 2]| p.map(|v| (v / (REACH * spacing)).floor() as i64);
-    let mut cells_in: HashMap<[i64; 2], Vec<(u32, CellStress)>> = HashMap::new();
-    let around = |[x, y]: [i64; 2]| (x - 1..=x + 1).flat_map(move |x| (y - 1..=y + 1).map(move |y| [x, y]));
-    let near_edge: HashSet<[i64; 2]> =
-        edge.particles.iter().flat_map(|&i| around(bucket(body.reference.get(i)))).collect();
-    let centres = cells.centroids(&body.reference).enumerate();
-    for (cell, centroid) in centres.filter(|&(_, centroid)| near_edge.contains(&bucket(centroid))) {
-        let (area, stress) = (area(cells.shape(cell)), of_cells[cell].components);
-        let region = cells.region_of(cell);
-        cells_in.entry(bucket(centroid)).or_default().push((region, CellStress { centroid, area, stress }));
-    }
-    let mut tractions_in: HashMap<[i64; 2], Vec<KnownTraction>> = HashMap::new();
-    let turns: Option<Vec<f64>> =
-        (rotation(engine) == Rotation::Corotated).then(|| stress::turns(cells, displacement).collect());
-    for (known, &cell) in edge.tractions.iter().zip(&edge.cells) {
-        let (sin, cos) = turns.as_ref().map_or(0.0, |turns| turns[cell as usize]).sin_cos();
-        let [x, y] = known.direction;
-        let direction = [cos * x + sin * y, cos * y - sin * x];
-        let known = KnownTraction { value: factor * known.value, direction, ..*known };
-        tractions_in.entry(bucket(known.point)).or_default().push(known);
-    }
-    let fields: Vec<Fields> = std::iter::once(elastic).chain(&cells.inclusions).map(Fields::of).collect();
-    let recover = |&i: &usize| {
-        let point = body.reference.get(i);
-        let near = |p: [f64; 2]| distance(p, point) < REACH * spacing;
-        let around_here = around(bucket(point)).filter_map(|b| cells_in.get(&b)).flatten();
-        let (regions, cells_here): (Vec<u32>, Vec<CellStress>) =
-            around_here.filter(|(_, cell)| near(cell.centroid)).copied().unzip();
-        // Across an interface no one field goes on.
-        let region = *regions.first()?;
-        if regions.iter().any(|&other| other != region) {
-            return None;
-        }
-        let elastic = cells.material_of_region(region, elastic);
-        let tractions: Vec<KnownTraction> = around(bucket(point))
-            .filter_map(|b| tractions_in.get(&b))
-            .flatten()
-            .filter(|t| near(t.point))
-            .copied()
-            .collect();
-        let stress = stress_at((point, spacing), &fields[region as usize], &cells_here, &tractions)?;
-        Some((i, StressState::of_stress(stress, elastic)))
-    };
-    edge.particles.par_iter().filter_map(recover).collect()
 }
 
 /// Which turns of a cell are no strain.

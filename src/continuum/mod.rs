@@ -10,6 +10,7 @@ pub mod bulk_response;
 mod damping;
 pub mod deviation;
 pub mod digest;
+mod edge_stress;
 pub mod equilibrium;
 pub mod layout;
 pub mod looks;

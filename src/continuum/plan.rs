@@ -357,6 +357,7 @@ fn flock(
         weights,
         forces,
         rest: None,
+        keeps_rest: false,
         bonds,
     };
     if scene.keeps_rest {

@@ -5,15 +5,17 @@ use std::fmt;
 use super::active_share::active_share;
 use super::bulk_response;
 use super::deviation::{Deviation, pieces};
+use super::edge_stress;
 use super::equilibrium::select_solver;
 use super::memory::neighbour_entries;
 use super::plan::Plan;
 use crate::flock::fracture::Threshold;
 use crate::flock::law::Weights;
 use crate::flock::role::Role;
-use crate::flock::rules::{FeedbackReference, Mean};
+use crate::flock::rules::{FeedbackReference, Mean, Rotation};
 use crate::material::outline_loads::Resultant;
 use crate::material::stiffness::area;
+use crate::scene::raw::RawLoad;
 use crate::scene::{LoadSteps, Scene, SceneError, Weights as SceneWeights};
 use crate::sweep::{Order, Sweep};
 
@@ -272,11 +274,26 @@ fn cautions(scene: &Scene, plan: &Plan, deviation: Option<&Deviation>) -> Vec<St
         );
     }
     cautions.extend(bulk_response::cautions(scene));
+    cautions.extend(dead_pressure(scene));
+    if let (Some(edge), Some(cells)) = (&plan.setup.free_edge, &plan.setup.cells) {
+        let body = &plan.setup.body;
+        cautions.extend(edge_stress::cautions(edge.of(body, cells), body, cells));
+    }
     let led = |role: &Role| role.is_led();
     if !plan.setup.roles.iter().any(led) && scene.roles.iter().all(|entry| !led(&entry.role)) {
         cautions.push("no particle leads: the body relaxes by itself".into());
     }
     cautions
+}
+
+/// The warning about a pressure on a body that turns, if there is one.
+pub fn dead_pressure(scene: &Scene) -> Option<String> {
+    let presses = scene.raw.loads.iter().any(|load| matches!(load, RawLoad::Pressure { .. }));
+    (presses && scene.rotation() == Rotation::Corotated).then(|| {
+        "pressure acts along the normals of the undeformed outline, on its undeformed length: it does not follow a body \
+         that turns"
+            .to_owned()
+    })
 }
 
 impl fmt::Display for PlanReport {

@@ -32,9 +32,9 @@ impl Conduct {
         loads: Vec<Vectors>,
         free_edge: Option<Arc<FreeEdge>>,
     ) -> Self {
-        let Flock { rule, weights, forces, rest, bonds, .. } = flock;
+        let Flock { rule, weights, forces, rest, keeps_rest, bonds, .. } = flock;
         let fracture = bonds.map(|bonds| (bonds.threshold, bonds.ghosts));
-        Self { rule, weights, forces, rest, fracture, update, cells, loads, free_edge }
+        Self { rule, weights, forces, rest, keeps_rest, fracture, update, cells, loads, free_edge }
     }
 }
 
@@ -73,10 +73,11 @@ impl Engine {
     }
 
     fn conduct(&mut self, conduct: &Conduct) {
-        let Conduct { rule, weights, forces, rest, fracture, update, cells, loads, free_edge } =
+        let Conduct { rule, weights, forces, rest, keeps_rest, fracture, update, cells, loads, free_edge } =
             conduct.clone();
         let flock = &mut self.flock;
-        (flock.rule, flock.weights, flock.forces, flock.rest) = (rule, weights, forces, rest);
+        (flock.rule, flock.weights, flock.forces) = (rule, weights, forces);
+        (flock.rest, flock.keeps_rest) = (rest, keeps_rest);
         match (&mut flock.bonds, fracture) {
             (Some(bonds), Some((threshold, ghosts))) => (bonds.threshold, bonds.ghosts) = (threshold, ghosts),
             (Some(bonds), None) => bonds.threshold = None,

@@ -36,7 +36,8 @@ pub struct Reaction {
     pub role: String,
     /// How many particles it holds; one that a later entry names too counts there.
     pub particles: usize,
-    /// Middle of these particles in the reference configuration \[length\].
+    /// Middle of these particles \[length\]: in the reference configuration under small rotations, at present if the rule
+    /// is corotated.
     pub centre: [f64; 2],
     /// Their mean displacement \[length\].
     pub displacement: [f64; 2],
@@ -98,7 +99,7 @@ impl Forces {
     fn reaction_of(&self, engine: &Engine, entry: usize, held: &[Held]) -> Reaction {
         let mean =
             |points: &Vectors| held.iter().map(|one| points.get(one.particle)).collect::<Vectors>().middle();
-        let centre = mean(&engine.body().reference);
+        let centre = mean(&self.places);
         let moment = |about: [f64; 2]| {
             let of = |one: &Held| cross(minus(self.places.get(one.particle), about), self.held_by(*one));
             held.iter().map(of).sum::<f64>()

@@ -383,6 +383,7 @@ impl Engine {
 
     fn compile_sweep(&mut self) {
         self.activity.forget();
+        self.flock.renew_rest_of_torn();
         let share = self.team.as_ref().map_or_else(Share::whole, |(_, share)| *share);
         self.sweep = if self.present_neighbours.is_some() {
             let mut sweep = Sweep::uncompiled(self.update, &self.flock, &self.roles);
@@ -408,6 +409,7 @@ impl Engine {
             tracing::debug!("step {}: {} bonds break", self.step, self.breaks.len() - known);
             self.takes_several = false;
             let torn = self.breaks[known..].iter().flat_map(|b| b.pair).map(|j| j as usize);
+            self.flock.renew_rest(torn.clone());
             self.sweep.set_aside(torn, &self.flock);
         }
     }

@@ -11,7 +11,7 @@ use super::forces::Forces;
 use crate::flock::vectors::Vectors;
 
 /// Forces at their last value times displacements \[force length\]. In equilibrium under small rotations the strain
-/// energy is half of the sum of both.
+/// energy is half of the sum of both; in a body that turns this is no energy.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Work {
     /// Of the loads.

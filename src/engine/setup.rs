@@ -72,6 +72,8 @@ pub struct Conduct {
     pub forces: Option<Vectors>,
     /// Rest offsets \[length\], shape \[count\].
     pub rest: Option<Vectors>,
+    /// Whether rest offsets keep an unloaded body in place.
+    pub keeps_rest: bool,
     /// When bonds break, and what stands in for them.
     pub fracture: Option<(Option<Threshold>, Ghosts)>,
     /// The order and the damping of the sweep.

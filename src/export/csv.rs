@@ -2,7 +2,9 @@
 //! `breaks.csv`, every broken bond; `residuals.csv`, how a solver came to rest.
 //!
 //! Ids count from 1, columns and rows from the lowest site, frame included, which is the paper's
-//! numbering; a body given as points has its own ids and order, and no columns; nor have particles along an outline. Numbers are the shortest that read back as the same.
+//! numbering; a body given as points has its own ids and order, and no columns; nor have particles along an outline. Stresses (`stress_xx`,
+//! `stress_yy`, `stress_xy`) are along x and y under small rotations; of a corotated rule in axes that turn with the
+//! material, which were along x and y in the reference configuration. Numbers are the shortest that read back as the same.
 
 use std::path::PathBuf;
 

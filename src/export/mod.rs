@@ -231,7 +231,7 @@ fn figures_of<'a>(results: &'a Results<'_>, subject: &'a Subject<'_>, units: &'a
             let components = move || {
                 let stresses =
                     Stresses::in_cells(&outcome.engine, elastic, &displacement(), &snapshot.broken);
-                figures::components(subject, snapshot, cells, &stresses, unit)
+                figures::components(subject, snapshot, (cells, scene.rotation()), &stresses, unit)
             };
             figures.push((name("von_mises"), Box::new(von_mises)));
             figures.push((name("stress"), Box::new(components)));

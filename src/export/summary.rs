@@ -11,10 +11,12 @@ use super::error::{ExportError, write_file};
 use super::{OutputFolder, bonds, largest_strain};
 use crate::continuum::mechanics::{Mechanics, Peak, Stresses};
 use crate::continuum::places::{AtPlace, at_places};
+use crate::continuum::report::dead_pressure;
 use crate::continuum::run::{Outcome, StopReason};
 use crate::engine::Engine;
 use crate::engine::forces::Reaction;
 use crate::flock::role::Role;
+use crate::flock::rules::Rotation;
 use crate::scene::Scene;
 use crate::scene::raw::RawScene;
 use crate::scene::units::Units;
@@ -166,6 +168,9 @@ pub struct Measured {
     /// Whether a solver found an equilibrium: what then is unbalanced is what its tolerance and rounding leave.
     #[serde(skip)]
     pub is_settled: bool,
+    /// Whether stresses are in axes that turn with the material.
+    #[serde(skip)]
+    pub is_corotated: bool,
     /// The readings themselves.
     #[serde(flatten)]
     pub mechanics: Mechanics,
@@ -227,7 +232,7 @@ impl Summary {
             share_swept: outcome.solved.is_none().then(|| outcome.engine.activity().share_computed()),
             equilibrium: outcome.solved.as_ref().map(Equilibrium::of),
             energies: Energies { pe1, pe2, largest_strain },
-            cautions: measured.as_ref().map_or_else(Vec::new, |measured| measured.mechanics.cautions(engine)),
+            cautions: cautions(scene, engine, measured.as_ref()),
             mechanics: measured,
             broken_bonds: broken_bonds(&outcome.engine),
             timings: Seconds {
@@ -249,6 +254,11 @@ impl Summary {
     }
 }
 
+fn cautions(scene: &Scene, engine: &Engine, measured: Option<&Measured>) -> Vec<String> {
+    let Some(measured) = measured else { return Vec::new() };
+    dead_pressure(scene).into_iter().chain(measured.mechanics.cautions(engine)).collect()
+}
+
 impl Measured {
     /// At the places where a run ended, and the stresses there; `None` without a material.
     pub fn of(scene: &Scene, outcome: &Outcome) -> Option<(Self, Stresses)> {
@@ -258,13 +268,14 @@ impl Measured {
         let mechanics = Mechanics::under(&stresses, engine, elastic)?;
         let places = at_places(scene, engine, &stresses);
         let is_settled = outcome.solved.as_ref().is_some_and(Solved::is_at_rest);
-        Some((Self { units: Units::of(scene), is_settled, mechanics, places }, stresses))
+        let is_corotated = scene.rotation() == Rotation::Corotated;
+        Some((Self { units: Units::of(scene), is_settled, is_corotated, mechanics, places }, stresses))
     }
 }
 
 impl fmt::Display for Measured {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { units, is_settled, mechanics, places } = self;
+        let Self { units, is_settled, is_corotated, mechanics, places } = self;
         let (force, moment, length) = (&units.force, &units.moment, &units.length);
         // Rounding of the larger component is no number of the smaller one.
         let shown = |value: f64, beside: f64| if value.abs() < 1e-9 * beside.abs() { 0.0 } else { value };
@@ -289,7 +300,7 @@ impl fmt::Display for Measured {
             writeln!(f, "{name}  {} {force}, moment {about} {moment} about the origin", pair(load.force))?;
         }
         let work = mechanics.work.map_or_else(String::new, |work| {
-            format!("; work of the loads {}, of the supports {}", short(work.loads), short(work.supports))
+            format!("; force times way, loads {}, supports {}", short(work.loads), short(work.supports))
         });
         let done = mechanics.work_done.map_or_else(String::new, |work| {
             format!(
@@ -319,7 +330,8 @@ impl fmt::Display for Measured {
         for AtPlace { place, displacement, stress: [xx, yy, xy], von_mises } in places {
             let ([xx, yy, xy, von_mises], unit) = ([*xx, *yy, *xy, *von_mises].map(short), &units.stress);
             let moved = format!("at {} {length}: moved by {} {length}", pair(*place), pair(*displacement));
-            writeln!(f, "{moved}, stress ({xx}, {yy}, {xy}) {unit}, von Mises {von_mises} {unit}")?;
+            let axes = if *is_corotated { " in axes that turn with the material" } else { "" };
+            writeln!(f, "{moved}, stress ({xx}, {yy}, {xy}) {unit}{axes}, von Mises {von_mises} {unit}")?;
         }
         Ok(())
     }

@@ -44,8 +44,8 @@ pub enum Ghosts {
     /// The mirror image of the opposite neighbour through the particle; where there is none, as
     /// `Lattice`.
     Mirrored,
-    /// Nothing: the mean runs over the neighbours that are left (the literal formula, which draws the flanks of a
-    /// crack together).
+    /// Nothing: the mean runs over the neighbours that are left. Rest offsets are then those of these neighbours; without
+    /// rest offsets (the literal formula) the flanks of a crack draw together.
     None,
 }
 

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::block::{Block, IDENTITY, apply, inverse as invert, plus, product};
 use super::cells_around::CellsAround;
-use super::fracture::Bonds;
+use super::fracture::{Bonds, Ghosts};
 use super::neighbourhood::Neighbours;
 use super::rules::{
     CellAround, Corner, Load, Mean, Neighbour, OWN, ParticleState, PatchCell, Rotation, Rule, pull,
@@ -26,6 +26,8 @@ pub struct Flock {
     pub forces: Option<Vectors>,
     /// Rest offsets \[length\], shape \[count\]; all zero where absent.
     pub rest: Option<Vectors>,
+    /// Whether rest offsets keep an unloaded body in place, also where bonds break and no ghost stands in.
+    pub keeps_rest: bool,
     /// Broken bonds; none can break where absent.
     pub bonds: Option<Bonds>,
 }
@@ -153,7 +155,16 @@ impl Weights {
 impl Flock {
     /// Without loads, rest offsets and bonds.
     pub fn new(rule: Rule, reference: Arc<Vectors>, neighbours: Neighbours, weights: Weights) -> Self {
-        Self { rule, reference, neighbours, weights, forces: None, rest: None, bonds: None }
+        Self {
+            rule,
+            reference,
+            neighbours,
+            weights,
+            forces: None,
+            rest: None,
+            keeps_rest: false,
+            bonds: None,
+        }
     }
 
     /// Target position of `particle` when all stand at `present` \[length, world frame\].
@@ -306,6 +317,7 @@ impl Flock {
     /// Computes and keeps the rest offsets of the reference configuration; none are kept where all
     /// are zero, so that a body that needs none does not pay for them.
     pub fn keep_rest(&mut self) {
+        self.keeps_rest = true;
         if let (COROTATED, Weights::Matrix(weights)) = (self.rule.mean, &self.weights) {
             self.rest = rest_of_cells(weights, &self.reference);
             return;
@@ -317,10 +329,46 @@ impl Flock {
         self.rest = needed.then_some(rest);
     }
 
+    /// Computes anew the rest offsets of particles whose bonds have broken or been mended, where no ghosts stand in for
+    /// lost neighbours: each then rests on the neighbours that are left. One without any has no mean and stays anyway.
+    pub fn renew_rest(&mut self, particles: impl IntoIterator<Item = usize>) {
+        let has_ghosts = self.bonds.as_ref().is_none_or(|bonds| bonds.ghosts != Ghosts::None);
+        if !self.keeps_rest || has_ghosts || matches!(self.rule.mean, Mean::Material { .. }) {
+            return;
+        }
+        let mut rest = self.rest.take();
+        let count = self.reference.len();
+        for j in particles {
+            let left = self.neighbours.bonds(j).filter(|&bond| !self.is_lost(bond)).map(|bond| {
+                let position = self.reference.get(self.neighbours.index[bond] as usize);
+                self.neighbour(j, bond, position)
+            });
+            let offset = self.rule.rest_offset(self.reference.get(j), left);
+            if rest.is_some() || offset != [0.0; 2] {
+                rest.get_or_insert_with(|| Vectors::zeros(count)).set(j, offset);
+            }
+        }
+        self.rest = rest;
+    }
+
+    /// The same of all particles that have lost a bond.
+    pub fn renew_rest_of_torn(&mut self) {
+        let Some(bonds) = self.bonds.as_ref().filter(|bonds| bonds.any_broken()) else { return };
+        let is_torn = |&j: &usize| bonds.is_torn(j, &self.neighbours);
+        let torn: Vec<usize> = (0..self.reference.len()).filter(is_torn).collect();
+        self.renew_rest(torn);
+    }
+
+    fn is_lost(&self, bond: usize) -> bool {
+        self.bonds.as_ref().is_some_and(|bonds| bonds.is_broken(bond))
+    }
+
     /// Indices of the neighbours that are not lost to `particle`.
     pub fn live_neighbours(&self, particle: usize) -> impl Iterator<Item = usize> + '_ {
-        let live = move |bond: &usize| self.bonds.as_ref().is_none_or(|bonds| !bonds.is_broken(*bond));
-        self.neighbours.bonds(particle).filter(live).map(|bond| self.neighbours.index[bond] as usize)
+        self.neighbours
+            .bonds(particle)
+            .filter(|&bond| !self.is_lost(bond))
+            .map(|bond| self.neighbours.index[bond] as usize)
     }
 
     fn load(&self, particle: usize) -> Option<Load> {

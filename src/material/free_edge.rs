@@ -37,6 +37,8 @@ pub struct Edge {
     pub cells: Vec<u32>,
     /// Particles on the outline that are at no inner corner and not held altogether.
     pub particles: Vec<usize>,
+    /// On all of the body under the whole load \[force / length^3\].
+    pub body_force: [f64; 2],
 }
 
 impl FreeEdge {
@@ -52,21 +54,28 @@ impl FreeEdge {
         self.edge.get_or_init(|| self.found(body, cells)).as_ref()
     }
 
+    /// \[force / length^3\]
+    fn body_force(&self) -> [f64; 2] {
+        let of = |load: &Load| if let Load::Body(force) = load { *force } else { [0.0; 2] };
+        let sum = self.loads.iter().map(of).fold([0.0; 2], |sum, f| [sum[0] + f[0], sum[1] + f[1]]);
+        sum.map(|force| force / self.thickness)
+    }
+
     fn found(&self, body: &Body, cells: &Cells) -> Option<Edge> {
         let (outline, held) = (&self.outline, &self.held);
         let places = &body.outline.as_ref()?.places;
         let incidence = cells.incidence(body.count());
         let sides = cells.boundary_sides(&incidence);
         let fits = sides.len().saturating_mul(outline.pieces().count()) <= MOST_DISTANCES;
+        if !fits {
+            return None;
+        }
         let outlined = |load: &Load| match load {
-            Load::Outline(load) => Some(Some(load.clone())),
-            Load::Particles { .. } => Some(None),
-            // A body force is in equilibrium with no field of the recovery.
-            Load::Body(force) => (*force == [0.0; 2]).then_some(None),
+            Load::Outline(load) => Some(load.clone()),
+            Load::Particles { .. } | Load::Body(_) => None,
         };
-        let loads: Option<Vec<Option<OutlineLoad>>> = self.loads.iter().map(outlined).collect();
-        let loads: Vec<OutlineLoad> = loads.filter(|_| fits)?.into_iter().flatten().collect();
-        let mut edge = Edge::default();
+        let loads: Vec<OutlineLoad> = self.loads.iter().filter_map(outlined).collect();
+        let mut edge = Edge { body_force: self.body_force(), ..Edge::default() };
         let finder = Finder::new(outline);
         for [a, b] in sides {
             let [from, to] = [a, b].map(|i| body.reference.get(i as usize));

@@ -8,7 +8,7 @@
 //! the tractions which are known there (the idea of equilibrated patch recovery: N.-E. Wiberg and F. Abdulwahab, Int. J.
 //! Numer. Meth. Eng. 36, 1993).
 //!
-//! Without body force only: otherwise an average is taken.
+//! The fields balance no body force: the caller takes a stress that balances it off cells and tractions beforehand.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -21,7 +21,7 @@ pub const REACH: f64 = 3.5;
 /// Weight of a known traction against that of a cell of average size.
 const TRACTION_WEIGHT: f64 = 4.0;
 /// Fewer cells than this say too little.
-const FEWEST_CELLS: usize = 6;
+pub const FEWEST_CELLS: usize = 6;
 /// Unknowns of the fit.
 const UNKNOWNS: usize = 4 * DEGREE + 3;
 /// Degree of the stress functions.

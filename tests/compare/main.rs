@@ -3,6 +3,7 @@
 #![cfg(feature = "fem")]
 
 mod beam;
+mod edge;
 #[cfg(feature = "export")]
 #[path = "../common/folders.rs"]
 mod folders;

@@ -68,6 +68,7 @@ impl Beam {
             weights: Weights::Matrix(weights.corotated_weights()),
             forces: Some(forces),
             rest: None,
+            keeps_rest: false,
             bonds: None,
         };
         let follows = (0..body.count() as u32).map(|i| !at(0.0, i)).collect();

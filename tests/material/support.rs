@@ -53,6 +53,7 @@ pub fn flock(body: &Body, weights: &MaterialWeights, forces: Option<Vectors>) ->
         weights: Weights::Matrix(weights.weights()),
         forces,
         rest: None,
+        keeps_rest: false,
         bonds: None,
     };
     flock.keep_rest();

@@ -8,6 +8,7 @@ use super::page;
 use super::panels::{MOST_CELLS, Panel, Scale, Sheet, arranged};
 use super::stress::{drawn, enlarged};
 use crate::continuum::record::Snapshot;
+use crate::flock::rules::Rotation;
 use crate::flock::vectors::Vectors;
 use crate::material::cells::Cells;
 use crate::material::stress::StressState;
@@ -21,7 +22,7 @@ const NOISE: f64 = 1e-9;
 pub fn components(
     subject: &Subject<'_>,
     snapshot: &Snapshot,
-    cells: &Cells,
+    (cells, rotation): (&Cells, Rotation),
     stresses: &[StressState],
     unit: &str,
 ) -> String {
@@ -39,7 +40,8 @@ pub fn components(
     let panels =
         [0, 1, 2].map(|k| Panel { name: NAMES[k], stress: &by_component[k], places: &places, scale: 0 });
     let mut note = format!(
-        "stresses xx, yy and xy in the cells, {}{}",
+        "stresses xx, yy and xy in the cells{}, {}{}",
+        axes_note(rotation),
         page::note(subject, snapshot),
         scale_note(factor)
     );
@@ -50,6 +52,14 @@ pub fn components(
     let scales = vec![Scale::around_zero("stress", largest, 10.0)];
     Sheet { axes, is_row, scales, heading, cells, unit: subject.unit, stress_unit: unit, spacing }
         .draw(&panels)
+}
+
+/// Words on the axes of stresses where they are not those of the plane.
+fn axes_note(rotation: Rotation) -> &'static str {
+    match rotation {
+        Rotation::Small => "",
+        Rotation::Corotated => ", in axes that turn with each cell",
+    }
 }
 
 /// The plot of each component, and whether the three stand in a row.

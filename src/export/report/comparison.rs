@@ -162,9 +162,10 @@ fn measures(report: &ComparisonReport) -> Table {
         ("The truth's own error, stated", part(c.truth_stated_rel_l2)),
         ("Displacement, largest error over the largest", percent(c.displacement_max_rel)),
         ("Von Mises stress, relative L2", percent(c.von_mises_rel_l2)),
-        ("Energy norm of the error", percent(c.energy_rel)),
+        ("Energy norm of the error", part(c.energy_norm_rel)),
+        ("… at the corners of the cells alone", percent(c.energy_rel)),
         ("Strain energy by the rule", number(c.strain_energy_rule)),
-        ("Strain energy in truth", number(c.strain_energy_truth)),
+        ("Strain energy in truth", c.strain_energy_truth.map_or("not known".to_owned(), number)),
         ("Time, rule", format!("{} s", number(c.seconds_rule))),
         ("Time, truth", format!("{} s", number(c.seconds_truth))),
     ];

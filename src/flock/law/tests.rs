@@ -21,6 +21,7 @@ fn triangle() -> (Flock, Vectors) {
         weights: Weights::Matrix(weights),
         forces: Some([[1.0, 0.0], [0.0, -2.0], [0.3, 0.3]].into_iter().collect()),
         rest: None,
+        keeps_rest: false,
         bonds: None,
     };
     flock.keep_rest();

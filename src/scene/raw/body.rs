@@ -105,7 +105,8 @@ pub struct RawBody {
 pub struct RawInclusion {
     /// The place of the part; what of it lies outside the body does not count.
     pub shape: RawShape,
-    /// Of the body's plane, stress or strain, and as thick.
+    /// Its constants, with a `plane` of their own: plane stress unless given, and it must be that of the body. Its
+    /// thickness must be the body's too.
     pub material: RawMaterial,
 }
 

@@ -65,7 +65,8 @@ pub enum RawLoad {
         #[serde(default)]
         profile: Option<RawProfile>,
     },
-    /// On the part of the outline that lies in the region, along its normal.
+    /// On the part of the outline that lies in the region, along the normal of the undeformed outline and on its
+    /// undeformed length: in a corotated body too, where it does not turn with the outline.
     Pressure {
         /// The place where the load acts.
         region: RawRegion,

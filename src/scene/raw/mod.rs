@@ -131,7 +131,7 @@ pub enum RawGhosts {
     Lattice,
     /// The mirror image of the opposite neighbour.
     Mirrored,
-    /// Nothing: the mean runs over those left.
+    /// Nothing: the mean runs over those left, and so does the correction of `rule.rest = "balanced"`.
     None,
 }
 

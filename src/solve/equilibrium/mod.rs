@@ -32,7 +32,7 @@ mod system;
 use std::sync::Arc;
 use std::time::Duration;
 
-pub use choice::{DIRECT_UP_TO, FACTORISED_UP_TO, UNSYMMETRIC_UP_TO, choose};
+pub use choice::{DIRECT_UP_TO, FACTORISED_UP_TO, INCOMPRESSIBLE_UP_TO, UNSYMMETRIC_UP_TO, choose};
 pub use error::SolveError;
 pub use system::System;
 
@@ -42,7 +42,7 @@ use super::part::{Cuts, Part, received_by};
 use super::stopwatch::Stopwatch;
 use crate::flock::vectors::Vectors;
 use crate::ranks::Team;
-use choice::falls_back;
+use choice::{PATIENCE, falls_back};
 use system::Prepared;
 
 /// Relative residual that no whole solve in single precision is asked to go below.
@@ -220,18 +220,27 @@ pub fn solve_shared(system: &System, request: &Request, team: Option<&Team>) -> 
     check(system, request, solver)?;
     let mut prepared = Prepared::new(system, team.cloned())?;
     let prepared_in = begin.elapsed();
-    let (found, solver, why) = match by(solver, &mut prepared, system, request) {
-        Err(SolveError::NotPositive { .. }) if falls_back(system, request, solver) => {
+    let can_fall_back = falls_back(system, request, solver);
+    let most_iterations =
+        if can_fall_back { request.most_iterations.min(PATIENCE) } else { request.most_iterations };
+    let patient = Request { most_iterations, ..*request };
+    let found = by(solver, &mut prepared, system, &patient);
+    let gives_up = match &found {
+        Err(SolveError::NotPositive { .. }) => {
+            Some(format!("{solver} took the body for unstable, which a factorisation finds out"))
+        }
+        Ok(found) if found.residuals.len() > PATIENCE && request.most_iterations > PATIENCE => {
+            Some(format!("{solver} was not at rest after {PATIENCE} iterations, and a factorisation is"))
+        }
+        _ => None,
+    };
+    let (found, solver, why) = match gives_up.filter(|_| can_fall_back) {
+        Some(why) => {
             // The iteration has used up the right-hand side.
             prepared.right = prepared.scaled_right(system);
-            let found = by(Solver::Direct, &mut prepared, system, request)?;
-            (
-                found,
-                Solver::Direct,
-                format!("{solver} took the body for unstable, which a factorisation finds out"),
-            )
+            (by(Solver::Direct, &mut prepared, system, request)?, Solver::Direct, why)
         }
-        found => (found?, solver, why),
+        None => (found?, solver, why),
     };
     let set_up = prepared_in + found.set_up;
     let mut residuals = found.residuals;

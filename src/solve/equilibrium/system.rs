@@ -17,13 +17,15 @@ pub struct System {
     pub forces: Vectors,
     /// Displacement of each held particle \[length\]; that of followers is not looked at. Shape \[count\].
     pub held: Vectors,
+    /// Whether its material hardly changes its volume: iterations are many then.
+    pub is_nearly_incompressible: bool,
     asymmetric_pair: OnceLock<Option<[usize; 2]>>,
 }
 
 impl System {
     /// `forces` \[force\] and `held` displacements \[length\] of shape \[count\] each.
     pub fn new(operator: Operator, forces: Vectors, held: Vectors) -> Self {
-        Self { operator, forces, held, asymmetric_pair: OnceLock::new() }
+        Self { operator, forces, held, is_nearly_incompressible: false, asymmetric_pair: OnceLock::new() }
     }
 
     /// See [`Operator::asymmetric_pair`]; looked for once.

@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-use super::measures::{Comparison, Sides, von_mises};
+use super::measures::{Comparison, Sides, energy_norm, von_mises};
 use super::places::{PlaceComparison, compare_places};
 use super::reference::{Reference, ReferenceError, Setting};
 use super::split::ErrorParts;
@@ -18,6 +18,7 @@ use crate::engine::Engine;
 use crate::engine::setup::RoleChange;
 use crate::fem::{Effort, FemError};
 use crate::flock::role::Role;
+use crate::flock::rules::Rotation;
 use crate::flock::vectors::Vectors;
 use crate::material::cells::Cells;
 use crate::material::elastic::Elastic;
@@ -137,6 +138,10 @@ pub fn compare(
     let sides = Sides { cells: &cells, elastic, rotation, rule: &rule, truth: known, follows: &follows };
     let mut comparison = Comparison::of(&sides)
         .map_err(|shape| scene.refuse("lattice", shape.to_string(), "use a lattice less slender"))?;
+    let energy = truth.truth.strain_energy();
+    comparison.strain_energy_truth = Some(energy);
+    comparison.energy_norm_rel = (is_orthogonal(scene, engine) && !cells.average_dilatations(elastic))
+        .then(|| energy_norm(comparison.strain_energy_rule, energy));
     comparison.seconds_rule = time.as_secs_f64();
     comparison.seconds_truth = truth.time.as_secs_f64();
     comparison.truth_stated_rel_l2 = Some(truth.truth.error().displacement).filter(|error| error.is_finite());
@@ -147,6 +152,12 @@ pub fn compare(
     let at_places = stresses.map_or_else(Vec::new, |stresses| at_places(scene, engine, &stresses));
     let places = compare_places(at_places, &truth.truth).map_err(|error| refused(scene, &error))?;
     Ok(Compared { comparison, outcome, truth, cells, rule, von_mises_rule, von_mises_truth, places })
+}
+
+/// Whether energies tell the error: those of a body that loads alone or moved supports alone drive, under small rotations.
+fn is_orthogonal(scene: &Scene, engine: &Engine) -> bool {
+    let is_moved = engine.changes().iter().any(|change| change.motion.is_some());
+    scene.is_fitted && scene.rotation() == Rotation::Small && (scene.loads.is_empty() || !is_moved)
 }
 
 /// The plan of a scene, its leaders led by this truth of its body or of a finer one; a leader that the truth

@@ -76,7 +76,7 @@ fn torn_particles_are_swept_to_the_bits_of_the_rule_as_cracks_spread() {
             let what = format!("{what}, {ghosts:?}");
             let count = body.reference.len();
             let follows: Vec<bool> = (0..count).map(|j| j % 43 != 11).collect();
-            body.rest = (ghosts != Ghosts::None).then(|| draws.points(&Vectors::zeros(count), 0.1));
+            body.rest = (ghosts != Ghosts::Mirrored).then(|| draws.points(&Vectors::zeros(count), 0.1));
             let mut bonds = Bonds::new(None, ghosts, &body.neighbours);
             let mut torn =
                 DamagedRows::new((0..BANDS).map(|band| band * count / BANDS..(band + 1) * count / BANDS));

@@ -1,0 +1,175 @@
+//! Stress along the outline of loaded bodies against closed forms: under body forces and beside other materials.
+
+use std::ops::ControlFlow;
+
+use flockform::continuum::equilibrium::{run_to_equilibrium, select_solver};
+use flockform::continuum::mechanics::{Mechanics, Stresses};
+use flockform::continuum::places::at_places;
+use flockform::continuum::plan::Plan;
+use flockform::continuum::report::PlanReport;
+use flockform::fem::Effort;
+use flockform::scene::Scene;
+use flockform::solve::equilibrium::Solver;
+use flockform::study::compare::run::compare;
+
+fn scene(text: &str, overrides: &[&str]) -> Scene {
+    let overrides: Vec<String> = overrides.iter().map(|&text| text.to_owned()).collect();
+    Scene::parse("edge", "edge.toml", text, &overrides, None).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// Stress at each place, and what the run warns of.
+fn measured(text: &str, overrides: &[&str]) -> (Vec<[f64; 3]>, Vec<String>) {
+    let scene = scene(text, overrides);
+    let plan = Plan::new(&scene).unwrap_or_else(|error| panic!("{error}"));
+    let outcome = run_to_equilibrium(&scene, plan, &mut |_, _| ControlFlow::Continue(()));
+    let engine = outcome.unwrap_or_else(|error| panic!("{error}")).engine;
+    let elastic = scene.material.expect("a material");
+    let stresses = Stresses::at_present(&engine, &elastic).expect("cells");
+    let mechanics = Mechanics::under(&stresses, &engine, &elastic).expect("cells");
+    let stress = at_places(&scene, &engine, &stresses).iter().map(|at| at.stress).collect();
+    (stress, mechanics.cautions(&engine))
+}
+
+/// What the plan warns of.
+fn planned(text: &str, overrides: &[&str]) -> Vec<String> {
+    let scene = scene(text, overrides);
+    let plan = Plan::new(&scene).unwrap_or_else(|error| panic!("{error}"));
+    PlanReport::new(&scene, &plan).unwrap_or_else(|error| panic!("{error}")).cautions
+}
+
+/// A beam of 10 by 1 under a moment of 1: the stress of its upper fibre is 6.
+const BENT: &str = r#"
+title = "A beam under a moment"
+lattice = { kind = "square", spacing = 0.25 }
+body = { shape = { kind = "rectangle", max = [10.0, 1.0] } }
+material = { kind = "isotropic", young = 1000.0, poisson = 0.3 }
+rule = { mean = { kind = "material" } }
+equilibrium = {}
+record = { places = [[5.0, 1.0]] }
+
+[[roles]]
+region = { kind = "outline", pieces = [4] }
+role = "clamped"
+axis = "x"
+
+[[roles]]
+region = { kind = "disc", centre = [0.0, 0.0], radius = 0.01 }
+role = "clamped"
+
+[[loads]]
+kind = "traction"
+region = { kind = "outline", pieces = [2] }
+traction = [6.0, 0.0]
+profile = { from = [10.0, 0.0], to = [10.0, 1.0], factors = [-1.0, 1.0] }
+"#;
+
+#[test]
+fn a_body_force_leaves_the_recovery_of_the_stress_of_bending_as_it_is() {
+    let ([without, with], weight) =
+        ([&[][..], &[WEIGHTLESS]].map(|set| measured(BENT, set).0[0]), WEIGHTLESS);
+    println!("{without:?}, {with:?} under {weight}");
+    assert!((without[0] / 6.0 - 1.0).abs() < 0.03, "{without:?}");
+    assert!((0..3).all(|k| (with[k] - without[k]).abs() < 1e-6), "{with:?} {without:?}");
+}
+
+const WEIGHTLESS: &str = "loads[1]={ kind = \"body\", force = [0.0, -1e-12] }";
+
+#[test]
+fn a_bar_under_its_weight_has_no_stress_at_its_free_end() {
+    // Without contraction the stress is b (L - x).
+    let weight = "loads=[{ kind = \"body\", force = [3.0, 0.0] }]";
+    for spacing in [0.25, 0.5] {
+        let h = format!("lattice.spacing={spacing}");
+        let free =
+            [&*h, weight, "material.poisson=0.0", "record.places=[[10.0, 1.0], [4.0, 1.0], [9.5, 0.0]]"];
+        let (found, _) = measured(BENT, &free);
+        for (found, exact) in found.iter().zip([0.0, 18.0, 1.5]) {
+            assert!(
+                (found[0] - exact).abs() < 1e-6 && found[1].abs() < 1e-6,
+                "{spacing}: {found:?}, {exact}"
+            );
+        }
+    }
+}
+
+/// Two layers bonded together and bent: strain is linear in y, and stress jumps with the modulus.
+const LAYERS: &[&str] = &[
+    "lattice.spacing=0.25",
+    "body={ shape = { kind = \"rectangle\", max = [9.0, 3.0] }, inclusions = [{ shape = { kind = \"rectangle\", \
+     min = [-1.0, 2.0], max = [10.0, 5.0] }, material = { kind = \"isotropic\", young = 6000.0, poisson = 0.3 } }] }",
+    "loads=[{ kind = \"traction\", region = { kind = \"outline\", between = [[9.0, 0.0], [9.0, 2.0]] }, \
+     traction = [1.0, 0.0], profile = { from = [9.0, 0.0], to = [9.0, 2.0], factors = [-2.125, -0.125] } }, \
+     { kind = \"traction\", region = { kind = \"outline\", between = [[9.0, 2.0], [9.0, 3.0]] }, \
+     traction = [1.0, 0.0], profile = { from = [9.0, 2.0], to = [9.0, 3.0], factors = [-0.75, 5.25] } }]",
+    "record.places=[[4.5, 3.0], [4.5, 0.0]]",
+];
+
+#[test]
+fn stress_is_recovered_beside_another_material() {
+    let (found, cautions) = measured(BENT, LAYERS);
+    println!("{found:?} {cautions:?}");
+    for (found, exact) in found.iter().zip([5.25, -2.125]) {
+        assert!((found[0] / exact - 1.0).abs() < 0.02 && found[1].abs() < 0.02, "{found:?}, exact {exact}");
+    }
+    assert!(cautions.iter().any(|caution| caution.contains("where materials meet")), "{cautions:?}");
+    assert_eq!(planned(BENT, LAYERS), cautions);
+}
+
+#[test]
+fn an_inclusion_of_the_body_s_own_material_changes_no_stress_beside_it() {
+    let disc = "body.inclusions=[{ shape = { kind = \"disc\", centre = [5.0, 0.4], radius = 0.2 }, \
+                material = { kind = \"isotropic\", young = 1000.0, poisson = 0.3 } }]";
+    let fine = "lattice.spacing=0.125";
+    let [without, with] = [&[fine][..], &[fine, disc]].map(|set| measured(BENT, set).0[0]);
+    println!("{without:?} {with:?}");
+    assert!((with[0] / 6.0 - 1.0).abs() < 0.015, "{with:?}, without {without:?}");
+}
+
+#[test]
+fn a_body_one_cell_thick_is_said_to_show_no_stress_of_bending() {
+    let (found, cautions) = measured(BENT, &["lattice.spacing=1.0"]);
+    println!("{found:?} {cautions:?}");
+    assert!(cautions.iter().any(|caution| caution.contains("one cell thick")), "{cautions:?}");
+    assert_eq!(planned(BENT, &["lattice.spacing=1.0"]), cautions);
+    assert_eq!(planned(BENT, &[]), [""; 0]);
+}
+
+#[test]
+fn pressure_on_a_body_that_turns_is_said_to_keep_its_direction() {
+    let pressed = [
+        "loads=[{ kind = \"pressure\", region = { kind = \"outline\", pieces = [3] }, pressure = 0.1 }]",
+        "rule.mean={ kind = \"material\", rotation = \"corotated\" }",
+    ];
+    let is_said =
+        |cautions: Vec<String>| cautions.iter().any(|caution| caution.contains("undeformed outline"));
+    assert!(is_said(planned(BENT, &pressed)));
+    assert!(!is_said(planned(BENT, &pressed[..1])));
+}
+
+#[test]
+fn a_comparison_has_the_energy_of_the_truth_itself() {
+    let scene = scene(BENT, &["lattice.spacing=0.5"]);
+    let found = compare(&scene, &Effort::default(), &mut |_, _| ControlFlow::Continue(()));
+    let found = found.unwrap_or_else(|error| panic!("{error}")).comparison;
+    // M^2 L / (2 E I).
+    let exact = 10.0 / (2.0 * 1000.0 / 12.0);
+    let truth = found.strain_energy_truth.expect("known");
+    println!("{found}");
+    assert!((truth / exact - 1.0).abs() < 1e-4, "{truth}, exact {exact}");
+    let norm = ((exact - found.strain_energy_rule).abs() / exact).sqrt();
+    assert!((found.energy_norm_rel.expect("loads alone") - norm).abs() < 1e-3 * norm, "{found} {norm}");
+    assert!(found.energy_norm_rel > Some(found.energy_rel), "{found}");
+    assert!(found.to_string().contains(&format!("truth {truth:.5e}")), "{found}");
+}
+
+#[test]
+fn a_nearly_incompressible_slice_is_factorised() {
+    let slice = ["material.poisson=0.4999999", "material.plane=strain", "lattice.spacing=0.05"];
+    for (sets, expected) in [(&slice[..], Solver::Direct), (&slice[2..], Solver::Multigrid)] {
+        let scene = scene(BENT, sets);
+        let plan = Plan::new(&scene).unwrap_or_else(|error| panic!("{error}"));
+        let asked = scene.equilibrium.as_ref().expect("asked for");
+        let (solver, why) = select_solver(&scene, &asked.request, &plan).expect("can be solved");
+        assert_eq!(solver, expected, "{why}");
+    }
+}
