@@ -51,6 +51,7 @@ impl Svg {
     }
 
     /// Elements of which only the part inside a rectangle shows. `name` is the rectangle's, one on a sheet.
+    #[cfg(feature = "swarm")]
     pub fn clipped(&mut self, name: &str, corner: [f64; 2], size: [f64; 2], draw: impl FnOnce(&mut Self)) {
         self.group_of("clipPath", format_args!("id=\"{name}\""), |svg| svg.rect(corner, size, ""));
         self.group(format_args!("clip-path=\"url(#{name})\""), draw);
