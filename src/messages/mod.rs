@@ -31,7 +31,6 @@ pub mod sensor_msgs;
 pub mod std_msgs;
 pub mod std_srvs;
 pub mod tf2_msgs;
-#[cfg(feature = "ros")]
 pub mod type_description_interfaces;
 pub mod visualization_msgs;
 pub mod wire;
