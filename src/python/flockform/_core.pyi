@@ -219,7 +219,7 @@ class Body:
     def __deepcopy__(self, _memo: object) -> Body: ...
 
 def material(scene: _File, *, set: _Set | None = None) -> dict[str, Any]:
-    """What material a scene's rule is, in a body without edges: a dict with the keys of `flockform material --json`.
+    """The material that a scene's rule is in a body without edges: a dict with the keys of `flockform material --json`.
 
     scene and set as for run().
     """
