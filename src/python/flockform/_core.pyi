@@ -311,7 +311,7 @@ class Swarm:
 
     @property
     def mode(self) -> Literal["running", "emergency-stopped"]:
-        """What the loop does: "running" or "emergency-stopped"."""
+        """The mode of the loop: "running" or "emergency-stopped"."""
 
     @property
     def manoeuvres(self) -> list[str]:
