@@ -10,6 +10,7 @@
 use std::io::{BufRead, BufReader, ErrorKind, Read, Write};
 use std::os::fd::OwnedFd;
 use std::os::unix::net::UnixStream;
+use std::path::PathBuf;
 use std::process::{Child, Command, ExitCode, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, channel};
@@ -99,7 +100,7 @@ fn lead(silence: Duration) -> std::io::Result<ExitCode> {
 /// Starts a child and sends it the state.
 fn start(number: u32, state: &[u8]) -> std::io::Result<(Child, Lines)> {
     let (ours, theirs) = UnixStream::pair()?;
-    let child = Command::new(std::env::current_exe()?)
+    let child = Command::new(program()?)
         .args(std::env::args_os().skip(1))
         .env(LIFE, number.to_string())
         .stdin(Stdio::from(OwnedFd::from(theirs)))
@@ -116,6 +117,12 @@ fn start(number: u32, state: &[u8]) -> std::io::Result<(Child, Lines)> {
         }
     });
     Ok((child, (ours, lines)))
+}
+
+/// This program; where its file was replaced or removed meanwhile, as by an update, the one that runs.
+fn program() -> std::io::Result<PathBuf> {
+    let path = std::env::current_exe()?;
+    Ok(if path.exists() { path } else { "/proc/self/exe".into() })
 }
 
 type Lines = (UnixStream, Receiver<Vec<u8>>);
