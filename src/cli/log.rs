@@ -91,8 +91,7 @@ pub fn start(arguments: &Arguments, ros: &RosArguments) {
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| level.into());
     let first = (given.unwrap_or(Severity::Unset), filter.to_string());
     // A control loop must not wait for a reader; any other command may.
-    let is_loop = matches!(arguments.command, Command::Node(_) | Command::Robots(_));
-    let thread = (is_console && is_loop).then(|| LogWriter::start(std::io::stderr()));
+    let thread = (is_console && is_node).then(|| LogWriter::start(std::io::stderr()));
     let writer = match thread {
         Some(Ok(writer)) => BoxMakeWriter::new(move || writer.clone()),
         _ if is_console => BoxMakeWriter::new(std::io::stderr),

@@ -1,5 +1,5 @@
-//! Standard error behind a thread. A line is written before its sender goes on, as long as somebody reads: once a line
-//! has waited for [`PATIENCE`], those after it wait for nobody. A pipe that is full holds up no control loop, and no end.
+//! Standard error behind a thread. A line is written before its sender goes on, as long as there is a reader: once a line
+//! has waited for [`PATIENCE`], senders wait no more. A pipe that is full holds up no control loop, and no end.
 
 use std::collections::VecDeque;
 use std::io::{self, Write};

@@ -21,11 +21,11 @@ use crate::material::recovery::{CellStress, FEWEST_CELLS, Fields, KnownTraction,
 use crate::material::stiffness::area;
 use crate::material::stress::{self, StressState};
 
-/// Steps of a line of sight [spacings].
+/// Steps of a line of sight \[spacings\].
 const SIGHT: f64 = 0.25;
 
 /// Spread of the middles of cells around their mean, in the direction in which it is least, below which they lie in one
-/// row [spacings]: two rows have a half, one row of triangles has a seventh.
+/// row \[spacings\]: two rows have a half, one row of triangles has a seventh.
 const ONE_ROW: f64 = 0.2;
 
 /// Cells and sides of one material around a particle.
