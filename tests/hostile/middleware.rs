@@ -329,6 +329,26 @@ fn a_process_that_is_killed_or_stands_still_is_followed_by_one_that_goes_on() {
     assert_eq!(scene.node.terminate(), Some(0));
 }
 
+/// As an update does while the swarm flies.
+#[test]
+fn a_program_whose_file_is_removed_or_replaced_goes_on_when_its_worker_dies() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let program = folder.path().join("flockform");
+    std::fs::copy(PROGRAM, &program).expect("copied");
+    let mut node = Running::start(&mut command_of(&program, domain(), &arguments("node", &[])));
+    let lines = node.lines();
+    let mut worker = until("a worker", || node.worker());
+    for put_in_place in [None, Some("this is no program")] {
+        std::fs::remove_file(&program).expect("it runs, and yet it can be removed");
+        put_in_place.iter().for_each(|text| std::fs::write(&program, text).expect("written"));
+        signal("KILL", worker);
+        worker = until("another worker", || node.worker().filter(|&process| process != worker));
+        until("it is told", || lines.try_iter().find(|line| line.contains("goes on")));
+        std::fs::write(&program, "").expect("written");
+    }
+    assert_eq!(node.terminate(), Some(0));
+}
+
 /// Takes seconds from `FLOCKFORM_ATTACK_SECONDS`.
 #[test]
 #[ignore = "takes a minute; half an hour with FLOCKFORM_ATTACK_SECONDS=1800"]

@@ -1,6 +1,7 @@
 //! Programs under attack, who watches them, and the packets.
 
 use std::io::Read;
+use std::path::Path;
 use std::process::{Command, Output, Stdio};
 use std::sync::atomic::{AtomicU16, Ordering};
 use std::time::Duration;
@@ -29,8 +30,15 @@ pub fn square(overrides: &[&str]) -> Swarm {
     load_swarm("square", overrides)
 }
 
+pub const PROGRAM: &str = env!("CARGO_BIN_EXE_flockform");
+
 pub fn command(domain: u16, arguments: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_flockform"));
+    command_of(Path::new(PROGRAM), domain, arguments)
+}
+
+/// The same with another file of the program.
+pub fn command_of(program: &Path, domain: u16, arguments: &[&str]) -> Command {
+    let mut command = Command::new(program);
     command
         .args(arguments)
         .env("ROS_DOMAIN_ID", domain.to_string())

@@ -7,6 +7,9 @@
 //! packet's submessages only the first [`SLOTS`] are checked, and carefully forged numbers can still make RustDDS deaf
 //! to a peer. [`pulse`](super::pulse) handles the rest.
 //!
+//! Where only this computer may be heard, the sockets are also bound to the loopback device, as `ss` shows: the kernel
+//! does so for any process since Linux 5.7, and the filter holds on older ones.
+//!
 //! A secured participant loses messages of the handshake by which peers prove who they are: they go to everybody, and of
 //! those that come at once RustDDS takes the last, which may be for another. Those for others are kept out too.
 
@@ -55,7 +58,12 @@ pub fn guard(
     for (_, number) in sockets()?.into_iter().filter(|(name, _)| !before.contains_key(name)) {
         let socket = borrowed(number);
         if port(socket).is_some() {
-            SockRef::from(&socket).attach_filter(&program)?;
+            let socket = SockRef::from(&socket);
+            socket.attach_filter(&program)?;
+            if loopback_only {
+                // Refused by older kernels: the filter alone then keeps others out.
+                let _ = socket.bind_device(Some(b"lo"));
+            }
             guarded += 1;
         }
     }
@@ -386,6 +394,7 @@ mod tests {
         inside.set_read_timeout(Some(Duration::from_millis(100))).expect("a socket");
         // Tests beside this one may have opened some too.
         assert!(guard(&before, true, secured).expect("Linux") >= 1);
+        assert_eq!(SockRef::from(&inside).device().expect("Linux").as_deref(), Some(&b"lo"[..]));
         let outside = UdpSocket::bind("127.0.0.1:0").expect("a socket");
         let to = inside.local_addr().expect("bound");
         let listener = inside.try_clone().expect("another descriptor");
