@@ -97,13 +97,13 @@ impl Judge {
             while let Some((target, _)) = self.targets[m].take() {
                 let to = [target.pose.position.x, target.pose.position.y];
                 let Some((stamp, at)) = self.places[m] else { continue };
-                // The pose that it was computed from may be a few periods old. Ours is older where the judge's own
-                // middleware is attacked: the robot has moved on since.
-                let since = (target.header.stamp.seconds() - stamp).max(0.0);
-                let (far, most) = (distance(to, at), limits.speed * (10.0 * period + since));
+                // The pose that it was computed from may be a few periods old. Where the judge's own middleware is
+                // attacked, the last pose is older still, or the target comes late: the robot has moved on between them.
+                let between = (target.header.stamp.seconds() - stamp).abs();
+                let (far, most) = (distance(to, at), limits.speed * (10.0 * period + between));
                 assert!(
-                    far <= most,
-                    "robot {m} is sent {far} m away, {since} s after the judge's last pose of it"
+                    far <= most + 1e-9,
+                    "robot {m} is sent {far} m away, {between} s from the judge's last pose of it"
                 );
                 (self.sent[m], self.held[m]) = (Instant::now(), None);
             }
