@@ -66,7 +66,7 @@ fn the_package_lies_where_ros_looks_for_it() {
 }
 
 #[test]
-fn the_views_show_topics_that_the_node_has() {
+fn the_views_show_topics_and_frames_that_the_node_has() {
     let views = Path::new(CHECKOUT).join("launch-configs/views");
     let read = |name: &str| std::fs::read_to_string(views.join(name)).expect("readable");
     let (rviz, foxglove) = (read("formation.rviz"), read("formation.foxglove.json"));
@@ -76,7 +76,9 @@ fn the_views_show_topics_that_the_node_has() {
         let quoted = |c: char| !(c.is_ascii_alphanumeric() || "/_".contains(c));
         text.split(quoted).filter(|word| word.starts_with("/flockform/")).map(str::to_owned).collect()
     };
-    assert_eq!(topics(&rviz), ["/flockform/markers".to_owned()].into());
+    // RViz takes this name in its own namespace, which is the fleet's in the demo.
+    let values = rviz.lines().filter_map(|line| line.trim().strip_prefix("Value: "));
+    assert_eq!(values.filter(|value| value.contains('/')).collect::<Vec<_>>(), ["flockform/markers"]);
     assert_eq!(topics(&foxglove), ["/flockform/markers", "/flockform/state"].map(str::to_owned).into());
     let state =
         std::fs::read_to_string(Path::new(CHECKOUT).join("msgs/flockform_msgs/msg/FormationState.msg"));
@@ -90,6 +92,24 @@ fn the_views_show_topics_that_the_node_has() {
     let tree = layout["layout"].to_string();
     let shown: BTreeSet<&str> = tree.split('"').filter(|word| word.contains('!')).collect();
     assert_eq!(shown, panels.keys().map(String::as_str).collect());
+    // Foxglove and its open fork Lichtblick each read the titles under a key of their own.
+    for (name, panel) in panels {
+        assert!(panel["foxglovePanelTitle"].is_string(), "{name}");
+        assert_eq!(panel["lichtblickPanelTitle"], panel["foxglovePanelTitle"], "{name}");
+    }
+    // Both show the frame of a swarm file that names none, and no frame of a robot, of which there are a hundred.
+    assert!(rviz.contains("    Fixed Frame: map\n"));
+    assert_eq!(panels["3D!formation"]["followTf"], "map");
+    assert_eq!(panels["3D!formation"]["scene"]["transforms"]["axisScale"], 0);
+    assert_eq!(panels["3D!formation"]["scene"]["transforms"]["lineWidth"], 0);
+    // RViz reads these two into variables that nothing initialises.
+    for dock in ["Left", "Right"] {
+        assert!(rviz.contains(&format!("\n  Hide {dock} Dock: false\n")), "{dock}");
+    }
+    // A launch that does not find the package rviz2 ends, and leaves running what it has started.
+    let demo = read("../demo_launch.xml");
+    let place = |what: &str| demo.find(what).expect("in the demo");
+    assert!(place("pkg=\"rviz2\"") < place("<include "));
 }
 
 #[test]
