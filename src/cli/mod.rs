@@ -31,7 +31,7 @@ mod sweep;
 mod trade;
 
 use std::io::ErrorKind;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::error::{ContextKind, ContextValue};
@@ -249,7 +249,7 @@ pub enum Refusal {
     Exists(PathBuf),
     #[error("cannot write to standard output: {0}")]
     Print(std::io::Error),
-    #[error("cannot write {}: {source}", .path.display())]
+    #[error("cannot write {}: {source}{}", .path.display(), folder_first(.path))]
     NewFile { path: PathBuf, source: std::io::Error },
     #[error(
         "`{name}` left no report for the gallery: {reason}\n  help: run it alone to see why, or name the others"
@@ -277,6 +277,14 @@ pub enum Refusal {
     Ranks(#[from] ranks::RanksError),
     #[error("--threads {threads}: {error}\n  help: give a number from 1 to the machine's cores")]
     Threads { threads: usize, error: std::io::Error },
+}
+
+/// The remedy for a file in a folder that is not there.
+fn folder_first(path: &Path) -> String {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty() && !folder.exists());
+    folder.map_or_else(String::new, |folder| {
+        format!("\n  help: make the folder first: mkdir -p {}", folder.display())
+    })
 }
 
 impl Refusal {

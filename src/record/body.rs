@@ -113,8 +113,9 @@ fn markers(engine: &Engine, header: &Header) -> MarkerArray {
     let particles = Marker {
         header: header.clone(),
         ns: "particles".into(),
-        r#type: Marker::POINTS,
-        scale: Vector3 { x: size, y: size, z: 0.0 },
+        // Spheres have a size in metres, which some viewers take for pixels where it is that of points; they take longer to draw.
+        r#type: if engine.present().len() <= MOST_MEMBERS { Marker::SPHERE_LIST } else { Marker::POINTS },
+        scale: Vector3 { x: size, y: size, z: size },
         points: engine.body().rows().map(|i| point(engine.present().get(i))).collect(),
         colors: engine.body().rows().map(|i| colour(engine.roles()[i])).collect(),
         ..Marker::default()

@@ -82,7 +82,7 @@ pub enum RecordError {
     },
     /// A recording that carries no swarm file.
     #[error(
-        "{} does not say which swarm flew\n  help: name the swarm file with --swarm; only flockform's own recordings of a swarm carry it",
+        "{} does not say which swarm flew\n  help: name the swarm file with --swarm; only flockform's own recordings of a swarm carry it (those of a body are for viewers: `flockform run` makes the run again)",
         .0.display()
     )]
     NoSwarm(PathBuf),

@@ -63,6 +63,7 @@ fn new_begins_with_a_file_that_runs_and_never_replaces_one() {
     said(&["plan", "fleet.toml"], folder.path());
     std::fs::write(folder.path().join("mine.toml"), "years of work").expect("writable");
     refused(&["new", "scene", "mine"], folder.path(), &["mine.toml is there already"]);
+    refused(&["new", "scene", "no/mine"], folder.path(), &["no/mine.toml", "mkdir -p no"]);
     assert_eq!(std::fs::read(folder.path().join("mine.toml")).expect("there"), b"years of work");
     refused(&["new", "scene", "nowhere/mine"], folder.path(), &["cannot write nowhere/mine.toml"]);
     refused(&["new", "scene", "a b"], folder.path(), &["`a b` cannot be the name"]);

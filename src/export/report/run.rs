@@ -524,7 +524,7 @@ fn facts(scene: &Scene, outcome: &Outcome, summary: &Summary) -> Vec<(String, St
     if broken.count > 0 {
         let first = broken.first.map_or_else(String::new, |first| {
             let [x, y] = first.place.map(number);
-            format!(", the first in a step at ({x}, {y}) {unit}, step {}", first.step)
+            format!(", the first at ({x}, {y}) {unit} in step {}", first.step)
         });
         fact("Broken bonds", format!("{}{first}", broken.count));
     }
@@ -542,6 +542,6 @@ fn texts(scene: &Scene, summary: &Summary) -> Vec<(String, String)> {
     if let serde_json::Value::Object(table) = &mut value {
         table.remove("scene");
     }
-    texts.push(("Summary".into(), serde_json::to_string_pretty(&value).unwrap_or_default()));
+    texts.push(("summary.json".into(), serde_json::to_string_pretty(&value).unwrap_or_default()));
     texts
 }

@@ -1,5 +1,8 @@
 //! Markers for RViz and Foxglove: members by role, links by strain, targets, obstacles.
 
+use parry2d::math::Vector;
+use parry2d::shape::TriMesh;
+
 use crate::flock::vectors::distance;
 use crate::messages::builtin_interfaces::Duration;
 use crate::messages::geometry_msgs::{Point, Pose, Vector3};
@@ -14,6 +17,10 @@ const LIFETIME: f64 = 2.0;
 const FULL_STRAIN: f64 = 0.3;
 /// Height of what stands on the plane \[m\].
 const HEIGHT: f64 = 0.1;
+/// Width of a link over the radius of the smallest robot \[1\], and its least \[m\]: thinner lines look dotted from afar.
+const LINK: (f64, f64) = (0.4, 0.02);
+/// Corners of an obstacle that is filled; one of more is drawn as its outline, so that no frame waits for its triangles.
+const MOST_CORNERS: usize = 250;
 
 const LEADER: ColorRGBA = colour(0.91, 0.13, 0.11, 1.0);
 const FOLLOWER: ColorRGBA = colour(0.13, 0.38, 0.75, 1.0);
@@ -70,7 +77,7 @@ fn member(control: &Control, m: usize, header: &Header) -> Option<Marker> {
 fn links(control: &Control, header: &Header) -> Marker {
     let formation = control.formation();
     let mut marker = Marker {
-        scale: Vector3 { x: 0.03, y: 0.0, z: 0.0 },
+        scale: Vector3 { x: (LINK.0 * smallest_radius(control)).max(LINK.1), y: 0.0, z: 0.0 },
         color: LOST,
         ..marker(header, "links", 0, Marker::LINE_LIST)
     };
@@ -91,8 +98,12 @@ fn links(control: &Control, header: &Header) -> Marker {
     marker
 }
 
+fn smallest_radius(control: &Control) -> f64 {
+    control.formation().radii.iter().copied().fold(f64::INFINITY, f64::min)
+}
+
 fn targets(control: &Control, header: &Header) -> Marker {
-    let size = control.formation().radii.iter().copied().fold(f64::INFINITY, f64::min);
+    let size = smallest_radius(control);
     Marker {
         scale: Vector3 { x: size, y: size, z: size },
         color: TARGET,
@@ -111,9 +122,33 @@ fn obstacle(obstacle: &RawObstacle, by: [f64; 2], id: usize, header: &Header) ->
             ..marker(header, "obstacles", id, Marker::CYLINDER)
         },
         RawObstacle::Polygon { vertices } => {
-            outline("obstacles", id, &vertices.iter().map(moved).collect::<Vec<_>>(), header)
+            let corners: Vec<_> = vertices.iter().map(moved).collect();
+            match triangles(&corners) {
+                Some(corners) => Marker {
+                    scale: Vector3 { x: 1.0, y: 1.0, z: 1.0 },
+                    color: OBSTACLE,
+                    points: corners.into_iter().map(point).collect(),
+                    ..marker(header, "obstacles", id, Marker::TRIANGLE_LIST)
+                },
+                None => outline("obstacles", id, &corners, header),
+            }
         }
     }
+}
+
+/// Corners of triangles that fill a polygon, three each.
+fn triangles(corners: &[[f64; 2]]) -> Option<Vec<[f64; 2]>> {
+    if corners.len() > MOST_CORNERS {
+        return None;
+    }
+    let mut corners: Vec<Vector> = corners.iter().map(|&[x, y]| Vector::new(x, y)).collect();
+    let pairs = corners.iter().zip(corners.iter().cycle().skip(1));
+    // Clockwise ones have no ears.
+    if pairs.map(|(a, b)| a.x * b.y - a.y * b.x).sum::<f64>() < 0.0 {
+        corners.reverse();
+    }
+    let mesh = TriMesh::from_polygon(corners)?;
+    Some(mesh.triangles().flat_map(|one| one.vertices().map(|corner| [corner.x, corner.y])).collect())
 }
 
 fn outline(ns: &str, id: usize, corners: &[[f64; 2]], header: &Header) -> Marker {
@@ -122,5 +157,26 @@ fn outline(ns: &str, id: usize, corners: &[[f64; 2]], header: &Header) -> Marker
         color: OBSTACLE,
         points: corners.iter().chain(corners.first()).copied().map(point).collect(),
         ..marker(header, ns, id, Marker::LINE_STRIP)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_obstacle_is_filled_whichever_way_round_its_corners_go() {
+        let mut corners = vec![[0.0, 0.0], [3.0, 0.0], [3.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0]];
+        for _ in 0..2 {
+            let filled = triangles(&corners).expect("a simple polygon");
+            let areas = filled.chunks_exact(3).map(|one| {
+                let [[ax, ay], [bx, by], [cx, cy]] = [one[0], one[1], one[2]];
+                ((bx - ax) * (cy - ay) - (by - ay) * (cx - ax)) / 2.0
+            });
+            assert!((areas.sum::<f64>() - 4.0).abs() < 1e-12, "{filled:?}");
+            corners.reverse();
+        }
+        let comb: Vec<_> = (0..MOST_CORNERS + 1).map(|k| [k as f64, (k % 2) as f64]).collect();
+        assert_eq!(triangles(&comb), None);
     }
 }

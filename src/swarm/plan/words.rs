@@ -38,13 +38,11 @@ impl fmt::Display for SwarmPlan {
                     format!("a disturbance halves {halves}; {left} is left after a period"),
                 )?;
                 let delayed = half_life(self.delay.half_life_s);
-                let simulated = self.delay.simulated_s;
-                line(
-                    "delay",
-                    format!(
-                        "slows convergence, never destabilises: with {simulated:.3} s the error halves {delayed}"
-                    ),
-                )?;
+                let with = match self.delay.simulated_s {
+                    0.0 => "none is simulated".into(),
+                    simulated => format!("with {simulated:.3} s the error halves {delayed}"),
+                };
+                line("delay", format!("slows convergence, never destabilises: {with}"))?;
             }
             None => {
                 line("comes to rest", format!("not predicted: {}", self.not_predicted.unwrap_or_default()))?
