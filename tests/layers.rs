@@ -227,6 +227,7 @@ fn threads_share_a_body_in_the_schedule_and_where_a_solver_or_a_report_goes_over
 #[test]
 fn unsafe_code_stands_where_it_was_measured_to_pay_or_where_the_system_is_called() {
     let known = [
+        "cli/interrupt.rs",
         "cli/memory.rs",
         "flock/grid/candidates.rs",
         "flock/lanes.rs",

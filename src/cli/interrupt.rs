@@ -60,6 +60,12 @@ fn left() -> MutexGuard<'static, Left> {
 
 /// Listens for signals, from now until the program ends.
 pub fn watch() {
+    // A file beyond the largest that the shell allows is then an error like a full disk, in words, and not a signal.
+    // SAFETY: no handler is called, and no other thread runs yet.
+    #[cfg(feature = "ros")]
+    unsafe {
+        libc::signal(libc::SIGXFSZ, libc::SIG_IGN);
+    }
     let heard = || {
         let first = FIRST.get_or_init(Instant::now);
         if RAISED.swap(true, Ordering::SeqCst) {

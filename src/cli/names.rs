@@ -167,7 +167,13 @@ impl TypedValueParser for FileName {
         argument: Option<&clap::Arg>,
         value: &OsStr,
     ) -> Result<String, clap::Error> {
-        StringValueParser::new().parse_ref(command, argument, value)
+        let word = StringValueParser::new().parse_ref(command, argument, value)?;
+        if word.contains(char::is_control) {
+            // Messages repeat it, and a file from elsewhere may be named to forge some.
+            let message = format!("{word:?} has control characters in it\n  help: rename the file");
+            return Err(command.clone().error(clap::error::ErrorKind::ValueValidation, message));
+        }
+        Ok(word)
     }
 
     fn possible_values(&self) -> Option<Box<dyn Iterator<Item = PossibleValue> + '_>> {

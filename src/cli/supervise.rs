@@ -31,8 +31,9 @@ const SEND_PERIOD: Duration = Duration::from_millis(100);
 const BEYOND_ITS_WATCHDOG: Duration = Duration::from_millis(800);
 /// How often the child is looked at \[s\].
 const LOOK: Duration = Duration::from_millis(10);
-/// How long a child that was asked to end may take \[s\].
+/// How long a child that was asked to end may take \[s\]: one that has spoken, and one that is still opening.
 const LEAVING: Duration = Duration::from_secs(8);
+const UNOPENED: Duration = Duration::from_millis(700);
 /// How long a child that is not stopped may take until it speaks \[s\].
 const OPENING: Duration = Duration::from_secs(30);
 /// Children in a row that end without a word before we give up \[1\]: for a reason of their own, and as those do whose
@@ -136,7 +137,7 @@ fn follow(
 ) -> std::io::Result<(Option<u8>, Option<Vec<u8>>)> {
     let (mut last, mut heard, mut asked): (Option<Vec<u8>>, Instant, Option<Instant>) =
         (None, Instant::now(), None);
-    let mut before = Instant::now();
+    let (mut before, mut is_ended) = (Instant::now(), false);
     loop {
         for mut line in lines.try_iter() {
             line.push(b'\n');
@@ -160,9 +161,12 @@ fn follow(
         }
         let is_late = || last.is_some() || heard.elapsed() > OPENING || is_stopped(child.id());
         let is_silent = asked.is_none() && heard.elapsed() > silence && is_late();
-        if is_silent || asked.is_some_and(|asked| asked.elapsed() > LEAVING) {
+        // One that has not opened yet has no robots to stop.
+        let leave = if last.is_some() { LEAVING } else { UNOPENED };
+        if !is_ended && (is_silent || asked.is_some_and(|asked| asked.elapsed() > leave)) {
             tracing::error!("the process does not answer and is ended");
             child.kill()?;
+            is_ended = true;
         }
         std::thread::sleep(LOOK);
     }

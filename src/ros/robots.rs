@@ -159,13 +159,13 @@ impl Link {
         let of = |pattern: &str, m: usize| topic(&owners[owner(m)], pattern, &formation.names[m]);
         check_topics(&swarm.raw, formation, &of)?;
         let target = |m: usize| -> Result<_, NodeError> {
-            Ok(nodes[owner(m)].subscription(&of(&raw.target_topic, m)?, Quality::reliable(1))?)
+            Ok(nodes[owner(m)].subscription(&of(&raw.target_topic, m)?, Quality::reliable(1))?.steady())
         };
         let targets = if raw.has_target_array() {
             let topic = of(&raw.target_topic, 0)?;
             // As many as there may be nodes.
             let depth = u16::try_from(formation.count()).unwrap_or(u16::MAX);
-            Targets::Array(Box::new(nodes[0].subscription(&topic, Quality::reliable(depth))?))
+            Targets::Array(Box::new(nodes[0].subscription(&topic, Quality::reliable(depth))?.steady()))
         } else {
             Targets::Stamped((0..formation.count()).map(target).collect::<Result<_, _>>()?)
         };

@@ -2,9 +2,9 @@
 
 use std::fmt;
 use std::net::IpAddr;
-use std::sync::Arc;
 use std::sync::mpsc::channel;
-use std::time::Duration;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 use ros2_client::NodeName;
 use ros2_client::builtin_topics::ros_discovery;
@@ -19,7 +19,6 @@ use super::outbox::{Outbox, Outlet};
 use super::payload::{Payload, Verbatim};
 use super::places::Places;
 use super::pulse::{self, Pulse};
-use super::topic::forget_earlier;
 use super::whole::WholeReplies;
 use super::{EdgeError, Publisher, Quality, Service, Subscription, farewell, names};
 use crate::messages::names::Names;
@@ -74,7 +73,12 @@ pub(super) struct Shared {
     pub is_secured: bool,
     pub graph: Arc<Graph>,
     beside: Option<Beside>,
+    /// When a reader was last replaced.
+    renewed: Mutex<Option<Instant>>,
 }
+
+/// Least time between two readers that take the place of others: each takes its time from the loop \[s\].
+const BETWEEN_RENEWALS: Duration = Duration::from_millis(40);
 
 impl Edge {
     /// Joins a domain, in the clear.
@@ -219,7 +223,18 @@ impl Shared {
             is_secured,
             graph,
             beside,
+            renewed: Mutex::default(),
         })
+    }
+
+    /// Whether another reader may be replaced now, which is then noted.
+    pub fn may_renew(&self) -> bool {
+        let mut renewed = self.renewed.lock().unwrap_or_else(PoisonError::into_inner);
+        let may = renewed.is_none_or(|renewed| renewed.elapsed() > BETWEEN_RENEWALS);
+        if may {
+            *renewed = Some(Instant::now());
+        }
+        may
     }
 
     /// GUID of the participant.
@@ -384,13 +399,7 @@ impl Node {
         quality: Quality,
     ) -> Result<Subscription<M>, EdgeError> {
         names::check("topic", topic)?;
-        let kind = names::dds_message(M::PACKAGE, M::NAME);
-        let reader = self.shared.reader(&names::dds_topic(topic), &kind, quality)?;
-        if !quality.transient_local {
-            forget_earlier(&reader);
-        }
-        self.shared.graph.add_reader(&self.name, reader.guid(), topic);
-        Ok(Subscription::new(topic.to_owned(), reader, self.shared.clone()))
+        Subscription::open(&self.shared, &self.name, topic, quality)
     }
 
     /// A service under a fully qualified name.

@@ -102,8 +102,9 @@ fn listen(domain: u16) -> io::Result<Socket> {
     socket.set_reuse_port(true)?;
     socket.set_nonblocking(true)?;
     socket.bind(&SocketAddrV4::new(Ipv4Addr::UNSPECIFIED, port).into())?;
-    socket.join_multicast_v4(&MULTICAST, &Ipv4Addr::UNSPECIFIED)?;
     // Without a device that carries multicast those of this computer are asked at their usual ports.
-    let _ = socket.join_multicast_v4(&MULTICAST, &Ipv4Addr::LOCALHOST);
+    for device in [Ipv4Addr::UNSPECIFIED, Ipv4Addr::LOCALHOST] {
+        let _ = socket.join_multicast_v4(&MULTICAST, &device);
+    }
     Ok(socket)
 }

@@ -21,6 +21,7 @@ use super::outbox::Outlet;
 use super::participant::{Reader, Shared};
 use super::payload::Payload;
 use super::topic::{Taken, next};
+use super::whole::LARGEST;
 use super::{EdgeError, Quality};
 use crate::messages::wire::{BadPayload, Order, decode, encode};
 use crate::messages::{ServiceType, said};
@@ -115,7 +116,16 @@ impl<S: ServiceType> Service<S> {
         let refused = |reason: String| EdgeError::Send { topic: self.name.clone(), reason };
         let options = WriteOptionsBuilder::new().source_timestamp(Timestamp::now());
         let mut bytes = Vec::new();
+        let mut body = Vec::new();
+        encode(response, &mut body).map_err(refused)?;
         let options = match &id.0 {
+            // In pieces nobody takes it, and a client that was sent such pieces takes no later reply either.
+            Mark::Enhanced(_) if body.len() > LARGEST => {
+                let length = body.len();
+                return Err(refused(format!(
+                    "a reply of {length} bytes is longer than a packet holds: ask for less at once"
+                )));
+            }
             Mark::Enhanced(identity) => options.related_sample_identity(SampleIdentity::from(*identity)),
             Mark::Cyclone(header) => {
                 bytes.extend_from_slice(header);
@@ -123,8 +133,6 @@ impl<S: ServiceType> Service<S> {
             }
         };
         // The header is as long as the widest alignment, twice: what follows is aligned as if it stood alone.
-        let mut body = Vec::new();
-        encode(response, &mut body).map_err(refused)?;
         bytes.append(&mut body);
         let payload = Payload { order: Order::Little, bytes };
         self.shared.outbox.post(&self.outlet, payload, options.build())

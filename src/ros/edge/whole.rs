@@ -21,7 +21,7 @@ use super::places::{Places, is_fast_dds};
 const NEVER_CUT: usize = 1000;
 
 /// Payloads that a packet of UDP holds, with what stands before them \[bytes\].
-const LARGEST: usize = 65_000;
+pub(super) const LARGEST: usize = 65_000;
 
 /// When a sample is sent again \[s\]. Its parts may be lost on the way, and RustDDS repeats only what is not understood.
 const AGAIN: [Duration; 2] = [Duration::from_millis(100), Duration::from_secs(1)];

@@ -82,13 +82,15 @@ impl Link {
         let formation = control.formation();
         let mut leaders = Vec::new();
         for m in formation.moved().filter(|m| part.mine.contains(m)) {
-            leaders.push((m, node.subscription(&topic(&raw.leader_topic, m)?, Quality::BEST_EFFORT)?));
+            leaders
+                .push((m, node.subscription(&topic(&raw.leader_topic, m)?, Quality::BEST_EFFORT)?.steady()));
         }
         let targets = TargetTopics::open(node, raw, formation.count(), &part.mine, topic)?;
         let mut ranges = Vec::new();
         let has_ranges = control.watch().limits().ranges.is_some();
         for &m in part.heard.iter().filter(|_| has_ranges) {
-            ranges.push((m, node.subscription(&topic(&raw.ranges_topic, m)?, Quality::BEST_EFFORT)?));
+            ranges
+                .push((m, node.subscription(&topic(&raw.ranges_topic, m)?, Quality::BEST_EFFORT)?.steady()));
         }
         let poses = PoseSource::open(node, raw, &part.heard, topic)?;
         Ok(Self {

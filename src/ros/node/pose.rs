@@ -30,7 +30,7 @@ impl PoseSource {
             RawPoseType::Odometry => Self::Odometry(each(node, raw, heard, topic)?),
             RawPoseType::PoseArray => {
                 let topic = topic(&raw.pose_topic, 0)?;
-                let topic = node.subscription(&topic, Quality::BEST_EFFORT)?;
+                let topic = node.subscription(&topic, Quality::BEST_EFFORT)?.steady();
                 Self::Array(Box::new(topic), heard.to_vec())
             }
         })
@@ -91,7 +91,7 @@ fn each<M: crate::messages::Message>(
 ) -> Result<Vec<(usize, Subscription<M>)>, NodeError> {
     let open = |&member: &usize| {
         let topic = topic(&raw.pose_topic, member)?;
-        Ok((member, node.subscription(&topic, Quality::BEST_EFFORT)?))
+        Ok((member, node.subscription(&topic, Quality::BEST_EFFORT)?.steady()))
     };
     heard.iter().map(open).collect()
 }

@@ -78,11 +78,15 @@ pub struct SceneError {
 impl SceneError {
     /// Adds a problem; beyond the first twenty they are only counted.
     pub fn push(&mut self, problem: Problem) {
-        if self.problems.len() < KEPT_PROBLEMS {
-            self.problems.push(problem);
-        } else {
-            self.omitted += 1;
+        match self.is_full() {
+            false => self.problems.push(problem),
+            true => self.omitted += 1,
         }
+    }
+
+    /// Whether further problems are only counted.
+    pub(super) fn is_full(&self) -> bool {
+        self.problems.len() >= KEPT_PROBLEMS
     }
 
     /// The problems that were kept.

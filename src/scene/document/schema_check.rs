@@ -133,13 +133,15 @@ impl Checker<'_> {
     fn table(&mut self, node: &Node, entries: &[(String, Node)], rule: &Rule<'_>, key: &str) -> Value {
         let mut values = Map::new();
         let mut meant = Vec::new();
+        let mut free = None;
         for (name, child) in entries {
             let path = child_path(key, name);
             let schema = match (rule.property(name), rule.other_keys()) {
                 (Some(schema), _) | (None, OtherKeys::Follow(schema)) => schema,
                 (None, OtherKeys::Unchecked) => &Value::Bool(true),
                 (None, OtherKeys::Refused) => {
-                    meant.extend(self.unknown_key(child, name, entries, rule, &path));
+                    let free = free.get_or_insert_with(|| free_keys(rule, entries));
+                    meant.extend(self.unknown_key(child, name, free, rule, &path));
                     continue;
                 }
             };
@@ -159,18 +161,22 @@ impl Checker<'_> {
         &mut self,
         node: &Node,
         name: &str,
-        siblings: &[(String, Node)],
+        free: &[&'s str],
         rule: &Rule<'s>,
         path: &str,
     ) -> Option<&'s str> {
+        if self.refused.is_full() {
+            // Only counted: a file of a million keys is refused as soon as any.
+            self.refuse(node, path, "is not a known key", None);
+            return None;
+        }
         if let Some(message) = rule.variants.as_ref().and_then(|variants| other_variant(variants, name)) {
             self.refuse(node, path, message, Some(format!("known keys: {}", listed(&rule.property_names()))));
             return None;
         }
         let known = rule.property_names();
-        let free: Vec<&str> = known.iter().copied().filter(|key| entry(siblings, key).is_none()).collect();
-        let now = renamed(name, &free);
-        let meant = now.or_else(|| nearest(name, &free));
+        let now = renamed(name, free);
+        let meant = now.or_else(|| nearest(name, free));
         let help = match meant {
             Some(key) if now.is_some() => format!("it is called `{key}` now"),
             Some(key) => format!("did you mean `{key}`?"),
@@ -375,6 +381,11 @@ const RENAMED: [(&str, &str); 8] = [
 fn renamed<'a>(word: &str, candidates: &[&'a str]) -> Option<&'a str> {
     let (_, now) = RENAMED.into_iter().find(|(then, _)| *then == word)?;
     candidates.iter().copied().find(|candidate| *candidate == now)
+}
+
+/// The keys that a table could still have.
+fn free_keys<'s>(rule: &Rule<'s>, entries: &[(String, Node)]) -> Vec<&'s str> {
+    rule.property_names().into_iter().filter(|key| entry(entries, key).is_none()).collect()
 }
 
 /// The candidate that `word` most probably misspells or abbreviates, if any is near enough: a mere guess would mislead
