@@ -13,6 +13,7 @@ use flockform::messages::flockform_msgs::SetFormationRequest;
 use flockform::record::About;
 use flockform::ros::arguments::RosArguments;
 use flockform::ros::edge::pulse::MIDDLEWARE_GONE;
+use flockform::ros::edge::pulse::bound_opening;
 use flockform::ros::node::{CommandQueue, FormationNode, KeptNode, NodeCommand, NodeError};
 use flockform::ros::robots::{Layout, RobotNodes};
 use flockform::scene::swarm::Swarm;
@@ -100,6 +101,8 @@ pub fn node(arguments: &NodeArguments, ros: &RosArguments) -> Result<ExitCode, R
     let name = arguments.member.as_deref();
     match life {
         Some(mut life) => {
+            // Of what strangers send, and not of what the file takes to be read.
+            bound_opening();
             let left: Option<Left> = life.left();
             let page = arguments
                 .live
@@ -288,6 +291,7 @@ pub fn robots(arguments: &RobotsArguments, ros: &RosArguments) -> Result<ExitCod
         Some(mut life) => {
             let layout = if arguments.node_per_robot { Layout::NodePerRobot } else { Layout::OneNode };
             interrupt::serves();
+            bound_opening();
             let mut robots = RobotNodes::open(&swarm, ros, layout)?;
             if let Some(level) = log::level() {
                 robots.serve_log_level(level).map_err(NodeError::from)?;

@@ -17,7 +17,7 @@ use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
 use flockform::ros::arguments::Security;
-use flockform::ros::edge::pulse::{MIDDLEWARE_GONE, bound_opening, longest_silence};
+use flockform::ros::edge::pulse::{MIDDLEWARE_GONE, longest_silence};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
@@ -182,7 +182,6 @@ fn is_stopped(process: u32) -> bool {
 impl Life {
     fn take_up(number: u32) -> std::io::Result<Self> {
         use std::os::fd::AsFd;
-        bound_opening();
         let socket = UnixStream::from(std::io::stdin().as_fd().try_clone_to_owned()?);
         Ok(Self { number, socket: Some(socket), unsent: Vec::new(), sent: None })
     }
