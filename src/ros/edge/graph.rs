@@ -14,7 +14,7 @@ use ros2_client::dds::rustdds::{
 use ros2_client::entities_info::{NodeEntitiesInfo, ParticipantEntitiesInfo};
 use ros2_client::{Gid, NodeName};
 
-use super::nudge;
+use super::nudge::Nudges;
 use super::participant::Reader;
 use super::places::Places;
 use super::topic::{Taken, next};
@@ -281,6 +281,7 @@ fn watch(
 ) {
     use ros2_client::dds::rustdds::RTPSEntity;
     let mut look = 0_u32;
+    let mut nudges = Nudges::default();
     while stopped.recv_timeout(LOOK) == Err(RecvTimeoutError::Timeout) {
         look = look.wrapping_add(1);
         if look.is_multiple_of(SWEEP) {
@@ -289,11 +290,12 @@ fn watch(
         if let Some(beside) = beside {
             beside.places.listen();
             beside.replies.repeat();
+            nudges.repeat(&beside.places);
         }
         // As many as RustDDS keeps for us.
         for event in std::iter::from_fn(|| listener.try_recv_status()).take(2048) {
             if let (Some(beside), Some((reader, writer))) = (beside, writer_matched(&event)) {
-                nudge::ask(&beside.places, reader, writer);
+                nudges.ask(&beside.places, reader, writer);
             }
             graph.note(event);
         }

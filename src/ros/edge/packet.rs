@@ -77,10 +77,15 @@ pub fn participant_port(domain: u16, participant: u16) -> Option<u16> {
     discovery_port(domain, Some(participant))?.checked_add(1)
 }
 
-/// An ACKNACK that asks a writer for its first sample, and for no heartbeat (RTPS 2.3, sections 9.4.5.2 and 9.4.5.8). It is the
-/// second of its reader: the middleware counts its own from 0.
-pub fn first_sample_wanted(own: [u8; 12], reader: [u8; 4], to: [u8; 12], writer: [u8; 4]) -> Vec<u8> {
-    const COUNT: u32 = 1;
+/// An ACKNACK that asks a writer for its first sample, and for no heartbeat (RTPS 2.3, sections 9.4.5.2 and 9.4.5.8). A writer
+/// takes one whose count is larger than that of the last: the middleware counts its own from 0.
+pub fn first_sample_wanted(
+    own: [u8; 12],
+    reader: [u8; 4],
+    to: [u8; 12],
+    writer: [u8; 4],
+    count: u32,
+) -> Vec<u8> {
     let mut packet = head(own);
     packet.extend([0x0e, 0x01, 12, 0]);
     packet.extend(to);
@@ -88,7 +93,7 @@ pub fn first_sample_wanted(own: [u8; 12], reader: [u8; 4], to: [u8; 12], writer:
     packet.extend(reader);
     packet.extend(writer);
     // One number from 1 on, and it is wanted.
-    for word in [0, 1, 1, 1 << 31, COUNT] {
+    for word in [0, 1, 1, 1 << 31, count] {
         packet.extend(u32::to_le_bytes(word));
     }
     packet
@@ -237,7 +242,7 @@ mod tests {
 
     #[test]
     fn the_wish_for_a_sample_has_the_length_that_it_says() {
-        let packet = first_sample_wanted([1; 12], [2; 4], [3; 12], [4; 4]);
+        let packet = first_sample_wanted([1; 12], [2; 4], [3; 12], [4; 4], 1);
         assert_eq!((packet.len(), packet[38]), (20 + 16 + 4 + 28, 28));
         assert_eq!(packet[64..], 1_u32.to_le_bytes());
     }
