@@ -294,6 +294,24 @@ mod tests {
     }
 
     #[test]
+    fn a_reply_that_no_packet_holds_is_not_sent_in_pieces_that_silence_a_client() {
+        use crate::messages::std_srvs::{Outcome, Trigger};
+        let domain = 100 + (std::process::id() % 101) as u16;
+        let options = crate::ros::edge::Options { domain, loopback_only: true };
+        let edge = crate::ros::edge::Edge::open(options).expect("sockets");
+        let node = edge.node("/", "replies").expect("a node");
+        let service = node.service::<Trigger>("/replies/at_length").expect("a service");
+        let reply = |mark: Mark, length: usize| {
+            service.reply(&RequestId(mark), &Outcome { success: true, message: "x".repeat(length) })
+        };
+        let enhanced = || Mark::Enhanced(identity(FAST, 3));
+        assert_eq!(reply(enhanced(), 60_000), Ok(()));
+        let refused = reply(enhanced(), 65_000).expect_err("too long").to_string();
+        assert!(refused.contains("/replies/at_length") && refused.contains("ask for less"), "{refused}");
+        assert_eq!(reply(Mark::Cyclone([0; HEADER]), 65_000), Ok(()));
+    }
+
+    #[test]
     fn a_request_that_names_no_reader_is_answered_to_its_writer() {
         let payload = little_endian(vec![0; 32]);
         let (id, _) = read::<u64>(&payload, identity(RUST, 3), None).expect("readable");
