@@ -2,9 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::ServiceType;
 use super::geometry_msgs::{Point, Vector3};
 use super::std_msgs::Header;
+use super::{messages, service};
 
 /// The state of one member, as the formation's node knows it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -119,7 +119,7 @@ pub struct Ranges {
     pub distances: Vec<f64>,
 }
 
-super::messages!("flockform_msgs": MemberState, FormationState, LoopEvent, Ranges);
+messages!("flockform_msgs": MemberState, FormationState, LoopEvent, Ranges);
 
 /// Request of the service `SetFormation`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -145,12 +145,7 @@ pub struct SetFormationResponse {
     pub message: String,
 }
 
-/// `srv/SetFormation`: moves the leaders.
-pub struct SetFormation;
-
-impl ServiceType for SetFormation {
-    const PACKAGE: &str = "flockform_msgs";
-    const NAME: &str = "SetFormation";
-    type Request = SetFormationRequest;
-    type Response = SetFormationResponse;
-}
+service!(
+    /// Moves the leaders.
+    SetFormation, "flockform_msgs", SetFormationRequest => SetFormationResponse
+);
