@@ -9,7 +9,7 @@ use flockform::export::film::{Film, FilmColour, FilmError, FilmFile, FilmFormat,
 
 use super::interrupt;
 use super::output::OutputArguments;
-use super::progress::Drawn;
+use super::progress::Progress;
 
 /// A film of a body.
 #[derive(Debug, Args)]
@@ -84,13 +84,13 @@ impl AskedFilm {
     pub fn make(self, film: &Film<'_>, kept: &Path, quiet: bool) -> Result<Option<Finished>, FilmError> {
         interrupt::removes([self.file.part().to_owned()]);
         interrupt::says(format!("interrupted: there is no film, the results are in {}", kept.display()));
-        let drawn = Drawn::new(quiet, "frame");
+        let progress = Progress::of_drawing(quiet, "frame");
         let show = |done: usize, of: usize| {
-            drawn.show(done, of);
+            progress.drawn(done, of);
             if interrupt::is_raised() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
         let made = film.write(self.file, &show);
-        drawn.finish();
+        progress.finish();
         made
     }
 }

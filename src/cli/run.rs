@@ -20,7 +20,7 @@ use flockform::export::checkpoint::{self, Checkpoint, RunRequest};
 use flockform::export::film;
 use flockform::export::memory::Outputs;
 use flockform::export::report;
-use flockform::export::{Drawing, Results, Timings, write_all};
+use flockform::export::{Drawing, Results, Signed, Timings, write_all};
 use flockform::ranks::Team;
 use flockform::record::About;
 use flockform::record::body::BodyMessages;
@@ -38,7 +38,7 @@ use super::checkpoint::{CheckpointArguments, Checkpointer, ResumedRun, resume_wo
 use super::film::{BodyFilmArguments, words as film_words};
 use super::names::{FileName, SceneArguments, in_full};
 use super::output::{FigureArguments, OutputArguments, ReportArguments, command_line};
-use super::progress::{Drawn, Progress};
+use super::progress::Progress;
 use super::ranks::{self, Interrupted, Start};
 use super::recording::{RecordArguments, close};
 use super::{FAILED, Refusal, interrupt, memory, print, say};
@@ -179,7 +179,7 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
     let about = About { source: "run", name: scene.name.clone(), ..About::default() };
     let recording = arguments.record.open(&about, arguments.output.force, 1)?;
     let messages = recording.as_ref().map(|one| BodyMessages::new(&scene, one.sink())).transpose()?;
-    let progress = Progress::new(arguments.output.quiet, steps_of(&scene));
+    let progress = Progress::of_steps(arguments.output.quiet, steps_of(&scene));
     let interrupted = interrupt::keeps();
     let looks = Looks::new(&plan, shown.is_some() || messages.is_some());
     let checkpointer = Checkpointer::new(&arguments.checkpoints, (asked, &scene, digest), left.as_ref());
@@ -232,10 +232,10 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
     let timings = Timings { setup, steps: elapsed.saturating_sub(on_the_way), output: writing };
     let (snapshots, probes, load_steps) = (&snapshots[..], &probes[..], &load_steps[..]);
     let results = Results { scene: &scene, outcome: &outcome, snapshots, probes, load_steps, timings };
-    let drawn = Drawn::new(arguments.output.quiet, "figure");
+    let progress = Progress::of_drawing(arguments.output.quiet, "figure");
     let is_cut_short = AtomicBool::new(false);
     let show = |done: usize, of: usize| {
-        drawn.show(done, of);
+        progress.drawn(done, of);
         if interrupt::is_raised() {
             is_cut_short.store(done < of, Ordering::Relaxed);
             return ControlFlow::Break(());
@@ -244,7 +244,7 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
     };
     let drawing = Drawing { formats: arguments.figures.formats(), progress: &show };
     let (_, summary) = write_all(&folder, &results, drawing)?;
-    drawn.finish();
+    progress.finish();
     if let Some(stage) = stage {
         report::run::write(&folder, &results, &summary, stage)?;
     }
@@ -261,7 +261,7 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
         film.make(&drawn, &kept, arguments.output.quiet)
     })?;
     if arguments.json {
-        print(&format!("{:#}\n", serde_json::json!(summary)))?;
+        print(&format!("{:#}\n", serde_json::json!(Signed::new(&summary))))?;
     } else if !arguments.output.quiet {
         say(&words)?;
         say(&(closing_words(&scene, &outcome, &summary, elapsed) + &where_to_look(&kept) + &recorded))?;
@@ -315,10 +315,5 @@ const QUICKLY_WRITTEN: usize = 50_000;
 const WORTH_KEEPING: Duration = Duration::from_secs(5);
 
 pub fn exit_code(outcome: &Outcome) -> ExitCode {
-    match outcome.reason {
-        StopReason::Equilibrium | StopReason::Steps => ExitCode::SUCCESS,
-        StopReason::Unsettled | StopReason::Stuck(_) | StopReason::Interrupted | StopReason::Diverged(_) => {
-            ExitCode::from(FAILED)
-        }
-    }
+    if outcome.reason.is_good() { ExitCode::SUCCESS } else { ExitCode::from(FAILED) }
 }
