@@ -35,13 +35,13 @@ use recorder::{Recorder, Records};
 use words::{closing_words, where_to_look};
 
 use super::checkpoint::{CheckpointArguments, Checkpointer, ResumedRun, resume_words};
-use super::film::{BodyFilmArguments, words as film_words};
+use super::film::{BodyFilmArguments, Finish};
 use super::names::{FileName, SceneArguments, in_full};
 use super::output::{FigureArguments, OutputArguments, ReportArguments, command_line};
 use super::progress::Progress;
 use super::ranks::{self, Interrupted, Start};
 use super::recording::{RecordArguments, close};
-use super::{FAILED, Refusal, interrupt, memory, print, say};
+use super::{FAILED, Refusal, interrupt, memory};
 
 #[derive(Debug, Args)]
 pub struct RunArguments {
@@ -242,7 +242,7 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
         }
         ControlFlow::Continue(())
     };
-    let drawing = Drawing { formats: arguments.figures.formats(), progress: &show };
+    let drawing = Drawing { formats: arguments.figures.figures, progress: &show };
     let (_, summary) = write_all(&folder, &results, drawing)?;
     progress.finish();
     if let Some(stage) = stage {
@@ -254,36 +254,25 @@ fn run_here(arguments: &RunArguments, team: Option<&Team>) -> Result<ExitCode, R
     if !is_interrupted {
         checkpoint::remove(&kept);
     }
-    let film = film.filter(|_| !is_interrupted).zip(animation);
-    let is_asked = film.is_some();
-    let made = film.map_or(Ok(None), |(film, animation)| {
-        let drawn = film::run::film(&scene, &outcome, &animation, film.colour);
-        film.make(&drawn, &kept, arguments.output.quiet)
-    })?;
-    if arguments.json {
-        print(&format!("{:#}\n", serde_json::json!(Signed::new(&summary))))?;
-    } else if !arguments.output.quiet {
-        say(&words)?;
-        say(&(closing_words(&scene, &outcome, &summary, elapsed) + &where_to_look(&kept) + &recorded))?;
-        say(&made.as_ref().map_or_else(String::new, film_words))?;
-    }
-    if is_asked && made.is_none() {
-        eprintln!("interrupted: there is no film, the rest is written");
-        return Ok(ExitCode::from(FAILED));
-    }
-    if is_cut_short.into_inner() && !is_interrupted {
-        eprintln!("interrupted: figures are missing, the rest is written");
-        return Ok(ExitCode::from(FAILED));
-    }
-    if !is_interrupted {
-        arguments.report.show(&kept);
-    }
-    Ok(exit_code(&outcome))
+    let drawn = film.as_ref().filter(|_| !is_interrupted).zip(animation.as_ref());
+    let drawn = drawn.map(|(film, animation)| film::run::film(&scene, &outcome, animation, film.colour));
+    let finish = Finish {
+        kept: &kept,
+        output: &arguments.output,
+        report: &arguments.report,
+        is_json: arguments.json,
+        is_interrupted,
+        is_cut_short: is_cut_short.into_inner() && !is_interrupted,
+    };
+    let closing =
+        || words + &closing_words(&scene, &outcome, &summary, elapsed) + &where_to_look(&kept) + &recorded;
+    let is_whole = finish.done(film, drawn, || serde_json::json!(Signed::new(&summary)), closing)?;
+    Ok(if is_whole { exit_code(&outcome) } else { ExitCode::from(FAILED) })
 }
 
 impl RunArguments {
     fn outputs(&self) -> Outputs {
-        Outputs { figures: self.figures.formats(), report: !self.report.no_report }
+        Outputs { figures: self.figures.figures, report: !self.report.no_report }
     }
 
     /// The requested run, independent of the working folder.
