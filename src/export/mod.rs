@@ -242,7 +242,7 @@ fn figures_of<'a>(results: &'a Results<'_>, subject: &'a Subject<'_>, units: &'a
     }
     if let Some(solved) = &outcome.solved {
         let title = &scene.raw.title;
-        let draw = move || figures::chart::residuals(title, solved.solver.name(), &solved.residuals);
+        let draw = move || figures::chart::draw_residuals(title, solved.solver.name(), &solved.residuals);
         figures.push(("residuals".into(), Box::new(draw)));
     }
     if let Some(chart) = load::chart(scene, units, load_steps) {

@@ -8,7 +8,6 @@ use super::super::{OutputFolder, flight};
 use super::encoded;
 use super::frames::{Channel, Frame, Frames};
 use super::page::{Page, Table, number, scene_text};
-use super::plot::Plot;
 use super::view::{Animation, Clock, Outline, Quantity, View};
 use crate::flock::role::Role;
 use crate::flock::vectors::{Vectors, distance};
@@ -224,13 +223,14 @@ pub fn write(
     report: &FlightReport,
     stage: View,
 ) -> Result<PathBuf, ExportError> {
-    let mut plots: Vec<Plot> =
-        flight::charts(record, report).iter().map(|chart| Plot::of(chart, true)).collect();
-    // As a figure the chart bears the flight's title; the page has that already.
-    plots
-        .iter_mut()
-        .filter(|plot| plot.title == report.title)
-        .for_each(|plot| plot.title = plot.y.quantity.clone());
+    let mut plots = flight::charts(record, report);
+    for plot in &mut plots {
+        plot.follows_clock = true;
+        // As a figure the chart bears the flight's title; the page has that already.
+        if plot.title == report.title {
+            plot.title.clone_from(&plot.y.quantity);
+        }
+    }
     let broken = report.bounds.iter().filter(|verdict| !verdict.holds).count();
     let verdict = match (report.bounds.len(), broken) {
         (0, _) => None,
