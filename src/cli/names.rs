@@ -7,7 +7,7 @@ use clap::builder::{PossibleValue, StringValueParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use flockform::continuum::memory::at_least;
 use flockform::scene::bundled::bundled_swarm;
-use flockform::scene::text::{is_path, nearest};
+use flockform::scene::text::{is_path, nearest, renamed};
 use flockform::scene::{self, Bundled, Scene, SceneError, bundled};
 
 use super::{Refusal, memory};
@@ -119,7 +119,7 @@ pub fn folder_of(word: &str) -> Option<PathBuf> {
 pub fn not_bundled(kinds: &[Kind], word: &str) -> Refusal {
     let named = |kind: Kind| kind.bundled().iter().map(|one| one.name).collect::<Vec<_>>();
     let all: Vec<&str> = kinds.iter().flat_map(|&kind| named(kind)).collect();
-    let nearest = nearest(word, &all);
+    let nearest = renamed(word, &all).or_else(|| nearest(word, &all));
     let kind = |name: &str| kinds.iter().find(|kind| named(**kind).contains(&name));
     let nearest = nearest.and_then(|name| Some((kind(name)?.name(), name)));
     Refusal::NotBundled { kinds: Kinds(kinds.to_vec()), name: word.to_owned(), nearest }

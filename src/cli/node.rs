@@ -12,7 +12,7 @@ use flockform::messages::flockform_msgs::SetFormationRequest;
 use flockform::record::About;
 use flockform::ros::arguments::RosArguments;
 use flockform::ros::edge::pulse::MIDDLEWARE_GONE;
-use flockform::ros::node::{CommandQueue, FormationNode, KeptNode, NodeCommand, NodeError};
+use flockform::ros::node::{CommandQueue, FormationNode, NodeCommand, NodeError, NodeSnapshot};
 use flockform::ros::robots::{Layout, RobotNodes};
 use flockform::scene::swarm::Swarm;
 use flockform::shm::{self, Domain, ShmError, SimulatedRobots};
@@ -173,7 +173,7 @@ fn refused(swarm: &Swarm, error: impl Into<Refusal>) -> Refusal {
 /// State that a node's process leaves to the next.
 #[derive(Deserialize, Serialize)]
 struct Left {
-    node: KeptNode,
+    node: NodeSnapshot,
     /// Port and token of the page.
     page: Option<(u16, String)>,
 }

@@ -16,7 +16,7 @@ use flockform::record::{About, Shared};
 use flockform::scene::bundled::bundled_swarm;
 use flockform::scene::swarm::Swarm;
 use flockform::swarm::control::Control;
-use flockform::swarm::flight::{Flight, FlightReport, Record, Sample, fly_heard};
+use flockform::swarm::flight::{Flight, FlightReport, Record, Sample, fly_with_observer};
 use flockform::swarm::plan::cautions;
 
 use super::film::{Finish, SwarmFilmArguments};
@@ -147,7 +147,7 @@ pub fn fly_recorded(
             messages.receive(received);
         }
     };
-    Ok(fly_heard(swarm, &mut hear, &mut |flight, sample| {
+    Ok(fly_with_observer(swarm, &mut hear, &mut |flight, sample| {
         if let Some(messages) = &mut *messages.borrow_mut() {
             // When the period began that has just been flown.
             messages.tick(flight.control(), (flight.fleet().period() - 1) as f64 * swarm.raw.control.period);

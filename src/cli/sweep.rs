@@ -9,7 +9,7 @@ use std::time::Instant;
 
 use clap::Args;
 use flockform::export::sweep::{
-    Begun, Found, Journal, Output, Row, SweepError, SweepRequest, Table, read, write_sweep,
+    Journal, JournalHeader, Output, Row, StoredSweep, SweepError, SweepRequest, Table, read, write_sweep,
 };
 use flockform::export::{ExportError, OutputFolder, unfinished};
 use flockform::scene::Scene;
@@ -107,7 +107,7 @@ impl SweepArguments {
 
 /// A sweep of a scene, laid out.
 struct Sweep {
-    begun: Begun,
+    begun: JournalHeader,
     /// Without the variations.
     scene: Scene,
     design: Design,
@@ -124,7 +124,7 @@ impl Sweep {
         let design = request.design()?;
         let rows = rows.into_iter().map(|row| (row.run, row)).collect();
         let plan_digest = runs::first_digest(&scene_arguments(&request), &design);
-        Ok(Self { begun: Begun::new(request, &scene, plan_digest), scene, design, rows })
+        Ok(Self { begun: JournalHeader::new(request, &scene, plan_digest), scene, design, rows })
     }
 
     fn request(&self) -> &SweepRequest {
@@ -261,7 +261,7 @@ fn sweep_here(arguments: &SweepArguments) -> Result<ExitCode, Refusal> {
 /// The folder of a new sweep, or of one that is gone on with, and its journal.
 fn open(
     arguments: &SweepArguments,
-    found: Option<&Found>,
+    found: Option<&StoredSweep>,
     sweep: &Sweep,
 ) -> Result<(OutputFolder, Journal), ExportError> {
     match found {
@@ -291,7 +291,7 @@ fn open(
 
 /// Puts the runs of several folders into one; what is missing can be made with `--resume`.
 fn merge(arguments: &SweepArguments, start: Instant) -> Result<ExitCode, Refusal> {
-    let parts: Vec<Found> = arguments.merge.iter().map(|dir| read(dir)).collect::<Result<_, _>>()?;
+    let parts: Vec<StoredSweep> = arguments.merge.iter().map(|dir| read(dir)).collect::<Result<_, _>>()?;
     let Some((one, others)) = parts.split_first() else { return Ok(ExitCode::SUCCESS) };
     let whole = one.begun.whole();
     if let Some(other) = others.iter().find(|other| other.begun.whole() != whole) {

@@ -19,8 +19,9 @@
 //! A page for people to look at is written beside them ([`report`]), and a gallery of such pages; a film ([`film`]) stands
 //! where it is asked for.
 //!
-//! A flight (`flight`, feature `swarm`), a comparison with the truth (`comparison`, feature `fem`) have folders of their own, and so has a study of
-//! what grows (`stability`) and a parameter sweep ([`sweep`]).
+//! A flight (`flight`, feature `swarm`), a comparison with the truth and a study of what accuracy costs (`comparison` and
+//! `trade`, feature `fem`), a study of what grows (`stability`), a parameter sweep ([`sweep`]) and benchmarks (`transport`
+//! and `scale`, feature `bench`) have folders of their own.
 //!
 //! Frames are written while the run goes on, since a long run cannot keep them ([`VtkSeries`]); the
 //! rest comes at the end, by [`write_all`]:

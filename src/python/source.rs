@@ -11,7 +11,7 @@ use super::run::interrupt_by;
 use crate::scene::bundled::{SCENES, SWARMS, bundled_swarm};
 use crate::scene::document::MAX_DEPTH;
 use crate::scene::swarm::Swarm;
-use crate::scene::text::{is_path, nearest};
+use crate::scene::text::{is_path, nearest, renamed};
 use crate::scene::{Bundled, Place, Problem, Scene, SceneError, bundled};
 use crate::study::trade::{Chosen, choose};
 
@@ -105,7 +105,7 @@ impl Source {
 
 fn not_bundled(kind: &str, all: &[Bundled], word: &str) -> PyErr {
     let names: Vec<&str> = all.iter().map(|one| one.name).collect();
-    let nearest = nearest(word, &names);
+    let nearest = renamed(word, &names).or_else(|| nearest(word, &names));
     let nearest = nearest.map_or_else(String::new, |name| format!("; the nearest name is `{name}`"));
     let list = kind.to_uppercase() + "S";
     let (message, help) = match kind {

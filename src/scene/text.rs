@@ -33,6 +33,26 @@ pub fn is_path(word: &str) -> bool {
     Path::new(word).exists() || word.contains(['/', '\\', '.'])
 }
 
+/// Keys, choices and bundled files that had another name once, with the one they have now.
+const RENAMED: [(&str, &str); 10] = [
+    ("growth", "divergence_ratio"),
+    ("kept", "balanced"),
+    ("liar", "faulty-robot"),
+    ("liars", "max_faulty_neighbours"),
+    ("max_liars", "max_faulty"),
+    ("present", "dynamic"),
+    ("pull", "axis"),
+    ("ring", "chebyshev"),
+    ("straight", "collinear"),
+    ("truth", "reference"),
+];
+
+/// The candidate that was called `word` once.
+pub fn renamed<'a>(word: &str, candidates: &[&'a str]) -> Option<&'a str> {
+    let (_, now) = RENAMED.into_iter().find(|(then, _)| *then == word)?;
+    candidates.iter().copied().find(|candidate| *candidate == now)
+}
+
 /// The candidate that `word` most probably misspells or abbreviates, if any is near enough: a mere guess would mislead
 /// more than none.
 pub fn nearest<'a>(word: &str, candidates: &[&'a str]) -> Option<&'a str> {

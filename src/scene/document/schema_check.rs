@@ -8,7 +8,7 @@ use serde_json::{Map, Number, Value};
 use crate::scene::document::problem::{Problem, SceneError};
 use crate::scene::document::schema_rule::{OtherKeys, Rule, Variants, any_of, listed, one_of};
 use crate::scene::document::{Content, Document, Node, child_path, entry};
-use crate::scene::text::nearest;
+use crate::scene::text::{nearest, renamed};
 
 /// Branches of an untagged enum are tried out only this many enums deep, since the tries multiply.
 const NESTED_TRIALS: usize = 2;
@@ -355,24 +355,6 @@ fn kind(content: &Content) -> &'static str {
         Content::Table(_) => "a table",
         Content::Unusable { .. } => "this",
     }
-}
-
-/// Keys and choices that had another name once, with the one they have now.
-const RENAMED: [(&str, &str); 8] = [
-    ("growth", "divergence_ratio"),
-    ("kept", "balanced"),
-    ("liars", "max_faulty_neighbours"),
-    ("present", "dynamic"),
-    ("pull", "axis"),
-    ("ring", "chebyshev"),
-    ("straight", "collinear"),
-    ("truth", "reference"),
-];
-
-/// The candidate that was called `word` once.
-fn renamed<'a>(word: &str, candidates: &[&'a str]) -> Option<&'a str> {
-    let (_, now) = RENAMED.into_iter().find(|(then, _)| *then == word)?;
-    candidates.iter().copied().find(|candidate| *candidate == now)
 }
 
 #[cfg(test)]

@@ -9,7 +9,7 @@ pub mod state;
 
 use serde::{Deserialize, Serialize};
 
-use super::formation::{Formation, KeptLead, Measures, Seen};
+use super::formation::{Formation, LeadSnapshot, Measures, Seen};
 use super::resilience::trim;
 use super::robots::DoubleIntegrator;
 use super::safety::{self, Filter, Flags, Limits, SafetyError};
@@ -45,13 +45,13 @@ impl Mode {
 
 /// The part of a loop's state that outlasts its process.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
-pub struct KeptControl {
+pub struct ControlSnapshot {
     is_stopped: bool,
     /// \[s\]
     program_time: f64,
     /// Periods that the programs have run.
     periods: u64,
-    leads: Vec<Option<KeptLead>>,
+    leads: Vec<Option<LeadSnapshot>>,
 }
 
 /// The filter's input where there are tracks.
@@ -301,8 +301,8 @@ impl Control {
     }
 
     /// The part of the state that outlasts the process, for [`Control::restore`].
-    pub fn kept(&self) -> KeptControl {
-        KeptControl {
+    pub fn kept(&self) -> ControlSnapshot {
+        ControlSnapshot {
             is_stopped: self.mode == Mode::EmergencyStopped,
             program_time: self.program_time(),
             periods: self.periods,
@@ -312,7 +312,7 @@ impl Control {
 
     /// Continues from the state of an earlier loop of the same swarm; an emergency stop holds every member at its
     /// next accepted pose.
-    pub fn restore(&mut self, kept: KeptControl) {
+    pub fn restore(&mut self, kept: ControlSnapshot) {
         (self.run_before, self.run, self.periods) = (kept.program_time, 0, kept.periods);
         self.formation.restore(kept.leads, kept.periods);
         if kept.is_stopped {
