@@ -10,6 +10,7 @@ use std::time::Instant;
 use clap::Args;
 use flockform::export::film;
 use flockform::export::flight::{write_flight, write_flight_tables};
+use flockform::export::report::page::number;
 use flockform::export::report::{self, FlightRecorder};
 use flockform::record::flight::FlightMessages;
 use flockform::record::{About, Shared};
@@ -167,33 +168,10 @@ fn words(report: &FlightReport, seconds: f64, kept: &Path) -> String {
         report.seconds,
         report.seconds / seconds.max(1e-9)
     );
-    let mut line = |name: &str, value: String| words += &format!("  {name:<18} {value}\n");
-    if let Some([largest, last]) = report.affine_error {
-        line("affine error", format!("largest {largest:.3e} m, at the end {last:.3e} m"));
-    }
-    if let Some([largest, last]) = report.formation_error {
-        line("formation error", format!("largest {largest:.3e} m, at the end {last:.3e} m"));
-    }
-    if let Some(error) = report.continuum_error {
-        line("from the continuum", format!("largest {error:.3e} m"));
-    }
-    line(
-        "settling time",
-        match report.settling_time {
-            Some(time) => format!("{time:.2} s (within {} m)", report.settled_within),
-            None => format!("never within {} m", report.settled_within),
-        },
-    );
-    if let Some(clearance) = report.clearance {
-        let closest = report.closest.as_ref().map_or(String::new(), |moment| format!(": {moment}"));
-        line("clearance", format!("smallest {clearance:.4} m{closest}"));
-    }
-    line("way", format!("mean {:.2} m, longest {:.2} m", report.way[0], report.way[1]));
+    let mut line = |name: &str, value: String| words += &format!("  {name:<33}  {value}\n");
+    report.facts(number).into_iter().for_each(|(name, value)| line(name, value));
     line("PE1", format!("largest {:.4e} m^2, at the end {:.4e} m^2", report.pe1[0], report.pe1[1]));
-    line("strain", format!("largest {:.4e}, at the end {:.4e}", report.strain[0], report.strain[1]));
-    if report.most_lost > 0 {
-        line("robots lost", format!("{} at one time", report.most_lost));
-    }
+    line("Strain", format!("largest {:.4e}, at the end {:.4e}", report.strain[0], report.strain[1]));
     for verdict in &report.bounds {
         let found = verdict.found.map_or("not measured".into(), |found| format!("{found:.4e}"));
         let worst = verdict.worst.as_ref().filter(|_| !verdict.holds);

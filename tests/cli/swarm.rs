@@ -19,7 +19,7 @@ fn a_swarm_is_flown_and_leaves_tables_and_figures() {
     let out = folder.path().join("out");
     let output = flockform(&["swarm", "bridge", "--out", "out"], folder.path());
     assert!(output.status.success(), "{}", text(&output.stderr));
-    assert!(text(&output.stdout).contains("from the continuum"), "{}", text(&output.stdout));
+    assert!(text(&output.stdout).contains("From the continuum run"), "{}", text(&output.stdout));
     for file in
         ["flight.json", "samples.csv", "robots.csv", "tracks.csv", "flight.png", "flight.svg", "errors.png"]
     {

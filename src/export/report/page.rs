@@ -225,7 +225,7 @@ fn table_html(table: &Table) -> String {
 }
 
 /// Up to six digits, without zeros at the end; small and large ones with a power of ten.
-pub(super) fn number(value: f64) -> String {
+pub fn number(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
         return if value.is_finite() { "0".into() } else { value.to_string() };
     }
