@@ -4,7 +4,7 @@
 //! computed from its neighbours' positions. That function, neighbours in and target position out,
 //! is the flocking rule, and it is written once, in [`flock`].
 //!
-//! The manual is in [`guide`]: scenes, materials, accuracy, fracture, swarms, ROS 2, performance, theory.
+//! The manual is in [`guide`], which lists its parts.
 //!
 //! The rooms, in the direction data flows:
 //!

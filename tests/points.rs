@@ -1,7 +1,6 @@
 //! A body given as points: the same whatever order they come in, and a lattice's where they are one.
 
 use std::collections::BTreeMap;
-use std::fmt::Write;
 use std::ops::ControlFlow;
 use std::path::Path;
 
@@ -10,6 +9,11 @@ use flockform::continuum::plan::Plan;
 use flockform::continuum::run::{Outcome, run};
 use flockform::scene::{Scene, SceneError};
 use flockform::sweep::Sweep;
+
+use cloud::{shuffled, table};
+
+#[path = "common/cloud.rs"]
+mod cloud;
 
 /// An id and a place.
 type Row = (u32, [f64; 2]);
@@ -27,23 +31,6 @@ fn patch() -> Vec<Row> {
             (7 * i as u32 + 1001, place)
         })
         .collect()
-}
-
-/// The same jumble each time.
-fn shuffled<T: Clone>(values: &[T], mut seed: u64) -> Vec<T> {
-    let mut values = values.to_vec();
-    for i in (1..values.len()).rev() {
-        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        values.swap(i, (seed >> 33) as usize % (i + 1));
-    }
-    values
-}
-
-fn table(rows: &[Row]) -> String {
-    rows.iter().fold("id,x,y\n".to_owned(), |mut text, (id, [x, y])| {
-        writeln!(text, "{id},{x:?},{y:?}").expect("a text");
-        text
-    })
 }
 
 /// Torn until bonds break; the leaders by table, by side and by id.

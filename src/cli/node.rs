@@ -8,13 +8,12 @@ use clap::{Args, ValueEnum};
 use flockform::live::command::Command;
 use flockform::live::monitor::{CommandLink, Feed, Monitor};
 use flockform::live::server::Server;
-use flockform::live::session::Session;
 use flockform::messages::flockform_msgs::SetFormationRequest;
 use flockform::record::About;
 use flockform::ros::arguments::RosArguments;
 use flockform::ros::edge::pulse::MIDDLEWARE_GONE;
 use flockform::ros::edge::pulse::bound_opening;
-use flockform::ros::node::{CommandQueue, FormationNode, KeptNode, NodeCommand, NodeError};
+use flockform::ros::node::{CommandQueue, FormationNode, NodeCommand, NodeError, NodeSnapshot};
 use flockform::ros::robots::{Layout, RobotNodes};
 use flockform::scene::swarm::Swarm;
 use flockform::shm::{self, Domain, ShmError, SimulatedRobots};
@@ -177,7 +176,7 @@ fn refused(swarm: &Swarm, error: impl Into<Refusal>) -> Refusal {
 /// State that a node's process leaves to the next.
 #[derive(Deserialize, Serialize)]
 struct Left {
-    node: KeptNode,
+    node: NodeSnapshot,
     /// Port and token of the page.
     page: Option<(u16, String)>,
 }
@@ -239,7 +238,7 @@ impl LivePage {
             CommandLink { send: Box::new(send), answers: answered }
         });
         let (monitor, feed) = Monitor::new(swarm.clone(), link)?;
-        let (session, place) = (Session::Monitor(Box::new(monitor)), server.place());
+        let (session, place) = (Box::new(monitor), server.place());
         let command = command_line(std::env::args().skip(1));
         let serve = move || {
             if let Err(error) = server.serve(session, command, PathBuf::new(), interrupt::serves()) {

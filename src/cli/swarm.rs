@@ -10,20 +10,21 @@ use std::time::Instant;
 use clap::Args;
 use flockform::export::film;
 use flockform::export::flight::{write_flight, write_flight_tables};
+use flockform::export::report::page::number;
 use flockform::export::report::{self, FlightRecorder};
 use flockform::record::flight::FlightMessages;
 use flockform::record::{About, Shared};
 use flockform::scene::bundled::bundled_swarm;
 use flockform::scene::swarm::Swarm;
 use flockform::swarm::control::Control;
-use flockform::swarm::flight::{Flight, FlightReport, Record, Sample, fly_heard};
+use flockform::swarm::flight::{Flight, FlightReport, Record, Sample, fly_with_observer};
 use flockform::swarm::plan::cautions;
 
-use super::film::{SwarmFilmArguments, words as film_words};
+use super::film::{Finish, SwarmFilmArguments};
 use super::names::{FileName, Kind, folder_of};
 use super::output::{OutputArguments, ReportArguments};
 use super::recording::{RecordArguments, close};
-use super::{FAILED, Refusal, interrupt, on_terminal, print, say};
+use super::{FAILED, Refusal, interrupt, on_terminal};
 
 /// A swarm and the changes to it.
 #[derive(Debug, Args)]
@@ -116,31 +117,21 @@ pub fn swarm(arguments: &SwarmArguments) -> Result<ExitCode, Refusal> {
     let kept = interrupt::commit(folder)?;
     let recorded = close(recording)?;
     drop(saving);
-    let broken_off = interrupted.load(Ordering::Relaxed);
-    let is_asked = film.is_some();
-    let film = film.filter(|_| !broken_off).zip(recorder);
-    let made = film.map_or(Ok(None), |(film, recorder)| {
-        let drawn = film::flight::film(&swarm, &record, &report, &recorder, film.colour);
-        film.make(&drawn, &kept, arguments.output.quiet)
-    })?;
-    if arguments.json {
-        print(&format!("{:#}\n", serde_json::json!(report)))?;
-    } else if !arguments.output.quiet {
-        say(&(words(&report, seconds, &kept) + &recorded))?;
-        say(&made.as_ref().map_or_else(String::new, film_words))?;
-    }
-    let broken_off = broken_off || is_asked && made.is_none();
-    let missing = match (is_drawn, is_asked && made.is_none()) {
-        (true, false) => None,
-        (true, true) => Some("there is no film"),
-        (false, false) => Some("there are no figures"),
-        (false, true) => Some("there are neither figures nor a film"),
+    let is_interrupted = interrupted.load(Ordering::Relaxed);
+    let drawn = film.as_ref().filter(|_| !is_interrupted).zip(recorder.as_ref());
+    let drawn =
+        drawn.map(|(film, recorder)| film::flight::film(&swarm, &record, &report, recorder, film.colour));
+    let finish = Finish {
+        kept: &kept,
+        output: &arguments.output,
+        report: &arguments.report,
+        is_json: arguments.json,
+        is_interrupted,
+        is_cut_short: !is_drawn,
     };
-    missing.iter().for_each(|missing| eprintln!("interrupted: {missing}, the rest is written"));
-    if !broken_off {
-        arguments.report.show(&kept);
-    }
-    Ok(if report.holds() && !broken_off { ExitCode::SUCCESS } else { ExitCode::from(FAILED) })
+    let closing = || words(&report, seconds, &kept) + &recorded;
+    let is_whole = finish.done(film, drawn, || serde_json::json!(report), closing)?;
+    Ok(if report.holds() && is_whole { ExitCode::SUCCESS } else { ExitCode::from(FAILED) })
 }
 
 /// Flies a swarm that this control is of, and records the messages of its loop.
@@ -157,7 +148,7 @@ pub fn fly_recorded(
             messages.receive(received);
         }
     };
-    Ok(fly_heard(swarm, &mut hear, &mut |flight, sample| {
+    Ok(fly_with_observer(swarm, &mut hear, &mut |flight, sample| {
         if let Some(messages) = &mut *messages.borrow_mut() {
             // When the period began that has just been flown.
             messages.tick(flight.control(), (flight.fleet().period() - 1) as f64 * swarm.raw.control.period);
@@ -177,33 +168,10 @@ fn words(report: &FlightReport, seconds: f64, kept: &Path) -> String {
         report.seconds,
         report.seconds / seconds.max(1e-9)
     );
-    let mut line = |name: &str, value: String| words += &format!("  {name:<18} {value}\n");
-    if let Some([largest, last]) = report.affine_error {
-        line("affine error", format!("largest {largest:.3e} m, at the end {last:.3e} m"));
-    }
-    if let Some([largest, last]) = report.formation_error {
-        line("formation error", format!("largest {largest:.3e} m, at the end {last:.3e} m"));
-    }
-    if let Some(error) = report.continuum_error {
-        line("from the continuum", format!("largest {error:.3e} m"));
-    }
-    line(
-        "settling time",
-        match report.settling_time {
-            Some(time) => format!("{time:.2} s (within {} m)", report.settled_within),
-            None => format!("never within {} m", report.settled_within),
-        },
-    );
-    if let Some(clearance) = report.clearance {
-        let closest = report.closest.as_ref().map_or(String::new(), |moment| format!(": {moment}"));
-        line("clearance", format!("smallest {clearance:.4} m{closest}"));
-    }
-    line("way", format!("mean {:.2} m, longest {:.2} m", report.way[0], report.way[1]));
+    let mut line = |name: &str, value: String| words += &format!("  {name:<33}  {value}\n");
+    report.facts(number).into_iter().for_each(|(name, value)| line(name, value));
     line("PE1", format!("largest {:.4e} m^2, at the end {:.4e} m^2", report.pe1[0], report.pe1[1]));
-    line("strain", format!("largest {:.4e}, at the end {:.4e}", report.strain[0], report.strain[1]));
-    if report.most_lost > 0 {
-        line("robots lost", format!("{} at one time", report.most_lost));
-    }
+    line("Strain", format!("largest {:.4e}, at the end {:.4e}", report.strain[0], report.strain[1]));
     for verdict in &report.bounds {
         let found = verdict.found.map_or("not measured".into(), |found| format!("{found:.4e}"));
         let worst = verdict.worst.as_ref().filter(|_| !verdict.holds);

@@ -7,9 +7,9 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use flockform::export::sweep::{
-    Begun, Found, Journal, Output, Row, SweepError, SweepRequest, Table, read, write_sweep,
+    Journal, JournalHeader, Output, Row, StoredSweep, SweepError, SweepRequest, Table, read, write_sweep,
 };
 use flockform::export::{ExportError, OutputFolder, unfinished};
 use flockform::scene::Scene;
@@ -42,7 +42,7 @@ pub struct SweepArguments {
     samples: Option<u32>,
     /// How samples are drawn
     #[arg(long, value_enum, default_value_t, requires = "samples")]
-    sampling: Sampled,
+    sampling: Sampling,
     /// Seed of the samples: the same seed draws the same runs
     #[arg(long, value_name = "S", default_value_t, requires = "samples")]
     seed: u64,
@@ -74,16 +74,6 @@ pub struct SweepArguments {
     json: bool,
 }
 
-/// How samples are drawn.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-enum Sampled {
-    /// One from each of as many equal parts of every range as there are runs
-    #[default]
-    LatinHypercube,
-    /// Independent and uniform
-    Random,
-}
-
 impl SweepArguments {
     /// Whether it is one of several that share the runs, each with a folder of its own.
     pub fn is_shard(&self) -> bool {
@@ -91,15 +81,11 @@ impl SweepArguments {
     }
 
     fn request(&self) -> Result<SweepRequest, Refusal> {
-        let sampling = match self.sampling {
-            Sampled::LatinHypercube => Sampling::LatinHypercube,
-            Sampled::Random => Sampling::Random,
-        };
         Ok(SweepRequest {
             scene: in_full(self.scene.as_deref().unwrap_or_default()),
             set: self.set.clone(),
             vary: self.vary.clone(),
-            samples: self.samples.map(|count| (count as usize, sampling, self.seed)),
+            samples: self.samples.map(|count| (count as usize, self.sampling, self.seed)),
             outputs: self.outputs.clone(),
             shard: self.shard.as_deref().map_or(Ok(Shard::WHOLE), str::parse)?,
             force: self.output.force,
@@ -121,7 +107,7 @@ impl SweepArguments {
 
 /// A sweep of a scene, laid out.
 struct Sweep {
-    begun: Begun,
+    begun: JournalHeader,
     /// Without the variations.
     scene: Scene,
     design: Design,
@@ -138,7 +124,7 @@ impl Sweep {
         let design = request.design()?;
         let rows = rows.into_iter().map(|row| (row.run, row)).collect();
         let plan_digest = runs::first_digest(&scene_arguments(&request), &design);
-        Ok(Self { begun: Begun::new(request, &scene, plan_digest), scene, design, rows })
+        Ok(Self { begun: JournalHeader::new(request, &scene, plan_digest), scene, design, rows })
     }
 
     fn request(&self) -> &SweepRequest {
@@ -172,7 +158,7 @@ impl Sweep {
             outputs: &self.request().outputs,
             rows: &self.rows,
         };
-        write_sweep(&folder, &table, arguments.figures.formats(), arguments.plot.as_deref())?;
+        write_sweep(&folder, &table, arguments.figures.figures, arguments.plot.as_deref())?;
         let json = arguments.json.then(|| table.json());
         let kept = interrupt::commit(folder)?;
         if let Some(json) = json {
@@ -275,7 +261,7 @@ fn sweep_here(arguments: &SweepArguments) -> Result<ExitCode, Refusal> {
 /// The folder of a new sweep, or of one that is gone on with, and its journal.
 fn open(
     arguments: &SweepArguments,
-    found: Option<&Found>,
+    found: Option<&StoredSweep>,
     sweep: &Sweep,
 ) -> Result<(OutputFolder, Journal), ExportError> {
     match found {
@@ -305,7 +291,7 @@ fn open(
 
 /// Puts the runs of several folders into one; what is missing can be made with `--resume`.
 fn merge(arguments: &SweepArguments, start: Instant) -> Result<ExitCode, Refusal> {
-    let parts: Vec<Found> = arguments.merge.iter().map(|dir| read(dir)).collect::<Result<_, _>>()?;
+    let parts: Vec<StoredSweep> = arguments.merge.iter().map(|dir| read(dir)).collect::<Result<_, _>>()?;
     let Some((one, others)) = parts.split_first() else { return Ok(ExitCode::SUCCESS) };
     let whole = one.begun.whole();
     if let Some(other) = others.iter().find(|other| other.begun.whole() != whole) {

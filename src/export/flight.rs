@@ -79,12 +79,12 @@ pub fn write_flight_tables(
 const BOUND: &str = "#444444";
 
 /// Shape and clearance against time, with what is declared of them.
-pub(super) fn charts<'a>(record: &Record, report: &FlightReport) -> Vec<Chart<'a>> {
+pub(super) fn charts(record: &Record, report: &FlightReport) -> Vec<Chart> {
     let series = |name: &str, colour, of: &dyn Fn(&Sample) -> Option<f64>| {
         let points = record.samples.iter().filter_map(|s| of(s).map(|value| [s.time, value])).collect();
-        Series { name: name.into(), colour, style: Style::Line, points }
+        Series::new(name, colour, Style::Line, points)
     };
-    let time = Axis { quantity: "time", unit: "s", is_log: false };
+    let time = || Axis::new("time", "s");
     let shape = [
         series("from the leaders' affine motion", SERIES[0], &|s| s.affine_error),
         series("from where the rule comes to rest", SERIES[1], &|s| s.formation_error),
@@ -94,11 +94,9 @@ pub(super) fn charts<'a>(record: &Record, report: &FlightReport) -> Vec<Chart<'a
     let end = record.samples.last().map_or(0.0, |sample| sample.time);
     let declared = |bounds: &[&str]| -> Vec<Series> {
         let those = report.bounds.iter().filter(|verdict| bounds.contains(&verdict.bound));
-        let line = |verdict: &Verdict| Series {
-            name: format!("declared {}", verdict.bound.replace('_', " ")),
-            colour: BOUND,
-            style: Style::Line,
-            points: vec![[0.0, verdict.declared], [end, verdict.declared]],
+        let line = |verdict: &Verdict| {
+            let name = format!("declared {}", verdict.bound.replace('_', " "));
+            Series::new(name, BOUND, Style::Line, vec![[0.0, verdict.declared], [end, verdict.declared]])
         };
         those.map(line).collect()
     };
@@ -106,36 +104,30 @@ pub(super) fn charts<'a>(record: &Record, report: &FlightReport) -> Vec<Chart<'a
     // An ideal flight has errors of rounding, which no axis in metres would show.
     let visible = |s: &Series| s.points.iter().any(|point| point[1] > 0.0);
     if shape.iter().any(visible) {
-        charts.push(Chart {
-            title: report.title.clone(),
-            note: "largest distance of a robot from its place".into(),
-            axes: [time, Axis { quantity: "distance", unit: "m", is_log: true }],
-            series: shape
-                .into_iter()
-                .chain(declared(&["affine_error", "final_error", "continuum_error"]))
-                .filter(visible)
-                .collect(),
-            landmarks: Vec::new(),
-        });
+        let bounds = declared(&["affine_error", "final_error", "continuum_error"]);
+        charts.push(Chart::new(
+            &report.title,
+            "largest distance of a robot from its place",
+            [time(), Axis::log("distance", "m")],
+            shape.into_iter().chain(bounds).filter(visible).collect(),
+        ));
     }
     if !clearance.points.is_empty() {
-        charts.push(Chart {
-            title: "Smallest free space".into(),
-            note: "between two robots' rims, or a rim and an obstacle".into(),
-            axes: [time, Axis { quantity: "clearance", unit: "m", is_log: false }],
-            series: [vec![clearance], declared(&["clearance"])].concat(),
-            landmarks: Vec::new(),
-        });
+        charts.push(Chart::new(
+            "Smallest free space",
+            "between two robots' rims, or a rim and an obstacle",
+            [time(), Axis::new("clearance", "m")],
+            [vec![clearance], declared(&["clearance"])].concat(),
+        ));
     }
     if charts.is_empty() {
         let strain = series("", SERIES[3], &|s| Some(s.strain));
-        charts.push(Chart {
-            title: report.title.clone(),
-            note: "largest strain of a robot's surroundings".into(),
-            axes: [time, Axis { quantity: "strain", unit: "1", is_log: false }],
-            series: vec![strain],
-            landmarks: Vec::new(),
-        });
+        charts.push(Chart::new(
+            &report.title,
+            "largest strain of a robot's surroundings",
+            [time(), Axis::new("strain", "1")],
+            vec![strain],
+        ));
     }
     charts
 }

@@ -110,23 +110,17 @@ fn row(step: &LoadStep, loads: &[Option<usize>], keys: &[&str]) -> Vec<Option<f6
 
 /// Load over displacement: of the loads along their resultant, and of each region that is moved along the way that it
 /// goes; `None` where neither is there.
-pub fn chart<'a>(scene: &Scene, units: &'a Units, steps: &[LoadStep]) -> Option<Chart<'a>> {
+pub fn chart(scene: &Scene, units: &Units, steps: &[LoadStep]) -> Option<Chart> {
     let loads = of_loads(steps).map(|points| ("loads".to_owned(), points));
     let moved = keys(steps)
         .into_iter()
         .filter_map(|key| of_region(steps, key).map(|points| (key.to_owned(), points)));
     let series = loads.into_iter().chain(moved).zip(SERIES.iter().cycle());
     let series: Vec<Series> =
-        series.map(|((name, points), colour)| Series { name, colour, style: Style::Front, points }).collect();
-    let axis = |quantity, unit| Axis { quantity, unit, is_log: false };
-    (!series.is_empty()).then(|| Chart {
-        title: scene.raw.title.clone(),
-        note: "force over mean displacement, both along the load or the motion; a ring is a row of load.csv"
-            .into(),
-        axes: [axis("displacement", units.length.as_str()), axis("force", units.force.as_str())],
-        series,
-        landmarks: Vec::new(),
-    })
+        series.map(|((name, points), colour)| Series::new(name, colour, Style::Front, points)).collect();
+    let note = "force over mean displacement, both along the load or the motion; a ring is a row of load.csv";
+    let axes = [Axis::new("displacement", &units.length), Axis::new("force", &units.force)];
+    (!series.is_empty()).then(|| Chart::new(&scene.raw.title, note, axes, series))
 }
 
 /// Displacement and size of the resultant; `None` without loads, and where they cancel.

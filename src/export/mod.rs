@@ -19,8 +19,9 @@
 //! A page for people to look at is written beside them ([`report`]), and a gallery of such pages; a film ([`film`]) stands
 //! where it is asked for.
 //!
-//! A flight (`flight`, feature `swarm`), a comparison with the truth (`comparison`, feature `fem`) have folders of their own, and so has a study of
-//! what grows (`stability`) and a parameter sweep ([`sweep`]).
+//! A flight (`flight`, feature `swarm`), a comparison with the truth and a study of what accuracy costs (`comparison` and
+//! `trade`, feature `fem`), a study of what grows (`stability`), a parameter sweep ([`sweep`]) and benchmarks (`transport`
+//! and `scale`, feature `bench`) have folders of their own.
 //!
 //! Frames are written while the run goes on, since a long run cannot keep them ([`VtkSeries`]); the
 //! rest comes at the end, by [`write_all`]:
@@ -98,7 +99,7 @@ pub use error::ExportError;
 use figures::{Formats, Subject};
 pub use folder::{OutputFolder, unfinished};
 pub use summary::{
-    BrokenBonds, Counts, Energies, Equilibrium, FirstBreak, Measured, Seconds, Summary, Timings,
+    BrokenBonds, Counts, Energies, Equilibrium, FirstBreak, Measured, Seconds, Signed, Summary, Timings,
 };
 pub use vtk::VtkSeries;
 
@@ -242,7 +243,7 @@ fn figures_of<'a>(results: &'a Results<'_>, subject: &'a Subject<'_>, units: &'a
     }
     if let Some(solved) = &outcome.solved {
         let title = &scene.raw.title;
-        let draw = move || figures::chart::residuals(title, solved.solver.name(), &solved.residuals);
+        let draw = move || figures::chart::draw_residuals(title, solved.solver.name(), &solved.residuals);
         figures.push(("residuals".into(), Box::new(draw)));
     }
     if let Some(chart) = load::chart(scene, units, load_steps) {

@@ -79,7 +79,7 @@ fn chart(
     report: &Report,
     (title, body): (&str, String),
     (cases, predicted): (&[Case], [Efficiency; 2]),
-) -> Chart<'static> {
+) -> Chart {
     let measured = cases.iter().map(|case| [case.ranks as f64, case.efficiency]).collect();
     let Link { latency_seconds, bytes_per_second } = Link::NETWORK;
     let network = format!(
@@ -89,21 +89,17 @@ fn chart(
     );
     let line = |name: String, n: usize, of: Efficiency| {
         let points = report.predicted.iter().map(|one| [one.ranks as f64, of(one)]).collect();
-        Series { name, colour: SERIES[n], style: Style::Line, points }
+        Series::new(name, SERIES[n], Style::Line, points)
     };
     let what = format!("measured here, ranks are {}", report.ranks_are);
-    Chart {
-        title: title.into(),
-        note: format!("{}; {body}", report.processor.as_deref().unwrap_or("a processor without name")),
-        axes: [
-            Axis { quantity: "ranks", unit: "", is_log: true },
-            Axis { quantity: "efficiency", unit: "", is_log: false },
-        ],
-        series: vec![
+    Chart::new(
+        title,
+        format!("{}; {body}", report.processor.as_deref().unwrap_or("a processor without name")),
+        [Axis::log("ranks", ""), Axis::new("efficiency", "")],
+        vec![
             line("predicted, messages as measured here".into(), 1, predicted[0]),
             line(network, 2, predicted[1]),
-            Series { name: what, colour: SERIES[0], style: Style::Beads, points: measured },
+            Series::new(what, SERIES[0], Style::Beads, measured),
         ],
-        landmarks: Vec::new(),
-    }
+    )
 }

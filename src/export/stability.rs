@@ -10,7 +10,7 @@ use super::csv::write;
 use super::error::ExportError;
 use super::figures::chart::{Axis, Chart, Landmark, Series, Style, draw_below_each_other};
 use super::figures::{self, SERIES};
-use super::summary::{signed, write_signed};
+use super::summary::{Signed, write_signed};
 use crate::study::stability::bisection::Growth;
 use crate::study::stability::study::{Linear, Study, Sweep, Threshold};
 
@@ -51,11 +51,8 @@ pub fn write_stability(folder: &OutputFolder, study: &Study) -> Result<Vec<PathB
 }
 
 /// The content of `stability.json`.
-///
-/// # Errors
-/// None that a study could cause.
-pub fn json(study: &Study) -> serde_json::Result<String> {
-    signed(&Report::of(study))
+pub fn json(study: &Study) -> serde_json::Value {
+    serde_json::json!(Signed::new(&Report::of(study)))
 }
 
 impl<'a> Report<'a> {
@@ -100,50 +97,44 @@ pub fn figure(study: &Study, linear: &Linear) -> String {
     draw_below_each_other(&panels(study, linear))
 }
 
-pub(super) fn panels<'a>(study: &Study, linear: &Linear) -> Vec<Chart<'a>> {
+pub(super) fn panels(study: &Study, linear: &Linear) -> Vec<Chart> {
     linear.sweeps.iter().map(|sweep| panel(study, linear, sweep)).collect()
 }
 
-fn panel<'a>(study: &Study, linear: &Linear, sweep: &Sweep) -> Chart<'a> {
+fn panel(study: &Study, linear: &Linear, sweep: &Sweep) -> Chart {
     let ends = [sweep.spectrum.first(), sweep.spectrum.last()].map(|end| end.map_or(0.0, |end| end.value));
     let thresholds = || linear.thresholds.iter().filter(|t| t.parameter == sweep.parameter);
-    let line = |name: &str, colour, style, points| Series { name: name.into(), colour, style, points };
     let series = vec![
-        line("no growth", "#8a8f98", Style::Line, ends.map(|value| [value, 1.0]).to_vec()),
-        line(
+        Series::new("no growth", "#8a8f98", Style::Line, ends.map(|value| [value, 1.0]).to_vec()),
+        Series::new(
             "predicted (spectral radius)",
             SERIES[0],
             Style::Line,
             sweep.spectrum.iter().map(|point| [point.value, point.radius]).collect(),
         ),
-        line(
+        Series::new(
             "runs",
             SERIES[1],
             Style::Dots,
             sweep.runs.iter().map(|run| [run.value, run.per_step]).collect(),
         ),
-        line(
+        Series::new(
             "threshold found by runs",
             THRESHOLD,
             Style::Beads,
             thresholds().filter_map(|t| Some([t.found.as_ref()?.value, 1.0])).collect(),
         ),
     ];
-    Chart {
-        title: format!("Growth against the {}", sweep.parameter.name()),
-        note: format!(
-            "{}; {} followers, the scene's value is {}",
-            study.title,
-            linear.followers,
-            rounded(sweep.present).trim_end_matches('0').trim_end_matches('.')
-        ),
-        axes: [
-            Axis { quantity: sweep.parameter.name(), unit: "", is_log: false },
-            Axis { quantity: "growth per step", unit: "", is_log: false },
-        ],
-        series,
-        landmarks: thresholds().filter_map(landmark).collect(),
-    }
+    let title = format!("Growth against the {}", sweep.parameter.name());
+    let note = format!(
+        "{}; {} followers, the scene's value is {}",
+        study.title,
+        linear.followers,
+        rounded(sweep.present).trim_end_matches('0').trim_end_matches('.')
+    );
+    let axes = [Axis::new(sweep.parameter.name(), ""), Axis::new("growth per step", "")];
+    let landmarks = thresholds().filter_map(landmark).collect();
+    Chart { landmarks, ..Chart::new(title, note, axes, series) }
 }
 
 fn landmark(threshold: &Threshold) -> Option<Landmark> {

@@ -69,46 +69,70 @@ fn row(point: &Point, on_the_front: bool) -> Row<'_> {
 }
 
 /// Error against time, both logarithmic: a colour for each solver, rings for the paper's rule and dots for
-/// the material rule, and the front.
-pub fn figure(study: &Study) -> String {
-    let front = study.front().into_iter().filter_map(place).collect();
-    let mut series = Vec::new();
-    for (n, solver) in Solver::ALL.into_iter().enumerate() {
-        let of = |rule: RuleChoice| {
-            let is_one = |point: &&Point| point.setting.solver == solver.name() && point.setting.rule == rule;
-            let settled = study.points.iter().filter(|point| point.outcome == Outcome::Settled);
-            settled.filter(is_one).filter_map(place).collect::<Vec<_>>()
-        };
-        let (colour, [paper, material]) = (SERIES[n], RuleChoice::ALL.map(of));
-        // The legend names a solver once, whichever rule it was used with.
-        let unnamed = if material.is_empty() { solver.name().to_owned() } else { String::new() };
-        series.push(Series { name: unnamed, colour, style: Style::Rings, points: paper });
-        series.push(Series { name: solver.name().into(), colour, style: Style::Dots, points: material });
+/// the material rule, and the front; each point by its setting.
+pub(super) fn chart(study: &Study) -> Chart {
+    let settled = || study.points.iter().filter(|point| point.outcome == Outcome::Settled);
+    let mut all = Vec::new();
+    for (solver, colour) in Solver::ALL.into_iter().zip(SERIES) {
+        for (rule, style) in [(RuleChoice::Paper, Style::Rings), (RuleChoice::Material, Style::Dots)] {
+            let of = settled().filter(|p| p.setting.solver == solver.name() && p.setting.rule == rule);
+            all.push(series(format!("{}, {} rule", solver.name(), rule.name()), colour, style, of));
+        }
     }
-    series.retain(|series| !series.points.is_empty());
-    series.push(Series { name: "Pareto-optimal".into(), colour: INK, style: Style::Front, points: front });
-    draw(&Chart {
-        title: study.title.clone(),
-        note: format!(
-            "rings: the paper's rule, dots: the material rule; {} settings, median of {} runs each, from the scene to \
-             rest; error against finite elements on {} nodes",
-            study.points.len(),
-            study.repeats,
-            study.truth_nodes
-        ),
-        axes: [
-            Axis { quantity: "time", unit: "s", is_log: true },
-            Axis { quantity: "relative L2 error of the displacement", unit: "", is_log: true },
-        ],
-        landmarks: vec![Landmark {
-            x: study.truth_seconds,
-            name: "the truth itself".into(),
-            colour: "#8a8f98",
-        }],
-        series,
-    })
+    all.retain(|series| !series.points.is_empty());
+    all.push(series("Pareto-optimal".into(), "ink", Style::Front, study.front().into_iter()));
+    let note = format!(
+        "{} settings, median of {} runs each, from the scene to rest; error against finite elements on {} nodes",
+        study.points.len(),
+        study.repeats,
+        study.truth_nodes
+    );
+    let axes = [Axis::log("time", "s"), Axis::log("relative L2 error of the displacement", "")];
+    let truth = Landmark { x: study.truth_seconds, name: "the truth itself".into(), colour: "#8a8f98" };
+    Chart { landmarks: vec![truth], ..Chart::new("What accuracy costs", note, axes, all) }
 }
 
-fn place(point: &Point) -> Option<[f64; 2]> {
-    Some([point.seconds?, point.error?])
+fn series<'a>(
+    name: String,
+    colour: &'static str,
+    style: Style,
+    of: impl Iterator<Item = &'a Point>,
+) -> Series {
+    let placed = of.filter_map(|point| Some(([point.seconds?, point.error?], label(point))));
+    let (points, labels) = placed.unzip();
+    Series { labels, ..Series::new(name, colour, style, points) }
+}
+
+fn label(point: &Point) -> String {
+    let (error, seconds) = (point.error.unwrap_or(f64::NAN), point.seconds.unwrap_or(f64::NAN));
+    let iterations = point.iterations.map_or_else(String::new, |count| format!(", {count} iterations"));
+    format!(
+        "{}\n{} particles{iterations}\nerror {:.3} %, {:.3} ms",
+        point.setting,
+        point.particles,
+        100.0 * error,
+        1e3 * seconds
+    )
+}
+
+/// The same as a figure, whose legend names a solver once, whichever rule it was used with.
+pub fn figure(study: &Study) -> String {
+    let mut chart = chart(study);
+    chart.title.clone_from(&study.title);
+    chart.note = format!("rings: the paper's rule, dots: the material rule; {}", chart.note);
+    let mut last = "";
+    for series in chart.series.iter_mut().rev() {
+        let solver = Solver::ALL
+            .into_iter()
+            .map(Solver::name)
+            .find(|name| series.name.starts_with(&format!("{name}, ")));
+        series.name = match solver {
+            None => continue,
+            Some(solver) if solver == last => String::new(),
+            Some(solver) => solver.to_owned(),
+        };
+        last = solver.unwrap_or_default();
+    }
+    chart.series.iter_mut().filter(|series| series.colour == "ink").for_each(|series| series.colour = INK);
+    draw(&chart)
 }

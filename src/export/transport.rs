@@ -79,18 +79,11 @@ pub fn figure(report: &Report) -> String {
             let of = report.cases.iter().filter(|case| case.work == work && case.transport == name);
             let point = |case: &Case| Some([case.poses as f64, 1e6 * case.round_trip.p50_seconds?]);
             let points = of.filter_map(point).collect();
-            Series { name: name.into(), colour: SERIES[n % SERIES.len()], style: Style::Front, points }
+            Series::new(name, SERIES[n % SERIES.len()], Style::Front, points)
         });
-        Chart {
-            title: work.words().into(),
-            note: format!("median round trip between two threads; {} bytes a pose", report.bytes_per_pose),
-            axes: [
-                Axis { quantity: "poses", unit: "", is_log: true },
-                Axis { quantity: "round trip", unit: "us", is_log: true },
-            ],
-            series: series.filter(|series| !series.points.is_empty()).collect(),
-            landmarks: Vec::new(),
-        }
+        let note = format!("median round trip between two threads; {} bytes a pose", report.bytes_per_pose);
+        let axes = [Axis::log("poses", ""), Axis::log("round trip", "us")];
+        Chart::new(work.words(), note, axes, series.filter(|series| !series.points.is_empty()).collect())
     });
     draw_below_each_other(&charts)
 }

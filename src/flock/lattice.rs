@@ -335,10 +335,9 @@ fn rounded_angle(angle: f64, period: f64) -> i64 {
     ((angle * 1e9).round() as i64).rem_euclid((period * 1e9).round() as i64)
 }
 
-#[cfg(test)]
 impl LatticeKind {
-    /// One lattice of each kind, for tests that must hold on all of them.
-    pub(crate) const SAMPLES: [LatticeKind; 6] = [
+    /// One lattice of each kind, of about unit size, to try on all of them what must hold on each.
+    pub const SAMPLES: [LatticeKind; 6] = [
         LatticeKind::Square { spacing: 1.0 },
         LatticeKind::Rectangular { a: 1.0, b: 1.5 },
         LatticeKind::CentredRectangular { a: 1.0, b: 1.4 },

@@ -27,7 +27,7 @@ pub struct MaterialReport {
     /// The name of the rule.
     pub rule: String,
     /// The material that was asked for; none where the question was what a rule is.
-    pub asked: Option<Asked>,
+    pub asked: Option<Request>,
     /// Neighbours of an interior particle of each sublattice with their weights, nearest first.
     pub weights: Vec<Weight>,
     /// `D = sum_j K_j` of each sublattice \[force / length\], or the sum of the weights \[1\] of a scalar
@@ -57,7 +57,7 @@ pub struct LatticeFacts {
 /// The constants that were given.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
-pub enum Asked {
+pub enum Request {
     /// A sheet alike in all directions.
     Isotropic {
         /// Young's modulus \[force / length^2\].
@@ -207,7 +207,7 @@ impl MaterialReport {
         let material = Material::of_sheet(&effective, elastic);
         let rule = "2x2 weights from the material".to_owned();
         let report = Self::gather(lattice, rule, &crystal, &effective, material, &zone);
-        Ok(Self { asked: Some(Asked::of(elastic)), ..report })
+        Ok(Self { asked: Some(Request::of(elastic)), ..report })
     }
 
     fn gather(
@@ -263,16 +263,16 @@ impl Weight {
     }
 }
 
-impl Asked {
+impl Request {
     fn of(elastic: &Elastic) -> Self {
         let thickness = elastic.thickness();
         match elastic.constants() {
             Constants::Isotropic { young, poisson, plane } => {
                 let plane = if plane == Plane::Stress { "stress" } else { "strain" };
-                Asked::Isotropic { young, poisson, plane, thickness }
+                Request::Isotropic { young, poisson, plane, thickness }
             }
             Constants::Orthotropic { young, poisson_12, shear, angle } => {
-                Asked::Orthotropic { young, poisson_12, shear, fibres: angle.to_degrees(), thickness }
+                Request::Orthotropic { young, poisson_12, shear, fibres: angle.to_degrees(), thickness }
             }
         }
     }

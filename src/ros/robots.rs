@@ -56,7 +56,7 @@ pub struct RobotNodes {
 
 /// The state of the robots that outlasts their process.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
-pub struct KeptRobots {
+pub struct RobotsSnapshot {
     robots: Vec<Robot>,
     goals: Vec<Option<[f64; 2]>>,
     period: u64,
@@ -293,13 +293,13 @@ impl RobotNodes {
         Ok(())
     }
 
-    pub fn kept(&self) -> KeptRobots {
+    pub fn kept(&self) -> RobotsSnapshot {
         let (robots, period) = (self.fleet.robots().to_vec(), self.fleet.period());
-        KeptRobots { robots, goals: self.goals.clone(), period }
+        RobotsSnapshot { robots, goals: self.goals.clone(), period }
     }
 
     /// Goes on from what another process left.
-    pub fn restore(&mut self, kept: &KeptRobots) {
+    pub fn restore(&mut self, kept: &RobotsSnapshot) {
         self.fleet.restore(&kept.robots, kept.period);
         self.goals.iter_mut().zip(&kept.goals).for_each(|(goal, kept)| *goal = *kept);
     }

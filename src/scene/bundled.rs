@@ -69,7 +69,8 @@ pub const SCENES: &[Bundled] = files!["scenes":
 ];
 
 /// Every bundled swarm, in the order in which `flockform list swarms` lists them.
-pub const SWARMS: &[Bundled] = files!["swarms": "square", "gap", "patch", "antipodal", "liar", "bridge"];
+pub const SWARMS: &[Bundled] =
+    files!["swarms": "square", "gap", "patch", "antipodal", "faulty-robot", "bridge"];
 
 /// The bundled swarm of this name.
 pub fn bundled_swarm(name: &str) -> Option<Bundled> {

@@ -141,7 +141,7 @@ fn the_plan_of_a_swarm_states_margins_and_speeds() {
     let ideal = said(&["plan", "gap"], folder.path());
     assert!(ideal.contains("  reachable speed   not limited: ideal robots"), "{ideal}");
     assert!(json(&["plan", "gap", "--json"], folder.path())["speed"]["reachable"].is_null(), "{ideal}");
-    for name in ["gap", "patch", "antipodal", "liar", "bridge"] {
+    for name in ["gap", "patch", "antipodal", "faulty-robot", "bridge"] {
         assert!(said(&["plan", name], folder.path()).contains("robots"), "{name}");
     }
     refused(&["plan", "square", "--set", "limits.speed=-1"], folder.path(), &["limits.speed"]);

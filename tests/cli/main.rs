@@ -4,6 +4,8 @@
 
 mod beginnings;
 mod checkpoint;
+#[path = "../common/cloud.rs"]
+mod cloud;
 #[path = "../common/command.rs"]
 mod command;
 mod compare;

@@ -67,15 +67,7 @@ fn poisson_and_young_are_recovered_on_every_lattice_by_the_command() {
 
 #[test]
 fn poisson_is_recovered_to_a_millionth_from_minus_nine_tenths_to_almost_a_half() {
-    let kinds = [
-        LatticeKind::Square { spacing: 1.0 },
-        LatticeKind::Rectangular { a: 1.0, b: 1.5 },
-        LatticeKind::CentredRectangular { a: 1.0, b: 1.4 },
-        LatticeKind::Hexagonal { spacing: 1.0 },
-        LatticeKind::Oblique { a: 1.0, b: 1.2, angle: 1.2 },
-        LatticeKind::Honeycomb { spacing: 1.0 },
-    ];
-    for kind in kinds {
+    for kind in LatticeKind::SAMPLES {
         let lattice = Lattice::new(kind, [0.0; 2], 0.2);
         for step in 0..=28 {
             let poisson = -0.9 + 1.39 * f64::from(step) / 28.0;

@@ -8,6 +8,7 @@ use flockform::messages::flockform_msgs::FormationState;
 use flockform::messages::geometry_msgs::PoseArray;
 use flockform::record::Reader;
 
+use crate::cloud::{shuffled, table};
 use crate::program::*;
 
 type Row = (usize, [f64; 2]);
@@ -22,14 +23,6 @@ fn cloud() -> Vec<Row> {
             (3 * i as usize + 5001, place)
         })
         .collect()
-}
-
-fn shuffled(mut rows: Vec<Row>, mut seed: u64) -> Vec<Row> {
-    for i in (1..rows.len()).rev() {
-        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        rows.swap(i, (seed >> 33) as usize % (i + 1));
-    }
-    rows
 }
 
 const SCENE: &str = r#"
@@ -58,11 +51,6 @@ fn write(folder: &Path, scene: &str, table: &str) {
     std::fs::write(folder.join("cloud.toml"), scene).expect("written");
 }
 
-fn table(rows: &[Row]) -> String {
-    let rows = rows.iter().map(|(id, [x, y])| format!("{id},{x:?},{y:?}\n"));
-    std::iter::once("id,x,y\n".to_owned()).chain(rows).collect()
-}
-
 fn run(folder: &Path, more: &[&str]) {
     let output = flockform(&[&["run", "cloud.toml", "-q", "--out", "o"][..], more].concat(), folder);
     assert!(output.status.success(), "{}", text(&output.stderr));
@@ -86,7 +74,7 @@ fn number(text: &str) -> f64 {
 
 #[test]
 fn tables_and_frames_have_the_ids_and_the_order_of_the_file() {
-    let (folder, rows) = (temporary(), shuffled(cloud(), 1));
+    let (folder, rows) = (temporary(), shuffled(&cloud(), 1));
     write(folder.path(), SCENE, &table(&rows));
     run(folder.path(), &[]);
     let out = folder.path().join("o");
@@ -145,7 +133,7 @@ fn tables_and_frames_have_the_ids_and_the_order_of_the_file() {
 fn two_orders_of_the_same_points_end_in_the_same_table() {
     let ended = |seed| {
         let folder = temporary();
-        write(folder.path(), SCENE, &table(&shuffled(cloud(), seed)));
+        write(folder.path(), SCENE, &table(&shuffled(&cloud(), seed)));
         run(folder.path(), &[]);
         let text = std::fs::read_to_string(folder.path().join("o/final.csv")).expect("written");
         let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
@@ -161,7 +149,7 @@ fn two_orders_of_the_same_points_end_in_the_same_table() {
 
 #[test]
 fn the_report_knows_the_particles_by_their_ids() {
-    let (folder, rows) = (temporary(), shuffled(cloud(), 4));
+    let (folder, rows) = (temporary(), shuffled(&cloud(), 4));
     write(folder.path(), SCENE, &table(&rows));
     run(folder.path(), &[]);
     let page = std::fs::read_to_string(folder.path().join("o/report.html")).expect("written");
@@ -190,7 +178,7 @@ fn the_report_knows_the_particles_by_their_ids() {
 
 #[test]
 fn a_recording_has_the_particles_in_the_order_of_the_file() {
-    let (folder, rows) = (temporary(), shuffled(cloud(), 5));
+    let (folder, rows) = (temporary(), shuffled(&cloud(), 5));
     write(folder.path(), SCENE, &table(&rows));
     run(folder.path(), &["--record", "r.mcap"]);
     let (mut poses, mut members) = (None, None);
@@ -215,7 +203,7 @@ fn a_recording_has_the_particles_in_the_order_of_the_file() {
 #[test]
 fn a_body_that_diverges_names_the_particle_as_its_file_does() {
     let folder = temporary();
-    write(folder.path(), SCENE, &table(&shuffled(cloud(), 6)));
+    write(folder.path(), SCENE, &table(&shuffled(&cloud(), 6)));
     let grown = ["--set", "rule.feedback={factor=1.0}", "--set", "fracture={}", "--set", "stop.steps=5000"];
     let output = flockform(&[&["run", "cloud.toml", "--out", "o"][..], &grown].concat(), folder.path());
     let said = text(&output.stdout);
@@ -228,7 +216,7 @@ fn a_body_that_diverges_names_the_particle_as_its_file_does() {
 #[cfg(unix)]
 #[test]
 fn a_killed_run_of_points_goes_on_to_the_same_end_unless_its_file_was_sorted_meanwhile() {
-    let (folder, rows) = (temporary(), shuffled(cloud(), 7));
+    let (folder, rows) = (temporary(), shuffled(&cloud(), 7));
     let scene = SCENE.replace("steps = 200", "steps = 30000").replace("vtk_every = 100", "vtk_every = 10000");
     write(folder.path(), &scene, &table(&rows));
     run(folder.path(), &[]);

@@ -19,7 +19,7 @@ fn a_swarm_is_flown_and_leaves_tables_and_figures() {
     let out = folder.path().join("out");
     let output = flockform(&["swarm", "bridge", "--out", "out"], folder.path());
     assert!(output.status.success(), "{}", text(&output.stderr));
-    assert!(text(&output.stdout).contains("from the continuum"), "{}", text(&output.stdout));
+    assert!(text(&output.stdout).contains("From the continuum run"), "{}", text(&output.stdout));
     for file in
         ["flight.json", "samples.csv", "robots.csv", "tracks.csv", "flight.png", "flight.svg", "errors.png"]
     {
@@ -88,7 +88,9 @@ fn a_broken_bound_ends_with_exit_code_1_and_all_is_written() {
 #[test]
 fn what_cannot_fly_is_refused_with_exit_code_2_and_nothing_is_left() {
     let folder = temporary();
-    let cases: [(&[&str], &str); 5] = [
+    let cases: [(&[&str], &str); 7] = [
+        (&["swarm", "liar"], "the nearest bundled swarm is `faulty-robot`"),
+        (&["swarm", "square", "--set", "ranges.max_liars=1"], "it is called `max_faulty` now"),
         (&["swarm", "sqare"], "the nearest bundled swarm is `square`"),
         (&["swarm", "nothing.toml"], "cannot be read"),
         (&["swarm", "square", "--set", "limits.speed=-1"], "--set limits.speed=-1: limits.speed = -1"),

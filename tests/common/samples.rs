@@ -4,14 +4,7 @@ use flockform::flock::lattice::LatticeKind;
 use flockform::material::elastic::{Constants, Elastic};
 
 /// The six lattices, of about unit size.
-pub const KINDS: [LatticeKind; 6] = [
-    LatticeKind::Square { spacing: 1.0 },
-    LatticeKind::Rectangular { a: 1.0, b: 1.5 },
-    LatticeKind::CentredRectangular { a: 1.0, b: 1.4 },
-    LatticeKind::Hexagonal { spacing: 1.0 },
-    LatticeKind::Oblique { a: 1.0, b: 1.2, angle: 1.2 },
-    LatticeKind::Honeycomb { spacing: 1.0 },
-];
+pub const KINDS: [LatticeKind; 6] = LatticeKind::SAMPLES;
 
 /// A material stiff along fibres that are turned.
 pub fn fibres() -> Elastic {

@@ -11,14 +11,7 @@ use flockform::material::weights::MaterialWeights;
 use flockform::solve::equilibrium::{Choice, Request, Solved, Solver, System, solve};
 use flockform::solve::operator::{Operator, Row};
 
-pub const KINDS: [LatticeKind; 6] = [
-    LatticeKind::Square { spacing: 1.0 },
-    LatticeKind::Rectangular { a: 1.0, b: 1.5 },
-    LatticeKind::CentredRectangular { a: 1.0, b: 1.4 },
-    LatticeKind::Hexagonal { spacing: 1.0 },
-    LatticeKind::Oblique { a: 1.0, b: 1.2, angle: 1.2 },
-    LatticeKind::Honeycomb { spacing: 1.0 },
-];
+pub const KINDS: [LatticeKind; 6] = LatticeKind::SAMPLES;
 
 /// How a particle's neighbours pull on it.
 #[derive(Clone, Copy, Debug, PartialEq)]

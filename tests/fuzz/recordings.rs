@@ -11,7 +11,7 @@ use flockform::record::flight::FlightMessages;
 use flockform::record::replay::{recorded_swarm, replay};
 use flockform::record::{About, Entry, Reader, Recording, Shared};
 use flockform::scene::bundled::bundled_swarm;
-use flockform::swarm::flight::{Flight, fly_heard};
+use flockform::swarm::flight::{Flight, fly_with_observer};
 use proptest::prelude::*;
 
 use super::*;
@@ -48,7 +48,7 @@ fn good() -> &'static [u8] {
         let messages = FlightMessages::new(&swarm, flight.control(), recording.sink()).expect("named");
         let messages = std::cell::RefCell::new(messages);
         let mut hear = |received| messages.borrow_mut().receive(received);
-        fly_heard(&swarm, &mut hear, &mut |flight, _| {
+        fly_with_observer(&swarm, &mut hear, &mut |flight, _| {
             let time = (flight.fleet().period() - 1) as f64 * swarm.raw.control.period;
             messages.borrow_mut().tick(flight.control(), time);
             std::ops::ControlFlow::Continue(())

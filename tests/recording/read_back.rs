@@ -127,8 +127,11 @@ fn mcap_and_rosbags_decode_every_message_to_the_values_written() {
         &["swarm", "square", "--set", "flight.duration=3.0", "--set", "flight.bounds={}"],
         &[&["swarm", "gap", "--set", "flight.duration=1.0", "--set", "flight.bounds={}"][..], &odometry]
             .concat(),
-        &[&["swarm", "liar", "--set", "flight.duration=2.0", "--set", "flight.bounds={}"][..], &covariance]
-            .concat(),
+        &[
+            &["swarm", "faulty-robot", "--set", "flight.duration=2.0", "--set", "flight.bounds={}"][..],
+            &covariance,
+        ]
+        .concat(),
         &["run", "fracture", "--set", "record.vtk_every=20"],
     ];
     for arguments in recordings {

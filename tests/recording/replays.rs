@@ -25,7 +25,7 @@ fn a_recorded_flight_replays_to_the_bit_whatever_its_robots_suffer() {
     let commands = "flight.commands=[{after=10,what={kind=\"move-obstacle\",obstacle=0,by=[0.0,0.3]}},{after=20,what={kind=\"channel\",noise=0.02,delay=1,loss=0.1}},{after=30,what={kind=\"lead\",robot=\"robot_1\",to=[0.5,0.5]}}]";
     let commanded = ["gap", "--set", commands];
     let short = ["--set", "flight.duration=5.0", "--set", "flight.bounds={}"];
-    for swarm in [&suffering[..], &driven, &broken, &measured, &commanded, &["liar"]] {
+    for swarm in [&suffering[..], &driven, &broken, &measured, &commanded, &["faulty-robot"]] {
         let folder = temporary();
         record(&[swarm, &short].concat(), folder.path());
         let report = replay_file(&folder.path().join("flight.mcap"), None, &[], 0.0).expect("readable");

@@ -65,7 +65,7 @@ fn a_bad_swarm_file_is_refused_with_place_and_remedy() {
         ),
         (with("[poses]\nrange = 0.5\n"), "and poses farther than poses.range (0.5 m) are rejected"),
         (with("[flight]\nduration = 1e15\n"), "periods; a flight has 1e7 at most"),
-        (with("[limits]\nspeed = 1.0\n[ranges]\nmax_liars = 2\n"), "there are 2 that could measure it"),
+        (with("[limits]\nspeed = 1.0\n[ranges]\nmax_faulty = 2\n"), "there are 2 that could measure it"),
         (
             with("[[obstacles]]\nkind = \"disc\"\ncentre = [1.0, 0.1]\nradius = 0.3\n"),
             "robots[1].place = [1.0, 0.0]: `b` starts at [1.0, 0.0]",
@@ -159,7 +159,7 @@ fn what_is_doubtful_is_a_caution_before_the_flight() {
             &["flight.start=[{ robot = \"robot_7\", place = [-9.0, 0.0] }]", fence],
             "these robots start outside",
         ),
-        (&["ranges={ reach = 1.0, max_liars = 1 }"], "no more than ranges.max_liars robots are within"),
+        (&["ranges={ reach = 1.0, max_faulty = 1 }"], "no more than ranges.max_faulty robots are within"),
     ];
     for (more, expected) in cases {
         let cautions = square(more);

@@ -66,7 +66,7 @@ fn honest_robots_are_never_contradicted_whatever_the_network_does() {
             "flight.duplicates=0.1",
         ];
         let mut flight =
-            square(&[&rough[..], &[RANGES, &seed, "ranges.max_liars=0", "ranges.tolerance=0.3"]].concat());
+            square(&[&rough[..], &[RANGES, &seed, "ranges.max_faulty=0", "ranges.tolerance=0.3"]].concat());
         fly(&mut flight);
         assert_eq!(contradicted(&flight), [0; 25], "{seed}");
     }

@@ -3,7 +3,7 @@
 use flockform::swarm::transport::in_process::{Controller, Robots, join};
 use flockform::swarm::transport::{ControllerEnd, RobotsEnd};
 
-use super::promises;
+use super::promises::kept;
 use super::support::*;
 
 struct InProcess {
@@ -34,52 +34,7 @@ impl Transport for InProcess {
     }
 }
 
-#[test]
-fn in_process_poses_come_in_order_and_the_newest_comes() {
-    promises::poses_come_in_order_and_the_newest_comes(&mut InProcess::new(3));
-}
-
-#[test]
-fn in_process_ranges_come_as_they_were_measured() {
-    promises::ranges_come_as_they_were_measured(&mut InProcess::new(3));
-}
-
-#[test]
-fn in_process_targets_reach_their_robots_to_the_bit() {
-    promises::targets_reach_their_robots_to_the_bit(&mut InProcess::new(3));
-}
-
-#[test]
-fn in_process_who_comes_late_hears_what_is_said_from_then_on() {
-    promises::who_comes_late_hears_what_is_said_from_then_on(&mut InProcess::new(3));
-}
-
-#[test]
-fn in_process_a_peer_that_goes_away_harms_nobody_else() {
-    promises::a_peer_that_goes_away_harms_nobody_else(&mut InProcess::new(3));
-}
-
-#[test]
-fn in_process_who_comes_back_is_heard_again() {
-    promises::who_comes_back_is_heard_again(&mut InProcess::new(3));
-}
-
-#[test]
-fn in_process_a_thousand_robots_are_carried() {
-    let all: Vec<usize> = (0..1000).collect();
-    promises::a_thousand_robots_are_carried(&mut InProcess::new(1000), &all);
-}
-
-#[test]
-fn in_process_who_does_not_listen_holds_nobody_up() {
-    promises::who_does_not_listen_holds_nobody_up(&mut InProcess::new(3));
-}
-
-#[test]
-fn in_process_a_pose_that_is_not_finite_moves_nobody() {
-    let (mut control, part) = control_of(&row(3, &[]));
-    promises::a_pose_that_is_not_finite_moves_nobody(&mut InProcess::new(3), &mut control, &part);
-}
+kept!(InProcess::new(3), InProcess::new(3), (InProcess::new(1000), (0..1000).collect()));
 
 #[test]
 fn in_process_a_pose_of_nobody_is_left_out_and_counted() {

@@ -2,12 +2,41 @@
 
 use std::time::{Duration, Instant};
 
-use flockform::swarm::control::Control;
 use flockform::swarm::transport::complaints::Complaints;
 use flockform::swarm::transport::{ControllerEnd, Received, RobotsEnd, serve};
 use flockform::swarm::watch::{Health, Range};
 
 use super::support::*;
+
+/// The promises as tests of a transport: of three robots, of three that measure each other, and of a thousand with those
+/// that get targets.
+macro_rules! kept {
+    (@$small:expr => $($promise:ident)+) => {$(
+        #[test]
+        fn $promise() {
+            crate::promises::$promise(&mut $small);
+        }
+    )+};
+    ($small:expr, $measuring:expr, $thousand:expr) => {
+        crate::promises::kept!(@$small =>
+            poses_come_in_order_and_the_newest_comes
+            targets_reach_their_robots_to_the_bit
+            who_comes_late_hears_what_is_said_from_then_on
+            a_peer_that_goes_away_harms_nobody_else
+            who_comes_back_is_heard_again
+            who_does_not_listen_holds_nobody_up
+            a_pose_that_is_not_finite_moves_nobody
+        );
+        crate::promises::kept!(@$measuring => ranges_come_as_they_were_measured);
+
+        #[test]
+        fn a_thousand_robots_are_carried() {
+            let (mut transport, served): (_, Vec<usize>) = $thousand;
+            crate::promises::a_thousand_robots_are_carried(&mut transport, &served);
+        }
+    };
+}
+pub(crate) use kept;
 
 /// A moment for what travels through a network.
 fn a_moment() {
@@ -187,11 +216,8 @@ pub fn who_does_not_listen_holds_nobody_up(transport: &mut impl Transport) {
     assert!(of_the_flood < said as usize / 4, "{of_the_flood} of {said} waited: the old ones give way");
 }
 
-pub fn a_pose_that_is_not_finite_moves_nobody(
-    transport: &mut impl Transport,
-    control: &mut Control,
-    part: &flockform::swarm::control::scope::NodeScope,
-) {
+pub fn a_pose_that_is_not_finite_moves_nobody(transport: &mut impl Transport) {
+    let (mut control, part) = control_of(&row(3, &[]));
     let (mut controller, mut robots) = (transport.controller(), transport.robots());
     meet(&mut controller, &mut robots, 1);
     let mut complaints = Complaints::default();
@@ -204,7 +230,7 @@ pub fn a_pose_that_is_not_finite_moves_nobody(
             .collect();
         robots.send(now, &all).expect("said");
         a_moment();
-        serve(control, part, &mut controller, &mut complaints, now + k).expect("sent");
+        serve(&mut control, &part, &mut controller, &mut complaints, now + k).expect("sent");
         (0..3).all(|m| control.health(m) == Health::Fresh).then_some(())
     });
     let before = control.watch().counts(1).rejected();
@@ -213,7 +239,7 @@ pub fn a_pose_that_is_not_finite_moves_nobody(
         let bad = flockform::swarm::watch::Pose { position: [f64::NAN, f64::INFINITY], ..pose(0.0, now + k) };
         robots.send(now, &[(1, bad)]).expect("said");
         a_moment();
-        serve(control, part, &mut controller, &mut complaints, now + k).expect("sent");
+        serve(&mut control, &part, &mut controller, &mut complaints, now + k).expect("sent");
         (control.watch().counts(1).rejected() > before + 2).then_some(())
     });
     assert_eq!(control.position(1), Some([1.0, 0.0]), "the last good one stands");

@@ -10,7 +10,7 @@ use flockform::scene::swarm::Swarm;
 use flockform::swarm::control::scope::NodeScope;
 use flockform::swarm::transport::{ControllerEnd, Received, Target};
 
-use super::promises;
+use super::promises::kept;
 use super::support::*;
 
 /// A loop's end with the node that it was made from.
@@ -94,51 +94,11 @@ impl Transport for Ros2 {
     }
 }
 
-#[test]
-fn ros2_poses_come_in_order_and_the_newest_comes() {
-    promises::poses_come_in_order_and_the_newest_comes(&mut Ros2::small());
-}
-
-#[test]
-fn ros2_ranges_come_as_they_were_measured() {
-    promises::ranges_come_as_they_were_measured(&mut Ros2::new(row(3, &MEASURED), vec![0, 1, 2]));
-}
-
-#[test]
-fn ros2_targets_reach_their_robots_to_the_bit() {
-    promises::targets_reach_their_robots_to_the_bit(&mut Ros2::small());
-}
-
-#[test]
-fn ros2_who_comes_late_hears_what_is_said_from_then_on() {
-    promises::who_comes_late_hears_what_is_said_from_then_on(&mut Ros2::small());
-}
-
-#[test]
-fn ros2_a_peer_that_goes_away_harms_nobody_else() {
-    promises::a_peer_that_goes_away_harms_nobody_else(&mut Ros2::small());
-}
-
-#[test]
-fn ros2_who_comes_back_is_heard_again() {
-    promises::who_comes_back_is_heard_again(&mut Ros2::small());
-}
-
-/// As one array; ten of them get targets, a topic each.
-#[test]
-fn ros2_a_thousand_robots_are_carried() {
+/// Large swarms as one array; ten of them get targets, a topic each.
+fn large() -> (Ros2, Vec<usize>) {
     let swarm = row(1000, &["node.pose_type=pose-array", "node.pose_topic=/poses"]);
     let served: Vec<usize> = (0..1000).step_by(100).collect();
-    promises::a_thousand_robots_are_carried(&mut Ros2::new(swarm, served.clone()), &served);
+    (Ros2::new(swarm, served.clone()), served)
 }
 
-#[test]
-fn ros2_who_does_not_listen_holds_nobody_up() {
-    promises::who_does_not_listen_holds_nobody_up(&mut Ros2::small());
-}
-
-#[test]
-fn ros2_a_pose_that_is_not_finite_moves_nobody() {
-    let (mut control, part) = control_of(&row(3, &[]));
-    promises::a_pose_that_is_not_finite_moves_nobody(&mut Ros2::small(), &mut control, &part);
-}
+kept!(Ros2::small(), Ros2::new(row(3, &MEASURED), vec![0, 1, 2]), large());

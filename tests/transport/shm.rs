@@ -8,7 +8,7 @@ use flockform::swarm::transport::{ControllerEnd, Received, RobotsEnd};
 use flockform::swarm::watch::Range;
 use iceoryx2::prelude::{ZeroCopySend, ipc};
 
-use super::promises;
+use super::promises::kept;
 use super::support::*;
 
 struct Shm {
@@ -50,15 +50,7 @@ impl Transport for Shm {
     }
 }
 
-#[test]
-fn shm_poses_come_in_order_and_the_newest_comes() {
-    promises::poses_come_in_order_and_the_newest_comes(&mut Shm::new(3));
-}
-
-#[test]
-fn shm_ranges_come_as_they_were_measured() {
-    promises::ranges_come_as_they_were_measured(&mut Shm { more: &MEASURED, ..Shm::new(3) });
-}
+kept!(Shm::new(3), Shm { more: &MEASURED, ..Shm::new(3) }, (Shm::new(1000), (0..1000).collect()));
 
 #[test]
 fn ranges_by_or_of_nobody_are_left_out_and_counted() {
@@ -73,43 +65,6 @@ fn ranges_by_or_of_nobody_are_left_out_and_counted() {
     assert_eq!(controller.refused(), 2);
     let unequipped = Robots::open(shm.peer(), "row", 3).expect("an end").send_ranges(1.0, &[range(0, 1)]);
     assert!(unequipped.expect_err("no rangefinders").to_string().contains("ranges"));
-}
-
-#[test]
-fn shm_targets_reach_their_robots_to_the_bit() {
-    promises::targets_reach_their_robots_to_the_bit(&mut Shm::new(3));
-}
-
-#[test]
-fn shm_who_comes_late_hears_what_is_said_from_then_on() {
-    promises::who_comes_late_hears_what_is_said_from_then_on(&mut Shm::new(3));
-}
-
-#[test]
-fn shm_a_peer_that_goes_away_harms_nobody_else() {
-    promises::a_peer_that_goes_away_harms_nobody_else(&mut Shm::new(3));
-}
-
-#[test]
-fn shm_who_comes_back_is_heard_again() {
-    promises::who_comes_back_is_heard_again(&mut Shm::new(3));
-}
-
-#[test]
-fn shm_a_thousand_robots_are_carried() {
-    let all: Vec<usize> = (0..1000).collect();
-    promises::a_thousand_robots_are_carried(&mut Shm::new(1000), &all);
-}
-
-#[test]
-fn shm_who_does_not_listen_holds_nobody_up() {
-    promises::who_does_not_listen_holds_nobody_up(&mut Shm::new(3));
-}
-
-#[test]
-fn shm_a_pose_that_is_not_finite_moves_nobody() {
-    let (mut control, part) = control_of(&row(3, &[]));
-    promises::a_pose_that_is_not_finite_moves_nobody(&mut Shm::new(3), &mut control, &part);
 }
 
 #[test]

@@ -1,6 +1,8 @@
 //! Curves and points over two axes, each linear or logarithmic: what a solver, a trade or a threshold
 //! looks like. Drawn here and not by a crate of charts: axes, ticks, fonts and colours are those of the figures of bodies.
 
+use serde::Serialize;
+
 use super::axes::Axes;
 use super::heading::{Heading, Key, Mark};
 use super::page;
@@ -13,16 +15,31 @@ const TEXT: f64 = 12.0;
 const TICK: f64 = 5.0;
 const GRID: &str = "#e6e8eb";
 
+/// Points of a line that a page can show; a longer one keeps the extremes of each stretch.
+const MOST_POINTS: usize = 1500;
+
 /// The quantity of an axis, and its scale.
-#[derive(Clone, Copy, Debug)]
-pub struct Axis<'a> {
-    pub quantity: &'a str,
-    pub unit: &'a str,
+#[derive(Clone, Debug, Serialize)]
+pub struct Axis {
+    pub quantity: String,
+    pub unit: String,
+    #[serde(rename = "log")]
     pub is_log: bool,
 }
 
+impl Axis {
+    pub fn new(quantity: impl Into<String>, unit: impl Into<String>) -> Self {
+        Self { quantity: quantity.into(), unit: unit.into(), is_log: false }
+    }
+
+    pub fn log(quantity: impl Into<String>, unit: impl Into<String>) -> Self {
+        Self { is_log: true, ..Self::new(quantity, unit) }
+    }
+}
+
 /// The style of a series.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Style {
     Line,
     Dots,
@@ -34,41 +51,76 @@ pub enum Style {
 }
 
 /// A set of points, in the legend if it has a name; those that an axis cannot show (zero on a logarithmic one) are left out.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize)]
 pub struct Series {
     pub name: String,
     pub colour: &'static str,
     pub style: Style,
     pub points: Vec<[f64; 2]>,
+    /// A label of each point on a page; empty where its coordinates suffice.
+    pub labels: Vec<String>,
+}
+
+impl Series {
+    pub fn new(name: impl Into<String>, colour: &'static str, style: Style, points: Vec<[f64; 2]>) -> Self {
+        Self { name: name.into(), colour, style, points, labels: Vec::new() }
+    }
 }
 
 /// A value on the horizontal axis that deserves a line and a word.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize)]
 pub struct Landmark {
     pub x: f64,
     /// Of one line or several.
     pub name: String,
+    #[serde(skip)]
     pub colour: &'static str,
 }
 
-#[derive(Clone, Debug)]
-pub struct Chart<'a> {
+/// A chart as a figure, and as data that a page draws.
+#[derive(Clone, Debug, Serialize)]
+pub struct Chart {
     pub title: String,
     pub note: String,
-    pub axes: [Axis<'a>; 2],
+    pub x: Axis,
+    pub y: Axis,
     pub series: Vec<Series>,
     pub landmarks: Vec<Landmark>,
+    /// Whether the horizontal axis is the clock of the page's animation.
+    pub follows_clock: bool,
+}
+
+impl Chart {
+    pub fn new(
+        title: impl Into<String>,
+        note: impl Into<String>,
+        [x, y]: [Axis; 2],
+        series: Vec<Series>,
+    ) -> Self {
+        let (title, note) = (title.into(), note.into());
+        Self { title, note, x, y, series, landmarks: Vec::new(), follows_clock: false }
+    }
+
+    /// As a page shows it: of long lines what can be seen, landmarks in one line.
+    pub fn on_page(&self) -> Self {
+        let mut chart = self.clone();
+        for series in chart.series.iter_mut().filter(|series| series.style == Style::Line) {
+            series.points = thinned(&series.points);
+        }
+        chart.landmarks.iter_mut().for_each(|mark| mark.name = mark.name.replace('\n', ", "));
+        chart
+    }
 }
 
 /// Draws a chart.
-pub fn draw(chart: &Chart<'_>) -> String {
+pub fn draw(chart: &Chart) -> String {
     let mut svg = Svg::new(page::WIDTH, height(chart));
     draw_on(&mut svg, chart);
     svg.finish()
 }
 
 /// Draws several charts on one sheet, in this order from the top.
-pub fn draw_below_each_other(charts: &[Chart<'_>]) -> String {
+pub fn draw_below_each_other(charts: &[Chart]) -> String {
     let mut svg = Svg::new(page::WIDTH, charts.iter().map(height).sum());
     let mut top = 0.0;
     for chart in charts {
@@ -78,11 +130,11 @@ pub fn draw_below_each_other(charts: &[Chart<'_>]) -> String {
     svg.finish()
 }
 
-fn height(chart: &Chart<'_>) -> f64 {
+fn height(chart: &Chart) -> f64 {
     heading(chart).height(page::WIDTH) + 4.0 + HEIGHT + Axes::BELOW
 }
 
-fn heading(chart: &Chart<'_>) -> Heading {
+fn heading(chart: &Chart) -> Heading {
     let mark = |style: Style| match style {
         Style::Line => Mark::Line,
         Style::Dots | Style::Beads => Mark::Dot,
@@ -97,7 +149,7 @@ fn heading(chart: &Chart<'_>) -> Heading {
     Heading { title: chart.title.clone(), note: chart.note.clone(), legend, ..Heading::default() }
 }
 
-fn draw_on(svg: &mut Svg, chart: &Chart<'_>) {
+fn draw_on(svg: &mut Svg, chart: &Chart) {
     let heading = heading(chart);
     let top = heading.height(page::WIDTH) + 4.0;
     let mut axes = window(chart);
@@ -105,8 +157,8 @@ fn draw_on(svg: &mut Svg, chart: &Chart<'_>) {
     axes.corner = [left, top];
     axes.size = [page::WIDTH - left - RIGHT, HEIGHT];
     heading.draw(svg, page::WIDTH);
-    draw_horizontal(svg, chart.axes[0], &axes);
-    draw_vertical(svg, chart.axes[1], &axes, left);
+    draw_horizontal(svg, &chart.x, &axes);
+    draw_vertical(svg, &chart.y, &axes, left);
     for landmark in &chart.landmarks {
         draw_landmark(svg, chart, &axes, landmark);
     }
@@ -117,19 +169,19 @@ fn draw_on(svg: &mut Svg, chart: &Chart<'_>) {
 }
 
 /// A value as the axes count it; `None` where they cannot show it.
-fn on_axis(axis: Axis<'_>, value: f64) -> Option<f64> {
+fn on_axis(axis: &Axis, value: f64) -> Option<f64> {
     let value = if axis.is_log { value.log10() } else { value };
     value.is_finite().then_some(value)
 }
 
-fn on_axes(chart: &Chart<'_>, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
-    Some([on_axis(chart.axes[0], x)?, on_axis(chart.axes[1], y)?])
+fn on_axes(chart: &Chart, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
+    Some([on_axis(&chart.x, x)?, on_axis(&chart.y, y)?])
 }
 
 /// The axes around everything shown, their place still to be given.
-fn window(chart: &Chart<'_>) -> Axes {
+fn window(chart: &Chart) -> Axes {
     let shown = || chart.series.iter().flat_map(|s| &s.points).filter_map(|&p| on_axes(chart, p));
-    let marked: Vec<f64> = chart.landmarks.iter().filter_map(|m| on_axis(chart.axes[0], m.x)).collect();
+    let marked: Vec<f64> = chart.landmarks.iter().filter_map(|m| on_axis(&chart.x, m.x)).collect();
     let range = |k: usize| {
         let values = shown().map(|p| p[k]).chain(if k == 0 { marked.clone() } else { Vec::new() });
         let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
@@ -146,13 +198,13 @@ fn window(chart: &Chart<'_>) -> Axes {
 }
 
 /// Positions of ticks as the axes count, with their labels (none for a minor tick).
-fn ticks(axis: Axis<'_>, low: f64, high: f64, most: f64) -> (Vec<(f64, String)>, String) {
+fn ticks(axis: &Axis, low: f64, high: f64, most: f64) -> (Vec<(f64, String)>, String) {
     if !axis.is_log || high - low < 0.7 {
         // Within less than a decade powers of ten would leave the axis bare.
         let exponential = |value: f64| if axis.is_log { 10f64.powf(value) } else { value };
         let ticks = Ticks::within(exponential(low), exponential(high), most);
         let at = |value: f64| Some((on_axis(axis, value)?, ticks.label(value)));
-        let name = ticks.axis_name(axis.quantity, axis.unit);
+        let name = ticks.axis_name(&axis.quantity, &axis.unit);
         return (ticks.values.iter().filter_map(|&value| at(value)).collect(), name);
     }
     let (first, last) = (low.ceil() as i32, high.floor() as i32);
@@ -167,24 +219,24 @@ fn ticks(axis: Axis<'_>, low: f64, high: f64, most: f64) -> (Vec<(f64, String)>,
         }
     }
     marks.retain(|(at, _)| (low..=high).contains(at));
-    let name = match axis.unit {
-        "" => axis.quantity.to_owned(),
+    let name = match &axis.unit[..] {
+        "" => axis.quantity.clone(),
         unit => format!("{} [{unit}]", axis.quantity),
     };
     (marks, name)
 }
 
-fn vertical_ticks(chart: &Chart<'_>, axes: &Axes) -> (Vec<(f64, String)>, String) {
-    ticks(chart.axes[1], axes.low[1], axes.high[1], 9.0)
+fn vertical_ticks(chart: &Chart, axes: &Axes) -> (Vec<(f64, String)>, String) {
+    ticks(&chart.y, axes.low[1], axes.high[1], 9.0)
 }
 
-fn room_on_the_left(chart: &Chart<'_>, axes: &Axes) -> f64 {
+fn room_on_the_left(chart: &Chart, axes: &Axes) -> f64 {
     let (marks, _) = vertical_ticks(chart, axes);
     let widest = marks.iter().map(|(_, label)| super::svg::text_width(label, TEXT)).fold(0.0, f64::max);
     widest + TICK + 36.0
 }
 
-fn draw_horizontal(svg: &mut Svg, axis: Axis<'_>, axes: &Axes) {
+fn draw_horizontal(svg: &mut Svg, axis: &Axis, axes: &Axes) {
     let (marks, name) = ticks(axis, axes.low[0], axes.high[0], 10.0);
     let bottom = axes.corner[1] + axes.size[1];
     for (value, label) in &marks {
@@ -200,7 +252,7 @@ fn draw_horizontal(svg: &mut Svg, axis: Axis<'_>, axes: &Axes) {
     svg.text([middle, bottom + 37.0], Anchor::Middle, TEXT + 1.0, INK, &name);
 }
 
-fn draw_vertical(svg: &mut Svg, axis: Axis<'_>, axes: &Axes, room: f64) {
+fn draw_vertical(svg: &mut Svg, axis: &Axis, axes: &Axes, room: f64) {
     let (marks, name) = ticks(axis, axes.low[1], axes.high[1], 9.0);
     let [left, right] = [axes.corner[0], axes.corner[0] + axes.size[0]];
     for (value, label) in &marks {
@@ -215,8 +267,8 @@ fn draw_vertical(svg: &mut Svg, axis: Axis<'_>, axes: &Axes, room: f64) {
     svg.upward_text([left - room + 14.0, axes.corner[1] + axes.size[1] / 2.0], TEXT + 1.0, &name);
 }
 
-fn draw_landmark(svg: &mut Svg, chart: &Chart<'_>, axes: &Axes, landmark: &Landmark) {
-    let Some(x) = on_axis(chart.axes[0], landmark.x) else { return };
+fn draw_landmark(svg: &mut Svg, chart: &Chart, axes: &Axes, landmark: &Landmark) {
+    let Some(x) = on_axis(&chart.x, landmark.x) else { return };
     let at = axes.place([x, axes.high[1]]);
     let stroke = format!("stroke=\"{}\" stroke-dasharray=\"5 3\"", landmark.colour);
     svg.group(stroke, |svg| svg.line(at, [at[0], axes.corner[1] + axes.size[1]]));
@@ -228,7 +280,7 @@ fn draw_landmark(svg: &mut Svg, chart: &Chart<'_>, axes: &Axes, landmark: &Landm
     }
 }
 
-fn draw_series(svg: &mut Svg, chart: &Chart<'_>, axes: &Axes, series: &Series) {
+fn draw_series(svg: &mut Svg, chart: &Chart, axes: &Axes, series: &Series) {
     let places: Vec<[f64; 2]> =
         series.points.iter().filter_map(|&p| on_axes(chart, p)).map(|p| axes.place(p)).collect();
     if matches!(series.style, Style::Line | Style::Front) {
@@ -250,39 +302,55 @@ fn draw_series(svg: &mut Svg, chart: &Chart<'_>, axes: &Axes, series: &Series) {
 }
 
 /// A solver's residual, iteration by iteration.
-pub fn residuals(title: &str, solver: &str, residuals: &[f64]) -> String {
+pub fn residuals(residuals: &[f64]) -> Chart {
     let points = residuals.iter().enumerate().map(|(n, &residual)| [n as f64, residual]).collect();
-    draw(&Chart {
-        title: title.to_owned(),
-        note: format!("residual of {solver}, {} iterations", residuals.len().saturating_sub(1)),
-        axes: [
-            Axis { quantity: "iteration", unit: "", is_log: false },
-            Axis { quantity: "residual force over load", unit: "", is_log: true },
-        ],
-        series: vec![Series {
-            name: solver.to_owned(),
-            colour: super::colour::SERIES[0],
-            style: Style::Line,
-            points,
-        }],
-        landmarks: Vec::new(),
-    })
+    Chart::new(
+        "Convergence of the solver",
+        "residual force over the load's",
+        [Axis::new("iteration", ""), Axis::log("residual", "")],
+        vec![Series::new("", super::colour::SERIES[0], Style::Line, points)],
+    )
+}
+
+/// The same as a figure that stands alone.
+pub fn draw_residuals(title: &str, solver: &str, values: &[f64]) -> String {
+    let mut chart = residuals(values);
+    chart.title = title.to_owned();
+    chart.note = format!("residual of {solver}, {} iterations", values.len().saturating_sub(1));
+    chart.y.quantity = "residual force over load".into();
+    chart.series[0].name = solver.to_owned();
+    draw(&chart)
+}
+
+/// Of a long line, the ends and extremes of each stretch.
+fn thinned(line: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    let finite: Vec<[f64; 2]> = line.iter().copied().filter(|point| point[1].is_finite()).collect();
+    if finite.len() <= MOST_POINTS {
+        return finite;
+    }
+    let mut kept = vec![finite[0]];
+    for run in finite.chunks(finite.len().div_ceil(MOST_POINTS / 2)) {
+        let by_height = |a: &&[f64; 2], b: &&[f64; 2]| a[1].total_cmp(&b[1]);
+        let mut extremes: Vec<[f64; 2]> = [run.iter().min_by(by_height), run.iter().max_by(by_height)]
+            .into_iter()
+            .flatten()
+            .copied()
+            .collect();
+        extremes.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        kept.extend(extremes);
+    }
+    kept.extend(finite.last());
+    kept.dedup();
+    kept
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn chart(points: Vec<[f64; 2]>) -> Chart<'static> {
-        let axis = |quantity| Axis { quantity, unit: "s", is_log: true };
-        let series = Series { name: "a < b".into(), colour: "#000000", style: Style::Front, points };
-        Chart {
-            title: "T".into(),
-            note: String::new(),
-            axes: [axis("time"), axis("error")],
-            series: vec![series],
-            landmarks: Vec::new(),
-        }
+    fn chart(points: Vec<[f64; 2]>) -> Chart {
+        let series = Series::new("a < b", "#000000", Style::Front, points);
+        Chart::new("T", "", [Axis::log("time", "s"), Axis::log("error", "s")], vec![series])
     }
 
     #[test]
@@ -308,5 +376,15 @@ mod tests {
             "its axes have their names: {svg}"
         );
         assert!(!svg.contains("NaN") && !svg.contains("inf") && !svg.contains("<circle"), "{svg}");
+    }
+
+    #[test]
+    fn a_thinned_line_keeps_its_ends_and_its_peaks() {
+        let mut line: Vec<[f64; 2]> = (0..100_000).map(|n| [f64::from(n), 0.0]).collect();
+        line[54_321][1] = -3.0;
+        let kept = thinned(&line);
+        assert!(kept.len() <= MOST_POINTS + 2, "{}", kept.len());
+        assert!(kept.contains(&[54_321.0, -3.0]));
+        assert_eq!([kept[0][0], kept[kept.len() - 1][0]], [0.0, 99_999.0]);
     }
 }

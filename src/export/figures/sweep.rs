@@ -125,20 +125,13 @@ fn lines(swept: &Swept<'_>, key: &Column) -> String {
         let mut points: Vec<[f64; 2]> = pairs.filter_map(|(&x, &y)| Some([x?, y?])).collect();
         points.sort_by(|a, b| a[0].total_cmp(&b[0]));
         let heading = swept.heading(output);
-        let series = |style| Series { name: String::new(), colour: SERIES[n], style, points: points.clone() };
+        let series = |style| Series::new("", SERIES[n], style, points.clone());
         // The line shows how it goes, the dots where it is known.
         let series =
             if style == Style::Line { vec![series(style), series(Style::Dots)] } else { vec![series(style)] };
-        Chart {
-            title: if n == 0 { heading.title } else { String::new() },
-            note: heading.note,
-            axes: [
-                Axis { quantity: &key.name, unit: "", is_log: key.is_log },
-                Axis { quantity: &output.name, unit: "", is_log: false },
-            ],
-            series,
-            landmarks: Vec::new(),
-        }
+        let x = Axis { is_log: key.is_log, ..Axis::new(&key.name, "") };
+        let title = if n == 0 { heading.title } else { String::new() };
+        Chart::new(title, heading.note, [x, Axis::new(&output.name, "")], series)
     });
     draw_below_each_other(&charts.collect::<Vec<_>>())
 }

@@ -151,27 +151,10 @@ fn facts(scene: &Scene, report: &ComparisonReport) -> Vec<(String, String)> {
 }
 
 fn measures(report: &ComparisonReport) -> Table {
-    let c = &report.comparison;
-    let percent = |part: f64| format!("{} %", number(100.0 * part));
-    let part = |part: Option<f64>| part.map_or("not known".to_owned(), percent);
-    let rows = [
-        ("Displacement, relative L2", percent(c.displacement_rel_l2)),
-        ("… of which discretisation", part(c.parts.discretisation)),
-        ("… of which outline of the cells", part(c.parts.outline)),
-        ("… of which solver", part(c.parts.solver)),
-        ("The truth's own error, stated", part(c.truth_stated_rel_l2)),
-        ("Displacement, largest error over the largest", percent(c.displacement_max_rel)),
-        ("Von Mises stress, relative L2", percent(c.von_mises_rel_l2)),
-        ("Energy norm of the error", part(c.energy_norm_rel)),
-        ("… at the corners of the cells alone", percent(c.energy_rel)),
-        ("Strain energy by the rule", number(c.strain_energy_rule)),
-        ("Strain energy in truth", c.strain_energy_truth.map_or("not known".to_owned(), number)),
-        ("Time, rule", format!("{} s", number(c.seconds_rule))),
-        ("Time, truth", format!("{} s", number(c.seconds_truth))),
-    ];
+    let rows = report.comparison.rows(|part| format!("{} %", number(100.0 * part)), number);
     Table {
         caption: "How far the rule is from the truth".into(),
         head: vec!["measure".into(), "value".into()],
-        rows: rows.map(|(name, value)| vec![name.into(), value]).into(),
+        rows: rows.map(|(name, value)| vec![name.replace("  ", "\u{2026} "), value]).into(),
     }
 }

@@ -8,7 +8,6 @@ use super::super::{OutputFolder, flight};
 use super::encoded;
 use super::frames::{Channel, Frame, Frames};
 use super::page::{Page, Table, number, scene_text};
-use super::plot::Plot;
 use super::view::{Animation, Clock, Outline, Quantity, View};
 use crate::flock::role::Role;
 use crate::flock::vectors::{Vectors, distance};
@@ -224,13 +223,14 @@ pub fn write(
     report: &FlightReport,
     stage: View,
 ) -> Result<PathBuf, ExportError> {
-    let mut plots: Vec<Plot> =
-        flight::charts(record, report).iter().map(|chart| Plot::of(chart, true)).collect();
-    // As a figure the chart bears the flight's title; the page has that already.
-    plots
-        .iter_mut()
-        .filter(|plot| plot.title == report.title)
-        .for_each(|plot| plot.title = plot.y.quantity.clone());
+    let mut plots = flight::charts(record, report);
+    for plot in &mut plots {
+        plot.follows_clock = true;
+        // As a figure the chart bears the flight's title; the page has that already.
+        if plot.title == report.title {
+            plot.title.clone_from(&plot.y.quantity);
+        }
+    }
     let broken = report.bounds.iter().filter(|verdict| !verdict.holds).count();
     let verdict = match (report.bounds.len(), broken) {
         (0, _) => None,
@@ -271,35 +271,10 @@ fn note(animation: &Animation, report: &FlightReport) -> String {
 }
 
 fn facts(report: &FlightReport) -> Vec<(String, String)> {
-    let mut facts = Vec::new();
-    let mut fact = |name: &str, value: String| facts.push((name.to_owned(), value));
-    fact("Robots", format!("{} ({}), {} of them lead", report.robots, report.model, report.leaders));
-    fact("Flown", format!("{} s", number(report.seconds)));
-    let pair =
-        |[largest, last]: [f64; 2]| format!("largest {} m, at the end {} m", number(largest), number(last));
-    if let Some(error) = report.affine_error {
-        fact("From the leaders' affine motion", pair(error));
-    }
-    if let Some(error) = report.formation_error {
-        fact("From where the rule comes to rest", pair(error));
-    }
-    if let Some(error) = report.continuum_error {
-        fact("From the continuum run", format!("largest {} m", number(error)));
-    }
-    let settled = match report.settling_time {
-        Some(time) => format!("{} s to within {} m", number(time), number(report.settled_within)),
-        None => format!("never within {} m", number(report.settled_within)),
-    };
-    fact("Settling time", settled);
-    if let Some(clearance) = report.clearance {
-        let closest = report.closest.as_ref().map_or(String::new(), |moment| format!(": {moment}"));
-        fact("Smallest clearance", format!("{} m{closest}", number(clearance)));
-    }
-    fact("Way", format!("mean {} m, longest {} m", number(report.way[0]), number(report.way[1])));
-    if report.most_lost > 0 {
-        fact("Robots lost", format!("{} at one time", report.most_lost));
-    }
-    facts
+    let robots = format!("{} ({}), {} of them lead", report.robots, report.model, report.leaders);
+    let first = [("Robots", robots), ("Flown", format!("{} s", number(report.seconds)))];
+    let facts = first.into_iter().chain(report.facts(number));
+    facts.map(|(name, value)| (name.to_owned(), value)).collect()
 }
 
 fn tables(report: &FlightReport) -> Vec<Table> {

@@ -1,7 +1,7 @@
 //! `report.html`: the results of a run, a flight, a comparison or a study as one page that opens by double
 //! click, without network or server.
 //!
-//! A page shows bodies in motion ([`view::View`]), charts (`plot`) and tables. The frames of an animation are kept
+//! A page shows bodies in motion ([`view::View`]), charts and tables. The frames of an animation are kept
 //! while the run goes on (`frames`), at an interval that doubles when there are too many, as displacements in whole
 //! multiples of a power of two (`quantized_channel`), and written as differences, deflated (`encode`). The page
 //! computes PE1, strain and stress from displacements; the values at the end are written to the last bit, as in
@@ -17,7 +17,7 @@ pub mod flight;
 pub(crate) mod frames;
 pub mod gallery;
 pub mod page;
-pub(crate) mod plot;
+mod probes;
 pub(crate) mod quantized_channel;
 pub mod run;
 pub mod stability;

@@ -12,8 +12,9 @@ use serde_json::json;
 
 use super::super::OutputFolder;
 use super::super::error::ExportError;
+use super::super::figures::chart::Chart;
+pub(super) use super::super::figures::escaped;
 use super::super::manifest::create_buffered;
-use super::plot::Plot;
 use super::view::View;
 
 /// Name of the file.
@@ -67,7 +68,7 @@ pub(crate) struct Page {
     pub stages: Vec<View>,
     /// The frames that are shown, and those that are left out.
     pub note: String,
-    pub plots: Vec<Plot>,
+    pub plots: Vec<Chart>,
     /// Names and values.
     pub facts: Vec<(String, String)>,
     pub tables: Vec<Table>,
@@ -121,7 +122,9 @@ impl Page {
     /// Texts for the template, by name.
     fn parts(&self, command: &str) -> [(&'static str, String); 14] {
         let stages: Vec<_> = self.stages.iter().map(|stage| &stage.animation).collect();
-        let data = in_script(&json!({ "stages": stages, "plots": self.plots, "live": self.live }));
+        let data = in_script(
+            &json!({ "stages": stages, "plots": self.plots.iter().map(Chart::on_page).collect::<Vec<_>>(), "live": self.live }),
+        );
         let live = if self.live.is_some() { &LIVE_SCRIPTS[..] } else { &[] };
         let script: String = SCRIPTS.iter().chain(live).map(|module| joined(module)).collect();
         [
@@ -201,10 +204,6 @@ pub(super) fn filled(template: &str, parts: &[(&str, String)]) -> String {
     page
 }
 
-pub(super) fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
-}
-
 fn table_html(table: &Table) -> String {
     let heads: String =
         table.head.iter().map(|name| format!("<th scope=\"col\">{}</th>", escaped(name))).collect();
@@ -226,7 +225,7 @@ fn table_html(table: &Table) -> String {
 }
 
 /// Up to six digits, without zeros at the end; small and large ones with a power of ten.
-pub(super) fn number(value: f64) -> String {
+pub fn number(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
         return if value.is_finite() { "0".into() } else { value.to_string() };
     }
@@ -265,12 +264,13 @@ mod tests {
     use std::collections::BTreeSet;
 
     use super::*;
+    use crate::export::figures::chart::Axis;
 
     #[test]
     fn a_page_stays_valid_with_any_title() {
         let title = "</script><b>{{script}}\"&".to_owned();
         let page = Page { title: title.clone(), command: "run".into(), ..Page::default() };
-        let plot = Plot { title, ..crate::export::report::plot::tests_plot() };
+        let plot = Chart::new(title, "", [Axis::new("x", ""), Axis::new("x", "")], Vec::new());
         let html = Page { plots: vec![plot], ..page }.html();
         assert!(!html.contains("<b>") && html.contains("&lt;/script&gt;&lt;b&gt;{{script}}"));
         assert_eq!(html.matches("</html>").count(), 1);

@@ -8,14 +8,14 @@ use serde::{Deserialize, Serialize};
 
 use super::super::bonds::pairs;
 use super::super::error::ExportError;
-use super::super::figures::SERIES;
+use super::super::figures::chart;
 use super::super::load;
-use super::super::{OutputFolder, Results, Summary};
+use super::super::{OutputFolder, Results, Signed, Summary};
 use super::encode::GROUP;
 use super::encoded;
 use super::frames::{Channel, Frame, Frames, MOST_FRAMES};
 use super::page::{Page, number, scene_text};
-use super::plot::{self, Plot, PlotAxis, PlotSeries};
+use super::probes;
 use super::view::{Animation, Clock, Quantity, Stress, View};
 use crate::continuum::mechanics::Stresses;
 use crate::continuum::memory::{measured, neighbour_entries};
@@ -399,10 +399,10 @@ pub fn write(
     stage: View,
 ) -> Result<PathBuf, ExportError> {
     let (scene, outcome) = (results.scene, results.outcome);
-    let mut plots = plot::of_probes(results.probes, outcome.engine.body(), scene.unit());
+    let mut plots = probes::charts(results.probes, outcome.engine.body(), scene.unit());
     let units = Units::of(scene);
-    plots.extend(load::chart(scene, &units, results.load_steps).map(|chart| Plot::of(&chart, false)));
-    plots.extend(outcome.solved.as_ref().map(|solved| residuals(&solved.residuals)));
+    plots.extend(load::chart(scene, &units, results.load_steps));
+    plots.extend(outcome.solved.as_ref().map(|solved| chart::residuals(&solved.residuals)));
     let page = Page {
         title: scene.raw.title.clone(),
         command: format!("flockform run {}", scene.name),
@@ -420,16 +420,15 @@ pub fn write(
 }
 
 fn verdict(outcome: &Outcome) -> (bool, String) {
-    let step = outcome.engine.step();
-    match &outcome.reason {
-        StopReason::Equilibrium if outcome.solved.is_some() => (true, "in equilibrium".into()),
-        StopReason::Equilibrium => (true, format!("in equilibrium at step {step}")),
-        StopReason::Steps => (true, format!("all {step} steps done")),
-        StopReason::Unsettled => (false, "the solver ended short of its tolerance".into()),
-        StopReason::Stuck(why) => (false, format!("in equilibrium at increment {step}, but not {why}")),
-        StopReason::Interrupted => (false, format!("interrupted at step {step}")),
-        StopReason::Diverged(divergence) => (false, divergence.to_string()),
-    }
+    let (reason, step) = (&outcome.reason, outcome.engine.step());
+    let words = match reason {
+        StopReason::Equilibrium if outcome.solved.is_none() => format!("{reason} at step {step}"),
+        StopReason::Interrupted => format!("{reason} at step {step}"),
+        StopReason::Steps => format!("all {step} steps done"),
+        StopReason::Stuck(_) => format!("in equilibrium at increment {step}, but {reason}"),
+        _ => reason.to_string(),
+    };
+    (reason.is_good(), words)
 }
 
 /// A sentence on the frames that are shown and those that are not.
@@ -463,26 +462,6 @@ fn note(animation: &Animation, outcome: &Outcome, is_solved: bool) -> String {
         " At the last frame the numbers are those of final.csv, to the last digit."
     };
     note
-}
-
-fn residuals(residuals: &[f64]) -> Plot {
-    let points = residuals.iter().enumerate().map(|(n, &residual)| [n as f64, residual]).collect();
-    let axis = |quantity: &str, log| PlotAxis { quantity: quantity.into(), unit: String::new(), log };
-    Plot {
-        title: "Convergence of the solver".into(),
-        note: "residual force over the load's".into(),
-        x: axis("iteration", false),
-        y: axis("residual", true),
-        series: vec![PlotSeries {
-            name: String::new(),
-            colour: SERIES[0].into(),
-            style: "line",
-            points,
-            labels: Vec::new(),
-        }],
-        landmarks: Vec::new(),
-        follows_clock: false,
-    }
 }
 
 fn facts(scene: &Scene, outcome: &Outcome, summary: &Summary) -> Vec<(String, String)> {
@@ -538,7 +517,7 @@ fn texts(scene: &Scene, summary: &Summary) -> Vec<(String, String)> {
         texts.push(("Notes of the scene".into(), scene.raw.notes.trim().to_owned()));
     }
     texts.push(("Scene, with its defaults and overrides".into(), scene_text(&scene.raw)));
-    let mut value = serde_json::to_value(summary).unwrap_or_default();
+    let mut value = serde_json::to_value(Signed::new(summary)).unwrap_or_default();
     if let serde_json::Value::Object(table) = &mut value {
         table.remove("scene");
     }

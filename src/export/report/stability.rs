@@ -6,7 +6,6 @@ use super::super::OutputFolder;
 use super::super::error::ExportError;
 use super::super::stability::panels;
 use super::page::{Page, Table, number};
-use super::plot::Plot;
 use crate::study::stability::extremes::Outcome;
 use crate::study::stability::study::Study;
 
@@ -21,12 +20,11 @@ pub fn write(folder: &OutputFolder, study: &Study) -> Result<PathBuf, ExportErro
     } else {
         "predictions and runs disagree, or an extreme is wrong"
     };
-    let charts = study.linear.iter().flat_map(|linear| panels(study, linear));
     let page = Page {
         title: study.title.clone(),
         command: format!("flockform stability {}", study.name),
         verdict: Some((holds, words.into())),
-        plots: charts.map(|chart| Plot::of(&chart, false)).collect(),
+        plots: study.linear.iter().flat_map(|linear| panels(study, linear)).collect(),
         facts: facts(study),
         tables: tables(study),
         texts: vec![("The study in words".into(), study.to_string())],

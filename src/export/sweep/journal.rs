@@ -56,7 +56,7 @@ impl SweepRequest {
 
 /// A sweep that has begun: the request, and which scene it is of.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Begun {
+pub struct JournalHeader {
     program: String,
     version: String,
     /// Of the scene without the variations, as text.
@@ -67,11 +67,11 @@ pub struct Begun {
     pub request: SweepRequest,
 }
 
-impl Begun {
+impl JournalHeader {
     /// A sweep of this scene, which is the one without the variations; `plan_digest` is of the first run that can be
     /// laid out.
     pub fn new(request: SweepRequest, scene: &Scene, plan_digest: Option<u64>) -> Self {
-        let (program, version) = (summary::PROGRAM.to_owned(), env!("CARGO_PKG_VERSION").to_owned());
+        let (program, version) = (summary::PROGRAM.to_owned(), summary::VERSION.to_owned());
         Self { program, version, scene_crc32: crc32(scene), plan_digest, request }
     }
 
@@ -161,13 +161,13 @@ pub enum SweepError {
 
 /// A sweep on disk.
 #[derive(Debug)]
-pub struct Found {
+pub struct StoredSweep {
     /// Where it stands.
     pub folder: PathBuf,
     /// Where its results go.
     pub out: PathBuf,
     /// The request and its scene.
-    pub begun: Begun,
+    pub begun: JournalHeader,
     /// The runs that have ended, in that order.
     pub rows: Vec<Row>,
     /// Bytes of the journal that hold them: what follows was being written.
@@ -178,7 +178,7 @@ pub struct Found {
 ///
 /// # Errors
 /// A folder without a sweep, or files that cannot be read.
-pub fn read(dir: &Path) -> Result<Found, SweepError> {
+pub fn read(dir: &Path) -> Result<StoredSweep, SweepError> {
     let stem = dir.file_stem().filter(|_| dir.extension().is_some_and(|ending| ending == "unfinished"));
     let out = stem.map_or_else(|| dir.to_owned(), |stem| dir.with_file_name(stem));
     // What a link leads to is what is replaced: an unfinished sweep stands beside that.
@@ -188,7 +188,7 @@ pub fn read(dir: &Path) -> Result<Found, SweepError> {
     let Some(folder) = candidates.into_iter().find(holds) else {
         return Err(SweepError::Nothing { unfinished: unfinished(&out), out });
     };
-    let begun: Begun = parsed(&folder.join(REQUEST), |text| Ok(serde_json::from_slice(text)?))?;
+    let begun: JournalHeader = parsed(&folder.join(REQUEST), |text| Ok(serde_json::from_slice(text)?))?;
     let (rows, whole) = parsed(&folder.join(RUNS), whole_rows)?;
     let design = begun.request.design().map_err(|error| SweepError::Unreadable {
         path: folder.join(REQUEST),
@@ -199,7 +199,7 @@ pub fn read(dir: &Path) -> Result<Found, SweepError> {
     if outputs == 0 || rows.iter().any(|row| row.run >= runs || row.outputs.len() != outputs) {
         return Err(SweepError::Foreign { folder, what: "not those of its sweep.json".to_owned() });
     }
-    Ok(Found { folder, out, begun, rows, whole })
+    Ok(StoredSweep { folder, out, begun, rows, whole })
 }
 
 /// Contents of a file of a sweep.
@@ -246,11 +246,12 @@ impl Journal {
     ///
     /// # Errors
     /// A file that cannot be written, or an unfinished sweep in the place.
-    pub fn begin(folder: &mut OutputFolder, begun: &Begun, rows: &[Row]) -> Result<Self, ExportError> {
-        let path = folder.path(REQUEST);
-        let mut text = serde_json::to_string_pretty(begun).map_err(ExportError::io("write", &path))?;
-        text.push('\n');
-        write_file(&path, text)?;
+    pub fn begin(
+        folder: &mut OutputFolder,
+        begun: &JournalHeader,
+        rows: &[Row],
+    ) -> Result<Self, ExportError> {
+        summary::write_json(folder, REQUEST, begun)?;
         let path = folder.path(RUNS);
         let lines: Result<Vec<String>, _> = rows.iter().map(line).collect();
         write_file(&path, lines.map_err(ExportError::io("write", &path))?.concat())?;
@@ -263,7 +264,7 @@ impl Journal {
     ///
     /// # Errors
     /// A file that cannot be written.
-    pub fn resume(folder: &OutputFolder, found: &Found) -> Result<Self, ExportError> {
+    pub fn resume(folder: &OutputFolder, found: &StoredSweep) -> Result<Self, ExportError> {
         let journal = Self::open(folder)?;
         {
             let file = journal.file.lock().unwrap_or_else(PoisonError::into_inner);

@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 pub(super) use journal::REQUEST;
-pub use journal::{Begun, Found, Journal, Row, SweepError, SweepRequest, read};
+pub use journal::{Journal, JournalHeader, Row, StoredSweep, SweepError, SweepRequest, read};
 pub use outputs::{Output, OutputError, Probed, Quantity, Values};
 
 use super::OutputFolder;

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::{Asked, Effect, Gradient, Material, MaterialReport, Waves, Weight};
+use super::{Effect, Gradient, Material, MaterialReport, Request, Waves, Weight};
 
 /// Width of the names of a table.
 const NAMES: usize = 26;
@@ -81,13 +81,13 @@ fn place(f: &mut fmt::Formatter<'_>, weight: &Weight) -> fmt::Result {
     write!(f, "  {i:3} {j:3}   [{x:9.5} {y:9.5}]  {:7.2} deg", settled(weight.direction))
 }
 
-impl fmt::Display for Asked {
+impl fmt::Display for Request {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Asked::Isotropic { young, poisson, plane, thickness } => {
+            Request::Isotropic { young, poisson, plane, thickness } => {
                 write!(f, "E = {young}, nu = {poisson}, plane {plane}, thickness {thickness}")
             }
-            Asked::Orthotropic { young: [along, across], poisson_12, shear, fibres, thickness } => write!(
+            Request::Orthotropic { young: [along, across], poisson_12, shear, fibres, thickness } => write!(
                 f,
                 "E1 = {along}, E2 = {across}, nu12 = {poisson_12}, G = {shear}, fibres at {fibres:.4} deg, thickness {thickness}"
             ),

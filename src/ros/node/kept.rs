@@ -5,14 +5,14 @@ use serde::{Deserialize, Serialize};
 use super::FormationNode;
 use crate::ros::edge::lifecycle::State;
 use crate::ros::edge::parameters::Value;
-use crate::swarm::control::KeptControl;
+use crate::swarm::control::ControlSnapshot;
 
 /// A node's state. Poses are not in it: they come again, and those of before would be too old.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
-pub struct KeptNode {
+pub struct NodeSnapshot {
     /// Label of its lifecycle's state.
     state: String,
-    control: KeptControl,
+    control: ControlSnapshot,
     /// Parameters that are numbers.
     parameters: Vec<(String, f64)>,
     /// Parameters that are names.
@@ -21,13 +21,13 @@ pub struct KeptNode {
 
 impl FormationNode {
     /// The state for [`FormationNode::restore`].
-    pub fn kept(&self) -> KeptNode {
+    pub fn kept(&self) -> NodeSnapshot {
         let number = |(name, value): (&str, &Value)| {
             let whole = value.as_integer().map(|number| number as f64);
             Some((name.to_owned(), value.as_double().or(whole)?))
         };
         let text = |(name, value): (&str, &Value)| Some((name.to_owned(), value.as_str()?.to_owned()));
-        KeptNode {
+        NodeSnapshot {
             state: self.lifecycle.state().label().to_owned(),
             control: self.control.kept(),
             parameters: self.parameters.iter().filter_map(number).collect(),
@@ -36,7 +36,7 @@ impl FormationNode {
     }
 
     /// Goes on from what another process left.
-    pub fn restore(&mut self, kept: KeptNode) {
+    pub fn restore(&mut self, kept: NodeSnapshot) {
         let now = self.time();
         let is_named = |(name, value): &(String, String)| {
             self.parameters.get(name).and_then(Value::as_str) == Some(value.as_str())

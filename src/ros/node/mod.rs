@@ -52,7 +52,7 @@ pub use commands::{Answer, CommandQueue, NodeCommand};
 use commands::{Commanded, MOST_AT_ONCE, not_allowed};
 use endpoints::Endpoints;
 pub use error::NodeError;
-pub use kept::KeptNode;
+pub use kept::NodeSnapshot;
 pub use link::Link;
 use origin::Origin;
 use settings::Settings;

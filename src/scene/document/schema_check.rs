@@ -8,12 +8,10 @@ use serde_json::{Map, Number, Value};
 use crate::scene::document::problem::{Problem, SceneError};
 use crate::scene::document::schema_rule::{OtherKeys, Rule, Variants, any_of, listed, one_of};
 use crate::scene::document::{Content, Document, Node, child_path, entry};
+use crate::scene::text::{nearest, renamed};
 
 /// Branches of an untagged enum are tried out only this many enums deep, since the tries multiply.
 const NESTED_TRIALS: usize = 2;
-
-/// No key is suggested for a word longer than this.
-const LONGEST_MISSPELLING: usize = 64;
 
 /// The value of `root`, a node of `document`, if it fits `schema`.
 pub(crate) fn check(document: &Document, root: &Node, schema: &Value) -> Result<Value, SceneError> {
@@ -365,48 +363,9 @@ fn kind(content: &Content) -> &'static str {
     }
 }
 
-/// Keys and choices that had another name once, with the one they have now.
-const RENAMED: [(&str, &str); 8] = [
-    ("growth", "divergence_ratio"),
-    ("kept", "balanced"),
-    ("liars", "max_faulty_neighbours"),
-    ("present", "dynamic"),
-    ("pull", "axis"),
-    ("ring", "chebyshev"),
-    ("straight", "collinear"),
-    ("truth", "reference"),
-];
-
-/// The candidate that was called `word` once.
-fn renamed<'a>(word: &str, candidates: &[&'a str]) -> Option<&'a str> {
-    let (_, now) = RENAMED.into_iter().find(|(then, _)| *then == word)?;
-    candidates.iter().copied().find(|candidate| *candidate == now)
-}
-
 /// The keys that a table could still have.
 fn free_keys<'s>(rule: &Rule<'s>, entries: &[(String, Node)]) -> Vec<&'s str> {
     rule.property_names().into_iter().filter(|key| entry(entries, key).is_none()).collect()
-}
-
-/// The candidate that `word` most probably misspells or abbreviates, if any is near enough: a mere guess would mislead
-/// more than none.
-fn nearest<'a>(word: &str, candidates: &[&'a str]) -> Option<&'a str> {
-    if word.len() > LONGEST_MISSPELLING {
-        return None;
-    }
-    let folded = |text: &str| text.to_lowercase().replace('-', "_");
-    let word = folded(word);
-    let distance = |candidate: &&'a str| {
-        let candidate = folded(candidate);
-        let distance = strsim::osa_distance(&word, &candidate);
-        let length = word.chars().count().max(candidate.chars().count());
-        let shorter = word.chars().count().min(candidate.chars().count());
-        let abbreviates = shorter >= 3 && (word.starts_with(&candidate) || candidate.starts_with(&word));
-        // Beyond a third of the letters, a suggestion is a guess.
-        (distance < length && (distance <= (length / 3).max(1) || abbreviates)).then_some(distance)
-    };
-    let scored = candidates.iter().filter_map(|candidate| Some((distance(candidate)?, *candidate)));
-    scored.min_by_key(|(distance, _)| *distance).map(|(_, candidate)| candidate)
 }
 
 #[cfg(test)]

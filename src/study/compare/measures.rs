@@ -134,18 +134,19 @@ fn ratio(error: f64, size: f64) -> f64 {
     if error == 0.0 { 0.0 } else { error / size }
 }
 
-impl fmt::Display for Comparison {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let percent = |part: f64| match 100.0 * part {
-            small if small > 0.0 && small < 1e-3 => format!("{small:.1e} %"),
-            part => format!("{part:.3} %"),
-        };
-        let largest =
-            format!("{:.4e} ({} of the largest)", self.displacement_max, percent(self.displacement_max_rel));
-        let energy_truth = self.strain_energy_truth.map_or("not known".to_owned(), |e| format!("{e:.5e}"));
-        let energies = format!("{:.5e}, truth {energy_truth}", self.strain_energy_rule);
-        let part = |part: Option<f64>| part.map_or("not known".to_owned(), percent);
-        let rows = [
+impl Comparison {
+    /// The measures under their names; `percent` writes a part of one, `number` a length or an energy.
+    pub fn rows(
+        &self,
+        percent: impl Fn(f64) -> String,
+        number: impl Fn(f64) -> String,
+    ) -> [(&'static str, String); 13] {
+        let none = || "not known".to_owned();
+        let part = |part: Option<f64>| part.map_or_else(none, &percent);
+        let largest = percent(self.displacement_max_rel);
+        let largest = format!("{} ({largest} of the largest)", number(self.displacement_max));
+        let energy_truth = self.strain_energy_truth.map_or_else(none, &number);
+        [
             ("displacement, relative L2", percent(self.displacement_rel_l2)),
             ("  of which discretisation", part(self.parts.discretisation)),
             ("  of which outline", part(self.parts.outline)),
@@ -155,11 +156,21 @@ impl fmt::Display for Comparison {
             ("von Mises, relative L2", percent(self.von_mises_rel_l2)),
             ("energy norm of the error", part(self.energy_norm_rel)),
             ("  at the cells' corners", percent(self.energy_rel)),
-            ("strain energy, rule", energies),
+            ("strain energy, rule", format!("{}, truth {energy_truth}", number(self.strain_energy_rule))),
             ("compared", format!("{} followers, {} cells", self.followers, self.cells)),
             ("time, rule", format!("{:.3} s", self.seconds_rule)),
             ("time, truth", format!("{:.3} s", self.seconds_truth)),
-        ];
+        ]
+    }
+}
+
+impl fmt::Display for Comparison {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let percent = |part: f64| match 100.0 * part {
+            small if small > 0.0 && small < 1e-3 => format!("{small:.1e} %"),
+            part => format!("{part:.3} %"),
+        };
+        let rows = self.rows(percent, |value| format!("{value:.5e}"));
         let width = rows.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
         rows.iter().try_for_each(|(name, value)| writeln!(f, "{name:width$}  {value}"))
     }

@@ -136,6 +136,31 @@ fn is_settled(sizes: &[f64]) -> bool {
     (last - before).abs() <= 0.02 * (last - 1.0).abs()
 }
 
+/// Two values between which `f` first is over, with what it is there, in strides that double from `inside` on; `None`
+/// where it is over there already, or still is not when a stride would be longer than `longest`.
+pub(super) fn bracket<T: Copy>(
+    mut f: impl FnMut(f64) -> T,
+    is_over: impl Fn(T) -> bool,
+    (inside, toward): (f64, f64),
+    longest: f64,
+) -> Option<[(f64, T); 2]> {
+    let (mut low, mut stride) = ((inside, f(inside)), toward);
+    if is_over(low.1) {
+        return None;
+    }
+    loop {
+        let next = low.0 + stride;
+        let next = (next, f(next));
+        if is_over(next.1) {
+            return Some([low, next]);
+        }
+        (low, stride) = (next, 2.0 * stride);
+        if stride.abs() > longest {
+            return None;
+        }
+    }
+}
+
 /// The value at which growth begins, to `within`, between one at which the body comes back and one beyond it.
 /// `toward` is the direction to look in and the first stride; `None` where nothing grows for thousands of
 /// strides. `progress` is called with each value before its run.
@@ -153,18 +178,8 @@ pub fn find(
         runs.push(run);
         run.grows()
     };
-    let (mut low, mut stride) = (inside, toward);
-    if grows(low) {
-        return None;
-    }
-    let mut high = low + stride;
-    while !grows(high) {
-        (low, stride) = (high, 2.0 * stride);
-        high = low + stride;
-        if stride.abs() > 4096.0 * toward.abs() {
-            return None;
-        }
-    }
+    let ends = bracket(&mut grows, |grows| grows, (inside, toward), 4096.0 * toward.abs())?;
+    let [mut low, mut high] = ends.map(|(value, _)| value);
     while (high - low).abs() > 2.0 * within {
         let middle = 0.5 * (low + high);
         if middle == low || middle == high {

@@ -8,6 +8,7 @@
 
 use serde::Serialize;
 
+use super::bisection::bracket;
 use super::subject::{Parameter, Subject};
 use crate::flock::rules::FeedbackReference;
 use crate::solve::spectrum::Ends;
@@ -72,22 +73,7 @@ pub fn predict(
         let excess = found.radius - 1.0;
         excess / (1.0 + excess.abs())
     };
-    let (inside, toward) = start(subject, parameter, side);
-    let (mut low, mut stride) = ((inside, excess(inside)), toward);
-    if low.1 > 0.0 {
-        return None;
-    }
-    let high = loop {
-        let next = low.0 + stride;
-        let over = excess(next);
-        if over > 0.0 {
-            break (next, over);
-        }
-        (low, stride) = ((next, over), 2.0 * stride);
-        if stride.abs() > 4096.0 {
-            return None;
-        }
-    };
+    let [low, high] = bracket(&mut excess, |excess| excess > 0.0, start(subject, parameter, side), 4096.0)?;
     let value = crossing(&mut excess, low, high);
     Some(Predicted { value, closed_form: closed_form(subject, parameter, side), converged })
 }

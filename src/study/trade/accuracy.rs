@@ -141,13 +141,8 @@ impl<'a> Body<'a> {
         let error = match error_of(&outcome, &self.truth.truth) {
             Some(error) => error + own,
             // Without followers there is nothing to be wrong; else some are where the truth is not.
-            None => {
-                if follows {
-                    f64::INFINITY
-                } else {
-                    0.0
-                }
-            }
+            None if follows => f64::INFINITY,
+            None => 0.0,
         };
         let converged = outcome.solved.as_ref().is_some_and(|solved| solved.converged);
         Ok(Solved { scene, error, converged, particles: outcome.engine.body().count() })

@@ -9,7 +9,7 @@ pub mod state;
 
 use serde::{Deserialize, Serialize};
 
-use super::formation::{Formation, KeptLead, Measures, Seen};
+use super::formation::{Formation, LeadSnapshot, Measures, Seen};
 use super::resilience::trim;
 use super::robots::DoubleIntegrator;
 use super::safety::{self, Filter, Flags, Limits, SafetyError};
@@ -32,22 +32,26 @@ pub enum Mode {
     Inactive,
 }
 
-/// A neighbour's pose was not usable. This flag and the next two add to those of the filter ([`Flags`]).
-pub const NEIGHBOUR_LOST: u32 = 64;
-/// Straying neighbours were left out.
-pub const TRIMMED: u32 = 128;
-/// A pose was rejected since the last tick.
-pub const POSE_REJECTED: u32 = 256;
+impl Mode {
+    /// The number in messages and in shared memory.
+    pub const fn number(self) -> u8 {
+        match self {
+            Mode::Running => 0,
+            Mode::EmergencyStopped => 2,
+            Mode::Inactive => 3,
+        }
+    }
+}
 
 /// The part of a loop's state that outlasts its process.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
-pub struct KeptControl {
+pub struct ControlSnapshot {
     is_stopped: bool,
     /// \[s\]
     program_time: f64,
     /// Periods that the programs have run.
     periods: u64,
-    leads: Vec<Option<KeptLead>>,
+    leads: Vec<Option<LeadSnapshot>>,
 }
 
 /// The filter's input where there are tracks.
@@ -297,8 +301,8 @@ impl Control {
     }
 
     /// The part of the state that outlasts the process, for [`Control::restore`].
-    pub fn kept(&self) -> KeptControl {
-        KeptControl {
+    pub fn kept(&self) -> ControlSnapshot {
+        ControlSnapshot {
             is_stopped: self.mode == Mode::EmergencyStopped,
             program_time: self.program_time(),
             periods: self.periods,
@@ -308,7 +312,7 @@ impl Control {
 
     /// Continues from the state of an earlier loop of the same swarm; an emergency stop holds every member at its
     /// next accepted pose.
-    pub fn restore(&mut self, kept: KeptControl) {
+    pub fn restore(&mut self, kept: ControlSnapshot) {
         (self.run_before, self.run, self.periods) = (kept.program_time, 0, kept.periods);
         self.formation.restore(kept.leads, kept.periods);
         if kept.is_stopped {
@@ -384,7 +388,7 @@ impl Control {
                 *flags |= self.filtered[member].0;
             }
             if std::mem::take(&mut self.rejected[member]) {
-                *flags |= POSE_REJECTED;
+                *flags |= Flags::POSE_REJECTED;
             }
         }
     }
@@ -453,7 +457,7 @@ impl Control {
             let lost = self.formation.neighbours(member).any(|k| !self.usable[k]);
             let target = if self.max_faulty > 0 {
                 let (target, trimmed) = self.resilient_target(member, &seen);
-                self.flags[member] |= if trimmed { TRIMMED } else { 0 };
+                self.flags[member] |= if trimmed { Flags::TRIMMED } else { 0 };
                 Some(target)
             } else if lost {
                 self.formation.target_among(member, &seen, |_| true)
@@ -461,7 +465,7 @@ impl Control {
                 continue;
             };
             if lost {
-                self.flags[member] |= NEIGHBOUR_LOST;
+                self.flags[member] |= Flags::NEIGHBOUR_LOST;
             }
             self.wanted.set(member, target.unwrap_or(self.present.get(member)));
         }

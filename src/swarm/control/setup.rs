@@ -62,7 +62,7 @@ pub fn watch(swarm: &Swarm, formation: &Formation, speed: f64) -> WatchLimits {
             .raw
             .ranges
             .as_ref()
-            .map(|ranges| RangeLimits { tolerance: ranges.tolerance, max_liars: ranges.max_liars }),
+            .map(|ranges| RangeLimits { tolerance: ranges.tolerance, max_faulty: ranges.max_faulty }),
         ..WatchLimits::default()
     }
 }

@@ -96,11 +96,11 @@ impl Flight {
 
     /// Flies one period.
     pub fn step(&mut self) {
-        self.step_heard(&mut |_| {});
+        self.step_with_observer(&mut |_| {});
     }
 
     /// Flies one period; `hear` receives what the control receives.
-    pub fn step_heard(&mut self, hear: &mut dyn FnMut(Received)) {
+    pub fn step_with_observer(&mut self, hear: &mut dyn FnMut(Received)) {
         let now = self.fleet.time();
         self.perform_due();
         let control = &mut self.control;
@@ -148,14 +148,14 @@ pub fn fly(
     swarm: &Swarm,
     watch: &mut dyn FnMut(&Flight, &Sample) -> ControlFlow<()>,
 ) -> Result<(Record, FlightReport), SceneError> {
-    fly_heard(swarm, &mut |_| {}, watch)
+    fly_with_observer(swarm, &mut |_| {}, watch)
 }
 
 /// As [`fly`]; `hear` receives what the control receives, before `watch` is called for the period.
 ///
 /// # Errors
 /// As [`Flight::new`].
-pub fn fly_heard(
+pub fn fly_with_observer(
     swarm: &Swarm,
     hear: &mut dyn FnMut(Received),
     watch: &mut dyn FnMut(&Flight, &Sample) -> ControlFlow<()>,
@@ -164,7 +164,7 @@ pub fn fly_heard(
     let mut record = Record::new(swarm, &flight);
     while flight.fleet.period() < flight.periods() {
         let before = flight.fleet.places();
-        flight.step_heard(hear);
+        flight.step_with_observer(hear);
         let sample = record.take(&flight, &before);
         if watch(&flight, &sample).is_break() {
             break;

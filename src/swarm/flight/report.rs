@@ -106,6 +106,34 @@ impl Verdict {
 }
 
 impl FlightReport {
+    /// What was measured, under its names; `number` writes lengths and times.
+    pub fn facts(&self, number: impl Fn(f64) -> String) -> Vec<(&'static str, String)> {
+        let pair = |[largest, last]: [f64; 2]| {
+            format!("largest {} m, at the end {} m", number(largest), number(last))
+        };
+        let within = number(self.settled_within);
+        let settled = match self.settling_time {
+            Some(time) => format!("{} s to within {within} m", number(time)),
+            None => format!("never within {within} m"),
+        };
+        let clearance = self.clearance.map(|clearance| {
+            let closest = self.closest.as_ref().map_or(String::new(), |moment| format!(": {moment}"));
+            format!("{} m{closest}", number(clearance))
+        });
+        let way = format!("mean {} m, longest {} m", number(self.way[0]), number(self.way[1]));
+        let from_continuum = self.continuum_error.map(|error| format!("largest {} m", number(error)));
+        let facts = [
+            ("From the leaders' affine motion", self.affine_error.map(pair)),
+            ("From where the rule comes to rest", self.formation_error.map(pair)),
+            ("From the continuum run", from_continuum),
+            ("Settling time", Some(settled)),
+            ("Smallest clearance", clearance),
+            ("Way", Some(way)),
+            ("Robots lost", (self.most_lost > 0).then(|| format!("{} at one time", self.most_lost))),
+        ];
+        facts.into_iter().filter_map(|(name, value)| Some((name, value?))).collect()
+    }
+
     /// The results of a flight that has ended.
     pub fn new(swarm: &Swarm, flight: &Flight, record: &Record) -> Self {
         let formation = flight.control().formation();

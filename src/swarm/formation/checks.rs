@@ -93,12 +93,12 @@ pub fn require_in_range(swarm: &Swarm, formation: &Formation) -> Result<(), Scen
 pub fn require_witnesses(swarm: &Swarm, formation: &Formation) -> Result<(), SceneError> {
     let Some(ranges) = &swarm.raw.ranges else { return Ok(()) };
     let others = formation.count().saturating_sub(1);
-    if ranges.max_liars < others {
+    if ranges.max_faulty < others {
         return Ok(());
     }
     let message = format!(
         "a pose is contradicted by more robots than this, and there are {others} that could measure it: no lie would ever be \
          found"
     );
-    Err(swarm.refuse("ranges.max_liars", message, "lower it, or leave ranges out"))
+    Err(swarm.refuse("ranges.max_faulty", message, "lower it, or leave ranges out"))
 }

@@ -8,7 +8,7 @@ use crate::flock::vectors::Vectors;
 
 /// A leader's motion, as in [`Lead`]; the motion itself stays in the swarm file.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
-pub enum KeptLead {
+pub enum LeadSnapshot {
     /// From outside: the place last given \[m\].
     External([f64; 2]),
     /// By the leader's own program.
@@ -19,7 +19,7 @@ pub enum KeptLead {
     /// With the other leaders.
     Manoeuvre {
         /// The motion that they fly.
-        manoeuvre: KeptManoeuvre,
+        manoeuvre: ManoeuvreSnapshot,
         /// Time from which on \[s\].
         since: f64,
     },
@@ -28,31 +28,31 @@ pub enum KeptLead {
 /// A [`Manoeuvre`] as it is written down: seconds, hold and posture of each leg; a posture is translation, turn,
 /// stretch and shear.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
-pub struct KeptManoeuvre {
+pub struct ManoeuvreSnapshot {
     about: [f64; 2],
-    from: KeptPosture,
-    legs: Vec<(f64, f64, KeptPosture)>,
+    from: PostureSnapshot,
+    legs: Vec<(f64, f64, PostureSnapshot)>,
 }
 
-type KeptPosture = ([f64; 2], f64, [f64; 2], [f64; 2]);
+type PostureSnapshot = ([f64; 2], f64, [f64; 2], [f64; 2]);
 
-fn kept_posture(posture: &Posture) -> KeptPosture {
+fn kept_posture(posture: &Posture) -> PostureSnapshot {
     (posture.translate, posture.rotate, posture.stretch, posture.shear)
 }
 
-fn posture((translate, rotate, stretch, shear): KeptPosture) -> Posture {
+fn posture((translate, rotate, stretch, shear): PostureSnapshot) -> Posture {
     Posture { translate, rotate, stretch, shear }
 }
 
-impl From<&Manoeuvre> for KeptManoeuvre {
+impl From<&Manoeuvre> for ManoeuvreSnapshot {
     fn from(manoeuvre: &Manoeuvre) -> Self {
         let legs = manoeuvre.legs.iter().map(|leg| (leg.seconds, leg.hold, kept_posture(&leg.posture)));
         Self { about: manoeuvre.about, from: kept_posture(&manoeuvre.from), legs: legs.collect() }
     }
 }
 
-impl From<KeptManoeuvre> for Manoeuvre {
-    fn from(kept: KeptManoeuvre) -> Self {
+impl From<ManoeuvreSnapshot> for Manoeuvre {
+    fn from(kept: ManoeuvreSnapshot) -> Self {
         let leg = |(seconds, hold, kept)| Leg { seconds, hold, posture: posture(kept) };
         let legs = kept.legs.into_iter().map(leg).collect();
         Self { about: kept.about, from: posture(kept.from), legs }
@@ -61,26 +61,28 @@ impl From<KeptManoeuvre> for Manoeuvre {
 
 impl Formation {
     /// By member.
-    pub fn kept_leads(&self) -> Vec<Option<KeptLead>> {
+    pub fn kept_leads(&self) -> Vec<Option<LeadSnapshot>> {
         let kept = |lead: &Lead| match lead {
-            Lead::External(place) => KeptLead::External(*place),
-            Lead::Motion { since, .. } => KeptLead::Motion { since: *since },
+            Lead::External(place) => LeadSnapshot::External(*place),
+            Lead::Motion { since, .. } => LeadSnapshot::Motion { since: *since },
             Lead::Manoeuvre { manoeuvre, since } => {
-                KeptLead::Manoeuvre { manoeuvre: manoeuvre.into(), since: *since }
+                LeadSnapshot::Manoeuvre { manoeuvre: manoeuvre.into(), since: *since }
             }
         };
         self.leads.iter().map(|lead| lead.as_ref().map(kept)).collect()
     }
 
     /// Continues from kept motions after `periods` periods. A motion that does not fit the file is ignored.
-    pub fn restore(&mut self, leads: Vec<Option<KeptLead>>, periods: u64) {
+    pub fn restore(&mut self, leads: Vec<Option<LeadSnapshot>>, periods: u64) {
         for (lead, kept) in self.leads.iter_mut().zip(leads) {
             match (lead, kept) {
-                (Some(lead), Some(KeptLead::Manoeuvre { manoeuvre, since })) => {
+                (Some(lead), Some(LeadSnapshot::Manoeuvre { manoeuvre, since })) => {
                     *lead = Lead::Manoeuvre { manoeuvre: manoeuvre.into(), since };
                 }
-                (Some(Lead::External(place)), Some(KeptLead::External(kept))) => *place = kept,
-                (Some(Lead::Motion { since, .. }), Some(KeptLead::Motion { since: kept })) => *since = kept,
+                (Some(Lead::External(place)), Some(LeadSnapshot::External(kept))) => *place = kept,
+                (Some(Lead::Motion { since, .. }), Some(LeadSnapshot::Motion { since: kept })) => {
+                    *since = kept
+                }
                 _ => {}
             }
         }

@@ -25,7 +25,7 @@ use crate::flock::vectors::{Vectors, distance};
 use crate::scene::swarm::NamedManoeuvre;
 use crate::swarm::resilience::{Trim, supported};
 use crate::sweep::Order;
-pub use kept::KeptLead;
+pub use kept::LeadSnapshot;
 use settling::Settling;
 
 /// Members are named by their number, from 0; positions in \[m\], world frame.

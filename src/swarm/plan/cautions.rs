@@ -81,9 +81,9 @@ fn unmeasured(raw: &RawSwarm, formation: &Formation) -> Option<String> {
         let apart = |other: &usize| distance(formation.places.get(m), formation.places.get(*other));
         (0..formation.count()).filter(|other| *other != m && apart(other) <= ranges.reach).count()
     };
-    let names = formation.named(|m| near(m) <= ranges.max_liars)?;
+    let names = formation.named(|m| near(m) <= ranges.max_faulty)?;
     Some(format!(
-        "no more than ranges.max_liars robots are within ranges.reach of {names}: lies of these robots are never found; \
+        "no more than ranges.max_faulty robots are within ranges.reach of {names}: lies of these robots are never found; \
          lower the one or raise the other"
     ))
 }

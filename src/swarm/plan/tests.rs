@@ -49,9 +49,9 @@ fn what_the_file_cannot_hold_is_warned_of() {
     assert!(!jittery.to_string().contains("no robot will get a target"), "{jittery}");
 }
 
-/// The formation of `liar` in which every robot believes every other and none lies, led at 1 m/s.
+/// The formation of `faulty-robot` in which every robot believes every other and none lies, led at 1 m/s.
 fn steadily_led(delay: u32) -> Swarm {
-    let text = bundled_swarm("liar").expect("bundled").text;
+    let text = bundled_swarm("faulty-robot").expect("bundled").text;
     let text = text.replace("[resilience]\nmax_faulty_neighbours = 1\n", "");
     let path = "leaders[0].program={ kind = \"path\", points = [{ at = 40.0, displacement = [40.0, 0.0] }] }";
     let delay = format!("flight.delay={delay}");
@@ -83,7 +83,7 @@ fn nothing_is_predicted_of_a_loop_that_is_not_linear_and_the_plan_says_why() {
         assert_eq!(numbers, (None, None, None, None), "{plan}");
         plan.not_predicted.expect("a reason")
     };
-    let liar = plan("liar", &[]);
+    let liar = plan("faulty-robot", &[]);
     assert!(reason(&liar).contains("straying"), "{liar}");
     assert!(liar.to_string().contains("straying"), "{liar}");
     let present = "title = \"two\"\nlinks = { kind = \"present\", radius = 3.0 }\nleaders = [\

@@ -31,7 +31,7 @@ pub struct RangeLimits {
     /// Difference between a range and the distance of two poses of its time that is no contradiction \[m\].
     pub tolerance: f64,
     /// Most members that lie, about places or ranges \[1\]: a pose that more contradict is rejected.
-    pub max_liars: usize,
+    pub max_faulty: usize,
 }
 
 /// What one member has measured of another lately.
@@ -108,7 +108,7 @@ impl Watch {
     }
 
     fn contradicted(&self, member: usize, pose: &Pose) -> Result<(), Rejection> {
-        let Some(RangeLimits { tolerance, max_liars }) = self.limits.ranges else { return Ok(()) };
+        let Some(RangeLimits { tolerance, max_faulty }) = self.limits.ranges else { return Ok(()) };
         let (mut measured, mut against) = (0, 0);
         for one in &self.ranges[member] {
             let Some(present) = self.pose(one.observer) else { continue };
@@ -127,8 +127,8 @@ impl Watch {
                 against += 1;
             }
         }
-        if against > max_liars {
-            return Err(Rejection::Contradicted { against, measured, max_liars });
+        if against > max_faulty {
+            return Err(Rejection::Contradicted { against, measured, max_faulty });
         }
         Ok(())
     }
@@ -151,7 +151,7 @@ mod tests {
     const PLACES: [[f64; 2]; 5] = [[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0], [2.0, 2.0]];
 
     fn watch() -> Watch {
-        let ranges = Some(RangeLimits { tolerance: 0.2, max_liars: 1 });
+        let ranges = Some(RangeLimits { tolerance: 0.2, max_faulty: 1 });
         Watch::new(5, WatchLimits { ranges, jump_speed: 1.0, recover: 1, ..WatchLimits::default() })
     }
 
@@ -200,7 +200,7 @@ mod tests {
                 0.35.. => assert!(
                     matches!(
                         verdicts[4],
-                        Err(Rejection::Contradicted { against: 4, measured: 4, max_liars: 1 })
+                        Err(Rejection::Contradicted { against: 4, measured: 4, max_faulty: 1 })
                     ),
                     "{now}: {:?}",
                     verdicts[4]
@@ -228,7 +228,7 @@ mod tests {
             watch.receive(1, pose([0.1, 3.9], now), now)
         };
         assert_eq!(mirrored(&mut watch, 0.0, &[]), Ok(()));
-        watch.limits.ranges = Some(RangeLimits { tolerance: 0.2, max_liars: 0 });
+        watch.limits.ranges = Some(RangeLimits { tolerance: 0.2, max_faulty: 0 });
         assert!(matches!(
             mirrored(&mut watch, 0.1, &[3]),
             Err(Rejection::Contradicted { against: 1, measured: 4, .. })

@@ -69,7 +69,7 @@ pub enum Rejection {
     /// More members measured it elsewhere than may lie.
     #[error(
         "a pose is contradicted by the ranges of {against} of the {measured} robots that measured this one, at most \
-         {max_liars} may be wrong: look after its localisation"
+         {max_faulty} may be wrong: look after its localisation"
     )]
     Contradicted {
         /// Members whose ranges disagree with the pose.
@@ -77,7 +77,7 @@ pub enum Rejection {
         /// Members that have measured.
         measured: usize,
         /// How many may disagree.
-        max_liars: usize,
+        max_faulty: usize,
     },
     /// A good pose of a member that was stopped.
     #[error("a pose of a stopped member: {seen} of the {recover} good ones in a row that it needs to go on")]

@@ -217,7 +217,7 @@ pub(super) mod defaults {
     pub fn range_tolerance() -> f64 {
         0.5
     }
-    pub fn max_liars() -> usize {
+    pub fn max_faulty() -> usize {
         1
     }
     pub fn frame_id() -> String {

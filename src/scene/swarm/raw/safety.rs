@@ -112,8 +112,8 @@ pub struct RawRanges {
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub tolerance: f64,
     /// Most robots that lie, about their places or about ranges [1]: one more has to contradict a pose.
-    #[serde(default = "defaults::max_liars")]
-    pub max_liars: usize,
+    #[serde(default = "defaults::max_faulty")]
+    pub max_faulty: usize,
 }
 
 /// W-MSR: each robot leaves the neighbours out that stray farthest from its own displacement.

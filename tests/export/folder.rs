@@ -1,7 +1,5 @@
 //! Whose files an output folder holds, and what becomes of them: `--force` removes what flockform wrote and nothing else.
 
-#![cfg(feature = "export")]
-
 use std::fs;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -10,14 +8,8 @@ use flockform::continuum::record::{ProbeSeries, Snapshot};
 use flockform::continuum::run::run;
 use flockform::export::{Drawing, ExportError, OutputFolder, Results, Timings, VtkSeries, write_all};
 
-use folders::{names_in, temporary};
-use scenes::{load, planned};
-
-#[path = "common/folders.rs"]
-mod folders;
-
-#[path = "common/scenes.rs"]
-mod scenes;
+use crate::folders::{names_in, temporary};
+use crate::scenes::{load, planned};
 
 /// The list of what flockform wrote.
 const LIST: &str = "flockform-files.txt";

@@ -1,15 +1,10 @@
 //! The finite elements against closed-form elasticity: errors, and the rates at which they fall.
 
-#![cfg(feature = "fem")]
-
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 
 use flockform::fem::{Axis, CellKind, Material, Mesh, Plane, Problem, Solution, solve};
 
-use reference::beam_rows;
-
-#[path = "common/reference.rs"]
-mod reference;
+use crate::reference::beam_rows;
 
 /// Observed order between two meshes, the second with cells half as wide.
 fn rate(coarse: f64, fine: f64) -> f64 {

@@ -1,7 +1,5 @@
 //! What a run leaves behind: the folder, the tables, the frames and the figures.
 
-#![cfg(feature = "export")]
-
 use std::fs;
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -18,18 +16,9 @@ use flockform::scene::Scene;
 use resvg::tiny_skia::Pixmap;
 use resvg::usvg::roxmltree::{Document, Node};
 
-use folders::{names_in, temporary};
-use json::json;
-use scenes::{load, planned};
-
-#[path = "common/folders.rs"]
-mod folders;
-
-#[path = "common/json.rs"]
-mod json;
-
-#[path = "common/scenes.rs"]
-mod scenes;
+use crate::folders::{names_in, temporary};
+use crate::json::json;
+use crate::scenes::{load, planned};
 
 /// A finished run with what was kept of it.
 struct Run {

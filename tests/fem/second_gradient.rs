@@ -10,10 +10,7 @@ use flockform::engine::Engine;
 use flockform::material::report::Effect;
 use flockform::scene::Scene;
 
-use scenes::{load, planned, try_load};
-
-#[path = "common/scenes.rs"]
-mod scenes;
+use crate::scenes::{load, planned, try_load};
 
 fn scene(overrides: &[&str]) -> Scene {
     load("gradient-layer", overrides)

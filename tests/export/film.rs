@@ -1,21 +1,12 @@
 //! Films: what a frame shows is what the run's own table says, and nothing half-made is left.
 
-#![cfg(feature = "cli")]
-
-#[path = "common/command.rs"]
-mod command;
-#[path = "common/folders.rs"]
-mod folders;
-#[path = "common/signals.rs"]
-mod signals;
-
 use std::fs::File;
 use std::path::Path;
 use std::process::Stdio;
 use std::time::{Duration, Instant};
 
-use command::{command, flockform, text};
-use folders::{names_in, temporary};
+use crate::command::{command, flockform, text};
+use crate::folders::{names_in, temporary};
 
 const STEPS: usize = 26;
 /// Of the leaders at the end \[length\].
@@ -279,7 +270,7 @@ fn an_interrupt_leaves_no_half_film_and_whole_results() {
         assert!(child.try_wait().expect("a child").is_none(), "it ended by itself");
         std::thread::sleep(Duration::from_millis(2));
     }
-    signals::signal("INT", child.id());
+    crate::signals::signal("INT", child.id());
     let output = child.wait_with_output().expect("it ends");
     assert_eq!(output.status.code(), Some(1), "{}", text(&output.stderr));
     assert!(text(&output.stderr).contains("there is no film"), "{}", text(&output.stderr));

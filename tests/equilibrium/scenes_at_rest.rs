@@ -12,10 +12,7 @@ use flockform::flock::vectors::distance;
 use flockform::scene::Scene;
 use flockform::solve::equilibrium::Precision;
 
-use scenes::{load, planned, try_load};
-
-#[path = "common/scenes.rs"]
-mod scenes;
+use crate::scenes::{load, planned, try_load};
 
 fn ended(scene: &Scene) -> Outcome {
     run_to_equilibrium(scene, planned(scene), &mut |_, _| ControlFlow::Continue(()))

@@ -17,10 +17,7 @@ use flockform::scene::Scene;
 use flockform::scene::bundled::SCENES;
 use proptest::prelude::*;
 
-use scenes::{load, planned};
-
-#[path = "common/scenes.rs"]
-mod scenes;
+use crate::scenes::{load, planned};
 
 const LATTICES: [&str; 6] = [
     "lattice-square",

@@ -6,10 +6,7 @@ use flockform::continuum::record::ProbeSeries;
 use flockform::continuum::run::run;
 use flockform::engine::Engine;
 
-use scenes::{load, planned};
-
-#[path = "common/scenes.rs"]
-mod scenes;
+use crate::scenes::{load, planned};
 
 /// What the oracle says of one frame rule.
 struct Oracle {

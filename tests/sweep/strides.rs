@@ -8,10 +8,7 @@ use flockform::engine::Engine;
 use flockform::engine::observer::Observer;
 use flockform::scene::Scene;
 
-use scenes::{load, planned};
-
-#[path = "common/scenes.rs"]
-mod scenes;
+use crate::scenes::{load, planned};
 
 /// Looks at the steps that a function names, and remembers them.
 struct Looks<'a> {

@@ -1,8 +1,6 @@
 //! Shapes solved on meshes of their own, against closed forms and published values; and whether the error that a
 //! solution states is the error that it has.
 
-#![cfg(feature = "fem")]
-
 use flockform::fem::{
     Effort, FemError, Holding, Material, Orthotropic, Plane, PlaneRegion, ShapeProblem, ShapeSolution,
     Strain, Support, solve_shape,

@@ -9,10 +9,7 @@ use flockform::flock::role::Role;
 use flockform::flock::rules::{Feedback, FeedbackReference, Rule};
 use flockform::solve::spectrum::{SpectralRadius, spectral_radius};
 
-use scenes::{load, planned};
-
-#[path = "common/scenes.rs"]
-mod scenes;
+use crate::scenes::{load, planned};
 
 fn plan(name: &str, overrides: &[&str]) -> Plan {
     planned(&load(name, overrides))
